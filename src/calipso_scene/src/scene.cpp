@@ -1,0 +1,147 @@
+#include "calipso_scene/scene.hpp"
+
+#include <filesystem>
+#include <set>
+#include <stdexcept>
+
+#include "yaml_reading.hpp"
+
+namespace calipso {
+
+namespace {
+
+std::string existing(const std::string& path) {
+  return std::filesystem::exists(path) ? path : std::string();
+}
+
+Camera readCamera(const YAML::Node& root, const YamlReader& reader) {
+  Camera camera;
+  camera.width = reader.integer(root, "width");
+  camera.height = reader.integer(root, "height");
+  camera.fx = reader.number(root, "fx");
+  camera.fy = reader.number(root, "fy");
+  camera.cx = reader.number(root, "cx");
+  camera.cy = reader.number(root, "cy");
+  if (camera.width <= 0) reader.fail("width", "must be > 0 px");
+  if (camera.height <= 0) reader.fail("height", "must be > 0 px");
+  if (camera.fx <= 0.0) reader.fail("fx", "must be > 0 px");
+  if (camera.fy <= 0.0) reader.fail("fy", "must be > 0 px");
+  if (root["distortion"] && !reader.vector(root, "distortion", 5).isZero()) {
+    reader.fail("distortion", "is not zero; undistort the images first (image_proc)");
+  }
+  camera.world_from_camera = reader.pose(root, "world_T_camera");
+  return camera;
+}
+
+std::vector<Eigen::Isometry3d> readCameraPath(const YAML::Node& root, const YamlReader& reader) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const auto& entry : root["world_T_camera_per_frame"]) {
+    YAML::Node wrapped;
+    wrapped["world_T_camera_per_frame"] = YAML::Node(entry);
+    poses.push_back(reader.pose(wrapped, "world_T_camera_per_frame"));
+  }
+  return poses;
+}
+
+void readSupport(const YAML::Node& root, const YamlReader& reader, Scene& scene) {
+  for (const auto& entry : root["support"]) {
+    if (entry["mesh"]) {
+      scene.support_meshes.push_back(scene.directory + "/" + reader.text(entry, "mesh"));
+      continue;
+    }
+    const Eigen::VectorXd plane = reader.vector(entry, "plane", 4);
+    const double length = plane.head<3>().norm();
+    if (length < 1e-9) reader.fail("support.plane", "has a zero normal; give [nx, ny, nz, d]");
+    SupportPlane support;
+    support.name = reader.text(entry, "name", "support plane");
+    support.normal = plane.head<3>() / length;
+    support.offset = plane[3] / length;
+    if (entry["x_range"]) support.x_range = reader.vector(entry, "x_range", 2);
+    scene.planes.push_back(support);
+  }
+}
+
+std::vector<AttachmentBox> readAttachments(const YAML::Node& boxes, const YamlReader& reader) {
+  std::vector<AttachmentBox> attachments;
+  for (const auto& box : boxes) {
+    attachments.push_back({reader.text(box, "name", "attachment"), reader.vector(box, "box_min", 3),
+                           reader.vector(box, "box_max", 3)});
+  }
+  return attachments;
+}
+
+SceneObject readObject(const YAML::Node& node, const YAML::Node& root, const std::string& file,
+                       const std::string& directory) {
+  SceneObject object;
+  object.name = YamlReader(file, "objects").text(node, "name");
+  const YamlReader reader(file, "object '" + object.name + "'");
+  object.index = reader.integer(node, "index");
+  if (object.index < 1 || object.index > 254) {
+    reader.fail("index", "is " + std::to_string(object.index) + "; it must be in 1..254");
+  }
+  object.cad_path = directory + "/" + reader.text(node, "cad");
+  object.initial_world_from_object = reader.pose(node, "initial_world_T_object");
+  object.rect = reader.vector(node, "rect_xywh", 4).cast<int>();
+  if (object.rect[2] <= 0 || object.rect[3] <= 0) {
+    reader.fail("rect_xywh", "has no area; draw a rectangle around the object");
+  }
+  const YAML::Node hints = root["attachment_hints"];
+  if (hints && hints.IsMap() && hints[object.name]) {
+    object.attachments = readAttachments(hints[object.name], reader);
+  }
+  return object;
+}
+
+void readObjects(const YAML::Node& root, const std::string& file, Scene& scene) {
+  const YamlReader reader(file, "");
+  std::set<std::string> names;
+  std::set<int> indices;
+  for (const auto& node : root["objects"]) {
+    scene.objects.push_back(readObject(node, root, file, scene.directory));
+    const SceneObject& object = scene.objects.back();
+    if (!names.insert(object.name).second) {
+      reader.fail("objects", "has '" + object.name + "' twice; give each object its own name");
+    }
+    if (!indices.insert(object.index).second) {
+      reader.fail("objects", "has index " + std::to_string(object.index) +
+                                 " twice; give each object its own index");
+    }
+  }
+  if (scene.objects.empty()) reader.fail("objects", "is empty; list at least one object");
+}
+
+}  // namespace
+
+const SceneObject& Scene::object(const std::string& wanted) const {
+  std::string known;
+  for (const auto& candidate : objects) {
+    if (candidate.name == wanted) return candidate;
+    known += (known.empty() ? "" : ", ") + candidate.name;
+  }
+  throw std::invalid_argument("object '" + wanted + "' is not in scene '" + name +
+                              "'; it has: " + known);
+}
+
+Scene loadScene(const std::string& directory) {
+  const std::string file = directory + "/scene.yaml";
+  const YAML::Node root = YamlReader::load(file);
+  const YamlReader reader(file, "");
+  Scene scene;
+  scene.directory = directory;
+  scene.name = reader.text(root, "name");
+  scene.fps = reader.number(root, "fps");
+  if (scene.fps <= 0.0) reader.fail("fps", "must be > 0 Hz");
+  scene.frame_count = reader.integer(root, "n_frames");
+  scene.frame_pattern = reader.text(root, "frames", "frames/%06d.jpg");
+  scene.camera = readCamera(root, reader);
+  scene.world_from_camera_per_frame = readCameraPath(root, reader);
+  if (root["gravity"]) scene.gravity = reader.vector(root, "gravity", 3);
+  readSupport(root, reader, scene);
+  scene.strokes_path = existing(directory + "/strokes.png");
+  scene.depth_path = existing(directory + "/depth/000000.png");
+  if (!scene.depth_path.empty()) scene.depth_scale = reader.number(root, "depth_scale_m");
+  readObjects(root, file, scene);
+  return scene;
+}
+
+}  // namespace calipso

@@ -1,0 +1,92 @@
+#include "calipso_scene/scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace calipso {
+namespace {
+
+const std::string kHead =
+    "name: desk\nfps: 30\nn_frames: 2\nwidth: 64\nheight: 36\nfx: 76\nfy: 76\ncx: 31.5\ncy: 17.5\n";
+const std::string kPose =
+    "world_T_camera: [[1, 0, 0, 0], [0, 0, 1, -2], [0, -1, 0, 1], [0, 0, 0, 1]]\n";
+const std::string kObject =
+    "objects:\n- {name: ball, index: 1, cad: cad/ball.obj, rect_xywh: [3, 4, 20, 10],\n"
+    "   initial_world_T_object: [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]]}\n";
+
+std::string writeScene(const std::string& yaml) {
+  const std::string directory = testing::TempDir() + "scene";
+  std::filesystem::create_directories(directory);
+  std::ofstream(directory + "/scene.yaml") << yaml;
+  return directory;
+}
+
+std::string errorOf(const std::string& yaml) {
+  try {
+    loadScene(writeScene(yaml));
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Scene, readsWhatAUserGives) {
+  const Scene scene = loadScene(writeScene(
+      kHead + kPose + kObject + "support:\n- {plane: [0, 0, 2, 1], name: table}\n" +
+      "attachment_hints:\n  ball:\n  - {name: peg, box_min: [0, 0, 0], box_max: [1, 1, 1]}\n"));
+  EXPECT_EQ(scene.name, "desk");
+  EXPECT_EQ(scene.frame_pattern, "frames/%06d.jpg");
+  ASSERT_EQ(scene.planes.size(), 1u);
+  EXPECT_DOUBLE_EQ(scene.planes[0].offset, 0.5);  // normalised with the normal
+  const SceneObject& ball = scene.object("ball");
+  EXPECT_EQ(ball.initial_world_from_object.translation(), Eigen::Vector3d(5, 6, 7));
+  ASSERT_EQ(ball.attachments.size(), 1u);
+  EXPECT_TRUE(scene.depth_path.empty());
+}
+
+TEST(Scene, aPointAheadProjectsToThePrincipalPoint) {
+  const Camera camera = loadScene(writeScene(kHead + kPose + kObject)).camera;
+  EXPECT_TRUE(camera.projectWorld({0, 3, 1}).isApprox(Eigen::Vector2d(31.5, 17.5), 1e-12));
+}
+
+TEST(Camera, projectJacobianMatchesFiniteDifferences) {
+  Camera camera;
+  camera.fx = 700;
+  camera.fy = 650;
+  const Eigen::Vector3d p(0.2, -0.1, 1.3);
+  const auto J = camera.projectJacobian(p);
+  constexpr double kStep = 1e-6;  // truncation ~ step^2 * f / z^3
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d d = kStep * Eigen::Vector3d::Unit(i);
+    const Eigen::Vector2d slope = (camera.project(p + d) - camera.project(p - d)) / (2 * kStep);
+    EXPECT_TRUE(slope.isApprox(J.col(i), 1e-6) || (slope - J.col(i)).norm() < 1e-5);
+  }
+}
+
+TEST(Scene, badInputNamesKeyAndRemedy) {
+  const auto expect = [](const std::string& yaml, const std::string& part) {
+    EXPECT_NE(errorOf(yaml).find(part), std::string::npos) << errorOf(yaml);
+  };
+  expect("name: desk\n" + kPose + kObject, "fps is missing");
+  expect(kHead + kObject, "world_T_camera is missing");
+  expect(kHead + kPose, "objects is empty");
+  expect(kHead + kPose + kObject + "distortion: [0.1, 0, 0, 0, 0]\n", "undistort");
+  expect(kHead + "world_T_camera: [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n",
+         "not a rigid transform");
+  EXPECT_THROW(loadScene("/nowhere"), std::runtime_error);
+}
+
+TEST(Scene, unknownObjectNamesTheKnownOnes) {
+  const Scene scene = loadScene(writeScene(kHead + kPose + kObject));
+  try {
+    scene.object("cube");
+    FAIL() << "no error";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("it has: ball"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace calipso
