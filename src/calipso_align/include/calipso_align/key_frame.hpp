@@ -1,0 +1,33 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_align/contour.hpp"
+#include "calipso_align/segmentation.hpp"
+#include "calipso_scene/scene.hpp"
+
+namespace calipso::align {
+
+// What is found in the key frame.
+struct KeyFrame {
+  cv::Mat labels;                       // CV_8U: 0 none, else the object's index
+  std::vector<ObjectContour> contours;  // in the scene's order of objects
+  double segmentation_ms = 0.0;         // wall time
+  double contour_ms = 0.0;
+};
+
+// The scene's objects as the segmenter wants them.
+std::vector<SegmentationTarget> segmentationTargets(const Scene& scene);
+
+// The scene's strokes (CV_8U), empty when it has none. @throw std::runtime_error naming the file
+cv::Mat loadStrokes(const Scene& scene);
+
+// Segments frame 0 (CV_8UC3, BGR) of a scene from what its user gave: rectangles and strokes.
+// @throw std::invalid_argument naming object, value and remedy
+KeyFrame segmentKeyFrame(const cv::Mat& image, const Scene& scene);
+
+// The same, reading the frame from the scene's folder.
+KeyFrame segmentKeyFrame(const Scene& scene);
+
+}  // namespace calipso::align

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace calipso::align {
+
+// How reluctantly labels change between neighbouring pixels.
+struct SmoothnessParams {
+  float gamma = 8.0f;        // cost of an edge between equal colours, nats
+  float floor = 0.02f;       // share of gamma that even the strongest image edge still costs
+};
+
+// Gives every pixel that is free its cheapest label (Boykov, Veksler and Zabih 2001):
+//
+//   E(L) = sum_p costs[L_p](p) + sum_{pq} w_pq [L_p != L_q]
+//   w_pq = gamma / |p - q| * (floor + (1 - floor) exp(-|I_p - I_q|^2 / (2 <|I_p - I_q|^2>)))
+//
+// over the 8-neighbourhood, by expansion moves; with one object the result is the global optimum.
+// labels  CV_8U, in: start and fixed surroundings; out: result
+// free    CV_8U, non-zero where labels may change
+// costs   CV_32F per label, 0 = background; a label whose cost is >= kForbidden is not taken
+// image   CV_8UC3; all of one size.
+// Deterministic. The pixels outside `free` act through their edges.
+constexpr float kForbidden = 1e6f;
+void cutLabels(const cv::Mat& image, const cv::Mat& free, const std::vector<cv::Mat>& costs,
+               const SmoothnessParams& params, cv::Mat& labels);
+
+}  // namespace calipso::align

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_scene/camera.hpp"
+#include "calipso_scene/triangle_mesh.hpp"
+
+namespace calipso::align {
+
+using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;   // #P x 3, m
+using Triangles = Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>;  // #F x 3
+
+// The edges of a mesh and the faces on both sides of each. Any triangle soup is accepted: an edge
+// may border one face or many.
+class MeshTopology {
+ public:
+  struct Edge {
+    int v0, v1;
+    std::vector<int> faces;
+  };
+
+  explicit MeshTopology(const Triangles& triangles);
+
+  const Triangles& triangles() const { return triangles_; }
+  const std::vector<Edge>& edges() const { return edges_; }
+
+ private:
+  Triangles triangles_;
+  std::vector<Edge> edges_;
+};
+
+// A depth image of the part of the picture that a mesh covers.
+struct DepthRendering {
+  cv::Rect roi;      // part of the picture, px; empty when nothing is visible
+  cv::Mat1f depth;   // roi.size(), m along the optical axis; 0: the mesh is not seen there
+
+  // Depth at pixel (u, v) of the picture, 0 outside.
+  float at(int u, int v) const {
+    return roi.contains({u, v}) ? depth(v - roi.y, u - roi.x) : 0.0f;
+  }
+};
+
+// Renders with a depth buffer. `x` holds the vertices in the camera frame. Triangles that reach
+// behind the camera are left out.
+DepthRendering renderDepth(const Points& x, const Triangles& triangles, const Camera& camera);
+
+// 255 where the rendering covers the pixel; the whole picture.
+cv::Mat1b maskOf(const DepthRendering& rendering, const Camera& camera);
+
+// A point of the visible outline: on the edge v0-v1, where it projects to, and which way is out.
+struct OutlinePoint {
+  int v0, v1;
+  double a0, a1;              // barycentric weights on the edge
+  Eigen::Vector3d position;   // camera frame, m
+  Eigen::Vector2d pixel;      // px
+  Eigen::Vector2d normal;     // unit, from the object outwards
+};
+
+// The occluding contour that borders the rendered mask, holes included: samples every `step_px` of
+// the edges between a front and a back face (or at a rim) that lie within 2 px of the mask's boundary.
+// Parts outside the picture are left out: they bear no boundary.
+std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& topology,
+                                           const DepthRendering& rendering, const Camera& camera,
+                                           double step_px);
+
+// Unit normals of the faces, zero for degenerate ones.
+Points faceNormals(const Points& x, const Triangles& triangles);
+
+}  // namespace calipso::align
