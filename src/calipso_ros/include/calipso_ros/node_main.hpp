@@ -1,0 +1,38 @@
+#pragma once
+
+#include <ros/ros.h>
+
+#include <exception>
+#include <stdexcept>
+#include <string>
+
+namespace calipso {
+
+// A parameter without which the node cannot run.
+// @throw std::invalid_argument naming the parameter
+template <typename T>
+T requiredParam(const ros::NodeHandle& pnh, const std::string& name) {
+  T value;
+  if (!pnh.getParam(name, value)) {
+    throw std::invalid_argument("parameter " + pnh.resolveName(name) + " is missing; set it");
+  }
+  return value;
+}
+
+// The main() of every node: init, construct Node(nh, pnh), spin. Returns 1 if construction throws.
+template <typename Node>
+int runNode(int argc, char** argv, const std::string& name) {
+  ros::init(argc, argv, name);
+  ros::NodeHandle nh;
+  ros::NodeHandle pnh("~");
+  try {
+    Node node(nh, pnh);
+    ros::spin();
+    return 0;
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM(name << ": " << error.what());
+    return 1;
+  }
+}
+
+}  // namespace calipso

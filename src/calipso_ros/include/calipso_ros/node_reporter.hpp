@@ -1,0 +1,46 @@
+#pragma once
+
+#include <calipso_msgs/NodeStatus.h>
+#include <ros/ros.h>
+
+#include <cstdint>
+#include <string>
+
+namespace calipso {
+
+// Says how a node fares: its latched status, the time each frame took, and diagnostics.
+// Not thread-safe: call from the node's callback thread.
+class NodeReporter {
+ public:
+  // node: the name the player and the summary know it by (calipso_msgs/NodeStatus).
+  NodeReporter(ros::NodeHandle& nh, const std::string& node);
+
+  void starting(const std::string& message);
+  void preparing(const std::string& message);
+  void ready(const std::string& message);
+  void failed(const std::string& message);
+
+  // One more frame of the clip has been taken in; lets the player send another.
+  void clipFrameDone();
+
+  // One more edit has come in, accepted or not; lets the player send the frame after it.
+  void editReceived();
+
+  void timing(const ros::Time& stamp, double ms);
+
+  // Something went wrong with the frame of this stamp: logged, and published as a diagnostic.
+  void warn(const ros::Time& stamp, const std::string& message);
+
+  std::uint8_t state() const { return status_.state; }
+
+ private:
+  void publish(std::uint8_t state, const std::string& message);
+  void publishDiagnostic(const ros::Time& stamp, std::int8_t level, const std::string& message);
+
+  ros::Publisher status_publisher_;
+  ros::Publisher timing_publisher_;
+  ros::Publisher diagnostics_publisher_;
+  calipso_msgs::NodeStatus status_;
+};
+
+}  // namespace calipso

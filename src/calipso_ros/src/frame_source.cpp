@@ -1,0 +1,63 @@
+#include "calipso_ros/frame_source.hpp"
+
+#include <limits>
+#include <stdexcept>
+
+#include "calipso_ros/conversions.hpp"
+#include "calipso_ros/topics.hpp"
+
+namespace calipso {
+
+namespace {
+
+constexpr double kKeepSec = 1e6;         // longer than any clip
+constexpr double kPoseTimeoutSec = 1.0;  // tf and image travel on different connections
+constexpr unsigned kUnboundedPairs = 100000;
+
+unsigned pairQueue(unsigned queue) { return queue == 0 ? kUnboundedPairs : queue; }
+
+}  // namespace
+
+CameraPoses::CameraPoses() : buffer_(ros::Duration(kKeepSec)), listener_(buffer_) {}
+
+Eigen::Isometry3d CameraPoses::worldFromCamera(const std::string& camera_frame,
+                                               const ros::Time& stamp) const {
+  try {
+    return fromMsg(buffer_
+                       .lookupTransform(topics::kWorldFrame, camera_frame, stamp,
+                                        ros::Duration(kPoseTimeoutSec))
+                       .transform);
+  } catch (const tf2::TransformException& error) {
+    throw std::runtime_error(std::string("tf has no pose of '") + camera_frame + "' in '" +
+                             topics::kWorldFrame + "' at " + std::to_string(stamp.toSec()) +
+                             " s (" + error.what() +
+                             "); publish it, or run camera_pose_node with the scene");
+  }
+}
+
+FrameSource::FrameSource(ros::NodeHandle& nh, const std::string& image_topic,
+                         const std::string& info_topic, unsigned queue, const CameraPoses& poses,
+                         OnFrame on_frame, OnBadFrame on_bad_frame)
+    : poses_(poses),
+      on_frame_(std::move(on_frame)),
+      on_bad_frame_(std::move(on_bad_frame)),
+      image_(nh, image_topic, queue),
+      info_(nh, info_topic, queue),
+      pairs_(image_, info_, pairQueue(queue)) {
+  pairs_.registerCallback(&FrameSource::onPair, this);
+}
+
+void FrameSource::onPair(const sensor_msgs::ImageConstPtr& image,
+                         const sensor_msgs::CameraInfoConstPtr& info) {
+  Frame frame;
+  try {
+    frame = {image, info,
+             fromMsg(*info, poses_.worldFromCamera(image->header.frame_id, image->header.stamp))};
+  } catch (const std::exception& error) {
+    on_bad_frame_(image, error.what());
+    return;
+  }
+  on_frame_(frame);
+}
+
+}  // namespace calipso

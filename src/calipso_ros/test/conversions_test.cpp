@@ -1,0 +1,112 @@
+#include "calipso_ros/conversions.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace calipso {
+namespace {
+
+Eigen::Isometry3d somePose() {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  pose.translation() = Eigen::Vector3d(4, 5, 6);
+  return pose;
+}
+
+TEST(Conversions, posesRoundTrip) {
+  constexpr double kRoundOff = 1e-14;  // matrix -> quaternion -> matrix
+  EXPECT_TRUE(fromMsg(toMsg(somePose())).isApprox(somePose(), kRoundOff));
+  EXPECT_TRUE(fromMsg(toTransformMsg(somePose())).isApprox(somePose(), kRoundOff));
+}
+
+TEST(Conversions, aZeroQuaternionIsRefused) {
+  EXPECT_THROW(fromMsg(geometry_msgs::Pose()), std::invalid_argument);
+}
+
+TEST(Conversions, camerasRoundTrip) {
+  Camera camera;
+  camera.width = 640;
+  camera.height = 360;
+  camera.fx = 760;
+  camera.fy = 761;
+  camera.cx = 319.5;
+  camera.cy = 179.5;
+  const Camera again = fromMsg(toMsg(camera), somePose());
+  EXPECT_EQ(again.width, 640);
+  EXPECT_EQ(again.height, 360);
+  EXPECT_EQ(again.fx, 760);
+  EXPECT_EQ(again.fy, 761);
+  EXPECT_EQ(again.cx, 319.5);
+  EXPECT_EQ(again.cy, 179.5);
+}
+
+TEST(Conversions, uncalibratedAndDistortedCamerasAreRefused) {
+  sensor_msgs::CameraInfo info;
+  EXPECT_THROW(fromMsg(info, somePose()), std::invalid_argument);
+  Camera camera;
+  camera.width = camera.height = 10;
+  camera.fx = camera.fy = 10;
+  info = toMsg(camera);
+  info.D[0] = 0.1;
+  EXPECT_THROW(fromMsg(info, somePose()), std::invalid_argument);
+}
+
+TEST(Conversions, meshesRoundTripAndBadOnesAreRefused) {
+  TriangleMesh mesh;
+  mesh.vertices.setRandom(4, 3);
+  mesh.triangles.resize(2, 3);
+  mesh.triangles << 0, 1, 2, 1, 3, 2;
+  calipso_msgs::Mesh msg = toMsg(mesh);
+  EXPECT_EQ(fromMsg(msg).vertices, mesh.vertices);
+  EXPECT_EQ(fromMsg(msg).triangles, mesh.triangles);
+  msg.triangles[0] = 4;
+  EXPECT_THROW(fromMsg(msg), std::invalid_argument);
+}
+
+TEST(Conversions, editsRoundTrip) {
+  Edit edit;
+  edit.time = 0.5;
+  edit.object = "banana1";
+  edit.kind = EditKind::kPull;
+  edit.mode = EditMode::kTarget;
+  edit.region.kind = RegionKind::kPixel;
+  edit.region.pixel = {3, 4};
+  edit.vector = {1, 2, 3};
+  edit.rotation = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ());
+  edit.ramp = 0.25;
+  const Edit again = fromMsg(toMsg(edit, ros::Time(7)), ros::Time(7));
+  EXPECT_NEAR(again.time, 0.5, 1e-9);  // stamps hold nanoseconds
+  EXPECT_EQ(again.object, edit.object);
+  EXPECT_EQ(again.kind, edit.kind);
+  EXPECT_EQ(again.mode, edit.mode);
+  EXPECT_EQ(again.region.kind, edit.region.kind);
+  EXPECT_EQ(again.region.pixel, edit.region.pixel);
+  EXPECT_EQ(again.vector, edit.vector);
+  EXPECT_TRUE(again.rotation.isApprox(edit.rotation, 1e-14));
+  EXPECT_EQ(again.ramp, edit.ramp);
+  EXPECT_TRUE(std::isnan(again.youngs_modulus));
+}
+
+TEST(Conversions, aMeantZeroSurvivesAndAMissingNumberIsUnchanged) {
+  Edit edit;
+  edit.kind = EditKind::kMaterial;
+  edit.damping = 0.0;
+  const Edit again = fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1));
+  EXPECT_NEAR(again.damping, 0.0, 1e-300);
+  EXPECT_TRUE(std::isnan(again.poissons_ratio));
+  EXPECT_TRUE(std::isnan(again.density));
+}
+
+TEST(Conversions, anEditWithOnlyANameMeansNowAndUnchanged) {
+  calipso_msgs::Edit msg;
+  msg.kind = calipso_msgs::Edit::REMOVE;
+  const Edit edit = fromMsg(msg, ros::Time(1));
+  EXPECT_LT(edit.time, 0.0);
+  EXPECT_EQ(edit.scale, 1.0);
+  EXPECT_TRUE(edit.rotation.isApprox(Eigen::Quaterniond::Identity()));
+  EXPECT_EQ(edit.region.kind, RegionKind::kAll);
+}
+
+}  // namespace
+}  // namespace calipso
