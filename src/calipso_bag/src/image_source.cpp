@@ -1,0 +1,149 @@
+#include "calipso_bag/image_source.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+#include <regex>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace calipso::bag {
+namespace {
+
+constexpr double kStillFps = 30.0;
+
+cv::Mat readImage(const std::string& path) {
+  cv::Mat image = cv::imread(path, cv::IMREAD_COLOR);
+  if (image.empty()) {
+    throw std::runtime_error(path + ": missing, or not an image; every frame must be there");
+  }
+  return image;
+}
+
+// @pre requirePattern(pattern)
+std::string numbered(const std::string& pattern, int index) {
+  std::vector<char> text(pattern.size() + 32);
+  std::snprintf(text.data(), text.size(), pattern.c_str(), index);
+  return text.data();
+}
+
+// A file name pattern comes from the user: nothing but one integer may be formatted by it.
+void requirePattern(const std::string& pattern) {
+  static const std::regex kOneInteger("[^%]*%(0?[1-9])?d[^%]*");
+  if (std::regex_match(pattern, kOneInteger)) return;
+  throw std::invalid_argument("frame pattern '" + pattern +
+                              "' needs exactly one integer field, like frames/%06d.jpg");
+}
+
+void requireSize(const cv::Mat& image, const cv::Size& size, const std::string& what) {
+  if (image.size() == size) return;
+  throw std::runtime_error(what + " is " + std::to_string(image.cols) + "x" +
+                           std::to_string(image.rows) + ", but the first frame is " +
+                           std::to_string(size.width) + "x" + std::to_string(size.height) +
+                           "; scale all frames to one size");
+}
+
+class Sequence : public ImageSource {
+ public:
+  Sequence(std::string directory, std::string pattern, int count, double fps)
+      : directory_(std::move(directory)), pattern_(std::move(pattern)), count_(count), fps_(fps) {}
+
+  std::optional<cv::Mat> next() override {
+    if (index_ == count_) return std::nullopt;
+    const std::string path = directory_ + "/" + numbered(pattern_, index_);
+    cv::Mat image = readImage(path);
+    if (index_++ == 0) size_ = image.size();
+    requireSize(image, size_, path);
+    return image;
+  }
+  double fps() const override { return fps_; }
+
+ private:
+  std::string directory_, pattern_;
+  int count_;
+  double fps_;
+  int index_ = 0;
+  cv::Size size_;
+};
+
+class Video : public ImageSource {
+ public:
+  explicit Video(const std::string& path) : path_(path), capture_(path, cv::CAP_FFMPEG) {
+    if (!capture_.isOpened()) throw std::runtime_error(path + ": neither a video nor an image");
+    fps_ = capture_.get(cv::CAP_PROP_FPS);
+    if (!(fps_ > 0.0 && fps_ < 1000.0)) {
+      throw std::runtime_error(path + ": frame rate " + std::to_string(fps_) +
+                               " is not usable; re-encode the video with a constant frame rate");
+    }
+  }
+
+  std::optional<cv::Mat> next() override {
+    cv::Mat image;
+    if (!capture_.read(image) || image.empty()) return std::nullopt;
+    if (size_.empty()) size_ = image.size();
+    requireSize(image, size_, path_ + ": a frame");
+    return image;
+  }
+  double fps() const override { return fps_; }
+
+ private:
+  std::string path_;
+  cv::VideoCapture capture_;
+  double fps_ = 0.0;
+  cv::Size size_;
+};
+
+class Still : public ImageSource {
+ public:
+  explicit Still(cv::Mat image) : image_(std::move(image)) {}
+  std::optional<cv::Mat> next() override { return std::exchange(image_, std::nullopt); }
+  double fps() const override { return kStillFps; }
+
+ private:
+  std::optional<cv::Mat> image_;
+};
+
+class Held : public ImageSource {
+ public:
+  Held(std::unique_ptr<ImageSource> source, int frames)
+      : source_(std::move(source)), frames_(frames) {}
+
+  std::optional<cv::Mat> next() override {
+    std::optional<cv::Mat> image = source_->next();
+    if (image) {
+      last_ = *image;
+    } else if (given_ < frames_ && !last_.empty()) {
+      image = last_.clone();
+    }
+    if (image) ++given_;
+    return image;
+  }
+  double fps() const override { return source_->fps(); }
+
+ private:
+  std::unique_ptr<ImageSource> source_;
+  int frames_;
+  int given_ = 0;
+  cv::Mat last_;
+};
+
+}  // namespace
+
+std::unique_ptr<ImageSource> openSequence(const std::string& directory, const std::string& pattern,
+                                          int count, double fps) {
+  requirePattern(pattern);
+  return std::make_unique<Sequence>(directory, pattern, count, fps);
+}
+
+std::unique_ptr<ImageSource> openVideo(const std::string& path) {
+  if (cv::haveImageReader(path)) return std::make_unique<Still>(readImage(path));
+  return std::make_unique<Video>(path);
+}
+
+std::unique_ptr<ImageSource> holdLast(std::unique_ptr<ImageSource> source, int frames) {
+  return std::make_unique<Held>(std::move(source), frames);
+}
+
+}  // namespace calipso::bag

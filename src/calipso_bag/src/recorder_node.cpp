@@ -1,0 +1,29 @@
+#include <iostream>
+
+#include "calipso_ros/node_main.hpp"
+#include "ros/guarded_main.hpp"
+#include "ros/recorder.hpp"
+
+namespace {
+
+calipso::bag::Recorder::Params loadParams(const ros::NodeHandle& pnh) {
+  calipso::bag::Recorder::Params params;
+  params.output = calipso::requiredParam<std::string>(pnh, "output");
+  params.live = pnh.param<std::string>("mode", "bag") == "live";
+  pnh.getParam("flow", params.flow);
+  pnh.getParam("late_timeout_sec", params.late_timeout_sec);
+  return params;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "recorder");
+  ros::NodeHandle nh;
+  const ros::NodeHandle pnh("~");
+  return calipso::bag::runGuarded("recorder", [&] {
+    calipso::bag::Recorder recorder(nh, loadParams(pnh));
+    recorder.run();
+    std::cout << calipso::bag::format(recorder.summary()) << std::endl;
+  });
+}

@@ -1,0 +1,82 @@
+#include "clip_checks.hpp"
+
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+namespace calipso::bag {
+namespace {
+
+namespace enc = sensor_msgs::image_encodings;
+
+std::string size(std::uint32_t width, std::uint32_t height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
+[[noreturn]] void fail(const std::string& where, const std::string& what) {
+  throw std::runtime_error(where + ": " + what);
+}
+
+}  // namespace
+
+void checkImage(const sensor_msgs::Image& image, const std::string& where) {
+  static const std::array<std::string, 5> kKnown = {enc::RGB8, enc::BGR8, enc::RGBA8, enc::BGRA8,
+                                                    enc::MONO8};
+  if (std::find(kKnown.begin(), kKnown.end(), image.encoding) == kKnown.end()) {
+    fail(where, "encoding '" + image.encoding +
+                    "' is not known; convert to one of rgb8, bgr8, rgba8, bgra8, mono8");
+  }
+  const std::size_t row = std::size_t{image.width} * enc::numChannels(image.encoding);
+  if (image.width == 0 || image.height == 0 || image.step < row ||
+      image.data.size() < std::size_t{image.step} * image.height) {
+    fail(where, size(image.width, image.height) + " pixels in rows of " +
+                    std::to_string(image.step) + " bytes do not fit its " +
+                    std::to_string(image.data.size()) + " bytes; record the image again");
+  }
+  if (image.header.stamp.isZero()) {
+    fail(where, "stamp 0; stamp the images with their time when recording");
+  }
+  if (image.header.frame_id.empty()) {
+    fail(where, "frame_id is empty; name the camera's optical frame when recording");
+  }
+}
+
+void checkFollows(const sensor_msgs::Image& image, const sensor_msgs::Image& first,
+                  const ros::Time& previous, const std::string& where) {
+  if (image.width != first.width || image.height != first.height) {
+    fail(where, "size " + size(image.width, image.height) + " after " +
+                    size(first.width, first.height) + "; a clip has one size: cut the bag there");
+  }
+  if (image.encoding != first.encoding) {
+    fail(where, "encoding '" + image.encoding + "' after '" + first.encoding +
+                    "'; a clip has one encoding");
+  }
+  if (image.header.frame_id != first.header.frame_id) {
+    fail(where, "frame_id '" + image.header.frame_id + "' after '" + first.header.frame_id +
+                    "'; a clip comes from one camera");
+  }
+  if (image.header.stamp <= previous) {
+    fail(where, "stamp " + std::to_string(image.header.stamp.toSec()) + " s after " +
+                    std::to_string(previous.toSec()) + " s; stamps must increase");
+  }
+}
+
+void checkCameraInfo(const sensor_msgs::CameraInfo& info, const sensor_msgs::Image& image,
+                     const std::string& where) {
+  if (info.width != image.width || info.height != image.height) {
+    fail(where, "camera_info is for " + size(info.width, info.height) + " pixels, the image has " +
+                    size(image.width, image.height) + "; calibrate for the recorded size");
+  }
+  if (!(info.K[0] > 0.0) || !(info.K[4] > 0.0)) {
+    fail(where, "camera_info has focal lengths " + std::to_string(info.K[0]) + ", " +
+                    std::to_string(info.K[4]) + " px; record a calibrated camera");
+  }
+}
+
+bool isDistorted(const sensor_msgs::CameraInfo& info) {
+  return std::any_of(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; });
+}
+
+}  // namespace calipso::bag

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+
+#include <string>
+
+namespace calipso::bag {
+
+// Each throws std::runtime_error naming what is wrong, the value and the remedy.
+// `where`: what is being checked, e.g. "in.bag: image 12".
+
+// Encoding known, 8 bit, data complete.
+void checkImage(const sensor_msgs::Image& image, const std::string& where);
+
+// Same size and frame as the clip's first image, and later than the one before.
+void checkFollows(const sensor_msgs::Image& image, const sensor_msgs::Image& first,
+                  const ros::Time& previous, const std::string& where);
+
+// Calibrated, and for images of this size.
+void checkCameraInfo(const sensor_msgs::CameraInfo& info, const sensor_msgs::Image& image,
+                     const std::string& where);
+
+bool isDistorted(const sensor_msgs::CameraInfo& info);
+
+}  // namespace calipso::bag

@@ -1,0 +1,55 @@
+#include "node_watch.hpp"
+
+#include <utility>
+
+#include "calipso_ros/topics.hpp"
+
+namespace calipso::bag {
+
+using calipso_msgs::NodeStatus;
+
+NodeWatch::NodeWatch(ros::NodeHandle& nh, Preparation::Roles roles)
+    : preparation_(std::move(roles)) {
+  constexpr bool kLatched = true;
+  publisher_ = nh.advertise<NodeStatus>(topics::kStatus, 100, kLatched);
+  subscriber_ = nh.subscribe(topics::kStatus, 1000, &NodeWatch::onStatus, this);
+}
+
+void NodeWatch::fail(const std::string& node, const std::string& reason) {
+  if (preparation_.standing(node).state == NodeState::kFailed) return;
+  ROS_ERROR_STREAM(node << ": " << reason << "; frames pass unedited where they need it");
+  preparation_.fail(node, reason);
+  NodeStatus status;
+  status.header.stamp = ros::Time::now();
+  status.node = node;
+  status.state = NodeStatus::FAILED;
+  status.message = reason;
+  publisher_.publish(status);
+}
+
+void NodeWatch::connectionLost(const std::string& ros_name) {
+  const auto found = node_of_.find(ros_name);
+  if (found == node_of_.end()) return;
+  ended_.insert(found->second);
+  fail(found->second, "its process ended");
+}
+
+void NodeWatch::onStatus(const ros::MessageEvent<NodeStatus const>& event) {
+  if (event.getPublisherName() == ros::this_node::getName()) return;
+  ++activity_;
+  const NodeStatus& status = *event.getMessage();
+  node_of_[event.getPublisherName()] = status.node;
+  NodeStanding standing;
+  standing.state = static_cast<NodeState>(status.state);
+  standing.message = status.message;
+  standing.clip_frames = static_cast<int>(status.clip_frames);
+  standing.edits = static_cast<int>(status.edits);
+  preparation_.update(status.node, standing);
+
+  std::string& said = last_said_[status.node];
+  if (said == status.message || status.message.empty()) return;
+  said = status.message;
+  ROS_INFO_STREAM(status.node << ": " << said);
+}
+
+}  // namespace calipso::bag

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <calipso_msgs/NodeStatus.h>
+#include <ros/ros.h>
+
+#include <map>
+#include <set>
+#include <string>
+
+#include "calipso_bag/preparation.hpp"
+
+namespace calipso::bag {
+
+// Follows what the nodes say on `status`, prints what changes, and notices when a process ends:
+// then says FAILED in its place, so that nobody waits for it. Not thread-safe.
+class NodeWatch {
+ public:
+  NodeWatch(ros::NodeHandle& nh, Preparation::Roles roles);
+
+  const Preparation& preparation() const { return preparation_; }
+
+  // How many messages of status have come in; grows while anybody makes progress.
+  int activity() const { return activity_; }
+
+  // True when the node's process has ended.
+  bool ended(const std::string& node) const { return ended_.count(node) > 0; }
+
+  // Declares a node FAILED, to everyone.
+  void fail(const std::string& node, const std::string& reason);
+
+  // To be called when a subscriber's connection closes; `ros_name`: the subscriber's.
+  void connectionLost(const std::string& ros_name);
+
+ private:
+  void onStatus(const ros::MessageEvent<calipso_msgs::NodeStatus const>& event);
+
+  Preparation preparation_;
+  std::map<std::string, std::string> node_of_;   // ROS name -> name in NodeStatus
+  std::map<std::string, std::string> last_said_;
+  std::set<std::string> ended_;
+  int activity_ = 0;
+  ros::Publisher publisher_;
+  ros::Subscriber subscriber_;
+};
+
+}  // namespace calipso::bag

@@ -1,0 +1,238 @@
+#include "player.hpp"
+
+#include <calipso_msgs/ClipInfo.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <algorithm>
+#include <iomanip>
+#include <stdexcept>
+
+#include "calipso_ros/topics.hpp"
+#include "calipso_scene/triangle_mesh.hpp"
+#include "edit_files.hpp"
+#include "wait.hpp"
+
+namespace calipso::bag {
+namespace {
+
+constexpr unsigned kQueue = 100;
+constexpr double kShowEverySec = 2.0;
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+std::vector<std::string> common(const std::vector<std::string>& a,
+                                const std::vector<std::string>& b) {
+  std::vector<std::string> both;
+  for (const std::string& name : a) {
+    if (std::find(b.begin(), b.end(), name) != b.end()) both.push_back(name);
+  }
+  return both;
+}
+
+}  // namespace
+
+Preparation::Roles Player::rolesOf(const std::vector<std::string>& nodes) {
+  Preparation::Roles roles;
+  if (nodes.empty()) return roles;
+  roles.key_frame = common(roles.key_frame, nodes);
+  roles.clip = common(roles.clip, nodes);
+  roles.all = nodes;
+  return roles;
+}
+
+Player::Player(ros::NodeHandle& nh, const Params& params)
+    : params_(params),
+      nh_(nh),
+      scene_(loadScene(params.scene)),
+      clip_(params.clip),
+      path_(cameraPath(clip_, scene_, poseSourceFromString(params.poses))),
+      edits_(readEdits(params.edits, scene_, clip_.stamps().front())),
+      watch_(nh, rolesOf(params.nodes)),
+      window_(params.in_flight) {
+  checkScene();
+  advertise();
+  ROS_INFO_STREAM(params.clip.path << ": " << clip_.frameCount() << " frames of "
+                                   << clip_.imageTopic() << ", " << clip_.firstInfo().width << "x"
+                                   << clip_.firstInfo().height << ", " << edits_.size()
+                                   << " edits; camera poses from " << path_.origin);
+}
+
+void Player::checkScene() const {
+  const sensor_msgs::CameraInfo& info = clip_.firstInfo();
+  if (static_cast<int>(info.width) != scene_.camera.width ||
+      static_cast<int>(info.height) != scene_.camera.height) {
+    throw std::runtime_error(
+        params_.clip.path + ": images are " + std::to_string(info.width) + "x" +
+        std::to_string(info.height) + ", but " + params_.scene + "/scene.yaml is for " +
+        std::to_string(scene_.camera.width) + "x" + std::to_string(scene_.camera.height) +
+        "; use the scene of this video");
+  }
+  for (const SceneObject& object : scene_.objects) loadMesh(object.cad_path);
+  const ros::Time last = clip_.stamps().back();
+  for (const calipso_msgs::Edit& edit : edits_) {
+    if (edit.header.stamp <= last) continue;
+    ROS_WARN_STREAM("edit '" << edit.kind << "' of '" << edit.object << "' lies "
+                             << (edit.header.stamp - last).toSec()
+                             << " s after the last frame and will not take effect");
+  }
+}
+
+void Player::advertise() {
+  constexpr bool kLatched = true;
+  ros::AdvertiseOptions options;
+  options.init<calipso_msgs::ClipInfo>(
+      topics::kClipInfo, 1, ros::SubscriberStatusCallback(),
+      [this](const ros::SingleSubscriberPublisher& s) {
+        watch_.connectionLost(s.getSubscriberName());
+      });
+  options.latch = true;
+  clip_info_ = nh_.advertise(options);
+  clip_image_ = nh_.advertise<sensor_msgs::Image>(topics::kClipImage, kQueue, kLatched);
+  clip_camera_info_ =
+      nh_.advertise<sensor_msgs::CameraInfo>(topics::kClipCameraInfo, kQueue, kLatched);
+  image_ = nh_.advertise<sensor_msgs::Image>(topics::kImage, kQueue);
+  camera_info_ = nh_.advertise<sensor_msgs::CameraInfo>(topics::kCameraInfo, kQueue);
+  tf_ = nh_.advertise<tf2_msgs::TFMessage>("/tf", kQueue, kLatched);
+  edit_ = nh_.advertise<calipso_msgs::Edit>(topics::kEdits, 1000);
+  edited_ = nh_.subscribe(topics::kImageEditedCameraInfo, kQueue, &Player::onEdited, this,
+                          ros::TransportHints().tcpNoDelay());
+}
+
+void Player::run() {
+  waitForGraph();
+  announceClip();
+  prepare();
+  sendEdits();
+  playFrames();
+}
+
+// True when a frame sent now reaches everyone who asked for frames.
+bool Player::connected() const {
+  const auto& all = watch_.preparation().unsettled();
+  const bool all_reported = std::all_of(all.begin(), all.end(), [this](const std::string& node) {
+    return !watch_.preparation().standing(node).message.empty();
+  });
+  return all_reported && image_.getNumSubscribers() > 0 && camera_info_.getNumSubscribers() > 0 &&
+         edited_.getNumPublishers() > 0;
+}
+
+void Player::waitForGraph() {
+  if (waitFor([this] { return connected(); }, params_.connect_timeout_sec)) return;
+  std::vector<std::string> silent;
+  for (const std::string& node : watch_.preparation().unsettled()) {
+    if (watch_.preparation().standing(node).message.empty()) silent.push_back(node);
+  }
+  throw std::runtime_error("after " + std::to_string(params_.connect_timeout_sec) +
+                           " s these nodes have not reported: " + listed(silent) +
+                           "; look for their own messages above");
+}
+
+void Player::announceClip() {
+  tf2_msgs::TFMessage tf;
+  tf.transforms = path_.world_from_camera;
+  tf_.publish(tf);
+  calipso_msgs::ClipInfo info;
+  info.header.stamp = clip_.stamps().front();
+  info.header.frame_id = clip_.frameId();
+  info.frames = static_cast<std::uint32_t>(clip_.frameCount());
+  info.fps = clip_.fps();
+  info.last_stamp = clip_.stamps().back();
+  clip_info_.publish(info);
+}
+
+void Player::prepare() {
+  sendClipFrames();
+  waitForProgress([this] { return watch_.preparation().allSettled(); }, "preparation");
+  const std::vector<std::string> failed = watch_.preparation().failed();
+  if (!failed.empty()) ROS_ERROR_STREAM("failed: " << listed(failed));
+}
+
+void Player::sendClipFrames() {
+  const Preparation& nodes = watch_.preparation();
+  BagClip::Reader reader = clip_.reader();
+  for (int sent = 0; sent < clip_.frameCount() && !nodes.hopeless(); ++sent) {
+    const auto has_room = [&] { return sent - nodes.clipFramesTaken(sent) < params_.in_flight; };
+    waitForProgress([&] { return nodes.hopeless() || has_room(); }, "the clip");
+    const BagFrame frame = reader.next();
+    clip_image_.publish(frame.image);
+    clip_camera_info_.publish(frame.info);
+    if (sent == 0) waitForProgress([&] { return nodes.keyFrameSettled(); }, "the key frame");
+  }
+}
+
+// Waits as long as anybody reports progress; nodes that stay silent are given up.
+void Player::waitForProgress(const std::function<bool()>& done, const std::string& what) {
+  while (!done()) {
+    const int before = watch_.activity();
+    const auto moved = [&] { return done() || watch_.activity() != before; };
+    if (waitFor(moved, params_.prepare_timeout_sec)) continue;
+    const std::vector<std::string> silent = watch_.preparation().unsettled();
+    const std::string complaint = "no sign of life for " +
+                                  std::to_string(params_.prepare_timeout_sec) + " s, waiting for " +
+                                  what;
+    if (silent.empty()) throw std::runtime_error(complaint + "; look for messages above");
+    for (const std::string& node : silent) watch_.fail(node, complaint);
+  }
+}
+
+// Edits and frames travel on different connections: no frame may overtake an edit.
+void Player::sendEdits() {
+  constexpr double kEditTimeoutSec = 10.0;
+  for (const calipso_msgs::Edit& edit : edits_) edit_.publish(edit);
+  const auto received = [this] {
+    const NodeStanding simulator = watch_.preparation().standing("simulator");
+    return watch_.preparation().hopeless() || simulator.state == NodeState::kFailed ||
+           simulator.edits >= static_cast<int>(edits_.size());
+  };
+  if (!edits_.empty() && !waitFor(received, kEditTimeoutSec)) {
+    throw std::runtime_error("the simulator has received " +
+                             std::to_string(watch_.preparation().standing("simulator").edits) +
+                             " of " + std::to_string(edits_.size()) +
+                             " edits; does anything else publish or remap the topic of edits?");
+  }
+}
+
+void Player::playFrames() {
+  BagClip::Reader reader = clip_.reader();
+  first_sent_ = last_shown_ = ros::WallTime::now();
+  for (int i = 0; i < clip_.frameCount(); ++i) {
+    const BagFrame frame = reader.next();
+    waitForEdited([this] { return window_.hasRoom(); });
+    window_.sent(static_cast<std::int64_t>(frame.image->header.stamp.toNSec()));
+    camera_info_.publish(frame.info);
+    image_.publish(frame.image);
+  }
+  waitForEdited([this] { return window_.empty(); });
+}
+
+void Player::waitForEdited(const std::function<bool()>& done) {
+  const bool in_time = waitFor([&] { return done() || watch_.ended("render"); },
+                               params_.frame_timeout_sec);
+  if (done()) return;
+  throw std::runtime_error(
+      (in_time ? "the renderer's process ended"
+               : "no edited frame for " + std::to_string(params_.frame_timeout_sec) + " s") +
+      " after " + std::to_string(window_.returned()) + " of " +
+      std::to_string(clip_.frameCount()) + " frames; look for the renderer's messages above");
+}
+
+void Player::onEdited(const sensor_msgs::CameraInfoConstPtr& info) {
+  window_.cameBack(static_cast<std::int64_t>(info->header.stamp.toNSec()));
+  showProgress();
+}
+
+void Player::showProgress() {
+  const ros::WallTime now = ros::WallTime::now();
+  const bool last = window_.returned() == clip_.frameCount();
+  if (!last && (now - last_shown_).toSec() < kShowEverySec) return;
+  last_shown_ = now;
+  ROS_INFO_STREAM("edited " << window_.returned() << " of " << clip_.frameCount() << " frames, "
+                            << std::fixed << std::setprecision(1)
+                            << window_.returned() / (now - first_sent_).toSec() << " per second");
+}
+
+}  // namespace calipso::bag

@@ -1,0 +1,201 @@
+#include "recorder.hpp"
+
+#include <ros/callback_queue.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <stdexcept>
+
+#include "calipso_msgs/ClipDynamics.h"
+#include "calipso_msgs/Dynamics.h"
+#include "calipso_msgs/SimulationState.h"
+#include "calipso_ros/topics.hpp"
+#include "run_log.hpp"
+#include "wait.hpp"
+
+namespace calipso::bag {
+namespace {
+
+constexpr unsigned kQueue = 10000;    // nothing may be lost before it is written
+constexpr std::size_t kLagFrames = 8;  // messages of a frame may come this much later than its image
+
+std::string seconds(const ros::Time& stamp) { return std::to_string(stamp.toSec()) + " s"; }
+
+}  // namespace
+
+Recorder::Recorder(ros::NodeHandle& nh, const Params& params)
+    : params_(params),
+      nh_(nh),
+      output_(params.output),
+      writer_(output_.bag()),
+      reporter_(nh, "recorder") {
+  summary_.output = params.output;
+  subscribeFrames();
+  subscribeExplanations();
+  reporter_.starting("waiting for the graph");
+}
+
+void Recorder::subscribeFrames() {
+  const boost::function<void(const calipso_msgs::ClipInfoConstPtr&)> on_clip =
+      [this](const calipso_msgs::ClipInfoConstPtr& clip) { clip_ = *clip; };
+  subscribers_.push_back(nh_.subscribe<calipso_msgs::ClipInfo>(topics::kClipInfo, 1, on_clip));
+  subscribers_.push_back(nh_.subscribe(topics::kCameraInfo, kQueue, &Recorder::onInput, this));
+  subscribers_.push_back(nh_.subscribe(topics::kImageEdited, kQueue, &Recorder::onEdited, this));
+  record<sensor_msgs::CameraInfo>(topics::kImageEditedCameraInfo);
+  record<sensor_msgs::Image>(topics::kProvenance);
+  record<calipso_msgs::SimulationState>(topics::kState);
+  subscribers_.push_back(nh_.subscribe("/tf", kQueue, &Recorder::onTf, this));
+  subscribers_.push_back(nh_.subscribe("/tf_static", kQueue, &Recorder::onTf, this));
+}
+
+void Recorder::subscribeExplanations() {
+  record<calipso_msgs::Dynamics>(topics::kDynamics);
+  record<calipso_msgs::ClipDynamics>(topics::kClipDynamics);
+  if (params_.flow) record<sensor_msgs::Image>(topics::kFlow);
+  recordAndNote<calipso_msgs::AlignedModels>(topics::kModels);
+  recordAndNote<calipso_msgs::Plan>(topics::kPlan);
+  recordAndNote<calipso_msgs::EditReport>(topics::kEditsApplied);
+  recordAndNote<calipso_msgs::Timing>(topics::kTiming);
+  subscribers_.push_back(
+      nh_.subscribe(topics::kSegmentation, kQueue, &Recorder::onSegmentation, this));
+  subscribers_.push_back(nh_.subscribe(topics::kMarkers, kQueue, &Recorder::onMarkers, this));
+  const boost::function<void(const calipso_msgs::NodeStatusConstPtr&)> on_status =
+      [this](const calipso_msgs::NodeStatusConstPtr& status) { note(*status, summary_); };
+  subscribers_.push_back(nh_.subscribe<calipso_msgs::NodeStatus>(topics::kStatus, 1000, on_status));
+}
+
+template <typename M>
+void Recorder::write(const std::string& topic, const ros::MessageEvent<M const>& event,
+                     const std::string& rank) {
+  const ros::Time stamp = event.getMessage()->header.stamp;
+  writer_.add(nh_.resolveName(topic), std::max(stamp, ros::TIME_MIN), rank, event.getConstMessage(),
+              event.getConnectionHeaderPtr());
+  ++count_[topic];
+}
+
+template <typename M>
+void Recorder::record(const std::string& topic, Rank<M> rank) {
+  const boost::function<void(const ros::MessageEvent<M const>&)> on_message =
+      [this, topic, rank](const ros::MessageEvent<M const>& event) {
+        write(topic, event, rank ? rank(*event.getMessage()) : std::string());
+      };
+  subscribers_.push_back(nh_.subscribe<M>(topic, kQueue, on_message));
+}
+
+template <typename M>
+void Recorder::recordAndNote(const std::string& topic) {
+  record<M>(topic, [this](const M& message) {
+    note(message, summary_);
+    return nextRank();
+  });
+}
+
+void Recorder::onInput(const sensor_msgs::CameraInfoConstPtr& info) {
+  input_.push_back(info->header.stamp);
+}
+
+void Recorder::onEdited(const ros::MessageEvent<sensor_msgs::Image const>& event) {
+  const ros::Time stamp = event.getMessage()->header.stamp;
+  if (!edited_.empty() && stamp <= edited_.back()) {
+    throw std::runtime_error("edited frame " + seconds(stamp) + " came after " +
+                             seconds(edited_.back()) + "; is a second renderer running?");
+  }
+  if (edited_.empty()) first_edited_ = ros::WallTime::now();
+  edited_.push_back(stamp);
+  write(topics::kImageEdited, event, "");
+  summary_.edit_seconds = (ros::WallTime::now() - first_edited_).toSec();
+  if (edited_.size() > kLagFrames) writer_.flush(edited_[edited_.size() - 1 - kLagFrames]);
+}
+
+// The key frame's only: later masks are tracked ones, and large.
+void Recorder::onSegmentation(const ros::MessageEvent<calipso_msgs::Segmentation const>& event) {
+  if (count_[topics::kSegmentation] == 0) write(topics::kSegmentation, event, "");
+}
+
+void Recorder::onMarkers(const ros::MessageEvent<visualization_msgs::MarkerArray const>& event) {
+  const auto& markers = event.getMessage()->markers;
+  if (markers.empty()) return;
+  const ros::Time stamp = std::max(markers.front().header.stamp, ros::TIME_MIN);
+  writer_.add(nh_.resolveName(topics::kMarkers), stamp, event.getPublisherName() + nextRank(),
+              event.getConstMessage(), event.getConnectionHeaderPtr());
+}
+
+// One message for each transform, so that each is found at its own stamp.
+void Recorder::onTf(const ros::MessageEvent<tf2_msgs::TFMessage const>& event) {
+  const std::string topic = event.getConnectionHeader().at("topic");
+  for (const geometry_msgs::TransformStamped& transform : event.getMessage()->transforms) {
+    const auto single = boost::make_shared<tf2_msgs::TFMessage>();
+    single->transforms.push_back(transform);
+    writer_.add<tf2_msgs::TFMessage>(topic, std::max(transform.header.stamp, ros::TIME_MIN),
+                                     transform.child_frame_id, single);
+  }
+}
+
+std::string Recorder::nextRank() {
+  char rank[24];
+  std::snprintf(rank, sizeof rank, "%012d", rank_++);
+  return rank;
+}
+
+bool Recorder::connected() const {
+  return std::all_of(subscribers_.begin(), subscribers_.end(), [this](const ros::Subscriber& s) {
+    const bool needed = s.getTopic() == nh_.resolveName(topics::kImageEdited) ||
+                        s.getTopic() == nh_.resolveName(topics::kImageEditedCameraInfo) ||
+                        s.getTopic() == nh_.resolveName(topics::kCameraInfo);
+    return !needed || s.getNumPublishers() > 0;
+  });
+}
+
+bool Recorder::allEdited() const { return clip_.frames > 0 && edited_.size() >= clip_.frames; }
+
+// What a failed node would have said is not waited for.
+bool Recorder::allExplained() const {
+  const auto complete = [this](const std::string& topic) {
+    const auto found = count_.find(topic);
+    return found != count_.end() && found->second >= static_cast<int>(clip_.frames);
+  };
+  const bool simulated = summary_.failed.empty();
+  return input_.size() >= clip_.frames && complete(topics::kImageEditedCameraInfo) &&
+         complete(topics::kProvenance) && (!simulated || complete(topics::kState)) &&
+         (!simulated || complete(topics::kDynamics));
+}
+
+void Recorder::run() {
+  if (params_.live) {
+    recordLive();
+  } else {
+    recordClip();
+  }
+  summary_.frames_in = static_cast<int>(input_.size());
+  summary_.frames_out = static_cast<int>(edited_.size());
+  writer_.flushAll();
+  output_.finish();
+}
+
+void Recorder::recordClip() {
+  constexpr double kOneHourSec = 3600.0;
+  while (!waitFor([this] { return connected(); }, kOneHourSec)) {
+  }
+  reporter_.ready("recording to " + output_.path());
+  while (!waitFor([this] { return allEdited(); }, kOneHourSec)) {
+  }
+  if (!waitFor([this] { return allExplained(); }, params_.late_timeout_sec)) {
+    ROS_WARN("not every frame has its camera_info, provenance, state and dynamics");
+  }
+  checkFrames();
+}
+
+void Recorder::recordLive() {
+  reporter_.ready("recording to " + output_.path() + " until stopped");
+  while (ros::ok()) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+}
+
+void Recorder::checkFrames() const {
+  if (edited_ == input_) return;
+  throw std::runtime_error(std::to_string(input_.size()) + " frames went in, " +
+                           std::to_string(edited_.size()) +
+                           " came out, or their stamps differ; the bag stays incomplete as " +
+                           output_.path() + ".active");
+}
+
+}  // namespace calipso::bag

@@ -1,0 +1,72 @@
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "calipso_bag/arguments.hpp"
+#include "ros/bag_images.hpp"
+#include "ros/guarded_main.hpp"
+
+using namespace calipso::bag;
+
+namespace {
+
+constexpr char kUsage[] =
+    "usage: compare_bags ORIGINAL.bag TOPIC EDITED.bag TOPIC OUT.png [--rows N]\n"
+    "  original and edited frames side by side, at N times spread over the clip (default 3)";
+
+std::map<ros::Time, cv::Mat> readAll(const std::string& bag, const std::string& topic) {
+  std::map<ros::Time, cv::Mat> images;
+  forEachImage(bag, topic, [&](const cv::Mat& image, const ros::Time& stamp) {
+    images[stamp] = image.clone();
+  });
+  return images;
+}
+
+void label(cv::Mat& image, const std::string& text) {
+  const cv::Point corner(12, 28);
+  cv::putText(image, text, corner, cv::FONT_HERSHEY_SIMPLEX, 0.7, {0, 0, 0}, 4, cv::LINE_AA);
+  cv::putText(image, text, corner, cv::FONT_HERSHEY_SIMPLEX, 0.7, {255, 255, 255}, 1, cv::LINE_AA);
+}
+
+cv::Mat sideBySide(cv::Mat original, cv::Mat edited, double seconds) {
+  char time[32];
+  std::snprintf(time, sizeof time, ", %.2f s", seconds);
+  label(original, std::string("original") + time);
+  label(edited, std::string("edited") + time);
+  cv::Mat row;
+  cv::hconcat(original, edited, row);
+  return row;
+}
+
+void compare(const Arguments& arguments) {
+  const auto original = readAll(arguments.word(0), arguments.word(1));
+  const auto edited = readAll(arguments.word(2), arguments.word(3));
+  const int rows = std::max(1, static_cast<int>(arguments.number("rows", 3)));
+  std::vector<cv::Mat> sheet;
+  for (int i = 1; i <= rows; ++i) {
+    const std::size_t step = (edited.size() - 1) * static_cast<std::size_t>(i) /
+                             static_cast<std::size_t>(rows);
+    const auto frame = std::next(edited.begin(), static_cast<std::ptrdiff_t>(step));
+    const auto before = original.find(frame->first);
+    if (before == original.end()) throw std::runtime_error("the bags' stamps differ");
+    const double seconds = (frame->first - edited.begin()->first).toSec();
+    sheet.push_back(sideBySide(before->second.clone(), frame->second.clone(), seconds));
+  }
+  cv::Mat picture;
+  cv::vconcat(sheet, picture);
+  if (!cv::imwrite(arguments.word(4), picture)) {
+    throw std::runtime_error(arguments.word(4) + ": cannot be written");
+  }
+  std::cout << arguments.word(4) << ": " << rows << " times, original | edited\n";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return runTool([&] { compare(Arguments(argc, argv, 5, {"rows"}, {}, kUsage)); });
+}

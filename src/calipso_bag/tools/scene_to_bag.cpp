@@ -1,0 +1,48 @@
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+
+#include "calipso_bag/arguments.hpp"
+#include "calipso_bag/image_source.hpp"
+#include "calipso_scene/scene.hpp"
+#include "ros/clip_writer.hpp"
+#include "ros/guarded_main.hpp"
+
+using namespace calipso;
+using namespace calipso::bag;
+
+namespace {
+
+constexpr char kUsage[] =
+    "usage: scene_to_bag SCENE_DIR OUT.bag [--seconds S] [--compressed]\n"
+    "  writes the scene's frames, camera_info and camera poses (tf) as a bag\n"
+    "  --seconds S   a shorter clip is continued with its last frame (a single frame: 2 s)\n"
+    "  --compressed  JPEG images";
+constexpr double kStillSeconds = 2.0;
+
+// The camera's pose at frame i; a clip that was continued keeps the last one.
+Eigen::Isometry3d poseAt(const Scene& scene, int i) {
+  const auto& moving = scene.world_from_camera_per_frame;
+  if (moving.empty()) return scene.camera.world_from_camera;
+  return moving[std::min<std::size_t>(static_cast<std::size_t>(i), moving.size() - 1)];
+}
+
+void convert(const Arguments& arguments) {
+  const Scene scene = loadScene(arguments.word(0));
+  const double seconds =
+      arguments.number("seconds", scene.frame_count == 1 ? kStillSeconds : 0.0);
+  const auto frames =
+      holdLast(openSequence(scene.directory, scene.frame_pattern, scene.frame_count, scene.fps),
+               static_cast<int>(std::lround(seconds * scene.fps)));
+  ClipWriter writer(arguments.word(1), scene.camera, scene.fps, arguments.has("compressed"));
+  while (const auto image = frames->next()) writer.add(*image, poseAt(scene, writer.frameCount()));
+  writer.finish();
+  std::cout << arguments.word(1) << ": " << writer.frameCount() << " frames at " << scene.fps
+            << " per second\n";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return runTool([&] { convert(Arguments(argc, argv, 2, {"seconds"}, {"compressed"}, kUsage)); });
+}
