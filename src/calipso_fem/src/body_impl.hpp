@@ -1,0 +1,97 @@
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "calipso_fem/deformable_body.hpp"
+#include "element.hpp"
+#include "linear_solver.hpp"
+
+namespace calipso::fem {
+
+// x(t) = prescribed displacement of one component, from its rest position.
+struct PrescribedDof {
+  DisplacementOverTime displacement;   // m
+};
+
+// v1 = rate (x1 - base); inertia acts as inertia M (x1 - predicted).
+struct Integrator {
+  double inertia = 0.0;   // 1/s^2
+  double rate = 0.0;      // 1/s
+  Vec predicted, base;    // m
+};
+
+struct SoftTerm {
+  SoftConstraint constraint;
+  Eigen::SparseVector<double> weights;   // on the nodes
+};
+
+struct DeformableBody::Impl {
+  FemOptions options;
+  VoxelGrid grid;
+  Embedding embedding;
+  CellMatrix surface_triangles;          // #F x 3
+  std::unique_ptr<ElasticModel> model;
+  std::unique_ptr<LinearSolver> solver;
+
+  // State
+  Vec x, v, a;                           // m, m/s, m/s^2 (trapezoidal)
+  std::optional<std::pair<Vec, Vec>> previous;  // x, v of the step before (BDF2)
+  double previous_h = 0.0;
+  double time = 0.0;
+
+  // Loads and constraints
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
+  Vec nodal_forces, surface_forces;      // empty: none
+  double pressure = 0.0;
+  std::vector<SoftTerm> soft;
+  std::map<int, PrescribedDof> prescribed;   // by dof
+  Vec reactions;                         // 3n, N
+  Vec soft_forces;                       // 3 per soft constraint, N
+
+  // Work space of the current step
+  std::optional<BlockMatrix> mass;       // consistent only
+  BlockMatrix A;
+  BlockMatrix viscosity;
+  bool system_valid = false;             // A holds the last step's system
+
+  void initialise(const Material& material);
+  double damping() const { return model->cellMaterials().front().damping; }
+
+  // y = M x for a 3n vector
+  Vec applyMass(const Vec& y) const;
+  Vec externalForces() const;            // gravity, nodal, surface, pressure; at the present state
+  Vec pressureForces() const;
+
+  Vec prescribedTargets(double t) const; // 3n; meaningful at prescribed dofs
+  void maskResidual(Vec* r) const;
+
+  // Springs: energy, force (gradient), stiffness, at positions y with velocities rate (y - base).
+  double softEnergy(const Vec& y, const Integrator& i) const;
+  void addSoftGradient(const Vec& y, const Integrator& i, Vec* r) const;
+  void addSoftHessian(const Integrator& i, BlockMatrix* K) const;
+  void rememberSoftForces(const Integrator& i);
+
+  Integrator integrator(double h) const;
+  // Incremental potential, its gradient and Hessian (the matrix A).
+  double potential(const Vec& y, const Integrator& i, const Vec& loads) const;
+  Vec gradient(const Vec& y, const Integrator& i, const Vec& loads) const;
+  void assemble(const Vec& y, const Integrator& i, Definiteness definiteness);  // all dofs
+  // Size of the terms that have to balance, N.
+  double forceScale(const Vec& y, const Integrator& i, const Vec& loads) const;
+
+  StepReport minimise(const Integrator& i, const Vec& loads, const Vec& targets, bool linearised,
+                      Vec* y);
+  // One Newton direction; false when no positive definite system could be solved.
+  bool newtonDirection(const Vec& y, const Integrator& i, const Vec& residual, const Vec& jump,
+                       double linear_tolerance, StepReport* report, Vec* direction);
+  double searchLine(const Vec& y, const Vec& direction, const Vec& residual, const Integrator& i,
+                    const Vec& loads, double energy) const;
+  void finishReport(StepReport* report) const;
+  void invalidateSystem();
+};
+
+// Rows and columns of the given dofs become those of the identity matrix times a typical diagonal.
+void eliminate(const std::map<int, PrescribedDof>& dofs, BlockMatrix* A);
+
+}  // namespace calipso::fem

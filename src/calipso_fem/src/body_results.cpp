@@ -1,0 +1,149 @@
+#include <Eigen/Geometry>
+#include <cmath>
+#include <stdexcept>
+
+#include "body_impl.hpp"
+
+namespace calipso::fem {
+
+using Eigen::Vector3d;
+
+Vec DeformableBody::surfaceVertices() const { return impl_->embedding.apply(impl_->x); }
+Vec DeformableBody::surfaceVelocities() const { return impl_->embedding.apply(impl_->v); }
+
+// Cells to nodes by filled volume, nodes to vertices by J.
+Eigen::VectorXd DeformableBody::surfaceVonMises() const {
+  const VolumeMesh& mesh = impl_->model->mesh();
+  const Eigen::VectorXd cell = impl_->model->cellVonMises(impl_->x);
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(nodeCount()), weight = sum;
+  for (int c = 0; c < mesh.cellCount(); ++c)
+    for (int k = 0; k < mesh.cells.cols(); ++k) {
+      sum[mesh.cells(c, k)] += mesh.fraction[c] * cell[c];
+      weight[mesh.cells(c, k)] += mesh.fraction[c];
+    }
+  const Eigen::VectorXd nodal = sum.cwiseQuotient(weight.cwiseMax(1e-300));
+  return (impl_->embedding.weights * nodal).cwiseMax(0.0);
+}
+
+double DeformableBody::elasticEnergy() const { return impl_->model->energy(impl_->x); }
+
+double DeformableBody::kineticEnergy() const {
+  return 0.5 * impl_->v.dot(impl_->applyMass(impl_->v));
+}
+
+double DeformableBody::gravityEnergy() const {
+  const Eigen::VectorXd& m = impl_->model->lumpedMass();
+  double energy = 0.0;
+  for (int k = 0; k < m.size(); ++k)
+    energy -= m[k] * impl_->gravity.dot(impl_->x.segment<3>(3 * k));
+  return energy;
+}
+
+Momentum DeformableBody::momentum() const {
+  const Eigen::VectorXd& m = impl_->model->lumpedMass();
+  const Vec Mv = impl_->applyMass(impl_->v);
+  Momentum result;
+  for (int k = 0; k < m.size(); ++k) {
+    result.center += m[k] / m.sum() * impl_->x.segment<3>(3 * k);
+    result.linear += Mv.segment<3>(3 * k);
+  }
+  for (int k = 0; k < m.size(); ++k)
+    result.angular +=
+        Vector3d(impl_->x.segment<3>(3 * k) - result.center).cross(Vector3d(Mv.segment<3>(3 * k)));
+  return result;
+}
+
+double DeformableBody::totalMass() const { return impl_->model->totalMass(); }
+
+bool DeformableBody::isAtRest(double speed) const {
+  for (int k = 0; k < nodeCount(); ++k)
+    if (!(impl_->v.segment<3>(3 * k).squaredNorm() <= speed * speed)) return false;
+  return true;
+}
+
+// A of body_system.cpp is the velocity system divided by h (backward Euler: inertia = rate / h).
+Vec DeformableBody::complianceColumn(const SurfacePoint& point, const Vector3d& direction,
+                                     double h) const {
+  Impl& m = *impl_;
+  if (!(h > 0.0)) throw std::invalid_argument("compliance: h must be > 0 s");
+  if (!m.system_valid) {
+    m.viscosity = BlockMatrix(m.model->pattern());
+    if (m.damping() > 0.0) {
+      m.model->viscosity(m.x, m.viscosity);
+      for (double& value : m.viscosity.values) value *= m.damping();
+    }
+    m.assemble(m.x, m.integrator(h), Definiteness::kPositive);
+    eliminate(m.prescribed, &m.A);
+    m.solver->setMatrix(m.A);
+    m.system_valid = true;
+  }
+  Vec b = Vec::Zero(m.x.size());
+  for (Eigen::SparseVector<double>::InnerIterator it(m.embedding.pointWeights(point)); it; ++it)
+    b.segment<3>(3 * it.index()) += it.value() * direction;
+  m.maskResidual(&b);
+  Vec w = Vec::Zero(b.size());
+  m.solver->solve(b, m.options.linear_tolerance, m.options.linear_iterations, &w);
+  return w / (h * h);
+}
+
+Eigen::MatrixXd DeformableBody::compliance(const std::vector<SurfacePoint>& points,
+                                           const std::vector<Vector3d>& directions,
+                                           double h) const {
+  if (points.size() != directions.size())
+    throw std::invalid_argument("compliance: needs one direction per point");
+  const int n = static_cast<int>(points.size());
+  std::vector<Eigen::SparseVector<double>> weights;
+  for (const SurfacePoint& p : points) weights.push_back(impl_->embedding.pointWeights(p));
+  Eigen::MatrixXd W(n, n);
+  for (int j = 0; j < n; ++j) {
+    const Vec column = complianceColumn(points[j], directions[j], h);
+    for (int i = 0; i < n; ++i) {
+      W(i, j) = 0.0;
+      for (Eigen::SparseVector<double>::InnerIterator it(weights[i]); it; ++it)
+        W(i, j) += it.value() * directions[i].dot(column.segment<3>(3 * it.index()));
+    }
+  }
+  return 0.5 * (W + W.transpose());
+}
+
+void DeformableBody::applyImpulses(const std::vector<SurfacePoint>& points,
+                                   const std::vector<Vector3d>& impulses, double h) {
+  if (points.size() != impulses.size())
+    throw std::invalid_argument("applyImpulses: needs one impulse per point");
+  for (std::size_t k = 0; k < points.size(); ++k)
+    if (!impulses[k].isZero(0.0)) impl_->v += complianceColumn(points[k], impulses[k], h);
+}
+
+// The grid follows its surface: rest nodes X + d with J d = new - old vertices in the least-squares
+// sense, smoothed by the body's own stiffness.
+void DeformableBody::setRestShape(const TriangleMesh& surface) {
+  Impl& m = *impl_;
+  if (surface.vertexCount() != m.embedding.vertexCount())
+    throw std::invalid_argument("rest shape: has " + std::to_string(surface.vertexCount()) +
+                                " vertices, the body's surface has " +
+                                std::to_string(m.embedding.vertexCount()));
+  BlockMatrix K;
+  const Vec rest = restPositions(m.model->mesh());
+  m.model->hessian(rest, Definiteness::kPositive, K);
+  double stiffest = 0.0;
+  for (int k : K.pattern->diagonal) stiffest = std::max(stiffest, K.block(k).trace());
+  const Eigen::Map<const Vec> target(surface.vertices.data(), 3 * surface.vertexCount());
+  const Vec miss = target - m.embedding.apply(rest);
+  const double spring = 100.0 * stiffest;
+  for (int v = 0; v < m.embedding.vertexCount(); ++v) {
+    const auto w = m.embedding.pointWeights(SurfacePoint::vertex(v));
+    for (Eigen::SparseVector<double>::InnerIterator p(w); p; ++p)
+      for (Eigen::SparseVector<double>::InnerIterator q(w); q; ++q)
+        K.block(K.pattern->find(p.index(), q.index())).diagonal().array() +=
+            spring * p.value() * q.value();
+  }
+  const auto cholesky = makeCholesky();
+  if (!cholesky->update(K))
+    throw std::runtime_error("rest shape: the grid cannot be carried along; build the body anew");
+  Vec d;
+  cholesky->apply(spring * m.embedding.applyTransposed(miss), d);
+  const Vec moved = rest + d;
+  setRestNodes(Eigen::Map<const NodeMatrix>(moved.data(), nodeCount(), 3));
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,197 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "body_impl.hpp"
+
+// Time steps and equilibria: damped Newton on the incremental potential of body_system.cpp.
+namespace calipso::fem {
+namespace {
+
+double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+Integrator DeformableBody::Impl::integrator(double h) const {
+  Integrator i;
+  const bool has_previous = previous && previous_h == h;
+  if (options.scheme == TimeScheme::kTrapezoidal) {
+    i.rate = 2.0 / h;
+    i.inertia = 4.0 / (h * h);
+    i.base = x + 0.5 * h * v;
+    i.predicted = x + h * v + 0.25 * h * h * a;
+  } else if (options.scheme == TimeScheme::kBdf2 && has_previous) {
+    i.rate = 1.5 / h;
+    i.inertia = i.rate * i.rate;
+    i.base = (4.0 * x - previous->first) / 3.0;
+    i.predicted = i.base + (4.0 * v - previous->second) / (3.0 * i.rate);
+  } else {
+    i.rate = 1.0 / h;
+    i.inertia = i.rate * i.rate;
+    i.base = x;
+    i.predicted = x + h * v;
+  }
+  return i;
+}
+
+bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, const Vec& residual,
+                                           const Vec& jump, double linear_tolerance,
+                                           StepReport* report, Vec* direction) {
+  for (const Definiteness definiteness : {Definiteness::kExact, Definiteness::kPositive}) {
+    Vec b = -residual;
+    assemble(y, i, definiteness);
+    // Prescribed components move by `jump`; what that does to the others goes to the right side.
+    if (!jump.isZero(0.0)) {
+      Vec AJ;
+      A.multiply(jump, AJ);
+      b -= AJ;
+    }
+    eliminate(prescribed, &A);
+    maskResidual(&b);
+    if (!solver->setMatrix(A)) continue;
+    direction->setZero(y.size());
+    const SolveReport solve =
+        solver->solve(b, linear_tolerance, options.linear_iterations, direction);
+    report->linear_iterations += solve.iterations;
+    if (!solve.positive) continue;
+    *direction += jump;
+    if (direction->allFinite()) return true;
+  }
+  solver->invalidate();
+  return false;
+}
+
+double DeformableBody::Impl::searchLine(const Vec& y, const Vec& direction, const Vec& residual,
+                                        const Integrator& i, const Vec& loads,
+                                        double energy) const {
+  constexpr double kSufficientDecrease = 1e-4;
+  constexpr double kSmallestStep = 1e-8;
+  const double slope = residual.dot(direction);
+  const double noise = 1e-13 * std::abs(energy);
+  for (double t = 1.0; t > kSmallestStep; t *= 0.5) {
+    const double trial = potential(y + t * direction, i, loads);
+    if (trial <= energy + kSufficientDecrease * t * slope + noise) return t;
+  }
+  return 0.0;
+}
+
+StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads, const Vec& targets,
+                                          bool linearised, Vec* y) {
+  StepReport report;
+  Vec jump = targets - *y;
+  Vec r = gradient(*y, i, loads);
+  Vec direction;
+  const double linear_tolerance = options.linear_tolerance;
+  const int most = linearised ? 1 : options.newton_iterations;
+  for (; report.newton_iterations < most; ++report.newton_iterations) {
+    Vec masked = r;
+    maskResidual(&masked);
+    report.residual = masked.norm() / forceScale(*y, i, loads);
+    if (!linearised && jump.isZero(0.0) && report.residual <= options.newton_tolerance) break;
+    if (!newtonDirection(*y, i, r, jump, linear_tolerance, &report, &direction)) {
+      report.message = "no positive definite system: the body is free to move without resistance, "
+                       "or its state is not finite";
+      return report;
+    }
+    const bool moved_boundary = !jump.isZero(0.0);
+    double t = 1.0;
+    if (!linearised && !moved_boundary) t = searchLine(*y, direction, masked, i, loads,
+                                                       potential(*y, i, loads));
+    if (t == 0.0) break;
+    *y += t * direction;
+    jump.setZero();
+    r = gradient(*y, i, loads);
+  }
+  Vec masked = r;
+  maskResidual(&masked);
+  report.residual = masked.norm() / forceScale(*y, i, loads);
+  report.converged = linearised || report.residual <= options.newton_tolerance;
+  reactions.setZero(x.size());
+  for (const auto& [dof, p] : prescribed) reactions[dof] = r[dof];
+  return report;
+}
+
+void DeformableBody::Impl::finishReport(StepReport* report) const {
+  report->kinetic_energy = 0.5 * v.dot(applyMass(v));
+  report->elastic_energy = model->energy(x);
+  const Eigen::VectorXd& m = model->lumpedMass();
+  for (int k = 0; k < m.size(); ++k) report->gravity_energy -= m[k] * gravity.dot(x.segment<3>(3 * k));
+  report->solver = toString(solver->kind());
+  report->recovering = model->model() == MaterialModel::kStVenantKirchhoff &&
+                       model->smallestDilatation(x) < kRecoveryDilatation;
+}
+
+StepReport DeformableBody::step(double h) {
+  Impl& m = *impl_;
+  if (!(h > 0.0) || !std::isfinite(h))
+    throw std::invalid_argument("time step h is " + std::to_string(h) + " s, allowed is > 0");
+  const auto start = std::chrono::steady_clock::now();
+  const Integrator i = m.integrator(h);
+  const Vec loads = m.externalForces();
+  const Vec targets = m.prescribedTargets(m.time + h);
+  if (m.damping() > 0.0) {
+    m.model->viscosity(m.x, m.viscosity);
+    for (double& value : m.viscosity.values) value *= m.damping();
+  }
+  Vec y = m.x;
+  StepReport report = m.minimise(i, loads, targets, m.options.linearised, &y);
+  if (y.allFinite()) {
+    const Vec v1 = i.rate * (y - i.base);
+    if (m.options.scheme == TimeScheme::kTrapezoidal) m.a = 2.0 / h * (v1 - m.v) - m.a;
+    m.previous = std::make_pair(m.x, m.v);
+    m.previous_h = h;
+    m.x = y;
+    m.v = v1;
+    m.rememberSoftForces(i);
+  } else {
+    report.converged = false;
+    report.message = "the step gave positions that are not finite; the state before it is kept";
+  }
+  m.time += h;
+  m.system_valid = true;
+  m.finishReport(&report);
+  report.milliseconds = millisecondsSince(start);
+  return report;
+}
+
+StepReport DeformableBody::solveStatic() {
+  Impl& m = *impl_;
+  const auto start = std::chrono::steady_clock::now();
+  Integrator rest;
+  rest.base = rest.predicted = m.x;
+  const Vec from = m.x, loads = m.externalForces(), targets = m.prescribedTargets(m.time);
+  StepReport report;
+  constexpr int kMostLoadSteps = 64;
+  // Load stepping: all loads and prescribed displacements grow together.
+  for (int steps = m.options.static_load_steps; steps <= kMostLoadSteps; steps *= 2) {
+    Vec y = from;
+    StepReport attempt;
+    for (int k = 1; k <= steps; ++k) {
+      const double s = static_cast<double>(k) / steps;
+      const StepReport part = m.minimise(rest, s * loads, from + s * (targets - from), false, &y);
+      attempt.converged = part.converged;
+      attempt.residual = part.residual;
+      attempt.message = part.message;
+      attempt.newton_iterations += part.newton_iterations;
+      attempt.linear_iterations += part.linear_iterations;
+      if (!part.converged) break;
+    }
+    const bool better = attempt.converged || steps == m.options.static_load_steps;
+    if (better && y.allFinite()) m.x = y;
+    report = attempt;
+    if (attempt.converged) break;
+  }
+  m.v.setZero();
+  m.a.setZero();
+  m.previous.reset();
+  m.rememberSoftForces(rest);
+  m.system_valid = false;
+  m.finishReport(&report);
+  report.milliseconds = millisecondsSince(start);
+  return report;
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,140 @@
+#include "branches.hpp"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <numeric>
+#include <unordered_map>
+
+namespace calipso::fem {
+namespace {
+
+using Eigen::Vector3i;
+
+constexpr int kMostBranches = 8;
+
+// Labels the parts of the solid within one cell: -1 empty, else the part, largest first.
+struct Parts {
+  std::vector<int> label;   // s^3, x fastest
+  std::vector<int> size;    // sub-voxels of each part
+};
+
+Parts labelParts(const CoveredCell& cell, const Occupancy& occupancy, int s) {
+  Parts parts;
+  parts.label.assign(s * s * s, -1);
+  const Vector3i low = cell.position * s;
+  const auto inside = [&](int i, int j, int k) {
+    return occupancy.get(low.x() + i, low.y() + j, low.z() + k);
+  };
+  std::vector<Vector3i> stack;
+  for (int seed = 0; seed < s * s * s; ++seed) {
+    const Vector3i start(seed % s, seed / s % s, seed / (s * s));
+    if (parts.label[seed] >= 0 || !inside(start.x(), start.y(), start.z())) continue;
+    const int label = static_cast<int>(parts.size.size());
+    parts.size.push_back(0);
+    parts.label[seed] = label;
+    stack.assign(1, start);
+    while (!stack.empty()) {
+      const Vector3i p = stack.back();
+      stack.pop_back();
+      ++parts.size[label];
+      for (int face = 0; face < 6; ++face) {
+        Vector3i n = p;
+        n[face / 2] += face % 2 ? 1 : -1;
+        if (n.minCoeff() < 0 || n.maxCoeff() >= s) continue;
+        int& l = parts.label[n.x() + s * (n.y() + s * n.z())];
+        if (l >= 0 || !inside(n.x(), n.y(), n.z())) continue;
+        l = label;
+        stack.push_back(n);
+      }
+    }
+  }
+  return parts;
+}
+
+// Specks below 2 % of the cell, and parts beyond kMostBranches, are counted to the largest part.
+void mergeSpecks(Parts* parts, int s) {
+  const int n = static_cast<int>(parts->size.size());
+  if (n < 2) return;
+  std::vector<int> order(n), renamed(n, 0);
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return parts->size[a] > parts->size[b]; });
+  std::vector<int> size;
+  for (int rank = 0; rank < n; ++rank) {
+    const int part = order[rank];
+    const bool keep = rank == 0 || (parts->size[part] * 50 > s * s * s && rank < kMostBranches);
+    renamed[part] = keep ? static_cast<int>(size.size()) : 0;
+    if (keep)
+      size.push_back(parts->size[part]);
+    else
+      size[0] += parts->size[part];
+  }
+  parts->size = size;
+  for (int& l : parts->label)
+    if (l >= 0) l = renamed[l];
+}
+
+// For every part of `a`: the set of parts of `b` behind the face that it touches.
+std::array<unsigned, kMostBranches> contacts(const Parts& a, const Parts& b, int face, int s) {
+  std::array<unsigned, kMostBranches> touched{};
+  const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+  for (int i = 0; i < s; ++i)
+    for (int j = 0; j < s; ++j) {
+      Vector3i p, q;
+      p[u] = q[u] = i;
+      p[v] = q[v] = j;
+      p[axis] = face % 2 ? s - 1 : 0;
+      q[axis] = face % 2 ? 0 : s - 1;
+      const int la = a.label[p.x() + s * (p.y() + s * p.z())];
+      const int lb = b.label[q.x() + s * (q.y() + s * q.z())];
+      if (la >= 0 && lb >= 0) touched[la] |= 1u << lb;
+    }
+  return touched;
+}
+
+using CellMap = std::map<std::array<int, 3>, int>;
+
+int neighbourOf(const CellMap& index, Vector3i p, int face) {
+  p[face / 2] += face % 2 ? 1 : -1;
+  const auto it = index.find({p.x(), p.y(), p.z()});
+  return it == index.end() ? -1 : it->second;
+}
+
+}  // namespace
+
+std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
+                                          const Occupancy& occupancy, int s) {
+  CellMap index;
+  std::vector<Parts> parts(cells.size());
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const Vector3i& p = cells[c].position;
+    index[{p.x(), p.y(), p.z()}] = static_cast<int>(c);
+    parts[c] = labelParts(cells[c], occupancy, s);
+    mergeSpecks(&parts[c], s);
+  }
+  std::vector<CoveredCell> result;
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    const int n = std::max<int>(1, static_cast<int>(parts[c].size.size()));
+    const double total = std::accumulate(parts[c].size.begin(), parts[c].size.end(), 0.0);
+    std::vector<CoveredCell> pieces(n, cells[c]);
+    for (int b = 0; b < n; ++b) {
+      pieces[b].branch = b;
+      if (n > 1) pieces[b].fraction *= parts[c].size[b] / total;
+    }
+    for (int face = 0; face < 6; ++face) {
+      const int other = neighbourOf(index, cells[c].position, face);
+      if (other < 0 || (n == 1 && parts[other].size.size() <= 1)) continue;
+      const auto touched = contacts(parts[c], parts[other], face, s);
+      for (int b = 0; b < n; ++b) pieces[b].neighbours[face] = touched[b];
+    }
+    // What touches nothing at all is a product of coarse sampling: it stays welded.
+    for (CoveredCell& piece : pieces)
+      if (std::all_of(piece.neighbours, piece.neighbours + 6, [](unsigned n) { return n == 0; }))
+        std::fill(piece.neighbours, piece.neighbours + 6, ~0u);
+    result.insert(result.end(), pieces.begin(), pieces.end());
+  }
+  return result;
+}
+
+}  // namespace calipso::fem

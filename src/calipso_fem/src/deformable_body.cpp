@@ -1,0 +1,194 @@
+#include "calipso_fem/deformable_body.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "body_impl.hpp"
+#include "threads.hpp"
+
+namespace calipso::fem {
+namespace {
+
+using Eigen::Vector3d;
+
+void requireSize(const Vec& given, Eigen::Index size, const std::string& what) {
+  if (given.size() != size)
+    throw std::invalid_argument(what + ": has " + std::to_string(given.size()) +
+                                " numbers, needs " + std::to_string(size));
+  if (!given.allFinite()) throw std::invalid_argument(what + ": a number is not finite");
+}
+
+void requireFinite(const Vector3d& given, const std::string& what) {
+  if (!given.allFinite()) throw std::invalid_argument(what + ": a component is not finite");
+}
+
+Embedding identityEmbedding(int nodes) {
+  Embedding embedding;
+  embedding.weights.resize(nodes, nodes);
+  embedding.weights.setIdentity();
+  return embedding;
+}
+
+VolumeMesh withElement(VolumeMesh hexes, ElementType element) {
+  return element == ElementType::kTetP1 && !hexes.isTetrahedral() ? kuhnSplit(hexes)
+                                                                  : std::move(hexes);
+}
+
+}  // namespace
+
+void DeformableBody::Impl::initialise(const Material& material) {
+  (void)material;
+  setThreads(options.threads);
+  if (!options.lumped_mass) mass = model->consistentMass();
+  solver = std::make_unique<LinearSolver>(model->mesh(), options.solver);
+  x = restPositions(model->mesh());
+  v = a = reactions = Vec::Zero(x.size());
+}
+
+void DeformableBody::Impl::invalidateSystem() {
+  solver->invalidate();
+  system_valid = false;
+  if (mass) mass = model->consistentMass();
+}
+
+DeformableBody::DeformableBody(const TriangleMesh& surface, const Material& material,
+                               const FemOptions& options)
+    : impl_(std::make_unique<Impl>()) {
+  validate(options);
+  VoxelizeOptions voxels;
+  voxels.cell_size = options.cell_size;
+  voxels.target_nodes = options.target_nodes;
+  impl_->options = options;
+  impl_->grid = voxelize(surface, voxels);
+  impl_->embedding = embed(surface.vertices, impl_->grid);
+  impl_->surface_triangles = surface.triangles;
+  impl_->model = std::make_unique<ElasticModel>(withElement(impl_->grid.mesh(), options.element),
+                                                material, options.material_model, options.element);
+  impl_->initialise(material);
+}
+
+DeformableBody::DeformableBody(VolumeMesh mesh, const Material& material, const FemOptions& options)
+    : impl_(std::make_unique<Impl>()) {
+  validate(options);
+  impl_->options = options;
+  impl_->embedding = identityEmbedding(mesh.nodeCount());
+  impl_->model = std::make_unique<ElasticModel>(withElement(std::move(mesh), options.element),
+                                                material, options.material_model, options.element);
+  impl_->initialise(material);
+}
+
+DeformableBody::~DeformableBody() = default;
+DeformableBody::DeformableBody(DeformableBody&&) noexcept = default;
+
+const ElasticModel& DeformableBody::model() const { return *impl_->model; }
+const Embedding& DeformableBody::embedding() const { return impl_->embedding; }
+const VoxelGrid& DeformableBody::grid() const { return impl_->grid; }
+const FemOptions& DeformableBody::options() const { return impl_->options; }
+int DeformableBody::nodeCount() const { return impl_->model->mesh().nodeCount(); }
+double DeformableBody::time() const { return impl_->time; }
+const Vec& DeformableBody::positions() const { return impl_->x; }
+const Vec& DeformableBody::velocities() const { return impl_->v; }
+
+void DeformableBody::setState(const Vec& positions, const Vec& velocities) {
+  requireSize(positions, impl_->x.size(), "positions");
+  requireSize(velocities, impl_->x.size(), "velocities");
+  impl_->x = positions;
+  impl_->v = velocities;
+  impl_->a.setZero();
+  impl_->previous.reset();
+}
+
+void DeformableBody::setRigidVelocity(const Vector3d& linear, const Vector3d& angular) {
+  requireFinite(linear, "linear velocity");
+  requireFinite(angular, "angular velocity");
+  const Vector3d center = momentum().center;
+  for (int k = 0; k < nodeCount(); ++k)
+    impl_->v.segment<3>(3 * k) = linear + angular.cross(impl_->x.segment<3>(3 * k) - center);
+  impl_->a.setZero();
+  impl_->previous.reset();
+}
+
+void DeformableBody::applyRigidTransform(const Eigen::Isometry3d& transform) {
+  for (int k = 0; k < nodeCount(); ++k) {
+    impl_->x.segment<3>(3 * k) = transform * Vector3d(impl_->x.segment<3>(3 * k));
+    impl_->v.segment<3>(3 * k) = transform.linear() * Vector3d(impl_->v.segment<3>(3 * k));
+  }
+  impl_->a.setZero();
+  impl_->previous.reset();
+  impl_->solver->invalidate();
+}
+
+void DeformableBody::reset() {
+  impl_->x = restPositions(impl_->model->mesh());
+  impl_->v.setZero();
+  impl_->a.setZero();
+  impl_->previous.reset();
+  impl_->time = 0.0;
+  impl_->solver->invalidate();
+}
+
+void DeformableBody::setMaterial(const Material& material) {
+  impl_->model->setMaterial(material);
+  impl_->invalidateSystem();
+}
+
+void DeformableBody::setCellMaterials(const std::vector<Material>& materials) {
+  impl_->model->setCellMaterials(materials);
+  impl_->invalidateSystem();
+}
+
+void DeformableBody::setGravity(const Vector3d& gravity) {
+  requireFinite(gravity, "gravity");
+  impl_->gravity = gravity;
+}
+
+void DeformableBody::setRestNodes(const NodeMatrix& nodes) {
+  impl_->model->setRestPositions(nodes);
+  impl_->invalidateSystem();
+}
+
+void DeformableBody::setTolerances(int newton_iterations, double newton_tolerance,
+                                   double linear_tolerance) {
+  FemOptions changed = impl_->options;
+  changed.newton_iterations = newton_iterations;
+  changed.newton_tolerance = newton_tolerance;
+  changed.linear_tolerance = linear_tolerance;
+  validate(changed);
+  impl_->options = changed;
+}
+
+void DeformableBody::setNodalForces(const Vec& forces) {
+  requireSize(forces, impl_->x.size(), "nodal forces");
+  impl_->nodal_forces = forces;
+}
+
+void DeformableBody::setSurfaceForces(const Vec& forces) {
+  requireSize(forces, 3 * impl_->embedding.vertexCount(), "surface forces");
+  impl_->surface_forces = forces;
+}
+
+void DeformableBody::setSoftConstraints(std::vector<SoftConstraint> constraints) {
+  impl_->soft.clear();
+  for (SoftConstraint& c : constraints) {
+    requireFinite(c.target, "soft constraint's target");
+    requireFinite(c.direction, "soft constraint's direction");
+    if (!(c.stiffness >= 0.0) || !(c.damping >= 0.0) || !std::isfinite(c.stiffness + c.damping))
+      throw std::invalid_argument("soft constraint: stiffness and damping must be >= 0 and finite");
+    Eigen::SparseVector<double> weights = impl_->embedding.pointWeights(c.point);
+    impl_->soft.push_back({std::move(c), std::move(weights)});
+  }
+}
+
+void DeformableBody::setPressure(double pressure) {
+  if (!std::isfinite(pressure)) throw std::invalid_argument("pressure is not finite");
+  impl_->pressure = pressure;
+}
+
+Vector3d DeformableBody::softConstraintForce(int index) const {
+  if (index < 0 || 3 * index >= impl_->soft_forces.size())
+    throw std::invalid_argument("soft constraint " + std::to_string(index) +
+                                " has not taken part in a step");
+  return impl_->soft_forces.segment<3>(3 * index);
+}
+
+}  // namespace calipso::fem

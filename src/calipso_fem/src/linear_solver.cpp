@@ -1,0 +1,105 @@
+#include "linear_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "multigrid.hpp"
+
+namespace calipso::fem {
+namespace {
+
+// Node counts up to which the choice was measured best; see the report.
+constexpr int kStaleCholeskyNodes = 1200;
+
+SolverKind chooseKind(const VolumeMesh& mesh) {
+  if (mesh.nodeCount() <= kStaleCholeskyNodes) return SolverKind::kStaleCholesky;
+  return mesh.lattice.rows() > 0 ? SolverKind::kMultigrid : SolverKind::kIncompleteCholesky;
+}
+
+std::unique_ptr<Preconditioner> makePreconditioner(const VolumeMesh& mesh, SolverKind kind) {
+  switch (kind) {
+    case SolverKind::kJacobi: return makeJacobi();
+    case SolverKind::kIncompleteCholesky: return makeIncompleteCholesky();
+    case SolverKind::kMultigrid: return makeMultigrid(mesh);
+    default: return makeCholesky();
+  }
+}
+
+// A stale preconditioner is renewed once it costs this many times the iterations of a fresh one.
+constexpr double kStaleFactor = 1.6;
+constexpr int kStaleSlack = 4;
+
+}  // namespace
+
+SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditioner, const Vec& b,
+                               double tolerance, int most_iterations, Vec* x) {
+  SolveReport report;
+  const double scale = b.norm();
+  Vec r, z, p, Ap;
+  A.multiply(*x, Ap);
+  r = b - Ap;
+  double residual = r.norm();
+  double rz = 0.0;
+  for (; report.iterations < most_iterations; ++report.iterations) {
+    if (residual <= tolerance * scale) break;
+    preconditioner.apply(r, z);
+    const double rz_next = r.dot(z);
+    p = report.iterations == 0 ? z : Vec(z + rz_next / rz * p);
+    rz = rz_next;
+    A.multiply(p, Ap);
+    const double curvature = p.dot(Ap);
+    if (!(curvature > 0.0) || !(rz > 0.0)) {
+      report.positive = false;
+      break;
+    }
+    const double step = rz / curvature;
+    *x += step * p;
+    r -= step * Ap;
+    residual = r.norm();
+  }
+  report.residual = scale > 0.0 ? residual / scale : residual;
+  report.converged = report.positive && residual <= tolerance * scale;
+  return report;
+}
+
+LinearSolver::LinearSolver(const VolumeMesh& mesh, SolverKind kind)
+    : kind_(kind == SolverKind::kAutomatic ? chooseKind(mesh) : kind),
+      preconditioner_(makePreconditioner(mesh, kind_)) {}
+
+bool LinearSolver::refresh() {
+  if (!preconditioner_->update(*A_)) {
+    stale_ = true;
+    return false;
+  }
+  stale_ = false;
+  current_ = true;
+  fresh_iterations_ = last_iterations_ = 0;
+  return true;
+}
+
+bool LinearSolver::setMatrix(const BlockMatrix& A) {
+  A_ = &A;
+  current_ = false;
+  const bool keeps = kind_ == SolverKind::kStaleCholesky || kind_ == SolverKind::kMultigrid;
+  const bool worn = last_iterations_ > kStaleFactor * fresh_iterations_ + kStaleSlack;
+  return keeps && !stale_ && !worn ? true : refresh();
+}
+
+SolveReport LinearSolver::solve(const Vec& b, double tolerance, int most_iterations, Vec* x) {
+  if (current_ && preconditioner_->isExact()) {
+    preconditioner_->apply(b, *x);
+    return {true, true, 0, 0.0};
+  }
+  SolveReport report =
+      conjugateGradients(*A_, *preconditioner_, b, tolerance, most_iterations, x);
+  last_iterations_ = report.iterations;
+  if (fresh_iterations_ == 0) fresh_iterations_ = std::max(1, report.iterations);
+  // A worn preconditioner can make CG stall; a fresh one gets a second chance.
+  if (!report.converged && !current_ && refresh()) {
+    x->setZero();
+    return solve(b, tolerance, most_iterations, x);
+  }
+  return report;
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "calipso_fem/fem_options.hpp"
+#include "preconditioner.hpp"
+
+namespace calipso::fem {
+
+struct SolveReport {
+  bool positive = true;      // false: A has shown a direction of negative curvature
+  bool converged = false;
+  int iterations = 0;
+  double residual = 0.0;     // |b - A x| / |b|
+};
+
+// Preconditioned conjugate gradients for A x = b, A symmetric. x is the start value on entry.
+SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditioner, const Vec& b,
+                               double tolerance, int most_iterations, Vec* x);
+
+// Solves a sequence of slowly changing systems on one pattern; chooses and refreshes the
+// preconditioner.
+class LinearSolver {
+ public:
+  LinearSolver(const VolumeMesh& mesh, SolverKind kind);
+
+  // @pre A stays unchanged until the last solve() with it
+  bool setMatrix(const BlockMatrix& A);
+  SolveReport solve(const Vec& b, double tolerance, int most_iterations, Vec* x);
+  SolverKind kind() const { return kind_; }
+  // The next setMatrix() rebuilds the preconditioner whatever its age.
+  void invalidate() { stale_ = true; }
+
+ private:
+  bool refresh();
+
+  SolverKind kind_;
+  std::unique_ptr<Preconditioner> preconditioner_;
+  const BlockMatrix* A_ = nullptr;
+  bool stale_ = true;          // nothing usable in the preconditioner
+  bool current_ = false;       // the preconditioner belongs to A_
+  int fresh_iterations_ = 0;   // CG iterations of the first solve after the last refresh
+  int last_iterations_ = 0;
+};
+
+}  // namespace calipso::fem

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+namespace calipso::fem {
+
+constexpr int kMaxCorners = 8;
+constexpr int kMaxPoints = 8;
+constexpr int kModes = 9;
+
+using CornerMatrix = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor, kMaxCorners, 3>;
+
+// What depends on a cell's rest shape alone; shared by cells of equal shape.
+struct ReferenceElement {
+  int corners = 0;   // 8 or 4
+  int points = 0;    // Gauss points: 8 or 1
+  double volume = 0.0;                                  // m^3, as if filled
+  std::array<double, kMaxPoints> weight{};              // m^3
+  std::array<CornerMatrix, kMaxPoints> gradient;        // dN_a/dX, corners x 3, 1/m
+  CornerMatrix center_gradient;                         // at the cell's centre
+  // Enhanced gradient modes (Simo and Rifai 1990; Simo and Armero 1992): the gradients of
+  // Wilson's bubbles 1 - xi_k^2, mapped with the centre's Jacobian so that the patch test holds:
+  // mode 3 k + c at a point is xi_k (j0/j) e_c (x) J0^-T e_k.
+  std::array<std::array<Eigen::Matrix3d, kModes>, kMaxPoints> mode;
+};
+
+// Shape functions of the trilinear hexahedron at parent coordinates xi in [-1, 1]^3, and derivatives.
+Eigen::Matrix<double, 8, 1> hexShape(const Eigen::Vector3d& xi);
+Eigen::Matrix<double, 8, 3> hexShapeDerivative(const Eigen::Vector3d& xi);
+
+// Parent coordinates of Gauss point q of the 2x2x2 rule; all weights are one.
+Eigen::Vector3d gaussPoint(int q);
+
+// @throw std::invalid_argument when the cell is inverted or has no volume
+ReferenceElement makeReferenceElement(const CornerMatrix& corners);
+
+// Mass matrix of a unit density between corners (row-major, corners x corners), m^3.
+Eigen::MatrixXd unitMass(const CornerMatrix& corners);
+
+}  // namespace calipso::fem
