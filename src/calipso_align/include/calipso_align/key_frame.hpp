@@ -23,8 +23,15 @@ std::vector<SegmentationTarget> segmentationTargets(const Scene& scene);
 // The scene's strokes (CV_8U), empty when it has none. @throw std::runtime_error naming the file
 cv::Mat loadStrokes(const Scene& scene);
 
-// Segments frame 0 (CV_8UC3, BGR) of a scene from what its user gave: rectangles and strokes.
+// Contours of all targets in a label image. @throw std::invalid_argument naming the object
+std::vector<ObjectContour> extractContours(const cv::Mat& image, const cv::Mat& labels,
+                                           const std::vector<SegmentationTarget>& targets);
+
+// Segments with these strokes (CV_8U or empty) and traces the contours; `image` is the segmenter's.
 // @throw std::invalid_argument naming object, value and remedy
+KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::Mat& strokes);
+
+// Segments frame 0 (CV_8UC3, BGR) of a scene from what its user gave: rectangles and strokes.
 KeyFrame segmentKeyFrame(const cv::Mat& image, const Scene& scene);
 
 // The same, reading the frame from the scene's folder.

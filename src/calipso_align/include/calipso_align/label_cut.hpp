@@ -7,7 +7,7 @@ namespace calipso::align {
 
 // How reluctantly labels change between neighbouring pixels.
 struct SmoothnessParams {
-  float gamma = 8.0f;        // cost of an edge between equal colours, nats
+  float gamma = 20.0f;        // cost of an edge between equal colours, nats
   float floor = 0.02f;       // share of gamma that even the strongest image edge still costs
 };
 

@@ -52,12 +52,11 @@ class Segmenter {
   struct Level;  // picture, constraints and labels at one resolution
 
   void checkStrokes(const cv::Mat& strokes) const;
-  void checkResult(const cv::Mat& strokes) const;
+  void checkResult() const;
   Level makeLevel(const cv::Mat& strokes, double scale) const;
   void initialiseModels(const Level& level);
   void refitModels(const Level& level);
   std::vector<cv::Mat> costs(const Level& level) const;
-  void cut(Level& level, const cv::Mat& free) const;
 
   cv::Mat image_;
   std::vector<SegmentationTarget> targets_;

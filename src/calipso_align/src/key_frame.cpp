@@ -1,0 +1,71 @@
+#include "calipso_align/key_frame.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+namespace calipso::align {
+namespace {
+
+double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+cv::Mat readImage(const std::string& path, int flags) {
+  cv::Mat image = cv::imread(path, flags);
+  if (image.empty())
+    throw std::runtime_error(path + ": no readable image; give a PNG or JPEG file");
+  return image;
+}
+
+std::string framePath(const Scene& scene, int frame) {
+  char name[4096];
+  std::snprintf(name, sizeof(name), scene.frame_pattern.c_str(), frame);
+  return scene.directory + "/" + name;
+}
+
+}  // namespace
+
+std::vector<SegmentationTarget> segmentationTargets(const Scene& scene) {
+  std::vector<SegmentationTarget> targets;
+  for (const SceneObject& object : scene.objects)
+    targets.push_back({object.name, object.index,
+                       cv::Rect(object.rect[0], object.rect[1], object.rect[2], object.rect[3]),
+                       {}});
+  return targets;
+}
+
+cv::Mat loadStrokes(const Scene& scene) {
+  return scene.strokes_path.empty() ? cv::Mat() : readImage(scene.strokes_path, cv::IMREAD_GRAYSCALE);
+}
+
+std::vector<ObjectContour> extractContours(const cv::Mat& image, const cv::Mat& labels,
+                                           const std::vector<SegmentationTarget>& targets) {
+  std::vector<ObjectContour> contours;
+  for (const SegmentationTarget& target : targets)
+    contours.push_back(extractContour(image, labels, target.label, target.name));
+  return contours;
+}
+
+KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::Mat& strokes) {
+  KeyFrame result;
+  const auto start = std::chrono::steady_clock::now();
+  result.labels = segmenter.segment(strokes).clone();
+  result.segmentation_ms = millisecondsSince(start);
+  const auto traced = std::chrono::steady_clock::now();
+  result.contours = extractContours(image, result.labels, segmenter.targets());
+  result.contour_ms = millisecondsSince(traced);
+  return result;
+}
+
+KeyFrame segmentKeyFrame(const cv::Mat& image, const Scene& scene) {
+  Segmenter segmenter(image, segmentationTargets(scene));
+  return segmentKeyFrame(image, segmenter, loadStrokes(scene));
+}
+
+KeyFrame segmentKeyFrame(const Scene& scene) {
+  return segmentKeyFrame(readImage(framePath(scene, 0), cv::IMREAD_COLOR), scene);
+}
+
+}  // namespace calipso::align

@@ -1,0 +1,116 @@
+#include "ros/segmentation_ros.hpp"
+
+#include <cv_bridge/cv_bridge.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <chrono>
+#include <stdexcept>
+
+#include "calipso_align/overlay.hpp"
+#include "calipso_ros/node_main.hpp"
+#include "calipso_ros/topics.hpp"
+#include "ros/segmentation_conversions.hpp"
+
+namespace calipso::align {
+namespace {
+
+// Every clip frame counts, so the queues of bag mode have no limit; a live camera's frames may drop.
+constexpr unsigned kUnlimited = 0, kLiveQueue = 2;
+constexpr bool kLatched = true;
+
+double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+SegmentationNodeParams loadSegmentationParams(const ros::NodeHandle& pnh) {
+  SegmentationNodeParams params{requiredParam<std::string>(pnh, "scene"),
+                                requiredParam<std::string>(pnh, "mode")};
+  if (params.mode != "bag" && params.mode != "live")
+    throw std::invalid_argument("parameter " + pnh.resolveName("mode") + " is '" + params.mode +
+                                "'; use bag or live");
+  return params;
+}
+
+SegmentationRos::SegmentationRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
+    : params_(loadSegmentationParams(pnh)),
+      scene_(loadScene(params_.scene)),
+      reporter_(nh, "segmentation"),
+      strokes_(loadStrokes(scene_)) {
+  const bool bag = params_.mode == "bag";
+  segmentation_publisher_ = nh.advertise<calipso_msgs::Segmentation>(
+      topics::kSegmentation, kUnlimited,
+      [this](const ros::SingleSubscriberPublisher& subscriber) { onSubscriber(subscriber); });
+  overlay_publisher_ = nh.advertise<sensor_msgs::Image>(topics::kOverlay, 1, kLatched);
+  strokes_subscriber_ = nh.subscribe(topics::kStrokes, 1, &SegmentationRos::onStrokes, this);
+  image_subscriber_ = nh.subscribe(bag ? topics::kClipImage : topics::kImage,
+                                   bag ? kUnlimited : kLiveQueue, &SegmentationRos::onImage, this);
+  reporter_.starting("waiting for the key frame");
+}
+
+// A subscriber that comes late gets the key frame first: latching alone would give it the last one.
+void SegmentationRos::onSubscriber(const ros::SingleSubscriberPublisher& subscriber) {
+  if (key_message_) subscriber.publish(*key_message_);
+}
+
+void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
+  try {
+    if (key_image_.empty())
+      adoptKeyFrame(msg);
+    else if (tracker_)
+      trackFrame(msg);
+  } catch (const std::exception& error) {
+    reporter_.warn(msg->header.stamp, error.what());
+  }
+  if (params_.mode == "bag") reporter_.clipFrameDone();
+}
+
+void SegmentationRos::onStrokes(const sensor_msgs::ImageConstPtr& msg) {
+  try {
+    strokes_ = labelsFromMsg(*msg);
+    if (!key_image_.empty()) segment();
+  } catch (const std::exception& error) {
+    reporter_.warn(msg->header.stamp, error.what());
+  }
+}
+
+void SegmentationRos::adoptKeyFrame(const sensor_msgs::ImageConstPtr& msg) {
+  key_image_ = colourImageFromMsg(msg).clone();
+  key_header_ = msg->header;
+  segment();
+}
+
+void SegmentationRos::segment() {
+  reporter_.preparing("segmenting the key frame");
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    if (!segmenter_)
+      segmenter_ = std::make_unique<Segmenter>(key_image_, segmentationTargets(scene_));
+    const KeyFrame key = segmentKeyFrame(key_image_, *segmenter_, strokes_);
+    tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels);
+    key_message_ = boost::make_shared<calipso_msgs::Segmentation>(
+        toMsg(key_header_, key.labels, key.contours, 1.0f));
+    segmentation_publisher_.publish(key_message_);
+    publishOverlay(key);
+    reporter_.ready("key frame segmented");
+  } catch (const std::exception& error) {
+    reporter_.failed(error.what());
+  }
+  reporter_.timing(key_header_.stamp, millisecondsSince(start));
+}
+
+void SegmentationRos::trackFrame(const sensor_msgs::ImageConstPtr& msg) {
+  const auto start = std::chrono::steady_clock::now();
+  const TrackedMask tracked = tracker_->track(colourImageFromMsg(msg));
+  segmentation_publisher_.publish(toMsg(msg->header, tracked.labels, {}, tracked.confidence));
+  reporter_.timing(msg->header.stamp, millisecondsSince(start));
+}
+
+void SegmentationRos::publishOverlay(const KeyFrame& key) {
+  const cv::Mat picture = drawOverlay(key_image_, key.labels, key.contours);
+  overlay_publisher_.publish(
+      cv_bridge::CvImage(key_header_, sensor_msgs::image_encodings::BGR8, picture).toImageMsg());
+}
+
+}  // namespace calipso::align
