@@ -73,10 +73,10 @@ void checkCameraInfo(const sensor_msgs::CameraInfo& info, const sensor_msgs::Ima
     fail(where, "camera_info has focal lengths " + std::to_string(info.K[0]) + ", " +
                     std::to_string(info.K[4]) + " px; record a calibrated camera");
   }
-}
-
-bool isDistorted(const sensor_msgs::CameraInfo& info) {
-  return std::any_of(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; });
+  if (std::any_of(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; })) {
+    fail(where, "camera_info has distortion, first coefficient " + std::to_string(info.D[0]) +
+                    "; undistort the images first (image_proc)");
+  }
 }
 
 }  // namespace calipso::bag

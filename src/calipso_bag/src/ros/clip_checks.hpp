@@ -17,10 +17,8 @@ void checkImage(const sensor_msgs::Image& image, const std::string& where);
 void checkFollows(const sensor_msgs::Image& image, const sensor_msgs::Image& first,
                   const ros::Time& previous, const std::string& where);
 
-// Calibrated, and for images of this size.
+// Calibrated, without distortion, and for images of this size.
 void checkCameraInfo(const sensor_msgs::CameraInfo& info, const sensor_msgs::Image& image,
                      const std::string& where);
-
-bool isDistorted(const sensor_msgs::CameraInfo& info);
 
 }  // namespace calipso::bag

@@ -1,0 +1,59 @@
+#include <sensor_msgs/CameraInfo.h>
+
+#include "calipso_ros/node_main.hpp"
+#include "calipso_ros/topics.hpp"
+#include "calipso_scene/scene.hpp"
+#include "ros/edit_files.hpp"
+#include "ros/node_watch.hpp"
+#include "ros/wait.hpp"
+
+namespace {
+
+using calipso::bag::NodeState;
+
+// Sends a file of edits into a running graph. Live video has no first frame to count from: the
+// times of the edits count from the first frame after the simulator and the renderer are ready.
+void sendEdits(ros::NodeHandle& nh, const ros::NodeHandle& pnh) {
+  constexpr double kOneHourSec = 3600.0;
+  const calipso::Scene scene =
+      calipso::loadScene(calipso::requiredParam<std::string>(pnh, "scene"));
+  const std::string path = calipso::requiredParam<std::string>(pnh, "edits");
+  calipso::bag::readEdits(path, scene, ros::Time(1.0));  // complain early
+
+  calipso::bag::NodeWatch watch(nh, calipso::bag::Preparation::Roles());
+  ros::Publisher edits = nh.advertise<calipso_msgs::Edit>(calipso::topics::kEdits, 1000);
+  const auto ready = [&] {
+    return watch.preparation().standing("simulator").state == NodeState::kReady &&
+           watch.preparation().standing("render").state == NodeState::kReady &&
+           edits.getNumSubscribers() > 0;
+  };
+  while (!calipso::bag::waitFor(ready, kOneHourSec)) {
+  }
+  ros::Time first;
+  const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> on_frame =
+      [&](const sensor_msgs::CameraInfoConstPtr& info) { first = info->header.stamp; };
+  const ros::Subscriber frames =
+      nh.subscribe<sensor_msgs::CameraInfo>(calipso::topics::kCameraInfo, 1, on_frame);
+  while (!calipso::bag::waitFor([&] { return !first.isZero(); }, kOneHourSec)) {
+  }
+  for (const calipso_msgs::Edit& edit : calipso::bag::readEdits(path, scene, first)) {
+    edits.publish(edit);
+  }
+  ROS_INFO_STREAM("edits sent; they count from the frame at " << first.toSec() << " s");
+  ros::spin();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "send_edits");
+  ros::NodeHandle nh;
+  const ros::NodeHandle pnh("~");
+  try {
+    sendEdits(nh, pnh);
+    return 0;
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM("send_edits: " << error.what());
+    return 1;
+  }
+}

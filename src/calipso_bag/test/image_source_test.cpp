@@ -1,0 +1,70 @@
+#include "calipso_bag/image_source.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+#include "temporary_folder.hpp"
+
+using namespace calipso::bag;
+
+namespace {
+
+void writeGrey(const std::string& path, int value, cv::Size size = {8, 6}) {
+  cv::imwrite(path, cv::Mat(size, CV_8UC3, cv::Scalar::all(value)));
+}
+
+int greyOf(const std::optional<cv::Mat>& image) { return image->at<cv::Vec3b>(0, 0)[0]; }
+
+}  // namespace
+
+TEST(Sequence, GivesItsFramesInOrder) {
+  const TemporaryFolder folder;
+  for (int i = 0; i < 3; ++i) writeGrey(folder / (std::to_string(i) + ".png"), 10 * i);
+  const auto source = openSequence(folder / "", "%d.png", 3, 25.0);
+  EXPECT_DOUBLE_EQ(source->fps(), 25.0);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(greyOf(source->next()), 10 * i);
+  EXPECT_FALSE(source->next());
+}
+
+TEST(Sequence, NamesAMissingFrameAndAChangeOfSize) {
+  const TemporaryFolder folder;
+  writeGrey(folder / "0.png", 1);
+  writeGrey(folder / "1.png", 1, {9, 6});
+  const auto sizes = openSequence(folder / "", "%d.png", 3, 25.0);
+  sizes->next();
+  EXPECT_NE(messageOf([&] { sizes->next(); }).find("9x6"), std::string::npos);
+  EXPECT_NE(messageOf([&] { sizes->next(); }).find("2.png"), std::string::npos);
+}
+
+TEST(Sequence, RejectsPatternsThatAreNotOneInteger) {
+  for (const char* pattern : {"%s.png", "%d%d.png", "%n.png", "0.png", "%*d.png"}) {
+    EXPECT_THROW(openSequence("", pattern, 1, 25.0), std::invalid_argument) << pattern;
+  }
+}
+
+TEST(HoldLast, ContinuesAShortClip) {
+  const TemporaryFolder folder;
+  writeGrey(folder / "still.png", 77);
+  const auto source = holdLast(openVideo(folder / "still.png"), 4);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(greyOf(source->next()), 77);
+  EXPECT_FALSE(source->next());
+}
+
+TEST(HoldLast, LeavesALongClipAlone) {
+  const TemporaryFolder folder;
+  for (int i = 0; i < 3; ++i) writeGrey(folder / (std::to_string(i) + ".png"), i);
+  const auto source = holdLast(openSequence(folder / "", "%d.png", 3, 25.0), 2);
+  int count = 0;
+  while (source->next()) ++count;
+  EXPECT_EQ(count, 3);
+}
+
+TEST(OpenVideo, NamesAFileThatIsNeitherVideoNorImage) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "notes.txt") << "words";
+  EXPECT_NE(messageOf([&] { openVideo(folder / "notes.txt"); }).find("notes.txt"),
+            std::string::npos);
+}

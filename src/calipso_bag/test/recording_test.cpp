@@ -1,0 +1,148 @@
+#include <calipso_msgs/EditReport.h>
+#include <gtest/gtest.h>
+#include <rosbag/view.h>
+#include <std_msgs/String.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "ros/edit_files.hpp"
+#include "ros/output_bag.hpp"
+#include "ros/stamped_writer.hpp"
+#include "temporary_folder.hpp"
+
+using namespace calipso;
+using namespace calipso::bag;
+
+namespace {
+
+std_msgs::StringConstPtr text(const std::string& words) {
+  const auto message = boost::make_shared<std_msgs::String>();
+  message->data = words;
+  return message;
+}
+
+std::string wordsIn(const std::string& path, const std::string& topic) {
+  rosbag::Bag bag(path, rosbag::bagmode::Read);
+  rosbag::View view(bag, rosbag::TopicQuery(topic));
+  std::string words;
+  for (const rosbag::MessageInstance& message : view) {
+    words += message.instantiate<std_msgs::String>()->data + " ";
+  }
+  return words;
+}
+
+Scene sceneWithPear() {
+  Scene scene;
+  scene.objects.resize(1);
+  scene.objects[0].name = "pear";
+  return scene;
+}
+
+}  // namespace
+
+TEST(OutputBag, HasItsNameOnlyWhenItIsFinished) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "new/folder/out.bag";
+  {
+    OutputBag output(path);
+    output.bag().write("/words", ros::Time(1.0), *text("a"));
+    EXPECT_FALSE(std::filesystem::exists(path));
+  }
+  EXPECT_FALSE(std::filesystem::exists(path)) << "an unfinished bag must not look complete";
+  OutputBag output(path);
+  output.bag().write("/words", ros::Time(1.0), *text("a"));
+  output.finish();
+  EXPECT_EQ(wordsIn(path, "/words"), "a ");
+  EXPECT_FALSE(std::filesystem::exists(path + ".active"));
+}
+
+TEST(OutputBag, SaysWhereItCannotBeWritten) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "file") << "not a folder";
+  const std::string text = messageOf([&] { OutputBag output(folder / "file/out.bag"); });
+  EXPECT_NE(text.find("file/out.bag: cannot be written"), std::string::npos) << text;
+}
+
+TEST(StampedWriter, OrdersByStampThenRankAndKeepsTheFirst) {
+  const TemporaryFolder folder;
+  OutputBag output(folder / "out.bag");
+  StampedWriter writer(output.bag());
+  writer.add<std_msgs::String>("/b", ros::Time(2.0), "", text("late"));
+  writer.add<std_msgs::String>("/b", ros::Time(1.0), "", text("early"));
+  writer.add<std_msgs::String>("/a", ros::Time(1.0), "y", text("second"));
+  writer.add<std_msgs::String>("/a", ros::Time(1.0), "x", text("first"));
+  writer.add<std_msgs::String>("/a", ros::Time(1.0), "x", text("doubled"));
+  writer.flush(ros::Time(1.0));
+  writer.add<std_msgs::String>("/a", ros::Time(2.0), "", text("third"));
+  writer.flushAll();
+  output.finish();
+  EXPECT_EQ(wordsIn(folder / "out.bag", "/a"), "first second third ");
+  EXPECT_EQ(wordsIn(folder / "out.bag", "/b"), "early late ");
+}
+
+// Two recordings of the same messages that arrived in different orders are the same file.
+TEST(StampedWriter, ArrivalDoesNotShow) {
+  const TemporaryFolder folder;
+  const auto record = [&](const std::string& name, bool swapped) {
+    OutputBag output(folder / name);
+    StampedWriter writer(output.bag());
+    for (int i = 0; i < 2; ++i) {
+      const std::string topic = (i == 1) != swapped ? "/a" : "/b";
+      writer.add<std_msgs::String>(topic, ros::Time(1.0), "", text(topic));
+    }
+    writer.flushAll();
+    output.finish();
+    std::ifstream file(folder / name, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  EXPECT_EQ(record("one.bag", false), record("other.bag", true));
+}
+
+TEST(ReadEdits, NoneMeansNone) {
+  EXPECT_TRUE(readEdits("", sceneWithPear(), ros::Time(1.0)).empty());
+  EXPECT_TRUE(readEdits("none", sceneWithPear(), ros::Time(1.0)).empty());
+}
+
+TEST(ReadEdits, YamlTimesCountFromTheFirstFrame) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "edits.yaml")
+      << "- {t: 0.5, object: pear, kind: material, mode: factor, youngs_modulus: 2}\n"
+         "- {t: 0.25, object: pear, kind: remove}\n";
+  const auto edits = readEdits(folder / "edits.yaml", sceneWithPear(), ros::Time(10.0));
+  ASSERT_EQ(edits.size(), 2u);
+  EXPECT_EQ(edits[0].kind, "remove");
+  EXPECT_EQ(edits[0].header.stamp, ros::Time(10.25));
+  EXPECT_EQ(edits[1].header.stamp, ros::Time(10.5));
+  EXPECT_DOUBLE_EQ(edits[1].youngs_modulus, 2.0);
+}
+
+TEST(ReadEdits, AnEditedBagRepeatsWhatWasApplied) {
+  const TemporaryFolder folder;
+  calipso_msgs::EditReport report;
+  report.header.stamp = ros::Time(10.3);
+  report.accepted = true;
+  report.edit.object = "pear";
+  report.edit.kind = calipso_msgs::Edit::REMOVE;
+  calipso_msgs::EditReport refused = report;
+  refused.accepted = false;
+  {
+    rosbag::Bag bag(folder / "edited.bag", rosbag::bagmode::Write);
+    bag.write("/calipso/edits/applied", ros::Time(10.3), report);
+    bag.write("/calipso/edits/applied", ros::Time(10.4), refused);
+  }
+  const auto edits = readEdits(folder / "edited.bag", sceneWithPear(), ros::Time(10.0));
+  ASSERT_EQ(edits.size(), 1u);
+  EXPECT_EQ(edits[0].header.stamp, ros::Time(10.3)) << "sent for the next frame: that one";
+}
+
+TEST(ReadEdits, NamesFileAndUnknownObject) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "edits.yaml") << "- {t: 0, object: plum, kind: remove}\n";
+  const std::string text = messageOf(
+      [&] { readEdits(folder / "edits.yaml", sceneWithPear(), ros::Time(10.0)); });
+  EXPECT_NE(text.find("edits.yaml"), std::string::npos) << text;
+  EXPECT_NE(text.find("plum"), std::string::npos) << text;
+  EXPECT_NE(text.find("pear"), std::string::npos) << text;
+}
