@@ -1,0 +1,40 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_render/clip_sample.hpp"
+
+namespace calipso::render {
+
+// The place without the objects, seen from the key frame's camera.
+struct Background {
+  cv::Mat plate;   // CV_32FC3, code values
+  cv::Mat count;   // CV_8UC1: frames of the sample in which the pixel was seen (at most 255)
+  cv::Mat spread;  // CV_32FC1: median absolute deviation over time, code values
+  cv::Mat invented;  // CV_8UC1: 255 where no frame shows it
+  cv::Mat origin;  // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
+};
+
+struct BackgroundParams {
+  int mask_margin_px = 3;      // masks are grown by this: mixed pixels and compression belong to the object
+  double shadow_step = 0.06;   // a pixel darker by more than this fraction may be shaded by an object
+};
+
+// Temporal median of every pixel over the frames in which no object covers it (masks grown), refined
+// to the mean of the values around the median. `objects_move`: darker groups of values are taken for
+// the passing objects' shadows and left out. Nothing is invented: where count is 0 the plate is 0.
+// @param frames all as seen from the key frame's camera; outside the picture labels are 255
+Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_move,
+                          const BackgroundParams& params = {});
+
+// Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects darken in
+// every frame), from the surroundings.
+void inventBackground(const cv::Mat& shaded, Background& background);
+
+// The key frame with its noise averaged away where the sample shows the same thing all the time
+// (same label, value within the noise); elsewhere the key frame itself. CV_32FC3, code values.
+// @param steadiness CV_8UC1 out: number of frames averaged, 1..255
+cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness);
+
+}  // namespace calipso::render

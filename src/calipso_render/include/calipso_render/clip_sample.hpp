@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_scene/camera.hpp"
+
+namespace calipso::render {
+
+// One frame of the clip with what belongs to which object.
+struct ClipFrame {
+  cv::Mat bgr;     // CV_8UC3
+  cv::Mat labels;  // CV_8UC1: 0 none, else an object's index
+  Camera camera;
+};
+
+// An evenly spaced sample of a clip of unknown length in bounded memory: when the store is full, every
+// other frame goes and from then on half as many come in. The first frame (the key frame) stays.
+class ClipSample {
+ public:
+  explicit ClipSample(std::size_t capacity = 24) : capacity_(capacity) {}
+
+  // Keeps or drops the frame. Pictures are copied. @throw std::invalid_argument if sizes differ
+  void add(const ClipFrame& frame);
+
+  const std::vector<ClipFrame>& frames() const { return frames_; }
+  std::size_t seen() const { return seen_; }
+
+ private:
+  std::size_t capacity_, stride_ = 1, seen_ = 0;
+  std::vector<ClipFrame> frames_;
+};
+
+}  // namespace calipso::render

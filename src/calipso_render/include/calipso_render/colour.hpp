@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+
+namespace calipso::render {
+
+// Light adds up in linear RGB; pictures hold sRGB code values (IEC 61966-2-1). Linear values here are
+// in [0, 1], 1 = code value 255. Channel order is OpenCV's B, G, R.
+
+// Linear value of a code value.
+float linearFromCode(std::uint8_t code);
+
+// The same for a code value that is a real number in [0, 255].
+float linearFromRealCode(float code);
+
+// Code value as a real number in [0, 255] of a linear value; clamps to [0, 1] first.
+float codeFromLinear(float linear);
+
+// CV_8UC3 -> CV_32FC3 and back (rounded).
+cv::Mat linearFromCode(const cv::Mat& bgr);
+cv::Mat codeFromLinear(const cv::Mat& linear);
+
+// Rounds a code value to the nearest representable one.
+inline std::uint8_t quantise(float code) {
+  return static_cast<std::uint8_t>(code <= 0.0f ? 0 : code >= 255.0f ? 255 : code + 0.5f);
+}
+
+// Rec. 709 luminance of a linear B, G, R triple.
+inline float luminance(const cv::Vec3f& c) { return 0.0722f * c[0] + 0.7152f * c[1] + 0.2126f * c[2]; }
+
+}  // namespace calipso::render

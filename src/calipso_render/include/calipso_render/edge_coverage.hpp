@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_render/rasterizer.hpp"
+
+namespace calipso::render {
+
+// An edge of a mesh and the two triangles beside it (b = -1 at a border).
+struct MeshEdge {
+  int from, to, a, b;
+};
+
+// Every edge once, in a fixed order.
+std::vector<MeshEdge> meshEdges(const Triangles& triangles);
+
+// Sub-pixel visibility where one is needed: 4 x 4 samples in the pixels that a silhouette crosses.
+// Inside a silhouette the pixel's centre speaks for it.
+class EdgeCoverage {
+ public:
+  static constexpr int kGrid = 4;
+  static constexpr int kSamples = kGrid * kGrid;
+  struct Pixel {
+    std::array<std::uint32_t, kSamples> ids;
+    std::array<float, kSamples> nearness;
+  };
+
+  // Chooses the pixels in which `centre` sees another object than in a neighbour.
+  explicit EdgeCoverage(const VisibilityBuffer& centre);
+
+  // Adds the pixels that the mesh's own silhouette crosses (parts thinner than a pixel).
+  void chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges);
+
+  // Draws into the chosen pixels. @pre nothing is chosen after the first draw
+  void draw(const ScreenMesh& mesh, int object);
+
+  // nullptr where the pixel's centre speaks for it. Picture coordinates.
+  const Pixel* at(int u, int v) const;
+
+  // Position of a sample against its pixel's centre, px.
+  static Eigen::Vector2f offset(int sample) {
+    return {(sample % kGrid + 0.5f) / kGrid - 0.5f, (sample / kGrid + 0.5f) / kGrid - 0.5f};
+  }
+
+ private:
+  void choose(int column, int row);  // region coordinates
+  void drawTriangle(const ScreenMesh& mesh, int triangle, std::uint32_t id);
+
+  cv::Rect region_;
+  std::vector<int> slots_;  // per pixel of the region: index into pixels_, -1 = none
+  std::vector<Pixel> pixels_;
+};
+
+}  // namespace calipso::render

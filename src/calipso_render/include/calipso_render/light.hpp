@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <opencv2/core.hpp>
+
+namespace calipso::render {
+
+// Distant light: a disc (the sun) and ambient light in real spherical harmonics up to second order,
+// band 0 first, in the world frame. Colours are linear B, G, R, in units of the radiance that a white
+// diffuse surface sends out under them (irradiance / pi).
+struct Light {
+  Eigen::Vector3f direction = Eigen::Vector3f::UnitZ();  // unit, towards the sun, world
+  cv::Vec3f sun = {0.6f, 0.6f, 0.6f};
+  std::array<cv::Vec3f, 9> ambient = {cv::Vec3f(0.4f, 0.4f, 0.4f)};  // times the basis of shBasis()
+  float angular_radius = 0.02f;  // of the sun, rad
+};
+
+// Torrance-Sparrow lobe with Beckmann's distribution: specular strength ks, roughness m.
+struct Gloss {
+  float specular = 0.0f;   // ks, reflectance at normal incidence
+  float roughness = 0.4f;  // m, root mean square slope of the facets
+};
+
+// 1, then the eight of bands 1 and 2, scaled so that band 0 is 1 (Ramamoorthi and Hanrahan 2001).
+std::array<float, 9> shBasis(const Eigen::Vector3f& n);
+
+cv::Vec3f ambientAt(const Light& light, const Eigen::Vector3f& n);
+
+// Radiance of a white diffuse surface with unit normal n; `sun`, `sky`: visible fraction of each.
+cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky = 1.0f);
+
+// D G F / (4 n.v) of Torrance and Sparrow 1967, per ks (F: Schlick's form, divided by ks is near 1 away
+// from grazing angles; included by the caller's ks). l, v: unit, towards light and viewer.
+float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v, float m);
+
+}  // namespace calipso::render

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace calipso::render {
+
+// The camera's noise: standard deviation in code values against code value, per channel.
+class NoiseModel {
+ public:
+  NoiseModel();  // a camera without noise
+
+  // From pictures of the same place: spread over time per code value, where `steady` (CV_8UC1) is not
+  // 0. With a single picture: from its finest detail, by the median, which edges do not move.
+  // @pre frames: CV_8UC3, all of one size, at least one
+  static NoiseModel estimate(const std::vector<cv::Mat>& frames, const cv::Mat& steady);
+
+  // Code values, >= 0.
+  float deviation(int channel, float code) const;
+
+ private:
+  static constexpr int kKnots = 9;  // at code values 0, 32, .. 256
+  std::array<std::array<float, kKnots>, 3> deviation_;
+};
+
+// Noise of unit variance per channel, half of it correlated between neighbours as demosaicing and
+// compression leave it. The same stamp and pixel always get the same value, whatever is drawn first.
+class NoiseField {
+ public:
+  explicit NoiseField(std::int64_t stamp_ns);
+  float at(int u, int v, int channel) const {
+    return tile()[((v + shift_v_) & (kSide - 1)) * kSide + ((u + shift_u_) & (kSide - 1))][channel];
+  }
+
+ private:
+  static constexpr int kSide = 256;
+  static const std::vector<cv::Vec3f>& tile();
+  int shift_u_, shift_v_;
+};
+
+}  // namespace calipso::render

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_scene/camera.hpp"
+
+namespace calipso::render {
+
+using Points = std::vector<Eigen::Vector3f>;
+using Triangles = std::vector<Eigen::Vector3i>;
+
+// A mesh on a picture plane: x, y in pixels, z = nearness. Nearness is any quantity that is linear in
+// the picture and grows towards the viewer: 1 / depth (1/m) for a pinhole camera, height towards the
+// light (m) for a parallel projection. A vertex that cannot be projected has nearness NaN.
+struct ScreenMesh {
+  Points points;
+  const Triangles* triangles = nullptr;
+};
+
+// @param world #V points in the world, m
+ScreenMesh projectMesh(const Points& world, const Triangles& triangles, const Camera& camera);
+
+// Bounding rectangle in whole pixels, grown by `margin` px and clipped to `size`.
+cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size);
+
+// Which surface each pixel sees: one sample at the pixel's centre, nearest surface wins.
+class VisibilityBuffer {
+ public:
+  static constexpr std::uint32_t kNothing = 0xffffffffu;
+
+  // @param region of the picture that is kept; everything outside is clipped
+  explicit VisibilityBuffer(const cv::Rect& region);
+
+  // @param object 0..254, slot by which objectOf() names the mesh
+  void draw(const ScreenMesh& mesh, int object);
+
+  const cv::Rect& region() const { return region_; }
+  // Region coordinates.
+  const std::uint32_t* ids(int row) const { return &ids_[static_cast<std::size_t>(row) * region_.width]; }
+  const float* nearness(int row) const { return &near_[static_cast<std::size_t>(row) * region_.width]; }
+  // Picture coordinates; outside the region nothing is seen.
+  std::uint32_t idAt(int u, int v) const {
+    u -= region_.x, v -= region_.y;
+    const bool inside = u >= 0 && v >= 0 && u < region_.width && v < region_.height;
+    return inside ? ids(v)[u] : kNothing;
+  }
+  float nearnessAt(int u, int v) const {
+    u -= region_.x, v -= region_.y;
+    const bool inside = u >= 0 && v >= 0 && u < region_.width && v < region_.height;
+    return inside ? nearness(v)[u] : kFar;
+  }
+
+  static int objectOf(std::uint32_t id) { return static_cast<int>(id >> 24); }
+  static int triangleOf(std::uint32_t id) { return static_cast<int>(id & 0xffffffu); }
+  static constexpr float kFar = -3.0e38f;
+
+ private:
+  cv::Rect region_;
+  std::vector<std::uint32_t> ids_;
+  std::vector<float> near_;
+};
+
+// Perspective-correct barycentric weights of pixel (u, v) in a triangle of `mesh` whose nearness is
+// 1 / depth; clamped into the triangle.
+Eigen::Vector3f barycentric(const ScreenMesh& mesh, int triangle, float u, float v);
+
+}  // namespace calipso::render

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calipso_render/appearance.hpp"
+#include "calipso_render/background.hpp"
+#include "calipso_render/clip_sample.hpp"
+#include "calipso_render/light_fit.hpp"
+#include "calipso_render/noise.hpp"
+#include "calipso_render/stage.hpp"
+
+namespace calipso::render {
+
+enum class Quality { kLive, kFinal };
+
+// One object in one frame, as the simulator has it.
+struct ObjectInFrame {
+  std::string name;
+  bool edited = false;   // false: as in the video, its pixels stay the original ones
+  bool removed = false;
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
+  Points vertices;       // world, m, one per model vertex; only read where edited
+};
+
+struct FrameInput {
+  cv::Mat bgr;           // CV_8UC3
+  cv::Mat labels;        // CV_8UC1; empty: the key frame's stand in
+  Camera camera;
+  std::int64_t stamp_ns = 0;
+  std::vector<ObjectInFrame> objects;
+};
+
+// Where a pixel of the output comes from (the `provenance` topic).
+enum Provenance : std::uint8_t { kOriginal = 0, kSeenElsewhere = 1, kRendered = 2, kInvented = 3 };
+
+struct FrameOutput {
+  cv::Mat bgr;         // CV_8UC3; where provenance is 0, the input's bytes
+  cv::Mat provenance;  // CV_8UC1
+};
+
+struct RenderParams {
+  Quality quality = Quality::kLive;
+  std::vector<SupportPlane> planes;
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  BackgroundParams background;
+  double sun_radius = 0.025;    // rad; the angular radius of the sun's disc with its glare
+  bool add_noise = true;        // on rendered and invented pixels
+  bool keep_still = true;       // what an edit does not move keeps the frame's own pixels
+};
+
+// Everything learnt from the clip. Coordinates: the key frame's camera, the world.
+struct Prepared {
+  Camera camera;                    // key frame
+  cv::Mat key_labels;
+  std::vector<Surface> surfaces;
+  std::vector<bool> moves;          // per surface: it moves in the video
+  std::vector<Appearance> appearances;
+  LightFit light;
+  Background background;
+  cv::Mat plate_linear;             // CV_32FC3
+  cv::Vec3f umbra = {0.4f, 0.4f, 0.4f};  // what the sun's absence leaves of a support plane's brightness
+  NoiseModel noise;
+  std::vector<std::string> remarks;  // what had to be assumed or invented, for a diagnostic
+};
+
+// Learns a clip.
+// @throw std::invalid_argument if there is no frame, or a model's mesh cannot be drawn
+Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models, const RenderParams& params);
+
+struct ShadowCache;
+
+// Draws edited frames. Every frame's result depends on that frame alone. Not thread-safe: shadow maps
+// of objects that rest are kept from frame to frame.
+class Renderer {
+ public:
+  Renderer(std::shared_ptr<const Prepared> prepared, const RenderParams& params);
+  ~Renderer();
+
+  // @throw std::invalid_argument naming object or size that does not fit
+  FrameOutput composite(const FrameInput& frame);
+
+ private:
+  std::shared_ptr<const Prepared> prepared_;
+  RenderParams params_;
+  std::unique_ptr<ShadowCache> shadows_;
+};
+
+}  // namespace calipso::render

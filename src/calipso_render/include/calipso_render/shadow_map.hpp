@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "calipso_render/rasterizer.hpp"
+
+namespace calipso::render {
+
+// A mesh in the world that can stop light.
+struct Occluder {
+  const Points* vertices;  // world, m
+  const Triangles* triangles;
+};
+
+// How much of a distant disc of light each point sees, from one depth map towards the disc's centre
+// (percentage-closer soft shadows, Fernando 2005: the blockers' mean height sets the penumbra).
+class ShadowMap {
+ public:
+  struct Params {
+    int resolution = 768;          // texels along the longer side
+    double angular_radius = 0.02;  // of the light, rad
+    int taps = 16;                 // samples of the filter
+  };
+
+  // @param direction unit vector towards the light, world
+  ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector3d& direction,
+            const Params& params);
+
+  // Visible fraction of the light, 0..1, from world point p with unit normal n.
+  float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
+
+  // Length of a texel, m.
+  float texel() const { return texel_; }
+
+ private:
+  float heightAt(float s, float t) const;
+  float coveredAt(float s, float t, float height) const;
+
+  Eigen::Vector3f origin_, axis_s_, axis_t_, axis_h_;
+  float texel_ = 0.0f, angular_radius_ = 0.0f, highest_ = 0.0f;
+  int width_ = 0, height_ = 0;
+  std::vector<Eigen::Vector2f> pattern_;  // unit disc
+  std::vector<float> heights_;            // towards the light, m
+};
+
+}  // namespace calipso::render

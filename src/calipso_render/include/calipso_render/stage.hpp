@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calipso_render/edge_coverage.hpp"
+#include "calipso_render/rasterizer.hpp"
+#include "calipso_scene/scene.hpp"
+#include "calipso_scene/triangle_mesh.hpp"
+
+namespace calipso::render {
+
+// An object's surface as fitted to the key frame.
+struct ObjectModel {
+  std::string name;
+  int index = 0;                 // label in the masks
+  TriangleMesh mesh;             // object frame, m
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // at the key frame
+};
+
+// What never changes about an object's surface.
+struct Surface {
+  std::string name;
+  int index = 0;
+  Triangles triangles;
+  std::vector<MeshEdge> edges;
+  Points object_vertices;  // object frame, m
+  Points key_vertices;     // world, key frame, m
+  Points key_normals;      // world, unit
+};
+
+// @throw std::invalid_argument naming the object and what is wrong with its mesh
+Surface makeSurface(const ObjectModel& model);
+
+// Area-weighted vertex normals, unit length (zero where a vertex has no face).
+Points vertexNormals(const Points& vertices, const Triangles& triangles);
+
+Points transformed(const Points& points, const Eigen::Isometry3d& transform);
+
+// A surface at one instant, seen by one camera.
+struct Actor {
+  const Surface* surface = nullptr;
+  Points vertices;  // world, m
+  Points normals;   // world, unit
+  ScreenMesh screen;
+};
+
+Actor makeActor(const Surface& surface, Points vertices, const Camera& camera);
+
+// A point of an actor's surface, with the same material point at the key frame.
+struct SurfacePoint {
+  Eigen::Vector3f position, normal;          // world; the normal faces the viewer
+  Eigen::Vector3f key_position, key_normal;  // world, key frame; the normal on the same side
+};
+
+// The point that pixel (u, v) sees of a triangle. @param eye world position of the camera
+SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye);
+
+// The support plane that pixel (u, v) of the camera looks at.
+struct Receiver {
+  Eigen::Vector3f position, normal;  // world
+};
+std::optional<Receiver> receiverAt(const std::vector<SupportPlane>& planes, const Camera& camera, float u, float v);
+
+}  // namespace calipso::render

@@ -1,0 +1,129 @@
+#include "calipso_render/background.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/inpaint.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kNearMedian = 6.0f;     // code values; farther ones do not enter the mean
+constexpr float kLit = 0.75f;           // quantile of brightness that stands for the unshaded value
+constexpr int kSteadyDifference = 14;   // code values; about five deviations of the difference
+
+cv::Mat grown(const cv::Mat& mask, int radius) {
+  cv::Mat out;
+  const cv::Size side(2 * radius + 1, 2 * radius + 1);
+  cv::dilate(mask, out, cv::getStructuringElement(cv::MORPH_ELLIPSE, side));
+  return out;
+}
+
+struct Series {
+  std::vector<cv::Vec3b> values;  // of one pixel, in time order
+};
+
+int brightness(const cv::Vec3b& c) { return c[0] + 2 * c[1] + c[2]; }
+
+// Leaves out the darker group if the values fall into two.
+void dropShaded(double step, std::vector<cv::Vec3b>& values) {
+  std::vector<int> sorted(values.size());
+  std::transform(values.begin(), values.end(), sorted.begin(), brightness);
+  std::sort(sorted.begin(), sorted.end());
+  const double lit = sorted[static_cast<std::size_t>(kLit * (sorted.size() - 1))];
+  const double limit = lit - std::max(step * lit, 4.0 * kNearMedian);
+  if (sorted.front() >= limit) return;
+  values.erase(std::remove_if(values.begin(), values.end(),
+                              [&](const cv::Vec3b& c) { return brightness(c) < limit; }),
+               values.end());
+}
+
+// Median per channel, then the mean of what lies around it; `spread`: the largest channel's MAD.
+cv::Vec3f robustMean(const std::vector<cv::Vec3b>& values, float& spread) {
+  cv::Vec3f result;
+  spread = 0.0f;
+  std::vector<int> sorted(values.size()), deviation(values.size());
+  const std::size_t middle = values.size() / 2;
+  for (int c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < values.size(); ++i) sorted[i] = values[i][c];
+    std::nth_element(sorted.begin(), sorted.begin() + middle, sorted.end());
+    const int median = sorted[middle];
+    float sum = 0.0f;
+    int used = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      deviation[i] = std::abs(values[i][c] - median);
+      if (deviation[i] <= kNearMedian) sum += values[i][c], ++used;
+    }
+    std::nth_element(deviation.begin(), deviation.begin() + middle, deviation.end());
+    spread = std::max(spread, static_cast<float>(deviation[middle]));
+    result[c] = sum / used;
+  }
+  return result;
+}
+
+}  // namespace
+
+Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_move,
+                          const BackgroundParams& params) {
+  CV_Assert(!frames.empty());
+  const cv::Size size = frames.front().bgr.size();
+  std::vector<cv::Mat> covered;
+  for (const ClipFrame& f : frames) covered.push_back(grown(f.labels != 0, params.mask_margin_px));
+  Background b;
+  b.plate = cv::Mat::zeros(size, CV_32FC3);
+  b.count = cv::Mat::zeros(size, CV_8U);
+  b.spread = cv::Mat::zeros(size, CV_32F);
+  b.origin = cv::Mat(size, CV_16SC2, cv::Scalar(-1, -1));
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < size.height; ++v) {
+    Series series;
+    for (int u = 0; u < size.width; ++u) {
+      series.values.clear();
+      for (std::size_t i = 0; i < frames.size(); ++i) {
+        if (covered[i].at<std::uint8_t>(v, u) == 0) series.values.push_back(frames[i].bgr.at<cv::Vec3b>(v, u));
+      }
+      if (series.values.empty()) continue;
+      b.count.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::min<std::size_t>(255, series.values.size()));
+      if (objects_move) dropShaded(params.shadow_step, series.values);
+      b.plate.at<cv::Vec3f>(v, u) = robustMean(series.values, b.spread.at<float>(v, u));
+    }
+  }
+  b.invented = b.count == 0;
+  return b;
+}
+
+void inventBackground(const cv::Mat& shaded, Background& background) {
+  if (!shaded.empty()) background.invented |= shaded != 0;
+  const InpaintResult filled = inpaint(background.plate, background.invented, cv::Mat());
+  background.plate = filled.image;
+  background.origin = filled.origin;
+}
+
+cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness) {
+  CV_Assert(!frames.empty());
+  const ClipFrame& key = frames.front();
+  cv::Mat steady(key.bgr.size(), CV_32FC3);
+  steadiness = cv::Mat(key.bgr.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < steady.rows; ++v) {
+    for (int u = 0; u < steady.cols; ++u) {
+      const cv::Vec3b k = key.bgr.at<cv::Vec3b>(v, u);
+      cv::Vec3f sum;
+      int same = 0;
+      for (const ClipFrame& f : frames) {
+        const cv::Vec3b x = f.bgr.at<cv::Vec3b>(v, u);
+        const int difference = std::max({std::abs(x[0] - k[0]), std::abs(x[1] - k[1]), std::abs(x[2] - k[2])});
+        if (difference > kSteadyDifference || f.labels.at<std::uint8_t>(v, u) != key.labels.at<std::uint8_t>(v, u)) continue;
+        sum += cv::Vec3f(x[0], x[1], x[2]), ++same;
+      }
+      // Something that moves agrees with the key frame by chance only: then the key frame alone counts.
+      const bool still = 4 * same >= 3 * static_cast<int>(frames.size());
+      steady.at<cv::Vec3f>(v, u) = still ? cv::Vec3f(sum / same) : cv::Vec3f(k[0], k[1], k[2]);
+      steadiness.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(still ? std::min(same, 255) : 1);
+    }
+  }
+  return steady;
+}
+
+}  // namespace calipso::render

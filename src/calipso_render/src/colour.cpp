@@ -1,0 +1,82 @@
+#include "calipso_render/colour.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace calipso::render {
+namespace {
+
+constexpr int kEncodeSteps = 8192;
+
+double decode(double s) { return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4); }
+
+double encode(double l) { return l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1.0 / 2.4) - 0.055; }
+
+const std::array<float, 256>& decodeTable() {
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> t{};
+    for (int i = 0; i < 256; ++i) t[i] = static_cast<float>(decode(i / 255.0));
+    return t;
+  }();
+  return table;
+}
+
+// Tabulated over sqrt(linear), in which the curve is nearly straight, so that dark values keep their
+// precision (largest error 0.002 code values).
+const std::array<float, kEncodeSteps + 2>& encodeTable() {
+  static const std::array<float, kEncodeSteps + 2> table = [] {
+    std::array<float, kEncodeSteps + 2> t{};
+    for (int i = 0; i < kEncodeSteps + 2; ++i) {
+      const double root = static_cast<double>(i) / kEncodeSteps;
+      t[i] = static_cast<float>(255.0 * encode(root * root));
+    }
+    return t;
+  }();
+  return table;
+}
+
+}  // namespace
+
+float linearFromCode(std::uint8_t code) { return decodeTable()[code]; }
+
+float linearFromRealCode(float code) {
+  const float x = std::clamp(code, 0.0f, 254.999f);
+  const int i = static_cast<int>(x);
+  const auto& table = decodeTable();
+  return table[i] + (x - i) * (table[i + 1] - table[i]);
+}
+
+float codeFromLinear(float linear) {
+  if (!(linear > 0.0f)) return 0.0f;  // also NaN
+  if (linear >= 1.0f) return 255.0f;
+  const float x = std::sqrt(linear) * kEncodeSteps;
+  const int i = static_cast<int>(x);
+  const auto& table = encodeTable();
+  return table[i] + (x - i) * (table[i + 1] - table[i]);
+}
+
+cv::Mat linearFromCode(const cv::Mat& bgr) {
+  CV_Assert(bgr.type() == CV_8UC3);
+  cv::Mat linear(bgr.size(), CV_32FC3);
+  const auto& table = decodeTable();
+  for (int v = 0; v < bgr.rows; ++v) {
+    const std::uint8_t* in = bgr.ptr<std::uint8_t>(v);
+    float* out = linear.ptr<float>(v);
+    for (int i = 0; i < 3 * bgr.cols; ++i) out[i] = table[in[i]];
+  }
+  return linear;
+}
+
+cv::Mat codeFromLinear(const cv::Mat& linear) {
+  CV_Assert(linear.type() == CV_32FC3);
+  cv::Mat bgr(linear.size(), CV_8UC3);
+  for (int v = 0; v < linear.rows; ++v) {
+    const float* in = linear.ptr<float>(v);
+    std::uint8_t* out = bgr.ptr<std::uint8_t>(v);
+    for (int i = 0; i < 3 * linear.cols; ++i) out[i] = quantise(codeFromLinear(in[i]));
+  }
+  return bgr;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,136 @@
+#include "calipso_render/edge_coverage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+namespace calipso::render {
+namespace {
+
+int objectOrNone(std::uint32_t id) {
+  return id == VisibilityBuffer::kNothing ? -1 : VisibilityBuffer::objectOf(id);
+}
+
+float signedArea(const ScreenMesh& mesh, const Eigen::Vector3i& t) {
+  const Eigen::Vector3f &p = mesh.points[t[0]], &q = mesh.points[t[1]], &r = mesh.points[t[2]];
+  return (q.x() - p.x()) * (r.y() - p.y()) - (r.x() - p.x()) * (q.y() - p.y());
+}
+
+bool isSilhouette(const ScreenMesh& mesh, const MeshEdge& edge) {
+  if (edge.b < 0) return true;
+  const float a = signedArea(mesh, (*mesh.triangles)[edge.a]);
+  const float b = signedArea(mesh, (*mesh.triangles)[edge.b]);
+  return (a > 0.0f) != (b > 0.0f);
+}
+
+}  // namespace
+
+std::vector<MeshEdge> meshEdges(const Triangles& triangles) {
+  std::unordered_map<std::uint64_t, int> found;
+  std::vector<MeshEdge> edges;
+  edges.reserve(triangles.size() * 3 / 2);
+  for (int t = 0; t < static_cast<int>(triangles.size()); ++t) {
+    for (int i = 0; i < 3; ++i) {
+      const int from = std::min(triangles[t][i], triangles[t][(i + 1) % 3]);
+      const int to = std::max(triangles[t][i], triangles[t][(i + 1) % 3]);
+      const std::uint64_t key = (static_cast<std::uint64_t>(from) << 32) | static_cast<unsigned>(to);
+      const auto [it, inserted] = found.try_emplace(key, static_cast<int>(edges.size()));
+      if (inserted) edges.push_back({from, to, t, -1});
+      else if (edges[it->second].b < 0) edges[it->second].b = t;
+    }
+  }
+  return edges;
+}
+
+EdgeCoverage::EdgeCoverage(const VisibilityBuffer& centre)
+    : region_(centre.region()), slots_(centre.region().area(), -1) {
+  const int width = region_.width, height = region_.height;
+  for (int v = 0; v < height; ++v) {
+    const std::uint32_t* row = centre.ids(v);
+    const std::uint32_t* below = v + 1 < height ? centre.ids(v + 1) : row;
+    for (int u = 0; u < width; ++u) {
+      const int here = objectOrNone(row[u]);
+      const bool right_differs = u + 1 < width && objectOrNone(row[u + 1]) != here;
+      const bool below_differs = objectOrNone(below[u]) != here;
+      if (right_differs || below_differs) choose(u, v);
+      if (right_differs) choose(u + 1, v);
+      if (below_differs) choose(u, v + 1);
+    }
+  }
+}
+
+void EdgeCoverage::choose(int column, int row) {
+  if (column < 0 || row < 0 || column >= region_.width || row >= region_.height) return;
+  int& slot = slots_[static_cast<std::size_t>(row) * region_.width + column];
+  if (slot >= 0) return;
+  slot = static_cast<int>(pixels_.size());
+  pixels_.emplace_back();
+  pixels_.back().ids.fill(VisibilityBuffer::kNothing);
+  pixels_.back().nearness.fill(VisibilityBuffer::kFar);
+}
+
+void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges) {
+  for (const MeshEdge& edge : edges) {
+    const Eigen::Vector3f &p = mesh.points[edge.from], &q = mesh.points[edge.to];
+    if (std::isnan(p.z() + q.z()) || !isSilhouette(mesh, edge)) continue;
+    const float length = std::min((q - p).head<2>().norm(), 2.0f * (region_.width + region_.height));
+    const int steps = 1 + static_cast<int>(2.0f * length);
+    for (int i = 0; i <= steps; ++i) {
+      const Eigen::Vector3f s = p + (q - p) * (static_cast<float>(i) / steps);
+      choose(static_cast<int>(std::floor(s.x() + 0.5f)) - region_.x,
+             static_cast<int>(std::floor(s.y() + 0.5f)) - region_.y);
+    }
+  }
+}
+
+void EdgeCoverage::draw(const ScreenMesh& mesh, int object) {
+  if (pixels_.empty()) return;
+  for (int t = 0; t < static_cast<int>(mesh.triangles->size()); ++t) {
+    drawTriangle(mesh, t, (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t));
+  }
+}
+
+void EdgeCoverage::drawTriangle(const ScreenMesh& mesh, int triangle, std::uint32_t id) {
+  const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
+  const Eigen::Vector3f offset(region_.x, region_.y, 0.0f);
+  Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset,
+                          mesh.points[t[2]] - offset};
+  float area = signedArea(mesh, t);
+  if (std::isnan(p[0].z() + p[1].z() + p[2].z()) || !(std::abs(area) > 1e-9f)) return;
+  if (area < 0.0f) std::swap(p[1], p[2]), area = -area;
+  const auto low = [](float a, float b, float c, int floor) {
+    return std::max(floor, static_cast<int>(std::floor(std::max(-1e6f, std::min({a, b, c})) + 0.5f)));
+  };
+  const auto high = [](float a, float b, float c, int ceiling) {
+    return std::min(ceiling, static_cast<int>(std::floor(std::min(1e6f, std::max({a, b, c})) + 0.5f)));
+  };
+  const int u0 = low(p[0].x(), p[1].x(), p[2].x(), 0);
+  const int u1 = high(p[0].x(), p[1].x(), p[2].x(), region_.width - 1);
+  const int v1 = high(p[0].y(), p[1].y(), p[2].y(), region_.height - 1);
+  for (int v = low(p[0].y(), p[1].y(), p[2].y(), 0); v <= v1; ++v) {
+    for (int u = u0; u <= u1; ++u) {
+      const int slot = slots_[static_cast<std::size_t>(v) * region_.width + u];
+      if (slot < 0) continue;
+      Pixel& pixel = pixels_[slot];
+      for (int s = 0; s < kSamples; ++s) {
+        const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(s);
+        const auto edge = [&](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+          return (b.x() - a.x()) * (x.y() - a.y()) - (b.y() - a.y()) * (x.x() - a.x());
+        };
+        const float w0 = edge(p[1], p[2]), w1 = edge(p[2], p[0]), w2 = edge(p[0], p[1]);
+        if (w0 < 0.0f || w1 < 0.0f || w2 < 0.0f) continue;
+        const float near = (w0 * p[0].z() + w1 * p[1].z() + w2 * p[2].z()) / area;
+        if (near > pixel.nearness[s]) pixel.nearness[s] = near, pixel.ids[s] = id;
+      }
+    }
+  }
+}
+
+const EdgeCoverage::Pixel* EdgeCoverage::at(int u, int v) const {
+  u -= region_.x, v -= region_.y;
+  if (u < 0 || v < 0 || u >= region_.width || v >= region_.height) return nullptr;
+  const int slot = slots_[static_cast<std::size_t>(v) * region_.width + u];
+  return slot < 0 ? nullptr : &pixels_[slot];
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,143 @@
+#include "frame_compositor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calipso_render/colour.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
+constexpr float kMovedPx = 0.3f;        // moved more: drawn
+constexpr float kSameShadow = 1.0f / 64;  // of the sun's visibility: no visible change
+
+cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
+  const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
+  return {linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2])};
+}
+
+float smoothStep(float from, float to, float x) {
+  const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
+  return t * t * (3.0f - 2.0f * t);
+}
+
+}  // namespace
+
+float FrameCompositor::newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
+  return shadows_.others->visibility(p, n) * moved_shadow_->visibility(p, n);
+}
+
+float FrameCompositor::oldSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
+  return shadows_.others->visibility(p, n) * shadows_.originals->visibility(p, n);
+}
+
+cv::Vec3f FrameCompositor::shadowRatio(float visible) const {
+  return prepared_.umbra + (cv::Vec3f(1, 1, 1) - prepared_.umbra) * visible;
+}
+
+// How far a surface point of an edited object stays where the video shows it: 1 at rest, 0 moved.
+float FrameCompositor::stillness(std::uint32_t id, float u, float v) const {
+  const int slot = VisibilityBuffer::objectOf(id), triangle = VisibilityBuffer::triangleOf(id);
+  if (observed_[slot].points.empty()) return 0.0f;
+  const Actor& actor = actors_[slot];
+  const Eigen::Vector3i& t = actor.surface->triangles[triangle];
+  const Eigen::Vector3f w = barycentric(actor.screen, triangle, u, v);
+  Eigen::Vector2f moved = Eigen::Vector2f::Zero();
+  for (int i = 0; i < 3; ++i) {
+    moved += w[i] * (actor.screen.points[t[i]] - observed_[slot].points[t[i]]).head<2>();
+  }
+  return 1.0f - smoothStep(kStillPx, kMovedPx, moved.norm());
+}
+
+cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) const {
+  const int slot = VisibilityBuffer::objectOf(id);
+  const SurfacePoint p = surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_);
+  const cv::Vec3f light = diffuseShading(prepared_.light.light, p.normal, newSun(p.position, p.normal));
+  return prepared_.appearances[surface_of_slot_[slot]].radiance(p, light);
+}
+
+// An edited object is drawn; another one only where the original picture does not show it.
+bool FrameCompositor::isDrawn(std::uint32_t id, int u, int v) const {
+  if (id == VisibilityBuffer::kNothing) return false;
+  const bool edited = edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]];
+  return edited || removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
+}
+
+FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
+  Drawn drawn;
+  const EdgeCoverage::Pixel* edge = edges_->at(u, v);
+  if (edge == nullptr) {
+    const std::uint32_t id = centre_->idAt(u, v);
+    if (isDrawn(id, u, v)) drawn = {shadeSurface(id, u, v), 1.0f};
+    return drawn;
+  }
+  // One shaded point for each object in the pixel: the sample nearest to the pixel's centre.
+  std::array<bool, EdgeCoverage::kSamples> done{};
+  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
+    if (done[i] || !isDrawn(edge->ids[i], u, v)) continue;
+    int count = 0, middle = i;
+    for (int j = i; j < EdgeCoverage::kSamples; ++j) {
+      const bool drawn_too = edge->ids[j] != VisibilityBuffer::kNothing;
+      if (!drawn_too || VisibilityBuffer::objectOf(edge->ids[j]) != VisibilityBuffer::objectOf(edge->ids[i])) continue;
+      done[j] = true, ++count;
+      if (EdgeCoverage::offset(j).squaredNorm() < EdgeCoverage::offset(middle).squaredNorm()) middle = j;
+    }
+    const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(middle);
+    const float part = static_cast<float>(count) / EdgeCoverage::kSamples;
+    drawn.colour += part * shadeSurface(edge->ids[middle], x.x(), x.y());
+    drawn.cover += part;
+  }
+  if (drawn.cover > 0.0f) drawn.colour /= drawn.cover;
+  return drawn;
+}
+
+FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
+  const bool removed = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
+  const bool invented = invented_.at<std::uint8_t>(v, u) != 0;
+  const cv::Vec3f plate = plate_.at<cv::Vec3f>(v, u);
+  Behind behind{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
+  if (removed) behind = {plate, 1.0f, invented ? kInvented : kSeenElsewhere};
+  if (!removed && labels_.at<std::uint8_t>(v, u) != 0) return behind;  // another object's own pixels
+  const auto receiver = receiverAt(params_.planes, frame_.camera, u, v);
+  if (!receiver) return behind;
+  const float now = newSun(receiver->position, receiver->normal);
+  if (removed) {
+    behind.colour = plate.mul(shadowRatio(now));
+    return behind;
+  }
+  const float before = oldSun(receiver->position, receiver->normal);
+  const float change = std::abs(now - before);
+  if (change < kSameShadow) return behind;
+  // Darkened further, a pixel keeps its own grain; lit up again, it must come from the plate.
+  const cv::Vec3f darkened = behind.colour.mul(shadowRatio(now)), relit = plate.mul(shadowRatio(now));
+  const float from_plate = smoothStep(0.0f, 0.25f, 1.0f - before) * smoothStep(0.0f, 0.1f, change);
+  const float own = 1.0f - from_plate;
+  behind.colour = from_plate * relit + own * (before > 0.99f ? darkened : behind.colour);
+  behind.fresh = from_plate;
+  behind.source = from_plate > 0.5f ? (invented ? kInvented : kSeenElsewhere) : kRendered;
+  return behind;
+}
+
+void FrameCompositor::composePixel(int u, int v, FrameOutput& out) const {
+  const float still = still_.at<float>(v - region_.y, u - region_.x);
+  const Behind behind = behindAt(u, v);
+  const Drawn drawn = drawnAt(u, v);
+  if (drawn.cover == 0.0f && behind.source == kOriginal) return;
+  // Where the surface rests, the frame's own pixel is the best picture of it.
+  const bool original_here = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
+  const float keep = original_here ? still : 0.0f;
+  if (keep >= 0.999f) return;
+  cv::Vec3f colour = drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour;
+  colour = keep * linearPixel(frame_.bgr, u, v) + (1.0f - keep) * colour;
+  const float fresh = (1.0f - keep) * (drawn.cover + (1.0f - drawn.cover) * behind.fresh);
+  cv::Vec3b& pixel = out.bgr.at<cv::Vec3b>(v, u);
+  for (int c = 0; c < 3; ++c) {
+    float code = codeFromLinear(colour[c]);
+    if (params_.add_noise) code += fresh * prepared_.noise.deviation(c, code) * noise_.at(u, v, c);
+    pixel[c] = quantise(code);
+  }
+  out.provenance.at<std::uint8_t>(v, u) = drawn.cover > 0.0f ? kRendered : behind.source;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "calipso_render/renderer.hpp"
+
+namespace calipso::render {
+
+// Shadow maps that stay the same while the same objects are edited.
+struct ShadowCache {
+  std::vector<bool> edited;              // per surface: which ones the maps are for
+  std::unique_ptr<ShadowMap> others;     // of what is not edited
+  std::unique_ptr<ShadowMap> originals;  // of the edited objects where the video has them
+};
+
+// One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.
+class FrameCompositor {
+ public:
+  FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame, ShadowCache& shadows);
+
+  FrameOutput run();
+
+ private:
+  // What lies behind the drawn objects at a pixel.
+  struct Behind {
+    cv::Vec3f colour;        // linear
+    float fresh = 0.0f;      // part of it that carries no camera noise yet
+    Provenance source = kOriginal;
+  };
+  // What a drawn surface adds to a pixel.
+  struct Drawn {
+    cv::Vec3f colour;
+    float cover = 0.0f;
+  };
+
+  void stage();
+  void prepareShadows();
+  void chooseRegion();
+  void findRemoved();
+  void drawVisibility();
+  void findStill();
+  void composePixel(int u, int v, FrameOutput& out) const;
+  Behind behindAt(int u, int v) const;
+  Drawn drawnAt(int u, int v) const;
+  bool isDrawn(std::uint32_t id, int u, int v) const;
+  cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
+  float stillness(std::uint32_t id, float u, float v) const;
+  float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
+  float oldSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
+  cv::Vec3f shadowRatio(float visible) const;
+  cv::Rect shadowBounds(const Points& vertices) const;
+
+  const Prepared& prepared_;
+  const RenderParams& params_;
+  const FrameInput& frame_;
+  ShadowCache& shadows_;
+
+  cv::Mat labels_, plate_;            // of this frame's view
+  cv::Mat invented_;
+  std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
+  std::vector<bool> edited_;                  // per surface
+  std::vector<Actor> actors_;                 // visible ones, per slot
+  std::vector<int> surface_of_slot_;
+  std::vector<ScreenMesh> observed_;          // per slot: where the video has it (edited objects at rest only)
+  std::unique_ptr<ShadowMap> moved_shadow_;   // of the edited objects where they are now
+  cv::Rect region_;
+  cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
+  cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
+  std::optional<VisibilityBuffer> centre_;
+  std::optional<EdgeCoverage> edges_;
+  Eigen::Vector3f eye_;
+  NoiseField noise_;
+};
+
+}  // namespace calipso::render

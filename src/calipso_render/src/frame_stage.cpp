@@ -1,0 +1,185 @@
+// The part of FrameCompositor that stages a frame: who is where, and which pixels that can change.
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+#include "frame_compositor.hpp"
+#include "view_warp.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kRegionMargin = 8;       // px
+constexpr int kShadowMapSide = 512;    // texels, live
+constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
+
+std::unique_ptr<ShadowMap> shadowOf(const std::vector<Occluder>& occluders, const Light& light, const RenderParams& params) {
+  const bool final_path = params.quality == Quality::kFinal;
+  const ShadowMap::Params map{final_path ? 2 * kShadowMapSide : kShadowMapSide, params.sun_radius, final_path ? 32 : 16};
+  return std::make_unique<ShadowMap>(occluders, light.direction.cast<double>(), map);
+}
+
+}  // namespace
+
+FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame,
+                                 ShadowCache& shadows)
+    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows),
+      labels_(frame.labels.empty() ? prepared.key_labels : frame.labels),
+      eye_(frame.camera.world_from_camera.translation().cast<float>()), noise_(frame.stamp_ns) {
+  if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");
+}
+
+FrameOutput FrameCompositor::run() {
+  stage();
+  prepareShadows();
+  chooseRegion();
+  FrameOutput out{frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
+  if (region_.empty()) return out;
+  findRemoved();
+  drawVisibility();
+  findStill();
+#pragma omp parallel for schedule(static)
+  for (int v = region_.y; v < region_.y + region_.height; ++v) {
+    for (int u = region_.x; u < region_.x + region_.width; ++u) composePixel(u, v, out);
+  }
+  return out;
+}
+
+void FrameCompositor::stage() {
+  const std::vector<Surface>& surfaces = prepared_.surfaces;
+  states_.assign(surfaces.size(), nullptr);
+  edited_.assign(surfaces.size(), false);
+  for (const ObjectInFrame& o : frame_.objects) {
+    const auto it = std::find_if(surfaces.begin(), surfaces.end(), [&](const Surface& s) { return s.name == o.name; });
+    if (it == surfaces.end()) throw std::invalid_argument("state names object '" + o.name + "', which has no model");
+    states_[it - surfaces.begin()] = &o;
+    edited_[it - surfaces.begin()] = o.edited || o.removed;
+  }
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const ObjectInFrame* o = states_[i];
+    if (o != nullptr && o->removed) continue;
+    Points vertices = surfaces[i].key_vertices;
+    if (o != nullptr && o->edited) vertices = o->vertices;
+    else if (o != nullptr && prepared_.moves[i]) vertices = transformed(surfaces[i].object_vertices, o->world_from_object);
+    if (vertices.size() != surfaces[i].key_vertices.size()) {
+      throw std::invalid_argument("object '" + surfaces[i].name + "': state has " + std::to_string(vertices.size()) +
+                                  " vertices, its model " + std::to_string(surfaces[i].key_vertices.size()));
+    }
+    actors_.push_back(makeActor(surfaces[i], std::move(vertices), frame_.camera));
+    surface_of_slot_.push_back(static_cast<int>(i));
+    const bool at_rest = edited_[i] && !prepared_.moves[i];
+    observed_.push_back(at_rest ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
+  }
+  plate_ = prepared_.plate_linear;
+  invented_ = prepared_.background.invented;
+  if (!sameView(frame_.camera, prepared_.camera)) {
+    const cv::Mat map = viewWarp(params_.planes, prepared_.camera, frame_.camera);
+    cv::Mat plate, invented;
+    cv::remap(plate_, plate, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+    cv::remap(invented_, invented, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));
+    plate_ = plate, invented_ = invented;
+  }
+}
+
+void FrameCompositor::prepareShadows() {
+  std::vector<Occluder> moved, others, originals;
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
+    auto& list = edited_[surface_of_slot_[slot]] ? moved : others;
+    list.push_back({&actors_[slot].vertices, &actors_[slot].surface->triangles});
+  }
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    const Surface& s = prepared_.surfaces[i];
+    if (edited_[i] && !prepared_.moves[i]) originals.push_back({&s.key_vertices, &s.triangles});
+  }
+  const Light& light = prepared_.light.light;
+  moved_shadow_ = shadowOf(moved, light, params_);
+  const bool others_rest = std::find(prepared_.moves.begin(), prepared_.moves.end(), true) == prepared_.moves.end();
+  if (shadows_.others && shadows_.edited == edited_ && others_rest) return;
+  shadows_.edited = edited_;
+  shadows_.others = shadowOf(others, light, params_);
+  shadows_.originals = shadowOf(originals, light, params_);
+}
+
+// Pixels onto which the sun can cast the vertices' shadow on a support plane.
+cv::Rect FrameCompositor::shadowBounds(const Points& vertices) const {
+  const Eigen::Vector3f l = prepared_.light.light.direction;
+  Points shadow;
+  for (const SupportPlane& plane : params_.planes) {
+    const Eigen::Vector3f n = plane.normal.cast<float>();
+    const float slope = n.dot(l);
+    if (slope < 0.02f) continue;
+    for (const Eigen::Vector3f& p : vertices) {
+      const float height = n.dot(p) - static_cast<float>(plane.offset);
+      if (height < -kHeightTolerance) continue;
+      const float spread = params_.sun_radius * height / (slope * slope);
+      const Eigen::Vector3f foot = p - l * (height / slope);
+      for (const Eigen::Vector3f& side : {Eigen::Vector3f(n.unitOrthogonal()), Eigen::Vector3f(n.cross(n.unitOrthogonal()))}) {
+        shadow.push_back(foot + spread * side), shadow.push_back(foot - spread * side);
+      }
+    }
+  }
+  return boundsOf(projectMesh(shadow, {}, frame_.camera), kRegionMargin, frame_.bgr.size());
+}
+
+void FrameCompositor::chooseRegion() {
+  const cv::Size size = frame_.bgr.size();
+  const cv::Rect all(0, 0, size.width, size.height);
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (!edited_[i]) continue;
+    const cv::Rect box = cv::boundingRect(labels_ == prepared_.surfaces[i].index);
+    if (!box.empty()) region_ |= cv::Rect(box.x - kRegionMargin, box.y - kRegionMargin, box.width + 2 * kRegionMargin, box.height + 2 * kRegionMargin);
+    if (!prepared_.moves[i]) region_ |= shadowBounds(prepared_.surfaces[i].key_vertices);
+  }
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
+    if (!edited_[surface_of_slot_[slot]]) continue;
+    region_ |= boundsOf(actors_[slot].screen, kRegionMargin, size);
+    region_ |= shadowBounds(actors_[slot].vertices);
+  }
+  region_ &= all;
+}
+
+void FrameCompositor::findRemoved() {
+  const cv::Mat labels = labels_(region_);
+  cv::Mat own = cv::Mat::zeros(region_.size(), CV_8U), others = labels != 0;
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (edited_[i]) own |= labels == prepared_.surfaces[i].index;
+  }
+  others &= ~own;
+  const int r = params_.background.mask_margin_px;
+  cv::dilate(own, removed_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * r + 1, 2 * r + 1}));
+  removed_.setTo(0, others);  // what stands beside it keeps its own pixels
+}
+
+void FrameCompositor::drawVisibility() {
+  centre_.emplace(region_);
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) centre_->draw(actors_[slot].screen, static_cast<int>(slot));
+  edges_.emplace(*centre_);
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
+    if (edited_[surface_of_slot_[slot]]) edges_->chooseSilhouette(actors_[slot].screen, actors_[slot].surface->edges);
+  }
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) edges_->draw(actors_[slot].screen, static_cast<int>(slot));
+}
+
+void FrameCompositor::findStill() {
+  still_ = cv::Mat::zeros(region_.size(), CV_32F);
+  if (!params_.keep_still) return;
+  cv::Mat covered = cv::Mat::zeros(region_.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region_.height; ++v) {
+    for (int u = 0; u < region_.width; ++u) {
+      const std::uint32_t id = centre_->ids(v)[u];
+      if (id == VisibilityBuffer::kNothing || !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]]) continue;
+      covered.at<std::uint8_t>(v, u) = 255;
+      still_.at<float>(v, u) = stillness(id, u + region_.x, v + region_.y);
+    }
+  }
+  // The rim of the original's pixels belongs to the surface beside it.
+  cv::Mat nearby;
+  const int side = 4 * params_.background.mask_margin_px + 1;
+  cv::dilate(still_, nearby, cv::Mat::ones(side, side, CV_8U));
+  nearby.copyTo(still_, covered == 0);
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,143 @@
+#include "calipso_render/noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace calipso::render {
+namespace {
+
+constexpr double kMedianToSigma = 1.4826;  // of a normal distribution's median absolute value
+constexpr int kFewestSamples = 64;         // per knot; below that the neighbours decide
+constexpr int kHistogram = 512;            // of absolute differences, in 1/8 code value
+
+std::uint64_t splitMix(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ull;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+  return x ^ (x >> 31);
+}
+
+// Absolute differences by code value, whose median gives the deviation.
+struct Differences {
+  std::vector<std::array<int, kHistogram>> counts;
+  explicit Differences(int knots) : counts(knots) {
+    for (auto& c : counts) c.fill(0);
+  }
+  void add(int code, double difference) {
+    ++counts[(code + 16) / 32][std::min(kHistogram - 1, static_cast<int>(8.0 * difference))];
+  }
+  // < 0: too few samples.
+  double median(int knot) const {
+    long total = 0;
+    for (int c : counts[knot]) total += c;
+    if (total < kFewestSamples) return -1.0;
+    long below = 0;
+    for (int i = 0; i < kHistogram; ++i) {
+      const int here = counts[knot][i];
+      if (2 * (below + here) >= total) return (i + (0.5 * total - below) / here) / 8.0;
+      below += here;
+    }
+    return kHistogram / 8.0;
+  }
+};
+
+// Knots without samples take the nearest one's value.
+template <std::size_t N>
+void fillGaps(std::array<float, N>& values) {
+  std::array<float, N> filled = values;
+  for (int i = 0; i < static_cast<int>(N); ++i) {
+    for (int d = 0; d < static_cast<int>(N) && filled[i] < 0.0f; ++d) {
+      if (i - d >= 0 && values[i - d] >= 0.0f) filled[i] = values[i - d];
+      else if (i + d < static_cast<int>(N) && values[i + d] >= 0.0f) filled[i] = values[i + d];
+    }
+    filled[i] = std::max(filled[i], 0.0f);
+  }
+  values = filled;
+}
+
+// Consecutive pairs: their difference has twice the variance.
+void addPairs(const cv::Mat& first, const cv::Mat& second, const cv::Mat& steady, int channel,
+              Differences& differences) {
+  for (int v = 0; v < first.rows; v += 2) {
+    const cv::Vec3b *a = first.ptr<cv::Vec3b>(v), *b = second.ptr<cv::Vec3b>(v);
+    const std::uint8_t* use = steady.ptr<std::uint8_t>(v);
+    for (int u = 0; u < first.cols; ++u) {
+      if (use[u] == 0) continue;
+      const int x = a[u][channel], y = b[u][channel];
+      // Spread within the cell of rounding, so that small deviations are not lost in steps of one.
+      const double dither = ((u * 7 + v * 13) % 16 + 0.5) / 16.0 - 0.5;
+      differences.add((x + y) / 2, std::abs(x - y + dither) / std::sqrt(2.0));
+    }
+  }
+}
+
+// Immerkaer's mask cancels everything that is linear in the picture; its noise gain is 6.
+void addDetail(const cv::Mat& frame, int channel, Differences& differences) {
+  cv::Mat plane, detail;
+  cv::extractChannel(frame, plane, channel);
+  const cv::Mat kernel = (cv::Mat_<float>(3, 3) << 1, -2, 1, -2, 4, -2, 1, -2, 1);
+  cv::filter2D(plane, detail, CV_32F, kernel);
+  for (int v = 1; v + 1 < frame.rows; ++v) {
+    for (int u = 1; u + 1 < frame.cols; ++u) {
+      differences.add(plane.at<std::uint8_t>(v, u), std::abs(detail.at<float>(v, u)) / 6.0);
+    }
+  }
+}
+
+}  // namespace
+
+NoiseModel::NoiseModel() {
+  for (auto& channel : deviation_) channel.fill(0.0f);
+}
+
+NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames, const cv::Mat& steady) {
+  CV_Assert(!frames.empty());
+  NoiseModel model;
+  for (int channel = 0; channel < 3; ++channel) {
+    Differences differences(kKnots);
+    for (std::size_t i = 0; i + 1 < frames.size() && i < 6; ++i) {
+      addPairs(frames[i], frames[i + 1], steady, channel, differences);
+    }
+    if (frames.size() == 1) addDetail(frames[0], channel, differences);
+    for (int knot = 0; knot < kKnots; ++knot) {
+      model.deviation_[channel][knot] = static_cast<float>(kMedianToSigma * differences.median(knot));
+    }
+    fillGaps(model.deviation_[channel]);
+  }
+  return model;
+}
+
+float NoiseModel::deviation(int channel, float code) const {
+  const float x = std::clamp(code, 0.0f, 255.0f) / 32.0f;
+  const int i = static_cast<int>(x);
+  const auto& d = deviation_[channel];
+  return d[i] + (x - i) * (d[i + 1] - d[i]);
+}
+
+NoiseField::NoiseField(std::int64_t stamp_ns) {
+  const std::uint64_t h = splitMix(static_cast<std::uint64_t>(stamp_ns));
+  shift_u_ = static_cast<int>(h & (kSide - 1));
+  shift_v_ = static_cast<int>((h >> 20) & (kSide - 1));
+}
+
+const std::vector<cv::Vec3f>& NoiseField::tile() {
+  static const std::vector<cv::Vec3f> field = [] {
+    cv::Mat white(kSide, kSide, CV_32FC3), other(kSide, kSide, CV_32FC3), smooth;
+    cv::RNG random(0x5eed);
+    random.fill(white, cv::RNG::NORMAL, 0.0, 1.0);
+    random.fill(other, cv::RNG::NORMAL, 0.0, 1.0);
+    cv::GaussianBlur(other, smooth, {5, 5}, 0.6, 0.6, cv::BORDER_REFLECT);
+    cv::Mat mix = white * std::sqrt(0.5) + smooth;  // smooth keeps about half of its variance
+    cv::Scalar mean, deviation;
+    cv::meanStdDev(mix, mean, deviation);
+    std::vector<cv::Vec3f> values(mix.begin<cv::Vec3f>(), mix.end<cv::Vec3f>());
+    for (cv::Vec3f& x : values) {
+      for (int c = 0; c < 3; ++c) x[c] = static_cast<float>((x[c] - mean[c]) / deviation[c]);
+    }
+    return values;
+  }();
+  return field;
+}
+
+}  // namespace calipso::render

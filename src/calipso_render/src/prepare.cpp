@@ -1,0 +1,165 @@
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+#include "calipso_render/colour.hpp"
+#include "calipso_render/renderer.hpp"
+#include "view_warp.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kShaded = 0.985f;       // visible fraction of the sun below which a pixel counts as shaded
+constexpr int kShadowMargin = 4;        // px added around the predicted shadow
+constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
+
+std::vector<ClipFrame> inKeyView(const ClipSample& clip, const std::vector<SupportPlane>& planes) {
+  std::vector<ClipFrame> frames = clip.frames();
+  const Camera& key = frames.front().camera;
+  for (ClipFrame& f : frames) {
+    if (sameView(f.camera, key)) continue;
+    const cv::Mat map = viewWarp(planes, f.camera, key);
+    cv::Mat bgr, labels;
+    cv::remap(f.bgr, bgr, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+    cv::remap(f.labels, labels, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));
+    f = {bgr, labels, key};
+  }
+  return frames;
+}
+
+bool movesInVideo(const std::vector<ClipFrame>& frames, int index) {
+  const cv::Mat key = frames.front().labels == index;
+  for (const ClipFrame& f : frames) {
+    const cv::Mat now = f.labels == index;
+    const int both = cv::countNonZero(now & key), either = cv::countNonZero(now | key);
+    if (both < kStillOverlap * either) return true;
+  }
+  return false;
+}
+
+// Sun visibility on the support planes, 0..1, where a plane is seen and no object hides it; 1 elsewhere.
+cv::Mat planeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& planes, const ClipFrame& key) {
+  cv::Mat visibility(key.bgr.size(), CV_32F, cv::Scalar(1.0f));
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < visibility.rows; ++v) {
+    for (int u = 0; u < visibility.cols; ++u) {
+      const auto receiver = receiverAt(planes, key.camera, u, v);
+      if (receiver) visibility.at<float>(v, u) = sun.visibility(receiver->position, receiver->normal);
+    }
+  }
+  return visibility;
+}
+
+// Median of picture / plate per channel over pixels of the full shadow; the light's own ratio if too few.
+cv::Vec3f measureUmbra(const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& visibility, const cv::Mat& labels,
+                       const cv::Vec3f& predicted) {
+  cv::Vec3f umbra = predicted;
+  for (int c = 0; c < 3; ++c) {
+    std::vector<float> ratios;
+    for (int v = 0; v < picture.rows; ++v) {
+      for (int u = 0; u < picture.cols; ++u) {
+        if (visibility.at<float>(v, u) > 0.15f || labels.at<std::uint8_t>(v, u) != 0) continue;
+        const float lit = linearFromRealCode(plate.at<cv::Vec3f>(v, u)[c]);
+        if (lit > 0.01f) ratios.push_back(linearFromRealCode(picture.at<cv::Vec3f>(v, u)[c]) / lit);
+      }
+    }
+    if (ratios.size() < 50) continue;
+    std::nth_element(ratios.begin(), ratios.begin() + ratios.size() / 2, ratios.end());
+    umbra[c] = std::clamp(ratios[ratios.size() / 2], 0.1f, 0.95f);
+  }
+  return umbra;
+}
+
+cv::Vec3f predictedUmbra(const Light& light, const std::vector<SupportPlane>& planes) {
+  const Eigen::Vector3f n = planes.empty() ? Eigen::Vector3f(Eigen::Vector3f::UnitZ()) : planes.front().normal.cast<float>();
+  const cv::Vec3f shaded = diffuseShading(light, n, 0.0f), lit = diffuseShading(light, n, 1.0f);
+  cv::Vec3f umbra;
+  for (int c = 0; c < 3; ++c) umbra[c] = std::clamp(shaded[c] / std::max(lit[c], 1e-4f), 0.1f, 0.95f);
+  return umbra;
+}
+
+cv::Mat linearOf(const cv::Mat& codes) {
+  cv::Mat linear(codes.size(), CV_32FC3);
+  for (int v = 0; v < codes.rows; ++v) {
+    const float* in = codes.ptr<float>(v);
+    float* out = linear.ptr<float>(v);
+    for (int i = 0; i < 3 * codes.cols; ++i) out[i] = linearFromRealCode(in[i]);
+  }
+  return linear;
+}
+
+std::vector<Actor> keyActors(const Prepared& p) {
+  std::vector<Actor> actors;
+  for (const Surface& s : p.surfaces) actors.push_back(makeActor(s, s.key_vertices, p.camera));
+  return actors;
+}
+
+std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
+  std::vector<Occluder> all;
+  for (const Actor& a : actors) all.push_back({&a.vertices, &a.surface->triangles});
+  return all;
+}
+
+void prepareBackground(const std::vector<ClipFrame>& frames, const cv::Mat& picture, const ShadowMap& sun,
+                       const RenderParams& params, Prepared& p) {
+  const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
+  const bool all_move = std::find(p.moves.begin(), p.moves.end(), false) == p.moves.end();
+  p.background = seenBackground(frames, any_moves, params.background);
+  const cv::Mat visibility = planeVisibility(sun, params.planes, frames.front());
+  cv::Mat shaded;
+  if (!all_move) {
+    const cv::Size side(2 * kShadowMargin + 1, 2 * kShadowMargin + 1);
+    cv::dilate(visibility < kShaded, shaded, cv::getStructuringElement(cv::MORPH_ELLIPSE, side));
+  }
+  inventBackground(shaded, p.background);
+  p.plate_linear = linearOf(p.background.plate);
+  p.umbra = measureUmbra(picture, p.background.plate, visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));
+}
+
+void remark(const ClipSample& clip, Prepared& p) {
+  if (clip.frames().size() == 1) p.remarks.push_back("the clip has one frame: all of the background is invented");
+  const double invented = cv::mean(p.background.invented)[0] / 255.0;
+  if (invented > 0.5) {
+    p.remarks.push_back(std::to_string(static_cast<int>(100 * invented)) +
+                        " % of the background is hidden in every frame and was invented; check the strokes");
+  }
+  if (!p.light.determined) p.remarks.push_back("too little of the objects is seen to tell the light; it is assumed high and frontal");
+  for (const Surface& s : p.surfaces) {
+    if (cv::countNonZero(p.key_labels == s.index) == 0) {
+      p.remarks.push_back("object '" + s.name + "' is not seen in the key frame: its colour is unknown");
+    }
+  }
+}
+
+}  // namespace
+
+Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models, const RenderParams& params) {
+  if (clip.frames().empty()) throw std::invalid_argument("no clip frame with a segmentation has arrived; send the key frame first");
+  const std::vector<ClipFrame> frames = inKeyView(clip, params.planes);
+  Prepared p;
+  p.camera = frames.front().camera;
+  p.key_labels = frames.front().labels;
+  for (const ObjectModel& m : models) {
+    p.surfaces.push_back(makeSurface(m));
+    p.moves.push_back(movesInVideo(frames, m.index));
+  }
+  cv::Mat steadiness;
+  const cv::Mat picture = steadyKeyFrame(frames, steadiness);
+  const std::vector<Actor> actors = keyActors(p);
+  int clusters = 0;
+  const std::vector<LightSample> samples = lightSamples(actors, picture, p.key_labels, p.camera, clusters);
+  const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
+  p.light = fitLight(samples, clusters, params.up.cast<float>(), view);
+  p.light.light.angular_radius = static_cast<float>(params.sun_radius);
+  const ShadowMap sun(occluders(actors), p.light.light.direction.cast<double>(), {768, params.sun_radius, 16});
+  prepareBackground(frames, picture, sun, params, p);
+  p.appearances = makeAppearances(actors, picture, p.key_labels, p.camera, p.light.light, sun);
+  std::vector<cv::Mat> pictures;
+  for (const ClipFrame& f : frames) pictures.push_back(f.bgr);
+  p.noise = NoiseModel::estimate(pictures, steadiness > 1);
+  remark(clip, p);
+  return p;
+}
+
+}  // namespace calipso::render

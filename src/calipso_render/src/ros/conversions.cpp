@@ -1,0 +1,77 @@
+#include "conversions.hpp"
+
+#include <sensor_msgs/image_encodings.h>
+
+#include <cstring>
+#include <stdexcept>
+
+#include "calipso_ros/conversions.hpp"
+
+namespace calipso::render {
+
+cv::Mat viewOf(const sensor_msgs::Image& image, PixelFormat format) {
+  const std::size_t row = static_cast<std::size_t>(image.width) * channels(format);
+  if (image.width == 0 || image.height == 0 || image.step < row ||
+      image.data.size() < static_cast<std::size_t>(image.step) * (image.height - 1) + row) {
+    throw std::invalid_argument("image of " + std::to_string(image.width) + " x " + std::to_string(image.height) + ", " +
+                                image.encoding + ", step " + std::to_string(image.step) + " has " +
+                                std::to_string(image.data.size()) + " bytes, which do not fit; check the source");
+  }
+  return cv::Mat(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC(channels(format)),
+                 const_cast<std::uint8_t*>(image.data.data()), image.step);
+}
+
+cv::Mat bgrFromMsg(const sensor_msgs::Image& image) {
+  const PixelFormat format = pixelFormat(image.encoding);
+  return toBgr(viewOf(image, format), format);
+}
+
+cv::Mat labelsFromMsg(const sensor_msgs::Image& image) {
+  if (image.encoding != sensor_msgs::image_encodings::MONO8) {
+    throw std::invalid_argument("segmentation labels are " + image.encoding + "; they must be mono8");
+  }
+  return viewOf(image, PixelFormat::kMono8).clone();
+}
+
+sensor_msgs::Image editedMsg(const sensor_msgs::Image& original, const FrameOutput& output) {
+  sensor_msgs::Image edited = original;
+  const PixelFormat format = pixelFormat(original.encoding);
+  cv::Mat view = viewOf(edited, format);
+  writeChanged(output.bgr, output.provenance, format, view);
+  return edited;
+}
+
+sensor_msgs::Image imageMsg(const std_msgs::Header& header, const cv::Mat& image) {
+  CV_Assert(image.depth() == CV_8U);
+  sensor_msgs::Image msg;
+  msg.header = header;
+  msg.width = image.cols;
+  msg.height = image.rows;
+  msg.encoding = image.channels() == 1 ? sensor_msgs::image_encodings::MONO8 : sensor_msgs::image_encodings::BGR8;
+  msg.step = image.cols * image.channels();
+  msg.data.resize(static_cast<std::size_t>(msg.step) * msg.height);
+  for (int v = 0; v < image.rows; ++v) std::memcpy(&msg.data[static_cast<std::size_t>(v) * msg.step], image.ptr(v), msg.step);
+  return msg;
+}
+
+std::vector<ObjectModel> fromMsg(const calipso_msgs::AlignedModels& models) {
+  std::vector<ObjectModel> out;
+  for (const calipso_msgs::AlignedModel& m : models.models) {
+    out.push_back({m.object, m.index, calipso::fromMsg(m.mesh), calipso::fromMsg(m.world_from_object.pose)});
+  }
+  return out;
+}
+
+ObjectInFrame fromMsg(const calipso_msgs::ObjectState& state) {
+  ObjectInFrame object;
+  object.name = state.object;
+  object.edited = state.edited;
+  object.removed = state.removed;
+  object.world_from_object = calipso::fromMsg(state.pose);
+  for (std::size_t i = 0; i + 2 < state.vertices.size(); i += 3) {
+    object.vertices.emplace_back(state.vertices[i], state.vertices[i + 1], state.vertices[i + 2]);
+  }
+  return object;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,249 @@
+#include "render_ros.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "calipso_ros/topics.hpp"
+#include "conversions.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr std::size_t kLiveLabels = 300;  // label images kept in live mode
+constexpr std::uint32_t kLatchedQueue = 10000;
+
+double milliseconds(std::chrono::steady_clock::time_point since) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since).count();
+}
+
+}  // namespace
+
+RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
+    : params_(loadParams(pnh)), reporter_(nh, "render"), clip_(params_.clip_samples),
+      labels_(params_.mode == Mode::kLive ? kLiveLabels : 0) {
+  edited_ = nh.advertise<sensor_msgs::Image>(topics::kImageEdited, 10);
+  edited_info_ = nh.advertise<sensor_msgs::CameraInfo>(topics::kImageEditedCameraInfo, 10);
+  provenance_ = nh.advertise<sensor_msgs::Image>(topics::kProvenance, 10);
+  plate_ = nh.advertise<sensor_msgs::Image>(topics::kPlate, 1, true);
+  reporter_.starting("waiting for clip, segmentation and models");
+  subscribers_ = {
+      nh.subscribe(topics::kClipInfo, 1, &RenderNode::onClipInfo, this),
+      nh.subscribe(topics::kSegmentation, kLatchedQueue, &RenderNode::onSegmentation, this),
+      nh.subscribe(topics::kModels, 1, &RenderNode::onModels, this),
+      nh.subscribe(topics::kState, kLatchedQueue, &RenderNode::onState, this),
+      nh.subscribe(topics::kStatus, 100, &RenderNode::onStatus, this),
+  };
+  clip_source_ = std::make_unique<FrameSource>(
+      nh, topics::kClipImage, topics::kClipCameraInfo, 0, poses_, [this](const Frame& f) { onClipFrame(f); },
+      [this](const sensor_msgs::ImageConstPtr& i, const std::string& r) { onBadClipFrame(i, r); });
+  source_ = std::make_unique<FrameSource>(
+      nh, topics::kImage, topics::kCameraInfo, params_.mode == Mode::kLive ? params_.live_queue : 0, poses_,
+      [this](const Frame& f) { onFrame(f); },
+      [this](const sensor_msgs::ImageConstPtr& i, const std::string& r) { onBadFrame(i, r); });
+}
+
+void RenderNode::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
+  clip_length_ = info->frames;
+  prepareIfComplete();
+}
+
+void RenderNode::onClipFrame(const Frame& frame) {
+  ++clip_frames_;
+  if (reporter_.state() == calipso_msgs::NodeStatus::STARTING) reporter_.preparing("taking in the clip");
+  unlabelled_.push_back(frame);
+  pairClipFrames(ros::Time(0));
+  reporter_.clipFrameDone();
+  prepareIfComplete();
+}
+
+void RenderNode::onBadClipFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason) {
+  ++clip_frames_;
+  reporter_.warn(image->header.stamp, "clip frame left out of the background: " + reason);
+  reporter_.clipFrameDone();
+  prepareIfComplete();
+}
+
+void RenderNode::onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) {
+  try {
+    labels_.put(msg->header.stamp, labelsFromMsg(msg->labels));
+  } catch (const std::exception& error) {
+    reporter_.warn(msg->header.stamp, error.what());
+    return;
+  }
+  pairClipFrames(msg->header.stamp);
+  prepareIfComplete();
+}
+
+// Frames up to the newest segmentation either have theirs or will not get one.
+void RenderNode::pairClipFrames(const ros::Time& segmented) {
+  while (!unlabelled_.empty()) {
+    const Frame frame = unlabelled_.front();
+    const bool labelled = labels_.has(frame.stamp());
+    if (!labelled && frame.stamp() >= segmented) return;
+    unlabelled_.pop_front();
+    if (labelled) addClipFrame(frame, labels_.at(frame.stamp()));
+    else reporter_.warn(frame.stamp(), "clip frame left out of the background: it has no segmentation");
+  }
+}
+
+void RenderNode::addClipFrame(const Frame& frame, const cv::Mat& labels) {
+  try {
+    clip_.add({bgrFromMsg(*frame.image), labels, frame.camera});
+  } catch (const std::exception& error) {
+    reporter_.warn(frame.stamp(), std::string("clip frame left out of the background: ") + error.what());
+  }
+}
+
+void RenderNode::onModels(const calipso_msgs::AlignedModelsConstPtr& msg) {
+  try {
+    models_ = fromMsg(*msg);
+  } catch (const std::exception& error) {
+    reporter_.failed(std::string("models cannot be used: ") + error.what());
+    workOff();
+    return;
+  }
+  renderer_.reset();
+  prepareIfComplete();
+}
+
+// Frames must not wait for a node that can do nothing.
+void RenderNode::onStatus(const calipso_msgs::NodeStatusConstPtr& msg) {
+  const bool needed = msg->node == "segmentation" || msg->node == "align" || msg->node == "simulator";
+  if (!needed) return;
+  failed_.erase(msg->node);
+  if (msg->state == calipso_msgs::NodeStatus::FAILED) failed_[msg->node] = msg->message;
+  const bool hopeless = failed_.count("segmentation") + failed_.count("align") > 0;
+  if (hopeless && !renderer_) reporter_.failed(whyUnedited());
+  workOff();
+}
+
+bool RenderNode::clipComplete() const {
+  if (models_.empty() || clip_.frames().empty()) return false;
+  if (params_.mode == Mode::kLive) return true;
+  return clip_length_ && clip_frames_ >= *clip_length_ && unlabelled_.empty();
+}
+
+void RenderNode::prepareIfComplete() {
+  if (!renderer_ && clipComplete()) prepareNow();
+}
+
+void RenderNode::prepareNow() {
+  try {
+    reporter_.preparing("background plate, light and appearance");
+    const auto start = std::chrono::steady_clock::now();
+    const auto prepared = std::make_shared<const Prepared>(prepare(clip_, models_, params_.render));
+    renderer_ = std::make_unique<Renderer>(prepared, params_.render);
+    cv::Mat plate;
+    prepared->background.plate.convertTo(plate, CV_8U);
+    std_msgs::Header header;
+    header.frame_id = topics::kWorldFrame;
+    plate_.publish(imageMsg(header, plate));
+    for (const std::string& remark : prepared->remarks) reporter_.warn(ros::Time(0), remark);
+    reporter_.ready("prepared from " + std::to_string(clip_.frames().size()) + " frames in " +
+                    std::to_string(static_cast<int>(milliseconds(start))) + " ms");
+  } catch (const std::exception& error) {
+    reporter_.failed(error.what());
+  }
+  workOff();
+}
+
+void RenderNode::onFrame(const Frame& frame) {
+  if (params_.mode == Mode::kLive && !renderer_) {
+    unlabelled_.push_back(frame);
+    if (unlabelled_.size() > static_cast<std::size_t>(params_.live_queue)) unlabelled_.pop_front();
+    pairClipFrames(ros::Time(0));
+    prepareIfComplete();
+  }
+  frames_.push_back({frame.image, frame.info, frame.camera, ""});
+  workOff();
+}
+
+void RenderNode::onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason) {
+  frames_.push_back({image, nullptr, std::nullopt, reason});
+  workOff();
+}
+
+void RenderNode::onState(const calipso_msgs::SimulationStateConstPtr& msg) {
+  states_[msg->header.stamp] = msg;
+  if (params_.mode == Mode::kLive && renderer_) skipOlderThan(msg->header.stamp);
+  workOff();
+}
+
+// Live: the newest frame that has a state goes out; those before it are too late.
+void RenderNode::skipOlderThan(const ros::Time& stamp) {
+  const bool here = std::any_of(frames_.begin(), frames_.end(), [&](const Waiting& w) { return w.image->header.stamp == stamp; });
+  if (!here) return;
+  while (!frames_.empty() && frames_.front().image->header.stamp < stamp) {
+    reporter_.warn(frames_.front().image->header.stamp, "frame skipped, the machine is too slow; " +
+                                                            std::to_string(++skipped_) + " so far");
+    frames_.pop_front();
+  }
+}
+
+// Empty: frames can be edited. Otherwise the reason why they pass unedited, "" while they must wait.
+std::string RenderNode::whyUnedited() const {
+  if (!failed_.empty()) return failed_.begin()->first + " failed: " + failed_.begin()->second;
+  if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) return "the renderer could not be prepared";
+  if (params_.mode == Mode::kLive && !renderer_) return "not ready yet: waiting for segmentation and models";
+  return "";
+}
+
+void RenderNode::workOff() {
+  while (!frames_.empty() && workOffFront()) {
+  }
+  if (params_.mode != Mode::kLive) return;
+  while (frames_.size() > static_cast<std::size_t>(params_.live_queue)) {
+    reporter_.warn(frames_.front().image->header.stamp, "frame skipped, no state came; " + std::to_string(++skipped_) + " so far");
+    frames_.pop_front();
+  }
+}
+
+// false: the first frame has to wait.
+bool RenderNode::workOffFront() {
+  const Waiting frame = frames_.front();
+  const std::string reason = frame.camera ? whyUnedited() : frame.trouble;
+  const auto state = states_.find(frame.image->header.stamp);
+  if (reason.empty() && (!renderer_ || state == states_.end())) return false;
+  frames_.pop_front();
+  if (reason.empty()) edit(frame, *state->second);
+  else passUnedited(frame, reason);
+  states_.erase(states_.begin(), states_.upper_bound(frame.image->header.stamp));
+  return true;
+}
+
+void RenderNode::edit(const Waiting& frame, const calipso_msgs::SimulationState& state) {
+  const auto start = std::chrono::steady_clock::now();
+  const ros::Time stamp = frame.image->header.stamp;
+  try {
+    FrameInput input;
+    for (const calipso_msgs::ObjectState& o : state.objects) input.objects.push_back(fromMsg(o));
+    const bool touched = std::any_of(input.objects.begin(), input.objects.end(),
+                                     [](const ObjectInFrame& o) { return o.edited || o.removed; });
+    if (!touched) {
+      publish(frame, *frame.image, cv::Mat::zeros(frame.image->height, frame.image->width, CV_8U));
+    } else {
+      input.bgr = bgrFromMsg(*frame.image);
+      input.labels = labels_.at(stamp);
+      input.camera = *frame.camera;
+      input.stamp_ns = static_cast<std::int64_t>(stamp.toNSec());
+      const FrameOutput output = renderer_->composite(input);
+      publish(frame, editedMsg(*frame.image, output), output.provenance);
+    }
+    reporter_.timing(stamp, milliseconds(start));
+  } catch (const std::exception& error) {
+    passUnedited(frame, error.what());
+  }
+}
+
+void RenderNode::passUnedited(const Waiting& frame, const std::string& reason) {
+  reporter_.warn(frame.image->header.stamp, "frame passes unedited: " + reason);
+  publish(frame, *frame.image, cv::Mat::zeros(frame.image->height, frame.image->width, CV_8U));
+}
+
+void RenderNode::publish(const Waiting& frame, const sensor_msgs::Image& edited, const cv::Mat& provenance) {
+  provenance_.publish(imageMsg(frame.image->header, provenance));
+  if (frame.info) edited_info_.publish(*frame.info);
+  edited_.publish(edited);
+}
+
+}  // namespace calipso::render

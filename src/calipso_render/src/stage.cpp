@@ -1,0 +1,98 @@
+#include "calipso_render/stage.hpp"
+
+#include <stdexcept>
+
+namespace calipso::render {
+
+Points vertexNormals(const Points& vertices, const Triangles& triangles) {
+  Points normals(vertices.size(), Eigen::Vector3f::Zero());
+  for (const Eigen::Vector3i& t : triangles) {
+    const Eigen::Vector3f n = (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
+    for (int i = 0; i < 3; ++i) normals[t[i]] += n;
+  }
+  for (Eigen::Vector3f& n : normals) {
+    const float length = n.norm();
+    if (length > 0.0f) n /= length;
+  }
+  return normals;
+}
+
+Points transformed(const Points& points, const Eigen::Isometry3d& transform) {
+  Points out(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) out[i] = (transform * points[i].cast<double>()).cast<float>();
+  return out;
+}
+
+Surface makeSurface(const ObjectModel& model) {
+  if (model.mesh.triangleCount() == 0) {
+    throw std::invalid_argument("object '" + model.name + "': its mesh has no triangles, nothing can be drawn");
+  }
+  if (!model.mesh.vertices.allFinite()) {
+    throw std::invalid_argument("object '" + model.name + "': its mesh has vertices that are not finite");
+  }
+  Surface surface;
+  surface.name = model.name;
+  surface.index = model.index;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) surface.object_vertices.push_back(model.mesh.vertex(i).cast<float>());
+  for (int t = 0; t < model.mesh.triangleCount(); ++t) {
+    const Eigen::Vector3i triangle = model.mesh.triangles.row(t);
+    if (triangle.minCoeff() < 0 || triangle.maxCoeff() >= model.mesh.vertexCount()) {
+      throw std::invalid_argument("object '" + model.name + "': triangle " + std::to_string(t) +
+                                  " names a vertex outside 0.." + std::to_string(model.mesh.vertexCount() - 1));
+    }
+    surface.triangles.push_back(triangle);
+  }
+  surface.edges = meshEdges(surface.triangles);
+  surface.key_vertices = transformed(surface.object_vertices, model.world_from_object);
+  surface.key_normals = vertexNormals(surface.key_vertices, surface.triangles);
+  return surface;
+}
+
+Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
+  Actor actor;
+  actor.surface = &surface;
+  actor.vertices = std::move(vertices);
+  actor.normals = vertexNormals(actor.vertices, surface.triangles);
+  actor.screen = projectMesh(actor.vertices, surface.triangles, camera);
+  return actor;
+}
+
+SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye) {
+  const Eigen::Vector3i& t = actor.surface->triangles[triangle];
+  const Eigen::Vector3f w = barycentric(actor.screen, triangle, u, v);
+  const auto mix = [&](const Points& x) -> Eigen::Vector3f {
+    return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]];
+  };
+  SurfacePoint point;
+  point.position = mix(actor.vertices);
+  point.normal = mix(actor.normals).normalized();
+  point.key_position = mix(actor.surface->key_vertices);
+  point.key_normal = mix(actor.surface->key_normals).normalized();
+  // Sheets are seen from both sides.
+  if (point.normal.dot(eye - point.position) < 0.0f) {
+    const Eigen::Vector3f& a = actor.vertices[t[0]];
+    const Eigen::Vector3f face = (actor.vertices[t[1]] - a).cross(actor.vertices[t[2]] - a);
+    if (face.dot(eye - point.position) < 0.0f) point.normal = -point.normal, point.key_normal = -point.key_normal;
+  }
+  return point;
+}
+
+std::optional<Receiver> receiverAt(const std::vector<SupportPlane>& planes, const Camera& camera, float u, float v) {
+  const Eigen::Vector3d eye = camera.world_from_camera.translation();
+  const Eigen::Vector3d ray = camera.world_from_camera.linear() * camera.ray(u, v);
+  std::optional<Receiver> nearest;
+  double nearest_depth = 1e30;
+  for (const SupportPlane& plane : planes) {
+    const double slope = plane.normal.dot(ray);
+    if (slope >= -1e-9) continue;  // seen from below, or never
+    const double depth = (plane.offset - plane.normal.dot(eye)) / slope;
+    const Eigen::Vector3d p = eye + depth * ray;
+    if (depth <= 0.0 || depth >= nearest_depth) continue;
+    if (plane.x_range && (p.x() < plane.x_range->x() || p.x() > plane.x_range->y())) continue;
+    nearest_depth = depth;
+    nearest = Receiver{p.cast<float>(), plane.normal.cast<float>()};
+  }
+  return nearest;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,110 @@
+#include "calipso_render/background.hpp"
+
+#include <gtest/gtest.h>
+
+#include "calipso_render/clip_sample.hpp"
+#include "calipso_render/inpaint.hpp"
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+// The empty table with a square that wanders to the right by 12 px per frame.
+std::vector<ClipFrame> wanderingSquare(int frames) {
+  std::vector<ClipFrame> clip;
+  for (int k = 0; k < frames; ++k) {
+    ClipFrame f{emptyTable(), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera()};
+    const cv::Rect square(10 + 12 * k, 40, 16, 16);
+    f.bgr(square).setTo(cv::Scalar(0, 0, 255));
+    f.labels(square).setTo(kBallLabel);
+    clip.push_back(f);
+  }
+  return clip;
+}
+
+TEST(SeenBackground, IsExactWhereAnyFrameShowsIt) {
+  const Background b = seenBackground(wanderingSquare(8), false);
+  EXPECT_EQ(cv::countNonZero(b.invented), 0);
+  cv::Mat plate;
+  b.plate.convertTo(plate, CV_8U);
+  EXPECT_EQ(cv::norm(plate, emptyTable(), cv::NORM_INF), 0.0);
+}
+
+TEST(SeenBackground, CountsTheFramesThatShowAPixel) {
+  const Background b = seenBackground(wanderingSquare(8), false);
+  EXPECT_EQ(b.count.at<std::uint8_t>(5, 5), 8);
+  EXPECT_EQ(b.count.at<std::uint8_t>(48, 18), 7);  // only the first frame's square is there
+}
+
+TEST(SeenBackground, LeavesOutPassingShadows) {
+  std::vector<ClipFrame> clip = wanderingSquare(9);
+  for (int k = 0; k < 4; ++k) clip[k].bgr(cv::Rect(60, 80, 20, 20)) *= 0.6;
+  const Background b = seenBackground(clip, true);
+  cv::Mat plate;
+  b.plate.convertTo(plate, CV_8U);
+  EXPECT_EQ(cv::norm(plate, emptyTable(), cv::NORM_INF), 0.0);
+}
+
+TEST(InventBackground, FillsOnlyTheHole) {
+  Background b = seenBackground(wanderingSquare(1), false);
+  const cv::Mat before = b.plate.clone(), hole = b.invented.clone();
+  ASSERT_GT(cv::countNonZero(hole), 0);
+  inventBackground(cv::Mat(), b);
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      if (hole.at<std::uint8_t>(v, u) == 0) {
+        ASSERT_EQ(b.plate.at<cv::Vec3f>(v, u), before.at<cv::Vec3f>(v, u));
+      } else {
+        // The square was pure red; the table has a third channel below the first never.
+        ASSERT_GT(b.plate.at<cv::Vec3f>(v, u)[1], 20.0f);
+      }
+    }
+  }
+}
+
+TEST(Inpaint, ContinuesStripes) {
+  // Vertical stripes with a period of 8 px leave one way to fill the hole.
+  cv::Mat image(96, 96, CV_32FC3), hole = cv::Mat::zeros(96, 96, CV_8U);
+  for (int v = 0; v < 96; ++v) {
+    for (int u = 0; u < 96; ++u) image.at<cv::Vec3f>(v, u) = cv::Vec3f::all(u % 8 < 4 ? 60.0f : 180.0f);
+  }
+  const cv::Mat truth = image.clone();
+  const cv::Rect square(40, 40, 14, 14);
+  hole(square).setTo(255);
+  image(square).setTo(cv::Scalar::all(0));
+  const InpaintResult r = inpaint(image, hole, cv::Mat());
+  EXPECT_TRUE(r.patches_found);
+  int wrong = 0;
+  for (int v = square.y; v < square.br().y; ++v) {
+    for (int u = square.x; u < square.br().x; ++u) wrong += std::abs(r.image.at<cv::Vec3f>(v, u)[0] - truth.at<cv::Vec3f>(v, u)[0]) > 1.0f;
+  }
+  EXPECT_LE(wrong, square.area() / 20);
+}
+
+TEST(Inpaint, SaysWhenThereIsNothingToCopy) {
+  const cv::Mat image(20, 20, CV_32FC3, cv::Scalar::all(50)), hole(20, 20, CV_8U, cv::Scalar(255));
+  EXPECT_FALSE(inpaint(image, hole, cv::Mat()).patches_found);
+}
+
+TEST(ClipSample, KeepsTheKeyFrameAndItsBound) {
+  ClipSample sample(4);
+  for (int k = 0; k < 100; ++k) {
+    sample.add({cv::Mat(2, 2, CV_8UC3, cv::Scalar::all(k)), cv::Mat::zeros(2, 2, CV_8U), Camera()});
+    ASSERT_LE(sample.frames().size(), 4u);
+  }
+  EXPECT_EQ(sample.seen(), 100u);
+  EXPECT_EQ(sample.frames().front().bgr.at<cv::Vec3b>(0, 0)[0], 0);
+  EXPECT_GE(sample.frames().back().bgr.at<cv::Vec3b>(0, 0)[0], 64);  // reaches into the last half
+}
+
+TEST(ClipSample, RefusesAnotherSize) {
+  ClipSample sample;
+  sample.add({cv::Mat(4, 4, CV_8UC3), cv::Mat(4, 4, CV_8U), Camera()});
+  EXPECT_THROW(sample.add({cv::Mat(4, 5, CV_8UC3), cv::Mat(4, 5, CV_8U), Camera()}), std::invalid_argument);
+  EXPECT_THROW(sample.add({cv::Mat(4, 4, CV_8UC3), cv::Mat(3, 4, CV_8U), Camera()}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace calipso::render

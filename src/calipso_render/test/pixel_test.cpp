@@ -1,0 +1,92 @@
+#include <gtest/gtest.h>
+
+#include "calipso_render/colour.hpp"
+#include "calipso_render/noise.hpp"
+#include "calipso_render/pixel_format.hpp"
+
+namespace calipso::render {
+namespace {
+
+TEST(Colour, EveryCodeComesBack) {
+  for (int code = 0; code < 256; ++code) {
+    const float linear = linearFromCode(static_cast<std::uint8_t>(code));
+    EXPECT_EQ(quantise(codeFromLinear(linear)), code);
+    EXPECT_NEAR(codeFromLinear(linear), code, 0.02f);
+  }
+}
+
+TEST(Colour, OutOfRangeAndNanAreClamped) {
+  EXPECT_EQ(codeFromLinear(-1.0f), 0.0f);
+  EXPECT_EQ(codeFromLinear(7.0f), 255.0f);
+  EXPECT_EQ(codeFromLinear(std::nanf("")), 0.0f);
+}
+
+TEST(PixelFormat, RefusesWhatItCannotEdit) {
+  for (const std::string encoding : {"mono16", "16UC3", "bayer_rggb8", ""}) {
+    try {
+      pixelFormat(encoding);
+      FAIL() << encoding << " was accepted";
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find("'" + encoding + "'"), std::string::npos);
+    }
+  }
+}
+
+TEST(PixelFormat, WritesOnlyChangedPixelsAndKeepsAlpha) {
+  for (const auto& [name, count] : {std::pair<std::string, int>{"bgr8", 3}, {"rgb8", 3}, {"mono8", 1}, {"bgra8", 4}, {"rgba8", 4}}) {
+    const PixelFormat format = pixelFormat(name);
+    ASSERT_EQ(channels(format), count);
+    cv::Mat image(2, 2, CV_8UC(count));
+    for (std::size_t i = 0; i < image.total() * count; ++i) image.data[i] = static_cast<std::uint8_t>(40 + 3 * i);
+    const cv::Mat before = image.clone();
+    cv::Mat bgr = toBgr(image, format).clone();
+    bgr.at<cv::Vec3b>(1, 0) = {9, 9, 9};
+    bgr.at<cv::Vec3b>(0, 1) = {200, 200, 200};  // differs, but is not flagged
+    cv::Mat changed = cv::Mat::zeros(2, 2, CV_8U);
+    changed.at<std::uint8_t>(1, 0) = 1;
+    writeChanged(bgr, changed, format, image);
+    for (int c = 0; c < count; ++c) {
+      const std::uint8_t expected = c == 3 ? before.ptr(1)[c] : 9;
+      EXPECT_EQ(image.ptr(1)[c], expected) << name;
+      EXPECT_EQ(image.ptr(0)[count + c], before.ptr(0)[count + c]) << name;
+    }
+  }
+}
+
+TEST(Noise, EstimatesWhatWasAdded) {
+  cv::RNG random(3);
+  std::vector<cv::Mat> frames;
+  for (int k = 0; k < 4; ++k) {
+    cv::Mat noise(120, 120, CV_32FC3), frame;
+    random.fill(noise, cv::RNG::NORMAL, 100.0, 3.0);
+    noise.convertTo(frame, CV_8U);
+    frames.push_back(frame);
+  }
+  const cv::Mat everywhere(120, 120, CV_8U, cv::Scalar(255));
+  EXPECT_NEAR(NoiseModel::estimate(frames, everywhere).deviation(1, 100.0f), 3.0f, 0.3f);       // 10 %: sampling
+  EXPECT_NEAR(NoiseModel::estimate({frames[0]}, everywhere).deviation(1, 100.0f), 3.0f, 0.3f);  // one picture
+}
+
+TEST(Noise, StillPicturesHaveNone) {
+  const std::vector<cv::Mat> frames(3, cv::Mat(64, 64, CV_8UC3, cv::Scalar::all(90)));
+  EXPECT_LT(NoiseModel::estimate(frames, cv::Mat(64, 64, CV_8U, cv::Scalar(255))).deviation(0, 90.0f), 0.4f);  // rounding
+}
+
+TEST(NoiseField, HangsOnStampAndPixelAlone) {
+  const NoiseField a(5), b(5), c(6);
+  int different = 0;
+  double sum = 0.0, squares = 0.0;
+  for (int v = 0; v < 256; ++v) {
+    for (int u = 0; u < 256; ++u) {
+      ASSERT_EQ(a.at(u, v, 1), b.at(u, v, 1));
+      different += a.at(u, v, 1) != c.at(u, v, 1);
+      sum += a.at(u, v, 1), squares += a.at(u, v, 1) * a.at(u, v, 1);
+    }
+  }
+  EXPECT_GT(different, 60000);
+  EXPECT_NEAR(sum / 65536, 0.0, 1e-3);
+  EXPECT_NEAR(squares / 65536, 1.0, 1e-2);
+}
+
+}  // namespace
+}  // namespace calipso::render

@@ -1,0 +1,130 @@
+#include "calipso_render/rasterizer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "calipso_render/edge_coverage.hpp"
+#include "calipso_render/shadow_map.hpp"
+
+namespace calipso::render {
+namespace {
+
+// A triangle on the picture plane with nearness z.
+ScreenMesh triangle(const Triangles& triangles, Eigen::Vector2f a, Eigen::Vector2f b, Eigen::Vector2f c, float z) {
+  ScreenMesh mesh;
+  mesh.points = {{a.x(), a.y(), z}, {b.x(), b.y(), z}, {c.x(), c.y(), z}};
+  mesh.triangles = &triangles;
+  return mesh;
+}
+
+const Triangles kOne = {{0, 1, 2}};
+
+TEST(VisibilityBuffer, NearerSurfaceWinsWhateverTheOrder) {
+  for (const bool near_first : {true, false}) {
+    VisibilityBuffer buffer({0, 0, 20, 20});
+    const ScreenMesh near = triangle(kOne, {0, 0}, {19, 0}, {0, 19}, 2.0f), far = triangle(kOne, {0, 0}, {19, 0}, {0, 19}, 1.0f);
+    buffer.draw(near_first ? near : far, near_first ? 0 : 1);
+    buffer.draw(near_first ? far : near, near_first ? 1 : 0);
+    EXPECT_EQ(VisibilityBuffer::objectOf(buffer.idAt(3, 3)), 0);
+    EXPECT_FLOAT_EQ(buffer.nearnessAt(3, 3), 2.0f);
+  }
+}
+
+TEST(VisibilityBuffer, SharedEdgesHaveNoCracks) {
+  // A fan around an odd centre covers its square without a gap.
+  ScreenMesh mesh;
+  mesh.points = {{10.37f, 9.81f, 1}, {0, 0, 1}, {20, 0, 1}, {20, 20, 1}, {0, 20, 1}};
+  const Triangles fan = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
+  mesh.triangles = &fan;
+  VisibilityBuffer buffer({0, 0, 21, 21});
+  buffer.draw(mesh, 0);
+  for (int v = 0; v <= 20; ++v) {
+    for (int u = 0; u <= 20; ++u) EXPECT_NE(buffer.idAt(u, v), VisibilityBuffer::kNothing) << u << ", " << v;
+  }
+}
+
+TEST(VisibilityBuffer, SkipsWhatLiesBehindTheCamera) {
+  Camera camera;
+  camera.width = camera.height = 10, camera.fx = camera.fy = 10.0, camera.cx = camera.cy = 4.5;
+  const Points behind = {{-1, -1, -1}, {1, -1, -1}, {0, 1, -1}};
+  VisibilityBuffer buffer({0, 0, 10, 10});
+  buffer.draw(projectMesh(behind, kOne, camera), 0);
+  for (int v = 0; v < 10; ++v) {
+    for (int u = 0; u < 10; ++u) EXPECT_EQ(buffer.idAt(u, v), VisibilityBuffer::kNothing);
+  }
+}
+
+TEST(Barycentric, IsPerspectiveCorrect) {
+  Camera camera;
+  camera.width = camera.height = 100, camera.fx = camera.fy = 100.0, camera.cx = camera.cy = 50.0;
+  const Points world = {{-1, -1, 3}, {2, -1, 8}, {0, 2, 5}};
+  const ScreenMesh mesh = projectMesh(world, kOne, camera);
+  const Eigen::Vector3f w(0.2f, 0.5f, 0.3f);
+  const Eigen::Vector3f p = w[0] * world[0] + w[1] * world[1] + w[2] * world[2];
+  const Eigen::Vector2d q = camera.project(p.cast<double>());
+  EXPECT_LT((barycentric(mesh, 0, float(q.x()), float(q.y())) - w).norm(), 1e-4f);  // float round-off
+}
+
+TEST(EdgeCoverage, MeasuresAreaWithinAPixel) {
+  // The edge u = 10.25 covers three quarters of the pixel column 10 (from 9.5 to 10.5).
+  ScreenMesh mesh;
+  mesh.points = {{-5, -5, 1}, {10.25f, -5, 1}, {10.25f, 30, 1}, {-5, 30, 1}};
+  const Triangles square = {{0, 1, 2}, {0, 2, 3}};
+  mesh.triangles = &square;
+  VisibilityBuffer buffer({0, 0, 20, 20});
+  buffer.draw(mesh, 0);
+  EdgeCoverage edges(buffer);
+  edges.draw(mesh, 0);
+  const EdgeCoverage::Pixel* pixel = edges.at(10, 10);
+  ASSERT_NE(pixel, nullptr);
+  int covered = 0;
+  for (const std::uint32_t id : pixel->ids) covered += id != VisibilityBuffer::kNothing;
+  EXPECT_EQ(covered, 12);
+  EXPECT_EQ(edges.at(5, 10), nullptr);
+}
+
+TEST(EdgeCoverage, FindsPartsThinnerThanAPixel) {
+  ScreenMesh mesh;
+  mesh.points = {{10.05f, 2, 1}, {10.3f, 2, 1}, {10.3f, 18, 1}, {10.05f, 18, 1}};
+  const Triangles strip = {{0, 1, 2}, {0, 2, 3}};
+  mesh.triangles = &strip;
+  VisibilityBuffer buffer({0, 0, 20, 20});
+  buffer.draw(mesh, 0);
+  ASSERT_EQ(buffer.idAt(10, 10), VisibilityBuffer::kNothing);
+  EdgeCoverage edges(buffer);
+  edges.chooseSilhouette(mesh, meshEdges(strip));
+  edges.draw(mesh, 0);
+  const EdgeCoverage::Pixel* pixel = edges.at(10, 10);
+  ASSERT_NE(pixel, nullptr);
+  int covered = 0;
+  for (const std::uint32_t id : pixel->ids) covered += id != VisibilityBuffer::kNothing;
+  EXPECT_EQ(covered, 4);
+}
+
+// A horizontal 2 m square at height 1 over the origin.
+const Points kRoof = {{-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1}};
+const Triangles kRoofFaces = {{0, 1, 2}, {0, 2, 3}};
+
+TEST(ShadowMap, FullShadeFullLightAndHalfAtTheEdge) {
+  const ShadowMap map({{&kRoof, &kRoofFaces}}, Eigen::Vector3d::UnitZ(), {400, 0.05, 32});
+  const Eigen::Vector3f up = Eigen::Vector3f::UnitZ();
+  EXPECT_FLOAT_EQ(map.visibility({0, 0, 0}, up), 0.0f);
+  EXPECT_FLOAT_EQ(map.visibility({2, 0, 0}, up), 1.0f);
+  EXPECT_FLOAT_EQ(map.visibility({0, 0, 2}, up), 1.0f);      // above the roof
+  EXPECT_NEAR(map.visibility({1, 0, 0}, up), 0.5f, 0.1f);    // half of the disc, by symmetry
+}
+
+TEST(ShadowMap, PenumbraGrowsWithTheBlockersHeight) {
+  const ShadowMap map({{&kRoof, &kRoofFaces}}, Eigen::Vector3d::UnitZ(), {400, 0.1, 32});
+  const Eigen::Vector3f up = Eigen::Vector3f::UnitZ();
+  EXPECT_GT(map.visibility({0.95f, 0, 0}, up), 0.05f);        // 0.1 m wide half penumbra at the ground
+  EXPECT_FLOAT_EQ(map.visibility({0.95f, 0, 0.9f}, up), 0.0f);  // 0.01 m just below the roof
+}
+
+TEST(ShadowMap, WithoutOccludersNothingIsShaded) {
+  EXPECT_FLOAT_EQ(ShadowMap({}, Eigen::Vector3d::UnitZ(), {}).visibility({0, 0, 0}, Eigen::Vector3f::UnitZ()), 1.0f);
+}
+
+}  // namespace
+}  // namespace calipso::render

@@ -1,0 +1,154 @@
+#include "calipso_render/renderer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
+
+RenderParams params() {
+  RenderParams p;
+  p.planes = table();
+  p.add_noise = false;
+  return p;
+}
+
+struct Setting {
+  ClipFrame key = frameWithBall(ballAt(kCentre));
+  std::shared_ptr<const Prepared> prepared;
+
+  explicit Setting(const RenderParams& p) {
+    ClipSample clip;
+    clip.add(key);
+    prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, p));
+  }
+  FrameInput input(bool edited, const Eigen::Vector3f& move) const {
+    FrameInput in;
+    in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera, in.stamp_ns = 7;
+    ObjectInFrame ball;
+    ball.name = "ball", ball.edited = edited;
+    ball.vertices = prepared->surfaces[0].key_vertices;
+    for (Eigen::Vector3f& x : ball.vertices) x += move;
+    in.objects = {ball};
+    return in;
+  }
+};
+
+int changedPixels(const FrameOutput& out) { return cv::countNonZero(out.provenance); }
+
+bool sameWhereOriginal(const FrameOutput& out, const cv::Mat& input) {
+  for (int v = 0; v < input.rows; ++v) {
+    for (int u = 0; u < input.cols; ++u) {
+      if (out.provenance.at<std::uint8_t>(v, u) == kOriginal && out.bgr.at<cv::Vec3b>(v, u) != input.at<cv::Vec3b>(v, u)) return false;
+    }
+  }
+  return true;
+}
+
+TEST(Renderer, NoEditLeavesEveryByte) {
+  const Setting s(params());
+  const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(false, Eigen::Vector3f::Zero()));
+  EXPECT_EQ(changedPixels(out), 0);
+  EXPECT_EQ(cv::norm(out.bgr, s.key.bgr, cv::NORM_INF), 0.0);
+}
+
+TEST(Renderer, AnEditThatMovesNothingLeavesTheObject) {
+  const Setting s(params());
+  const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(true, Eigen::Vector3f::Zero()));
+  cv::Mat ball;
+  cv::dilate(s.key.labels, ball, cv::Mat::ones(7, 7, CV_8U));
+  EXPECT_GT(psnr(out.bgr, s.key.bgr, ball), 40.0);
+  EXPECT_TRUE(sameWhereOriginal(out, s.key.bgr));
+}
+
+TEST(Renderer, UnmovedSurfaceDrawsBackToItsPixels) {
+  RenderParams p = params();
+  p.keep_still = false;  // so that every pixel is really drawn
+  const Setting s(p);
+  const FrameOutput out = Renderer(s.prepared, p).composite(s.input(true, Eigen::Vector3f::Zero()));
+  cv::Mat inside;
+  cv::erode(s.key.labels, inside, cv::Mat::ones(7, 7, CV_8U));
+  EXPECT_GT(psnr(out.bgr, s.key.bgr, inside), 50.0);
+}
+
+TEST(Renderer, MovedObjectLeavesTheTableBehind) {
+  const Setting s(params());
+  const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(true, {0.25f, 0.0f, 0.0f}));
+  EXPECT_TRUE(sameWhereOriginal(out, s.key.bgr));
+  // Its centre has become table-like: no longer red against blue as the ball is.
+  const Eigen::Vector2d q = camera().projectWorld(kCentre);
+  const cv::Vec3b old_place = out.bgr.at<cv::Vec3b>(int(q.y()), int(q.x()));
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(int(q.y()), int(q.x())), kInvented);
+  EXPECT_LT(double(old_place[2]) / old_place[0], 1.7);
+  const Eigen::Vector2d r = camera().projectWorld(kCentre + Eigen::Vector3d(0.25, 0, 0));
+  const cv::Vec3b new_place = out.bgr.at<cv::Vec3b>(int(r.y()), int(r.x()));
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(int(r.y()), int(r.x())), kRendered);
+  EXPECT_GT(double(new_place[2]) / new_place[0], 1.7);
+}
+
+TEST(Renderer, SameInputGivesSameBytes) {
+  RenderParams p = params();
+  p.add_noise = true;
+  const Setting s(p);
+  Renderer first(s.prepared, p), second(s.prepared, p);
+  const FrameOutput a = first.composite(s.input(true, {0.05f, 0.0f, 0.1f}));
+  second.composite(s.input(true, {0.2f, 0.0f, 0.0f}));  // what was drawn before must not matter
+  const FrameOutput b = second.composite(s.input(true, {0.05f, 0.0f, 0.1f}));
+  EXPECT_EQ(cv::norm(a.bgr, b.bgr, cv::NORM_INF), 0.0);
+}
+
+TEST(Renderer, NearerObjectHidesTheOther) {
+  const ObjectModel front = ballAt({0.0, -0.15, 0.12}, "front", 1), back = ballAt({0.0, 0.25, 0.12}, "back", 2);
+  ClipSample clip;
+  const ClipFrame key = frameWithBall(front);
+  clip.add(key);
+  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {front, back}, params()));
+  FrameInput in;
+  in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera;
+  ObjectInFrame moved;
+  moved.name = "back", moved.edited = true;
+  moved.vertices = prepared->surfaces[1].key_vertices;
+  for (Eigen::Vector3f& x : moved.vertices) x.y() -= 0.2f;  // still behind the front one
+  in.objects = {moved};
+  const FrameOutput out = Renderer(prepared, params()).composite(in);
+  const Eigen::Vector2d q = camera().projectWorld({0.0, -0.15, 0.12});
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(int(q.y()), int(q.x())), kOriginal);
+}
+
+TEST(Renderer, RefusesWhatDoesNotFit) {
+  const Setting s(params());
+  Renderer renderer(s.prepared, params());
+  FrameInput small = s.input(true, Eigen::Vector3f::Zero());
+  small.bgr = cv::Mat::zeros(10, 10, CV_8UC3);
+  EXPECT_THROW(renderer.composite(small), std::invalid_argument);
+  FrameInput unknown = s.input(true, Eigen::Vector3f::Zero());
+  unknown.objects[0].name = "teapot";
+  try {
+    renderer.composite(unknown);
+    FAIL() << "an unknown object was accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("teapot"), std::string::npos);
+  }
+  FrameInput short_mesh = s.input(true, Eigen::Vector3f::Zero());
+  short_mesh.objects[0].vertices.pop_back();
+  EXPECT_THROW(renderer.composite(short_mesh), std::invalid_argument);
+}
+
+TEST(Prepare, NeedsAFrameAndDrawableMeshes) {
+  EXPECT_THROW(prepare(ClipSample(), {ballAt(kCentre)}, params()), std::invalid_argument);
+  ClipSample clip;
+  clip.add(frameWithBall(ballAt(kCentre)));
+  ObjectModel empty = ballAt(kCentre);
+  empty.mesh.triangles.resize(0, 3);
+  EXPECT_THROW(prepare(clip, {empty}, params()), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace calipso::render

@@ -1,0 +1,90 @@
+#include "truth.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+namespace calipso::render {
+namespace {
+
+Eigen::Isometry3d toIsometry(const YAML::Node& rows) {
+  Eigen::Matrix4d m;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) m(i, j) = rows[i][j].as<double>();
+  }
+  Eigen::Isometry3d pose;
+  pose.matrix() = m;
+  return pose;
+}
+
+std::string numbered(const std::string& pattern, int k) {
+  char name[512];
+  std::snprintf(name, sizeof(name), pattern.c_str(), k);
+  return name;
+}
+
+Truth::Object toObject(const Scene& scene, const YAML::Node& node) {
+  Truth::Object object;
+  object.model.name = node["name"].as<std::string>();
+  object.model.index = node["index"].as<int>();
+  object.model.mesh = loadMesh(scene.directory + "/" + node["true_mesh"].as<std::string>());
+  for (const YAML::Node& pose : node["world_T_object"]) object.poses.push_back(toIsometry(pose));
+  object.model.world_from_object = object.poses.front();
+  const YAML::Node material = node["material"];
+  if (material && material.size() > 0 && material[0]["roughness"]) object.roughness = material[0]["roughness"].as<double>();
+  return object;
+}
+
+}  // namespace
+
+Truth loadTruth(const Scene& scene) {
+  const std::string file = scene.directory + "/scene.yaml";
+  try {
+    const YAML::Node root = YAML::LoadFile(file);
+    Truth truth;
+    for (const YAML::Node& node : root["objects"]) truth.objects.push_back(toObject(scene, node));
+    const YAML::Node sun = root["lights"]["sun"]["direction_to_sun_world"];
+    if (sun) truth.to_sun = Eigen::Vector3d(sun[0].as<double>(), sun[1].as<double>(), sun[2].as<double>());
+    return truth;
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(file + ": no ground truth to evaluate against (" + error.what() + ")");
+  }
+}
+
+cv::Mat loadFrame(const Scene& scene, int k) {
+  const std::string file = scene.directory + "/" + numbered(scene.frame_pattern, k);
+  const cv::Mat frame = cv::imread(file, cv::IMREAD_COLOR);
+  if (frame.empty()) throw std::runtime_error(file + ": cannot be read as a picture");
+  return frame;
+}
+
+cv::Mat loadLabels(const Scene& scene, int k) {
+  cv::Mat labels = cv::Mat::zeros(scene.camera.height, scene.camera.width, CV_8U);
+  for (const SceneObject& o : scene.objects) {
+    const std::string stem = scene.directory + "/masks/" + o.name;
+    cv::Mat mask = cv::imread(stem + numbered("_%06d.png", k), cv::IMREAD_GRAYSCALE);
+    if (mask.empty()) mask = cv::imread(stem + "_000000.png", cv::IMREAD_GRAYSCALE);
+    if (mask.empty()) throw std::runtime_error(stem + "_000000.png: no mask");
+    labels.setTo(o.index, mask > 127);
+  }
+  return labels;
+}
+
+std::optional<cv::Mat> loadPlate(const Scene& scene, int k) {
+  cv::Mat plate = cv::imread(scene.directory + numbered("/plates/%06d.png", k), cv::IMREAD_COLOR);
+  if (plate.empty()) plate = cv::imread(scene.directory + "/plates/000000.png", cv::IMREAD_COLOR);
+  if (plate.empty()) return std::nullopt;
+  return plate;
+}
+
+std::optional<cv::Mat> loadAlbedo(const Scene& scene) {
+  const cv::Mat coded = cv::imread(scene.directory + "/truth/albedo_000000.png", cv::IMREAD_UNCHANGED);
+  if (coded.type() != CV_16UC3) return std::nullopt;
+  cv::Mat albedo;
+  coded.convertTo(albedo, CV_32F, 1.0 / 65535.0);
+  return albedo;
+}
+
+}  // namespace calipso::render
