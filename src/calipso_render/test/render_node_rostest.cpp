@@ -1,0 +1,172 @@
+#include <calipso_msgs/AlignedModels.h>
+#include <calipso_msgs/ClipInfo.h>
+#include <calipso_msgs/NodeStatus.h>
+#include <calipso_msgs/Segmentation.h>
+#include <calipso_msgs/SimulationState.h>
+#include <geometry_msgs/TransformStamped.h>
+#include <gtest/gtest.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <tf2_ros/static_transform_broadcaster.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "calipso_ros/conversions.hpp"
+#include "calipso_ros/topics.hpp"
+#include "conversions.hpp"
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
+constexpr int kClipFrames = 3;
+
+// Plays the other nodes' part for a clip of one resting ball.
+class RenderNodeTest : public ::testing::Test {
+ protected:
+  RenderNodeTest() {
+    namespace t = topics;
+    info_ = nh_.advertise<calipso_msgs::ClipInfo>(t::kClipInfo, 1, true);
+    clip_ = nh_.advertise<sensor_msgs::Image>(t::kClipImage, 10);
+    clip_camera_ = nh_.advertise<sensor_msgs::CameraInfo>(t::kClipCameraInfo, 10);
+    segmentation_ = nh_.advertise<calipso_msgs::Segmentation>(t::kSegmentation, 10);
+    models_ = nh_.advertise<calipso_msgs::AlignedModels>(t::kModels, 1, true);
+    image_ = nh_.advertise<sensor_msgs::Image>(t::kImage, 10);
+    camera_ = nh_.advertise<sensor_msgs::CameraInfo>(t::kCameraInfo, 10);
+    state_ = nh_.advertise<calipso_msgs::SimulationState>(t::kState, 10);
+    edited_sub_ = nh_.subscribe<sensor_msgs::Image>(t::kImageEdited, 10, [this](const sensor_msgs::ImageConstPtr& m) { edited_.push_back(*m); });
+    provenance_sub_ = nh_.subscribe<sensor_msgs::Image>(t::kProvenance, 10, [this](const sensor_msgs::ImageConstPtr& m) { provenance_.push_back(*m); });
+    status_sub_ = nh_.subscribe<calipso_msgs::NodeStatus>(t::kStatus, 10, [this](const calipso_msgs::NodeStatusConstPtr& m) { status_ = *m; });
+    sendCameraPose();
+  }
+
+  static bool waitFor(const std::function<bool()>& condition, double seconds = 60.0) {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
+    while (ros::ok() && !condition() && ros::WallTime::now() < end) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.02));
+    return condition();
+  }
+
+  static ros::Time stamp(int k) { return ros::Time(100, 0) + ros::Duration(k / 30.0); }
+
+  static std_msgs::Header header(int k) {
+    std_msgs::Header h;
+    h.stamp = stamp(k);
+    h.frame_id = "camera_optical_frame";
+    return h;
+  }
+
+  void sendCameraPose() {
+    geometry_msgs::TransformStamped t;
+    t.header.stamp = stamp(0);
+    t.header.frame_id = topics::kWorldFrame;
+    t.child_frame_id = header(0).frame_id;
+    t.transform = toTransformMsg(camera().world_from_camera);
+    tf_.sendTransform(t);
+  }
+
+  sensor_msgs::CameraInfo cameraInfo(int k) const {
+    sensor_msgs::CameraInfo info = toMsg(camera());
+    info.header = header(k);
+    return info;
+  }
+
+  sensor_msgs::Image picture(int k) const { return imageMsg(header(k), key_.bgr); }
+
+  void sendClip() {
+    calipso_msgs::ClipInfo info;
+    info.header = header(0);
+    info.frames = kClipFrames;
+    info.fps = 30.0;
+    info.last_stamp = stamp(kClipFrames - 1);
+    info_.publish(info);
+    for (int k = 0; k < kClipFrames; ++k) {
+      clip_.publish(picture(k));
+      clip_camera_.publish(cameraInfo(k));
+      calipso_msgs::Segmentation s;
+      s.header = header(k);
+      s.labels = imageMsg(header(k), key_.labels);
+      segmentation_.publish(s);
+    }
+    calipso_msgs::AlignedModels models;
+    models.header = header(0);
+    models.models.resize(1);
+    models.models[0].object = "ball";
+    models.models[0].index = kBallLabel;
+    models.models[0].mesh = toMsg(ball());
+    models.models[0].world_from_object.pose = toMsg(ballAt(kCentre).world_from_object);
+    models_.publish(models);
+  }
+
+  calipso_msgs::SimulationState state(int k, bool edited) const {
+    calipso_msgs::SimulationState s;
+    s.header = header(k);
+    s.objects.resize(1);
+    s.objects[0].object = "ball";
+    s.objects[0].index = kBallLabel;
+    s.objects[0].edited = edited;
+    s.objects[0].pose = toMsg(ballAt(kCentre).world_from_object);
+    const TriangleMesh mesh = ball();
+    for (int i = 0; edited && i < mesh.vertexCount(); ++i) {
+      const Eigen::Vector3d p = mesh.vertex(i) + kCentre + Eigen::Vector3d(0.2, 0, 0);
+      for (int c = 0; c < 3; ++c) s.objects[0].vertices.push_back(static_cast<float>(p[c]));
+    }
+    return s;
+  }
+
+  void sendFrame(const sensor_msgs::Image& image, int k) {
+    image_.publish(image);
+    camera_.publish(cameraInfo(k));
+  }
+
+  ros::NodeHandle nh_;
+  tf2_ros::StaticTransformBroadcaster tf_;
+  ros::Publisher info_, clip_, clip_camera_, segmentation_, models_, image_, camera_, state_;
+  ros::Subscriber edited_sub_, provenance_sub_, status_sub_;
+  std::vector<sensor_msgs::Image> edited_, provenance_;
+  calipso_msgs::NodeStatus status_;
+  const ClipFrame key_ = frameWithBall(ballAt(kCentre));
+};
+
+TEST_F(RenderNodeTest, PreparesAndEditsInOrder) {
+  ASSERT_TRUE(waitFor([&] { return image_.getNumSubscribers() > 0 && clip_.getNumSubscribers() > 0 && clip_camera_.getNumSubscribers() > 0 &&
+                                   segmentation_.getNumSubscribers() > 0 && state_.getNumSubscribers() > 0 && edited_sub_.getNumPublishers() > 0 &&
+                                   provenance_sub_.getNumPublishers() > 0; }));
+  sendClip();
+  ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; })) << status_.message;
+  EXPECT_EQ(status_.clip_frames, static_cast<unsigned>(kClipFrames));
+
+  // The later frame's state comes first: nothing may overtake.
+  sendFrame(picture(0), 0);
+  sendFrame(picture(1), 1);
+  sensor_msgs::Image deep = picture(2);
+  deep.encoding = "mono16", deep.step = deep.width * 2, deep.data.resize(deep.step * deep.height);
+  sendFrame(deep, 2);
+  state_.publish(state(1, true));
+  state_.publish(state(2, true));
+  state_.publish(state(0, false));
+  ASSERT_TRUE(waitFor([&] { return edited_.size() == 3 && provenance_.size() == 3; })) << edited_.size();
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(edited_[k].header.stamp, stamp(k));
+
+  EXPECT_EQ(edited_[0].data, picture(0).data);
+  EXPECT_NE(edited_[1].data, picture(1).data);
+  EXPECT_EQ(edited_[2].data, deep.data);  // cannot be edited: passes as it came
+  const auto changed = [&](int k) { return std::count_if(provenance_[k].data.begin(), provenance_[k].data.end(), [](int p) { return p != 0; }); };
+  EXPECT_EQ(changed(0), 0);
+  EXPECT_GT(changed(1), 1000);  // the ball covers about 1900 px
+  EXPECT_EQ(changed(2), 0);
+}
+
+}  // namespace
+}  // namespace calipso::render
+
+int main(int argc, char** argv) {
+  ::testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "render_node_rostest");
+  return RUN_ALL_TESTS();
+}
