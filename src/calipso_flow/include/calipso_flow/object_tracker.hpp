@@ -1,0 +1,83 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "calipso_flow/pose_fit.hpp"
+#include "calipso_flow/reference_view.hpp"
+
+namespace calipso::flow {
+
+struct TrackerParams {
+  int seed_count = 120;              // surface points followed at a time
+  double forward_backward_px = 0.3;  // a track that does not come back this close is dropped
+  double largest_deviation_px = 0.5; // a track less certain than this is dropped
+  double least_correlation = 0.4;    // of a patch with its reference
+  double least_inliers = 0.5;        // below this share of its seeds a reference is worn out
+  double least_coverage = 0.55;      // below this share of known surface a new reference is taken
+  int max_references = 12;
+  double search_px = 24.0;           // the coarse search looks this far beyond the prediction
+  PatchParams patch;
+  PoseFitParams pose;
+};
+
+// A surface point followed into one frame.
+struct Track {
+  Eigen::Vector3d point;  // object frame, m
+  Eigen::Vector2d pixel;  // px
+  double confidence;      // 0..1: correlation with the reference
+  bool inlier;            // agrees with the rigid motion
+};
+
+// Where an object was found in one frame.
+struct Observation {
+  double time = 0.0;  // s
+  bool found = false;
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
+  Matrix6d covariance = Matrix6d::Zero();  // (m of the centroid, rad), world axes
+  double deviation = 0.0;                  // see PoseFit
+  std::vector<Track> tracks;
+  int inliers() const;
+};
+
+// Follows one rigid object from its pose in the key frame through the frames of a video (paper,
+// section 7): the object's look is warped from a reference view to the predicted pose, surface
+// points are matched from there to the frame by Lucas-Kanade, forward and back, and their positions
+// give the pose. Not thread-safe; frames come in order of time.
+class ObjectTracker {
+ public:
+  // @param mask  CV_8U of the picture's size: where the object is seen in the key frame; or empty
+  ObjectTracker(const ObjectModel& model, const Frame& key_frame, const cv::Mat& mask,
+                const TrackerParams& params = {});
+
+  // The observation of the key frame itself: the aligned pose.
+  const Observation& keyObservation() const { return key_; }
+
+  // @param cut  the picture does not continue the last one: no motion is assumed
+  Observation track(const Frame& frame, bool cut);
+
+  const ObjectModel& model() const { return model_; }
+  const Eigen::Vector3d& centroid() const { return centroid_; }  // object frame, m
+
+ private:
+  Eigen::Isometry3d predict(double time) const;
+  Eigen::Isometry3d searchCoarsely(const Frame& frame, const ReferenceView& reference,
+                                   const Eigen::Isometry3d& predicted) const;
+  Observation refine(const Frame& frame, const ReferenceView& reference,
+                     const Eigen::Isometry3d& start) const;
+  const ReferenceView& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) const;
+  Observation attempt(const Frame& frame, const ReferenceView& reference,
+                      const Eigen::Isometry3d& predicted) const;
+  void remember(const Frame& frame, const Observation& observation, bool cut);
+
+  ObjectModel model_;
+  TrackerParams params_;
+  Eigen::Vector3d centroid_;
+  std::vector<ReferenceView> references_;
+  Observation key_;
+  std::optional<Observation> last_, before_last_;  // found, most recent first
+  double last_seen_time_ = 0.0;                    // s; of the last frame, found in or not
+  int frames_lost_ = 0;
+};
+
+}  // namespace calipso::flow

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "calipso_scene/camera.hpp"
+
+namespace calipso::flow {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+// A point of an object's surface and where it was found in the picture.
+struct Correspondence {
+  Eigen::Vector3d point;       // object frame, m
+  Eigen::Vector2d pixel;       // px
+  Eigen::Matrix2d covariance;  // of pixel, px^2
+};
+
+struct PoseFitParams {
+  double start_scale_px = 8.0;  // residuals up to this count fully at first, then less and less
+  double floor_px = 0.03;       // no track is better than this: model error, compression
+  double inlier_sigma = 4.0;    // a track further off than this many deviations does not count
+  int max_iterations = 30;
+  int least_inliers = 6;
+};
+
+struct PoseFit {
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
+  Matrix6d covariance = Matrix6d::Zero();  // of (m of the pivot, rad), world axes
+  std::vector<bool> inlier;                // per correspondence
+  int inliers = 0;
+  double deviation = 0.0;  // robust deviation of the residuals over their own, 1 = as expected
+  bool converged = false;
+};
+
+// Pose of a rigid object from points found in one picture: robust Gauss-Newton on the reprojection
+// error, the scale of the Geman-McClure weight shrinking from start_scale_px to the noise found.
+// @param start  first guess of world_from_object
+// @param pivot  object frame, m; the point whose position the covariance speaks of
+PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera& camera,
+                const Eigen::Isometry3d& start, const Eigen::Vector3d& pivot,
+                const PoseFitParams& params = {});
+
+// Moves a pose by (translation of the pivot, rotation vector about it), world axes.
+Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object,
+                           const Eigen::Vector3d& pivot, const Vector6d& motion);
+
+}  // namespace calipso::flow

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_flow/frame.hpp"
+#include "calipso_flow/object_model.hpp"
+#include "calipso_flow/patch_match.hpp"
+#include "calipso_flow/surface_view.hpp"
+
+namespace calipso::flow {
+
+// A frame with the object's pose in it, from which the object's look is taken: later frames are
+// compared with this one, not with their predecessor, so that errors do not add up.
+class ReferenceView {
+ public:
+  // @param mask  CV_8U of the picture's size, non-zero where the object is seen; empty: everywhere
+  //   on its surface
+  // @param seed_count  most surface points to follow
+  ReferenceView(const Frame& frame, const ObjectModel& model,
+                const Eigen::Isometry3d& world_from_object, const cv::Mat& mask, int seed_count);
+
+  // What `camera` would see with the object at `world_from_object`: the reference's pixels moved
+  // along the model's surface.
+  struct Warped {
+    ImageWindow gray;
+    ImageWindow weight;     // 1 where the pixel is known, else 0
+    double coverage = 0.0;  // share of the visible surface's pixels that the reference knows
+  };
+  Warped warp(const Camera& camera, const Eigen::Isometry3d& world_from_object) const;
+
+  const std::vector<Eigen::Vector3d>& seeds() const { return seeds_; }  // object frame, m
+  const Eigen::Isometry3d& worldFromObject() const { return world_from_object_; }
+  const Frame& frame() const { return frame_; }
+
+ private:
+  void chooseSeeds(int count);
+
+  Frame frame_;
+  TriangleMesh mesh_;
+  double diagonal_;  // m
+  Eigen::Isometry3d world_from_object_;
+  SurfaceView surface_;
+  cv::Mat usable_;  // CV_8U over the surface's window
+  std::vector<Eigen::Vector3d> seeds_;
+};
+
+}  // namespace calipso::flow

@@ -1,0 +1,39 @@
+#include "calipso_flow/frame.hpp"
+
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace calipso::flow {
+namespace {
+
+constexpr double kPrefilterSigma = 0.7;  // px
+
+void checkPicture(const cv::Mat& picture, const Camera& camera) {
+  if (picture.empty()) throw std::invalid_argument("frame: the picture is empty");
+  if (picture.type() != CV_8UC1 && picture.type() != CV_8UC3) {
+    throw std::invalid_argument("frame: pixel type " + cv::typeToString(picture.type()) +
+                                " is not supported; give 8-bit grey or BGR");
+  }
+  if (picture.cols != camera.width || picture.rows != camera.height) {
+    throw std::invalid_argument("frame: the picture is " + std::to_string(picture.cols) + "x" +
+                                std::to_string(picture.rows) + " but its camera is " +
+                                std::to_string(camera.width) + "x" +
+                                std::to_string(camera.height) + "; give matching camera info");
+  }
+}
+
+}  // namespace
+
+Frame makeFrame(double time, const cv::Mat& picture, const Camera& camera) {
+  checkPicture(picture, camera);
+  cv::Mat gray = picture;
+  if (picture.channels() == 3) cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
+  Frame frame{time, {}, camera};
+  gray.convertTo(frame.gray, CV_32F);
+  cv::GaussianBlur(frame.gray, frame.gray, {5, 5}, kPrefilterSigma, kPrefilterSigma,
+                   cv::BORDER_REPLICATE);
+  return frame;
+}
+
+}  // namespace calipso::flow

@@ -1,0 +1,253 @@
+#include "calipso_flow/object_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+#include "calipso_flow/coarse_search.hpp"
+#include "calipso_flow/rotation.hpp"
+
+namespace calipso::flow {
+namespace {
+
+constexpr int kRefinements = 3;          // warp, match, fit
+constexpr double kSettledPx = 0.05;      // a refinement that moves less than this is the last
+constexpr double kLeastInlierShare = 0.35;
+constexpr int kForgetAfter = 3;         // frames without the object before its motion is forgotten
+constexpr int kWeakInliers = 12;         // fewer tracks than this are worth another attempt
+constexpr double kReturnDeviations = 3.0;
+constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
+constexpr int kSurrounding = 16;         // px of the frame around the object's window; even
+
+// A picture and its half-size copy.
+struct Pyramid {
+  ImageWindow full, half;
+};
+
+Pyramid pyramidOf(const ImageWindow& window) {
+  Pyramid pyramid{window, {{}, 0.5 * window.origin}};
+  cv::pyrDown(window.image, pyramid.half.image);
+  return pyramid;
+}
+
+// The warped look of the object, and the frame it is to be found in.
+struct Match {
+  Pyramid look, weight, frame;
+};
+
+Match prepareMatch(const ReferenceView::Warped& look, const cv::Mat& picture) {
+  const cv::Point origin(static_cast<int>(look.gray.origin.x),
+                         static_cast<int>(look.gray.origin.y));
+  // The frame around the object, at even pixels like the look.
+  const cv::Rect around(origin - cv::Point(kSurrounding, kSurrounding),
+                        look.gray.image.size() + cv::Size(2 * kSurrounding, 2 * kSurrounding));
+  const cv::Rect inside = around & cv::Rect({0, 0}, picture.size());
+  return {pyramidOf(look.gray), pyramidOf(look.weight),
+          pyramidOf({picture(inside), cv::Point2d(inside.tl())})};
+}
+
+// Half size first when the start may be far off; the result is always that of the full size.
+std::optional<PatchMatch> matchForward(const Match& match, const Eigen::Vector2d& at, bool far,
+                                       const PatchParams& params) {
+  Eigen::Vector2d start = at;
+  if (far) {
+    const Eigen::Vector2d half = 0.5 * at;
+    const auto rough = matchPatch({match.look.half, half, match.weight.half, half},
+                                  match.frame.half, half, params);
+    if (rough) start = 2.0 * rough->position;
+  }
+  return matchPatch({match.look.full, at, match.weight.full, at}, match.frame.full, start, params);
+}
+
+// Distance at which the match, followed back into the look, misses the point where it began.
+double missOnReturn(const Match& match, const Eigen::Vector2d& at, const PatchMatch& there,
+                    const PatchParams& params) {
+  const auto back = matchPatch({match.frame.full, there.position, match.weight.full, at},
+                               match.look.full, at, params);
+  return back ? (back->position - at).norm() : std::numeric_limits<double>::infinity();
+}
+
+// Follows the reference's seeds into the frame, the object's look being warped to `pose`.
+std::vector<Track> followSeeds(const Match& match, const ReferenceView& reference,
+                               const Camera& camera, const Eigen::Isometry3d& pose, bool far,
+                               const TrackerParams& params, std::vector<Correspondence>& found) {
+  std::vector<Track> tracks;
+  const Eigen::Isometry3d camera_from_object = camera.world_from_camera.inverse() * pose;
+  for (const Eigen::Vector3d& seed : reference.seeds()) {
+    const Eigen::Vector3d p_camera = camera_from_object * seed;
+    if (p_camera.z() <= 0.0) continue;
+    const Eigen::Vector2d at = camera.project(p_camera);
+    const auto there = matchForward(match, at, far, params.patch);
+    if (!there || there->correlation < params.least_correlation) continue;
+    // A patch with little texture wanders with the noise, and is trusted accordingly.
+    const double deviation = std::sqrt(there->covariance.trace());
+    if (deviation > params.largest_deviation_px) continue;
+    const double allowed = params.forward_backward_px + kReturnDeviations * deviation;
+    if (missOnReturn(match, at, *there, params.patch) > allowed) continue;
+    found.push_back({seed, there->position, there->covariance});
+    tracks.push_back({seed, there->position, there->correlation, false});
+  }
+  return tracks;
+}
+
+// Largest image motion of the model's centroid sphere between two poses, roughly: px.
+double imageMotion(const Camera& camera, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
+                   const std::vector<Eigen::Vector3d>& points) {
+  const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
+  double largest = 0.0;
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d pa = camera_from_world * a * point, pb = camera_from_world * b * point;
+    if (pa.z() <= 0.0 || pb.z() <= 0.0) continue;
+    largest = std::max(largest, (camera.project(pa) - camera.project(pb)).norm());
+  }
+  return largest;
+}
+
+// Moves a pose parallel to the picture plane, so that its pivot moves by `pixels`.
+Eigen::Isometry3d shiftInPicture(const Camera& camera, const Eigen::Isometry3d& pose,
+                                 const Eigen::Vector3d& pivot, const Eigen::Vector2d& pixels) {
+  const double depth = (camera.world_from_camera.inverse() * (pose * pivot)).z();
+  const Eigen::Vector3d shift(pixels.x() * depth / camera.fx, pixels.y() * depth / camera.fy, 0.0);
+  Eigen::Isometry3d moved = pose;
+  moved.translation() += camera.world_from_camera.linear() * shift;
+  return moved;
+}
+
+}  // namespace
+
+int Observation::inliers() const {
+  return static_cast<int>(
+      std::count_if(tracks.begin(), tracks.end(), [](const Track& t) { return t.inlier; }));
+}
+
+ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, const cv::Mat& mask,
+                             const TrackerParams& params)
+    : model_(model), params_(params), centroid_(flow::centroid(model.mesh)) {
+  references_.emplace_back(key_frame, model_, model.world_from_object, mask, params.seed_count);
+  const double sigma = kKeySigma * boundingDiagonal(model.mesh);
+  key_.time = key_frame.time;
+  key_.found = true;
+  key_.world_from_object = model.world_from_object;
+  key_.covariance.diagonal() << Eigen::Vector3d::Constant(sigma * sigma),
+      Eigen::Vector3d::Constant(kKeySigma * kKeySigma);
+  for (const Eigen::Vector3d& seed : references_.front().seeds()) {
+    key_.tracks.push_back(
+        {seed, key_frame.camera.projectWorld(model.world_from_object * seed), 1.0, true});
+  }
+  last_ = key_;
+  last_seen_time_ = key_.time;
+}
+
+Eigen::Isometry3d ObjectTracker::predict(double time) const {
+  if (!before_last_) return last_->world_from_object;
+  const double share = (time - last_->time) / (last_->time - before_last_->time);
+  const Eigen::Isometry3d& from = before_last_->world_from_object;
+  const Eigen::Isometry3d& to = last_->world_from_object;
+  Vector6d motion;
+  motion << to * centroid_ - from * centroid_,
+      vectorFromRotation(to.linear() * from.linear().transpose());
+  return movePose(to, centroid_, share * motion);
+}
+
+Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const ReferenceView& reference,
+                                                const Eigen::Isometry3d& predicted) const {
+  const ReferenceView::Warped look = reference.warp(frame.camera, predicted);
+  if (look.coverage == 0.0) return predicted;
+  // The object may have stopped, or turned round: look as far as twice back to where it was.
+  const Eigen::Vector2d home = frame.camera.projectWorld(predicted * centroid_);
+  const Eigen::Vector2d before = frame.camera.projectWorld(last_->world_from_object * centroid_);
+  Eigen::AlignedBox2d reach(Eigen::Vector2d::Constant(-params_.search_px),
+                            Eigen::Vector2d::Constant(params_.search_px));
+  const Eigen::Vector2d back = 1.5 * (before - home), margin(params_.search_px, params_.search_px);
+  reach.extend(Eigen::AlignedBox2d(back - margin, back + margin));
+  return shiftInPicture(frame.camera, predicted, centroid_,
+                        coarseDisplacement(look, frame.gray, reach));
+}
+
+Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& reference,
+                                  const Eigen::Isometry3d& start) const {
+  Observation observation;
+  observation.time = frame.time;
+  observation.world_from_object = start;
+  for (int round = 0; round < kRefinements; ++round) {
+    const Eigen::Isometry3d pose = observation.world_from_object;
+    const ReferenceView::Warped look = reference.warp(frame.camera, pose);
+    if (look.coverage == 0.0) return observation;
+    std::vector<Correspondence> found;
+    observation.tracks = followSeeds(prepareMatch(look, frame.gray), reference, frame.camera, pose,
+                                     round == 0, params_, found);
+    const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params_.pose);
+    observation.found = fit.converged && fit.inliers >= kLeastInlierShare * found.size();
+    if (!observation.found) return observation;
+    for (size_t i = 0; i < found.size(); ++i) observation.tracks[i].inlier = fit.inlier[i];
+    observation.world_from_object = fit.world_from_object;
+    observation.covariance = fit.covariance;
+    observation.deviation = fit.deviation;
+    if (imageMotion(frame.camera, pose, fit.world_from_object, reference.seeds()) < kSettledPx) {
+      break;
+    }
+  }
+  return observation;
+}
+
+const ReferenceView& ObjectTracker::nearestReference(const Frame& frame,
+                                                     const Eigen::Isometry3d& pose) const {
+  // The way the camera sees the object decides: compare rotations of object against camera.
+  const auto angle = [&](const ReferenceView& r) {
+    const Eigen::Matrix3d now = frame.camera.world_from_camera.linear().transpose() * pose.linear();
+    const Eigen::Matrix3d then = r.frame().camera.world_from_camera.linear().transpose() *
+                                 r.worldFromObject().linear();
+    return vectorFromRotation(now * then.transpose()).norm();
+  };
+  return *std::min_element(
+      references_.begin(), references_.end(),
+      [&](const ReferenceView& a, const ReferenceView& b) { return angle(a) < angle(b); });
+}
+
+Observation ObjectTracker::track(const Frame& frame, bool cut) {
+  if (!(frame.time > last_seen_time_)) {
+    throw std::invalid_argument("object tracker: frame at " + std::to_string(frame.time) +
+                                " s is not later than the one before (" +
+                                std::to_string(last_seen_time_) +
+                                " s); give frames in order of time");
+  }
+  last_seen_time_ = frame.time;
+  frames_lost_ = cut ? kForgetAfter : frames_lost_;
+  const Eigen::Isometry3d predicted =
+      frames_lost_ < kForgetAfter ? predict(frame.time) : last_->world_from_object;
+  Observation best = attempt(frame, nearestReference(frame, predicted), predicted);
+  if (best.inliers() < kWeakInliers) {
+    // The motion may have changed, or the look: try every other way to recognise the object.
+    for (const ReferenceView& reference : references_) {
+      Observation other = attempt(frame, reference, last_->world_from_object);
+      if (other.inliers() > best.inliers()) best = std::move(other);
+    }
+  }
+  frames_lost_ = best.found ? 0 : frames_lost_ + 1;
+  if (best.found) remember(frame, best, cut);
+  return best;
+}
+
+Observation ObjectTracker::attempt(const Frame& frame, const ReferenceView& reference,
+                                   const Eigen::Isometry3d& predicted) const {
+  return refine(frame, reference, searchCoarsely(frame, reference, predicted));
+}
+
+void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
+  before_last_ = cut ? std::nullopt : last_;
+  last_ = observation;
+  const ReferenceView& nearest = nearestReference(frame, observation.world_from_object);
+  const bool worn = observation.inliers() <
+                    params_.least_inliers * static_cast<double>(nearest.seeds().size());
+  const double coverage = nearest.warp(frame.camera, observation.world_from_object).coverage;
+  if (!worn && coverage >= params_.least_coverage) return;
+  if (static_cast<int>(references_.size()) >= params_.max_references) {
+    references_.erase(references_.begin() + 1);  // the key frame stays
+  }
+  references_.emplace_back(frame, model_, observation.world_from_object, cv::Mat(),
+                           params_.seed_count);
+}
+
+}  // namespace calipso::flow

@@ -1,0 +1,108 @@
+#include "piece_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace calipso::flow {
+namespace {
+
+// Noise densities tried, as shares of the prior deviation of acceleration and spin.
+constexpr double kJerkShares[] = {0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0};
+constexpr double kSpinShares[] = {0.003, 0.01, 0.03, 0.1, 0.3, 1.0};
+constexpr int kRounds = 2;
+
+std::vector<MotionPiece> travelOptions(const MotionPiece& piece, const MotionPrior& prior) {
+  std::vector<MotionPiece> options;
+  for (Travel travel : {Travel::kRest, Travel::kUniform, Travel::kFreeFall, Travel::kAccelerated}) {
+    if (travel == Travel::kFreeFall && prior.gravity.norm() == 0.0) continue;
+    options.push_back(piece);
+    options.back().travel = travel;
+  }
+  for (double share : kJerkShares) {
+    options.push_back(piece);
+    options.back().travel = Travel::kForced;
+    options.back().jerk = share * prior.acceleration;
+  }
+  return options;
+}
+
+std::vector<MotionPiece> turningOptions(const MotionPiece& piece, const MotionPrior& prior) {
+  std::vector<MotionPiece> options;
+  for (Turning turning : {Turning::kNone, Turning::kSteady}) {
+    options.push_back(piece);
+    options.back().turning = turning;
+  }
+  for (double share : kSpinShares) {
+    options.push_back(piece);
+    options.back().turning = Turning::kForced;
+    options.back().spin_noise = share * prior.spin;
+  }
+  return options;
+}
+
+}  // namespace
+
+void chooseKind(const std::vector<PoseMeasurement>& measurements, size_t index,
+                const MotionPrior& prior, double noise_scale, std::vector<MotionPiece>& pieces) {
+  const auto takeBest = [&](const std::vector<MotionPiece>& options) {
+    double best = -std::numeric_limits<double>::infinity();
+    MotionPiece winner = pieces[index];
+    for (const MotionPiece& option : options) {
+      pieces[index] = option;
+      const double value = logLikelihood(measurements, pieces, prior, noise_scale);
+      if (value > best) best = value, winner = option;
+    }
+    pieces[index] = winner;
+  };
+  MotionPiece& piece = pieces[index];
+  if (piece.travel == Travel::kForced && piece.jerk == 0.0) piece.jerk = 0.3 * prior.acceleration;
+  if (piece.turning == Turning::kForced && piece.spin_noise == 0.0) {
+    piece.spin_noise = 0.3 * prior.spin;
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    takeBest(travelOptions(pieces[index], prior));
+    takeBest(turningOptions(pieces[index], prior));
+  }
+}
+
+double chooseNoiseScale(const std::vector<PoseMeasurement>& measurements,
+                        const std::vector<MotionPiece>& pieces, const MotionPrior& prior,
+                        double start) {
+  const auto score = [&](double log_scale) {
+    return logLikelihood(measurements, pieces, prior, std::exp(log_scale));
+  };
+  const double now = std::log(start), least = std::log(0.3), most = std::log(30.0);
+  const Maximum best =
+      maximise(score, std::max(least, now - 1.5), std::min(most, now + 1.5), 1.5);
+  return std::exp(best.at);
+}
+
+Maximum maximise(const std::function<double(double)>& score, double low, double high,
+                 double step) {
+  Maximum best{0.5 * (low + high), -std::numeric_limits<double>::infinity()};
+  if (!(high > low)) return {best.at, score(best.at)};
+  const double grid = 0.1 * step;
+  const int count = std::max(2, static_cast<int>(std::ceil((high - low) / grid)));
+  for (int i = 0; i <= count; ++i) {
+    const double at = low + (high - low) * i / count;
+    const double value = score(at);
+    if (value > best.value) best = {at, value};
+  }
+  // Golden section between the neighbours of the best grid point.
+  double a = std::max(low, best.at - grid), b = std::min(high, best.at + grid);
+  const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
+  double x1 = b - golden * (b - a), x2 = a + golden * (b - a);
+  double f1 = score(x1), f2 = score(x2);
+  while (b - a > 1e-3 * step) {
+    if (f1 > f2) {
+      b = x2, x2 = x1, f2 = f1, x1 = b - golden * (b - a), f1 = score(x1);
+    } else {
+      a = x1, x1 = x2, f1 = f2, x2 = a + golden * (b - a), f2 = score(x2);
+    }
+  }
+  const Maximum refined = f1 > f2 ? Maximum{x1, f1} : Maximum{x2, f2};
+  return refined.value > best.value ? refined : best;
+}
+
+}  // namespace calipso::flow

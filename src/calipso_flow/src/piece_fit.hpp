@@ -1,0 +1,27 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "calipso_flow/motion_filter.hpp"
+
+namespace calipso::flow {
+
+// Sets the kind and the noise densities of pieces[index] to those under which the measurements are
+// likeliest; the other pieces stay as they are.
+void chooseKind(const std::vector<PoseMeasurement>& measurements, size_t index,
+                const MotionPrior& prior, double noise_scale, std::vector<MotionPiece>& pieces);
+
+// The likeliest factor on the measurements' deviations.
+double chooseNoiseScale(const std::vector<PoseMeasurement>& measurements,
+                        const std::vector<MotionPiece>& pieces, const MotionPrior& prior,
+                        double start);
+
+struct Maximum {
+  double at, value;
+};
+
+// Largest value of `score` in [low, high]: a grid of a tenth of `step`, then golden section.
+Maximum maximise(const std::function<double(double)>& score, double low, double high, double step);
+
+}  // namespace calipso::flow

@@ -1,0 +1,141 @@
+#include "calipso_flow/pose_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "calipso_flow/rotation.hpp"
+
+namespace calipso::flow {
+namespace {
+
+// Residuals and their derivatives by the motion of movePose(), for one pose.
+struct Linearisation {
+  std::vector<Eigen::Vector2d> residual;            // px
+  std::vector<Eigen::Matrix<double, 2, 6>> jacobian;
+  std::vector<Eigen::Matrix2d> information;         // 1/px^2
+};
+
+Linearisation linearise(const std::vector<Correspondence>& correspondences, const Camera& camera,
+                        const Eigen::Isometry3d& pose, const Eigen::Vector3d& pivot, double floor) {
+  Linearisation lin;
+  const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
+  for (const Correspondence& c : correspondences) {
+    const Eigen::Vector3d p_camera = camera_from_world * (pose * c.point);
+    if (p_camera.z() <= 0.0) {
+      lin.residual.emplace_back(1e6, 1e6);
+      lin.jacobian.emplace_back(Eigen::Matrix<double, 2, 6>::Zero());
+    } else {
+      lin.residual.push_back(camera.project(p_camera) - c.pixel);
+      Eigen::Matrix<double, 3, 6> motion;
+      motion << Eigen::Matrix3d::Identity(), -skew(pose.linear() * (c.point - pivot));
+      lin.jacobian.push_back(camera.projectJacobian(p_camera) * camera_from_world.linear() *
+                             motion);
+    }
+    const Eigen::Matrix2d covariance = c.covariance + floor * floor * Eigen::Matrix2d::Identity();
+    lin.information.push_back(covariance.inverse());
+  }
+  return lin;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Mahalanobis lengths of the residuals.
+std::vector<double> lengths(const Linearisation& lin) {
+  std::vector<double> result;
+  for (size_t i = 0; i < lin.residual.size(); ++i) {
+    result.push_back(std::sqrt(lin.residual[i].dot(lin.information[i] * lin.residual[i])));
+  }
+  return result;
+}
+
+// The median of a two-dimensional standard normal's length is 1.1774.
+double robustDeviation(const std::vector<double>& lengths) { return median(lengths) / 1.1774; }
+
+struct NormalEquations {
+  Matrix6d matrix = Matrix6d::Zero();
+  Vector6d right = Vector6d::Zero();
+};
+
+// Geman-McClure: weight (s^2 / (s^2 + r^2))^2 with r in deviations.
+NormalEquations weightedNormal(const Linearisation& lin, const std::vector<double>& lengths,
+                               double scale) {
+  NormalEquations normal;
+  for (size_t i = 0; i < lin.residual.size(); ++i) {
+    const double ratio = scale * scale / (scale * scale + lengths[i] * lengths[i]);
+    const Eigen::Matrix<double, 6, 2> weighted =
+        ratio * ratio * lin.jacobian[i].transpose() * lin.information[i];
+    normal.matrix += weighted * lin.jacobian[i];
+    normal.right -= weighted * lin.residual[i];
+  }
+  return normal;
+}
+
+// Directions that the tracks do not determine keep their start: a weak prior of one part in 1e-9.
+Vector6d solveStep(const NormalEquations& normal) {
+  Matrix6d damped = normal.matrix;
+  for (int i = 0; i < 6; ++i) damped(i, i) *= 1.0 + 1e-9;
+  return damped.ldlt().solve(normal.right);
+}
+
+void judge(const Linearisation& lin, const PoseFitParams& params, PoseFit& fit) {
+  const std::vector<double> all = lengths(lin);
+  fit.deviation = robustDeviation(all);
+  const double limit = params.inlier_sigma * std::max(1.0, fit.deviation);
+  Matrix6d information = Matrix6d::Zero();
+  for (size_t i = 0; i < all.size(); ++i) {
+    fit.inlier.push_back(all[i] < limit);
+    if (!fit.inlier.back()) continue;
+    ++fit.inliers;
+    information += lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
+  }
+  if (fit.inliers < params.least_inliers) return;
+  const Eigen::LDLT<Matrix6d> factor(information);
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0.0)) return;
+  const double inflation = std::max(1.0, fit.deviation);
+  fit.covariance = inflation * inflation * factor.solve(Matrix6d::Identity());
+  fit.converged = fit.covariance.allFinite();
+}
+
+}  // namespace
+
+Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object,
+                           const Eigen::Vector3d& pivot, const Vector6d& motion) {
+  const Eigen::Vector3d position = world_from_object * pivot + motion.head<3>();
+  Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
+  moved.linear() = rotationFromVector(motion.tail<3>()) * world_from_object.linear();
+  moved.translation() = position - moved.linear() * pivot;
+  return moved;
+}
+
+PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera& camera,
+                const Eigen::Isometry3d& start, const Eigen::Vector3d& pivot,
+                const PoseFitParams& params) {
+  PoseFit fit;
+  fit.world_from_object = start;
+  if (static_cast<int>(correspondences.size()) < params.least_inliers) return fit;
+  Linearisation lin = linearise(correspondences, camera, start, pivot, params.floor_px);
+  double scale = std::max(4.0, params.start_scale_px / params.floor_px);
+  for (int iteration = 0; iteration < params.max_iterations; ++iteration) {
+    const std::vector<double> residuals = lengths(lin);
+    const Vector6d step = solveStep(weightedNormal(lin, residuals, scale));
+    if (!step.allFinite()) return fit;
+    fit.world_from_object = movePose(fit.world_from_object, pivot, step);
+    lin = linearise(correspondences, camera, fit.world_from_object, pivot, params.floor_px);
+    const double noise_scale = 3.0 * std::max(1.0, robustDeviation(lengths(lin)));
+    const bool annealed = scale <= noise_scale;
+    const double change = (lin.jacobian[0] * step).norm();
+    if (annealed && change < 1e-4) break;
+    scale = std::max(noise_scale, 0.5 * scale);
+  }
+  judge(lin, params, fit);
+  return fit;
+}
+
+}  // namespace calipso::flow

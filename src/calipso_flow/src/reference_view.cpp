@@ -1,0 +1,115 @@
+#include "calipso_flow/reference_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+namespace calipso::flow {
+namespace {
+
+constexpr int kMargin = 20;           // px around the surface's window in a warped view
+constexpr double kSameSurface = 0.02;  // of the diagonal: depths closer than this agree
+
+// Pixels well inside the object, whose smoothed grey holds nothing of the background.
+cv::Mat usablePixels(const SurfaceView& surface, const cv::Mat& mask) {
+  cv::Mat usable = surface.depth > 0.0f;
+  if (!mask.empty()) usable &= mask(surface.window) != 0;
+  const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {5, 5});
+  cv::erode(usable, usable, square, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+  return usable;
+}
+
+void checkMask(const cv::Mat& mask, const Frame& frame) {
+  if (mask.empty()) return;
+  if (mask.type() != CV_8UC1 || mask.size() != frame.gray.size()) {
+    throw std::invalid_argument("reference view: the mask must be 8-bit with one channel and " +
+                                std::to_string(frame.gray.cols) + "x" +
+                                std::to_string(frame.gray.rows) + ", like the picture");
+  }
+}
+
+}  // namespace
+
+ReferenceView::ReferenceView(const Frame& frame, const ObjectModel& model,
+                             const Eigen::Isometry3d& world_from_object, const cv::Mat& mask,
+                             int seed_count)
+    : frame_(frame),
+      mesh_(model.mesh),
+      diagonal_(boundingDiagonal(model.mesh)),
+      world_from_object_(world_from_object) {
+  checkMask(mask, frame);
+  surface_ = viewSurface(mesh_, frame.camera,
+                         frame.camera.world_from_camera.inverse() * world_from_object);
+  if (surface_.empty()) return;
+  usable_ = usablePixels(surface_, mask);
+  chooseSeeds(seed_count);
+}
+
+void ReferenceView::chooseSeeds(int count) {
+  const int area = cv::countNonZero(usable_);
+  if (area == 0) return;
+  const double spacing = std::max(4.0, std::sqrt(static_cast<double>(area) / count));
+  std::vector<cv::Point2f> corners;
+  cv::goodFeaturesToTrack(frame_.gray(surface_.window), corners, count, 0.001, 0.8 * spacing,
+                          usable_, 5);
+  const Eigen::Isometry3d object_from_camera =
+      world_from_object_.inverse() * frame_.camera.world_from_camera;
+  for (const cv::Point2f& corner : corners) {
+    const double depth = surface_.depth.at<float>(cvRound(corner.y), cvRound(corner.x));
+    if (depth <= 0.0) continue;
+    const Eigen::Vector3d ray =
+        frame_.camera.ray(corner.x + surface_.window.x, corner.y + surface_.window.y);
+    seeds_.push_back(object_from_camera * (depth * ray));
+  }
+}
+
+ReferenceView::Warped ReferenceView::warp(const Camera& camera,
+                                          const Eigen::Isometry3d& world_from_object) const {
+  Warped warped;
+  const Eigen::Isometry3d camera_from_object =
+      camera.world_from_camera.inverse() * world_from_object;
+  const SurfaceView view = viewSurface(mesh_, camera, camera_from_object);
+  if (view.empty() || surface_.empty()) return warped;
+
+  // The window starts at even pixels, so that its half-size copy keeps simple coordinates.
+  const int left = (view.window.x - kMargin) & ~1, top = (view.window.y - kMargin) & ~1;
+  const cv::Size size(view.window.br().x + kMargin - left, view.window.br().y + kMargin - top);
+  const cv::Point offset = view.window.tl() - cv::Point(left, top);
+  cv::Mat map(size, CV_32FC2, cv::Scalar(-1e4, -1e4));
+  warped.weight.image = cv::Mat(size, CV_32F, cv::Scalar(0));
+
+  const Eigen::Isometry3d reference_from_camera = frame_.camera.world_from_camera.inverse() *
+                                                  world_from_object_ *
+                                                  camera_from_object.inverse();
+  int visible = 0, known = 0;
+  for (int y = 0; y < view.depth.rows; ++y) {
+    const float* depth = view.depth.ptr<float>(y);
+    cv::Vec2f* source = map.ptr<cv::Vec2f>(y + offset.y) + offset.x;
+    float* weight = warped.weight.image.ptr<float>(y + offset.y) + offset.x;
+    for (int x = 0; x < view.depth.cols; ++x) {
+      if (depth[x] <= 0.0f) continue;
+      ++visible;
+      const Eigen::Vector3d p_reference =
+          reference_from_camera *
+          (depth[x] * camera.ray(x + view.window.x, y + view.window.y));
+      if (p_reference.z() <= 0.0) continue;
+      const Eigen::Vector2d pixel = frame_.camera.project(p_reference);
+      const float there = surface_.depthAt(pixel.x(), pixel.y());
+      if (there <= 0.0f || std::abs(there - p_reference.z()) > kSameSurface * diagonal_) continue;
+      source[x] = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
+      const cv::Point nearest(cvRound(pixel.x()) - surface_.window.x,
+                              cvRound(pixel.y()) - surface_.window.y);
+      if (usable_.at<uchar>(nearest) == 0) continue;
+      weight[x] = 1.0f;
+      ++known;
+    }
+  }
+  cv::remap(frame_.gray, warped.gray.image, map, cv::noArray(), cv::INTER_CUBIC,
+            cv::BORDER_CONSTANT, cv::Scalar(0));
+  warped.gray.origin = warped.weight.origin = cv::Point2d(left, top);
+  warped.coverage = visible > 0 ? static_cast<double>(known) / visible : 0.0;
+  return warped;
+}
+
+}  // namespace calipso::flow

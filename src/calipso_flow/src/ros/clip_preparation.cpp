@@ -1,0 +1,65 @@
+#include "clip_preparation.hpp"
+
+#include <algorithm>
+
+#include "calipso_ros/topics.hpp"
+#include "conversions.hpp"
+
+namespace calipso::flow {
+
+void KeyCollector::take(const calipso_msgs::SegmentationConstPtr& segmentation) {
+  const std::optional<ros::Time> key = keyStamp();
+  if (key && segmentation->header.stamp != *key) return;
+  segmentations_.push_back(segmentation);
+}
+
+std::optional<ros::Time> KeyCollector::keyStamp() const {
+  if (!models_) return std::nullopt;
+  return models_->header.stamp;
+}
+
+std::optional<KeyKnowledge> KeyCollector::knowledge() const {
+  if (!models_) return std::nullopt;
+  const auto of_key = std::find_if(
+      segmentations_.begin(), segmentations_.end(),
+      [&](const auto& s) { return s->header.stamp == models_->header.stamp; });
+  if (of_key == segmentations_.end()) return std::nullopt;
+  KeyKnowledge knowledge;
+  for (const calipso_msgs::AlignedModel& model : models_->models) {
+    knowledge.models.push_back(modelFromMsg(model));
+    knowledge.masks.push_back(maskFromMsg((*of_key)->labels, model.index));
+  }
+  return knowledge;
+}
+
+calipso_msgs::Dynamics dynamicsMsg(const Scene& scene, const std::vector<NamedMotion>& motions,
+                                   const std_msgs::Header& header) {
+  calipso_msgs::Dynamics msg;
+  msg.header = header;
+  msg.header.frame_id = topics::kWorldFrame;
+  for (const SceneObject& object : scene.objects) {
+    const auto motion = std::find_if(motions.begin(), motions.end(),
+                                     [&](const auto& m) { return m.object == object.name; });
+    msg.objects.push_back(motion == motions.end() ? withoutEstimate(object)
+                                                  : toMsg(object.name, motion->motion));
+  }
+  return msg;
+}
+
+calipso_msgs::ClipDynamics clipDynamicsMsg(const Scene& scene,
+                                           const std::vector<ObjectDynamics>& objects,
+                                           const std::vector<std_msgs::Header>& headers) {
+  calipso_msgs::ClipDynamics msg;
+  if (!headers.empty()) msg.header = headers.front();
+  msg.header.frame_id = topics::kWorldFrame;
+  for (size_t k = 0; k < headers.size(); ++k) {
+    std::vector<NamedMotion> motions;
+    for (const ObjectDynamics& object : objects) {
+      motions.push_back({object.name, object.motions.at(k)});
+    }
+    msg.frames.push_back(dynamicsMsg(scene, motions, headers[k]));
+  }
+  return msg;
+}
+
+}  // namespace calipso::flow

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <calipso_msgs/AlignedModels.h>
+#include <calipso_msgs/ClipDynamics.h>
+#include <calipso_msgs/ClipInfo.h>
+#include <calipso_msgs/Segmentation.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calipso_flow/clip_dynamics.hpp"
+#include "calipso_flow/live_dynamics.hpp"
+#include "calipso_ros/frame_source.hpp"
+#include "calipso_scene/scene.hpp"
+
+namespace calipso::flow {
+
+// The models and masks of the key frame, in whatever order their messages come.
+struct KeyKnowledge {
+  std::vector<ObjectModel> models;
+  std::vector<cv::Mat> masks;
+};
+
+// Collects `models` and the segmentation of their stamp.
+class KeyCollector {
+ public:
+  void take(const calipso_msgs::AlignedModelsConstPtr& models) { models_ = models; }
+  void take(const calipso_msgs::SegmentationConstPtr& segmentation);
+  // Stamp of the key frame, once models have come.
+  std::optional<ros::Time> keyStamp() const;
+  // Both messages' content, once both have come. @throw std::invalid_argument for a bad message
+  std::optional<KeyKnowledge> knowledge() const;
+
+ private:
+  calipso_msgs::AlignedModelsConstPtr models_;
+  std::vector<calipso_msgs::SegmentationConstPtr> segmentations_;  // until the models have come
+};
+
+// The whole clip's dynamics as a message, one entry per stamp and object of the scene.
+calipso_msgs::ClipDynamics clipDynamicsMsg(const Scene& scene,
+                                           const std::vector<ObjectDynamics>& objects,
+                                           const std::vector<std_msgs::Header>& headers);
+
+// One frame's dynamics; `motions` by object name, objects without one get no estimate.
+calipso_msgs::Dynamics dynamicsMsg(const Scene& scene, const std::vector<NamedMotion>& motions,
+                                   const std_msgs::Header& header);
+
+}  // namespace calipso::flow

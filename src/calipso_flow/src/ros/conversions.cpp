@@ -1,0 +1,88 @@
+#include "conversions.hpp"
+
+#include <cv_bridge/cv_bridge.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <stdexcept>
+
+#include "calipso_ros/conversions.hpp"
+
+namespace calipso::flow {
+namespace {
+
+void checkSize(const sensor_msgs::Image& image) {
+  const size_t needed = static_cast<size_t>(image.step) * image.height;
+  if (image.width > 0 && image.height > 0 && image.data.size() >= needed) return;
+  throw std::invalid_argument("image of " + std::to_string(image.width) + "x" +
+                              std::to_string(image.height) + " with " +
+                              std::to_string(image.data.size()) + " bytes of " +
+                              std::to_string(needed) + "; publish whole images");
+}
+
+// An unmeasured quantity's variance: large, but finite, so that a filter can take it in.
+constexpr double kUnknownVariance = 1e6;
+
+}  // namespace
+
+cv::Mat pictureFromMsg(const sensor_msgs::ImageConstPtr& image) {
+  checkSize(*image);
+  try {
+    return cv_bridge::toCvShare(image, sensor_msgs::image_encodings::BGR8)->image;
+  } catch (const cv_bridge::Exception& error) {
+    throw std::invalid_argument("image encoding '" + image->encoding +
+                                "' is no colour or grey picture; publish bgr8 or rgb8 (" +
+                                error.what() + ")");
+  }
+}
+
+Frame frameFromMsg(const calipso::Frame& frame) {
+  return makeFrame(frame.stamp().toSec(), pictureFromMsg(frame.image), frame.camera);
+}
+
+ObjectModel modelFromMsg(const calipso_msgs::AlignedModel& model) {
+  return {model.object, model.index, fromMsg(model.mesh),
+          fromMsg(model.world_from_object.pose)};
+}
+
+cv::Mat maskFromMsg(const sensor_msgs::Image& labels, int index) {
+  checkSize(labels);
+  if (labels.encoding != sensor_msgs::image_encodings::MONO8) {
+    throw std::invalid_argument("label image has encoding '" + labels.encoding +
+                                "'; publish mono8 (0 none, else the object's index)");
+  }
+  return cv_bridge::toCvCopy(labels)->image == index;
+}
+
+calipso_msgs::ObjectDynamics toMsg(const std::string& object, const ObjectMotion& motion) {
+  calipso_msgs::ObjectDynamics msg;
+  msg.object = object;
+  msg.moving = motion.moving;
+  msg.world_from_object = calipso::toMsg(motion.world_from_object);
+  msg.centroid = toPointMsg(motion.state.position);
+  msg.twist.twist.linear = toVectorMsg(motion.state.velocity);
+  msg.twist.twist.angular = toVectorMsg(motion.state.spin);
+  const Matrix6d covariance = motion.state.twistCovariance();
+  for (int r = 0; r < 6; ++r) {
+    for (int c = 0; c < 6; ++c) msg.twist.covariance[6 * r + c] = covariance(r, c);
+  }
+  msg.acceleration = toVectorMsg(motion.state.acceleration);
+  msg.tracks = motion.tracks;
+  return msg;
+}
+
+calipso_msgs::ObjectDynamics withoutEstimate(const SceneObject& object) {
+  calipso_msgs::ObjectDynamics msg;
+  msg.object = object.name;
+  msg.world_from_object = calipso::toMsg(object.initial_world_from_object);
+  msg.centroid = toPointMsg(object.initial_world_from_object.translation());
+  for (int i = 0; i < 6; ++i) msg.twist.covariance[7 * i] = kUnknownVariance;
+  return msg;
+}
+
+sensor_msgs::Image flowToMsg(const cv::Mat& flow, const std_msgs::Header& header) {
+  sensor_msgs::Image msg;
+  cv_bridge::CvImage(header, sensor_msgs::image_encodings::TYPE_32FC2, flow).toImageMsg(msg);
+  return msg;
+}
+
+}  // namespace calipso::flow

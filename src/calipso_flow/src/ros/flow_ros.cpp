@@ -1,0 +1,199 @@
+#include "flow_ros.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+
+#include "calipso_ros/topics.hpp"
+#include "conversions.hpp"
+
+namespace calipso::flow {
+namespace {
+
+constexpr unsigned kKeepAll = 0;
+constexpr size_t kLiveWaiting = 300;  // frames kept while a live key frame is being aligned
+
+double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
+}
+
+}  // namespace
+
+FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
+    : params_(loadParams(pnh)),
+      scene_(loadScene(params_.scene)),
+      reporter_(nh, "flow"),
+      clip_dynamics_publisher_(
+          nh.advertise<calipso_msgs::ClipDynamics>(topics::kClipDynamics, 1, true)),
+      dynamics_publisher_(nh.advertise<calipso_msgs::Dynamics>(topics::kDynamics, 100)),
+      flow_publisher_(nh.advertise<sensor_msgs::Image>(topics::kFlow, 10)),
+      markers_(nh),
+      dense_flow_(params_.flow_preset) {
+  reporter_.starting("waiting for the key frame's models");
+  subscribers_ = {
+      nh.subscribe(topics::kModels, 1, &FlowNode::onModels, this),
+      nh.subscribe(topics::kSegmentation, kKeepAll, &FlowNode::onSegmentation, this),
+      nh.subscribe(topics::kStatus, 100, &FlowNode::onStatus, this)};
+  if (!params_.live) {
+    subscribers_.push_back(nh.subscribe(topics::kClipInfo, 1, &FlowNode::onClipInfo, this));
+    clip_frames_source_ = std::make_unique<FrameSource>(
+        nh, topics::kClipImage, topics::kClipCameraInfo, kKeepAll, poses_,
+        [this](const calipso::Frame& frame) { onClipFrame(frame); },
+        [this](const auto& image, const auto& reason) { onBadFrame(image, reason, true); });
+  }
+  frames_source_ = std::make_unique<FrameSource>(
+      nh, topics::kImage, topics::kCameraInfo, params_.live ? 2 : kKeepAll, poses_,
+      [this](const calipso::Frame& frame) { onFrame(frame); },
+      [this](const auto& image, const auto& reason) { onBadFrame(image, reason, false); });
+}
+
+void FlowNode::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
+  clip_ = info;
+  finishWhenComplete();
+}
+
+void FlowNode::onModels(const calipso_msgs::AlignedModelsConstPtr& models) {
+  key_.take(models);
+  beginWhenPossible();
+}
+
+void FlowNode::onSegmentation(const calipso_msgs::SegmentationConstPtr& segmentation) {
+  if (clip_analyser_ || live_analyser_) return;
+  key_.take(segmentation);
+  beginWhenPossible();
+}
+
+void FlowNode::onStatus(const calipso_msgs::NodeStatusConstPtr& status) {
+  const bool needed = status->node == "align" || status->node == "segmentation";
+  if (!needed || status->state != calipso_msgs::NodeStatus::FAILED) return;
+  if (clip_analyser_ || live_analyser_) return;
+  reporter_.failed("no dynamics without models: " + status->node + " failed (" + status->message +
+                   ")");
+}
+
+void FlowNode::onClipFrame(const calipso::Frame& frame) {
+  ++clip_frames_;
+  if (clip_analyser_) {
+    analyse(frame);
+  } else {
+    waiting_.push_back(frame);
+    reporter_.preparing("waiting for the key frame's models");
+    beginWhenPossible();
+  }
+  reporter_.clipFrameDone();
+  finishWhenComplete();
+}
+
+void FlowNode::onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason,
+                          bool of_clip) {
+  reporter_.warn(image->header.stamp, reason);
+  if (!of_clip) return;
+  ++clip_frames_;
+  reporter_.clipFrameDone();
+  finishWhenComplete();
+}
+
+// Starts once the models, their masks and the key frame are there.
+void FlowNode::beginWhenPossible() {
+  if (clip_analyser_ || live_analyser_) return;
+  try {
+    const std::optional<KeyKnowledge> knowledge = key_.knowledge();
+    if (knowledge) begin(*knowledge);
+  } catch (const std::exception& error) {
+    reporter_.failed(error.what());
+  }
+}
+
+void FlowNode::begin(const KeyKnowledge& knowledge) {
+  const auto key = std::find_if(waiting_.begin(), waiting_.end(), [&](const calipso::Frame& f) {
+    return f.stamp() == *key_.keyStamp();
+  });
+  if (key == waiting_.end()) return;
+  const Frame key_frame = frameFromMsg(*key);
+  if (params_.live) {
+    live_analyser_ = std::make_unique<LiveAnalyser>(key_frame, knowledge.models, knowledge.masks,
+                                                    scene_.gravity, params_.dynamics);
+    waiting_.clear();
+    reporter_.ready("following " + std::to_string(knowledge.models.size()) + " objects");
+    return;
+  }
+  clip_analyser_ = std::make_unique<ClipAnalyser>(key_frame, knowledge.models, knowledge.masks,
+                                                  scene_.gravity, params_.dynamics);
+  headers_ = {key->image->header};
+  const std::vector<calipso::Frame> later(key + 1, waiting_.end());
+  waiting_.clear();
+  for (const calipso::Frame& frame : later) analyse(frame);
+  finishWhenComplete();
+}
+
+void FlowNode::analyse(const calipso::Frame& frame) {
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    clip_analyser_->add(frameFromMsg(frame));
+    headers_.push_back(frame.image->header);
+  } catch (const std::exception& error) {
+    reporter_.warn(frame.stamp(), error.what());
+  }
+  reporter_.timing(frame.stamp(), millisecondsSince(start));
+}
+
+void FlowNode::finishWhenComplete() {
+  if (finished_ || !clip_ || !clip_analyser_ || clip_frames_ < clip_->frames) return;
+  finished_ = true;
+  try {
+    std::vector<ObjectDynamics> objects = clip_analyser_->finish();
+    const calipso_msgs::ClipDynamics msg = clipDynamicsMsg(scene_, objects, headers_);
+    for (const auto& frame : msg.frames) dynamics_[frame.header.stamp] = frame;
+    clip_dynamics_publisher_.publish(msg);
+    reporter_.ready(summary(objects));
+    markers_.keep(std::move(objects));
+  } catch (const std::exception& error) {
+    reporter_.failed(error.what());
+  }
+}
+
+void FlowNode::onFrame(const calipso::Frame& frame) {
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    publishDynamics(frame);
+    publishFlow(frame);
+  } catch (const std::exception& error) {
+    reporter_.warn(frame.stamp(), error.what());
+  }
+  reporter_.timing(frame.stamp(), millisecondsSince(start));
+}
+
+void FlowNode::publishDynamics(const calipso::Frame& frame) {
+  if (params_.live) {
+    if (!live_analyser_) {
+      if (waiting_.size() >= kLiveWaiting) waiting_.erase(waiting_.begin() + 1);
+      waiting_.push_back(frame);
+      beginWhenPossible();
+      return;
+    }
+    const auto motions = live_analyser_->add(frameFromMsg(frame));
+    dynamics_publisher_.publish(dynamicsMsg(scene_, motions, frame.image->header));
+    return;
+  }
+  const auto known = dynamics_.find(frame.stamp());
+  if (known == dynamics_.end()) {
+    dynamics_publisher_.publish(dynamicsMsg(scene_, {}, frame.image->header));
+    return;
+  }
+  dynamics_publisher_.publish(known->second);
+  markers_.publish(std::distance(dynamics_.begin(), known), frame.stamp());
+}
+
+// The flow lives on this frame's pixels: how far each has come since the frame before.
+void FlowNode::publishFlow(const calipso::Frame& frame) {
+  const sensor_msgs::ImageConstPtr before = previous_image_;
+  previous_image_ = frame.image;
+  if (flow_publisher_.getNumSubscribers() == 0) return;
+  const cv::Mat now = pictureFromMsg(frame.image);
+  cv::Mat flow(now.size(), CV_32FC2, cv::Scalar::all(std::numeric_limits<float>::quiet_NaN()));
+  if (before) flow = -dense_flow_.compute(now, pictureFromMsg(before));
+  flow_publisher_.publish(flowToMsg(flow, frame.image->header));
+}
+
+}  // namespace calipso::flow

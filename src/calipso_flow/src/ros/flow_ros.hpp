@@ -1,0 +1,67 @@
+#pragma once
+
+#include <calipso_msgs/NodeStatus.h>
+#include <ros/ros.h>
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "calipso_flow/dense_flow.hpp"
+#include "calipso_ros/frame_source.hpp"
+#include "calipso_ros/node_reporter.hpp"
+#include "clip_preparation.hpp"
+#include "marker_publisher.hpp"
+#include "params.hpp"
+
+namespace calipso::flow {
+
+// Wires the analysers to topics. Everything runs in the node's one callback thread.
+//   bag:  clip frames + models + masks -> clip/dynamics; then, per image, dynamics and flow
+//   live: image + models + masks -> per image, dynamics and flow
+class FlowNode {
+ public:
+  FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh);
+
+ private:
+  void onClipInfo(const calipso_msgs::ClipInfoConstPtr& info);
+  void onModels(const calipso_msgs::AlignedModelsConstPtr& models);
+  void onSegmentation(const calipso_msgs::SegmentationConstPtr& segmentation);
+  void onStatus(const calipso_msgs::NodeStatusConstPtr& status);
+  void onClipFrame(const calipso::Frame& frame);
+  void onFrame(const calipso::Frame& frame);
+  void onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason, bool of_clip);
+
+  void beginWhenPossible();
+  void begin(const KeyKnowledge& knowledge);
+  void analyse(const calipso::Frame& frame);
+  void finishWhenComplete();
+  void publishDynamics(const calipso::Frame& frame);
+  void publishFlow(const calipso::Frame& frame);
+
+  Params params_;
+  Scene scene_;
+  CameraPoses poses_;
+  NodeReporter reporter_;
+  ros::Publisher clip_dynamics_publisher_, dynamics_publisher_, flow_publisher_;
+  MarkerPublisher markers_;
+
+  calipso_msgs::ClipInfoConstPtr clip_;
+  KeyCollector key_;
+  std::vector<calipso::Frame> waiting_;   // frames that came before the models
+  std::vector<std_msgs::Header> headers_;  // of the frames the analyser has taken in
+  unsigned clip_frames_ = 0;              // received, usable or not
+  std::unique_ptr<ClipAnalyser> clip_analyser_;
+  std::unique_ptr<LiveAnalyser> live_analyser_;
+  std::map<ros::Time, calipso_msgs::Dynamics> dynamics_;
+  bool finished_ = false;
+
+  DenseFlow dense_flow_;
+  sensor_msgs::ImageConstPtr previous_image_;
+
+  // Last, so that no callback comes before the rest is there.
+  std::vector<ros::Subscriber> subscribers_;
+  std::unique_ptr<FrameSource> clip_frames_source_, frames_source_;
+};
+
+}  // namespace calipso::flow

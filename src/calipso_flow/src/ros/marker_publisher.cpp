@@ -1,0 +1,114 @@
+#include "marker_publisher.hpp"
+
+#include "calipso_ros/conversions.hpp"
+#include "calipso_ros/topics.hpp"
+
+namespace calipso::flow {
+namespace {
+
+constexpr char kTopic[] = "flow/markers";
+constexpr float kConfident[] = {0.1f, 0.8f, 0.2f}, kOutlier[] = {0.9f, 0.2f, 0.1f};
+
+visualization_msgs::Marker makeMarker(const std_msgs::Header& header, const std::string& ns,
+                                      int type, double size) {
+  visualization_msgs::Marker marker;
+  marker.header = header;
+  marker.ns = ns;
+  marker.type = type;
+  marker.action = visualization_msgs::Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  marker.scale.x = marker.scale.y = marker.scale.z = size;
+  marker.color.r = 1.0f, marker.color.g = 0.8f, marker.color.b = 0.1f, marker.color.a = 1.0f;
+  return marker;
+}
+
+visualization_msgs::Marker trackMarker(const ObjectDynamics& object, size_t index,
+                                       const std_msgs::Header& header, double size) {
+  auto marker = makeMarker(header, object.name + "/tracks",
+                           visualization_msgs::Marker::SPHERE_LIST, size);
+  for (const Track& track : object.observations[index].tracks) {
+    marker.points.push_back(
+        toPointMsg(object.motions[index].world_from_object * track.point));
+    const float* colour = track.inlier ? kConfident : kOutlier;
+    std_msgs::ColorRGBA rgba;
+    rgba.r = colour[0], rgba.g = colour[1], rgba.b = colour[2];
+    rgba.a = static_cast<float>(0.3 + 0.7 * track.confidence);
+    marker.colors.push_back(rgba);
+  }
+  return marker;
+}
+
+visualization_msgs::Marker trajectoryMarker(const ObjectDynamics& object,
+                                            const std_msgs::Header& header, double size) {
+  auto marker = makeMarker(header, object.name + "/trajectory",
+                           visualization_msgs::Marker::LINE_STRIP, 0.5 * size);
+  for (const ObjectMotion& motion : object.motions) {
+    marker.points.push_back(toPointMsg(motion.state.position));
+  }
+  return marker;
+}
+
+// The way the centroid goes in a tenth of a second.
+visualization_msgs::Marker velocityMarker(const ObjectMotion& motion, const std::string& name,
+                                          const std_msgs::Header& header, double size) {
+  auto marker = makeMarker(header, name + "/velocity", visualization_msgs::Marker::ARROW, size);
+  marker.scale.y = 2.0 * size, marker.scale.z = 2.0 * size;
+  const Eigen::Vector3d from = motion.state.position;
+  marker.points = {toPointMsg(from), toPointMsg(from + 0.1 * motion.state.velocity)};
+  return marker;
+}
+
+visualization_msgs::Marker collisionMarker(const ObjectDynamics& object,
+                                           const std_msgs::Header& header, double size) {
+  auto marker = makeMarker(header, object.name + "/collisions",
+                           visualization_msgs::Marker::SPHERE_LIST, 3.0 * size);
+  marker.color.g = 0.2f;
+  for (const Collision& collision : object.trajectory.collisions) {
+    marker.points.push_back(toPointMsg(collision.before.position));
+  }
+  return marker;
+}
+
+// One deviation of the centroid's position in every direction.
+visualization_msgs::Marker uncertaintyMarker(const ObjectMotion& motion, const std::string& name,
+                                             const std_msgs::Header& header) {
+  auto marker = makeMarker(header, name + "/uncertainty", visualization_msgs::Marker::SPHERE, 1.0);
+  const Eigen::Vector3d variance = motion.state.covariance.diagonal().head<3>();
+  marker.scale = toVectorMsg(2.0 * variance.cwiseMax(1e-12).cwiseSqrt());
+  marker.pose.position = toPointMsg(motion.state.position);
+  marker.color.a = 0.4f;
+  return marker;
+}
+
+}  // namespace
+
+MarkerPublisher::MarkerPublisher(ros::NodeHandle& nh)
+    : publisher_(nh.advertise<visualization_msgs::MarkerArray>(kTopic, 2)) {}
+
+void MarkerPublisher::publish(size_t index, const ros::Time& stamp) const {
+  if (publisher_.getNumSubscribers() == 0) return;
+  std_msgs::Header header;
+  header.stamp = stamp;
+  header.frame_id = topics::kWorldFrame;
+  visualization_msgs::MarkerArray all;
+  for (const ObjectDynamics& object : objects_) {
+    const visualization_msgs::MarkerArray of_object = markersOf(object, index, header);
+    all.markers.insert(all.markers.end(), of_object.markers.begin(), of_object.markers.end());
+  }
+  publisher_.publish(all);
+}
+
+visualization_msgs::MarkerArray markersOf(const ObjectDynamics& object, size_t index,
+                                          const std_msgs::Header& header) {
+  const double size = 0.02 * object.diagonal;
+  const ObjectMotion& motion = object.motions.at(index);
+  visualization_msgs::MarkerArray markers;
+  markers.markers = {trackMarker(object, index, header, size),
+                     trajectoryMarker(object, header, size),
+                     velocityMarker(motion, object.name, header, size),
+                     collisionMarker(object, header, size),
+                     uncertaintyMarker(motion, object.name, header)};
+  return markers;
+}
+
+}  // namespace calipso::flow

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <ros/ros.h>
+
+#include <string>
+
+#include "calipso_flow/clip_dynamics.hpp"
+#include "calipso_flow/dense_flow.hpp"
+
+namespace calipso::flow {
+
+// The node's parameters; config/flow.yaml explains each.
+struct Params {
+  std::string scene;         // directory
+  bool live = false;
+  DenseFlow::Preset flow_preset = DenseFlow::Preset::kUltrafast;
+  DynamicsParams dynamics;
+};
+
+// @throw std::invalid_argument naming the parameter, its value and the allowed range
+Params loadParams(const ros::NodeHandle& pnh);
+
+}  // namespace calipso::flow

@@ -1,0 +1,98 @@
+#include "calipso_flow/surface_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace calipso::flow {
+namespace {
+
+constexpr double kNear = 1e-6;  // m; nothing nearer is projected
+
+struct ProjectedVertex {
+  double u, v;        // px
+  double inverse_z;   // 1/m; 0 = behind the camera
+};
+
+std::vector<ProjectedVertex> projectVertices(const TriangleMesh& mesh, const Camera& camera,
+                                             const Eigen::Isometry3d& camera_from_object) {
+  std::vector<ProjectedVertex> projected(mesh.vertexCount());
+  for (int i = 0; i < mesh.vertexCount(); ++i) {
+    const Eigen::Vector3d p = camera_from_object * mesh.vertex(i);
+    if (p.z() < kNear) {
+      projected[i] = {0.0, 0.0, 0.0};
+      continue;
+    }
+    const Eigen::Vector2d pixel = camera.project(p);
+    projected[i] = {pixel.x(), pixel.y(), 1.0 / p.z()};
+  }
+  return projected;
+}
+
+cv::Rect boundingWindow(const std::vector<ProjectedVertex>& vertices, const Camera& camera) {
+  double u_min = camera.width, u_max = -1.0, v_min = camera.height, v_max = -1.0;
+  for (const ProjectedVertex& p : vertices) {
+    if (p.inverse_z == 0.0) continue;
+    u_min = std::min(u_min, p.u), u_max = std::max(u_max, p.u);
+    v_min = std::min(v_min, p.v), v_max = std::max(v_max, p.v);
+  }
+  const int left = std::max(0, static_cast<int>(std::floor(std::max(u_min, 0.0))));
+  const int top = std::max(0, static_cast<int>(std::floor(std::max(v_min, 0.0))));
+  const int right = static_cast<int>(std::ceil(std::min(u_max, camera.width - 1.0)));
+  const int bottom = static_cast<int>(std::ceil(std::min(v_max, camera.height - 1.0)));
+  if (right < left || bottom < top) return {};
+  return {left, top, right - left + 1, bottom - top + 1};
+}
+
+// Writes the largest 1/z of the triangle's pixels. 1/z is linear in the picture.
+void drawTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const ProjectedVertex& c,
+                  const cv::Rect& window, cv::Mat& inverse_z) {
+  const double area = (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u);
+  if (area == 0.0) return;
+  const int x0 = std::max<int>(window.x, std::ceil(std::min({a.u, b.u, c.u})));
+  const int y0 = std::max<int>(window.y, std::ceil(std::min({a.v, b.v, c.v})));
+  const int x1 = std::min<int>(window.br().x - 1, std::floor(std::max({a.u, b.u, c.u})));
+  const int y1 = std::min<int>(window.br().y - 1, std::floor(std::max({a.v, b.v, c.v})));
+  const double db_du = (c.v - a.v) / area, db_dv = -(c.u - a.u) / area;
+  const double dc_du = -(b.v - a.v) / area, dc_dv = (b.u - a.u) / area;
+  for (int y = y0; y <= y1; ++y) {
+    float* row = inverse_z.ptr<float>(y - window.y) - window.x;
+    for (int x = x0; x <= x1; ++x) {
+      const double wb = db_du * (x - a.u) + db_dv * (y - a.v);
+      const double wc = dc_du * (x - a.u) + dc_dv * (y - a.v);
+      if (wb < 0.0 || wc < 0.0 || wb + wc > 1.0) continue;
+      const double iz = a.inverse_z + wb * (b.inverse_z - a.inverse_z) +
+                        wc * (c.inverse_z - a.inverse_z);
+      row[x] = std::max(row[x], static_cast<float>(iz));
+    }
+  }
+}
+
+}  // namespace
+
+float SurfaceView::depthAt(double u, double v) const {
+  const cv::Point pixel(static_cast<int>(std::lround(u)), static_cast<int>(std::lround(v)));
+  return window.contains(pixel) ? depth.at<float>(pixel - window.tl()) : 0.0f;
+}
+
+SurfaceView viewSurface(const TriangleMesh& mesh, const Camera& camera,
+                        const Eigen::Isometry3d& camera_from_object) {
+  const std::vector<ProjectedVertex> vertices = projectVertices(mesh, camera, camera_from_object);
+  SurfaceView view;
+  view.window = boundingWindow(vertices, camera);
+  if (view.empty()) return view;
+  cv::Mat inverse_z(view.window.size(), CV_32F, cv::Scalar(0));
+  for (int t = 0; t < mesh.triangleCount(); ++t) {
+    const ProjectedVertex& a = vertices[mesh.triangles(t, 0)];
+    const ProjectedVertex& b = vertices[mesh.triangles(t, 1)];
+    const ProjectedVertex& c = vertices[mesh.triangles(t, 2)];
+    if (a.inverse_z > 0.0 && b.inverse_z > 0.0 && c.inverse_z > 0.0) {
+      drawTriangle(a, b, c, view.window, inverse_z);
+    }
+  }
+  cv::divide(1.0, inverse_z, view.depth);  // for CV_32F this gives inf where inverse_z is 0
+  view.depth.setTo(0.0f, inverse_z == 0.0f);
+  return view;
+}
+
+}  // namespace calipso::flow

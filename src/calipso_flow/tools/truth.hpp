@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+// What the evaluator alone may read of a scene folder: how its objects really moved.
+namespace calipso::flow {
+
+struct TrueCollision {
+  double time;                              // s
+  Eigen::Vector3d velocity_before, velocity_after;  // m/s, of the centre of mass
+};
+
+struct TrueObject {
+  std::string mesh_path;
+  std::vector<Eigen::Isometry3d> world_from_object;  // one, or one per frame
+  std::vector<Eigen::Vector3d> velocity;             // m/s; empty: the object stands still
+  std::vector<Eigen::Vector3d> spin;                 // rad/s
+  std::vector<TrueCollision> collisions;
+  std::string mask_path;                             // of frame 0; empty when there is none
+};
+
+// The truth of the object called `name`; nothing when the scene folder holds no truth about it.
+std::optional<TrueObject> readTruth(const std::string& directory, const std::string& name);
+
+}  // namespace calipso::flow
