@@ -25,10 +25,9 @@ void FlightWindow::sent(std::int64_t stamp_ns) {
 
 void FlightWindow::cameBack(std::int64_t stamp_ns) {
   if (in_flight_.empty() || in_flight_.front() != stamp_ns) {
-    throw std::runtime_error(
-        "an edited frame with stamp " + seconds(stamp_ns) + " s came back where " +
-        (in_flight_.empty() ? "none" : seconds(in_flight_.front()) + " s") +
-        " was due; is a second renderer running?");
+    const std::string due = in_flight_.empty() ? "none" : seconds(in_flight_.front()) + " s";
+    throw std::runtime_error("the edited frame of " + seconds(stamp_ns) + " s came where " + due +
+                             " was due; a frame was lost, or a second renderer is running");
   }
   in_flight_.pop_front();
   ++returned_;

@@ -15,7 +15,7 @@
 namespace calipso::bag {
 namespace {
 
-constexpr unsigned kQueue = 100;
+constexpr unsigned kQueue = 1000;
 constexpr double kShowEverySec = 2.0;
 
 std::string listed(const std::vector<std::string>& names) {
@@ -54,7 +54,7 @@ Player::Player(ros::NodeHandle& nh, const Params& params)
       watch_(nh, rolesOf(params.nodes)),
       window_(params.in_flight) {
   checkScene();
-  advertise();
+  advertiseAll();
   ROS_INFO_STREAM(params.clip.path << ": " << clip_.frameCount() << " frames of "
                                    << clip_.imageTopic() << ", " << clip_.firstInfo().width << "x"
                                    << clip_.firstInfo().height << ", " << edits_.size()
@@ -81,23 +81,27 @@ void Player::checkScene() const {
   }
 }
 
-void Player::advertise() {
-  constexpr bool kLatched = true;
+// A subscriber whose connection closes has most likely ended.
+template <typename M>
+ros::Publisher Player::advertise(const std::string& topic, bool latched) {
   ros::AdvertiseOptions options;
-  options.init<calipso_msgs::ClipInfo>(
-      topics::kClipInfo, 1, ros::SubscriberStatusCallback(),
-      [this](const ros::SingleSubscriberPublisher& s) {
-        watch_.connectionLost(s.getSubscriberName());
-      });
-  options.latch = true;
-  clip_info_ = nh_.advertise(options);
-  clip_image_ = nh_.advertise<sensor_msgs::Image>(topics::kClipImage, kQueue, kLatched);
-  clip_camera_info_ =
-      nh_.advertise<sensor_msgs::CameraInfo>(topics::kClipCameraInfo, kQueue, kLatched);
-  image_ = nh_.advertise<sensor_msgs::Image>(topics::kImage, kQueue);
-  camera_info_ = nh_.advertise<sensor_msgs::CameraInfo>(topics::kCameraInfo, kQueue);
-  tf_ = nh_.advertise<tf2_msgs::TFMessage>("/tf", kQueue, kLatched);
-  edit_ = nh_.advertise<calipso_msgs::Edit>(topics::kEdits, 1000);
+  options.init<M>(topic, kQueue, ros::SubscriberStatusCallback(),
+                  [this](const ros::SingleSubscriberPublisher& subscriber) {
+                    watch_.connectionLost(subscriber.getSubscriberName());
+                  });
+  options.latch = latched;
+  return nh_.advertise(options);
+}
+
+void Player::advertiseAll() {
+  constexpr bool kLatched = true, kOnce = false;
+  clip_info_ = advertise<calipso_msgs::ClipInfo>(topics::kClipInfo, kLatched);
+  clip_image_ = advertise<sensor_msgs::Image>(topics::kClipImage, kLatched);
+  clip_camera_info_ = advertise<sensor_msgs::CameraInfo>(topics::kClipCameraInfo, kLatched);
+  image_ = advertise<sensor_msgs::Image>(topics::kImage, kOnce);
+  camera_info_ = advertise<sensor_msgs::CameraInfo>(topics::kCameraInfo, kOnce);
+  tf_ = advertise<tf2_msgs::TFMessage>("/tf", kLatched);
+  edit_ = advertise<calipso_msgs::Edit>(topics::kEdits, kOnce);
   edited_ = nh_.subscribe(topics::kImageEditedCameraInfo, kQueue, &Player::onEdited, this,
                           ros::TransportHints().tcpNoDelay());
 }

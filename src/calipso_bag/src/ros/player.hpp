@@ -43,7 +43,9 @@ class Player {
  private:
   static Preparation::Roles rolesOf(const std::vector<std::string>& nodes);
   void checkScene() const;
-  void advertise();
+  template <typename M>
+  ros::Publisher advertise(const std::string& topic, bool latched);
+  void advertiseAll();
   bool connected() const;
   void waitForGraph();
   void announceClip();

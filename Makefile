@@ -1,0 +1,44 @@
+# make demo    edits the shipped example; make test   runs every test; make bench  measures
+# make deps    installs missing Debian packages; make build  compiles; make clean  removes what was built
+# Each installs and builds what it needs first.
+
+# A Python from elsewhere on the path breaks catkin.
+export PATH := /usr/bin:/bin:/usr/sbin:/sbin
+SHELL := /bin/bash
+
+JOBS := $(shell nproc)
+SOURCES := $(shell find src -type f)
+CATKIN := catkin_make -DCMAKE_BUILD_TYPE=Release -j$(JOBS)
+
+.PHONY: deps build demo test bench lint clean
+
+deps:
+	@scripts/install_dependencies
+
+build: deps
+	@$(MAKE) --no-print-directory build/.built
+
+# Asked for only when a source has changed: catkin_make takes its time to find that nothing has.
+build/.built: $(SOURCES)
+	$(CATKIN)
+	@touch $@
+
+build/.tests_built: build/.built
+	$(CATKIN) tests
+	@touch $@
+
+demo: build
+	@scripts/demo
+
+test: build
+	@$(MAKE) --no-print-directory build/.tests_built
+	@scripts/run_tests
+
+bench: build
+	@scripts/run_benchmarks
+
+lint: deps
+	catkin_lint src
+
+clean:
+	rm -rf build devel out

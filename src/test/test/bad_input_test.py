@@ -1,0 +1,121 @@
+#!/usr/bin/python3
+"""What the player cannot play: one message that names what, the value and the remedy; exit status 1."""
+
+import os
+import subprocess
+import tempfile
+import unittest
+
+import rostest
+import yaml
+
+import clips
+
+IMAGE, INFO = clips.IMAGE_TOPIC, "/camera/camera_info"
+
+
+class BadInput(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.scene = clips.make_scene(cls.folder.name, 4)
+        cls.bag = clips.make_bag(cls.scene, os.path.join(cls.folder.name, "in.bag"))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def expect_complaint(self, *parts, **parameters):
+        parameters = dict({"bag": self.bag, "scene": self.scene, "edits": "none"}, **parameters)
+        words = ["_%s:=%s" % (name, value) for name, value in parameters.items()]
+        result = subprocess.run(["rosrun", "calipso_bag", "player_node", *words], text=True,
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60)
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertEqual(result.stdout.count("FATAL"), 1, result.stdout)
+        for part in parts:
+            self.assertIn(part, result.stdout)
+
+    def spoilt(self, change):
+        return clips.rewrite(self.bag, self.path("spoilt.bag"), change)
+
+    def edits(self, *edits):
+        return clips.write_edits(self.folder.name, list(edits))
+
+    def test_bag_without_images(self):
+        bag = self.spoilt(lambda topic, message, _: None if topic == IMAGE else message)
+        self.expect_complaint("spoilt.bag", "images", "image_topic:=", bag=bag)
+
+    def test_bag_without_camera_info(self):
+        bag = self.spoilt(lambda topic, message, _: None if topic == INFO else message)
+        self.expect_complaint("no camera_info for " + IMAGE, "video_to_bag", bag=bag)
+
+    def test_images_of_two_sizes(self):
+        def change(topic, message, index):
+            if topic == IMAGE and index == 2:
+                message.height -= 10
+            return message
+        self.expect_complaint("image 2", "640x350", "640x360", bag=self.spoilt(change))
+
+    def test_unknown_encoding(self):
+        def change(topic, message, index):
+            if topic == IMAGE:
+                message.encoding = "yuv_planar"
+            return message
+        self.expect_complaint("image 0", "'yuv_planar'", "bgr8", bag=self.spoilt(change))
+
+    def test_truncated_bag(self):
+        bag = self.path("truncated.bag")
+        with open(self.bag, "rb") as file, open(bag, "wb") as target:
+            target.write(file.read()[:1000000])
+        self.expect_complaint("truncated.bag", "rosbag reindex", bag=bag)
+
+    def test_missing_bag(self):
+        self.expect_complaint("absent.bag", bag=self.path("absent.bag"))
+
+    def test_edit_of_an_unknown_object(self):
+        edits = self.edits({"t": 0, "object": "pear", "kind": "remove"})
+        self.expect_complaint("edits.yaml", "pear", "banana1", edits=edits)
+
+    def test_edit_that_is_not_a_number(self):
+        edits = self.edits({"t": 0, "object": "banana1", "kind": "pull",
+                            "vector": [0, 0, float("nan")]})
+        self.expect_complaint("edits.yaml", "vector", "nan", edits=edits)
+
+    def test_edit_out_of_range(self):
+        edits = self.edits({"t": 0, "object": "banana1", "kind": "material", "poissons_ratio": 0.7})
+        self.expect_complaint("edits.yaml", "poissons_ratio", "0.7", edits=edits)
+
+    def test_missing_and_broken_mesh(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene = clips.make_scene(folder, 4)
+            mesh = os.path.join(scene, "cad", "banana1.obj")
+            with open(mesh, "w") as file:
+                file.write("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
+            self.expect_complaint("banana1.obj", "9", scene=scene)
+            os.remove(mesh)
+            self.expect_complaint("banana1.obj", scene=scene)
+
+    def test_scene_of_another_video(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene = clips.make_scene(folder, 4)
+            path = os.path.join(scene, "scene.yaml")
+            with open(path) as file:
+                content = yaml.safe_load(file)
+            content["width"] = 320
+            with open(path, "w") as file:
+                yaml.safe_dump(content, file)
+            self.expect_complaint("640x360", "320x360", scene=scene)
+
+    def test_tf_that_does_not_lead_to_the_camera(self):
+        def change(topic, message, _):
+            if topic == "/tf":
+                message.transforms[0].header.frame_id = "odom"
+            return message
+        self.expect_complaint("'map'", "poses:=scene", bag=self.spoilt(change))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("calipso_test", "bad_input", BadInput)

@@ -1,0 +1,41 @@
+"""Runs roslaunch as a user would."""
+
+import os
+import signal
+import socket
+import subprocess
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Launch:
+    """A launch file under way, by default with a ROS master of its own.
+
+    Bounded in time: a launch that hangs is ended and fails the test.
+    """
+
+    def __init__(self, package, file, master=None, **arguments):
+        master = master or "http://127.0.0.1:%d" % free_port()
+        words = ["%s:=%s" % (name, value) for name, value in arguments.items()]
+        environment = dict(os.environ, ROS_MASTER_URI=master, ROS_IP="127.0.0.1")
+        self.process = subprocess.Popen(
+            ["roslaunch", package, file, *words], env=environment, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+
+    def wait(self, timeout_sec=240):
+        """(exit status, everything it printed)."""
+        try:
+            output, _ = self.process.communicate(timeout=timeout_sec)
+        except subprocess.TimeoutExpired:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            output, _ = self.process.communicate()
+            raise AssertionError("no end within %d s:\n%s" % (timeout_sec, output))
+        return self.process.returncode, output
+
+
+def run(package, file, timeout_sec=240, **arguments):
+    return Launch(package, file, **arguments).wait(timeout_sec)

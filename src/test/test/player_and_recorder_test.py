@@ -1,0 +1,95 @@
+#!/usr/bin/python3
+"""Player and recorder with an echo between them: what goes in comes out, or the run fails."""
+
+import os
+import tempfile
+import unittest
+
+import rosbag
+import rostest
+
+import clips
+import launching
+
+FRAMES = 6
+EDITED = "/calipso/image_edited"
+
+
+class PlayerAndRecorder(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.scene = clips.make_scene(self.folder.name, FRAMES)
+        self.bag = clips.make_bag(self.scene, self.path("in.bag"))
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def echo(self, **arguments):
+        arguments.setdefault("bag", self.bag)
+        return launching.run("calipso_test", "echo.launch", scene=self.scene,
+                             out=self.path("out.bag"), **arguments)
+
+    def test_every_frame_comes_out_as_it_went_in(self):
+        status, output = self.echo()
+        self.assertEqual(status, 0, output)
+        self.assertIn("frames: %d in, %d out" % (FRAMES, FRAMES), output)
+        out = self.path("out.bag")
+        self.assertEqual(clips.stamps(out, EDITED), clips.stamps(self.bag, clips.IMAGE_TOPIC))
+        self.assertEqual(clips.pixels(out, EDITED), clips.pixels(self.bag, clips.IMAGE_TOPIC))
+        self.assertFalse(os.path.exists(out + ".active"))
+
+    def test_the_bag_holds_what_explains_the_images(self):
+        edits = clips.write_edits(self.folder.name, [{"t": 0.1, "object": "banana1", "kind": "remove"}])
+        status, output = self.echo(edits=edits)
+        self.assertEqual(status, 0, output)
+        with rosbag.Bag(self.path("out.bag")) as bag:
+            counts = {topic: info.message_count
+                      for topic, info in bag.get_type_and_topic_info().topics.items()}
+            for topic in ("image_edited", "image_edited/camera_info", "provenance", "state", "dynamics"):
+                self.assertEqual(counts.get("/calipso/" + topic), FRAMES, topic)
+            self.assertEqual(counts.get("/tf"), FRAMES)
+            self.assertEqual(counts.get("/calipso/edits/applied"), 1)
+            for topic, message, time in bag.read_messages(topics=[EDITED, "/calipso/state"]):
+                self.assertEqual(time, message.header.stamp, topic)
+
+    def test_compressed_images_go_in_too(self):
+        bag = clips.make_bag(self.scene, self.path("compressed.bag"), "--compressed")
+        status, output = self.echo(bag=bag)
+        self.assertEqual(status, 0, output)
+        images = clips.messages(self.path("out.bag"), EDITED)
+        self.assertEqual([image.encoding for image in images], ["bgr8"] * FRAMES)
+        self.assertEqual([image.header.stamp for image in images],
+                         clips.stamps(bag, clips.IMAGE_TOPIC + "/compressed"))
+
+    def test_a_lost_frame_fails_the_run_and_leaves_no_bag(self):
+        status, output = self.echo(swallow=2)
+        self.assertNotEqual(status, 0)
+        self.assertIn("a frame was lost", output)
+        self.assertFalse(os.path.exists(self.path("out.bag")))
+
+    def test_a_last_frame_that_never_comes_is_not_waited_for_for_ever(self):
+        status, output = self.echo(swallow=FRAMES - 1, frame_timeout_sec=3)
+        self.assertNotEqual(status, 0)
+        self.assertIn("no edited frame for 3", output)
+        self.assertFalse(os.path.exists(self.path("out.bag")))
+
+    def test_a_dead_node_fails_the_run_at_once(self):
+        status, output = self.echo(die_at=3)
+        self.assertNotEqual(status, 0)
+        self.assertIn("process ended", output)
+        self.assertFalse(os.path.exists(self.path("out.bag")))
+
+    def test_the_scene_gives_the_poses_that_the_bag_lacks(self):
+        bag = clips.rewrite(self.bag, self.path("no_tf.bag"),
+                            lambda topic, message, _: None if topic == "/tf" else message)
+        status, output = self.echo(bag=bag)
+        self.assertEqual(status, 0, output)
+        self.assertIn("the bag has no tf", output)
+        self.assertEqual(len(clips.messages(self.path("out.bag"), "/tf")), FRAMES)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("calipso_test", "player_and_recorder", PlayerAndRecorder)
