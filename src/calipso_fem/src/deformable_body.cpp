@@ -58,6 +58,8 @@ DeformableBody::DeformableBody(const TriangleMesh& surface, const Material& mate
   VoxelizeOptions voxels;
   voxels.cell_size = options.cell_size;
   voxels.target_nodes = options.target_nodes;
+  voxels.has_anchor = options.has_anchor;
+  voxels.anchor = options.anchor;
   impl_->options = options;
   impl_->grid = voxelize(surface, voxels);
   impl_->embedding = embed(surface.vertices, impl_->grid);

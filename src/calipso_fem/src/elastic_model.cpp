@@ -1,5 +1,6 @@
 #include "calipso_fem/elastic_model.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -305,6 +306,11 @@ Eigen::VectorXd ElasticModel::cellVonMises(const Vec& x) const {
     result[cell] = vonMises(stress(kind.model, kind.lame, F), F);
   });
   return result;
+}
+
+Eigen::Matrix3d ElasticModel::centerGradient(int cell, const Vec& x) const {
+  return cornersOf(impl_->mesh.cells, cell, x.data()).transpose() *
+         impl_->references[impl_->reference_of[cell]]->center_gradient;
 }
 
 double ElasticModel::smallestDilatation(const Vec& x) const {

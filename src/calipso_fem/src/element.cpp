@@ -1,6 +1,7 @@
 #include "element.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 
 namespace calipso::fem {
 namespace {

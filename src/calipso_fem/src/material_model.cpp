@@ -1,6 +1,7 @@
 #include "calipso_fem/material_model.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <stdexcept>

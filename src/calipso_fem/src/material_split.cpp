@@ -1,5 +1,7 @@
 #include "material_split.hpp"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>

@@ -70,6 +70,8 @@ class ElasticModel {
 
   // Von Mises stress, mean over each cell, #C, Pa.
   Eigen::VectorXd cellVonMises(const Vec& x) const;
+  // F = dx/dX at the centre of one cell.
+  Eigen::Matrix3d centerGradient(int cell, const Vec& x) const;
   // Smallest det F over all integration points: <= 0 where an element is inverted.
   double smallestDilatation(const Vec& x) const;
 

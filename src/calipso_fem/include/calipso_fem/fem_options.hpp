@@ -26,6 +26,8 @@ TimeScheme timeSchemeFromString(const std::string& name);  // @throw std::invali
 struct FemOptions {
   int target_nodes = 1500;
   double cell_size = 0.0;              // m; > 0 overrides target_nodes
+  bool has_anchor = false;             // a lattice plane of each axis passes through `anchor`
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();   // m
   ElementType element = ElementType::kHexEnhanced;
   MaterialModel material_model = MaterialModel::kStVenantKirchhoff;
   TimeScheme scheme = TimeScheme::kBackwardEuler;

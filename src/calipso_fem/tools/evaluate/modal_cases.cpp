@@ -1,0 +1,48 @@
+#include <chrono>
+
+#include "calipso_fem/modal_analysis.hpp"
+#include "mesh_probe.hpp"
+#include "reference_cases.hpp"
+
+namespace calipso::fem {
+namespace {
+
+void runModes(const CaseFile& file, const std::string& kind, ElementType element, bool lumped,
+              const Eigen::Vector3i& cells, const Eigen::VectorXd& reference) {
+  const Box box = readBox(file);
+  VolumeMesh mesh = boxMesh(box.min, box.max, cells);
+  if (element == ElementType::kTetP1) mesh = kuhnSplit(mesh);
+  const ElasticModel model(mesh, readMaterial(file), MaterialModel::kLinear, element);
+  std::vector<int> fixed;
+  for (int node : nodesOnPlane(mesh, 0, box.min.x()))
+    for (int axis = 0; axis < 3; ++axis) fixed.push_back(3 * node + axis);
+  const auto start = std::chrono::steady_clock::now();
+  const ModalResult modes =
+      naturalFrequencies(model, fixed, static_cast<int>(reference.size()), lumped);
+  ResultLine line = lineFor(file, kind, element, MaterialModel::kLinear, mesh.nodeCount());
+  line.solver = "subspace_iteration";
+  line.quantity = lumped ? "frequencies_hz:lumped" : "frequencies_hz:consistent";
+  line.value = modes.frequencies;
+  line.reference = reference;
+  line.newton_iterations = modes.iterations;
+  line.error = (modes.frequencies - reference).cwiseQuotient(reference).cwiseAbs().maxCoeff();
+  line.ms_per_step = std::chrono::duration<double, std::milli>(
+                         std::chrono::steady_clock::now() - start).count();
+  print(line);
+}
+
+}  // namespace
+
+void evaluateModes(const CaseFile& file) {
+  const Eigen::VectorXd converged = readVector(require(file, file.at("reference"), "frequencies_hz"));
+  for (const YAML::Node& r : file.at("same_discretisation")) {
+    const Eigen::Vector3i cells(r["nx"].as<int>(), r["ny"].as<int>(), r["nz"].as<int>());
+    const ElementType element = referenceElement(r["element"].as<std::string>());
+    const bool lumped = r["mass"].as<std::string>() == "lumped";
+    runModes(file, "same_discretisation", element, lumped, cells, readVector(r["frequencies_hz"]));
+    if (element == ElementType::kHexQ1)
+      runModes(file, "default", FemOptions().element, lumped, cells, converged);
+  }
+}
+
+}  // namespace calipso::fem
