@@ -11,7 +11,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kTextureSide = 9;        // px, window of the texture features
-constexpr float kTextureWeight = 2.0f;
+constexpr float kTextureWeight = 4.0f;
 
 struct Level {
   cv::Mat image;         // CV_32FC(5) of Feature
@@ -124,7 +124,7 @@ void refine(PatchField& field, bool finest, const InpaintParams& params) {
   for (int i = 0; i < iterations; ++i) {
     field.search(false, reach);
     field.search(true, reach);
-    field.vote(finest && i + 1 == iterations);
+    field.vote(finest || i + 1 == iterations);
   }
 }
 
@@ -156,11 +156,11 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   std::optional<PatchField> field;
   for (int i = static_cast<int>(levels.size()) - 1; i >= 0; --i) {
     PatchField next(smoothFill(levels[i]), levels[i].hole, sourceMask(levels[i], params.patch_radius),
-                    params.patch_radius, params.seed + i);
+                    params.patch_radius, static_cast<float>(1 << i), params.seed + i);
     if (!next.hasSources()) continue;
     if (field) {
       next.initialiseFrom(*field);
-      next.vote(false);
+      next.vote(true);
     } else {
       next.initialiseRandomly();
     }

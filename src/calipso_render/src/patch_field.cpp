@@ -9,13 +9,15 @@ namespace {
 
 constexpr int kBands = 4;            // rows searched independently; fixed, so the result is
 constexpr float kInside = 1.15f;     // weight ratio per px towards the hole's rim
+constexpr float kPerColumn = 0.3f, kPerRow = 1.5f;  // squared code values per px of the finest level
 constexpr float kTolerance = 60.0f;  // squared code values: how fast a poor match loses its vote
 
 }  // namespace
 
-PatchField::PatchField(cv::Mat image, cv::Mat hole, cv::Mat source, int radius, std::uint32_t seed)
+PatchField::PatchField(cv::Mat image, cv::Mat hole, cv::Mat source, int radius, float scale,
+                       std::uint32_t seed)
     : image_(std::move(image)), hole_(std::move(hole)), source_(std::move(source)), radius_(radius),
-      seed_(seed), matches_(image_.total()) {
+      scale_(scale), seed_(seed), matches_(image_.total()) {
   const int side = 2 * radius + 1;
   cv::dilate(hole_, target_, cv::Mat::ones(side, side, CV_8U));
   cv::distanceTransform(hole_ != 0, depth_, cv::DIST_L2, 3);
@@ -58,9 +60,15 @@ float PatchField::squaredDistance(int u, int v, int su, int sv, float limit) con
   return sum / count;
 }
 
+// What looks alike is more plausible from near by, above all from the same height: places are layered.
+float PatchField::cost(int u, int v, int su, int sv, float limit) const {
+  const float way = scale_ * (kPerColumn * std::abs(su - u) + kPerRow * std::abs(sv - v));
+  return way < limit ? way + squaredDistance(u, v, su, sv, limit - way) : way;
+}
+
 void PatchField::tryMatch(int u, int v, int su, int sv, Match& best) const {
   if (!isSource(su, sv) || (su == best.u && sv == best.v)) return;
-  const float d = squaredDistance(u, v, su, sv, best.distance);
+  const float d = cost(u, v, su, sv, best.distance);
   if (d < best.distance) best = {su, sv, d};
 }
 
@@ -69,7 +77,7 @@ void PatchField::initialiseRandomly() {
     for (int u = 0; u < image_.cols; ++u) {
       if (target_.at<std::uint8_t>(v, u) == 0) continue;
       const cv::Point s = sources_[random(u, v, 1) % sources_.size()];
-      at(u, v) = {s.x, s.y, squaredDistance(u, v, s.x, s.y, 1e30f)};
+      at(u, v) = {s.x, s.y, cost(u, v, s.x, s.y, 1e30f)};
     }
   }
 }
@@ -98,7 +106,7 @@ void PatchField::searchRow(int v, bool backwards, int reach, const std::vector<M
     const int u = backwards ? image_.cols - 1 - i : i;
     if (target_.at<std::uint8_t>(v, u) == 0) continue;
     Match& best = at(u, v);
-    best.distance = squaredDistance(u, v, best.u, best.v, 1e30f);
+    best.distance = cost(u, v, best.u, best.v, 1e30f);
     const int beside = u + step;
     if (beside >= 0 && beside < image_.cols && at(beside, v).u >= 0) {
       tryMatch(u, v, at(beside, v).u - step, at(beside, v).v, best);

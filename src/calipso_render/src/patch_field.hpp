@@ -14,7 +14,8 @@ using Feature = cv::Vec<float, 5>;
 class PatchField {
  public:
   // @param image CV_32FC(5) of Feature, filled somehow; hole, source: CV_8UC1 (source: whole patch may be copied)
-  PatchField(cv::Mat image, cv::Mat hole, cv::Mat source, int radius, std::uint32_t seed);
+  // @param scale size of this level's pixels in the finest level's
+  PatchField(cv::Mat image, cv::Mat hole, cv::Mat source, int radius, float scale, std::uint32_t seed);
 
   // false: there is no source patch at this level.
   bool hasSources() const { return !sources_.empty(); }
@@ -36,8 +37,10 @@ class PatchField {
  private:
   struct Match {
     int u = -1, v = -1;
-    float distance = 0.0f;  // squared, mean per pixel
+    float distance = 0.0f;  // cost()
   };
+  // Squared difference of two patches, mean per pixel, plus the cost of the way between them.
+  float cost(int u, int v, int su, int sv, float limit) const;
   float squaredDistance(int u, int v, int su, int sv, float limit) const;
   bool isSource(int u, int v) const;
   void tryMatch(int u, int v, int su, int sv, Match& best) const;
@@ -49,6 +52,7 @@ class PatchField {
 
   cv::Mat image_, hole_, source_, target_, origin_, depth_;
   int radius_;
+  float scale_;
   std::uint32_t seed_;
   int sweep_ = 0;
   std::vector<Match> matches_;

@@ -1,0 +1,254 @@
+#include "evaluation.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "measures.hpp"
+#include "truth.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kSeam = 3;             // px on either side of the silhouette
+constexpr int kRim = 3;              // px of a mask's rim that "inside" leaves out
+constexpr int kAround = 40;          // px around a moved object in which its shadow is judged
+constexpr int kMovedStep = 4;        // every so many frames of a moving object are drawn again
+constexpr int kFlickerFrames = 8;
+constexpr double kFlickers = 0.3;    // code values of true change from which flicker is judged
+
+double elapsedMs(std::chrono::steady_clock::time_point since) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since).count();
+}
+
+void keepLowest(std::optional<double>& lowest, std::optional<double> value) {
+  if (value && (!lowest || *value < *lowest)) lowest = value;
+}
+
+class Evaluation {
+ public:
+  Evaluation(const std::string& directory, const EvaluationOptions& options)
+      : scene_(loadScene(directory)), truth_(loadTruth(scene_)), options_(options) {
+    params_.planes = scene_.planes;
+    params_.up = -scene_.gravity.normalized();
+    figures_.name = scene_.name;
+  }
+
+  Figures run() {
+    prepareClip();
+    judgeBackground();
+    judgeAppearance();
+    judgeUndeformed();
+    judgeMoved();
+    timeFrames();
+    return figures_;
+  }
+
+ private:
+  void put(const std::string& key, std::optional<double> value) { figures_.values.emplace_back(key, value); }
+
+  void picture(const std::string& what, const cv::Mat& image) const {
+    if (!options_.pictures.empty()) cv::imwrite(options_.pictures + "/" + scene_.name + "_" + what + ".png", image);
+  }
+
+  void prepareClip() {
+    ClipSample clip;
+    for (int k = 0; k < scene_.frame_count; ++k) clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.camera});
+    std::vector<ObjectModel> models;
+    for (const Truth::Object& o : truth_.objects) models.push_back(o.model);
+    const auto start = std::chrono::steady_clock::now();
+    prepared_ = std::make_shared<Prepared>(prepare(clip, models, params_));
+    ms_prepare_ = elapsedMs(start);
+  }
+
+  // Frame k with every object in the state that `change` gives it.
+  template <typename Change>
+  FrameInput frame(int k, Change change) const {
+    FrameInput in{loadFrame(scene_, k), loadLabels(scene_, k), scene_.camera, static_cast<std::int64_t>(1e9 * k / scene_.fps), {}};
+    for (std::size_t i = 0; i < prepared_->surfaces.size(); ++i) {
+      ObjectInFrame o;
+      o.name = prepared_->surfaces[i].name;
+      o.vertices = prepared_->surfaces[i].key_vertices;
+      change(i, o);
+      in.objects.push_back(o);
+    }
+    return in;
+  }
+
+  FrameInput removedFrame(int k) const {
+    return frame(k, [](std::size_t, ObjectInFrame& o) { o.removed = true; });
+  }
+
+  RenderParams without(bool noise, bool still) const {
+    RenderParams p = params_;
+    p.add_noise = noise, p.keep_still = still;
+    return p;
+  }
+
+  void judgeBackground() {
+    cv::Mat plate;
+    prepared_->background.plate.convertTo(plate, CV_8U);
+    picture("plate", plate);
+    const cv::Mat invented = prepared_->background.invented;
+    const auto truth = loadPlate(scene_, 0);
+    const cv::Mat hidden = loadLabels(scene_, 0) != 0;
+    const cv::Mat seen = hidden & (invented == 0);
+    const cv::Mat emptied = Renderer(prepared_, without(false, true)).composite(removedFrame(0)).bgr;
+    picture("removed", emptied);
+    put("plate_psnr_seen_db", truth ? psnr(plate, *truth, seen) : std::nullopt);
+    put("plate_psnr_invented_db", truth ? psnr(emptied, *truth, invented) : std::nullopt);
+    put("gradient_ratio", truth ? gradientRatio(emptied, *truth, hidden & invented) : std::nullopt);
+    put("flicker_ratio", flickerRatio());
+  }
+
+  std::optional<double> flickerRatio() const {
+    Renderer renderer(prepared_, without(false, true));
+    double own = 0.0, reference = 0.0;
+    cv::Mat before, truth_before;
+    for (int k = 0; k < std::min(kFlickerFrames, scene_.frame_count); ++k) {
+      const auto truth = loadPlate(scene_, k);
+      if (!truth) return std::nullopt;
+      const cv::Mat now = renderer.composite(removedFrame(k)).bgr, hidden = shrink(loadLabels(scene_, k) != 0, kRim);
+      if (!before.empty()) own += change(before, now, hidden).value_or(0.0), reference += change(truth_before, *truth, hidden).value_or(0.0);
+      before = now, truth_before = *truth;
+    }
+    return reference > kFlickers ? std::optional<double>(own / reference) : std::nullopt;
+  }
+
+  void judgeAppearance() {
+    const Eigen::Vector3d found = prepared_->light.light.direction.cast<double>();
+    std::optional<double> angle, roughness;
+    if (truth_.to_sun) angle = std::acos(std::clamp(found.dot(truth_.to_sun->normalized()), -1.0, 1.0)) * 180.0 / M_PI;
+    put("light_error_deg", angle);
+    put("albedo_error_percent", albedoFigure());
+    // Beckmann's slope m is the square of the roughness that Principled shaders ask for.
+    for (std::size_t i = 0; i < truth_.objects.size() && !roughness; ++i) {
+      const Gloss& gloss = prepared_->appearances[i].gloss;
+      if (truth_.objects[i].roughness && gloss.specular > 0.0f) {
+        roughness = 100.0 * std::abs(std::sqrt(gloss.roughness) / *truth_.objects[i].roughness - 1.0);
+      }
+    }
+    put("roughness_error_percent", roughness);
+  }
+
+  std::optional<double> albedoFigure() const {
+    const auto truth = loadAlbedo(scene_);
+    if (!truth) return std::nullopt;
+    cv::Mat albedo = cv::Mat::zeros(truth->size(), CV_32FC3), known = cv::Mat::zeros(truth->size(), CV_8U);
+    for (std::size_t i = 0; i < prepared_->surfaces.size(); ++i) {
+      const Appearance& a = prepared_->appearances[i];
+      const cv::Mat mask = shrink(prepared_->key_labels == prepared_->surfaces[i].index, kRim)(a.region);
+      a.albedo.copyTo(albedo(a.region), mask);
+      known(a.region).setTo(255, mask);
+    }
+    return albedoError(albedo, *truth, known);
+  }
+
+  void judgeUndeformed() {
+    const auto everything = [](std::size_t, ObjectInFrame& o) { o.edited = true; };
+    const FrameInput in = frame(0, everything);
+    const cv::Mat mask = in.labels != 0, inside = shrink(mask, kRim), seam = grow(mask, kSeam) & ~shrink(mask, kSeam);
+    const cv::Mat kept = Renderer(prepared_, params_).composite(in).bgr;
+    const cv::Mat drawn = Renderer(prepared_, without(false, false)).composite(in).bgr;
+    picture("undeformed", drawn);
+    put("undeformed_psnr_db", psnr(kept, in.bgr, inside));
+    put("seam_psnr_db", psnr(kept, in.bgr, seam));
+    put("undeformed_drawn_psnr_db", psnr(drawn, in.bgr, inside));
+    put("seam_drawn_psnr_db", psnr(drawn, in.bgr, seam));
+  }
+
+  // The same texture without light: what copying pixels would give.
+  std::shared_ptr<Prepared> unlit() const {
+    auto flat = std::make_shared<Prepared>(*prepared_);
+    flat->light.light.sun = {0, 0, 0};
+    flat->light.light.ambient = {};
+    flat->light.light.ambient[0] = {1, 1, 1};
+    std::vector<Actor> actors;
+    for (const Surface& s : flat->surfaces) actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
+    const ShadowMap none({}, Eigen::Vector3d::UnitZ(), {});
+    cv::Mat key;
+    loadFrame(scene_, 0).convertTo(key, CV_32F);
+    flat->appearances = makeAppearances(actors, key, flat->key_labels, scene_.camera, flat->light.light, none);
+    return flat;
+  }
+
+  void judgeMoved() {
+    std::optional<double> moved, around, copied, gain;
+    Renderer renderer(prepared_, without(false, false)), copier(unlit(), without(false, false));
+    for (int k = kMovedStep; k < scene_.frame_count; k += kMovedStep) {
+      const auto followTruth = [&](std::size_t i, ObjectInFrame& o) {
+        const auto& poses = truth_.objects[i].poses;
+        o.edited = poses.size() > 1;
+        if (o.edited) o.vertices = transformed(prepared_->surfaces[i].object_vertices, poses[k]);
+      };
+      const FrameInput in = frame(k, followTruth);
+      if (std::none_of(in.objects.begin(), in.objects.end(), [](const ObjectInFrame& o) { return o.edited; })) break;
+      const cv::Mat drawn = renderer.composite(in).bgr, mask = in.labels != 0, inside = shrink(mask, 2);
+      const auto relit = psnr(drawn, in.bgr, inside), copy = psnr(copier.composite(in).bgr, in.bgr, inside);
+      keepLowest(moved, relit), keepLowest(copied, copy);
+      if (relit && copy) keepLowest(gain, *relit - *copy);
+      keepLowest(around, psnr(drawn, in.bgr, grow(mask, kAround) & ~grow(mask, 2)));
+      if (k + kMovedStep >= scene_.frame_count) picture("moved", drawn);
+    }
+    put("moved_psnr_db", moved);
+    put("shadow_psnr_db", around);
+    put("moved_copied_psnr_db", copied);
+    put("relighting_gain_db", gain);
+  }
+
+  // Every object lifted by a twentieth of the distance: drawn, shaded and replaced in full.
+  double msPerFrame(Quality quality) const {
+    RenderParams p = params_;
+    p.quality = quality;
+    Renderer renderer(prepared_, p);
+    const double distance = (prepared_->surfaces[0].key_vertices[0].cast<double>() - scene_.camera.world_from_camera.translation()).norm();
+    const Eigen::Vector3f lift = (0.05 * distance * params_.up).cast<float>();
+    const FrameInput in = frame(0, [&](std::size_t, ObjectInFrame& o) {
+      o.edited = true;
+      for (Eigen::Vector3f& x : o.vertices) x += lift;
+    });
+    double best = 1e9;
+    for (int i = 0; i < 5; ++i) {
+      const auto start = std::chrono::steady_clock::now();
+      const FrameOutput out = renderer.composite(in);
+      best = std::min(best, elapsedMs(start));
+      if (i == 0) picture(quality == Quality::kFinal ? "lifted_final" : "lifted", out.bgr);
+    }
+    return best;
+  }
+
+  void timeFrames() {
+    put("ms_prepare", ms_prepare_);
+    put("ms_frame_live", msPerFrame(Quality::kLive));
+    put("ms_frame_final", msPerFrame(Quality::kFinal));
+  }
+
+  Scene scene_;
+  Truth truth_;
+  EvaluationOptions options_;
+  RenderParams params_;
+  std::shared_ptr<Prepared> prepared_;
+  double ms_prepare_ = 0.0;
+  Figures figures_;
+};
+
+}  // namespace
+
+Figures evaluateScene(const std::string& directory, const EvaluationOptions& options) {
+  return Evaluation(directory, options).run();
+}
+
+std::string toJson(const Figures& figures) {
+  std::string json = "{\"case\": \"" + figures.name + "\"";
+  for (const auto& [key, value] : figures.values) {
+    char text[64] = "null";
+    if (value) std::snprintf(text, sizeof(text), "%.4g", *value);
+    json += ", \"" + key + "\": " + text;
+  }
+  return json + "}";
+}
+
+}  // namespace calipso::render

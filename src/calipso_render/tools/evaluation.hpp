@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace calipso::render {
+
+// One case's figures in output order; nullopt where the folder holds no truth for one.
+struct Figures {
+  std::string name;
+  std::vector<std::pair<std::string, std::optional<double>>> values;
+};
+
+struct EvaluationOptions {
+  std::string pictures;  // folder for pictures to look at; empty: none
+};
+
+// Runs the whole renderer on a scene folder, the true shape and masks standing in for alignment and
+// segmentation. @throw std::runtime_error / std::invalid_argument if the folder cannot be read
+Figures evaluateScene(const std::string& directory, const EvaluationOptions& options);
+
+// One line of JSON.
+std::string toJson(const Figures& figures);
+
+}  // namespace calipso::render
