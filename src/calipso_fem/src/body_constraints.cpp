@@ -25,16 +25,16 @@ void DeformableBody::fixNode(int node) {
     const double u = impl_->x[dof] - impl_->model->mesh().nodes(node, axis);
     impl_->prescribed[dof] = {[u](double) { return u; }};
   }
-  impl_->solver->invalidate();
+  impl_->invalidateSystem();
 }
 
 std::vector<int> DeformableBody::nodesOfSurfaceVertices(const std::vector<int>& vertices) const {
   std::set<int> nodes;
-  for (int v : vertices)
-    for (Eigen::SparseVector<double>::InnerIterator it(
-             impl_->embedding.pointWeights(SurfacePoint::vertex(v)));
-         it; ++it)
+  for (int v : vertices) {
+    const auto weights = impl_->embedding.pointWeights(SurfacePoint::vertex(v));
+    for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
       nodes.insert(static_cast<int>(it.index()));
+  }
   return {nodes.begin(), nodes.end()};
 }
 
@@ -48,7 +48,7 @@ void DeformableBody::prescribe(int node, int axis, DisplacementOverTime displace
     throw std::invalid_argument("axis is " + std::to_string(axis) + ", allowed is 0, 1, 2");
   if (!displacement) throw std::invalid_argument("prescribe: no displacement function given");
   impl_->prescribed[3 * node + axis] = {std::move(displacement)};
-  impl_->solver->invalidate();
+  impl_->invalidateSystem();
 }
 
 void DeformableBody::twist(const std::vector<int>& nodes, const Vector3d& center,
@@ -68,7 +68,7 @@ void DeformableBody::twist(const std::vector<int>& nodes, const Vector3d& center
 void DeformableBody::releaseNode(int node) {
   requireNode(node, nodeCount());
   for (int axis = 0; axis < 3; ++axis) impl_->prescribed.erase(3 * node + axis);
-  impl_->solver->invalidate();
+  impl_->invalidateSystem();
 }
 
 void DeformableBody::releaseSurfaceVertices(const std::vector<int>& vertices) {
@@ -77,7 +77,7 @@ void DeformableBody::releaseSurfaceVertices(const std::vector<int>& vertices) {
 
 void DeformableBody::releaseAll() {
   impl_->prescribed.clear();
-  impl_->solver->invalidate();
+  impl_->invalidateSystem();
 }
 
 bool DeformableBody::isFixed(int node) const {

@@ -79,6 +79,8 @@ struct DeformableBody::Impl {
   void assemble(const Vec& y, const Integrator& i, Definiteness definiteness);  // all dofs
   // Size of the terms that have to balance, N.
   double forceScale(const Vec& y, const Integrator& i, const Vec& loads) const;
+  // Residual that rounding of positions and inner forces alone leaves, N. @pre A is assembled
+  double roundOff(const Vec& y) const;
 
   StepReport minimise(const Integrator& i, const Vec& loads, const Vec& targets, bool linearised,
                       Vec* y);
@@ -89,6 +91,8 @@ struct DeformableBody::Impl {
                     const Vec& loads, double energy) const;
   void finishReport(StepReport* report) const;
   void invalidateSystem();
+  // A^-1 of the last step's system times impulses on the nodes (N s): change of velocity, m/s.
+  Vec velocityChange(Vec impulses, double h);
 };
 
 // Rows and columns of the given dofs become those of the identity matrix times a typical diagonal.

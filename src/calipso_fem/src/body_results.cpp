@@ -62,28 +62,32 @@ bool DeformableBody::isAtRest(double speed) const {
 }
 
 // A of body_system.cpp is the velocity system divided by h (backward Euler: inertia = rate / h).
+Vec DeformableBody::Impl::velocityChange(Vec impulses, double h) {
+  if (!(h > 0.0)) throw std::invalid_argument("compliance: h must be > 0 s");
+  if (!system_valid) {
+    viscosity = BlockMatrix(model->pattern());
+    if (damping() > 0.0) {
+      model->viscosity(x, viscosity);
+      for (double& value : viscosity.values) value *= damping();
+    }
+    assemble(x, integrator(h), Definiteness::kPositive);
+    eliminate(prescribed, &A);
+    solver->setMatrix(A);
+    system_valid = true;
+  }
+  maskResidual(&impulses);
+  Vec w = Vec::Zero(impulses.size());
+  solver->solve(impulses, options.linear_tolerance, options.linear_iterations, &w);
+  return w / (h * h);
+}
+
 Vec DeformableBody::complianceColumn(const SurfacePoint& point, const Vector3d& direction,
                                      double h) const {
-  Impl& m = *impl_;
-  if (!(h > 0.0)) throw std::invalid_argument("compliance: h must be > 0 s");
-  if (!m.system_valid) {
-    m.viscosity = BlockMatrix(m.model->pattern());
-    if (m.damping() > 0.0) {
-      m.model->viscosity(m.x, m.viscosity);
-      for (double& value : m.viscosity.values) value *= m.damping();
-    }
-    m.assemble(m.x, m.integrator(h), Definiteness::kPositive);
-    eliminate(m.prescribed, &m.A);
-    m.solver->setMatrix(m.A);
-    m.system_valid = true;
-  }
-  Vec b = Vec::Zero(m.x.size());
-  for (Eigen::SparseVector<double>::InnerIterator it(m.embedding.pointWeights(point)); it; ++it)
+  Vec b = Vec::Zero(impl_->x.size());
+  const Eigen::SparseVector<double> weights = impl_->embedding.pointWeights(point);
+  for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
     b.segment<3>(3 * it.index()) += it.value() * direction;
-  m.maskResidual(&b);
-  Vec w = Vec::Zero(b.size());
-  m.solver->solve(b, m.options.linear_tolerance, m.options.linear_iterations, &w);
-  return w / (h * h);
+  return impl_->velocityChange(std::move(b), h);
 }
 
 Eigen::MatrixXd DeformableBody::compliance(const std::vector<SurfacePoint>& points,
@@ -110,8 +114,13 @@ void DeformableBody::applyImpulses(const std::vector<SurfacePoint>& points,
                                    const std::vector<Vector3d>& impulses, double h) {
   if (points.size() != impulses.size())
     throw std::invalid_argument("applyImpulses: needs one impulse per point");
-  for (std::size_t k = 0; k < points.size(); ++k)
-    if (!impulses[k].isZero(0.0)) impl_->v += complianceColumn(points[k], impulses[k], h);
+  Vec b = Vec::Zero(impl_->x.size());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const Eigen::SparseVector<double> weights = impl_->embedding.pointWeights(points[k]);
+    for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
+      b.segment<3>(3 * it.index()) += it.value() * impulses[k];
+  }
+  if (!b.isZero(0.0)) impl_->v += impl_->velocityChange(std::move(b), h);
 }
 
 // The grid follows its surface: rest nodes X + d with J d = new - old vertices in the least-squares

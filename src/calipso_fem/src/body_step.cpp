@@ -58,9 +58,10 @@ bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, co
     report->linear_iterations += solve.iterations;
     if (!solve.positive) continue;
     *direction += jump;
-    if (direction->allFinite()) return true;
+    system_valid = direction->allFinite();
+    if (system_valid) return true;
   }
-  solver->invalidate();
+  invalidateSystem();
   return false;
 }
 
@@ -96,6 +97,11 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
                        "or its state is not finite";
       return report;
     }
+    const double noise = roundOff(*y);
+    if (!linearised && jump.isZero(0.0) && masked.norm() <= noise) {
+      report.converged = true;
+      break;
+    }
     const bool moved_boundary = !jump.isZero(0.0);
     double t = 1.0;
     if (!linearised && !moved_boundary) t = searchLine(*y, direction, masked, i, loads,
@@ -108,7 +114,8 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
   Vec masked = r;
   maskResidual(&masked);
   report.residual = masked.norm() / forceScale(*y, i, loads);
-  report.converged = linearised || report.residual <= options.newton_tolerance;
+  report.converged =
+      report.converged || linearised || report.residual <= options.newton_tolerance;
   reactions.setZero(x.size());
   for (const auto& [dof, p] : prescribed) reactions[dof] = r[dof];
   return report;
@@ -151,7 +158,6 @@ StepReport DeformableBody::step(double h) {
     report.message = "the step gave positions that are not finite; the state before it is kept";
   }
   m.time += h;
-  m.system_valid = true;
   m.finishReport(&report);
   report.milliseconds = millisecondsSince(start);
   return report;

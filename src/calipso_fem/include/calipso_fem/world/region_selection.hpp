@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calipso_fem/world/world_types.hpp"
+
+namespace calipso::fem {
+
+struct RayHit {
+  int object = 0;        // index into the scene's objects
+  int triangle = 0;
+  double depth = 0.0;    // along the ray, in lengths of its direction
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  // world, m
+};
+
+// Nearest intersection of the ray with the objects as they stand at the key frame.
+std::optional<RayHit> castRay(const WorldScene& scene, const Eigen::Vector3d& origin,
+                              const Eigen::Vector3d& direction);
+
+// Vertices of the scene's object `object` that a region chooses at the key frame, ascending.
+// @throw std::invalid_argument when the region meets no vertex of the object, naming the remedy
+std::vector<int> selectVertices(const WorldScene& scene, int object, const Region& region);
+
+// Vertices of a mesh at `pose` that lie in one of the boxes (world frame), ascending.
+std::vector<int> verticesInBoxes(const TriangleMesh& mesh, const Eigen::Isometry3d& pose,
+                                 const std::vector<AttachmentBox>& boxes);
+
+}  // namespace calipso::fem

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "calipso_fem/world/world_types.hpp"
+
+namespace calipso::fem {
+
+// The whole scene, simulated in video time. The observed motion is the reference: an object is as in
+// the video until an edit touches it; then it starts from its observed pose and velocity, in
+// equilibrium with what held it (attachments, supports, or buoyancy equal to its weight), and is
+// modelled as simply as the edits known so far allow: kinematic, rigid (Bullet) or deformable (FEM).
+// Deterministic; not thread-safe.
+class World {
+ public:
+  // @throw std::invalid_argument naming what is wrong with scene or parameters
+  World(WorldScene scene, WorldParams params);
+  ~World();
+
+  // Motion of one object at one instant of the video.
+  // @throw std::invalid_argument naming the object and the ones there are
+  void addObservedMotion(const std::string& object, const ObservedMotion& motion);
+
+  // Takes an edit in; it takes effect with the first frame at or after its time. Never throws: what is
+  // wrong with it is said in its outcome.
+  void submit(const Edit& edit);
+
+  // Steps to video time `time` (s) and applies the edits due by then. The first call sets the clock.
+  // Times that do not increase step nothing. @return what became of the edits that were due
+  std::vector<EditOutcome> advanceTo(double time);
+
+  double time() const;
+  WorldState state() const;
+  std::vector<PlanEntry> plan() const;
+  bool planChanged();  // since it was last asked
+
+  const WorldScene& scene() const;
+  // For drawing: the volume grid's edges and fixed nodes of a deformable object, user forces.
+  struct Drawing {
+    std::string object;
+    std::vector<Eigen::Vector3d> edges;   // pairs of points, world
+    std::vector<Eigen::Vector3d> fixed;   // points, world
+    std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> forces;  // point, N
+  };
+  std::vector<Drawing> drawings() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace calipso::fem

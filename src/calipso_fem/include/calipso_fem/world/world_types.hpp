@@ -1,0 +1,139 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calipso_fem/fem_options.hpp"
+#include "calipso_scene/edit.hpp"
+#include "calipso_scene/material.hpp"
+#include "calipso_scene/scene.hpp"
+#include "calipso_scene/triangle_mesh.hpp"
+
+// What goes into the simulated world and what comes out of it. SI units, world frame unless said.
+namespace calipso::fem {
+
+// An object as the alignment found it at the key frame.
+struct WorldObject {
+  std::string name;
+  int index = 0;                        // label in masks
+  TriangleMesh mesh;                    // object frame
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // at the key frame
+  std::vector<AttachmentBox> attachments;
+};
+
+struct SupportMesh {
+  std::string name;
+  TriangleMesh mesh;  // world frame
+};
+
+struct WorldScene {
+  Camera camera;  // at the key frame
+  Eigen::Vector3d gravity = {0.0, 0.0, -9.81};  // m/s^2
+  std::vector<SupportPlane> planes;
+  std::vector<SupportMesh> support_meshes;
+  std::vector<WorldObject> objects;
+};
+
+// How an object moves in the video at one instant (calipso_msgs/ObjectDynamics).
+struct ObservedMotion {
+  double time = 0.0;  // s since the clip's first frame
+  bool moving = false;
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();      // the point that moves with `linear`
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero();        // m/s
+  Eigen::Vector3d angular = Eigen::Vector3d::Zero();       // rad/s
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  // m/s^2
+};
+
+// How a surface takes part in contacts. A pair's value is the geometric mean of its two surfaces'.
+struct SurfaceSettings {
+  double friction = 0.5;
+  double restitution = 0.3;       // 0..1
+  double rolling_friction = 0.0;  // m
+};
+
+// What the user may set per object. Empty: chosen automatically.
+struct ObjectSettings {
+  std::optional<double> youngs_modulus, poissons_ratio, density, damping;
+  std::optional<ObjectKind> kind;  // once an edit touches the object
+  std::optional<double> cell_size;  // m
+  SurfaceSettings surface;
+};
+
+struct WorldParams {
+  double frame_period = 1.0 / 30.0;  // s; steps are whole fractions of it
+  double pixel_error = 0.5;          // px, discretisation error the resolution is chosen for
+  int max_nodes = 2000;              // per deformable object
+  int max_substeps = 2;              // of deformable objects, per frame
+  FemOptions fem;                    // cell_size and target_nodes are chosen per object
+  double proximity = 0.0;            // m, minimal distance of surfaces; 0: a fiftieth of the smallest object
+  int contact_iterations = 60;       // block Gauss-Seidel sweeps per solve
+  double contact_tolerance = 1e-6;   // relative change of the impulses at which sweeping stops
+  SurfaceSettings support;           // of planes and support meshes
+  ObjectSettings defaults;
+  std::map<std::string, ObjectSettings> objects;  // by object name; replaces the defaults
+
+  const ObjectSettings& settingsOf(const std::string& object) const;
+};
+
+// @throw std::invalid_argument naming parameter, value and range
+void validate(const WorldParams& params);
+
+// One object at one instant.
+struct ObjectSnapshot {
+  std::string name;
+  int index = 0;
+  ObjectKind kind = ObjectKind::kStatic;
+  bool edited = false;    // false: as in the video
+  bool removed = false;
+  bool sleeping = false;
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // best rigid motion
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> vertices;   // #V x 3; empty unless edited
+  Eigen::VectorXd von_mises;     // #V, Pa; empty unless deformable
+  double kinetic_energy = 0.0;   // J
+  double elastic_energy = 0.0;   // J
+};
+
+struct ContactPoint {
+  std::string a, b;  // b: an object or a support
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // from b towards a
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();    // on a, N
+  double depth = 0.0;         // m, negative: a gap
+  bool first_touch = false;   // the pair's first contact since they were last apart
+};
+
+struct WorldState {
+  double time = 0.0;  // s since the first frame
+  std::vector<ObjectSnapshot> objects;
+  std::vector<ContactPoint> contacts;
+  double step_ms = 0.0;
+  int substeps = 0;
+};
+
+// How an object is modelled, and why.
+struct PlanEntry {
+  std::string object;
+  ObjectKind kind = ObjectKind::kStatic;
+  std::string reason;
+  int nodes = 0;
+  int elements = 0;
+  std::string element, material_model, solver;
+  double cell_size = 0.0;  // m
+  double time_step = 0.0;  // s
+  Material material;
+  double mass = 0.0;       // kg
+  double ms_per_frame = 0.0;
+};
+
+struct EditOutcome {
+  Edit edit;
+  double time = 0.0;  // s, of the frame with which it took effect or was refused
+  bool accepted = false;
+  std::string message;
+};
+
+}  // namespace calipso::fem

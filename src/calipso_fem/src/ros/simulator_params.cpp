@@ -1,0 +1,83 @@
+#include "simulator_params.hpp"
+
+#include <stdexcept>
+
+#include "calipso_ros/node_main.hpp"
+
+namespace calipso::fem {
+namespace {
+
+double number(XmlRpc::XmlRpcValue& value, const std::string& name) {
+  if (value.getType() == XmlRpc::XmlRpcValue::TypeInt) return static_cast<int>(value);
+  if (value.getType() == XmlRpc::XmlRpcValue::TypeDouble) return static_cast<double>(value);
+  throw std::invalid_argument("parameter " + name + " is no number; give one in SI units");
+}
+
+// One object's settings; `where` is the parameter's name, for errors.
+ObjectSettings readSettings(XmlRpc::XmlRpcValue& map, ObjectSettings settings, const std::string& where) {
+  if (map.getType() != XmlRpc::XmlRpcValue::TypeStruct)
+    throw std::invalid_argument("parameter " + where + " is no map; give keys such as youngs_modulus");
+  for (auto& [key, value] : map) {
+    const std::string name = where + "/" + key;
+    if (key == "kind") {
+      if (value.getType() != XmlRpc::XmlRpcValue::TypeString)
+        throw std::invalid_argument("parameter " + name + " is no text");
+      settings.kind = objectKindFromString(static_cast<std::string>(value));
+    } else if (key == "youngs_modulus") settings.youngs_modulus = number(value, name);
+    else if (key == "poissons_ratio") settings.poissons_ratio = number(value, name);
+    else if (key == "density") settings.density = number(value, name);
+    else if (key == "damping") settings.damping = number(value, name);
+    else if (key == "cell_size") settings.cell_size = number(value, name);
+    else if (key == "friction") settings.surface.friction = number(value, name);
+    else if (key == "restitution") settings.surface.restitution = number(value, name);
+    else if (key == "rolling_friction") settings.surface.rolling_friction = number(value, name);
+    else throw std::invalid_argument("parameter " + name + " is unknown; see config/simulator.yaml");
+  }
+  return settings;
+}
+
+void readObjects(const ros::NodeHandle& pnh, WorldParams& world) {
+  XmlRpc::XmlRpcValue value;
+  if (pnh.getParam("defaults", value)) world.defaults = readSettings(value, {}, "defaults");
+  if (pnh.getParam("support", value)) world.support = readSettings(value, {}, "support").surface;
+  if (!pnh.getParam("objects", value)) return;
+  if (value.getType() != XmlRpc::XmlRpcValue::TypeStruct)
+    throw std::invalid_argument("parameter objects is no map of object names");
+  for (auto& [name, settings] : value)
+    world.objects[name] = readSettings(settings, world.defaults, "objects/" + name);
+}
+
+}  // namespace
+
+SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
+  SimulatorParams p;
+  p.scene_directory = requiredParam<std::string>(pnh, "scene");
+  const std::string mode = pnh.param<std::string>("mode", "bag");
+  if (mode != "bag" && mode != "live")
+    throw std::invalid_argument("parameter mode = '" + mode + "'; must be bag or live");
+  p.live = mode == "live";
+  p.colour_by = pnh.param("colour_by", p.colour_by);
+  if (p.colour_by != "von_mises" && p.colour_by != "displacement")
+    throw std::invalid_argument("parameter colour_by = '" + p.colour_by +
+                                "'; must be von_mises or displacement");
+  p.force_scale = pnh.param("force_scale", p.force_scale);
+  WorldParams& w = p.world;
+  w.pixel_error = pnh.param("pixel_error", w.pixel_error);
+  w.max_nodes = pnh.param("max_nodes", w.max_nodes);
+  w.max_substeps = pnh.param("max_substeps", w.max_substeps);
+  w.proximity = pnh.param("proximity", w.proximity);
+  w.contact_iterations = pnh.param("contact_iterations", w.contact_iterations);
+  w.contact_tolerance = pnh.param("contact_tolerance", w.contact_tolerance);
+  w.fem.element = elementTypeFromString(pnh.param("element", toString(w.fem.element)));
+  w.fem.material_model =
+      materialModelFromString(pnh.param("material_model", toString(w.fem.material_model)));
+  w.fem.solver = solverKindFromString(pnh.param("solver", toString(w.fem.solver)));
+  w.fem.newton_iterations = pnh.param("newton_iterations", w.fem.newton_iterations);
+  w.fem.newton_tolerance = pnh.param("newton_tolerance", w.fem.newton_tolerance);
+  w.fem.linear_tolerance = pnh.param("linear_tolerance", w.fem.linear_tolerance);
+  readObjects(pnh, w);
+  validate(w);
+  return p;
+}
+
+}  // namespace calipso::fem

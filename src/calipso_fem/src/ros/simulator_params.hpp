@@ -1,0 +1,23 @@
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <string>
+
+#include "calipso_fem/world/world_types.hpp"
+
+namespace calipso::fem {
+
+// Parameters of simulator_node; config/simulator.yaml lists them with units.
+struct SimulatorParams {
+  std::string scene_directory;
+  bool live = false;            // mode: bag | live
+  std::string colour_by = "von_mises";  // or displacement
+  double force_scale = 0.05;    // m of arrow per N
+  WorldParams world;
+};
+
+// @throw std::invalid_argument naming the parameter, its value and what is allowed
+SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh);
+
+}  // namespace calipso::fem

@@ -1,0 +1,179 @@
+#include "simulator_ros.hpp"
+
+#include <calipso_msgs/EditReport.h>
+#include <calipso_msgs/Plan.h>
+#include <calipso_msgs/SimulationState.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include "calipso_ros/conversions.hpp"
+#include "calipso_ros/topics.hpp"
+#include "world_conversions.hpp"
+#include "world_markers.hpp"
+
+namespace calipso::fem {
+namespace {
+
+constexpr unsigned kKeepAll = 0;  // in bag mode nothing may be lost
+
+}  // namespace
+
+SimulatorRos::SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
+    : params_(loadSimulatorParams(pnh)), scene_(loadScene(params_.scene_directory)),
+      reporter_(nh, "simulator") {
+  if (scene_.fps > 0.0) params_.world.frame_period = 1.0 / scene_.fps;
+  constexpr bool kLatched = true;
+  state_ = nh.advertise<calipso_msgs::SimulationState>(topics::kState, 1000);
+  plan_ = nh.advertise<calipso_msgs::Plan>(topics::kPlan, 1, kLatched);
+  applied_ = nh.advertise<calipso_msgs::EditReport>(topics::kEditsApplied, 1000);
+  markers_ = nh.advertise<visualization_msgs::MarkerArray>(topics::kMarkers, 2);
+  const unsigned queue = params_.live ? 2 : kKeepAll;
+  subscribers_ = {
+      nh.subscribe(topics::kModels, 1, &SimulatorRos::onModels, this),
+      nh.subscribe(topics::kEdits, kKeepAll, &SimulatorRos::onEdit, this),
+      nh.subscribe(topics::kCameraInfo, queue, &SimulatorRos::onFrame, this),
+  };
+  if (params_.live) {
+    subscribers_.push_back(nh.subscribe(topics::kDynamics, queue, &SimulatorRos::onDynamics, this));
+  } else {
+    subscribers_.push_back(nh.subscribe(topics::kClipInfo, 1, &SimulatorRos::onClipInfo, this));
+    subscribers_.push_back(nh.subscribe(topics::kClipDynamics, 1, &SimulatorRos::onClipDynamics, this));
+  }
+  reporter_.starting("waiting for models");
+}
+
+void SimulatorRos::onModels(const calipso_msgs::AlignedModelsConstPtr& models) {
+  models_ = models;
+  prepare();
+}
+
+void SimulatorRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
+  first_stamp_ = info->header.stamp;
+  if (info->fps > 0.0) params_.world.frame_period = 1.0 / info->fps;
+  prepare();
+}
+
+void SimulatorRos::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip) {
+  clip_dynamics_ = clip;
+  prepare();
+}
+
+void SimulatorRos::onDynamics(const calipso_msgs::DynamicsConstPtr& dynamics) {
+  if (world_ && first_stamp_) take(*dynamics);
+}
+
+void SimulatorRos::prepare() {
+  if (!models_) return;
+  if (!params_.live && !(first_stamp_ && clip_dynamics_)) {
+    reporter_.preparing("models are there; waiting for the clip's dynamics");
+    return;
+  }
+  try {
+    world_ = std::make_unique<World>(toWorldScene(scene_, *models_), params_.world);
+  } catch (const std::exception& error) {
+    reporter_.failed(error.what());
+    return;
+  }
+  if (!params_.live)
+    for (const auto& frame : clip_dynamics_->frames) take(frame);
+  if (first_stamp_)
+    for (const auto& edit : early_edits_) submit(edit);
+  if (first_stamp_) early_edits_.clear();
+  publishPlan(models_->header.stamp);
+  reporter_.ready(std::to_string(models_->models.size()) + " objects");
+}
+
+void SimulatorRos::take(const calipso_msgs::Dynamics& dynamics) {
+  for (const auto& object : dynamics.objects) {
+    if (object.tracks == 0) continue;  // no estimate
+    try {
+      world_->addObservedMotion(object.object,
+                                fromMsg(object, (dynamics.header.stamp - *first_stamp_).toSec()));
+    } catch (const std::invalid_argument& error) {
+      reporter_.warn(dynamics.header.stamp, error.what());
+    }
+  }
+}
+
+void SimulatorRos::onEdit(const calipso_msgs::EditConstPtr& edit) {
+  if (world_ && first_stamp_)
+    submit(*edit);
+  else
+    early_edits_.push_back(*edit);
+  reporter_.editReceived();
+}
+
+void SimulatorRos::submit(const calipso_msgs::Edit& edit) {
+  try {
+    world_->submit(calipso::fromMsg(edit, *first_stamp_));
+  } catch (const std::invalid_argument& error) {
+    refuse(edit, error.what());
+  }
+}
+
+void SimulatorRos::refuse(const calipso_msgs::Edit& edit, const std::string& message) {
+  calipso_msgs::EditReport report;
+  report.header.stamp = edit.header.stamp;
+  report.header.frame_id = topics::kWorldFrame;
+  report.edit = edit;
+  report.accepted = false;
+  report.message = message;
+  applied_.publish(report);
+  reporter_.warn(edit.header.stamp, "edit refused: " + message);
+}
+
+void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
+  const ros::Time stamp = info->header.stamp;
+  if (!world_) {
+    // A state without objects lets the frame pass unedited.
+    if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) {
+      state_.publish(toMsg(WorldState{}, stamp));
+      reporter_.warn(stamp, "there is no simulation; the frame passes unedited");
+    }
+    return;
+  }
+  if (!first_stamp_) {
+    first_stamp_ = stamp;
+    for (const auto& edit : early_edits_) submit(edit);
+    early_edits_.clear();
+  }
+  try {
+    publish(world_->advanceTo((stamp - *first_stamp_).toSec()), stamp);
+  } catch (const std::exception& error) {
+    state_.publish(toMsg(WorldState{}, stamp));
+    reporter_.warn(stamp, std::string(error.what()) + "; the frame passes unedited");
+  }
+}
+
+void SimulatorRos::publish(const std::vector<EditOutcome>& outcomes, const ros::Time& stamp) {
+  for (const EditOutcome& outcome : outcomes) {
+    applied_.publish(toMsg(outcome, stamp, *first_stamp_));
+    if (!outcome.accepted) reporter_.warn(stamp, "edit refused: " + outcome.message);
+  }
+  const WorldState state = world_->state();
+  state_.publish(toMsg(state, stamp));
+  reporter_.timing(stamp, state.step_ms);
+  if (world_->planChanged()) publishPlan(stamp);
+  sendRigidTransforms(state, stamp);
+  if (markers_.getNumSubscribers() > 0)
+    markers_.publish(toMarkers(*world_, {params_.colour_by, params_.force_scale}, stamp));
+}
+
+void SimulatorRos::publishPlan(const ros::Time& stamp) {
+  plan_.publish(toMsg(world_->plan(), stamp));
+}
+
+void SimulatorRos::sendRigidTransforms(const WorldState& state, const ros::Time& stamp) {
+  std::vector<geometry_msgs::TransformStamped> transforms;
+  for (const ObjectSnapshot& object : state.objects) {
+    if (object.kind != ObjectKind::kRigid && object.kind != ObjectKind::kKinematic) continue;
+    geometry_msgs::TransformStamped t;
+    t.header.stamp = stamp;
+    t.header.frame_id = topics::kWorldFrame;
+    t.child_frame_id = "object/" + object.name;
+    t.transform = toTransformMsg(object.world_from_object);
+    transforms.push_back(t);
+  }
+  if (!transforms.empty()) tf_.sendTransform(transforms);
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <calipso_msgs/AlignedModels.h>
+#include <calipso_msgs/ClipDynamics.h>
+#include <calipso_msgs/ClipInfo.h>
+#include <calipso_msgs/Dynamics.h>
+#include <calipso_msgs/Edit.h>
+#include <ros/ros.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "calipso_fem/world/world.hpp"
+#include "calipso_ros/node_reporter.hpp"
+#include "calipso_scene/scene.hpp"
+#include "simulator_params.hpp"
+
+namespace calipso::fem {
+
+// Wires the World to topics. camera_info is the clock: one state per stamp. All callbacks run in one
+// thread.
+class SimulatorRos {
+ public:
+  SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh);
+
+ private:
+  void onModels(const calipso_msgs::AlignedModelsConstPtr& models);
+  void onClipInfo(const calipso_msgs::ClipInfoConstPtr& info);
+  void onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip);
+  void onDynamics(const calipso_msgs::DynamicsConstPtr& dynamics);
+  void onEdit(const calipso_msgs::EditConstPtr& edit);
+  void onFrame(const sensor_msgs::CameraInfoConstPtr& info);
+
+  void prepare();                         // once everything it takes has arrived
+  void take(const calipso_msgs::Dynamics& dynamics);
+  void submit(const calipso_msgs::Edit& edit);
+  void refuse(const calipso_msgs::Edit& edit, const std::string& message);
+  void publish(const std::vector<EditOutcome>& outcomes, const ros::Time& stamp);
+  void publishPlan(const ros::Time& stamp);
+  void sendRigidTransforms(const WorldState& state, const ros::Time& stamp);
+
+  SimulatorParams params_;
+  Scene scene_;
+  NodeReporter reporter_;
+  tf2_ros::TransformBroadcaster tf_;
+  ros::Publisher state_, plan_, applied_, markers_;
+  std::vector<ros::Subscriber> subscribers_;
+  calipso_msgs::AlignedModelsConstPtr models_;
+  calipso_msgs::ClipDynamicsConstPtr clip_dynamics_;
+  std::optional<ros::Time> first_stamp_;
+  std::vector<calipso_msgs::Edit> early_edits_;  // came before the world was there
+  std::unique_ptr<World> world_;
+};
+
+}  // namespace calipso::fem

@@ -1,0 +1,124 @@
+#include "world_conversions.hpp"
+
+#include "calipso_ros/conversions.hpp"
+#include "calipso_ros/topics.hpp"
+
+namespace calipso::fem {
+namespace {
+
+std_msgs::Header headerAt(const ros::Time& stamp) {
+  std_msgs::Header header;
+  header.stamp = stamp;
+  header.frame_id = topics::kWorldFrame;
+  return header;
+}
+
+calipso_msgs::ObjectState toMsg(const ObjectSnapshot& s) {
+  calipso_msgs::ObjectState m;
+  m.object = s.name;
+  m.index = static_cast<std::uint8_t>(s.index);
+  m.kind = toString(s.kind);
+  m.edited = s.edited;
+  m.removed = s.removed;
+  m.sleeping = s.sleeping;
+  m.pose = calipso::toMsg(s.world_from_object);
+  m.vertices.assign(s.vertices.data(), s.vertices.data() + s.vertices.size());
+  m.von_mises.assign(s.von_mises.data(), s.von_mises.data() + s.von_mises.size());
+  m.kinetic_energy = s.kinetic_energy;
+  m.elastic_energy = s.elastic_energy;
+  return m;
+}
+
+calipso_msgs::Contact toMsg(const ContactPoint& c) {
+  calipso_msgs::Contact m;
+  m.object_a = c.a;
+  m.object_b = c.b;
+  m.position = toPointMsg(c.position);
+  m.normal = toVectorMsg(c.normal);
+  m.force = toVectorMsg(c.force);
+  m.depth = c.depth;
+  m.first_touch = c.first_touch;
+  return m;
+}
+
+calipso_msgs::ObjectPlan toMsg(const PlanEntry& e) {
+  calipso_msgs::ObjectPlan m;
+  m.object = e.object;
+  m.kind = toString(e.kind);
+  m.reason = e.reason;
+  m.nodes = static_cast<std::uint32_t>(e.nodes);
+  m.elements = static_cast<std::uint32_t>(e.elements);
+  m.element = e.element;
+  m.material = e.material_model;
+  m.solver = e.solver;
+  m.cell_size = e.cell_size;
+  m.time_step = e.time_step;
+  m.youngs_modulus = e.material.youngs_modulus;
+  m.poissons_ratio = e.material.poissons_ratio;
+  m.density = e.material.density;
+  m.mass = e.mass;
+  m.estimated_ms_per_frame = e.ms_per_frame;
+  return m;
+}
+
+}  // namespace
+
+WorldScene toWorldScene(const Scene& scene, const calipso_msgs::AlignedModels& models) {
+  WorldScene w;
+  w.camera = scene.camera;
+  w.gravity = scene.gravity;
+  w.planes = scene.planes;
+  for (const std::string& path : scene.support_meshes)
+    w.support_meshes.push_back({path.substr(path.find_last_of('/') + 1), loadMesh(path)});
+  for (const calipso_msgs::AlignedModel& model : models.models) {
+    WorldObject object;
+    object.name = model.object;
+    object.index = model.index;
+    object.mesh = calipso::fromMsg(model.mesh);
+    object.world_from_object = calipso::fromMsg(model.world_from_object.pose);
+    object.attachments = scene.object(model.object).attachments;
+    w.objects.push_back(std::move(object));
+  }
+  return w;
+}
+
+ObservedMotion fromMsg(const calipso_msgs::ObjectDynamics& d, double time) {
+  ObservedMotion m;
+  m.time = time;
+  m.moving = d.moving;
+  m.world_from_object = calipso::fromMsg(d.world_from_object);
+  m.centroid = calipso::fromMsg(d.centroid);
+  m.linear = calipso::fromMsg(d.twist.twist.linear);
+  m.angular = calipso::fromMsg(d.twist.twist.angular);
+  m.acceleration = calipso::fromMsg(d.acceleration);
+  return m;
+}
+
+calipso_msgs::SimulationState toMsg(const WorldState& state, const ros::Time& stamp) {
+  calipso_msgs::SimulationState m;
+  m.header = headerAt(stamp);
+  for (const ObjectSnapshot& object : state.objects) m.objects.push_back(toMsg(object));
+  for (const ContactPoint& contact : state.contacts) m.contacts.push_back(toMsg(contact));
+  m.step_ms = static_cast<float>(state.step_ms);
+  m.substeps = static_cast<std::uint32_t>(state.substeps);
+  return m;
+}
+
+calipso_msgs::Plan toMsg(const std::vector<PlanEntry>& plan, const ros::Time& stamp) {
+  calipso_msgs::Plan m;
+  m.header = headerAt(stamp);
+  for (const PlanEntry& entry : plan) m.objects.push_back(toMsg(entry));
+  return m;
+}
+
+calipso_msgs::EditReport toMsg(const EditOutcome& outcome, const ros::Time& stamp,
+                               const ros::Time& first_stamp) {
+  calipso_msgs::EditReport m;
+  m.header = headerAt(stamp);
+  m.edit = calipso::toMsg(outcome.edit, first_stamp);
+  m.accepted = outcome.accepted;
+  m.message = outcome.message;
+  return m;
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calipso_fem/world/observed_track.hpp"
+#include "calipso_fem/world/rigid_world.hpp"
+#include "calipso_fem/world/soft_object.hpp"
+#include "calipso_fem/world/surface_tree.hpp"
+#include "calipso_fem/world/world_types.hpp"
+
+namespace calipso::fem {
+
+// A pull that is still acting.
+struct Pull {
+  std::vector<int> vertices;
+  std::vector<int> nodes;        // deformable, target mode: the nodes that are led
+  bool to_target = false;
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();  // N, or m
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // object frame, centre of the region
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();   // world, where the anchor was
+  double begin = 0.0, ramp = 0.0, duration = 0.0;    // s
+
+  double share(double time) const {  // 0..1 along the ramp
+    return ramp > 0.0 ? std::min(1.0, std::max(0.0, (time - begin) / ramp)) : 1.0;
+  }
+  bool over(double time) const { return duration > 0.0 && time >= begin + duration - 1e-9; }
+};
+
+// Pose and velocity of a body as a whole, handed on when its kind changes.
+struct BodyMotion {
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero();   // of the centre of mass, m/s
+  Eigen::Vector3d angular = Eigen::Vector3d::Zero();  // rad/s
+};
+
+// What is known about how the video holds an object, decided when an edit first touches it.
+enum class Holder { kUnknown, kAttachment, kSupport, kBuoyancy, kNothing };
+
+// One object of the simulated world.
+struct Actor {
+  explicit Actor(const WorldObject& object) : object(object), track(object.world_from_object) {}
+
+  WorldObject object;            // its mesh is rescaled by edits
+  ObservedTrack track;
+  int id = 0;                    // index among the actors; also its obstacle's id
+  ObjectSettings settings;
+  Material observed_material;    // with which the observed shape is at rest
+  Material material;
+  ObjectKind kind = ObjectKind::kStatic;
+  std::optional<ObjectKind> forced_kind;
+  std::string reason = "no edit touches it";
+  bool edited = false, removed = false;
+  Holder holder = Holder::kUnknown;
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   // m/s^2
+  Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();  // m/s^2
+  Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  // by edits, of a kinematic object
+  std::optional<RigidWorld::Id> body;                  // also as a collider while static
+  std::vector<TriangleMesh> hulls;                     // cached convex parts, object frame
+  std::unique_ptr<SoftObject> soft;
+  Eigen::Isometry3d soft_from_object = Eigen::Isometry3d::Identity();  // pose when soft was made
+  std::unique_ptr<SurfaceTree> tree;                   // object frame
+  std::vector<Pull> pulls;
+  std::vector<std::vector<int>> fixed;                 // vertices per fixed region
+  bool asleep = false;
+  int calm_frames = 0;
+  double soft_ms = 0.0;                                // of the last frame
+  std::string note;                                    // what the user should know about the model
+
+  Eigen::Vector3d acceleration() const { return gravity + buoyancy; }
+  bool simulated() const {
+    return !removed && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
+  }
+};
+
+}  // namespace calipso::fem

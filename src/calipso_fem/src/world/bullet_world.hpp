@@ -1,0 +1,44 @@
+#pragma once
+
+#include <btBulletDynamicsCommon.h>
+
+#include <Eigen/Geometry>
+#include <map>
+#include <set>
+#include <utility>
+
+// Bullet's world with the three things the simulator needs beyond it. Private to the rigid world.
+namespace calipso::fem {
+
+inline btVector3 toBullet(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+inline Eigen::Vector3d fromBullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+btTransform toBullet(const Eigen::Isometry3d& pose);
+Eigen::Isometry3d fromBullet(const btTransform& pose);
+
+// NOTE: deviations from btDiscreteDynamicsWorld, each with its reason:
+//  - overlap at the start is forgiven (alignment errors must not make objects jump);
+//  - a bounce takes place in the sub-step in which the surfaces meet; Bullet starts to brake bodies
+//    that are still apart, which costs most of the height of a bounce;
+//  - free flight is exact: Bullet's x += h (v + h a) leads the parabola by h^2 a / 2.
+class BulletWorld : public btDiscreteDynamicsWorld {
+ public:
+  using Pair = std::pair<int, int>;  // user indices, smaller first
+
+  using btDiscreteDynamicsWorld::btDiscreteDynamicsWorld;
+
+  static Pair pairOf(const btPersistentManifold& manifold);
+  static bool isDynamic(const btCollisionObject* object);
+
+  // Detects contacts, and forgives `id` the depth it has in others.
+  void forgiveOverlapOf(int id);
+  void forget(int id);
+  void substep(double h);
+
+ private:
+  void solveConstraints(btContactSolverInfo& info) override;
+  void adjust(btManifoldPoint& point, const btPersistentManifold& manifold, double h, double forgiven);
+
+  std::map<Pair, double> forgiven_;  // m
+};
+
+}  // namespace calipso::fem

@@ -1,0 +1,65 @@
+#include "calipso_fem/world/contact_solver.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace calipso::fem {
+namespace {
+
+// One block: the normal part is solved exactly, then the tangential one inside its disk.
+Eigen::Vector3d solveBlock(const Eigen::Matrix3d& W, const Eigen::Vector3d& velocity,
+                           const ContactRow& row) {
+  Eigen::Vector3d p = row.impulse;
+  p[0] = std::max(-row.held_normal, p[0] - velocity[0] / W(0, 0));
+  const Eigen::Vector2d u_t =
+      velocity.tail<2>() + W.block<2, 1>(1, 0) * (p[0] - row.impulse[0]);
+  // The larger eigenvalue of the tangential block makes the step a contraction.
+  const double a = W(1, 1), b = W(1, 2), d = W(2, 2);
+  const double stiffest = 0.5 * (a + d) + std::sqrt(0.25 * (a - d) * (a - d) + b * b);
+  p.tail<2>() -= u_t / stiffest;
+  const double limit = row.friction * (p[0] + row.held_normal) + row.held_tangential;
+  const double length = p.tail<2>().norm();
+  if (length > limit) p.tail<2>() *= limit / length;
+  return p;
+}
+
+}  // namespace
+
+ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRow>& rows,
+                                 int max_iterations, double tolerance) {
+  const int n = static_cast<int>(rows.size());
+  Eigen::VectorXd velocity(3 * n), change(3 * n);
+  for (int i = 0; i < n; ++i) {
+    velocity.segment<3>(3 * i) = rows[i].free_velocity;
+    change.segment<3>(3 * i) = rows[i].impulse - rows[i].start_impulse;
+  }
+  velocity.noalias() += W * change;
+  ContactSolveReport report;
+  report.converged = n == 0;
+  while (!report.converged && report.iterations < max_iterations) {
+    double largest_change = 0.0, largest = 0.0;
+    for (int i = 0; i < n; ++i) {
+      const Eigen::Vector3d p =
+          solveBlock(W.block<3, 3>(3 * i, 3 * i), velocity.segment<3>(3 * i), rows[i]);
+      const Eigen::Vector3d step = p - rows[i].impulse;
+      rows[i].impulse = p;
+      largest_change = std::max(largest_change, step.norm());
+      largest = std::max(largest, p.norm());
+      if (!step.isZero(0.0)) velocity.noalias() += W.middleCols<3>(3 * i) * step;
+    }
+    ++report.iterations;
+    report.residual = largest > 0.0 ? largest_change / largest : 0.0;
+    report.converged = report.residual <= tolerance;
+  }
+  return report;
+}
+
+Eigen::Matrix3d contactFrame(const Eigen::Vector3d& normal) {
+  Eigen::Matrix3d frame;
+  frame.row(0) = normal.transpose();
+  frame.row(1) = normal.unitOrthogonal().transpose();
+  frame.row(2) = normal.cross(frame.row(1).transpose()).transpose();
+  return frame;
+}
+
+}  // namespace calipso::fem

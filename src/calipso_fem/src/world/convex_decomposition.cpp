@@ -1,0 +1,173 @@
+#include "calipso_fem/world/convex_decomposition.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <set>
+
+#include "calipso_fem/voxel_grid.hpp"
+#include "calipso_fem/world/mass_properties.hpp"
+
+namespace calipso::fem {
+namespace {
+
+using Box = Eigen::AlignedBox3d;
+using Points = std::vector<Eigen::Vector3d>;
+
+// The solid behind the surface: how much of it lies in a box, and whether a point is inside.
+class Solid {
+ public:
+  Solid(const TriangleMesh& mesh, int grid) {
+    VoxelizeOptions options;
+    options.cell_size =
+        (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).maxCoeff() / grid;
+    options.separate_branches = false;
+    grid_ = voxelize(mesh, options);
+    for (int c = 0; c < grid_.cellCount(); ++c)
+      if (grid_.fraction[c] > 0.5) inside_.insert(key(grid_.cell_lattice.row(c)));
+  }
+
+  double volumeIn(const Box& box) const {
+    const double h = grid_.cell_size;
+    double cells = 0.0;
+    for (int c = 0; c < grid_.cellCount(); ++c) {
+      const Eigen::Vector3d center =
+          grid_.origin + h * (grid_.cell_lattice.row(c).cast<double>().transpose().array() + 0.5).matrix();
+      if (box.contains(center)) cells += grid_.fraction[c];
+    }
+    return cells * h * h * h;
+  }
+
+  bool contains(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d q = (p - grid_.origin) / grid_.cell_size;
+    return inside_.count(key(q.array().floor().cast<int>().matrix().transpose())) > 0;
+  }
+
+ private:
+  static std::array<int, 3> key(const Eigen::RowVector3i& c) { return {c.x(), c.y(), c.z()}; }
+
+  VoxelGrid grid_;
+  std::set<std::array<int, 3>> inside_;
+};
+
+struct Part {
+  Box box;
+  std::vector<std::array<Eigen::Vector3d, 3>> triangles;  // the surface clipped to the box
+  TriangleMesh hull;
+  double concavity = 0.0;  // m^3
+};
+
+using Triangles = std::vector<std::array<Eigen::Vector3d, 3>>;
+
+// The part of each triangle on the side where sign * (x[axis] - at) <= 0.
+Triangles clip(const Triangles& triangles, int axis, double at, double sign) {
+  Triangles kept;
+  for (const auto& t : triangles) {
+    Points polygon;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d &a = t[k], &b = t[(k + 1) % 3];
+      const double da = sign * (a[axis] - at), db = sign * (b[axis] - at);
+      if (da <= 0.0) polygon.push_back(a);
+      if ((da < 0.0 && db > 0.0) || (da > 0.0 && db < 0.0))
+        polygon.push_back(a + da / (da - db) * (b - a));
+    }
+    for (size_t k = 2; k < polygon.size(); ++k)
+      kept.push_back({polygon[0], polygon[k - 1], polygon[k]});
+  }
+  return kept;
+}
+
+// Hull of the clipped surface and of those box corners that lie inside the solid; empty when flat.
+TriangleMesh hullOf(const Triangles& triangles, const Box& box, const Solid& solid) {
+  Points points;
+  for (const auto& t : triangles) points.insert(points.end(), t.begin(), t.end());
+  for (int c = 0; c < 8; ++c) {
+    const Eigen::Vector3d corner = box.corner(static_cast<Box::CornerType>(c));
+    if (solid.contains(corner)) points.push_back(corner);
+  }
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> rows(points.size(), 3);
+  for (size_t i = 0; i < points.size(); ++i) rows.row(static_cast<Eigen::Index>(i)) = points[i];
+  try {
+    return points.size() < 4 ? TriangleMesh{} : convexHull(rows);
+  } catch (const std::invalid_argument&) {
+    return {};  // a sliver without volume
+  }
+}
+
+double hullVolume(const TriangleMesh& hull) {
+  return hull.triangleCount() ? signedVolume(hull) : 0.0;
+}
+
+struct Cut {
+  int axis = -1;
+  double at = 0.0;
+  double volume = std::numeric_limits<double>::infinity();  // of the two hulls together
+};
+
+Box half(const Box& box, int axis, double at, double sign) {
+  Box b = box;
+  (sign > 0.0 ? b.max() : b.min())[axis] = at;
+  return b;
+}
+
+Cut bestCut(const Part& part, const Solid& solid, int cuts_per_axis) {
+  Cut best;
+  Box extent;
+  for (const auto& t : part.triangles)
+    for (const auto& p : t) extent.extend(p);
+  for (int axis = 0; axis < 3; ++axis)
+    for (int i = 1; i <= cuts_per_axis; ++i) {
+      const double s = i / (cuts_per_axis + 1.0);
+      const double at = (1.0 - s) * extent.min()[axis] + s * extent.max()[axis];
+      double volume = 0.0;
+      for (const double sign : {1.0, -1.0})
+        volume += hullVolume(
+            hullOf(clip(part.triangles, axis, at, sign), half(part.box, axis, at, sign), solid));
+      if (volume < best.volume) best = {axis, at, volume};
+    }
+  return best;
+}
+
+Part makePart(Triangles triangles, const Box& box, const Solid& solid) {
+  Part part{box, std::move(triangles), {}, 0.0};
+  part.hull = hullOf(part.triangles, box, solid);
+  part.concavity = std::max(0.0, hullVolume(part.hull) - solid.volumeIn(box));
+  return part;
+}
+
+}  // namespace
+
+std::vector<TriangleMesh> decomposeConvex(const TriangleMesh& mesh,
+                                          const DecompositionParams& params) {
+  const TriangleMesh whole = convexHull(mesh.vertices);  // also refuses flat meshes
+  Box box;
+  for (int i = 0; i < mesh.vertexCount(); ++i) box.extend(mesh.vertex(i));
+  const Solid solid(mesh, params.grid);
+  const double tolerance = params.concavity * solid.volumeIn(box);
+  if (hullVolume(whole) - solid.volumeIn(box) < 2.0 * tolerance) return {whole};
+
+  Triangles all;
+  for (int f = 0; f < mesh.triangleCount(); ++f)
+    all.push_back({mesh.vertex(mesh.triangles(f, 0)), mesh.vertex(mesh.triangles(f, 1)),
+                   mesh.vertex(mesh.triangles(f, 2))});
+  std::vector<Part> parts = {makePart(std::move(all), box, solid)};
+  while (static_cast<int>(parts.size()) < params.max_hulls) {
+    const auto worst = std::max_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
+      return a.concavity < b.concavity;
+    });
+    if (worst->concavity < tolerance) break;
+    const Part part = std::move(*worst);
+    parts.erase(worst);
+    const Cut cut = bestCut(part, solid, params.cuts_per_axis);
+    for (const double sign : {1.0, -1.0})
+      parts.push_back(makePart(clip(part.triangles, cut.axis, cut.at, sign),
+                               half(part.box, cut.axis, cut.at, sign), solid));
+  }
+  std::vector<TriangleMesh> hulls;
+  for (const Part& part : parts)
+    if (part.hull.triangleCount()) hulls.push_back(part.hull);
+  return hulls;
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,190 @@
+#include "calipso_fem/world/world.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "world_impl.hpp"
+
+namespace calipso::fem {
+namespace {
+
+Material observedMaterial(const WorldObject& object, const ObjectSettings& settings,
+                          const Eigen::Vector3d& gravity) {
+  Material m = defaultMaterial(boundingDiagonal(object.mesh), gravity.norm());
+  m.youngs_modulus = settings.youngs_modulus.value_or(m.youngs_modulus);
+  m.poissons_ratio = settings.poissons_ratio.value_or(m.poissons_ratio);
+  m.density = settings.density.value_or(m.density);
+  m.damping = settings.damping.value_or(m.damping);
+  return m;
+}
+
+double smallestDiagonal(const WorldScene& scene) {
+  double smallest = scene.objects.empty() ? 1.0 : boundingDiagonal(scene.objects.front().mesh);
+  for (const WorldObject& object : scene.objects)
+    smallest = std::min(smallest, boundingDiagonal(object.mesh));
+  return smallest;
+}
+
+ContactParams contactParams(const WorldScene& scene, const WorldParams& params) {
+  ContactParams c;
+  const double size = smallestDiagonal(scene);
+  c.proximity = params.proximity > 0.0 ? params.proximity : 0.02 * size;
+  c.iterations = params.contact_iterations;
+  c.tolerance = params.contact_tolerance;
+  c.allowed_depth = 1e-3 * c.proximity;
+  return c;
+}
+
+void validateScene(const WorldScene& scene) {
+  std::set<std::string> names;
+  for (const WorldObject& object : scene.objects) {
+    if (!names.insert(object.name).second)
+      throw std::invalid_argument("two objects are named '" + object.name +
+                                  "'; every object needs a name of its own");
+    if (object.mesh.triangleCount() == 0)
+      throw std::invalid_argument(object.name + ": its mesh has no triangles");
+    if (!object.mesh.vertices.allFinite() || !object.world_from_object.matrix().allFinite())
+      throw std::invalid_argument(object.name + ": mesh or pose contains a number that is not finite");
+  }
+  if (!scene.gravity.allFinite())
+    throw std::invalid_argument("the scene's gravity is not finite; give m/s^2 in world axes");
+}
+
+}  // namespace
+
+World::Impl::Impl(WorldScene scene_in, WorldParams params_in)
+    : scene(std::move(scene_in)), params(std::move(params_in)), contacts(contactParams(scene, params)) {
+  validate(params);
+  validateScene(scene);
+  for (const SupportMesh& mesh : scene.support_meshes)
+    support_trees.push_back(std::make_unique<SurfaceTree>(mesh.mesh));
+  for (const WorldObject& object : scene.objects) {
+    Actor actor(object);
+    actor.id = static_cast<int>(actors.size());
+    actor.settings = params.settingsOf(object.name);
+    actor.observed_material = actor.material = observedMaterial(object, actor.settings, scene.gravity);
+    actor.gravity = scene.gravity;
+    actors.push_back(std::move(actor));
+  }
+}
+
+World::World(WorldScene scene, WorldParams params)
+    : impl_(std::make_unique<Impl>(std::move(scene), std::move(params))) {}
+World::~World() = default;
+
+double World::time() const { return impl_->now; }
+const WorldScene& World::scene() const { return impl_->scene; }
+
+void World::addObservedMotion(const std::string& object, const ObservedMotion& motion) {
+  Actor* actor = impl_->find(object);
+  if (!actor) {
+    std::string known;
+    for (const std::string& name : impl_->names()) known += (known.empty() ? "" : ", ") + name;
+    throw std::invalid_argument("observed motion of '" + object + "': there is no such object; known: " + known);
+  }
+  actor->track.add(motion);
+}
+
+void World::submit(const Edit& edit) {
+  // A time that is no number cannot be ordered; the edit is refused with the next frame.
+  const auto key = [](const Edit& e) { return std::isfinite(e.time) ? e.time : -1.0; };
+  auto& pending = impl_->pending;
+  pending.insert(std::upper_bound(pending.begin(), pending.end(), edit,
+                                  [&](const Edit& a, const Edit& b) { return key(a) < key(b); }),
+                 edit);
+}
+
+std::vector<EditOutcome> World::advanceTo(double time) {
+  const auto start = std::chrono::steady_clock::now();
+  Impl& w = *impl_;
+  w.substeps = 0;
+  if (w.started && time > w.now) {
+    // Stamps are rounded to nanoseconds; equal steps keep factorisations and compliances valid.
+    const double period = w.params.frame_period;
+    const double frames = (time - w.now) / period;
+    const int whole = std::max(1, static_cast<int>(std::lround(frames)));
+    const bool regular = std::abs(frames - whole) < 1e-3;
+    for (int k = 0; k < whole; ++k) w.stepFrame(regular ? period : (time - w.now) / (whole - k));
+  }
+  if (!w.started || time > w.now - 1e-3 * w.params.frame_period) w.now = time;
+  w.started = true;
+
+  std::vector<EditOutcome> outcomes;
+  while (!w.pending.empty() && !(w.pending.front().time > time + 1e-6)) {
+    const Edit edit = w.pending.front();
+    EditOutcome outcome{edit, time, true, ""};
+    try {
+      outcome.message = w.apply(edit);
+    } catch (const std::exception& error) {
+      outcome.accepted = false;
+      outcome.message = error.what();
+    }
+    w.pending.pop_front();
+    outcomes.push_back(outcome);
+  }
+  w.rememberFirstTouches();
+  w.step_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return outcomes;
+}
+
+void World::Impl::rememberFirstTouches() {
+  shown_contacts = rigid.contacts();
+  const auto& soft = contacts.contacts();
+  shown_contacts.insert(shown_contacts.end(), soft.begin(), soft.end());
+  std::set<std::pair<std::string, std::string>> touching_now;
+  for (ContactPoint& c : shown_contacts) {
+    const auto pair = std::minmax(c.a, c.b);
+    c.first_touch = touching.count(pair) == 0 && touching_now.count(pair) == 0;
+    touching_now.insert(pair);
+  }
+  touching = std::move(touching_now);
+}
+
+ObjectSnapshot World::Impl::snapshot(const Actor& actor) const {
+  ObjectSnapshot s;
+  s.name = actor.object.name;
+  s.index = actor.object.index;
+  s.kind = actor.kind;
+  s.edited = actor.edited;
+  s.removed = actor.removed;
+  s.world_from_object = poseOf(actor, now);
+  if (!actor.edited || actor.removed) return s;
+  s.vertices = verticesOf(actor);
+  if (actor.soft) {
+    s.sleeping = actor.asleep;
+    s.von_mises = actor.soft->body().surfaceVonMises();
+    s.kinetic_energy = actor.soft->body().kineticEnergy();
+    s.elastic_energy = actor.soft->body().elasticEnergy();
+  } else if (actor.kind == ObjectKind::kRigid && actor.body) {
+    s.sleeping = rigid.sleeping(*actor.body);
+    s.kinetic_energy = rigid.kineticEnergy(*actor.body);
+  }
+  return s;
+}
+
+WorldState World::state() const {
+  WorldState state;
+  state.time = impl_->now;
+  for (const Actor& actor : impl_->actors) state.objects.push_back(impl_->snapshot(actor));
+  state.contacts = impl_->shown_contacts;
+  state.step_ms = impl_->step_ms;
+  state.substeps = impl_->substeps;
+  return state;
+}
+
+Actor* World::Impl::find(const std::string& name) {
+  for (Actor& actor : actors)
+    if (actor.object.name == name) return &actor;
+  return nullptr;
+}
+
+std::vector<std::string> World::Impl::names() const {
+  std::vector<std::string> list;
+  for (const Actor& actor : actors) list.push_back(actor.object.name);
+  return list;
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,300 @@
+#include <algorithm>
+#include <cmath>
+
+#include "calipso_fem/world/convex_decomposition.hpp"
+#include "calipso_fem/world/region_selection.hpp"
+#include "obstacle_query.hpp"
+#include "world_impl.hpp"
+
+// How an object of the video becomes a body, and changes from one kind into another.
+namespace calipso::fem {
+namespace {
+
+// Alignment leaves supported objects a little above or inside their support: gaps up to this share
+// of the object's diagonal count as contact.
+constexpr double kSupportGap = 0.02;
+// Surface up to this much (same unit) above the lowest point is what the object stands on.
+constexpr double kContactPatch = 0.01;
+// Sag that changes nothing: of the object's diagonal, and in pixels.
+constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
+
+TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose) {
+  TriangleMesh m = mesh;
+  m.vertices = (mesh.vertices * pose.linear().transpose()).rowwise() + pose.translation().transpose();
+  return m;
+}
+
+double pixelsPerMeter(const Camera& camera, const Eigen::Vector3d& at) {
+  const double depth = (camera.world_from_camera.inverse() * at).z();
+  return depth > 0.0 && camera.fx > 0.0 ? camera.fx / depth : 0.0;
+}
+
+// Smallest gap to any obstacle that pushes against gravity.
+double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obstacles,
+                  const Eigen::Vector3d& gravity, double reach) {
+  double smallest = reach;
+  const Eigen::Vector3d up = gravity.norm() > 0.0 ? Eigen::Vector3d(-gravity.normalized())
+                                                  : Eigen::Vector3d::Zero();
+  const Eigen::AlignedBox3d bounds(surface.vertices.colwise().minCoeff().transpose().array() - reach,
+                                   surface.vertices.colwise().maxCoeff().transpose().array() + reach);
+  for (const Obstacle& obstacle : obstacles) {
+    const Eigen::AlignedBox3d box = obstacleBounds(obstacle);
+    if (!box.isEmpty() && !box.intersects(bounds)) continue;
+    for (int v = 0; v < surface.vertexCount(); ++v) {
+      const Eigen::Vector3d x = surface.vertex(v);
+      const auto hit = queryObstacle(obstacle, x, x, reach, boundingDiagonal(surface));
+      if (hit && hit->normal.dot(up) > 0.3) smallest = std::min(smallest, hit->gap);
+    }
+  }
+  return smallest;
+}
+
+}  // namespace
+
+FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const WorldParams& params,
+                     const ObjectSettings& settings) {
+  FemOptions options = params.fem;
+  options.target_nodes = params.max_nodes;
+  if (settings.cell_size) {
+    options.cell_size = *settings.cell_size;
+    return options;
+  }
+  // Displacements of a third of the size, with an error that falls with the square of the cells:
+  // error = size / 3 (cell / size)^2.
+  const double size = boundingDiagonal(surface);
+  const double pixels = size * pixelsPerMeter(camera, surface.vertices.colwise().mean().transpose());
+  if (pixels <= 0.0) return options;
+  const double cells = std::sqrt(pixels / 3.0 / params.pixel_error);
+  const double cell = size / std::max(4.0, cells);
+  const Eigen::Vector3d extent =
+      (surface.vertices.colwise().maxCoeff() - surface.vertices.colwise().minCoeff()).transpose();
+  // Thin objects need cells no larger than their thickness; what is too many nodes is left to the
+  // search for max_nodes.
+  const double thickness = std::max(std::abs(signedVolume(surface)) / (extent.prod() / extent.minCoeff()),
+                                    1e-3 * size);
+  const double nodes = std::abs(signedVolume(surface)) / std::pow(cell, 3) *
+                       std::pow(1.0 + cell / thickness, 2);
+  if (nodes < params.max_nodes) options.cell_size = cell;
+  return options;
+}
+
+Eigen::Isometry3d World::Impl::poseOf(const Actor& actor, double at) const {
+  if (actor.soft) return actor.soft->motion() * actor.soft_from_object;
+  if (actor.kind == ObjectKind::kRigid && actor.body) return rigid.pose(*actor.body);
+  return actor.placement * actor.track.at(at).world_from_object;
+}
+
+BodyMotion World::Impl::motionOf(const Actor& actor) const {
+  BodyMotion m;
+  m.world_from_object = poseOf(actor, now);
+  if (actor.soft) {
+    const Momentum p = actor.soft->body().momentum();
+    const Eigen::VectorXd& mass = actor.soft->body().model().lumpedMass();
+    Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+    for (int i = 0; i < mass.size(); ++i) {
+      const Eigen::Vector3d r = actor.soft->body().positions().segment<3>(3 * i) - p.center;
+      inertia += mass[i] * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+    }
+    m.linear = p.linear / mass.sum();
+    m.angular = inertia.ldlt().solve(p.angular);
+  } else if (actor.kind == ObjectKind::kRigid && actor.body) {
+    m.linear = rigid.linearVelocity(*actor.body);
+    m.angular = rigid.angularVelocity(*actor.body);
+  } else {
+    const ObservedMotion seen = actor.track.at(now);
+    if (!seen.moving) return m;
+    const Eigen::Vector3d center =
+        seen.world_from_object * massProperties(actor.object.mesh, 1.0).center;
+    m.angular = actor.placement.linear() * seen.angular;
+    m.linear = actor.placement.linear() * (seen.linear + seen.angular.cross(center - seen.centroid));
+  }
+  return m;
+}
+
+decltype(TriangleMesh::vertices) World::Impl::verticesOf(const Actor& actor) const {
+  if (actor.soft) return actor.soft->vertices();
+  return placed(actor.object.mesh, poseOf(actor, now)).vertices;
+}
+
+Eigen::Vector3d World::Impl::centroidOf(const Actor& actor) const {
+  return verticesOf(actor).colwise().mean().transpose();
+}
+
+// What holds the object in the video, and with what buoyancy.
+void World::Impl::findHolder(Actor& actor) {
+  if (actor.holder != Holder::kUnknown) return;
+  actor.buoyancy.setZero();
+  const auto boxes = actor.object.attachments;
+  if (!verticesInBoxes(actor.object.mesh, actor.object.world_from_object, boxes).empty()) {
+    actor.holder = Holder::kAttachment;
+    return;
+  }
+  const TriangleMesh surface = placed(actor.object.mesh, poseOf(actor, now));
+  const double reach = kSupportGap * boundingDiagonal(surface);
+  if (supportGap(surface, obstacles(now, now, &actor), scene.gravity, reach) < reach) {
+    actor.holder = Holder::kSupport;
+    return;
+  }
+  const ObservedMotion seen = actor.track.at(now);
+  const bool falls =
+      seen.moving && seen.acceleration.dot(scene.gravity) > 0.5 * scene.gravity.squaredNorm();
+  actor.holder = falls ? Holder::kNothing : Holder::kBuoyancy;
+  if (!falls) actor.buoyancy = -scene.gravity;
+}
+
+void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reason) {
+  if (kind != ObjectKind::kStatic && !actor.edited) findHolder(actor);
+  // What is attached does not move as a whole.
+  const bool stays = kind == ObjectKind::kRigid && actor.holder == Holder::kAttachment;
+  if (stays) kind = ObjectKind::kKinematic;
+  actor.edited = actor.edited || kind != ObjectKind::kStatic;
+  if (actor.kind == kind) return;
+  const BodyMotion motion = motionOf(actor);
+  const bool as_observed = actor.kind == ObjectKind::kStatic;
+  removeBodies(actor);
+  const Eigen::Isometry3d seen = actor.track.at(now).world_from_object;
+  actor.kind = kind;
+  actor.reason = reason + (stays ? "; its attachments hold it in place" : "");
+  actor.placement = motion.world_from_object * seen.inverse();
+  if (kind == ObjectKind::kRigid) makeRigid(actor, motion);
+  if (kind == ObjectKind::kDeformable) makeSoft(actor, motion, as_observed);
+  if (kind == ObjectKind::kKinematic || kind == ObjectKind::kStatic) addCollider(actor);
+  plan_changed = true;
+}
+
+// The same kind again, from a changed mesh.
+void World::Impl::rebuild(Actor& actor) {
+  const BodyMotion motion = motionOf(actor);
+  removeBodies(actor);
+  actor.hulls.clear();
+  actor.tree.reset();
+  if (actor.kind == ObjectKind::kRigid) makeRigid(actor, motion);
+  if (actor.kind == ObjectKind::kDeformable) makeSoft(actor, motion, false);
+  if (!actor.simulated()) addCollider(actor);
+  plan_changed = true;
+}
+
+const std::vector<TriangleMesh>& World::Impl::hullsOf(Actor& actor) {
+  if (actor.hulls.empty()) actor.hulls = decomposeConvex(actor.object.mesh);
+  return actor.hulls;
+}
+
+void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
+  addColliders();
+  RigidBodySpec spec;
+  spec.name = actor.object.name;
+  spec.shapes = hullsOf(actor);
+  spec.mass = massProperties(actor.object.mesh, actor.material.density);
+  spec.surface = actor.settings.surface;
+  spec.world_from_object = motion.world_from_object;
+  spec.linear = motion.linear;
+  spec.angular = motion.angular;
+  spec.asleep = actor.holder == Holder::kSupport && motion.linear.isZero() && motion.angular.isZero();
+  actor.note = spec.mass.note;
+  actor.body = rigid.add(spec);
+  rigid.setAcceleration(*actor.body, actor.acceleration());
+}
+
+void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) {
+  const TriangleMesh surface = placed(actor.object.mesh, motion.world_from_object);
+  const FemOptions options = chooseFem(surface, scene.camera, params, actor.settings);
+  actor.soft = std::make_unique<SoftObject>(surface, actor.observed_material, options);
+  actor.soft_from_object = motion.world_from_object;
+  DeformableBody& body = actor.soft->body();
+  for (const std::string& message : body.grid().messages) actor.note += message + "; ";
+  const auto attached = verticesInBoxes(actor.object.mesh, actor.object.world_from_object,
+                                        actor.object.attachments);
+  if (!attached.empty() && actor.holder == Holder::kAttachment) {
+    body.fixSurfaceVertices(attached);
+    if (actor.fixed.empty()) actor.fixed.push_back(attached);
+  }
+  for (const auto& region : actor.fixed) body.fixSurfaceVertices(region);
+  actor.soft->setGravity(actor.acceleration());
+  if (settle) {
+    const double size = boundingDiagonal(surface);
+    const auto around = obstacles(now, now, &actor);
+    const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get(), false};
+    std::vector<HoldPoint> hold;
+    std::vector<int> by;
+    if (actor.holder == Holder::kSupport) {
+      const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
+      const double reach = std::max(0.0, gap) + kContactPatch * size;
+      for (const auto& [point, obstacle] : contacts.touching(entry, around, reach)) {
+        hold.push_back(point);
+        by.push_back(obstacle);
+      }
+    }
+    const double px = pixelsPerMeter(scene.camera, surface.vertices.colwise().mean().transpose());
+    const double tolerance = std::min(kSagOfSize * size, px > 0.0 ? kSagPixels / px : kSagOfSize * size);
+    // Buoyancy and free fall leave nothing to balance.
+    if (!hold.empty() || actor.holder == Holder::kAttachment) {
+      const SettleReport report = actor.soft->settle(scene.gravity + actor.buoyancy, hold, tolerance);
+      if (!report.message.empty()) actor.note += report.message + "; ";
+      for (size_t i = 0; i < hold.size(); ++i)
+        contacts.hold(entry, around[by[i]], hold[i], 2.0 * kSupportGap * size);
+    }
+  }
+  body.setMaterial(actor.material);
+  if (!motion.linear.isZero() || !motion.angular.isZero())
+    body.setRigidVelocity(motion.linear, motion.angular);
+  actor.soft->changed();
+  actor.asleep = false;
+  actor.calm_frames = 0;
+}
+
+void World::Impl::removeBodies(Actor& actor) {
+  if (actor.body) rigid.remove(*actor.body);
+  actor.body.reset();
+  actor.soft.reset();
+  contacts.forget(actor.id);
+}
+
+void World::Impl::reset(Actor& actor) {
+  const int id = actor.id;
+  removeBodies(actor);
+  Actor fresh(scene.objects[id]);
+  fresh.id = id;
+  fresh.track = actor.track;
+  fresh.settings = actor.settings;
+  fresh.observed_material = fresh.material = actor.observed_material;
+  fresh.gravity = scene.gravity;
+  actor = std::move(fresh);
+  addCollider(actor);
+  plan_changed = true;
+}
+
+// Bullet gets the supports and the objects at rest with the first rigid body, not before.
+void World::Impl::addColliders() {
+  if (has_colliders) return;
+  has_colliders = true;
+  for (const SupportPlane& plane : scene.planes) supports.push_back(rigid.addPlane(plane, params.support));
+  for (const SupportMesh& mesh : scene.support_meshes) {
+    RigidBodySpec spec;
+    spec.name = mesh.name;
+    spec.shapes = {mesh.mesh};
+    spec.motion = RigidMotion::kStatic;
+    spec.surface = params.support;
+    supports.push_back(rigid.add(spec));
+  }
+  for (Actor& actor : actors) addCollider(actor);
+}
+
+void World::Impl::addCollider(Actor& actor) {
+  if (!has_colliders || actor.removed || actor.body || actor.simulated()) return;
+  RigidBodySpec spec;
+  spec.name = actor.object.name;
+  spec.surface = actor.settings.surface;
+  spec.world_from_object = poseOf(actor, now);
+  const bool moves = !actor.track.empty() || actor.kind == ObjectKind::kKinematic;
+  spec.motion = moves ? RigidMotion::kKinematic : RigidMotion::kStatic;
+  spec.shapes = moves ? hullsOf(actor) : std::vector<TriangleMesh>{actor.object.mesh};
+  actor.body = rigid.add(spec);
+}
+
+void World::Impl::wake(Actor& actor) {
+  actor.asleep = false;
+  actor.calm_frames = 0;
+  if (actor.kind == ObjectKind::kRigid && actor.body) rigid.wake(*actor.body);
+}
+
+}  // namespace calipso::fem

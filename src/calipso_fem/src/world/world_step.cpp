@@ -1,0 +1,205 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "obstacle_query.hpp"
+#include "world_impl.hpp"
+
+// What happens between two frames.
+namespace calipso::fem {
+namespace {
+
+// Rest: slower than this share of the own size per second, for so many frames.
+constexpr double kRestSpeed = 1e-3;
+constexpr int kCalmFrames = 15;
+
+double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+Eigen::AlignedBox3d boxOf(const SoftObject& soft) {
+  return {soft.vertices().colwise().minCoeff().transpose(),
+          soft.vertices().colwise().maxCoeff().transpose()};
+}
+
+
+}  // namespace
+
+std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor* except) {
+  std::vector<Obstacle> list;
+  const int object_count = static_cast<int>(actors.size());
+  int id = object_count;  // supports come after the objects
+  for (const SupportPlane& plane : scene.planes) {
+    Obstacle o;
+    o.id = id++;
+    o.name = plane.name;
+    o.surface = params.support;
+    o.plane = &plane;
+    list.push_back(o);
+  }
+  for (size_t k = 0; k < scene.support_meshes.size(); ++k) {
+    Obstacle o;
+    o.id = id++;
+    o.name = scene.support_meshes[k].name;
+    o.surface = params.support;
+    o.tree = support_trees[k].get();
+    list.push_back(o);
+  }
+  for (Actor& actor : actors) {
+    if (actor.removed || &actor == except) continue;
+    Obstacle o;
+    o.id = actor.id;
+    o.name = actor.object.name;
+    o.surface = actor.settings.surface;
+    if (actor.soft) {
+      o.soft = actor.soft.get();
+      o.tree = &actor.soft->tree();
+    } else {
+      if (!actor.tree) actor.tree = std::make_unique<SurfaceTree>(actor.object.mesh);
+      o.tree = actor.tree.get();
+      o.previous_pose = poseOf(actor, from);
+      o.pose = poseOf(actor, to);
+      if (actor.kind == ObjectKind::kRigid) {
+        o.rigid = actor.body;
+        o.acceleration = rigid.sleeping(*actor.body) ? Eigen::Vector3d::Zero() : actor.acceleration();
+      }
+    }
+    list.push_back(o);
+  }
+  return list;
+}
+
+std::vector<SoftEntry> World::Impl::softEntries() {
+  std::vector<SoftEntry> list;
+  for (Actor& actor : actors)
+    if (actor.soft && !actor.removed && !actor.asleep)
+      list.push_back({actor.id, actor.object.name, actor.settings.surface, actor.soft.get(), false});
+  return list;
+}
+
+// Sub-steps of the deformable objects: eight to a period of the slowest wave through the object,
+// within what the user allows.
+int World::Impl::substepsPerFrame() const {
+  double wanted = 1.0;
+  for (const Actor& actor : actors) {
+    if (!actor.soft || actor.asleep || actor.removed) continue;
+    const double speed = std::sqrt(actor.material.youngs_modulus / actor.material.density);
+    const double frequency = speed / (2.0 * boundingDiagonal(actor.object.mesh));
+    wanted = std::max(wanted, std::ceil(8.0 * frequency * params.frame_period));
+  }
+  return static_cast<int>(std::min<double>(wanted, params.max_substeps));
+}
+
+void World::Impl::stepFrame(double h) {
+  const bool soft = std::any_of(actors.begin(), actors.end(), [](const Actor& a) {
+    return a.soft && !a.removed && !a.asleep;
+  });
+  const int parts = soft ? substepsPerFrame() : 1;
+  for (Actor& actor : actors) actor.soft_ms = 0.0;
+  for (int k = 0; k < parts; ++k) {
+    substep(now, h / parts);
+    now += h / parts;
+  }
+  updateSleep();
+}
+
+void World::Impl::substep(double from, double h) {
+  const double to = from + h;
+  endPulls(from);
+  applyPulls(to);
+  const std::vector<SoftEntry> softs = softEntries();
+  if (!softs.empty()) {
+    const std::vector<Obstacle> around = obstacles(from, to);
+    contacts.pushOn(softs, around, rigid, h);
+    for (Actor& actor : actors) {
+      if (!actor.soft || actor.removed || actor.asleep) continue;
+      const auto start = std::chrono::steady_clock::now();
+      const StepReport report = actor.soft->step(h);
+      if (!report.message.empty()) actor.note = report.message;
+      actor.soft_ms += millisecondsSince(start);
+    }
+    // Trees of deformable objects have moved along.
+    contacts.solve(softs, obstacles(from, to), rigid, h);
+  }
+  for (Actor& actor : actors)
+    if (actor.body && !actor.simulated()) rigid.moveKinematic(*actor.body, poseOf(actor, to));
+  substeps += std::max(rigid.step(h), softs.empty() ? 0 : 1);
+}
+
+void World::Impl::applyPulls(double at) {
+  for (Actor& actor : actors) {
+    if (actor.soft)
+      for (const Pull& pull : actor.pulls) pullSoft(actor, pull, at);
+    if (actor.kind == ObjectKind::kRigid && actor.body) pullRigid(actor, at);
+  }
+}
+
+// Nodes led to a target are prescribed when the pull begins; forces are renewed every step.
+void World::Impl::pullSoft(Actor& actor, const Pull& pull, double at) {
+  if (pull.to_target) return;
+  const Eigen::Vector3d force = pull.share(at) * pull.vector / static_cast<double>(pull.vertices.size());
+  for (const int v : pull.vertices) actor.soft->addForce(SurfacePoint::vertex(v), force);
+}
+
+// On a rigid body a pull acts at its region's centre; a target draws it by a critically damped spring.
+void World::Impl::pullRigid(Actor& actor, double at) {
+  constexpr double kFrequency = 2.0 * M_PI * 4.0;  // rad/s, a quarter of a second to follow
+  Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d center = rigid.center(*actor.body);
+  for (const Pull& pull : actor.pulls) {
+    const Eigen::Vector3d arm = rigid.pose(*actor.body) * pull.anchor - center;
+    Eigen::Vector3d f = pull.share(at) * pull.vector;
+    if (pull.to_target) {
+      const Eigen::Vector3d velocity =
+          rigid.linearVelocity(*actor.body) + rigid.angularVelocity(*actor.body).cross(arm);
+      const Eigen::Matrix3d mass =
+          rigid.compliance(*actor.body, center + arm, center + arm).inverse();
+      f = mass * (kFrequency * kFrequency * (pull.start + f - center - arm) -
+                  2.0 * kFrequency * velocity);
+    }
+    force += f;
+    torque += arm.cross(f);
+  }
+  rigid.setForce(*actor.body, force, torque);
+}
+
+void World::Impl::endPulls(double at) {
+  for (Actor& actor : actors) {
+    for (const Pull& pull : actor.pulls) {
+      if (!pull.over(at) || !actor.soft) continue;
+      for (const int node : pull.nodes) actor.soft->body().releaseNode(node);
+      for (const auto& region : actor.fixed) actor.soft->body().fixSurfaceVertices(region);
+      actor.soft->forgetCompliance();
+    }
+    const auto over = [&](const Pull& pull) { return pull.over(at); };
+    actor.pulls.erase(std::remove_if(actor.pulls.begin(), actor.pulls.end(), over), actor.pulls.end());
+  }
+}
+
+// A deformable object sleeps once it has been still, and wakes when something moving comes near.
+void World::Impl::updateSleep() {
+  for (Actor& actor : actors) {
+    if (!actor.soft || actor.removed) continue;
+    const double size = boundingDiagonal(actor.object.mesh);
+    if (actor.asleep) {
+      Eigen::AlignedBox3d box = boxOf(*actor.soft);
+      box = {box.min().array() - 0.05 * size, box.max().array() + 0.05 * size};
+      for (const Actor& other : actors) {
+        if (&other == &actor || other.removed) continue;
+        const bool moves = other.soft ? !other.asleep && other.calm_frames == 0
+                                      : other.kind == ObjectKind::kRigid && !rigid.sleeping(*other.body);
+        if (!moves) continue;
+        const auto vertices = verticesOf(other);
+        if (box.intersects({vertices.colwise().minCoeff().transpose(),
+                            vertices.colwise().maxCoeff().transpose()}))
+          wake(actor);
+      }
+      continue;
+    }
+    const bool calm = actor.pulls.empty() && actor.soft->body().isAtRest(kRestSpeed * size);
+    actor.calm_frames = calm ? actor.calm_frames + 1 : 0;
+    actor.asleep = actor.calm_frames >= kCalmFrames;
+  }
+}
+
+}  // namespace calipso::fem

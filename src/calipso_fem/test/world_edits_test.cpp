@@ -1,0 +1,155 @@
+#include <gtest/gtest.h>
+
+#include "world_fixtures.hpp"
+
+namespace calipso::fem {
+namespace {
+
+using namespace test;
+
+WorldParams coarse() {
+  WorldParams params;
+  params.max_nodes = 150;
+  return params;
+}
+
+World boxWorld() { return World(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.05}), coarse()); }
+
+std::string refusal(World& world, const Edit& edit) {
+  world.submit(edit);
+  const auto outcomes = world.advanceTo(0.0);
+  EXPECT_EQ(outcomes.size(), 1u);
+  EXPECT_FALSE(outcomes.at(0).accepted);
+  return outcomes.at(0).message;
+}
+
+TEST(WorldEdits, UntouchedObjectIsAsInTheVideo) {
+  World world = boxWorld();
+  world.advanceTo(0.0);
+  play(world, 0.5);
+  const auto state = world.state().objects[0];
+  EXPECT_FALSE(state.edited);
+  EXPECT_EQ(state.kind, ObjectKind::kStatic);
+  EXPECT_EQ(state.vertices.rows(), 0);
+}
+
+TEST(WorldEdits, UnknownObjectIsNamed) {
+  World world = boxWorld();
+  Edit edit = editOf(EditKind::kRemove);
+  edit.object = "teapot";
+  const std::string message = refusal(world, edit);
+  EXPECT_NE(message.find("teapot"), std::string::npos);
+  EXPECT_NE(message.find("thing"), std::string::npos);
+}
+
+TEST(WorldEdits, BadMaterialIsRefusedAndChangesNothing) {
+  World world = boxWorld();
+  Edit edit = editOf(EditKind::kMaterial, EditMode::kFactor);
+  edit.youngs_modulus = -1.0;
+  EXPECT_NE(refusal(world, edit).find("youngs_modulus = -1"), std::string::npos);
+  EXPECT_FALSE(world.state().objects[0].edited);
+}
+
+TEST(WorldEdits, RegionBesideTheObjectIsRefused) {
+  World world = boxWorld();
+  Edit edit = editOf(EditKind::kFix);
+  edit.region.kind = RegionKind::kSphere;
+  edit.region.point = {5, 5, 5};
+  EXPECT_NE(refusal(world, edit).find("enlarge"), std::string::npos);
+}
+
+TEST(WorldEdits, EstimatedVelocityNeedsAnEstimate) {
+  World world = boxWorld();
+  EXPECT_NE(refusal(world, editOf(EditKind::kVelocity, EditMode::kEstimated)).find("absolute"), std::string::npos);
+}
+
+TEST(WorldEdits, ReleaseOfNothingIsRefused) {
+  World world = boxWorld();
+  EXPECT_NE(refusal(world, editOf(EditKind::kRelease)).find("nothing is fixed"), std::string::npos);
+}
+
+TEST(WorldEdits, TransformMovesWithoutPhysics) {
+  World world = boxWorld();
+  Edit edit = editOf(EditKind::kTransform);
+  edit.translation = {0, 0, 0.5};
+  world.submit(edit);
+  world.advanceTo(0.0);
+  play(world, 0.5);
+  const auto state = world.state();
+  EXPECT_EQ(state.objects[0].kind, ObjectKind::kKinematic);
+  EXPECT_NEAR((centerOf(state) - Eigen::Vector3d(0, 0, 0.55)).norm(), 0.0, 1e-12);
+}
+
+TEST(WorldEdits, ScaleKeepsTheCentroid) {
+  World world = boxWorld();
+  Edit edit = editOf(EditKind::kTransform);
+  edit.scale = 2.0;
+  world.submit(edit);
+  world.advanceTo(0.0);
+  const auto vertices = world.state().objects[0].vertices;
+  EXPECT_NEAR((centerOf(world.state()) - Eigen::Vector3d(0, 0, 0.05)).norm(), 0.0, 1e-12);
+  EXPECT_NEAR(vertices.col(0).maxCoeff(), 0.1, 1e-12);
+}
+
+TEST(WorldEdits, RemoveAndReset) {
+  World world = boxWorld();
+  world.submit(editOf(EditKind::kRemove));
+  world.submit(editOf(EditKind::kReset, EditMode::kAbsolute, 0.1));
+  world.advanceTo(0.0);
+  EXPECT_TRUE(world.state().objects[0].removed);
+  play(world, 0.2);
+  EXPECT_FALSE(world.state().objects[0].removed);
+  EXPECT_FALSE(world.state().objects[0].edited);
+}
+
+TEST(WorldEdits, EditsTakeEffectAtTheirTime) {
+  World world = boxWorld();
+  Edit edit = editOf(EditKind::kTransform, EditMode::kAbsolute, 0.11);
+  edit.translation = {0, 0, 0.5};
+  world.submit(edit);
+  EXPECT_TRUE(world.advanceTo(0.0).empty());
+  EXPECT_TRUE(world.advanceTo(0.1).empty());
+  const auto outcomes = world.advanceTo(0.2);
+  ASSERT_EQ(outcomes.size(), 1u);
+  EXPECT_EQ(outcomes[0].time, 0.2);
+}
+
+TEST(WorldEdits, LaterPullMakesTheObjectDeformableFromTheStart) {
+  World world = boxWorld();
+  world.submit(editOf(EditKind::kTransform));
+  Edit pull = editOf(EditKind::kPull, EditMode::kForce, 1.0);
+  pull.vector = {0, 0, 1};
+  world.submit(pull);
+  world.advanceTo(0.0);
+  EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kDeformable);
+}
+
+TEST(WorldEdits, SceneGravityLeavesWhatLiesOnTheTable) {
+  World world = boxWorld();
+  Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);
+  edit.object.clear();
+  edit.factor = 3.0;
+  world.submit(edit);
+  ASSERT_TRUE(world.advanceTo(0.0).at(0).accepted);
+  EXPECT_FALSE(world.state().objects[0].edited);
+}
+
+TEST(WorldEdits, TwoObjectsOfOneNameAreRefused) {
+  WorldScene scene = sceneWith(boxSurface({1, 1, 1}, 1), {0, 0, 1});
+  scene.objects.push_back(scene.objects.front());
+  EXPECT_THROW(World(scene, {}), std::invalid_argument);
+}
+
+TEST(WorldEdits, NegativeFrictionIsRefused) {
+  WorldParams params;
+  params.defaults.surface.friction = -0.1;
+  try {
+    World world(sceneWith(boxSurface({1, 1, 1}, 1), {0, 0, 1}), params);
+    FAIL() << "negative friction was accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("friction = -0.1"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace calipso::fem

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+
+#include "calipso_fem/world/world.hpp"
+
+// Small scenes for the tests of the world.
+namespace calipso::fem::test {
+
+// Axis-aligned box around `center`, each side cut into n x n quads of two triangles.
+TriangleMesh boxSurface(const Eigen::Vector3d& size, int n);
+
+// A sphere by latitude and longitude.
+TriangleMesh sphereSurface(double radius, int rings, int segments);
+
+// Bent rod of the size of a banana, lying in the xy plane, ends up to `size` apart.
+TriangleMesh bentRod(double size, double thickness);
+
+// Scene with one object at `position` and, unless told otherwise, a table at z = 0; the camera looks
+// along +y from 1 m away.
+WorldScene sceneWith(const TriangleMesh& mesh, const Eigen::Vector3d& position, bool table = true);
+
+Edit editOf(EditKind kind, EditMode mode = EditMode::kAbsolute, double time = 0.0);
+
+// Lets `seconds` of video pass at 30 frames per second.
+void play(World& world, double seconds);
+
+Eigen::Vector3d centerOf(const WorldState& state, int object = 0);
+
+}  // namespace calipso::fem::test

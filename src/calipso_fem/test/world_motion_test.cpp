@@ -1,0 +1,148 @@
+#include <gtest/gtest.h>
+
+#include "world_fixtures.hpp"
+
+namespace calipso::fem {
+namespace {
+
+using namespace test;
+
+constexpr double kG = 9.81;
+
+TEST(WorldMotion, FallingRigidBodyFollowsTheParabola) {
+  World world(sceneWith(boxSurface({0.1, 0.2, 0.3}, 1), {0, 0, 10}, false), {});
+  world.addObservedMotion("thing", {0.0, true, Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
+                                    {0, 0, 10}, {1, 0, 2}, {0, 0, 3}, {0, 0, -kG}});
+  world.submit(editOf(EditKind::kVelocity, EditMode::kEstimated));
+  world.advanceTo(0.0);
+  play(world, 1.0);
+  const auto state = world.state().objects[0];
+  EXPECT_EQ(state.kind, ObjectKind::kRigid);
+  // Exact but for the accumulated round-off of about 2000 sub-steps.
+  EXPECT_NEAR((state.world_from_object.translation() - Eigen::Vector3d(1, 0, 12 - 0.5 * kG)).norm(), 0.0, 1e-6);
+}
+
+TEST(WorldMotion, DeformableFlightIsExactToo) {
+  WorldParams params;
+  params.defaults.kind = ObjectKind::kDeformable;
+  params.max_nodes = 200;
+  World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 10}, false), params);
+  world.addObservedMotion("thing", {0.0, true, Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
+                                    {0, 0, 10}, {1, 0, 0}, {0, 0, 0}, {0, 0, -kG}});
+  Edit edit = editOf(EditKind::kVelocity);
+  edit.vector = {1, 0, 2};
+  edit.angular = {0, 3, 0};
+  world.submit(edit);
+  world.advanceTo(0.0);
+  play(world, 0.5);
+  const Eigen::Vector3d expected(0.5, 0, 10 + 1.0 - 0.5 * kG * 0.25);
+  // Newton's tolerance of 1e-4 leaves momentum errors of that order in a step.
+  EXPECT_NEAR((centerOf(world.state()) - expected).norm(), 0.0, 2e-3);
+}
+
+TEST(WorldMotion, AfloatObjectFallsWithWhatGravityGains) {
+  World world(sceneWith(sphereSurface(0.5, 8, 12), {0, 0, 20}, false), {});
+  Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);
+  edit.factor = 4.0;
+  world.submit(edit);
+  world.advanceTo(0.0);
+  const double start = centerOf(world.state()).z();
+  play(world, 1.0);
+  EXPECT_NEAR(centerOf(world.state()).z(), start - 0.5 * 3.0 * kG, 1e-5);
+}
+
+TEST(WorldMotion, UnchangedStiffnessChangesNothing) {
+  World world(sceneWith(bentRod(0.2, 0.04), {0, 0, 0.018}), {});  // 2 mm inside the table
+  Edit edit = editOf(EditKind::kMaterial, EditMode::kFactor);
+  edit.youngs_modulus = 1.0;
+  world.submit(edit);
+  world.advanceTo(0.0);
+  const auto before = world.state().objects[0].vertices;
+  play(world, 1.0);
+  const auto after = world.state().objects[0].vertices;
+  EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kDeformable);
+  EXPECT_LT((after - before).rowwise().norm().maxCoeff(), 1e-4);
+}
+
+TEST(WorldMotion, HundredfoldSofterSagsAndStaysOnTheTable) {
+  WorldParams params;
+  params.max_nodes = 800;
+  World world(sceneWith(bentRod(0.2, 0.04), {0, 0, 0.02}), params);
+  Edit edit = editOf(EditKind::kMaterial, EditMode::kFactor);
+  edit.youngs_modulus = 0.01;
+  world.submit(edit);
+  world.advanceTo(0.0);
+  const double before = world.state().objects[0].vertices.col(2).maxCoeff();
+  play(world, 2.0);
+  const auto after = world.state().objects[0].vertices;
+  EXPECT_LT(after.col(2).maxCoeff(), before - 1e-3);
+  EXPECT_GT(after.col(2).minCoeff(), -1e-3);
+}
+
+TEST(WorldMotion, PulledAndLetGoReturns) {
+  WorldParams params;
+  params.max_nodes = 400;
+  WorldScene scene = sceneWith(boxSurface({0.3, 0.05, 0.05}, 6), {0, 0, 1}, false);
+  scene.objects[0].attachments.push_back({"end", {-0.2, -0.1, 0.9}, {-0.14, 0.1, 1.1}});
+  World world(scene, params);
+  Edit pull = editOf(EditKind::kPull, EditMode::kTarget);
+  pull.region.kind = RegionKind::kSphere;
+  pull.region.point = {0.15, 0, 1};
+  pull.region.radius = 0.05;
+  pull.vector = {0, 0, 0.03};
+  pull.ramp = 0.2;
+  pull.duration = 0.5;
+  world.submit(pull);
+  world.advanceTo(0.0);
+  const auto before = world.state().objects[0].vertices;
+  play(world, 0.4);
+  EXPECT_NEAR((world.state().objects[0].vertices - before).col(2).maxCoeff(), 0.03, 3e-3);
+  play(world, 4.0);
+  // Returned within half a per mille of its length.
+  EXPECT_LT((world.state().objects[0].vertices - before).rowwise().norm().maxCoeff(), 1.5e-4);
+}
+
+TEST(WorldMotion, KindChangeKeepsMomentum) {
+  WorldParams params;
+  params.max_nodes = 300;
+  World world(sceneWith(boxSurface({0.2, 0.1, 0.1}, 4), {0, 0, 5}, false), params);
+  Edit throw_it = editOf(EditKind::kVelocity);
+  throw_it.vector = {1, 2, 0};
+  throw_it.angular = {0, 0, 2};
+  world.submit(throw_it);
+  world.advanceTo(0.0);
+  play(world, 0.5);
+  const Eigen::Vector3d rigid_place = centerOf(world.state());
+  const double rigid_energy = world.state().objects[0].kinetic_energy;
+  Edit soften = editOf(EditKind::kObjectKind, EditMode::kAbsolute, -1.0);
+  soften.object_kind = ObjectKind::kDeformable;
+  world.submit(soften);
+  play(world, 1.0 / 30.0);
+  const auto state = world.state();
+  EXPECT_EQ(state.objects[0].kind, ObjectKind::kDeformable);
+  EXPECT_NEAR((centerOf(state) - rigid_place - Eigen::Vector3d(1, 2, 0) / 30.0).norm(), 0.0, 1e-5);
+  // Mass on nodes differs from mass in the solid by the filled fractions: energy to 5 %.
+  EXPECT_NEAR(state.objects[0].kinetic_energy, rigid_energy, 0.05 * rigid_energy);
+}
+
+TEST(WorldMotion, SameInputSameResult) {
+  const auto run = [] {
+    World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 2), {0, 0, 0.4}), {});
+    Edit edit = editOf(EditKind::kVelocity);
+    edit.vector = {0.3, 0.1, 0};
+    edit.angular = {1, 2, 3};
+    world.submit(edit);
+    world.submit([] {
+      Edit heavy = editOf(EditKind::kGravity);
+      heavy.vector = {0, 0, -20.0};
+      return heavy;
+    }());
+    world.advanceTo(0.0);
+    play(world, 1.0);
+    return world.state().objects[0].vertices;
+  };
+  EXPECT_EQ((run() - run()).cwiseAbs().maxCoeff(), 0.0);
+}
+
+}  // namespace
+}  // namespace calipso::fem

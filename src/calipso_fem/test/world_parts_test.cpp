@@ -1,0 +1,153 @@
+#include <gtest/gtest.h>
+
+#include "calipso_fem/world/contact_solver.hpp"
+#include "calipso_fem/world/convex_decomposition.hpp"
+#include "calipso_fem/world/mass_properties.hpp"
+#include "calipso_fem/world/region_selection.hpp"
+#include "calipso_fem/world/surface_tree.hpp"
+#include "world_fixtures.hpp"
+
+namespace calipso::fem {
+namespace {
+
+using test::boxSurface;
+using test::sceneWith;
+using test::sphereSurface;
+
+TEST(MassProperties, OfABoxAreExact) {
+  const Eigen::Vector3d size(1.0, 2.0, 3.0);
+  const MassProperties m = massProperties(boxSurface(size, 2), 500.0);
+  EXPECT_NEAR(m.mass, 3000.0, 1e-9);
+  EXPECT_NEAR(m.center.norm(), 0.0, 1e-12);
+  EXPECT_NEAR(m.inertia(0, 0), m.mass * (4.0 + 9.0) / 12.0, 1e-9);
+  EXPECT_NEAR(m.inertia(2, 2), m.mass * (1.0 + 4.0) / 12.0, 1e-9);
+  EXPECT_TRUE(m.note.empty());
+}
+
+TEST(MassProperties, InsideOutMeshIsTurned) {
+  TriangleMesh box = boxSurface({1, 1, 1}, 1);
+  box.triangles.col(1).swap(box.triangles.col(2));
+  const MassProperties m = massProperties(box, 1000.0);
+  EXPECT_NEAR(m.mass, 1000.0, 1e-9);
+  EXPECT_FALSE(m.note.empty());
+}
+
+TEST(MassProperties, OpenMeshUsesItsHullAndSaysSo) {
+  TriangleMesh box = boxSurface({1, 1, 1}, 1);
+  box.triangles.conservativeResize(10, 3);
+  const MassProperties m = massProperties(box, 1000.0);
+  EXPECT_NEAR(m.mass, 1000.0, 1e-6);
+  EXPECT_NE(m.note.find("hull"), std::string::npos);
+}
+
+TEST(MassProperties, RefusesFlatMeshAndBadDensity) {
+  TriangleMesh flat = boxSurface({1, 1, 1}, 1);
+  flat.vertices.col(2).setZero();
+  EXPECT_THROW(massProperties(flat, 1000.0), std::invalid_argument);
+  EXPECT_THROW(massProperties(boxSurface({1, 1, 1}, 1), 0.0), std::invalid_argument);
+}
+
+double totalVolume(const std::vector<TriangleMesh>& hulls) {
+  double sum = 0.0;
+  for (const TriangleMesh& hull : hulls) sum += signedVolume(hull);
+  return sum;
+}
+
+// Two boxes joined to an L: the hull of the whole is a quarter too large.
+TriangleMesh bracket() {
+  TriangleMesh a = boxSurface({0.4, 0.1, 0.1}, 4), b = boxSurface({0.1, 0.1, 0.4}, 4);
+  b.vertices.rowwise() += Eigen::RowVector3d(-0.15, 0.0, 0.15);
+  TriangleMesh both;
+  both.vertices.resize(a.vertexCount() + b.vertexCount(), 3);
+  both.vertices << a.vertices, b.vertices;
+  both.triangles.resize(a.triangleCount() + b.triangleCount(), 3);
+  both.triangles << a.triangles, (b.triangles.array() + a.vertexCount()).matrix();
+  return both;
+}
+
+TEST(ConvexDecomposition, ConvexShapeIsOneHull) {
+  EXPECT_EQ(decomposeConvex(boxSurface({1, 2, 3}, 3)).size(), 1u);
+}
+
+TEST(ConvexDecomposition, PartsOfABracketFillLittleMoreThanIt) {
+  const auto hulls = decomposeConvex(bracket());
+  EXPECT_GE(hulls.size(), 2u);
+  const double solid = 0.1 * 0.1 * 0.7;  // the boxes share a cube
+  // Concavity tolerance 2 % plus the resolution of the volume grid.
+  EXPECT_NEAR(totalVolume(hulls), solid, 0.06 * solid);
+}
+
+TEST(SurfaceTree, SignedDistanceToABox) {
+  const SurfaceTree tree(boxSurface({2, 2, 2}, 3));
+  EXPECT_NEAR(tree.nearest({0, 0, 1.5}, 1.0)->distance, 0.5, 1e-12);
+  EXPECT_NEAR(tree.nearest({0.9, 0.1, 0}, 1.0)->distance, -0.1, 1e-12);
+  EXPECT_NEAR(tree.nearest({2, 2, 2}, 5.0)->distance, std::sqrt(3.0), 1e-12);
+  EXPECT_FALSE(tree.nearest({0, 0, 3}, 1.0));
+}
+
+TEST(SurfaceTree, FastPointIsCaught) {
+  TriangleMesh plate = boxSurface({2, 2, 0.001}, 2);
+  const auto hit = SurfaceTree(plate).firstEntry({0.1, 0.2, 1.0}, {0.1, 0.2, -1.0});
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->distance, -1.0005, 1e-9);
+  EXPECT_NEAR(hit->normal.z(), 1.0, 1e-12);
+}
+
+TEST(SurfaceTree, RefitFollowsTheVertices) {
+  SurfaceTree tree(boxSurface({2, 2, 2}, 2));
+  auto moved = tree.mesh().vertices;
+  moved.rowwise() += Eigen::RowVector3d(0, 0, 5);
+  tree.refit(moved);
+  EXPECT_NEAR(tree.nearest({0, 0, 6.25}, 1.0)->distance, 0.25, 1e-12);
+}
+
+TEST(ContactSolver, PointMassStopsAndSlidesAsCoulombSays) {
+  const double mass = 2.0;
+  std::vector<ContactRow> rows(1);
+  rows[0].free_velocity = {-1.0, 1.0, 0.0};
+  rows[0].friction = 0.3;
+  const auto report = solveContacts(Eigen::Matrix3d::Identity() / mass, rows, 50, 1e-12);
+  EXPECT_TRUE(report.converged);
+  EXPECT_NEAR(rows[0].impulse[0], mass, 1e-9);
+  EXPECT_NEAR(rows[0].impulse[1], -0.3 * mass, 1e-9);
+}
+
+TEST(ContactSolver, SeparatingContactGivesNoImpulse) {
+  std::vector<ContactRow> rows(1);
+  rows[0].free_velocity = {0.5, 1.0, 0.0};
+  rows[0].friction = 1.0;
+  rows[0].start_impulse = rows[0].impulse = {0.2, 0.0, 0.0};
+  solveContacts(Eigen::Matrix3d::Identity(), rows, 50, 1e-12);
+  EXPECT_EQ(rows[0].impulse.norm(), 0.0);
+}
+
+TEST(RegionSelection, PixelChoosesTheVisibleSide) {
+  const WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 4), {0, 0, 0.1});
+  Region region;
+  region.kind = RegionKind::kPixel;
+  region.pixel = {319.5, 239.5};  // the middle of the face towards the camera, at y = -0.1
+  region.radius = 0.06;
+  for (const int v : selectVertices(scene, 0, region))
+    EXPECT_NEAR(scene.objects[0].mesh.vertex(v).y(), -0.1, 1e-12);
+}
+
+TEST(RegionSelection, SaysWhatThePixelShows) {
+  const WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 4), {0, 0, 0.1});
+  Region region;
+  region.kind = RegionKind::kPixel;
+  region.pixel = {1, 1};
+  try {
+    selectVertices(scene, 0, region);
+    FAIL() << "a pixel beside the object was accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("shows no object"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace calipso::fem
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}
