@@ -77,7 +77,6 @@ Points smoothed(const Points& points, const std::vector<double>& weights, double
   return result;
 }
 
-const std::array<double,256> lin=[]{std::array<double,256> t;for(int i=0;i<256;++i){double x=i/255.;t[i]=255*(x<=0.04045?x/12.92:std::pow((x+0.055)/1.055,2.4));}return t;}();
 Vector3d colourAt(const cv::Mat& image, const Vector2d& p) {
   const double u = std::clamp(p.x(), 0.0, image.cols - 1.001);
   const double v = std::clamp(p.y(), 0.0, image.rows - 1.001);
@@ -86,7 +85,7 @@ Vector3d colourAt(const cv::Mat& image, const Vector2d& p) {
   const auto at = [&](int dx, int dy) {
     const cv::Vec3b& c = image.at<cv::Vec3b>(std::min(y + dy, image.rows - 1),
                                              std::min(x + dx, image.cols - 1));
-    return Vector3d(lin[c[0]], lin[c[1]], lin[c[2]]);
+    return Vector3d(c[0], c[1], c[2]);
   };
   return (1 - b) * ((1 - a) * at(0, 0) + a * at(1, 0)) + b * ((1 - a) * at(0, 1) + a * at(1, 1));
 }
@@ -128,7 +127,7 @@ struct Fall {
 };
 
 Fall steepestFall(const std::vector<double>& alpha, double first_s, double max_offset) {
-  constexpr int kReach = 2;  // samples on both sides: 1.25 px, the width of a sharp edge's blur
+  constexpr int kReach = 3;  // samples on both sides: 1.75 px, the width of a sharp edge's blur
   const int n = static_cast<int>(alpha.size()) - 1;
   Fall best;
   for (int k = kReach; k < n - kReach; ++k) {

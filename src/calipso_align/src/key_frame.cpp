@@ -5,6 +5,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "calipso_align/silhouette.hpp"
+#include "calipso_scene/triangle_mesh.hpp"
+
 namespace calipso::align {
 namespace {
 
@@ -27,12 +30,27 @@ std::string framePath(const Scene& scene, int frame) {
 
 }  // namespace
 
+cv::Mat placedSilhouette(const Scene& scene, const SceneObject& object) {
+  Camera camera = scene.camera;
+  const int margin_u = camera.width / 4, margin_v = camera.height / 4;
+  camera.width += 2 * margin_u;
+  camera.height += 2 * margin_v;
+  camera.cx += margin_u;
+  camera.cy += margin_v;
+  const TriangleMesh mesh = loadMesh(object.cad_path);
+  const Eigen::Isometry3d camera_from_object =
+      camera.world_from_camera.inverse() * object.initial_world_from_object;
+  const Points x = (mesh.vertices * camera_from_object.linear().transpose()).rowwise() +
+                   camera_from_object.translation().transpose();
+  return maskOf(renderDepth(x, mesh.triangles, camera), camera);
+}
+
 std::vector<SegmentationTarget> segmentationTargets(const Scene& scene) {
   std::vector<SegmentationTarget> targets;
-  for (const SceneObject& object : scene.objects)
-    targets.push_back({object.name, object.index,
-                       cv::Rect(object.rect[0], object.rect[1], object.rect[2], object.rect[3]),
-                       {}});
+  for (const SceneObject& object : scene.objects) {
+    const cv::Rect rect(object.rect[0], object.rect[1], object.rect[2], object.rect[3]);
+    targets.push_back({object.name, object.index, rect, {}, placedSilhouette(scene, object)});
+  }
   return targets;
 }
 

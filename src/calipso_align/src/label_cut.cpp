@@ -41,8 +41,9 @@ class ExpansionMove {
   bool run(int alpha, cv::Mat& labels) {
     const int nodes = numberNodes(alpha, labels);
     if (nodes == 0) return false;
-    cv::detail::GCGraph<float> graph(nodes, 8 * nodes);
-    for (int i = 0; i < nodes; ++i) graph.addVtx();
+    cv::detail::GCGraph<float> graph(nodes + 2, 8 * nodes + 2);
+    for (int i = 0; i < nodes + 2; ++i) graph.addVtx();
+    graph.addEdges(nodes, nodes + 1, 0.0f, 0.0f);  // GCGraph refuses a graph without any arc
     for (int y = 0; y < free_.rows; ++y)
       for (int x = 0; x < free_.cols; ++x) addPixel(x, y, alpha, labels, graph);
     graph.maxFlow();

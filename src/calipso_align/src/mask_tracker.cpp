@@ -26,6 +26,10 @@ cv::Mat grown(const cv::Mat& mask, int px) {
   return result;
 }
 
+cv::Rect grown(const cv::Rect& rect, int px) {
+  return {rect.x - px, rect.y - px, rect.width + 2 * px, rect.height + 2 * px};
+}
+
 std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {
   const int total = cv::countNonZero(mask);
   const int step = std::max<int>(1, total / static_cast<int>(kMaxSamples));
@@ -38,10 +42,8 @@ std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {
 }
 
 cv::Rect around(const cv::Mat& mask, int margin) {
-  cv::Rect box = cv::boundingRect(mask);
-  box -= cv::Point(margin, margin);
-  box += cv::Size(2 * margin, 2 * margin);
-  return box & cv::Rect(cv::Point(), mask.size());
+  const cv::Rect box = cv::boundingRect(mask);
+  return box.empty() ? box : grown(box, margin) & cv::Rect(cv::Point(), mask.size());
 }
 
 // Signed distance from the outline of a mask, px; negative inside.
@@ -60,13 +62,14 @@ MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerPar
       flow_(cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_FAST)) {
   checkInput(image, labels);
   cv::cvtColor(image, previous_grey_, cv::COLOR_BGR2GRAY);
+  previous_means_ = blockMeans(image);
   std::set<int> found(labels.begin<uchar>(), labels.end<uchar>());
   found.erase(0);
   for (const int label : found) {
     Object object;
     object.label = label;
     object.mask = labels == label;
-    object.reference_mean = blockMeans(image);
+    object.reference_mean = previous_means_;
     object.key_area = cv::countNonZero(object.mask);
     object.colours = ColourModel::fit(coloursUnder(image, object.mask), params_.components);
     objects_.push_back(std::move(object));
@@ -90,23 +93,29 @@ void MaskTracker::checkInput(const cv::Mat& image, const cv::Mat& labels) const 
 TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
   checkInput(image, prior);
   const cv::Mat means = blockMeans(image);
-  cv::Mat grey, flow;
+  cv::Mat grey;
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  TrackedMask result{cv::Mat::zeros(size_, CV_8U), 1.0f, 0};
-  for (Object& object : objects_) {
-    if (!isStill(object, means)) {
-      if (flow.empty()) flow = backwardFlow(grey);
-      cv::Mat predicted = predict(object, flow);
-      if (!prior.empty() && cv::countNonZero(prior == object.label) > 0)
-        predicted = prior == object.label;
-      follow(object, image, predicted);
-      object.reference_mean = means;
-      ++result.moved;
-    }
+  std::vector<Object*> moving;
+  for (Object& object : objects_)
+    if (!isStill(object, means)) moving.push_back(&object);
+
+  const cv::Mat flow = moving.empty() ? cv::Mat() : backwardFlow(grey, means, moving);
+  for (Object* object : moving) {
+    const bool told = !prior.empty() && cv::countNonZero(prior == object->label) > 0;
+    follow(*object, image, told ? cv::Mat(prior == object->label) : predict(*object, flow));
+    object->reference_mean = means;
+  }
+  previous_grey_ = grey;
+  previous_means_ = means;
+  return combine(static_cast<int>(moving.size()));
+}
+
+TrackedMask MaskTracker::combine(int moved) const {
+  TrackedMask result{cv::Mat::zeros(size_, CV_8U), 1.0f, moved};
+  for (const Object& object : objects_) {
     result.labels.setTo(object.label, object.mask);
     result.confidence = std::min(result.confidence, object.confidence);
   }
-  previous_grey_ = grey;
   return result;
 }
 
@@ -134,8 +143,33 @@ bool MaskTracker::isStill(const Object& object, const cv::Mat& means) const {
   return cv::countNonZero(changed) <= params_.still_share * counted;
 }
 
-cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey) const {
-  cv::Mat flow;
+// Translation of an object since the previous frame: best match of its pixels on a coarse picture.
+cv::Point MaskTracker::coarseShift(const Object& object, const cv::Mat& means) const {
+  const cv::Rect box = cv::boundingRect(object.mask);
+  if (box.empty()) return {};
+  const cv::Rect cells = cv::Rect(box.tl() / kMeanSize, box.size() / kMeanSize) &
+                         cv::Rect(cv::Point(), means.size());
+  if (cells.width < 2 || cells.height < 2) return {};
+  const int reach = params_.search_px / kMeanSize;
+  const cv::Rect search = grown(cells, reach) & cv::Rect(cv::Point(), means.size());
+  cv::Mat weight, score;
+  cv::resize(object.mask, weight, means.size(), 0, 0, cv::INTER_AREA);
+  cv::matchTemplate(means(search), previous_means_(cells), score, cv::TM_SQDIFF, weight(cells));
+  cv::Point best;
+  cv::minMaxLoc(score, nullptr, nullptr, &best);
+  return (search.tl() + best - cells.tl()) * kMeanSize;
+}
+
+// Backward flow, current to previous frame, started from the moving objects' coarse shifts.
+cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey, const cv::Mat& means,
+                                  const std::vector<Object*>& moving) const {
+  cv::Mat flow = cv::Mat::zeros(size_, CV_32FC2);
+  for (const Object* object : moving) {
+    const cv::Point shift = coarseShift(*object, means);
+    const cv::Rect whole(cv::Point(), size_);
+    const cv::Rect target = (cv::boundingRect(object->mask) + shift) & whole;
+    if (!target.empty()) flow(target).setTo(cv::Scalar(-shift.x, -shift.y));
+  }
   flow_->calc(grey, previous_grey_, flow);
   return flow;
 }

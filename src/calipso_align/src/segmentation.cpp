@@ -4,7 +4,12 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <set>
+#include <opencv2/imgcodecs.hpp>
+#include <cstdio>
 #include <stdexcept>
+
+#include "calipso_align/local_colour.hpp"
+#include "calipso_align/shape_prior.hpp"
 
 namespace calipso::align {
 
@@ -14,6 +19,7 @@ struct Segmenter::Level {
   std::vector<cv::Mat> allowed;  // CV_8U per target
   cv::Mat free;                  // CV_8U
   cv::Mat labels;                // CV_8U, target numbers (0 background)
+  std::vector<cv::Mat> odds;     // CV_32F per target, nats for the object by its shape; or empty
 };
 
 namespace {
@@ -44,6 +50,12 @@ void checkTarget(const SegmentationTarget& t, const cv::Size& size, std::set<int
                                 " " + std::to_string(t.rect.height) +
                                 " does not meet the picture of " + std::to_string(size.width) +
                                 "x" + std::to_string(size.height) + "; correct it");
+}
+
+[[noreturn]] void failWithoutForeground(const SegmentationTarget& t) {
+  throw std::invalid_argument("object '" + t.name +
+                              "': the rectangle and strokes leave no foreground; draw a stroke on "
+                              "the object, or enlarge its rectangle");
 }
 
 cv::Mat allowedRegion(const SegmentationTarget& t, cv::Size size) {
@@ -99,10 +111,7 @@ void Segmenter::checkStrokes(const cv::Mat& strokes) const {
 
 void Segmenter::checkResult() const {
   for (const SegmentationTarget& t : targets_)
-    if (cv::countNonZero(labels_ == t.label) == 0)
-      throw std::invalid_argument("object '" + t.name +
-                                  "': the rectangle and strokes leave no foreground; draw a stroke "
-                                  "on the object, or enlarge its rectangle");
+    if (cv::countNonZero(labels_ == t.label) == 0) failWithoutForeground(t);
 }
 
 Segmenter::Level Segmenter::makeLevel(const cv::Mat& strokes, double scale) const {
@@ -138,11 +147,18 @@ void Segmenter::initialiseModels(const Level& level) {
   cv::dilate(any, near, cv::Mat::ones(2 * r + 1, 2 * r + 1, CV_8U));
   bg &= near;
   bg |= level.seeds == 1;
-  models_.push_back(ColourModel::fit(sample(level.image, bg), params_.components));
+  const std::vector<cv::Vec3f> surroundings = sample(level.image, bg);
+  if (surroundings.empty())
+    throw std::invalid_argument(
+        "segmentation: rectangles and strokes leave no background to learn from; draw smaller "
+        "rectangles or a background stroke");
+  models_.push_back(ColourModel::fit(surroundings, params_.components));
   for (size_t k = 0; k < targets_.size(); ++k) {
     cv::Mat fg = level.seeds == int(k + 2);
     if (cv::countNonZero(fg) < 20) fg = level.allowed[k] & (level.seeds == 0);
-    models_.push_back(ColourModel::fit(sample(level.image, fg), params_.components));
+    const std::vector<cv::Vec3f> colours = sample(level.image, fg);
+    if (colours.empty()) failWithoutForeground(targets_[k]);
+    models_.push_back(ColourModel::fit(colours, params_.components));
   }
 }
 
@@ -169,9 +185,58 @@ std::vector<cv::Mat> Segmenter::costs(const Level& level) const {
     for (int y = 0; y < c.rows; ++y)
       for (int x = 0; x < c.cols; ++x)
         c.at<float>(y, x) = a.at<uchar>(y, x) ? std::min(params_.outlier_cost, models_[k].cost(cv::Vec3f(level.image.at<cv::Vec3b>(y, x)))) : kForbidden;
+    if (k > 0 && !level.odds.empty() && !level.odds[k - 1].empty()) c -= level.odds[k - 1];
     out.push_back(c);
   }
   return out;
+}
+
+// What the colours say for one object against everything else, nats per pixel.
+cv::Mat Segmenter::evidence(const Level& level, size_t k, const std::vector<cv::Mat>& cost) const {
+  constexpr double kMaxEvidence = 6.0;
+  cv::Mat result = cost[0] - cost[k + 1];
+  for (size_t j = 0; j < targets_.size(); ++j)
+    if (j != k) result = cv::min(result, cv::max(cost[j + 1] - cost[k + 1], 0));
+  const cv::Mat own = level.seeds == static_cast<int>(k + 2);
+  result.setTo(-kMaxEvidence, (level.allowed[k] == 0) | (level.seeds != 0));
+  result.setTo(kMaxEvidence, own);
+  return cv::min(cv::max(result, -kMaxEvidence), kMaxEvidence);
+}
+
+void Segmenter::placeSilhouettes(const Level& coarse) {
+  const double factor = static_cast<double>(image_.cols) / coarse.image.cols;
+  const std::vector<cv::Mat> cost = costs(coarse);
+  shapes_.resize(targets_.size());
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    const cv::Mat& full = targets_[k].silhouette;
+    if (full.empty() || cv::countNonZero(full) == 0) continue;
+    cv::Mat silhouette;
+    cv::resize(full, silhouette, cv::Size(), 1.0 / factor, 1.0 / factor, cv::INTER_AREA);
+    const cv::Matx23d start(1, 0, -0.5 * (full.cols - image_.cols), 0, 1,
+                            -0.5 * (full.rows - image_.rows));
+    PlacedShape shape =
+        placeSilhouette(silhouette, evidence(coarse, k, cost), scaled(start, 1.0 / factor));
+    shape.map = scaled(shape.map, factor);
+    shapes_[k] = shape;
+  }
+}
+
+void Segmenter::addShapeOdds(Level& level) const {
+  constexpr double kNoAgreement = 0.5, kFullAgreement = 0.8;
+  const double factor = static_cast<double>(level.image.cols) / image_.cols;
+  level.odds.assign(targets_.size(), cv::Mat());
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    if (shapes_.empty() || !shapes_[k]) continue;
+    const double trust = std::clamp(
+        (shapes_[k]->agreement - kNoAgreement) / (kFullAgreement - kNoAgreement), 0.0, 1.0);
+    cv::Mat placed, resized;
+    cv::warpAffine(targets_[k].silhouette, placed, shapes_[k]->map, image_.size());
+    cv::resize(placed, resized, level.image.size(), 0, 0, cv::INTER_AREA);
+    level.odds[k] = shapeOdds(resized > 127, static_cast<float>(trust * params_.shape_weight),
+                              static_cast<float>(params_.shape_tolerance * level.image.cols));
+    (void)factor;
+    if (getenv("PR")) { printf("agree %.2f ", shapes_[k]->agreement); cv::imwrite(("/tmp/seg/sil_"+targets_[k].name+".png"), resized); }
+  }
 }
 
 const cv::Mat& Segmenter::segment(const cv::Mat& strokes) {
@@ -182,14 +247,38 @@ const cv::Mat& Segmenter::segment(const cv::Mat& strokes) {
   for (int r = 0; r < params_.rounds; ++r) {
     if (r > 0) refitModels(coarse);
     cutLabels(coarse.image, coarse.free, costs(coarse), params_.smoothness, coarse.labels);
+    if (r < 2) {
+      refitModels(coarse);
+      coarse.odds.clear();
+      placeSilhouettes(coarse);
+      addShapeOdds(coarse);
+    }
   }
   Level fine = makeLevel(strokes, 1.0);
+  addShapeOdds(fine);
   refitModels(coarse);
   cv::Mat up;
   cv::resize(coarse.labels, up, image_.size(), 0, 0, cv::INTER_NEAREST);
   up.copyTo(fine.labels, fine.free);
   cv::Mat band = fine.free.clone();
-  cutLabels(fine.image, band, costs(fine), params_.smoothness, fine.labels);
+  auto ev=[](const char*n,double d){const char*q=getenv(n);return q?atof(q):d;};
+  int passes=ev("LP",2), cell=ev("CELL",16), lc=ev("LC",2); double mix=ev("MIX",0.5); SmoothnessParams sp=params_.smoothness; sp.gamma=ev("FG",sp.gamma);
+  std::vector<cv::Mat> global = costs(fine);
+  if(ev("FIRST",1)) cutLabels(fine.image, band, global, params_.smoothness, fine.labels);
+  for (int pass = 0; pass < passes; ++pass) {
+    std::vector<cv::Mat> c2;
+    for (size_t k = 0; k <= targets_.size(); ++k) {
+      LocalColourModel local(fine.image, fine.labels == int(k), cell, lc, models_[k]);
+      cv::Mat c = global[k].clone();
+      for (int y = 0; y < c.rows; ++y) for (int x = 0; x < c.cols; ++x) if (band.at<uchar>(y, x) && c.at<float>(y,x) < kForbidden/2) {
+        cv::Vec3f col = fine.image.at<cv::Vec3b>(y, x);
+        float odds = k > 0 && !fine.odds[k-1].empty() ? fine.odds[k-1].at<float>(y, x) : 0.f;
+        c.at<float>(y, x) = (1-mix)*c.at<float>(y,x) + mix*(std::min(params_.outlier_cost, local.cost(col, x, y)) - odds);
+      }
+      c2.push_back(c);
+    }
+    cutLabels(fine.image, band, c2, sp, fine.labels);
+  }
   labels_ = cv::Mat::zeros(image_.size(), CV_8U);
   for (size_t k = 0; k < targets_.size(); ++k) labels_.setTo(targets_[k].label, fine.labels == int(k + 1));
   checkResult();

@@ -28,7 +28,7 @@ struct ContourParams {
   double occluder_px = 2.0;       // an edge this close to another object is unknown
   double window_px = 5.0;         // half length of the colour profile across the edge
   double smoothing_px = 4.0;      // half width of the moving least squares fit along the edge
-  double max_offset_px = 1.0;     // a refinement that moves the edge further is not believed
+  double max_offset_px = 0.7;     // a refinement that moves the edge further is not believed
   double min_contrast = 12.0;     // grey levels; weaker edges are left where the mask has them
 };
 

@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "calipso_align/contour_loop.hpp"
+#include "calipso_align/contour.hpp"
 
 namespace calipso::align {
 

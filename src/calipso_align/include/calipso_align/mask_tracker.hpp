@@ -14,7 +14,8 @@ struct TrackerParams {
   int components = 5;              // Gaussians per colour model
   int margin_px = 40;              // surroundings of an object that are looked at
   int band_px = 5;                 // the outline is looked for this close to where the flow puts it
-  float still_levels = 3.0f;       // grey levels; what changes less than this (4 x 4 px mean) is still
+  int search_px = 96;              // how far an object can go from one frame to the next
+  float still_levels = 5.0f;       // grey levels; what changes less than this (4 x 4 px mean) is still
   float still_share = 0.002f;      // ... in all but this share of the object and its rim
   float prior_cost = 1.0f;         // nats per pixel of distance from the predicted outline
   float outlier_cost = 18.0f;      // nats; cost of a colour that a model does not know
@@ -52,16 +53,19 @@ class MaskTracker {
   };
 
   bool isStill(const Object& object, const cv::Mat& means) const;
-  cv::Mat backwardFlow(const cv::Mat& grey) const;
+  cv::Point coarseShift(const Object& object, const cv::Mat& means) const;
+  cv::Mat backwardFlow(const cv::Mat& grey, const cv::Mat& means,
+                       const std::vector<Object*>& moving) const;
   cv::Mat predict(const Object& object, const cv::Mat& flow) const;
   void follow(Object& object, const cv::Mat& image, const cv::Mat& predicted);
+  TrackedMask combine(int moved) const;
   void settle(Object& object, const cv::Mat& image, const cv::Mat& predicted, const cv::Rect& roi);
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
 
   TrackerParams params_;
   cv::Size size_;
   std::vector<Object> objects_;
-  cv::Mat previous_grey_;
+  cv::Mat previous_grey_, previous_means_;
   cv::Ptr<cv::DISOpticalFlow> flow_;
 };
 

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calipso_align/colour_model.hpp"
 #include "calipso_align/label_cut.hpp"
+#include "calipso_align/shape_prior.hpp"
 
 namespace calipso::align {
 
@@ -18,6 +20,8 @@ struct SegmentationTarget {
   int label = 0;                 // 1..254, distinct
   cv::Rect rect;                 // px; empty: anywhere
   std::vector<cv::Point> lasso;  // px, polygon; empty: none. The object lies inside both.
+  cv::Mat silhouette;            // CV_8U: roughly its shape and place, or empty. May be larger than
+                                 // the picture, with an equal margin on opposite sides.
 };
 
 struct SegmenterParams {
@@ -26,6 +30,8 @@ struct SegmenterParams {
   int coarse_pixels = 40000;      // the coarse picture has at most about this many
   int band_px = 3;                // half width of the band around the coarse boundary, coarse pixels
   float outlier_cost = 18.0f;     // nats; cost of a colour that a model does not know
+  float shape_weight = 4.0f;      // nats; the most that a silhouette says about a pixel
+  float shape_tolerance = 0.04f;  // of the picture's width; how wrong a silhouette's outline may be
   SmoothnessParams smoothness;
 };
 
@@ -57,11 +63,15 @@ class Segmenter {
   void initialiseModels(const Level& level);
   void refitModels(const Level& level);
   std::vector<cv::Mat> costs(const Level& level) const;
+  cv::Mat evidence(const Level& level, size_t k, const std::vector<cv::Mat>& cost) const;
+  void placeSilhouettes(const Level& coarse);
+  void addShapeOdds(Level& level) const;
 
   cv::Mat image_;
   std::vector<SegmentationTarget> targets_;
   SegmenterParams params_;
   std::vector<ColourModel> models_;  // 0: background, k: targets_[k - 1]; empty before the first call
+  std::vector<std::optional<PlacedShape>> shapes_;  // in pixels of `image_`
   cv::Mat labels_;
 };
 

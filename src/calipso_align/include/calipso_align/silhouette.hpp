@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -10,6 +11,11 @@ namespace calipso::align {
 
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;   // #P x 3, m
 using Triangles = Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>;  // #F x 3
+
+// All points moved by a rigid motion.
+inline Points transformed(const Eigen::Isometry3d& motion, const Points& points) {
+  return (points * motion.linear().transpose()).rowwise() + motion.translation().transpose();
+}
 
 // The edges of a mesh and the faces on both sides of each. Any triangle soup is accepted: an edge
 // may border one face or many.

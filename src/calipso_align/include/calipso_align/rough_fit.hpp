@@ -1,0 +1,23 @@
+#pragma once
+
+#include "calipso_align/fit_problem.hpp"
+#include "calipso_align/low_order_map.hpp"
+
+namespace calipso::align {
+
+// How well the rough placement can be started from.
+struct RoughCheck {
+  bool usable = true;
+  std::string reason;   // what is wrong with it, and what to do
+};
+
+// Whether the placement is in front of the camera, on the picture, and of the contour's size.
+RoughCheck checkPlacement(const FitProblem& problem);
+
+// Shifts and scales the model so that the centroid and the area of its silhouette are those of the
+// contour, at the depth that the depth image has for it. Areas are left alone where much of the
+// contour is unknown: then they cannot be compared.
+void placeRoughly(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+                  LowOrderMap& map);
+
+}  // namespace calipso::align

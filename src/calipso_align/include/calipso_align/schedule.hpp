@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calipso_align/fem_stage.hpp"
+#include "calipso_align/fit_problem.hpp"
+#include "calipso_align/low_order_stage.hpp"
+
+// The order of a fit: which freedom the model has in which stage, and how strictly it is held to the
+// picture meanwhile. Lengths are parts of the contour's extent (px) or of the model's size (m).
+namespace calipso::align {
+
+// A quantity that goes geometrically from one value to another during a stage.
+struct Ramp {
+  double from, to;
+  double at(int k, int count) const;
+};
+
+struct LowOrderStep {
+  std::string name;
+  LowOrderStageOptions fit;
+  Ramp robust;          // of the contour, parts of its extent
+  double sigma;         // what the stage's model cannot follow, parts of the extent
+  Ramp depth_robust;    // model sizes
+};
+
+// Similarity, affine, quadratic.
+std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOptions& options);
+MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, int iteration);
+
+struct ElasticStep {
+  FemStageOptions fit;
+  Ramp robust_px, dead_band_px;
+};
+
+// One per grid, coarse to fine.
+std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOptions& options);
+MeasureSettings settingsAt(const ElasticStep& step, const FitProblem& problem, int iteration);
+
+}  // namespace calipso::align

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "calipso_align/fit_problem.hpp"
+
+namespace calipso::align {
+
+// What the contour says about a finished fit.
+struct FitQuality {
+  std::vector<double> residuals;   // signed, per target point, px; NaN without counterpart
+  double mean_px = 0.0, p95_px = 0.0;
+  double matched = 0.0;            // part of the known contour that has a counterpart
+};
+
+FitQuality assess(const FitProblem& problem, const Points& x);
+
+struct Verdict {
+  bool trusted = false;
+  std::string reason;   // why not; or what the user should know all the same
+};
+
+// @param converged  the last stage's own report
+Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+              const FitQuality& quality, double scale);
+
+// Whether turning the model about one of its principal axes leaves it where it was: then no contour
+// shows that turn. Returns the axis in the frame of X.
+std::optional<Eigen::Vector3d> spinAxis(const Points& X);
+
+}  // namespace calipso::align

@@ -1,0 +1,191 @@
+#include "calipso_align/alignment.hpp"
+
+#include <Eigen/SVD>
+#include <chrono>
+#include <cmath>
+#include <functional>
+
+#include "calipso_align/fit_problem.hpp"
+#include "calipso_align/rough_fit.hpp"
+#include "calipso_align/schedule.hpp"
+#include "calipso_align/trust.hpp"
+
+namespace calipso::align {
+namespace {
+
+// Where points of the object frame stand in the camera frame.
+using Placement = std::function<Points(const Points&)>;
+
+class StageClock {
+ public:
+  explicit StageClock(std::vector<StageTime>& times) : times_(times) {}
+  void stop(const std::string& stage) {
+    const auto now = std::chrono::steady_clock::now();
+    times_.push_back({stage, std::chrono::duration<double, std::milli>(now - last_).count()});
+    last_ = now;
+  }
+
+ private:
+  std::vector<StageTime>& times_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+// Stages A and B: similarity, affine, quadratic.
+LowOrderMap fitLowOrderStages(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+                              const AlignOptions& options, StageClock& clock) {
+  LowOrderMap map(problem.X);
+  placeRoughly(problem, contour, map);
+  clock.stop("placement");
+  for (const LowOrderStep& step : lowOrderSteps(problem, options)) {
+    const auto observe = [&](const Points& x, int k) {
+      return measure(problem, x, settingsAt(step, problem, k));
+    };
+    fitLowOrder(problem.X, observe, step.fit, map);
+    clock.stop(step.name);
+  }
+  return map;
+}
+
+// Stage C: the elastic body on finer and finer grids.
+Points fitElasticStages(const TriangleMesh& cad, const FitProblem& problem, Placement placed,
+                        const AlignOptions& options, StageClock& clock) {
+  for (const ElasticStep& step : elasticSteps(problem, options)) {
+    const auto fit = std::make_shared<ElasticFit>(cad, placed, step.fit);
+    clock.stop("grid of " + std::to_string(step.fit.nodes));
+    fit->fit([&](const Points& x, int k) {
+      return measure(problem, x, settingsAt(step, problem, k));
+    });
+    placed = [fit](const Points& points) { return fit->carry(points); };
+    clock.stop("elastic " + std::to_string(step.fit.nodes));
+  }
+  return placed(cad.vertices);
+}
+
+// The rigid motion that brings `from` closest to `to` (least squares, Kabsch).
+Eigen::Isometry3d bestRigid(const Points& from, const Points& to) {
+  const Eigen::RowVector3d a = from.colwise().mean(), b = to.colwise().mean();
+  const Eigen::Matrix3d cross = (to.rowwise() - b).transpose() * (from.rowwise() - a);
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d sign = Eigen::Vector3d::Ones();
+  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) sign.z() = -1.0;
+  Eigen::Isometry3d best = Eigen::Isometry3d::Identity();
+  best.linear() = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  best.translation() = b.transpose() - best.linear() * a.transpose();
+  return best;
+}
+
+// Ratio of the mean distances from the centroid.
+double sizeRatio(const Points& to, const Points& from) {
+  const auto size = [](const Points& p) {
+    return std::sqrt((p.rowwise() - p.colwise().mean()).rowwise().squaredNorm().mean());
+  };
+  return size(to) / size(from);
+}
+
+// Pose covariance at the end of the fit, with all low-order deformations left free. World axes.
+Eigen::Matrix<double, 6, 6> poseCovariance(const FitProblem& problem, const Points& x,
+                                           const AlignOptions& options,
+                                           const Eigen::Isometry3d& camera_from_object) {
+  const LowOrderStep last = lowOrderSteps(problem, options).back();
+  const MeasureSettings settings = settingsAt(last, problem, last.fit.iterations - 1);
+  LowOrderPrior prior = last.fit.prior;
+  // What no measurement shows keeps the rough placement's uncertainty: a twentieth of the distance.
+  if (!(prior.depth > 0.0)) prior.depth = 0.05 * x.col(2).mean() / LowOrderMap(x).size();
+  const LowOrderMap here(x);
+  const Eigen::MatrixXd all = covariance(x, measure(problem, x, settings), prior, here);
+
+  // From translation of the centroid and rotation about it to the object frame's origin.
+  const Eigen::Vector3d arm = camera_from_object.translation() - here.centroid();
+  Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Zero();
+  const Eigen::Matrix3d R = problem.camera.world_from_camera.linear();
+  J.topLeftCorner<3, 3>() = R;
+  for (int k = 0; k < 3; ++k) J.block<3, 1>(0, 3 + k) = R * Eigen::Vector3d::Unit(k).cross(arm);
+  J.bottomRightCorner<3, 3>() = R;
+  Eigen::Matrix<double, 6, 6> local;
+  local << all.block<3, 3>(3, 3), all.block<3, 3>(3, 0), all.block<3, 3>(0, 3), all.block<3, 3>(0, 0);
+  return J * local * J.transpose();
+}
+
+// Residuals of the target's points, handed to the contour points that they stand for.
+std::vector<std::vector<float>> residualsPerLoop(const FitProblem& problem,
+                                                 const FitQuality& quality,
+                                                 const std::vector<ContourLoop>& contour) {
+  std::vector<std::vector<float>> residuals;
+  for (const ContourLoop& loop : contour) {
+    residuals.emplace_back(loop.points.size(), std::nanf(""));
+  }
+  const std::vector<TargetPoint>& points = problem.target.points;
+  for (size_t k = 0; k < points.size(); ++k) {
+    std::vector<float>& loop = residuals[points[k].loop];
+    const bool last = k + 1 == points.size() || points[k + 1].loop != points[k].loop;
+    const size_t end = last ? loop.size() : points[k + 1].index;
+    for (size_t i = points[k].index; i < end; ++i) {
+      if (contour[points[k].loop].known[i]) loop[i] = static_cast<float>(quality.residuals[k]);
+    }
+  }
+  return residuals;
+}
+
+AlignmentResult unaligned(const TriangleMesh& cad, const Eigen::Isometry3d& pose,
+                          const std::string& reason) {
+  AlignmentResult result;
+  result.world_from_object = pose;
+  result.mesh = result.rest = cad;
+  result.reason = reason;
+  return result;
+}
+
+// Fills in everything that follows from where the vertices ended.
+void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& x,
+              const std::vector<ContourLoop>& contour, const AlignOptions& options,
+              AlignmentResult& result) {
+  const Points world = transformed(problem.camera.world_from_camera, x);
+  result.world_from_object = bestRigid(cad.vertices, world);
+  result.mesh = {transformed(result.world_from_object.inverse(), world), cad.triangles};
+  result.rest = cad;
+  result.scale = sizeRatio(x, problem.X);
+  result.noise_px = problem.target.noise_px;
+  result.covariance =
+      poseCovariance(problem, x, options,
+                     problem.camera.world_from_camera.inverse() * result.world_from_object);
+  const FitQuality quality = assess(problem, x);
+  result.contour_mean_px = quality.mean_px;
+  result.contour_p95_px = quality.p95_px;
+  result.residual_px = residualsPerLoop(problem, quality, contour);
+  const Verdict verdict = judge(problem, contour, quality, result.scale);
+  result.trusted = verdict.trusted;
+  result.reason = verdict.reason;
+}
+
+}  // namespace
+
+double totalMs(const AlignmentResult& result) {
+  double sum = 0.0;
+  for (const StageTime& time : result.times) sum += time.ms;
+  return sum;
+}
+
+AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
+                      const Eigen::Isometry3d& initial_world_from_object,
+                      const std::vector<ContourLoop>& contour, const AlignOptions& options) {
+  AlignmentResult result;
+  StageClock clock(result.times);
+  const FitProblem problem =
+      makeFitProblem(cad, camera, initial_world_from_object, contour, options);
+  clock.stop("contour");
+  const RoughCheck check = checkPlacement(problem);
+  if (!check.usable) return unaligned(cad, initial_world_from_object, check.reason);
+
+  const LowOrderMap map = fitLowOrderStages(problem, contour, options, clock);
+  const Eigen::Isometry3d camera_from_object =
+      camera.world_from_camera.inverse() * initial_world_from_object;
+  const Placement placed = [&](const Points& points) {
+    return map.apply(transformed(camera_from_object, points));
+  };
+  const Points x = fitElasticStages(cad, problem, placed, options, clock);
+  describe(problem, cad, x, contour, options, result);
+  clock.stop("result");
+  return result;
+}
+
+}  // namespace calipso::align

@@ -1,0 +1,125 @@
+#include "calipso_align/contour_term.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace calipso::align {
+namespace {
+
+// A point of the image plane with its normal, scaled for the search: (u, v, s nu, s nv).
+struct Feature {
+  float u, v, nu, nv;
+};
+
+Feature featureOf(const Eigen::Vector2d& pixel, const Eigen::Vector2d& normal, double scale) {
+  return {static_cast<float>(pixel.x()), static_cast<float>(pixel.y()),
+          static_cast<float>(scale * normal.x()), static_cast<float>(scale * normal.y())};
+}
+
+// For every query, the nearest candidate that is close enough and looks the same way; -1 for none.
+std::vector<int> nearest(const std::vector<Feature>& queries, const std::vector<Feature>& candidates,
+                         const ContourTermOptions& options) {
+  const float reject = static_cast<float>(options.reject_px * options.reject_px);
+  const float scale = static_cast<float>(options.normal_scale_px);
+  // n.n >= cosine  <=>  |s n - s n'|^2 <= 2 s^2 (1 - cosine)
+  const float reject_normal = 2.0f * scale * scale * (1.0f - static_cast<float>(options.reject_cosine));
+  std::vector<int> match(queries.size(), -1);
+#pragma omp parallel for schedule(static)
+  for (size_t q = 0; q < queries.size(); ++q) {
+    const Feature a = queries[q];
+    float best = std::numeric_limits<float>::max();
+    for (size_t k = 0; k < candidates.size(); ++k) {
+      const Feature b = candidates[k];
+      const float distance = (a.u - b.u) * (a.u - b.u) + (a.v - b.v) * (a.v - b.v);
+      const float turn = (a.nu - b.nu) * (a.nu - b.nu) + (a.nv - b.nv) * (a.nv - b.nv);
+      const bool usable = distance < reject && turn < reject_normal;
+      if (usable && distance + turn < best) {
+        best = distance + turn;
+        match[q] = static_cast<int>(k);
+      }
+    }
+  }
+  return match;
+}
+
+std::vector<Feature> featuresOf(const ContourTarget& target, double scale) {
+  std::vector<Feature> features;
+  for (const TargetPoint& p : target.points) features.push_back(featureOf(p.pixel, p.normal, scale));
+  return features;
+}
+
+std::vector<Feature> featuresOf(const std::vector<OutlinePoint>& outline, double scale) {
+  std::vector<Feature> features;
+  for (const OutlinePoint& p : outline) features.push_back(featureOf(p.pixel, p.normal, scale));
+  return features;
+}
+
+// The residual outside of the dead band.
+double shrink(double r, double band) {
+  return std::abs(r) <= band ? 0.0 : r - std::copysign(band, r);
+}
+
+void appendPair(const TargetPoint& data, const OutlinePoint& model, const Camera& camera,
+                double weight, const ContourTermOptions& options, Rows& rows) {
+  const Eigen::Matrix<double, 2, 3> d = camera.projectJacobian(model.position);
+  const Eigen::Vector2d gap = model.pixel - data.pixel;
+  const Eigen::Vector2d tangent(-data.normal.y(), data.normal.x());
+  const double r = shrink(data.normal.dot(gap), options.dead_band_px);
+  const double w = weight * gemanMcClure(r, options.robust_px);
+  rows.push_back({model.v0, model.v1, model.a0, model.a1, d.transpose() * data.normal, r, w});
+  if (options.tangential > 0.0) {
+    rows.push_back({model.v0, model.v1, model.a0, model.a1, d.transpose() * tangent,
+                    tangent.dot(gap), options.tangential * w});
+  }
+}
+
+}  // namespace
+
+std::vector<int> matchTargetToOutline(const ContourTarget& target,
+                                      const std::vector<OutlinePoint>& outline,
+                                      const ContourTermOptions& options) {
+  return nearest(featuresOf(target, options.normal_scale_px),
+                 featuresOf(outline, options.normal_scale_px), options);
+}
+
+Rows contourRows(const ContourTarget& target, const std::vector<OutlinePoint>& outline,
+                 const Camera& camera, const ContourTermOptions& options) {
+  const std::vector<Feature> data = featuresOf(target, options.normal_scale_px);
+  const std::vector<Feature> model = featuresOf(outline, options.normal_scale_px);
+  const double share = options.two_way ? 0.5 : 1.0;
+  Rows rows;
+
+  const std::vector<int> model_of = nearest(data, model, options);
+  for (size_t k = 0; k < data.size(); ++k) {
+    if (model_of[k] < 0 || !target.points[k].known) continue;
+    appendPair(target.points[k], outline[model_of[k]], camera, share * target.points[k].weight,
+               options, rows);
+  }
+  if (!options.two_way) return rows;
+
+  // A part of the outline whose nearest target is unknown is hidden, and pulls nobody.
+  const std::vector<int> data_of = nearest(model, data, options);
+  const double weight = share * target.length_px / std::max<size_t>(1, outline.size());
+  for (size_t k = 0; k < model.size(); ++k) {
+    if (data_of[k] < 0 || !target.points[data_of[k]].known) continue;
+    appendPair(target.points[data_of[k]], outline[k], camera, weight, options, rows);
+  }
+  return rows;
+}
+
+std::vector<double> contourResiduals(const ContourTarget& target,
+                                     const std::vector<OutlinePoint>& outline) {
+  ContourTermOptions options;
+  options.normal_scale_px = 5.0;
+  const std::vector<int> match = matchTargetToOutline(target, outline, options);
+  std::vector<double> residuals(target.points.size(), std::numeric_limits<double>::quiet_NaN());
+  for (size_t k = 0; k < match.size(); ++k) {
+    if (match[k] < 0 || !target.points[k].known) continue;
+    const TargetPoint& p = target.points[k];
+    residuals[k] = p.normal.dot(outline[match[k]].pixel - p.pixel);
+  }
+  return residuals;
+}
+
+}  // namespace calipso::align

@@ -1,0 +1,247 @@
+#include "calipso_align/fem_stage.hpp"
+
+#include <Eigen/CholmodSupport>
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace calipso::align {
+namespace {
+
+using fem::BlockMatrix;
+using fem::Vec;
+
+// Nodes and weights that carry one vertex.
+struct Carrier {
+  int nodes[8];
+  double weights[8];
+  int count = 0;
+};
+
+std::vector<Carrier> carriersOf(const fem::Embedding& embedding) {
+  std::vector<Carrier> carriers(embedding.vertexCount());
+  for (int v = 0; v < embedding.vertexCount(); ++v) {
+    Carrier& c = carriers[v];
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(embedding.weights, v); it;
+         ++it) {
+      if (it.value() == 0.0 || c.count == 8) continue;
+      c.nodes[c.count] = static_cast<int>(it.col());
+      c.weights[c.count++] = it.value();
+    }
+  }
+  return carriers;
+}
+
+fem::VoxelGrid gridOf(const TriangleMesh& cad, int nodes) {
+  fem::VoxelizeOptions options;
+  options.target_nodes = nodes;
+  return fem::voxelize(cad, options);
+}
+
+// Smallest volume that three edges of a cell span at one of its corners.
+double smallestCornerVolume(const fem::VolumeMesh& mesh) {
+  double smallest = std::numeric_limits<double>::max();
+  for (int cell = 0; cell < mesh.cellCount(); ++cell) {
+    for (int c = 0; c < 8; ++c) {
+      Eigen::Matrix3d edges;
+      for (int k = 0; k < 3; ++k) {
+        const int low = c & ~(1 << k), high = c | (1 << k);
+        edges.col(k) = mesh.node(mesh.cells(cell, high)) - mesh.node(mesh.cells(cell, low));
+      }
+      smallest = std::min(smallest, edges.determinant());
+    }
+  }
+  return smallest;
+}
+
+// The affine map that comes closest to taking `from` to `to`, applied to `from`.
+Points affinePart(const Points& from, const Points& to) {
+  const Eigen::RowVector3d a = from.colwise().mean(), b = to.colwise().mean();
+  const Points d = from.rowwise() - a;
+  const Eigen::Matrix3d normal = d.transpose() * d, cross = d.transpose() * (to.rowwise() - b);
+  return (d * normal.ldlt().solve(cross)).rowwise() + b;
+}
+
+// The grid's mesh at rest where the fit stands: the low-order deformation costs nothing any more. A
+// bend that would fold cells, which can reach beyond the model's surface, is taken back as far as
+// they ask for.
+fem::VolumeMesh restMesh(const fem::VoxelGrid& grid, const Points& placed) {
+  constexpr double kLeastVolume = 0.1;  // of the cells' volume
+  fem::VolumeMesh mesh = grid.mesh();
+  const Points affine = affinePart(mesh.nodes, placed);
+  mesh.nodes = affine;
+  mesh.lattice.resize(0, 3);
+  const double least = kLeastVolume * smallestCornerVolume(mesh);
+  for (const double bend : {1.0, 0.75, 0.5, 0.25, 0.0}) {
+    mesh.nodes = affine + bend * (placed - affine);
+    if (smallestCornerVolume(mesh) > least) break;
+  }
+  return mesh;
+}
+
+Vec vectorOf(const Points& nodes) { return Eigen::Map<const Vec>(nodes.data(), nodes.size()); }
+
+Material unitMaterial(double poissons_ratio) {
+  Material material;
+  material.youngs_modulus = 1.0;
+  material.poissons_ratio = poissons_ratio;
+  material.density = 1.0;
+  return material;
+}
+
+}  // namespace
+
+struct ElasticFit::Impl {
+  FemStageOptions options;
+  fem::VoxelGrid grid;
+  fem::Embedding embedding;
+  std::vector<Carrier> carriers;
+  Vec x, x0;                 // current and starting nodal positions, 3n
+  fem::ElasticModel model;
+  double volume, size;       // m^3, m
+  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver;
+  bool analyzed = false;
+
+  Impl(const TriangleMesh& cad, const std::function<Points(const Points&)>& placed,
+       const FemStageOptions& o)
+      : options(o),
+        grid(gridOf(cad, o.nodes)),
+        embedding(fem::embed(cad.vertices, grid)),
+        carriers(carriersOf(embedding)),
+        x(vectorOf(placed(grid.nodes))),
+        x0(x),
+        model(restMesh(grid, Eigen::Map<const Points>(x.data(), grid.nodeCount(), 3)),
+              unitMaterial(o.poissons_ratio), fem::MaterialModel::kCorotated,
+              fem::ElementType::kHexQ1),
+        volume(model.totalMass()),
+        size(boundingDiagonal(cad)) {}
+
+  Points vertices() const {
+    const Vec s = embedding.apply(x);
+    return Eigen::Map<const Points>(s.data(), s.size() / 3, 3);
+  }
+
+  double lambda(int iteration) const {
+    const auto& weights = options.elastic_weights;
+    return weights[std::min<size_t>(iteration, weights.size() - 1)] / volume;
+  }
+  double depthInformation() const {
+    return 1.0 / (options.depth_sigma * options.depth_sigma * size * size * grid.nodeCount());
+  }
+
+  // Adds the measurements' gradient J^T W r, and a bound of J^T W J that stays inside K's pattern:
+  // (a0 x0 + a1 x1)^2 <= a0 x0^2 + a1 x1^2, each vertex in one cell.
+  void addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) const;
+  void addVertex(int vertex, double share, const PointRow& row, BlockMatrix& H) const;
+  Vec solve(const BlockMatrix& H, const Vec& gradient);
+  double energy(const Vec& at, const Vec& from, const Rows& rows, double weight) const;
+  Vec lineSearch(const Vec& step, const Rows& rows, double weight, double slope) const;
+};
+
+void ElasticFit::Impl::addVertex(int vertex, double share, const PointRow& row,
+                                 BlockMatrix& H) const {
+  const Carrier& c = carriers[vertex];
+  const Eigen::Matrix3d outer = share * row.weight * row.g * row.g.transpose();
+  for (int i = 0; i < c.count; ++i) {
+    for (int j = 0; j < c.count; ++j) {
+      H.block(H.pattern->find(c.nodes[i], c.nodes[j])) += c.weights[i] * c.weights[j] * outer;
+    }
+  }
+}
+
+void ElasticFit::Impl::addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) const {
+  for (const PointRow& row : rows) {
+    if (row.weight == 0.0) continue;
+    for (const auto& [vertex, share] : {std::pair(row.v0, row.a0), std::pair(row.v1, row.a1)}) {
+      if (share == 0.0) continue;
+      const Carrier& c = carriers[vertex];
+      const Eigen::Vector3d f = share * row.weight * row.r * row.g;
+      for (int i = 0; i < c.count; ++i) gradient.segment<3>(3 * c.nodes[i]) += c.weights[i] * f;
+      addVertex(vertex, share, row, H);
+    }
+  }
+}
+
+Vec ElasticFit::Impl::solve(const BlockMatrix& H, const Vec& gradient) {
+  const Eigen::SparseMatrix<double> A = H.toSparse();
+  if (!analyzed) solver.analyzePattern(A);
+  analyzed = true;
+  solver.factorize(A);
+  if (solver.info() != Eigen::Success) return Vec::Constant(gradient.size(), std::nan(""));
+  return solver.solve(-gradient);
+}
+
+// Energy at `at`, with measurements linearised at `from`.
+double ElasticFit::Impl::energy(const Vec& at, const Vec& from, const Rows& rows,
+                                double weight) const {
+  double sum = weight * model.energy(at);
+  const Vec moved = embedding.apply(at - from);
+  for (const PointRow& row : rows) {
+    const double r = row.r + row.g.dot(row.a0 * moved.segment<3>(3 * row.v0) +
+                                       row.a1 * moved.segment<3>(3 * row.v1));
+    sum += 0.5 * row.weight * r * r;
+  }
+  for (int i = 2; i < at.size(); i += 3) {
+    sum += 0.5 * depthInformation() * (at[i] - x0[i]) * (at[i] - x0[i]);
+  }
+  return sum;
+}
+
+// The longest of the steps 1, 1/2, 1/4 ... that lowers the energy enough (Armijo).
+Vec ElasticFit::Impl::lineSearch(const Vec& step, const Rows& rows, double weight,
+                                 double slope) const {
+  constexpr double kArmijo = 1e-4;
+  const double start = energy(x, x, rows, weight);
+  for (double t = 1.0; t > 0.01; t *= 0.5) {
+    if (energy(x + t * step, x, rows, weight) <= start + kArmijo * t * slope) return t * step;
+  }
+  return Vec::Zero(step.size());
+}
+
+ElasticFit::ElasticFit(const TriangleMesh& cad, const std::function<Points(const Points&)>& placed,
+                       const FemStageOptions& options)
+    : impl_(std::make_shared<Impl>(cad, placed, options)) {}
+
+FemStageReport ElasticFit::fit(const std::function<Rows(const Points&, int)>& observe) {
+  Impl& m = *impl_;
+  FemStageReport report;
+  report.nodes = m.grid.nodeCount();
+  const int iterations = static_cast<int>(m.options.elastic_weights.size());
+  for (; report.iterations < iterations && !report.converged; ++report.iterations) {
+    const double weight = m.lambda(report.iterations);
+    const Rows rows = observe(m.vertices(), report.iterations);
+
+    // (lambda K + J^T W J + eps) delta = -g
+    Vec gradient;
+    m.model.gradient(m.x, gradient);
+    gradient *= weight;
+    BlockMatrix H(m.model.pattern());
+    m.model.viscosity(m.x, H);
+    for (double& value : H.values) value *= weight;
+    m.addRows(rows, gradient, H);
+    for (int i = 0; i < m.grid.nodeCount(); ++i) {
+      H.block(H.pattern->diagonal[i])(2, 2) += m.depthInformation();
+      gradient[3 * i + 2] += m.depthInformation() * (m.x[3 * i + 2] - m.x0[3 * i + 2]);
+    }
+    const Vec step = m.solve(H, gradient);
+    if (!step.allFinite()) break;
+    const Vec taken = m.lineSearch(step, rows, weight, gradient.dot(step));
+    m.x += taken;
+    const bool last_weight = report.iterations + 1 >= iterations ||
+                             m.options.elastic_weights[report.iterations] ==
+                                 m.options.elastic_weights.back();
+    report.converged =
+        last_weight && taken.lpNorm<Eigen::Infinity>() < m.options.smallest_step * m.size;
+  }
+  return report;
+}
+
+Points ElasticFit::vertices() const { return impl_->vertices(); }
+
+Points ElasticFit::carry(const Points& object_points) const {
+  const Vec s = fem::embed(object_points, impl_->grid).apply(impl_->x);
+  return Eigen::Map<const Points>(s.data(), s.size() / 3, 3);
+}
+
+}  // namespace calipso::align

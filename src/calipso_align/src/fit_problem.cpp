@@ -1,0 +1,143 @@
+#include "calipso_align/fit_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace calipso::align {
+namespace {
+
+void checkMesh(const TriangleMesh& cad) {
+  if (cad.vertexCount() < 4 || cad.triangleCount() < 4) {
+    throw std::invalid_argument("the model has " + std::to_string(cad.vertexCount()) +
+                                " vertices and " + std::to_string(cad.triangleCount()) +
+                                " triangles: a solid needs at least 4 of both");
+  }
+  if (!cad.vertices.allFinite()) {
+    throw std::invalid_argument("the model has a vertex that is not a finite number");
+  }
+  if (cad.triangles.minCoeff() < 0 || cad.triangles.maxCoeff() >= cad.vertexCount()) {
+    throw std::invalid_argument("the model's triangles name vertices outside of 0 .. " +
+                                std::to_string(cad.vertexCount() - 1));
+  }
+  if (!(boundingDiagonal(cad) > 0.0)) {
+    throw std::invalid_argument("all vertices of the model coincide");
+  }
+}
+
+void checkCamera(const Camera& camera) {
+  if (camera.width <= 0 || camera.height <= 0 || !(camera.fx > 0.0) || !(camera.fy > 0.0) ||
+      !std::isfinite(camera.cx) || !std::isfinite(camera.cy)) {
+    throw std::invalid_argument(
+        "the camera is not calibrated: width, height, fx and fy must be positive (" +
+        std::to_string(camera.width) + ", " + std::to_string(camera.height) + ", " +
+        std::to_string(camera.fx) + ", " + std::to_string(camera.fy) + ")");
+  }
+}
+
+void checkPose(const Eigen::Isometry3d& pose) {
+  const Eigen::Matrix3d R = pose.linear();
+  if (!pose.matrix().allFinite() || !(R * R.transpose()).isIdentity(1e-3) ||
+      R.determinant() < 0.0) {
+    throw std::invalid_argument(
+        "the rough placement is not a rotation and a translation: give a proper rigid motion");
+  }
+}
+
+double extentOf(const ContourTarget& target) {
+  Eigen::Vector2d low = target.points.front().pixel, high = low;
+  for (const TargetPoint& p : target.points) {
+    low = low.cwiseMin(p.pixel);
+    high = high.cwiseMax(p.pixel);
+  }
+  return (high - low).norm();
+}
+
+double lengthOf(const std::vector<ContourLoop>& loops) {
+  double length = 0.0;
+  for (const ContourLoop& loop : loops) {
+    for (size_t i = 0; i < loop.points.size(); ++i) {
+      length += (loop.points[(i + 1) % loop.points.size()] - loop.points[i]).norm();
+    }
+  }
+  return length;
+}
+
+void checkDepth(const cv::Mat1f& depth, const Camera& camera) {
+  if (depth.cols == camera.width && depth.rows == camera.height) return;
+  throw std::invalid_argument("the depth image is " + std::to_string(depth.cols) + "x" +
+                              std::to_string(depth.rows) + ", the camera's pictures are " +
+                              std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                              ": register the depth with the picture");
+}
+
+// Whether the rough placement, which may be off by a twentieth of the distance, has the object on
+// the plane.
+bool standsOn(const SupportTarget& support, const FitProblem& problem) {
+  constexpr double kPlacementError = 0.06;
+  const std::optional<double> height = clearance(support, problem.X, problem.camera);
+  return height && std::abs(*height) < kPlacementError * problem.X.col(2).mean();
+}
+
+}  // namespace
+
+bool FitProblem::depthIsKnown() const {
+  const auto stands = [](const SupportTarget& support) { return support.stands; };
+  return !depth.empty() || std::any_of(supports.begin(), supports.end(), stands);
+}
+
+FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
+                          const Eigen::Isometry3d& initial_world_from_object,
+                          const std::vector<ContourLoop>& contour, const AlignOptions& options) {
+  constexpr double kFinestSpacingPx = 1.5;
+  constexpr double kTargetPoints = 500.0;
+  checkMesh(cad);
+  checkCamera(camera);
+  checkPose(initial_world_from_object);
+
+  const Eigen::Isometry3d camera_from_object =
+      camera.world_from_camera.inverse() * initial_world_from_object;
+  const double spacing = std::max(kFinestSpacingPx, lengthOf(contour) / kTargetPoints);
+  FitProblem problem{transformed(camera_from_object, cad.vertices),
+                     MeshTopology(cad.triangles),
+                     camera,
+                     makeContourTarget(contour, spacing),
+                     {},
+                     makeSupportTargets(options.planes, camera),
+                     0.0,
+                     boundingDiagonal(cad)};
+  problem.extent_px = extentOf(problem.target);
+  if (options.depth) {
+    checkDepth(options.depth->depth, camera);
+    problem.depth =
+        makeDepthTarget(options.depth->depth, fillContour(contour, {camera.width, camera.height}));
+  }
+  for (SupportTarget& support : problem.supports) {
+    support.stands = problem.depth.empty() && standsOn(support, problem);
+  }
+  return problem;
+}
+
+Rows measure(const FitProblem& problem, const Points& x, const MeasureSettings& settings) {
+  constexpr double kOutlineStepPx = 2.0;
+  const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
+  Rows rows = contourRows(
+      problem.target,
+      occludingContour(x, problem.topology, rendering, problem.camera, kOutlineStepPx),
+      problem.camera, settings.contour);
+  const double information = 1.0 / (settings.contour_sigma_px * settings.contour_sigma_px *
+                                    settings.contour_correlation_px);
+  for (PointRow& row : rows) row.weight *= information;
+
+  const Rows depth =
+      depthRows(problem.depth, x, problem.topology.triangles(), rendering, problem.camera,
+                {settings.depth_robust * problem.model_size,
+                 settings.depth_sigma * problem.model_size});
+  const Rows support = supportRows(problem.supports, x, problem.camera,
+                                   settings.support_sigma * problem.model_size);
+  rows.insert(rows.end(), depth.begin(), depth.end());
+  rows.insert(rows.end(), support.begin(), support.end());
+  return rows;
+}
+
+}  // namespace calipso::align

@@ -1,0 +1,159 @@
+#include "calipso_align/metrics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "calipso_align/contour_term.hpp"
+
+namespace calipso::align {
+namespace {
+
+Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                  const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  // Regions of the triangle's plane, after Ericson, Real-Time Collision Detection, 5.1.5.
+  const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),
+               d6 = ac.dot(cp);
+  if (d1 <= 0 && d2 <= 0) return a;
+  if (d3 >= 0 && d4 <= d3) return b;
+  if (d6 >= 0 && d5 <= d6) return c;
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
+  }
+  const double sum = va + vb + vc;
+  return a + ab * (vb / sum) + ac * (vc / sum);
+}
+
+// Distance of every point of `from` to the surface.
+std::vector<double> distances(const Points& from, const Points& x, const Triangles& triangles) {
+  // Bounding spheres reject most triangles without a closer look.
+  const int faces = static_cast<int>(triangles.rows());
+  Points centre(faces, 3);
+  Eigen::VectorXd radius(faces);
+  for (int f = 0; f < faces; ++f) {
+    centre.row(f) = (x.row(triangles(f, 0)) + x.row(triangles(f, 1)) + x.row(triangles(f, 2))) / 3.0;
+    radius[f] = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      radius[f] = std::max(radius[f], (x.row(triangles(f, k)) - centre.row(f)).norm());
+    }
+  }
+  std::vector<double> result(from.rows());
+#pragma omp parallel for schedule(static)
+  for (int i = 0; i < from.rows(); ++i) {
+    const Eigen::Vector3d p = from.row(i);
+    double best = std::numeric_limits<double>::max();
+    for (int f = 0; f < faces; ++f) {
+      const double reach = best + radius[f];
+      if ((centre.row(f).transpose() - p).squaredNorm() > reach * reach) continue;
+      const Eigen::Vector3d q = closestOnTriangle(p, x.row(triangles(f, 0)), x.row(triangles(f, 1)),
+                                                  x.row(triangles(f, 2)));
+      best = std::min(best, (q - p).norm());
+    }
+    result[i] = best;
+  }
+  return result;
+}
+
+// Distance of p to the polygon's nearest segment.
+double distanceToLoops(const Eigen::Vector2d& p, const std::vector<ContourLoop>& loops, bool& known) {
+  double best = std::numeric_limits<double>::max();
+  for (const ContourLoop& loop : loops) {
+    const size_t n = loop.points.size();
+    for (size_t i = 0; i < n; ++i) {
+      const Eigen::Vector2d& a = loop.points[i];
+      const Eigen::Vector2d ab = loop.points[(i + 1) % n] - a;
+      const double t = std::clamp(ab.dot(p - a) / std::max(ab.squaredNorm(), 1e-12), 0.0, 1.0);
+      const double distance = (a + t * ab - p).norm();
+      if (distance < best) {
+        best = distance;
+        known = loop.known[i];
+      }
+    }
+  }
+  return best;
+}
+
+double distanceToOutline(const Eigen::Vector2d& p, const std::vector<OutlinePoint>& outline) {
+  double best = std::numeric_limits<double>::max();
+  for (const OutlinePoint& q : outline) best = std::min(best, (q.pixel - p).squaredNorm());
+  return std::sqrt(best);
+}
+
+}  // namespace
+
+ContourError contourError(const std::vector<ContourLoop>& contour, const Points& x,
+                          const MeshTopology& topology, const Camera& camera) {
+  constexpr double kStepPx = 0.25;    // of the outline's samples: an eighth of a pixel at most is added
+  constexpr double kSpacingPx = 1.0;  // of the contour's samples
+  const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
+  const std::vector<OutlinePoint> outline =
+      occludingContour(x, topology, rendering, camera, kStepPx);
+  if (outline.empty()) return {1e9, 1e9};
+
+  std::vector<double> errors;
+  for (const ContourLoop& loop : contour) {
+    Eigen::Vector2d last(-1e9, -1e9);
+    for (size_t i = 0; i < loop.points.size(); ++i) {
+      if (!loop.known[i] || (loop.points[i] - last).norm() < kSpacingPx) continue;
+      last = loop.points[i];
+      errors.push_back(distanceToOutline(last, outline));
+    }
+  }
+  for (size_t k = 0; k < outline.size(); k += 4) {
+    bool known = false;
+    const double distance = distanceToLoops(outline[k].pixel, contour, known);
+    if (known) errors.push_back(distance);
+  }
+  if (errors.empty()) return {1e9, 1e9};
+  ContourError error;
+  error.mean_px = std::accumulate(errors.begin(), errors.end(), 0.0) / errors.size();
+  const auto p95 = errors.begin() + static_cast<long>(0.95 * (errors.size() - 1));
+  std::nth_element(errors.begin(), p95, errors.end());
+  error.p95_px = *p95;
+  return error;
+}
+
+SurfaceError surfaceError(const Points& a, const Points& b, const Triangles& triangles_a,
+                          const Triangles& triangles_b) {
+  const std::vector<double> ab = distances(a, b, triangles_b), ba = distances(b, a, triangles_a);
+  SurfaceError error;
+  for (const std::vector<double>* side : {&ab, &ba}) {
+    for (const double d : *side) {
+      error.mean += 0.5 * d / side->size();
+      error.rms += 0.5 * d * d / side->size();
+      error.hausdorff = std::max(error.hausdorff, d);
+    }
+  }
+  error.rms = std::sqrt(error.rms);
+  return error;
+}
+
+double reprojectionError(const Points& x, const Points& truth, const Camera& camera,
+                         const std::vector<int>& vertices) {
+  double sum = 0.0;
+  int count = 0;
+  for (const int i : vertices) {
+    if (x(i, 2) <= 0.0 || truth(i, 2) <= 0.0) continue;
+    sum += (camera.project(x.row(i).transpose()) - camera.project(truth.row(i).transpose())).norm();
+    ++count;
+  }
+  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+double depthGauge(const Points& x, const Points& truth) {
+  return truth.col(2).mean() / x.col(2).mean();
+}
+
+double intersectionOverUnion(const cv::Mat1b& a, const cv::Mat1b& b) {
+  const int both = cv::countNonZero(a & b), either = cv::countNonZero(a | b);
+  return either > 0 ? static_cast<double>(both) / either : 1.0;
+}
+
+}  // namespace calipso::align

@@ -1,0 +1,102 @@
+#include "calipso_align/rough_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <sstream>
+
+#include "calipso_align/depth_term.hpp"
+
+namespace calipso::align {
+namespace {
+
+constexpr double kLeastKnown = 0.9;  // part of the contour that must be known to compare areas
+
+// Size that the model seems to have in the picture against the contour's.
+double apparentScale(const FitProblem& problem) {
+  const double z = problem.X.col(2).mean();
+  const double f = std::sqrt(problem.camera.fx * problem.camera.fy);
+  return problem.extent_px * z / (f * problem.model_size);
+}
+
+struct Moments {
+  double area = 0.0;
+  Eigen::Vector2d centroid = Eigen::Vector2d::Zero();
+};
+
+Moments momentsOf(const cv::Mat1b& mask) {
+  const cv::Moments m = cv::moments(mask, true);
+  if (m.m00 <= 0.0) return {};
+  return {m.m00, {m.m10 / m.m00, m.m01 / m.m00}};
+}
+
+// Shift and scale by which the rendered silhouette's moments become the contour's.
+void matchMoments(const FitProblem& problem, const Moments& goal, LowOrderMap& map) {
+  constexpr double kLargestLogScale = 0.25;  // per round
+  const Camera& camera = problem.camera;
+  const Points x = map.apply(problem.X);
+  const Moments now =
+      momentsOf(maskOf(renderDepth(x, problem.topology.triangles(), camera), camera));
+  if (now.area <= 0.0) return;
+  const double z = x.col(2).mean();
+  const Eigen::Vector2d shift = goal.centroid - now.centroid;
+  LowOrderMap::Parameters step = LowOrderMap::Parameters::Zero();
+  step[LowOrderMap::kTranslation] = shift.x() * z / camera.fx;
+  step[LowOrderMap::kTranslation + 1] = shift.y() * z / camera.fy;
+  step[LowOrderMap::kLogScale] =
+      std::clamp(0.5 * std::log(goal.area / now.area), -kLargestLogScale, kLargestLogScale);
+  map.setParameters(map.plus(step));
+}
+
+// Shift along the sight line of the centroid to where the depth image has the object.
+void matchDepth(const FitProblem& problem, LowOrderMap& map) {
+  if (problem.depth.empty()) return;
+  const Points x = map.apply(problem.X);
+  const Eigen::Vector3d centroid = x.colwise().mean().transpose();
+  const double offset = medianDepthOffset(
+      problem.depth, renderDepth(x, problem.topology.triangles(), problem.camera));
+  LowOrderMap::Parameters step = LowOrderMap::Parameters::Zero();
+  step.segment<3>(LowOrderMap::kTranslation) = centroid / centroid.z() * offset;
+  map.setParameters(map.plus(step));
+}
+
+}  // namespace
+
+RoughCheck checkPlacement(const FitProblem& problem) {
+  // A model far larger or smaller than the contour was drawn in another unit.
+  constexpr double kImplausible = 5.0;
+  const double z = problem.X.col(2).mean();
+  if (z <= 0.0) {
+    return {false, "the rough placement is behind the camera (" + std::to_string(-z) +
+                       " m): move the model in front of it"};
+  }
+  const double scale = apparentScale(problem);
+  if (scale > kImplausible || scale < 1.0 / kImplausible) {
+    std::ostringstream text;
+    text.precision(3);
+    text << "size implausible: the model (" << problem.model_size << " m) at its rough distance ("
+         << z << " m) would have to be scaled by " << scale
+         << " to fill the contour; is it in millimetres? Scale it by about that much";
+    return {false, text.str()};
+  }
+  if (renderDepth(problem.X, problem.topology.triangles(), problem.camera).roi.empty()) {
+    return {false, "the rough placement is off the image: move the model onto the object"};
+  }
+  return {};
+}
+
+void placeRoughly(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+                  LowOrderMap& map) {
+  constexpr int kRounds = 3;
+  const Camera& camera = problem.camera;
+  const bool comparable =
+      problem.target.known_length_px >= kLeastKnown * problem.target.length_px;
+  const Moments goal =
+      comparable ? momentsOf(fillContour(contour, {camera.width, camera.height})) : Moments{};
+  for (int round = 0; round < kRounds; ++round) {
+    matchDepth(problem, map);
+    if (goal.area > 0.0) matchMoments(problem, goal, map);
+  }
+}
+
+}  // namespace calipso::align

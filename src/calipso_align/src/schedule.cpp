@@ -1,0 +1,113 @@
+#include "calipso_align/schedule.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace calipso::align {
+namespace {
+
+double knob(const char* name, double value) {
+  const char* text = std::getenv(name);
+  return text ? std::atof(text) : value;
+}
+
+LowOrderPrior similarityPrior(const FitProblem& problem, const AlignOptions& options) {
+  LowOrderPrior prior;
+  prior.rotation_rad = options.rotation_sigma_deg * M_PI / 180.0;
+  prior.in_plane = 2.0;
+  prior.log_scale = problem.depthIsKnown() ? 0.3 : knob("K_LOGS", 0.15);
+  // One picture does not show the depth: it is held, unless something else does.
+  prior.depth = problem.depthIsKnown() ? 0.5 : 0.0;
+  return prior;
+}
+
+LowOrderPrior affinePrior(const FitProblem& problem, const AlignOptions& options) {
+  LowOrderPrior prior = similarityPrior(problem, options);
+  prior.strain = knob("K_STRAIN", 0.25);
+  prior.shear = knob("K_SHEAR", 0.15);
+  prior.strain_depth = problem.depth.empty() ? knob("K_STRAINZ", 0.02) : 0.25;
+  return prior;
+}
+
+LowOrderPrior quadraticPrior(const FitProblem& problem, const AlignOptions& options) {
+  LowOrderPrior prior = affinePrior(problem, options);
+  prior.quadratic = knob("K_QUAD", 0.3);
+  prior.quadratic_depth = problem.depth.empty() ? knob("K_QUADZ", 0.02) : 0.3;
+  return prior;
+}
+
+LowOrderStageOptions stage(const LowOrderPrior& prior, int iterations) {
+  LowOrderStageOptions options;
+  options.prior = prior;
+  options.iterations = iterations;
+  return options;
+}
+
+}  // namespace
+
+double Ramp::at(int k, int count) const {
+  const double t = count < 2 ? 1.0 : std::min(1.0, static_cast<double>(k) / (count - 1));
+  return from * std::pow(to / from, t);
+}
+
+std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOptions& options) {
+  return {{"similarity", stage(similarityPrior(problem, options), 12), {0.10, 0.06},
+           knob("K_SIGA", 0.1), {0.15, 0.10}},
+          {"affine", stage(affinePrior(problem, options), 10), {0.06, 0.03},
+           knob("K_SIGB", 0.04), {0.10, 0.05}},
+          {"quadratic", stage(quadraticPrior(problem, options), 14), {0.04, 0.015},
+           knob("K_SIGC", 0.01), {0.06, 0.03}}};
+}
+
+MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, int iteration) {
+  constexpr double kNarrowestPx = 4.0;  // of the robust kernel
+  const double noise = problem.target.noise_px;
+  MeasureSettings settings;
+  settings.contour.robust_px =
+      std::max(step.robust.at(iteration, step.fit.iterations) * problem.extent_px,
+               kNarrowestPx + 2.0 * noise);
+  settings.contour.reject_px = 3.0 * settings.contour.robust_px;
+  settings.contour_sigma_px = std::max(step.sigma * problem.extent_px, 0.5 + noise);
+  settings.contour_correlation_px = knob("K_CORR", 10);
+  settings.depth_robust = step.depth_robust.at(iteration, step.fit.iterations);
+  settings.depth_sigma = 0.5 * step.sigma;
+  return settings;
+}
+
+std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOptions& options) {
+  std::vector<ElasticStep> steps;
+  const double noise = problem.target.noise_px;
+  for (size_t level = 0; level < options.levels.size(); ++level) {
+    const bool first = level == 0;
+    const int iterations = first ? knob("K_N0", 10) : knob("K_N1", 4);
+    const double end = options.elastic_weight * knob("K_LAMBDA", 3e3);
+    const Ramp stiffness{first ? knob("K_LAMBDA0", 3e5) : end, end};
+    ElasticStep step;
+    step.fit.nodes = options.levels[level];
+    step.fit.poissons_ratio = knob("K_NU", options.poissons_ratio);
+    step.fit.depth_sigma = problem.depth.empty() ? knob("K_DEPTH", 0.1) : 1.0;
+    for (int k = 0; k < iterations; ++k) {
+      step.fit.elastic_weights.push_back(stiffness.at(k, iterations - 2));
+    }
+    step.robust_px = first ? Ramp{10.0 + noise, 4.0 + noise} : Ramp{4.0 + noise, 4.0 + noise};
+    // Eq. 9 asks for 4 px; once the model is there, the contour's own noise is what remains.
+    step.dead_band_px = first ? Ramp{1.0, 0.05} : Ramp{0.05, 0.05};
+    steps.push_back(step);
+  }
+  return steps;
+}
+
+MeasureSettings settingsAt(const ElasticStep& step, const FitProblem& problem, int iteration) {
+  const int iterations = static_cast<int>(step.fit.elastic_weights.size());
+  MeasureSettings settings;
+  settings.contour.robust_px = step.robust_px.at(iteration, iterations);
+  settings.contour.reject_px = 4.0 * settings.contour.robust_px;
+  settings.contour.dead_band_px = step.dead_band_px.at(iteration, iterations);
+  settings.contour_sigma_px = 0.5 + 0.2 * problem.target.noise_px;
+  settings.contour_correlation_px = 5.0;
+  settings.depth_robust = 0.02;
+  return settings;
+}
+
+}  // namespace calipso::align

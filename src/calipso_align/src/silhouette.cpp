@@ -1,0 +1,215 @@
+#include "calipso_align/silhouette.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace calipso::align {
+namespace {
+
+constexpr double kNear = 1e-6;           // m; nothing closer is drawn
+constexpr float kBoundaryBandPx = 2.0f;  // how far from the mask's boundary an outline edge may lie
+
+using Pixels = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
+
+// Pixels of all points; points behind the camera get NaN.
+Pixels projectAll(const Points& x, const Camera& camera) {
+  Pixels pixels(x.rows(), 2);
+  for (int i = 0; i < x.rows(); ++i) {
+    const Eigen::Vector3d p = x.row(i);
+    if (p.z() > kNear) {
+      pixels.row(i) = camera.project(p);
+    } else {
+      pixels.row(i).setConstant(std::nan(""));
+    }
+  }
+  return pixels;
+}
+
+// The picture's part that holds all pixels, with a margin of background around it where there is room.
+cv::Rect boundingRoi(const Pixels& pixels, const Camera& camera) {
+  constexpr int kMargin = 3;
+  double u0 = 1e9, v0 = 1e9, u1 = -1e9, v1 = -1e9;
+  for (int i = 0; i < pixels.rows(); ++i) {
+    if (std::isnan(pixels(i, 0))) continue;
+    u0 = std::min(u0, pixels(i, 0));
+    u1 = std::max(u1, pixels(i, 0));
+    v0 = std::min(v0, pixels(i, 1));
+    v1 = std::max(v1, pixels(i, 1));
+  }
+  const auto inside = [](double value, int limit) {
+    return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(limit)));
+  };
+  const int left = inside(std::floor(u0) - kMargin, camera.width);
+  const int top = inside(std::floor(v0) - kMargin, camera.height);
+  const int right = inside(std::ceil(u1) + kMargin + 1, camera.width);
+  const int bottom = inside(std::ceil(v1) + kMargin + 1, camera.height);
+  if (right <= left || bottom <= top) return {};
+  return {left, top, right - left, bottom - top};
+}
+
+// Fills one triangle. 1/z is linear on the screen; the buffer holds the largest one.
+void fillTriangle(const Eigen::Vector2d (&p)[3], const double (&inverse_z)[3], const cv::Rect& roi,
+                  cv::Mat1f& buffer) {
+  const double area = (p[1] - p[0]).x() * (p[2] - p[0]).y() - (p[1] - p[0]).y() * (p[2] - p[0]).x();
+  if (area == 0.0 || !std::isfinite(area)) return;
+  const auto [min_u, max_u] = std::minmax({p[0].x(), p[1].x(), p[2].x()});
+  const auto [min_v, max_v] = std::minmax({p[0].y(), p[1].y(), p[2].y()});
+  const int u_begin = std::max(roi.x, static_cast<int>(std::ceil(std::max(min_u, -1.0))));
+  const int u_end = std::min<int>(roi.x + roi.width - 1, std::floor(std::min(max_u, 1e6)));
+  const int v_begin = std::max(roi.y, static_cast<int>(std::ceil(std::max(min_v, -1.0))));
+  const int v_end = std::min<int>(roi.y + roi.height - 1, std::floor(std::min(max_v, 1e6)));
+
+  // Barycentric weights b1, b2 are linear in (u, v); step them along the row.
+  const double b1_u = (p[2] - p[0]).y() / area, b1_v = -(p[2] - p[0]).x() / area;
+  const double b2_u = -(p[1] - p[0]).y() / area, b2_v = (p[1] - p[0]).x() / area;
+  for (int v = v_begin; v <= v_end; ++v) {
+    float* row = buffer[v - roi.y] - roi.x;
+    double b1 = b1_u * (u_begin - p[0].x()) + b1_v * (v - p[0].y());
+    double b2 = b2_u * (u_begin - p[0].x()) + b2_v * (v - p[0].y());
+    for (int u = u_begin; u <= u_end; ++u, b1 += b1_u, b2 += b2_u) {
+      if (b1 < 0.0 || b2 < 0.0 || b1 + b2 > 1.0) continue;
+      const double value =
+          inverse_z[0] + b1 * (inverse_z[1] - inverse_z[0]) + b2 * (inverse_z[2] - inverse_z[0]);
+      row[u] = std::max(row[u], static_cast<float>(value));
+    }
+  }
+}
+
+// Distance of every covered pixel to the nearest uncovered one. The picture's border is no boundary.
+cv::Mat1f distanceToBackground(const DepthRendering& rendering) {
+  const cv::Mat1b mask = rendering.depth > 0.0f;
+  cv::Mat1f distance;
+  cv::distanceTransform(mask, distance, cv::DIST_L2, cv::DIST_MASK_3);
+  return distance;
+}
+
+// Whether a face is seen from its front, for all faces.
+std::vector<char> frontFacing(const Points& x, const Triangles& triangles) {
+  std::vector<char> front(triangles.rows());
+  for (int f = 0; f < triangles.rows(); ++f) {
+    const Eigen::Vector3d a = x.row(triangles(f, 0)), b = x.row(triangles(f, 1)),
+                          c = x.row(triangles(f, 2));
+    front[f] = (b - a).cross(c - a).dot(a) < 0.0;
+  }
+  return front;
+}
+
+// The face whose projection lies on the inner side of an outline edge, or -1 where it is none.
+int innerFace(const MeshTopology::Edge& edge, const std::vector<char>& front) {
+  int front_face = -1, back_face = -1;
+  for (const int f : edge.faces) (front[f] ? front_face : back_face) = f;
+  if (edge.faces.size() == 1) return edge.faces[0];
+  return front_face >= 0 && back_face >= 0 ? front_face : -1;
+}
+
+// Unit vector normal to a-b, away from `inner`.
+Eigen::Vector2d outwardNormal(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                              const Eigen::Vector2d& inner) {
+  const Eigen::Vector2d along = (b - a).normalized();
+  const Eigen::Vector2d normal(along.y(), -along.x());
+  return normal.dot(inner - a) > 0.0 ? Eigen::Vector2d(-normal) : normal;
+}
+
+int oppositeVertex(const Triangles& triangles, int face, const MeshTopology::Edge& edge) {
+  for (int k = 0; k < 3; ++k) {
+    const int v = triangles(face, k);
+    if (v != edge.v0 && v != edge.v1) return v;
+  }
+  return edge.v0;
+}
+
+}  // namespace
+
+MeshTopology::MeshTopology(const Triangles& triangles) : triangles_(triangles) {
+  struct HalfEdge {
+    int v0, v1, face;
+  };
+  std::vector<HalfEdge> half_edges;
+  half_edges.reserve(3 * triangles.rows());
+  for (int f = 0; f < triangles.rows(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = triangles(f, k), b = triangles(f, (k + 1) % 3);
+      half_edges.push_back({std::min(a, b), std::max(a, b), f});
+    }
+  }
+  std::sort(half_edges.begin(), half_edges.end(), [](const HalfEdge& a, const HalfEdge& b) {
+    return std::tie(a.v0, a.v1, a.face) < std::tie(b.v0, b.v1, b.face);
+  });
+  for (const HalfEdge& h : half_edges) {
+    if (edges_.empty() || edges_.back().v0 != h.v0 || edges_.back().v1 != h.v1) {
+      edges_.push_back({h.v0, h.v1, {}});
+    }
+    edges_.back().faces.push_back(h.face);
+  }
+}
+
+DepthRendering renderDepth(const Points& x, const Triangles& triangles, const Camera& camera) {
+  const Pixels pixels = projectAll(x, camera);
+  DepthRendering rendering;
+  rendering.roi = boundingRoi(pixels, camera);
+  if (rendering.roi.empty()) return rendering;
+  rendering.depth = cv::Mat1f::zeros(rendering.roi.size());
+  for (int f = 0; f < triangles.rows(); ++f) {
+    const int v[3] = {triangles(f, 0), triangles(f, 1), triangles(f, 2)};
+    const Eigen::Vector2d p[3] = {pixels.row(v[0]), pixels.row(v[1]), pixels.row(v[2])};
+    const double inverse_z[3] = {1.0 / x(v[0], 2), 1.0 / x(v[1], 2), 1.0 / x(v[2], 2)};
+    fillTriangle(p, inverse_z, rendering.roi, rendering.depth);
+  }
+  for (float& value : rendering.depth) value = value > 0.0f ? 1.0f / value : 0.0f;
+  return rendering;
+}
+
+cv::Mat1b maskOf(const DepthRendering& rendering, const Camera& camera) {
+  cv::Mat1b mask = cv::Mat1b::zeros(camera.height, camera.width);
+  if (!rendering.roi.empty()) cv::Mat1b(rendering.depth > 0.0f).copyTo(mask(rendering.roi));
+  return mask;
+}
+
+std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& topology,
+                                           const DepthRendering& rendering, const Camera& camera,
+                                           double step_px) {
+  std::vector<OutlinePoint> outline;
+  if (rendering.roi.empty()) return outline;
+  const cv::Mat1f distance = distanceToBackground(rendering);
+  const std::vector<char> front = frontFacing(x, topology.triangles());
+
+  for (const MeshTopology::Edge& edge : topology.edges()) {
+    const int face = innerFace(edge, front);
+    if (face < 0) continue;
+    const Eigen::Vector3d a = x.row(edge.v0), b = x.row(edge.v1);
+    const Eigen::Vector3d c = x.row(oppositeVertex(topology.triangles(), face, edge));
+    if (std::min({a.z(), b.z(), c.z()}) <= kNear) continue;
+    const Eigen::Vector2d pa = camera.project(a), pb = camera.project(b);
+    const double length = (pb - pa).norm();
+    if (!(length > 1e-9) || length > 1e5) continue;
+    const Eigen::Vector2d normal = outwardNormal(pa, pb, camera.project(c));
+
+    // Samples in the middle of equal parts of the edge, where the mask's boundary is near.
+    const int parts = std::max(1, static_cast<int>(std::lround(length / step_px)));
+    for (int k = 0; k < parts; ++k) {
+      const double t = (k + 0.5) / parts;
+      const Eigen::Vector3d position = (1.0 - t) * a + t * b;
+      const Eigen::Vector2d pixel = camera.project(position);
+      const cv::Point at(static_cast<int>(std::lround(pixel.x())),
+                         static_cast<int>(std::lround(pixel.y())));
+      if (!rendering.roi.contains(at)) continue;
+      if (distance(at - rendering.roi.tl()) > kBoundaryBandPx) continue;
+      outline.push_back({edge.v0, edge.v1, 1.0 - t, t, position, pixel, normal});
+    }
+  }
+  return outline;
+}
+
+Points faceNormals(const Points& x, const Triangles& triangles) {
+  Points normals(triangles.rows(), 3);
+  for (int f = 0; f < triangles.rows(); ++f) {
+    const Eigen::Vector3d a = x.row(triangles(f, 0)), b = x.row(triangles(f, 1)),
+                          c = x.row(triangles(f, 2));
+    const Eigen::Vector3d n = (b - a).cross(c - a);
+    normals.row(f) = n.stableNormalized();
+  }
+  return normals;
+}
+
+}  // namespace calipso::align

@@ -1,0 +1,61 @@
+#include "calipso_align/support_term.hpp"
+
+namespace calipso::align {
+namespace {
+
+// Whether the plane reaches under the point.
+bool reachesUnder(const SupportPlane& plane, const Camera& camera, const Eigen::Vector3d& p) {
+  if (!plane.x_range) return true;
+  const double x = (camera.world_from_camera * p).x();
+  return x >= plane.x_range->x() && x <= plane.x_range->y();
+}
+
+// The lowest vertex above the plane, or -1.
+int lowestVertex(const SupportTarget& target, const Points& x, const Camera& camera) {
+  int lowest = -1;
+  double height = 0.0;
+  for (int i = 0; i < x.rows(); ++i) {
+    const double h = target.normal.dot(x.row(i)) - target.offset;
+    if ((lowest >= 0 && h >= height) || !reachesUnder(target.plane, camera, x.row(i))) continue;
+    lowest = i;
+    height = h;
+  }
+  return lowest;
+}
+
+}  // namespace
+
+std::vector<SupportTarget> makeSupportTargets(const std::vector<SupportPlane>& planes,
+                                              const Camera& camera) {
+  std::vector<SupportTarget> targets;
+  const Eigen::Isometry3d& world_from_camera = camera.world_from_camera;
+  for (const SupportPlane& plane : planes) {
+    targets.push_back({plane, world_from_camera.linear().transpose() * plane.normal,
+                       plane.offset - plane.normal.dot(world_from_camera.translation()), false});
+  }
+  return targets;
+}
+
+std::optional<double> clearance(const SupportTarget& target, const Points& x,
+                                const Camera& camera) {
+  const int lowest = lowestVertex(target, x, camera);
+  if (lowest < 0) return std::nullopt;
+  return target.normal.dot(x.row(lowest)) - target.offset;
+}
+
+Rows supportRows(const std::vector<SupportTarget>& targets, const Points& x, const Camera& camera,
+                 double sigma) {
+  Rows rows;
+  const double weight = 1.0 / (sigma * sigma);
+  for (const SupportTarget& target : targets) {
+    const int lowest = target.stands ? lowestVertex(target, x, camera) : -1;
+    for (int i = 0; i < x.rows(); ++i) {
+      const double h = target.normal.dot(x.row(i)) - target.offset;
+      if (i != lowest && (h >= 0.0 || !reachesUnder(target.plane, camera, x.row(i)))) continue;
+      rows.push_back({i, i, 1.0, 0.0, target.normal, h, weight});
+    }
+  }
+  return rows;
+}
+
+}  // namespace calipso::align

@@ -1,0 +1,92 @@
+#include "calipso_align/mask_tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "synthetic_picture.hpp"
+
+namespace calipso::align {
+namespace {
+
+using testing::disc;
+using testing::intersectionOverUnion;
+using testing::maskOf;
+
+const cv::Size kSize(200, 150);
+
+// A disc with stripes, so that the flow sees it move, on a background with a gradient.
+cv::Mat picture(double u0, double v0, int seed) {
+  cv::Mat image(kSize, CV_8UC3);
+  cv::RNG rng(seed);
+  for (int v = 0; v < kSize.height; ++v)
+    for (int u = 0; u < kSize.width; ++u) {
+      const double alpha = std::clamp(0.5 - disc(u0, v0, 25)(u, v), 0.0, 1.0);
+      const double stripe = 30.0 * std::sin(0.5 * (u - u0) + 0.3 * (v - v0));
+      const cv::Vec3d fore(50, 90 + stripe, 190), back(150 + 0.2 * u, 150 + 0.2 * v, 140);
+      for (int c = 0; c < 3; ++c)
+        image.at<cv::Vec3b>(v, u)[c] = cv::saturate_cast<uchar>(
+            alpha * fore[c] + (1.0 - alpha) * back[c] + rng.gaussian(2.0));
+    }
+  return image;
+}
+
+cv::Mat truth(double u0, double v0) { return maskOf(kSize, disc(u0, v0, 25)); }
+
+TEST(MaskTracker, FollowsATranslation) {
+  MaskTracker tracker(picture(60, 60, 1), truth(60, 60) / 255);
+  for (int k = 1; k <= 12; ++k) {
+    const double u = 60 + 4.3 * k, v = 60 + 1.7 * k;
+    const TrackedMask tracked = tracker.track(picture(u, v, k + 1));
+    EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(u, v)), 0.97) << "frame " << k;
+    EXPECT_EQ(tracked.moved, 1);
+    EXPECT_GE(tracked.confidence, 0.6f);
+  }
+}
+
+TEST(MaskTracker, FollowsAJump) {
+  MaskTracker tracker(picture(60, 60, 1), truth(60, 60) / 255);
+  const TrackedMask tracked = tracker.track(picture(110, 90, 2));
+  EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(110, 90)), 0.95);
+}
+
+TEST(MaskTracker, AStillObjectKeepsItsMaskExactly) {
+  const cv::Mat labels = truth(60, 60) / 255;
+  MaskTracker tracker(picture(60, 60, 1), labels);
+  for (int k = 2; k < 6; ++k) {
+    const TrackedMask tracked = tracker.track(picture(60, 60, k));  // other noise, same scene
+    EXPECT_EQ(tracked.moved, 0);
+    EXPECT_EQ(cv::countNonZero(tracked.labels != labels), 0);
+    EXPECT_EQ(tracked.confidence, 1.0f);
+  }
+}
+
+TEST(MaskTracker, OwnsUpWhenTheObjectIsGone) {
+  MaskTracker tracker(picture(60, 60, 1), truth(60, 60) / 255);
+  EXPECT_LT(tracker.track(picture(-100, -100, 2)).confidence, 0.5f);
+}
+
+TEST(MaskTracker, APriorLeads) {
+  MaskTracker tracker(picture(60, 60, 1), truth(60, 60) / 255);
+  const cv::Mat prior = truth(141, 89) / 255;
+  const TrackedMask tracked = tracker.track(picture(140, 90, 2), prior);
+  EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(140, 90)), 0.96);
+}
+
+TEST(MaskTracker, NamesWrongSizes) {
+  MaskTracker tracker(picture(60, 60, 1), truth(60, 60) / 255);
+  try {
+    tracker.track(cv::Mat::zeros(10, 20, CV_8UC3));
+    FAIL() << "nothing was thrown";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("20x10"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("200x150"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(tracker.track(picture(60, 60, 1), cv::Mat::zeros(10, 20, CV_8U)),
+               std::invalid_argument);
+  EXPECT_THROW(MaskTracker(picture(60, 60, 1), cv::Mat::zeros(10, 20, CV_8U)),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace calipso::align

@@ -1,0 +1,107 @@
+// Feeds the segmentation node a clip of a moving disc and looks at what comes out.
+#include <calipso_msgs/NodeStatus.h>
+#include <calipso_msgs/Segmentation.h>
+#include <cv_bridge/cv_bridge.h>
+#include <gtest/gtest.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+
+#include <functional>
+#include <vector>
+
+#include "calipso_ros/topics.hpp"
+#include "ros/segmentation_conversions.hpp"
+#include "synthetic_picture.hpp"
+
+namespace calipso::align {
+namespace {
+
+const cv::Size kSize(160, 120);
+constexpr double kRadius = 30.0;
+constexpr double kTimeoutSec = 20.0;
+
+sensor_msgs::ImagePtr frame(double u0, double stamp) {
+  const cv::Mat picture = testing::paint(kSize, testing::disc(u0, 60, kRadius),
+                                         cv::Vec3b(40, 160, 60), cv::Vec3b(150, 150, 150), 2.0);
+  std_msgs::Header header;
+  header.stamp = ros::Time(stamp);
+  header.frame_id = "camera_optical_frame";
+  return cv_bridge::CvImage(header, "bgr8", picture).toImageMsg();
+}
+
+class SegmentationNode : public ::testing::Test {
+ protected:
+  SegmentationNode()
+      : images_(nh_.advertise<sensor_msgs::Image>(topics::kClipImage, 100)),
+        strokes_(nh_.advertise<sensor_msgs::Image>(topics::kStrokes, 1)),
+        segmentations_(
+            nh_.subscribe(topics::kSegmentation, 0, &SegmentationNode::onSegmentation, this)),
+        statuses_(nh_.subscribe(topics::kStatus, 0, &SegmentationNode::onStatus, this)) {}
+
+  void onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) { received_.push_back(msg); }
+  void onStatus(const calipso_msgs::NodeStatusConstPtr& msg) { status_ = *msg; }
+
+  // Spins until `done`, or fails after the timeout.
+  void waitFor(const std::function<bool()>& done, const char* what) {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kTimeoutSec);
+    while (!done()) {
+      ASSERT_LT(ros::WallTime::now(), end) << "gave up waiting for " << what;
+      ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+    }
+  }
+
+  ros::NodeHandle nh_;
+  ros::Publisher images_, strokes_;
+  ros::Subscriber segmentations_, statuses_;
+  std::vector<calipso_msgs::SegmentationConstPtr> received_;
+  calipso_msgs::NodeStatus status_;
+};
+
+TEST_F(SegmentationNode, SegmentsTheKeyFrameTracksTheRestAndServesLateSubscribers) {
+  waitFor([&] { return images_.getNumSubscribers() > 0 && segmentations_.getNumPublishers() > 0; },
+          "the node");
+  for (int k = 0; k < 3; ++k) images_.publish(frame(80.0 + 2.0 * k, 1.0 + 0.1 * k));
+  waitFor([&] { return received_.size() >= 3 && status_.clip_frames == 3; }, "three frames");
+
+  EXPECT_EQ(status_.state, calipso_msgs::NodeStatus::READY);
+  for (int k = 0; k < 3; ++k) {
+    const auto& msg = *received_[k];
+    EXPECT_EQ(msg.header.stamp, ros::Time(1.0 + 0.1 * k));
+    const cv::Mat truth = testing::maskOf(kSize, testing::disc(80.0 + 2.0 * k, 60, kRadius));
+    EXPECT_GE(testing::intersectionOverUnion(labelsFromMsg(msg.labels) == 1, truth), 0.95);
+  }
+  ASSERT_EQ(received_[0]->contours.size(), 1u);
+  const ObjectContour contour = fromMsg(received_[0]->contours[0]);
+  EXPECT_EQ(contour.object, "disc");
+  for (const Eigen::Vector2d& p : contour.loops.at(0).points)
+    EXPECT_NEAR((p - Eigen::Vector2d(80, 60)).norm(), kRadius, 1.5);
+  EXPECT_TRUE(received_[1]->contours.empty());
+
+  // A new connection (this process had one already) is handed the key frame first.
+  segmentations_.shutdown();
+  received_.clear();
+  segmentations_ = nh_.subscribe(topics::kSegmentation, 0, &SegmentationNode::onSegmentation, this);
+  waitFor([&] { return !received_.empty(); }, "the key frame, late");
+  EXPECT_EQ(received_[0]->header.stamp, ros::Time(1.0));
+  EXPECT_EQ(received_[0]->contours.size(), 1u);
+
+  images_.publish(boost::make_shared<sensor_msgs::Image>());
+  waitFor([&] { return status_.clip_frames == 4; }, "the broken frame to be counted");
+  EXPECT_EQ(status_.state, calipso_msgs::NodeStatus::READY);
+
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  strokes(cv::Rect(70, 50, 20, 20)).setTo(1);
+  strokes_.publish(cv_bridge::CvImage(std_msgs::Header(), "mono8", strokes).toImageMsg());
+  waitFor([&] { return received_.size() >= 2; }, "the key frame after a stroke");
+  EXPECT_EQ(received_.back()->header.stamp, ros::Time(1.0));
+  EXPECT_EQ(received_.back()->contours.size(), 1u);
+}
+
+}  // namespace
+}  // namespace calipso::align
+
+int main(int argc, char** argv) {
+  ::testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "segmentation_node_rostest");
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,135 @@
+#include "calipso_align/segmentation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "synthetic_picture.hpp"
+
+namespace calipso::align {
+namespace {
+
+using testing::box;
+using testing::disc;
+using testing::intersectionOverUnion;
+using testing::maskOf;
+using testing::paint;
+
+const cv::Size kSize(160, 120);
+const cv::Vec3b kGreen(40, 160, 60), kRed(40, 40, 190), kGrey(150, 150, 150);
+
+std::string messageOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+void expectContains(const std::string& message, const std::string& part) {
+  EXPECT_NE(message.find(part), std::string::npos) << "message was: " << message;
+}
+
+TEST(Segmenter, FindsADiscFromItsRectangle) {
+  const auto shape = disc(80.3, 60.7, 30.2);
+  const cv::Mat image = paint(kSize, shape, kGreen, kGrey, 3.0);
+  Segmenter segmenter(image, {{"disc", 7, cv::Rect(45, 25, 72, 72), {}}});
+  const cv::Mat labels = segmenter.segment({});
+  // One pixel of uncertainty along a fifth of the edge costs about 1 %.
+  EXPECT_GE(intersectionOverUnion(labels == 7, maskOf(kSize, shape)), 0.985);
+}
+
+TEST(Segmenter, GivesTouchingObjectsTheirOwnPixels) {
+  const auto left = box(30, 30, 80, 90), right = box(80, 30, 130, 90);
+  const cv::Mat image =
+      paint(kSize, right, kRed, kGrey, 3.0, paint(kSize, left, kGreen, kGrey, 0.0));
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  cv::line(strokes, {40, 60}, {70, 60}, 1, 3);
+  cv::line(strokes, {90, 60}, {120, 60}, 2, 3);
+  Segmenter segmenter(image, {{"left", 1, cv::Rect(25, 25, 90, 70), {}},
+                              {"right", 2, cv::Rect(50, 25, 90, 70), {}}});
+  const cv::Mat labels = segmenter.segment(strokes);
+  EXPECT_GE(intersectionOverUnion(labels == 1, maskOf(kSize, left)), 0.97);
+  EXPECT_GE(intersectionOverUnion(labels == 2, maskOf(kSize, right)), 0.97);
+}
+
+TEST(Segmenter, LeavesAHoleOpen) {
+  const auto ring = [](double u, double v) {
+    const double r = std::hypot(u - 80, v - 60);
+    return std::max(r - 40.0, 18.0 - r);
+  };
+  const cv::Mat image = paint(kSize, ring, kGreen, kGrey, 3.0);
+  Segmenter segmenter(image, {{"ring", 1, cv::Rect(36, 16, 89, 89), {}}});
+  const cv::Mat labels = segmenter.segment({});
+  EXPECT_EQ(labels.at<uchar>(60, 80), 0);
+  EXPECT_GE(intersectionOverUnion(labels == 1, maskOf(kSize, ring)), 0.97);
+}
+
+TEST(Segmenter, ALaterStrokeTakesAPartAway) {
+  const auto object = box(30, 30, 80, 90), twin = box(90, 30, 130, 90);
+  const cv::Mat image =
+      paint(kSize, twin, kGreen, kGrey, 3.0, paint(kSize, object, kGreen, kGrey, 0.0));
+  Segmenter segmenter(image, {{"object", 1, cv::Rect(25, 25, 110, 70), {}}});
+  EXPECT_NE(segmenter.segment({}).at<uchar>(60, 110), 0);
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  cv::line(strokes, {40, 60}, {70, 60}, 1, 3);
+  cv::rectangle(strokes, {94, 34}, {126, 86}, kBackgroundStroke, 3);
+  cv::line(strokes, {94, 60}, {126, 60}, kBackgroundStroke, 3);
+  const cv::Mat labels = segmenter.segment(strokes);
+  EXPECT_EQ(cv::countNonZero((labels == 1) & (strokes == kBackgroundStroke)), 0);
+  EXPECT_GE(cv::countNonZero((labels == 1) & maskOf(kSize, object)),
+            0.95 * cv::countNonZero(maskOf(kSize, object)));
+}
+
+TEST(Segmenter, KeepsInsideALasso) {
+  const auto shape = disc(80, 60, 30);
+  const cv::Mat image = paint(kSize, shape, kGreen, kGrey, 3.0);
+  const std::vector<cv::Point> diamond = {{80, 10}, {130, 60}, {80, 110}, {30, 60}};
+  Segmenter segmenter(image, {{"disc", 1, cv::Rect(), diamond}});
+  const cv::Mat labels = segmenter.segment({});
+  cv::Mat inside = cv::Mat::zeros(kSize, CV_8U);
+  cv::fillPoly(inside, std::vector<std::vector<cv::Point>>{diamond}, 255);
+  EXPECT_EQ(cv::countNonZero((labels > 0) & (inside == 0)), 0);
+  EXPECT_GE(intersectionOverUnion(labels == 1, maskOf(kSize, shape)), 0.98);
+}
+
+TEST(Segmenter, TwoRunsAreByteIdentical) {
+  const cv::Mat image = paint(kSize, disc(80, 60, 30), kGreen, kGrey, 8.0);
+  const std::vector<SegmentationTarget> targets = {{"disc", 1, cv::Rect(40, 20, 80, 80), {}}};
+  Segmenter first(image, targets), second(image, targets);
+  EXPECT_EQ(cv::countNonZero(first.segment({}) != second.segment({})), 0);
+}
+
+TEST(Segmenter, NamesWhatIsWrongWithTheInput) {
+  const cv::Mat image = paint(kSize, disc(80, 60, 30), kGreen, kGrey);
+  const std::vector<SegmentationTarget> good = {{"disc", 1, cv::Rect(40, 20, 80, 80), {}}};
+  expectContains(messageOf([&] { Segmenter(cv::Mat(), good); }), "empty");
+  expectContains(messageOf([&] { Segmenter(image, {}); }), "no object");
+  expectContains(messageOf([&] { Segmenter(image, {{"far", 1, {500, 5, 9, 9}, {}}}); }),
+                      "object 'far': rectangle 500 5 9 9 does not meet the picture");
+  expectContains(messageOf([&] { Segmenter(image, {{"odd", 255, {5, 5, 9, 9}, {}}}); }),
+                      "index 255 is not in 1..254");
+  expectContains(
+      messageOf([&] { Segmenter(image, {{"a", 1, {5, 5, 9, 9}, {}}, {"b", 1, {5, 5, 9, 9}, {}}}); }),
+      "also another object's");
+  Segmenter segmenter(image, good);
+  expectContains(messageOf([&] { segmenter.segment(cv::Mat::zeros(5, 5, CV_8U)); }), "5x5");
+  expectContains(
+      messageOf([&] { segmenter.segment(cv::Mat(kSize, CV_8U, cv::Scalar(3))); }),
+      "value 3 names no object");
+}
+
+TEST(Segmenter, StrokesThatLeaveNoForegroundNameTheObject) {
+  const cv::Mat image = paint(kSize, disc(80, 60, 30), kGreen, kGrey);
+  Segmenter segmenter(image, {{"disc", 1, cv::Rect(40, 20, 80, 80), {}}});
+  const std::string message =
+      messageOf([&] { segmenter.segment(cv::Mat(kSize, CV_8U, cv::Scalar(kBackgroundStroke))); });
+  expectContains(message, "object 'disc'");
+  expectContains(message, "draw a stroke");
+}
+
+}  // namespace
+}  // namespace calipso::align
