@@ -10,6 +10,7 @@
 namespace calipso::render {
 namespace {
 
+constexpr float kMatt = 0.25f;  // part of a pixel's light that is never taken for a highlight
 constexpr int kMargin = 12;  // px around the object that albedo is extended by
 
 // Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the first
@@ -35,14 +36,16 @@ cv::Mat trustOf(const cv::Mat& labels, int index) {
 }
 
 struct Shaded {
+  cv::Mat highlight;  // CV_32FC3: specular radiance
   cv::Mat light;     // CV_32FC3: shading of a white surface; 0 where the object is not seen
   cv::Mat nearness;  // CV_32FC1
   cv::Vec3f mean;
 };
 
 // Light on one actor's visible surface, pixel by pixel.
-Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light, const ShadowMap& sun) {
-  Shaded s{cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32F), {}};
+Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light, const Gloss& gloss,
+             const ShadowMap& sun) {
+  Shaded s{cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32F), {}};
   VisibilityBuffer buffer(region);
   buffer.draw(actor.screen, 0);
   const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
@@ -54,8 +57,10 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       const std::uint32_t id = buffer.ids(v)[u];
       if (id == VisibilityBuffer::kNothing) continue;
       const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
-      const cv::Vec3f l = diffuseShading(light, p.normal, sun.visibility(p.position, p.normal));
+      const float visible = sun.visibility(p.position, p.normal);
+      const cv::Vec3f l = diffuseShading(light, p.normal, visible);
       s.light.at<cv::Vec3f>(v, u) = l;
+      s.highlight.at<cv::Vec3f>(v, u) = specularShading(light, gloss, p.normal, (eye - p.position).normalized(), visible);
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
       sums[v] += cv::Vec3d(l), ++counts[v];
     }
@@ -68,15 +73,16 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
 }
 
 Appearance makeAppearance(const Actor& actor, const cv::Mat& picture, const cv::Mat& labels, const Camera& camera,
-                          const Light& light, const ShadowMap& sun) {
+                          const Light& light, const Gloss& gloss, const ShadowMap& sun) {
   Appearance a;
+  a.gloss = gloss;
   a.key_camera = camera;
   const cv::Rect all(0, 0, picture.cols, picture.rows);
   cv::Rect mask_box = cv::boundingRect(labels == actor.surface->index);
   mask_box = mask_box.empty() ? mask_box : (mask_box + cv::Size(2 * kMargin, 2 * kMargin) - cv::Point(kMargin, kMargin)) & all;
   a.region = boundsOf(actor.screen, kMargin, picture.size()) | mask_box;
   if (a.region.empty()) a.region = cv::Rect(0, 0, 1, 1);
-  const Shaded shaded = shade(actor, a.region, camera, light, sun);
+  const Shaded shaded = shade(actor, a.region, camera, light, gloss, sun);
   a.key_nearness = shaded.nearness;
   a.mean_light = shaded.mean;
   const cv::Vec3f floor = lightFloor(a.mean_light);
@@ -88,7 +94,11 @@ Appearance makeAppearance(const Actor& actor, const cv::Mat& picture, const cv::
       const cv::Vec3f code = picture.at<cv::Vec3f>(v + a.region.y, u + a.region.x);
       cv::Vec3f l = shaded.light.at<cv::Vec3f>(v, u);
       if (shaded.nearness.at<float>(v, u) == 0.0f) l = a.mean_light;
-      for (int c = 0; c < 3; ++c) albedo.at<cv::Vec3f>(v, u)[c] = linearFromRealCode(code[c]) / (l[c] + floor[c]);
+      const cv::Vec3f highlight = shaded.highlight.at<cv::Vec3f>(v, u);
+      for (int c = 0; c < 3; ++c) {
+        const float i = linearFromRealCode(code[c]);
+        albedo.at<cv::Vec3f>(v, u)[c] = std::max(i - highlight[c], kMatt * i) / (l[c] + floor[c]);
+      }
     }
   }
   a.albedo = pushPull(albedo, trust);
@@ -98,9 +108,10 @@ Appearance makeAppearance(const Actor& actor, const cv::Mat& picture, const cv::
 }  // namespace
 
 std::vector<Appearance> makeAppearances(const std::vector<Actor>& key, const cv::Mat& picture, const cv::Mat& labels,
-                                        const Camera& camera, const Light& light, const ShadowMap& sun) {
+                                        const Camera& camera, const Light& light, const Gloss& gloss,
+                                        const ShadowMap& sun) {
   std::vector<Appearance> appearances;
-  for (const Actor& actor : key) appearances.push_back(makeAppearance(actor, picture, labels, camera, light, sun));
+  for (const Actor& actor : key) appearances.push_back(makeAppearance(actor, picture, labels, camera, light, gloss, sun));
   return appearances;
 }
 
@@ -109,8 +120,8 @@ cv::Vec3f Appearance::albedoAt(const Eigen::Vector3f& key_position) const {
   return sampleBicubic(albedo, static_cast<float>(q.x()) - region.x, static_cast<float>(q.y()) - region.y);
 }
 
-cv::Vec3f Appearance::radiance(const SurfacePoint& point, const cv::Vec3f& now) const {
-  return albedoAt(point.key_position).mul(now + lightFloor(mean_light));
+cv::Vec3f Appearance::radiance(const SurfacePoint& point, const cv::Vec3f& now, const cv::Vec3f& highlight) const {
+  return albedoAt(point.key_position).mul(now + lightFloor(mean_light)) + highlight;
 }
 
 cv::Vec3f sampleBicubic(const cv::Mat& image, float u, float v) {

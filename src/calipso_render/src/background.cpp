@@ -11,6 +11,8 @@ namespace {
 
 constexpr float kNearMedian = 6.0f;     // code values; farther ones do not enter the mean
 constexpr float kLit = 0.75f;           // quantile of brightness that stands for the unshaded value
+constexpr float kMovingSpread = 4.0f;   // code values: from there on a place moves by itself
+constexpr int kFewestMoving = 200;      // px; fewer are noise
 constexpr int kSteadyDifference = 14;   // code values; about five deviations of the difference
 
 cv::Mat grown(const cv::Mat& mask, int radius) {
@@ -93,11 +95,29 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
   return b;
 }
 
-void inventBackground(const cv::Mat& shaded, Background& background) {
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
-  const InpaintResult filled = inpaint(background.plate, background.invented, cv::Mat());
-  background.plate = filled.image;
+  cv::Mat moving;
+  cv::blur(background.spread, moving, {5, 5});
+  moving = moving > kMovingSpread;
+  const bool any_moving = cv::countNonZero(moving) > kFewestMoving;
+  cv::Mat look = background.plate.clone();
+  if (any_moving) {
+    cv::Mat now;
+    key.bgr.convertTo(now, CV_32F);
+    now.copyTo(look, moving & (background.invented == 0) & (key.labels == 0));
+  }
+  const InpaintResult filled = inpaint(look, background.invented, cv::Mat());
+  filled.image.copyTo(background.plate, background.invented);
   background.origin = filled.origin;
+  if (!any_moving) return;
+  background.live_origin = cv::Mat(moving.size(), CV_16SC2, cv::Scalar(-1, -1));
+  for (int v = 0; v < moving.rows; ++v) {
+    for (int u = 0; u < moving.cols; ++u) {
+      const cv::Vec2s from = background.origin.at<cv::Vec2s>(v, u);
+      if (from[0] >= 0 && moving.at<std::uint8_t>(from[1], from[0]) != 0) background.live_origin.at<cv::Vec2s>(v, u) = from;
+    }
+  }
 }
 
 cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness) {

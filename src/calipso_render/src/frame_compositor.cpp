@@ -10,7 +10,8 @@ namespace {
 
 constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
 constexpr float kMovedPx = 0.3f;        // moved more: drawn
-constexpr float kSameShadow = 1.0f / 64;  // of the sun's visibility: no visible change
+constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
+constexpr float kSameRatio = 0.01f, kPlateRatio = 0.06f;  // brightening from which the plate is taken, and only it
 
 cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
   const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
@@ -28,12 +29,8 @@ float FrameCompositor::newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n
   return shadows_.others->visibility(p, n) * moved_shadow_->visibility(p, n);
 }
 
-float FrameCompositor::oldSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
-  return shadows_.others->visibility(p, n) * shadows_.originals->visibility(p, n);
-}
-
-cv::Vec3f FrameCompositor::shadowRatio(float visible) const {
-  return prepared_.umbra + (cv::Vec3f(1, 1, 1) - prepared_.umbra) * visible;
+cv::Vec3f FrameCompositor::shadowRatio(float sun, float sky) const {
+  return prepared_.umbra * sky + (cv::Vec3f(1, 1, 1) - prepared_.umbra) * sun;
 }
 
 // How far a surface point of an edited object stays where the video shows it: 1 at rest, 0 moved.
@@ -53,8 +50,11 @@ float FrameCompositor::stillness(std::uint32_t id, float u, float v) const {
 cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) const {
   const int slot = VisibilityBuffer::objectOf(id);
   const SurfacePoint p = surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_);
-  const cv::Vec3f light = diffuseShading(prepared_.light.light, p.normal, newSun(p.position, p.normal));
-  return prepared_.appearances[surface_of_slot_[slot]].radiance(p, light);
+  const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
+  const Light& light = prepared_.light.light;
+  const float sun = newSun(p.position, p.normal);
+  const cv::Vec3f highlight = specularShading(light, appearance.gloss, p.normal, (eye_ - p.position).normalized(), sun);
+  return appearance.radiance(p, diffuseShading(light, p.normal, sun), highlight);
 }
 
 // An edited object is drawn; another one only where the original picture does not show it.
@@ -93,30 +93,43 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
 }
 
 FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
-  const bool removed = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
-  const bool invented = invented_.at<std::uint8_t>(v, u) != 0;
-  const cv::Vec3f plate = plate_.at<cv::Vec3f>(v, u);
   Behind behind{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
-  if (removed) behind = {plate, 1.0f, invented ? kInvented : kSeenElsewhere};
+  const bool removed = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
+  if (removed) behind = revealedAt(u, v);
   if (!removed && labels_.at<std::uint8_t>(v, u) != 0) return behind;  // another object's own pixels
   const auto receiver = receiverAt(params_.planes, frame_.camera, u, v);
   if (!receiver) return behind;
-  const float now = newSun(receiver->position, receiver->normal);
+  const Eigen::Vector3f &p = receiver->position, &n = receiver->normal;
+  const float moved = moved_shadow_->visibility(p, n), sky = moved_sky_->visibility(p, n);
   if (removed) {
-    behind.colour = plate.mul(shadowRatio(now));
+    behind.colour = behind.colour.mul(shadowRatio(moved * shadows_.others->visibility(p, n), sky));
     return behind;
   }
-  const float before = oldSun(receiver->position, receiver->normal);
-  const float change = std::abs(now - before);
-  if (change < kSameShadow) return behind;
+  const float original = shadows_.originals->visibility(p, n), original_sky = shadows_.originals_sky->visibility(p, n);
+  if (std::abs(moved - original) + std::abs(sky - original_sky) < kSameShadow) return behind;
+  const float others = shadows_.others->visibility(p, n);
+  const cv::Vec3f now = shadowRatio(others * moved, sky), before = shadowRatio(others * original, original_sky);
+  const float change = luminance(now) - luminance(before);
   // Darkened further, a pixel keeps its own grain; lit up again, it must come from the plate.
-  const cv::Vec3f darkened = behind.colour.mul(shadowRatio(now)), relit = plate.mul(shadowRatio(now));
-  const float from_plate = smoothStep(0.0f, 0.25f, 1.0f - before) * smoothStep(0.0f, 0.1f, change);
-  const float own = 1.0f - from_plate;
-  behind.colour = from_plate * relit + own * (before > 0.99f ? darkened : behind.colour);
-  behind.fresh = from_plate;
-  behind.source = from_plate > 0.5f ? (invented ? kInvented : kSeenElsewhere) : kRendered;
+  const float from_plate = smoothStep(kSameRatio, kPlateRatio, change);
+  cv::Vec3f darkened = behind.colour;
+  for (int c = 0; c < 3; ++c) darkened[c] *= std::min(1.0f, now[c] / std::max(before[c], 0.05f));
+  const Behind revealed = revealedAt(u, v);
+  behind.colour = from_plate * revealed.colour.mul(now) + (1.0f - from_plate) * darkened;
+  behind.fresh = from_plate * revealed.fresh;
+  behind.source = from_plate > 0.5f ? revealed.source : kRendered;
   return behind;
+}
+
+// What comes to light where an object or its shadow was.
+FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
+  const bool invented = invented_.at<std::uint8_t>(v, u) != 0;
+  if (invented && !live_origin_.empty()) {
+    // A moving background goes on moving: the same place is copied from this very frame.
+    const cv::Vec2s from = live_origin_.at<cv::Vec2s>(v, u);
+    if (from[0] >= 0 && labels_.at<std::uint8_t>(from[1], from[0]) == 0) return {linearPixel(frame_.bgr, from[0], from[1]), 0.0f, kInvented};
+  }
+  return {plate_.at<cv::Vec3f>(v, u), 1.0f, invented ? kInvented : kSeenElsewhere};
 }
 
 void FrameCompositor::composePixel(int u, int v, FrameOutput& out) const {

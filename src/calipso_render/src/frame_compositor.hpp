@@ -13,6 +13,7 @@ struct ShadowCache {
   std::vector<bool> edited;              // per surface: which ones the maps are for
   std::unique_ptr<ShadowMap> others;     // of what is not edited
   std::unique_ptr<ShadowMap> originals;  // of the edited objects where the video has them
+  std::unique_ptr<ShadowMap> originals_sky;  // the same against the sky above the support plane
 };
 
 // One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.
@@ -39,17 +40,19 @@ class FrameCompositor {
   void prepareShadows();
   void chooseRegion();
   void findRemoved();
+  void findPassingShadows();
   void drawVisibility();
   void findStill();
   void composePixel(int u, int v, FrameOutput& out) const;
   Behind behindAt(int u, int v) const;
+  Behind revealedAt(int u, int v) const;
   Drawn drawnAt(int u, int v) const;
   bool isDrawn(std::uint32_t id, int u, int v) const;
   cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
   float stillness(std::uint32_t id, float u, float v) const;
   float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
-  float oldSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
-  cv::Vec3f shadowRatio(float visible) const;
+  // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
+  cv::Vec3f shadowRatio(float sun, float sky) const;
   cv::Rect shadowBounds(const Points& vertices) const;
 
   const Prepared& prepared_;
@@ -59,13 +62,16 @@ class FrameCompositor {
 
   cv::Mat labels_, plate_;            // of this frame's view
   cv::Mat invented_;
+  cv::Mat live_origin_;  // Background::live_origin, where the camera stands as at the key frame
   std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
   std::vector<bool> edited_;                  // per surface
   std::vector<Actor> actors_;                 // visible ones, per slot
   std::vector<int> surface_of_slot_;
   std::vector<ScreenMesh> observed_;          // per slot: where the video has it (edited objects at rest only)
   std::unique_ptr<ShadowMap> moved_shadow_;   // of the edited objects where they are now
+  std::unique_ptr<ShadowMap> moved_sky_;
   cv::Rect region_;
+  cv::Mat passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
   std::optional<VisibilityBuffer> centre_;

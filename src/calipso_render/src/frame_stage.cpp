@@ -13,7 +13,15 @@ namespace {
 
 constexpr int kRegionMargin = 8;       // px
 constexpr int kShadowMapSide = 512;    // texels, live
+constexpr float kDarker = 0.94f;       // of the plate's brightness: a passing shadow
+constexpr float kQuiet = 5.0f;         // code values of spread over time: the background rests
 constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
+
+// The sky over a support plane as one wide light: near contact an object hides much of it.
+std::unique_ptr<ShadowMap> skyShadowOf(const std::vector<Occluder>& occluders, const RenderParams& params) {
+  const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
+  return std::make_unique<ShadowMap>(params.planes.empty() ? std::vector<Occluder>{} : occluders, up, ShadowMap::Params{256, kSkyRadius, 24});
+}
 
 std::unique_ptr<ShadowMap> shadowOf(const std::vector<Occluder>& occluders, const Light& light, const RenderParams& params) {
   const bool final_path = params.quality == Quality::kFinal;
@@ -34,6 +42,7 @@ FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& p
 FrameOutput FrameCompositor::run() {
   stage();
   prepareShadows();
+  findPassingShadows();
   chooseRegion();
   FrameOutput out{frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
   if (region_.empty()) return out;
@@ -74,7 +83,9 @@ void FrameCompositor::stage() {
   }
   plate_ = prepared_.plate_linear;
   invented_ = prepared_.background.invented;
-  if (!sameView(frame_.camera, prepared_.camera)) {
+  if (sameView(frame_.camera, prepared_.camera)) {
+    live_origin_ = prepared_.background.live_origin;
+  } else {
     const cv::Mat map = viewWarp(params_.planes, prepared_.camera, frame_.camera);
     cv::Mat plate, invented;
     cv::remap(plate_, plate, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
@@ -95,11 +106,13 @@ void FrameCompositor::prepareShadows() {
   }
   const Light& light = prepared_.light.light;
   moved_shadow_ = shadowOf(moved, light, params_);
+  moved_sky_ = skyShadowOf(moved, params_);
   const bool others_rest = std::find(prepared_.moves.begin(), prepared_.moves.end(), true) == prepared_.moves.end();
   if (shadows_.others && shadows_.edited == edited_ && others_rest) return;
   shadows_.edited = edited_;
   shadows_.others = shadowOf(others, light, params_);
   shadows_.originals = shadowOf(originals, light, params_);
+  shadows_.originals_sky = skyShadowOf(originals, params_);
 }
 
 // Pixels onto which the sun can cast the vertices' shadow on a support plane.
@@ -137,7 +150,26 @@ void FrameCompositor::chooseRegion() {
     region_ |= boundsOf(actors_[slot].screen, kRegionMargin, size);
     region_ |= shadowBounds(actors_[slot].vertices);
   }
+  if (!passing_.empty()) region_ |= cv::boundingRect(passing_);
   region_ &= all;
+}
+
+// The shadow of an object that moves in the video shows as darkening against the plate.
+void FrameCompositor::findPassingShadows() {
+  bool any = false;
+  for (std::size_t i = 0; i < edited_.size(); ++i) any = any || (edited_[i] && prepared_.moves[i]);
+  if (!any || !sameView(frame_.camera, prepared_.camera)) return;
+  cv::Mat now, ratio_now, ratio_plate, plate;
+  cv::cvtColor(frame_.bgr, now, cv::COLOR_BGR2GRAY);
+  prepared_.background.plate.convertTo(plate, CV_8U);
+  cv::cvtColor(plate, plate, cv::COLOR_BGR2GRAY);
+  cv::blur(now, ratio_now, {5, 5});
+  cv::blur(plate, ratio_plate, {5, 5});
+  ratio_plate.convertTo(ratio_plate, CV_8U, kDarker);
+  passing_ = ratio_now < ratio_plate;
+  passing_ &= (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet) & (labels_ == 0);
+  cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
+  cv::dilate(passing_, passing_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
 }
 
 void FrameCompositor::findRemoved() {
@@ -149,6 +181,7 @@ void FrameCompositor::findRemoved() {
   others &= ~own;
   const int r = params_.background.mask_margin_px;
   cv::dilate(own, removed_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * r + 1, 2 * r + 1}));
+  if (!passing_.empty()) removed_ |= passing_(region_);
   removed_.setTo(0, others);  // what stands beside it keeps its own pixels
 }
 

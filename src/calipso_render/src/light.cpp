@@ -4,6 +4,11 @@
 #include <cmath>
 
 namespace calipso::render {
+namespace {
+
+constexpr double kHorizon = 1e-4;  // cosine below which a direction counts as below the horizon
+
+}  // namespace
 
 std::array<float, 9> shBasis(const Eigen::Vector3f& n) {
   const float x = n.x(), y = n.y(), z = n.z();
@@ -25,13 +30,35 @@ cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun
 
 float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v, float m) {
   const float nl = n.dot(l), nv = n.dot(v);
-  if (nl <= 1e-4f || nv <= 1e-4f) return 0.0f;
-  const Eigen::Vector3f h = (l + v).normalized();
-  const float nh = std::max(n.dot(h), 1e-4f), vh = std::max(v.dot(h), 1e-4f);
-  const float c2 = nh * nh, m2 = m * m;
-  const float D = std::exp((c2 - 1.0f) / (c2 * m2)) / (m2 * c2 * c2);  // Beckmann, times pi
-  const float G = std::min({1.0f, 2.0f * nh * nv / vh, 2.0f * nh * nl / vh});
+  if (nl <= kHorizon || nv <= kHorizon) return 0.0f;
+  const Eigen::Vector3f sum = l + v;
+  const float length = sum.norm(), c = n.dot(sum) / length, vh = 0.5f * length, c2 = c * c, m2 = m * m;
+  const float D = std::exp((c2 - 1.0f) / (c2 * m2)) / (m2 * c2 * c2);
+  const float G = std::min({1.0f, 2.0f * c * nv / vh, 2.0f * c * nl / vh});
   return D * G / (4.0f * nv);
+}
+
+Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l, const Eigen::Vector3d& v, double m) {
+  const double nl = n.dot(l), nv = n.dot(v);
+  if (nl <= kHorizon || nv <= kHorizon) return {};
+  // For unit vectors v.h = l.h = |l + v| / 2.
+  const Eigen::Vector3d sum = l + v;
+  const double length = sum.norm(), c = n.dot(sum) / length, vh = 0.5 * length;
+  const Eigen::Vector3d h = sum / length, dc = (n - c * h) / length, dvh = 0.5 * h;
+  const double c2 = c * c, m2 = m * m, D = std::exp((c2 - 1.0) / (c2 * m2)) / (m2 * c2 * c2);
+  const double dD_dc = D * (2.0 / (c * c2 * m2) - 4.0 / c), dD_dm = D * (2.0 * (1.0 - c2) / (c2 * m2 * m) - 2.0 / m);
+  double G = 1.0;
+  Eigen::Vector3d dG = Eigen::Vector3d::Zero();
+  if (2.0 * c * nv / vh < G) G = 2.0 * c * nv / vh, dG = 2.0 * nv * (dc * vh - c * dvh) / (vh * vh);
+  if (2.0 * c * nl / vh < G) G = 2.0 * c * nl / vh, dG = 2.0 * ((dc * nl + c * n) * vh - c * nl * dvh) / (vh * vh);
+  const double scale = 1.0 / (4.0 * nv);
+  return {D * G * scale, (dD_dc * dc * G + D * dG) * scale, dD_dm * G * scale};
+}
+
+cv::Vec3f specularShading(const Light& light, const Gloss& gloss, const Eigen::Vector3f& n, const Eigen::Vector3f& view,
+                          float sun) {
+  if (gloss.specular <= 0.0f || sun <= 0.0f) return {};
+  return light.sun * (gloss.specular * sun * torranceSparrow(n, light.direction, view, gloss.roughness));
 }
 
 }  // namespace calipso::render

@@ -1,107 +1,175 @@
 #include "calipso_render/light_fit.hpp"
 
+#include <ceres/ceres.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "light_search.hpp"
+#include "reflectance_cost.hpp"
 
 namespace calipso::render {
 namespace {
 
-constexpr int kDirections = 400;     // tried over the upper hemisphere
 constexpr int kFewestSamples = 60;
-constexpr float kLowestSun = 0.08f;  // sine of its elevation
+constexpr std::size_t kStarts = 3;
+constexpr double kRobust = 0.15;        // relative residual beyond which a pixel counts less
+constexpr double kPriorWeight = 0.05;   // of one prior, as a part of all pixels
 
-// Evenly spread over the sphere (Fibonacci), those above the horizon.
-std::vector<Eigen::Vector3f> candidateDirections(const Eigen::Vector3f& up) {
-  std::vector<Eigen::Vector3f> directions;
-  for (int i = 0; i < kDirections * 2; ++i) {
-    const float z = 1.0f - (2 * i + 1.0f) / (2 * kDirections), r = std::sqrt(1.0f - z * z), a = i * 2.39996323f;
-    const Eigen::Vector3f d(r * std::cos(a), r * std::sin(a), z);
-    if (d.dot(up) > kLowestSun) directions.push_back(d);
+// Every parameter of the model; blocks as in ReflectanceCost.
+struct Unknowns {
+  Eigen::Vector3d direction, ambient, sun;
+  double gradient = kSkyGradient;
+  Eigen::Vector2d gloss = {std::log(0.03), std::log(0.3)};
+  std::vector<Eigen::Vector3d> albedos;
+};
+
+// Pulls a block of one number towards a value.
+class Prior : public ceres::SizedCostFunction<1, 1> {
+ public:
+  Prior(double value, double weight) : value_(value), weight_(weight) {}
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    residual[0] = weight_ * (x[0][0] - value_);
+    if (jacobians != nullptr && jacobians[0] != nullptr) jacobians[0][0] = weight_;
+    return true;
   }
-  return directions;
-}
 
-// Sums of one cluster's channel for the line I = x + y max(0, n.l).
-struct LineSums {
-  double n = 0, s = 0, ss = 0, i = 0, si = 0, ii = 0;
+ private:
+  double value_, weight_;
 };
 
-struct Line {
-  double ambient, sun, error;
-};
-
-// Least squares with both parts kept positive.
-Line fitLine(const LineSums& m) {
-  const double determinant = m.n * m.ss - m.s * m.s;
-  double sun = determinant > 1e-9 ? (m.n * m.si - m.s * m.i) / determinant : 0.0;
-  double ambient = (m.i - sun * m.s) / m.n;
-  if (sun < 0.0) sun = 0.0, ambient = m.i / m.n;
-  if (ambient < 0.0) ambient = 0.0, sun = m.ss > 0.0 ? m.si / m.ss : 0.0;
-  const double error = m.ii - 2.0 * (ambient * m.i + sun * m.si) + ambient * ambient * m.n +
-                       2.0 * ambient * sun * m.s + sun * sun * m.ss;
-  return {ambient, sun, error};
-}
-
-struct Candidate {
-  double error = 0.0;
-  cv::Vec3d ambient, sun;        // weighted over the clusters, of the cluster's mean radiance
-};
-
-// One straight line per cluster and channel; the errors count relative to the cluster's brightness.
-Candidate evaluate(const std::vector<LightSample>& samples, int clusters, const Eigen::Vector3f& l) {
-  std::vector<std::array<LineSums, 3>> sums(clusters);
-  for (const LightSample& x : samples) {
-    const double s = std::max(0.0f, x.normal.dot(l));
-    for (int c = 0; c < 3; ++c) {
-      LineSums& m = sums[x.cluster][c];
-      const double i = x.radiance[c];
-      m.n += 1, m.s += s, m.ss += s * s, m.i += i, m.si += s * i, m.ii += i * i;
+// The same for the logarithms of ks and m.
+class GlossPrior : public ceres::SizedCostFunction<2, 2> {
+ public:
+  explicit GlossPrior(double weight) : weight_(weight) {}
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const Unknowns typical;
+    for (int i = 0; i < 2; ++i) residual[i] = weight_ * (x[0][i] - typical.gloss[i]);
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      jacobians[0][0] = jacobians[0][3] = weight_;
+      jacobians[0][1] = jacobians[0][2] = 0.0;
     }
+    return true;
   }
-  Candidate total;
-  for (const auto& cluster : sums) {
-    for (int c = 0; c < 3; ++c) {
-      if (cluster[c].n < 8) continue;
-      const Line line = fitLine(cluster[c]);
-      const double mean = cluster[c].i / cluster[c].n + 1e-4;
-      total.error += line.error / (mean * mean);
-      total.ambient[c] += cluster[c].n * line.ambient / mean;
-      total.sun[c] += cluster[c].n * line.sun / mean;
-    }
-  }
-  return total;
+
+ private:
+  double weight_;
+};
+
+Eigen::Vector3d logOf(const cv::Vec3f& c) { return Eigen::Vector3d(c[0], c[1], c[2]).array().max(1e-4).log(); }
+
+cv::Vec3f expOf(const Eigen::Vector3d& x) {
+  return {static_cast<float>(std::exp(x[0])), static_cast<float>(std::exp(x[1])), static_cast<float>(std::exp(x[2]))};
 }
 
-Light defaultLight(const Eigen::Vector3f& up, const Eigen::Vector3f& view) {
-  Light light;
-  light.direction = (up + 0.4f * view).normalized();
-  return light;
+std::vector<cv::Vec3f> meanRadiance(const std::vector<LightSample>& samples, int clusters) {
+  std::vector<cv::Vec3f> sums(clusters);
+  std::vector<int> counts(clusters, 0);
+  for (const LightSample& s : samples) sums[s.cluster] += s.radiance, ++counts[s.cluster];
+  for (int k = 0; k < clusters; ++k) sums[k] = sums[k] * (1.0f / std::max(1, counts[k])) + cv::Vec3f::all(1e-3f);
+  return sums;
+}
+
+class Fit {
+ public:
+  Fit(const std::vector<LightSample>& samples, int clusters, const std::vector<Occluder>& occluders, const Eigen::Vector3f& up)
+      : samples_(samples), occluders_(occluders), up_(up.cast<double>()), means_(meanRadiance(samples, clusters)) {}
+
+  // Four passes, then everything; twice, since the shadows hang on the direction found.
+  double run(const LightCandidate& start, Unknowns& x) {
+    x.direction = start.direction.cast<double>();
+    x.ambient = logOf(start.ambient), x.sun = logOf(start.sun);
+    for (const cv::Vec3f& mean : means_) x.albedos.push_back(logOf(mean));
+    double cost = 0.0;
+    for (int round = 0; round < 2; ++round) {
+      using Blocks = std::array<bool, 3>;  // light, albedo, gloss free?
+      ceres::Problem problem;
+      build(problem, x);
+      for (const Blocks& free : {Blocks{true, false, false}, {false, true, false}, {false, false, true}, {true, true, true}}) {
+        cost = solve(problem, x, free);
+      }
+    }
+    return cost;
+  }
+
+ private:
+  void build(ceres::Problem& problem, Unknowns& x) const {
+    const ShadowMap shadows(occluders_, x.direction, {512, 0.02, 16});
+    for (const LightSample& s : samples_) {
+      ReflectanceCost::Sample r;
+      r.normal = s.normal.cast<double>(), r.view = s.view.cast<double>(), r.up = up_;
+      r.radiance = Eigen::Vector3d(s.radiance[0], s.radiance[1], s.radiance[2]);
+      r.visible = shadows.visibility(s.position, s.normal);
+      r.scale = (means_[s.cluster][0] + means_[s.cluster][1] + means_[s.cluster][2]) / 3.0;
+      problem.AddResidualBlock(new ReflectanceCost(r), new ceres::SoftLOneLoss(kRobust), x.direction.data(), x.ambient.data(),
+                               x.sun.data(), &x.gradient, x.albedos[s.cluster].data(), x.gloss.data());
+    }
+    const double weight = std::sqrt(kPriorWeight * samples_.size());
+    problem.AddResidualBlock(new Prior(kSkyGradient, 0.5 * weight), nullptr, &x.gradient);
+    problem.AddResidualBlock(new GlossPrior(0.05 * weight), nullptr, x.gloss.data());
+    problem.SetManifold(x.direction.data(), new ceres::SphereManifold<3>);
+    problem.SetParameterLowerBound(&x.gradient, 0, 0.0);
+    problem.SetParameterUpperBound(&x.gradient, 0, 0.9);
+    problem.SetParameterLowerBound(x.gloss.data(), 1, std::log(0.03));
+    problem.SetParameterUpperBound(x.gloss.data(), 1, std::log(0.8));
+    problem.SetParameterUpperBound(x.gloss.data(), 0, std::log(0.5));
+  }
+
+  static double solve(ceres::Problem& problem, Unknowns& x, const std::array<bool, 3>& free) {
+    const auto hold = [&](double* block, bool is_free) {
+      if (!problem.HasParameterBlock(block)) return;
+      if (is_free) problem.SetParameterBlockVariable(block);
+      else problem.SetParameterBlockConstant(block);
+    };
+    hold(x.direction.data(), free[0]), hold(x.sun.data(), free[0]), hold(&x.gradient, free[0]);
+    // Brightness is shared between light and albedo: the ambient light is the unit.
+    hold(x.ambient.data(), free[0] && !free[1]);
+    for (Eigen::Vector3d& a : x.albedos) hold(a.data(), free[1]);
+    hold(x.gloss.data(), free[2]);
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+    options.max_num_iterations = free[0] && free[1] ? 25 : 8;
+    options.logging_type = ceres::SILENT;
+    options.num_threads = 1;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem, &summary);
+    return summary.final_cost;
+  }
+
+  const std::vector<LightSample>& samples_;
+  const std::vector<Occluder>& occluders_;
+  Eigen::Vector3d up_;
+  std::vector<cv::Vec3f> means_;
+};
+
+LightFit toFit(const Unknowns& x, const Eigen::Vector3f& up, double cost) {
+  LightFit fit;
+  fit.determined = true;
+  fit.cost = cost;
+  fit.light.direction = x.direction.cast<float>();
+  fit.light.sun = expOf(x.sun), fit.light.ambient[0] = expOf(x.ambient);
+  // Band 1 of the harmonics is ordered y, z, x.
+  for (int i = 0; i < 3; ++i) fit.light.ambient[1 + i] = fit.light.ambient[0] * (static_cast<float>(x.gradient) * up[(i + 1) % 3]);
+  fit.gloss = {static_cast<float>(std::exp(x.gloss[0])), static_cast<float>(std::exp(x.gloss[1]))};
+  for (const Eigen::Vector3d& a : x.albedos) fit.albedos.push_back(expOf(a));
+  return fit;
 }
 
 }  // namespace
 
-LightFit fitLight(const std::vector<LightSample>& samples, int clusters, const Eigen::Vector3f& up,
-                  const Eigen::Vector3f& view) {
-  LightFit fit;
-  fit.light = defaultLight(up, view);
-  if (static_cast<int>(samples.size()) < kFewestSamples) return fit;
-  Candidate best;
-  best.error = 1e300;
-  for (const Eigen::Vector3f& l : candidateDirections(up)) {
-    const Candidate candidate = evaluate(samples, clusters, l);
-    if (candidate.error >= best.error) continue;
-    best = candidate;
-    fit.light.direction = l;
+LightFit fitLight(const std::vector<LightSample>& samples, int clusters, const std::vector<Occluder>& occluders,
+                  const Eigen::Vector3f& up, const Eigen::Vector3f& view) {
+  LightFit best;
+  best.light.direction = (up + 0.4f * view).normalized();
+  if (static_cast<int>(samples.size()) < kFewestSamples) return best;
+  Fit fit(samples, clusters, occluders, up);
+  for (const LightCandidate& start : searchLight(samples, clusters, up, kStarts)) {
+    Unknowns x;
+    const double cost = fit.run(start, x);
+    if (!best.determined || cost < best.cost) best = toFit(x, up, cost);
   }
-  // Brightness is shared between light and albedo; the mean of ambient and sun is set to 1.
-  for (int c = 0; c < 3; ++c) {
-    const double total = best.ambient[c] + best.sun[c];
-    fit.light.ambient[0][c] = static_cast<float>(std::max(0.1, best.ambient[c] / total));
-    fit.light.sun[c] = static_cast<float>(std::max(0.0, best.sun[c] / total));
-  }
-  fit.residual = static_cast<float>(std::sqrt(best.error / (3.0 * samples.size())));
-  fit.determined = true;
-  return fit;
+  return best;
 }
 
 }  // namespace calipso::render

@@ -11,6 +11,7 @@ namespace calipso::render {
 namespace {
 
 constexpr float kShaded = 0.985f;       // visible fraction of the sun below which a pixel counts as shaded
+constexpr float kSkyShaded = 0.85f;     // the same for the sky: the dark line along a contact
 constexpr int kShadowMargin = 4;        // px added around the predicted shadow
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
 
@@ -66,7 +67,39 @@ cv::Vec3f measureUmbra(const cv::Mat& picture, const cv::Mat& plate, const cv::M
     }
     if (ratios.size() < 50) continue;
     std::nth_element(ratios.begin(), ratios.begin() + ratios.size() / 2, ratios.end());
-    umbra[c] = std::clamp(ratios[ratios.size() / 2], 0.1f, 0.95f);
+    // A shadow that is hardly darker than the light's own ratio says was not seen where it was predicted.
+    const float measured = ratios[ratios.size() / 2];
+    if (measured < 0.85f) umbra[c] = std::max(measured, 0.1f);
+  }
+  return umbra;
+}
+
+// The same from shadows that pass over the plate: the dark end of what darkens it.
+cv::Vec3f umbraOfPassing(const std::vector<ClipFrame>& frames, const std::vector<SupportPlane>& planes, const Background& background,
+                         const cv::Vec3f& predicted) {
+  std::vector<float> ratios[3];
+  for (const ClipFrame& f : frames) {
+    cv::Mat covered;
+    cv::dilate(f.labels != 0, covered, cv::Mat::ones(11, 11, CV_8U));
+    for (int v = 0; v < f.bgr.rows; v += 2) {
+      for (int u = 0; u < f.bgr.cols; u += 2) {
+        const bool quiet = background.count.at<std::uint8_t>(v, u) > 2 && background.spread.at<float>(v, u) < 5.0f;
+        if (!quiet || covered.at<std::uint8_t>(v, u) != 0) continue;
+        float ratio[3];
+        for (int c = 0; c < 3; ++c) {
+          const float lit = linearFromRealCode(background.plate.at<cv::Vec3f>(v, u)[c]);
+          ratio[c] = linearFromCode(f.bgr.at<cv::Vec3b>(v, u)[c]) / std::max(lit, 0.004f);
+        }
+        if (std::max({ratio[0], ratio[1], ratio[2]}) > 0.8f || !receiverAt(planes, f.camera, u, v)) continue;
+        for (int c = 0; c < 3; ++c) ratios[c].push_back(ratio[c]);
+      }
+    }
+  }
+  if (ratios[0].size() < 100) return predicted;
+  cv::Vec3f umbra;
+  for (int c = 0; c < 3; ++c) {
+    std::nth_element(ratios[c].begin(), ratios[c].begin() + ratios[c].size() / 3, ratios[c].end());
+    umbra[c] = std::clamp(ratios[c][ratios[c].size() / 3], 0.1f, 0.95f);
   }
   return umbra;
 }
@@ -102,19 +135,21 @@ std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
 }
 
 void prepareBackground(const std::vector<ClipFrame>& frames, const cv::Mat& picture, const ShadowMap& sun,
-                       const RenderParams& params, Prepared& p) {
+                       const ShadowMap& sky, const RenderParams& params, Prepared& p) {
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const bool all_move = std::find(p.moves.begin(), p.moves.end(), false) == p.moves.end();
   p.background = seenBackground(frames, any_moves, params.background);
   const cv::Mat visibility = planeVisibility(sun, params.planes, frames.front());
+  const cv::Mat sky_visibility = planeVisibility(sky, params.planes, frames.front());
   cv::Mat shaded;
   if (!all_move) {
     const cv::Size side(2 * kShadowMargin + 1, 2 * kShadowMargin + 1);
-    cv::dilate(visibility < kShaded, shaded, cv::getStructuringElement(cv::MORPH_ELLIPSE, side));
+    cv::dilate((visibility < kShaded) | (sky_visibility < kSkyShaded), shaded, cv::getStructuringElement(cv::MORPH_ELLIPSE, side));
   }
-  inventBackground(shaded, p.background);
+  inventBackground(shaded, frames.front(), p.background);
   p.plate_linear = linearOf(p.background.plate);
-  p.umbra = measureUmbra(picture, p.background.plate, visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));
+  p.umbra = any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
+                      : measureUmbra(picture, p.background.plate, visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));
 }
 
 void remark(const ClipSample& clip, Prepared& p) {
@@ -150,11 +185,14 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   int clusters = 0;
   const std::vector<LightSample> samples = lightSamples(actors, picture, p.key_labels, p.camera, clusters);
   const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
-  p.light = fitLight(samples, clusters, params.up.cast<float>(), view);
+  p.light = fitLight(samples, clusters, occluders(actors), params.up.cast<float>(), view);
   p.light.light.angular_radius = static_cast<float>(params.sun_radius);
   const ShadowMap sun(occluders(actors), p.light.light.direction.cast<double>(), {768, params.sun_radius, 16});
-  prepareBackground(frames, picture, sun, params, p);
-  p.appearances = makeAppearances(actors, picture, p.key_labels, p.camera, p.light.light, sun);
+  const std::vector<Occluder> above = params.planes.empty() ? std::vector<Occluder>{} : occluders(actors);
+  const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
+  const ShadowMap sky(above, up, {256, kSkyRadius, 24});
+  prepareBackground(frames, picture, sun, sky, params, p);
+  p.appearances = makeAppearances(actors, picture, p.key_labels, p.camera, p.light.light, p.light.gloss, sun);
   std::vector<cv::Mat> pictures;
   for (const ClipFrame& f : frames) pictures.push_back(f.bgr);
   p.noise = NoiseModel::estimate(pictures, steadiness > 1);

@@ -51,7 +51,7 @@ TEST(InventBackground, FillsOnlyTheHole) {
   Background b = seenBackground(wanderingSquare(1), false);
   const cv::Mat before = b.plate.clone(), hole = b.invented.clone();
   ASSERT_GT(cv::countNonZero(hole), 0);
-  inventBackground(cv::Mat(), b);
+  inventBackground(cv::Mat(), wanderingSquare(1).front(), b);
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       if (hole.at<std::uint8_t>(v, u) == 0) {

@@ -164,6 +164,7 @@ class Evaluation {
   std::shared_ptr<Prepared> unlit() const {
     auto flat = std::make_shared<Prepared>(*prepared_);
     flat->light.light.sun = {0, 0, 0};
+    flat->light.gloss = {};
     flat->light.light.ambient = {};
     flat->light.light.ambient[0] = {1, 1, 1};
     std::vector<Actor> actors;
@@ -171,7 +172,7 @@ class Evaluation {
     const ShadowMap none({}, Eigen::Vector3d::UnitZ(), {});
     cv::Mat key;
     loadFrame(scene_, 0).convertTo(key, CV_32F);
-    flat->appearances = makeAppearances(actors, key, flat->key_labels, scene_.camera, flat->light.light, none);
+    flat->appearances = makeAppearances(actors, key, flat->key_labels, scene_.camera, flat->light.light, {}, none);
     return flat;
   }
 

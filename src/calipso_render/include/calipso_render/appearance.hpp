@@ -23,8 +23,8 @@ class Appearance {
   cv::Vec3f mean_light;  // average shading over the seen surface: regularises the relighting
   Gloss gloss;
 
-  // Linear radiance of the point in light `now` (diffuseShading at its present place).
-  cv::Vec3f radiance(const SurfacePoint& point, const cv::Vec3f& now) const;
+  // Linear radiance of the point under diffuse shading `now` with highlight `highlight` at its place.
+  cv::Vec3f radiance(const SurfacePoint& point, const cv::Vec3f& now, const cv::Vec3f& highlight) const;
 
   // Linear reflectance of a surface point given at the key frame.
   cv::Vec3f albedoAt(const Eigen::Vector3f& key_position) const;
@@ -36,7 +36,8 @@ inline cv::Vec3f lightFloor(const cv::Vec3f& mean_light) { return mean_light * 0
 // @param key all objects at the key frame; @param picture CV_32FC3, code values
 // @param labels CV_8UC1 key frame; @param sun shadows at the key frame
 std::vector<Appearance> makeAppearances(const std::vector<Actor>& key, const cv::Mat& picture, const cv::Mat& labels,
-                                        const Camera& camera, const Light& light, const ShadowMap& sun);
+                                        const Camera& camera, const Light& light, const Gloss& gloss,
+                                        const ShadowMap& sun);
 
 // Bicubic (Catmull-Rom) lookup with borders repeated. (u, v) in the image's own pixels.
 cv::Vec3f sampleBicubic(const cv::Mat& image, float u, float v);

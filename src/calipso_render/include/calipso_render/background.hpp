@@ -14,6 +14,9 @@ struct Background {
   cv::Mat spread;  // CV_32FC1: median absolute deviation over time, code values
   cv::Mat invented;  // CV_8UC1: 255 where no frame shows it
   cv::Mat origin;  // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
+  // CV_16SC2: origin where that place moves by itself (clouds, water), so that a frame shows it best;
+  // (-1, -1) elsewhere. Empty if nothing moves.
+  cv::Mat live_origin;
 };
 
 struct BackgroundParams {
@@ -29,8 +32,9 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
                           const BackgroundParams& params = {});
 
 // Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects darken in
-// every frame), from the surroundings.
-void inventBackground(const cv::Mat& shaded, Background& background);
+// every frame), from the surroundings. Where the place moves by itself, the median is no picture of
+// it: there the key frame is what the surroundings look like.
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& background);
 
 // The key frame with its noise averaged away where the sample shows the same thing all the time
 // (same label, value within the noise); elsewhere the key frame itself. CV_32FC3, code values.

@@ -30,8 +30,20 @@ cv::Vec3f ambientAt(const Light& light, const Eigen::Vector3f& n);
 // Radiance of a white diffuse surface with unit normal n; `sun`, `sky`: visible fraction of each.
 cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky = 1.0f);
 
-// D G F / (4 n.v) of Torrance and Sparrow 1967, per ks (F: Schlick's form, divided by ks is near 1 away
-// from grazing angles; included by the caller's ks). l, v: unit, towards light and viewer.
+// D G / (4 n.v) of Torrance and Sparrow 1967 with unit ks, Beckmann's D times pi (the light's colour is
+// irradiance / pi). Zero where light or viewer are below the horizon. l, v: unit, towards light, viewer.
 float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v, float m);
+
+// The same with its derivatives. The derivative to l holds for l on the unit sphere.
+struct Lobe {
+  double value = 0.0;
+  Eigen::Vector3d by_light = Eigen::Vector3d::Zero();
+  double by_roughness = 0.0;
+};
+Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l, const Eigen::Vector3d& v, double m);
+
+// Radiance of the highlight: ks times the lobe times the visible sun.
+cv::Vec3f specularShading(const Light& light, const Gloss& gloss, const Eigen::Vector3f& n, const Eigen::Vector3f& view,
+                          float sun);
 
 }  // namespace calipso::render

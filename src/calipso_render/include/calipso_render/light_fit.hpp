@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calipso_render/light.hpp"
+#include "calipso_render/shadow_map.hpp"
 #include "calipso_render/stage.hpp"
 
 namespace calipso::render {
@@ -22,14 +23,18 @@ std::vector<LightSample> lightSamples(const std::vector<Actor>& actors, const cv
 
 struct LightFit {
   Light light;
+  Gloss gloss;                     // of all objects together
   std::vector<cv::Vec3f> albedos;  // per cluster, up to a common factor
   bool determined = false;         // false: too little was seen; the light is a default, high and frontal
-  float residual = 0.0f;           // root mean square, relative to the mean radiance
+  double cost = 0.0;               // of the last pass, half the robust sum of squares
 };
 
-// Sun direction, sun and ambient colour from shading.
+// Sun direction, sun and ambient colour, albedos and gloss from shading: a search over directions, then
+// four passes (light, diffuse, specular, roughness) and one with everything free, from each of the best
+// directions (paper: section 6). The objects shade themselves and each other.
 // @param up unit vector against gravity: the sun is not below the horizon
-LightFit fitLight(const std::vector<LightSample>& samples, int clusters, const Eigen::Vector3f& up,
-                  const Eigen::Vector3f& view);
+// @param view unit vector towards the camera, for the default
+LightFit fitLight(const std::vector<LightSample>& samples, int clusters, const std::vector<Occluder>& occluders,
+                  const Eigen::Vector3f& up, const Eigen::Vector3f& view);
 
 }  // namespace calipso::render

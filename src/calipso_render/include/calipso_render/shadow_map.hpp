@@ -13,6 +13,9 @@ struct Occluder {
   const Triangles* triangles;
 };
 
+// Half the angle of the disc of sky that shades softly near contact, rad.
+constexpr double kSkyRadius = 0.8;
+
 // How much of a distant disc of light each point sees, from one depth map towards the disc's centre
 // (percentage-closer soft shadows, Fernando 2005: the blockers' mean height sets the penumbra).
 class ShadowMap {

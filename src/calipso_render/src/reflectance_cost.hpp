@@ -1,0 +1,34 @@
+#pragma once
+
+#include <ceres/sized_cost_function.h>
+
+#include <Eigen/Core>
+
+namespace calipso::render {
+
+// What one pixel's three channels say about light and material (paper: section 6, eqs. 10, 11).
+//   r = (a E - I + ks T L V) / scale,  E = A (1 + g n.up) + L V max(0, n.l),  T: torranceSparrow(n, l, v, m)
+// Parameter blocks, colours as logarithms so that they stay positive:
+//   0  l   direction to the sun, unit, world   3
+//   1  A   ambient light                       3
+//   2  L   sun                                 3
+//   3  g   how much brighter the sky is        1
+//   4  a   albedo of the pixel's cluster       3
+//   5  log ks, log m                           2
+class ReflectanceCost : public ceres::SizedCostFunction<3, 3, 3, 3, 1, 3, 2> {
+ public:
+  struct Sample {
+    Eigen::Vector3d normal, view, up;  // unit, world
+    Eigen::Vector3d radiance;          // I, linear B, G, R
+    double visible = 1.0;              // V
+    double scale = 1.0;
+  };
+  explicit ReflectanceCost(const Sample& sample) : s_(sample) {}
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  Sample s_;
+};
+
+}  // namespace calipso::render
