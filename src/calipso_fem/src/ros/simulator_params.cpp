@@ -72,8 +72,8 @@ SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
   w.fem.material_model =
       materialModelFromString(pnh.param("material_model", toString(w.fem.material_model)));
   w.fem.solver = solverKindFromString(pnh.param("solver", toString(w.fem.solver)));
-  w.fem.newton_iterations = pnh.param("newton_iterations", w.fem.newton_iterations);
-  w.fem.newton_tolerance = pnh.param("newton_tolerance", w.fem.newton_tolerance);
+  w.fem.newton_iterations = pnh.param("newton_iterations", 8);
+  w.fem.newton_tolerance = pnh.param("newton_tolerance", 1e-3);
   w.fem.linear_tolerance = pnh.param("linear_tolerance", w.fem.linear_tolerance);
   readObjects(pnh, w);
   validate(w);

@@ -135,7 +135,7 @@ void SurfaceTree::improve(int f, const Eigen::Vector3d& point, double& squared,
   const Eigen::Vector3d w = closestBarycentric(point, a, b, c);
   const Eigen::Vector3d q = w[0] * a + w[1] * b + w[2] * c;
   const double squared_distance = (point - q).squaredNorm();
-  if (squared_distance >= squared) return;
+  if (!(squared_distance < squared)) return;  // also for triangles without area
   squared = squared_distance;
   hit.triangle = f;
   hit.barycentric = w;
@@ -167,6 +167,7 @@ std::optional<SurfaceHit> SurfaceTree::nearest(const Eigen::Vector3d& point, dou
   const double sign = offset.dot(pseudo) < 0.0 ? -1.0 : 1.0;
   hit.distance = sign * offset.norm();
   hit.normal = std::abs(hit.distance) > 1e-6 * reach ? Eigen::Vector3d(offset / hit.distance) : pseudo;
+  if (hit.normal.squaredNorm() < 0.5) return std::nullopt;  // on a triangle without area
   return hit;
 }
 

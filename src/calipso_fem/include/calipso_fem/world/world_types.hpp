@@ -66,7 +66,7 @@ struct ObjectSettings {
 struct WorldParams {
   double frame_period = 1.0 / 30.0;  // s; steps are whole fractions of it
   double pixel_error = 0.5;          // px, discretisation error the resolution is chosen for
-  int max_nodes = 2000;              // per deformable object
+  int max_nodes = 1200;              // per deformable object
   int max_substeps = 2;              // of deformable objects, per frame
   FemOptions fem;                    // cell_size and target_nodes are chosen per object
   double proximity = 0.0;            // m, minimal distance of surfaces; 0: a fiftieth of the smallest object
