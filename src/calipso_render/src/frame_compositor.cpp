@@ -57,11 +57,18 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   return appearance.radiance(p, diffuseShading(light, p.normal, sun), highlight);
 }
 
+// Something without a model stands in front: it hid the object at the key frame, and goes on doing so.
+bool FrameCompositor::hiddenByFront(int surface, int u, int v) const {
+  const cv::Mat& front = fronts_[surface];
+  return !front.empty() && front.at<std::uint8_t>(v, u) != 0;
+}
+
 // An edited object is drawn; another one only where the original picture does not show it.
 bool FrameCompositor::isDrawn(std::uint32_t id, int u, int v) const {
   if (id == VisibilityBuffer::kNothing) return false;
-  const bool edited = edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]];
-  return edited || removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
+  const int surface = surface_of_slot_[VisibilityBuffer::objectOf(id)];
+  if (hiddenByFront(surface, u, v)) return false;
+  return edited_[surface] || removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
 }
 
 FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
@@ -100,12 +107,12 @@ FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
   const auto receiver = receiverAt(params_.planes, frame_.camera, u, v);
   if (!receiver) return behind;
   const Eigen::Vector3f &p = receiver->position, &n = receiver->normal;
-  const float moved = moved_shadow_->visibility(p, n), sky = moved_sky_->visibility(p, n);
+  const float moved = moved_shadow_->visibility(p, n), sky = sky_now_.at<float>(v - region_.y, u - region_.x);
   if (removed) {
     behind.colour = behind.colour.mul(shadowRatio(moved * shadows_.others->visibility(p, n), sky));
     return behind;
   }
-  const float original = shadows_.originals->visibility(p, n), original_sky = shadows_.originals_sky->visibility(p, n);
+  const float original = shadows_.originals->visibility(p, n), original_sky = sky_before_.at<float>(v - region_.y, u - region_.x);
   if (std::abs(moved - original) + std::abs(sky - original_sky) < kSameShadow) return behind;
   const float others = shadows_.others->visibility(p, n);
   const cv::Vec3f now = shadowRatio(others * moved, sky), before = shadowRatio(others * original, original_sky);
@@ -139,7 +146,7 @@ void FrameCompositor::composePixel(int u, int v, FrameOutput& out) const {
   if (drawn.cover == 0.0f && behind.source == kOriginal) return;
   // Where the surface rests, the frame's own pixel is the best picture of it.
   const bool original_here = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
-  const float keep = original_here ? still : 0.0f;
+  const float keep = original_here || drawn.cover > 0.0f ? still : 0.0f;
   if (keep >= 0.999f) return;
   cv::Vec3f colour = drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour;
   colour = keep * linearPixel(frame_.bgr, u, v) + (1.0f - keep) * colour;

@@ -11,9 +11,9 @@ namespace calipso::render {
 // Shadow maps that stay the same while the same objects are edited.
 struct ShadowCache {
   std::vector<bool> edited;              // per surface: which ones the maps are for
-  std::unique_ptr<ShadowMap> others;     // of what is not edited
-  std::unique_ptr<ShadowMap> originals;  // of the edited objects where the video has them
-  std::unique_ptr<ShadowMap> originals_sky;  // the same against the sky above the support plane
+  std::unique_ptr<Visibility> others;     // of what is not edited
+  std::unique_ptr<Visibility> originals;  // of the edited objects where the video has them
+  std::unique_ptr<Visibility> originals_sky;  // the same against the sky above the support plane
 };
 
 // One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.
@@ -37,16 +37,19 @@ class FrameCompositor {
   };
 
   void stage();
+  bool restsAt(int surface) const;
   void prepareShadows();
   void chooseRegion();
   void findRemoved();
   void findPassingShadows();
   void drawVisibility();
   void findStill();
+  void measureSky();
   void composePixel(int u, int v, FrameOutput& out) const;
   Behind behindAt(int u, int v) const;
   Behind revealedAt(int u, int v) const;
   Drawn drawnAt(int u, int v) const;
+  bool hiddenByFront(int surface, int u, int v) const;
   bool isDrawn(std::uint32_t id, int u, int v) const;
   cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
   float stillness(std::uint32_t id, float u, float v) const;
@@ -60,19 +63,22 @@ class FrameCompositor {
   const FrameInput& frame_;
   ShadowCache& shadows_;
 
+  std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame
   cv::Mat labels_, plate_;            // of this frame's view
   cv::Mat invented_;
   cv::Mat live_origin_;  // Background::live_origin, where the camera stands as at the key frame
   std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
   std::vector<bool> edited_;                  // per surface
+  std::vector<bool> at_rest_;                 // per surface: the video has it where the key frame has it
   std::vector<Actor> actors_;                 // visible ones, per slot
   std::vector<int> surface_of_slot_;
   std::vector<ScreenMesh> observed_;          // per slot: where the video has it (edited objects at rest only)
-  std::unique_ptr<ShadowMap> moved_shadow_;   // of the edited objects where they are now
-  std::unique_ptr<ShadowMap> moved_sky_;
+  std::unique_ptr<Visibility> moved_shadow_;   // of the edited objects where they are now
+  std::unique_ptr<Visibility> moved_sky_;
   cv::Rect region_;
   cv::Mat passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
+  cv::Mat sky_now_, sky_before_;  // CV_32FC1, at least region_: part of the sky that a support plane sees
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;

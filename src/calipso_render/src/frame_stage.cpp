@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "calipso_render/ray_shadow.hpp"
 #include "frame_compositor.hpp"
 #include "view_warp.hpp"
 
@@ -13,20 +14,25 @@ namespace {
 
 constexpr int kRegionMargin = 8;       // px
 constexpr int kShadowMapSide = 512;    // texels, live
-constexpr float kDarker = 0.94f;       // of the plate's brightness: a passing shadow
+constexpr int kSkyMapSide = 128;       // the same for the sky, which is soft
+constexpr int kSkyStep = 4;            // px between places where the sky is measured
+constexpr double kRestOverlap = 0.95;  // of masks: the object is where the key frame has it
+constexpr float kDarker = 0.97f;       // of the plate's brightness: a passing shadow
 constexpr float kQuiet = 5.0f;         // code values of spread over time: the background rests
 constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
 
 // The sky over a support plane as one wide light: near contact an object hides much of it.
-std::unique_ptr<ShadowMap> skyShadowOf(const std::vector<Occluder>& occluders, const RenderParams& params) {
+std::unique_ptr<Visibility> skyShadowOf(const std::vector<Occluder>& all, const RenderParams& params) {
+  const std::vector<Occluder> occluders = params.planes.empty() ? std::vector<Occluder>{} : all;
   const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
-  return std::make_unique<ShadowMap>(params.planes.empty() ? std::vector<Occluder>{} : occluders, up, ShadowMap::Params{256, kSkyRadius, 24});
+  if (params.quality == Quality::kFinal) return std::make_unique<RayShadow>(occluders, up, RayShadow::Params{kSkyRadius, 48});
+  return std::make_unique<ShadowMap>(occluders, up, ShadowMap::Params{kSkyMapSide, kSkyRadius, 24});
 }
 
-std::unique_ptr<ShadowMap> shadowOf(const std::vector<Occluder>& occluders, const Light& light, const RenderParams& params) {
-  const bool final_path = params.quality == Quality::kFinal;
-  const ShadowMap::Params map{final_path ? 2 * kShadowMapSide : kShadowMapSide, params.sun_radius, final_path ? 32 : 16};
-  return std::make_unique<ShadowMap>(occluders, light.direction.cast<double>(), map);
+std::unique_ptr<Visibility> shadowOf(const std::vector<Occluder>& occluders, const Light& light, const RenderParams& params) {
+  const Eigen::Vector3d direction = light.direction.cast<double>();
+  if (params.quality == Quality::kFinal) return std::make_unique<RayShadow>(occluders, direction, RayShadow::Params{params.sun_radius, 24});
+  return std::make_unique<ShadowMap>(occluders, direction, ShadowMap::Params{kShadowMapSide, params.sun_radius, 16});
 }
 
 }  // namespace
@@ -49,6 +55,7 @@ FrameOutput FrameCompositor::run() {
   findRemoved();
   drawVisibility();
   findStill();
+  measureSky();
 #pragma omp parallel for schedule(static)
   for (int v = region_.y; v < region_.y + region_.height; ++v) {
     for (int u = region_.x; u < region_.x + region_.width; ++u) composePixel(u, v, out);
@@ -66,6 +73,7 @@ void FrameCompositor::stage() {
     states_[it - surfaces.begin()] = &o;
     edited_[it - surfaces.begin()] = o.edited || o.removed;
   }
+  for (std::size_t i = 0; i < surfaces.size(); ++i) at_rest_.push_back(restsAt(static_cast<int>(i)));
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ObjectInFrame* o = states_[i];
     if (o != nullptr && o->removed) continue;
@@ -78,13 +86,14 @@ void FrameCompositor::stage() {
     }
     actors_.push_back(makeActor(surfaces[i], std::move(vertices), frame_.camera));
     surface_of_slot_.push_back(static_cast<int>(i));
-    const bool at_rest = edited_[i] && !prepared_.moves[i];
-    observed_.push_back(at_rest ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
+    observed_.push_back(edited_[i] && at_rest_[i] ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
   }
+  fronts_.assign(surfaces.size(), cv::Mat());
   plate_ = prepared_.plate_linear;
   invented_ = prepared_.background.invented;
   if (sameView(frame_.camera, prepared_.camera)) {
     live_origin_ = prepared_.background.live_origin;
+    fronts_ = prepared_.fronts;
   } else {
     const cv::Mat map = viewWarp(params_.planes, prepared_.camera, frame_.camera);
     cv::Mat plate, invented;
@@ -92,6 +101,32 @@ void FrameCompositor::stage() {
     cv::remap(invented_, invented, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));
     plate_ = plate, invented_ = invented;
   }
+}
+
+// An object at rest in the video, or one that moves but is seen where it was at the key frame.
+bool FrameCompositor::restsAt(int surface) const {
+  if (!prepared_.moves[surface]) return true;
+  const int index = prepared_.surfaces[surface].index;
+  const cv::Mat now = labels_ == index, key = prepared_.key_labels == index;
+  return cv::countNonZero(now & key) > kRestOverlap * cv::countNonZero(now | key);
+}
+
+// The sky changes slowly over a support plane: measured on a grid, interpolated between.
+void FrameCompositor::measureSky() {
+  const cv::Size size(region_.width / kSkyStep + 2, region_.height / kSkyStep + 2);
+  sky_now_ = cv::Mat(size, CV_32F, cv::Scalar(1.0f));
+  sky_before_ = sky_now_.clone();
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      const auto r = receiverAt(params_.planes, frame_.camera, region_.x + u * kSkyStep, region_.y + v * kSkyStep);
+      if (!r) continue;
+      sky_now_.at<float>(v, u) = moved_sky_->visibility(r->position, r->normal);
+      sky_before_.at<float>(v, u) = shadows_.originals_sky->visibility(r->position, r->normal);
+    }
+  }
+  cv::resize(sky_now_, sky_now_, {}, kSkyStep, kSkyStep, cv::INTER_LINEAR);
+  cv::resize(sky_before_, sky_before_, {}, kSkyStep, kSkyStep, cv::INTER_LINEAR);
 }
 
 void FrameCompositor::prepareShadows() {
@@ -169,7 +204,7 @@ void FrameCompositor::findPassingShadows() {
   passing_ = ratio_now < ratio_plate;
   passing_ &= (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet) & (labels_ == 0);
   cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
-  cv::dilate(passing_, passing_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
+  cv::dilate(passing_, passing_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {13, 13}));
 }
 
 void FrameCompositor::findRemoved() {
@@ -210,7 +245,7 @@ void FrameCompositor::findStill() {
   }
   // The rim of the original's pixels belongs to the surface beside it.
   cv::Mat nearby;
-  const int side = 4 * params_.background.mask_margin_px + 1;
+  const int side = 8 * params_.background.mask_margin_px + 1;
   cv::dilate(still_, nearby, cv::Mat::ones(side, side, CV_8U));
   nearby.copyTo(still_, covered == 0);
 }

@@ -15,6 +15,7 @@ namespace {
 constexpr int kFewestSamples = 60;
 constexpr std::size_t kStarts = 3;
 constexpr double kRobust = 0.15;        // relative residual beyond which a pixel counts less
+constexpr double kLogRange = 4.0;       // of a light's colour: e^4 times brighter or darker than the unit
 constexpr double kPriorWeight = 0.05;   // of one prior, as a part of all pixels
 
 // Every parameter of the model; blocks as in ReflectanceCost.
@@ -109,6 +110,10 @@ class Fit {
     problem.AddResidualBlock(new Prior(kSkyGradient, 0.5 * weight), nullptr, &x.gradient);
     problem.AddResidualBlock(new GlossPrior(0.05 * weight), nullptr, x.gloss.data());
     problem.SetManifold(x.direction.data(), new ceres::SphereManifold<3>);
+    for (int c = 0; c < 3; ++c) {
+      problem.SetParameterLowerBound(x.sun.data(), c, -kLogRange), problem.SetParameterUpperBound(x.sun.data(), c, kLogRange);
+      problem.SetParameterLowerBound(x.ambient.data(), c, -kLogRange), problem.SetParameterUpperBound(x.ambient.data(), c, kLogRange);
+    }
     problem.SetParameterLowerBound(&x.gradient, 0, 0.0);
     problem.SetParameterUpperBound(&x.gradient, 0, 0.9);
     problem.SetParameterLowerBound(x.gloss.data(), 1, std::log(0.03));
@@ -167,7 +172,8 @@ LightFit fitLight(const std::vector<LightSample>& samples, int clusters, const s
   for (const LightCandidate& start : searchLight(samples, clusters, up, kStarts)) {
     Unknowns x;
     const double cost = fit.run(start, x);
-    if (!best.determined || cost < best.cost) best = toFit(x, up, cost);
+    const bool above = x.direction.dot(up.cast<double>()) > 0.0;
+    if (above && (!best.determined || cost < best.cost)) best = toFit(x, up, cost);
   }
   return best;
 }

@@ -12,6 +12,7 @@ namespace {
 
 constexpr float kShaded = 0.985f;       // visible fraction of the sun below which a pixel counts as shaded
 constexpr float kSkyShaded = 0.85f;     // the same for the sky: the dark line along a contact
+constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and model are misfit
 constexpr int kShadowMargin = 4;        // px added around the predicted shadow
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
 
@@ -128,6 +129,26 @@ std::vector<Actor> keyActors(const Prepared& p) {
   return actors;
 }
 
+// Where an object's surface should be seen at the key frame but no mask is, something stands before it.
+// The rim is left out: there the fit is not exact.
+std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p) {
+  std::vector<cv::Mat> fronts;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    cv::Mat front = cv::Mat::zeros(p.key_labels.size(), CV_8U);
+    VisibilityBuffer buffer({0, 0, front.cols, front.rows});
+    buffer.draw(actors[i].screen, 0);
+    for (int v = 0; v < front.rows; ++v) {
+      for (int u = 0; u < front.cols; ++u) {
+        if (buffer.ids(v)[u] != VisibilityBuffer::kNothing && p.key_labels.at<std::uint8_t>(v, u) == 0) front.at<std::uint8_t>(v, u) = 255;
+      }
+    }
+    cv::morphologyEx(front, front, cv::MORPH_OPEN, cv::Mat::ones(kFrontOpening, kFrontOpening, CV_8U));
+    const bool usable = !p.moves[i] && cv::countNonZero(front) > 0;
+    fronts.push_back(usable ? front : cv::Mat());
+  }
+  return fronts;
+}
+
 std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
   std::vector<Occluder> all;
   for (const Actor& a : actors) all.push_back({&a.vertices, &a.surface->triangles});
@@ -192,6 +213,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
   const ShadowMap sky(above, up, {256, kSkyRadius, 24});
   prepareBackground(frames, picture, sun, sky, params, p);
+  p.fronts = frontsOf(actors, p);
   p.appearances = makeAppearances(actors, picture, p.key_labels, p.camera, p.light.light, p.light.gloss, sun);
   std::vector<cv::Mat> pictures;
   for (const ClipFrame& f : frames) pictures.push_back(f.bgr);

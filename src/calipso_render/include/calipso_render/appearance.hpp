@@ -9,10 +9,10 @@
 
 namespace calipso::render {
 
-// An object's reflectance as a picture: the key frame divided by the light that fell on the surface
-// there. A surface point is coloured by the pixel in which the key frame's camera saw it, so that what
-// is drawn where it was seen is the key frame again. A point that was not seen takes the colour of its
-// mirror image if the object is symmetric and that was seen, else the colour in front of it.
+// An object's reflectance as a picture: the key frame, its highlights taken off, divided by the light
+// that fell on the surface there. A surface point is coloured by the pixel in which the key frame's
+// camera saw it, so that what is drawn where it was seen is the key frame again. A point that was not
+// seen takes the reflectance of the surface in front of it: continuous at the silhouette.
 class Appearance {
  public:
   // Pixel-wise reflectance (linear; CV_32FC3), extended beyond the silhouette.

@@ -61,6 +61,7 @@ struct Prepared {
   std::vector<bool> moves;          // per surface: it moves in the video
   std::vector<Appearance> appearances;
   LightFit light;
+  std::vector<cv::Mat> fronts;      // per surface, CV_8UC1: places where something unmodelled stands before it
   Background background;
   cv::Mat plate_linear;             // CV_32FC3
   cv::Vec3f umbra = {0.4f, 0.4f, 0.4f};  // what the sun's absence leaves of a support plane's brightness

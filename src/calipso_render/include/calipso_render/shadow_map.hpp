@@ -3,22 +3,16 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "calipso_render/rasterizer.hpp"
+#include "calipso_render/visibility.hpp"
 
 namespace calipso::render {
-
-// A mesh in the world that can stop light.
-struct Occluder {
-  const Points* vertices;  // world, m
-  const Triangles* triangles;
-};
 
 // Half the angle of the disc of sky that shades softly near contact, rad.
 constexpr double kSkyRadius = 0.8;
 
 // How much of a distant disc of light each point sees, from one depth map towards the disc's centre
 // (percentage-closer soft shadows, Fernando 2005: the blockers' mean height sets the penumbra).
-class ShadowMap {
+class ShadowMap : public Visibility {
  public:
   struct Params {
     int resolution = 768;          // texels along the longer side
@@ -30,8 +24,7 @@ class ShadowMap {
   ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector3d& direction,
             const Params& params);
 
-  // Visible fraction of the light, 0..1, from world point p with unit normal n.
-  float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
+  float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const override;
 
   // Length of a texel, m.
   float texel() const { return texel_; }

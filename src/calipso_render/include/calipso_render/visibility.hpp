@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "calipso_render/rasterizer.hpp"
+
+namespace calipso::render {
+
+// A mesh in the world that can stop light.
+struct Occluder {
+  const Points* vertices;  // world, m
+  const Triangles* triangles;
+};
+
+// How much of a distant disc of light the points of the scene see.
+class Visibility {
+ public:
+  virtual ~Visibility() = default;
+
+  // Visible fraction of the light, 0..1, from world point p with unit normal n. Thread-safe.
+  virtual float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const = 0;
+};
+
+}  // namespace calipso::render

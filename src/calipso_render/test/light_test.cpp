@@ -1,0 +1,124 @@
+#include "calipso_render/light.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "calipso_render/light_fit.hpp"
+#include "calipso_render/ray_shadow.hpp"
+#include "reflectance_cost.hpp"
+
+namespace calipso::render {
+namespace {
+
+const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
+
+Eigen::Vector3d direction(double x, double y, double z) { return Eigen::Vector3d(x, y, z).normalized(); }
+
+TEST(DiffuseShading, SunAddsItsCosine) {
+  Light light;
+  light.ambient[0] = {0.2f, 0.2f, 0.2f}, light.sun = {0.6f, 0.5f, 0.4f};
+  const Eigen::Vector3f slanted = Eigen::Vector3f(0.6f, 0.0f, 0.8f);
+  EXPECT_NEAR(diffuseShading(light, slanted, 1.0f)[0], 0.2f + 0.6f * 0.8f, 1e-6f);
+  EXPECT_NEAR(diffuseShading(light, slanted, 0.0f)[0], 0.2f, 1e-6f);
+  EXPECT_NEAR(diffuseShading(light, -slanted, 1.0f)[2], 0.2f, 1e-6f);  // turned away
+}
+
+TEST(TorranceSparrow, PeaksAtTheMirrorDirectionOfSmoothSurfaces) {
+  const Eigen::Vector3f n = Eigen::Vector3f::UnitZ(), l = Eigen::Vector3f(0.6f, 0, 0.8f);
+  EXPECT_GT(torranceSparrow(n, l, {-0.6f, 0, 0.8f}, 0.1f), 100.0f * torranceSparrow(n, l, {0.6f, 0, 0.8f}, 0.1f));
+  EXPECT_EQ(torranceSparrow(n, {0.6f, 0, -0.8f}, {-0.6f, 0, 0.8f}, 0.1f), 0.0f);  // light from below
+}
+
+TEST(TorranceSparrow, LobeAgreesWithItsFloatTwin) {
+  const Eigen::Vector3d n = direction(0.1, 0.2, 1), l = direction(0.5, -0.3, 0.8), v = direction(-0.4, 0.5, 0.7);
+  const double twin = torranceSparrow(n.cast<float>(), l.cast<float>(), v.cast<float>(), 0.3f);
+  EXPECT_NEAR(torranceSparrowLobe(n, l, v, 0.3).value, twin, 1e-5 * twin + 1e-7);
+}
+
+// Every block of the Jacobian against central differences.
+TEST(ReflectanceCost, DerivativesMatchDifferences) {
+  ReflectanceCost::Sample s;
+  s.normal = direction(0.2, -0.3, 0.9), s.view = direction(-0.3, -0.6, 0.7), s.up = kUp;
+  s.radiance = {0.2, 0.3, 0.4}, s.visible = 0.8, s.scale = 0.3;
+  const ReflectanceCost cost(s);
+  const int sizes[] = {3, 3, 3, 1, 3, 2};
+  for (const double m : {0.15, 0.5}) {
+    std::vector<std::vector<double>> x = {{0, 0, 0}, {-1.0, -1.1, -0.9}, {-0.3, -0.4, -0.6}, {0.4}, {-0.7, -1.2, -0.5}, {std::log(0.1), std::log(m)}};
+    const Eigen::Vector3d l = direction(0.4, -0.1, 0.8);
+    for (int i = 0; i < 3; ++i) x[0][i] = l[i];
+    std::vector<double*> blocks, jacobians;
+    std::vector<std::vector<double>> J;
+    for (int b = 0; b < 6; ++b) blocks.push_back(x[b].data()), J.emplace_back(3 * sizes[b]);
+    for (auto& j : J) jacobians.push_back(j.data());
+    double r[3], plus[3], minus[3];
+    ASSERT_TRUE(cost.Evaluate(blocks.data(), r, jacobians.data()));
+    // The direction lives on the sphere: compared along tangents, stepping on the sphere.
+    const Eigen::Vector3d tangents[] = {l.unitOrthogonal(), l.cross(l.unitOrthogonal())};
+    const double h = 1e-6;
+    for (const Eigen::Vector3d& t : tangents) {
+      const auto at = [&](double step, double* out) {
+        const Eigen::Vector3d moved = (l + step * t).normalized();
+        for (int i = 0; i < 3; ++i) x[0][i] = moved[i];
+        cost.Evaluate(blocks.data(), out, nullptr);
+      };
+      at(h, plus), at(-h, minus), at(0.0, r);
+      for (int c = 0; c < 3; ++c) {
+        const double analytic = J[0][3 * c] * t[0] + J[0][3 * c + 1] * t[1] + J[0][3 * c + 2] * t[2];
+        EXPECT_NEAR(analytic, (plus[c] - minus[c]) / (2 * h), 1e-5) << "direction, m = " << m;
+      }
+    }
+    for (int b = 1; b < 6; ++b) {
+      for (int i = 0; i < sizes[b]; ++i) {
+        const double kept = x[b][i];
+        x[b][i] = kept + h, cost.Evaluate(blocks.data(), plus, nullptr);
+        x[b][i] = kept - h, cost.Evaluate(blocks.data(), minus, nullptr);
+        x[b][i] = kept;
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(J[b][c * sizes[b] + i], (plus[c] - minus[c]) / (2 * h), 1e-6) << b << ", " << i;
+      }
+    }
+  }
+}
+
+// Half a ball of one colour in known light.
+std::vector<LightSample> ballSamples(const Eigen::Vector3f& sun) {
+  std::vector<LightSample> samples;
+  const Eigen::Vector3f view(0, -1, 0);
+  for (int i = 0; i < 1200; ++i) {
+    const float z = 1.0f - (2 * i + 1) / 1200.0f, r = std::sqrt(1.0f - z * z), a = i * 2.39996f;
+    const Eigen::Vector3f n(r * std::cos(a), r * std::sin(a), z);
+    if (n.dot(view) < 0.2f) continue;
+    const float shade = 0.3f * (1.0f + 0.45f * n.z()) + 0.6f * std::max(0.0f, n.dot(sun));
+    samples.push_back({n, n, view, cv::Vec3f(0.2f, 0.4f, 0.6f) * shade, 0});
+  }
+  return samples;
+}
+
+TEST(FitLight, FindsTheSunOfABall) {
+  const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
+  const LightFit fit = fitLight(ballSamples(sun), 1, {}, kUp.cast<float>(), {0, -1, 0});
+  ASSERT_TRUE(fit.determined);
+  EXPECT_GT(fit.light.direction.dot(sun), std::cos(2.0 * M_PI / 180.0));  // 2 degrees: the gloss prior's pull
+  EXPECT_NEAR(fit.light.sun[1] / fit.light.ambient[0][1], 2.0f, 0.2f);
+}
+
+TEST(FitLight, SaysWhenThereIsTooLittleToSee) {
+  const LightFit fit = fitLight({}, 0, {}, kUp.cast<float>(), {0, -1, 0});
+  EXPECT_FALSE(fit.determined);
+  EXPECT_GT(fit.light.direction.z(), 0.0f);
+}
+
+TEST(RayShadow, AgreesWithGeometry) {
+  const Points roof = {{-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1}};
+  const Triangles faces = {{0, 1, 2}, {0, 2, 3}};
+  const RayShadow rays({{&roof, &faces}}, kUp, {0.05, 64});
+  const Eigen::Vector3f up = Eigen::Vector3f::UnitZ();
+  EXPECT_FLOAT_EQ(rays.visibility({0, 0, 0}, up), 0.0f);
+  EXPECT_FLOAT_EQ(rays.visibility({2, 0, 0}, up), 1.0f);
+  EXPECT_NEAR(rays.visibility({1, 0, 0}, up), 0.5f, 0.1f);  // half of the disc, by symmetry
+  EXPECT_FLOAT_EQ(RayShadow({}, kUp, {}).visibility({0, 0, 0}, up), 1.0f);
+}
+
+}  // namespace
+}  // namespace calipso::render
