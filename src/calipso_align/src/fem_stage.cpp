@@ -112,7 +112,8 @@ struct ElasticFit::Impl {
         x(vectorOf(placed(grid.nodes))),
         x0(x),
         model(restMesh(grid, Eigen::Map<const Points>(x.data(), grid.nodeCount(), 3)),
-              unitMaterial(o.poissons_ratio), fem::MaterialModel::kCorotated,
+              unitMaterial(o.poissons_ratio),
+              o.linear ? fem::MaterialModel::kLinear : fem::MaterialModel::kCorotated,
               fem::ElementType::kHexQ1),
         volume(model.totalMass()),
         size(boundingDiagonal(cad)) {}

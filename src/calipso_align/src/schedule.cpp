@@ -7,6 +7,8 @@
 namespace calipso::align {
 namespace {
 
+constexpr double kElasticWeight = 3e3;  // of the finished fit: see FemStageOptions
+
 double knob(const char* name, double value) {
   const char* text = std::getenv(name);
   return text ? std::atof(text) : value;
@@ -44,6 +46,33 @@ LowOrderStageOptions stage(const LowOrderPrior& prior, int iterations) {
   return options;
 }
 
+// Eq. 9 as it stands: pairs of nearest points, all of one weight, held to 4 px.
+void makeLiteral(MeasureSettings& settings) {
+  constexpr double kEverywherePx = 1e4;
+  settings.contour.robust_px = settings.contour.reject_px = kEverywherePx;
+  settings.contour.reject_cosine = -1.0;
+  settings.contour.normal_scale_px = 0.0;
+  settings.contour.tangential = 1.0;
+  settings.contour.two_way = false;
+  settings.contour.dead_band_px = 4.0;
+}
+
+LowOrderStep literalRigidStep(const FitProblem& problem, const AlignOptions& options) {
+  LowOrderPrior prior = similarityPrior(problem, options);
+  prior.log_scale = 0.0;
+  return {"rigid", stage(prior, 15), {1.0, 1.0}, 0.04, {0.15, 0.10}, true};
+}
+
+ElasticStep literalElasticStep(const AlignOptions& options) {
+  ElasticStep step;
+  step.fit.nodes = options.levels.empty() ? 600 : options.levels.front();
+  step.fit.poissons_ratio = options.poissons_ratio;
+  step.fit.linear = true;
+  step.fit.elastic_weights.assign(20, options.elastic_weight * kElasticWeight);
+  step.literal = true;
+  return step;
+}
+
 }  // namespace
 
 double Ramp::at(int k, int count) const {
@@ -52,6 +81,7 @@ double Ramp::at(int k, int count) const {
 }
 
 std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOptions& options) {
+  if (options.method == Method::kLiteral) return {literalRigidStep(problem, options)};
   return {{"similarity", stage(similarityPrior(problem, options), 12), {0.10, 0.06},
            knob("K_SIGA", 0.1), {0.15, 0.10}},
           {"affine", stage(affinePrior(problem, options), 10), {0.06, 0.03},
@@ -72,16 +102,18 @@ MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, 
   settings.contour_correlation_px = knob("K_CORR", 10);
   settings.depth_robust = step.depth_robust.at(iteration, step.fit.iterations);
   settings.depth_sigma = 0.5 * step.sigma;
+  if (step.literal) makeLiteral(settings);
   return settings;
 }
 
 std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOptions& options) {
+  if (options.method == Method::kLiteral) return {literalElasticStep(options)};
   std::vector<ElasticStep> steps;
   const double noise = problem.target.noise_px;
   for (size_t level = 0; level < options.levels.size(); ++level) {
     const bool first = level == 0;
     const int iterations = first ? knob("K_N0", 10) : knob("K_N1", 4);
-    const double end = options.elastic_weight * knob("K_LAMBDA", 3e3);
+    const double end = options.elastic_weight * knob("K_LAMBDA", kElasticWeight);
     const Ramp stiffness{first ? knob("K_LAMBDA0", 3e5) : end, end};
     ElasticStep step;
     step.fit.nodes = options.levels[level];
@@ -107,6 +139,7 @@ MeasureSettings settingsAt(const ElasticStep& step, const FitProblem& problem, i
   settings.contour_sigma_px = 0.5 + 0.2 * problem.target.noise_px;
   settings.contour_correlation_px = 5.0;
   settings.depth_robust = 0.02;
+  if (step.literal) makeLiteral(settings);
   return settings;
 }
 

@@ -91,7 +91,8 @@ PlacedShape placeSilhouette(const cv::Mat& silhouette, const cv::Mat& evidence,
         }
     }
   }
-  return {score.map(best_change), overlap(score.place(best_change) > 127, evidence > 0)};
+  const cv::Mat placed = score.place(best_change) > 127;
+  return {score.map(best_change), overlap(placed, evidence > 0)};
 }
 
 // Pixel centres lie at integers, so that small = large / factor + c with c = (1 / factor - 1) / 2.
@@ -108,10 +109,10 @@ cv::Mat shapeOdds(const cv::Mat& silhouette, float weight, float tolerance_px) {
   cv::distanceTransform(silhouette, inside, cv::DIST_L2, 3);
   cv::distanceTransform(silhouette == 0, outside, cv::DIST_L2, 3);
   for (int y = 0; y < odds.rows; ++y)
-    for (int x = 0; x < odds.cols; ++x)
-      odds.at<float>(y, x) =
-          weight *
-          std::tanh((inside.at<float>(y, x) - outside.at<float>(y, x)) / tolerance_px);
+    for (int x = 0; x < odds.cols; ++x) {
+      const float depth = inside.at<float>(y, x) - outside.at<float>(y, x);
+      odds.at<float>(y, x) = weight * std::tanh(depth / tolerance_px);
+    }
   return odds;
 }
 

@@ -22,6 +22,7 @@ namespace calipso::align {
 struct FemStageOptions {
   int nodes = 600;                 // about
   double poissons_ratio = 0.0;
+  bool linear = false;             // constant K, as eq. 9 has it, instead of corotated elements
   std::vector<double> elastic_weights = {1e4};  // lambda, one per iteration: soft contour to stiff
   double depth_sigma = 0.1;        // of nodes along the sight line, in model sizes, all together
   double smallest_step = 1e-4;     // of the model's size

@@ -23,6 +23,7 @@ struct LowOrderStep {
   Ramp robust;          // of the contour, parts of its extent
   double sigma;         // what the stage's model cannot follow, parts of the extent
   Ramp depth_robust;    // model sizes
+  bool literal = false; // eq. 9 as it stands
 };
 
 // Similarity, affine, quadratic.
@@ -31,7 +32,8 @@ MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, 
 
 struct ElasticStep {
   FemStageOptions fit;
-  Ramp robust_px, dead_band_px;
+  Ramp robust_px{4.0, 4.0}, dead_band_px{4.0, 4.0};
+  bool literal = false;
 };
 
 // One per grid, coarse to fine.

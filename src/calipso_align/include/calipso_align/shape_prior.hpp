@@ -20,9 +20,8 @@ PlacedShape placeSilhouette(const cv::Mat& silhouette, const cv::Mat& evidence,
 // The same map where silhouette and picture are `factor` times as large.
 cv::Matx23d scaled(const cv::Matx23d& map, double factor);
 
-// How much a silhouette favours the object at each pixel: CV_32F, nats, positive inside.
-// weight * tanh(depth below its outline / tolerance)
-// tolerance_px: how far off the outline may be without saying anything about a pixel.
+// How much a silhouette favours the object at each pixel: CV_32F, nats, positive inside:
+// weight * tanh(depth below its outline / tolerance_px).
 cv::Mat shapeOdds(const cv::Mat& silhouette, float weight, float tolerance_px);
 
 }  // namespace calipso::align

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calipso_align/colour_model.hpp"
+
+namespace calipso::align {
+
+// What the user marks in a stroke image (CV_8U): 0 nothing, kBackgroundStroke, or an object's label.
+constexpr int kBackgroundStroke = 255;
+
+// An object to be found in the picture, and where the user says that it lies.
+struct SegmentationTarget {
+  std::string name;
+  int label = 0;                 // 1..254, distinct
+  cv::Rect rect;                 // px; empty: anywhere
+  std::vector<cv::Point> lasso;  // px, polygon; empty: none. The object lies inside both.
+  cv::Mat silhouette;            // CV_8U: roughly its shape and place, or empty. May be larger than
+                                 // the picture, with an equal margin on opposite sides.
+};
+
+// The picture at one resolution and all that a cut needs there. Label number 0 is the background,
+// number k is targets[k - 1].
+struct SegmentationLevel {
+  cv::Mat image;                 // CV_8UC3
+  std::vector<cv::Mat> allowed;  // CV_8U per target: where it may lie
+  cv::Mat region;                // CV_8U: where any target may lie
+  cv::Mat seeds;                 // CV_8U: label number + 1 where a stroke says so, else 0
+  cv::Mat labels;                // CV_8U: label numbers
+  std::vector<cv::Mat> costs;    // CV_32F per label number, nats
+};
+
+// scale: of the level's picture to `image`, at most 1.
+SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<SegmentationTarget>& targets,
+                            double scale);
+
+// Takes the strokes (CV_8U of the full picture's size, or empty) over into seeds and labels.
+void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& strokes,
+              SegmentationLevel& level);
+
+// Colour costs of every label number, at most `outlier_cost`, kForbidden where a label may not be.
+void evaluateCosts(const std::vector<ColourModel>& models, float outlier_cost,
+                   SegmentationLevel& level);
+
+// Pixels without a seed in the region.
+cv::Mat freePixels(const SegmentationLevel& level);
+
+// Free pixels near a change of label, or whose colour speaks against their label: what a finer level
+// has to decide anew, thin parts included.
+cv::Mat uncertainPixels(const SegmentationLevel& level, int band_px);
+
+// The colours under a mask, evenly thinned out to what a model needs.
+std::vector<cv::Vec3f> sampleColours(const cv::Mat& image, const cv::Mat& mask);
+
+// Whatever lies near the region, objects and background.
+cv::Mat surroundings(const SegmentationLevel& level);
+
+}  // namespace calipso::align

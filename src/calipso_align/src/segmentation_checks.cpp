@@ -1,0 +1,82 @@
+#include "segmentation_checks.hpp"
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+#include <string>
+
+namespace calipso::align {
+namespace {
+
+std::string sizeText(const cv::Size& size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+void checkTarget(const SegmentationTarget& target, const cv::Size& size) {
+  const std::string who = "object '" + target.name + "': ";
+  if (target.label < 1 || target.label > 254)
+    throw std::invalid_argument(who + "index " + std::to_string(target.label) +
+                                " is not in 1..254");
+  const cv::Rect& r = target.rect;
+  if ((r.width != 0 || r.height != 0) && (r & cv::Rect(cv::Point(), size)).area() < 4)
+    throw std::invalid_argument(who + "rectangle " + std::to_string(r.x) + " " +
+                                std::to_string(r.y) + " " + std::to_string(r.width) + " " +
+                                std::to_string(r.height) + " does not meet the picture of " +
+                                sizeText(size) + "; correct it");
+}
+
+}  // namespace
+
+void checkPicture(const cv::Mat& image) {
+  if (image.empty() || image.type() != CV_8UC3)
+    throw std::invalid_argument(
+        "segmentation: the picture is " +
+        (image.empty() ? std::string("empty") : "of OpenCV type " + std::to_string(image.type())) +
+        "; give 8 bit BGR");
+}
+
+void checkTargets(const std::vector<SegmentationTarget>& targets, const cv::Size& size) {
+  if (targets.empty())
+    throw std::invalid_argument("segmentation: no object to look for; list at least one");
+  std::set<int> seen;
+  for (const SegmentationTarget& target : targets) {
+    checkTarget(target, size);
+    if (!seen.insert(target.label).second)
+      throw std::invalid_argument("object '" + target.name + "': index " +
+                                  std::to_string(target.label) +
+                                  " is also another object's; give each its own");
+  }
+}
+
+void checkStrokes(const cv::Mat& strokes, const std::vector<SegmentationTarget>& targets,
+                  const cv::Size& size) {
+  if (strokes.empty()) {
+    for (const SegmentationTarget& target : targets)
+      if (target.rect.empty() && target.lasso.empty())
+        throw std::invalid_argument("object '" + target.name +
+                                    "' has neither rectangle nor lasso nor stroke; give one");
+    return;
+  }
+  if (strokes.type() != CV_8U || strokes.size() != size)
+    throw std::invalid_argument("strokes: the image is " + sizeText(strokes.size()) +
+                                " of OpenCV type " + std::to_string(strokes.type()) +
+                                "; give 8 bit grey of the picture's size, " + sizeText(size));
+  const std::set<int> used(strokes.begin<uchar>(), strokes.end<uchar>());
+  for (const int value : used) {
+    const bool known = value == 0 || value == kBackgroundStroke ||
+                       std::any_of(targets.begin(), targets.end(),
+                                   [&](const auto& target) { return target.label == value; });
+    if (!known)
+      throw std::invalid_argument("strokes: value " + std::to_string(value) +
+                                  " names no object; use 0 for none, 255 for background or an "
+                                  "object's index");
+  }
+}
+
+void failWithoutForeground(const SegmentationTarget& target) {
+  throw std::invalid_argument("object '" + target.name +
+                              "': the rectangle and strokes leave no foreground; draw a stroke on "
+                              "the object, or enlarge its rectangle");
+}
+
+}  // namespace calipso::align

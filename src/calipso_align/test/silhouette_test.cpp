@@ -1,0 +1,155 @@
+#include "calipso_align/silhouette.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_align/contour_term.hpp"
+#include "synthetic_shape.hpp"
+
+namespace calipso::align {
+namespace {
+
+// A square plate of side 1 with a square hole of side 0.4, 2 m in front of the camera.
+struct Frame {
+  Points x{8, 3};
+  Triangles triangles{8, 3};
+  Frame() {
+    for (int k = 0; k < 4; ++k) {
+      const double u = k == 0 || k == 3 ? -1 : 1, v = k < 2 ? -1 : 1;
+      x.row(k) << 0.5 * u, 0.5 * v, 2.0;
+      x.row(4 + k) << 0.2 * u, 0.2 * v, 2.0;
+      const int next = (k + 1) % 4;
+      triangles.row(2 * k) << k, 4 + k, next;
+      triangles.row(2 * k + 1) << next, 4 + k, 4 + next;
+    }
+  }
+};
+
+TEST(Silhouette, DepthOfAPlateIsItsDistance) {
+  const Frame frame;
+  const DepthRendering rendering = renderDepth(frame.x, frame.triangles, test::frontCamera());
+  EXPECT_NEAR(rendering.at(159 - 80, 119), 2.0f, 1e-5f);
+  EXPECT_EQ(rendering.at(159, 119), 0.0f);   // through the hole
+  EXPECT_EQ(rendering.at(5, 5), 0.0f);
+}
+
+TEST(Silhouette, CoversTheAreaOfThePolygon) {
+  const Frame frame;
+  const Camera camera = test::frontCamera();
+  const int area = cv::countNonZero(maskOf(renderDepth(frame.x, frame.triangles, camera), camera));
+  // 250 x 250 px minus 100 x 100 px; the height is cut to the picture's 240.
+  EXPECT_NEAR(area, 250 * 240 - 100 * 100, 2 * 250);
+}
+
+TEST(Silhouette, OutlineHasTheHoleAndPointsOutwards) {
+  const Frame frame;
+  const Camera camera = test::frontCamera();
+  const MeshTopology topology(frame.triangles);
+  const auto outline =
+      occludingContour(frame.x, topology, renderDepth(frame.x, frame.triangles, camera), camera, 2.0);
+  int hole = 0;
+  for (const OutlinePoint& p : outline) {
+    const Eigen::Vector2d from_centre = p.pixel - Eigen::Vector2d(camera.cx, camera.cy);
+    const bool inner = from_centre.lpNorm<Eigen::Infinity>() < 60.0;
+    hole += inner;
+    EXPECT_GT((inner ? -1.0 : 1.0) * p.normal.dot(from_centre), 0.0);
+  }
+  EXPECT_GT(hole, 100);
+  EXPECT_GT(static_cast<int>(outline.size()) - hole, 200);
+}
+
+TEST(Silhouette, PartsBehindTheCameraAreLeftOut) {
+  Frame frame;
+  frame.x.col(2).setConstant(-1.0);
+  EXPECT_TRUE(renderDepth(frame.x, frame.triangles, test::frontCamera()).roi.empty());
+}
+
+TEST(ContourTerm, ResidualDerivativesMatchDifferences) {
+  const TriangleMesh mesh = test::pear();
+  const Camera camera = test::frontCamera();
+  const MeshTopology topology(mesh.triangles);
+  const Points x = test::inCamera(camera, test::roughPose(), mesh.vertices);
+  const ContourTarget target =
+      makeContourTarget(test::contourOf(mesh, Eigen::Isometry3d::Identity(), camera), 3.0);
+  const auto outline =
+      occludingContour(x, topology, renderDepth(x, mesh.triangles, camera), camera, 3.0);
+  ContourTermOptions options;
+  options.tangential = 0.0;
+  const Rows rows = contourRows(target, outline, camera, options);
+  ASSERT_GT(rows.size(), 50u);
+
+  // Moving both ends of the edge by d changes the residual by g.d, to first order.
+  const Eigen::Vector3d d = 1e-6 * Eigen::Vector3d(0.3, -0.5, 0.8);
+  for (size_t k = 0; k < rows.size(); k += 7) {
+    const PointRow& row = rows[k];
+    const Eigen::Vector3d p = row.a0 * x.row(row.v0) + row.a1 * x.row(row.v1);
+    const Eigen::Vector2d change = camera.project(p + d) - camera.project(p);
+    const Eigen::Vector2d normal =
+        (camera.projectJacobian(p) * camera.projectJacobian(p).transpose()).inverse() *
+        (camera.projectJacobian(p) * row.g);
+    EXPECT_NEAR(row.g.dot(d), normal.dot(change), 1e-8);
+  }
+}
+
+TEST(ContourTerm, NothingPullsWhereTheModelIsTheTruth) {
+  const TriangleMesh mesh = test::pear();
+  const Camera camera = test::frontCamera();
+  const MeshTopology topology(mesh.triangles);
+  const Points x = test::inCamera(camera, Eigen::Isometry3d::Identity(), mesh.vertices);
+  const ContourTarget target =
+      makeContourTarget(test::contourOf(mesh, Eigen::Isometry3d::Identity(), camera), 3.0);
+  const auto outline =
+      occludingContour(x, topology, renderDepth(x, mesh.triangles, camera), camera, 1.0);
+  double worst = 0.0;
+  for (const double r : contourResiduals(target, outline)) {
+    if (std::isfinite(r)) worst = std::max(worst, std::abs(r));
+  }
+  EXPECT_LT(worst, 1.5);  // the traced contour runs along pixel cracks, the outline does not
+}
+
+TEST(ContourTarget, SmoothingTakesNoiseOutAndKeepsTheCircle) {
+  ContourLoop circle;
+  constexpr int kPoints = 4000;
+  constexpr double kRadius = 80.0, kNoise = 3.0;
+  unsigned state = 1;
+  const auto uniform = [&] {  // deviation 1, mean 0
+    state = 1664525u * state + 1013904223u;
+    return (state / 4294967296.0 - 0.5) * std::sqrt(12.0);
+  };
+  for (int i = 0; i < kPoints; ++i) {
+    const double a = 2.0 * M_PI * i / kPoints;
+    circle.points.emplace_back(100.0 + kRadius * std::cos(a) + kNoise * uniform(),
+                               100.0 + kRadius * std::sin(a) + kNoise * uniform());
+  }
+  circle.known.assign(kPoints, true);
+  circle.confidence.assign(kPoints, 1.0f);
+  const ContourTarget target = makeContourTarget({circle}, 4.0);
+  EXPECT_NEAR(target.noise_px, kNoise, 0.15 * kNoise);
+  EXPECT_NEAR(target.length_px, 2.0 * M_PI * kRadius, 0.05 * 2.0 * M_PI * kRadius);
+  double mean = 0.0, square = 0.0;
+  for (const TargetPoint& p : target.points) {
+    const double error = (p.pixel - Eigen::Vector2d(100.0, 100.0)).norm() - kRadius;
+    mean += error / target.points.size();
+    square += error * error / target.points.size();
+  }
+  EXPECT_LT(std::abs(mean), 0.15);           // it does not shrink
+  EXPECT_LT(std::sqrt(square), 0.3 * kNoise);
+}
+
+TEST(ContourTarget, RejectsLoopsThatAreNone) {
+  EXPECT_THROW(makeContourTarget({}, 2.0), std::invalid_argument);
+  ContourLoop few;
+  few.points.assign(3, Eigen::Vector2d::Zero());
+  few.known.assign(3, true);
+  few.confidence.assign(3, 1.0f);
+  try {
+    makeContourTarget({few}, 2.0);
+    FAIL() << "three points make no contour";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("loop 0 has 3 points"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace calipso::align

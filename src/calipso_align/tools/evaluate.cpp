@@ -1,0 +1,253 @@
+// rosrun calipso_align evaluate [options] PATH...   one JSON object per case and line, no roscore.
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <random>
+#include <sstream>
+
+#include "calipso_align/metrics.hpp"
+#include "evaluation_case.hpp"
+
+namespace {
+
+using namespace calipso;
+using namespace calipso::align;
+
+constexpr char kUsage[] =
+    "usage: evaluate [--noise PX,PX,...] [--seeds N] [--nodes N,N] [--no-depth] [--literal] "
+    "PATH...\n"
+    "  PATH      a folder with alignment.yaml or scene.yaml\n"
+    "  --noise   Gaussian noise on the contour's points, px (default 0)\n"
+    "  --seeds   random rough placements up to 10 degrees and 5 % of the distance off instead of\n"
+    "            the folder's own\n"
+    "  --nodes   of the grids, coarse to fine (default 600,2000)\n"
+    "  --no-depth  leave a scene's depth image unused\n"
+    "  --literal eq. 9 of the paper as it stands\n";
+
+struct Arguments {
+  std::vector<std::string> paths;
+  std::vector<double> noise = {0.0};
+  int seeds = 0;
+  std::vector<int> nodes;
+  bool use_depth = true;
+  bool literal = false;
+};
+
+template <class T>
+std::vector<T> listOf(const std::string& text) {
+  std::vector<T> values;
+  std::istringstream in(text);
+  std::string item;
+  while (std::getline(in, item, ',')) values.push_back(static_cast<T>(std::stod(item)));
+  return values;
+}
+
+Arguments parse(int argc, char** argv) {
+  Arguments arguments;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool takes_value = word == "--noise" || word == "--seeds" || word == "--nodes";
+    if (takes_value && ++i >= argc) throw std::invalid_argument(word + " needs a value\n" + kUsage);
+    if (word == "--noise") arguments.noise = listOf<double>(argv[i]);
+    else if (word == "--seeds") arguments.seeds = std::stoi(argv[i]);
+    else if (word == "--nodes") arguments.nodes = listOf<int>(argv[i]);
+    else if (word == "--no-depth") arguments.use_depth = false;
+    else if (word == "--literal") arguments.literal = true;
+    else if (word.rfind("--", 0) == 0)
+      throw std::invalid_argument("unknown option " + word + "\n" + kUsage);
+    else arguments.paths.push_back(word);
+  }
+  if (arguments.paths.empty()) throw std::invalid_argument(kUsage);
+  return arguments;
+}
+
+// One line of JSON, key by key; numbers that are not known become null.
+class JsonLine {
+ public:
+  void addNumber(const std::string& key, std::optional<double> value) {
+    char text[32] = "null";
+    if (value && std::isfinite(*value)) std::snprintf(text, sizeof text, "%.6g", *value);
+    put(key, text);
+  }
+  void addText(const std::string& key, const std::string& value) {
+    std::string quoted = "\"";
+    for (const char c : value) {
+      if (c == '"' || c == '\\') quoted += '\\';
+      quoted += c == '\n' ? ' ' : c;
+    }
+    put(key, quoted + "\"");
+  }
+  void addFlag(const std::string& key, bool value) { put(key, value ? "true" : "false"); }
+  std::string text() const { return "{" + text_ + "}"; }
+
+ private:
+  void put(const std::string& key, const std::string& value) {
+    text_ += (text_.empty() ? "\"" : ", \"") + key + "\": " + value;
+  }
+  std::string text_;
+};
+
+std::vector<ContourLoop> withNoise(std::vector<ContourLoop> loops, double noise_px, int seed) {
+  std::mt19937 generator(1000 + seed);
+  std::normal_distribution<double> normal(0.0, noise_px);
+  for (ContourLoop& loop : loops) {
+    for (Eigen::Vector2d& p : loop.points) {
+      if (noise_px > 0.0) p += Eigen::Vector2d(normal(generator), normal(generator));
+    }
+  }
+  return loops;
+}
+
+// The true pose, turned about the centroid and moved.
+Eigen::Isometry3d randomRough(const EvaluationCase& one, int seed) {
+  constexpr double kLargestTurn = 10.0 * M_PI / 180.0, kLargestShift = 0.05;
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::normal_distribution<double> normal;
+  const auto direction = [&] {
+    return Eigen::Vector3d(normal(generator), normal(generator), normal(generator)).normalized();
+  };
+  const Eigen::Isometry3d truth = one.truth->world_from_object;
+  const Eigen::Vector3d centroid =
+      truth * Eigen::Vector3d(one.truth->mesh.vertices.colwise().mean().transpose());
+  const double distance = (centroid - one.camera.world_from_camera.translation()).norm();
+  const Eigen::Vector3d axis = direction(), shift = direction();
+  const double angle = kLargestTurn * uniform(generator);
+  return Eigen::Translation3d(centroid + kLargestShift * uniform(generator) * distance * shift) *
+         Eigen::AngleAxisd(angle, axis) * Eigen::Translation3d(-centroid) * truth;
+}
+
+Points inCamera(const Camera& camera, const Eigen::Isometry3d& pose, const TriangleMesh& mesh) {
+  return transformed(camera.world_from_camera.inverse() * pose, mesh.vertices);
+}
+
+std::vector<int> allVertices(const Points& x) {
+  std::vector<int> all(x.rows());
+  for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
+  return all;
+}
+
+std::vector<int> contourVertices(const Points& x, const MeshTopology& topology,
+                                 const Camera& camera) {
+  std::vector<int> vertices;
+  const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
+  for (const OutlinePoint& p : occludingContour(x, topology, rendering, camera, 1e9)) {
+    vertices.push_back(p.v0);
+    vertices.push_back(p.v1);
+  }
+  return vertices;
+}
+
+double maskIou(const Truth& truth, const Points& x, const Triangles& triangles,
+               const Camera& camera) {
+  cv::Mat1b mask = maskOf(renderDepth(x, triangles, camera), camera);
+  if (!truth.ignored.empty()) mask.setTo(0, truth.ignored);
+  return intersectionOverUnion(mask, truth.visible);
+}
+
+// Errors of the model at x; `suffix` tells before from after. The depth that no picture shows is
+// taken out when the fit had nothing else to find it from.
+void addErrors(const EvaluationCase& one, Points x, bool remove_gauge, const std::string& suffix,
+               JsonLine& line) {
+  const Truth& truth = *one.truth;
+  const MeshTopology topology(one.cad.triangles);
+  const Points true_x = inCamera(one.camera, truth.world_from_object, truth.mesh);
+  const double percent = 100.0 / boundingDiagonal(truth.mesh);
+  const ContourError contour = contourError(truth.contour, x, topology, one.camera);
+  line.addNumber("contour_mean_px" + suffix, contour.mean_px);
+  line.addNumber("contour_p95_px" + suffix, contour.p95_px);
+
+  std::optional<double> contour_vertex, all_vertex;
+  if (truth.correspondence) {
+    contour_vertex =
+        reprojectionError(x, true_x, one.camera, contourVertices(true_x, topology, one.camera));
+    all_vertex = reprojectionError(x, true_x, one.camera, allVertices(x));
+  }
+  line.addNumber("contour_vertex_px" + suffix, contour_vertex);
+  line.addNumber("all_vertex_px" + suffix, all_vertex);
+  const double gauge = depthGauge(x, true_x);
+  if (remove_gauge) x *= gauge;
+  const SurfaceError surface = surfaceError(x, true_x, one.cad.triangles, truth.mesh.triangles);
+  line.addNumber("error3d_mean_percent" + suffix, percent * surface.mean);
+  line.addNumber("error3d_rms_percent" + suffix, percent * surface.rms);
+  line.addNumber("hausdorff_percent" + suffix, percent * surface.hausdorff);
+  line.addNumber("depth_gauge" + suffix, gauge);
+  if (!truth.visible.empty()) {
+    line.addNumber("mask_iou" + suffix, maskIou(truth, x, one.cad.triangles, one.camera));
+  }
+}
+
+void addUnknown(JsonLine& line) {
+  for (const char* key : {"contour_mean_px", "contour_p95_px", "contour_vertex_px", "all_vertex_px",
+                          "error3d_mean_percent", "error3d_rms_percent", "hausdorff_percent",
+                          "mask_iou"}) {
+    line.addNumber(key, std::optional<double>());
+  }
+}
+
+std::string evaluate(const EvaluationCase& one, const Arguments& arguments, double noise_px,
+                     int seed) {
+  AlignOptions options = one.options;
+  if (!arguments.nodes.empty()) options.levels = arguments.nodes;
+  if (arguments.literal) options.method = Method::kLiteral;
+  const bool random = seed > 0 && one.truth;
+  const Eigen::Isometry3d rough = random ? randomRough(one, seed) : one.rough;
+  const AlignmentResult result = calipso::align::align(
+      one.cad, one.camera, rough, withNoise(one.contour, noise_px, seed), options);
+
+  JsonLine line;
+  line.addText("case", one.name);
+  line.addText("object", one.object);
+  line.addNumber("deformation_percent", one.deformation_percent);
+  line.addNumber("noise_px", noise_px);
+  line.addNumber("seed", static_cast<double>(seed));
+  const bool remove_gauge = !options.depth;
+  if (one.truth) {
+    addErrors(one, inCamera(one.camera, rough, one.cad), remove_gauge, "_before", line);
+    addErrors(one, inCamera(one.camera, result.world_from_object, result.mesh), remove_gauge, "",
+              line);
+  } else {
+    addUnknown(line);
+  }
+  line.addFlag("gauge_removed", remove_gauge);
+  line.addNumber("segmentation_iou", one.segmentation_iou);
+  line.addNumber("fit_mean_px", result.contour_mean_px);
+  line.addFlag("trusted", result.trusted);
+  line.addText("reason", result.reason);
+  line.addNumber("ms_segment", one.ms_segment);
+  line.addNumber("ms_align", totalMs(result));
+  for (const StageTime& time : result.times) line.addNumber("ms " + time.stage, time.ms);
+  return line.text();
+}
+
+void evaluateFolder(const std::string& path, const Arguments& arguments) {
+  for (const EvaluationCase& one : loadCases(path, {arguments.use_depth})) {
+    for (const double noise : arguments.noise) {
+      const int first = arguments.seeds > 0 ? 1 : 0;
+      for (int seed = first; seed <= arguments.seeds; ++seed) {
+        std::cout << evaluate(one, arguments, noise, seed) << std::endl;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int failed = 0;
+  try {
+    const Arguments arguments = parse(argc, argv);
+    for (const std::string& path : arguments.paths) {
+      try {
+        evaluateFolder(path, arguments);
+      } catch (const std::exception& error) {
+        std::cerr << path << ": " << error.what() << "\n";
+        ++failed;
+      }
+    }
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << "\n";
+    return 2;
+  }
+  return failed > 0 ? 1 : 0;
+}
