@@ -1,10 +1,44 @@
 #include "calipso_flow/clip_dynamics.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <stdexcept>
 
 namespace calipso::flow {
+
+namespace {
+
+// Largest image motion of the object's followed points between the first state and any other, px,
+// were the camera at rest.
+double largestImageMotion(const std::vector<MotionState>& states, const Camera& camera,
+                          const ObjectTracker& tracker) {
+  const Eigen::Isometry3d first =
+      motionFrom(states.front(), tracker.centroid(), false, 0).world_from_object;
+  double largest = 0.0;
+  for (const MotionState& state : states) {
+    const Eigen::Isometry3d pose =
+        motionFrom(state, tracker.centroid(), false, 0).world_from_object;
+    for (const Track& track : tracker.keyObservation().tracks) {
+      const Eigen::Vector2d moved = camera.projectWorld(pose * track.point) -
+                                    camera.projectWorld(first * track.point);
+      largest = std::max(largest, moved.norm());
+    }
+  }
+  return largest;
+}
+
+// Relative deviation of the object's distance from the camera, as the alignment states it. What is
+// twice as far moves twice as fast: every velocity carries it.
+double scaleDeviation(const ObjectModel& model, const Eigen::Vector3d& position,
+                      const Camera& camera) {
+  const Eigen::Vector3d sight = position - camera.world_from_camera.translation();
+  const Eigen::Vector3d direction = sight.normalized();
+  const double variance = direction.dot(model.position_covariance * direction);
+  return variance > 0.0 ? std::sqrt(variance) / sight.norm() : 0.0;
+}
+
+}  // namespace
 
 std::string summary(const std::vector<ObjectDynamics>& objects) {
   std::string text;
@@ -75,9 +109,15 @@ ObjectDynamics ClipAnalyser::finishObject(size_t index) const {
   const Camera& camera = last_.camera;
   const double depth =
       (camera.world_from_camera.inverse() * measurements.front().position).norm();
-  dynamics.trajectory = fitTrajectory(measurements, cut_times_, priorFor(camera, depth, gravity_),
-                                      params_.trajectory);
+  TrajectoryParams trajectory = params_.trajectory;
+  trajectory.still = [&](const std::vector<MotionState>& states) {
+    return largestImageMotion(states, camera, tracker) < params_.rest_px;
+  };
+  dynamics.trajectory =
+      fitTrajectory(measurements, cut_times_, priorFor(camera, depth, gravity_), trajectory);
+  const double scale = scaleDeviation(tracker.model(), measurements.front().position, camera);
   for (size_t k = 0; k < measurements.size(); ++k) {
+    dynamics.trajectory.states[k].addScaleUncertainty(scale);
     dynamics.motions.push_back(motionFrom(dynamics.trajectory.states[k], tracker.centroid(),
                                           dynamics.trajectory.movingAt(measurements[k].time),
                                           dynamics.observations[k].inliers()));

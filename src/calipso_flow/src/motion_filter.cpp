@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "calipso_flow/rotation.hpp"
 
@@ -16,6 +15,9 @@ constexpr int kP = 0, kV = 3, kA = 6, kR = 9, kW = 12;
 // A quantity that a piece holds at zero keeps this share of its prior deviation, so that every
 // covariance can be inverted.
 constexpr double kZeroShare = 1e-7;
+
+// After a collision a piece's speed is given at least this share of the prior's deviation.
+constexpr double kLeastSpeedShare = 0.01;
 
 using StateByPose = Eigen::Matrix<double, kStateSize, 6>;
 
@@ -151,6 +153,7 @@ StateMatrix entryTransition(const MotionPiece& piece) {
   if (piece.cut) return F;
   F.block<3, 3>(kP, kP).setIdentity();
   F.block<3, 3>(kR, kR).setIdentity();
+  if (piece.same_acceleration) F.block<3, 3>(kA, kA).setIdentity();
   return F;
 }
 
@@ -212,6 +215,24 @@ Matrix6d MotionState::twistCovariance() const {
   return result;
 }
 
+Eigen::Matrix3d MotionState::accelerationCovariance() const {
+  return covariance.block<3, 3>(kA, kA);
+}
+
+void MotionState::setVelocityCovariance(const StateMatrix& other) {
+  covariance.block<3, 3>(kV, kV) = other.block<3, 3>(kV, kV);
+}
+
+void MotionState::setSpinCovariance(const StateMatrix& other) {
+  covariance.block<3, 3>(kW, kW) = other.block<3, 3>(kW, kW);
+}
+
+void MotionState::addScaleUncertainty(double relative) {
+  const double variance = relative * relative;
+  covariance.block<3, 3>(kV, kV) += variance * velocity * velocity.transpose();
+  covariance.block<3, 3>(kA, kA) += variance * acceleration * acceleration.transpose();
+}
+
 MotionState initialState(double time, const MotionPiece& piece, const MotionPrior& prior,
                          const PoseMeasurement& first) {
   MotionState state;
@@ -227,7 +248,18 @@ MotionState initialState(double time, const MotionPiece& piece, const MotionPrio
 MotionState enterPiece(const MotionState& before, const MotionPiece& piece,
                        const MotionPrior& prior) {
   MotionState state = before;
-  applyStart(pieceStart(piece, prior), state);
+  PieceStart start = pieceStart(piece, prior);
+  if (!piece.cut && piece.travel != Travel::kRest) {
+    // A collision takes energy away: what comes out of it is about as fast as what went in.
+    const double variance = before.covariance.block<3, 3>(kV, kV).trace();
+    const double speed = std::sqrt(before.velocity.squaredNorm() + variance);
+    start.velocity = std::min(start.velocity, std::max(speed, kLeastSpeedShare * start.velocity));
+  }
+  applyStart(start, state);
+  if (piece.same_acceleration) {
+    state.acceleration = before.acceleration;
+    state.covariance.block<3, 3>(kA, kA) = before.covariance.block<3, 3>(kA, kA);
+  }
   if (piece.cut) {
     state.covariance.block<3, 3>(kP, kP) = scaledIdentity(prior.position * prior.position);
     state.covariance.block<3, 3>(kR, kR) = scaledIdentity(M_PI * M_PI);

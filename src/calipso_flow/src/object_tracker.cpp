@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kRefinements = 3;          // warp, match, fit
 constexpr double kSettledPx = 0.05;      // a refinement that moves less than this is the last
+constexpr double kNearPx = 1.5;          // a prediction this close needs no half-size match
 constexpr double kLeastInlierShare = 0.35;
 constexpr int kForgetAfter = 3;         // frames without the object before its motion is forgotten
 constexpr int kWeakInliers = 12;         // fewer tracks than this are worth another attempt
@@ -48,17 +49,16 @@ Match prepareMatch(const ReferenceView::Warped& look, const cv::Mat& picture) {
           pyramidOf({picture(inside), cv::Point2d(inside.tl())})};
 }
 
-// Half size first when the start may be far off; the result is always that of the full size.
-std::optional<PatchMatch> matchForward(const Match& match, const Eigen::Vector2d& at, bool far,
+// A match at half size, in coordinates of the full size: reaches far, but is not precise.
+std::optional<PatchMatch> matchRoughly(const Match& match, const Eigen::Vector2d& at,
                                        const PatchParams& params) {
-  Eigen::Vector2d start = at;
-  if (far) {
-    const Eigen::Vector2d half = 0.5 * at;
-    const auto rough = matchPatch({match.look.half, half, match.weight.half, half},
-                                  match.frame.half, half, params);
-    if (rough) start = 2.0 * rough->position;
-  }
-  return matchPatch({match.look.full, at, match.weight.full, at}, match.frame.full, start, params);
+  const Eigen::Vector2d half = 0.5 * at;
+  auto rough = matchPatch({match.look.half, half, match.weight.half, half}, match.frame.half, half,
+                          params);
+  if (!rough) return std::nullopt;
+  rough->position *= 2.0;
+  rough->covariance *= 4.0;
+  return rough;
 }
 
 // Distance at which the match, followed back into the look, misses the point where it began.
@@ -69,9 +69,23 @@ double missOnReturn(const Match& match, const Eigen::Vector2d& at, const PatchMa
   return back ? (back->position - at).norm() : std::numeric_limits<double>::infinity();
 }
 
+// A precise match that is as likely and as certain as asked for, and comes back.
+std::optional<PatchMatch> matchPrecisely(const Match& match, const Eigen::Vector2d& at,
+                                         const TrackerParams& params) {
+  const auto there = matchPatch({match.look.full, at, match.weight.full, at}, match.frame.full, at,
+                                params.patch);
+  if (!there) return std::nullopt;
+  // A patch with little texture wanders with the noise, and is trusted accordingly.
+  const double deviation = std::sqrt(there->covariance.trace());
+  if (deviation > params.largest_deviation_px) return std::nullopt;
+  const double allowed = params.forward_backward_px + kReturnDeviations * deviation;
+  if (missOnReturn(match, at, *there, params.patch) > allowed) return std::nullopt;
+  return there;
+}
+
 // Follows the reference's seeds into the frame, the object's look being warped to `pose`.
 std::vector<Track> followSeeds(const Match& match, const ReferenceView& reference,
-                               const Camera& camera, const Eigen::Isometry3d& pose, bool far,
+                               const Camera& camera, const Eigen::Isometry3d& pose, bool rough,
                                const TrackerParams& params, std::vector<Correspondence>& found) {
   std::vector<Track> tracks;
   const Eigen::Isometry3d camera_from_object = camera.world_from_camera.inverse() * pose;
@@ -79,20 +93,16 @@ std::vector<Track> followSeeds(const Match& match, const ReferenceView& referenc
     const Eigen::Vector3d p_camera = camera_from_object * seed;
     if (p_camera.z() <= 0.0) continue;
     const Eigen::Vector2d at = camera.project(p_camera);
-    const auto there = matchForward(match, at, far, params.patch);
+    const auto there =
+        rough ? matchRoughly(match, at, params.patch) : matchPrecisely(match, at, params);
     if (!there || there->correlation < params.least_correlation) continue;
-    // A patch with little texture wanders with the noise, and is trusted accordingly.
-    const double deviation = std::sqrt(there->covariance.trace());
-    if (deviation > params.largest_deviation_px) continue;
-    const double allowed = params.forward_backward_px + kReturnDeviations * deviation;
-    if (missOnReturn(match, at, *there, params.patch) > allowed) continue;
     found.push_back({seed, there->position, there->covariance});
     tracks.push_back({seed, there->position, there->correlation, false});
   }
   return tracks;
 }
 
-// Largest image motion of the model's centroid sphere between two poses, roughly: px.
+// Largest image motion of the points between two poses, px.
 double imageMotion(const Camera& camera, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
                    const std::vector<Eigen::Vector3d>& points) {
   const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
@@ -167,29 +177,41 @@ Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const Refere
 }
 
 Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& reference,
-                                  const Eigen::Isometry3d& start) const {
+                                  const Eigen::Isometry3d& start, bool near) const {
   Observation observation;
   observation.time = frame.time;
   observation.world_from_object = start;
+  if (!near) observation.world_from_object = refineOnce(frame, reference, true, observation);
   for (int round = 0; round < kRefinements; ++round) {
-    const Eigen::Isometry3d pose = observation.world_from_object;
-    const ReferenceView::Warped look = reference.warp(frame.camera, pose);
-    if (look.coverage == 0.0) return observation;
-    std::vector<Correspondence> found;
-    observation.tracks = followSeeds(prepareMatch(look, frame.gray), reference, frame.camera, pose,
-                                     round == 0, params_, found);
-    const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params_.pose);
-    observation.found = fit.converged && fit.inliers >= kLeastInlierShare * found.size();
-    if (!observation.found) return observation;
-    for (size_t i = 0; i < found.size(); ++i) observation.tracks[i].inlier = fit.inlier[i];
-    observation.world_from_object = fit.world_from_object;
-    observation.covariance = fit.covariance;
-    observation.deviation = fit.deviation;
-    if (imageMotion(frame.camera, pose, fit.world_from_object, reference.seeds()) < kSettledPx) {
+    const Eigen::Isometry3d before = observation.world_from_object;
+    observation.world_from_object = refineOnce(frame, reference, false, observation);
+    if (!observation.found) break;
+    if (imageMotion(frame.camera, before, observation.world_from_object, reference.seeds()) <
+        kSettledPx) {
       break;
     }
   }
   return observation;
+}
+
+Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceView& reference,
+                                            bool rough, Observation& observation) const {
+  const Eigen::Isometry3d pose = observation.world_from_object;
+  observation.found = false;
+  observation.tracks.clear();
+  const ReferenceView::Warped look = reference.warp(frame.camera, pose);
+  observation.coverage = look.coverage;
+  if (look.coverage == 0.0) return pose;
+  std::vector<Correspondence> found;
+  observation.tracks = followSeeds(prepareMatch(look, frame.gray), reference, frame.camera, pose,
+                                   rough, params_, found);
+  const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params_.pose);
+  observation.found = fit.converged && fit.inliers >= kLeastInlierShare * found.size();
+  if (!observation.found) return pose;
+  for (size_t i = 0; i < found.size(); ++i) observation.tracks[i].inlier = fit.inlier[i];
+  observation.covariance = fit.covariance;
+  observation.deviation = fit.deviation;
+  return fit.world_from_object;
 }
 
 const ReferenceView& ObjectTracker::nearestReference(const Frame& frame,
@@ -232,7 +254,11 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
 
 Observation ObjectTracker::attempt(const Frame& frame, const ReferenceView& reference,
                                    const Eigen::Isometry3d& predicted) const {
-  return refine(frame, reference, searchCoarsely(frame, reference, predicted));
+  const Eigen::Isometry3d start = searchCoarsely(frame, reference, predicted);
+  const bool near =
+      last_ && imageMotion(frame.camera, last_->world_from_object, start, reference.seeds()) <
+                   kNearPx;
+  return refine(frame, reference, start, near);
 }
 
 void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
@@ -241,8 +267,7 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   const ReferenceView& nearest = nearestReference(frame, observation.world_from_object);
   const bool worn = observation.inliers() <
                     params_.least_inliers * static_cast<double>(nearest.seeds().size());
-  const double coverage = nearest.warp(frame.camera, observation.world_from_object).coverage;
-  if (!worn && coverage >= params_.least_coverage) return;
+  if (!worn && observation.coverage >= params_.least_coverage) return;
   if (static_cast<int>(references_.size()) >= params_.max_references) {
     references_.erase(references_.begin() + 1);  // the key frame stays
   }

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -16,47 +17,54 @@ constexpr double kLeastGradient = 0.4;
 // A match whose contrast is a smaller share of the patch's shows another surface.
 constexpr double kLeastGain = 0.2;
 
-float bilinear(const cv::Mat& image, double x, double y) {
+// The patch as a linear model of what the target shows near the right place:
+//   I(x + d) = gain T(x) + offset + ramp . x - gain grad T(x) . e,   e = error of d.
+// The ramp takes up shading, which moves with the light and not with the surface. Grey values are
+// taken relative to the patch's mean, so that single precision is enough for the sums.
+enum Term { kGradientX, kGradientY, kValue, kOne, kRampX, kRampY, kTerms };
+using TermsMatrix = Eigen::Matrix<double, kTerms, kTerms>;
+using TermsVector = Eigen::Matrix<double, kTerms, 1>;
+using Values = std::vector<float>;
+
+struct PatchModel {
+  std::array<Values, kTerms> terms;  // per pixel; 0 where the pixel does not count
+  float mean = 0.0f;                 // grey
+  double support = 0.0;              // pixels that count
+  Eigen::LDLT<TermsMatrix> factor;
+  TermsMatrix inverse;
+};
+
+double dot(const Values& a, const Values& b) {
+  float sum = 0.0f;
+  const int count = static_cast<int>(a.size());
+#pragma omp simd reduction(+ : sum)
+  for (int k = 0; k < count; ++k) sum += a[k] * b[k];
+  return sum;
+}
+
+// Samples the square around a position of the picture, row by row; every pixel has the same
+// bilinear weights. False when the square does not fit.
+bool sampleSquare(const ImageWindow& window, const Eigen::Vector2d& at, int radius, Values& out) {
+  const double x = at.x() - window.origin.x - radius, y = at.y() - window.origin.y - radius;
+  const int side = 2 * radius + 1;
+  if (!(x >= 0.0 && y >= 0.0 && x < window.image.cols - side && y < window.image.rows - side)) {
+    return false;
+  }
   const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
   const float fx = static_cast<float>(x - x0), fy = static_cast<float>(y - y0);
-  const float* top = image.ptr<float>(y0) + x0;
-  const float* bottom = image.ptr<float>(y0 + 1) + x0;
-  return (1 - fy) * ((1 - fx) * top[0] + fx * top[1]) +
-         fy * ((1 - fx) * bottom[0] + fx * bottom[1]);
-}
-
-// True when the square around (x, y) of the image can be sampled.
-bool fits(const cv::Mat& image, double x, double y, int radius) {
-  return x >= radius && y >= radius && x < image.cols - 1 - radius && y < image.rows - 1 - radius;
-}
-
-// Samples the square around a position of the picture, row by row. False when it does not fit.
-bool sampleSquare(const ImageWindow& window, const Eigen::Vector2d& at, int radius,
-                  std::vector<float>& out) {
-  const double x = at.x() - window.origin.x, y = at.y() - window.origin.y;
-  if (!fits(window.image, x, y, radius)) return false;
-  out.clear();
-  for (int j = -radius; j <= radius; ++j) {
-    for (int i = -radius; i <= radius; ++i) out.push_back(bilinear(window.image, x + i, y + j));
+  const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
+  out.resize(side * side);
+  for (int j = 0; j < side; ++j) {
+    const float* top = window.image.ptr<float>(y0 + j) + x0;
+    const float* bottom = window.image.ptr<float>(y0 + j + 1) + x0;
+    float* row = out.data() + j * side;
+#pragma omp simd
+    for (int i = 0; i < side; ++i) {
+      row[i] = w00 * top[i] + w01 * top[i + 1] + w10 * bottom[i] + w11 * bottom[i + 1];
+    }
   }
   return true;
 }
-
-// The patch as a linear model of what the target shows near the right place:
-//   I(x + d) = gain T(x) + offset + ramp . x - gain grad T(x) . e,   e = error of d.
-// The ramp takes up shading, which moves with the light and not with the surface.
-constexpr int kTerms = 6;
-using TermsMatrix = Eigen::Matrix<double, kTerms, kTerms>;
-using TermsVector = Eigen::Matrix<double, kTerms, 1>;
-using TermsRow = Eigen::Matrix<float, kTerms, 1>;
-
-struct PatchModel {
-  std::vector<TermsRow> rows;  // (T_x, T_y, T, 1, x, y) per pixel
-  std::vector<float> weights;
-  Eigen::LDLT<TermsMatrix> factor;
-  TermsMatrix inverse;
-  double support = 0.0;  // sum of weights
-};
 
 // True when enough gradient is left in every direction after gain, offset and ramp are taken out.
 bool hasTexture(const TermsMatrix& inverse, double support) {
@@ -68,33 +76,51 @@ bool hasTexture(const TermsMatrix& inverse, double support) {
   return half_trace - spread > kLeastGradient * kLeastGradient * support;
 }
 
-std::optional<PatchModel> buildModel(const PatchSource& source, const PatchParams& params) {
-  const int r = params.radius_px, wide = 2 * r + 3;
-  // One more ring than the patch, for central differences.
-  std::vector<float> values, weights;
-  if (!sampleSquare(source.gray, source.at, r + 1, values)) return std::nullopt;
-  if (!sampleSquare(source.weight, source.weight_at, r + 1, weights)) return std::nullopt;
-
-  PatchModel model;
-  TermsMatrix normal = TermsMatrix::Zero();
-  for (int j = 1; j <= 2 * r + 1; ++j) {
-    for (int i = 1; i <= 2 * r + 1; ++i) {
-      const int k = j * wide + i;
-      const float around = std::min(std::min(weights[k - 1], weights[k + 1]),
-                                    std::min(weights[k - wide], weights[k + wide]));
-      const float w = std::min(weights[k], around) > 0.99f ? 1.0f : 0.0f;
-      TermsRow row;
-      row << 0.5f * (values[k + 1] - values[k - 1]), 0.5f * (values[k + wide] - values[k - wide]),
-          values[k], 1.0f, i - 1.0f - r, j - 1.0f - r;
-      model.rows.push_back(row);
-      model.weights.push_back(w);
-      if (w == 0.0f) continue;
-      normal += row.cast<double>() * row.cast<double>().transpose();
-      model.support += w;
+// Fills the terms from grey values and weights that have one more ring than the patch, for central
+// differences; a pixel counts when it and its four neighbours do.
+void fillTerms(const Values& values, const Values& weights, int radius, PatchModel& model) {
+  const int side = 2 * radius + 1, wide = side + 2;
+  for (Values& term : model.terms) term.assign(side * side, 0.0f);
+  double sum = 0.0;
+  for (int j = 0; j < side; ++j) {
+    for (int i = 0; i < side; ++i) {
+      const int k = (j + 1) * wide + i + 1, p = j * side + i;
+      const float least = std::min({weights[k], weights[k - 1], weights[k + 1], weights[k - wide],
+                                    weights[k + wide]});
+      if (least < 0.99f) continue;
+      model.terms[kGradientX][p] = 0.5f * (values[k + 1] - values[k - 1]);
+      model.terms[kGradientY][p] = 0.5f * (values[k + wide] - values[k - wide]);
+      model.terms[kValue][p] = values[k];
+      model.terms[kOne][p] = 1.0f;
+      model.terms[kRampX][p] = static_cast<float>(i - radius);
+      model.terms[kRampY][p] = static_cast<float>(j - radius);
+      model.support += 1.0;
+      sum += values[k];
     }
   }
-  const double pixels = (2 * r + 1) * (2 * r + 1);
+  if (model.support == 0.0) return;
+  model.mean = static_cast<float>(sum / model.support);
+  for (size_t p = 0; p < model.terms[kOne].size(); ++p) {
+    model.terms[kValue][p] -= model.mean * model.terms[kOne][p];
+  }
+}
+
+std::optional<PatchModel> buildModel(const PatchSource& source, const PatchParams& params) {
+  Values values, weights;
+  if (!sampleSquare(source.gray, source.at, params.radius_px + 1, values)) return std::nullopt;
+  if (!sampleSquare(source.weight, source.weight_at, params.radius_px + 1, weights)) {
+    return std::nullopt;
+  }
+  PatchModel model;
+  fillTerms(values, weights, params.radius_px, model);
+  const double pixels = static_cast<double>(model.terms[kOne].size());
   if (model.support < params.least_support * pixels) return std::nullopt;
+  TermsMatrix normal;
+  for (int a = 0; a < kTerms; ++a) {
+    for (int b = 0; b <= a; ++b) {
+      normal(a, b) = normal(b, a) = dot(model.terms[a], model.terms[b]);
+    }
+  }
   model.factor.compute(normal);
   model.inverse = model.factor.solve(TermsMatrix::Identity());
   if (!hasTexture(model.inverse, model.support)) return std::nullopt;
@@ -104,28 +130,26 @@ std::optional<PatchModel> buildModel(const PatchSource& source, const PatchParam
 struct Regression {
   TermsVector coefficients;  // (-gain e_x, -gain e_y, gain, offset, ramp)
   double squared_residual;
-  double squared_signal;  // sum of squares of the target about its weighted mean
+  double squared_signal;  // sum of squares of the target about its mean
 };
 
-Regression regress(const PatchModel& model, const std::vector<float>& target) {
-  TermsVector right = TermsVector::Zero();
-  double sum = 0.0, sum_squared = 0.0;
-  for (size_t k = 0; k < target.size(); ++k) {
-    const double value = model.weights[k] * target[k];
-    right += value * model.rows[k].cast<double>();
-    sum += value;
-    sum_squared += value * target[k];
-  }
+// @param target  the target's grey values; changed: made relative to the patch's mean
+Regression regress(const PatchModel& model, Values& target) {
+  const Values& one = model.terms[kOne];
+  for (size_t p = 0; p < target.size(); ++p) target[p] = (target[p] - model.mean) * one[p];
+  TermsVector right;
+  for (int a = 0; a < kTerms; ++a) right[a] = dot(model.terms[a], target);
+  const double squared = dot(target, target);
   Regression result;
   result.coefficients = model.factor.solve(right);
-  result.squared_signal = sum_squared - sum * sum / model.support;
-  result.squared_residual = std::max(0.0, sum_squared - result.coefficients.dot(right));
+  result.squared_signal = squared - right[kOne] * right[kOne] / model.support;
+  result.squared_residual = std::max(0.0, squared - result.coefficients.dot(right));
   return result;
 }
 
 PatchMatch makeMatch(const PatchModel& model, const Regression& fit,
                      const Eigen::Vector2d& position) {
-  const double gain = fit.coefficients[2];
+  const double gain = fit.coefficients[kValue];
   const double noise = fit.squared_residual / std::max(1.0, model.support - kTerms);
   PatchMatch match;
   match.position = position;
@@ -141,12 +165,12 @@ std::optional<PatchMatch> matchPatch(const PatchSource& source, const ImageWindo
                                      const Eigen::Vector2d& start, const PatchParams& params) {
   const std::optional<PatchModel> model = buildModel(source, params);
   if (!model) return std::nullopt;
-  std::vector<float> sampled;
+  Values sampled;
   Eigen::Vector2d position = start;
   for (int iteration = 0; iteration < params.max_iterations; ++iteration) {
     if (!sampleSquare(target, position, params.radius_px, sampled)) return std::nullopt;
     const Regression fit = regress(*model, sampled);
-    const double gain = fit.coefficients[2];
+    const double gain = fit.coefficients[kValue];
     if (gain < kLeastGain) return std::nullopt;
     const Eigen::Vector2d step = -fit.coefficients.head<2>() / gain;
     if (!(step.norm() < params.radius_px)) return std::nullopt;

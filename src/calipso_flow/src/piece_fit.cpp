@@ -7,18 +7,35 @@
 namespace calipso::flow {
 namespace {
 
-// Noise densities tried, as shares of the prior deviation of acceleration and spin.
-constexpr double kJerkShares[] = {0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0};
-constexpr double kSpinShares[] = {0.003, 0.01, 0.03, 0.1, 0.3, 1.0};
+// Noise densities tried, as shares of the prior deviation of acceleration and spin. What changes
+// faster than the largest is a collision.
+constexpr double kJerkShares[] = {0.003, 0.01, 0.03, 0.1, 0.3};
+constexpr double kSpinShares[] = {0.003, 0.01, 0.03, 0.1, 0.3};
 constexpr int kRounds = 2;
 
-std::vector<MotionPiece> travelOptions(const MotionPiece& piece, const MotionPrior& prior) {
+// Fewer frames in a piece say nothing about how its acceleration or spin changes.
+constexpr int kLeastForForced = 5;
+
+int framesInPiece(const std::vector<PoseMeasurement>& measurements,
+                  const std::vector<MotionPiece>& pieces, size_t index) {
+  return static_cast<int>(
+      std::count_if(measurements.begin(), measurements.end(), [&](const PoseMeasurement& m) {
+        const bool begun = index == 0 || m.time >= pieces[index].start;
+        const bool ended = index + 1 < pieces.size() && m.time >= pieces[index + 1].start;
+        return m.valid && begun && !ended;
+      }));
+}
+
+std::vector<MotionPiece> travelOptions(const MotionPiece& piece, const MotionPrior& prior,
+                                       bool few) {
   std::vector<MotionPiece> options;
   for (Travel travel : {Travel::kRest, Travel::kUniform, Travel::kFreeFall, Travel::kAccelerated}) {
     if (travel == Travel::kFreeFall && prior.gravity.norm() == 0.0) continue;
+    if (travel == Travel::kAccelerated && few) continue;
     options.push_back(piece);
     options.back().travel = travel;
   }
+  if (few) return options;
   for (double share : kJerkShares) {
     options.push_back(piece);
     options.back().travel = Travel::kForced;
@@ -27,12 +44,14 @@ std::vector<MotionPiece> travelOptions(const MotionPiece& piece, const MotionPri
   return options;
 }
 
-std::vector<MotionPiece> turningOptions(const MotionPiece& piece, const MotionPrior& prior) {
+std::vector<MotionPiece> turningOptions(const MotionPiece& piece, const MotionPrior& prior,
+                                        bool few) {
   std::vector<MotionPiece> options;
   for (Turning turning : {Turning::kNone, Turning::kSteady}) {
     options.push_back(piece);
     options.back().turning = turning;
   }
+  if (few) return options;
   for (double share : kSpinShares) {
     options.push_back(piece);
     options.back().turning = Turning::kForced;
@@ -55,14 +74,15 @@ void chooseKind(const std::vector<PoseMeasurement>& measurements, size_t index,
     }
     pieces[index] = winner;
   };
+  const bool few = framesInPiece(measurements, pieces, index) < kLeastForForced;
   MotionPiece& piece = pieces[index];
   if (piece.travel == Travel::kForced && piece.jerk == 0.0) piece.jerk = 0.3 * prior.acceleration;
   if (piece.turning == Turning::kForced && piece.spin_noise == 0.0) {
     piece.spin_noise = 0.3 * prior.spin;
   }
   for (int round = 0; round < kRounds; ++round) {
-    takeBest(travelOptions(pieces[index], prior));
-    takeBest(turningOptions(pieces[index], prior));
+    takeBest(travelOptions(pieces[index], prior, few));
+    takeBest(turningOptions(pieces[index], prior, few));
   }
 }
 

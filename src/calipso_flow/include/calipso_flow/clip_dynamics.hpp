@@ -11,6 +11,7 @@ namespace calipso::flow {
 struct DynamicsParams {
   TrackerParams tracker;
   TrajectoryParams trajectory;
+  double rest_px = 0.3;          // image motion over a piece that tracking errors may explain
   double cut_correlation = 0.5;  // successive pictures that agree less than this are cut apart
 };
 

@@ -30,6 +30,12 @@ struct MotionState {
 
   // Covariance of (velocity, spin).
   Matrix6d twistCovariance() const;
+  Eigen::Matrix3d accelerationCovariance() const;
+  // Widens velocity and acceleration along themselves by a relative deviation of the scale.
+  void addScaleUncertainty(double relative);
+  // Replaces one block by that of another covariance.
+  void setVelocityCovariance(const StateMatrix& other);
+  void setSpinCovariance(const StateMatrix& other);
 };
 
 struct PoseMeasurement {
@@ -47,6 +53,7 @@ enum class Turning { kNone, kSteady, kForced };
 struct MotionPiece {
   double start = 0.0;     // s; the first piece's start is not read
   bool cut = false;       // the video was cut here: nothing carries over
+  bool same_acceleration = false;  // the acceleration of the piece before goes on: gravity
   Travel travel = Travel::kForced;
   Turning turning = Turning::kForced;
   double jerk = 0.0;        // m/s^3 per square root of Hz; kForced only

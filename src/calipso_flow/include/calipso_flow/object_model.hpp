@@ -12,6 +12,7 @@ struct ObjectModel {
   int index = 0;      // label in masks
   TriangleMesh mesh;  // object frame, m
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // at the key frame
+  Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();  // of the placement, world, m^2
 };
 
 // Centre of mass of the body of uniform density that `mesh` encloses. Where the mesh encloses

@@ -36,6 +36,7 @@ struct Observation {
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
   Matrix6d covariance = Matrix6d::Zero();  // (m of the centroid, rad), world axes
   double deviation = 0.0;                  // see PoseFit
+  double coverage = 0.0;                   // see ReferenceView::Warped
   std::vector<Track> tracks;
   int inliers() const;
 };
@@ -64,7 +65,9 @@ class ObjectTracker {
   Eigen::Isometry3d searchCoarsely(const Frame& frame, const ReferenceView& reference,
                                    const Eigen::Isometry3d& predicted) const;
   Observation refine(const Frame& frame, const ReferenceView& reference,
-                     const Eigen::Isometry3d& start) const;
+                     const Eigen::Isometry3d& start, bool near) const;
+  Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, bool rough,
+                               Observation& observation) const;
   const ReferenceView& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) const;
   Observation attempt(const Frame& frame, const ReferenceView& reference,
                       const Eigen::Isometry3d& predicted) const;

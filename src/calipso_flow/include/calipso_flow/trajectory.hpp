@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -21,6 +22,9 @@ struct TrajectoryParams {
   double least_evidence = 8.0;   // log of the odds a collision must raise the likelihood by
   int window_frames = 5;         // frames on either side that a first look for a collision uses
   int max_collisions = 24;
+  // Says of the states of one piece that their motion cannot be told from tracking errors; empty:
+  // the likelihood alone decides.
+  std::function<bool(const std::vector<MotionState>&)> still;
 };
 
 // The motion of one object over a clip.

@@ -40,8 +40,14 @@ Frame frameFromMsg(const calipso::Frame& frame) {
 }
 
 ObjectModel modelFromMsg(const calipso_msgs::AlignedModel& model) {
-  return {model.object, model.index, fromMsg(model.mesh),
-          fromMsg(model.world_from_object.pose)};
+  ObjectModel result{model.object, model.index, fromMsg(model.mesh),
+                     fromMsg(model.world_from_object.pose), Eigen::Matrix3d::Zero()};
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      result.position_covariance(r, c) = model.world_from_object.covariance[6 * r + c];
+    }
+  }
+  return result;
 }
 
 cv::Mat maskFromMsg(const sensor_msgs::Image& labels, int index) {
