@@ -182,6 +182,14 @@ double DeformableBody::Impl::forceScale(const Vec& y, const Integrator& i, const
   return std::max({inner.norm(), outer.norm(), 1e-12 * loads.norm(), 1e-300});
 }
 
+double DeformableBody::Impl::roundOff(const Vec& y) const {
+  constexpr double kUnit = 2e-16;
+  double sum = 0.0;
+  for (int k = 0; k < A.pattern->rows(); ++k)
+    sum += A.block(A.pattern->diagonal[k]).diagonal().cwiseProduct(y.segment<3>(3 * k)).squaredNorm();
+  return kUnit * std::sqrt(sum);
+}
+
 void eliminate(const std::map<int, PrescribedDof>& dofs, BlockMatrix* A) {
   const BlockPattern& pattern = *A->pattern;
   for (const auto& [dof, unused] : dofs) {

@@ -52,8 +52,8 @@ Parts labelParts(const CoveredCell& cell, const Occupancy& occupancy, int s) {
   return parts;
 }
 
-// Specks below 2 % of the cell, and parts beyond kMostBranches, are counted to the largest part.
-void mergeSpecks(Parts* parts, int s) {
+// Specks below 2 % of the cell, and parts beyond `most`, are counted to the largest part.
+void mergeSpecks(Parts* parts, int s, int most) {
   const int n = static_cast<int>(parts->size.size());
   if (n < 2) return;
   std::vector<int> order(n), renamed(n, 0);
@@ -63,7 +63,7 @@ void mergeSpecks(Parts* parts, int s) {
   std::vector<int> size;
   for (int rank = 0; rank < n; ++rank) {
     const int part = order[rank];
-    const bool keep = rank == 0 || (parts->size[part] * 50 > s * s * s && rank < kMostBranches);
+    const bool keep = rank == 0 || (parts->size[part] * 50 > s * s * s && rank < most);
     renamed[part] = keep ? static_cast<int>(size.size()) : 0;
     if (keep)
       size.push_back(parts->size[part]);
@@ -93,6 +93,27 @@ std::array<unsigned, kMostBranches> contacts(const Parts& a, const Parts& b, int
   return touched;
 }
 
+// Octants that hold next to nothing keep this share, so that no Gauss point goes without stiffness.
+constexpr double kLeastShare = 0.03;
+
+void spreadOverOctants(const Parts& parts, int part, int s, CoveredCell* cell) {
+  double count[8] = {}, total = 0.0;
+  // The middle sub-voxels of an odd count belong to both halves.
+  const auto half = [s](int i, int side) {
+    return 2 * i + 1 == s ? 0.5 : (2 * i + 1 > s) == (side == 1) ? 1.0 : 0.0;
+  };
+  for (int k = 0; k < s; ++k)
+    for (int j = 0; j < s; ++j)
+      for (int i = 0; i < s; ++i)
+        for (int o = 0; parts.label[i + s * (j + s * k)] == part && o < 8; ++o)
+          count[o] += half(i, o & 1) * half(j, o >> 1 & 1) * half(k, o >> 2);
+  for (double c : count) total += c;
+  if (total == 0.0) return;
+  double sum = 0.0;
+  for (int o = 0; o < 8; ++o) sum += cell->share[o] = std::max(kLeastShare, 8.0 * count[o] / total);
+  for (double& share : cell->share) share *= 8.0 / sum;
+}
+
 using CellMap = std::map<std::array<int, 3>, int>;
 
 int neighbourOf(const CellMap& index, Vector3i p, int face) {
@@ -104,14 +125,14 @@ int neighbourOf(const CellMap& index, Vector3i p, int face) {
 }  // namespace
 
 std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
-                                          const Occupancy& occupancy, int s) {
+                                          const Occupancy& occupancy, int s, bool separate) {
   CellMap index;
   std::vector<Parts> parts(cells.size());
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const Vector3i& p = cells[c].position;
     index[{p.x(), p.y(), p.z()}] = static_cast<int>(c);
     parts[c] = labelParts(cells[c], occupancy, s);
-    mergeSpecks(&parts[c], s);
+    mergeSpecks(&parts[c], s, separate ? kMostBranches : 1);
   }
   std::vector<CoveredCell> result;
   for (std::size_t c = 0; c < cells.size(); ++c) {
@@ -121,6 +142,7 @@ std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
     for (int b = 0; b < n; ++b) {
       pieces[b].branch = b;
       if (n > 1) pieces[b].fraction *= parts[c].size[b] / total;
+      spreadOverOctants(parts[c], b, s, &pieces[b]);
     }
     for (int face = 0; face < 6; ++face) {
       const int other = neighbourOf(index, cells[c].position, face);

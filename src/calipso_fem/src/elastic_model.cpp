@@ -10,6 +10,7 @@
 
 #include "cell_coloring.hpp"
 #include "element.hpp"
+#include "stvk_batch.hpp"
 
 namespace calipso::fem {
 namespace {
@@ -20,6 +21,28 @@ constexpr std::array<std::pair<ElementType, const char*>, 4> kNames = {{
     {ElementType::kHexEnhanced, "enhanced"},
     {ElementType::kTetP1, "P1"},
 }};
+
+// Below this, waking a second thread for every colour costs more than it saves.
+constexpr int kSerialCells = 200;
+
+StvkBatchKind makeBatchKind(const ElementKind& kind) {
+  StvkBatchKind b{};
+  const ReferenceElement& ref = *kind.reference;
+  for (int q = 0; q < 8; ++q) {
+    b.weight[q] = ref.weight[q];
+    for (int a = 0; a < 8; ++a)
+      for (int c = 0; c < 3; ++c) b.gradient[q][a][c] = ref.gradient[q](a, c);
+    for (int k = 0; k < 3; ++k)
+      for (int c = 0; c < 3; ++c) b.mode[q][k][c] = ref.mode[q][3 * k](0, c);
+  }
+  b.lambda = kind.lame.lambda;
+  b.mu = kind.lame.mu;
+  b.enhanced = kind.type == ElementType::kHexEnhanced;
+  if (!b.enhanced) return b;
+  for (int i = 0; i < kModes; ++i)
+    for (int j = 0; j < kModes; ++j) b.mode_inverse[i][j] = kind.mode_stiffness_inverse(i, j);
+  return b;
+}
 
 CornerMatrix cornersOf(const CellMatrix& cells, int cell, const double* x) {
   CornerMatrix corners(cells.cols(), 3);
@@ -70,12 +93,28 @@ struct ElasticModel::Impl {
   std::shared_ptr<const BlockPattern> pattern;
   std::vector<int> block_of;                   // per cell, corners x corners
   CellColoring coloring;
+  // Cells of one colour and kind, four by four, where the batch kernel can take them.
+  struct Batch {
+    std::array<int, kLanes> cell;   // the last one repeats where fewer are left
+    int count;
+  };
+  std::vector<StvkBatchKind> batch_kinds;      // as kinds
+  std::vector<Batch> batches;
+  std::vector<int> batch_start;                // by colour
   Eigen::VectorXd lumped_mass;
 
   void buildReferences();
   void buildKinds();
   void buildBlocks();
   void buildMass();
+  void buildBatches();
+  bool isBatched() const { return !batches.empty(); }
+  // Calls work(cell, lane, result) for all cells of batched models.
+  template <class Work>
+  void forEachBatched(const Vec& x, int derivatives, StvkPart part, const Work& work) const;
+  ElementResult evaluate(int cell, const Vec& x, int derivatives, Part part) const;
+  void addToMatrix(int cell, const ElementResult& r, BlockMatrix& K) const;
+  void addToMatrix(int cell, int lane, const StvkBatchResult& r, BlockMatrix& K) const;
   template <class Work>
   void forEachCell(const Work& work) const;
   void assemble(const Vec& x, Part part, BlockMatrix& K) const;
@@ -86,10 +125,88 @@ struct ElasticModel::Impl {
 template <class Work>
 void ElasticModel::Impl::forEachCell(const Work& work) const {
   for (std::size_t color = 0; color + 1 < coloring.start.size(); ++color) {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (mesh.cellCount() > kSerialCells)
     for (int k = coloring.start[color]; k < coloring.start[color + 1]; ++k)
       work(coloring.cells[k]);
   }
+}
+
+ElementResult ElasticModel::Impl::evaluate(int cell, const Vec& x, int derivatives,
+                                           Part part) const {
+  ElementResult r;
+  evaluateElement(kinds[kind_of[cell]], cornersOf(mesh.cells, cell, x.data()), derivatives, part,
+                  &r);
+  return r;
+}
+
+template <class Work>
+void ElasticModel::Impl::forEachBatched(const Vec& x, int derivatives, StvkPart part,
+                                        const Work& work) const {
+  for (std::size_t color = 0; color + 1 < batch_start.size(); ++color) {
+#pragma omp parallel for schedule(static) if (mesh.cellCount() > kSerialCells)
+    for (int k = batch_start[color]; k < batch_start[color + 1]; ++k) {
+      const Batch& batch = batches[k];
+      alignas(32) double corners[24][kLanes];
+      StvkBatchResult result;
+      for (int l = 0; l < kLanes; ++l)
+        for (int c = 0; c < 8; ++c)
+          for (int i = 0; i < 3; ++i)
+            corners[3 * c + i][l] = x[3 * mesh.cells(batch.cell[l], c) + i];
+      evaluateStvkBatch(batch_kinds[kind_of[batch.cell[0]]], corners, derivatives, part, &result);
+      for (int l = 0; l < batch.count; ++l) work(batch.cell[l], l, result);
+    }
+  }
+}
+
+void ElasticModel::Impl::buildBatches() {
+  batches.clear();
+  batch_kinds.clear();
+  batch_start.assign(1, 0);
+  if (model != MaterialModel::kStVenantKirchhoff ||
+      (type != ElementType::kHexEnhanced && type != ElementType::kHexQ1))
+    return;
+  for (const ElementKind& kind : kinds) batch_kinds.push_back(makeBatchKind(kind));
+  for (std::size_t color = 0; color + 1 < coloring.start.size(); ++color) {
+    std::vector<int> cells(coloring.cells.begin() + coloring.start[color],
+                           coloring.cells.begin() + coloring.start[color + 1]);
+    std::stable_sort(cells.begin(), cells.end(),
+                     [this](int a, int b) { return kind_of[a] < kind_of[b]; });
+    for (std::size_t k = 0; k < cells.size();) {
+      Batch batch{};
+      const int kind = kind_of[cells[k]];
+      while (batch.count < kLanes && k < cells.size() && kind_of[cells[k]] == kind)
+        batch.cell[batch.count++] = cells[k++];
+      for (int l = batch.count; l < kLanes; ++l) batch.cell[l] = batch.cell[batch.count - 1];
+      batches.push_back(batch);
+    }
+    batch_start.push_back(static_cast<int>(batches.size()));
+  }
+}
+
+void ElasticModel::Impl::addToMatrix(int cell, const ElementResult& r, BlockMatrix& K) const {
+  const int n = static_cast<int>(mesh.cells.cols());
+  const int* blocks = block_of.data() + static_cast<std::size_t>(cell) * n * n;
+  for (int a = 0; a < n; ++a)
+    for (int b = 0; b < n; ++b)
+      K.block(blocks[a * n + b]) += mesh.fraction[cell] * r.K.block<3, 3>(3 * a, 3 * b);
+}
+
+void ElasticModel::Impl::addToMatrix(int cell, int lane, const StvkBatchResult& r,
+                                     BlockMatrix& K) const {
+  const int* blocks = block_of.data() + static_cast<std::size_t>(cell) * 64;
+  const double fraction = mesh.fraction[cell];
+  int pair = 0;
+  for (int a = 0; a < 8; ++a)
+    for (int b = a; b < 8; ++b, ++pair) {
+      double* upper = K.values.data() + 9 * static_cast<std::size_t>(blocks[8 * a + b]);
+      double* lower = K.values.data() + 9 * static_cast<std::size_t>(blocks[8 * b + a]);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+          const double value = fraction * r.K[pair][3 * i + j][lane];
+          upper[3 * i + j] += value;
+          if (a != b) lower[3 * j + i] += value;
+        }
+    }
 }
 
 void ElasticModel::Impl::buildReferences() {
@@ -98,9 +215,15 @@ void ElasticModel::Impl::buildReferences() {
   std::map<std::vector<long>, int> known;
   for (int cell = 0; cell < mesh.cellCount(); ++cell) {
     const CornerMatrix corners = cornersOf(mesh.cells, cell, mesh.nodes.data());
-    const auto [it, is_new] = known.try_emplace(shapeKey(corners), references.size());
-    if (is_new)
+    std::vector<long> key = shapeKey(corners);
+    const bool spread = mesh.point_share.rows() > 0;
+    if (spread)
+      for (int q = 0; q < 8; ++q) key.push_back(std::lround(1e6 * mesh.point_share(cell, q)));
+    const auto [it, is_new] = known.try_emplace(std::move(key), references.size());
+    if (is_new) {
       references.push_back(std::make_unique<ReferenceElement>(makeReferenceElement(corners)));
+      if (spread) spreadWeights(mesh.point_share.row(cell), references.back().get());
+    }
     reference_of[cell] = it->second;
   }
 }
@@ -145,14 +268,18 @@ void ElasticModel::Impl::buildMass() {
 void ElasticModel::Impl::assemble(const Vec& x, Part part, BlockMatrix& K) const {
   if (K.pattern != pattern) K = BlockMatrix(pattern);
   K.setZero();
-  const int n = static_cast<int>(mesh.cells.cols());
-  forEachCell([&](int cell) {
-    ElementResult r;
-    evaluateElement(kinds[kind_of[cell]], cornersOf(mesh.cells, cell, x.data()), 2, part, &r);
-    const int* blocks = block_of.data() + static_cast<std::size_t>(cell) * n * n;
-    for (int a = 0; a < n; ++a)
-      for (int b = 0; b < n; ++b)
-        K.block(blocks[a * n + b]) += mesh.fraction[cell] * r.K.block<3, 3>(3 * a, 3 * b);
+  if (!isBatched()) {
+    forEachCell([&](int cell) { addToMatrix(cell, evaluate(cell, x, 2, part), K); });
+    return;
+  }
+  const StvkPart stvk_part = part == Part::kFull       ? StvkPart::kFull
+                             : part == Part::kPositive ? StvkPart::kPositive
+                                                       : StvkPart::kMaterialOnly;
+  forEachBatched(x, 2, stvk_part, [&](int cell, int lane, const StvkBatchResult& r) {
+    if (r.smallest_dilatation[lane] < kRecoveryDilatation && part != Part::kMaterialOnly)
+      addToMatrix(cell, evaluate(cell, x, 2, part), K);
+    else
+      addToMatrix(cell, lane, r, K);
   });
 }
 
@@ -171,6 +298,7 @@ ElasticModel::ElasticModel(VolumeMesh mesh, const Material& material, MaterialMo
   impl_->buildReferences();
   impl_->buildKinds();
   impl_->buildBlocks();
+  impl_->buildBatches();
   impl_->buildMass();
 }
 
@@ -195,6 +323,7 @@ void ElasticModel::setCellMaterials(const std::vector<Material>& materials) {
   for (const Material& material : materials) validate(material);
   impl_->materials = materials;
   impl_->buildKinds();
+  impl_->buildBatches();
   impl_->buildMass();
 }
 
@@ -213,30 +342,38 @@ void ElasticModel::setRestPositions(const NodeMatrix& nodes) {
     throw;
   }
   impl_->buildKinds();
+  impl_->buildBatches();
   impl_->buildMass();
 }
 
 double ElasticModel::energy(const Vec& x) const {
   const Impl& m = *impl_;
   Eigen::VectorXd cell_energy(m.mesh.cellCount());
-  m.forEachCell([&](int cell) {
-    ElementResult r;
-    evaluateElement(m.kinds[m.kind_of[cell]], cornersOf(m.mesh.cells, cell, x.data()), 0,
-                    Part::kFull, &r);
-    cell_energy[cell] = m.mesh.fraction[cell] * r.energy;
-  });
-  return cell_energy.sum();
+  const auto generic = [&](int cell) { return m.evaluate(cell, x, 0, Part::kFull).energy; };
+  if (m.isBatched())
+    m.forEachBatched(x, 0, StvkPart::kFull, [&](int cell, int lane, const StvkBatchResult& r) {
+      cell_energy[cell] = r.smallest_dilatation[lane] < kRecoveryDilatation ? generic(cell)
+                                                                            : r.energy[lane];
+    });
+  else
+    m.forEachCell([&](int cell) { cell_energy[cell] = generic(cell); });
+  return cell_energy.dot(m.mesh.fraction);
 }
 
 void ElasticModel::gradient(const Vec& x, Vec& f) const {
   const Impl& m = *impl_;
   f.setZero(dofCount());
-  m.forEachCell([&](int cell) {
-    ElementResult r;
-    evaluateElement(m.kinds[m.kind_of[cell]], cornersOf(m.mesh.cells, cell, x.data()), 1,
-                    Part::kFull, &r);
+  const auto generic = [&](int cell) {
+    const ElementResult r = m.evaluate(cell, x, 1, Part::kFull);
     for (int c = 0; c < m.mesh.cells.cols(); ++c)
       f.segment<3>(3 * m.mesh.cells(cell, c)) += m.mesh.fraction[cell] * r.f.segment<3>(3 * c);
+  };
+  if (!m.isBatched()) return m.forEachCell(generic);
+  m.forEachBatched(x, 1, StvkPart::kFull, [&](int cell, int lane, const StvkBatchResult& r) {
+    if (r.smallest_dilatation[lane] < kRecoveryDilatation) return generic(cell);
+    for (int c = 0; c < 8; ++c)
+      for (int i = 0; i < 3; ++i)
+        f[3 * m.mesh.cells(cell, c) + i] += m.mesh.fraction[cell] * r.f[3 * c + i][lane];
   });
 }
 
@@ -245,19 +382,16 @@ void ElasticModel::hessian(const Vec& x, Definiteness definiteness, BlockMatrix&
 }
 
 void ElasticModel::viscosity(const Vec& x, BlockMatrix& D) const {
-  Impl& m = *impl_;
+  const Impl& m = *impl_;
+  if (m.isBatched()) return m.assemble(x, Part::kMaterialOnly, D);
   if (D.pattern != m.pattern) D = BlockMatrix(m.pattern);
   D.setZero();
-  const int n = static_cast<int>(m.mesh.cells.cols());
   m.forEachCell([&](int cell) {
     ElementKind kind = m.kinds[m.kind_of[cell]];
     if (kind.model != MaterialModel::kLinear) kind.model = MaterialModel::kStVenantKirchhoff;
     ElementResult r;
     evaluateElement(kind, cornersOf(m.mesh.cells, cell, x.data()), 2, Part::kMaterialOnly, &r);
-    const int* blocks = m.block_of.data() + static_cast<std::size_t>(cell) * n * n;
-    for (int a = 0; a < n; ++a)
-      for (int b = 0; b < n; ++b)
-        D.block(blocks[a * n + b]) += m.mesh.fraction[cell] * r.K.block<3, 3>(3 * a, 3 * b);
+    m.addToMatrix(cell, r, D);
   });
 }
 

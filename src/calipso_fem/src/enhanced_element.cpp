@@ -98,6 +98,7 @@ ModeSystem modeSystem(const ElementKind& kind, const CornerMatrix& x, const Mode
 // Amplitudes that minimise the element's energy at corners x: damped Newton from zero.
 ModeVector solveModes(const ElementKind& kind, const CornerMatrix& x) {
   constexpr int kMaxIterations = 25;
+  constexpr double kExact = 1e-11, kSmall = 1e-5;   // of an amplitude
   ModeVector a = ModeVector::Zero();
   double energy = modeEnergy(kind, x, a);
   for (int it = 0; it < kMaxIterations; ++it) {
@@ -108,14 +109,21 @@ ModeVector solveModes(const ElementKind& kind, const CornerMatrix& x) {
       llt.compute(s.K);
     }
     const ModeVector step = -llt.solve(s.gradient);
+    const double largest = step.lpNorm<Eigen::Infinity>();
+    if (!std::isfinite(largest)) break;
+    // Near the minimum the energy's own rounding would mislead a line search.
+    if (largest < kSmall) {
+      a += step;
+      if (largest < kExact) break;
+      continue;
+    }
     const double slope = s.gradient.dot(step);
     double t = 1.0, trial = modeEnergy(kind, x, a + step);
-    while (!(trial <= energy + 1e-4 * t * slope + 1e-14 * std::abs(energy)) && t > 1e-6)
+    while (!(trial <= energy + 1e-4 * t * slope) && t > 1e-6)
       trial = modeEnergy(kind, x, a + (t *= 0.5) * step);
-    if (!(trial <= energy + 1e-14 * std::abs(energy))) break;
+    if (!(trial <= energy)) break;
     a += t * step;
     energy = trial;
-    if (step.lpNorm<Eigen::Infinity>() < 1e-10) break;
   }
   return a;
 }

@@ -83,6 +83,17 @@ ReferenceElement makeReferenceElement(const CornerMatrix& corners) {
   return corners.rows() == 4 ? makeTet(corners) : makeHex(corners);
 }
 
+void spreadWeights(const Eigen::Matrix<double, 1, 8>& share, ReferenceElement* r) {
+  double spread = 0.0;
+  for (int q = 0; q < 8; ++q) spread += r->weight[q] * share[q];
+  for (int q = 0; q < 8; ++q) r->weight[q] *= share[q] * r->volume / spread;
+  for (int m = 0; m < kModes; ++m) {
+    Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+    for (int q = 0; q < 8; ++q) mean += r->weight[q] / r->volume * r->mode[q][m];
+    for (int q = 0; q < 8; ++q) r->mode[q][m] -= mean;
+  }
+}
+
 Eigen::MatrixXd unitMass(const CornerMatrix& X) {
   if (X.rows() == 4) {
     const Eigen::Matrix4d pattern = Eigen::Matrix4d::Ones() + Eigen::Matrix4d::Identity();

@@ -35,6 +35,10 @@ Eigen::Vector3d gaussPoint(int q);
 // @throw std::invalid_argument when the cell is inverted or has no volume
 ReferenceElement makeReferenceElement(const CornerMatrix& corners);
 
+// Spreads the weights over the Gauss points of a hexahedron by `share` (mean one), and shifts the
+// modes so that they still do no work on constant stress (patch test).
+void spreadWeights(const Eigen::Matrix<double, 1, 8>& share, ReferenceElement* reference);
+
 // Mass matrix of a unit density between corners (row-major, corners x corners), m^3.
 Eigen::MatrixXd unitMass(const CornerMatrix& corners);
 

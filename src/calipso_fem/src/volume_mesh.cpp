@@ -45,6 +45,7 @@ VolumeMesh kuhnSplit(const VolumeMesh& hexes) {
   VolumeMesh tets = hexes;
   tets.cells.resize(6 * hexes.cells.rows(), 4);
   tets.fraction.resize(tets.cells.rows());
+  tets.point_share.resize(0, 8);
   for (int cell = 0; cell < hexes.cellCount(); ++cell)
     for (int t = 0; t < 6; ++t) {
       for (int c = 0; c < 4; ++c) tets.cells(6 * cell + t, c) = hexes.cells(cell, kKuhn[t][c]);
@@ -64,6 +65,9 @@ void validate(const VolumeMesh& mesh) {
     fail("cells need 8 or 4 corners, not " + std::to_string(mesh.cells.cols()));
   if (!mesh.nodes.allFinite()) fail("a node position is not finite");
   if (mesh.fraction.size() != mesh.cells.rows()) fail("needs one filled fraction per cell");
+  if (mesh.point_share.rows() != 0 &&
+      (mesh.point_share.rows() != mesh.cells.rows() || !(mesh.point_share.minCoeff() > 0.0)))
+    fail("needs a positive point share for every cell, or none");
   for (int cell = 0; cell < mesh.cellCount(); ++cell) {
     if (mesh.cells.row(cell).minCoeff() < 0 || mesh.cells.row(cell).maxCoeff() >= mesh.nodeCount())
       fail("cell " + std::to_string(cell) + " names a node outside 0.." +

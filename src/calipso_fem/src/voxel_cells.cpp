@@ -167,8 +167,7 @@ std::vector<CoveredCell> coverSurface(const TriangleMesh& surface, const VoxelLa
   // A sheet without any volume still has to weigh and to resist something.
   if (filled <= 1e-6 * cells.size())
     for (CoveredCell& cell : cells) cell.fraction = 1.0;
-  if (o.separate_branches) cells = separateBranches(cells, coverage.occupancy, o.samples_per_edge);
-  return cells;
+  return separateBranches(cells, coverage.occupancy, o.samples_per_edge, o.separate_branches);
 }
 
 }  // namespace calipso::fem

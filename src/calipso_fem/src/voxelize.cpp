@@ -67,8 +67,10 @@ VoxelGrid makeGrid(const VoxelLayout& layout, const std::vector<CoveredCell>& ce
   grid.hexes = numbering.hexes;
   grid.cell_lattice.resize(cells.size(), 3);
   grid.fraction.resize(cells.size());
+  grid.point_share.resize(cells.size(), 8);
   for (std::size_t c = 0; c < cells.size(); ++c) {
     grid.cell_lattice.row(c) = cells[c].position.transpose();
+    for (int o = 0; o < 8; ++o) grid.point_share(c, o) = cells[c].share[o];
     grid.fraction[c] = std::clamp(cells[c].fraction, min_fraction, 1.0);
   }
   grid.node_lattice = numbering.node_lattice;
@@ -103,6 +105,7 @@ VolumeMesh VoxelGrid::mesh() const {
   m.nodes = nodes;
   m.cells = hexes;
   m.fraction = fraction;
+  m.point_share = point_share;
   m.lattice = node_lattice;
   return m;
 }

@@ -7,6 +7,7 @@ namespace calipso::fem {
 // Nodal vectors hold 3n numbers, node by node: (x0, y0, z0, x1, ...).
 using Vec = Eigen::VectorXd;
 using NodeMatrix = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using PointMatrix = Eigen::Matrix<double, Eigen::Dynamic, 8, Eigen::RowMajor>;
 using CellMatrix = Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // A volume mesh of hexahedra (8 corners) or tetrahedra (4 corners).
@@ -15,6 +16,9 @@ struct VolumeMesh {
   NodeMatrix nodes;           // #N x 3, rest positions, m
   CellMatrix cells;           // #C x 8 or #C x 4
   Eigen::VectorXd fraction;   // #C, filled part of each cell, in (0, 1]
+  // How the filled part of each hexahedron is spread over the octants around its Gauss points, mean
+  // one per row; empty: evenly. #C x 8
+  PointMatrix point_share;
   // Lattice coordinates of the nodes when they lie on a regular grid, else empty. #N x 3
   Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor> lattice;
 

@@ -18,6 +18,7 @@ struct VoxelGrid {
   Eigen::Matrix<int, Eigen::Dynamic, 8, Eigen::RowMajor> hexes;          // #C x 8, x fastest
   Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor> cell_lattice;   // #C x 3
   Eigen::VectorXd fraction;                             // #C, filled part, in (0, 1]
+  PointMatrix point_share;                              // #C x 8, as in VolumeMesh
   std::vector<std::string> messages;                    // what had to be repaired, for the user
 
   int nodeCount() const { return static_cast<int>(nodes.rows()); }
