@@ -34,6 +34,7 @@ test: build
 	@$(MAKE) --no-print-directory build/.tests_built
 	@scripts/run_tests
 
+# SCENES="DIR..." and REFERENCES="DIR..." name more cases than the shipped one.
 bench: build
 	@scripts/run_benchmarks
 
