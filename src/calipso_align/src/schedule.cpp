@@ -2,23 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 namespace calipso::align {
 namespace {
 
 constexpr double kElasticWeight = 3e3;  // of the finished fit: see FemStageOptions
 
-double knob(const char* name, double value) {
-  const char* text = std::getenv(name);
-  return text ? std::atof(text) : value;
-}
-
 LowOrderPrior similarityPrior(const FitProblem& problem, const AlignOptions& options) {
   LowOrderPrior prior;
   prior.rotation_rad = options.rotation_sigma_deg * M_PI / 180.0;
   prior.in_plane = 2.0;
-  prior.log_scale = problem.depthIsKnown() ? 0.3 : knob("K_LOGS", 0.15);
+  prior.log_scale = problem.depthIsKnown() ? 0.3 : 0.15;
   // One picture does not show the depth: it is held, unless something else does.
   prior.depth = problem.depthIsKnown() ? 0.5 : 0.0;
   return prior;
@@ -26,16 +20,16 @@ LowOrderPrior similarityPrior(const FitProblem& problem, const AlignOptions& opt
 
 LowOrderPrior affinePrior(const FitProblem& problem, const AlignOptions& options) {
   LowOrderPrior prior = similarityPrior(problem, options);
-  prior.strain = knob("K_STRAIN", 0.25);
-  prior.shear = knob("K_SHEAR", 0.15);
-  prior.strain_depth = problem.depth.empty() ? knob("K_STRAINZ", 0.02) : 0.25;
+  prior.strain = 0.25;
+  prior.shear = 0.15;
+  prior.strain_depth = problem.depth.empty() ? 0.02 : 0.25;
   return prior;
 }
 
 LowOrderPrior quadraticPrior(const FitProblem& problem, const AlignOptions& options) {
   LowOrderPrior prior = affinePrior(problem, options);
-  prior.quadratic = knob("K_QUAD", 0.3);
-  prior.quadratic_depth = problem.depth.empty() ? knob("K_QUADZ", 0.02) : 0.3;
+  prior.quadratic = 0.3;
+  prior.quadratic_depth = problem.depth.empty() ? 0.02 : 0.3;
   return prior;
 }
 
@@ -83,11 +77,11 @@ double Ramp::at(int k, int count) const {
 std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOptions& options) {
   if (options.method == Method::kLiteral) return {literalRigidStep(problem, options)};
   return {{"similarity", stage(similarityPrior(problem, options), 12), {0.10, 0.06},
-           knob("K_SIGA", 0.1), {0.15, 0.10}},
+           0.1, {0.15, 0.10}},
           {"affine", stage(affinePrior(problem, options), 10), {0.06, 0.03},
-           knob("K_SIGB", 0.04), {0.10, 0.05}},
+           0.04, {0.10, 0.05}},
           {"quadratic", stage(quadraticPrior(problem, options), 14), {0.04, 0.015},
-           knob("K_SIGC", 0.01), {0.06, 0.03}}};
+           0.01, {0.06, 0.03}}};
 }
 
 MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, int iteration) {
@@ -99,7 +93,7 @@ MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, 
                kNarrowestPx + 2.0 * noise);
   settings.contour.reject_px = 3.0 * settings.contour.robust_px;
   settings.contour_sigma_px = std::max(step.sigma * problem.extent_px, 0.5 + noise);
-  settings.contour_correlation_px = knob("K_CORR", 10);
+  settings.contour_correlation_px = 10.0;
   settings.depth_robust = step.depth_robust.at(iteration, step.fit.iterations);
   settings.depth_sigma = 0.5 * step.sigma;
   if (step.literal) makeLiteral(settings);
@@ -112,13 +106,13 @@ std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOpti
   const double noise = problem.target.noise_px;
   for (size_t level = 0; level < options.levels.size(); ++level) {
     const bool first = level == 0;
-    const int iterations = first ? knob("K_N0", 10) : knob("K_N1", 4);
-    const double end = options.elastic_weight * knob("K_LAMBDA", kElasticWeight);
-    const Ramp stiffness{first ? knob("K_LAMBDA0", 3e5) : end, end};
+    const int iterations = first ? 10 : 4;
+    const double end = options.elastic_weight * kElasticWeight;
+    const Ramp stiffness{first ? 3e5 : end, end};
     ElasticStep step;
     step.fit.nodes = options.levels[level];
-    step.fit.poissons_ratio = knob("K_NU", options.poissons_ratio);
-    step.fit.depth_sigma = problem.depth.empty() ? knob("K_DEPTH", 0.1) : 1.0;
+    step.fit.poissons_ratio = options.poissons_ratio;
+    step.fit.depth_sigma = problem.depth.empty() ? 0.1 : 1.0;
     for (int k = 0; k < iterations; ++k) {
       step.fit.elastic_weights.push_back(stiffness.at(k, iterations - 2));
     }

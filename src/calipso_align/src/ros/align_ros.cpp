@@ -83,9 +83,17 @@ AlignRos::AlignRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
         "align/initial_pose/" + graphName(description.name), 1,
         [this, object](const geometry_msgs::PoseStampedConstPtr& m) { onInitialPose(m, object); }));
   }
+  clip_subscriber_ = nh.subscribe(topics::kClipInfo, 1, &AlignRos::onClipInfo, this);
   segmentation_subscriber_ =
       nh.subscribe(topics::kSegmentation, kUnlimited, &AlignRos::onSegmentation, this);
   reporter_.starting("waiting for the key frame's segmentation");
+}
+
+void AlignRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& msg) {
+  if (!key_) {
+    reporter_.starting("waiting for the segmentation of the first of " +
+                       std::to_string(msg->frames) + " frames");
+  }
 }
 
 // Only key frames carry contours.

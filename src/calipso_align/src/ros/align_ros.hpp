@@ -1,6 +1,7 @@
 #pragma once
 
 #include <calipso_msgs/AlignedModels.h>
+#include <calipso_msgs/ClipInfo.h>
 #include <calipso_msgs/Segmentation.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <ros/ros.h>
@@ -34,6 +35,7 @@ class AlignRos {
   AlignRos(ros::NodeHandle& nh, ros::NodeHandle& pnh);
 
  private:
+  void onClipInfo(const calipso_msgs::ClipInfoConstPtr& msg);
   void onSegmentation(const calipso_msgs::SegmentationConstPtr& msg);
   void onInitialPose(const geometry_msgs::PoseStampedConstPtr& msg, int object);
   void moveTo(int object, const Eigen::Isometry3d& world_from_object);
@@ -49,7 +51,7 @@ class AlignRos {
   AlignOptions options_;
   NodeReporter reporter_;
   ros::Publisher models_publisher_, markers_publisher_;
-  ros::Subscriber segmentation_subscriber_;
+  ros::Subscriber clip_subscriber_, segmentation_subscriber_;
   std::vector<ros::Subscriber> pose_subscribers_;
   ros::ServiceServer rerun_service_;
   std::unique_ptr<PoseMarkers> pose_markers_;
