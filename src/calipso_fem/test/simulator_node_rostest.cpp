@@ -113,9 +113,8 @@ TEST_F(SimulatorNodeTest, OneStatePerFrameAndEditsAreReported) {
   edits_.publish(bad);
   ASSERT_TRUE(waitFor([&] { return !statuses_.empty() && statuses_.back().edits == 2; }));
   sendClip();
-  ASSERT_TRUE(waitFor([&] {
-    return statuses_.back().state == calipso_msgs::NodeStatus::READY;
-  })) << statuses_.back().message;
+  ASSERT_TRUE(waitFor([&] { return statuses_.back().state == calipso_msgs::NodeStatus::READY; }))
+      << statuses_.back().message;
 
   for (int k = 0; k < kFrames; ++k) sendFrame(k);
   ASSERT_TRUE(waitFor([&] { return states_.size() == kFrames && reports_.size() == 2; }));
@@ -133,7 +132,8 @@ TEST_F(SimulatorNodeTest, OneStatePerFrameAndEditsAreReported) {
   EXPECT_NEAR(object.pose.position.z, kStart.z() - 9.81 * t * t, 1e-6);
   EXPECT_EQ(object.vertices.size(), 3u * 26u);
 
-  ASSERT_TRUE(waitFor([&] { return !plans_.empty() && plans_.back().objects.at(0).kind == "rigid"; }));
+  ASSERT_TRUE(
+      waitFor([&] { return !plans_.empty() && plans_.back().objects.at(0).kind == "rigid"; }));
   ASSERT_TRUE(waitFor([&] { return !markers_.empty(); }));
   std::set<std::string> namespaces;
   for (const auto& marker : markers_.back().markers) namespaces.insert(marker.ns);

@@ -13,7 +13,9 @@ WorldParams coarse() {
   return params;
 }
 
-World boxWorld() { return World(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.05}), coarse()); }
+World boxWorld() {
+  return World(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.05}), coarse());
+}
 
 std::string refusal(World& world, const Edit& edit) {
   world.submit(edit);
@@ -60,7 +62,8 @@ TEST(WorldEdits, RegionBesideTheObjectIsRefused) {
 
 TEST(WorldEdits, EstimatedVelocityNeedsAnEstimate) {
   World world = boxWorld();
-  EXPECT_NE(refusal(world, editOf(EditKind::kVelocity, EditMode::kEstimated)).find("absolute"), std::string::npos);
+  EXPECT_NE(refusal(world, editOf(EditKind::kVelocity, EditMode::kEstimated)).find("absolute"),
+            std::string::npos);
 }
 
 TEST(WorldEdits, ReleaseOfNothingIsRefused) {

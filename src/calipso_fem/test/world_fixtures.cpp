@@ -7,7 +7,8 @@
 namespace calipso::fem::test {
 namespace {
 
-TriangleMesh meshOf(const std::vector<Eigen::Vector3d>& vertices, const std::vector<Eigen::Vector3i>& triangles) {
+TriangleMesh meshOf(const std::vector<Eigen::Vector3d>& vertices,
+                    const std::vector<Eigen::Vector3i>& triangles) {
   TriangleMesh mesh;
   mesh.vertices.resize(vertices.size(), 3);
   mesh.triangles.resize(triangles.size(), 3);
@@ -23,8 +24,10 @@ TriangleMesh boxSurface(const Eigen::Vector3d& size, int n) {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector3i> triangles;
   const auto id = [&](const Eigen::Vector3i& l) {
-    const auto [it, fresh] = ids.emplace(std::make_tuple(l.x(), l.y(), l.z()), static_cast<int>(vertices.size()));
-    if (fresh) vertices.push_back(size.cwiseProduct(l.cast<double>() / n - Eigen::Vector3d::Constant(0.5)));
+    const auto [it, fresh] =
+        ids.emplace(std::make_tuple(l.x(), l.y(), l.z()), static_cast<int>(vertices.size()));
+    if (fresh)
+      vertices.push_back(size.cwiseProduct(l.cast<double>() / n - Eigen::Vector3d::Constant(0.5)));
     return it->second;
   };
   for (int axis = 0; axis < 3; ++axis)
@@ -39,8 +42,10 @@ TriangleMesh boxSurface(const Eigen::Vector3d& size, int n) {
             return id(l);
           };
           const int a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
-          if (side) triangles.insert(triangles.end(), {{a, b, c}, {a, c, d}});
-          else triangles.insert(triangles.end(), {{a, c, b}, {a, d, c}});
+          if (side)
+            triangles.insert(triangles.end(), {{a, b, c}, {a, c, d}});
+          else
+            triangles.insert(triangles.end(), {{a, c, b}, {a, d, c}});
         }
   return meshOf(vertices, triangles);
 }
@@ -52,7 +57,8 @@ TriangleMesh sphereSurface(double radius, int rings, int segments) {
     for (int j = 0; j < segments; ++j) {
       const double theta = M_PI * i / rings, phi = 2.0 * M_PI * j / segments;
       vertices.push_back(radius * Eigen::Vector3d(std::sin(theta) * std::cos(phi),
-                                                  std::sin(theta) * std::sin(phi), std::cos(theta)));
+                                                  std::sin(theta) * std::sin(phi),
+                                                  std::cos(theta)));
     }
   vertices.push_back({0, 0, -radius});
   const int last = static_cast<int>(vertices.size()) - 1;
@@ -69,7 +75,8 @@ TriangleMesh sphereSurface(double radius, int rings, int segments) {
 }
 
 TriangleMesh bentRod(double size, double thickness) {
-  // A sphere stretched along x and bent upwards at both ends in the xz plane, then laid on its side.
+  // A sphere stretched along x and bent upwards at both ends in the xz plane, then laid on its
+  // side.
   TriangleMesh mesh = sphereSurface(1.0, 16, 24);
   for (int i = 0; i < mesh.vertexCount(); ++i) {
     const Eigen::Vector3d p = mesh.vertex(i);

@@ -16,8 +16,8 @@ TriangleMesh sphereSurface(double radius, int rings, int segments);
 // Bent rod of the size of a banana, lying in the xy plane, ends up to `size` apart.
 TriangleMesh bentRod(double size, double thickness);
 
-// Scene with one object at `position` and, unless told otherwise, a table at z = 0; the camera looks
-// along +y from 1 m away.
+// Scene with one object at `position` and, unless told otherwise, a table at z = 0; the camera
+// looks along +y from 1 m away.
 WorldScene sceneWith(const TriangleMesh& mesh, const Eigen::Vector3d& position, bool table = true);
 
 Edit editOf(EditKind kind, EditMode mode = EditMode::kAbsolute, double time = 0.0);

@@ -11,15 +11,21 @@ constexpr double kG = 9.81;
 
 TEST(WorldMotion, FallingRigidBodyFollowsTheParabola) {
   World world(sceneWith(boxSurface({0.1, 0.2, 0.3}, 1), {0, 0, 10}, false), {});
-  world.addObservedMotion("thing", {0.0, true, Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
-                                    {0, 0, 10}, {1, 0, 2}, {0, 0, 3}, {0, 0, -kG}});
+  world.addObservedMotion("thing", {0.0,
+                                    true,
+                                    Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
+                                    {0, 0, 10},
+                                    {1, 0, 2},
+                                    {0, 0, 3},
+                                    {0, 0, -kG}});
   world.submit(editOf(EditKind::kVelocity, EditMode::kEstimated));
   world.advanceTo(0.0);
   play(world, 1.0);
   const auto state = world.state().objects[0];
   EXPECT_EQ(state.kind, ObjectKind::kRigid);
   // Exact but for the accumulated round-off of about 2000 sub-steps.
-  EXPECT_NEAR((state.world_from_object.translation() - Eigen::Vector3d(1, 0, 12 - 0.5 * kG)).norm(), 0.0, 1e-6);
+  EXPECT_NEAR((state.world_from_object.translation() - Eigen::Vector3d(1, 0, 12 - 0.5 * kG)).norm(),
+              0.0, 1e-6);
 }
 
 TEST(WorldMotion, DeformableFlightIsExactToo) {
@@ -27,8 +33,13 @@ TEST(WorldMotion, DeformableFlightIsExactToo) {
   params.defaults.kind = ObjectKind::kDeformable;
   params.max_nodes = 200;
   World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 10}, false), params);
-  world.addObservedMotion("thing", {0.0, true, Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
-                                    {0, 0, 10}, {1, 0, 0}, {0, 0, 0}, {0, 0, -kG}});
+  world.addObservedMotion("thing", {0.0,
+                                    true,
+                                    Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
+                                    {0, 0, 10},
+                                    {1, 0, 0},
+                                    {0, 0, 0},
+                                    {0, 0, -kG}});
   Edit edit = editOf(EditKind::kVelocity);
   edit.vector = {1, 0, 2};
   edit.angular = {0, 3, 0};

@@ -14,24 +14,35 @@ double number(XmlRpc::XmlRpcValue& value, const std::string& name) {
 }
 
 // One object's settings; `where` is the parameter's name, for errors.
-ObjectSettings readSettings(XmlRpc::XmlRpcValue& map, ObjectSettings settings, const std::string& where) {
+ObjectSettings readSettings(XmlRpc::XmlRpcValue& map, ObjectSettings settings,
+                            const std::string& where) {
   if (map.getType() != XmlRpc::XmlRpcValue::TypeStruct)
-    throw std::invalid_argument("parameter " + where + " is no map; give keys such as youngs_modulus");
+    throw std::invalid_argument("parameter " + where +
+                                " is no map; give keys such as youngs_modulus");
   for (auto& [key, value] : map) {
     const std::string name = where + "/" + key;
     if (key == "kind") {
       if (value.getType() != XmlRpc::XmlRpcValue::TypeString)
         throw std::invalid_argument("parameter " + name + " is no text");
       settings.kind = objectKindFromString(static_cast<std::string>(value));
-    } else if (key == "youngs_modulus") settings.youngs_modulus = number(value, name);
-    else if (key == "poissons_ratio") settings.poissons_ratio = number(value, name);
-    else if (key == "density") settings.density = number(value, name);
-    else if (key == "damping") settings.damping = number(value, name);
-    else if (key == "cell_size") settings.cell_size = number(value, name);
-    else if (key == "friction") settings.surface.friction = number(value, name);
-    else if (key == "restitution") settings.surface.restitution = number(value, name);
-    else if (key == "rolling_friction") settings.surface.rolling_friction = number(value, name);
-    else throw std::invalid_argument("parameter " + name + " is unknown; see config/simulator.yaml");
+    } else if (key == "youngs_modulus")
+      settings.youngs_modulus = number(value, name);
+    else if (key == "poissons_ratio")
+      settings.poissons_ratio = number(value, name);
+    else if (key == "density")
+      settings.density = number(value, name);
+    else if (key == "damping")
+      settings.damping = number(value, name);
+    else if (key == "cell_size")
+      settings.cell_size = number(value, name);
+    else if (key == "friction")
+      settings.surface.friction = number(value, name);
+    else if (key == "restitution")
+      settings.surface.restitution = number(value, name);
+    else if (key == "rolling_friction")
+      settings.surface.rolling_friction = number(value, name);
+    else
+      throw std::invalid_argument("parameter " + name + " is unknown; see config/simulator.yaml");
   }
   return settings;
 }

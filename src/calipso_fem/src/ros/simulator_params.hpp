@@ -11,9 +11,9 @@ namespace calipso::fem {
 // Parameters of simulator_node; config/simulator.yaml lists them with units.
 struct SimulatorParams {
   std::string scene_directory;
-  bool live = false;            // mode: bag | live
+  bool live = false;                    // mode: bag | live
   std::string colour_by = "von_mises";  // or displacement
-  double force_scale = 0.05;    // m of arrow per N
+  double force_scale = 0.05;            // m of arrow per N
   WorldParams world;
 };
 

@@ -18,7 +18,8 @@ constexpr unsigned kKeepAll = 0;  // in bag mode nothing may be lost
 }  // namespace
 
 SimulatorRos::SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
-    : params_(loadSimulatorParams(pnh)), scene_(loadScene(params_.scene_directory)),
+    : params_(loadSimulatorParams(pnh)),
+      scene_(loadScene(params_.scene_directory)),
       reporter_(nh, "simulator") {
   if (scene_.fps > 0.0) params_.world.frame_period = 1.0 / scene_.fps;
   constexpr bool kLatched = true;
@@ -36,7 +37,8 @@ SimulatorRos::SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
     subscribers_.push_back(nh.subscribe(topics::kDynamics, queue, &SimulatorRos::onDynamics, this));
   } else {
     subscribers_.push_back(nh.subscribe(topics::kClipInfo, 1, &SimulatorRos::onClipInfo, this));
-    subscribers_.push_back(nh.subscribe(topics::kClipDynamics, 1, &SimulatorRos::onClipDynamics, this));
+    subscribers_.push_back(
+        nh.subscribe(topics::kClipDynamics, 1, &SimulatorRos::onClipDynamics, this));
   }
   reporter_.starting("waiting for models");
 }

@@ -20,8 +20,8 @@
 
 namespace calipso::fem {
 
-// Wires the World to topics. camera_info is the clock: one state per stamp. All callbacks run in one
-// thread.
+// Wires the World to topics. camera_info is the clock: one state per stamp. All callbacks run in
+// one thread.
 class SimulatorRos {
  public:
   SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh);
@@ -34,7 +34,7 @@ class SimulatorRos {
   void onEdit(const calipso_msgs::EditConstPtr& edit);
   void onFrame(const sensor_msgs::CameraInfoConstPtr& info);
 
-  void prepare();                         // once everything it takes has arrived
+  void prepare();  // once everything it takes has arrived
   void take(const calipso_msgs::Dynamics& dynamics);
   void submit(const calipso_msgs::Edit& edit);
   void refuse(const calipso_msgs::Edit& edit, const std::string& message);

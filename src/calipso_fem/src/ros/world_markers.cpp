@@ -23,7 +23,8 @@ std_msgs::ColorRGBA colour(double r, double g, double b, double a = 1.0) {
 // Blue over green to red for s in 0..1.
 std_msgs::ColorRGBA heat(double s) {
   const double t = std::min(1.0, std::max(0.0, s));
-  return colour(std::max(0.0, 2.0 * t - 1.0), 1.0 - std::abs(2.0 * t - 1.0), std::max(0.0, 1.0 - 2.0 * t));
+  return colour(std::max(0.0, 2.0 * t - 1.0), 1.0 - std::abs(2.0 * t - 1.0),
+                std::max(0.0, 1.0 - 2.0 * t));
 }
 
 Marker markerOf(const std::string& ns, int id, int type, const ros::Time& stamp) {
@@ -41,12 +42,14 @@ Marker markerOf(const std::string& ns, int id, int type, const ros::Time& stamp)
 }
 
 // What colours the surface, scaled to 0..1 by its largest value.
-Eigen::VectorXd surfaceValue(const ObjectSnapshot& s, const WorldObject& object, const std::string& by) {
+Eigen::VectorXd surfaceValue(const ObjectSnapshot& s, const WorldObject& object,
+                             const std::string& by) {
   Eigen::VectorXd value = s.von_mises;
   if (by == "displacement") {
     value.resize(s.vertices.rows());
     for (int i = 0; i < value.size(); ++i)
-      value[i] = (s.vertices.row(i).transpose() - object.world_from_object * object.mesh.vertex(i)).norm();
+      value[i] =
+          (s.vertices.row(i).transpose() - object.world_from_object * object.mesh.vertex(i)).norm();
   }
   const double largest = value.size() ? value.maxCoeff() : 0.0;
   return largest > 0.0 ? Eigen::VectorXd(value / largest) : value;
@@ -130,12 +133,14 @@ void addSupports(const World& world, const ros::Time& stamp, std::vector<Marker>
   const double half = 5.0 * sizeOf(world);
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const WorldObject& object : world.scene().objects)
-    middle += object.world_from_object.translation() / static_cast<double>(world.scene().objects.size());
+    middle +=
+        object.world_from_object.translation() / static_cast<double>(world.scene().objects.size());
   int id = 0;
   for (const SupportPlane& plane : world.scene().planes) {
     Marker m = markerOf("support", ++id, Marker::CUBE, stamp);
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), plane.normal).toRotationMatrix();
+    pose.linear() = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), plane.normal)
+                        .toRotationMatrix();
     pose.translation() = middle - (plane.normal.dot(middle) - plane.offset) * plane.normal;
     m.pose = calipso::toMsg(pose);
     m.scale.x = m.scale.y = 2.0 * half;
@@ -154,7 +159,8 @@ visualization_msgs::MarkerArray toMarkers(const World& world, const MarkerStyle&
   for (const char* ns : {"volume_grid", "fixed_nodes", "forces", "contacts"})
     array.markers.push_back(clear(ns, stamp));
   for (size_t k = 0; k < state.objects.size(); ++k)
-    array.markers.push_back(surfaceMarker(state.objects[k], world.scene().objects[k], style, stamp));
+    array.markers.push_back(
+        surfaceMarker(state.objects[k], world.scene().objects[k], style, stamp));
   addDrawings(world, style, stamp, array.markers);
   addContacts(state, style, stamp, array.markers);
   addSupports(world, stamp, array.markers);

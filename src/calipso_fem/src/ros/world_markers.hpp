@@ -14,8 +14,8 @@ struct MarkerStyle {
   double force_scale = 0.05;            // m per N
 };
 
-// Everything the simulator shows in rviz, one namespace per kind of thing: surface, volume grid, fixed
-// nodes, forces, contacts, support. Frame: the world.
+// Everything the simulator shows in rviz, one namespace per kind of thing: surface, volume grid,
+// fixed nodes, forces, contacts, support. Frame: the world.
 visualization_msgs::MarkerArray toMarkers(const World& world, const MarkerStyle& style,
                                           const ros::Time& stamp);
 

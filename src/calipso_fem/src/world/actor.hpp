@@ -16,7 +16,7 @@ namespace calipso::fem {
 // A pull that is still acting.
 struct Pull {
   std::vector<int> vertices;
-  std::vector<int> nodes;        // deformable, target mode: the nodes that are led
+  std::vector<int> nodes;  // deformable, target mode: the nodes that are led
   bool to_target = false;
   Eigen::Vector3d vector = Eigen::Vector3d::Zero();  // N, or m
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // object frame, centre of the region
@@ -43,31 +43,31 @@ enum class Holder { kUnknown, kAttachment, kSupport, kBuoyancy, kNothing };
 struct Actor {
   explicit Actor(const WorldObject& object) : object(object), track(object.world_from_object) {}
 
-  WorldObject object;            // its mesh is rescaled by edits
+  WorldObject object;  // its mesh is rescaled by edits
   ObservedTrack track;
-  int id = 0;                    // index among the actors; also its obstacle's id
+  int id = 0;  // index among the actors; also its obstacle's id
   ObjectSettings settings;
-  Material observed_material;    // with which the observed shape is at rest
+  Material observed_material;  // with which the observed shape is at rest
   Material material;
   ObjectKind kind = ObjectKind::kStatic;
   std::optional<ObjectKind> forced_kind;
   std::string reason = "no edit touches it";
   bool edited = false, removed = false;
   Holder holder = Holder::kUnknown;
-  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   // m/s^2
-  Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();  // m/s^2
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();            // m/s^2
+  Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();           // m/s^2
   Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  // by edits, of a kinematic object
-  std::optional<RigidWorld::Id> body;                  // also as a collider while static
-  std::vector<TriangleMesh> hulls;                     // cached convex parts, object frame
+  std::optional<RigidWorld::Id> body;                           // also as a collider while static
+  std::vector<TriangleMesh> hulls;                              // cached convex parts, object frame
   std::unique_ptr<SoftObject> soft;
   Eigen::Isometry3d soft_from_object = Eigen::Isometry3d::Identity();  // pose when soft was made
-  std::unique_ptr<SurfaceTree> tree;                   // object frame
+  std::unique_ptr<SurfaceTree> tree;                                   // object frame
   std::vector<Pull> pulls;
-  std::vector<std::vector<int>> fixed;                 // vertices per fixed region
+  std::vector<std::vector<int>> fixed;  // vertices per fixed region
   bool asleep = false;
   int calm_frames = 0;
-  double soft_ms = 0.0;                                // of the last frame
-  std::string note;                                    // what the user should know about the model
+  double soft_ms = 0.0;  // of the last frame
+  std::string note;      // what the user should know about the model
 
   Eigen::Vector3d acceleration() const { return gravity + buoyancy; }
   bool simulated() const {

@@ -8,7 +8,8 @@ namespace calipso::fem {
 namespace {
 
 std::unique_ptr<btCollisionShape> hullShape(const TriangleMesh& hull,
-                                            const Eigen::Isometry3d& body_from_object, double margin) {
+                                            const Eigen::Isometry3d& body_from_object,
+                                            double margin) {
   auto shape = std::make_unique<btConvexHullShape>();
   for (int i = 0; i < hull.vertexCount(); ++i)
     shape->addPoint(toBullet(Eigen::Vector3d(body_from_object * hull.vertex(i))), false);
@@ -61,7 +62,8 @@ void buildShape(BulletBody& body, const RigidBodySpec& spec) {
     body.shapes.push_back(hullShape(hull, body_from_object, margin));
   if (body.shapes.size() == 1) return;
   auto compound = std::make_unique<btCompoundShape>();
-  for (const auto& shape : body.shapes) compound->addChildShape(btTransform::getIdentity(), shape.get());
+  for (const auto& shape : body.shapes)
+    compound->addChildShape(btTransform::getIdentity(), shape.get());
   body.shapes.push_back(std::move(compound));
 }
 
@@ -74,7 +76,8 @@ void buildStrip(BulletBody& owner, const SupportPlane& plane) {
   axes.col(1) = n.cross(axes.col(0));
   const double half_x = 0.5 * (plane.x_range->y() - plane.x_range->x()) / axes(0, 0);
   Eigen::Vector3d center = plane.offset * n;
-  center += (0.5 * (plane.x_range->x() + plane.x_range->y()) - center.x()) / axes(0, 0) * axes.col(0);
+  center +=
+      (0.5 * (plane.x_range->x() + plane.x_range->y()) - center.x()) / axes(0, 0) * axes.col(0);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = axes;
   pose.translation() = center - kHalfThickness * n;

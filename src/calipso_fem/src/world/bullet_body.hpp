@@ -19,7 +19,7 @@ struct BulletBody {
   std::unique_ptr<btTriangleMesh> triangles;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;  // the last one is the body's own
   std::unique_ptr<btRigidBody> body;
-  Eigen::Isometry3d kinematic_start, kinematic_target;    // world_from_object over the next step
+  Eigen::Isometry3d kinematic_start, kinematic_target;  // world_from_object over the next step
   bool moves = false;
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
 };
@@ -30,7 +30,8 @@ double span(const std::vector<TriangleMesh>& shapes);
 // Diagonal of the inertia; sets the pose of its axes at the centre of mass.
 Eigen::Vector3d principal(const MassProperties& mass, Eigen::Isometry3d& object_from_body);
 
-// Convex hulls (compound if several) in the body's frame; for static bodies the triangles themselves.
+// Convex hulls (compound if several) in the body's frame; for static bodies the triangles
+// themselves.
 void buildShape(BulletBody& body, const RigidBodySpec& spec);
 
 // Box whose upper face is the plane's strip between the two world x of its range.

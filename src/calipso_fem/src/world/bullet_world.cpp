@@ -22,9 +22,9 @@ double deepest(const btPersistentManifold& manifold) {
 
 btTransform toBullet(const Eigen::Isometry3d& pose) {
   const Eigen::Matrix3d& R = pose.linear();
-  return btTransform(btMatrix3x3(R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0),
-                                 R(2, 1), R(2, 2)),
-                     toBullet(Eigen::Vector3d(pose.translation())));
+  return btTransform(
+      btMatrix3x3(R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2)),
+      toBullet(Eigen::Vector3d(pose.translation())));
 }
 
 Eigen::Isometry3d fromBullet(const btTransform& pose) {

@@ -36,7 +36,8 @@ class BulletWorld : public btDiscreteDynamicsWorld {
 
  private:
   void solveConstraints(btContactSolverInfo& info) override;
-  void adjust(btManifoldPoint& point, const btPersistentManifold& manifold, double h, double forgiven);
+  void adjust(btManifoldPoint& point, const btPersistentManifold& manifold, double h,
+              double forgiven);
 
   std::map<Pair, double> forgiven_;  // m
 };

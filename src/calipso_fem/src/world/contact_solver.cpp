@@ -12,8 +12,7 @@ Eigen::Vector3d solveBlock(const Eigen::Matrix3d& W, const Eigen::Vector3d& velo
   Eigen::Vector3d p = row.impulse;
   if (!(W(0, 0) > 0.0)) return p;  // both surfaces are held: no impulse can move them
   p[0] = std::max(-row.held_normal, p[0] - velocity[0] / W(0, 0));
-  const Eigen::Vector2d u_t =
-      velocity.tail<2>() + W.block<2, 1>(1, 0) * (p[0] - row.impulse[0]);
+  const Eigen::Vector2d u_t = velocity.tail<2>() + W.block<2, 1>(1, 0) * (p[0] - row.impulse[0]);
   // The larger eigenvalue of the tangential block makes the step a contraction.
   const double a = W(1, 1), b = W(1, 2), d = W(2, 2);
   const double stiffest = 0.5 * (a + d) + std::sqrt(0.25 * (a - d) * (a - d) + b * b);

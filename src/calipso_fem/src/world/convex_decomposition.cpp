@@ -33,7 +33,8 @@ class Solid {
     double cells = 0.0;
     for (int c = 0; c < grid_.cellCount(); ++c) {
       const Eigen::Vector3d center =
-          grid_.origin + h * (grid_.cell_lattice.row(c).cast<double>().transpose().array() + 0.5).matrix();
+          grid_.origin +
+          h * (grid_.cell_lattice.row(c).cast<double>().transpose().array() + 0.5).matrix();
       if (box.contains(center)) cells += grid_.fraction[c];
     }
     return cells * h * h * h;
@@ -153,9 +154,9 @@ std::vector<TriangleMesh> decomposeConvex(const TriangleMesh& mesh,
                    mesh.vertex(mesh.triangles(f, 2))});
   std::vector<Part> parts = {makePart(std::move(all), box, solid)};
   while (static_cast<int>(parts.size()) < params.max_hulls) {
-    const auto worst = std::max_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
-      return a.concavity < b.concavity;
-    });
+    const auto worst =
+        std::max_element(parts.begin(), parts.end(),
+                         [](const Part& a, const Part& b) { return a.concavity < b.concavity; });
     if (worst->concavity < tolerance) break;
     const Part part = std::move(*worst);
     parts.erase(worst);

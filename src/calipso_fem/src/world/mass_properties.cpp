@@ -26,8 +26,8 @@ Moments moments(const TriangleMesh& mesh, const Eigen::Vector3d& origin) {
     const Eigen::Vector3d s = a + b + c;
     m.volume += v;
     m.first += v / 4.0 * s;
-    m.second += v / 20.0 *
-                (s * s.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
+    m.second +=
+        v / 20.0 * (s * s.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
   }
   return m;
 }
@@ -68,8 +68,8 @@ TriangleMesh convexHull(const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::Ro
   for (int f = 0; f < hull.faces.size(); ++f) {
     const auto* first = &hull.edges[hull.faces[f]];
     // Fan around the face's first vertex.
-    for (const auto* e = first->getNextEdgeOfFace(); e->getTargetVertex() != first->getSourceVertex();
-         e = e->getNextEdgeOfFace())
+    for (const auto* e = first->getNextEdgeOfFace();
+         e->getTargetVertex() != first->getSourceVertex(); e = e->getNextEdgeOfFace())
       triangles.emplace_back(first->getSourceVertex(), e->getSourceVertex(), e->getTargetVertex());
   }
   mesh.triangles.resize(static_cast<Eigen::Index>(triangles.size()), 3);

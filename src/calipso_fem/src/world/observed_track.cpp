@@ -7,7 +7,8 @@ namespace {
 
 Eigen::Isometry3d interpolate(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double s) {
   Eigen::Isometry3d p = Eigen::Isometry3d::Identity();
-  p.linear() = Eigen::Quaterniond(a.linear()).slerp(s, Eigen::Quaterniond(b.linear())).toRotationMatrix();
+  p.linear() =
+      Eigen::Quaterniond(a.linear()).slerp(s, Eigen::Quaterniond(b.linear())).toRotationMatrix();
   p.translation() = (1.0 - s) * a.translation() + s * b.translation();
   return p;
 }
@@ -34,9 +35,8 @@ ObservedMotion ObservedTrack::at(double time) const {
   m.world_from_object = key_pose_;
   m.time = time;
   if (!moves) return m;  // a clip in which the object rests: the alignment is the best pose known
-  const auto after = std::lower_bound(
-      samples_.begin(), samples_.end(), time,
-      [](const ObservedMotion& s, double t) { return s.time < t; });
+  const auto after = std::lower_bound(samples_.begin(), samples_.end(), time,
+                                      [](const ObservedMotion& s, double t) { return s.time < t; });
   if (after == samples_.begin()) return samples_.front();
   if (after == samples_.end()) return samples_.back();
   const ObservedMotion &a = *(after - 1), &b = *after;

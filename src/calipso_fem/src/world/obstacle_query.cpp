@@ -29,9 +29,10 @@ std::optional<ObstacleHit> queryObstacle(const Obstacle& obstacle, const Eigen::
   auto hit = obstacle.tree->firstEntry(from, to);
   if (!hit) hit = obstacle.tree->nearest(to, std::max(reach, 0.1 * size));
   if (!hit || hit->distance > reach) return std::nullopt;
-  ObstacleHit result{hit->distance, obstacle.pose.linear() * hit->normal, obstacle.pose * hit->point, {}};
-  result.other = SurfacePoint::onTriangle(obstacle.tree->mesh().triangles.row(hit->triangle).transpose(),
-                                          hit->barycentric);
+  ObstacleHit result{
+      hit->distance, obstacle.pose.linear() * hit->normal, obstacle.pose * hit->point, {}};
+  result.other = SurfacePoint::onTriangle(
+      obstacle.tree->mesh().triangles.row(hit->triangle).transpose(), hit->barycentric);
   return result;
 }
 
@@ -40,7 +41,8 @@ Eigen::AlignedBox3d obstacleBounds(const Obstacle& obstacle) {
   if (obstacle.plane) return box;
   for (int c = 0; c < 8; ++c)
     for (const Eigen::Isometry3d* pose : {&obstacle.pose, &obstacle.previous_pose})
-      box.extend(*pose * obstacle.tree->bounds().corner(static_cast<Eigen::AlignedBox3d::CornerType>(c)));
+      box.extend(*pose *
+                 obstacle.tree->bounds().corner(static_cast<Eigen::AlignedBox3d::CornerType>(c)));
   return box;
 }
 

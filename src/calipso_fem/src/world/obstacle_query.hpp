@@ -8,10 +8,10 @@ namespace calipso::fem {
 
 // Where a point stands relative to an obstacle.
 struct ObstacleHit {
-  double gap = 0.0;                                  // m, negative inside
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ(); // outwards, world
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();   // nearest point of the obstacle, world
-  SurfacePoint other;                                // the same on a deformable obstacle
+  double gap = 0.0;                                   // m, negative inside
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // outwards, world
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();    // nearest point of the obstacle, world
+  SurfacePoint other;                                 // the same on a deformable obstacle
 };
 
 // Gap of the point `now` that was at `before` when the step began; nothing if it is further than

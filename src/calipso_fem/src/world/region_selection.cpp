@@ -20,7 +20,8 @@ std::optional<double> intersect(const Eigen::Vector3d& o, const Eigen::Vector3d&
   return t;
 }
 
-std::vector<int> verticesNear(const WorldObject& object, const Eigen::Vector3d& point, double radius) {
+std::vector<int> verticesNear(const WorldObject& object, const Eigen::Vector3d& point,
+                              double radius) {
   std::vector<int> chosen;
   for (int i = 0; i < object.mesh.vertexCount(); ++i)
     if ((object.world_from_object * object.mesh.vertex(i) - point).norm() <= radius)
@@ -31,9 +32,9 @@ std::vector<int> verticesNear(const WorldObject& object, const Eigen::Vector3d& 
 std::vector<int> verticesUnderPixel(const WorldScene& scene, int index, const Region& region,
                                     double radius) {
   const WorldObject& object = scene.objects[index];
-  const auto hit = castRay(
-      scene, scene.camera.world_from_camera.translation(),
-      scene.camera.world_from_camera.linear() * scene.camera.ray(region.pixel.x(), region.pixel.y()));
+  const auto hit = castRay(scene, scene.camera.world_from_camera.translation(),
+                           scene.camera.world_from_camera.linear() *
+                               scene.camera.ray(region.pixel.x(), region.pixel.y()));
   std::ostringstream where;
   where << "pixel (" << region.pixel.x() << ", " << region.pixel.y() << ")";
   if (!hit)
@@ -55,10 +56,12 @@ std::optional<RayHit> castRay(const WorldScene& scene, const Eigen::Vector3d& or
   for (size_t k = 0; k < scene.objects.size(); ++k) {
     const TriangleMesh& mesh = scene.objects[k].mesh;
     const Eigen::Isometry3d object_from_world = scene.objects[k].world_from_object.inverse();
-    const Eigen::Vector3d o = object_from_world * origin, d = object_from_world.linear() * direction;
+    const Eigen::Vector3d o = object_from_world * origin,
+                          d = object_from_world.linear() * direction;
     for (int f = 0; f < mesh.triangleCount(); ++f) {
-      const auto t = intersect(o, d, mesh.vertex(mesh.triangles(f, 0)),
-                               mesh.vertex(mesh.triangles(f, 1)), mesh.vertex(mesh.triangles(f, 2)));
+      const auto t =
+          intersect(o, d, mesh.vertex(mesh.triangles(f, 0)), mesh.vertex(mesh.triangles(f, 1)),
+                    mesh.vertex(mesh.triangles(f, 2)));
       if (t && (!nearest || *t < nearest->depth))
         nearest = RayHit{static_cast<int>(k), f, *t, origin + *t * direction};
     }

@@ -30,11 +30,13 @@ Eigen::Matrix3d cross(const Eigen::Vector3d& r) {
 void validate(const RigidBodySpec& spec) {
   if (spec.shapes.empty() || spec.shapes.front().triangleCount() == 0)
     throw std::invalid_argument(spec.name + ": a body needs a collision shape; its mesh is empty");
-  if (spec.motion == RigidMotion::kDynamic && !(spec.mass.mass > 0.0 && std::isfinite(spec.mass.mass)))
+  if (spec.motion == RigidMotion::kDynamic &&
+      !(spec.mass.mass > 0.0 && std::isfinite(spec.mass.mass)))
     throw std::invalid_argument(spec.name + ": mass = " + std::to_string(spec.mass.mass) +
                                 " kg; must be positive and finite");
   const SurfaceSettings& s = spec.surface;
-  if (!(s.friction >= 0.0) || !(s.rolling_friction >= 0.0) || !(s.restitution >= 0.0 && s.restitution <= 1.0))
+  if (!(s.friction >= 0.0) || !(s.rolling_friction >= 0.0) ||
+      !(s.restitution >= 0.0 && s.restitution <= 1.0))
     throw std::invalid_argument(spec.name + ": friction = " + std::to_string(s.friction) +
                                 " and rolling friction must be >= 0, restitution = " +
                                 std::to_string(s.restitution) + " in [0, 1]");
@@ -105,7 +107,8 @@ RigidWorld::Id RigidWorld::add(const RigidBodySpec& spec) {
   body.body = std::make_unique<btRigidBody>(info);
   applySurface(*body.body, spec.surface);
   if (spec.motion == RigidMotion::kKinematic) {
-    body.body->setCollisionFlags(body.body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    body.body->setCollisionFlags(body.body->getCollisionFlags() |
+                                 btCollisionObject::CF_KINEMATIC_OBJECT);
     body.body->setActivationState(DISABLE_DEACTIVATION);
     body.kinematic_start = body.kinematic_target = spec.world_from_object;
   }
@@ -131,7 +134,8 @@ RigidWorld::Id RigidWorld::addPlane(const SupportPlane& plane, const SurfaceSett
   if (plane.x_range) {
     buildStrip(body, plane);
   } else {
-    body.shapes.push_back(std::make_unique<btStaticPlaneShape>(toBullet(plane.normal), plane.offset));
+    body.shapes.push_back(
+        std::make_unique<btStaticPlaneShape>(toBullet(plane.normal), plane.offset));
     body.shapes.back()->setMargin(0.0);
     body.body = std::make_unique<btRigidBody>(
         btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, body.shapes.back().get()));
@@ -256,19 +260,23 @@ double RigidWorld::kineticEnergy(Id id) const {
 bool RigidWorld::sleeping(Id id) const { return !impl_->at(id).body->isActive(); }
 
 int RigidWorld::awakeCount() const {
-  return static_cast<int>(std::count_if(impl_->bodies.begin(), impl_->bodies.end(), [](const auto& b) {
-    return b.second.motion == RigidMotion::kDynamic && b.second.body->isActive();
-  }));
+  return static_cast<int>(
+      std::count_if(impl_->bodies.begin(), impl_->bodies.end(), [](const auto& b) {
+        return b.second.motion == RigidMotion::kDynamic && b.second.body->isActive();
+      }));
 }
 
 namespace {
 
 // Rate of the sub-steps: as fine as a video's frame rate allows for what is awake, 1/s.
-double substepRate(int awake) { return awake <= 4 ? 1920.0 : awake <= 16 ? 960.0 : awake <= 64 ? 240.0 : 120.0; }
+double substepRate(int awake) {
+  return awake <= 4 ? 1920.0 : awake <= 16 ? 960.0 : awake <= 64 ? 240.0 : 120.0;
+}
 
 Eigen::Isometry3d between(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double s) {
   Eigen::Isometry3d p = b;
-  p.linear() = Eigen::Quaterniond(a.linear()).slerp(s, Eigen::Quaterniond(b.linear())).toRotationMatrix();
+  p.linear() =
+      Eigen::Quaterniond(a.linear()).slerp(s, Eigen::Quaterniond(b.linear())).toRotationMatrix();
   p.translation() = (1.0 - s) * a.translation() + s * b.translation();
   return p;
 }
@@ -285,9 +293,9 @@ int RigidWorld::step(double h) {
   for (int k = 1; k <= steps; ++k) {
     for (auto& [id, b] : impl_->bodies) {
       if (b.moves)
-        b.body->setCenterOfMassTransform(
-            toBullet(between(b.kinematic_start, b.kinematic_target, static_cast<double>(k) / steps) *
-                     b.object_from_body));
+        b.body->setCenterOfMassTransform(toBullet(
+            between(b.kinematic_start, b.kinematic_target, static_cast<double>(k) / steps) *
+            b.object_from_body));
       if (b.force.isZero() && b.torque.isZero()) continue;
       b.body->applyCentralForce(toBullet(b.force));
       b.body->applyTorque(toBullet(b.torque));

@@ -40,7 +40,8 @@ void SoftContacts::exclude(int a, int b, bool excluded) {
 
 void SoftContacts::forget(int id) {
   for (auto it = memory_.begin(); it != memory_.end();)
-    it = std::get<0>(it->first) == id || std::get<1>(it->first) == id ? memory_.erase(it) : std::next(it);
+    it = std::get<0>(it->first) == id || std::get<1>(it->first) == id ? memory_.erase(it)
+                                                                      : std::next(it);
 }
 
 // Keeps the deepest touch of a key; the vertex of the last step has a small advantage, so that
@@ -60,8 +61,8 @@ void SoftContacts::offer(const Touch& touch, double reach, Touches& touches) con
     at->second = touch;
 }
 
-void SoftContacts::addVertices(const SoftEntry& entry, int soft, const Obstacle& obstacle, int index,
-                               double reach, Touches& touches) const {
+void SoftContacts::addVertices(const SoftEntry& entry, int soft, const Obstacle& obstacle,
+                               int index, double reach, Touches& touches) const {
   const auto& now = entry.soft->vertices();
   const auto& before = entry.soft->previousVertices();
   const double size = sizeOf(*entry.soft);
@@ -81,8 +82,9 @@ void SoftContacts::addVertices(const SoftEntry& entry, int soft, const Obstacle&
     const auto hit = queryObstacle(obstacle, x0, x, farthest, size);
     if (!hit) continue;
     const Key key{entry.id, obstacle.id, entry.soft->carrier(v), false};
-    offer({key, soft, index, SurfacePoint::vertex(v), hit->other, hit->place, hit->normal, hit->gap},
-          reach, touches);
+    offer(
+        {key, soft, index, SurfacePoint::vertex(v), hit->other, hit->place, hit->normal, hit->gap},
+        reach, touches);
   }
 }
 
@@ -122,7 +124,8 @@ SoftContacts::Touches SoftContacts::collect(const std::vector<SoftEntry>& softs,
       if (!box.isEmpty() && !box.intersects(sweptBounds(*entry.soft, reach))) continue;
       addVertices(entry, static_cast<int>(s), obstacle, static_cast<int>(o), reach, touches);
       if (!obstacle.plane)
-        addObstacleVertices(entry, static_cast<int>(s), obstacle, static_cast<int>(o), reach, touches);
+        addObstacleVertices(entry, static_cast<int>(s), obstacle, static_cast<int>(o), reach,
+                            touches);
     }
   return touches;
 }

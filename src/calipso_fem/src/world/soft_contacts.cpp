@@ -29,8 +29,8 @@ Eigen::Matrix3d coupling(const Side& at, const Side& from, const RigidWorld& rig
 
 }  // namespace
 
-void SoftContacts::pushOn(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
-                          RigidWorld& rigid, double h) {
+void SoftContacts::pushOn(const std::vector<SoftEntry>& softs,
+                          const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h) {
   for (const auto& [key, m] : memory_) {
     if (m.force.isZero(0.0)) continue;
     for (const SoftEntry& entry : softs)
@@ -63,7 +63,8 @@ ContactRow SoftContacts::rowOf(const Touch& touch, const SoftEntry& entry, const
     row.held_tangential = h * m.held_tangential;
   }
   // Rigid bodies have not moved yet in this step; everything else has.
-  const double gap_before = gap - h * touch.normal.dot(obstacle.rigid ? own : Eigen::Vector3d(own - others));
+  const double gap_before =
+      gap - h * touch.normal.dot(obstacle.rigid ? own : Eigen::Vector3d(own - others));
   row.free_velocity[0] += std::max(gap_before / h, -push_out);
   return row;
 }
@@ -72,10 +73,11 @@ const Eigen::MatrixXd& SoftContacts::complianceOf(const Touches& touches,
                                                   const std::vector<SoftEntry>& softs,
                                                   const std::vector<Obstacle>& obstacles,
                                                   const RigidWorld& rigid, double h) {
-  const bool same = W_step_ == h && W_of_.size() == touches.size() &&
-                    std::equal(touches.begin(), touches.end(), W_of_.begin(), [](const auto& t, const auto& w) {
-                      return t.first == w.first && t.second.normal.dot(w.second) > kSameDirection;
-                    });
+  const bool same =
+      W_step_ == h && W_of_.size() == touches.size() &&
+      std::equal(touches.begin(), touches.end(), W_of_.begin(), [](const auto& t, const auto& w) {
+        return t.first == w.first && t.second.normal.dot(w.second) > kSameDirection;
+      });
   if (same) return W_;
   W_step_ = h;
   W_of_.clear();
@@ -103,9 +105,10 @@ const Eigen::MatrixXd& SoftContacts::complianceOf(const Touches& touches,
 }
 
 void SoftContacts::correct(const Touches& touches, const std::vector<Eigen::Vector3d>& impulses,
-                           const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
-                           RigidWorld& rigid, double h) {
-  std::map<int, std::pair<std::vector<SurfacePoint>, std::vector<Eigen::Vector3d>>> per_soft;  // by id
+                           const std::vector<SoftEntry>& softs,
+                           const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h) {
+  std::map<int, std::pair<std::vector<SurfacePoint>, std::vector<Eigen::Vector3d>>>
+      per_soft;  // by id
   std::map<int, SoftObject*> bodies;
   size_t i = 0;
   for (const auto& [key, t] : touches) {
@@ -141,7 +144,8 @@ SoftContacts::Touches SoftContacts::releaseLost(const Touches& touches,
                                    [&](const SoftEntry& e) { return e.id == std::get<0>(key); });
     const auto obstacle = std::find_if(obstacles.begin(), obstacles.end(),
                                        [&](const Obstacle& o) { return o.id == std::get<1>(key); });
-    if (soft == softs.end() || obstacle == obstacles.end()) continue;  // asleep, or not in this step
+    if (soft == softs.end() || obstacle == obstacles.end())
+      continue;  // asleep, or not in this step
     t.soft = static_cast<int>(soft - softs.begin());
     t.obstacle = static_cast<int>(obstacle - obstacles.begin());
     lost.emplace(key, t);
@@ -150,7 +154,8 @@ SoftContacts::Touches SoftContacts::releaseLost(const Touches& touches,
 }
 
 ContactReport SoftContacts::solve(const std::vector<SoftEntry>& softs,
-                                  const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h) {
+                                  const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
+                                  double h) {
   ContactReport report;
   Touches touches = collect(softs, obstacles, params_.proximity);
   const Touches lost = releaseLost(touches, softs, obstacles);

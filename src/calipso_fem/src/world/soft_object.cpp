@@ -8,14 +8,13 @@ namespace {
 
 using Vertices = decltype(TriangleMesh::vertices);
 
-Vertices asRows(const Vec& v) {
-  return Eigen::Map<const Vertices>(v.data(), v.size() / 3, 3);
-}
+Vertices asRows(const Vec& v) { return Eigen::Map<const Vertices>(v.data(), v.size() / 3, 3); }
 
 int largestWeight(const Embedding& embedding, int vertex) {
   int node = 0;
   double largest = -1.0;
-  for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(embedding.weights, vertex); it; ++it)
+  for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(embedding.weights, vertex);
+       it; ++it)
     if (it.value() > largest) {
       largest = it.value();
       node = static_cast<int>(it.col());
@@ -31,10 +30,14 @@ int mainVertex(const SurfacePoint& point) {
 
 }  // namespace
 
-SoftObject::SoftObject(const TriangleMesh& surface, const Material& material, const FemOptions& options)
-    : body_(surface, material, options), forces_(Vec::Zero(3 * surface.vertexCount())),
-      observed_(body_.positions()), surface_(surface) {
-  for (int i = 0; i < surface.vertexCount(); ++i) carrier_.push_back(largestWeight(body_.embedding(), i));
+SoftObject::SoftObject(const TriangleMesh& surface, const Material& material,
+                       const FemOptions& options)
+    : body_(surface, material, options),
+      forces_(Vec::Zero(3 * surface.vertexCount())),
+      observed_(body_.positions()),
+      surface_(surface) {
+  for (int i = 0; i < surface.vertexCount(); ++i)
+    carrier_.push_back(largestWeight(body_.embedding(), i));
   changed();
   previous_ = vertices_;
 }
@@ -59,7 +62,8 @@ const SurfaceTree& SoftObject::tree() {
 Eigen::Isometry3d SoftObject::motion() const {
   const Eigen::VectorXd& mass = body_.model().lumpedMass();
   const Vertices a = asRows(observed_), b = asRows(body_.positions());
-  const Eigen::Vector3d ca = a.transpose() * mass / mass.sum(), cb = b.transpose() * mass / mass.sum();
+  const Eigen::Vector3d ca = a.transpose() * mass / mass.sum(),
+                        cb = b.transpose() * mass / mass.sum();
   const Eigen::Matrix3d S = (b.rowwise() - cb.transpose()).transpose() * mass.asDiagonal() *
                             (a.rowwise() - ca.transpose());
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(S, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -85,8 +89,8 @@ SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<Hold
   Vec rest = restPositions(body_.model().mesh());
   // A contact gives way by a hundredth of what the whole body would; the rest shape absorbs it.
   const Material& material = body_.model().cellMaterials().front();
-  const double stiffness =
-      100.0 * material.youngs_modulus * boundingDiagonal(surface_) / std::max<size_t>(1, hold.size());
+  const double stiffness = 100.0 * material.youngs_modulus * boundingDiagonal(surface_) /
+                           std::max<size_t>(1, hold.size());
   std::vector<SoftConstraint> constraints;
   for (const HoldPoint& h : hold) {
     SoftConstraint c;
@@ -106,8 +110,8 @@ SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<Hold
     for (size_t i = 0; i < hold.size(); ++i)
       hold[i].force = body_.softConstraintForce(static_cast<int>(i));
     const Vec error = body_.positions() - goal;
-    const double sag = Eigen::Map<const NodeMatrix>(error.data(), error.size() / 3, 3)
-                           .rowwise().norm().maxCoeff();
+    const double sag =
+        Eigen::Map<const NodeMatrix>(error.data(), error.size() / 3, 3).rowwise().norm().maxCoeff();
     if (report.iterations == 0) report.sag = sag;
     report.converged = sag <= tolerance;
     if (report.converged) break;
@@ -128,8 +132,7 @@ void SoftObject::setGravity(const Eigen::Vector3d& gravity) {
 }
 
 void SoftObject::addForce(const SurfacePoint& point, const Eigen::Vector3d& force) {
-  for (int k = 0; k < 3; ++k)
-    forces_.segment<3>(3 * point.vertices[k]) += point.weights[k] * force;
+  for (int k = 0; k < 3; ++k) forces_.segment<3>(3 * point.vertices[k]) += point.weights[k] * force;
   forced_ = true;
 }
 
@@ -146,8 +149,8 @@ StepReport SoftObject::step(double h) {
   return report;
 }
 
-// NOTE: backward Euler leads the parabola by h^2 g / 2 and loses spin; both errors are rigid motions,
-// so mending them does not touch the deformation.
+// NOTE: backward Euler leads the parabola by h^2 g / 2 and loses spin; both errors are rigid
+// motions, so mending them does not touch the deformation.
 void SoftObject::keepFlightExact(const Momentum& before, double h) {
   const Eigen::Vector3d lead = 0.5 * h * h * gravity_;
   body_.setState(body_.positions() - lead.replicate(body_.nodeCount(), 1), Vec(body_.velocities()));

@@ -52,8 +52,10 @@ std::vector<Eigen::Vector3i> neighbours(const TriangleMesh& mesh) {
 
 }  // namespace
 
-SurfaceTree::SurfaceTree(TriangleMesh mesh) : mesh_(std::move(mesh)), order_(mesh_.triangleCount()) {
-  if (order_.empty()) throw std::invalid_argument("a surface for contacts needs at least one triangle");
+SurfaceTree::SurfaceTree(TriangleMesh mesh)
+    : mesh_(std::move(mesh)), order_(mesh_.triangleCount()) {
+  if (order_.empty())
+    throw std::invalid_argument("a surface for contacts needs at least one triangle");
   std::iota(order_.begin(), order_.end(), 0);
   neighbour_ = neighbours(mesh_);
   build(0, static_cast<int>(order_.size()));
@@ -103,7 +105,8 @@ void SurfaceTree::updateNormals() {
   face_normal_.assign(mesh_.triangleCount(), Eigen::Vector3d::Zero());
   vertex_normal_.assign(mesh_.vertexCount(), Eigen::Vector3d::Zero());
   for (int f = 0; f < mesh_.triangleCount(); ++f) {
-    const Eigen::Vector3d p[3] = {mesh_.vertex(mesh_.triangles(f, 0)), mesh_.vertex(mesh_.triangles(f, 1)),
+    const Eigen::Vector3d p[3] = {mesh_.vertex(mesh_.triangles(f, 0)),
+                                  mesh_.vertex(mesh_.triangles(f, 1)),
                                   mesh_.vertex(mesh_.triangles(f, 2))};
     face_normal_[f] = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
     for (int k = 0; k < 3; ++k) {
@@ -130,7 +133,8 @@ Eigen::Vector3d SurfaceTree::pseudoNormal(int f, const Eigen::Vector3d& barycent
 
 void SurfaceTree::improve(int f, const Eigen::Vector3d& point, double& squared,
                           SurfaceHit& hit) const {
-  const Eigen::Vector3d a = mesh_.vertex(mesh_.triangles(f, 0)), b = mesh_.vertex(mesh_.triangles(f, 1)),
+  const Eigen::Vector3d a = mesh_.vertex(mesh_.triangles(f, 0)),
+                        b = mesh_.vertex(mesh_.triangles(f, 1)),
                         c = mesh_.vertex(mesh_.triangles(f, 2));
   const Eigen::Vector3d w = closestBarycentric(point, a, b, c);
   const Eigen::Vector3d q = w[0] * a + w[1] * b + w[2] * c;
@@ -166,7 +170,8 @@ std::optional<SurfaceHit> SurfaceTree::nearest(const Eigen::Vector3d& point, dou
   const Eigen::Vector3d pseudo = pseudoNormal(hit.triangle, hit.barycentric);
   const double sign = offset.dot(pseudo) < 0.0 ? -1.0 : 1.0;
   hit.distance = sign * offset.norm();
-  hit.normal = std::abs(hit.distance) > 1e-6 * reach ? Eigen::Vector3d(offset / hit.distance) : pseudo;
+  hit.normal =
+      std::abs(hit.distance) > 1e-6 * reach ? Eigen::Vector3d(offset / hit.distance) : pseudo;
   if (hit.normal.squaredNorm() < 0.5) return std::nullopt;  // on a triangle without area
   return hit;
 }
@@ -194,7 +199,8 @@ std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from,
       const double height = n.dot(from - a), fall = -n.dot(d);
       if (fall <= 0.0 || height < 0.0 || height > fall || height / fall >= first) continue;
       const Eigen::Vector3d q = from + height / fall * d;
-      const Eigen::Vector3d b = mesh_.vertex(mesh_.triangles(f, 1)), c = mesh_.vertex(mesh_.triangles(f, 2));
+      const Eigen::Vector3d b = mesh_.vertex(mesh_.triangles(f, 1)),
+                            c = mesh_.vertex(mesh_.triangles(f, 2));
       const Eigen::Vector3d w = closestBarycentric(q, a, b, c);
       const double size = (b - a).norm() + (c - a).norm();
       if ((w[0] * a + w[1] * b + w[2] * c - q).norm() > 1e-9 * size) continue;

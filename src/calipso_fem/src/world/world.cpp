@@ -46,7 +46,8 @@ void validateScene(const WorldScene& scene) {
     if (object.mesh.triangleCount() == 0)
       throw std::invalid_argument(object.name + ": its mesh has no triangles");
     if (!object.mesh.vertices.allFinite() || !object.world_from_object.matrix().allFinite())
-      throw std::invalid_argument(object.name + ": mesh or pose contains a number that is not finite");
+      throw std::invalid_argument(object.name +
+                                  ": mesh or pose contains a number that is not finite");
   }
   if (!scene.gravity.allFinite())
     throw std::invalid_argument("the scene's gravity is not finite; give m/s^2 in world axes");
@@ -55,7 +56,9 @@ void validateScene(const WorldScene& scene) {
 }  // namespace
 
 World::Impl::Impl(WorldScene scene_in, WorldParams params_in)
-    : scene(std::move(scene_in)), params(std::move(params_in)), contacts(contactParams(scene, params)) {
+    : scene(std::move(scene_in)),
+      params(std::move(params_in)),
+      contacts(contactParams(scene, params)) {
   validate(params);
   validateScene(scene);
   for (const SupportMesh& mesh : scene.support_meshes)
@@ -64,7 +67,8 @@ World::Impl::Impl(WorldScene scene_in, WorldParams params_in)
     Actor actor(object);
     actor.id = static_cast<int>(actors.size());
     actor.settings = params.settingsOf(object.name);
-    actor.observed_material = actor.material = observedMaterial(object, actor.settings, scene.gravity);
+    actor.observed_material = actor.material =
+        observedMaterial(object, actor.settings, scene.gravity);
     actor.gravity = scene.gravity;
     actors.push_back(std::move(actor));
   }
@@ -82,7 +86,8 @@ void World::addObservedMotion(const std::string& object, const ObservedMotion& m
   if (!actor) {
     std::string known;
     for (const std::string& name : impl_->names()) known += (known.empty() ? "" : ", ") + name;
-    throw std::invalid_argument("observed motion of '" + object + "': there is no such object; known: " + known);
+    throw std::invalid_argument("observed motion of '" + object +
+                                "': there is no such object; known: " + known);
   }
   actor->track.add(motion);
 }

@@ -20,7 +20,8 @@ constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
 
 TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose) {
   TriangleMesh m = mesh;
-  m.vertices = (mesh.vertices * pose.linear().transpose()).rowwise() + pose.translation().transpose();
+  m.vertices =
+      (mesh.vertices * pose.linear().transpose()).rowwise() + pose.translation().transpose();
   return m;
 }
 
@@ -33,10 +34,11 @@ double pixelsPerMeter(const Camera& camera, const Eigen::Vector3d& at) {
 double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obstacles,
                   const Eigen::Vector3d& gravity, double reach) {
   double smallest = reach;
-  const Eigen::Vector3d up = gravity.norm() > 0.0 ? Eigen::Vector3d(-gravity.normalized())
-                                                  : Eigen::Vector3d::Zero();
-  const Eigen::AlignedBox3d bounds(surface.vertices.colwise().minCoeff().transpose().array() - reach,
-                                   surface.vertices.colwise().maxCoeff().transpose().array() + reach);
+  const Eigen::Vector3d up =
+      gravity.norm() > 0.0 ? Eigen::Vector3d(-gravity.normalized()) : Eigen::Vector3d::Zero();
+  const Eigen::AlignedBox3d bounds(
+      surface.vertices.colwise().minCoeff().transpose().array() - reach,
+      surface.vertices.colwise().maxCoeff().transpose().array() + reach);
   for (const Obstacle& obstacle : obstacles) {
     const Eigen::AlignedBox3d box = obstacleBounds(obstacle);
     if (!box.isEmpty() && !box.intersects(bounds)) continue;
@@ -62,7 +64,8 @@ FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const Wo
   // Displacements of a third of the size, with an error that falls with the square of the cells:
   // error = size / 3 (cell / size)^2.
   const double size = boundingDiagonal(surface);
-  const double pixels = size * pixelsPerMeter(camera, surface.vertices.colwise().mean().transpose());
+  const double pixels =
+      size * pixelsPerMeter(camera, surface.vertices.colwise().mean().transpose());
   if (pixels <= 0.0) return options;
   const double cells = std::sqrt(pixels / 3.0 / params.pixel_error);
   const double cell = size / std::max(4.0, cells);
@@ -70,10 +73,10 @@ FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const Wo
       (surface.vertices.colwise().maxCoeff() - surface.vertices.colwise().minCoeff()).transpose();
   // Thin objects need cells no larger than their thickness; what is too many nodes is left to the
   // search for max_nodes.
-  const double thickness = std::max(std::abs(signedVolume(surface)) / (extent.prod() / extent.minCoeff()),
-                                    1e-3 * size);
-  const double nodes = std::abs(signedVolume(surface)) / std::pow(cell, 3) *
-                       std::pow(1.0 + cell / thickness, 2);
+  const double thickness =
+      std::max(std::abs(signedVolume(surface)) / (extent.prod() / extent.minCoeff()), 1e-3 * size);
+  const double nodes =
+      std::abs(signedVolume(surface)) / std::pow(cell, 3) * std::pow(1.0 + cell / thickness, 2);
   if (nodes < params.max_nodes) options.cell_size = cell;
   return options;
 }
@@ -106,7 +109,8 @@ BodyMotion World::Impl::motionOf(const Actor& actor) const {
     const Eigen::Vector3d center =
         seen.world_from_object * massProperties(actor.object.mesh, 1.0).center;
     m.angular = actor.placement.linear() * seen.angular;
-    m.linear = actor.placement.linear() * (seen.linear + seen.angular.cross(center - seen.centroid));
+    m.linear =
+        actor.placement.linear() * (seen.linear + seen.angular.cross(center - seen.centroid));
   }
   return m;
 }
@@ -189,10 +193,38 @@ void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
   spec.world_from_object = motion.world_from_object;
   spec.linear = motion.linear;
   spec.angular = motion.angular;
-  spec.asleep = actor.holder == Holder::kSupport && motion.linear.isZero() && motion.angular.isZero();
+  spec.asleep =
+      actor.holder == Holder::kSupport && motion.linear.isZero() && motion.angular.isZero();
   actor.note = spec.mass.note;
   actor.body = rigid.add(spec);
   rigid.setAcceleration(*actor.body, actor.acceleration());
+}
+
+// Makes the observed shape the equilibrium under what held the object in the video. Buoyancy and
+// free fall leave nothing to balance.
+void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface) {
+  const double size = boundingDiagonal(surface);
+  const auto around = obstacles(now, now, &actor);
+  const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get(),
+                        false};
+  std::vector<HoldPoint> hold;
+  std::vector<int> by;
+  if (actor.holder == Holder::kSupport) {
+    const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
+    const double reach = std::max(0.0, gap) + kContactPatch * size;
+    for (const auto& [point, obstacle] : contacts.touching(entry, around, reach)) {
+      hold.push_back(point);
+      by.push_back(obstacle);
+    }
+  }
+  if (hold.empty() && actor.holder != Holder::kAttachment) return;
+  const double px = pixelsPerMeter(scene.camera, surface.vertices.colwise().mean().transpose());
+  const double tolerance =
+      std::min(kSagOfSize * size, px > 0.0 ? kSagPixels / px : kSagOfSize * size);
+  const SettleReport report = actor.soft->settle(scene.gravity + actor.buoyancy, hold, tolerance);
+  if (!report.message.empty()) actor.note += report.message + "; ";
+  for (size_t i = 0; i < hold.size(); ++i)
+    contacts.hold(entry, around[by[i]], hold[i], 2.0 * kSupportGap * size);
 }
 
 void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) {
@@ -202,38 +234,15 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   actor.soft_from_object = motion.world_from_object;
   DeformableBody& body = actor.soft->body();
   for (const std::string& message : body.grid().messages) actor.note += message + "; ";
-  const auto attached = verticesInBoxes(actor.object.mesh, actor.object.world_from_object,
-                                        actor.object.attachments);
+  const auto attached =
+      verticesInBoxes(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
   if (!attached.empty() && actor.holder == Holder::kAttachment) {
     body.fixSurfaceVertices(attached);
     if (actor.fixed.empty()) actor.fixed.push_back(attached);
   }
   for (const auto& region : actor.fixed) body.fixSurfaceVertices(region);
   actor.soft->setGravity(actor.acceleration());
-  if (settle) {
-    const double size = boundingDiagonal(surface);
-    const auto around = obstacles(now, now, &actor);
-    const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get(), false};
-    std::vector<HoldPoint> hold;
-    std::vector<int> by;
-    if (actor.holder == Holder::kSupport) {
-      const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
-      const double reach = std::max(0.0, gap) + kContactPatch * size;
-      for (const auto& [point, obstacle] : contacts.touching(entry, around, reach)) {
-        hold.push_back(point);
-        by.push_back(obstacle);
-      }
-    }
-    const double px = pixelsPerMeter(scene.camera, surface.vertices.colwise().mean().transpose());
-    const double tolerance = std::min(kSagOfSize * size, px > 0.0 ? kSagPixels / px : kSagOfSize * size);
-    // Buoyancy and free fall leave nothing to balance.
-    if (!hold.empty() || actor.holder == Holder::kAttachment) {
-      const SettleReport report = actor.soft->settle(scene.gravity + actor.buoyancy, hold, tolerance);
-      if (!report.message.empty()) actor.note += report.message + "; ";
-      for (size_t i = 0; i < hold.size(); ++i)
-        contacts.hold(entry, around[by[i]], hold[i], 2.0 * kSupportGap * size);
-    }
-  }
+  if (settle) settleAsObserved(actor, surface);
   body.setMaterial(actor.material);
   if (!motion.linear.isZero() || !motion.angular.isZero())
     body.setRigidVelocity(motion.linear, motion.angular);
@@ -267,7 +276,8 @@ void World::Impl::reset(Actor& actor) {
 void World::Impl::addColliders() {
   if (has_colliders) return;
   has_colliders = true;
-  for (const SupportPlane& plane : scene.planes) supports.push_back(rigid.addPlane(plane, params.support));
+  for (const SupportPlane& plane : scene.planes)
+    supports.push_back(rigid.addPlane(plane, params.support));
   for (const SupportMesh& mesh : scene.support_meshes) {
     RigidBodySpec spec;
     spec.name = mesh.name;

@@ -22,7 +22,8 @@ bool intersects(const std::vector<int>& a, const std::vector<int>& b) {  // both
   return !common.empty();
 }
 
-Eigen::Vector3d meanOf(const decltype(TriangleMesh::vertices)& vertices, const std::vector<int>& chosen) {
+Eigen::Vector3d meanOf(const decltype(TriangleMesh::vertices)& vertices,
+                       const std::vector<int>& chosen) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const int v : chosen) sum += vertices.row(v).transpose();
   return sum / static_cast<double>(chosen.size());
@@ -34,7 +35,8 @@ double changed(double value, double by, EditMode mode) {
 }
 
 bool changesStiffness(const Edit& edit) {
-  return !std::isnan(edit.youngs_modulus) || !std::isnan(edit.poissons_ratio) || !std::isnan(edit.damping);
+  return !std::isnan(edit.youngs_modulus) || !std::isnan(edit.poissons_ratio) ||
+         !std::isnan(edit.damping);
 }
 
 }  // namespace
@@ -98,12 +100,18 @@ std::string World::Impl::apply(const Edit& edit) {
   }
   Actor& actor = *find(edit.object);
   switch (edit.kind) {
-    case EditKind::kTransform: return transform(actor, edit);
-    case EditKind::kPull: return pull(actor, edit);
-    case EditKind::kFix: return fix(actor, edit);
-    case EditKind::kRelease: return release(actor, edit);
-    case EditKind::kMaterial: return changeMaterial(actor, edit);
-    case EditKind::kVelocity: return changeVelocity(actor, edit);
+    case EditKind::kTransform:
+      return transform(actor, edit);
+    case EditKind::kPull:
+      return pull(actor, edit);
+    case EditKind::kFix:
+      return fix(actor, edit);
+    case EditKind::kRelease:
+      return release(actor, edit);
+    case EditKind::kMaterial:
+      return changeMaterial(actor, edit);
+    case EditKind::kVelocity:
+      return changeVelocity(actor, edit);
     case EditKind::kObjectKind: {
       actor.forced_kind = edit.object_kind;
       touch(actor, edit);
@@ -117,7 +125,9 @@ std::string World::Impl::apply(const Edit& edit) {
       plan_changed = true;
       return actor.object.name + " is removed";
     }
-    default: reset(actor); return actor.object.name + " is as in the video again";
+    default:
+      reset(actor);
+      return actor.object.name + " is as in the video again";
   }
 }
 
@@ -209,7 +219,8 @@ std::string World::Impl::release(Actor& actor, const Edit& edit) {
     ++released;
     return true;
   };
-  actor.fixed.erase(std::remove_if(actor.fixed.begin(), actor.fixed.end(), meets), actor.fixed.end());
+  actor.fixed.erase(std::remove_if(actor.fixed.begin(), actor.fixed.end(), meets),
+                    actor.fixed.end());
   const auto lets_go = [&](const Pull& pull) {
     if (!intersects(pull.vertices, vertices)) return false;
     if (actor.soft)
@@ -217,9 +228,11 @@ std::string World::Impl::release(Actor& actor, const Edit& edit) {
     ++released;
     return true;
   };
-  actor.pulls.erase(std::remove_if(actor.pulls.begin(), actor.pulls.end(), lets_go), actor.pulls.end());
+  actor.pulls.erase(std::remove_if(actor.pulls.begin(), actor.pulls.end(), lets_go),
+                    actor.pulls.end());
   if (released == 0)
-    throw std::invalid_argument("nothing is fixed or pulled in that region of " + actor.object.name);
+    throw std::invalid_argument("nothing is fixed or pulled in that region of " +
+                                actor.object.name);
   if (actor.soft) {
     for (const auto& region : actor.fixed) actor.soft->body().fixSurfaceVertices(region);
     actor.soft->forgetCompliance();
@@ -231,7 +244,8 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   Material material = actor.material;
   material.youngs_modulus = changed(material.youngs_modulus, edit.youngs_modulus, edit.mode);
   material.density = changed(material.density, edit.density, edit.mode);
-  material.poissons_ratio = changed(material.poissons_ratio, edit.poissons_ratio, EditMode::kAbsolute);
+  material.poissons_ratio =
+      changed(material.poissons_ratio, edit.poissons_ratio, EditMode::kAbsolute);
   material.damping = changed(material.damping, edit.damping, EditMode::kAbsolute);
   validate(material);
   touch(actor, edit);
@@ -244,9 +258,9 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
     rigid.setMass(*actor.body, massProperties(actor.object.mesh, material.density));
   plan_changed = true;
   std::ostringstream text;
-  text << actor.object.name << ": E = " << material.youngs_modulus << " Pa, nu = "
-       << material.poissons_ratio << ", density = " << material.density << " kg/m^3, damping = "
-       << material.damping << " s";
+  text << actor.object.name << ": E = " << material.youngs_modulus
+       << " Pa, nu = " << material.poissons_ratio << ", density = " << material.density
+       << " kg/m^3, damping = " << material.damping << " s";
   return text.str();
 }
 
@@ -270,7 +284,8 @@ std::string World::Impl::changeGravity(const Edit& edit) {
     if (actor.kind == ObjectKind::kRigid) rigid.setAcceleration(*actor.body, actor.acceleration());
     changed_objects += " " + actor.object.name + " " + describe(gravity) + " m/s^2;";
   }
-  return changed_objects.empty() ? "gravity changed; every object goes on resting" : "gravity:" + changed_objects;
+  return changed_objects.empty() ? "gravity changed; every object goes on resting"
+                                 : "gravity:" + changed_objects;
 }
 
 std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
@@ -304,7 +319,8 @@ std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
   } else {
     rigid.setVelocity(*actor.body, linear, angular);
   }
-  return actor.object.name + " moves with " + describe(linear) + " m/s, " + describe(angular) + " rad/s";
+  return actor.object.name + " moves with " + describe(linear) + " m/s, " + describe(angular) +
+         " rad/s";
 }
 
 }  // namespace calipso::fem

@@ -30,6 +30,7 @@ struct World::Impl {
   void rebuild(Actor& actor);
   void makeRigid(Actor& actor, const BodyMotion& motion);
   void makeSoft(Actor& actor, const BodyMotion& motion, bool settle);
+  void settleAsObserved(Actor& actor, const TriangleMesh& surface);
   void removeBodies(Actor& actor);
   void reset(Actor& actor);
   void addColliders();
@@ -66,7 +67,7 @@ struct World::Impl {
   std::vector<Actor> actors;
   RigidWorld rigid;
   SoftContacts contacts;
-  std::vector<RigidWorld::Id> supports;               // planes and meshes in the rigid world
+  std::vector<RigidWorld::Id> supports;  // planes and meshes in the rigid world
   std::vector<std::unique_ptr<SurfaceTree>> support_trees;
   bool has_colliders = false;
 
@@ -76,7 +77,7 @@ struct World::Impl {
   int substeps = 0;
   std::vector<ContactPoint> shown_contacts;
   std::set<std::pair<std::string, std::string>> touching;
-  std::deque<Edit> pending;                           // by time
+  std::deque<Edit> pending;  // by time
   bool plan_changed = true;
 };
 

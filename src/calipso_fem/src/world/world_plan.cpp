@@ -35,7 +35,8 @@ PlanEntry entryOf(const Actor& actor, double time_step) {
 // The twelve edges of a hexahedron, or six of a tetrahedron, as corner pairs.
 std::vector<std::pair<int, int>> cellEdges(bool tetrahedral) {
   if (tetrahedral) return {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
-  return {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3}, {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
+  return {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3},
+          {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
 }
 
 void drawGrid(const DeformableBody& body, World::Drawing& drawing) {

@@ -14,14 +14,14 @@ constexpr double kRestSpeed = 1e-3;
 constexpr int kCalmFrames = 15;
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
 }
 
 Eigen::AlignedBox3d boxOf(const SoftObject& soft) {
   return {soft.vertices().colwise().minCoeff().transpose(),
           soft.vertices().colwise().maxCoeff().transpose()};
 }
-
 
 }  // namespace
 
@@ -61,7 +61,8 @@ std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor
       o.pose = poseOf(actor, to);
       if (actor.kind == ObjectKind::kRigid) {
         o.rigid = actor.body;
-        o.acceleration = rigid.sleeping(*actor.body) ? Eigen::Vector3d::Zero() : actor.acceleration();
+        o.acceleration =
+            rigid.sleeping(*actor.body) ? Eigen::Vector3d::Zero() : actor.acceleration();
       }
     }
     list.push_back(o);
@@ -73,7 +74,8 @@ std::vector<SoftEntry> World::Impl::softEntries() {
   std::vector<SoftEntry> list;
   for (Actor& actor : actors)
     if (actor.soft && !actor.removed && !actor.asleep)
-      list.push_back({actor.id, actor.object.name, actor.settings.surface, actor.soft.get(), false});
+      list.push_back(
+          {actor.id, actor.object.name, actor.settings.surface, actor.soft.get(), false});
   return list;
 }
 
@@ -91,9 +93,8 @@ int World::Impl::substepsPerFrame() const {
 }
 
 void World::Impl::stepFrame(double h) {
-  const bool soft = std::any_of(actors.begin(), actors.end(), [](const Actor& a) {
-    return a.soft && !a.removed && !a.asleep;
-  });
+  const bool soft = std::any_of(actors.begin(), actors.end(),
+                                [](const Actor& a) { return a.soft && !a.removed && !a.asleep; });
   const int parts = soft ? substepsPerFrame() : 1;
   for (Actor& actor : actors) actor.soft_ms = 0.0;
   for (int k = 0; k < parts; ++k) {
@@ -137,11 +138,13 @@ void World::Impl::applyPulls(double at) {
 // Nodes led to a target are prescribed when the pull begins; forces are renewed every step.
 void World::Impl::pullSoft(Actor& actor, const Pull& pull, double at) {
   if (pull.to_target) return;
-  const Eigen::Vector3d force = pull.share(at) * pull.vector / static_cast<double>(pull.vertices.size());
+  const Eigen::Vector3d force =
+      pull.share(at) * pull.vector / static_cast<double>(pull.vertices.size());
   for (const int v : pull.vertices) actor.soft->addForce(SurfacePoint::vertex(v), force);
 }
 
-// On a rigid body a pull acts at its region's centre; a target draws it by a critically damped spring.
+// On a rigid body a pull acts at its region's centre; a target draws it by a critically damped
+// spring.
 void World::Impl::pullRigid(Actor& actor, double at) {
   constexpr double kFrequency = 2.0 * M_PI * 4.0;  // rad/s, a quarter of a second to follow
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
@@ -154,8 +157,8 @@ void World::Impl::pullRigid(Actor& actor, double at) {
           rigid.linearVelocity(*actor.body) + rigid.angularVelocity(*actor.body).cross(arm);
       const Eigen::Matrix3d mass =
           rigid.compliance(*actor.body, center + arm, center + arm).inverse();
-      f = mass * (kFrequency * kFrequency * (pull.start + f - center - arm) -
-                  2.0 * kFrequency * velocity);
+      f = mass *
+          (kFrequency * kFrequency * (pull.start + f - center - arm) - 2.0 * kFrequency * velocity);
     }
     force += f;
     torque += arm.cross(f);
@@ -172,7 +175,8 @@ void World::Impl::endPulls(double at) {
       actor.soft->forgetCompliance();
     }
     const auto over = [&](const Pull& pull) { return pull.over(at); };
-    actor.pulls.erase(std::remove_if(actor.pulls.begin(), actor.pulls.end(), over), actor.pulls.end());
+    actor.pulls.erase(std::remove_if(actor.pulls.begin(), actor.pulls.end(), over),
+                      actor.pulls.end());
   }
 }
 
@@ -186,8 +190,9 @@ void World::Impl::updateSleep() {
       box = {box.min().array() - 0.05 * size, box.max().array() + 0.05 * size};
       for (const Actor& other : actors) {
         if (&other == &actor || other.removed) continue;
-        const bool moves = other.soft ? !other.asleep && other.calm_frames == 0
-                                      : other.kind == ObjectKind::kRigid && !rigid.sleeping(*other.body);
+        const bool moves = other.soft
+                               ? !other.asleep && other.calm_frames == 0
+                               : other.kind == ObjectKind::kRigid && !rigid.sleeping(*other.body);
         if (!moves) continue;
         const auto vertices = verticesOf(other);
         if (box.intersects({vertices.colwise().minCoeff().transpose(),

@@ -16,7 +16,8 @@ void require(bool ok, const std::string& name, double value, const std::string& 
 void validate(const SurfaceSettings& s, const std::string& name) {
   require(s.friction >= 0.0, name + "/friction", s.friction, ">= 0");
   require(s.rolling_friction >= 0.0, name + "/rolling_friction", s.rolling_friction, ">= 0 (m)");
-  require(s.restitution >= 0.0 && s.restitution <= 1.0, name + "/restitution", s.restitution, "in [0, 1]");
+  require(s.restitution >= 0.0 && s.restitution <= 1.0, name + "/restitution", s.restitution,
+          "in [0, 1]");
 }
 
 void validate(const ObjectSettings& s, const std::string& name) {

@@ -9,11 +9,11 @@ namespace calipso::fem {
 
 // Mass, centre and inertia of a homogeneous solid, in the frame of its mesh.
 struct MassProperties {
-  double volume = 0.0;  // m^3
-  double mass = 0.0;    // kg
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();     // m
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();    // about the centre, kg m^2
-  std::string note;     // how a mesh that is no closed solid was completed; empty when it is one
+  double volume = 0.0;                                // m^3
+  double mass = 0.0;                                  // kg
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();   // m
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about the centre, kg m^2
+  std::string note;  // how a mesh that is no closed solid was completed; empty when it is one
 };
 
 // Exact integrals over the enclosed solid. Inside-out meshes are turned; where the mesh encloses no

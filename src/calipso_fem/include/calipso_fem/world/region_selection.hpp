@@ -10,9 +10,9 @@
 namespace calipso::fem {
 
 struct RayHit {
-  int object = 0;        // index into the scene's objects
+  int object = 0;  // index into the scene's objects
   int triangle = 0;
-  double depth = 0.0;    // along the ray, in lengths of its direction
+  double depth = 0.0;                               // along the ray, in lengths of its direction
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  // world, m
 };
 

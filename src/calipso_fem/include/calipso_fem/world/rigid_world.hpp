@@ -26,9 +26,9 @@ struct RigidBodySpec {
   bool asleep = false;
 };
 
-// Rigid bodies and supports in Bullet (double precision). World frame, SI units. Gravity is given per
-// body, so that each may have its own. Where two bodies overlap when one is added, the overlap is
-// forgiven: it may only become smaller, and gives no push. Deterministic; not thread-safe.
+// Rigid bodies and supports in Bullet (double precision). World frame, SI units. Gravity is given
+// per body, so that each may have its own. Where two bodies overlap when one is added, the overlap
+// is forgiven: it may only become smaller, and gives no push. Deterministic; not thread-safe.
 class RigidWorld {
  public:
   using Id = int;
@@ -45,24 +45,24 @@ class RigidWorld {
   void exclude(Id a, Id b);
   void include(Id a, Id b);
 
-  void setPose(Id id, const Eigen::Isometry3d& world_from_object);         // a jump
-  void moveKinematic(Id id, const Eigen::Isometry3d& world_from_object);   // by the end of step()
+  void setPose(Id id, const Eigen::Isometry3d& world_from_object);        // a jump
+  void moveKinematic(Id id, const Eigen::Isometry3d& world_from_object);  // by the end of step()
   void setVelocity(Id id, const Eigen::Vector3d& linear, const Eigen::Vector3d& angular);
   void setMass(Id id, const MassProperties& mass);
-  void setAcceleration(Id id, const Eigen::Vector3d& acceleration);        // m/s^2, until changed
+  void setAcceleration(Id id, const Eigen::Vector3d& acceleration);  // m/s^2, until changed
   void setForce(Id id, const Eigen::Vector3d& force, const Eigen::Vector3d& torque);  // same
   void applyImpulse(Id id, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
   void wake(Id id);
 
-  Eigen::Isometry3d pose(Id id) const;       // world_from_object
-  Eigen::Vector3d center(Id id) const;       // of mass, m
+  Eigen::Isometry3d pose(Id id) const;  // world_from_object
+  Eigen::Vector3d center(Id id) const;  // of mass, m
   Eigen::Vector3d linearVelocity(Id id) const;
   Eigen::Vector3d angularVelocity(Id id) const;
   // Change of the velocity at `at` per impulse at `from`: (1/m) I - [r_at] I^-1 [r_from].
   Eigen::Matrix3d compliance(Id id, const Eigen::Vector3d& at, const Eigen::Vector3d& from) const;
-  double kineticEnergy(Id id) const;         // J
+  double kineticEnergy(Id id) const;  // J
   bool sleeping(Id id) const;
-  int awakeCount() const;                    // dynamic bodies
+  int awakeCount() const;  // dynamic bodies
 
   // Advances by h in sub-steps that get finer the fewer bodies are awake. @return their number
   int step(double h);

@@ -17,20 +17,21 @@ namespace calipso::fem {
 // Something a deformable object can meet: a plane, a surface that stands, is moved or is rigid, or
 // another deformable object. Pointers are borrowed for one step.
 struct Obstacle {
-  int id = 0;                        // unique and lasting
+  int id = 0;  // unique and lasting
   std::string name;
   SurfaceSettings surface;
   const SupportPlane* plane = nullptr;
-  const SurfaceTree* tree = nullptr; // in its own frame
+  const SurfaceTree* tree = nullptr;                                // in its own frame
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();           // world_from_tree, end of step
   Eigen::Isometry3d previous_pose = Eigen::Isometry3d::Identity();  // start of step
-  std::optional<RigidWorld::Id> rigid;  // dynamic rigid body: pose is still that at the step's start
+  std::optional<RigidWorld::Id>
+      rigid;  // dynamic rigid body: pose is still that at the step's start
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  // of the rigid body, m/s^2
   SoftObject* soft = nullptr;
 };
 
 struct SoftEntry {
-  int id = 0;                        // unique and lasting, shared with its Obstacle
+  int id = 0;  // unique and lasting, shared with its Obstacle
   std::string name;
   SurfaceSettings surface;
   SoftObject* soft = nullptr;
@@ -38,18 +39,18 @@ struct SoftEntry {
 };
 
 struct ContactParams {
-  double proximity = 5e-3;     // m, surfaces closer than this are watched
+  double proximity = 5e-3;  // m, surfaces closer than this are watched
   int iterations = 60;
   double tolerance = 1e-6;
-  int passes = 3;              // exact corrections per step
-  double allowed_depth = 1e-5; // m, ends the passes
+  int passes = 3;               // exact corrections per step
+  double allowed_depth = 1e-5;  // m, ends the passes
 };
 
 struct ContactReport {
   int contacts = 0;
-  int iterations = 0;          // Gauss-Seidel sweeps, all passes together
+  int iterations = 0;  // Gauss-Seidel sweeps, all passes together
   int passes = 0;
-  double deepest = 0.0;        // m, after the last pass
+  double deepest = 0.0;  // m, after the last pass
 };
 
 // Contacts of deformable objects with everything else. Surface vertices are the primitives, tested
@@ -60,7 +61,8 @@ class SoftContacts {
  public:
   explicit SoftContacts(const ContactParams& params) : params_(params) {}
 
-  // Points where `entry` touches or is nearer to an obstacle than `reach`, deepest per carrier node.
+  // Points where `entry` touches or is nearer to an obstacle than `reach`, deepest per carrier
+  // node.
   // @return hold points with, for each, the obstacle's index
   std::vector<std::pair<HoldPoint, int>> touching(const SoftEntry& entry,
                                                   const std::vector<Obstacle>& obstacles,
@@ -84,18 +86,18 @@ class SoftContacts {
   // Which contact: (deformable, obstacle, carrier node or the obstacle's vertex, its side).
   using Key = std::tuple<int, int, int, bool>;
   struct Memory {
-    SurfacePoint point, other;               // on the deformable; on the obstacle if it is deformable
+    SurfacePoint point, other;  // on the deformable; on the obstacle if it is deformable
     Eigen::Vector3d place = Eigen::Vector3d::Zero();  // on the obstacle, world
     Eigen::Vector3d force = Eigen::Vector3d::Zero();  // on the deformable, N
-    double offset = 0.0;                     // gap at which the surfaces count as touching, m
+    double offset = 0.0;  // gap at which the surfaces count as touching, m
     double held_normal = 0.0, held_tangential = 0.0;  // N
   };
   struct Touch {
     Key key;
-    int soft = 0, obstacle = 0;              // indices of the step's lists
+    int soft = 0, obstacle = 0;  // indices of the step's lists
     SurfacePoint point, other;
     Eigen::Vector3d place = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
-    double gap = 0.0;                        // m
+    double gap = 0.0;  // m
   };
   using Touches = std::map<Key, Touch>;
 

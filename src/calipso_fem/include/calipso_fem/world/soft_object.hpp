@@ -18,14 +18,15 @@ struct HoldPoint {
 };
 
 struct SettleReport {
-  double sag = 0.0;       // largest displacement under gravity if the shape were the rest shape, m
-  int iterations = 0;     // of the rest shape; 0: the sag is below the tolerance
+  double sag = 0.0;    // largest displacement under gravity if the shape were the rest shape, m
+  int iterations = 0;  // of the rest shape; 0: the sag is below the tolerance
   bool converged = false;
-  std::string message;    // empty unless something has to be said
+  std::string message;  // empty unless something has to be said
 };
 
-// A deformable object in the simulated world: the FEM body and what the world needs around it: loads
-// added up from several sources, its rigid motion, the surface for contacts, cached compliances.
+// A deformable object in the simulated world: the FEM body and what the world needs around it:
+// loads added up from several sources, its rigid motion, the surface for contacts, cached
+// compliances.
 class SoftObject {
  public:
   // surface: world frame, as observed.
@@ -37,7 +38,8 @@ class SoftObject {
   // Makes the present shape the equilibrium under `gravity`, the hard constraints and the given
   // points of contact: the rest shape X is corrected by X -= x(X) - x_observed until the sag of the
   // remainder is below `tolerance` (m).
-  SettleReport settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold, double tolerance);
+  SettleReport settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold,
+                      double tolerance);
 
   // One step under gravity and all forces given since the last one. Without constraints and forces
   // the flight is exact: the centre of mass follows its parabola, angular momentum is kept.
@@ -56,7 +58,8 @@ class SoftObject {
   Eigen::Matrix3d compliance(const SurfacePoint& at, const SurfacePoint& from, double h);
   void forgetCompliance() { columns_.clear(); }
 
-  // The node with the largest weight at a surface vertex: contacts are thinned to one per such node.
+  // The node with the largest weight at a surface vertex: contacts are thinned to one per such
+  // node.
   int carrier(int vertex) const { return carrier_[vertex]; }
   Eigen::Vector3d position(const SurfacePoint& point) const;
   Eigen::Vector3d velocity(const SurfacePoint& point) const;
@@ -71,8 +74,8 @@ class SoftObject {
 
  private:
   struct Column {
-    NodeMatrix c[3];             // #N x 3 each: answer to a unit impulse along x, y, z
-    Eigen::Matrix3d rotation;    // of the body when it was computed
+    NodeMatrix c[3];           // #N x 3 each: answer to a unit impulse along x, y, z
+    Eigen::Matrix3d rotation;  // of the body when it was computed
   };
 
   const Column& columnOf(int vertex, double h);
@@ -82,15 +85,15 @@ class SoftObject {
 
   DeformableBody body_;
   Eigen::Vector3d gravity_ = Eigen::Vector3d::Zero();
-  Vec forces_;                              // 3 #V, for the next step
+  Vec forces_;  // 3 #V, for the next step
   bool forced_ = false;
-  Vec observed_;                            // 3 #N, nodes at construction
+  Vec observed_;  // 3 #N, nodes at construction
   std::vector<int> carrier_;
   decltype(TriangleMesh::vertices) vertices_, previous_;
   std::unique_ptr<SurfaceTree> tree_;
   bool tree_stale_ = true;
   TriangleMesh surface_;
-  std::map<int, Column> columns_;           // by carrier node
+  std::map<int, Column> columns_;  // by carrier node
   double column_step_ = 0.0;
   Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();  // of motion(), renewed by changed()
 };

@@ -11,13 +11,13 @@ namespace calipso::fem {
 struct SurfaceHit {
   int triangle = -1;
   Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();   // on the surface, m
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ(); // outwards, unit length
-  double distance = 0.0;                             // m, negative inside
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();    // on the surface, m
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // outwards, unit length
+  double distance = 0.0;                              // m, negative inside
 };
 
-// Bounding-volume hierarchy over a triangle surface: signed distances (angle-weighted pseudo-normals,
-// Baerentzen and Aanaes 2005) and swept points. Vertices may move; then refit().
+// Bounding-volume hierarchy over a triangle surface: signed distances (angle-weighted
+// pseudo-normals, Baerentzen and Aanaes 2005) and swept points. Vertices may move; then refit().
 class SurfaceTree {
  public:
   explicit SurfaceTree(TriangleMesh mesh);
@@ -29,7 +29,8 @@ class SurfaceTree {
   std::optional<SurfaceHit> nearest(const Eigen::Vector3d& point, double reach) const;
   // First triangle that the segment from -> to enters through its outer side; distance is the depth
   // of `to` behind it, negative.
-  std::optional<SurfaceHit> firstEntry(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+  std::optional<SurfaceHit> firstEntry(const Eigen::Vector3d& from,
+                                       const Eigen::Vector3d& to) const;
 
   const TriangleMesh& mesh() const { return mesh_; }
   const Eigen::AlignedBox3d& bounds() const { return nodes_.front().box; }
@@ -37,8 +38,8 @@ class SurfaceTree {
  private:
   struct Node {
     Eigen::AlignedBox3d box;
-    int left = -1, right = -1;    // children; leaves: -1
-    int first = 0, count = 0;     // range in order_
+    int left = -1, right = -1;  // children; leaves: -1
+    int first = 0, count = 0;   // range in order_
   };
 
   int build(int first, int count);
@@ -49,7 +50,7 @@ class SurfaceTree {
 
   TriangleMesh mesh_;
   std::vector<Node> nodes_;
-  std::vector<int> order_;                 // triangles, grouped by leaf
+  std::vector<int> order_;                  // triangles, grouped by leaf
   std::vector<Eigen::Vector3i> neighbour_;  // across the edge opposite to each corner; -1: border
   std::vector<Eigen::Vector3d> face_normal_, vertex_normal_;
 };

@@ -8,11 +8,11 @@
 
 namespace calipso::fem {
 
-// The whole scene, simulated in video time. The observed motion is the reference: an object is as in
-// the video until an edit touches it; then it starts from its observed pose and velocity, in
+// The whole scene, simulated in video time. The observed motion is the reference: an object is as
+// in the video until an edit touches it; then it starts from its observed pose and velocity, in
 // equilibrium with what held it (attachments, supports, or buoyancy equal to its weight), and is
-// modelled as simply as the edits known so far allow: kinematic, rigid (Bullet) or deformable (FEM).
-// Deterministic; not thread-safe.
+// modelled as simply as the edits known so far allow: kinematic, rigid (Bullet) or deformable
+// (FEM). Deterministic; not thread-safe.
 class World {
  public:
   // @throw std::invalid_argument naming what is wrong with scene or parameters
@@ -23,12 +23,12 @@ class World {
   // @throw std::invalid_argument naming the object and the ones there are
   void addObservedMotion(const std::string& object, const ObservedMotion& motion);
 
-  // Takes an edit in; it takes effect with the first frame at or after its time. Never throws: what is
-  // wrong with it is said in its outcome.
+  // Takes an edit in; it takes effect with the first frame at or after its time. Never throws: what
+  // is wrong with it is said in its outcome.
   void submit(const Edit& edit);
 
-  // Steps to video time `time` (s) and applies the edits due by then. The first call sets the clock.
-  // Times that do not increase step nothing. @return what became of the edits that were due
+  // Steps to video time `time` (s) and applies the edits due by then. The first call sets the
+  // clock. Times that do not increase step nothing. @return what became of the edits that were due
   std::vector<EditOutcome> advanceTo(double time);
 
   double time() const;
@@ -40,8 +40,8 @@ class World {
   // For drawing: the volume grid's edges and fixed nodes of a deformable object, user forces.
   struct Drawing {
     std::string object;
-    std::vector<Eigen::Vector3d> edges;   // pairs of points, world
-    std::vector<Eigen::Vector3d> fixed;   // points, world
+    std::vector<Eigen::Vector3d> edges;                               // pairs of points, world
+    std::vector<Eigen::Vector3d> fixed;                               // points, world
     std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> forces;  // point, N
   };
   std::vector<Drawing> drawings() const;

@@ -18,8 +18,8 @@ namespace calipso::fem {
 // An object as the alignment found it at the key frame.
 struct WorldObject {
   std::string name;
-  int index = 0;                        // label in masks
-  TriangleMesh mesh;                    // object frame
+  int index = 0;                                                        // label in masks
+  TriangleMesh mesh;                                                    // object frame
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // at the key frame
   std::vector<AttachmentBox> attachments;
 };
@@ -30,7 +30,7 @@ struct SupportMesh {
 };
 
 struct WorldScene {
-  Camera camera;  // at the key frame
+  Camera camera;                                // at the key frame
   Eigen::Vector3d gravity = {0.0, 0.0, -9.81};  // m/s^2
   std::vector<SupportPlane> planes;
   std::vector<SupportMesh> support_meshes;
@@ -58,7 +58,7 @@ struct SurfaceSettings {
 // What the user may set per object. Empty: chosen automatically.
 struct ObjectSettings {
   std::optional<double> youngs_modulus, poissons_ratio, density, damping;
-  std::optional<ObjectKind> kind;  // once an edit touches the object
+  std::optional<ObjectKind> kind;   // once an edit touches the object
   std::optional<double> cell_size;  // m
   SurfaceSettings surface;
 };
@@ -69,10 +69,10 @@ struct WorldParams {
   int max_nodes = 1200;              // per deformable object
   int max_substeps = 2;              // of deformable objects, per frame
   FemOptions fem;                    // cell_size and target_nodes are chosen per object
-  double proximity = 0.0;            // m, minimal distance of surfaces; 0: a fiftieth of the smallest object
-  int contact_iterations = 60;       // block Gauss-Seidel sweeps per solve
-  double contact_tolerance = 1e-6;   // relative change of the impulses at which sweeping stops
-  SurfaceSettings support;           // of planes and support meshes
+  double proximity = 0.0;  // m, minimal distance of surfaces; 0: a fiftieth of the smallest object
+  int contact_iterations = 60;      // block Gauss-Seidel sweeps per solve
+  double contact_tolerance = 1e-6;  // relative change of the impulses at which sweeping stops
+  SurfaceSettings support;          // of planes and support meshes
   ObjectSettings defaults;
   std::map<std::string, ObjectSettings> objects;  // by object name; replaces the defaults
 
@@ -87,14 +87,15 @@ struct ObjectSnapshot {
   std::string name;
   int index = 0;
   ObjectKind kind = ObjectKind::kStatic;
-  bool edited = false;    // false: as in the video
+  bool edited = false;  // false: as in the video
   bool removed = false;
   bool sleeping = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // best rigid motion
-  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> vertices;   // #V x 3; empty unless edited
-  Eigen::VectorXd von_mises;     // #V, Pa; empty unless deformable
-  double kinetic_energy = 0.0;   // J
-  double elastic_energy = 0.0;   // J
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>
+      vertices;                 // #V x 3; empty unless edited
+  Eigen::VectorXd von_mises;    // #V, Pa; empty unless deformable
+  double kinetic_energy = 0.0;  // J
+  double elastic_energy = 0.0;  // J
 };
 
 struct ContactPoint {
@@ -102,8 +103,8 @@ struct ContactPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // from b towards a
   Eigen::Vector3d force = Eigen::Vector3d::Zero();    // on a, N
-  double depth = 0.0;         // m, negative: a gap
-  bool first_touch = false;   // the pair's first contact since they were last apart
+  double depth = 0.0;                                 // m, negative: a gap
+  bool first_touch = false;  // the pair's first contact since they were last apart
 };
 
 struct WorldState {
@@ -125,7 +126,7 @@ struct PlanEntry {
   double cell_size = 0.0;  // m
   double time_step = 0.0;  // s
   Material material;
-  double mass = 0.0;       // kg
+  double mass = 0.0;  // kg
   double ms_per_frame = 0.0;
 };
 
