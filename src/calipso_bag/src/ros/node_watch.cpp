@@ -29,7 +29,7 @@ void NodeWatch::fail(const std::string& node, const std::string& reason) {
 
 void NodeWatch::connectionLost(const std::string& ros_name) {
   const auto found = node_of_.find(ros_name);
-  if (found == node_of_.end()) return;
+  if (found == node_of_.end() || over_) return;
   ended_.insert(found->second);
   fail(found->second, "its process ended");
 }

@@ -28,6 +28,9 @@ class NodeWatch {
   // Declares a node FAILED, to everyone.
   void fail(const std::string& node, const std::string& reason);
 
+  // From now on nodes may end: the run is over.
+  void runIsOver() { over_ = true; }
+
   // To be called when a subscriber's connection closes; `ros_name`: the subscriber's.
   void connectionLost(const std::string& ros_name);
 
@@ -39,6 +42,7 @@ class NodeWatch {
   std::map<std::string, std::string> last_said_;
   std::set<std::string> ended_;
   int activity_ = 0;
+  bool over_ = false;
   ros::Publisher publisher_;
   ros::Subscriber subscriber_;
 };

@@ -112,6 +112,7 @@ void Player::run() {
   prepare();
   sendEdits();
   playFrames();
+  watch_.runIsOver();
 }
 
 // True when a frame sent now reaches everyone who asked for frames.
