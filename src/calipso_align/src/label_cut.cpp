@@ -17,25 +17,13 @@ float squaredDistance(const cv::Vec3b& a, const cv::Vec3b& b) {
   return static_cast<float>(d0 * d0 + d1 * d1 + d2 * d2);
 }
 
-// 1 / (2 <|I_p - I_q|^2>) over the pairs that touch a free pixel.
-float contrastScale(const cv::Mat& image, const cv::Mat& free) {
-  double sum = 0.0;
-  long count = 0;
-  for (int y = 0; y < free.rows; ++y)
-    for (int x = 1; x < free.cols; ++x) {
-      if (!free.at<uchar>(y, x)) continue;
-      sum += squaredDistance(image.at<cv::Vec3b>(y, x), image.at<cv::Vec3b>(y, x - 1));
-      ++count;
-    }
-  return sum > 0.0 ? static_cast<float>(count / (2.0 * sum)) : 0.0f;
-}
-
 class ExpansionMove {
  public:
   ExpansionMove(const cv::Mat& image, const cv::Mat& free, const std::vector<cv::Mat>& costs,
                 const SmoothnessParams& params)
       : image_(image), free_(free), costs_(costs), params_(params),
-        beta_(contrastScale(image, free)), node_(free.size(), CV_32S) {}
+        beta_(params.contrast_scale > 0.0f ? params.contrast_scale : contrastScale(image, free)),
+        node_(free.size(), CV_32S) {}
 
   // Lets every free pixel choose between its label and `alpha`. Returns whether any did.
   bool run(int alpha, cv::Mat& labels) {
@@ -125,6 +113,18 @@ class ExpansionMove {
 };
 
 }  // namespace
+
+float contrastScale(const cv::Mat& image, const cv::Mat& mask) {
+  double sum = 0.0;
+  long count = 0;
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 1; x < mask.cols; ++x) {
+      if (!mask.at<uchar>(y, x)) continue;
+      sum += squaredDistance(image.at<cv::Vec3b>(y, x), image.at<cv::Vec3b>(y, x - 1));
+      ++count;
+    }
+  return sum > 0.0 ? static_cast<float>(count / (2.0 * sum)) : 0.0f;
+}
 
 void cutLabels(const cv::Mat& image, const cv::Mat& free, const std::vector<cv::Mat>& costs,
                const SmoothnessParams& params, cv::Mat& labels) {

@@ -33,8 +33,7 @@ const cv::Mat& Segmenter::segment(const cv::Mat& strokes) {
   if (models_.empty() || strokesContradictModels())
     learn();
   else
-    cutLabels(coarse_.image, freePixels(coarse_), coarse_.costs, params_.smoothness,
-              coarse_.labels);
+    cut(freePixels(coarse_), coarse_);
   cutFine();
   adoptLabels();
   return labels_;
@@ -52,8 +51,7 @@ void Segmenter::learn() {
   for (int round = 0; round < params_.rounds; ++round) {
     if (round > 0) refitModels();
     evaluate(coarse_);
-    cutLabels(coarse_.image, freePixels(coarse_), coarse_.costs, params_.smoothness,
-              coarse_.labels);
+    cut(freePixels(coarse_), coarse_);
     if (round < kPlacements) placeSilhouettes();
   }
   refitModels();
@@ -160,6 +158,12 @@ void Segmenter::evaluate(SegmentationLevel& level) const {
   addShapeOdds(level);
 }
 
+void Segmenter::cut(const cv::Mat& free, SegmentationLevel& level) const {
+  SmoothnessParams smoothness = params_.smoothness;
+  smoothness.contrast_scale = level.contrast_scale;
+  cutLabels(level.image, free, level.costs, smoothness, level.labels);
+}
+
 // Settles on the full picture what the coarse one leaves open.
 void Segmenter::cutFine() {
   cv::Mat enlarged;
@@ -167,8 +171,7 @@ void Segmenter::cutFine() {
   enlarged.copyTo(fine_.labels, freePixels(fine_));
   const double factor = static_cast<double>(image_.cols) / coarse_.image.cols;
   const int band = static_cast<int>(std::ceil(params_.band_px * factor));
-  cutLabels(fine_.image, uncertainPixels(fine_, band), fine_.costs, params_.smoothness,
-            fine_.labels);
+  cut(uncertainPixels(fine_, band), fine_);
 }
 
 void Segmenter::adoptLabels() {

@@ -53,6 +53,7 @@ SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<Segmentation
     level.allowed.push_back(resized(allowedRegion(target, image.size()), size));
     level.region |= level.allowed.back();
   }
+  level.contrast_scale = contrastScale(level.image, level.region);
   level.labels = cv::Mat::zeros(size, CV_8U);
   return level;
 }
@@ -94,15 +95,15 @@ cv::Mat uncertainPixels(const SegmentationLevel& level, int band_px) {
   const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3));
   cv::erode(level.labels, low, square);
   cv::dilate(level.labels, high, square);
-  cv::Mat uncertain = grown(low != high, band_px);
-  for (int y = 0; y < uncertain.rows; ++y)
-    for (int x = 0; x < uncertain.cols; ++x) {
+  cv::Mat doubtful = cv::Mat::zeros(level.labels.size(), CV_8U);
+  for (int y = 0; y < doubtful.rows; ++y)
+    for (int x = 0; x < doubtful.cols; ++x) {
       if (!level.region.at<uchar>(y, x)) continue;
       const float own = level.costs[level.labels.at<uchar>(y, x)].at<float>(y, x);
       for (const cv::Mat& cost : level.costs)
-        if (cost.at<float>(y, x) < own) uncertain.at<uchar>(y, x) = 255;
+        if (cost.at<float>(y, x) < own) doubtful.at<uchar>(y, x) = 255;
     }
-  return uncertain & freePixels(level);
+  return (grown(low != high, band_px) | grown(doubtful, band_px)) & freePixels(level);
 }
 
 std::vector<cv::Vec3f> sampleColours(const cv::Mat& image, const cv::Mat& mask) {

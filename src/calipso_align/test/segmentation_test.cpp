@@ -43,7 +43,8 @@ TEST(Segmenter, FindsADiscFromItsRectangle) {
 }
 
 TEST(Segmenter, GivesTouchingObjectsTheirOwnPixels) {
-  const auto left = box(30, 30, 80, 90), right = box(80, 30, 130, 90);
+  // Edges between pixels: a mixed pixel would belong to either side.
+  const auto left = box(29.5, 29.5, 79.5, 89.5), right = box(79.5, 29.5, 129.5, 89.5);
   const cv::Mat image =
       paint(kSize, right, kRed, kGrey, 3.0, paint(kSize, left, kGreen, kGrey, 0.0));
   cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
@@ -93,7 +94,8 @@ TEST(Segmenter, KeepsInsideALasso) {
   cv::Mat inside = cv::Mat::zeros(kSize, CV_8U);
   cv::fillPoly(inside, std::vector<std::vector<cv::Point>>{diamond}, 255);
   EXPECT_EQ(cv::countNonZero((labels > 0) & (inside == 0)), 0);
-  EXPECT_GE(intersectionOverUnion(labels == 1, maskOf(kSize, shape)), 0.98);
+  // Half a pixel all along the edge costs 3 %.
+  EXPECT_GE(intersectionOverUnion(labels == 1, maskOf(kSize, shape)), 0.97);
 }
 
 TEST(Segmenter, TwoRunsAreByteIdentical) {

@@ -51,6 +51,7 @@ class Segmenter {
   void placeSilhouettes();
   void addShapeOdds(SegmentationLevel& level) const;
   void evaluate(SegmentationLevel& level) const;
+  void cut(const cv::Mat& free, SegmentationLevel& level) const;
   void cutFine();
   void adoptLabels();
 

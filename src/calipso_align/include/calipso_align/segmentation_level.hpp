@@ -18,7 +18,7 @@ struct SegmentationTarget {
   int label = 0;                 // 1..254, distinct
   cv::Rect rect;                 // px; empty: anywhere
   std::vector<cv::Point> lasso;  // px, polygon; empty: none. The object lies inside both.
-  cv::Mat silhouette;            // CV_8U: roughly its shape and place, or empty. May be larger than
+  cv::Mat silhouette = {};       // CV_8U: roughly its shape and place, or empty. May be larger than
                                  // the picture, with an equal margin on opposite sides.
 };
 
@@ -31,6 +31,7 @@ struct SegmentationLevel {
   cv::Mat seeds;                 // CV_8U: label number + 1 where a stroke says so, else 0
   cv::Mat labels;                // CV_8U: label numbers
   std::vector<cv::Mat> costs;    // CV_32F per label number, nats
+  float contrast_scale = 0.0f;   // beta of label_cut.hpp over the region
 };
 
 // scale: of the level's picture to `image`, at most 1.
