@@ -38,6 +38,7 @@ struct DeformableBody::Impl {
   Vec x, v, a;                           // m, m/s, m/s^2 (trapezoidal)
   std::optional<std::pair<Vec, Vec>> previous;  // x, v of the step before (BDF2)
   double previous_h = 0.0;
+  bool acceleration_known = false;
   double time = 0.0;
 
   // Loads and constraints
@@ -89,6 +90,8 @@ struct DeformableBody::Impl {
                        double linear_tolerance, StepReport* report, Vec* direction);
   double searchLine(const Vec& y, const Vec& direction, const Vec& residual, const Integrator& i,
                     const Vec& loads, double energy) const;
+  // M^-1 (F - f_int - D v) of the free components: what the trapezoidal rule starts from.
+  Vec startAcceleration(const Vec& loads) const;
   void finishReport(StepReport* report) const;
   void invalidateSystem();
   // A^-1 of the last step's system times impulses on the nodes (N s): change of velocity, m/s.

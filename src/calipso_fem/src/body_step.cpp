@@ -131,18 +131,47 @@ void DeformableBody::Impl::finishReport(StepReport* report) const {
                        model->smallestDilatation(x) < kRecoveryDilatation;
 }
 
+Vec DeformableBody::Impl::startAcceleration(const Vec& loads) const {
+  Integrator here;
+  here.base = here.predicted = x;
+  Vec b = -gradient(x, here, loads);
+  if (options.mass_damping > 0.0) b -= options.mass_damping * applyMass(v);
+  if (damping() > 0.0) {
+    Vec Dv;
+    viscosity.multiply(v, Dv);
+    b -= Dv;
+  }
+  maskResidual(&b);
+  if (!mass) {
+    for (Eigen::Index k = 0; k < b.size(); ++k) b[k] /= model->lumpedMass()[k / 3];
+    return b;
+  }
+  BlockMatrix M = *mass;
+  eliminate(prescribed, &M);
+  const auto jacobi = makeJacobi();
+  jacobi->update(M);
+  Vec result = Vec::Zero(b.size());
+  constexpr double kTolerance = 1e-13;
+  conjugateGradients(M, *jacobi, b, kTolerance, 1000, &result);
+  return result;
+}
+
 StepReport DeformableBody::step(double h) {
   Impl& m = *impl_;
   if (!(h > 0.0) || !std::isfinite(h))
     throw std::invalid_argument("time step h is " + std::to_string(h) + " s, allowed is > 0");
   const auto start = std::chrono::steady_clock::now();
-  const Integrator i = m.integrator(h);
   const Vec loads = m.externalForces();
   const Vec targets = m.prescribedTargets(m.time + h);
   if (m.damping() > 0.0) {
     m.model->viscosity(m.x, m.viscosity);
     for (double& value : m.viscosity.values) value *= m.damping();
   }
+  if (m.options.scheme == TimeScheme::kTrapezoidal && !m.acceleration_known) {
+    m.a = m.startAcceleration(loads);
+    m.acceleration_known = true;
+  }
+  const Integrator i = m.integrator(h);
   Vec y = m.x;
   StepReport report = m.minimise(i, loads, targets, m.options.linearised, &y);
   if (y.allFinite()) {
@@ -191,7 +220,7 @@ StepReport DeformableBody::solveStatic() {
     if (attempt.converged) break;
   }
   m.v.setZero();
-  m.a.setZero();
+  m.acceleration_known = false;
   m.previous.reset();
   m.rememberSoftForces(rest);
   m.system_valid = false;

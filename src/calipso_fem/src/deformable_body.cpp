@@ -96,7 +96,7 @@ void DeformableBody::setState(const Vec& positions, const Vec& velocities) {
   requireSize(velocities, impl_->x.size(), "velocities");
   impl_->x = positions;
   impl_->v = velocities;
-  impl_->a.setZero();
+  impl_->acceleration_known = false;
   impl_->previous.reset();
 }
 
@@ -106,7 +106,7 @@ void DeformableBody::setRigidVelocity(const Vector3d& linear, const Vector3d& an
   const Vector3d center = momentum().center;
   for (int k = 0; k < nodeCount(); ++k)
     impl_->v.segment<3>(3 * k) = linear + angular.cross(impl_->x.segment<3>(3 * k) - center);
-  impl_->a.setZero();
+  impl_->acceleration_known = false;
   impl_->previous.reset();
 }
 
@@ -115,7 +115,7 @@ void DeformableBody::applyRigidTransform(const Eigen::Isometry3d& transform) {
     impl_->x.segment<3>(3 * k) = transform * Vector3d(impl_->x.segment<3>(3 * k));
     impl_->v.segment<3>(3 * k) = transform.linear() * Vector3d(impl_->v.segment<3>(3 * k));
   }
-  impl_->a.setZero();
+  impl_->acceleration_known = false;
   impl_->previous.reset();
   impl_->solver->invalidate();
 }
@@ -123,7 +123,7 @@ void DeformableBody::applyRigidTransform(const Eigen::Isometry3d& transform) {
 void DeformableBody::reset() {
   impl_->x = restPositions(impl_->model->mesh());
   impl_->v.setZero();
-  impl_->a.setZero();
+  impl_->acceleration_known = false;
   impl_->previous.reset();
   impl_->time = 0.0;
   impl_->solver->invalidate();

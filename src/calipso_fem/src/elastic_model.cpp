@@ -2,15 +2,10 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
+#include <limits>
 #include <stdexcept>
-#include <tuple>
 
-#include "cell_coloring.hpp"
-#include "element.hpp"
-#include "stvk_batch.hpp"
+#include "elastic_model_impl.hpp"
 
 namespace calipso::fem {
 namespace {
@@ -21,50 +16,6 @@ constexpr std::array<std::pair<ElementType, const char*>, 4> kNames = {{
     {ElementType::kHexEnhanced, "enhanced"},
     {ElementType::kTetP1, "P1"},
 }};
-
-// Below this, waking a second thread for every colour costs more than it saves.
-constexpr int kSerialCells = 200;
-
-StvkBatchKind makeBatchKind(const ElementKind& kind) {
-  StvkBatchKind b{};
-  const ReferenceElement& ref = *kind.reference;
-  for (int q = 0; q < 8; ++q) {
-    b.weight[q] = ref.weight[q];
-    for (int a = 0; a < 8; ++a)
-      for (int c = 0; c < 3; ++c) b.gradient[q][a][c] = ref.gradient[q](a, c);
-    for (int k = 0; k < 3; ++k)
-      for (int c = 0; c < 3; ++c) b.mode[q][k][c] = ref.mode[q][3 * k](0, c);
-  }
-  b.lambda = kind.lame.lambda;
-  b.mu = kind.lame.mu;
-  b.enhanced = kind.type == ElementType::kHexEnhanced;
-  if (!b.enhanced) return b;
-  for (int i = 0; i < kModes; ++i)
-    for (int j = 0; j < kModes; ++j) b.mode_inverse[i][j] = kind.mode_stiffness_inverse(i, j);
-  return b;
-}
-
-CornerMatrix cornersOf(const CellMatrix& cells, int cell, const double* x) {
-  CornerMatrix corners(cells.cols(), 3);
-  for (int c = 0; c < cells.cols(); ++c) {
-    const double* p = x + 3 * cells(cell, c);
-    corners.row(c) << p[0], p[1], p[2];
-  }
-  return corners;
-}
-
-// Cells whose corners lie alike, to a billionth of their size, share a reference element.
-std::vector<long> shapeKey(const CornerMatrix& corners) {
-  std::vector<long> key;
-  const CornerMatrix edges = corners.rowwise() - corners.row(0).eval();
-  const double size = edges.rowwise().norm().maxCoeff();
-  int exponent = 0;
-  std::frexp(size, &exponent);
-  const double unit = std::ldexp(1.0, exponent) * 1e-9;
-  key.push_back(exponent);
-  for (int i = 0; i < edges.size(); ++i) key.push_back(std::lround(edges.data()[i] / unit));
-  return key;
-}
 
 }  // namespace
 
@@ -81,106 +32,12 @@ ElementType elementTypeFromString(const std::string& name) {
                               "': known are Q1, mean_dilatation, enhanced, P1");
 }
 
-struct ElasticModel::Impl {
-  VolumeMesh mesh;
-  MaterialModel model;
-  ElementType type;
-  std::vector<Material> materials;             // per cell
-  std::vector<std::unique_ptr<ReferenceElement>> references;
-  std::vector<int> reference_of;               // per cell
-  std::vector<ElementKind> kinds;
-  std::vector<int> kind_of;                    // per cell
-  std::shared_ptr<const BlockPattern> pattern;
-  std::vector<int> block_of;                   // per cell, corners x corners
-  CellColoring coloring;
-  // Cells of one colour and kind, four by four, where the batch kernel can take them.
-  struct Batch {
-    std::array<int, kLanes> cell;   // the last one repeats where fewer are left
-    int count;
-  };
-  std::vector<StvkBatchKind> batch_kinds;      // as kinds
-  std::vector<Batch> batches;
-  std::vector<int> batch_start;                // by colour
-  Eigen::VectorXd lumped_mass;
-
-  void buildReferences();
-  void buildKinds();
-  void buildBlocks();
-  void buildMass();
-  void buildBatches();
-  bool isBatched() const { return !batches.empty(); }
-  // Calls work(cell, lane, result) for all cells of batched models.
-  template <class Work>
-  void forEachBatched(const Vec& x, int derivatives, StvkPart part, const Work& work) const;
-  ElementResult evaluate(int cell, const Vec& x, int derivatives, Part part) const;
-  void addToMatrix(int cell, const ElementResult& r, BlockMatrix& K) const;
-  void addToMatrix(int cell, int lane, const StvkBatchResult& r, BlockMatrix& K) const;
-  template <class Work>
-  void forEachCell(const Work& work) const;
-  void assemble(const Vec& x, Part part, BlockMatrix& K) const;
-};
-
-// Calls work(cell) colour by colour: cells of one colour share no node, so that sums into nodes are
-// free of races and always in the same order.
-template <class Work>
-void ElasticModel::Impl::forEachCell(const Work& work) const {
-  for (std::size_t color = 0; color + 1 < coloring.start.size(); ++color) {
-#pragma omp parallel for schedule(static) if (mesh.cellCount() > kSerialCells)
-    for (int k = coloring.start[color]; k < coloring.start[color + 1]; ++k)
-      work(coloring.cells[k]);
-  }
-}
-
 ElementResult ElasticModel::Impl::evaluate(int cell, const Vec& x, int derivatives,
                                            Part part) const {
   ElementResult r;
   evaluateElement(kinds[kind_of[cell]], cornersOf(mesh.cells, cell, x.data()), derivatives, part,
                   &r);
   return r;
-}
-
-template <class Work>
-void ElasticModel::Impl::forEachBatched(const Vec& x, int derivatives, StvkPart part,
-                                        const Work& work) const {
-  for (std::size_t color = 0; color + 1 < batch_start.size(); ++color) {
-#pragma omp parallel for schedule(static) if (mesh.cellCount() > kSerialCells)
-    for (int k = batch_start[color]; k < batch_start[color + 1]; ++k) {
-      const Batch& batch = batches[k];
-      alignas(32) double corners[24][kLanes];
-      StvkBatchResult result;
-      for (int l = 0; l < kLanes; ++l)
-        for (int c = 0; c < 8; ++c)
-          for (int i = 0; i < 3; ++i)
-            corners[3 * c + i][l] = x[3 * mesh.cells(batch.cell[l], c) + i];
-      evaluateStvkBatch(batch_kinds[kind_of[batch.cell[0]]], corners, derivatives, part, &result);
-      for (int l = 0; l < batch.count; ++l) work(batch.cell[l], l, result);
-    }
-  }
-}
-
-void ElasticModel::Impl::buildBatches() {
-  batches.clear();
-  batch_kinds.clear();
-  batch_start.assign(1, 0);
-  if (model != MaterialModel::kStVenantKirchhoff ||
-      (type != ElementType::kHexEnhanced && type != ElementType::kHexQ1))
-    return;
-  for (const ElementKind& kind : kinds) batch_kinds.push_back(makeBatchKind(kind));
-  for (std::size_t color = 0; color + 1 < coloring.start.size(); ++color) {
-    std::vector<int> cells(coloring.cells.begin() + coloring.start[color],
-                           coloring.cells.begin() + coloring.start[color + 1]);
-    std::stable_sort(cells.begin(), cells.end(),
-                     [this](int a, int b) { return kind_of[a] < kind_of[b]; });
-    for (std::size_t k = 0; k < cells.size();) {
-      Batch batch{};
-      const int kind = kind_of[cells[k]];
-      while (batch.count < kLanes && k < cells.size() && kind_of[cells[k]] == kind)
-        batch.cell[batch.count++] = cells[k++];
-      for (int l = batch.count; l < kLanes; ++l) batch.cell[l] = batch.cell[batch.count - 1];
-      batches.push_back(batch);
-    }
-    batch_start.push_back(static_cast<int>(batches.size()));
-  }
 }
 
 void ElasticModel::Impl::addToMatrix(int cell, const ElementResult& r, BlockMatrix& K) const {
@@ -207,62 +64,6 @@ void ElasticModel::Impl::addToMatrix(int cell, int lane, const StvkBatchResult& 
           if (a != b) lower[3 * j + i] += value;
         }
     }
-}
-
-void ElasticModel::Impl::buildReferences() {
-  references.clear();
-  reference_of.assign(mesh.cellCount(), 0);
-  std::map<std::vector<long>, int> known;
-  for (int cell = 0; cell < mesh.cellCount(); ++cell) {
-    const CornerMatrix corners = cornersOf(mesh.cells, cell, mesh.nodes.data());
-    std::vector<long> key = shapeKey(corners);
-    const bool spread = mesh.point_share.rows() > 0;
-    if (spread)
-      for (int q = 0; q < 8; ++q) key.push_back(std::lround(1e6 * mesh.point_share(cell, q)));
-    const auto [it, is_new] = known.try_emplace(std::move(key), references.size());
-    if (is_new) {
-      references.push_back(std::make_unique<ReferenceElement>(makeReferenceElement(corners)));
-      if (spread) spreadWeights(mesh.point_share.row(cell), references.back().get());
-    }
-    reference_of[cell] = it->second;
-  }
-}
-
-void ElasticModel::Impl::buildKinds() {
-  kinds.clear();
-  kind_of.assign(mesh.cellCount(), 0);
-  std::map<std::tuple<int, double, double>, int> known;
-  for (int cell = 0; cell < mesh.cellCount(); ++cell) {
-    const Material& m = materials[cell];
-    const auto [it, is_new] = known.try_emplace(
-        {reference_of[cell], m.youngs_modulus, m.poissons_ratio}, kinds.size());
-    if (is_new)
-      kinds.push_back(
-          makeElementKind(*references[reference_of[cell]], type, model, lameParameters(m)));
-    kind_of[cell] = it->second;
-  }
-}
-
-void ElasticModel::Impl::buildBlocks() {
-  pattern = makeBlockPattern(mesh.cells, mesh.nodeCount());
-  coloring = colorCells(mesh.cells, mesh.nodeCount());
-  const int n = static_cast<int>(mesh.cells.cols());
-  block_of.resize(static_cast<std::size_t>(mesh.cellCount()) * n * n);
-  for (int cell = 0; cell < mesh.cellCount(); ++cell)
-    for (int a = 0; a < n; ++a)
-      for (int b = 0; b < n; ++b)
-        block_of[(static_cast<std::size_t>(cell) * n + a) * n + b] =
-            pattern->find(mesh.cells(cell, a), mesh.cells(cell, b));
-}
-
-void ElasticModel::Impl::buildMass() {
-  lumped_mass.setZero(mesh.nodeCount());
-  for (int cell = 0; cell < mesh.cellCount(); ++cell) {
-    const Eigen::VectorXd rows =
-        unitMass(cornersOf(mesh.cells, cell, mesh.nodes.data())).rowwise().sum();
-    const double density = materials[cell].density * mesh.fraction[cell];
-    for (int c = 0; c < mesh.cells.cols(); ++c) lumped_mass[mesh.cells(cell, c)] += density * rows[c];
-  }
 }
 
 void ElasticModel::Impl::assemble(const Vec& x, Part part, BlockMatrix& K) const {
