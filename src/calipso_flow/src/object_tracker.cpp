@@ -15,7 +15,9 @@ namespace {
 constexpr int kRefinements = 3;          // warp, match, fit
 constexpr double kSettledPx = 0.05;      // a refinement that moves less than this is the last
 constexpr double kNearPx = 1.5;          // a prediction this close needs no half-size match
-constexpr double kLeastInlierShare = 0.35;
+constexpr double kLeastInlierShare = 0.35;    // of the matches
+constexpr double kLeastVisibleShare = 0.25;   // of the seeds inside the picture
+constexpr double kFirstSearch = 0.2;     // of the picture's width, while no motion is known
 constexpr int kForgetAfter = 3;         // frames without the object before its motion is forgotten
 constexpr int kWeakInliers = 12;         // fewer tracks than this are worth another attempt
 constexpr double kReturnDeviations = 3.0;
@@ -115,6 +117,19 @@ double imageMotion(const Camera& camera, const Eigen::Isometry3d& a, const Eigen
   return largest;
 }
 
+// Seeds that the camera would see inside the picture, hidden or not.
+int seedsInPicture(const ReferenceView& reference, const Camera& camera,
+                   const Eigen::Isometry3d& pose) {
+  const Eigen::Isometry3d camera_from_object = camera.world_from_camera.inverse() * pose;
+  return static_cast<int>(std::count_if(
+      reference.seeds().begin(), reference.seeds().end(), [&](const Eigen::Vector3d& seed) {
+        const Eigen::Vector3d p = camera_from_object * seed;
+        if (p.z() <= 0.0) return false;
+        const Eigen::Vector2d at = camera.project(p);
+        return at.x() >= 0.0 && at.y() >= 0.0 && at.x() < camera.width && at.y() < camera.height;
+      }));
+}
+
 // Moves a pose parallel to the picture plane, so that its pivot moves by `pixels`.
 Eigen::Isometry3d shiftInPicture(const Camera& camera, const Eigen::Isometry3d& pose,
                                  const Eigen::Vector3d& pivot, const Eigen::Vector2d& pixels) {
@@ -168,9 +183,13 @@ Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const Refere
   // The object may have stopped, or turned round: look as far as twice back to where it was.
   const Eigen::Vector2d home = frame.camera.projectWorld(predicted * centroid_);
   const Eigen::Vector2d before = frame.camera.projectWorld(last_->world_from_object * centroid_);
-  Eigen::AlignedBox2d reach(Eigen::Vector2d::Constant(-params_.search_px),
-                            Eigen::Vector2d::Constant(params_.search_px));
-  const Eigen::Vector2d back = 1.5 * (before - home), margin(params_.search_px, params_.search_px);
+  // Without a motion to go by, it may be anywhere near.
+  const bool known = before_last_ && frames_lost_ < kForgetAfter;
+  const double search = known ? params_.search_px
+                              : std::max(params_.search_px, kFirstSearch * frame.camera.width);
+  const Eigen::Vector2d margin(search, search);
+  Eigen::AlignedBox2d reach(-margin, margin);
+  const Eigen::Vector2d back = 1.5 * (before - home);
   reach.extend(Eigen::AlignedBox2d(back - margin, back + margin));
   return shiftInPicture(frame.camera, predicted, centroid_,
                         coarseDisplacement(look, frame.gray, reach));
@@ -206,7 +225,10 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   observation.tracks = followSeeds(prepareMatch(look, frame.gray), reference, frame.camera, pose,
                                    rough, params_, found);
   const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params_.pose);
-  observation.found = fit.converged && fit.inliers >= kLeastInlierShare * found.size();
+  // Few agreeing matches where many are due are the background, not the object.
+  const int due = seedsInPicture(reference, frame.camera, fit.world_from_object);
+  observation.found = fit.converged && fit.inliers >= kLeastInlierShare * found.size() &&
+                      fit.inliers >= kLeastVisibleShare * due;
   if (!observation.found) return pose;
   for (size_t i = 0; i < found.size(); ++i) observation.tracks[i].inlier = fit.inlier[i];
   observation.covariance = fit.covariance;
