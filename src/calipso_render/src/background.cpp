@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 
 namespace calipso::render {
@@ -11,6 +12,9 @@ namespace {
 
 constexpr float kNearMedian = 6.0f;     // code values; farther ones do not enter the mean
 constexpr float kLit = 0.75f;           // quantile of brightness that stands for the unshaded value
+constexpr std::size_t kFewestLit = 3;   // samples that a lit or shaded group must have
+constexpr double kGroupGap = 4.0;       // gap between two groups, in spreads of either
+constexpr float kShadowTint = 1.8f;     // a shadow's largest ratio of shaded to lit in a channel over its smallest
 constexpr float kMovingSpread = 4.0f;   // code values: from there on a place moves by itself
 constexpr int kFewestMoving = 200;      // px; fewer are noise
 constexpr int kSteadyDifference = 14;   // code values; about five deviations of the difference
@@ -28,14 +32,56 @@ struct Series {
 
 int brightness(const cv::Vec3b& c) { return c[0] + 2 * c[1] + c[2]; }
 
+using Samples = std::vector<cv::Vec3b>;
+
+// Where values in order of brightness fall apart best: the least sum of squares within two groups (Otsu).
+std::size_t bestSplit(const Samples& sorted) {
+  double total = 0.0, below = 0.0, best = -1.0;
+  for (const cv::Vec3b& c : sorted) total += brightness(c);
+  std::size_t split = 0;
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    below += brightness(sorted[i - 1]);
+    const double gap = (total - below) / (sorted.size() - i) - below / i;
+    const double between = gap * gap * i * (sorted.size() - i);
+    if (between > best) best = between, split = i;
+  }
+  return split;
+}
+
+// Half the range that the middle half of a group covers, at least the camera's noise.
+double groupSpread(const Samples& sorted, std::size_t from, std::size_t to) {
+  const std::size_t quarter = (to - from) / 4;
+  return std::max(0.5 * (brightness(sorted[to - 1 - quarter]) - brightness(sorted[from + quarter])), 1.0 * kNearMedian);
+}
+
+// A shadow darkens all channels, and to about the same part of their linear values.
+bool darkenedAlike(const cv::Vec3b& shaded, const cv::Vec3b& lit) {
+  float least = 1.0f, most = 0.0f;
+  for (int c = 0; c < 3; ++c) {
+    const float ratio = linearFromCode(shaded[c]) / std::max(linearFromCode(lit[c]), 1e-3f);
+    least = std::min(least, ratio), most = std::max(most, ratio);
+  }
+  return most < 1.0f && most < kShadowTint * least;
+}
+
+// Brightness without shade. A shadow that stays can hold most of the samples; two clear groups
+// that differ as shade does tell it, however few the bright ones are.
+double litBrightness(double step, Samples values) {
+  std::stable_sort(values.begin(), values.end(), [](const cv::Vec3b& a, const cv::Vec3b& b) { return brightness(a) < brightness(b); });
+  const std::size_t n = values.size(), split = bestSplit(values);
+  const double usual = brightness(values[static_cast<std::size_t>(kLit * (n - 1))]);
+  if (split < kFewestLit || n - split < kFewestLit) return usual;
+  const cv::Vec3b &shaded = values[split / 2], &lit = values[(split + n) / 2];
+  const double gap = brightness(lit) - brightness(shaded);
+  const double spread = std::max(groupSpread(values, 0, split), groupSpread(values, split, n));
+  const bool apart = gap > std::max(step * brightness(lit), kGroupGap * spread);
+  return apart && darkenedAlike(shaded, lit) ? brightness(lit) : usual;
+}
+
 // Leaves out the darker group if the values fall into two.
-void dropShaded(double step, std::vector<cv::Vec3b>& values) {
-  std::vector<int> sorted(values.size());
-  std::transform(values.begin(), values.end(), sorted.begin(), brightness);
-  std::sort(sorted.begin(), sorted.end());
-  const double lit = sorted[static_cast<std::size_t>(kLit * (sorted.size() - 1))];
+void dropShaded(double step, Samples& values) {
+  const double lit = litBrightness(step, values);
   const double limit = lit - std::max(step * lit, 4.0 * kNearMedian);
-  if (sorted.front() >= limit) return;
   values.erase(std::remove_if(values.begin(), values.end(),
                               [&](const cv::Vec3b& c) { return brightness(c) < limit; }),
                values.end());

@@ -11,16 +11,10 @@ namespace {
 constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
 constexpr float kMovedPx = 0.3f;        // moved more: drawn
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
-constexpr float kSameRatio = 0.01f, kPlateRatio = 0.06f;  // brightening from which the plate is taken, and only it
 
 cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
   const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
   return {linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2])};
-}
-
-float smoothStep(float from, float to, float x) {
-  const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
-  return t * t * (3.0f - 2.0f * t);
 }
 
 }  // namespace
@@ -104,21 +98,18 @@ FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
   const bool removed = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
   if (removed) behind = revealedAt(u, v);
   if (!removed && labels_.at<std::uint8_t>(v, u) != 0) return behind;  // another object's own pixels
-  const auto receiver = receiverAt(params_.planes, frame_.camera, u, v);
-  if (!receiver) return behind;
-  const Eigen::Vector3f &p = receiver->position, &n = receiver->normal;
-  const float moved = moved_shadow_->visibility(p, n), sky = sky_now_.at<float>(v - region_.y, u - region_.x);
+  const cv::Point at = cv::Point(u, v) - region_.tl();
+  const float sun = sun_now_.at<float>(at), sun_before = sun_before_.at<float>(at);
+  const float sky = sky_now_.at<float>(at), sky_before = sky_before_.at<float>(at);
+  if (sun < 0.0f) return behind;
+  const cv::Vec3f now = shadowRatio(sun, sky), before = shadowRatio(sun_before, sky_before);
   if (removed) {
-    behind.colour = behind.colour.mul(shadowRatio(moved * shadows_.others->visibility(p, n), sky));
+    behind.colour = behind.colour.mul(now);
     return behind;
   }
-  const float original = shadows_.originals->visibility(p, n), original_sky = sky_before_.at<float>(v - region_.y, u - region_.x);
-  if (std::abs(moved - original) + std::abs(sky - original_sky) < kSameShadow) return behind;
-  const float others = shadows_.others->visibility(p, n);
-  const cv::Vec3f now = shadowRatio(others * moved, sky), before = shadowRatio(others * original, original_sky);
-  const float change = luminance(now) - luminance(before);
-  // Darkened further, a pixel keeps its own grain; lit up again, it must come from the plate.
-  const float from_plate = smoothStep(kSameRatio, kPlateRatio, change);
+  // Darkened further, a pixel keeps its own grain; what the original shaded must come from the plate.
+  const float from_plate = relit_.at<float>(at);
+  if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameShadow) return behind;
   cv::Vec3f darkened = behind.colour;
   for (int c = 0; c < 3; ++c) darkened[c] *= std::min(1.0f, now[c] / std::max(before[c], 0.05f));
   const Behind revealed = revealedAt(u, v);

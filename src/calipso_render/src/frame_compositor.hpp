@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <vector>
 
@@ -15,6 +17,13 @@ struct ShadowCache {
   std::unique_ptr<Visibility> originals;  // of the edited objects where the video has them
   std::unique_ptr<Visibility> originals_sky;  // the same against the sky above the support plane
 };
+
+inline float smoothStep(float from, float to, float x) {
+  const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
+  return t * t * (3.0f - 2.0f * t);
+}
+
+inline cv::Mat disc(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
 
 // One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.
 class FrameCompositor {
@@ -44,7 +53,11 @@ class FrameCompositor {
   void findPassingShadows();
   void drawVisibility();
   void findStill();
+  void keepRims(const cv::Mat& owner);
   void measureSky();
+  void measureSun();
+  void findRelit();
+  cv::Mat originalOf(int surface) const;
   void composePixel(int u, int v, FrameOutput& out) const;
   Behind behindAt(int u, int v) const;
   Behind revealedAt(int u, int v) const;
@@ -63,6 +76,7 @@ class FrameCompositor {
   const FrameInput& frame_;
   ShadowCache& shadows_;
 
+  std::vector<cv::Mat> footprints_;   // Prepared::footprints, likewise
   std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame
   cv::Mat labels_, plate_;            // of this frame's view
   cv::Mat invented_;
@@ -79,6 +93,9 @@ class FrameCompositor {
   cv::Mat passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat sky_now_, sky_before_;  // CV_32FC1, at least region_: part of the sky that a support plane sees
+  cv::Mat sun_now_, sun_before_;  // CV_32FC1 over region_: the same of the sun; negative where there is no plane
+  cv::Mat shaded_;   // CV_32FC1 over region_: 1 = the edited objects darken it in the video
+  cv::Mat relit_;    // CV_32FC1 over region_: 1 = the original's shadow, to be taken from the plate
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;

@@ -56,6 +56,8 @@ FrameOutput FrameCompositor::run() {
   drawVisibility();
   findStill();
   measureSky();
+  measureSun();
+  findRelit();
 #pragma omp parallel for schedule(static)
   for (int v = region_.y; v < region_.y + region_.height; ++v) {
     for (int u = region_.x; u < region_.x + region_.width; ++u) composePixel(u, v, out);
@@ -89,11 +91,13 @@ void FrameCompositor::stage() {
     observed_.push_back(edited_[i] && at_rest_[i] ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
   }
   fronts_.assign(surfaces.size(), cv::Mat());
+  footprints_.assign(surfaces.size(), cv::Mat());
   plate_ = prepared_.plate_linear;
   invented_ = prepared_.background.invented;
   if (sameView(frame_.camera, prepared_.camera)) {
     live_origin_ = prepared_.background.live_origin;
     fronts_ = prepared_.fronts;
+    footprints_ = prepared_.footprints;
   } else {
     const cv::Mat map = viewWarp(params_.planes, prepared_.camera, frame_.camera);
     cv::Mat plate, invented;
@@ -207,15 +211,21 @@ void FrameCompositor::findPassingShadows() {
   cv::dilate(passing_, passing_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {13, 13}));
 }
 
+// The pixels of region_ that show an object in the video.
+cv::Mat FrameCompositor::originalOf(int surface) const {
+  cv::Mat original = labels_(region_) == prepared_.surfaces[surface].index;
+  if (!footprints_[surface].empty()) original |= footprints_[surface](region_);
+  return original;
+}
+
 void FrameCompositor::findRemoved() {
-  const cv::Mat labels = labels_(region_);
-  cv::Mat own = cv::Mat::zeros(region_.size(), CV_8U), others = labels != 0;
+  cv::Mat own = cv::Mat::zeros(region_.size(), CV_8U), others = labels_(region_) != 0;
   for (std::size_t i = 0; i < edited_.size(); ++i) {
-    if (edited_[i]) own |= labels == prepared_.surfaces[i].index;
+    if (!edited_[i]) continue;
+    own |= originalOf(static_cast<int>(i));
+    others &= labels_(region_) != prepared_.surfaces[i].index;
   }
-  others &= ~own;
-  const int r = params_.background.mask_margin_px;
-  cv::dilate(own, removed_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * r + 1, 2 * r + 1}));
+  cv::dilate(own, removed_, disc(params_.background.mask_margin_px));
   if (!passing_.empty()) removed_ |= passing_(region_);
   removed_.setTo(0, others);  // what stands beside it keeps its own pixels
 }
@@ -228,26 +238,6 @@ void FrameCompositor::drawVisibility() {
     if (edited_[surface_of_slot_[slot]]) edges_->chooseSilhouette(actors_[slot].screen, actors_[slot].surface->edges);
   }
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) edges_->draw(actors_[slot].screen, static_cast<int>(slot));
-}
-
-void FrameCompositor::findStill() {
-  still_ = cv::Mat::zeros(region_.size(), CV_32F);
-  if (!params_.keep_still) return;
-  cv::Mat covered = cv::Mat::zeros(region_.size(), CV_8U);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) {
-    for (int u = 0; u < region_.width; ++u) {
-      const std::uint32_t id = centre_->ids(v)[u];
-      if (id == VisibilityBuffer::kNothing || !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]]) continue;
-      covered.at<std::uint8_t>(v, u) = 255;
-      still_.at<float>(v, u) = stillness(id, u + region_.x, v + region_.y);
-    }
-  }
-  // The rim of the original's pixels belongs to the surface beside it.
-  cv::Mat nearby;
-  const int side = 8 * params_.background.mask_margin_px + 1;
-  cv::dilate(still_, nearby, cv::Mat::ones(side, side, CV_8U));
-  nearby.copyTo(still_, covered == 0);
 }
 
 }  // namespace calipso::render

@@ -13,7 +13,6 @@ namespace {
 constexpr float kShaded = 0.985f;       // visible fraction of the sun below which a pixel counts as shaded
 constexpr float kSkyShaded = 0.85f;     // the same for the sky: the dark line along a contact
 constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and model are misfit
-constexpr int kShadowMargin = 4;        // px added around the predicted shadow
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
 
 std::vector<ClipFrame> inKeyView(const ClipSample& clip, const std::vector<SupportPlane>& planes) {
@@ -149,6 +148,39 @@ std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& 
   return fronts;
 }
 
+cv::Mat grown(const cv::Mat& mask, int radius) {
+  cv::Mat out;
+  cv::dilate(mask, out, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+  return out;
+}
+
+// All that a resting object covers at the key frame: its mask, which can miss thin or dark ends, and its model.
+std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepared& p) {
+  std::vector<cv::Mat> footprints;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    cv::Mat footprint = p.key_labels == p.surfaces[i].index;
+    VisibilityBuffer buffer({0, 0, footprint.cols, footprint.rows});
+    buffer.draw(actors[i].screen, 0);
+    for (int v = 0; v < footprint.rows; ++v) {
+      for (int u = 0; u < footprint.cols; ++u) {
+        if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) footprint.at<std::uint8_t>(v, u) = 255;
+      }
+    }
+    if (!p.fronts[i].empty()) footprint.setTo(0, p.fronts[i]);
+    footprints.push_back(p.moves[i] ? cv::Mat() : footprint);
+  }
+  return footprints;
+}
+
+// What objects at rest cover or shade at the key frame, with soft edges and the predictions' errors.
+cv::Mat restingTraces(const Prepared& p, const cv::Mat& sun, const cv::Mat& sky, const RenderParams& params) {
+  cv::Mat traces = grown((sun < kShaded) | (sky < kSkyShaded), params.background.shadow_margin_px);
+  for (const cv::Mat& f : p.footprints) {
+    if (!f.empty()) traces |= grown(f, params.background.mask_margin_px);
+  }
+  return traces;
+}
+
 std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
   std::vector<Occluder> all;
   for (const Actor& a : actors) all.push_back({&a.vertices, &a.surface->triangles});
@@ -163,10 +195,7 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const cv::Mat& pict
   const cv::Mat visibility = planeVisibility(sun, params.planes, frames.front());
   const cv::Mat sky_visibility = planeVisibility(sky, params.planes, frames.front());
   cv::Mat shaded;
-  if (!all_move) {
-    const cv::Size side(2 * kShadowMargin + 1, 2 * kShadowMargin + 1);
-    cv::dilate((visibility < kShaded) | (sky_visibility < kSkyShaded), shaded, cv::getStructuringElement(cv::MORPH_ELLIPSE, side));
-  }
+  if (!all_move) shaded = restingTraces(p, visibility, sky_visibility, params);
   inventBackground(shaded, frames.front(), p.background);
   p.plate_linear = linearOf(p.background.plate);
   p.umbra = any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
@@ -212,8 +241,9 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const std::vector<Occluder> above = params.planes.empty() ? std::vector<Occluder>{} : occluders(actors);
   const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
   const ShadowMap sky(above, up, {256, kSkyRadius, 24});
-  prepareBackground(frames, picture, sun, sky, params, p);
   p.fronts = frontsOf(actors, p);
+  p.footprints = footprintsOf(actors, p);
+  prepareBackground(frames, picture, sun, sky, params, p);
   p.appearances = makeAppearances(actors, picture, p.key_labels, p.camera, p.light.light, p.light.gloss, sun);
   std::vector<cv::Mat> pictures;
   for (const ClipFrame& f : frames) pictures.push_back(f.bgr);

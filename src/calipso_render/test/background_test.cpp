@@ -47,6 +47,39 @@ TEST(SeenBackground, LeavesOutPassingShadows) {
   EXPECT_EQ(cv::norm(plate, emptyTable(), cv::NORM_INF), 0.0);
 }
 
+// Noise of one code value, the same in every run.
+void addGrain(std::vector<ClipFrame>& clip) {
+  cv::RNG random(7);
+  for (ClipFrame& f : clip) {
+    cv::Mat grain(f.bgr.size(), CV_16SC3), sum;
+    random.fill(grain, cv::RNG::NORMAL, 0.0, 1.0);
+    cv::add(f.bgr, grain, sum, cv::noArray(), CV_8U);
+    f.bgr = sum;
+  }
+}
+
+TEST(SeenBackground, LeavesOutAShadowThatComesToRest) {
+  std::vector<ClipFrame> clip = wanderingSquare(12);
+  const cv::Rect place(60, 80, 20, 20);
+  for (int k = 3; k < 12; ++k) cv::multiply(clip[k].bgr(place), cv::Scalar(0.77, 0.73, 0.68), clip[k].bgr(place));
+  addGrain(clip);
+  const Background b = seenBackground(clip, true);
+  cv::Mat plate;
+  b.plate.convertTo(plate, CV_8U);
+  EXPECT_LE(cv::norm(plate(place), emptyTable()(place), cv::NORM_INF), 5.0);
+}
+
+TEST(SeenBackground, BrightStrangersInFewFramesAreNoLight) {
+  // Brighter in one channel alone: no shadow's colours, so what most frames show is the place.
+  std::vector<ClipFrame> clip = wanderingSquare(12);
+  const cv::Rect place(60, 80, 20, 20);
+  for (int k = 0; k < 3; ++k) clip[k].bgr(place) += cv::Scalar(70, 0, 0);
+  const Background b = seenBackground(clip, true);
+  cv::Mat plate;
+  b.plate.convertTo(plate, CV_8U);
+  EXPECT_EQ(cv::norm(plate(place), emptyTable()(place), cv::NORM_INF), 0.0);
+}
+
 TEST(InventBackground, FillsOnlyTheHole) {
   Background b = seenBackground(wanderingSquare(1), false);
   const cv::Mat before = b.plate.clone(), hole = b.invented.clone();

@@ -93,6 +93,46 @@ TEST(Renderer, MovedObjectLeavesTheTableBehind) {
   EXPECT_GT(double(new_place[2]) / new_place[0], 1.7);
 }
 
+TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
+  // A mask that stops five pixels short of the ball's right side, as a stroke can leave it.
+  ClipFrame key = frameWithBall(ballAt(kCentre));
+  const cv::Rect box = cv::boundingRect(key.labels);
+  const cv::Rect missed(box.br().x - 5, box.y, 5, box.height);
+  const cv::Mat ball = key.labels(missed).clone();
+  key.labels(missed).setTo(0);
+  ClipSample clip;
+  clip.add(key);
+  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
+  FrameInput in;
+  in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera;
+  ObjectInFrame moved;
+  moved.name = "ball", moved.edited = true, moved.vertices = prepared->surfaces[0].key_vertices;
+  for (Eigen::Vector3f& x : moved.vertices) x.x() -= 0.3f;
+  in.objects = {moved};
+  const FrameOutput out = Renderer(prepared, params()).composite(in);
+  cv::Mat left_over;
+  cv::bitwise_and(ball != 0, out.provenance(missed) == kOriginal, left_over);
+  EXPECT_EQ(cv::countNonZero(left_over), 0);
+}
+
+TEST(Renderer, AMovedShadowTakesItsWholeEdgeAlong) {
+  const Setting s(params());
+  const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(true, {0.25f, 0.0f, 0.0f}));
+  const Actor original = makeActor(s.prepared->surfaces[0], s.prepared->surfaces[0].key_vertices, camera());
+  const ShadowMap sun({{&original.vertices, &original.surface->triangles}}, s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+  cv::Mat shaded = cv::Mat::zeros(kHeight, kWidth, CV_8U), edge;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto receiver = receiverAt(params().planes, camera(), u, v);
+      if (receiver && sun.visibility(receiver->position, receiver->normal) < 0.5f) shaded.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  ASSERT_GT(cv::countNonZero(shaded), 50);
+  cv::dilate(shaded, edge, cv::Mat::ones(7, 7, CV_8U));  // three pixels beyond the predicted shadow
+  cv::Mat kept = edge & (out.provenance == kOriginal);
+  EXPECT_LT(cv::countNonZero(kept), cv::countNonZero(edge) / 50);
+}
+
 TEST(Renderer, SameInputGivesSameBytes) {
   RenderParams p = params();
   p.add_noise = true;

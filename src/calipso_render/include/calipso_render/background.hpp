@@ -21,6 +21,7 @@ struct Background {
 
 struct BackgroundParams {
   int mask_margin_px = 3;      // masks are grown by this: mixed pixels and compression belong to the object
+  int shadow_margin_px = 7;    // predicted shadows are grown by this: penumbra, errors of light and model
   double shadow_step = 0.06;   // a pixel darker by more than this fraction may be shaded by an object
 };
 
@@ -31,8 +32,8 @@ struct BackgroundParams {
 Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_move,
                           const BackgroundParams& params = {});
 
-// Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects darken in
-// every frame), from the surroundings. Where the place moves by itself, the median is no picture of
+// Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects cover or
+// darken in every frame), from the surroundings. Where the place moves by itself, the median is no picture of
 // it: there the key frame is what the surroundings look like.
 void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& background);
 

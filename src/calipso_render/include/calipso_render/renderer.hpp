@@ -62,6 +62,7 @@ struct Prepared {
   std::vector<Appearance> appearances;
   LightFit light;
   std::vector<cv::Mat> fronts;      // per surface, CV_8UC1: places where something unmodelled stands before it
+  std::vector<cv::Mat> footprints;  // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
   Background background;
   cv::Mat plate_linear;             // CV_32FC3
   cv::Vec3f umbra = {0.4f, 0.4f, 0.4f};  // what the sun's absence leaves of a support plane's brightness
