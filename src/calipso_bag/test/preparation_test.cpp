@@ -55,6 +55,13 @@ TEST(Preparation, NobodyWaitsForAFailedNode) {
   EXPECT_EQ(preparation.failed(), std::vector<std::string>{"align"});
 }
 
+TEST(Preparation, WithoutASegmentationNobodyWaitsForTheAlignment) {
+  Preparation preparation;
+  preparation.update("align", at(NodeState::kStarting));
+  preparation.update("segmentation", at(NodeState::kFailed));
+  EXPECT_TRUE(preparation.keyFrameSettled());
+}
+
 TEST(Preparation, AFailedNodeStaysFailed) {
   Preparation preparation;
   preparation.fail("flow", "its process ended");

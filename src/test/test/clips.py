@@ -15,7 +15,7 @@ def example_folder():
     return os.path.join(rospkg.RosPack().get_path("calipso_launch"), "examples", "bananas")
 
 
-def make_scene(folder, frames, objects=1):
+def make_scene(folder, frames, objects=3):
     """The shipped scene with fewer frames and objects, in `folder`/scene."""
     source, scene = example_folder(), os.path.join(folder, "scene")
     shutil.copytree(source, scene)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The whole graph on a short clip of one banana, launched as a user would."""
+"""The whole graph on a short clip of the shipped example, launched as a user would."""
 
 import os
 import subprocess
@@ -43,6 +43,17 @@ class Graph(unittest.TestCase):
         if edits is not None:
             arguments["edits"] = clips.write_edits(self.folder.name, edits)
         return arguments
+
+    def test_a_segmentation_that_fails_lets_the_frames_pass(self):
+        with tempfile.TemporaryDirectory() as folder:
+            # The strokes name objects that this scene does not have.
+            scene = clips.make_scene(folder, FRAMES, objects=1)
+            arguments = dict(self.arguments("failed.bag", None), scene=scene)
+            status, output = launching.run("calipso_launch", "edit.launch", **arguments)
+        self.assertEqual(status, 0, output)
+        self.assertIn("segmentation failed", output)
+        self.assertEqual(clips.pixels(self.path("failed.bag"), EDITED),
+                         clips.pixels(self.bag, clips.IMAGE_TOPIC))
 
     def edit(self, out, edits=None):
         status, output = launching.run("calipso_launch", "edit.launch", **self.arguments(out, edits))

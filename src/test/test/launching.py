@@ -4,6 +4,7 @@ import os
 import signal
 import socket
 import subprocess
+import tempfile
 
 
 def free_port():
@@ -22,19 +23,25 @@ class Launch:
         master = master or "http://127.0.0.1:%d" % free_port()
         words = ["%s:=%s" % (name, value) for name, value in arguments.items()]
         environment = dict(os.environ, ROS_MASTER_URI=master, ROS_IP="127.0.0.1")
+        # A file, not a pipe: nodes that outlive roslaunch would keep a pipe open.
+        self.output = tempfile.TemporaryFile("w+")
         self.process = subprocess.Popen(
             ["roslaunch", package, file, *words], env=environment, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+            stdout=self.output, stderr=subprocess.STDOUT)
 
     def wait(self, timeout_sec=240):
         """(exit status, everything it printed)."""
         try:
-            output, _ = self.process.communicate(timeout=timeout_sec)
+            self.process.wait(timeout_sec)
         except subprocess.TimeoutExpired:
-            os.killpg(self.process.pid, signal.SIGKILL)
-            output, _ = self.process.communicate()
-            raise AssertionError("no end within %d s:\n%s" % (timeout_sec, output))
-        return self.process.returncode, output
+            self.process.send_signal(signal.SIGINT)  # roslaunch then ends its nodes
+            self.process.wait(60)
+            raise AssertionError("no end within %d s:\n%s" % (timeout_sec, self.printed()))
+        return self.process.returncode, self.printed()
+
+    def printed(self):
+        self.output.seek(0)
+        return self.output.read()
 
 
 def run(package, file, timeout_sec=240, **arguments):

@@ -37,7 +37,7 @@ class Preparation {
   // Marks a node as failed on its behalf, e.g. because its process ended.
   void fail(const std::string& node, const std::string& reason);
 
-  bool keyFrameSettled() const { return unsettled(roles_.key_frame).empty(); }
+  bool keyFrameSettled() const { return hopeless() || unsettled(roles_.key_frame).empty(); }
   bool allSettled() const { return hopeless() || unsettled(roles_.all).empty(); }
 
   // A node that every other one builds on has failed: there is nothing more to prepare.
