@@ -65,7 +65,9 @@ void FrameCompositor::keepRims(const cv::Mat& owner) {
       if (edited_[j] && j != i) foreign |= originalOf(static_cast<int>(j));
     }
     cv::dilate(foreign, foreign, disc(margin));
-    foreign.setTo(0, originalOf(static_cast<int>(i)));
+    cv::Mat own;
+    cv::dilate(originalOf(static_cast<int>(i)), own, disc(margin));
+    foreign.setTo(0, own);
     rim.setTo(0.0f, foreign);
     rims = cv::max(rims, rim);
   }
