@@ -1,0 +1,141 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "calipso_fem/embedding.hpp"
+#include "calipso_fem/voxel_grid.hpp"
+
+namespace calipso::fem {
+namespace {
+
+void appendBox(const Eigen::Vector3d& low, const Eigen::Vector3d& high, TriangleMesh* mesh) {
+  static const int kFaces[12][3] = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
+                                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  const int first = mesh->vertexCount(), face = mesh->triangleCount();
+  mesh->vertices.conservativeResize(first + 8, 3);
+  mesh->triangles.conservativeResize(face + 12, 3);
+  for (int c = 0; c < 8; ++c)
+    mesh->vertices.row(first + c) << (c & 1 ? high : low).x(), (c & 2 ? high : low).y(),
+        (c & 4 ? high : low).z();
+  for (int t = 0; t < 12; ++t)
+    mesh->triangles.row(face + t) << first + kFaces[t][0], first + kFaces[t][1], first + kFaces[t][2];
+}
+
+double filledVolume(const VoxelGrid& grid) {
+  return grid.fraction.sum() * std::pow(grid.cell_size, 3);
+}
+
+TEST(Voxelize, AlignedBoxIsExact) {
+  TriangleMesh mesh;
+  appendBox({0, 0, 0}, {1.0, 0.5, 0.25}, &mesh);
+  VoxelizeOptions options;
+  options.cell_size = 0.125;
+  const VoxelGrid grid = voxelize(mesh, options);
+  EXPECT_EQ(grid.cellCount(), 8 * 4 * 2);
+  EXPECT_EQ(grid.nodeCount(), 9 * 5 * 3);
+  EXPECT_NEAR(grid.fraction.minCoeff(), 1.0, 1e-12);
+  EXPECT_TRUE(grid.messages.empty());
+}
+
+TEST(Voxelize, CutCellsCarryTheirShare) {
+  TriangleMesh mesh;
+  appendBox({0.03, -0.01, 0.02}, {0.97, 0.49, 0.33}, &mesh);
+  VoxelizeOptions options;
+  options.cell_size = 0.1;
+  options.has_anchor = true;
+  const VoxelGrid grid = voxelize(mesh, options);
+  EXPECT_NEAR(filledVolume(grid), 0.94 * 0.5 * 0.31, 0.005 * 0.94 * 0.5 * 0.31);
+}
+
+TEST(Voxelize, NodeCountFollowsTheTarget) {
+  TriangleMesh mesh;
+  appendBox({0, 0, 0}, {1.0, 0.8, 0.6}, &mesh);
+  for (const int target : {200, 1000, 3000}) {
+    VoxelizeOptions options;
+    options.target_nodes = target;
+    EXPECT_NEAR(voxelize(mesh, options).nodeCount() / double(target), 1.0, 0.25);
+  }
+}
+
+TEST(Voxelize, OverlappingShellsAreOneSolidAndInwardFacesAreTurned) {
+  TriangleMesh mesh;
+  appendBox({0, 0, 0}, {1, 1, 1}, &mesh);
+  appendBox({0.5, 0.2, 0.2}, {1.5, 0.8, 0.8}, &mesh);
+  VoxelizeOptions options;
+  options.cell_size = 0.1;
+  const double volume = 1.0 + 0.5 * 0.36;
+  EXPECT_NEAR(filledVolume(voxelize(mesh, options)), volume, 0.01 * volume);
+  mesh.triangles.col(1).swap(mesh.triangles.col(2));
+  const VoxelGrid turned = voxelize(mesh, options);
+  EXPECT_NEAR(filledVolume(turned), volume, 0.01 * volume);
+  ASSERT_FALSE(turned.messages.empty());
+  EXPECT_NE(turned.messages[0].find("inwards"), std::string::npos);
+}
+
+TEST(Voxelize, OpenAndFlatMeshesAreCoveredWithAMessage) {
+  TriangleMesh box;
+  appendBox({0, 0, 0}, {1, 1, 1}, &box);
+  TriangleMesh open = box;
+  open.triangles = box.triangles.topRows(10).eval();
+  VoxelizeOptions options;
+  options.cell_size = 0.25;
+  const VoxelGrid grid = voxelize(open, options);
+  EXPECT_NEAR(filledVolume(grid), 1.0, 0.1);
+  EXPECT_FALSE(grid.messages.empty());
+
+  TriangleMesh sheet;
+  sheet.vertices.resize(4, 3);
+  sheet.vertices << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0;
+  sheet.triangles.resize(2, 3);
+  sheet.triangles << 0, 1, 2, 0, 2, 3;
+  const VoxelGrid flat = voxelize(sheet, options);
+  EXPECT_GE(flat.cellCount(), 16);
+  EXPECT_FALSE(flat.messages.empty());
+}
+
+TEST(Voxelize, BranchesThatShareACellAreNotWelded) {
+  TriangleMesh mesh;
+  // The gap is wider than a sixth of a cell, the spacing of the sight lines.
+  appendBox({0.0, 0.0, 0.0}, {2.0, 0.40, 0.5}, &mesh);
+  appendBox({0.0, 0.70, 0.0}, {2.0, 1.0, 0.5}, &mesh);
+  VoxelizeOptions options;
+  options.cell_size = 1.0;
+  options.has_anchor = true;
+  const VoxelGrid apart = voxelize(mesh, options);
+  EXPECT_EQ(apart.cellCount(), 4);
+  EXPECT_EQ(apart.nodeCount(), 24);
+  options.separate_branches = false;
+  EXPECT_EQ(voxelize(mesh, options).nodeCount(), 12);
+}
+
+TEST(Embedding, ReproducesPointsAndSumsToOne) {
+  TriangleMesh mesh;
+  appendBox({0.1, 0.2, 0.3}, {1.0, 0.7, 0.8}, &mesh);
+  VoxelizeOptions options;
+  options.cell_size = 0.13;
+  const VoxelGrid grid = voxelize(mesh, options);
+  const Embedding embedding = embed(mesh.vertices, grid);
+  const Eigen::VectorXd ones = embedding.weights * Eigen::VectorXd::Ones(grid.nodeCount());
+  EXPECT_LT((ones.array() - 1.0).abs().maxCoeff(), 1e-12);
+  EXPECT_LT((embedding.weights * grid.nodes - mesh.vertices).norm(), 1e-12);
+}
+
+TEST(Voxelize, RejectsBadInput) {
+  TriangleMesh mesh;
+  appendBox({0, 0, 0}, {1, 1, 1}, &mesh);
+  VoxelizeOptions options;
+  options.cell_size = -1.0;
+  EXPECT_THROW(voxelize(mesh, options), std::invalid_argument);
+  options.cell_size = 0.1;
+  TriangleMesh bad = mesh;
+  bad.vertices(0, 0) = std::nan("");
+  EXPECT_THROW(voxelize(bad, options), std::invalid_argument);
+  bad = mesh;
+  bad.triangles(0, 0) = 99;
+  EXPECT_THROW(voxelize(bad, options), std::invalid_argument);
+  EXPECT_THROW(voxelize(TriangleMesh{}, options), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace calipso::fem

@@ -1,0 +1,202 @@
+#include "hard_cases.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <random>
+#include <stdexcept>
+
+namespace calipso::fem {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// One run: the beam of the reference measurements, what is done to it, and for how long.
+struct Setup {
+  VolumeMesh mesh = boxMesh({0, 0, 0}, {1.0, 0.25, 0.25}, {16, 4, 4});
+  Material material{1e6, 0.3, 1000.0, 0.0};
+  FemOptions options;
+  double h = 1.0 / 30.0;
+  int steps = 150;
+  bool clamped = true;
+  bool loaded = false;   // work is done on it: energy growth means nothing
+  bool should_recover = true;
+  std::function<void(DeformableBody*)> start = [](DeformableBody*) {};
+  std::function<void(DeformableBody*, int)> before_step = [](DeformableBody*, int) {};
+};
+
+double sizeOf(const VolumeMesh& mesh) {
+  return (mesh.nodes.colwise().maxCoeff() - mesh.nodes.colwise().minCoeff()).norm();
+}
+
+// Moves every free node: rest position -> new position.
+void deform(DeformableBody* body, const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& map) {
+  Vec x = body->positions();
+  for (int i = 0; i < body->nodeCount(); ++i)
+    if (!body->isFixed(i)) x.segment<3>(3 * i) = map(body->model().mesh().node(i));
+  body->setState(x, Vec::Zero(x.size()));
+}
+
+void stretch(DeformableBody* body) {
+  deform(body, [](Eigen::Vector3d p) { return Eigen::Vector3d(3.0 * p.x(), p.y(), p.z()); });
+}
+
+void twist(DeformableBody* body) {
+  const Eigen::Vector3d axis(0.0, 0.125, 0.125);
+  deform(body, [axis](const Eigen::Vector3d& p) {
+    return Eigen::Vector3d(Eigen::AngleAxisd(4.0 * kPi * p.x(), Eigen::Vector3d::UnitX()) *
+                               (p - axis) + axis);
+  });
+}
+
+void squash(DeformableBody* body) {
+  deform(body, [](Eigen::Vector3d p) { return Eigen::Vector3d(p.x(), 0.125, p.z()); });
+}
+
+void scramble(DeformableBody* body) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  deform(body, [&](const Eigen::Vector3d&) {
+    const double a = unit(random), b = unit(random), c = unit(random);
+    return Eigen::Vector3d(a, 0.25 * b, 0.25 * c);
+  });
+}
+
+// The middle third is turned inside out along the beam.
+void invert(DeformableBody* body) {
+  deform(body, [](Eigen::Vector3d p) {
+    if (p.x() > 0.34 && p.x() < 0.67) p.x() = 1.01 - p.x();
+    return p;
+  });
+}
+
+void stiffnessRatio(DeformableBody* body) {
+  std::vector<Material> materials = body->model().cellMaterials();
+  for (std::size_t c = 0; c < materials.size(); ++c)
+    if ((c / 4) % 2) materials[c].youngs_modulus *= 1e6;
+  body->setCellMaterials(materials);
+  deform(body, [](Eigen::Vector3d p) {
+    return Eigen::Vector3d(p.x(), p.y() + 0.1 * p.x() * p.x(), p.z());
+  });
+}
+
+void changeOnline(DeformableBody* body, int step) {
+  Material m{1e6, 0.3, 1000.0, 0.0};
+  if (step == 20) body->setMaterial({1e3, 0.3, 1e6, 0.0});
+  if (step == 40) body->setMaterial(m);
+}
+
+void pullHard(DeformableBody* body) {
+  Vec f = Vec::Zero(3 * body->nodeCount());
+  std::vector<int> end;
+  for (int i = 0; i < body->nodeCount(); ++i)
+    if (body->model().mesh().nodes(i, 0) > 1.0 - 1e-9) end.push_back(i);
+  for (int i : end) f[3 * i] = 1000.0 * 9.81 * body->totalMass() / end.size();
+  body->setNodalForces(f);
+}
+
+void bump(DeformableBody* body) {
+  const double size = sizeOf(body->model().mesh());
+  deform(body, [size](Eigen::Vector3d p) {
+    p.y() += 0.3 * p.x() * p.x() / size;
+    return p;
+  });
+}
+
+Setup scaled(double length) {
+  Setup s;
+  s.mesh = boxMesh({0, 0, 0}, length * Eigen::Vector3d(1.0, 0.25, 0.25), {16, 4, 4});
+  s.start = bump;
+  return s;
+}
+
+Setup almostEmptyCells() {
+  Setup s;
+  for (int c = 0; c < s.mesh.cellCount(); ++c)
+    if (c / 16 % 4 == 3) s.mesh.fraction[c] = 1e-4;
+  s.start = stretch;
+  return s;
+}
+
+const std::map<std::string, std::function<Setup()>>& setups() {
+  static const auto with = [](auto change) {
+    return [change] {
+      Setup s;
+      change(&s);
+      return s;
+    };
+  };
+  static const std::map<std::string, std::function<Setup()>> kSetups = {
+      {"stretched 3x", with([](Setup* s) { s->start = stretch; })},
+      {"twisted by 720 degrees", with([](Setup* s) { s->start = twist; })},
+      {"squashed flat", with([](Setup* s) { s->start = squash; })},
+      {"every node at random", with([](Setup* s) { s->start = scramble; })},
+      {"inverted elements", with([](Setup* s) { s->start = invert; })},
+      {"nu = 0.499", with([](Setup* s) { s->material.poissons_ratio = 0.499; s->start = stretch; })},
+      {"stiffness ratio 1e6", with([](Setup* s) { s->start = stiffnessRatio; s->steps = 300; })},
+      {"mass x 1000, E x 0.001 and back",
+       with([](Setup* s) { s->start = bump; s->before_step = changeOnline; s->loaded = true; })},
+      {"h = 0.2 s", with([](Setup* s) { s->h = 0.2; s->start = stretch; })},
+      {"pulled by 1000 times its weight",
+       with([](Setup* s) { s->start = pullHard; s->loaded = true; s->should_recover = false; })},
+      {"filled fraction 1e-4", almostEmptyCells},
+      {"1 mm object", [] { return scaled(1e-3); }},
+      {"100 m object", [] { Setup s = scaled(100.0); s.steps = 3000; return s; }},
+  };
+  return kSetups;
+}
+
+double largestDistance(const Vec& a, const Vec& b) {
+  double largest = 0.0;
+  for (Eigen::Index k = 0; k < a.size(); k += 3)
+    largest = std::max(largest, (a.segment<3>(k) - b.segment<3>(k)).norm());
+  return largest;
+}
+
+}  // namespace
+
+std::vector<std::string> hardCaseNames() {
+  std::vector<std::string> names;
+  for (const auto& entry : setups()) names.push_back(entry.first);
+  return names;
+}
+
+HardCaseResult runHardCase(const std::string& name, MaterialModel material) {
+  const auto it = setups().find(name);
+  if (it == setups().end()) throw std::invalid_argument("hard case '" + name + "' is unknown");
+  Setup s = it->second();
+  s.options.material_model = material;
+  DeformableBody body(s.mesh, s.material, s.options);
+  for (int i = 0; s.clamped && i < body.nodeCount(); ++i)
+    if (s.mesh.nodes(i, 0) == 0.0) body.fixNode(i);
+  s.start(&body);
+  HardCaseResult r;
+  r.name = name;
+  r.nodes = body.nodeCount();
+  r.material = toString(material);
+  r.h = s.h;
+  r.should_recover = s.should_recover;
+  double energy = body.elasticEnergy() + body.kineticEnergy(), largest = energy;
+  const double size = sizeOf(s.mesh);
+  const Vec rest = restPositions(s.mesh);
+  for (; r.steps < s.steps; ++r.steps) {
+    s.before_step(&body, r.steps);
+    const StepReport report = body.step(s.h);
+    const double next = report.elastic_energy + report.kinetic_energy;
+    r.finite = r.finite && std::isfinite(next) && body.positions().allFinite();
+    if (!r.finite) break;
+    if (!s.loaded) r.energy_growth = std::max(r.energy_growth, (next - energy) / largest);
+    energy = next;
+    largest = std::max(largest, energy);
+    if (s.should_recover && r.steps > 50 && largestDistance(body.positions(), rest) < 1e-4 * size &&
+        body.isAtRest(1e-4 * size))
+      break;
+  }
+  r.displacement = largestDistance(body.positions(), rest) / size;
+  r.recovered = r.finite && r.displacement < 1e-3;
+  return r;
+}
+
+}  // namespace calipso::fem
