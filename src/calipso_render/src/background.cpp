@@ -14,7 +14,6 @@ constexpr float kNearMedian = 6.0f;     // code values; farther ones do not ente
 constexpr float kLit = 0.75f;           // quantile of brightness that stands for the unshaded value
 constexpr std::size_t kFewestLit = 3;   // samples that a lit or shaded group must have
 constexpr double kGroupGap = 4.0;       // gap between two groups, in spreads of either
-constexpr int kMostChanges = 2;         // a shadow that stays comes and perhaps goes; what flutters is none
 constexpr float kShadowTint = 1.8f;     // a shadow's largest ratio of shaded to lit in a channel over its smallest
 constexpr float kMovingSpread = 4.0f;   // code values: from there on a place moves by itself
 constexpr int kFewestMoving = 200;      // px; fewer are noise
@@ -65,17 +64,9 @@ bool darkenedAlike(const cv::Vec3b& shaded, const cv::Vec3b& lit) {
   return most < 1.0f && most < kShadowTint * least;
 }
 
-// How often values in time order cross a brightness.
-int crossings(const Samples& values, double limit) {
-  int count = 0;
-  for (std::size_t i = 1; i < values.size(); ++i) count += (brightness(values[i - 1]) < limit) != (brightness(values[i]) < limit);
-  return count;
-}
-
 // Brightness without shade. A shadow that stays can hold most of the samples; two clear groups
 // that differ as shade does tell it, however few the bright ones are.
-double litBrightness(double step, const Samples& in_time) {
-  Samples values = in_time;
+double litBrightness(double step, Samples values) {
   const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) { return brightness(a) < brightness(b); };
   std::stable_sort(values.begin(), values.end(), darker);
   const std::size_t n = values.size(), split = bestSplit(values);
@@ -85,8 +76,7 @@ double litBrightness(double step, const Samples& in_time) {
   const double gap = brightness(lit) - brightness(shaded);
   const double spread = std::max(groupSpread(values, 0, split), groupSpread(values, split, n));
   const bool apart = gap > std::max(step * brightness(lit), kGroupGap * spread);
-  const bool stays = crossings(in_time, 0.5 * (brightness(lit) + brightness(shaded))) <= kMostChanges;
-  return apart && stays && darkenedAlike(shaded, lit) ? brightness(lit) : usual;
+  return apart && darkenedAlike(shaded, lit) ? brightness(lit) : usual;
 }
 
 // Leaves out the darker group if the values fall into two.
