@@ -49,6 +49,7 @@ void NodeWatch::onStatus(const ros::MessageEvent<NodeStatus const>& event) {
   std::string& said = last_said_[status.node];
   if (said == status.message || status.message.empty()) return;
   said = status.message;
+  if (standing.state == NodeState::kFailed) return;  // the node has complained itself
   ROS_INFO_STREAM(status.node << ": " << said);
 }
 
