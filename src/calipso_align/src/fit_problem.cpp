@@ -132,7 +132,7 @@ Rows measure(const FitProblem& problem, const Points& x, const MeasureSettings& 
   const Rows depth =
       depthRows(problem.depth, x, problem.topology.triangles(), rendering, problem.camera,
                 {settings.depth_robust * problem.model_size,
-                 settings.depth_sigma * problem.model_size});
+                 settings.depth_sigma * problem.model_size, settings.depth_samples});
   const Rows support = supportRows(problem.supports, x, problem.camera,
                                    settings.support_sigma * problem.model_size);
   rows.insert(rows.end(), depth.begin(), depth.end());

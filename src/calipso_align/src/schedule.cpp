@@ -95,7 +95,11 @@ MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, 
   settings.contour_sigma_px = std::max(step.sigma * problem.extent_px, 0.5 + noise);
   settings.contour_correlation_px = 10.0;
   settings.depth_robust = step.depth_robust.at(iteration, step.fit.iterations);
-  settings.depth_sigma = 0.5 * step.sigma;
+  // What the stage's model cannot follow is the same in all measurements: none may drag the model
+  // out of another's reach.
+  settings.depth_sigma = step.sigma;
+  settings.depth_samples = problem.target.known_length_px / settings.contour_correlation_px;
+  settings.support_sigma = std::max(settings.support_sigma, 0.1 * step.sigma);
   if (step.literal) makeLiteral(settings);
   return settings;
 }

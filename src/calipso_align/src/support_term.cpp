@@ -1,5 +1,7 @@
 #include "calipso_align/support_term.hpp"
 
+#include <algorithm>
+
 namespace calipso::align {
 namespace {
 
@@ -46,14 +48,17 @@ std::optional<double> clearance(const SupportTarget& target, const Points& x,
 Rows supportRows(const std::vector<SupportTarget>& targets, const Points& x, const Camera& camera,
                  double sigma) {
   Rows rows;
-  const double weight = 1.0 / (sigma * sigma);
   for (const SupportTarget& target : targets) {
+    const size_t first = rows.size();
     const int lowest = target.stands ? lowestVertex(target, x, camera) : -1;
     for (int i = 0; i < x.rows(); ++i) {
       const double h = target.normal.dot(x.row(i)) - target.offset;
       if (i != lowest && (h >= 0.0 || !reachesUnder(target.plane, camera, x.row(i)))) continue;
-      rows.push_back({i, i, 1.0, 0.0, target.normal, h, weight});
+      rows.push_back({i, i, 1.0, 0.0, target.normal, h, 1.0});
     }
+    // One contact, however many vertices the mesh spends on it.
+    const double weight = 1.0 / (sigma * sigma * std::max<size_t>(1, rows.size() - first));
+    for (size_t k = first; k < rows.size(); ++k) rows[k].weight = weight;
   }
   return rows;
 }

@@ -35,6 +35,7 @@ struct MeasureSettings {
   double contour_correlation_px = 10.0;  // ... of which there is one every so many pixels
   double depth_robust = 0.05;            // in model sizes
   double depth_sigma = 0.003;            // in model sizes
+  double depth_samples = 200.0;          // how many independent measurements it is worth
   double support_sigma = 0.002;          // in model sizes
 };
 
