@@ -1,5 +1,6 @@
 #include "ros/segmentation_conversions.hpp"
 
+#include <boost/make_shared.hpp>
 #include <gtest/gtest.h>
 
 #include <string>

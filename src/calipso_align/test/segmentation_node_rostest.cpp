@@ -2,6 +2,7 @@
 #include <calipso_msgs/NodeStatus.h>
 #include <calipso_msgs/Segmentation.h>
 #include <cv_bridge/cv_bridge.h>
+#include <boost/make_shared.hpp>
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
@@ -34,9 +35,14 @@ class SegmentationNode : public ::testing::Test {
   SegmentationNode()
       : images_(nh_.advertise<sensor_msgs::Image>(topics::kClipImage, 100)),
         strokes_(nh_.advertise<sensor_msgs::Image>(topics::kStrokes, 1)),
-        segmentations_(
-            nh_.subscribe(topics::kSegmentation, 0, &SegmentationNode::onSegmentation, this)),
-        statuses_(nh_.subscribe(topics::kStatus, 0, &SegmentationNode::onStatus, this)) {}
+        statuses_(nh_.subscribe(topics::kStatus, 0, &SegmentationNode::onStatus, this)) {
+    listen();
+  }
+
+  void listen() {
+    segmentations_ =
+        nh_.subscribe(topics::kSegmentation, 0, &SegmentationNode::onSegmentation, this);
+  }
 
   void onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) { received_.push_back(msg); }
   void onStatus(const calipso_msgs::NodeStatusConstPtr& msg) { status_ = *msg; }
@@ -80,7 +86,7 @@ TEST_F(SegmentationNode, SegmentsTheKeyFrameTracksTheRestAndServesLateSubscriber
   // A new connection (this process had one already) is handed the key frame first.
   segmentations_.shutdown();
   received_.clear();
-  segmentations_ = nh_.subscribe(topics::kSegmentation, 0, &SegmentationNode::onSegmentation, this);
+  listen();
   waitFor([&] { return !received_.empty(); }, "the key frame, late");
   EXPECT_EQ(received_[0]->header.stamp, ros::Time(1.0));
   EXPECT_EQ(received_[0]->contours.size(), 1u);
