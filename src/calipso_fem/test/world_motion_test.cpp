@@ -86,7 +86,9 @@ TEST(WorldMotion, HundredfoldSofterSagsAndStaysOnTheTable) {
   const double before = world.state().objects[0].vertices.col(2).maxCoeff();
   play(world, 2.0);
   const auto after = world.state().objects[0].vertices;
-  EXPECT_LT(after.col(2).maxCoeff(), before - 1e-3);
+  // Its own weight shortens a column of height H by rho g H^2 / 2E, here 0.8 mm; half of it is asked
+  // for, since a bent rod does not stand on the table all along.
+  EXPECT_LT(after.col(2).maxCoeff(), before - 4e-4);
   EXPECT_GT(after.col(2).minCoeff(), -1e-3);
 }
 
