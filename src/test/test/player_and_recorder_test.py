@@ -79,6 +79,7 @@ class PlayerAndRecorder(unittest.TestCase):
     def test_a_dead_node_fails_the_run(self):
         status, output = self.echo(die_at=3)
         self.assertNotEqual(status, 0)
+        self.assertRegex(output, "process ended|no edited frame for")
         self.assertFalse(os.path.exists(self.path("out.bag")))
 
     def test_the_scene_gives_the_poses_that_the_bag_lacks(self):
