@@ -23,6 +23,44 @@ bool isSilhouette(const ScreenMesh& mesh, const MeshEdge& edge) {
   return (a > 0.0f) != (b > 0.0f);
 }
 
+// Edge functions and nearness of one triangle, linear in the picture, at all samples of a pixel at once.
+class Sampler {
+ public:
+  Sampler() = default;
+  Sampler(const Eigen::Vector3f* p, float area) {
+    near_ = {0.0f, 0.0f, 0.0f};
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3f &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
+      edges_[i] = {a.y() - b.y(), b.x() - a.x(), (b.y() - a.y()) * a.x() - (b.x() - a.x()) * a.y()};
+      near_ += edges_[i] * (p[i].z() / area);
+    }
+  }
+
+  void draw(int u, int v, std::uint32_t id, EdgeCoverage::Pixel& pixel) const {
+    constexpr float kReach = 0.375f;  // px from the centre to the outermost samples
+    float at_centre[3];
+    for (int i = 0; i < 3; ++i) {
+      at_centre[i] = edges_[i][0] * u + edges_[i][1] * v + edges_[i][2];
+      if (at_centre[i] < -kReach * (std::abs(edges_[i][0]) + std::abs(edges_[i][1]))) return;
+    }
+    const float near_centre = near_[0] * u + near_[1] * v + near_[2];
+    for (int s = 0; s < EdgeCoverage::kSamples; ++s) {
+      const Eigen::Vector2f d = EdgeCoverage::offset(s);
+      const float w0 = at_centre[0] + edges_[0][0] * d.x() + edges_[0][1] * d.y();
+      const float w1 = at_centre[1] + edges_[1][0] * d.x() + edges_[1][1] * d.y();
+      const float w2 = at_centre[2] + edges_[2][0] * d.x() + edges_[2][1] * d.y();
+      const float near = near_centre + near_[0] * d.x() + near_[1] * d.y();
+      const bool wins = (w0 >= 0.0f) & (w1 >= 0.0f) & (w2 >= 0.0f) & (near > pixel.nearness[s]);
+      pixel.nearness[s] = wins ? near : pixel.nearness[s];
+      pixel.ids[s] = wins ? id : pixel.ids[s];
+    }
+  }
+
+ private:
+  Eigen::Vector3f edges_[3];  // a u + b v + c >= 0 inside
+  Eigen::Vector3f near_;
+};
+
 }  // namespace
 
 std::vector<MeshEdge> meshEdges(const Triangles& triangles) {
@@ -98,30 +136,21 @@ void EdgeCoverage::drawTriangle(const ScreenMesh& mesh, int triangle, std::uint3
   float area = signedArea(mesh, t);
   if (std::isnan(p[0].z() + p[1].z() + p[2].z()) || !(std::abs(area) > 1e-9f)) return;
   if (area < 0.0f) std::swap(p[1], p[2]), area = -area;
-  const auto low = [](float a, float b, float c, int floor) {
-    return std::max(floor, static_cast<int>(std::floor(std::max(-1e6f, std::min({a, b, c})) + 0.5f)));
-  };
+  // From the pixel whose square holds the least coordinate to the one that holds the greatest.
+  const auto low = [](float a, float b, float c) { return static_cast<int>(std::clamp(std::min({a, b, c}) + 0.5f, 0.0f, 1e6f)); };
   const auto high = [](float a, float b, float c, int ceiling) {
-    return std::min(ceiling, static_cast<int>(std::floor(std::min(1e6f, std::max({a, b, c})) + 0.5f)));
+    return std::min(ceiling, static_cast<int>(std::clamp(std::max({a, b, c}) + 1.5f, 0.0f, 1e6f)) - 1);
   };
-  const int u0 = low(p[0].x(), p[1].x(), p[2].x(), 0);
-  const int u1 = high(p[0].x(), p[1].x(), p[2].x(), region_.width - 1);
-  const int v1 = high(p[0].y(), p[1].y(), p[2].y(), region_.height - 1);
-  for (int v = low(p[0].y(), p[1].y(), p[2].y(), 0); v <= v1; ++v) {
+  const int u0 = low(p[0].x(), p[1].x(), p[2].x()), u1 = high(p[0].x(), p[1].x(), p[2].x(), region_.width - 1);
+  const int v0 = low(p[0].y(), p[1].y(), p[2].y()), v1 = high(p[0].y(), p[1].y(), p[2].y(), region_.height - 1);
+  Sampler sampler;
+  bool ready = false;
+  for (int v = v0; v <= v1; ++v) {
+    const int* slots = &slots_[static_cast<std::size_t>(v) * region_.width];
     for (int u = u0; u <= u1; ++u) {
-      const int slot = slots_[static_cast<std::size_t>(v) * region_.width + u];
-      if (slot < 0) continue;
-      Pixel& pixel = pixels_[slot];
-      for (int s = 0; s < kSamples; ++s) {
-        const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(s);
-        const auto edge = [&](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-          return (b.x() - a.x()) * (x.y() - a.y()) - (b.y() - a.y()) * (x.x() - a.x());
-        };
-        const float w0 = edge(p[1], p[2]), w1 = edge(p[2], p[0]), w2 = edge(p[0], p[1]);
-        if (w0 < 0.0f || w1 < 0.0f || w2 < 0.0f) continue;
-        const float near = (w0 * p[0].z() + w1 * p[1].z() + w2 * p[2].z()) / area;
-        if (near > pixel.nearness[s]) pixel.nearness[s] = near, pixel.ids[s] = id;
-      }
+      if (slots[u] < 0) continue;
+      if (!ready) sampler = Sampler(p, area), ready = true;
+      sampler.draw(u, v, id, pixels_[slots[u]]);
     }
   }
 }

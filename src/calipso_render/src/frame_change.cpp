@@ -14,42 +14,34 @@ constexpr int kRimReach = 4;  // mask margins around a surface at rest in which 
 
 }  // namespace
 
-void FrameCompositor::measureSun() {
-  sun_now_ = cv::Mat(region_.size(), CV_32F, cv::Scalar(-1.0f));
-  sun_before_ = sun_now_.clone();
-  shaded_ = cv::Mat::zeros(region_.size(), CV_32F);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) {
-    for (int u = 0; u < region_.width; ++u) {
-      const auto r = receiverAt(params_.planes, frame_.camera, region_.x + u, region_.y + v);
-      if (!r) continue;
-      const float others = shadows_.others->visibility(r->position, r->normal);
-      const float original = shadows_.originals->visibility(r->position, r->normal);
-      sun_now_.at<float>(v, u) = others * moved_shadow_->visibility(r->position, r->normal);
-      sun_before_.at<float>(v, u) = others * original;
-      const float kept = luminance(shadowRatio(original, sky_before_.at<float>(v, u)));
-      shaded_.at<float>(v, u) = smoothStep(kSameRatio, kPlateRatio, 1.0f - kept);
-    }
-  }
+std::uint8_t changeOfLight(float before, float now) {
+  return static_cast<std::uint8_t>(255.0f * smoothStep(kSameRatio, kPlateRatio, std::abs(now - before)) + 0.5f);
 }
 
 // Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by some
 // pixels, so what lies that near to both the shadow and the change is taken from the plate.
 void FrameCompositor::findRelit() {
-  cv::Mat change = cv::Mat::zeros(region_.size(), CV_32F), shaded;
+  relit_ = cv::Mat::zeros(region_.size(), CV_32F);
+  const int reach = params_.background.shadow_margin_px, side = reach + 2;
+  cv::Rect box = shadows_.shaded_box;
+  if (box.empty()) return;
+  box = cv::Rect(box.x - side, box.y - side, box.width + 2 * side, box.height + 2 * side) & region_;
+  if (box.empty()) return;
+  cv::Mat change = cv::Mat::zeros(box.size(), CV_8U), relit;
 #pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) {
-    for (int u = 0; u < region_.width; ++u) {
-      if (sun_now_.at<float>(v, u) < 0.0f) continue;
-      const float now = luminance(shadowRatio(sun_now_.at<float>(v, u), sky_now_.at<float>(v, u)));
-      const float before = luminance(shadowRatio(sun_before_.at<float>(v, u), sky_before_.at<float>(v, u)));
-      change.at<float>(v, u) = smoothStep(kSameRatio, kPlateRatio, std::abs(now - before));
+  for (int v = 0; v < box.height; ++v) {
+    for (int u = 0; u < box.width; ++u) {
+      const cv::Point at = cv::Point(u, v) + box.tl() - region_.tl();
+      const float sun = sun_now_.at<float>(at), sun_before = sun_before_.at<float>(at);
+      if (sun < 0.0f) continue;
+      const float now = luminance(shadowRatio(sun, sky_now_.at<float>(at))), before = luminance(shadowRatio(sun_before, sky_before_.at<float>(at)));
+      change.at<std::uint8_t>(v, u) = changeOfLight(before, now);
     }
   }
-  const cv::Mat reach = disc(params_.background.shadow_margin_px);
-  cv::dilate(change, change, reach);
-  cv::dilate(shaded_, shaded, reach);
-  cv::blur(cv::min(change, shaded), relit_, {3, 3});
+  cv::dilate(change, change, disc(reach));
+  cv::min(change, shadows_.shaded(box), change);
+  change.convertTo(relit, CV_32F, 1.0 / 255.0);
+  cv::blur(relit, relit_(cv::Rect(box.tl() - region_.tl(), box.size())), {3, 3}, {-1, -1}, cv::BORDER_DEFAULT | cv::BORDER_ISOLATED);
 }
 
 // The rim of an original's pixels belongs to the surface beside it, not to another edited object's.
@@ -74,9 +66,32 @@ void FrameCompositor::keepRims(const cv::Mat& owner) {
   rims.copyTo(still_, owner < 0);
 }
 
+// The triangles with a point that may be at rest: the box around its corners' movements reaches zero.
+bool FrameCompositor::findResting(int slot, std::vector<bool>& can_rest) const {
+  const Actor& actor = actors_[slot];
+  can_rest.assign(actor.surface->triangles.size(), false);
+  if (observed_[slot].points.empty()) return false;
+  bool any = false;
+  for (std::size_t t = 0; t < can_rest.size(); ++t) {
+    Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
+    for (int i = 0; i < 3; ++i) {
+      const int vertex = actor.surface->triangles[t][i];
+      const Eigen::Array2f moved = (actor.screen.points[vertex] - observed_[slot].points[vertex]).head<2>();
+      low = low.min(moved), high = high.max(moved);
+    }
+    can_rest[t] = (low < kMovedPx).all() && (high > -kMovedPx).all();
+    any = any || can_rest[t];
+  }
+  return any;
+}
+
 void FrameCompositor::findStill() {
   still_ = cv::Mat::zeros(region_.size(), CV_32F);
   if (!params_.keep_still) return;
+  std::vector<std::vector<bool>> can_rest(actors_.size());
+  bool any = false;
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) any = findResting(static_cast<int>(slot), can_rest[slot]) || any;
+  if (!any) return;
   cv::Mat owner(region_.size(), CV_16S, cv::Scalar(-1));  // edited surface seen there
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) {
@@ -84,6 +99,7 @@ void FrameCompositor::findStill() {
       const std::uint32_t id = centre_->ids(v)[u];
       if (id == VisibilityBuffer::kNothing || !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]]) continue;
       owner.at<short>(v, u) = static_cast<short>(surface_of_slot_[VisibilityBuffer::objectOf(id)]);
+      if (!can_rest[VisibilityBuffer::objectOf(id)][VisibilityBuffer::triangleOf(id)]) continue;
       still_.at<float>(v, u) = stillness(id, u + region_.x, v + region_.y);
     }
   }

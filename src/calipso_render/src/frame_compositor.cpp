@@ -9,7 +9,6 @@ namespace calipso::render {
 namespace {
 
 constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
-constexpr float kMovedPx = 0.3f;        // moved more: drawn
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
 
 cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
@@ -46,7 +45,7 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   const SurfacePoint p = surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_);
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
   const Light& light = prepared_.light.light;
-  const float sun = newSun(p.position, p.normal);
+  const float sun = surfaceSun(p, id, u, v);
   const cv::Vec3f highlight = specularShading(light, appearance.gloss, p.normal, (eye_ - p.position).normalized(), sun);
   return appearance.radiance(p, diffuseShading(light, p.normal, sun), highlight);
 }
@@ -132,8 +131,8 @@ FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
 
 void FrameCompositor::composePixel(int u, int v, FrameOutput& out) const {
   const float still = still_.at<float>(v - region_.y, u - region_.x);
-  const Behind behind = behindAt(u, v);
   const Drawn drawn = drawnAt(u, v);
+  const Behind behind = drawn.cover < 1.0f ? behindAt(u, v) : Behind{};
   if (drawn.cover == 0.0f && behind.source == kOriginal) return;
   // Where the surface rests, the frame's own pixel is the best picture of it.
   const bool original_here = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;

@@ -7,16 +7,23 @@
 #include <vector>
 
 #include "calipso_render/renderer.hpp"
+#include "plane_view.hpp"
 
 namespace calipso::render {
 
-// Shadow maps that stay the same while the same objects are edited.
+// Light that stays the same while the same objects are edited under the same camera. Pictures are CV_32F of
+// the whole frame: the part of sun or sky that a support plane sees there.
 struct ShadowCache {
-  std::vector<bool> edited;              // per surface: which ones the maps are for
-  std::unique_ptr<Visibility> others;     // of what is not edited
-  std::unique_ptr<Visibility> originals;  // of the edited objects where the video has them
-  std::unique_ptr<Visibility> originals_sky;  // the same against the sky above the support plane
+  std::vector<bool> edited;            // per surface: which ones it is for
+  Camera camera;
+  std::unique_ptr<Visibility> others;  // of what is not edited
+  cv::Mat others_sun;                  // empty: nothing else casts a shadow
+  cv::Mat originals_sun, originals_sky;  // of the edited objects where the video has them
+  cv::Mat shaded;                      // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
+  cv::Rect shaded_box, bounds;         // of `shaded`; of all that the originals' shadows can reach
 };
+
+constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
 
 inline float smoothStep(float from, float to, float x) {
   const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
@@ -24,6 +31,9 @@ inline float smoothStep(float from, float to, float x) {
 }
 
 inline cv::Mat disc(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
+
+// How much a change of brightness calls for the plate: 0 not visible .. 255 only it.
+std::uint8_t changeOfLight(float before, float now);
 
 // One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.
 class FrameCompositor {
@@ -48,12 +58,19 @@ class FrameCompositor {
   void stage();
   bool restsAt(int surface) const;
   void prepareShadows();
+  void cacheOriginals(const std::vector<Occluder>& originals);
+  void cacheOthers(const std::vector<Occluder>& others);
+  cv::Mat sunOver(const Visibility& shadow, const cv::Rect& bounds) const;
+  cv::Mat skyOver(const Visibility& shadow, const cv::Rect& region) const;
   void chooseRegion();
   void findRemoved();
   void findPassingShadows();
   void drawVisibility();
   void findStill();
+  bool findResting(int slot, std::vector<bool>& can_rest) const;
   void keepRims(const cv::Mat& owner);
+  void findCovered();
+  void findSurfaceSun();
   void measureSky();
   void measureSun();
   void findRelit();
@@ -67,6 +84,7 @@ class FrameCompositor {
   cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
   float stillness(std::uint32_t id, float u, float v) const;
   float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
+  float surfaceSun(const SurfacePoint& p, std::uint32_t id, float u, float v) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
   cv::Rect shadowBounds(const Points& vertices) const;
@@ -89,17 +107,26 @@ class FrameCompositor {
   std::vector<ScreenMesh> observed_;          // per slot: where the video has it (edited objects at rest only)
   std::unique_ptr<Visibility> moved_shadow_;   // of the edited objects where they are now
   std::unique_ptr<Visibility> moved_sky_;
-  cv::Rect region_;
+  cv::Rect region_, moved_bounds_;  // what an edit can change; what the edited objects can shade now
   cv::Mat passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
-  cv::Mat sky_now_, sky_before_;  // CV_32FC1, at least region_: part of the sky that a support plane sees
+  cv::Mat covered_;  // CV_8UC1 over region_: 255 = so deep behind drawn surfaces that light there does not matter
+  cv::Mat sky_now_, sky_before_;  // CV_32FC1 over region_: part of the sky that a support plane sees
   cv::Mat sun_now_, sun_before_;  // CV_32FC1 over region_: the same of the sun; negative where there is no plane
-  cv::Mat shaded_;   // CV_32FC1 over region_: 1 = the edited objects darken it in the video
   cv::Mat relit_;    // CV_32FC1 over region_: 1 = the original's shadow, to be taken from the plate
+  // Squares of kSunStep px over region_: the corners' sun on the surfaces where all four agree; kMixedSun elsewhere.
+  struct SunSquare {
+    float sun;
+    int slot;
+    float near_0, near_u, near_v;  // nearness at the first corner and its slopes, 1/m and 1/(m px)
+  };
+  std::vector<SunSquare> sun_squares_;
+  int sun_columns_ = 0;
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;
   Eigen::Vector3f eye_;
+  PlaneView plane_view_;
   NoiseField noise_;
 };
 

@@ -5,7 +5,6 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "calipso_render/ray_shadow.hpp"
 #include "frame_compositor.hpp"
 #include "view_warp.hpp"
 
@@ -13,27 +12,9 @@ namespace calipso::render {
 namespace {
 
 constexpr int kRegionMargin = 8;       // px
-constexpr int kShadowMapSide = 512;    // texels, live
-constexpr int kSkyMapSide = 128;       // the same for the sky, which is soft
-constexpr int kSkyStep = 4;            // px between places where the sky is measured
 constexpr double kRestOverlap = 0.95;  // of masks: the object is where the key frame has it
 constexpr float kDarker = 0.97f;       // of the plate's brightness: a passing shadow
 constexpr float kQuiet = 5.0f;         // code values of spread over time: the background rests
-constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
-
-// The sky over a support plane as one wide light: near contact an object hides much of it.
-std::unique_ptr<Visibility> skyShadowOf(const std::vector<Occluder>& all, const RenderParams& params) {
-  const std::vector<Occluder> occluders = params.planes.empty() ? std::vector<Occluder>{} : all;
-  const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
-  if (params.quality == Quality::kFinal) return std::make_unique<RayShadow>(occluders, up, RayShadow::Params{kSkyRadius, 48});
-  return std::make_unique<ShadowMap>(occluders, up, ShadowMap::Params{kSkyMapSide, kSkyRadius, 24});
-}
-
-std::unique_ptr<Visibility> shadowOf(const std::vector<Occluder>& occluders, const Light& light, const RenderParams& params) {
-  const Eigen::Vector3d direction = light.direction.cast<double>();
-  if (params.quality == Quality::kFinal) return std::make_unique<RayShadow>(occluders, direction, RayShadow::Params{params.sun_radius, 24});
-  return std::make_unique<ShadowMap>(occluders, direction, ShadowMap::Params{kShadowMapSide, params.sun_radius, 16});
-}
 
 }  // namespace
 
@@ -41,7 +22,8 @@ FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& p
                                  ShadowCache& shadows)
     : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows),
       labels_(frame.labels.empty() ? prepared.key_labels : frame.labels),
-      eye_(frame.camera.world_from_camera.translation().cast<float>()), noise_(frame.stamp_ns) {
+      eye_(frame.camera.world_from_camera.translation().cast<float>()),
+      plane_view_(params.planes, frame.camera), noise_(frame.stamp_ns) {
   if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");
 }
 
@@ -55,10 +37,12 @@ FrameOutput FrameCompositor::run() {
   findRemoved();
   drawVisibility();
   findStill();
+  findCovered();
   measureSky();
   measureSun();
   findRelit();
-#pragma omp parallel for schedule(static)
+  findSurfaceSun();
+#pragma omp parallel for schedule(dynamic, 8)
   for (int v = region_.y; v < region_.y + region_.height; ++v) {
     for (int u = region_.x; u < region_.x + region_.width; ++u) composePixel(u, v, out);
   }
@@ -115,66 +99,6 @@ bool FrameCompositor::restsAt(int surface) const {
   return cv::countNonZero(now & key) > kRestOverlap * cv::countNonZero(now | key);
 }
 
-// The sky changes slowly over a support plane: measured on a grid, interpolated between.
-void FrameCompositor::measureSky() {
-  const cv::Size size(region_.width / kSkyStep + 2, region_.height / kSkyStep + 2);
-  sky_now_ = cv::Mat(size, CV_32F, cv::Scalar(1.0f));
-  sky_before_ = sky_now_.clone();
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < size.height; ++v) {
-    for (int u = 0; u < size.width; ++u) {
-      const auto r = receiverAt(params_.planes, frame_.camera, region_.x + u * kSkyStep, region_.y + v * kSkyStep);
-      if (!r) continue;
-      sky_now_.at<float>(v, u) = moved_sky_->visibility(r->position, r->normal);
-      sky_before_.at<float>(v, u) = shadows_.originals_sky->visibility(r->position, r->normal);
-    }
-  }
-  cv::resize(sky_now_, sky_now_, {}, kSkyStep, kSkyStep, cv::INTER_LINEAR);
-  cv::resize(sky_before_, sky_before_, {}, kSkyStep, kSkyStep, cv::INTER_LINEAR);
-}
-
-void FrameCompositor::prepareShadows() {
-  std::vector<Occluder> moved, others, originals;
-  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
-    auto& list = edited_[surface_of_slot_[slot]] ? moved : others;
-    list.push_back({&actors_[slot].vertices, &actors_[slot].surface->triangles});
-  }
-  for (std::size_t i = 0; i < edited_.size(); ++i) {
-    const Surface& s = prepared_.surfaces[i];
-    if (edited_[i] && !prepared_.moves[i]) originals.push_back({&s.key_vertices, &s.triangles});
-  }
-  const Light& light = prepared_.light.light;
-  moved_shadow_ = shadowOf(moved, light, params_);
-  moved_sky_ = skyShadowOf(moved, params_);
-  const bool others_rest = std::find(prepared_.moves.begin(), prepared_.moves.end(), true) == prepared_.moves.end();
-  if (shadows_.others && shadows_.edited == edited_ && others_rest) return;
-  shadows_.edited = edited_;
-  shadows_.others = shadowOf(others, light, params_);
-  shadows_.originals = shadowOf(originals, light, params_);
-  shadows_.originals_sky = skyShadowOf(originals, params_);
-}
-
-// Pixels onto which the sun can cast the vertices' shadow on a support plane.
-cv::Rect FrameCompositor::shadowBounds(const Points& vertices) const {
-  const Eigen::Vector3f l = prepared_.light.light.direction;
-  Points shadow;
-  for (const SupportPlane& plane : params_.planes) {
-    const Eigen::Vector3f n = plane.normal.cast<float>();
-    const float slope = n.dot(l);
-    if (slope < 0.02f) continue;
-    for (const Eigen::Vector3f& p : vertices) {
-      const float height = n.dot(p) - static_cast<float>(plane.offset);
-      if (height < -kHeightTolerance) continue;
-      const float spread = params_.sun_radius * height / (slope * slope);
-      const Eigen::Vector3f foot = p - l * (height / slope);
-      for (const Eigen::Vector3f& side : {Eigen::Vector3f(n.unitOrthogonal()), Eigen::Vector3f(n.cross(n.unitOrthogonal()))}) {
-        shadow.push_back(foot + spread * side), shadow.push_back(foot - spread * side);
-      }
-    }
-  }
-  return boundsOf(projectMesh(shadow, {}, frame_.camera), kRegionMargin, frame_.bgr.size());
-}
-
 void FrameCompositor::chooseRegion() {
   const cv::Size size = frame_.bgr.size();
   const cv::Rect all(0, 0, size.width, size.height);
@@ -182,13 +106,12 @@ void FrameCompositor::chooseRegion() {
     if (!edited_[i]) continue;
     const cv::Rect box = cv::boundingRect(labels_ == prepared_.surfaces[i].index);
     if (!box.empty()) region_ |= cv::Rect(box.x - kRegionMargin, box.y - kRegionMargin, box.width + 2 * kRegionMargin, box.height + 2 * kRegionMargin);
-    if (!prepared_.moves[i]) region_ |= shadowBounds(prepared_.surfaces[i].key_vertices);
   }
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     if (!edited_[surface_of_slot_[slot]]) continue;
     region_ |= boundsOf(actors_[slot].screen, kRegionMargin, size);
-    region_ |= shadowBounds(actors_[slot].vertices);
   }
+  region_ |= shadows_.bounds | moved_bounds_;
   if (!passing_.empty()) region_ |= cv::boundingRect(passing_);
   region_ &= all;
 }

@@ -12,6 +12,16 @@ constexpr int kBands = 8;               // rows are split in fixed bands: the re
 constexpr float kEdgeTolerance = 1e-3f; // px; shared edges belong to both sides, so no cracks
 constexpr float kSmallestArea = 1e-9f;  // px^2
 
+// Without SSE 4.1 std::floor and std::ceil are calls; |x| must fit an int.
+int floorInt(float x) {
+  const int i = static_cast<int>(x);
+  return i - (static_cast<float>(i) > x);
+}
+int ceilInt(float x) {
+  const int i = static_cast<int>(x);
+  return i + (static_cast<float>(i) < x);
+}
+
 // A triangle made ready for row spans: edge functions a u + b v + c >= 0 inside, nearness plane.
 struct Span {
   float a[3], b[3], c[3];
@@ -34,18 +44,19 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Span
   const float area = (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) -
                      (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
   if (!(std::abs(area) > kSmallestArea) || std::isnan(p[0].z() + p[1].z() + p[2].z())) return false;
-  span.row_min = std::max(0, static_cast<int>(std::ceil(top - kEdgeTolerance)));
-  span.row_max = std::min(region.height - 1, static_cast<int>(std::floor(bottom + kEdgeTolerance)));
-  span.column_min = std::max(0, static_cast<int>(std::ceil(left - kEdgeTolerance)));
-  span.column_max = std::min(region.width - 1, static_cast<int>(std::floor(right + kEdgeTolerance)));
+  span.row_min = ceilInt(std::max(0.0f, top - kEdgeTolerance));
+  span.row_max = floorInt(std::min(region.height - 1.0f, bottom + kEdgeTolerance));
+  span.column_min = ceilInt(std::max(0.0f, left - kEdgeTolerance));
+  span.column_max = floorInt(std::min(region.width - 1.0f, right + kEdgeTolerance));
   if (span.row_min > span.row_max || span.column_min > span.column_max) return false;
   const float sign = area > 0 ? 1.0f : -1.0f;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f& s = p[(i + 1) % 3];
     const Eigen::Vector3f& e = p[(i + 2) % 3];
-    const float length = std::hypot(e.x() - s.x(), e.y() - s.y()) + 1e-12f;
-    span.a[i] = sign * (s.y() - e.y()) / length;
-    span.b[i] = sign * (e.x() - s.x()) / length;
+    const float dx = e.x() - s.x(), dy = e.y() - s.y();
+    const float scale = sign / (std::sqrt(dx * dx + dy * dy) + 1e-12f);
+    span.a[i] = -dy * scale;
+    span.b[i] = dx * scale;
     span.c[i] = -(span.a[i] * s.x() + span.b[i] * s.y()) + kEdgeTolerance;
   }
   const float dz1 = p[1].z() - p[0].z(), dz2 = p[2].z() - p[0].z();
@@ -64,8 +75,8 @@ void rowLimits(const Span& s, float v, int& from, int& to) {
     else if (s.a[i] < -1e-9f) high = std::min(high, -rest / s.a[i]);
     else if (rest < 0.0f) high = low - 1.0f;
   }
-  from = static_cast<int>(std::ceil(low));
-  to = static_cast<int>(std::floor(high));
+  from = ceilInt(low);
+  to = high < low ? from - 1 : floorInt(high);
 }
 
 void fillRow(const Span& s, int row, int from, int to, std::uint32_t* ids, float* nearest) {
@@ -86,8 +97,11 @@ ScreenMesh projectMesh(const Points& world, const Triangles& triangles, const Ca
   mesh.triangles = &triangles;
   mesh.points.resize(world.size());
   const float nan = std::numeric_limits<float>::quiet_NaN();
+  const Eigen::Matrix3d R = camera_from_world.linear();
+  const Eigen::Vector3d t = camera_from_world.translation();
+#pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < world.size(); ++i) {
-    const Eigen::Vector3d p = camera_from_world * world[i].cast<double>();
+    const Eigen::Vector3d p = R * world[i].cast<double>() + t;
     if (!(p.z() > kNearPlane)) {
       mesh.points[i].setConstant(nan);
       continue;
@@ -119,14 +133,14 @@ VisibilityBuffer::VisibilityBuffer(const cv::Rect& region)
     : region_(region), ids_(region.area(), kNothing), near_(region.area(), kFar) {}
 
 void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
-  std::vector<Span> spans;
-  spans.reserve(mesh.triangles->size());
-  Span span;
-  for (int t = 0; t < static_cast<int>(mesh.triangles->size()); ++t) {
-    if (!makeSpan(mesh, t, region_, span)) continue;
-    span.id = (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t);
-    spans.push_back(span);
+  const int count = static_cast<int>(mesh.triangles->size());
+  std::vector<Span> spans(count);
+#pragma omp parallel for schedule(static)
+  for (int t = 0; t < count; ++t) {
+    if (makeSpan(mesh, t, region_, spans[t])) spans[t].id = (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t);
+    else spans[t].row_max = -1;
   }
+  spans.erase(std::remove_if(spans.begin(), spans.end(), [](const Span& s) { return s.row_max < 0; }), spans.end());
 #pragma omp parallel for schedule(static)
   for (int band = 0; band < kBands; ++band) {
     const int first = region_.height * band / kBands;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace calipso::render {
 namespace {
@@ -53,24 +54,82 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
     buffer.draw(mesh, 0);
   }
   heights_.assign(buffer.nearness(0), buffer.nearness(0) + static_cast<std::size_t>(width_) * height_);
+  buildLevels();
 }
 
-float ShadowMap::heightAt(float s, float t) const {
-  const int i = static_cast<int>(std::floor(s + 0.5f)), j = static_cast<int>(std::floor(t + 0.5f));
-  if (i < 0 || j < 0 || i >= width_ || j >= height_) return VisibilityBuffer::kFar;
-  return heights_[static_cast<std::size_t>(j) * width_ + i];
+void ShadowMap::buildLevels() {
+  const Extremes nothing{VisibilityBuffer::kFar, VisibilityBuffer::kFar};
+  const auto merge = [](Extremes& into, const Extremes& e) {
+    into.lowest = std::min(into.lowest, e.lowest), into.highest = std::max(into.highest, e.highest);
+  };
+  const Extremes none{std::numeric_limits<float>::max(), VisibilityBuffer::kFar};
+  std::vector<Extremes> own(heights_.size());
+  for (std::size_t i = 0; i < own.size(); ++i) own[i] = {heights_[i], heights_[i]};
+  int width = width_, height = height_, shrink = 1 << kFirstLevel;
+  while (levels_.empty() || std::max(levels_.back().width, levels_.back().height) > 2) {
+    const int w = (width + shrink - 1) / shrink, h = (height + shrink - 1) / shrink;
+    std::vector<Extremes> next(static_cast<std::size_t>(w) * h, none);
+    for (int j = 0; j < height; ++j) {
+      const Extremes* row = &own[static_cast<std::size_t>(j) * width];
+      Extremes* out = &next[static_cast<std::size_t>(j / shrink) * w];
+      for (int i = 0; i < width; ++i) merge(out[i / shrink], row[i]);
+    }
+    Level level{w, h, std::vector<Extremes>(next.size())};
+    for (int j = 0; j < h; ++j) {
+      for (int i = 0; i < w; ++i) {
+        const bool rim = i == 0 || j == 0 || i + 1 == w || j + 1 == h;
+        Extremes e = rim ? nothing : none;  // beyond the map there is nothing
+        for (int b = std::max(0, j - 1); b <= std::min(h - 1, j + 1); ++b) {
+          for (int a = std::max(0, i - 1); a <= std::min(w - 1, i + 1); ++a) merge(e, next[static_cast<std::size_t>(b) * w + a]);
+        }
+        level.cells[static_cast<std::size_t>(j) * w + i] = e;
+      }
+    }
+    levels_.push_back(std::move(level));
+    own = std::move(next), width = w, height = h, shrink = 2;
+  }
 }
 
-// Fraction of the four nearest texels that lie above `height`, weighted bilinearly.
-float ShadowMap::coveredAt(float s, float t, float height) const {
-  const float fs = std::floor(s), ft = std::floor(t);
-  const int i = static_cast<int>(fs), j = static_cast<int>(ft);
-  if (i < 0 || j < 0 || i + 1 >= width_ || j + 1 >= height_) return 0.0f;
-  const float* row = &heights_[static_cast<std::size_t>(j) * width_ + i];
-  const float a = row[0] > height, b = row[1] > height, c = row[width_] > height,
-              d = row[width_ + 1] > height;
-  const float x = s - fs, y = t - ft;
-  return (a * (1 - x) + b * x) * (1 - y) + (c * (1 - x) + d * x) * y;
+// Bounds of the heights within `reach` texels.
+ShadowMap::Extremes ShadowMap::around(float s, float t, float reach) const {
+  std::size_t level = 0;
+  int shift = kFirstLevel;
+  while (level + 1 < levels_.size() && static_cast<float>(1 << shift) < reach) ++level, ++shift;
+  const Level& l = levels_[level];
+  if (static_cast<float>(1 << shift) < reach) return {VisibilityBuffer::kFar, highest_};
+  const int i = std::clamp(static_cast<int>(s) >> shift, 0, l.width - 1), j = std::clamp(static_cast<int>(t) >> shift, 0, l.height - 1);
+  Extremes e = l.cells[static_cast<std::size_t>(j) * l.width + i];
+  if (s < 0.0f || t < 0.0f || s >= width_ || t >= height_) e.lowest = VisibilityBuffer::kFar;
+  return e;
+}
+
+// Blockers' mean height, then the covered fraction of the penumbra it sets. kInside: all taps are in the map.
+template <bool kInside>
+float ShadowMap::filtered(float s, float t, float h, float search) const {
+  const auto outside = [&](int i, int j, int more) { return i < 0 || j < 0 || i + more >= width_ || j + more >= height_; };
+  constexpr float kUp = 16384.0f;  // makes the truncation to int a floor
+  constexpr int kDown = 16384;
+  float sum = 0.0f;
+  int blockers = 0;
+  for (const Eigen::Vector2f& d : pattern_) {
+    const int i = static_cast<int>(s + search * d.x() + (kUp + 0.5f)) - kDown, j = static_cast<int>(t + search * d.y() + (kUp + 0.5f)) - kDown;
+    if (!kInside && outside(i, j, 0)) continue;
+    const float above = heights_[static_cast<std::size_t>(j) * width_ + i] - h;
+    if (above > 0.0f) sum += above, ++blockers;
+  }
+  if (blockers == 0) return 1.0f;
+  const float radius = std::max(1.0f, angular_radius_ * sum / blockers / texel_);
+  float covered = 0.0f;
+  for (const Eigen::Vector2f& d : pattern_) {
+    const float x = s + radius * d.x(), y = t + radius * d.y();
+    const int i = static_cast<int>(x + kUp) - kDown, j = static_cast<int>(y + kUp) - kDown;
+    if (!kInside && outside(i, j, 1)) continue;
+    const float* row = &heights_[static_cast<std::size_t>(j) * width_ + i];
+    const float a = row[0] > h, b = row[1] > h, c = row[width_] > h, e = row[width_ + 1] > h;
+    const float fx = x - i, fy = y - j;
+    covered += (a + (b - a) * fx) * (1.0f - fy) + (c + (e - c) * fx) * fy;
+  }
+  return 1.0f - covered / pattern_.size();
 }
 
 float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
@@ -85,17 +144,12 @@ float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   // Blockers inside the cone that the disc spans up to the highest occluder.
   const float search = std::max(1.5f, angular_radius_ * (highest_ - h) / texel_);
   if (s < -search || t < -search || s > width_ + search || t > height_ + search) return 1.0f;
-  float sum = 0.0f;
-  int blockers = 0;
-  for (const Eigen::Vector2f& d : pattern_) {
-    const float height = heightAt(s + search * d.x(), t + search * d.y());
-    if (height > h) sum += height - h, ++blockers;
-  }
-  if (blockers == 0) return 1.0f;
-  const float radius = std::max(1.0f, angular_radius_ * sum / blockers / texel_);
-  float covered = 0.0f;
-  for (const Eigen::Vector2f& d : pattern_) covered += coveredAt(s + radius * d.x(), t + radius * d.y(), h);
-  return 1.0f - covered / pattern_.size();
+  const Extremes near = around(s, t, search + 2.0f);
+  if (near.highest <= h) return 1.0f;
+  if (near.lowest > h) return 0.0f;
+  const float reach = search + 2.0f;
+  const bool inside = s > reach && t > reach && s + reach < width_ && t + reach < height_;
+  return inside ? filtered<true>(s, t, h, search) : filtered<false>(s, t, h, search);
 }
 
 }  // namespace calipso::render

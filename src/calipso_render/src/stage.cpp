@@ -1,5 +1,6 @@
 #include "calipso_render/stage.hpp"
 
+#include <cmath>
 #include <stdexcept>
 
 namespace calipso::render {
@@ -60,18 +61,22 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
 SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye) {
   const Eigen::Vector3i& t = actor.surface->triangles[triangle];
   const Eigen::Vector3f w = barycentric(actor.screen, triangle, u, v);
+  const Eigen::Vector3f &a = actor.vertices[t[0]], &b = actor.vertices[t[1]], &c = actor.vertices[t[2]];
   const auto mix = [&](const Points& x) -> Eigen::Vector3f {
     return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]];
   };
+  const auto unit = [](const Eigen::Vector3f& x) -> Eigen::Vector3f {
+    const float squared = x.squaredNorm();
+    return squared > 0.0f ? Eigen::Vector3f(x * (1.0f / std::sqrt(squared))) : x;
+  };
   SurfacePoint point;
-  point.position = mix(actor.vertices);
-  point.normal = mix(actor.normals).normalized();
+  point.position = w[0] * a + w[1] * b + w[2] * c;
+  point.normal = unit(mix(actor.normals));
   point.key_position = mix(actor.surface->key_vertices);
-  point.key_normal = mix(actor.surface->key_normals).normalized();
+  point.key_normal = unit(mix(actor.surface->key_normals));
   // Sheets are seen from both sides.
   if (point.normal.dot(eye - point.position) < 0.0f) {
-    const Eigen::Vector3f& a = actor.vertices[t[0]];
-    const Eigen::Vector3f face = (actor.vertices[t[1]] - a).cross(actor.vertices[t[2]] - a);
+    const Eigen::Vector3f face = (b - a).cross(c - a);
     if (face.dot(eye - point.position) < 0.0f) point.normal = -point.normal, point.key_normal = -point.key_normal;
   }
   return point;

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <omp.h>
+
 #include <opencv2/imgproc.hpp>
 
+#include "plane_view.hpp"
 #include "render_test_scene.hpp"
 
 namespace calipso::render {
@@ -142,6 +145,40 @@ TEST(Renderer, SameInputGivesSameBytes) {
   second.composite(s.input(true, {0.2f, 0.0f, 0.0f}));  // what was drawn before must not matter
   const FrameOutput b = second.composite(s.input(true, {0.05f, 0.0f, 0.1f}));
   EXPECT_EQ(cv::norm(a.bgr, b.bgr, cv::NORM_INF), 0.0);
+}
+
+TEST(Renderer, SameBytesForAnyNumberOfThreads) {
+  RenderParams p = params();
+  p.add_noise = true;
+  const int usual = omp_get_max_threads();
+  std::vector<cv::Mat> pictures;
+  for (const int threads : {1, 2, 5}) {
+    omp_set_num_threads(threads);
+    const Setting s(p);
+    pictures.push_back(Renderer(s.prepared, p).composite(s.input(true, {0.05f, 0.0f, 0.1f})).bgr);
+  }
+  omp_set_num_threads(usual);
+  EXPECT_EQ(cv::norm(pictures[0], pictures[1], cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(pictures[0], pictures[2], cv::NORM_INF), 0.0);
+}
+
+TEST(PlaneView, AgreesWithTheReceiverOfEveryPixel) {
+  SupportPlane shelf;
+  shelf.normal = Eigen::Vector3d(0.2, 0.0, 1.0).normalized(), shelf.offset = 0.05, shelf.x_range = Eigen::Vector2d(-0.1, 0.2);
+  std::vector<SupportPlane> planes = table();
+  planes.push_back(shelf);
+  const PlaneView view(planes, camera());
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      Receiver found{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+      const bool seen = view.at(u, v, found);
+      const auto expected = receiverAt(planes, camera(), u, v);
+      ASSERT_EQ(seen, expected.has_value()) << u << ", " << v;
+      if (!seen) continue;
+      ASSERT_LT((found.position - expected->position).norm(), 1e-5f * (1.0f + expected->position.norm())) << u << ", " << v;
+      ASSERT_LT((found.normal - expected->normal).norm(), 1e-6f) << u << ", " << v;
+    }
+  }
 }
 
 TEST(Renderer, NearerObjectHidesTheOther) {

@@ -30,14 +30,27 @@ class ShadowMap : public Visibility {
   float texel() const { return texel_; }
 
  private:
-  float heightAt(float s, float t) const;
-  float coveredAt(float s, float t, float height) const;
+  // Lowest and highest of the 3 x 3 cells around a cell; cells of 2^(kFirstLevel + level) texels.
+  struct Extremes {
+    float lowest, highest;
+  };
+  struct Level {
+    int width = 0, height = 0;
+    std::vector<Extremes> cells;
+  };
+  static constexpr int kFirstLevel = 2;
+
+  void buildLevels();
+  Extremes around(float s, float t, float reach) const;
+  template <bool kInside>
+  float filtered(float s, float t, float h, float search) const;
 
   Eigen::Vector3f origin_, axis_s_, axis_t_, axis_h_;
   float texel_ = 0.0f, angular_radius_ = 0.0f, highest_ = 0.0f;
   int width_ = 0, height_ = 0;
   std::vector<Eigen::Vector2f> pattern_;  // unit disc
   std::vector<float> heights_;            // towards the light, m
+  std::vector<Level> levels_;             // tell at once where all is lit or all is shaded
 };
 
 }  // namespace calipso::render

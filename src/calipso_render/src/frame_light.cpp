@@ -1,0 +1,233 @@
+// The part of FrameCompositor that measures the light of a frame: sun and sky on the support planes, before and
+// after the edit, and the sun on the drawn surfaces.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+#include "calipso_render/ray_shadow.hpp"
+#include "frame_compositor.hpp"
+#include "view_warp.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kShadowMapSide = 512;    // texels, live
+constexpr int kSkyMapSide = 128;       // the same for the sky, which is soft
+constexpr int kSkySteps = 160;         // places along the picture's width where the sky is measured
+constexpr int kSunStep = 4;            // px between the corners of the squares in which surfaces are lit alike
+constexpr int kShadowBoundsMargin = 8;     // px
+constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
+constexpr float kMixedSun = -1.0f;         // a square whose corners differ, or a corner that tells nothing
+
+int skyStep(const cv::Size& picture) { return std::max(4, picture.width / kSkySteps); }
+
+// The sky over a support plane as one wide light: near contact an object hides much of it.
+std::unique_ptr<Visibility> skyShadowOf(const std::vector<Occluder>& all, const RenderParams& params) {
+  const std::vector<Occluder> occluders = params.planes.empty() ? std::vector<Occluder>{} : all;
+  const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
+  if (params.quality == Quality::kFinal) return std::make_unique<RayShadow>(occluders, up, RayShadow::Params{kSkyRadius, 48});
+  return std::make_unique<ShadowMap>(occluders, up, ShadowMap::Params{kSkyMapSide, kSkyRadius, 24});
+}
+
+std::unique_ptr<Visibility> shadowOf(const std::vector<Occluder>& occluders, const Light& light, const RenderParams& params) {
+  const Eigen::Vector3d direction = light.direction.cast<double>();
+  if (params.quality == Quality::kFinal) return std::make_unique<RayShadow>(occluders, direction, RayShadow::Params{params.sun_radius, 24});
+  return std::make_unique<ShadowMap>(occluders, direction, ShadowMap::Params{kShadowMapSide, params.sun_radius, 16});
+}
+
+float valueOrOne(const cv::Mat& picture, int u, int v) { return picture.empty() ? 1.0f : picture.at<float>(v, u); }
+
+}  // namespace
+
+void FrameCompositor::prepareShadows() {
+  std::vector<Occluder> moved, others, originals;
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
+    auto& list = edited_[surface_of_slot_[slot]] ? moved : others;
+    list.push_back({&actors_[slot].vertices, &actors_[slot].surface->triangles});
+  }
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    const Surface& s = prepared_.surfaces[i];
+    if (edited_[i] && !prepared_.moves[i]) originals.push_back({&s.key_vertices, &s.triangles});
+  }
+  moved_shadow_ = shadowOf(moved, prepared_.light.light, params_);
+  moved_sky_ = skyShadowOf(moved, params_);
+  for (const Occluder& o : moved) moved_bounds_ |= shadowBounds(*o.vertices);
+  const bool same = shadows_.others && shadows_.edited == edited_ && sameView(shadows_.camera, frame_.camera);
+  const bool others_rest = std::find(prepared_.moves.begin(), prepared_.moves.end(), true) == prepared_.moves.end();
+  if (!same) cacheOriginals(originals);
+  if (!same || !others_rest) cacheOthers(others);
+  shadows_.edited = edited_, shadows_.camera = frame_.camera;
+}
+
+void FrameCompositor::cacheOthers(const std::vector<Occluder>& others) {
+  shadows_.others = shadowOf(others, prepared_.light.light, params_);
+  cv::Rect bounds;
+  for (const Occluder& o : others) bounds |= shadowBounds(*o.vertices);
+  shadows_.others_sun = bounds.empty() ? cv::Mat() : sunOver(*shadows_.others, bounds);
+}
+
+void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
+  const cv::Rect whole({0, 0}, frame_.bgr.size());
+  shadows_.bounds = {};
+  for (const Occluder& o : originals) shadows_.bounds |= shadowBounds(*o.vertices);
+  shadows_.originals_sun = shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadowOf(originals, prepared_.light.light, params_), shadows_.bounds);
+  shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_32F, cv::Scalar(1.0f)) : skyOver(*skyShadowOf(originals, params_), whole);
+  shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < whole.height; ++v) {
+    Receiver r;
+    for (int u = 0; u < whole.width; ++u) {
+      const float sun = valueOrOne(shadows_.originals_sun, u, v), sky = shadows_.originals_sky.at<float>(v, u);
+      if ((sun == 1.0f && sky == 1.0f) || !plane_view_.at(u, v, r)) continue;
+      shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(1.0f, luminance(shadowRatio(sun, sky)));
+    }
+  }
+  cv::dilate(shadows_.shaded, shadows_.shaded, disc(params_.background.shadow_margin_px));
+  shadows_.shaded_box = cv::boundingRect(shadows_.shaded);
+}
+
+cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds) const {
+  cv::Mat sun(frame_.bgr.size(), CV_32F, cv::Scalar(1.0f));
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = bounds.y; v < bounds.br().y; ++v) {
+    Receiver r;
+    for (int u = bounds.x; u < bounds.br().x; ++u) {
+      if (plane_view_.at(u, v, r)) sun.at<float>(v, u) = shadow.visibility(r.position, r.normal);
+    }
+  }
+  return sun;
+}
+
+// The sky changes slowly over a support plane: measured on a grid that hangs on the picture, interpolated between.
+cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region) const {
+  const int step = skyStep(frame_.bgr.size());
+  const cv::Point first(region.x / step, region.y / step);
+  cv::Mat grid((region.br().y - 1) / step - first.y + 2, (region.br().x - 1) / step - first.x + 2, CV_32F, cv::Scalar(1.0f));
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int j = 0; j < grid.rows; ++j) {
+    Receiver r;
+    for (int i = 0; i < grid.cols; ++i) {
+      if (plane_view_.at((first.x + i) * step, (first.y + j) * step, r)) grid.at<float>(j, i) = shadow.visibility(r.position, r.normal);
+    }
+  }
+  cv::Mat sky(region.size(), CV_32F), line(1, grid.cols, CV_32F);
+  for (int v = 0; v < region.height; ++v) {
+    const int j = (region.y + v) / step - first.y;
+    const float y = static_cast<float>((region.y + v) % step) / step;
+    for (int i = 0; i < grid.cols; ++i) line.at<float>(i) = (1.0f - y) * grid.at<float>(j, i) + y * grid.at<float>(j + 1, i);
+    float* out = sky.ptr<float>(v);
+    int i = 0, rest = region.x % step;
+    for (int u = 0; u < region.width; ++u) {
+      const float x = static_cast<float>(rest) / step;
+      out[u] = (1.0f - x) * line.at<float>(i) + x * line.at<float>(i + 1);
+      if (++rest == step) rest = 0, ++i;
+    }
+  }
+  return sky;
+}
+
+// Pixels onto which the sun can cast the vertices' shadow on a support plane.
+cv::Rect FrameCompositor::shadowBounds(const Points& vertices) const {
+  const Eigen::Vector3f l = prepared_.light.light.direction;
+  Points shadow;
+  for (const SupportPlane& plane : params_.planes) {
+    const Eigen::Vector3f n = plane.normal.cast<float>();
+    const float slope = n.dot(l);
+    if (slope < 0.02f) continue;
+    const Eigen::Vector3f side = n.unitOrthogonal(), other = n.cross(side);
+    for (const Eigen::Vector3f& p : vertices) {
+      const float height = n.dot(p) - static_cast<float>(plane.offset);
+      if (height < -kHeightTolerance) continue;
+      const float spread = params_.sun_radius * height / (slope * slope);
+      const Eigen::Vector3f foot = p - l * (height / slope);
+      shadow.insert(shadow.end(), {foot + spread * side, foot - spread * side, foot + spread * other, foot - spread * other});
+    }
+  }
+  return boundsOf(projectMesh(shadow, {}, frame_.camera), kShadowBoundsMargin, frame_.bgr.size());
+}
+
+void FrameCompositor::findCovered() {
+  covered_ = cv::Mat::zeros(region_.size(), CV_8U);
+  for (int v = 0; v < region_.height; ++v) {
+    const std::uint32_t* ids = centre_->ids(v);
+    for (int u = 0; u < region_.width; ++u) {
+      if (isDrawn(ids[u], u + region_.x, v + region_.y)) covered_.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  const int side = 2 * (params_.background.shadow_margin_px + 2) + 1;
+  cv::erode(covered_, covered_, cv::Mat::ones(side, side, CV_8U));
+}
+
+void FrameCompositor::measureSky() {
+  sky_now_ = skyOver(*moved_sky_, region_);
+  sky_before_ = shadows_.originals_sky(region_);
+}
+
+void FrameCompositor::measureSun() {
+  sun_now_ = cv::Mat(region_.size(), CV_32F, cv::Scalar(-1.0f));
+  sun_before_ = sun_now_.clone();
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = 0; v < region_.height; ++v) {
+    Receiver r;
+    for (int u = 0; u < region_.width; ++u) {
+      const cv::Point at(u + region_.x, v + region_.y);
+      if (covered_.at<std::uint8_t>(v, u) != 0 || !plane_view_.at(at.x, at.y, r)) continue;
+      const float others = valueOrOne(shadows_.others_sun, at.x, at.y);
+      const float moved = moved_bounds_.contains(at) ? moved_shadow_->visibility(r.position, r.normal) : 1.0f;
+      sun_now_.at<float>(v, u) = others * moved;
+      sun_before_.at<float>(v, u) = others * valueOrOne(shadows_.originals_sun, at.x, at.y);
+    }
+  }
+}
+
+// The sun on the drawn surfaces at the corners of small squares; where all four see all or nothing of it, so do the
+// points between that lie on the same smooth piece of surface.
+void FrameCompositor::findSurfaceSun() {
+  struct Corner {
+    float sun = kMixedSun, near = 0.0f;
+    int slot = -1;
+  };
+  const int columns = region_.width / kSunStep + 2, rows = region_.height / kSunStep + 2;
+  std::vector<Corner> corners(static_cast<std::size_t>(columns) * rows);
+#pragma omp parallel for schedule(dynamic, 2)
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      const int u = region_.x + i * kSunStep, v = region_.y + j * kSunStep;
+      const std::uint32_t id = centre_->idAt(u, v);
+      if (!region_.contains({u, v}) || !isDrawn(id, u, v)) continue;
+      const SurfacePoint p = surfacePoint(actors_[VisibilityBuffer::objectOf(id)], VisibilityBuffer::triangleOf(id), u, v, eye_);
+      if (p.normal.dot(prepared_.light.light.direction) <= 0.0f) continue;
+      corners[static_cast<std::size_t>(j) * columns + i] = {newSun(p.position, p.normal), centre_->nearnessAt(u, v), VisibilityBuffer::objectOf(id)};
+    }
+  }
+  sun_columns_ = columns - 1;
+  sun_squares_.assign(static_cast<std::size_t>(sun_columns_) * (rows - 1), {kMixedSun, -1, 0, 0, 0});
+  for (int j = 0; j + 1 < rows; ++j) {
+    for (int i = 0; i + 1 < columns; ++i) {
+      const Corner *a = &corners[static_cast<std::size_t>(j) * columns + i], *b = a + 1, *c = a + columns, *d = c + 1;
+      const bool alike = (a->sun == 0.0f || a->sun == 1.0f) && a->sun == b->sun && a->sun == c->sun && a->sun == d->sun;
+      if (!alike || a->slot != b->slot || a->slot != c->slot || a->slot != d->slot) continue;
+      sun_squares_[static_cast<std::size_t>(j) * sun_columns_ + i] = {a->sun, a->slot, a->near, (b->near - a->near) / kSunStep, (c->near - a->near) / kSunStep};
+    }
+  }
+}
+
+// @param u, v the pixel, or a place in it
+float FrameCompositor::surfaceSun(const SurfacePoint& p, std::uint32_t id, float u, float v) const {
+  if (p.normal.dot(prepared_.light.light.direction) <= 0.0f) return 0.0f;  // lit from behind
+  const int iu = static_cast<int>(u), iv = static_cast<int>(v);
+  if (static_cast<float>(iu) == u && static_cast<float>(iv) == v) {
+    const int du = iu - region_.x, dv = iv - region_.y;
+    const SunSquare& s = sun_squares_[static_cast<std::size_t>(dv / kSunStep) * sun_columns_ + du / kSunStep];
+    if (s.sun >= 0.0f && s.slot == VisibilityBuffer::objectOf(id)) {
+      const float near = centre_->nearness(dv)[du], expected = s.near_0 + (du % kSunStep) * s.near_u + (dv % kSunStep) * s.near_v;
+      if (std::abs(near - expected) * frame_.camera.fx < kSunStep * near) return s.sun;
+    }
+  }
+  return newSun(p.position, p.normal);
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,22 @@
+#include "plane_view.hpp"
+
+#include <limits>
+
+namespace calipso::render {
+
+PlaneView::PlaneView(const std::vector<SupportPlane>& planes, const Camera& camera) {
+  const Eigen::Matrix3d R = camera.world_from_camera.linear();
+  const Eigen::Vector3d eye = camera.world_from_camera.translation();
+  eye_ = eye.cast<float>();
+  ray_0_ = (R * camera.ray(0.0, 0.0)).cast<float>();
+  ray_u_ = (R.col(0) / camera.fx).cast<float>();
+  ray_v_ = (R.col(1) / camera.fy).cast<float>();
+  constexpr float kNoLimit = std::numeric_limits<float>::max();
+  for (const SupportPlane& p : planes) {
+    Plane plane{p.normal.cast<float>(), static_cast<float>(p.offset - p.normal.dot(eye)), -kNoLimit, kNoLimit};
+    if (p.x_range) plane.x_min = static_cast<float>(p.x_range->x()), plane.x_max = static_cast<float>(p.x_range->y());
+    planes_.push_back(plane);
+  }
+}
+
+}  // namespace calipso::render

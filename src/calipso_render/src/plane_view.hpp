@@ -1,0 +1,41 @@
+#pragma once
+
+#include <vector>
+
+#include "calipso_render/stage.hpp"
+
+namespace calipso::render {
+
+// The support planes as one camera sees them: receiverAt() for many pixels.
+class PlaneView {
+ public:
+  PlaneView(const std::vector<SupportPlane>& planes, const Camera& camera);
+
+  // @return false where no plane is seen
+  bool at(float u, float v, Receiver& receiver) const {
+    const Eigen::Vector3f ray = ray_0_ + u * ray_u_ + v * ray_v_;
+    float nearest = 1e30f;
+    for (const Plane& plane : planes_) {
+      const float slope = plane.normal.dot(ray);
+      if (slope >= -1e-9f) continue;  // seen from below, or never
+      const float depth = plane.height / slope;
+      const float x = eye_.x() + depth * ray.x();
+      if (depth <= 0.0f || depth >= nearest || x < plane.x_min || x > plane.x_max) continue;
+      nearest = depth;
+      receiver.normal = plane.normal;
+    }
+    receiver.position = eye_ + nearest * ray;
+    return nearest < 1e30f;
+  }
+
+ private:
+  struct Plane {
+    Eigen::Vector3f normal;
+    float height;        // of the plane over the eye, m (negative: the eye is above it)
+    float x_min, x_max;  // world, m
+  };
+  std::vector<Plane> planes_;
+  Eigen::Vector3f eye_, ray_0_, ray_u_, ray_v_;  // world; a pixel's sight line is ray_0 + u ray_u + v ray_v
+};
+
+}  // namespace calipso::render
