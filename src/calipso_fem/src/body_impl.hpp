@@ -56,6 +56,18 @@ struct DeformableBody::Impl {
   BlockMatrix viscosity;
   bool system_valid = false;             // A holds the last step's system
 
+  // A step taken in parts (body_stepwise.cpp)
+  struct Trial {
+    double h = 0.0;
+    Integrator integrator;
+    Vec loads, targets, y;
+    Vec slope;   // gradient at y without contact; empty when y has moved since
+    StepReport report;
+  };
+  std::optional<Trial> trial;
+  Trial& runningTrial();
+  const Vec& trialGradient();
+
   void initialise(const Material& material);
   double damping() const { return model->cellMaterials().front().damping; }
 
@@ -95,7 +107,7 @@ struct DeformableBody::Impl {
   void finishReport(StepReport* report) const;
   void invalidateSystem();
   // A^-1 of the last step's system times impulses on the nodes (N s): change of velocity, m/s.
-  Vec velocityChange(Vec impulses, double h);
+  Vec velocityChange(Vec impulses, double h, double tolerance);
 };
 
 // Rows and columns of the given dofs become those of the identity matrix times a typical diagonal.

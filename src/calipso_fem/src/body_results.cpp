@@ -62,7 +62,7 @@ bool DeformableBody::isAtRest(double speed) const {
 }
 
 // A of body_system.cpp is the velocity system divided by h (backward Euler: inertia = rate / h).
-Vec DeformableBody::Impl::velocityChange(Vec impulses, double h) {
+Vec DeformableBody::Impl::velocityChange(Vec impulses, double h, double tolerance) {
   if (!(h > 0.0)) throw std::invalid_argument("compliance: h must be > 0 s");
   if (!system_valid) {
     viscosity = BlockMatrix(model->pattern());
@@ -77,17 +77,22 @@ Vec DeformableBody::Impl::velocityChange(Vec impulses, double h) {
   }
   maskResidual(&impulses);
   Vec w = Vec::Zero(impulses.size());
-  solver->solve(impulses, options.linear_tolerance, options.linear_iterations, &w);
+  solver->solve(impulses, tolerance, options.linear_iterations, &w);
   return w / (h * h);
 }
 
 Vec DeformableBody::complianceColumn(const SurfacePoint& point, const Vector3d& direction,
                                      double h) const {
+  return complianceColumn(point, direction, h, impl_->options.linear_tolerance);
+}
+
+Vec DeformableBody::complianceColumn(const SurfacePoint& point, const Vector3d& direction, double h,
+                                     double tolerance) const {
   Vec b = Vec::Zero(impl_->x.size());
   const Eigen::SparseVector<double> weights = impl_->embedding.pointWeights(point);
   for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
     b.segment<3>(3 * it.index()) += it.value() * direction;
-  return impl_->velocityChange(std::move(b), h);
+  return impl_->velocityChange(std::move(b), h, tolerance);
 }
 
 Eigen::MatrixXd DeformableBody::compliance(const std::vector<SurfacePoint>& points,
@@ -120,7 +125,7 @@ void DeformableBody::applyImpulses(const std::vector<SurfacePoint>& points,
     for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
       b.segment<3>(3 * it.index()) += it.value() * impulses[k];
   }
-  if (!b.isZero(0.0)) impl_->v += impl_->velocityChange(std::move(b), h);
+  if (!b.isZero(0.0)) impl_->v += impl_->velocityChange(std::move(b), h, impl_->options.linear_tolerance);
 }
 
 // The grid follows its surface: rest nodes X + d with J d = new - old vertices in the least-squares

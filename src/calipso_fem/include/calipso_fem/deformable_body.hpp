@@ -112,6 +112,22 @@ class DeformableBody {
   StepReport step(double h);               // h > 0, s. @throw std::invalid_argument
   StepReport solveStatic();                // equilibrium under the present loads; velocities zero
 
+  // One step in parts, so that what depends on where it ends (contact) can be solved along with it:
+  // beginStep(), then trialDirection() and moveTrial() until trialResidual() is small, endStep().
+  // contact_forces: 3n, N; they act in addition to the loads and may differ from call to call.
+  void beginStep(double h);                // h > 0, s; the trial starts at the present positions
+  const Vec& trialPositions() const;       // 3n, m
+  // Newton direction d of the incremental potential with the forces held: A d = forces - gradient.
+  Vec trialDirection(const Vec& contact_forces);
+  // A^-1 times nodal forces, A as of the last trialDirection(): change of the trial positions, m.
+  Vec trialResponse(const Vec& forces);
+  double trialPotential(const Vec& positions, const Vec& contact_forces) const;
+  double trialResidual(const Vec& contact_forces) const;  // over loads and inner forces
+  // How far towards `positions` the potential falls: 1, 1/2, 1/4 ...; 0 when it does not.
+  double trialStepLength(const Vec& positions, const Vec& contact_forces) const;
+  void moveTrial(const Vec& positions);
+  StepReport endStep(const Vec& contact_forces);   // the trial becomes the state
+
   // Results
   Vec surfaceVertices() const;             // J x, 3 #V, m
   Vec surfaceVelocities() const;           // J v, 3 #V, m/s
@@ -126,6 +142,9 @@ class DeformableBody {
   // Columns w = A^-1 J^T n of the last step's system A = M + h D + h^2 K: the velocity change per
   // unit impulse at a surface point along a direction (Saupin et al. 2008). 3n, m/s per N s.
   Vec complianceColumn(const SurfacePoint& point, const Eigen::Vector3d& direction, double h) const;
+  // The same, to a relative accuracy of `tolerance` only.
+  Vec complianceColumn(const SurfacePoint& point, const Eigen::Vector3d& direction, double h,
+                       double tolerance) const;
   // W_ij = n_i^T J_i A^-1 J_j^T n_j for all pairs of given points and directions.
   Eigen::MatrixXd compliance(const std::vector<SurfacePoint>& points,
                              const std::vector<Eigen::Vector3d>& directions, double h) const;

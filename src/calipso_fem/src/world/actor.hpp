@@ -53,6 +53,7 @@ struct Actor {
   std::optional<ObjectKind> forced_kind;
   std::string reason = "no edit touches it";
   bool edited = false, removed = false;
+  bool inserted = false;  // not in the video
   Holder holder = Holder::kUnknown;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();            // m/s^2
   Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();           // m/s^2

@@ -57,17 +57,28 @@ void BulletWorld::forgiveOverlapOf(int id) {
 }
 
 void BulletWorld::forget(int id) {
+  const auto concerns = [&](const Pair& pair) { return pair.first == id || pair.second == id; };
+  for (auto it = touching_.begin(); it != touching_.end();)
+    it = concerns(*it) ? touching_.erase(it) : std::next(it);
   for (auto it = forgiven_.begin(); it != forgiven_.end();)
-    it = it->first.first == id || it->first.second == id ? forgiven_.erase(it) : std::next(it);
+    it = concerns(it->first) ? forgiven_.erase(it) : std::next(it);
 }
 
 void BulletWorld::adjust(btManifoldPoint& point, const btPersistentManifold& manifold, double h,
                          double forgiven) {
   point.setDistance(point.getDistance() + forgiven);
-  if (point.m_combinedRestitution <= 0.0 || point.getDistance() <= 0.0) return;
+  const Pair pair = pairOf(manifold);
+  const auto surface = pair_surface_.find(pair);
+  if (surface != pair_surface_.end()) {
+    if (surface->second.friction) point.m_combinedFriction = *surface->second.friction;
+    if (surface->second.restitution) point.m_combinedRestitution = *surface->second.restitution;
+  }
   const double closing =
       point.m_normalWorldOnB.dot(velocityAt(manifold.getBody1(), point.getPositionWorldOnB()) -
                                  velocityAt(manifold.getBody0(), point.getPositionWorldOnA()));
+  double& fastest = closing_[pair];
+  fastest = std::max(fastest, closing);
+  if (point.m_combinedRestitution <= 0.0 || point.getDistance() <= 0.0) return;
   if (closing < getSolverInfo().m_restitutionVelocityThreshold) return;
   const bool meet = point.getDistance() <= closing * h;
   point.setDistance(meet ? 0.0 : 1e3 * closing * h);
@@ -75,6 +86,7 @@ void BulletWorld::adjust(btManifoldPoint& point, const btPersistentManifold& man
 
 void BulletWorld::solveConstraints(btContactSolverInfo& info) {
   std::map<Pair, double> depth;
+  closing_.clear();
   for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
     btPersistentManifold& manifold = *getDispatcher()->getManifoldByIndexInternal(i);
     const auto found = forgiven_.find(pairOf(manifold));
@@ -94,8 +106,36 @@ void BulletWorld::solveConstraints(btContactSolverInfo& info) {
   btDiscreteDynamicsWorld::solveConstraints(info);
 }
 
+void BulletWorld::setPairSurface(const Pair& pair, std::optional<double> friction,
+                                 std::optional<double> restitution) {
+  if (friction || restitution)
+    pair_surface_[pair] = {friction, restitution};
+  else
+    pair_surface_.erase(pair);
+}
+
+void BulletWorld::findTouches() {
+  std::set<Pair> touching;
+  new_touches_.clear();
+  for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
+    const btPersistentManifold& manifold = *getDispatcher()->getManifoldByIndexInternal(i);
+    for (int k = 0; k < manifold.getNumContacts(); ++k) {
+      const btManifoldPoint& point = manifold.getContactPoint(k);
+      if (point.m_appliedImpulse <= 0.0) continue;
+      const Pair pair = pairOf(manifold);
+      if (touching.insert(pair).second && touching_.count(pair) == 0)
+        new_touches_.push_back({manifold.getBody0()->getUserIndex(),
+                                manifold.getBody1()->getUserIndex(), point.getPositionWorldOnB(),
+                                point.m_normalWorldOnB, closing_[pair]});
+      break;
+    }
+  }
+  touching_ = std::move(touching);
+}
+
 void BulletWorld::substep(double h) {
   stepSimulation(h, 0);
+  findTouches();
   std::set<const btCollisionObject*> touched;
   for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
     const btPersistentManifold& manifold = *getDispatcher()->getManifoldByIndexInternal(i);

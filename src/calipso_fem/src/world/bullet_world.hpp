@@ -4,8 +4,10 @@
 
 #include <Eigen/Geometry>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
+#include <vector>
 
 // Bullet's world with the three things the simulator needs beyond it. Private to the rigid world.
 namespace calipso::fem {
@@ -32,14 +34,32 @@ class BulletWorld : public btDiscreteDynamicsWorld {
   // Detects contacts, and forgives `id` the depth it has in others.
   void forgiveOverlapOf(int id);
   void forget(int id);
+  void setPairSurface(const Pair& pair, std::optional<double> friction,
+                      std::optional<double> restitution);
   void substep(double h);
+
+  // Pairs that push on each other since the last sub-step, and did not before.
+  struct Touch {
+    int a = 0, b = 0;  // user indices
+    btVector3 position, normal;
+    double approach_speed = 0.0;  // m/s
+  };
+  const std::vector<Touch>& newTouches() const { return new_touches_; }
 
  private:
   void solveConstraints(btContactSolverInfo& info) override;
   void adjust(btManifoldPoint& point, const btPersistentManifold& manifold, double h,
               double forgiven);
+  void findTouches();
 
   std::map<Pair, double> forgiven_;  // m
+  struct PairSurface {
+    std::optional<double> friction, restitution;
+  };
+  std::map<Pair, PairSurface> pair_surface_;
+  std::map<Pair, double> closing_;  // m/s, of the pairs near each other, before they are solved
+  std::set<Pair> touching_;
+  std::vector<Touch> new_touches_;
 };
 
 }  // namespace calipso::fem

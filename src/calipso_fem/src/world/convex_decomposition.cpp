@@ -142,6 +142,9 @@ Part makePart(Triangles triangles, const Box& box, const Solid& solid) {
 std::vector<TriangleMesh> decomposeConvex(const TriangleMesh& mesh,
                                           const DecompositionParams& params) {
   const TriangleMesh whole = convexHull(mesh.vertices);  // also refuses flat meshes
+  // A closed mesh that fills its hull needs no grid to be known as convex.
+  if (isClosed(mesh) && std::abs(signedVolume(mesh)) > (1.0 - 1e-6) * hullVolume(whole))
+    return {whole};
   Box box;
   for (int i = 0; i < mesh.vertexCount(); ++i) box.extend(mesh.vertex(i));
   const Solid solid(mesh, params.grid);

@@ -34,12 +34,7 @@ void validate(const RigidBodySpec& spec) {
       !(spec.mass.mass > 0.0 && std::isfinite(spec.mass.mass)))
     throw std::invalid_argument(spec.name + ": mass = " + std::to_string(spec.mass.mass) +
                                 " kg; must be positive and finite");
-  const SurfaceSettings& s = spec.surface;
-  if (!(s.friction >= 0.0) || !(s.rolling_friction >= 0.0) ||
-      !(s.restitution >= 0.0 && s.restitution <= 1.0))
-    throw std::invalid_argument(spec.name + ": friction = " + std::to_string(s.friction) +
-                                " and rolling friction must be >= 0, restitution = " +
-                                std::to_string(s.restitution) + " in [0, 1]");
+  validate(spec.surface, spec.name);
 }
 
 // Bullet multiplies the two surfaces' values; roots make that the geometric mean.
@@ -63,6 +58,7 @@ struct RigidWorld::Impl {
   std::map<Id, Body> bodies;
   Id next = 0;
   double substep = 1.0 / 960.0;  // s, of the last step
+  std::vector<TouchEvent> touches;
 
   Impl() {
     world.setGravity(btVector3(0, 0, 0));
@@ -152,17 +148,32 @@ void RigidWorld::remove(Id id) {
   impl_->bodies.erase(id);
 }
 
-void RigidWorld::exclude(Id a, Id b) {
-  impl_->filter.excluded.insert(std::minmax({a, b}));
-  auto* cache = impl_->world.getPairCache();
-  cache->removeOverlappingPair(impl_->at(a).body->getBroadphaseProxy(),
-                               impl_->at(b).body->getBroadphaseProxy(), &impl_->dispatcher);
+void RigidWorld::setRule(Id a, Id b, const PairRule& rule) {
+  const BulletWorld::Pair pair = std::minmax({a, b});
+  impl_->world.setPairSurface(pair, rule.friction, rule.restitution);
+  const bool excluded = impl_->filter.excluded.count(pair) > 0;
+  if (excluded == !rule.contact) return;
+  btRigidBody &body_a = *impl_->at(a).body, &body_b = *impl_->at(b).body;
+  if (rule.contact) {
+    impl_->filter.excluded.erase(pair);
+    for (btRigidBody* body : {&body_a, &body_b})  // a renewed proxy finds its pairs again
+      impl_->world.refreshBroadphaseProxy(body);
+    for (const Id id : {a, b})
+      if (BulletWorld::isDynamic(impl_->at(id).body.get())) impl_->world.forgiveOverlapOf(id);
+  } else {
+    impl_->filter.excluded.insert(pair);
+    impl_->world.getPairCache()->removeOverlappingPair(
+        body_a.getBroadphaseProxy(), body_b.getBroadphaseProxy(), &impl_->dispatcher);
+  }
+  for (btRigidBody* body : {&body_a, &body_b})  // what lay on the other may fall
+    if (BulletWorld::isDynamic(body)) body->activate();
 }
 
-void RigidWorld::include(Id a, Id b) {
-  impl_->filter.excluded.erase(std::minmax({a, b}));
-  for (const Id id : {a, b})  // a renewed proxy finds its pairs again
-    impl_->world.refreshBroadphaseProxy(impl_->at(id).body.get());
+void RigidWorld::setSurface(Id id, const SurfaceSettings& surface) {
+  BulletBody& b = impl_->at(id);
+  validate(surface, b.name);
+  applySurface(*b.body, surface);
+  if (b.motion == RigidMotion::kDynamic) b.body->activate();
 }
 
 void RigidWorld::setPose(Id id, const Eigen::Isometry3d& world_from_object) {
@@ -284,6 +295,7 @@ Eigen::Isometry3d between(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b
 }  // namespace
 
 int RigidWorld::step(double h) {
+  impl_->touches.clear();
   const int awake = awakeCount();
   const bool pushed = std::any_of(impl_->bodies.begin(), impl_->bodies.end(),
                                   [](const auto& b) { return b.second.moves; });
@@ -301,6 +313,9 @@ int RigidWorld::step(double h) {
       b.body->applyTorque(toBullet(b.torque));
     }
     impl_->world.substep(impl_->substep);
+    for (const BulletWorld::Touch& t : impl_->world.newTouches())
+      impl_->touches.push_back({impl_->at(t.a).name, impl_->at(t.b).name, k * impl_->substep,
+                                fromBullet(t.position), fromBullet(t.normal), t.approach_speed});
   }
   for (auto& [id, b] : impl_->bodies) {
     b.kinematic_start = b.kinematic_target;
@@ -308,6 +323,8 @@ int RigidWorld::step(double h) {
   }
   return steps;
 }
+
+const std::vector<TouchEvent>& RigidWorld::touches() const { return impl_->touches; }
 
 std::vector<ContactPoint> RigidWorld::contacts() const {
   std::vector<ContactPoint> contacts;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "calipso_fem/world/soft_contacts.hpp"
 #include "obstacle_query.hpp"
@@ -28,14 +29,23 @@ int mainVertex(const SurfacePoint& point) {
 }  // namespace
 
 bool SoftContacts::meets(int a, int b) const {
-  return a != b && excluded_.find(std::minmax({a, b})) == excluded_.end();
+  const auto rule = rules_.find(std::minmax({a, b}));
+  return a != b && (rule == rules_.end() || rule->second.contact);
 }
 
-void SoftContacts::exclude(int a, int b, bool excluded) {
-  if (excluded)
-    excluded_[std::minmax({a, b})] = true;
-  else
-    excluded_.erase(std::minmax({a, b}));
+void SoftContacts::setRule(int a, int b, const PairRule& rule) {
+  rules_[std::minmax({a, b})] = rule;
+  if (rule.contact) return;
+  for (auto it = memory_.begin(); it != memory_.end();) {
+    const auto pair = std::minmax({std::get<0>(it->first), std::get<1>(it->first)});
+    it = pair == std::minmax({a, b}) ? memory_.erase(it) : std::next(it);
+  }
+}
+
+double SoftContacts::frictionOf(const SoftEntry& entry, const Obstacle& obstacle) const {
+  const auto rule = rules_.find(std::minmax({entry.id, obstacle.id}));
+  if (rule != rules_.end() && rule->second.friction) return *rule->second.friction;
+  return std::sqrt(entry.surface.friction * obstacle.surface.friction);
 }
 
 void SoftContacts::forget(int id) {
@@ -155,7 +165,7 @@ void SoftContacts::hold(const SoftEntry& entry, const Obstacle& obstacle, const 
   m.force = point.force;
   m.offset = hit->gap;
   const double normal = hit->normal.dot(point.force);
-  const double friction = std::sqrt(entry.surface.friction * obstacle.surface.friction);
+  const double friction = frictionOf(entry, obstacle);
   m.held_normal = std::max(0.0, -normal);
   m.held_tangential = std::max(
       0.0, (point.force - normal * hit->normal).norm() - friction * (normal + m.held_normal));

@@ -48,7 +48,7 @@ ContactRow SoftContacts::rowOf(const Touch& touch, const SoftEntry& entry, const
   // Depth of an earlier step is undone at this speed at most, so that it gives no kick.
   const double push_out = 10.0 * params_.proximity;
   ContactRow row;
-  row.friction = std::sqrt(entry.surface.friction * obstacle.surface.friction);
+  row.friction = frictionOf(entry, obstacle);
   const Eigen::Matrix3d frame = contactFrame(touch.normal);
   const Eigen::Vector3d own = entry.soft->velocity(touch.point);
   const Eigen::Vector3d others = obstacleVelocity(obstacle, touch.other, touch.place, rigid, h);

@@ -48,6 +48,8 @@ void SoftObject::changed() {
   tree_stale_ = true;
 }
 
+void SoftObject::standStill() { previous_ = vertices_; }
+
 const SurfaceTree& SoftObject::tree() {
   if (!tree_) {
     surface_.vertices = vertices_;

@@ -10,16 +10,6 @@
 namespace calipso::fem {
 namespace {
 
-Material observedMaterial(const WorldObject& object, const ObjectSettings& settings,
-                          const Eigen::Vector3d& gravity) {
-  Material m = defaultMaterial(boundingDiagonal(object.mesh), gravity.norm());
-  m.youngs_modulus = settings.youngs_modulus.value_or(m.youngs_modulus);
-  m.poissons_ratio = settings.poissons_ratio.value_or(m.poissons_ratio);
-  m.density = settings.density.value_or(m.density);
-  m.damping = settings.damping.value_or(m.damping);
-  return m;
-}
-
 double smallestDiagonal(const WorldScene& scene) {
   double smallest = scene.objects.empty() ? 1.0 : boundingDiagonal(scene.objects.front().mesh);
   for (const WorldObject& object : scene.objects)
@@ -37,6 +27,18 @@ ContactParams contactParams(const WorldScene& scene, const WorldParams& params) 
   return c;
 }
 
+}  // namespace
+
+Material observedMaterial(const WorldObject& object, const ObjectSettings& settings,
+                          const Eigen::Vector3d& gravity) {
+  Material m = defaultMaterial(boundingDiagonal(object.mesh), gravity.norm());
+  m.youngs_modulus = settings.youngs_modulus.value_or(m.youngs_modulus);
+  m.poissons_ratio = settings.poissons_ratio.value_or(m.poissons_ratio);
+  m.density = settings.density.value_or(m.density);
+  m.damping = settings.damping.value_or(m.damping);
+  return m;
+}
+
 void validateScene(const WorldScene& scene) {
   std::set<std::string> names;
   for (const WorldObject& object : scene.objects) {
@@ -52,8 +54,6 @@ void validateScene(const WorldScene& scene) {
   if (!scene.gravity.allFinite())
     throw std::invalid_argument("the scene's gravity is not finite; give m/s^2 in world axes");
 }
-
-}  // namespace
 
 World::Impl::Impl(WorldScene scene_in, WorldParams params_in)
     : scene(std::move(scene_in)),
@@ -105,6 +105,7 @@ std::vector<EditOutcome> World::advanceTo(double time) {
   const auto start = std::chrono::steady_clock::now();
   Impl& w = *impl_;
   w.substeps = 0;
+  w.first_touches.clear();
   if (w.started && time > w.now) {
     // Stamps are rounded to nanoseconds; equal steps keep factorisations and compliances valid.
     const double period = w.params.frame_period;
@@ -135,6 +136,12 @@ std::vector<EditOutcome> World::advanceTo(double time) {
   return outcomes;
 }
 
+void World::Impl::noteTouch(const TouchEvent& touch) {
+  for (const TouchEvent& known : first_touches)
+    if (std::minmax(known.a, known.b) == std::minmax(touch.a, touch.b)) return;
+  first_touches.push_back(touch);
+}
+
 void World::Impl::rememberFirstTouches() {
   shown_contacts = rigid.contacts();
   const auto& soft = contacts.contacts();
@@ -143,8 +150,15 @@ void World::Impl::rememberFirstTouches() {
   for (ContactPoint& c : shown_contacts) {
     const auto pair = std::minmax(c.a, c.b);
     c.first_touch = touching.count(pair) == 0 && touching_now.count(pair) == 0;
+    if (c.first_touch) noteTouch({c.a, c.b, now, c.position, c.normal, 0.0});
     touching_now.insert(pair);
   }
+  // Pairs that met and parted within a frame have been noted by the rigid world.
+  first_touches.erase(std::remove_if(first_touches.begin(), first_touches.end(),
+                                     [&](const TouchEvent& t) {
+                                       return touching.count(std::minmax(t.a, t.b)) > 0;
+                                     }),
+                      first_touches.end());
   touching = std::move(touching_now);
 }
 
@@ -175,6 +189,7 @@ WorldState World::state() const {
   state.time = impl_->now;
   for (const Actor& actor : impl_->actors) state.objects.push_back(impl_->snapshot(actor));
   state.contacts = impl_->shown_contacts;
+  state.first_touches = impl_->first_touches;
   state.step_ms = impl_->step_ms;
   state.substeps = impl_->substeps;
   return state;

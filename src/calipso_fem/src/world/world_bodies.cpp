@@ -18,13 +18,6 @@ constexpr double kContactPatch = 0.01;
 // Sag that changes nothing: of the object's diagonal, and in pixels.
 constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
 
-TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose) {
-  TriangleMesh m = mesh;
-  m.vertices =
-      (mesh.vertices * pose.linear().transpose()).rowwise() + pose.translation().transpose();
-  return m;
-}
-
 double pixelsPerMeter(const Camera& camera, const Eigen::Vector3d& at) {
   const double depth = (camera.world_from_camera.inverse() * at).z();
   return depth > 0.0 && camera.fx > 0.0 ? camera.fx / depth : 0.0;
@@ -52,6 +45,13 @@ double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obst
 }
 
 }  // namespace
+
+TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose) {
+  TriangleMesh m = mesh;
+  m.vertices =
+      (mesh.vertices * pose.linear().transpose()).rowwise() + pose.translation().transpose();
+  return m;
+}
 
 FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const WorldParams& params,
                      const ObjectSettings& settings) {
@@ -198,6 +198,7 @@ void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
   actor.note = spec.mass.note;
   actor.body = rigid.add(spec);
   rigid.setAcceleration(*actor.body, actor.acceleration());
+  applyRules(actor);
 }
 
 // Makes the observed shape the equilibrium under what held the object in the video. Buoyancy and
@@ -261,6 +262,12 @@ void World::Impl::removeBodies(Actor& actor) {
 void World::Impl::reset(Actor& actor) {
   const int id = actor.id;
   removeBodies(actor);
+  if (actor.inserted) {  // the video does not have it
+    actor.removed = actor.edited = true;
+    actor.kind = ObjectKind::kStatic;
+    plan_changed = true;
+    return;
+  }
   Actor fresh(scene.objects[id]);
   fresh.id = id;
   fresh.track = actor.track;
@@ -299,6 +306,7 @@ void World::Impl::addCollider(Actor& actor) {
   spec.motion = moves ? RigidMotion::kKinematic : RigidMotion::kStatic;
   spec.shapes = moves ? hullsOf(actor) : std::vector<TriangleMesh>{actor.object.mesh};
   actor.body = rigid.add(spec);
+  applyRules(actor);
 }
 
 void World::Impl::wake(Actor& actor) {

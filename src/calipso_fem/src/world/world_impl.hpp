@@ -1,6 +1,8 @@
 #pragma once
 
 #include <deque>
+#include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -18,6 +20,7 @@ struct World::Impl {
   void stepFrame(double h);
   void substep(double from, double h);
   void rememberFirstTouches();
+  void noteTouch(const TouchEvent& touch);  // unless the pair has been noted in this frame
   ObjectSnapshot snapshot(const Actor& actor) const;
 
   // Bodies (world_bodies.cpp)
@@ -33,6 +36,19 @@ struct World::Impl {
   void settleAsObserved(Actor& actor, const TriangleMesh& surface);
   void removeBodies(Actor& actor);
   void reset(Actor& actor);
+  // Friction, restitution and proximity of one object's surface, in all its contacts.
+  void setSurface(Actor& actor, const SurfaceSettings& surface);
+  // Objects or supports by name. Empty b: a and everything; then a rule already given stays.
+  void setPairContact(const std::string& a, const std::string& b, bool on);
+  void setPairRule(const std::string& a, const std::string& b, const PairRule& rule);
+  PairRule pairRule(const std::string& a, const std::string& b) const;
+  // A new object takes part from now on, at its world_from_object; static until an edit touches it.
+  Actor& addObject(const WorldObject& object, const ObjectSettings& settings);
+  // A copy in the present state (shape, velocity, material, gravity), moved by `motion` (world).
+  // Attachments and what holds the original are not copied.
+  Actor& duplicate(const std::string& source, const std::string& name,
+                   const Eigen::Isometry3d& motion);
+  void copySoft(Actor& copy, const Actor& source, const Eigen::Isometry3d& motion);
   void addColliders();
   void addCollider(Actor& actor);
   const std::vector<TriangleMesh>& hullsOf(Actor& actor);
@@ -59,12 +75,15 @@ struct World::Impl {
   std::string changeVelocity(Actor& actor, const Edit& edit);
   void touch(Actor& actor, const Edit& edit);
   ObjectKind kindFor(const Actor& actor, const Edit& edit) const;
+  int idOf(const std::string& name) const;  // of an object or a support
+  std::optional<RigidWorld::Id> rigidIdOf(int id) const;
+  void applyRules(const Actor& actor);
   Actor* find(const std::string& name);
   std::vector<std::string> names() const;
 
   WorldScene scene;
   WorldParams params;
-  std::vector<Actor> actors;
+  std::deque<Actor> actors;  // grows without moving what is there
   RigidWorld rigid;
   SoftContacts contacts;
   std::vector<RigidWorld::Id> supports;  // planes and meshes in the rigid world
@@ -77,9 +96,21 @@ struct World::Impl {
   int substeps = 0;
   std::vector<ContactPoint> shown_contacts;
   std::set<std::pair<std::string, std::string>> touching;
+  std::vector<TouchEvent> first_touches;
+  std::map<std::pair<int, int>, PairRule> rules;  // by ids, smaller first
   std::deque<Edit> pending;  // by time
   bool plan_changed = true;
 };
+
+// Defaults completed by what the user set. (world.cpp)
+Material observedMaterial(const WorldObject& object, const ObjectSettings& settings,
+                          const Eigen::Vector3d& gravity);
+// @throw std::invalid_argument naming the object and what is wrong with it (world.cpp)
+void validateScene(const WorldScene& scene);
+TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose);  // world_bodies.cpp
+
+// Lasting id of the k-th support, planes first; objects have ids from 0 up.
+constexpr int supportId(size_t k) { return -1 - static_cast<int>(k); }
 
 // Edge length of the cells and all other FEM options for an object, from its size in the picture.
 FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const WorldParams& params,

@@ -27,11 +27,10 @@ Eigen::AlignedBox3d boxOf(const SoftObject& soft) {
 
 std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor* except) {
   std::vector<Obstacle> list;
-  const int object_count = static_cast<int>(actors.size());
-  int id = object_count;  // supports come after the objects
+  size_t support = 0;
   for (const SupportPlane& plane : scene.planes) {
     Obstacle o;
-    o.id = id++;
+    o.id = supportId(support++);
     o.name = plane.name;
     o.surface = params.support;
     o.plane = &plane;
@@ -39,7 +38,7 @@ std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor
   }
   for (size_t k = 0; k < scene.support_meshes.size(); ++k) {
     Obstacle o;
-    o.id = id++;
+    o.id = supportId(support++);
     o.name = scene.support_meshes[k].name;
     o.surface = params.support;
     o.tree = support_trees[k].get();
@@ -125,6 +124,10 @@ void World::Impl::substep(double from, double h) {
   for (Actor& actor : actors)
     if (actor.body && !actor.simulated()) rigid.moveKinematic(*actor.body, poseOf(actor, to));
   substeps += std::max(rigid.step(h), softs.empty() ? 0 : 1);
+  for (TouchEvent touch : rigid.touches()) {
+    touch.time += from;
+    noteTouch(touch);
+  }
 }
 
 void World::Impl::applyPulls(double at) {

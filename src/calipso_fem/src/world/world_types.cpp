@@ -1,5 +1,6 @@
 #include "calipso_fem/world/world_types.hpp"
 
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
 
@@ -11,13 +12,6 @@ void require(bool ok, const std::string& name, double value, const std::string& 
   std::ostringstream message;
   message << "parameter " << name << " = " << value << "; must be " << range;
   throw std::invalid_argument(message.str());
-}
-
-void validate(const SurfaceSettings& s, const std::string& name) {
-  require(s.friction >= 0.0, name + "/friction", s.friction, ">= 0");
-  require(s.rolling_friction >= 0.0, name + "/rolling_friction", s.rolling_friction, ">= 0 (m)");
-  require(s.restitution >= 0.0 && s.restitution <= 1.0, name + "/restitution", s.restitution,
-          "in [0, 1]");
 }
 
 void validate(const ObjectSettings& s, const std::string& name) {
@@ -37,6 +31,27 @@ void validate(const ObjectSettings& s, const std::string& name) {
 const ObjectSettings& WorldParams::settingsOf(const std::string& object) const {
   const auto found = objects.find(object);
   return found == objects.end() ? defaults : found->second;
+}
+
+void validate(const SurfaceSettings& s, const std::string& name) {
+  require(s.friction >= 0.0 && std::isfinite(s.friction), name + "/friction", s.friction,
+          ">= 0 and finite");
+  require(s.rolling_friction >= 0.0, name + "/rolling_friction", s.rolling_friction, ">= 0 (m)");
+  require(s.restitution >= 0.0 && s.restitution <= 1.0, name + "/restitution", s.restitution,
+          "in [0, 1]");
+  require(s.proximity >= 0.0, name + "/proximity", s.proximity, ">= 0 (m); 0: the world's");
+}
+
+void validate(const PairRule& r, const std::string& name) {
+  if (r.friction)
+    require(*r.friction >= 0.0 && std::isfinite(*r.friction), name + "/friction", *r.friction,
+            ">= 0 and finite");
+  if (r.restitution)
+    require(*r.restitution >= 0.0 && *r.restitution <= 1.0, name + "/restitution", *r.restitution,
+            "in [0, 1]");
+  if (r.proximity)
+    require(*r.proximity > 0.0 && std::isfinite(*r.proximity), name + "/proximity", *r.proximity,
+            "> 0 (m)");
 }
 
 void validate(const WorldParams& p) {

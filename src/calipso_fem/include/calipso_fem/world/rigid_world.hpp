@@ -41,9 +41,9 @@ class RigidWorld {
   Id addPlane(const SupportPlane& plane, const SurfaceSettings& surface);
   void remove(Id id);
 
-  // No contact between the two, whatever they are.
-  void exclude(Id a, Id b);
-  void include(Id a, Id b);
+  // Contact between the two, whatever they are: none, or with a friction or restitution of its own.
+  void setRule(Id a, Id b, const PairRule& rule);
+  void setSurface(Id id, const SurfaceSettings& surface);
 
   void setPose(Id id, const Eigen::Isometry3d& world_from_object);        // a jump
   void moveKinematic(Id id, const Eigen::Isometry3d& world_from_object);  // by the end of step()
@@ -67,6 +67,8 @@ class RigidWorld {
   // Advances by h in sub-steps that get finer the fewer bodies are awake. @return their number
   int step(double h);
   std::vector<ContactPoint> contacts() const;  // of the last sub-step
+  // Pairs that met during the last step; times since its beginning.
+  const std::vector<TouchEvent>& touches() const;
 
  private:
   struct Impl;

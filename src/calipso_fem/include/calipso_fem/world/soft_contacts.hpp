@@ -79,7 +79,7 @@ class SoftContacts {
                       RigidWorld& rigid, double h);
 
   void forget(int id);                        // object or obstacle
-  void exclude(int a, int b, bool excluded);  // pairs that do not meet
+  void setRule(int a, int b, const PairRule& rule);
   const std::vector<ContactPoint>& contacts() const { return contacts_; }
 
  private:
@@ -102,6 +102,7 @@ class SoftContacts {
   using Touches = std::map<Key, Touch>;
 
   bool meets(int a, int b) const;
+  double frictionOf(const SoftEntry& entry, const Obstacle& obstacle) const;
   Touches collect(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
                   double reach) const;
   void addVertices(const SoftEntry& entry, int soft, const Obstacle& obstacle, int index,
@@ -124,7 +125,7 @@ class SoftContacts {
 
   ContactParams params_;
   std::map<Key, Memory> memory_;
-  std::map<std::pair<int, int>, bool> excluded_;
+  std::map<std::pair<int, int>, PairRule> rules_;
   std::vector<ContactPoint> contacts_;
   // Compliance of the last contact set; while the set stays, it stays good enough to iterate with,
   // since the corrections themselves are exact.

@@ -70,7 +70,8 @@ class SoftObject {
   // Rigid motion that best maps the observed shape to the present one (Kabsch, by nodal mass).
   Eigen::Isometry3d motion() const;
   bool hasFixedNodes() const;
-  void changed();  // the state was set from outside
+  void changed();     // the state was set from outside
+  void standStill();  // it did not get here by moving: nothing lies on its way
 
  private:
   struct Column {

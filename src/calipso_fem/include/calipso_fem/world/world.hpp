@@ -27,6 +27,19 @@ class World {
   // is wrong with it is said in its outcome.
   void submit(const Edit& edit);
 
+  // Contact between two objects or supports, by name; an empty b stands for everything.
+  // @throw std::invalid_argument naming what is not known, or the value and its range
+  void setPairContact(const std::string& a, const std::string& b, bool on);
+  void setPairRule(const std::string& a, const std::string& b, const PairRule& rule);
+  PairRule pairRule(const std::string& a, const std::string& b) const;
+  void setSurface(const std::string& object, const SurfaceSettings& surface);
+
+  // A new object takes part from now on. @throw std::invalid_argument: name taken, bad mesh
+  void addObject(const WorldObject& object, const ObjectSettings& settings);
+  // A copy in the present state (shape, velocity, material, gravity), moved by `motion` (world).
+  void duplicate(const std::string& source, const std::string& name,
+                 const Eigen::Isometry3d& motion);
+
   // Steps to video time `time` (s) and applies the edits due by then. The first call sets the
   // clock. Times that do not increase step nothing. @return what became of the edits that were due
   std::vector<EditOutcome> advanceTo(double time);

@@ -53,6 +53,14 @@ struct SurfaceSettings {
   double friction = 0.5;
   double restitution = 0.3;       // 0..1
   double rolling_friction = 0.0;  // m
+  double proximity = 0.0;         // m, minimal distance; 0: the world's. A pair takes the larger.
+};
+
+// What holds for one pair of surfaces instead of what follows from the two.
+struct PairRule {
+  bool contact = true;
+  std::optional<double> friction, restitution;
+  std::optional<double> proximity;  // m
 };
 
 // What the user may set per object. Empty: chosen automatically.
@@ -81,6 +89,8 @@ struct WorldParams {
 
 // @throw std::invalid_argument naming parameter, value and range
 void validate(const WorldParams& params);
+void validate(const SurfaceSettings& surface, const std::string& name);
+void validate(const PairRule& rule, const std::string& name);
 
 // One object at one instant.
 struct ObjectSnapshot {
@@ -107,10 +117,20 @@ struct ContactPoint {
   bool first_touch = false;  // the pair's first contact since they were last apart
 };
 
+// Two things have met that were apart.
+struct TouchEvent {
+  std::string a, b;  // b: an object or a support
+  double time = 0.0;  // s since the first frame, finer than a frame
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // from b towards a
+  double approach_speed = 0.0;                        // m/s, along the normal, positive
+};
+
 struct WorldState {
   double time = 0.0;  // s since the first frame
   std::vector<ObjectSnapshot> objects;
   std::vector<ContactPoint> contacts;
+  std::vector<TouchEvent> first_touches;  // since the frame before, by time
   double step_ms = 0.0;
   int substeps = 0;
 };

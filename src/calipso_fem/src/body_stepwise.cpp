@@ -1,0 +1,125 @@
+#include <cassert>
+#include <cmath>
+#include <stdexcept>
+
+#include "body_impl.hpp"
+
+// The step of body_step.cpp taken in parts: whoever drives it chooses forces, directions and step
+// lengths, the body gives Newton's direction on the incremental potential and its value.
+namespace calipso::fem {
+
+DeformableBody::Impl::Trial& DeformableBody::Impl::runningTrial() {
+  assert(trial);
+  return *trial;
+}
+
+const Vec& DeformableBody::Impl::trialGradient() {
+  Trial& t = runningTrial();
+  if (t.slope.size() == 0) t.slope = gradient(t.y, t.integrator, t.loads);
+  return t.slope;
+}
+
+void DeformableBody::beginStep(double h) {
+  Impl& m = *impl_;
+  if (!(h > 0.0) || !std::isfinite(h))
+    throw std::invalid_argument("time step h is " + std::to_string(h) + " s, allowed is > 0");
+  Impl::Trial t;
+  t.h = h;
+  t.loads = m.externalForces();
+  t.targets = m.prescribedTargets(m.time + h);
+  if (m.damping() > 0.0) {
+    m.model->viscosity(m.x, m.viscosity);
+    for (double& value : m.viscosity.values) value *= m.damping();
+  }
+  if (m.options.scheme == TimeScheme::kTrapezoidal && !m.acceleration_known) {
+    m.a = m.startAcceleration(t.loads);
+    m.acceleration_known = true;
+  }
+  t.integrator = m.integrator(h);
+  t.y = m.x;
+  m.trial = std::move(t);
+}
+
+const Vec& DeformableBody::trialPositions() const { return impl_->runningTrial().y; }
+
+Vec DeformableBody::trialDirection(const Vec& contact_forces) {
+  Impl& m = *impl_;
+  Impl::Trial& t = m.runningTrial();
+  Vec direction;
+  const Vec residual = m.trialGradient() - contact_forces;
+  ++t.report.newton_iterations;
+  if (m.newtonDirection(t.y, t.integrator, residual, t.targets - t.y, m.options.linear_tolerance,
+                        &t.report, &direction))
+    return direction;
+  t.report.message = "no positive definite system: the body is free to move without resistance, "
+                     "or its state is not finite";
+  return Vec::Zero(t.y.size());
+}
+
+Vec DeformableBody::trialResponse(const Vec& forces) {
+  Impl& m = *impl_;
+  const double h = m.runningTrial().h;
+  return h * h * m.velocityChange(forces, h, m.options.linear_tolerance);
+}
+
+double DeformableBody::trialPotential(const Vec& positions, const Vec& contact_forces) const {
+  const Impl::Trial& t = impl_->runningTrial();
+  return impl_->potential(positions, t.integrator, t.loads + contact_forces);
+}
+
+double DeformableBody::trialResidual(const Vec& contact_forces) const {
+  Impl& m = *impl_;
+  const Impl::Trial& t = m.runningTrial();
+  Vec residual = m.trialGradient() - contact_forces;
+  m.maskResidual(&residual);
+  return residual.norm() / m.forceScale(t.y, t.integrator, t.loads + contact_forces);
+}
+
+double DeformableBody::trialStepLength(const Vec& positions, const Vec& contact_forces) const {
+  constexpr double kSmallestStep = 1.0 / 4096.0;
+  const Impl::Trial& t = impl_->runningTrial();
+  // Where a prescribed boundary moves, the potential may rise.
+  for (const auto& [dof, p] : impl_->prescribed)
+    if (t.targets[dof] != t.y[dof]) return 1.0;
+  const double here = trialPotential(t.y, contact_forces);
+  const double noise = 1e-13 * std::abs(here);
+  for (double s = 1.0; s >= kSmallestStep; s *= 0.5)
+    if (trialPotential(t.y + s * (positions - t.y), contact_forces) <= here + noise) return s;
+  return 0.0;
+}
+
+void DeformableBody::moveTrial(const Vec& positions) {
+  Impl::Trial& t = impl_->runningTrial();
+  t.y = positions;
+  t.slope.resize(0);
+}
+
+StepReport DeformableBody::endStep(const Vec& contact_forces) {
+  Impl& m = *impl_;
+  Impl::Trial& t = m.runningTrial();
+  StepReport report = t.report;
+  report.converged = t.y.allFinite() && report.message.empty();
+  if (t.y.allFinite()) {
+    const Integrator& i = t.integrator;
+    const Vec v1 = i.rate * (t.y - i.base);
+    if (m.options.scheme == TimeScheme::kTrapezoidal) m.a = 2.0 / t.h * (v1 - m.v) - m.a;
+    m.previous = std::make_pair(m.x, m.v);
+    m.previous_h = t.h;
+    m.reactions.setZero(m.x.size());
+    if (!m.prescribed.empty()) {
+      const Vec r = m.trialGradient() - contact_forces;
+      for (const auto& [dof, p] : m.prescribed) m.reactions[dof] = r[dof];
+    }
+    m.x = t.y;
+    m.v = v1;
+    m.rememberSoftForces(i);
+  } else {
+    report.message = "the step gave positions that are not finite; the state before it is kept";
+  }
+  m.time += t.h;
+  m.finishReport(&report);
+  m.trial.reset();
+  return report;
+}
+
+}  // namespace calipso::fem

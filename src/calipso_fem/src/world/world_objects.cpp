@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <stdexcept>
+
+#include "world_impl.hpp"
+
+// Objects and pairs of objects, changed while the world runs.
+namespace calipso::fem {
+
+int World::Impl::idOf(const std::string& name) const {
+  for (const Actor& actor : actors)
+    if (actor.object.name == name) return actor.id;
+  std::vector<std::string> supports_by_id;
+  for (const SupportPlane& plane : scene.planes) supports_by_id.push_back(plane.name);
+  for (const SupportMesh& mesh : scene.support_meshes) supports_by_id.push_back(mesh.name);
+  std::string known;
+  for (const std::string& object : names()) known += " " + object;
+  for (size_t k = 0; k < supports_by_id.size(); ++k) {
+    if (supports_by_id[k] == name) return supportId(k);
+    known += " " + supports_by_id[k];
+  }
+  throw std::invalid_argument("there is no object or support '" + name + "'; there are:" + known);
+}
+
+std::optional<RigidWorld::Id> World::Impl::rigidIdOf(int id) const {
+  if (id >= 0) return actors[id].body;
+  const size_t k = static_cast<size_t>(-1 - id);
+  return k < supports.size() ? std::optional<RigidWorld::Id>(supports[k]) : std::nullopt;
+}
+
+void World::Impl::setSurface(Actor& actor, const SurfaceSettings& surface) {
+  validate(surface, actor.object.name);
+  actor.settings.surface = surface;
+  if (actor.body) rigid.setSurface(*actor.body, surface);
+  wake(actor);
+}
+
+PairRule World::Impl::pairRule(const std::string& a, const std::string& b) const {
+  const auto found = rules.find(std::minmax({idOf(a), idOf(b)}));
+  return found == rules.end() ? PairRule{} : found->second;
+}
+
+void World::Impl::setPairRule(const std::string& a, const std::string& b, const PairRule& rule) {
+  validate(rule, a + " and " + b);
+  const int ia = idOf(a), ib = idOf(b);
+  if (ia == ib)
+    throw std::invalid_argument("'" + a + "' with itself is no pair; name two objects or supports");
+  rules[std::minmax({ia, ib})] = rule;
+  contacts.setRule(ia, ib, rule);
+  const auto ra = rigidIdOf(ia), rb = rigidIdOf(ib);
+  if (ra && rb) rigid.setRule(*ra, *rb, rule);
+  for (const int id : {ia, ib})
+    if (id >= 0) wake(actors[id]);
+}
+
+void World::Impl::setPairContact(const std::string& a, const std::string& b, bool on) {
+  std::vector<std::string> others = {b};
+  if (b.empty()) {
+    others = names();
+    for (const SupportPlane& plane : scene.planes) others.push_back(plane.name);
+    for (const SupportMesh& mesh : scene.support_meshes) others.push_back(mesh.name);
+    others.erase(std::remove(others.begin(), others.end(), a), others.end());
+  }
+  for (const std::string& other : others) {
+    PairRule rule = pairRule(a, other);
+    rule.contact = on;
+    setPairRule(a, other, rule);
+  }
+}
+
+// Bullet has given the object's body a new id.
+void World::Impl::applyRules(const Actor& actor) {
+  for (const auto& [pair, rule] : rules) {
+    if (pair.first != actor.id && pair.second != actor.id) continue;
+    const auto a = rigidIdOf(pair.first), b = rigidIdOf(pair.second);
+    if (a && b) rigid.setRule(*a, *b, rule);
+  }
+}
+
+Actor& World::Impl::addObject(const WorldObject& object, const ObjectSettings& settings) {
+  scene.objects.push_back(object);
+  try {
+    validateScene(scene);
+  } catch (...) {
+    scene.objects.pop_back();
+    throw;
+  }
+  Actor actor(object);
+  actor.id = static_cast<int>(actors.size());
+  actor.inserted = true;
+  actor.settings = settings;
+  actor.observed_material = actor.material = observedMaterial(object, settings, scene.gravity);
+  actor.gravity = scene.gravity;
+  actor.holder = Holder::kNothing;
+  actor.edited = true;
+  actor.kind = ObjectKind::kKinematic;
+  actor.reason = "it was added";
+  actors.push_back(std::move(actor));
+  addCollider(actors.back());
+  plan_changed = true;
+  return actors.back();
+}
+
+Actor& World::Impl::duplicate(const std::string& source_name, const std::string& name,
+                              const Eigen::Isometry3d& motion) {
+  Actor* found = find(source_name);
+  if (!found || found->removed)
+    throw std::invalid_argument("there is no object '" + source_name + "' to duplicate");
+  Actor& source = *found;
+  const BodyMotion moves = motionOf(source);
+  WorldObject object = source.object;
+  object.name = name;
+  object.attachments.clear();
+  for (const Actor& actor : actors) object.index = std::max(object.index, actor.object.index + 1);
+  object.world_from_object = motion * moves.world_from_object;
+  Actor& copy = addObject(object, source.settings);
+  copy.observed_material = source.observed_material;
+  copy.material = source.material;
+  copy.gravity = source.gravity;
+  if (source.holder == Holder::kBuoyancy) {
+    copy.holder = source.holder;
+    copy.buoyancy = source.buoyancy;
+  }
+  copy.hulls = source.hulls;
+  copy.reason = "it is a copy of " + source_name;
+  if (!source.simulated()) return copy;
+  removeBodies(copy);
+  copy.kind = source.kind;
+  BodyMotion start{object.world_from_object, motion.linear() * moves.linear,
+                   motion.linear() * moves.angular};
+  if (source.kind == ObjectKind::kRigid)
+    makeRigid(copy, start);
+  else
+    copySoft(copy, source, motion);
+  return copy;
+}
+
+// The same grid in the same place, with the original's rest shape; then the state, moved.
+void World::Impl::copySoft(Actor& copy, const Actor& source, const Eigen::Isometry3d& motion) {
+  const DeformableBody& from = source.soft->body();
+  copy.soft = std::make_unique<SoftObject>(placed(copy.object.mesh, source.soft_from_object),
+                                           copy.observed_material, from.options());
+  copy.soft_from_object = source.soft_from_object;
+  DeformableBody& body = copy.soft->body();
+  body.setRestNodes(from.model().mesh().nodes);
+  body.setMaterial(copy.material);
+  body.setState(from.positions(), from.velocities());
+  body.applyRigidTransform(motion);
+  copy.soft->setGravity(copy.acceleration());
+  copy.soft->changed();
+  copy.soft->standStill();
+}
+
+void World::setPairContact(const std::string& a, const std::string& b, bool on) {
+  impl_->setPairContact(a, b, on);
+}
+
+void World::setPairRule(const std::string& a, const std::string& b, const PairRule& rule) {
+  impl_->setPairRule(a, b, rule);
+}
+
+PairRule World::pairRule(const std::string& a, const std::string& b) const {
+  return impl_->pairRule(a, b);
+}
+
+void World::setSurface(const std::string& object, const SurfaceSettings& surface) {
+  Actor* actor = impl_->find(object);
+  if (!actor) impl_->idOf(object);  // says which names there are
+  if (!actor)
+    throw std::invalid_argument("'" + object + "' is a support; set the surface of an object");
+  impl_->setSurface(*actor, surface);
+}
+
+void World::addObject(const WorldObject& object, const ObjectSettings& settings) {
+  impl_->addObject(object, settings);
+}
+
+void World::duplicate(const std::string& source, const std::string& name,
+                      const Eigen::Isometry3d& motion) {
+  impl_->duplicate(source, name, motion);
+}
+
+}  // namespace calipso::fem
