@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <future>
 
 #include "calipso_align/fit_problem.hpp"
 #include "calipso_align/rough_fit.hpp"
@@ -31,26 +32,48 @@ class StageClock {
 };
 
 // Stages A and B: similarity, affine, quadratic.
-LowOrderMap fitLowOrderStages(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+struct LowOrderFit {
+  LowOrderMap map;
+  LowOrderStep last;   // with the prior that it ended with
+};
+
+LowOrderFit fitLowOrderStages(const FitProblem& problem, const std::vector<ContourLoop>& contour,
                               const AlignOptions& options, StageClock& clock) {
-  LowOrderMap map(problem.X);
-  placeRoughly(problem, contour, map);
+  LowOrderFit result{LowOrderMap(problem.X), {}};
+  placeRoughly(problem, contour, result.map);
   clock.stop("placement");
-  for (const LowOrderStep& step : lowOrderSteps(problem, options)) {
-    const auto observe = [&](const Points& x, int k) {
-      return measure(problem, x, settingsAt(step, problem, k));
+  double deformation = 0.0;
+  for (LowOrderStep step : lowOrderSteps(problem, options)) {
+    if (step.order > 0) result.map.absorbScale();
+    if (step.order > 1) step.fit.prior.deformation = deformation;
+    const auto observe = [&](const Points& x, int k, double a) {
+      return measure(problem, x, settingsAt(step, problem, k, a));
     };
-    fitLowOrder(problem.X, observe, step.fit, map);
+    deformation = fitLowOrder(problem.X, observe, step.fit, result.map).deformation;
+    step.fit.prior.deformation = deformation;
+    result.last = step;
     clock.stop(step.name);
   }
-  return map;
+  return result;
+}
+
+// The grids only depend on the stock model: they are laid while the first stages run.
+using Grids = std::vector<std::future<fem::VoxelGrid>>;
+
+Grids layGrids(const TriangleMesh& cad, const std::vector<ElasticStep>& steps) {
+  Grids grids;
+  for (const ElasticStep& step : steps) {
+    grids.push_back(std::async(std::launch::async, gridOf, std::cref(cad), step.fit.nodes));
+  }
+  return grids;
 }
 
 // Stage C: the elastic body on finer and finer grids.
 Points fitElasticStages(const TriangleMesh& cad, const FitProblem& problem, Placement placed,
-                        const AlignOptions& options, StageClock& clock) {
-  for (const ElasticStep& step : elasticSteps(problem, options)) {
-    const auto fit = std::make_shared<ElasticFit>(cad, placed, step.fit);
+                        const std::vector<ElasticStep>& steps, Grids& grids, StageClock& clock) {
+  for (size_t k = 0; k < steps.size(); ++k) {
+    const ElasticStep& step = steps[k];
+    const auto fit = std::make_shared<ElasticFit>(cad, grids[k].get(), placed, step.fit);
     clock.stop("grid of " + std::to_string(step.fit.nodes));
     fit->fit([&](const Points& x, int k) {
       return measure(problem, x, settingsAt(step, problem, k));
@@ -84,13 +107,11 @@ double sizeRatio(const Points& to, const Points& from) {
 
 // Pose covariance at the end of the fit, with all low-order deformations left free. World axes.
 Eigen::Matrix<double, 6, 6> poseCovariance(const FitProblem& problem, const Points& x,
-                                           const AlignOptions& options,
+                                           const LowOrderStep& last,
                                            const Eigen::Isometry3d& camera_from_object) {
-  const LowOrderStep last = lowOrderSteps(problem, options).back();
-  const MeasureSettings settings = settingsAt(last, problem, last.fit.iterations - 1);
-  LowOrderPrior prior = last.fit.prior;
-  // What no measurement shows keeps the rough placement's uncertainty: a twentieth of the distance.
-  if (!(prior.depth > 0.0)) prior.depth = 0.05 * x.col(2).mean() / LowOrderMap(x).size();
+  const LowOrderPrior& prior = last.fit.prior;
+  const MeasureSettings settings =
+      settingsAt(last, problem, last.fit.iterations - 1, prior.deformation);
   const LowOrderMap here(x);
   const Eigen::MatrixXd all = covariance(x, measure(problem, x, settings), prior, here);
 
@@ -137,16 +158,17 @@ AlignmentResult unaligned(const TriangleMesh& cad, const Eigen::Isometry3d& pose
 
 // Fills in everything that follows from where the vertices ended.
 void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& x,
-              const std::vector<ContourLoop>& contour, const AlignOptions& options,
+              const std::vector<ContourLoop>& contour, const LowOrderStep& last,
               AlignmentResult& result) {
   const Points world = transformed(problem.camera.world_from_camera, x);
   result.world_from_object = bestRigid(cad.vertices, world);
   result.mesh = {transformed(result.world_from_object.inverse(), world), cad.triangles};
   result.rest = cad;
   result.scale = sizeRatio(x, problem.X);
+  result.deformation = last.fit.prior.deformation;
   result.noise_px = problem.target.noise_px;
   result.covariance =
-      poseCovariance(problem, x, options,
+      poseCovariance(problem, x, last,
                      problem.camera.world_from_camera.inverse() * result.world_from_object);
   const FitQuality quality = assess(problem, x);
   result.contour_mean_px = quality.mean_px;
@@ -176,14 +198,16 @@ AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
   const RoughCheck check = checkPlacement(problem);
   if (!check.usable) return unaligned(cad, initial_world_from_object, check.reason);
 
-  const LowOrderMap map = fitLowOrderStages(problem, contour, options, clock);
+  const std::vector<ElasticStep> steps = elasticSteps(problem, options);
+  Grids grids = layGrids(cad, steps);
+  const LowOrderFit low = fitLowOrderStages(problem, contour, options, clock);
   const Eigen::Isometry3d camera_from_object =
       camera.world_from_camera.inverse() * initial_world_from_object;
   const Placement placed = [&](const Points& points) {
-    return map.apply(transformed(camera_from_object, points));
+    return low.map.apply(transformed(camera_from_object, points));
   };
-  const Points x = fitElasticStages(cad, problem, placed, options, clock);
-  describe(problem, cad, x, contour, options, result);
+  const Points x = fitElasticStages(cad, problem, placed, steps, grids, clock);
+  describe(problem, cad, x, contour, low.last, result);
   clock.stop("result");
   return result;
 }

@@ -33,12 +33,6 @@ std::vector<Carrier> carriersOf(const fem::Embedding& embedding) {
   return carriers;
 }
 
-fem::VoxelGrid gridOf(const TriangleMesh& cad, int nodes) {
-  fem::VoxelizeOptions options;
-  options.target_nodes = nodes;
-  return fem::voxelize(cad, options);
-}
-
 // Smallest volume that three edges of a cell span at one of its corners.
 double smallestCornerVolume(const fem::VolumeMesh& mesh) {
   double smallest = std::numeric_limits<double>::max();
@@ -98,25 +92,32 @@ struct ElasticFit::Impl {
   fem::Embedding embedding;
   std::vector<Carrier> carriers;
   Vec x, x0;                 // current and starting nodal positions, 3n
+  int free;                  // coordinates of a node that move: x, y, and z unless it is held
   fem::ElasticModel model;
+  BlockMatrix K;             // of the linear model, which never changes; else of the last call
   double volume, size;       // m^3, m
+  Eigen::SparseMatrix<double> A;   // lower half of the free coordinates' system
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver;
-  bool analyzed = false;
 
-  Impl(const TriangleMesh& cad, const std::function<Points(const Points&)>& placed,
-       const FemStageOptions& o)
+  Impl(const TriangleMesh& cad, const fem::VoxelGrid& g,
+       const std::function<Points(const Points&)>& placed, const FemStageOptions& o)
       : options(o),
-        grid(gridOf(cad, o.nodes)),
+        grid(g),
         embedding(fem::embed(cad.vertices, grid)),
         carriers(carriersOf(embedding)),
         x(vectorOf(placed(grid.nodes))),
         x0(x),
+        free(o.hold_depth ? 2 : 3),
         model(restMesh(grid, Eigen::Map<const Points>(x.data(), grid.nodeCount(), 3)),
               unitMaterial(o.poissons_ratio),
               o.linear ? fem::MaterialModel::kLinear : fem::MaterialModel::kCorotated,
               fem::ElementType::kHexQ1),
+        K(model.pattern()),
         volume(model.totalMass()),
-        size(boundingDiagonal(cad)) {}
+        size(boundingDiagonal(cad)) {
+    makePattern();
+    if (options.linear) model.viscosity(x, K);
+  }
 
   Points vertices() const {
     const Vec s = embedding.apply(x);
@@ -135,6 +136,7 @@ struct ElasticFit::Impl {
   // (a0 x0 + a1 x1)^2 <= a0 x0^2 + a1 x1^2, each vertex in one cell.
   void addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) const;
   void addVertex(int vertex, double share, const PointRow& row, BlockMatrix& H) const;
+  void makePattern();
   Vec solve(const BlockMatrix& H, const Vec& gradient);
   double energy(const Vec& at, const Vec& from, const Rows& rows, double weight) const;
   Vec lineSearch(const Vec& step, const Rows& rows, double weight, double slope) const;
@@ -164,13 +166,45 @@ void ElasticFit::Impl::addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) 
   }
 }
 
+// The lower half's pattern: column `free j + c` holds the blocks (i, j), i >= j, from its diagonal down.
+void ElasticFit::Impl::makePattern() {
+  const fem::BlockPattern& p = *model.pattern();
+  A.resize(free * p.rows(), free * p.rows());
+  A.resizeNonZeros(free * free * (p.blockCount() + p.rows()) / 2 - (free == 3 ? 3 : 1) * p.rows());
+  int count = 0;
+  for (int j = 0; j < p.rows(); ++j) {
+    for (int c = 0; c < free; ++c) {
+      A.outerIndexPtr()[free * j + c] = count;
+      for (int k = p.diagonal[j]; k < p.row_start[j + 1]; ++k) {
+        for (int r = k == p.diagonal[j] ? c : 0; r < free; ++r) {
+          A.innerIndexPtr()[count++] = free * p.column[k] + r;
+        }
+      }
+    }
+  }
+  A.outerIndexPtr()[free * p.rows()] = count;
+  std::fill_n(A.valuePtr(), count, 1.0);
+  solver.analyzePattern(A);
+}
+
 Vec ElasticFit::Impl::solve(const BlockMatrix& H, const Vec& gradient) {
-  const Eigen::SparseMatrix<double> A = H.toSparse();
-  if (!analyzed) solver.analyzePattern(A);
-  analyzed = true;
+  const fem::BlockPattern& p = *H.pattern;
+  double* value = A.valuePtr();
+  for (int j = 0; j < p.rows(); ++j) {
+    for (int c = 0; c < free; ++c) {
+      for (int k = p.diagonal[j]; k < p.row_start[j + 1]; ++k) {
+        for (int r = k == p.diagonal[j] ? c : 0; r < free; ++r) *value++ = H.block(k)(c, r);
+      }
+    }
+  }
   solver.factorize(A);
   if (solver.info() != Eigen::Success) return Vec::Constant(gradient.size(), std::nan(""));
-  return solver.solve(-gradient);
+  Eigen::Map<const Points> g(gradient.data(), p.rows(), 3);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> b = -g.leftCols(free);
+  const Vec solution = solver.solve(Eigen::Map<const Vec>(b.data(), b.size()));
+  Points step = Points::Zero(p.rows(), 3);
+  step.leftCols(free) = Eigen::Map<const decltype(b)>(solution.data(), p.rows(), free);
+  return vectorOf(step);
 }
 
 // Energy at `at`, with measurements linearised at `from`.
@@ -193,6 +227,7 @@ double ElasticFit::Impl::energy(const Vec& at, const Vec& from, const Rows& rows
 Vec ElasticFit::Impl::lineSearch(const Vec& step, const Rows& rows, double weight,
                                  double slope) const {
   constexpr double kArmijo = 1e-4;
+  if (options.linear) return step;   // the energy is the quadratic form that the step minimises
   const double start = energy(x, x, rows, weight);
   for (double t = 1.0; t > 0.01; t *= 0.5) {
     if (energy(x + t * step, x, rows, weight) <= start + kArmijo * t * slope) return t * step;
@@ -200,9 +235,16 @@ Vec ElasticFit::Impl::lineSearch(const Vec& step, const Rows& rows, double weigh
   return Vec::Zero(step.size());
 }
 
-ElasticFit::ElasticFit(const TriangleMesh& cad, const std::function<Points(const Points&)>& placed,
+fem::VoxelGrid gridOf(const TriangleMesh& cad, int nodes) {
+  fem::VoxelizeOptions options;
+  options.target_nodes = nodes;
+  return fem::voxelize(cad, options);
+}
+
+ElasticFit::ElasticFit(const TriangleMesh& cad, const fem::VoxelGrid& grid,
+                       const std::function<Points(const Points&)>& placed,
                        const FemStageOptions& options)
-    : impl_(std::make_shared<Impl>(cad, placed, options)) {}
+    : impl_(std::make_shared<Impl>(cad, grid, placed, options)) {}
 
 FemStageReport ElasticFit::fit(const std::function<Rows(const Points&, int)>& observe) {
   Impl& m = *impl_;
@@ -217,8 +259,8 @@ FemStageReport ElasticFit::fit(const std::function<Rows(const Points&, int)>& ob
     Vec gradient;
     m.model.gradient(m.x, gradient);
     gradient *= weight;
-    BlockMatrix H(m.model.pattern());
-    m.model.viscosity(m.x, H);
+    if (!m.options.linear) m.model.viscosity(m.x, m.K);
+    BlockMatrix H = m.K;
     for (double& value : H.values) value *= weight;
     m.addRows(rows, gradient, H);
     for (int i = 0; i < m.grid.nodeCount(); ++i) {

@@ -84,4 +84,13 @@ LowOrderMap::Parameters LowOrderMap::plus(const Parameters& step) const {
   return p;
 }
 
+void LowOrderMap::absorbScale() {
+  Parameters p = p_;
+  p.segment<6>(kStrain) *= s_;
+  p.segment<3>(kStrain).array() += s_ - 1.0;
+  p.segment<18>(kQuadratic) *= s_;
+  p[kLogScale] = 0.0;
+  setParameters(p);
+}
+
 }  // namespace calipso::align

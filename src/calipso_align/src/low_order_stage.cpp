@@ -16,6 +16,13 @@ double informationOf(double deviation) {
                          : std::numeric_limits<double>::infinity();
 }
 
+// s_i of a coefficient of the deformation: what it deviates by, in units of a.
+double relativeDeviation(int i) {
+  const bool is_square = (i - (i < Map::kQuadratic ? Map::kStrain : Map::kQuadratic)) % 6 < 3;
+  if (i < Map::kQuadratic) return is_square ? 1.0 : std::sqrt(0.5);
+  return kOrderRatio * (is_square ? std::sqrt(0.75) : 1.0);
+}
+
 struct NormalEquations {
   Hessian H = Hessian::Zero();
   Map::Parameters gradient = Map::Parameters::Zero();
@@ -35,7 +42,7 @@ NormalEquations assemble(const Points& X, const Rows& rows, const Map& map) {
 }
 
 // Adds the prior, and replaces held parameters by a unit row.
-void addPrior(const Map::Parameters& info, const Map::Parameters& p, NormalEquations& normal) {
+void addPrior(const Map::Parameters& info, const Map::Parameters& off, NormalEquations& normal) {
   for (int i = 0; i < Map::kParameters; ++i) {
     if (std::isinf(info[i])) {
       normal.H.row(i).setZero();
@@ -44,37 +51,62 @@ void addPrior(const Map::Parameters& info, const Map::Parameters& p, NormalEquat
       normal.gradient[i] = 0.0;
     } else {
       normal.H(i, i) += info[i];
-      normal.gradient[i] += info[i] * p[i];
+      normal.gradient[i] += info[i] * off[i];
     }
   }
+}
+
+// a from the coefficients' deviations p and their covariance C, given the a that led to them.
+double estimateDeformation(const Map::Parameters& p, const Hessian& C, const Map::Parameters& info,
+                           double a) {
+  constexpr double kLeast = 0.002, kLargest = 0.8, kLargestChange = 2.0;
+  double sum = 0.0, gamma = 0.0;
+  for (int i = Map::kStrain; i < Map::kParameters; ++i) {
+    if (std::isinf(info[i])) continue;
+    const double s = relativeDeviation(i);
+    sum += p[i] * p[i] / (s * s);
+    gamma += std::max(0.0, 1.0 - C(i, i) * info[i]);
+  }
+  if (!(gamma > 0.0)) return a;
+  const double estimate = std::clamp(std::sqrt(sum / gamma), a / kLargestChange, a * kLargestChange);
+  return std::clamp(estimate, kLeast, kLargest);
 }
 
 }  // namespace
 
 Map::Parameters information(const LowOrderPrior& prior, const Map& map) {
   Map::Parameters info;
-  info.segment<3>(Map::kRotation).setConstant(informationOf(prior.rotation_rad));
+  const double a = prior.deformation;
+  info.segment<3>(Map::kRotation)
+      .setConstant(informationOf(std::sqrt(prior.rotation_rad * prior.rotation_rad + 0.5 * a * a)));
   info.segment<2>(Map::kTranslation).setConstant(informationOf(prior.in_plane * map.size()));
   info[Map::kTranslation + 2] = informationOf(prior.depth * map.size());
   info[Map::kLogScale] = informationOf(prior.log_scale);
-  for (int k = 0; k < 6; ++k) {
-    const bool in_plane = k == 0 || k == 1 || k == 3;
-    const double deviation = in_plane ? prior.strain : k == 2 ? prior.strain_depth : prior.shear;
-    info[Map::kStrain + k] = informationOf(deviation);
+  for (int i = Map::kStrain; i < Map::kParameters; ++i) {
+    const bool is_held = i >= Map::kQuadratic && !prior.quadratic;
+    info[i] = informationOf(is_held ? 0.0 : a * relativeDeviation(i));
   }
-  info.segment<12>(Map::kQuadratic).setConstant(informationOf(prior.quadratic));
-  info.segment<6>(Map::kQuadratic + 12).setConstant(informationOf(prior.quadratic_depth));
   return info;
+}
+
+Map::Parameters expectation(const LowOrderPrior& prior) {
+  Map::Parameters mean = Map::Parameters::Zero();
+  mean.segment<3>(Map::kStrain).setConstant(0.5 * prior.deformation * prior.deformation);
+  return mean;
 }
 
 LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
                            const LowOrderStageOptions& options, Map& map) {
-  const Map::Parameters info = information(options.prior, map);
+  LowOrderPrior prior = options.prior;
   LowOrderReport report;
   for (; report.iterations < options.iterations && !report.converged; ++report.iterations) {
-    NormalEquations normal = assemble(X, observe(map.apply(X), report.iterations), map);
-    addPrior(info, map.parameters(), normal);
-    const Map::Parameters step = -normal.H.ldlt().solve(normal.gradient);
+    const Map::Parameters info = information(prior, map);
+    NormalEquations normal =
+        assemble(X, observe(map.apply(X), report.iterations, prior.deformation), map);
+    const Map::Parameters off = map.parameters() - expectation(prior);
+    addPrior(info, off, normal);
+    const Eigen::LDLT<Hessian> factor(normal.H);
+    const Map::Parameters step = -factor.solve(normal.gradient);
     if (!step.allFinite()) break;
 
     // A step that turns or scales by more than this leaves what the linearisation describes.
@@ -84,7 +116,15 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
     const double length = scaled.lpNorm<Eigen::Infinity>();
     map.setParameters(map.plus(step * std::min(1.0, kLongestStep / std::max(length, 1e-300))));
     report.converged = length < options.smallest_step;
+    if (options.estimate_deformation) {
+      const double before = prior.deformation;
+      prior.deformation = estimateDeformation(map.parameters() - expectation(prior), factor.solve(Hessian::Identity()),
+                                              info, before);
+      constexpr double kSettled = 0.05;
+      report.converged &= std::abs(prior.deformation - before) < kSettled * before;
+    }
   }
+  report.deformation = prior.deformation;
   return report;
 }
 
@@ -92,7 +132,7 @@ Eigen::MatrixXd covariance(const Points& X, const Rows& rows, const LowOrderPrio
                            const Map& map) {
   const Map::Parameters info = information(prior, map);
   NormalEquations normal = assemble(X, rows, map);
-  addPrior(info, map.parameters(), normal);
+  addPrior(info, map.parameters() - expectation(prior), normal);
   Eigen::MatrixXd inverse = normal.H.ldlt().solve(Hessian::Identity());
   for (int i = 0; i < Map::kParameters; ++i) {
     if (!std::isinf(info[i])) continue;

@@ -8,28 +8,30 @@ namespace {
 
 constexpr double kElasticWeight = 3e3;  // of the finished fit: see FemStageOptions
 
+constexpr double kTypicalDeformation = 0.15;   // a (LowOrderPrior) before anything is known
+
+// A rough placement is up to a twentieth of the distance off, in any direction.
+double placementDepthSigma(const FitProblem& problem) {
+  return 0.05 / std::sqrt(3.0) * problem.X.col(2).mean() / LowOrderMap(problem.X).size();
+}
+
+// The model's size in the picture is made right before anything else; the distance is held meanwhile.
 LowOrderPrior similarityPrior(const FitProblem& problem, const AlignOptions& options) {
   LowOrderPrior prior;
   prior.rotation_rad = options.rotation_sigma_deg * M_PI / 180.0;
   prior.in_plane = 2.0;
   prior.log_scale = problem.depthIsKnown() ? 0.3 : 0.15;
-  // One picture does not show the depth: it is held, unless something else does.
   prior.depth = problem.depthIsKnown() ? 0.5 : 0.0;
   return prior;
 }
 
-LowOrderPrior affinePrior(const FitProblem& problem, const AlignOptions& options) {
+// From here on size is part of the deformation: how far the picture shows another size, and how far
+// another distance, follows from how well each is known.
+LowOrderPrior deformationPrior(const FitProblem& problem, const AlignOptions& options) {
   LowOrderPrior prior = similarityPrior(problem, options);
-  prior.strain = 0.25;
-  prior.shear = 0.15;
-  prior.strain_depth = problem.depth.empty() ? 0.02 : 0.25;
-  return prior;
-}
-
-LowOrderPrior quadraticPrior(const FitProblem& problem, const AlignOptions& options) {
-  LowOrderPrior prior = affinePrior(problem, options);
-  prior.quadratic = 0.3;
-  prior.quadratic_depth = problem.depth.empty() ? 0.02 : 0.3;
+  prior.log_scale = 0.0;
+  prior.depth = problem.depthIsKnown() ? 0.5 : placementDepthSigma(problem);
+  prior.deformation = kTypicalDeformation;
   return prior;
 }
 
@@ -38,6 +40,19 @@ LowOrderStageOptions stage(const LowOrderPrior& prior, int iterations) {
   options.prior = prior;
   options.iterations = iterations;
   return options;
+}
+
+LowOrderStep deformationStep(const FitProblem& problem, const AlignOptions& options, int order) {
+  LowOrderPrior prior = deformationPrior(problem, options);
+  prior.quadratic = order == 2;
+  LowOrderStep step;
+  step.name = order == 1 ? "affine" : "quadratic";
+  step.fit = stage(prior, order == 1 ? 10 : 20);
+  step.fit.estimate_deformation = true;
+  step.robust = order == 1 ? Ramp{0.06, 0.03} : Ramp{0.04, 0.015};
+  step.depth_robust = order == 1 ? Ramp{0.10, 0.05} : Ramp{0.06, 0.03};
+  step.order = order;
+  return step;
 }
 
 // Eq. 9 as it stands: pairs of nearest points, all of one weight, held to 4 px.
@@ -54,7 +69,11 @@ void makeLiteral(MeasureSettings& settings) {
 LowOrderStep literalRigidStep(const FitProblem& problem, const AlignOptions& options) {
   LowOrderPrior prior = similarityPrior(problem, options);
   prior.log_scale = 0.0;
-  return {"rigid", stage(prior, 15), {1.0, 1.0}, 0.04, {0.15, 0.10}, true};
+  LowOrderStep step;
+  step.name = "rigid";
+  step.fit = stage(prior, 15);
+  step.literal = true;
+  return step;
 }
 
 ElasticStep literalElasticStep(const AlignOptions& options) {
@@ -76,15 +95,14 @@ double Ramp::at(int k, int count) const {
 
 std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOptions& options) {
   if (options.method == Method::kLiteral) return {literalRigidStep(problem, options)};
-  return {{"similarity", stage(similarityPrior(problem, options), 12), {0.10, 0.06},
-           0.1, {0.15, 0.10}},
-          {"affine", stage(affinePrior(problem, options), 10), {0.06, 0.03},
-           0.04, {0.10, 0.05}},
-          {"quadratic", stage(quadraticPrior(problem, options), 14), {0.04, 0.015},
-           0.01, {0.06, 0.03}}};
+  LowOrderStep similarity;
+  similarity.name = "similarity";
+  similarity.fit = stage(similarityPrior(problem, options), 12);
+  return {similarity, deformationStep(problem, options, 1), deformationStep(problem, options, 2)};
 }
 
-MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, int iteration) {
+MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, int iteration,
+                           double deformation) {
   constexpr double kNarrowestPx = 4.0;  // of the robust kernel
   const double noise = problem.target.noise_px;
   MeasureSettings settings;
@@ -92,14 +110,23 @@ MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, 
       std::max(step.robust.at(iteration, step.fit.iterations) * problem.extent_px,
                kNarrowestPx + 2.0 * noise);
   settings.contour.reject_px = 3.0 * settings.contour.robust_px;
-  settings.contour_sigma_px = std::max(step.sigma * problem.extent_px, 0.5 + noise);
-  settings.contour_correlation_px = 10.0;
+
+  // What the stage's model cannot follow: the next order of the deformation, about a third of the
+  // size away from the centroid. It changes slowly along the contour, the picture's noise quickly.
+  const double a = step.order == 0 ? kTypicalDeformation : deformation;
+  const double misfit = a * std::pow(kOrderRatio, step.order) / 3.0;
+  const double misfit_px = misfit * problem.extent_px, noise_px = 0.5 + 0.5 * noise;
+  const double misfit_correlation_px = problem.extent_px / 8.0, noise_correlation_px = 10.0;
+  const double variance = misfit_px * misfit_px + noise_px * noise_px;
+  settings.contour_sigma_px = std::sqrt(variance);
+  settings.contour_correlation_px = (misfit_px * misfit_px * misfit_correlation_px +
+                                     noise_px * noise_px * noise_correlation_px) /
+                                    variance;
+  // It is the same in all measurements: none may drag the model out of another's reach.
   settings.depth_robust = step.depth_robust.at(iteration, step.fit.iterations);
-  // What the stage's model cannot follow is the same in all measurements: none may drag the model
-  // out of another's reach.
-  settings.depth_sigma = step.sigma;
+  settings.depth_sigma = std::max(settings.depth_sigma, misfit);
   settings.depth_samples = problem.target.known_length_px / settings.contour_correlation_px;
-  settings.support_sigma = std::max(settings.support_sigma, 0.1 * step.sigma);
+  settings.support_sigma = std::max(settings.support_sigma, 0.1 * misfit);
   if (step.literal) makeLiteral(settings);
   return settings;
 }
@@ -116,7 +143,8 @@ std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOpti
     ElasticStep step;
     step.fit.nodes = options.levels[level];
     step.fit.poissons_ratio = options.poissons_ratio;
-    step.fit.depth_sigma = problem.depth.empty() ? 0.1 : 1.0;
+    step.fit.hold_depth = problem.depth.empty();
+    step.fit.linear = !first || options.levels.size()==1;
     for (int k = 0; k < iterations; ++k) {
       step.fit.elastic_weights.push_back(stiffness.at(k, iterations - 2));
     }

@@ -57,7 +57,7 @@ TEST(LowOrderStage, RecoversAnAffineMapFromPoints) {
   truth.setParameters(p);
   const Points goal = truth.apply(X);
 
-  const Observe observe = [&](const Points& x, int) {
+  const Observe observe = [&](const Points& x, int, double) {
     Rows rows;
     for (int i = 0; i < x.rows(); ++i) {
       for (int k = 0; k < 3; ++k) {
@@ -67,7 +67,7 @@ TEST(LowOrderStage, RecoversAnAffineMapFromPoints) {
     return rows;
   };
   LowOrderStageOptions options;
-  options.prior = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0};
+  options.prior = {1.0, 1.0, 1.0, 1.0, 1.0, false};
   options.iterations = 30;
   options.smallest_step = 1e-9;
   LowOrderMap map(X);
@@ -78,7 +78,7 @@ TEST(LowOrderStage, RecoversAnAffineMapFromPoints) {
 
 TEST(LowOrderStage, HeldParametersStayWhereTheyAre) {
   const Points X = test::pear().vertices;
-  const Observe observe = [](const Points& x, int) {
+  const Observe observe = [](const Points& x, int, double) {
     return Rows{{0, 0, 1.0, 0.0, Eigen::Vector3d::UnitZ(), x(0, 2) - 5.0, 1.0}};
   };
   LowOrderStageOptions options;

@@ -1,6 +1,7 @@
 // rosrun calipso_align evaluate [options] PATH...   one JSON object per case and line, no roscore.
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <iostream>
 #include <random>
 #include <sstream>
@@ -145,14 +146,22 @@ double maskIou(const Truth& truth, const Points& x, const Triangles& triangles,
   return intersectionOverUnion(mask, truth.visible);
 }
 
-// Errors of the model at x; `suffix` tells before from after. The depth that no picture shows is
-// taken out when the fit had nothing else to find it from.
-void addErrors(const EvaluationCase& one, Points x, bool remove_gauge, const std::string& suffix,
+void addSurfaceError(const EvaluationCase& one, const Points& x, const Points& true_x,
+                     const std::string& suffix, JsonLine& line) {
+  const double percent = 100.0 / boundingDiagonal(one.truth->mesh);
+  const SurfaceError surface = surfaceError(x, true_x, one.cad.triangles, one.truth->mesh.triangles);
+  line.addNumber("error3d_mean_percent" + suffix, percent * surface.mean);
+  line.addNumber("error3d_rms_percent" + suffix, percent * surface.rms);
+  line.addNumber("hausdorff_percent" + suffix, percent * surface.hausdorff);
+}
+
+// Errors of the model at x; `suffix` tells before from after. In 3D also with the scale about the
+// camera's centre taken out, which one picture cannot show.
+void addErrors(const EvaluationCase& one, const Points& x, const std::string& suffix,
                JsonLine& line) {
   const Truth& truth = *one.truth;
   const MeshTopology topology(one.cad.triangles);
   const Points true_x = inCamera(one.camera, truth.world_from_object, truth.mesh);
-  const double percent = 100.0 / boundingDiagonal(truth.mesh);
   const ContourError contour = contourError(truth.contour, x, topology, one.camera);
   line.addNumber("contour_mean_px" + suffix, contour.mean_px);
   line.addNumber("contour_p95_px" + suffix, contour.p95_px);
@@ -166,11 +175,8 @@ void addErrors(const EvaluationCase& one, Points x, bool remove_gauge, const std
   line.addNumber("contour_vertex_px" + suffix, contour_vertex);
   line.addNumber("all_vertex_px" + suffix, all_vertex);
   const double gauge = depthGauge(x, true_x);
-  if (remove_gauge) x *= gauge;
-  const SurfaceError surface = surfaceError(x, true_x, one.cad.triangles, truth.mesh.triangles);
-  line.addNumber("error3d_mean_percent" + suffix, percent * surface.mean);
-  line.addNumber("error3d_rms_percent" + suffix, percent * surface.rms);
-  line.addNumber("hausdorff_percent" + suffix, percent * surface.hausdorff);
+  addSurfaceError(one, x, true_x, suffix, line);
+  addSurfaceError(one, gauge * x, true_x, suffix + "_depth_removed", line);
   line.addNumber("depth_gauge" + suffix, gauge);
   if (!truth.visible.empty()) {
     line.addNumber("mask_iou" + suffix, maskIou(truth, x, one.cad.triangles, one.camera));
@@ -185,6 +191,9 @@ void addUnknown(JsonLine& line) {
   }
 }
 
+// Processor time of all threads so far.
+double cpuMs() { return 1e3 * std::clock() / CLOCKS_PER_SEC; }
+
 std::string evaluate(const EvaluationCase& one, const Arguments& arguments, double noise_px,
                      int seed) {
   AlignOptions options = one.options;
@@ -192,8 +201,11 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   if (arguments.literal) options.method = Method::kLiteral;
   const bool random = seed > 0 && one.truth;
   const Eigen::Isometry3d rough = random ? randomRough(one, seed) : one.rough;
-  const AlignmentResult result = calipso::align::align(
-      one.cad, one.camera, rough, withNoise(one.contour, noise_px, seed), options);
+  const std::vector<ContourLoop> contour = withNoise(one.contour, noise_px, seed);
+  const double cpu_start_ms = cpuMs();
+  const AlignmentResult result =
+      calipso::align::align(one.cad, one.camera, rough, contour, options);
+  const double cpu_ms = cpuMs() - cpu_start_ms;
 
   JsonLine line;
   line.addText("case", one.name);
@@ -201,21 +213,20 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   line.addNumber("deformation_percent", one.deformation_percent);
   line.addNumber("noise_px", noise_px);
   line.addNumber("seed", static_cast<double>(seed));
-  const bool remove_gauge = !options.depth;
   if (one.truth) {
-    addErrors(one, inCamera(one.camera, rough, one.cad), remove_gauge, "_before", line);
-    addErrors(one, inCamera(one.camera, result.world_from_object, result.mesh), remove_gauge, "",
-              line);
+    addErrors(one, inCamera(one.camera, rough, one.cad), "_before", line);
+    addErrors(one, inCamera(one.camera, result.world_from_object, result.mesh), "", line);
   } else {
     addUnknown(line);
   }
-  line.addFlag("gauge_removed", remove_gauge);
   line.addNumber("segmentation_iou", one.segmentation_iou);
   line.addNumber("fit_mean_px", result.contour_mean_px);
+  line.addNumber("deformation_found", result.deformation);
   line.addFlag("trusted", result.trusted);
   line.addText("reason", result.reason);
   line.addNumber("ms_segment", one.ms_segment);
   line.addNumber("ms_align", totalMs(result));
+  line.addNumber("cpu_ms_align", cpu_ms);
   for (const StageTime& time : result.times) line.addNumber("ms " + time.stage, time.ms);
   return line.text();
 }

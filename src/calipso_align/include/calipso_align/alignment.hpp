@@ -59,6 +59,7 @@ struct AlignmentResult {
   double contour_p95_px = 0.0;
   double noise_px = 0.0;                   // estimated noise of the contour
   double scale = 1.0;                      // size of S* relative to S
+  double deformation = 0.0;                // how far S had to be deformed: r.m.s. strain, estimated
   bool trusted = false;
   std::string reason;                      // why not, and what to do
   std::vector<StageTime> times;

@@ -16,7 +16,7 @@
 //          low-order stage ended
 //  E V     Young's modulus times volume, so that Psi / (E V) is a mean squared strain
 //  lambda  what a mean squared strain of one costs, in units of r^2 w
-//  eps     holds what no picture shows: nodes along the sight line
+//  eps     keeps nodes from drifting along the sight line; where nothing shows the depth, they are held
 namespace calipso::align {
 
 struct FemStageOptions {
@@ -24,7 +24,8 @@ struct FemStageOptions {
   double poissons_ratio = 0.0;
   bool linear = false;             // constant K, as eq. 9 has it, instead of corotated elements
   std::vector<double> elastic_weights = {1e4};  // lambda, one per iteration: soft contour to stiff
-  double depth_sigma = 0.1;        // of nodes along the sight line, in model sizes, all together
+  bool hold_depth = false;         // nodes only move across the optical axis
+  double depth_sigma = 1.0;        // of nodes along the sight line, in model sizes, all together
   double smallest_step = 1e-4;     // of the model's size
 };
 
@@ -34,14 +35,18 @@ struct FemStageReport {
   bool converged = false;
 };
 
+// Cubes that cover the model, object frame.
+// @throw std::invalid_argument for a mesh that cannot be covered by a grid
+fem::VoxelGrid gridOf(const TriangleMesh& cad, int nodes);
+
 // The body on one grid.
 class ElasticFit {
  public:
-  // @param cad        stock model, object frame; the grid is laid in this frame
+  // @param cad        stock model, object frame
+  // @param grid       covers it
   // @param placed     maps points of the object frame to where the fit stands (camera frame)
-  // @throw std::invalid_argument for a mesh that cannot be covered by a grid
-  ElasticFit(const TriangleMesh& cad, const std::function<Points(const Points&)>& placed,
-             const FemStageOptions& options);
+  ElasticFit(const TriangleMesh& cad, const fem::VoxelGrid& grid,
+             const std::function<Points(const Points&)>& placed, const FemStageOptions& options);
 
   // Newton steps with re-linearised measurements; `observe` as in fitLowOrder().
   FemStageReport fit(const std::function<Rows(const Points&, int)>& observe);

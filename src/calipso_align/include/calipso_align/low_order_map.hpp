@@ -37,6 +37,8 @@ class LowOrderMap {
   Jacobian jacobian(const Eigen::Vector3d& X) const;
   // p with the increment added: rotations are composed, all others summed.
   Parameters plus(const Parameters& step) const;
+  // The same map with its scale counted as strain: s (1 + E) = 1 + E'.
+  void absorbScale();
   // The rigid and scaling part alone.
   Eigen::Matrix3d rotation() const { return R_; }
   double scale() const { return s_; }

@@ -20,15 +20,16 @@ struct Ramp {
 struct LowOrderStep {
   std::string name;
   LowOrderStageOptions fit;
-  Ramp robust;          // of the contour, parts of its extent
-  double sigma;         // what the stage's model cannot follow, parts of the extent
-  Ramp depth_robust;    // model sizes
+  Ramp robust{0.10, 0.06};         // of the contour, parts of its extent
+  Ramp depth_robust{0.15, 0.10};   // model sizes
+  int order = 0;                   // of the deformation: none, affine, quadratic
   bool literal = false; // eq. 9 as it stands
 };
 
 // Similarity, affine, quadratic.
 std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOptions& options);
-MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, int iteration);
+MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, int iteration,
+                           double deformation);
 
 struct ElasticStep {
   FemStageOptions fit;
