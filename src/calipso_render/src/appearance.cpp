@@ -58,9 +58,9 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       if (id == VisibilityBuffer::kNothing) continue;
       const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
       const float visible = sun.visibility(p.position, p.normal);
-      const cv::Vec3f l = diffuseShading(light, p.normal, visible);
+      const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.sky);
       s.light.at<cv::Vec3f>(v, u) = l;
-      s.highlight.at<cv::Vec3f>(v, u) = specularShading(light, gloss, p.normal, (eye - p.position).normalized(), visible);
+      s.highlight.at<cv::Vec3f>(v, u) = specularShading(light, gloss, p.normal, (eye - p.position).normalized(), visible, p.sky);
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
       sums[v] += cv::Vec3d(l), ++counts[v];
     }

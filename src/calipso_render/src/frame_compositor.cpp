@@ -46,8 +46,8 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
   const Light& light = prepared_.light.light;
   const float sun = surfaceSun(p, id, u, v);
-  const cv::Vec3f highlight = specularShading(light, appearance.gloss, p.normal, (eye_ - p.position).normalized(), sun);
-  return appearance.radiance(p, diffuseShading(light, p.normal, sun), highlight);
+  const cv::Vec3f highlight = specularShading(light, appearance.gloss, p.normal, (eye_ - p.position).normalized(), sun, p.sky);
+  return appearance.radiance(p, diffuseShading(light, p.normal, sun, p.sky), highlight);
 }
 
 // Something without a model stands in front: it hid the object at the key frame, and goes on doing so.

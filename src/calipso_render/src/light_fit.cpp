@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kFewestSamples = 60;
 constexpr std::size_t kStarts = 3;
+constexpr double kShadowsSpeak = 12.0;  // of log-likelihood: cast shadows are seen where this light casts them
 constexpr double kRobust = 0.15;        // relative residual beyond which a pixel counts less
 constexpr double kLogRange = 4.0;       // of a light's colour: e^4 times brighter or darker than the unit
 constexpr double kPriorWeight = 0.05;   // of one prior, as a part of all pixels
@@ -74,8 +75,10 @@ std::vector<cv::Vec3f> meanRadiance(const std::vector<LightSample>& samples, int
 
 class Fit {
  public:
-  Fit(const std::vector<LightSample>& samples, int clusters, const std::vector<Occluder>& occluders, const Eigen::Vector3f& up)
-      : samples_(samples), occluders_(occluders), up_(up.cast<double>()), means_(meanRadiance(samples, clusters)) {}
+  // @param direction_free false: cast shadows know it better
+  Fit(const LightEvidence& evidence, const Eigen::Vector3f& up, bool direction_free)
+      : evidence_(evidence), direction_free_(direction_free), up_(up.cast<double>()),
+        means_(meanRadiance(evidence.samples, evidence.clusters)) {}
 
   // Four passes, then everything; twice, since the shadows hang on the direction found.
   double run(const LightCandidate& start, Unknowns& x) {
@@ -83,7 +86,7 @@ class Fit {
     x.ambient = logOf(start.ambient), x.sun = logOf(start.sun);
     for (const cv::Vec3f& mean : means_) x.albedos.push_back(logOf(mean));
     double cost = 0.0;
-    for (int round = 0; round < 2; ++round) {
+    for (int round = 0; round < (direction_free_ ? 2 : 1); ++round) {
       using Blocks = std::array<bool, 3>;  // light, albedo, gloss free?
       ceres::Problem problem;
       build(problem, x);
@@ -96,17 +99,18 @@ class Fit {
 
  private:
   void build(ceres::Problem& problem, Unknowns& x) const {
-    const ShadowMap shadows(occluders_, x.direction, {512, 0.02, 16});
-    for (const LightSample& s : samples_) {
+    const Eigen::Vector3f l = x.direction.cast<float>();
+    for (const LightSample& s : evidence_.samples) {
       ReflectanceCost::Sample r;
       r.normal = s.normal.cast<double>(), r.view = s.view.cast<double>(), r.up = up_;
       r.radiance = Eigen::Vector3d(s.radiance[0], s.radiance[1], s.radiance[2]);
-      r.visible = shadows.visibility(s.position, s.normal);
+      r.visible = evidence_.visible ? evidence_.visible(s, l) : 1.0f;
+      r.sky = s.sky;
       r.scale = (means_[s.cluster][0] + means_[s.cluster][1] + means_[s.cluster][2]) / 3.0;
       problem.AddResidualBlock(new ReflectanceCost(r), new ceres::SoftLOneLoss(kRobust), x.direction.data(), x.ambient.data(),
                                x.sun.data(), &x.gradient, x.albedos[s.cluster].data(), x.gloss.data());
     }
-    const double weight = std::sqrt(kPriorWeight * samples_.size());
+    const double weight = std::sqrt(kPriorWeight * evidence_.samples.size());
     problem.AddResidualBlock(new Prior(kSkyGradient, 0.5 * weight), nullptr, &x.gradient);
     problem.AddResidualBlock(new GlossPrior(0.05 * weight), nullptr, x.gloss.data());
     problem.SetManifold(x.direction.data(), new ceres::SphereManifold<3>);
@@ -121,13 +125,13 @@ class Fit {
     problem.SetParameterUpperBound(x.gloss.data(), 0, std::log(0.5));
   }
 
-  static double solve(ceres::Problem& problem, Unknowns& x, const std::array<bool, 3>& free) {
+  double solve(ceres::Problem& problem, Unknowns& x, const std::array<bool, 3>& free) const {
     const auto hold = [&](double* block, bool is_free) {
       if (!problem.HasParameterBlock(block)) return;
       if (is_free) problem.SetParameterBlockVariable(block);
       else problem.SetParameterBlockConstant(block);
     };
-    hold(x.direction.data(), free[0]), hold(x.sun.data(), free[0]), hold(&x.gradient, free[0]);
+    hold(x.direction.data(), free[0] && direction_free_), hold(x.sun.data(), free[0]), hold(&x.gradient, free[0]);
     // Brightness is shared between light and albedo: the ambient light is the unit.
     hold(x.ambient.data(), free[0] && !free[1]);
     for (Eigen::Vector3d& a : x.albedos) hold(a.data(), free[1]);
@@ -142,8 +146,8 @@ class Fit {
     return summary.final_cost;
   }
 
-  const std::vector<LightSample>& samples_;
-  const std::vector<Occluder>& occluders_;
+  const LightEvidence& evidence_;
+  bool direction_free_;
   Eigen::Vector3d up_;
   std::vector<cv::Vec3f> means_;
 };
@@ -161,20 +165,30 @@ LightFit toFit(const Unknowns& x, const Eigen::Vector3f& up, double cost) {
   return fit;
 }
 
+// Fits from one start and keeps the result if it is the best so far.
+void tryStart(const LightEvidence& evidence, const Eigen::Vector3f& up, const LightCandidate& start, bool direction_free, LightFit& best) {
+  Unknowns x;
+  const double cost = Fit(evidence, up, direction_free).run(start, x);
+  if (x.direction.dot(up.cast<double>()) <= 0.0 || (best.determined && cost >= best.cost)) return;
+  const bool from_shadows = best.from_shadows;
+  best = toFit(x, up, cost);
+  best.from_shadows = from_shadows;
+}
+
 }  // namespace
 
-LightFit fitLight(const std::vector<LightSample>& samples, int clusters, const std::vector<Occluder>& occluders,
-                  const Eigen::Vector3f& up, const Eigen::Vector3f& view) {
+LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up, const Eigen::Vector3f& view) {
   LightFit best;
   best.light.direction = (up + 0.4f * view).normalized();
-  if (static_cast<int>(samples.size()) < kFewestSamples) return best;
-  Fit fit(samples, clusters, occluders, up);
-  for (const LightCandidate& start : searchLight(samples, clusters, up, kStarts)) {
-    Unknowns x;
-    const double cost = fit.run(start, x);
-    const bool above = x.direction.dot(up.cast<double>()) > 0.0;
-    if (above && (!best.determined || cost < best.cost)) best = toFit(x, up, cost);
+  if (static_cast<int>(evidence.samples.size()) < kFewestSamples) return best;
+  const std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
+  const auto shadows = [&](const LightCandidate& c) { return evidence.shadow_misfit ? evidence.shadow_misfit(c.direction) : 0.0; };
+  best.from_shadows = shadows(starts.front()) < -kShadowsSpeak;
+  if (!best.from_shadows) {
+    for (const LightCandidate& start : starts) tryStart(evidence, up, start, true, best);
   }
+  // Shading alone may lead below the horizon: then the search's direction stands, as it does where shadows tell it.
+  if (!best.determined) tryStart(evidence, up, starts.front(), false, best);
   return best;
 }
 

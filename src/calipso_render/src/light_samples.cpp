@@ -1,23 +1,27 @@
 #include <algorithm>
+#include <memory>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/light_fit.hpp"
+#include "ray_scene.hpp"
+#include "shadow_clue.hpp"
 
 namespace calipso::render {
 namespace {
 
-constexpr int kPerObject = 1500;       // samples at most
+constexpr std::size_t kPerObject = 1500;       // samples at most
 constexpr int kRim = 3;                // px of the mask's rim that are left out
 constexpr float kSaturated = 250.0f;   // code value
 constexpr int kClustersPerObject = 4;
+constexpr float kGrazingView = 0.25f;  // cosine to the viewer; flatter ones mirror more than the model knows
 
 struct Pixel {
   int u, v;
 };
 
 // Pixels well inside the object's mask that its surface covers, thinned evenly.
-std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const cv::Mat& picture, const cv::Mat& inside) {
+std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const cv::Mat& picture, const cv::Mat& inside, std::size_t limit) {
   std::vector<Pixel> pixels;
   const cv::Rect& r = buffer.region();
   for (int v = 0; v < r.height; ++v) {
@@ -27,7 +31,7 @@ std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const cv::Mat& p
       if (std::max({x[0], x[1], x[2]}) < kSaturated) pixels.push_back({u + r.x, v + r.y});
     }
   }
-  const std::size_t step = std::max<std::size_t>(1, pixels.size() / kPerObject);
+  const std::size_t step = std::max<std::size_t>(1, pixels.size() / limit);
   std::vector<Pixel> thinned;
   for (std::size_t i = 0; i < pixels.size(); i += step) thinned.push_back(pixels[i]);
   return thinned;
@@ -52,30 +56,65 @@ int clusterByColour(std::vector<LightSample>& samples, std::size_t first, int ba
   return kClustersPerObject;
 }
 
+void sampleView(const View& view, int picture, std::size_t object, std::size_t limit, std::vector<LightSample>& samples) {
+  const Actor& actor = view.actors[object];
+  const Eigen::Vector3f eye = view.camera.world_from_camera.translation().cast<float>();
+  VisibilityBuffer buffer(boundsOf(actor.screen, 0, view.picture.size()));
+  buffer.draw(actor.screen, 0);
+  cv::Mat inside;
+  cv::erode(view.labels == actor.surface->index, inside, cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
+  for (const Pixel& p : usablePixels(buffer, view.picture, inside, limit)) {
+    const int triangle = VisibilityBuffer::triangleOf(buffer.idAt(p.u, p.v));
+    const SurfacePoint s = surfacePoint(actor, triangle, p.u, p.v, eye);
+    const Eigen::Vector3f towards = (eye - s.position).normalized();
+    if (s.normal.dot(towards) < kGrazingView) continue;
+    LightSample sample{s.position, s.normal, towards, {}, 0, s.sky, picture};
+    const cv::Vec3f& code = view.picture.at<cv::Vec3f>(p.v, p.u);
+    for (int c = 0; c < 3; ++c) sample.radiance[c] = linearFromRealCode(code[c]);
+    samples.push_back(sample);
+  }
+}
+
 }  // namespace
 
-std::vector<LightSample> lightSamples(const std::vector<Actor>& actors, const cv::Mat& picture, const cv::Mat& labels,
-                                      const Camera& camera, int& clusters) {
-  const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
+std::vector<LightSample> lightSamples(const std::vector<View>& views, const std::vector<bool>& moves, int& clusters) {
   std::vector<LightSample> samples;
   clusters = 0;
-  for (const Actor& actor : actors) {
-    VisibilityBuffer buffer(boundsOf(actor.screen, 0, picture.size()));
-    buffer.draw(actor.screen, 0);
-    cv::Mat inside;
-    cv::erode(labels == actor.surface->index, inside, cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
+  for (std::size_t object = 0; object < moves.size(); ++object) {
     const std::size_t first = samples.size();
-    for (const Pixel& p : usablePixels(buffer, picture, inside)) {
-      const int triangle = VisibilityBuffer::triangleOf(buffer.idAt(p.u, p.v));
-      const SurfacePoint s = surfacePoint(actor, triangle, p.u, p.v, eye);
-      const cv::Vec3f& code = picture.at<cv::Vec3f>(p.v, p.u);
-      LightSample sample{s.position, s.normal, (eye - s.position).normalized(), {}, clusters};
-      for (int c = 0; c < 3; ++c) sample.radiance[c] = linearFromRealCode(code[c]);
-      samples.push_back(sample);
-    }
+    const std::size_t pictures = moves[object] ? views.size() : 1;
+    for (std::size_t i = 0; i < pictures; ++i) sampleView(views[i], static_cast<int>(i), object, kPerObject / pictures, samples);
+    for (std::size_t i = first; i < samples.size(); ++i) samples[i].cluster = clusters;
     clusters += clusterByColour(samples, first, clusters);
   }
   return samples;
+}
+
+LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bool>& moves,
+                            const std::vector<SupportPlane>& planes, const Background& plate) {
+  LightEvidence evidence;
+  evidence.samples = lightSamples(views, moves, evidence.clusters);
+  const auto scenes = std::make_shared<std::vector<RayScene>>();
+  const auto clues = std::make_shared<std::vector<ShadowClue>>();
+  for (const View& view : views) {
+    std::vector<Occluder> occluders;
+    for (const Actor& a : view.actors) occluders.push_back({&a.vertices, &a.surface->triangles});
+    scenes->emplace_back(occluders);
+    if (!planes.empty()) clues->emplace_back(view, planes, plate);
+  }
+  evidence.visible = [scenes](const LightSample& s, const Eigen::Vector3f& l) {
+    return (*scenes)[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
+  };
+  evidence.shadow_misfit = [scenes, clues](const Eigen::Vector3f& l) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < clues->size(); ++i) sum += (*clues)[i].misfit((*scenes)[i], l);
+    return sum;
+  };
+  for (const ShadowClue& clue : *clues) {
+    const std::vector<Eigen::Vector3f> more = clue.candidates();
+    evidence.shadow_candidates.insert(evidence.shadow_candidates.end(), more.begin(), more.end());
+  }
+  return evidence;
 }
 
 }  // namespace calipso::render

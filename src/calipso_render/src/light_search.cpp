@@ -7,9 +7,18 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kDirections = 400;     // tried over the upper hemisphere
-constexpr float kApart = 0.94f;      // cosine of the angle between two candidates
+constexpr int kDirections = 400;     // tried over the upper hemisphere, without the objects' own shadows
+constexpr std::size_t kKept = 10;    // of those, tried with them
+constexpr float kApart = 0.94f;      // cosine of the angle between two of them
+constexpr float kShadowApart = 0.9976f;  // the same between two that cast shadows speak for: 4 degrees
 constexpr float kLowestSun = 0.08f;  // sine of its elevation
+constexpr double kLeastRatio = 0.1, kMostRatio = 10.0;  // of sun to ambient light
+constexpr int kRatios = 20;
+constexpr double kShadingWeight = 50.0;  // pixels that err independently of each other
+constexpr std::size_t kSearchSamples = 1200;
+constexpr float kFirstStep = 0.08f, kLastStep = 0.006f;  // rad, of the refinement
+
+using Visible = std::function<float(const LightSample&, const Eigen::Vector3f&)>;
 
 // Evenly spread over the sphere (Fibonacci), those above the horizon.
 std::vector<Eigen::Vector3f> candidateDirections(const Eigen::Vector3f& up) {
@@ -22,74 +31,135 @@ std::vector<Eigen::Vector3f> candidateDirections(const Eigen::Vector3f& up) {
   return directions;
 }
 
-// Sums of one cluster's channel for the line I = x + y max(0, n.l).
+// Sums of one cluster's channel for I = a (p + q s): p the ambient light's profile, s = V max(0, n.l).
 struct LineSums {
-  double n = 0, s = 0, ss = 0, i = 0, si = 0, ii = 0;
+  double n = 0, i = 0, pp = 0, ps = 0, ss = 0, ip = 0, is = 0, ii = 0;
+
+  double albedo(double q) const { return std::max(0.0, ip + q * is) / std::max(pp + q * (2.0 * ps + q * ss), 1e-12); }
+  // Sum of squares at the best a, relative to the mean brightness.
+  double error(double q) const {
+    const double a = albedo(q), mean = i / n + 1e-4;
+    return std::max(0.0, ii - 2.0 * a * (ip + q * is) + a * a * (pp + q * (2.0 * ps + q * ss))) / (mean * mean);
+  }
 };
 
-struct Line {
-  double ambient, sun, error;
-};
+using ClusterSums = std::vector<std::array<LineSums, 3>>;
 
-// Least squares with both parts kept positive.
-Line fitLine(const LineSums& m) {
-  const double determinant = m.n * m.ss - m.s * m.s;
-  double sun = determinant > 1e-9 ? (m.n * m.si - m.s * m.i) / determinant : 0.0;
-  double ambient = (m.i - sun * m.s) / m.n;
-  if (sun < 0.0) sun = 0.0, ambient = m.i / m.n;
-  if (ambient < 0.0) ambient = 0.0, sun = m.ss > 0.0 ? m.si / m.ss : 0.0;
-  const double error = m.ii - 2.0 * (ambient * m.i + sun * m.si) + ambient * ambient * m.n +
-                       2.0 * ambient * sun * m.s + sun * sun * m.ss;
-  return {ambient, sun, error};
+double errorOf(const ClusterSums& sums, int channel, double q) {
+  double error = 0.0;
+  for (const auto& cluster : sums) {
+    if (cluster[channel].n >= 8) error += cluster[channel].error(q);
+  }
+  return error;
 }
 
-// One straight line per cluster and channel; the errors count relative to the cluster's brightness.
-LightCandidate evaluate(const std::vector<LightSample>& samples, int clusters, const Eigen::Vector3f& l, const Eigen::Vector3f& up) {
-  std::vector<std::array<LineSums, 3>> sums(clusters);
-  for (const LightSample& x : samples) {
-    const double diffuse = std::max(0.0f, x.normal.dot(l));
-    for (int c = 0; c < 3; ++c) {
-      LineSums& m = sums[x.cluster][c];
-      // Divided by the ambient light's assumed profile, a sample obeys the plain line.
-      const double profile = 1.0 + kSkyGradient * x.normal.dot(up);
-      const double i = x.radiance[c] / profile, s = diffuse / profile;
-      m.n += 1, m.s += s, m.ss += s * s, m.i += i, m.si += s * i, m.ii += i * i;
+// The ratio of sun to ambient light that all clusters share.
+double bestRatio(const ClusterSums& sums, int channel) {
+  double best = 0.0, best_error = errorOf(sums, channel, 0.0);
+  for (int i = 0; i <= kRatios; ++i) {
+    const double q = kLeastRatio * std::pow(kMostRatio / kLeastRatio, static_cast<double>(i) / kRatios);
+    const double error = errorOf(sums, channel, q);
+    if (error < best_error) best = q, best_error = error;
+  }
+  return best;
+}
+
+class Search {
+ public:
+  Search(const LightEvidence& evidence, const Eigen::Vector3f& up) : evidence_(evidence), up_(up) {
+    const std::size_t step = std::max<std::size_t>(1, evidence.samples.size() / kSearchSamples);
+    for (std::size_t i = 0; i < evidence.samples.size(); i += step) samples_.push_back(evidence.samples[i]);
+  }
+
+  // One albedo per cluster and channel; the errors count relative to the cluster's brightness.
+  LightCandidate byShading(const Eigen::Vector3f& l, const Visible& visible) const {
+    ClusterSums sums(evidence_.clusters);
+    for (const LightSample& x : samples_) {
+      const float cosine = x.normal.dot(l);
+      const double s = cosine > 0.0f ? cosine * (visible ? visible(x, l) : 1.0f) : 0.0f;
+      const double p = x.sky * (1.0 + kSkyGradient * x.normal.dot(up_));
+      for (int c = 0; c < 3; ++c) {
+        LineSums& m = sums[x.cluster][c];
+        const double i = x.radiance[c];
+        m.n += 1, m.i += i, m.pp += p * p, m.ps += p * s, m.ss += s * s, m.ip += i * p, m.is += i * s, m.ii += i * i;
+      }
     }
-  }
-  cv::Vec3d ambient, sun;
-  LightCandidate total;
-  total.direction = l;
-  for (const auto& cluster : sums) {
+    LightCandidate total;
+    total.direction = l;
+    double error = 0.0;
     for (int c = 0; c < 3; ++c) {
-      if (cluster[c].n < 8) continue;
-      const Line line = fitLine(cluster[c]);
-      const double mean = cluster[c].i / cluster[c].n + 1e-4;
-      total.error += line.error / (mean * mean);
-      ambient[c] += cluster[c].n * line.ambient / mean;
-      sun[c] += cluster[c].n * line.sun / mean;
+      const double q = bestRatio(sums, c);
+      error += errorOf(sums, c, q);
+      total.ambient[c] = static_cast<float>(std::max(0.1, 1.0 / (1.0 + q)));
+      total.sun[c] = static_cast<float>(std::max(0.05, q / (1.0 + q)));
     }
+    // The errors' size is not known: its likelihood is profiled out.
+    total.misfit = kShadingWeight * std::log(error / samples_.size() + 1e-6);
+    return total;
   }
-  for (int c = 0; c < 3; ++c) {
-    const double sum = std::max(ambient[c] + sun[c], 1e-9);
-    total.ambient[c] = static_cast<float>(std::max(0.1, ambient[c] / sum));
-    total.sun[c] = static_cast<float>(std::max(0.05, sun[c] / sum));
+
+  LightCandidate byAll(const Eigen::Vector3f& l) const {
+    LightCandidate candidate = byShading(l, evidence_.visible);
+    if (evidence_.shadow_misfit) candidate.misfit += evidence_.shadow_misfit(l);
+    return candidate;
   }
-  return total;
+
+  // Steps along two tangents, halved when none leads on.
+  LightCandidate refined(LightCandidate best) const {
+    for (float step = kFirstStep; step > kLastStep; step *= 0.5f) {
+      for (bool better = true; better;) {
+        better = false;
+        const Eigen::Vector3f centre = best.direction, s = centre.unitOrthogonal(), t = centre.cross(s);
+        for (const Eigen::Vector3f& d : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)}) {
+          const Eigen::Vector3f l = (centre + step * d).normalized();
+          if (l.dot(up_) < kLowestSun) continue;
+          const LightCandidate next = byAll(l);
+          if (next.misfit < best.misfit - 1e-6) best = next, better = true;
+        }
+      }
+    }
+    return best;
+  }
+
+ private:
+  const LightEvidence& evidence_;
+  Eigen::Vector3f up_;
+  std::vector<LightSample> samples_;
+};
+
+bool better(const LightCandidate& a, const LightCandidate& b) { return a.misfit < b.misfit; }
+
+// The first `count` of them that are apart from each other.
+std::vector<LightCandidate> spread(const std::vector<LightCandidate>& sorted, float apart, std::size_t count) {
+  std::vector<LightCandidate> chosen;
+  for (const LightCandidate& candidate : sorted) {
+    if (chosen.size() == count) break;
+    const bool far = std::all_of(chosen.begin(), chosen.end(), [&](const LightCandidate& b) { return b.direction.dot(candidate.direction) < apart; });
+    if (far) chosen.push_back(candidate);
+  }
+  return chosen;
 }
 
 }  // namespace
 
-std::vector<LightCandidate> searchLight(const std::vector<LightSample>& samples, int clusters, const Eigen::Vector3f& up,
-                                        std::size_t count) {
-  std::vector<LightCandidate> all, best;
-  for (const Eigen::Vector3f& l : candidateDirections(up)) all.push_back(evaluate(samples, clusters, l, up));
-  std::stable_sort(all.begin(), all.end(), [](const LightCandidate& a, const LightCandidate& b) { return a.error < b.error; });
-  for (const LightCandidate& candidate : all) {
-    const bool apart = std::all_of(best.begin(), best.end(), [&](const LightCandidate& b) { return b.direction.dot(candidate.direction) < kApart; });
-    if (apart) best.push_back(candidate);
-    if (best.size() == count) break;
+std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up, std::size_t count) {
+  const Search search(evidence, up);
+  std::vector<LightCandidate> all;
+  for (const Eigen::Vector3f& l : candidateDirections(up)) all.push_back(search.byShading(l, {}));
+  std::stable_sort(all.begin(), all.end(), better);
+  std::vector<LightCandidate> kept;
+  for (const LightCandidate& c : spread(all, kApart, kKept)) kept.push_back(search.byAll(c.direction));
+  std::vector<LightCandidate> from_shadows;
+  for (const Eigen::Vector3f& l : evidence.shadow_candidates) {
+    if (l.dot(up) > kLowestSun) from_shadows.push_back(search.byAll(l));
   }
-  return best;
+  std::stable_sort(from_shadows.begin(), from_shadows.end(), better);
+  for (const LightCandidate& c : spread(from_shadows, kShadowApart, count)) kept.push_back(c);
+  std::stable_sort(kept.begin(), kept.end(), better);
+  kept.resize(std::min(kept.size(), count));
+  for (LightCandidate& c : kept) c = search.refined(c);
+  std::stable_sort(kept.begin(), kept.end(), better);
+  return kept;
 }
 
 }  // namespace calipso::render

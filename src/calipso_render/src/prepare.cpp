@@ -13,6 +13,7 @@ namespace {
 constexpr float kShaded = 0.985f;       // visible fraction of the sun below which a pixel counts as shaded
 constexpr float kSkyShaded = 0.85f;     // the same for the sky: the dark line along a contact
 constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and model are misfit
+constexpr std::size_t kFurtherViews = 5;  // beside the key frame
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
 
 std::vector<ClipFrame> inKeyView(const ClipSample& clip, const std::vector<SupportPlane>& planes) {
@@ -128,6 +129,37 @@ std::vector<Actor> keyActors(const Prepared& p) {
   return actors;
 }
 
+// The key frame, and further frames in which the poses of all moving objects are known, evenly spaced.
+std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::Mat& key_picture) {
+  std::vector<View> views = {{key_picture, p.key_labels, p.camera, keyActors(p)}};
+  std::vector<const ClipFrame*> usable;
+  for (std::size_t i = 1; i < clip.frames().size(); ++i) {
+    const ClipFrame& f = clip.frames()[i];
+    const auto known = [&](const Surface& s) {
+      return std::any_of(f.poses.begin(), f.poses.end(), [&](const ObjectPose& o) { return o.index == s.index; });
+    };
+    bool all = !f.poses.empty();
+    for (std::size_t k = 0; k < p.surfaces.size(); ++k) all = all && (!p.moves[k] || known(p.surfaces[k]));
+    if (all) usable.push_back(&f);
+  }
+  const std::size_t count = std::min(usable.size(), kFurtherViews);
+  for (std::size_t i = 0; i < count; ++i) {
+    const ClipFrame& f = *usable[(i + 1) * usable.size() / count - 1];
+    View view{{}, f.labels, f.camera, {}};
+    f.bgr.convertTo(view.picture, CV_32F);
+    for (std::size_t k = 0; k < p.surfaces.size(); ++k) {
+      const Surface& s = p.surfaces[k];
+      Points vertices = s.key_vertices;
+      for (const ObjectPose& o : f.poses) {
+        if (p.moves[k] && o.index == s.index) vertices = transformed(s.object_vertices, o.world_from_object);
+      }
+      view.actors.push_back(makeActor(s, std::move(vertices), f.camera));
+    }
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
 // Where an object's surface should be seen at the key frame but no mask is, something stands before it.
 // The rim is left out: there the fit is not exact.
 std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p) {
@@ -187,11 +219,11 @@ std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
   return all;
 }
 
-void prepareBackground(const std::vector<ClipFrame>& frames, const cv::Mat& picture, const ShadowMap& sun,
+void prepareBackground(const std::vector<ClipFrame>& frames, const Background& seen, const cv::Mat& picture, const ShadowMap& sun,
                        const ShadowMap& sky, const RenderParams& params, Prepared& p) {
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const bool all_move = std::find(p.moves.begin(), p.moves.end(), false) == p.moves.end();
-  p.background = seenBackground(frames, any_moves, params.background);
+  p.background = seen;
   const cv::Mat visibility = planeVisibility(sun, params.planes, frames.front());
   const cv::Mat sky_visibility = planeVisibility(sky, params.planes, frames.front());
   cv::Mat shaded;
@@ -232,10 +264,12 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);
   const std::vector<Actor> actors = keyActors(p);
-  int clusters = 0;
-  const std::vector<LightSample> samples = lightSamples(actors, picture, p.key_labels, p.camera, clusters);
+  const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
+  const std::vector<View> views = viewsOf(clip, p, picture);
+  const Background seen = seenBackground(frames, any_moves, params.background);
+  const LightEvidence evidence = lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background());
   const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
-  p.light = fitLight(samples, clusters, occluders(actors), params.up.cast<float>(), view);
+  p.light = fitLight(evidence, params.up.cast<float>(), view);
   p.light.light.angular_radius = static_cast<float>(params.sun_radius);
   const ShadowMap sun(occluders(actors), p.light.light.direction.cast<double>(), {768, params.sun_radius, 16});
   const std::vector<Occluder> above = params.planes.empty() ? std::vector<Occluder>{} : occluders(actors);
@@ -243,7 +277,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const ShadowMap sky(above, up, {256, kSkyRadius, 24});
   p.fronts = frontsOf(actors, p);
   p.footprints = footprintsOf(actors, p);
-  prepareBackground(frames, picture, sun, sky, params, p);
+  prepareBackground(frames, seen, picture, sun, sky, params, p);
   p.appearances = makeAppearances(actors, picture, p.key_labels, p.camera, p.light.light, p.light.gloss, sun);
   std::vector<cv::Mat> pictures;
   for (const ClipFrame& f : frames) pictures.push_back(f.bgr);

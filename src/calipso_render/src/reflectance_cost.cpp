@@ -18,10 +18,13 @@ bool ReflectanceCost::Evaluate(double const* const* parameters, double* residual
   const double nl = std::max(0.0, s_.normal.dot(l)), height = s_.normal.dot(s_.up);
   const Lobe T = torranceSparrowLobe(s_.normal, l, s_.view, m);
 
-  const Eigen::Array3d ambient = A * (1.0 + g * height), sun = L * (s_.visible * nl);
-  const Eigen::Array3d gloss = ks * T.value * s_.visible * L;
+  const double nv = s_.normal.dot(s_.view), mirrored_height = (2.0 * nv * s_.normal - s_.view).dot(s_.up);
+  const double mirrored = ks * s_.sky * grazing(static_cast<float>(nv));
+
+  const Eigen::Array3d ambient = A * (s_.sky * (1.0 + g * height)), sun = L * (s_.visible * nl);
+  const Eigen::Array3d highlight = ks * T.value * s_.visible * L, surroundings = A * (mirrored * (1.0 + g * mirrored_height));
   Column r(residuals);
-  r = (a * (ambient + sun) + gloss - s_.radiance.array()) / s_.scale;
+  r = (a * (ambient + sun) + highlight + surroundings - s_.radiance.array()) / s_.scale;
   if (jacobians == nullptr) return true;
 
   if (jacobians[0] != nullptr) {
@@ -32,15 +35,15 @@ bool ReflectanceCost::Evaluate(double const* const* parameters, double* residual
   }
   if (jacobians[1] != nullptr) {
     Square J(jacobians[1]);
-    J = Eigen::Matrix3d((a * ambient / s_.scale).matrix().asDiagonal());
+    J = Eigen::Matrix3d(((a * ambient + surroundings) / s_.scale).matrix().asDiagonal());
   }
   if (jacobians[2] != nullptr) {
     Square J(jacobians[2]);
-    J = Eigen::Matrix3d(((a * sun + gloss) / s_.scale).matrix().asDiagonal());
+    J = Eigen::Matrix3d(((a * sun + highlight) / s_.scale).matrix().asDiagonal());
   }
   if (jacobians[3] != nullptr) {
     Column J(jacobians[3]);
-    J = a * A * height / s_.scale;
+    J = A * (a * (s_.sky * height) + mirrored * mirrored_height) / s_.scale;
   }
   if (jacobians[4] != nullptr) {
     Square J(jacobians[4]);
@@ -48,7 +51,7 @@ bool ReflectanceCost::Evaluate(double const* const* parameters, double* residual
   }
   if (jacobians[5] != nullptr) {
     Eigen::Map<Eigen::Matrix<double, 3, 2, Eigen::RowMajor>> J(jacobians[5]);
-    J.col(0) = gloss / s_.scale;
+    J.col(0) = (highlight + surroundings) / s_.scale;
     J.col(1) = ks * m * T.by_roughness * s_.visible * L / s_.scale;
   }
   return true;

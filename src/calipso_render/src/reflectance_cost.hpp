@@ -7,7 +7,8 @@
 namespace calipso::render {
 
 // What one pixel's three channels say about light and material (paper: section 6, eqs. 10, 11).
-//   r = (a E - I + ks T L V) / scale,  E = A (1 + g n.up) + L V max(0, n.l),  T: torranceSparrow(n, l, v, m)
+//   r = (a E + ks (T L V + F A (1 + g r.up) S) - I) / scale,  E = A (1 + g n.up) S + L V max(0, n.l),
+//   T: torranceSparrow(n, l, v, m),  F: grazing(n.v),  r: v mirrored at n,  V, S: visible part of sun and sky
 // Parameter blocks, colours as logarithms so that they stay positive:
 //   0  l   direction to the sun, unit, world   3
 //   1  A   ambient light                       3
@@ -20,7 +21,7 @@ class ReflectanceCost : public ceres::SizedCostFunction<3, 3, 3, 3, 1, 3, 2> {
   struct Sample {
     Eigen::Vector3d normal, view, up;  // unit, world
     Eigen::Vector3d radiance;          // I, linear B, G, R
-    double visible = 1.0;              // V
+    double visible = 1.0, sky = 1.0;   // V, S
     double scale = 1.0;
   };
   explicit ReflectanceCost(const Sample& sample) : s_(sample) {}

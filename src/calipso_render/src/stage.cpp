@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "ray_scene.hpp"
+
 namespace calipso::render {
 
 Points vertexNormals(const Points& vertices, const Triangles& triangles) {
@@ -46,6 +48,7 @@ Surface makeSurface(const ObjectModel& model) {
   surface.edges = meshEdges(surface.triangles);
   surface.key_vertices = transformed(surface.object_vertices, model.world_from_object);
   surface.key_normals = vertexNormals(surface.key_vertices, surface.triangles);
+  surface.sky = skyExposure(surface.key_vertices, surface.key_normals, surface.triangles);
   return surface;
 }
 
@@ -70,6 +73,10 @@ SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, co
     return squared > 0.0f ? Eigen::Vector3f(x * (1.0f / std::sqrt(squared))) : x;
   };
   SurfacePoint point;
+  point.triangle = triangle;
+  point.weights = w;
+  const std::vector<float>& sky = actor.surface->sky;
+  point.sky = w[0] * sky[t[0]] + w[1] * sky[t[1]] + w[2] * sky[t[2]];
   point.position = w[0] * a + w[1] * b + w[2] * c;
   point.normal = unit(mix(actor.normals));
   point.key_position = mix(actor.surface->key_vertices);

@@ -7,6 +7,7 @@
 
 #include "calipso_render/light_fit.hpp"
 #include "calipso_render/ray_shadow.hpp"
+#include "ray_scene.hpp"
 #include "reflectance_cost.hpp"
 
 namespace calipso::render {
@@ -41,7 +42,7 @@ TEST(TorranceSparrow, LobeAgreesWithItsFloatTwin) {
 TEST(ReflectanceCost, DerivativesMatchDifferences) {
   ReflectanceCost::Sample s;
   s.normal = direction(0.2, -0.3, 0.9), s.view = direction(-0.3, -0.6, 0.7), s.up = kUp;
-  s.radiance = {0.2, 0.3, 0.4}, s.visible = 0.8, s.scale = 0.3;
+  s.radiance = {0.2, 0.3, 0.4}, s.visible = 0.8, s.sky = 0.7, s.scale = 0.3;
   const ReflectanceCost cost(s);
   const int sizes[] = {3, 3, 3, 1, 3, 2};
   for (const double m : {0.15, 0.5}) {
@@ -97,14 +98,40 @@ std::vector<LightSample> ballSamples(const Eigen::Vector3f& sun) {
 
 TEST(FitLight, FindsTheSunOfABall) {
   const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
-  const LightFit fit = fitLight(ballSamples(sun), 1, {}, kUp.cast<float>(), {0, -1, 0});
+  LightEvidence evidence;
+  evidence.samples = ballSamples(sun), evidence.clusters = 1;
+  const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
   ASSERT_TRUE(fit.determined);
   EXPECT_GT(fit.light.direction.dot(sun), std::cos(2.0 * M_PI / 180.0));  // 2 degrees: the gloss prior's pull
   EXPECT_NEAR(fit.light.sun[1] / fit.light.ambient[0][1], 2.0f, 0.2f);
 }
 
+// A shadow of known direction outweighs shading that says otherwise.
+TEST(FitLight, BelievesCastShadows) {
+  const Eigen::Vector3f shading = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized(), shadow = Eigen::Vector3f(0.2f, -0.5f, 0.8f).normalized();
+  LightEvidence evidence;
+  evidence.samples = ballSamples(shading), evidence.clusters = 1;
+  evidence.shadow_misfit = [&](const Eigen::Vector3f& l) { return -2000.0 * std::max(0.0f, l.dot(shadow) - 0.99f) / 0.01; };
+  evidence.shadow_candidates = {Eigen::Vector3f(0.25f, -0.5f, 0.8f).normalized()};
+  const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
+  EXPECT_TRUE(fit.from_shadows);
+  EXPECT_GT(fit.light.direction.dot(shadow), std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
+}
+
+TEST(SkyExposure, IsFullOutsideAndLessInABox) {
+  // An open box: its floor sees part of the sky, its walls' outsides all of it.
+  const Points box = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 2}, {1, -1, 2}, {1, 1, 2}, {-1, 1, 2}, {0, 0, 0}};
+  const Triangles faces = {{8, 0, 1}, {8, 1, 2}, {8, 2, 3}, {8, 3, 0}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+  Points normals(box.size(), Eigen::Vector3f::UnitZ());
+  normals[4] = Eigen::Vector3f(-1, -1, 0).normalized();
+  const std::vector<float> sky = skyExposure(box, normals, faces);
+  EXPECT_FLOAT_EQ(sky[4], 1.0f);
+  EXPECT_LT(sky[8], 0.6f);   // form factor of the opening: 0.24, the rest partly thrown back
+  EXPECT_GT(sky[8], 0.3f);
+}
+
 TEST(FitLight, SaysWhenThereIsTooLittleToSee) {
-  const LightFit fit = fitLight({}, 0, {}, kUp.cast<float>(), {0, -1, 0});
+  const LightFit fit = fitLight({}, kUp.cast<float>(), {0, -1, 0});
   EXPECT_FALSE(fit.determined);
   EXPECT_GT(fit.light.direction.z(), 0.0f);
 }

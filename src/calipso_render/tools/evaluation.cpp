@@ -39,11 +39,11 @@ class Evaluation {
 
   Figures run() {
     prepareClip();
-    judgeBackground();
+    if (!options_.appearance_only) judgeBackground();
     judgeAppearance();
     judgeUndeformed();
     judgeMoved();
-    timeFrames();
+    if (!options_.appearance_only) timeFrames();
     return figures_;
   }
 
@@ -56,12 +56,20 @@ class Evaluation {
 
   void prepareClip() {
     ClipSample clip;
-    for (int k = 0; k < scene_.frame_count; ++k) clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.camera});
+    for (int k = 0; k < scene_.frame_count; ++k) clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.camera, posesAt(k)});
     std::vector<ObjectModel> models;
     for (const Truth::Object& o : truth_.objects) models.push_back(o.model);
     const auto start = std::chrono::steady_clock::now();
     prepared_ = std::make_shared<Prepared>(prepare(clip, models, params_));
     ms_prepare_ = elapsedMs(start);
+  }
+
+  std::vector<ObjectPose> posesAt(int k) const {
+    std::vector<ObjectPose> poses;
+    for (const Truth::Object& o : truth_.objects) {
+      if (o.poses.size() > 1) poses.push_back({o.model.index, o.poses[k]});
+    }
+    return poses;
   }
 
   // Frame k with every object in the state that `change` gives it.
@@ -190,9 +198,9 @@ class Evaluation {
       const cv::Mat drawn = renderer.composite(in).bgr, mask = in.labels != 0, inside = shrink(mask, 2);
       const auto relit = psnr(drawn, in.bgr, inside), copy = psnr(copier.composite(in).bgr, in.bgr, inside);
       keepLowest(moved, relit), keepLowest(copied, copy);
+      picture("moved_" + std::to_string(k), drawn);
       if (relit && copy) keepLowest(gain, *relit - *copy);
       keepLowest(around, psnr(drawn, in.bgr, grow(mask, kAround) & ~grow(mask, 2)));
-      if (k + kMovedStep >= scene_.frame_count) picture("moved", drawn);
     }
     put("moved_psnr_db", moved);
     put("shadow_psnr_db", around);

@@ -15,6 +15,7 @@ struct Figures {
 
 struct EvaluationOptions {
   std::string pictures;  // folder for pictures to look at; empty: none
+  bool appearance_only = false;  // leaves background and times out
 };
 
 // Runs the whole renderer on a scene folder, the true shape and masks standing in for alignment and

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -8,11 +9,18 @@
 
 namespace calipso::render {
 
+// Where an object was in a frame of the clip.
+struct ObjectPose {
+  int index = 0;  // label in the masks
+  Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
+};
+
 // One frame of the clip with what belongs to which object.
 struct ClipFrame {
   cv::Mat bgr;     // CV_8UC3
   cv::Mat labels;  // CV_8UC1: 0 none, else an object's index
   Camera camera;
+  std::vector<ObjectPose> poses = {};  // of the rigid objects that move, as far as known
 };
 
 // An evenly spaced sample of a clip of unknown length in bounded memory: when the store is full, every

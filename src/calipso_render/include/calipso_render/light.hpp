@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <opencv2/core.hpp>
 
@@ -22,6 +23,8 @@ struct Gloss {
   float roughness = 0.4f;  // m, root mean square slope of the facets
 };
 
+inline constexpr float kGrazing = 14.0f;  // of grazing()
+
 // 1, then the eight of bands 1 and 2, scaled so that band 0 is 1 (Ramamoorthi and Hanrahan 2001).
 std::array<float, 9> shBasis(const Eigen::Vector3f& n);
 
@@ -42,8 +45,16 @@ struct Lobe {
 };
 Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l, const Eigen::Vector3d& v, double m);
 
-// Radiance of the highlight: ks times the lobe times the visible sun.
+// How much more a surface mirrors at a grazing view (Schlick 1994), relative to normal incidence. One minus the
+// roughness that a rough surface keeps of it is taken as constant: the surroundings are smooth.
+inline float grazing(float n_v) {
+  const float rest = 1.0f - std::clamp(n_v, 0.0f, 1.0f), squared = rest * rest;
+  return 1.0f + kGrazing * squared * squared * rest;
+}
+
+// Radiance of the gloss: ks times the lobe times the visible sun, and the mirrored surroundings.
+// @param sun, sky visible fraction of each
 cv::Vec3f specularShading(const Light& light, const Gloss& gloss, const Eigen::Vector3f& n, const Eigen::Vector3f& view,
-                          float sun);
+                          float sun, float sky = 1.0f);
 
 }  // namespace calipso::render

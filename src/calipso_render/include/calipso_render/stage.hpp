@@ -30,6 +30,7 @@ struct Surface {
   Points object_vertices;  // object frame, m
   Points key_vertices;     // world, key frame, m
   Points key_normals;      // world, unit
+  std::vector<float> sky;  // part of the ambient light that a vertex gets past its own object
 };
 
 // @throw std::invalid_argument naming the object and what is wrong with its mesh
@@ -54,10 +55,21 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera);
 struct SurfacePoint {
   Eigen::Vector3f position, normal;          // world; the normal faces the viewer
   Eigen::Vector3f key_position, key_normal;  // world, key frame; the normal on the same side
+  float sky = 1.0f;                          // Surface::sky there
+  int triangle = -1;
+  Eigen::Vector3f weights = Eigen::Vector3f::Zero();  // barycentric
 };
 
 // The point that pixel (u, v) sees of a triangle. @param eye world position of the camera
 SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye);
+
+// One picture of the clip with its objects where they were.
+struct View {
+  cv::Mat picture;  // CV_32FC3, code values
+  cv::Mat labels;   // CV_8UC1
+  Camera camera;
+  std::vector<Actor> actors;
+};
 
 // The support plane that pixel (u, v) of the camera looks at.
 struct Receiver {

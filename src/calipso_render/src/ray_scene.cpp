@@ -1,0 +1,102 @@
+#include "ray_scene.hpp"
+
+#include <embree3/rtcore.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace calipso::render {
+namespace {
+
+constexpr float kGoldenAngle = 2.39996323f;
+constexpr float kLift = 1e-3f;       // of the scene's radius: rays start that far off the surface
+constexpr int kRayBudget = 120000;   // for the exposure of a whole mesh
+constexpr int kFewestRays = 12, kMostRays = 48;
+constexpr float kThrownBack = 0.3f;  // part of the hidden sky's light that comes back from what hides it
+
+// One single-threaded device for the process: the renderer's own loops use the cores.
+RTCDevice device() {
+  static const RTCDevice shared = rtcNewDevice("threads=1");
+  if (shared == nullptr) throw std::runtime_error("Embree has no device on this machine: light cannot be fitted");
+  return shared;
+}
+
+}  // namespace
+
+struct RayScene::Handle {
+  RTCScene scene = rtcNewScene(device());
+  ~Handle() { rtcReleaseScene(scene); }
+  void add(const Occluder& occluder) const {
+    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    const std::size_t points = occluder.vertices->size(), faces = occluder.triangles->size();
+    void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), points);
+    void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), faces);
+    if (vertices == nullptr || indices == nullptr) throw std::runtime_error("Embree could not take a mesh of " + std::to_string(faces) + " triangles");
+    std::memcpy(vertices, occluder.vertices->data(), points * 3 * sizeof(float));
+    std::memcpy(indices, occluder.triangles->data(), faces * 3 * sizeof(unsigned));
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+  }
+};
+
+RayScene::RayScene(const std::vector<Occluder>& occluders) {
+  Eigen::AlignedBox3f box;
+  for (const Occluder& o : occluders) {
+    if (o.triangles->empty()) continue;
+    if (!handle_) handle_ = std::make_unique<Handle>();
+    handle_->add(o);
+    for (const Eigen::Vector3f& p : *o.vertices) box.extend(p);
+  }
+  if (!handle_) return;
+  rtcSetSceneFlags(handle_->scene, RTC_SCENE_FLAG_ROBUST);
+  rtcCommitScene(handle_->scene);
+  centre_ = box.center();
+  radius_ = 0.5f * box.diagonal().norm();
+}
+
+RayScene::~RayScene() = default;
+RayScene::RayScene(RayScene&&) noexcept = default;
+
+bool RayScene::blocked(const Eigen::Vector3f& p, const Eigen::Vector3f& n, const Eigen::Vector3f& d) const {
+  if (!handle_) return false;
+  const Eigen::Vector3f from = p + n * (kLift * radius_), to_centre = centre_ - from;
+  const float along = to_centre.dot(d);
+  if (to_centre.squaredNorm() - along * along > radius_ * radius_ || along < -radius_) return false;
+  RTCRay r{};
+  r.org_x = from.x(), r.org_y = from.y(), r.org_z = from.z();
+  r.dir_x = d.x(), r.dir_y = d.y(), r.dir_z = d.z();
+  r.tnear = 0.0f, r.tfar = std::numeric_limits<float>::infinity(), r.mask = ~0u;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(handle_->scene, &context, &r);
+  return r.tfar < 0.0f;
+}
+
+std::vector<float> skyExposure(const Points& vertices, const Points& normals, const Triangles& triangles) {
+  const RayScene scene({{&vertices, &triangles}});
+  const int count = static_cast<int>(vertices.size());
+  const int rays = std::clamp(kRayBudget / std::max(1, count), kFewestRays, kMostRays);
+  std::vector<float> exposure(count, 1.0f);
+#pragma omp parallel for schedule(dynamic, 64)
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3f& n = normals[i];
+    if (n.squaredNorm() < 0.5f) continue;
+    const Eigen::Vector3f s = n.unitOrthogonal(), t = n.cross(s);
+    int hits = 0;
+    // Evenly spread over the disc below the hemisphere: the cosine weighs by itself (Malley).
+    for (int k = 0; k < rays; ++k) {
+      const float r2 = (k + 0.5f) / rays, r = std::sqrt(r2), a = k * kGoldenAngle;
+      hits += scene.blocked(vertices[i], n, r * std::cos(a) * s + r * std::sin(a) * t + std::sqrt(1.0f - r2) * n);
+    }
+    exposure[i] = 1.0f - (1.0f - kThrownBack) * hits / rays;
+  }
+  return exposure;
+}
+
+}  // namespace calipso::render

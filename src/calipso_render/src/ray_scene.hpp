@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "calipso_render/visibility.hpp"
+
+namespace calipso::render {
+
+// Meshes in the world at one instant, asked by rays of any direction (Embree). Thread-safe once built.
+class RayScene {
+ public:
+  // Copies what it needs. @throw std::runtime_error if Embree cannot build the scene
+  explicit RayScene(const std::vector<Occluder>& occluders);
+  ~RayScene();
+  RayScene(RayScene&&) noexcept;
+
+  // Is anything in the way from the surface point p with unit normal n along unit direction d?
+  bool blocked(const Eigen::Vector3f& p, const Eigen::Vector3f& n, const Eigen::Vector3f& d) const;
+
+ private:
+  struct Handle;
+  std::unique_ptr<Handle> handle_;  // empty: nothing is in the way
+  Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();
+  float radius_ = 0.0f;             // m, of a ball around everything
+};
+
+// Part of the sky that each vertex of a mesh sees past the mesh itself, weighted by the cosine, plus what the mesh
+// throws back of the rest. 0..1.
+std::vector<float> skyExposure(const Points& vertices, const Points& normals, const Triangles& triangles);
+
+}  // namespace calipso::render
