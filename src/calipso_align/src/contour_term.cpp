@@ -98,26 +98,53 @@ Rows contourRows(const ContourTarget& target, const std::vector<OutlinePoint>& o
   }
   if (!options.two_way) return rows;
 
-  // A part of the outline whose nearest target is unknown is hidden, and pulls nobody.
+  // A part of the outline whose nearest target is unknown may be hidden anywhere beyond it, but the
+  // object reaches at least as far as it is seen.
   const std::vector<int> data_of = nearest(model, data, options);
   const double weight = share * target.length_px / std::max<size_t>(1, outline.size());
   for (size_t k = 0; k < model.size(); ++k) {
-    if (data_of[k] < 0 || !target.points[data_of[k]].known) continue;
-    appendPair(target.points[data_of[k]], outline[k], camera, weight, options, rows);
+    if (data_of[k] < 0) continue;
+    const TargetPoint& p = target.points[data_of[k]];
+    if (!p.known && p.normal.dot(outline[k].pixel - p.pixel) > 0.0) continue;
+    appendPair(p, outline[k], camera, weight, options, rows);
   }
   return rows;
 }
 
-std::vector<double> contourResiduals(const ContourTarget& target,
-                                     const std::vector<OutlinePoint>& outline) {
+namespace {
+
+// Positions count, normals only decide between near ones.
+ContourTermOptions plainMatching() {
   ContourTermOptions options;
   options.normal_scale_px = 5.0;
+  return options;
+}
+
+}  // namespace
+
+std::vector<double> contourResiduals(const ContourTarget& target,
+                                     const std::vector<OutlinePoint>& outline) {
+  const ContourTermOptions options = plainMatching();
   const std::vector<int> match = matchTargetToOutline(target, outline, options);
   std::vector<double> residuals(target.points.size(), std::numeric_limits<double>::quiet_NaN());
   for (size_t k = 0; k < match.size(); ++k) {
     if (match[k] < 0 || !target.points[k].known) continue;
     const TargetPoint& p = target.points[k];
     residuals[k] = p.normal.dot(outline[match[k]].pixel - p.pixel);
+  }
+  return residuals;
+}
+
+std::vector<double> outlineResiduals(const ContourTarget& target,
+                                     const std::vector<OutlinePoint>& outline) {
+  const ContourTermOptions options = plainMatching();
+  const std::vector<int> match = nearest(featuresOf(outline, options.normal_scale_px),
+                                         featuresOf(target, options.normal_scale_px), options);
+  std::vector<double> residuals;
+  for (size_t k = 0; k < match.size(); ++k) {
+    if (match[k] < 0 || !target.points[match[k]].known) continue;
+    const TargetPoint& p = target.points[match[k]];
+    residuals.push_back(p.normal.dot(outline[k].pixel - p.pixel));
   }
   return residuals;
 }

@@ -79,6 +79,53 @@ bool standsOn(const SupportTarget& support, const FitProblem& problem) {
   return height && std::abs(*height) < kPlacementError * problem.X.col(2).mean();
 }
 
+// 1 / depth at a pixel; 0 where it is unknown or far away.
+double inverseDepth(const cv::Mat1f& depth, const Eigen::Vector2d& p) {
+  const cv::Point pixel(static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())));
+  if (!cv::Rect({}, depth.size()).contains(pixel)) return 0.0;
+  const float d = depth(pixel);
+  return std::isfinite(d) && d > 0.0f ? 1.0 / d : 0.0;
+}
+
+// From now on the point may be met, but pulls nobody towards the inside.
+void makeUnknown(TargetPoint& p, ContourTarget& target) {
+  if (!p.known) return;
+  p.known = false;
+  p.weight = 0.0;
+  target.known_length_px -= target.length_px / target.points.size();
+}
+
+// Where the surroundings are nearer than the object, the contour is the edge of what hides it. What
+// the object stands on is nearer too, but reaches the contour at the object's depth: the inverse depth
+// of a plane is linear in the picture.
+void markHidden(const cv::Mat1f& depth, ContourTarget& target) {
+  constexpr double kReachPx = 4.0;     // beyond the pixels that mix two surfaces
+  constexpr double kNearer = 1.05;
+  for (TargetPoint& p : target.points) {
+    const double inside = inverseDepth(depth, p.pixel - kReachPx * p.normal);
+    const double near = inverseDepth(depth, p.pixel + kReachPx * p.normal);
+    const double far = inverseDepth(depth, p.pixel + 2.0 * kReachPx * p.normal);
+    const bool is_hidden = inside > 0.0 && std::min(near, 2.0 * near - far) >= kNearer * inside;
+    if (is_hidden) makeUnknown(p, target);
+  }
+}
+
+// Where the object meets a support plane it may go on below, as a pier does under water: seen is only
+// that it reaches the plane.
+void markContacts(const cv::Mat1f& depth, const Camera& camera,
+                  const std::vector<SupportTarget>& supports, ContourTarget& target) {
+  constexpr double kReachPx = 4.0, kSameDepth = 0.03;
+  for (TargetPoint& p : target.points) {
+    const Eigen::Vector3d ray((p.pixel.x() - camera.cx) / camera.fx,
+                              (p.pixel.y() - camera.cy) / camera.fy, 1.0);
+    const double inside = inverseDepth(depth, p.pixel - kReachPx * p.normal);
+    for (const SupportTarget& support : supports) {
+      const double of_plane = support.normal.dot(ray) / support.offset;   // 1 / depth
+      if (inside > 0.0 && std::abs(of_plane / inside - 1.0) < kSameDepth) makeUnknown(p, target);
+    }
+  }
+}
+
 }  // namespace
 
 bool FitProblem::depthIsKnown() const {
@@ -109,6 +156,8 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
   problem.extent_px = extentOf(problem.target);
   if (options.depth) {
     checkDepth(options.depth->depth, camera);
+    markHidden(options.depth->depth, problem.target);
+    markContacts(options.depth->depth, camera, problem.supports, problem.target);
     problem.depth =
         makeDepthTarget(options.depth->depth, fillContour(contour, {camera.width, camera.height}));
   }

@@ -20,8 +20,8 @@ LowOrderPrior similarityPrior(const FitProblem& problem, const AlignOptions& opt
   LowOrderPrior prior;
   prior.rotation_rad = options.rotation_sigma_deg * M_PI / 180.0;
   prior.in_plane = 2.0;
-  prior.log_scale = problem.depthIsKnown() ? 0.3 : 0.15;
-  prior.depth = problem.depthIsKnown() ? 0.5 : 0.0;
+  prior.log_scale = 0.15;
+  prior.depth = problem.depthIsKnown() ? placementDepthSigma(problem) : 0.0;
   return prior;
 }
 
@@ -30,7 +30,7 @@ LowOrderPrior similarityPrior(const FitProblem& problem, const AlignOptions& opt
 LowOrderPrior deformationPrior(const FitProblem& problem, const AlignOptions& options) {
   LowOrderPrior prior = similarityPrior(problem, options);
   prior.log_scale = 0.0;
-  prior.depth = problem.depthIsKnown() ? 0.5 : placementDepthSigma(problem);
+  prior.depth = placementDepthSigma(problem);
   prior.deformation = kTypicalDeformation;
   return prior;
 }

@@ -5,6 +5,8 @@
 namespace calipso::align {
 namespace {
 
+constexpr double kReachesThrough = 5.0;   // deviations
+
 // Whether the plane reaches under the point.
 bool reachesUnder(const SupportPlane& plane, const Camera& camera, const Eigen::Vector3d& p) {
   if (!plane.x_range) return true;
@@ -58,7 +60,11 @@ Rows supportRows(const std::vector<SupportTarget>& targets, const Points& x, con
     }
     // One contact, however many vertices the mesh spends on it.
     const double weight = 1.0 / (sigma * sigma * std::max<size_t>(1, rows.size() - first));
-    for (size_t k = first; k < rows.size(); ++k) rows[k].weight = weight;
+    for (size_t k = first; k < rows.size(); ++k) {
+      // What other measurements hold far below a plane reaches through it, as a pier through water.
+      const double trust = target.stands ? 1.0 : gemanMcClure(rows[k].r, kReachesThrough * sigma);
+      rows[k].weight = weight * trust;
+    }
   }
   return rows;
 }

@@ -11,8 +11,9 @@ namespace calipso::align {
 namespace {
 
 constexpr double kLeastKnown = 0.3;      // part of the contour
-constexpr double kLeastMatched = 0.85;   // part of the known contour
-constexpr double kLargestMean = 0.006;   // of the contour's extent
+constexpr double kLeastMet = 0.8;        // part of the known contour: it may have spurs and details
+constexpr double kMostProtruding = 0.25; // part of the outline: the contour may lack thin parts
+constexpr double kLargestMeanPx = 1.0;   // on top of half the contour's noise
 constexpr double kLargestScale = 2.5;
 
 std::string percent(double part) { return std::to_string(std::lround(100.0 * part)) + " %"; }
@@ -48,9 +49,10 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
   constexpr double kFineStepPx = 0.5;
   const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
   FitQuality quality;
-  quality.residuals = contourResiduals(
-      problem.target,
-      occludingContour(x, problem.topology, rendering, problem.camera, kFineStepPx));
+  const std::vector<OutlinePoint> outline =
+      occludingContour(x, problem.topology, rendering, problem.camera, kFineStepPx);
+  quality.residuals = contourResiduals(problem.target, outline);
+  quality.tolerance_px = 2.0 + problem.target.noise_px;
   std::vector<double> sizes;
   int known = 0;
   for (size_t k = 0; k < quality.residuals.size(); ++k) {
@@ -58,7 +60,19 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
     if (std::isfinite(quality.residuals[k])) sizes.push_back(std::abs(quality.residuals[k]));
   }
   if (sizes.empty()) return quality;
-  quality.matched = static_cast<double>(sizes.size()) / known;
+  int met = 0;
+  for (const double size : sizes) {
+    if (size > quality.tolerance_px) continue;
+    quality.met_mean_px += size;
+    ++met;
+  }
+  quality.met_mean_px /= std::max(1, met);
+  quality.met = static_cast<double>(met) / known;
+  const std::vector<double> outwards = outlineResiduals(problem.target, outline);
+  quality.protruding =
+      static_cast<double>(std::count_if(outwards.begin(), outwards.end(), [&](double r) {
+        return r > quality.tolerance_px;
+      })) / std::max<size_t>(1, outwards.size());
   quality.mean_px = std::accumulate(sizes.begin(), sizes.end(), 0.0) / sizes.size();
   const auto p95 = sizes.begin() + static_cast<long>(0.95 * (sizes.size() - 1));
   std::nth_element(sizes.begin(), p95, sizes.end());
@@ -71,13 +85,16 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
   std::ostringstream reason;
   reason.precision(3);
   const double known = problem.target.known_length_px / problem.target.length_px;
-  const double allowed = std::max(1.0, kLargestMean * problem.extent_px) + problem.target.noise_px;
+  const double allowed = kLargestMeanPx + 0.5 * problem.target.noise_px;
   if (known < kLeastKnown) {
     reason << "contour mostly unknown: only " << percent(known)
            << " of it is not hidden or cut by the image border";
-  } else if (quality.matched < kLeastMatched || quality.mean_px > allowed) {
+  } else if (quality.met < kLeastMet || quality.protruding > kMostProtruding ||
+             quality.met_mean_px > allowed) {
     reason << "did not converge: the contour is off by " << quality.mean_px << " px on average, "
-           << percent(quality.matched) << " of it is matched; place the model closer";
+           << percent(quality.met) << " of it is met within " << quality.tolerance_px << " px, "
+           << percent(quality.protruding)
+           << " of the model's outline lies outside of it; place the model closer";
     if (isInPieces(contour)) reason << ", or correct the contour: it is in separate pieces";
   } else if (scale > kLargestScale || scale < 1.0 / kLargestScale) {
     reason << "size implausible: the model had to be scaled by " << scale

@@ -8,7 +8,10 @@ namespace calipso::align {
 struct FitQuality {
   std::vector<double> residuals;   // signed, per target point, px; NaN without counterpart
   double mean_px = 0.0, p95_px = 0.0;
-  double matched = 0.0;            // part of the known contour that has a counterpart
+  double tolerance_px = 0.0;       // what counts as met: the contour's noise and a little more
+  double met = 0.0;                // part of the known contour that the model meets
+  double met_mean_px = 0.0;        // of that part
+  double protruding = 0.0;         // part of the model's outline that lies outside of the contour
 };
 
 FitQuality assess(const FitProblem& problem, const Points& x);
