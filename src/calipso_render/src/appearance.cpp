@@ -3,15 +3,25 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
+#include "calipso_render/shadow_map.hpp"
 
 namespace calipso::render {
 namespace {
 
 constexpr float kMatt = 0.25f;  // part of a pixel's light that is never taken for a highlight
 constexpr int kMargin = 12;  // px around the object that albedo is extended by
+constexpr int kShadowMapSide = 768;
+constexpr std::size_t kMostTexels = 300000;  // per object
+constexpr float kDepthTolerance = 0.012f;    // of the object's extent: a point that far behind the front is hidden
+constexpr float kFlattest = 0.05f, kFull = 0.25f;  // cosine of the view from which a surface is seen, and well seen
+constexpr float kEnough = 0.3f;   // weight of a look that needs no other
+constexpr float kSeen = 1e-5f;    // sum of weights, cubed, below which a texel counts as not seen
+constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exact
+const cv::Vec3f kUnknown(0.3f, 0.3f, 0.3f);  // reflectance of an object that no picture shows
 
 // Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the first
 // pixels mix with the background and with what compression spreads.
@@ -35,14 +45,14 @@ cv::Mat trustOf(const cv::Mat& labels, int index) {
   return trust;
 }
 
+// Light on one actor's visible surface, pixel by pixel.
 struct Shaded {
   cv::Mat highlight;  // CV_32FC3: specular radiance
-  cv::Mat light;     // CV_32FC3: shading of a white surface; 0 where the object is not seen
-  cv::Mat nearness;  // CV_32FC1
+  cv::Mat light;      // CV_32FC3: shading of a white surface; 0 where the object is not seen
+  cv::Mat nearness;   // CV_32FC1
   cv::Vec3f mean;
 };
 
-// Light on one actor's visible surface, pixel by pixel.
 Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light, const Gloss& gloss,
              const ShadowMap& sun) {
   Shaded s{cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32F), {}};
@@ -72,56 +82,230 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
   return s;
 }
 
-Appearance makeAppearance(const Actor& actor, const cv::Mat& picture, const cv::Mat& labels, const Camera& camera,
-                          const Light& light, const Gloss& gloss, const ShadowMap& sun) {
-  Appearance a;
-  a.gloss = gloss;
-  a.key_camera = camera;
-  const cv::Rect all(0, 0, picture.cols, picture.rows);
-  cv::Rect mask_box = cv::boundingRect(labels == actor.surface->index);
+// The reflectance that one picture shows of an object.
+struct Reflectance {
+  cv::Rect region;
+  cv::Mat albedo;    // CV_32FC3
+  cv::Mat nearness;  // CV_32FC1: 1 / depth of the object's front, 0 = none
+  cv::Mat trust;     // CV_32FC1
+  cv::Vec3f mean_light;
+};
+
+// @param mean_light that of the key frame, where there is one
+Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light, const Gloss& gloss, const ShadowMap& sun,
+                          const std::optional<cv::Vec3f>& mean_light) {
+  Reflectance r;
+  const cv::Rect all(0, 0, view.picture.cols, view.picture.rows);
+  cv::Rect mask_box = cv::boundingRect(view.labels == actor.surface->index);
   mask_box = mask_box.empty() ? mask_box : (mask_box + cv::Size(2 * kMargin, 2 * kMargin) - cv::Point(kMargin, kMargin)) & all;
-  a.region = boundsOf(actor.screen, kMargin, picture.size()) | mask_box;
-  if (a.region.empty()) a.region = cv::Rect(0, 0, 1, 1);
-  const Shaded shaded = shade(actor, a.region, camera, light, gloss, sun);
-  a.key_nearness = shaded.nearness;
-  a.mean_light = shaded.mean;
-  const cv::Vec3f floor = lightFloor(a.mean_light);
-  cv::Mat trust = trustOf(labels, actor.surface->index)(a.region).clone();
-  cv::Mat albedo(a.region.size(), CV_32FC3, cv::Scalar::all(0));
-  for (int v = 0; v < a.region.height; ++v) {
-    for (int u = 0; u < a.region.width; ++u) {
-      if (shaded.nearness.at<float>(v, u) == 0.0f) trust.at<float>(v, u) = 0.0f;
-      const cv::Vec3f code = picture.at<cv::Vec3f>(v + a.region.y, u + a.region.x);
-      cv::Vec3f l = shaded.light.at<cv::Vec3f>(v, u);
-      if (shaded.nearness.at<float>(v, u) == 0.0f) l = a.mean_light;
-      const cv::Vec3f highlight = shaded.highlight.at<cv::Vec3f>(v, u);
+  r.region = boundsOf(actor.screen, kMargin, view.picture.size()) | mask_box;
+  if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
+  const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun);
+  r.nearness = shaded.nearness;
+  r.mean_light = mean_light.value_or(shaded.mean);
+  const cv::Vec3f floor = lightFloor(r.mean_light);
+  r.trust = trustOf(view.labels, actor.surface->index)(r.region).clone();
+  r.albedo = cv::Mat(r.region.size(), CV_32FC3, cv::Scalar::all(0));
+  for (int v = 0; v < r.region.height; ++v) {
+    for (int u = 0; u < r.region.width; ++u) {
+      if (r.nearness.at<float>(v, u) == 0.0f) {
+        r.trust.at<float>(v, u) = 0.0f;
+        continue;
+      }
+      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v + r.region.y, u + r.region.x);
+      const cv::Vec3f& l = shaded.light.at<cv::Vec3f>(v, u);
+      const cv::Vec3f& highlight = shaded.highlight.at<cv::Vec3f>(v, u);
       for (int c = 0; c < 3; ++c) {
         const float i = linearFromRealCode(code[c]);
-        albedo.at<cv::Vec3f>(v, u)[c] = std::max(i - highlight[c], kMatt * i) / (l[c] + floor[c]);
+        r.albedo.at<cv::Vec3f>(v, u)[c] = std::max(i - highlight[c], kMatt * i) / (l[c] + floor[c]);
       }
     }
   }
-  a.albedo = pushPull(albedo, trust);
+  return r;
+}
+
+// How well a picture shows a surface point: 0 not at all, 1 straight on and well inside the mask.
+struct Look {
+  float weight = 0.0f;
+  float u = 0.0f, v = 0.0f;  // in Reflectance::region
+};
+
+class TextureFill {
+ public:
+  TextureFill(const std::vector<const View*>& views, const std::vector<const Actor*>& actors, const std::vector<Reflectance>& pictures)
+      : views_(views), actors_(actors), pictures_(pictures), surface_(*actors.front()->surface) {
+    Eigen::AlignedBox3f box;
+    for (const Eigen::Vector3f& p : surface_.key_vertices) box.extend(p);
+    tolerance_ = kDepthTolerance * box.diagonal().norm();
+    two_sided_ = std::any_of(surface_.edges.begin(), surface_.edges.end(), [](const MeshEdge& e) { return e.b < 0; });
+    for (const View* v : views) camera_from_world_.push_back(v->camera.world_from_camera.inverse().cast<float>());
+  }
+
+  void run(Appearance& a) const {
+    const Camera& camera = views_[0]->camera;
+    const float depth = std::max(1e-6f, (camera_from_world_[0] * surface_.key_vertices.front()).z());
+    a.texture = SurfaceTexture(surface_.key_vertices, surface_.triangles, depth / static_cast<float>(camera.fx), kMostTexels);
+    const std::vector<MirrorPlane> planes = mirrorPlanes(surface_.key_vertices, surface_.triangles);
+    std::vector<char> from(a.texture.size(), kFilled);
+#pragma omp parallel for schedule(static)
+    for (int t = 0; t < a.texture.triangleCount(); ++t) {
+      for (std::size_t i = a.texture.firstOf(t); i < a.texture.firstOf(t + 1); ++i) {
+        from[i] = look(t, a.texture.weightsOf(t, i - a.texture.firstOf(t)), planes, a.albedo, a.texture.texels[i]);
+      }
+    }
+    fillUnseen(from, a.texture);
+    const auto part = [&](char kind) { return static_cast<float>(std::count(from.begin(), from.end(), kind)) / std::max<std::size_t>(1, from.size()); };
+    a.seen_in_key = part(kKey), a.seen_elsewhere = part(kElsewhere), a.mirrored = part(kMirrored);
+  }
+
+ private:
+  enum From : char { kFilled, kKey, kElsewhere, kMirrored };
+
+  Look lookAt(std::size_t view, const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
+    const Reflectance& r = pictures_[view];
+    const Camera& camera = views_[view]->camera;
+    const Eigen::Vector3f q = camera_from_world_[view] * p;
+    if (!(q.z() > 0.0f)) return {};
+    const float facing = -n.dot(views_[view]->camera.world_from_camera.linear().cast<float>() * q) / q.norm();
+    const float cosine = two_sided_ ? std::abs(facing) : facing;
+    if (cosine < kFlattest) return {};
+    const Eigen::Vector2d pixel = camera.project(q.cast<double>());
+    Look look{0.0f, static_cast<float>(pixel.x()) - r.region.x, static_cast<float>(pixel.y()) - r.region.y};
+    const int u = static_cast<int>(std::lround(std::clamp(look.u, -9.0f, r.region.width + 9.0f)));
+    const int v = static_cast<int>(std::lround(std::clamp(look.v, -9.0f, r.region.height + 9.0f)));
+    float trust = 0.0f;
+    bool front = false;
+    for (int y = std::max(0, v - 1); y <= std::min(r.region.height - 1, v + 1); ++y) {
+      for (int x = std::max(0, u - 1); x <= std::min(r.region.width - 1, u + 1); ++x) {
+        const float near = r.nearness.at<float>(y, x);
+        if (near <= 0.0f || q.z() > 1.0f / near + tolerance_) continue;
+        front = true;
+        trust = std::max(trust, r.trust.at<float>(y, x));
+      }
+    }
+    look.weight = front ? trust * std::min(1.0f, (cosine - kFlattest) / (kFull - kFlattest)) : 0.0f;
+    return look;
+  }
+
+  From look(int triangle, const Eigen::Vector3f& w, const std::vector<MirrorPlane>& planes, const cv::Mat& key_albedo, cv::Vec4f& texel) const {
+    const Eigen::Vector3i& t = surface_.triangles[triangle];
+    const auto mix = [&](const Points& x) -> Eigen::Vector3f { return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]]; };
+    cv::Vec3f sum;
+    float total = 0.0f, key = 0.0f;
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      const Look l = lookAt(i, mix(actors_[i]->vertices), mix(actors_[i]->normals).normalized());
+      if (l.weight <= 0.0f) continue;
+      const float weight = l.weight * l.weight * l.weight * (i == 0 ? 1.0f : kFurther);
+      sum += sampleBicubic(i == 0 ? key_albedo : pictures_[i].albedo, l.u, l.v) * weight;
+      total += weight;
+      if (i == 0) key = l.weight;
+    }
+    const float by_key = std::clamp(key / kEnough, 0.0f, 1.0f);
+    if (total > kSeen) {
+      texel = cv::Vec4f(sum[0] / total, sum[1] / total, sum[2] / total, by_key);
+      return key > 0.0f ? kKey : kElsewhere;
+    }
+    const Eigen::Vector3f p = mix(surface_.key_vertices), n = mix(surface_.key_normals).normalized();
+    for (const MirrorPlane& plane : planes) {
+      const Eigen::Vector3f image = p - 2.0f * (plane.normal.dot(p) - plane.offset) * plane.normal;
+      const Look l = lookAt(0, image, n - 2.0f * plane.normal.dot(n) * plane.normal);
+      if (l.weight < kEnough) continue;
+      const cv::Vec3f c = sampleBicubic(key_albedo, l.u, l.v);
+      texel = cv::Vec4f(c[0], c[1], c[2], 0.0f);
+      return kMirrored;
+    }
+    return kFilled;
+  }
+
+  // What no picture shows continues the surface around it.
+  void fillUnseen(const std::vector<char>& from, SurfaceTexture& texture) const {
+    const Triangles& triangles = surface_.triangles;
+    std::vector<cv::Vec3f> values(surface_.key_vertices.size());
+    std::vector<int> parts(values.size(), 0);
+    for (int t = 0; t < texture.triangleCount(); ++t) {
+      for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
+        if (from[i] == kFilled) continue;
+        Eigen::Index corner;
+        const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
+        w.maxCoeff(&corner);
+        const cv::Vec4f& c = texture.texels[i];
+        values[triangles[t][corner]] += cv::Vec3f(c[0], c[1], c[2]), ++parts[triangles[t][corner]];
+      }
+    }
+    std::vector<bool> known(values.size(), false);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (parts[i] > 0) values[i] *= 1.0f / parts[i], known[i] = true;
+    }
+    if (std::find(known.begin(), known.end(), true) == known.end()) std::fill(values.begin(), values.end(), kUnknown);
+    else diffuseOverMesh(surface_.key_vertices, triangles, known, values);
+    for (int t = 0; t < texture.triangleCount(); ++t) {
+      for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
+        if (from[i] != kFilled) continue;
+        const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
+        const cv::Vec3f c = values[triangles[t][0]] * w[0] + values[triangles[t][1]] * w[1] + values[triangles[t][2]] * w[2];
+        texture.texels[i] = cv::Vec4f(c[0], c[1], c[2], 0.0f);
+      }
+    }
+  }
+
+  const std::vector<const View*>& views_;
+  const std::vector<const Actor*>& actors_;
+  const std::vector<Reflectance>& pictures_;
+  const Surface& surface_;
+  std::vector<Eigen::Isometry3f> camera_from_world_;
+  float tolerance_ = 0.0f;  // m
+  bool two_sided_ = false;  // an open sheet is seen from both sides
+};
+
+Appearance makeAppearance(const std::vector<View>& views, const std::vector<ShadowMap>& suns, std::size_t object, bool moves,
+                          const Light& light, const Gloss& gloss) {
+  Appearance a;
+  a.gloss = gloss;
+  a.key_camera = views[0].camera;
+  std::vector<const View*> used;
+  std::vector<const Actor*> actors;
+  std::vector<Reflectance> pictures;
+  for (std::size_t i = 0; i < (moves ? views.size() : 1); ++i) {
+    used.push_back(&views[i]);
+    actors.push_back(&views[i].actors[object]);
+    const std::optional<cv::Vec3f> mean = i == 0 ? std::nullopt : std::make_optional(a.mean_light);
+    pictures.push_back(reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean));
+    if (i == 0) a.mean_light = pictures[0].mean_light;
+  }
+  a.region = pictures[0].region;
+  a.albedo = pushPull(pictures[0].albedo, pictures[0].trust);
+  TextureFill(used, actors, pictures).run(a);
   return a;
 }
 
 }  // namespace
 
-std::vector<Appearance> makeAppearances(const std::vector<Actor>& key, const cv::Mat& picture, const cv::Mat& labels,
-                                        const Camera& camera, const Light& light, const Gloss& gloss,
-                                        const ShadowMap& sun) {
+std::vector<Appearance> makeAppearances(const std::vector<View>& views, const std::vector<bool>& moves, const Light& light, const Gloss& gloss) {
+  std::vector<ShadowMap> suns;
+  for (const View& view : views) {
+    std::vector<Occluder> occluders;
+    for (const Actor& a : view.actors) occluders.push_back({&a.vertices, &a.surface->triangles});
+    suns.emplace_back(occluders, light.direction.cast<double>(), ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
+  }
   std::vector<Appearance> appearances;
-  for (const Actor& actor : key) appearances.push_back(makeAppearance(actor, picture, labels, camera, light, gloss, sun));
+  for (std::size_t i = 0; i < moves.size(); ++i) appearances.push_back(makeAppearance(views, suns, i, moves[i], light, gloss));
   return appearances;
 }
 
-cv::Vec3f Appearance::albedoAt(const Eigen::Vector3f& key_position) const {
+cv::Vec3f Appearance::pictureAt(const Eigen::Vector3f& key_position) const {
   const Eigen::Vector2d q = key_camera.projectWorld(key_position.cast<double>());
   return sampleBicubic(albedo, static_cast<float>(q.x()) - region.x, static_cast<float>(q.y()) - region.y);
 }
 
+cv::Vec3f Appearance::albedoAt(const SurfacePoint& point) const {
+  const cv::Vec4f texel = texture.at(point.triangle, point.weights);
+  if (texel[3] > 0.999f) return pictureAt(point.key_position);
+  const cv::Vec3f filled(texel[0], texel[1], texel[2]);
+  return texel[3] < 0.001f ? filled : filled * (1.0f - texel[3]) + pictureAt(point.key_position) * texel[3];
+}
+
 cv::Vec3f Appearance::radiance(const SurfacePoint& point, const cv::Vec3f& now, const cv::Vec3f& highlight) const {
-  return albedoAt(point.key_position).mul(now + lightFloor(mean_light)) + highlight;
+  return albedoAt(point).mul(now + lightFloor(mean_light)) + highlight;
 }
 
 cv::Vec3f sampleBicubic(const cv::Mat& image, float u, float v) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calipso_render/renderer.hpp"
+#include "calipso_render/visibility.hpp"
 #include "plane_view.hpp"
 
 namespace calipso::render {

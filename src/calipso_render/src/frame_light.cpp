@@ -8,6 +8,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/ray_shadow.hpp"
+#include "calipso_render/shadow_map.hpp"
 #include "frame_compositor.hpp"
 #include "view_warp.hpp"
 

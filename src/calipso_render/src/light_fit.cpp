@@ -189,6 +189,8 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up, cons
   }
   // Shading alone may lead below the horizon: then the search's direction stands, as it does where shadows tell it.
   if (!best.determined) tryStart(evidence, up, starts.front(), false, best);
+  if (!best.determined || !evidence.gloss) return best;
+  if (const std::optional<Gloss> gloss = evidence.gloss(best)) best.gloss = *gloss;
   return best;
 }
 

@@ -4,6 +4,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/light_fit.hpp"
+#include "gloss_fit.hpp"
 #include "ray_scene.hpp"
 #include "shadow_clue.hpp"
 
@@ -109,6 +110,9 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
     double sum = 0.0;
     for (std::size_t i = 0; i < clues->size(); ++i) sum += (*clues)[i].misfit((*scenes)[i], l);
     return sum;
+  };
+  evidence.gloss = [&views, moves, samples = evidence.samples, visible = evidence.visible](const LightFit& fit) {
+    return fitGloss(highlightSamples(views, moves, samples, fit.light.direction), fit, visible);
   };
   for (const ShadowClue& clue : *clues) {
     const std::vector<Eigen::Vector3f> more = clue.candidates();

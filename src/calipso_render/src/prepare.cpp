@@ -5,6 +5,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/renderer.hpp"
+#include "calipso_render/shadow_map.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -278,7 +279,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.fronts = frontsOf(actors, p);
   p.footprints = footprintsOf(actors, p);
   prepareBackground(frames, seen, picture, sun, sky, params, p);
-  p.appearances = makeAppearances(actors, picture, p.key_labels, p.camera, p.light.light, p.light.gloss, sun);
+  p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   std::vector<cv::Mat> pictures;
   for (const ClipFrame& f : frames) pictures.push_back(f.bgr);
   p.noise = NoiseModel::estimate(pictures, steadiness > 1);

@@ -1,4 +1,5 @@
 #include "calipso_render/renderer.hpp"
+#include "calipso_render/shadow_map.hpp"
 
 #include <gtest/gtest.h>
 

@@ -16,7 +16,8 @@ namespace {
 constexpr int kSeam = 3;             // px on either side of the silhouette
 constexpr int kRim = 3;              // px of a mask's rim that "inside" leaves out
 constexpr int kAround = 40;          // px around a moved object in which its shadow is judged
-constexpr int kMovedStep = 4;        // every so many frames of a moving object are drawn again
+constexpr int kMovedFirst = 3, kMovedStep = 4;  // frames of a moving object that are drawn again: odd ones, which a
+                                                // clip sample of more than 24 frames leaves out
 constexpr int kFlickerFrames = 8;
 constexpr double kFlickers = 0.3;    // code values of true change from which flicker is judged
 
@@ -168,6 +169,21 @@ class Evaluation {
     put("seam_drawn_psnr_db", psnr(drawn, in.bgr, seam));
   }
 
+  // Appearances from the key frame alone, under p's light.
+  std::vector<Appearance> keyAppearances(const Prepared& p) const {
+    std::vector<View> views(1);
+    loadFrame(scene_, 0).convertTo(views[0].picture, CV_32F);
+    views[0].labels = p.key_labels, views[0].camera = scene_.camera;
+    for (const Surface& s : p.surfaces) views[0].actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
+    return makeAppearances(views, p.moves, p.light.light, p.light.gloss);
+  }
+
+  std::shared_ptr<Prepared> fromKeyFrame() const {
+    auto key = std::make_shared<Prepared>(*prepared_);
+    key->appearances = keyAppearances(*key);
+    return key;
+  }
+
   // The same texture without light: what copying pixels would give.
   std::shared_ptr<Prepared> unlit() const {
     auto flat = std::make_shared<Prepared>(*prepared_);
@@ -175,19 +191,16 @@ class Evaluation {
     flat->light.gloss = {};
     flat->light.light.ambient = {};
     flat->light.light.ambient[0] = {1, 1, 1};
-    std::vector<Actor> actors;
-    for (const Surface& s : flat->surfaces) actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
-    const ShadowMap none({}, Eigen::Vector3d::UnitZ(), {});
-    cv::Mat key;
-    loadFrame(scene_, 0).convertTo(key, CV_32F);
-    flat->appearances = makeAppearances(actors, key, flat->key_labels, scene_.camera, flat->light.light, {}, none);
+    for (Surface& s : flat->surfaces) std::fill(s.sky.begin(), s.sky.end(), 1.0f);
+    flat->appearances = keyAppearances(*flat);
     return flat;
   }
 
   void judgeMoved() {
-    std::optional<double> moved, around, copied, gain;
-    Renderer renderer(prepared_, without(false, false)), copier(unlit(), without(false, false));
-    for (int k = kMovedStep; k < scene_.frame_count; k += kMovedStep) {
+    std::optional<double> moved, around, copied, gain, from_clip;
+    const RenderParams bare = without(false, false);
+    Renderer renderer(fromKeyFrame(), bare), clip_renderer(prepared_, bare), copier(unlit(), bare);
+    for (int k = kMovedFirst; k < scene_.frame_count; k += kMovedStep) {
       const auto followTruth = [&](std::size_t i, ObjectInFrame& o) {
         const auto& poses = truth_.objects[i].poses;
         o.edited = poses.size() > 1;
@@ -198,12 +211,14 @@ class Evaluation {
       const cv::Mat drawn = renderer.composite(in).bgr, mask = in.labels != 0, inside = shrink(mask, 2);
       const auto relit = psnr(drawn, in.bgr, inside), copy = psnr(copier.composite(in).bgr, in.bgr, inside);
       keepLowest(moved, relit), keepLowest(copied, copy);
-      picture("moved_" + std::to_string(k), drawn);
       if (relit && copy) keepLowest(gain, *relit - *copy);
+      keepLowest(from_clip, psnr(clip_renderer.composite(in).bgr, in.bgr, inside));
       keepLowest(around, psnr(drawn, in.bgr, grow(mask, kAround) & ~grow(mask, 2)));
+      picture("moved_" + std::to_string(k), drawn);
     }
     put("moved_psnr_db", moved);
     put("shadow_psnr_db", around);
+    put("moved_from_clip_psnr_db", from_clip);
     put("moved_copied_psnr_db", copied);
     put("relighting_gain_db", gain);
   }

@@ -4,40 +4,42 @@
 #include <vector>
 
 #include "calipso_render/light.hpp"
-#include "calipso_render/shadow_map.hpp"
 #include "calipso_render/stage.hpp"
+#include "calipso_render/surface_texture.hpp"
 
 namespace calipso::render {
 
-// An object's reflectance as a picture: the key frame, its highlights taken off, divided by the light
-// that fell on the surface there. A surface point is coloured by the pixel in which the key frame's
-// camera saw it, so that what is drawn where it was seen is the key frame again. A point that was not
-// seen takes the reflectance of the surface in front of it: continuous at the silhouette.
+// An object's reflectance: a picture, the key frame with its highlights taken off divided by the light that fell on the
+// surface there, and a texture on the mesh. What the key frame's camera saw takes its colour from the picture, so that
+// drawn there it is the key frame again; the rest takes it from the texture: from further frames, by symmetry, or
+// smoothly from the surface around it.
 class Appearance {
  public:
   // Pixel-wise reflectance (linear; CV_32FC3), extended beyond the silhouette.
   cv::Mat albedo;
   cv::Rect region;       // of the key frame's picture that albedo covers
-  cv::Mat key_nearness;  // CV_32FC1 over region: 1/depth of the object's front at the key frame, 0 = none
+  SurfaceTexture texture;  // reflectance, and how far the picture is to be taken instead (0..1)
   Camera key_camera;
   cv::Vec3f mean_light;  // average shading over the seen surface: regularises the relighting
   Gloss gloss;
+  float seen_in_key = 0.0f, seen_elsewhere = 0.0f, mirrored = 0.0f;  // parts of the texture's texels; the rest is filled
 
   // Linear radiance of the point under diffuse shading `now` with highlight `highlight` at its place.
   cv::Vec3f radiance(const SurfacePoint& point, const cv::Vec3f& now, const cv::Vec3f& highlight) const;
 
-  // Linear reflectance of a surface point given at the key frame.
-  cv::Vec3f albedoAt(const Eigen::Vector3f& key_position) const;
+  // Linear reflectance of a surface point.
+  cv::Vec3f albedoAt(const SurfacePoint& point) const;
+
+ private:
+  cv::Vec3f pictureAt(const Eigen::Vector3f& key_position) const;
 };
 
 // Keeps relighting finite where the key frame's light was weak: albedo = I / (S + floor).
 inline cv::Vec3f lightFloor(const cv::Vec3f& mean_light) { return mean_light * 0.05f; }
 
-// @param key all objects at the key frame; @param picture CV_32FC3, code values
-// @param labels CV_8UC1 key frame; @param sun shadows at the key frame
-std::vector<Appearance> makeAppearances(const std::vector<Actor>& key, const cv::Mat& picture, const cv::Mat& labels,
-                                        const Camera& camera, const Light& light, const Gloss& gloss,
-                                        const ShadowMap& sun);
+// @param views the key frame, then frames in which the objects that `moves` names are seen from other sides
+std::vector<Appearance> makeAppearances(const std::vector<View>& views, const std::vector<bool>& moves, const Light& light,
+                                        const Gloss& gloss);
 
 // Bicubic (Catmull-Rom) lookup with borders repeated. (u, v) in the image's own pixels.
 cv::Vec3f sampleBicubic(const cv::Mat& image, float u, float v);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct LightSample {
 // @param clusters out: number of clusters
 std::vector<LightSample> lightSamples(const std::vector<View>& views, const std::vector<bool>& moves, int& clusters);
 
+struct LightFit;
+
 // All that the pictures show of the light.
 struct LightEvidence {
   std::vector<LightSample> samples;
@@ -33,6 +36,8 @@ struct LightEvidence {
   // How badly cast shadows agree with a sun in direction l: minus a log-likelihood, 0 = no shadow was seen; may be empty.
   std::function<double(const Eigen::Vector3f& l)> shadow_misfit;
   std::vector<Eigen::Vector3f> shadow_candidates;  // directions that cast shadows speak for
+  // Gloss from the pixels near the mirror direction, under a light found; may be empty, and find none.
+  std::function<std::optional<Gloss>(const LightFit&)> gloss;
 };
 
 // What views, one or several, show. @param plate what was seen of the place without the objects, from the key frame's

@@ -1,0 +1,194 @@
+#include "gloss_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kRim = 1;               // px of the mask's rim that are left out
+constexpr float kSaturated = 0.95f;   // linear; the surface may be brighter than that
+constexpr float kNearMirror = 0.85f;  // cosine between normal and half vector
+constexpr std::size_t kMost = 2500;
+constexpr std::size_t kFewest = 30;
+constexpr double kSmoothest = 0.03, kRoughest = 0.7;  // m
+constexpr int kRoughnesses = 24;
+constexpr int kReweightings = 3;
+constexpr double kOutlier = 0.15;     // of the cluster's brightness
+constexpr double kSharp = 0.98;       // of the worst roughness' error: less must remain, or the roughness is not told
+constexpr double kExplained = 0.97;   // of the error without gloss: less must remain, or no highlight was seen
+
+struct NormalMap {
+  cv::Rect region;
+  cv::Mat normals;    // CV_32FC3; 0 where the object is not seen
+  cv::Mat triangles;  // CV_32SC1
+};
+
+NormalMap normalMap(const View& view, const Actor& actor, const Eigen::Vector3f& eye) {
+  NormalMap map;
+  map.region = boundsOf(actor.screen, 1, view.picture.size());
+  map.normals = cv::Mat::zeros(map.region.size(), CV_32FC3);
+  map.triangles = cv::Mat(map.region.size(), CV_32S, cv::Scalar(-1));
+  VisibilityBuffer buffer(map.region);
+  buffer.draw(actor.screen, 0);
+  for (int v = 0; v < map.region.height; ++v) {
+    for (int u = 0; u < map.region.width; ++u) {
+      const std::uint32_t id = buffer.ids(v)[u];
+      if (id == VisibilityBuffer::kNothing) continue;
+      map.triangles.at<int>(v, u) = VisibilityBuffer::triangleOf(id);
+      const Eigen::Vector3f n = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + map.region.x, v + map.region.y, eye).normal;
+      map.normals.at<cv::Vec3f>(v, u) = {n.x(), n.y(), n.z()};
+    }
+  }
+  return map;
+}
+
+// Turn of the normal across a pixel, as the deviation of a uniform spread over it.
+float spreadAt(const cv::Mat& normals, int u, int v) {
+  double sum = 0.0;
+  int count = 0;
+  const cv::Vec3f& here = normals.at<cv::Vec3f>(v, u);
+  for (const cv::Point d : {cv::Point(1, 0), cv::Point(-1, 0), cv::Point(0, 1), cv::Point(0, -1)}) {
+    const int x = u + d.x, y = v + d.y;
+    if (x < 0 || y < 0 || x >= normals.cols || y >= normals.rows) continue;
+    const cv::Vec3f& there = normals.at<cv::Vec3f>(y, x);
+    if (there.dot(there) == 0.0f) continue;
+    const cv::Vec3f turn = there - here;
+    sum += turn.dot(turn), ++count;
+  }
+  return count > 0 ? static_cast<float>(std::sqrt(sum / count / 12.0)) : 0.0f;
+}
+
+int nearestCluster(const std::vector<LightSample>& samples, int picture, const Eigen::Vector3f& p) {
+  float best = 1e30f;
+  int cluster = -1;
+  for (const LightSample& s : samples) {
+    const float squared = s.picture == picture ? (s.position - p).squaredNorm() : 1e30f;
+    if (squared < best) best = squared, cluster = s.cluster;
+  }
+  return cluster;
+}
+
+void collect(const View& view, int picture, const Actor& actor, const Eigen::Vector3f& light, std::vector<HighlightSample>& highlights) {
+  const Eigen::Vector3f eye = view.camera.world_from_camera.translation().cast<float>();
+  const NormalMap map = normalMap(view, actor, eye);
+  cv::Mat inside;
+  cv::erode(view.labels == actor.surface->index, inside, cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
+  for (int v = 0; v < map.region.height; ++v) {
+    for (int u = 0; u < map.region.width; ++u) {
+      const int triangle = map.triangles.at<int>(v, u);
+      if (triangle < 0 || inside.at<std::uint8_t>(v + map.region.y, u + map.region.x) == 0) continue;
+      const SurfacePoint s = surfacePoint(actor, triangle, u + map.region.x, v + map.region.y, eye);
+      const Eigen::Vector3f towards = (eye - s.position).normalized();
+      if (s.normal.dot((light + towards).normalized()) < kNearMirror || s.normal.dot(light) <= 0.0f) continue;
+      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v + map.region.y, u + map.region.x);
+      HighlightSample h{{s.position, s.normal, towards, {}, -1, s.sky, picture}, spreadAt(map.normals, u, v)};
+      for (int c = 0; c < 3; ++c) h.at.radiance[c] = linearFromRealCode(code[c]);
+      highlights.push_back(h);
+    }
+  }
+}
+
+// I_c = x_k a_kc E_c + ks G_c, linear in the clusters' brightness x and in ks.
+struct Row {
+  int cluster;
+  cv::Vec3f diffuse, radiance, sun, mirrored;  // a E; I; L V; F A S
+  double scale;
+};
+
+struct Solution {
+  double strength = 0.0, cost = 1e30;
+};
+
+// @param lobe per row; nullptr: no gloss
+Solution solve(const std::vector<Row>& rows, const std::vector<double>* lobe, int clusters) {
+  std::vector<double> weights(rows.size(), 1.0);
+  Solution solution;
+  for (int round = 0; round < kReweightings; ++round) {
+    // The clusters' unknowns are eliminated: each meets only itself and ks.
+    std::vector<double> dd(clusters, 1e-9), dg(clusters, 0.0), di(clusters, 0.0);
+    double gg = 1e-12, gi = 0.0;
+    const auto glossOf = [&](std::size_t i, int c) { return lobe == nullptr ? 0.0 : rows[i].sun[c] * (*lobe)[i] + rows[i].mirrored[c]; };
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double w = weights[i] / (rows[i].scale * rows[i].scale);
+      for (int c = 0; c < 3; ++c) {
+        const double d = rows[i].diffuse[c], g = glossOf(i, c), x = rows[i].radiance[c];
+        dd[rows[i].cluster] += w * d * d, dg[rows[i].cluster] += w * d * g, di[rows[i].cluster] += w * d * x, gg += w * g * g, gi += w * g * x;
+      }
+    }
+    double left = gg, right = gi;
+    for (int k = 0; k < clusters; ++k) left -= dg[k] * dg[k] / dd[k], right -= dg[k] * di[k] / dd[k];
+    solution.strength = left > 1e-12 ? std::max(0.0, right / left) : 0.0;
+    solution.cost = 0.0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const int k = rows[i].cluster;
+      const double brightness = (di[k] - solution.strength * dg[k]) / dd[k];
+      double squared = 0.0;
+      for (int c = 0; c < 3; ++c) {
+        const double r = (brightness * rows[i].diffuse[c] + solution.strength * glossOf(i, c) - rows[i].radiance[c]) / rows[i].scale;
+        if (r < 0.0 || rows[i].radiance[c] < kSaturated) squared += r * r;
+      }
+      // Cauchy's loss: a highlight that is not explained goes on counting.
+      const double bound = 3.0 * kOutlier * kOutlier;
+      solution.cost += bound * std::log1p(squared / bound);
+      weights[i] = bound / (squared + bound);
+    }
+  }
+  return solution;
+}
+
+}  // namespace
+
+std::vector<HighlightSample> highlightSamples(const std::vector<View>& views, const std::vector<bool>& moves,
+                                              const std::vector<LightSample>& samples, const Eigen::Vector3f& light) {
+  std::vector<HighlightSample> all, thinned;
+  for (std::size_t object = 0; object < moves.size(); ++object) {
+    for (std::size_t i = 0; i < (moves[object] ? views.size() : 1); ++i) collect(views[i], static_cast<int>(i), views[i].actors[object], light, all);
+  }
+  const std::size_t step = std::max<std::size_t>(1, all.size() / kMost);
+  for (std::size_t i = 0; i < all.size(); i += step) {
+    thinned.push_back(all[i]);
+    thinned.back().at.cluster = nearestCluster(samples, all[i].at.picture, all[i].at.position);
+    if (thinned.back().at.cluster < 0) thinned.pop_back();
+  }
+  return thinned;
+}
+
+std::optional<Gloss> fitGloss(const std::vector<HighlightSample>& highlights, const LightFit& fit,
+                              const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible) {
+  if (highlights.size() < kFewest) return std::nullopt;
+  const Light& light = fit.light;
+  std::vector<Row> rows;
+  for (const HighlightSample& h : highlights) {
+    const float sun = visible ? visible(h.at, light.direction) : 1.0f, n_v = h.at.normal.dot(h.at.view);
+    const cv::Vec3f& a = fit.albedos[h.at.cluster];
+    Row row{h.at.cluster, a.mul(diffuseShading(light, h.at.normal, sun, h.at.sky)), h.at.radiance, light.sun * sun, {}, 1.0};
+    row.mirrored = ambientAt(light, 2.0f * n_v * h.at.normal - h.at.view) * (h.at.sky * grazing(n_v));
+    row.scale = (row.diffuse[0] + row.diffuse[1] + row.diffuse[2]) / 3.0 + 1e-3;
+    rows.push_back(row);
+  }
+  const int clusters = static_cast<int>(fit.albedos.size());
+  const double without = solve(rows, nullptr, clusters).cost;
+  Gloss best;
+  double best_cost = kExplained * without;
+  double worst = 0.0;
+  bool found = false;
+  for (int i = 0; i <= kRoughnesses; ++i) {
+    const double m = kSmoothest * std::pow(kRoughest / kSmoothest, static_cast<double>(i) / kRoughnesses);
+    std::vector<double> lobe(rows.size());
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      // The pixel averages the lobe: its width and the normals' spread add up (Beckmann's variance per axis is m^2 / 2).
+      const double spread = highlights[k].spread, wide = std::sqrt(m * m + 2.0 * spread * spread);
+      lobe[k] = torranceSparrow(highlights[k].at.normal, light.direction, highlights[k].at.view, static_cast<float>(wide));
+    }
+    const Solution s = solve(rows, &lobe, clusters);
+    worst = std::max(worst, s.cost);
+    if (s.strength > 0.0 && s.cost < best_cost) best_cost = s.cost, best = {static_cast<float>(s.strength), static_cast<float>(m)}, found = true;
+  }
+  return found && best_cost < kSharp * worst ? std::make_optional(best) : std::nullopt;
+}
+
+}  // namespace calipso::render

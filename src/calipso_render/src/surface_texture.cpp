@@ -1,0 +1,177 @@
+#include "calipso_render/surface_texture.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace calipso::render {
+namespace {
+
+constexpr int kMostSteps = 24;          // texels along an edge
+constexpr std::size_t kMirrorProbes = 300;
+constexpr float kMirrorTolerance = 0.03f;  // of the surface's extent
+constexpr float kMirrorPart = 0.95f;    // of the vertices that must find their image
+constexpr float kAlike = 0.9f;          // principal axes of nearly the same length: any axis between may be the one
+constexpr int kAnglesBetween = 12;      // tried there, over half a turn
+constexpr double kAnchor = 1e-4;        // pull towards the mean where nothing known is connected
+constexpr float kSamePlace = 1e-5f;     // of the surface's extent
+
+std::size_t texelCount(int steps) { return static_cast<std::size_t>(steps + 1) * (steps + 2) / 2; }
+
+float longestEdge(const Points& p, const Eigen::Vector3i& t) {
+  return std::max({(p[t[1]] - p[t[0]]).norm(), (p[t[2]] - p[t[1]]).norm(), (p[t[0]] - p[t[2]]).norm()});
+}
+
+Eigen::AlignedBox3f boxOf(const Points& points) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : points) box.extend(p);
+  return box;
+}
+
+// Part of a spread of vertices whose mirror image lies near some vertex.
+float mirroredPart(const Points& vertices, const MirrorPlane& plane, float tolerance) {
+  const std::size_t step = std::max<std::size_t>(1, vertices.size() / kMirrorProbes);
+  int hits = 0, probes = 0;
+  for (std::size_t i = 0; i < vertices.size(); i += step, ++probes) {
+    const Eigen::Vector3f image = vertices[i] - 2.0f * (plane.normal.dot(vertices[i]) - plane.offset) * plane.normal;
+    const bool near = std::any_of(vertices.begin(), vertices.end(), [&](const Eigen::Vector3f& p) { return (p - image).squaredNorm() < tolerance * tolerance; });
+    hits += near;
+  }
+  return static_cast<float>(hits) / std::max(1, probes);
+}
+
+// The first vertex at the place of each.
+std::vector<int> weld(const Points& vertices) {
+  const float cell = std::max(kSamePlace * boxOf(vertices).diagonal().norm(), 1e-12f);
+  std::map<std::array<long, 3>, int> first;
+  std::vector<int> welded(vertices.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    std::array<long, 3> key;
+    for (int k = 0; k < 3; ++k) key[k] = std::lround(vertices[i][k] / cell);
+    welded[i] = first.try_emplace(key, static_cast<int>(i)).first->second;
+  }
+  return welded;
+}
+
+}  // namespace
+
+SurfaceTexture::SurfaceTexture(const Points& vertices, const Triangles& triangles, float texel, std::size_t most) {
+  std::size_t count = 0;
+  for (;; texel *= 1.4f) {
+    steps_.clear(), count = 0;
+    for (const Eigen::Vector3i& t : triangles) {
+      steps_.push_back(std::clamp(static_cast<int>(std::ceil(longestEdge(vertices, t) / texel)), 1, kMostSteps));
+      count += texelCount(steps_.back());
+    }
+    if (count <= std::max(most, 3 * triangles.size())) break;
+  }
+  texels.assign(count, cv::Vec4f());
+  count = 0;
+  for (const int steps : steps_) first_.push_back(count), count += texelCount(steps);
+}
+
+Eigen::Vector3f SurfaceTexture::weightsOf(int triangle, std::size_t texel) const {
+  const int n = steps_[triangle];
+  int i = 0;
+  while (texel >= static_cast<std::size_t>(n + 1 - i)) texel -= n + 1 - i, ++i;
+  const float a = static_cast<float>(i) / n, b = static_cast<float>(texel) / n;
+  return {a, b, std::max(0.0f, 1.0f - a - b)};
+}
+
+cv::Vec4f SurfaceTexture::at(int triangle, const Eigen::Vector3f& weights) const {
+  const int n = steps_[triangle];
+  const cv::Vec4f* grid = &texels[first_[triangle]];
+  const float x = std::clamp(weights[0], 0.0f, 1.0f) * n, y = std::clamp(weights[1], 0.0f, 1.0f) * n;
+  const int i = std::min(static_cast<int>(x), n - 1), j = std::min(static_cast<int>(y), n - 1 - i);
+  float fx = x - i, fy = y - j;
+  if (fx + fy <= 1.0f || i + j + 2 > n) {
+    const float sum = std::max(1.0f, fx + fy);
+    fx /= sum, fy /= sum;
+    return grid[index(i, j, n)] * (1.0f - fx - fy) + grid[index(i + 1, j, n)] * fx + grid[index(i, j + 1, n)] * fy;
+  }
+  return grid[index(i + 1, j + 1, n)] * (fx + fy - 1.0f) + grid[index(i + 1, j, n)] * (1.0f - fy) + grid[index(i, j + 1, n)] * (1.0f - fx);
+}
+
+std::vector<MirrorPlane> mirrorPlanes(const Points& vertices, const Triangles& triangles) {
+  // Middle and second moments of the surface, triangle by triangle.
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  double total = 0.0;
+  for (const Eigen::Vector3i& t : triangles) {
+    const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(), c = vertices[t[2]].cast<double>();
+    const double area = 0.5 * (b - a).cross(c - a).norm();
+    const Eigen::Vector3d centre = (a + b + c) / 3.0;
+    total += area, middle += area * centre, moments += area * centre * centre.transpose();
+  }
+  if (!(total > 0.0)) return {};
+  middle /= total;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments / total - middle * middle.transpose());
+  std::vector<Eigen::Vector3d> normals;
+  for (int k = 0; k < 3; ++k) normals.push_back(axes.eigenvectors().col(k));
+  for (int k = 0; k < 2; ++k) {
+    if (axes.eigenvalues()[k] < kAlike * axes.eigenvalues()[k + 1]) continue;
+    for (int i = 1; i < kAnglesBetween; ++i) {
+      const double angle = M_PI * i / kAnglesBetween;
+      normals.push_back(std::cos(angle) * normals[k] + std::sin(angle) * normals[k + 1]);
+    }
+  }
+  const float tolerance = kMirrorTolerance * boxOf(vertices).diagonal().norm();
+  std::vector<MirrorPlane> planes;
+  for (const Eigen::Vector3d& n : normals) {
+    const MirrorPlane plane{n.cast<float>(), static_cast<float>(n.dot(middle))};
+    if (mirroredPart(vertices, plane, tolerance) >= kMirrorPart) planes.push_back(plane);
+  }
+  return planes;
+}
+
+void diffuseOverMesh(const Points& vertices, const Triangles& triangles, const std::vector<bool>& known, std::vector<cv::Vec3f>& values) {
+  const std::vector<int> welded = weld(vertices);
+  const int count = static_cast<int>(vertices.size());
+  std::vector<bool> fixed(count, false);
+  std::vector<cv::Vec3d> sums(count);
+  std::vector<int> parts(count, 0), row(count, -1);
+  cv::Vec3d mean;
+  int all = 0;
+  for (int i = 0; i < count; ++i) {
+    if (known[i]) fixed[welded[i]] = true, sums[welded[i]] += cv::Vec3d(values[i]), ++parts[welded[i]], mean += cv::Vec3d(values[i]), ++all;
+  }
+  mean *= 1.0 / std::max(1, all);
+  int rows = 0;
+  for (int i = 0; i < count; ++i) {
+    if (welded[i] == i && !fixed[i]) row[i] = rows++;
+  }
+  // Graph Laplacian with a weak pull to the mean.
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(rows, 3);
+  for (int r = 0; r < rows; ++r) {
+    entries.emplace_back(r, r, kAnchor);
+    for (int c = 0; c < 3; ++c) right(r, c) = kAnchor * mean[c];
+  }
+  const auto link = [&](int a, int b) {
+    if (row[a] < 0) return;
+    entries.emplace_back(row[a], row[a], 1.0);
+    if (row[b] >= 0) entries.emplace_back(row[a], row[b], -1.0);
+    else for (int c = 0; c < 3; ++c) right(row[a], c) += sums[b][c] / parts[b];
+  };
+  for (const Eigen::Vector3i& t : triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = welded[t[k]], b = welded[t[(k + 1) % 3]];
+      if (a != b) link(a, b), link(b, a);
+    }
+  }
+  if (rows == 0) return;
+  Eigen::SparseMatrix<double> L(rows, rows);
+  L.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(L);
+  const Eigen::MatrixXd x = solver.solve(right);
+  for (int i = 0; i < count; ++i) {
+    const int r = row[welded[i]];
+    if (!known[i] && r >= 0) values[i] = cv::Vec3f(x(r, 0), x(r, 1), x(r, 2));
+    else if (!known[i]) values[i] = cv::Vec3f(sums[welded[i]] * (1.0 / parts[welded[i]]));
+  }
+}
+
+}  // namespace calipso::render
