@@ -111,40 +111,16 @@ Rows contourRows(const ContourTarget& target, const std::vector<OutlinePoint>& o
   return rows;
 }
 
-namespace {
-
-// Positions count, normals only decide between near ones.
-ContourTermOptions plainMatching() {
-  ContourTermOptions options;
-  options.normal_scale_px = 5.0;
-  return options;
-}
-
-}  // namespace
-
 std::vector<double> contourResiduals(const ContourTarget& target,
                                      const std::vector<OutlinePoint>& outline) {
-  const ContourTermOptions options = plainMatching();
+  ContourTermOptions options;
+  options.normal_scale_px = 5.0;
   const std::vector<int> match = matchTargetToOutline(target, outline, options);
   std::vector<double> residuals(target.points.size(), std::numeric_limits<double>::quiet_NaN());
   for (size_t k = 0; k < match.size(); ++k) {
     if (match[k] < 0 || !target.points[k].known) continue;
     const TargetPoint& p = target.points[k];
     residuals[k] = p.normal.dot(outline[match[k]].pixel - p.pixel);
-  }
-  return residuals;
-}
-
-std::vector<double> outlineResiduals(const ContourTarget& target,
-                                     const std::vector<OutlinePoint>& outline) {
-  const ContourTermOptions options = plainMatching();
-  const std::vector<int> match = nearest(featuresOf(outline, options.normal_scale_px),
-                                         featuresOf(target, options.normal_scale_px), options);
-  std::vector<double> residuals;
-  for (size_t k = 0; k < match.size(); ++k) {
-    if (match[k] < 0 || !target.points[match[k]].known) continue;
-    const TargetPoint& p = target.points[match[k]];
-    residuals.push_back(p.normal.dot(outline[k].pixel - p.pixel));
   }
   return residuals;
 }

@@ -53,14 +53,12 @@ double extentOf(const ContourTarget& target) {
   return (high - low).norm();
 }
 
-double lengthOf(const std::vector<ContourLoop>& loops) {
-  double length = 0.0;
-  for (const ContourLoop& loop : loops) {
-    for (size_t i = 0; i < loop.points.size(); ++i) {
-      length += (loop.points[(i + 1) % loop.points.size()] - loop.points[i]).norm();
-    }
-  }
-  return length;
+// Close enough for the shape, far enough apart for the time.
+ContourTarget targetOf(const std::vector<ContourLoop>& contour) {
+  constexpr double kFinestSpacingPx = 1.5, kTargetPoints = 500.0, kCoarseSpacingPx = 50.0;
+  // The length without its noise, which makes the polygon itself many times as long.
+  const double length = makeContourTarget(contour, kCoarseSpacingPx).length_px;
+  return makeContourTarget(contour, std::max(kFinestSpacingPx, length / kTargetPoints));
 }
 
 void checkDepth(const cv::Mat1f& depth, const Camera& camera) {
@@ -136,19 +134,16 @@ bool FitProblem::depthIsKnown() const {
 FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
                           const Eigen::Isometry3d& initial_world_from_object,
                           const std::vector<ContourLoop>& contour, const AlignOptions& options) {
-  constexpr double kFinestSpacingPx = 1.5;
-  constexpr double kTargetPoints = 500.0;
   checkMesh(cad);
   checkCamera(camera);
   checkPose(initial_world_from_object);
 
   const Eigen::Isometry3d camera_from_object =
       camera.world_from_camera.inverse() * initial_world_from_object;
-  const double spacing = std::max(kFinestSpacingPx, lengthOf(contour) / kTargetPoints);
   FitProblem problem{transformed(camera_from_object, cad.vertices),
                      MeshTopology(cad.triangles),
                      camera,
-                     makeContourTarget(contour, spacing),
+                     targetOf(contour),
                      {},
                      makeSupportTargets(options.planes, camera),
                      0.0,

@@ -137,7 +137,7 @@ std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOpti
   const double noise = problem.target.noise_px;
   for (size_t level = 0; level < options.levels.size(); ++level) {
     const bool first = level == 0;
-    const int iterations = first ? 10 : 4;
+    const int iterations = first ? 6 : 3;
     const double end = options.elastic_weight * kElasticWeight;
     const Ramp stiffness{first ? 3e5 : end, end};
     ElasticStep step;

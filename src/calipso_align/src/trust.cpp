@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kLeastKnown = 0.3;      // part of the contour
 constexpr double kLeastMet = 0.8;        // part of the known contour: it may have spurs and details
-constexpr double kMostProtruding = 0.25; // part of the outline: the contour may lack thin parts
+constexpr double kMostProtruding = 0.02; // part of the area: the contour may lack thin parts
 constexpr double kLargestMeanPx = 1.0;   // on top of half the contour's noise
 constexpr double kLargestScale = 2.5;
 
@@ -43,9 +43,42 @@ bool isInPieces(const std::vector<ContourLoop>& contour) {
                        [&](double area) { return area >= kLargePiece * largest; }) > 1;
 }
 
+// Index of the target point nearest to a pixel.
+size_t nearestTarget(const ContourTarget& target, const Eigen::Vector2d& pixel) {
+  size_t best = 0;
+  for (size_t k = 1; k < target.points.size(); ++k) {
+    if ((target.points[k].pixel - pixel).squaredNorm() <
+        (target.points[best].pixel - pixel).squaredNorm()) {
+      best = k;
+    }
+  }
+  return best;
+}
+
+// Area of the model outside of the contour by more than the tolerance, as part of the contour's area.
+// Beyond unknown parts of the contour it may well be there.
+double protrudingPart(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+                      const DepthRendering& rendering, double tolerance_px) {
+  constexpr int kStridePx = 2;
+  const cv::Mat1b inside = fillContour(contour, {problem.camera.width, problem.camera.height});
+  cv::Mat1f distance;
+  cv::distanceTransform(inside == 0, distance, cv::DIST_L2, cv::DIST_MASK_3);
+  double outside = 0.0;
+  const cv::Rect& roi = rendering.roi;
+  for (int v = roi.y; v < roi.y + roi.height; v += kStridePx) {
+    for (int u = roi.x; u < roi.x + roi.width; u += kStridePx) {
+      if (rendering.at(u, v) <= 0.0f || distance(v, u) <= tolerance_px) continue;
+      const size_t nearest = nearestTarget(problem.target, {u, v});
+      if (problem.target.points[nearest].known) outside += kStridePx * kStridePx;
+    }
+  }
+  return outside / std::max(1, cv::countNonZero(inside));
+}
+
 }  // namespace
 
-FitQuality assess(const FitProblem& problem, const Points& x) {
+FitQuality assess(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+                  const Points& x) {
   constexpr double kFineStepPx = 0.5;
   const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
   FitQuality quality;
@@ -68,11 +101,7 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
   }
   quality.met_mean_px /= std::max(1, met);
   quality.met = static_cast<double>(met) / known;
-  const std::vector<double> outwards = outlineResiduals(problem.target, outline);
-  quality.protruding =
-      static_cast<double>(std::count_if(outwards.begin(), outwards.end(), [&](double r) {
-        return r > quality.tolerance_px;
-      })) / std::max<size_t>(1, outwards.size());
+  quality.protruding = protrudingPart(problem, contour, rendering, quality.tolerance_px);
   quality.mean_px = std::accumulate(sizes.begin(), sizes.end(), 0.0) / sizes.size();
   const auto p95 = sizes.begin() + static_cast<long>(0.95 * (sizes.size() - 1));
   std::nth_element(sizes.begin(), p95, sizes.end());
@@ -94,7 +123,7 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
     reason << "did not converge: the contour is off by " << quality.mean_px << " px on average, "
            << percent(quality.met) << " of it is met within " << quality.tolerance_px << " px, "
            << percent(quality.protruding)
-           << " of the model's outline lies outside of it; place the model closer";
+           << " of the model lies outside of it; place the model closer";
     if (isInPieces(contour)) reason << ", or correct the contour: it is in separate pieces";
   } else if (scale > kLargestScale || scale < 1.0 / kLargestScale) {
     reason << "size implausible: the model had to be scaled by " << scale

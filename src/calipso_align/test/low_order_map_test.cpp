@@ -48,6 +48,54 @@ TEST(LowOrderMap, JacobianMatchesCentralDifferences) {
   }
 }
 
+TEST(LowOrderMap, ScaleCanBeCountedAsStrain) {
+  const Points X = test::pear().vertices;
+  LowOrderMap map(X);
+  map.setParameters(someParameters());
+  const Points before = map.apply(X);
+  map.absorbScale();
+  EXPECT_EQ(map.parameters()[LowOrderMap::kLogScale], 0.0);
+  EXPECT_TRUE(map.apply(X).isApprox(before, 1e-13));
+}
+
+// a that the fit to `truth` finds, from measurements of all points that are good to a thousandth.
+double deformationOf(const Points& X, const LowOrderMap& truth) {
+  const Points goal = truth.apply(X);
+  const Observe observe = [&](const Points& x, int, double) {
+    Rows rows;
+    for (int i = 0; i < x.rows(); ++i) {
+      for (int k = 0; k < 3; ++k) {
+        rows.push_back({i, i, 1.0, 0.0, Eigen::Vector3d::Unit(k), x(i, k) - goal(i, k), 1e6});
+      }
+    }
+    return rows;
+  };
+  LowOrderStageOptions options;
+  options.prior = {0.1, 1.0, 1.0, 0.0, 0.1, false};
+  options.iterations = 30;
+  options.estimate_deformation = true;
+  LowOrderMap map(X);
+  return fitLowOrder(X, observe, options, map).deformation;
+}
+
+TEST(LowOrderStage, FindsHowFarTheModelIsDeformed) {
+  const Points X = test::pear().vertices;
+  LowOrderMap moved(X), strained(X);
+  LowOrderMap::Parameters p = LowOrderMap::Parameters::Zero();
+  p[LowOrderMap::kRotation] = 0.15;
+  moved.setParameters(p);
+  EXPECT_LT(deformationOf(X, moved), 0.003);   // the least that is estimated is 0.002
+
+  // Six coefficients of one deviation 0.2, signs mixed: the estimate is their r.m.s. about the mean
+  // a^2 / 2 of the first three.
+  for (int k = 0; k < 6; ++k) {
+    const double sign = k % 2 == 0 ? 1.0 : -1.0;
+    p[LowOrderMap::kStrain + k] = k < 3 ? 0.02 + sign * 0.2 : sign * 0.2 * std::sqrt(0.5);
+  }
+  strained.setParameters(p);
+  EXPECT_NEAR(deformationOf(X, strained), 0.2, 0.02);
+}
+
 TEST(LowOrderStage, RecoversAnAffineMapFromPoints) {
   const Points X = test::pear().vertices;
   LowOrderMap truth(X);

@@ -32,9 +32,4 @@ Rows contourRows(const ContourTarget& target, const std::vector<OutlinePoint>& o
 std::vector<double> contourResiduals(const ContourTarget& target,
                                      const std::vector<OutlinePoint>& outline);
 
-// The other way: signed distances of the outline's points to the contour, of those that have a known
-// counterpart.
-std::vector<double> outlineResiduals(const ContourTarget& target,
-                                     const std::vector<OutlinePoint>& outline);
-
 }  // namespace calipso::align

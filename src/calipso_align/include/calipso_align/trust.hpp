@@ -11,10 +11,11 @@ struct FitQuality {
   double tolerance_px = 0.0;       // what counts as met: the contour's noise and a little more
   double met = 0.0;                // part of the known contour that the model meets
   double met_mean_px = 0.0;        // of that part
-  double protruding = 0.0;         // part of the model's outline that lies outside of the contour
+  double protruding = 0.0;         // area of the model outside of the contour, part of the contour's
 };
 
-FitQuality assess(const FitProblem& problem, const Points& x);
+FitQuality assess(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+                  const Points& x);
 
 struct Verdict {
   bool trusted = false;

@@ -1,0 +1,158 @@
+#include "calipso_align/fit_problem.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "calipso_align/trust.hpp"
+#include "synthetic_shape.hpp"
+
+namespace calipso::align {
+namespace {
+
+constexpr float kWallDepth = 6.0f;   // m, behind the pear at 3 m
+
+struct Seen {
+  Camera camera = test::frontCamera();
+  TriangleMesh mesh = test::pear();
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::vector<ContourLoop> contour = test::contourOf(mesh, pose, camera);
+  AlignOptions options;
+
+  // The pear in front of a wall.
+  cv::Mat1f depth() const {
+    const DepthRendering rendering =
+        renderDepth(test::inCamera(camera, pose, mesh.vertices), mesh.triangles, camera);
+    cv::Mat1f picture(camera.height, camera.width, kWallDepth);
+    cv::Mat1f part = picture(rendering.roi);
+    rendering.depth.copyTo(part, rendering.depth > 0.0f);
+    return picture;
+  }
+  FitProblem problem() const { return makeFitProblem(mesh, camera, pose, contour, options); }
+};
+
+long knownPoints(const FitProblem& problem, bool right, double middle) {
+  return std::count_if(problem.target.points.begin(), problem.target.points.end(),
+                       [&](const TargetPoint& p) {
+                         return p.known && (p.pixel.x() > middle) == right;
+                       });
+}
+
+// Points in between, each off by noise: what a hand drawn or scattered contour looks like.
+std::vector<ContourLoop> denseAndNoisy(const std::vector<ContourLoop>& contour, double noise_px) {
+  constexpr int kParts = 6;
+  std::mt19937 generator(7);
+  std::normal_distribution<double> normal(0.0, noise_px);
+  std::vector<ContourLoop> loops;
+  for (const ContourLoop& loop : contour) {
+    ContourLoop dense;
+    for (size_t i = 0; i < loop.points.size() * kParts; ++i) {
+      const Eigen::Vector2d a = loop.points[i / kParts];
+      const Eigen::Vector2d b = loop.points[(i / kParts + 1) % loop.points.size()];
+      dense.points.push_back(a + (b - a) * (i % kParts) / kParts +
+                             Eigen::Vector2d(normal(generator), normal(generator)));
+    }
+    dense.known.assign(dense.points.size(), true);
+    dense.confidence.assign(dense.points.size(), 1.0f);
+    loops.push_back(dense);
+  }
+  return loops;
+}
+
+TEST(FitProblem, NoiseDoesNotThinTheTarget) {
+  Seen seen;
+  const size_t clean = seen.problem().target.points.size();
+  seen.contour = denseAndNoisy(seen.contour, 3.0);
+  const ContourTarget target = seen.problem().target;
+  EXPECT_NEAR(target.noise_px, 3.0, 0.5);
+  EXPECT_NEAR(target.points.size(), clean, 0.15 * clean);   // the contour's corners are cut a little
+}
+
+TEST(FitProblem, ContourOfAnOccluderIsUnknown) {
+  Seen seen;
+  cv::Mat1f depth = seen.depth();
+  const double middle = seen.camera.cx;
+  seen.options.depth = DepthObservation{depth};
+  const long right = knownPoints(seen.problem(), true, middle);
+  // Everything right of the middle that is not the pear comes nearer than it.
+  for (float& d : cv::Mat1f(depth.colRange(static_cast<int>(middle) + 1, depth.cols))) {
+    if (d == kWallDepth) d = 1.5f;
+  }
+  seen.options.depth = DepthObservation{depth};
+  const FitProblem hidden = seen.problem();
+  EXPECT_GT(right, 50);
+  EXPECT_LT(knownPoints(hidden, true, middle), right / 10);
+  EXPECT_GT(knownPoints(hidden, false, middle), right / 2);
+  EXPECT_LT(hidden.target.known_length_px, 0.7 * hidden.target.length_px);
+}
+
+TEST(FitProblem, ContourOnASupportPlaneIsUnknown) {
+  Seen seen;
+  const double water = -0.2;   // m; the pear reaches down to -0.5
+  cv::Mat1f depth = seen.depth();
+  cv::Mat1b mask = fillContour(seen.contour, depth.size());
+  int line = 0;   // the lowest row where the pear is seen
+  for (int v = 0; v < depth.rows; ++v) {
+    const double below = (v - seen.camera.cy) / seen.camera.fy;   // of a ray of depth 1
+    const float surface = below > 0.0 ? static_cast<float>(-water / below) : kWallDepth;
+    for (int u = 0; u < depth.cols; ++u) {
+      if (surface < depth(v, u)) mask(v, u) = 0;
+      if (mask(v, u)) line = v;
+      depth(v, u) = std::min(depth(v, u), surface);
+    }
+  }
+  seen.contour = traceLoops(mask / 255, 1, {});
+  seen.options.depth = DepthObservation{depth};
+  const auto known_at_line = [&](const FitProblem& problem) {
+    return std::count_if(problem.target.points.begin(), problem.target.points.end(),
+                         [&](const TargetPoint& p) { return p.known && p.pixel.y() > line - 1.0; });
+  };
+  EXPECT_GT(known_at_line(seen.problem()), 10);
+  seen.options.planes.push_back({"water", Eigen::Vector3d::UnitZ(), water, std::nullopt});
+  EXPECT_LT(known_at_line(seen.problem()), 3);
+}
+
+TEST(ContourTerm, AnUnknownEdgeOnlyPullsOutwards) {
+  Seen seen;
+  for (ContourLoop& loop : seen.contour) loop.known.assign(loop.known.size(), false);
+  const FitProblem problem = seen.problem();
+  const auto pulls = [&](double scale) {
+    const Eigen::RowVector3d c = problem.X.colwise().mean();
+    const Points x = (scale * (problem.X.rowwise() - c)).rowwise() + c;
+    const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
+    ContourTermOptions options;
+    options.tangential = 0.0;
+    const Rows rows =
+        contourRows(problem.target,
+                    occludingContour(x, problem.topology, rendering, problem.camera, 2.0),
+                    problem.camera, options);
+    double sum = 0.0;
+    for (const PointRow& row : rows) sum += row.weight * std::abs(row.r);
+    return sum;
+  };
+  EXPECT_GT(pulls(0.8), 0.0);
+  EXPECT_EQ(pulls(1.2), 0.0);
+}
+
+TEST(Trust, AModelThatSticksOutIsNotTrusted) {
+  const Seen seen;
+  const FitProblem problem = seen.problem();
+  const FitQuality fits = assess(problem, seen.contour, problem.X);
+  EXPECT_GT(fits.met, 0.99);
+  EXPECT_EQ(fits.protruding, 0.0);
+  EXPECT_TRUE(judge(problem, seen.contour, fits, 1.0).trusted);
+
+  // One end drawn out: most of the contour is still met.
+  Points x = problem.X;
+  const double end = x.col(1).minCoeff();
+  for (int i = 0; i < x.rows(); ++i) {
+    if (x(i, 1) < 0.6 * end) x(i, 1) -= 0.8 * (0.6 * end - x(i, 1));
+  }
+  const FitQuality drawn = assess(problem, seen.contour, x);
+  EXPECT_GT(drawn.protruding, 0.02);
+  EXPECT_FALSE(judge(problem, seen.contour, drawn, 1.0).trusted);
+}
+
+}  // namespace
+}  // namespace calipso::align
