@@ -304,8 +304,8 @@ cv::Vec3f Appearance::albedoAt(const SurfacePoint& point) const {
   return texel[3] < 0.001f ? filled : filled * (1.0f - texel[3]) + pictureAt(point.key_position) * texel[3];
 }
 
-cv::Vec3f Appearance::radiance(const SurfacePoint& point, const cv::Vec3f& now, const cv::Vec3f& highlight) const {
-  return albedoAt(point).mul(now + lightFloor(mean_light)) + highlight;
+cv::Vec3f Appearance::radiance(const cv::Vec3f& albedo_at, const cv::Vec3f& now, const cv::Vec3f& highlight) const {
+  return albedo_at.mul(now + lightFloor(mean_light)) + highlight;
 }
 
 cv::Vec3f sampleBicubic(const cv::Mat& image, float u, float v) {

@@ -44,10 +44,15 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   const int slot = VisibilityBuffer::objectOf(id);
   const SurfacePoint p = surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_);
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
-  const Light& light = prepared_.light.light;
+  const ObjectInFrame* state = states_[surface_of_slot_[slot]];
+  const Look look = state != nullptr ? state->look : Look();
+  Gloss gloss = appearance.gloss;
+  gloss.specular = look.specular.value_or(gloss.specular);
+  gloss.roughness = look.roughness.value_or(gloss.roughness);
   const float sun = surfaceSun(p, id, u, v);
-  const cv::Vec3f highlight = specularShading(light, appearance.gloss, p.normal, (eye_ - p.position).normalized(), sun, p.sky);
-  return appearance.radiance(p, diffuseShading(light, p.normal, sun, p.sky), highlight);
+  const cv::Vec3f highlight = specularShading(light_, gloss, p.normal, (eye_ - p.position).normalized(), sun, p.sky);
+  const cv::Vec3f albedo = look.albedo.value_or(appearance.albedoAt(p)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
+  return appearance.radiance(albedo, diffuseShading(light_, p.normal, sun, p.sky), highlight);
 }
 
 // Something without a model stands in front: it hid the object at the key frame, and goes on doing so.

@@ -17,6 +17,7 @@ namespace calipso::render {
 struct ShadowCache {
   std::vector<bool> edited;            // per surface: which ones it is for
   Camera camera;
+  Eigen::Vector3f sun = Eigen::Vector3f::Zero();  // direction
   std::unique_ptr<Visibility> others;  // of what is not edited
   cv::Mat others_sun;                  // empty: nothing else casts a shadow
   cv::Mat originals_sun, originals_sky;  // of the edited objects where the video has them
@@ -56,6 +57,7 @@ class FrameCompositor {
     float cover = 0.0f;
   };
 
+  Light lightOf(const FrameInput& frame) const;
   void stage();
   bool restsAt(int surface) const;
   void prepareShadows();
@@ -88,12 +90,13 @@ class FrameCompositor {
   float surfaceSun(const SurfacePoint& p, std::uint32_t id, float u, float v) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
-  cv::Rect shadowBounds(const Points& vertices) const;
+  cv::Rect shadowBounds(const Points& vertices, const Light& light) const;
 
   const Prepared& prepared_;
   const RenderParams& params_;
   const FrameInput& frame_;
   ShadowCache& shadows_;
+  const Light light_;  // of this frame; what the video shows was lit by Prepared::light
 
   std::vector<cv::Mat> footprints_;   // Prepared::footprints, likewise
   std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame

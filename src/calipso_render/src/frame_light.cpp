@@ -51,29 +51,29 @@ void FrameCompositor::prepareShadows() {
   }
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     const Surface& s = prepared_.surfaces[i];
-    if (edited_[i] && !prepared_.moves[i]) originals.push_back({&s.key_vertices, &s.triangles});
+    if (edited_[i] && !prepared_.moves[i] && s.in_video) originals.push_back({&s.key_vertices, &s.triangles});
   }
-  moved_shadow_ = shadowOf(moved, prepared_.light.light, params_);
+  moved_shadow_ = shadowOf(moved, light_, params_);
   moved_sky_ = skyShadowOf(moved, params_);
-  for (const Occluder& o : moved) moved_bounds_ |= shadowBounds(*o.vertices);
-  const bool same = shadows_.others && shadows_.edited == edited_ && sameView(shadows_.camera, frame_.camera);
+  for (const Occluder& o : moved) moved_bounds_ |= shadowBounds(*o.vertices, light_);
+  const bool same = shadows_.others && shadows_.edited == edited_ && shadows_.sun == light_.direction && sameView(shadows_.camera, frame_.camera);
   const bool others_rest = std::find(prepared_.moves.begin(), prepared_.moves.end(), true) == prepared_.moves.end();
   if (!same) cacheOriginals(originals);
   if (!same || !others_rest) cacheOthers(others);
-  shadows_.edited = edited_, shadows_.camera = frame_.camera;
+  shadows_.edited = edited_, shadows_.camera = frame_.camera, shadows_.sun = light_.direction;
 }
 
 void FrameCompositor::cacheOthers(const std::vector<Occluder>& others) {
-  shadows_.others = shadowOf(others, prepared_.light.light, params_);
+  shadows_.others = shadowOf(others, light_, params_);
   cv::Rect bounds;
-  for (const Occluder& o : others) bounds |= shadowBounds(*o.vertices);
+  for (const Occluder& o : others) bounds |= shadowBounds(*o.vertices, light_);
   shadows_.others_sun = bounds.empty() ? cv::Mat() : sunOver(*shadows_.others, bounds);
 }
 
 void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   const cv::Rect whole({0, 0}, frame_.bgr.size());
   shadows_.bounds = {};
-  for (const Occluder& o : originals) shadows_.bounds |= shadowBounds(*o.vertices);
+  for (const Occluder& o : originals) shadows_.bounds |= shadowBounds(*o.vertices, prepared_.light.light);
   shadows_.originals_sun = shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadowOf(originals, prepared_.light.light, params_), shadows_.bounds);
   shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_32F, cv::Scalar(1.0f)) : skyOver(*skyShadowOf(originals, params_), whole);
   shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
@@ -131,8 +131,8 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
 }
 
 // Pixels onto which the sun can cast the vertices' shadow on a support plane.
-cv::Rect FrameCompositor::shadowBounds(const Points& vertices) const {
-  const Eigen::Vector3f l = prepared_.light.light.direction;
+cv::Rect FrameCompositor::shadowBounds(const Points& vertices, const Light& light) const {
+  const Eigen::Vector3f l = light.direction;
   Points shadow;
   for (const SupportPlane& plane : params_.planes) {
     const Eigen::Vector3f n = plane.normal.cast<float>();
@@ -200,7 +200,7 @@ void FrameCompositor::findSurfaceSun() {
       const std::uint32_t id = centre_->idAt(u, v);
       if (!region_.contains({u, v}) || !isDrawn(id, u, v)) continue;
       const SurfacePoint p = surfacePoint(actors_[VisibilityBuffer::objectOf(id)], VisibilityBuffer::triangleOf(id), u, v, eye_);
-      if (p.normal.dot(prepared_.light.light.direction) <= 0.0f) continue;
+      if (p.normal.dot(light_.direction) <= 0.0f) continue;
       corners[static_cast<std::size_t>(j) * columns + i] = {newSun(p.position, p.normal), centre_->nearnessAt(u, v), VisibilityBuffer::objectOf(id)};
     }
   }
@@ -218,7 +218,7 @@ void FrameCompositor::findSurfaceSun() {
 
 // @param u, v the pixel, or a place in it
 float FrameCompositor::surfaceSun(const SurfacePoint& p, std::uint32_t id, float u, float v) const {
-  if (p.normal.dot(prepared_.light.light.direction) <= 0.0f) return 0.0f;  // lit from behind
+  if (p.normal.dot(light_.direction) <= 0.0f) return 0.0f;  // lit from behind
   const int iu = static_cast<int>(u), iv = static_cast<int>(v);
   if (static_cast<float>(iu) == u && static_cast<float>(iv) == v) {
     const int du = iu - region_.x, dv = iv - region_.y;

@@ -20,9 +20,8 @@ constexpr float kQuiet = 5.0f;         // code values of spread over time: the b
 
 FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame,
                                  ShadowCache& shadows)
-    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows),
-      labels_(frame.labels.empty() ? prepared.key_labels : frame.labels),
-      eye_(frame.camera.world_from_camera.translation().cast<float>()),
+    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), light_(lightOf(frame)),
+      labels_(frame.labels.empty() ? prepared.key_labels : frame.labels), eye_(frame.camera.world_from_camera.translation().cast<float>()),
       plane_view_(params.planes, frame.camera), noise_(frame.stamp_ns) {
   if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");
 }
@@ -49,6 +48,13 @@ FrameOutput FrameCompositor::run() {
   return out;
 }
 
+Light FrameCompositor::lightOf(const FrameInput& frame) const {
+  Light light = prepared_.light.light;
+  if (frame.sun.direction) light.direction = frame.sun.direction->normalized();
+  light.sun *= frame.sun.factor;
+  return light;
+}
+
 void FrameCompositor::stage() {
   const std::vector<Surface>& surfaces = prepared_.surfaces;
   states_.assign(surfaces.size(), nullptr);
@@ -62,7 +68,7 @@ void FrameCompositor::stage() {
   for (std::size_t i = 0; i < surfaces.size(); ++i) at_rest_.push_back(restsAt(static_cast<int>(i)));
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ObjectInFrame* o = states_[i];
-    if (o != nullptr && o->removed) continue;
+    if (o != nullptr ? o->removed : !surfaces[i].in_video) continue;
     Points vertices = surfaces[i].key_vertices;
     if (o != nullptr && o->edited) vertices = o->vertices;
     else if (o != nullptr && prepared_.moves[i]) vertices = transformed(surfaces[i].object_vertices, o->world_from_object);
@@ -72,7 +78,8 @@ void FrameCompositor::stage() {
     }
     actors_.push_back(makeActor(surfaces[i], std::move(vertices), frame_.camera));
     surface_of_slot_.push_back(static_cast<int>(i));
-    observed_.push_back(edited_[i] && at_rest_[i] ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
+    const bool as_seen = edited_[i] && at_rest_[i] && !o->look.changes();
+    observed_.push_back(as_seen ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
   }
   fronts_.assign(surfaces.size(), cv::Mat());
   footprints_.assign(surfaces.size(), cv::Mat());
@@ -93,6 +100,7 @@ void FrameCompositor::stage() {
 
 // An object at rest in the video, or one that moves but is seen where it was at the key frame.
 bool FrameCompositor::restsAt(int surface) const {
+  if (!prepared_.surfaces[surface].in_video) return false;
   if (!prepared_.moves[surface]) return true;
   const int index = prepared_.surfaces[surface].index;
   const cv::Mat now = labels_ == index, key = prepared_.key_labels == index;
@@ -119,7 +127,7 @@ void FrameCompositor::chooseRegion() {
 // The shadow of an object that moves in the video shows as darkening against the plate.
 void FrameCompositor::findPassingShadows() {
   bool any = false;
-  for (std::size_t i = 0; i < edited_.size(); ++i) any = any || (edited_[i] && prepared_.moves[i]);
+  for (std::size_t i = 0; i < edited_.size(); ++i) any = any || (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video);
   if (!any || !sameView(frame_.camera, prepared_.camera)) return;
   cv::Mat now, ratio_now, ratio_plate, plate;
   cv::cvtColor(frame_.bgr, now, cv::COLOR_BGR2GRAY);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -39,9 +40,39 @@ double toField(double value) {
 
 double fromField(double value) { return value == 0.0 ? kUnchanged : value; }
 
-// Left out, the estimated velocity is taken as it is. (Weightlessness, factor 0, is meant.)
+// Left out, a factor is 1. (Weightlessness, gravity times 0, is meant.)
 double factorOf(const calipso_msgs::Edit& msg, EditKind kind) {
   return msg.factor == 0.0 && kind != EditKind::kGravity ? 1.0 : msg.factor;
+}
+
+// A message that leaves the colour out holds zeros.
+Eigen::Vector3d colorOf(const std_msgs::ColorRGBA& c) {
+  if (c.r == 0.0f && c.g == 0.0f && c.b == 0.0f) return Eigen::Vector3d::Constant(kUnchanged);
+  return {c.r, c.g, c.b};
+}
+
+// What black means must not read as "left out".
+std_msgs::ColorRGBA toColorMsg(const Eigen::Vector3d& color) {
+  std_msgs::ColorRGBA msg;
+  if (!color.allFinite()) return msg;
+  msg.r = static_cast<float>(color.x());
+  msg.g = static_cast<float>(color.y());
+  msg.b = static_cast<float>(color.z());
+  if (color.isZero()) msg.r = std::numeric_limits<float>::min();
+  msg.a = 1.0f;
+  return msg;
+}
+
+std::string valueOf(const Edit& edit) {
+  if (edit.kind == EditKind::kObjectKind) return toString(edit.object_kind);
+  if (edit.kind == EditKind::kContact) return edit.meet ? "include" : "exclude";
+  return edit.copy;
+}
+
+void setValue(const calipso_msgs::Edit& msg, Edit& edit) {
+  if (edit.kind == EditKind::kObjectKind) edit.object_kind = objectKindFromString(msg.value);
+  if (edit.kind == EditKind::kContact) edit.meet = meetFromString(msg.value);
+  if (edit.kind == EditKind::kDuplicate) edit.copy = msg.value;
 }
 
 // A message that leaves the quaternion out holds zeros.
@@ -78,7 +109,16 @@ calipso_msgs::Edit toMsg(const Edit& edit, const ros::Time& first_stamp) {
   msg.poissons_ratio = toField(edit.poissons_ratio);
   msg.density = toField(edit.density);
   msg.damping = toField(edit.damping);
-  if (edit.kind == EditKind::kObjectKind) msg.value = toString(edit.object_kind);
+  msg.value = valueOf(edit);
+  msg.other = edit.other;
+  msg.friction = toField(edit.friction);
+  msg.restitution = toField(edit.restitution);
+  msg.pressure = edit.pressure;
+  msg.color = toColorMsg(edit.color);
+  msg.specular = toField(edit.specular);
+  msg.roughness = toField(edit.roughness);
+  msg.after = edit.after;
+  msg.collision = static_cast<std::uint32_t>(edit.collision);
   return msg;
 }
 
@@ -101,7 +141,16 @@ Edit fromMsg(const calipso_msgs::Edit& msg, const ros::Time& first_stamp) {
   edit.poissons_ratio = fromField(msg.poissons_ratio);
   edit.density = fromField(msg.density);
   edit.damping = fromField(msg.damping);
-  if (edit.kind == EditKind::kObjectKind) edit.object_kind = objectKindFromString(msg.value);
+  setValue(msg, edit);
+  edit.other = msg.other;
+  edit.friction = fromField(msg.friction);
+  edit.restitution = fromField(msg.restitution);
+  edit.pressure = msg.pressure;
+  edit.color = colorOf(msg.color);
+  edit.specular = fromField(msg.specular);
+  edit.roughness = fromField(msg.roughness);
+  edit.after = msg.after;
+  edit.collision = std::max(1, static_cast<int>(msg.collision));
   return edit;
 }
 

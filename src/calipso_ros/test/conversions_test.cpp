@@ -88,6 +88,32 @@ TEST(Conversions, editsRoundTrip) {
   EXPECT_TRUE(std::isnan(again.youngs_modulus));
 }
 
+TEST(Conversions, whatTheKindsNeedRoundTrips) {
+  Edit edit;
+  edit.kind = EditKind::kContact;
+  edit.other = "table";
+  edit.meet = false;
+  edit.friction = 0.0;
+  edit.color = {0.25, 0.5, 1.0};
+  edit.after = "cup";
+  edit.collision = 2;
+  edit.pressure = -3.0;
+  Edit again = fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1));
+  EXPECT_EQ(again.other, "table");
+  EXPECT_FALSE(again.meet);
+  EXPECT_NEAR(again.friction, 0.0, 1e-300);
+  EXPECT_TRUE(std::isnan(again.restitution));
+  EXPECT_EQ(again.color, edit.color);
+  EXPECT_EQ(again.after, "cup");
+  EXPECT_EQ(again.collision, 2);
+  EXPECT_EQ(again.pressure, -3.0);
+  edit.color.setZero();  // black
+  EXPECT_NEAR(fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1)).color.norm(), 0.0, 1e-30);
+  edit.kind = EditKind::kDuplicate;
+  edit.copy = "twin";
+  EXPECT_EQ(fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1)).copy, "twin");
+}
+
 TEST(Conversions, aMeantZeroSurvivesAndAMissingNumberIsUnchanged) {
   Edit edit;
   edit.kind = EditKind::kMaterial;

@@ -5,8 +5,6 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "yaml_reading.hpp"
-
 namespace calipso {
 
 namespace {
@@ -22,14 +20,37 @@ void requireFinite(const Eigen::Vector3d& value, const char* field) {
   for (int i = 0; i < 3; ++i) require(std::isfinite(value[i]), field, value[i], "finite");
 }
 
-void validateObject(const Edit& edit, const std::vector<std::string>& objects) {
-  const bool whole_scene = edit.kind == EditKind::kGravity || edit.kind == EditKind::kReset;
-  if (edit.object.empty() && whole_scene) return;
-  if (std::find(objects.begin(), objects.end(), edit.object) != objects.end()) return;
+bool concernsScene(EditKind kind) {
+  switch (kind) {
+    case EditKind::kGravity:
+    case EditKind::kReset:
+    case EditKind::kWind:
+    case EditKind::kSpeedScale:
+    case EditKind::kTimeScale:
+    case EditKind::kLight:
+      return true;
+    default:
+      return false;
+  }
+}
+
+void requireKnown(const std::string& name, const char* field, const std::vector<std::string>& objects) {
+  if (std::find(objects.begin(), objects.end(), name) != objects.end()) return;
   std::string known;
-  for (const auto& name : objects) known += (known.empty() ? "" : ", ") + name;
-  throw std::invalid_argument("object is '" + edit.object + "', which is not in the scene; it has " +
-                              known);
+  for (const auto& object : objects) known += (known.empty() ? "" : ", ") + object;
+  throw std::invalid_argument(std::string(field) + " is '" + name +
+                              "', which is not in the scene; it has " + known);
+}
+
+void validateObject(const Edit& edit, const std::vector<std::string>& objects) {
+  if (!edit.object.empty() || !concernsScene(edit.kind)) requireKnown(edit.object, "object", objects);
+  if (!edit.after.empty()) requireKnown(edit.after, "after", objects);
+  require(edit.collision >= 1, "collision", edit.collision, "1 for the first, 2 for the second, ...");
+}
+
+// A share, or NaN for "unchanged".
+void requireShare(double value, const char* field) {
+  require(std::isnan(value) || (value >= 0.0 && value <= 1.0), field, value, "in [0, 1]");
 }
 
 void validateRegion(const Region& region) {
@@ -66,68 +87,38 @@ void validateMaterial(const Edit& edit) {
   }
 }
 
-const std::vector<std::string>& editKeys() {
-  static const std::vector<std::string> keys = {
-      "t",      "object", "kind",  "mode",           "region",         "vector",  "angular",
-      "translation",      "rotation", "scale",       "factor",         "ramp",    "duration",
-      "youngs_modulus",   "poissons_ratio",          "density",        "damping", "value"};
-  return keys;
+void validateContact(const Edit& edit) {
+  require(std::isnan(edit.friction) || (std::isfinite(edit.friction) && edit.friction >= 0.0),
+          "friction", edit.friction, "finite and >= 0");
+  requireShare(edit.restitution, "restitution");
 }
 
-// A point of the surface is given in pixels of the key frame or in metres of the world.
-Region readRegion(const YAML::Node& node, const YamlReader& reader) {
-  reader.rejectUnknownKeys(node, {"kind", "u", "v", "point", "radius", "box_min", "box_max"});
-  Region region;
-  region.kind = regionKindFromString(reader.text(node, "kind", ""));
-  region.radius = reader.number(node, "radius", 0.0);
-  if (region.kind == RegionKind::kPixel) {
-    region.pixel = {reader.number(node, "u"), reader.number(node, "v")};
-  } else if (region.kind == RegionKind::kSphere) {
-    region.point = reader.vector(node, "point", 3);
-  } else if (region.kind == RegionKind::kBox) {
-    region.box_min = reader.vector(node, "box_min", 3);
-    region.box_max = reader.vector(node, "box_max", 3);
+void validateLook(const Edit& edit) {
+  for (int i = 0; i < 3; ++i)
+    require(std::isnan(edit.color[i]) || (std::isfinite(edit.color[i]) && edit.color[i] >= 0.0),
+            "color", edit.color[i], "finite and >= 0");
+  requireShare(edit.specular, "specular");
+  requireShare(edit.roughness, "roughness");
+}
+
+void validateScale(const Edit& edit) {
+  const bool slower = edit.kind == EditKind::kTimeScale;
+  if (slower && !edit.after.empty()) {
+    throw std::invalid_argument("a time_scale edit cannot wait for a collision (after is '" + edit.after +
+                                "'): the video is laid out before it plays; give its time t");
   }
-  return region;
+  require(edit.factor > 0.0 && (!slower || edit.factor <= 1.0), "factor", edit.factor,
+          slower ? "in (0, 1]" : "> 0");
 }
 
-// [x, y, z, w], as in geometry_msgs/Quaternion.
-Eigen::Quaterniond readRotation(const YAML::Node& node, const YamlReader& reader) {
-  const Eigen::VectorXd q = reader.vector(node, "rotation", 4);
-  if (q.norm() < 1e-6) reader.fail("rotation", "is zero; give a quaternion [x, y, z, w]");
-  return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized();
-}
-
-void readVectors(const YAML::Node& node, const YamlReader& reader, Edit& edit) {
-  if (node["region"]) edit.region = readRegion(node["region"], reader);
-  if (node["vector"]) edit.vector = reader.vector(node, "vector", 3);
-  if (node["angular"]) edit.angular = reader.vector(node, "angular", 3);
-  if (node["translation"]) edit.translation = reader.vector(node, "translation", 3);
-  if (node["rotation"]) edit.rotation = readRotation(node, reader);
-}
-
-Edit readEdit(const YAML::Node& node, const YamlReader& reader) {
-  if (!node.IsMap()) reader.fail("", "is not a map of key: value; see the tutorial for examples");
-  reader.rejectUnknownKeys(node, editKeys());
-  Edit edit;
-  edit.time = reader.number(node, "t");
-  if (edit.time < 0.0) reader.fail("t", "must be >= 0 s after the first frame");
-  edit.object = reader.text(node, "object", "");
-  edit.kind = editKindFromString(reader.text(node, "kind"));
-  edit.mode = editModeFromString(reader.text(node, "mode", ""), edit.kind);
-  readVectors(node, reader, edit);
-  edit.scale = reader.number(node, "scale", edit.scale);
-  edit.factor = reader.number(node, "factor", edit.factor);
-  edit.ramp = reader.number(node, "ramp", edit.ramp);
-  edit.duration = reader.number(node, "duration", edit.duration);
-  edit.youngs_modulus = reader.number(node, "youngs_modulus", kUnchanged);
-  edit.poissons_ratio = reader.number(node, "poissons_ratio", kUnchanged);
-  edit.density = reader.number(node, "density", kUnchanged);
-  edit.damping = reader.number(node, "damping", kUnchanged);
-  if (edit.kind == EditKind::kObjectKind) {
-    edit.object_kind = objectKindFromString(reader.text(node, "value"));
+void validateDuplicate(const Edit& edit, const std::vector<std::string>& objects) {
+  if (edit.copy.empty()) {
+    throw std::invalid_argument("value is empty; give the new object's name");
   }
-  return edit;
+  if (std::find(objects.begin(), objects.end(), edit.copy) != objects.end()) {
+    throw std::invalid_argument("value is '" + edit.copy +
+                                "', which the scene has already; give the copy a name of its own");
+  }
 }
 
 }  // namespace
@@ -145,31 +136,13 @@ void validate(const Edit& edit, const std::vector<std::string>& objects) {
   require(std::isfinite(edit.ramp) && edit.ramp >= 0.0, "ramp", edit.ramp, "finite and >= 0 s");
   require(std::isfinite(edit.duration) && edit.duration >= 0.0, "duration", edit.duration,
           "finite and >= 0 s");
+  require(std::isfinite(edit.pressure), "pressure", edit.pressure, "finite");
+  validateContact(edit);
+  validateLook(edit);
   if (edit.kind == EditKind::kMaterial) validateMaterial(edit);
-}
-
-std::vector<Edit> loadEdits(const std::string& path, const std::vector<std::string>& objects) {
-  const YAML::Node root = YamlReader::load(path);
-  if (root.IsNull()) return {};
-  if (!root.IsSequence()) {
-    throw std::invalid_argument(path + ": is not a list of edits; start each edit with '- '");
-  }
-  std::vector<Edit> edits;
-  for (std::size_t i = 0; i < root.size(); ++i) {
-    const std::string entry = "edit " + std::to_string(i + 1);
-    const YamlReader reader(path, entry);
-    try {
-      edits.push_back(readEdit(root[i], reader));
-      validate(edits.back(), objects);
-    } catch (const std::invalid_argument& error) {
-      const std::string text = error.what();
-      if (text.rfind(path, 0) == 0) throw;
-      throw std::invalid_argument(path + ": " + entry + ": " + text);
-    }
-  }
-  std::stable_sort(edits.begin(), edits.end(),
-                   [](const Edit& a, const Edit& b) { return a.time < b.time; });
-  return edits;
+  if (edit.kind == EditKind::kDuplicate) validateDuplicate(edit, objects);
+  if (edit.kind == EditKind::kSpeedScale || edit.kind == EditKind::kTimeScale) validateScale(edit);
+  if (edit.kind == EditKind::kLight) require(edit.factor > 0.0, "factor", edit.factor, "> 0");
 }
 
 }  // namespace calipso

@@ -11,12 +11,17 @@ namespace {
 template <typename Enum, std::size_t N>
 using Names = std::pair<Enum, const char*>[N];
 
-constexpr Names<EditKind, 10> kEditKinds = {
+constexpr Names<EditKind, 19> kEditKinds = {
     {EditKind::kTransform, "transform"}, {EditKind::kPull, "pull"},
     {EditKind::kFix, "fix"},             {EditKind::kRelease, "release"},
     {EditKind::kMaterial, "material"},   {EditKind::kGravity, "gravity"},
     {EditKind::kVelocity, "velocity"},   {EditKind::kObjectKind, "kind"},
-    {EditKind::kRemove, "remove"},       {EditKind::kReset, "reset"}};
+    {EditKind::kRemove, "remove"},       {EditKind::kReset, "reset"},
+    {EditKind::kDuplicate, "duplicate"}, {EditKind::kContact, "contact"},
+    {EditKind::kWind, "wind"},           {EditKind::kPressure, "pressure"},
+    {EditKind::kTwist, "twist"},         {EditKind::kSpeedScale, "speed_scale"},
+    {EditKind::kTimeScale, "time_scale"}, {EditKind::kAppearance, "appearance"},
+    {EditKind::kLight, "light"}};
 
 constexpr Names<EditMode, 6> kEditModes = {
     {EditMode::kForce, "force"},   {EditMode::kTarget, "target"}, {EditMode::kAbsolute, "absolute"},
@@ -51,18 +56,23 @@ Enum valueOf(const std::string& text, const char* what, const Names<Enum, N>& na
 }
 
 EditMode defaultMode(EditKind kind) {
-  return kind == EditKind::kPull ? EditMode::kForce : EditMode::kAbsolute;
+  const bool force = kind == EditKind::kPull || kind == EditKind::kTwist;
+  return force ? EditMode::kForce : EditMode::kAbsolute;
 }
 
 bool allows(EditKind kind, EditMode mode) {
   switch (kind) {
     case EditKind::kPull:
+    case EditKind::kTwist:
       return mode == EditMode::kForce || mode == EditMode::kTarget;
     case EditKind::kMaterial:
     case EditKind::kGravity:
+    case EditKind::kAppearance:
       return mode == EditMode::kAbsolute || mode == EditMode::kFactor;
     case EditKind::kVelocity:
       return mode == EditMode::kAbsolute || mode == EditMode::kAdd || mode == EditMode::kEstimated;
+    case EditKind::kWind:
+      return mode == EditMode::kAbsolute || mode == EditMode::kEstimated;
     default:
       return mode == EditMode::kAbsolute;
   }
@@ -93,6 +103,12 @@ EditMode editModeFromString(const std::string& name, EditKind kind) {
 
 ObjectKind objectKindFromString(const std::string& name) {
   return valueOf(name, "value", kObjectKinds);
+}
+
+bool meetFromString(const std::string& name) {
+  if (name.empty() || name == "include") return true;
+  if (name == "exclude") return false;
+  throw std::invalid_argument("value is '" + name + "'; it must be one of include, exclude");
 }
 
 RegionKind regionKindFromString(const std::string& name) {

@@ -46,6 +46,28 @@ TEST(Edit, readsEveryFieldAndSortsByTime) {
   EXPECT_TRUE(std::isnan(edits[1].density));
 }
 
+TEST(Edit, readsWhatTheKindsNeed) {
+  const auto edits = loadEdits(
+      writeFile("- {t: 0, object: banana1, kind: duplicate, value: twin, translation: [0, 0, 0.1]}\n"
+                "- {t: 0, object: twin, kind: appearance, color: [1, 0.5, 0.2], roughness: 0.4}\n"
+                "- {t: 0, object: twin, other: banana2, kind: contact, value: exclude}\n"
+                "- {t: 0, object: banana2, kind: contact, friction: 0, restitution: 0.9}\n"
+                "- {t: 0.1, after: banana1, collision: 2, kind: speed_scale, factor: 0.5}\n"),
+      kObjects);
+  ASSERT_EQ(edits.size(), 5u);
+  EXPECT_EQ(edits[0].copy, "twin");
+  EXPECT_EQ(edits[1].color, Eigen::Vector3d(1, 0.5, 0.2));
+  EXPECT_EQ(edits[1].roughness, 0.4);
+  EXPECT_TRUE(std::isnan(edits[1].specular));
+  EXPECT_FALSE(edits[2].meet);
+  EXPECT_EQ(edits[2].other, "banana2");
+  EXPECT_TRUE(edits[3].meet);
+  EXPECT_EQ(edits[3].friction, 0.0);
+  EXPECT_EQ(edits[3].restitution, 0.9);
+  EXPECT_EQ(edits[4].after, "banana1");
+  EXPECT_EQ(edits[4].collision, 2);
+}
+
 TEST(Edit, emptyListsAreValid) {
   EXPECT_TRUE(loadEdits(writeFile(""), kObjects).empty());
   EXPECT_TRUE(loadEdits(writeFile("[]"), kObjects).empty());
@@ -53,7 +75,8 @@ TEST(Edit, emptyListsAreValid) {
 
 TEST(Edit, namesRoundTrip) {
   for (const char* name : {"transform", "pull", "fix", "release", "material", "gravity", "velocity",
-                           "kind", "remove", "reset"}) {
+                           "kind", "remove", "reset", "duplicate", "contact", "wind", "pressure",
+                           "twist", "speed_scale", "time_scale", "appearance", "light"}) {
     EXPECT_EQ(toString(editKindFromString(name)), name);
   }
   EXPECT_EQ(editModeFromString("", EditKind::kPull), EditMode::kForce);
@@ -76,6 +99,16 @@ TEST(Edit, badInputNamesEntryFieldAndRemedy) {
   expect("- {t: 0, object: banana1, kind: pull, vector: [0, 0]}", "list of 3 numbers");
   expect("- {t: 0, object: banana1, kind: pull, mode: factor}", "for kind 'pull'");
   expect("- {t: 0, object: banana1, kind: transform, scale: 0}", "scale = 0");
+  expect("- {t: 0, object: banana1, kind: duplicate}", "value is missing");
+  expect("- {t: 0, object: banana1, kind: duplicate, value: banana2}", "has already");
+  expect("- {t: 0, object: banana1, kind: contact, friction: -1}", "friction = -1");
+  expect("- {t: 0, object: banana1, kind: contact, restitution: 1.5}", "restitution = 1.5");
+  expect("- {t: 0, object: banana1, kind: contact, value: maybe}", "include, exclude");
+  expect("- {t: 0, kind: time_scale, factor: 2}", "factor = 2");
+  expect("- {t: 0, kind: speed_scale, factor: 0}", "factor = 0");
+  expect("- {t: 0, object: banana1, kind: appearance, roughness: 2}", "roughness = 2");
+  expect("- {t: 0, object: banana1, kind: remove, after: apple}", "after is 'apple'");
+  expect("- {t: 0, kind: wind, mode: factor}", "for kind 'wind'");
   expect("pull: 3", "not a list of edits");
   expect("- {t: 0, object: [", "not valid YAML");
 }

@@ -96,10 +96,14 @@ void AlignRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& msg) {
   }
 }
 
-// Only key frames carry contours.
+// Only key frames carry contours. The same one can come twice to a subscriber that connects while it is published.
 void AlignRos::onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) {
-  if (msg->contours.empty()) return;
+  if (msg->contours.empty() || (key_ && *key_ == *msg)) return;
   key_ = msg;
+  fitAll();
+}
+
+void AlignRos::fitAll() {
   std::vector<int> all(scene_.objects.size());
   std::iota(all.begin(), all.end(), 0);
   fit(all);
@@ -127,7 +131,7 @@ void AlignRos::moveTo(int object, const Eigen::Isometry3d& world_from_object) {
 bool AlignRos::onRerun(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
   response.success = key_ != nullptr;
   response.message = key_ ? "" : "there is no segmentation of the key frame yet";
-  if (key_) onSegmentation(key_);
+  if (key_) fitAll();
   for (const auto& [object, model] : aligned_) {
     if (model.trusted) continue;
     response.message += model.object + ": " + model.reason + "\n";

@@ -41,6 +41,7 @@ class AlignRos {
   void moveTo(int object, const Eigen::Isometry3d& world_from_object);
   bool onRerun(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
 
+  void fitAll();
   void fit(const std::vector<int>& objects);   // indices into scene_.objects
   calipso_msgs::AlignedModel fitObject(int object);
   void publish();

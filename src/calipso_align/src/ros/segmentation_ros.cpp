@@ -54,7 +54,10 @@ void SegmentationRos::onSubscriber(const ros::SingleSubscriberPublisher& subscri
   if (key_message_) subscriber.publish(*key_message_);
 }
 
+// A latched image can come twice to a subscriber that connects while it is published.
 void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
+  if (msg->header.stamp == last_stamp_) return;
+  last_stamp_ = msg->header.stamp;
   try {
     if (key_image_.empty())
       adoptKeyFrame(msg);

@@ -45,6 +45,7 @@ class SegmentationRos {
   ros::Subscriber image_subscriber_, strokes_subscriber_;
 
   cv::Mat strokes_;
+  ros::Time last_stamp_;
   std_msgs::Header key_header_;
   cv::Mat key_image_;                               // empty before the first frame
   std::unique_ptr<Segmenter> segmenter_;

@@ -35,6 +35,7 @@ std::vector<calipso_msgs::Edit> readYaml(const std::string& path, const Scene& s
 std::vector<calipso_msgs::Edit> readBag(const std::string& path, const Scene& scene,
                                         const ros::Time& first_stamp) {
   std::vector<calipso_msgs::Edit> edits;
+  std::vector<std::string> names = objectNames(scene);
   rosbag::Bag bag(path, rosbag::bagmode::Read);
   rosbag::View view(bag, rosbag::TypeQuery("calipso_msgs/EditReport"));
   for (const rosbag::MessageInstance& message : view) {
@@ -42,7 +43,9 @@ std::vector<calipso_msgs::Edit> readBag(const std::string& path, const Scene& sc
     if (!report->accepted) continue;
     edits.push_back(report->edit);
     if (edits.back().header.stamp.isZero()) edits.back().header.stamp = report->header.stamp;
-    validate(fromMsg(edits.back(), first_stamp), objectNames(scene));
+    const Edit edit = fromMsg(edits.back(), first_stamp);
+    validate(edit, names);
+    if (!edit.copy.empty()) names.push_back(edit.copy);
   }
   return edits;
 }

@@ -27,6 +27,12 @@ void NodeWatch::fail(const std::string& node, const std::string& reason) {
   publisher_.publish(status);
 }
 
+std::set<std::string> NodeWatch::rosNames() const {
+  std::set<std::string> names;
+  for (const auto& [ros_name, node] : node_of_) names.insert(ros_name);
+  return names;
+}
+
 void NodeWatch::connectionLost(const std::string& ros_name) {
   const auto found = node_of_.find(ros_name);
   if (found == node_of_.end() || over_) return;

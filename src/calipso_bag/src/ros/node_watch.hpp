@@ -25,6 +25,9 @@ class NodeWatch {
   // True when the node's process has ended.
   bool ended(const std::string& node) const { return ended_.count(node) > 0; }
 
+  // ROS names of the nodes that have reported.
+  std::set<std::string> rosNames() const;
+
   // Declares a node FAILED, to everyone.
   void fail(const std::string& node, const std::string& reason);
 

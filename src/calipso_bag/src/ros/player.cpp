@@ -1,5 +1,6 @@
 #include "player.hpp"
 
+#include <boost/make_shared.hpp>
 #include <calipso_msgs/ClipInfo.h>
 #include <tf2_msgs/TFMessage.h>
 
@@ -33,6 +34,17 @@ std::vector<std::string> common(const std::vector<std::string>& a,
   return both;
 }
 
+std::vector<PlayedFrame> scheduleOf(const BagClip& clip, const std::vector<calipso_msgs::Edit>& edits) {
+  std::vector<std::int64_t> frames;
+  for (const ros::Time& stamp : clip.stamps()) frames.push_back(static_cast<std::int64_t>(stamp.toNSec()));
+  std::vector<TimeScale> scales;
+  for (const calipso_msgs::Edit& edit : edits) {
+    if (edit.kind != calipso_msgs::Edit::TIME_SCALE) continue;
+    scales.push_back({static_cast<std::int64_t>(edit.header.stamp.toNSec()), edit.factor});
+  }
+  return playSchedule(frames, scales);
+}
+
 }  // namespace
 
 Preparation::Roles Player::rolesOf(const std::vector<std::string>& nodes) {
@@ -51,6 +63,7 @@ Player::Player(ros::NodeHandle& nh, const Params& params)
       clip_(params.clip),
       path_(cameraPath(clip_, scene_, poseSourceFromString(params.poses))),
       edits_(readEdits(params.edits, scene_, clip_.stamps().front())),
+      schedule_(scheduleOf(clip_, edits_)),
       watch_(nh, rolesOf(params.nodes)),
       window_(params.in_flight) {
   checkScene();
@@ -85,11 +98,16 @@ void Player::checkScene() const {
 template <typename M>
 ros::Publisher Player::advertise(const std::string& topic, bool latched) {
   ros::AdvertiseOptions options;
-  options.init<M>(topic, kQueue, ros::SubscriberStatusCallback(),
+  options.init<M>(topic, kQueue,
                   [this](const ros::SingleSubscriberPublisher& subscriber) {
+                    links_.opened(subscriber.getTopic(), subscriber.getSubscriberName());
+                  },
+                  [this](const ros::SingleSubscriberPublisher& subscriber) {
+                    links_.closed(subscriber.getTopic(), subscriber.getSubscriberName());
                     watch_.connectionLost(subscriber.getSubscriberName());
                   });
   options.latch = latched;
+  advertised_.insert(nh_.resolveName(topic));
   return nh_.advertise(options);
 }
 
@@ -115,25 +133,35 @@ void Player::run() {
   watch_.runIsOver();
 }
 
-// True when a frame sent now reaches everyone who asked for frames.
-bool Player::connected() const {
-  const auto& all = watch_.preparation().unsettled();
-  const bool all_reported = std::all_of(all.begin(), all.end(), [this](const std::string& node) {
-    return !watch_.preparation().standing(node).message.empty();
-  });
-  return all_reported && image_.getNumSubscribers() > 0 && camera_info_.getNumSubscribers() > 0 &&
-         edited_.getNumPublishers() > 0;
+// Nodes of the run that have not said anything yet; the recorder has to say that it is ready.
+std::vector<std::string> Player::silent() const {
+  std::vector<std::string> names;
+  for (const std::string& node : watch_.preparation().unsettled()) {
+    if (node == "recorder" || watch_.preparation().standing(node).message.empty()) names.push_back(node);
+  }
+  return names;
 }
 
+// A node reports once it has subscribed, so by then the master knows what it is to be sent.
+std::vector<std::string> Player::unconnected() const {
+  std::vector<std::string> names =
+      links_.missing(registeredSubscriptions(), advertised_, watch_.rosNames());
+  if (edited_.getNumPublishers() == 0) names.push_back("a renderer to the player");
+  return names;
+}
+
+// A frame sent before everyone is connected would be lost to some.
 void Player::waitForGraph() {
-  if (waitFor([this] { return connected(); }, params_.connect_timeout_sec)) return;
-  std::vector<std::string> silent;
-  for (const std::string& node : watch_.preparation().unsettled()) {
-    if (watch_.preparation().standing(node).message.empty()) silent.push_back(node);
+  if (!waitFor([this] { return silent().empty(); }, params_.connect_timeout_sec)) {
+    throw std::runtime_error("after " + std::to_string(params_.connect_timeout_sec) +
+                             " s these nodes have not reported: " + listed(silent()) +
+                             "; look for their own messages above");
   }
-  throw std::runtime_error("after " + std::to_string(params_.connect_timeout_sec) +
-                           " s these nodes have not reported: " + listed(silent) +
-                           "; look for their own messages above");
+  if (!waitFor([this] { return unconnected().empty(); }, params_.connect_timeout_sec)) {
+    throw std::runtime_error("after " + std::to_string(params_.connect_timeout_sec) +
+                             " s not connected: " + listed(unconnected()) +
+                             "; can the machines reach each other (ROS_IP, ROS_HOSTNAME)?");
+  }
 }
 
 void Player::announceClip() {
@@ -146,6 +174,7 @@ void Player::announceClip() {
   info.frames = static_cast<std::uint32_t>(clip_.frameCount());
   info.fps = clip_.fps();
   info.last_stamp = clip_.stamps().back();
+  info.played_frames = static_cast<std::uint32_t>(schedule_.size());
   clip_info_.publish(info);
 }
 
@@ -203,15 +232,28 @@ void Player::sendEdits() {
 
 void Player::playFrames() {
   BagClip::Reader reader = clip_.reader();
+  BagFrame frame;
   first_sent_ = last_shown_ = ros::WallTime::now();
-  for (int i = 0; i < clip_.frameCount(); ++i) {
-    const BagFrame frame = reader.next();
+  for (std::size_t i = 0; i < schedule_.size(); ++i) {
+    if (i == 0 || schedule_[i].source != schedule_[i - 1].source) frame = reader.next();
     waitForEdited([this] { return window_.hasRoom(); });
-    window_.sent(static_cast<std::int64_t>(frame.image->header.stamp.toNSec()));
-    camera_info_.publish(frame.info);
-    image_.publish(frame.image);
+    playFrame(frame, ros::Time().fromNSec(static_cast<std::uint64_t>(schedule_[i].time_ns)));
   }
   waitForEdited([this] { return window_.empty(); });
+}
+
+void Player::playFrame(const BagFrame& frame, const ros::Time& stamp) {
+  window_.sent(static_cast<std::int64_t>(stamp.toNSec()));
+  if (stamp == frame.image->header.stamp) {
+    camera_info_.publish(frame.info);
+    image_.publish(frame.image);
+    return;
+  }
+  const auto info = boost::make_shared<sensor_msgs::CameraInfo>(*frame.info);
+  const auto image = boost::make_shared<sensor_msgs::Image>(*frame.image);
+  info->header.stamp = image->header.stamp = stamp;
+  camera_info_.publish(info);
+  image_.publish(image);
 }
 
 void Player::waitForEdited(const std::function<bool()>& done) {
@@ -222,7 +264,7 @@ void Player::waitForEdited(const std::function<bool()>& done) {
       (in_time ? "the renderer's process ended"
                : "no edited frame for " + std::to_string(params_.frame_timeout_sec) + " s") +
       " after " + std::to_string(window_.returned()) + " of " +
-      std::to_string(clip_.frameCount()) + " frames; look for the renderer's messages above");
+      std::to_string(schedule_.size()) + " frames; look for the renderer's messages above");
 }
 
 void Player::onEdited(const sensor_msgs::CameraInfoConstPtr& info) {
@@ -232,10 +274,10 @@ void Player::onEdited(const sensor_msgs::CameraInfoConstPtr& info) {
 
 void Player::showProgress() {
   const ros::WallTime now = ros::WallTime::now();
-  const bool last = window_.returned() == clip_.frameCount();
+  const bool last = window_.returned() == static_cast<int>(schedule_.size());
   if (!last && (now - last_shown_).toSec() < kShowEverySec) return;
   last_shown_ = now;
-  ROS_INFO_STREAM("edited " << window_.returned() << " of " << clip_.frameCount() << " frames, "
+  ROS_INFO_STREAM("edited " << window_.returned() << " of " << schedule_.size() << " frames, "
                             << std::fixed << std::setprecision(1)
                             << window_.returned() / (now - first_sent_).toSec() << " per second");
 }

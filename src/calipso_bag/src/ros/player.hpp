@@ -5,13 +5,16 @@
 #include <sensor_msgs/CameraInfo.h>
 
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "bag_clip.hpp"
 #include "calipso_bag/flight_window.hpp"
+#include "calipso_bag/play_schedule.hpp"
 #include "calipso_scene/scene.hpp"
 #include "camera_path.hpp"
+#include "links.hpp"
 #include "node_watch.hpp"
 
 namespace calipso::bag {
@@ -46,7 +49,8 @@ class Player {
   template <typename M>
   ros::Publisher advertise(const std::string& topic, bool latched);
   void advertiseAll();
-  bool connected() const;
+  std::vector<std::string> silent() const;
+  std::vector<std::string> unconnected() const;
   void waitForGraph();
   void announceClip();
   void prepare();
@@ -54,6 +58,7 @@ class Player {
   void waitForProgress(const std::function<bool()>& done, const std::string& what);
   void sendEdits();
   void playFrames();
+  void playFrame(const BagFrame& frame, const ros::Time& stamp);
   void waitForEdited(const std::function<bool()>& done);
   void onEdited(const sensor_msgs::CameraInfoConstPtr& info);
   void showProgress();
@@ -64,7 +69,10 @@ class Player {
   BagClip clip_;
   CameraPath path_;
   std::vector<calipso_msgs::Edit> edits_;
+  std::vector<PlayedFrame> schedule_;  // of the editing pass
   NodeWatch watch_;
+  Links links_;
+  std::set<std::string> advertised_;  // full names of the topics
   FlightWindow window_;
   ros::Publisher clip_info_, clip_image_, clip_camera_info_, image_, camera_info_, tf_, edit_;
   ros::Subscriber edited_;

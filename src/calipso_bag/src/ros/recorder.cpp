@@ -146,16 +146,16 @@ bool Recorder::connected() const {
   });
 }
 
-bool Recorder::allEdited() const { return clip_.frames > 0 && edited_.size() >= clip_.frames; }
+bool Recorder::allEdited() const { return clip_.played_frames > 0 && edited_.size() >= clip_.played_frames; }
 
 // What a failed node would have said is not waited for.
 bool Recorder::allExplained() const {
   const auto complete = [this](const std::string& topic) {
     const auto found = count_.find(topic);
-    return found != count_.end() && found->second >= static_cast<int>(clip_.frames);
+    return found != count_.end() && found->second >= static_cast<int>(clip_.played_frames);
   };
   const bool simulated = summary_.failed.empty();
-  return input_.size() >= clip_.frames && complete(topics::kImageEditedCameraInfo) &&
+  return input_.size() >= clip_.played_frames && complete(topics::kImageEditedCameraInfo) &&
          complete(topics::kProvenance) && (!simulated || complete(topics::kState)) &&
          (!simulated || complete(topics::kDynamics));
 }

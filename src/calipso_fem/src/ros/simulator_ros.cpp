@@ -43,18 +43,22 @@ SimulatorRos::SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
   reporter_.starting("waiting for models");
 }
 
+// Latched messages can come twice; the world must not start anew for that.
 void SimulatorRos::onModels(const calipso_msgs::AlignedModelsConstPtr& models) {
+  if (models_ && *models_ == *models) return;
   models_ = models;
   prepare();
 }
 
 void SimulatorRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
+  if (first_stamp_) return;
   first_stamp_ = info->header.stamp;
   if (info->fps > 0.0) params_.world.frame_period = 1.0 / info->fps;
   prepare();
 }
 
 void SimulatorRos::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip) {
+  if (clip_dynamics_ && *clip_dynamics_ == *clip) return;
   clip_dynamics_ = clip;
   prepare();
 }

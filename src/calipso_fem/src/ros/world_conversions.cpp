@@ -13,6 +13,15 @@ std_msgs::Header headerAt(const ros::Time& stamp) {
   return header;
 }
 
+calipso_msgs::Look toMsg(const Look& look) {
+  calipso_msgs::Look m;
+  for (int i = 0; i < 3; ++i) m.color[i] = look.color[i];
+  m.color_is_absolute = look.absolute;
+  m.specular = look.specular;
+  m.roughness = look.roughness;
+  return m;
+}
+
 calipso_msgs::ObjectState toMsg(const ObjectSnapshot& s) {
   calipso_msgs::ObjectState m;
   m.object = s.name;
@@ -26,6 +35,8 @@ calipso_msgs::ObjectState toMsg(const ObjectSnapshot& s) {
   m.von_mises.assign(s.von_mises.data(), s.von_mises.data() + s.von_mises.size());
   m.kinetic_energy = s.kinetic_energy;
   m.elastic_energy = s.elastic_energy;
+  m.source = s.source;
+  if (s.look.changes()) m.look.push_back(toMsg(s.look));
   return m;
 }
 
@@ -99,6 +110,8 @@ calipso_msgs::SimulationState toMsg(const WorldState& state, const ros::Time& st
   m.header = headerAt(stamp);
   for (const ObjectSnapshot& object : state.objects) m.objects.push_back(toMsg(object));
   for (const ContactPoint& contact : state.contacts) m.contacts.push_back(toMsg(contact));
+  m.sun_direction = toVectorMsg(state.sun.direction);
+  m.sun_factor = state.sun.factor;
   m.step_ms = static_cast<float>(state.step_ms);
   m.substeps = static_cast<std::uint32_t>(state.substeps);
   return m;

@@ -18,15 +18,31 @@ struct Pull {
   std::vector<int> vertices;
   std::vector<int> nodes;  // deformable, target mode: the nodes that are led
   bool to_target = false;
-  Eigen::Vector3d vector = Eigen::Vector3d::Zero();  // N, or m
+  bool twists = false;                               // turns the region about its middle
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();  // N or m; twisting N m or rad
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // object frame, centre of the region
   Eigen::Vector3d start = Eigen::Vector3d::Zero();   // world, where the anchor was
+  Eigen::Matrix3d start_rotation = Eigen::Matrix3d::Identity();  // of the object
   double begin = 0.0, ramp = 0.0, duration = 0.0;    // s
 
   double share(double time) const {  // 0..1 along the ramp
     return ramp > 0.0 ? std::min(1.0, std::max(0.0, (time - begin) / ramp)) : 1.0;
   }
+  // Displacement of a point at `arm` from the region's middle, `share` of the way to the target.
+  Eigen::Vector3d way(double share, const Eigen::Vector3d& arm) const {
+    if (!twists) return share * vector;
+    const double angle = vector.norm();
+    if (angle == 0.0) return Eigen::Vector3d::Zero();
+    return Eigen::AngleAxisd(share * angle, vector / angle) * arm - arm;
+  }
   bool over(double time) const { return duration > 0.0 && time >= begin + duration - 1e-9; }
+};
+
+// Air that moves around an object.
+struct AirFlow {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s
+  bool estimated = false;  // as the video shows it, times `factor`, instead of `velocity`
+  double factor = 1.0;
 };
 
 // Pose and velocity of a body as a whole, handed on when its kind changes.
@@ -54,6 +70,7 @@ struct Actor {
   std::string reason = "no edit touches it";
   bool edited = false, removed = false;
   bool inserted = false;  // not in the video
+  std::string source;     // of a copy: the object of the video whose model it is drawn by
   Holder holder = Holder::kUnknown;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();            // m/s^2
   Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();           // m/s^2
@@ -64,6 +81,15 @@ struct Actor {
   Eigen::Isometry3d soft_from_object = Eigen::Isometry3d::Identity();  // pose when soft was made
   std::unique_ptr<SurfaceTree> tree;                                   // object frame
   std::vector<Pull> pulls;
+  struct Sheet {
+    bool closed = false;
+    double areal_density = 0.0;  // kg/m^2
+  };
+  std::optional<Sheet> sheet;  // how the surface meets the air; made when it is needed
+  std::optional<AirFlow> air;
+  std::vector<ObservedWind> observed_wind;  // by time
+  std::vector<double> collisions;           // instants in the video, s, ascending
+  Look look;
   std::vector<std::vector<int>> fixed;  // vertices per fixed region
   bool asleep = false;
   int calm_frames = 0;

@@ -257,6 +257,14 @@ Eigen::Matrix3d RigidWorld::compliance(Id id, const Eigen::Vector3d& at,
          cross(at - center) * inverse_inertia * cross(from - center);
 }
 
+Eigen::Matrix3d RigidWorld::inertia(Id id) const {
+  const btRigidBody& body = *impl_->at(id).body;
+  if (!BulletWorld::isDynamic(&body)) return Eigen::Matrix3d::Zero();
+  const Eigen::Matrix3d axes = fromBullet(body.getWorldTransform()).linear();
+  const Eigen::Vector3d inverse = fromBullet(body.getInvInertiaDiagLocal());
+  return axes * inverse.cwiseInverse().asDiagonal() * axes.transpose();
+}
+
 double RigidWorld::kineticEnergy(Id id) const {
   const btRigidBody& body = *impl_->at(id).body;
   if (body.getInvMass() == 0.0) return 0.0;

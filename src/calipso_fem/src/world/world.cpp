@@ -92,13 +92,52 @@ void World::addObservedMotion(const std::string& object, const ObservedMotion& m
   actor->track.add(motion);
 }
 
-void World::submit(const Edit& edit) {
+void World::Impl::enqueue(const Edit& edit) {
   // A time that is no number cannot be ordered; the edit is refused with the next frame.
   const auto key = [](const Edit& e) { return std::isfinite(e.time) ? e.time : -1.0; };
-  auto& pending = impl_->pending;
   pending.insert(std::upper_bound(pending.begin(), pending.end(), edit,
                                   [&](const Edit& a, const Edit& b) { return key(a) < key(b); }),
                  edit);
+}
+
+// Edits that wait for a collision get its instant once it is known. What waits for one that the video does not have
+// is handed on as it is, to be refused.
+void World::Impl::releaseWaiting() {
+  const std::vector<Edit> all = std::move(waiting);
+  waiting.clear();
+  for (Edit edit : all) {
+    const Actor* actor = find(edit.after);
+    const bool known = actor && edit.collision >= 1 &&
+                       edit.collision <= static_cast<int>(actor->collisions.size());
+    if (known) {
+      edit.time = actor->collisions[edit.collision - 1] + std::max(0.0, edit.time);
+      edit.after.clear();
+    } else if (actor && !collisions_known) {
+      waiting.push_back(edit);
+      continue;
+    }
+    enqueue(edit);
+  }
+}
+
+void World::addObservedWind(const std::string& object, const ObservedWind& wind) {
+  if (Actor* actor = impl_->find(object)) actor->observed_wind.push_back(wind);
+}
+
+void World::addCollision(const std::string& object, double time) {
+  if (Actor* actor = impl_->find(object)) actor->collisions.push_back(time);
+  impl_->releaseWaiting();
+}
+
+void World::allCollisionsKnown() {
+  impl_->collisions_known = true;
+  impl_->releaseWaiting();
+}
+
+void World::submit(const Edit& edit) {
+  if (edit.after.empty()) return impl_->enqueue(edit);
+  impl_->waiting.push_back(edit);
+  impl_->releaseWaiting();
 }
 
 std::vector<EditOutcome> World::advanceTo(double time) {
@@ -169,6 +208,8 @@ ObjectSnapshot World::Impl::snapshot(const Actor& actor) const {
   s.kind = actor.kind;
   s.edited = actor.edited;
   s.removed = actor.removed;
+  s.source = actor.source;
+  s.look = actor.look;
   s.world_from_object = poseOf(actor, now);
   if (!actor.edited || actor.removed) return s;
   s.vertices = verticesOf(actor);
@@ -190,6 +231,7 @@ WorldState World::state() const {
   for (const Actor& actor : impl_->actors) state.objects.push_back(impl_->snapshot(actor));
   state.contacts = impl_->shown_contacts;
   state.first_touches = impl_->first_touches;
+  state.sun = impl_->sun;
   state.step_ms = impl_->step_ms;
   state.substeps = impl_->substeps;
   return state;

@@ -3,31 +3,12 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "calipso_fem/world/region_selection.hpp"
+#include "describe.hpp"
 #include "world_impl.hpp"
 
-// What an edit does. Each function returns what was done, or throws what is wrong.
+// What an edit does to an object as a whole. Each function returns what was done, or throws what is wrong.
 namespace calipso::fem {
 namespace {
-
-std::string describe(const Eigen::Vector3d& v) {
-  std::ostringstream text;
-  text << "(" << v.x() << ", " << v.y() << ", " << v.z() << ")";
-  return text.str();
-}
-
-bool intersects(const std::vector<int>& a, const std::vector<int>& b) {  // both ascending
-  std::vector<int> common;
-  std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(common));
-  return !common.empty();
-}
-
-Eigen::Vector3d meanOf(const decltype(TriangleMesh::vertices)& vertices,
-                       const std::vector<int>& chosen) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const int v : chosen) sum += vertices.row(v).transpose();
-  return sum / static_cast<double>(chosen.size());
-}
 
 double changed(double value, double by, EditMode mode) {
   if (std::isnan(by)) return value;
@@ -47,11 +28,14 @@ ObjectKind World::Impl::kindFor(const Actor& actor, const Edit& edit) const {
     case EditKind::kPull:
     case EditKind::kFix:
     case EditKind::kRelease:
+    case EditKind::kTwist:
+    case EditKind::kPressure:
       return ObjectKind::kDeformable;
     case EditKind::kMaterial:
       return changesStiffness(edit) ? ObjectKind::kDeformable : ObjectKind::kRigid;
     case EditKind::kGravity:
     case EditKind::kVelocity:
+    case EditKind::kWind:
       // What is attached can only give way elastically.
       return actor.holder == Holder::kAttachment ? ObjectKind::kDeformable : ObjectKind::kRigid;
     case EditKind::kObjectKind:
@@ -93,41 +77,49 @@ void World::Impl::touch(Actor& actor, const Edit& edit) {
 
 std::string World::Impl::apply(const Edit& edit) {
   validate(edit, names());
+  if (!edit.after.empty())
+    throw std::invalid_argument("collision " + std::to_string(edit.collision) + " of " + edit.after +
+                                " is not in the video, which shows " +
+                                std::to_string(find(edit.after)->collisions.size()));
+  if (edit.object.empty()) return applyToScene(edit);
   if (edit.kind == EditKind::kGravity) return changeGravity(edit);
-  if (edit.kind == EditKind::kReset && edit.object.empty()) {
-    for (Actor& actor : actors) reset(actor);
-    return "every object is as in the video again";
-  }
   Actor& actor = *find(edit.object);
   switch (edit.kind) {
     case EditKind::kTransform:
       return transform(actor, edit);
     case EditKind::kPull:
+    case EditKind::kTwist:
       return pull(actor, edit);
     case EditKind::kFix:
       return fix(actor, edit);
     case EditKind::kRelease:
       return release(actor, edit);
+    case EditKind::kPressure:
+      return press(actor, edit);
+    case EditKind::kWind:
+      return blow(actor, edit);
     case EditKind::kMaterial:
       return changeMaterial(actor, edit);
     case EditKind::kVelocity:
       return changeVelocity(actor, edit);
-    case EditKind::kObjectKind: {
+    case EditKind::kContact:
+      return changeContact(actor, edit);
+    case EditKind::kDuplicate:
+      return copy(actor, edit);
+    case EditKind::kAppearance:
+      return changeLook(actor, edit);
+    case EditKind::kObjectKind:
       actor.forced_kind = edit.object_kind;
       touch(actor, edit);
       return actor.object.name + " is " + toString(actor.kind) + " now";
-    }
-    case EditKind::kRemove: {
-      removeBodies(actor);
-      actor.removed = actor.edited = true;
-      actor.kind = ObjectKind::kStatic;
-      actor.reason = "edit 'remove'";
-      plan_changed = true;
-      return actor.object.name + " is removed";
-    }
-    default:
+    case EditKind::kRemove:
+      return remove(actor);
+    case EditKind::kReset:
       reset(actor);
       return actor.object.name + " is as in the video again";
+    default:
+      throw std::invalid_argument("an edit '" + toString(edit.kind) +
+                                  "' is for the whole scene; leave object out");
   }
 }
 
@@ -149,95 +141,17 @@ std::string World::Impl::transform(Actor& actor, const Edit& edit) {
   }
   std::string message = actor.object.name + " is moved by " + describe(edit.translation) + " m";
   if (edit.scale == 1.0) return message;
-  const Eigen::RowVector3d middle = actor.object.mesh.vertices.colwise().mean();
-  actor.object.mesh.vertices =
-      (edit.scale * (actor.object.mesh.vertices.rowwise() - middle)).rowwise() + middle;
   const bool deformed = actor.soft != nullptr;
-  rebuild(actor);
+  scale(actor, edit.scale);
   message += " and scaled by " + std::to_string(edit.scale);
   return deformed ? message + "; it starts anew from its undeformed shape" : message;
 }
 
-std::string World::Impl::pull(Actor& actor, const Edit& edit) {
-  Pull pull;
-  pull.vertices = selectVertices(scene, actor.id, edit.region);
-  pull.to_target = edit.mode == EditMode::kTarget;
-  pull.vector = edit.vector;
-  pull.begin = now;
-  pull.ramp = edit.ramp;
-  pull.duration = edit.duration;
-  touch(actor, edit);
-  if (!actor.simulated())
-    throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
-                                " and cannot be pulled; make it rigid or deformable (edit 'kind')");
-  pull.anchor = meanOf(actor.object.mesh.vertices, pull.vertices);
-  pull.start = meanOf(verticesOf(actor), pull.vertices);
-  if (actor.soft && pull.to_target) {
-    DeformableBody& body = actor.soft->body();
-    const double start = body.time(), begin = now;
-    for (const int node : body.nodesOfSurfaceVertices(pull.vertices)) {
-      if (body.isFixed(node)) continue;
-      pull.nodes.push_back(node);
-      const Eigen::Vector3d from =
-          body.positions().segment<3>(3 * node) - body.model().mesh().node(node);
-      for (int axis = 0; axis < 3; ++axis)
-        body.prescribe(node, axis, [pull, start, begin, axis, d = from[axis]](double t) {
-          return d + pull.share(begin + t - start) * pull.vector[axis];
-        });
-    }
-    if (pull.nodes.empty())
-      throw std::invalid_argument("the region to pull on " + actor.object.name +
-                                  " is held fixed; release it first or choose another");
-    actor.soft->forgetCompliance();
-  }
-  actor.pulls.push_back(pull);
-  return actor.object.name + " (" + toString(actor.kind) + ") is pulled " +
-         (pull.to_target ? "to a target by " + describe(edit.vector) + " m"
-                         : "with " + describe(edit.vector) + " N") +
-         " at " + std::to_string(pull.vertices.size()) + " vertices";
-}
-
-std::string World::Impl::fix(Actor& actor, const Edit& edit) {
-  const std::vector<int> vertices = selectVertices(scene, actor.id, edit.region);
-  touch(actor, edit);
-  if (!actor.soft)
-    throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
-                                "; only a deformable object has regions to fix (edit 'kind')");
-  actor.soft->body().fixSurfaceVertices(vertices);
-  actor.soft->forgetCompliance();
-  actor.fixed.push_back(vertices);
-  return actor.object.name + " is held at " + std::to_string(vertices.size()) + " vertices";
-}
-
-std::string World::Impl::release(Actor& actor, const Edit& edit) {
-  const std::vector<int> vertices = selectVertices(scene, actor.id, edit.region);
-  touch(actor, edit);
-  size_t released = 0;
-  const auto meets = [&](const std::vector<int>& region) {
-    if (!intersects(region, vertices)) return false;
-    if (actor.soft) actor.soft->body().releaseSurfaceVertices(region);
-    ++released;
-    return true;
-  };
-  actor.fixed.erase(std::remove_if(actor.fixed.begin(), actor.fixed.end(), meets),
-                    actor.fixed.end());
-  const auto lets_go = [&](const Pull& pull) {
-    if (!intersects(pull.vertices, vertices)) return false;
-    if (actor.soft)
-      for (const int node : pull.nodes) actor.soft->body().releaseNode(node);
-    ++released;
-    return true;
-  };
-  actor.pulls.erase(std::remove_if(actor.pulls.begin(), actor.pulls.end(), lets_go),
-                    actor.pulls.end());
-  if (released == 0)
-    throw std::invalid_argument("nothing is fixed or pulled in that region of " +
-                                actor.object.name);
-  if (actor.soft) {
-    for (const auto& region : actor.fixed) actor.soft->body().fixSurfaceVertices(region);
-    actor.soft->forgetCompliance();
-  }
-  return std::to_string(released) + " region(s) of " + actor.object.name + " are let go";
+void World::Impl::scale(Actor& actor, double factor) {
+  const Eigen::RowVector3d middle = actor.object.mesh.vertices.colwise().mean();
+  actor.object.mesh.vertices =
+      (factor * (actor.object.mesh.vertices.rowwise() - middle)).rowwise() + middle;
+  rebuild(actor);
 }
 
 std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
@@ -262,30 +176,6 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
        << " Pa, nu = " << material.poissons_ratio << ", density = " << material.density
        << " kg/m^3, damping = " << material.damping << " s";
   return text.str();
-}
-
-std::string World::Impl::changeGravity(const Edit& edit) {
-  std::string changed_objects;
-  for (Actor& actor : actors) {
-    if (actor.removed || (!edit.object.empty() && actor.object.name != edit.object)) continue;
-    const Eigen::Vector3d gravity =
-        edit.mode == EditMode::kFactor ? edit.factor * actor.gravity : edit.vector;
-    // A change for the whole scene leaves alone what goes on lying on its support.
-    if (edit.object.empty() && !actor.edited) {
-      findHolder(actor);
-      if (actor.holder == Holder::kSupport && gravity.dot(scene.gravity) > 0.0) {
-        actor.gravity = gravity;
-        continue;
-      }
-    }
-    touch(actor, edit);
-    actor.gravity = gravity;
-    if (actor.soft) actor.soft->setGravity(actor.acceleration());
-    if (actor.kind == ObjectKind::kRigid) rigid.setAcceleration(*actor.body, actor.acceleration());
-    changed_objects += " " + actor.object.name + " " + describe(gravity) + " m/s^2;";
-  }
-  return changed_objects.empty() ? "gravity changed; every object goes on resting"
-                                 : "gravity:" + changed_objects;
 }
 
 std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
@@ -321,6 +211,46 @@ std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
   }
   return actor.object.name + " moves with " + describe(linear) + " m/s, " + describe(angular) +
          " rad/s";
+}
+
+std::string World::Impl::remove(Actor& actor) {
+  removeBodies(actor);
+  actor.removed = actor.edited = true;
+  actor.kind = ObjectKind::kStatic;
+  actor.reason = "edit 'remove'";
+  plan_changed = true;
+  return actor.object.name + " is removed";
+}
+
+// Moved like edit 'transform' moves, from where the original is now.
+std::string World::Impl::copy(Actor& actor, const Edit& edit) {
+  if (actor.removed)
+    throw std::invalid_argument(actor.object.name + " has been removed; send a reset for it first");
+  const Eigen::Vector3d centroid = centroidOf(actor);
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = edit.rotation.normalized().toRotationMatrix();
+  motion.translation() = centroid + edit.translation - motion.linear() * centroid;
+  Actor& fresh = duplicate(actor.object.name, edit.copy, motion);
+  fresh.source = actor.source.empty() ? actor.object.name : actor.source;
+  fresh.look = actor.look;
+  fresh.edited = true;
+  if (edit.scale != 1.0) scale(fresh, edit.scale);
+  return edit.copy + " is a copy of " + actor.object.name + ", moved by " +
+         describe(edit.translation) + " m";
+}
+
+// Only the picture changes, but an object that is drawn is one that an edit has touched.
+std::string World::Impl::changeLook(Actor& actor, const Edit& edit) {
+  touch(actor, edit);
+  actor.edited = true;
+  Look& look = actor.look;
+  if (edit.color.allFinite()) {
+    look.absolute = edit.mode == EditMode::kAbsolute;
+    look.color = edit.color;
+  }
+  if (!std::isnan(edit.specular)) look.specular = edit.specular;
+  if (!std::isnan(edit.roughness)) look.roughness = edit.roughness;
+  return actor.object.name + " looks different";
 }
 
 }  // namespace calipso::fem

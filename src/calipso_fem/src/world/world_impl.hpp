@@ -9,6 +9,7 @@
 
 #include "actor.hpp"
 #include "calipso_fem/world/soft_contacts.hpp"
+#include "calipso_fem/world/wind.hpp"
 #include "calipso_fem/world/world.hpp"
 
 namespace calipso::fem {
@@ -18,7 +19,7 @@ struct World::Impl {
 
   // Clock (world.cpp)
   void stepFrame(double h);
-  void substep(double from, double h);
+  void substep(double from, double span);
   void rememberFirstTouches();
   void noteTouch(const TouchEvent& touch);  // unless the pair has been noted in this frame
   ObjectSnapshot snapshot(const Actor& actor) const;
@@ -57,19 +58,36 @@ struct World::Impl {
   // Contacts and forces of a step (world_step.cpp)
   std::vector<Obstacle> obstacles(double from, double to, const Actor* except = nullptr);
   std::vector<SoftEntry> softEntries();
-  void applyPulls(double at);
+  void applyLoads(double at, double h);  // world_forces.cpp
+  Eigen::Vector3d twistOf(const Actor& actor, const Pull& pull, double at) const;
+  void twistSoft(Actor& actor, const Pull& pull, double at);
+  Air airAt(const Actor& actor, double at) const;
+  Vertices airOn(Actor& actor, const Vertices& x, const Vertices& u, double at, double h);
+  void blowSoft(Actor& actor, double at, double h);
   void pullSoft(Actor& actor, const Pull& pull, double at);
-  void pullRigid(Actor& actor, double at);
+  void loadRigid(Actor& actor, double at, double h);
   void endPulls(double at);
   void updateSleep();
   int substepsPerFrame() const;
 
-  // Edits (world_edits.cpp)
+  // Edits (world_edits.cpp, world_loads.cpp, world_scene_edits.cpp)
+  void enqueue(const Edit& edit);
+  void releaseWaiting();
   std::string apply(const Edit& edit);
+  std::string applyToScene(const Edit& edit);
   std::string transform(Actor& actor, const Edit& edit);
   std::string pull(Actor& actor, const Edit& edit);
   std::string fix(Actor& actor, const Edit& edit);
   std::string release(Actor& actor, const Edit& edit);
+  std::string press(Actor& actor, const Edit& edit);
+  std::string blow(Actor& actor, const Edit& edit);
+  std::string blowEverywhere(const Edit& edit);
+  void lead(Actor& actor, Pull& pull);
+  void scale(Actor& actor, double factor);
+  std::string remove(Actor& actor);
+  std::string copy(Actor& actor, const Edit& edit);
+  std::string changeContact(Actor& actor, const Edit& edit);
+  std::string changeLook(Actor& actor, const Edit& edit);
   std::string changeMaterial(Actor& actor, const Edit& edit);
   std::string changeGravity(const Edit& edit);
   std::string changeVelocity(Actor& actor, const Edit& edit);
@@ -90,7 +108,9 @@ struct World::Impl {
   std::vector<std::unique_ptr<SurfaceTree>> support_trees;
   bool has_colliders = false;
 
-  double now = 0.0;
+  double now = 0.0;          // video time, s
+  double speed_scale = 1.0;  // simulated seconds per second of the video
+  Sun sun;
   bool started = false;
   double step_ms = 0.0;
   int substeps = 0;
@@ -98,7 +118,9 @@ struct World::Impl {
   std::set<std::pair<std::string, std::string>> touching;
   std::vector<TouchEvent> first_touches;
   std::map<std::pair<int, int>, PairRule> rules;  // by ids, smaller first
-  std::deque<Edit> pending;  // by time
+  std::deque<Edit> pending;   // by time
+  std::vector<Edit> waiting;  // for a collision in the video that is not known yet
+  bool collisions_known = false;
   bool plan_changed = true;
 };
 

@@ -103,10 +103,11 @@ void World::Impl::stepFrame(double h) {
   updateSleep();
 }
 
-void World::Impl::substep(double from, double h) {
-  const double to = from + h;
+// From video time `from` on for `span` seconds; the bodies live through speed_scale times as many.
+void World::Impl::substep(double from, double span) {
+  const double to = from + span, h = speed_scale * span;
   endPulls(from);
-  applyPulls(to);
+  applyLoads(to, h);
   const std::vector<SoftEntry> softs = softEntries();
   if (!softs.empty()) {
     const std::vector<Obstacle> around = obstacles(from, to);
@@ -128,45 +129,6 @@ void World::Impl::substep(double from, double h) {
     touch.time += from;
     noteTouch(touch);
   }
-}
-
-void World::Impl::applyPulls(double at) {
-  for (Actor& actor : actors) {
-    if (actor.soft)
-      for (const Pull& pull : actor.pulls) pullSoft(actor, pull, at);
-    if (actor.kind == ObjectKind::kRigid && actor.body) pullRigid(actor, at);
-  }
-}
-
-// Nodes led to a target are prescribed when the pull begins; forces are renewed every step.
-void World::Impl::pullSoft(Actor& actor, const Pull& pull, double at) {
-  if (pull.to_target) return;
-  const Eigen::Vector3d force =
-      pull.share(at) * pull.vector / static_cast<double>(pull.vertices.size());
-  for (const int v : pull.vertices) actor.soft->addForce(SurfacePoint::vertex(v), force);
-}
-
-// On a rigid body a pull acts at its region's centre; a target draws it by a critically damped
-// spring.
-void World::Impl::pullRigid(Actor& actor, double at) {
-  constexpr double kFrequency = 2.0 * M_PI * 4.0;  // rad/s, a quarter of a second to follow
-  Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
-  const Eigen::Vector3d center = rigid.center(*actor.body);
-  for (const Pull& pull : actor.pulls) {
-    const Eigen::Vector3d arm = rigid.pose(*actor.body) * pull.anchor - center;
-    Eigen::Vector3d f = pull.share(at) * pull.vector;
-    if (pull.to_target) {
-      const Eigen::Vector3d velocity =
-          rigid.linearVelocity(*actor.body) + rigid.angularVelocity(*actor.body).cross(arm);
-      const Eigen::Matrix3d mass =
-          rigid.compliance(*actor.body, center + arm, center + arm).inverse();
-      f = mass *
-          (kFrequency * kFrequency * (pull.start + f - center - arm) - 2.0 * kFrequency * velocity);
-    }
-    force += f;
-    torque += arm.cross(f);
-  }
-  rigid.setForce(*actor.body, force, torque);
 }
 
 void World::Impl::endPulls(double at) {
@@ -204,7 +166,7 @@ void World::Impl::updateSleep() {
       }
       continue;
     }
-    const bool calm = actor.pulls.empty() && actor.soft->body().isAtRest(kRestSpeed * size);
+    const bool calm = actor.pulls.empty() && !actor.air && actor.soft->body().isAtRest(kRestSpeed * size);
     actor.calm_frames = calm ? actor.calm_frames + 1 : 0;
     actor.asleep = actor.calm_frames >= kCalmFrames;
   }

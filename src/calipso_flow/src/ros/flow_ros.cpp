@@ -30,7 +30,6 @@ FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       flow_publisher_(nh.advertise<sensor_msgs::Image>(topics::kFlow, 10)),
       markers_(nh),
       dense_flow_(params_.flow_preset) {
-  reporter_.starting("waiting for the key frame's models");
   subscribers_ = {
       nh.subscribe(topics::kModels, 1, &FlowNode::onModels, this),
       nh.subscribe(topics::kSegmentation, kKeepAll, &FlowNode::onSegmentation, this),
@@ -46,6 +45,7 @@ FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       nh, topics::kImage, topics::kCameraInfo, params_.live ? 2 : kKeepAll, poses_,
       [this](const calipso::Frame& frame) { onFrame(frame); },
       [this](const auto& image, const auto& reason) { onBadFrame(image, reason, false); });
+  reporter_.starting("waiting for the key frame's models");
 }
 
 void FlowNode::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {

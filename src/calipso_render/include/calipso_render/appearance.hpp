@@ -24,8 +24,8 @@ class Appearance {
   Gloss gloss;
   float seen_in_key = 0.0f, seen_elsewhere = 0.0f, mirrored = 0.0f;  // parts of the texture's texels; the rest is filled
 
-  // Linear radiance of the point under diffuse shading `now` with highlight `highlight` at its place.
-  cv::Vec3f radiance(const SurfacePoint& point, const cv::Vec3f& now, const cv::Vec3f& highlight) const;
+  // Linear radiance of reflectance `albedo_at` under diffuse shading `now` with highlight `highlight` at its place.
+  cv::Vec3f radiance(const cv::Vec3f& albedo_at, const cv::Vec3f& now, const cv::Vec3f& highlight) const;
 
   // Linear reflectance of a surface point.
   cv::Vec3f albedoAt(const SurfacePoint& point) const;

@@ -18,9 +18,26 @@ namespace calipso::render {
 
 enum class Quality { kLive, kFinal };
 
+// What an edit changes of an object's look.
+struct Look {
+  std::optional<cv::Vec3f> tint;    // BGR, linear: times the reflectance
+  std::optional<cv::Vec3f> albedo;  // BGR, linear: instead of it
+  std::optional<float> specular, roughness;
+
+  bool changes() const { return tint || albedo || specular || roughness; }
+};
+
+// What an edit changes of the sun, for what is drawn.
+struct SunChange {
+  std::optional<Eigen::Vector3f> direction;  // towards it, world
+  float factor = 1.0f;                       // of its brightness
+};
+
 // One object in one frame, as the simulator has it.
 struct ObjectInFrame {
   std::string name;
+  std::string source;    // a copy: the object whose model and look it has; empty: its own
+  Look look;
   bool edited = false;   // false: as in the video, its pixels stay the original ones
   bool removed = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
@@ -33,6 +50,7 @@ struct FrameInput {
   Camera camera;
   std::int64_t stamp_ns = 0;
   std::vector<ObjectInFrame> objects;
+  SunChange sun;
 };
 
 // Where a pixel of the output comes from (the `provenance` topic).
@@ -77,7 +95,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
 struct ShadowCache;
 
 // Draws edited frames. Every frame's result depends on that frame alone. Not thread-safe: shadow maps
-// of objects that rest are kept from frame to frame.
+// of objects that rest, and the models of copies, are kept from frame to frame.
 class Renderer {
  public:
   Renderer(std::shared_ptr<const Prepared> prepared, const RenderParams& params);
@@ -87,6 +105,8 @@ class Renderer {
   FrameOutput composite(const FrameInput& frame);
 
  private:
+  void addCopies(const FrameInput& frame);
+
   std::shared_ptr<const Prepared> prepared_;
   RenderParams params_;
   std::unique_ptr<ShadowCache> shadows_;

@@ -24,7 +24,8 @@ struct ObjectModel {
 // What never changes about an object's surface.
 struct Surface {
   std::string name;
-  int index = 0;
+  int index = 0;         // of its label in the video; -1: the video does not have it
+  bool in_video = true;  // false: a copy, drawn only where a state has it
   Triangles triangles;
   std::vector<MeshEdge> edges;
   Points object_vertices;  // object frame, m

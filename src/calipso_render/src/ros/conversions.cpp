@@ -2,7 +2,9 @@
 
 #include <sensor_msgs/image_encodings.h>
 
+#include <cmath>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
 
 #include "calipso_ros/conversions.hpp"
@@ -62,9 +64,37 @@ std::vector<ObjectModel> fromMsg(const calipso_msgs::AlignedModels& models) {
   return out;
 }
 
+namespace {
+
+std::optional<float> ifGiven(double value) {
+  return std::isnan(value) ? std::nullopt : std::optional<float>(static_cast<float>(value));
+}
+
+Look fromMsg(const calipso_msgs::Look& msg) {
+  Look look;
+  const cv::Vec3f color(static_cast<float>(msg.color[2]), static_cast<float>(msg.color[1]), static_cast<float>(msg.color[0]));
+  const bool given = !std::isnan(msg.color[0]) && !std::isnan(msg.color[1]) && !std::isnan(msg.color[2]);
+  if (given) (msg.color_is_absolute ? look.albedo : look.tint) = color;
+  look.specular = ifGiven(msg.specular);
+  look.roughness = ifGiven(msg.roughness);
+  return look;
+}
+
+}  // namespace
+
+SunChange sunFromMsg(const calipso_msgs::SimulationState& state) {
+  SunChange sun;
+  const Eigen::Vector3d direction = calipso::fromMsg(state.sun_direction);
+  if (!direction.isZero()) sun.direction = direction.normalized().cast<float>();
+  if (state.sun_factor > 0.0) sun.factor = static_cast<float>(state.sun_factor);
+  return sun;
+}
+
 ObjectInFrame fromMsg(const calipso_msgs::ObjectState& state) {
   ObjectInFrame object;
   object.name = state.object;
+  object.source = state.source;
+  if (!state.look.empty()) object.look = fromMsg(state.look.front());
   object.edited = state.edited;
   object.removed = state.removed;
   object.world_from_object = calipso::fromMsg(state.pose);

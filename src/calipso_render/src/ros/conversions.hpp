@@ -2,6 +2,7 @@
 
 #include <calipso_msgs/AlignedModels.h>
 #include <calipso_msgs/ObjectState.h>
+#include <calipso_msgs/SimulationState.h>
 #include <sensor_msgs/Image.h>
 
 #include <opencv2/core.hpp>
@@ -29,6 +30,7 @@ sensor_msgs::Image editedMsg(const sensor_msgs::Image& original, const FrameOutp
 sensor_msgs::Image imageMsg(const std_msgs::Header& header, const cv::Mat& image);
 
 std::vector<ObjectModel> fromMsg(const calipso_msgs::AlignedModels& models);
+SunChange sunFromMsg(const calipso_msgs::SimulationState& state);
 ObjectInFrame fromMsg(const calipso_msgs::ObjectState& state);
 
 }  // namespace calipso::render

@@ -25,7 +25,6 @@ RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
   edited_info_ = nh.advertise<sensor_msgs::CameraInfo>(topics::kImageEditedCameraInfo, 10);
   provenance_ = nh.advertise<sensor_msgs::Image>(topics::kProvenance, 10);
   plate_ = nh.advertise<sensor_msgs::Image>(topics::kPlate, 1, true);
-  reporter_.starting("waiting for clip, segmentation and models");
   subscribers_ = {
       nh.subscribe(topics::kClipInfo, 1, &RenderNode::onClipInfo, this),
       nh.subscribe(topics::kSegmentation, kLatchedQueue, &RenderNode::onSegmentation, this),
@@ -40,6 +39,7 @@ RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       nh, topics::kImage, topics::kCameraInfo, params_.mode == Mode::kLive ? params_.live_queue : 0, poses_,
       [this](const Frame& f) { onFrame(f); },
       [this](const sensor_msgs::ImageConstPtr& i, const std::string& r) { onBadFrame(i, r); });
+  reporter_.starting("waiting for clip, segmentation and models");
 }
 
 void RenderNode::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
@@ -94,7 +94,10 @@ void RenderNode::addClipFrame(const Frame& frame, const cv::Mat& labels) {
   }
 }
 
+// A latched message can come twice to a subscriber that connects while it is published.
 void RenderNode::onModels(const calipso_msgs::AlignedModelsConstPtr& msg) {
+  if (models_msg_ && *models_msg_ == *msg) return;
+  models_msg_ = msg;
   try {
     models_ = fromMsg(*msg);
   } catch (const std::exception& error) {
@@ -217,6 +220,7 @@ void RenderNode::edit(const Waiting& frame, const calipso_msgs::SimulationState&
   try {
     FrameInput input;
     for (const calipso_msgs::ObjectState& o : state.objects) input.objects.push_back(fromMsg(o));
+    input.sun = sunFromMsg(state);
     const bool touched = std::any_of(input.objects.begin(), input.objects.end(),
                                      [](const ObjectInFrame& o) { return o.edited || o.removed; });
     if (!touched) {

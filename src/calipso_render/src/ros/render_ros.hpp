@@ -70,6 +70,7 @@ class RenderNode {
   std::deque<Frame> unlabelled_;               // clip frames that wait for their segmentation
   std::optional<std::uint32_t> clip_length_;
   std::uint32_t clip_frames_ = 0;              // seen, good or bad
+  calipso_msgs::AlignedModelsConstPtr models_msg_;
   std::vector<ObjectModel> models_;
   std::map<std::string, std::string> failed_;  // node -> why
   std::unique_ptr<Renderer> renderer_;

@@ -22,7 +22,8 @@ struct Region {
 };
 
 enum class EditKind {
-  kTransform, kPull, kFix, kRelease, kMaterial, kGravity, kVelocity, kObjectKind, kRemove, kReset
+  kTransform, kPull, kFix, kRelease, kMaterial, kGravity, kVelocity, kObjectKind, kRemove, kReset, kDuplicate,
+  kContact, kWind, kPressure, kTwist, kSpeedScale, kTimeScale, kAppearance, kLight
 };
 enum class EditMode { kForce, kTarget, kAbsolute, kFactor, kAdd, kEstimated };
 enum class ObjectKind { kStatic, kKinematic, kRigid, kDeformable };
@@ -47,6 +48,17 @@ struct Edit {
   double density = kUnchanged;
   double damping = kUnchanged;
   ObjectKind object_kind = ObjectKind::kStatic;
+  std::string copy;             // duplicate: the new object's name
+  std::string other;            // contact: the other object or support; empty: everything
+  bool meet = true;             // contact: include (true) or exclude
+  double friction = kUnchanged;
+  double restitution = kUnchanged;
+  double pressure = 0.0;        // Pa, inwards when > 0
+  Eigen::Vector3d color = Eigen::Vector3d::Constant(kUnchanged);  // linear RGB
+  double specular = kUnchanged;
+  double roughness = kUnchanged;
+  std::string after;            // not empty: `time` counts from a collision of this object
+  int collision = 1;            // its first, second, ... in the video
 };
 
 // Names as they stand in YAML and in messages. The parsing direction throws std::invalid_argument
@@ -59,6 +71,7 @@ EditKind editKindFromString(const std::string& name);
 EditMode editModeFromString(const std::string& name, EditKind kind);  // empty: the kind's default
 ObjectKind objectKindFromString(const std::string& name);
 RegionKind regionKindFromString(const std::string& name);
+bool meetFromString(const std::string& name);  // include (or empty): true; exclude: false
 
 // Checks one edit's fields against their ranges and `objects` (the scene's names).
 // @throw std::invalid_argument naming field, value and range

@@ -60,7 +60,8 @@ class RigidWorld {
   Eigen::Vector3d angularVelocity(Id id) const;
   // Change of the velocity at `at` per impulse at `from`: (1/m) I - [r_at] I^-1 [r_from].
   Eigen::Matrix3d compliance(Id id, const Eigen::Vector3d& at, const Eigen::Vector3d& from) const;
-  double kineticEnergy(Id id) const;  // J
+  Eigen::Matrix3d inertia(Id id) const;  // about the centre, world axes, kg m^2
+  double kineticEnergy(Id id) const;     // J
   bool sleeping(Id id) const;
   int awakeCount() const;  // dynamic bodies
 

@@ -23,6 +23,13 @@ class World {
   // @throw std::invalid_argument naming the object and the ones there are
   void addObservedMotion(const std::string& object, const ObservedMotion& motion);
 
+  // What the video shows besides: the wind on an object, and the instants of its collisions (s), both in the order
+  // of time. Objects that are not there are passed over.
+  void addObservedWind(const std::string& object, const ObservedWind& wind);
+  void addCollision(const std::string& object, double time);
+  // No more collisions will come: an edit that waits for another one is refused.
+  void allCollisionsKnown();
+
   // Takes an edit in; it takes effect with the first frame at or after its time. Never throws: what
   // is wrong with it is said in its outcome.
   void submit(const Edit& edit);

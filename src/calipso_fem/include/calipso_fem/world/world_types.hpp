@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string>
@@ -14,6 +15,8 @@
 
 // What goes into the simulated world and what comes out of it. SI units, world frame unless said.
 namespace calipso::fem {
+
+constexpr double kAirDrag = 1.2;  // kg/m^3: density of air times a flat plate's coefficient of drag
 
 // An object as the alignment found it at the key frame.
 struct WorldObject {
@@ -46,6 +49,32 @@ struct ObservedMotion {
   Eigen::Vector3d linear = Eigen::Vector3d::Zero();        // m/s
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();       // rad/s
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  // m/s^2
+};
+
+// The wind that moves a cloth in the video (calipso_msgs/Wind).
+struct ObservedWind {
+  double time = 0.0;                                   // s since the clip's first frame
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s
+  double drag = kAirDrag;                              // kg/m^3, see Air
+  double density = 0.0;  // kg/m^3, of the cloth it was fitted with; 0: unknown
+};
+
+// How an object's look differs from the video's. NaN: unchanged.
+struct Look {
+  Eigen::Vector3d color = Eigen::Vector3d::Constant(kUnchanged);  // linear RGB
+  bool absolute = false;  // color is the albedo; otherwise it multiplies it
+  double specular = kUnchanged;
+  double roughness = kUnchanged;
+
+  bool changes() const {
+    return color.allFinite() || !std::isnan(specular) || !std::isnan(roughness);
+  }
+};
+
+// Where the sun stands for what is drawn.
+struct Sun {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // towards it, world; zero: as in the video
+  double factor = 1.0;                                  // of its brightness in the video
 };
 
 // How a surface takes part in contacts. A pair's value is the geometric mean of its two surfaces'.
@@ -106,6 +135,8 @@ struct ObjectSnapshot {
   Eigen::VectorXd von_mises;    // #V, Pa; empty unless deformable
   double kinetic_energy = 0.0;  // J
   double elastic_energy = 0.0;  // J
+  std::string source;           // the object whose model this one is a copy of; empty: its own
+  Look look;
 };
 
 struct ContactPoint {
@@ -131,6 +162,7 @@ struct WorldState {
   std::vector<ObjectSnapshot> objects;
   std::vector<ContactPoint> contacts;
   std::vector<TouchEvent> first_touches;  // since the frame before, by time
+  Sun sun;
   double step_ms = 0.0;
   int substeps = 0;
 };

@@ -1,0 +1,155 @@
+#include <algorithm>
+#include <cmath>
+
+#include "calipso_fem/world/mass_properties.hpp"
+#include "world_impl.hpp"
+
+// What pulls and winds do to the bodies in a step.
+namespace calipso::fem {
+namespace {
+
+constexpr double kPullFrequency = 2.0 * M_PI * 4.0;  // rad/s, a quarter of a second to follow a target
+
+double surfaceArea(const TriangleMesh& mesh) {
+  double doubled = 0.0;
+  for (int t = 0; t < mesh.triangleCount(); ++t) {
+    const Eigen::RowVector3i face = mesh.triangles.row(t);
+    const Eigen::Vector3d a = mesh.vertex(face[0]);
+    doubled += (mesh.vertex(face[1]) - a).cross(mesh.vertex(face[2]) - a).norm();
+  }
+  return 0.5 * doubled;
+}
+
+}  // namespace
+
+void World::Impl::applyLoads(double at, double h) {
+  for (Actor& actor : actors) {
+    if (actor.removed) continue;
+    if (actor.soft) {
+      for (const Pull& pull : actor.pulls) pullSoft(actor, pull, at);
+      if (actor.air) blowSoft(actor, at, h);
+    }
+    if (actor.kind == ObjectKind::kRigid && actor.body) loadRigid(actor, at, h);
+  }
+}
+
+// Nodes led to a target are prescribed when the pull begins; forces are renewed every step.
+void World::Impl::pullSoft(Actor& actor, const Pull& pull, double at) {
+  if (pull.to_target) return;
+  if (pull.twists) return twistSoft(actor, pull, at);
+  const Eigen::Vector3d force =
+      pull.share(at) * pull.vector / static_cast<double>(pull.vertices.size());
+  for (const int v : pull.vertices) actor.soft->addForce(SurfacePoint::vertex(v), force);
+}
+
+// A torque T about the axis a: forces f = T (a x r) / sum |a x r|^2 about the region's middle, which add up to
+// no force along the axis and to T about it.
+void World::Impl::twistSoft(Actor& actor, const Pull& pull, double at) {
+  const double torque = pull.share(at) * pull.vector.norm();
+  if (torque == 0.0) return;
+  const Eigen::Vector3d axis = pull.vector.normalized();
+  const auto& vertices = actor.soft->vertices();
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const int v : pull.vertices) middle += vertices.row(v).transpose();
+  middle /= static_cast<double>(pull.vertices.size());
+  double inertia = 0.0;
+  for (const int v : pull.vertices)
+    inertia += axis.cross(vertices.row(v).transpose() - middle).squaredNorm();
+  if (inertia == 0.0) return;
+  for (const int v : pull.vertices)
+    actor.soft->addForce(SurfacePoint::vertex(v),
+                         torque / inertia * axis.cross(vertices.row(v).transpose() - middle));
+}
+
+// Torque on a rigid body; towards a target angle by a critically damped spring.
+Eigen::Vector3d World::Impl::twistOf(const Actor& actor, const Pull& pull, double at) const {
+  const Eigen::Vector3d wanted = pull.share(at) * pull.vector;
+  if (!pull.to_target) return wanted;
+  const Eigen::AngleAxisd turned(rigid.pose(*actor.body).linear() * pull.start_rotation.transpose());
+  const Eigen::Vector3d error = wanted - turned.angle() * turned.axis();
+  const Eigen::Matrix3d inertia = rigid.inertia(*actor.body);
+  return inertia * (kPullFrequency * kPullFrequency * error -
+                    2.0 * kPullFrequency * rigid.angularVelocity(*actor.body));
+}
+
+// On a rigid body a pull acts at its region's centre; a target draws it by a critically damped
+// spring.
+void World::Impl::loadRigid(Actor& actor, double at, double h) {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d center = rigid.center(*actor.body);
+  for (const Pull& pull : actor.pulls) {
+    if (pull.twists) {
+      torque += twistOf(actor, pull, at);
+      continue;
+    }
+    const Eigen::Vector3d arm = rigid.pose(*actor.body) * pull.anchor - center;
+    Eigen::Vector3d f = pull.share(at) * pull.vector;
+    if (pull.to_target) {
+      const Eigen::Vector3d velocity =
+          rigid.linearVelocity(*actor.body) + rigid.angularVelocity(*actor.body).cross(arm);
+      const Eigen::Matrix3d mass =
+          rigid.compliance(*actor.body, center + arm, center + arm).inverse();
+      f = mass *
+          (kPullFrequency * kPullFrequency * (pull.start + f - center - arm) - 2.0 * kPullFrequency * velocity);
+    }
+    force += f;
+    torque += arm.cross(f);
+  }
+  if (actor.air) {
+    const Eigen::Isometry3d pose = rigid.pose(*actor.body);
+    const Vertices x = placed(actor.object.mesh, pose).vertices;
+    Vertices u(x.rows(), 3);
+    const Eigen::Vector3d linear = rigid.linearVelocity(*actor.body);
+    const Eigen::Vector3d angular = rigid.angularVelocity(*actor.body);
+    for (Eigen::Index i = 0; i < x.rows(); ++i)
+      u.row(i) = (linear + angular.cross(x.row(i).transpose() - center)).transpose();
+    const Vertices forces = airOn(actor, x, u, at, h);
+    for (Eigen::Index i = 0; i < x.rows(); ++i) {
+      force += forces.row(i).transpose();
+      torque += (x.row(i).transpose() - center).cross(forces.row(i).transpose());
+    }
+  }
+  rigid.setForce(*actor.body, force, torque);
+}
+
+Air World::Impl::airAt(const Actor& actor, double at) const {
+  if (!actor.air->estimated) return {actor.air->velocity, (actor.sheet->closed ? 0.5 : 1.0) * kAirDrag};
+  const auto& seen = actor.observed_wind;
+  auto after = std::lower_bound(seen.begin(), seen.end(), at,
+                                [](const ObservedWind& w, double t) { return w.time < t; });
+  if (after == seen.end()) --after;
+  ObservedWind wind = *after;
+  if (after != seen.begin() && after->time > at) {
+    const ObservedWind& before = *(after - 1);
+    const double share = (at - before.time) / (after->time - before.time);
+    wind.velocity = (1.0 - share) * before.velocity + share * after->velocity;
+  }
+  // Only the ratio of drag to density shows in a motion.
+  const double heavier = wind.density > 0.0 ? std::sqrt(actor.observed_material.density / wind.density) : 1.0;
+  return {actor.air->factor * heavier * wind.velocity, wind.drag};
+}
+
+Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, double at, double h) {
+  if (!actor.sheet) {
+    const TriangleMesh& mesh = actor.object.mesh;
+    Actor::Sheet sheet;
+    sheet.closed = isClosed(mesh);
+    const double area = (sheet.closed ? 0.5 : 1.0) * surfaceArea(mesh);
+    const double mass = actor.soft ? actor.soft->body().totalMass()
+                                   : massProperties(mesh, actor.material.density).mass;
+    sheet.areal_density = mass / std::max(area, 1e-12);
+    actor.sheet = sheet;
+  }
+  return windForces(x, u, actor.object.mesh.triangles, airAt(actor, at),
+                    actor.sheet->areal_density, h);
+}
+
+void World::Impl::blowSoft(Actor& actor, double at, double h) {
+  const Vec velocities = actor.soft->body().surfaceVelocities();
+  const Vertices u = Eigen::Map<const Vertices>(velocities.data(), velocities.size() / 3, 3);
+  const Vertices forces = airOn(actor, actor.soft->vertices(), u, at, h);
+  for (Eigen::Index v = 0; v < forces.rows(); ++v)
+    actor.soft->addForce(SurfacePoint::vertex(static_cast<int>(v)), forces.row(v).transpose());
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "calipso_fem/world/region_selection.hpp"
+#include "describe.hpp"
+#include "world_impl.hpp"
+
+// Edits that hold, draw or press an object. Each function returns what was done, or throws what is wrong.
+namespace calipso::fem {
+namespace {
+
+bool intersects(const std::vector<int>& a, const std::vector<int>& b) {  // both ascending
+  std::vector<int> common;
+  std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(common));
+  return !common.empty();
+}
+
+Eigen::Vector3d meanOf(const decltype(TriangleMesh::vertices)& vertices,
+                       const std::vector<int>& chosen) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const int v : chosen) sum += vertices.row(v).transpose();
+  return sum / static_cast<double>(chosen.size());
+}
+
+}  // namespace
+
+std::string World::Impl::pull(Actor& actor, const Edit& edit) {
+  Pull pull;
+  pull.vertices = selectVertices(scene, actor.id, edit.region);
+  pull.to_target = edit.mode == EditMode::kTarget;
+  pull.twists = edit.kind == EditKind::kTwist;
+  pull.vector = edit.vector;
+  pull.begin = now;
+  pull.ramp = edit.ramp;
+  pull.duration = edit.duration;
+  touch(actor, edit);
+  if (!actor.simulated())
+    throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
+                                " and cannot be pulled; make it rigid or deformable (edit 'kind')");
+  pull.anchor = meanOf(actor.object.mesh.vertices, pull.vertices);
+  pull.start = meanOf(verticesOf(actor), pull.vertices);
+  pull.start_rotation = poseOf(actor, now).linear();
+  if (actor.soft && pull.to_target) lead(actor, pull);
+  actor.pulls.push_back(pull);
+  const char* unit = pull.twists ? (pull.to_target ? " rad" : " N m") : (pull.to_target ? " m" : " N");
+  return actor.object.name + " (" + toString(actor.kind) + ") is " +
+         (pull.twists ? "turned" : "pulled") + " by " + describe(edit.vector) + unit + " at " +
+         std::to_string(pull.vertices.size()) + " vertices";
+}
+
+// Nodes that carry the region follow a given path; they are let go when the pull is over.
+void World::Impl::lead(Actor& actor, Pull& pull) {
+  DeformableBody& body = actor.soft->body();
+  for (const int node : body.nodesOfSurfaceVertices(pull.vertices))
+    if (!body.isFixed(node)) pull.nodes.push_back(node);
+  if (pull.nodes.empty())
+    throw std::invalid_argument("the region to pull on " + actor.object.name +
+                                " is held fixed; release it first or choose another");
+  // The body's clock counts simulated seconds, the pull's those of the video.
+  const auto share = [pull, start = body.time(), begin = now, pace = speed_scale](double t) {
+    return pull.share(begin + (t - start) / pace);
+  };
+  for (const int node : pull.nodes) {
+    const Eigen::Vector3d now_at = body.positions().segment<3>(3 * node);
+    const Eigen::Vector3d from = now_at - body.model().mesh().node(node), arm = now_at - pull.start;
+    for (int axis = 0; axis < 3; ++axis)
+      body.prescribe(node, axis, [share, pull, from, arm, axis](double t) {
+        return from[axis] + pull.way(share(t), arm)[axis];
+      });
+  }
+  actor.soft->forgetCompliance();
+}
+
+std::string World::Impl::fix(Actor& actor, const Edit& edit) {
+  const std::vector<int> vertices = selectVertices(scene, actor.id, edit.region);
+  touch(actor, edit);
+  if (!actor.soft)
+    throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
+                                "; only a deformable object has regions to fix (edit 'kind')");
+  actor.soft->body().fixSurfaceVertices(vertices);
+  actor.soft->forgetCompliance();
+  actor.fixed.push_back(vertices);
+  return actor.object.name + " is held at " + std::to_string(vertices.size()) + " vertices";
+}
+
+std::string World::Impl::release(Actor& actor, const Edit& edit) {
+  const std::vector<int> vertices = selectVertices(scene, actor.id, edit.region);
+  touch(actor, edit);
+  size_t released = 0;
+  const auto meets = [&](const std::vector<int>& region) {
+    if (!intersects(region, vertices)) return false;
+    if (actor.soft) actor.soft->body().releaseSurfaceVertices(region);
+    ++released;
+    return true;
+  };
+  actor.fixed.erase(std::remove_if(actor.fixed.begin(), actor.fixed.end(), meets),
+                    actor.fixed.end());
+  const auto lets_go = [&](const Pull& pull) {
+    if (!intersects(pull.vertices, vertices)) return false;
+    if (actor.soft)
+      for (const int node : pull.nodes) actor.soft->body().releaseNode(node);
+    ++released;
+    return true;
+  };
+  actor.pulls.erase(std::remove_if(actor.pulls.begin(), actor.pulls.end(), lets_go),
+                    actor.pulls.end());
+  if (released == 0)
+    throw std::invalid_argument("nothing is fixed or pulled in that region of " +
+                                actor.object.name);
+  if (actor.soft) {
+    for (const auto& region : actor.fixed) actor.soft->body().fixSurfaceVertices(region);
+    actor.soft->forgetCompliance();
+  }
+  return std::to_string(released) + " region(s) of " + actor.object.name + " are let go";
+}
+
+std::string World::Impl::press(Actor& actor, const Edit& edit) {
+  touch(actor, edit);
+  if (!actor.soft)
+    throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
+                                "; only a deformable object gives way to pressure (edit 'kind')");
+  actor.soft->body().setPressure(edit.pressure);
+  return actor.object.name + " is under " + std::to_string(edit.pressure) + " Pa";
+}
+
+std::string World::Impl::blow(Actor& actor, const Edit& edit) {
+  AirFlow air;
+  air.velocity = edit.vector;
+  if (edit.mode == EditMode::kEstimated) {
+    if (actor.observed_wind.empty())
+      throw std::invalid_argument("the video shows no wind on " + actor.object.name +
+                                  "; use mode absolute and give a vector");
+    air.estimated = true;
+    air.factor = edit.factor;
+  }
+  touch(actor, edit);
+  actor.air = air;
+  if (!actor.simulated())
+    throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
+                                " and no wind moves it; make it rigid or deformable (edit 'kind')");
+  return air.estimated ? "the wind of the video, times " + std::to_string(air.factor) + ", moves " +
+                             actor.object.name
+                       : "wind of " + describe(air.velocity) + " m/s moves " + actor.object.name;
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,91 @@
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "describe.hpp"
+#include "world_impl.hpp"
+
+// Edits of the whole scene, and of what two objects are to each other.
+namespace calipso::fem {
+
+std::string World::Impl::applyToScene(const Edit& edit) {
+  switch (edit.kind) {
+    case EditKind::kGravity:
+      return changeGravity(edit);
+    case EditKind::kWind:
+      return blowEverywhere(edit);
+    case EditKind::kSpeedScale:
+      speed_scale = edit.factor;
+      return "what is simulated runs at " + std::to_string(edit.factor) + " of the video's speed";
+    case EditKind::kTimeScale:
+      return "the video runs at " + std::to_string(edit.factor) + " of its speed";
+    case EditKind::kLight:
+      sun = {edit.vector, edit.factor};
+      return "the sun stands towards " + describe(edit.vector);
+    default:
+      for (Actor& actor : actors) reset(actor);
+      sun = Sun();
+      speed_scale = 1.0;
+      return "every object is as in the video again";
+  }
+}
+
+std::string World::Impl::changeGravity(const Edit& edit) {
+  std::string changed_objects;
+  for (Actor& actor : actors) {
+    if (actor.removed || (!edit.object.empty() && actor.object.name != edit.object)) continue;
+    const Eigen::Vector3d gravity =
+        edit.mode == EditMode::kFactor ? edit.factor * actor.gravity : edit.vector;
+    // A change for the whole scene leaves alone what goes on lying on its support.
+    if (edit.object.empty() && !actor.edited) {
+      findHolder(actor);
+      if (actor.holder == Holder::kSupport && gravity.dot(scene.gravity) > 0.0) {
+        actor.gravity = gravity;
+        continue;
+      }
+    }
+    touch(actor, edit);
+    actor.gravity = gravity;
+    if (actor.soft) actor.soft->setGravity(actor.acceleration());
+    if (actor.kind == ObjectKind::kRigid) rigid.setAcceleration(*actor.body, actor.acceleration());
+    changed_objects += " " + actor.object.name + " " + describe(gravity) + " m/s^2;";
+  }
+  return changed_objects.empty() ? "gravity changed; every object goes on resting"
+                                 : "gravity:" + changed_objects;
+}
+
+std::string World::Impl::blowEverywhere(const Edit& edit) {
+  std::string message;
+  for (Actor& actor : actors) {
+    if (actor.removed || (edit.mode == EditMode::kEstimated && actor.observed_wind.empty())) continue;
+    message += (message.empty() ? "" : "; ") + blow(actor, edit);
+  }
+  if (message.empty())
+    throw std::invalid_argument("the video shows no wind on any object; use mode absolute and give a vector");
+  return message;
+}
+
+std::string World::Impl::changeContact(Actor& actor, const Edit& edit) {
+  std::string message;
+  if (std::isnan(edit.friction) && std::isnan(edit.restitution)) {
+    setPairContact(actor.object.name, edit.other, edit.meet);
+    return actor.object.name + (edit.meet ? " meets " : " does not meet ") +
+           (edit.other.empty() ? "anything" : edit.other);
+  }
+  if (edit.other.empty()) {
+    SurfaceSettings surface = actor.settings.surface;
+    if (!std::isnan(edit.friction)) surface.friction = edit.friction;
+    if (!std::isnan(edit.restitution)) surface.restitution = edit.restitution;
+    setSurface(actor, surface);
+  } else {
+    PairRule rule = pairRule(actor.object.name, edit.other);
+    rule.contact = edit.meet;
+    if (!std::isnan(edit.friction)) rule.friction = edit.friction;
+    if (!std::isnan(edit.restitution)) rule.restitution = edit.restitution;
+    setPairRule(actor.object.name, edit.other, rule);
+  }
+  return "the surface of " + actor.object.name + " has changed" +
+         (edit.other.empty() ? "" : " towards " + edit.other);
+}
+
+}  // namespace calipso::fem

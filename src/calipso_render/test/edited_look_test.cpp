@@ -1,0 +1,130 @@
+// What edits change of the look of a frame: copies, reflectance, gloss, and the sun.
+
+#include <gtest/gtest.h>
+
+#include "calipso_render/renderer.hpp"
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
+
+RenderParams params() {
+  RenderParams p;
+  p.planes = table();
+  p.add_noise = false;
+  return p;
+}
+
+struct Setting {
+  ClipFrame key = frameWithBall(ballAt(kCentre));
+  std::shared_ptr<const Prepared> prepared;
+
+  Setting() {
+    ClipSample clip;
+    clip.add(key);
+    prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
+  }
+  FrameInput input(bool edited) const {
+    FrameInput in;
+    in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera, in.stamp_ns = 7;
+    ObjectInFrame ball;
+    ball.name = "ball", ball.edited = edited;
+    ball.vertices = prepared->surfaces[0].key_vertices;
+    in.objects = {ball};
+    return in;
+  }
+  FrameOutput draw(const FrameInput& in) const { return Renderer(prepared, params()).composite(in); }
+  cv::Point at(const Eigen::Vector3d& x) const {
+    const Eigen::Vector2d p = key.camera.projectWorld(x);
+    return {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))};
+  }
+};
+
+ObjectInFrame copyOf(const ObjectInFrame& ball, const Eigen::Vector3f& move) {
+  ObjectInFrame copy = ball;
+  copy.name = "twin", copy.source = "ball", copy.edited = true;
+  for (Eigen::Vector3f& x : copy.vertices) x += move;
+  return copy;
+}
+
+TEST(EditedLook, ACopyIsDrawnBesideAnUntouchedOriginal) {
+  const Setting s;
+  FrameInput in = s.input(false);
+  const Eigen::Vector3f move(0.22f, 0.0f, 0.0f);
+  in.objects.push_back(copyOf(in.objects[0], move));
+  const FrameOutput out = s.draw(in);
+  const cv::Point original = s.at(kCentre), twin = s.at(kCentre + move.cast<double>());
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(original), kOriginal);
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(twin), kRendered);
+  // The same matt ball in the same light looks the same.
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(out.bgr.at<cv::Vec3b>(twin)[c], s.key.bgr.at<cv::Vec3b>(original)[c], 12);
+}
+
+TEST(EditedLook, ACopyThatAStateDoesNotHaveIsNotDrawn) {
+  const Setting s;
+  Renderer renderer(s.prepared, params());
+  FrameInput with = s.input(false);
+  with.objects.push_back(copyOf(with.objects[0], {0.22f, 0.0f, 0.0f}));
+  renderer.composite(with);
+  const FrameInput moved = [&] {
+    FrameInput in = s.input(true);
+    for (Eigen::Vector3f& x : in.objects[0].vertices) x.z() += 0.05f;
+    return in;
+  }();
+  const FrameOutput after = renderer.composite(moved), alone = s.draw(moved);
+  EXPECT_EQ(cv::norm(after.bgr, alone.bgr, cv::NORM_INF), 0.0) << "a frame depends on itself alone";
+}
+
+TEST(EditedLook, ACopyOfNothingIsRefused) {
+  const Setting s;
+  FrameInput in = s.input(false);
+  in.objects.push_back(copyOf(in.objects[0], {0.2f, 0.0f, 0.0f}));
+  in.objects.back().source = "teapot";
+  EXPECT_THROW(s.draw(in), std::invalid_argument);
+}
+
+TEST(EditedLook, ATintMultipliesTheReflectance) {
+  const Setting s;
+  FrameInput in = s.input(true);
+  in.objects[0].look.tint = cv::Vec3f(1.0f, 0.5f, 0.25f);
+  const FrameOutput out = s.draw(in);
+  const cv::Point p = s.at(kCentre);
+  for (int c = 0; c < 3; ++c) {
+    const float before = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[c]), now = linearFromCode(out.bgr.at<cv::Vec3b>(p)[c]);
+    EXPECT_NEAR(now / before, (*in.objects[0].look.tint)[c], 0.06f) << c;  // codes are rounded
+  }
+}
+
+TEST(EditedLook, AnAlbedoReplacesTheReflectance) {
+  const Setting s;
+  const auto pixelAt = [&](float albedo) {
+    FrameInput in = s.input(true);
+    in.objects[0].look.albedo = cv::Vec3f(0.5f * albedo, albedo, albedo);
+    return s.draw(in).bgr.at<cv::Vec3b>(s.at(kCentre));
+  };
+  const cv::Vec3b bright = pixelAt(0.3f), dark = pixelAt(0.15f);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(linearFromCode(dark[c]) / linearFromCode(bright[c]), 0.5f, 0.06f) << c;  // codes are rounded
+  }
+}
+
+TEST(EditedLook, AnotherSunLightsTheOtherSide) {
+  const Setting s;
+  FrameInput in = s.input(true);
+  for (Eigen::Vector3f& x : in.objects[0].vertices) x.z() += 0.02f;
+  const Eigen::Vector3d centre = kCentre + Eigen::Vector3d(0, 0, 0.02);
+  const cv::Point left = s.at(centre + Eigen::Vector3d(-0.07, -0.05, 0)), right = s.at(centre + Eigen::Vector3d(0.07, -0.05, 0));
+  in.sun.direction = Eigen::Vector3f(-1.0f, -0.4f, 0.5f).normalized();
+  const FrameOutput from_left = s.draw(in);
+  in.sun.direction = Eigen::Vector3f(1.0f, -0.4f, 0.5f).normalized();
+  const FrameOutput from_right = s.draw(in);
+  EXPECT_GT(from_left.bgr.at<cv::Vec3b>(left)[2], from_right.bgr.at<cv::Vec3b>(left)[2] + 15);
+  EXPECT_LT(from_left.bgr.at<cv::Vec3b>(right)[2], from_right.bgr.at<cv::Vec3b>(right)[2] - 15);
+}
+
+}  // namespace
+}  // namespace calipso::render
