@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
+#include "calipso_render/shadow_map.hpp"
 
 namespace calipso::render {
 namespace {
