@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "thread_team.hpp"
+
 namespace calipso::fem {
 
 int BlockPattern::tryFind(int i, int j) const {
@@ -49,27 +51,28 @@ void BlockMatrix::setZero() { std::fill(values.begin(), values.end(), 0.0); }
 void BlockMatrix::multiply(const Vec& x, Vec& y) const {
   const int n = pattern->rows();
   y.resize(3 * n);
-#pragma omp parallel for schedule(static)
-  for (int i = 0; i < n; ++i) {
-    double s0 = 0.0, s1 = 0.0, s2 = 0.0;
-    for (int k = pattern->row_start[i]; k < pattern->row_start[i + 1]; ++k) {
-      const double* a = values.data() + 9 * static_cast<std::size_t>(k);
-      const double* v = x.data() + 3 * pattern->column[k];
-      s0 += a[0] * v[0] + a[1] * v[1] + a[2] * v[2];
-      s1 += a[3] * v[0] + a[4] * v[1] + a[5] * v[2];
-      s2 += a[6] * v[0] + a[7] * v[1] + a[8] * v[2];
+  parallelFor(n, 200, [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      double s0 = 0.0, s1 = 0.0, s2 = 0.0;
+      for (int k = pattern->row_start[i]; k < pattern->row_start[i + 1]; ++k) {
+        const double* a = values.data() + 9 * static_cast<std::size_t>(k);
+        const double* v = x.data() + 3 * pattern->column[k];
+        s0 += a[0] * v[0] + a[1] * v[1] + a[2] * v[2];
+        s1 += a[3] * v[0] + a[4] * v[1] + a[5] * v[2];
+        s2 += a[6] * v[0] + a[7] * v[1] + a[8] * v[2];
+      }
+      y[3 * i] = s0;
+      y[3 * i + 1] = s1;
+      y[3 * i + 2] = s2;
     }
-    y[3 * i] = s0;
-    y[3 * i + 1] = s1;
-    y[3 * i + 2] = s2;
-  }
+  });
 }
 
 void BlockMatrix::combine(double a, double b, const BlockMatrix& other) {
   assert(pattern == other.pattern);
-  const long n = static_cast<long>(values.size());
-#pragma omp parallel for schedule(static)
-  for (long k = 0; k < n; ++k) values[k] = a * values[k] + b * other.values[k];
+  parallelFor(pattern->blockCount(), 4096, [&](int begin, int end) {
+    for (long k = 9L * begin; k < 9L * end; ++k) values[k] = a * values[k] + b * other.values[k];
+  });
 }
 
 Eigen::SparseMatrix<double> BlockMatrix::toSparse() const {

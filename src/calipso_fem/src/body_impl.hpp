@@ -5,6 +5,7 @@
 
 #include "calipso_fem/deformable_body.hpp"
 #include "element.hpp"
+#include "hex_solver.hpp"
 #include "linear_solver.hpp"
 
 namespace calipso::fem {
@@ -26,6 +27,16 @@ struct SoftTerm {
   Eigen::SparseVector<double> weights;   // on the nodes
 };
 
+// The elastic energy and its gradient at y, each when first asked for.
+struct ElasticState {
+  Vec y;
+  bool has_energy = false, has_forces = false, has_dilatation = false;
+  bool has_stresses = false, positive = false;   // in `hex`, for the system at y
+  double energy = 0.0, dilatation = 0.0;
+  Vec forces;
+  HexEvaluation hex;
+};
+
 struct DeformableBody::Impl {
   FemOptions options;
   VoxelGrid grid;
@@ -33,6 +44,7 @@ struct DeformableBody::Impl {
   CellMatrix surface_triangles;          // #F x 3
   std::unique_ptr<ElasticModel> model;
   std::unique_ptr<LinearSolver> solver;
+  std::unique_ptr<HexSolver> hex_solver;   // without a matrix; null where not possible or not wanted
 
   // State
   Vec x, v, a;                           // m, m/s, m/s^2 (trapezoidal)
@@ -52,9 +64,14 @@ struct DeformableBody::Impl {
 
   // Work space of the current step
   std::optional<BlockMatrix> mass;       // consistent only
+  mutable ElasticState elastic;
+  HexEvaluation elastic_scratch;
   BlockMatrix A;
+  Vec viscosity_at;                      // damping acts as D(viscosity_at) v
   BlockMatrix viscosity;
-  bool system_valid = false;             // A holds the last step's system
+  bool viscosity_valid = false;          // viscosity is D(viscosity_at)
+  bool system_valid = false;             // the solver holds the last step's system
+  bool matrix_free = false;              // ... and it is hex_solver
 
   // A step taken in parts (body_stepwise.cpp)
   struct Trial {
@@ -76,6 +93,16 @@ struct DeformableBody::Impl {
   Vec externalForces() const;            // gravity, nodal, surface, pressure; at the present state
   Vec pressureForces() const;
 
+  // Of the elastic energy at y; what is asked for again is not computed again.
+  double elasticEnergy(const Vec& y) const;
+  const Vec& elasticForces(const Vec& y) const;
+  double leastDilatation(const Vec& y) const;
+  void prepareElastic(const Vec& y) const;
+  void evaluateHexes(const Vec& y, bool stresses, bool positive) const;
+  void setViscosity(const Vec& y);
+  Vec applyViscosity(const Vec& w);           // D w, damping included
+  const BlockMatrix& assembledViscosity();
+
   Vec prescribedTargets(double t) const; // 3n; meaningful at prescribed dofs
   void maskResidual(Vec* r) const;
 
@@ -87,12 +114,17 @@ struct DeformableBody::Impl {
 
   Integrator integrator(double h) const;
   // Incremental potential, its gradient and Hessian (the matrix A).
-  double potential(const Vec& y, const Integrator& i, const Vec& loads) const;
-  Vec gradient(const Vec& y, const Integrator& i, const Vec& loads) const;
+  double potential(const Vec& y, const Integrator& i, const Vec& loads);
+  Vec gradient(const Vec& y, const Integrator& i, const Vec& loads);
   void assemble(const Vec& y, const Integrator& i, Definiteness definiteness);  // all dofs
+  // The system at y, solved without a matrix where that is possible. AJ: A jump, when jump is given.
+  // False: not positive definite.
+  bool setSystem(const Vec& y, const Integrator& i, Definiteness definiteness, const Vec* jump, Vec* AJ);
+  bool setMatrixFreeSystem(const Vec& y, const Integrator& i, Definiteness definiteness);
+  SolveReport solveSystem(const Vec& b, double linear_tolerance, Vec* direction);
   // Size of the terms that have to balance, N.
   double forceScale(const Vec& y, const Integrator& i, const Vec& loads) const;
-  // Residual that rounding of positions and inner forces alone leaves, N. @pre A is assembled
+  // Residual that rounding of positions and inner forces alone leaves, N. @pre the system is set
   double roundOff(const Vec& y) const;
 
   StepReport minimise(const Integrator& i, const Vec& loads, const Vec& targets, bool linearised,
@@ -101,11 +133,13 @@ struct DeformableBody::Impl {
   bool newtonDirection(const Vec& y, const Integrator& i, const Vec& residual, const Vec& jump,
                        double linear_tolerance, StepReport* report, Vec* direction);
   double searchLine(const Vec& y, const Vec& direction, const Vec& residual, const Integrator& i,
-                    const Vec& loads, double energy) const;
+                    const Vec& loads, double energy);
   // M^-1 (F - f_int - D v) of the free components: what the trapezoidal rule starts from.
-  Vec startAcceleration(const Vec& loads) const;
+  Vec startAcceleration(const Vec& loads);
   void finishReport(StepReport* report) const;
+  void invalidatePreconditioner();
   void invalidateSystem();
+  void modelChanged();                   // material or rest shape
   // A^-1 of the last step's system times impulses on the nodes (N s): change of velocity, m/s.
   Vec velocityChange(Vec impulses, double h, double tolerance);
 };

@@ -25,7 +25,7 @@ Eigen::VectorXd DeformableBody::surfaceVonMises() const {
   return (impl_->embedding.weights * nodal).cwiseMax(0.0);
 }
 
-double DeformableBody::elasticEnergy() const { return impl_->model->energy(impl_->x); }
+double DeformableBody::elasticEnergy() const { return impl_->elasticEnergy(impl_->x); }
 
 double DeformableBody::kineticEnergy() const {
   return 0.5 * impl_->v.dot(impl_->applyMass(impl_->v));
@@ -65,19 +65,13 @@ bool DeformableBody::isAtRest(double speed) const {
 Vec DeformableBody::Impl::velocityChange(Vec impulses, double h, double tolerance) {
   if (!(h > 0.0)) throw std::invalid_argument("compliance: h must be > 0 s");
   if (!system_valid) {
-    viscosity = BlockMatrix(model->pattern());
-    if (damping() > 0.0) {
-      model->viscosity(x, viscosity);
-      for (double& value : viscosity.values) value *= damping();
-    }
-    assemble(x, integrator(h), Definiteness::kPositive);
-    eliminate(prescribed, &A);
-    solver->setMatrix(A);
+    if (damping() > 0.0) setViscosity(x);
+    setSystem(x, integrator(h), Definiteness::kPositive, nullptr, nullptr);
     system_valid = true;
   }
   maskResidual(&impulses);
   Vec w = Vec::Zero(impulses.size());
-  solver->solve(impulses, tolerance, options.linear_iterations, &w);
+  solveSystem(impulses, tolerance, &w);
   return w / (h * h);
 }
 

@@ -40,21 +40,16 @@ Integrator DeformableBody::Impl::integrator(double h) const {
 bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, const Vec& residual,
                                            const Vec& jump, double linear_tolerance,
                                            StepReport* report, Vec* direction) {
+  const bool jumps = !jump.isZero(0.0);
   for (const Definiteness definiteness : {Definiteness::kExact, Definiteness::kPositive}) {
-    Vec b = -residual;
-    assemble(y, i, definiteness);
+    Vec b = -residual, AJ;
+    if (!setSystem(y, i, definiteness, jumps ? &jump : nullptr, &AJ)) continue;
     // Prescribed components move by `jump`; what that does to the others goes to the right side.
-    if (!jump.isZero(0.0)) {
-      Vec AJ;
-      A.multiply(jump, AJ);
-      b -= AJ;
-    }
-    eliminate(prescribed, &A);
+    if (jumps) b -= AJ;
     maskResidual(&b);
-    if (!solver->setMatrix(A)) continue;
-    direction->setZero(y.size());
-    const SolveReport solve =
-        solver->solve(b, linear_tolerance, options.linear_iterations, direction);
+    *direction = i.inertia > 0.0 ? Vec(i.predicted - y) : Vec(Vec::Zero(y.size()));
+    maskResidual(direction);
+    const SolveReport solve = solveSystem(b, linear_tolerance, direction);
     report->linear_iterations += solve.iterations;
     if (!solve.positive) continue;
     *direction += jump;
@@ -67,7 +62,7 @@ bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, co
 
 double DeformableBody::Impl::searchLine(const Vec& y, const Vec& direction, const Vec& residual,
                                         const Integrator& i, const Vec& loads,
-                                        double energy) const {
+                                        double energy) {
   constexpr double kSufficientDecrease = 1e-4;
   constexpr double kSmallestStep = 1e-8;
   const double slope = residual.dot(direction);
@@ -123,24 +118,20 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
 
 void DeformableBody::Impl::finishReport(StepReport* report) const {
   report->kinetic_energy = 0.5 * v.dot(applyMass(v));
-  report->elastic_energy = model->energy(x);
+  report->elastic_energy = elasticEnergy(x);
   const Eigen::VectorXd& m = model->lumpedMass();
   for (int k = 0; k < m.size(); ++k) report->gravity_energy -= m[k] * gravity.dot(x.segment<3>(3 * k));
-  report->solver = toString(solver->kind());
+  report->solver = toString(matrix_free ? SolverKind::kMultigrid : solver->kind());
   report->recovering = model->model() == MaterialModel::kStVenantKirchhoff &&
-                       model->smallestDilatation(x) < kRecoveryDilatation;
+                       leastDilatation(x) < kRecoveryDilatation;
 }
 
-Vec DeformableBody::Impl::startAcceleration(const Vec& loads) const {
+Vec DeformableBody::Impl::startAcceleration(const Vec& loads) {
   Integrator here;
   here.base = here.predicted = x;
   Vec b = -gradient(x, here, loads);
   if (options.mass_damping > 0.0) b -= options.mass_damping * applyMass(v);
-  if (damping() > 0.0) {
-    Vec Dv;
-    viscosity.multiply(v, Dv);
-    b -= Dv;
-  }
+  if (damping() > 0.0) b -= applyViscosity(v);
   maskResidual(&b);
   if (!mass) {
     for (Eigen::Index k = 0; k < b.size(); ++k) b[k] /= model->lumpedMass()[k / 3];
@@ -163,10 +154,7 @@ StepReport DeformableBody::step(double h) {
   const auto start = std::chrono::steady_clock::now();
   const Vec loads = m.externalForces();
   const Vec targets = m.prescribedTargets(m.time + h);
-  if (m.damping() > 0.0) {
-    m.model->viscosity(m.x, m.viscosity);
-    for (double& value : m.viscosity.values) value *= m.damping();
-  }
+  if (m.damping() > 0.0) m.setViscosity(m.x);
   if (m.options.scheme == TimeScheme::kTrapezoidal && !m.acceleration_known) {
     m.a = m.startAcceleration(loads);
     m.acceleration_known = true;

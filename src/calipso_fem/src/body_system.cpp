@@ -124,36 +124,92 @@ void DeformableBody::Impl::rememberSoftForces(const Integrator& i) {
     soft_forces.segment<3>(3 * k) = springForce(soft[k], x, i);
 }
 
-double DeformableBody::Impl::potential(const Vec& y, const Integrator& i, const Vec& loads) const {
-  double energy = model->energy(y) + softEnergy(y, i) - loads.dot(y);
+void DeformableBody::Impl::evaluateHexes(const Vec& y, bool stresses, bool positive) const {
+  ElasticState& e = elastic;
+  model->hexes()->evaluate(y, stresses, positive, &e.hex);
+  e.y = y;
+  e.energy = e.hex.energy;
+  e.dilatation = e.hex.dilatation;
+  e.forces.swap(e.hex.forces);
+  e.has_energy = e.has_forces = e.has_dilatation = true;
+  e.has_stresses = stresses;
+  e.positive = positive;
+}
+
+double DeformableBody::Impl::elasticEnergy(const Vec& y) const {
+  prepareElastic(y);
+  if (!elastic.has_energy) elastic.energy = model->energy(y);
+  elastic.has_energy = true;
+  return elastic.energy;
+}
+
+const Vec& DeformableBody::Impl::elasticForces(const Vec& y) const {
+  prepareElastic(y);
+  if (!elastic.has_forces) model->gradient(y, elastic.forces);
+  elastic.has_forces = true;
+  return elastic.forces;
+}
+
+double DeformableBody::Impl::leastDilatation(const Vec& y) const {
+  prepareElastic(y);
+  if (!elastic.has_dilatation) elastic.dilatation = model->smallestDilatation(y);
+  elastic.has_dilatation = true;
+  return elastic.dilatation;
+}
+
+// Hexahedra without a matrix give everything at once.
+void DeformableBody::Impl::prepareElastic(const Vec& y) const {
+  ElasticState& e = elastic;
+  if (e.y.size() == y.size() && e.y == y) return;
+  if (model->hexes()) return evaluateHexes(y, hex_solver != nullptr, false);
+  e.y = y;
+  e.has_energy = e.has_forces = e.has_dilatation = false;
+}
+
+void DeformableBody::Impl::setViscosity(const Vec& y) {
+  viscosity_at = y;
+  viscosity_valid = false;
+}
+
+const BlockMatrix& DeformableBody::Impl::assembledViscosity() {
+  if (viscosity_valid) return viscosity;
+  model->viscosity(viscosity_at, viscosity);
+  for (double& value : viscosity.values) value *= damping();
+  viscosity_valid = true;
+  return viscosity;
+}
+
+Vec DeformableBody::Impl::applyViscosity(const Vec& w) {
+  Vec Dw;
+  if (hex_solver && !viscosity_valid) {
+    model->hexes()->multiplyMaterial(viscosity_at, w, &elastic_scratch, &Dw);
+    Dw *= damping();
+  } else {
+    assembledViscosity().multiply(w, Dw);
+  }
+  return Dw;
+}
+
+double DeformableBody::Impl::potential(const Vec& y, const Integrator& i, const Vec& loads) {
+  double energy = elasticEnergy(y) + softEnergy(y, i) - loads.dot(y);
   if (i.inertia > 0.0) {
     const Vec d = y - i.predicted;
     energy += 0.5 * i.inertia * d.dot(applyMass(d));
     const Vec w = y - i.base;
     if (options.mass_damping > 0.0)
       energy += 0.5 * i.rate * options.mass_damping * w.dot(applyMass(w));
-    if (damping() > 0.0) {
-      Vec Dw;
-      viscosity.multiply(w, Dw);
-      energy += 0.5 * i.rate * w.dot(Dw);
-    }
+    if (damping() > 0.0) energy += 0.5 * i.rate * w.dot(applyViscosity(w));
   }
   return energy;
 }
 
-Vec DeformableBody::Impl::gradient(const Vec& y, const Integrator& i, const Vec& loads) const {
-  Vec r;
-  model->gradient(y, r);
-  r -= loads;
+Vec DeformableBody::Impl::gradient(const Vec& y, const Integrator& i, const Vec& loads) {
+  Vec r = elasticForces(y) - loads;
   addSoftGradient(y, i, &r);
   if (i.inertia > 0.0) {
     const Vec w = y - i.base;
     r += applyMass(i.inertia * (y - i.predicted) + i.rate * options.mass_damping * w);
-    if (damping() > 0.0) {
-      Vec Dw;
-      viscosity.multiply(w, Dw);
-      r += i.rate * Dw;
-    }
+    if (damping() > 0.0) r += i.rate * applyViscosity(w);
   }
   return r;
 }
@@ -169,14 +225,57 @@ void DeformableBody::Impl::assemble(const Vec& y, const Integrator& i, Definiten
       for (int k = 0; k < m.size(); ++k)
         A.block(A.pattern->diagonal[k]).diagonal().array() += scale * m[k];
     }
-    if (damping() > 0.0) A.combine(1.0, i.rate, viscosity);
+    if (damping() > 0.0) A.combine(1.0, i.rate, assembledViscosity());
   }
   addSoftHessian(i, &A);
 }
 
+// The viscous part is taken at y instead of viscosity_at: exact in the first iteration of a step.
+bool DeformableBody::Impl::setMatrixFreeSystem(const Vec& y, const Integrator& i,
+                                               Definiteness definiteness) {
+  const bool positive = definiteness == Definiteness::kPositive;
+  prepareElastic(y);
+  if (!elastic.has_stresses || elastic.positive != positive) evaluateHexes(y, true, positive);
+  HexSystem system;
+  system.inertia = i.inertia + i.rate * options.mass_damping;
+  system.factor = 1.0 + i.rate * damping();
+  for (const SoftTerm& term : soft) {
+    SpringBlock spring;
+    for (Eigen::SparseVector<double>::InnerIterator it(term.weights); it; ++it)
+      spring.weights.emplace_back(static_cast<int>(it.index()), it.value());
+    spring.block = (term.constraint.stiffness + i.rate * term.constraint.damping) *
+                   projector(term.constraint);
+    system.springs.push_back(std::move(spring));
+  }
+  std::vector<int> fixed;
+  for (const auto& [dof, unused] : prescribed) fixed.push_back(dof);
+  elastic.has_stresses = false;   // the solver takes them
+  return hex_solver->setSystem(&elastic.hex, std::move(system), model->lumpedMass(), fixed);
+}
+
+bool DeformableBody::Impl::setSystem(const Vec& y, const Integrator& i, Definiteness definiteness,
+                                     const Vec* jump, Vec* AJ) {
+  // Recovery from inversion adds a material that only the assembled system knows.
+  matrix_free = hex_solver && !(leastDilatation(y) < kRecoveryDilatation);
+  if (matrix_free) {
+    const bool positive = setMatrixFreeSystem(y, i, definiteness);
+    if (jump) hex_solver->multiply(*jump, AJ);
+    return positive;
+  }
+  assemble(y, i, definiteness);
+  if (jump) A.multiply(*jump, *AJ);
+  eliminate(prescribed, &A);
+  return solver->setMatrix(A);
+}
+
+SolveReport DeformableBody::Impl::solveSystem(const Vec& b, double linear_tolerance, Vec* direction) {
+  return matrix_free
+             ? hex_solver->solve(b, linear_tolerance, options.linear_iterations, direction)
+             : solver->solve(b, linear_tolerance, options.linear_iterations, direction);
+}
+
 double DeformableBody::Impl::forceScale(const Vec& y, const Integrator& i, const Vec& loads) const {
-  Vec inner;
-  model->gradient(y, inner);
+  const Vec& inner = elasticForces(y);
   Vec outer = loads;
   if (i.inertia > 0.0) outer += applyMass(i.inertia * (i.predicted - y));
   return std::max({inner.norm(), outer.norm(), 1e-12 * loads.norm(), 1e-300});
@@ -185,8 +284,12 @@ double DeformableBody::Impl::forceScale(const Vec& y, const Integrator& i, const
 double DeformableBody::Impl::roundOff(const Vec& y) const {
   constexpr double kUnit = 2e-16;
   double sum = 0.0;
-  for (int k = 0; k < A.pattern->rows(); ++k)
-    sum += A.block(A.pattern->diagonal[k]).diagonal().cwiseProduct(y.segment<3>(3 * k)).squaredNorm();
+  for (Eigen::Index k = 0; k < y.size(); ++k) {
+    const Eigen::Index node = k / 3, c = k % 3;
+    const double diagonal = matrix_free ? hex_solver->diagonal()[9 * node + 4 * c]
+                                        : A.block(A.pattern->diagonal[node])(c, c);
+    sum += diagonal * y[k] * diagonal * y[k];
+  }
   return kUnit * std::sqrt(sum);
 }
 

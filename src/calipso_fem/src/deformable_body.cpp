@@ -29,6 +29,9 @@ Embedding identityEmbedding(int nodes) {
   return embedding;
 }
 
+// Below this, a kept Cholesky factor is faster.
+constexpr int kMatrixFreeNodes = 200;
+
 VolumeMesh withElement(VolumeMesh hexes, ElementType element) {
   return element == ElementType::kTetP1 && !hexes.isTetrahedral() ? kuhnSplit(hexes)
                                                                   : std::move(hexes);
@@ -41,14 +44,31 @@ void DeformableBody::Impl::initialise(const Material& material) {
   setThreads(options.threads);
   if (!options.lumped_mass) mass = model->consistentMass();
   solver = std::make_unique<LinearSolver>(model->mesh(), options.solver);
+  const bool multigrid =
+      options.solver == SolverKind::kAutomatic || options.solver == SolverKind::kMultigrid;
+  if (multigrid && model->hexes() && options.lumped_mass && HexSolver::fits(model->mesh()) &&
+      model->mesh().nodeCount() >= kMatrixFreeNodes)
+    hex_solver = std::make_unique<HexSolver>(model->mesh(), *model->hexes());
   x = restPositions(model->mesh());
   v = a = reactions = Vec::Zero(x.size());
 }
 
-void DeformableBody::Impl::invalidateSystem() {
+void DeformableBody::Impl::invalidatePreconditioner() {
   solver->invalidate();
+  if (hex_solver) hex_solver->invalidate();
+}
+
+void DeformableBody::Impl::invalidateSystem() {
+  invalidatePreconditioner();
   system_valid = false;
   if (mass) mass = model->consistentMass();
+}
+
+void DeformableBody::Impl::modelChanged() {
+  if (hex_solver) hex_solver->setHexes(*model->hexes());
+  elastic.y.resize(0);
+  viscosity_valid = false;
+  invalidateSystem();
 }
 
 DeformableBody::DeformableBody(const TriangleMesh& surface, const Material& material,
@@ -117,7 +137,7 @@ void DeformableBody::applyRigidTransform(const Eigen::Isometry3d& transform) {
   }
   impl_->acceleration_known = false;
   impl_->previous.reset();
-  impl_->solver->invalidate();
+  impl_->invalidatePreconditioner();
 }
 
 void DeformableBody::reset() {
@@ -126,17 +146,17 @@ void DeformableBody::reset() {
   impl_->acceleration_known = false;
   impl_->previous.reset();
   impl_->time = 0.0;
-  impl_->solver->invalidate();
+  impl_->invalidatePreconditioner();
 }
 
 void DeformableBody::setMaterial(const Material& material) {
   impl_->model->setMaterial(material);
-  impl_->invalidateSystem();
+  impl_->modelChanged();
 }
 
 void DeformableBody::setCellMaterials(const std::vector<Material>& materials) {
   impl_->model->setCellMaterials(materials);
-  impl_->invalidateSystem();
+  impl_->modelChanged();
 }
 
 void DeformableBody::setGravity(const Vector3d& gravity) {
@@ -146,7 +166,7 @@ void DeformableBody::setGravity(const Vector3d& gravity) {
 
 void DeformableBody::setRestNodes(const NodeMatrix& nodes) {
   impl_->model->setRestPositions(nodes);
-  impl_->invalidateSystem();
+  impl_->modelChanged();
 }
 
 void DeformableBody::setTolerances(int newton_iterations, double newton_tolerance,

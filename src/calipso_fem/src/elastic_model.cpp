@@ -149,32 +149,29 @@ void ElasticModel::setRestPositions(const NodeMatrix& nodes) {
 
 double ElasticModel::energy(const Vec& x) const {
   const Impl& m = *impl_;
+  if (m.hexes) {
+    HexEvaluation evaluation;
+    m.hexes->evaluate(x, false, false, &evaluation);
+    return evaluation.energy;
+  }
   Eigen::VectorXd cell_energy(m.mesh.cellCount());
-  const auto generic = [&](int cell) { return m.evaluate(cell, x, 0, Part::kFull).energy; };
-  if (m.isBatched())
-    m.forEachBatched(x, 0, StvkPart::kFull, [&](int cell, int lane, const StvkBatchResult& r) {
-      cell_energy[cell] = r.smallest_dilatation[lane] < kRecoveryDilatation ? generic(cell)
-                                                                            : r.energy[lane];
-    });
-  else
-    m.forEachCell([&](int cell) { cell_energy[cell] = generic(cell); });
+  m.forEachCell([&](int cell) { cell_energy[cell] = m.evaluate(cell, x, 0, Part::kFull).energy; });
   return cell_energy.dot(m.mesh.fraction);
 }
 
 void ElasticModel::gradient(const Vec& x, Vec& f) const {
   const Impl& m = *impl_;
+  if (m.hexes) {
+    HexEvaluation evaluation;
+    m.hexes->evaluate(x, false, false, &evaluation);
+    f = std::move(evaluation.forces);
+    return;
+  }
   f.setZero(dofCount());
-  const auto generic = [&](int cell) {
+  m.forEachCell([&](int cell) {
     const ElementResult r = m.evaluate(cell, x, 1, Part::kFull);
     for (int c = 0; c < m.mesh.cells.cols(); ++c)
       f.segment<3>(3 * m.mesh.cells(cell, c)) += m.mesh.fraction[cell] * r.f.segment<3>(3 * c);
-  };
-  if (!m.isBatched()) return m.forEachCell(generic);
-  m.forEachBatched(x, 1, StvkPart::kFull, [&](int cell, int lane, const StvkBatchResult& r) {
-    if (r.smallest_dilatation[lane] < kRecoveryDilatation) return generic(cell);
-    for (int c = 0; c < 8; ++c)
-      for (int i = 0; i < 3; ++i)
-        f[3 * m.mesh.cells(cell, c) + i] += m.mesh.fraction[cell] * r.f[3 * c + i][lane];
   });
 }
 
@@ -195,6 +192,8 @@ void ElasticModel::viscosity(const Vec& x, BlockMatrix& D) const {
     m.addToMatrix(cell, r, D);
   });
 }
+
+const StvkHexes* ElasticModel::hexes() const { return impl_->hexes.get(); }
 
 const std::shared_ptr<const BlockPattern>& ElasticModel::pattern() const { return impl_->pattern; }
 

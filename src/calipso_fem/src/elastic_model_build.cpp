@@ -106,6 +106,7 @@ void ElasticModel::Impl::buildBatches() {
   if (model != MaterialModel::kStVenantKirchhoff ||
       (type != ElementType::kHexEnhanced && type != ElementType::kHexQ1))
     return;
+  hexes = std::make_unique<StvkHexes>(mesh, kinds, kind_of);
   for (const ElementKind& kind : kinds) batch_kinds.push_back(makeBatchKind(kind));
   for (std::size_t color = 0; color + 1 < coloring.start.size(); ++color) {
     std::vector<int> cells(coloring.cells.begin() + coloring.start[color],

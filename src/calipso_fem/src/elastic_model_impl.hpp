@@ -6,11 +6,12 @@
 #include "cell_coloring.hpp"
 #include "element.hpp"
 #include "stvk_batch.hpp"
+#include "stvk_hexes.hpp"
 
 namespace calipso::fem {
 
 // Below this, waking a second thread for every colour costs more than it saves.
-inline constexpr int kSerialCells = 200;
+inline constexpr int kSerialCells = 64;
 
 // Corners of one cell (corners x 3) out of a 3n vector.
 inline CornerMatrix cornersOf(const CellMatrix& cells, int cell, const double* x) {
@@ -42,6 +43,7 @@ struct ElasticModel::Impl {
   std::vector<StvkBatchKind> batch_kinds;      // as kinds
   std::vector<Batch> batches;
   std::vector<int> batch_start;                // by colour
+  std::unique_ptr<StvkHexes> hexes;            // beside the batches
   Eigen::VectorXd lumped_mass;
 
   void buildReferences();
@@ -66,9 +68,10 @@ struct ElasticModel::Impl {
 template <class Work>
 void ElasticModel::Impl::forEachCell(const Work& work) const {
   for (std::size_t color = 0; color + 1 < coloring.start.size(); ++color) {
-#pragma omp parallel for schedule(static) if (mesh.cellCount() > kSerialCells)
-    for (int k = coloring.start[color]; k < coloring.start[color + 1]; ++k)
-      work(coloring.cells[k]);
+    const int start = coloring.start[color];
+    parallelFor(coloring.start[color + 1] - start, kSerialCells, [&](int begin, int end) {
+      for (int k = start + begin; k < start + end; ++k) work(coloring.cells[k]);
+    });
   }
 }
 
@@ -76,8 +79,7 @@ template <class Work>
 void ElasticModel::Impl::forEachBatched(const Vec& x, int derivatives, StvkPart part,
                                         const Work& work) const {
   for (std::size_t color = 0; color + 1 < batch_start.size(); ++color) {
-#pragma omp parallel for schedule(static) if (mesh.cellCount() > kSerialCells)
-    for (int k = batch_start[color]; k < batch_start[color + 1]; ++k) {
+    const auto evaluateBatch = [&](int k) {
       const Batch& batch = batches[k];
       alignas(32) double corners[24][kLanes];
       StvkBatchResult result;
@@ -87,7 +89,11 @@ void ElasticModel::Impl::forEachBatched(const Vec& x, int derivatives, StvkPart 
             corners[3 * c + i][l] = x[3 * mesh.cells(batch.cell[l], c) + i];
       evaluateStvkBatch(batch_kinds[kind_of[batch.cell[0]]], corners, derivatives, part, &result);
       for (int l = 0; l < batch.count; ++l) work(batch.cell[l], l, result);
-    }
+    };
+    const int start = batch_start[color];
+    parallelFor(batch_start[color + 1] - start, kSerialCells / kLanes, [&](int begin, int end) {
+      for (int k = start + begin; k < start + end; ++k) evaluateBatch(k);
+    });
   }
 }
 

@@ -1,82 +1,58 @@
 #include "grid_transfer.hpp"
 
 #include <algorithm>
-#include <array>
-#include <map>
+
+#include "thread_team.hpp"
 
 namespace calipso::fem {
 namespace {
 
-using Key = std::array<int, 3>;  // z, y, x
-
-// Coarse lattice positions around a fine one, and their common weight.
-std::vector<Key> parentsOf(const Eigen::RowVector3i& p) {
-  std::vector<Key> keys = {{0, 0, 0}};
-  for (int axis = 0; axis < 3; ++axis) {
-    const int low = p[axis] >> 1;
-    const bool odd = p[axis] & 1;
-    const std::size_t n = keys.size();
-    for (std::size_t k = 0; k < n; ++k) {
-      if (odd) {
-        keys.push_back(keys[k]);
-        keys.back()[2 - axis] = low + 1;
-      }
-      keys[k][2 - axis] = low;
-    }
-  }
-  return keys;
+// Calls visit(x, y, z, weight) for the coarse lattice positions around a fine one.
+template <class Visit>
+void forEachParent(const Eigen::RowVector3i& p, const Visit& visit) {
+  const Eigen::RowVector3i low = p / 2, odd(p.x() & 1, p.y() & 1, p.z() & 1);
+  const double weight = 1.0 / (1 << odd.sum());
+  for (int k = 0; k <= odd.z(); ++k)
+    for (int j = 0; j <= odd.y(); ++j)
+      for (int i = 0; i <= odd.x(); ++i) visit(low.x() + i, low.y() + j, low.z() + k, weight);
 }
 
 }  // namespace
 
+LatticeIndex::LatticeIndex(const Eigen::RowVector3i& size)
+    : size_(size), id_(static_cast<std::size_t>(size.x()) * size.y() * size.z(), -1) {}
+
 GridTransfer makeGridTransfer(const LatticeMatrix& fine_lattice) {
   const int n = static_cast<int>(fine_lattice.rows());
-  std::map<Key, int> id;
+  LatticeIndex id((fine_lattice.colwise().maxCoeff().array() + 1) / 2 + 1);
   for (int i = 0; i < n; ++i)
-    for (const Key& key : parentsOf(fine_lattice.row(i))) id[key] = 0;
+    forEachParent(fine_lattice.row(i), [&](int x, int y, int z, double) { id.at(x, y, z) = 0; });
   GridTransfer t;
-  t.coarse_lattice.resize(id.size(), 3);
   int next = 0;
-  for (auto& [key, node] : id) {
-    t.coarse_lattice.row(next) << key[2], key[1], key[0];
-    node = next++;
-  }
-  std::vector<std::vector<GridTransfer::Entry>> children(next);
-  t.parent_start.push_back(0);
+  for (int& node : id.all())
+    if (node == 0) node = next++;
+  t.coarse_lattice.resize(next, 3);
+  for (int z = 0; z < id.size().z(); ++z)
+    for (int y = 0; y < id.size().y(); ++y)
+      for (int x = 0; x < id.size().x(); ++x)
+        if (id.at(x, y, z) >= 0) t.coarse_lattice.row(id.at(x, y, z)) << x, y, z;
+
+  t.parent_start.assign(1, 0);
+  t.child_start.assign(next + 1, 0);
   for (int i = 0; i < n; ++i) {
-    const std::vector<Key> keys = parentsOf(fine_lattice.row(i));
-    for (const Key& key : keys) {
-      t.parents.push_back({id[key], 1.0 / keys.size()});
-      children[id[key]].push_back({i, 1.0 / keys.size()});
-    }
+    forEachParent(fine_lattice.row(i), [&](int x, int y, int z, double weight) {
+      t.parents.push_back({id.at(x, y, z), static_cast<float>(weight)});
+      ++t.child_start[id.at(x, y, z) + 1];
+    });
     t.parent_start.push_back(static_cast<int>(t.parents.size()));
   }
-  t.child_start.push_back(0);
-  for (const auto& list : children) {
-    t.children.insert(t.children.end(), list.begin(), list.end());
-    t.child_start.push_back(static_cast<int>(t.children.size()));
-  }
-  return t;
-}
-
-void GridTransfer::prolongAdd(const Vec& coarse, Vec* fine) const {
-  const int n = fineCount();
-#pragma omp parallel for schedule(static)
+  for (int I = 0; I < next; ++I) t.child_start[I + 1] += t.child_start[I];
+  t.children.resize(t.parents.size());
+  std::vector<int> place(t.child_start.begin(), t.child_start.end() - 1);
   for (int i = 0; i < n; ++i)
-    for (int k = parent_start[i]; k < parent_start[i + 1]; ++k)
-      fine->segment<3>(3 * i) += parents[k].weight * coarse.segment<3>(3 * parents[k].node);
-}
-
-void GridTransfer::restrictTo(const Vec& fine, Vec* coarse) const {
-  const int n = coarseCount();
-  coarse->resize(3 * n);
-#pragma omp parallel for schedule(static)
-  for (int i = 0; i < n; ++i) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (int k = child_start[i]; k < child_start[i + 1]; ++k)
-      sum += children[k].weight * fine.segment<3>(3 * children[k].node);
-    coarse->segment<3>(3 * i) = sum;
-  }
+    for (int k = t.parent_start[i]; k < t.parent_start[i + 1]; ++k)
+      t.children[place[t.parents[k].node]++] = {i, t.parents[k].weight};
+  return t;
 }
 
 std::shared_ptr<const BlockPattern> coarsePattern(const BlockPattern& fine,
@@ -110,11 +86,9 @@ void galerkin(const BlockMatrix& A, const GridTransfer& t, const Vec& free, Bloc
   const BlockPattern& coarse = *Ac->pattern;
   Ac->setZero();
   const int n = t.coarseCount();
-#pragma omp parallel
-  {
+  parallelFor(n, 64, [&](int begin, int end) {
     std::vector<int> position(n);
-#pragma omp for schedule(static)
-    for (int I = 0; I < n; ++I) {
+    for (int I = begin; I < end; ++I) {
       for (int k = coarse.row_start[I]; k < coarse.row_start[I + 1]; ++k)
         position[coarse.column[k]] = k;
       for (int c = t.child_start[I]; c < t.child_start[I + 1]; ++c) {
@@ -137,7 +111,7 @@ void galerkin(const BlockMatrix& A, const GridTransfer& t, const Vec& free, Bloc
         }
       }
     }
-  }
+  });
 }
 
 }  // namespace calipso::fem

@@ -14,7 +14,7 @@ using LatticeMatrix = Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>;
 struct GridTransfer {
   struct Entry {
     int node;
-    double weight;
+    float weight;   // exact: a power of two
   };
   std::vector<int> parent_start, child_start;
   std::vector<Entry> parents;    // of each fine node: coarse nodes
@@ -23,11 +23,24 @@ struct GridTransfer {
 
   int fineCount() const { return static_cast<int>(parent_start.size()) - 1; }
   int coarseCount() const { return static_cast<int>(child_start.size()) - 1; }
-
-  void prolongAdd(const Vec& coarse, Vec* fine) const;   // fine += P coarse
-  void restrictTo(const Vec& fine, Vec* coarse) const;   // coarse = P^T fine
 };
 
+// Ids of the points of a lattice of the given size; -1: none.
+class LatticeIndex {
+ public:
+  explicit LatticeIndex(const Eigen::RowVector3i& size);
+  int& at(int x, int y, int z) {
+    return id_[x + static_cast<std::size_t>(size_.x()) * (y + static_cast<std::size_t>(size_.y()) * z)];
+  }
+  std::vector<int>& all() { return id_; }   // x runs fastest, then y
+  const Eigen::RowVector3i& size() const { return size_; }
+
+ private:
+  Eigen::RowVector3i size_;
+  std::vector<int> id_;
+};
+
+// @pre no coordinate is negative
 GridTransfer makeGridTransfer(const LatticeMatrix& fine_lattice);
 
 // Pattern of P^T A P.

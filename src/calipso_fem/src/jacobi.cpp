@@ -1,6 +1,7 @@
 #include <Eigen/LU>
 
 #include "preconditioner.hpp"
+#include "thread_team.hpp"
 
 namespace calipso::fem {
 namespace {
@@ -24,10 +25,11 @@ class Jacobi : public Preconditioner {
   void apply(const Vec& r, Vec& z) override {
     const int n = static_cast<int>(r.size()) / 3;
     z.resize(r.size());
-#pragma omp parallel for schedule(static)
-    for (int i = 0; i < n; ++i)
-      z.segment<3>(3 * i).noalias() =
-          Eigen::Map<const Block>(inverse_.data() + 9 * i) * r.segment<3>(3 * i);
+    parallelFor(n, 500, [&](int begin, int end) {
+      for (int i = begin; i < end; ++i)
+        z.segment<3>(3 * i).noalias() =
+            Eigen::Map<const Block>(inverse_.data() + 9 * i) * r.segment<3>(3 * i);
+    });
   }
 
  private:

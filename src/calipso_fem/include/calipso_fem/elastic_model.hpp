@@ -16,6 +16,8 @@
 //  K_e    elementStiffness  one element's stiffness at rest        N/m
 namespace calipso::fem {
 
+class StvkHexes;
+
 enum class ElementType {
   kHexQ1,              // trilinear, 2x2x2 Gauss points
   kHexMeanDilatation,  // trilinear, one dilatation per element (F-bar): for nu near 0.5
@@ -55,6 +57,10 @@ class ElasticModel {
   // K without the geometric part: the viscosity of stiffness-proportional damping per unit of its
   // coefficient. Positive semi-definite; rigid velocities give no force.
   void viscosity(const Vec& x, BlockMatrix& D) const;
+
+  // The cells packed for products without a matrix; null where material or element have none. Built anew by
+  // every change of material or rest shape.
+  const StvkHexes* hexes() const;
 
   const std::shared_ptr<const BlockPattern>& pattern() const;
   // K at rest, weighted by filled fraction and element material.

@@ -1,0 +1,13 @@
+#include "hex_kernel.hpp"
+
+#include <type_traits>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#define CALIPSO_HEX_AVX
+#pragma GCC target("avx2,fma,avx512f,avx512vl,avx512dq,avx512bw")
+#endif
+
+namespace calipso::fem::avx512 {
+#include "hex_kernel.inl"
+}  // namespace calipso::fem::avx512

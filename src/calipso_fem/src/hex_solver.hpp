@@ -1,0 +1,86 @@
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "linear_solver.hpp"
+#include "multigrid.hpp"
+#include "stvk_hexes.hpp"
+
+namespace calipso::fem {
+
+// A spring's share of the system: block times w w^T for the nodes it hangs on.
+struct SpringBlock {
+  std::vector<std::pair<int, double>> weights;
+  Eigen::Matrix3d block;
+};
+
+// A = factor K_material(x) + K_geometric(x) + inertia M + springs, rows and columns of fixed components out.
+struct HexSystem {
+  double factor = 1.0;            // 1 + rate * stiffness damping
+  double inertia = 0.0;           // 1/s^2, times the lumped mass
+  std::vector<SpringBlock> springs;
+};
+
+// Which coarse cell of the next level each fine cell lies in.
+struct HexCoarsening {
+  CellMatrix coarse_cells;            // #coarse cells x 8
+  std::vector<int> coarse_of;         // per place in StvkHexes::order(); -1: no cell
+  std::vector<unsigned char> parity;  // bits: odd along x, y, z
+  std::vector<int> block_of;          // per coarse cell, 8 x 8, in the coarse pattern
+};
+
+// Solves A x = b without assembling A: CG in double precision, multigrid in single. The multigrid's fine level
+// follows x at every setSystem(); its diagonal and coarse levels are renewed when that has become worth it.
+class HexSolver {
+ public:
+  // mesh and hexes must outlive this. @throw std::invalid_argument for a mesh without lattice
+  HexSolver(const VolumeMesh& mesh, const StvkHexes& hexes);
+  ~HexSolver();
+
+  // True where the lattice fits the cells, as it does for voxel grids and boxes.
+  static bool fits(const VolumeMesh& mesh);
+
+  // The cells have been packed anew.
+  void setHexes(const StvkHexes& hexes);
+  // fixed: dofs taken out. Takes positions and stresses out of `at`. False: the matrix has shown not to
+  // be positive definite.
+  bool setSystem(HexEvaluation* at, HexSystem system, const Eigen::VectorXd& lumped_mass,
+                 const std::vector<int>& fixed);
+  // y = A x, the fixed components included.
+  void multiply(const Vec& x, Vec* y);
+  // b and x: zero at fixed components. x is the start value on entry.
+  SolveReport solve(const Vec& b, double tolerance, int most_iterations, Vec* x);
+  void invalidate() { stale_ = true; }
+  // Diagonal blocks of A when the multigrid was last renewed, 9 per node.
+  const AlignedBuffer<double>& diagonal() const { return diagonal_; }
+
+ private:
+  class Fine;
+  struct Vectors;
+
+  bool refresh();
+  void sumCoarse();
+  void addMassAndSprings();
+  void product(const Crew& crew, const double* x) const;
+  void productRow(int node, const double* x, double* y) const;
+  SolveReport iterate(const Vec& b, double tolerance, int most_iterations, Vec* x);
+
+  const VolumeMesh& mesh_;
+  const StvkHexes* hexes_;
+  AlignedBuffer<double> x_, stress_;   // as in HexEvaluation
+  AlignedBuffer<double> diagonal_;
+  HexSystem system_;
+  const Eigen::VectorXd* lumped_mass_ = nullptr;
+  HexCoarsening coarsening_;
+  std::unique_ptr<Fine> fine_;
+  std::unique_ptr<Vectors> vectors_;
+  Multigrid multigrid_;
+  bool stale_ = true;
+  bool current_ = false;          // the multigrid was renewed for this system
+  int fresh_iterations_ = 0;      // CG iterations of the first solve after the last renewal
+  int wasted_iterations_ = 0;     // those above it since then
+};
+
+}  // namespace calipso::fem

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "aligned_buffer.hpp"
+#include "element.hpp"
+#include "hex_kernel.hpp"
+#include "thread_team.hpp"
+
+namespace calipso::fem {
+
+// What one evaluation of the elastic energy at x has found.
+struct HexEvaluation {
+  AlignedBuffer<double> x;        // four per node
+  AlignedBuffer<double> stress;   // geometric stresses, as the kernel stores them; empty unless asked for
+  AlignedBuffer<double> slots, energies, dilatations;   // work space
+  Vec forces;                     // 3n, N
+  double energy = 0.0;            // J
+  double dilatation = 0.0;        // least det F
+};
+
+// The cells of a mesh of St. Venant-Kirchhoff hexahedra (Q1 or enhanced), packed for hex_kernel.hpp:
+// eight cells a batch in single, four in double precision, in the same order. Immutable.
+class StvkHexes {
+ public:
+  // cell -> its kind; the kinds' references must outlive this.
+  StvkHexes(const VolumeMesh& mesh, const std::vector<ElementKind>& kinds,
+            const std::vector<int>& kind_of);
+
+  int nodeCount() const { return nodes_; }
+  // Cells of the batches; -1 marks a lane without one. A multiple of 8.
+  const std::vector<int>& order() const { return order_; }
+  template <class Real>
+  int batchCount() const { return static_cast<int>(order_.size()) / kHexLanes<Real>; }
+  template <class Real>
+  HexBatches<Real> batches() const;
+  template <class Real>
+  std::size_t slotNumbers() const { return 32 * order_.size(); }
+
+  // Sum of a node's slots: y[0..3].
+  template <class Real>
+  void sumSlots(const Real* slots, int node, Real* y) const;
+
+  // Energy, forces and least dilatation at x; stresses where asked for, with `positive` shifted to
+  // positive ones. Cells below kRecoveryDilatation get their recovery energy and force.
+  void evaluate(const Vec& x, bool stresses, bool positive, HexEvaluation* result) const;
+  // y = material part of the tangent at x times w.
+  void multiplyMaterial(const Vec& x, const Vec& w, HexEvaluation* scratch, Vec* y) const;
+
+ private:
+  template <class Real>
+  struct Packed {
+    std::vector<int> node;
+    AlignedBuffer<Real> constants;
+    std::vector<long> block;
+    std::vector<int> slot;        // per node, in the order of slot_start_
+  };
+
+  void orderCells(const std::vector<bool>& is_box);
+  template <class Real>
+  void pack(Packed<Real>* packed) const;
+  std::vector<double> cellConstants(int cell, bool box) const;
+  void recover(const HexEvaluation& e, int batch, double* slots, double* energies) const;
+  template <class Real>
+  const Packed<Real>& packed() const;
+
+  const VolumeMesh& mesh_;
+  const std::vector<ElementKind>& kinds_;
+  const std::vector<int>& kind_of_;
+  int nodes_ = 0;
+  int boxes_ = 0;                 // cells of order_ that stand in batches of boxes
+  bool enhanced_ = false;
+  std::vector<int> order_;
+  std::vector<int> slot_start_;
+  Packed<float> single_;
+  Packed<double> double_;
+};
+
+template <>
+inline const StvkHexes::Packed<float>& StvkHexes::packed<float>() const { return single_; }
+template <>
+inline const StvkHexes::Packed<double>& StvkHexes::packed<double>() const { return double_; }
+
+template <class Real>
+HexBatches<Real> StvkHexes::batches() const {
+  const Packed<Real>& p = packed<Real>();
+  return {p.node.data(), p.constants.data(), p.block.data(), boxes_ / kHexLanes<Real>, enhanced_};
+}
+
+template <class Real>
+inline void StvkHexes::sumSlots(const Real* slots, int node, Real* y) const {
+  typedef Real Four __attribute__((vector_size(4 * sizeof(Real))));
+  const int* slot = packed<Real>().slot.data();
+  Four sum{};
+  for (int k = slot_start_[node]; k < slot_start_[node + 1]; ++k)
+    sum += *reinterpret_cast<const Four*>(slots + 4L * slot[k]);
+  *reinterpret_cast<Four*>(y) = sum;
+}
+
+}  // namespace calipso::fem
