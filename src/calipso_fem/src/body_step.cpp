@@ -37,6 +37,13 @@ Integrator DeformableBody::Impl::integrator(double h) const {
   return i;
 }
 
+// Where CG starts: what is left of a motion whose acceleration stays, or none.
+Vec DeformableBody::Impl::expectedMove(const Vec& y, const Integrator& i) const {
+  if (!(i.inertia > 0.0)) return Vec::Zero(y.size());
+  const Vec next = previous && previous_h > 0.0 ? Vec(2.0 * v - previous->second) : v;
+  return i.base + next / i.rate - y;
+}
+
 bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, const Vec& residual,
                                            const Vec& jump, double linear_tolerance,
                                            StepReport* report, Vec* direction) {
@@ -47,7 +54,7 @@ bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, co
     // Prescribed components move by `jump`; what that does to the others goes to the right side.
     if (jumps) b -= AJ;
     maskResidual(&b);
-    *direction = i.inertia > 0.0 ? Vec(i.predicted - y) : Vec(Vec::Zero(y.size()));
+    *direction = expectedMove(y, i);
     maskResidual(direction);
     const SolveReport solve = solveSystem(b, linear_tolerance, direction);
     report->linear_iterations += solve.iterations;

@@ -8,114 +8,11 @@ namespace calipso::fem {
 namespace {
 
 // Renewing the multigrid costs about this many CG iterations.
-constexpr int kRenewalCost = 6;
+constexpr int kRenewalCost = 3;
 constexpr int kGrain = Multigrid::kGrain;
 constexpr int kFloatLanes = kHexLanes<float>;
-constexpr int kDoubleLanes = kHexLanes<double>;
 
 }  // namespace
-
-namespace {
-
-// What springs add to a product: kept per node, four numbers each, zero where no spring hangs.
-template <class Real>
-class SpringForces {
- public:
-  void allocate(std::size_t nodes) { force_.assign(4 * nodes, Real(0)); }
-
-  void set(const std::vector<SpringBlock>& springs) {
-    clear();
-    springs_ = springs;
-  }
-
-  void apply(const Real* u) {
-    clear();
-    for (const SpringBlock& s : springs_) {
-      Vector p = Vector::Zero();
-      for (const auto& [node, weight] : s.weights)
-        p += static_cast<Real>(weight) * Eigen::Map<const Vector>(u + 4L * node);
-      const Vector force = s.block.cast<Real>() * p;
-      for (const auto& [node, weight] : s.weights)
-        Eigen::Map<Vector>(&force_[4L * node]) += static_cast<Real>(weight) * force;
-    }
-  }
-
-  bool empty() const { return springs_.empty(); }
-  const Real* at(int node) const { return &force_[4L * node]; }
-
- private:
-  using Vector = Eigen::Matrix<Real, 3, 1>;
-  void clear() {
-    for (const SpringBlock& s : springs_)
-      for (const auto& [node, weight] : s.weights) Eigen::Map<Vector>(&force_[4L * node]).setZero();
-  }
-
-  std::vector<SpringBlock> springs_;
-  AlignedBuffer<Real> force_;
-};
-
-}  // namespace
-
-// The fine level of the multigrid, in single precision.
-class HexSolver::Fine : public FineOperator {
- public:
-  void prepareProduct(const Crew& crew, const float* x) override {
-    const auto [begin, end] = crew.share(hexes->batchCount<float>());
-    hexKernel().multiplyFloat(hexes->batches<float>(), begin, end, this->x.data(), stress.data(), factor, x,
-                              slots.data());
-    if (crew.rank() == 0 && !springs_.empty()) springs_.apply(x);
-  }
-
-  Quad productRow(int node, const float* x) const override {
-    alignas(16) float sum[4];
-    hexes->sumSlots(slots.data(), node, sum);
-    const std::size_t at = 4 * static_cast<std::size_t>(node);
-    Quad y = loadQuad(sum) + splat(mass[node]) * loadQuad(x + at);
-    if (!springs_.empty()) y += loadQuad(springs_.at(node));
-    return y * loadQuad(free.data() + at);
-  }
-
-  void allocate(const StvkHexes& h) {
-    hexes = &h;
-    const std::size_t nodes = h.nodeCount();
-    x.resize(4 * nodes);
-    free.resize(4 * nodes);
-    springs_.allocate(nodes);
-    mass.resize(nodes);
-    stress.resize(kHexStress * h.order().size());
-    slots.resize(h.slotNumbers<float>());
-  }
-
-  void load(const AlignedBuffer<double>& at, const AlignedBuffer<double>& at_stress,
-            const HexSystem& system, const Eigen::VectorXd& lumped_mass,
-            const std::vector<int>& fixed) {
-    factor = static_cast<float>(system.factor);
-    std::fill(free.begin(), free.end(), 1.0f);
-    for (std::size_t k = 3; k < free.size(); k += 4) free[k] = 0.0f;
-    for (int dof : fixed) free[4 * (dof / 3) + dof % 3] = 0.0f;
-    springs_.set(system.springs);
-    parallelFor(hexes->nodeCount(), 1024, [&](int begin, int end) {
-      for (long k = 4L * begin; k < 4L * end; ++k) x[k] = static_cast<float>(at[k]);
-      for (int i = begin; i < end; ++i) mass[i] = static_cast<float>(system.inertia * lumped_mass[i]);
-    });
-    // Two batches in double precision make one in single.
-    parallelFor(hexes->batchCount<float>(), 32, [&](int begin, int end) {
-      for (long batch = begin; batch < end; ++batch)
-        for (int n = 0; n < kHexStress; ++n)
-          for (int l = 0; l < kFloatLanes; ++l)
-            stress[(batch * kHexStress + n) * kFloatLanes + l] = static_cast<float>(
-                at_stress[((2 * batch + l / kDoubleLanes) * kHexStress + n) * kDoubleLanes +
-                          l % kDoubleLanes]);
-    });
-  }
-
-  const StvkHexes* hexes = nullptr;
-  AlignedBuffer<float> x, stress, free, mass, slots;
-  float factor = 1.0f;
-
- private:
-  SpringForces<float> springs_;
-};
 
 // Work space of CG, four numbers per node; partial sums per kGrain nodes.
 struct HexSolver::Vectors {
@@ -178,7 +75,7 @@ HexCoarsening makeCoarsening(const VolumeMesh& mesh, const StvkHexes& hexes, con
 }  // namespace
 
 HexSolver::HexSolver(const VolumeMesh& mesh, const StvkHexes& hexes)
-    : mesh_(mesh), hexes_(nullptr), fine_(std::make_unique<Fine>()),
+    : mesh_(mesh), hexes_(nullptr), fine_(std::make_unique<HexLevel>()),
       vectors_(std::make_unique<Vectors>()), multigrid_(mesh.lattice) {
   if (!fits(mesh))
     throw std::invalid_argument("multigrid: the mesh has no lattice; use incomplete_cholesky");
@@ -370,11 +267,12 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
   };
   runParallel([&](const Crew& crew) {
     const auto [begin, end] = crew.share(nodes, kGrain);
-    // Calls work(i, sum) for this thread's nodes.
+    // Calls work(4 i, sum) for this thread's nodes i.
     const auto eachNode = [first = begin, last = end](std::vector<double>* sums, const auto& work) {
-      for (int i = first; i < last; ++i) {
-        if (i % kGrain == 0) (*sums)[i / kGrain] = 0.0;
-        work(4L * i, &(*sums)[i / kGrain]);
+      for (int block = first; block < last; block += kGrain) {
+        double sum = 0.0;
+        for (int i = block; i < std::min(block + kGrain, last); ++i) work(4L * i, &sum);
+        (*sums)[block / kGrain] = sum;
       }
     };
     for (long i = begin; i < end; ++i)
@@ -409,7 +307,8 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
     for (; iteration < most_iterations && !(residual <= tolerance * scale); ++iteration) {
       // The residual's size is taken out, so that single precision has room.
       float* right_side = multigrid_.rightSide();
-      for (long k = 4L * begin; k < 4L * end; ++k) right_side[k] = static_cast<float>(v.r[k] / residual);
+      const double inverse = 1.0 / residual;
+      for (long k = 4L * begin; k < 4L * end; ++k) right_side[k] = static_cast<float>(v.r[k] * inverse);
       crew.barrier();
       multigrid_.cycle(crew);
       crew.barrier();

@@ -1,27 +1,13 @@
 #pragma once
 
 #include <memory>
-#include <utility>
 #include <vector>
 
+#include "hex_level.hpp"
 #include "linear_solver.hpp"
 #include "multigrid.hpp"
-#include "stvk_hexes.hpp"
 
 namespace calipso::fem {
-
-// A spring's share of the system: block times w w^T for the nodes it hangs on.
-struct SpringBlock {
-  std::vector<std::pair<int, double>> weights;
-  Eigen::Matrix3d block;
-};
-
-// A = factor K_material(x) + K_geometric(x) + inertia M + springs, rows and columns of fixed components out.
-struct HexSystem {
-  double factor = 1.0;            // 1 + rate * stiffness damping
-  double inertia = 0.0;           // 1/s^2, times the lumped mass
-  std::vector<SpringBlock> springs;
-};
 
 // Which coarse cell of the next level each fine cell lies in.
 struct HexCoarsening {
@@ -57,7 +43,6 @@ class HexSolver {
   const AlignedBuffer<double>& diagonal() const { return diagonal_; }
 
  private:
-  class Fine;
   struct Vectors;
 
   bool refresh();
@@ -74,7 +59,7 @@ class HexSolver {
   HexSystem system_;
   const Eigen::VectorXd* lumped_mass_ = nullptr;
   HexCoarsening coarsening_;
-  std::unique_ptr<Fine> fine_;
+  std::unique_ptr<HexLevel> fine_;
   std::unique_ptr<Vectors> vectors_;
   Multigrid multigrid_;
   bool stale_ = true;

@@ -133,7 +133,7 @@ bool Multigrid::invertDiagonal(const double* blocks, Level* level) const {
   return positive;
 }
 
-bool Multigrid::update(FineOperator* fine, const AlignedBuffer<double>& diagonal) {
+bool Multigrid::update(HexLevel* fine, const AlignedBuffer<double>& diagonal) {
   Level& finest = levels_.front();
   finest.fine = fine;
   if (!invertDiagonal(diagonal.data(), &finest)) return false;
@@ -249,14 +249,17 @@ void Multigrid::estimate(Level* level) const {
   });
 }
 
-// z += d, d = D^-1 r / theta; d complete after a barrier.
-void Multigrid::smoothFirst(const Crew& crew, Level& level) const {
+// level.r = r; z += d, d = D^-1 r / theta; d complete after a barrier.
+void Multigrid::smoothFirst(const Crew& crew, Level& level, const float* r, bool z_is_zero) const {
   const Chebyshev c(level.lambda_max);
   const auto [begin, end] = crew.share(level.nodes, kGrain);
   for (long i = begin; i < end; ++i) {
-    const Quad d = splat(c.inverse_theta) * multiplyBlock(level.inverse.data() + 12 * i, loadQuad(level.r.data() + 4 * i));
+    const Quad r_i = loadQuad(r + 4 * i);
+    const Quad d = splat(c.inverse_theta) * multiplyBlock(level.inverse.data() + 12 * i, r_i);
+    const Quad z = z_is_zero ? d : loadQuad(level.z.data() + 4 * i) + d;
+    storeQuad(level.r.data() + 4 * i, r_i);
     storeQuad(level.d.data() + 4 * i, d);
-    storeQuad(level.z.data() + 4 * i, loadQuad(level.z.data() + 4 * i) + d);
+    storeQuad(level.z.data() + 4 * i, z);
   }
 }
 
@@ -290,9 +293,7 @@ void Multigrid::cycle(const Crew& crew, std::size_t l) {
     return;
   }
   const auto [begin, end] = crew.share(level.nodes, kGrain);
-  std::fill(level.z.begin() + 4L * begin, level.z.begin() + 4L * end, 0.0f);
-  std::copy(level.b.begin() + 4L * begin, level.b.begin() + 4L * end, level.r.begin() + 4L * begin);
-  smoothFirst(crew, level);
+  smoothFirst(crew, level, level.b.data(), true);
   crew.barrier();
   smoothSecond(crew, level, true);
   crew.barrier();
@@ -326,7 +327,7 @@ void Multigrid::cycle(const Crew& crew, std::size_t l) {
     storeQuad(level.r.data() + 4 * i, loadQuad(level.r.data() + 4 * i) - Ad);
   });
   crew.barrier();
-  smoothFirst(crew, level);
+  smoothFirst(crew, level, level.r.data(), false);
   crew.barrier();
   smoothSecond(crew, level, false);
 }

@@ -5,9 +5,8 @@
 
 #include "aligned_buffer.hpp"
 #include "grid_transfer.hpp"
+#include "hex_level.hpp"
 #include "preconditioner.hpp"
-#include "quad.hpp"
-#include "thread_team.hpp"
 
 namespace calipso::fem {
 
@@ -20,21 +19,10 @@ struct FloatMatrix {
   Quad row(int i, const float* x) const;
 };
 
-// The finest level's operator where it is not assembled. Called inside a parallel region.
-class FineOperator {
- public:
-  virtual ~FineOperator() = default;
-  // First half of y = A x for this thread; complete after a barrier.
-  virtual void prepareProduct(const Crew& crew, const float* x) = 0;
-  // Second half: one row of y.
-  virtual Quad productRow(int node, const float* x) const = 0;
-};
-
 // V-cycles on the voxel hierarchy in single precision: Chebyshev over block Jacobi, Galerkin coarse levels,
 // the coarsest by a dense inverse. Nodal fields hold four numbers per node.
 class Multigrid {
  public:
-  // A coarse level's first matrix: sums up into it (all zero before).
   explicit Multigrid(const LatticeMatrix& lattice);
 
   // Level 1 and its pattern; what the caller sums the coarse operator into. Null: there is no level 1.
@@ -45,7 +33,7 @@ class Multigrid {
 
   // Builds all levels below the finest from coarseMatrix(), and smoothers. diagonal: 9 per fine node, zero rows
   // and columns for fixed components. False: not positive definite.
-  bool update(FineOperator* fine, const AlignedBuffer<double>& diagonal);
+  bool update(HexLevel* fine, const AlignedBuffer<double>& diagonal);
   // The same for an assembled finest level.
   bool update(const BlockMatrix& A);
 
@@ -61,7 +49,7 @@ class Multigrid {
     int nodes = 0;
     BlockMatrix own;                // not of the finest
     FloatMatrix A;                  // unused where `fine` is set
-    FineOperator* fine = nullptr;
+    HexLevel* fine = nullptr;
     GridTransfer to_coarse;         // unused on the coarsest level
     float lambda_max = 1.0f;        // of D^-1 A
     AlignedBuffer<float> inverse;   // of the diagonal blocks, as FloatMatrix's
@@ -76,7 +64,7 @@ class Multigrid {
   void estimate(Level* level) const;
   void solveCoarsest(Level* level) const;
   void cycle(const Crew& crew, std::size_t l);
-  void smoothFirst(const Crew& crew, Level& level) const;
+  void smoothFirst(const Crew& crew, Level& level, const float* r, bool z_is_zero) const;
   void smoothSecond(const Crew& crew, Level& level, bool need_residual) const;
   template <class Work>
   void product(const Crew& crew, Level& level, const float* x, const Work& work) const;

@@ -90,12 +90,14 @@ HexBatches<Real> StvkHexes::batches() const {
 
 template <class Real>
 inline void StvkHexes::sumSlots(const Real* slots, int node, Real* y) const {
-  typedef Real Four __attribute__((vector_size(4 * sizeof(Real))));
+  // Sixteen bytes at a time: what every target has.
+  typedef Real Part __attribute__((vector_size(16)));
+  constexpr int kParts = static_cast<int>(sizeof(Real)) / 4;
   const int* slot = packed<Real>().slot.data();
-  Four sum{};
+  Part sum[kParts] = {};
   for (int k = slot_start_[node]; k < slot_start_[node + 1]; ++k)
-    sum += *reinterpret_cast<const Four*>(slots + 4L * slot[k]);
-  *reinterpret_cast<Four*>(y) = sum;
+    for (int p = 0; p < kParts; ++p) sum[p] += reinterpret_cast<const Part*>(slots + 4L * slot[k])[p];
+  for (int p = 0; p < kParts; ++p) reinterpret_cast<Part*>(y)[p] = sum[p];
 }
 
 }  // namespace calipso::fem

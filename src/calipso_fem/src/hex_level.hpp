@@ -1,0 +1,96 @@
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "quad.hpp"
+#include "stvk_hexes.hpp"
+
+namespace calipso::fem {
+
+// A spring's share of the system: block times w w^T for the nodes it hangs on.
+struct SpringBlock {
+  std::vector<std::pair<int, double>> weights;
+  Eigen::Matrix3d block;
+};
+
+// A = factor K_material(x) + K_geometric(x) + inertia M + springs, rows and columns of fixed components out.
+struct HexSystem {
+  double factor = 1.0;            // 1 + rate * stiffness damping
+  double inertia = 0.0;           // 1/s^2, times the lumped mass
+  std::vector<SpringBlock> springs;
+};
+
+// What springs add to a product: kept per node, four numbers each, zero where no spring hangs.
+template <class Real>
+class SpringForces {
+ public:
+  void allocate(std::size_t nodes) { force_.assign(4 * nodes, Real(0)); }
+
+  void set(const std::vector<SpringBlock>& springs) {
+    clear();
+    springs_ = springs;
+  }
+
+  void apply(const Real* u) {
+    clear();
+    for (const SpringBlock& s : springs_) {
+      Vector p = Vector::Zero();
+      for (const auto& [node, weight] : s.weights)
+        p += static_cast<Real>(weight) * Eigen::Map<const Vector>(u + 4L * node);
+      const Vector force = s.block.cast<Real>() * p;
+      for (const auto& [node, weight] : s.weights)
+        Eigen::Map<Vector>(&force_[4L * node]) += static_cast<Real>(weight) * force;
+    }
+  }
+
+  bool empty() const { return springs_.empty(); }
+  const Real* at(int node) const { return &force_[4L * node]; }
+
+ private:
+  using Vector = Eigen::Matrix<Real, 3, 1>;
+  void clear() {
+    for (const SpringBlock& s : springs_)
+      for (const auto& [node, weight] : s.weights) Eigen::Map<Vector>(&force_[4L * node]).setZero();
+  }
+
+  std::vector<SpringBlock> springs_;
+  AlignedBuffer<Real> force_;
+};
+
+// The finest level of the multigrid, in single precision: the system's operator without its matrix. Products are
+// made in two halves inside a parallel region.
+class HexLevel {
+ public:
+  // First half of y = A x for this thread; complete after a barrier.
+  void prepareProduct(const Crew& crew, const float* x) {
+    const auto [begin, end] = crew.share(hexes->batchCount<float>());
+    hexKernel().multiplyFloat(hexes->batches<float>(), begin, end, this->x.data(), stress.data(), factor, x,
+                              slots.data());
+    if (crew.rank() == 0 && !springs_.empty()) springs_.apply(x);
+  }
+
+  // Second half: one row of y.
+  Quad productRow(int node, const float* x) const {
+    alignas(16) float sum[4];
+    hexes->sumSlots(slots.data(), node, sum);
+    const std::size_t at = 4 * static_cast<std::size_t>(node);
+    Quad y = loadQuad(sum) + splat(mass[node]) * loadQuad(x + at);
+    if (!springs_.empty()) y += loadQuad(springs_.at(node));
+    return y * loadQuad(free.data() + at);
+  }
+
+  void allocate(const StvkHexes& hexes);
+  // Positions and stresses as in HexEvaluation; fixed: dofs taken out.
+  void load(const AlignedBuffer<double>& at, const AlignedBuffer<double>& at_stress,
+            const HexSystem& system, const Eigen::VectorXd& lumped_mass, const std::vector<int>& fixed);
+
+  const StvkHexes* hexes = nullptr;
+  AlignedBuffer<float> x, stress, free, mass, slots;
+  float factor = 1.0f;
+
+ private:
+  SpringForces<float> springs_;
+};
+
+}  // namespace calipso::fem
