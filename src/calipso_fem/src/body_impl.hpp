@@ -86,6 +86,7 @@ struct DeformableBody::Impl {
   const Vec& trialGradient();
 
   void initialise(const Material& material);
+  void chooseSolver();
   double damping() const { return model->cellMaterials().front().damping; }
 
   // y = M x for a 3n vector
@@ -129,7 +130,7 @@ struct DeformableBody::Impl {
 
   StepReport minimise(const Integrator& i, const Vec& loads, const Vec& targets, bool linearised,
                       Vec* y);
-  Vec expectedMove(const Vec& y, const Integrator& i) const;
+  Vec expectedMove(const Integrator& i) const;
   // One Newton direction; false when no positive definite system could be solved.
   bool newtonDirection(const Vec& y, const Integrator& i, const Vec& residual, const Vec& jump,
                        double linear_tolerance, StepReport* report, Vec* direction);

@@ -13,6 +13,9 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
+// Largest relative residual of a Newton direction.
+constexpr double kLoosestForcing = 0.05;
+
 }  // namespace
 
 Integrator DeformableBody::Impl::integrator(double h) const {
@@ -37,11 +40,13 @@ Integrator DeformableBody::Impl::integrator(double h) const {
   return i;
 }
 
-// Where CG starts: what is left of a motion whose acceleration stays, or none.
-Vec DeformableBody::Impl::expectedMove(const Vec& y, const Integrator& i) const {
-  if (!(i.inertia > 0.0)) return Vec::Zero(y.size());
-  const Vec next = previous && previous_h > 0.0 ? Vec(2.0 * v - previous->second) : v;
-  return i.base + next / i.rate - y;
+// Displacement of the free components in this step if their acceleration stays.
+Vec DeformableBody::Impl::expectedMove(const Integrator& i) const {
+  if (!(i.inertia > 0.0)) return Vec::Zero(x.size());
+  const Vec next = previous ? Vec(2.0 * v - previous->second) : v;
+  Vec move = i.base + next / i.rate - x;
+  maskResidual(&move);
+  return move;
 }
 
 bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, const Vec& residual,
@@ -54,8 +59,7 @@ bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, co
     // Prescribed components move by `jump`; what that does to the others goes to the right side.
     if (jumps) b -= AJ;
     maskResidual(&b);
-    *direction = expectedMove(y, i);
-    maskResidual(direction);
+    *direction = y == x ? expectedMove(i) : Vec(Vec::Zero(y.size()));
     const SolveReport solve = solveSystem(b, linear_tolerance, direction);
     report->linear_iterations += solve.iterations;
     if (!solve.positive) continue;
@@ -85,15 +89,27 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
                                           bool linearised, Vec* y) {
   StepReport report;
   Vec jump = targets - *y;
+  if (!linearised && i.inertia > 0.0 && jump.isZero(0.0)) {
+    const double before = potential(*y, i, loads);
+    const Vec start = *y + expectedMove(i);
+    if (potential(start, i, loads) < before) *y = start;
+  }
   Vec r = gradient(*y, i, loads);
   Vec direction;
-  const double linear_tolerance = options.linear_tolerance;
+  double residual_before = 0.0;
   const int most = linearised ? 1 : options.newton_iterations;
   for (; report.newton_iterations < most; ++report.newton_iterations) {
     Vec masked = r;
     maskResidual(&masked);
     report.residual = masked.norm() / forceScale(*y, i, loads);
     if (!linearised && jump.isZero(0.0) && report.residual <= options.newton_tolerance) break;
+    // Forcing terms (Eisenstat and Walker 1996, choice 2): no direction is solved for better than it is worth.
+    double linear_tolerance = options.linear_tolerance;
+    if (!linearised && jump.isZero(0.0)) {
+      const double ratio = residual_before > 0.0 ? masked.norm() / residual_before : 1.0;
+      linear_tolerance = std::max(linear_tolerance, std::min(kLoosestForcing, 0.9 * ratio * ratio));
+    }
+    residual_before = masked.norm();
     if (!newtonDirection(*y, i, r, jump, linear_tolerance, &report, &direction)) {
       report.message = "no positive definite system: the body is free to move without resistance, "
                        "or its state is not finite";

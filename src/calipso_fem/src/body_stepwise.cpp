@@ -27,10 +27,7 @@ void DeformableBody::beginStep(double h) {
   t.h = h;
   t.loads = m.externalForces();
   t.targets = m.prescribedTargets(m.time + h);
-  if (m.damping() > 0.0) {
-    m.model->viscosity(m.x, m.viscosity);
-    for (double& value : m.viscosity.values) value *= m.damping();
-  }
+  if (m.damping() > 0.0) m.setViscosity(m.x);
   if (m.options.scheme == TimeScheme::kTrapezoidal && !m.acceleration_known) {
     m.a = m.startAcceleration(t.loads);
     m.acceleration_known = true;

@@ -1,5 +1,6 @@
 #include "calipso_fem/deformable_body.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -39,16 +40,34 @@ VolumeMesh withElement(VolumeMesh hexes, ElementType element) {
 
 }  // namespace
 
+// Called again when the material has changed.
+void DeformableBody::Impl::chooseSolver() {
+  const VolumeMesh& mesh = model->mesh();
+  double least = 1e300, largest = 0.0;
+  for (const Material& m : model->cellMaterials()) {
+    least = std::min(least, m.youngs_modulus);
+    largest = std::max(largest, m.youngs_modulus);
+  }
+  const bool automatic = options.solver == SolverKind::kAutomatic;
+  const double contrast = largest / least;
+  const SolverKind kind = automatic ? chooseSolverKind(mesh, contrast) : options.solver;
+  if (!solver || solver->kind() != kind) solver = std::make_unique<LinearSolver>(mesh, kind);
+  const bool multigrid = options.solver == SolverKind::kMultigrid ||
+                         (automatic && contrast <= kMultigridContrast);
+  if (!multigrid || !model->hexes() || !options.lumped_mass ||
+      mesh.nodeCount() < kMatrixFreeNodes || !HexSolver::fits(mesh))
+    hex_solver.reset();
+  else if (hex_solver)
+    hex_solver->setHexes(*model->hexes());
+  else
+    hex_solver = std::make_unique<HexSolver>(mesh, *model->hexes());
+}
+
 void DeformableBody::Impl::initialise(const Material& material) {
   (void)material;
   setThreads(options.threads);
   if (!options.lumped_mass) mass = model->consistentMass();
-  solver = std::make_unique<LinearSolver>(model->mesh(), options.solver);
-  const bool multigrid =
-      options.solver == SolverKind::kAutomatic || options.solver == SolverKind::kMultigrid;
-  if (multigrid && model->hexes() && options.lumped_mass && HexSolver::fits(model->mesh()) &&
-      model->mesh().nodeCount() >= kMatrixFreeNodes)
-    hex_solver = std::make_unique<HexSolver>(model->mesh(), *model->hexes());
+  chooseSolver();
   x = restPositions(model->mesh());
   v = a = reactions = Vec::Zero(x.size());
 }
@@ -65,7 +84,7 @@ void DeformableBody::Impl::invalidateSystem() {
 }
 
 void DeformableBody::Impl::modelChanged() {
-  if (hex_solver) hex_solver->setHexes(*model->hexes());
+  chooseSolver();
   elastic.y.resize(0);
   viscosity_valid = false;
   invalidateSystem();

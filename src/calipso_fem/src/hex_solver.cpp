@@ -8,7 +8,7 @@ namespace calipso::fem {
 namespace {
 
 // Renewing the multigrid costs about this many CG iterations.
-constexpr int kRenewalCost = 3;
+constexpr double kRenewalCost = 3.0;
 constexpr int kGrain = Multigrid::kGrain;
 constexpr int kFloatLanes = kHexLanes<float>;
 
@@ -122,7 +122,7 @@ bool HexSolver::refresh() {
   addMassAndSprings();
   stale_ = !multigrid_.update(fine_.get(), diagonal_);
   current_ = !stale_;
-  fresh_iterations_ = wasted_iterations_ = 0;
+  fresh_rate_ = wasted_iterations_ = 0.0;
   return current_;
 }
 
@@ -241,8 +241,10 @@ void HexSolver::multiply(const Vec& x, Vec* y) {
 
 SolveReport HexSolver::solve(const Vec& b, double tolerance, int most_iterations, Vec* x) {
   SolveReport report = iterate(b, tolerance, most_iterations, x);
-  if (fresh_iterations_ == 0) fresh_iterations_ = std::max(1, report.iterations);
-  wasted_iterations_ += std::max(0, report.iterations - fresh_iterations_);
+  if (decades_ > 0.0) {
+    if (fresh_rate_ == 0.0) fresh_rate_ = report.iterations / decades_;
+    wasted_iterations_ += std::max(0.0, report.iterations - fresh_rate_ * decades_);
+  }
   // A worn preconditioner can make CG stall; a fresh one gets a second chance.
   if (!report.converged && !current_ && refresh()) {
     x->setZero();
@@ -302,6 +304,7 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
       crew.barrier();
       residual = std::sqrt(total(v.rr));
     }
+    const double first_residual = residual;
     int iteration = 0;
     bool positive = true;
     for (; iteration < most_iterations && !(residual <= tolerance * scale); ++iteration) {
@@ -352,6 +355,7 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
       for (int c = 0; c < 3; ++c) (*solution)[3 * i + c] = v.x[4 * i + c];
     if (crew.rank() != 0) return;
     report.iterations = iteration;
+    decades_ = iteration > 0 && residual > 0.0 ? std::log10(first_residual / residual) : 0.0;
     report.positive = positive;
     report.residual = scale > 0.0 ? residual / scale : residual;
     report.converged = positive && residual <= tolerance * scale;

@@ -64,8 +64,9 @@ class HexSolver {
   Multigrid multigrid_;
   bool stale_ = true;
   bool current_ = false;          // the multigrid was renewed for this system
-  int fresh_iterations_ = 0;      // CG iterations of the first solve after the last renewal
-  int wasted_iterations_ = 0;     // those above it since then
+  double decades_ = 0.0;          // of residual in the last solve
+  double fresh_rate_ = 0.0;       // CG iterations per decade in the first solve after the last renewal
+  double wasted_iterations_ = 0.0;   // those above that rate since then
 };
 
 }  // namespace calipso::fem

@@ -10,11 +10,8 @@ namespace {
 
 // Node counts up to which the choice was measured best; see the report.
 constexpr int kStaleCholeskyNodes = 1200;
-
-SolverKind chooseKind(const VolumeMesh& mesh) {
-  if (mesh.nodeCount() <= kStaleCholeskyNodes) return SolverKind::kStaleCholesky;
-  return mesh.lattice.rows() > 0 ? SolverKind::kMultigrid : SolverKind::kIncompleteCholesky;
-}
+// Coarse grids see stiff and soft cells as one: beyond kMultigridContrast, a factor pays up to here.
+constexpr int kContrastCholeskyNodes = 20000;
 
 std::unique_ptr<Preconditioner> makePreconditioner(const VolumeMesh& mesh, SolverKind kind) {
   switch (kind) {
@@ -30,6 +27,12 @@ constexpr double kStaleFactor = 1.6;
 constexpr int kStaleSlack = 4;
 
 }  // namespace
+
+SolverKind chooseSolverKind(const VolumeMesh& mesh, double contrast) {
+  const int most = contrast > kMultigridContrast ? kContrastCholeskyNodes : kStaleCholeskyNodes;
+  if (mesh.nodeCount() <= most) return SolverKind::kStaleCholesky;
+  return mesh.lattice.rows() > 0 ? SolverKind::kMultigrid : SolverKind::kIncompleteCholesky;
+}
 
 SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditioner, const Vec& b,
                                double tolerance, int most_iterations, Vec* x) {
@@ -63,7 +66,7 @@ SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditio
 }
 
 LinearSolver::LinearSolver(const VolumeMesh& mesh, SolverKind kind)
-    : kind_(kind == SolverKind::kAutomatic ? chooseKind(mesh) : kind),
+    : kind_(kind),
       preconditioner_(makePreconditioner(mesh, kind_)) {}
 
 bool LinearSolver::refresh() {

@@ -8,6 +8,9 @@
 
 namespace calipso::fem {
 
+// Ratio of Young's moduli up to which multigrid is trusted.
+constexpr double kMultigridContrast = 1e3;
+
 struct SolveReport {
   bool positive = true;      // false: A has shown a direction of negative curvature
   bool converged = false;
@@ -19,10 +22,14 @@ struct SolveReport {
 SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditioner, const Vec& b,
                                double tolerance, int most_iterations, Vec* x);
 
+// What automatic means for a mesh. contrast: largest over smallest Young's modulus of its cells
+SolverKind chooseSolverKind(const VolumeMesh& mesh, double contrast);
+
 // Solves a sequence of slowly changing systems on one pattern; chooses and refreshes the
 // preconditioner.
 class LinearSolver {
  public:
+  // kind: not automatic
   LinearSolver(const VolumeMesh& mesh, SolverKind kind);
 
   // @pre A stays unchanged until the last solve() with it
