@@ -1,12 +1,13 @@
 #!/bin/sh
-# usage: run.sh OUTPUT_FOLDER REFERENCE_PATH...
-# Runs the evaluator on the reference cases and the benchmark, and writes OUTPUT_FOLDER/fem.md.
+# usage: run.sh OUTPUT_FOLDER [REFERENCE_PATH...]
+# Runs the evaluator on the reference cases, if any, and the benchmark, and writes OUTPUT_FOLDER/fem.md.
 set -e
 output=$1
 shift
 mkdir -p "$output"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-rosrun calipso_fem evaluate "$@" > "$work/evaluate.jsonl"
+touch "$work/evaluate.jsonl"
+[ $# -eq 0 ] || rosrun calipso_fem evaluate "$@" > "$work/evaluate.jsonl"
 rosrun calipso_fem benchmark > "$work/benchmark.jsonl"
 /usr/bin/python3 "$(dirname "$0")/report.py" "$output" "$work/evaluate.jsonl" "$work/benchmark.jsonl"

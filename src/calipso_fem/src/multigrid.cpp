@@ -292,8 +292,23 @@ void Multigrid::cycle(const Crew& crew, std::size_t l) {
     if (crew.rank() == 0) solveCoarsest(&level);
     return;
   }
+  pass(crew, l, level.b.data(), true);
+  if (l == 0) return;
+  // A second one on the coarse levels, where trilinear interpolation is too stiff in bending and one leaves
+  // much of the error: a W-cycle.
+  crew.barrier();
+  product(crew, level, level.z.data(), [&](long i, Quad Az) {
+    storeQuad(level.r.data() + 4 * i, loadQuad(level.b.data() + 4 * i) - Az);
+  });
+  crew.barrier();
+  pass(crew, l, level.r.data(), false);
+}
+
+// z += smoothing, coarse correction and smoothing of the residual r.
+void Multigrid::pass(const Crew& crew, std::size_t l, const float* residual, bool z_is_zero) {
+  Level& level = levels_[l];
   const auto [begin, end] = crew.share(level.nodes, kGrain);
-  smoothFirst(crew, level, level.b.data(), true);
+  smoothFirst(crew, level, residual, z_is_zero);
   crew.barrier();
   smoothSecond(crew, level, true);
   crew.barrier();

@@ -19,7 +19,7 @@ struct FloatMatrix {
   Quad row(int i, const float* x) const;
 };
 
-// V-cycles on the voxel hierarchy in single precision: Chebyshev over block Jacobi, Galerkin coarse levels,
+// Multigrid cycles on the voxel hierarchy in single precision: Chebyshev over block Jacobi, Galerkin coarse levels,
 // the coarsest by a dense inverse. Nodal fields hold four numbers per node.
 class Multigrid {
  public:
@@ -64,6 +64,7 @@ class Multigrid {
   void estimate(Level* level) const;
   void solveCoarsest(Level* level) const;
   void cycle(const Crew& crew, std::size_t l);
+  void pass(const Crew& crew, std::size_t l, const float* residual, bool z_is_zero);
   void smoothFirst(const Crew& crew, Level& level, const float* r, bool z_is_zero) const;
   void smoothSecond(const Crew& crew, Level& level, bool need_residual) const;
   template <class Work>

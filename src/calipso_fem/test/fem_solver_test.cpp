@@ -1,0 +1,173 @@
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "calipso_fem/deformable_body.hpp"
+#include "hex_solver.hpp"
+#include "thread_team.hpp"
+#include "threads.hpp"
+
+namespace calipso::fem {
+namespace {
+
+constexpr double kStep = 1.0 / 30.0;
+const Material kRubber{1e5, 0.4, 900.0, 0.0};
+
+enum class Cells { kFull, kCut, kSheared };
+
+// 324 nodes; cut: any filled fraction, spread anyhow over the cell.
+VolumeMesh makeMesh(Cells cells) {
+  VolumeMesh mesh = boxMesh({0, 0, 0}, {0.8, 0.5, 0.4}, {8, 5, 5});
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  if (cells == Cells::kCut) {
+    mesh.point_share.resize(mesh.cellCount(), 8);
+    for (int c = 0; c < mesh.cellCount(); ++c) {
+      mesh.fraction[c] = 0.1 + 0.9 * unit(random);
+      for (int q = 0; q < 8; ++q) mesh.point_share(c, q) = 0.2 + unit(random);
+      mesh.point_share.row(c) /= mesh.point_share.row(c).mean();
+    }
+  }
+  if (cells == Cells::kSheared)
+    for (int i = 0; i < mesh.nodeCount(); ++i)
+      for (int k = 0; k < 3; ++k) mesh.nodes(i, k) += 0.02 * unit(random);
+  return mesh;
+}
+
+Vec randomVector(Eigen::Index size, double amplitude, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> spread(-amplitude, amplitude);
+  Vec v(size);
+  for (double& value : v) value = spread(random);
+  return v;
+}
+
+class MatrixFree : public testing::TestWithParam<std::tuple<Cells, ElementType>> {};
+
+TEST_P(MatrixFree, ProductsEqualThoseOfTheAssembledTangent) {
+  const auto& [cells, element] = GetParam();
+  const ElasticModel model(makeMesh(cells), kRubber, MaterialModel::kStVenantKirchhoff, element);
+  ASSERT_NE(model.hexes(), nullptr);
+  const Vec x = restPositions(model.mesh()) + randomVector(model.dofCount(), 0.02, 3);
+  const Vec u = randomVector(model.dofCount(), 1.0, 4);
+  HexSolver solver(model.mesh(), *model.hexes());
+  for (const bool positive : {false, true}) {
+    BlockMatrix K;
+    model.hessian(x, positive ? Definiteness::kPositive : Definiteness::kExact, K);
+    HexEvaluation at;
+    model.hexes()->evaluate(x, true, positive, &at);
+    solver.setSystem(&at, HexSystem{}, model.lumpedMass(), {});
+    Vec expected, product;
+    K.multiply(u, expected);
+    solver.multiply(u, &product);
+    EXPECT_LT((product - expected).norm(), 1e-12 * expected.norm());   // round-off of 24 sums
+  }
+  BlockMatrix D;
+  model.viscosity(x, D);
+  HexEvaluation scratch;
+  Vec expected, product;
+  D.multiply(u, expected);
+  model.hexes()->multiplyMaterial(x, u, &scratch, &product);
+  EXPECT_LT((product - expected).norm(), 1e-12 * expected.norm());
+}
+
+TEST_P(MatrixFree, ForcesAreTheDerivativeOfTheEnergy) {
+  const auto& [cells, element] = GetParam();
+  const ElasticModel model(makeMesh(cells), kRubber, MaterialModel::kStVenantKirchhoff, element);
+  const Vec x = restPositions(model.mesh()) + randomVector(model.dofCount(), 0.02, 5);
+  const Vec u = randomVector(model.dofCount(), 1.0, 6);
+  Vec f;
+  model.gradient(x, f);
+  constexpr double kDelta = 1e-6;
+  const double slope = (model.energy(x + kDelta * u) - model.energy(x - kDelta * u)) / (2.0 * kDelta);
+  EXPECT_NEAR(slope, f.dot(u), 1e-6 * f.norm() * u.norm());   // second order in kDelta, and its rounding
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    AllCells, MatrixFree,
+    testing::Combine(testing::Values(Cells::kFull, Cells::kCut, Cells::kSheared),
+                     testing::Values(ElementType::kHexEnhanced, ElementType::kHexQ1)));
+
+// A body held at one end, pulled by a spring, damped, swinging.
+DeformableBody makeSwing(Cells cells, SolverKind solver, int threads) {
+  FemOptions options;
+  options.solver = solver;
+  options.threads = threads;
+  options.newton_tolerance = 1e-10;
+  options.linear_tolerance = 1e-10;
+  Material material = kRubber;
+  material.damping = 0.01;
+  DeformableBody body(makeMesh(cells), material, options);
+  for (int i = 0; i < body.nodeCount(); ++i)
+    if (body.model().mesh().lattice(i, 0) == 0) body.fixNode(i);
+  body.setGravity({0.0, 0.0, -9.81});
+  SoftConstraint spring;
+  spring.point = SurfacePoint::vertex(body.nodeCount() - 1);
+  spring.target = body.positions().tail<3>() + Eigen::Vector3d(0.0, 0.1, 0.1);
+  spring.stiffness = 500.0;
+  spring.damping = 1.0;
+  body.setSoftConstraints({spring});
+  return body;
+}
+
+TEST(Solver, MultigridGivesTheMotionOfADirectSolver) {
+  for (const Cells cells : {Cells::kFull, Cells::kCut, Cells::kSheared}) {
+    DeformableBody direct = makeSwing(cells, SolverKind::kCholesky, 2);
+    DeformableBody multigrid = makeSwing(cells, SolverKind::kMultigrid, 2);
+    for (int k = 0; k < 5; ++k) {
+      EXPECT_TRUE(direct.step(kStep).converged);
+      const StepReport report = multigrid.step(kStep);
+      EXPECT_TRUE(report.converged);
+      EXPECT_EQ(report.solver, "multigrid");
+    }
+    // Newton's tolerance, over five steps and the condition of the system.
+    EXPECT_LT((direct.positions() - multigrid.positions()).norm(), 1e-7);
+  }
+}
+
+TEST(Solver, SameBytesForAnyNumberOfThreads) {
+  for (const SolverKind solver : {SolverKind::kMultigrid, SolverKind::kJacobi}) {
+    Vec first;
+    for (const int threads : {1, 2, 3}) {
+      DeformableBody body = makeSwing(Cells::kCut, solver, threads);
+      for (int k = 0; k < 3; ++k) body.step(kStep);
+      if (threads == 1) first = body.positions();
+      EXPECT_TRUE(body.positions() == first) << threads << " threads";
+    }
+  }
+  setThreads(2);
+}
+
+TEST(Solver, MaterialChangeIsFollowed) {
+  DeformableBody changed = makeSwing(Cells::kFull, SolverKind::kMultigrid, 2);
+  changed.step(kStep);
+  changed.setMaterial({1e4, 0.3, 2000.0, 0.0});
+  changed.reset();
+  DeformableBody fresh(makeMesh(Cells::kFull), Material{1e4, 0.3, 2000.0, 0.0}, changed.options());
+  for (int i = 0; i < fresh.nodeCount(); ++i)
+    if (changed.isFixed(i)) fresh.fixNode(i);
+  fresh.setGravity({0.0, 0.0, -9.81});
+  changed.setSoftConstraints({});
+  changed.step(kStep);
+  fresh.step(kStep);
+  EXPECT_LT((changed.positions() - fresh.positions()).norm(), 1e-8);
+}
+
+TEST(ThreadTeam, EveryShareIsWorkedOnOnceAndBarriersHold) {
+  setThreads(2);
+  constexpr int kCount = 1000;
+  for (int round = 0; round < 200; ++round) {
+    std::vector<int> value(kCount, 0), sum(kCount, 0);
+    runParallel([&](const Crew& crew) {
+      const auto [begin, end] = crew.share(kCount, 64);
+      for (int k = begin; k < end; ++k) value[k] = k + round;
+      crew.barrier();
+      // What the other thread has written is there.
+      for (int k = begin; k < end; ++k) sum[k] += value[k] + value[kCount - 1 - k];
+    });
+    for (int k = 0; k < kCount; ++k) ASSERT_EQ(sum[k], kCount - 1 + 2 * round);
+  }
+}
+
+}  // namespace
+}  // namespace calipso::fem
