@@ -1,6 +1,5 @@
 #include "calipso_fem/deformable_body.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -43,17 +42,12 @@ VolumeMesh withElement(VolumeMesh hexes, ElementType element) {
 // Called again when the material has changed.
 void DeformableBody::Impl::chooseSolver() {
   const VolumeMesh& mesh = model->mesh();
-  double least = 1e300, largest = 0.0;
-  for (const Material& m : model->cellMaterials()) {
-    least = std::min(least, m.youngs_modulus);
-    largest = std::max(largest, m.youngs_modulus);
-  }
   const bool automatic = options.solver == SolverKind::kAutomatic;
-  const double contrast = largest / least;
-  const SolverKind kind = automatic ? chooseSolverKind(mesh, contrast) : options.solver;
+  const std::vector<Material>& materials = model->cellMaterials();
+  const SolverKind kind = automatic ? chooseSolverKind(mesh, materials) : options.solver;
   if (!solver || solver->kind() != kind) solver = std::make_unique<LinearSolver>(mesh, kind);
-  const bool multigrid = options.solver == SolverKind::kMultigrid ||
-                         (automatic && contrast <= kMultigridContrast);
+  const bool multigrid =
+      options.solver == SolverKind::kMultigrid || (automatic && suitsMultigrid(materials));
   if (!multigrid || !model->hexes() || !options.lumped_mass ||
       mesh.nodeCount() < kMatrixFreeNodes || !HexSolver::fits(mesh))
     hex_solver.reset();

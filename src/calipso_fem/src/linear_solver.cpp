@@ -10,8 +10,9 @@ namespace {
 
 // Node counts up to which the choice was measured best; see the report.
 constexpr int kStaleCholeskyNodes = 1200;
-// Coarse grids see stiff and soft cells as one: beyond kMultigridContrast, a factor pays up to here.
-constexpr int kContrastCholeskyNodes = 20000;
+constexpr int kHardCholeskyNodes = 20000;         // where multigrid would need many iterations
+constexpr double kMultigridContrast = 1e3;         // largest over smallest Young's modulus
+constexpr double kMultigridPoisson = 0.495;
 
 std::unique_ptr<Preconditioner> makePreconditioner(const VolumeMesh& mesh, SolverKind kind) {
   switch (kind) {
@@ -28,8 +29,18 @@ constexpr int kStaleSlack = 4;
 
 }  // namespace
 
-SolverKind chooseSolverKind(const VolumeMesh& mesh, double contrast) {
-  const int most = contrast > kMultigridContrast ? kContrastCholeskyNodes : kStaleCholeskyNodes;
+bool suitsMultigrid(const std::vector<Material>& materials) {
+  double least = materials.front().youngs_modulus, largest = least, poisson = 0.0;
+  for (const Material& m : materials) {
+    least = std::min(least, m.youngs_modulus);
+    largest = std::max(largest, m.youngs_modulus);
+    poisson = std::max(poisson, m.poissons_ratio);
+  }
+  return largest <= kMultigridContrast * least && poisson <= kMultigridPoisson;
+}
+
+SolverKind chooseSolverKind(const VolumeMesh& mesh, const std::vector<Material>& materials) {
+  const int most = suitsMultigrid(materials) ? kStaleCholeskyNodes : kHardCholeskyNodes;
   if (mesh.nodeCount() <= most) return SolverKind::kStaleCholesky;
   return mesh.lattice.rows() > 0 ? SolverKind::kMultigrid : SolverKind::kIncompleteCholesky;
 }

@@ -1,15 +1,13 @@
 #pragma once
 
 #include <memory>
-#include <string>
+#include <vector>
 
 #include "calipso_fem/fem_options.hpp"
+#include "calipso_scene/material.hpp"
 #include "preconditioner.hpp"
 
 namespace calipso::fem {
-
-// Ratio of Young's moduli up to which multigrid is trusted.
-constexpr double kMultigridContrast = 1e3;
 
 struct SolveReport {
   bool positive = true;      // false: A has shown a direction of negative curvature
@@ -22,8 +20,11 @@ struct SolveReport {
 SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditioner, const Vec& b,
                                double tolerance, int most_iterations, Vec* x);
 
-// What automatic means for a mesh. contrast: largest over smallest Young's modulus of its cells
-SolverKind chooseSolverKind(const VolumeMesh& mesh, double contrast);
+// Whether coarse grids see what matters: not where stiff and soft cells lie side by side, nor where the material
+// hardly changes its volume.
+bool suitsMultigrid(const std::vector<Material>& materials);
+// What automatic means where every solver works on an assembled matrix.
+SolverKind chooseSolverKind(const VolumeMesh& mesh, const std::vector<Material>& materials);
 
 // Solves a sequence of slowly changing systems on one pattern; chooses and refreshes the
 // preconditioner.
