@@ -80,8 +80,8 @@ std::vector<double> StvkHexes::cellConstants(int cell, bool box) const {
   const double fraction = mesh_.fraction[cell];
   std::vector<double> c = {kind.lame.lambda, 2.0 * kind.lame.mu};
   for (int q = 0; q < 8; ++q) c.push_back(fraction * ref.weight[q]);
-  for (int i = 0; i < kModes; ++i)
-    for (int j = i; j < kModes; ++j)
+  for (int i = 0; i < 9; ++i)
+    for (int j = i; j < 9; ++j)
       c.push_back(enhanced_ ? kind.mode_stiffness_inverse(i, j) / fraction : 0.0);
   const CornerMatrix X = restCorners(mesh_, cell);
   if (box) {
