@@ -29,16 +29,18 @@ class Signal {
     wake_.notify_all();
   }
 
-  void waitPast(unsigned seen) {
+  // True when the wait was long enough to sleep.
+  bool waitPast(unsigned seen) {
     constexpr int kSpins = 1000;
     for (int k = 0; k < kSpins; ++k) {
-      if (value() != seen) return;
+      if (value() != seen) return false;
       pause();
     }
     std::unique_lock<std::mutex> lock(mutex_);
     sleepers_.fetch_add(1);
     wake_.wait(lock, [&] { return value_.load() != seen; });
     sleepers_.fetch_sub(1);
+    return true;
   }
 
  private:
@@ -52,14 +54,43 @@ class Barrier {
  public:
   void wait(int count) {
     const unsigned seen = passed_.value();
-    if (arrived_.fetch_add(1) + 1 < count) return passed_.waitPast(seen);
+    if (arrived_.fetch_add(1) + 1 < count) {
+      if (passed_.waitPast(seen)) slept_.fetch_add(1, std::memory_order_relaxed);
+      return;
+    }
     arrived_.store(0);
     passed_.advance();
   }
 
+  unsigned passed() const { return passed_.value(); }
+  unsigned slept() const { return slept_.load(std::memory_order_relaxed); }
+
  private:
   std::atomic<int> arrived_{0};
+  std::atomic<unsigned> slept_{0};
   Signal passed_;
+};
+
+// Where other processes keep the processors busy, threads wait for each other longer than they work: then the
+// caller works alone for a while, and tries again after ever more regions.
+class Concurrency {
+ public:
+  bool isWorthwhile() { return alone_ == 0 || --alone_ == 0; }
+
+  void judge(unsigned barriers, unsigned slept) {
+    constexpr unsigned kEnoughToJudge = 16;
+    constexpr int kFirstPause = 16, kLongestPause = 512;
+    if (barriers < kEnoughToJudge) return;
+    if (4 * slept <= barriers) {
+      pause_ = kFirstPause;
+      return;
+    }
+    alone_ = pause_;
+    pause_ = std::min(2 * pause_, kLongestPause);
+  }
+
+ private:
+  int alone_ = 0, pause_ = 16;
 };
 
 // The process's helper threads; started at first use, ended with the process.
@@ -73,7 +104,7 @@ class Team {
 
   bool tryRun(int count, const std::function<void(const Crew&)>& work) {
     std::unique_lock<std::mutex> lock(busy_, std::try_to_lock);
-    if (!lock.owns_lock()) return false;
+    if (!lock.owns_lock() || !concurrency_.isWorthwhile()) return false;
     while (static_cast<int>(threads_.size()) + 1 < count) {
       const int rank = static_cast<int>(threads_.size()) + 1;
       threads_.emplace_back([this, rank, seen = start_.value()] { serve(rank, seen); });
@@ -81,8 +112,10 @@ class Team {
     count_ = count;
     work_ = &work;
     start_.advance();
+    const unsigned passed = inner_.passed(), slept = inner_.slept();
     work(Crew(0, count));
     end_.wait(static_cast<int>(threads_.size()) + 1);
+    concurrency_.judge(inner_.passed() - passed, inner_.slept() - slept);
     return true;
   }
 
@@ -102,6 +135,7 @@ class Team {
   std::vector<std::thread> threads_;
   Signal start_;
   Barrier inner_, end_;
+  Concurrency concurrency_;
   int count_ = 1;
   const std::function<void(const Crew&)>* work_ = nullptr;
 };
