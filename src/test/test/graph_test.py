@@ -93,6 +93,21 @@ class Graph(unittest.TestCase):
         self.assertGreater(changed[90:190, 190:445].sum(), 300, "the banana's pixels")
         self.assertEqual(changed[:, :150].sum(), 0, "pixels far from it")
 
+    def test_slow_motion_has_more_frames_and_a_copy_is_an_object(self):
+        edits = [{"t": 0, "object": "banana1", "kind": "duplicate", "value": "twin", "translation": [0, -0.1, 0.1]},
+                 {"t": 0, "kind": "time_scale", "factor": 0.5}]
+        status, output = launching.run("calipso_launch", "edit.launch", **self.arguments("slow.bag", edits))
+        self.assertEqual(status, 0, output)
+        stamps = clips.stamps(self.path("slow.bag"), EDITED)
+        self.assertEqual(len(stamps), 2 * FRAMES - 1, output)
+        self.assertEqual(stamps[::2], clips.stamps(self.bag, clips.IMAGE_TOPIC))
+        state = clips.messages(self.path("slow.bag"), "/calipso/state")[-1]
+        self.assertEqual([(o.object, o.source) for o in state.objects][-1], ("twin", "banana1"))
+        before = picture(clips.messages(self.bag, clips.IMAGE_TOPIC)[-1])
+        after = picture(clips.messages(self.path("slow.bag"), EDITED)[-1])
+        changed = numpy.abs(before - after).max(axis=2) > 30.0  # far beyond the sensor noise
+        self.assertGreater(changed.sum(), 3000, "about the pixels of a banana")
+
     def test_edits_over_the_topic_while_playing(self):
         # Latched on the test's own master: there before the simulator is, effective with the next frame.
         sender = subprocess.Popen(["rostopic", "pub", "--latch", "/calipso/edits", "calipso_msgs/Edit",
