@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -58,26 +59,33 @@ class SpringForces {
   AlignedBuffer<Real> force_;
 };
 
-// The finest level of the multigrid, in single precision: the system's operator without its matrix. Products are
-// made in two halves inside a parallel region.
+// The finest level of the multigrid, in single precision: the system's operator without its matrix. Used inside
+// parallel regions.
 class HexLevel {
  public:
-  // First half of y = A x for this thread; complete after a barrier.
-  void prepareProduct(const Crew& crew, const float* x) {
-    const auto [begin, end] = crew.share(hexes->batchCount<float>());
-    hexKernel().multiplyFloat(hexes->batches<float>(), begin, end, this->x.data(), stress.data(), factor, x,
-                              slots.data());
-    if (crew.rank() == 0 && !springs_.empty()) springs_.apply(x);
-  }
-
-  // Second half: one row of y.
-  Quad productRow(int node, const float* x) const {
-    alignas(16) float sum[4];
-    hexes->sumSlots(slots.data(), node, sum);
-    const std::size_t at = 4 * static_cast<std::size_t>(node);
-    Quad y = loadQuad(sum) + splat(mass[node]) * loadQuad(x + at);
-    if (!springs_.empty()) y += loadQuad(springs_.at(node));
-    return y * loadQuad(free.data() + at);
+  // Calls work(node, row of A x) for nodes begin .. end of this thread; x is complete. A row is made as soon as
+  // its cells are done, while they are still in the cache.
+  template <class Work>
+  void product(const Crew& crew, const float* x, int begin, int end, const Work& work) {
+    constexpr int kBatches = 64, kLanes = kHexLanes<float>;
+    const auto [first, last] = crew.share(hexes->batchCount<float>());
+    const bool early = springs_.empty();
+    if (crew.rank() == 0 && !early) springs_.apply(x);
+    int from = begin;
+    while (from < end && hexes->firstPlace(from) < kLanes * first) ++from;
+    int next = from;
+    for (int batch = first; batch < last; batch += kBatches) {
+      const int stop = std::min(batch + kBatches, last);
+      hexKernel().multiplyFloat(hexes->batches<float>(), batch, stop, this->x.data(), stress.data(),
+                                factor, x, slots.data());
+      for (; early && next < end && hexes->firstPlace(next) >= kLanes * first &&
+             hexes->lastPlace(next) < kLanes * stop;
+           ++next)
+        work(next, row(next, x));
+    }
+    crew.barrier();
+    for (int i = begin; i < from; ++i) work(i, row(i, x));
+    for (int i = next; i < end; ++i) work(i, row(i, x));
   }
 
   void allocate(const StvkHexes& hexes);
@@ -90,6 +98,16 @@ class HexLevel {
   float factor = 1.0f;
 
  private:
+  // @pre the cells of the node are done
+  Quad row(int node, const float* x) const {
+    alignas(16) float sum[4];
+    hexes->sumSlots(slots.data(), node, sum);
+    const std::size_t at = 4 * static_cast<std::size_t>(node);
+    Quad y = loadQuad(sum) + splat(mass[node]) * loadQuad(x + at);
+    if (!springs_.empty()) y += loadQuad(springs_.at(node));
+    return y * loadQuad(free.data() + at);
+  }
+
   SpringForces<float> springs_;
 };
 

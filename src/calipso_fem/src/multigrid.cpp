@@ -201,17 +201,12 @@ void Multigrid::solveCoarsest(Level* level) const {
   }
 }
 
-// Calls work(node, row of A x) for this thread's nodes. @pre x is complete
+// Calls work(node, row of A x) for this thread's nodes, in any order. @pre x is complete
 template <class Work>
 void Multigrid::product(const Crew& crew, Level& level, const float* x, const Work& work) const {
   const auto [begin, end] = crew.share(level.nodes, kGrain);
-  if (level.fine) {
-    level.fine->prepareProduct(crew, x);
-    crew.barrier();
-    for (int i = begin; i < end; ++i) work(i, level.fine->productRow(i, x));
-  } else {
-    for (int i = begin; i < end; ++i) work(i, level.A.row(i, x));
-  }
+  if (level.fine) return level.fine->product(crew, x, begin, end, work);
+  for (int i = begin; i < end; ++i) work(i, level.A.row(i, x));
 }
 
 // Power iteration on D^-1 A; goes on from the vector of the last time.
@@ -232,10 +227,13 @@ void Multigrid::estimate(Level* level) const {
       product(crew, *level, x, [&](int i, Quad Ax) {
         const Quad y = splat(scale) * multiplyBlock(level->inverse.data() + 12 * static_cast<std::size_t>(i), Ax);
         storeQuad(level->e.data() + 4 * static_cast<std::size_t>(i), y);
-        double& norm = level->norms[i / kGrain];
-        if (i % kGrain == 0) norm = 0.0;
-        norm += static_cast<double>(y[0] * y[0] + y[1] * y[1] + y[2] * y[2]);
       });
+      for (int first = begin; first < end; first += kGrain) {
+        double norm = 0.0;
+        for (long k = 4L * first; k < 4L * std::min(first + kGrain, end); ++k)
+          norm += static_cast<double>(level->e[k] * level->e[k]);
+        level->norms[first / kGrain] = norm;
+      }
       crew.barrier();
       double sum = 0.0;
       for (int k = 0; k < blocks; ++k) sum += level->norms[k];

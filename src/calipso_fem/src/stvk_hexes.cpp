@@ -50,6 +50,14 @@ StvkHexes::StvkHexes(const VolumeMesh& mesh, const std::vector<ElementKind>& kin
   for (int cell = 0; cell < mesh.cellCount(); ++cell)
     for (int c = 0; c < 8; ++c) ++slot_start_[mesh.cells(cell, c) + 1];
   for (int i = 0; i < nodes_; ++i) slot_start_[i + 1] += slot_start_[i];
+  first_place_.assign(nodes_, static_cast<int>(order_.size()));
+  last_place_.assign(nodes_, -1);
+  for (int place = 0; place < static_cast<int>(order_.size()); ++place)
+    for (int c = 0; c < 8 && order_[place] >= 0; ++c) {
+      const int node = mesh.cells(order_[place], c);
+      first_place_[node] = std::min(first_place_[node], place);
+      last_place_[node] = std::max(last_place_[node], place);
+    }
   pack(&single_);
   pack(&double_);
 }

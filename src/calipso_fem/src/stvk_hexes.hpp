@@ -38,6 +38,10 @@ class StvkHexes {
   template <class Real>
   std::size_t slotNumbers() const { return 32 * order_.size(); }
 
+  // First and last place in order() of a node's cells.
+  int firstPlace(int node) const { return first_place_[node]; }
+  int lastPlace(int node) const { return last_place_[node]; }
+
   // Sum of a node's slots: y[0..3].
   template <class Real>
   void sumSlots(const Real* slots, int node, Real* y) const;
@@ -72,6 +76,7 @@ class StvkHexes {
   int boxes_ = 0;                 // cells of order_ that stand in batches of boxes
   bool enhanced_ = false;
   std::vector<int> order_;
+  std::vector<int> first_place_, last_place_;
   std::vector<int> slot_start_;
   Packed<float> single_;
   Packed<double> double_;
