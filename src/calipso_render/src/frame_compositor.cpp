@@ -28,8 +28,13 @@ cv::Vec3f FrameCompositor::shadowRatio(float sun, float sky) const {
 
 // How far a surface point of an edited object stays where the video shows it: 1 at rest, 0 moved.
 float FrameCompositor::stillness(std::uint32_t id, float u, float v) const {
+  if (observed_[VisibilityBuffer::objectOf(id)].points.empty()) return 0.0f;
+  return 1.0f - smoothStep(kStillPx, kMovedPx, movement(id, u, v).norm());
+}
+
+// How far from its place in the video a surface point is seen, px. @pre the video has its object at rest
+Eigen::Vector2f FrameCompositor::movement(std::uint32_t id, float u, float v) const {
   const int slot = VisibilityBuffer::objectOf(id), triangle = VisibilityBuffer::triangleOf(id);
-  if (observed_[slot].points.empty()) return 0.0f;
   const Actor& actor = actors_[slot];
   const Eigen::Vector3i& t = actor.surface->triangles[triangle];
   const Eigen::Vector3f w = barycentric(actor.screen, triangle, u, v);
@@ -37,7 +42,7 @@ float FrameCompositor::stillness(std::uint32_t id, float u, float v) const {
   for (int i = 0; i < 3; ++i) {
     moved += w[i] * (actor.screen.points[t[i]] - observed_[slot].points[t[i]]).head<2>();
   }
-  return 1.0f - smoothStep(kStillPx, kMovedPx, moved.norm());
+  return moved;
 }
 
 cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) const {
@@ -134,25 +139,35 @@ FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
   return {plate_.at<cv::Vec3f>(v, u), 1.0f, invented ? kInvented : kSeenElsewhere};
 }
 
-void FrameCompositor::composePixel(int u, int v, FrameOutput& out) const {
-  const float still = still_.at<float>(v - region_.y, u - region_.x);
+FrameCompositor::Composed FrameCompositor::composedAt(int u, int v) const {
   const Drawn drawn = drawnAt(u, v);
   const Behind behind = drawn.cover < 1.0f ? behindAt(u, v) : Behind{};
-  if (drawn.cover == 0.0f && behind.source == kOriginal) return;
+  return {drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour,
+          drawn.cover + (1.0f - drawn.cover) * behind.fresh, drawn.cover > 0.0f ? kRendered : behind.source};
+}
+
+void FrameCompositor::composePixel(int u, int v, FrameOutput& out) const {
+  const cv::Point at = cv::Point(u, v) - region_.tl();
+  Composed pixel = composedAt(u, v);
+  if (pixel.source == kOriginal) return;
   // Where the surface rests, the frame's own pixel is the best picture of it.
-  const bool original_here = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
-  const float keep = original_here || drawn.cover > 0.0f ? still : 0.0f;
+  const bool original_here = removed_.at<std::uint8_t>(at) != 0;
+  const float keep = original_here || pixel.source == kRendered ? still_.at<float>(at) : 0.0f;
   if (keep >= 0.999f) return;
-  cv::Vec3f colour = drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour;
-  colour = keep * linearPixel(frame_.bgr, u, v) + (1.0f - keep) * colour;
-  const float fresh = (1.0f - keep) * (drawn.cover + (1.0f - drawn.cover) * behind.fresh);
-  cv::Vec3b& pixel = out.bgr.at<cv::Vec3b>(v, u);
-  for (int c = 0; c < 3; ++c) {
-    float code = codeFromLinear(colour[c]);
-    if (params_.add_noise) code += fresh * prepared_.noise.deviation(c, code) * noise_.at(u, v, c);
-    pixel[c] = quantise(code);
+  if (!residual_.empty()) {
+    const cv::Vec4f& residual = residual_.at<cv::Vec4f>(at);
+    pixel.colour += cv::Vec3f(residual[0], residual[1], residual[2]);
+    pixel.fresh *= 1.0f - residual[3];
   }
-  out.provenance.at<std::uint8_t>(v, u) = drawn.cover > 0.0f ? kRendered : behind.source;
+  pixel.colour = keep * linearPixel(frame_.bgr, u, v) + (1.0f - keep) * pixel.colour;
+  pixel.fresh *= 1.0f - keep;
+  cv::Vec3b& code = out.bgr.at<cv::Vec3b>(v, u);
+  for (int c = 0; c < 3; ++c) {
+    float value = codeFromLinear(pixel.colour[c]);
+    if (params_.add_noise) value += pixel.fresh * prepared_.noise.deviation(c, value) * noise_.at(u, v, c);
+    code[c] = quantise(value);
+  }
+  out.provenance.at<std::uint8_t>(v, u) = pixel.source;
 }
 
 }  // namespace calipso::render

@@ -25,6 +25,12 @@ struct ShadowCache {
   cv::Rect shaded_box, bounds;         // of `shaded`; of all that the originals' shadows can reach
 };
 
+// Edited objects drawn where the video has them, which stays the same while the same ones are edited.
+struct RestPicture {
+  std::vector<bool> edited;
+  cv::Mat picture;  // CV_32FC3, linear; negative where nothing was drawn
+};
+
 constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
 
 inline float smoothStep(float from, float to, float x) {
@@ -40,7 +46,8 @@ std::uint8_t changeOfLight(float before, float now);
 // One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.
 class FrameCompositor {
  public:
-  FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame, ShadowCache& shadows);
+  FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame, ShadowCache& shadows,
+                  RestPicture& rest);
 
   FrameOutput run();
 
@@ -58,7 +65,21 @@ class FrameCompositor {
   };
 
   Light lightOf(const FrameInput& frame) const;
+  // A pixel of the result.
+  struct Composed {
+    cv::Vec3f colour;     // linear
+    float fresh = 0.0f;   // part of it that carries no camera noise yet
+    Provenance source = kOriginal;
+  };
+
+  void prepareFrame();
   void stage();
+  void findResidual();
+  void findOwners(const std::vector<bool>& resting);
+  cv::Vec4f residualAt(float u, float v, int owner) const;
+  static cv::Mat restPicture(const Prepared& prepared, const RenderParams& params, const std::vector<bool>& edited);
+  Composed composedAt(int u, int v) const;
+  Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool restsAt(int surface) const;
   void prepareShadows();
   void cacheOriginals(const std::vector<Occluder>& originals);
@@ -97,6 +118,7 @@ class FrameCompositor {
   const FrameInput& frame_;
   ShadowCache& shadows_;
   const Light light_;  // of this frame; what the video shows was lit by Prepared::light
+  RestPicture& rest_;
 
   std::vector<cv::Mat> footprints_;   // Prepared::footprints, likewise
   std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame
@@ -127,6 +149,8 @@ class FrameCompositor {
   std::vector<SunSquare> sun_squares_;
   int sun_columns_ = 0;
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
+  cv::Mat owners_;    // CV_16SC1 over region_: edited surface to whose surroundings the video's pixel belongs
+  cv::Mat residual_;  // CV_32FC4 over region_: what drawing misses, linear, and how much of the pixel that speaks for; may be empty
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;
   Eigen::Vector3f eye_;

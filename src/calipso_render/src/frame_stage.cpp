@@ -19,20 +19,31 @@ constexpr float kQuiet = 5.0f;         // code values of spread over time: the b
 }  // namespace
 
 FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame,
-                                 ShadowCache& shadows)
-    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), light_(lightOf(frame)),
+                                 ShadowCache& shadows, RestPicture& rest)
+    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), rest_(rest), light_(lightOf(frame)),
       labels_(frame.labels.empty() ? prepared.key_labels : frame.labels), eye_(frame.camera.world_from_camera.translation().cast<float>()),
       plane_view_(params.planes, frame.camera), noise_(frame.stamp_ns) {
   if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");
 }
 
 FrameOutput FrameCompositor::run() {
+  prepareFrame();
+  FrameOutput out{frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
+  if (region_.empty()) return out;
+  findResidual();
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = region_.y; v < region_.y + region_.height; ++v) {
+    for (int u = region_.x; u < region_.x + region_.width; ++u) composePixel(u, v, out);
+  }
+  return out;
+}
+
+void FrameCompositor::prepareFrame() {
   stage();
   prepareShadows();
   findPassingShadows();
   chooseRegion();
-  FrameOutput out{frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
-  if (region_.empty()) return out;
+  if (region_.empty()) return;
   findRemoved();
   drawVisibility();
   findStill();
@@ -41,11 +52,6 @@ FrameOutput FrameCompositor::run() {
   measureSun();
   findRelit();
   findSurfaceSun();
-#pragma omp parallel for schedule(dynamic, 8)
-  for (int v = region_.y; v < region_.y + region_.height; ++v) {
-    for (int u = region_.x; u < region_.x + region_.width; ++u) composePixel(u, v, out);
-  }
-  return out;
 }
 
 Light FrameCompositor::lightOf(const FrameInput& frame) const {

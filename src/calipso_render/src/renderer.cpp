@@ -8,7 +8,7 @@
 namespace calipso::render {
 
 Renderer::Renderer(std::shared_ptr<const Prepared> prepared, const RenderParams& params)
-    : prepared_(std::move(prepared)), params_(params), shadows_(std::make_unique<ShadowCache>()) {}
+    : prepared_(std::move(prepared)), params_(params), shadows_(std::make_unique<ShadowCache>()), rest_(std::make_unique<RestPicture>()) {}
 
 Renderer::~Renderer() = default;
 
@@ -48,7 +48,7 @@ FrameOutput Renderer::composite(const FrameInput& frame) {
                                 std::to_string(expected.height) + "; play both at one size");
   }
   addCopies(frame);
-  return FrameCompositor(*prepared_, params_, frame, *shadows_).run();
+  return FrameCompositor(*prepared_, params_, frame, *shadows_, *rest_).run();
 }
 
 }  // namespace calipso::render

@@ -68,6 +68,7 @@ struct RenderParams {
   BackgroundParams background;
   double sun_radius = 0.025;    // rad; the angular radius of the sun's disc with its glare
   bool add_noise = true;        // on rendered and invented pixels
+  bool carry_residual = true;   // what drawing misses goes along with what moves little
   bool keep_still = true;       // what an edit does not move keeps the frame's own pixels
 };
 
@@ -93,6 +94,7 @@ struct Prepared {
 Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models, const RenderParams& params);
 
 struct ShadowCache;
+struct RestPicture;
 
 // Draws edited frames. Every frame's result depends on that frame alone. Not thread-safe: shadow maps
 // of objects that rest, and the models of copies, are kept from frame to frame.
@@ -110,6 +112,7 @@ class Renderer {
   std::shared_ptr<const Prepared> prepared_;
   RenderParams params_;
   std::unique_ptr<ShadowCache> shadows_;
+  std::unique_ptr<RestPicture> rest_;
 };
 
 }  // namespace calipso::render
