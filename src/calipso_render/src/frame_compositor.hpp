@@ -28,7 +28,9 @@ struct ShadowCache {
 // Edited objects drawn where the video has them, which stays the same while the same ones are edited.
 struct RestPicture {
   std::vector<bool> edited;
-  cv::Mat picture;  // CV_32FC3, linear; negative where nothing was drawn
+  cv::Mat drawn;    // CV_32FC3: what they add to a pixel, linear; negative where the video does not show them
+  cv::Mat passing;  // CV_32FC3: part of the background's light that passes beside them
+  cv::Mat owners;   // CV_16SC1: surface that is seen there, or nearest; -1 = none
 };
 
 constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
@@ -75,9 +77,8 @@ class FrameCompositor {
   void prepareFrame();
   void stage();
   void findResidual();
-  void findOwners(const std::vector<bool>& resting);
   cv::Vec4f residualAt(float u, float v, int owner) const;
-  static cv::Mat restPicture(const Prepared& prepared, const RenderParams& params, const std::vector<bool>& edited);
+  static RestPicture restPicture(const Prepared& prepared, const RenderParams& params, const std::vector<bool>& edited);
   Composed composedAt(int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool restsAt(int surface) const;
@@ -149,7 +150,6 @@ class FrameCompositor {
   std::vector<SunSquare> sun_squares_;
   int sun_columns_ = 0;
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
-  cv::Mat owners_;    // CV_16SC1 over region_: edited surface to whose surroundings the video's pixel belongs
   cv::Mat residual_;  // CV_32FC4 over region_: what drawing misses, linear, and how much of the pixel that speaks for; may be empty
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;
