@@ -20,7 +20,7 @@ constexpr float kQuiet = 5.0f;         // code values of spread over time: the b
 
 FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame,
                                  ShadowCache& shadows, RestPicture& rest)
-    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), rest_(rest), light_(lightOf(frame)),
+    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), light_(lightOf(frame)), rest_(rest),
       labels_(frame.labels.empty() ? prepared.key_labels : frame.labels), eye_(frame.camera.world_from_camera.translation().cast<float>()),
       plane_view_(params.planes, frame.camera), noise_(frame.stamp_ns) {
   if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");

@@ -76,7 +76,7 @@ class Evaluation {
   // Frame k with every object in the state that `change` gives it.
   template <typename Change>
   FrameInput frame(int k, Change change) const {
-    FrameInput in{loadFrame(scene_, k), loadLabels(scene_, k), scene_.camera, static_cast<std::int64_t>(1e9 * k / scene_.fps), {}};
+    FrameInput in{loadFrame(scene_, k), loadLabels(scene_, k), scene_.camera, static_cast<std::int64_t>(1e9 * k / scene_.fps), {}, {}};
     for (std::size_t i = 0; i < prepared_->surfaces.size(); ++i) {
       ObjectInFrame o;
       o.name = prepared_->surfaces[i].name;
