@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "calipso_align/depth_image.hpp"
 #include "calipso_align/silhouette.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
 
@@ -78,7 +79,8 @@ KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::M
 }
 
 KeyFrame segmentKeyFrame(const cv::Mat& image, const Scene& scene) {
-  Segmenter segmenter(image, segmentationTargets(scene));
+  const std::optional<DepthObservation> depth = loadDepth(scene);
+  Segmenter segmenter(image, segmentationTargets(scene), {}, depth ? cv::Mat(depth->depth) : cv::Mat());
   return segmentKeyFrame(image, segmenter, loadStrokes(scene));
 }
 

@@ -20,8 +20,9 @@ float squaredDistance(const cv::Vec3b& a, const cv::Vec3b& b) {
 class ExpansionMove {
  public:
   ExpansionMove(const cv::Mat& image, const cv::Mat& free, const std::vector<cv::Mat>& costs,
-                const SmoothnessParams& params)
+                const SmoothnessParams& params, const Relief* relief)
       : image_(image), free_(free), costs_(costs), params_(params),
+        relief_(relief && relief->registered ? relief : nullptr),
         beta_(params.contrast_scale > 0.0f ? params.contrast_scale : contrastScale(image, free)),
         node_(free.size(), CV_32S) {}
 
@@ -52,7 +53,11 @@ class ExpansionMove {
 
   float weight(int x, int y, int dx, int dy) const {
     const float d = squaredDistance(image_.at<cv::Vec3b>(y, x), image_.at<cv::Vec3b>(y + dy, x + dx));
-    const float similarity = params_.floor + (1.0f - params_.floor) * std::exp(-beta_ * d);
+    float similarity = params_.floor + (1.0f - params_.floor) * std::exp(-beta_ * d);
+    if (relief_) {
+      const float j = jump(*relief_, {x, y}, {dx, dy});
+      similarity *= std::exp(-params_.jump_scale * j * j);
+    }
     return params_.gamma * similarity * (dx != 0 && dy != 0 ? 0.70710678f : 1.0f);
   }
 
@@ -108,6 +113,7 @@ class ExpansionMove {
   const cv::Mat& free_;
   const std::vector<cv::Mat>& costs_;
   const SmoothnessParams params_;
+  const Relief* relief_;
   const float beta_;
   cv::Mat node_;
 };
@@ -127,8 +133,8 @@ float contrastScale(const cv::Mat& image, const cv::Mat& mask) {
 }
 
 void cutLabels(const cv::Mat& image, const cv::Mat& free, const std::vector<cv::Mat>& costs,
-               const SmoothnessParams& params, cv::Mat& labels) {
-  ExpansionMove move(image, free, costs, params);
+               const SmoothnessParams& params, cv::Mat& labels, const Relief* relief) {
+  ExpansionMove move(image, free, costs, params, relief);
   const int label_count = static_cast<int>(costs.size());
   // With two labels one move from "all background" is exact.
   if (label_count == 2) {

@@ -71,7 +71,7 @@ MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerPar
     object.mask = labels == label;
     object.reference_mean = previous_means_;
     object.key_area = cv::countNonZero(object.mask);
-    object.colours = ColourModel::fit(coloursUnder(image, object.mask), params_.components);
+    object.colours = GaussianMixture::fit(coloursUnder(image, object.mask), params_.components);
     objects_.push_back(std::move(object));
   }
 }
@@ -195,7 +195,7 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& pr
     object.confidence = 0.0f;
     return;
   }
-  const ColourModel background = ColourModel::fit(surroundings, params_.components);
+  const GaussianMixture background = GaussianMixture::fit(surroundings, params_.components);
 
   std::vector<cv::Mat> costs = {cv::Mat::zeros(roi.size(), CV_32F), cv::Mat::zeros(roi.size(), CV_32F)};
   for (int y = 0; y < roi.height; ++y)

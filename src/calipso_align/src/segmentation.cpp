@@ -17,19 +17,24 @@ constexpr int kMinModelPixels = 20;
 }  // namespace
 
 Segmenter::Segmenter(const cv::Mat& image, std::vector<SegmentationTarget> targets,
-                     SegmenterParams params)
-    : image_(image), targets_(std::move(targets)), params_(params) {
-  checkPicture(image_);
-  checkTargets(targets_, image_.size());
-  const double share = static_cast<double>(params_.coarse_pixels) / image_.total();
-  coarse_ = makeLevel(image_, targets_, std::min(1.0, std::sqrt(share)));
-  fine_ = makeLevel(image_, targets_, 1.0);
+                     SegmenterParams params, const cv::Mat& depth)
+    : size_(image.size()), targets_(std::move(targets)), params_(params) {
+  checkPicture(image);
+  checkTargets(targets_, size_);
+  checkDepth(depth, size_);
+  const Relief relief = makeRelief(image, depth);
+  view_ = viewOf(targets_, size_);
+  image_ = image(view_);
+  const double share = static_cast<double>(params_.coarse_pixels) / view_.area();
+  coarse_ = makeLevel(image, targets_, relief, view_, std::min(1.0, std::sqrt(share)));
+  fine_ = makeLevel(image, targets_, relief, view_, 1.0);
 }
 
 const cv::Mat& Segmenter::segment(const cv::Mat& strokes) {
-  checkStrokes(strokes, targets_, image_.size());
-  setSeeds(targets_, strokes, coarse_);
-  setSeeds(targets_, strokes, fine_);
+  checkStrokes(strokes, targets_, size_);
+  const cv::Mat seen = strokes.empty() ? strokes : strokes(view_);
+  setSeeds(targets_, seen, coarse_);
+  setSeeds(targets_, seen, fine_);
   if (models_.empty() || strokesContradictModels())
     learn();
   else
@@ -49,12 +54,12 @@ void Segmenter::learn() {
   shapes_.assign(targets_.size(), std::nullopt);
   initialiseModels();
   for (int round = 0; round < params_.rounds; ++round) {
-    if (round > 0) refitModels();
     evaluate(coarse_);
     cut(freePixels(coarse_), coarse_);
+    refitColours();
     if (round < kPlacements) placeSilhouettes();
+    refitSurfaces(round == 0);
   }
-  refitModels();
   evaluate(coarse_);
   evaluate(fine_);
 }
@@ -62,31 +67,59 @@ void Segmenter::learn() {
 // From strokes and from what lies outside of the rectangles.
 void Segmenter::initialiseModels() {
   const cv::Mat outside = surroundings(coarse_) & (coarse_.region == 0) & (coarse_.seeds <= 1);
-  const std::vector<cv::Vec3f> background =
-      sampleColours(coarse_.image, outside | (coarse_.seeds == 1));
-  if (background.empty())
+  const cv::Mat background = outside | (coarse_.seeds == 1);
+  if (cv::countNonZero(background) == 0)
     throw std::invalid_argument(
         "segmentation: rectangles and strokes leave no background to learn from; draw smaller "
         "rectangles or a background stroke");
-  models_ = {ColourModel::fit(background, params_.components)};
+  models_.assign(targets_.size() + 1, {});
+  fitColours(coarse_, background, params_.components, models_[0]);
   for (size_t k = 0; k < targets_.size(); ++k) {
     cv::Mat own = coarse_.seeds == static_cast<int>(k + 2);
     if (cv::countNonZero(own) < kMinModelPixels) own |= coarse_.allowed[k] & (coarse_.seeds == 0);
-    const std::vector<cv::Vec3f> colours = sampleColours(coarse_.image, own);
-    if (colours.empty()) {
+    if (cv::countNonZero(own) == 0) {
       models_.clear();
       failWithoutForeground(targets_[k]);
     }
-    models_.push_back(ColourModel::fit(colours, params_.components));
+    fitColours(coarse_, own, params_.components, models_[k + 1]);
   }
 }
 
-void Segmenter::refitModels() {
+void Segmenter::refitColours() {
   const cv::Mat near = surroundings(coarse_);
   for (size_t k = 0; k < models_.size(); ++k) {
     const cv::Mat own = (coarse_.labels == static_cast<int>(k)) & near;
     if (cv::countNonZero(own) >= kMinModelPixels)
-      models_[k] = ColourModel::fit(sampleColours(coarse_.image, own), params_.components);
+      fitColours(coarse_, own, params_.components, models_[k]);
+  }
+}
+
+// Colours alone may have given parts of an object to the background and the reverse. With `certain`
+// surfaces are learnt from what is background without doubt and from what the silhouettes confirm;
+// without it from all there is, once surfaces have had their say.
+cv::Mat Segmenter::certainPixels(size_t k) const {
+  const cv::Size size = coarse_.image.size();
+  const cv::Mat marked = coarse_.seeds == static_cast<int>(k + 1);
+  if (k > 0)
+    return shapes_[k - 1] ? cv::Mat(marked | (placedSilhouette(k - 1, size) > 127))
+                          : cv::Mat(size, CV_8U, cv::Scalar(255));
+  cv::Mat clear(size, CV_8U, cv::Scalar(255));
+  const int margin = static_cast<int>(0.5 * params_.shape_tolerance * size.width);
+  for (size_t j = 0; j < targets_.size(); ++j)
+    clear.setTo(0, shapes_[j] ? grown(placedSilhouette(j, size) > 127, margin) : coarse_.allowed[j]);
+  return clear | marked;
+}
+
+void Segmenter::refitSurfaces(bool certain) {
+  if (coarse_.relief.empty()) return;
+  const cv::Mat near = surroundings(coarse_);
+  const double area = cv::countNonZero(coarse_.region);
+  for (size_t k = 0; k < models_.size(); ++k) {
+    cv::Mat own = (coarse_.labels == static_cast<int>(k)) & near;
+    const double share = cv::countNonZero(own & coarse_.region) / area;
+    if (certain) own &= certainPixels(k);
+    if (cv::countNonZero(own) >= kMinModelPixels)
+      models_[k].surfaces = SurfaceModel::fit(coarse_.relief, own, share, params_.surfaces);
   }
 }
 
@@ -122,7 +155,6 @@ cv::Mat Segmenter::evidence(size_t k) const {
 }
 
 void Segmenter::placeSilhouettes() {
-  refitModels();
   evaluateCosts(models_, params_.outlier_cost, coarse_);
   const double factor = static_cast<double>(image_.cols) / coarse_.image.cols;
   for (size_t k = 0; k < targets_.size(); ++k) {
@@ -130,11 +162,19 @@ void Segmenter::placeSilhouettes() {
     if (full.empty() || cv::countNonZero(full) == 0) continue;
     cv::Mat silhouette;
     cv::resize(full, silhouette, cv::Size(), 1.0 / factor, 1.0 / factor, cv::INTER_AREA);
-    const cv::Matx23d start(1, 0, -0.5 * (full.cols - image_.cols),  //
-                            0, 1, -0.5 * (full.rows - image_.rows));
+    const cv::Matx23d start(1, 0, -0.5 * (full.cols - size_.width) - view_.x,  //
+                            0, 1, -0.5 * (full.rows - size_.height) - view_.y);
     shapes_[k] = placeSilhouette(silhouette, evidence(k), scaled(start, 1.0 / factor));
     shapes_[k]->map = scaled(shapes_[k]->map, factor);
   }
+}
+
+// Target k's silhouette where it was placed, in a picture of another size.
+cv::Mat Segmenter::placedSilhouette(size_t k, const cv::Size& size) const {
+  cv::Mat placed, resized;
+  cv::warpAffine(targets_[k].silhouette, placed, shapes_[k]->map, image_.size());
+  cv::resize(placed, resized, size, 0, 0, cv::INTER_AREA);
+  return resized;
 }
 
 // A silhouette that does not fit what the colours say has no say.
@@ -144,12 +184,10 @@ void Segmenter::addShapeOdds(SegmentationLevel& level) const {
     if (!shapes_[k]) continue;
     const double trust = std::clamp(
         (shapes_[k]->agreement - kNoAgreement) / (kFullAgreement - kNoAgreement), 0.0, 1.0);
-    cv::Mat placed, resized;
-    cv::warpAffine(targets_[k].silhouette, placed, shapes_[k]->map, image_.size());
-    cv::resize(placed, resized, level.image.size(), 0, 0, cv::INTER_AREA);
     level.costs[k + 1] -=
-        shapeOdds(resized > 127, static_cast<float>(trust * params_.shape_weight),
-                  params_.shape_tolerance * static_cast<float>(level.image.cols));
+        shapeOdds(placedSilhouette(k, level.image.size()) > 127, static_cast<float>(trust * params_.shape_weight),
+                  params_.shape_tolerance * static_cast<float>(size_.width) * static_cast<float>(level.image.cols) /
+                      static_cast<float>(image_.cols));
   }
 }
 
@@ -161,7 +199,9 @@ void Segmenter::evaluate(SegmentationLevel& level) const {
 void Segmenter::cut(const cv::Mat& free, SegmentationLevel& level) const {
   SmoothnessParams smoothness = params_.smoothness;
   smoothness.contrast_scale = level.contrast_scale;
-  cutLabels(level.image, free, level.costs, smoothness, level.labels);
+  smoothness.jump_scale = level.jump_scale;
+  cutLabels(level.image, free, level.costs, smoothness, level.labels,
+            level.relief.empty() ? nullptr : &level.relief);
 }
 
 // Settles on the full picture what the coarse one leaves open.
@@ -175,11 +215,11 @@ void Segmenter::cutFine() {
 }
 
 void Segmenter::adoptLabels() {
-  labels_ = cv::Mat::zeros(image_.size(), CV_8U);
+  labels_ = cv::Mat::zeros(size_, CV_8U);
   for (size_t k = 0; k < targets_.size(); ++k) {
     const cv::Mat own = fine_.labels == static_cast<int>(k + 1);
     if (cv::countNonZero(own) == 0) failWithoutForeground(targets_[k]);
-    labels_.setTo(targets_[k].label, own);
+    labels_(view_).setTo(targets_[k].label, own);
   }
 }
 

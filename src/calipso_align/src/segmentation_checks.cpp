@@ -35,6 +35,13 @@ void checkPicture(const cv::Mat& image) {
         "; give 8 bit BGR");
 }
 
+void checkDepth(const cv::Mat& depth, const cv::Size& size) {
+  if (!depth.empty() && (depth.type() != CV_32F || depth.size() != size))
+    throw std::invalid_argument("depth: the image is " + sizeText(depth.size()) +
+                                " of OpenCV type " + std::to_string(depth.type()) +
+                                "; give CV_32F metres of the picture's size, " + sizeText(size));
+}
+
 void checkTargets(const std::vector<SegmentationTarget>& targets, const cv::Size& size) {
   if (targets.empty())
     throw std::invalid_argument("segmentation: no object to look for; list at least one");

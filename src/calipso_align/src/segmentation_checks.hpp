@@ -9,6 +9,7 @@ namespace calipso::align {
 
 // All throw std::invalid_argument naming the object, the value and the remedy.
 void checkPicture(const cv::Mat& image);
+void checkDepth(const cv::Mat& depth, const cv::Size& size);
 void checkTargets(const std::vector<SegmentationTarget>& targets, const cv::Size& size);
 void checkStrokes(const cv::Mat& strokes, const std::vector<SegmentationTarget>& targets,
                   const cv::Size& size);

@@ -9,16 +9,10 @@
 namespace calipso::align {
 namespace {
 
-constexpr size_t kMaxSamples = 12000;
-constexpr double kSurroundings = 0.1;  // of the picture's width: what counts as near an object
+constexpr size_t kMaxSamples = 4000;
 
-cv::Mat grown(const cv::Mat& mask, int px) {
-  const cv::Mat square =
-      cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1));
-  cv::Mat result;
-  cv::dilate(mask, result, square);
-  return result;
-}
+// What counts as near an object, px.
+int nearReach(int picture_width) { return std::max(3, picture_width / 10); }
 
 cv::Mat allowedRegion(const SegmentationTarget& target, const cv::Size& size) {
   cv::Mat allowed(size, CV_8U, cv::Scalar(target.rect.empty() ? 255 : 0));
@@ -37,24 +31,64 @@ cv::Mat resized(const cv::Mat& mask, const cv::Size& size) {
   return result;
 }
 
+// Strokes in a smaller picture, where a line of one pixel must not get lost: of the marks that fall
+// into a pixel the first counts.
+cv::Mat thinnedOut(const cv::Mat& strokes, const cv::Size& size) {
+  if (strokes.size() == size) return strokes;
+  cv::Mat marks = cv::Mat::zeros(size, CV_8U);
+  for (int y = 0; y < strokes.rows; ++y)
+    for (int x = 0; x < strokes.cols; ++x) {
+      const uchar mark = strokes.at<uchar>(y, x);
+      if (mark == 0) continue;
+      uchar& cell = marks.at<uchar>(y * size.height / strokes.rows, x * size.width / strokes.cols);
+      if (cell == 0) cell = mark;
+    }
+  return marks;
+}
+
 }  // namespace
 
+cv::Mat grown(const cv::Mat& mask, int px) {
+  const cv::Mat square =
+      cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1));
+  cv::Mat result;
+  cv::dilate(mask, result, square);
+  return result;
+}
+
+cv::Rect viewOf(const std::vector<SegmentationTarget>& targets, const cv::Size& size) {
+  const cv::Rect whole(cv::Point(), size);
+  cv::Rect view;
+  for (const SegmentationTarget& target : targets) {
+    cv::Rect place = target.rect.empty() ? whole : target.rect & whole;
+    if (!target.lasso.empty()) place &= cv::boundingRect(target.lasso);
+    view |= place;
+  }
+  const int margin = nearReach(size.width);
+  return cv::Rect(view.x - margin, view.y - margin, view.width + 2 * margin,
+                  view.height + 2 * margin) & whole;
+}
+
 SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<SegmentationTarget>& targets,
-                            double scale) {
+                            const Relief& relief, const cv::Rect& view, double scale) {
   SegmentationLevel level;
-  const cv::Size size(static_cast<int>(std::lround(image.cols * scale)),
-                      static_cast<int>(std::lround(image.rows * scale)));
-  if (size == image.size())
-    level.image = image;
+  const cv::Size size(static_cast<int>(std::lround(view.width * scale)),
+                      static_cast<int>(std::lround(view.height * scale)));
+  level.near_px = std::max(3, static_cast<int>(scale * nearReach(image.cols)));
+  if (size == view.size())
+    level.image = image(view);
   else
-    cv::resize(image, level.image, size, 0, 0, cv::INTER_AREA);
+    cv::resize(image(view), level.image, size, 0, 0, cv::INTER_NEAREST);
   level.region = cv::Mat::zeros(size, CV_8U);
   for (const SegmentationTarget& target : targets) {
-    level.allowed.push_back(resized(allowedRegion(target, image.size()), size));
+    level.allowed.push_back(resized(allowedRegion(target, image.size())(view), size));
     level.region |= level.allowed.back();
   }
   level.contrast_scale = contrastScale(level.image, level.region);
   level.labels = cv::Mat::zeros(size, CV_8U);
+  level.relief = resized(relief, view, size);
+  const float mean = relief.empty() ? 0.0f : meanJump(level.relief, level.region);
+  level.jump_scale = mean > 0.0f ? 0.5f / (mean * mean) : 0.0f;
   return level;
 }
 
@@ -62,7 +96,7 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
               SegmentationLevel& level) {
   level.seeds = cv::Mat::zeros(level.image.size(), CV_8U);
   if (strokes.empty()) return;
-  const cv::Mat marks = resized(strokes, level.image.size());
+  const cv::Mat marks = thinnedOut(strokes, level.image.size());
   level.seeds.setTo(1, marks == kBackgroundStroke);
   level.labels.setTo(0, marks == kBackgroundStroke);
   for (size_t k = 0; k < targets.size(); ++k) {
@@ -72,7 +106,23 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
   }
 }
 
-void evaluateCosts(const std::vector<ColourModel>& models, float outlier_cost,
+void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int components,
+                LabelModel& model) {
+  const auto fit = [&](const cv::Mat& part) -> std::optional<GaussianMixture> {
+    const std::vector<cv::Vec3f> samples = sampleColours(level.image, part);
+    if (samples.empty()) return std::nullopt;
+    return GaussianMixture::fit(samples, components);
+  };
+  if (!level.relief.registered) {
+    model.colours = fit(mask);
+    return;
+  }
+  const cv::Mat open = level.relief.state == Relief::kNone;
+  model.colours = fit(mask & ~open);
+  model.open_colours = fit(mask & open);
+}
+
+void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
                    SegmentationLevel& level) {
   level.costs.resize(models.size());
   for (size_t k = 0; k < models.size(); ++k) {
@@ -82,9 +132,18 @@ void evaluateCosts(const std::vector<ColourModel>& models, float outlier_cost,
 #pragma omp parallel for schedule(static)
     for (int y = 0; y < cost.rows; ++y)
       for (int x = 0; x < cost.cols; ++x)
-        if (allowed.at<uchar>(y, x))
-          cost.at<float>(y, x) =
-              std::min(outlier_cost, models[k].cost(cv::Vec3f(level.image.at<cv::Vec3b>(y, x))));
+        if (allowed.at<uchar>(y, x)) {
+          const bool open =
+              level.relief.registered && level.relief.state.at<uchar>(y, x) == Relief::kNone;
+          const std::optional<GaussianMixture>& colours =
+              open ? models[k].open_colours : models[k].colours;
+          cost.at<float>(y, x) = outlier_cost;
+          if (colours)
+            cost.at<float>(y, x) = std::min(
+                outlier_cost, colours->cost(cv::Vec3f(level.image.at<cv::Vec3b>(y, x))));
+          if (models[k].surfaces)
+            cost.at<float>(y, x) += models[k].surfaces->cost(level.relief, x, y);
+        }
   }
 }
 
@@ -118,7 +177,7 @@ std::vector<cv::Vec3f> sampleColours(const cv::Mat& image, const cv::Mat& mask) 
 }
 
 cv::Mat surroundings(const SegmentationLevel& level) {
-  return grown(level.region, std::max(3, static_cast<int>(kSurroundings * level.image.cols)));
+  return grown(level.region, level.near_px);
 }
 
 }  // namespace calipso::align

@@ -5,7 +5,7 @@
 #include <opencv2/video/tracking.hpp>
 #include <vector>
 
-#include "calipso_align/colour_model.hpp"
+#include "calipso_align/gaussian_mixture.hpp"
 #include "calipso_align/label_cut.hpp"
 
 namespace calipso::align {
@@ -45,7 +45,7 @@ class MaskTracker {
  private:
   struct Object {
     int label = 0;
-    ColourModel colours;
+    GaussianMixture colours;
     cv::Mat mask;            // CV_8U, the whole picture
     cv::Mat reference_mean;  // 4 x 4 px means of the frame in which `mask` was found
     double key_area = 0.0;   // px

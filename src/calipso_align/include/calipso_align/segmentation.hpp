@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "calipso_align/colour_model.hpp"
+#include "calipso_align/gaussian_mixture.hpp"
 #include "calipso_align/label_cut.hpp"
 #include "calipso_align/segmentation_level.hpp"
 #include "calipso_align/shape_prior.hpp"
@@ -13,8 +13,9 @@ namespace calipso::align {
 
 struct SegmenterParams {
   int components = 6;             // Gaussians per colour model
+  int surfaces = 12;              // Gaussians per model of surfaces
   int rounds = 4;                 // of colour model and cut on the coarse picture
-  int coarse_pixels = 40000;      // the coarse picture has at most about this many
+  int coarse_pixels = 40000;      // the coarse view has at most about this many
   int band_px = 2;                // half width of the band around the coarse boundary, coarse pixels
   float outlier_cost = 18.0f;     // nats; cost of a colour that a model does not know
   float shape_weight = 4.0f;      // nats; the most that a silhouette says about a pixel
@@ -27,10 +28,11 @@ struct SegmenterParams {
 // are kept between calls, so that a further stroke costs two cuts only. One thread at a time.
 class Segmenter {
  public:
-  // image: CV_8UC3 BGR, kept by reference count.
+  // image: CV_8UC3 BGR, kept by reference count; depth: CV_32F, m, 0 unknown, of the same size, or
+  // empty.
   // @throw std::invalid_argument naming the target, the value and the remedy
   Segmenter(const cv::Mat& image, std::vector<SegmentationTarget> targets,
-            SegmenterParams params = {});
+            SegmenterParams params = {}, const cv::Mat& depth = {});
 
   // Segments with these strokes (CV_8U, the picture's size, or empty for none): all of them, not
   // only the new ones. Returns CV_8U: 0 none, else the object's label. The first call learns the
@@ -45,22 +47,27 @@ class Segmenter {
  private:
   void learn();
   void initialiseModels();
-  void refitModels();
+  void refitColours();
+  cv::Mat certainPixels(size_t k) const;
+  void refitSurfaces(bool certain);
   bool strokesContradictModels() const;
   cv::Mat evidence(size_t k) const;
   void placeSilhouettes();
+  cv::Mat placedSilhouette(size_t k, const cv::Size& size) const;
   void addShapeOdds(SegmentationLevel& level) const;
   void evaluate(SegmentationLevel& level) const;
   void cut(const cv::Mat& free, SegmentationLevel& level) const;
   void cutFine();
   void adoptLabels();
 
-  cv::Mat image_;
+  cv::Size size_;          // of the picture
+  cv::Rect view_;          // what matters of it: where targets may lie and what is near
+  cv::Mat image_;          // the view
   std::vector<SegmentationTarget> targets_;
   SegmenterParams params_;
   SegmentationLevel coarse_, fine_;
-  std::vector<ColourModel> models_;                 // per label number; empty before the first call
-  std::vector<std::optional<PlacedShape>> shapes_;  // per target, in pixels of image_
+  std::vector<LabelModel> models_;                  // per label number; empty before the first call
+  std::vector<std::optional<PlacedShape>> shapes_;  // per target, in pixels of the view
   cv::Mat labels_;
 };
 

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "calipso_align/colour_model.hpp"
+#include "calipso_align/gaussian_mixture.hpp"
+#include "calipso_align/relief.hpp"
 
 namespace calipso::align {
 
@@ -28,22 +29,40 @@ struct SegmentationLevel {
   cv::Mat image;                 // CV_8UC3
   std::vector<cv::Mat> allowed;  // CV_8U per target: where it may lie
   cv::Mat region;                // CV_8U: where any target may lie
+  int near_px = 3;               // what is this close to the region counts as its surroundings
   cv::Mat seeds;                 // CV_8U: label number + 1 where a stroke says so, else 0
   cv::Mat labels;                // CV_8U: label numbers
   std::vector<cv::Mat> costs;    // CV_32F per label number, nats
   float contrast_scale = 0.0f;   // beta of label_cut.hpp over the region
+  Relief relief;                 // empty without a depth image
+  float jump_scale = 0.0f;       // of label_cut.hpp over the region
 };
 
-// scale: of the level's picture to `image`, at most 1.
-SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<SegmentationTarget>& targets,
-                            double scale);
+// Where the targets may lie in a picture and what is near.
+cv::Rect viewOf(const std::vector<SegmentationTarget>& targets, const cv::Size& size);
 
-// Takes the strokes (CV_8U of the full picture's size, or empty) over into seeds and labels.
+// Takes part `view` of the picture. scale: of the level's picture to the view, at most 1; relief: of
+// the picture, or empty.
+SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<SegmentationTarget>& targets,
+                            const Relief& relief, const cv::Rect& view, double scale);
+
+// Takes the strokes (CV_8U of the view, or empty) over into seeds and labels.
 void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& strokes,
               SegmentationLevel& level);
 
-// Colour costs of every label number, at most `outlier_cost`, kForbidden where a label may not be.
-void evaluateCosts(const std::vector<ColourModel>& models, float outlier_cost,
+// What a label looks like, and where its surfaces lie once that is known.
+struct LabelModel {
+  std::optional<GaussianMixture> colours;       // all of them, or of surfaces where a relief tells them
+  std::optional<GaussianMixture> open_colours;  // where a registered relief has no surface: sky
+  std::optional<SurfaceModel> surfaces;
+};
+
+// Colours of the pixels under a mask; where a registered relief tells sky from surfaces, of both.
+void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int components,
+                LabelModel& model);
+
+// Costs of every label number, of colours at most `outlier_cost`, kForbidden where a label may not be.
+void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
                    SegmentationLevel& level);
 
 // Pixels without a seed in the region.
@@ -55,6 +74,9 @@ cv::Mat uncertainPixels(const SegmentationLevel& level, int band_px);
 
 // The colours under a mask, evenly thinned out to what a model needs.
 std::vector<cv::Vec3f> sampleColours(const cv::Mat& image, const cv::Mat& mask);
+
+// A mask made larger by so many pixels on every side.
+cv::Mat grown(const cv::Mat& mask, int px);
 
 // Whatever lies near the region, objects and background.
 cv::Mat surroundings(const SegmentationLevel& level);

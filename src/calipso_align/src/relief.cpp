@@ -1,0 +1,206 @@
+#include "calipso_align/relief.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace calipso::align {
+namespace {
+
+constexpr float kNoiseUnits = 2.0f;      // GaussianMixture's noise
+constexpr size_t kMaxSamples = 3000;
+constexpr float kOpenJump = 1e6f;        // between a surface and nothing
+
+float quantile(std::vector<float>& values, double share) {
+  const auto place = values.begin() + static_cast<size_t>(share * (values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+// Standard deviation of inverse depth: second differences of a plane are noise alone (variance 6),
+// and most triples of neighbours lie on something flat. Where depth is quantised most of them are zero,
+// and the smallest of the others tell the quantum.
+float noiseOf(const cv::Mat& inverse) {
+  std::vector<float> bends, values;
+  for (int y = 0; y < inverse.rows; ++y) {
+    const float* q = inverse.ptr<float>(y);
+    for (int x = 1; x + 1 < inverse.cols; ++x) {
+      if (q[x] <= 0.0f) continue;
+      values.push_back(q[x]);
+      if (q[x - 1] > 0.0f && q[x + 1] > 0.0f) bends.push_back(std::abs(q[x - 1] - 2 * q[x] + q[x + 1]));
+    }
+  }
+  if (bends.empty()) return 0.0f;
+  const float scale = 1.4826f / std::sqrt(6.0f);
+  const float finest = 1e-5f * *std::max_element(values.begin(), values.end());
+  const float noise = scale * quantile(bends, 0.5);
+  bends.erase(std::remove_if(bends.begin(), bends.end(), [&](float b) { return b < finest; }),
+              bends.end());
+  const float quantum = bends.empty() ? 0.0f : quantile(bends, 0.1);
+  return std::max({noise, scale * quantum, finest});
+}
+
+float colourStep(const cv::Mat& image, int x, int y, int dx, int dy) {
+  const cv::Vec3b a = image.at<cv::Vec3b>(y, x), b = image.at<cv::Vec3b>(y + dy, x + dx);
+  return static_cast<float>(std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]));
+}
+
+constexpr int kReach = 8;  // px; edges of depth and picture are compared this far apart
+using Profile = std::array<double, 2 * kReach + 1>;
+
+// Sum of the picture's steps at every offset from the steps of depth, along rows or columns.
+void addProfile(const cv::Mat& image, const cv::Mat& steps, int dx, int dy, Profile& profile) {
+  for (int y = kReach; y + kReach + 1 < image.rows; ++y)
+    for (int x = kReach; x + kReach + 1 < image.cols; ++x)
+      if (steps.at<uchar>(y, x))
+        for (int o = -kReach; o <= kReach; ++o)
+          profile[o + kReach] += colourStep(image, x + o * dx, y + o * dy, dx, dy);
+}
+
+// How far from the steps of depth the steps of the picture lie, px: most of what stands out.
+double registrationError(const cv::Mat& image, const cv::Mat& across, const cv::Mat& down) {
+  Profile profile = {};
+  addProfile(image, across, 1, 0, profile);
+  addProfile(image, down, 0, 1, profile);
+  Profile sorted = profile;
+  std::sort(sorted.begin(), sorted.end());
+  const double ground = sorted[kReach];  // median: what there is anywhere
+  double total = 0.0;
+  for (const double p : profile) total += std::max(0.0, p - ground);
+  if (!(total > 0.0)) return kReach;
+  constexpr double kMost = 0.7;
+  double within = std::max(0.0, profile[kReach] - ground);
+  int r = 0;
+  while (within < kMost * total && ++r <= kReach)
+    for (const int o : {-r, r}) within += std::max(0.0, profile[kReach + o] - ground);
+  return r;
+}
+
+cv::Mat grown(const cv::Mat& mask, int px) {
+  cv::Mat result;
+  cv::dilate(mask, result, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1)));
+  return result;
+}
+
+}  // namespace
+
+Relief makeRelief(const cv::Mat& image, const cv::Mat& depth) {
+  constexpr double kRegistered = 2.0;  // px; an edge is blurred about as far
+  constexpr float kClear = 5.0f * kNoiseUnits;
+  Relief relief;
+  if (depth.empty() || cv::countNonZero(depth > 0) == 0) return relief;
+  cv::Mat inverse = cv::Mat::zeros(depth.size(), CV_32F);
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x)
+      if (depth.at<float>(y, x) > 0.0f) inverse.at<float>(y, x) = 1.0f / depth.at<float>(y, x);
+  const float noise = noiseOf(inverse);
+  if (!(noise > 0.0f)) return relief;
+
+  double nearest = 0.0;
+  cv::minMaxLoc(inverse, nullptr, &nearest);
+  relief.volume = static_cast<double>(depth.total()) * kNoiseUnits * nearest / noise;
+  relief.surface.create(depth.size(), CV_32FC3);
+  relief.state.create(depth.size(), CV_8U);
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x) {
+      const float q = inverse.at<float>(y, x);
+      relief.surface.at<cv::Vec3f>(y, x) = cv::Vec3f(x, y, kNoiseUnits * q / noise);
+      relief.state.at<uchar>(y, x) = q > 0.0f ? Relief::kSurface : Relief::kNone;
+    }
+
+  const cv::Mat everywhere(depth.size(), CV_8U, cv::Scalar(255));
+  const float strong = std::max(kClear, 4.0f * meanJump(relief, everywhere));
+  cv::Mat across = cv::Mat::zeros(depth.size(), CV_8U), down = across.clone();
+  for (int y = 0; y + 1 < depth.rows; ++y)
+    for (int x = 0; x + 1 < depth.cols; ++x) {
+      across.at<uchar>(y, x) = jump(relief, {x, y}, {1, 0}) > strong ? 255 : 0;
+      down.at<uchar>(y, x) = jump(relief, {x, y}, {0, 1}) > strong ? 255 : 0;
+    }
+  const double error = registrationError(image, across, down);
+  relief.registered = error <= kRegistered;
+  if (!relief.registered)
+    relief.state.setTo(Relief::kUnusable, grown(across | down, static_cast<int>(std::ceil(error)) + 1));
+  return relief;
+}
+
+Relief resized(const Relief& relief, const cv::Rect& view, const cv::Size& size) {
+  Relief result;
+  if (relief.empty()) return result;
+  cv::resize(relief.surface(view), result.surface, size, 0, 0, cv::INTER_NEAREST);
+  cv::resize(relief.state(view), result.state, size, 0, 0, cv::INTER_NEAREST);
+  result.volume = relief.volume;
+  result.registered = relief.registered;
+  return result;
+}
+
+float jump(const Relief& relief, const cv::Point& p, const cv::Point& step) {
+  const cv::Rect whole(cv::Point(), relief.state.size());
+  const auto seen = [&](const cv::Point& a) {
+    return whole.contains(a) && relief.state.at<uchar>(a) == Relief::kSurface;
+  };
+  const auto q = [&](const cv::Point& a) { return relief.surface.at<cv::Vec3f>(a)[2]; };
+  const cv::Point next = p + step;
+  const bool here = seen(p), there = seen(next);
+  if (!here && !there) return 0.0f;
+  if (!here || !there) return kOpenJump;
+  float least = std::abs(q(p) - q(next));
+  const cv::Point before = p - step, behind = next + step;
+  if (seen(before)) least = std::min(least, std::abs(q(next) - 2 * q(p) + q(before)));
+  if (seen(behind)) least = std::min(least, std::abs(q(p) - 2 * q(next) + q(behind)));
+  return least;
+}
+
+float meanJump(const Relief& relief, const cv::Mat& mask) {
+  double sum = 0.0;
+  long count = 0;
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x + 1 < mask.cols; ++x) {
+      if (!mask.at<uchar>(y, x)) continue;
+      const float j = jump(relief, {x, y}, {1, 0});
+      if (j >= kOpenJump) continue;
+      sum += j;
+      ++count;
+    }
+  return count > 0 ? static_cast<float>(sum / count) : 0.0f;
+}
+
+SurfaceModel SurfaceModel::fit(const Relief& relief, const cv::Mat& samples, double share,
+                               int components) {
+  constexpr double kOutliers = 0.05;  // of the surfaces there are, known to no model
+  SurfaceModel model;
+  std::vector<cv::Vec3f> all;
+  double none = 0.0;
+  for (int y = 0; y < samples.rows; ++y)
+    for (int x = 0; x < samples.cols; ++x) {
+      if (!samples.at<uchar>(y, x)) continue;
+      const uchar state = relief.state.at<uchar>(y, x);
+      none += state == Relief::kNone;
+      if (state == Relief::kSurface) all.push_back(relief.surface.at<cv::Vec3f>(y, x));
+    }
+  // Laplace's rule: what was never seen is still possible.
+  const double total = none + all.size() + 2.0;
+  const double floor = 1.0 / (samples.total() + 1.0);
+  const auto nats = [](double p) { return static_cast<float>(-std::log(p)); };
+  model.none_cost_ = nats(std::max(floor, share) * (none + 1.0) / total);
+  model.some_cost_ = nats(std::max(floor, share) * (all.size() + 1.0) / total);
+  model.outlier_cost_ = nats(kOutliers / relief.volume);
+  std::vector<cv::Vec3f> few;
+  const size_t count = std::min(all.size(), kMaxSamples);
+  for (size_t i = 0; i < count; ++i) few.push_back(all[i * all.size() / count]);
+  if (!few.empty()) model.surfaces_ = {GaussianMixture::fit(few, components, Split::kThickest)};
+  return model;
+}
+
+float SurfaceModel::cost(const Relief& relief, int x, int y) const {
+  switch (relief.state.at<uchar>(y, x)) {
+    case Relief::kNone: return none_cost_;
+    case Relief::kSurface:
+      if (surfaces_.empty()) return outlier_cost_;
+      return std::min(outlier_cost_,
+                      some_cost_ + surfaces_[0].cost(relief.surface.at<cv::Vec3f>(y, x)));
+    default: return 0.0f;
+  }
+}
+
+}  // namespace calipso::align
