@@ -56,9 +56,10 @@ void Segmenter::learn() {
   for (int round = 0; round < params_.rounds; ++round) {
     evaluate(coarse_);
     cut(freePixels(coarse_), coarse_);
+    const cv::Mat contradicted = contradictedPixels(coarse_);
     refitColours();
     if (round < kPlacements) placeSilhouettes();
-    refitSurfaces(round == 0);
+    refitSurfaces(round == 0 ? certainPixels(contradicted) : std::vector<cv::Mat>());
   }
   evaluate(coarse_);
   evaluate(fine_);
@@ -94,30 +95,31 @@ void Segmenter::refitColours() {
   }
 }
 
-// Colours alone may have given parts of an object to the background and the reverse. With `certain`
-// surfaces are learnt from what is background without doubt and from what the silhouettes confirm;
-// without it from all there is, once surfaces have had their say.
-cv::Mat Segmenter::certainPixels(size_t k) const {
+// Colours alone may have given parts of an object to the background and the reverse. Per label what
+// is its own beyond doubt, should it have that label: of the background what lies clear of all
+// silhouettes, of an object what lies in its silhouette and is there for its own colour's sake.
+std::vector<cv::Mat> Segmenter::certainPixels(const cv::Mat& contradicted) const {
   const cv::Size size = coarse_.image.size();
-  const cv::Mat marked = coarse_.seeds == static_cast<int>(k + 1);
-  if (k > 0)
-    return shapes_[k - 1] ? cv::Mat(marked | (placedSilhouette(k - 1, size) > 127))
-                          : cv::Mat(size, CV_8U, cv::Scalar(255));
-  cv::Mat clear(size, CV_8U, cv::Scalar(255));
   const int margin = static_cast<int>(0.5 * params_.shape_tolerance * size.width);
-  for (size_t j = 0; j < targets_.size(); ++j)
-    clear.setTo(0, shapes_[j] ? grown(placedSilhouette(j, size) > 127, margin) : coarse_.allowed[j]);
-  return clear | marked;
+  std::vector<cv::Mat> certain = {cv::Mat(size, CV_8U, cv::Scalar(255))};
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    const cv::Mat placed =
+        shapes_[k] ? cv::Mat(placedSilhouette(k, size) > 127) : coarse_.allowed[k];
+    certain[0].setTo(0, grown(placed, shapes_[k] ? margin : 0));
+    certain.push_back(placed & ~contradicted);
+  }
+  for (size_t k = 0; k < certain.size(); ++k) certain[k] |= coarse_.seeds == static_cast<int>(k + 1);
+  return certain;
 }
 
-void Segmenter::refitSurfaces(bool certain) {
+void Segmenter::refitSurfaces(const std::vector<cv::Mat>& certain) {
   if (coarse_.relief.empty()) return;
   const cv::Mat near = surroundings(coarse_);
   const double area = cv::countNonZero(coarse_.region);
   for (size_t k = 0; k < models_.size(); ++k) {
     cv::Mat own = (coarse_.labels == static_cast<int>(k)) & near;
     const double share = cv::countNonZero(own & coarse_.region) / area;
-    if (certain) own &= certainPixels(k);
+    if (!certain.empty()) own &= certain[k];
     if (cv::countNonZero(own) >= kMinModelPixels)
       models_[k].surfaces = SurfaceModel::fit(coarse_.relief, own, share, params_.surfaces);
   }

@@ -78,7 +78,8 @@ SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<Segmentation
   if (size == view.size())
     level.image = image(view);
   else
-    cv::resize(image(view), level.image, size, 0, 0, cv::INTER_NEAREST);
+    cv::resize(image(view), level.image, size, 0, 0,
+               relief.registered ? cv::INTER_NEAREST : cv::INTER_AREA);
   level.region = cv::Mat::zeros(size, CV_8U);
   for (const SegmentationTarget& target : targets) {
     level.allowed.push_back(resized(allowedRegion(target, image.size())(view), size));
@@ -149,20 +150,24 @@ void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
 
 cv::Mat freePixels(const SegmentationLevel& level) { return level.region & (level.seeds == 0); }
 
+cv::Mat contradictedPixels(const SegmentationLevel& level) {
+  cv::Mat contradicted = cv::Mat::zeros(level.labels.size(), CV_8U);
+  for (int y = 0; y < contradicted.rows; ++y)
+    for (int x = 0; x < contradicted.cols; ++x) {
+      if (!level.region.at<uchar>(y, x)) continue;
+      const float own = level.costs[level.labels.at<uchar>(y, x)].at<float>(y, x);
+      for (const cv::Mat& cost : level.costs)
+        if (cost.at<float>(y, x) < own) contradicted.at<uchar>(y, x) = 255;
+    }
+  return contradicted;
+}
+
 cv::Mat uncertainPixels(const SegmentationLevel& level, int band_px) {
   cv::Mat low, high;
   const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3));
   cv::erode(level.labels, low, square);
   cv::dilate(level.labels, high, square);
-  cv::Mat doubtful = cv::Mat::zeros(level.labels.size(), CV_8U);
-  for (int y = 0; y < doubtful.rows; ++y)
-    for (int x = 0; x < doubtful.cols; ++x) {
-      if (!level.region.at<uchar>(y, x)) continue;
-      const float own = level.costs[level.labels.at<uchar>(y, x)].at<float>(y, x);
-      for (const cv::Mat& cost : level.costs)
-        if (cost.at<float>(y, x) < own) doubtful.at<uchar>(y, x) = 255;
-    }
-  return (grown(low != high, band_px) | grown(doubtful, band_px)) & freePixels(level);
+  return grown((low != high) | contradictedPixels(level), band_px) & freePixels(level);
 }
 
 std::vector<cv::Vec3f> sampleColours(const cv::Mat& image, const cv::Mat& mask) {

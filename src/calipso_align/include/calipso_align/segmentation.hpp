@@ -48,8 +48,8 @@ class Segmenter {
   void learn();
   void initialiseModels();
   void refitColours();
-  cv::Mat certainPixels(size_t k) const;
-  void refitSurfaces(bool certain);
+  std::vector<cv::Mat> certainPixels(const cv::Mat& contradicted) const;
+  void refitSurfaces(const std::vector<cv::Mat>& certain);
   bool strokesContradictModels() const;
   cv::Mat evidence(size_t k) const;
   void placeSilhouettes();

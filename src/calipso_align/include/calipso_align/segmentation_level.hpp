@@ -68,6 +68,9 @@ void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
 // Pixels without a seed in the region.
 cv::Mat freePixels(const SegmentationLevel& level);
 
+// Pixels that would cost less with another label.
+cv::Mat contradictedPixels(const SegmentationLevel& level);
+
 // Free pixels near a change of label, or whose colour speaks against their label: what a finer level
 // has to decide anew, thin parts included.
 cv::Mat uncertainPixels(const SegmentationLevel& level, int band_px);
