@@ -67,6 +67,12 @@ std::vector<ObjectContour> extractContours(const cv::Mat& image, const cv::Mat& 
   return contours;
 }
 
+Segmenter makeSegmenter(const cv::Mat& image, const Scene& scene, bool use_depth) {
+  std::optional<DepthObservation> depth;
+  if (use_depth) depth = loadDepth(scene);
+  return Segmenter(image, segmentationTargets(scene), {}, depth ? cv::Mat(depth->depth) : cv::Mat());
+}
+
 KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::Mat& strokes) {
   KeyFrame result;
   const auto start = std::chrono::steady_clock::now();
@@ -79,8 +85,7 @@ KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::M
 }
 
 KeyFrame segmentKeyFrame(const cv::Mat& image, const Scene& scene) {
-  const std::optional<DepthObservation> depth = loadDepth(scene);
-  Segmenter segmenter(image, segmentationTargets(scene), {}, depth ? cv::Mat(depth->depth) : cv::Mat());
+  Segmenter segmenter = makeSegmenter(image, scene, true);
   return segmentKeyFrame(image, segmenter, loadStrokes(scene));
 }
 

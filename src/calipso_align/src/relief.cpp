@@ -20,25 +20,33 @@ float quantile(std::vector<float>& values, double share) {
 
 // Standard deviation of inverse depth: second differences of a plane are noise alone (variance 6),
 // and most triples of neighbours lie on something flat. Where depth is quantised most of them are zero,
-// and the smallest of the others tell the quantum.
+// and the smallest of the others tell the quantum, unless they are so few that they are edges.
 float noiseOf(const cv::Mat& inverse) {
-  std::vector<float> bends, values;
-  for (int y = 0; y < inverse.rows; ++y) {
-    const float* q = inverse.ptr<float>(y);
+  constexpr double kMoreThanEdges = 0.03;
+  std::vector<float> bends;
+  const auto add = [&](float before, float here, float behind) {
+    if (before > 0.0f && here > 0.0f && behind > 0.0f)
+      bends.push_back(std::abs(before - 2 * here + behind));
+  };
+  for (int y = 1; y + 1 < inverse.rows; ++y) {
+    const float *above = inverse.ptr<float>(y - 1), *q = inverse.ptr<float>(y),
+                *below = inverse.ptr<float>(y + 1);
     for (int x = 1; x + 1 < inverse.cols; ++x) {
-      if (q[x] <= 0.0f) continue;
-      values.push_back(q[x]);
-      if (q[x - 1] > 0.0f && q[x + 1] > 0.0f) bends.push_back(std::abs(q[x - 1] - 2 * q[x] + q[x + 1]));
+      add(q[x - 1], q[x], q[x + 1]);
+      add(above[x], q[x], below[x]);
     }
   }
   if (bends.empty()) return 0.0f;
-  const float scale = 1.4826f / std::sqrt(6.0f);
-  const float finest = 1e-5f * *std::max_element(values.begin(), values.end());
+  double largest = 0.0;
+  cv::minMaxLoc(inverse, nullptr, &largest);
+  const float scale = 1.4826f / std::sqrt(6.0f), finest = 1e-5f * static_cast<float>(largest);
   const float noise = scale * quantile(bends, 0.5);
+  const size_t all = bends.size();
   bends.erase(std::remove_if(bends.begin(), bends.end(), [&](float b) { return b < finest; }),
               bends.end());
-  const float quantum = bends.empty() ? 0.0f : quantile(bends, 0.1);
-  return std::max({noise, scale * quantum, finest});
+  const float quantum =
+      bends.size() > kMoreThanEdges * all ? scale * quantile(bends, 0.1) : 0.0f;
+  return std::max({noise, quantum, finest});
 }
 
 float colourStep(const cv::Mat& image, int x, int y, int dx, int dy) {

@@ -13,7 +13,6 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "calipso_align/depth_image.hpp"
 #include "calipso_align/key_frame.hpp"
 #include "calipso_align/mask_tracker.hpp"
 #include "calipso_align/metrics.hpp"
@@ -185,17 +184,15 @@ void putTracking(const char* suffix, const Tracking& tracking, int label) {
 void evaluate(const std::string& path, const Arguments& arguments) {
   const Scene scene = loadScene(path);
   const cv::Mat image = readFrame(scene, 0), strokes = loadStrokes(scene);
-  const std::vector<SegmentationTarget> targets = segmentationTargets(scene);
   std::optional<Segmenter> segmenter;
   KeyFrame key;
-  std::optional<DepthObservation> depth;
-  if (arguments.use_depth) depth = loadDepth(scene);
   const double ms_first = cpuMsOf([&] {
-    segmenter.emplace(image, targets, SegmenterParams(), depth ? cv::Mat(depth->depth) : cv::Mat());
+    segmenter.emplace(makeSegmenter(image, scene, arguments.use_depth));
     segmenter->segment(strokes);
   });
   const double ms_stroke = cpuMsOf([&] { segmenter->segment(strokes); });
   const double ms_contour = cpuMsOf([&] { key = segmentKeyFrame(image, *segmenter, strokes); }) - ms_stroke;
+  const std::vector<SegmentationTarget>& targets = segmenter->targets();
   const cv::Mat truth = trueLabels(scene, 0);
   const bool track_it = arguments.track && !truth.empty();
   const Tracking tracked = track_it ? track(scene, key.labels, arguments.pictures) : Tracking();

@@ -24,6 +24,10 @@ cv::Mat placedSilhouette(const Scene& scene, const SceneObject& object);
 // The scene's objects as the segmenter wants them.
 std::vector<SegmentationTarget> segmentationTargets(const Scene& scene);
 
+// A segmenter of the scene's key frame. use_depth: the scene's depth image, where it has one, is of
+// this very picture. @throw std::runtime_error naming a file that cannot be read
+Segmenter makeSegmenter(const cv::Mat& image, const Scene& scene, bool use_depth);
+
 // The scene's strokes (CV_8U), empty when it has none. @throw std::runtime_error naming the file
 cv::Mat loadStrokes(const Scene& scene);
 

@@ -89,7 +89,9 @@ void SegmentationRos::segment() {
   const auto start = std::chrono::steady_clock::now();
   try {
     if (!segmenter_)
-      segmenter_ = std::make_unique<Segmenter>(key_image_, segmentationTargets(scene_));
+      // A live camera's first frame is not the picture that the scene's depth image was taken with.
+      segmenter_ = std::make_unique<Segmenter>(
+          makeSegmenter(key_image_, scene_, params_.mode == "bag"));
     const KeyFrame key = segmentKeyFrame(key_image_, *segmenter_, strokes_);
     tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels);
     key_message_ = boost::make_shared<calipso_msgs::Segmentation>(

@@ -1,0 +1,106 @@
+#include "calipso_align/relief.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calipso_align/segmentation.hpp"
+#include "synthetic_picture.hpp"
+
+namespace calipso::align {
+namespace {
+
+using testing::box;
+using testing::disc;
+using testing::intersectionOverUnion;
+using testing::maskOf;
+using testing::paint;
+
+const cv::Size kSize(160, 120);
+const cv::Vec3b kGreen(40, 160, 60), kGrey(150, 150, 150);
+const testing::SignedDistance kDisc = disc(80.3, 60.7, 30.2);
+
+// A disc 1 m away in front of a slanted wall, moved by `shift` px against its picture.
+cv::Mat depthOfDisc(double shift) {
+  cv::Mat depth(kSize, CV_32F);
+  for (int v = 0; v < kSize.height; ++v)
+    for (int u = 0; u < kSize.width; ++u)
+      depth.at<float>(v, u) =
+          kDisc(u - shift, v) < 0.0 ? 1.0f : 1.0f / (0.5f + 0.001f * static_cast<float>(u));
+  return depth;
+}
+
+TEST(Relief, APlaneHasNoJumpAndAStepHasOne) {
+  const Relief relief = makeRelief(paint(kSize, kDisc, kGreen, kGrey, 2.0), depthOfDisc(0));
+  EXPECT_LT(jump(relief, {10, 60}, {1, 0}), 0.1f);            // rounding of floats
+  EXPECT_GT(jump(relief, {50, 60}, {1, 0}), 100.0f);          // the disc's left edge
+  EXPECT_FLOAT_EQ(jump(relief, {50, 60}, {1, 0}), jump(relief, {51, 60}, {-1, 0}));
+}
+
+TEST(Relief, RegistrationIsMeasured) {
+  const cv::Mat image = paint(kSize, kDisc, kGreen, kGrey, 2.0);
+  EXPECT_TRUE(makeRelief(image, depthOfDisc(0)).registered);
+  const Relief shifted = makeRelief(image, depthOfDisc(6));
+  EXPECT_FALSE(shifted.registered);
+  EXPECT_EQ(shifted.state.at<uchar>(60, 56), Relief::kUnusable);
+  EXPECT_EQ(shifted.state.at<uchar>(60, 80), Relief::kSurface);
+}
+
+TEST(Relief, NoDepthIsNoRelief) {
+  const cv::Mat image = paint(kSize, kDisc, kGreen, kGrey, 2.0);
+  EXPECT_TRUE(makeRelief(image, cv::Mat::zeros(kSize, CV_32F)).empty());
+  EXPECT_TRUE(makeRelief(image, cv::Mat()).empty());
+}
+
+TEST(SurfaceModel, SkyBelongsToTheLabelThatHasIt) {
+  cv::Mat depth = depthOfDisc(0);
+  depth.setTo(0.0f, maskOf(kSize, kDisc) == 0);
+  const Relief relief = makeRelief(paint(kSize, kDisc, kGreen, kGrey, 2.0), depth);
+  const cv::Mat own = maskOf(kSize, kDisc);
+  const SurfaceModel object = SurfaceModel::fit(relief, own, 0.15, 4);
+  const SurfaceModel sky = SurfaceModel::fit(relief, own == 0, 0.85, 4);
+  EXPECT_LT(sky.cost(relief, 5, 5), object.cost(relief, 5, 5) - 5.0f);
+  EXPECT_LT(object.cost(relief, 80, 60), sky.cost(relief, 80, 60) - 5.0f);
+}
+
+// A picture in which colours tell nothing of the object's right half, and depth tells everything.
+TEST(Segmenter, DepthFindsWhatColoursDoNot) {
+  const auto left = [](double u, double v) { return std::max(kDisc(u, v), u - 80.0); };
+  const cv::Mat image = paint(kSize, left, kGreen, kGrey, 3.0);
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  strokes(cv::Rect(60, 55, 40, 8)).setTo(1);
+  const std::vector<SegmentationTarget> targets = {{"disc", 1, cv::Rect(45, 25, 72, 72), {}, {}}};
+  Segmenter with(image, targets, {}, depthOfDisc(0)), without(image, targets);
+  const cv::Mat truth = maskOf(kSize, kDisc);
+  EXPECT_GE(intersectionOverUnion(with.segment(strokes) == 1, truth), 0.98);
+  EXPECT_LT(intersectionOverUnion(without.segment(strokes) == 1, truth), 0.8);
+}
+
+TEST(Segmenter, DepthThatDoesNotFitThePictureDoesNoHarm) {
+  const cv::Mat image = paint(kSize, kDisc, kGreen, kGrey, 3.0);
+  Segmenter segmenter(image, {{"disc", 1, cv::Rect(45, 25, 72, 72), {}, {}}}, {}, depthOfDisc(6));
+  EXPECT_GE(intersectionOverUnion(segmenter.segment({}) == 1, maskOf(kSize, kDisc)), 0.985);
+}
+
+TEST(Segmenter, ALineOfOnePixelIsSeenInALargePicture) {
+  const cv::Size size(1280, 720);
+  const auto object = box(400, 200, 700, 500);
+  const cv::Mat image = paint(size, object, kGreen, kGrey, 3.0);
+  cv::Mat strokes = cv::Mat::zeros(size, CV_8U);
+  strokes(cv::Rect(450, 301, 200, 1)).setTo(1);
+  Segmenter segmenter(image, {{"box", 1, cv::Rect(350, 150, 420, 420), {}, {}}});
+  EXPECT_GE(intersectionOverUnion(segmenter.segment(strokes) == 1, maskOf(size, object)), 0.985);
+}
+
+TEST(Segmenter, NamesADepthImageOfAnotherSize) {
+  const cv::Mat image = paint(kSize, kDisc, kGreen, kGrey, 3.0);
+  try {
+    Segmenter(image, {{"disc", 1, cv::Rect(45, 25, 72, 72), {}, {}}}, {}, cv::Mat::ones(5, 7, CV_32F));
+    FAIL() << "nothing was thrown";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("7x5"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace calipso::align
