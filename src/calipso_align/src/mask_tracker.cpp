@@ -7,11 +7,16 @@
 #include <stdexcept>
 #include <string>
 
+#include "calipso_align/layer_motion.hpp"
+#include "layer_appearance.hpp"
+
 namespace calipso::align {
 namespace {
 
+constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
 constexpr int kMeanSize = 4;  // px; blocks over which stillness averages the sensor's noise away
-constexpr size_t kMaxSamples = 4000;
+constexpr size_t kMaxSamples = 2000;
+constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
 
 cv::Mat blockMeans(const cv::Mat& image) {
   cv::Mat means;
@@ -54,13 +59,34 @@ cv::Mat signedDistance(const cv::Mat& mask) {
   return outside - inside;
 }
 
+// A mask without its rim, where flow mixes both sides; the mask itself where nothing else is left.
+cv::Mat insideOf(const cv::Mat& mask) {
+  for (const int rim : {4, 2, 1}) {
+    cv::Mat core;
+    cv::erode(mask, core, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * rim + 1, 2 * rim + 1)));
+    if (4 * cv::countNonZero(core) > cv::countNonZero(mask)) return core;
+  }
+  return mask;
+}
+
+// Mean over a mask, large differences cut off: an object that passes is no camera motion.
+double meanDifference(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
+  constexpr double kMost = 20.0;  // grey levels
+  cv::Mat difference;
+  cv::absdiff(a, b, difference);
+  cv::min(difference, cv::Scalar::all(kMost), difference);
+  const cv::Scalar mean = cv::mean(difference, mask);
+  return mean[0] + mean[1] + mean[2];
+}
+
 }  // namespace
 
 MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerParams params)
     : params_(params),
       size_(image.size()),
-      flow_(cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_FAST)) {
+      flow_(cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM)) {
   checkInput(image, labels);
+  previous_image_ = image.clone();
   cv::cvtColor(image, previous_grey_, cv::COLOR_BGR2GRAY);
   previous_means_ = blockMeans(image);
   std::set<int> found(labels.begin<uchar>(), labels.end<uchar>());
@@ -69,11 +95,13 @@ MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerPar
     Object object;
     object.label = label;
     object.mask = labels == label;
+    object.coverage = object.mask.clone();
     object.reference_mean = previous_means_;
-    object.key_area = cv::countNonZero(object.mask);
     object.colours = GaussianMixture::fit(coloursUnder(image, object.mask), params_.components);
+    object.recent_colours = object.colours;
     objects_.push_back(std::move(object));
   }
+  rememberBackground(image);
 }
 
 void MaskTracker::checkInput(const cv::Mat& image, const cv::Mat& labels) const {
@@ -99,12 +127,16 @@ TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
   for (Object& object : objects_)
     if (!isStill(object, means)) moving.push_back(&object);
 
-  const cv::Mat flow = moving.empty() ? cv::Mat() : backwardFlow(grey, means, moving);
   for (Object* object : moving) {
+    const cv::Point shift = coarseShift(*object, means);
+    const cv::Mat flow = backwardFlow(grey, *object, shift);
     const bool told = !prior.empty() && cv::countNonZero(prior == object->label) > 0;
-    follow(*object, image, told ? cv::Mat(prior == object->label) : predict(*object, flow));
+    follow(*object, image, flow, told ? cv::Mat(prior == object->label) : predict(*object, flow, shift),
+           told);
     object->reference_mean = means;
   }
+  rememberBackground(image);
+  previous_image_ = image.clone();
   previous_grey_ = grey;
   previous_means_ = means;
   return combine(static_cast<int>(moving.size()));
@@ -119,11 +151,53 @@ TrackedMask MaskTracker::combine(int moved) const {
   return result;
 }
 
-void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& predicted) {
-  const cv::Rect roi = around(predicted, params_.margin_px);
+void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& flow,
+                         const cv::Mat& rough, bool exact) {
+  const cv::Rect roi = around(rough, params_.margin_px);
+  if (roi.empty()) lose(object);
+  else settle(object, image, flow, rough(roi), exact, roi);
+}
+
+void MaskTracker::lose(Object& object) const {
   object.mask = cv::Mat::zeros(size_, CV_8U);
-  if (roi.empty()) object.confidence = 0.0f;
-  else settle(object, image, predicted(roi), roi);
+  object.coverage = object.mask.clone();
+  object.confidence = 0.0f;
+}
+
+// Where objects are, and so many pixels around them.
+cv::Mat MaskTracker::occupied(int px) const {
+  cv::Mat all = cv::Mat::zeros(size_, CV_8U);
+  for (const Object& object : objects_) all |= object.mask;
+  return grown(all, px);
+}
+
+void MaskTracker::rememberBackground(const cv::Mat& image) {
+  constexpr int kClearance = 2;  // px; edge pixels show a bit of the object
+  if (background_.image.empty()) {
+    background_.image = image.clone();
+    background_.known = cv::Mat::zeros(size_, CV_8U);
+  }
+  const cv::Mat seen = ~occupied(kClearance);
+  image.copyTo(background_.image, seen);
+  background_.known.setTo(255, seen);
+}
+
+// The background in a part of the picture: as it is remembered, or as the previous frame shows it,
+// moved along with its own flow; whichever the picture bears out.
+KnownBackground MaskTracker::backgroundIn(const cv::Rect& roi, const cv::Mat& image,
+                                          const cv::Mat& flow) const {
+  constexpr int kClearance = 3;
+  const KnownBackground remembered{background_.image(roi), background_.known(roi)};
+  const cv::Mat free = ~occupied(kClearance), visible = free(roi);
+  constexpr double kSensorNoise = 4.0;  // grey levels; not more differs where nothing moves
+  if (cv::countNonZero(visible) == 0 || noiseOf(image(roi), remembered.image, visible) <= kSensorNoise)
+    return remembered;
+  const cv::Mat motion = layerMotion(flow, free, roi);
+  const KnownBackground moved{movedBack(previous_image_, motion, roi), movedBack(free, motion, roi) > 250};
+  return meanDifference(image(roi), remembered.image, visible) <=
+                 meanDifference(image(roi), moved.image, visible)
+             ? remembered
+             : moved;
 }
 
 bool MaskTracker::isStill(const Object& object, const cv::Mat& means) const {
@@ -157,36 +231,51 @@ cv::Point MaskTracker::coarseShift(const Object& object, const cv::Mat& means) c
   cv::matchTemplate(means(search), previous_means_(cells), score, cv::TM_SQDIFF, weight(cells));
   cv::Point best;
   cv::minMaxLoc(score, nullptr, nullptr, &best);
-  return (search.tl() + best - cells.tl()) * kMeanSize;
+  const cv::Point moved = search.tl() + best - cells.tl();
+  // Motion of a cell or two is the flow's to find.
+  return std::abs(moved.x) > 2 || std::abs(moved.y) > 2 ? moved * kMeanSize : cv::Point();
 }
 
-// Backward flow, current to previous frame, started from the moving objects' coarse shifts.
-cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey, const cv::Mat& means,
-                                  const std::vector<Object*>& moving) const {
-  cv::Mat flow = cv::Mat::zeros(size_, CV_32FC2);
-  for (const Object* object : moving) {
-    const cv::Point shift = coarseShift(*object, means);
-    const cv::Rect whole(cv::Point(), size_);
-    const cv::Rect target = (cv::boundingRect(object->mask) + shift) & whole;
-    if (!target.empty()) flow(target).setTo(cv::Scalar(-shift.x, -shift.y));
-  }
-  flow_->calc(grey, previous_grey_, flow);
+// Backward flow, current to previous frame, near where an object went; zero elsewhere. What the object
+// moved as a whole is taken out first: the flow then has only the rest to find.
+cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey, const Object& object,
+                                  const cv::Point& shift) const {
+  const cv::Rect whole(cv::Point(), size_);
+  const cv::Rect view = grown(cv::boundingRect(object.mask) + shift, params_.margin_px) & whole;
+  cv::Mat flow(size_, CV_32FC2, cv::Scalar(-shift.x, -shift.y));
+  if (view.width < kLeastFlowWidth || view.height < kLeastFlowWidth) return flow;
+  cv::Mat before;
+  const cv::Matx23d back(1, 0, -shift.x + view.x, 0, 1, -shift.y + view.y);
+  cv::warpAffine(previous_grey_, before, back, view.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                 cv::BORDER_REPLICATE);
+  cv::Mat rest;
+  flow_->calc(grey(view).clone(), before, rest);  // wants whole rows
+  flow(view) += rest;
   return flow;
 }
 
-cv::Mat MaskTracker::predict(const Object& object, const cv::Mat& flow) const {
-  cv::Mat map(size_, CV_32FC2);
-  for (int y = 0; y < map.rows; ++y)
-    for (int x = 0; x < map.cols; ++x)
-      map.at<cv::Vec2f>(y, x) = flow.at<cv::Vec2f>(y, x) + cv::Vec2f(x, y);
-  cv::Mat warped;
-  cv::remap(object.mask, warped, map, cv::noArray(), cv::INTER_LINEAR);
-  return warped > 127;
+// Roughly where an object is now: where its pixels flowed, or where it went as a whole if that is far,
+// for then the background's own flow leads back to where the object was.
+cv::Mat MaskTracker::predict(const Object& object, const cv::Mat& flow, const cv::Point& shift) const {
+  if (shift == cv::Point()) return movedBack(object.mask, flow, cv::Rect(cv::Point(), size_)) > 127;
+  cv::Mat moved;
+  cv::warpAffine(object.mask, moved, cv::Matx23d(1, 0, shift.x, 0, 1, shift.y), size_);
+  return moved > 127;
 }
 
-void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& predicted,
-                         const cv::Rect& roi) {
+void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& flow,
+                         const cv::Mat& rough, bool exact, const cv::Rect& roi) {
   const cv::Mat view = image(roi);
+  const cv::Mat core = insideOf(rough);
+  cv::Mat support = cv::Mat::zeros(size_, CV_8U);
+  core.copyTo(support(roi));
+  const cv::Mat motion = layerMotion(flow, support, roi);
+  const cv::Mat coverage = movedBack(object.coverage, motion, roi);
+  const cv::Mat predicted = exact ? rough.clone() : cv::Mat(coverage > 127);
+  if (cv::countNonZero(predicted) == 0) {
+    lose(object);
+    return;
+  }
   const cv::Mat distance = signedDistance(predicted);
   const cv::Mat band = cv::abs(distance) <= params_.band_px;
   const cv::Mat ring = (distance > params_.band_px) & (distance < params_.margin_px);
@@ -195,16 +284,33 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& pr
     object.confidence = 0.0f;
     return;
   }
-  const GaussianMixture background = GaussianMixture::fit(surroundings, params_.components);
+  const KnownBackground background = backgroundIn(roi, image, flow);
+  const cv::Mat moved = movedBack(previous_image_, motion, roi);
+  const cv::Mat moved_relit = relit(moved, view, core);
+  const double noise = noiseOf(view, moved_relit, core);
+  const LayerAppearance fore{{{moved, coverage, 0.5f, noise}, {moved_relit, coverage, 0.3f, noise}},
+                             {&object.colours, &object.recent_colours}};
+  const GaussianMixture ring_colours = GaussianMixture::fit(surroundings, params_.components);
+  const cv::Mat clear = background.known & (distance > 1.0);
+  const double back_noise = noiseOf(view, background.image, clear);
+  // What hides the object may move along with it.
+  const LayerAppearance back{{{background.image, background.known, 0.6f, back_noise},
+                              {relit(background.image, view, clear), background.known, 0.37f, back_noise},
+                              {moved, ~coverage, 0.02f, noise}},
+                             {&ring_colours}};
 
+  // Log odds of a pixel's centre lying across the outline although it was predicted at this distance.
+  const auto prior = [&](float d) {
+    return std::clamp(params_.prior_cost * (d - 0.5f), 0.0f, params_.prior_limit);
+  };
   std::vector<cv::Mat> costs = {cv::Mat::zeros(roi.size(), CV_32F), cv::Mat::zeros(roi.size(), CV_32F)};
   for (int y = 0; y < roi.height; ++y)
     for (int x = 0; x < roi.width; ++x) {
       if (!band.at<uchar>(y, x)) continue;
       const cv::Vec3f colour = view.at<cv::Vec3b>(y, x);
       const float d = distance.at<float>(y, x);
-      costs[0].at<float>(y, x) = std::min(params_.outlier_cost, background.cost(colour)) + std::max(0.0f, -d) * params_.prior_cost;
-      costs[1].at<float>(y, x) = std::min(params_.outlier_cost, object.colours.cost(colour)) + std::max(0.0f, d) * params_.prior_cost;
+      costs[0].at<float>(y, x) = back.cost(colour, x, y, params_.outlier_cost) + prior(-d);
+      costs[1].at<float>(y, x) = fore.cost(colour, x, y, params_.outlier_cost) + prior(d);
     }
   cv::Mat labels = predicted / 255;
   cutLabels(view, band, costs, params_.smoothness, labels);
@@ -212,7 +318,13 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& pr
   const double area = cv::countNonZero(labels);
   const double flipped = cv::countNonZero((labels > 0) != (predicted > 0));
   object.confidence = static_cast<float>(std::clamp(1.0 - 4.0 * flipped / std::max(1.0, area), 0.0, 1.0));
-  object.mask(roi).setTo(255, labels);
+  cv::Mat mask = labels > 0;
+  object.coverage = cv::Mat::zeros(size_, CV_8U);
+  settleEdge(view, cv::Mat(), background, back_noise, mask).copyTo(object.coverage(roi));
+  object.mask = cv::Mat::zeros(size_, CV_8U);
+  mask.copyTo(object.mask(roi));
+  if (object.confidence > kSureEnough && cv::countNonZero(mask) > 0)
+    object.recent_colours = GaussianMixture::fit(coloursUnder(view, insideOf(mask)), params_.components);
 }
 
 }  // namespace calipso::align

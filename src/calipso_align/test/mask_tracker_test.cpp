@@ -66,6 +66,36 @@ TEST(MaskTracker, OwnsUpWhenTheObjectIsGone) {
   EXPECT_LT(tracker.track(picture(-100, -100, 2)).confidence, 0.5f);
 }
 
+// A moving object of the wall's own colour: only where it was seen before tells it from the wall.
+TEST(MaskTracker, ARememberedBackgroundIsNotTakenIn) {
+  const auto withTwin = [](double u0, int seed) {
+    cv::Mat image = picture(u0, 60, seed);
+    image(cv::Rect(120, 40, 60, 40)).setTo(cv::Scalar(50, 90, 190));  // stands still
+    return image;
+  };
+  MaskTracker tracker(withTwin(60, 1), truth(60, 60) / 255);
+  TrackedMask tracked;
+  for (int k = 1; k <= 10; ++k) tracked = tracker.track(withTwin(60 + 3.4 * k, k + 1));
+  const cv::Mat found = tracked.labels == 1;
+  EXPECT_GE(intersectionOverUnion(found, truth(94, 60)), 0.95);
+}
+
+// What light does to the background next to an object is no part of it.
+TEST(MaskTracker, AShadowThatComesAlongIsLeftOut) {
+  const auto withShadow = [](double u0, int seed) {
+    cv::Mat image = picture(u0, 60, seed);
+    const cv::Mat object = maskOf(kSize, disc(u0, 60, 26.5)), shade = maskOf(kSize, disc(u0 + 20, 80, 25)) & ~object;
+    cv::Mat darker;
+    image.convertTo(darker, -1, 0.6);
+    darker.copyTo(image, shade);
+    return image;
+  };
+  MaskTracker tracker(withShadow(60, 1), truth(60, 60) / 255);
+  TrackedMask tracked;
+  for (int k = 1; k <= 10; ++k) tracked = tracker.track(withShadow(60 + 3.0 * k, k + 1));
+  EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(90, 60)), 0.95);
+}
+
 TEST(MaskTracker, APriorLeads) {
   MaskTracker tracker(picture(60, 60, 1), truth(60, 60) / 255);
   const cv::Mat prior = truth(141, 89) / 255;

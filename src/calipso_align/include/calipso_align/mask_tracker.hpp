@@ -7,6 +7,7 @@
 
 #include "calipso_align/gaussian_mixture.hpp"
 #include "calipso_align/label_cut.hpp"
+#include "calipso_align/mask_edge.hpp"
 
 namespace calipso::align {
 
@@ -17,9 +18,10 @@ struct TrackerParams {
   int search_px = 96;              // how far an object can go from one frame to the next
   float still_levels = 5.0f;       // grey levels; what changes less than this (4 x 4 px mean) is still
   float still_share = 0.002f;      // ... in all but this share of the object and its rim
-  float prior_cost = 1.0f;         // nats per pixel of distance from the predicted outline
+  float prior_cost = 3.0f;         // nats per pixel of distance from the predicted outline
+  float prior_limit = 9.0f;        // nats; the most that the prediction says
   float outlier_cost = 18.0f;      // nats; cost of a colour that a model does not know
-  SmoothnessParams smoothness;
+  SmoothnessParams smoothness{4.0f, 0.02f, 0.0f, 0.0f};
 };
 
 struct TrackedMask {
@@ -28,9 +30,12 @@ struct TrackedMask {
   int moved = 0;           // objects that were looked for anew; the others kept their mask
 };
 
-// Carries a label image through a video: backward flow predicts where each object went, a cut in a
-// narrow band around the predicted outline settles it. An object whose surroundings do not change
-// keeps its mask at hardly any cost. One thread at a time; frames in order.
+// Carries a label image through a video. Each object is a layer that moves by itself in front of a
+// background that is remembered: a pixel near the predicted outline is the object's when the object
+// of the previous frame, moved along, explains it better than the background does. What neither
+// explains is left to colour models. A cut settles the labels, the coverage of the edge pixels the
+// outline. An object whose surroundings do not change keeps its mask at hardly any cost. One thread at
+// a time; frames in order.
 class MaskTracker {
  public:
   // image: CV_8UC3, labels: CV_8U, of equal size.
@@ -45,27 +50,34 @@ class MaskTracker {
  private:
   struct Object {
     int label = 0;
-    GaussianMixture colours;
+    GaussianMixture colours;         // of the key frame
+    GaussianMixture recent_colours;  // of the last frame in which its mask was certain
     cv::Mat mask;            // CV_8U, the whole picture
+    cv::Mat coverage;        // CV_8U, as `mask` but with the share of the pixels along its edge
     cv::Mat reference_mean;  // 4 x 4 px means of the frame in which `mask` was found
-    double key_area = 0.0;   // px
     float confidence = 1.0f;
   };
 
   bool isStill(const Object& object, const cv::Mat& means) const;
   cv::Point coarseShift(const Object& object, const cv::Mat& means) const;
-  cv::Mat backwardFlow(const cv::Mat& grey, const cv::Mat& means,
-                       const std::vector<Object*>& moving) const;
-  cv::Mat predict(const Object& object, const cv::Mat& flow) const;
-  void follow(Object& object, const cv::Mat& image, const cv::Mat& predicted);
+  cv::Mat backwardFlow(const cv::Mat& grey, const Object& object, const cv::Point& shift) const;
+  cv::Mat predict(const Object& object, const cv::Mat& flow, const cv::Point& shift) const;
+  cv::Mat occupied(int px) const;
+  void rememberBackground(const cv::Mat& image);
+  KnownBackground backgroundIn(const cv::Rect& roi, const cv::Mat& image, const cv::Mat& flow) const;
+  void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
+              bool exact);
+  void lose(Object& object) const;
   TrackedMask combine(int moved) const;
-  void settle(Object& object, const cv::Mat& image, const cv::Mat& predicted, const cv::Rect& roi);
+  void settle(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
+              bool exact, const cv::Rect& roi);
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
 
   TrackerParams params_;
   cv::Size size_;
   std::vector<Object> objects_;
-  cv::Mat previous_grey_, previous_means_;
+  cv::Mat previous_image_, previous_grey_, previous_means_;
+  KnownBackground background_;  // the whole picture
   cv::Ptr<cv::DISOpticalFlow> flow_;
 };
 
