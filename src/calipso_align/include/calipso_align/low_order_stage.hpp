@@ -36,8 +36,9 @@ struct LowOrderStageOptions {
   LowOrderPrior prior;
   int iterations = 15;
   double smallest_step = 2e-4;       // of the model's size: below, the stage has converged
-  // Re-estimates a from the coefficients that the measurements determine (MacKay 1992, evidence):
-  //   a^2 = sum (p_i / s_i)^2 / gamma,  gamma = sum of 1 - C_ii / (a s_i)^2
+  // Re-estimates a from the coefficients that the measurements determine, of which there are
+  // gamma = sum of 1 - C_ii / (a s_i)^2 (MacKay 1992). As they are few, the mean of a^2 and not its mode:
+  //   a^2 = sum (p_i / s_i)^2 / (gamma - 2)      (log a unknown: inverse gamma distribution)
   bool estimate_deformation = false;
 };
 
