@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kLeastKnown = 0.3;      // part of the contour
 constexpr double kLeastMet = 0.8;        // part of the known contour: it may have spurs and details
-constexpr double kMostProtruding = 0.02; // part of the area: the contour may lack thin parts
+constexpr double kMostOff = 0.02;         // part of the area: thin parts may be missing on either side
 constexpr double kLargestMeanPx = 1.0;   // on top of half the contour's noise
 constexpr double kLargestScale = 2.5;
 
@@ -75,6 +75,26 @@ double protrudingPart(const FitProblem& problem, const std::vector<ContourLoop>&
   return outside / std::max(1, cv::countNonZero(inside));
 }
 
+// The model's silhouette without its holes: of a lattice the contour often has none.
+cv::Mat1b filledSilhouette(const FitProblem& problem, const DepthRendering& rendering) {
+  cv::Mat1b mask = maskOf(rendering, problem.camera);
+  std::vector<std::vector<cv::Point>> outer;
+  cv::findContours(mask.clone(), outer, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+  cv::drawContours(mask, outer, -1, cv::Scalar(255), cv::FILLED);
+  return mask;
+}
+
+// Area of the contour that the model leaves open by more than the tolerance, as part of its area.
+double openPart(const FitProblem& problem, const std::vector<ContourLoop>& contour,
+                const DepthRendering& rendering, double tolerance_px) {
+  const cv::Mat1b inside = fillContour(contour, {problem.camera.width, problem.camera.height});
+  cv::Mat1f distance;
+  cv::distanceTransform(filledSilhouette(problem, rendering) == 0, distance, cv::DIST_L2,
+                        cv::DIST_MASK_3);
+  return static_cast<double>(cv::countNonZero(inside & (distance > tolerance_px))) /
+         std::max(1, cv::countNonZero(inside));
+}
+
 }  // namespace
 
 FitQuality assess(const FitProblem& problem, const std::vector<ContourLoop>& contour,
@@ -101,6 +121,7 @@ FitQuality assess(const FitProblem& problem, const std::vector<ContourLoop>& con
   }
   quality.met_mean_px /= std::max(1, met);
   quality.met = static_cast<double>(met) / known;
+  quality.open = openPart(problem, contour, rendering, quality.tolerance_px);
   quality.protruding = protrudingPart(problem, contour, rendering, quality.tolerance_px);
   quality.mean_px = std::accumulate(sizes.begin(), sizes.end(), 0.0) / sizes.size();
   const auto p95 = sizes.begin() + static_cast<long>(0.95 * (sizes.size() - 1));
@@ -118,12 +139,13 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
   if (known < kLeastKnown) {
     reason << "contour mostly unknown: only " << percent(known)
            << " of it is not hidden or cut by the image border";
-  } else if (quality.met < kLeastMet || quality.protruding > kMostProtruding ||
+  } else if (quality.met < kLeastMet || quality.protruding > kMostOff || quality.open > kMostOff ||
              quality.met_mean_px > allowed) {
     reason << "did not converge: the contour is off by " << quality.mean_px << " px on average, "
            << percent(quality.met) << " of it is met within " << quality.tolerance_px << " px, "
            << percent(quality.protruding)
-           << " of the model lies outside of it; place the model closer";
+           << " of its area the model has besides, " << percent(quality.open)
+           << " it leaves open; place the model closer";
     if (isInPieces(contour)) reason << ", or correct the contour: it is in separate pieces";
   } else if (scale > kLargestScale || scale < 1.0 / kLargestScale) {
     reason << "size implausible: the model had to be scaled by " << scale

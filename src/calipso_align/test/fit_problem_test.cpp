@@ -135,7 +135,7 @@ TEST(ContourTerm, AnUnknownEdgeOnlyPullsOutwards) {
   EXPECT_EQ(pulls(1.2), 0.0);
 }
 
-TEST(Trust, AModelThatSticksOutIsNotTrusted) {
+TEST(Trust, AModelThatSticksOutOrFallsShortIsNotTrusted) {
   const Seen seen;
   const FitProblem problem = seen.problem();
   const FitQuality fits = assess(problem, seen.contour, problem.X);
@@ -152,6 +152,13 @@ TEST(Trust, AModelThatSticksOutIsNotTrusted) {
   const FitQuality drawn = assess(problem, seen.contour, x);
   EXPECT_GT(drawn.protruding, 0.02);
   EXPECT_FALSE(judge(problem, seen.contour, drawn, 1.0).trusted);
+
+  // One end pushed in.
+  for (int i = 0; i < x.rows(); ++i) x(i, 1) = std::max(problem.X(i, 1), 0.7 * end);
+  const FitQuality pushed = assess(problem, seen.contour, x);
+  EXPECT_GT(pushed.open, 0.02);
+  EXPECT_EQ(pushed.protruding, 0.0);
+  EXPECT_FALSE(judge(problem, seen.contour, pushed, 1.0).trusted);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ struct FitQuality {
   double tolerance_px = 0.0;       // what counts as met: the contour's noise and a little more
   double met = 0.0;                // part of the known contour that the model meets
   double met_mean_px = 0.0;        // of that part
+  double open = 0.0;               // part of the contour's area that the model leaves open
   double protruding = 0.0;         // area of the model outside of the contour, part of the contour's
 };
 
