@@ -104,8 +104,9 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
     report.residual = masked.norm() / forceScale(*y, i, loads);
     if (!linearised && jump.isZero(0.0) && report.residual <= options.newton_tolerance) break;
     // Forcing terms (Eisenstat and Walker 1996, choice 2): no direction is solved for better than it is worth.
+    // Steps that take long get exact ones: near-incompressible bodies would run out of iterations.
     double linear_tolerance = options.linear_tolerance;
-    if (!linearised && jump.isZero(0.0)) {
+    if (!linearised && jump.isZero(0.0) && report.newton_iterations < 2) {
       const double ratio = residual_before > 0.0 ? masked.norm() / residual_before : 1.0;
       linear_tolerance = std::max(linear_tolerance, std::min(kLoosestForcing, 0.9 * ratio * ratio));
     }
