@@ -72,6 +72,17 @@ TEST(Renderer, AnEditThatMovesNothingLeavesTheObject) {
   EXPECT_TRUE(sameWhereOriginal(out, s.key.bgr));
 }
 
+// With nothing kept, the residual makes up for all that drawing misses; farther away none of it is left.
+TEST(Renderer, TheResidualGoesAlongWithSmallMovesOnly) {
+  RenderParams drawn = params(), plain = params();
+  drawn.keep_still = plain.keep_still = plain.carry_residual = false;
+  const Setting s(drawn);
+  const FrameInput rest = s.input(true, Eigen::Vector3f::Zero()), far = s.input(true, {0.1f, 0.0f, 0.0f});
+  EXPECT_EQ(cv::norm(Renderer(s.prepared, drawn).composite(rest).bgr, s.key.bgr, cv::NORM_INF), 0.0);
+  EXPECT_GT(cv::norm(Renderer(s.prepared, plain).composite(rest).bgr, s.key.bgr, cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(Renderer(s.prepared, drawn).composite(far).bgr, Renderer(s.prepared, plain).composite(far).bgr, cv::NORM_INF), 0.0);
+}
+
 TEST(Renderer, UnmovedSurfaceDrawsBackToItsPixels) {
   RenderParams p = params();
   p.keep_still = false;  // so that every pixel is really drawn

@@ -1,0 +1,81 @@
+#include "calipso_render/surface_texture.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace calipso::render {
+namespace {
+
+// A box of 2 x 1 x 0.5 with its middle at (1, 2, 3), every side split in the middle.
+void makeBox(Points& vertices, Triangles& triangles) {
+  const Eigen::Vector3f middle(1, 2, 3), half(1.0f, 0.5f, 0.25f);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float side : {-1.0f, 1.0f}) {
+      const int s = (axis + 1) % 3, t = (axis + 2) % 3, first = static_cast<int>(vertices.size());
+      for (const auto& [a, b] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}, {0, 0}}) {
+        Eigen::Vector3f p;
+        p[axis] = side, p[s] = static_cast<float>(a), p[t] = static_cast<float>(b);
+        vertices.push_back(middle + p.cwiseProduct(half));
+      }
+      for (int k = 0; k < 4; ++k) triangles.push_back({first + k, first + (k + 1) % 4, first + 4});
+    }
+  }
+}
+
+TEST(SurfaceTexture, InterpolatesALinearFunctionExactly) {
+  Points vertices = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}};
+  const Triangles triangles = {{0, 1, 2}};
+  SurfaceTexture texture(vertices, triangles, 0.3f, 1000);
+  ASSERT_GT(texture.size(), 10u);
+  const auto value = [](const Eigen::Vector3f& w) { return cv::Vec4f(w[0], 2.0f * w[1], w[0] - w[2], 1.0f); };
+  for (std::size_t i = 0; i < texture.size(); ++i) texture.texels[i] = value(texture.weightsOf(0, i));
+  for (const Eigen::Vector3f& w : {Eigen::Vector3f(1, 0, 0), Eigen::Vector3f(0, 0, 1), Eigen::Vector3f(0.31f, 0.33f, 0.36f), Eigen::Vector3f(0.05f, 0.9f, 0.05f)}) {
+    for (int c = 0; c < 4; ++c) EXPECT_NEAR(texture.at(0, w)[c], value(w)[c], 1e-5f) << w.transpose();
+  }
+}
+
+TEST(SurfaceTexture, GetsCoarserRatherThanTooLarge) {
+  Points vertices;
+  Triangles triangles;
+  makeBox(vertices, triangles);
+  EXPECT_LE(SurfaceTexture(vertices, triangles, 1e-4f, 500).size(), 500u);
+}
+
+TEST(MirrorPlanes, OfABoxAreItsThreeMiddlePlanes) {
+  Points vertices;
+  Triangles triangles;
+  makeBox(vertices, triangles);
+  const std::vector<MirrorPlane> planes = mirrorPlanes(vertices, triangles);
+  ASSERT_EQ(planes.size(), 3u);
+  for (const MirrorPlane& p : planes) {
+    EXPECT_NEAR(p.normal.cwiseAbs().maxCoeff(), 1.0f, 1e-4f);
+    EXPECT_NEAR(p.normal.dot(Eigen::Vector3f(1, 2, 3)), p.offset, 1e-4f);
+  }
+}
+
+TEST(MirrorPlanes, OfALopsidedShapeAreNone) {
+  const Points vertices = {{0, 0, 0}, {3, 0, 0}, {0, 1, 0}, {0.5f, 0.2f, 0.7f}};
+  EXPECT_TRUE(mirrorPlanes(vertices, {{0, 1, 2}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}).empty());
+}
+
+// The values known at the ends of a strip run evenly between them; a second vertex at a known place is known too.
+TEST(DiffuseOverMesh, IsHarmonic) {
+  Points vertices;
+  Triangles triangles;
+  for (int i = 0; i < 5; ++i) vertices.emplace_back(i, 0, 0), vertices.emplace_back(i, 1, 0);
+  for (int i = 0; i < 4; ++i) triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1}), triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+  vertices.emplace_back(4, 0, 0);
+  std::vector<bool> known(vertices.size(), false);
+  std::vector<cv::Vec3f> values(vertices.size());
+  known[0] = known[1] = known[8] = known[9] = true;
+  values[8] = values[9] = {1, 1, 1};
+  diffuseOverMesh(vertices, triangles, known, values);
+  EXPECT_NEAR(values[4][0] + values[5][0], 1.0f, 0.02f);  // the middle; the pull to the mean is 1e-4
+  EXPECT_LT(values[2][0], values[4][0]);
+  EXPECT_LT(values[4][0], values[6][0]);
+  EXPECT_FLOAT_EQ(values[10][0], 1.0f);
+}
+
+}  // namespace
+}  // namespace calipso::render
