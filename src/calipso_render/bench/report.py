@@ -14,6 +14,7 @@ COLUMNS = [
     ("roughness_error_percent", "roughness, %"), ("undeformed_psnr_db", "unmoved, dB"),
     ("seam_psnr_db", "unmoved seam, dB"), ("undeformed_drawn_psnr_db", "unmoved, all drawn, dB"),
     ("seam_drawn_psnr_db", "seam, all drawn, dB"), ("moved_psnr_db", "moved, dB"),
+    ("moved_from_clip_psnr_db", "moved, texture from the clip, dB"),
     ("shadow_psnr_db", "around moved, dB"), ("moved_copied_psnr_db", "moved, not relit, dB"),
     ("ms_prepare", "prepare, ms"), ("ms_frame_live", "live, ms"), ("ms_frame_final", "final, ms"),
 ]
@@ -22,7 +23,8 @@ HEADER = """# Appearance
 
 Written by `src/calipso_render/bench/report.py`. The true shape, pose and masks stand in for alignment and
 segmentation. "moved": later frames drawn again from the key frame's appearance with the true motion; the worst
-frame counts. "all drawn": no pixel of the frame is kept. "live" and "final": every object lifted, so that all of
+frame counts; "texture from the clip": further frames add what the key frame does not show, and frames between those are
+judged. "all drawn": no pixel of the frame is kept, what drawing misses goes along as a residual. "live" and "final": every object lifted, so that all of
 it is drawn, shaded and replaced. Times are wall times of the machine while it ran, best of five.
 
 """

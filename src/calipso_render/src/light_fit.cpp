@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kFewestSamples = 60;
 constexpr std::size_t kStarts = 3;
+constexpr double kTelling = 3.0;        // of log-likelihood: a direction is better than most
 constexpr double kShadowsSpeak = 12.0;  // of log-likelihood: cast shadows are seen where this light casts them
 constexpr double kRobust = 0.15;        // relative residual beyond which a pixel counts less
 constexpr double kLogRange = 4.0;       // of a light's colour: e^4 times brighter or darker than the unit
@@ -187,8 +188,9 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up, cons
   if (!best.from_shadows) {
     for (const LightCandidate& start : starts) tryStart(evidence, up, start, true, best);
   }
-  // Shading alone may lead below the horizon: then the search's direction stands, as it does where shadows tell it.
-  if (!best.determined) tryStart(evidence, up, starts.front(), false, best);
+  // Shading alone may lead below the horizon: then the search's direction stands, if it stands out, as it does where
+  // shadows tell it.
+  if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling)) tryStart(evidence, up, starts.front(), false, best);
   if (!best.determined || !evidence.gloss) return best;
   if (const std::optional<Gloss> gloss = evidence.gloss(best)) best.gloss = *gloss;
   return best;

@@ -157,7 +157,8 @@ std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eig
   for (const LightCandidate& c : spread(from_shadows, kShadowApart, count)) kept.push_back(c);
   std::stable_sort(kept.begin(), kept.end(), better);
   kept.resize(std::min(kept.size(), count));
-  for (LightCandidate& c : kept) c = search.refined(c);
+  const double contrast = all[all.size() / 2].misfit - all.front().misfit;
+  for (LightCandidate& c : kept) c = search.refined(c), c.contrast = contrast;
   std::stable_sort(kept.begin(), kept.end(), better);
   return kept;
 }

@@ -10,6 +10,7 @@ namespace calipso::render {
 struct LightCandidate {
   Eigen::Vector3f direction;
   double misfit = 0.0;      // minus a log-likelihood of shading and cast shadows
+  double contrast = 0.0;    // of shading alone: how much better the best direction is than half of all; 0: nothing tells
   cv::Vec3f ambient, sun;   // their sum is 1
 };
 
