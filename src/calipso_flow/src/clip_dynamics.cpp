@@ -9,6 +9,9 @@ namespace calipso::flow {
 
 namespace {
 
+constexpr size_t kRecentFrames = 8;  // kept, to be looked at again when an object starts to deform
+constexpr int kLeftFrames = 2;       // in which an object must have left its place
+
 // Largest image motion of the object's followed points between the first state and any other, px,
 // were the camera at rest.
 double largestImageMotion(const std::vector<MotionState>& states, const Camera& camera,
@@ -38,6 +41,30 @@ double scaleDeviation(const ObjectModel& model, const Eigen::Vector3d& position,
   return variance > 0.0 ? std::sqrt(variance) / sight.norm() : 0.0;
 }
 
+std::string summaryOf(const DeformationMotion& deformation) {
+  char text[160];
+  std::string result = ", deforms";
+  for (const SurfaceLine& line : deformation.lines) {
+    std::snprintf(text, sizeof text, ", %.3f +- %.3f Hz%s", line.line.frequency,
+                  line.line.deviation, line.wave_vector.isZero() ? "" : " travelling");
+    result += text;
+  }
+  if (deformation.stiffness) {
+    std::snprintf(text, sizeof text, ", proposed E/rho %.4g +- %.2g m^2/s^2",
+                  deformation.stiffness->value, deformation.stiffness->deviation);
+    result += text;
+  }
+  if (deformation.wind) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& w : deformation.wind->velocity) mean += w;
+    mean /= static_cast<double>(deformation.wind->velocity.size());
+    std::snprintf(text, sizeof text, ", mean wind (%.2f, %.2f, %.2f) m/s", mean.x(), mean.y(),
+                  mean.z());
+    result += text;
+  }
+  return result + (deformation.note.empty() ? "" : " (" + deformation.note + ")");
+}
+
 }  // namespace
 
 std::string summary(const std::vector<ObjectDynamics>& objects) {
@@ -58,6 +85,7 @@ std::string summary(const std::vector<ObjectDynamics>& objects) {
                     trajectory.gravity->acceleration.norm(), trajectory.gravity->deviation);
       text += number;
     }
+    if (object.deformation) text += summaryOf(*object.deformation);
   }
   return text;
 }
@@ -65,15 +93,17 @@ std::string summary(const std::vector<ObjectDynamics>& objects) {
 ClipAnalyser::ClipAnalyser(const Frame& key_frame, const std::vector<ObjectModel>& models,
                            const std::vector<cv::Mat>& masks, const Eigen::Vector3d& gravity,
                            const DynamicsParams& params)
-    : params_(params), gravity_(gravity), last_(key_frame), times_{key_frame.time} {
+    : params_(params), gravity_(gravity), key_(key_frame), last_(key_frame),
+      times_{key_frame.time} {
   if (models.size() != masks.size()) {
     throw std::invalid_argument("clip analyser: " + std::to_string(models.size()) +
                                 " models but " + std::to_string(masks.size()) +
                                 " masks; give one mask (or an empty one) per model");
   }
   for (size_t i = 0; i < models.size(); ++i) {
-    trackers_.emplace_back(models[i], key_frame, masks[i], params.tracker);
-    observations_.push_back({trackers_.back().keyObservation()});
+    ObjectTracker tracker(models[i], key_frame, masks[i], params.tracker);
+    const Observation key = tracker.keyObservation();
+    objects_.push_back(Followed{std::move(tracker), masks[i], {key}, 0, nullptr, {}});
   }
 }
 
@@ -86,30 +116,72 @@ void ClipAnalyser::add(const Frame& frame) {
   }
   const bool cut = isCut(last_, frame, params_.cut_correlation);
   if (cut) cut_times_.push_back(0.5 * (times_.back() + frame.time));
-  for (size_t i = 0; i < trackers_.size(); ++i) {
-    observations_[i].push_back(trackers_[i].track(frame, cut));
-  }
+  recent_.push_back(frame);
+  if (recent_.size() > kRecentFrames) recent_.pop_front();
+  for (Followed& object : objects_) follow(frame, cut, object);
   times_.push_back(frame.time);
   last_ = frame;
 }
 
+void ClipAnalyser::follow(const Frame& frame, bool cut, Followed& object) const {
+  if (object.deformable) {
+    object.deformations.push_back(object.deformable->track(frame, cut));
+    object.observations.push_back(
+        rigidPart(*object.deformable, object.deformations.back(), object.tracker.centroid()));
+    return;
+  }
+  object.observations.push_back(object.tracker.track(frame, cut));
+  const ObjectModel& model = object.tracker.model();
+  const bool left = !model.attached.empty() &&
+                    hasLeft(object.observations.back(), model.world_from_object, frame.camera,
+                            params_.rest_px);
+  object.frames_left = left ? object.frames_left + 1 : 0;
+  if (object.frames_left >= kLeftFrames) beginDeformable(object);
+}
+
+// Looks at the frames just seen again; before them the object was in its place.
+void ClipAnalyser::beginDeformable(Followed& object) const {
+  object.deformable = std::make_unique<DeformableTracker>(object.tracker.model(), key_, object.mask,
+                                                          params_.tracker);
+  const size_t before = object.observations.size() - recent_.size();
+  for (size_t k = 0; k < before; ++k) {
+    object.deformations.push_back(object.deformable->keyObservation());
+    object.deformations.back().time = object.observations[k].time;
+  }
+  for (const Frame& frame : recent_) {
+    const size_t k = object.deformations.size();
+    const bool cut = std::any_of(cut_times_.begin(), cut_times_.end(), [&](double time) {
+      return time > object.observations[k - 1].time && time < frame.time;
+    });
+    object.deformations.push_back(object.deformable->track(frame, cut));
+    object.observations[k] =
+        rigidPart(*object.deformable, object.deformations.back(), object.tracker.centroid());
+  }
+}
+
 std::vector<ObjectDynamics> ClipAnalyser::finish() const {
-  std::vector<ObjectDynamics> result(trackers_.size());
-  for (size_t i = 0; i < trackers_.size(); ++i) result[i] = finishObject(i);
+  std::vector<ObjectDynamics> result;
+  for (const Followed& object : objects_) result.push_back(finishObject(object));
   return result;
 }
 
-ObjectDynamics ClipAnalyser::finishObject(size_t index) const {
-  const ObjectTracker& tracker = trackers_[index];
+ObjectDynamics ClipAnalyser::finishObject(const Followed& object) const {
+  const ObjectTracker& tracker = object.tracker;
   ObjectDynamics dynamics;
   dynamics.name = tracker.model().name;
   dynamics.diagonal = boundingDiagonal(tracker.model().mesh);
-  dynamics.observations = observations_[index];
+  dynamics.observations = object.observations;
+  if (object.deformable) {
+    dynamics.deformation =
+        describeDeformation(*object.deformable, object.deformations, gravity_);
+    if (dynamics.deformation->modes.count() == 0) dynamics.deformation.reset();
+  }
   const auto measurements = measurementsOf(dynamics.observations, tracker.centroid());
   const Camera& camera = last_.camera;
   const double depth =
       (camera.world_from_camera.inverse() * measurements.front().position).norm();
   TrajectoryParams trajectory = params_.trajectory;
+  if (object.deformable) trajectory.max_collisions = 0;  // a swing is no collision
   trajectory.still = [&](const std::vector<MotionState>& states) {
     return largestImageMotion(states, camera, tracker) < params_.rest_px;
   };
@@ -118,8 +190,9 @@ ObjectDynamics ClipAnalyser::finishObject(size_t index) const {
   const double scale = scaleDeviation(tracker.model(), measurements.front().position, camera);
   for (size_t k = 0; k < measurements.size(); ++k) {
     dynamics.trajectory.states[k].addScaleUncertainty(scale);
-    dynamics.motions.push_back(motionFrom(dynamics.trajectory.states[k], tracker.centroid(),
-                                          dynamics.trajectory.movingAt(measurements[k].time),
+    const bool moving =
+        dynamics.deformation || dynamics.trajectory.movingAt(measurements[k].time);
+    dynamics.motions.push_back(motionFrom(dynamics.trajectory.states[k], tracker.centroid(), moving,
                                           dynamics.observations[k].inliers()));
   }
   dynamics.motions.front().world_from_object = tracker.model().world_from_object;

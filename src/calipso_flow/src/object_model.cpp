@@ -1,5 +1,6 @@
 #include "calipso_flow/object_model.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -24,6 +25,18 @@ Eigen::Vector3d surfaceCentre(const TriangleMesh& mesh) {
 }
 
 }  // namespace
+
+std::vector<int> verticesIn(const std::vector<AttachmentBox>& boxes, const ObjectModel& model) {
+  std::vector<int> inside;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    const Eigen::Vector3d p = model.world_from_object * model.mesh.vertex(i);
+    const bool held = std::any_of(boxes.begin(), boxes.end(), [&](const AttachmentBox& box) {
+      return (p.array() >= box.min.array()).all() && (p.array() <= box.max.array()).all();
+    });
+    if (held) inside.push_back(i);
+  }
+  return inside;
+}
 
 Eigen::Vector3d centroid(const TriangleMesh& mesh) {
   if (mesh.triangleCount() == 0) {

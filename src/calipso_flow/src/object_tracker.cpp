@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "calipso_flow/coarse_search.hpp"
+#include "calipso_flow/look_match.hpp"
 #include "calipso_flow/rotation.hpp"
 
 namespace calipso::flow {
@@ -22,71 +21,23 @@ constexpr int kForgetAfter = 3;         // frames without the object before its 
 constexpr int kWeakInliers = 12;         // fewer tracks than this are worth another attempt
 constexpr double kReturnDeviations = 3.0;
 constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
-constexpr int kSurrounding = 16;         // px of the frame around the object's window; even
-
-// A picture and its half-size copy.
-struct Pyramid {
-  ImageWindow full, half;
-};
-
-Pyramid pyramidOf(const ImageWindow& window) {
-  Pyramid pyramid{window, {{}, 0.5 * window.origin}};
-  cv::pyrDown(window.image, pyramid.half.image);
-  return pyramid;
-}
-
-// The warped look of the object, and the frame it is to be found in.
-struct Match {
-  Pyramid look, weight, frame;
-};
-
-Match prepareMatch(const ReferenceView::Warped& look, const cv::Mat& picture) {
-  const cv::Point origin(static_cast<int>(look.gray.origin.x),
-                         static_cast<int>(look.gray.origin.y));
-  // The frame around the object, at even pixels like the look.
-  const cv::Rect around(origin - cv::Point(kSurrounding, kSurrounding),
-                        look.gray.image.size() + cv::Size(2 * kSurrounding, 2 * kSurrounding));
-  const cv::Rect inside = around & cv::Rect({0, 0}, picture.size());
-  return {pyramidOf(look.gray), pyramidOf(look.weight),
-          pyramidOf({picture(inside), cv::Point2d(inside.tl())})};
-}
-
-// A match at half size, in coordinates of the full size: reaches far, but is not precise.
-std::optional<PatchMatch> matchRoughly(const Match& match, const Eigen::Vector2d& at,
-                                       const PatchParams& params) {
-  const Eigen::Vector2d half = 0.5 * at;
-  auto rough = matchPatch({match.look.half, half, match.weight.half, half}, match.frame.half, half,
-                          params);
-  if (!rough) return std::nullopt;
-  rough->position *= 2.0;
-  rough->covariance *= 4.0;
-  return rough;
-}
-
-// Distance at which the match, followed back into the look, misses the point where it began.
-double missOnReturn(const Match& match, const Eigen::Vector2d& at, const PatchMatch& there,
-                    const PatchParams& params) {
-  const auto back = matchPatch({match.frame.full, there.position, match.weight.full, at},
-                               match.look.full, at, params);
-  return back ? (back->position - at).norm() : std::numeric_limits<double>::infinity();
-}
 
 // A precise match that is as likely and as certain as asked for, and comes back.
-std::optional<PatchMatch> matchPrecisely(const Match& match, const Eigen::Vector2d& at,
+std::optional<PatchMatch> matchPrecisely(const LookMatch& match, const Eigen::Vector2d& at,
                                          const TrackerParams& params) {
-  const auto there = matchPatch({match.look.full, at, match.weight.full, at}, match.frame.full, at,
-                                params.patch);
+  const auto there = match.fine(at, params.patch);
   if (!there) return std::nullopt;
   // A patch with little texture wanders with the noise, and is trusted accordingly.
   const double deviation = std::sqrt(there->covariance.trace());
   if (deviation > params.largest_deviation_px) return std::nullopt;
   const double allowed = params.forward_backward_px + kReturnDeviations * deviation;
-  if (missOnReturn(match, at, *there, params.patch) > allowed) return std::nullopt;
+  const auto back = match.missOnReturn(at, *there, params.patch);
+  if (!back || back->norm() > allowed) return std::nullopt;
   return there;
 }
 
 // Follows the reference's seeds into the frame, the object's look being warped to `pose`.
-std::vector<Track> followSeeds(const Match& match, const ReferenceView& reference,
+std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& reference,
                                const Camera& camera, const Eigen::Isometry3d& pose, bool rough,
                                const TrackerParams& params, std::vector<Correspondence>& found) {
   std::vector<Track> tracks;
@@ -96,7 +47,7 @@ std::vector<Track> followSeeds(const Match& match, const ReferenceView& referenc
     if (p_camera.z() <= 0.0) continue;
     const Eigen::Vector2d at = camera.project(p_camera);
     const auto there =
-        rough ? matchRoughly(match, at, params.patch) : matchPrecisely(match, at, params);
+        rough ? match.rough(at, params.patch) : matchPrecisely(match, at, params);
     if (!there || there->correlation < params.least_correlation) continue;
     found.push_back({seed, there->position, there->covariance});
     tracks.push_back({seed, there->position, there->correlation, false});
@@ -222,7 +173,7 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   observation.coverage = look.coverage;
   if (look.coverage == 0.0) return pose;
   std::vector<Correspondence> found;
-  observation.tracks = followSeeds(prepareMatch(look, frame.gray), reference, frame.camera, pose,
+  observation.tracks = followSeeds(LookMatch(look, frame.gray), reference, frame.camera, pose,
                                    rough, params_, found);
   const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params_.pose);
   // Few agreeing matches where many are due are the background, not the object.

@@ -1,6 +1,7 @@
 #include "calipso_flow/patch_match.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -10,12 +11,11 @@
 namespace calipso::flow {
 namespace {
 
-// A patch whose weaker gradient direction varies by less than this, in grey levels per pixel, gives
-// no reliable position.
-constexpr double kLeastGradient = 0.4;
-
 // A match whose contrast is a smaller share of the patch's shows another surface.
 constexpr double kLeastGain = 0.2;
+
+// Deviation along a patch's stripes: nothing is known.
+constexpr double kAlongPx = 1e3;
 
 // The patch as a linear model of what the target shows near the right place:
 //   I(x + d) = gain T(x) + offset + ramp . x - gain grad T(x) . e,   e = error of d.
@@ -32,6 +32,13 @@ struct PatchModel {
   double support = 0.0;              // pixels that count
   Eigen::LDLT<TermsMatrix> factor;
   TermsMatrix inverse;
+  bool striped = false;          // matched along `across` only, which the first term stands for
+  Eigen::Vector2d across = Eigen::Vector2d::Zero();
+
+  // The displacement that the two gradient terms' coefficients mean.
+  Eigen::Vector2d direction(const Eigen::Vector2d& coefficients) const {
+    return striped ? Eigen::Vector2d(coefficients.x() * across) : coefficients;
+  }
 };
 
 double dot(const Values& a, const Values& b) {
@@ -66,14 +73,12 @@ bool sampleSquare(const ImageWindow& window, const Eigen::Vector2d& at, int radi
   return true;
 }
 
-// True when enough gradient is left in every direction after gain, offset and ramp are taken out.
-bool hasTexture(const TermsMatrix& inverse, double support) {
+// Gradient energy in the picture's directions that is left after gain, offset and ramp are taken out.
+// Nothing when the patch is flat.
+std::optional<Eigen::Matrix2d> gradientEnergy(const TermsMatrix& inverse) {
   const Eigen::Matrix2d covariance = inverse.topLeftCorner<2, 2>();
-  if (!covariance.allFinite() || covariance.determinant() <= 0.0) return false;
-  const Eigen::Matrix2d energy = covariance.inverse();
-  const double half_trace = 0.5 * energy.trace();
-  const double spread = std::sqrt(std::max(0.0, half_trace * half_trace - energy.determinant()));
-  return half_trace - spread > kLeastGradient * kLeastGradient * support;
+  if (!covariance.allFinite() || covariance.determinant() <= 0.0) return std::nullopt;
+  return covariance.inverse();
 }
 
 // Fills the terms from grey values and weights that have one more ring than the patch, for central
@@ -105,6 +110,30 @@ void fillTerms(const Values& values, const Values& weights, int radius, PatchMod
   }
 }
 
+void factorise(PatchModel& model) {
+  TermsMatrix normal;
+  for (int a = 0; a < kTerms; ++a) {
+    for (int b = 0; b <= a; ++b) {
+      normal(a, b) = normal(b, a) = dot(model.terms[a], model.terms[b]);
+    }
+  }
+  if (model.striped) normal(kGradientY, kGradientY) = 1.0;
+  model.factor.compute(normal);
+  model.inverse = model.factor.solve(TermsMatrix::Identity());
+}
+
+// Leaves only motion along `across` free.
+void restrictTo(const Eigen::Vector2d& across, PatchModel& model) {
+  Values &x = model.terms[kGradientX], &y = model.terms[kGradientY];
+  for (size_t p = 0; p < x.size(); ++p) {
+    x[p] = static_cast<float>(across.x() * x[p] + across.y() * y[p]);
+    y[p] = 0.0f;
+  }
+  model.striped = true;
+  model.across = across;
+  factorise(model);
+}
+
 std::optional<PatchModel> buildModel(const PatchSource& source, const PatchParams& params) {
   Values values, weights;
   if (!sampleSquare(source.gray, source.at, params.radius_px + 1, values)) return std::nullopt;
@@ -115,15 +144,14 @@ std::optional<PatchModel> buildModel(const PatchSource& source, const PatchParam
   fillTerms(values, weights, params.radius_px, model);
   const double pixels = static_cast<double>(model.terms[kOne].size());
   if (model.support < params.least_support * pixels) return std::nullopt;
-  TermsMatrix normal;
-  for (int a = 0; a < kTerms; ++a) {
-    for (int b = 0; b <= a; ++b) {
-      normal(a, b) = normal(b, a) = dot(model.terms[a], model.terms[b]);
-    }
-  }
-  model.factor.compute(normal);
-  model.inverse = model.factor.solve(TermsMatrix::Identity());
-  if (!hasTexture(model.inverse, model.support)) return std::nullopt;
+  factorise(model);
+  const std::optional<Eigen::Matrix2d> energy = gradientEnergy(model.inverse);
+  if (!energy) return std::nullopt;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> directions(*energy);
+  const double least = params.least_gradient * params.least_gradient * model.support;
+  if (directions.eigenvalues()[0] > least) return model;
+  if (!params.stripes || directions.eigenvalues()[1] <= least) return std::nullopt;
+  restrictTo(directions.eigenvectors().col(1), model);
   return model;
 }
 
@@ -154,6 +182,11 @@ PatchMatch makeMatch(const PatchModel& model, const Regression& fit,
   PatchMatch match;
   match.position = position;
   match.covariance = model.inverse.topLeftCorner<2, 2>() * noise / (gain * gain);
+  if (model.striped) {
+    const Eigen::Vector2d along(-model.across.y(), model.across.x());
+    match.covariance = match.covariance(0, 0) * model.across * model.across.transpose() +
+                       kAlongPx * kAlongPx * along * along.transpose();
+  }
   match.correlation = std::sqrt(
       std::max(0.0, 1.0 - fit.squared_residual / std::max(1e-9, fit.squared_signal)));
   return match;
@@ -172,7 +205,7 @@ std::optional<PatchMatch> matchPatch(const PatchSource& source, const ImageWindo
     const Regression fit = regress(*model, sampled);
     const double gain = fit.coefficients[kValue];
     if (gain < kLeastGain) return std::nullopt;
-    const Eigen::Vector2d step = -fit.coefficients.head<2>() / gain;
+    const Eigen::Vector2d step = -model->direction(fit.coefficients.head<2>()) / gain;
     if (!(step.norm() < params.radius_px)) return std::nullopt;
     position += step;
     if (step.norm() < params.converged_px) return makeMatch(*model, fit, position);

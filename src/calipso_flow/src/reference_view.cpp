@@ -64,52 +64,113 @@ void ReferenceView::chooseSeeds(int count) {
   }
 }
 
+struct ReferenceView::WarpMap {
+  cv::Mat source;  // CV_32FC2: pixel of the reference
+  cv::Mat weight;  // CV_32F
+  cv::Mat covered;  // CV_8U
+  // @param window  of the view; the map gets a margin and starts at even pixels, so that its
+  //   half-size copy keeps simple coordinates
+  explicit WarpMap(const cv::Rect& window)
+      : origin((window.x - kMargin) & ~1, (window.y - kMargin) & ~1), offset(window.tl() - origin) {
+    const cv::Size size(window.br().x + kMargin - origin.x, window.br().y + kMargin - origin.y);
+    source = cv::Mat(size, CV_32FC2, cv::Scalar(-1e4, -1e4));
+    weight = cv::Mat(size, CV_32F, cv::Scalar(0));
+    covered = cv::Mat(size, CV_8U, cv::Scalar(0));
+  }
+  cv::Point origin, offset;
+};
+
+bool ReferenceView::note(const Eigen::Vector3d& p_reference, int x, int y, WarpMap& map) const {
+  const cv::Point at(x + map.offset.x, y + map.offset.y);
+  map.covered.at<uchar>(at) = 255;
+  if (p_reference.z() <= 0.0) return false;
+  const Eigen::Vector2d pixel = frame_.camera.project(p_reference);
+  const float there = surface_.depthAt(pixel.x(), pixel.y());
+  if (there <= 0.0f || std::abs(there - p_reference.z()) > kSameSurface * diagonal_) return false;
+  map.source.at<cv::Vec2f>(at) = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
+  const cv::Point nearest(cvRound(pixel.x()) - surface_.window.x,
+                          cvRound(pixel.y()) - surface_.window.y);
+  if (usable_.at<uchar>(nearest) == 0) return false;
+  map.weight.at<float>(at) = 1.0f;
+  return true;
+}
+
+ReferenceView::Warped ReferenceView::finish(const WarpMap& map, int visible, int known) const {
+  Warped warped;
+  cv::remap(frame_.gray, warped.gray.image, map.source, cv::noArray(), cv::INTER_CUBIC,
+            cv::BORDER_CONSTANT, cv::Scalar(0));
+  warped.weight.image = map.weight;
+  warped.covered = map.covered;
+  warped.gray.origin = warped.weight.origin = cv::Point2d(map.origin);
+  warped.coverage = visible > 0 ? static_cast<double>(known) / visible : 0.0;
+  return warped;
+}
+
 ReferenceView::Warped ReferenceView::warp(const Camera& camera,
                                           const Eigen::Isometry3d& world_from_object) const {
-  Warped warped;
   const Eigen::Isometry3d camera_from_object =
       camera.world_from_camera.inverse() * world_from_object;
   const SurfaceView view = viewSurface(mesh_, camera, camera_from_object);
-  if (view.empty() || surface_.empty()) return warped;
-
-  // The window starts at even pixels, so that its half-size copy keeps simple coordinates.
-  const int left = (view.window.x - kMargin) & ~1, top = (view.window.y - kMargin) & ~1;
-  const cv::Size size(view.window.br().x + kMargin - left, view.window.br().y + kMargin - top);
-  const cv::Point offset = view.window.tl() - cv::Point(left, top);
-  cv::Mat map(size, CV_32FC2, cv::Scalar(-1e4, -1e4));
-  warped.weight.image = cv::Mat(size, CV_32F, cv::Scalar(0));
-
+  if (view.empty() || surface_.empty()) return {};
+  WarpMap map(view.window);
   const Eigen::Isometry3d reference_from_camera = frame_.camera.world_from_camera.inverse() *
                                                   world_from_object_ *
                                                   camera_from_object.inverse();
   int visible = 0, known = 0;
   for (int y = 0; y < view.depth.rows; ++y) {
     const float* depth = view.depth.ptr<float>(y);
-    cv::Vec2f* source = map.ptr<cv::Vec2f>(y + offset.y) + offset.x;
-    float* weight = warped.weight.image.ptr<float>(y + offset.y) + offset.x;
     for (int x = 0; x < view.depth.cols; ++x) {
       if (depth[x] <= 0.0f) continue;
       ++visible;
-      const Eigen::Vector3d p_reference =
-          reference_from_camera *
-          (depth[x] * camera.ray(x + view.window.x, y + view.window.y));
-      if (p_reference.z() <= 0.0) continue;
-      const Eigen::Vector2d pixel = frame_.camera.project(p_reference);
-      const float there = surface_.depthAt(pixel.x(), pixel.y());
-      if (there <= 0.0f || std::abs(there - p_reference.z()) > kSameSurface * diagonal_) continue;
-      source[x] = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
-      const cv::Point nearest(cvRound(pixel.x()) - surface_.window.x,
-                              cvRound(pixel.y()) - surface_.window.y);
-      if (usable_.at<uchar>(nearest) == 0) continue;
-      weight[x] = 1.0f;
-      ++known;
+      const Eigen::Vector3d ray = camera.ray(x + view.window.x, y + view.window.y);
+      known += note(reference_from_camera * (depth[x] * ray), x, y, map);
     }
   }
-  cv::remap(frame_.gray, warped.gray.image, map, cv::noArray(), cv::INTER_CUBIC,
-            cv::BORDER_CONSTANT, cv::Scalar(0));
-  warped.gray.origin = warped.weight.origin = cv::Point2d(left, top);
-  warped.coverage = visible > 0 ? static_cast<double>(known) / visible : 0.0;
-  return warped;
+  return finish(map, visible, known);
+}
+
+ReferenceView::Warped ReferenceView::warp(const Camera& camera,
+                                          const Eigen::Isometry3d& world_from_object,
+                                          const decltype(TriangleMesh::vertices)& deformed) const {
+  if (surface_.empty()) return {};
+  const auto inCamera = [](const decltype(TriangleMesh::vertices)& points,
+                           const Eigen::Isometry3d& pose) -> decltype(TriangleMesh::vertices) {
+    return (points * pose.linear().transpose()).rowwise() + pose.translation().transpose();
+  };
+  const CarriedView view = carrySurface(
+      mesh_, camera, inCamera(deformed, camera.world_from_camera.inverse() * world_from_object),
+      inCamera(mesh_.vertices, frame_.camera.world_from_camera.inverse() * world_from_object_));
+  if (view.window.area() == 0) return {};
+  WarpMap map(view.window);
+  int visible = 0, known = 0;
+  for (int y = 0; y < view.position.rows; ++y) {
+    const cv::Vec3f* position = view.position.ptr<cv::Vec3f>(y);
+    for (int x = 0; x < view.position.cols; ++x) {
+      if (position[x][2] <= 0.0f) continue;
+      ++visible;
+      known += note({position[x][0], position[x][1], position[x][2]}, x, y, map);
+    }
+  }
+  return finish(map, visible, known);
+}
+
+std::vector<Eigen::Vector3d> ReferenceView::gridPoints(int count) const {
+  std::vector<Eigen::Vector3d> points;
+  if (surface_.empty()) return points;
+  const double area = cv::countNonZero(usable_);
+  const double spacing = std::max(4.0, std::sqrt(area / count));
+  const Eigen::Isometry3d object_from_camera =
+      world_from_object_.inverse() * frame_.camera.world_from_camera;
+  for (double v = 0.5 * spacing; v < usable_.rows; v += spacing) {
+    for (double u = 0.5 * spacing; u < usable_.cols; u += spacing) {
+      const cv::Point at(static_cast<int>(u), static_cast<int>(v));
+      if (usable_.at<uchar>(at) == 0) continue;
+      const Eigen::Vector3d ray =
+          frame_.camera.ray(at.x + surface_.window.x, at.y + surface_.window.y);
+      points.push_back(object_from_camera * (surface_.depth.at<float>(at) * ray));
+    }
+  }
+  return points;
 }
 
 }  // namespace calipso::flow

@@ -14,11 +14,13 @@ struct ProjectedVertex {
   double inverse_z;   // 1/m; 0 = behind the camera
 };
 
-std::vector<ProjectedVertex> projectVertices(const TriangleMesh& mesh, const Camera& camera,
-                                             const Eigen::Isometry3d& camera_from_object) {
-  std::vector<ProjectedVertex> projected(mesh.vertexCount());
-  for (int i = 0; i < mesh.vertexCount(); ++i) {
-    const Eigen::Vector3d p = camera_from_object * mesh.vertex(i);
+using Vertices = decltype(TriangleMesh::vertices);
+
+// @param vertices  camera frame
+std::vector<ProjectedVertex> projectVertices(const Vertices& vertices, const Camera& camera) {
+  std::vector<ProjectedVertex> projected(vertices.rows());
+  for (int i = 0; i < vertices.rows(); ++i) {
+    const Eigen::Vector3d p = vertices.row(i).transpose();
     if (p.z() < kNear) {
       projected[i] = {0.0, 0.0, 0.0};
       continue;
@@ -44,9 +46,10 @@ cv::Rect boundingWindow(const std::vector<ProjectedVertex>& vertices, const Came
   return {left, top, right - left + 1, bottom - top + 1};
 }
 
-// Writes the largest 1/z of the triangle's pixels. 1/z is linear in the picture.
-void drawTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const ProjectedVertex& c,
-                  const cv::Rect& window, cv::Mat& inverse_z) {
+// Calls draw(x, y, wb, wc) for the pixels of a triangle with their weights of b and c.
+template <class Draw>
+void scanTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const ProjectedVertex& c,
+                  const cv::Rect& window, Draw draw) {
   const double area = (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u);
   if (area == 0.0) return;
   const int x0 = std::max<int>(window.x, std::ceil(std::min({a.u, b.u, c.u})));
@@ -56,16 +59,23 @@ void drawTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const Proj
   const double db_du = (c.v - a.v) / area, db_dv = -(c.u - a.u) / area;
   const double dc_du = -(b.v - a.v) / area, dc_dv = (b.u - a.u) / area;
   for (int y = y0; y <= y1; ++y) {
-    float* row = inverse_z.ptr<float>(y - window.y) - window.x;
     for (int x = x0; x <= x1; ++x) {
       const double wb = db_du * (x - a.u) + db_dv * (y - a.v);
       const double wc = dc_du * (x - a.u) + dc_dv * (y - a.v);
-      if (wb < 0.0 || wc < 0.0 || wb + wc > 1.0) continue;
-      const double iz = a.inverse_z + wb * (b.inverse_z - a.inverse_z) +
-                        wc * (c.inverse_z - a.inverse_z);
-      row[x] = std::max(row[x], static_cast<float>(iz));
+      if (wb >= 0.0 && wc >= 0.0 && wb + wc <= 1.0) draw(x - window.x, y - window.y, wb, wc);
     }
   }
+}
+
+// Writes the largest 1/z of the triangle's pixels. 1/z is linear in the picture.
+void drawTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const ProjectedVertex& c,
+                  const cv::Rect& window, cv::Mat& inverse_z) {
+  scanTriangle(a, b, c, window, [&](int x, int y, double wb, double wc) {
+    const double iz =
+        a.inverse_z + wb * (b.inverse_z - a.inverse_z) + wc * (c.inverse_z - a.inverse_z);
+    float& nearest = inverse_z.at<float>(y, x);
+    nearest = std::max(nearest, static_cast<float>(iz));
+  });
 }
 
 }  // namespace
@@ -77,7 +87,9 @@ float SurfaceView::depthAt(double u, double v) const {
 
 SurfaceView viewSurface(const TriangleMesh& mesh, const Camera& camera,
                         const Eigen::Isometry3d& camera_from_object) {
-  const std::vector<ProjectedVertex> vertices = projectVertices(mesh, camera, camera_from_object);
+  const Vertices moved = (mesh.vertices * camera_from_object.linear().transpose()).rowwise() +
+                         camera_from_object.translation().transpose();
+  const std::vector<ProjectedVertex> vertices = projectVertices(moved, camera);
   SurfaceView view;
   view.window = boundingWindow(vertices, camera);
   if (view.empty()) return view;
@@ -92,6 +104,36 @@ SurfaceView viewSurface(const TriangleMesh& mesh, const Camera& camera,
   }
   cv::divide(1.0, inverse_z, view.depth);  // for CV_32F this gives inf where inverse_z is 0
   view.depth.setTo(0.0f, inverse_z == 0.0f);
+  return view;
+}
+
+CarriedView carrySurface(const TriangleMesh& mesh, const Camera& camera, const Vertices& moved,
+                         const Vertices& carried) {
+  const std::vector<ProjectedVertex> vertices = projectVertices(moved, camera);
+  CarriedView view;
+  view.window = boundingWindow(vertices, camera);
+  view.position = cv::Mat(view.window.size(), CV_32FC3, cv::Scalar::all(0.0));
+  if (view.window.area() == 0) return view;
+  cv::Mat inverse_z(view.window.size(), CV_32F, cv::Scalar(0));
+  for (int t = 0; t < mesh.triangleCount(); ++t) {
+    const Eigen::Vector3i corner = mesh.triangles.row(t).transpose();
+    const ProjectedVertex &a = vertices[corner[0]], &b = vertices[corner[1]],
+                          &c = vertices[corner[2]];
+    if (!(a.inverse_z > 0.0 && b.inverse_z > 0.0 && c.inverse_z > 0.0)) continue;
+    // carried / z is linear in the picture, as 1/z is.
+    const Eigen::Vector3d ca = carried.row(corner[0]).transpose() * a.inverse_z;
+    const Eigen::Vector3d cb = carried.row(corner[1]).transpose() * b.inverse_z - ca;
+    const Eigen::Vector3d cc = carried.row(corner[2]).transpose() * c.inverse_z - ca;
+    scanTriangle(a, b, c, view.window, [&](int x, int y, double wb, double wc) {
+      const double iz =
+          a.inverse_z + wb * (b.inverse_z - a.inverse_z) + wc * (c.inverse_z - a.inverse_z);
+      float& nearest = inverse_z.at<float>(y, x);
+      if (iz <= nearest) return;
+      nearest = static_cast<float>(iz);
+      const Eigen::Vector3f p = ((ca + wb * cb + wc * cc) / iz).cast<float>();
+      view.position.at<cv::Vec3f>(y, x) = {p.x(), p.y(), p.z()};
+    });
+  }
   return view;
 }
 

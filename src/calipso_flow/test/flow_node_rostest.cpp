@@ -118,6 +118,10 @@ class FlowNodeTest : public testing::Test {
     // Six frames of a 100 px box: a few per cent.
     EXPECT_NEAR(first.twist.twist.linear.x, kVelocity.x(), 0.05);
     EXPECT_NEAR(first.twist.twist.linear.z, kVelocity.z(), 0.05);
+    ASSERT_EQ(clip_.objects.size(), 1u);
+    EXPECT_EQ(clip_.objects[0].object, "box");
+    EXPECT_TRUE(clip_.objects[0].collisions.empty());
+    EXPECT_TRUE(clip_.cuts.empty());
   }
 
   ros::NodeHandle nh_;

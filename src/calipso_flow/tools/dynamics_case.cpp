@@ -12,6 +12,7 @@
 
 #include "calipso_flow/clip_dynamics.hpp"
 #include "calipso_scene/scene.hpp"
+#include "deformation_errors.hpp"
 #include "json_entry.hpp"
 #include "truth.hpp"
 
@@ -216,8 +217,8 @@ struct Cost {
   double track, fit;
 };
 
-std::string describe(const Scene& scene, const TrueObject& truth, const ObjectDynamics& dynamics,
-                     const Cost& cost) {
+std::string describe(const Scene& scene, const ObjectModel& model, const TrueObject& truth,
+                     const ObjectDynamics& dynamics, const Cost& cost) {
   const MotionErrors errors = motionErrors(scene, truth, dynamics);
   const Trajectory& trajectory = dynamics.trajectory;
   const bool moving = std::any_of(dynamics.motions.begin(), dynamics.motions.end(),
@@ -234,9 +235,11 @@ std::string describe(const Scene& scene, const TrueObject& truth, const ObjectDy
   entry.number("collisions_found", static_cast<double>(trajectory.collisions.size()));
   entry.number("sign_change_error_frames", signChangeError(scene, truth, dynamics));
   entry.number("restitution_error_percent", restitutionError(scene, truth, trajectory));
-  entry.null("frequency_error_percent").null("endpoint_error_px");
+  addDeformationErrors(model, scene.gravity, truth, dynamics, entry);
+  entry.null("endpoint_error_px");
   entry.number("covered_95", errors.covered);
-  if (truth.velocity.empty()) entry.flag("below_uncertainty", errors.below_uncertainty);
+  const bool still = truth.velocity.empty() && truth.vertices.empty();
+  if (still) entry.flag("below_uncertainty", errors.below_uncertainty);
   entry.number("track_ms_frame", cost.track).number("fit_ms_frame", cost.fit);
   return entry.number("ms_frame", cost.track + cost.fit).str();
 }
@@ -253,13 +256,15 @@ std::vector<std::string> evaluateScene(const std::string& directory, const std::
     const std::optional<TrueObject> truth = readTruth(directory, object.name);
     if (!truth) continue;
     object_models.push_back(modelOf(scene, object, *truth, models));
+    object_models.back().attached = verticesIn(object.attachments, object_models.back());
     masks.push_back(truth->mask_path.empty() ? cv::Mat()
                                              : cv::imread(truth->mask_path, cv::IMREAD_GRAYSCALE));
     truths.push_back(*truth);
   }
   if (truths.empty()) throw std::runtime_error(directory + " holds no truth to compare with");
 
-  ClipAnalyser analyser(makeFrame(0.0, readFrame(scene, 0), cameraOf(scene, 0)), object_models, masks, scene.gravity);
+  ClipAnalyser analyser(makeFrame(0.0, readFrame(scene, 0), cameraOf(scene, 0)), object_models,
+                        masks, scene.gravity);
   Cost cost{0.0, 0.0};
   for (int k = 1; k < scene.frame_count; ++k) {
     const cv::Mat picture = readFrame(scene, k);
@@ -272,7 +277,7 @@ std::vector<std::string> evaluateScene(const std::string& directory, const std::
   cost.fit = (cpuMilliseconds() - start) / scene.frame_count;
   std::vector<std::string> entries;
   for (size_t i = 0; i < dynamics.size(); ++i) {
-    entries.push_back(describe(scene, truths[i], dynamics[i], cost));
+    entries.push_back(describe(scene, object_models[i], truths[i], dynamics[i], cost));
     if (!trace.empty()) writeTrace(trace, scene, truths[i], dynamics[i]);
   }
   return entries;

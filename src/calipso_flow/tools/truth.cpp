@@ -2,7 +2,11 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <cstdint>
+#include <cstdio>
 #include <filesystem>
+#include <fstream>
+#include <stdexcept>
 
 namespace calipso::flow {
 namespace {
@@ -30,6 +34,33 @@ Eigen::Isometry3d readPose(const YAML::Node& node) {
   return pose;
 }
 
+// A NumPy file of 32-bit floats, frames x vertices x 3, in C order.
+// @throw std::runtime_error naming file and fault
+std::vector<Eigen::MatrixXd> readVertices(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  char magic[8] = {};
+  uint16_t length = 0;
+  file.read(magic, 8);
+  file.read(reinterpret_cast<char*>(&length), 2);
+  std::string header(length, ' ');
+  file.read(header.data(), length);
+  int frames = 0, count = 0;
+  const size_t shape = header.find("'shape': (");
+  const bool known = file && magic[6] == 1 && header.find("'<f4'") != std::string::npos &&
+                     header.find("'fortran_order': False") != std::string::npos &&
+                     shape != std::string::npos &&
+                     std::sscanf(header.c_str() + shape, "'shape': (%d, %d, 3)", &frames, &count) == 2;
+  if (!known) throw std::runtime_error(path + " is no array of <f4 with shape (frames, N, 3)");
+  std::vector<Eigen::MatrixXd> result;
+  Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> values(count, 3);
+  for (int k = 0; k < frames; ++k) {
+    file.read(reinterpret_cast<char*>(values.data()), sizeof(float) * values.size());
+    result.push_back(values.cast<double>());
+  }
+  if (!file) throw std::runtime_error(path + " ends before its last frame");
+  return result;
+}
+
 TrueObject readObject(const std::string& directory, const YAML::Node& node) {
   TrueObject truth;
   truth.mesh_path = directory + "/" + node["true_mesh"].as<std::string>();
@@ -42,6 +73,15 @@ TrueObject readObject(const std::string& directory, const YAML::Node& node) {
   for (const YAML::Node& c : node["collisions"]) {
     truth.collisions.push_back({c["time_s"].as<double>(), readVector(c["com_velocity_before"]),
                                 readVector(c["com_velocity_after"])});
+  }
+  if (const YAML::Node wave = node["wave"]) {
+    truth.wave = {wave["om"].as<double>(),
+                  wave["lean"].as<double>(),
+                  {wave["sgn"].as<double>() * wave["kx"].as<double>(), 0.0,
+                   -wave["kz"].as<double>()}};
+  }
+  if (const YAML::Node vertices = node["true_vertices_per_frame"]) {
+    truth.vertices = readVertices(directory + "/" + vertices.as<std::string>());
   }
   const std::string mask = directory + "/masks/" + node["name"].as<std::string>() + "_000000.png";
   if (std::filesystem::exists(mask)) truth.mask_path = mask;

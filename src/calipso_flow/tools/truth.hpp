@@ -19,6 +19,13 @@ struct TrueObject {
   std::vector<Eigen::Vector3d> velocity;             // m/s; empty: the object stands still
   std::vector<Eigen::Vector3d> spin;                 // rad/s
   std::vector<TrueCollision> collisions;
+  // A prescribed wave: dy = u^1.3 (lean + A sin(k.x - omega t + ...) + ...), object frame.
+  struct Wave {
+    double omega, lean;      // rad/s, m
+    Eigen::Vector3d vector;  // k, rad/m
+  };
+  std::optional<Wave> wave;
+  std::vector<Eigen::MatrixXd> vertices;  // of a deforming object: per frame #V x 3, object frame
   std::string mask_path;                             // of frame 0; empty when there is none
 };
 

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <deque>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "calipso_flow/deformation_motion.hpp"
 #include "calipso_flow/object_motion.hpp"
 #include "calipso_flow/trajectory.hpp"
 
@@ -21,14 +25,16 @@ struct ObjectDynamics {
   double diagonal = 0.0;                  // m, of the model
   std::vector<ObjectMotion> motions;     // one per frame
   std::vector<Observation> observations;  // one per frame
-  Trajectory trajectory;
+  Trajectory trajectory;                  // of a deforming object: of its closest rigid motion
+  std::optional<DeformationMotion> deformation;  // nothing: the object moves as a rigid body
 };
 
 // One line about what was found, for the user.
 std::string summary(const std::vector<ObjectDynamics>& objects);
 
 // Analyses a clip: follows every object through the frames as they come, then fits one trajectory
-// per object over all of them. Not thread-safe.
+// per object over all of them. An object is rigid until it is held somewhere and is seen to move: from
+// then on its deformation is followed. Not thread-safe.
 class ClipAnalyser {
  public:
   // @param masks  per object in `models`: CV_8U where it is seen in the key frame; or empty
@@ -45,15 +51,26 @@ class ClipAnalyser {
   std::vector<ObjectDynamics> finish() const;
 
  private:
-  ObjectDynamics finishObject(size_t index) const;
+  // One object as it is followed.
+  struct Followed {
+    ObjectTracker tracker;
+    cv::Mat mask;
+    std::vector<Observation> observations;  // one per frame
+    int frames_left = 0;                    // successive frames in which it had left its place
+    std::unique_ptr<DeformableTracker> deformable;      // once it is seen to deform
+    std::vector<DeformationObservation> deformations;  // one per frame, then
+  };
+  void follow(const Frame& frame, bool cut, Followed& object) const;
+  void beginDeformable(Followed& object) const;
+  ObjectDynamics finishObject(const Followed& object) const;
 
   DynamicsParams params_;
   Eigen::Vector3d gravity_;  // m/s^2, world
-  Frame last_;
+  Frame key_, last_;
+  std::deque<Frame> recent_;  // the frames just seen, oldest first
   std::vector<double> times_;
   std::vector<double> cut_times_;
-  std::vector<ObjectTracker> trackers_;
-  std::vector<std::vector<Observation>> observations_;  // per object, per frame
+  std::vector<Followed> objects_;
 };
 
 }  // namespace calipso::flow

@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "calipso_flow/deformation_fit.hpp"
 #include "calipso_flow/pose_fit.hpp"
 #include "calipso_flow/reference_view.hpp"
 
@@ -19,6 +20,7 @@ struct TrackerParams {
   double search_px = 24.0;           // the coarse search looks this far beyond the prediction
   PatchParams patch;
   PoseFitParams pose;
+  DeformationParams deformation;
 };
 
 // A surface point followed into one frame.

@@ -17,6 +17,11 @@ struct PatchParams {
   int max_iterations = 12;
   double least_support = 0.4;   // share of the patch's pixels that must carry weight
   double converged_px = 0.005;  // an update smaller than this ends the iteration
+  // Grey levels per pixel; a direction in which the patch varies by less gives no position.
+  double least_gradient = 0.4;
+  // True: a patch that varies in one direction only is matched across its stripes; its covariance
+  // says that its position along them is not known.
+  bool stripes = false;
 };
 
 struct PatchMatch {

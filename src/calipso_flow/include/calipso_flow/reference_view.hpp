@@ -25,9 +25,16 @@ class ReferenceView {
   struct Warped {
     ImageWindow gray;
     ImageWindow weight;     // 1 where the pixel is known, else 0
+    cv::Mat covered;        // CV_8U, of the same window: non-zero where the surface is
     double coverage = 0.0;  // share of the visible surface's pixels that the reference knows
   };
   Warped warp(const Camera& camera, const Eigen::Isometry3d& world_from_object) const;
+  // The same with the surface deformed besides. @param deformed  #V x 3, object frame
+  Warped warp(const Camera& camera, const Eigen::Isometry3d& world_from_object,
+              const decltype(TriangleMesh::vertices)& deformed) const;
+
+  // Surface points on a regular grid of the picture, about `count`, object frame, m.
+  std::vector<Eigen::Vector3d> gridPoints(int count) const;
 
   const std::vector<Eigen::Vector3d>& seeds() const { return seeds_; }  // object frame, m
   const Eigen::Isometry3d& worldFromObject() const { return world_from_object_; }
@@ -35,6 +42,11 @@ class ReferenceView {
 
  private:
   void chooseSeeds(int count);
+  // Notes where the reference shows a surface point (p_reference, its camera frame) for pixel (x, y)
+  // of the warped view. False where it does not show it.
+  struct WarpMap;
+  bool note(const Eigen::Vector3d& p_reference, int x, int y, WarpMap& map) const;
+  Warped finish(const WarpMap& map, int visible, int known) const;
 
   Frame frame_;
   TriangleMesh mesh_;

@@ -17,6 +17,18 @@ struct SurfaceView {
   float depthAt(double u, double v) const;
 };
 
+// For every pixel that sees a moved surface: where the same surface point stands before the move.
+struct CarriedView {
+  cv::Rect window;   // px, inside the picture
+  cv::Mat position;  // CV_32FC3, window-sized: the carried coordinates; (0, 0, 0) = not covered
+};
+
+// Draws the triangles of `mesh`, moved to `moved` (camera frame, #V x 3), and interpolates `carried`
+// (#V x 3, not zero where it counts) over them.
+CarriedView carrySurface(const TriangleMesh& mesh, const Camera& camera,
+                         const decltype(TriangleMesh::vertices)& moved,
+                         const decltype(TriangleMesh::vertices)& carried);
+
 // Draws `mesh` into a z-buffer. Triangles that reach behind the camera are left out.
 // @param camera_from_object  pose of the mesh in the camera frame
 SurfaceView viewSurface(const TriangleMesh& mesh, const Camera& camera,

@@ -18,7 +18,7 @@ std::optional<ros::Time> KeyCollector::keyStamp() const {
   return models_->header.stamp;
 }
 
-std::optional<KeyKnowledge> KeyCollector::knowledge() const {
+std::optional<KeyKnowledge> KeyCollector::knowledge(const Scene& scene) const {
   if (!models_) return std::nullopt;
   const auto of_key = std::find_if(
       segmentations_.begin(), segmentations_.end(),
@@ -26,7 +26,7 @@ std::optional<KeyKnowledge> KeyCollector::knowledge() const {
   if (of_key == segmentations_.end()) return std::nullopt;
   KeyKnowledge knowledge;
   for (const calipso_msgs::AlignedModel& model : models_->models) {
-    knowledge.models.push_back(modelFromMsg(model));
+    knowledge.models.push_back(modelFromMsg(model, scene));
     knowledge.masks.push_back(maskFromMsg((*of_key)->labels, model.index));
   }
   return knowledge;
@@ -48,6 +48,7 @@ calipso_msgs::Dynamics dynamicsMsg(const Scene& scene, const std::vector<NamedMo
 
 calipso_msgs::ClipDynamics clipDynamicsMsg(const Scene& scene,
                                            const std::vector<ObjectDynamics>& objects,
+                                           const std::vector<double>& cut_times,
                                            const std::vector<std_msgs::Header>& headers) {
   calipso_msgs::ClipDynamics msg;
   if (!headers.empty()) msg.header = headers.front();
@@ -58,7 +59,17 @@ calipso_msgs::ClipDynamics clipDynamicsMsg(const Scene& scene,
       motions.push_back({object.name, object.motions.at(k)});
     }
     msg.frames.push_back(dynamicsMsg(scene, motions, headers[k]));
+    for (const ObjectDynamics& object : objects) {
+      if (!object.deformation) continue;
+      const auto entry = std::find_if(
+          msg.frames.back().objects.begin(), msg.frames.back().objects.end(),
+          [&](const calipso_msgs::ObjectDynamics& o) { return o.object == object.name; });
+      if (entry == msg.frames.back().objects.end()) continue;
+      addDeformation(*object.deformation, static_cast<int>(k), *entry);
+    }
   }
+  for (const ObjectDynamics& object : objects) msg.objects.push_back(toMsg(object));
+  for (const double time : cut_times) msg.cuts.push_back(ros::Time(time));
   return msg;
 }
 

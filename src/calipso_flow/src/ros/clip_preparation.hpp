@@ -31,7 +31,8 @@ class KeyCollector {
   // Stamp of the key frame, once models have come.
   std::optional<ros::Time> keyStamp() const;
   // Both messages' content, once both have come. @throw std::invalid_argument for a bad message
-  std::optional<KeyKnowledge> knowledge() const;
+  // @param scene  says where objects are attached
+  std::optional<KeyKnowledge> knowledge(const Scene& scene) const;
 
  private:
   calipso_msgs::AlignedModelsConstPtr models_;
@@ -41,6 +42,7 @@ class KeyCollector {
 // The whole clip's dynamics as a message, one entry per stamp and object of the scene.
 calipso_msgs::ClipDynamics clipDynamicsMsg(const Scene& scene,
                                            const std::vector<ObjectDynamics>& objects,
+                                           const std::vector<double>& cut_times,
                                            const std::vector<std_msgs::Header>& headers);
 
 // One frame's dynamics; `motions` by object name, objects without one get no estimate.

@@ -22,6 +22,69 @@ void checkSize(const sensor_msgs::Image& image) {
 // An unmeasured quantity's variance: large, but finite, so that a filter can take it in.
 constexpr double kUnknownVariance = 1e6;
 
+geometry_msgs::Twist twistOf(const MotionState& state) {
+  geometry_msgs::Twist twist;
+  twist.linear = toVectorMsg(state.velocity);
+  twist.angular = toVectorMsg(state.spin);
+  return twist;
+}
+
+calipso_msgs::Collision toMsg(const Collision& collision) {
+  calipso_msgs::Collision msg;
+  msg.stamp = ros::Time(collision.time);
+  msg.deviation = collision.time_deviation;
+  msg.before = twistOf(collision.before);
+  msg.after = twistOf(collision.after);
+  msg.restitution = collision.restitution();
+  return msg;
+}
+
+calipso_msgs::Vibration toMsg(const SurfaceLine& line) {
+  calipso_msgs::Vibration msg;
+  msg.frequency = line.line.frequency;
+  msg.deviation = line.line.deviation;
+  msg.decay = line.line.decay;
+  msg.quality = line.line.quality;
+  msg.amplitude = line.amplitude;
+  const double waves = line.wave_vector.norm();  // rad/m
+  if (waves > 0.0) {
+    msg.travel = toVectorMsg(line.wave_vector / waves);
+    msg.travel_speed = 2.0 * M_PI * line.line.frequency / waves;
+  }
+  return msg;
+}
+
+calipso_msgs::Wind toMsg(const WindEstimate& wind, int index) {
+  calipso_msgs::Wind msg;
+  msg.velocity = toVectorMsg(wind.velocity.at(index));
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) msg.covariance[3 * r + c] = wind.covariance.at(index)(r, c);
+  }
+  msg.drag = wind.drag;
+  msg.density = wind.density;
+  msg.pressure = wind.pressure.at(index).norm();
+  if (msg.pressure > 0.0) {
+    msg.pressure_normal = toVectorMsg(wind.pressure.at(index).normalized());
+  }
+  return msg;
+}
+
+void addDeformation(const DeformationMotion& deformation, calipso_msgs::ObjectClipDynamics& msg) {
+  const Eigen::MatrixXf shapes = deformation.modes.shapes.cast<float>();
+  for (int m = 0; m < shapes.cols(); ++m) {
+    msg.modes.emplace_back();
+    msg.modes.back().displacements.assign(shapes.col(m).data(),
+                                          shapes.col(m).data() + shapes.rows());
+  }
+  for (const SurfaceLine& line : deformation.lines) msg.vibrations.push_back(toMsg(line));
+  msg.lean = toVectorMsg(deformation.lean);
+  if (deformation.stiffness) {
+    msg.stiffness_over_density = deformation.stiffness->value;
+    msg.stiffness_over_density_deviation = deformation.stiffness->deviation;
+  }
+  msg.note = deformation.note;
+}
+
 }  // namespace
 
 cv::Mat pictureFromMsg(const sensor_msgs::ImageConstPtr& image) {
@@ -39,13 +102,16 @@ Frame frameFromMsg(const calipso::Frame& frame) {
   return makeFrame(frame.stamp().toSec(), pictureFromMsg(frame.image), frame.camera);
 }
 
-ObjectModel modelFromMsg(const calipso_msgs::AlignedModel& model) {
+ObjectModel modelFromMsg(const calipso_msgs::AlignedModel& model, const Scene& scene) {
   ObjectModel result{model.object, model.index, fromMsg(model.mesh),
-                     fromMsg(model.world_from_object.pose), Eigen::Matrix3d::Zero()};
+                     fromMsg(model.world_from_object.pose), Eigen::Matrix3d::Zero(), {}};
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) {
       result.position_covariance(r, c) = model.world_from_object.covariance[6 * r + c];
     }
+  }
+  for (const SceneObject& object : scene.objects) {
+    if (object.name == model.object) result.attached = verticesIn(object.attachments, result);
   }
   return result;
 }
@@ -73,6 +139,30 @@ calipso_msgs::ObjectDynamics toMsg(const std::string& object, const ObjectMotion
   }
   msg.acceleration = toVectorMsg(motion.state.acceleration);
   msg.tracks = motion.tracks;
+  return msg;
+}
+
+void addDeformation(const DeformationMotion& deformation, int index,
+                    calipso_msgs::ObjectDynamics& msg) {
+  for (int m = 0; m < deformation.modes.count(); ++m) {
+    msg.mode_amplitudes.push_back(static_cast<float>(deformation.modes.amplitudes(index, m)));
+    msg.mode_velocities.push_back(static_cast<float>(deformation.modes.velocities(index, m)));
+  }
+  if (deformation.wind) msg.wind.push_back(toMsg(*deformation.wind, index));
+}
+
+calipso_msgs::ObjectClipDynamics toMsg(const ObjectDynamics& object) {
+  calipso_msgs::ObjectClipDynamics msg;
+  msg.object = object.name;
+  for (const Collision& collision : object.trajectory.collisions) {
+    msg.collisions.push_back(toMsg(collision));
+  }
+  if (object.trajectory.gravity) {
+    msg.falls = true;
+    msg.gravity = toVectorMsg(object.trajectory.gravity->acceleration);
+    msg.gravity_deviation = object.trajectory.gravity->deviation;
+  }
+  if (object.deformation) addDeformation(*object.deformation, msg);
   return msg;
 }
 

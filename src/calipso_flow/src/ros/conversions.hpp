@@ -2,6 +2,7 @@
 
 #include <calipso_msgs/AlignedModel.h>
 #include <calipso_msgs/Dynamics.h>
+#include <calipso_msgs/ObjectClipDynamics.h>
 #include <calipso_msgs/ObjectDynamics.h>
 #include <calipso_msgs/Segmentation.h>
 #include <sensor_msgs/Image.h>
@@ -23,12 +24,20 @@ cv::Mat pictureFromMsg(const sensor_msgs::ImageConstPtr& image);
 // @throw std::invalid_argument as pictureFromMsg, or when picture and camera differ in size
 Frame frameFromMsg(const calipso::Frame& frame);
 
-ObjectModel modelFromMsg(const calipso_msgs::AlignedModel& model);
+// @param scene  says where the object is attached
+ObjectModel modelFromMsg(const calipso_msgs::AlignedModel& model, const Scene& scene);
 
 // 255 where the label image shows the object. @throw std::invalid_argument unless it is mono8
 cv::Mat maskFromMsg(const sensor_msgs::Image& labels, int index);
 
 calipso_msgs::ObjectDynamics toMsg(const std::string& object, const ObjectMotion& motion);
+
+// Adds the deformation and the wind at frame `index` of the clip.
+void addDeformation(const DeformationMotion& deformation, int index,
+                    calipso_msgs::ObjectDynamics& msg);
+
+// What the whole clip says about one object; times are seconds of ROS time.
+calipso_msgs::ObjectClipDynamics toMsg(const ObjectDynamics& object);
 
 // What is said about an object of which nothing is known but its rough placement.
 calipso_msgs::ObjectDynamics withoutEstimate(const SceneObject& object);

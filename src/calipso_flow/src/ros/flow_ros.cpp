@@ -98,7 +98,7 @@ void FlowNode::onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::st
 void FlowNode::beginWhenPossible() {
   if (clip_analyser_ || live_analyser_) return;
   try {
-    const std::optional<KeyKnowledge> knowledge = key_.knowledge();
+    const std::optional<KeyKnowledge> knowledge = key_.knowledge(scene_);
     if (knowledge) begin(*knowledge);
   } catch (const std::exception& error) {
     reporter_.failed(error.what());
@@ -143,7 +143,8 @@ void FlowNode::finishWhenComplete() {
   finished_ = true;
   try {
     std::vector<ObjectDynamics> objects = clip_analyser_->finish();
-    const calipso_msgs::ClipDynamics msg = clipDynamicsMsg(scene_, objects, headers_);
+    const calipso_msgs::ClipDynamics msg = 
+        clipDynamicsMsg(scene_, objects, clip_analyser_->cutTimes(), headers_);
     for (const auto& frame : msg.frames) dynamics_[frame.header.stamp] = frame;
     clip_dynamics_publisher_.publish(msg);
     reporter_.ready(summary(objects));

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "calipso_flow/deformation_fit.hpp"
+#include "calipso_flow/object_tracker.hpp"
+
+namespace calipso::flow {
+
+// How an object was found deformed in one frame.
+struct DeformationObservation {
+  double time = 0.0;  // s
+  bool found = false;
+  Eigen::VectorXd controls;    // of the field, from the shape in the key frame
+  Eigen::MatrixXd covariance;  // of controls, m^2
+  double deviation = 0.0;      // see DeformationFit
+  std::vector<Track> tracks;
+};
+
+// Follows an object that deforms from its shape in the key frame: its look is warped along the
+// deformed surface to the predicted shape, patches are matched from there to the frame, and a smooth
+// deformation is fitted to them. The reference is always the key frame, so that errors do not add up.
+// Not thread-safe; frames come in order of time.
+class DeformableTracker {
+ public:
+  // @param mask  as ObjectTracker's
+  DeformableTracker(const ObjectModel& model, const Frame& key_frame, const cv::Mat& mask,
+                    const TrackerParams& params);
+
+  DeformationObservation keyObservation() const;
+  // @param cut  the picture does not continue the last one: no motion is assumed
+  DeformationObservation track(const Frame& frame, bool cut);
+
+  const ObjectModel& model() const { return model_; }
+  const DeformationFitter& fitter() const { return fitter_; }
+  // The deformed surface, object frame.
+  decltype(TriangleMesh::vertices) surfaceAt(const Eigen::VectorXd& controls) const;
+  const DeformationField::Weights& vertexWeights() const { return vertex_weights_; }
+
+ private:
+  Eigen::VectorXd predict(double time) const;
+  std::vector<SurfaceMatch> match(const Frame& frame, const Eigen::VectorXd& controls,
+                                  bool rough) const;
+
+  ObjectModel model_;
+  TrackerParams params_;
+  ReferenceView reference_;
+  DeformationFitter fitter_;
+  DeformationField::Weights vertex_weights_, point_weights_;
+  DeformationField::Points points_;  // surface points followed, object frame
+  DeformationObservation last_;
+  std::optional<DeformationObservation> before_last_;
+};
+
+}  // namespace calipso::flow

@@ -1,0 +1,147 @@
+#include "calipso_flow/deformable_tracker.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+
+#include "calipso_flow/look_match.hpp"
+#include "calipso_flow/outline_match.hpp"
+
+namespace calipso::flow {
+namespace {
+
+constexpr int kPoints = 150;              // surface points followed
+constexpr int kRounds = 2;                // warp, match, fit
+constexpr double kRoughScale = 30.0;      // deviations; residuals of a rough match
+constexpr double kFineScale = 40.0;
+constexpr double kLeastInlierShare = 0.35;
+constexpr double kReturnDeviations = 3.0;
+constexpr double kStripeGradient = 2.0;      // grey levels per px; below, a direction is a stripe's
+
+DeformationField::Points matrixOf(const std::vector<Eigen::Vector3d>& points) {
+  DeformationField::Points matrix(points.size(), 3);
+  for (size_t i = 0; i < points.size(); ++i) matrix.row(i) = points[i].transpose();
+  return matrix;
+}
+
+// A patch counts when it is certain in one direction at least; the other is weighted by its own
+// uncertainty.
+PatchParams patchParams(const PatchParams& rigid) {
+  PatchParams params = rigid;
+  params.least_gradient = kStripeGradient;
+  params.stripes = true;
+  return params;
+}
+
+std::optional<PatchMatch> matchFine(const LookMatch& look, const Eigen::Vector2d& at,
+                                    const TrackerParams& params) {
+  const auto there = look.fine(at, params.patch);
+  if (!there) return std::nullopt;
+  const double certain =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(there->covariance).eigenvalues()[0];
+  if (std::sqrt(std::max(0.0, certain)) > params.largest_deviation_px) return std::nullopt;
+  const auto miss = look.missOnReturn(at, *there, params.patch);
+  if (!miss) return std::nullopt;
+  const double floor = params.forward_backward_px / kReturnDeviations;
+  const Eigen::Matrix2d allowed =
+      there->covariance + floor * floor * Eigen::Matrix2d::Identity();
+  if (miss->dot(allowed.inverse() * *miss) > kReturnDeviations * kReturnDeviations) {
+    return std::nullopt;
+  }
+  return there;
+}
+
+}  // namespace
+
+DeformableTracker::DeformableTracker(const ObjectModel& model, const Frame& key_frame,
+                                     const cv::Mat& mask, const TrackerParams& params)
+    : model_(model),
+      params_(params),
+      reference_(key_frame, model, model.world_from_object, mask, params.seed_count),
+      fitter_(model, params.deformation),
+      vertex_weights_(fitter_.field().weightsAt(model.mesh.vertices)),
+      points_(matrixOf(reference_.gridPoints(kPoints))) {
+  point_weights_ = fitter_.field().weightsAt(points_);
+  params_.patch = patchParams(params.patch);
+  last_ = keyObservation();
+  last_.time = key_frame.time;
+}
+
+DeformationObservation DeformableTracker::keyObservation() const {
+  DeformationObservation key;
+  key.time = reference_.frame().time;
+  key.found = true;
+  key.controls = fitter_.zero();
+  key.covariance = Eigen::MatrixXd::Zero(key.controls.size(), key.controls.size());
+  return key;
+}
+
+decltype(TriangleMesh::vertices) DeformableTracker::surfaceAt(
+    const Eigen::VectorXd& controls) const {
+  return DeformationFitter::displaced(model_.mesh.vertices, vertex_weights_, controls);
+}
+
+Eigen::VectorXd DeformableTracker::predict(double time) const {
+  if (!before_last_) return last_.controls;
+  const double share = (time - last_.time) / (last_.time - before_last_->time);
+  return last_.controls + share * (last_.controls - before_last_->controls);
+}
+
+std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
+                                                   const Eigen::VectorXd& controls,
+                                                   bool rough) const {
+  std::vector<SurfaceMatch> matches;
+  const auto surface = surfaceAt(controls);
+  const auto look = reference_.warp(frame.camera, model_.world_from_object, surface);
+  if (look.coverage == 0.0) return matches;
+  const LookMatch pictures(look, frame.gray);
+  const auto points = DeformationFitter::displaced(points_, point_weights_, controls);
+  const Eigen::Isometry3d camera_from_object =
+      frame.camera.world_from_camera.inverse() * model_.world_from_object;
+  for (int i = 0; i < points.rows(); ++i) {
+    const Eigen::Vector3d p = camera_from_object * points.row(i).transpose();
+    if (p.z() <= 0.0) continue;
+    const Eigen::Vector2d at = frame.camera.project(p);
+    const auto there =
+        rough ? pictures.rough(at, params_.patch) : matchFine(pictures, at, params_);
+    if (!there || there->correlation < params_.least_correlation) continue;
+    matches.push_back({points_.row(i).transpose(), there->position, there->covariance});
+  }
+  if (rough) return matches;
+  const auto outline = matchOutline(model_.mesh, surface, look, frame, model_.world_from_object);
+  matches.insert(matches.end(), outline.begin(), outline.end());
+  return matches;
+}
+
+DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
+  if (cut) before_last_.reset();
+  const Eigen::VectorXd predicted = predict(frame.time);
+  DeformationObservation observation;
+  observation.time = frame.time;
+  observation.controls = predicted;
+  // Without a motion to go by, the shape may be some pixels away.
+  for (int round = before_last_ ? 1 : 0; round <= kRounds; ++round) {
+    const bool rough = round == 0;
+    const auto matches = match(frame, observation.controls, rough);
+    const DeformationFit fit = fitter_.fit(matches, frame.camera, observation.controls, predicted,
+                                           rough ? kRoughScale : kFineScale);
+    observation.found = fit.converged && fit.inliers >= kLeastInlierShare * matches.size();
+    if (!observation.found) break;
+    observation.controls = fit.controls;
+    observation.covariance = fit.covariance;
+    observation.deviation = fit.deviation;
+    observation.tracks.clear();
+    for (size_t i = 0; i < matches.size(); ++i) {
+      observation.tracks.push_back({matches[i].point, matches[i].pixel, 1.0, fit.inlier[i]});
+    }
+  }
+  if (!observation.found) {
+    before_last_.reset();
+    return observation;
+  }
+  before_last_ = last_;
+  last_ = observation;
+  return observation;
+}
+
+}  // namespace calipso::flow

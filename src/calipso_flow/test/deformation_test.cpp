@@ -1,0 +1,161 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "calipso_flow/deformation_fit.hpp"
+#include "calipso_flow/deformation_modes.hpp"
+#include "calipso_flow/stiffness_ratio.hpp"
+#include "rendered_scene.hpp"
+
+namespace calipso::flow {
+namespace {
+
+// A closed box [0, size], its sides cut into `count` parts along each axis.
+TriangleMesh fineBox(const Eigen::Vector3d& size, const Eigen::Vector3i& count) {
+  TriangleMesh mesh;
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Eigen::Vector3i> triangles;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (int end = 0; end < 2; ++end) {
+      const int base = static_cast<int>(vertices.size());
+      for (int j = 0; j <= count[v]; ++j) {
+        for (int i = 0; i <= count[u]; ++i) {
+          Eigen::Vector3d p;
+          p[axis] = end * size[axis];
+          p[u] = size[u] * i / count[u];
+          p[v] = size[v] * j / count[v];
+          vertices.push_back(p);
+        }
+      }
+      for (int j = 0; j < count[v]; ++j) {
+        for (int i = 0; i < count[u]; ++i) {
+          const int a = base + j * (count[u] + 1) + i, b = a + 1, c = a + count[u] + 1, d = c + 1;
+          if (end == 1) {
+            triangles.emplace_back(a, b, d), triangles.emplace_back(a, d, c);
+          } else {
+            triangles.emplace_back(a, d, b), triangles.emplace_back(a, c, d);
+          }
+        }
+      }
+    }
+  }
+  mesh.vertices.resize(vertices.size(), 3);
+  for (size_t i = 0; i < vertices.size(); ++i) mesh.vertices.row(i) = vertices[i].transpose();
+  mesh.triangles.resize(triangles.size(), 3);
+  for (size_t t = 0; t < triangles.size(); ++t) mesh.triangles.row(t) = triangles[t].transpose();
+  return mesh;
+}
+
+ObjectModel sheet() {
+  ObjectModel model;
+  model.name = "sheet";
+  model.mesh = fineBox({0.6, 0.01, 0.8}, {6, 1, 8});
+  model.world_from_object.translation() << -0.3, 0.0, -0.4;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    if (model.mesh.vertices(i, 2) > 0.79) model.attached.push_back(i);
+  }
+  return model;
+}
+
+TEST(DeformationField, weightsAddUpToOneAndStraightLinesCostNothing) {
+  const ObjectModel model = sheet();
+  const DeformationField field(model.mesh, 3);
+  ASSERT_TRUE(field.sheetNormal().has_value());
+  EXPECT_NEAR(std::abs(field.sheetNormal()->y()), 1.0, 1e-9);
+  const auto weights = field.weightsAt(model.mesh.vertices);
+  for (int i = 0; i < weights.rows(); ++i) EXPECT_NEAR(weights.row(i).sum(), 1.0, 1e-12);
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(field.size());
+  EXPECT_NEAR(ones.dot(field.roughness() * ones), 0.0, 1e-9);
+}
+
+TEST(DeformationField, refusesAMeshWithoutSurface) {
+  TriangleMesh mesh;
+  mesh.vertices.setZero(3, 3);
+  mesh.triangles.resize(1, 3);
+  mesh.triangles << 0, 1, 2;
+  EXPECT_THROW(DeformationField(mesh, 3), std::invalid_argument);
+}
+
+TEST(DeformationFit, followsASheetThatSwingsOut) {
+  const ObjectModel model = sheet();
+  const Camera camera = test::testCamera();
+  const DeformationFitter fitter(model, {});
+  // dy = 0.1 (1 - z/h)^2: seen by perspective only, noise of a tenth of a pixel.
+  const auto swing = [](const Eigen::Vector3d& X) { return 0.1 * std::pow(1.0 - X.z() / 0.8, 2); };
+  std::mt19937 generator(1);
+  std::normal_distribution<double> noise(0.0, 0.1);
+  std::vector<SurfaceMatch> matches;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    const Eigen::Vector3d X = model.mesh.vertex(i);
+    if (X.y() > 1e-6) continue;
+    const Eigen::Vector3d p = model.world_from_object * (X + Eigen::Vector3d(0.0, swing(X), 0.0));
+    const Eigen::Vector2d error(noise(generator), noise(generator));
+    matches.push_back({X, camera.projectWorld(p) + error, 0.01 * Eigen::Matrix2d::Identity()});
+  }
+  matches[20].pixel.x() += 30.0;  // an outlier
+  const DeformationFit fit = fitter.fit(matches, camera, fitter.zero(), fitter.zero(), 40.0);
+  ASSERT_TRUE(fit.converged);
+  EXPECT_FALSE(fit.inlier[20]);
+  const auto weights = fitter.field().weightsAt(model.mesh.vertices);
+  const auto moved = DeformationFitter::displaced(model.mesh.vertices, weights, fit.controls);
+  double squared = 0.0;
+  for (int i = 0; i < moved.rows(); ++i) {
+    const double error = moved(i, 1) - model.mesh.vertices(i, 1) - swing(model.mesh.vertex(i));
+    squared += error * error / moved.rows();
+  }
+  // 0.1 px at 60 px from the centre of view is 2.5 mm of depth per point; the field averages many.
+  EXPECT_LT(std::sqrt(squared), 0.01);
+}
+
+TEST(DeformationModes, nothingMovesNothingFound) {
+  const ObjectModel model = sheet();
+  const DeformationFitter fitter(model, {});
+  std::vector<DeformationObservation> observations(10);
+  const int size = static_cast<int>(fitter.zero().size());
+  std::mt19937 generator(2);
+  std::normal_distribution<double> noise(0.0, 1e-3);
+  for (size_t k = 0; k < observations.size(); ++k) {
+    observations[k].time = k / 30.0;
+    observations[k].found = true;
+    observations[k].controls = Eigen::VectorXd::NullaryExpr(size, [&] { return noise(generator); });
+    observations[k].covariance = 1e-6 * Eigen::MatrixXd::Identity(size, size);
+  }
+  EXPECT_EQ(modesOf(observations, fitter.field().weightsAt(model.mesh.vertices)).count(), 0);
+}
+
+// A cantilever's first frequency after Euler and Bernoulli:  omega = 1.8751^2 sqrt(E I / (rho A L^4)).
+TEST(StiffnessRatio, ofACantileverIsTheBeams) {
+  constexpr double kLength = 0.6, kHeight = 0.05, kRatio = 4000.0;
+  ObjectModel model;
+  model.mesh = fineBox({kLength, kHeight, kHeight}, {12, 2, 2});
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    if (model.mesh.vertices(i, 0) < 1e-6) model.attached.push_back(i);
+  }
+  const double beta = 1.875104;
+  const double omega = beta * beta * std::sqrt(kRatio / 12.0) * kHeight / (kLength * kLength);
+  SpectralLine line;
+  line.frequency = omega / (2.0 * M_PI);
+  line.deviation = 0.01 * line.frequency;
+  Eigen::VectorXcd shape = Eigen::VectorXcd::Zero(3 * model.mesh.vertexCount());
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    const double s = beta * model.mesh.vertices(i, 0) / kLength;
+    const double sigma = 0.734096;
+    shape[3 * i + 2] = std::polar(
+        0.01 * (std::cosh(s) - std::cos(s) - sigma * (std::sinh(s) - std::sin(s))), 0.3);
+  }
+  std::string note;
+  const auto ratio = stiffnessRatio(model, line, shape, note);
+  ASSERT_TRUE(ratio.has_value()) << note;
+  EXPECT_GT(ratio->agreement, 0.95);
+  // Euler and Bernoulli leave out shear, 1 % of the frequency here; the grid costs as much.
+  EXPECT_NEAR(ratio->value / kRatio, 1.0, 0.05);
+  EXPECT_NEAR(ratio->deviation, 0.02 * ratio->value, 1e-6 * ratio->value);
+  model.attached.clear();
+  EXPECT_FALSE(stiffnessRatio(model, line, shape, note).has_value());
+  EXPECT_NE(note.find("attachment"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace calipso::flow
