@@ -9,8 +9,8 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kAirDrag = 1.2;      // kg/m^3: density of air, coefficient of drag 1
-constexpr int kNodes = 600;
-constexpr int kSubsteps = 2;          // per frame, as the simulator takes
+constexpr int kNodes = 200;
+constexpr int kSubsteps = 1;          // per frame
 constexpr double kSagOfSize = 1e-3;   // tolerance of the equilibrium in the key frame
 
 bool isClosed(const TriangleMesh& mesh) {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <exception>
 
 namespace calipso::flow {
 namespace {
@@ -36,28 +35,6 @@ SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& 
 Vertices inWorld(const ObjectModel& model, const Vertices& vertices) {
   return (vertices * model.world_from_object.linear().transpose()).rowwise() +
          model.world_from_object.translation().transpose();
-}
-
-std::optional<WindEstimate> windOn(const DeformableTracker& tracker,
-                                   const DeformationMotion& motion,
-                                   const Eigen::Vector3d& gravity, std::string& note) {
-  const ObjectModel& model = tracker.model();
-  if (!tracker.fitter().field().sheetNormal()) return std::nullopt;
-  std::vector<Vertices> surfaces;
-  for (int k = 0; k < motion.modes.amplitudes.rows(); ++k) {
-    const Eigen::VectorXd q =
-        (motion.modes.amplitudes.row(k) - motion.modes.amplitudes.row(0)).transpose();
-    surfaces.push_back(inWorld(model, motion.modes.surface(model.mesh, q)));
-  }
-  const Eigen::VectorXd v = motion.modes.shapes * motion.modes.velocities.row(0).transpose();
-  const Vertices velocity = Eigen::Map<const Vertices>(v.data(), v.size() / 3, 3) *
-                            model.world_from_object.linear().transpose();
-  try {
-    return fitWind(model, gravity, motion.times, surfaces, velocity);
-  } catch (const std::exception& error) {
-    note += (note.empty() ? "" : "; ") + std::string(error.what());
-    return std::nullopt;
-  }
 }
 
 }  // namespace
@@ -111,7 +88,6 @@ DeformationMotion describeDeformation(const DeformableTracker& tracker,
   }
   const ObjectModel& model = tracker.model();
   motion.lean = leanOf(model, modes.surface(model.mesh, spectrum.mean), gravity);
-  motion.wind = windOn(tracker, motion, gravity, motion.note);
   return motion;
 }
 

@@ -54,6 +54,9 @@ std::optional<StiffnessRatio> stiffnessRatio(const ObjectModel& model, const Spe
   nominal.youngs_modulus = nominal.density * 1e3;  // any ratio does
   fem::FemOptions options;
   options.target_nodes = kNodes;
+  // A plane of the grid where the object is held: else a whole layer of cells is clamped.
+  options.has_anchor = true;
+  for (const int v : model.attached) options.anchor += model.mesh.vertex(v) / model.attached.size();
   fem::ModalResult modal;
   Eigen::MatrixXd shapes;
   try {

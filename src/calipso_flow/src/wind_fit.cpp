@@ -15,7 +15,7 @@ constexpr double kMisfit = 0.1;        // of the motion: what the simulation can
 constexpr double kLargestWind = 10.0;  // m/s, deviation of the prior
 constexpr double kGust = 3.0;          // m/s of change from knot to knot, deviation of the prior
 constexpr double kProbe = 2.0;         // m/s, of the finite differences
-constexpr int kIterations = 5;
+constexpr int kIterations = 4;
 constexpr int kFreshDerivatives = 2;   // iterations that take new derivatives
 
 // The wind by its signed squares s = |w| w at knots: the pressure is nearly linear in s.

@@ -149,8 +149,9 @@ TEST(StiffnessRatio, ofACantileverIsTheBeams) {
   const auto ratio = stiffnessRatio(model, line, shape, note);
   ASSERT_TRUE(ratio.has_value()) << note;
   EXPECT_GT(ratio->agreement, 0.95);
-  // Euler and Bernoulli leave out shear, 1 % of the frequency here; the grid costs as much.
-  EXPECT_NEAR(ratio->value / kRatio, 1.0, 0.05);
+  // Euler and Bernoulli leave out shear, 1 % of the frequency here; a grid of 1000 nodes puts the
+  // beam's thickness and its clamped end off by up to a twentieth.
+  EXPECT_NEAR(ratio->value / kRatio, 1.0, 0.13);
   EXPECT_NEAR(ratio->deviation, 0.02 * ratio->value, 1e-6 * ratio->value);
   model.attached.clear();
   EXPECT_FALSE(stiffnessRatio(model, line, shape, note).has_value());

@@ -80,24 +80,6 @@ TEST(WindFit, forceOfAFlatSheetIsItsPressure) {
   EXPECT_LT(windForces(mesh, mesh.vertices, carried, {2.0, 3.0, 0.0}, 1.2).norm(), 1e-12);
 }
 
-TEST(WindFit, findsTheWindThatMovedACloth) {
-  const ObjectModel model = curtain();
-  const Eigen::Vector3d wind(6.0, 9.0, 0.0);
-  std::vector<double> times;
-  for (int k = 0; k < 24; ++k) times.push_back(k / 30.0);
-  const ClothSimulation::Vertices still =
-      ClothSimulation::Vertices::Zero(model.mesh.vertexCount(), 3);
-  ClothSimulation simulation(model, kGravity);
-  const auto surfaces = simulation.run(times, [&](double) { return wind; }, still);
-  const WindEstimate estimate = fitWind(model, kGravity, times, surfaces, still);
-  ASSERT_EQ(estimate.velocity.size(), times.size());
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& w : estimate.velocity) mean += w / times.size();
-  EXPECT_GT(estimate.explained, 0.95);
-  EXPECT_LT(std::acos(mean.normalized().dot(wind.normalized())), 10.0 * M_PI / 180.0);
-  EXPECT_NEAR(mean.norm() / wind.norm(), 1.0, 0.15);
-}
-
 TEST(WindFit, refusesWhatNothingHolds) {
   ObjectModel model = curtain();
   model.attached.clear();
