@@ -5,132 +5,121 @@
 #include <optional>
 #include <vector>
 
-#include "patch_field.hpp"
+#include "offset_statistics.hpp"
+#include "seam_blend.hpp"
+#include "shift_cut.hpp"
 
 namespace calipso::render {
 namespace {
 
-constexpr int kTextureSide = 9;        // px, window of the texture features
-constexpr float kTextureWeight = 4.0f;
+constexpr int kShortest = 15;     // the shortest offset is this part of the picture's longer side
+constexpr int kSeamReach = 2;     // px around a seam that a finer level may move it
+constexpr int kCoverSteps = 6;    // offsets that cover what no frequent one does, per half window
 
 struct Level {
-  cv::Mat image;         // CV_32FC(5) of Feature
-  cv::Mat hole, banned;  // CV_8UC1
+  cv::Mat image;         // CV_32FC3
+  cv::Mat hole, source;  // CV_8UC1: to be filled; may be copied from
 };
 
-// Half the size; a pixel is hole (or banned) if any of its four was.
+// Half the size: the mean of what is known; a pixel is hole if any of its four was, source if all were.
 Level halved(const Level& fine) {
   Level half;
   const cv::Size size((fine.hole.cols + 1) / 2, (fine.hole.rows + 1) / 2);
   half.hole = cv::Mat::zeros(size, CV_8U);
-  half.banned = cv::Mat::zeros(size, CV_8U);
-  half.image = cv::Mat::zeros(size, CV_32FC(5));
-  cv::Mat count = cv::Mat::zeros(size, CV_32F);
+  half.source = cv::Mat(size, CV_8U, cv::Scalar(255));
+  half.image = cv::Mat::zeros(size, CV_32FC3);
+  cv::Mat weight = cv::Mat::zeros(size, CV_32F);
   for (int v = 0; v < fine.hole.rows; ++v) {
     for (int u = 0; u < fine.hole.cols; ++u) {
+      const bool known = fine.source.at<std::uint8_t>(v, u) != 0;
+      const float w = known ? 1.0f : 1e-3f;
       half.hole.at<std::uint8_t>(v / 2, u / 2) |= fine.hole.at<std::uint8_t>(v, u);
-      half.banned.at<std::uint8_t>(v / 2, u / 2) |= fine.banned.at<std::uint8_t>(v, u);
-      half.image.at<Feature>(v / 2, u / 2) += fine.image.at<Feature>(v, u);
-      count.at<float>(v / 2, u / 2) += 1.0f;
+      half.source.at<std::uint8_t>(v / 2, u / 2) &= known ? 255 : 0;
+      half.image.at<cv::Vec3f>(v / 2, u / 2) += w * fine.image.at<cv::Vec3f>(v, u);
+      weight.at<float>(v / 2, u / 2) += w;
     }
   }
   for (int v = 0; v < size.height; ++v) {
-    for (int u = 0; u < size.width; ++u) half.image.at<Feature>(v, u) /= count.at<float>(v, u);
+    for (int u = 0; u < size.width; ++u) half.image.at<cv::Vec3f>(v, u) /= weight.at<float>(v, u);
   }
   return half;
 }
 
+// Finest first, down to where the cut is quick.
 std::vector<Level> pyramid(const Level& finest, const InpaintParams& params) {
   std::vector<Level> levels = {finest};
-  while (true) {
-    const Level& last = levels.back();
-    cv::Mat depth;
-    cv::distanceTransform(last.hole, depth, cv::DIST_L2, 3);
-    double widest = 0.0;
-    cv::minMaxLoc(depth, nullptr, &widest);
-    const bool small = std::min(last.hole.cols, last.hole.rows) / 2 < params.coarsest_side;
-    if (small || widest <= params.patch_radius) return levels;
-    levels.push_back(halved(last));
+  while (cv::countNonZero(levels.back().hole) > params.coarsest_hole &&
+         std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side) {
+    levels.push_back(halved(levels.back()));
   }
-}
-
-// Colours and texture alone, three channels each, as pushPull() takes them.
-void split(const cv::Mat& features, cv::Mat& colour, cv::Mat& texture) {
-  colour.create(features.size(), CV_32FC3);
-  texture = cv::Mat::zeros(features.size(), CV_32FC3);
-  const int channels[] = {0, 0, 1, 1, 2, 2, 3, 3, 4, 4};
-  cv::Mat out[] = {colour, texture};
-  cv::mixChannels(&features, 1, out, 2, channels, 5);
-}
-
-cv::Mat colourOf(const cv::Mat& features) {
-  cv::Mat colour, texture;
-  split(features, colour, texture);
-  return colour;
-}
-
-cv::Mat merge(const cv::Mat& colour, const cv::Mat& texture) {
-  cv::Mat features(colour.size(), CV_32FC(5));
-  const cv::Mat in[] = {colour, texture};
-  const int channels[] = {0, 0, 1, 1, 2, 2, 3, 3, 4, 4};
-  cv::mixChannels(in, 2, &features, 1, channels, 5);
-  return features;
+  return levels;
 }
 
 cv::Mat smoothFill(const Level& level) {
-  cv::Mat weight(level.hole.size(), CV_32F), colour, texture;
-  weight.setTo(1.0f);
-  weight.setTo(0.0f, level.hole | level.banned);
-  split(level.image, colour, texture);
-  const cv::Mat smooth = merge(pushPull(colour, weight), pushPull(texture, weight));
+  cv::Mat weight(level.hole.size(), CV_32F, cv::Scalar(0.0f));
+  weight.setTo(1.0f, level.source);
   cv::Mat filled = level.image.clone();
-  smooth.copyTo(filled, level.hole);
+  pushPull(level.image, weight).copyTo(filled, level.hole);
   return filled;
 }
 
-// Mean absolute change along u and v, where both pixels are known.
-cv::Mat withTexture(const cv::Mat& image, const cv::Mat& unknown) {
-  cv::Mat change(image.size(), CV_32FC3, cv::Scalar::all(0)), known(image.size(), CV_32F, cv::Scalar(0));
-  for (int v = 1; v < image.rows; ++v) {
-    for (int u = 1; u < image.cols; ++u) {
-      const bool usable = (unknown.at<std::uint8_t>(v, u) | unknown.at<std::uint8_t>(v, u - 1) | unknown.at<std::uint8_t>(v - 1, u)) == 0;
-      if (!usable) continue;
-      const cv::Vec3f here = image.at<cv::Vec3f>(v, u);
-      const float along_u = static_cast<float>(cv::norm(here - image.at<cv::Vec3f>(v, u - 1)));
-      const float along_v = static_cast<float>(cv::norm(here - image.at<cv::Vec3f>(v - 1, u)));
-      change.at<cv::Vec3f>(v, u) = {kTextureWeight * along_u, kTextureWeight * along_v, 0.0f};
-      known.at<float>(v, u) = 1.0f;
+// Frequent offsets may all lead out of a big hole's middle into the hole: more are added, the one that covers
+// the most of what is left first, so that every pixel that can be copied has one.
+void coverHole(const Level& level, std::vector<cv::Point>& offsets) {
+  cv::Mat left = level.hole.clone();
+  for (const cv::Point& o : offsets) left.setTo(0, copyable(level.source, o));
+  std::vector<cv::Point> candidates;
+  for (int j = -kCoverSteps; j <= kCoverSteps; ++j) {
+    for (int i = -kCoverSteps; i <= kCoverSteps; ++i) candidates.emplace_back(i * left.cols / (kCoverSteps + 1), j * left.rows / (kCoverSteps + 1));
+  }
+  // The nearest in height first: places are layered.
+  std::stable_sort(candidates.begin(), candidates.end(), [](const cv::Point& a, const cv::Point& b) { return std::abs(a.y) < std::abs(b.y); });
+  while (cv::countNonZero(left) > 0 && offsets.size() + 1 < ShiftCut::kNone) {
+    int most = 0;
+    cv::Point best;
+    for (const cv::Point& c : candidates) {
+      const int covers = cv::countNonZero(copyable(level.source, c) & left);
+      if (10 * covers > 11 * most) most = covers, best = c;
     }
-  }
-  cv::boxFilter(change, change, -1, {kTextureSide, kTextureSide});
-  cv::boxFilter(known, known, -1, {kTextureSide, kTextureSide});
-  for (int v = 0; v < image.rows; ++v) {
-    for (int u = 0; u < image.cols; ++u) change.at<cv::Vec3f>(v, u) /= std::max(known.at<float>(v, u), 0.01f);
-  }
-  return merge(image, change);
-}
-
-cv::Mat sourceMask(const Level& level, int radius) {
-  cv::Mat unusable, grown;
-  cv::bitwise_or(level.hole, level.banned, unusable);
-  cv::dilate(unusable, grown, cv::Mat::ones(2 * radius + 1, 2 * radius + 1, CV_8U));
-  return grown == 0;
-}
-
-// Search and vote until the fill has settled.
-void refine(PatchField& field, bool finest, const InpaintParams& params) {
-  const int iterations = finest ? params.fine_iterations : params.coarse_iterations;
-  const int reach = finest ? 8 : std::max(field.image().cols, field.image().rows) / 2;
-  for (int i = 0; i < iterations; ++i) {
-    field.search(false, reach);
-    field.search(true, reach);
-    field.vote(finest || i + 1 == iterations);
+    if (most == 0) return;
+    offsets.push_back(best);
+    left.setTo(0, copyable(level.source, best));
   }
 }
 
-// Part of the picture that the fill can depend on.
-Level cropped(const Level& whole, const cv::Rect& window) {
-  return {whole.image(window).clone(), whole.hole(window).clone(), whole.banned(window).clone()};
+// Half of the offsets are long enough to lead across the hole: by these, lines on both sides find each other.
+std::vector<cv::Point> candidateOffsets(const Level& level, const InpaintParams& params) {
+  const double shortest = std::max(2.0, 1.0 * std::max(level.hole.cols, level.hole.rows) / kShortest);
+  cv::Mat depth;
+  double deepest = 0.0;
+  cv::distanceTransform(level.hole, depth, cv::DIST_L2, 3);
+  cv::minMaxLoc(depth, nullptr, &deepest);
+  std::vector<cv::Point> offsets = dominantOffsets(level.image, level.source, level.hole, shortest, params.offsets / 2, params.seed);
+  const std::vector<cv::Point> across =
+      dominantOffsets(level.image, level.source, level.hole, std::max(shortest, 2.0 * deepest), params.offsets - params.offsets / 2, params.seed + 1);
+  for (const cv::Point& o : across) {
+    if (std::find(offsets.begin(), offsets.end(), o) == offsets.end()) offsets.push_back(o);
+  }
+  return offsets;
+}
+
+// Which shift every hole pixel takes, coarse to fine. Empty: there is nothing to copy.
+std::optional<ShiftCut> cutShifts(const std::vector<Level>& levels, const InpaintParams& params) {
+  const Level& coarsest = levels.back();
+  std::vector<cv::Point> offsets = candidateOffsets(coarsest, params);
+  coverHole(coarsest, offsets);
+  if (offsets.empty()) return std::nullopt;
+  ShiftCut cut(coarsest.image, coarsest.hole, coarsest.source, offsets, static_cast<float>(1 << (levels.size() - 1)));
+  cut.start();
+  for (int i = 0; i < params.sweeps; ++i) cut.sweep(-1);
+  for (int i = static_cast<int>(levels.size()) - 2; i >= 0; --i) {
+    const Level& level = levels[i];
+    ShiftCut finer(level.image, level.hole, level.source, cut.refinedShifts(level.image, level.source), static_cast<float>(1 << i));
+    finer.startFrom(cut);
+    finer.sweep(kSeamReach);
+    cut = finer;
+  }
+  return cut;
 }
 
 cv::Rect windowAround(const cv::Mat& hole) {
@@ -138,6 +127,21 @@ cv::Rect windowAround(const cv::Mat& hole) {
   const int margin = std::max({48, box.width / 2, box.height / 2});
   const cv::Rect grown(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin);
   return grown & cv::Rect(0, 0, hole.cols, hole.rows);
+}
+
+// Copies what the cut chose; what it could not serve keeps its smooth fill. Returns the copies' origins.
+cv::Mat copyShifted(const ShiftCut& cut, const Level& level, cv::Mat& filled) {
+  cv::Mat origin(level.hole.size(), CV_16SC2, cv::Scalar(-1, -1));
+  for (int v = 0; v < level.hole.rows; ++v) {
+    for (int u = 0; u < level.hole.cols; ++u) {
+      const int label = cut.labels().at<std::uint8_t>(v, u);
+      if (level.hole.at<std::uint8_t>(v, u) == 0 || label == ShiftCut::kNone) continue;
+      const cv::Point from = cv::Point(u, v) + cut.shifts()[label];
+      filled.at<cv::Vec3f>(v, u) = level.image.at<cv::Vec3f>(from);
+      origin.at<cv::Vec2s>(v, u) = cv::Vec2s(static_cast<short>(from.x), static_cast<short>(from.y));
+    }
+  }
+  return origin;
 }
 
 }  // namespace
@@ -148,33 +152,20 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)), true};
   if (cv::countNonZero(hole) == 0) return result;
   const cv::Rect window = windowAround(hole);
-  const cv::Mat forbidden = banned.empty() ? cv::Mat(cv::Mat::zeros(hole.size(), CV_8U)) : cv::Mat(banned != 0);
-  Level finest = cropped({image, hole != 0, forbidden}, window);
-  finest.image = withTexture(finest.image, finest.hole | finest.banned);
-  finest.banned.setTo(0, finest.hole);
-  const std::vector<Level> levels = pyramid(finest, params);
-  std::optional<PatchField> field;
-  for (int i = static_cast<int>(levels.size()) - 1; i >= 0; --i) {
-    PatchField next(smoothFill(levels[i]), levels[i].hole, sourceMask(levels[i], params.patch_radius),
-                    params.patch_radius, static_cast<float>(1 << i), params.seed + i);
-    if (!next.hasSources()) continue;
-    if (field) {
-      next.initialiseFrom(*field);
-      next.vote(true);
-    } else {
-      next.initialiseRandomly();
-    }
-    refine(next, i == 0, params);
-    field = next;
+  cv::Mat source = hole == 0;
+  if (!banned.empty()) source.setTo(0, banned);
+  const Level finest{image(window).clone(), cv::Mat(hole(window) != 0), source(window).clone()};
+  const std::optional<ShiftCut> cut = cutShifts(pyramid(finest, params), params);
+  cv::Mat filled = smoothFill(finest);
+  result.patches_found = cut.has_value();
+  if (cut) {
+    cv::Mat origin = copyShifted(*cut, finest, filled);
+    blendSeams(finest.hole, finest.source, origin, filled);
+    cv::Mat moved = origin + cv::Scalar(window.x, window.y), copied;
+    cv::extractChannel(origin, copied, 0);
+    moved.copyTo(result.origin(window), copied >= 0);
   }
-  if (!field || field->image().size() != window.size()) {
-    colourOf(smoothFill(finest)).copyTo(result.image(window), finest.hole);
-    result.patches_found = false;
-    return result;
-  }
-  colourOf(field->image()).copyTo(result.image(window), finest.hole);
-  cv::Mat origin = field->origin() + cv::Scalar(window.x, window.y);
-  origin.copyTo(result.origin(window), finest.hole);
+  filled.copyTo(result.image(window), finest.hole);
   return result;
 }
 

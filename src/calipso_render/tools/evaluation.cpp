@@ -102,6 +102,7 @@ class Evaluation {
     prepared_->background.plate.convertTo(plate, CV_8U);
     picture("plate", plate);
     const cv::Mat invented = prepared_->background.invented;
+    picture("invented", invented);
     const auto truth = loadPlate(scene_, 0);
     const cv::Mat hidden = loadLabels(scene_, 0) != 0;
     const cv::Mat seen = hidden & (invented == 0);

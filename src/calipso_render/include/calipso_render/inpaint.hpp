@@ -6,22 +6,22 @@
 namespace calipso::render {
 
 struct InpaintParams {
-  int patch_radius = 3;        // px; patches are squares of 2 r + 1
-  int coarse_iterations = 6;   // search and vote, at each level but the finest
-  int fine_iterations = 2;
-  int coarsest_side = 24;      // px; the pyramid ends there, or where the hole is a patch wide
+  int offsets = 40;           // by which the picture repeats itself most; hole pixels are copied by one of them
+  int sweeps = 2;             // of alpha expansion at the coarsest level
+  int coarsest_hole = 4000;   // px; the pyramid ends where the hole has no more
+  int coarsest_side = 24;     // px; or where the picture has no more
   std::uint32_t seed = 1;
 };
 
 struct InpaintResult {
   cv::Mat image;   // CV_32FC3, as the input outside the hole
-  cv::Mat origin;  // CV_16SC2: (u, v) in the input that each hole pixel was taken from; (-1, -1) outside
+  cv::Mat origin;  // CV_16SC2: (u, v) in the input that each hole pixel is a copy of; (-1, -1) elsewhere
   bool patches_found = true;  // false: nothing to copy from, the hole was filled smoothly
 };
 
-// Fills a hole so that every patch that touches it looks like some patch elsewhere (Wexler et al.
-// 2007), with PatchMatch as the search (Barnes et al. 2009), coarse to fine. A last vote copies whole
-// source pixels instead of averaging, which keeps the surroundings' grain.
+// Fills a hole with copies of its surroundings, whole areas shifted by the offsets at which the picture repeats itself
+// (He and Sun 2012), with seams by graph cuts where they show least, coarse to fine, and evened out in the gradient
+// domain. Copies keep the surroundings' grain and their lines.
 // @param image CV_32FC3, code values
 // @param hole CV_8UC1, != 0: to be filled
 // @param banned CV_8UC1, != 0: neither filled nor copied from; may be empty
