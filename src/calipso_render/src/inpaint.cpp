@@ -87,18 +87,21 @@ void coverHole(const Level& level, std::vector<cv::Point>& offsets) {
   }
 }
 
-// Half of the offsets are long enough to lead across the hole: by these, lines on both sides find each other.
+// By what the picture repeats itself, near by and across the hole, and along level lines.
 std::vector<cv::Point> candidateOffsets(const Level& level, const InpaintParams& params) {
   const double shortest = std::max(2.0, 1.0 * std::max(level.hole.cols, level.hole.rows) / kShortest);
   cv::Mat depth;
   double deepest = 0.0;
   cv::distanceTransform(level.hole, depth, cv::DIST_L2, 3);
   cv::minMaxLoc(depth, nullptr, &deepest);
-  std::vector<cv::Point> offsets = dominantOffsets(level.image, level.source, level.hole, shortest, params.offsets / 2, params.seed);
-  const std::vector<cv::Point> across =
-      dominantOffsets(level.image, level.source, level.hole, std::max(shortest, 2.0 * deepest), params.offsets - params.offsets / 2, params.seed + 1);
-  for (const cv::Point& o : across) {
-    if (std::find(offsets.begin(), offsets.end(), o) == offsets.end()) offsets.push_back(o);
+  const double across = std::max(shortest, 2.0 * deepest);
+  std::vector<cv::Point> offsets;
+  for (const auto& found : {dominantOffsets(level.image, level.source, level.hole, shortest, params.repeats, params.seed),
+                            dominantOffsets(level.image, level.source, level.hole, across, params.repeats, params.seed + 1),
+                            levelOffsets(level.image, level.source, level.hole, params.levels)}) {
+    for (const cv::Point& o : found) {
+      if (std::find(offsets.begin(), offsets.end(), o) == offsets.end()) offsets.push_back(o);
+    }
   }
   return offsets;
 }

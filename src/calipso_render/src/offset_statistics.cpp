@@ -11,10 +11,15 @@ namespace {
 constexpr int kRadius = 3;      // px; patches are squares of 7
 constexpr int kSweeps = 4;
 constexpr int kPeakRadius = 2;  // px: offsets so close are one
-constexpr double kSpot = 1.4, kLine = 0.9, kRidge = 6.0;  // px: a repeated thing's spread; across and along a line
-constexpr float kFewest = 0.1f;   // pooled count; a single match of full contrast makes 0.08 as a spot
+constexpr double kBlur = 1.4;     // px, of the histogram
+constexpr float kFewest = 0.1f;   // blurred count; a single match of full contrast makes 0.08
 constexpr float kContrast = 10.0f;  // code values: patches of less count less, they fit anywhere
 constexpr int kWeighed = 4;     // times as many as asked for are judged by the hole they fill
+
+constexpr int kAround = 10;       // px around the hole in which level offsets are judged
+constexpr int kSteepest = 8;      // a level line falls by no more than one px in so many
+constexpr double kOther = 40.0;   // code values
+constexpr int kFewestKnown = 40;  // px
 
 // Approximate nearest patches (PatchMatch, Barnes et al. 2009) at least `shortest` px away.
 class PatchMatches {
@@ -111,35 +116,6 @@ class PatchMatches {
 
 }  // namespace
 
-namespace {
-
-struct Peak {
-  float score;
-  cv::Point offset;
-};
-
-bool better(const Peak& a, const Peak& b) { return a.score > b.score; }
-
-// Local maxima of the counts, each pooled over `pool` px: a thing that repeats makes a spot, a line makes a ridge
-// along itself, from which one offset in a while is enough.
-void findPeaks(const cv::Mat& counts, const cv::Size2d& pool, const cv::Size& size, std::vector<Peak>& peaks) {
-  cv::Mat pooled, highest;
-  cv::GaussianBlur(counts, pooled, {0, 0}, pool.width, pool.height);
-  const cv::Size window(2 * static_cast<int>(kPeakRadius * pool.width / kSpot) + 1, 2 * static_cast<int>(kPeakRadius * pool.height / kSpot) + 1);
-  cv::dilate(pooled, highest, cv::Mat::ones(window, CV_8U));
-  for (int v = 0; v < pooled.rows; ++v) {
-    for (int u = 0; u < pooled.cols; ++u) {
-      const float count = pooled.at<float>(v, u);
-      if (count < kFewest || count != highest.at<float>(v, u)) continue;
-      const cv::Point offset(u - size.width, v - size.height);
-      const float partners = static_cast<float>(size.width - std::abs(offset.x)) * (size.height - std::abs(offset.y)) + size.area() / 50.0f;
-      peaks.push_back({count / std::sqrt(partners), offset});
-    }
-  }
-}
-
-}  // namespace
-
 cv::Mat copyable(const cv::Mat& source, const cv::Point& offset) {
   const cv::Rect all(0, 0, source.cols, source.rows), from = (all + offset) & all;
   cv::Mat out = cv::Mat::zeros(source.size(), CV_8U);
@@ -150,21 +126,56 @@ cv::Mat copyable(const cv::Mat& source, const cv::Point& offset) {
 std::vector<cv::Point> dominantOffsets(const cv::Mat& image, const cv::Mat& source, const cv::Mat& hole, double shortest, int most, std::uint32_t seed) {
   PatchMatches matches(image, source, shortest, seed);
   for (int i = 0; i < kSweeps; ++i) matches.sweep(i % 2 != 0);
-  const cv::Mat counts = matches.histogram();
+  cv::Mat counts = matches.histogram(), highest;
+  cv::GaussianBlur(counts, counts, {0, 0}, kBlur);
+  cv::dilate(counts, highest, cv::Mat::ones(2 * kPeakRadius + 1, 2 * kPeakRadius + 1, CV_8U));
+  std::vector<std::pair<float, cv::Point>> peaks;
+  for (int v = 0; v < counts.rows; ++v) {
+    for (int u = 0; u < counts.cols; ++u) {
+      const float count = counts.at<float>(v, u);
+      if (count < kFewest || count != highest.at<float>(v, u)) continue;
+      const cv::Point offset(u - image.cols, v - image.rows);
+      const float partners = static_cast<float>(image.cols - std::abs(offset.x)) * (image.rows - std::abs(offset.y)) + image.total() / 50.0f;
+      peaks.push_back({count / std::sqrt(partners), offset});
+    }
+  }
+  const auto better = [](const auto& a, const auto& b) { return a.first > b.first; };
+  std::stable_sort(peaks.begin(), peaks.end(), better);
+  if (static_cast<int>(peaks.size()) > kWeighed * most) peaks.resize(kWeighed * most);
   const double total = cv::countNonZero(hole);
+  for (auto& [score, offset] : peaks) score *= static_cast<float>(0.1 + cv::countNonZero(copyable(source, offset) & hole) / total);
+  std::stable_sort(peaks.begin(), peaks.end(), better);
   std::vector<cv::Point> offsets;
-  const cv::Size2d pools[] = {{kSpot, kSpot}, {kRidge, kLine}, {kLine, kRidge}};
-  const double shares[] = {0.5, 0.85, 1.0};  // of what is asked for, after each kind
-  for (int kind = 0; kind < 3; ++kind) {
-    std::vector<Peak> peaks;
-    findPeaks(counts, pools[kind], image.size(), peaks);
-    std::stable_sort(peaks.begin(), peaks.end(), better);
-    if (static_cast<int>(peaks.size()) > kWeighed * most) peaks.resize(kWeighed * most);
-    for (Peak& p : peaks) p.score *= static_cast<float>(0.1 + cv::countNonZero(copyable(source, p.offset) & hole) / total);
-    std::stable_sort(peaks.begin(), peaks.end(), better);
-    for (const Peak& p : peaks) {
-      if (static_cast<double>(offsets.size()) >= shares[kind] * most) break;
-      if (std::find(offsets.begin(), offsets.end(), p.offset) == offsets.end()) offsets.push_back(p.offset);
+  for (const auto& [score, offset] : peaks) {
+    if (static_cast<int>(offsets.size()) < most) offsets.push_back(offset);
+  }
+  return offsets;
+}
+
+std::vector<cv::Point> levelOffsets(const cv::Mat& image, const cv::Mat& source, const cv::Mat& hole, int most) {
+  cv::Mat around;
+  cv::dilate(hole, around, cv::Mat::ones(2 * kAround + 1, 2 * kAround + 1, CV_8U));
+  std::vector<cv::Point> known;
+  cv::findNonZero(around & source, known);
+  const cv::Rect all(0, 0, image.cols, image.rows);
+  std::vector<cv::Point> offsets;
+  for (int i = 1; i <= most / 2; ++i) {
+    const int way = image.cols * i / (most / 2 + 1), slope = std::max(2, way / kSteepest);
+    for (const int du : {way, -way}) {
+      double best = 1e30;
+      cv::Point best_offset;
+      for (int dv = -slope; dv <= slope; ++dv) {
+        double sum = 0.0;
+        int count = 0;
+        for (const cv::Point& p : known) {
+          const cv::Point q = p + cv::Point(du, dv);
+          if (!all.contains(q) || source.at<std::uint8_t>(q) == 0) continue;
+          // What differs much is another thing, not the same one continued.
+          sum += std::min(cv::norm(image.at<cv::Vec3f>(p) - image.at<cv::Vec3f>(q)), kOther), ++count;
+        }
+        if (count >= kFewestKnown && sum / count < best) best = sum / count, best_offset = {du, dv};
+      }
+      if (best < 1e30) offsets.push_back(best_offset);
     }
   }
   return offsets;

@@ -14,6 +14,10 @@ namespace calipso::render {
 // @return at most `most`, the best first; empty if no patch has a match
 std::vector<cv::Point> dominantOffsets(const cv::Mat& image, const cv::Mat& source, const cv::Mat& hole, double shortest, int most, std::uint32_t seed);
 
+// Offsets along lines that run more or less level, as ground, walls and horizons do: for evenly spread widths the
+// height at which the hole's surroundings continue best.
+std::vector<cv::Point> levelOffsets(const cv::Mat& image, const cv::Mat& source, const cv::Mat& hole, int most);
+
 // Where a hole's pixel finds a source at an offset: CV_8UC1, 255.
 cv::Mat copyable(const cv::Mat& source, const cv::Point& offset);
 

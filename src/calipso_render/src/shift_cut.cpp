@@ -10,8 +10,9 @@ namespace calipso::render {
 namespace {
 
 constexpr int kContext = 3;         // px around a pixel that must look alike under its shift
-constexpr float kRimWeight = 1.0f;  // of the surroundings against a seam
-constexpr float kAwayRow = 0.004f, kAwayColumn = 0.0005f;  // code values per px of the finest level: places are layered
+constexpr float kRimWeight = 3.0f;  // of the surroundings against a seam
+constexpr float kAwayRow = 0.02f, kAwayColumn = 0.001f;  // code values per px of the finest level: places are layered
+constexpr double kSamples = 1500.0;    // px that tell where a shift fits best at a finer level
 constexpr float kImpossible = 500.0f;  // code values: nothing to copy there
 const cv::Point kAround[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 
@@ -181,7 +182,7 @@ std::vector<cv::Point> ShiftCut::refinedShifts(const cv::Mat& fine_image, const 
     cv::resize(around, around, fine_source.size(), 0, 0, cv::INTER_NEAREST);
     around &= fine_source;
     if (cv::countNonZero(around) < 50) around = fine_source;
-    const int step = cv::countNonZero(around) > 20000 ? 3 : 1;
+    const int step = 1 + static_cast<int>(std::sqrt(cv::countNonZero(around) / kSamples));
     float best = std::numeric_limits<float>::max();
     cv::Point best_shift = 2 * shifts_[i];
     for (int dv = -1; dv <= 1; ++dv) {

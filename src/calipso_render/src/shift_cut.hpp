@@ -46,7 +46,8 @@ class ShiftCut {
   bool expand(int label, int reach);
   void repair();
 
-  cv::Mat image_, hole_, source_, labels_, index_;  // index_: CV_32S, into pixels_
+  cv::Mat image_, hole_, source_;
+  cv::Mat labels_, index_;  // index_: CV_32S, into pixels_
   std::vector<cv::Point> shifts_;
   float scale_;
   std::vector<Pixel> pixels_;

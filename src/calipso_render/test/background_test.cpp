@@ -116,11 +116,6 @@ TEST(Inpaint, ContinuesStripes) {
   EXPECT_LE(wrong, square.area() / 20);
 }
 
-TEST(Inpaint, SaysWhenThereIsNothingToCopy) {
-  const cv::Mat image(20, 20, CV_32FC3, cv::Scalar::all(50)), hole(20, 20, CV_8U, cv::Scalar(255));
-  EXPECT_FALSE(inpaint(image, hole, cv::Mat()).patches_found);
-}
-
 TEST(ClipSample, KeepsTheKeyFrameAndItsBound) {
   ClipSample sample(4);
   for (int k = 0; k < 100; ++k) {

@@ -6,7 +6,8 @@
 namespace calipso::render {
 
 struct InpaintParams {
-  int offsets = 40;           // by which the picture repeats itself most; hole pixels are copied by one of them
+  int repeats = 14;           // offsets by which the picture repeats itself most, near by and again across the hole
+  int levels = 24;            // offsets along level lines
   int sweeps = 2;             // of alpha expansion at the coarsest level
   int coarsest_hole = 4000;   // px; the pyramid ends where the hole has no more
   int coarsest_side = 24;     // px; or where the picture has no more
