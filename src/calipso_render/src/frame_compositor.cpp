@@ -49,15 +49,10 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   const int slot = VisibilityBuffer::objectOf(id);
   const SurfacePoint p = surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_);
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
-  const ObjectInFrame* state = states_[surface_of_slot_[slot]];
-  const Look look = state != nullptr ? state->look : Look();
-  Gloss gloss = appearance.gloss;
-  gloss.specular = look.specular.value_or(gloss.specular);
-  gloss.roughness = look.roughness.value_or(gloss.roughness);
-  const float sun = surfaceSun(p, id, u, v);
-  const cv::Vec3f highlight = specularShading(light_, gloss, p.normal, (eye_ - p.position).normalized(), sun, p.sky);
+  const Look look = lookOf(slot);
+  const Lit lit = lightAt(p, id, u, v);
   const cv::Vec3f albedo = look.albedo.value_or(appearance.albedoAt(p)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
-  return appearance.radiance(albedo, diffuseShading(light_, p.normal, sun, p.sky), highlight);
+  return appearance.radiance(albedo, lit.diffuse, lit.highlight);
 }
 
 // Something without a model stands in front: it hid the object at the key frame, and goes on doing so.
@@ -131,15 +126,25 @@ FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
 // What comes to light where an object or its shadow was.
 FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
   const bool invented = invented_.at<std::uint8_t>(v, u) != 0;
-  if (invented && !live_origin_.empty()) {
-    // A moving background goes on moving: the same place is copied from this very frame.
-    const cv::Vec2s from = live_origin_.at<cv::Vec2s>(v, u);
-    if (from[0] >= 0 && labels_.at<std::uint8_t>(from[1], from[0]) == 0) return {linearPixel(frame_.bgr, from[0], from[1]), 0.0f, kInvented};
+  cv::Vec3f now;
+  if (invented && live_ != nullptr && live_->at(frame_.bgr, labels_, live_corrections_, prepared_.noise.deviation(1, 128.0f), u, v, now)) {
+    for (int c = 0; c < 3; ++c) now[c] = linearFromRealCode(now[c]);
+    return {now, 1.0f, kInvented};
   }
   return {plate_.at<cv::Vec3f>(v, u), 1.0f, invented ? kInvented : kSeenElsewhere};
 }
 
+// Nothing is drawn here, nothing goes, and no light changes.
+bool FrameCompositor::isUntouched(int u, int v) const {
+  const cv::Point at = cv::Point(u, v) - region_.tl();
+  if (removed_.at<std::uint8_t>(at) != 0 || centre_->ids(at.y)[at.x] != VisibilityBuffer::kNothing || edges_->at(u, v) != nullptr) return false;
+  if (sun_now_.at<float>(at) < 0.0f || labels_.at<std::uint8_t>(v, u) != 0) return true;
+  const float change = std::abs(sun_now_.at<float>(at) - sun_before_.at<float>(at)) + std::abs(sky_now_.at<float>(at) - sky_before_.at<float>(at));
+  return relit_.at<float>(at) == 0.0f && change < kSameShadow;
+}
+
 FrameCompositor::Composed FrameCompositor::composedAt(int u, int v) const {
+  if (isUntouched(u, v)) return {};
   const Drawn drawn = drawnAt(u, v);
   const Behind behind = drawn.cover < 1.0f ? behindAt(u, v) : Behind{};
   return {drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour,

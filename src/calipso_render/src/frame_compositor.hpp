@@ -66,6 +66,13 @@ class FrameCompositor {
     float cover = 0.0f;
   };
 
+  // Light on a drawn surface.
+  struct Lit {
+    cv::Vec3f diffuse, highlight;  // of a white surface; radiance
+    float near = 0.0f;             // of the surface, 1/m
+    int slot = -1;                 // -1: nothing is drawn here
+  };
+
   Light lightOf(const FrameInput& frame) const;
   // A pixel of the result.
   struct Composed {
@@ -95,8 +102,9 @@ class FrameCompositor {
   bool findResting(int slot, std::vector<bool>& can_rest) const;
   void keepRims(const cv::Mat& owner);
   void findCovered();
-  void findSurfaceSun();
+  void findSurfaceLight();
   void measureSky();
+  cv::Mat movedSun() const;
   void measureSun();
   void findRelit();
   cv::Mat originalOf(int surface) const;
@@ -109,7 +117,11 @@ class FrameCompositor {
   cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
   float stillness(std::uint32_t id, float u, float v) const;
   float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
-  float surfaceSun(const SurfacePoint& p, std::uint32_t id, float u, float v) const;
+  Lit lightAt(const SurfacePoint& p, std::uint32_t id, float u, float v) const;
+  Lit exactLight(const SurfacePoint& p, int slot) const;
+  Look lookOf(int slot) const;
+  bool isSmooth(const Lit& a, const Lit& b, const Lit& c, const Lit& d) const;
+  bool isUntouched(int u, int v) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
   cv::Rect shadowBounds(const Points& vertices, const Light& light) const;
@@ -125,7 +137,8 @@ class FrameCompositor {
   std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame
   cv::Mat labels_, plate_;            // of this frame's view
   cv::Mat invented_;
-  cv::Mat live_origin_;  // Background::live_origin, where the camera stands as at the key frame
+  const LiveFill* live_ = nullptr;  // Background::live, where the camera stands as at the key frame
+  std::vector<cv::Vec3f> live_corrections_;
   std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
   std::vector<bool> edited_;                  // per surface
   std::vector<bool> at_rest_;                 // per surface: the video has it where the key frame has it
@@ -141,14 +154,9 @@ class FrameCompositor {
   cv::Mat sky_now_, sky_before_;  // CV_32FC1 over region_: part of the sky that a support plane sees
   cv::Mat sun_now_, sun_before_;  // CV_32FC1 over region_: the same of the sun; negative where there is no plane
   cv::Mat relit_;    // CV_32FC1 over region_: 1 = the original's shadow, to be taken from the plate
-  // Squares of kSunStep px over region_: the corners' sun on the surfaces where all four agree; kMixedSun elsewhere.
-  struct SunSquare {
-    float sun;
-    int slot;
-    float near_0, near_u, near_v;  // nearness at the first corner and its slopes, 1/m and 1/(m px)
-  };
-  std::vector<SunSquare> sun_squares_;
-  int sun_columns_ = 0;
+  std::vector<Lit> lit_;           // at the corners of squares of kLightStep px over region_
+  std::vector<bool> smooth_;       // per square, by its first corner: light between the corners follows from theirs
+  int lit_columns_ = 0;
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
   cv::Mat residual_;  // CV_32FC4 over region_: what drawing misses, linear, and how much of the pixel that speaks for; may be empty
   std::optional<VisibilityBuffer> centre_;

@@ -2,7 +2,6 @@
 // after the edit, and the sun on the drawn surfaces.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -18,10 +17,11 @@ namespace {
 constexpr int kShadowMapSide = 512;    // texels, live
 constexpr int kSkyMapSide = 128;       // the same for the sky, which is soft
 constexpr int kSkySteps = 160;         // places along the picture's width where the sky is measured
-constexpr int kSunStep = 4;            // px between the corners of the squares in which surfaces are lit alike
+constexpr int kLightStep = 4;          // px between the places where the light on a smooth surface is computed
+constexpr float kSmoothLight = 0.06f;  // of the light: between corners that differ by no more it is interpolated
+constexpr float kPlainShadow = 0.3f;   // of the sun: between places that differ by less a shadow is interpolated
 constexpr int kShadowBoundsMargin = 8;     // px
 constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
-constexpr float kMixedSun = -1.0f;         // a square whose corners differ, or a corner that tells nothing
 
 int skyStep(const cv::Size& picture) { return std::max(4, picture.width / kSkySteps); }
 
@@ -152,6 +152,7 @@ cv::Rect FrameCompositor::shadowBounds(const Points& vertices, const Light& ligh
 
 void FrameCompositor::findCovered() {
   covered_ = cv::Mat::zeros(region_.size(), CV_8U);
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) {
     const std::uint32_t* ids = centre_->ids(v);
     for (int u = 0; u < region_.width; ++u) {
@@ -167,9 +168,38 @@ void FrameCompositor::measureSky() {
   sky_before_ = shadows_.originals_sky(region_);
 }
 
+// The shadow that falls on the planes now: at every second pixel, and at the others where it is not plain from these.
+cv::Mat FrameCompositor::movedSun() const {
+  cv::Mat sun(region_.size(), CV_32F, cv::Scalar(1.0f));
+  const cv::Rect bounds = moved_bounds_ & region_;
+  const auto measured = [&](int u, int v) {
+    Receiver r;
+    const bool needed = covered_.at<std::uint8_t>(v, u) == 0 && plane_view_.at(u + region_.x, v + region_.y, r);
+    return needed ? moved_shadow_->visibility(r.position, r.normal) : 1.0f;
+  };
+  const int left = bounds.x - region_.x, right = bounds.br().x - region_.x, top = bounds.y - region_.y, bottom = bounds.br().y - region_.y;
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int v = top; v < bottom; v += 2) {
+    for (int u = left; u < right; u += 2) sun.at<float>(v, u) = measured(u, v);
+  }
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int v = top; v < bottom; v += 2) {
+    for (int u = left; u < right; u += 2) {
+      const bool rim = u + 2 >= right || v + 2 >= bottom;
+      const float a = sun.at<float>(v, u), b = rim ? a : sun.at<float>(v, u + 2), c = rim ? a : sun.at<float>(v + 2, u), d = rim ? a : sun.at<float>(v + 2, u + 2);
+      const bool plain = !rim && std::max({a, b, c, d}) - std::min({a, b, c, d}) < kPlainShadow;
+      if (u + 1 < right) sun.at<float>(v, u + 1) = plain ? 0.5f * (a + b) : measured(u + 1, v);
+      if (v + 1 < bottom) sun.at<float>(v + 1, u) = plain ? 0.5f * (a + c) : measured(u, v + 1);
+      if (u + 1 < right && v + 1 < bottom) sun.at<float>(v + 1, u + 1) = plain ? 0.25f * (a + b + c + d) : measured(u + 1, v + 1);
+    }
+  }
+  return sun;
+}
+
 void FrameCompositor::measureSun() {
   sun_now_ = cv::Mat(region_.size(), CV_32F, cv::Scalar(-1.0f));
   sun_before_ = sun_now_.clone();
+  const cv::Mat moved = movedSun();
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < region_.height; ++v) {
     Receiver r;
@@ -177,58 +207,80 @@ void FrameCompositor::measureSun() {
       const cv::Point at(u + region_.x, v + region_.y);
       if (covered_.at<std::uint8_t>(v, u) != 0 || !plane_view_.at(at.x, at.y, r)) continue;
       const float others = valueOrOne(shadows_.others_sun, at.x, at.y);
-      const float moved = moved_bounds_.contains(at) ? moved_shadow_->visibility(r.position, r.normal) : 1.0f;
-      sun_now_.at<float>(v, u) = others * moved;
+      sun_now_.at<float>(v, u) = others * moved.at<float>(v, u);
       sun_before_.at<float>(v, u) = others * valueOrOne(shadows_.originals_sun, at.x, at.y);
     }
   }
 }
 
-// The sun on the drawn surfaces at the corners of small squares; where all four see all or nothing of it, so do the
-// points between that lie on the same smooth piece of surface.
-void FrameCompositor::findSurfaceSun() {
-  struct Corner {
-    float sun = kMixedSun, near = 0.0f;
-    int slot = -1;
-  };
-  const int columns = region_.width / kSunStep + 2, rows = region_.height / kSunStep + 2;
-  std::vector<Corner> corners(static_cast<std::size_t>(columns) * rows);
+Look FrameCompositor::lookOf(int slot) const {
+  const ObjectInFrame* state = states_[surface_of_slot_[slot]];
+  return state != nullptr ? state->look : Look();
+}
+
+FrameCompositor::Lit FrameCompositor::exactLight(const SurfacePoint& p, int slot) const {
+  const Look look = lookOf(slot);
+  Gloss gloss = prepared_.appearances[surface_of_slot_[slot]].gloss;
+  gloss.specular = look.specular.value_or(gloss.specular);
+  gloss.roughness = look.roughness.value_or(gloss.roughness);
+  const float sun = p.normal.dot(light_.direction) > 0.0f ? newSun(p.position, p.normal) : 0.0f;
+  return {diffuseShading(light_, p.normal, sun, p.sky), specularShading(light_, gloss, p.normal, (eye_ - p.position).normalized(), sun, p.sky), 0.0f, slot};
+}
+
+// Light at the corners of small squares; where a smooth piece of surface fills a square and the light changes little
+// over it, the points between take it from the corners.
+void FrameCompositor::findSurfaceLight() {
+  const int columns = region_.width / kLightStep + 2, rows = region_.height / kLightStep + 2;
+  lit_.assign(static_cast<std::size_t>(columns) * rows, {});
+  smooth_.assign(lit_.size(), false);
+  lit_columns_ = columns;
 #pragma omp parallel for schedule(dynamic, 2)
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
-      const int u = region_.x + i * kSunStep, v = region_.y + j * kSunStep;
+      const int u = region_.x + i * kLightStep, v = region_.y + j * kLightStep;
       const std::uint32_t id = centre_->idAt(u, v);
       if (!region_.contains({u, v}) || !isDrawn(id, u, v)) continue;
-      const SurfacePoint p = surfacePoint(actors_[VisibilityBuffer::objectOf(id)], VisibilityBuffer::triangleOf(id), u, v, eye_);
-      if (p.normal.dot(light_.direction) <= 0.0f) continue;
-      corners[static_cast<std::size_t>(j) * columns + i] = {newSun(p.position, p.normal), centre_->nearnessAt(u, v), VisibilityBuffer::objectOf(id)};
+      const int slot = VisibilityBuffer::objectOf(id);
+      Lit& lit = lit_[static_cast<std::size_t>(j) * columns + i];
+      lit = exactLight(surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_), slot);
+      lit.near = centre_->nearnessAt(u, v);
     }
   }
-  sun_columns_ = columns - 1;
-  sun_squares_.assign(static_cast<std::size_t>(sun_columns_) * (rows - 1), {kMixedSun, -1, 0, 0, 0});
   for (int j = 0; j + 1 < rows; ++j) {
     for (int i = 0; i + 1 < columns; ++i) {
-      const Corner *a = &corners[static_cast<std::size_t>(j) * columns + i], *b = a + 1, *c = a + columns, *d = c + 1;
-      const bool alike = (a->sun == 0.0f || a->sun == 1.0f) && a->sun == b->sun && a->sun == c->sun && a->sun == d->sun;
-      if (!alike || a->slot != b->slot || a->slot != c->slot || a->slot != d->slot) continue;
-      sun_squares_[static_cast<std::size_t>(j) * sun_columns_ + i] = {a->sun, a->slot, a->near, (b->near - a->near) / kSunStep, (c->near - a->near) / kSunStep};
+      const std::size_t at = static_cast<std::size_t>(j) * columns + i;
+      smooth_[at] = isSmooth(lit_[at], lit_[at + 1], lit_[at + columns], lit_[at + columns + 1]);
     }
   }
 }
 
-// @param u, v the pixel, or a place in it
-float FrameCompositor::surfaceSun(const SurfacePoint& p, std::uint32_t id, float u, float v) const {
-  if (p.normal.dot(light_.direction) <= 0.0f) return 0.0f;  // lit from behind
-  const int iu = static_cast<int>(u), iv = static_cast<int>(v);
-  if (static_cast<float>(iu) == u && static_cast<float>(iv) == v) {
-    const int du = iu - region_.x, dv = iv - region_.y;
-    const SunSquare& s = sun_squares_[static_cast<std::size_t>(dv / kSunStep) * sun_columns_ + du / kSunStep];
-    if (s.sun >= 0.0f && s.slot == VisibilityBuffer::objectOf(id)) {
-      const float near = centre_->nearness(dv)[du], expected = s.near_0 + (du % kSunStep) * s.near_u + (dv % kSunStep) * s.near_v;
-      if (std::abs(near - expected) * frame_.camera.fx < kSunStep * near) return s.sun;
-    }
+// Corners: first, right, below, right below.
+bool FrameCompositor::isSmooth(const Lit& a, const Lit& b, const Lit& c, const Lit& d) const {
+  if (a.slot < 0 || a.slot != b.slot || a.slot != c.slot || a.slot != d.slot) return false;
+  if (std::abs(a.near + d.near - b.near - c.near) * frame_.camera.fx > kLightStep * a.near) return false;
+  for (int k = 0; k < 3; ++k) {
+    const float all[] = {a.diffuse[k] + a.highlight[k], b.diffuse[k] + b.highlight[k], c.diffuse[k] + c.highlight[k], d.diffuse[k] + d.highlight[k]};
+    const auto [low, high] = std::minmax_element(std::begin(all), std::end(all));
+    if (*high - *low > kSmoothLight * *high) return false;
   }
-  return newSun(p.position, p.normal);
+  return true;
+}
+
+// @param u, v the pixel, or a place in it
+FrameCompositor::Lit FrameCompositor::lightAt(const SurfacePoint& p, std::uint32_t id, float u, float v) const {
+  const int slot = VisibilityBuffer::objectOf(id), iu = static_cast<int>(u), iv = static_cast<int>(v);
+  if (static_cast<float>(iu) != u || static_cast<float>(iv) != v) return exactLight(p, slot);
+  const int du = iu - region_.x, dv = iv - region_.y;
+  const std::size_t at = static_cast<std::size_t>(dv / kLightStep) * lit_columns_ + du / kLightStep;
+  const Lit& a = lit_[at];
+  if (!smooth_[at] || a.slot != slot) return exactLight(p, slot);
+  const Lit &b = lit_[at + 1], &c = lit_[at + lit_columns_], &d = lit_[at + lit_columns_ + 1];
+  const float x = static_cast<float>(du % kLightStep) / kLightStep, y = static_cast<float>(dv % kLightStep) / kLightStep;
+  const float wa = (1.0f - x) * (1.0f - y), wb = x * (1.0f - y), wc = (1.0f - x) * y, wd = x * y;
+  const float near = centre_->nearness(dv)[du], expected = wa * a.near + wb * b.near + wc * c.near + wd * d.near;
+  // Another piece of the surface can look out between the corners.
+  if (std::abs(near - expected) * frame_.camera.fx > kLightStep * near) return exactLight(p, slot);
+  return {wa * a.diffuse + wb * b.diffuse + wc * c.diffuse + wd * d.diffuse, wa * a.highlight + wb * b.highlight + wc * c.highlight + wd * d.highlight, near, slot};
 }
 
 }  // namespace calipso::render

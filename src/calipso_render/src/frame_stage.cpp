@@ -51,7 +51,7 @@ void FrameCompositor::prepareFrame() {
   measureSky();
   measureSun();
   findRelit();
-  findSurfaceSun();
+  findSurfaceLight();
 }
 
 Light FrameCompositor::lightOf(const FrameInput& frame) const {
@@ -92,7 +92,8 @@ void FrameCompositor::stage() {
   plate_ = prepared_.plate_linear;
   invented_ = prepared_.background.invented;
   if (sameView(frame_.camera, prepared_.camera)) {
-    live_origin_ = prepared_.background.live_origin;
+    live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
+    if (live_ != nullptr) live_corrections_ = live_->corrections(frame_.bgr, labels_);
     fronts_ = prepared_.fronts;
     footprints_ = prepared_.footprints;
   } else {

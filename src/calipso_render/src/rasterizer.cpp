@@ -22,9 +22,14 @@ int ceilInt(float x) {
   return i + (static_cast<float>(i) < x);
 }
 
-// A triangle made ready for row spans: edge functions a u + b v + c >= 0 inside, nearness plane.
+// A triangle made ready for row spans. A row v lies inside from the greatest of `left` to the least of `right`, each
+// linear in v; nearness is a plane.
 struct Span {
-  float a[3], b[3], c[3];
+  struct Bound {
+    float at_0, slope;  // column = at_0 + slope * v
+  };
+  Bound left[3], right[3];
+  int lefts, rights;
   float near_u, near_v, near_0;
   int row_min, row_max, column_min, column_max;  // in the buffer's region
   std::uint32_t id;
@@ -49,15 +54,18 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Span
   span.column_min = ceilInt(std::max(0.0f, left - kEdgeTolerance));
   span.column_max = floorInt(std::min(region.width - 1.0f, right + kEdgeTolerance));
   if (span.row_min > span.row_max || span.column_min > span.column_max) return false;
-  const float sign = area > 0 ? 1.0f : -1.0f;
+  span.lefts = span.rights = 0;
   for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3f& s = p[(i + 1) % 3];
-    const Eigen::Vector3f& e = p[(i + 2) % 3];
-    const float dx = e.x() - s.x(), dy = e.y() - s.y();
-    const float scale = sign / (std::sqrt(dx * dx + dy * dy) + 1e-12f);
-    span.a[i] = -dy * scale;
-    span.b[i] = dx * scale;
-    span.c[i] = -(span.a[i] * s.x() + span.b[i] * s.y()) + kEdgeTolerance;
+    const Eigen::Vector3f& start = p[(i + 1) % 3];
+    const Eigen::Vector3f& end = p[(i + 2) % 3];
+    const float dx = end.x() - start.x(), dy = end.y() - start.y();
+    if (dy == 0.0f) continue;  // level: the rows' limits bound it
+    // The edge is moved out by kEdgeTolerance: along the row by that times length / |dy|.
+    const float slope = dx / dy, reach = kEdgeTolerance * std::sqrt(1.0f + slope * slope);
+    const bool is_left = (area > 0.0f) == (dy < 0.0f);
+    const float at_0 = start.x() - slope * start.y() + (is_left ? -reach : reach);
+    if (is_left) span.left[span.lefts++] = {at_0, slope};
+    else span.right[span.rights++] = {at_0, slope};
   }
   const float dz1 = p[1].z() - p[0].z(), dz2 = p[2].z() - p[0].z();
   span.near_u = (dz1 * (p[2].y() - p[0].y()) - dz2 * (p[1].y() - p[0].y())) / area;
@@ -69,12 +77,8 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Span
 // Columns of row v inside the triangle.
 void rowLimits(const Span& s, float v, int& from, int& to) {
   float low = static_cast<float>(s.column_min), high = static_cast<float>(s.column_max);
-  for (int i = 0; i < 3; ++i) {
-    const float rest = s.b[i] * v + s.c[i];
-    if (s.a[i] > 1e-9f) low = std::max(low, -rest / s.a[i]);
-    else if (s.a[i] < -1e-9f) high = std::min(high, -rest / s.a[i]);
-    else if (rest < 0.0f) high = low - 1.0f;
-  }
+  for (int i = 0; i < s.lefts; ++i) low = std::max(low, s.left[i].at_0 + s.left[i].slope * v);
+  for (int i = 0; i < s.rights; ++i) high = std::min(high, s.right[i].at_0 + s.right[i].slope * v);
   from = ceilInt(low);
   to = high < low ? from - 1 : floorInt(high);
 }

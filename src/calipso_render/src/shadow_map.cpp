@@ -46,10 +46,11 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
   for (const Occluder& o : occluders) {
     ScreenMesh mesh;
     mesh.triangles = o.triangles;
-    mesh.points.reserve(o.vertices->size());
-    for (const Eigen::Vector3f& p : *o.vertices) {
-      mesh.points.emplace_back((p.dot(axis_s_) - origin_.x()) / texel_,
-                               (p.dot(axis_t_) - origin_.y()) / texel_, p.dot(axis_h_) - origin_.z());
+    mesh.points.resize(o.vertices->size());
+#pragma omp parallel for schedule(static)
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+      const Eigen::Vector3f& p = (*o.vertices)[i];
+      mesh.points[i] = {(p.dot(axis_s_) - origin_.x()) / texel_, (p.dot(axis_t_) - origin_.y()) / texel_, p.dot(axis_h_) - origin_.z()};
     }
     buffer.draw(mesh, 0);
   }
@@ -69,10 +70,13 @@ void ShadowMap::buildLevels() {
   while (levels_.empty() || std::max(levels_.back().width, levels_.back().height) > 2) {
     const int w = (width + shrink - 1) / shrink, h = (height + shrink - 1) / shrink;
     std::vector<Extremes> next(static_cast<std::size_t>(w) * h, none);
-    for (int j = 0; j < height; ++j) {
-      const Extremes* row = &own[static_cast<std::size_t>(j) * width];
-      Extremes* out = &next[static_cast<std::size_t>(j / shrink) * w];
-      for (int i = 0; i < width; ++i) merge(out[i / shrink], row[i]);
+#pragma omp parallel for schedule(static)
+    for (int b = 0; b < h; ++b) {
+      Extremes* out = &next[static_cast<std::size_t>(b) * w];
+      for (int j = b * shrink; j < std::min(height, (b + 1) * shrink); ++j) {
+        const Extremes* row = &own[static_cast<std::size_t>(j) * width];
+        for (int i = 0; i < width; ++i) merge(out[i / shrink], row[i]);
+      }
     }
     Level level{w, h, std::vector<Extremes>(next.size())};
     for (int j = 0; j < h; ++j) {

@@ -116,6 +116,45 @@ TEST(Inpaint, ContinuesStripes) {
   EXPECT_LE(wrong, square.area() / 20);
 }
 
+// A grey picture with grain whose left half's copy, `step` code values darker, fills a hole in the right half.
+struct LiveCase {
+  cv::Mat frame = cv::Mat(60, 120, CV_8UC3), labels = cv::Mat::zeros(60, 120, CV_8U);
+  LiveFill fill;
+  explicit LiveCase(int step) {
+    cv::RNG random(3);
+    random.fill(frame, cv::RNG::UNIFORM, 100, 110);
+    cv::subtract(frame.colRange(0, 60), cv::Scalar::all(step), frame.colRange(0, 60));
+    labels(cv::Rect(75, 15, 30, 30)).setTo(1);
+    cv::Mat origin(60, 120, CV_16SC2, cv::Scalar(-1, -1));
+    for (int v = 15; v < 45; ++v) {
+      for (int u = 75; u < 105; ++u) origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 65), short(v));
+    }
+    fill = LiveFill(origin, labels);
+  }
+};
+
+TEST(LiveFill, CopiesTheFrameAtHandAndMeetsTheRim) {
+  const LiveCase c(6);
+  const std::vector<cv::Vec3f> corrections = c.fill.corrections(c.frame, c.labels);
+  cv::Vec3f rim_sum, middle;
+  for (int v = 15; v < 45; ++v) {
+    cv::Vec3f colour;
+    ASSERT_TRUE(c.fill.at(c.frame, c.labels, corrections, 0.0f, 75, v, colour));
+    rim_sum += colour;
+  }
+  EXPECT_NEAR(rim_sum[0] / 30, 105.0, 2.0);  // the copy alone has 99
+  ASSERT_TRUE(c.fill.at(c.frame, c.labels, corrections, 0.0f, 90, 30, middle));
+  EXPECT_NEAR(middle[0], c.frame.at<cv::Vec3b>(30, 25)[0], 3.0);
+}
+
+TEST(LiveFill, HasNothingWhereTheFrameHidesTheOrigin) {
+  LiveCase c(0);
+  c.labels(cv::Rect(10, 15, 30, 30)).setTo(2);
+  cv::Vec3f colour;
+  EXPECT_FALSE(c.fill.at(c.frame, c.labels, c.fill.corrections(c.frame, c.labels), 0.0f, 90, 30, colour));
+  EXPECT_FALSE(c.fill.at(c.frame, c.labels, c.fill.corrections(c.frame, c.labels), 0.0f, 5, 5, colour));
+}
+
 TEST(ClipSample, KeepsTheKeyFrameAndItsBound) {
   ClipSample sample(4);
   for (int k = 0; k < 100; ++k) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calipso_render/clip_sample.hpp"
+#include "calipso_render/live_fill.hpp"
 
 namespace calipso::render {
 
@@ -14,9 +15,7 @@ struct Background {
   cv::Mat spread;  // CV_32FC1: median absolute deviation over time, code values
   cv::Mat invented;  // CV_8UC1: 255 where no frame shows it
   cv::Mat origin;  // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
-  // CV_16SC2: origin where that place moves by itself (clouds, water), so that a frame shows it best;
-  // (-1, -1) elsewhere. Empty if nothing moves.
-  cv::Mat live_origin;
+  LiveFill live;   // where an invented pixel's origin moves by itself; empty if nothing moves
 };
 
 struct BackgroundParams {

@@ -4,15 +4,21 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <exception>
+#include <functional>
+#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
 #include "drawing_case.hpp"
+#include "filling_case.hpp"
+#ifdef CALIPSO_HAVE_EGL
+#include "llvmpipe.hpp"
+#endif
 
 namespace calipso::render {
 namespace {
-
 
 double wallMs() { return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -23,41 +29,79 @@ double cpuMs() {
   return 1e3 * t.tv_sec + 1e-6 * t.tv_nsec;
 }
 
-void timeDrawing(Quality quality, int frames, const char* picture) {
-  const DrawingCase c = makeDrawingCase(quality);
-  Renderer renderer(c.prepared, c.params);
+struct Options {
+  std::string pictures;  // folder; empty: none are written
+  int frames = 12;
+  bool drawing = true;
+  std::vector<std::string> scenes;
+};
+
+// Best and median of the frames after the first two.
+void timeFrames(const std::string& name, const DrawingCase& drawing, const Options& options, const std::function<cv::Mat(int)>& draw) {
   std::vector<double> wall, cpu;
   cv::Mat last;
-  for (int k = 0; k < frames + 2; ++k) {
-    const FrameInput in = c.input(k);
+  for (int k = 0; k < options.frames + 2; ++k) {
     const double w = wallMs(), p = cpuMs();
-    const FrameOutput out = renderer.composite(in);
+    last = draw(k);
     if (k >= 2) wall.push_back(wallMs() - w), cpu.push_back(cpuMs() - p);
-    last = out.bgr;
   }
-  if (picture != nullptr) cv::imwrite(std::string(picture) + (quality == Quality::kFinal ? "/drawing_final.png" : "/drawing_live.png"), last);
-  std::printf("{\"case\": \"drawing_%s\", \"triangles\": %d, \"coverage\": %.3f, \"wall_ms\": %.2f, \"cpu_ms\": %.2f}\n",
-              quality == Quality::kFinal ? "final" : "live", c.triangles, c.coverage,
-              *std::min_element(wall.begin(), wall.end()), *std::min_element(cpu.begin(), cpu.end()));
+  std::sort(wall.begin(), wall.end()), std::sort(cpu.begin(), cpu.end());
+  if (!options.pictures.empty()) cv::imwrite(options.pictures + "/" + name + ".png", last);
+  std::printf("{\"case\": \"%s\", \"triangles\": %d, \"coverage\": %.3f, \"wall_ms\": %.2f, \"cpu_ms\": %.2f, \"cpu_median_ms\": %.2f}\n", name.c_str(),
+              drawing.triangles, drawing.coverage, wall.front(), cpu.front(), cpu[cpu.size() / 2]);
   std::fflush(stdout);
+}
+
+void timeDrawing(const Options& options) {
+  const DrawingCase live = makeDrawingCase(Quality::kLive);
+  Renderer live_renderer(live.prepared, live.params);
+  timeFrames("drawing_live", live, options, [&](int k) { return live_renderer.composite(live.input(k)).bgr; });
+  DrawingCase final = live;
+  final.params.quality = Quality::kFinal;
+  Renderer final_renderer(final.prepared, final.params);
+  timeFrames("drawing_final", final, options, [&](int k) { return final_renderer.composite(final.input(k)).bgr; });
+#ifdef CALIPSO_HAVE_EGL
+  try {
+    LlvmpipeDrawing peer(live);
+    std::fprintf(stderr, "OpenGL: %s\n", peer.renderer().c_str());
+    timeFrames("drawing_llvmpipe", live, options, [&](int k) { return peer.draw(live.verticesAt(k)); });
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "drawing_llvmpipe left out: %s\n", error.what());
+  }
+#else
+  std::fprintf(stderr, "drawing_llvmpipe left out: built without EGL (libegl-dev, libgl-dev)\n");
+#endif
+}
+
+void compareScene(const std::string& scene, const Options& options) {
+  const auto text = [](const std::optional<double>& value) { return value ? std::to_string(*value) : std::string("null"); };
+  for (const FillingResult& r : compareFilling(scene, options.pictures, cpuMs)) {
+    std::printf("{\"case\": \"filling\", \"scene\": \"%s\", \"method\": \"%s\", \"hole\": %.3f, \"psnr_db\": %s, \"gradient_ratio\": %s, \"cpu_ms\": %.1f}\n",
+                scene.c_str(), r.method.c_str(), r.hole, text(r.psnr_db).c_str(), text(r.gradient_ratio).c_str(), r.cpu_ms);
+    std::fflush(stdout);
+  }
 }
 
 }  // namespace
 }  // namespace calipso::render
 
-// Usage: benchmark [--frames N] [--pictures DIR] [CASE...]   One line of JSON per case.
+// Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [SCENE_DIR...]   One line of JSON per case.
 int main(int argc, char** argv) {
   using namespace calipso::render;
-  const char* pictures = nullptr;
-  int frames = 12;
-  std::vector<std::string> cases;
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
+  Options options;
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;
-    if (std::strcmp(argv[i], "--pictures") == 0 && has_value) pictures = argv[++i];
-    else if (std::strcmp(argv[i], "--frames") == 0 && has_value) frames = std::max(1, std::atoi(argv[++i]));
-    else cases.push_back(argv[i]);
+    if (std::strcmp(argv[i], "--pictures") == 0 && has_value) options.pictures = argv[++i];
+    else if (std::strcmp(argv[i], "--frames") == 0 && has_value) options.frames = std::max(1, std::atoi(argv[++i]));
+    else if (std::strcmp(argv[i], "--no-drawing") == 0) options.drawing = false;
+    else options.scenes.push_back(argv[i]);
   }
-  const auto wanted = [&](const char* name) { return cases.empty() || std::count(cases.begin(), cases.end(), name) > 0; };
-  if (wanted("drawing_live")) timeDrawing(Quality::kLive, frames, pictures);
-  if (wanted("drawing_final")) timeDrawing(Quality::kFinal, frames, pictures);
+  try {
+    if (options.drawing) timeDrawing(options);
+    for (const std::string& scene : options.scenes) compareScene(scene, options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
 }

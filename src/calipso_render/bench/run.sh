@@ -1,0 +1,12 @@
+#!/bin/sh
+# usage: run.sh OUTPUT_FOLDER SCENE_FOLDER...
+# Runs the evaluator and the benchmark with its peers on the scenes, and writes OUTPUT_FOLDER/appearance.md.
+set -e
+output=$1
+shift
+mkdir -p "$output"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+rosrun calipso_render evaluate "$@" > "$work/evaluate.jsonl"
+rosrun calipso_render benchmark "$@" > "$work/benchmark.jsonl"
+/usr/bin/python3 "$(dirname "$0")/report.py" "$output/appearance.md" "$work/evaluate.jsonl" "$work/benchmark.jsonl"
