@@ -26,7 +26,8 @@ int ceilInt(float x) {
 // linear in v; nearness is a plane.
 struct Span {
   struct Bound {
-    float at_0, slope;  // column = at_0 + slope * v
+    float column, row, slope;  // a point of it, and columns per row
+    float at(float v) const { return column + slope * (v - row); }
   };
   Bound left[3], right[3];
   int lefts, rights;
@@ -59,13 +60,12 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Span
     const Eigen::Vector3f& start = p[(i + 1) % 3];
     const Eigen::Vector3f& end = p[(i + 2) % 3];
     const float dx = end.x() - start.x(), dy = end.y() - start.y();
-    if (dy == 0.0f) continue;  // level: the rows' limits bound it
+    if (std::abs(dy) < kEdgeTolerance) continue;  // level: the rows' limits bound it
     // The edge is moved out by kEdgeTolerance: along the row by that times length / |dy|.
     const float slope = dx / dy, reach = kEdgeTolerance * std::sqrt(1.0f + slope * slope);
     const bool is_left = (area > 0.0f) == (dy < 0.0f);
-    const float at_0 = start.x() - slope * start.y() + (is_left ? -reach : reach);
-    if (is_left) span.left[span.lefts++] = {at_0, slope};
-    else span.right[span.rights++] = {at_0, slope};
+    if (is_left) span.left[span.lefts++] = {start.x() - reach, start.y(), slope};
+    else span.right[span.rights++] = {start.x() + reach, start.y(), slope};
   }
   const float dz1 = p[1].z() - p[0].z(), dz2 = p[2].z() - p[0].z();
   span.near_u = (dz1 * (p[2].y() - p[0].y()) - dz2 * (p[1].y() - p[0].y())) / area;
@@ -77,8 +77,8 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Span
 // Columns of row v inside the triangle.
 void rowLimits(const Span& s, float v, int& from, int& to) {
   float low = static_cast<float>(s.column_min), high = static_cast<float>(s.column_max);
-  for (int i = 0; i < s.lefts; ++i) low = std::max(low, s.left[i].at_0 + s.left[i].slope * v);
-  for (int i = 0; i < s.rights; ++i) high = std::min(high, s.right[i].at_0 + s.right[i].slope * v);
+  for (int i = 0; i < s.lefts; ++i) low = std::max(low, s.left[i].at(v));
+  for (int i = 0; i < s.rights; ++i) high = std::min(high, s.right[i].at(v));
   from = ceilInt(low);
   to = high < low ? from - 1 : floorInt(high);
 }
