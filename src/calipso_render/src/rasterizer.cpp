@@ -79,8 +79,12 @@ void rowLimits(const Span& s, float v, int& from, int& to) {
   float low = static_cast<float>(s.column_min), high = static_cast<float>(s.column_max);
   for (int i = 0; i < s.lefts; ++i) low = std::max(low, s.left[i].at(v));
   for (int i = 0; i < s.rights; ++i) high = std::min(high, s.right[i].at(v));
+  if (!(low <= high)) {  // far off, they might not fit an int
+    from = 0, to = -1;
+    return;
+  }
   from = ceilInt(low);
-  to = high < low ? from - 1 : floorInt(high);
+  to = floorInt(high);
 }
 
 void fillRow(const Span& s, int row, int from, int to, std::uint32_t* ids, float* nearest) {

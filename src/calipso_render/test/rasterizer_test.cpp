@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <opencv2/core.hpp>
 
 #include "calipso_render/edge_coverage.hpp"
 #include "calipso_render/shadow_map.hpp"
@@ -41,6 +42,34 @@ TEST(VisibilityBuffer, SharedEdgesHaveNoCracks) {
   buffer.draw(mesh, 0);
   for (int v = 0; v <= 20; ++v) {
     for (int u = 0; u <= 20; ++u) EXPECT_NE(buffer.idAt(u, v), VisibilityBuffer::kNothing) << u << ", " << v;
+  }
+}
+
+TEST(VisibilityBuffer, CoversWhatTheEdgesEnclose) {
+  // Against the edges' signs at every pixel, for triangles of all shapes: slivers, nearly level, far beyond the picture.
+  cv::RNG random(5);
+  for (int k = 0; k < 2000; ++k) {
+    Eigen::Vector2f p[3];
+    for (Eigen::Vector2f& x : p) {
+      const float spread = k % 4 == 0 ? 3000.0f : 40.0f;
+      x = {random.uniform(-spread, spread), k % 5 == 0 ? 17.3f + random.uniform(-0.01f, 0.01f) : random.uniform(-spread, spread)};
+    }
+    const ScreenMesh mesh = triangle(kOne, p[0], p[1], p[2], 1.0f);
+    VisibilityBuffer buffer({0, 0, 33, 29});
+    buffer.draw(mesh, 0);
+    for (int v = 0; v < 29; ++v) {
+      for (int u = 0; u < 33; ++u) {
+        double least = 1e30, greatest = -1e30;  // signed distances to the edges, px
+        for (int i = 0; i < 3; ++i) {
+          const Eigen::Vector2d a = p[i].cast<double>(), e = p[(i + 1) % 3].cast<double>() - a, x = Eigen::Vector2d(u, v) - a;
+          const double distance = (e.x() * x.y() - e.y() * x.x()) / (e.norm() + 1e-12);
+          least = std::min(least, distance), greatest = std::max(greatest, distance);
+        }
+        const bool seen = buffer.idAt(u, v) != VisibilityBuffer::kNothing;
+        if (least > 0.02 || greatest < -0.02) ASSERT_TRUE(seen) << k << ": " << u << ", " << v;
+        if (least < -0.02 && greatest > 0.02) ASSERT_FALSE(seen) << k << ": " << u << ", " << v;
+      }
+    }
   }
 }
 
