@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -320,6 +321,19 @@ cv::Vec3f sampleBicubic(const cv::Mat& image, float u, float v) {
   };
   float wx[4], wy[4];
   weights(x, wx), weights(y, wy);
+  // Away from the borders four floats are taken at a time: a pixel and one value of the next.
+  if (u >= 1.0f && v >= 1.0f && u < image.cols - 3.0f && v < image.rows - 2.0f) {
+    cv::v_float32x4 sum = cv::v_setzero_f32();
+    for (int b = 0; b < 4; ++b) {
+      const float* row = image.ptr<float>(static_cast<int>(fv) - 1 + b) + 3 * (static_cast<int>(fu) - 1);
+      cv::v_float32x4 line = cv::v_setall_f32(wx[0]) * cv::v_load(row);
+      for (int a = 1; a < 4; ++a) line += cv::v_setall_f32(wx[a]) * cv::v_load(row + 3 * a);
+      sum += cv::v_setall_f32(wy[b]) * line;
+    }
+    float values[4];
+    cv::v_store(values, cv::v_max(sum, cv::v_setzero_f32()));
+    return {values[0], values[1], values[2]};
+  }
   const auto clampTo = [](float f, int limit) { return static_cast<int>(std::clamp(f, -8.0f, limit + 8.0f)); };
   const int i = clampTo(fu, image.cols), j = clampTo(fv, image.rows);
   cv::Vec3f sum;
