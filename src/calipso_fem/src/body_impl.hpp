@@ -140,6 +140,8 @@ struct DeformableBody::Impl {
   Vec startAcceleration(const Vec& loads);
   void finishReport(StepReport* report) const;
   void invalidatePreconditioner();
+  Momentum momentum() const;
+  void keepAngularMomentum(const Momentum& before, const Vec& loads, double h);
   void invalidateSystem();
   void modelChanged();                   // material or rest shape
   // A^-1 of the last step's system times impulses on the nodes (N s): change of velocity, m/s.

@@ -39,19 +39,22 @@ double DeformableBody::gravityEnergy() const {
   return energy;
 }
 
-Momentum DeformableBody::momentum() const {
-  const Eigen::VectorXd& m = impl_->model->lumpedMass();
-  const Vec Mv = impl_->applyMass(impl_->v);
+Momentum DeformableBody::Impl::momentum() const {
+  const Eigen::VectorXd& m = model->lumpedMass();
+  const double total = m.sum();
+  const Vec Mv = applyMass(v);
   Momentum result;
   for (int k = 0; k < m.size(); ++k) {
-    result.center += m[k] / m.sum() * impl_->x.segment<3>(3 * k);
+    result.center += m[k] / total * x.segment<3>(3 * k);
     result.linear += Mv.segment<3>(3 * k);
   }
   for (int k = 0; k < m.size(); ++k)
     result.angular +=
-        Vector3d(impl_->x.segment<3>(3 * k) - result.center).cross(Vector3d(Mv.segment<3>(3 * k)));
+        Vector3d(x.segment<3>(3 * k) - result.center).cross(Vector3d(Mv.segment<3>(3 * k)));
   return result;
 }
+
+Momentum DeformableBody::momentum() const { return impl_->momentum(); }
 
 double DeformableBody::totalMass() const { return impl_->model->totalMass(); }
 
@@ -115,6 +118,8 @@ void DeformableBody::applyImpulses(const std::vector<SurfacePoint>& points,
     throw std::invalid_argument("applyImpulses: needs one impulse per point");
   Vec b = Vec::Zero(impl_->x.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
+    if (!impulses[k].allFinite())
+      throw std::invalid_argument("applyImpulses: impulse " + std::to_string(k) + " is not finite");
     const Eigen::SparseVector<double> weights = impl_->embedding.pointWeights(points[k]);
     for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
       b.segment<3>(3 * it.index()) += it.value() * impulses[k];

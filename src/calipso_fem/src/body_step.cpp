@@ -1,3 +1,5 @@
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -171,6 +173,38 @@ Vec DeformableBody::Impl::startAcceleration(const Vec& loads) {
   return result;
 }
 
+// NOTE: backward Euler slows the turning of a free body by (omega h)^2 in every step. Its change of
+// angular momentum is set to what the external forces give it: a rigid rotation about the centre of
+// mass is added to the velocities.
+void DeformableBody::Impl::keepAngularMomentum(const Momentum& before, const Vec& loads, double h) {
+  const Momentum now = momentum();
+  Vec force = -loads;
+  Integrator i;
+  i.rate = 1.0 / h;
+  i.base = x - h * v;
+  addSoftGradient(x, i, &force);
+  const auto momentOf = [&](const Vec& f) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (Eigen::Index k = 0; k < x.size(); k += 3)
+      sum += Eigen::Vector3d(x.segment<3>(k) - now.center).cross(Eigen::Vector3d(f.segment<3>(k)));
+    return sum;
+  };
+  const Eigen::Vector3d target =
+      (before.angular - h * momentOf(force)) / (1.0 + h * options.mass_damping);
+  Vec spin[3];
+  Eigen::Matrix3d inertia;
+  for (int axis = 0; axis < 3; ++axis) {
+    spin[axis].resize(x.size());
+    for (Eigen::Index k = 0; k < x.size(); k += 3)
+      spin[axis].segment<3>(k) =
+          Eigen::Vector3d::Unit(axis).cross(Eigen::Vector3d(x.segment<3>(k) - now.center));
+    inertia.col(axis) = momentOf(applyMass(spin[axis]));
+  }
+  const Eigen::Vector3d turn = inertia.ldlt().solve(target - now.angular);
+  if (!turn.allFinite()) return;
+  for (int axis = 0; axis < 3; ++axis) v += turn[axis] * spin[axis];
+}
+
 StepReport DeformableBody::step(double h) {
   Impl& m = *impl_;
   if (!(h > 0.0) || !std::isfinite(h))
@@ -184,6 +218,9 @@ StepReport DeformableBody::step(double h) {
     m.acceleration_known = true;
   }
   const Integrator i = m.integrator(h);
+  const bool turns_freely =
+      m.options.scheme == TimeScheme::kBackwardEuler && m.prescribed.empty();
+  const Momentum before = turns_freely ? m.momentum() : Momentum();
   Vec y = m.x;
   StepReport report = m.minimise(i, loads, targets, m.options.linearised, &y);
   if (y.allFinite()) {
@@ -194,6 +231,7 @@ StepReport DeformableBody::step(double h) {
     m.x = y;
     m.v = v1;
     m.rememberSoftForces(i);
+    if (turns_freely) m.keepAngularMomentum(before, loads, h);
   } else {
     report.converged = false;
     report.message = "the step gave positions that are not finite; the state before it is kept";

@@ -144,6 +144,8 @@ void DeformableBody::setRigidVelocity(const Vector3d& linear, const Vector3d& an
 }
 
 void DeformableBody::applyRigidTransform(const Eigen::Isometry3d& transform) {
+  if (!transform.matrix().allFinite())
+    throw std::invalid_argument("rigid transform: an entry is not finite");
   for (int k = 0; k < nodeCount(); ++k) {
     impl_->x.segment<3>(3 * k) = transform * Vector3d(impl_->x.segment<3>(3 * k));
     impl_->v.segment<3>(3 * k) = transform.linear() * Vector3d(impl_->v.segment<3>(3 * k));
@@ -207,6 +209,7 @@ void DeformableBody::setSoftConstraints(std::vector<SoftConstraint> constraints)
   for (SoftConstraint& c : constraints) {
     requireFinite(c.target, "soft constraint's target");
     requireFinite(c.direction, "soft constraint's direction");
+    requireFinite(c.target_velocity, "soft constraint's target velocity");
     if (!(c.stiffness >= 0.0) || !(c.damping >= 0.0) || !std::isfinite(c.stiffness + c.damping))
       throw std::invalid_argument("soft constraint: stiffness and damping must be >= 0 and finite");
     Eigen::SparseVector<double> weights = impl_->embedding.pointWeights(c.point);
@@ -215,7 +218,8 @@ void DeformableBody::setSoftConstraints(std::vector<SoftConstraint> constraints)
 }
 
 void DeformableBody::setPressure(double pressure) {
-  if (!std::isfinite(pressure)) throw std::invalid_argument("pressure is not finite");
+  if (!std::isfinite(pressure)) throw std::invalid_argument("pressure is " + std::to_string(pressure) +
+                                " Pa, allowed is any finite value");
   impl_->pressure = pressure;
 }
 

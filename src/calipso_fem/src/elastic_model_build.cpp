@@ -23,8 +23,8 @@ StvkBatchKind makeBatchKind(const ElementKind& kind) {
   b.mu = kind.lame.mu;
   b.enhanced = kind.type == ElementType::kHexEnhanced;
   if (!b.enhanced) return b;
-  for (int i = 0; i < kModes; ++i)
-    for (int j = 0; j < kModes; ++j) b.mode_inverse[i][j] = kind.mode_stiffness_inverse(i, j);
+  for (int i = 0; i < kGradientModes; ++i)
+    for (int j = 0; j < kGradientModes; ++j) b.mode_inverse[i][j] = kind.mode_stiffness_inverse(i, j);
   return b;
 }
 

@@ -116,7 +116,9 @@ ElementKind makeElementKind(const ReferenceElement& reference, ElementType type,
   kind.lame = lame;
   if (type == ElementType::kHexEnhanced) {
     kind.mode_stiffness = restModeStiffness(reference, lame);
-    kind.mode_stiffness_inverse = kind.mode_stiffness.ldlt().solve(ModeMatrix::Identity());
+    kind.mode_stiffness_inverse =
+        kind.mode_stiffness.topLeftCorner<kGradientModes, kGradientModes>().ldlt().solve(
+            GradientModeMatrix::Identity());
   }
   return kind;
 }

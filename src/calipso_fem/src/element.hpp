@@ -12,6 +12,7 @@ constexpr int kMaxDof = 3 * kMaxCorners;
 using ElementVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxDof, 1>;
 using ElementMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxDof, kMaxDof>;
 using ModeMatrix = Eigen::Matrix<double, kModes, kModes>;
+using GradientModeMatrix = Eigen::Matrix<double, kGradientModes, kGradientModes>;
 
 // What cells of equal shape and equal elastic constants share.
 struct ElementKind {
@@ -20,7 +21,9 @@ struct ElementKind {
   MaterialModel model = MaterialModel::kStVenantKirchhoff;
   Lame lame;
   ModeMatrix mode_stiffness;          // K_aa at rest (enhanced elements only)
-  ModeMatrix mode_stiffness_inverse;
+  // St. Venant-Kirchhoff: inverse for the modes it uses, the gradient modes. NOTE: the volumetric ones
+  // would cost it an eighth of its time, for 0.04 % of the error at nu = 0.3.
+  GradientModeMatrix mode_stiffness_inverse;
 };
 
 ElementKind makeElementKind(const ReferenceElement& reference, ElementType type,

@@ -5,7 +5,7 @@
 #include "element.hpp"
 
 // Hexahedra with enhanced strains, condensed in the element.
-//  a      mode amplitudes, kModes
+//  a      mode amplitudes
 //  K_aa   d2W/da2,  K_xa  d2W/dx da,  K = K_xx - K_xa K_aa^-1 K_ax
 namespace calipso::fem {
 namespace {
@@ -13,6 +13,8 @@ namespace {
 using Eigen::Matrix3d;
 using ModeVector = Eigen::Matrix<double, kModes, 1>;
 using Coupling = Eigen::Matrix<double, kMaxDof, kModes>;
+using GradientModeVector = Eigen::Matrix<double, kGradientModes, 1>;
+using GradientCoupling = Eigen::Matrix<double, kMaxDof, kGradientModes>;
 
 Matrix3d symmetric(const Matrix3d& A) { return 0.5 * (A + A.transpose()); }
 
@@ -137,20 +139,20 @@ void evaluateEnhancedStvk(const ElementKind& kind, const CornerMatrix& x, int de
                           ElementResult* r) {
   const ReferenceElement& ref = *kind.reference;
   std::array<Matrix3d, kMaxPoints> F, E;
-  ModeVector load = ModeVector::Zero();
+  GradientModeVector load = GradientModeVector::Zero();
   for (int q = 0; q < ref.points; ++q) {
     F[q] = x.transpose() * ref.gradient[q];
     E[q] = 0.5 * (F[q].transpose() * F[q] - Matrix3d::Identity());
     const Matrix3d S = ref.weight[q] * hooke(kind.lame, E[q]);
-    for (int i = 0; i < kModes; ++i) load[i] += S.cwiseProduct(ref.mode[q][i]).sum();
+    for (int i = 0; i < kGradientModes; ++i) load[i] += S.cwiseProduct(ref.mode[q][i]).sum();
   }
-  const ModeVector a = -kind.mode_stiffness_inverse * load;
+  const GradientModeVector a = -kind.mode_stiffness_inverse * load;
 
-  Coupling C = Coupling::Zero();  // K_xa
+  GradientCoupling C = GradientCoupling::Zero();  // K_xa
   for (int q = 0; q < ref.points; ++q) {
     const double w = ref.weight[q];
     Matrix3d enhanced = E[q];
-    for (int i = 0; i < kModes; ++i) enhanced += a[i] * symmetric(ref.mode[q][i]);
+    for (int i = 0; i < kGradientModes; ++i) enhanced += a[i] * symmetric(ref.mode[q][i]);
     const Matrix3d S = hooke(kind.lame, enhanced);
     r->energy += 0.5 * w * S.cwiseProduct(enhanced).sum();
     if (derivatives < 1) continue;
@@ -173,7 +175,7 @@ void evaluateEnhancedStvk(const ElementKind& kind, const CornerMatrix& x, int de
              w * kind.lame.mu * (p.row(j).transpose() * p.row(i) + GG(i, j) * B);
         K.diagonal().array() += w * GSG(i, j);
       }
-    for (int m = 0; m < kModes; ++m) {
+    for (int m = 0; m < kGradientModes; ++m) {
       const Matrix3d T = w * hooke(kind.lame, symmetric(ref.mode[q][m]));
       for (int c = 0; c < ref.corners; ++c)
         C.block<3, 1>(3 * c, m) += F[q] * (T * G.row(c).transpose());

@@ -7,7 +7,8 @@ namespace calipso::fem {
 
 constexpr int kMaxCorners = 8;
 constexpr int kMaxPoints = 8;
-constexpr int kModes = 9;
+constexpr int kModes = 12;
+constexpr int kGradientModes = 9;   // the first of them
 
 using CornerMatrix = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor, kMaxCorners, 3>;
 
@@ -21,7 +22,9 @@ struct ReferenceElement {
   CornerMatrix center_gradient;                         // at the cell's centre
   // Enhanced gradient modes (Simo and Rifai 1990; Simo and Armero 1992): the gradients of
   // Wilson's bubbles 1 - xi_k^2, mapped with the centre's Jacobian so that the patch test holds:
-  // mode 3 k + c at a point is xi_k (j0/j) e_c (x) J0^-T e_k.
+  // mode 3 k + c at a point is xi_k (j0/j) e_c (x) J0^-T e_k. Three more change the volume only,
+  // xi_0 xi_1, xi_1 xi_2 and xi_2 xi_0 times (j0/j) I: against locking near nu = 0.5 (Simo, Armero and
+  // Taylor 1993).
   std::array<std::array<Eigen::Matrix3d, kModes>, kMaxPoints> mode;
 };
 

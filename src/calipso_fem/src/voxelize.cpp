@@ -1,8 +1,9 @@
 #include "calipso_fem/voxel_grid.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <map>
+#include <set>
 #include <stdexcept>
 
 #include "column_scan.hpp"
@@ -27,12 +28,44 @@ void checkInput(const TriangleMesh& surface, const VoxelizeOptions& o) {
   if (o.cell_size == 0.0 && o.target_nodes < 8)
     throw std::invalid_argument("voxelize: target_nodes is " + std::to_string(o.target_nodes) +
                                 ", allowed is >= 8");
+  if (o.has_anchor && !o.anchor.allFinite())
+    throw std::invalid_argument("voxelize: the anchor is not finite");
   if (o.samples_per_edge < 1 || o.samples_per_edge > 16)
     throw std::invalid_argument("voxelize: samples_per_edge is " +
                                 std::to_string(o.samples_per_edge) + ", allowed is 1..16");
   if (!(o.min_fraction > 0.0 && o.min_fraction <= 1.0))
     throw std::invalid_argument("voxelize: min_fraction is " + std::to_string(o.min_fraction) +
                                 ", allowed is (0, 1]");
+}
+
+// Without faces that have no area and without second copies of a face, whichever way they are turned:
+// either would make sight lines enter the solid more often than they leave it.
+TriangleMesh withoutBadFaces(const TriangleMesh& surface, std::vector<std::string>* messages) {
+  TriangleMesh clean = surface;
+  std::set<std::array<int, 3>> known;
+  int kept = 0, flat = 0, copies = 0;
+  for (int face = 0; face < surface.triangleCount(); ++face) {
+    const Eigen::RowVector3i t = surface.triangles.row(face);
+    const Vector3d ab = surface.vertex(t[1]) - surface.vertex(t[0]);
+    const Vector3d ac = surface.vertex(t[2]) - surface.vertex(t[0]);
+    constexpr double kNoAngle = 1e-12;
+    std::array<int, 3> corners = {t[0], t[1], t[2]};
+    std::sort(corners.begin(), corners.end());
+    if (!(ab.cross(ac).norm() > kNoAngle * std::max(ab.squaredNorm(), ac.squaredNorm()))) {
+      ++flat;
+    } else if (!known.insert(corners).second) {
+      ++copies;
+    } else {
+      clean.triangles.row(kept++) = t;
+    }
+  }
+  clean.triangles.conservativeResize(kept, 3);
+  if (flat > 0) messages->push_back(std::to_string(flat) + " faces without area are left out");
+  if (copies > 0)
+    messages->push_back(std::to_string(copies) + " faces that repeat another one are left out");
+  if (kept == 0)
+    throw std::invalid_argument("voxelize: no face of the mesh has an area; give a surface");
+  return clean;
 }
 
 VoxelLayout makeLayout(const TriangleMesh& surface, double h, const VoxelizeOptions& o) {
@@ -79,9 +112,9 @@ VoxelGrid makeGrid(const VoxelLayout& layout, const std::vector<CoveredCell>& ce
   return grid;
 }
 
-VoxelGrid voxelizeAt(const TriangleMesh& surface, double h, const VoxelizeOptions& o) {
+VoxelGrid voxelizeAt(const TriangleMesh& surface, double h, const VoxelizeOptions& o,
+                     std::vector<std::string> messages) {
   const VoxelLayout layout = makeLayout(surface, h, o);
-  std::vector<std::string> messages;
   const std::vector<CoveredCell> cells = coverSurface(surface, layout, o, &messages);
   VoxelGrid grid = makeGrid(layout, cells, o.min_fraction);
   grid.messages = std::move(messages);
@@ -110,15 +143,17 @@ VolumeMesh VoxelGrid::mesh() const {
   return m;
 }
 
-VoxelGrid voxelize(const TriangleMesh& surface, const VoxelizeOptions& options) {
-  checkInput(surface, options);
-  if (options.cell_size > 0.0) return voxelizeAt(surface, options.cell_size, options);
+VoxelGrid voxelize(const TriangleMesh& given, const VoxelizeOptions& options) {
+  checkInput(given, options);
+  std::vector<std::string> repairs;
+  const TriangleMesh surface = withoutBadFaces(given, &repairs);
+  if (options.cell_size > 0.0) return voxelizeAt(surface, options.cell_size, options, repairs);
   // Fixed point on the node count; the best of a few tries is kept.
   constexpr int kTries = 6;
   double h = startCellSize(surface, options.target_nodes);
   VoxelGrid best;
   for (int i = 0; i < kTries; ++i) {
-    VoxelGrid grid = voxelizeAt(surface, h, options);
+    VoxelGrid grid = voxelizeAt(surface, h, options, repairs);
     const double ratio = static_cast<double>(grid.nodeCount()) / options.target_nodes;
     const bool better = best.nodeCount() == 0 ||
                         std::abs(std::log(ratio)) <

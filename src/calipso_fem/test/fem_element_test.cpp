@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <random>
+#include <sstream>
 
 #include "calipso_fem/elastic_model.hpp"
 
@@ -66,6 +67,24 @@ TEST(MaterialModelTest, DerivativesMatchDifferencesUpToExtremeDeformation) {
     }
 }
 
+// Force against the energy and stiffness against the force, by central differences along d.
+void expectDerivatives(const ElasticModel& elastic, const Vec& x, const Vec& d,
+                       const std::string& what) {
+  constexpr double e = 1e-5;
+  Vec f, plus, minus;
+  elastic.gradient(x, f);
+  elastic.gradient(x + e * d, plus);
+  elastic.gradient(x - e * d, minus);
+  const double slope = (elastic.energy(x + e * d) - elastic.energy(x - e * d)) / (2.0 * e);
+  // Truncation e^2, and rounding of the energy over e.
+  EXPECT_NEAR(f.dot(d), slope, 1e-6 * f.norm() * d.norm() + 1e-10 * elastic.energy(x)) << what;
+  BlockMatrix K;
+  elastic.hessian(x, Definiteness::kExact, K);
+  Vec Kd;
+  K.multiply(d, Kd);
+  EXPECT_LT((Kd - (plus - minus) / (2.0 * e)).norm(), 1e-5 * Kd.norm()) << what;
+}
+
 TEST(ElementTest, DerivativesMatchDifferences) {
   std::mt19937 random(2);
   for (const ElementType element : kElements)
@@ -75,19 +94,25 @@ TEST(ElementTest, DerivativesMatchDifferences) {
         const ElasticModel elastic(mesh, kRubber, model, element);
         const Vec x = randomState(mesh, size, &random);
         const Vec d = randomState(mesh, 1.0, &random) - restPositions(mesh);
-        constexpr double e = 1e-5;
-        Vec f, plus, minus;
-        elastic.gradient(x, f);
-        elastic.gradient(x + e * d, plus);
-        elastic.gradient(x - e * d, minus);
-        const double slope = (elastic.energy(x + e * d) - elastic.energy(x - e * d)) / (2.0 * e);
-        const std::string what = toString(element) + " " + toString(model);
-        EXPECT_NEAR(f.dot(d), slope, 1e-6 * f.norm() * d.norm()) << what;
-        BlockMatrix K;
-        elastic.hessian(x, Definiteness::kExact, K);
-        Vec Kd;
-        K.multiply(d, Kd);
-        EXPECT_LT((Kd - (plus - minus) / (2.0 * e)).norm(), 1e-5 * Kd.norm()) << what;
+        expectDerivatives(elastic, x, d, toString(element) + " " + toString(model));
+      }
+}
+
+// Stretched tenfold, squashed to a thousandth, turned inside out; each with noise on every node.
+TEST(ElementTest, DerivativesMatchDifferencesAtExtremeDeformation) {
+  const Eigen::Vector3d stretches[] = {{10.0, 1.2, 0.8}, {1.0, 1e-3, 1.1}, {-0.5, 1.0, 1.3}};
+  std::mt19937 random(11);
+  for (const ElementType element : kElements)
+    for (const MaterialModel model : kModels)
+      for (const Eigen::Vector3d& stretch : stretches) {
+        const VolumeMesh mesh = skewedMesh(element);
+        const ElasticModel elastic(mesh, kRubber, model, element);
+        Vec x = randomState(mesh, 0.02, &random);
+        for (Eigen::Index k = 0; k < x.size(); ++k) x[k] *= stretch[k % 3];
+        const Vec d = randomState(mesh, 1.0, &random) - restPositions(mesh);
+        std::stringstream what;
+        what << toString(element) << " " << toString(model) << " " << stretch.transpose();
+        expectDerivatives(elastic, x, d, what.str());
       }
 }
 

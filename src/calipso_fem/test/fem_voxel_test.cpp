@@ -94,6 +94,40 @@ TEST(Voxelize, OpenAndFlatMeshesAreCoveredWithAMessage) {
   EXPECT_FALSE(flat.messages.empty());
 }
 
+TEST(Voxelize, FacesWithoutAreaAndCopiesAreLeftOutWithAMessage) {
+  TriangleMesh clean;
+  appendBox({0, 0, 0}, {1, 1, 1}, &clean);
+  TriangleMesh mesh = clean;
+  mesh.triangles.conservativeResize(16, 3);
+  mesh.triangles.row(12) << 0, 0, 1;                       // a corner named twice
+  mesh.triangles.row(13) = clean.triangles.row(3);         // a copy
+  mesh.triangles.row(14) = clean.triangles.row(5).reverse();   // a copy turned round
+  mesh.triangles.row(15) << 0, 7, 7;
+  VoxelizeOptions options;
+  options.cell_size = 0.25;
+  const VoxelGrid grid = voxelize(mesh, options), expected = voxelize(clean, options);
+  EXPECT_EQ(grid.cellCount(), expected.cellCount());
+  EXPECT_LT((grid.fraction - expected.fraction).norm(), 1e-12);
+  ASSERT_EQ(grid.messages.size(), 2u);
+  EXPECT_EQ(grid.messages[0], "2 faces without area are left out");
+  EXPECT_EQ(grid.messages[1], "2 faces that repeat another one are left out");
+  mesh.triangles = mesh.triangles.bottomRows(1).eval();
+  EXPECT_THROW(voxelize(mesh, options), std::invalid_argument);
+}
+
+// A plate far thinner than a cell: no cell centre and next to no volume lies inside.
+TEST(Voxelize, PlateThinnerThanACellIsALayerOfCells) {
+  TriangleMesh mesh;
+  appendBox({0, 0, 0.1}, {1.0, 1.0, 0.101}, &mesh);
+  VoxelizeOptions options;
+  options.cell_size = 0.25;
+  const VoxelGrid grid = voxelize(mesh, options);
+  EXPECT_GE(grid.cellCount(), 16);
+  EXPECT_GT(grid.fraction.minCoeff(), 0.0);
+  ASSERT_FALSE(grid.messages.empty());
+  EXPECT_NE(grid.messages.back().find("layer of surface cells"), std::string::npos);
+}
+
 TEST(Voxelize, BranchesThatShareACellAreNotWelded) {
   TriangleMesh mesh;
   // The gap is wider than a sixth of a cell, the spacing of the sight lines.

@@ -78,16 +78,19 @@ void measureNewton() {
 }
 
 void measureHardCases() {
-  for (const MaterialModel material : {MaterialModel::kStVenantKirchhoff})
+  for (const MaterialModel material :
+       {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
+        MaterialModel::kCorotated})
     for (const std::string& name : hardCaseNames()) {
       const HardCaseResult r = runHardCase(name, material);
       std::printf(
           "{\"kind\": \"hard\", \"case\": \"%s\", \"nodes\": %d, \"material\": \"%s\", \"h\": %.4g, "
-          "\"steps\": %d, \"energy_growth\": %.3g, \"displacement\": %.3g, \"finite\": %s, "
-          "\"recovered\": %s, \"should_recover\": %s}\n",
+          "\"steps\": %d, \"energy_growth\": %.3g, \"displacement\": %.3g, "
+          "\"momentum_error\": %.3g, \"recovering_steps\": %d, \"unconverged_steps\": %d, "
+          "\"finite\": %s, \"recovered\": %s}\n",
           r.name.c_str(), r.nodes, r.material.c_str(), r.h, r.steps, r.energy_growth,
-          r.displacement, r.finite ? "true" : "false", r.recovered ? "true" : "false",
-          r.should_recover ? "true" : "false");
+          r.displacement, r.momentum_error, r.recovering_steps, r.unconverged_steps,
+          r.finite ? "true" : "false", r.recovered ? "true" : "false");
       std::fflush(stdout);
     }
 }

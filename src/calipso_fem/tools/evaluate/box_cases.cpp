@@ -8,7 +8,8 @@ namespace {
 
 Eigen::Vector3d readTraction(const CaseFile& file) {
   const YAML::Node t = file.root["traction"];
-  if (!t || !t.IsMap()) return Eigen::Vector3d::Zero();
+  if (!t || t.IsNull()) return Eigen::Vector3d::Zero();
+  if (!t.IsMap()) throw std::runtime_error(file.path + ": traction: expected an object or null");
   for (const char* key : {"dead_traction_per_reference_area", "dead_traction"})
     if (t[key]) return readVector3(t[key]);
   throw std::runtime_error(file.path + ": traction: no dead_traction_per_reference_area");
@@ -30,33 +31,26 @@ void runBox(const CaseFile& file, const std::string& kind, ElementType element,
                                0.5 * (box.min.z() + box.max.z()));
   ResultLine line = lineFor(file, kind, element, readModel(file), mesh.nodeCount());
   addReport(report, &line);
-  line.quantity = "tip";
-  line.value = displacementAt(mesh, body.positions(), center);
-  line.reference = readVector(reference["tip"]);
-  print(line);
-  line.quantity = "energy";
-  line.value = scalar(body.elasticEnergy());
-  line.reference = readVector(reference["energy"]);
-  print(line);
-  if (!reference["tip_corner_ypzp"]) return;
-  line.quantity = "tip_corner_ypzp";
-  line.value = displacementAt(mesh, body.positions(), box.max);
-  line.reference = readVector(reference["tip_corner_ypzp"]);
-  print(line);
+  const auto show = [&](const char* name, const auto& value) {
+    if (reference[name]) printQuantity(line, name, value, reference[name]);
+  };
+  show("tip", displacementAt(mesh, body.positions(), center));
+  show("energy", scalar(body.elasticEnergy()));
+  show("tip_corner_ypzp", displacementAt(mesh, body.positions(), box.max));
 }
 
 }  // namespace
 
 void evaluateBoxLoads(const CaseFile& file) {
-  std::vector<Eigen::Vector3i> grids;
-  for (const YAML::Node& r : require(file, file.at("same_discretisation"), "results")) {
-    const Eigen::Vector3i cells(r["nx"].as<int>(), r["ny"].as<int>(), r["nz"].as<int>());
-    runBox(file, "same_discretisation", referenceElement(r["element"].as<std::string>()), cells, r);
-    if (grids.empty() || std::find(grids.begin(), grids.end(), cells) == grids.end())
-      grids.push_back(cells);
-  }
-  for (const Eigen::Vector3i& cells : grids)
-    runBox(file, "default", FemOptions().element, cells, file.at("reference"));
+  for (const YAML::Node& r : sameDiscretisation(file))
+    attempt(file.path, [&] {
+      runBox(file, "same_discretisation", referenceElement(readText(file, r, "element")),
+             readCells(file, r), r);
+    });
+  if (!converged(file).IsMap()) return;
+  for (const Eigen::Vector3i& cells : gridsOf(file))
+    attempt(file.path,
+            [&] { runBox(file, "default", FemOptions().element, cells, converged(file)); });
 }
 
 }  // namespace calipso::fem

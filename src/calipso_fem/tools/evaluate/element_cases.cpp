@@ -30,15 +30,22 @@ struct ElementCase {
 };
 
 void show(const ElementCase& c, const std::string& model, const std::string& quantity,
-          const Eigen::VectorXd& value, const Eigen::VectorXd& reference) {
+          const Eigen::MatrixXd& value, const YAML::Node& expected) {
+  if (!expected) return;
+  const Eigen::MatrixXd reference =
+      value.cols() == 1 ? Eigen::MatrixXd(readVector(expected)) : readMatrix(expected);
+  if (reference.rows() != value.rows() || reference.cols() != value.cols())
+    throw std::runtime_error(c.file.path + ": " + model + ": " + quantity + ": expected " +
+                             std::to_string(value.rows()) + " x " + std::to_string(value.cols()) +
+                             " numbers");
   ResultLine line = lineFor(c.file, "same_discretisation", c.element, MaterialModel::kLinear,
                             c.mesh.nodeCount());
   line.material = model;
   line.solver = "none";
   line.steps = 0;
   line.quantity = quantity;
-  line.value = value;
-  line.reference = reference;
+  line.value = flatten(value);
+  line.reference = flatten(reference);
   print(line);
 }
 
@@ -48,14 +55,13 @@ void checkModel(const ElementCase& c, const std::string& name, MaterialModel mod
   const double rest =
       restEnergyDensity(model, lameParameters(c.material)) * elastic.totalMass() /
       c.material.density;
-  show(c, name, "energy", scalar(elastic.energy(c.x) + rest), readVector(expected["energy"]));
+  show(c, name, "energy", scalar(elastic.energy(c.x) + rest), expected["energy"]);
   Vec f;
   elastic.gradient(c.x, f);
-  show(c, name, "force", f, readVector(expected["f"]));
+  show(c, name, "force", f, expected["f"]);
   BlockMatrix K;
   elastic.hessian(c.x, Definiteness::kExact, K);
-  show(c, name, "stiffness", flatten(Eigen::MatrixXd(K.toSparse())),
-       flatten(readMatrix(expected["K"])));
+  show(c, name, "stiffness", Eigen::MatrixXd(K.toSparse()), expected["K"]);
 }
 
 // f = R_b K_rest (R_b^T x - X), R of F at the element's centre.
@@ -65,35 +71,37 @@ void checkWarped(const ElementCase& c, const YAML::Node& expected) {
   const Eigen::Matrix3d R = polarRotation(elastic.centerGradient(0, c.x));
   Eigen::MatrixXd Rb = Eigen::MatrixXd::Zero(K.rows(), K.cols());
   for (int i = 0; i < K.rows(); i += 3) Rb.block<3, 3>(i, i) = R;
-  show(c, "corotated_warped_stiffness", "force",
-       Rb * (K * (Rb.transpose() * c.x - restPositions(c.mesh))), readVector(expected["f"]));
-  show(c, "corotated_warped_stiffness", "stiffness", flatten(Rb * K * Rb.transpose()),
-       flatten(readMatrix(expected["K_approx"])));
+  const std::string name = "corotated_warped_stiffness";
+  show(c, name, "force", Rb * (K * (Rb.transpose() * c.x - restPositions(c.mesh))), expected["f"]);
+  show(c, name, "stiffness", Rb * K * Rb.transpose(), expected["K_approx"]);
 }
 
 }  // namespace
 
 void evaluateElements(const CaseFile& file) {
   const Eigen::MatrixXd nodes = readMatrix(file.at("nodes_X"));
-  const NodeMatrix moved = nodes + readMatrix(file.at("displacement_u"));
+  const Eigen::MatrixXd displacement = readMatrix(file.at("displacement_u"));
+  if ((nodes.rows() != 8 && nodes.rows() != 4) || nodes.cols() != 3 ||
+      displacement.rows() != nodes.rows() || displacement.cols() != 3)
+    throw std::runtime_error(file.path + ": nodes_X and displacement_u: expected 4 or 8 points each");
+  const NodeMatrix moved = nodes + displacement;
   ElementCase c{file, oneCell(nodes), Eigen::Map<const Vec>(moved.data(), moved.size()),
                 readMaterial(file),
                 nodes.rows() == 8 ? ElementType::kHexQ1 : ElementType::kTetP1};
-  for (const auto& entry : file.at("models")) {
-    const std::string name = entry.first.as<std::string>();
-    if (name == "corotated_warped_stiffness")
-      checkWarped(c, entry.second);
-    else
+  for (const auto& entry : file.at("models"))
+    attempt(file.path, [&] {
+      const std::string name = entry.first.as<std::string>();
+      if (name == "corotated_warped_stiffness") return checkWarped(c, entry.second);
       checkModel(c, name,
                  name == "corotated_energy" ? MaterialModel::kCorotated
                                             : materialModelFromString(name),
                  entry.second);
-  }
+    });
   const ElasticModel elastic(c.mesh, c.material, MaterialModel::kLinear, c.element);
-  show(c, "linear", "rest_stiffness", flatten(Eigen::MatrixXd(elastic.linearStiffness())),
-       flatten(readMatrix(file.at("K_rest"))));
-  show(c, "linear", "consistent_mass", flatten(Eigen::MatrixXd(elastic.consistentMass().toSparse())),
-       flatten(readMatrix(file.at("M_consistent_rho"))));
+  show(c, "linear", "rest_stiffness", Eigen::MatrixXd(elastic.linearStiffness()),
+       file.root["K_rest"]);
+  show(c, "linear", "consistent_mass", Eigen::MatrixXd(elastic.consistentMass().toSparse()),
+       file.root["M_consistent_rho"]);
 }
 
 }  // namespace calipso::fem

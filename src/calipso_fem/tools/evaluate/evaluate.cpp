@@ -1,5 +1,6 @@
 // Runs reference cases (files or folders of JSON) through the finite element core and prints one
-// JSON object per result. Exit code 1, with a message, when a case cannot be read.
+// JSON object per result. What cannot be read or solved is named on standard error, the rest goes on;
+// the exit code is then 1.
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
@@ -30,7 +31,7 @@ void evaluateFile(const std::string& path) {
       {"G", evaluateModes},    {"H", evaluateBoxLoads},    {"I", evaluateShapes},
       {"J", evaluateElements}};
   const CaseFile file = readCase(path);
-  const std::string family = file.at("family").as<std::string>();
+  const std::string family = readText(file, file.root, "family");
   const auto it = kFamilies.find(family);
   if (it == kFamilies.end())
     throw std::runtime_error(path + ": family '" + family + "' is unknown; known are A to J");
@@ -67,17 +68,16 @@ void addReport(const StepReport& report, ResultLine* line) {
 }  // namespace calipso::fem
 
 int main(int argc, char** argv) {
+  using namespace calipso::fem;
   if (argc < 2) {
     std::cerr << "usage: evaluate PATH...   (reference cases: JSON files, or folders of them)\n";
     return 1;
   }
-  try {
-    for (int k = 1; k < argc; ++k)
-      for (const std::string& file : calipso::fem::caseFiles(argv[k]))
-        calipso::fem::evaluateFile(file);
-  } catch (const std::exception& e) {
-    std::cerr << "evaluate: " << e.what() << "\n";
-    return 1;
+  bool complete = true;
+  for (int k = 1; k < argc; ++k) {
+    std::vector<std::string> files;
+    complete &= attempt(argv[k], [&] { files = caseFiles(argv[k]); });
+    for (const std::string& file : files) complete &= attempt(file, [&] { evaluateFile(file); });
   }
-  return 0;
+  return complete && failedAttempts() == 0 ? 0 : 1;
 }

@@ -34,15 +34,21 @@ void runModes(const CaseFile& file, const std::string& kind, ElementType element
 }  // namespace
 
 void evaluateModes(const CaseFile& file) {
-  const Eigen::VectorXd converged = readVector(require(file, file.at("reference"), "frequencies_hz"));
-  for (const YAML::Node& r : file.at("same_discretisation")) {
-    const Eigen::Vector3i cells(r["nx"].as<int>(), r["ny"].as<int>(), r["nz"].as<int>());
-    const ElementType element = referenceElement(r["element"].as<std::string>());
-    const bool lumped = r["mass"].as<std::string>() == "lumped";
-    runModes(file, "same_discretisation", element, lumped, cells, readVector(r["frequencies_hz"]));
-    if (element == ElementType::kHexQ1)
-      runModes(file, "default", FemOptions().element, lumped, cells, converged);
-  }
+  const YAML::Node finest = converged(file)["frequencies_hz"];
+  for (const YAML::Node& r : sameDiscretisation(file))
+    attempt(file.path, [&] {
+      const Eigen::Vector3i cells = readCells(file, r);
+      const ElementType element = referenceElement(readText(file, r, "element"));
+      const bool lumped = readText(file, r, "mass") == "lumped";
+      runModes(file, "same_discretisation", element, lumped, cells,
+               readVector(require(file, r, "frequencies_hz")));
+    });
+  if (!finest) return;
+  for (const Eigen::Vector3i& cells : gridsOf(file))
+    for (const bool lumped : {false, true})
+      attempt(file.path, [&] {
+        runModes(file, "default", FemOptions().element, lumped, cells, readVector(finest));
+      });
 }
 
 }  // namespace calipso::fem

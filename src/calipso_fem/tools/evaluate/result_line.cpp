@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <cstdio>
+#include <stdexcept>
+
+#include "case_reader.hpp"
 
 namespace calipso::fem {
 namespace {
@@ -39,6 +42,18 @@ void print(const ResultLine& r) {
       number(r.relativeError()).c_str(), r.steps, number(r.ms_per_step).c_str(),
       r.newton_iterations, r.cg_iterations);
   std::fflush(stdout);
+}
+
+void printQuantity(ResultLine line, const std::string& quantity, const Eigen::VectorXd& value,
+                   const YAML::Node& reference) {
+  line.quantity = quantity;
+  line.value = value;
+  line.reference = readVector(reference);
+  if (line.reference.size() != value.size())
+    throw std::runtime_error(line.case_name + ": " + quantity + ": the reference has " +
+                             std::to_string(line.reference.size()) + " numbers, expected " +
+                             std::to_string(value.size()));
+  print(line);
 }
 
 Eigen::VectorXd scalar(double value) { return Eigen::VectorXd::Constant(1, value); }

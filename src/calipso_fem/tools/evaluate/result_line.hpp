@@ -1,5 +1,7 @@
 #pragma once
 
+#include <yaml-cpp/yaml.h>
+
 #include <Eigen/Core>
 #include <optional>
 #include <string>
@@ -25,6 +27,9 @@ struct ResultLine {
 
 // One JSON object on one line of standard output.
 void print(const ResultLine& line);
+// The same with quantity, value and reference (a number or a list) put in.
+void printQuantity(ResultLine line, const std::string& quantity, const Eigen::VectorXd& value,
+                   const YAML::Node& reference);
 
 Eigen::VectorXd scalar(double value);
 

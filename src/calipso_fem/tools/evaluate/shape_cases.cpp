@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
+#include <filesystem>
 
 #include "reference_cases.hpp"
 
@@ -12,7 +13,7 @@ constexpr double kPi = 3.14159265358979323846;
 struct EmbeddedShape {
   TriangleMesh surface;
   std::function<double(const Eigen::Vector3d&)> beyond_clamp;   // <= 0: held
-  Eigen::Vector3d clamp_point;                                  // a point of the clamped face
+  Eigen::Vector3d clamp_point, clamp_normal;                    // of the clamped face
   bool clamp_on_lattice = false;                                // the face lies in a lattice plane
   Eigen::Vector3d tip;
 };
@@ -35,8 +36,8 @@ TriangleMesh makeMesh(const std::vector<Eigen::Vector3d>& vertices,
 
 // A bar of circular section, radius a, bent on an arc of radius R and angle Phi.
 EmbeddedShape bentBar(const CaseFile& file, const YAML::Node& g) {
-  const double R = require(file, g, "R").as<double>(), a = require(file, g, "a").as<double>();
-  const double Phi = require(file, g, "Phi_deg").as<double>() * kPi / 180.0;
+  const double R = readNumber(file, g, "R"), a = readNumber(file, g, "a");
+  const double Phi = readNumber(file, g, "Phi_deg") * kPi / 180.0;
   const Eigen::Vector3d d = readVector3(require(file, g, "arc_plane_d"));
   const Eigen::Vector3d C = readVector3(require(file, g, "arc_center_C"));
   const Eigen::Vector3d ex = Eigen::Vector3d::UnitX(), n = ex.cross(d);
@@ -66,6 +67,7 @@ EmbeddedShape bentBar(const CaseFile& file, const YAML::Node& g) {
   shape.surface = makeMesh(vertices, faces);
   shape.beyond_clamp = [](const Eigen::Vector3d& p) { return p.x(); };
   shape.clamp_point = C - R * d;
+  shape.clamp_normal = ex;
   shape.clamp_on_lattice = true;
   shape.tip = readVector3(require(file, g, "tip_material_point"));
   return shape;
@@ -78,8 +80,10 @@ EmbeddedShape rotatedBox(const CaseFile& file, const YAML::Node& g) {
   Eigen::Vector3d low, high;
   const char* axes[] = {"x", "y", "z"};
   for (int a = 0; a < 3; ++a) {
-    low[a] = b[axes[a]][0].as<double>();
-    high[a] = b[axes[a]][1].as<double>();
+    const Eigen::VectorXd range = readVector(require(file, b, axes[a]));
+    if (range.size() != 2) throw std::runtime_error(file.path + ": local_box: expected [low, high]");
+    low[a] = range[0];
+    high[a] = range[1];
   }
   const double start = low.x();
   low.x() -= 0.2 * (high.x() - low.x());
@@ -100,8 +104,32 @@ EmbeddedShape rotatedBox(const CaseFile& file, const YAML::Node& g) {
     return (Q.transpose() * p).x() - start;
   };
   shape.clamp_point = Q * Eigen::Vector3d(start, 0.0, 0.0);
+  shape.clamp_normal = Q.col(0);
   shape.tip = readVector3(require(file, g, "tip_material_point"));
   return shape;
+}
+
+// Any other shape: the surface file, held where x <= 0.
+EmbeddedShape surfaceFile(const CaseFile& file, const YAML::Node& g) {
+  EmbeddedShape shape;
+  const std::filesystem::path folder = std::filesystem::path(file.path).parent_path();
+  shape.surface = loadMesh((folder / readText(file, g, "surface_obj")).string());
+  shape.beyond_clamp = [](const Eigen::Vector3d& p) { return p.x(); };
+  shape.clamp_normal = Eigen::Vector3d::UnitX();
+  shape.clamp_point = Eigen::Vector3d::Zero();
+  shape.clamp_on_lattice = true;
+  shape.tip = readVector3(require(file, g, "tip_material_point"));
+  return shape;
+}
+
+// A node belongs to the clamped face when the face lies nearer to it than to the next node along the
+// lattice axis closest to the face's normal: held nodes end on average in the face, not before it.
+void holdClamp(const EmbeddedShape& shape, DeformableBody* body) {
+  const VolumeMesh& mesh = body->model().mesh();
+  const double half =
+      0.5 * body->grid().cell_size * shape.clamp_normal.cwiseAbs().maxCoeff() * (1.0 - 1e-6);
+  for (int i = 0; i < mesh.nodeCount(); ++i)
+    if (shape.beyond_clamp(mesh.node(i)) <= half) body->fixNode(i);
 }
 
 void runShape(const CaseFile& file, const EmbeddedShape& shape, int target_nodes) {
@@ -111,36 +139,33 @@ void runShape(const CaseFile& file, const EmbeddedShape& shape, int target_nodes
   options.anchor = shape.clamp_point;
   DeformableBody body(shape.surface, readMaterial(file), options);
   body.setGravity(readGravity(file));
-  const VolumeMesh& mesh = body.model().mesh();
-  const double size = body.grid().cell_size;
-  for (int i = 0; i < mesh.nodeCount(); ++i)
-    if (shape.beyond_clamp(mesh.node(i)) <= 1e-6 * size) body.fixNode(i);
+  holdClamp(shape, &body);
   const StepReport report = body.solveStatic();
   NodeMatrix tip(1, 3);
   tip.row(0) = shape.tip.transpose();
   const Embedding probe = embed(tip, body.grid());
   ResultLine line = lineFor(file, "default", options.element, options.material_model,
-                            mesh.nodeCount());
+                            body.nodeCount());
   addReport(report, &line);
-  line.quantity = "tip";
-  line.value = probe.apply(body.positions()) - shape.tip;
-  line.reference = readVector(file.at("reference")["tip"]);
-  print(line);
-  line.quantity = "energy";
-  line.value = scalar(body.elasticEnergy());
-  line.reference = readVector(file.at("reference")["energy"]);
-  print(line);
+  const YAML::Node reference = file.at("reference");
+  if (reference["tip"])
+    printQuantity(line, "tip", probe.apply(body.positions()) - shape.tip, reference["tip"]);
+  if (reference["energy"])
+    printQuantity(line, "energy", scalar(body.elasticEnergy()), reference["energy"]);
 }
 
 }  // namespace
 
 void evaluateShapes(const CaseFile& file) {
   const YAML::Node g = file.at("geometry");
-  const bool bar = static_cast<bool>(g["arc_plane_d"]);
-  if (!bar && !g["local_box"])
-    throw std::runtime_error(file.path + ": geometry is neither a bent bar nor a rotated box");
-  const EmbeddedShape shape = bar ? bentBar(file, g) : rotatedBox(file, g);
-  for (int nodes : {600, 1200, 2400, 6000}) runShape(file, shape, nodes);
+  if (!g["arc_plane_d"] && !g["local_box"] && !g["surface_obj"])
+    throw std::runtime_error(file.path +
+                             ": geometry is no bent bar, no rotated box, and names no surface_obj");
+  const EmbeddedShape shape = g["arc_plane_d"] ? bentBar(file, g)
+                              : g["local_box"] ? rotatedBox(file, g)
+                                               : surfaceFile(file, g);
+  for (int nodes : {600, 1200, 2400, 6000})
+    attempt(file.path, [&] { runShape(file, shape, nodes); });
 }
 
 }  // namespace calipso::fem

@@ -31,11 +31,7 @@ void printTorsion(const TorsionRun& run, const DeformableBody& body, const std::
   const std::string suffix = "@" + std::to_string(std::lround(degrees)) + "deg";
   const auto show = [&](const std::string& name, const Eigen::VectorXd& value,
                         const YAML::Node& expected) {
-    if (!expected) return;
-    line.quantity = name + suffix;
-    line.value = value;
-    line.reference = readVector(expected);
-    print(line);
+    if (expected) printQuantity(line, name + suffix, value, expected);
   };
   show("torque_x", scalar(torque), reference["torque_x"]);
   show("axial_force", scalar(axial), reference["axial_force"]);
@@ -59,7 +55,7 @@ void runTorsion(const TorsionRun& run, const std::vector<YAML::Node>& references
   body.twist(end, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), [&angle](double) { return angle; });
   double degrees = 0.0;
   for (const YAML::Node& reference : references) {
-    const double goal = reference["angle_deg"].as<double>();
+    const double goal = readNumber(run.file, reference, "angle_deg");
     const int parts = std::max(1, static_cast<int>(std::ceil(std::abs(goal - degrees) / 15.0)));
     StepReport total;
     for (int k = 1; k <= parts; ++k) {
@@ -88,19 +84,23 @@ void runTorsion(const TorsionRun& run, const std::vector<YAML::Node>& references
 
 void evaluateTorsion(const CaseFile& file) {
   std::map<std::array<int, 4>, std::vector<YAML::Node>> runs;
-  for (const YAML::Node& r : require(file, file.at("same_discretisation"), "results"))
-    runs[{static_cast<int>(referenceElement(r["element"].as<std::string>())), r["nx"].as<int>(),
-          r["ny"].as<int>(), r["nz"].as<int>()}]
-        .push_back(r);
-  const YAML::Node converged = require(file, file.at("reference"), "results");
-  const std::vector<YAML::Node> reference(converged.begin(), converged.end());
-  for (const auto& [key, results] : runs) {
-    const Eigen::Vector3i cells(key[1], key[2], key[3]);
-    const auto element = static_cast<ElementType>(key[0]);
-    runTorsion({file, "same_discretisation", element, cells}, results);
-    if (element == ElementType::kHexQ1)
-      runTorsion({file, "default", FemOptions().element, cells}, reference);
-  }
+  for (const YAML::Node& r : sameDiscretisation(file))
+    attempt(file.path, [&] {
+      const Eigen::Vector3i cells = readCells(file, r);
+      const auto element = referenceElement(readText(file, r, "element"));
+      runs[{static_cast<int>(element), cells.x(), cells.y(), cells.z()}].push_back(r);
+    });
+  for (const auto& [key, results] : runs)
+    attempt(file.path, [&, &k = key, &r = results] {
+      runTorsion({file, "same_discretisation", static_cast<ElementType>(k[0]), {k[1], k[2], k[3]}},
+                 r);
+    });
+  const YAML::Node list = converged(file)["results"];
+  if (!list || !list.IsSequence()) return;
+  const std::vector<YAML::Node> reference(list.begin(), list.end());
+  for (const Eigen::Vector3i& cells : gridsOf(file))
+    attempt(file.path,
+            [&] { runTorsion({file, "default", FemOptions().element, cells}, reference); });
 }
 
 }  // namespace calipso::fem
