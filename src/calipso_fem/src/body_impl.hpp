@@ -141,6 +141,9 @@ struct DeformableBody::Impl {
   void finishReport(StepReport* report) const;
   void invalidatePreconditioner();
   Momentum momentum() const;
+  bool turnsFreely() const {
+    return options.scheme == TimeScheme::kBackwardEuler && prescribed.empty();
+  }
   void keepAngularMomentum(const Momentum& before, const Vec& loads, double h);
   void invalidateSystem();
   void modelChanged();                   // material or rest shape

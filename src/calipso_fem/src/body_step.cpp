@@ -218,8 +218,7 @@ StepReport DeformableBody::step(double h) {
     m.acceleration_known = true;
   }
   const Integrator i = m.integrator(h);
-  const bool turns_freely =
-      m.options.scheme == TimeScheme::kBackwardEuler && m.prescribed.empty();
+  const bool turns_freely = m.turnsFreely();
   const Momentum before = turns_freely ? m.momentum() : Momentum();
   Vec y = m.x;
   StepReport report = m.minimise(i, loads, targets, m.options.linearised, &y);

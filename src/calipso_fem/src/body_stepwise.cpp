@@ -102,6 +102,8 @@ StepReport DeformableBody::endStep(const Vec& contact_forces) {
     if (m.options.scheme == TimeScheme::kTrapezoidal) m.a = 2.0 / t.h * (v1 - m.v) - m.a;
     m.previous = std::make_pair(m.x, m.v);
     m.previous_h = t.h;
+    const bool turns_freely = m.turnsFreely();
+    const Momentum before = turns_freely ? m.momentum() : Momentum();
     m.reactions.setZero(m.x.size());
     if (!m.prescribed.empty()) {
       const Vec r = m.trialGradient() - contact_forces;
@@ -110,6 +112,7 @@ StepReport DeformableBody::endStep(const Vec& contact_forces) {
     m.x = t.y;
     m.v = v1;
     m.rememberSoftForces(i);
+    if (turns_freely) m.keepAngularMomentum(before, t.loads + contact_forces, t.h);
   } else {
     report.message = "the step gave positions that are not finite; the state before it is kept";
   }

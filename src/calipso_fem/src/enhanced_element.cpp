@@ -99,7 +99,7 @@ ModeSystem modeSystem(const ElementKind& kind, const CornerMatrix& x, const Mode
 
 // Amplitudes that minimise the element's energy at corners x: damped Newton from zero.
 ModeVector solveModes(const ElementKind& kind, const CornerMatrix& x) {
-  constexpr int kMaxIterations = 25;
+  constexpr int kMaxIterations = 200;
   constexpr double kExact = 1e-11, kSmall = 1e-5;   // of an amplitude
   ModeVector a = ModeVector::Zero();
   double energy = modeEnergy(kind, x, a);
@@ -119,11 +119,11 @@ ModeVector solveModes(const ElementKind& kind, const CornerMatrix& x) {
       if (largest < kExact) break;
       continue;
     }
-    const double slope = s.gradient.dot(step);
+    const double slope = s.gradient.dot(step), noise = 1e-14 * std::abs(energy);
     double t = 1.0, trial = modeEnergy(kind, x, a + step);
-    while (!(trial <= energy + 1e-4 * t * slope) && t > 1e-6)
+    while (!(trial <= energy + 1e-4 * t * slope + noise) && t > 1e-6)
       trial = modeEnergy(kind, x, a + (t *= 0.5) * step);
-    if (!(trial <= energy)) break;
+    if (!(trial <= energy + noise)) break;
     a += t * step;
     energy = trial;
   }

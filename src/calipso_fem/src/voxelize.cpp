@@ -1,5 +1,6 @@
 #include "calipso_fem/voxel_grid.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>

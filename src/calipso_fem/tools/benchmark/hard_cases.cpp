@@ -12,7 +12,7 @@ namespace calipso::fem {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-const Eigen::Vector3i kCells(12, 3, 3);
+const Eigen::Vector3i kCells(8, 2, 2);
 
 // One run: a clamped beam, what is done to it, and for how long.
 struct Setup {
@@ -20,7 +20,7 @@ struct Setup {
   Material material{1e6, 0.3, 1000.0, 0.0};
   FemOptions options;
   double h = 1.0 / 30.0;
-  int steps = 150, least_steps = 0;   // ends sooner when at rest
+  int steps = 600, least_steps = 0;   // ends sooner when at rest
   bool clamped = true;
   std::function<void(DeformableBody*)> start = [](DeformableBody*) {};
   // May set `load`, the dead nodal forces (3n, N) the body is under from this step on.
@@ -75,7 +75,7 @@ void invert(DeformableBody* body) {
 void stiffnessRatio(DeformableBody* body) {
   std::vector<Material> materials = body->model().cellMaterials();
   for (std::size_t c = 0; c < materials.size(); ++c)
-    if ((c / 4) % 2) materials[c].youngs_modulus *= 1e6;
+    if (c / 2 % 2) materials[c].youngs_modulus *= 1e6;
   body->setCellMaterials(materials);
   deform(body, [](Eigen::Vector3d p) {
     return Eigen::Vector3d(p.x(), p.y() + 0.1 * p.x() * p.x(), p.z());
@@ -153,7 +153,7 @@ const std::map<std::string, std::function<Setup()>>& setups() {
       {"every node at random", with([](Setup* s) { s->start = scramble; })},
       {"inverted elements", with([](Setup* s) { s->start = invert; })},
       {"nu = 0.499", with([](Setup* s) { s->material.poissons_ratio = 0.499; s->start = stretch; })},
-      {"stiffness ratio 1e6", with([](Setup* s) { s->start = stiffnessRatio; s->steps = 300; })},
+      {"stiffness ratio 1e6", with([](Setup* s) { s->start = stiffnessRatio; })},
       {"mass x 1000, E x 0.001 and back",
        with([](Setup* s) { s->start = bump; s->before_step = changeOnline; s->least_steps = 41; })},
       {"h = 0.2 s", with([](Setup* s) { s->h = 0.2; s->start = stretch; })},
