@@ -12,7 +12,7 @@ namespace calipso::fem {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-const Eigen::Vector3i kCells(8, 2, 2);
+const Eigen::Vector3i kCells(16, 4, 4);
 
 // One run: a clamped beam, what is done to it, and for how long.
 struct Setup {
@@ -75,7 +75,7 @@ void invert(DeformableBody* body) {
 void stiffnessRatio(DeformableBody* body) {
   std::vector<Material> materials = body->model().cellMaterials();
   for (std::size_t c = 0; c < materials.size(); ++c)
-    if (c / 2 % 2) materials[c].youngs_modulus *= 1e6;
+    if (c / 4 % 2) materials[c].youngs_modulus *= 1e6;
   body->setCellMaterials(materials);
   deform(body, [](Eigen::Vector3d p) {
     return Eigen::Vector3d(p.x(), p.y() + 0.1 * p.x() * p.x(), p.z());
