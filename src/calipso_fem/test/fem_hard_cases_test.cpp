@@ -5,11 +5,6 @@
 namespace calipso::fem {
 namespace {
 
-// Stays finite and gains no energy, but a folded light cell keeps it from its rest shape.
-bool endsAway(const std::string& name, MaterialModel material) {
-  return name == "filled fraction 1e-4" && material == MaterialModel::kStVenantKirchhoff;
-}
-
 class HardCase : public testing::TestWithParam<std::tuple<std::string, MaterialModel>> {};
 
 TEST_P(HardCase, StaysFiniteGainsNoEnergyAndComesBack) {
@@ -18,9 +13,7 @@ TEST_P(HardCase, StaysFiniteGainsNoEnergyAndComesBack) {
   EXPECT_TRUE(r.finite);
   // Newton stops at a relative residual of 1e-4, which leaves that much of the work in doubt.
   EXPECT_LE(r.energy_growth, 1e-4);
-  if (!endsAway(name, material)) {
-    EXPECT_LT(r.displacement, 1e-3);
-  }
+  EXPECT_LT(r.displacement, 1e-3);
   EXPECT_LT(r.momentum_error, 1e-6);
 }
 
