@@ -17,15 +17,12 @@ TEST_P(HardCase, StaysFiniteGainsNoEnergyAndComesBack) {
   EXPECT_LT(r.momentum_error, 1e-6);
 }
 
-// All of them with the default material, the short ones with the others too: the benchmark runs all.
+// All of them with the default material, a short one with another: the benchmark runs them all with three.
 std::vector<std::tuple<std::string, MaterialModel>> allCases() {
   std::vector<std::tuple<std::string, MaterialModel>> cases;
   for (const std::string& name : hardCaseNames())
     cases.emplace_back(name, MaterialModel::kStVenantKirchhoff);
-  for (const MaterialModel material :
-       {MaterialModel::kStableNeoHookean, MaterialModel::kCorotated})
-    for (const char* name : {"inverted elements", "squashed flat"})
-      cases.emplace_back(name, material);
+  cases.emplace_back("squashed flat", MaterialModel::kCorotated);
   return cases;
 }
 
