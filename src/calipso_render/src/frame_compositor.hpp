@@ -104,7 +104,6 @@ class FrameCompositor {
   void findCovered();
   void findSurfaceLight();
   void measureSky();
-  cv::Mat movedSun() const;
   void measureSun();
   void findRelit();
   cv::Mat originalOf(int surface) const;

@@ -19,7 +19,6 @@ constexpr int kSkyMapSide = 128;       // the same for the sky, which is soft
 constexpr int kSkySteps = 160;         // places along the picture's width where the sky is measured
 constexpr int kLightStep = 4;          // px between the places where the light on a smooth surface is computed
 constexpr float kSmoothLight = 0.06f;  // of the light: between corners that differ by no more it is interpolated
-constexpr float kPlainShadow = 0.3f;   // of the sun: between places that differ by less a shadow is interpolated
 constexpr int kShadowBoundsMargin = 8;     // px
 constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
 
@@ -168,38 +167,9 @@ void FrameCompositor::measureSky() {
   sky_before_ = shadows_.originals_sky(region_);
 }
 
-// The shadow that falls on the planes now: at every second pixel, and at the others where it is not plain from these.
-cv::Mat FrameCompositor::movedSun() const {
-  cv::Mat sun(region_.size(), CV_32F, cv::Scalar(1.0f));
-  const cv::Rect bounds = moved_bounds_ & region_;
-  const auto measured = [&](int u, int v) {
-    Receiver r;
-    const bool needed = covered_.at<std::uint8_t>(v, u) == 0 && plane_view_.at(u + region_.x, v + region_.y, r);
-    return needed ? moved_shadow_->visibility(r.position, r.normal) : 1.0f;
-  };
-  const int left = bounds.x - region_.x, right = bounds.br().x - region_.x, top = bounds.y - region_.y, bottom = bounds.br().y - region_.y;
-#pragma omp parallel for schedule(dynamic, 4)
-  for (int v = top; v < bottom; v += 2) {
-    for (int u = left; u < right; u += 2) sun.at<float>(v, u) = measured(u, v);
-  }
-#pragma omp parallel for schedule(dynamic, 4)
-  for (int v = top; v < bottom; v += 2) {
-    for (int u = left; u < right; u += 2) {
-      const bool rim = u + 2 >= right || v + 2 >= bottom;
-      const float a = sun.at<float>(v, u), b = rim ? a : sun.at<float>(v, u + 2), c = rim ? a : sun.at<float>(v + 2, u), d = rim ? a : sun.at<float>(v + 2, u + 2);
-      const bool plain = !rim && std::max({a, b, c, d}) - std::min({a, b, c, d}) < kPlainShadow;
-      if (u + 1 < right) sun.at<float>(v, u + 1) = plain ? 0.5f * (a + b) : measured(u + 1, v);
-      if (v + 1 < bottom) sun.at<float>(v + 1, u) = plain ? 0.5f * (a + c) : measured(u, v + 1);
-      if (u + 1 < right && v + 1 < bottom) sun.at<float>(v + 1, u + 1) = plain ? 0.25f * (a + b + c + d) : measured(u + 1, v + 1);
-    }
-  }
-  return sun;
-}
-
 void FrameCompositor::measureSun() {
   sun_now_ = cv::Mat(region_.size(), CV_32F, cv::Scalar(-1.0f));
   sun_before_ = sun_now_.clone();
-  const cv::Mat moved = movedSun();
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < region_.height; ++v) {
     Receiver r;
@@ -207,7 +177,8 @@ void FrameCompositor::measureSun() {
       const cv::Point at(u + region_.x, v + region_.y);
       if (covered_.at<std::uint8_t>(v, u) != 0 || !plane_view_.at(at.x, at.y, r)) continue;
       const float others = valueOrOne(shadows_.others_sun, at.x, at.y);
-      sun_now_.at<float>(v, u) = others * moved.at<float>(v, u);
+      const float moved = moved_bounds_.contains(at) ? moved_shadow_->visibility(r.position, r.normal) : 1.0f;
+      sun_now_.at<float>(v, u) = others * moved;
       sun_before_.at<float>(v, u) = others * valueOrOne(shadows_.originals_sun, at.x, at.y);
     }
   }
