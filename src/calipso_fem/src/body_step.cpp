@@ -248,9 +248,8 @@ StepReport DeformableBody::solveStatic() {
   rest.base = rest.predicted = m.x;
   const Vec from = m.x, loads = m.externalForces(), targets = m.prescribedTargets(m.time);
   StepReport report;
-  constexpr int kMostLoadSteps = 64;
   // Load stepping: all loads and prescribed displacements grow together.
-  for (int steps = m.options.static_load_steps; steps <= kMostLoadSteps; steps *= 2) {
+  for (int steps = m.options.static_load_steps; steps <= m.options.static_most_load_steps; steps *= 2) {
     Vec y = from;
     StepReport attempt;
     for (int k = 1; k <= steps; ++k) {

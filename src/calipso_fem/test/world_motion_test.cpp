@@ -115,6 +115,22 @@ TEST(WorldMotion, PulledAndLetGoReturns) {
   EXPECT_LT((world.state().objects[0].vertices - before).rowwise().norm().maxCoeff(), 1.5e-4);
 }
 
+TEST(WorldMotion, WhatIsAttachedSagsWhenItGetsHeavier) {
+  WorldParams params;
+  params.max_nodes = 300;
+  WorldScene scene = sceneWith(boxSurface({0.3, 0.05, 0.05}, 6), {0, 0, 1}, false);
+  scene.objects[0].attachments.push_back({"end", {-0.2, -0.1, 0.9}, {-0.14, 0.1, 1.1}});
+  World world(scene, params);
+  Edit heavier = editOf(EditKind::kMaterial, EditMode::kFactor);
+  heavier.density = 10.0;
+  world.submit(heavier);
+  world.advanceTo(0.0);
+  const auto before = world.state().objects[0].vertices;
+  play(world, 1.0);
+  EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kDeformable);
+  EXPECT_LT((world.state().objects[0].vertices - before).col(2).minCoeff(), -1e-3);
+}
+
 TEST(WorldMotion, KindChangeKeepsMomentum) {
   WorldParams params;
   params.max_nodes = 300;

@@ -38,7 +38,8 @@ struct FemOptions {
   bool linearised = false;
   int newton_iterations = 20;
   double newton_tolerance = 1e-4;      // residual / (loads and inner forces)
-  int static_load_steps = 1;           // more are taken when Newton does not converge
+  int static_load_steps = 1;           // more are taken when Newton does not converge,
+  int static_most_load_steps = 64;     // up to so many
 
   SolverKind solver = SolverKind::kAutomatic;
   double linear_tolerance = 1e-5;      // CG, relative residual

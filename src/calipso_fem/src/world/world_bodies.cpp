@@ -18,6 +18,9 @@ constexpr double kContactPatch = 0.01;
 // Sag that changes nothing: of the object's diagonal, and in pixels.
 constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
 
+// An object that starts to be simulated must not keep the video waiting.
+constexpr int kSettlingLoadSteps = 4;
+
 double pixelsPerMeter(const Camera& camera, const Eigen::Vector3d& at) {
   const double depth = (camera.world_from_camera.inverse() * at).z();
   return depth > 0.0 && camera.fx > 0.0 ? camera.fx / depth : 0.0;
@@ -56,6 +59,7 @@ TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose) {
 FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const WorldParams& params,
                      const ObjectSettings& settings) {
   FemOptions options = params.fem;
+  options.static_most_load_steps = kSettlingLoadSteps;
   options.target_nodes = params.max_nodes;
   if (settings.cell_size) {
     options.cell_size = *settings.cell_size;

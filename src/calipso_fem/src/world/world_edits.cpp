@@ -32,7 +32,8 @@ ObjectKind World::Impl::kindFor(const Actor& actor, const Edit& edit) const {
     case EditKind::kPressure:
       return ObjectKind::kDeformable;
     case EditKind::kMaterial:
-      return changesStiffness(edit) ? ObjectKind::kDeformable : ObjectKind::kRigid;
+      if (changesStiffness(edit)) return ObjectKind::kDeformable;
+      [[fallthrough]];  // density
     case EditKind::kGravity:
     case EditKind::kVelocity:
     case EditKind::kWind:
