@@ -84,21 +84,6 @@ TEST(WorldLoads, WindTakesABodyAlongAndNotBeyond) {
   }
 }
 
-TEST(WorldLoads, EstimatedWindNeedsAnEstimate) {
-  World world = boxInTheAir();
-  Edit wind = editOf(EditKind::kWind, EditMode::kEstimated);
-  world.submit(wind);
-  const auto refused = world.advanceTo(0.0);
-  ASSERT_EQ(refused.size(), 1u);
-  EXPECT_FALSE(refused[0].accepted);
-  EXPECT_NE(refused[0].message.find("absolute"), std::string::npos);
-  world.addObservedWind("thing", {0.0, {2, 0, 0}, 1.2, 0.0});
-  world.submit(wind);
-  EXPECT_TRUE(world.advanceTo(0.0).at(0).accepted);
-  play(world, 1.0);
-  EXPECT_GT(centerOf(world.state()).x(), 1e-4);
-}
-
 TEST(WorldLoads, ATorqueTurnsARigidBodyByItsInertia) {
   World world = boxInTheAir();
   world.submit(rigidKind());

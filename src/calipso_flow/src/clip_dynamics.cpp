@@ -54,14 +54,6 @@ std::string summaryOf(const DeformationMotion& deformation) {
                   deformation.stiffness->value, deformation.stiffness->deviation);
     result += text;
   }
-  if (deformation.wind) {
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    for (const Eigen::Vector3d& w : deformation.wind->velocity) mean += w;
-    mean /= static_cast<double>(deformation.wind->velocity.size());
-    std::snprintf(text, sizeof text, ", mean wind (%.2f, %.2f, %.2f) m/s", mean.x(), mean.y(),
-                  mean.z());
-    result += text;
-  }
   return result + (deformation.note.empty() ? "" : " (" + deformation.note + ")");
 }
 

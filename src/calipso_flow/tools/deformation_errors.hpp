@@ -6,10 +6,9 @@
 
 namespace calipso::flow {
 
-// Adds what is known about a deforming object's wave, wind and shape to its entry; null where there
+// Adds what is known about a deforming object's wave and shape to its entry; null where there
 // is no truth or no estimate.
-void addDeformationErrors(const ObjectModel& model, const Eigen::Vector3d& gravity,
-                          const TrueObject& truth, const ObjectDynamics& dynamics,
+void addDeformationErrors(const ObjectModel& model, const TrueObject& truth, const ObjectDynamics& dynamics,
                           JsonEntry& entry);
 
 }  // namespace calipso::flow

@@ -235,7 +235,7 @@ std::string describe(const Scene& scene, const ObjectModel& model, const TrueObj
   entry.number("collisions_found", static_cast<double>(trajectory.collisions.size()));
   entry.number("sign_change_error_frames", signChangeError(scene, truth, dynamics));
   entry.number("restitution_error_percent", restitutionError(scene, truth, trajectory));
-  addDeformationErrors(model, scene.gravity, truth, dynamics, entry);
+  addDeformationErrors(model, truth, dynamics, entry);
   entry.null("endpoint_error_px");
   entry.number("covered_95", errors.covered);
   const bool still = truth.velocity.empty() && truth.vertices.empty();

@@ -71,8 +71,6 @@ bool allows(EditKind kind, EditMode mode) {
       return mode == EditMode::kAbsolute || mode == EditMode::kFactor;
     case EditKind::kVelocity:
       return mode == EditMode::kAbsolute || mode == EditMode::kAdd || mode == EditMode::kEstimated;
-    case EditKind::kWind:
-      return mode == EditMode::kAbsolute || mode == EditMode::kEstimated;
     default:
       return mode == EditMode::kAbsolute;
   }

@@ -79,8 +79,13 @@ void SimulatorRos::prepare() {
     reporter_.failed(error.what());
     return;
   }
-  if (!params_.live)
+  if (!params_.live) {
     for (const auto& frame : clip_dynamics_->frames) take(frame);
+    for (const auto& object : clip_dynamics_->objects)
+      for (const auto& collision : object.collisions)
+        world_->addCollision(object.object, (collision.stamp - *first_stamp_).toSec());
+    world_->allCollisionsKnown();
+  }
   if (first_stamp_)
     for (const auto& edit : early_edits_) submit(edit);
   if (first_stamp_) early_edits_.clear();

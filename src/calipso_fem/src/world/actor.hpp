@@ -38,13 +38,6 @@ struct Pull {
   bool over(double time) const { return duration > 0.0 && time >= begin + duration - 1e-9; }
 };
 
-// Air that moves around an object.
-struct AirFlow {
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s
-  bool estimated = false;  // as the video shows it, times `factor`, instead of `velocity`
-  double factor = 1.0;
-};
-
 // Pose and velocity of a body as a whole, handed on when its kind changes.
 struct BodyMotion {
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
@@ -86,8 +79,7 @@ struct Actor {
     double areal_density = 0.0;  // kg/m^2
   };
   std::optional<Sheet> sheet;  // how the surface meets the air; made when it is needed
-  std::optional<AirFlow> air;
-  std::vector<ObservedWind> observed_wind;  // by time
+  std::optional<Eigen::Vector3d> air;       // velocity of the air around it, m/s
   std::vector<double> collisions;           // instants in the video, s, ascending
   Look look;
   std::vector<std::vector<int>> fixed;  // vertices per fixed region

@@ -120,10 +120,6 @@ void World::Impl::releaseWaiting() {
   }
 }
 
-void World::addObservedWind(const std::string& object, const ObservedWind& wind) {
-  if (Actor* actor = impl_->find(object)) actor->observed_wind.push_back(wind);
-}
-
 void World::addCollision(const std::string& object, double time) {
   if (Actor* actor = impl_->find(object)) actor->collisions.push_back(time);
   impl_->releaseWaiting();

@@ -27,7 +27,7 @@ void World::Impl::applyLoads(double at, double h) {
     if (actor.removed) continue;
     if (actor.soft) {
       for (const Pull& pull : actor.pulls) pullSoft(actor, pull, at);
-      if (actor.air) blowSoft(actor, at, h);
+      if (actor.air) blowSoft(actor, h);
     }
     if (actor.kind == ObjectKind::kRigid && actor.body) loadRigid(actor, at, h);
   }
@@ -103,7 +103,7 @@ void World::Impl::loadRigid(Actor& actor, double at, double h) {
     const Eigen::Vector3d angular = rigid.angularVelocity(*actor.body);
     for (Eigen::Index i = 0; i < x.rows(); ++i)
       u.row(i) = (linear + angular.cross(x.row(i).transpose() - center)).transpose();
-    const Vertices forces = airOn(actor, x, u, at, h);
+    const Vertices forces = airOn(actor, x, u, h);
     for (Eigen::Index i = 0; i < x.rows(); ++i) {
       force += forces.row(i).transpose();
       torque += (x.row(i).transpose() - center).cross(forces.row(i).transpose());
@@ -112,24 +112,7 @@ void World::Impl::loadRigid(Actor& actor, double at, double h) {
   rigid.setForce(*actor.body, force, torque);
 }
 
-Air World::Impl::airAt(const Actor& actor, double at) const {
-  if (!actor.air->estimated) return {actor.air->velocity, (actor.sheet->closed ? 0.5 : 1.0) * kAirDrag};
-  const auto& seen = actor.observed_wind;
-  auto after = std::lower_bound(seen.begin(), seen.end(), at,
-                                [](const ObservedWind& w, double t) { return w.time < t; });
-  if (after == seen.end()) --after;
-  ObservedWind wind = *after;
-  if (after != seen.begin() && after->time > at) {
-    const ObservedWind& before = *(after - 1);
-    const double share = (at - before.time) / (after->time - before.time);
-    wind.velocity = (1.0 - share) * before.velocity + share * after->velocity;
-  }
-  // Only the ratio of drag to density shows in a motion.
-  const double heavier = wind.density > 0.0 ? std::sqrt(actor.observed_material.density / wind.density) : 1.0;
-  return {actor.air->factor * heavier * wind.velocity, wind.drag};
-}
-
-Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, double at, double h) {
+Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, double h) {
   if (!actor.sheet) {
     const TriangleMesh& mesh = actor.object.mesh;
     Actor::Sheet sheet;
@@ -140,14 +123,14 @@ Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, 
     sheet.areal_density = mass / std::max(area, 1e-12);
     actor.sheet = sheet;
   }
-  return windForces(x, u, actor.object.mesh.triangles, airAt(actor, at),
-                    actor.sheet->areal_density, h);
+  const Air air{*actor.air, (actor.sheet->closed ? 0.5 : 1.0) * kAirDrag};
+  return windForces(x, u, actor.object.mesh.triangles, air, actor.sheet->areal_density, h);
 }
 
-void World::Impl::blowSoft(Actor& actor, double at, double h) {
+void World::Impl::blowSoft(Actor& actor, double h) {
   const Vec velocities = actor.soft->body().surfaceVelocities();
   const Vertices u = Eigen::Map<const Vertices>(velocities.data(), velocities.size() / 3, 3);
-  const Vertices forces = airOn(actor, actor.soft->vertices(), u, at, h);
+  const Vertices forces = airOn(actor, actor.soft->vertices(), u, h);
   for (Eigen::Index v = 0; v < forces.rows(); ++v)
     actor.soft->addForce(SurfacePoint::vertex(static_cast<int>(v)), forces.row(v).transpose());
 }

@@ -61,9 +61,8 @@ struct World::Impl {
   void applyLoads(double at, double h);  // world_forces.cpp
   Eigen::Vector3d twistOf(const Actor& actor, const Pull& pull, double at) const;
   void twistSoft(Actor& actor, const Pull& pull, double at);
-  Air airAt(const Actor& actor, double at) const;
-  Vertices airOn(Actor& actor, const Vertices& x, const Vertices& u, double at, double h);
-  void blowSoft(Actor& actor, double at, double h);
+  Vertices airOn(Actor& actor, const Vertices& x, const Vertices& u, double h);
+  void blowSoft(Actor& actor, double h);
   void pullSoft(Actor& actor, const Pull& pull, double at);
   void loadRigid(Actor& actor, double at, double h);
   void endPulls(double at);

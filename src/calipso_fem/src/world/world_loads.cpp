@@ -125,23 +125,12 @@ std::string World::Impl::press(Actor& actor, const Edit& edit) {
 }
 
 std::string World::Impl::blow(Actor& actor, const Edit& edit) {
-  AirFlow air;
-  air.velocity = edit.vector;
-  if (edit.mode == EditMode::kEstimated) {
-    if (actor.observed_wind.empty())
-      throw std::invalid_argument("the video shows no wind on " + actor.object.name +
-                                  "; use mode absolute and give a vector");
-    air.estimated = true;
-    air.factor = edit.factor;
-  }
   touch(actor, edit);
-  actor.air = air;
   if (!actor.simulated())
     throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
                                 " and no wind moves it; make it rigid or deformable (edit 'kind')");
-  return air.estimated ? "the wind of the video, times " + std::to_string(air.factor) + ", moves " +
-                             actor.object.name
-                       : "wind of " + describe(air.velocity) + " m/s moves " + actor.object.name;
+  actor.air = edit.vector;
+  return "wind of " + describe(edit.vector) + " m/s moves " + actor.object.name;
 }
 
 }  // namespace calipso::fem

@@ -57,12 +57,9 @@ std::string World::Impl::changeGravity(const Edit& edit) {
 std::string World::Impl::blowEverywhere(const Edit& edit) {
   std::string message;
   for (Actor& actor : actors) {
-    if (actor.removed || (edit.mode == EditMode::kEstimated && actor.observed_wind.empty())) continue;
-    message += (message.empty() ? "" : "; ") + blow(actor, edit);
+    if (!actor.removed) message += (message.empty() ? "" : "; ") + blow(actor, edit);
   }
-  if (message.empty())
-    throw std::invalid_argument("the video shows no wind on any object; use mode absolute and give a vector");
-  return message;
+  return message.empty() ? "there is nothing that wind could move" : message;
 }
 
 std::string World::Impl::changeContact(Actor& actor, const Edit& edit) {

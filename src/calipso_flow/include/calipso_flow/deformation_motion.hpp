@@ -7,7 +7,6 @@
 #include "calipso_flow/deformation_modes.hpp"
 #include "calipso_flow/stiffness_ratio.hpp"
 #include "calipso_flow/vibration.hpp"
-#include "calipso_flow/wind_fit.hpp"
 
 namespace calipso::flow {
 
@@ -25,7 +24,6 @@ struct DeformationMotion {
   std::vector<SurfaceLine> lines;  // strongest first
   Eigen::Vector3d lean = Eigen::Vector3d::Zero();  // m, world: see leanOf
   std::optional<StiffnessRatio> stiffness;
-  std::optional<WindEstimate> wind;
   std::string note;            // what was refused, for the user
 };
 

@@ -54,37 +54,6 @@ calipso_msgs::Vibration toMsg(const SurfaceLine& line) {
   return msg;
 }
 
-calipso_msgs::Wind toMsg(const WindEstimate& wind, int index) {
-  calipso_msgs::Wind msg;
-  msg.velocity = toVectorMsg(wind.velocity.at(index));
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) msg.covariance[3 * r + c] = wind.covariance.at(index)(r, c);
-  }
-  msg.drag = wind.drag;
-  msg.density = wind.density;
-  msg.pressure = wind.pressure.at(index).norm();
-  if (msg.pressure > 0.0) {
-    msg.pressure_normal = toVectorMsg(wind.pressure.at(index).normalized());
-  }
-  return msg;
-}
-
-void addDeformation(const DeformationMotion& deformation, calipso_msgs::ObjectClipDynamics& msg) {
-  const Eigen::MatrixXf shapes = deformation.modes.shapes.cast<float>();
-  for (int m = 0; m < shapes.cols(); ++m) {
-    msg.modes.emplace_back();
-    msg.modes.back().displacements.assign(shapes.col(m).data(),
-                                          shapes.col(m).data() + shapes.rows());
-  }
-  for (const SurfaceLine& line : deformation.lines) msg.vibrations.push_back(toMsg(line));
-  msg.lean = toVectorMsg(deformation.lean);
-  if (deformation.stiffness) {
-    msg.stiffness_over_density = deformation.stiffness->value;
-    msg.stiffness_over_density_deviation = deformation.stiffness->deviation;
-  }
-  msg.note = deformation.note;
-}
-
 }  // namespace
 
 cv::Mat pictureFromMsg(const sensor_msgs::ImageConstPtr& image) {
@@ -148,7 +117,6 @@ void addDeformation(const DeformationMotion& deformation, int index,
     msg.mode_amplitudes.push_back(static_cast<float>(deformation.modes.amplitudes(index, m)));
     msg.mode_velocities.push_back(static_cast<float>(deformation.modes.velocities(index, m)));
   }
-  if (deformation.wind) msg.wind.push_back(toMsg(*deformation.wind, index));
 }
 
 calipso_msgs::ObjectClipDynamics toMsg(const ObjectDynamics& object) {

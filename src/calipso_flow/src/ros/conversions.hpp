@@ -32,7 +32,7 @@ cv::Mat maskFromMsg(const sensor_msgs::Image& labels, int index);
 
 calipso_msgs::ObjectDynamics toMsg(const std::string& object, const ObjectMotion& motion);
 
-// Adds the deformation and the wind at frame `index` of the clip.
+// Adds the deformation at frame `index` of the clip.
 void addDeformation(const DeformationMotion& deformation, int index,
                     calipso_msgs::ObjectDynamics& msg);
 

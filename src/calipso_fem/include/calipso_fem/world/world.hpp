@@ -23,9 +23,8 @@ class World {
   // @throw std::invalid_argument naming the object and the ones there are
   void addObservedMotion(const std::string& object, const ObservedMotion& motion);
 
-  // What the video shows besides: the wind on an object, and the instants of its collisions (s), both in the order
-  // of time. Objects that are not there are passed over.
-  void addObservedWind(const std::string& object, const ObservedWind& wind);
+  // The instant (s) of an object's next collision in the video; they come in order. Objects that are not there are
+  // passed over.
   void addCollision(const std::string& object, double time);
   // No more collisions will come: an edit that waits for another one is refused.
   void allCollisionsKnown();

@@ -51,14 +51,6 @@ struct ObservedMotion {
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  // m/s^2
 };
 
-// The wind that moves a cloth in the video (calipso_msgs/Wind).
-struct ObservedWind {
-  double time = 0.0;                                   // s since the clip's first frame
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s
-  double drag = kAirDrag;                              // kg/m^3, see Air
-  double density = 0.0;  // kg/m^3, of the cloth it was fitted with; 0: unknown
-};
-
 // How an object's look differs from the video's. NaN: unchanged.
 struct Look {
   Eigen::Vector3d color = Eigen::Vector3d::Constant(kUnchanged);  // linear RGB
