@@ -54,6 +54,22 @@ calipso_msgs::Vibration toMsg(const SurfaceLine& line) {
   return msg;
 }
 
+void addDeformation(const DeformationMotion& deformation, calipso_msgs::ObjectClipDynamics& msg) {
+  const Eigen::MatrixXf shapes = deformation.modes.shapes.cast<float>();
+  for (int m = 0; m < shapes.cols(); ++m) {
+    msg.modes.emplace_back();
+    msg.modes.back().displacements.assign(shapes.col(m).data(),
+                                          shapes.col(m).data() + shapes.rows());
+  }
+  for (const SurfaceLine& line : deformation.lines) msg.vibrations.push_back(toMsg(line));
+  msg.lean = toVectorMsg(deformation.lean);
+  if (deformation.stiffness) {
+    msg.stiffness_over_density = deformation.stiffness->value;
+    msg.stiffness_over_density_deviation = deformation.stiffness->deviation;
+  }
+  msg.note = deformation.note;
+}
+
 }  // namespace
 
 cv::Mat pictureFromMsg(const sensor_msgs::ImageConstPtr& image) {
