@@ -38,9 +38,9 @@ Parts labelParts(const CoveredCell& cell, const Occupancy& occupancy, int s) {
       const Vector3i p = stack.back();
       stack.pop_back();
       ++parts.size[label];
-      for (int face = 0; face < 6; ++face) {
-        Vector3i n = p;
-        n[face / 2] += face % 2 ? 1 : -1;
+      // Over edges and corners too: a sheet thinner than a sub-voxel is sampled as a staircase.
+      for (int around = 0; around < 27; ++around) {
+        const Vector3i n = p + Vector3i(around % 3 - 1, around / 3 % 3 - 1, around / 9 - 1);
         if (n.minCoeff() < 0 || n.maxCoeff() >= s) continue;
         int& l = parts.label[n.x() + s * (n.y() + s * n.z())];
         if (l >= 0 || !inside(n.x(), n.y(), n.z())) continue;
@@ -75,20 +75,25 @@ void mergeSpecks(Parts* parts, int s, int most) {
     if (l >= 0) l = renamed[l];
 }
 
-// For every part of `a`: the set of parts of `b` behind the face that it touches.
+// For every part of `a`: the set of parts of `b` behind the face that it touches, over edges and corners of the
+// sub-voxels too.
 std::array<unsigned, kMostBranches> contacts(const Parts& a, const Parts& b, int face, int s) {
   std::array<unsigned, kMostBranches> touched{};
   const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
   for (int i = 0; i < s; ++i)
     for (int j = 0; j < s; ++j) {
       Vector3i p, q;
-      p[u] = q[u] = i;
-      p[v] = q[v] = j;
+      p[u] = i;
+      p[v] = j;
       p[axis] = face % 2 ? s - 1 : 0;
       q[axis] = face % 2 ? 0 : s - 1;
       const int la = a.label[p.x() + s * (p.y() + s * p.z())];
-      const int lb = b.label[q.x() + s * (q.y() + s * q.z())];
-      if (la >= 0 && lb >= 0) touched[la] |= 1u << lb;
+      if (la < 0) continue;
+      for (q[u] = std::max(0, i - 1); q[u] <= std::min(s - 1, i + 1); ++q[u])
+        for (q[v] = std::max(0, j - 1); q[v] <= std::min(s - 1, j + 1); ++q[v]) {
+          const int lb = b.label[q.x() + s * (q.y() + s * q.z())];
+          if (lb >= 0) touched[la] |= 1u << lb;
+        }
     }
   return touched;
 }
