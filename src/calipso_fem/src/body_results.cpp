@@ -65,7 +65,7 @@ bool DeformableBody::isAtRest(double speed) const {
 }
 
 // A of body_system.cpp is the velocity system divided by h (backward Euler: inertia = rate / h).
-Vec DeformableBody::Impl::velocityChange(Vec impulses, double h, double tolerance) {
+Vec DeformableBody::Impl::velocityChange(Vec impulses, double h) {
   if (!(h > 0.0)) throw std::invalid_argument("compliance: h must be > 0 s");
   if (!system_valid) {
     if (damping() > 0.0) setViscosity(x);
@@ -74,22 +74,47 @@ Vec DeformableBody::Impl::velocityChange(Vec impulses, double h, double toleranc
   }
   maskResidual(&impulses);
   Vec w = Vec::Zero(impulses.size());
-  solveSystem(impulses, tolerance, &w);
+  solveSystem(impulses, options.linear_tolerance, &w);
   return w / (h * h);
+}
+
+Vec DeformableBody::Impl::nodalImpulse(const SurfacePoint& point, const Vector3d& impulse) const {
+  Vec b = Vec::Zero(x.size());
+  const Eigen::SparseVector<double> weights = embedding.pointWeights(point);
+  for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
+    b.segment<3>(3 * it.index()) += it.value() * impulse;
+  return b;
 }
 
 Vec DeformableBody::complianceColumn(const SurfacePoint& point, const Vector3d& direction,
                                      double h) const {
-  return complianceColumn(point, direction, h, impl_->options.linear_tolerance);
+  return impl_->velocityChange(impl_->nodalImpulse(point, direction), h);
 }
 
-Vec DeformableBody::complianceColumn(const SurfacePoint& point, const Vector3d& direction, double h,
-                                     double tolerance) const {
-  Vec b = Vec::Zero(impl_->x.size());
-  const Eigen::SparseVector<double> weights = impl_->embedding.pointWeights(point);
-  for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
-    b.segment<3>(3 * it.index()) += it.value() * direction;
-  return impl_->velocityChange(std::move(b), h, tolerance);
+void DeformableBody::freezeCompliance(double h) {
+  Impl& m = *impl_;
+  m.frozen = makeCholesky();
+  m.frozen_h = h;
+  // The solver's own matrix is left as it is: a step may be under way with it.
+  const BlockMatrix running = m.A;
+  if (m.trial)
+    m.assemble(m.trial->y, m.trial->integrator, Definiteness::kPositive);
+  else
+    m.assemble(m.x, m.integrator(h), Definiteness::kPositive);
+  eliminate(m.prescribed, &m.A);
+  const bool positive = m.frozen->update(m.A);
+  m.A = running;
+  if (!positive)
+    throw std::runtime_error("compliance: the body's system is not positive definite");
+}
+
+Vec DeformableBody::frozenColumn(const SurfacePoint& point, const Vector3d& direction) const {
+  const Impl& m = *impl_;
+  if (!m.frozen) throw std::logic_error("frozenColumn() needs freezeCompliance() before it");
+  Vec b = m.nodalImpulse(point, direction), w;
+  m.maskResidual(&b);
+  m.frozen->apply(b, w);
+  return w / (m.frozen_h * m.frozen_h);
 }
 
 Eigen::MatrixXd DeformableBody::compliance(const std::vector<SurfacePoint>& points,
@@ -124,7 +149,7 @@ void DeformableBody::applyImpulses(const std::vector<SurfacePoint>& points,
     for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
       b.segment<3>(3 * it.index()) += it.value() * impulses[k];
   }
-  if (!b.isZero(0.0)) impl_->v += impl_->velocityChange(std::move(b), h, impl_->options.linear_tolerance);
+  if (!b.isZero(0.0)) impl_->v += impl_->velocityChange(std::move(b), h);
 }
 
 // The grid follows its surface: rest nodes X + d with J d = new - old vertices in the least-squares

@@ -56,7 +56,7 @@ Vec DeformableBody::trialDirection(const Vec& contact_forces) {
 Vec DeformableBody::trialResponse(const Vec& forces) {
   Impl& m = *impl_;
   const double h = m.runningTrial().h;
-  return h * h * m.velocityChange(forces, h, m.options.linear_tolerance);
+  return h * h * m.velocityChange(forces, h);
 }
 
 double DeformableBody::trialPotential(const Vec& positions, const Vec& contact_forces) const {
@@ -69,6 +69,7 @@ double DeformableBody::trialResidual(const Vec& contact_forces) const {
   const Impl::Trial& t = m.runningTrial();
   Vec residual = m.trialGradient() - contact_forces;
   m.maskResidual(&residual);
+  if (m.system_valid && residual.norm() <= m.roundOff(t.y)) return 0.0;
   return residual.norm() / m.forceScale(t.y, t.integrator, t.loads + contact_forces);
 }
 

@@ -142,9 +142,10 @@ class DeformableBody {
   // Columns w = A^-1 J^T n of the last step's system A = M + h D + h^2 K: the velocity change per
   // unit impulse at a surface point along a direction (Saupin et al. 2008). 3n, m/s per N s.
   Vec complianceColumn(const SurfacePoint& point, const Eigen::Vector3d& direction, double h) const;
-  // The same, to a relative accuracy of `tolerance` only.
-  Vec complianceColumn(const SurfacePoint& point, const Eigen::Vector3d& direction, double h,
-                       double tolerance) const;
+  // Keeps the factor of the last step's or trial's system; frozenColumn() gives columns of it. All of
+  // them belong to one matrix, so that what is put together from them stays positive.
+  void freezeCompliance(double h);
+  Vec frozenColumn(const SurfacePoint& point, const Eigen::Vector3d& direction) const;
   // W_ij = n_i^T J_i A^-1 J_j^T n_j for all pairs of given points and directions.
   Eigen::MatrixXd compliance(const std::vector<SurfacePoint>& points,
                              const std::vector<Eigen::Vector3d>& directions, double h) const;

@@ -21,6 +21,7 @@ struct BulletBody {
   std::unique_ptr<btRigidBody> body;
   Eigen::Isometry3d kinematic_start, kinematic_target;  // world_from_object over the next step
   bool moves = false;
+  bool pushed = false;  // by an impulse that acts over the next step
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
 };
 

@@ -34,6 +34,9 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
     change.segment<3>(3 * i) = rows[i].impulse - rows[i].start_impulse;
   }
   velocity.noalias() += W * change;
+  // W is approximate: a hundredth of the first sweep's change is below what it is good for.
+  constexpr double kReduction = 0.01;
+  double first_change = 0.0;
   ContactSolveReport report;
   report.converged = n == 0;
   while (!report.converged && report.iterations < max_iterations) {
@@ -49,7 +52,8 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
     }
     ++report.iterations;
     report.residual = largest > 0.0 ? largest_change / largest : 0.0;
-    report.converged = report.residual <= tolerance;
+    if (report.iterations == 1) first_change = largest_change;
+    report.converged = report.residual <= tolerance || largest_change <= kReduction * first_change;
   }
   return report;
 }

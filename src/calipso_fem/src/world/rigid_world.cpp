@@ -75,6 +75,19 @@ struct RigidWorld::Impl {
   Body& at(Id id) { return bodies.at(id); }
   const Body& at(Id id) const { return bodies.at(id); }
 
+  // Gives pushed bodies their weight's impulse of a step h at once, and none within it.
+  std::vector<std::pair<btRigidBody*, btVector3>> takeWeights(double h) {
+    std::vector<std::pair<btRigidBody*, btVector3>> taken;
+    for (auto& [id, b] : bodies) {
+      if (!std::exchange(b.pushed, false)) continue;
+      const btVector3 acceleration = b.body->getGravity();
+      taken.emplace_back(b.body.get(), acceleration);
+      b.body->setLinearVelocity(b.body->getLinearVelocity() + h * acceleration);
+      b.body->setGravity(btVector3(0, 0, 0));
+    }
+    return taken;
+  }
+
   Id enter(Body body) {
     const Id id = next++;
     body.body->setUserIndex(id);
@@ -226,6 +239,11 @@ void RigidWorld::applyImpulse(Id id, const Eigen::Vector3d& impulse, const Eigen
   body.activate(true);
 }
 
+void RigidWorld::push(Id id, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) {
+  applyImpulse(id, impulse, point);
+  impl_->at(id).pushed = true;
+}
+
 void RigidWorld::wake(Id id) { impl_->at(id).body->activate(true); }
 
 Eigen::Isometry3d RigidWorld::pose(Id id) const {
@@ -263,6 +281,13 @@ Eigen::Matrix3d RigidWorld::inertia(Id id) const {
   const Eigen::Matrix3d axes = fromBullet(body.getWorldTransform()).linear();
   const Eigen::Vector3d inverse = fromBullet(body.getInvInertiaDiagLocal());
   return axes * inverse.cwiseInverse().asDiagonal() * axes.transpose();
+}
+
+std::pair<Eigen::Vector3d, Eigen::Vector3d> RigidWorld::velocityChange(
+    Id id, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) const {
+  const btRigidBody& body = *impl_->at(id).body;
+  const btVector3 moment = (toBullet(point) - body.getCenterOfMassPosition()).cross(toBullet(impulse));
+  return {body.getInvMass() * impulse, fromBullet(body.getInvInertiaTensorWorld() * moment)};
 }
 
 double RigidWorld::kineticEnergy(Id id) const {
@@ -310,6 +335,7 @@ int RigidWorld::step(double h) {
   if (awake == 0 && !pushed) return 0;  // whatever rests costs nothing
   const int steps = std::max(1, static_cast<int>(std::ceil(h * substepRate(awake) - 1e-9)));
   impl_->substep = h / steps;
+  const std::vector<std::pair<btRigidBody*, btVector3>> weightless = impl_->takeWeights(h);
   for (int k = 1; k <= steps; ++k) {
     for (auto& [id, b] : impl_->bodies) {
       if (b.moves)
@@ -325,11 +351,44 @@ int RigidWorld::step(double h) {
       impl_->touches.push_back({impl_->at(t.a).name, impl_->at(t.b).name, k * impl_->substep,
                                 fromBullet(t.position), fromBullet(t.normal), t.approach_speed});
   }
+  for (const auto& [body, acceleration] : weightless) body->setGravity(acceleration);
   for (auto& [id, b] : impl_->bodies) {
     b.kinematic_start = b.kinematic_target;
     b.moves = false;
   }
   return steps;
+}
+
+std::vector<RigidTouch> RigidWorld::touchesAround(std::set<Id> ids) const {
+  auto& dispatcher = impl_->dispatcher;
+  const auto dynamic = [&](const btCollisionObject* o) {
+    return BulletWorld::isDynamic(o) ? std::optional<Id>(o->getUserIndex()) : std::nullopt;
+  };
+  std::set<int> manifolds;
+  for (bool grows = true; grows;) {
+    grows = false;
+    for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+      const btPersistentManifold* m = dispatcher.getManifoldByIndexInternal(i);
+      const auto a = dynamic(m->getBody0()), b = dynamic(m->getBody1());
+      if (m->getNumContacts() == 0 || manifolds.count(i)) continue;
+      if (!(a && ids.count(*a)) && !(b && ids.count(*b))) continue;
+      manifolds.insert(i);
+      for (const auto& id : {a, b})
+        if (id) ids.insert(*id);
+      grows = true;
+    }
+  }
+  std::vector<RigidTouch> touches;
+  for (const int i : manifolds) {
+    const btPersistentManifold* m = dispatcher.getManifoldByIndexInternal(i);
+    for (int k = 0; k < m->getNumContacts(); ++k) {
+      const btManifoldPoint& p = m->getContactPoint(k);
+      touches.push_back({dynamic(m->getBody0()), dynamic(m->getBody1()),
+                         fromBullet(p.getPositionWorldOnB()), fromBullet(p.m_normalWorldOnB),
+                         std::max(0.0, p.getDistance()), p.m_combinedFriction});
+    }
+  }
+  return touches;
 }
 
 const std::vector<TouchEvent>& RigidWorld::touches() const { return impl_->touches; }

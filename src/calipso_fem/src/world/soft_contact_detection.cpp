@@ -1,29 +1,84 @@
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "calipso_fem/world/soft_contacts.hpp"
 #include "obstacle_query.hpp"
+#include "step_motion.hpp"
 
 namespace calipso::fem {
 namespace {
 
-Eigen::AlignedBox3d sweptBounds(const SoftObject& soft, double margin) {
-  Eigen::AlignedBox3d box;
-  for (const auto* vertices : {&soft.vertices(), &soft.previousVertices()}) {
-    box.extend(vertices->colwise().minCoeff().transpose());
-    box.extend(vertices->colwise().maxCoeff().transpose());
-  }
-  return {box.min().array() - margin, box.max().array() + margin};
-}
+// How a contact was found; part of its key.
+enum Found { kNearest = 0, kNearestReversed = 1, kCrossing = 2, kCrossingReversed = 3 };
 
 double sizeOf(const SoftObject& soft) {
   return (soft.vertices().colwise().maxCoeff() - soft.vertices().colwise().minCoeff()).norm();
+}
+
+Eigen::AlignedBox3d boxOf(const SoftObject& soft, double margin) {
+  const Eigen::Vector3d low = soft.vertices().colwise().minCoeff().transpose(),
+                        high = soft.vertices().colwise().maxCoeff().transpose();
+  return {low.array() - margin, high.array() + margin};
 }
 
 int mainVertex(const SurfacePoint& point) {
   int k = 0;
   point.weights.maxCoeff(&k);
   return point.vertices[k];
+}
+
+int indexOf(const std::vector<SoftEntry>& softs, const SoftObject* soft) {
+  for (size_t i = 0; i < softs.size(); ++i)
+    if (softs[i].soft == soft) return static_cast<int>(i);
+  return -1;
+}
+
+// The contact of a deformable's surface point with an obstacle that was found at `hit`.
+Contact contactAt(const Contact::Key& key, int soft, int index, const Obstacle& obstacle,
+                  int soft_b, const SurfacePoint& point, const ObstacleHit& hit) {
+  Contact c;
+  c.key = key;
+  c.soft_a = soft;
+  c.soft_b = soft_b;
+  c.obstacle = index;
+  c.rigid_b = obstacle.rigid;
+  c.point = point;
+  c.other = hit.other;
+  c.place = hit.place;
+  c.normal = hit.normal;
+  c.start_gap = hit.gap;
+  if (!obstacle.rigid && obstacle.tree)
+    c.motion = obstacle.pose * (obstacle.previous_pose.inverse() * hit.place) - hit.place;
+  return c;
+}
+
+ObstacleHit toWorld(const SurfaceHit& hit, const SurfaceTree& tree, const Eigen::Isometry3d& pose) {
+  ObstacleHit h{hit.distance, pose.linear() * hit.normal, pose * hit.point, {}};
+  h.other = SurfacePoint::onTriangle(tree.mesh().triangles.row(hit.triangle).transpose(),
+                                     hit.barycentric);
+  return h;
+}
+
+// Fastest approach of the two in this step, m: bounds how far away a contact can come from.
+double travelOf(const SoftObject& soft, const Obstacle& obstacle, const RigidWorld& rigid,
+                double h) {
+  double way = h * soft.fastest() + h * h * soft.gravity().norm();
+  if (obstacle.soft) {
+    way += h * obstacle.soft->fastest() + h * h * obstacle.soft->gravity().norm();
+  } else if (obstacle.rigid) {
+    const double radius = obstacle.tree->bounds().diagonal().norm();
+    way += h * (rigid.linearVelocity(*obstacle.rigid).norm() + h * obstacle.acceleration.norm() +
+                radius * rigid.angularVelocity(*obstacle.rigid).norm());
+  } else if (obstacle.tree) {
+    for (int c = 0; c < 8; ++c) {
+      const Eigen::Vector3d corner =
+          obstacle.tree->bounds().corner(static_cast<Eigen::AlignedBox3d::CornerType>(c));
+      way = std::max(way, h * soft.fastest() +
+                              (obstacle.pose * corner - obstacle.previous_pose * corner).norm());
+    }
+  }
+  return way;
 }
 
 }  // namespace
@@ -48,120 +103,218 @@ double SoftContacts::frictionOf(const SoftEntry& entry, const Obstacle& obstacle
   return std::sqrt(entry.surface.friction * obstacle.surface.friction);
 }
 
+double SoftContacts::reachOf(const SoftEntry& entry, const Obstacle& obstacle) const {
+  const auto rule = rules_.find(std::minmax({entry.id, obstacle.id}));
+  if (rule != rules_.end() && rule->second.proximity) return *rule->second.proximity;
+  const double own = std::max(entry.surface.proximity, obstacle.surface.proximity);
+  return own > 0.0 ? own : params_.proximity;
+}
+
 void SoftContacts::forget(int id) {
   for (auto it = memory_.begin(); it != memory_.end();)
     it = std::get<0>(it->first) == id || std::get<1>(it->first) == id ? memory_.erase(it)
                                                                       : std::next(it);
 }
 
-// Keeps the deepest touch of a key; the vertex of the last step has a small advantage, so that
-// contacts do not flicker between neighbours.
-void SoftContacts::offer(const Touch& touch, double reach, Touches& touches) const {
-  const auto remembered = memory_.find(touch.key);
-  const double offset = remembered == memory_.end() ? 0.0 : remembered->second.offset;
-  if (touch.gap - offset > reach) return;
-  const auto advantage = [&](const Touch& t) {
-    return remembered != memory_.end() &&
-                   mainVertex(remembered->second.point) == mainVertex(t.point)
-               ? 1e-3 * params_.proximity
-               : 0.0;
-  };
-  const auto [at, is_new] = touches.emplace(touch.key, touch);
-  if (!is_new && touch.gap - advantage(touch) < at->second.gap - advantage(at->second))
-    at->second = touch;
+Contact SoftContacts::completed(Contact contact) const {
+  const auto known = memory_.find(contact.key);
+  if (known == memory_.end()) return contact;
+  const Memory& m = known->second;
+  contact.offset = m.offset;
+  contact.held_normal = m.held_normal;
+  contact.held_tangential = m.held_tangential;
+  contact.force = m.force;
+  return contact;
 }
 
-void SoftContacts::addVertices(const SoftEntry& entry, int soft, const Obstacle& obstacle,
-                               int index, double reach, Touches& touches) const {
-  const auto& now = entry.soft->vertices();
-  const auto& before = entry.soft->previousVertices();
-  const double size = sizeOf(*entry.soft);
-  Eigen::AlignedBox3d bounds = obstacleBounds(obstacle);
-  const bool everywhere = bounds.isEmpty();
-  bounds = {bounds.min().array() - reach, bounds.max().array() + reach};
-  // Observed gaps may be larger than the reach; their offsets are subtracted in offer().
-  double farthest = reach;
-  for (auto it = memory_.lower_bound({entry.id, obstacle.id, 0, false});
+std::vector<SoftContacts::Candidate> SoftContacts::candidates(
+    const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
+    const RigidWorld& rigid, double h) const {
+  std::vector<Candidate> list;
+  for (size_t s = 0; s < softs.size(); ++s)
+    for (size_t o = 0; o < obstacles.size(); ++o) {
+      // Each pair of moving deformable objects is looked at once.
+      const bool twin = obstacles[o].soft && obstacles[o].id < softs[s].id &&
+                        indexOf(softs, obstacles[o].soft) >= 0;
+      if (meets(softs[s].id, obstacles[o].id) && !twin)
+        watchPair(softs, static_cast<int>(s), obstacles, static_cast<int>(o), rigid, h, list);
+    }
+  return list;
+}
+
+void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
+                             const std::vector<Obstacle>& obstacles, int index,
+                             const RigidWorld& rigid, double h,
+                             std::vector<Candidate>& list) const {
+  const SoftEntry& entry = softs[soft];
+  const Obstacle& obstacle = obstacles[index];
+  const double reach = reachOf(entry, obstacle);
+  const double travel = travelOf(*entry.soft, obstacle, rigid, h);
+  // Observed gaps may be larger than the reach.
+  double watch = reach + travel;
+  for (auto it = memory_.lower_bound({entry.id, obstacle.id, 0, 0});
        it != memory_.end() && std::get<0>(it->first) == entry.id &&
        std::get<1>(it->first) == obstacle.id;
        ++it)
-    farthest = std::max(farthest, reach + it->second.offset);
-  for (int v = 0; v < now.rows(); ++v) {
-    const Eigen::Vector3d x = now.row(v).transpose(), x0 = before.row(v).transpose();
-    if (!everywhere && !bounds.intersects({x.cwiseMin(x0), x.cwiseMax(x0)})) continue;
-    const auto hit = queryObstacle(obstacle, x0, x, farthest, size);
-    if (!hit) continue;
-    const Key key{entry.id, obstacle.id, entry.soft->carrier(v), false};
-    offer(
-        {key, soft, index, SurfacePoint::vertex(v), hit->other, hit->place, hit->normal, hit->gap},
-        reach, touches);
-  }
-}
+    watch = std::max(watch, reach + it->second.offset);
+  const Eigen::AlignedBox3d own = boxOf(*entry.soft, watch);
+  Eigen::AlignedBox3d others = obstacleBounds(obstacle);
+  if (!others.isEmpty() && !others.intersects(own)) return;
+  const double friction = frictionOf(entry, obstacle), size = sizeOf(*entry.soft);
+  const int soft_b = obstacle.soft ? indexOf(softs, obstacle.soft) : -1;
+  const auto watchVertex = [&](Contact contact, bool reversed, int vertex) {
+    contact.reach = reach;
+    contact.friction = friction;
+    contact = completed(contact);
+    const bool near = obstacle.plane || contact.start_gap - contact.offset <= reach;
+    contact.force.setZero();
+    list.push_back({contact, reversed, vertex, near});
+  };
 
-void SoftContacts::addObstacleVertices(const SoftEntry& entry, int soft, const Obstacle& obstacle,
-                                       int index, double reach, Touches& touches) const {
+  const auto& vertices = entry.soft->vertices();
+  const bool everywhere = others.isEmpty();
+  if (!everywhere) others = {others.min().array() - watch, others.max().array() + watch};
+  for (int v = 0; v < vertices.rows(); ++v) {
+    const Eigen::Vector3d x = vertices.row(v).transpose();
+    if (!everywhere && !others.contains(x)) continue;
+    const auto hit = queryObstacle(obstacle, x, watch, size);
+    if (!hit) continue;
+    watchVertex(contactAt({entry.id, obstacle.id, v, kNearest}, soft, index, obstacle, soft_b,
+                          SurfacePoint::vertex(v), *hit),
+                false, v);
+  }
+  if (obstacle.plane) return;
+
   Obstacle self;  // the deformable object as an obstacle for the other's vertices
   self.tree = &entry.soft->tree();
-  self.soft = entry.soft;
-  const Eigen::AlignedBox3d bounds = sweptBounds(*entry.soft, reach);
-  const double size = sizeOf(*entry.soft);
-  const auto& vertices = obstacle.tree->mesh().vertices;
-  for (int v = 0; v < vertices.rows(); ++v) {
-    const Eigen::Vector3d x = obstacle.pose * Eigen::Vector3d(vertices.row(v).transpose());
-    if (!bounds.contains(x)) continue;
-    const Eigen::Vector3d x0 =
-        obstacle.soft ? Eigen::Vector3d(obstacle.soft->previousVertices().row(v).transpose())
-                      : obstacle.previous_pose * Eigen::Vector3d(vertices.row(v).transpose());
-    const auto hit = queryObstacle(self, x0, x, reach, size);
+  const auto& theirs = obstacle.tree->mesh().vertices;
+  for (int v = 0; v < theirs.rows(); ++v) {
+    const Eigen::Vector3d x = obstacle.previous_pose * Eigen::Vector3d(theirs.row(v).transpose());
+    if (!own.contains(x)) continue;
+    const auto hit = queryObstacle(self, x, watch, size);
     if (!hit) continue;
-    const Key key{entry.id, obstacle.id, entry.soft->carrier(mainVertex(hit->other)), true};
-    offer({key, soft, index, hit->other, SurfacePoint::vertex(v), x, -hit->normal, hit->gap}, reach,
-          touches);
+    const ObstacleHit turned{hit->gap, -hit->normal, x, SurfacePoint::vertex(v)};
+    watchVertex(contactAt({entry.id, obstacle.id, v, kNearestReversed}, soft, index, obstacle,
+                          soft_b, hit->other, turned),
+                true, v);
   }
 }
 
-SoftContacts::Touches SoftContacts::collect(const std::vector<SoftEntry>& softs,
-                                            const std::vector<Obstacle>& obstacles,
-                                            double reach) const {
-  Touches touches;
-  for (size_t s = 0; s < softs.size(); ++s)
-    for (size_t o = 0; o < obstacles.size(); ++o) {
-      const SoftEntry& entry = softs[s];
-      const Obstacle& obstacle = obstacles[o];
-      // Each pair of deformable objects is looked at once.
-      if (!meets(entry.id, obstacle.id) || (obstacle.soft && obstacle.id < entry.id)) continue;
-      const Eigen::AlignedBox3d box = obstacleBounds(obstacle);
-      if (!box.isEmpty() && !box.intersects(sweptBounds(*entry.soft, reach))) continue;
-      addVertices(entry, static_cast<int>(s), obstacle, static_cast<int>(o), reach, touches);
-      if (!obstacle.plane)
-        addObstacleVertices(entry, static_cast<int>(s), obstacle, static_cast<int>(o), reach,
-                            touches);
+// The way of the vertex relative to the other surface, followed where that surface was at the start.
+std::optional<Contact> SoftContacts::crossing(const Candidate& c,
+                                              const std::vector<Obstacle>& obstacles,
+                                              const std::vector<SoftEntry>& softs,
+                                              const StepMotion& motion) const {
+  const Obstacle& obstacle = obstacles[c.contact.obstacle];
+  if (obstacle.plane) return std::nullopt;
+  const SoftEntry& entry = softs[c.contact.soft_a];
+  Contact::Key key = c.contact.key;
+  const Eigen::Vector3d slip = motion.slip(c.contact);
+  Contact found;
+  if (c.reversed) {
+    const auto hit = entry.soft->tree().firstEntry(c.contact.place, c.contact.place - slip);
+    if (!hit) return std::nullopt;
+    std::get<3>(key) = kCrossingReversed;
+    const ObstacleHit at = toWorld(*hit, entry.soft->tree(), Eigen::Isometry3d::Identity());
+    const double gap = at.normal.dot(c.contact.place - at.place);
+    found = contactAt(key, c.contact.soft_a, c.contact.obstacle, obstacle, c.contact.soft_b,
+                      at.other, {gap, -at.normal, c.contact.place, c.contact.other});
+  } else {
+    const Eigen::Vector3d x = entry.soft->vertices().row(c.vertex).transpose();
+    const Eigen::Isometry3d to_tree = obstacle.previous_pose.inverse();
+    const auto hit = obstacle.tree->firstEntry(to_tree * x, to_tree * Eigen::Vector3d(x + slip));
+    if (!hit) return std::nullopt;
+    std::get<3>(key) = kCrossing;
+    ObstacleHit at = toWorld(*hit, *obstacle.tree, obstacle.previous_pose);
+    at.gap = at.normal.dot(x - at.place);
+    found = contactAt(key, c.contact.soft_a, c.contact.obstacle, obstacle, c.contact.soft_b,
+                      SurfacePoint::vertex(c.vertex), at);
+  }
+  found.reach = c.contact.reach;
+  found.friction = c.contact.friction;
+  return found;
+}
+
+// Which nodes a contact is between: those that carry most of it on either side.
+SoftContacts::Neighbourhood SoftContacts::neighbourhoodOf(
+    const Contact& c, const std::vector<SoftEntry>& softs) const {
+  const int a = c.soft_a >= 0 ? softs[c.soft_a].soft->carrier(mainVertex(c.point)) : -1;
+  const int b = c.soft_b >= 0 ? softs[c.soft_b].soft->carrier(mainVertex(c.other)) : -1;
+  return {c.soft_a, c.obstacle, a, b};
+}
+
+int SoftContacts::grow(const std::vector<Candidate>& list, const std::vector<Obstacle>& obstacles,
+                       const std::vector<SoftEntry>& softs, const StepMotion& motion,
+                       Contacts& contacts) const {
+  // A neighbourhood gets its deepest contact first, others only when that does not hold them out.
+  constexpr double kHeldOut = 0.04;  // of the minimal distance
+  std::set<Neighbourhood> served;
+  for (const auto& [key, c] : contacts) served.insert(neighbourhoodOf(c, softs));
+  std::map<Neighbourhood, std::pair<double, Contact>> deepest;
+  for (const Candidate& c : list) {
+    // A point that was near is kept on its side; one from afar only if its way crosses a surface.
+    Contact contact = c.contact;
+    double depth = -motion.clearance(contact);
+    if (!c.near || motion.slip(c.contact).norm() > c.contact.reach) {
+      if (const auto crossed = crossing(c, obstacles, softs, motion)) {
+        const bool other_side = crossed->normal.dot(contact.normal) < 0.9;
+        if (!c.near || (other_side && contacts.count(contact.key))) {
+          contact = *crossed;
+          depth = -motion.clearance(contact);
+        }
+      } else if (!c.near) {
+        continue;
+      }
     }
-  return touches;
+    if (depth <= 0.1 * params_.allowed_depth || contacts.count(contact.key)) continue;
+    const Neighbourhood place = neighbourhoodOf(contact, softs);
+    if (served.count(place) && depth <= kHeldOut * contact.reach) continue;
+    const auto [at, is_new] = deepest.emplace(place, std::make_pair(depth, contact));
+    if (!is_new && depth > at->second.first) at->second = {depth, contact};
+  }
+  for (const auto& [place, found] : deepest)
+    contacts.emplace(found.second.key, found.second);
+  return static_cast<int>(deepest.size());
 }
 
 std::vector<std::pair<HoldPoint, int>> SoftContacts::touching(
     const SoftEntry& entry, const std::vector<Obstacle>& obstacles, double reach) const {
   std::vector<std::pair<HoldPoint, int>> points;
+  const double size = sizeOf(*entry.soft);
+  const auto& vertices = entry.soft->vertices();
   for (size_t o = 0; o < obstacles.size(); ++o) {
     if (!meets(entry.id, obstacles[o].id)) continue;
-    Touches touches;
-    addVertices(entry, 0, obstacles[o], static_cast<int>(o), reach, touches);
-    for (const auto& [key, touch] : touches)
-      points.push_back({{mainVertex(touch.point), Eigen::Vector3d::Zero()}, static_cast<int>(o)});
+    std::map<int, std::pair<double, int>> lowest;  // by carrier node
+    for (int v = 0; v < vertices.rows(); ++v) {
+      const auto hit = queryObstacle(obstacles[o], vertices.row(v).transpose(), reach, size);
+      if (!hit) continue;
+      const auto [at, is_new] =
+          lowest.emplace(entry.soft->carrier(v), std::make_pair(hit->gap, v));
+      if (!is_new) at->second = std::min(at->second, std::make_pair(hit->gap, v));
+    }
+    for (const auto& [carrier, found] : lowest)
+      points.push_back({{found.second, Eigen::Vector3d::Zero()}, static_cast<int>(o)});
   }
   return points;
 }
 
 void SoftContacts::hold(const SoftEntry& entry, const Obstacle& obstacle, const HoldPoint& point,
                         double reach) {
-  const Eigen::Vector3d x = entry.soft->position(SurfacePoint::vertex(point.vertex));
-  const auto hit = queryObstacle(obstacle, x, x, reach, sizeOf(*entry.soft));
+  const double size = sizeOf(*entry.soft);
+  const auto& vertices = entry.soft->vertices();
+  const auto known = memory_.lower_bound({entry.id, obstacle.id, 0, 0});
+  const bool first = known == memory_.end() || std::get<0>(known->first) != entry.id ||
+                     std::get<1>(known->first) != obstacle.id;
+  // What else is inside is forgiven, as far as it is.
+  for (int v = 0; first && v < vertices.rows(); ++v) {
+    const auto hit = queryObstacle(obstacle, vertices.row(v).transpose(), 0.0, size);
+    if (hit && hit->gap < 0.0) memory_[{entry.id, obstacle.id, v, kNearest}].offset = hit->gap;
+  }
+  const auto hit =
+      queryObstacle(obstacle, entry.soft->position(SurfacePoint::vertex(point.vertex)), reach, size);
   if (!hit) return;
   Memory m;
-  m.point = SurfacePoint::vertex(point.vertex);
-  m.other = hit->other;
-  m.place = hit->place;
+  m.holds = true;
   m.force = point.force;
   m.offset = hit->gap;
   const double normal = hit->normal.dot(point.force);
@@ -169,7 +322,7 @@ void SoftContacts::hold(const SoftEntry& entry, const Obstacle& obstacle, const 
   m.held_normal = std::max(0.0, -normal);
   m.held_tangential = std::max(
       0.0, (point.force - normal * hit->normal).norm() - friction * (normal + m.held_normal));
-  memory_[{entry.id, obstacle.id, entry.soft->carrier(point.vertex), false}] = m;
+  memory_[{entry.id, obstacle.id, point.vertex, kNearest}] = m;
 }
 
 }  // namespace calipso::fem

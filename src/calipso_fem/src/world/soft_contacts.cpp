@@ -2,215 +2,217 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <set>
 
-#include "obstacle_query.hpp"
+#include "contact_compliance.hpp"
+#include "step_motion.hpp"
 
 namespace calipso::fem {
 namespace {
 
-constexpr double kSameDirection = 0.999;  // cosine below which a normal has turned
+// A longer step that does not converge is given up: the report then has no bodies, nothing has
+// changed, and the caller takes two of half the length.
+constexpr double kShortestStep = 1.0 / 500.0;  // s
+constexpr int kPasses = 3;         // corrections of one direction
+constexpr double kSlow = 0.5;      // share of a violation that a good correction does not leave
+// Added to the diagonal: kept columns do not quite make a positive matrix where contacts repeat each
+// other. The corrections are exact, so that this costs iterations, not accuracy.
+constexpr double kDamping = 0.03;
+constexpr double kRenewal = 1.5;   // caution from which new columns pay
+constexpr double kMostCaution = 2.0;
 
-// One of the bodies a contact acts on: sign +1 for the deformable object, -1 for what it meets.
-struct Side {
-  SoftObject* soft = nullptr;
-  std::optional<RigidWorld::Id> rigid;
-  SurfacePoint point;
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();
-  double sign = 1.0;
-};
+ContactRow rowOf(const Contact& c, const StepMotion& motion) {
+  const double h = motion.h();
+  const Eigen::Matrix3d frame = contactFrame(c.normal);
+  ContactRow row;
+  row.free_velocity = frame * motion.slip(c) / h;
+  row.free_velocity[0] = motion.clearance(c) / h;
+  row.start_impulse = row.impulse = h * (frame * c.force);
+  row.friction = c.friction;
+  row.held_normal = h * c.held_normal;
+  row.held_tangential = h * c.held_tangential;
+  return row;
+}
 
-Eigen::Matrix3d coupling(const Side& at, const Side& from, const RigidWorld& rigid, double h) {
-  if (at.soft && at.soft == from.soft)
-    return at.sign * from.sign * at.soft->compliance(at.point, from.point, h);
-  if (at.rigid && at.rigid == from.rigid)
-    return at.sign * from.sign * rigid.compliance(*at.rigid, at.place, from.place);
-  return Eigen::Matrix3d::Zero();
+// How far a contact is from its law, m.
+double violation(const ContactRow& row, double h) {
+  const double normal = row.impulse[0] > -row.held_normal
+                            ? std::abs(row.free_velocity[0])
+                            : std::max(0.0, -row.free_velocity[0]);
+  const double limit = row.friction * (row.impulse[0] + row.held_normal) + row.held_tangential;
+  const bool sticks = row.impulse.tail<2>().norm() < (1.0 - 1e-6) * limit;
+  return h * std::max(normal, sticks ? row.free_velocity.tail<2>().norm() : 0.0);
+}
+
+// Whether a step may be kept, be it not solved to the last digit.
+bool acceptable(const std::map<Contact::Key, Contact>& contacts, const StepMotion& motion) {
+  constexpr double kResidual = 100.0;  // tolerances of Newton's iteration
+  constexpr double kOff = 0.04;        // minimal distances
+  for (const StepMotion::Body& b : motion.bodies())
+    if (b.touched && !(b.residual <= kResidual * b.soft->body().options().newton_tolerance)) return false;
+  for (const auto& [key, c] : contacts)
+    if (c.soft_a >= 0 && !(violation(rowOf(c, motion), motion.h()) <= kOff * c.reach)) return false;
+  return true;
+}
+
+// A point that came from afar is near from now on.
+Contact::Key atRest(Contact::Key key) {
+  std::get<3>(key) &= 1;
+  return key;
 }
 
 }  // namespace
 
-void SoftContacts::pushOn(const std::vector<SoftEntry>& softs,
-                          const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h) {
-  for (const auto& [key, m] : memory_) {
-    if (m.force.isZero(0.0)) continue;
-    for (const SoftEntry& entry : softs)
-      if (entry.id == std::get<0>(key)) entry.soft->addForce(m.point, m.force);
-    for (const Obstacle& obstacle : obstacles) {
-      if (obstacle.id != std::get<1>(key)) continue;
-      if (obstacle.soft) obstacle.soft->addForce(m.other, -m.force);
-      if (obstacle.rigid) rigid.applyImpulse(*obstacle.rigid, -h * m.force, m.place);
-    }
-  }
-}
+SoftContacts::SoftContacts(const ContactParams& params)
+    : params_(params), compliance_(std::make_unique<ContactCompliance>()) {}
+SoftContacts::~SoftContacts() = default;
 
-ContactRow SoftContacts::rowOf(const Touch& touch, const SoftEntry& entry, const Obstacle& obstacle,
-                               const RigidWorld& rigid, double h) const {
-  // Depth of an earlier step is undone at this speed at most, so that it gives no kick.
-  const double push_out = 10.0 * params_.proximity;
-  ContactRow row;
-  row.friction = frictionOf(entry, obstacle);
-  const Eigen::Matrix3d frame = contactFrame(touch.normal);
-  const Eigen::Vector3d own = entry.soft->velocity(touch.point);
-  const Eigen::Vector3d others = obstacleVelocity(obstacle, touch.other, touch.place, rigid, h);
-  row.free_velocity = frame * (own - others);
-  double gap = touch.gap;
-  const auto remembered = memory_.find(touch.key);
-  if (remembered != memory_.end()) {
-    const Memory& m = remembered->second;
-    gap -= m.offset;
-    row.start_impulse = row.impulse = h * (frame * m.force);
-    row.held_normal = h * m.held_normal;
-    row.held_tangential = h * m.held_tangential;
-  }
-  // Rigid bodies have not moved yet in this step; everything else has.
-  const double gap_before =
-      gap - h * touch.normal.dot(obstacle.rigid ? own : Eigen::Vector3d(own - others));
-  row.free_velocity[0] += std::max(gap_before / h, -push_out);
-  return row;
-}
-
-const Eigen::MatrixXd& SoftContacts::complianceOf(const Touches& touches,
-                                                  const std::vector<SoftEntry>& softs,
-                                                  const std::vector<Obstacle>& obstacles,
-                                                  const RigidWorld& rigid, double h) {
-  const bool same =
-      W_step_ == h && W_of_.size() == touches.size() &&
-      std::equal(touches.begin(), touches.end(), W_of_.begin(), [](const auto& t, const auto& w) {
-        return t.first == w.first && t.second.normal.dot(w.second) > kSameDirection;
-      });
-  if (same) return W_;
-  W_step_ = h;
-  W_of_.clear();
-  std::vector<std::array<Side, 2>> sides;
-  std::vector<Eigen::Matrix3d> frames;
-  for (const auto& [key, t] : touches) {
-    const Obstacle& obstacle = obstacles[t.obstacle];
-    sides.push_back({Side{softs[t.soft].soft, std::nullopt, t.point, t.place, 1.0},
-                     Side{obstacle.soft, obstacle.rigid, t.other, t.place, -1.0}});
-    frames.push_back(contactFrame(t.normal));
-    W_of_.emplace_back(key, t.normal);
-  }
-  const int n = static_cast<int>(sides.size());
-  W_.setZero(3 * n, 3 * n);
-  for (int i = 0; i < n; ++i)
-    for (int j = i; j < n; ++j) {
-      Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
-      for (const Side& at : sides[i])
-        for (const Side& from : sides[j]) C += coupling(at, from, rigid, h);
-      const Eigen::Matrix3d block = frames[i] * C * frames[j].transpose();
-      W_.block<3, 3>(3 * i, 3 * j) = block;
-      W_.block<3, 3>(3 * j, 3 * i) = block.transpose();
-    }
-  return W_;
-}
-
-void SoftContacts::correct(const Touches& touches, const std::vector<Eigen::Vector3d>& impulses,
-                           const std::vector<SoftEntry>& softs,
-                           const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h) {
-  std::map<int, std::pair<std::vector<SurfacePoint>, std::vector<Eigen::Vector3d>>>
-      per_soft;  // by id
-  std::map<int, SoftObject*> bodies;
-  size_t i = 0;
-  for (const auto& [key, t] : touches) {
-    const Eigen::Vector3d& p = impulses[i++];
-    if (p.isZero(0.0)) continue;
-    const Obstacle& obstacle = obstacles[t.obstacle];
-    bodies[softs[t.soft].id] = softs[t.soft].soft;
-    per_soft[softs[t.soft].id].first.push_back(t.point);
-    per_soft[softs[t.soft].id].second.push_back(p);
-    if (obstacle.soft) {
-      bodies[obstacle.id] = obstacle.soft;
-      per_soft[obstacle.id].first.push_back(t.other);
-      per_soft[obstacle.id].second.push_back(-p);
-    }
-    if (obstacle.rigid) rigid.applyImpulse(*obstacle.rigid, -p, t.place);
-  }
-  for (const auto& [id, work] : per_soft) bodies[id]->applyImpulses(work.first, work.second, h);
-}
-
-// Contacts that pushed in the last step and are gone: their impulse has to be taken back.
-SoftContacts::Touches SoftContacts::releaseLost(const Touches& touches,
-                                                const std::vector<SoftEntry>& softs,
-                                                const std::vector<Obstacle>& obstacles) const {
-  Touches lost;
-  for (const auto& [key, m] : memory_) {
-    if (touches.count(key)) continue;
-    Touch t;
-    t.key = key;
-    t.point = m.point;
-    t.other = m.other;
-    t.place = m.place;
-    const auto soft = std::find_if(softs.begin(), softs.end(),
-                                   [&](const SoftEntry& e) { return e.id == std::get<0>(key); });
-    const auto obstacle = std::find_if(obstacles.begin(), obstacles.end(),
-                                       [&](const Obstacle& o) { return o.id == std::get<1>(key); });
-    if (soft == softs.end() || obstacle == obstacles.end())
-      continue;  // asleep, or not in this step
-    t.soft = static_cast<int>(soft - softs.begin());
-    t.obstacle = static_cast<int>(obstacle - obstacles.begin());
-    lost.emplace(key, t);
-  }
-  return lost;
-}
-
-ContactReport SoftContacts::solve(const std::vector<SoftEntry>& softs,
-                                  const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
-                                  double h) {
-  ContactReport report;
-  Touches touches = collect(softs, obstacles, params_.proximity);
-  const Touches lost = releaseLost(touches, softs, obstacles);
-  std::vector<Eigen::Vector3d> back;
-  for (const auto& [key, t] : lost) back.push_back(-h * memory_.at(key).force);
-  correct(lost, back, softs, obstacles, rigid, h);
-  for (const auto& entry : lost) memory_.erase(entry.first);
-
-  while (!touches.empty() && report.passes < params_.passes) {
+// Drives all contacts to their laws at the bodies' targets. @return whether they are there
+bool SoftContacts::correct(const std::vector<Candidate>& watched,
+                           const std::vector<Obstacle>& obstacles,
+                           const std::vector<SoftEntry>& softs, const RigidWorld& rigid,
+                           StepMotion& motion, Contacts& contacts, Correction& correction,
+                           ContactReport& report) {
+  const double h = motion.h();
+  double last_worst = 0.0;  // before the last solve, of the same contacts
+  for (int pass = 0;; ++pass) {
+    const int added = grow(watched, obstacles, softs, motion, contacts);
     std::vector<ContactRow> rows;
-    report.deepest = 0.0;
-    for (const auto& [key, t] : touches) {
-      rows.push_back(rowOf(t, softs[t.soft], obstacles[t.obstacle], rigid, h));
-      report.deepest = std::max(report.deepest, -h * rows.back().free_velocity[0]);
+    double worst = 0.0;
+    for (const auto& [key, c] : contacts) {
+      rows.push_back(rowOf(c, motion));
+      worst = std::max(worst, violation(rows.back(), h));
     }
-    if (report.passes > 0 && report.deepest <= params_.allowed_depth) break;
-    const Eigen::MatrixXd& W = complianceOf(touches, softs, obstacles, rigid, h);
+    // What does not converge has another compliance by now.
+    const bool slow = added == 0 && last_worst > 0.0 && worst > kSlow * last_worst &&
+                      worst > params_.allowed_depth;
+    if (slow && correction.caution >= kRenewal && !std::exchange(correction.renewed, true)) {
+      for (const StepMotion::Body& b : motion.bodies())
+        if (b.touched) b.soft->forgetCompliance();
+      compliance_->forget();
+    } else if (slow) {
+      correction.caution = std::min(kMostCaution, 1.25 * correction.caution);
+    }
+    last_worst = worst;
+    const bool done = added == 0 && worst <= params_.allowed_depth;
+    if (done || rows.empty() || pass == kPasses) return done || rows.empty();
+    Eigen::MatrixXd W = correction.caution * compliance_->of(contacts, softs, rigid, h);
+    W.diagonal() *= 1.0 + kDamping;
     report.iterations += solveContacts(W, rows, params_.iterations, params_.tolerance).iterations;
-    std::vector<Eigen::Vector3d> change;
     size_t i = 0;
-    for (const auto& [key, t] : touches) {
-      const Eigen::Matrix3d frame = contactFrame(t.normal);
-      const ContactRow& row = rows[i++];
-      change.push_back(frame.transpose() * (row.impulse - row.start_impulse));
-      Memory& m = memory_[key];
-      if (t.gap - m.offset > 0.2 * params_.proximity)  // apart: what held it holds no more
-        m.held_normal = m.held_tangential = 0.0;
-      m.point = t.point;
-      m.other = t.other;
-      m.place = t.place;
-      m.force = frame.transpose() * row.impulse / h;
-    }
-    correct(touches, change, softs, obstacles, rigid, h);
-    ++report.passes;
-    touches = collect(softs, obstacles, params_.proximity);
+    for (auto& [key, c] : contacts)
+      c.force = contactFrame(c.normal).transpose() * rows[i++].impulse / h;
+    motion.setForces(contacts, true);
   }
-  report.contacts = static_cast<int>(touches.size());
-  publish(touches, softs, obstacles);
+}
+
+ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
+                                 const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
+                                 double h) {
+  ContactReport report;
+  const std::vector<Candidate> watched = candidates(softs, obstacles, rigid, h);
+  StepMotion motion(softs, obstacles, rigid, h);
+  // What pushed in the last step pushes from the start, and is a contact as long as it is near.
+  Contacts contacts;
+  for (const Candidate& c : watched) {
+    const auto known = memory_.find(c.contact.key);
+    if (c.near && known != memory_.end() && !known->second.force.isZero(0.0))
+      contacts.emplace(c.contact.key, completed(c.contact));
+  }
+  addRigidTouches(watched, rigid, contacts);
+  motion.setForces(contacts, false);
+  Correction correction;
+  bool open = true;  // some contact is off its law
+  while (true) {
+    bool moving = false;
+    for (StepMotion::Body& b : motion.bodies()) {
+      const FemOptions& options = b.soft->body().options();
+      const int most = options.linearised ? 1 : options.newton_iterations;
+      const bool first = report.newton_iterations == 0;
+      const bool unbalanced = report.newton_iterations < most && !b.stuck &&
+                              b.residual > options.newton_tolerance;
+      const bool unsettled =
+          report.newton_iterations < params_.newton_iterations && open && b.touched;
+      if (!first && !unbalanced && !unsettled) continue;
+      moving = true;
+      motion.aim(b);
+    }
+    if (!moving) break;
+    ++report.newton_iterations;
+    open = !correct(watched, obstacles, softs, rigid, motion, contacts, correction, report);
+    motion.advance();
+  }
+  for (const auto& [key, c] : contacts) {
+    report.deepest = std::max(report.deepest, c.offset - motion.gap(c));
+    report.contacts += c.soft_a >= 0 && !c.force.isZero(0.0);
+  }
+  report.converged = !open;
+  if (h > kShortestStep && !acceptable(contacts, motion)) return report;
+  remember(contacts, motion);
+  publish(contacts, motion, softs, obstacles);
+  report.bodies = motion.finish(contacts);
   return report;
 }
 
-void SoftContacts::publish(const Touches& touches, const std::vector<SoftEntry>& softs,
+// What rigid bodies near a deformable one rest on holds against its push. Bullet solves these contacts
+// itself afterwards; here they only keep the deformable side from pushing the rigid one through.
+void SoftContacts::addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
+                                   Contacts& contacts) const {
+  constexpr int kNoSoft = std::numeric_limits<int>::max();
+  std::set<RigidWorld::Id> ids;
+  for (const Candidate& c : watched)
+    if (c.near && c.contact.rigid_b) ids.insert(*c.contact.rigid_b);
+  if (ids.empty()) return;
+  int index = 0;
+  for (const RigidTouch& t : rigid.touchesAround(ids)) {
+    Contact c;
+    c.key = {kNoSoft, 0, index++, 0};
+    c.rigid_a = t.a;
+    c.rigid_b = t.b;
+    c.place = t.place;
+    c.normal = t.normal;
+    c.start_gap = t.gap;
+    c.friction = t.friction;
+    contacts.emplace(c.key, c);
+  }
+}
+
+void SoftContacts::remember(const Contacts& contacts, const StepMotion& motion) {
+  for (auto it = memory_.begin(); it != memory_.end();) {
+    it->second.force.setZero();
+    const bool empty = !it->second.holds && it->second.offset >= 0.0;
+    it = empty ? memory_.erase(it) : std::next(it);
+  }
+  for (const auto& [key, c] : contacts) {
+    if (c.soft_a < 0) continue;
+    Memory& m = memory_[atRest(key)];
+    if (m.force.squaredNorm() > c.force.squaredNorm()) continue;  // found twice: once is enough
+    m.force = c.force;
+    const double gap = motion.gap(c);
+    if (m.holds && gap - m.offset > 0.2 * c.reach) {  // apart: what held it holds no more
+      m.holds = false;
+      m.held_normal = m.held_tangential = 0.0;
+    }
+    if (!m.holds) m.offset = std::min(0.0, std::max(m.offset, gap));
+    if (m.force.isZero(0.0) && !m.holds && m.offset >= 0.0) memory_.erase(atRest(key));
+  }
+}
+
+void SoftContacts::publish(const Contacts& contacts, const StepMotion& motion,
+                           const std::vector<SoftEntry>& softs,
                            const std::vector<Obstacle>& obstacles) {
   contacts_.clear();
-  for (const auto& [key, t] : touches) {
-    const auto remembered = memory_.find(key);
-    if (remembered == memory_.end() || remembered->second.force.isZero(0.0)) continue;
-    ContactPoint c;
-    c.a = softs[t.soft].name;
-    c.b = obstacles[t.obstacle].name;
-    c.position = t.place;
-    c.normal = t.normal;
-    c.force = remembered->second.force;
-    c.depth = remembered->second.offset - t.gap;
-    contacts_.push_back(c);
+  for (const auto& [key, c] : contacts) {
+    if (c.soft_a < 0 || c.force.isZero(0.0)) continue;
+    ContactPoint p;
+    p.a = softs[c.soft_a].name;
+    p.b = obstacles[c.obstacle].name;
+    p.position = c.place;
+    p.normal = c.normal;
+    p.force = c.force;
+    p.depth = c.offset - motion.gap(c);
+    contacts_.push_back(p);
   }
 }
 

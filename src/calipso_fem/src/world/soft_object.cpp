@@ -22,12 +22,6 @@ int largestWeight(const Embedding& embedding, int vertex) {
   return node;
 }
 
-int mainVertex(const SurfacePoint& point) {
-  int k = 0;
-  point.weights.maxCoeff(&k);
-  return point.vertices[k];
-}
-
 }  // namespace
 
 SoftObject::SoftObject(const TriangleMesh& surface, const Material& material,
@@ -39,16 +33,14 @@ SoftObject::SoftObject(const TriangleMesh& surface, const Material& material,
   for (int i = 0; i < surface.vertexCount(); ++i)
     carrier_.push_back(largestWeight(body_.embedding(), i));
   changed();
-  previous_ = vertices_;
 }
 
 void SoftObject::changed() {
   vertices_ = asRows(body_.surfaceVertices());
+  fastest_ = asRows(body_.surfaceVelocities()).rowwise().norm().maxCoeff();
   rotation_ = motion().linear();
   tree_stale_ = true;
 }
-
-void SoftObject::standStill() { previous_ = vertices_; }
 
 const SurfaceTree& SoftObject::tree() {
   if (!tree_) {
@@ -138,82 +130,100 @@ void SoftObject::addForce(const SurfacePoint& point, const Eigen::Vector3d& forc
   forced_ = true;
 }
 
-StepReport SoftObject::step(double h) {
-  const Momentum before = body_.momentum();
-  const bool flying = !forced_ && !hasFixedNodes();
+void SoftObject::beginStep(double h) {
+  before_ = body_.momentum();
   body_.setSurfaceForces(forces_);
-  const StepReport report = body_.step(h);
-  if (flying) keepFlightExact(before, h);
+  body_.beginStep(h);
+}
+
+// NOTE: backward Euler leads the parabola by h^2 g / 2 and loses spin, Newton's tolerance leaves a
+// remainder; both errors are rigid motions, so mending them does not touch the deformation.
+StepReport SoftObject::endStep(const Vec& contact_forces, double h,
+                               const std::optional<Momentum>& gained) {
+  const StepReport report = body_.endStep(contact_forces);
+  if (gained && !forced_ && !hasFixedNodes()) {
+    const double mass = body_.totalMass();
+    Momentum target;
+    target.linear = before_.linear + h * mass * gravity_ + gained->linear;
+    target.angular = before_.angular + gained->angular;
+    // Impulses act over the step like the scheme says; weight alone gives the exact parabola.
+    target.center = before_.center + h / mass * target.linear - 0.5 * h * h * gravity_;
+    setMomentum(target);
+  }
   forces_.setZero();
   forced_ = false;
-  previous_ = vertices_;
   changed();
   return report;
 }
 
-// NOTE: backward Euler leads the parabola by h^2 g / 2 and loses spin; both errors are rigid
-// motions, so mending them does not touch the deformation.
-void SoftObject::keepFlightExact(const Momentum& before, double h) {
-  const Eigen::Vector3d lead = 0.5 * h * h * gravity_;
-  body_.setState(body_.positions() - lead.replicate(body_.nodeCount(), 1), Vec(body_.velocities()));
-  restoreAngularMomentum(before.angular);
-}
-
-void SoftObject::restoreAngularMomentum(const Eigen::Vector3d& target) {
+void SoftObject::setMomentum(const Momentum& target) {
   const Momentum now = body_.momentum();
   const Eigen::VectorXd& mass = body_.model().lumpedMass();
-  const Vec& x = body_.positions();
+  Vec x = body_.positions(), v = body_.velocities();
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
   for (int i = 0; i < body_.nodeCount(); ++i) {
     const Eigen::Vector3d r = x.segment<3>(3 * i) - now.center;
     inertia += mass[i] * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
   }
-  const Eigen::Vector3d spin = inertia.ldlt().solve(target - now.angular);
-  Vec v = body_.velocities();
-  for (int i = 0; i < body_.nodeCount(); ++i)
-    v.segment<3>(3 * i) += spin.cross(x.segment<3>(3 * i) - now.center);
-  body_.setState(Vec(x), v);
+  const Eigen::Vector3d spin = inertia.ldlt().solve(target.angular - now.angular);
+  const Eigen::Vector3d linear = (target.linear - now.linear) / mass.sum();
+  for (int i = 0; i < body_.nodeCount(); ++i) {
+    v.segment<3>(3 * i) += linear + spin.cross(x.segment<3>(3 * i) - now.center);
+    x.segment<3>(3 * i) += target.center - now.center;
+  }
+  body_.setState(x, v);
 }
 
-void SoftObject::applyImpulses(const std::vector<SurfacePoint>& points,
-                               const std::vector<Eigen::Vector3d>& impulses, double h) {
-  const bool free = !hasFixedNodes();
-  Momentum target = body_.momentum();
-  if (free)
-    for (size_t i = 0; i < points.size(); ++i)
-      target.angular += (position(points[i]) - target.center).cross(impulses[i]);
-  const Vec before = body_.velocities();
-  body_.applyImpulses(points, impulses, h);
-  const Vec after = body_.velocities();
-  body_.setState(body_.positions() + h * (after - before), after);
-  if (free) restoreAngularMomentum(target.angular);
-  changed();
+void SoftObject::forgetCompliance() {
+  columns_.clear();
+  blocks_.clear();
+  frozen_rotation_.reset();
 }
 
 const SoftObject::Column& SoftObject::columnOf(int vertex, double h) {
-  if (h != column_step_) {
-    columns_.clear();
-    column_step_ = h;
-  }
-  const auto found = columns_.find(carrier_[vertex]);
+  const auto found = columns_.find(vertex);
   if (found != columns_.end()) return found->second;
-  Column column;
-  column.rotation = rotation_;
-  for (int k = 0; k < 3; ++k) {
-    const Vec w = body_.complianceColumn(SurfacePoint::vertex(vertex), Eigen::Vector3d::Unit(k), h);
-    column.c[k] = Eigen::Map<const NodeMatrix>(w.data(), w.size() / 3, 3);
+  if (!frozen_rotation_) {
+    body_.freezeCompliance(h);
+    frozen_rotation_ = rotation_;
   }
-  return columns_.emplace(carrier_[vertex], std::move(column)).first->second;
+  Column column;
+  for (int k = 0; k < 3; ++k) {
+    const Vec w = body_.frozenColumn(SurfacePoint::vertex(vertex), frozen_rotation_->col(k));
+    column[k] = Eigen::Map<const NodeMatrix>(w.data(), w.size() / 3, 3) * *frozen_rotation_;
+  }
+  return columns_.emplace(vertex, std::move(column)).first->second;
+}
+
+// J_at A^-1 J_from^T in the body's axes; symmetric in the pair, so that one column serves both.
+const Eigen::Matrix3d& SoftObject::block(int at, int from, double h) {
+  const auto found = blocks_.find({at, from});
+  if (found != blocks_.end()) return found->second;
+  const bool turned = columns_.count(from) == 0 && columns_.count(at) > 0;
+  const Column& column = columnOf(turned ? at : from, h);
+  Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
+  for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(body_.embedding().weights,
+                                                                      turned ? from : at);
+       it; ++it)
+    for (int k = 0; k < 3; ++k) C.col(k) += it.value() * column[k].row(it.col()).transpose();
+  if (turned) C.transposeInPlace();
+  if (at == from) C = 0.5 * (C + C.transpose()).eval();
+  if (at != from) blocks_[{from, at}] = C.transpose();
+  return blocks_[{at, from}] = C;
 }
 
 Eigen::Matrix3d SoftObject::compliance(const SurfacePoint& at, const SurfacePoint& from, double h) {
-  const Column& column = columnOf(mainVertex(from), h);
-  const Eigen::SparseVector<double> weights = body_.embedding().pointWeights(at);
+  if (h != column_step_) {
+    forgetCompliance();
+    column_step_ = h;
+  }
   Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
-  for (Eigen::SparseVector<double>::InnerIterator it(weights); it; ++it)
-    for (int k = 0; k < 3; ++k) C.col(k) += it.value() * column.c[k].row(it.index()).transpose();
-  const Eigen::Matrix3d turn = rotation_ * column.rotation.transpose();
-  return turn * C * turn.transpose();
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) {
+      const double weight = at.weights[a] * from.weights[b];
+      if (weight != 0.0) C += weight * block(at.vertices[a], from.vertices[b], h);
+    }
+  return rotation_ * C * rotation_.transpose();
 }
 
 Eigen::Vector3d SoftObject::gather(const Vec& nodal, const SurfacePoint& point) const {

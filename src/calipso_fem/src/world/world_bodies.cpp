@@ -40,7 +40,7 @@ double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obst
     if (!box.isEmpty() && !box.intersects(bounds)) continue;
     for (int v = 0; v < surface.vertexCount(); ++v) {
       const Eigen::Vector3d x = surface.vertex(v);
-      const auto hit = queryObstacle(obstacle, x, x, reach, boundingDiagonal(surface));
+      const auto hit = queryObstacle(obstacle, x, reach, boundingDiagonal(surface));
       if (hit && hit->normal.dot(up) > 0.3) smallest = std::min(smallest, hit->gap);
     }
   }
@@ -210,8 +210,7 @@ void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
 void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface) {
   const double size = boundingDiagonal(surface);
   const auto around = obstacles(now, now, &actor);
-  const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get(),
-                        false};
+  const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
   std::vector<HoldPoint> hold;
   std::vector<int> by;
   if (actor.holder == Holder::kSupport) {

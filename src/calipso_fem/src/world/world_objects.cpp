@@ -147,7 +147,6 @@ void World::Impl::copySoft(Actor& copy, const Actor& source, const Eigen::Isomet
   body.applyRigidTransform(motion);
   copy.soft->setGravity(copy.acceleration());
   copy.soft->changed();
-  copy.soft->standStill();
 }
 
 void World::setPairContact(const std::string& a, const std::string& b, bool on) {

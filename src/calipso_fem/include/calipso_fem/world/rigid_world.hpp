@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +26,14 @@ struct RigidBodySpec {
   Eigen::Vector3d linear = Eigen::Vector3d::Zero();   // of the centre of mass, m/s
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();  // rad/s
   bool asleep = false;
+};
+
+// A point where a dynamic rigid body rests on, or is about to touch, something rigid.
+struct RigidTouch {
+  std::optional<int> a, b;  // dynamic bodies; empty: it stands
+  Eigen::Vector3d place = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();  // b to a
+  double gap = 0.0;  // m
+  double friction = 0.0;
 };
 
 // Rigid bodies and supports in Bullet (double precision). World frame, SI units. Gravity is given
@@ -52,6 +62,9 @@ class RigidWorld {
   void setAcceleration(Id id, const Eigen::Vector3d& acceleration);  // m/s^2, until changed
   void setForce(Id id, const Eigen::Vector3d& force, const Eigen::Vector3d& torque);  // same
   void applyImpulse(Id id, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
+  // The same, for an impulse that acts over the whole next step: weight and impulse change the
+  // velocity at its beginning (backward Euler), so that what is balanced does not move.
+  void push(Id id, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
   void wake(Id id);
 
   Eigen::Isometry3d pose(Id id) const;  // world_from_object
@@ -60,6 +73,9 @@ class RigidWorld {
   Eigen::Vector3d angularVelocity(Id id) const;
   // Change of the velocity at `at` per impulse at `from`: (1/m) I - [r_at] I^-1 [r_from].
   Eigen::Matrix3d compliance(Id id, const Eigen::Vector3d& at, const Eigen::Vector3d& from) const;
+  // Change of linear (m/s) and angular velocity (rad/s) by an impulse at a point.
+  std::pair<Eigen::Vector3d, Eigen::Vector3d> velocityChange(Id id, const Eigen::Vector3d& impulse,
+                                                             const Eigen::Vector3d& point) const;
   Eigen::Matrix3d inertia(Id id) const;  // about the centre, world axes, kg m^2
   double kineticEnergy(Id id) const;     // J
   bool sleeping(Id id) const;
@@ -68,6 +84,8 @@ class RigidWorld {
   // Advances by h in sub-steps that get finer the fewer bodies are awake. @return their number
   int step(double h);
   std::vector<ContactPoint> contacts() const;  // of the last sub-step
+  // Where the given bodies, and those they reach through others, touch something rigid.
+  std::vector<RigidTouch> touchesAround(std::set<Id> ids) const;
   // Pairs that met during the last step; times since its beginning.
   const std::vector<TouchEvent>& touches() const;
 

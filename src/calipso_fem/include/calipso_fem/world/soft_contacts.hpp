@@ -2,9 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "calipso_fem/world/contact_solver.hpp"
@@ -21,11 +23,10 @@ struct Obstacle {
   std::string name;
   SurfaceSettings surface;
   const SupportPlane* plane = nullptr;
-  const SurfaceTree* tree = nullptr;                                // in its own frame
+  const SurfaceTree* tree = nullptr;                                // in its own frame, at the start
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();           // world_from_tree, end of step
   Eigen::Isometry3d previous_pose = Eigen::Isometry3d::Identity();  // start of step
-  std::optional<RigidWorld::Id>
-      rigid;  // dynamic rigid body: pose is still that at the step's start
+  std::optional<RigidWorld::Id> rigid;  // dynamic rigid body: both poses are those at the start
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  // of the rigid body, m/s^2
   SoftObject* soft = nullptr;
 };
@@ -35,34 +36,61 @@ struct SoftEntry {
   std::string name;
   SurfaceSettings surface;
   SoftObject* soft = nullptr;
-  bool asleep = false;
 };
 
 struct ContactParams {
   double proximity = 5e-3;  // m, surfaces closer than this are watched
-  int iterations = 60;
-  double tolerance = 1e-6;
-  int passes = 3;               // exact corrections per step
-  double allowed_depth = 1e-5;  // m, ends the passes
+  int iterations = 60;      // Gauss-Seidel sweeps per solve
+  double tolerance = 1e-4;  // relative change of the impulses that ends the sweeps
+  int newton_iterations = 12;
+  double allowed_depth = 1e-5;  // m, remaining violation that ends a step's iteration
 };
 
 struct ContactReport {
   int contacts = 0;
-  int iterations = 0;  // Gauss-Seidel sweeps, all passes together
-  int passes = 0;
-  double deepest = 0.0;  // m, after the last pass
+  int iterations = 0;         // Gauss-Seidel sweeps of the step
+  int newton_iterations = 0;  // of the body that needed most
+  double deepest = 0.0;       // m, where the step ended
+  bool converged = true;
+  std::vector<StepReport> bodies;  // as the softs
 };
 
-// Contacts of deformable objects with everything else. Surface vertices are the primitives, tested
-// against the other's surface in both directions, by distance and, against tunnelling, along their
-// way of this step. The impulse of the last step enters the next free motion as a force, so that at
-// rest nothing is left to correct.
+// A contact of a step: the gap between a surface point of a deformable object (a) and a point of
+// what it meets (b), linear in their motion, gap = start_gap + normal . (d_a - d_b).
+struct Contact {
+  // (deformable, obstacle, vertex, how it was found): one vertex may touch two sides of a corner.
+  using Key = std::tuple<int, int, int, int>;
+  Key key;
+  int soft_a = -1, soft_b = -1;                  // indices of the step's list
+  int obstacle = -1;                             // index
+  std::optional<RigidWorld::Id> rigid_a, rigid_b;
+  SurfacePoint point, other;                     // on a; on b if it is deformable
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of b at the start, world; force acts here
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // from b to a
+  Eigen::Vector3d motion = Eigen::Vector3d::Zero();   // d_b where b is moved by nobody's force, m
+  double start_gap = 0.0;                             // m
+  double reach = 0.0;                                 // m, minimal distance of the pair
+  double friction = 0.0;
+  double offset = 0.0;                                // gap at which the surfaces touch, m
+  double held_normal = 0.0, held_tangential = 0.0;    // N
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();    // on a, N
+};
+
+class ContactCompliance;
+class StepMotion;
+
+// Steps deformable objects together with their contacts: backward Euler with the conditions
+//   0 <= gap(x_end)  _|_  f_n >= 0,   |f_t| <= mu f_n opposite to the slip over the step.
+// Newton on the incremental potentials of all bodies; each direction is corrected by block
+// Gauss-Seidel with the compliance H A^-1 H^T of the bodies (Saupin et al. 2008), so that the forces
+// are those of the same implicit step as the elasticity. Gaps are measured at the start of the step
+// and taken along; a point that is further away becomes a contact when its way crosses a surface.
 class SoftContacts {
  public:
-  explicit SoftContacts(const ContactParams& params) : params_(params) {}
+  explicit SoftContacts(const ContactParams& params);
+  ~SoftContacts();
 
-  // Points where `entry` touches or is nearer to an obstacle than `reach`, deepest per carrier
-  // node.
+  // Surface vertices of `entry` that touch or are nearer to an obstacle than `reach`.
   // @return hold points with, for each, the obstacle's index
   std::vector<std::pair<HoldPoint, int>> touching(const SoftEntry& entry,
                                                   const std::vector<Obstacle>& obstacles,
@@ -71,67 +99,73 @@ class SoftContacts {
   // are kept, so that the observed state is an equilibrium.
   void hold(const SoftEntry& entry, const Obstacle& obstacle, const HoldPoint& point, double reach);
 
-  // Gives the impulses of the last step to the bodies as forces; call before their free motion.
-  void pushOn(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
-              RigidWorld& rigid, double h);
-  // Corrects the free motion of the step of length h (s).
-  ContactReport solve(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
-                      RigidWorld& rigid, double h);
+  // One step of length h (s) of all `softs`; rigid bodies get their share as impulses.
+  ContactReport step(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
+                     RigidWorld& rigid, double h);
 
-  void forget(int id);                        // object or obstacle
+  void forget(int id);  // object or obstacle
   void setRule(int a, int b, const PairRule& rule);
   const std::vector<ContactPoint>& contacts() const { return contacts_; }
 
  private:
-  // Which contact: (deformable, obstacle, carrier node or the obstacle's vertex, its side).
-  using Key = std::tuple<int, int, int, bool>;
+  using Key = Contact::Key;
   struct Memory {
-    SurfacePoint point, other;  // on the deformable; on the obstacle if it is deformable
-    Eigen::Vector3d place = Eigen::Vector3d::Zero();  // on the obstacle, world
     Eigen::Vector3d force = Eigen::Vector3d::Zero();  // on the deformable, N
-    double offset = 0.0;  // gap at which the surfaces count as touching, m
+    double offset = 0.0;                              // m
     double held_normal = 0.0, held_tangential = 0.0;  // N
+    bool holds = false;  // from hold(): the offset stays until the surfaces part
   };
-  struct Touch {
-    Key key;
-    int soft = 0, obstacle = 0;  // indices of the step's lists
-    SurfacePoint point, other;
-    Eigen::Vector3d place = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();
-    double gap = 0.0;  // m
+  using Contacts = std::map<Key, Contact>;
+  // A vertex that may meet an obstacle in this step, and the obstacle's nearest point.
+  struct Candidate {
+    Contact contact;
+    bool reversed = false;  // the obstacle's vertex against the deformable's surface
+    int vertex = 0;
+    bool near = false;  // within the minimal distance at the start
   };
-  using Touches = std::map<Key, Touch>;
+
+  // What a step has learned about the compliances it iterates with.
+  struct Correction {
+    double caution = 1.0;   // factor on them; larger: shorter corrections
+    bool renewed = false;   // they are those of the bodies as they are now
+  };
+
+  using Neighbourhood = std::tuple<int, int, int, int>;
+  Neighbourhood neighbourhoodOf(const Contact& c, const std::vector<SoftEntry>& softs) const;
 
   bool meets(int a, int b) const;
   double frictionOf(const SoftEntry& entry, const Obstacle& obstacle) const;
-  Touches collect(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
-                  double reach) const;
-  void addVertices(const SoftEntry& entry, int soft, const Obstacle& obstacle, int index,
-                   double reach, Touches& touches) const;
-  void addObstacleVertices(const SoftEntry& entry, int soft, const Obstacle& obstacle, int index,
-                           double reach, Touches& touches) const;
-  void offer(const Touch& touch, double reach, Touches& touches) const;
-  ContactRow rowOf(const Touch& touch, const SoftEntry& entry, const Obstacle& obstacle,
-                   const RigidWorld& rigid, double h) const;
-  const Eigen::MatrixXd& complianceOf(const Touches& touches, const std::vector<SoftEntry>& softs,
-                                      const std::vector<Obstacle>& obstacles,
-                                      const RigidWorld& rigid, double h);
-  void correct(const Touches& touches, const std::vector<Eigen::Vector3d>& impulses,
-               const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
-               RigidWorld& rigid, double h);
-  Touches releaseLost(const Touches& touches, const std::vector<SoftEntry>& softs,
-                      const std::vector<Obstacle>& obstacles) const;
-  void publish(const Touches& touches, const std::vector<SoftEntry>& softs,
-               const std::vector<Obstacle>& obstacles);
+  double reachOf(const SoftEntry& entry, const Obstacle& obstacle) const;
+
+  // Detection (soft_contact_detection.cpp)
+  std::vector<Candidate> candidates(const std::vector<SoftEntry>& softs,
+                                    const std::vector<Obstacle>& obstacles, const RigidWorld& rigid,
+                                    double h) const;
+  void watchPair(const std::vector<SoftEntry>& softs, int soft,
+                 const std::vector<Obstacle>& obstacles, int obstacle, const RigidWorld& rigid,
+                 double h, std::vector<Candidate>& list) const;
+  // Candidates that the trial motion violates become contacts. @return how many were added
+  int grow(const std::vector<Candidate>& list, const std::vector<Obstacle>& obstacles,
+           const std::vector<SoftEntry>& softs, const StepMotion& motion, Contacts& contacts) const;
+  std::optional<Contact> crossing(const Candidate& c, const std::vector<Obstacle>& obstacles,
+                                  const std::vector<SoftEntry>& softs,
+                                  const StepMotion& motion) const;
+  Contact completed(Contact contact) const;  // with what is remembered of its key
+
+  bool correct(const std::vector<Candidate>& watched, const std::vector<Obstacle>& obstacles,
+               const std::vector<SoftEntry>& softs, const RigidWorld& rigid, StepMotion& motion,
+               Contacts& contacts, Correction& correction, ContactReport& report);
+  void addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
+                       Contacts& contacts) const;
+  void remember(const Contacts& contacts, const StepMotion& motion);
+  void publish(const Contacts& contacts, const StepMotion& motion,
+               const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles);
 
   ContactParams params_;
   std::map<Key, Memory> memory_;
   std::map<std::pair<int, int>, PairRule> rules_;
   std::vector<ContactPoint> contacts_;
-  // Compliance of the last contact set; while the set stays, it stays good enough to iterate with,
-  // since the corrections themselves are exact.
-  Eigen::MatrixXd W_;
-  std::vector<std::pair<Key, Eigen::Vector3d>> W_of_;  // contacts and their normals
-  double W_step_ = 0.0;
+  std::unique_ptr<ContactCompliance> compliance_;
 };
 
 }  // namespace calipso::fem

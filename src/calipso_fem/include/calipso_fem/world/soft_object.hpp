@@ -1,9 +1,12 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calipso_fem/deformable_body.hpp"
@@ -41,22 +44,21 @@ class SoftObject {
   SettleReport settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold,
                       double tolerance);
 
-  // One step under gravity and all forces given since the last one. Without constraints and forces
-  // the flight is exact: the centre of mass follows its parabola, angular momentum is kept.
-  StepReport step(double h);
+  // One step under gravity, all forces given since the last one, and contacts: whoever solves for
+  // these drives the body's trial in between. `gained`: impulse and, about the centre of mass
+  // before the step, its moment, of a body that nothing else holds; then momentum is exact, and
+  // flight follows its parabola.
+  void beginStep(double h);
+  StepReport endStep(const Vec& contact_forces, double h, const std::optional<Momentum>& gained);
+  const Momentum& momentumBefore() const { return before_; }
 
   void setGravity(const Eigen::Vector3d& gravity);
   void addForce(const SurfacePoint& point, const Eigen::Vector3d& force);  // N, for the next step
 
-  // Impulses (N s) that act over the step just made: velocities change by A^-1 J^T p, positions by
-  // h times that.
-  void applyImpulses(const std::vector<SurfacePoint>& points,
-                     const std::vector<Eigen::Vector3d>& impulses, double h);
-
   // Approximate change of the velocity at `at` per impulse at `from`, from cached columns of A^-1
   // turned with the body (Saupin et al. 2008). m/s per N s.
   Eigen::Matrix3d compliance(const SurfacePoint& at, const SurfacePoint& from, double h);
-  void forgetCompliance() { columns_.clear(); }
+  void forgetCompliance();
 
   // The node with the largest weight at a surface vertex: contacts are thinned to one per such
   // node.
@@ -64,24 +66,21 @@ class SoftObject {
   Eigen::Vector3d position(const SurfacePoint& point) const;
   Eigen::Vector3d velocity(const SurfacePoint& point) const;
   const decltype(TriangleMesh::vertices)& vertices() const { return vertices_; }
-  const decltype(TriangleMesh::vertices)& previousVertices() const { return previous_; }
+  double fastest() const { return fastest_; }  // surface vertex, m/s
+  const Eigen::Vector3d& gravity() const { return gravity_; }
   const SurfaceTree& tree();
 
   // Rigid motion that best maps the observed shape to the present one (Kabsch, by nodal mass).
   Eigen::Isometry3d motion() const;
   bool hasFixedNodes() const;
-  void changed();     // the state was set from outside
-  void standStill();  // it did not get here by moving: nothing lies on its way
+  void changed();  // the state was set from outside
 
  private:
-  struct Column {
-    NodeMatrix c[3];           // #N x 3 each: answer to a unit impulse along x, y, z
-    Eigen::Matrix3d rotation;  // of the body when it was computed
-  };
+  using Column = std::array<NodeMatrix, 3>;  // #N x 3 each: answer to unit impulses along x, y, z
 
   const Column& columnOf(int vertex, double h);
-  void keepFlightExact(const Momentum& before, double h);
-  void restoreAngularMomentum(const Eigen::Vector3d& target);
+  const Eigen::Matrix3d& block(int at, int from, double h);
+  void setMomentum(const Momentum& target);
   Eigen::Vector3d gather(const Vec& nodal, const SurfacePoint& point) const;
 
   DeformableBody body_;
@@ -90,11 +89,16 @@ class SoftObject {
   bool forced_ = false;
   Vec observed_;  // 3 #N, nodes at construction
   std::vector<int> carrier_;
-  decltype(TriangleMesh::vertices) vertices_, previous_;
+  decltype(TriangleMesh::vertices) vertices_;
+  double fastest_ = 0.0;
+  Momentum before_;
   std::unique_ptr<SurfaceTree> tree_;
   bool tree_stale_ = true;
   TriangleMesh surface_;
-  std::map<int, Column> columns_;  // by carrier node
+  // Columns of A^-1 and its blocks between surface vertices, in the body's own axes.
+  std::map<int, Column> columns_;
+  std::map<std::pair<int, int>, Eigen::Matrix3d> blocks_;
+  std::optional<Eigen::Matrix3d> frozen_rotation_;  // of the body whose system the columns answer
   double column_step_ = 0.0;
   Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();  // of motion(), renewed by changed()
 };

@@ -1,0 +1,183 @@
+#include "step_motion.hpp"
+
+#include <algorithm>
+
+namespace calipso::fem {
+namespace {
+
+using Vertices = decltype(TriangleMesh::vertices);
+
+void addForce(Vec& surface, const SurfacePoint& point, const Eigen::Vector3d& force) {
+  for (int k = 0; k < 3; ++k)
+    if (point.weights[k] != 0.0)
+      surface.segment<3>(3 * point.vertices[k]) += point.weights[k] * force;
+}
+
+constexpr double kOverlapShare = 0.2;
+constexpr double kPushOutRate = 10.0;  // 1/s
+
+}  // namespace
+
+double allowance(const Contact& c, double h) {
+  const double depth = c.offset - c.start_gap;
+  if (depth <= 0.0) return 0.0;
+  return depth - std::min(kOverlapShare * depth, h * kPushOutRate * c.reach);
+}
+
+StepMotion::StepMotion(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
+                       RigidWorld& rigid, double h)
+    : rigid_(rigid), h_(h) {
+  for (const SoftEntry& entry : softs) {
+    Body b;
+    b.soft = entry.soft;
+    b.soft->beginStep(h);
+    b.start = b.soft->vertices();
+    b.target = b.soft->body().trialPositions();
+    b.forces.setZero(b.target.size());
+    b.moved.setZero(b.start.rows(), 3);
+    bodies_.push_back(std::move(b));
+  }
+  for (const Obstacle& o : obstacles)
+    if (o.rigid) rigids_[*o.rigid].acceleration = o.acceleration;
+}
+
+void StepMotion::follow(Body& body) {
+  const Vec s = body.soft->body().embedding().apply(body.target);
+  body.moved = Eigen::Map<const Vertices>(s.data(), s.size() / 3, 3) - body.start;
+}
+
+void StepMotion::aim(Body& body) {
+  DeformableBody& fem = body.soft->body();
+  body.target = fem.trialPositions() + fem.trialDirection(body.forces);
+  follow(body);
+}
+
+void StepMotion::setForces(const std::map<Contact::Key, Contact>& contacts, bool targets_follow) {
+  std::vector<Vec> surface;
+  for (const Body& b : bodies_) surface.push_back(Vec::Zero(3 * b.start.rows()));
+  for (auto& [id, r] : rigids_) r.linear.setZero(), r.angular.setZero();
+  for (const auto& [key, c] : contacts) {
+    if (c.soft_a >= 0) bodies_[c.soft_a].touched = true;
+    if (c.soft_b >= 0) bodies_[c.soft_b].touched = true;
+    if (c.force.isZero(0.0)) continue;
+    if (c.soft_a >= 0) addForce(surface[c.soft_a], c.point, c.force);
+    if (c.soft_b >= 0) addForce(surface[c.soft_b], c.other, -c.force);
+    for (const auto& [id, sign] : {std::make_pair(c.rigid_a, h_), std::make_pair(c.rigid_b, -h_)}) {
+      if (!id) continue;
+      Rigid& r = rigids_[*id];
+      const auto [linear, angular] = rigid_.velocityChange(*id, sign * c.force, c.place);
+      r.linear += linear;
+      r.angular += angular;
+    }
+  }
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    Body& b = bodies_[i];
+    if (!b.touched) continue;
+    const Vec forces = b.soft->body().embedding().applyTransposed(surface[i]);
+    if (targets_follow && forces != b.forces) {
+      b.target += b.soft->body().trialResponse(forces - b.forces);
+      follow(b);
+    }
+    b.forces = forces;
+  }
+}
+
+void StepMotion::advance() {
+  double share = 1.0;
+  for (const Body& b : bodies_)
+    if (b.touched)
+      share = std::min(share, b.soft->body().trialStepLength(b.target, b.forces));
+  for (Body& b : bodies_) {
+    DeformableBody& fem = b.soft->body();
+    const double t = b.touched ? share : fem.trialStepLength(b.target, b.forces);
+    if (t != 1.0) b.target = (1.0 - t) * fem.trialPositions() + t * b.target;
+    fem.moveTrial(b.target);
+    if (t != 1.0) follow(b);
+    const double before = b.residual;
+    b.residual = fem.trialResidual(b.forces);
+    // Where hardly any force acts, rounding is all that is left of the residual.
+    b.stuck = t == 0.0 || (!b.touched && before > 0.0 && b.residual > 0.5 * before);
+  }
+}
+
+Eigen::Vector3d StepMotion::way(int soft, const SurfacePoint& point) const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3; ++k)
+    if (point.weights[k] != 0.0)
+      sum += point.weights[k] * bodies_[soft].moved.row(point.vertices[k]).transpose();
+  return sum;
+}
+
+Eigen::Vector3d StepMotion::rigidWay(RigidWorld::Id id, const Eigen::Vector3d& place) const {
+  const auto found = rigids_.find(id);
+  const Rigid r = found == rigids_.end() ? Rigid{} : found->second;
+  const Eigen::Vector3d spin = rigid_.angularVelocity(id) + r.angular;
+  return h_ * (rigid_.linearVelocity(id) + h_ * r.acceleration + r.linear +
+               spin.cross(place - rigid_.center(id)));
+}
+
+Eigen::Vector3d StepMotion::slip(const Contact& c) const {
+  Eigen::Vector3d s = -c.motion;
+  if (c.soft_a >= 0) s += way(c.soft_a, c.point);
+  if (c.rigid_a) s += rigidWay(*c.rigid_a, c.place);
+  if (c.soft_b >= 0) s -= way(c.soft_b, c.other);
+  if (c.rigid_b) s -= rigidWay(*c.rigid_b, c.place);
+  return s;
+}
+
+// Bodies that a force from outside reaches through their contacts: their momentum is not theirs.
+std::vector<bool> StepMotion::grounded(const std::map<Contact::Key, Contact>& contacts) const {
+  std::vector<bool> bodies(bodies_.size(), false);
+  std::map<RigidWorld::Id, bool> rigids;
+  for (size_t i = 0; i < bodies_.size(); ++i) bodies[i] = bodies_[i].soft->hasFixedNodes();
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const auto& [key, c] : contacts) {
+      if (c.force.isZero(0.0)) continue;
+      const bool free_a = c.soft_a >= 0 || c.rigid_a, free_b = c.soft_b >= 0 || c.rigid_b;
+      bool held = !free_a || !free_b;
+      if (c.soft_a >= 0) held = held || bodies[c.soft_a];
+      if (c.soft_b >= 0) held = held || bodies[c.soft_b];
+      if (c.rigid_a) held = held || rigids[*c.rigid_a];
+      if (c.rigid_b) held = held || rigids[*c.rigid_b];
+      if (!held) continue;
+      for (const int s : {c.soft_a, c.soft_b})
+        if (s >= 0 && !bodies[s]) changed = bodies[s] = true;
+      for (const auto& r : {c.rigid_a, c.rigid_b})
+        if (r && !rigids[*r]) changed = rigids[*r] = true;
+    }
+  }
+  return bodies;
+}
+
+std::vector<StepReport> StepMotion::finish(const std::map<Contact::Key, Contact>& contacts) {
+  // Each body's impulse and its moment about where the centre of mass was; both sides of a contact
+  // use the same point, so that together they change nothing.
+  std::vector<Momentum> gained(bodies_.size());
+  const auto give = [&](int soft, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at) {
+    if (soft < 0) return;
+    gained[soft].linear += impulse;
+    gained[soft].angular += (at - bodies_[soft].soft->momentumBefore().center).cross(impulse);
+  };
+  const std::vector<bool> held = grounded(contacts);
+  for (const auto& [key, c] : contacts) {
+    if (c.force.isZero(0.0)) continue;
+    const Eigen::Vector3d impulse = h_ * c.force;
+    give(c.soft_a, impulse, c.place);
+    give(c.soft_b, -impulse, c.place);
+    // What rigid bodies give each other is Bullet's own affair.
+    if (c.soft_a >= 0 && c.rigid_b) rigid_.push(*c.rigid_b, -impulse, c.place);
+  }
+  std::vector<StepReport> reports;
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    Body& b = bodies_[i];
+    reports.push_back(b.soft->endStep(
+        b.forces, h_, held[i] ? std::nullopt : std::optional<Momentum>(gained[i])));
+    reports.back().residual = b.residual;
+    reports.back().converged =
+        reports.back().converged && b.residual <= b.soft->body().options().newton_tolerance;
+  }
+  return reports;
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <map>
+#include <vector>
+
+#include "calipso_fem/world/soft_contacts.hpp"
+
+namespace calipso::fem {
+
+// Violation at the start that may be left at the end, m: overlap from before the step is undone by a
+// share of it per step, and no faster than so many minimal distances per second, without a kick.
+double allowance(const Contact& c, double h);
+
+// Where everything goes in the step that is being solved: the target of each deformable body, and
+// what contact forces do to rigid ones. Private to the contacts.
+class StepMotion {
+ public:
+  struct Body {
+    SoftObject* soft = nullptr;
+    Vec target;                             // 3n, m
+    Vec forces;                             // of contacts, 3n, N
+    decltype(TriangleMesh::vertices) start, moved;  // surface at the start; its way to the target
+    bool touched = false;                   // has contacts
+    double residual = 0.0;
+    bool stuck = false;                     // the potential falls no more
+  };
+
+  StepMotion(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
+             RigidWorld& rigid, double h);
+
+  std::vector<Body>& bodies() { return bodies_; }
+  const std::vector<Body>& bodies() const { return bodies_; }
+  double h() const { return h_; }
+
+  // Newton's direction of a body under the present forces becomes its target.
+  void aim(Body& body);
+  // The forces of the contacts act from now on; targets follow by A^-1.
+  void setForces(const std::map<Contact::Key, Contact>& contacts, bool targets_follow);
+  // Moves towards the targets as far as the potentials fall, all touching bodies alike.
+  void advance();
+
+  Eigen::Vector3d way(int soft, const SurfacePoint& point) const;  // m, to the target
+  Eigen::Vector3d rigidWay(RigidWorld::Id id, const Eigen::Vector3d& place) const;  // m
+  Eigen::Vector3d slip(const Contact& c) const;                    // d_a - d_b, m
+  double gap(const Contact& c) const { return c.start_gap + c.normal.dot(slip(c)); }
+  // What must not become negative.
+  double clearance(const Contact& c) const { return gap(c) - c.offset + allowance(c, h_); }
+
+  // The targets become the states; rigid bodies get their impulses.
+  std::vector<StepReport> finish(const std::map<Contact::Key, Contact>& contacts);
+
+ private:
+  struct Rigid {
+    Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
+    Eigen::Vector3d linear = Eigen::Vector3d::Zero(), angular = Eigen::Vector3d::Zero();  // gained
+  };
+  std::vector<bool> grounded(const std::map<Contact::Key, Contact>& contacts) const;
+  void follow(Body& body);
+
+  RigidWorld& rigid_;
+  double h_;
+  std::vector<Body> bodies_;
+  std::map<RigidWorld::Id, Rigid> rigids_;
+};
+
+}  // namespace calipso::fem

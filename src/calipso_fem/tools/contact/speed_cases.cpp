@@ -1,0 +1,172 @@
+#include <algorithm>
+
+#include "contact_cases.hpp"
+
+// Time per frame (process CPU time, both threads together).
+namespace calipso::fem {
+namespace {
+
+using test::boxSurface;
+using test::editOf;
+using test::movedMesh;
+using test::sceneWith;
+using test::SoftScene;
+
+// Two soft cubes of 512 nodes fall on a plane and on each other.
+std::vector<Result> twoCubesAt(double rate) {
+  SoftScene scene;
+  scene.surface.friction = 0.1;
+  scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
+  for (const Eigen::Vector3d& at : {Eigen::Vector3d(0, 0, 0.5), Eigen::Vector3d(0.03, 0.02, 1.2)})
+    scene.addSoft(movedMesh(boxSurface({0.5, 0.5, 0.5}, 7), at), {1e5, 0.3, 1000.0, 0.01}, 0.5 / 7);
+  const double start = scene.energy();
+  double lowest = 1.0, growth = 0.0, slowest = 0.0;
+  const int frames = 90, parts = static_cast<int>(std::lround(rate * kFrame));
+  for (int k = 0; k < frames; ++k) {
+    const double before = scene.cpuMs();
+    for (int p = 0; p < parts; ++p) scene.step(kFrame / parts);
+    slowest = std::max(slowest, scene.cpuMs() - before);
+    for (const int i : {0, 1}) lowest = std::min(lowest, scene.soft(i).vertices().col(2).minCoeff());
+    growth = std::max(growth, scene.energy() / start - 1.0);
+  }
+  const std::string what = "two soft cubes, " + std::to_string(static_cast<int>(rate)) + " steps a second, ";
+  return {{"lowest vertex of " + what + "m", lowest, 0.0, scene.deepest() / 5e-3, growth,
+           scene.cpuMs() / frames},
+          {"slowest frame of " + what + "ms", slowest, 10.0, scene.deepest() / 5e-3, growth,
+           slowest}};
+}
+
+std::vector<Result> twoCubes() {
+  std::vector<Result> results;
+  for (const double rate : {30.0, 60.0})
+    for (const Result& r : twoCubesAt(rate)) results.push_back(r);
+  return results;
+}
+
+// Two bodies of 1,000 nodes each, one lying on the other, at h = 1/60.
+std::vector<Result> twoBodies() {
+  SoftScene scene;
+  scene.surface.friction = 0.5;
+  scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
+  for (const double z : {0.101, 0.303})
+    scene.addSoft(movedMesh(boxSurface({0.2, 0.2, 0.2}, 9), {0.1 * z, 0, z}),
+                  {1e5, 0.3, 1000.0, 0.01}, 0.2 / 9);
+  for (int k = 0; k < 20; ++k) scene.step(1.0 / 60.0);
+  const double before = scene.cpuMs();
+  const int frames = 60;
+  for (int k = 0; k < frames; ++k) scene.step(1.0 / 60.0);
+  const double ms = (scene.cpuMs() - before) / frames;
+  return {{"two deformable bodies of 1000 nodes in contact, ms per frame", ms, 10.0,
+           scene.deepest() / 5e-3, 0.0, ms}};
+}
+
+WorldScene pyramidOf(const TriangleMesh& mesh, double pitch) {
+  const Eigen::Vector3d size =
+      (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).transpose();
+  WorldScene scene = sceneWith(mesh, {0, 0, 0.5 * size.z()});
+  const WorldObject first = scene.objects.front();
+  scene.objects.clear();
+  int id = 0;
+  for (int row = 0; row < 10; ++row)
+    for (int i = 0; i < 10 - row; ++i) {
+      WorldObject o = first;
+      o.name = "cup" + std::to_string(id++);
+      o.world_from_object.translation() = Eigen::Vector3d(
+          pitch * size.x() * (i + 0.5 * row), 0, 0.6 * size.z() + 1.1 * size.z() * row);
+      scene.objects.push_back(o);
+    }
+  return scene;
+}
+
+// A cup without its handle: an open beaker with a wall.
+TriangleMesh beaker() {
+  const double outer = 0.04, inner = 0.034, height = 0.09, floor = 0.006;
+  const int n = 24;
+  const std::vector<std::pair<double, double>> profile = {  // r, z from the bottom's centre round
+      {0.0, 0.0}, {outer, 0.0}, {outer, height}, {inner, height}, {inner, floor}, {0.0, floor}};
+  TriangleMesh mesh;
+  const int rings = static_cast<int>(profile.size()) - 2;
+  mesh.vertices.resize(2 + rings * n, 3);
+  std::vector<Eigen::Vector3i> triangles;
+  mesh.vertices.row(0) << 0, 0, -0.5 * height;
+  mesh.vertices.row(1) << 0, 0, floor - 0.5 * height;
+  const auto at = [&](int ring, int j) { return 2 + ring * n + j % n; };
+  for (int r = 0; r < rings; ++r)
+    for (int j = 0; j < n; ++j)
+      mesh.vertices.row(at(r, j)) << profile[r + 1].first * std::cos(2 * M_PI * j / n),
+          profile[r + 1].first * std::sin(2 * M_PI * j / n), profile[r + 1].second - 0.5 * height;
+  for (int j = 0; j < n; ++j) {
+    triangles.push_back({0, at(0, j + 1), at(0, j)});
+    triangles.push_back({1, at(rings - 1, j), at(rings - 1, j + 1)});
+    for (int r = 0; r + 1 < rings; ++r) {
+      triangles.push_back({at(r, j), at(r, j + 1), at(r + 1, j + 1)});
+      triangles.push_back({at(r, j), at(r + 1, j + 1), at(r + 1, j)});
+    }
+  }
+  mesh.triangles.resize(static_cast<Eigen::Index>(triangles.size()), 3);
+  for (size_t f = 0; f < triangles.size(); ++f)
+    mesh.triangles.row(static_cast<Eigen::Index>(f)) = triangles[f].transpose();
+  return mesh;
+}
+
+std::vector<Result> pyramid() {
+  WorldScene scene = pyramidOf(beaker(), 1.2);
+  World world(scene, {});
+  for (const WorldObject& o : scene.objects) {
+    Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);
+    edit.object = o.name;
+    edit.factor = 2.0;  // afloat before: they fall with 1 g
+    world.submit(edit);
+  }
+  world.advanceTo(0.0);
+  Run falling, settling;
+  falling.play(world, 1.0);
+  settling.play(world, 5.0);
+  double lowest = 1.0;
+  for (const ObjectSnapshot& o : world.state().objects)
+    lowest = std::min(lowest, o.vertices.col(2).minCoeff());
+  return {{"55 cups falling as a pyramid, ms per frame", falling.msPerFrame(), 15.0, 0, 0,
+           falling.msPerFrame()},
+          {"slowest frame of it, ms", falling.slowest_ms, 15.0, 0, 0, falling.slowest_ms},
+          {"lowest point of the cups after 6 s, m", lowest, 0.0, 0, 0, settling.msPerFrame()}};
+}
+
+// 100 rigid bodies that have come to rest.
+std::vector<Result> asleep() {
+  WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 1), {0, 0, 0.0501});
+  const WorldObject first = scene.objects.front();
+  scene.objects.clear();
+  for (int i = 0; i < 100; ++i) {
+    WorldObject o = first;
+    o.name = "box" + std::to_string(i);
+    o.world_from_object.translation() = Eigen::Vector3d(0.15 * (i % 10), 0.15 * (i / 10), 0.06);
+    scene.objects.push_back(o);
+  }
+  World world(scene, {});
+  for (const WorldObject& o : scene.objects) {
+    Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);
+    edit.object = o.name;
+    edit.factor = 2.0;  // afloat before: they fall with 1 g
+    world.submit(edit);
+  }
+  world.advanceTo(0.0);
+  Run settling, resting;
+  settling.play(world, 5.0);
+  resting.play(world, 2.0);
+  int awake = 0;
+  for (const ObjectSnapshot& o : world.state().objects) awake += !o.sleeping;
+  return {{"100 sleeping bodies, ms per frame", resting.msPerFrame(), 0.3, 0, 0,
+           resting.msPerFrame()},
+          {"of them awake", static_cast<double>(awake), 0.0, 0, 0, resting.msPerFrame()}};
+}
+
+}  // namespace
+
+Cases speedCases() {
+  return {{"two_cubes", twoCubes},
+          {"two_bodies", twoBodies},
+          {"pyramid", pyramid},
+          {"asleep", asleep}};
+}
+
+}  // namespace calipso::fem
