@@ -22,11 +22,17 @@ int largestWeight(const Embedding& embedding, int vertex) {
   return node;
 }
 
+// Contact asks for many answers of one system, exact ones, and for its factor besides.
+FemOptions withFactor(FemOptions options) {
+  if (options.solver == SolverKind::kAutomatic) options.solver = SolverKind::kCholesky;
+  return options;
+}
+
 }  // namespace
 
 SoftObject::SoftObject(const TriangleMesh& surface, const Material& material,
                        const FemOptions& options)
-    : body_(surface, material, options),
+    : body_(surface, material, withFactor(options)),
       forces_(Vec::Zero(3 * surface.vertexCount())),
       observed_(body_.positions()),
       surface_(surface) {
@@ -98,7 +104,8 @@ SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<Hold
   while (report.iterations < kMaxIterations) {
     const StepReport equilibrium = body_.solveStatic();
     if (!equilibrium.converged) {
-      report.message = "no equilibrium found for the observed shape: " + equilibrium.message;
+      report.message = "no equilibrium found for the observed shape";
+      if (!equilibrium.message.empty()) report.message += ": " + equilibrium.message;
       break;
     }
     for (size_t i = 0; i < hold.size(); ++i)
