@@ -4,9 +4,11 @@
 import os
 import subprocess
 import tempfile
+import time
 import unittest
 
 import numpy
+import rosgraph
 import rostest
 
 import clips
@@ -93,6 +95,14 @@ class Graph(unittest.TestCase):
         self.assertGreater(changed[90:190, 190:445].sum(), 300, "the banana's pixels")
         self.assertEqual(changed[:, :150].sum(), 0, "pixels far from it")
 
+    def wait_for_publisher(self, topic, timeout_sec=60):
+        """Until the master knows one; the run is over within seconds."""
+        master = rosgraph.Master("/graph_test")
+        end = time.monotonic() + timeout_sec
+        while topic not in [name for name, _ in master.getSystemState()[0]]:
+            self.assertLess(time.monotonic(), end, "nobody publishes " + topic)
+            time.sleep(0.05)
+
     def test_slow_motion_has_more_frames_and_a_copy_is_an_object(self):
         edits = [{"t": 0, "object": "banana1", "kind": "duplicate", "value": "twin", "translation": [0, -0.1, 0.1]},
                  {"t": 0, "kind": "time_scale", "factor": 0.5}]
@@ -111,7 +121,8 @@ class Graph(unittest.TestCase):
     def test_edits_over_the_topic_while_playing(self):
         # Latched on the test's own master: there before the simulator is, effective with the next frame.
         sender = subprocess.Popen(["rostopic", "pub", "--latch", "/calipso/edits", "calipso_msgs/Edit",
-                                   "{object: banana1, kind: remove}"])
+                                   "{object: banana1, kind: remove}"], env=launching.with_messages())
+        self.wait_for_publisher("/calipso/edits")
         launch = launching.Launch("calipso_launch", "edit.launch", os.environ["ROS_MASTER_URI"],
                                   **self.arguments("topic.bag", None))
         try:
