@@ -4,42 +4,21 @@
 #include <cmath>
 #include <limits>
 
+#include "outline_search.hpp"
+
 namespace calipso::align {
 namespace {
-
-// A point of the image plane with its normal, scaled for the search: (u, v, s nu, s nv).
-struct Feature {
-  float u, v, nu, nv;
-};
-
-Feature featureOf(const Eigen::Vector2d& pixel, const Eigen::Vector2d& normal, double scale) {
-  return {static_cast<float>(pixel.x()), static_cast<float>(pixel.y()),
-          static_cast<float>(scale * normal.x()), static_cast<float>(scale * normal.y())};
-}
 
 // For every query, the nearest candidate that is close enough and looks the same way; -1 for none.
 std::vector<int> nearest(const std::vector<Feature>& queries, const std::vector<Feature>& candidates,
                          const ContourTermOptions& options) {
-  const float reject = static_cast<float>(options.reject_px * options.reject_px);
   const float scale = static_cast<float>(options.normal_scale_px);
   // n.n >= cosine  <=>  |s n - s n'|^2 <= 2 s^2 (1 - cosine)
-  const float reject_normal = 2.0f * scale * scale * (1.0f - static_cast<float>(options.reject_cosine));
-  std::vector<int> match(queries.size(), -1);
+  const float reject_turn = 2.0f * scale * scale * (1.0f - static_cast<float>(options.reject_cosine));
+  const OutlineSearch search(candidates, static_cast<float>(options.reject_px), reject_turn);
+  std::vector<int> match(queries.size());
 #pragma omp parallel for schedule(static)
-  for (size_t q = 0; q < queries.size(); ++q) {
-    const Feature a = queries[q];
-    float best = std::numeric_limits<float>::max();
-    for (size_t k = 0; k < candidates.size(); ++k) {
-      const Feature b = candidates[k];
-      const float distance = (a.u - b.u) * (a.u - b.u) + (a.v - b.v) * (a.v - b.v);
-      const float turn = (a.nu - b.nu) * (a.nu - b.nu) + (a.nv - b.nv) * (a.nv - b.nv);
-      const bool usable = distance < reject && turn < reject_normal;
-      if (usable && distance + turn < best) {
-        best = distance + turn;
-        match[q] = static_cast<int>(k);
-      }
-    }
-  }
+  for (size_t q = 0; q < queries.size(); ++q) match[q] = search.nearest(queries[q]);
   return match;
 }
 
@@ -74,6 +53,24 @@ void appendPair(const TargetPoint& data, const OutlinePoint& model, const Camera
   }
 }
 
+// Points of the outline at equal distances along it, so that neither short edges nor lattices of many
+// bars count for more than their length.
+std::vector<int> spreadEvenly(const std::vector<OutlinePoint>& outline) {
+  constexpr double kFinestPx = 2.0, kMostPoints = 800.0;
+  double length = 0.0;
+  for (const OutlinePoint& p : outline) length += p.length_px;
+  const double spacing = std::max(kFinestPx, length / kMostPoints);
+  std::vector<int> chosen;
+  double along = 0.5 * spacing;
+  for (size_t k = 0; k < outline.size(); ++k) {
+    along += outline[k].length_px;
+    if (along < spacing) continue;
+    along = std::fmod(along, spacing);
+    chosen.push_back(static_cast<int>(k));
+  }
+  return chosen;
+}
+
 }  // namespace
 
 std::vector<int> matchTargetToOutline(const ContourTarget& target,
@@ -100,13 +97,17 @@ Rows contourRows(const ContourTarget& target, const std::vector<OutlinePoint>& o
 
   // A part of the outline whose nearest target is unknown may be hidden anywhere beyond it, but the
   // object reaches at least as far as it is seen.
-  const std::vector<int> data_of = nearest(model, data, options);
-  const double weight = share * target.length_px / std::max<size_t>(1, outline.size());
-  for (size_t k = 0; k < model.size(); ++k) {
-    if (data_of[k] < 0) continue;
-    const TargetPoint& p = target.points[data_of[k]];
-    if (!p.known && p.normal.dot(outline[k].pixel - p.pixel) > 0.0) continue;
-    appendPair(p, outline[k], camera, weight, options, rows);
+  const std::vector<int> chosen = spreadEvenly(outline);
+  std::vector<Feature> model_chosen;
+  for (const int k : chosen) model_chosen.push_back(model[k]);
+  const std::vector<int> data_of = nearest(model_chosen, data, options);
+  const double weight = share * target.length_px / std::max<size_t>(1, chosen.size());
+  for (size_t i = 0; i < chosen.size(); ++i) {
+    if (data_of[i] < 0) continue;
+    const OutlinePoint& q = outline[chosen[i]];
+    const TargetPoint& p = target.points[data_of[i]];
+    if (!p.known && p.normal.dot(q.pixel - p.pixel) > 0.0) continue;
+    appendPair(p, q, camera, weight, options, rows);
   }
   return rows;
 }

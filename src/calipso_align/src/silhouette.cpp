@@ -8,7 +8,6 @@ namespace calipso::align {
 namespace {
 
 constexpr double kNear = 1e-6;           // m; nothing closer is drawn
-constexpr float kBoundaryBandPx = 2.0f;  // how far from the mask's boundary an outline edge may lie
 
 using Pixels = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
 
@@ -76,12 +75,13 @@ void fillTriangle(const Eigen::Vector2d (&p)[3], const double (&inverse_z)[3], c
   }
 }
 
-// Distance of every covered pixel to the nearest uncovered one. The picture's border is no boundary.
-cv::Mat1f distanceToBackground(const DepthRendering& rendering) {
-  const cv::Mat1b mask = rendering.depth > 0.0f;
-  cv::Mat1f distance;
-  cv::distanceTransform(mask, distance, cv::DIST_L2, cv::DIST_MASK_3);
-  return distance;
+// Whether the mask ends at the edge: the pixel beyond it is uncovered.
+bool bordersBackground(const DepthRendering& rendering, const Eigen::Vector2d& pixel,
+                       const Eigen::Vector2d& normal) {
+  constexpr double kBeyondPx = 1.0;   // the pixel there has its centre beyond the edge for certain
+  const Eigen::Vector2d beyond = pixel + kBeyondPx * normal;
+  return rendering.at(static_cast<int>(std::lround(beyond.x())),
+                      static_cast<int>(std::lround(beyond.y()))) <= 0.0f;
 }
 
 // Whether a face is seen from its front, for all faces.
@@ -171,7 +171,6 @@ std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& 
                                            double step_px) {
   std::vector<OutlinePoint> outline;
   if (rendering.roi.empty()) return outline;
-  const cv::Mat1f distance = distanceToBackground(rendering);
   const std::vector<char> front = frontFacing(x, topology.triangles());
 
   for (const MeshTopology::Edge& edge : topology.edges()) {
@@ -185,7 +184,7 @@ std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& 
     if (!(length > 1e-9) || length > 1e5) continue;
     const Eigen::Vector2d normal = outwardNormal(pa, pb, camera.project(c));
 
-    // Samples in the middle of equal parts of the edge, where the mask's boundary is near.
+    // Samples in the middle of equal parts of the edge.
     const int parts = std::max(1, static_cast<int>(std::lround(length / step_px)));
     for (int k = 0; k < parts; ++k) {
       const double t = (k + 0.5) / parts;
@@ -194,8 +193,8 @@ std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& 
       const cv::Point at(static_cast<int>(std::lround(pixel.x())),
                          static_cast<int>(std::lround(pixel.y())));
       if (!rendering.roi.contains(at)) continue;
-      if (distance(at - rendering.roi.tl()) > kBoundaryBandPx) continue;
-      outline.push_back({edge.v0, edge.v1, 1.0 - t, t, position, pixel, normal});
+      if (!bordersBackground(rendering, pixel, normal)) continue;
+      outline.push_back({edge.v0, edge.v1, 1.0 - t, t, position, pixel, normal, length / parts});
     }
   }
   return outline;

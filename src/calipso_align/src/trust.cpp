@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
@@ -166,23 +167,22 @@ std::optional<Eigen::Vector3d> spinAxis(const Points& X) {
   const double size = std::sqrt(d.rowwise().squaredNorm().mean());
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(d.transpose() * d);
   const int step = std::max<int>(1, static_cast<int>(d.rows()) / 300);
+  double spacing = 0.0;
+  for (int i = 0; i < d.rows(); i += step) {
+    Eigen::VectorXd distances = (d.rowwise() - d.row(i)).rowwise().squaredNorm();
+    distances[i] = std::numeric_limits<double>::max();
+    spacing = std::max(spacing, std::sqrt(distances.minCoeff()));
+  }
+  const double allowed = spacing + kSymmetric * size;
   for (int k = 0; k < 3; ++k) {
     const Eigen::Vector3d axis = axes.eigenvectors().col(k);
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, axis).toRotationMatrix();
-    // Vertices lie on circles about the axis: compare radius and height, not the vertices themselves.
     double worst = 0.0;
-    for (int i = 0; i < d.rows(); i += step) {
+    for (int i = 0; i < d.rows() && worst < allowed; i += step) {
       const Eigen::RowVector3d p = d.row(i) * turn.transpose();
       worst = std::max(worst, std::sqrt((d.rowwise() - p).rowwise().squaredNorm().minCoeff()));
-      if (worst > 0.25 * size) break;
     }
-    double spacing = 0.0;
-    for (int i = 0; i < d.rows(); i += step) {
-      Eigen::VectorXd distances = (d.rowwise() - d.row(i)).rowwise().squaredNorm();
-      distances[i] = 1e300;
-      spacing = std::max(spacing, std::sqrt(distances.minCoeff()));
-    }
-    if (worst < spacing + kSymmetric * size) return axis;
+    if (worst < allowed) return axis;
   }
   return std::nullopt;
 }

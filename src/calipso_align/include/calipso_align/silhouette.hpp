@@ -61,10 +61,11 @@ struct OutlinePoint {
   Eigen::Vector3d position;   // camera frame, m
   Eigen::Vector2d pixel;      // px
   Eigen::Vector2d normal;     // unit, from the object outwards
+  double length_px;           // how much of the outline it stands for
 };
 
 // The occluding contour that borders the rendered mask, holes included: samples every `step_px` of
-// the edges between a front and a back face (or at a rim) that lie within 2 px of the mask's boundary.
+// the edges between a front and a back face (or at a rim) beyond which the mask ends within a pixel.
 // Parts outside the picture are left out: they bear no boundary.
 std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& topology,
                                            const DepthRendering& rendering, const Camera& camera,
