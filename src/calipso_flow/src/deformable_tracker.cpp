@@ -11,7 +11,6 @@ namespace calipso::flow {
 namespace {
 
 constexpr int kPoints = 150;              // surface points followed
-constexpr int kRounds = 2;                // warp, match, fit
 constexpr double kRoughScale = 30.0;      // deviations; residuals of a rough match
 constexpr double kFineScale = 40.0;
 constexpr double kLeastInlierShare = 0.35;
@@ -33,13 +32,15 @@ PatchParams patchParams(const PatchParams& rigid) {
   return params;
 }
 
-std::optional<PatchMatch> matchFine(const LookMatch& look, const Eigen::Vector2d& at,
-                                    const TrackerParams& params) {
-  const auto there = look.fine(at, params.patch);
-  if (!there) return std::nullopt;
+std::optional<PatchMatch> matchPoint(const LookMatch& look, const Eigen::Vector2d& at,
+                                     const TrackerParams& params) {
+  const auto there = look.find(at, params.patch);
+  if (!there || there->correlation < params.least_correlation) return std::nullopt;
+  if (look.care() == Care::kRough) return there;
   const double certain =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(there->covariance).eigenvalues()[0];
   if (std::sqrt(std::max(0.0, certain)) > params.largest_deviation_px) return std::nullopt;
+  if (look.care() == Care::kForward) return there;
   const auto miss = look.missOnReturn(at, *there, params.patch);
   if (!miss) return std::nullopt;
   const double floor = params.forward_backward_px / kReturnDeviations;
@@ -57,6 +58,7 @@ DeformableTracker::DeformableTracker(const ObjectModel& model, const Frame& key_
                                      const cv::Mat& mask, const TrackerParams& params)
     : model_(model),
       params_(params),
+      edges_(edgesOf(model.mesh)),
       reference_(key_frame, model, model.world_from_object, mask, params.seed_count),
       fitter_(model, params.deformation),
       vertex_weights_(fitter_.field().weightsAt(model.mesh.vertices)),
@@ -89,12 +91,12 @@ Eigen::VectorXd DeformableTracker::predict(double time) const {
 
 std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
                                                    const Eigen::VectorXd& controls,
-                                                   bool rough) const {
+                                                   Care care) const {
   std::vector<SurfaceMatch> matches;
   const auto surface = surfaceAt(controls);
   const auto look = reference_.warp(frame.camera, model_.world_from_object, surface);
   if (look.coverage == 0.0) return matches;
-  const LookMatch pictures(look, frame.gray);
+  const LookMatch pictures(look, frame.gray, care);
   const auto points = DeformationFitter::displaced(points_, point_weights_, controls);
   const Eigen::Isometry3d camera_from_object =
       frame.camera.world_from_camera.inverse() * model_.world_from_object;
@@ -102,13 +104,12 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
     const Eigen::Vector3d p = camera_from_object * points.row(i).transpose();
     if (p.z() <= 0.0) continue;
     const Eigen::Vector2d at = frame.camera.project(p);
-    const auto there =
-        rough ? pictures.rough(at, params_.patch) : matchFine(pictures, at, params_);
-    if (!there || there->correlation < params_.least_correlation) continue;
+    const auto there = matchPoint(pictures, at, params_);
+    if (!there) continue;
     matches.push_back({points_.row(i).transpose(), there->position, there->covariance});
   }
-  if (rough) return matches;
-  const auto outline = matchOutline(model_.mesh, surface, look, frame, model_.world_from_object);
+  if (care == Care::kRough) return matches;
+  const auto outline = matchOutline(edges_, model_.mesh, surface, look, frame, model_.world_from_object);
   matches.insert(matches.end(), outline.begin(), outline.end());
   return matches;
 }
@@ -120,11 +121,11 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
   observation.time = frame.time;
   observation.controls = predicted;
   // Without a motion to go by, the shape may be some pixels away.
-  for (int round = before_last_ ? 1 : 0; round <= kRounds; ++round) {
-    const bool rough = round == 0;
-    const auto matches = match(frame, observation.controls, rough);
+  for (const Care care : {Care::kRough, Care::kForward, Care::kChecked}) {
+    if (care == Care::kRough && before_last_) continue;
+    const auto matches = match(frame, observation.controls, care);
     const DeformationFit fit = fitter_.fit(matches, frame.camera, observation.controls, predicted,
-                                           rough ? kRoughScale : kFineScale);
+                                           care == Care::kRough ? kRoughScale : kFineScale);
     observation.found = fit.converged && fit.inliers >= kLeastInlierShare * matches.size();
     if (!observation.found) break;
     observation.controls = fit.controls;

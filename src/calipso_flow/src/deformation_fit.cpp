@@ -68,13 +68,19 @@ Eigen::Matrix3d inPlane(const ObjectModel& model, const Eigen::Vector3d& normal)
   return plane + (1.0 / (kAcross * kAcross) - 1.0) * across * across.transpose();
 }
 
+using Blocks = Eigen::Matrix<double, 9, Eigen::Dynamic>;
+
+int blockIndex(int row, int column) { return row * (row + 1) / 2 + column; }
+
 // Adds A (3 x 3) to the blocks of all pairs of functions with weight a and b.
 template <class RowIterator>
-void addBlocks(RowIterator first, const Eigen::Matrix3d& A, Eigen::MatrixXd& matrix) {
+void addBlocks(RowIterator first, const Eigen::Matrix3d& A, Blocks& blocks) {
+  const Eigen::Map<const Eigen::Matrix<double, 9, 1>> flat(A.data());
   for (RowIterator i = first; i; ++i) {
+    const Eigen::Matrix<double, 9, 1> weighted = i.value() * flat;
     for (RowIterator j = first; j; ++j) {
       if (j.index() > i.index()) break;
-      matrix.block<3, 3>(3 * i.index(), 3 * j.index()) += i.value() * j.value() * A;
+      blocks.col(blockIndex(i.index(), j.index())) += j.value() * weighted;
     }
   }
 }
@@ -87,6 +93,18 @@ Eigen::Vector3d displacementOf(DeformationField::Weights::InnerIterator weight,
 }
 
 }  // namespace
+
+Eigen::MatrixXd DeformationFitter::Normal::matrix() const {
+  const int size = static_cast<int>(right.size()) / 3;
+  Eigen::MatrixXd full = Eigen::MatrixXd::Zero(right.size(), right.size());
+  for (int i = 0; i < size; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      full.block<3, 3>(3 * i, 3 * j) =
+          Eigen::Map<const Eigen::Matrix3d>(blocks.col(blockIndex(i, j)).data());
+    }
+  }
+  return full;
+}
 
 DeformationFitter::DeformationFitter(const ObjectModel& model,
                                      const DeformationParams& params)
@@ -118,6 +136,13 @@ DeformationFitter::DeformationFitter(const ObjectModel& model,
     const double in_plane = params.in_plane * diagonal_;
     const Eigen::Matrix3d tangential = inPlane(model, *normal) / (in_plane * in_plane);
     for (int i = 0; i < field_.size(); ++i) quadratic_.block<3, 3>(3 * i, 3 * i) += tangential;
+  }
+  quadratic_blocks_.resize(9, blockIndex(field_.size(), 0));
+  for (int i = 0; i < field_.size(); ++i) {
+    for (int j = 0; j <= i; ++j) {
+      Eigen::Map<Eigen::Matrix3d>(quadratic_blocks_.col(blockIndex(i, j)).data()) =
+          quadratic_.block<3, 3>(3 * i, 3 * j);
+    }
   }
 }
 
@@ -169,12 +194,8 @@ std::vector<DeformationFitter::Residual> DeformationFitter::residuals(
   return result;
 }
 
-DeformationFitter::Normal DeformationFitter::priorNormal(const Eigen::VectorXd& controls,
-                                                         const Eigen::VectorXd& predicted) const {
-  Normal normal{quadratic_, -quadratic_ * controls};
-  // The innovation's prior is about the prediction, not about zero.
-  const double innovation = params_.innovation * diagonal_;
-  normal.right += predicted / (innovation * innovation);
+DeformationFitter::Normal DeformationFitter::springNormal(const Eigen::VectorXd& controls) const {
+  Normal normal{Blocks::Zero(9, quadratic_blocks_.cols()), Eigen::VectorXd::Zero(controls.size())};
   for (const Spring& spring : springs_) {
     Eigen::Vector3d d = spring.rest;
     for (Eigen::SparseVector<double>::InnerIterator w(spring.weights); w; ++w) {
@@ -185,12 +206,20 @@ DeformationFitter::Normal DeformationFitter::priorNormal(const Eigen::VectorXd& 
     const Eigen::Vector3d g = d / std::max(length, 1e-9 * rest) / sigma;
     const double r = (length - rest) / sigma;
     addBlocks(Eigen::SparseVector<double>::InnerIterator(spring.weights),
-              Eigen::Matrix3d(g * g.transpose()), normal.matrix);
+              Eigen::Matrix3d(g * g.transpose()), normal.blocks);
     for (Eigen::SparseVector<double>::InnerIterator w(spring.weights); w; ++w) {
       normal.right.segment<3>(3 * w.index()) -= w.value() * r * g;
     }
   }
   return normal;
+}
+
+void DeformationFitter::addPriors(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted,
+                                  Normal& normal) const {
+  normal.blocks += quadratic_blocks_;
+  // The innovation's prior is about the prediction, not about zero.
+  const double innovation = params_.innovation * diagonal_;
+  normal.right += predicted / (innovation * innovation) - quadratic_ * controls;
 }
 
 void DeformationFitter::addMatches(const DeformationField::Weights& weights,
@@ -204,7 +233,7 @@ void DeformationFitter::addMatches(const DeformationField::Weights& weights,
     const Eigen::Matrix3d A = weighted * r.jacobian;
     const Eigen::Vector3d b = weighted * r.value;
     const DeformationField::Weights::InnerIterator row(weights, i);
-    addBlocks(row, A, normal.matrix);
+    addBlocks(row, A, normal.blocks);
     for (auto w = row; w; ++w) normal.right.segment<3>(3 * w.index()) -= w.value() * b;
   }
 }
@@ -225,6 +254,17 @@ DeformationFit DeformationFitter::fit(const std::vector<SurfaceMatch>& matches,
     return result;
   };
   std::vector<double> trust(matches.size());
+  // Distances along the surface change little within a frame: their springs are linearised once, at
+  // c0, and pull with  right - H (c - c0)  elsewhere.
+  const Normal springs = springNormal(start);
+  const Eigen::MatrixXd spring_matrix = springs.matrix();
+  const auto normalAt = [&](const Eigen::VectorXd& controls) {
+    Normal normal = springs;
+    normal.right -= spring_matrix.selfadjointView<Eigen::Lower>() * (controls - start);
+    addPriors(controls, predicted, normal);
+    addMatches(weights, found, trust, normal);
+    return normal;
+  };
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     // The median of a two-dimensional standard normal's length is 1.1774.
     const double noise = std::max(1.0, median(lengths()) / 1.1774);
@@ -233,11 +273,10 @@ DeformationFit DeformationFitter::fit(const std::vector<SurfaceMatch>& matches,
       const double ratio = scale * scale / (scale * scale + found[i].length * found[i].length);
       trust[i] = ratio * ratio / (noise * noise);
     }
-    Normal normal = priorNormal(fit.controls, predicted);
-    addMatches(weights, found, trust, normal);
-    const Eigen::LDLT<Eigen::MatrixXd, Eigen::Lower> factor(normal.matrix);
+    const Normal normal = normalAt(fit.controls);
+    const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(normal.matrix());
     const Eigen::VectorXd step = factor.solve(normal.right);
-    if (!step.allFinite()) return fit;
+    if (factor.info() != Eigen::Success || !step.allFinite()) return fit;
     fit.controls += step;
     found = residuals(matches, weights, camera, fit.controls);
     if (scale <= 3.01 * noise && step.cwiseAbs().maxCoeff() < kSettled * diagonal_) break;
@@ -250,10 +289,9 @@ DeformationFit DeformationFitter::fit(const std::vector<SurfaceMatch>& matches,
     fit.inliers += fit.inlier.back();
   }
   if (fit.inliers < params_.least_inliers) return fit;
-  Normal normal = priorNormal(fit.controls, predicted);
-  addMatches(weights, found, trust, normal);
-  fit.covariance = normal.matrix.selfadjointView<Eigen::Lower>().ldlt().solve(
-      Eigen::MatrixXd::Identity(normal.matrix.rows(), normal.matrix.cols()));
+  const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(normalAt(fit.controls).matrix());
+  if (factor.info() != Eigen::Success) return fit;
+  fit.covariance = factor.solve(Eigen::MatrixXd::Identity(fit.controls.size(), fit.controls.size()));
   fit.converged = fit.covariance.allFinite();
   return fit;
 }

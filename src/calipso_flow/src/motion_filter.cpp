@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calipso_flow/rotation.hpp"
 
@@ -285,15 +286,19 @@ MotionState predicted(const MotionState& state, double time, const MotionPiece& 
 
 double correct(MotionState& state, const PoseMeasurement& measurement, double noise_scale) {
   const Matrix6d S = innovationCovariance(state, measurement, noise_scale);
-  const Eigen::LDLT<Matrix6d> factor(S);
-  const Vector6d r = innovation(state, measurement);
-  const StateByPose cross = poseColumns(state.covariance);
-  const StateByPose gain = factor.solve(cross.transpose()).transpose();
-  moveState(gain * r, state);
-  state.covariance -= gain * cross.transpose();
-  state.covariance = (0.5 * (state.covariance + state.covariance.transpose())).eval();
-  const double log_determinant = factor.vectorD().array().max(1e-300).log().sum();
-  return -0.5 * (r.dot(factor.solve(r)) + log_determinant + 6.0 * std::log(2.0 * M_PI));
+  const Eigen::LLT<Matrix6d> factor(S);
+  if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
+  // S = L L^T, Y = L^-1 H P: gain and covariance follow from one triangular solution.
+  using PoseByState = Eigen::Matrix<double, 6, kStateSize>;
+  PoseByState Y;
+  Y << state.covariance.middleRows<3>(kP), state.covariance.middleRows<3>(kR);
+  factor.matrixL().solveInPlace(Y);
+  Vector6d r = innovation(state, measurement);
+  factor.matrixL().solveInPlace(r);
+  moveState(Y.transpose() * r, state);
+  state.covariance.noalias() -= Y.transpose().lazyProduct(Y);
+  const double log_determinant = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+  return -0.5 * (r.squaredNorm() + log_determinant + 6.0 * std::log(2.0 * M_PI));
 }
 
 double squaredSurprise(const MotionState& state, const PoseMeasurement& measurement,

@@ -11,7 +11,7 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kRefinements = 3;          // warp, match, fit
+constexpr int kRefinements = 2;          // warp, match both ways, fit
 constexpr double kSettledPx = 0.05;      // a refinement that moves less than this is the last
 constexpr double kNearPx = 1.5;          // a prediction this close needs no half-size match
 constexpr double kLeastInlierShare = 0.35;    // of the matches
@@ -22,14 +22,16 @@ constexpr int kWeakInliers = 12;         // fewer tracks than this are worth ano
 constexpr double kReturnDeviations = 3.0;
 constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
 
-// A precise match that is as likely and as certain as asked for, and comes back.
-std::optional<PatchMatch> matchPrecisely(const LookMatch& match, const Eigen::Vector2d& at,
-                                         const TrackerParams& params) {
-  const auto there = match.fine(at, params.patch);
-  if (!there) return std::nullopt;
+// A match that is as likely and as certain as asked for, and comes back where that is checked.
+std::optional<PatchMatch> matchSeed(const LookMatch& match, const Eigen::Vector2d& at,
+                                    const TrackerParams& params) {
+  const auto there = match.find(at, params.patch);
+  if (!there || there->correlation < params.least_correlation) return std::nullopt;
+  if (match.care() == Care::kRough) return there;
   // A patch with little texture wanders with the noise, and is trusted accordingly.
   const double deviation = std::sqrt(there->covariance.trace());
   if (deviation > params.largest_deviation_px) return std::nullopt;
+  if (match.care() == Care::kForward) return there;
   const double allowed = params.forward_backward_px + kReturnDeviations * deviation;
   const auto back = match.missOnReturn(at, *there, params.patch);
   if (!back || back->norm() > allowed) return std::nullopt;
@@ -38,7 +40,7 @@ std::optional<PatchMatch> matchPrecisely(const LookMatch& match, const Eigen::Ve
 
 // Follows the reference's seeds into the frame, the object's look being warped to `pose`.
 std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& reference,
-                               const Camera& camera, const Eigen::Isometry3d& pose, bool rough,
+                               const Camera& camera, const Eigen::Isometry3d& pose,
                                const TrackerParams& params, std::vector<Correspondence>& found) {
   std::vector<Track> tracks;
   const Eigen::Isometry3d camera_from_object = camera.world_from_camera.inverse() * pose;
@@ -46,9 +48,8 @@ std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& refe
     const Eigen::Vector3d p_camera = camera_from_object * seed;
     if (p_camera.z() <= 0.0) continue;
     const Eigen::Vector2d at = camera.project(p_camera);
-    const auto there =
-        rough ? match.rough(at, params.patch) : matchPrecisely(match, at, params);
-    if (!there || there->correlation < params.least_correlation) continue;
+    const auto there = matchSeed(match, at, params);
+    if (!there) continue;
     found.push_back({seed, there->position, there->covariance});
     tracks.push_back({seed, there->position, there->correlation, false});
   }
@@ -151,10 +152,11 @@ Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& refer
   Observation observation;
   observation.time = frame.time;
   observation.world_from_object = start;
-  if (!near) observation.world_from_object = refineOnce(frame, reference, true, observation);
+  if (!near) observation.world_from_object = refineOnce(frame, reference, Care::kRough, observation);
+  observation.world_from_object = refineOnce(frame, reference, Care::kForward, observation);
   for (int round = 0; round < kRefinements; ++round) {
     const Eigen::Isometry3d before = observation.world_from_object;
-    observation.world_from_object = refineOnce(frame, reference, false, observation);
+    observation.world_from_object = refineOnce(frame, reference, Care::kChecked, observation);
     if (!observation.found) break;
     if (imageMotion(frame.camera, before, observation.world_from_object, reference.seeds()) <
         kSettledPx) {
@@ -165,7 +167,7 @@ Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& refer
 }
 
 Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceView& reference,
-                                            bool rough, Observation& observation) const {
+                                            Care care, Observation& observation) const {
   const Eigen::Isometry3d pose = observation.world_from_object;
   observation.found = false;
   observation.tracks.clear();
@@ -173,8 +175,8 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   observation.coverage = look.coverage;
   if (look.coverage == 0.0) return pose;
   std::vector<Correspondence> found;
-  observation.tracks = followSeeds(LookMatch(look, frame.gray), reference, frame.camera, pose,
-                                   rough, params_, found);
+  observation.tracks = followSeeds(LookMatch(look, frame.gray, care), reference, frame.camera,
+                                   pose, params_, found);
   const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params_.pose);
   // Few agreeing matches where many are due are the background, not the object.
   const int due = seedsInPicture(reference, frame.camera, fit.world_from_object);

@@ -34,22 +34,24 @@ bool bilinear(const cv::Mat& image, const Eigen::Vector2d& at, double& value) {
 }
 
 // Edges between a triangle that faces the camera and one that does not, or none.
-std::vector<std::pair<int, int>> silhouetteEdges(const TriangleMesh& mesh,
-                                                 const std::vector<Eigen::Vector2d>& pixels,
-                                                 const std::vector<bool>& usable) {
-  std::map<std::pair<int, int>, int> facing;  // +1 per front face, +10 per back face
+std::vector<SurfaceEdge> silhouetteEdges(const std::vector<SurfaceEdge>& edges,
+                                         const TriangleMesh& mesh,
+                                         const std::vector<Eigen::Vector2d>& pixels,
+                                         const std::vector<bool>& usable) {
+  std::vector<int> facing(mesh.triangleCount(), 0);  // +1 front, -1 back, 0: not to be used
   for (int t = 0; t < mesh.triangleCount(); ++t) {
     const Eigen::Vector3i c = mesh.triangles.row(t).transpose();
     if (!usable[c[0]] || !usable[c[1]] || !usable[c[2]]) continue;
     const Eigen::Vector2d a = pixels[c[1]] - pixels[c[0]], b = pixels[c[2]] - pixels[c[0]];
-    const int side = a.x() * b.y() - a.y() * b.x() < 0.0 ? 1 : 10;
-    for (int e = 0; e < 3; ++e) facing[std::minmax(c[e], c[(e + 1) % 3])] += side;
+    facing[t] = a.x() * b.y() - a.y() * b.x() < 0.0 ? 1 : -1;
   }
-  std::vector<std::pair<int, int>> edges;
-  for (const auto& [edge, sides] : facing) {
-    if (sides == 11 || sides == 1 || sides == 10) edges.push_back(edge);
+  std::vector<SurfaceEdge> silhouette;
+  for (const SurfaceEdge& edge : edges) {
+    const int left = edge.left < 0 ? 0 : facing[edge.left];
+    const int right = edge.right < 0 ? 0 : facing[edge.right];
+    if (left != right) silhouette.push_back(edge);
   }
-  return edges;
+  return silhouette;
 }
 
 bool covered(const ReferenceView::Warped& look, const Eigen::Vector2d& at) {
@@ -73,7 +75,8 @@ std::optional<Eigen::Vector2d> outwardOf(const ReferenceView::Warped& look,
   return std::nullopt;
 }
 
-std::vector<OutlinePoint> outlinePoints(const TriangleMesh& mesh,
+std::vector<OutlinePoint> outlinePoints(const std::vector<SurfaceEdge>& edges,
+                                        const TriangleMesh& mesh,
                                         const decltype(TriangleMesh::vertices)& deformed,
                                         const ReferenceView::Warped& look, const Camera& camera,
                                         const Eigen::Isometry3d& camera_from_object) {
@@ -86,7 +89,8 @@ std::vector<OutlinePoint> outlinePoints(const TriangleMesh& mesh,
   }
   std::vector<OutlinePoint> points;
   std::map<std::pair<int, int>, bool> taken;  // cells of the picture that have their point
-  for (const auto& [i, j] : silhouetteEdges(mesh, pixels, usable)) {
+  for (const SurfaceEdge& border : silhouetteEdges(edges, mesh, pixels, usable)) {
+    const int i = border.from, j = border.to;
     const Eigen::Vector2d at = 0.5 * (pixels[i] + pixels[j]), edge = pixels[j] - pixels[i];
     if (!(edge.norm() > 1e-6)) continue;
     bool& cell = taken[{static_cast<int>(at.x() / kSpacing), static_cast<int>(at.y() / kSpacing)}];
@@ -145,7 +149,24 @@ std::optional<std::pair<double, double>> locateStep(const std::vector<double>& v
 
 }  // namespace
 
-std::vector<SurfaceMatch> matchOutline(const TriangleMesh& mesh,
+std::vector<SurfaceEdge> edgesOf(const TriangleMesh& mesh) {
+  std::map<std::pair<int, int>, std::vector<int>> beside;
+  for (int t = 0; t < mesh.triangleCount(); ++t) {
+    for (int e = 0; e < 3; ++e) {
+      beside[std::minmax({mesh.triangles(t, e), mesh.triangles(t, (e + 1) % 3)})].push_back(t);
+    }
+  }
+  std::vector<SurfaceEdge> edges;
+  for (const auto& [edge, triangles] : beside) {
+    if (triangles.size() > 2) continue;
+    edges.push_back({edge.first, edge.second, triangles[0],
+                     triangles.size() == 2 ? triangles[1] : -1});
+  }
+  return edges;
+}
+
+std::vector<SurfaceMatch> matchOutline(const std::vector<SurfaceEdge>& edges,
+                                       const TriangleMesh& mesh,
                                        const decltype(TriangleMesh::vertices)& deformed,
                                        const ReferenceView::Warped& look, const Frame& frame,
                                        const Eigen::Isometry3d& world_from_object) {
@@ -154,7 +175,7 @@ std::vector<SurfaceMatch> matchOutline(const TriangleMesh& mesh,
   std::vector<SurfaceMatch> matches;
   std::vector<double> values;
   for (const OutlinePoint& point :
-       outlinePoints(mesh, deformed, look, frame.camera, camera_from_object)) {
+       outlinePoints(edges, mesh, deformed, look, frame.camera, camera_from_object)) {
     if (!profile(frame.gray, point, values)) continue;
     const auto step = locateStep(values);
     if (!step) continue;

@@ -81,17 +81,19 @@ struct ReferenceView::WarpMap {
 };
 
 bool ReferenceView::note(const Eigen::Vector3d& p_reference, int x, int y, WarpMap& map) const {
-  const cv::Point at(x + map.offset.x, y + map.offset.y);
-  map.covered.at<uchar>(at) = 255;
+  const int row = y + map.offset.y, column = x + map.offset.x;
+  map.covered.ptr<uchar>(row)[column] = 255;
   if (p_reference.z() <= 0.0) return false;
   const Eigen::Vector2d pixel = frame_.camera.project(p_reference);
-  const float there = surface_.depthAt(pixel.x(), pixel.y());
+  const double u = pixel.x() - surface_.window.x + 0.5, v = pixel.y() - surface_.window.y + 0.5;
+  if (!(u >= 0.0 && v >= 0.0 && u < surface_.window.width && v < surface_.window.height)) return false;
+  const int nearest_u = static_cast<int>(u), nearest_v = static_cast<int>(v);
+  const float there = surface_.depth.ptr<float>(nearest_v)[nearest_u];
   if (there <= 0.0f || std::abs(there - p_reference.z()) > kSameSurface * diagonal_) return false;
-  map.source.at<cv::Vec2f>(at) = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
-  const cv::Point nearest(cvRound(pixel.x()) - surface_.window.x,
-                          cvRound(pixel.y()) - surface_.window.y);
-  if (usable_.at<uchar>(nearest) == 0) return false;
-  map.weight.at<float>(at) = 1.0f;
+  map.source.ptr<cv::Vec2f>(row)[column] = {static_cast<float>(pixel.x()),
+                                            static_cast<float>(pixel.y())};
+  if (usable_.ptr<uchar>(nearest_v)[nearest_u] == 0) return false;
+  map.weight.ptr<float>(row)[column] = 1.0f;
   return true;
 }
 
@@ -117,13 +119,16 @@ ReferenceView::Warped ReferenceView::warp(const Camera& camera,
                                                   world_from_object_ *
                                                   camera_from_object.inverse();
   int visible = 0, known = 0;
+  const Eigen::Vector3d ray_step = reference_from_camera.linear().col(0) / camera.fx;
+  const Eigen::Vector3d origin = reference_from_camera.translation();
   for (int y = 0; y < view.depth.rows; ++y) {
     const float* depth = view.depth.ptr<float>(y);
+    const Eigen::Vector3d ray =
+        reference_from_camera.linear() * camera.ray(view.window.x, y + view.window.y);
     for (int x = 0; x < view.depth.cols; ++x) {
       if (depth[x] <= 0.0f) continue;
       ++visible;
-      const Eigen::Vector3d ray = camera.ray(x + view.window.x, y + view.window.y);
-      known += note(reference_from_camera * (depth[x] * ray), x, y, map);
+      known += note(origin + depth[x] * (ray + x * ray_step), x, y, map);
     }
   }
   return finish(map, visible, known);

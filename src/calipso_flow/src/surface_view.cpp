@@ -46,16 +46,30 @@ cv::Rect boundingWindow(const std::vector<ProjectedVertex>& vertices, const Came
   return {left, top, right - left + 1, bottom - top + 1};
 }
 
+// The conversions of the C library cost as much as the rest of a small triangle.
+int floorOf(double value) {
+  const int whole = static_cast<int>(value);
+  return whole - (whole > value);
+}
+
+int ceilingOf(double value) { return -floorOf(-value); }
+
 // Calls draw(x, y, wb, wc) for the pixels of a triangle with their weights of b and c.
 template <class Draw>
 void scanTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const ProjectedVertex& c,
                   const cv::Rect& window, Draw draw) {
+  const double left = std::min(a.u, std::min(b.u, c.u)), right = std::max(a.u, std::max(b.u, c.u));
+  const double top = std::min(a.v, std::min(b.v, c.v)), bottom = std::max(a.v, std::max(b.v, c.v));
+  const int last_x = window.br().x - 1, last_y = window.br().y - 1;
+  if (!(left <= last_x && right >= window.x && top <= last_y && bottom >= window.y)) return;
+  // Most triangles of a fine mesh lie between pixel centres.
+  const int x0 = ceilingOf(std::max<double>(window.x, left));
+  const int x1 = floorOf(std::min<double>(last_x, right));
+  const int y0 = ceilingOf(std::max<double>(window.y, top));
+  const int y1 = floorOf(std::min<double>(last_y, bottom));
+  if (x0 > x1 || y0 > y1) return;
   const double area = (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u);
   if (area == 0.0) return;
-  const int x0 = std::max<int>(window.x, std::ceil(std::min({a.u, b.u, c.u})));
-  const int y0 = std::max<int>(window.y, std::ceil(std::min({a.v, b.v, c.v})));
-  const int x1 = std::min<int>(window.br().x - 1, std::floor(std::max({a.u, b.u, c.u})));
-  const int y1 = std::min<int>(window.br().y - 1, std::floor(std::max({a.v, b.v, c.v})));
   const double db_du = (c.v - a.v) / area, db_dv = -(c.u - a.u) / area;
   const double dc_du = -(b.v - a.v) / area, dc_dv = (b.u - a.u) / area;
   for (int y = y0; y <= y1; ++y) {
@@ -73,7 +87,7 @@ void drawTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const Proj
   scanTriangle(a, b, c, window, [&](int x, int y, double wb, double wc) {
     const double iz =
         a.inverse_z + wb * (b.inverse_z - a.inverse_z) + wc * (c.inverse_z - a.inverse_z);
-    float& nearest = inverse_z.at<float>(y, x);
+    float& nearest = inverse_z.ptr<float>(y)[x];
     nearest = std::max(nearest, static_cast<float>(iz));
   });
 }

@@ -5,6 +5,7 @@
 
 #include "calipso_flow/deformation_fit.hpp"
 #include "calipso_flow/object_tracker.hpp"
+#include "calipso_flow/outline_match.hpp"
 
 namespace calipso::flow {
 
@@ -41,10 +42,11 @@ class DeformableTracker {
  private:
   Eigen::VectorXd predict(double time) const;
   std::vector<SurfaceMatch> match(const Frame& frame, const Eigen::VectorXd& controls,
-                                  bool rough) const;
+                                  Care care) const;
 
   ObjectModel model_;
   TrackerParams params_;
+  std::vector<SurfaceEdge> edges_;
   ReferenceView reference_;
   DeformationFitter fitter_;
   DeformationField::Weights vertex_weights_, point_weights_;

@@ -63,9 +63,11 @@ class DeformationFitter {
     Eigen::SparseVector<double> weights;  // of the difference of its ends
     Eigen::Vector3d rest;                 // m
   };
+  // Normal equations: 3 x 3 blocks of the lower triangle of their matrix, each a column.
   struct Normal {
-    Eigen::MatrixXd matrix;
+    Eigen::Matrix<double, 9, Eigen::Dynamic> blocks;
     Eigen::VectorXd right;
+    Eigen::MatrixXd matrix() const;  // lower triangle
   };
   struct Residual {
     Eigen::Vector2d value;                     // px
@@ -76,7 +78,10 @@ class DeformationFitter {
   std::vector<Residual> residuals(const std::vector<SurfaceMatch>& matches,
                                   const DeformationField::Weights& weights, const Camera& camera,
                                   const Eigen::VectorXd& controls) const;
-  Normal priorNormal(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted) const;
+  // Of the springs, linearised at `controls`.
+  Normal springNormal(const Eigen::VectorXd& controls) const;
+  // Adds what is quadratic in the controls.
+  void addPriors(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted, Normal& normal) const;
   // @param trust  weight of each match
   static void addMatches(const DeformationField::Weights& weights,
                          const std::vector<Residual>& residuals, const std::vector<double>& trust,
@@ -90,6 +95,7 @@ class DeformationFitter {
   DeformationField field_;
   std::vector<Spring> springs_;
   Eigen::MatrixXd quadratic_;  // roughness, anchors and innovation: constant
+  Eigen::Matrix<double, 9, Eigen::Dynamic> quadratic_blocks_;  // the same, as Normal's
 };
 
 }  // namespace calipso::flow

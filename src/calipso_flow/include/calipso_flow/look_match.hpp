@@ -7,27 +7,27 @@
 
 namespace calipso::flow {
 
-// The warped look of an object and the frame it is to be found in, at full and at half size.
+// How much a match is worth: a rough one, at half size, reaches far; a forward one is precise but may
+// show another surface; a checked one has been followed back.
+enum class Care { kRough, kForward, kChecked };
+
+// The warped look of an object and the frame it is to be found in. Immutable once made.
 class LookMatch {
  public:
   // @param picture  CV_32F, the whole frame
-  LookMatch(const ReferenceView::Warped& look, const cv::Mat& picture);
+  LookMatch(const ReferenceView::Warped& look, const cv::Mat& picture, Care care);
 
-  // Where the patch of the look around `at` is found in the frame.
-  std::optional<PatchMatch> fine(const Eigen::Vector2d& at, const PatchParams& params) const;
-  // The same at half size, in coordinates of the full size: reaches far, but is not precise.
-  std::optional<PatchMatch> rough(const Eigen::Vector2d& at, const PatchParams& params) const;
+  Care care() const { return care_; }
+  // Where the patch of the look around `at` is found in the frame, in coordinates of the full size.
+  std::optional<PatchMatch> find(const Eigen::Vector2d& at, const PatchParams& params) const;
   // By how much the match, followed back into the look, misses the point where it began.
   std::optional<Eigen::Vector2d> missOnReturn(const Eigen::Vector2d& at, const PatchMatch& there,
                                               const PatchParams& params) const;
 
  private:
-  struct Pyramid {
-    ImageWindow full, half;
-  };
-  static Pyramid pyramidOf(const ImageWindow& window);
-
-  Pyramid look_, weight_, frame_;
+  Care care_;
+  double scale_;
+  ImageWindow look_, weight_, frame_;
 };
 
 }  // namespace calipso::flow

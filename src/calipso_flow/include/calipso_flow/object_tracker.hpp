@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calipso_flow/deformation_fit.hpp"
+#include "calipso_flow/look_match.hpp"
 #include "calipso_flow/pose_fit.hpp"
 #include "calipso_flow/reference_view.hpp"
 
@@ -68,7 +69,7 @@ class ObjectTracker {
                                    const Eigen::Isometry3d& predicted) const;
   Observation refine(const Frame& frame, const ReferenceView& reference,
                      const Eigen::Isometry3d& start, bool near) const;
-  Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, bool rough,
+  Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
                                Observation& observation) const;
   const ReferenceView& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) const;
   Observation attempt(const Frame& frame, const ReferenceView& reference,
