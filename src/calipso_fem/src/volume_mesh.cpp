@@ -1,5 +1,6 @@
 #include "calipso_fem/volume_mesh.hpp"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -37,6 +38,19 @@ VolumeMesh boxMesh(const Eigen::Vector3d& min, const Eigen::Vector3d& max,
           mesh.cells(cell, c) = id(i + (c & 1), j + ((c >> 1) & 1), k + (c >> 2));
   mesh.fraction = Eigen::VectorXd::Ones(mesh.cells.rows());
   return mesh;
+}
+
+void gradeBox(int axis, GradedEnds ends, VolumeMesh* box) {
+  const auto drawn = [](double t) { return t * std::sqrt(t); };
+  const double low = box->nodes.col(axis).minCoeff();
+  const double side = box->nodes.col(axis).maxCoeff() - low;
+  for (double& x : box->nodes.col(axis)) {
+    const double t = (x - low) / side;
+    const double graded = ends == GradedEnds::kLow ? drawn(t)
+                          : t < 0.5                ? 0.5 * drawn(2.0 * t)
+                                                   : 1.0 - 0.5 * drawn(2.0 * (1.0 - t));
+    x = low + side * graded;
+  }
 }
 
 VolumeMesh kuhnSplit(const VolumeMesh& hexes) {

@@ -26,6 +26,18 @@ double filledVolume(const VoxelGrid& grid) {
   return grid.fraction.sum() * std::pow(grid.cell_size, 3);
 }
 
+TEST(GradedBox, KeepsItsSidesAndGetsFinerTowardsItsEnds) {
+  VolumeMesh low = boxMesh({1, 0, 0}, {3, 1, 1}, {8, 1, 1}), both = low;
+  gradeBox(0, GradedEnds::kLow, &low);
+  gradeBox(0, GradedEnds::kBoth, &both);
+  for (int i = 0; i <= 8; ++i) {
+    EXPECT_NEAR(low.nodes(i, 0), 1.0 + 2.0 * std::pow(i / 8.0, 1.5), 1e-14);
+    EXPECT_NEAR(both.nodes(i, 0) - 1.0, 3.0 - both.nodes(8 - i, 0), 1e-14);   // symmetric
+  }
+  EXPECT_NEAR(both.nodes(1, 0), 1.0 + std::pow(0.25, 1.5), 1e-14);
+  EXPECT_EQ(low.nodes(0, 1), 0.0);
+}
+
 TEST(Voxelize, AlignedBoxIsExact) {
   TriangleMesh mesh;
   appendBox({0, 0, 0}, {1.0, 0.5, 0.25}, &mesh);
