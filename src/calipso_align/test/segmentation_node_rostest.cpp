@@ -91,14 +91,19 @@ TEST_F(SegmentationNode, SegmentsTheKeyFrameTracksTheRestAndServesLateSubscriber
   EXPECT_EQ(received_[0]->header.stamp, ros::Time(1.0));
   EXPECT_EQ(received_[0]->contours.size(), 1u);
 
-  images_.publish(boost::make_shared<sensor_msgs::Image>());
-  waitFor([&] { return status_.clip_frames == 4; }, "the broken frame to be counted");
+  const auto broken = boost::make_shared<sensor_msgs::Image>();
+  broken->header.stamp = ros::Time(1.3);
+  images_.publish(broken);
+  waitFor([&] { return status_.clip_frames == 4 && received_.size() >= 2; }, "the broken frame to be counted");
   EXPECT_EQ(status_.state, calipso_msgs::NodeStatus::READY);
+  EXPECT_EQ(received_[1]->header.stamp, ros::Time(1.3));
+  EXPECT_EQ(received_[1]->confidence, 0.0f);
+  EXPECT_GT(cv::countNonZero(labelsFromMsg(received_[1]->labels)), 0) << "the labels of the frame before";
 
   cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
   strokes(cv::Rect(70, 50, 20, 20)).setTo(1);
   strokes_.publish(cv_bridge::CvImage(std_msgs::Header(), "mono8", strokes).toImageMsg());
-  waitFor([&] { return received_.size() >= 2; }, "the key frame after a stroke");
+  waitFor([&] { return received_.size() >= 3; }, "the key frame after a stroke");
   EXPECT_EQ(received_.back()->header.stamp, ros::Time(1.0));
   EXPECT_EQ(received_.back()->contours.size(), 1u);
 }

@@ -182,7 +182,7 @@ TEST(WorldLoads, ACollisionThatIsNotInTheVideoIsRefused) {
 TEST(WorldLoads, ACopyLivesOnItsOwn) {
   World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 2), {0, 0, 0.05}), coarse());
   Edit twin = editOf(EditKind::kDuplicate);
-  twin.copy = "twin";
+  twin.new_name = "twin";
   twin.translation = {0.3, 0, 0.2};
   world.submit(twin);
   Edit drop = editOf(EditKind::kObjectKind);
@@ -199,9 +199,53 @@ TEST(WorldLoads, ACopyLivesOnItsOwn) {
   EXPECT_FALSE(state.objects[0].edited);
   EXPECT_NEAR(centerOf(state, 1).z(), 0.05, 2e-3);  // it lies on the table, up to the resting gap
   Edit again = editOf(EditKind::kDuplicate);
-  again.copy = "twin";
+  again.new_name = "twin";
   world.submit(again);
   EXPECT_FALSE(world.advanceTo(world.time()).at(0).accepted) << "the name is taken";
+}
+
+TEST(WorldLoads, AnInsertedModelFallsOntoTheTable) {
+  WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 2), {0, 0, 0.05});
+  scene.directory = ::testing::TempDir();
+  saveObj(boxSurface({1.0, 2.0, 1.0}, 2), scene.directory + "/crate.obj");
+  World world(scene, coarse());
+  Edit insert = editOf(EditKind::kInsert);
+  insert.object.clear();
+  insert.new_name = "crate";
+  insert.model_path = "crate.obj";
+  insert.scale = 0.05;
+  insert.translation = {0.3, 0, 0.2};
+  insert.density = 700.0;
+  insert.color = {0.8, 0.1, 0.1};
+  world.submit(insert);
+  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  WorldState state = world.state();
+  ASSERT_EQ(state.objects.size(), 2u);
+  EXPECT_EQ(state.objects[1].kind, ObjectKind::kRigid);
+  EXPECT_EQ(state.objects[1].triangles.rows(), boxSurface({1, 1, 1}, 2).triangles.rows());
+  EXPECT_EQ(state.objects[1].look.color, insert.color);
+  EXPECT_NEAR((centerOf(state, 1) - insert.translation).norm(), 0.0, 1e-9);
+  for (const PlanEntry& entry : world.plan())
+    if (entry.object == "crate") EXPECT_NEAR(entry.mass, 700.0 * 2.0 * std::pow(0.05, 3), 1e-9);
+  play(world, 1.5);
+  state = world.state();
+  EXPECT_FALSE(state.objects[0].edited);
+  EXPECT_TRUE(state.objects[0].triangles.rows() == 0);
+  EXPECT_NEAR(centerOf(state, 1).z(), 0.025, 2e-3);
+}
+
+TEST(WorldLoads, AModelThatIsNotThereIsRefused) {
+  World world = boxInTheAir();
+  Edit insert = editOf(EditKind::kInsert);
+  insert.object.clear();
+  insert.new_name = "crate";
+  insert.model_path = "nowhere.obj";
+  world.submit(insert);
+  const auto outcomes = world.advanceTo(0.0);
+  ASSERT_EQ(outcomes.size(), 1u);
+  EXPECT_FALSE(outcomes[0].accepted);
+  EXPECT_NE(outcomes[0].message.find("nowhere.obj"), std::string::npos) << outcomes[0].message;
+  EXPECT_EQ(world.state().objects.size(), 1u);
 }
 
 TEST(WorldLoads, WhatDoesNotMeetTheTableFallsThroughIt) {

@@ -87,6 +87,40 @@ TEST(EditedLook, ACopyOfNothingIsRefused) {
   EXPECT_THROW(s.draw(in), std::invalid_argument);
 }
 
+// A square of 6 cm, upright, facing the camera.
+ObjectInFrame card(const Eigen::Vector3d& centre) {
+  ObjectInFrame o;
+  o.name = "card", o.edited = true;
+  const Eigen::Vector3f c = centre.cast<float>();
+  for (const auto& [x, z] : {std::pair{-0.03f, -0.03f}, {0.03f, -0.03f}, {0.03f, 0.03f}, {-0.03f, 0.03f}})
+    o.vertices.push_back(c + Eigen::Vector3f(x, 0.0f, z));
+  o.triangles = {{0, 1, 2}, {0, 2, 3}};
+  o.look.albedo = cv::Vec3f(0.02f, 0.02f, 0.6f);
+  return o;
+}
+
+TEST(EditedLook, AnInsertedObjectIsDrawnInItsColour) {
+  const Setting s;
+  FrameInput in = s.input(false);
+  const Eigen::Vector3d centre = kCentre + Eigen::Vector3d(0.2, 0.0, 0.0);
+  in.objects.push_back(card(centre));
+  const FrameOutput out = s.draw(in);
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(s.at(kCentre)), kOriginal);
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(s.at(centre)), kRendered);
+  const cv::Vec3b red = out.bgr.at<cv::Vec3b>(s.at(centre));
+  EXPECT_GT(red[2], 3 * red[0]);
+  EXPECT_GT(red[2], 3 * red[1]);
+}
+
+TEST(EditedLook, AnInsertedObjectIsHiddenByWhatStandsBeforeIt) {
+  const Setting s;
+  FrameInput in = s.input(true);  // the ball is drawn
+  in.objects.push_back(card(kCentre + Eigen::Vector3d(0.0, 0.3, 0.0)));
+  const FrameOutput with = s.draw(in);
+  in.objects.pop_back();
+  EXPECT_EQ(with.bgr.at<cv::Vec3b>(s.at(kCentre)), s.draw(in).bgr.at<cv::Vec3b>(s.at(kCentre)));
+}
+
 TEST(EditedLook, ATintMultipliesTheReflectance) {
   const Setting s;
   FrameInput in = s.input(true);

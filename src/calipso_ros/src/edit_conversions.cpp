@@ -66,13 +66,13 @@ std_msgs::ColorRGBA toColorMsg(const Eigen::Vector3d& color) {
 std::string valueOf(const Edit& edit) {
   if (edit.kind == EditKind::kObjectKind) return toString(edit.object_kind);
   if (edit.kind == EditKind::kContact) return edit.meet ? "include" : "exclude";
-  return edit.copy;
+  return edit.new_name;
 }
 
 void setValue(const calipso_msgs::Edit& msg, Edit& edit) {
   if (edit.kind == EditKind::kObjectKind) edit.object_kind = objectKindFromString(msg.value);
   if (edit.kind == EditKind::kContact) edit.meet = meetFromString(msg.value);
-  if (edit.kind == EditKind::kDuplicate) edit.copy = msg.value;
+  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert) edit.new_name = msg.value;
 }
 
 // A message that leaves the quaternion out holds zeros.
@@ -110,6 +110,7 @@ calipso_msgs::Edit toMsg(const Edit& edit, const ros::Time& first_stamp) {
   msg.density = toField(edit.density);
   msg.damping = toField(edit.damping);
   msg.value = valueOf(edit);
+  msg.model = edit.model_path;
   msg.other = edit.other;
   msg.friction = toField(edit.friction);
   msg.restitution = toField(edit.restitution);
@@ -142,6 +143,7 @@ Edit fromMsg(const calipso_msgs::Edit& msg, const ros::Time& first_stamp) {
   edit.density = fromField(msg.density);
   edit.damping = fromField(msg.damping);
   setValue(msg, edit);
+  edit.model_path = msg.model;
   edit.other = msg.other;
   edit.friction = fromField(msg.friction);
   edit.restitution = fromField(msg.restitution);

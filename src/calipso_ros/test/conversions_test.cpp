@@ -110,8 +110,13 @@ TEST(Conversions, whatTheKindsNeedRoundTrips) {
   edit.color.setZero();  // black
   EXPECT_NEAR(fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1)).color.norm(), 0.0, 1e-30);
   edit.kind = EditKind::kDuplicate;
-  edit.copy = "twin";
-  EXPECT_EQ(fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1)).copy, "twin");
+  edit.new_name = "twin";
+  EXPECT_EQ(fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1)).new_name, "twin");
+  edit.kind = EditKind::kInsert;
+  edit.model_path = "cad/ball.obj";
+  again = fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1));
+  EXPECT_EQ(again.new_name, "twin");
+  EXPECT_EQ(again.model_path, "cad/ball.obj");
 }
 
 TEST(Conversions, aMeantZeroSurvivesAndAMissingNumberIsUnchanged) {

@@ -28,6 +28,7 @@ bool concernsScene(EditKind kind) {
     case EditKind::kSpeedScale:
     case EditKind::kTimeScale:
     case EditKind::kLight:
+    case EditKind::kInsert:
       return true;
     default:
       return false;
@@ -80,6 +81,9 @@ void validateMaterial(const Edit& edit) {
           "poissons_ratio", edit.poissons_ratio, "in (-1, 0.5)");
   require(std::isnan(edit.damping) || (std::isfinite(edit.damping) && edit.damping >= 0.0),
           "damping", edit.damping, "finite and >= 0 s");
+}
+
+void requireAnyChange(const Edit& edit) {
   if (std::isnan(edit.youngs_modulus) && std::isnan(edit.density) &&
       std::isnan(edit.poissons_ratio) && std::isnan(edit.damping)) {
     throw std::invalid_argument(
@@ -111,14 +115,22 @@ void validateScale(const Edit& edit) {
           slower ? "in (0, 1]" : "> 0");
 }
 
-void validateDuplicate(const Edit& edit, const std::vector<std::string>& objects) {
-  if (edit.copy.empty()) {
+void validateNewName(const Edit& edit, const std::vector<std::string>& objects) {
+  if (edit.new_name.empty()) {
     throw std::invalid_argument("value is empty; give the new object's name");
   }
-  if (std::find(objects.begin(), objects.end(), edit.copy) != objects.end()) {
-    throw std::invalid_argument("value is '" + edit.copy +
-                                "', which the scene has already; give the copy a name of its own");
+  if (std::find(objects.begin(), objects.end(), edit.new_name) != objects.end()) {
+    throw std::invalid_argument("value is '" + edit.new_name +
+                                "', which the scene has already; give the new object a name of its own");
   }
+}
+
+void validateInsert(const Edit& edit) {
+  if (!edit.object.empty()) {
+    throw std::invalid_argument("object is '" + edit.object +
+                                "', but an insert is of the scene; leave it out and name the new object in value");
+  }
+  if (edit.model_path.empty()) throw std::invalid_argument("model is empty; give the path of a CAD file");
 }
 
 }  // namespace
@@ -139,8 +151,10 @@ void validate(const Edit& edit, const std::vector<std::string>& objects) {
   require(std::isfinite(edit.pressure), "pressure", edit.pressure, "finite");
   validateContact(edit);
   validateLook(edit);
-  if (edit.kind == EditKind::kMaterial) validateMaterial(edit);
-  if (edit.kind == EditKind::kDuplicate) validateDuplicate(edit, objects);
+  validateMaterial(edit);
+  if (edit.kind == EditKind::kMaterial) requireAnyChange(edit);
+  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert) validateNewName(edit, objects);
+  if (edit.kind == EditKind::kInsert) validateInsert(edit);
   if (edit.kind == EditKind::kSpeedScale || edit.kind == EditKind::kTimeScale) validateScale(edit);
   if (edit.kind == EditKind::kLight) require(edit.factor > 0.0, "factor", edit.factor, "> 0");
 }

@@ -11,17 +11,17 @@ namespace {
 template <typename Enum, std::size_t N>
 using Names = std::pair<Enum, const char*>[N];
 
-constexpr Names<EditKind, 19> kEditKinds = {
+constexpr Names<EditKind, 20> kEditKinds = {
     {EditKind::kTransform, "transform"}, {EditKind::kPull, "pull"},
-    {EditKind::kFix, "fix"},             {EditKind::kRelease, "release"},
-    {EditKind::kMaterial, "material"},   {EditKind::kGravity, "gravity"},
-    {EditKind::kVelocity, "velocity"},   {EditKind::kObjectKind, "kind"},
-    {EditKind::kRemove, "remove"},       {EditKind::kReset, "reset"},
-    {EditKind::kDuplicate, "duplicate"}, {EditKind::kContact, "contact"},
-    {EditKind::kWind, "wind"},           {EditKind::kPressure, "pressure"},
-    {EditKind::kTwist, "twist"},         {EditKind::kSpeedScale, "speed_scale"},
-    {EditKind::kTimeScale, "time_scale"}, {EditKind::kAppearance, "appearance"},
-    {EditKind::kLight, "light"}};
+    {EditKind::kFix, "fix"}, {EditKind::kRelease, "release"},
+    {EditKind::kMaterial, "material"}, {EditKind::kGravity, "gravity"},
+    {EditKind::kVelocity, "velocity"}, {EditKind::kObjectKind, "kind"},
+    {EditKind::kRemove, "remove"}, {EditKind::kReset, "reset"},
+    {EditKind::kDuplicate, "duplicate"}, {EditKind::kInsert, "insert"},
+    {EditKind::kContact, "contact"}, {EditKind::kWind, "wind"},
+    {EditKind::kPressure, "pressure"}, {EditKind::kTwist, "twist"},
+    {EditKind::kSpeedScale, "speed_scale"}, {EditKind::kTimeScale, "time_scale"},
+    {EditKind::kAppearance, "appearance"}, {EditKind::kLight, "light"}};
 
 constexpr Names<EditMode, 6> kEditModes = {
     {EditMode::kForce, "force"},   {EditMode::kTarget, "target"}, {EditMode::kAbsolute, "absolute"},

@@ -12,7 +12,7 @@ const std::vector<std::string>& editKeys() {
   static const std::vector<std::string> keys = {
       "t",      "object", "kind",  "mode",           "region",         "vector",  "angular",
       "translation",      "rotation", "scale",       "factor",         "ramp",    "duration",
-      "youngs_modulus",   "poissons_ratio",          "density",        "damping", "value",
+      "youngs_modulus",   "poissons_ratio",          "density",        "damping", "value",   "model",
       "other",  "friction", "restitution", "pressure", "color", "specular", "roughness",
       "after",  "collision"};
   return keys;
@@ -51,13 +51,6 @@ void readVectors(const YAML::Node& node, const YamlReader& reader, Edit& edit) {
   if (node["color"]) edit.color = reader.vector(node, "color", 3);
 }
 
-void readContact(const YAML::Node& node, const YamlReader& reader, Edit& edit) {
-  edit.other = reader.text(node, "other", "");
-  edit.friction = reader.number(node, "friction", kUnchanged);
-  edit.restitution = reader.number(node, "restitution", kUnchanged);
-  edit.meet = meetFromString(reader.text(node, "value", ""));
-}
-
 Edit readEdit(const YAML::Node& node, const YamlReader& reader) {
   if (!node.IsMap()) reader.fail("", "is not a map of key: value; see the tutorial for examples");
   reader.rejectUnknownKeys(node, editKeys());
@@ -84,8 +77,12 @@ Edit readEdit(const YAML::Node& node, const YamlReader& reader) {
   if (edit.kind == EditKind::kObjectKind) {
     edit.object_kind = objectKindFromString(reader.text(node, "value"));
   }
-  if (edit.kind == EditKind::kDuplicate) edit.copy = reader.text(node, "value");
-  if (edit.kind == EditKind::kContact) readContact(node, reader, edit);
+  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert) edit.new_name = reader.text(node, "value");
+  if (edit.kind == EditKind::kInsert) edit.model_path = reader.text(node, "model");
+  edit.other = reader.text(node, "other", "");
+  edit.friction = reader.number(node, "friction", kUnchanged);
+  edit.restitution = reader.number(node, "restitution", kUnchanged);
+  if (edit.kind == EditKind::kContact) edit.meet = meetFromString(reader.text(node, "value", ""));
   return edit;
 }
 
@@ -105,7 +102,7 @@ std::vector<Edit> loadEdits(const std::string& path, const std::vector<std::stri
     try {
       edits.push_back(readEdit(root[i], reader));
       validate(edits.back(), known);
-      if (!edits.back().copy.empty()) known.push_back(edits.back().copy);
+      if (!edits.back().new_name.empty()) known.push_back(edits.back().new_name);
     } catch (const std::invalid_argument& error) {
       const std::string text = error.what();
       if (text.rfind(path, 0) == 0) throw;

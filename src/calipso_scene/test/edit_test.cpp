@@ -55,7 +55,7 @@ TEST(Edit, readsWhatTheKindsNeed) {
                 "- {t: 0.1, after: banana1, collision: 2, kind: speed_scale, factor: 0.5}\n"),
       kObjects);
   ASSERT_EQ(edits.size(), 5u);
-  EXPECT_EQ(edits[0].copy, "twin");
+  EXPECT_EQ(edits[0].new_name, "twin");
   EXPECT_EQ(edits[1].color, Eigen::Vector3d(1, 0.5, 0.2));
   EXPECT_EQ(edits[1].roughness, 0.4);
   EXPECT_TRUE(std::isnan(edits[1].specular));
@@ -75,7 +75,7 @@ TEST(Edit, emptyListsAreValid) {
 
 TEST(Edit, namesRoundTrip) {
   for (const char* name : {"transform", "pull", "fix", "release", "material", "gravity", "velocity",
-                           "kind", "remove", "reset", "duplicate", "contact", "wind", "pressure",
+                           "kind", "remove", "reset", "duplicate", "insert", "contact", "wind", "pressure",
                            "twist", "speed_scale", "time_scale", "appearance", "light"}) {
     EXPECT_EQ(toString(editKindFromString(name)), name);
   }
@@ -101,6 +101,11 @@ TEST(Edit, badInputNamesEntryFieldAndRemedy) {
   expect("- {t: 0, object: banana1, kind: transform, scale: 0}", "scale = 0");
   expect("- {t: 0, object: banana1, kind: duplicate}", "value is missing");
   expect("- {t: 0, object: banana1, kind: duplicate, value: banana2}", "has already");
+  expect("- {t: 0, kind: insert, model: ball.obj}", "value is missing");
+  expect("- {t: 0, kind: insert, value: ball}", "model is missing");
+  expect("- {t: 0, kind: insert, value: banana1, model: ball.obj}", "has already");
+  expect("- {t: 0, object: banana1, kind: insert, value: ball, model: ball.obj}", "leave it out");
+  expect("- {t: 0, kind: insert, value: ball, model: ball.obj, density: -1}", "density = -1");
   expect("- {t: 0, object: banana1, kind: contact, friction: -1}", "friction = -1");
   expect("- {t: 0, object: banana1, kind: contact, restitution: 1.5}", "restitution = 1.5");
   expect("- {t: 0, object: banana1, kind: contact, value: maybe}", "include, exclude");

@@ -118,6 +118,23 @@ class Graph(unittest.TestCase):
         changed = numpy.abs(before - after).max(axis=2) > 30.0  # far beyond the sensor noise
         self.assertGreater(changed.sum(), 3000, "about the pixels of a banana")
 
+    def test_an_inserted_model_is_drawn_and_lies_on_the_table(self):
+        with open(os.path.join(self.scene, "cad", "crate.off"), "w") as model:
+            corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+            faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+            model.write("OFF\n8 6 0\n" + "".join("%g %g %g\n" % c for c in corners) +
+                        "".join("4 %d %d %d %d\n" % f for f in faces))
+        out = self.edit("crate.bag", [{"t": 0, "kind": "insert", "value": "crate", "model": "cad/crate.off", "scale": 0.06,
+                                       "translation": [0.0, -0.1, 0.035], "density": 400, "color": [0.02, 0.02, 0.7]}])
+        state = clips.messages(out, "/calipso/state")[-1]
+        crate = [o for o in state.objects if o.object == "crate"][0]
+        self.assertEqual((crate.kind, len(crate.triangles)), ("rigid", 36))
+        self.assertAlmostEqual(min(crate.vertices[2::3]), 0.0, delta=0.01)
+        before = picture(clips.messages(self.bag, clips.IMAGE_TOPIC)[-1])
+        after = picture(clips.messages(out, EDITED)[-1])
+        blue = (after[..., 0] > 2 * after[..., 2]) & (numpy.abs(before - after).max(axis=2) > 30.0)
+        self.assertGreater(blue.sum(), 500, "the crate's pixels")
+
     def test_edits_over_the_topic_while_playing(self):
         # Latched on the test's own master: there before the simulator is, effective with the next frame.
         sender = subprocess.Popen(["rostopic", "pub", "--latch", "/calipso/edits", "calipso_msgs/Edit",

@@ -94,6 +94,7 @@ void SegmentationRos::segment() {
           makeSegmenter(key_image_, scene_, params_.mode == "bag"));
     const KeyFrame key = segmentKeyFrame(key_image_, *segmenter_, strokes_);
     tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels);
+    labels_ = key.labels;
     key_message_ = boost::make_shared<calipso_msgs::Segmentation>(
         toMsg(key_header_, key.labels, key.contours, 1.0f));
     segmentation_publisher_.publish(key_message_);
@@ -105,9 +106,16 @@ void SegmentationRos::segment() {
   reporter_.timing(key_header_.stamp, millisecondsSince(start));
 }
 
+// Who waits for the labels of a frame gets some, even if the frame cannot be read: those of the frame before.
 void SegmentationRos::trackFrame(const sensor_msgs::ImageConstPtr& msg) {
   const auto start = std::chrono::steady_clock::now();
-  const TrackedMask tracked = tracker_->track(colourImageFromMsg(msg));
+  TrackedMask tracked{labels_, 0.0f};
+  try {
+    tracked = tracker_->track(colourImageFromMsg(msg));
+    labels_ = tracked.labels;
+  } catch (const std::exception& error) {
+    reporter_.warn(msg->header.stamp, error.what());
+  }
   segmentation_publisher_.publish(toMsg(msg->header, tracked.labels, {}, tracked.confidence));
   reporter_.timing(msg->header.stamp, millisecondsSince(start));
 }

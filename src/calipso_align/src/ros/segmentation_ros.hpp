@@ -49,6 +49,7 @@ class SegmentationRos {
   std_msgs::Header key_header_;
   cv::Mat key_image_;                               // empty before the first frame
   std::unique_ptr<Segmenter> segmenter_;
+  cv::Mat labels_;                                  // of the newest frame that could be read
   std::unique_ptr<MaskTracker> tracker_;            // null while there is no segmentation
   calipso_msgs::SegmentationConstPtr key_message_;  // handed to every new subscriber
 };

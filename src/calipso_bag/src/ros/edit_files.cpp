@@ -45,7 +45,7 @@ std::vector<calipso_msgs::Edit> readBag(const std::string& path, const Scene& sc
     if (edits.back().header.stamp.isZero()) edits.back().header.stamp = report->header.stamp;
     const Edit edit = fromMsg(edits.back(), first_stamp);
     validate(edit, names);
-    if (!edit.copy.empty()) names.push_back(edit.copy);
+    if (!edit.new_name.empty()) names.push_back(edit.new_name);
   }
   return edits;
 }

@@ -32,6 +32,7 @@ calipso_msgs::ObjectState toMsg(const ObjectSnapshot& s) {
   m.sleeping = s.sleeping;
   m.pose = calipso::toMsg(s.world_from_object);
   m.vertices.assign(s.vertices.data(), s.vertices.data() + s.vertices.size());
+  m.triangles.assign(s.triangles.data(), s.triangles.data() + s.triangles.size());
   m.von_mises.assign(s.von_mises.data(), s.von_mises.data() + s.von_mises.size());
   m.kinetic_energy = s.kinetic_energy;
   m.elastic_energy = s.elastic_energy;
@@ -77,6 +78,7 @@ calipso_msgs::ObjectPlan toMsg(const PlanEntry& e) {
 WorldScene toWorldScene(const Scene& scene, const calipso_msgs::AlignedModels& models) {
   WorldScene w;
   w.camera = scene.camera;
+  w.directory = scene.directory;
   w.gravity = scene.gravity;
   w.planes = scene.planes;
   for (const std::string& path : scene.support_meshes)

@@ -209,6 +209,7 @@ ObjectSnapshot World::Impl::snapshot(const Actor& actor) const {
   s.world_from_object = poseOf(actor, now);
   if (!actor.edited || actor.removed) return s;
   s.vertices = verticesOf(actor);
+  if (actor.inserted && actor.source.empty()) s.triangles = actor.object.mesh.triangles;
   if (actor.soft) {
     s.sleeping = actor.asleep;
     s.von_mises = actor.soft->body().surfaceVonMises();

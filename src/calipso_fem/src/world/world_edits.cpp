@@ -41,6 +41,8 @@ ObjectKind World::Impl::kindFor(const Actor& actor, const Edit& edit) const {
       return actor.holder == Holder::kAttachment ? ObjectKind::kDeformable : ObjectKind::kRigid;
     case EditKind::kObjectKind:
       return edit.object_kind;
+    case EditKind::kInsert:
+      return ObjectKind::kRigid;
     case EditKind::kTransform:
       return ObjectKind::kKinematic;
     default:
@@ -231,12 +233,12 @@ std::string World::Impl::copy(Actor& actor, const Edit& edit) {
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   motion.linear() = edit.rotation.normalized().toRotationMatrix();
   motion.translation() = centroid + edit.translation - motion.linear() * centroid;
-  Actor& fresh = duplicate(actor.object.name, edit.copy, motion);
-  fresh.source = actor.source.empty() ? actor.object.name : actor.source;
+  Actor& fresh = duplicate(actor.object.name, edit.new_name, motion);
+  fresh.source = actor.source.empty() && !actor.inserted ? actor.object.name : actor.source;
   fresh.look = actor.look;
   fresh.edited = true;
   if (edit.scale != 1.0) scale(fresh, edit.scale);
-  return edit.copy + " is a copy of " + actor.object.name + ", moved by " +
+  return edit.new_name + " is a copy of " + actor.object.name + ", moved by " +
          describe(edit.translation) + " m";
 }
 
@@ -246,8 +248,9 @@ std::string World::Impl::changeLook(Actor& actor, const Edit& edit) {
   actor.edited = true;
   Look& look = actor.look;
   if (edit.color.allFinite()) {
-    look.absolute = edit.mode == EditMode::kAbsolute;
-    look.color = edit.color;
+    const bool replaces = edit.mode == EditMode::kAbsolute;
+    look.color = look.absolute && !replaces ? look.color.cwiseProduct(edit.color).eval() : edit.color;
+    look.absolute |= replaces;
   }
   if (!std::isnan(edit.specular)) look.specular = edit.specular;
   if (!std::isnan(edit.roughness)) look.roughness = edit.roughness;

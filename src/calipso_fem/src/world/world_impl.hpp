@@ -49,6 +49,7 @@ struct World::Impl {
   // Attachments and what holds the original are not copied.
   Actor& duplicate(const std::string& source, const std::string& name,
                    const Eigen::Isometry3d& motion);
+  int freeIndex() const;  // a label that no object has
   void copySoft(Actor& copy, const Actor& source, const Eigen::Isometry3d& motion);
   void addColliders();
   void addCollider(Actor& actor);
@@ -81,6 +82,7 @@ struct World::Impl {
   std::string press(Actor& actor, const Edit& edit);
   std::string blow(Actor& actor, const Edit& edit);
   std::string blowEverywhere(const Edit& edit);
+  std::string insert(const Edit& edit);
   void lead(Actor& actor, Pull& pull);
   void scale(Actor& actor, double factor);
   std::string remove(Actor& actor);

@@ -76,6 +76,12 @@ void World::Impl::applyRules(const Actor& actor) {
   }
 }
 
+int World::Impl::freeIndex() const {
+  int index = 1;
+  for (const Actor& actor : actors) index = std::max(index, actor.object.index + 1);
+  return index;
+}
+
 Actor& World::Impl::addObject(const WorldObject& object, const ObjectSettings& settings) {
   scene.objects.push_back(object);
   try {
@@ -110,7 +116,7 @@ Actor& World::Impl::duplicate(const std::string& source_name, const std::string&
   WorldObject object = source.object;
   object.name = name;
   object.attachments.clear();
-  for (const Actor& actor : actors) object.index = std::max(object.index, actor.object.index + 1);
+  object.index = freeIndex();
   object.world_from_object = motion * moves.world_from_object;
   Actor& copy = addObject(object, source.settings);
   copy.observed_material = source.observed_material;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 
@@ -19,6 +20,8 @@ std::string World::Impl::applyToScene(const Edit& edit) {
       return "what is simulated runs at " + std::to_string(edit.factor) + " of the video's speed";
     case EditKind::kTimeScale:
       return "the video runs at " + std::to_string(edit.factor) + " of its speed";
+    case EditKind::kInsert:
+      return insert(edit);
     case EditKind::kLight:
       sun = {edit.vector, edit.factor};
       return "the sun stands towards " + describe(edit.vector);
@@ -60,6 +63,36 @@ std::string World::Impl::blowEverywhere(const Edit& edit) {
     if (!actor.removed) message += (message.empty() ? "" : "; ") + blow(actor, edit);
   }
   return message.empty() ? "there is nothing that wind could move" : message;
+}
+
+// A CAD model that the video does not have. It is rigid unless an edit to come needs more.
+std::string World::Impl::insert(const Edit& edit) {
+  WorldObject object;
+  object.name = edit.new_name;
+  object.index = freeIndex();
+  try {
+    object.mesh = loadMesh((std::filesystem::path(scene.directory) / edit.model_path).string());
+  } catch (const std::runtime_error& error) {
+    throw std::invalid_argument(error.what());
+  }
+  object.mesh.vertices *= edit.scale;
+  object.world_from_object.linear() = edit.rotation.normalized().toRotationMatrix();
+  object.world_from_object.translation() =
+      edit.translation -
+      object.world_from_object.linear() * object.mesh.vertices.colwise().mean().transpose();
+  ObjectSettings settings = params.settingsOf(object.name);
+  const auto give = [](double value, std::optional<double>& to) { if (!std::isnan(value)) to = value; };
+  give(edit.youngs_modulus, settings.youngs_modulus);
+  give(edit.poissons_ratio, settings.poissons_ratio);
+  give(edit.density, settings.density);
+  give(edit.damping, settings.damping);
+  if (!std::isnan(edit.friction)) settings.surface.friction = edit.friction;
+  if (!std::isnan(edit.restitution)) settings.surface.restitution = edit.restitution;
+  Actor& fresh = addObject(object, settings);
+  const Eigen::Vector3d grey = Eigen::Vector3d::Constant(0.5);
+  fresh.look = {edit.color.allFinite() ? edit.color : grey, true, edit.specular, edit.roughness};
+  touch(fresh, edit);
+  return object.name + " is a new object at " + describe(edit.translation) + " m";
 }
 
 std::string World::Impl::changeContact(Actor& actor, const Edit& edit) {

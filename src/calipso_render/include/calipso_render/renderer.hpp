@@ -42,6 +42,7 @@ struct ObjectInFrame {
   bool removed = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
   Points vertices;       // world, m, one per model vertex; only read where edited
+  Triangles triangles;   // of an object that no model describes; empty: its model's
 };
 
 struct FrameInput {
@@ -107,7 +108,7 @@ class Renderer {
   FrameOutput composite(const FrameInput& frame);
 
  private:
-  void addCopies(const FrameInput& frame);
+  void addNewcomers(const FrameInput& frame);
 
   std::shared_ptr<const Prepared> prepared_;
   RenderParams params_;

@@ -101,6 +101,9 @@ ObjectInFrame fromMsg(const calipso_msgs::ObjectState& state) {
   for (std::size_t i = 0; i + 2 < state.vertices.size(); i += 3) {
     object.vertices.emplace_back(state.vertices[i], state.vertices[i + 1], state.vertices[i + 2]);
   }
+  for (std::size_t i = 0; i + 2 < state.triangles.size(); i += 3) {
+    object.triangles.emplace_back(state.triangles[i], state.triangles[i + 1], state.triangles[i + 2]);
+  }
   return object;
 }
 

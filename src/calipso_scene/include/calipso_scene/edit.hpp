@@ -23,7 +23,7 @@ struct Region {
 
 enum class EditKind {
   kTransform, kPull, kFix, kRelease, kMaterial, kGravity, kVelocity, kObjectKind, kRemove, kReset, kDuplicate,
-  kContact, kWind, kPressure, kTwist, kSpeedScale, kTimeScale, kAppearance, kLight
+  kInsert, kContact, kWind, kPressure, kTwist, kSpeedScale, kTimeScale, kAppearance, kLight
 };
 enum class EditMode { kForce, kTarget, kAbsolute, kFactor, kAdd, kEstimated };
 enum class ObjectKind { kStatic, kKinematic, kRigid, kDeformable };
@@ -48,7 +48,8 @@ struct Edit {
   double density = kUnchanged;
   double damping = kUnchanged;
   ObjectKind object_kind = ObjectKind::kStatic;
-  std::string copy;             // duplicate: the new object's name
+  std::string new_name;         // duplicate, insert: the new object's
+  std::string model_path;       // insert: a CAD file
   std::string other;            // contact: the other object or support; empty: everything
   bool meet = true;             // contact: include (true) or exclude
   double friction = kUnchanged;

@@ -38,6 +38,7 @@ struct WorldScene {
   std::vector<SupportPlane> planes;
   std::vector<SupportMesh> support_meshes;
   std::vector<WorldObject> objects;
+  std::string directory;  // from which the paths of edits start
 };
 
 // How an object moves in the video at one instant (calipso_msgs/ObjectDynamics).
@@ -124,6 +125,8 @@ struct ObjectSnapshot {
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // best rigid motion
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>
       vertices;                 // #V x 3; empty unless edited
+  Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>
+      triangles;                // #F x 3, of a model that the video does not have; else empty
   Eigen::VectorXd von_mises;    // #V, Pa; empty unless deformable
   double kinetic_energy = 0.0;  // J
   double elastic_energy = 0.0;  // J
