@@ -13,6 +13,7 @@ namespace {
 
 constexpr float kShaded = 0.985f;       // visible fraction of the sun below which a pixel counts as shaded
 constexpr float kSkyShaded = 0.85f;     // the same for the sky: the dark line along a contact
+constexpr float kOpenSky = 0.4f;        // ... above which the dark of a shadow says how dark the sun's absence is
 constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and model are misfit
 constexpr std::size_t kFurtherViews = 5;  // beside the key frame
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
@@ -54,16 +55,17 @@ cv::Mat planeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& p
   return visibility;
 }
 
-// Median of picture / plate per channel over pixels of the full shadow; the light's own ratio if too few.
-cv::Vec3f measureUmbra(const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& visibility, const cv::Mat& labels,
+// Median of picture / plate per channel over pixels of the full shadow, where all of the sky would be seen; the light's
+// own ratio if there are too few. @param sun, sky visible parts of them on the support planes
+cv::Vec3f measureUmbra(const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& labels,
                        const cv::Vec3f& predicted) {
   cv::Vec3f umbra = predicted;
   for (int c = 0; c < 3; ++c) {
     std::vector<float> ratios;
     for (int v = 0; v < picture.rows; ++v) {
       for (int u = 0; u < picture.cols; ++u) {
-        if (visibility.at<float>(v, u) > 0.15f || labels.at<std::uint8_t>(v, u) != 0) continue;
-        const float lit = linearFromRealCode(plate.at<cv::Vec3f>(v, u)[c]);
+        if (sun.at<float>(v, u) > 0.15f || sky.at<float>(v, u) < kOpenSky || labels.at<std::uint8_t>(v, u) != 0) continue;
+        const float lit = linearFromRealCode(plate.at<cv::Vec3f>(v, u)[c]) * sky.at<float>(v, u);
         if (lit > 0.01f) ratios.push_back(linearFromRealCode(picture.at<cv::Vec3f>(v, u)[c]) / lit);
       }
     }
@@ -232,7 +234,7 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const Background& s
   inventBackground(shaded, frames.front(), p.background);
   p.plate_linear = linearOf(p.background.plate);
   p.umbra = any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
-                      : measureUmbra(picture, p.background.plate, visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));
+                      : measureUmbra(picture, p.background.plate, visibility, sky_visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));
 }
 
 void remark(const ClipSample& clip, Prepared& p) {

@@ -130,6 +130,31 @@ TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
   EXPECT_EQ(cv::countNonZero(left_over), 0);
 }
 
+// Near the ball the shadow is darker than the sun's absence makes it: the ball hides sky, too.
+TEST(Renderer, TheDarkOfAShadowIsToldFromTheHiddenSky) {
+  const cv::Vec3f umbra(0.45f, 0.4f, 0.35f);
+  const ObjectModel ball = ballAt({0.0, 0.1, kBallRadius});
+  ClipFrame frame = frameWithBall(ball);
+  const Surface surface = makeSurface(ball);
+  const std::vector<Occluder> occluder = {{&surface.key_vertices, &surface.triangles}};
+  const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}), sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = receiverAt(table(), frame.camera, u, v);
+      if (frame.labels.at<std::uint8_t>(v, u) != 0 || !r) continue;
+      const float part = sun.visibility(r->position, r->normal), open = sky.visibility(r->position, r->normal);
+      for (int c = 0; c < 3; ++c) {
+        std::uint8_t& code = frame.bgr.at<cv::Vec3b>(v, u)[c];
+        code = quantise(codeFromLinear(linearFromCode(code) * (umbra[c] * open + (1.0f - umbra[c]) * part)));
+      }
+    }
+  }
+  ClipSample clip;
+  clip.add(frame);
+  const Prepared prepared = prepare(clip, {ball}, params());
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(prepared.umbra[c], umbra[c], 0.05f) << c;  // the table behind it is invented
+}
+
 TEST(Renderer, AMovedShadowTakesItsWholeEdgeAlong) {
   const Setting s(params());
   const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(true, {0.25f, 0.0f, 0.0f}));
