@@ -171,6 +171,8 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
       poseCovariance(problem, x, last,
                      problem.camera.world_from_camera.inverse() * result.world_from_object);
   const FitQuality quality = assess(problem, contour, x);
+  result.placed = true;
+  result.met_mean_px = quality.met_mean_px;
   result.contour_mean_px = quality.mean_px;
   result.contour_p95_px = quality.p95_px;
   result.residual_px = residualsPerLoop(problem, quality, contour);

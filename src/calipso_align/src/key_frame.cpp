@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "calipso_align/alignment.hpp"
 #include "calipso_align/depth_image.hpp"
 #include "calipso_align/silhouette.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
@@ -29,6 +30,29 @@ std::string framePath(const Scene& scene, int frame) {
   return scene.directory + "/" + name;
 }
 
+// Fits the low-order deformations only: what is to be told is where the contour is implausible.
+ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
+                        const std::optional<DepthObservation>& depth) {
+  AlignOptions options;
+  options.levels = {};
+  options.planes = scene.planes;
+  options.depth = depth;
+  return [mesh = loadMesh(object.cad_path), camera = scene.camera, options,
+          rough = object.initial_world_from_object](
+             const std::vector<ContourLoop>& contour) -> std::optional<ModelView> {
+    constexpr double kLeastTolerancePx = 1.5;
+    const AlignmentResult fit = align(mesh, camera, rough, contour, options);
+    if (!fit.placed) return std::nullopt;
+    const Points x = transformed(camera.world_from_camera.inverse() * fit.world_from_object,
+                                 fit.mesh.vertices);
+    const DepthRendering rendering = renderDepth(x, mesh.triangles, camera);
+    ModelView view{maskOf(rendering, camera), cv::Mat1f::zeros(camera.height, camera.width),
+                   std::max(kLeastTolerancePx, 2.0 * fit.met_mean_px)};
+    if (!rendering.roi.empty()) rendering.depth.copyTo(view.depth(rendering.roi));
+    return view;
+  };
+}
+
 }  // namespace
 
 cv::Mat placedSilhouette(const Scene& scene, const SceneObject& object) {
@@ -46,11 +70,13 @@ cv::Mat placedSilhouette(const Scene& scene, const SceneObject& object) {
   return maskOf(renderDepth(x, mesh.triangles, camera), camera);
 }
 
-std::vector<SegmentationTarget> segmentationTargets(const Scene& scene) {
+std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
+                                                    const std::optional<DepthObservation>& depth) {
   std::vector<SegmentationTarget> targets;
   for (const SceneObject& object : scene.objects) {
     const cv::Rect rect(object.rect[0], object.rect[1], object.rect[2], object.rect[3]);
-    targets.push_back({object.name, object.index, rect, {}, placedSilhouette(scene, object)});
+    targets.push_back({object.name, object.index, rect, {}, placedSilhouette(scene, object),
+                       modelFitter(scene, object, depth)});
   }
   return targets;
 }
@@ -70,7 +96,7 @@ std::vector<ObjectContour> extractContours(const cv::Mat& image, const cv::Mat& 
 Segmenter makeSegmenter(const cv::Mat& image, const Scene& scene, bool use_depth) {
   std::optional<DepthObservation> depth;
   if (use_depth) depth = loadDepth(scene);
-  return Segmenter(image, segmentationTargets(scene), {}, depth ? cv::Mat(depth->depth) : cv::Mat());
+  return Segmenter(image, segmentationTargets(scene, depth), {}, depth ? cv::Mat(depth->depth) : cv::Mat());
 }
 
 KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::Mat& strokes) {

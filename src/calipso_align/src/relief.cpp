@@ -107,6 +107,7 @@ Relief makeRelief(const cv::Mat& image, const cv::Mat& depth) {
 
   double nearest = 0.0;
   cv::minMaxLoc(inverse, nullptr, &nearest);
+  relief.units = kNoiseUnits / noise;
   relief.volume = static_cast<double>(depth.total()) * kNoiseUnits * nearest / noise;
   relief.surface.create(depth.size(), CV_32FC3);
   relief.state.create(depth.size(), CV_8U);
@@ -137,6 +138,7 @@ Relief resized(const Relief& relief, const cv::Rect& view, const cv::Size& size)
   if (relief.empty()) return result;
   cv::resize(relief.surface(view), result.surface, size, 0, 0, cv::INTER_NEAREST);
   cv::resize(relief.state(view), result.state, size, 0, 0, cv::INTER_NEAREST);
+  result.units = relief.units;
   result.volume = relief.volume;
   result.registered = relief.registered;
   return result;

@@ -18,7 +18,7 @@ constexpr int kMinModelPixels = 20;
 
 Segmenter::Segmenter(const cv::Mat& image, std::vector<SegmentationTarget> targets,
                      SegmenterParams params, const cv::Mat& depth)
-    : size_(image.size()), targets_(std::move(targets)), params_(params) {
+    : size_(image.size()), picture_(image), targets_(std::move(targets)), params_(params) {
   checkPicture(image);
   checkTargets(targets_, size_);
   checkDepth(depth, size_);
@@ -35,10 +35,14 @@ const cv::Mat& Segmenter::segment(const cv::Mat& strokes) {
   const cv::Mat seen = strokes.empty() ? strokes : strokes(view_);
   setSeeds(targets_, seen, coarse_);
   setSeeds(targets_, seen, fine_);
-  if (models_.empty() || strokesContradictModels())
+  if (models_.empty() || strokesContradictModels()) {
     learn();
-  else
+    cutFine();
+    adoptLabels();
+    guide();
+  } else {
     cut(freePixels(coarse_), coarse_);
+  }
   cutFine();
   adoptLabels();
   return labels_;
@@ -52,6 +56,9 @@ void Segmenter::learn() {
   for (size_t k = 0; k < targets_.size(); ++k)
     coarse_.labels.setTo(static_cast<double>(k + 1), coarse_.seeds == static_cast<int>(k + 2));
   shapes_.assign(targets_.size(), std::nullopt);
+  fitted_.assign(targets_.size(), std::nullopt);
+  coarse_.expected.clear();
+  fine_.expected.clear();
   initialiseModels();
   for (int round = 0; round < params_.rounds; ++round) {
     evaluate(coarse_);
@@ -179,17 +186,136 @@ cv::Mat Segmenter::placedSilhouette(size_t k, const cv::Size& size) const {
   return resized;
 }
 
-// A silhouette that does not fit what the colours say has no say.
-void Segmenter::addShapeOdds(SegmentationLevel& level) const {
-  constexpr double kNoAgreement = 0.5, kFullAgreement = 0.8;
+// Models fitted to what was found say where the objects end beyond what a rough placement can, which
+// colours are theirs where strokes did not go, and how deep in the scene they lie.
+void Segmenter::guide() {
+  fitModels();
+  if (std::none_of(fitted_.begin(), fitted_.end(), [](const auto& f) { return f.has_value(); })) return;
+  expectSurfaces(coarse_);
+  expectSurfaces(fine_);
+  measureSurfaces();
+  // A depth image has told objects from background already, and better than an outline does.
+  const bool relearn = coarse_.relief.empty();
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds; ++round) {
+    if (relearn) relearnColours();
+    evaluate(coarse_);
+    cut(freePixels(coarse_), coarse_);
+  }
+  evaluate(fine_);
+}
+
+void Segmenter::relearnColours() {
+  const std::vector<cv::Mat> own = guidedPixels();
+  for (size_t k = 0; k < models_.size(); ++k)
+    if (cv::countNonZero(own[k]) >= kMinModelPixels)
+      fitColours(coarse_, own[k], params_.components, models_[k]);
+}
+
+void Segmenter::fitModels() {
   for (size_t k = 0; k < targets_.size(); ++k) {
-    if (!shapes_[k]) continue;
-    const double trust = std::clamp(
-        (shapes_[k]->agreement - kNoAgreement) / (kFullAgreement - kNoAgreement), 0.0, 1.0);
-    level.costs[k + 1] -=
-        shapeOdds(placedSilhouette(k, level.image.size()) > 127, static_cast<float>(trust * params_.shape_weight),
-                  params_.shape_tolerance * static_cast<float>(size_.width) * static_cast<float>(level.image.cols) /
-                      static_cast<float>(image_.cols));
+    if (!targets_[k].fit_model) continue;
+    const ObjectContour contour =
+        extractContour(picture_, labels_, targets_[k].label, targets_[k].name);
+    std::optional<ModelView> view = targets_[k].fit_model(contour.loops);
+    if (!view) continue;
+    const cv::Mat silhouette = view->silhouette(view_), own = labels_(view_) == targets_[k].label;
+    const double agreement = cv::countNonZero(silhouette & own) /
+                             static_cast<double>(std::max(1, cv::countNonZero(silhouette | own)));
+    fitted_[k] = FittedShape{{silhouette, view->depth(view_), view->tolerance_px}, agreement};
+  }
+}
+
+// Where fitted models have their surfaces, in the relief's units.
+void Segmenter::expectSurfaces(SegmentationLevel& level) const {
+  level.expected.assign(models_.size(), cv::Mat());
+  if (level.relief.empty()) return;
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    if (!fitted_[k]) continue;
+    cv::Mat depth;
+    cv::resize(fitted_[k]->view.depth, depth, level.image.size(), 0, 0, cv::INTER_NEAREST);
+    cv::Mat& expected = level.expected[k + 1];
+    expected = cv::Mat::zeros(depth.size(), CV_32F);
+    for (int y = 0; y < depth.rows; ++y)
+      for (int x = 0; x < depth.cols; ++x)
+        if (depth.at<float>(y, x) > 0.0f)
+          expected.at<float>(y, x) =
+              static_cast<float>(level.relief.units) / depth.at<float>(y, x);
+  }
+}
+
+// How far the relief is off the models' surfaces where the labels have the objects.
+void Segmenter::measureSurfaces() {
+  constexpr float kLeastSigma = 2.0f;   // the relief's own noise
+  for (size_t k = 1; k < models_.size(); ++k) {
+    models_[k].expected.reset();
+    const cv::Mat& expected = coarse_.expected[k];
+    if (expected.empty() || !models_[k].surfaces) continue;
+    std::vector<float> errors;
+    for (int y = 0; y < expected.rows; ++y)
+      for (int x = 0; x < expected.cols; ++x)
+        if (expected.at<float>(y, x) > 0.0f && coarse_.labels.at<uchar>(y, x) == k &&
+            coarse_.relief.state.at<uchar>(y, x) == Relief::kSurface)
+          errors.push_back(
+              std::abs(coarse_.relief.surface.at<cv::Vec3f>(y, x)[2] - expected.at<float>(y, x)));
+    if (errors.size() < static_cast<size_t>(kMinModelPixels)) continue;
+    const auto middle = errors.begin() + errors.size() / 2;
+    std::nth_element(errors.begin(), middle, errors.end());
+    const float sigma = std::max(kLeastSigma, 1.4826f * *middle);
+    const double area = static_cast<double>(cv::countNonZero(fitted_[k - 1]->view.silhouette));
+    models_[k].expected = ExpectedSurface{
+        sigma, models_[k].surfaces->someCost() +
+                   static_cast<float>(std::log(area * sigma * std::sqrt(2.0 * CV_PI)))};
+  }
+}
+
+// What is each label's beyond doubt now that its model stands: deep inside of the silhouette and not
+// another's, or found there and not contradicted; of the background what is clear of all silhouettes.
+std::vector<cv::Mat> Segmenter::guidedPixels() const {
+  const cv::Size size = coarse_.image.size();
+  const double scale = static_cast<double>(size.width) / image_.cols;
+  const cv::Mat near = surroundings(coarse_), contradicted = contradictedPixels(coarse_);
+  std::vector<cv::Mat> own = {near & (coarse_.labels == 0)};
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    const cv::Mat found = (coarse_.labels == static_cast<int>(k + 1)) & ~contradicted;
+    if (!fitted_[k]) {
+      own.push_back(found);
+      continue;
+    }
+    cv::Mat silhouette, depth;
+    cv::resize(fitted_[k]->view.silhouette, silhouette, size, 0, 0, cv::INTER_NEAREST);
+    cv::distanceTransform(silhouette, depth, cv::DIST_L2, 3);
+    const double tolerance = std::max(1.0, fitted_[k]->view.tolerance_px * scale);
+    const cv::Mat deep = (depth > tolerance) & ((coarse_.labels == 0) | (coarse_.labels == static_cast<int>(k + 1)));
+    own.push_back(deep | (found & silhouette));
+    own[0] &= ~grown(silhouette, static_cast<int>(std::ceil(tolerance)));
+  }
+  for (size_t k = 0; k < own.size(); ++k) {
+    own[k].setTo(0, (coarse_.seeds != 0) & (coarse_.seeds != static_cast<int>(k + 1)));
+    own[k] |= coarse_.seeds == static_cast<int>(k + 1);
+  }
+  return own;
+}
+
+// A silhouette that does not fit what the colours say has no say. That of a fitted model is wrong about
+// a pixel as often as it was about those it was fitted to.
+void Segmenter::addShapeOdds(SegmentationLevel& level) const {
+  constexpr double kNoAgreement = 0.5, kFullAgreement = 0.8, kMostCertain = 0.99;
+  const double scale = static_cast<double>(level.image.cols) / image_.cols;
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    if (fitted_[k]) {
+      const double p = std::clamp(fitted_[k]->agreement, kNoAgreement, kMostCertain);
+      cv::Mat silhouette;
+      cv::resize(fitted_[k]->view.silhouette, silhouette, level.image.size(), 0, 0, cv::INTER_AREA);
+      level.costs[k + 1] -= shapeOdds(silhouette > 127, static_cast<float>(std::log(p / (1.0 - p))),
+                                      static_cast<float>(fitted_[k]->view.tolerance_px * scale));
+    } else if (shapes_[k]) {
+      const double trust = std::clamp(
+          (shapes_[k]->agreement - kNoAgreement) / (kFullAgreement - kNoAgreement), 0.0, 1.0);
+      level.costs[k + 1] -= shapeOdds(placedSilhouette(k, level.image.size()) > 127,
+                                      static_cast<float>(trust * params_.shape_weight),
+                                      static_cast<float>(params_.shape_tolerance * size_.width * scale));
+    }
   }
 }
 

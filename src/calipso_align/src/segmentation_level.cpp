@@ -31,6 +31,20 @@ cv::Mat resized(const cv::Mat& mask, const cv::Size& size) {
   return result;
 }
 
+// Cost of a label's surface at a pixel: a fitted model's, which may lack details, or any of the label's.
+float surfaceCost(const LabelModel& model, const SegmentationLevel& level, size_t k, int x, int y) {
+  constexpr float kDetails = 0.2f;   // part of a label's pixels that its model does not know
+  const float any = model.surfaces->cost(level.relief, x, y);
+  if (!model.expected || level.relief.state.at<uchar>(y, x) != Relief::kSurface) return any;
+  const float expected = level.expected[k].at<float>(y, x);
+  float on_model = 0.0f;
+  if (expected > 0.0f) {
+    const float r = (level.relief.surface.at<cv::Vec3f>(y, x)[2] - expected) / model.expected->sigma;
+    on_model = (1.0f - kDetails) * std::exp(any - model.expected->nearest_cost - 0.5f * r * r);
+  }
+  return any - std::log(on_model + kDetails);
+}
+
 // Strokes in a smaller picture, where a line of one pixel must not get lost: of the marks that fall
 // into a pixel the first counts.
 cv::Mat thinnedOut(const cv::Mat& strokes, const cv::Size& size) {
@@ -143,7 +157,7 @@ void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
             cost.at<float>(y, x) = std::min(
                 outlier_cost, colours->cost(cv::Vec3f(level.image.at<cv::Vec3b>(y, x))));
           if (models[k].surfaces)
-            cost.at<float>(y, x) += models[k].surfaces->cost(level.relief, x, y);
+            cost.at<float>(y, x) += surfaceCost(models[k], level, k, x, y);
         }
   }
 }

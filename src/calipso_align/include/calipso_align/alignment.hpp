@@ -55,6 +55,8 @@ struct AlignmentResult {
   TriangleMesh rest;                       // S, as given
   std::vector<std::vector<float>> residual_px;  // per loop and point; positive: the model reaches
                                                 // too far out; NaN: unknown or without counterpart
+  bool placed = false;                     // false: the rough placement was of no use, nothing was fitted
+  double met_mean_px = 0.0;                // of known points that the model meets
   double contour_mean_px = 0.0;            // of known points
   double contour_p95_px = 0.0;
   double noise_px = 0.0;                   // estimated noise of the contour

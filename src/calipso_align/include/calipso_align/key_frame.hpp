@@ -1,8 +1,10 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
+#include "calipso_align/alignment.hpp"
 #include "calipso_align/contour.hpp"
 #include "calipso_align/segmentation.hpp"
 #include "calipso_scene/scene.hpp"
@@ -21,8 +23,9 @@ struct KeyFrame {
 // with a margin of a quarter of the picture on every side; all zero behind the camera. @throw std::runtime_error (mesh file)
 cv::Mat placedSilhouette(const Scene& scene, const SceneObject& object);
 
-// The scene's objects as the segmenter wants them.
-std::vector<SegmentationTarget> segmentationTargets(const Scene& scene);
+// The scene's objects as the segmenter wants them; depth: of the key frame, where there is one.
+std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
+                                                    const std::optional<DepthObservation>& depth);
 
 // A segmenter of the scene's key frame. use_depth: the scene's depth image, where it has one, is of
 // this very picture. @throw std::runtime_error naming a file that cannot be read

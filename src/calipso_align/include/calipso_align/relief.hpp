@@ -14,6 +14,7 @@ struct Relief {
   enum State : uchar { kUnusable = 0, kNone = 1, kSurface = 2 };
   cv::Mat surface;  // CV_32FC3: u, v (px) and inverse depth in half standard deviations of its noise
   cv::Mat state;    // CV_8U: kUnusable near edges when `registered` is false, kNone without depth
+  double units = 0.0;       // of `surface` per inverse metre
   double volume = 0.0;      // px x px x units of inverse depth: where a surface may be
   bool registered = false;  // its edges lie on the picture's edges to a pixel: measured
 
@@ -45,6 +46,9 @@ class SurfaceModel {
 
   // Negative log intensity of what is seen at a pixel, nats.
   float cost(const Relief& relief, int x, int y) const;
+
+  // Of any surface, wherever it lies.
+  float someCost() const { return some_cost_; }
 
  private:
   std::vector<GaussianMixture> surfaces_;  // one, or none without enough samples

@@ -23,6 +23,12 @@ struct SegmenterParams {
   SmoothnessParams smoothness;
 };
 
+// A model that was fitted to the first contour, in pixels of the view.
+struct FittedShape {
+  ModelView view;
+  double agreement = 0.0;   // 0..1: overlap with the labels it was fitted to
+};
+
 // Interactive segmentation of one picture into several objects and the background (after GrabCut,
 // Rother et al. 2004): coarse first, then a narrow band with the colour models frozen. Colour models
 // are kept between calls, so that a further stroke costs two cuts only. One thread at a time.
@@ -54,6 +60,12 @@ class Segmenter {
   cv::Mat evidence(size_t k) const;
   void placeSilhouettes();
   cv::Mat placedSilhouette(size_t k, const cv::Size& size) const;
+  void guide();
+  void relearnColours();
+  void fitModels();
+  void expectSurfaces(SegmentationLevel& level) const;
+  void measureSurfaces();
+  std::vector<cv::Mat> guidedPixels() const;
   void addShapeOdds(SegmentationLevel& level) const;
   void evaluate(SegmentationLevel& level) const;
   void cut(const cv::Mat& free, SegmentationLevel& level) const;
@@ -61,6 +73,7 @@ class Segmenter {
   void adoptLabels();
 
   cv::Size size_;          // of the picture
+  cv::Mat picture_;
   cv::Rect view_;          // what matters of it: where targets may lie and what is near
   cv::Mat image_;          // the view
   std::vector<SegmentationTarget> targets_;
@@ -68,6 +81,7 @@ class Segmenter {
   SegmentationLevel coarse_, fine_;
   std::vector<LabelModel> models_;                  // per label number; empty before the first call
   std::vector<std::optional<PlacedShape>> shapes_;  // per target, in pixels of the view
+  std::vector<std::optional<FittedShape>> fitted_;  // per target, of the view
   cv::Mat labels_;
 };
 

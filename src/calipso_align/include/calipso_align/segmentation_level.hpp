@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calipso_align/gaussian_mixture.hpp"
+#include "calipso_align/model_view.hpp"
 #include "calipso_align/relief.hpp"
 
 namespace calipso::align {
@@ -21,6 +22,7 @@ struct SegmentationTarget {
   std::vector<cv::Point> lasso;  // px, polygon; empty: none. The object lies inside both.
   cv::Mat silhouette = {};       // CV_8U: roughly its shape and place, or empty. May be larger than
                                  // the picture, with an equal margin on opposite sides.
+  ModelFitter fit_model = {};    // or none
 };
 
 // The picture at one resolution and all that a cut needs there. Label number 0 is the background,
@@ -35,6 +37,8 @@ struct SegmentationLevel {
   std::vector<cv::Mat> costs;    // CV_32F per label number, nats
   float contrast_scale = 0.0f;   // beta of label_cut.hpp over the region
   Relief relief;                 // empty without a depth image
+  std::vector<cv::Mat> expected; // CV_32F per label number, as the relief's inverse depth: where a fitted
+                                 // model has its surface, 0 outside of it; or empty
   float jump_scale = 0.0f;       // of label_cut.hpp over the region
 };
 
@@ -50,11 +54,18 @@ SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<Segmentation
 void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& strokes,
               SegmentationLevel& level);
 
+// How well a fitted model's surface is met by the relief.
+struct ExpectedSurface {
+  float sigma = 1.0f;         // of the relief's inverse depth about it
+  float nearest_cost = 0.0f;  // nats, of a pixel that lies on it
+};
+
 // What a label looks like, and where its surfaces lie once that is known.
 struct LabelModel {
   std::optional<GaussianMixture> colours;       // all of them, or of surfaces where a relief tells them
   std::optional<GaussianMixture> open_colours;  // where a registered relief has no surface: sky
   std::optional<SurfaceModel> surfaces;
+  std::optional<ExpectedSurface> expected;
 };
 
 // Colours of the pixels under a mask; where a registered relief tells sky from surfaces, of both.
