@@ -24,7 +24,9 @@ std::vector<int> nearest(const std::vector<Feature>& queries, const std::vector<
 
 std::vector<Feature> featuresOf(const ContourTarget& target, double scale) {
   std::vector<Feature> features;
-  for (const TargetPoint& p : target.points) features.push_back(featureOf(p.pixel, p.normal, scale));
+  for (const TargetPoint& p : target.points) {
+    features.push_back(p.foreign ? kNowhere : featureOf(p.pixel, p.normal, scale));
+  }
   return features;
 }
 

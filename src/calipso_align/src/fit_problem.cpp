@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 namespace calipso::align {
@@ -93,6 +94,48 @@ void makeUnknown(TargetPoint& p, ContourTarget& target) {
   target.known_length_px -= target.length_px / target.points.size();
 }
 
+// Mask without what is narrower than 2 radius + 1 pixels.
+cv::Mat1b opened(const cv::Mat1b& mask, int radius) {
+  cv::Mat1b result;
+  const cv::Size size(2 * radius + 1, 2 * radius + 1);
+  cv::morphologyEx(mask, result, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_ELLIPSE, size));
+  return result;
+}
+
+// Largest radius of an opening that leaves the model's silhouette as it is, give or take its corners.
+int narrowestRadius(const cv::Mat1b& silhouette) {
+  constexpr int kLargest = 4;
+  constexpr double kCorners = 0.003;   // of the area
+  const double area = cv::countNonZero(silhouette);
+  for (int radius = kLargest; radius > 0; --radius) {
+    if (cv::countNonZero(opened(silhouette, radius)) >= (1.0 - kCorners) * area) return radius;
+  }
+  return 0;
+}
+
+// Spurs of the contour that are narrower than anything the model has are no part of it: what hides the
+// object or lies behind it was taken in.
+void markSpurs(const std::vector<ContourLoop>& contour, FitProblem& problem) {
+  constexpr double kInsidePx = 0.75;
+  const Camera& camera = problem.camera;
+  const cv::Mat1b silhouette =
+      maskOf(renderDepth(problem.X, problem.topology.triangles(), camera), camera);
+  const int radius = narrowestRadius(silhouette);
+  if (radius == 0 || cv::countNonZero(silhouette) == 0) return;
+  // A margin that continues the mask: the border of the picture makes nothing narrow.
+  cv::Mat1b inside = fillContour(contour, {camera.width, camera.height});
+  cv::copyMakeBorder(inside, inside, radius, radius, radius, radius, cv::BORDER_REPLICATE);
+  const cv::Mat1b spurs = inside & ~opened(inside, radius);
+  for (TargetPoint& p : problem.target.points) {
+    const Eigen::Vector2d within = p.pixel - kInsidePx * p.normal;
+    const cv::Point at(static_cast<int>(std::lround(within.x())) + radius,
+                       static_cast<int>(std::lround(within.y())) + radius);
+    if (!cv::Rect({}, spurs.size()).contains(at) || !spurs(at)) continue;
+    makeUnknown(p, problem.target);
+    p.foreign = true;
+  }
+}
+
 // Where the surroundings are nearer than the object, the contour is the edge of what hides it. What
 // the object stands on is nearer too, but reaches the contour at the object's depth: the inverse depth
 // of a plane is linear in the picture.
@@ -149,6 +192,7 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
                      0.0,
                      boundingDiagonal(cad)};
   problem.extent_px = extentOf(problem.target);
+  markSpurs(contour, problem);
   if (options.depth) {
     checkDepth(options.depth->depth, camera);
     markHidden(options.depth->depth, problem.target);

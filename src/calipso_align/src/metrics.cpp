@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <opencv2/imgproc.hpp>
 
 #include "calipso_align/contour_term.hpp"
 
@@ -86,17 +87,11 @@ double distanceToOutline(const Eigen::Vector2d& p, const std::vector<OutlinePoin
   return std::sqrt(best);
 }
 
-}  // namespace
-
-ContourError contourError(const std::vector<ContourLoop>& contour, const Points& x,
-                          const MeshTopology& topology, const Camera& camera) {
-  constexpr double kStepPx = 0.25;    // of the outline's samples: an eighth of a pixel at most is added
+// Distances both ways between the known contour and outline samples.
+ContourError errorBetween(const std::vector<ContourLoop>& contour,
+                          const std::vector<OutlinePoint>& outline) {
   constexpr double kSpacingPx = 1.0;  // of the contour's samples
-  const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
-  const std::vector<OutlinePoint> outline =
-      occludingContour(x, topology, rendering, camera, kStepPx);
   if (outline.empty()) return {1e9, 1e9};
-
   std::vector<double> errors;
   for (const ContourLoop& loop : contour) {
     Eigen::Vector2d last(-1e9, -1e9);
@@ -118,6 +113,44 @@ ContourError contourError(const std::vector<ContourLoop>& contour, const Points&
   std::nth_element(errors.begin(), p95, errors.end());
   error.p95_px = *p95;
   return error;
+}
+
+constexpr double kOutlineStepPx = 0.25;   // an eighth of a pixel at most is added
+
+// 255 where the background is joined to the picture's border.
+cv::Mat1b openBackground(const cv::Mat1b& mask) {
+  constexpr uchar kOpen = 128;
+  cv::Mat1b padded;
+  cv::copyMakeBorder(mask, padded, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::floodFill(padded, cv::Point(0, 0), cv::Scalar(kOpen));
+  return padded == kOpen;
+}
+
+}  // namespace
+
+ContourError contourError(const std::vector<ContourLoop>& contour, const Points& x,
+                          const MeshTopology& topology, const Camera& camera) {
+  const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
+  return errorBetween(contour, occludingContour(x, topology, rendering, camera, kOutlineStepPx));
+}
+
+ContourError hullError(const std::vector<ContourLoop>& contour, const Points& x,
+                       const MeshTopology& topology, const Camera& camera) {
+  const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
+  const cv::Mat1b open = openBackground(maskOf(rendering, camera));
+  std::vector<OutlinePoint> hull;
+  for (const OutlinePoint& p :
+       occludingContour(x, topology, rendering, camera, kOutlineStepPx)) {
+    const Eigen::Vector2d beyond = p.pixel + p.normal;
+    const cv::Point at(static_cast<int>(std::lround(beyond.x())) + 1,
+                       static_cast<int>(std::lround(beyond.y())) + 1);
+    if (cv::Rect({}, open.size()).contains(at) && open(at)) hull.push_back(p);
+  }
+  std::vector<ContourLoop> outer;
+  for (const ContourLoop& loop : contour) {
+    if (!loop.hole) outer.push_back(loop);
+  }
+  return errorBetween(outer, hull);
 }
 
 SurfaceError surfaceError(const Points& a, const Points& b, const Triangles& triangles_a,

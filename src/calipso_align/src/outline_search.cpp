@@ -14,14 +14,15 @@ Feature featureOf(const Eigen::Vector2d& pixel, const Eigen::Vector2d& normal, d
 OutlineSearch::OutlineSearch(const std::vector<Feature>& candidates, float reject_px,
                              float reject_turn)
     : reject_(reject_px * reject_px), reject_turn_(reject_turn) {
-  if (candidates.empty()) return;
-  constexpr float kPerCell = 2.0f;
-  float u1 = candidates[0].u, v1 = candidates[0].v;
-  u0_ = u1, v0_ = v1;
+  constexpr float kPerCell = 2.0f, kFar = std::numeric_limits<float>::max();
+  float u1 = -kFar, v1 = -kFar;
+  u0_ = v0_ = kFar;
   for (const Feature& f : candidates) {
+    if (std::isnan(f.u)) continue;
     u0_ = std::min(u0_, f.u), u1 = std::max(u1, f.u);
     v0_ = std::min(v0_, f.v), v1 = std::max(v1, f.v);
   }
+  if (u1 < u0_) return;
   // Outlines are curves: cells as long as a few of their points are apart.
   const float length = (u1 - u0_) + (v1 - v0_);
   cell_px_ = std::max({1.0f, length / 256.0f, kPerCell * length / candidates.size()});
@@ -33,12 +34,15 @@ OutlineSearch::OutlineSearch(const std::vector<Feature>& candidates, float rejec
            static_cast<int>((f.u - u0_) / cell_px_);
   };
   start_.assign(columns_ * rows_ + 1, 0);
-  for (const Feature& f : candidates) ++start_[cellOf(f) + 1];
+  for (const Feature& f : candidates) {
+    if (!std::isnan(f.u)) ++start_[cellOf(f) + 1];
+  }
   for (size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
   std::vector<int> next(start_.begin(), start_.end() - 1);
   features_.resize(candidates.size());
   index_.resize(candidates.size());
   for (size_t i = 0; i < candidates.size(); ++i) {
+    if (std::isnan(candidates[i].u)) continue;
     const int place = next[cellOf(candidates[i])]++;
     features_[place] = candidates[i];
     index_[place] = static_cast<int>(i);
@@ -61,7 +65,7 @@ void OutlineSearch::searchCell(int column, int row, const Feature& a, Best& best
 
 int OutlineSearch::nearest(const Feature& query) const {
   Best best{std::numeric_limits<float>::max(), -1};
-  if (features_.empty()) return -1;
+  if (features_.empty() || std::isnan(query.u)) return -1;
   const float x = (query.u - u0_) / cell_px_, y = (query.v - v0_) / cell_px_;
   const int column = static_cast<int>(std::floor(std::clamp(x, -1e6f, 1e6f)));
   const int row = static_cast<int>(std::floor(std::clamp(y, -1e6f, 1e6f)));

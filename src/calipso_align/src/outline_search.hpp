@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <vector>
 
 namespace calipso::align {
@@ -9,6 +10,9 @@ namespace calipso::align {
 struct Feature {
   float u, v, nu, nv;
 };
+
+constexpr float kUnset = std::numeric_limits<float>::quiet_NaN();
+constexpr Feature kNowhere = {kUnset, kUnset, kUnset, kUnset};   // pairs with nothing
 
 Feature featureOf(const Eigen::Vector2d& pixel, const Eigen::Vector2d& normal, double scale);
 

@@ -165,6 +165,8 @@ void addErrors(const EvaluationCase& one, const Points& x, const std::string& su
   const ContourError contour = contourError(truth.contour, x, topology, one.camera);
   line.addNumber("contour_mean_px" + suffix, contour.mean_px);
   line.addNumber("contour_p95_px" + suffix, contour.p95_px);
+  line.addNumber("hull_mean_px" + suffix,
+                 hullError(truth.contour, x, topology, one.camera).mean_px);
 
   std::optional<double> contour_vertex, all_vertex;
   if (truth.correspondence) {

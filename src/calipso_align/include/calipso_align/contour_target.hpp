@@ -14,6 +14,7 @@ struct TargetPoint {
   double weight;            // length of contour it stands for times its confidence, px
   bool known;               // false: it may be met, but pulls nobody
   int loop, index;          // where it comes from: points[index] of loops[loop]
+  bool foreign = false;     // true: no part of the model can be meant, nothing is paired with it
 };
 
 // The contour as the fit sees it: evenly spaced points with normals, and its noise level.

@@ -16,6 +16,10 @@ struct ContourError {
 ContourError contourError(const std::vector<ContourLoop>& contour, const Points& x,
                           const MeshTopology& topology, const Camera& camera);
 
+// The same between the outer hulls: loops that are no holes, and the outline towards the picture's border.
+ContourError hullError(const std::vector<ContourLoop>& contour, const Points& x,
+                       const MeshTopology& topology, const Camera& camera);
+
 struct SurfaceError {
   double mean = 0.0, rms = 0.0, hausdorff = 0.0;   // m
 };
