@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "bicubic.hpp"
 
 namespace calipso::render {
 namespace {
@@ -22,6 +22,7 @@ constexpr float kFlattest = 0.05f, kFull = 0.25f;  // cosine of the view from wh
 constexpr float kEnough = 0.3f;   // weight of a look that needs no other
 constexpr float kSeen = 1e-5f;    // sum of weights, cubed, below which a texel counts as not seen
 constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exact
+constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
 const cv::Vec3f kUnknown(0.3f, 0.3f, 0.3f);  // reflectance of an object that no picture shows
 
 // Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the first
@@ -125,6 +126,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   return r;
 }
 
+cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
+
 // How well a picture shows a surface point: 0 not at all, 1 straight on and well inside the mask.
 struct Look {
   float weight = 0.0f;
@@ -197,7 +200,7 @@ class TextureFill {
       const Look l = lookAt(i, mix(actors_[i]->vertices), mix(actors_[i]->normals).normalized());
       if (l.weight <= 0.0f) continue;
       const float weight = l.weight * l.weight * l.weight * (i == 0 ? 1.0f : kFurther);
-      sum += sampleBicubic(i == 0 ? key_albedo : pictures_[i].albedo, l.u, l.v) * weight;
+      sum += colourOf(sampleBicubic(i == 0 ? key_albedo : pictures_[i].albedo, l.u, l.v)) * weight;
       total += weight;
       if (i == 0) key = l.weight;
     }
@@ -211,7 +214,7 @@ class TextureFill {
       const Eigen::Vector3f image = p - 2.0f * (plane.normal.dot(p) - plane.offset) * plane.normal;
       const Look l = lookAt(0, image, n - 2.0f * plane.normal.dot(n) * plane.normal);
       if (l.weight < kEnough) continue;
-      const cv::Vec3f c = sampleBicubic(key_albedo, l.u, l.v);
+      const cv::Vec4f c = sampleBicubic(key_albedo, l.u, l.v);
       texel = cv::Vec4f(c[0], c[1], c[2], 0.0f);
       return kMirrored;
     }
@@ -258,6 +261,20 @@ class TextureFill {
   bool two_sided_ = false;  // an open sheet is seen from both sides
 };
 
+cv::Mat widened(const cv::Mat& colour) {
+  cv::Mat wide;
+  cv::cvtColor(colour, wide, cv::COLOR_BGR2BGRA);
+  return wide;
+}
+
+Appearance::Source sourceOf(const SurfaceTexture& texture, int triangle) {
+  bool picture = true, filled = true;
+  for (std::size_t i = texture.firstOf(triangle); i < texture.firstOf(triangle + 1); ++i) {
+    picture = picture && texture.texels[i][3] > kOnlyPicture, filled = filled && texture.texels[i][3] < kOnlyTexture;
+  }
+  return picture ? Appearance::Source::kPicture : filled ? Appearance::Source::kTexture : Appearance::Source::kBoth;
+}
+
 Appearance makeAppearance(const std::vector<View>& views, const std::vector<ShadowMap>& suns, std::size_t object, bool moves,
                           const Light& light, const Gloss& gloss) {
   Appearance a;
@@ -274,8 +291,10 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
     if (i == 0) a.mean_light = pictures[0].mean_light;
   }
   a.region = pictures[0].region;
-  a.albedo = pushPull(pictures[0].albedo, pictures[0].trust);
+  a.albedo = widened(pushPull(pictures[0].albedo, pictures[0].trust));
+  for (Reflectance& r : pictures) r.albedo = widened(r.albedo);
   TextureFill(used, actors, pictures).run(a);
+  for (int t = 0; t < a.texture.triangleCount(); ++t) a.sources.push_back(sourceOf(a.texture, t));
   return a;
 }
 
@@ -285,7 +304,7 @@ std::vector<Appearance> makeAppearances(const std::vector<View>& views, const st
   std::vector<ShadowMap> suns;
   for (const View& view : views) {
     std::vector<Occluder> occluders;
-    for (const Actor& a : view.actors) occluders.push_back({&a.vertices, &a.surface->triangles});
+    for (const Actor& a : view.actors) occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
     suns.emplace_back(occluders, light.direction.cast<double>(), ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
   }
   std::vector<Appearance> appearances;
@@ -295,56 +314,25 @@ std::vector<Appearance> makeAppearances(const std::vector<View>& views, const st
 
 cv::Vec3f Appearance::pictureAt(const Eigen::Vector3f& key_position) const {
   const Eigen::Vector2d q = key_camera.projectWorld(key_position.cast<double>());
-  return sampleBicubic(albedo, static_cast<float>(q.x()) - region.x, static_cast<float>(q.y()) - region.y);
+  const cv::Vec4f c = sampleBicubic(albedo, static_cast<float>(q.x()) - region.x, static_cast<float>(q.y()) - region.y);
+  return {c[0], c[1], c[2]};
 }
 
 cv::Vec3f Appearance::albedoAt(const SurfacePoint& point) const {
   const cv::Vec4f texel = texture.at(point.triangle, point.weights);
-  if (texel[3] > 0.999f) return pictureAt(point.key_position);
+  if (texel[3] > kOnlyPicture) return pictureAt(point.key_position);
   const cv::Vec3f filled(texel[0], texel[1], texel[2]);
-  return texel[3] < 0.001f ? filled : filled * (1.0f - texel[3]) + pictureAt(point.key_position) * texel[3];
+  return texel[3] < kOnlyTexture ? filled : filled * (1.0f - texel[3]) + pictureAt(point.key_position) * texel[3];
 }
 
 cv::Vec3f Appearance::radiance(const cv::Vec3f& albedo_at, const cv::Vec3f& now, const cv::Vec3f& highlight) const {
   return albedo_at.mul(now + lightFloor(mean_light)) + highlight;
 }
 
-cv::Vec3f sampleBicubic(const cv::Mat& image, float u, float v) {
-  const float fu = std::floor(u), fv = std::floor(v);
-  const float x = u - fu, y = v - fv;
-  const auto weights = [](float t, float* w) {
-    const float t2 = t * t, t3 = t2 * t;
-    w[0] = 0.5f * (-t + 2.0f * t2 - t3);
-    w[1] = 0.5f * (2.0f - 5.0f * t2 + 3.0f * t3);
-    w[2] = 0.5f * (t + 4.0f * t2 - 3.0f * t3);
-    w[3] = 0.5f * (t3 - t2);
-  };
-  float wx[4], wy[4];
-  weights(x, wx), weights(y, wy);
-  // Away from the borders four floats are taken at a time: a pixel and one value of the next.
-  if (u >= 1.0f && v >= 1.0f && u < image.cols - 3.0f && v < image.rows - 2.0f) {
-    cv::v_float32x4 sum = cv::v_setzero_f32();
-    for (int b = 0; b < 4; ++b) {
-      const float* row = image.ptr<float>(static_cast<int>(fv) - 1 + b) + 3 * (static_cast<int>(fu) - 1);
-      cv::v_float32x4 line = cv::v_setall_f32(wx[0]) * cv::v_load(row);
-      for (int a = 1; a < 4; ++a) line += cv::v_setall_f32(wx[a]) * cv::v_load(row + 3 * a);
-      sum += cv::v_setall_f32(wy[b]) * line;
-    }
-    float values[4];
-    cv::v_store(values, cv::v_max(sum, cv::v_setzero_f32()));
-    return {values[0], values[1], values[2]};
-  }
-  const auto clampTo = [](float f, int limit) { return static_cast<int>(std::clamp(f, -8.0f, limit + 8.0f)); };
-  const int i = clampTo(fu, image.cols), j = clampTo(fv, image.rows);
-  cv::Vec3f sum;
-  for (int b = 0; b < 4; ++b) {
-    const cv::Vec3f* row = image.ptr<cv::Vec3f>(std::clamp(j - 1 + b, 0, image.rows - 1));
-    cv::Vec3f line;
-    for (int a = 0; a < 4; ++a) line += wx[a] * row[std::clamp(i - 1 + a, 0, image.cols - 1)];
-    sum += wy[b] * line;
-  }
-  for (int c = 0; c < 3; ++c) sum[c] = std::max(sum[c], 0.0f);
-  return sum;
+cv::Vec4f sampleBicubic(const cv::Mat& image, float u, float v) {
+  cv::Vec4f value;
+  cv::v_store(value.val, bicubic(image, u, v));
+  return value;
 }
 
 }  // namespace calipso::render

@@ -7,8 +7,6 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kEncodeSteps = 1024;
-
 double decode(double s) { return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4); }
 
 double encode(double l) { return l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1.0 / 2.4) - 0.055; }
@@ -17,20 +15,6 @@ const std::array<float, 256>& decodeTable() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> t{};
     for (int i = 0; i < 256; ++i) t[i] = static_cast<float>(decode(i / 255.0));
-    return t;
-  }();
-  return table;
-}
-
-// Tabulated over sqrt(linear), in which the curve is nearly straight, so that dark values keep their
-// precision (largest error 0.001 code values).
-const std::array<float, kEncodeSteps + 2>& encodeTable() {
-  static const std::array<float, kEncodeSteps + 2> table = [] {
-    std::array<float, kEncodeSteps + 2> t{};
-    for (int i = 0; i < kEncodeSteps + 2; ++i) {
-      const double root = static_cast<double>(i) / kEncodeSteps;
-      t[i] = static_cast<float>(255.0 * encode(root * root));
-    }
     return t;
   }();
   return table;
@@ -47,13 +31,26 @@ float linearFromRealCode(float code) {
   return table[i] + (x - i) * (table[i + 1] - table[i]);
 }
 
+// Tabulated over sqrt(linear), in which the curve is nearly straight, so that dark values keep their
+// precision (largest error 0.001 code values).
+const EncodeStep* encodeSteps() {
+  static const std::array<EncodeStep, kEncodeSteps + 1> steps = [] {
+    std::array<EncodeStep, kEncodeSteps + 1> t{};
+    const auto code = [](int i) { return static_cast<float>(255.0 * encode(std::pow(static_cast<double>(i) / kEncodeSteps, 2))); };
+    for (int i = 0; i < kEncodeSteps; ++i) t[i] = {code(i), code(i + 1) - code(i)};
+    t[kEncodeSteps] = {255.0f, 0.0f};
+    return t;
+  }();
+  return steps.data();
+}
+
 float codeFromLinear(float linear) {
   if (!(linear > 0.0f)) return 0.0f;  // also NaN
   if (linear >= 1.0f) return 255.0f;
   const float x = std::sqrt(linear) * kEncodeSteps;
   const int i = static_cast<int>(x);
-  const auto& table = encodeTable();
-  return table[i] + (x - i) * (table[i + 1] - table[i]);
+  const EncodeStep& step = encodeSteps()[i];
+  return step.code + (x - i) * step.rise;
 }
 
 cv::Mat linearFromCode(const cv::Mat& bgr) {

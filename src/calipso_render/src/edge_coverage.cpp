@@ -16,13 +16,6 @@ float signedArea(const ScreenMesh& mesh, const Eigen::Vector3i& t) {
   return (q.x() - p.x()) * (r.y() - p.y()) - (r.x() - p.x()) * (q.y() - p.y());
 }
 
-bool isSilhouette(const ScreenMesh& mesh, const MeshEdge& edge) {
-  if (edge.b < 0) return true;
-  const float a = signedArea(mesh, (*mesh.triangles)[edge.a]);
-  const float b = signedArea(mesh, (*mesh.triangles)[edge.b]);
-  return (a > 0.0f) != (b > 0.0f);
-}
-
 // Edge functions and nearness of one triangle, linear in the picture, at all samples of a pixel at once.
 class Sampler {
  public:
@@ -81,7 +74,8 @@ std::vector<MeshEdge> meshEdges(const Triangles& triangles) {
 }
 
 EdgeCoverage::EdgeCoverage(const VisibilityBuffer& centre)
-    : region_(centre.region()), slots_(centre.region().area(), -1) {
+    : region_(centre.region()), slots_(centre.region().area(), -1), tiles_across_(centre.region().width / kTile + 1),
+      tiles_(static_cast<std::size_t>(tiles_across_) * (centre.region().height / kTile + 1), 0) {
   const int width = region_.width, height = region_.height;
   for (int v = 0; v < height; ++v) {
     const std::uint32_t* row = centre.ids(v);
@@ -102,15 +96,19 @@ void EdgeCoverage::choose(int column, int row) {
   int& slot = slots_[static_cast<std::size_t>(row) * region_.width + column];
   if (slot >= 0) return;
   slot = static_cast<int>(pixels_.size());
+  tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + column / kTile] = 1;
   pixels_.emplace_back();
   pixels_.back().ids.fill(VisibilityBuffer::kNothing);
   pixels_.back().nearness.fill(VisibilityBuffer::kFar);
 }
 
 void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges) {
+  std::vector<char> turned(mesh.triangles->size());
+  for (std::size_t t = 0; t < turned.size(); ++t) turned[t] = signedArea(mesh, (*mesh.triangles)[t]) > 0.0f;
   for (const MeshEdge& edge : edges) {
+    if (edge.b >= 0 && turned[edge.a] == turned[edge.b]) continue;
     const Eigen::Vector3f &p = mesh.points[edge.from], &q = mesh.points[edge.to];
-    if (std::isnan(p.z() + q.z()) || !isSilhouette(mesh, edge)) continue;
+    if (std::isnan(p.z() + q.z())) continue;
     const float length = std::min((q - p).head<2>().norm(), 2.0f * (region_.width + region_.height));
     const int steps = 1 + static_cast<int>(2.0f * length);
     for (int i = 0; i <= steps; ++i) {
@@ -134,7 +132,7 @@ void EdgeCoverage::drawTriangle(const ScreenMesh& mesh, int triangle, std::uint3
   Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset,
                           mesh.points[t[2]] - offset};
   float area = signedArea(mesh, t);
-  if (std::isnan(p[0].z() + p[1].z() + p[2].z()) || !(std::abs(area) > 1e-9f)) return;
+  if (mesh.hides(area) || std::isnan(p[0].z() + p[1].z() + p[2].z()) || !(std::abs(area) > 1e-9f)) return;
   if (area < 0.0f) std::swap(p[1], p[2]), area = -area;
   // From the pixel whose square holds the least coordinate to the one that holds the greatest.
   const auto low = [](float a, float b, float c) { return static_cast<int>(std::clamp(std::min({a, b, c}) + 0.5f, 0.0f, 1e6f)); };
@@ -143,6 +141,7 @@ void EdgeCoverage::drawTriangle(const ScreenMesh& mesh, int triangle, std::uint3
   };
   const int u0 = low(p[0].x(), p[1].x(), p[2].x()), u1 = high(p[0].x(), p[1].x(), p[2].x(), region_.width - 1);
   const int v0 = low(p[0].y(), p[1].y(), p[2].y()), v1 = high(p[0].y(), p[1].y(), p[2].y(), region_.height - 1);
+  if (!anyChosen(u0, v0, u1, v1)) return;
   Sampler sampler;
   bool ready = false;
   for (int v = v0; v <= v1; ++v) {
@@ -153,6 +152,15 @@ void EdgeCoverage::drawTriangle(const ScreenMesh& mesh, int triangle, std::uint3
       sampler.draw(u, v, id, pixels_[slots[u]]);
     }
   }
+}
+
+bool EdgeCoverage::anyChosen(int u0, int v0, int u1, int v1) const {
+  for (int j = v0 / kTile; j <= v1 / kTile && v0 <= v1; ++j) {
+    for (int i = u0 / kTile; i <= u1 / kTile && u0 <= u1; ++i) {
+      if (tiles_[static_cast<std::size_t>(j) * tiles_across_ + i] != 0) return true;
+    }
+  }
+  return false;
 }
 
 const EdgeCoverage::Pixel* EdgeCoverage::at(int u, int v) const {

@@ -44,6 +44,23 @@ void FrameCompositor::findRelit() {
   cv::blur(relit, relit_(cv::Rect(box.tl() - region_.tl(), box.size())), {3, 3}, {-1, -1}, cv::BORDER_DEFAULT | cv::BORDER_ISOLATED);
 }
 
+// Where no object hides a support plane whose light changes.
+void FrameCompositor::findChanged() {
+  changed_.create(region_.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region_.height; ++v) {
+    const float *sun = sun_now_.ptr<float>(v), *sun_before = sun_before_.ptr<float>(v), *relit = relit_.ptr<float>(v);
+    const float *sky = sky_now_.ptr<float>(v), *sky_before = sky_before_.ptr<float>(v);
+    const std::uint8_t* labels = labels_.ptr<std::uint8_t>(region_.y + v) + region_.x;
+    std::uint8_t* changed = changed_.ptr<std::uint8_t>(v);
+    for (int u = 0; u < region_.width; ++u) {
+      const float change = std::abs(sun[u] - sun_before[u]) + std::abs(sky[u] - sky_before[u]);
+      const bool differs = (relit[u] > 0.0f) | (change >= kSameShadow);
+      changed[u] = (differs & (sun[u] >= 0.0f) & (labels[u] == 0)) ? 255 : 0;
+    }
+  }
+}
+
 // The rim of an original's pixels belongs to the surface beside it, not to another edited object's.
 void FrameCompositor::keepRims(const cv::Mat& owner) {
   cv::Mat rims = cv::Mat::zeros(region_.size(), CV_32F);

@@ -9,7 +9,6 @@ namespace calipso::render {
 namespace {
 
 constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
-constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
 
 cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
   const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
@@ -52,7 +51,8 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   const Look look = lookOf(slot);
   const Lit lit = lightAt(p, id, u, v);
   const cv::Vec3f albedo = look.albedo.value_or(appearance.albedoAt(p)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
-  return appearance.radiance(albedo, lit.diffuse, lit.highlight);
+  const auto colour = [](const cv::Vec4f& c) { return cv::Vec3f(c[0], c[1], c[2]); };
+  return appearance.radiance(albedo, colour(lit.diffuse), colour(lit.highlight));
 }
 
 // Something without a model stands in front: it hid the object at the key frame, and goes on doing so.
@@ -64,6 +64,7 @@ bool FrameCompositor::hiddenByFront(int surface, int u, int v) const {
 // An edited object is drawn; another one only where the original picture does not show it.
 bool FrameCompositor::isDrawn(std::uint32_t id, int u, int v) const {
   if (id == VisibilityBuffer::kNothing) return false;
+  if (always_drawn_[VisibilityBuffer::objectOf(id)]) return true;
   const int surface = surface_of_slot_[VisibilityBuffer::objectOf(id)];
   if (hiddenByFront(surface, u, v)) return false;
   return edited_[surface] || removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
@@ -115,7 +116,7 @@ FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
   const float from_plate = relit_.at<float>(at);
   if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameShadow) return behind;
   cv::Vec3f darkened = behind.colour;
-  for (int c = 0; c < 3; ++c) darkened[c] *= std::min(1.0f, now[c] / std::max(before[c], 0.05f));
+  for (int c = 0; c < 3; ++c) darkened[c] *= std::min(1.0f, now[c] / std::max(before[c], kDarkest));
   const Behind revealed = revealedAt(u, v);
   behind.colour = from_plate * revealed.colour.mul(now) + (1.0f - from_plate) * darkened;
   behind.fresh = from_plate * revealed.fresh;
@@ -134,45 +135,11 @@ FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
   return {plate_.at<cv::Vec3f>(v, u), 1.0f, invented ? kInvented : kSeenElsewhere};
 }
 
-// Nothing is drawn here, nothing goes, and no light changes.
-bool FrameCompositor::isUntouched(int u, int v) const {
-  const cv::Point at = cv::Point(u, v) - region_.tl();
-  if (removed_.at<std::uint8_t>(at) != 0 || centre_->ids(at.y)[at.x] != VisibilityBuffer::kNothing || edges_->at(u, v) != nullptr) return false;
-  if (sun_now_.at<float>(at) < 0.0f || labels_.at<std::uint8_t>(v, u) != 0) return true;
-  const float change = std::abs(sun_now_.at<float>(at) - sun_before_.at<float>(at)) + std::abs(sky_now_.at<float>(at) - sky_before_.at<float>(at));
-  return relit_.at<float>(at) == 0.0f && change < kSameShadow;
-}
-
 FrameCompositor::Composed FrameCompositor::composedAt(int u, int v) const {
-  if (isUntouched(u, v)) return {};
   const Drawn drawn = drawnAt(u, v);
   const Behind behind = drawn.cover < 1.0f ? behindAt(u, v) : Behind{};
   return {drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour,
           drawn.cover + (1.0f - drawn.cover) * behind.fresh, drawn.cover > 0.0f ? kRendered : behind.source};
-}
-
-void FrameCompositor::composePixel(int u, int v, FrameOutput& out) const {
-  const cv::Point at = cv::Point(u, v) - region_.tl();
-  Composed pixel = composedAt(u, v);
-  if (pixel.source == kOriginal) return;
-  // Where the surface rests, the frame's own pixel is the best picture of it.
-  const bool original_here = removed_.at<std::uint8_t>(at) != 0;
-  const float keep = original_here || pixel.source == kRendered ? still_.at<float>(at) : 0.0f;
-  if (keep >= 0.999f) return;
-  if (!residual_.empty()) {
-    const cv::Vec4f& residual = residual_.at<cv::Vec4f>(at);
-    pixel.colour += cv::Vec3f(residual[0], residual[1], residual[2]);
-    pixel.fresh *= 1.0f - residual[3];
-  }
-  pixel.colour = keep * linearPixel(frame_.bgr, u, v) + (1.0f - keep) * pixel.colour;
-  pixel.fresh *= 1.0f - keep;
-  cv::Vec3b& code = out.bgr.at<cv::Vec3b>(v, u);
-  for (int c = 0; c < 3; ++c) {
-    float value = codeFromLinear(pixel.colour[c]);
-    if (params_.add_noise) value += pixel.fresh * prepared_.noise.deviation(c, value) * noise_.at(u, v, c);
-    code[c] = quantise(value);
-  }
-  out.provenance.at<std::uint8_t>(v, u) = pixel.source;
 }
 
 }  // namespace calipso::render

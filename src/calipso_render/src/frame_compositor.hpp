@@ -8,7 +8,9 @@
 
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/visibility.hpp"
+#include "line_codec.hpp"
 #include "plane_view.hpp"
+#include "triangle_map.hpp"
 
 namespace calipso::render {
 
@@ -31,8 +33,13 @@ struct RestPicture {
   cv::Mat drawn;    // CV_32FC3: what they add to a pixel, linear; negative where the video does not show them
   cv::Mat passing;  // CV_32FC3: part of the background's light that passes beside them
   cv::Mat owners;   // CV_16SC1: surface that is seen there, or nearest; -1 = none
+  cv::Mat reach;    // CV_8UC1: 255 where what drawing misses can be carried to
+  cv::Rect box;     // of what `drawn` has
 };
 
+constexpr int kLightStep = 4;     // px between the places where the light on a smooth surface is computed
+constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
+constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own pixels do not tell what it would be in more light
 constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
 
 inline float smoothStep(float from, float to, float x) {
@@ -68,9 +75,22 @@ class FrameCompositor {
 
   // Light on a drawn surface.
   struct Lit {
-    cv::Vec3f diffuse, highlight;  // of a white surface; radiance
-    float near = 0.0f;             // of the surface, 1/m
-    int slot = -1;                 // -1: nothing is drawn here
+    cv::Vec4f diffuse;    // of a white surface; fourth: its nearness, 1/m
+    cv::Vec4f highlight;  // radiance
+    int slot = -1;        // -1: nothing is drawn here
+  };
+
+  // A row of the result over region_, on its way.
+  struct Row {
+    std::vector<cv::Vec4f> colour;     // linear; fourth: the part that carries no camera noise yet
+    std::vector<std::uint8_t> source;  // Provenance
+    std::vector<Lit> light;            // at the columns of lit_
+  };
+
+  // What drawing misses beyond the silhouette, where a surface's rim has come to.
+  struct Rim {
+    int u, v;
+    cv::Point nearest;  // drawn pixel
   };
 
   Light lightOf(const FrameInput& frame) const;
@@ -84,7 +104,11 @@ class FrameCompositor {
   void prepareFrame();
   void stage();
   void findResidual();
-  cv::Vec4f residualAt(float u, float v, int owner) const;
+  void findMiss();
+  void findRims();
+  void addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, cv::Vec4f& colour) const;
+  void addRimResidual(int v, Row& row) const;
+  cv::Vec4f missAt(float u, float v, int owner) const;
   static RestPicture restPicture(const Prepared& prepared, const RenderParams& params, const std::vector<bool>& edited);
   Composed composedAt(int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
@@ -106,8 +130,16 @@ class FrameCompositor {
   void measureSky();
   void measureSun();
   void findRelit();
+  void findChanged();
+  void findMaps();
   cv::Mat originalOf(int surface) const;
-  void composePixel(int u, int v, FrameOutput& out) const;
+  void composeRow(int v, Row& row, FrameOutput& out) const;
+  void drawRow(int v, Row& row) const;
+  void lightRow(int v, Row& row) const;
+  void shadeRun(int v, int first, int last, std::uint32_t id, Row& row) const;
+  void composeBehind(int u, int v, Row& row) const;
+  void composeSpecial(int u, int v, Row& row) const;
+  void keepStill(int v, Row& row) const;
   Behind behindAt(int u, int v) const;
   Behind revealedAt(int u, int v) const;
   Drawn drawnAt(int u, int v) const;
@@ -119,8 +151,7 @@ class FrameCompositor {
   Lit lightAt(const SurfacePoint& p, std::uint32_t id, float u, float v) const;
   Lit exactLight(const SurfacePoint& p, int slot) const;
   Look lookOf(int slot) const;
-  bool isSmooth(const Lit& a, const Lit& b, const Lit& c, const Lit& d) const;
-  bool isUntouched(int u, int v) const;
+  bool isSmooth(int i, int j) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
   cv::Rect shadowBounds(const Points& vertices, const Light& light) const;
@@ -154,15 +185,20 @@ class FrameCompositor {
   cv::Mat sun_now_, sun_before_;  // CV_32FC1 over region_: the same of the sun; negative where there is no plane
   cv::Mat relit_;    // CV_32FC1 over region_: 1 = the original's shadow, to be taken from the plate
   std::vector<Lit> lit_;           // at the corners of squares of kLightStep px over region_
-  std::vector<bool> smooth_;       // per square, by its first corner: light between the corners follows from theirs
+  std::vector<std::uint8_t> smooth_;  // per square, by its first corner: light between the corners follows from theirs
   int lit_columns_ = 0;
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
-  cv::Mat residual_;  // CV_32FC4 over region_: what drawing misses, linear, and how much of the pixel that speaks for; may be empty
+  cv::Mat changed_;  // CV_8UC1 over region_: 255 = light on a support plane changes
+  cv::Mat miss_;     // CV_32FC4 over rest_.box: what drawing misses of the video, linear, and 1 where that is known; may be empty
+  std::vector<Rim> rims_;            // by rows
+  std::vector<std::size_t> rim_rows_;  // per row of region_: its first in rims_, and one more
+  std::vector<bool> always_drawn_;     // per slot: isDrawn() wherever it is seen
+  std::vector<std::vector<TriangleMap>> maps_;  // per slot, per triangle; empty where the slot is not drawn
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;
   Eigen::Vector3f eye_;
   PlaneView plane_view_;
-  NoiseField noise_;
+  LineCodec codec_;
 };
 
 }  // namespace calipso::render

@@ -9,6 +9,7 @@
 #include "calipso_render/ray_shadow.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "frame_compositor.hpp"
+#include "plane_light.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -17,8 +18,8 @@ namespace {
 constexpr int kShadowMapSide = 512;    // texels, live
 constexpr int kSkyMapSide = 128;       // the same for the sky, which is soft
 constexpr int kSkySteps = 160;         // places along the picture's width where the sky is measured
-constexpr int kLightStep = 4;          // px between the places where the light on a smooth surface is computed
-constexpr float kSmoothLight = 0.06f;  // of the light: between corners that differ by no more it is interpolated
+constexpr float kEvenLight = 0.06f;    // of the light: between corners that differ by no more it is interpolated
+constexpr float kSmoothLight = 0.015f; // likewise where the light in their middle is their mean but for this
 constexpr int kShadowBoundsMargin = 8;     // px
 constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
 
@@ -46,11 +47,11 @@ void FrameCompositor::prepareShadows() {
   std::vector<Occluder> moved, others, originals;
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     auto& list = edited_[surface_of_slot_[slot]] ? moved : others;
-    list.push_back({&actors_[slot].vertices, &actors_[slot].surface->triangles});
+    list.push_back({&actors_[slot].vertices, &actors_[slot].surface->triangles, actors_[slot].surface->winding});
   }
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     const Surface& s = prepared_.surfaces[i];
-    if (edited_[i] && !prepared_.moves[i] && s.in_video) originals.push_back({&s.key_vertices, &s.triangles});
+    if (edited_[i] && !prepared_.moves[i] && s.in_video) originals.push_back({&s.key_vertices, &s.triangles, s.winding});
   }
   moved_shadow_ = shadowOf(moved, light_, params_);
   moved_sky_ = skyShadowOf(moved, params_);
@@ -90,14 +91,8 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
 }
 
 cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds) const {
-  cv::Mat sun(frame_.bgr.size(), CV_32F, cv::Scalar(1.0f));
-#pragma omp parallel for schedule(dynamic, 8)
-  for (int v = bounds.y; v < bounds.br().y; ++v) {
-    Receiver r;
-    for (int u = bounds.x; u < bounds.br().x; ++u) {
-      if (plane_view_.at(u, v, r)) sun.at<float>(v, u) = shadow.visibility(r.position, r.normal);
-    }
-  }
+  cv::Mat sun(frame_.bgr.size(), CV_32F, cv::Scalar(1.0f)), part = sun(bounds);
+  planesInLight(plane_view_, shadow, bounds, cv::Mat(), part);
   return sun;
 }
 
@@ -168,18 +163,25 @@ void FrameCompositor::measureSky() {
 }
 
 void FrameCompositor::measureSun() {
-  sun_now_ = cv::Mat(region_.size(), CV_32F, cv::Scalar(-1.0f));
-  sun_before_ = sun_now_.clone();
-#pragma omp parallel for schedule(dynamic, 8)
+  sun_now_ = cv::Mat(region_.size(), CV_32F, cv::Scalar(1.0f));
+  sun_before_.create(region_.size(), CV_32F);
+  const cv::Rect bounds = moved_bounds_ & region_;
+  if (!bounds.empty()) {
+    const cv::Rect here = bounds - region_.tl();
+    cv::Mat part = sun_now_(here);
+    planesInLight(plane_view_, *moved_shadow_, bounds, covered_(here), part);
+  }
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) {
-    Receiver r;
+    float *now = sun_now_.ptr<float>(v), *before = sun_before_.ptr<float>(v);
+    const std::uint8_t* covered = covered_.ptr<std::uint8_t>(v);
+    const auto rowOf = [&](const cv::Mat& picture) { return picture.empty() ? nullptr : picture.ptr<float>(v + region_.y) + region_.x; };
+    const float *others = rowOf(shadows_.others_sun), *originals = rowOf(shadows_.originals_sun);
     for (int u = 0; u < region_.width; ++u) {
-      const cv::Point at(u + region_.x, v + region_.y);
-      if (covered_.at<std::uint8_t>(v, u) != 0 || !plane_view_.at(at.x, at.y, r)) continue;
-      const float others = valueOrOne(shadows_.others_sun, at.x, at.y);
-      const float moved = moved_bounds_.contains(at) ? moved_shadow_->visibility(r.position, r.normal) : 1.0f;
-      sun_now_.at<float>(v, u) = others * moved;
-      sun_before_.at<float>(v, u) = others * valueOrOne(shadows_.originals_sun, at.x, at.y);
+      const float rest = others != nullptr ? others[u] : 1.0f;
+      const bool wanted = covered[u] == 0 && plane_view_.sees(u + region_.x, v + region_.y);
+      now[u] = wanted ? now[u] * rest : -1.0f;
+      before[u] = wanted ? (originals != nullptr ? originals[u] : 1.0f) * rest : -1.0f;
     }
   }
 }
@@ -195,7 +197,9 @@ FrameCompositor::Lit FrameCompositor::exactLight(const SurfacePoint& p, int slot
   gloss.specular = look.specular.value_or(gloss.specular);
   gloss.roughness = look.roughness.value_or(gloss.roughness);
   const float sun = p.normal.dot(light_.direction) > 0.0f ? newSun(p.position, p.normal) : 0.0f;
-  return {diffuseShading(light_, p.normal, sun, p.sky), specularShading(light_, gloss, p.normal, (eye_ - p.position).normalized(), sun, p.sky), 0.0f, slot};
+  const cv::Vec3f diffuse = diffuseShading(light_, p.normal, sun, p.sky);
+  const cv::Vec3f highlight = specularShading(light_, gloss, p.normal, (eye_ - p.position).normalized(), sun, p.sky);
+  return {{diffuse[0], diffuse[1], diffuse[2], 0.0f}, {highlight[0], highlight[1], highlight[2], 0.0f}, slot};
 }
 
 // Light at the corners of small squares; where a smooth piece of surface fills a square and the light changes little
@@ -214,25 +218,37 @@ void FrameCompositor::findSurfaceLight() {
       const int slot = VisibilityBuffer::objectOf(id);
       Lit& lit = lit_[static_cast<std::size_t>(j) * columns + i];
       lit = exactLight(surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_), slot);
-      lit.near = centre_->nearnessAt(u, v);
+      lit.diffuse[3] = centre_->nearnessAt(u, v);
     }
   }
-  for (int j = 0; j + 1 < rows; ++j) {
-    for (int i = 0; i + 1 < columns; ++i) {
-      const std::size_t at = static_cast<std::size_t>(j) * columns + i;
-      smooth_[at] = isSmooth(lit_[at], lit_[at + 1], lit_[at + columns], lit_[at + columns + 1]);
-    }
+#pragma omp parallel for schedule(dynamic, 2)
+  for (int j = 0; j < rows - 1; ++j) {
+    for (int i = 0; i + 1 < columns; ++i) smooth_[static_cast<std::size_t>(j) * columns + i] = isSmooth(i, j) ? 1 : 0;
   }
 }
 
-// Corners: first, right, below, right below.
-bool FrameCompositor::isSmooth(const Lit& a, const Lit& b, const Lit& c, const Lit& d) const {
+// Does the light in a square follow from that at its corners? Where they differ, its middle has to agree.
+bool FrameCompositor::isSmooth(int i, int j) const {
+  const Lit* first = &lit_[static_cast<std::size_t>(j) * lit_columns_ + i];
+  const Lit &a = first[0], &b = first[1], &c = first[lit_columns_], &d = first[lit_columns_ + 1];
   if (a.slot < 0 || a.slot != b.slot || a.slot != c.slot || a.slot != d.slot) return false;
-  if (std::abs(a.near + d.near - b.near - c.near) * frame_.camera.fx > kLightStep * a.near) return false;
+  if (std::abs(a.diffuse[3] + d.diffuse[3] - b.diffuse[3] - c.diffuse[3]) * frame_.camera.fx > kLightStep * a.diffuse[3]) return false;
+  cv::Vec4f mean;
+  bool even = true;
+  float highest[3];
   for (int k = 0; k < 3; ++k) {
     const float all[] = {a.diffuse[k] + a.highlight[k], b.diffuse[k] + b.highlight[k], c.diffuse[k] + c.highlight[k], d.diffuse[k] + d.highlight[k]};
     const auto [low, high] = std::minmax_element(std::begin(all), std::end(all));
-    if (*high - *low > kSmoothLight * *high) return false;
+    mean[k] = 0.25f * (all[0] + all[1] + all[2] + all[3]), highest[k] = *high;
+    even = even && *high - *low <= kEvenLight * *high;
+  }
+  if (even) return true;
+  const int u = region_.x + i * kLightStep + kLightStep / 2, v = region_.y + j * kLightStep + kLightStep / 2;
+  const std::uint32_t id = centre_->idAt(u, v);
+  if (id == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(id) != a.slot) return false;
+  const Lit middle = exactLight(surfacePoint(actors_[a.slot], VisibilityBuffer::triangleOf(id), static_cast<float>(u), static_cast<float>(v), eye_), a.slot);
+  for (int k = 0; k < 3; ++k) {
+    if (std::abs(middle.diffuse[k] + middle.highlight[k] - mean[k]) > kSmoothLight * highest[k]) return false;
   }
   return true;
 }
@@ -244,14 +260,15 @@ FrameCompositor::Lit FrameCompositor::lightAt(const SurfacePoint& p, std::uint32
   const int du = iu - region_.x, dv = iv - region_.y;
   const std::size_t at = static_cast<std::size_t>(dv / kLightStep) * lit_columns_ + du / kLightStep;
   const Lit& a = lit_[at];
-  if (!smooth_[at] || a.slot != slot) return exactLight(p, slot);
+  if (smooth_[at] == 0 || a.slot != slot) return exactLight(p, slot);
   const Lit &b = lit_[at + 1], &c = lit_[at + lit_columns_], &d = lit_[at + lit_columns_ + 1];
   const float x = static_cast<float>(du % kLightStep) / kLightStep, y = static_cast<float>(dv % kLightStep) / kLightStep;
   const float wa = (1.0f - x) * (1.0f - y), wb = x * (1.0f - y), wc = (1.0f - x) * y, wd = x * y;
-  const float near = centre_->nearness(dv)[du], expected = wa * a.near + wb * b.near + wc * c.near + wd * d.near;
+  const cv::Vec4f diffuse = wa * a.diffuse + wb * b.diffuse + wc * c.diffuse + wd * d.diffuse;
+  const float near = centre_->nearness(dv)[du];
   // Another piece of the surface can look out between the corners.
-  if (std::abs(near - expected) * frame_.camera.fx > kLightStep * near) return exactLight(p, slot);
-  return {wa * a.diffuse + wb * b.diffuse + wc * c.diffuse + wd * d.diffuse, wa * a.highlight + wb * b.highlight + wc * c.highlight + wd * d.highlight, near, slot};
+  if (std::abs(near - diffuse[3]) * frame_.camera.fx > kLightStep * near) return exactLight(p, slot);
+  return {diffuse, wa * a.highlight + wb * b.highlight + wc * c.highlight + wd * d.highlight, slot};
 }
 
 }  // namespace calipso::render

@@ -61,7 +61,7 @@ RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderP
   rest.prepareFrame();
   const cv::Rect& r = rest.region_;
   RestPicture picture{edited, cv::Mat(input.bgr.size(), CV_32FC3, cv::Scalar::all(-1)), cv::Mat::zeros(input.bgr.size(), CV_32FC3),
-                      cv::Mat(input.bgr.size(), CV_16S, cv::Scalar(-1))};
+                      cv::Mat(input.bgr.size(), CV_16S, cv::Scalar(-1)), cv::Mat::zeros(input.bgr.size(), CV_8U), {}};
   if (r.empty()) return picture;
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = r.y; v < r.y + r.height; ++v) {
@@ -82,6 +82,8 @@ RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderP
   }
   const Nearest nearest = nearestWhere(owners >= 0);
   if (nearest.place.empty()) return picture;
+  cv::dilate(rest.removed_, picture.reach(r), disc(static_cast<int>(kNonePx)));
+  picture.box = cv::boundingRect(rest.removed_) + r.tl();
   cv::Mat out = picture.owners(r);
   for (int v = 0; v < r.height; ++v) {
     for (int u = 0; u < r.width; ++u) out.at<short>(v, u) = owners.at<short>(nearest.at(v, u));
@@ -96,51 +98,95 @@ void FrameCompositor::findResidual() {
   std::vector<bool> resting(edited_.size());
   for (std::size_t i = 0; i < edited_.size(); ++i) resting[i] = edited_[i] && at_rest_[i];
   if (rest_.edited != resting) rest_ = restPicture(prepared_, params_, resting);
-  // Where each drawn pixel's surface is seen in the video, and beyond the silhouette the nearest one's.
-  // What the model lacks, within the mask however far, goes along too.
-  cv::Mat shift(region_.size(), CV_32FC2, cv::Scalar::all(0)), uncovered(region_.size(), CV_8U, cv::Scalar(255));
-  cv::Mat owner(region_.size(), CV_16S, cv::Scalar(-1));
+  findMiss();
+  findRims();
+}
+
+void FrameCompositor::findMiss() {
+  const cv::Rect box = rest_.box;
+  if (box.empty()) return;
+  miss_ = cv::Mat(box.size(), CV_32FC4);
 #pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) {
-    for (int u = 0; u < region_.width; ++u) {
-      const std::uint32_t id = centre_->ids(v)[u];
-      if (id == VisibilityBuffer::kNothing) continue;
-      const int slot = VisibilityBuffer::objectOf(id);
-      if (observed_[slot].points.empty()) continue;
-      const Eigen::Vector2f moved = movement(id, static_cast<float>(u + region_.x), static_cast<float>(v + region_.y));
-      shift.at<cv::Vec2f>(v, u) = {moved.x(), moved.y()};
-      uncovered.at<std::uint8_t>(v, u) = 0;
-      owner.at<short>(v, u) = static_cast<short>(surface_of_slot_[slot]);
-    }
-  }
-  const Nearest nearest = nearestWhere(uncovered == 0);
-  if (nearest.place.empty()) return;
-  residual_ = cv::Mat(region_.size(), CV_32FC4, cv::Scalar::all(0));
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) {
-    for (int u = 0; u < region_.width; ++u) {
-      const cv::Point from = nearest.at(v, u);
-      const cv::Vec2f& d = shift.at<cv::Vec2f>(from);
-      const float part = 1.0f - smoothStep(kWholePx, kNonePx, std::hypot(d[0], d[1]));
-      if (part > 0.0f) residual_.at<cv::Vec4f>(v, u) = residualAt(u + region_.x - d[0], v + region_.y - d[1], owner.at<short>(from)) * part;
+  for (int j = 0; j < box.height; ++j) {
+    const int v = box.y + j;
+    const cv::Vec3b* codes = frame_.bgr.ptr<cv::Vec3b>(v) + box.x;
+    const cv::Vec3f *drawn = rest_.drawn.ptr<cv::Vec3f>(v) + box.x, *passing = rest_.passing.ptr<cv::Vec3f>(v) + box.x;
+    cv::Vec4f* miss = miss_.ptr<cv::Vec4f>(j);
+    for (int i = 0; i < box.width; ++i) {
+      if (drawn[i][0] < 0.0f) {
+        miss[i] = {};
+        continue;
+      }
+      cv::Vec3f expected = drawn[i];
+      if (passing[i] != cv::Vec3f()) expected += passing[i].mul(revealedAt(box.x + i, v).colour);
+      miss[i] = {linearFromCode(codes[i][0]) - expected[0], linearFromCode(codes[i][1]) - expected[1], linearFromCode(codes[i][2]) - expected[2], 1.0f};
     }
   }
 }
 
-// Residual of the video at a place of the picture, linear light, and 1 as the fourth value; 0 where there is none.
-cv::Vec4f FrameCompositor::residualAt(float u, float v, int owner) const {
+// Pixels that no surface at rest is drawn in, but to which its rim may have come, each with the nearest drawn one: carried
+// from neighbour to neighbour, down and up again (Danielsson 1980).
+void FrameCompositor::findRims() {
+  const auto isDrawnAtRest = [&](std::uint32_t id) { return id != VisibilityBuffer::kNothing && !observed_[VisibilityBuffer::objectOf(id)].points.empty(); };
+  cv::Mat index(region_.size(), CV_32S, cv::Scalar(-1));
+  for (int v = 0; v < region_.height; ++v) {
+    rim_rows_.push_back(rims_.size());
+    const std::uint32_t* ids = centre_->ids(v);
+    const std::uint8_t* reach = rest_.reach.ptr<std::uint8_t>(v + region_.y) + region_.x;
+    for (int u = 0; u < region_.width; ++u) {
+      if (reach[u] == 0 || isDrawnAtRest(ids[u])) continue;
+      index.at<int>(v, u) = static_cast<int>(rims_.size());
+      rims_.push_back({u, v, {-1, -1}});
+    }
+  }
+  rim_rows_.push_back(rims_.size());
+  const auto look = [&](Rim& rim, int du, int dv) {
+    const cv::Point q(rim.u + du, rim.v + dv);
+    if (q.x < 0 || q.y < 0 || q.x >= region_.width || q.y >= region_.height) return;
+    const int other = index.at<int>(q);
+    const cv::Point drawn = other >= 0 ? rims_[other].nearest : isDrawnAtRest(centre_->ids(q.y)[q.x]) ? q : cv::Point(-1, -1);
+    if (drawn.x < 0) return;
+    const auto squared = [&](const cv::Point& p) { return (p.x - rim.u) * (p.x - rim.u) + (p.y - rim.v) * (p.y - rim.v); };
+    if (rim.nearest.x < 0 || squared(drawn) < squared(rim.nearest)) rim.nearest = drawn;
+  };
+  for (int pass = 0; pass < 2; ++pass) {
+    for (std::size_t i = 0; i < rims_.size(); ++i) look(rims_[i], -1, 0), look(rims_[i], -1, -1), look(rims_[i], 0, -1), look(rims_[i], 1, -1);
+    for (std::size_t i = rims_.size(); i-- > 0;) look(rims_[i], 1, 0), look(rims_[i], 1, 1), look(rims_[i], 0, 1), look(rims_[i], -1, 1);
+  }
+}
+
+void FrameCompositor::addRimResidual(int v, Row& row) const {
+  if (rims_.empty()) return;
+  for (std::size_t i = rim_rows_[v - region_.y]; i < rim_rows_[v - region_.y + 1]; ++i) {
+    const Rim& rim = rims_[i];
+    if (rim.nearest.x < 0 || row.source[rim.u] == kOriginal) continue;
+    const std::uint32_t id = centre_->ids(rim.nearest.y)[rim.nearest.x];
+    const cv::Point from = rim.nearest + region_.tl();
+    const Eigen::Vector2f moved = movement(id, static_cast<float>(from.x), static_cast<float>(from.y));
+    addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved, surface_of_slot_[VisibilityBuffer::objectOf(id)], row.colour[rim.u]);
+  }
+}
+
+// What drawing misses of the video at (u, v), on a pixel to which the surface there has moved.
+void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, cv::Vec4f& colour) const {
+  const float squared = moved.squaredNorm();
+  if (squared >= kNonePx * kNonePx) return;
+  const float part = 1.0f - smoothStep(kWholePx, kNonePx, std::sqrt(squared));
+  const cv::Vec4f miss = missAt(u, v, owner);
+  for (int c = 0; c < 3; ++c) colour[c] += part * miss[c];
+  colour[3] *= 1.0f - part * miss[3];
+}
+
+// @return 0 where nothing is known of this owner
+cv::Vec4f FrameCompositor::missAt(float u, float v, int owner) const {
   const float fu = std::floor(u), fv = std::floor(v), x = u - fu, y = v - fv;
+  const int i = static_cast<int>(fu) - rest_.box.x, j = static_cast<int>(fv) - rest_.box.y;
   cv::Vec4f sum;
   for (int k = 0; k < 4; ++k) {
     const float weight = ((k & 1) != 0 ? x : 1.0f - x) * ((k & 2) != 0 ? y : 1.0f - y);
-    const cv::Point at(static_cast<int>(fu) + (k & 1), static_cast<int>(fv) + (k >> 1));
-    if (weight == 0.0f || !region_.contains(at)) continue;
-    cv::Vec3f drawn = rest_.drawn.at<cv::Vec3f>(at);
-    if (drawn[0] < 0.0f || rest_.owners.at<short>(at) != owner) continue;
-    drawn += rest_.passing.at<cv::Vec3f>(at).mul(revealedAt(at.x, at.y).colour);
-    const cv::Vec3b& code = frame_.bgr.at<cv::Vec3b>(at);
-    for (int c = 0; c < 3; ++c) sum[c] += weight * (linearFromCode(code[c]) - drawn[c]);
-    sum[3] += weight;
+    const int column = i + (k & 1), row = j + (k >> 1);
+    if (weight == 0.0f || column < 0 || row < 0 || column >= miss_.cols || row >= miss_.rows) continue;
+    if (rest_.owners.at<short>(row + rest_.box.y, column + rest_.box.x) == owner) sum += weight * miss_.at<cv::Vec4f>(row, column);
   }
   return sum;
 }

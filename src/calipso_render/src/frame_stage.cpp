@@ -22,7 +22,7 @@ FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& p
                                  ShadowCache& shadows, RestPicture& rest)
     : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), light_(lightOf(frame)), rest_(rest),
       labels_(frame.labels.empty() ? prepared.key_labels : frame.labels), eye_(frame.camera.world_from_camera.translation().cast<float>()),
-      plane_view_(params.planes, frame.camera), noise_(frame.stamp_ns) {
+      plane_view_(params.planes, frame.camera), codec_(params.add_noise ? prepared.noise : NoiseModel(), frame.stamp_ns) {
   if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");
 }
 
@@ -31,9 +31,13 @@ FrameOutput FrameCompositor::run() {
   FrameOutput out{frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
   if (region_.empty()) return out;
   findResidual();
-#pragma omp parallel for schedule(dynamic, 8)
-  for (int v = region_.y; v < region_.y + region_.height; ++v) {
-    for (int u = region_.x; u < region_.x + region_.width; ++u) composePixel(u, v, out);
+  findChanged();
+  findMaps();
+#pragma omp parallel
+  {
+    Row row;
+#pragma omp for schedule(dynamic, 8)
+    for (int v = region_.y; v < region_.y + region_.height; ++v) composeRow(v, row, out);
   }
   return out;
 }
@@ -168,7 +172,16 @@ void FrameCompositor::findRemoved() {
   removed_.setTo(0, others);  // what stands beside it keeps its own pixels
 }
 
+void FrameCompositor::findMaps() {
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
+    const int surface = surface_of_slot_[slot];
+    const bool seen = edited_[surface] || !(boundsOf(actors_[slot].screen, 0, frame_.bgr.size()) & region_).empty();
+    maps_.push_back(seen ? triangleMaps(actors_[slot], prepared_.appearances[surface]) : std::vector<TriangleMap>{});
+  }
+}
+
 void FrameCompositor::drawVisibility() {
+  for (const int surface : surface_of_slot_) always_drawn_.push_back(edited_[surface] && fronts_[surface].empty());
   centre_.emplace(region_);
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) centre_->draw(actors_[slot].screen, static_cast<int>(slot));
   edges_.emplace(*centre_);

@@ -99,7 +99,7 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
   const auto clues = std::make_shared<std::vector<ShadowClue>>();
   for (const View& view : views) {
     std::vector<Occluder> occluders;
-    for (const Actor& a : view.actors) occluders.push_back({&a.vertices, &a.surface->triangles});
+    for (const Actor& a : view.actors) occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
     scenes->emplace_back(occluders);
     if (!planes.empty()) clues->emplace_back(view, planes, plate);
   }

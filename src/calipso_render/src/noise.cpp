@@ -121,8 +121,8 @@ NoiseField::NoiseField(std::int64_t stamp_ns) {
   shift_v_ = static_cast<int>((h >> 20) & (kSide - 1));
 }
 
-const std::vector<cv::Vec3f>& NoiseField::tile() {
-  static const std::vector<cv::Vec3f> field = [] {
+const std::vector<cv::Vec4f>& NoiseField::tile() {
+  static const std::vector<cv::Vec4f> field = [] {
     cv::Mat white(kSide, kSide, CV_32FC3), other(kSide, kSide, CV_32FC3), smooth;
     cv::RNG random(0x5eed);
     random.fill(white, cv::RNG::NORMAL, 0.0, 1.0);
@@ -131,9 +131,10 @@ const std::vector<cv::Vec3f>& NoiseField::tile() {
     cv::Mat mix = white * std::sqrt(0.5) + smooth;  // smooth keeps about half of its variance
     cv::Scalar mean, deviation;
     cv::meanStdDev(mix, mean, deviation);
-    std::vector<cv::Vec3f> values(mix.begin<cv::Vec3f>(), mix.end<cv::Vec3f>());
-    for (cv::Vec3f& x : values) {
-      for (int c = 0; c < 3; ++c) x[c] = static_cast<float>((x[c] - mean[c]) / deviation[c]);
+    std::vector<cv::Vec4f> values;
+    for (auto x = mix.begin<cv::Vec3f>(); x != mix.end<cv::Vec3f>(); ++x) {
+      values.emplace_back();
+      for (int c = 0; c < 3; ++c) values.back()[c] = static_cast<float>(((*x)[c] - mean[c]) / deviation[c]);
     }
     return values;
   }();

@@ -13,7 +13,9 @@ PlaneView::PlaneView(const std::vector<SupportPlane>& planes, const Camera& came
   ray_v_ = (R.col(1) / camera.fy).cast<float>();
   constexpr float kNoLimit = std::numeric_limits<float>::max();
   for (const SupportPlane& p : planes) {
-    Plane plane{p.normal.cast<float>(), static_cast<float>(p.offset - p.normal.dot(eye)), -kNoLimit, kNoLimit};
+    Plane plane{p.normal.cast<float>(), static_cast<float>(p.offset - p.normal.dot(eye)), -kNoLimit, kNoLimit, 0.0f, 0.0f, 0.0f, false};
+    plane.slope_0 = plane.normal.dot(ray_0_), plane.slope_u = plane.normal.dot(ray_u_), plane.slope_v = plane.normal.dot(ray_v_);
+    plane.endless = !p.x_range && plane.height < 0.0f;
     if (p.x_range) plane.x_min = static_cast<float>(p.x_range->x()), plane.x_max = static_cast<float>(p.x_range->y());
     planes_.push_back(plane);
   }

@@ -11,6 +11,12 @@ class PlaneView {
  public:
   PlaneView(const std::vector<SupportPlane>& planes, const Camera& camera);
 
+  bool sees(float u, float v) const {
+    if (planes_.size() == 1 && planes_[0].endless) return planes_[0].slope_0 + u * planes_[0].slope_u + v * planes_[0].slope_v < -1e-9f;
+    Receiver receiver;
+    return at(u, v, receiver);
+  }
+
   // @return false where no plane is seen
   bool at(float u, float v, Receiver& receiver) const {
     const Eigen::Vector3f ray = ray_0_ + u * ray_u_ + v * ray_v_;
@@ -33,6 +39,8 @@ class PlaneView {
     Eigen::Vector3f normal;
     float height;        // of the plane over the eye, m (negative: the eye is above it)
     float x_min, x_max;  // world, m
+    float slope_0, slope_u, slope_v;  // of a pixel's sight line against it
+    bool endless;        // below the eye, without limits
   };
   std::vector<Plane> planes_;
   Eigen::Vector3f eye_, ray_0_, ray_u_, ray_v_;  // world; a pixel's sight line is ray_0 + u ray_u + v ray_v

@@ -218,7 +218,7 @@ cv::Mat restingTraces(const Prepared& p, const cv::Mat& sun, const cv::Mat& sky,
 
 std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
   std::vector<Occluder> all;
-  for (const Actor& a : actors) all.push_back({&a.vertices, &a.surface->triangles});
+  for (const Actor& a : actors) all.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
   return all;
 }
 

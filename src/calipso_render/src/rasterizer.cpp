@@ -49,7 +49,7 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Span
   if (!(right >= 0 && bottom >= 0 && left <= region.width - 1 && top <= region.height - 1)) return false;
   const float area = (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) -
                      (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
-  if (!(std::abs(area) > kSmallestArea) || std::isnan(p[0].z() + p[1].z() + p[2].z())) return false;
+  if (mesh.hides(area) || !(std::abs(area) > kSmallestArea) || std::isnan(p[0].z() + p[1].z() + p[2].z())) return false;
   span.row_min = ceilInt(std::max(0.0f, top - kEdgeTolerance));
   span.row_max = floorInt(std::min(region.height - 1.0f, bottom + kEdgeTolerance));
   span.column_min = ceilInt(std::max(0.0f, left - kEdgeTolerance));

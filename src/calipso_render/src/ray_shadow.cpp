@@ -85,6 +85,14 @@ bool RayShadow::blocked(const Eigen::Vector3f& from, int ray) const {
   return r.tfar < 0.0f;
 }
 
+std::optional<float> RayShadow::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f&, float radius) const {
+  if (!scene_) return 1.0f;
+  const Eigen::Vector3f q(p.dot(axis_s_), p.dot(axis_t_), p.dot(axis_h_));
+  const float around = radius + 4.0f * lift_, reach = around + spread_ * (high_.z() - q.z() + around);
+  const bool clear = high_.z() < q.z() - around || q.x() + reach < low_.x() || q.x() - reach > high_.x() || q.y() + reach < low_.y() || q.y() - reach > high_.y();
+  return clear ? std::make_optional(1.0f) : std::nullopt;
+}
+
 float RayShadow::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
   if (!scene_) return 1.0f;
   const Eigen::Vector3f from = p + n * lift_ * 4.0f;

@@ -46,6 +46,7 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
   for (const Occluder& o : occluders) {
     ScreenMesh mesh;
     mesh.triangles = o.triangles;
+    mesh.hidden_side = -o.winding;  // the light looks along rows upwards
     mesh.points.resize(o.vertices->size());
 #pragma omp parallel for schedule(static)
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
@@ -136,14 +137,15 @@ float ShadowMap::filtered(float s, float t, float h, float search) const {
   return 1.0f - covered / pattern_.size();
 }
 
-float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
-  if (heights_.empty()) return 1.0f;
-  // The start is lifted off the surface by a texel or two, so that it does not shade itself.
+ShadowMap::Place ShadowMap::placeOf(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
   const float slope = 1.0f - std::clamp(n.dot(axis_h_), 0.0f, 1.0f);
   const Eigen::Vector3f q = p + n * texel_ * (1.0f + 2.0f * slope);
-  const float s = (q.dot(axis_s_) - origin_.x()) / texel_;
-  const float t = (q.dot(axis_t_) - origin_.y()) / texel_;
-  const float h = q.dot(axis_h_) - origin_.z() + 1.5f * texel_;
+  return {(q.dot(axis_s_) - origin_.x()) / texel_, (q.dot(axis_t_) - origin_.y()) / texel_, q.dot(axis_h_) - origin_.z() + 1.5f * texel_};
+}
+
+float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
+  if (heights_.empty()) return 1.0f;
+  const auto [s, t, h] = placeOf(p, n);
   if (h > highest_) return 1.0f;
   // Blockers inside the cone that the disc spans up to the highest occluder.
   const float search = std::max(1.5f, angular_radius_ * (highest_ - h) / texel_);
@@ -154,6 +156,19 @@ float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   const float reach = search + 2.0f;
   const bool inside = s > reach && t > reach && s + reach < width_ && t + reach < height_;
   return inside ? filtered<true>(s, t, h, search) : filtered<false>(s, t, h, search);
+}
+
+std::optional<float> ShadowMap::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const {
+  if (heights_.empty()) return 1.0f;
+  const auto [s, t, h] = placeOf(p, n);
+  const float lowest = h - radius, highest = h + radius;  // of the disc
+  if (lowest > highest_) return 1.0f;
+  const float reach = std::max(1.5f, angular_radius_ * (highest_ - lowest) / texel_) + 2.0f + radius / texel_;
+  if (s < -reach || t < -reach || s > width_ + reach || t > height_ + reach) return 1.0f;
+  const Extremes near = around(s, t, reach);
+  if (near.highest <= lowest) return 1.0f;
+  if (near.lowest > highest) return 0.0f;
+  return std::nullopt;
 }
 
 }  // namespace calipso::render

@@ -1,8 +1,10 @@
 #include "calipso_render/stage.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "mesh_topology.hpp"
 #include "ray_scene.hpp"
 
 namespace calipso::render {
@@ -46,6 +48,7 @@ Surface makeSurface(const ObjectModel& model) {
     surface.triangles.push_back(triangle);
   }
   surface.edges = meshEdges(surface.triangles);
+  surface.winding = outsideWinding(surface.object_vertices, surface.triangles);
   surface.key_vertices = transformed(surface.object_vertices, model.world_from_object);
   surface.key_normals = vertexNormals(surface.key_vertices, surface.triangles);
   surface.sky = skyExposure(surface.key_vertices, surface.key_normals, surface.triangles);
@@ -58,6 +61,9 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
   actor.vertices = std::move(vertices);
   actor.normals = vertexNormals(actor.vertices, surface.triangles);
   actor.screen = projectMesh(actor.vertices, surface.triangles, camera);
+  const auto behind = [](const Eigen::Vector3f& p) { return std::isnan(p.z()); };
+  const bool around_us = std::any_of(actor.screen.points.begin(), actor.screen.points.end(), behind);
+  actor.screen.hidden_side = around_us ? 0 : surface.winding;
   return actor;
 }
 

@@ -4,8 +4,8 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numeric>
+
+#include "mesh_topology.hpp"
 
 namespace calipso::render {
 namespace {
@@ -17,7 +17,6 @@ constexpr float kMirrorPart = 0.95f;    // of the vertices that must find their 
 constexpr float kAlike = 0.9f;          // principal axes of nearly the same length: any axis between may be the one
 constexpr int kAnglesBetween = 12;      // tried there, over half a turn
 constexpr double kAnchor = 1e-4;        // pull towards the mean where nothing known is connected
-constexpr float kSamePlace = 1e-5f;     // of the surface's extent
 
 std::size_t texelCount(int steps) { return static_cast<std::size_t>(steps + 1) * (steps + 2) / 2; }
 
@@ -41,19 +40,6 @@ float mirroredPart(const Points& vertices, const MirrorPlane& plane, float toler
     hits += near;
   }
   return static_cast<float>(hits) / std::max(1, probes);
-}
-
-// The first vertex at the place of each.
-std::vector<int> weld(const Points& vertices) {
-  const float cell = std::max(kSamePlace * boxOf(vertices).diagonal().norm(), 1e-12f);
-  std::map<std::array<long, 3>, int> first;
-  std::vector<int> welded(vertices.size());
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    std::array<long, 3> key;
-    for (int k = 0; k < 3; ++k) key[k] = std::lround(vertices[i][k] / cell);
-    welded[i] = first.try_emplace(key, static_cast<int>(i)).first->second;
-  }
-  return welded;
 }
 
 }  // namespace

@@ -90,18 +90,18 @@ TEST(NoiseField, HangsOnStampAndPixelAlone) {
 }
 
 TEST(SampleBicubic, ReproducesAPlaneAndThePixelsThemselves) {
-  cv::Mat plane(12, 15, CV_32FC3), random(12, 15, CV_32FC3);
+  cv::Mat plane(12, 15, CV_32FC4), random(12, 15, CV_32FC4);
   for (int v = 0; v < 12; ++v) {
-    for (int u = 0; u < 15; ++u) plane.at<cv::Vec3f>(v, u) = cv::Vec3f(1.0f + 2.0f * u, 3.0f + v, 50.0f + u - v);
+    for (int u = 0; u < 15; ++u) plane.at<cv::Vec4f>(v, u) = cv::Vec4f(1.0f + 2.0f * u, 3.0f + v, 50.0f + u - v, 4.0f);
   }
   cv::RNG numbers(2);
   numbers.fill(random, cv::RNG::UNIFORM, 0.0, 1.0);
   for (int v = 0; v < 12; ++v) {
-    for (int u = 0; u < 15; ++u) EXPECT_LT(cv::norm(sampleBicubic(random, float(u), float(v)) - random.at<cv::Vec3f>(v, u)), 1e-6) << u << ", " << v;
+    for (int u = 0; u < 15; ++u) EXPECT_LT(cv::norm(sampleBicubic(random, float(u), float(v)) - random.at<cv::Vec4f>(v, u)), 1e-6) << u << ", " << v;
   }
   for (float v = 1.0f; v < 10.0f; v += 0.37f) {
     for (float u = 1.0f; u < 13.0f; u += 0.41f) {
-      EXPECT_LT(cv::norm(sampleBicubic(plane, u, v) - cv::Vec3f(1.0f + 2.0f * u, 3.0f + v, 50.0f + u - v)), 1e-4) << u << ", " << v;
+      EXPECT_LT(cv::norm(sampleBicubic(plane, u, v) - cv::Vec4f(1.0f + 2.0f * u, 3.0f + v, 50.0f + u - v, 4.0f)), 1e-4) << u << ", " << v;
     }
   }
 }

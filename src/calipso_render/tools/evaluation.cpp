@@ -151,7 +151,9 @@ class Evaluation {
     for (std::size_t i = 0; i < prepared_->surfaces.size(); ++i) {
       const Appearance& a = prepared_->appearances[i];
       const cv::Mat mask = shrink(prepared_->key_labels == prepared_->surfaces[i].index, kRim)(a.region);
-      a.albedo.copyTo(albedo(a.region), mask);
+      cv::Mat colour;
+      cv::cvtColor(a.albedo, colour, cv::COLOR_BGRA2BGR);
+      colour.copyTo(albedo(a.region), mask);
       known(a.region).setTo(255, mask);
     }
     return albedoError(albedo, *truth, known);

@@ -15,10 +15,13 @@ namespace calipso::render {
 // smoothly from the surface around it.
 class Appearance {
  public:
-  // Pixel-wise reflectance (linear; CV_32FC3), extended beyond the silhouette.
+  enum class Source : std::uint8_t { kPicture, kTexture, kBoth };
+
+  // Pixel-wise reflectance (linear; CV_32FC4, the fourth unused), extended beyond the silhouette.
   cv::Mat albedo;
   cv::Rect region;       // of the key frame's picture that albedo covers
   SurfaceTexture texture;  // reflectance, and how far the picture is to be taken instead (0..1)
+  std::vector<Source> sources;  // per triangle: what `texture` says there
   Camera key_camera;
   cv::Vec3f mean_light;  // average shading over the seen surface: regularises the relighting
   Gloss gloss;
@@ -41,7 +44,8 @@ inline cv::Vec3f lightFloor(const cv::Vec3f& mean_light) { return mean_light * 0
 std::vector<Appearance> makeAppearances(const std::vector<View>& views, const std::vector<bool>& moves, const Light& light,
                                         const Gloss& gloss);
 
-// Bicubic (Catmull-Rom) lookup with borders repeated. (u, v) in the image's own pixels.
-cv::Vec3f sampleBicubic(const cv::Mat& image, float u, float v);
+// Bicubic (Catmull-Rom) lookup with borders repeated, not below 0. (u, v) in the image's own pixels.
+// @param image CV_32FC4
+cv::Vec4f sampleBicubic(const cv::Mat& image, float u, float v);
 
 }  // namespace calipso::render

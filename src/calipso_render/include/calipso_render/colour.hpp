@@ -17,6 +17,13 @@ float linearFromRealCode(float code);
 // Code value as a real number in [0, 255] of a linear value; clamps to [0, 1] first.
 float codeFromLinear(float linear);
 
+// What codeFromLinear() interpolates: code value at sqrt(linear) = i / kEncodeSteps, and the rise to the next step.
+constexpr int kEncodeSteps = 1024;
+struct EncodeStep {
+  float code, rise;
+};
+const EncodeStep* encodeSteps();  // kEncodeSteps + 1 of them
+
 // CV_8UC3 -> CV_32FC3 and back (rounded).
 cv::Mat linearFromCode(const cv::Mat& bgr);
 cv::Mat codeFromLinear(const cv::Mat& linear);

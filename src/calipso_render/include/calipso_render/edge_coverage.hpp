@@ -39,6 +39,9 @@ class EdgeCoverage {
   // nullptr where the pixel's centre speaks for it. Picture coordinates.
   const Pixel* at(int u, int v) const;
 
+  // Region coordinates: per pixel of a row, negative where the centre speaks for it.
+  const int* slots(int row) const { return &slots_[static_cast<std::size_t>(row) * region_.width]; }
+
   // Position of a sample against its pixel's centre, px.
   static Eigen::Vector2f offset(int sample) {
     return {(sample % kGrid + 0.5f) / kGrid - 0.5f, (sample / kGrid + 0.5f) / kGrid - 0.5f};
@@ -46,10 +49,14 @@ class EdgeCoverage {
 
  private:
   void choose(int column, int row);  // region coordinates
+  bool anyChosen(int u0, int v0, int u1, int v1) const;  // within this rectangle, or near it
   void drawTriangle(const ScreenMesh& mesh, int triangle, std::uint32_t id);
 
   cv::Rect region_;
   std::vector<int> slots_;  // per pixel of the region: index into pixels_, -1 = none
+  static constexpr int kTile = 8;  // px
+  int tiles_across_;
+  std::vector<std::uint8_t> tiles_;  // 1: some pixel of the tile is chosen
   std::vector<Pixel> pixels_;
 };
 

@@ -30,13 +30,15 @@ class NoiseModel {
 class NoiseField {
  public:
   explicit NoiseField(std::int64_t stamp_ns);
-  float at(int u, int v, int channel) const {
-    return tile()[((v + shift_v_) & (kSide - 1)) * kSide + ((u + shift_u_) & (kSide - 1))][channel];
-  }
+  float at(int u, int v, int channel) const { return row(v)[column(u)][channel]; }
+
+  // Row v of the picture, as columns say; the fourth value is 0.
+  const cv::Vec4f* row(int v) const { return &tile()[static_cast<std::size_t>((v + shift_v_) & (kSide - 1)) * kSide]; }
+  int column(int u) const { return (u + shift_u_) & (kSide - 1); }
 
  private:
   static constexpr int kSide = 256;
-  static const std::vector<cv::Vec3f>& tile();
+  static const std::vector<cv::Vec4f>& tile();
   int shift_u_, shift_v_;
 };
 

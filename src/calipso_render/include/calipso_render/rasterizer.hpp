@@ -18,6 +18,11 @@ using Triangles = std::vector<Eigen::Vector3i>;
 struct ScreenMesh {
   Points points;
   const Triangles* triangles = nullptr;
+  // Sign of the area in the picture (rows downwards: positive is clockwise) of triangles that others are known to hide: those
+  // on the far side of a mesh that encloses space. They are left out. 0: all can be seen.
+  int hidden_side = 0;
+
+  bool hides(float area) const { return static_cast<float>(hidden_side) * area > 0.0f; }
 };
 
 // @param world #V points in the world, m

@@ -25,6 +25,7 @@ class ShadowMap : public Visibility {
             const Params& params);
 
   float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const override;
+  std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const override;
 
   // Length of a texel, m.
   float texel() const { return texel_; }
@@ -39,6 +40,12 @@ class ShadowMap : public Visibility {
     std::vector<Extremes> cells;
   };
   static constexpr int kFirstLevel = 2;
+
+  // A surface point in the map, lifted off so that it does not shade itself.
+  struct Place {
+    float s, t, h;  // texels, texels, m
+  };
+  Place placeOf(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
 
   void buildLevels();
   Extremes around(float s, float t, float reach) const;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "calipso_render/rasterizer.hpp"
 
@@ -10,6 +11,7 @@ namespace calipso::render {
 struct Occluder {
   const Points* vertices;  // world, m
   const Triangles* triangles;
+  int winding = 0;         // Surface::winding
 };
 
 // How much of a distant disc of light the points of the scene see.
@@ -19,6 +21,9 @@ class Visibility {
 
   // Visible fraction of the light, 0..1, from world point p with unit normal n. Thread-safe.
   virtual float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const = 0;
+
+  // What visibility() is all over the disc of `radius` around p, where that is known to be 0 or 1.
+  virtual std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const = 0;
 };
 
 }  // namespace calipso::render

@@ -33,6 +33,7 @@ struct Options {
   std::string pictures;  // folder; empty: none are written
   int frames = 12;
   bool drawing = true;
+  std::string only;      // one way of drawing; empty: all
   std::vector<std::string> scenes;
 };
 
@@ -54,12 +55,16 @@ void timeFrames(const std::string& name, const DrawingCase& drawing, const Optio
 
 void timeDrawing(const Options& options) {
   const DrawingCase live = makeDrawingCase(Quality::kLive);
-  Renderer live_renderer(live.prepared, live.params);
-  timeFrames("drawing_live", live, options, [&](int k) { return live_renderer.composite(live.input(k)).bgr; });
-  DrawingCase final = live;
-  final.params.quality = Quality::kFinal;
-  Renderer final_renderer(final.prepared, final.params);
-  timeFrames("drawing_final", final, options, [&](int k) { return final_renderer.composite(final.input(k)).bgr; });
+  const auto wanted = [&](const char* name) { return options.only.empty() || options.only == name; };
+  for (const Quality quality : {Quality::kLive, Quality::kFinal}) {
+    const char* name = quality == Quality::kLive ? "drawing_live" : "drawing_final";
+    if (!wanted(name)) continue;
+    DrawingCase drawing = live;
+    drawing.params.quality = quality;
+    Renderer renderer(drawing.prepared, drawing.params);
+    timeFrames(name, drawing, options, [&](int k) { return renderer.composite(drawing.input(k)).bgr; });
+  }
+  if (!wanted("drawing_llvmpipe")) return;
 #ifdef CALIPSO_HAVE_EGL
   try {
     LlvmpipeDrawing peer(live);
@@ -85,7 +90,7 @@ void compareScene(const std::string& scene, const Options& options) {
 }  // namespace
 }  // namespace calipso::render
 
-// Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [SCENE_DIR...]   One line of JSON per case.
+// Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only drawing_live|drawing_final|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per case.
 int main(int argc, char** argv) {
   using namespace calipso::render;
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
@@ -94,6 +99,7 @@ int main(int argc, char** argv) {
     const bool has_value = i + 1 < argc;
     if (std::strcmp(argv[i], "--pictures") == 0 && has_value) options.pictures = argv[++i];
     else if (std::strcmp(argv[i], "--frames") == 0 && has_value) options.frames = std::max(1, std::atoi(argv[++i]));
+    else if (std::strcmp(argv[i], "--only") == 0 && has_value) options.only = argv[++i];
     else if (std::strcmp(argv[i], "--no-drawing") == 0) options.drawing = false;
     else options.scenes.push_back(argv[i]);
   }

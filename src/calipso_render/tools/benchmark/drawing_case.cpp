@@ -102,7 +102,7 @@ Points DrawingCase::verticesAt(int k) const {
 }
 
 FrameInput DrawingCase::input(int k) const {
-  FrameInput in{frame, prepared->key_labels, prepared->camera, 40000000LL * k, {}};
+  FrameInput in{frame, prepared->key_labels, prepared->camera, 40000000LL * k, {}, {}};
   ObjectInFrame ball;
   ball.name = "ball", ball.edited = true, ball.vertices = verticesAt(k);
   in.objects.push_back(ball);

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core.hpp>
+
+#include "calipso_render/noise.hpp"
+
+namespace calipso::render {
+
+// Linear colours to code values with the camera's noise, a stretch of a row at a time. Colours are four floats: linear B, G,
+// R, and the part of the pixel that carries no noise yet.
+class LineCodec {
+ public:
+  // @param noise of the camera; a model without deviations adds none
+  LineCodec(const NoiseModel& noise, std::int64_t stamp_ns);
+
+  // @param u, v the first pixel's place in the picture
+  void encode(const cv::Vec4f* colours, int u, int v, int count, cv::Vec3b* codes) const;
+
+ private:
+  std::array<std::array<float, 256>, 3> deviation_;  // per channel and code value
+  NoiseField field_;
+};
+
+}  // namespace calipso::render

@@ -1,0 +1,103 @@
+#include "plane_light.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace calipso::render {
+namespace {
+
+constexpr int kLargest = 16, kSquare = 8, kStep = 2;  // px: squares, and the places in the least of them
+constexpr float kSlow = 0.3f;  // of visibility: between places that differ by no more it is interpolated
+
+class Squares {
+ public:
+  Squares(const PlaneView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out)
+      : view_(view), light_(light), rect_(rect), skip_(skip), out_(out) {}
+
+  // Squares hang on the picture, not on the rectangle: pixels are the same whatever else is asked for.
+  void run() const {
+    const int first_row = rect_.y / kLargest, rows = (rect_.br().y - 1) / kLargest - first_row + 1;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (int j = 0; j < rows; ++j) {
+      for (int u = rect_.x / kLargest * kLargest; u < rect_.br().x; u += kLargest) fill({u, (first_row + j) * kLargest, kLargest, kLargest});
+    }
+  }
+
+ private:
+  void fill(const cv::Rect& square) const {
+    const cv::Rect here = (square & rect_) - rect_.tl();
+    if (here.empty() || (!skip_.empty() && isSkipped(here))) return;
+    Receiver middle, corner;
+    bool even = view_.at(square.x + 0.5f * square.width, square.y + 0.5f * square.height, middle);
+    float radius = 0.0f;
+    for (int k = 0; k < 4 && even; ++k) {
+      even = view_.at(square.x + (k & 1) * square.width, square.y + (k >> 1) * square.height, corner) && corner.normal == middle.normal;
+      radius = std::max(radius, (corner.position - middle.position).norm());
+    }
+    const std::optional<float> uniform = even ? light_.uniform(middle.position, middle.normal, radius) : std::nullopt;
+    if (uniform) {
+      out_(here).setTo(*uniform);
+    } else if (square.width > kSquare) {
+      const int half = square.width / 2;
+      for (int k = 0; k < 4; ++k) fill({square.x + (k & 1) * half, square.y + (k >> 1) * half, half, half});
+    } else if (even) {
+      refine(square, here);
+    } else {
+      fillExactly(here);
+    }
+  }
+
+  bool isSkipped(const cv::Rect& here) const {
+    for (int v = here.y; v < here.br().y; ++v) {
+      const std::uint8_t* row = skip_.ptr<std::uint8_t>(v);
+      if (std::find(row + here.x, row + here.br().x, 0) != row + here.br().x) return false;
+    }
+    return true;
+  }
+
+  float exactly(int u, int v) const {
+    Receiver r;
+    return view_.at(u, v, r) ? light_.visibility(r.position, r.normal) : 1.0f;
+  }
+
+  void refine(const cv::Rect& square, const cv::Rect& here) const {
+    constexpr int kPlaces = kSquare / kStep + 1;
+    float grid[kPlaces][kPlaces];
+    for (int j = 0; j < kPlaces; ++j) {
+      for (int i = 0; i < kPlaces; ++i) grid[j][i] = exactly(square.x + i * kStep, square.y + j * kStep);
+    }
+    for (int y = here.y; y < here.br().y; ++y) {
+      float* row = out_.ptr<float>(y);
+      for (int x = here.x; x < here.br().x; ++x) {
+        const int u = x + rect_.x - square.x, v = y + rect_.y - square.y, i = u / kStep, j = v / kStep;
+        const float a = grid[j][i], b = grid[j][i + 1], c = grid[j + 1][i], d = grid[j + 1][i + 1];
+        const auto [low, high] = std::minmax({a, b, c, d});
+        const float s = static_cast<float>(u % kStep) / kStep, t = static_cast<float>(v % kStep) / kStep;
+        row[x] = high - low <= kSlow ? (a + (b - a) * s) * (1.0f - t) + (c + (d - c) * s) * t : exactly(x + rect_.x, y + rect_.y);
+      }
+    }
+  }
+
+  void fillExactly(const cv::Rect& here) const {
+    Receiver r;
+    for (int y = here.y; y < here.br().y; ++y) {
+      for (int x = here.x; x < here.br().x; ++x) {
+        if (view_.at(x + rect_.x, y + rect_.y, r)) out_.at<float>(y, x) = light_.visibility(r.position, r.normal);
+      }
+    }
+  }
+
+  const PlaneView& view_;
+  const Visibility& light_;
+  const cv::Rect rect_;
+  const cv::Mat& skip_;
+  cv::Mat& out_;
+};
+
+}  // namespace
+
+void planesInLight(const PlaneView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out) {
+  if (!rect.empty()) Squares(view, light, rect, skip, out).run();
+}
+
+}  // namespace calipso::render

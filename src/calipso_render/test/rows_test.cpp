@@ -1,0 +1,106 @@
+#include <gtest/gtest.h>
+
+#include "calipso_render/colour.hpp"
+#include "calipso_render/shadow_map.hpp"
+#include "line_codec.hpp"
+#include "mesh_topology.hpp"
+#include "plane_light.hpp"
+#include "render_test_scene.hpp"
+#include "triangle_map.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
+
+// Against the surface point of every pixel, of a ball that has turned and moved since the key frame.
+TEST(TriangleMap, TellsWhatThePixelsShow) {
+  const Surface surface = makeSurface(ballAt(kCentre));
+  Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
+  turn.translate(kCentre + Eigen::Vector3d(0.05, 0.1, 0.02)).rotate(Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, 3).normalized()));
+  const Actor actor = makeActor(surface, transformed(surface.object_vertices, turn), camera());
+  Appearance appearance;
+  appearance.key_camera = camera();
+  const std::vector<TriangleMap> maps = triangleMaps(actor, appearance);
+  VisibilityBuffer buffer({0, 0, kWidth, kHeight});
+  buffer.draw(actor.screen, 0);
+  const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
+  int seen = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const std::uint32_t id = buffer.ids(v)[u];
+      if (id == VisibilityBuffer::kNothing || maps[VisibilityBuffer::triangleOf(id)].thin) continue;
+      const TriangleMap& map = maps[VisibilityBuffer::triangleOf(id)];
+      const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u, v, eye);
+      ASSERT_LT((map.keyAt(u, v).cast<double>() - camera().projectWorld(p.key_position.cast<double>())).norm(), 0.01) << u << ", " << v;
+      ASSERT_LT((map.weightsAt(u, v) - p.weights).norm(), 2e-3f) << u << ", " << v;
+      ++seen;
+    }
+  }
+  EXPECT_GT(seen, 300);
+}
+
+TEST(LineCodec, EncodesAsCodeFromLinear) {
+  std::vector<cv::Vec4f> colours;
+  for (int i = 0; i <= 2000; ++i) colours.emplace_back(i / 1990.0f - 0.001f, 0.3f * i / 2000.0f, std::nanf(""), 1.0f);
+  std::vector<cv::Vec3b> codes(colours.size());
+  LineCodec(NoiseModel(), 3).encode(colours.data(), 5, 7, static_cast<int>(colours.size()), codes.data());
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    for (int c = 0; c < 3; ++c) ASSERT_EQ(codes[i][c], quantise(codeFromLinear(colours[i][c]))) << i << ", " << c;
+  }
+}
+
+TEST(OutsideWinding, KnowsClosedMeshesFromOpenOnes) {
+  const Surface surface = makeSurface(ballAt(kCentre));
+  Triangles turned = surface.triangles, open = surface.triangles, disagreeing = surface.triangles;
+  for (Eigen::Vector3i& t : turned) std::swap(t[0], t[1]);
+  std::swap(disagreeing[200][0], disagreeing[200][1]);
+  open.erase(open.begin() + 200);
+  EXPECT_EQ(std::abs(surface.winding), 1);
+  EXPECT_EQ(outsideWinding(surface.object_vertices, turned), -surface.winding);
+  EXPECT_EQ(outsideWinding(surface.object_vertices, open), 0);
+  EXPECT_EQ(outsideWinding(surface.object_vertices, disagreeing), 0);
+}
+
+// What lies on the far side of a closed mesh is hidden by its near side: leaving it out changes nothing.
+TEST(OutsideWinding, LeavesOutOnlyWhatIsHidden) {
+  Surface surface = makeSurface(ballAt(kCentre));
+  const Actor actor = makeActor(surface, surface.key_vertices, camera());
+  ASSERT_NE(actor.screen.hidden_side, 0);
+  ScreenMesh all = actor.screen;
+  all.hidden_side = 0;
+  VisibilityBuffer some({0, 0, kWidth, kHeight}), every({0, 0, kWidth, kHeight});
+  some.draw(actor.screen, 0), every.draw(all, 0);
+  int different = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) different += some.ids(v)[u] != every.ids(v)[u];
+  }
+  EXPECT_LE(different, 4);  // on the silhouette the two sides meet within the edges' tolerance
+  const Eigen::Vector3d light(0.3, 0.2, 1.0);
+  const ShadowMap with({{&actor.vertices, &surface.triangles, surface.winding}}, light, {256, 0.02, 16}), without({{&actor.vertices, &surface.triangles}}, light, {256, 0.02, 16});
+  for (float x = -0.3f; x < 0.3f; x += 0.01f) EXPECT_NEAR(with.visibility({x, 0.1f, 0.0f}, Eigen::Vector3f::UnitZ()), without.visibility({x, 0.1f, 0.0f}, Eigen::Vector3f::UnitZ()), 0.02f) << x;
+}
+
+TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
+  const Surface surface = makeSurface(ballAt(kCentre));
+  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}}, sunlight().direction.cast<double>(), {512, 0.03, 16});
+  const PlaneView view(table(), camera());
+  const cv::Rect rect(13, 9, 120, 101);
+  cv::Mat fast(rect.size(), CV_32F, cv::Scalar(1.0f));
+  planesInLight(view, sun, rect, cv::Mat(), fast);
+  int shaded = 0;
+  for (int v = 0; v < rect.height; ++v) {
+    for (int u = 0; u < rect.width; ++u) {
+      Receiver r;
+      const float exact = view.at(u + rect.x, v + rect.y, r) ? sun.visibility(r.position, r.normal) : 1.0f;
+      ASSERT_NEAR(fast.at<float>(v, u), exact, 0.16f) << u << ", " << v;  // half of what may lie between two places
+      shaded += exact < 0.5f;
+    }
+  }
+  EXPECT_GT(shaded, 100);
+}
+
+}  // namespace
+}  // namespace calipso::render
