@@ -1,6 +1,7 @@
 #include "thread_team.hpp"
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -10,6 +11,8 @@
 
 namespace calipso::fem {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 inline void pause() {
 #if defined(__x86_64__)
@@ -29,18 +32,19 @@ class Signal {
     wake_.notify_all();
   }
 
-  // True when the wait was long enough to sleep.
-  bool waitPast(unsigned seen) {
+  // The time slept.
+  Clock::duration waitPast(unsigned seen) {
     constexpr int kSpins = 1000;
     for (int k = 0; k < kSpins; ++k) {
-      if (value() != seen) return false;
+      if (value() != seen) return Clock::duration::zero();
       pause();
     }
+    const Clock::time_point start = Clock::now();
     std::unique_lock<std::mutex> lock(mutex_);
     sleepers_.fetch_add(1);
     wake_.wait(lock, [&] { return value_.load() != seen; });
     sleepers_.fetch_sub(1);
-    return true;
+    return Clock::now() - start;
   }
 
  private:
@@ -55,42 +59,48 @@ class Barrier {
   void wait(int count) {
     const unsigned seen = passed_.value();
     if (arrived_.fetch_add(1) + 1 < count) {
-      if (passed_.waitPast(seen)) slept_.fetch_add(1, std::memory_order_relaxed);
+      slept_.fetch_add(passed_.waitPast(seen).count(), std::memory_order_relaxed);
       return;
     }
     arrived_.store(0);
     passed_.advance();
   }
 
-  unsigned passed() const { return passed_.value(); }
-  unsigned slept() const { return slept_.load(std::memory_order_relaxed); }
+  // Of all threads together, so far.
+  Clock::duration slept() const { return Clock::duration(slept_.load(std::memory_order_relaxed)); }
 
  private:
   std::atomic<int> arrived_{0};
-  std::atomic<unsigned> slept_{0};
+  std::atomic<Clock::rep> slept_{0};
   Signal passed_;
 };
 
-// Where other processes keep the processors busy, threads wait for each other longer than they work: then the
-// caller works alone for a while, and tries again after ever more regions.
+// Where other processes keep the processors busy, threads sleep waiting for each other for about as long as the
+// work takes: then the caller works alone for a while, and tries again after ever longer ones.
 class Concurrency {
  public:
-  bool isWorthwhile() { return alone_ == 0 || --alone_ == 0; }
+  bool isWorthwhile() const { return Clock::now() >= alone_until_; }
 
-  void judge(unsigned barriers, unsigned slept) {
-    constexpr unsigned kEnoughToJudge = 16;
-    constexpr int kFirstPause = 16, kLongestPause = 512;
-    if (barriers < kEnoughToJudge) return;
-    if (4 * slept <= barriers) {
+  void judge(Clock::duration passed, Clock::duration slept, int count) {
+    constexpr Clock::duration kEnoughToJudge = std::chrono::milliseconds(2);
+    constexpr double kWorthwhile = 0.6;   // share of the helpers' time that may be slept
+    passed_ += passed;
+    slept_ += slept;
+    if (passed_ < kEnoughToJudge) return;
+    if (static_cast<double>(slept_.count()) <= kWorthwhile * (count - 1) * passed_.count()) {
       pause_ = kFirstPause;
-      return;
+    } else {
+      alone_until_ = Clock::now() + std::max(pause_, 4 * passed_);
+      pause_ = std::min(2 * pause_, kLongestPause);
     }
-    alone_ = pause_;
-    pause_ = std::min(2 * pause_, kLongestPause);
+    passed_ = slept_ = Clock::duration::zero();
   }
 
  private:
-  int alone_ = 0, pause_ = 16;
+  static constexpr Clock::duration kFirstPause = std::chrono::milliseconds(10);
+  static constexpr Clock::duration kLongestPause = std::chrono::milliseconds(500);
+  Clock::time_point alone_until_;
+  Clock::duration pause_ = kFirstPause, passed_{}, slept_{};
 };
 
 // The process's helper threads; started at first use, ended with the process.
@@ -112,10 +122,11 @@ class Team {
     count_ = count;
     work_ = &work;
     start_.advance();
-    const unsigned passed = inner_.passed(), slept = inner_.slept();
+    const Clock::time_point start = Clock::now();
+    const Clock::duration slept = inner_.slept() + end_.slept();
     work(Crew(0, count));
     end_.wait(static_cast<int>(threads_.size()) + 1);
-    concurrency_.judge(inner_.passed() - passed, inner_.slept() - slept);
+    concurrency_.judge(Clock::now() - start, inner_.slept() + end_.slept() - slept, count);
     return true;
   }
 
