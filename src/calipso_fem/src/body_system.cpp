@@ -282,12 +282,12 @@ double DeformableBody::Impl::forceScale(const Vec& y, const Integrator& i, const
 }
 
 double DeformableBody::Impl::roundOff(const Vec& y) const {
+  if (matrix_free) return hex_solver->roundOff(y);
   constexpr double kUnit = 2e-16;
   double sum = 0.0;
   for (Eigen::Index k = 0; k < y.size(); ++k) {
-    const Eigen::Index node = k / 3, c = k % 3;
-    const double diagonal = matrix_free ? hex_solver->diagonal()[9 * node + 4 * c]
-                                        : A.block(A.pattern->diagonal[node])(c, c);
+    const Eigen::Index c = k % 3;
+    const double diagonal = A.block(A.pattern->diagonal[k / 3])(c, c);
     sum += diagonal * y[k] * diagonal * y[k];
   }
   return kUnit * std::sqrt(sum);

@@ -22,16 +22,16 @@ void HexLevel::allocate(const StvkHexes& h) {
 }
 
 void HexLevel::load(const AlignedBuffer<double>& at, const AlignedBuffer<double>& at_stress,
-          const HexSystem& system, const Eigen::VectorXd& lumped_mass,
-          const std::vector<int>& fixed) {
+                    const HexSystem& system, const AlignedBuffer<double>& at_mass,
+                    const std::vector<int>& fixed) {
   factor = static_cast<float>(system.factor);
   std::fill(free.begin(), free.end(), 1.0f);
   for (std::size_t k = 3; k < free.size(); k += 4) free[k] = 0.0f;
-  for (int dof : fixed) free[4 * (dof / 3) + dof % 3] = 0.0f;
+  for (int dof : fixed) free[4L * hexes->nodeOf(dof / 3) + dof % 3] = 0.0f;
   springs_.set(system.springs);
   parallelFor(hexes->nodeCount(), 1024, [&](int begin, int end) {
     for (long k = 4L * begin; k < 4L * end; ++k) x[k] = static_cast<float>(at[k]);
-    for (int i = begin; i < end; ++i) mass[i] = static_cast<float>(system.inertia * lumped_mass[i]);
+    for (int i = begin; i < end; ++i) mass[i] = static_cast<float>(at_mass[i]);
   });
   // Two batches in double precision make one in single.
   parallelFor(hexes->batchCount<float>(), 32, [&](int begin, int end) {

@@ -59,39 +59,49 @@ class SpringForces {
   AlignedBuffer<Real> force_;
 };
 
+// A product without a matrix: multiply(first, last) fills the slots of some batches, row(node) sums up nodes
+// begin .. end of this thread. `early`: a row is made as soon as its cells are done, while they are in the cache.
+template <class Real, class Multiply, class Row>
+void sweepRows(const Crew& crew, const StvkHexes& hexes, int begin, int end, bool early,
+               const Multiply& multiply, const Row& row) {
+  constexpr int kLanes = kHexLanes<Real>, kBatches = 512 / kLanes;
+  const auto [first, last] = crew.share(hexes.batchCount<Real>());
+  int from = begin;
+  while (from < end && hexes.firstPlace(from) < kLanes * first) ++from;
+  int next = from;
+  for (int batch = first; batch < last; batch += kBatches) {
+    const int stop = std::min(batch + kBatches, last);
+    multiply(batch, stop);
+    for (; early && next < end && hexes.firstPlace(next) >= kLanes * first &&
+           hexes.lastPlace(next) < kLanes * stop;
+         ++next)
+      row(next);
+  }
+  crew.barrier();
+  for (int i = begin; i < from; ++i) row(i);
+  for (int i = next; i < end; ++i) row(i);
+}
+
 // The finest level of the multigrid, in single precision: the system's operator without its matrix. Used inside
 // parallel regions.
 class HexLevel {
  public:
-  // Calls work(node, row of A x) for nodes begin .. end of this thread; x is complete. A row is made as soon as
-  // its cells are done, while they are still in the cache.
+  // Calls work(node, row of A x) for nodes begin .. end of this thread; x is complete.
   template <class Work>
   void product(const Crew& crew, const float* x, int begin, int end, const Work& work) {
-    constexpr int kBatches = 64, kLanes = kHexLanes<float>;
-    const auto [first, last] = crew.share(hexes->batchCount<float>());
-    const bool early = springs_.empty();
-    if (crew.rank() == 0 && !early) springs_.apply(x);
-    int from = begin;
-    while (from < end && hexes->firstPlace(from) < kLanes * first) ++from;
-    int next = from;
-    for (int batch = first; batch < last; batch += kBatches) {
-      const int stop = std::min(batch + kBatches, last);
-      hexKernel().multiplyFloat(hexes->batches<float>(), batch, stop, this->x.data(), stress.data(),
+    if (crew.rank() == 0 && !springs_.empty()) springs_.apply(x);
+    const auto multiply = [&](int first, int last) {
+      hexKernel().multiplyFloat(hexes->batches<float>(), first, last, this->x.data(), stress.data(),
                                 factor, x, slots.data());
-      for (; early && next < end && hexes->firstPlace(next) >= kLanes * first &&
-             hexes->lastPlace(next) < kLanes * stop;
-           ++next)
-        work(next, row(next, x));
-    }
-    crew.barrier();
-    for (int i = begin; i < from; ++i) work(i, row(i, x));
-    for (int i = next; i < end; ++i) work(i, row(i, x));
+    };
+    sweepRows<float>(crew, *hexes, begin, end, springs_.empty(), multiply,
+                     [&](int node) { work(node, row(node, x)); });
   }
 
   void allocate(const StvkHexes& hexes);
-  // Positions and stresses as in HexEvaluation; fixed: dofs taken out.
+  // Positions and stresses as in HexEvaluation; mass: inertia times mass; fixed: dofs of the mesh taken out.
   void load(const AlignedBuffer<double>& at, const AlignedBuffer<double>& at_stress,
-            const HexSystem& system, const Eigen::VectorXd& lumped_mass, const std::vector<int>& fixed);
+            const HexSystem& system, const AlignedBuffer<double>& mass, const std::vector<int>& fixed);
 
   const StvkHexes* hexes = nullptr;
   AlignedBuffer<float> x, stress, free, mass, slots;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
+#include <tuple>
 
 namespace calipso::fem {
 namespace {
@@ -12,17 +14,23 @@ constexpr double kRenewalCost = 3.0;
 constexpr int kGrain = Multigrid::kGrain;
 constexpr int kFloatLanes = kHexLanes<float>;
 
+double total(const std::vector<double>& parts) {
+  double sum = 0.0;
+  for (double part : parts) sum += part;
+  return sum;
+}
+
 }  // namespace
 
 // Work space of CG, four numbers per node; partial sums per kGrain nodes.
 struct HexSolver::Vectors {
-  AlignedBuffer<double> x, r, p, Ap, slots;
+  AlignedBuffer<double> x, b, r, p, Ap, slots;
   std::vector<double> rr, rz, pAp;
   SpringForces<double> springs;
 
   void allocate(const StvkHexes& h) {
     const std::size_t nodes = h.nodeCount(), blocks = (nodes + kGrain - 1) / kGrain;
-    for (auto* field : {&x, &r, &p, &Ap}) field->assign(4 * nodes, 0.0);
+    for (auto* field : {&x, &b, &r, &p, &Ap}) field->assign(4 * nodes, 0.0);
     springs.allocate(nodes);
     slots.resize(h.slotNumbers<double>());
     for (auto* sums : {&rr, &rz, &pAp}) sums->assign(blocks, 0.0);
@@ -41,9 +49,9 @@ bool HexSolver::fits(const VolumeMesh& mesh) {
 
 namespace {
 
-HexCoarsening makeCoarsening(const VolumeMesh& mesh, const StvkHexes& hexes, const GridTransfer& t) {
+HexCoarsening makeCoarsening(const StvkHexes& hexes, const GridTransfer& t) {
   const LatticeMatrix& coarse = t.coarse_lattice;
-  const Eigen::RowVector3i low = mesh.lattice.colwise().minCoeff();
+  const std::array<int, 3>& axes = hexes.axes();
   const Eigen::RowVector3i size = coarse.colwise().maxCoeff().array() + 1;
   LatticeIndex node(size), cell_id(size);
   for (int i = 0; i < coarse.rows(); ++i) node.at(coarse(i, 0), coarse(i, 1), coarse(i, 2)) = i;
@@ -55,30 +63,34 @@ HexCoarsening makeCoarsening(const VolumeMesh& mesh, const StvkHexes& hexes, con
       c.parity.push_back(0);
       continue;
     }
-    const Eigen::RowVector3i at = mesh.lattice.row(mesh.cells(cell, 0)) - low, parent = at / 2;
+    const Eigen::RowVector3i at = hexes.lattice().row(hexes.cells()(cell, 0)), parent = at / 2;
     int& id = cell_id.at(parent.x(), parent.y(), parent.z());
     if (id < 0) {
       id = static_cast<int>(corners.size());
       corners.push_back(parent);
     }
     c.coarse_of.push_back(id);
-    c.parity.push_back((at.x() & 1) | (at.y() & 1) << 1 | (at.z() & 1) << 2);
+    c.parity.push_back((at.x() & 1) << axes[0] | (at.y() & 1) << axes[1] | (at.z() & 1) << axes[2]);
   }
   c.coarse_cells.resize(corners.size(), 8);
   for (std::size_t k = 0; k < corners.size(); ++k)
     for (int b = 0; b < 8; ++b)
-      c.coarse_cells(k, b) = node.at(corners[k].x() + (b & 1), corners[k].y() + ((b >> 1) & 1),
-                                     corners[k].z() + (b >> 2));
+      c.coarse_cells(k, b) = node.at(corners[k].x() + (b >> axes[0] & 1), corners[k].y() + (b >> axes[1] & 1),
+                                     corners[k].z() + (b >> axes[2] & 1));
   return c;
+}
+
+const LatticeMatrix& checkedLattice(const VolumeMesh& mesh, const StvkHexes& hexes) {
+  if (!HexSolver::fits(mesh))
+    throw std::invalid_argument("multigrid: the mesh has no lattice; use incomplete_cholesky");
+  return hexes.lattice();
 }
 
 }  // namespace
 
 HexSolver::HexSolver(const VolumeMesh& mesh, const StvkHexes& hexes)
-    : mesh_(mesh), hexes_(nullptr), fine_(std::make_unique<HexLevel>()),
-      vectors_(std::make_unique<Vectors>()), multigrid_(mesh.lattice) {
-  if (!fits(mesh))
-    throw std::invalid_argument("multigrid: the mesh has no lattice; use incomplete_cholesky");
+    : hexes_(nullptr), fine_(std::make_unique<HexLevel>()), vectors_(std::make_unique<Vectors>()),
+      multigrid_(checkedLattice(mesh, hexes)) {
   setHexes(hexes);
 }
 
@@ -89,13 +101,18 @@ void HexSolver::setHexes(const StvkHexes& hexes) {
   stale_ = true;
   fine_->allocate(hexes);
   vectors_->allocate(hexes);
+  mass_.resize(hexes.nodeCount());
   if (!multigrid_.hasCoarse()) throw std::logic_error("multigrid: the mesh has no coarser level");
-  coarsening_ = makeCoarsening(mesh_, hexes, multigrid_.transfer());
+  coarsening_ = makeCoarsening(hexes, multigrid_.transfer());
   if (!multigrid_.coarseMatrix()->pattern)
     multigrid_.setCoarsePattern(
         makeBlockPattern(coarsening_.coarse_cells, multigrid_.transfer().coarseCount()));
   const BlockPattern& pattern = *multigrid_.coarseMatrix()->pattern;
-  coarsening_.block_of.clear();
+  const GridTransfer& t = multigrid_.transfer();
+  for (int i = 0; i < t.fineCount(); ++i)
+    for (int p = t.parent_start[i]; p < t.parent_start[i + 1]; ++p)
+      for (int q = t.parent_start[i]; q < t.parent_start[i + 1]; ++q)
+        coarsening_.parent_blocks.push_back(pattern.find(t.parents[p].node, t.parents[q].node));
   for (int k = 0; k < coarsening_.coarse_cells.rows(); ++k)
     for (int a = 0; a < 8; ++a)
       for (int b = 0; b < 8; ++b)
@@ -108,8 +125,11 @@ bool HexSolver::setSystem(HexEvaluation* at, HexSystem system, const Eigen::Vect
   x_.swap(at->x);
   stress_.swap(at->stress);
   system_ = std::move(system);
-  lumped_mass_ = &lumped_mass;
-  fine_->load(x_, stress_, system_, lumped_mass, fixed);
+  for (SpringBlock& s : system_.springs)
+    for (auto& [node, weight] : s.weights) node = hexes_->nodeOf(node);
+  for (int i = 0; i < hexes_->nodeCount(); ++i)
+    mass_[i] = system_.inertia * lumped_mass[hexes_->meshNode(i)];
+  fine_->load(x_, stress_, system_, mass_, fixed);
   vectors_->springs.set(system_.springs);
   current_ = false;
   return !stale_ && wasted_iterations_ < kRenewalCost ? true : refresh();
@@ -146,7 +166,7 @@ void HexSolver::sumCoarse() {
     if (cell < 0) return;
     const int l = place % kFloatLanes;
     for (int a = 0; a < 8; ++a) {
-      const int node = mesh_.cells(cell, a);
+      const int node = hexes_->cells()(cell, a);
       if (node >= rows.first && node < rows.second)
         for (int k = 0; k < 9; ++k) diagonal_[9L * node + k] += s.diagonal[a][k][l];
       const int row = coarsening_.coarse_cells(coarse, a);
@@ -176,12 +196,13 @@ void HexSolver::addMassAndSprings() {
   BlockMatrix& Ac = *multigrid_.coarseMatrix();
   const GridTransfer& t = multigrid_.transfer();
   const float* free = fine_->free.data();
+  const int* parents = coarsening_.parent_blocks.data();
   for (int i = 0; i < hexes_->nodeCount(); ++i) {
-    const double m = system_.inertia * (*lumped_mass_)[i];
+    const double m = mass_[i];
     for (int c = 0; c < 3; ++c) diagonal_[9L * i + 4 * c] += m * free[4L * i + c];
     for (int p = t.parent_start[i]; p < t.parent_start[i + 1]; ++p)
       for (int q = t.parent_start[i]; q < t.parent_start[i + 1]; ++q) {
-        auto block = Ac.block(Ac.pattern->find(t.parents[p].node, t.parents[q].node));
+        auto block = Ac.block(*parents++);
         for (int c = 0; c < 3; ++c)
           block(c, c) += m * t.parents[p].weight * t.parents[q].weight * free[4L * i + c];
       }
@@ -204,39 +225,51 @@ void HexSolver::addMassAndSprings() {
       }
 }
 
-// Element part of y = A x; complete after a barrier.
-void HexSolver::product(const Crew& crew, const double* x) const {
-  const auto [begin, end] = crew.share(hexes_->batchCount<double>());
-  hexKernel().multiply(hexes_->batches<double>(), begin, end, x_.data(), stress_.data(),
-                       system_.factor, x, vectors_->slots.data());
-  if (crew.rank() == 0 && !vectors_->springs.empty()) vectors_->springs.apply(x);
-}
-
-void HexSolver::productRow(int node, const double* x, double* y) const {
-  hexes_->sumSlots(vectors_->slots.data(), node, y);
-  const double m = system_.inertia * (*lumped_mass_)[node];
-  for (int c = 0; c < 3; ++c) y[c] += m * x[4L * node + c];
-  if (vectors_->springs.empty()) return;
-  for (int c = 0; c < 3; ++c) y[c] += vectors_->springs.at(node)[c];
+// y = A x for nodes begin .. end of this thread; x is complete.
+void HexSolver::product(const Crew& crew, int begin, int end, const double* x, double* y) const {
+  Vectors& v = *vectors_;
+  const bool springs = !v.springs.empty();
+  if (crew.rank() == 0 && springs) v.springs.apply(x);
+  const auto multiply = [&](int first, int last) {
+    hexKernel().multiply(hexes_->batches<double>(), first, last, x_.data(), stress_.data(),
+                         system_.factor, x, v.slots.data());
+  };
+  sweepRows<double>(crew, *hexes_, begin, end, !springs, multiply, [&](int node) {
+    double* row = y + 4L * node;
+    hexes_->sumSlots(v.slots.data(), node, row);
+    for (int c = 0; c < 3; ++c) row[c] += mass_[node] * x[4L * node + c];
+    if (!springs) return;
+    for (int c = 0; c < 3; ++c) row[c] += v.springs.at(node)[c];
+  });
 }
 
 void HexSolver::multiply(const Vec& x, Vec* y) {
   Vectors& v = *vectors_;
-  const int nodes = hexes_->nodeCount();
   y->resize(x.size());
   runParallel([&](const Crew& crew) {
-    const auto [begin, end] = crew.share(nodes, kGrain);
-    for (int i = begin; i < end; ++i)
-      for (int c = 0; c < 4; ++c) v.p[4L * i + c] = c < 3 ? x[3 * i + c] : 0.0;
+    const auto [begin, end] = crew.share(hexes_->nodeCount(), kGrain);
+    hexes_->take(x, begin, end, v.p.data());
     crew.barrier();
-    product(crew, v.p.data());
-    crew.barrier();
-    for (int i = begin; i < end; ++i) {
-      alignas(32) double row[4];
-      productRow(i, v.p.data(), row);
-      for (int c = 0; c < 3; ++c) (*y)[3 * i + c] = row[c];
+    product(crew, begin, end, v.p.data(), v.Ap.data());
+    hexes_->give(v.Ap.data(), begin, end, y);
+  });
+}
+
+double HexSolver::roundOff(const Vec& y) const {
+  constexpr double kUnit = 2e-16;
+  std::vector<double> sums(vectors_->rr.size());
+  parallelFor(static_cast<int>(sums.size()), 16, [&](int first, int last) {
+    for (int block = first; block < last; ++block) {
+      double sum = 0.0;
+      for (int i = kGrain * block; i < std::min(kGrain * (block + 1), hexes_->nodeCount()); ++i)
+        for (int c = 0; c < 3; ++c) {
+          const double force = diagonal_[9L * i + 4 * c] * y[3L * hexes_->meshNode(i) + c];
+          sum += force * force;
+        }
+      sums[block] = sum;
     }
   });
+  return kUnit * std::sqrt(total(sums));
 }
 
 SolveReport HexSolver::solve(const Vec& b, double tolerance, int most_iterations, Vec* x) {
@@ -253,109 +286,112 @@ SolveReport HexSolver::solve(const Vec& b, double tolerance, int most_iterations
   return report;
 }
 
-// Preconditioned conjugate gradients by all threads. Sums run over blocks of kGrain nodes, then over the
-// blocks, whatever the number of threads.
+// One thread's part in preconditioned conjugate gradients on nodes begin .. end. Sums run over blocks of kGrain
+// nodes, then over the blocks, whatever the number of threads.
+class HexSolver::Iteration {
+ public:
+  Iteration(HexSolver* solver, const Crew& crew)
+      : s_(*solver), v_(*solver->vectors_), crew_(crew), free_(solver->fine_->free.data()) {
+    std::tie(begin_, end_) = crew.share(s_.hexes_->nodeCount(), kGrain);
+  }
+
+  // r = b - A x; x = 0 where that is no worse. Returns |r|.
+  double start(const Vec& b, const Vec& x, double scale) {
+    s_.hexes_->take(b, begin_, end_, v_.b.data());
+    s_.hexes_->take(x, begin_, end_, v_.x.data());
+    const bool from_zero = x.isZero(0.0);
+    crew_.barrier();
+    if (!from_zero) s_.product(crew_, begin_, end_, v_.x.data(), v_.Ap.data());
+    double residual = firstResidual(from_zero);
+    if (from_zero || !(residual > scale)) return residual;
+    crew_.barrier();   // every thread has read the sums
+    std::fill(v_.x.begin() + 4L * begin_, v_.x.begin() + 4L * end_, 0.0);
+    return firstResidual(true);
+  }
+
+  // z ~ A^-1 r; p = z + (r z / previous r z) p. The residual's size is taken out for the cycle, so that single
+  // precision has room.
+  bool turn(double residual, bool first) {
+    float* right_side = s_.multigrid_.rightSide();
+    const double inverse = 1.0 / residual;
+    for (long k = 4L * begin_; k < 4L * end_; ++k) right_side[k] = static_cast<float>(v_.r[k] * inverse);
+    crew_.barrier();
+    s_.multigrid_.cycle(crew_);
+    crew_.barrier();
+    const float* z = s_.multigrid_.result();
+    const double next = residual * sum(&v_.rz, [&](long k) { return v_.r[k] * z[k]; });
+    const double beta = first ? 0.0 : next / rz_;
+    rz_ = next;
+    for (long k = 4L * begin_; k < 4L * end_; ++k) v_.p[k] = residual * z[k] + beta * v_.p[k];
+    return rz_ > 0.0;
+  }
+
+  // x += t p, r -= t A p with the t that minimises. Returns |r|; nothing where A is not positive along p.
+  std::optional<double> advance() {
+    crew_.barrier();   // p is complete
+    s_.product(crew_, begin_, end_, v_.p.data(), v_.Ap.data());
+    const double curvature = sum(&v_.pAp, [&](long k) {
+      v_.Ap[k] *= free_[k];
+      return v_.p[k] * v_.Ap[k];
+    });
+    if (!(curvature > 0.0)) return std::nullopt;
+    const double step = rz_ / curvature;
+    return std::sqrt(sum(&v_.rr, [&](long k) {
+      v_.x[k] += step * v_.p[k];
+      v_.r[k] -= step * v_.Ap[k];
+      return v_.r[k] * v_.r[k];
+    }));
+  }
+
+  void finish(Vec* solution) const { s_.hexes_->give(v_.x.data(), begin_, end_, solution); }
+
+ private:
+  double firstResidual(bool from_zero) {
+    return std::sqrt(sum(&v_.rr, [&](long k) {
+      v_.r[k] = free_[k] * (from_zero ? v_.b[k] : v_.b[k] - v_.Ap[k]);
+      return v_.r[k] * v_.r[k];
+    }));
+  }
+
+  // Sum of work(k) over the components k = 4 node + c of all threads' nodes.
+  template <class Work>
+  double sum(std::vector<double>* sums, const Work& work) {
+    for (int block = begin_; block < end_; block += kGrain) {
+      double sum = 0.0;
+      for (long k = 4L * block; k < 4L * std::min(block + kGrain, end_); ++k) sum += work(k);
+      (*sums)[block / kGrain] = sum;
+    }
+    crew_.barrier();
+    return total(*sums);
+  }
+
+  HexSolver& s_;
+  Vectors& v_;
+  const Crew& crew_;
+  const float* free_;
+  int begin_ = 0, end_ = 0;
+  double rz_ = 0.0;
+};
+
 SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iterations, Vec* solution) {
   SolveReport report;
-  const int nodes = hexes_->nodeCount();
-  Vectors& v = *vectors_;
-  const float* free = fine_->free.data();
   const double scale = b.norm();
-  const bool from_zero = solution->isZero(0.0);
-  const auto total = [](const std::vector<double>& parts) {
-    double sum = 0.0;
-    for (double part : parts) sum += part;
-    return sum;
-  };
   runParallel([&](const Crew& crew) {
-    const auto [begin, end] = crew.share(nodes, kGrain);
-    // Calls work(4 i, sum) for this thread's nodes i.
-    const auto eachNode = [first = begin, last = end](std::vector<double>* sums, const auto& work) {
-      for (int block = first; block < last; block += kGrain) {
-        double sum = 0.0;
-        for (int i = block; i < std::min(block + kGrain, last); ++i) work(4L * i, &sum);
-        (*sums)[block / kGrain] = sum;
-      }
-    };
-    for (long i = begin; i < end; ++i)
-      for (int c = 0; c < 4; ++c) v.x[4 * i + c] = c < 3 ? (*solution)[3 * i + c] : 0.0;
-    crew.barrier();
-    if (!from_zero) product(crew, v.x.data());
-    crew.barrier();
-    eachNode(&v.rr, [&](long i, double* sum) {
-      alignas(32) double row[4] = {0.0, 0.0, 0.0, 0.0};
-      if (!from_zero) productRow(static_cast<int>(i / 4), v.x.data(), row);
-      for (int c = 0; c < 3; ++c) {
-        v.r[i + c] = free[i + c] * (b[i / 4 * 3 + c] - row[c]);
-        *sum += v.r[i + c] * v.r[i + c];
-      }
-    });
-    crew.barrier();
-    double residual = std::sqrt(total(v.rr)), rz = 0.0;
-    if (!from_zero && residual > scale) {   // a start worse than none
-      crew.barrier();
-      eachNode(&v.rr, [&](long i, double* sum) {
-        for (int c = 0; c < 3; ++c) {
-          v.x[i + c] = 0.0;
-          v.r[i + c] = free[i + c] * b[i / 4 * 3 + c];
-          *sum += v.r[i + c] * v.r[i + c];
-        }
-      });
-      crew.barrier();
-      residual = std::sqrt(total(v.rr));
-    }
-    const double first_residual = residual;
+    Iteration cg(this, crew);
+    const double first = cg.start(b, *solution, scale);
+    double residual = first;
     int iteration = 0;
     bool positive = true;
-    for (; iteration < most_iterations && !(residual <= tolerance * scale); ++iteration) {
-      // The residual's size is taken out, so that single precision has room.
-      float* right_side = multigrid_.rightSide();
-      const double inverse = 1.0 / residual;
-      for (long k = 4L * begin; k < 4L * end; ++k) right_side[k] = static_cast<float>(v.r[k] * inverse);
-      crew.barrier();
-      multigrid_.cycle(crew);
-      crew.barrier();
-      const float* z = multigrid_.result();
-      eachNode(&v.rz, [&](long i, double* sum) {
-        for (int c = 0; c < 3; ++c) *sum += v.r[i + c] * z[i + c];
-      });
-      crew.barrier();
-      const double next = residual * total(v.rz), beta = iteration == 0 ? 0.0 : next / rz;
-      rz = next;
-      for (long k = 4L * begin; k < 4L * end; ++k) v.p[k] = residual * z[k] + beta * v.p[k];
-      crew.barrier();
-      product(crew, v.p.data());
-      crew.barrier();
-      eachNode(&v.pAp, [&](long i, double* sum) {
-        alignas(32) double row[4];
-        productRow(static_cast<int>(i / 4), v.p.data(), row);
-        for (int c = 0; c < 3; ++c) {
-          v.Ap[i + c] = free[i + c] * row[c];
-          *sum += v.p[i + c] * v.Ap[i + c];
-        }
-      });
-      crew.barrier();
-      const double curvature = total(v.pAp);
-      if (!(curvature > 0.0) || !(rz > 0.0)) {
-        positive = false;
-        break;
-      }
-      const double step = rz / curvature;
-      eachNode(&v.rr, [&](long i, double* sum) {
-        for (int c = 0; c < 3; ++c) {
-          v.x[i + c] += step * v.p[i + c];
-          v.r[i + c] -= step * v.Ap[i + c];
-          *sum += v.r[i + c] * v.r[i + c];
-        }
-      });
-      crew.barrier();
-      residual = std::sqrt(total(v.rr));
+    for (; positive && iteration < most_iterations && !(residual <= tolerance * scale); ++iteration) {
+      positive = cg.turn(residual, iteration == 0);
+      const std::optional<double> next = positive ? cg.advance() : std::nullopt;
+      positive = next.has_value();
+      residual = next.value_or(residual);
     }
-    for (long i = begin; i < end; ++i)
-      for (int c = 0; c < 3; ++c) (*solution)[3 * i + c] = v.x[4 * i + c];
+    cg.finish(solution);
     if (crew.rank() != 0) return;
     report.iterations = iteration;
-    decades_ = iteration > 0 && residual > 0.0 ? std::log10(first_residual / residual) : 0.0;
+    decades_ = iteration > 0 && residual > 0.0 ? std::log10(first / residual) : 0.0;
     report.positive = positive;
     report.residual = scale > 0.0 ? residual / scale : residual;
     report.converged = positive && residual <= tolerance * scale;

@@ -15,6 +15,7 @@ struct HexCoarsening {
   std::vector<int> coarse_of;         // per place in StvkHexes::order(); -1: no cell
   std::vector<unsigned char> parity;  // bits: odd along x, y, z
   std::vector<int> block_of;          // per coarse cell, 8 x 8, in the coarse pattern
+  std::vector<int> parent_blocks;     // per fine node, every pair of its parents, in the coarse pattern
 };
 
 // Solves A x = b without assembling A: CG in double precision, multigrid in single. The multigrid's fine level
@@ -39,25 +40,24 @@ class HexSolver {
   // b and x: zero at fixed components. x is the start value on entry.
   SolveReport solve(const Vec& b, double tolerance, int most_iterations, Vec* x);
   void invalidate() { stale_ = true; }
-  // Diagonal blocks of A when the multigrid was last renewed, 9 per node.
-  const AlignedBuffer<double>& diagonal() const { return diagonal_; }
+  // Residual that rounding of positions y and inner forces alone leaves, N.
+  double roundOff(const Vec& y) const;
 
  private:
   struct Vectors;
+  class Iteration;
 
   bool refresh();
   void sumCoarse();
   void addMassAndSprings();
-  void product(const Crew& crew, const double* x) const;
-  void productRow(int node, const double* x, double* y) const;
+  void product(const Crew& crew, int begin, int end, const double* x, double* y) const;
   SolveReport iterate(const Vec& b, double tolerance, int most_iterations, Vec* x);
 
-  const VolumeMesh& mesh_;
   const StvkHexes* hexes_;
   AlignedBuffer<double> x_, stress_;   // as in HexEvaluation
-  AlignedBuffer<double> diagonal_;
-  HexSystem system_;
-  const Eigen::VectorXd* lumped_mass_ = nullptr;
+  AlignedBuffer<double> diagonal_;     // blocks, 9 per node
+  AlignedBuffer<double> mass_;         // inertia times mass, kg/s^2
+  HexSystem system_;                   // springs in the numbering of hexes_
   HexCoarsening coarsening_;
   std::unique_ptr<HexLevel> fine_;
   std::unique_ptr<Vectors> vectors_;

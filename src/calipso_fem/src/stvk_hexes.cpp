@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "threads.hpp"
@@ -44,17 +45,18 @@ StvkHexes::StvkHexes(const VolumeMesh& mesh, const std::vector<ElementKind>& kin
     if (is_new) it->second = isBox(restCorners(mesh, cell));
     is_box[cell] = it->second;
   }
+  numberNodes();
   orderCells(is_box);
 
   slot_start_.assign(nodes_ + 1, 0);
   for (int cell = 0; cell < mesh.cellCount(); ++cell)
-    for (int c = 0; c < 8; ++c) ++slot_start_[mesh.cells(cell, c) + 1];
+    for (int c = 0; c < 8; ++c) ++slot_start_[cells_(cell, c) + 1];
   for (int i = 0; i < nodes_; ++i) slot_start_[i + 1] += slot_start_[i];
   first_place_.assign(nodes_, static_cast<int>(order_.size()));
   last_place_.assign(nodes_, -1);
   for (int place = 0; place < static_cast<int>(order_.size()); ++place)
     for (int c = 0; c < 8 && order_[place] >= 0; ++c) {
-      const int node = mesh.cells(order_[place], c);
+      const int node = cells_(order_[place], c);
       first_place_[node] = std::min(first_place_[node], place);
       last_place_[node] = std::max(last_place_[node], place);
     }
@@ -62,11 +64,48 @@ StvkHexes::StvkHexes(const VolumeMesh& mesh, const std::vector<ElementKind>& kin
   pack(&double_);
 }
 
+void StvkHexes::numberNodes() {
+  mesh_node_.resize(nodes_);
+  node_of_.resize(nodes_);
+  std::iota(mesh_node_.begin(), mesh_node_.end(), 0);
+  if (mesh_.lattice.rows() == nodes_) {
+    const Eigen::RowVector3i low = mesh_.lattice.colwise().minCoeff();
+    const Eigen::RowVector3i extent = mesh_.lattice.colwise().maxCoeff() - low;
+    std::stable_sort(axes_.begin(), axes_.end(), [&](int a, int b) { return extent[a] < extent[b]; });
+    lattice_.resize(nodes_, 3);
+    std::vector<std::array<int, 3>> place(nodes_);
+    for (int i = 0; i < nodes_; ++i)
+      for (int k = 0; k < 3; ++k) place[i][2 - k] = mesh_.lattice(i, axes_[k]) - low[axes_[k]];
+    std::stable_sort(mesh_node_.begin(), mesh_node_.end(), [&](int a, int b) { return place[a] < place[b]; });
+    for (int i = 0; i < nodes_; ++i)
+      for (int k = 0; k < 3; ++k) lattice_(i, k) = place[mesh_node_[i]][2 - k];
+  }
+  for (int i = 0; i < nodes_; ++i) node_of_[mesh_node_[i]] = i;
+  cells_ = mesh_.cells.unaryExpr([this](int node) { return node_of_[node]; });
+}
+
+void StvkHexes::take(const Vec& from, int begin, int end, double* to) const {
+  for (int i = begin; i < end; ++i) {
+    const double* p = from.data() + 3L * mesh_node_[i];
+    for (int c = 0; c < 3; ++c) to[4L * i + c] = p[c];
+    to[4L * i + 3] = 0.0;
+  }
+}
+
+void StvkHexes::give(const double* from, int begin, int end, Vec* to) const {
+  for (int i = begin; i < end; ++i)
+    for (int c = 0; c < 3; ++c) (*to)[3L * mesh_node_[i] + c] = from[4L * i + c];
+}
+
 // Boxes first; among them, groups of equal cells before those that are mixed.
 void StvkHexes::orderCells(const std::vector<bool>& is_box) {
+  std::vector<int> sliced(mesh_.cellCount());
+  std::iota(sliced.begin(), sliced.end(), 0);
+  const auto before = [this](int a, int b) { return cells_(a, 0) < cells_(b, 0); };
+  std::stable_sort(sliced.begin(), sliced.end(), before);
   for (const bool box : {true, false}) {
     std::map<std::pair<int, double>, std::vector<int>> equal;
-    for (int cell = 0; cell < mesh_.cellCount(); ++cell)
+    for (const int cell : sliced)
       if (is_box[cell] == box) equal[{kind_of_[cell], mesh_.fraction[cell]}].push_back(cell);
     std::vector<int> mixed;
     for (auto& [key, cells] : equal) {
@@ -74,7 +113,7 @@ void StvkHexes::orderCells(const std::vector<bool>& is_box) {
       order_.insert(order_.end(), cells.begin(), cells.begin() + grouped);
       mixed.insert(mixed.end(), cells.begin() + grouped, cells.end());
     }
-    std::sort(mixed.begin(), mixed.end());
+    std::stable_sort(mixed.begin(), mixed.end(), before);
     order_.insert(order_.end(), mixed.begin(), mixed.end());
     while (order_.size() % kGroup != 0) order_.push_back(-1);
     if (box) boxes_ = static_cast<int>(order_.size());
@@ -125,7 +164,7 @@ void StvkHexes::pack(Packed<Real>* p) const {
               mesh_.fraction[cells[l]] == mesh_.fraction[some];
     for (int c = 0; c < 8; ++c)
       for (int l = 0; l < kLanes; ++l) {
-        const int node = mesh_.cells(std::max(cells[l], 0), c);
+        const int node = cells_(std::max(cells[l], 0), c);
         p->node.push_back(node);
         if (cells[l] >= 0) p->slot[next[node]++] = 8 * first + c * kLanes + hexPlace<Real>(l);
       }
@@ -163,7 +202,7 @@ void StvkHexes::recover(const HexEvaluation& e, int batch, double* slots, double
     if (cell < 0 || !(e.dilatations[kLanes * batch + l] < kRecoveryDilatation)) continue;
     CornerMatrix corners(8, 3);
     for (int c = 0; c < 8; ++c)
-      for (int i = 0; i < 3; ++i) corners(c, i) = e.x[4 * mesh_.cells(cell, c) + i];
+      for (int i = 0; i < 3; ++i) corners(c, i) = e.x[4L * cells_(cell, c) + i];
     ElementResult r;
     evaluateElement(kinds_[kind_of_[cell]], corners, 1, Part::kFull, &r);
     energies[kLanes * batch + l] = mesh_.fraction[cell] * r.energy;
@@ -186,10 +225,7 @@ void StvkHexes::evaluate(const Vec& x, bool stresses, bool positive, HexEvaluati
                        stresses ? e->stress.data() : nullptr, positive};
   const auto work = [&](const Crew& crew) {
     const auto [first, last] = crew.share(nodes_);
-    for (int i = first; i < last; ++i) {
-      for (int c = 0; c < 3; ++c) e->x[4L * i + c] = x[3 * i + c];
-      e->x[4L * i + 3] = 0.0;
-    }
+    take(x, first, last, e->x.data());
     crew.barrier();
     const auto [begin, end] = crew.share(batchCount<double>());
     hexKernel().evaluate(batches<double>(), begin, end, e->x.data(), state, e->slots.data());
@@ -199,7 +235,7 @@ void StvkHexes::evaluate(const Vec& x, bool stresses, bool positive, HexEvaluati
     for (int i = first; i < last; ++i) {
       alignas(32) double f[4];
       sumSlots(e->slots.data(), i, f);
-      for (int c = 0; c < 3; ++c) e->forces[3 * i + c] = f[c];
+      for (int c = 0; c < 3; ++c) e->forces[3L * mesh_node_[i] + c] = f[c];
     }
   };
   if (static_cast<int>(lanes) < kSerialCells)
@@ -223,11 +259,8 @@ void StvkHexes::multiplyMaterial(const Vec& x, const Vec& w, HexEvaluation* e, V
   y->resize(w.size());
   runParallel([&](const Crew& crew) {
     const auto [first, last] = crew.share(nodes_);
-    for (int i = first; i < last; ++i)
-      for (int c = 0; c < 4; ++c) {
-        e->x[4L * i + c] = c < 3 ? x[3 * i + c] : 0.0;
-        u[4L * i + c] = c < 3 ? w[3 * i + c] : 0.0;
-      }
+    take(x, first, last, e->x.data());
+    take(w, first, last, u.data());
     crew.barrier();
     const auto [begin, end] = crew.share(batchCount<double>());
     hexKernel().multiply(batches<double>(), begin, end, e->x.data(), nullptr, 1.0, u.data(),
@@ -236,7 +269,7 @@ void StvkHexes::multiplyMaterial(const Vec& x, const Vec& w, HexEvaluation* e, V
     for (int i = first; i < last; ++i) {
       alignas(32) double f[4];
       sumSlots(e->slots.data(), i, f);
-      for (int c = 0; c < 3; ++c) (*y)[3 * i + c] = f[c];
+      for (int c = 0; c < 3; ++c) (*y)[3L * mesh_node_[i] + c] = f[c];
     }
   });
 }

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
 #include "aligned_buffer.hpp"
 #include "element.hpp"
+#include "grid_transfer.hpp"
 #include "hex_kernel.hpp"
 #include "thread_team.hpp"
 
@@ -21,7 +23,9 @@ struct HexEvaluation {
 };
 
 // The cells of a mesh of St. Venant-Kirchhoff hexahedra (Q1 or enhanced), packed for hex_kernel.hpp:
-// eight cells a batch in single, four in double precision, in the same order. Immutable.
+// eight cells a batch in single, four in double precision, in the same order. Nodes and cells are numbered anew, slice
+// by slice across the longest side of the lattice: what neighbouring slices share stays in the cache, and threads
+// share the smallest of them. Immutable.
 class StvkHexes {
  public:
   // cell -> its kind; the kinds' references must outlive this.
@@ -29,6 +33,19 @@ class StvkHexes {
             const std::vector<int>& kind_of);
 
   int nodeCount() const { return nodes_; }
+  // The mesh's number of a node, and back.
+  int meshNode(int node) const { return mesh_node_[node]; }
+  int nodeOf(int mesh_node) const { return node_of_[mesh_node]; }
+  // Corners of the mesh's cells, in the new numbering.
+  const CellMatrix& cells() const { return cells_; }
+  // Lattice of the nodes; its column k runs along the mesh's axis axes()[k]. Empty where the mesh has none.
+  const LatticeMatrix& lattice() const { return lattice_; }
+  const std::array<int, 3>& axes() const { return axes_; }
+
+  // 3 numbers per node of the mesh <-> 4 per node, begin .. end of the new numbering.
+  void take(const Vec& from, int begin, int end, double* to) const;
+  void give(const double* from, int begin, int end, Vec* to) const;
+
   // Cells of the batches; -1 marks a lane without one. A multiple of 8.
   const std::vector<int>& order() const { return order_; }
   template <class Real>
@@ -61,6 +78,7 @@ class StvkHexes {
     std::vector<int> slot;        // per node, in the order of slot_start_
   };
 
+  void numberNodes();
   void orderCells(const std::vector<bool>& is_box);
   template <class Real>
   void pack(Packed<Real>* packed) const;
@@ -73,6 +91,10 @@ class StvkHexes {
   const std::vector<ElementKind>& kinds_;
   const std::vector<int>& kind_of_;
   int nodes_ = 0;
+  std::array<int, 3> axes_{0, 1, 2};
+  std::vector<int> mesh_node_, node_of_;
+  LatticeMatrix lattice_;
+  CellMatrix cells_;
   int boxes_ = 0;                 // cells of order_ that stand in batches of boxes
   bool enhanced_ = false;
   std::vector<int> order_;
