@@ -179,6 +179,26 @@ TEST(WorldLoads, ACollisionThatIsNotInTheVideoIsRefused) {
   EXPECT_NE(outcomes[0].message.find("collision 1 of thing"), std::string::npos);
 }
 
+TEST(WorldLoads, WhatTheVideoShowsOfGravityCanBeTaken) {
+  Edit edit = editOf(EditKind::kGravity, EditMode::kEstimated);
+  edit.object.clear();
+  World blind(sceneWith(boxSurface({0.1, 0.1, 0.1}, 2), {0, 0, 5}, false), coarse());
+  blind.submit(edit);
+  const auto refused = blind.advanceTo(0.0);
+  EXPECT_FALSE(refused.at(0).accepted);
+  EXPECT_NE(refused[0].message.find("seen to fall"), std::string::npos);
+
+  World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 2), {0, 0, 5}, false), coarse());
+  world.addObservedGravity({0, 0, -6.0}, 0.1);
+  world.addObservedGravity({0, 0, -5.0}, 0.5);  // less sure
+  world.submit(rigidKind());
+  world.submit(edit);
+  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  play(world, 0.5);
+  // Afloat: buoyancy holds the weight under the scene's 9.81 m/s^2. 0.04: of the time step.
+  EXPECT_NEAR(centerOf(world.state()).z(), 5.0 + 0.5 * (9.81 - 6.0) * 0.25, 0.04);
+}
+
 TEST(WorldLoads, ACopyLivesOnItsOwn) {
   World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 2), {0, 0, 0.05}), coarse());
   Edit twin = editOf(EditKind::kDuplicate);

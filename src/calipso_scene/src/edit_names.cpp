@@ -65,8 +65,9 @@ bool allows(EditKind kind, EditMode mode) {
     case EditKind::kPull:
     case EditKind::kTwist:
       return mode == EditMode::kForce || mode == EditMode::kTarget;
-    case EditKind::kMaterial:
     case EditKind::kGravity:
+      return mode == EditMode::kAbsolute || mode == EditMode::kFactor || mode == EditMode::kEstimated;
+    case EditKind::kMaterial:
     case EditKind::kAppearance:
       return mode == EditMode::kAbsolute || mode == EditMode::kFactor;
     case EditKind::kVelocity:

@@ -81,9 +81,11 @@ void SimulatorRos::prepare() {
   }
   if (!params_.live) {
     for (const auto& frame : clip_dynamics_->frames) take(frame);
-    for (const auto& object : clip_dynamics_->objects)
+    for (const auto& object : clip_dynamics_->objects) {
+      if (object.falls) world_->addObservedGravity(calipso::fromMsg(object.gravity), object.gravity_deviation);
       for (const auto& collision : object.collisions)
         world_->addCollision(object.object, (collision.stamp - *first_stamp_).toSec());
+    }
     world_->allCollisionsKnown();
   }
   if (first_stamp_)

@@ -120,6 +120,11 @@ void World::Impl::releaseWaiting() {
   }
 }
 
+void World::addObservedGravity(const Eigen::Vector3d& gravity, double deviation) {
+  std::optional<ObservedGravity>& known = impl_->observed_gravity;
+  if (!known || deviation < known->deviation) known = {gravity, deviation};
+}
+
 void World::addCollision(const std::string& object, double time) {
   if (Actor* actor = impl_->find(object)) actor->collisions.push_back(time);
   impl_->releaseWaiting();

@@ -14,6 +14,11 @@
 
 namespace calipso::fem {
 
+struct ObservedGravity {
+  Eigen::Vector3d vector;  // m/s^2
+  double deviation;        // of its length
+};
+
 struct World::Impl {
   Impl(WorldScene scene, WorldParams params);
 
@@ -110,6 +115,7 @@ struct World::Impl {
   bool has_colliders = false;
 
   double now = 0.0;          // video time, s
+  std::optional<ObservedGravity> observed_gravity;
   double speed_scale = 1.0;  // simulated seconds per second of the video
   Sun sun;
   bool started = false;

@@ -34,11 +34,14 @@ std::string World::Impl::applyToScene(const Edit& edit) {
 }
 
 std::string World::Impl::changeGravity(const Edit& edit) {
+  if (edit.mode == EditMode::kEstimated && !observed_gravity)
+    throw std::invalid_argument("nothing was seen to fall in the video; give gravity by mode absolute or factor");
+  const Eigen::Vector3d replaced = edit.mode == EditMode::kEstimated ? observed_gravity->vector : edit.vector;
   std::string changed_objects;
   for (Actor& actor : actors) {
     if (actor.removed || (!edit.object.empty() && actor.object.name != edit.object)) continue;
     const Eigen::Vector3d gravity =
-        edit.mode == EditMode::kFactor ? edit.factor * actor.gravity : edit.vector;
+        edit.mode == EditMode::kFactor ? edit.factor * actor.gravity : replaced;
     // A change for the whole scene leaves alone what goes on lying on its support.
     if (edit.object.empty() && !actor.edited) {
       findHolder(actor);

@@ -23,6 +23,10 @@ class World {
   // @throw std::invalid_argument naming the object and the ones there are
   void addObservedMotion(const std::string& object, const ObservedMotion& motion);
 
+  // Gravity (m/s^2) as an object in free flight shows it; the surest of several counts.
+  // @param deviation standard deviation of its length, m/s^2
+  void addObservedGravity(const Eigen::Vector3d& gravity, double deviation);
+
   // The instant (s) of an object's next collision in the video; they come in order. Objects that are not there are
   // passed over.
   void addCollision(const std::string& object, double time);
