@@ -3,6 +3,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "calipso_render/clip_poses.hpp"
 #include "calipso_render/colour.hpp"
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/shadow_map.hpp"
@@ -254,6 +255,10 @@ void remark(const ClipSample& clip, Prepared& p) {
 
 }  // namespace
 
+bool anyMoves(const ClipSample& clip, const std::vector<ObjectModel>& models) {
+  return std::any_of(models.begin(), models.end(), [&](const ObjectModel& m) { return movesInVideo(clip.frames(), m.index); });
+}
+
 Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models, const RenderParams& params) {
   if (clip.frames().empty()) throw std::invalid_argument("no clip frame with a segmentation has arrived; send the key frame first");
   const std::vector<ClipFrame> frames = inKeyView(clip, params.planes);
@@ -269,6 +274,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const std::vector<Actor> actors = keyActors(p);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const std::vector<View> views = viewsOf(clip, p, picture);
+  p.views = static_cast<int>(views.size());
   const Background seen = seenBackground(frames, any_moves, params.background);
   const LightEvidence evidence = lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background());
   const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();

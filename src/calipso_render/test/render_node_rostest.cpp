@@ -1,4 +1,5 @@
 #include <calipso_msgs/AlignedModels.h>
+#include <calipso_msgs/ClipDynamics.h>
 #include <calipso_msgs/ClipInfo.h>
 #include <calipso_msgs/NodeStatus.h>
 #include <calipso_msgs/Segmentation.h>
@@ -27,10 +28,11 @@ using namespace testing;
 const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
 constexpr int kClipFrames = 3;
 
-// Plays the other nodes' part for a clip of one resting ball.
+// Plays the other nodes' part for a clip of one ball.
 class RenderNodeTest : public ::testing::Test {
  protected:
-  RenderNodeTest() {
+  // @param step the ball's way from frame to frame
+  explicit RenderNodeTest(const std::string& space = "", const Eigen::Vector3d& step = Eigen::Vector3d::Zero()) : nh_(space), step_(step) {
     namespace t = topics;
     info_ = nh_.advertise<calipso_msgs::ClipInfo>(t::kClipInfo, 1, true);
     clip_ = nh_.advertise<sensor_msgs::Image>(t::kClipImage, 10);
@@ -42,7 +44,9 @@ class RenderNodeTest : public ::testing::Test {
     state_ = nh_.advertise<calipso_msgs::SimulationState>(t::kState, 10);
     edited_sub_ = nh_.subscribe<sensor_msgs::Image>(t::kImageEdited, 10, [this](const sensor_msgs::ImageConstPtr& m) { edited_.push_back(*m); });
     provenance_sub_ = nh_.subscribe<sensor_msgs::Image>(t::kProvenance, 10, [this](const sensor_msgs::ImageConstPtr& m) { provenance_.push_back(*m); });
-    status_sub_ = nh_.subscribe<calipso_msgs::NodeStatus>(t::kStatus, 10, [this](const calipso_msgs::NodeStatusConstPtr& m) { status_ = *m; });
+    status_sub_ = nh_.subscribe<calipso_msgs::NodeStatus>(t::kStatus, 10, [this](const calipso_msgs::NodeStatusConstPtr& m) {
+      if (m->node == "render") status_ = *m;
+    });
     sendCameraPose();
   }
 
@@ -76,7 +80,8 @@ class RenderNodeTest : public ::testing::Test {
     return info;
   }
 
-  sensor_msgs::Image picture(int k) const { return imageMsg(header(k), key_.bgr); }
+  ClipFrame frame(int k) const { return frameWithBall(ballAt(kCentre + k * step_)); }
+  sensor_msgs::Image picture(int k) const { return imageMsg(header(k), frame(k).bgr); }
 
   void sendClip() {
     calipso_msgs::ClipInfo info;
@@ -90,7 +95,7 @@ class RenderNodeTest : public ::testing::Test {
       clip_camera_.publish(cameraInfo(k));
       calipso_msgs::Segmentation s;
       s.header = header(k);
-      s.labels = imageMsg(header(k), key_.labels);
+      s.labels = imageMsg(header(k), frame(k).labels);
       segmentation_.publish(s);
     }
     calipso_msgs::AlignedModels models;
@@ -130,8 +135,51 @@ class RenderNodeTest : public ::testing::Test {
   ros::Subscriber edited_sub_, provenance_sub_, status_sub_;
   std::vector<sensor_msgs::Image> edited_, provenance_;
   calipso_msgs::NodeStatus status_;
-  const ClipFrame key_ = frameWithBall(ballAt(kCentre));
+  const Eigen::Vector3d step_;
 };
+
+// The ball rolls, and somebody follows it.
+class RenderNodeWithMotionTest : public RenderNodeTest {
+ protected:
+  RenderNodeWithMotionTest() : RenderNodeTest("moving", {0.08, 0.0, 0.0}) {
+    flow_status_ = nh_.advertise<calipso_msgs::NodeStatus>(topics::kStatus, 10);
+    dynamics_ = nh_.advertise<calipso_msgs::ClipDynamics>(topics::kClipDynamics, 1, true);
+  }
+
+  void sendFlowStatus(int state) {
+    calipso_msgs::NodeStatus status;
+    status.node = "flow", status.state = static_cast<std::uint8_t>(state);
+    flow_status_.publish(status);
+  }
+
+  // The last frame's pose is wrong.
+  calipso_msgs::ClipDynamics dynamics() const {
+    calipso_msgs::ClipDynamics all;
+    for (int k = 0; k < kClipFrames; ++k) {
+      calipso_msgs::Dynamics d;
+      d.header = header(k);
+      d.objects.resize(1);
+      d.objects[0].object = "ball", d.objects[0].tracks = 20;
+      d.objects[0].world_from_object = toMsg(ballAt(kCentre + (k == kClipFrames - 1 ? 0 : k) * step_).world_from_object);
+      all.frames.push_back(d);
+    }
+    return all;
+  }
+
+  ros::Publisher flow_status_, dynamics_;
+};
+
+TEST_F(RenderNodeWithMotionTest, LearnsFromFramesWhosePosesFit) {
+  ASSERT_TRUE(waitFor([&] { return clip_.getNumSubscribers() > 0 && clip_camera_.getNumSubscribers() > 0 && segmentation_.getNumSubscribers() > 0 &&
+                                   flow_status_.getNumSubscribers() > 1 && dynamics_.getNumSubscribers() > 0; }));
+  sendFlowStatus(calipso_msgs::NodeStatus::PREPARING);
+  sendClip();
+  ASSERT_TRUE(waitFor([&] { return status_.message.find("motion in the clip") != std::string::npos; })) << status_.message;
+  dynamics_.publish(dynamics());
+  ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; })) << status_.message;
+  EXPECT_NE(status_.message.find("from 2 frames"), std::string::npos) << status_.message;
+  EXPECT_NE(status_.message.find("2 of 3 poses"), std::string::npos) << status_.message;
+}
 
 TEST_F(RenderNodeTest, PreparesAndEditsInOrder) {
   ASSERT_TRUE(waitFor([&] { return image_.getNumSubscribers() > 0 && clip_.getNumSubscribers() > 0 && clip_camera_.getNumSubscribers() > 0 &&

@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
 #include <opencv2/core.hpp>
+#include <utility>
 #include <vector>
 
 #include "calipso_scene/camera.hpp"
@@ -21,6 +23,7 @@ struct ClipFrame {
   cv::Mat labels;  // CV_8UC1: 0 none, else an object's index
   Camera camera;
   std::vector<ObjectPose> poses = {};  // of the rigid objects that move, as far as known
+  std::int64_t stamp_ns = 0;
 };
 
 // An evenly spaced sample of a clip of unknown length in bounded memory: when the store is full, every
@@ -31,6 +34,8 @@ class ClipSample {
 
   // Keeps or drops the frame. Pictures are copied. @throw std::invalid_argument if sizes differ
   void add(const ClipFrame& frame);
+
+  void setPoses(std::size_t frame, std::vector<ObjectPose> poses) { frames_.at(frame).poses = std::move(poses); }
 
   const std::vector<ClipFrame>& frames() const { return frames_; }
   std::size_t seen() const { return seen_; }

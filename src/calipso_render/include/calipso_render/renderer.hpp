@@ -87,6 +87,7 @@ struct Prepared {
   cv::Mat plate_linear;             // CV_32FC3
   cv::Vec3f umbra = {0.4f, 0.4f, 0.4f};  // what the sun's absence leaves of a support plane's brightness
   NoiseModel noise;
+  int views = 1;                     // frames that light and texture come from
   std::vector<std::string> remarks;  // what had to be assumed or invented, for a diagnostic
 };
 

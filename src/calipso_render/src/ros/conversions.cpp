@@ -2,6 +2,7 @@
 
 #include <sensor_msgs/image_encodings.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -81,6 +82,19 @@ Look fromMsg(const calipso_msgs::Look& msg) {
 }
 
 }  // namespace
+
+PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics, const std::vector<ObjectModel>& models) {
+  PosesByStamp poses;
+  for (const calipso_msgs::Dynamics& frame : dynamics.frames) {
+    std::vector<ObjectPose>& here = poses[static_cast<std::int64_t>(frame.header.stamp.toNSec())];
+    for (const calipso_msgs::ObjectDynamics& o : frame.objects) {
+      const auto model = std::find_if(models.begin(), models.end(), [&](const ObjectModel& m) { return m.name == o.object; });
+      const bool rigid = o.tracks > 0 && o.mode_amplitudes.empty();
+      if (rigid && model != models.end()) here.push_back({model->index, calipso::fromMsg(o.world_from_object)});
+    }
+  }
+  return poses;
+}
 
 SunChange sunFromMsg(const calipso_msgs::SimulationState& state) {
   SunChange sun;

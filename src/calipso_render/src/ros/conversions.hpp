@@ -1,6 +1,7 @@
 #pragma once
 
 #include <calipso_msgs/AlignedModels.h>
+#include <calipso_msgs/ClipDynamics.h>
 #include <calipso_msgs/ObjectState.h>
 #include <calipso_msgs/SimulationState.h>
 #include <sensor_msgs/Image.h>
@@ -8,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "calipso_render/clip_poses.hpp"
 #include "calipso_render/pixel_format.hpp"
 #include "calipso_render/renderer.hpp"
 
@@ -30,6 +32,10 @@ sensor_msgs::Image editedMsg(const sensor_msgs::Image& original, const FrameOutp
 sensor_msgs::Image imageMsg(const std_msgs::Header& header, const cv::Mat& image);
 
 std::vector<ObjectModel> fromMsg(const calipso_msgs::AlignedModels& models);
+
+// Of the objects that were followed as rigid bodies.
+PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics, const std::vector<ObjectModel>& models);
+
 SunChange sunFromMsg(const calipso_msgs::SimulationState& state);
 ObjectInFrame fromMsg(const calipso_msgs::ObjectState& state);
 

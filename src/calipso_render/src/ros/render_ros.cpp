@@ -29,6 +29,7 @@ RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       nh.subscribe(topics::kClipInfo, 1, &RenderNode::onClipInfo, this),
       nh.subscribe(topics::kSegmentation, kLatchedQueue, &RenderNode::onSegmentation, this),
       nh.subscribe(topics::kModels, 1, &RenderNode::onModels, this),
+      nh.subscribe(topics::kClipDynamics, 1, &RenderNode::onClipDynamics, this),
       nh.subscribe(topics::kState, kLatchedQueue, &RenderNode::onState, this),
       nh.subscribe(topics::kStatus, 100, &RenderNode::onStatus, this),
   };
@@ -88,7 +89,7 @@ void RenderNode::pairClipFrames(const ros::Time& segmented) {
 
 void RenderNode::addClipFrame(const Frame& frame, const cv::Mat& labels) {
   try {
-    clip_.add({bgrFromMsg(*frame.image), labels, frame.camera});
+    clip_.add({bgrFromMsg(*frame.image), labels, frame.camera, {}, static_cast<std::int64_t>(frame.stamp().toNSec())});
   } catch (const std::exception& error) {
     reporter_.warn(frame.stamp(), std::string("clip frame left out of the background: ") + error.what());
   }
@@ -109,8 +110,18 @@ void RenderNode::onModels(const calipso_msgs::AlignedModelsConstPtr& msg) {
   prepareIfComplete();
 }
 
+// The light and the sides that the key frame does not show are learnt once: what comes later is not used.
+void RenderNode::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& msg) {
+  dynamics_ = msg;
+  prepareIfComplete();
+}
+
 // Frames must not wait for a node that can do nothing.
 void RenderNode::onStatus(const calipso_msgs::NodeStatusConstPtr& msg) {
+  if (msg->node == "flow") {
+    flow_works_ = msg->state != calipso_msgs::NodeStatus::FAILED;
+    prepareIfComplete();
+  }
   const bool needed = msg->node == "segmentation" || msg->node == "align" || msg->node == "simulator";
   if (!needed) return;
   failed_.erase(msg->node);
@@ -127,13 +138,22 @@ bool RenderNode::clipComplete() const {
 }
 
 void RenderNode::prepareIfComplete() {
-  if (!renderer_ && clipComplete()) prepareNow();
+  if (!renderer_ && clipComplete() && !mustWaitForPoses()) prepareNow();
+}
+
+// Where objects move, further frames show more of them; the poses that this takes come from the flow.
+bool RenderNode::mustWaitForPoses() {
+  if (params_.mode == Mode::kLive || dynamics_ || !flow_works_ || !anyMoves(clip_, models_)) return false;
+  reporter_.preparing("waiting for the objects' motion in the clip");
+  return true;
 }
 
 void RenderNode::prepareNow() {
   try {
     reporter_.preparing("background plate, light and appearance");
     const auto start = std::chrono::steady_clock::now();
+    PosesTaken taken;
+    if (dynamics_) taken = takePoses(posesFromMsg(*dynamics_, models_), models_, clip_);
     const auto prepared = std::make_shared<const Prepared>(prepare(clip_, models_, params_.render));
     renderer_ = std::make_unique<Renderer>(prepared, params_.render);
     cv::Mat plate;
@@ -143,7 +163,9 @@ void RenderNode::prepareNow() {
     plate_.publish(imageMsg(header, plate));
     for (const std::string& remark : prepared->remarks) reporter_.warn(ros::Time(0), remark);
     reporter_.ready("prepared from " + std::to_string(clip_.frames().size()) + " frames in " +
-                    std::to_string(static_cast<int>(milliseconds(start))) + " ms");
+                    std::to_string(static_cast<int>(milliseconds(start))) + " ms; light and texture from " +
+                    std::to_string(prepared->views) + (prepared->views == 1 ? " frame" : " frames") + ", " +
+                    std::to_string(taken.accepted) + " of " + std::to_string(taken.offered) + " poses fit their masks");
   } catch (const std::exception& error) {
     reporter_.failed(error.what());
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <calipso_msgs/AlignedModels.h>
+#include <calipso_msgs/ClipDynamics.h>
 #include <calipso_msgs/ClipInfo.h>
 #include <calipso_msgs/NodeStatus.h>
 #include <calipso_msgs/Segmentation.h>
@@ -42,6 +43,7 @@ class RenderNode {
   void onBadClipFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason);
   void onSegmentation(const calipso_msgs::SegmentationConstPtr& msg);
   void onModels(const calipso_msgs::AlignedModelsConstPtr& msg);
+  void onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& msg);
   void onStatus(const calipso_msgs::NodeStatusConstPtr& msg);
   void onFrame(const Frame& frame);
   void onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason);
@@ -50,6 +52,7 @@ class RenderNode {
   void addClipFrame(const Frame& frame, const cv::Mat& labels);
   void pairClipFrames(const ros::Time& segmented);
   bool clipComplete() const;
+  bool mustWaitForPoses();
   void prepareIfComplete();
   void prepareNow();
   void workOff();
@@ -72,6 +75,8 @@ class RenderNode {
   std::uint32_t clip_frames_ = 0;              // seen, good or bad
   calipso_msgs::AlignedModelsConstPtr models_msg_;
   std::vector<ObjectModel> models_;
+  calipso_msgs::ClipDynamicsConstPtr dynamics_;  // of the clip; empty: not there yet, or nobody estimates it
+  bool flow_works_ = false;                    // somebody estimates it, and has not failed
   std::map<std::string, std::string> failed_;  // node -> why
   std::unique_ptr<Renderer> renderer_;
 

@@ -1,0 +1,55 @@
+#include "calipso_render/clip_poses.hpp"
+
+#include <algorithm>
+
+#include "calipso_render/rasterizer.hpp"
+
+namespace calipso::render {
+namespace {
+
+// Of the model drawn at a pose with the object's mask; what another object's mask covers does not count.
+double overlap(const ObjectModel& model, const ObjectPose& pose, const ClipFrame& frame) {
+  Points vertices;
+  Triangles triangles;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) vertices.push_back((pose.world_from_object * model.mesh.vertex(i)).cast<float>());
+  for (int t = 0; t < model.mesh.triangleCount(); ++t) triangles.push_back(model.mesh.triangles.row(t));
+  VisibilityBuffer buffer({0, 0, frame.labels.cols, frame.labels.rows});
+  buffer.draw(projectMesh(vertices, triangles, frame.camera), 0);
+  long both = 0, either = 0;
+  for (int v = 0; v < frame.labels.rows; ++v) {
+    const std::uint32_t* ids = buffer.ids(v);
+    const std::uint8_t* labels = frame.labels.ptr<std::uint8_t>(v);
+    for (int u = 0; u < frame.labels.cols; ++u) {
+      const bool drawn = ids[u] != VisibilityBuffer::kNothing, seen = labels[u] == pose.index;
+      if (!seen && labels[u] != 0) continue;
+      both += drawn && seen, either += drawn || seen;
+    }
+  }
+  return either > 0 ? static_cast<double>(both) / either : 0.0;
+}
+
+}  // namespace
+
+PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& models, ClipSample& clip, double least) {
+  PosesTaken taken;
+  for (std::size_t i = 0; i < clip.frames().size(); ++i) {
+    const ClipFrame& frame = clip.frames()[i];
+    const auto here = poses.find(frame.stamp_ns);
+    if (here == poses.end()) continue;
+    std::vector<ObjectPose> fitting;
+    for (const ObjectPose& pose : here->second) {
+      const auto model = std::find_if(models.begin(), models.end(), [&](const ObjectModel& m) { return m.index == pose.index; });
+      if (model == models.end()) continue;
+      ++taken.offered;
+      const double fit = overlap(*model, pose, frame);
+      if (fit < least) continue;
+      ++taken.accepted;
+      taken.worst_accepted_overlap = std::min(taken.worst_accepted_overlap, fit);
+      fitting.push_back(pose);
+    }
+    clip.setPoses(i, fitting);
+  }
+  return taken;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,68 @@
+#include "calipso_render/clip_poses.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3d kStart(0.0, 0.1, 0.12), kEnd(0.15, 0.1, 0.12);
+
+ClipSample rollingBall() {
+  ClipSample clip;
+  for (int k = 0; k < 3; ++k) {
+    ClipFrame frame = frameWithBall(ballAt(kStart + 0.5 * k * (kEnd - kStart)));
+    frame.stamp_ns = 1000 + k;
+    clip.add(frame);
+  }
+  return clip;
+}
+
+ObjectPose poseAt(const Eigen::Vector3d& centre) { return {kBallLabel, ballAt(centre).world_from_object}; }
+
+TEST(TakePoses, AcceptsWhatFitsTheMaskAtItsStamp) {
+  ClipSample clip = rollingBall();
+  const PosesTaken taken = takePoses({{1001, {poseAt(0.5 * (kStart + kEnd))}}, {1002, {poseAt(kStart)}}, {5, {poseAt(kStart)}}}, {ballAt(kStart)}, clip);
+  EXPECT_EQ(taken.offered, 2);
+  EXPECT_EQ(taken.accepted, 1);
+  EXPECT_GT(taken.worst_accepted_overlap, 0.97);
+  EXPECT_TRUE(clip.frames()[0].poses.empty());
+  ASSERT_EQ(clip.frames()[1].poses.size(), 1u);
+  EXPECT_TRUE(clip.frames()[2].poses.empty());  // the ball is not where it was at the start
+}
+
+TEST(TakePoses, WhatStandsBeforeTheObjectDoesNotCount) {
+  ClipSample whole = rollingBall(), hidden;
+  for (ClipFrame frame : whole.frames()) {
+    const cv::Rect box = cv::boundingRect(frame.labels);
+    cv::Mat half = frame.labels(cv::Rect(box.x, box.y, box.width, box.height / 2));
+    half.setTo(kBallLabel + 1);  // another object before its upper half
+    hidden.add(frame);
+  }
+  EXPECT_EQ(takePoses({{1002, {poseAt(kEnd)}}}, {ballAt(kStart)}, hidden).accepted, 1);
+}
+
+TEST(AnyMoves, TellsRestFromMotion) {
+  ClipSample resting;
+  for (int k = 0; k < 3; ++k) resting.add(frameWithBall(ballAt(kStart)));
+  EXPECT_FALSE(anyMoves(resting, {ballAt(kStart)}));
+  EXPECT_TRUE(anyMoves(rollingBall(), {ballAt(kStart)}));
+}
+
+// Poses that were taken make further frames count.
+TEST(Prepare, UsesTheFramesWhosePosesAreKnown) {
+  ClipSample clip = rollingBall();
+  RenderParams params;
+  params.planes = table();
+  EXPECT_EQ(prepare(clip, {ballAt(kStart)}, params).views, 1);
+  takePoses({{1001, {poseAt(0.5 * (kStart + kEnd))}}, {1002, {poseAt(kEnd)}}}, {ballAt(kStart)}, clip);
+  EXPECT_EQ(prepare(clip, {ballAt(kStart)}, params).views, 3);
+}
+
+}  // namespace
+}  // namespace calipso::render
