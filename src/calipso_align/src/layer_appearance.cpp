@@ -59,6 +59,74 @@ float Expectation::cost(const cv::Vec3f& seen, int x, int y) const {
          0.5f * (kFreedom + 3.0f) * std::log1p(d.dot(d) / (kFreedom * variance)) - std::log(likely);
 }
 
+namespace {
+
+constexpr float kDarkest = 0.3f, kLightest = 0.97f;   // of a shadow, in the picture's own gamma
+constexpr float kTint = 0.05f;   // of what a shadow takes in brightness: the sky that still lights it
+
+// What is left of a colour when the shadow that comes closest is put on it.
+struct Darkened {
+  float factor, squared_rest, tint;   // tint: how far off the rest may be, grey levels
+};
+
+Darkened darkened(const cv::Vec3f& lit, const cv::Vec3f& seen) {
+  const float squared = std::max(1.0f, lit.dot(lit));
+  const float s = seen.dot(lit) / squared;
+  const cv::Vec3f rest = seen - std::clamp(s, kDarkest, kLightest) * lit;
+  return {s, rest.dot(rest), kTint * std::max(0.0f, 1.0f - s) * std::sqrt(squared)};
+}
+
+}  // namespace
+
+// Uniform over the factors that a shadow darkens by, Student's t across the line from black to the
+// colour: the sky that still lights a shadow has another tint than the sun.
+float Shadow::cost(const cv::Vec3f& seen, int x, int y) const {
+  if (colour.empty()) return kForbidden;
+  constexpr float kFreedom = 3.0f, kNormaliser = 1.84f;  // -log of the density's constant in the plane
+  const float likely = share.at<uchar>(y, x) / 255.0f;
+  if (!(likely > 0.0f)) return kForbidden;
+  const cv::Vec3f lit(colour.at<cv::Vec3b>(y, x));
+  const Darkened d = darkened(lit, seen);
+  const float variance = static_cast<float>(noise * noise) + d.tint * d.tint;
+  return kNormaliser + std::log(variance) +
+         0.5f * (kFreedom + 2.0f) * std::log1p(d.squared_rest / (kFreedom * variance)) +
+         std::log((kLightest - kDarkest) * std::max(1.0f, static_cast<float>(cv::norm(lit)))) -
+         std::log(likely);
+}
+
+Shadow shadowOn(const cv::Mat& background, const cv::Mat& view, const cv::Mat& clear, double noise,
+                const std::vector<const GaussianMixture*>& object) {
+  const cv::Size kWindow(21, 21);   // px
+  constexpr float kDeep = 0.92f;    // darker than this: no change of exposure
+  constexpr double kChance = 0.002;  // of the clear pixels: so few look shaded without any shadow
+  constexpr float kFewest = 0.02f;  // share of the window that must be clear
+  Shadow shadow{background, cv::Mat(view.size(), CV_8U, cv::Scalar(255)), noise};
+  const auto isShaded = [&](int x, int y) {
+    const cv::Vec3f colour(view.at<cv::Vec3b>(y, x));
+    const Darkened d = darkened(background.at<cv::Vec3b>(y, x), colour);
+    const float allowed = static_cast<float>(9.0 * noise * noise) + 4.0f * d.tint * d.tint;
+    if (d.factor < kDarkest || d.factor > kDeep || d.squared_rest > allowed) return false;
+    const float cost = shadow.cost(colour, x, y);
+    return std::all_of(object.begin(), object.end(),
+                       [&](const GaussianMixture* colours) { return colours->cost(colour) > cost; });
+  };
+  cv::Mat seen, shaded(view.size(), CV_32F, cv::Scalar(0));
+  cv::Mat(clear > 0).convertTo(seen, CV_32F, 1.0 / 255.0);
+  for (int y = 0; y < view.rows; ++y)
+    for (int x = 0; x < view.cols; ++x)
+      if (clear.at<uchar>(y, x) && isShaded(x, y)) shaded.at<float>(y, x) = 1.0f;
+  shadow.share.setTo(0);
+  if (cv::sum(shaded)[0] < kChance * cv::sum(seen)[0]) return shadow;
+  cv::boxFilter(seen, seen, CV_32F, kWindow);
+  cv::boxFilter(shaded, shaded, CV_32F, kWindow);
+  for (int y = 0; y < view.rows; ++y)
+    for (int x = 0; x < view.cols; ++x)
+      if (seen.at<float>(y, x) > kFewest)
+        shadow.share.at<uchar>(y, x) =
+            cv::saturate_cast<uchar>(255.0f * shaded.at<float>(y, x) / seen.at<float>(y, x));
+  return shadow;
+}
+
 float LayerAppearance::cost(const cv::Vec3f& seen, int x, int y, float outlier_cost) const {
   constexpr float kUnforeseen = 0.05f, kLeast = 0.02f;  // shares of what no account explains
   float likely = 0.0f, best = kForbidden;
@@ -66,6 +134,7 @@ float LayerAppearance::cost(const cv::Vec3f& seen, int x, int y, float outlier_c
     likely += account.factor * account.share.at<uchar>(y, x) / 255.0f;
     best = std::min(best, account.cost(seen, x, y));
   }
+  best = std::min(best, shadow.cost(seen, x, y));
   float anything = outlier_cost;
   for (const GaussianMixture* mixture : colours) anything = std::min(anything, mixture->cost(seen));
   return std::min(best, anything - std::log(kUnforeseen * std::max(kLeast, 1.0f - likely)));

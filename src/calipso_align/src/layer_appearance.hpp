@@ -25,11 +25,26 @@ struct Expectation {
   float cost(const cv::Vec3f& seen, int x, int y) const;
 };
 
+// The background in a shadow that was not there before: its colour, darker by any factor.
+struct Shadow {
+  cv::Mat colour;       // CV_8UC3; empty: no shadow is expected
+  cv::Mat share;        // CV_8U 0..255: how likely a pixel of the background lies in it, before looking
+  double noise = 2.0;   // grey levels
+
+  float cost(const cv::Vec3f& seen, int x, int y) const;
+};
+
+// The shadow on a background, expected as far as the pixels of `clear` (CV_8U: no object there) show it
+// close by, and do not rather look like the object that may have moved there.
+Shadow shadowOn(const cv::Mat& background, const cv::Mat& view, const cv::Mat& clear, double noise,
+                const std::vector<const GaussianMixture*>& object);
+
 // All accounts of a layer of the picture. A pixel that none of them explains may look like anything
 // the layer has shown.
 struct LayerAppearance {
   std::vector<Expectation> accounts;
   std::vector<const GaussianMixture*> colours;
+  Shadow shadow = {};
 
   // Negative log density, nats.
   float cost(const cv::Vec3f& seen, int x, int y, float outlier_cost) const;

@@ -294,10 +294,12 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   const cv::Mat clear = background.known & (distance > 1.0);
   const double back_noise = noiseOf(view, background.image, clear);
   // What hides the object may move along with it.
+  const Shadow shadow = shadowOn(background.image, view, clear, back_noise, fore.colours);
   const LayerAppearance back{{{background.image, background.known, 0.6f, back_noise},
                               {relit(background.image, view, clear), background.known, 0.37f, back_noise},
                               {moved, ~coverage, 0.02f, noise}},
-                             {&ring_colours}};
+                             {&ring_colours},
+                             shadow};
 
   // Log odds of a pixel's centre lying across the outline although it was predicted at this distance.
   const auto prior = [&](float d) {
