@@ -82,9 +82,7 @@ double meanDifference(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
 }  // namespace
 
 MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerParams params)
-    : params_(params),
-      size_(image.size()),
-      flow_(cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM)) {
+    : params_(params), size_(image.size()) {
   checkInput(image, labels);
   previous_image_ = image.clone();
   cv::cvtColor(image, previous_grey_, cv::COLOR_BGR2GRAY);
@@ -97,6 +95,7 @@ MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerPar
     object.mask = labels == label;
     object.coverage = object.mask.clone();
     object.reference_mean = previous_means_;
+    object.flow = cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM);
     object.colours = GaussianMixture::fit(coloursUnder(image, object.mask), params_.components);
     object.recent_colours = object.colours;
     objects_.push_back(std::move(object));
@@ -127,7 +126,11 @@ TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
   for (Object& object : objects_)
     if (!isStill(object, means)) moving.push_back(&object);
 
-  for (Object* object : moving) {
+  occupied_ = cv::Mat::zeros(size_, CV_8U);
+  for (const Object& object : objects_) occupied_ |= object.mask;
+#pragma omp parallel for schedule(dynamic)
+  for (size_t k = 0; k < moving.size(); ++k) {
+    Object* object = moving[k];
     const cv::Point shift = coarseShift(*object, means);
     const cv::Mat flow = backwardFlow(grey, *object, shift);
     const bool told = !prior.empty() && cv::countNonZero(prior == object->label) > 0;
@@ -164,20 +167,15 @@ void MaskTracker::lose(Object& object) const {
   object.confidence = 0.0f;
 }
 
-// Where objects are, and so many pixels around them.
-cv::Mat MaskTracker::occupied(int px) const {
-  cv::Mat all = cv::Mat::zeros(size_, CV_8U);
-  for (const Object& object : objects_) all |= object.mask;
-  return grown(all, px);
-}
-
 void MaskTracker::rememberBackground(const cv::Mat& image) {
   constexpr int kClearance = 2;  // px; edge pixels show a bit of the object
   if (background_.image.empty()) {
     background_.image = image.clone();
     background_.known = cv::Mat::zeros(size_, CV_8U);
   }
-  const cv::Mat seen = ~occupied(kClearance);
+  cv::Mat now = cv::Mat::zeros(size_, CV_8U);
+  for (const Object& object : objects_) now |= object.mask;
+  const cv::Mat seen = ~grown(now, kClearance);
   image.copyTo(background_.image, seen);
   background_.known.setTo(255, seen);
 }
@@ -188,7 +186,7 @@ KnownBackground MaskTracker::backgroundIn(const cv::Rect& roi, const cv::Mat& im
                                           const cv::Mat& flow) const {
   constexpr int kClearance = 3;
   const KnownBackground remembered{background_.image(roi), background_.known(roi)};
-  const cv::Mat free = ~occupied(kClearance), visible = free(roi);
+  const cv::Mat free = ~grown(occupied_, kClearance), visible = free(roi);
   constexpr double kSensorNoise = 4.0;  // grey levels; not more differs where nothing moves
   if (cv::countNonZero(visible) == 0 || noiseOf(image(roi), remembered.image, visible) <= kSensorNoise)
     return remembered;
@@ -249,7 +247,7 @@ cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey, const Object& object,
   cv::warpAffine(previous_grey_, before, back, view.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
                  cv::BORDER_REPLICATE);
   cv::Mat rest;
-  flow_->calc(grey(view).clone(), before, rest);  // wants whole rows
+  object.flow->calc(grey(view).clone(), before, rest);  // wants whole rows
   flow(view) += rest;
   return flow;
 }

@@ -34,8 +34,8 @@ struct TrackedMask {
 // background that is remembered: a pixel near the predicted outline is the object's when the object
 // of the previous frame, moved along, explains it better than the background does. What neither
 // explains is left to colour models. A cut settles the labels, the coverage of the edge pixels the
-// outline. An object whose surroundings do not change keeps its mask at hardly any cost. One thread at
-// a time; frames in order.
+// outline. An object whose surroundings do not change keeps its mask at hardly any cost. Objects of one
+// frame are followed in parallel, each from where the others were. One caller at a time; frames in order.
 class MaskTracker {
  public:
   // image: CV_8UC3, labels: CV_8U, of equal size.
@@ -56,13 +56,13 @@ class MaskTracker {
     cv::Mat coverage;        // CV_8U, as `mask` but with the share of the pixels along its edge
     cv::Mat reference_mean;  // 4 x 4 px means of the frame in which `mask` was found
     float confidence = 1.0f;
+    cv::Ptr<cv::DISOpticalFlow> flow;  // has buffers of its own
   };
 
   bool isStill(const Object& object, const cv::Mat& means) const;
   cv::Point coarseShift(const Object& object, const cv::Mat& means) const;
   cv::Mat backwardFlow(const cv::Mat& grey, const Object& object, const cv::Point& shift) const;
   cv::Mat predict(const Object& object, const cv::Mat& flow, const cv::Point& shift) const;
-  cv::Mat occupied(int px) const;
   void rememberBackground(const cv::Mat& image);
   KnownBackground backgroundIn(const cv::Rect& roi, const cv::Mat& image, const cv::Mat& flow) const;
   void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
@@ -77,8 +77,8 @@ class MaskTracker {
   cv::Size size_;
   std::vector<Object> objects_;
   cv::Mat previous_image_, previous_grey_, previous_means_;
+  cv::Mat occupied_;            // CV_8U: any object of the previous frame
   KnownBackground background_;  // the whole picture
-  cv::Ptr<cv::DISOpticalFlow> flow_;
 };
 
 }  // namespace calipso::align
