@@ -9,6 +9,7 @@
 #include "calipso_align/fit_problem.hpp"
 #include "calipso_align/rough_fit.hpp"
 #include "calipso_align/schedule.hpp"
+#include "calipso_align/shape_uncertainty.hpp"
 #include "calipso_align/trust.hpp"
 
 namespace calipso::align {
@@ -105,18 +106,25 @@ double sizeRatio(const Points& to, const Points& from) {
   return size(to) / size(from);
 }
 
-// Pose covariance at the end of the fit, with all low-order deformations left free. World axes.
-Eigen::Matrix<double, 6, 6> poseCovariance(const FitProblem& problem, const Points& x,
-                                           const LowOrderStep& last,
-                                           const Eigen::Isometry3d& camera_from_object) {
+// Covariance of motion and low-order deformation at the end of the fit, all of them left free.
+struct Posterior {
+  LowOrderMap here;   // the identity
+  Eigen::MatrixXd covariance;
+};
+
+Posterior posterior(const FitProblem& problem, const Points& x, const LowOrderStep& last) {
   const LowOrderPrior& prior = last.fit.prior;
   const MeasureSettings settings =
       settingsAt(last, problem, last.fit.iterations - 1, prior.deformation);
   const LowOrderMap here(x);
-  const Eigen::MatrixXd all = covariance(x, measure(problem, x, settings), prior, here);
+  return {here, covariance(x, measure(problem, x, settings), prior, here)};
+}
 
-  // From translation of the centroid and rotation about it to the object frame's origin.
-  const Eigen::Vector3d arm = camera_from_object.translation() - here.centroid();
+// From translation of the centroid and rotation about it to the object frame's origin, world axes.
+Eigen::Matrix<double, 6, 6> poseCovariance(const FitProblem& problem, const Posterior& end,
+                                           const Eigen::Isometry3d& camera_from_object) {
+  const Eigen::MatrixXd& all = end.covariance;
+  const Eigen::Vector3d arm = camera_from_object.translation() - end.here.centroid();
   Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Zero();
   const Eigen::Matrix3d R = problem.camera.world_from_camera.linear();
   J.topLeftCorner<3, 3>() = R;
@@ -167,16 +175,21 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
   result.scale = sizeRatio(x, problem.X);
   result.deformation = last.fit.prior.deformation;
   result.noise_px = problem.target.noise_px;
-  result.covariance =
-      poseCovariance(problem, x, last,
-                     problem.camera.world_from_camera.inverse() * result.world_from_object);
+  const Posterior end = posterior(problem, x, last);
+  result.covariance = poseCovariance(
+      problem, end, problem.camera.world_from_camera.inverse() * result.world_from_object);
+  const double unseen = problem.depth.empty() ? unresolved(last.order, result.deformation) : 0.0;
+  const ShapeUncertainty error = shapeUncertainty(x, cad.triangles, end.here, end.covariance,
+                                                  problem.model_size, unseen);
+  result.expected_error = error.mean;
+  result.expected_rms = error.rms;
   const FitQuality quality = assess(problem, contour, x);
   result.placed = true;
   result.met_mean_px = quality.met_mean_px;
   result.contour_mean_px = quality.mean_px;
   result.contour_p95_px = quality.p95_px;
   result.residual_px = residualsPerLoop(problem, quality, contour);
-  const Verdict verdict = judge(problem, contour, quality, result.scale);
+  const Verdict verdict = judge(problem, contour, quality, result.scale, error);
   result.trusted = verdict.trusted;
   result.reason = verdict.reason;
 }

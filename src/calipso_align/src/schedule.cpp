@@ -93,6 +93,10 @@ double Ramp::at(int k, int count) const {
   return from * std::pow(to / from, t);
 }
 
+double unresolved(int order, double deformation) {
+  return deformation * std::pow(kOrderRatio, order) / 3.0;
+}
+
 std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOptions& options) {
   if (options.method == Method::kLiteral) return {literalRigidStep(problem, options)};
   LowOrderStep similarity;
@@ -111,10 +115,9 @@ MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, 
                kNarrowestPx + 2.0 * noise);
   settings.contour.reject_px = 3.0 * settings.contour.robust_px;
 
-  // What the stage's model cannot follow: the next order of the deformation, about a third of the
-  // size away from the centroid. It changes slowly along the contour, the picture's noise quickly.
-  const double a = step.order == 0 ? kTypicalDeformation : deformation;
-  const double misfit = a * std::pow(kOrderRatio, step.order) / 3.0;
+  // What the stage's model cannot follow changes slowly along the contour, the picture's noise quickly.
+  const double misfit =
+      unresolved(step.order, step.order == 0 ? kTypicalDeformation : deformation);
   const double misfit_px = misfit * problem.extent_px, noise_px = 0.5 + 0.5 * noise;
   const double misfit_correlation_px = problem.extent_px / 8.0, noise_correlation_px = 10.0;
   const double variance = misfit_px * misfit_px + noise_px * noise_px;

@@ -223,6 +223,8 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   }
   line.addNumber("segmentation_iou", one.segmentation_iou);
   line.addNumber("fit_mean_px", result.contour_mean_px);
+  line.addNumber("expected3d_mean_percent", 100.0 * result.expected_error);
+  line.addNumber("expected3d_rms_percent", 100.0 * result.expected_rms);
   line.addNumber("deformation_found", result.deformation);
   line.addFlag("trusted", result.trusted);
   line.addText("reason", result.reason);

@@ -59,6 +59,8 @@ struct AlignmentResult {
   double met_mean_px = 0.0;                // of known points that the model meets
   double contour_mean_px = 0.0;            // of known points
   double contour_p95_px = 0.0;
+  double expected_error = 0.0;             // mean distance of the surface from the true one, predicted,
+  double expected_rms = 0.0;               // in parts of the model's diagonal
   double noise_px = 0.0;                   // estimated noise of the contour
   double scale = 1.0;                      // size of S* relative to S
   double deformation = 0.0;                // how far S had to be deformed: r.m.s. strain, estimated

@@ -26,6 +26,10 @@ struct LowOrderStep {
   bool literal = false; // eq. 9 as it stands
 };
 
+// What a deformation of this size has beyond this order, about a third of the size away from the
+// centroid; model sizes.
+double unresolved(int order, double deformation);
+
 // Similarity, affine, quadratic.
 std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOptions& options);
 MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, int iteration,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "calipso_align/fit_problem.hpp"
+#include "calipso_align/shape_uncertainty.hpp"
 
 namespace calipso::align {
 
@@ -23,9 +24,10 @@ struct Verdict {
   std::string reason;   // why not; or what the user should know all the same
 };
 
-// @param converged  the last stage's own report
+// @param scale     size of the fitted model relative to the stock model
+// @param expected  of the fitted surface
 Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-              const FitQuality& quality, double scale);
+              const FitQuality& quality, double scale, const ShapeUncertainty& expected);
 
 // Whether turning the model about one of its principal axes leaves it where it was: then no contour
 // shows that turn. Returns the axis in the frame of X.
