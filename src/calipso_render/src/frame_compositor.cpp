@@ -75,7 +75,7 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
   const EdgeCoverage::Pixel* edge = edges_->at(u, v);
   if (edge == nullptr) {
     const std::uint32_t id = centre_->idAt(u, v);
-    if (isDrawn(id, u, v)) drawn = {shadeSurface(id, u, v), 1.0f};
+    if (isDrawn(id, u, v)) drawn = {shadeSurface(id, u, v), 1.0f - screenAt(u, v)};
     return drawn;
   }
   // One shaded point for each object in the pixel: the sample nearest to the pixel's centre.
@@ -95,6 +95,7 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
     drawn.cover += part;
   }
   if (drawn.cover > 0.0f) drawn.colour /= drawn.cover;
+  drawn.cover *= 1.0f - screenAt(u, v);
   return drawn;
 }
 
@@ -102,7 +103,10 @@ FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
   Behind behind{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
   const bool removed = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
   if (removed) behind = revealedAt(u, v);
-  if (!removed && labels_.at<std::uint8_t>(v, u) != 0) return behind;  // another object's own pixels
+  if (!removed && labels_.at<std::uint8_t>(v, u) != 0) {
+    shadeOther(u, v, behind);
+    return behind;
+  }
   const cv::Point at = cv::Point(u, v) - region_.tl();
   const float sun = sun_now_.at<float>(at), sun_before = sun_before_.at<float>(at);
   const float sky = sky_now_.at<float>(at), sky_before = sky_before_.at<float>(at);

@@ -21,6 +21,7 @@ struct ShadowCache {
   Camera camera;
   Eigen::Vector3f sun = Eigen::Vector3f::Zero();  // direction
   std::unique_ptr<Visibility> others;  // of what is not edited
+  std::unique_ptr<Visibility> originals;  // of the edited objects where the video has them; null: of none
   cv::Mat others_sun;                  // empty: nothing else casts a shadow
   cv::Mat originals_sun, originals_sky;  // of the edited objects where the video has them
   cv::Mat shaded;                      // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
@@ -132,6 +133,11 @@ class FrameCompositor {
   void findRelit();
   void findChanged();
   void findMaps();
+  void findShaded();
+  void findScreened();
+  float screenAt(int u, int v) const { return screened_.empty() ? 0.0f : screened_.at<std::uint8_t>(v - region_.y, u - region_.x) / 255.0f; }
+  std::optional<SurfacePoint> otherAt(int u, int v) const;
+  void shadeOther(int u, int v, Behind& behind) const;
   cv::Mat originalOf(int surface) const;
   void composeRow(int v, Row& row, FrameOutput& out) const;
   void drawRow(int v, Row& row) const;
@@ -192,6 +198,8 @@ class FrameCompositor {
   cv::Mat miss_;     // CV_32FC4 over rest_.box: what drawing misses of the video, linear, and 1 where that is known; may be empty
   std::vector<Rim> rims_;            // by rows
   std::vector<std::size_t> rim_rows_;  // per row of region_: its first in rims_, and one more
+  std::vector<bool> may_be_shaded_;    // per slot: not edited, and in the way of the sun that falls on edited ones
+  cv::Mat screened_;                   // CV_8UC1 over region_: 255 = scenery hides what is drawn; may be empty
   std::vector<bool> always_drawn_;     // per slot: isDrawn() wherever it is seen
   std::vector<std::vector<TriangleMap>> maps_;  // per slot, per triangle; empty where the slot is not drawn
   std::optional<VisibilityBuffer> centre_;

@@ -74,7 +74,8 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   const cv::Rect whole({0, 0}, frame_.bgr.size());
   shadows_.bounds = {};
   for (const Occluder& o : originals) shadows_.bounds |= shadowBounds(*o.vertices, prepared_.light.light);
-  shadows_.originals_sun = shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadowOf(originals, prepared_.light.light, params_), shadows_.bounds);
+  shadows_.originals = originals.empty() ? nullptr : shadowOf(originals, prepared_.light.light, params_);
+  shadows_.originals_sun = shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadows_.originals, shadows_.bounds);
   shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_32F, cv::Scalar(1.0f)) : skyOver(*skyShadowOf(originals, params_), whole);
   shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
 #pragma omp parallel for schedule(static)

@@ -119,7 +119,7 @@ void FrameCompositor::composeSpecial(int u, int v, Row& row) const {
   const std::uint32_t id = centre_->idAt(u, v);
   if (miss_.empty() || pixel.source == kOriginal || id == VisibilityBuffer::kNothing) return;
   const int slot = VisibilityBuffer::objectOf(id);
-  if (observed_[slot].points.empty()) return;
+  if (observed_[slot].points.empty() || screenAt(u, v) > 0.0f) return;
   const Eigen::Vector2f moved = movement(id, static_cast<float>(u), static_cast<float>(v));
   addResidual(u - moved.x(), v - moved.y(), moved, surface_of_slot_[slot], out);
 }
@@ -132,7 +132,7 @@ void FrameCompositor::drawRow(int v, Row& row) const {
   const float* still = still_.ptr<float>(j);
   std::fill(row.source.begin(), row.source.end(), static_cast<std::uint8_t>(kOriginal));
   lightRow(v, row);
-  const auto isPlain = [&](int i) { return edges[i] < 0 && still[i] < kKept && isDrawn(ids[i], region_.x + i, v); };
+  const auto isPlain = [&](int i) { return edges[i] < 0 && still[i] < kKept && isDrawn(ids[i], region_.x + i, v) && screenAt(region_.x + i, v) == 0.0f; };
   for (int i = 0; i < region_.width;) {
     const bool seen = ids[i] != VisibilityBuffer::kNothing;
     if (!seen && edges[i] < 0 && (removed[i] | relit[i]) == 0) {

@@ -14,6 +14,8 @@ namespace {
 constexpr int kRegionMargin = 8;       // px
 constexpr double kRestOverlap = 0.95;  // of masks: the object is where the key frame has it
 constexpr float kDarker = 0.97f;       // of the plate's brightness: a passing shadow
+constexpr int kRimShare = 50;          // of the picture's width: how far a mask may miss a moving object
+constexpr int kInFront = 127;          // of a matte
 constexpr float kQuiet = 5.0f;         // code values of spread over time: the background rests
 
 }  // namespace
@@ -45,6 +47,7 @@ FrameOutput FrameCompositor::run() {
 void FrameCompositor::prepareFrame() {
   stage();
   prepareShadows();
+  findShaded();
   findPassingShadows();
   chooseRegion();
   if (region_.empty()) return;
@@ -54,6 +57,7 @@ void FrameCompositor::prepareFrame() {
   findCovered();
   measureSky();
   measureSun();
+  findScreened();
   findRelit();
   findSurfaceLight();
 }
@@ -127,7 +131,7 @@ void FrameCompositor::chooseRegion() {
     if (!box.empty()) region_ |= cv::Rect(box.x - kRegionMargin, box.y - kRegionMargin, box.width + 2 * kRegionMargin, box.height + 2 * kRegionMargin);
   }
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
-    if (!edited_[surface_of_slot_[slot]]) continue;
+    if (!edited_[surface_of_slot_[slot]] && !may_be_shaded_[slot]) continue;
     region_ |= boundsOf(actors_[slot].screen, kRegionMargin, size);
   }
   region_ |= shadows_.bounds | moved_bounds_;
@@ -151,6 +155,13 @@ void FrameCompositor::findPassingShadows() {
   passing_ &= (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet) & (labels_ == 0);
   cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
   cv::dilate(passing_, passing_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {13, 13}));
+  // The rim that the mask of another moving object has missed is no shadow.
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (edited_[i] || !prepared_.moves[i]) continue;
+    cv::Mat near;
+    cv::dilate(labels_ == prepared_.surfaces[i].index, near, disc(std::max(2, labels_.cols / kRimShare)));
+    passing_.setTo(0, near);
+  }
 }
 
 // The pixels of region_ that show an object in the video.
@@ -169,7 +180,8 @@ void FrameCompositor::findRemoved() {
   }
   cv::dilate(own, removed_, disc(params_.background.mask_margin_px));
   if (!passing_.empty()) removed_ |= passing_(region_);
-  removed_.setTo(0, others);  // what stands beside it keeps its own pixels
+  removed_.setTo(0, others);  // what stands beside it keeps its own pixels, and what stands before it
+  if (!params_.matte.empty() && sameView(frame_.camera, prepared_.camera)) removed_.setTo(0, params_.matte(region_) > kInFront);
 }
 
 void FrameCompositor::findMaps() {

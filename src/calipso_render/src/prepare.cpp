@@ -184,6 +184,20 @@ std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& 
   return fronts;
 }
 
+// What the depth image shows beside the objects, as near as all of its surroundings: its edges are not exact.
+cv::Mat sceneryOf(const cv::Mat& depth, const Prepared& p, int margin) {
+  if (depth.empty()) return {};
+  if (depth.size() != p.key_labels.size()) throw std::invalid_argument("the depth image is not of the key frame's size; scale it or leave it out");
+  cv::Mat objects = p.key_labels != 0, nearness = cv::Mat::zeros(depth.size(), CV_32F);
+  for (const cv::Mat& f : p.footprints) {
+    if (!f.empty()) objects |= f;
+  }
+  cv::dilate(objects, objects, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
+  cv::Mat(1.0 / depth).copyTo(nearness, (depth > 0.0f) & (objects == 0));
+  cv::erode(nearness, nearness, cv::Mat::ones(3, 3, CV_8U));
+  return nearness;
+}
+
 cv::Mat grown(const cv::Mat& mask, int radius) {
   cv::Mat out;
   cv::dilate(mask, out, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
@@ -286,6 +300,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const ShadowMap sky(above, up, {256, kSkyRadius, 24});
   p.fronts = frontsOf(actors, p);
   p.footprints = footprintsOf(actors, p);
+  p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
   prepareBackground(frames, seen, picture, sun, sky, params, p);
   p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   std::vector<cv::Mat> pictures;

@@ -138,6 +138,7 @@ Scene loadScene(const std::string& directory) {
   if (root["gravity"]) scene.gravity = reader.vector(root, "gravity", 3);
   readSupport(root, reader, scene);
   scene.strokes_path = existing(directory + "/strokes.png");
+  scene.matte_path = existing(directory + "/matte.png");
   scene.depth_path = existing(directory + "/depth/000000.png");
   if (!scene.depth_path.empty()) scene.depth_scale = reader.number(root, "depth_scale_m");
   readObjects(root, file, scene);

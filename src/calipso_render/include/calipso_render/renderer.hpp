@@ -67,6 +67,9 @@ struct RenderParams {
   std::vector<SupportPlane> planes;
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   BackgroundParams background;
+  // What stands before edited objects, seen from the key frame's camera. Either may be empty.
+  cv::Mat depth;                // CV_32FC1, m along the optical axis; 0: unknown
+  cv::Mat matte;                // CV_8UC1, 255: stays in front
   double sun_radius = 0.025;    // rad; the angular radius of the sun's disc with its glare
   bool add_noise = true;        // on rendered and invented pixels
   bool carry_residual = true;   // what drawing misses goes along with what moves little
@@ -83,6 +86,7 @@ struct Prepared {
   LightFit light;
   std::vector<cv::Mat> fronts;      // per surface, CV_8UC1: places where something unmodelled stands before it
   std::vector<cv::Mat> footprints;  // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
+  cv::Mat scenery;                  // CV_32FC1, 1/m: nearness of what is no object and may hide one; 0 unknown; may be empty
   Background background;
   cv::Mat plate_linear;             // CV_32FC3
   cv::Vec3f umbra = {0.4f, 0.4f, 0.4f};  // what the sun's absence leaves of a support plane's brightness

@@ -1,5 +1,6 @@
 #include "params.hpp"
 
+#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "calipso_ros/node_main.hpp"
@@ -30,6 +31,22 @@ T inRange(const ros::NodeHandle& pnh, const std::string& name, T fallback, T low
   return value;
 }
 
+// @throw std::invalid_argument naming file, size and what it must be
+cv::Mat pictureOf(const std::string& path, int type, const Camera& camera) {
+  const cv::Mat picture = cv::imread(path, type == CV_8U ? cv::IMREAD_GRAYSCALE : cv::IMREAD_UNCHANGED);
+  if (picture.type() != type || picture.cols != camera.width || picture.rows != camera.height) {
+    throw std::invalid_argument(path + " is no picture of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+                                " with one channel of " + (type == CV_8U ? "8" : "16") + " bits; replace or remove it");
+  }
+  return picture;
+}
+
+// A live camera's first frame is not the picture that these were made for.
+void loadScenery(const Scene& scene, RenderParams& render) {
+  if (!scene.depth_path.empty()) pictureOf(scene.depth_path, CV_16U, scene.camera).convertTo(render.depth, CV_32F, scene.depth_scale);
+  if (!scene.matte_path.empty()) render.matte = pictureOf(scene.matte_path, CV_8U, scene.camera);
+}
+
 }  // namespace
 
 NodeParams loadParams(const ros::NodeHandle& pnh) {
@@ -44,6 +61,7 @@ NodeParams loadParams(const ros::NodeHandle& pnh) {
   p.live_queue = inRange(pnh, "live_queue", p.live_queue, 1, 1000);
   const Scene scene = loadScene(p.scene);
   p.render.planes = scene.planes;
+  if (p.mode == Mode::kBag) loadScenery(scene, p.render);
   if (scene.gravity.norm() > 0.0) p.render.up = -scene.gravity.normalized();
   return p;
 }

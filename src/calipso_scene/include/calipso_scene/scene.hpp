@@ -47,6 +47,7 @@ struct Scene {
   std::vector<SupportPlane> planes;
   std::vector<std::string> support_meshes;      // absolute paths, world frame
   std::string strokes_path;                     // empty when there are none
+  std::string matte_path;                       // frame 0: white stays before edited objects; empty: none
   std::string depth_path;                       // frame 0, 16 bit; empty when there is none
   double depth_scale = 0.001;                   // m per unit of the depth image
   std::vector<SceneObject> objects;

@@ -1,0 +1,123 @@
+// What no edit touches: objects in the shadow of edited ones, and scenery before them.
+
+#include <gtest/gtest.h>
+
+#include "calipso_render/renderer.hpp"
+#include "calipso_render/shadow_map.hpp"
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3d kCentre(-0.15, 0.1, 0.12), kOther(0.15, 0.25, 0.12);
+
+RenderParams params() {
+  RenderParams p;
+  p.planes = table();
+  p.add_noise = false;
+  return p;
+}
+
+// A ball that is edited, and one that is not.
+struct TwoBalls {
+  ClipFrame key = frameWithBall(ballAt(kCentre));
+  RenderParams render = params();
+  std::shared_ptr<const Prepared> prepared;
+
+  explicit TwoBalls(const RenderParams& p) : render(p) {
+    const ObjectModel other = ballAt(kOther, "other", 2);
+    const ClipFrame behind = frameWithBall(other);
+    behind.bgr.copyTo(key.bgr, (behind.labels == 2) & (key.labels == 0));
+    behind.labels.copyTo(key.labels, (behind.labels == 2) & (key.labels == 0));
+    ClipSample clip;
+    clip.add(key);
+    prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre), other}, render));
+  }
+  FrameOutput drawn(const Eigen::Vector3d& move) const {
+    FrameInput in;
+    in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera, in.stamp_ns = 7;
+    ObjectInFrame ball, other;
+    ball.name = "ball", ball.edited = true;
+    for (const Eigen::Vector3f& x : prepared->surfaces[0].key_vertices) ball.vertices.push_back(x + move.cast<float>());
+    other.name = "other";
+    in.objects = {ball, other};
+    return Renderer(prepared, render).composite(in);
+  }
+  cv::Point at(const Eigen::Vector3d& x) const {
+    const Eigen::Vector2d p = key.camera.projectWorld(x);
+    return {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))};
+  }
+};
+
+TEST(Others, AnEditedObjectCastsItsShadowOnOneThatStays) {
+  const TwoBalls s(params());
+  const Eigen::Vector3d sun = s.prepared->light.light.direction.cast<double>();
+  const FrameOutput out = s.drawn(kOther + 2.6 * kBallRadius * sun - kCentre);  // between the sun and the other ball
+  // The point of the other ball's front that looks at the sun as far as the camera sees it.
+  const Eigen::Vector3d eye = s.key.camera.world_from_camera.translation();
+  const Eigen::Vector3d facing = (sun + (eye - kOther).normalized()).normalized();
+  const cv::Point p = s.at(kOther + kBallRadius * facing);
+  ASSERT_EQ(s.key.labels.at<std::uint8_t>(p), 2);
+  const Light& light = s.prepared->light.light;
+  const Eigen::Vector3f n = facing.cast<float>();
+  for (int c = 0; c < 3; ++c) {
+    const float before = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[c]), now = linearFromCode(out.bgr.at<cv::Vec3b>(p)[c]);
+    EXPECT_NEAR(now / before, diffuseShading(light, n, 0.0f)[c] / diffuseShading(light, n, 1.0f)[c], 0.06f) << c;  // codes are rounded
+  }
+}
+
+TEST(Others, WhereNoShadowFallsTheirPixelsStay) {
+  const TwoBalls s(params());
+  const FrameOutput out = s.drawn({-0.02, 0.0, 0.0});
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      if (s.key.labels.at<std::uint8_t>(v, u) != 2) continue;
+      ASSERT_EQ(out.bgr.at<cv::Vec3b>(v, u), s.key.bgr.at<cv::Vec3b>(v, u)) << u << ", " << v;
+    }
+  }
+}
+
+TEST(Others, WhatTheDepthImageHasNearerStaysInFront) {
+  RenderParams p = params();
+  p.depth = cv::Mat(kHeight, kWidth, CV_32F, cv::Scalar(5.0));
+  const Eigen::Vector3d place = kCentre + Eigen::Vector3d(0.0, 0.0, 0.22);  // above the table's far end
+  const cv::Point middle = TwoBalls(params()).at(place);
+  p.depth(cv::Rect(0, 0, middle.x, kHeight)).setTo(0.3);
+  const TwoBalls s(p);
+  const FrameOutput out = s.drawn(place - kCentre);
+  const cv::Point left = middle - cv::Point(8, 0), right = middle + cv::Point(8, 0);
+  EXPECT_EQ(out.bgr.at<cv::Vec3b>(left), s.key.bgr.at<cv::Vec3b>(left));
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(left), kOriginal);
+  EXPECT_EQ(out.provenance.at<std::uint8_t>(right), kRendered);
+  EXPECT_NE(out.bgr.at<cv::Vec3b>(right), s.key.bgr.at<cv::Vec3b>(right));
+}
+
+TEST(Others, AMatteStaysInFrontAndItsGreysMix) {
+  RenderParams p = params();
+  const Eigen::Vector3d place = kCentre + Eigen::Vector3d(0.0, 0.0, 0.22);
+  const cv::Point middle = TwoBalls(params()).at(place);
+  const TwoBalls bare(p);
+  p.matte = cv::Mat::zeros(kHeight, kWidth, CV_8U);
+  p.matte(cv::Rect(middle.x - 6, 0, 6, kHeight)).setTo(255);
+  p.matte(cv::Rect(middle.x, 0, 6, kHeight)).setTo(128);
+  const TwoBalls s(p);
+  const FrameOutput out = s.drawn(place - kCentre), free = bare.drawn(place - kCentre);
+  const cv::Point full = middle - cv::Point(3, 0), half = middle + cv::Point(3, 0), open = middle + cv::Point(9, 0);
+  EXPECT_EQ(out.bgr.at<cv::Vec3b>(full), s.key.bgr.at<cv::Vec3b>(full));
+  EXPECT_EQ(out.bgr.at<cv::Vec3b>(open), free.bgr.at<cv::Vec3b>(open));
+  for (int c = 0; c < 3; ++c) {
+    const float mixed = 0.5f * (linearFromCode(s.key.bgr.at<cv::Vec3b>(half)[c]) + linearFromCode(free.bgr.at<cv::Vec3b>(half)[c]));
+    EXPECT_NEAR(linearFromCode(out.bgr.at<cv::Vec3b>(half)[c]), mixed, 0.01f) << c;
+  }
+}
+
+TEST(Others, ADepthImageOfAnotherSizeIsRefused) {
+  RenderParams p = params();
+  p.depth = cv::Mat(10, 10, CV_32F, cv::Scalar(1.0));
+  EXPECT_THROW(TwoBalls{p}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace calipso::render
