@@ -80,6 +80,10 @@ void DeformableBody::releaseAll() {
   impl_->invalidateSystem();
 }
 
+bool DeformableBody::isPrescribed(int node, int axis) const {
+  return impl_->prescribed.count(3 * node + axis) > 0;
+}
+
 bool DeformableBody::isFixed(int node) const {
   requireNode(node, nodeCount());
   for (int axis = 0; axis < 3; ++axis)

@@ -150,8 +150,6 @@ struct DeformableBody::Impl {
   // A^-1 of the last step's system times impulses on the nodes (N s): change of velocity, m/s.
   Vec velocityChange(Vec impulses, double h);
   Vec nodalImpulse(const SurfacePoint& point, const Eigen::Vector3d& impulse) const;
-  std::unique_ptr<Preconditioner> frozen;   // factor kept for compliances
-  double frozen_h = 0.0;
 };
 
 // Rows and columns of the given dofs become those of the identity matrix times a typical diagonal.

@@ -91,32 +91,6 @@ Vec DeformableBody::complianceColumn(const SurfacePoint& point, const Vector3d& 
   return impl_->velocityChange(impl_->nodalImpulse(point, direction), h);
 }
 
-void DeformableBody::freezeCompliance(double h) {
-  Impl& m = *impl_;
-  m.frozen = makeCholesky();
-  m.frozen_h = h;
-  // The solver's own matrix is left as it is: a step may be under way with it.
-  const BlockMatrix running = m.A;
-  if (m.trial)
-    m.assemble(m.trial->y, m.trial->integrator, Definiteness::kPositive);
-  else
-    m.assemble(m.x, m.integrator(h), Definiteness::kPositive);
-  eliminate(m.prescribed, &m.A);
-  const bool positive = m.frozen->update(m.A);
-  m.A = running;
-  if (!positive)
-    throw std::runtime_error("compliance: the body's system is not positive definite");
-}
-
-Vec DeformableBody::frozenColumn(const SurfacePoint& point, const Vector3d& direction) const {
-  const Impl& m = *impl_;
-  if (!m.frozen) throw std::logic_error("frozenColumn() needs freezeCompliance() before it");
-  Vec b = m.nodalImpulse(point, direction), w;
-  m.maskResidual(&b);
-  m.frozen->apply(b, w);
-  return w / (m.frozen_h * m.frozen_h);
-}
-
 Eigen::MatrixXd DeformableBody::compliance(const std::vector<SurfacePoint>& points,
                                            const std::vector<Vector3d>& directions,
                                            double h) const {

@@ -92,6 +92,47 @@ void DeformableBody::moveTrial(const Vec& positions) {
   t.slope.resize(0);
 }
 
+Vec DeformableBody::trialDescent() {
+  Vec descent = -impl_->trialGradient();
+  impl_->maskResidual(&descent);
+  return descent;
+}
+
+Vec DeformableBody::trialJump() const {
+  const Impl::Trial& t = impl_->runningTrial();
+  Vec jump = Vec::Zero(t.y.size());
+  for (const auto& [dof, p] : impl_->prescribed) jump[dof] = t.targets[dof] - t.y[dof];
+  return jump;
+}
+
+// NOTE: the viscous part has the tangent at the trial positions instead of the step's start: good
+// enough to iterate with, and half the work.
+void DeformableBody::trialSystem(BlockMatrix* A, Vec* pull) {
+  Impl& m = *impl_;
+  const Impl::Trial& t = m.runningTrial();
+  const Integrator& i = t.integrator;
+  m.model->hessian(t.y, Definiteness::kPositive, *A);
+  for (double& value : A->values) value *= 1.0 + i.rate * m.damping();
+  const double inertia = i.inertia + i.rate * m.options.mass_damping;
+  if (m.mass) {
+    A->combine(1.0, inertia, *m.mass);
+  } else {
+    const Eigen::VectorXd& mass = m.model->lumpedMass();
+    for (int k = 0; k < mass.size(); ++k)
+      A->block(A->pattern->diagonal[k]).diagonal().array() += inertia * mass[k];
+  }
+  m.addSoftHessian(i, A);
+  const Vec jump = trialJump();
+  if (jump.isZero(0.0)) {
+    pull->setZero(t.y.size());
+  } else {
+    A->multiply(jump, *pull);
+    *pull = -*pull;
+    m.maskResidual(pull);
+  }
+  eliminate(m.prescribed, A);
+}
+
 StepReport DeformableBody::endStep(const Vec& contact_forces) {
   Impl& m = *impl_;
   Impl::Trial& t = m.runningTrial();

@@ -181,7 +181,7 @@ const BlockMatrix& DeformableBody::Impl::assembledViscosity() {
 
 Vec DeformableBody::Impl::applyViscosity(const Vec& w) {
   Vec Dw;
-  if (hex_solver && !viscosity_valid) {
+  if (model->hexes() && !viscosity_valid) {
     model->hexes()->multiplyMaterial(viscosity_at, w, &elastic_scratch, &Dw);
     Dw *= damping();
   } else {

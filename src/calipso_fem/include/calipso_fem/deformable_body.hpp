@@ -98,6 +98,7 @@ class DeformableBody {
   void releaseSurfaceVertices(const std::vector<int>& vertices);
   void releaseAll();
   bool isFixed(int node) const;
+  bool isPrescribed(int node, int axis) const;
   std::vector<int> nodesOfSurfaceVertices(const std::vector<int>& vertices) const;
   Eigen::Vector3d reaction(int node) const;        // force the constraint puts on the body, N
   Eigen::Vector3d totalReaction() const;
@@ -127,6 +128,12 @@ class DeformableBody {
   double trialStepLength(const Vec& positions, const Vec& contact_forces) const;
   void moveTrial(const Vec& positions);
   StepReport endStep(const Vec& contact_forces);   // the trial becomes the state
+  // For who iterates with a system of his own: -gradient without contact, zero where prescribed; ...
+  Vec trialDescent();
+  // ... A at the trial positions, positive definite, prescribed components eliminated. `pull` is what
+  // the way of these to their targets asks of the others: A d = trialDescent() + pull + forces.
+  void trialSystem(BlockMatrix* A, Vec* pull);
+  Vec trialJump() const;   // that way, 3n; zero at all other components
 
   // Results
   Vec surfaceVertices() const;             // J x, 3 #V, m
@@ -142,10 +149,6 @@ class DeformableBody {
   // Columns w = A^-1 J^T n of the last step's system A = M + h D + h^2 K: the velocity change per
   // unit impulse at a surface point along a direction (Saupin et al. 2008). 3n, m/s per N s.
   Vec complianceColumn(const SurfacePoint& point, const Eigen::Vector3d& direction, double h) const;
-  // Keeps the factor of the last step's or trial's system; frozenColumn() gives columns of it. All of
-  // them belong to one matrix, so that what is put together from them stays positive.
-  void freezeCompliance(double h);
-  Vec frozenColumn(const SurfacePoint& point, const Eigen::Vector3d& direction) const;
   // W_ij = n_i^T J_i A^-1 J_j^T n_j for all pairs of given points and directions.
   Eigen::MatrixXd compliance(const std::vector<SurfacePoint>& points,
                              const std::vector<Eigen::Vector3d>& directions, double h) const;

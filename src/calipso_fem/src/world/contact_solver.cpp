@@ -26,7 +26,7 @@ Eigen::Vector3d solveBlock(const Eigen::Matrix3d& W, const Eigen::Vector3d& velo
 }  // namespace
 
 ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRow>& rows,
-                                 int max_iterations, double tolerance) {
+                                 int max_iterations, double tolerance, double velocity_tolerance) {
   const int n = static_cast<int>(rows.size());
   Eigen::VectorXd velocity(3 * n), change(3 * n);
   for (int i = 0; i < n; ++i) {
@@ -34,26 +34,23 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
     change.segment<3>(3 * i) = rows[i].impulse - rows[i].start_impulse;
   }
   velocity.noalias() += W * change;
-  // W is approximate: a hundredth of the first sweep's change is below what it is good for.
-  constexpr double kReduction = 0.01;
-  double first_change = 0.0;
   ContactSolveReport report;
   report.converged = n == 0;
   while (!report.converged && report.iterations < max_iterations) {
-    double largest_change = 0.0, largest = 0.0;
+    double largest_change = 0.0, largest = 0.0, fastest = 0.0;
     for (int i = 0; i < n; ++i) {
-      const Eigen::Vector3d p =
-          solveBlock(W.block<3, 3>(3 * i, 3 * i), velocity.segment<3>(3 * i), rows[i]);
+      const Eigen::Matrix3d own = W.block<3, 3>(3 * i, 3 * i);
+      const Eigen::Vector3d p = solveBlock(own, velocity.segment<3>(3 * i), rows[i]);
       const Eigen::Vector3d step = p - rows[i].impulse;
       rows[i].impulse = p;
       largest_change = std::max(largest_change, step.norm());
       largest = std::max(largest, p.norm());
+      fastest = std::max(fastest, (own * step).norm());
       if (!step.isZero(0.0)) velocity.noalias() += W.middleCols<3>(3 * i) * step;
     }
     ++report.iterations;
     report.residual = largest > 0.0 ? largest_change / largest : 0.0;
-    if (report.iterations == 1) first_change = largest_change;
-    report.converged = report.residual <= tolerance || largest_change <= kReduction * first_change;
+    report.converged = report.residual <= tolerance || fastest <= velocity_tolerance;
   }
   return report;
 }

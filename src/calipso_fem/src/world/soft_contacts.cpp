@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <set>
 
-#include "contact_compliance.hpp"
+#include "contact_operator.hpp"
 #include "step_motion.hpp"
 
 namespace calipso::fem {
@@ -14,13 +15,8 @@ namespace {
 // A longer step that does not converge is given up: the report then has no bodies, nothing has
 // changed, and the caller takes two of half the length.
 constexpr double kShortestStep = 1.0 / 500.0;  // s
-constexpr int kPasses = 3;         // corrections of one direction
-constexpr double kSlow = 0.5;      // share of a violation that a good correction does not leave
-// Added to the diagonal: kept columns do not quite make a positive matrix where contacts repeat each
-// other. The corrections are exact, so that this costs iterations, not accuracy.
-constexpr double kDamping = 0.03;
-constexpr double kRenewal = 1.5;   // caution from which new columns pay
-constexpr double kMostCaution = 2.0;
+// Iterations that a renewal of a tangent costs.
+constexpr double kRenewal = 12.0;
 
 ContactRow rowOf(const Contact& c, const StepMotion& motion) {
   const double h = motion.h();
@@ -56,6 +52,19 @@ bool acceptable(const std::map<Contact::Key, Contact>& contacts, const StepMotio
   return true;
 }
 
+bool unbalanced(const StepMotion::Body& b) {
+  return !b.stuck && b.residual > b.soft->body().options().newton_tolerance;
+}
+
+// Whether the iteration with the kept tangent will take longer than with a new one.
+bool slow(const StepMotion::Body& b) {
+  if (!(b.residual_before > 0.0)) return false;
+  const double ratio = b.residual / b.residual_before;
+  if (ratio >= 1.0) return true;
+  const double left = std::log(b.soft->body().options().newton_tolerance / b.residual);
+  return left / std::log(ratio) > kRenewal;
+}
+
 // A point that came from afar is near from now on.
 Contact::Key atRest(Contact::Key key) {
   std::get<3>(key) &= 1;
@@ -64,47 +73,50 @@ Contact::Key atRest(Contact::Key key) {
 
 }  // namespace
 
-SoftContacts::SoftContacts(const ContactParams& params)
-    : params_(params), compliance_(std::make_unique<ContactCompliance>()) {}
+SoftContacts::SoftContacts(const ContactParams& params) : params_(params) {}
 SoftContacts::~SoftContacts() = default;
 
-// Drives all contacts to their laws at the bodies' targets. @return whether they are there
-bool SoftContacts::correct(const std::vector<Candidate>& watched,
-                           const std::vector<Obstacle>& obstacles,
-                           const std::vector<SoftEntry>& softs, const RigidWorld& rigid,
-                           StepMotion& motion, Contacts& contacts, Correction& correction,
-                           ContactReport& report) {
-  const double h = motion.h();
-  double last_worst = 0.0;  // before the last solve, of the same contacts
-  for (int pass = 0;; ++pass) {
-    const int added = grow(watched, obstacles, softs, motion, contacts);
-    std::vector<ContactRow> rows;
-    double worst = 0.0;
-    for (const auto& [key, c] : contacts) {
-      rows.push_back(rowOf(c, motion));
-      worst = std::max(worst, violation(rows.back(), h));
-    }
-    // What does not converge has another compliance by now.
-    const bool slow = added == 0 && last_worst > 0.0 && worst > kSlow * last_worst &&
-                      worst > params_.allowed_depth;
-    if (slow && correction.caution >= kRenewal && !std::exchange(correction.renewed, true)) {
-      for (const StepMotion::Body& b : motion.bodies())
-        if (b.touched) b.soft->forgetCompliance();
-      compliance_->forget();
-    } else if (slow) {
-      correction.caution = std::min(kMostCaution, 1.25 * correction.caution);
-    }
-    last_worst = worst;
-    const bool done = added == 0 && worst <= params_.allowed_depth;
-    if (done || rows.empty() || pass == kPasses) return done || rows.empty();
-    Eigen::MatrixXd W = correction.caution * compliance_->of(contacts, softs, rigid, h);
-    W.diagonal() *= 1.0 + kDamping;
-    report.iterations += solveContacts(W, rows, params_.iterations, params_.tolerance).iterations;
-    size_t i = 0;
-    for (auto& [key, c] : contacts)
-      c.force = contactFrame(c.normal).transpose() * rows[i++].impulse / h;
-    motion.setForces(contacts, true);
+// What pushed in the last step pushes from the start, and is a contact as long as it is near; what is
+// in the way of the present motion may become one.
+SoftContacts::Contacts SoftContacts::startingContacts(const std::vector<Candidate>& watched,
+                                                      const std::vector<Obstacle>& obstacles,
+                                                      const std::vector<SoftEntry>& softs,
+                                                      const RigidWorld& rigid,
+                                                      const StepMotion& motion) const {
+  Contacts contacts;
+  for (const Candidate& c : watched) {
+    const auto known = memory_.find(c.contact.key);
+    if (c.near && known != memory_.end() && !known->second.force.isZero(0.0))
+      contacts.emplace(c.contact.key, completed(c.contact));
   }
+  addRigidTouches(watched, rigid, contacts);
+  grow(watched, obstacles, softs, motion, contacts);
+  return contacts;
+}
+
+int SoftContacts::solve(const ContactOperator& problem, const StepMotion& motion,
+                        Contacts& contacts) const {
+  const double h = motion.h();
+  std::vector<ContactRow> rows;
+  for (const auto& [key, c] : contacts) {
+    const Eigen::Matrix3d frame = contactFrame(c.normal);
+    const Eigen::Vector3d slip = problem.freeSlip(static_cast<int>(rows.size()), motion);
+    ContactRow row;
+    row.free_velocity = frame * slip / h;
+    row.free_velocity[0] += (c.start_gap - c.offset + allowance(c, h)) / h;
+    row.impulse = h * (frame * c.force);
+    row.friction = c.friction;
+    row.held_normal = h * c.held_normal;
+    row.held_tangential = h * c.held_tangential;
+    rows.push_back(row);
+  }
+  const int sweeps = solveContacts(problem.W(), rows, params_.iterations, params_.tolerance,
+                                   0.5 * params_.allowed_depth / h)
+                         .iterations;
+  size_t i = 0;
+  for (auto& [key, c] : contacts)
+    c.force = contactFrame(c.normal).transpose() * rows[i++].impulse / h;
+  return sweeps;
 }
 
 ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
@@ -113,36 +125,36 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
   ContactReport report;
   const std::vector<Candidate> watched = candidates(softs, obstacles, rigid, h);
   StepMotion motion(softs, obstacles, rigid, h);
-  // What pushed in the last step pushes from the start, and is a contact as long as it is near.
-  Contacts contacts;
-  for (const Candidate& c : watched) {
-    const auto known = memory_.find(c.contact.key);
-    if (c.near && known != memory_.end() && !known->second.force.isZero(0.0))
-      contacts.emplace(c.contact.key, completed(c.contact));
-  }
-  addRigidTouches(watched, rigid, contacts);
-  motion.setForces(contacts, false);
-  Correction correction;
-  bool open = true;  // some contact is off its law
-  while (true) {
-    bool moving = false;
-    for (StepMotion::Body& b : motion.bodies()) {
-      const FemOptions& options = b.soft->body().options();
-      const int most = options.linearised ? 1 : options.newton_iterations;
-      const bool first = report.newton_iterations == 0;
-      const bool unbalanced = report.newton_iterations < most && !b.stuck &&
-                              b.residual > options.newton_tolerance;
-      const bool unsettled =
-          report.newton_iterations < params_.newton_iterations && open && b.touched;
-      if (!first && !unbalanced && !unsettled) continue;
-      moving = true;
-      motion.aim(b);
-    }
-    if (!moving) break;
+  Contacts contacts = startingContacts(watched, obstacles, softs, rigid, motion);
+  ContactOperator problem;
+  std::vector<int> renewals(softs.size(), 0);
+  bool open = true;  // something is off its law
+  while (open && report.newton_iterations < params_.newton_iterations) {
     ++report.newton_iterations;
-    open = !correct(watched, obstacles, softs, rigid, motion, contacts, correction, report);
+    motion.touch(contacts);
+    for (StepMotion::Body& b : motion.bodies())
+      if (b.touched || report.newton_iterations == 1 || unbalanced(b)) motion.aim(b);
+    if (!contacts.empty()) {
+      problem.update(contacts, motion, softs, rigid);
+      report.iterations += solve(problem, motion, contacts);
+      motion.follow(contacts);
+    }
+    const int added = grow(watched, obstacles, softs, motion, contacts);
     motion.advance();
+    open = added > 0;
+    for (const auto& [key, c] : contacts)
+      open = open || violation(rowOf(c, motion), h) > params_.allowed_depth;
+    for (size_t i = 0; i < softs.size(); ++i) {
+      const StepMotion::Body& b = motion.bodies()[i];
+      if (!unbalanced(b)) continue;
+      open = true;
+      if (b.touched && added == 0 && renewals[i] < 2 && slow(b)) {
+        motion.renew(static_cast<int>(i), contacts);
+        ++renewals[i];
+      }
+    }
   }
+  report.renewals = std::accumulate(renewals.begin(), renewals.end(), 0);
   for (const auto& [key, c] : contacts) {
     report.deepest = std::max(report.deepest, c.offset - motion.gap(c));
     report.contacts += c.soft_a >= 0 && !c.force.isZero(0.0);

@@ -3,6 +3,8 @@
 #include <Eigen/SVD>
 #include <algorithm>
 
+#include "soft_system.hpp"
+
 namespace calipso::fem {
 namespace {
 
@@ -22,24 +24,21 @@ int largestWeight(const Embedding& embedding, int vertex) {
   return node;
 }
 
-// Contact asks for many answers of one system, exact ones, and for its factor besides.
-FemOptions withFactor(FemOptions options) {
-  if (options.solver == SolverKind::kAutomatic) options.solver = SolverKind::kCholesky;
-  return options;
-}
-
 }  // namespace
 
 SoftObject::SoftObject(const TriangleMesh& surface, const Material& material,
                        const FemOptions& options)
-    : body_(surface, material, withFactor(options)),
+    : body_(surface, material, options),
       forces_(Vec::Zero(3 * surface.vertexCount())),
       observed_(body_.positions()),
-      surface_(surface) {
+      surface_(surface),
+      system_(std::make_unique<SoftSystem>()) {
   for (int i = 0; i < surface.vertexCount(); ++i)
     carrier_.push_back(largestWeight(body_.embedding(), i));
   changed();
 }
+
+SoftObject::~SoftObject() = default;
 
 void SoftObject::changed() {
   vertices_ = asRows(body_.surfaceVertices());
@@ -181,57 +180,7 @@ void SoftObject::setMomentum(const Momentum& target) {
   body_.setState(x, v);
 }
 
-void SoftObject::forgetCompliance() {
-  columns_.clear();
-  blocks_.clear();
-  frozen_rotation_.reset();
-}
-
-const SoftObject::Column& SoftObject::columnOf(int vertex, double h) {
-  const auto found = columns_.find(vertex);
-  if (found != columns_.end()) return found->second;
-  if (!frozen_rotation_) {
-    body_.freezeCompliance(h);
-    frozen_rotation_ = rotation_;
-  }
-  Column column;
-  for (int k = 0; k < 3; ++k) {
-    const Vec w = body_.frozenColumn(SurfacePoint::vertex(vertex), frozen_rotation_->col(k));
-    column[k] = Eigen::Map<const NodeMatrix>(w.data(), w.size() / 3, 3) * *frozen_rotation_;
-  }
-  return columns_.emplace(vertex, std::move(column)).first->second;
-}
-
-// J_at A^-1 J_from^T in the body's axes; symmetric in the pair, so that one column serves both.
-const Eigen::Matrix3d& SoftObject::block(int at, int from, double h) {
-  const auto found = blocks_.find({at, from});
-  if (found != blocks_.end()) return found->second;
-  const bool turned = columns_.count(from) == 0 && columns_.count(at) > 0;
-  const Column& column = columnOf(turned ? at : from, h);
-  Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
-  for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(body_.embedding().weights,
-                                                                      turned ? from : at);
-       it; ++it)
-    for (int k = 0; k < 3; ++k) C.col(k) += it.value() * column[k].row(it.col()).transpose();
-  if (turned) C.transposeInPlace();
-  if (at == from) C = 0.5 * (C + C.transpose()).eval();
-  if (at != from) blocks_[{from, at}] = C.transpose();
-  return blocks_[{at, from}] = C;
-}
-
-Eigen::Matrix3d SoftObject::compliance(const SurfacePoint& at, const SurfacePoint& from, double h) {
-  if (h != column_step_) {
-    forgetCompliance();
-    column_step_ = h;
-  }
-  Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b) {
-      const double weight = at.weights[a] * from.weights[b];
-      if (weight != 0.0) C += weight * block(at.vertices[a], from.vertices[b], h);
-    }
-  return rotation_ * C * rotation_.transpose();
-}
+void SoftObject::forgetSystem() { system_->forget(); }
 
 Eigen::Vector3d SoftObject::gather(const Vec& nodal, const SurfacePoint& point) const {
   const Eigen::SparseVector<double> weights = body_.embedding().pointWeights(point);

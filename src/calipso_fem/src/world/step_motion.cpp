@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "contact_operator.hpp"
+#include "soft_system.hpp"
+
 namespace calipso::fem {
 namespace {
 
@@ -34,31 +37,66 @@ StepMotion::StepMotion(const std::vector<SoftEntry>& softs, const std::vector<Ob
     b.start = b.soft->vertices();
     b.target = b.soft->body().trialPositions();
     b.forces.setZero(b.target.size());
-    b.moved.setZero(b.start.rows(), 3);
+    const Vec s = h * b.soft->body().surfaceVelocities();  // until there is a target
+    b.moved = Eigen::Map<const Vertices>(s.data(), s.size() / 3, 3);
+    b.moved.rowwise() += h * h * b.soft->gravity().transpose();
     bodies_.push_back(std::move(b));
   }
   for (const Obstacle& o : obstacles)
     if (o.rigid) rigids_[*o.rigid].acceleration = o.acceleration;
 }
 
-void StepMotion::follow(Body& body) {
+void StepMotion::measure(Body& body) {
   const Vec s = body.soft->body().embedding().apply(body.target);
   body.moved = Eigen::Map<const Vertices>(s.data(), s.size() / 3, 3) - body.start;
 }
 
-void StepMotion::aim(Body& body) {
-  DeformableBody& fem = body.soft->body();
-  body.target = fem.trialPositions() + fem.trialDirection(body.forces);
-  follow(body);
+void StepMotion::touch(const std::map<Contact::Key, Contact>& contacts) {
+  for (const auto& [key, c] : contacts)
+    for (const int soft : {c.soft_a, c.soft_b})
+      if (soft >= 0) bodies_[soft].touched = true;
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    Body& b = bodies_[i];
+    if (!b.touched) continue;
+    SoftSystem& system = b.soft->system();
+    const std::vector<int> nodes = ContactOperator::nodesOf(static_cast<int>(i), contacts, *b.soft);
+    const bool jumps = !b.soft->body().trialJump().isZero(0.0);
+    if (jumps || !system.serves(nodes, h_))
+      system.renew(b.soft->body(), b.soft->rotation(), nodes, h_);
+    else
+      system.turnTo(b.soft->rotation(), b.soft->hasFixedNodes());
+  }
 }
 
-void StepMotion::setForces(const std::map<Contact::Key, Contact>& contacts, bool targets_follow) {
+void StepMotion::renew(int soft, const std::map<Contact::Key, Contact>& contacts) {
+  Body& b = bodies_[soft];
+  b.soft->system().renew(b.soft->body(), b.soft->rotation(),
+                         ContactOperator::nodesOf(soft, contacts, *b.soft), h_);
+}
+
+void StepMotion::aim(Body& body) {
+  DeformableBody& fem = body.soft->body();
+  if (!body.touched) {
+    body.target = fem.trialPositions() + fem.trialDirection(body.forces);
+    measure(body);
+    return;
+  }
+  SoftSystem& system = body.soft->system();
+  Vec b = fem.trialDescent();
+  const Vec jump = fem.trialJump();
+  if (!jump.isZero(0.0)) b += system.pull();
+  body.free_way = system.reduce(b);
+  const Vec so_far = fem.trialPositions() - fem.positions() + jump;
+  for (int node = 0; node < fem.nodeCount(); ++node)
+    if (const int k = system.indexOf(node); k >= 0)
+      body.free_way.segment<3>(3 * k) += so_far.segment<3>(3 * node);
+}
+
+void StepMotion::setForces(const std::map<Contact::Key, Contact>& contacts) {
   std::vector<Vec> surface;
   for (const Body& b : bodies_) surface.push_back(Vec::Zero(3 * b.start.rows()));
   for (auto& [id, r] : rigids_) r.linear.setZero(), r.angular.setZero();
   for (const auto& [key, c] : contacts) {
-    if (c.soft_a >= 0) bodies_[c.soft_a].touched = true;
-    if (c.soft_b >= 0) bodies_[c.soft_b].touched = true;
     if (c.force.isZero(0.0)) continue;
     if (c.soft_a >= 0) addForce(surface[c.soft_a], c.point, c.force);
     if (c.soft_b >= 0) addForce(surface[c.soft_b], c.other, -c.force);
@@ -70,19 +108,22 @@ void StepMotion::setForces(const std::map<Contact::Key, Contact>& contacts, bool
       r.angular += angular;
     }
   }
-  for (size_t i = 0; i < bodies_.size(); ++i) {
-    Body& b = bodies_[i];
+  for (size_t i = 0; i < bodies_.size(); ++i)
+    if (bodies_[i].touched)
+      bodies_[i].forces = bodies_[i].soft->body().embedding().applyTransposed(surface[i]);
+}
+
+void StepMotion::follow(const std::map<Contact::Key, Contact>& contacts) {
+  setForces(contacts);
+  for (Body& b : bodies_) {
     if (!b.touched) continue;
-    const Vec forces = b.soft->body().embedding().applyTransposed(surface[i]);
-    if (targets_follow && forces != b.forces) {
-      b.target += b.soft->body().trialResponse(forces - b.forces);
-      follow(b);
-    }
-    b.forces = forces;
+    DeformableBody& fem = b.soft->body();
+    b.target = fem.trialPositions() + fem.trialJump() + b.soft->system().complete(b.forces);
+    measure(b);
   }
 }
 
-void StepMotion::advance() {
+double StepMotion::advance() {
   double share = 1.0;
   for (const Body& b : bodies_)
     if (b.touched)
@@ -92,12 +133,14 @@ void StepMotion::advance() {
     const double t = b.touched ? share : fem.trialStepLength(b.target, b.forces);
     if (t != 1.0) b.target = (1.0 - t) * fem.trialPositions() + t * b.target;
     fem.moveTrial(b.target);
-    if (t != 1.0) follow(b);
-    const double before = b.residual;
+    if (t != 1.0) measure(b);
+    b.residual_before = b.residual;
     b.residual = fem.trialResidual(b.forces);
     // Where hardly any force acts, rounding is all that is left of the residual.
-    b.stuck = t == 0.0 || (!b.touched && before > 0.0 && b.residual > 0.5 * before);
+    b.stuck = t == 0.0 ||
+              (!b.touched && b.residual_before > 0.0 && b.residual > 0.5 * b.residual_before);
   }
+  return share;
 }
 
 Eigen::Vector3d StepMotion::way(int soft, const SurfacePoint& point) const {
@@ -114,6 +157,14 @@ Eigen::Vector3d StepMotion::rigidWay(RigidWorld::Id id, const Eigen::Vector3d& p
   const Eigen::Vector3d spin = rigid_.angularVelocity(id) + r.angular;
   return h_ * (rigid_.linearVelocity(id) + h_ * r.acceleration + r.linear +
                spin.cross(place - rigid_.center(id)));
+}
+
+Eigen::Vector3d StepMotion::freeRigidWay(RigidWorld::Id id, const Eigen::Vector3d& place) const {
+  const auto found = rigids_.find(id);
+  const Eigen::Vector3d acceleration =
+      found == rigids_.end() ? Eigen::Vector3d(0, 0, 0) : found->second.acceleration;
+  return h_ * (rigid_.linearVelocity(id) + h_ * acceleration +
+               rigid_.angularVelocity(id).cross(place - rigid_.center(id)));
 }
 
 Eigen::Vector3d StepMotion::slip(const Contact& c) const {

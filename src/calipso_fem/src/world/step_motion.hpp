@@ -20,9 +20,10 @@ class StepMotion {
     SoftObject* soft = nullptr;
     Vec target;                             // 3n, m
     Vec forces;                             // of contacts, 3n, N
+    Vec free_way;                           // of the contact nodes without contact forces, m
     decltype(TriangleMesh::vertices) start, moved;  // surface at the start; its way to the target
     bool touched = false;                   // has contacts
-    double residual = 0.0;
+    double residual = 0.0, residual_before = 0.0;
     bool stuck = false;                     // the potential falls no more
   };
 
@@ -33,15 +34,20 @@ class StepMotion {
   const std::vector<Body>& bodies() const { return bodies_; }
   double h() const { return h_; }
 
-  // Newton's direction of a body under the present forces becomes its target.
+  // Bodies that contacts act on get a system whose contact nodes are among those it is condensed to.
+  void touch(const std::map<Contact::Key, Contact>& contacts);
+  // Without contacts, Newton's direction becomes the target; with them, its part without their forces.
   void aim(Body& body);
-  // The forces of the contacts act from now on; targets follow by A^-1.
-  void setForces(const std::map<Contact::Key, Contact>& contacts, bool targets_follow);
-  // Moves towards the targets as far as the potentials fall, all touching bodies alike.
-  void advance();
+  // The forces of the contacts act from now on, and touched bodies get their targets.
+  void follow(const std::map<Contact::Key, Contact>& contacts);
+  // Moves towards the targets as far as the potentials fall, all touching bodies alike. @return how far
+  double advance();
+  // The body's system becomes that of where it is now.
+  void renew(int soft, const std::map<Contact::Key, Contact>& contacts);
 
   Eigen::Vector3d way(int soft, const SurfacePoint& point) const;  // m, to the target
   Eigen::Vector3d rigidWay(RigidWorld::Id id, const Eigen::Vector3d& place) const;  // m
+  Eigen::Vector3d freeRigidWay(RigidWorld::Id id, const Eigen::Vector3d& place) const;
   Eigen::Vector3d slip(const Contact& c) const;                    // d_a - d_b, m
   double gap(const Contact& c) const { return c.start_gap + c.normal.dot(slip(c)); }
   // What must not become negative.
@@ -56,7 +62,8 @@ class StepMotion {
     Eigen::Vector3d linear = Eigen::Vector3d::Zero(), angular = Eigen::Vector3d::Zero();  // gained
   };
   std::vector<bool> grounded(const std::map<Contact::Key, Contact>& contacts) const;
-  void follow(Body& body);
+  void measure(Body& body);
+  void setForces(const std::map<Contact::Key, Contact>& contacts);
 
   RigidWorld& rigid_;
   double h_;

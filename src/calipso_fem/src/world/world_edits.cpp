@@ -169,7 +169,7 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   actor.material = material;
   if (actor.soft) {
     actor.soft->body().setMaterial(material);
-    actor.soft->forgetCompliance();
+    actor.soft->forgetSystem();
   }
   if (actor.kind == ObjectKind::kRigid)
     rigid.setMass(*actor.body, massProperties(actor.object.mesh, material.density));

@@ -69,7 +69,7 @@ void World::Impl::lead(Actor& actor, Pull& pull) {
         return from[axis] + pull.way(share(t), arm)[axis];
       });
   }
-  actor.soft->forgetCompliance();
+  actor.soft->forgetSystem();
 }
 
 std::string World::Impl::fix(Actor& actor, const Edit& edit) {
@@ -79,7 +79,7 @@ std::string World::Impl::fix(Actor& actor, const Edit& edit) {
     throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
                                 "; only a deformable object has regions to fix (edit 'kind')");
   actor.soft->body().fixSurfaceVertices(vertices);
-  actor.soft->forgetCompliance();
+  actor.soft->forgetSystem();
   actor.fixed.push_back(vertices);
   return actor.object.name + " is held at " + std::to_string(vertices.size()) + " vertices";
 }
@@ -110,7 +110,7 @@ std::string World::Impl::release(Actor& actor, const Edit& edit) {
                                 actor.object.name);
   if (actor.soft) {
     for (const auto& region : actor.fixed) actor.soft->body().fixSurfaceVertices(region);
-    actor.soft->forgetCompliance();
+    actor.soft->forgetSystem();
   }
   return std::to_string(released) + " region(s) of " + actor.object.name + " are let go";
 }

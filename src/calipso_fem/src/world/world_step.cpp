@@ -146,7 +146,7 @@ void World::Impl::endPulls(double at) {
       if (!pull.over(at) || !actor.soft) continue;
       for (const int node : pull.nodes) actor.soft->body().releaseNode(node);
       for (const auto& region : actor.fixed) actor.soft->body().fixSurfaceVertices(region);
-      actor.soft->forgetCompliance();
+      actor.soft->forgetSystem();
     }
     const auto over = [&](const Pull& pull) { return pull.over(at); };
     actor.pulls.erase(std::remove_if(actor.pulls.begin(), actor.pulls.end(), over),

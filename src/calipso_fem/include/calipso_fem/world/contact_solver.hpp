@@ -30,9 +30,12 @@ struct ContactSolveReport {
   bool converged = false;
 };
 
+// Ends when the impulses change by less than `tolerance` (relative), or no relative velocity by more than
+// velocity_tolerance (m/s).
 // @pre W is symmetric, positive semi-definite, with positive diagonal blocks
 ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRow>& rows,
-                                 int max_iterations, double tolerance);
+                                 int max_iterations, double tolerance,
+                                 double velocity_tolerance = 0.0);
 
 // Right-handed orthonormal frame as rows: normal, then two tangents.
 Eigen::Matrix3d contactFrame(const Eigen::Vector3d& normal);

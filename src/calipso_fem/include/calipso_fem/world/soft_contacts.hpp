@@ -42,14 +42,15 @@ struct ContactParams {
   double proximity = 5e-3;  // m, surfaces closer than this are watched
   int iterations = 60;      // Gauss-Seidel sweeps per solve
   double tolerance = 1e-4;  // relative change of the impulses that ends the sweeps
-  int newton_iterations = 12;
+  int newton_iterations = 30;
   double allowed_depth = 1e-5;  // m, remaining violation that ends a step's iteration
 };
 
 struct ContactReport {
   int contacts = 0;
   int iterations = 0;         // Gauss-Seidel sweeps of the step
-  int newton_iterations = 0;  // of the body that needed most
+  int newton_iterations = 0;
+  int renewals = 0;           // of kept tangents
   double deepest = 0.0;       // m, where the step ended
   bool converged = true;
   std::vector<StepReport> bodies;  // as the softs
@@ -76,15 +77,16 @@ struct Contact {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();    // on a, N
 };
 
-class ContactCompliance;
+class ContactOperator;
 class StepMotion;
 
 // Steps deformable objects together with their contacts: backward Euler with the conditions
 //   0 <= gap(x_end)  _|_  f_n >= 0,   |f_t| <= mu f_n opposite to the slip over the step.
-// Newton on the incremental potentials of all bodies; each direction is corrected by block
-// Gauss-Seidel with the compliance H A^-1 H^T of the bodies (Saupin et al. 2008), so that the forces
-// are those of the same implicit step as the elasticity. Gaps are measured at the start of the step
-// and taken along; a point that is further away becomes a contact when its way crosses a surface.
+// Newton on the incremental potentials of all bodies with kept tangents. Each direction solves the
+// contacts' laws by block Gauss-Seidel with the compliance H A^-1 H^T (Saupin et al. 2008) of the
+// same tangents, so that it obeys them however old these are; a tangent is renewed when the
+// iteration would take longer than that. Gaps are measured at the start of the step and taken
+// along; a point that is further away becomes a contact when its way crosses a surface.
 class SoftContacts {
  public:
   explicit SoftContacts(const ContactParams& params);
@@ -124,12 +126,6 @@ class SoftContacts {
     bool near = false;  // within the minimal distance at the start
   };
 
-  // What a step has learned about the compliances it iterates with.
-  struct Correction {
-    double caution = 1.0;   // factor on them; larger: shorter corrections
-    bool renewed = false;   // they are those of the bodies as they are now
-  };
-
   using Neighbourhood = std::tuple<int, int, int, int>;
   Neighbourhood neighbourhoodOf(const Contact& c, const std::vector<SoftEntry>& softs) const;
 
@@ -152,9 +148,12 @@ class SoftContacts {
                                   const StepMotion& motion) const;
   Contact completed(Contact contact) const;  // with what is remembered of its key
 
-  bool correct(const std::vector<Candidate>& watched, const std::vector<Obstacle>& obstacles,
-               const std::vector<SoftEntry>& softs, const RigidWorld& rigid, StepMotion& motion,
-               Contacts& contacts, Correction& correction, ContactReport& report);
+  Contacts startingContacts(const std::vector<Candidate>& watched,
+                            const std::vector<Obstacle>& obstacles,
+                            const std::vector<SoftEntry>& softs, const RigidWorld& rigid,
+                            const StepMotion& motion) const;
+  // Contact forces of the direction that the bodies have aimed at. @return sweeps
+  int solve(const ContactOperator& problem, const StepMotion& motion, Contacts& contacts) const;
   void addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
                        Contacts& contacts) const;
   void remember(const Contacts& contacts, const StepMotion& motion);
@@ -165,7 +164,6 @@ class SoftContacts {
   std::map<Key, Memory> memory_;
   std::map<std::pair<int, int>, PairRule> rules_;
   std::vector<ContactPoint> contacts_;
-  std::unique_ptr<ContactCompliance> compliance_;
 };
 
 }  // namespace calipso::fem

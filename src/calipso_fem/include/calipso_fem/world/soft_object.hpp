@@ -27,13 +27,16 @@ struct SettleReport {
   std::string message;  // empty unless something has to be said
 };
 
+class SoftSystem;
+
 // A deformable object in the simulated world: the FEM body and what the world needs around it:
-// loads added up from several sources, its rigid motion, the surface for contacts, cached
-// compliances.
+// loads added up from several sources, its rigid motion, the surface for contacts, the system contacts
+// are solved with.
 class SoftObject {
  public:
   // surface: world frame, as observed.
   SoftObject(const TriangleMesh& surface, const Material& material, const FemOptions& options);
+  ~SoftObject();
 
   DeformableBody& body() { return body_; }
   const DeformableBody& body() const { return body_; }
@@ -55,10 +58,10 @@ class SoftObject {
   void setGravity(const Eigen::Vector3d& gravity);
   void addForce(const SurfacePoint& point, const Eigen::Vector3d& force);  // N, for the next step
 
-  // Approximate change of the velocity at `at` per impulse at `from`, from cached columns of A^-1
-  // turned with the body (Saupin et al. 2008). m/s per N s.
-  Eigen::Matrix3d compliance(const SurfacePoint& at, const SurfacePoint& from, double h);
-  void forgetCompliance();
+  // The system that contact iterates with; forgotten when the body's own has changed for good.
+  SoftSystem& system() { return *system_; }
+  void forgetSystem();
+  const Eigen::Matrix3d& rotation() const { return rotation_; }  // of motion()
 
   // The node with the largest weight at a surface vertex: contacts are thinned to one per such
   // node.
@@ -76,10 +79,6 @@ class SoftObject {
   void changed();  // the state was set from outside
 
  private:
-  using Column = std::array<NodeMatrix, 3>;  // #N x 3 each: answer to unit impulses along x, y, z
-
-  const Column& columnOf(int vertex, double h);
-  const Eigen::Matrix3d& block(int at, int from, double h);
   void setMomentum(const Momentum& target);
   Eigen::Vector3d gather(const Vec& nodal, const SurfacePoint& point) const;
 
@@ -95,11 +94,7 @@ class SoftObject {
   std::unique_ptr<SurfaceTree> tree_;
   bool tree_stale_ = true;
   TriangleMesh surface_;
-  // Columns of A^-1 and its blocks between surface vertices, in the body's own axes.
-  std::map<int, Column> columns_;
-  std::map<std::pair<int, int>, Eigen::Matrix3d> blocks_;
-  std::optional<Eigen::Matrix3d> frozen_rotation_;  // of the body whose system the columns answer
-  double column_step_ = 0.0;
+  std::unique_ptr<SoftSystem> system_;
   Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();  // of motion(), renewed by changed()
 };
 
