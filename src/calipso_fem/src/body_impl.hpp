@@ -70,6 +70,7 @@ struct DeformableBody::Impl {
   Vec viscosity_at;                      // damping acts as D(viscosity_at) v
   BlockMatrix viscosity;
   bool viscosity_valid = false;          // viscosity is D(viscosity_at)
+  Vec viscous_velocity, viscous_forces;  // of the last applyViscosity(); empty: none
   bool system_valid = false;             // the solver holds the last step's system
   bool matrix_free = false;              // ... and it is hex_solver
 

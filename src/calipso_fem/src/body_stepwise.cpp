@@ -107,11 +107,11 @@ Vec DeformableBody::trialJump() const {
 
 // NOTE: the viscous part has the tangent at the trial positions instead of the step's start: good
 // enough to iterate with, and half the work.
-void DeformableBody::trialSystem(BlockMatrix* A, Vec* pull) {
+void DeformableBody::trialSystem(Definiteness definiteness, BlockMatrix* A, Vec* pull) {
   Impl& m = *impl_;
   const Impl::Trial& t = m.runningTrial();
   const Integrator& i = t.integrator;
-  m.model->hessian(t.y, Definiteness::kPositive, *A);
+  m.model->hessian(t.y, definiteness, *A);
   for (double& value : A->values) value *= 1.0 + i.rate * m.damping();
   const double inertia = i.inertia + i.rate * m.options.mass_damping;
   if (m.mass) {

@@ -169,6 +169,7 @@ void DeformableBody::Impl::prepareElastic(const Vec& y) const {
 void DeformableBody::Impl::setViscosity(const Vec& y) {
   viscosity_at = y;
   viscosity_valid = false;
+  viscous_velocity.resize(0);
 }
 
 const BlockMatrix& DeformableBody::Impl::assembledViscosity() {
@@ -180,14 +181,15 @@ const BlockMatrix& DeformableBody::Impl::assembledViscosity() {
 }
 
 Vec DeformableBody::Impl::applyViscosity(const Vec& w) {
-  Vec Dw;
+  if (viscous_velocity.size() == w.size() && viscous_velocity == w) return viscous_forces;
   if (model->hexes() && !viscosity_valid) {
-    model->hexes()->multiplyMaterial(viscosity_at, w, &elastic_scratch, &Dw);
-    Dw *= damping();
+    model->hexes()->multiplyMaterial(viscosity_at, w, &elastic_scratch, &viscous_forces);
+    viscous_forces *= damping();
   } else {
-    assembledViscosity().multiply(w, Dw);
+    assembledViscosity().multiply(w, viscous_forces);
   }
-  return Dw;
+  viscous_velocity = w;
+  return viscous_forces;
 }
 
 double DeformableBody::Impl::potential(const Vec& y, const Integrator& i, const Vec& loads) {

@@ -1,12 +1,29 @@
 #include "calipso_fem/condensed_factor.hpp"
 
-#include <Eigen/Cholesky>
 #include <cholmod.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <stdexcept>
+#include <string>
+
+// LAPACK: inverse of A from its Cholesky factor, lower triangle.
+extern "C" void dpotri_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 
 namespace calipso::fem {
+namespace {
+
+// CHOLMOD asks OpenMP for more threads than there are processors; its small supernodes lose by any.
+class OneThread {
+ public:
+  OneThread() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+  ~OneThread() { omp_set_max_active_levels(levels_); }
+
+ private:
+  int levels_;
+};
+
+}  // namespace
 
 struct CondensedFactor::Impl {
   cholmod_common common{};
@@ -153,6 +170,7 @@ bool CondensedFactor::update(const BlockMatrix& A, const std::vector<int>& nodes
   }
   m.fill(A);
   m.compliance.resize(0, 0);
+  const OneThread serial;
   cholmod_factorize(m.matrix, m.factor, &m.common);
   if (m.common.status != CHOLMOD_OK || m.factor->minor != m.factor->n) return false;
   m.readLast();
@@ -168,9 +186,12 @@ int CondensedFactor::indexOf(int node) const {
 const Eigen::MatrixXd& CondensedFactor::compliance() {
   Impl& m = *impl_;
   if (m.compliance.size() > 0 || m.last.size() == 0) return m.compliance;
-  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(m.last.rows(), m.last.cols());
-  m.last.triangularView<Eigen::Lower>().solveInPlace(inverse);
-  m.compliance.noalias() = inverse.transpose() * inverse;
+  m.compliance = m.last;
+  const int n = static_cast<int>(m.last.rows());
+  int info = 0;
+  dpotri_("L", &n, m.compliance.data(), &n, &info);
+  if (info != 0) throw std::runtime_error("LAPACK: dpotri failed (" + std::to_string(info) + ")");
+  m.compliance.triangularView<Eigen::StrictlyUpper>() = m.compliance.transpose();
   return m.compliance;
 }
 
@@ -187,8 +208,9 @@ Vec CondensedFactor::reduce(const Vec& b) {
 
 Vec CondensedFactor::complete(const Vec& forces) {
   Impl& m = *impl_;
-  m.reduced.tail(m.last.rows()) += m.last.triangularView<Eigen::Lower>().solve(forces);
-  const auto x = m.solve(CHOLMOD_Lt, m.reduced);
+  Vec z = m.reduced;
+  z.tail(m.last.rows()) += m.last.triangularView<Eigen::Lower>().solve(forces);
+  const auto x = m.solve(CHOLMOD_Lt, z);
   const auto* permutation = static_cast<const int*>(m.factor->Perm);
   Vec result(x.size());
   for (Eigen::Index k = 0; k < x.size(); ++k) result[permutation[k]] = x[k];

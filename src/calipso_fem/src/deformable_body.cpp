@@ -81,6 +81,7 @@ void DeformableBody::Impl::modelChanged() {
   chooseSolver();
   elastic.y.resize(0);
   viscosity_valid = false;
+  viscous_velocity.resize(0);
   invalidateSystem();
 }
 

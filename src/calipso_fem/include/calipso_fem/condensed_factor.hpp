@@ -27,7 +27,7 @@ class CondensedFactor {
   const Eigen::MatrixXd& compliance();
   // (A^-1 b)_c, 3m; b (3n) is kept for complete().
   Vec reduce(const Vec& b);
-  // A^-1 (b + forces at the chosen nodes), forces: 3m. Once per reduce().
+  // A^-1 (b + forces at the chosen nodes), forces: 3m, b as of the last reduce().
   Vec complete(const Vec& forces);
 
  private:

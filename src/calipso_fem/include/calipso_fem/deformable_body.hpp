@@ -130,9 +130,9 @@ class DeformableBody {
   StepReport endStep(const Vec& contact_forces);   // the trial becomes the state
   // For who iterates with a system of his own: -gradient without contact, zero where prescribed; ...
   Vec trialDescent();
-  // ... A at the trial positions, positive definite, prescribed components eliminated. `pull` is what
-  // the way of these to their targets asks of the others: A d = trialDescent() + pull + forces.
-  void trialSystem(BlockMatrix* A, Vec* pull);
+  // ... A at the trial positions, prescribed components eliminated. `pull` is what the way of these to
+  // their targets asks of the others: A d = trialDescent() + pull + forces.
+  void trialSystem(Definiteness definiteness, BlockMatrix* A, Vec* pull);
   Vec trialJump() const;   // that way, 3n; zero at all other components
 
   // Results

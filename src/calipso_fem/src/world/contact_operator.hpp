@@ -15,6 +15,7 @@ class ContactOperator {
   // Takes over the contacts, which may have become more since the last call, and the systems of the bodies.
   void update(const std::map<Contact::Key, Contact>& contacts, const StepMotion& motion,
               const std::vector<SoftEntry>& softs, const RigidWorld& rigid);
+  void forget() { versions_.clear(); }  // contacts have changed
   const Eigen::MatrixXd& W() const { return W_; }
   // d_a - d_b over the step under all forces but those of contacts, m.
   Eigen::Vector3d freeSlip(int contact, const StepMotion& motion) const;

@@ -34,6 +34,9 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
     change.segment<3>(3 * i) = rows[i].impulse - rows[i].start_impulse;
   }
   velocity.noalias() += W * change;
+  // While the first sweep changes a lot, the bodies are far from their end, and so is the problem.
+  constexpr double kReduction = 0.02;
+  double first = 0.0;
   ContactSolveReport report;
   report.converged = n == 0;
   while (!report.converged && report.iterations < max_iterations) {
@@ -50,7 +53,9 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
     }
     ++report.iterations;
     report.residual = largest > 0.0 ? largest_change / largest : 0.0;
-    report.converged = report.residual <= tolerance || fastest <= velocity_tolerance;
+    if (report.iterations == 1 && velocity_tolerance > 0.0) first = fastest;
+    report.converged = report.residual <= tolerance || fastest <= velocity_tolerance ||
+                       fastest <= kReduction * first;
   }
   return report;
 }

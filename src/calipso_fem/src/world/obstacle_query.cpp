@@ -1,6 +1,7 @@
 #include "obstacle_query.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace calipso::fem {
 namespace {
@@ -41,6 +42,20 @@ Eigen::AlignedBox3d obstacleBounds(const Obstacle& obstacle) {
       box.extend(*pose *
                  obstacle.tree->bounds().corner(static_cast<Eigen::AlignedBox3d::CornerType>(c)));
   return box;
+}
+
+// Sum of the triangles' solid angles (Van Oosterom and Strackee 1983).
+bool encloses(const TriangleMesh& surface, const Eigen::Vector3d& point) {
+  double sum = 0.0;
+  for (int f = 0; f < surface.triangles.rows(); ++f) {
+    const Eigen::Vector3d a = surface.vertex(surface.triangles(f, 0)) - point,
+                          b = surface.vertex(surface.triangles(f, 1)) - point,
+                          c = surface.vertex(surface.triangles(f, 2)) - point;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    sum += 2.0 * std::atan2(a.dot(b.cross(c)),
+                            la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return sum > 2.0 * M_PI;
 }
 
 }  // namespace calipso::fem

@@ -22,4 +22,8 @@ std::optional<ObstacleHit> queryObstacle(const Obstacle& obstacle, const Eigen::
 // Box around everything the obstacle may touch; empty for planes, which are everywhere.
 Eigen::AlignedBox3d obstacleBounds(const Obstacle& obstacle);
 
+// Whether a point is inside of a closed surface, by its winding number: holds where the surface folds, and where
+// the nearest point's normal says nothing.
+bool encloses(const TriangleMesh& surface, const Eigen::Vector3d& point);
+
 }  // namespace calipso::fem

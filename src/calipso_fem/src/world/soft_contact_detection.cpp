@@ -60,6 +60,13 @@ ObstacleHit toWorld(const SurfaceHit& hit, const SurfaceTree& tree, const Eigen:
   return h;
 }
 
+// Where a deformable surface is folded or inside out, points outside may seem to be deep inside.
+bool misjudged(const ObstacleHit& hit, const SurfaceTree& tree, const Eigen::Vector3d& x,
+               double reach) {
+  constexpr double kShallow = 0.1;  // minimal distances
+  return hit.gap < -kShallow * reach && !encloses(tree.mesh(), x);
+}
+
 // Fastest approach of the two in this step, m: bounds how far away a contact can come from.
 double travelOf(const SoftObject& soft, const Obstacle& obstacle, const RigidWorld& rigid,
                 double h) {
@@ -178,7 +185,7 @@ void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
     const Eigen::Vector3d x = vertices.row(v).transpose();
     if (!everywhere && !others.contains(x)) continue;
     const auto hit = queryObstacle(obstacle, x, watch, size);
-    if (!hit) continue;
+    if (!hit || (obstacle.soft && misjudged(*hit, *obstacle.tree, x, reach))) continue;
     watchVertex(contactAt({entry.id, obstacle.id, v, kNearest}, soft, index, obstacle, soft_b,
                           SurfacePoint::vertex(v), *hit),
                 false, v);
@@ -192,7 +199,7 @@ void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
     const Eigen::Vector3d x = obstacle.previous_pose * Eigen::Vector3d(theirs.row(v).transpose());
     if (!own.contains(x)) continue;
     const auto hit = queryObstacle(self, x, watch, size);
-    if (!hit) continue;
+    if (!hit || misjudged(*hit, *self.tree, x, reach)) continue;
     const ObstacleHit turned{hit->gap, -hit->normal, x, SurfacePoint::vertex(v)};
     watchVertex(contactAt({entry.id, obstacle.id, v, kNearestReversed}, soft, index, obstacle,
                           soft_b, hit->other, turned),

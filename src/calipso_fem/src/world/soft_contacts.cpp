@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include "anderson.hpp"
 #include "contact_operator.hpp"
 #include "step_motion.hpp"
 
@@ -14,9 +15,15 @@ namespace {
 
 // A longer step that does not converge is given up: the report then has no bodies, nothing has
 // changed, and the caller takes two of half the length.
-constexpr double kShortestStep = 1.0 / 500.0;  // s
+constexpr double kShortestStep = 1.0 / 100.0;       // s, for forces that do not balance,
+constexpr double kShortestHeldStep = 1.0 / 500.0;   // s, for surfaces that are not held apart,
+constexpr double kShortestFastStep = 1.0 / 1000.0;  // s, for objects too fast for their size
 // Iterations that a renewal of a tangent costs.
-constexpr double kRenewal = 12.0;
+constexpr double kRenewal = 20.0;
+constexpr int kMending = 8;         // more iterations while a contact is violated
+constexpr double kViolated = 0.02;  // minimal distances
+constexpr int kStraightenings = 3;  // of the gaps of a step
+constexpr double kFar = 3.0;  // of the wanted residual: from here on the iteration is accelerated
 
 ContactRow rowOf(const Contact& c, const StepMotion& motion) {
   const double h = motion.h();
@@ -41,28 +48,37 @@ double violation(const ContactRow& row, double h) {
   return h * std::max(normal, sticks ? row.free_velocity.tail<2>().norm() : 0.0);
 }
 
-// Whether a step may be kept, be it not solved to the last digit.
-bool acceptable(const std::map<Contact::Key, Contact>& contacts, const StepMotion& motion) {
-  constexpr double kResidual = 100.0;  // tolerances of Newton's iteration
-  constexpr double kOff = 0.04;        // minimal distances
-  for (const StepMotion::Body& b : motion.bodies())
-    if (b.touched && !(b.residual <= kResidual * b.soft->body().options().newton_tolerance)) return false;
-  for (const auto& [key, c] : contacts)
-    if (c.soft_a >= 0 && !(violation(rowOf(c, motion), motion.h()) <= kOff * c.reach)) return false;
-  return true;
-}
-
-bool unbalanced(const StepMotion::Body& b) {
-  return !b.stuck && b.residual > b.soft->body().options().newton_tolerance;
-}
-
 // Whether the iteration with the kept tangent will take longer than with a new one.
-bool slow(const StepMotion::Body& b) {
+bool slow(const StepMotion::Body& b, double wanted) {
   if (!(b.residual_before > 0.0)) return false;
   const double ratio = b.residual / b.residual_before;
-  if (ratio >= 1.0) return true;
-  const double left = std::log(b.soft->body().options().newton_tolerance / b.residual);
-  return left / std::log(ratio) > kRenewal;
+  return ratio >= 1.0 || std::log(wanted / b.residual) / std::log(ratio) > kRenewal;
+}
+
+Vec forcesOf(const std::map<Contact::Key, Contact>& contacts) {
+  Vec forces(3 * contacts.size());
+  Eigen::Index at = 0;
+  for (const auto& [key, c] : contacts) forces.segment<3>(3 * at++) = c.force;
+  return forces;
+}
+
+void setForces(std::map<Contact::Key, Contact>& contacts, const Vec& forces) {
+  Eigen::Index at = 0;
+  for (auto& [key, c] : contacts) c.force = forces.segment<3>(3 * at++);
+}
+
+// Moves the bodies to where the last directions together point, if that is better than where they are.
+// Contacts obey their laws only nearly there, so that the last iterations of a step do without.
+bool accelerate(Anderson& anderson, StepMotion& motion,
+                std::map<Contact::Key, Contact>& contacts) {
+  const Vec plain = forcesOf(contacts);
+  const auto next = anderson.next(motion.positions(), motion.targets(), plain);
+  if (!next) return false;
+  setForces(contacts, next->second);
+  if (motion.tryTargets(next->first, contacts)) return true;
+  setForces(contacts, plain);
+  motion.follow(contacts);
+  return false;
 }
 
 // A point that came from afar is near from now on.
@@ -75,6 +91,36 @@ Contact::Key atRest(Contact::Key key) {
 
 SoftContacts::SoftContacts(const ContactParams& params) : params_(params) {}
 SoftContacts::~SoftContacts() = default;
+
+// Whether a step may be kept, be it not solved to the last digit.
+bool SoftContacts::acceptable(const Contacts& contacts, const StepMotion& motion) const {
+  constexpr double kResidual = 10.0;  // of what is wanted
+  constexpr double kOff = 0.04;       // minimal distances
+  for (const StepMotion::Body& b : motion.bodies())
+    if (motion.h() > kShortestStep && b.touched && !(b.residual <= kResidual * params_.residual))
+      return false;
+  if (motion.h() <= kShortestHeldStep) return true;
+  for (const auto& [key, c] : contacts)
+    if (c.soft_a >= 0 && !(-motion.clearance(c) <= kOff * c.reach)) return false;
+  return true;
+}
+
+bool SoftContacts::unbalanced(const StepMotion& motion, size_t soft) const {
+  const StepMotion::Body& b = motion.bodies()[soft];
+  const double wanted =
+      b.touched ? params_.residual : b.soft->body().options().newton_tolerance;
+  return !b.stuck && b.residual > wanted;
+}
+
+// Whether an object with something in its way would go further than its own size.
+bool SoftContacts::tooFast(const std::vector<Candidate>& watched,
+                           const std::vector<SoftEntry>& softs, double h) const {
+  return std::any_of(watched.begin(), watched.end(), [&](const Candidate& c) {
+    const SoftObject& soft = *softs[c.contact.soft_a].soft;
+    const auto extent = soft.vertices().colwise().maxCoeff() - soft.vertices().colwise().minCoeff();
+    return h * soft.fastest() > extent.norm();
+  });
+}
 
 // What pushed in the last step pushes from the start, and is a contact as long as it is near; what is
 // in the way of the present motion may become one.
@@ -103,7 +149,7 @@ int SoftContacts::solve(const ContactOperator& problem, const StepMotion& motion
     const Eigen::Vector3d slip = problem.freeSlip(static_cast<int>(rows.size()), motion);
     ContactRow row;
     row.free_velocity = frame * slip / h;
-    row.free_velocity[0] += (c.start_gap - c.offset + allowance(c, h)) / h;
+    row.free_velocity[0] += (c.start_gap + c.slack - c.offset + allowance(c, h)) / h;
     row.impulse = h * (frame * c.force);
     row.friction = c.friction;
     row.held_normal = h * c.held_normal;
@@ -123,44 +169,80 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
                                  const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
                                  double h) {
   ContactReport report;
+ 
   const std::vector<Candidate> watched = candidates(softs, obstacles, rigid, h);
+  if (h > kShortestFastStep && tooFast(watched, softs, h)) return report;
   StepMotion motion(softs, obstacles, rigid, h);
   Contacts contacts = startingContacts(watched, obstacles, softs, rigid, motion);
+  // A pair that does not touch must not change a bit of what is computed.
+  std::set<std::pair<int, int>> touching;
+  for (const auto& [key, c] : contacts) touching.emplace(std::get<0>(key), std::get<1>(key));
+  Contacts expected;
+  for (const Candidate& c : watched)
+    if (c.near && motion.clearance(c.contact) < c.contact.reach &&
+        touching.count({std::get<0>(c.contact.key), std::get<1>(c.contact.key)}))
+      expected.emplace(c.contact.key, c.contact);
+  motion.expect(expected);
+ 
   ContactOperator problem;
-  std::vector<int> renewals(softs.size(), 0);
-  bool open = true;  // something is off its law
-  while (open && report.newton_iterations < params_.newton_iterations) {
+  Anderson anderson;
+  std::vector<char> renewed(softs.size(), 0);
+  int undisturbed = 0;  // iterations with the same contacts and systems
+  int straightened = 0;
+  bool open = true;     // something is off its law
+  bool violated = false;  // ... that must not stay so
+  const int most = params_.newton_iterations;
+  while (open && report.newton_iterations < (violated ? most + kMending : most)) {
     ++report.newton_iterations;
     motion.touch(contacts);
-    for (StepMotion::Body& b : motion.bodies())
-      if (b.touched || report.newton_iterations == 1 || unbalanced(b)) motion.aim(b);
+    for (size_t i = 0; i < softs.size(); ++i)
+      if (motion.bodies()[i].touched || report.newton_iterations == 1 || unbalanced(motion, i))
+        motion.aim(motion.bodies()[i]);
+   
     if (!contacts.empty()) {
       problem.update(contacts, motion, softs, rigid);
       report.iterations += solve(problem, motion, contacts);
       motion.follow(contacts);
     }
     const int added = grow(watched, obstacles, softs, motion, contacts);
-    motion.advance();
+    motion.advanceFree();
+    undisturbed = added > 0 ? 0 : undisturbed + 1;
+    if (undisturbed == 0) anderson.reset();
+    const bool far = std::any_of(motion.bodies().begin(), motion.bodies().end(), [&](const auto& b) {
+      return b.touched && b.residual > kFar * params_.residual;
+    });
+    if (undisturbed == 0 || !far || !accelerate(anderson, motion, contacts))
+      motion.advanceTouched();
+   
     open = added > 0;
     for (const auto& [key, c] : contacts)
       open = open || violation(rowOf(c, motion), h) > params_.allowed_depth;
     for (size_t i = 0; i < softs.size(); ++i) {
-      const StepMotion::Body& b = motion.bodies()[i];
-      if (!unbalanced(b)) continue;
+      if (!unbalanced(motion, i)) continue;
       open = true;
-      if (b.touched && added == 0 && renewals[i] < 2 && slow(b)) {
-        motion.renew(static_cast<int>(i), contacts);
-        ++renewals[i];
-      }
+      const StepMotion::Body& b = motion.bodies()[i];
+      if (!b.touched || undisturbed < 3 || renewed[i] || !slow(b, params_.residual)) continue;
+      motion.renew(static_cast<int>(i), contacts);
+      renewed[i] = 1;
+      undisturbed = 0;
+      anderson.reset();
     }
+    const bool late = 2 * report.newton_iterations == most;
+    if ((open && !late) || straightened == kStraightenings) continue;
+    ++straightened;
+    if (straighten(watched, obstacles, softs, motion, contacts) == 0) continue;
+    open = true;
+    problem.forget();
+    undisturbed = 0;
+    anderson.reset();
   }
-  report.renewals = std::accumulate(renewals.begin(), renewals.end(), 0);
+  report.renewals = std::accumulate(renewed.begin(), renewed.end(), 0);
   for (const auto& [key, c] : contacts) {
     report.deepest = std::max(report.deepest, c.offset - motion.gap(c));
     report.contacts += c.soft_a >= 0 && !c.force.isZero(0.0);
   }
   report.converged = !open;
-  if (h > kShortestStep && !acceptable(contacts, motion)) return report;
+  if (!acceptable(contacts, motion)) return report;
   remember(contacts, motion);
   publish(contacts, motion, softs, obstacles);
   report.bodies = motion.finish(contacts);

@@ -21,7 +21,6 @@ bool SoftSystem::serves(const std::vector<int>& nodes, double h) const {
 
 void SoftSystem::renew(DeformableBody& body, const Eigen::Matrix3d& rotation,
                        const std::vector<int>& nodes, double h) {
-  body.trialSystem(&A_, &pull_);
   // Nodes of before stay as long as they are not most of the work: contacts come and go.
   std::vector<int> all = nodes;
   const std::vector<int>& before = factor_.nodes();
@@ -31,7 +30,11 @@ void SoftSystem::renew(DeformableBody& body, const Eigen::Matrix3d& rotation,
     std::set_union(before.begin(), before.end(), nodes.begin(), nodes.end(), std::back_inserter(all));
     if (contained) all = before;
   }
-  valid_ = factor_.update(A_, all);
+  for (const Definiteness definiteness : {Definiteness::kExact, Definiteness::kPositive}) {
+    body.trialSystem(definiteness, &A_, &pull_);
+    valid_ = factor_.update(A_, all);
+    if (valid_) break;
+  }
   if (!valid_) throw std::runtime_error("contact: the body's system is not positive definite");
   held_.clear();
   compliance_.resize(0, 0);

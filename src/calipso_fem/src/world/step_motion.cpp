@@ -1,6 +1,8 @@
 #include "step_motion.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "contact_operator.hpp"
 #include "soft_system.hpp"
@@ -62,16 +64,25 @@ void StepMotion::touch(const std::map<Contact::Key, Contact>& contacts) {
     const std::vector<int> nodes = ContactOperator::nodesOf(static_cast<int>(i), contacts, *b.soft);
     const bool jumps = !b.soft->body().trialJump().isZero(0.0);
     if (jumps || !system.serves(nodes, h_))
-      system.renew(b.soft->body(), b.soft->rotation(), nodes, h_);
+      renew(static_cast<int>(i), contacts);
     else
       system.turnTo(b.soft->rotation(), b.soft->hasFixedNodes());
   }
 }
 
+void StepMotion::expect(const std::map<Contact::Key, Contact>& contacts) {
+  for (size_t i = 0; i < bodies_.size(); ++i)
+    bodies_[i].expected =
+        ContactOperator::nodesOf(static_cast<int>(i), contacts, *bodies_[i].soft);
+}
+
 void StepMotion::renew(int soft, const std::map<Contact::Key, Contact>& contacts) {
   Body& b = bodies_[soft];
-  b.soft->system().renew(b.soft->body(), b.soft->rotation(),
-                         ContactOperator::nodesOf(soft, contacts, *b.soft), h_);
+  const std::vector<int> own = ContactOperator::nodesOf(soft, contacts, *b.soft);
+  std::vector<int> nodes;
+  std::set_union(own.begin(), own.end(), b.expected.begin(), b.expected.end(),
+                 std::back_inserter(nodes));
+  b.soft->system().renew(b.soft->body(), b.soft->rotation(), nodes, h_);
 }
 
 void StepMotion::aim(Body& body) {
@@ -123,24 +134,91 @@ void StepMotion::follow(const std::map<Contact::Key, Contact>& contacts) {
   }
 }
 
-double StepMotion::advance() {
-  double share = 1.0;
-  for (const Body& b : bodies_)
-    if (b.touched)
-      share = std::min(share, b.soft->body().trialStepLength(b.target, b.forces));
+void StepMotion::advanceFree() {
   for (Body& b : bodies_) {
+    if (b.touched) continue;
     DeformableBody& fem = b.soft->body();
-    const double t = b.touched ? share : fem.trialStepLength(b.target, b.forces);
+    const double t = fem.trialStepLength(b.target, b.forces);
     if (t != 1.0) b.target = (1.0 - t) * fem.trialPositions() + t * b.target;
     fem.moveTrial(b.target);
     if (t != 1.0) measure(b);
     b.residual_before = b.residual;
     b.residual = fem.trialResidual(b.forces);
     // Where hardly any force acts, rounding is all that is left of the residual.
-    b.stuck = t == 0.0 ||
-              (!b.touched && b.residual_before > 0.0 && b.residual > 0.5 * b.residual_before);
+    b.stuck = t == 0.0 || (b.residual_before > 0.0 && b.residual > 0.5 * b.residual_before);
   }
-  return share;
+}
+
+void StepMotion::advanceTouched() {
+  double share = 1.0;
+  for (const Body& b : bodies_)
+    if (b.touched) share = std::min(share, b.soft->body().trialStepLength(b.target, b.forces));
+  for (Body& b : bodies_) {
+    if (!b.touched) continue;
+    DeformableBody& fem = b.soft->body();
+    if (share != 1.0) b.target = (1.0 - share) * fem.trialPositions() + share * b.target;
+    fem.moveTrial(b.target);
+    if (share != 1.0) measure(b);
+    b.residual_before = b.residual;
+    b.residual = fem.trialResidual(b.forces);
+    b.stuck = share == 0.0;
+  }
+}
+
+Vec StepMotion::positions() const {
+  Vec all;
+  for (const Body& b : bodies_) {
+    if (!b.touched) continue;
+    const Vec& x = b.soft->body().trialPositions();
+    all.conservativeResize(all.size() + x.size());
+    all.tail(x.size()) = x;
+  }
+  return all;
+}
+
+Vec StepMotion::targets() const {
+  Vec all;
+  for (const Body& b : bodies_) {
+    if (!b.touched) continue;
+    all.conservativeResize(all.size() + b.target.size());
+    all.tail(b.target.size()) = b.target;
+  }
+  return all;
+}
+
+void StepMotion::setTargets(const Vec& targets) {
+  Eigen::Index at = 0;
+  for (Body& b : bodies_) {
+    if (!b.touched) continue;
+    b.target = targets.segment(at, b.target.size());
+    at += b.target.size();
+    measure(b);
+  }
+}
+
+bool StepMotion::tryTargets(const Vec& targets, const std::map<Contact::Key, Contact>& contacts) {
+  const Vec from = positions(), plain = this->targets();
+  setForces(contacts);
+  setTargets(targets);
+  double before = 0.0, after = 0.0;
+  std::vector<double> residuals;
+  for (Body& b : bodies_) {
+    if (!b.touched) continue;
+    b.soft->body().moveTrial(b.target);
+    residuals.push_back(b.soft->body().trialResidual(b.forces));
+    before = std::max(before, b.residual);
+    after = std::max(after, residuals.back());
+  }
+  const bool better = after < before;
+  size_t i = 0;
+  if (!better) setTargets(from);
+  for (Body& b : bodies_) {
+    if (!b.touched) continue;
+    if (!better) b.soft->body().moveTrial(b.target);
+    if (better) b.residual_before = std::exchange(b.residual, residuals[i++]);
+  }
+  if (!better) setTargets(plain);
+  return better;
 }
 
 Eigen::Vector3d StepMotion::way(int soft, const SurfacePoint& point) const {

@@ -22,6 +22,7 @@ class StepMotion {
     Vec forces;                             // of contacts, 3n, N
     Vec free_way;                           // of the contact nodes without contact forces, m
     decltype(TriangleMesh::vertices) start, moved;  // surface at the start; its way to the target
+    std::vector<int> expected;              // nodes that may get contacts, ascending
     bool touched = false;                   // has contacts
     double residual = 0.0, residual_before = 0.0;
     bool stuck = false;                     // the potential falls no more
@@ -34,14 +35,23 @@ class StepMotion {
   const std::vector<Body>& bodies() const { return bodies_; }
   double h() const { return h_; }
 
+  // Contacts that may come: their nodes are taken along when a system is made.
+  void expect(const std::map<Contact::Key, Contact>& contacts);
   // Bodies that contacts act on get a system whose contact nodes are among those it is condensed to.
   void touch(const std::map<Contact::Key, Contact>& contacts);
   // Without contacts, Newton's direction becomes the target; with them, its part without their forces.
   void aim(Body& body);
   // The forces of the contacts act from now on, and touched bodies get their targets.
   void follow(const std::map<Contact::Key, Contact>& contacts);
-  // Moves towards the targets as far as the potentials fall, all touching bodies alike. @return how far
-  double advance();
+  // Moves towards the targets as far as the potentials fall: bodies without contacts each by itself,
+  void advanceFree();
+  // those with contacts all alike.
+  void advanceTouched();
+  // Positions and targets of the bodies with contacts, one after the other, m.
+  Vec positions() const;
+  Vec targets() const;
+  // Moves them to `targets` under the contacts' forces if that makes the largest residual smaller.
+  bool tryTargets(const Vec& targets, const std::map<Contact::Key, Contact>& contacts);
   // The body's system becomes that of where it is now.
   void renew(int soft, const std::map<Contact::Key, Contact>& contacts);
 
@@ -49,7 +59,7 @@ class StepMotion {
   Eigen::Vector3d rigidWay(RigidWorld::Id id, const Eigen::Vector3d& place) const;  // m
   Eigen::Vector3d freeRigidWay(RigidWorld::Id id, const Eigen::Vector3d& place) const;
   Eigen::Vector3d slip(const Contact& c) const;                    // d_a - d_b, m
-  double gap(const Contact& c) const { return c.start_gap + c.normal.dot(slip(c)); }
+  double gap(const Contact& c) const { return c.start_gap + c.slack + c.normal.dot(slip(c)); }
   // What must not become negative.
   double clearance(const Contact& c) const { return gap(c) - c.offset + allowance(c, h_); }
 
@@ -63,6 +73,7 @@ class StepMotion {
   };
   std::vector<bool> grounded(const std::map<Contact::Key, Contact>& contacts) const;
   void measure(Body& body);
+  void setTargets(const Vec& targets);
   void setForces(const std::map<Contact::Key, Contact>& contacts);
 
   RigidWorld& rigid_;

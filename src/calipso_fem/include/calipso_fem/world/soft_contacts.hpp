@@ -43,7 +43,8 @@ struct ContactParams {
   int iterations = 60;      // Gauss-Seidel sweeps per solve
   double tolerance = 1e-4;  // relative change of the impulses that ends the sweeps
   int newton_iterations = 30;
-  double allowed_depth = 1e-5;  // m, remaining violation that ends a step's iteration
+  double allowed_depth = 1e-5;  // m, remaining violation that ends a step's iteration,
+  double residual = 1e-3;       // with this of bodies in contact, over their forces
 };
 
 struct ContactReport {
@@ -57,7 +58,7 @@ struct ContactReport {
 };
 
 // A contact of a step: the gap between a surface point of a deformable object (a) and a point of
-// what it meets (b), linear in their motion, gap = start_gap + normal . (d_a - d_b).
+// what it meets (b), linear in their motion, gap = start_gap + slack + normal . (d_a - d_b).
 struct Contact {
   // (deformable, obstacle, vertex, how it was found): one vertex may touch two sides of a corner.
   using Key = std::tuple<int, int, int, int>;
@@ -70,6 +71,7 @@ struct Contact {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // from b to a
   Eigen::Vector3d motion = Eigen::Vector3d::Zero();   // d_b where b is moved by nobody's force, m
   double start_gap = 0.0;                             // m
+  double slack = 0.0;  // what the linear gap was wrong by where the step ends, m
   double reach = 0.0;                                 // m, minimal distance of the pair
   double friction = 0.0;
   double offset = 0.0;                                // gap at which the surfaces touch, m
@@ -77,6 +79,7 @@ struct Contact {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();    // on a, N
 };
 
+class Anderson;
 class ContactOperator;
 class StepMotion;
 
@@ -85,8 +88,9 @@ class StepMotion;
 // Newton on the incremental potentials of all bodies with kept tangents. Each direction solves the
 // contacts' laws by block Gauss-Seidel with the compliance H A^-1 H^T (Saupin et al. 2008) of the
 // same tangents, so that it obeys them however old these are; a tangent is renewed when the
-// iteration would take longer than that. Gaps are measured at the start of the step and taken
-// along; a point that is further away becomes a contact when its way crosses a surface.
+// iteration would take longer than that. Gaps are measured at the start of the step and taken along, and
+// measured again where the step ends; a point that is further away becomes a contact when its way
+// crosses a surface.
 class SoftContacts {
  public:
   explicit SoftContacts(const ContactParams& params);
@@ -146,6 +150,10 @@ class SoftContacts {
   std::optional<Contact> crossing(const Candidate& c, const std::vector<Obstacle>& obstacles,
                                   const std::vector<SoftEntry>& softs,
                                   const StepMotion& motion) const;
+  // Gaps and normals become those at the targets (soft_contact_geometry.cpp). @return how many were off
+  int straighten(const std::vector<Candidate>& watched, const std::vector<Obstacle>& obstacles,
+                 const std::vector<SoftEntry>& softs, const StepMotion& motion,
+                 Contacts& contacts) const;
   Contact completed(Contact contact) const;  // with what is remembered of its key
 
   Contacts startingContacts(const std::vector<Candidate>& watched,
@@ -154,6 +162,10 @@ class SoftContacts {
                             const StepMotion& motion) const;
   // Contact forces of the direction that the bodies have aimed at. @return sweeps
   int solve(const ContactOperator& problem, const StepMotion& motion, Contacts& contacts) const;
+  bool tooFast(const std::vector<Candidate>& watched, const std::vector<SoftEntry>& softs,
+               double h) const;
+  bool unbalanced(const StepMotion& motion, size_t soft) const;
+  bool acceptable(const Contacts& contacts, const StepMotion& motion) const;
   void addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
                        Contacts& contacts) const;
   void remember(const Contacts& contacts, const StepMotion& motion);
