@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
 namespace calipso::flow {
@@ -110,9 +111,16 @@ void ClipAnalyser::add(const Frame& frame) {
   if (cut) cut_times_.push_back(0.5 * (times_.back() + frame.time));
   recent_.push_back(frame);
   if (recent_.size() > kRecentFrames) recent_.pop_front();
-  for (Followed& object : objects_) follow(frame, cut, object);
+  forEachObject([&](size_t i) { follow(frame, cut, objects_[i]); });
   times_.push_back(frame.time);
   last_ = frame;
+}
+
+// Objects do not know of each other: however many threads, the result is the same.
+void ClipAnalyser::forEachObject(const std::function<void(size_t)>& work) const {
+  cv::parallel_for_({0, static_cast<int>(objects_.size())}, [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) work(i);
+  });
 }
 
 void ClipAnalyser::follow(const Frame& frame, bool cut, Followed& object) const {
@@ -152,8 +160,8 @@ void ClipAnalyser::beginDeformable(Followed& object) const {
 }
 
 std::vector<ObjectDynamics> ClipAnalyser::finish() const {
-  std::vector<ObjectDynamics> result;
-  for (const Followed& object : objects_) result.push_back(finishObject(object));
+  std::vector<ObjectDynamics> result(objects_.size());
+  forEachObject([&](size_t i) { result[i] = finishObject(objects_[i]); });
   return result;
 }
 

@@ -100,13 +100,20 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
   const auto points = DeformationFitter::displaced(points_, point_weights_, controls);
   const Eigen::Isometry3d camera_from_object =
       frame.camera.world_from_camera.inverse() * model_.world_from_object;
+  std::vector<int> visible;
+  std::vector<Eigen::Vector2d> pixels;
   for (int i = 0; i < points.rows(); ++i) {
     const Eigen::Vector3d p = camera_from_object * points.row(i).transpose();
     if (p.z() <= 0.0) continue;
-    const Eigen::Vector2d at = frame.camera.project(p);
-    const auto there = matchPoint(pictures, at, params_);
-    if (!there) continue;
-    matches.push_back({points_.row(i).transpose(), there->position, there->covariance});
+    visible.push_back(i);
+    pixels.push_back(frame.camera.project(p));
+  }
+  const LookMatch::Matches found = LookMatch::forEach(
+      pixels, [&](const Eigen::Vector2d& at) { return matchPoint(pictures, at, params_); });
+  for (size_t i = 0; i < visible.size(); ++i) {
+    if (!found[i]) continue;
+    matches.push_back(
+        {points_.row(visible[i]).transpose(), found[i]->position, found[i]->covariance});
   }
   if (care == Care::kRough) return matches;
   const auto outline = matchOutline(edges_, model_.mesh, surface, look, frame, model_.world_from_object);

@@ -1,5 +1,6 @@
 #include "calipso_flow/frame.hpp"
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
@@ -8,6 +9,15 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kPrefilterSigma = 0.7;  // px
+constexpr int kThumbnailWidth = 64;      // px
+
+cv::Mat thumbnailOf(const cv::Mat& gray) {
+  cv::Mat small;
+  const int height = std::max(1, gray.rows * kThumbnailWidth / gray.cols);
+  cv::resize(gray, small, {kThumbnailWidth, height}, 0, 0, cv::INTER_AREA);
+  small.convertTo(small, CV_32F);
+  return small;
+}
 
 void checkPicture(const cv::Mat& picture, const Camera& camera) {
   if (picture.empty()) throw std::invalid_argument("frame: the picture is empty");
@@ -29,7 +39,7 @@ Frame makeFrame(double time, const cv::Mat& picture, const Camera& camera) {
   checkPicture(picture, camera);
   cv::Mat gray = picture;
   if (picture.channels() == 3) cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
-  Frame frame{time, {}, camera};
+  Frame frame{time, {}, camera, thumbnailOf(gray)};
   gray.convertTo(frame.gray, CV_32F);
   cv::GaussianBlur(frame.gray, frame.gray, {5, 5}, kPrefilterSigma, kPrefilterSigma,
                    cv::BORDER_REPLICATE);

@@ -1,11 +1,13 @@
 #include "calipso_flow/look_match.hpp"
 
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace calipso::flow {
 namespace {
 
 constexpr int kSurrounding = 16;  // px of the frame around the object's window; even
+constexpr double kStripes = 8;    // in which points are shared out
 
 ImageWindow halved(const ImageWindow& window) {
   ImageWindow half{{}, 0.5 * window.origin};
@@ -41,6 +43,15 @@ std::optional<PatchMatch> LookMatch::find(const Eigen::Vector2d& at,
   match->position /= scale_;
   match->covariance /= scale_ * scale_;
   return match;
+}
+
+LookMatch::Matches LookMatch::forEach(const std::vector<Eigen::Vector2d>& points,
+                                      const Search& search) {
+  Matches matches(points.size());
+  cv::parallel_for_({0, static_cast<int>(points.size())}, [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) matches[i] = search(points[i]);
+  }, kStripes);
+  return matches;
 }
 
 std::optional<Eigen::Vector2d> LookMatch::missOnReturn(const Eigen::Vector2d& at,

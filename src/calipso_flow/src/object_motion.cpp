@@ -2,20 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 
 namespace calipso::flow {
 namespace {
 
 constexpr double kCrossingTime = 0.1;  // s; see priorFor
-constexpr int kThumbnailWidth = 64;    // px; cuts are seen in small pictures
-
-cv::Mat thumbnail(const cv::Mat& picture) {
-  cv::Mat small;
-  const int height = std::max(1, picture.rows * kThumbnailWidth / std::max(1, picture.cols));
-  cv::resize(picture, small, {kThumbnailWidth, height}, 0, 0, cv::INTER_AREA);
-  return small;
-}
 
 }  // namespace
 
@@ -32,7 +24,7 @@ ObjectMotion motionFrom(const MotionState& state, const Eigen::Vector3d& centroi
 
 bool isCut(const Frame& previous, const Frame& next, double least_correlation) {
   cv::Scalar mean_a, mean_b, deviation_a, deviation_b;
-  const cv::Mat a = thumbnail(previous.gray), b = thumbnail(next.gray);
+  const cv::Mat &a = previous.thumbnail, &b = next.thumbnail;
   cv::meanStdDev(a, mean_a, deviation_a);
   cv::meanStdDev(b, mean_b, deviation_b);
   const double spread = deviation_a[0] * deviation_b[0];

@@ -42,16 +42,23 @@ std::optional<PatchMatch> matchSeed(const LookMatch& match, const Eigen::Vector2
 std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& reference,
                                const Camera& camera, const Eigen::Isometry3d& pose,
                                const TrackerParams& params, std::vector<Correspondence>& found) {
-  std::vector<Track> tracks;
   const Eigen::Isometry3d camera_from_object = camera.world_from_camera.inverse() * pose;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> pixels;
   for (const Eigen::Vector3d& seed : reference.seeds()) {
     const Eigen::Vector3d p_camera = camera_from_object * seed;
     if (p_camera.z() <= 0.0) continue;
-    const Eigen::Vector2d at = camera.project(p_camera);
-    const auto there = matchSeed(match, at, params);
+    points.push_back(seed);
+    pixels.push_back(camera.project(p_camera));
+  }
+  const LookMatch::Matches matches = LookMatch::forEach(
+      pixels, [&](const Eigen::Vector2d& at) { return matchSeed(match, at, params); });
+  std::vector<Track> tracks;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const auto& there = matches[i];
     if (!there) continue;
-    found.push_back({seed, there->position, there->covariance});
-    tracks.push_back({seed, there->position, there->correlation, false});
+    found.push_back({points[i], there->position, there->covariance});
+    tracks.push_back({points[i], there->position, there->correlation, false});
   }
   return tracks;
 }

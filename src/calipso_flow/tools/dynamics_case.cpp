@@ -1,6 +1,7 @@
 #include "dynamics_case.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -8,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "calipso_flow/clip_dynamics.hpp"
@@ -21,15 +23,39 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-double cpuMilliseconds() { return 1e3 * std::clock() / CLOCKS_PER_SEC; }
+// Wall and processor time, ms.
+struct Cost {
+  double wall = 0.0, cpu = 0.0;
+};
 
-cv::Mat readFrame(const Scene& scene, int k) {
+Cost now() {
+  const std::chrono::duration<double, std::milli> wall =
+      std::chrono::steady_clock::now().time_since_epoch();
+  return {wall.count(), 1e3 * std::clock() / CLOCKS_PER_SEC};
+}
+
+void add(const Cost& since, int frames, Cost& cost) {
+  const Cost end = now();
+  cost.wall += (end.wall - since.wall) / frames;
+  cost.cpu += (end.cpu - since.cpu) / frames;
+}
+
+cv::Mat readFrame(const Scene& scene, int k, int scale) {
   char name[512];
   std::snprintf(name, sizeof name, scene.frame_pattern.c_str(), k);
   const std::string path = scene.directory + "/" + name;
-  const cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
+  cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
   if (picture.empty()) throw std::runtime_error(path + " is no picture that can be read");
+  if (scale > 1) cv::resize(picture, picture, {}, scale, scale, cv::INTER_CUBIC);
   return picture;
+}
+
+// The camera of a picture whose pixels were each divided into scale x scale.
+Camera enlarged(Camera camera, int scale) {
+  camera.width *= scale, camera.height *= scale;
+  camera.fx *= scale, camera.fy *= scale;
+  camera.cx = scale * (camera.cx + 0.5) - 0.5, camera.cy = scale * (camera.cy + 0.5) - 0.5;
+  return camera;
 }
 
 Camera cameraOf(const Scene& scene, int k) {
@@ -38,6 +64,8 @@ Camera cameraOf(const Scene& scene, int k) {
   if (!poses.empty()) camera.world_from_camera = poses.at(k);
   return camera;
 }
+
+constexpr double kPlacementOff = 0.05;
 
 double meanDepth(const TriangleMesh& mesh, const Eigen::Isometry3d& camera_from_object) {
   double sum = 0.0;
@@ -53,6 +81,9 @@ ObjectModel heldAtDepth(const SceneObject& object, const Camera& camera, ObjectM
                                 camera_from_world * object.initial_world_from_object);
   const double factor = held / meanDepth(model.mesh, camera_from_world * model.world_from_object);
   const Eigen::Vector3d eye = camera.world_from_camera.translation();
+  const Eigen::Vector3d sight = model.world_from_object.translation() - eye;
+  // A rough placement is off by 5 % of the distance in any direction.
+  model.position_covariance = kPlacementOff * kPlacementOff / 3.0 * sight * sight.transpose();
   model.mesh.vertices *= factor;
   model.world_from_object.translation() =
       eye + factor * (model.world_from_object.translation() - eye);
@@ -212,13 +243,13 @@ void writeTrace(const std::string& folder, const Scene& scene, const TrueObject&
   }
 }
 
-// CPU time per frame for all objects together, ms.
-struct Cost {
-  double track, fit;
+// Per frame, for all objects together.
+struct Costs {
+  Cost track, fit;
 };
 
 std::string describe(const Scene& scene, const ObjectModel& model, const TrueObject& truth,
-                     const ObjectDynamics& dynamics, const Cost& cost) {
+                     const ObjectDynamics& dynamics, const Costs& costs) {
   const MotionErrors errors = motionErrors(scene, truth, dynamics);
   const Trajectory& trajectory = dynamics.trajectory;
   const bool moving = std::any_of(dynamics.motions.begin(), dynamics.motions.end(),
@@ -240,45 +271,51 @@ std::string describe(const Scene& scene, const ObjectModel& model, const TrueObj
   entry.number("covered_95", errors.covered);
   const bool still = truth.velocity.empty() && truth.vertices.empty();
   if (still) entry.flag("below_uncertainty", errors.below_uncertainty);
-  entry.number("track_ms_frame", cost.track).number("fit_ms_frame", cost.fit);
-  return entry.number("ms_frame", cost.track + cost.fit).str();
+  entry.number("width", scene.camera.width);
+  entry.number("track_ms_frame", costs.track.wall).number("fit_ms_frame", costs.fit.wall);
+  entry.number("cpu_ms_frame", costs.track.cpu + costs.fit.cpu);
+  return entry.number("ms_frame", costs.track.wall + costs.fit.wall).str();
 }
 
 }  // namespace
 
-std::vector<std::string> evaluateScene(const std::string& directory, const std::string& models,
-                                       const std::string& trace) {
-  const Scene scene = loadScene(directory);
+std::vector<std::string> evaluateScene(const std::string& directory, const DynamicsOptions& options) {
+  Scene scene = loadScene(directory);
   std::vector<ObjectModel> object_models;
   std::vector<cv::Mat> masks;
   std::vector<TrueObject> truths;
+  const int scale = options.scale;
   for (const SceneObject& object : scene.objects) {
     const std::optional<TrueObject> truth = readTruth(directory, object.name);
     if (!truth) continue;
-    object_models.push_back(modelOf(scene, object, *truth, models));
+    object_models.push_back(modelOf(scene, object, *truth, options.models));
     object_models.back().attached = verticesIn(object.attachments, object_models.back());
     masks.push_back(truth->mask_path.empty() ? cv::Mat()
                                              : cv::imread(truth->mask_path, cv::IMREAD_GRAYSCALE));
+    if (!masks.back().empty()) {
+      cv::resize(masks.back(), masks.back(), {}, scale, scale, cv::INTER_NEAREST);
+    }
     truths.push_back(*truth);
   }
   if (truths.empty()) throw std::runtime_error(directory + " holds no truth to compare with");
+  scene.camera = enlarged(scene.camera, scale);
 
-  ClipAnalyser analyser(makeFrame(0.0, readFrame(scene, 0), cameraOf(scene, 0)), object_models,
-                        masks, scene.gravity);
-  Cost cost{0.0, 0.0};
+  ClipAnalyser analyser(makeFrame(0.0, readFrame(scene, 0, scale), cameraOf(scene, 0)),
+                        object_models, masks, scene.gravity);
+  Costs costs;
   for (int k = 1; k < scene.frame_count; ++k) {
-    const cv::Mat picture = readFrame(scene, k);
-    const double start = cpuMilliseconds();
+    const cv::Mat picture = readFrame(scene, k, scale);
+    const Cost start = now();
     analyser.add(makeFrame(k / scene.fps, picture, cameraOf(scene, k)));
-    cost.track += (cpuMilliseconds() - start) / scene.frame_count;
+    add(start, scene.frame_count, costs.track);
   }
-  const double start = cpuMilliseconds();
+  const Cost start = now();
   const std::vector<ObjectDynamics> dynamics = analyser.finish();
-  cost.fit = (cpuMilliseconds() - start) / scene.frame_count;
+  add(start, scene.frame_count, costs.fit);
   std::vector<std::string> entries;
   for (size_t i = 0; i < dynamics.size(); ++i) {
-    entries.push_back(describe(scene, object_models[i], truths[i], dynamics[i], cost));
-    if (!trace.empty()) writeTrace(trace, scene, truths[i], dynamics[i]);
+    entries.push_back(describe(scene, object_models[i], truths[i], dynamics[i], costs));
+    if (!options.trace.empty()) writeTrace(options.trace, scene, truths[i], dynamics[i]);
   }
   return entries;
 }

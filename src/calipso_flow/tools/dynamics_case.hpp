@@ -5,10 +5,13 @@
 
 namespace calipso::flow {
 
+struct DynamicsOptions {
+  std::string models = "held";  // "true", "held" or a folder of aligned meshes; see evaluate's usage
+  std::string trace;            // folder for one CSV file per object; empty: none
+  int scale = 1;                // the frames are enlarged by this factor first
+};
+
 // Runs the dynamics on a scene folder and compares with its truth: one JSON object per object.
-// @param models  "true", "held" or a folder of aligned meshes; see evaluate's usage
-// @param trace   folder for one CSV file per object; empty: none
-std::vector<std::string> evaluateScene(const std::string& directory, const std::string& models,
-                                       const std::string& trace);
+std::vector<std::string> evaluateScene(const std::string& directory, const DynamicsOptions& options);
 
 }  // namespace calipso::flow

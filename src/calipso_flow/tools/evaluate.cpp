@@ -1,6 +1,7 @@
 // Evaluates the dynamics on scene folders and the dense flow on folders with a true flow; see the
 // package's README for the keys that are printed.
-#include <cstdio>
+#include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 
@@ -10,24 +11,27 @@
 namespace {
 
 constexpr char kUsage[] =
-    "usage: evaluate [--models true|held|DIR] [--trace DIR] PATH...\n"
+    "usage: evaluate [--models true|held|DIR] [--trace DIR] [--scale N] PATH...\n"
     "  PATH      a scene folder (scene.yaml), or a folder with frame10.png, frame11.png, flow10.flo\n"
     "  --models  true: true shape and pose; held (default): the true shape as an alignment sees it\n"
     "            that holds the rough placement's depth; DIR: aligned models, <object>.obj in world\n"
     "            coordinates\n"
-    "  --trace   writes one CSV file per object there: the estimate and the truth, frame by frame\n";
+    "  --trace   writes one CSV file per object there: the estimate and the truth, frame by frame\n"
+    "  --scale   enlarges the frames first: 2 makes 1280x720 of 640x360\n";
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::string models = "held", trace;
+  calipso::flow::DynamicsOptions options;
   std::vector<std::string> paths;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--models" && i + 1 < argc) {
-      models = argv[++i];
+      options.models = argv[++i];
     } else if (argument == "--trace" && i + 1 < argc) {
-      trace = argv[++i];
+      options.trace = argv[++i];
+    } else if (argument == "--scale" && i + 1 < argc) {
+      options.scale = std::max(1, std::atoi(argv[++i]));
     } else {
       paths.push_back(argument);
     }
@@ -42,7 +46,7 @@ int main(int argc, char** argv) {
     try {
       const bool is_flow = std::filesystem::exists(path + "/flow10.flo");
       const std::vector<std::string> found = is_flow ? calipso::flow::evaluateFlow(path)
-                                                     : calipso::flow::evaluateScene(path, models, trace);
+                                                     : calipso::flow::evaluateScene(path, options);
       entries.insert(entries.end(), found.begin(), found.end());
     } catch (const std::exception& error) {
       std::cerr << "evaluate: " << path << ": " << error.what() << "\n";

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,6 +61,7 @@ class ClipAnalyser {
     std::unique_ptr<DeformableTracker> deformable;      // once it is seen to deform
     std::vector<DeformationObservation> deformations;  // one per frame, then
   };
+  void forEachObject(const std::function<void(size_t)>& work) const;
   void follow(const Frame& frame, bool cut, Followed& object) const;
   void beginDeformable(Followed& object) const;
   ObjectDynamics finishObject(const Followed& object) const;

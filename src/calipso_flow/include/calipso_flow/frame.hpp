@@ -10,6 +10,7 @@ struct Frame {
   double time = 0.0;  // s
   cv::Mat gray;       // CV_32F, 0..255, lightly smoothed (see makeFrame)
   Camera camera;      // intrinsics and pose at `time`
+  cv::Mat thumbnail;  // CV_32F, small: cuts of the video show in it
 };
 
 // Converts an 8-bit grey or BGR picture. The picture is smoothed by a Gaussian of 0.7 px, so that

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <functional>
 #include <optional>
+#include <vector>
 
 #include "calipso_flow/patch_match.hpp"
 #include "calipso_flow/reference_view.hpp"
@@ -20,6 +22,10 @@ class LookMatch {
   Care care() const { return care_; }
   // Where the patch of the look around `at` is found in the frame, in coordinates of the full size.
   std::optional<PatchMatch> find(const Eigen::Vector2d& at, const PatchParams& params) const;
+  // The search at every point, by several threads.
+  using Matches = std::vector<std::optional<PatchMatch>>;
+  using Search = std::function<std::optional<PatchMatch>(const Eigen::Vector2d& at)>;
+  static Matches forEach(const std::vector<Eigen::Vector2d>& points, const Search& search);
   // By how much the match, followed back into the look, misses the point where it began.
   std::optional<Eigen::Vector2d> missOnReturn(const Eigen::Vector2d& at, const PatchMatch& there,
                                               const PatchParams& params) const;
