@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "calipso_flow/look_match.hpp"
@@ -15,6 +16,7 @@ constexpr double kRoughScale = 30.0;      // deviations; residuals of a rough ma
 constexpr double kFineScale = 40.0;
 constexpr double kLeastInlierShare = 0.35;
 constexpr double kReturnDeviations = 3.0;
+constexpr int kRadius = 5;                   // px, of a patch: a sheet is often plain
 constexpr double kStripeGradient = 2.0;      // grey levels per px; below, a direction is a stripe's
 
 DeformationField::Points matrixOf(const std::vector<Eigen::Vector3d>& points) {
@@ -29,6 +31,7 @@ PatchParams patchParams(const PatchParams& rigid) {
   PatchParams params = rigid;
   params.least_gradient = kStripeGradient;
   params.stripes = true;
+  params.radius_px = std::max(rigid.radius_px, kRadius);
   return params;
 }
 

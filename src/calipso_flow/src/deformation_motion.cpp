@@ -87,6 +87,11 @@ DeformationMotion describeDeformation(const DeformableTracker& tracker,
     if (own) motion.stiffness = stiffnessRatio(tracker.model(), line, shape, motion.note);
   }
   const ObjectModel& model = tracker.model();
+  if (tracker.fitter().field().sheetNormal()) {
+    std::string note;
+    motion.wind = estimateWind(model, motion.times, modes, gravity, note);
+    if (!note.empty()) motion.note += (motion.note.empty() ? "" : "; ") + note;
+  }
   motion.lean = leanOf(model, modes.surface(model.mesh, spectrum.mean), gravity);
   return motion;
 }

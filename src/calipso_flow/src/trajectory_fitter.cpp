@@ -25,18 +25,22 @@ struct FirstLook {
 };
 
 // What a jump of velocity and spin at `time` does for the frames around it, the acceleration going
-// on unchanged.
+// on unchanged: an unknown one, or gravity, which a few frames cannot tell from a jump otherwise.
 FirstLook lookFirst(const std::vector<PoseMeasurement>& around, double time,
                     const MotionPrior& prior, double noise_scale) {
-  MotionPiece piece;
-  piece.travel = Travel::kAccelerated;
-  piece.turning = Turning::kSteady;
-  piece.start = around.front().time;
-  MotionPiece second = piece;
-  second.start = time;
-  second.same_acceleration = true;
-  const double with = logLikelihood(around, {piece, second}, prior, noise_scale);
-  const double without = logLikelihood(around, {piece}, prior, noise_scale);
+  double with = -kEver, without = -kEver;
+  for (const Travel travel : {Travel::kAccelerated, Travel::kFreeFall}) {
+    if (travel == Travel::kFreeFall && prior.gravity.isZero()) continue;
+    MotionPiece piece;
+    piece.travel = travel;
+    piece.turning = Turning::kSteady;
+    piece.start = around.front().time;
+    MotionPiece second = piece;
+    second.start = time;
+    second.same_acceleration = true;
+    with = std::max(with, logLikelihood(around, {piece, second}, prior, noise_scale));
+    without = std::max(without, logLikelihood(around, {piece}, prior, noise_scale));
+  }
   double noise_alone = 0.0;
   for (const PoseMeasurement& m : around) {
     if (!m.valid) continue;

@@ -26,10 +26,32 @@ double shapeError(const ObjectModel& model, const TrueObject& truth, const Defor
   return 100.0 * std::sqrt(error / motion);
 }
 
+// Correlation of the way of the lower edge (within 5 % of the height) with that of the sheet simulated in the
+// estimated wind, over frames and axes.
+double edgeCorrelation(const ObjectModel& model, const TrueObject& truth, const Eigen::Vector3d& gravity,
+                       const DeformationMotion& motion) {
+  const Eigen::Vector3d down = model.world_from_object.linear().transpose() * gravity.normalized();
+  const Eigen::VectorXd depth = model.mesh.vertices * down;
+  const double edge = depth.maxCoeff() - 0.05 * (depth.maxCoeff() - depth.minCoeff());
+  Eigen::MatrixXd simulated = Eigen::MatrixXd::Zero(motion.times.size(), 3), real = simulated;
+  for (size_t k = 0; k < motion.times.size(); ++k) {
+    const auto moved = motion.modes.surface(model.mesh, motion.wind->amplitudes.row(k).transpose());
+    for (int i = 0; i < depth.size(); ++i) {
+      if (depth[i] < edge) continue;
+      simulated.row(k) += moved.row(i) - model.mesh.vertices.row(i);
+      real.row(k) += truth.vertices[k].row(i) - truth.vertices[0].row(i);
+    }
+  }
+  simulated.rowwise() -= simulated.colwise().mean().eval();
+  real.rowwise() -= real.colwise().mean().eval();
+  return (simulated.array() * real.array()).sum() / (simulated.norm() * real.norm());
+}
+
 }  // namespace
 
 void addDeformationErrors(const ObjectModel& model, const TrueObject& truth, const ObjectDynamics& dynamics,
-                          JsonEntry& entry) {
+                          const Eigen::Vector3d& gravity, JsonEntry& entry) {
+  double edge = kNone, explained = kNone;
   double frequency = kNone, travel = kNone, lean = kNone, shape = kNone, estimate = kNone,
          deviation = kNone;
   if (dynamics.deformation) {
@@ -50,6 +72,7 @@ void addDeformationErrors(const ObjectModel& model, const TrueObject& truth, con
     }
     if (truth.vertices.size() == motion.times.size()) {
       shape = shapeError(model, truth, motion.modes);
+      if (motion.wind) edge = edgeCorrelation(model, truth, gravity, motion);
     }
   }
   entry.flag("deforms", dynamics.deformation.has_value());
@@ -57,8 +80,15 @@ void addDeformationErrors(const ObjectModel& model, const TrueObject& truth, con
   entry.number("frequency_hz", estimate).number("frequency_deviation_hz", deviation);
   entry.number("travel_direction_error_deg", travel).number("lean_error_percent", lean);
   entry.number("shape_error_percent", shape);
-  // The wind is not estimated.
+  // A scene's wind is only nominal.
   entry.null("wind_direction_error_deg").null("wind_strength_error_percent");
+  if (dynamics.deformation && dynamics.deformation->wind) {
+    const WindEstimate& wind = *dynamics.deformation->wind;
+    entry.numbers("wind_m_s", {wind.mean.x(), wind.mean.y(), wind.mean.z()});
+    explained = wind.explained;
+  }
+  entry.number("wind_explained", explained).number("lower_edge_correlation", edge);
+  if (dynamics.deformation) entry.text("note", dynamics.deformation->note);
 }
 
 }  // namespace calipso::flow

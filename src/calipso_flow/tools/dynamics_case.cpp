@@ -16,6 +16,7 @@
 #include "calipso_scene/scene.hpp"
 #include "deformation_errors.hpp"
 #include "json_entry.hpp"
+#include "throw_case.hpp"
 #include "truth.hpp"
 
 namespace calipso::flow {
@@ -266,11 +267,13 @@ std::string describe(const Scene& scene, const ObjectModel& model, const TrueObj
   entry.number("collisions_found", static_cast<double>(trajectory.collisions.size()));
   entry.number("sign_change_error_frames", signChangeError(scene, truth, dynamics));
   entry.number("restitution_error_percent", restitutionError(scene, truth, trajectory));
-  addDeformationErrors(model, truth, dynamics, entry);
+  addDeformationErrors(model, truth, dynamics, scene.gravity, entry);
   entry.null("endpoint_error_px");
   entry.number("covered_95", errors.covered);
   const bool still = truth.velocity.empty() && truth.vertices.empty();
   if (still) entry.flag("below_uncertainty", errors.below_uncertainty);
+  const bool rigid = !dynamics.deformation && truth.world_from_object.size() > 1;
+  if (rigid) addThrow(scene, model, truth, dynamics, entry);
   entry.number("width", scene.camera.width);
   entry.number("track_ms_frame", costs.track.wall).number("fit_ms_frame", costs.fit.wall);
   entry.number("cpu_ms_frame", costs.track.cpu + costs.fit.cpu);

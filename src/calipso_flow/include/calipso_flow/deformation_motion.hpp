@@ -7,6 +7,7 @@
 #include "calipso_flow/deformation_modes.hpp"
 #include "calipso_flow/stiffness_ratio.hpp"
 #include "calipso_flow/vibration.hpp"
+#include "calipso_flow/wind_estimate.hpp"
 
 namespace calipso::flow {
 
@@ -24,6 +25,7 @@ struct DeformationMotion {
   std::vector<SurfaceLine> lines;  // strongest first
   Eigen::Vector3d lean = Eigen::Vector3d::Zero();  // m, world: see leanOf
   std::optional<StiffnessRatio> stiffness;
+  std::optional<WindEstimate> wind;  // of a thin sheet
   std::string note;            // what was refused, for the user
 };
 

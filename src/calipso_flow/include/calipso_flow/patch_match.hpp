@@ -13,7 +13,7 @@ struct ImageWindow {
 };
 
 struct PatchParams {
-  int radius_px = 7;            // the patch is a square of 2 r + 1 pixels
+  int radius_px = 4;            // the patch is a square of 2 r + 1 pixels: small, since shading bends large ones
   int max_iterations = 12;
   double least_support = 0.4;   // share of the patch's pixels that must carry weight
   double converged_px = 0.005;  // an update smaller than this ends the iteration

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_flow/object_model.hpp"
+#include "calipso_scene/camera.hpp"
+
+// Pictures of bodies whose motion is known because we simulated it.
+namespace calipso::flow {
+
+using Shapes = std::vector<decltype(TriangleMesh::vertices)>;  // world, m; one per frame
+
+// A box from `low` to `high`, its sides divided into `cells`; faces outwards.
+TriangleMesh dividedBox(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+                        const Eigen::Vector3i& cells);
+
+// Looks from `eye` at `target`, z up.
+Camera lookingAt(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, int width, int height,
+                 double focal_px);
+
+// An 8-bit picture of a surface that carries a smooth texture from its rest shape, before a textured
+// wall, with Gaussian noise. @param moved  #V x 3, world
+cv::Mat film(const ObjectModel& model, const decltype(TriangleMesh::vertices)& moved,
+             const Camera& camera, double noise_grey, uint64_t seed);
+
+struct FilmedSheet {
+  ObjectModel model;
+  Camera camera;
+  Eigen::Vector3d gravity;
+  std::vector<double> times;   // s
+  Shapes shapes;
+  Eigen::Vector3d wind;        // m/s
+};
+
+// A sheet that hangs at rest by its upper edge, simulated in a steady wind that sets in with the first frame.
+FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames);
+
+struct FilmedBeam {
+  ObjectModel model;
+  Camera camera;
+  std::vector<double> times;
+  Shapes shapes;
+  double frequency;            // Hz, lowest
+  double stiffness_ratio;      // m^2/s^2
+};
+
+// A beam that is held at one end, struck at the first frame, without weight.
+FilmedBeam filmedBeam(double stiffness_ratio, int frames);
+
+}  // namespace calipso::flow
