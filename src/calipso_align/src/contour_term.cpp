@@ -13,8 +13,10 @@ namespace {
 std::vector<int> nearest(const std::vector<Feature>& queries, const std::vector<Feature>& candidates,
                          const ContourTermOptions& options) {
   const float scale = static_cast<float>(options.normal_scale_px);
-  // n.n >= cosine  <=>  |s n - s n'|^2 <= 2 s^2 (1 - cosine)
-  const float reject_turn = 2.0f * scale * scale * (1.0f - static_cast<float>(options.reject_cosine));
+  // n.n >= cosine  <=>  |s n - s n'|^2 <= 2 s^2 (1 - cosine); without scale normals do not count.
+  const float reject_turn =
+      scale > 0.0f ? 2.0f * scale * scale * (1.0f - static_cast<float>(options.reject_cosine))
+                   : std::numeric_limits<float>::max();
   const OutlineSearch search(candidates, static_cast<float>(options.reject_px), reject_turn);
   std::vector<int> match(queries.size());
 #pragma omp parallel for schedule(static)

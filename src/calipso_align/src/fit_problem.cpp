@@ -192,6 +192,7 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
                      0.0,
                      boundingDiagonal(cad)};
   problem.extent_px = extentOf(problem.target);
+  problem.origin = camera_from_object.translation();
   markSpurs(contour, problem);
   if (options.depth) {
     checkDepth(options.depth->depth, camera);

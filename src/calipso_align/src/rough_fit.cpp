@@ -19,6 +19,16 @@ double apparentScale(const FitProblem& problem) {
   return problem.extent_px * z / (f * problem.model_size);
 }
 
+// By what the model's coordinates would have to be multiplied to fill the contour: it then shrinks
+// towards its frame's origin, which stays where it was placed.
+//   s size f / (z0 + s (z - z0)) = extent
+double unitScale(const FitProblem& problem) {
+  const double f = std::sqrt(problem.camera.fx * problem.camera.fy), z0 = problem.origin.z();
+  const double arm = problem.X.col(2).mean() - z0;
+  const double scale = problem.extent_px * z0 / (f * problem.model_size - problem.extent_px * arm);
+  return scale > 0.0 && std::isfinite(scale) ? scale : apparentScale(problem);
+}
+
 struct Moments {
   double area = 0.0;
   Eigen::Vector2d centroid = Eigen::Vector2d::Zero();
@@ -75,7 +85,7 @@ RoughCheck checkPlacement(const FitProblem& problem) {
     std::ostringstream text;
     text.precision(3);
     text << "size implausible: the model (" << problem.model_size << " m) at its rough distance ("
-         << z << " m) would have to be scaled by " << scale
+         << z << " m) would have to be scaled by " << unitScale(problem)
          << " to fill the contour; is it in millimetres? Scale it by about that much";
     return {false, text.str()};
   }

@@ -77,11 +77,12 @@ LowOrderStep literalRigidStep(const FitProblem& problem, const AlignOptions& opt
 }
 
 ElasticStep literalElasticStep(const AlignOptions& options) {
+  constexpr double kFixedWeight = 3e4;   // of 3e1 .. 3e4 what met the contours best; softer bodies break
   ElasticStep step;
   step.fit.nodes = options.levels.empty() ? 600 : options.levels.front();
   step.fit.poissons_ratio = options.poissons_ratio;
   step.fit.linear = true;
-  step.fit.elastic_weights.assign(20, options.elastic_weight * kElasticWeight);
+  step.fit.elastic_weights.assign(20, options.elastic_weight * kFixedWeight);
   step.literal = true;
   return step;
 }

@@ -12,6 +12,7 @@ namespace calipso::align {
 namespace {
 
 constexpr double kLeastKnown = 0.3;      // part of the contour
+constexpr double kMostlyKnown = 0.95;    // less is worth a word
 constexpr double kLeastMet = 0.8;        // part of the known contour: it may have spurs and details
 constexpr double kMostOff = 0.02;         // part of the area: thin parts may be missing on either side
 constexpr double kLargestMeanPx = 1.0;   // on top of half the contour's noise
@@ -32,14 +33,14 @@ double loopArea(const ContourLoop& loop) {
 
 // Two large pieces whose outlines are all known: nothing hides what should join them.
 bool isInPieces(const std::vector<ContourLoop>& contour) {
-  constexpr double kLargePiece = 0.1, kMostlyKnown = 0.98;
+  constexpr double kLargePiece = 0.1, kAllKnown = 0.98;
   std::vector<double> areas;
   double largest = 0.0;
   for (const ContourLoop& loop : contour) {
     if (loop.hole) continue;
     const double known = std::count(loop.known.begin(), loop.known.end(), true);
     largest = std::max(largest, loopArea(loop));
-    if (known >= kMostlyKnown * loop.points.size()) areas.push_back(loopArea(loop));
+    if (known >= kAllKnown * loop.points.size()) areas.push_back(loopArea(loop));
   }
   return std::count_if(areas.begin(), areas.end(),
                        [&](double area) { return area >= kLargePiece * largest; }) > 1;
@@ -161,6 +162,11 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
     if (spinAxis(problem.X)) {
       reason << "spin about its axis undetermined: the shape is axisymmetric, so that the contour "
                 "leaves it as it was placed";
+    }
+    if (known < kMostlyKnown) {
+      reason << (reason.tellp() > 0 ? "; " : "") << "part of the contour is unknown: "
+             << percent(1.0 - known)
+             << " of it is hidden or cut by the image border, and the model there is as it was drawn";
     }
     return {true, reason.str()};
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <numeric>
 
 #include "calipso_align/metrics.hpp"
@@ -115,6 +116,95 @@ TEST(Alignment, FlagsAModelInMillimetres) {
   mesh.vertices *= 1000.0;
   EXPECT_NE(reasonOf(mesh, Eigen::Isometry3d::Identity()).find("size implausible"),
             std::string::npos);
+}
+
+TEST(Alignment, OffersTheScaleOfAModelInMillimetres) {
+  TriangleMesh mesh = test::pear();
+  mesh.vertices *= 1000.0;
+  // A model a thousand times too large, around the camera: said with the factor that mends it.
+  Eigen::Isometry3d rough = Eigen::Isometry3d::Identity();
+  const std::string reason = reasonOf(mesh, rough);
+  const size_t at = reason.find("scaled by ");
+  ASSERT_NE(at, std::string::npos) << reason;
+  EXPECT_NEAR(std::stod(reason.substr(at + 10)), 1e-3, 3e-4);
+}
+
+// The contour of the pear's silhouette after a change of its mask.
+std::vector<ContourLoop> contourOfMask(const std::function<void(cv::Mat1b&)>& change,
+                                       const TriangleMesh& mesh = test::pear()) {
+  const Camera camera = test::frontCamera();
+  const Points x = test::inCamera(camera, Eigen::Isometry3d::Identity(), mesh.vertices);
+  cv::Mat1b mask = maskOf(renderDepth(x, mesh.triangles, camera), camera);
+  change(mask);
+  return traceLoops(mask / 255, 1, {});
+}
+
+TEST(Alignment, FlagsAContourOfTwoPieces) {
+  const std::vector<ContourLoop> contour =
+      contourOfMask([](cv::Mat1b& mask) { mask.rowRange(105, 135).setTo(0); });
+  ASSERT_EQ(contour.size(), 2u);
+  const AlignmentResult result = align(test::pear(), test::frontCamera(), test::roughPose(),
+                                       contour, coarse());
+  EXPECT_FALSE(result.trusted);
+  EXPECT_NE(result.reason.find("separate pieces"), std::string::npos) << result.reason;
+}
+
+TEST(Alignment, FlagsAMaskThatFillsTheImage) {
+  const std::vector<ContourLoop> contour = contourOfMask([](cv::Mat1b& mask) { mask.setTo(255); });
+  const AlignmentResult result = align(test::pear(), test::frontCamera(), test::roughPose(),
+                                       contour, coarse());
+  EXPECT_FALSE(result.trusted);
+  EXPECT_NE(result.reason.find("contour mostly unknown"), std::string::npos) << result.reason;
+}
+
+TEST(Alignment, RejectsAnEmptyContour) {
+  try {
+    align(test::pear(), test::frontCamera(), test::roughPose(), {}, coarse());
+    FAIL() << "nothing was thrown";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("segment the object first"), std::string::npos);
+  }
+}
+
+TEST(Alignment, SaysThatTheImageBorderCutsTheObject) {
+  // The camera looks past the pear, so that a third of it is outside of the picture.
+  Camera camera = test::frontCamera();
+  camera.cx = 20.0;
+  const TriangleMesh mesh = test::pear();
+  const std::vector<ContourLoop> contour =
+      test::contourOf(mesh, Eigen::Isometry3d::Identity(), camera);
+  const AlignmentResult result = align(mesh, camera, test::roughPose(), contour, coarse());
+  EXPECT_NE(result.reason.find("cut by the image border"), std::string::npos) << result.reason;
+  const Points x = test::inCamera(camera, result.world_from_object, result.mesh.vertices);
+  EXPECT_LT(contourError(contour, x, MeshTopology(mesh.triangles), camera).mean_px, 0.7);
+}
+
+TEST(Alignment, ExpectsALargerErrorWhereNothingShowsTheDepth) {
+  const Camera camera = test::frontCamera();
+  const TriangleMesh truth = deformedPear();
+  const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
+  const std::vector<ContourLoop> contour = test::contourOf(truth, identity, camera);
+  const AlignmentResult blind = align(test::pear(), camera, test::roughPose(), contour, coarse());
+  const DepthRendering rendering = renderDepth(test::inCamera(camera, identity, truth.vertices),
+                                               truth.triangles, camera);
+  cv::Mat1f depth = cv::Mat1f::zeros(camera.height, camera.width);
+  rendering.depth.copyTo(depth(rendering.roi));
+  AlignOptions options = coarse();
+  options.depth = DepthObservation{depth};
+  const AlignmentResult seen = align(test::pear(), camera, test::roughPose(), contour, options);
+  EXPECT_LT(seen.expected_error, 0.5 * blind.expected_error);
+}
+
+TEST(Alignment, LiteralMethodComesCloseToASmallDeformation) {
+  AlignOptions options = coarse();
+  options.method = Method::kLiteral;
+  const Camera camera = test::frontCamera();
+  const std::vector<ContourLoop> contour =
+      test::contourOf(test::pear(), Eigen::Isometry3d::Identity(), camera);
+  const AlignmentResult result = align(test::pear(), camera, test::roughPose(), contour, options);
+  const Points x = test::inCamera(camera, result.world_from_object, result.mesh.vertices);
+  // Its constraint asks for 4 px.
+  EXPECT_LT(contourError(contour, x, MeshTopology(result.mesh.triangles), camera).mean_px, 4.0);
 }
 
 TEST(Alignment, RejectsATriangleWithoutVertex) {

@@ -19,6 +19,7 @@ struct FitProblem {
   std::vector<SupportTarget> supports;
   double extent_px = 0.0;   // diagonal of the contour's bounding box
   double model_size = 0.0;  // diagonal of the model, m
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();   // of the object frame, at the rough pose
 
   bool depthIsKnown() const;   // from a depth image, or because the object stands on something
 };
