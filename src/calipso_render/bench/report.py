@@ -16,7 +16,9 @@ COLUMNS = [
     ("seam_drawn_psnr_db", "seam, all drawn, dB"), ("moved_psnr_db", "moved, dB"),
     ("moved_from_clip_psnr_db", "moved, texture from the clip, dB"),
     ("shadow_psnr_db", "around moved, dB"), ("moved_copied_psnr_db", "moved, not relit, dB"),
-    ("ms_prepare", "prepare, ms"), ("ms_frame_live", "live, ms"), ("ms_frame_final", "final, ms"),
+    ("relighting_gain_db", "gain over copying, dB"), ("ms_prepare", "prepare, ms"),
+    ("ms_prepare_background", "of it the background, ms"), ("ms_prepare_appearance", "light and texture, ms"),
+    ("ms_inpaint", "filling the hole, ms"), ("ms_frame_live", "live, ms"), ("ms_frame_final", "final, ms"),
 ]
 
 HEADER = """# Appearance

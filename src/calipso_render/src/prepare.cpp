@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
@@ -7,6 +8,8 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "prepare_remarks.hpp"
+#include "shadow_check.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -223,8 +226,8 @@ std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepar
 }
 
 // What objects at rest cover or shade at the key frame, with soft edges and the predictions' errors.
-cv::Mat restingTraces(const Prepared& p, const cv::Mat& sun, const cv::Mat& sky, const RenderParams& params) {
-  cv::Mat traces = grown((sun < kShaded) | (sky < kSkyShaded), params.background.shadow_margin_px);
+cv::Mat restingTraces(const Prepared& p, const cv::Mat& shadow, const cv::Mat& sky, const RenderParams& params) {
+  cv::Mat traces = grown(shadow | (sky < kSkyShaded), params.background.shadow_margin_px);
   for (const cv::Mat& f : p.footprints) {
     if (!f.empty()) traces |= grown(f, params.background.mask_margin_px);
   }
@@ -245,27 +248,31 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const Background& s
   const cv::Mat visibility = planeVisibility(sun, params.planes, frames.front());
   const cv::Mat sky_visibility = planeVisibility(sky, params.planes, frames.front());
   cv::Mat shaded;
-  if (!all_move) shaded = restingTraces(p, visibility, sky_visibility, params);
+  if (!all_move) {
+    const cv::Mat believed = seenShadows(visibility < kShaded, picture, p.key_labels);
+    if (cv::countNonZero(believed) < cv::countNonZero(visibility < kShaded)) {
+      p.remarks.push_back("a shadow that the light predicts is not seen in the picture and stays as it is; give the light if it is wrong");
+    }
+    shaded = restingTraces(p, believed, sky_visibility, params);
+  }
   inventBackground(shaded, frames.front(), p.background);
   p.plate_linear = linearOf(p.background.plate);
   p.umbra = any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
                       : measureUmbra(picture, p.background.plate, visibility, sky_visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));
 }
 
-void remark(const ClipSample& clip, Prepared& p) {
-  if (clip.frames().size() == 1) p.remarks.push_back("the clip has one frame: all of the background is invented");
-  const double invented = cv::mean(p.background.invented)[0] / 255.0;
-  if (invented > 0.5) {
-    p.remarks.push_back(std::to_string(static_cast<int>(100 * invented)) +
-                        " % of the background is hidden in every frame and was invented; check the strokes");
+class Stopwatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return ms;
   }
-  if (!p.light.determined) p.remarks.push_back("too little of the objects is seen to tell the light; it is assumed high and frontal");
-  for (const Surface& s : p.surfaces) {
-    if (cv::countNonZero(p.key_labels == s.index) == 0) {
-      p.remarks.push_back("object '" + s.name + "' is not seen in the key frame: its colour is unknown");
-    }
-  }
-}
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
 
 }  // namespace
 
@@ -289,7 +296,9 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const std::vector<View> views = viewsOf(clip, p, picture);
   p.views = static_cast<int>(views.size());
+  Stopwatch watch;
   const Background seen = seenBackground(frames, any_moves, params.background);
+  p.background_ms = watch.lap();
   const LightEvidence evidence = lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background());
   const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
   p.light = fitLight(evidence, params.up.cast<float>(), view);
@@ -298,15 +307,18 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const std::vector<Occluder> above = params.planes.empty() ? std::vector<Occluder>{} : occluders(actors);
   const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
   const ShadowMap sky(above, up, {256, kSkyRadius, 24});
+  p.appearance_ms = watch.lap();
   p.fronts = frontsOf(actors, p);
   p.footprints = footprintsOf(actors, p);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
   prepareBackground(frames, seen, picture, sun, sky, params, p);
+  p.background_ms += watch.lap();
   p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
+  p.appearance_ms += watch.lap();
   std::vector<cv::Mat> pictures;
   for (const ClipFrame& f : frames) pictures.push_back(f.bgr);
   p.noise = NoiseModel::estimate(pictures, steadiness > 1);
-  remark(clip, p);
+  addRemarks(clip.frames(), actors, p);
   return p;
 }
 

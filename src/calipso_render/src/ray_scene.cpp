@@ -22,7 +22,7 @@ constexpr float kThrownBack = 0.3f;  // part of the hidden sky's light that come
 // One single-threaded device for the process: the renderer's own loops use the cores.
 RTCDevice device() {
   static const RTCDevice shared = rtcNewDevice("threads=1");
-  if (shared == nullptr) throw std::runtime_error("Embree has no device on this machine: light cannot be fitted");
+  if (shared == nullptr) throw std::runtime_error("Embree has no device on this machine: neither light nor final frames are possible");
   return shared;
 }
 
@@ -68,6 +68,11 @@ bool RayScene::blocked(const Eigen::Vector3f& p, const Eigen::Vector3f& n, const
   const Eigen::Vector3f from = p + n * (kLift * radius_), to_centre = centre_ - from;
   const float along = to_centre.dot(d);
   if (to_centre.squaredNorm() - along * along > radius_ * radius_ || along < -radius_) return false;
+  return blocked(from, d);
+}
+
+bool RayScene::blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& d) const {
+  if (!handle_) return false;
   RTCRay r{};
   r.org_x = from.x(), r.org_y = from.y(), r.org_z = from.z();
   r.dir_x = d.x(), r.dir_y = d.y(), r.dir_z = d.z();

@@ -19,6 +19,11 @@ class RayScene {
   // Is anything in the way from the surface point p with unit normal n along unit direction d?
   bool blocked(const Eigen::Vector3f& p, const Eigen::Vector3f& n, const Eigen::Vector3f& d) const;
 
+  // The same from exactly here.
+  bool blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& d) const;
+
+  bool empty() const { return !handle_; }
+
  private:
   struct Handle;
   std::unique_ptr<Handle> handle_;  // empty: nothing is in the way

@@ -1,13 +1,11 @@
 #include "calipso_render/ray_shadow.hpp"
 
-#include <embree3/rtcore.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <stdexcept>
+
+#include "ray_scene.hpp"
 
 namespace calipso::render {
 namespace {
@@ -16,52 +14,22 @@ constexpr float kGoldenAngle = 2.39996323f;
 constexpr int kFirstRays = 6;        // if these agree, so do the others
 constexpr float kLiftPart = 2e-4f;   // of the occluders' extent
 
-// One single-threaded device for the process: the renderer's own loops use the cores.
-RTCDevice device() {
-  static const RTCDevice shared = rtcNewDevice("threads=1");
-  if (shared == nullptr) throw std::runtime_error("Embree has no device on this machine; use quality: live");
-  return shared;
-}
-
 }  // namespace
 
-struct RayShadow::Scene {
-  RTCScene handle = nullptr;
-  ~Scene() {
-    if (handle != nullptr) rtcReleaseScene(handle);
-  }
-  void add(const Occluder& occluder) const {
-    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-    const std::size_t points = occluder.vertices->size(), faces = occluder.triangles->size();
-    void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), points);
-    void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), faces);
-    if (vertices == nullptr || indices == nullptr) throw std::runtime_error("Embree could not take a mesh of " + std::to_string(faces) + " triangles");
-    std::memcpy(vertices, occluder.vertices->data(), points * 3 * sizeof(float));
-    std::memcpy(indices, occluder.triangles->data(), faces * 3 * sizeof(unsigned));
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(handle, geometry);
-    rtcReleaseGeometry(geometry);
-  }
-};
-
 RayShadow::RayShadow(const std::vector<Occluder>& occluders, const Eigen::Vector3d& direction, const Params& params)
-    : spread_(static_cast<float>(std::tan(params.angular_radius))) {
+    : scene_(std::make_unique<const RayScene>(occluders)), spread_(static_cast<float>(std::tan(params.angular_radius))) {
   axis_h_ = direction.normalized().cast<float>();
   axis_s_ = axis_h_.unitOrthogonal();
   axis_t_ = axis_h_.cross(axis_s_);
   low_ = Eigen::Vector3f::Constant(std::numeric_limits<float>::max()), high_ = -low_;
   for (const Occluder& o : occluders) {
     if (o.triangles->empty()) continue;
-    if (!scene_) scene_ = std::make_unique<Scene>(), scene_->handle = rtcNewScene(device());
-    scene_->add(o);
     for (const Eigen::Vector3f& p : *o.vertices) {
       const Eigen::Vector3f q(p.dot(axis_s_), p.dot(axis_t_), p.dot(axis_h_));
       low_ = low_.cwiseMin(q), high_ = high_.cwiseMax(q);
     }
   }
-  if (!scene_) return;
-  rtcSetSceneFlags(scene_->handle, RTC_SCENE_FLAG_ROBUST);
-  rtcCommitScene(scene_->handle);
+  if (scene_->empty()) return;
   lift_ = kLiftPart * (high_ - low_).norm();
   // Vogel's spiral, strided so that the first few rays already spread over the disc.
   for (int i = 0; i < params.rays; ++i) {
@@ -73,20 +41,8 @@ RayShadow::RayShadow(const std::vector<Occluder>& occluders, const Eigen::Vector
 
 RayShadow::~RayShadow() = default;
 
-bool RayShadow::blocked(const Eigen::Vector3f& from, int ray) const {
-  const Eigen::Vector3f& d = rays_[ray];
-  RTCRay r{};
-  r.org_x = from.x(), r.org_y = from.y(), r.org_z = from.z();
-  r.dir_x = d.x(), r.dir_y = d.y(), r.dir_z = d.z();
-  r.tnear = 0.0f, r.tfar = std::numeric_limits<float>::infinity(), r.mask = ~0u;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(scene_->handle, &context, &r);
-  return r.tfar < 0.0f;
-}
-
 std::optional<float> RayShadow::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f&, float radius) const {
-  if (!scene_) return 1.0f;
+  if (scene_->empty()) return 1.0f;
   const Eigen::Vector3f q(p.dot(axis_s_), p.dot(axis_t_), p.dot(axis_h_));
   const float around = radius + 4.0f * lift_, reach = around + spread_ * (high_.z() - q.z() + around);
   const bool clear = high_.z() < q.z() - around || q.x() + reach < low_.x() || q.x() - reach > high_.x() || q.y() + reach < low_.y() || q.y() - reach > high_.y();
@@ -94,7 +50,7 @@ std::optional<float> RayShadow::uniform(const Eigen::Vector3f& p, const Eigen::V
 }
 
 float RayShadow::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
-  if (!scene_) return 1.0f;
+  if (scene_->empty()) return 1.0f;
   const Eigen::Vector3f from = p + n * lift_ * 4.0f;
   const Eigen::Vector3f q(from.dot(axis_s_), from.dot(axis_t_), from.dot(axis_h_));
   const float reach = spread_ * (high_.z() - q.z());
@@ -102,9 +58,9 @@ float RayShadow::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   if (clear) return 1.0f;
   const int all = static_cast<int>(rays_.size()), first = std::min(kFirstRays, all);
   int hits = 0;
-  for (int i = 0; i < first; ++i) hits += blocked(from, i);
+  for (int i = 0; i < first; ++i) hits += scene_->blocked(from, rays_[i]);
   if (hits == 0 || hits == first) return hits == 0 ? 1.0f : 0.0f;
-  for (int i = first; i < all; ++i) hits += blocked(from, i);
+  for (int i = first; i < all; ++i) hits += scene_->blocked(from, rays_[i]);
   return 1.0f - static_cast<float>(hits) / all;
 }
 

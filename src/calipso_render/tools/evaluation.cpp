@@ -7,6 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "blind_sheet.hpp"
+#include "calipso_render/inpaint.hpp"
 #include "measures.hpp"
 #include "truth.hpp"
 
@@ -19,6 +21,7 @@ constexpr int kAround = 40;          // px around a moved object in which its sh
 constexpr int kMovedFirst = 3, kMovedStep = 4;  // frames of a moving object that are drawn again: odd ones, which a
                                                 // clip sample of more than 24 frames leaves out
 constexpr int kFlickerFrames = 8;
+constexpr int kSheetFrames = 4;      // of a clip on a blind sheet
 constexpr double kFlickers = 0.3;    // code values of true change from which flicker is judged
 
 double elapsedMs(std::chrono::steady_clock::time_point since) {
@@ -44,6 +47,7 @@ class Evaluation {
     judgeAppearance();
     judgeUndeformed();
     judgeMoved();
+    if (!options_.sheets.empty()) writeSheet();
     if (!options_.appearance_only) timeFrames();
     return figures_;
   }
@@ -172,6 +176,22 @@ class Evaluation {
     put("seam_drawn_psnr_db", psnr(drawn, in.bgr, seam));
   }
 
+  // Crops of the video and of the same frames with everything edited but nothing moved, all of it drawn, with noise.
+  void writeSheet() const {
+    Renderer renderer(prepared_, without(true, false));
+    BlindSheet sheet(scene_.name);
+    for (int k = 0; k < scene_.frame_count; k += std::max(1, scene_.frame_count / kSheetFrames)) {
+      const FrameInput in = frame(k, [&](std::size_t i, ObjectInFrame& o) {
+        o.edited = true;
+        const auto& poses = truth_.objects[i].poses;
+        if (poses.size() > 1) o.vertices = transformed(prepared_->surfaces[i].object_vertices, poses[k]);
+      });
+      const cv::Mat drawn = renderer.composite(in).bgr;
+      for (const Truth::Object& o : truth_.objects) sheet.add(in.bgr, drawn, cv::boundingRect(in.labels == o.model.index), k);
+    }
+    sheet.write(options_.sheets);
+  }
+
   // Appearances from the key frame alone, under p's light.
   std::vector<Appearance> keyAppearances(const Prepared& p) const {
     std::vector<View> views(1);
@@ -247,8 +267,20 @@ class Evaluation {
     return best;
   }
 
+  // The hole that the plate has, filled from what is around it.
+  double msInpaint() const {
+    cv::Mat image = prepared_->background.plate.clone();
+    image.setTo(cv::Scalar::all(0), prepared_->background.invented);
+    const auto start = std::chrono::steady_clock::now();
+    inpaint(image, prepared_->background.invented, cv::Mat());
+    return elapsedMs(start);
+  }
+
   void timeFrames() {
     put("ms_prepare", ms_prepare_);
+    put("ms_prepare_background", prepared_->background_ms);
+    put("ms_prepare_appearance", prepared_->appearance_ms);
+    put("ms_inpaint", msInpaint());
     put("ms_frame_live", msPerFrame(Quality::kLive));
     put("ms_frame_final", msPerFrame(Quality::kFinal));
   }

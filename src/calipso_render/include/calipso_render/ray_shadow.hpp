@@ -7,6 +7,8 @@
 
 namespace calipso::render {
 
+class RayScene;
+
 // Exact visibility by tracing rays (Embree) to fixed points of the light's disc: for final frames.
 class RayShadow : public Visibility {
  public:
@@ -24,10 +26,7 @@ class RayShadow : public Visibility {
   std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const override;
 
  private:
-  struct Scene;
-  bool blocked(const Eigen::Vector3f& from, int ray) const;
-
-  std::unique_ptr<Scene> scene_;       // empty: nothing casts a shadow
+  std::unique_ptr<const RayScene> scene_;
   std::vector<Eigen::Vector3f> rays_;  // unit, towards the disc
   Eigen::Vector3f axis_h_, axis_s_, axis_t_, low_, high_;  // light space and the occluders' box in it, m
   float spread_ = 0.0f;                // tangent of the angular radius

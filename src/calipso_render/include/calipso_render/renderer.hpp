@@ -92,6 +92,7 @@ struct Prepared {
   cv::Vec3f umbra = {0.4f, 0.4f, 0.4f};  // what the sun's absence leaves of a support plane's brightness
   NoiseModel noise;
   int views = 1;                     // frames that light and texture come from
+  double background_ms = 0.0, appearance_ms = 0.0;  // wall time that plate, and light with appearances, took
   std::vector<std::string> remarks;  // what had to be assumed or invented, for a diagnostic
 };
 
