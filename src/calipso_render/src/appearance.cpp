@@ -294,7 +294,7 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
   a.albedo = widened(pushPull(pictures[0].albedo, pictures[0].trust));
   for (Reflectance& r : pictures) r.albedo = widened(r.albedo);
   TextureFill(used, actors, pictures).run(a);
-  for (int t = 0; t < a.texture.triangleCount(); ++t) a.sources.push_back(sourceOf(a.texture, t));
+  a.findSources();
   return a;
 }
 
@@ -310,6 +310,11 @@ std::vector<Appearance> makeAppearances(const std::vector<View>& views, const st
   std::vector<Appearance> appearances;
   for (std::size_t i = 0; i < moves.size(); ++i) appearances.push_back(makeAppearance(views, suns, i, moves[i], light, gloss));
   return appearances;
+}
+
+void Appearance::findSources() {
+  sources.clear();
+  for (int t = 0; t < texture.triangleCount(); ++t) sources.push_back(sourceOf(texture, t));
 }
 
 cv::Vec3f Appearance::pictureAt(const Eigen::Vector3f& key_position) const {

@@ -1,5 +1,6 @@
 #include "gloss_fit.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -19,6 +20,9 @@ constexpr int kRoughnesses = 24;
 constexpr int kReweightings = 3;
 constexpr double kOutlier = 0.15;     // of the cluster's brightness
 constexpr double kSharp = 0.98;       // of the worst roughness' error: less must remain, or the roughness is not told
+constexpr double kBroad = 0.35;       // m from which a lobe looks like diffuse shading
+constexpr double kNarrowPart = 0.5;   // of its roughness, that a narrow one beside it has at most
+constexpr double kSeenBeside = 15.0;  // rows' mean errors by which the narrow one has to make the fit better
 constexpr double kExplained = 0.97;   // of the error without gloss: less must remain, or no highlight was seen
 
 struct NormalMap {
@@ -92,7 +96,7 @@ void collect(const View& view, int picture, const Actor& actor, const Eigen::Vec
   }
 }
 
-// I_c = x_k a_kc E_c + ks G_c, linear in the clusters' brightness x and in ks.
+// I_c = x_k a_kc E_c + ks G_c + kb B_c, linear in the clusters' brightness x, in ks and in kb.
 struct Row {
   int cluster;
   cv::Vec3f diffuse, radiance, sun, mirrored;  // a E; I; L V; F A S
@@ -103,32 +107,60 @@ struct Solution {
   double strength = 0.0, cost = 1e30;
 };
 
-// @param lobe per row; nullptr: no gloss
-Solution solve(const std::vector<Row>& rows, const std::vector<double>* lobe, int clusters) {
+// Lobes of the rows whose strengths are unknown: the one in question, and a broad one beside it. nullptr: there is none.
+struct Lobes {
+  const std::vector<double>* own = nullptr;
+  const std::vector<double>* broad = nullptr;
+};
+
+// Normal equations of the lobes' strengths, the clusters' brightness eliminated: each cluster meets only itself and them.
+struct Reduced {
+  std::vector<double> dd, di;
+  std::vector<Eigen::Vector2d> dg;
+  Eigen::Matrix2d gg = 1e-12 * Eigen::Matrix2d::Identity();
+  Eigen::Vector2d gi = Eigen::Vector2d::Zero();
+  explicit Reduced(int clusters) : dd(clusters, 1e-9), di(clusters, 0.0), dg(clusters, Eigen::Vector2d::Zero()) {}
+  void add(int k, double w, double d, const Eigen::Vector2d& g, double x) {
+    dd[k] += w * d * d, dg[k] += w * d * g, di[k] += w * d * x, gg += w * g * g.transpose(), gi += w * g * x;
+  }
+  Eigen::Vector2d strengths() const {
+    Eigen::Matrix2d left = gg;
+    Eigen::Vector2d right = gi;
+    for (std::size_t k = 0; k < dd.size(); ++k) left -= dg[k] * dg[k].transpose() / dd[k], right -= dg[k] * di[k] / dd[k];
+    const auto alone = [&](int i) { return left(i, i) > 1e-12 ? std::max(0.0, right[i] / left(i, i)) : 0.0; };
+    const double determinant = left.determinant();
+    if (determinant > 1e-9 * left(0, 0) * left(1, 1)) {
+      const Eigen::Vector2d both = left.inverse() * right;
+      if (both.minCoeff() >= 0.0) return both;
+    }
+    // No strength is negative: then one of them is 0, the one that explains less alone.
+    const Eigen::Vector2d own(alone(0), 0.0), broad(0.0, alone(1));
+    return right.dot(own) >= right.dot(broad) ? own : broad;
+  }
+};
+
+Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
   std::vector<double> weights(rows.size(), 1.0);
   Solution solution;
+  const auto glossOf = [&](std::size_t i, int c) {
+    const double mirrored = rows[i].mirrored[c];  // goes with the broader one
+    const double own = lobes.own == nullptr ? 0.0 : rows[i].sun[c] * (*lobes.own)[i] + (lobes.broad == nullptr ? mirrored : 0.0);
+    return Eigen::Vector2d(own, lobes.broad == nullptr ? 0.0 : rows[i].sun[c] * (*lobes.broad)[i] + mirrored);
+  };
   for (int round = 0; round < kReweightings; ++round) {
-    // The clusters' unknowns are eliminated: each meets only itself and ks.
-    std::vector<double> dd(clusters, 1e-9), dg(clusters, 0.0), di(clusters, 0.0);
-    double gg = 1e-12, gi = 0.0;
-    const auto glossOf = [&](std::size_t i, int c) { return lobe == nullptr ? 0.0 : rows[i].sun[c] * (*lobe)[i] + rows[i].mirrored[c]; };
+    Reduced sums(clusters);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double w = weights[i] / (rows[i].scale * rows[i].scale);
-      for (int c = 0; c < 3; ++c) {
-        const double d = rows[i].diffuse[c], g = glossOf(i, c), x = rows[i].radiance[c];
-        dd[rows[i].cluster] += w * d * d, dg[rows[i].cluster] += w * d * g, di[rows[i].cluster] += w * d * x, gg += w * g * g, gi += w * g * x;
-      }
+      for (int c = 0; c < 3; ++c) sums.add(rows[i].cluster, w, rows[i].diffuse[c], glossOf(i, c), rows[i].radiance[c]);
     }
-    double left = gg, right = gi;
-    for (int k = 0; k < clusters; ++k) left -= dg[k] * dg[k] / dd[k], right -= dg[k] * di[k] / dd[k];
-    solution.strength = left > 1e-12 ? std::max(0.0, right / left) : 0.0;
-    solution.cost = 0.0;
+    const Eigen::Vector2d strengths = sums.strengths();
+    solution.strength = strengths[0], solution.cost = 0.0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const int k = rows[i].cluster;
-      const double brightness = (di[k] - solution.strength * dg[k]) / dd[k];
+      const double brightness = (sums.di[k] - strengths.dot(sums.dg[k])) / sums.dd[k];
       double squared = 0.0;
       for (int c = 0; c < 3; ++c) {
-        const double r = (brightness * rows[i].diffuse[c] + solution.strength * glossOf(i, c) - rows[i].radiance[c]) / rows[i].scale;
+        const double r = (brightness * rows[i].diffuse[c] + strengths.dot(glossOf(i, c)) - rows[i].radiance[c]) / rows[i].scale;
         if (r < 0.0 || rows[i].radiance[c] < kSaturated) squared += r * r;
       }
       // Cauchy's loss: a highlight that is not explained goes on counting.
@@ -138,6 +170,33 @@ Solution solve(const std::vector<Row>& rows, const std::vector<double>* lobe, in
     }
   }
   return solution;
+}
+
+double roughnessAt(int i) { return kSmoothest * std::pow(kRoughest / kSmoothest, static_cast<double>(i) / kRoughnesses); }
+
+// The pixel averages the lobe: its width and the normals' spread add up (Beckmann's variance per axis is m^2 / 2).
+std::vector<double> lobesOf(const std::vector<HighlightSample>& highlights, const Eigen::Vector3f& light, double m) {
+  std::vector<double> lobes;
+  for (const HighlightSample& h : highlights) {
+    const double wide = std::sqrt(m * m + 2.0 * h.spread * h.spread);
+    lobes.push_back(torranceSparrow(h.at.normal, light, h.at.view, static_cast<float>(wide)));
+  }
+  return lobes;
+}
+
+// A lobe nearly as broad as diffuse shading explains that one's errors too. Where beside it a narrow one is seen, that is the gloss.
+std::optional<Gloss> narrowBeside(const Gloss& broad, const std::vector<Row>& rows, const std::vector<HighlightSample>& highlights,
+                                  const Eigen::Vector3f& light, int clusters) {
+  const std::vector<double> beside = lobesOf(highlights, light, broad.roughness);
+  const double without = solve(rows, {nullptr, &beside}, clusters).cost;
+  double best_cost = without * (1.0 - kSeenBeside / static_cast<double>(rows.size()));
+  std::optional<Gloss> best;
+  for (int i = 0; roughnessAt(i) < kNarrowPart * broad.roughness; ++i) {
+    const std::vector<double> own = lobesOf(highlights, light, roughnessAt(i));
+    const Solution s = solve(rows, {&own, &beside}, clusters);
+    if (s.strength > 0.0 && s.cost < best_cost) best_cost = s.cost, best = {static_cast<float>(s.strength), static_cast<float>(roughnessAt(i))};
+  }
+  return best;
 }
 
 }  // namespace
@@ -171,24 +230,21 @@ std::optional<Gloss> fitGloss(const std::vector<HighlightSample>& highlights, co
     rows.push_back(row);
   }
   const int clusters = static_cast<int>(fit.albedos.size());
-  const double without = solve(rows, nullptr, clusters).cost;
+  const double without = solve(rows, {}, clusters).cost;
   Gloss best;
   double best_cost = kExplained * without;
   double worst = 0.0;
   bool found = false;
   for (int i = 0; i <= kRoughnesses; ++i) {
-    const double m = kSmoothest * std::pow(kRoughest / kSmoothest, static_cast<double>(i) / kRoughnesses);
-    std::vector<double> lobe(rows.size());
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-      // The pixel averages the lobe: its width and the normals' spread add up (Beckmann's variance per axis is m^2 / 2).
-      const double spread = highlights[k].spread, wide = std::sqrt(m * m + 2.0 * spread * spread);
-      lobe[k] = torranceSparrow(highlights[k].at.normal, light.direction, highlights[k].at.view, static_cast<float>(wide));
-    }
-    const Solution s = solve(rows, &lobe, clusters);
+    const std::vector<double> lobe = lobesOf(highlights, light.direction, roughnessAt(i));
+    const Solution s = solve(rows, {&lobe, nullptr}, clusters);
     worst = std::max(worst, s.cost);
-    if (s.strength > 0.0 && s.cost < best_cost) best_cost = s.cost, best = {static_cast<float>(s.strength), static_cast<float>(m)}, found = true;
+    if (s.strength > 0.0 && s.cost < best_cost) best_cost = s.cost, best = {static_cast<float>(s.strength), static_cast<float>(roughnessAt(i))}, found = true;
   }
-  return found && best_cost < kSharp * worst ? std::make_optional(best) : std::nullopt;
+  if (!found || best_cost >= kSharp * worst) return std::nullopt;
+  if (best.roughness < kBroad) return best;
+  const std::optional<Gloss> narrow = narrowBeside(best, rows, highlights, light.direction, clusters);
+  return narrow ? narrow : std::make_optional(best);
 }
 
 }  // namespace calipso::render

@@ -31,6 +31,7 @@ Appearance plainAppearance(const Surface& surface, const Camera& camera) {
   plain.sources.assign(surface.triangles.size(), Appearance::Source::kTexture);
   plain.key_camera = camera;
   plain.mean_light = cv::Vec3f(1.0f, 1.0f, 1.0f);
+  plain.findSources();
   return plain;
 }
 

@@ -21,11 +21,13 @@ class Appearance {
   cv::Mat albedo;
   cv::Rect region;       // of the key frame's picture that albedo covers
   SurfaceTexture texture;  // reflectance, and how far the picture is to be taken instead (0..1)
-  std::vector<Source> sources;  // per triangle: what `texture` says there
+  std::vector<Source> sources;  // per triangle: what `texture` says there; findSources() once that is complete
   Camera key_camera;
   cv::Vec3f mean_light;  // average shading over the seen surface: regularises the relighting
   Gloss gloss;
   float seen_in_key = 0.0f, seen_elsewhere = 0.0f, mirrored = 0.0f;  // parts of the texture's texels; the rest is filled
+
+  void findSources();
 
   // Linear radiance of reflectance `albedo_at` under diffuse shading `now` with highlight `highlight` at its place.
   cv::Vec3f radiance(const cv::Vec3f& albedo_at, const cv::Vec3f& now, const cv::Vec3f& highlight) const;
