@@ -81,6 +81,8 @@ std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
   return targets;
 }
 
+cv::Mat loadKeyImage(const Scene& scene) { return readImage(framePath(scene, 0), cv::IMREAD_COLOR); }
+
 cv::Mat loadStrokes(const Scene& scene) {
   return scene.strokes_path.empty() ? cv::Mat() : readImage(scene.strokes_path, cv::IMREAD_GRAYSCALE);
 }
@@ -108,15 +110,6 @@ KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::M
   result.contours = extractContours(image, result.labels, segmenter.targets());
   result.contour_ms = millisecondsSince(traced);
   return result;
-}
-
-KeyFrame segmentKeyFrame(const cv::Mat& image, const Scene& scene) {
-  Segmenter segmenter = makeSegmenter(image, scene, true);
-  return segmentKeyFrame(image, segmenter, loadStrokes(scene));
-}
-
-KeyFrame segmentKeyFrame(const Scene& scene) {
-  return segmentKeyFrame(readImage(framePath(scene, 0), cv::IMREAD_COLOR), scene);
 }
 
 }  // namespace calipso::align

@@ -141,7 +141,7 @@ TEST(Trust, AModelThatSticksOutOrFallsShortIsNotTrusted) {
   const FitQuality fits = assess(problem, seen.contour, problem.X);
   EXPECT_GT(fits.met, 0.99);
   EXPECT_EQ(fits.protruding, 0.0);
-  EXPECT_TRUE(judge(problem, seen.contour, fits, 1.0).trusted);
+  EXPECT_TRUE(judge(problem, seen.contour, fits, 1.0, {}).trusted);
 
   // One end drawn out: most of the contour is still met.
   Points x = problem.X;
@@ -151,14 +151,14 @@ TEST(Trust, AModelThatSticksOutOrFallsShortIsNotTrusted) {
   }
   const FitQuality drawn = assess(problem, seen.contour, x);
   EXPECT_GT(drawn.protruding, 0.02);
-  EXPECT_FALSE(judge(problem, seen.contour, drawn, 1.0).trusted);
+  EXPECT_FALSE(judge(problem, seen.contour, drawn, 1.0, {}).trusted);
 
   // One end pushed in.
   for (int i = 0; i < x.rows(); ++i) x(i, 1) = std::max(problem.X(i, 1), 0.7 * end);
   const FitQuality pushed = assess(problem, seen.contour, x);
   EXPECT_GT(pushed.open, 0.02);
   EXPECT_EQ(pushed.protruding, 0.0);
-  EXPECT_FALSE(judge(problem, seen.contour, pushed, 1.0).trusted);
+  EXPECT_FALSE(judge(problem, seen.contour, pushed, 1.0, {}).trusted);
 }
 
 }  // namespace

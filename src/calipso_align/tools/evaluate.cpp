@@ -1,13 +1,17 @@
 // rosrun calipso_align evaluate [options] PATH...   one JSON object per case and line, no roscore.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <iostream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <sstream>
 
 #include "calipso_align/metrics.hpp"
 #include "evaluation_case.hpp"
+#include "run_evaluation.hpp"
 
 namespace {
 
@@ -15,21 +19,25 @@ using namespace calipso;
 using namespace calipso::align;
 
 constexpr char kUsage[] =
-    "usage: evaluate [--noise PX,PX,...] [--seeds N] [--nodes N,N] [--no-depth] [--literal] "
-    "PATH...\n"
+    "usage: evaluate [--noise PX,..] [--seeds N] [--deformation D,..] [--nodes N,N] [--no-depth]\n"
+    "                [--literal] [--pictures DIR] PATH...\n"
     "  PATH      a folder with alignment.yaml or scene.yaml\n"
     "  --noise   Gaussian noise on the contour's points, px (default 0)\n"
     "  --seeds   random rough placements up to 10 degrees and 5 % of the distance off instead of\n"
     "            the folder's own\n"
+    "  --deformation  only these cases of an alignment folder, percent (default all)\n"
     "  --nodes   of the grids, coarse to fine (default 600,2000)\n"
     "  --no-depth  leave a scene's depth image unused\n"
-    "  --literal eq. 9 of the paper as it stands\n";
+    "  --literal eq. 9 of the paper as it stands\n"
+    "  --pictures DIR  writes the fitted models' outlines over the pictures, CASE_OBJECT.png\n";
 
 struct Arguments {
   std::vector<std::string> paths;
   std::vector<double> noise = {0.0};
   int seeds = 0;
+  std::vector<double> deformations;
   std::vector<int> nodes;
+  std::string pictures;
   bool use_depth = true;
   bool literal = false;
 };
@@ -47,10 +55,13 @@ Arguments parse(int argc, char** argv) {
   Arguments arguments;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
-    const bool takes_value = word == "--noise" || word == "--seeds" || word == "--nodes";
+    const bool takes_value = word == "--noise" || word == "--seeds" || word == "--nodes" ||
+                             word == "--deformation" || word == "--pictures";
     if (takes_value && ++i >= argc) throw std::invalid_argument(word + " needs a value\n" + kUsage);
     if (word == "--noise") arguments.noise = listOf<double>(argv[i]);
     else if (word == "--seeds") arguments.seeds = std::stoi(argv[i]);
+    else if (word == "--deformation") arguments.deformations = listOf<double>(argv[i]);
+    else if (word == "--pictures") arguments.pictures = argv[i];
     else if (word == "--nodes") arguments.nodes = listOf<int>(argv[i]);
     else if (word == "--no-depth") arguments.use_depth = false;
     else if (word == "--literal") arguments.literal = true;
@@ -193,6 +204,29 @@ void addUnknown(JsonLine& line) {
   }
 }
 
+// Red where the model's outline lies, over the picture around it.
+void drawOutline(const EvaluationCase& one, const Points& x, const std::string& directory) {
+  constexpr int kTimes = 2, kMarginPx = 20, kShift = 4;
+  const DepthRendering rendering = renderDepth(x, one.cad.triangles, one.camera);
+  const cv::Rect roi = cv::Rect(rendering.roi.x - kMarginPx, rendering.roi.y - kMarginPx,
+                                rendering.roi.width + 2 * kMarginPx,
+                                rendering.roi.height + 2 * kMarginPx) &
+                       cv::Rect({}, one.image.size());
+  if (roi.empty()) return;
+  cv::Mat picture;
+  cv::resize(one.image(roi), picture, cv::Size(), kTimes, kTimes, cv::INTER_CUBIC);
+  for (const OutlinePoint& p :
+       occludingContour(x, MeshTopology(one.cad.triangles), rendering, one.camera, 0.5)) {
+    const Eigen::Vector2d at = kTimes * (p.pixel - Eigen::Vector2d(roi.x - 0.5, roi.y - 0.5)) -
+                               Eigen::Vector2d(0.5, 0.5);
+    const cv::Point centre(static_cast<int>(std::lround(at.x() * (1 << kShift))),
+                           static_cast<int>(std::lround(at.y() * (1 << kShift))));
+    cv::circle(picture, centre, 1 << (kShift - 1), cv::Scalar(0, 0, 255), cv::FILLED, cv::LINE_AA,
+               kShift);
+  }
+  cv::imwrite(directory + "/" + one.name + "_" + one.object + ".png", picture);
+}
+
 // Processor time of all threads so far.
 double cpuMs() { return 1e3 * std::clock() / CLOCKS_PER_SEC; }
 
@@ -208,6 +242,11 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   const AlignmentResult result =
       calipso::align::align(one.cad, one.camera, rough, contour, options);
   const double cpu_ms = cpuMs() - cpu_start_ms;
+
+  if (!arguments.pictures.empty() && !one.image.empty()) {
+    drawOutline(one, inCamera(one.camera, result.world_from_object, result.mesh),
+                arguments.pictures);
+  }
 
   JsonLine line;
   line.addText("case", one.name);
@@ -235,8 +274,15 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   return line.text();
 }
 
+bool isAsked(const EvaluationCase& one, const Arguments& arguments) {
+  const std::vector<double>& asked = arguments.deformations;
+  return asked.empty() || !one.deformation_percent ||
+         std::find(asked.begin(), asked.end(), *one.deformation_percent) != asked.end();
+}
+
 void evaluateFolder(const std::string& path, const Arguments& arguments) {
   for (const EvaluationCase& one : loadCases(path, {arguments.use_depth})) {
+    if (!isAsked(one, arguments)) continue;
     for (const double noise : arguments.noise) {
       const int first = arguments.seeds > 0 ? 1 : 0;
       for (int seed = first; seed <= arguments.seeds; ++seed) {
@@ -248,21 +294,4 @@ void evaluateFolder(const std::string& path, const Arguments& arguments) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  int failed = 0;
-  try {
-    const Arguments arguments = parse(argc, argv);
-    for (const std::string& path : arguments.paths) {
-      try {
-        evaluateFolder(path, arguments);
-      } catch (const std::exception& error) {
-        std::cerr << path << ": " << error.what() << "\n";
-        ++failed;
-      }
-    }
-  } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
-    return 2;
-  }
-  return failed > 0 ? 1 : 0;
-}
+int main(int argc, char** argv) { return runEvaluation(argc, argv, parse, evaluateFolder); }

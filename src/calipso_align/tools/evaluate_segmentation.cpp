@@ -16,6 +16,7 @@
 #include "calipso_align/key_frame.hpp"
 #include "calipso_align/mask_tracker.hpp"
 #include "calipso_align/metrics.hpp"
+#include "run_evaluation.hpp"
 
 namespace {
 
@@ -34,7 +35,7 @@ constexpr char kUsage[] =
 struct Arguments {
   bool grabcut = false, track = false, use_depth = true;
   std::string pictures;
-  std::vector<std::string> scenes;
+  std::vector<std::string> paths;
 };
 
 Arguments parse(int argc, char** argv) {
@@ -47,9 +48,9 @@ Arguments parse(int argc, char** argv) {
     else if (word == "--pictures" && i + 1 < argc) arguments.pictures = argv[++i];
     else if (word.rfind("--", 0) == 0)
       throw std::invalid_argument("unknown option or missing value: " + word + "\n" + kUsage);
-    else arguments.scenes.push_back(word);
+    else arguments.paths.push_back(word);
   }
-  if (arguments.scenes.empty()) throw std::invalid_argument(kUsage);
+  if (arguments.paths.empty()) throw std::invalid_argument(kUsage);
   return arguments;
 }
 
@@ -227,21 +228,4 @@ void evaluate(const std::string& path, const Arguments& arguments) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  int failed = 0;
-  try {
-    const Arguments arguments = parse(argc, argv);
-    for (const std::string& path : arguments.scenes) {
-      try {
-        evaluate(path, arguments);
-      } catch (const std::exception& error) {
-        std::cerr << path << ": " << error.what() << "\n";
-        ++failed;
-      }
-    }
-  } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
-    return 2;
-  }
-  return failed > 0 ? 1 : 0;
-}
+int main(int argc, char** argv) { return runEvaluation(argc, argv, parse, evaluate); }

@@ -27,6 +27,7 @@ struct EvaluationCase {
   TriangleMesh cad;
   Eigen::Isometry3d rough = Eigen::Isometry3d::Identity();
   std::vector<ContourLoop> contour;
+  cv::Mat image;                        // the key frame; empty: none
   AlignOptions options;                 // planes, attachments and depth of the scene
   std::optional<double> ms_segment;
   std::optional<double> segmentation_iou;

@@ -65,7 +65,9 @@ std::vector<EvaluationCase> loadSceneFolder(const std::string& directory,
                                             const CaseOptions& options) {
   const Scene scene = loadScene(directory);
   const YAML::Node root = YAML::LoadFile(directory + "/scene.yaml");
-  const KeyFrame key = segmentKeyFrame(scene);
+  const cv::Mat image = loadKeyImage(scene);
+  Segmenter segmenter = makeSegmenter(image, scene, options.use_depth);
+  const KeyFrame key = segmentKeyFrame(image, segmenter, loadStrokes(scene));
   const cv::Mat1b labels = trueLabels(scene);
   std::vector<EvaluationCase> cases;
   for (size_t k = 0; k < scene.objects.size(); ++k) {
@@ -77,6 +79,7 @@ std::vector<EvaluationCase> loadSceneFolder(const std::string& directory,
     one.cad = loadMesh(object.cad_path);
     one.rough = object.initial_world_from_object;
     one.contour = key.contours[k].loops;
+    one.image = image;
     one.options.planes = scene.planes;
     one.options.attachments = object.attachments;
     if (options.use_depth) one.options.depth = loadDepth(scene);

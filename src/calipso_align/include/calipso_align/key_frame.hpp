@@ -31,6 +31,9 @@ std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
 // this very picture. @throw std::runtime_error naming a file that cannot be read
 Segmenter makeSegmenter(const cv::Mat& image, const Scene& scene, bool use_depth);
 
+// Frame 0 (CV_8UC3, BGR). @throw std::runtime_error naming the file
+cv::Mat loadKeyImage(const Scene& scene);
+
 // The scene's strokes (CV_8U), empty when it has none. @throw std::runtime_error naming the file
 cv::Mat loadStrokes(const Scene& scene);
 
@@ -41,11 +44,5 @@ std::vector<ObjectContour> extractContours(const cv::Mat& image, const cv::Mat& 
 // Segments with these strokes (CV_8U or empty) and traces the contours; `image` is the segmenter's.
 // @throw std::invalid_argument naming object, value and remedy
 KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::Mat& strokes);
-
-// Segments frame 0 (CV_8UC3, BGR) of a scene from what its user gave: rectangles and strokes.
-KeyFrame segmentKeyFrame(const cv::Mat& image, const Scene& scene);
-
-// The same, reading the frame from the scene's folder.
-KeyFrame segmentKeyFrame(const Scene& scene);
 
 }  // namespace calipso::align
