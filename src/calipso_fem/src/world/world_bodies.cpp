@@ -183,8 +183,18 @@ void World::Impl::rebuild(Actor& actor) {
 }
 
 const std::vector<TriangleMesh>& World::Impl::hullsOf(Actor& actor) {
-  if (actor.hulls.empty()) actor.hulls = decomposeConvex(actor.object.mesh);
-  return actor.hulls;
+  if (!actor.hulls.empty()) return actor.hulls;
+  const TriangleMesh& mesh = actor.object.mesh;
+  const auto same = [](const auto& a, const auto& b) {
+    return a.rows() == b.rows() && (a.array() == b.array()).all();
+  };
+  const auto known =
+      std::find_if(decompositions.begin(), decompositions.end(), [&](const Decomposition& d) {
+        return same(d.mesh.vertices, mesh.vertices) && same(d.mesh.triangles, mesh.triangles);
+      });
+  if (known != decompositions.end()) return actor.hulls = known->hulls;
+  decompositions.push_back({mesh, decomposeConvex(mesh)});
+  return actor.hulls = decompositions.back().hulls;
 }
 
 void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {

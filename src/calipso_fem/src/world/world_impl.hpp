@@ -58,7 +58,7 @@ struct World::Impl {
   void copySoft(Actor& copy, const Actor& source, const Eigen::Isometry3d& motion);
   void addColliders();
   void addCollider(Actor& actor);
-  const std::vector<TriangleMesh>& hullsOf(Actor& actor);
+  const std::vector<TriangleMesh>& hullsOf(Actor& actor);  // computed once per mesh
   void wake(Actor& actor);
 
   // Contacts and forces of a step (world_step.cpp)
@@ -129,6 +129,12 @@ struct World::Impl {
   std::vector<Edit> waiting;  // for a collision in the video that is not known yet
   bool collisions_known = false;
   bool plan_changed = true;
+
+  struct Decomposition {
+    TriangleMesh mesh;
+    std::vector<TriangleMesh> hulls;
+  };
+  std::vector<Decomposition> decompositions;  // of the objects' meshes; copies share one
 };
 
 // Defaults completed by what the user set. (world.cpp)

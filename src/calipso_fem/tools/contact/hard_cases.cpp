@@ -85,13 +85,14 @@ std::vector<Result> clothOnEdge() {
   return {resultOf("depth of a cloth in the edge it hangs over, m", deepest, 0.0, scene, watch, 3.0)};
 }
 
+// NOTE: a column of one piece buckles under its own weight above (7.84 E I / q)^(1/3): 1.4 m for these.
 std::vector<Result> stackOfFive() {
   SoftScene scene;
   scene.surface.friction = 0.5;
   scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
   for (int i = 0; i < 5; ++i)
     scene.addSoft(movedMesh(boxSurface({0.2, 0.2, 0.2}, 4), {0.005 * (i % 2), 0, 0.101 + 0.201 * i}),
-                  {1e5, 0.3, 500.0, 0.02}, 0.05);
+                  {5e5, 0.3, 500.0, 0.02}, 0.05);
   Watch watch;
   watch.scale = 5 * 4.0 * kG * 0.5;
   watch.play(scene, 60.0, kFrame);
@@ -144,7 +145,7 @@ std::vector<Result> frictionExtremes() {
     const double e0 = scene.energy();
     Watch watch;
     watch.scale = e0;
-    watch.play(scene, 1.0, 1.0 / 60.0);
+    watch.play(scene, 1.0, 1.0 / 480.0);  // it stands after 51 ms
     const double way = soft.body().momentum().center.x();
     // Without friction 1 m; with friction 2 the block stands after v^2 / 2 mu g if it does not tip.
     results.push_back(resultOf("way of a soft block at 1 m/s in 1 s, friction " + std::to_string(mu) +
