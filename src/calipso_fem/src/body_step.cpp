@@ -174,10 +174,11 @@ Vec DeformableBody::Impl::startAcceleration(const Vec& loads) {
 }
 
 // NOTE: backward Euler slows the turning of a free body by (omega h)^2 in every step. Its change of
-// angular momentum is set to what the external forces give it: a rigid rotation about the centre of
-// mass is added to the velocities.
+// angular momentum is set to what the external forces give it. (y - x) / h is the velocity in the middle of the
+// step, along the chord: it is turned by half the step's rotation; then a rigid rotation about the centre of mass is
+// added.
 void DeformableBody::Impl::keepAngularMomentum(const Momentum& before, const Vec& loads, double h) {
-  const Momentum now = momentum();
+  Momentum now = momentum();
   Vec force = -loads;
   Integrator i;
   i.rate = 1.0 / h;
@@ -200,8 +201,15 @@ void DeformableBody::Impl::keepAngularMomentum(const Momentum& before, const Vec
           Eigen::Vector3d::Unit(axis).cross(Eigen::Vector3d(x.segment<3>(k) - now.center));
     inertia.col(axis) = momentOf(applyMass(spin[axis]));
   }
-  const Eigen::Vector3d turn = inertia.ldlt().solve(target - now.angular);
-  if (!turn.allFinite()) return;
+  const auto solver = inertia.ldlt();
+  const Eigen::Vector3d half = 0.5 * h * solver.solve(target);
+  if (!half.allFinite()) return;
+  const Eigen::Vector3d drift = now.linear / model->totalMass();
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(half.norm(), half.stableNormalized()).toRotationMatrix();
+  for (Eigen::Index k = 0; k < v.size(); k += 3)
+    v.segment<3>(k) = drift + R * (Eigen::Vector3d(v.segment<3>(k)) - drift);
+  now = momentum();
+  const Eigen::Vector3d turn = solver.solve(target - now.angular);
   for (int axis = 0; axis < 3; ++axis) v += turn[axis] * spin[axis];
 }
 
