@@ -57,24 +57,44 @@ void evaluateMeanDilatation(const ElementKind& kind, const CornerMatrix& x, int 
   if (derivatives == 2) r->K += kappa / ref.volume * mean * mean.transpose();
 }
 
-// NOTE: St. Venant-Kirchhoff depends on F^T F only and cannot tell an inverted element from a
-// sound one. kappa/2 (J - J0)^2 below J0 pushes it back; J0 lies far below what it is valid for.
+// Smoothstep from 0 at kRecoveryDilatation to 1 at det F = 0, with its derivatives by det F.
+struct Activation {
+  double s = 1.0, ds = 0.0, dds = 0.0;
+  explicit Activation(double J) {
+    const double t = 1.0 - J / kRecoveryDilatation;
+    if (t >= 1.0) return;
+    s = t * t * (3.0 - 2.0 * t);
+    ds = -6.0 * t * (1.0 - t) / kRecoveryDilatation;
+    dds = 6.0 * (1.0 - 2.0 * t) / (kRecoveryDilatation * kRecoveryDilatation);
+  }
+};
+
+// NOTE: St. Venant-Kirchhoff depends on F^T F only, cannot tell an inverted element from a sound one, and has no
+// force in a collapsed one. Below J0, far below what it is valid for, kappa/2 (J - J0)^2 + s(J) psi_corot pushes it
+// back: the first raises J, the second has a force at any F but a rotation.
 void addRecovery(const ElementKind& kind, const CornerMatrix& x, int derivatives, Part part,
                  ElementResult* r) {
   const ReferenceElement& ref = *kind.reference;
+  const auto outer = [](const Matrix3d& A, const Matrix3d& B) -> Matrix9d {
+    return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(A.data()) *
+           Eigen::Map<const Eigen::Matrix<double, 1, 9>>(B.data());
+  };
   for (int q = 0; q < ref.points; ++q) {
     const Matrix3d F = x.transpose() * ref.gradient[q];
-    if (F.determinant() >= kRecoveryDilatation) continue;
+    const double J = F.determinant(), w = ref.weight[q];
+    if (J >= kRecoveryDilatation) continue;
     const Lame lame{kind.lame.lambda + 2.0 * kind.lame.mu, 0.0};
-    MaterialSplit s = evaluateSplit(MaterialModel::kStableNeoHookeanNoLog, lame, F, derivatives);
-    s.g += 1.0 - kRecoveryDilatation;
-    r->energy += ref.weight[q] * 0.5 * s.kappa * s.g * s.g;
+    MaterialSplit d = evaluateSplit(MaterialModel::kStableNeoHookeanNoLog, lame, F, derivatives);
+    d.g += 1.0 - kRecoveryDilatation;   // J - J0
+    const MaterialSplit c = evaluateSplit(MaterialModel::kCorotated, kind.lame, F, derivatives);
+    const Activation a(J);
+    r->energy += w * (0.5 * d.kappa * d.g * d.g + a.s * c.energy());
     if (derivatives < 1) continue;
-    addForce(ref.gradient[q], s.kappa * s.g * s.dg, ref.weight[q], &r->f);
+    addForce(ref.gradient[q], (d.kappa * d.g + a.ds * c.energy()) * d.dg + a.s * c.stress(), w, &r->f);
     if (derivatives < 2) continue;
-    const Matrix9d H = s.tangent();
-    addTangent(ref.gradient[q], part == Part::kPositive ? projectPositive(H) : H, ref.weight[q],
-               &r->K);
+    const Matrix9d H = d.tangent() + a.dds * c.energy() * outer(d.dg, d.dg) + a.ds * c.energy() * d.ddg +
+                       a.ds * (outer(d.dg, c.stress()) + outer(c.stress(), d.dg)) + a.s * c.tangent();
+    addTangent(ref.gradient[q], part == Part::kPositive ? projectPositive(H) : H, w, &r->K);
   }
 }
 

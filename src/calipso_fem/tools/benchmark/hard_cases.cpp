@@ -12,11 +12,15 @@ namespace calipso::fem {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-const Eigen::Vector3i kCells(16, 4, 4);
 
 // One run: a clamped beam, what is done to it, and for how long.
 struct Setup {
-  VolumeMesh mesh = boxMesh({0, 0, 0}, {1.0, 0.25, 0.25}, kCells);
+  explicit Setup(int across, double length = 1.0)
+      : cells(4 * across, across, across),
+        mesh(boxMesh({0, 0, 0}, length * Eigen::Vector3d(1.0, 0.25, 0.25), cells)) {}
+
+  Eigen::Vector3i cells;
+  VolumeMesh mesh;
   Material material{1e6, 0.3, 1000.0, 0.0};
   FemOptions options;
   double h = 1.0 / 30.0;
@@ -109,17 +113,16 @@ void bump(DeformableBody* body) {
 }
 
 // The time a body takes grows with its length: the same motion, at another scale.
-Setup scaled(double length) {
-  Setup s;
-  s.mesh = boxMesh({0, 0, 0}, length * Eigen::Vector3d(1.0, 0.25, 0.25), kCells);
+Setup scaled(int across, double length) {
+  Setup s(across, length);
   s.start = bump;
   s.h = length / 30.0;
   return s;
 }
 
 // Adrift and turning, without any force.
-Setup adrift() {
-  Setup s;
+Setup adrift(int) {
+  Setup s(1);
   s.mesh = boxMesh({0, 0, 0}, {0.3, 0.2, 0.1}, {3, 2, 1});
   s.clamped = false;
   s.steps = 10000;
@@ -130,23 +133,23 @@ Setup adrift() {
   return s;
 }
 
-Setup almostEmptyCells() {
-  Setup s;
+Setup almostEmptyCells(int across) {
+  Setup s(across);
   for (int c = 0; c < s.mesh.cellCount(); ++c)
-    if (c / kCells.x() % kCells.y() == kCells.y() - 1) s.mesh.fraction[c] = 1e-4;
+    if (c / s.cells.x() % across == across - 1) s.mesh.fraction[c] = 1e-4;
   s.start = stretch;
   return s;
 }
 
-const std::map<std::string, std::function<Setup()>>& setups() {
+const std::map<std::string, std::function<Setup(int)>>& setups() {
   static const auto with = [](auto change) {
-    return [change] {
-      Setup s;
+    return [change](int across) {
+      Setup s(across);
       change(&s);
       return s;
     };
   };
-  static const std::map<std::string, std::function<Setup()>> kSetups = {
+  static const std::map<std::string, std::function<Setup(int)>> kSetups = {
       {"stretched 3x", with([](Setup* s) { s->start = stretch; })},
       {"twisted by 720 degrees", with([](Setup* s) { s->start = twist; })},
       {"squashed flat", with([](Setup* s) { s->start = squash; })},
@@ -159,8 +162,8 @@ const std::map<std::string, std::function<Setup()>>& setups() {
       {"h = 0.2 s", with([](Setup* s) { s->h = 0.2; s->start = stretch; })},
       {"pulled by 1000 times its weight", with([](Setup* s) { s->before_step = pullHard; s->least_steps = 61; })},
       {"filled fraction 1e-4", almostEmptyCells},
-      {"1 mm object", [] { return scaled(1e-3); }},
-      {"100 m object", [] { return scaled(100.0); }},
+      {"1 mm object", [](int across) { return scaled(across, 1e-3); }},
+      {"100 m object", [](int across) { return scaled(across, 100.0); }},
       {"unconstrained for 10,000 steps", adrift},
   };
   return kSetups;
@@ -192,10 +195,10 @@ std::vector<std::string> hardCaseNames() {
   return names;
 }
 
-HardCaseResult runHardCase(const std::string& name, MaterialModel material) {
+HardCaseResult runHardCase(const std::string& name, MaterialModel material, int across) {
   const auto it = setups().find(name);
   if (it == setups().end()) throw std::invalid_argument("hard case '" + name + "' is unknown");
-  Setup s = it->second();
+  Setup s = it->second(across);
   s.options.material_model = material;
   DeformableBody body(s.mesh, s.material, s.options);
   for (int i = 0; s.clamped && i < body.nodeCount(); ++i)

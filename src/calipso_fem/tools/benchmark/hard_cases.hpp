@@ -27,7 +27,7 @@ struct HardCaseResult {
 
 // All of them, in a fixed order. `material` in {stvk, snh, corot}.
 std::vector<std::string> hardCaseNames();
-// @throw std::invalid_argument for an unknown name
-HardCaseResult runHardCase(const std::string& name, MaterialModel material);
+// On a beam of 4 across x across x across cells. @throw std::invalid_argument for an unknown name
+HardCaseResult runHardCase(const std::string& name, MaterialModel material, int across = 4);
 
 }  // namespace calipso::fem
