@@ -283,6 +283,10 @@ SolveReport HexSolver::solve(const Vec& b, double tolerance, int most_iterations
     x->setZero();
     return solve(b, tolerance, most_iterations, x);
   }
+  if (!report.preconditioner_positive && multigrid_.widen()) {
+    x->setZero();
+    return solve(b, tolerance, most_iterations, x);
+  }
   return report;
 }
 
@@ -381,10 +385,10 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
     const double first = cg.start(b, *solution, scale);
     double residual = first;
     int iteration = 0;
-    bool positive = true;
+    bool positive = true, turned = true;
     for (; positive && iteration < most_iterations && !(residual <= tolerance * scale); ++iteration) {
-      positive = cg.turn(residual, iteration == 0);
-      const std::optional<double> next = positive ? cg.advance() : std::nullopt;
+      turned = cg.turn(residual, iteration == 0);
+      const std::optional<double> next = turned ? cg.advance() : std::nullopt;
       positive = next.has_value();
       residual = next.value_or(residual);
     }
@@ -393,6 +397,7 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
     report.iterations = iteration;
     decades_ = iteration > 0 && residual > 0.0 ? std::log10(first / residual) : 0.0;
     report.positive = positive;
+    report.preconditioner_positive = turned;
     report.residual = scale > 0.0 ? residual / scale : residual;
     report.converged = positive && residual <= tolerance * scale;
   });

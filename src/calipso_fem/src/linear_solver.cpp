@@ -64,6 +64,7 @@ SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditio
     const double curvature = p.dot(Ap);
     if (!(curvature > 0.0) || !(rz > 0.0)) {
       report.positive = false;
+      report.preconditioner_positive = rz > 0.0;
       break;
     }
     const double step = rz / curvature;
@@ -102,7 +103,9 @@ bool LinearSolver::setMatrix(const BlockMatrix& A) {
 SolveReport LinearSolver::solve(const Vec& b, double tolerance, int most_iterations, Vec* x) {
   if (current_ && preconditioner_->isExact()) {
     preconditioner_->apply(b, *x);
-    return {true, true, 0, 0.0};
+    SolveReport exact;
+    exact.converged = true;
+    return exact;
   }
   SolveReport report =
       conjugateGradients(*A_, *preconditioner_, b, tolerance, most_iterations, x);
@@ -110,6 +113,10 @@ SolveReport LinearSolver::solve(const Vec& b, double tolerance, int most_iterati
   if (fresh_iterations_ == 0) fresh_iterations_ = std::max(1, report.iterations);
   // A worn preconditioner can make CG stall; a fresh one gets a second chance.
   if (!report.converged && !current_ && refresh()) {
+    x->setZero();
+    return solve(b, tolerance, most_iterations, x);
+  }
+  if (!report.preconditioner_positive && preconditioner_->widen()) {
     x->setZero();
     return solve(b, tolerance, most_iterations, x);
   }

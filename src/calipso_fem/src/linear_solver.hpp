@@ -11,6 +11,7 @@ namespace calipso::fem {
 
 struct SolveReport {
   bool positive = true;      // false: A has shown a direction of negative curvature
+  bool preconditioner_positive = true;
   bool converged = false;
   int iterations = 0;
   double residual = 0.0;     // |b - A x| / |b|

@@ -175,6 +175,18 @@ bool Multigrid::updateCoarse() {
   return hasCoarse() ? factorizeCoarsest() : true;
 }
 
+// x^T A x <= 8 x^T D x, because every cell has eight corners.
+bool Multigrid::widen() {
+  constexpr float kBound = 8.0f, kFactor = 1.5f;
+  bool wider = false;
+  for (std::size_t l = 0; l + 1 < levels_.size(); ++l) {
+    float& lambda = levels_[l].lambda_max;
+    wider = wider || lambda < kBound;
+    lambda = std::min(kBound, kFactor * lambda);
+  }
+  return wider;
+}
+
 bool Multigrid::factorizeCoarsest() {
   const Eigen::MatrixXd A = Eigen::MatrixXd(levels_.back().own.toSparse());
   const Eigen::LLT<Eigen::MatrixXd> llt(A);
@@ -352,6 +364,8 @@ class AssembledMultigrid : public Preconditioner {
   explicit AssembledMultigrid(const VolumeMesh& mesh) : cycle_(mesh.lattice), nodes_(mesh.nodeCount()) {}
 
   bool update(const BlockMatrix& A) override { return cycle_.update(A); }
+
+  bool widen() override { return cycle_.widen(); }
 
   void apply(const Vec& r, Vec& z) override {
     z.resize(r.size());

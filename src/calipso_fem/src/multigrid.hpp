@@ -37,6 +37,10 @@ class Multigrid {
   // The same for an assembled finest level.
   bool update(const BlockMatrix& A);
 
+  // Smooths for larger eigenvalues than were estimated, up to their bound. False: it has been reached. For cycles
+  // that have shown not to be positive definite.
+  bool widen();
+
   float* rightSide() { return levels_.front().b.data(); }
   const float* result() const { return levels_.front().z.data(); }
   // result ~ A^-1 rightSide. Called by every thread of a region, with a barrier before.

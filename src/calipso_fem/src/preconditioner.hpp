@@ -14,6 +14,8 @@ class Preconditioner {
   // Takes over the values of A; the pattern is that of construction. False: A is not positive
   // definite as far as this preconditioner can tell.
   virtual bool update(const BlockMatrix& A) = 0;
+  // After it has shown not to be positive definite: makes it more so. False: nothing can be done.
+  virtual bool widen() { return false; }
   virtual void apply(const Vec& r, Vec& z) = 0;
   // True when apply() solves A z = r to round-off for the matrix of the last update().
   virtual bool isExact() const { return false; }

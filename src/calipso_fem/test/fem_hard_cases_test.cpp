@@ -5,30 +5,36 @@
 namespace calipso::fem {
 namespace {
 
-class HardCase : public testing::TestWithParam<std::tuple<std::string, MaterialModel>> {};
+class HardCase : public testing::TestWithParam<std::tuple<std::string, MaterialModel, int>> {};
 
 TEST_P(HardCase, StaysFiniteGainsNoEnergyAndComesBack) {
-  const auto& [name, material] = GetParam();
-  const HardCaseResult r = runHardCase(name, material);
+  const auto& [name, material, across] = GetParam();
+  const HardCaseResult r = runHardCase(name, material, across);
   EXPECT_TRUE(r.finite);
-  // Newton stops at a relative residual of 1e-4, which leaves that much of the work in doubt.
-  EXPECT_LE(r.energy_growth, 1e-4);
+  // A body adrift settles to its spin within some steps; then rounding is left.
+  EXPECT_LE(r.energy_growth, 1e-8);
   EXPECT_LT(r.displacement, 1e-3);
   EXPECT_LT(r.momentum_error, 1e-6);
 }
 
-// All of them with the default material, a short one with another: the benchmark runs them all with three.
-std::vector<std::tuple<std::string, MaterialModel>> allCases() {
-  std::vector<std::tuple<std::string, MaterialModel>> cases;
-  for (const std::string& name : hardCaseNames())
-    cases.emplace_back(name, MaterialModel::kStVenantKirchhoff);
-  cases.emplace_back("squashed flat", MaterialModel::kCorotated);
+// All of them with the default material on 81 and 425 nodes, a short one with another: the benchmark runs them all
+// with three.
+std::vector<std::tuple<std::string, MaterialModel, int>> allCases() {
+  std::vector<std::tuple<std::string, MaterialModel, int>> cases;
+  for (const int across : {2, 4})
+    for (const std::string& name : hardCaseNames())
+      if (across == 4 || name.find("unconstrained") == std::string::npos)   // has a grid of its own
+        cases.emplace_back(name, MaterialModel::kStVenantKirchhoff, across);
+  cases.emplace_back("squashed flat", MaterialModel::kCorotated, 4);
+  // 756 nodes are solved without a matrix: its smoother has to be widened on the way.
+  cases.emplace_back("twisted by 720 degrees", MaterialModel::kStVenantKirchhoff, 5);
   return cases;
 }
 
 INSTANTIATE_TEST_SUITE_P(
     AllMaterials, HardCase, testing::ValuesIn(allCases()), [](const auto& info) {
-      std::string name = std::get<0>(info.param) + "_" + toString(std::get<1>(info.param));
+      std::string name = std::get<0>(info.param) + "_" + toString(std::get<1>(info.param)) + "_" +
+                         std::to_string(std::get<2>(info.param));
       for (char& c : name)
         if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
       return name;

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <functional>
 #include <map>
 #include <random>
@@ -195,7 +196,8 @@ std::vector<std::string> hardCaseNames() {
   return names;
 }
 
-HardCaseResult runHardCase(const std::string& name, MaterialModel material, int across) {
+HardCaseResult runHardCase(const std::string& name, MaterialModel material, int across,
+                           double most_cpu_seconds) {
   const auto it = setups().find(name);
   if (it == setups().end()) throw std::invalid_argument("hard case '" + name + "' is unknown");
   Setup s = it->second(across);
@@ -212,7 +214,9 @@ HardCaseResult runHardCase(const std::string& name, MaterialModel material, int 
   Vec load = Vec::Zero(3 * body.nodeCount());
   const Momentum start = body.momentum();
   double largest = 0.0;
-  for (; r.steps < s.steps && r.finite; ++r.steps) {
+  const std::clock_t begin = std::clock();
+  const auto seconds = [begin] { return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC; };
+  for (; r.steps < s.steps && r.finite && seconds() < most_cpu_seconds; ++r.steps) {
     // What changes between two steps may change the energy; the step itself may not add any.
     s.before_step(&body, &load, r.steps);
     const double before = totalEnergy(body, load);

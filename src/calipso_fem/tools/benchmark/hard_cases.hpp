@@ -27,7 +27,9 @@ struct HardCaseResult {
 
 // All of them, in a fixed order. `material` in {stvk, snh, corot}.
 std::vector<std::string> hardCaseNames();
-// On a beam of 4 across x across x across cells. @throw std::invalid_argument for an unknown name
-HardCaseResult runHardCase(const std::string& name, MaterialModel material, int across = 4);
+// On a beam of 4 across x across x across cells; ends after so much CPU time at the latest.
+// @throw std::invalid_argument for an unknown name
+HardCaseResult runHardCase(const std::string& name, MaterialModel material, int across,
+                           double most_cpu_seconds = 1e9);
 
 }  // namespace calipso::fem
