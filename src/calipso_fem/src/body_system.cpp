@@ -239,6 +239,7 @@ bool DeformableBody::Impl::setMatrixFreeSystem(const Vec& y, const Integrator& i
   prepareElastic(y);
   if (!elastic.has_stresses || elastic.positive != positive) evaluateHexes(y, true, positive);
   HexSystem system;
+  system.positive = positive;
   system.inertia = i.inertia + i.rate * options.mass_damping;
   system.factor = 1.0 + i.rate * damping();
   for (const SoftTerm& term : soft) {
@@ -267,7 +268,7 @@ bool DeformableBody::Impl::setSystem(const Vec& y, const Integrator& i, Definite
   assemble(y, i, definiteness);
   if (jump) A.multiply(*jump, *AJ);
   eliminate(prescribed, &A);
-  return solver->setMatrix(A);
+  return solver->setMatrix(A, definiteness == Definiteness::kPositive);
 }
 
 SolveReport DeformableBody::Impl::solveSystem(const Vec& b, double linear_tolerance, Vec* direction) {

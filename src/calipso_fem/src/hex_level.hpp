@@ -17,6 +17,7 @@ struct SpringBlock {
 
 // A = factor K_material(x) + K_geometric(x) + inertia M + springs, rows and columns of fixed components out.
 struct HexSystem {
+  bool positive = false;          // known to be positive definite
   double factor = 1.0;            // 1 + rate * stiffness damping
   double inertia = 0.0;           // 1/s^2, times the lumped mass
   std::vector<SpringBlock> springs;

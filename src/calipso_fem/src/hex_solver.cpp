@@ -283,7 +283,8 @@ SolveReport HexSolver::solve(const Vec& b, double tolerance, int most_iterations
     x->setZero();
     return solve(b, tolerance, most_iterations, x);
   }
-  if (!report.preconditioner_positive && multigrid_.widen()) {
+  if (!report.preconditioner_positive && system_.positive && multigrid_.widen()) {
+    stale_ = true;   // the next system gets its own smoothers
     x->setZero();
     return solve(b, tolerance, most_iterations, x);
   }

@@ -92,8 +92,9 @@ bool LinearSolver::refresh() {
   return true;
 }
 
-bool LinearSolver::setMatrix(const BlockMatrix& A) {
+bool LinearSolver::setMatrix(const BlockMatrix& A, bool positive) {
   A_ = &A;
+  positive_ = positive;
   current_ = false;
   const bool keeps = kind_ == SolverKind::kStaleCholesky || kind_ == SolverKind::kMultigrid;
   const bool worn = last_iterations_ > kStaleFactor * fresh_iterations_ + kStaleSlack;
@@ -116,7 +117,8 @@ SolveReport LinearSolver::solve(const Vec& b, double tolerance, int most_iterati
     x->setZero();
     return solve(b, tolerance, most_iterations, x);
   }
-  if (!report.preconditioner_positive && preconditioner_->widen()) {
+  if (!report.preconditioner_positive && positive_ && preconditioner_->widen()) {
+    stale_ = true;
     x->setZero();
     return solve(b, tolerance, most_iterations, x);
   }

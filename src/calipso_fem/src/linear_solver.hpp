@@ -35,7 +35,7 @@ class LinearSolver {
   LinearSolver(const VolumeMesh& mesh, SolverKind kind);
 
   // @pre A stays unchanged until the last solve() with it
-  bool setMatrix(const BlockMatrix& A);
+  bool setMatrix(const BlockMatrix& A, bool positive = false);
   SolveReport solve(const Vec& b, double tolerance, int most_iterations, Vec* x);
   SolverKind kind() const { return kind_; }
   // The next setMatrix() rebuilds the preconditioner whatever its age.
@@ -47,6 +47,7 @@ class LinearSolver {
   SolverKind kind_;
   std::unique_ptr<Preconditioner> preconditioner_;
   const BlockMatrix* A_ = nullptr;
+  bool positive_ = false;   // A is known to be positive definite
   bool stale_ = true;          // nothing usable in the preconditioner
   bool current_ = false;       // the preconditioner belongs to A_
   int fresh_iterations_ = 0;   // CG iterations of the first solve after the last refresh
