@@ -176,7 +176,12 @@ ObjectDynamics ClipAnalyser::finishObject(const Followed& object) const {
         describeDeformation(*object.deformable, object.deformations, gravity_);
     if (dynamics.deformation->modes.count() == 0) dynamics.deformation.reset();
   }
-  const auto measurements = measurementsOf(dynamics.observations, tracker.centroid());
+  auto measurements = measurementsOf(dynamics.observations, tracker.centroid());
+  // All frames are compared with the key frame: its noise is an error that they share, so that it is the key
+  // pose that errs against them.
+  const auto first = std::find_if(measurements.begin() + 1, measurements.end(),
+                                  [](const PoseMeasurement& m) { return m.valid; });
+  if (first != measurements.end()) measurements.front().covariance = first->covariance;
   const Camera& camera = last_.camera;
   const double depth =
       (camera.world_from_camera.inverse() * measurements.front().position).norm();

@@ -325,6 +325,7 @@ Trajectory TrajectoryFitter::result() {
   trajectory.pieces = pieces_;
   trajectory.noise_scale = noise_scale_;
   trajectory.gravity = fittedGravity();
+  if (trajectory.gravity) trajectory.gravity->deviation *= std::sqrt(factor);
   for (const Jump& jump : motion.jumps) {
     if (jump.cut) continue;
     const double time = jump.after.time;
