@@ -13,21 +13,22 @@ namespace {
 constexpr size_t kRecentFrames = 8;  // kept, to be looked at again when an object starts to deform
 constexpr int kLeftFrames = 2;       // in which an object must have left its place
 
-// Largest image motion of the object's followed points between the first state and any other, px,
-// were the camera at rest.
+// Image motion between the first state and the farthest other one, px, were the camera at rest: the mean over the
+// object's followed points, since errors of the pose are largest at single points far out.
 double largestImageMotion(const std::vector<MotionState>& states, const Camera& camera,
                           const ObjectTracker& tracker) {
+  const std::vector<Track>& tracks = tracker.keyObservation().tracks;
   const Eigen::Isometry3d first =
       motionFrom(states.front(), tracker.centroid(), false, 0).world_from_object;
   double largest = 0.0;
   for (const MotionState& state : states) {
     const Eigen::Isometry3d pose =
         motionFrom(state, tracker.centroid(), false, 0).world_from_object;
-    for (const Track& track : tracker.keyObservation().tracks) {
-      const Eigen::Vector2d moved = camera.projectWorld(pose * track.point) -
-                                    camera.projectWorld(first * track.point);
-      largest = std::max(largest, moved.norm());
+    double sum = 0.0;
+    for (const Track& track : tracks) {
+      sum += (camera.projectWorld(pose * track.point) - camera.projectWorld(first * track.point)).norm();
     }
+    largest = std::max(largest, sum / std::max<size_t>(1, tracks.size()));
   }
   return largest;
 }
@@ -48,6 +49,13 @@ std::string summaryOf(const DeformationMotion& deformation) {
   for (const SurfaceLine& line : deformation.lines) {
     std::snprintf(text, sizeof text, ", %.3f +- %.3f Hz%s", line.line.frequency,
                   line.line.deviation, line.wave_vector.isZero() ? "" : " travelling");
+    result += text;
+  }
+  if (deformation.wind) {
+    const Eigen::Vector3d& w = deformation.wind->mean;
+    const Eigen::Vector3d deviation = deformation.wind->mean_covariance.diagonal().cwiseSqrt();
+    std::snprintf(text, sizeof text, ", wind (%.1f +- %.1f, %.1f +- %.1f, %.1f +- %.1f) m/s", w.x(),
+                  deviation.x(), w.y(), deviation.y(), w.z(), deviation.z());
     result += text;
   }
   if (deformation.stiffness) {
