@@ -66,6 +66,16 @@ def evaluation(cases):
     return text
 
 
+def pictures(cases, page):
+    """One picture of each case that the evaluator wrote beside the page."""
+    text = ""
+    for case in cases:
+        path = os.path.join("appearance", case["case"] + ".jpg")
+        if os.path.exists(os.path.join(os.path.dirname(os.path.abspath(page)), path)):
+            text += f"![{case['case']}: video, without its objects, objects lifted]({path})\n\n"
+    return text and "\n## Pictures\nThe video; without its objects; its objects lifted (final quality).\n\n" + text
+
+
 def drawing(cases):
     if not cases:
         return ""
@@ -94,7 +104,8 @@ def main():
         sys.exit(__doc__)
     benchmark = read(sys.argv[3])
     with open(sys.argv[1], "w", encoding="utf-8") as page:
-        page.write(HEADER + evaluation(read(sys.argv[2])))
+        cases = read(sys.argv[2])
+        page.write(HEADER + evaluation(cases) + pictures(cases, sys.argv[1]))
         page.write(drawing([case for case in benchmark if case["case"].startswith("drawing_")]))
         page.write(filling([case for case in benchmark if case["case"] == "filling"]))
 

@@ -1,12 +1,13 @@
 #!/bin/sh
 # usage: run.sh OUTPUT_FOLDER SCENE_FOLDER...
-# Runs the evaluator and the benchmark with its peers on the scenes, and writes OUTPUT_FOLDER/appearance.md.
+# Runs the evaluator and the benchmark with its peers on the scenes, and writes OUTPUT_FOLDER/appearance.md with its pictures.
 set -e
 output=$1
 shift
 mkdir -p "$output"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-rosrun calipso_render evaluate "$@" > "$work/evaluate.jsonl"
+mkdir -p "$output/appearance"
+rosrun calipso_render evaluate --summaries "$output/appearance" "$@" > "$work/evaluate.jsonl"
 rosrun calipso_render benchmark "$@" > "$work/benchmark.jsonl"
 /usr/bin/python3 "$(dirname "$0")/report.py" "$output/appearance.md" "$work/evaluate.jsonl" "$work/benchmark.jsonl"

@@ -28,7 +28,6 @@ Appearance plainAppearance(const Surface& surface, const Camera& camera) {
   Appearance plain;
   plain.texture = SurfaceTexture(surface.key_vertices, surface.triangles, 1.0f, surface.triangles.size());
   plain.texture.texels.assign(plain.texture.size(), cv::Vec4f(0.5f, 0.5f, 0.5f, 0.0f));
-  plain.sources.assign(surface.triangles.size(), Appearance::Source::kTexture);
   plain.key_camera = camera;
   plain.mean_light = cv::Vec3f(1.0f, 1.0f, 1.0f);
   plain.findSources();

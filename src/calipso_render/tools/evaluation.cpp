@@ -21,6 +21,7 @@ constexpr int kAround = 40;          // px around a moved object in which its sh
 constexpr int kMovedFirst = 3, kMovedStep = 4;  // frames of a moving object that are drawn again: odd ones, which a
                                                 // clip sample of more than 24 frames leaves out
 constexpr int kFlickerFrames = 8;
+constexpr int kSummaryWidth = 1440;  // px
 constexpr int kSheetFrames = 4;      // of a clip on a blind sheet
 constexpr double kFlickers = 0.3;    // code values of true change from which flicker is judged
 
@@ -49,6 +50,7 @@ class Evaluation {
     judgeMoved();
     if (!options_.sheets.empty()) writeSheet();
     if (!options_.appearance_only) timeFrames();
+    if (!options_.summaries.empty() && !summary_.empty()) writeSummary();
     return figures_;
   }
 
@@ -112,6 +114,7 @@ class Evaluation {
     const cv::Mat seen = hidden & (invented == 0);
     const cv::Mat emptied = Renderer(prepared_, without(false, true)).composite(removedFrame(0)).bgr;
     picture("removed", emptied);
+    summary_ = {loadFrame(scene_, 0), Renderer(prepared_, params_).composite(removedFrame(0)).bgr};
     put("plate_psnr_seen_db", truth ? psnr(plate, *truth, seen) : std::nullopt);
     put("plate_psnr_invented_db", truth ? psnr(emptied, *truth, invented) : std::nullopt);
     put("gradient_ratio", truth ? gradientRatio(emptied, *truth, hidden & invented) : std::nullopt);
@@ -247,7 +250,7 @@ class Evaluation {
   }
 
   // Every object lifted by a twentieth of the distance: drawn, shaded and replaced in full.
-  double msPerFrame(Quality quality) const {
+  double msPerFrame(Quality quality) {
     RenderParams p = params_;
     p.quality = quality;
     Renderer renderer(prepared_, p);
@@ -263,8 +266,17 @@ class Evaluation {
       const FrameOutput out = renderer.composite(in);
       best = std::min(best, elapsedMs(start));
       if (i == 0) picture(quality == Quality::kFinal ? "lifted_final" : "lifted", out.bgr);
+      if (i == 0 && quality == Quality::kFinal) summary_.push_back(out.bgr);
     }
     return best;
+  }
+
+  void writeSummary() const {
+    cv::Mat all;
+    cv::hconcat(summary_, all);
+    const double scale = static_cast<double>(kSummaryWidth) / all.cols;
+    cv::resize(all, all, {}, scale, scale, cv::INTER_AREA);
+    cv::imwrite(options_.summaries + "/" + scene_.name + ".jpg", all, {cv::IMWRITE_JPEG_QUALITY, 85});
   }
 
   // The hole that the plate has, filled from what is around it.
@@ -291,6 +303,7 @@ class Evaluation {
   RenderParams params_;
   std::shared_ptr<Prepared> prepared_;
   double ms_prepare_ = 0.0;
+  std::vector<cv::Mat> summary_;
   Figures figures_;
 };
 
