@@ -59,6 +59,8 @@ def read(path):
 
 
 def evaluation(cases):
+    if not cases:
+        return "No scene with ground truth was given (`make bench SCENES=...`).\n"
     text = "| | " + " | ".join(case["case"] for case in cases) + " |\n"
     text += "|---|" + "---|" * len(cases) + "\n"
     for key, title in COLUMNS:

