@@ -81,7 +81,8 @@ def plot_cost(bench, path):
     for kind, element, solver in groups:
         points = sorted((b["nodes"], b["cpu_ms_per_step"]) for b in bench
                         if (b["kind"], b.get("element"), b.get("solver")) == (kind, element, solver))
-        axes.loglog(*zip(*points), "o-", label=" ".join((kind, element, solver)))
+        axes.loglog(*zip(*points), "s--" if kind == "newton" else "o-",
+                    label=" ".join((kind, element, solver)))
     axes.set(xlabel="nodes", ylabel="CPU ms per step")
     axes.legend(fontsize=7)
     figure.tight_layout()
@@ -152,12 +153,12 @@ def against_bullet(bench):
 
 
 def scaling(bench):
-    points = sorted((b["nodes"], b["cpu_ms_per_step"]) for b in bench
-                    if b["kind"] == "newton" and b["nodes"] > 1000)
-    memory = max((b["kb_per_node"] for b in bench if b["kind"] == "newton" and b["nodes"] > 5000),
-                 default=None)
-    return (f"Newton's cost grows with the exponent {exponent(points):.2f} from {points[0][0]:,} to "
-            f"{points[-1][0]:,} nodes; at most {short(memory)} kB per node are in use (above 5,000 nodes).")
+    newton = sorted((b for b in bench if b["kind"] == "newton" and b["nodes"] > 1000), key=lambda b: b["nodes"])
+    cpu, wall = (exponent([(b["nodes"], b[key]) for b in newton])
+                 for key in ("cpu_ms_per_step", "wall_ms_per_step"))
+    memory = max((b["kb_per_node"] for b in newton if b["nodes"] > 5000), default=None)
+    return (f"Newton's cost grows with the exponent {wall:.2f} (wall; CPU {cpu:.2f}) from {newton[0]['nodes']:,} to "
+            f"{newton[-1]['nodes']:,} nodes; at most {short(memory)} kB per node are in use (above 5,000 nodes).")
 
 
 def steps(bench):

@@ -96,7 +96,8 @@ void measureHardCases() {
   constexpr double kSeconds = 2.0;
   for (const std::string& name : hardCaseNames())
     for (const int across : {2, 4})
-      measureHardCase(name, MaterialModel::kStVenantKirchhoff, across, 60.0);
+      if (across == 4 || name.find("unconstrained") == std::string::npos)   // has a grid of its own
+        measureHardCase(name, MaterialModel::kStVenantKirchhoff, across, 60.0);
   for (const MaterialModel material : {MaterialModel::kStableNeoHookean, MaterialModel::kCorotated})
     for (const std::string& name : hardCaseNames()) measureHardCase(name, material, 2, kSeconds);
 }
