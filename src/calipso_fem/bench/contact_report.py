@@ -16,7 +16,7 @@ FLOOR_MM = 1e-3  # depths below are drawn there
 
 
 def number(value):
-    return "failed" if value is None else f"{value:.4g}"
+    return "-" if value is None else f"{value:.4g}"
 
 
 def rows(results):

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "calipso_fem/condensed_factor.hpp"
+#include "calipso_fem/deformable_body.hpp"
 #include "calipso_fem/world/contact_solver.hpp"
 #include "calipso_fem/world/convex_decomposition.hpp"
 #include "calipso_fem/world/mass_properties.hpp"
@@ -119,6 +121,38 @@ TEST(ContactSolver, SeparatingContactGivesNoImpulse) {
   rows[0].start_impulse = rows[0].impulse = {0.2, 0.0, 0.0};
   solveContacts(Eigen::Matrix3d::Identity(), rows, 50, 1e-12);
   EXPECT_EQ(rows[0].impulse.norm(), 0.0);
+}
+
+TEST(CondensedFactor, AgreesWithTheWholeSystem) {
+  FemOptions options;
+  options.cell_size = 0.1;
+  DeformableBody body(boxSurface({0.2, 0.2, 0.2}, 2), {1e5, 0.3, 1000.0, 0.0}, options);
+  BlockMatrix A;
+  body.model().hessian(body.positions(), Definiteness::kPositive, A);
+  for (const int k : A.pattern->diagonal) A.block(k).diagonal().array() += 1e3;
+  const Eigen::MatrixXd inverse = Eigen::MatrixXd(A.toSparse()).inverse();
+  const std::vector<int> nodes = {0, 5, 13};
+  CondensedFactor factor;
+  ASSERT_TRUE(factor.update(A, nodes));
+  const Vec b = Vec::LinSpaced(3 * body.nodeCount(), -1.0, 2.0), f = Vec::LinSpaced(9, 3.0, -5.0);
+  Vec all = b;
+  for (int k = 0; k < 3; ++k) all.segment<3>(3 * nodes[k]) += f.segment<3>(3 * k);
+  const Vec without = inverse * b, with = inverse * all;
+  const Vec reduced = factor.reduce(b);
+  // Round-off of a system with a condition of about 1e3.
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_LT((reduced.segment<3>(3 * k) - without.segment<3>(3 * nodes[k])).norm(),
+              1e-10 * without.norm());
+    for (int j = 0; j < 3; ++j)
+      EXPECT_LT((factor.compliance().block<3, 3>(3 * k, 3 * j) -
+                 inverse.block<3, 3>(3 * nodes[k], 3 * nodes[j]))
+                    .norm(),
+                1e-10 * inverse.norm());
+  }
+  EXPECT_LT((factor.complete(f) - with).norm(), 1e-10 * with.norm());
+  EXPECT_LT((factor.complete(f) - with).norm(), 1e-10 * with.norm());  // b is still there
+  EXPECT_EQ(factor.indexOf(5), 1);
+  EXPECT_EQ(factor.indexOf(6), -1);
 }
 
 TEST(RegionSelection, PixelChoosesTheVisibleSide) {

@@ -314,7 +314,7 @@ namespace {
 
 // Rate of the sub-steps: as fine as a video's frame rate allows for what is awake, 1/s.
 double substepRate(int awake) {
-  return awake <= 4 ? 1920.0 : awake <= 16 ? 960.0 : awake <= 64 ? 240.0 : 120.0;
+  return awake <= 4 ? 1920.0 : awake <= 16 ? 960.0 : awake <= 32 ? 240.0 : 120.0;
 }
 
 Eigen::Isometry3d between(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double s) {

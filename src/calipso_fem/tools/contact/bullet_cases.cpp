@@ -111,15 +111,13 @@ std::vector<Result> cubesAt(int count, double rate) {
            finite ? lowest : NAN, 0.0, std::max(0.0, -lowest) / 5e-3, 0.0, ms}};
 }
 
-std::vector<Result> bullet() {
-  std::vector<Result> results;
-  for (const double rate : {30.0, 120.0, 240.0, 480.0})
-    for (const Result& r : cubesAt(2, rate)) results.push_back(r);
-  return results;
-}
-
 }  // namespace
 
-Cases bulletCases() { return {{"bullet_two_cubes", bullet}}; }
+Cases bulletCases() {
+  Cases cases;
+  for (const int rate : {30, 120, 240, 480})
+    cases["bullet_two_cubes_" + std::to_string(rate)] = [rate] { return cubesAt(2, rate); };
+  return cases;
+}
 
 }  // namespace calipso::fem

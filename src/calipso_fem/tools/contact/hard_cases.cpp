@@ -56,9 +56,11 @@ std::vector<Result> fastBlockOnThinPlate() {
   Watch watch;
   watch.scale = scene.energy();
   double lowest = 1.0;
-  watch.play(scene, 1.0, 1.0 / 60.0, [&](double) { lowest = std::min(lowest, lowestVertex(block)); });
+  const double seconds = 0.1;  // it is there after 10 ms, and flattened in 20
+  watch.play(scene, seconds, 1.0 / 60.0,
+             [&](double) { lowest = std::min(lowest, lowestVertex(block)); });
   return {resultOf("lowest vertex of a block dropped at 50 m/s on a plate at z = 0, m", lowest, 0.0,
-                   scene, watch, 1.0)};
+                   scene, watch, seconds)};
 }
 
 std::vector<Result> clothOnEdge() {
