@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "calipso_align/metrics.hpp"
+#include "calipso_align/support_term.hpp"
 #include "evaluation_case.hpp"
 #include "run_evaluation.hpp"
 
@@ -227,6 +228,17 @@ void drawOutline(const EvaluationCase& one, const Points& x, const std::string& 
   cv::imwrite(directory + "/" + one.name + "_" + one.object + ".png", picture);
 }
 
+// Height of the lowest vertex above the highest support plane under it; nothing without a plane.
+std::optional<double> clearanceMm(const EvaluationCase& one, const Points& x) {
+  std::optional<double> least;
+  for (const SupportTarget& support : makeSupportTargets(one.options.planes, one.camera)) {
+    const std::optional<double> height = clearance(support, x, one.camera);
+    if (height && (!least || *height < *least)) least = height;
+  }
+  if (!least) return std::nullopt;
+  return 1e3 * *least;
+}
+
 // Processor time of all threads so far.
 double cpuMs() { return 1e3 * std::clock() / CLOCKS_PER_SEC; }
 
@@ -265,6 +277,8 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   line.addNumber("expected3d_mean_percent", 100.0 * result.expected_error);
   line.addNumber("expected3d_rms_percent", 100.0 * result.expected_rms);
   line.addNumber("deformation_found", result.deformation);
+  line.addNumber("clearance_mm",
+                 clearanceMm(one, inCamera(one.camera, result.world_from_object, result.mesh)));
   line.addFlag("trusted", result.trusted);
   line.addText("reason", result.reason);
   line.addNumber("ms_segment", one.ms_segment);
