@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "calipso_align/trust.hpp"
@@ -85,6 +86,23 @@ TEST(FitProblem, ContourOfAnOccluderIsUnknown) {
   EXPECT_LT(knownPoints(hidden, true, middle), right / 10);
   EXPECT_GT(knownPoints(hidden, false, middle), right / 2);
   EXPECT_LT(hidden.target.known_length_px, 0.7 * hidden.target.length_px);
+}
+
+// A rail that was taken in: two pixels high, where the pear has nothing as thin.
+TEST(FitProblem, ASpurNarrowerThanTheModelIsNotItsOwn) {
+  const Seen seen;
+  cv::Mat1b mask = fillContour(seen.contour, {seen.camera.width, seen.camera.height});
+  const cv::Rect body = cv::boundingRect(mask);
+  mask(cv::Rect(body.x + body.width / 2, body.y + body.height / 2, body.width, 2)).setTo(255);
+  const FitProblem problem = makeFitProblem(seen.mesh, seen.camera, seen.pose,
+                                            traceLoops(mask / 255, 1, {}), seen.options);
+  for (const TargetPoint& p : problem.target.points) {
+    if (p.pixel.x() > body.x + body.width + 3) {
+      EXPECT_TRUE(p.foreign && !p.known);
+    } else if (p.pixel.x() < body.x + body.width / 2) {
+      EXPECT_FALSE(p.foreign);
+    }
+  }
 }
 
 TEST(FitProblem, ContourOnASupportPlaneIsUnknown) {

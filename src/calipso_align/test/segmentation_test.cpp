@@ -42,6 +42,36 @@ TEST(Segmenter, FindsADiscFromItsRectangle) {
   EXPECT_GE(intersectionOverUnion(labels == 7, maskOf(kSize, shape)), 0.985);
 }
 
+// A box whose lower part is nearly the background's colour, and without a stroke.
+TEST(Segmenter, AFittedModelBringsInColoursWithoutStroke) {
+  const cv::Vec3b nearly(150, 150, 164);
+  const auto whole = box(59.5, 29.5, 99.5, 89.5), lower = box(59.5, 79.5, 99.5, 89.5);
+  const cv::Mat image =
+      paint(kSize, lower, nearly, kGrey, 0.0, paint(kSize, whole, kGreen, kGrey, 3.0));
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  cv::line(strokes, {65, 40}, {95, 70}, 1, 3);
+  SegmentationTarget target{"box", 1, cv::Rect(45, 20, 70, 85), {}};
+  Segmenter alone(image, {target});
+  EXPECT_LT(intersectionOverUnion(alone.segment(strokes) == 1, maskOf(kSize, whole)), 0.86);
+  target.fit_model = [&](const std::vector<ContourLoop>& contour) -> std::optional<ModelView> {
+    EXPECT_EQ(contour.size(), 1u);
+    return ModelView{maskOf(kSize, whole), cv::Mat1f::zeros(kSize), 1.5};
+  };
+  Segmenter guided(image, {target});
+  EXPECT_GE(intersectionOverUnion(guided.segment(strokes) == 1, maskOf(kSize, whole)), 0.97);
+}
+
+TEST(Segmenter, AModelThatCannotBeFittedChangesNothing) {
+  const auto shape = disc(80.3, 60.7, 30.2);
+  const cv::Mat image = paint(kSize, shape, kGreen, kGrey, 3.0);
+  SegmentationTarget target{"disc", 7, cv::Rect(45, 25, 72, 72), {}};
+  Segmenter alone(image, {target});
+  const cv::Mat before = alone.segment({}).clone();
+  target.fit_model = [](const std::vector<ContourLoop>&) { return std::nullopt; };
+  Segmenter guided(image, {target});
+  EXPECT_EQ(cv::countNonZero(guided.segment({}) != before), 0);
+}
+
 TEST(Segmenter, GivesTouchingObjectsTheirOwnPixels) {
   // Edges between pixels: a mixed pixel would belong to either side.
   const auto left = box(29.5, 29.5, 79.5, 89.5), right = box(79.5, 29.5, 129.5, 89.5);
