@@ -173,5 +173,41 @@ TEST(WorldMotion, SameInputSameResult) {
   EXPECT_EQ((run() - run()).cwiseAbs().maxCoeff(), 0.0);
 }
 
+// Makes an object deformable and changes nothing.
+Edit becomeDeformable() {
+  Edit edit = editOf(EditKind::kObjectKind);
+  edit.object_kind = ObjectKind::kDeformable;
+  return edit;
+}
+
+TEST(WorldMotion, ResolutionFollowsThePixelErrorAskedFor) {
+  const auto nodes = [](double pixel_error) {
+    WorldParams params;
+    params.pixel_error = pixel_error;
+    World world(sceneWith(boxSurface({0.2, 0.2, 0.2}, 3), {0, 0, 0.1}), params);
+    world.submit(becomeDeformable());
+    world.advanceTo(0.0);
+    return world.plan().at(0).nodes;
+  };
+  EXPECT_GT(nodes(8.0), 0);
+  EXPECT_GT(nodes(0.5), nodes(8.0));
+  EXPECT_LE(nodes(1e-3), 1.25 * WorldParams().max_nodes);   // what NodeCountFollowsTheTarget allows
+}
+
+TEST(WorldMotion, DeformableObjectSleepsWhenStillAndWakesForAnEdit) {
+  World world(sceneWith(boxSurface({0.2, 0.2, 0.2}, 3), {0, 0, 0.1}), {});
+  world.submit(becomeDeformable());
+  Edit throwing = editOf(EditKind::kVelocity, EditMode::kAbsolute, 2.5);
+  throwing.vector = {0, 0, 1};
+  world.submit(throwing);
+  world.advanceTo(0.0);
+  EXPECT_FALSE(world.state().objects[0].sleeping);
+  play(world, 2.0);
+  EXPECT_TRUE(world.state().objects[0].sleeping);
+  play(world, 0.6);
+  EXPECT_FALSE(world.state().objects[0].sleeping);
+  EXPECT_GT(centerOf(world.state()).z(), 0.11);
+}
+
 }  // namespace
 }  // namespace calipso::fem
