@@ -41,15 +41,27 @@ TriangleMesh boxSurface(const Eigen::Vector3d& low, const Eigen::Vector3d& high)
   return mesh;
 }
 
+constexpr ElementType kElements[] = {ElementType::kHexEnhanced, ElementType::kHexQ1,
+                                     ElementType::kHexMeanDilatation, ElementType::kTetP1};
+
 TEST(Statics, ReactionsBalanceWeightAndLoads) {
-  DeformableBody body = clampedBeam(exact());
-  body.setGravity(kGravity);
-  Vec f = Vec::Zero(3 * body.nodeCount());
-  f[3 * (body.nodeCount() - 1)] = 20.0;
-  body.setNodalForces(f);
-  ASSERT_TRUE(body.solveStatic().converged);
-  const Eigen::Vector3d load = body.totalMass() * kGravity + Eigen::Vector3d(20.0, 0.0, 0.0);
-  EXPECT_LT((body.totalReaction() + load).norm(), 1e-8 * load.norm());
+  for (const ElementType element : kElements)
+    for (const MaterialModel material :
+         {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
+          MaterialModel::kStableNeoHookeanNoLog, MaterialModel::kCorotated, MaterialModel::kLinear}) {
+      FemOptions options = exact();
+      options.element = element;
+      options.material_model = material;
+      DeformableBody body = clampedBeam(options);
+      body.setGravity(kGravity);
+      Vec f = Vec::Zero(3 * body.nodeCount());
+      f[3 * (body.nodeCount() - 1)] = 20.0;
+      body.setNodalForces(f);
+      const std::string what = toString(element) + " " + toString(material);
+      ASSERT_TRUE(body.solveStatic().converged) << what;
+      const Eigen::Vector3d load = body.totalMass() * kGravity + Eigen::Vector3d(20.0, 0.0, 0.0);
+      EXPECT_LT((body.totalReaction() + load).norm(), 1e-8 * load.norm()) << what;
+    }
 }
 
 TEST(Embedding, ConservesPower) {
