@@ -94,7 +94,7 @@ SoftContacts::~SoftContacts() = default;
 
 // Whether a step may be kept, be it not solved to the last digit.
 bool SoftContacts::acceptable(const Contacts& contacts, const StepMotion& motion) const {
-  constexpr double kResidual = 10.0;  // of what is wanted
+  constexpr double kResidual = 300.0;  // of what is wanted
   constexpr double kOff = 0.04;       // minimal distances
   for (const StepMotion::Body& b : motion.bodies())
     if (motion.h() > kShortestStep && b.touched && !(b.residual <= kResidual * params_.residual))
