@@ -20,6 +20,8 @@ constexpr double kFirstSearch = 0.2;     // of the picture's width, while no mot
 constexpr int kForgetAfter = 3;         // frames without the object before its motion is forgotten
 constexpr int kWeakInliers = 12;         // fewer tracks than this are worth another attempt
 constexpr double kReturnDeviations = 3.0;
+constexpr double kPatchShare = 1.0 / 160.0;  // of the picture's width: a patch's radius
+constexpr int kLargestRadius = 9;            // px
 constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
 
 // A match that is as likely and as certain as asked for, and comes back where that is checked.
@@ -109,6 +111,9 @@ int Observation::inliers() const {
 ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, const cv::Mat& mask,
                              const TrackerParams& params)
     : model_(model), params_(params), centroid_(flow::centroid(model.mesh)) {
+  // What a larger picture shows larger is not seen sharper by as much.
+  const int scaled = static_cast<int>(std::lround(kPatchShare * key_frame.camera.width));
+  params_.patch.radius_px = std::max(params.patch.radius_px, std::min(scaled, kLargestRadius));
   references_.emplace_back(key_frame, model_, model.world_from_object, mask, params.seed_count);
   const double sigma = kKeySigma * boundingDiagonal(model.mesh);
   key_.time = key_frame.time;
