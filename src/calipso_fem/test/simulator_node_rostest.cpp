@@ -1,5 +1,4 @@
 #include <calipso_msgs/AlignedModels.h>
-#include <calipso_msgs/ClipDynamics.h>
 #include <calipso_msgs/ClipInfo.h>
 #include <calipso_msgs/Edit.h>
 #include <calipso_msgs/EditReport.h>
@@ -25,13 +24,13 @@ namespace {
 constexpr int kFrames = 6;
 const Eigen::Vector3d kStart(0.0, 0.0, 1.0);
 
-// Plays player, alignment, flow and user for one box in the air.
+// Plays player, alignment, user and a flow that fails, for one box in the air.
 class SimulatorNodeTest : public ::testing::Test {
  protected:
   SimulatorNodeTest() {
     info_ = nh_.advertise<calipso_msgs::ClipInfo>(topics::kClipInfo, 1, true);
     models_ = nh_.advertise<calipso_msgs::AlignedModels>(topics::kModels, 1, true);
-    dynamics_ = nh_.advertise<calipso_msgs::ClipDynamics>(topics::kClipDynamics, 1, true);
+    status_ = nh_.advertise<calipso_msgs::NodeStatus>(topics::kStatus, 10);
     camera_ = nh_.advertise<sensor_msgs::CameraInfo>(topics::kCameraInfo, 10);
     edits_ = nh_.advertise<calipso_msgs::Edit>(topics::kEdits, 10);
     listen(topics::kState, states_);
@@ -58,7 +57,7 @@ class SimulatorNodeTest : public ::testing::Test {
 
   bool connected() const {
     return camera_.getNumSubscribers() > 0 && edits_.getNumSubscribers() > 0 &&
-           subscribers_.front().getNumPublishers() > 0 && subscribers_[1].getNumPublishers() > 0 &&
+           status_.getNumSubscribers() > 1 && subscribers_.front().getNumPublishers() > 0 && subscribers_[1].getNumPublishers() > 0 &&
            subscribers_.back().getNumPublishers() > 0;
   }
 
@@ -78,9 +77,21 @@ class SimulatorNodeTest : public ::testing::Test {
     models.models[0].world_from_object.pose =
         calipso::toMsg(Eigen::Isometry3d(Eigen::Translation3d(kStart)));
     models_.publish(models);
-    calipso_msgs::ClipDynamics clip;
-    clip.header.stamp = stamp(0);
-    dynamics_.publish(clip);
+  }
+
+  void sayThatFlowFailed() {
+    calipso_msgs::NodeStatus failed;
+    failed.node = "flow";
+    failed.state = calipso_msgs::NodeStatus::FAILED;
+    failed.message = "its process ended";
+    status_.publish(failed);
+  }
+
+  calipso_msgs::NodeStatus own() const {  // the simulator's last
+    calipso_msgs::NodeStatus last;
+    for (const auto& status : statuses_)
+      if (status.node == "simulator") last = status;
+    return last;
   }
 
   void sendFrame(int k) {
@@ -90,7 +101,7 @@ class SimulatorNodeTest : public ::testing::Test {
   }
 
   ros::NodeHandle nh_;
-  ros::Publisher info_, models_, dynamics_, camera_, edits_;
+  ros::Publisher info_, models_, status_, camera_, edits_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<calipso_msgs::SimulationState> states_;
   std::vector<calipso_msgs::EditReport> reports_;
@@ -111,10 +122,11 @@ TEST_F(SimulatorNodeTest, OneStatePerFrameAndEditsAreReported) {
   calipso_msgs::Edit bad = heavier;
   bad.object = "teapot";
   edits_.publish(bad);
-  ASSERT_TRUE(waitFor([&] { return !statuses_.empty() && statuses_.back().edits == 2; }));
+  ASSERT_TRUE(waitFor([&] { return own().edits == 2; }));
   sendClip();
-  ASSERT_TRUE(waitFor([&] { return statuses_.back().state == calipso_msgs::NodeStatus::READY; }))
-      << statuses_.back().message;
+  ASSERT_TRUE(waitFor([&] { return own().state == calipso_msgs::NodeStatus::PREPARING; })) << own().message;
+  sayThatFlowFailed();
+  ASSERT_TRUE(waitFor([&] { return own().state == calipso_msgs::NodeStatus::READY; })) << own().message;
 
   for (int k = 0; k < kFrames; ++k) sendFrame(k);
   ASSERT_TRUE(waitFor([&] { return states_.size() == kFrames && reports_.size() == 2; }));

@@ -22,6 +22,7 @@ constexpr int kWeakInliers = 12;         // fewer tracks than this are worth ano
 constexpr double kReturnDeviations = 3.0;
 constexpr double kPatchShare = 1.0 / 160.0;  // of the picture's width: a patch's radius
 constexpr int kLargestRadius = 9;            // px
+constexpr double kDrownedShare = 0.35;   // of the seeds in the picture: with fewer tracks noise or blur drowns small patches
 constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
 
 // A match that is as likely and as certain as asked for, and comes back where that is checked.
@@ -114,6 +115,8 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
   // What a larger picture shows larger is not seen sharper by as much.
   const int scaled = static_cast<int>(std::lround(kPatchShare * key_frame.camera.width));
   params_.patch.radius_px = std::max(params.patch.radius_px, std::min(scaled, kLargestRadius));
+  wide_ = params_;
+  wide_.patch.radius_px = std::max(params_.patch.radius_px, kLargestRadius);
   references_.emplace_back(key_frame, model_, model.world_from_object, mask, params.seed_count);
   const double sigma = kKeySigma * boundingDiagonal(model.mesh);
   key_.time = key_frame.time;
@@ -160,15 +163,16 @@ Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const Refere
 }
 
 Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& reference,
-                                  const Eigen::Isometry3d& start, bool near) const {
+                                  const Eigen::Isometry3d& start, bool near,
+                                  const TrackerParams& params) const {
   Observation observation;
   observation.time = frame.time;
   observation.world_from_object = start;
-  if (!near) observation.world_from_object = refineOnce(frame, reference, Care::kRough, observation);
-  observation.world_from_object = refineOnce(frame, reference, Care::kForward, observation);
+  if (!near) observation.world_from_object = refineOnce(frame, reference, Care::kRough, params, observation);
+  observation.world_from_object = refineOnce(frame, reference, Care::kForward, params, observation);
   for (int round = 0; round < kRefinements; ++round) {
     const Eigen::Isometry3d before = observation.world_from_object;
-    observation.world_from_object = refineOnce(frame, reference, Care::kChecked, observation);
+    observation.world_from_object = refineOnce(frame, reference, Care::kChecked, params, observation);
     if (!observation.found) break;
     if (imageMotion(frame.camera, before, observation.world_from_object, reference.seeds()) <
         kSettledPx) {
@@ -179,7 +183,8 @@ Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& refer
 }
 
 Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceView& reference,
-                                            Care care, Observation& observation) const {
+                                            Care care, const TrackerParams& params,
+                                            Observation& observation) const {
   const Eigen::Isometry3d pose = observation.world_from_object;
   observation.found = false;
   observation.tracks.clear();
@@ -188,8 +193,8 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   if (look.coverage == 0.0) return pose;
   std::vector<Correspondence> found;
   observation.tracks = followSeeds(LookMatch(look, frame.gray, care), reference, frame.camera,
-                                   pose, params_, found);
-  const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params_.pose);
+                                   pose, params, found);
+  const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params.pose);
   // Few agreeing matches where many are due are the background, not the object.
   const int due = seedsInPicture(reference, frame.camera, fit.world_from_object);
   observation.found = fit.converged && fit.inliers >= kLeastInlierShare * found.size() &&
@@ -226,13 +231,18 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
   frames_lost_ = cut ? kForgetAfter : frames_lost_;
   const Eigen::Isometry3d predicted =
       frames_lost_ < kForgetAfter ? predict(frame.time) : last_->world_from_object;
-  Observation best = attempt(frame, nearestReference(frame, predicted), predicted);
+  const ReferenceView& nearest = nearestReference(frame, predicted);
+  Observation best = attempt(frame, nearest, predicted, params_);
   if (best.inliers() < kWeakInliers) {
     // The motion may have changed, or the look: try every other way to recognise the object.
     for (const ReferenceView& reference : references_) {
-      Observation other = attempt(frame, reference, last_->world_from_object);
+      Observation other = attempt(frame, reference, last_->world_from_object, params_);
       if (other.inliers() > best.inliers()) best = std::move(other);
     }
+  }
+  if (best.inliers() < kDrownedShare * seedsInPicture(nearest, frame.camera, predicted)) {
+    Observation wide = attempt(frame, nearest, predicted, wide_);
+    if (wide.inliers() > best.inliers()) best = std::move(wide);
   }
   frames_lost_ = best.found ? 0 : frames_lost_ + 1;
   if (best.found) remember(frame, best, cut);
@@ -240,12 +250,13 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
 }
 
 Observation ObjectTracker::attempt(const Frame& frame, const ReferenceView& reference,
-                                   const Eigen::Isometry3d& predicted) const {
+                                   const Eigen::Isometry3d& predicted,
+                                   const TrackerParams& params) const {
   const Eigen::Isometry3d start = searchCoarsely(frame, reference, predicted);
   const bool near =
       last_ && imageMotion(frame.camera, last_->world_from_object, start, reference.seeds()) <
                    kNearPx;
-  return refine(frame, reference, start, near);
+  return refine(frame, reference, start, near, params);
 }
 
 void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {

@@ -1,11 +1,12 @@
 #pragma once
 
+#include "calipso_flow/patch_match.hpp"
+
 namespace calipso::flow {
 
 // The sums over a patch's pixels on which Lucas-Kanade spends its time. Fixed order, so that the same
 // pixels give the same bits; compiled for the processor's vector width besides the portable one.
 
-constexpr int kMostRadius = 10;  // px
 constexpr int kPatchSide = 2 * kMostRadius + 1;
 // Floats of one term, a whole number of vectors.
 constexpr int kPatchStride = (kPatchSide * kPatchSide + 15) / 16 * 16;

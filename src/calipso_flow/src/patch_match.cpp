@@ -4,8 +4,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
-#include <cassert>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "patch_kernel.hpp"
 
@@ -146,7 +147,10 @@ PatchMatch makeMatch(const PatchModel& model, const Regression& fit,
 
 std::optional<PatchMatch> matchPatch(const PatchSource& source, const ImageWindow& target,
                                      const Eigen::Vector2d& start, const PatchParams& params) {
-  assert(params.radius_px >= 1 && params.radius_px <= kMostRadius);
+  if (params.radius_px < 1 || params.radius_px > kMostRadius) {
+    throw std::invalid_argument("patch radius is " + std::to_string(params.radius_px) + " px; give 1 to " +
+                                std::to_string(kMostRadius));
+  }
   PatchModel model;
   if (!buildModel(source, params, model)) return std::nullopt;
   alignas(64) float sampled[kPatchStride] = {};

@@ -12,9 +12,10 @@ constexpr double kFps = 30.0;
 constexpr double kNoise = 2.0;  // grey levels
 const Eigen::Vector3d kGravity(0.0, 0.0, -9.81);
 
-Frame frameOf(double time, const Eigen::Isometry3d& pose, uint64_t seed, double scroll = 0.0) {
+Frame frameOf(double time, const Eigen::Isometry3d& pose, uint64_t seed, double scroll = 0.0,
+              double noise = kNoise) {
   const Camera camera = test::testCamera();
-  return makeFrame(time, test::render(test::boxModel(), pose, camera, kNoise, seed, scroll),
+  return makeFrame(time, test::render(test::boxModel(), pose, camera, noise, seed, scroll),
                    camera);
 }
 
@@ -46,6 +47,21 @@ TEST(ClipDynamics, findsVelocityAndSpinOfARenderedBox) {
   EXPECT_NEAR(box.motions[6].state.velocity.x(), 0.5, 0.01);
   EXPECT_NEAR(box.motions[6].state.velocity.z(), 0.3, 0.01);
   EXPECT_NEAR(box.motions[6].state.spin.z(), 0.8, 0.08);
+}
+
+// A box with a strong texture is found all the same.
+TEST(ClipDynamics, heavyNoiseCostsCertaintyOnly) {
+  constexpr double kHeavy = 40.0;  // grey levels
+  const Eigen::Vector3d velocity(0.5, 0.0, 0.3);
+  ClipAnalyser analyser = analyserOf(frameOf(0.0, movedPose(0.0, velocity, 0.8), 1, 0.0, kHeavy));
+  for (int k = 1; k < 12; ++k) {
+    analyser.add(frameOf(k / kFps, movedPose(k / kFps, velocity, 0.8), 1 + k, 0.0, kHeavy));
+  }
+  const ObjectDynamics box = analyser.finish().front();
+  ASSERT_EQ(box.motions.size(), 12u);
+  EXPECT_TRUE(box.motions[6].moving);
+  EXPECT_NEAR(box.motions[6].state.velocity.x(), 0.5, 0.05);
+  EXPECT_NEAR(box.motions[6].state.velocity.z(), 0.3, 0.05);
 }
 
 TEST(ClipDynamics, twoFramesAreEnoughForAVelocity) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
 
 namespace calipso::flow {
 namespace {
@@ -56,6 +57,15 @@ TEST(PatchMatch, keepsPictureCoordinatesOfWindows) {
 TEST(PatchMatch, givesNothingWithoutTexture) {
   const cv::Mat flat(80, 80, CV_32F, cv::Scalar(90));
   EXPECT_FALSE(matchPatch(sourceAt(flat, {40, 40}), {flat, {}}, {40, 40}, {}));
+}
+
+TEST(PatchMatch, refusesARadiusItHasNoRoomFor) {
+  const cv::Mat image = picture(0, 0, 1, 0, 0);
+  PatchParams params;
+  for (const int radius : {0, kMostRadius + 1}) {
+    params.radius_px = radius;
+    EXPECT_THROW(matchPatch(sourceAt(image, {40, 40}), {image, {}}, {40, 40}, params), std::invalid_argument);
+  }
 }
 
 TEST(PatchMatch, givesNothingForAnEdge) {

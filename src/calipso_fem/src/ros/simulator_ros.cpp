@@ -5,6 +5,8 @@
 #include <calipso_msgs/SimulationState.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <boost/make_shared.hpp>
+
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
 #include "world_conversions.hpp"
@@ -39,6 +41,7 @@ SimulatorRos::SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
     subscribers_.push_back(nh.subscribe(topics::kClipInfo, 1, &SimulatorRos::onClipInfo, this));
     subscribers_.push_back(
         nh.subscribe(topics::kClipDynamics, 1, &SimulatorRos::onClipDynamics, this));
+    subscribers_.push_back(nh.subscribe(topics::kStatus, 100, &SimulatorRos::onStatus, this));
   }
   reporter_.starting("waiting for models");
 }
@@ -60,6 +63,14 @@ void SimulatorRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
 void SimulatorRos::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip) {
   if (clip_dynamics_ && *clip_dynamics_ == *clip) return;
   clip_dynamics_ = clip;
+  prepare();
+}
+
+// Without the flow nothing is known to move, and every other edit still works.
+void SimulatorRos::onStatus(const calipso_msgs::NodeStatusConstPtr& status) {
+  if (status->node != "flow" || status->state != calipso_msgs::NodeStatus::FAILED || clip_dynamics_) return;
+  reporter_.warn(status->header.stamp, "how things move in the video is not known, flow failed: " + status->message);
+  clip_dynamics_ = boost::make_shared<const calipso_msgs::ClipDynamics>();
   prepare();
 }
 

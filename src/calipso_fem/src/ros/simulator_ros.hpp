@@ -5,6 +5,7 @@
 #include <calipso_msgs/ClipInfo.h>
 #include <calipso_msgs/Dynamics.h>
 #include <calipso_msgs/Edit.h>
+#include <calipso_msgs/NodeStatus.h>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <tf2_ros/transform_broadcaster.h>
@@ -30,6 +31,7 @@ class SimulatorRos {
   void onModels(const calipso_msgs::AlignedModelsConstPtr& models);
   void onClipInfo(const calipso_msgs::ClipInfoConstPtr& info);
   void onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip);
+  void onStatus(const calipso_msgs::NodeStatusConstPtr& status);
   void onDynamics(const calipso_msgs::DynamicsConstPtr& dynamics);
   void onEdit(const calipso_msgs::EditConstPtr& edit);
   void onFrame(const sensor_msgs::CameraInfoConstPtr& info);

@@ -68,16 +68,17 @@ class ObjectTracker {
   Eigen::Isometry3d searchCoarsely(const Frame& frame, const ReferenceView& reference,
                                    const Eigen::Isometry3d& predicted) const;
   Observation refine(const Frame& frame, const ReferenceView& reference,
-                     const Eigen::Isometry3d& start, bool near) const;
+                     const Eigen::Isometry3d& start, bool near, const TrackerParams& params) const;
   Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
-                               Observation& observation) const;
+                               const TrackerParams& params, Observation& observation) const;
   const ReferenceView& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) const;
   Observation attempt(const Frame& frame, const ReferenceView& reference,
-                      const Eigen::Isometry3d& predicted) const;
+                      const Eigen::Isometry3d& predicted, const TrackerParams& params) const;
   void remember(const Frame& frame, const Observation& observation, bool cut);
 
   ObjectModel model_;
   TrackerParams params_;
+  TrackerParams wide_;  // the same with large patches, for frames whose noise or blur drowns small ones
   Eigen::Vector3d centroid_;
   std::vector<ReferenceView> references_;
   Observation key_;

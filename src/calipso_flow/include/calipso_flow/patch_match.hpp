@@ -12,8 +12,10 @@ struct ImageWindow {
   cv::Point2d origin;  // picture coordinates of image(0, 0)
 };
 
+constexpr int kMostRadius = 10;  // px, of a patch
+
 struct PatchParams {
-  int radius_px = 4;            // the patch is a square of 2 r + 1 pixels: small, since shading bends large ones
+  int radius_px = 4;            // 1..kMostRadius; the patch is a square of 2 r + 1 pixels: small, since shading bends large ones
   int max_iterations = 12;
   double least_support = 0.4;   // share of the patch's pixels that must carry weight
   double converged_px = 0.005;  // an update smaller than this ends the iteration
@@ -43,6 +45,7 @@ struct PatchSource {
 // factored once. Gain and offset of the brightness are free, so that shading may change. Nothing is
 // returned where the patch leaves a picture, has too little support or texture, or does not settle.
 // @param start   first guess of the position in the target, px
+// @throw std::invalid_argument if the radius is out of range
 std::optional<PatchMatch> matchPatch(const PatchSource& source, const ImageWindow& target,
                                      const Eigen::Vector2d& start, const PatchParams& params);
 
