@@ -21,6 +21,8 @@ constexpr float kDepthTolerance = 0.012f;    // of the object's extent: a point 
 constexpr float kFlattest = 0.05f, kFull = 0.25f;  // cosine of the view from which a surface is seen, and well seen
 constexpr float kEnough = 0.3f;   // weight of a look that needs no other
 constexpr float kSeen = 1e-5f;    // sum of weights, cubed, below which a texel counts as not seen
+constexpr float kSure = 0.2f;   // ... of which nothing else is needed
+constexpr float kLit = 0.7f;    // of the mean light: what has less of it shows its reflectance with less certainty
 constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exact
 constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
 const cv::Vec3f kUnknown(0.3f, 0.3f, 0.3f);  // reflectance of an object that no picture shows
@@ -121,6 +123,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
         const float i = linearFromRealCode(code[c]);
         r.albedo.at<cv::Vec3f>(v, u)[c] = std::max(i - highlight[c], kMatt * i) / (l[c] + floor[c]);
       }
+      r.trust.at<float>(v, u) *= std::min(1.0f, luminance(l) / (kLit * luminance(r.mean_light)));
     }
   }
   return r;
@@ -205,7 +208,7 @@ class TextureFill {
       if (i == 0) key = l.weight;
     }
     const float by_key = std::clamp(key / kEnough, 0.0f, 1.0f);
-    if (total > kSeen) {
+    if (total > kSure) {
       texel = cv::Vec4f(sum[0] / total, sum[1] / total, sum[2] / total, by_key);
       return key > 0.0f ? kKey : kElsewhere;
     }
@@ -214,11 +217,14 @@ class TextureFill {
       const Eigen::Vector3f image = p - 2.0f * (plane.normal.dot(p) - plane.offset) * plane.normal;
       const Look l = lookAt(0, image, n - 2.0f * plane.normal.dot(n) * plane.normal);
       if (l.weight < kEnough) continue;
-      const cv::Vec4f c = sampleBicubic(key_albedo, l.u, l.v);
-      texel = cv::Vec4f(c[0], c[1], c[2], 0.0f);
-      return kMirrored;
+      // What is seen at a flat angle or in the shade goes over into the mirror image.
+      const cv::Vec3f c = (sum + colourOf(sampleBicubic(key_albedo, l.u, l.v)) * (kSure - total)) / kSure;
+      texel = cv::Vec4f(c[0], c[1], c[2], by_key);
+      return total > kSeen ? kKey : kMirrored;
     }
-    return kFilled;
+    if (total <= kSeen) return kFilled;
+    texel = cv::Vec4f(sum[0] / total, sum[1] / total, sum[2] / total, by_key);
+    return key > 0.0f ? kKey : kElsewhere;
   }
 
   // What no picture shows continues the surface around it.
