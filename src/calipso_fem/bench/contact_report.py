@@ -28,14 +28,18 @@ def rows(results):
         yield f"| {name} | {r['quantity']} | " + " | ".join(number(r[k]) for k in keys) + " |"
 
 
+def tells_depth(result):
+    return result["quantity"].startswith("lowest vertex") and "cube" in result["quantity"]
+
+
 def error_against_time(results):
     yield "| scene and step | deepest penetration, mm | CPU ms per frame |"
     yield "|---|---|---|"
     for r in results:
-        if "lowest" not in r["quantity"] or "cube" not in r["quantity"]:
+        if not tells_depth(r):
             continue
         depth = "blew up" if r["value"] is None else f"{max(0.0, -r['value']) * 1e3:.3g}"
-        yield f"| {r['quantity'].split('lowest ')[-1]} | {depth} | {number(r['ms_per_frame'])} |"
+        yield f"| {r['quantity'].split('lowest vertex of ')[-1].removesuffix(', m')} | {depth} | {number(r['ms_per_frame'])} |"
 
 
 def plot_error_against_time(results, path):
@@ -44,7 +48,7 @@ def plot_error_against_time(results, path):
         points = sorted(
             (r["ms_per_frame"], max(FLOOR_MM, -1e3 * r["value"]), r["quantity"])
             for r in results
-            if "lowest" in r["quantity"] and "cube" in r["quantity"] and r["value"] is not None
+            if tells_depth(r) and r["value"] is not None
             and ("Bullet" not in r["quantity"]) == ours
         )
         if points:
