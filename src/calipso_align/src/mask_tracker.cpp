@@ -261,6 +261,25 @@ cv::Mat MaskTracker::predict(const Object& object, const cv::Mat& flow, const cv
   return moved > 127;
 }
 
+// Costs of a pixel's being background [0] or object [1], over a band along the predicted outline.
+std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
+                                          const LayerAppearance& back, const LayerAppearance& fore) const {
+  // Log odds of a pixel's centre lying across the outline although it was predicted at this distance.
+  const auto prior = [&](float d) {
+    return std::clamp(params_.prior_cost * (d - 0.5f), 0.0f, params_.prior_limit);
+  };
+  std::vector<cv::Mat> costs = {cv::Mat::zeros(view.size(), CV_32F), cv::Mat::zeros(view.size(), CV_32F)};
+  for (int y = 0; y < view.rows; ++y)
+    for (int x = 0; x < view.cols; ++x) {
+      if (!band.at<uchar>(y, x)) continue;
+      const cv::Vec3f colour = view.at<cv::Vec3b>(y, x);
+      const float d = distance.at<float>(y, x);
+      costs[0].at<float>(y, x) = back.cost(colour, x, y, params_.outlier_cost) + prior(-d);
+      costs[1].at<float>(y, x) = fore.cost(colour, x, y, params_.outlier_cost) + prior(d);
+    }
+  return costs;
+}
+
 void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& flow,
                          const cv::Mat& rough, bool exact, const cv::Rect& roi) {
   const cv::Mat view = image(roi);
@@ -298,22 +317,8 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
                               {moved, ~coverage, 0.02f, noise}},
                              {&ring_colours},
                              shadow};
-
-  // Log odds of a pixel's centre lying across the outline although it was predicted at this distance.
-  const auto prior = [&](float d) {
-    return std::clamp(params_.prior_cost * (d - 0.5f), 0.0f, params_.prior_limit);
-  };
-  std::vector<cv::Mat> costs = {cv::Mat::zeros(roi.size(), CV_32F), cv::Mat::zeros(roi.size(), CV_32F)};
-  for (int y = 0; y < roi.height; ++y)
-    for (int x = 0; x < roi.width; ++x) {
-      if (!band.at<uchar>(y, x)) continue;
-      const cv::Vec3f colour = view.at<cv::Vec3b>(y, x);
-      const float d = distance.at<float>(y, x);
-      costs[0].at<float>(y, x) = back.cost(colour, x, y, params_.outlier_cost) + prior(-d);
-      costs[1].at<float>(y, x) = fore.cost(colour, x, y, params_.outlier_cost) + prior(d);
-    }
   cv::Mat labels = predicted / 255;
-  cutLabels(view, band, costs, params_.smoothness, labels);
+  cutLabels(view, band, costsOf(view, band, distance, back, fore), params_.smoothness, labels);
 
   const double area = cv::countNonZero(labels);
   const double flipped = cv::countNonZero((labels > 0) != (predicted > 0));

@@ -11,6 +11,8 @@
 
 namespace calipso::align {
 
+struct LayerAppearance;
+
 struct TrackerParams {
   int components = 5;              // Gaussians per colour model
   int margin_px = 40;              // surroundings of an object that are looked at
@@ -71,6 +73,8 @@ class MaskTracker {
   TrackedMask combine(int moved) const;
   void settle(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
               bool exact, const cv::Rect& roi);
+  std::vector<cv::Mat> costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
+                               const LayerAppearance& back, const LayerAppearance& fore) const;
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
 
   TrackerParams params_;

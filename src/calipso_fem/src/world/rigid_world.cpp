@@ -4,22 +4,10 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "bullet_body.hpp"
-#include "bullet_world.hpp"
+#include "rigid_world_impl.hpp"
 
 namespace calipso::fem {
 namespace {
-
-// Excluded pairs; every other pair that Bullet would test is tested.
-struct PairFilter : btOverlapFilterCallback {
-  std::set<BulletWorld::Pair> excluded;
-  bool needBroadphaseCollision(btBroadphaseProxy* a, btBroadphaseProxy* b) const override {
-    const auto* oa = static_cast<const btCollisionObject*>(a->m_clientObject);
-    const auto* ob = static_cast<const btCollisionObject*>(b->m_clientObject);
-    if (!BulletWorld::isDynamic(oa) && !BulletWorld::isDynamic(ob)) return false;
-    return excluded.count(std::minmax({oa->getUserIndex(), ob->getUserIndex()})) == 0;
-  }
-};
 
 Eigen::Matrix3d cross(const Eigen::Vector3d& r) {
   Eigen::Matrix3d m;
@@ -45,58 +33,6 @@ void applySurface(btRigidBody& body, const SurfaceSettings& surface) {
 }
 
 }  // namespace
-
-struct RigidWorld::Impl {
-  using Body = BulletBody;
-
-  btDefaultCollisionConfiguration configuration;
-  btCollisionDispatcher dispatcher{&configuration};
-  btDbvtBroadphase broadphase;
-  btSequentialImpulseConstraintSolver solver;
-  BulletWorld world{&dispatcher, &broadphase, &solver, &configuration};
-  PairFilter filter;
-  std::map<Id, Body> bodies;
-  Id next = 0;
-  double substep = 1.0 / 960.0;  // s, of the last step
-  std::vector<TouchEvent> touches;
-
-  Impl() {
-    world.setGravity(btVector3(0, 0, 0));
-    world.getPairCache()->setOverlapFilterCallback(&filter);
-    btContactSolverInfo& info = world.getSolverInfo();
-    info.m_numIterations = 40;
-    info.m_splitImpulsePenetrationThreshold = 0.0;  // depth is mended without giving velocity
-    info.m_restitutionVelocityThreshold = 0.02;     // m/s
-    info.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
-  }
-  ~Impl() {
-    for (auto& [id, b] : bodies) world.removeRigidBody(b.body.get());
-  }
-  Body& at(Id id) { return bodies.at(id); }
-  const Body& at(Id id) const { return bodies.at(id); }
-
-  // Gives pushed bodies their weight's impulse of a step h at once, and none within it.
-  std::vector<std::pair<btRigidBody*, btVector3>> takeWeights(double h) {
-    std::vector<std::pair<btRigidBody*, btVector3>> taken;
-    for (auto& [id, b] : bodies) {
-      if (!std::exchange(b.pushed, false)) continue;
-      const btVector3 acceleration = b.body->getGravity();
-      taken.emplace_back(b.body.get(), acceleration);
-      b.body->setLinearVelocity(b.body->getLinearVelocity() + h * acceleration);
-      b.body->setGravity(btVector3(0, 0, 0));
-    }
-    return taken;
-  }
-
-  Id enter(Body body) {
-    const Id id = next++;
-    body.body->setUserIndex(id);
-    world.addRigidBody(body.body.get());
-    body.body->setGravity(btVector3(0, 0, 0));
-    bodies.emplace(id, std::move(body));
-    return id;
-  }
-};
 
 RigidWorld::RigidWorld() : impl_(std::make_unique<Impl>()) {}
 RigidWorld::~RigidWorld() = default;
@@ -357,65 +293,6 @@ int RigidWorld::step(double h) {
     b.moves = false;
   }
   return steps;
-}
-
-std::vector<RigidTouch> RigidWorld::touchesAround(std::set<Id> ids) const {
-  auto& dispatcher = impl_->dispatcher;
-  const auto dynamic = [&](const btCollisionObject* o) {
-    return BulletWorld::isDynamic(o) ? std::optional<Id>(o->getUserIndex()) : std::nullopt;
-  };
-  std::set<int> manifolds;
-  for (bool grows = true; grows;) {
-    grows = false;
-    for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
-      const btPersistentManifold* m = dispatcher.getManifoldByIndexInternal(i);
-      const auto a = dynamic(m->getBody0()), b = dynamic(m->getBody1());
-      if (m->getNumContacts() == 0 || manifolds.count(i)) continue;
-      if (!(a && ids.count(*a)) && !(b && ids.count(*b))) continue;
-      manifolds.insert(i);
-      for (const auto& id : {a, b})
-        if (id) ids.insert(*id);
-      grows = true;
-    }
-  }
-  std::vector<RigidTouch> touches;
-  for (const int i : manifolds) {
-    const btPersistentManifold* m = dispatcher.getManifoldByIndexInternal(i);
-    for (int k = 0; k < m->getNumContacts(); ++k) {
-      const btManifoldPoint& p = m->getContactPoint(k);
-      touches.push_back({dynamic(m->getBody0()), dynamic(m->getBody1()),
-                         fromBullet(p.getPositionWorldOnB()), fromBullet(p.m_normalWorldOnB),
-                         std::max(0.0, p.getDistance()), p.m_combinedFriction});
-    }
-  }
-  return touches;
-}
-
-const std::vector<TouchEvent>& RigidWorld::touches() const { return impl_->touches; }
-
-std::vector<ContactPoint> RigidWorld::contacts() const {
-  std::vector<ContactPoint> contacts;
-  const auto& dispatcher = impl_->dispatcher;
-  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
-    const btPersistentManifold* manifold =
-        const_cast<btCollisionDispatcher&>(dispatcher).getManifoldByIndexInternal(i);
-    for (int k = 0; k < manifold->getNumContacts(); ++k) {
-      const btManifoldPoint& p = manifold->getContactPoint(k);
-      if (p.m_appliedImpulse <= 0.0) continue;
-      ContactPoint c;
-      c.a = impl_->at(manifold->getBody0()->getUserIndex()).name;
-      c.b = impl_->at(manifold->getBody1()->getUserIndex()).name;
-      c.position = fromBullet(p.getPositionWorldOnB());
-      c.normal = fromBullet(p.m_normalWorldOnB);
-      c.force = fromBullet(p.m_appliedImpulse * p.m_normalWorldOnB +
-                           p.m_appliedImpulseLateral1 * p.m_lateralFrictionDir1 +
-                           p.m_appliedImpulseLateral2 * p.m_lateralFrictionDir2) /
-                impl_->substep;
-      c.depth = -p.getDistance();
-      contacts.push_back(c);
-    }
-  }
-  return contacts;
 }
 
 }  // namespace calipso::fem

@@ -20,21 +20,27 @@ constexpr double kShortestHeldStep = 1.0 / 500.0;   // s, for surfaces that are 
 constexpr double kShortestFastStep = 1.0 / 1000.0;  // s, for objects too fast for their size
 // Iterations that a renewal of a tangent costs.
 constexpr double kRenewal = 20.0;
-constexpr int kMending = 8;         // more iterations while a contact is violated
-constexpr double kViolated = 0.02;  // minimal distances
 constexpr int kStraightenings = 3;  // of the gaps of a step
 constexpr double kFar = 3.0;  // of the wanted residual: from here on the iteration is accelerated
+
+// @param velocity  of the surfaces against each other: along the normal, and two ways across
+ContactRow rowOf(const Contact& c, const Eigen::Matrix3d& frame, const Eigen::Vector3d& velocity, double h) {
+  ContactRow row;
+  row.free_velocity = velocity;
+  row.impulse = h * (frame * c.force);
+  row.friction = c.friction;
+  row.held_normal = h * c.held_normal;
+  row.held_tangential = h * c.held_tangential;
+  return row;
+}
 
 ContactRow rowOf(const Contact& c, const StepMotion& motion) {
   const double h = motion.h();
   const Eigen::Matrix3d frame = contactFrame(c.normal);
-  ContactRow row;
-  row.free_velocity = frame * motion.slip(c) / h;
-  row.free_velocity[0] = motion.clearance(c) / h;
-  row.start_impulse = row.impulse = h * (frame * c.force);
-  row.friction = c.friction;
-  row.held_normal = h * c.held_normal;
-  row.held_tangential = h * c.held_tangential;
+  Eigen::Vector3d velocity = frame * motion.slip(c) / h;
+  velocity[0] = motion.clearance(c) / h;
+  ContactRow row = rowOf(c, frame, velocity, h);
+  row.start_impulse = row.impulse;  // the velocity has its effect
   return row;
 }
 
@@ -147,14 +153,9 @@ int SoftContacts::solve(const ContactOperator& problem, const StepMotion& motion
   for (const auto& [key, c] : contacts) {
     const Eigen::Matrix3d frame = contactFrame(c.normal);
     const Eigen::Vector3d slip = problem.freeSlip(static_cast<int>(rows.size()), motion);
-    ContactRow row;
-    row.free_velocity = frame * slip / h;
-    row.free_velocity[0] += (c.start_gap + c.slack - c.offset + allowance(c, h)) / h;
-    row.impulse = h * (frame * c.force);
-    row.friction = c.friction;
-    row.held_normal = h * c.held_normal;
-    row.held_tangential = h * c.held_tangential;
-    rows.push_back(row);
+    Eigen::Vector3d velocity = frame * slip / h;
+    velocity[0] += (c.start_gap + c.slack - c.offset + allowance(c, h)) / h;
+    rows.push_back(rowOf(c, frame, velocity, h));
   }
   const int sweeps = solveContacts(problem.W(), rows, params_.iterations, params_.tolerance,
                                    0.5 * params_.allowed_depth / h)
@@ -165,16 +166,9 @@ int SoftContacts::solve(const ContactOperator& problem, const StepMotion& motion
   return sweeps;
 }
 
-ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
-                                 const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
-                                 double h) {
-  ContactReport report;
- 
-  const std::vector<Candidate> watched = candidates(softs, obstacles, rigid, h);
-  if (h > kShortestFastStep && tooFast(watched, softs, h)) return report;
-  StepMotion motion(softs, obstacles, rigid, h);
-  Contacts contacts = startingContacts(watched, obstacles, softs, rigid, motion);
-  // A pair that does not touch must not change a bit of what is computed.
+// Contacts that will act again. A pair that does not touch must not change a bit of what is computed.
+SoftContacts::Contacts SoftContacts::expectedContacts(const std::vector<Candidate>& watched, const Contacts& contacts,
+                                                      const StepMotion& motion) const {
   std::set<std::pair<int, int>> touching;
   for (const auto& [key, c] : contacts) touching.emplace(std::get<0>(key), std::get<1>(key));
   Contacts expected;
@@ -182,59 +176,84 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
     if (c.near && motion.clearance(c.contact) < c.contact.reach &&
         touching.count({std::get<0>(c.contact.key), std::get<1>(c.contact.key)}))
       expected.emplace(c.contact.key, c.contact);
-  motion.expect(expected);
- 
+  return expected;
+}
+
+// Whether a contact is off its law or a body out of balance.
+bool SoftContacts::isOpen(const Contacts& contacts, const StepMotion& motion) const {
+  for (const auto& [key, c] : contacts)
+    if (violation(rowOf(c, motion), motion.h()) > params_.allowed_depth) return true;
+  for (size_t i = 0; i < motion.bodies().size(); ++i)
+    if (unbalanced(motion, i)) return true;
+  return false;
+}
+
+// One body whose tangent has become too old gets a new one, once in a step. @return whether there was one
+bool SoftContacts::renewOne(const Contacts& contacts, StepMotion& motion, std::vector<char>& renewed) const {
+  for (size_t i = 0; i < renewed.size(); ++i) {
+    const StepMotion::Body& b = motion.bodies()[i];
+    if (!unbalanced(motion, i) || !b.touched || renewed[i] || !slow(b, params_.residual)) continue;
+    motion.renew(static_cast<int>(i), contacts);
+    renewed[i] = 1;
+    return true;
+  }
+  return false;
+}
+
+// The next direction of the bodies that something keeps from their balance, with the contacts' forces. @return sweeps
+int SoftContacts::direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid, bool first, ContactOperator& problem,
+                         StepMotion& motion, Contacts& contacts) const {
+  motion.touch(contacts);
+  for (size_t i = 0; i < softs.size(); ++i)
+    if (motion.bodies()[i].touched || first || unbalanced(motion, i)) motion.aim(motion.bodies()[i]);
+  if (contacts.empty()) return 0;
+  problem.update(contacts, motion, softs, rigid);
+  const int sweeps = solve(problem, motion, contacts);
+  motion.follow(contacts);
+  return sweeps;
+}
+
+ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
+                                 const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
+                                 double h) {
+  ContactReport report;
+  const std::vector<Candidate> watched = candidates(softs, obstacles, rigid, h);
+  if (h > kShortestFastStep && tooFast(watched, softs, h)) return report;
+  StepMotion motion(softs, obstacles, rigid, h);
+  Contacts contacts = startingContacts(watched, obstacles, softs, rigid, motion);
+  motion.expect(expectedContacts(watched, contacts, motion));
+
   ContactOperator problem;
   Anderson anderson;
   std::vector<char> renewed(softs.size(), 0);
-  int undisturbed = 0;  // iterations with the same contacts and systems
+  int undisturbed = 0;    // iterations with the same contacts and systems
   int straightened = 0;
-  bool open = true;     // something is off its law
-  bool violated = false;  // ... that must not stay so
-  const int most = params_.newton_iterations;
-  while (open && report.newton_iterations < (violated ? most + kMending : most)) {
+  bool open = true;       // something is off its law
+  const auto disturb = [&] {
+    undisturbed = 0;
+    anderson.reset();
+  };
+  while (open && report.newton_iterations < params_.newton_iterations) {
     ++report.newton_iterations;
-    motion.touch(contacts);
-    for (size_t i = 0; i < softs.size(); ++i)
-      if (motion.bodies()[i].touched || report.newton_iterations == 1 || unbalanced(motion, i))
-        motion.aim(motion.bodies()[i]);
-   
-    if (!contacts.empty()) {
-      problem.update(contacts, motion, softs, rigid);
-      report.iterations += solve(problem, motion, contacts);
-      motion.follow(contacts);
-    }
+    report.iterations += direct(softs, rigid, report.newton_iterations == 1, problem, motion, contacts);
     const int added = grow(watched, obstacles, softs, motion, contacts);
     motion.advanceFree();
-    undisturbed = added > 0 ? 0 : undisturbed + 1;
-    if (undisturbed == 0) anderson.reset();
+    ++undisturbed;
+    if (added > 0) disturb();
     const bool far = std::any_of(motion.bodies().begin(), motion.bodies().end(), [&](const auto& b) {
       return b.touched && b.residual > kFar * params_.residual;
     });
-    if (undisturbed == 0 || !far || !accelerate(anderson, motion, contacts))
-      motion.advanceTouched();
-   
-    open = added > 0;
-    for (const auto& [key, c] : contacts)
-      open = open || violation(rowOf(c, motion), h) > params_.allowed_depth;
-    for (size_t i = 0; i < softs.size(); ++i) {
-      if (!unbalanced(motion, i)) continue;
-      open = true;
-      const StepMotion::Body& b = motion.bodies()[i];
-      if (!b.touched || undisturbed < 3 || renewed[i] || !slow(b, params_.residual)) continue;
-      motion.renew(static_cast<int>(i), contacts);
-      renewed[i] = 1;
-      undisturbed = 0;
-      anderson.reset();
-    }
-    const bool late = 2 * report.newton_iterations == most;
+    if (undisturbed == 0 || !far || !accelerate(anderson, motion, contacts)) motion.advanceTouched();
+
+    open = added > 0 || isOpen(contacts, motion);
+    if (undisturbed >= 3 && renewOne(contacts, motion, renewed)) disturb();
+    const bool late = 2 * report.newton_iterations == params_.newton_iterations;
     if ((open && !late) || straightened == kStraightenings) continue;
     ++straightened;
     if (straighten(watched, obstacles, softs, motion, contacts) == 0) continue;
     open = true;
     problem.forget();
-    undisturbed = 0;
-    anderson.reset();
+    disturb();
   }
   report.renewals = std::accumulate(renewed.begin(), renewed.end(), 0);
   for (const auto& [key, c] : contacts) {

@@ -162,6 +162,12 @@ class SoftContacts {
                             const StepMotion& motion) const;
   // Contact forces of the direction that the bodies have aimed at. @return sweeps
   int solve(const ContactOperator& problem, const StepMotion& motion, Contacts& contacts) const;
+  Contacts expectedContacts(const std::vector<Candidate>& watched, const Contacts& contacts,
+                            const StepMotion& motion) const;
+  bool isOpen(const Contacts& contacts, const StepMotion& motion) const;
+  bool renewOne(const Contacts& contacts, StepMotion& motion, std::vector<char>& renewed) const;
+  int direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid, bool first, ContactOperator& problem,
+             StepMotion& motion, Contacts& contacts) const;
   bool tooFast(const std::vector<Candidate>& watched, const std::vector<SoftEntry>& softs,
                double h) const;
   bool unbalanced(const StepMotion& motion, size_t soft) const;
