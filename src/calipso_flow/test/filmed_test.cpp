@@ -9,23 +9,11 @@
 namespace calipso::flow {
 namespace {
 
-constexpr double kNoise = 2.0;  // grey levels
-
-ObjectDynamics analyse(const ObjectModel& model, const Camera& camera, const Shapes& shapes,
-                       const std::vector<double>& times, const Eigen::Vector3d& gravity) {
-  const auto frame = [&](size_t k) {
-    return makeFrame(times[k], film(model, shapes[k], camera, kNoise, k + 1), camera);
-  };
-  ClipAnalyser analyser(frame(0), {model}, {cv::Mat()}, gravity);
-  for (size_t k = 1; k < times.size(); ++k) analyser.add(frame(k));
-  return analyser.finish().front();
-}
-
 TEST(Filmed, windAcrossASheetIsFound) {
   const Eigen::Vector3d wind(0.0, 4.0, 0.0);
   const FilmedSheet sheet = filmedSheet(wind, 24);
   const ObjectDynamics found =
-      analyse(sheet.model, sheet.camera, sheet.shapes, sheet.times, sheet.gravity);
+      analyseFilm(sheet.model, sheet.camera, sheet.shapes, sheet.times, sheet.gravity);
   ASSERT_TRUE(found.deformation);
   ASSERT_TRUE(found.deformation->wind) << found.deformation->note;
   const WindEstimate& w = *found.deformation->wind;
@@ -39,7 +27,7 @@ TEST(Filmed, windAcrossASheetIsFound) {
 
 TEST(Filmed, beamVibratesAtItsFrequency) {
   const FilmedBeam beam = filmedBeam(15e3, 40);
-  const ObjectDynamics found = analyse(beam.model, beam.camera, beam.shapes, beam.times,
+  const ObjectDynamics found = analyseFilm(beam.model, beam.camera, beam.shapes, beam.times,
                                        Eigen::Vector3d(0.0, 0.0, -9.81));
   ASSERT_TRUE(found.deformation);
   ASSERT_FALSE(found.deformation->lines.empty());

@@ -131,6 +131,17 @@ cv::Mat film(const ObjectModel& model, const Vertices& moved, const Camera& came
   return result;
 }
 
+ObjectDynamics analyseFilm(const ObjectModel& model, const Camera& camera, const Shapes& shapes,
+                           const std::vector<double>& times, const Eigen::Vector3d& gravity) {
+  constexpr double kNoise = 2.0;  // grey levels
+  const auto frame = [&](size_t k) {
+    return makeFrame(times[k], film(model, shapes[k], camera, kNoise, k + 1), camera);
+  };
+  ClipAnalyser analyser(frame(0), {model}, {cv::Mat()}, gravity);
+  for (size_t k = 1; k < times.size(); ++k) analyser.add(frame(k));
+  return analyser.finish().front();
+}
+
 FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames) {
   FilmedSheet sheet;
   sheet.model.name = "sheet";

@@ -3,6 +3,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "calipso_flow/clip_dynamics.hpp"
 #include "calipso_flow/object_model.hpp"
 #include "calipso_scene/camera.hpp"
 
@@ -23,6 +24,10 @@ Camera lookingAt(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, int 
 // wall, with Gaussian noise. @param moved  #V x 3, world
 cv::Mat film(const ObjectModel& model, const decltype(TriangleMesh::vertices)& moved,
              const Camera& camera, double noise_grey, uint64_t seed);
+
+// What the analysis of its film, with noise of 2 grey levels, says of a surface's motion.
+ObjectDynamics analyseFilm(const ObjectModel& model, const Camera& camera, const Shapes& shapes,
+                           const std::vector<double>& times, const Eigen::Vector3d& gravity);
 
 struct FilmedSheet {
   ObjectModel model;

@@ -9,18 +9,6 @@
 namespace calipso::flow {
 namespace {
 
-constexpr double kNoise = 2.0;  // grey levels
-
-ObjectDynamics analyse(const ObjectModel& model, const Camera& camera, const Shapes& shapes,
-                       const std::vector<double>& times, const Eigen::Vector3d& gravity) {
-  const auto frame = [&](size_t k) {
-    return makeFrame(times[k], film(model, shapes[k], camera, kNoise, k + 1), camera);
-  };
-  ClipAnalyser analyser(frame(0), {model}, {cv::Mat()}, gravity);
-  for (size_t k = 1; k < times.size(); ++k) analyser.add(frame(k));
-  return analyser.finish().front();
-}
-
 // Root mean square error of the tracked surface over that of its true motion, percent.
 double shapeError(const ObjectModel& model, const Shapes& shapes, const ObjectDynamics& found) {
   if (!found.deformation) return std::nan("");
@@ -39,7 +27,7 @@ double shapeError(const ObjectModel& model, const Shapes& shapes, const ObjectDy
 std::string windEntry(const std::string& name, const Eigen::Vector3d& wind) {
   const FilmedSheet sheet = filmedSheet(wind, 45);
   const ObjectDynamics found =
-      analyse(sheet.model, sheet.camera, sheet.shapes, sheet.times, sheet.gravity);
+      analyseFilm(sheet.model, sheet.camera, sheet.shapes, sheet.times, sheet.gravity);
   JsonEntry entry;
   entry.text("case", name).text("object", sheet.model.name);
   entry.flag("deforms", found.deformation.has_value());
@@ -66,7 +54,7 @@ std::string windEntry(const std::string& name, const Eigen::Vector3d& wind) {
 std::string beamEntry(const std::string& name, double ratio) {
   const FilmedBeam beam = filmedBeam(ratio, 60);
   const ObjectDynamics found =
-      analyse(beam.model, beam.camera, beam.shapes, beam.times, Eigen::Vector3d(0.0, 0.0, -9.81));
+      analyseFilm(beam.model, beam.camera, beam.shapes, beam.times, Eigen::Vector3d(0.0, 0.0, -9.81));
   JsonEntry entry;
   entry.text("case", name).text("object", beam.model.name);
   entry.flag("deforms", found.deformation.has_value());

@@ -109,16 +109,21 @@ TriangleMesh beaker() {
   return mesh;
 }
 
-std::vector<Result> pyramid() {
-  WorldScene scene = pyramidOf(beaker(), 1.2);
-  World world(scene, {});
+// Afloat before: with twice the gravity they fall with 1 g.
+void letFall(const WorldScene& scene, World& world) {
   for (const WorldObject& o : scene.objects) {
     Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);
     edit.object = o.name;
-    edit.factor = 2.0;  // afloat before: they fall with 1 g
+    edit.factor = 2.0;
     world.submit(edit);
   }
   world.advanceTo(0.0);
+}
+
+std::vector<Result> pyramid() {
+  WorldScene scene = pyramidOf(beaker(), 1.2);
+  World world(scene, {});
+  letFall(scene, world);
   Run falling, settling;
   falling.play(world, 1.0);
   settling.play(world, 5.0);
@@ -143,13 +148,7 @@ std::vector<Result> asleep() {
     scene.objects.push_back(o);
   }
   World world(scene, {});
-  for (const WorldObject& o : scene.objects) {
-    Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);
-    edit.object = o.name;
-    edit.factor = 2.0;  // afloat before: they fall with 1 g
-    world.submit(edit);
-  }
-  world.advanceTo(0.0);
+  letFall(scene, world);
   Run settling, resting;
   settling.play(world, 5.0);
   resting.play(world, 2.0);
