@@ -9,6 +9,8 @@
 #include "bullet_body.hpp"
 #include "bullet_world.hpp"
 #include "calipso_fem/world/rigid_world.hpp"
+#include "coulomb_solver.hpp"
+#include "plane_contact.hpp"
 
 namespace calipso::fem {
 
@@ -27,9 +29,10 @@ struct RigidWorld::Impl {
   using Body = BulletBody;
 
   btDefaultCollisionConfiguration configuration;
+  HullPlaneAlgorithm::Creator on_plane, under_hull;
   btCollisionDispatcher dispatcher{&configuration};
   btDbvtBroadphase broadphase;
-  btSequentialImpulseConstraintSolver solver;
+  CoulombSolver solver;
   BulletWorld world{&dispatcher, &broadphase, &solver, &configuration};
   PairFilter filter;
   std::map<Id, Body> bodies;
@@ -38,10 +41,15 @@ struct RigidWorld::Impl {
   std::vector<TouchEvent> touches;
 
   Impl() {
+    on_plane.m_swapped = false;
+    under_hull.m_swapped = true;
+    dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, &on_plane);
+    dispatcher.registerCollisionCreateFunc(STATIC_PLANE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, &under_hull);
     world.setGravity(btVector3(0, 0, 0));
     world.getPairCache()->setOverlapFilterCallback(&filter);
     btContactSolverInfo& info = world.getSolverInfo();
     info.m_numIterations = 40;
+    info.m_leastSquaresResidualThreshold = 1e-12;  // (m/s)^2
     info.m_splitImpulsePenetrationThreshold = 0.0;  // depth is mended without giving velocity
     info.m_restitutionVelocityThreshold = 0.02;     // m/s
     info.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;

@@ -69,12 +69,15 @@ std::vector<Result> slope(double (*slide)(double, Run&)) {
 std::vector<Result> sliding() {
   const double v = 2.0;
   WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.1}, 2), {0, 0, 0.05});
-  World world(scene, {});
+  Run run;
+  run.period = 1.0 / 240.0;  // with which the stop is seen
+  WorldParams params;
+  params.frame_period = run.period;
+  World world(scene, params);
   Edit push = editOf(EditKind::kVelocity);
   push.vector = {v, 0, 0};
   world.submit(push);
   world.advanceTo(0.0);
-  Run run;
   double stopped = 0.0;
   run.play(world, 1.5, [&](const WorldState& s) {
     if (s.objects[0].kinetic_energy > 1e-6) stopped = s.time;
@@ -82,8 +85,7 @@ std::vector<Result> sliding() {
   const double way = world.state().objects[0].world_from_object.translation().x();
   return {{"way of a block pushed at 2 m/s, m", way, v * v / (2 * kFriction * kG), 0, 0,
            run.msPerFrame()},
-          // A frame is the resolution with which the stop is seen.
-          {"time until it stands, s", stopped + 0.5 * kFrame, v / (kFriction * kG), 0, 0,
+          {"time until it stands, s", stopped + 0.5 * run.period, v / (kFriction * kG), 0, 0,
            run.msPerFrame()}};
 }
 

@@ -1,0 +1,93 @@
+#include "plane_contact.hpp"
+
+#include <cmath>
+#include <functional>
+#include <vector>
+
+namespace calipso::fem {
+namespace {
+
+struct Corner {
+  btVector3 point;  // on the hull, in the plane's frame
+  double height;
+};
+
+// Where `gain` is most, if it is anything there.
+const Corner* best(const std::vector<Corner>& corners, const std::function<double(const Corner&)>& gain) {
+  const Corner* found = nullptr;
+  double most = 0.0;
+  for (const Corner& c : corners)
+    if (const double g = gain(c); g > most) most = g, found = &c;
+  return found;
+}
+
+// The deepest corner, the one furthest from it, and those furthest from the line through both.
+std::vector<const Corner*> spanning(const std::vector<Corner>& corners, const btVector3& normal) {
+  std::vector<const Corner*> chosen;
+  for (const Corner& c : corners)
+    if (chosen.empty() || c.height < chosen[0]->height) chosen.assign(1, &c);
+  if (chosen.empty()) return chosen;
+  const btVector3 first = chosen[0]->point;
+  const Corner* far = best(corners, [&](const Corner& c) { return (c.point - first).length2(); });
+  if (!far) return chosen;
+  chosen.push_back(far);
+  const btVector3 across = normal.cross(far->point - first);
+  for (const double side : {1.0, -1.0})
+    if (const Corner* c = best(corners, [&](const Corner& k) { return side * across.dot(k.point - first); }))
+      chosen.push_back(c);
+  return chosen;
+}
+
+}  // namespace
+
+btCollisionAlgorithm* HullPlaneAlgorithm::Creator::CreateCollisionAlgorithm(
+    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
+    const btCollisionObjectWrapper* b) {
+  void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(HullPlaneAlgorithm));
+  return new (memory) HullPlaneAlgorithm(info, a, b, m_swapped);
+}
+
+HullPlaneAlgorithm::HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
+                                       const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                                       bool swapped)
+    : btCollisionAlgorithm(info), swapped_(swapped), manifold_(info.m_manifold) {
+  const btCollisionObjectWrapper *hull = swapped ? b : a, *plane = swapped ? a : b;
+  if (manifold_ || !m_dispatcher->needsCollision(hull->getCollisionObject(), plane->getCollisionObject()))
+    return;
+  manifold_ = m_dispatcher->getNewManifold(hull->getCollisionObject(), plane->getCollisionObject());
+  owner_ = true;
+}
+
+HullPlaneAlgorithm::~HullPlaneAlgorithm() {
+  if (owner_) m_dispatcher->releaseManifold(manifold_);
+}
+
+void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                                          const btDispatcherInfo&, btManifoldResult* result) {
+  if (!manifold_) return;
+  const btCollisionObjectWrapper *hull = swapped_ ? b : a, *plane = swapped_ ? a : b;
+  const auto& shape = *static_cast<const btConvexHullShape*>(hull->getCollisionShape());
+  const auto& ground = *static_cast<const btStaticPlaneShape*>(plane->getCollisionShape());
+  const btVector3& normal = ground.getPlaneNormal();
+  const btTransform plane_from_hull = plane->getWorldTransform().inverseTimes(hull->getWorldTransform());
+  const double reach = manifold_->getContactBreakingThreshold();
+  result->setPersistentManifold(manifold_);
+  std::vector<Corner> near;
+  for (int i = 0; i < shape.getNumPoints(); ++i) {
+    const btVector3 x = plane_from_hull * shape.getScaledPoint(i);
+    const double height = normal.dot(x) - ground.getPlaneConstant() - shape.getMargin();
+    if (height < reach) near.push_back({x, height});
+  }
+  const btTransform& world_from_plane = plane->getWorldTransform();
+  const btVector3 up = world_from_plane.getBasis() * normal;
+  for (const Corner* c : spanning(near, normal))
+    result->addContactPoint(up, world_from_plane * (c->point - (c->height + shape.getMargin()) * normal),
+                            c->height);
+  if (owner_ && manifold_->getNumContacts()) result->refreshContactPoints();
+}
+
+void HullPlaneAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
+  if (manifold_ && owner_) manifolds.push_back(manifold_);
+}
+
+}  // namespace calipso::fem

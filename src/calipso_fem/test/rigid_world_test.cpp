@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calipso_fem/world/rigid_world.hpp"
+#include "world_fixtures.hpp"
+
+// Rigid bodies by themselves: analytic cases.
+namespace calipso::fem {
+namespace {
+
+constexpr double kG = 9.81, kFriction = 0.5;
+constexpr double kStep = 1.0 / 60.0;  // s
+
+// A block that lies on a plane through the origin.
+struct Block {
+  RigidWorld world;
+  RigidWorld::Id id = 0;
+  Eigen::Vector3d start;
+
+  Block(const Eigen::Vector3d& normal, const Eigen::Vector3d& velocity) {
+    SurfaceSettings surface;
+    surface.friction = kFriction;
+    world.addPlane({"plane", normal, 0.0, std::nullopt}, surface);
+    RigidBodySpec spec;
+    spec.name = "block";
+    spec.shapes = {test::boxSurface({0.2, 0.2, 0.1}, 1)};
+    spec.mass = massProperties(spec.shapes.front(), 1000.0);
+    spec.surface = surface;
+    spec.world_from_object.linear() =
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal).toRotationMatrix();
+    spec.world_from_object.translation() = 0.05 * normal;
+    spec.linear = velocity;
+    id = world.add(spec);
+    world.setAcceleration(id, {0, 0, -kG});
+    start = world.center(id);
+  }
+  Eigen::Vector3d way(double seconds) {
+    for (int k = 0; k < std::lround(seconds / kStep); ++k) world.step(kStep);
+    return world.center(id) - start;
+  }
+};
+
+TEST(RigidWorld, BlockSticksBelowAndSlidesAboveTheFrictionAngle) {
+  for (const double factor : {0.99, 1.01, 1.3}) {
+    const double angle = factor * std::atan(kFriction);
+    Block block({std::sin(angle), 0, std::cos(angle)}, {0, 0, 0});
+    const double expected = std::max(0.0, 0.5 * kG * (std::sin(angle) - kFriction * std::cos(angle)));
+    EXPECT_NEAR(block.way(1.0).norm(), expected, 0.005 * expected + 1e-5) << factor;
+  }
+}
+
+// Whichever way it slides, over its edges or over a corner.
+TEST(RigidWorld, FrictionIsTheSameInAllDirections) {
+  const double v = 2.0, expected = v * v / (2.0 * kFriction * kG);
+  for (const double direction : {0.0, 0.4, M_PI / 4}) {
+    const Eigen::Vector3d ahead(std::cos(direction), std::sin(direction), 0);
+    Block block(Eigen::Vector3d::UnitZ(), v * ahead);
+    const Eigen::Vector3d way = block.way(1.0);
+    EXPECT_NEAR(way.dot(ahead), expected, 0.005 * expected) << direction;
+    EXPECT_LT((way - way.dot(ahead) * ahead).norm(), 0.005 * expected) << direction;
+  }
+}
+
+// What Bullet reports as forces is what changes the velocity, and lies in the friction cone.
+TEST(RigidWorld, ForcesOfASlidingBlockLieInTheConeAndAreAllThatBrakesIt) {
+  Block block(Eigen::Vector3d::UnitZ(), {1, 1, 0});
+  const double h = 1.0 / 1920.0;  // one sub-step
+  const double mass = massProperties(test::boxSurface({0.2, 0.2, 0.1}, 1), 1000.0).mass;
+  Eigen::Vector3d impulse = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d before = block.world.linearVelocity(block.id);
+  for (int k = 0; k < 200; ++k) {
+    block.world.step(h);
+    for (const ContactPoint& c : block.world.contacts()) {
+      impulse += h * c.force;
+      const double normal = c.force.dot(c.normal);
+      EXPECT_LE((c.force - normal * c.normal).norm(), kFriction * normal * (1.0 + 1e-3) + 1e-6);
+    }
+  }
+  const Eigen::Vector3d weight(0, 0, -200 * h * mass * kG);
+  const Eigen::Vector3d gained = mass * (block.world.linearVelocity(block.id) - before);
+  EXPECT_LT((impulse + weight - gained).norm(), 1e-6 * gained.norm());
+}
+
+}  // namespace
+}  // namespace calipso::fem
