@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "calipso_fem/world/mass_properties.hpp"
 #include "calipso_fem/world/wind.hpp"
 #include "world_fixtures.hpp"
@@ -197,6 +199,53 @@ TEST(WorldLoads, WhatTheVideoShowsOfGravityCanBeTaken) {
   play(world, 0.5);
   // Afloat: buoyancy holds the weight under the scene's 9.81 m/s^2. 0.04: of the time step.
   EXPECT_NEAR(centerOf(world.state()).z(), 5.0 + 0.5 * (9.81 - 6.0) * 0.25, 0.04);
+}
+
+TEST(WorldLoads, TheWindOfTheVideoCanBeTaken) {
+  Edit edit = editOf(EditKind::kWind, EditMode::kEstimated);
+  World blind = boxInTheAir();
+  blind.submit(edit);
+  const auto refused = blind.advanceTo(0.0);
+  EXPECT_FALSE(refused.at(0).accepted);
+  EXPECT_NE(refused[0].message.find("mode absolute"), std::string::npos) << refused[0].message;
+
+  // Taken, it does what the same wind given by hand does; doubled, more.
+  const auto drift = [&](const std::function<void(World&, Edit&)>& choose) {
+    World world = boxInTheAir();
+    Edit chosen = edit;
+    choose(world, chosen);
+    world.submit(rigidKind());
+    world.submit(chosen);
+    for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+    const Eigen::Vector3d start = centerOf(world.state());
+    play(world, 0.5);
+    return Eigen::Vector3d(centerOf(world.state()) - start);
+  };
+  const Eigen::Vector3d velocity(9.0, 0.0, 0.0);
+  const auto show = [&](World& world, const Eigen::Vector3d& late) {
+    world.addObservedWind("thing", {1.0, late, Eigen::Matrix3d::Identity()});
+    world.addObservedWind("thing", {0.0, velocity, Eigen::Matrix3d::Identity()});
+  };
+  const Eigen::Vector3d given = drift([&](World&, Edit& e) { e.mode = EditMode::kAbsolute, e.vector = velocity; });
+  const Eigen::Vector3d taken = drift([&](World& w, Edit&) { show(w, velocity); });
+  const Eigen::Vector3d doubled = drift([&](World& w, Edit& e) { show(w, velocity), e.factor = 2.0; });
+  const Eigen::Vector3d dying = drift([&](World& w, Edit&) { show(w, -velocity); });
+  EXPECT_EQ(taken, given);
+  EXPECT_NEAR(doubled.x(), 4.0 * taken.x(), 0.1 * taken.x());  // drag is quadratic; less what it drifts with the air
+  EXPECT_GT(dying.x(), 0.0);
+  EXPECT_LT(dying.x(), 0.8 * taken.x());
+}
+
+TEST(WindTrack, IsLinearBetweenItsSamplesAndHoldsOutside) {
+  WindTrack track;
+  track.add({1.0, {2.0, 0.0, 0.0}, Eigen::Matrix3d::Identity()});
+  track.add({0.0, {0.0, 4.0, 0.0}, 3.0 * Eigen::Matrix3d::Identity()});
+  EXPECT_EQ(track.at(-1.0), Eigen::Vector3d(0.0, 4.0, 0.0));
+  EXPECT_EQ(track.at(0.25), Eigen::Vector3d(0.5, 3.0, 0.0));
+  EXPECT_EQ(track.at(2.0), Eigen::Vector3d(2.0, 0.0, 0.0));
+  EXPECT_EQ(track.variance(), 2.0);
+  EXPECT_EQ(track.times(-2.0).at(1.0), Eigen::Vector3d(-4.0, 0.0, 0.0));
+  EXPECT_EQ(track.times(-2.0).variance(), 8.0);
 }
 
 TEST(WorldLoads, ACopyLivesOnItsOwn) {

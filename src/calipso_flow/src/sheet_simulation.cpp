@@ -66,22 +66,10 @@ void SheetSimulation::blow(const Eigen::Vector3d& wind, double h) {
   sheet_.body().setSurfaceForces(Eigen::Map<const Eigen::VectorXd>(forces.data(), forces.size()));
 }
 
-// A node goes as the surface that it carries does, on average.
-Eigen::VectorXd SheetSimulation::nodalVelocities(const SurfaceVector& surface) const {
-  const auto& weights = sheet_.body().embedding().weights;
-  const Eigen::VectorXd carried = weights.transpose() * Eigen::VectorXd::Ones(weights.rows());
-  Eigen::VectorXd nodal = sheet_.body().embedding().applyTransposed(surface);
-  for (int n = 0; n < carried.size(); ++n) {
-    const bool still = carried[n] <= 0.0 || sheet_.body().isFixed(n);
-    nodal.segment<3>(3 * n) *= still ? 0.0 : 1.0 / carried[n];
-  }
-  return nodal;
-}
-
 std::vector<SurfaceVector> SheetSimulation::run(const std::vector<double>& times,
                                                 const SurfaceVector& velocities, const Wind& wind) {
   fem::DeformableBody& body = sheet_.body();
-  body.setState(start_, nodalVelocities(velocities));
+  body.setState(start_, sheet_.nodalField(velocities));
   const Eigen::VectorXd shape = body.surfaceVertices();
   std::vector<SurfaceVector> displacements{SurfaceVector::Zero(shape.size())};
   for (size_t k = 1; k < times.size(); ++k) {

@@ -27,7 +27,6 @@ class SheetSimulation {
 
  private:
   void blow(const Eigen::Vector3d& wind, double h);
-  Eigen::VectorXd nodalVelocities(const SurfaceVector& surface) const;
 
   double longest_step_;   // s
   TriangleMesh surface_;  // world

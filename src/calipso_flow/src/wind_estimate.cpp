@@ -178,6 +178,12 @@ Eigen::Vector3d WindEstimate::at(double time) const {
   return sum;
 }
 
+Eigen::Matrix3d WindEstimate::covarianceAt(double time) const {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (size_t i = 0; i < knots.size(); ++i) sum += hatAt(knots, i, time) * covariance[i];
+  return sum;
+}
+
 std::optional<WindEstimate> estimateWind(const ObjectModel& model, const std::vector<double>& times,
                                          const DeformationModes& modes, const Eigen::Vector3d& gravity,
                                          std::string& note, const WindParams& params) {

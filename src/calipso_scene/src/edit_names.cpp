@@ -70,6 +70,8 @@ bool allows(EditKind kind, EditMode mode) {
     case EditKind::kMaterial:
     case EditKind::kAppearance:
       return mode == EditMode::kAbsolute || mode == EditMode::kFactor;
+    case EditKind::kWind:
+      return mode == EditMode::kAbsolute || mode == EditMode::kEstimated;
     case EditKind::kVelocity:
       return mode == EditMode::kAbsolute || mode == EditMode::kAdd || mode == EditMode::kEstimated;
     default:

@@ -68,6 +68,16 @@ TEST(Edit, readsWhatTheKindsNeed) {
   EXPECT_EQ(edits[4].collision, 2);
 }
 
+TEST(Edit, windIsGivenOrAsInTheVideo) {
+  const auto edits = loadEdits(writeFile("- {t: 0, object: banana1, kind: wind, vector: [3, 0, 0]}\n"
+                                         "- {t: 0, kind: wind, mode: estimated, factor: 2}\n"),
+                               kObjects);
+  ASSERT_EQ(edits.size(), 2u);
+  EXPECT_EQ(edits[0].mode, EditMode::kAbsolute);
+  EXPECT_EQ(edits[1].mode, EditMode::kEstimated);
+  EXPECT_EQ(edits[1].factor, 2.0);
+}
+
 TEST(Edit, emptyListsAreValid) {
   EXPECT_TRUE(loadEdits(writeFile(""), kObjects).empty());
   EXPECT_TRUE(loadEdits(writeFile("[]"), kObjects).empty());

@@ -92,11 +92,7 @@ void SimulatorRos::prepare() {
   }
   if (!params_.live) {
     for (const auto& frame : clip_dynamics_->frames) take(frame);
-    for (const auto& object : clip_dynamics_->objects) {
-      if (object.falls) world_->addObservedGravity(calipso::fromMsg(object.gravity), object.gravity_deviation);
-      for (const auto& collision : object.collisions)
-        world_->addCollision(object.object, (collision.stamp - *first_stamp_).toSec());
-    }
+    for (const auto& object : clip_dynamics_->objects) take(object);
     world_->allCollisionsKnown();
   }
   if (first_stamp_)
@@ -116,6 +112,18 @@ void SimulatorRos::take(const calipso_msgs::Dynamics& dynamics) {
       reporter_.warn(dynamics.header.stamp, error.what());
     }
   }
+}
+
+void SimulatorRos::take(const calipso_msgs::ObjectClipDynamics& object) {
+  try {
+    if (!object.modes.empty()) world_->addObservedModes(object.object, shapesOf(object.modes));
+  } catch (const std::invalid_argument& error) {
+    reporter_.warn(clip_dynamics_->header.stamp, error.what());
+  }
+  if (object.falls) world_->addObservedGravity(calipso::fromMsg(object.gravity), object.gravity_deviation);
+  for (const auto& wind : object.wind) world_->addObservedWind(object.object, fromMsg(wind, *first_stamp_));
+  for (const auto& collision : object.collisions)
+    world_->addCollision(object.object, (collision.stamp - *first_stamp_).toSec());
 }
 
 void SimulatorRos::onEdit(const calipso_msgs::EditConstPtr& edit) {

@@ -38,6 +38,7 @@ class SimulatorRos {
 
   void prepare();  // once everything it takes has arrived
   void take(const calipso_msgs::Dynamics& dynamics);
+  void take(const calipso_msgs::ObjectClipDynamics& object);
   void submit(const calipso_msgs::Edit& edit);
   void refuse(const calipso_msgs::Edit& edit, const std::string& message);
   void publish(const std::vector<EditOutcome>& outcomes, const ros::Time& stamp);

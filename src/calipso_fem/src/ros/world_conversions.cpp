@@ -1,5 +1,8 @@
 #include "world_conversions.hpp"
 
+#include <stdexcept>
+#include <string>
+
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
 
@@ -73,6 +76,10 @@ calipso_msgs::ObjectPlan toMsg(const PlanEntry& e) {
   return m;
 }
 
+Eigen::VectorXd toVector(const std::vector<float>& numbers) {
+  return Eigen::Map<const Eigen::VectorXf>(numbers.data(), numbers.size()).cast<double>();
+}
+
 }  // namespace
 
 WorldScene toWorldScene(const Scene& scene, const calipso_msgs::AlignedModels& models) {
@@ -104,7 +111,30 @@ ObservedMotion fromMsg(const calipso_msgs::ObjectDynamics& d, double time) {
   m.linear = calipso::fromMsg(d.twist.twist.linear);
   m.angular = calipso::fromMsg(d.twist.twist.angular);
   m.acceleration = calipso::fromMsg(d.acceleration);
+  m.mode_amplitudes = toVector(d.mode_amplitudes);
+  m.mode_velocities = toVector(d.mode_velocities);
   return m;
+}
+
+ObservedWind fromMsg(const calipso_msgs::Wind& wind, const ros::Time& first_stamp) {
+  ObservedWind w;
+  w.time = (wind.stamp - first_stamp).toSec();
+  w.velocity = calipso::fromMsg(wind.velocity);
+  w.covariance = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(wind.covariance.data());
+  return w;
+}
+
+Eigen::MatrixXd shapesOf(const std::vector<calipso_msgs::DeformationMode>& modes) {
+  const size_t rows = modes.empty() ? 0 : modes.front().displacements.size();
+  Eigen::MatrixXd shapes(rows, modes.size());
+  for (size_t m = 0; m < modes.size(); ++m) {
+    if (modes[m].displacements.size() != rows)
+      throw std::invalid_argument("mode " + std::to_string(m) + " has " +
+                                  std::to_string(modes[m].displacements.size()) + " numbers, the first one " +
+                                  std::to_string(rows));
+    shapes.col(m) = toVector(modes[m].displacements);
+  }
+  return shapes;
 }
 
 calipso_msgs::SimulationState toMsg(const WorldState& state, const ros::Time& stamp) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calipso_fem/world/observed_track.hpp"
+#include "calipso_fem/world/observed_wind.hpp"
 #include "calipso_fem/world/rigid_world.hpp"
 #include "calipso_fem/world/soft_object.hpp"
 #include "calipso_fem/world/surface_tree.hpp"
@@ -54,6 +55,8 @@ struct Actor {
 
   WorldObject object;  // its mesh is rescaled by edits
   ObservedTrack track;
+  Eigen::MatrixXd modes;  // 3 #V x K, object frame: in which it deforms in the video; empty: as a rigid body
+  WindTrack wind;  // that its cloth shows in the video
   int id = 0;  // index among the actors; also its obstacle's id
   ObjectSettings settings;
   Material observed_material;  // with which the observed shape is at rest
@@ -79,7 +82,7 @@ struct Actor {
     double areal_density = 0.0;  // kg/m^2
   };
   std::optional<Sheet> sheet;  // how the surface meets the air; made when it is needed
-  std::optional<Eigen::Vector3d> air;       // velocity of the air around it, m/s
+  WindTrack air;                            // around it, by edits
   std::vector<double> collisions;           // instants in the video, s, ascending
   Look look;
   std::vector<std::vector<int>> fixed;  // vertices per fixed region

@@ -30,7 +30,7 @@ void ObservedTrack::add(const ObservedMotion& sample) {
 
 ObservedMotion ObservedTrack::at(double time) const {
   const bool moves = std::any_of(samples_.begin(), samples_.end(),
-                                 [](const ObservedMotion& s) { return s.moving; });
+                                 [](const ObservedMotion& s) { return s.moving || s.mode_amplitudes.size() > 0; });
   ObservedMotion m;
   m.world_from_object = key_pose_;
   m.time = time;
@@ -47,6 +47,10 @@ ObservedMotion ObservedTrack::at(double time) const {
   m.linear = (1.0 - s) * a.linear + s * b.linear;
   m.angular = (1.0 - s) * a.angular + s * b.angular;
   m.acceleration = (1.0 - s) * a.acceleration + s * b.acceleration;
+  if (a.mode_amplitudes.size() == b.mode_amplitudes.size()) {
+    m.mode_amplitudes = (1.0 - s) * a.mode_amplitudes + s * b.mode_amplitudes;
+    m.mode_velocities = (1.0 - s) * a.mode_velocities + s * b.mode_velocities;
+  }
   return m;
 }
 

@@ -58,6 +58,17 @@ const SurfaceTree& SoftObject::tree() {
   return *tree_;
 }
 
+Vec SoftObject::nodalField(const Vec& surface) const {
+  const auto& weights = body_.embedding().weights;
+  const Vec carried = weights.transpose() * Vec::Ones(weights.rows());
+  Vec nodal = body_.embedding().applyTransposed(surface);
+  for (int n = 0; n < carried.size(); ++n) {
+    const bool still = carried[n] <= 0.0 || body_.isFixed(n);
+    nodal.segment<3>(3 * n) *= still ? 0.0 : 1.0 / carried[n];
+  }
+  return nodal;
+}
+
 Eigen::Isometry3d SoftObject::motion() const {
   const Eigen::VectorXd& mass = body_.model().lumpedMass();
   const Vertices a = asRows(observed_), b = asRows(body_.positions());

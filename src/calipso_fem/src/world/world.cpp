@@ -82,14 +82,14 @@ double World::time() const { return impl_->now; }
 const WorldScene& World::scene() const { return impl_->scene; }
 
 void World::addObservedMotion(const std::string& object, const ObservedMotion& motion) {
-  Actor* actor = impl_->find(object);
-  if (!actor) {
-    std::string known;
-    for (const std::string& name : impl_->names()) known += (known.empty() ? "" : ", ") + name;
-    throw std::invalid_argument("observed motion of '" + object +
-                                "': there is no such object; known: " + known);
-  }
-  actor->track.add(motion);
+  impl_->known(object, "observed motion").track.add(motion);
+}
+
+Actor& World::Impl::known(const std::string& object, const char* what) {
+  if (Actor* actor = find(object)) return *actor;
+  std::string all;
+  for (const std::string& name : names()) all += (all.empty() ? "" : ", ") + name;
+  throw std::invalid_argument(std::string(what) + " of '" + object + "': there is no such object; known: " + all);
 }
 
 void World::Impl::enqueue(const Edit& edit) {
@@ -123,6 +123,19 @@ void World::Impl::releaseWaiting() {
 void World::addObservedGravity(const Eigen::Vector3d& gravity, double deviation) {
   std::optional<ObservedGravity>& known = impl_->observed_gravity;
   if (!known || deviation < known->deviation) known = {gravity, deviation};
+}
+
+void World::addObservedWind(const std::string& object, const ObservedWind& wind) {
+  if (Actor* actor = impl_->find(object)) actor->wind.add(wind);
+}
+
+void World::addObservedModes(const std::string& object, const Eigen::MatrixXd& shapes) {
+  Actor& actor = impl_->known(object, "observed modes");
+  if (shapes.rows() != 3 * actor.object.mesh.vertexCount())
+    throw std::invalid_argument("observed modes of '" + object + "' have " + std::to_string(shapes.rows() / 3) +
+                                " vertices, but its model has " +
+                                std::to_string(actor.object.mesh.vertexCount()));
+  actor.modes = shapes;
 }
 
 void World::addCollision(const std::string& object, double time) {

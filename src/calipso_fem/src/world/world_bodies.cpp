@@ -157,15 +157,21 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
   if (stays) kind = ObjectKind::kKinematic;
   actor.edited = actor.edited || kind != ObjectKind::kStatic;
   if (actor.kind == kind) return;
-  const BodyMotion motion = motionOf(actor);
+  BodyMotion motion = motionOf(actor);
   const bool as_observed = actor.kind == ObjectKind::kStatic;
   removeBodies(actor);
-  const Eigen::Isometry3d seen = actor.track.at(now).world_from_object;
+  Eigen::Isometry3d seen = actor.track.at(now).world_from_object;
+  const bool deforms = as_observed && kind == ObjectKind::kDeformable && actor.modes.cols() > 0;
+  if (deforms) {  // its modes start from the key frame's shape and place
+    motion = BodyMotion();
+    motion.world_from_object = seen = actor.object.world_from_object;
+  }
   actor.kind = kind;
   actor.reason = reason + (stays ? "; its attachments hold it in place" : "");
   actor.placement = motion.world_from_object * seen.inverse();
   if (kind == ObjectKind::kRigid) makeRigid(actor, motion);
   if (kind == ObjectKind::kDeformable) makeSoft(actor, motion, as_observed);
+  if (deforms) deformAsObserved(actor);
   if (kind == ObjectKind::kKinematic || kind == ObjectKind::kStatic) addCollider(actor);
   plan_changed = true;
 }
@@ -265,6 +271,22 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   actor.calm_frames = 0;
 }
 
+// The field sum_m a_m phi_m of the video's deformation as the nodes move, world axes.
+Vec World::Impl::nodalModes(const Actor& actor, const Vec& amplitudes) const {
+  Vec field = actor.modes * amplitudes;
+  Eigen::Map<Eigen::Matrix3Xd> columns(field.data(), 3, field.size() / 3);
+  columns = (actor.soft_from_object.linear() * columns).eval();
+  return actor.soft->nodalField(field);
+}
+
+void World::Impl::deformAsObserved(Actor& actor) {
+  const ObservedMotion seen = actor.track.at(now);
+  if (seen.mode_amplitudes.size() != actor.modes.cols()) return;
+  DeformableBody& body = actor.soft->body();
+  body.setState(body.positions() + nodalModes(actor, seen.mode_amplitudes), nodalModes(actor, seen.mode_velocities));
+  actor.soft->changed();
+}
+
 void World::Impl::removeBodies(Actor& actor) {
   if (actor.body) rigid.remove(*actor.body);
   actor.body.reset();
@@ -284,6 +306,8 @@ void World::Impl::reset(Actor& actor) {
   Actor fresh(scene.objects[id]);
   fresh.id = id;
   fresh.track = actor.track;
+  fresh.wind = actor.wind;
+  fresh.modes = actor.modes;
   fresh.settings = actor.settings;
   fresh.observed_material = fresh.material = actor.observed_material;
   fresh.gravity = scene.gravity;

@@ -207,6 +207,10 @@ std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
     for (int i = 0; i < body.nodeCount(); ++i)
       v.segment<3>(3 * i) += edit.vector + edit.angular.cross(x.segment<3>(3 * i) - center);
     body.setState(x, v);
+  } else if (actor.soft && edit.mode == EditMode::kEstimated && actor.modes.cols() > 0) {
+    DeformableBody& body = actor.soft->body();
+    body.setState(body.positions(), edit.factor * nodalModes(actor, actor.track.at(now).mode_velocities));
+    return actor.object.name + " moves with " + std::to_string(edit.factor) + " of the velocity it deforms with";
   } else if (actor.soft) {
     actor.soft->body().setRigidVelocity(linear, angular);
   } else {

@@ -27,7 +27,7 @@ void World::Impl::applyLoads(double at, double h) {
     if (actor.removed) continue;
     if (actor.soft) {
       for (const Pull& pull : actor.pulls) pullSoft(actor, pull, at);
-      if (actor.air) blowSoft(actor, h);
+      if (!actor.air.empty()) blowSoft(actor, at, h);
     }
     if (actor.kind == ObjectKind::kRigid && actor.body) loadRigid(actor, at, h);
   }
@@ -95,7 +95,7 @@ void World::Impl::loadRigid(Actor& actor, double at, double h) {
     force += f;
     torque += arm.cross(f);
   }
-  if (actor.air) {
+  if (!actor.air.empty()) {
     const Eigen::Isometry3d pose = rigid.pose(*actor.body);
     const Vertices x = placed(actor.object.mesh, pose).vertices;
     Vertices u(x.rows(), 3);
@@ -103,7 +103,7 @@ void World::Impl::loadRigid(Actor& actor, double at, double h) {
     const Eigen::Vector3d angular = rigid.angularVelocity(*actor.body);
     for (Eigen::Index i = 0; i < x.rows(); ++i)
       u.row(i) = (linear + angular.cross(x.row(i).transpose() - center)).transpose();
-    const Vertices forces = airOn(actor, x, u, h);
+    const Vertices forces = airOn(actor, x, u, at, h);
     for (Eigen::Index i = 0; i < x.rows(); ++i) {
       force += forces.row(i).transpose();
       torque += (x.row(i).transpose() - center).cross(forces.row(i).transpose());
@@ -112,7 +112,7 @@ void World::Impl::loadRigid(Actor& actor, double at, double h) {
   rigid.setForce(*actor.body, force, torque);
 }
 
-Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, double h) {
+Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, double at, double h) {
   if (!actor.sheet) {
     const TriangleMesh& mesh = actor.object.mesh;
     Actor::Sheet sheet;
@@ -123,14 +123,14 @@ Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, 
     sheet.areal_density = mass / std::max(area, 1e-12);
     actor.sheet = sheet;
   }
-  const Air air{*actor.air, (actor.sheet->closed ? 0.5 : 1.0) * kAirDrag};
+  const Air air{actor.air.at(at), (actor.sheet->closed ? 0.5 : 1.0) * kAirDrag};
   return windForces(x, u, actor.object.mesh.triangles, air, actor.sheet->areal_density, h);
 }
 
-void World::Impl::blowSoft(Actor& actor, double h) {
+void World::Impl::blowSoft(Actor& actor, double at, double h) {
   const Vec velocities = actor.soft->body().surfaceVelocities();
   const Vertices u = Eigen::Map<const Vertices>(velocities.data(), velocities.size() / 3, 3);
-  const Vertices forces = airOn(actor, actor.soft->vertices(), u, h);
+  const Vertices forces = airOn(actor, actor.soft->vertices(), u, at, h);
   for (Eigen::Index v = 0; v < forces.rows(); ++v)
     actor.soft->addForce(SurfacePoint::vertex(static_cast<int>(v)), forces.row(v).transpose());
 }

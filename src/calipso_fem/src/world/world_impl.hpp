@@ -39,6 +39,8 @@ struct World::Impl {
   void rebuild(Actor& actor);
   void makeRigid(Actor& actor, const BodyMotion& motion);
   void makeSoft(Actor& actor, const BodyMotion& motion, bool settle);
+  void deformAsObserved(Actor& actor);  // shape and velocity as in the video at this instant
+  Vec nodalModes(const Actor& actor, const Vec& amplitudes) const;
   void settleAsObserved(Actor& actor, const TriangleMesh& surface);
   void removeBodies(Actor& actor);
   void reset(Actor& actor);
@@ -67,8 +69,8 @@ struct World::Impl {
   void applyLoads(double at, double h);  // world_forces.cpp
   Eigen::Vector3d twistOf(const Actor& actor, const Pull& pull, double at) const;
   void twistSoft(Actor& actor, const Pull& pull, double at);
-  Vertices airOn(Actor& actor, const Vertices& x, const Vertices& u, double h);
-  void blowSoft(Actor& actor, double h);
+  Vertices airOn(Actor& actor, const Vertices& x, const Vertices& u, double at, double h);
+  void blowSoft(Actor& actor, double at, double h);
   void pullSoft(Actor& actor, const Pull& pull, double at);
   void loadRigid(Actor& actor, double at, double h);
   void endPulls(double at);
@@ -87,6 +89,7 @@ struct World::Impl {
   std::string press(Actor& actor, const Edit& edit);
   std::string blow(Actor& actor, const Edit& edit);
   std::string blowEverywhere(const Edit& edit);
+  const WindTrack& windFor(const Actor& actor) const;  // @throw std::invalid_argument when the video shows none
   std::string insert(const Edit& edit);
   void lead(Actor& actor, Pull& pull);
   void scale(Actor& actor, double factor);
@@ -103,6 +106,7 @@ struct World::Impl {
   std::optional<RigidWorld::Id> rigidIdOf(int id) const;
   void applyRules(const Actor& actor);
   Actor* find(const std::string& name);
+  Actor& known(const std::string& object, const char* what);  // @throw std::invalid_argument: what of an unknown one
   std::vector<std::string> names() const;
 
   WorldScene scene;

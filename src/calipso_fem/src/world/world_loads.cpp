@@ -124,13 +124,30 @@ std::string World::Impl::press(Actor& actor, const Edit& edit) {
   return actor.object.name + " is under " + std::to_string(edit.pressure) + " Pa";
 }
 
+// Wind is the scene's: cloth that shows none of its own, and what the video does not have, take the surest.
+const WindTrack& World::Impl::windFor(const Actor& actor) const {
+  const WindTrack* surest = actor.wind.empty() ? nullptr : &actor.wind;
+  for (const Actor& other : actors) {
+    if (!actor.wind.empty() || other.wind.empty()) continue;
+    if (!surest || other.wind.variance() < surest->variance()) surest = &other.wind;
+  }
+  if (!surest)
+    throw std::invalid_argument("no cloth of the video shows a wind; give one by mode absolute and a vector");
+  return *surest;
+}
+
 std::string World::Impl::blow(Actor& actor, const Edit& edit) {
+  const bool estimated = edit.mode == EditMode::kEstimated;
+  WindTrack air;
+  if (estimated) air = windFor(actor).times(edit.factor);
+  else air.add({now, edit.vector, Eigen::Matrix3d::Zero()});
   touch(actor, edit);
   if (!actor.simulated())
     throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
                                 " and no wind moves it; make it rigid or deformable (edit 'kind')");
-  actor.air = edit.vector;
-  return "wind of " + describe(edit.vector) + " m/s moves " + actor.object.name;
+  actor.air = air;
+  return "wind of " + describe(air.at(now)) + " m/s moves " + actor.object.name +
+         (estimated ? ", changing as in the video" : "");
 }
 
 }  // namespace calipso::fem

@@ -175,7 +175,7 @@ void World::Impl::updateSleep() {
       }
       continue;
     }
-    const bool calm = actor.pulls.empty() && !actor.air && actor.soft->body().isAtRest(kRestSpeed * size);
+    const bool calm = actor.pulls.empty() && actor.air.empty() && actor.soft->body().isAtRest(kRestSpeed * size);
     actor.calm_frames = calm ? actor.calm_frames + 1 : 0;
     actor.asleep = actor.calm_frames >= kCalmFrames;
   }

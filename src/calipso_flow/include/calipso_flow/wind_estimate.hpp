@@ -23,6 +23,7 @@ struct WindEstimate {
   double explained = 0.0;  // share of the observed motion's mean square that the simulation shows
 
   Eigen::Vector3d at(double time) const;
+  Eigen::Matrix3d covarianceAt(double time) const;  // linear between the knots, as if their errors were one
 };
 
 struct WindParams {

@@ -39,6 +39,16 @@ calipso_msgs::Collision toMsg(const Collision& collision) {
   return msg;
 }
 
+calipso_msgs::Wind windMsg(double time, const Eigen::Vector3d& velocity, const Eigen::Matrix3d& covariance) {
+  calipso_msgs::Wind msg;
+  msg.stamp = ros::Time(time);
+  msg.velocity = toVectorMsg(velocity);
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) msg.covariance[3 * r + c] = covariance(r, c);
+  }
+  return msg;
+}
+
 calipso_msgs::Vibration toMsg(const SurfaceLine& line) {
   calipso_msgs::Vibration msg;
   msg.frequency = line.line.frequency;
@@ -66,6 +76,14 @@ void addDeformation(const DeformationMotion& deformation, calipso_msgs::ObjectCl
   if (deformation.stiffness) {
     msg.stiffness_over_density = deformation.stiffness->value;
     msg.stiffness_over_density_deviation = deformation.stiffness->deviation;
+  }
+  if (deformation.wind) {
+    const WindEstimate& wind = *deformation.wind;
+    for (size_t i = 0; i < wind.knots.size(); ++i) {
+      msg.wind.push_back(windMsg(wind.knots[i], wind.wind[i], wind.covariance[i]));
+    }
+    const double middle = 0.5 * (wind.knots.front() + wind.knots.back());
+    msg.mean_wind.push_back(windMsg(middle, wind.mean, wind.mean_covariance));
   }
   msg.note = deformation.note;
 }
@@ -133,6 +151,9 @@ void addDeformation(const DeformationMotion& deformation, int index,
     msg.mode_amplitudes.push_back(static_cast<float>(deformation.modes.amplitudes(index, m)));
     msg.mode_velocities.push_back(static_cast<float>(deformation.modes.velocities(index, m)));
   }
+  if (!deformation.wind) return;
+  const double time = deformation.times.at(index);
+  msg.wind = {windMsg(time, deformation.wind->at(time), deformation.wind->covarianceAt(time))};
 }
 
 calipso_msgs::ObjectClipDynamics toMsg(const ObjectDynamics& object) {

@@ -1,5 +1,7 @@
 #include "marker_publisher.hpp"
 
+#include <Eigen/Eigenvalues>
+
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
 
@@ -80,6 +82,30 @@ visualization_msgs::Marker uncertaintyMarker(const ObjectMotion& motion, const s
   return marker;
 }
 
+// The way the air goes in a tenth of a second, from the middle of the cloth that shows it, and one deviation about its tip.
+std::vector<visualization_msgs::Marker> windMarkers(const ObjectDynamics& object, size_t index,
+                                                    const std_msgs::Header& header, double size) {
+  if (!object.deformation || !object.deformation->wind) return {};
+  const WindEstimate& wind = *object.deformation->wind;
+  const double time = object.deformation->times.at(index);
+  const Eigen::Vector3d from = object.motions[index].state.position, tip = from + 0.1 * wind.at(time);
+  auto arrow = makeMarker(header, object.name + "/wind", visualization_msgs::Marker::ARROW, size);
+  arrow.scale.y = 3.0 * size, arrow.scale.z = 3.0 * size;
+  arrow.color.r = 0.3f, arrow.color.b = 1.0f;
+  arrow.points = {toPointMsg(from), toPointMsg(tip)};
+  auto ball = makeMarker(header, object.name + "/wind uncertainty", visualization_msgs::Marker::SPHERE, 1.0);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(0.01 * wind.covarianceAt(time));
+  ball.scale = toVectorMsg(2.0 * axes.eigenvalues().cwiseMax(1e-12).cwiseSqrt());
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const double hand = axes.eigenvectors().determinant() < 0.0 ? -1.0 : 1.0;
+  pose.linear() << axes.eigenvectors().leftCols<2>(), hand * axes.eigenvectors().col(2);
+  pose.translation() = tip;
+  ball.pose = toMsg(pose);
+  ball.color = arrow.color;
+  ball.color.a = 0.3f;
+  return {arrow, ball};
+}
+
 }  // namespace
 
 MarkerPublisher::MarkerPublisher(ros::NodeHandle& nh)
@@ -108,6 +134,7 @@ visualization_msgs::MarkerArray markersOf(const ObjectDynamics& object, size_t i
                      velocityMarker(motion, object.name, header, size),
                      collisionMarker(object, header, size),
                      uncertaintyMarker(motion, object.name, header)};
+  for (const auto& marker : windMarkers(object, index, header, size)) markers.markers.push_back(marker);
   return markers;
 }
 

@@ -73,6 +73,10 @@ class SoftObject {
   const Eigen::Vector3d& gravity() const { return gravity_; }
   const SurfaceTree& tree();
 
+  // A field on the surface (3 #V) as the nodes move that carry it: each goes as its surface does on average. Zero at
+  // nodes that are fixed or carry none.
+  Vec nodalField(const Vec& surface) const;
+
   // Rigid motion that best maps the observed shape to the present one (Kabsch, by nodal mass).
   Eigen::Isometry3d motion() const;
   bool hasFixedNodes() const;

@@ -50,6 +50,8 @@ struct ObservedMotion {
   Eigen::Vector3d linear = Eigen::Vector3d::Zero();        // m/s
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();       // rad/s
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  // m/s^2
+  // Of a deforming object: amplitudes of its modes (m) from the shape in the key frame, and their velocities (m/s).
+  Eigen::VectorXd mode_amplitudes = {}, mode_velocities = {};
 };
 
 // How an object's look differs from the video's. NaN: unchanged.
