@@ -17,6 +17,7 @@ constexpr double kGroupGap = 4.0;       // gap between two groups, in spreads of
 constexpr float kShadowTint = 1.8f;     // a shadow's largest ratio of shaded to lit in a channel over its smallest
 constexpr float kMovingSpread = 2.2f;   // times what still places have, and
 constexpr float kLeastMoving = 2.0f;    // code values: from there on a place moves by itself
+constexpr int kMovingGap = 12;          // px between moving places that move with them
 constexpr int kFewestMoving = 50;       // one part in so many of the picture; fewer are passing things
 constexpr int kSteadyDifference = 14;   // code values; about five deviations of the difference
 
@@ -156,12 +157,36 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
   return b;
 }
 
+// Where the place moves by itself: it spreads over time, or the key frame shows something else than the median does.
+// Its gaps belong to it. Empty if there is little of it: passing things.
+cv::Mat movingPlaces(const ClipFrame& key, const Background& background) {
+  const auto beyondNoise = [&](const cv::Mat& change) {
+    cv::Mat smooth;
+    cv::blur(change, smooth, {5, 5});
+    return cv::Mat(smooth > std::max(kLeastMoving, kMovingSpread * lowerQuartile(smooth, background.count > 0)));
+  };
+  const cv::Mat spreads = beyondNoise(background.spread);
+  if (kFewestMoving * static_cast<std::size_t>(cv::countNonZero(spreads)) <= spreads.total()) return cv::Mat::zeros(spreads.size(), CV_8U);
+  cv::Mat now, difference(spreads.size(), CV_32F, cv::Scalar(0.0f));
+  key.bgr.convertTo(now, CV_32F);
+  for (int v = 0; v < now.rows; ++v) {
+    for (int u = 0; u < now.cols; ++u) {
+      if (background.count.at<std::uint8_t>(v, u) == 0 || key.labels.at<std::uint8_t>(v, u) != 0) continue;
+      const cv::Vec3f d = now.at<cv::Vec3f>(v, u) - background.plate.at<cv::Vec3f>(v, u);
+      difference.at<float>(v, u) = std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
+    }
+  }
+  cv::Mat moving = spreads | beyondNoise(difference);
+  const cv::Mat gap = cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kMovingGap + 1, 2 * kMovingGap + 1});
+  cv::copyMakeBorder(moving, moving, kMovingGap, kMovingGap, kMovingGap, kMovingGap, cv::BORDER_REPLICATE);
+  cv::morphologyEx(moving, moving, cv::MORPH_CLOSE, gap);
+  return moving(cv::Rect(kMovingGap, kMovingGap, now.cols, now.rows)).clone();
+}
+
 void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
-  cv::Mat moving;
-  cv::blur(background.spread, moving, {5, 5});
-  moving = moving > std::max(kLeastMoving, kMovingSpread * lowerQuartile(moving, background.count > 0));
-  const bool any_moving = kFewestMoving * static_cast<std::size_t>(cv::countNonZero(moving)) > moving.total();
+  const cv::Mat moving = movingPlaces(key, background);
+  const bool any_moving = cv::countNonZero(moving) > 0;
   cv::Mat look = background.plate.clone();
   if (any_moving) {
     cv::Mat now;

@@ -1,13 +1,14 @@
 #include "calipso_render/inpaint.hpp"
 
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "offset_statistics.hpp"
+#include "patch_fill.hpp"
 #include "seam_blend.hpp"
-#include "shift_cut.hpp"
 
 namespace calipso::render {
 namespace {
@@ -20,10 +21,16 @@ cv::Mat grain(int width, int height) {
   return image;
 }
 
+// Grain on spots that are large enough to be seen at the coarsest level too.
+cv::Mat spots(int width, int height) {
+  cv::Mat image = grain(width, height), smooth;
+  cv::GaussianBlur(image, smooth, {0, 0}, 5.0);
+  return 8.0 * (smooth - cv::Scalar::all(120.0)) + 0.5 * image + cv::Scalar::all(60.0);
+}
+
 // Its left part again at the right, `period` px on.
-cv::Mat repeated(int width, int height, int period) {
-  cv::Mat image = grain(width, height);
-  for (int u = period; u < width; ++u) image.col(u - period).copyTo(image.col(u));
+cv::Mat repeated(cv::Mat image, int period) {
+  for (int u = period; u < image.cols; ++u) image.col(u - period).copyTo(image.col(u));
   return image;
 }
 
@@ -34,61 +41,74 @@ double meanDifference(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
   return (mean[0] + mean[1] + mean[2]) / 3.0;
 }
 
-TEST(DominantOffsets, FindsThePeriodOfAPicture) {
-  const cv::Mat image = repeated(120, 60, 37), source(60, 120, CV_8U, cv::Scalar(255)), hole = cv::Mat::zeros(60, 120, CV_8U);
-  const std::vector<cv::Point> offsets = dominantOffsets(image, source, source, 8.0, 2, 1);
-  ASSERT_EQ(offsets.size(), 2u);
-  for (const cv::Point& o : offsets) EXPECT_TRUE(o == cv::Point(37, 0) || o == cv::Point(-37, 0)) << o;
-}
-
-TEST(DominantOffsets, HasNoneWhereNoPatchIsWhole) {
-  const cv::Mat image = grain(40, 40), source = cv::Mat::zeros(40, 40, CV_8U);
-  EXPECT_TRUE(dominantOffsets(image, source, source == 0, 4.0, 5, 1).empty());
-}
-
-TEST(LevelOffsets, FollowALineThatFalls) {
-  // A dark line that falls by 1 px in 12 on a bright ground, hidden in the middle.
-  cv::Mat image(80, 160, CV_32FC3, cv::Scalar::all(160)), hole = cv::Mat::zeros(80, 160, CV_8U);
-  for (int u = 0; u < 160; ++u) image(cv::Rect(u, 30 + u / 12, 1, 3)).setTo(cv::Scalar::all(30));
-  hole(cv::Rect(60, 15, 40, 50)).setTo(255);
-  const std::vector<cv::Point> offsets = levelOffsets(image, hole == 0, hole, 8);
-  ASSERT_FALSE(offsets.empty());
-  for (const cv::Point& o : offsets) EXPECT_NEAR(o.y, o.x / 12.0, 1.0) << o;
-}
-
-TEST(ShiftCut, TakesTheOnlyShiftThatContinuesThePicture) {
-  const cv::Mat image = repeated(90, 60, 30);
-  cv::Mat hole = cv::Mat::zeros(60, 90, CV_8U);
-  hole(cv::Rect(40, 20, 16, 16)).setTo(255);
-  ShiftCut cut(image, hole, hole == 0, {{-25, 3}, {30, 0}, {17, -9}}, 1.0f);
-  cut.start();
-  cut.sweep(-1);
-  EXPECT_EQ(cv::countNonZero((cut.labels() != 1) & hole), 0);
-  EXPECT_EQ(cv::countNonZero((cut.labels() != ShiftCut::kNone) & (hole == 0)), 0);
-}
-
-TEST(ShiftCut, ASeamRunsWhereItShowsLeast) {
-  // Two shifts, left and right, that agree on one column alone: there the seam must be.
-  cv::Mat image = grain(120, 24), hole = cv::Mat::zeros(24, 120, CV_8U);
-  hole(cv::Rect(50, 0, 20, 24)).setTo(255);
-  for (int v = 0; v < 24; ++v) {
-    for (int u = 60; u < 62; ++u) image.at<cv::Vec3f>(v, u - 40) = image.at<cv::Vec3f>(v, u + 40);
+TEST(PatchOrigins, AreWhereThePictureRepeatsItself) {
+  const cv::Mat image = repeated(spots(160, 120), 52);
+  cv::Mat hole = cv::Mat::zeros(120, 160, CV_8U);
+  hole(cv::Rect(60, 40, 30, 30)).setTo(255);
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, {});
+  int elsewhere = 0;
+  for (int v = 0; v < 120; ++v) {
+    for (int u = 0; u < 160; ++u) {
+      const cv::Vec2s from = origin.at<cv::Vec2s>(v, u);
+      if (hole.at<std::uint8_t>(v, u) == 0) EXPECT_EQ(from, cv::Vec2s(-1, -1));
+      else elsewhere += std::abs(from[0] - u) != 52 || from[1] != v;
+    }
   }
-  // Each shift continues its own side of the hole.
-  image(cv::Rect(6, 0, 4, 24)).copyTo(image(cv::Rect(46, 0, 4, 24)));
-  image(cv::Rect(110, 0, 4, 24)).copyTo(image(cv::Rect(70, 0, 4, 24)));
-  ShiftCut cut(image, hole, hole == 0, {{-40, 0}, {40, 0}}, 1.0f);
-  cut.start();
-  cut.sweep(-1);
-  cut.sweep(-1);
-  for (int v = 0; v < 24; ++v) {
-    for (int u = 50; u < 70; ++u) EXPECT_EQ(int(cut.labels().at<std::uint8_t>(v, u)), u <= 60 ? 0 : 1) << u << ", " << v;
+  EXPECT_EQ(elsewhere, 0);
+}
+
+TEST(PatchOrigins, ConnectALineThatEntersAtTwoPlaces) {
+  // A dark line that falls by 1 px in 12 over grain, hidden in the middle.
+  cv::Mat image = 0.1 * grain(320, 160) + cv::Scalar::all(150.0), hole = cv::Mat::zeros(160, 320, CV_8U);
+  for (int u = 0; u < 320; ++u) image(cv::Rect(u, 60 + u / 12, 1, 4)).setTo(cv::Scalar::all(30));
+  hole(cv::Rect(120, 40, 70, 70)).setTo(255);
+  const InpaintResult r = inpaint(image, hole, cv::Mat());
+  for (int u = 120; u < 190; ++u) {
+    int dark = 0, near = 0;
+    for (int v = 40; v < 110; ++v) {
+      if (r.image.at<cv::Vec3f>(v, u)[1] > 90.0f) continue;
+      ++dark, near += std::abs(v - (61.5 + u / 12)) < 6.0;
+    }
+    EXPECT_GE(near, 2) << u;
+    EXPECT_EQ(near, dark) << u;
   }
+}
+
+TEST(PatchOrigins, StayInTheirLayer) {
+  // Two grains that differ in colour alone, one above the other: nothing from below comes above the border.
+  cv::Mat image = 0.2 * grain(240, 160) + cv::Scalar(120, 90, 60), hole = cv::Mat::zeros(160, 240, CV_8U);
+  cv::add(image(cv::Rect(0, 80, 240, 80)), cv::Scalar(-60, 20, 20), image(cv::Rect(0, 80, 240, 80)));
+  hole(cv::Rect(80, 30, 60, 100)).setTo(255);
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, {});
+  for (int v = 30; v < 130; ++v) {
+    if (std::abs(v - 80) < 6) continue;  // the border may waver by a patch
+    for (int u = 80; u < 140; ++u) EXPECT_EQ(origin.at<cv::Vec2s>(v, u)[1] < 80, v < 80) << u << ", " << v;
+  }
+}
+
+TEST(PatchOrigins, DoNotDependOnTheNumberOfThreads) {
+  const cv::Mat image = grain(200, 150);
+  cv::Mat hole = cv::Mat::zeros(150, 200, CV_8U), first;
+  hole(cv::Rect(40, 20, 90, 100)).setTo(255);
+  const int threads = omp_get_max_threads();
+  for (const int count : {1, 2, 5}) {
+    omp_set_num_threads(count);
+    const cv::Mat origin = patchOrigins(image, hole, hole == 0, {});
+    if (first.empty()) first = origin;
+    EXPECT_EQ(cv::norm(origin, first, cv::NORM_INF), 0.0) << count;
+  }
+  omp_set_num_threads(threads);
+}
+
+TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
+  const cv::Mat image = grain(40, 40), hole(40, 40, CV_8U, cv::Scalar(255)), source = cv::Mat::zeros(40, 40, CV_8U);
+  const cv::Mat origin = patchOrigins(image, hole, source, {});
+  EXPECT_EQ(cv::countNonZero(origin.reshape(1) != -1), 0);
 }
 
 TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
   // A copy of the left part, 3 code values too dark, between two parts that fit.
-  const cv::Mat truth = repeated(120, 30, 40);
+  const cv::Mat truth = repeated(grain(120, 30), 40);
   cv::Mat hole = cv::Mat::zeros(30, 120, CV_8U), origin(30, 120, CV_16SC2, cv::Scalar(-1, -1)), image = truth.clone();
   hole(cv::Rect(50, 5, 20, 20)).setTo(255);
   for (int v = 5; v < 25; ++v) {
@@ -103,7 +123,7 @@ TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
 }
 
 TEST(Inpaint, ContinuesWhatRepeatsItself) {
-  const cv::Mat truth = repeated(160, 120, 53);
+  const cv::Mat truth = repeated(spots(160, 120), 52);
   cv::Mat image = truth.clone(), hole = cv::Mat::zeros(120, 160, CV_8U);
   hole(cv::Rect(60, 40, 30, 30)).setTo(255);
   image.setTo(cv::Scalar::all(0), hole);

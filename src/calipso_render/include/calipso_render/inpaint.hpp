@@ -6,11 +6,10 @@
 namespace calipso::render {
 
 struct InpaintParams {
-  int repeats = 14;           // offsets by which the picture repeats itself most, near by and again across the hole
-  int levels = 24;            // offsets along level lines
-  int sweeps = 2;             // of alpha expansion at the coarsest level
-  int coarsest_hole = 4000;   // px; the pyramid ends where the hole has no more
-  int coarsest_side = 24;     // px; or where the picture has no more
+  int coarsest_side = 30;     // px; the pyramid ends where the picture's shorter side has no more
+  int coarsest_rounds = 12;   // of search and vote at the coarsest level,
+  int rounds = 4;             // at the finer ones
+  float away_row = 4.0f, away_column = 0.2f;  // what a px of way to the source counts, squared code values: places are layered
   std::uint32_t seed = 1;
 };
 
@@ -20,9 +19,8 @@ struct InpaintResult {
   bool patches_found = true;  // false: nothing to copy from, the hole was filled smoothly
 };
 
-// Fills a hole with copies of its surroundings, whole areas shifted by the offsets at which the picture repeats itself
-// (He and Sun 2012), with seams by graph cuts where they show least, coarse to fine, and evened out in the gradient
-// domain. Copies keep the surroundings' grain and their lines.
+// Fills a hole with copies of its surroundings so that every patch of the result resembles one of them, coarse to fine,
+// with seams evened out in the gradient domain. Copies keep the surroundings' grain.
 // @param image CV_32FC3, code values
 // @param hole CV_8UC1, != 0: to be filled
 // @param banned CV_8UC1, != 0: neither filled nor copied from; may be empty

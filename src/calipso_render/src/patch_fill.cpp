@@ -1,0 +1,316 @@
+#include "patch_fill.hpp"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+namespace calipso::render {
+namespace {
+
+constexpr int kRadius = 3;  // px; patches are squares of 7
+constexpr int kSide = 2 * kRadius + 1;
+constexpr float kLively = 6.0f;        // weight of the mean gradient against colour
+constexpr int kLivelySide = 9;         // px of the square in which gradients are averaged
+constexpr float kUnknown = 1e-3f;      // weight of unknown pixels in coarser levels
+constexpr int kBandRows = 16;          // rows that one thread searches in order
+constexpr int kFirstGuesses = 200;     // places tried for a patch of the rim
+constexpr int kFarthest = 16, kFinest = 2;  // px around the best place in which levels, and the finest, look further
+constexpr int kSweeps = 2;             // of a search
+
+// Mean gradient around every pixel, of what is known.
+cv::Mat liveliness(const cv::Mat& image, const cv::Mat& known) {
+  cv::Mat grey, strength = cv::Mat::zeros(image.size(), CV_32F), weight = cv::Mat::zeros(image.size(), CV_32F);
+  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+  for (int v = 0; v + 1 < image.rows; ++v) {
+    for (int u = 0; u + 1 < image.cols; ++u) {
+      const bool whole = known.at<std::uint8_t>(v, u) != 0 && known.at<std::uint8_t>(v + 1, u) != 0 && known.at<std::uint8_t>(v, u + 1) != 0;
+      if (!whole) continue;
+      const float g = grey.at<float>(v, u);
+      strength.at<float>(v, u) = std::abs(grey.at<float>(v, u + 1) - g) + std::abs(grey.at<float>(v + 1, u) - g);
+      weight.at<float>(v, u) = 1.0f;
+    }
+  }
+  cv::blur(strength, strength, {kLivelySide, kLivelySide});
+  cv::blur(weight, weight, {kLivelySide, kLivelySide});
+  return strength / cv::max(weight, 1e-3);
+}
+
+struct Level {
+  cv::Mat image;         // CV_32FC4: colour, and how lively it is around
+  cv::Mat hole, source;  // CV_8UC1
+};
+
+// Half the size: the mean of what is known; a pixel is hole if any of its four was, source if all were.
+Level halved(const Level& fine) {
+  const cv::Size size((fine.hole.cols + 1) / 2, (fine.hole.rows + 1) / 2);
+  Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_8U), cv::Mat(size, CV_8U, cv::Scalar(255))};
+  cv::Mat weight = cv::Mat::zeros(size, CV_32F);
+  for (int v = 0; v < fine.hole.rows; ++v) {
+    for (int u = 0; u < fine.hole.cols; ++u) {
+      const bool known = fine.source.at<std::uint8_t>(v, u) != 0;
+      const float w = known ? 1.0f : kUnknown;
+      half.hole.at<std::uint8_t>(v / 2, u / 2) |= fine.hole.at<std::uint8_t>(v, u);
+      half.source.at<std::uint8_t>(v / 2, u / 2) &= known ? 255 : 0;
+      half.image.at<cv::Vec4f>(v / 2, u / 2) += w * fine.image.at<cv::Vec4f>(v, u);
+      weight.at<float>(v / 2, u / 2) += w;
+    }
+  }
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) half.image.at<cv::Vec4f>(v, u) /= weight.at<float>(v, u);
+  }
+  return half;
+}
+
+cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
+cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_cast<short>(p.y)}; }
+
+// One level's hole: the nearest source patch of every patch that touches it, and the picture that they make.
+class Filling {
+ public:
+  Filling(const Level& level, float scale, const InpaintParams& params)
+      : image_(level.image.clone()), hole_(level.hole), scale_(scale), params_(params), to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
+        cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)), bands_((hole_.rows + kBandRows - 1) / kBandRows) {
+    const cv::Mat patch = cv::Mat::ones(kSide, kSide, CV_8U);
+    cv::Mat touched;
+    cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+    cv::findNonZero(whole_, sources_);
+    cv::dilate(hole_, touched, patch);
+    for (int v = kRadius; v + kRadius < hole_.rows; ++v) {
+      for (int u = kRadius; u + kRadius < hole_.cols; ++u) {
+        if (touched.at<std::uint8_t>(v, u) != 0) bands_[v / kBandRows].emplace_back(u, v);
+      }
+    }
+  }
+
+  bool possible() const {
+    return !sources_.empty() && std::any_of(bands_.begin(), bands_.end(), [](const auto& band) { return !band.empty(); });
+  }
+
+  // From the rim inwards: a ring's patches are compared by what is known of them, then the ring is filled.
+  void peel(const cv::Mat& source) {
+    cv::Mat known = source.clone(), ring;
+    for (;;) {
+      cv::dilate(known, ring, cv::Mat::ones(3, 3, CV_8U));
+      ring &= hole_ & (known == 0);
+      std::vector<cv::Point> pixels;
+      cv::findNonZero(ring, pixels);
+      if (pixels.empty()) return;
+      for (const cv::Point& pixel : pixels) firstMatch(centreFor(pixel), known);
+      for (const cv::Point& pixel : pixels) {
+        const cv::Point p = centreFor(pixel);
+        image_.at<cv::Vec4f>(pixel) = image_.at<cv::Vec4f>(match(p) + pixel - p);
+      }
+      known |= ring;
+    }
+  }
+
+  // Takes over, twice as far, what half the size found.
+  void startFrom(const Filling& coarse) {
+    forEachPatch([&](const cv::Point& p) {
+      const cv::Point c = coarse.centreFor({p.x / 2, p.y / 2});
+      const cv::Vec2s from = coarse.to_.at<cv::Vec2s>(c);
+      if (from[0] < 0) return;
+      const cv::Point q = p + 2 * (point(from) - c);
+      for (int i = 0; i < 9 && !hasMatch(p); ++i) {
+        const cv::Point near = i == 0 ? q : q + jitter(p, i, kFinest);
+        if (isWhole(near)) to_.at<cv::Vec2s>(p) = shorts(near);
+      }
+    });
+    vote();
+  }
+
+  // @param reach px around the best place found so far in which others are tried
+  void search(int reach) {
+    forEachPatch([&](const cv::Point& p) {
+      if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(anySource(p, 0));
+      cost_.at<float>(p) = distance(p, match(p), 1e30f);
+    });
+    for (int s = 0; s < kSweeps; ++s) {
+      ++sweep_;
+      // Bands beside each other never at the same time: they read each other's rims.
+      for (int first = 0; first < 2; ++first) {
+#pragma omp parallel for schedule(dynamic, 1)
+        for (int b = first; b < static_cast<int>(bands_.size()); b += 2) searchBand(bands_[b], sweep_ % 2 == 0, reach);
+      }
+    }
+  }
+
+  // Every hole pixel becomes the mean of what the patches over it have there, good ones above all.
+  void vote() {
+    std::vector<float> costs;
+    for (const auto& band : bands_) {
+      for (const cv::Point& p : band) costs.push_back(cost_.at<float>(p));
+    }
+    const std::size_t part = 3 * costs.size() / 4;
+    std::nth_element(costs.begin(), costs.begin() + part, costs.end());
+    const float scale = -0.5f / std::max(costs[part], 1.0f);
+    cv::Mat weights(hole_.size(), CV_32F, cv::Scalar(0.0f)), next = image_.clone();
+    forEachPatch([&](const cv::Point& p) { weights.at<float>(p) = hasMatch(p) ? std::exp(scale * cost_.at<float>(p)) + 1e-6f : 0.0f; });
+#pragma omp parallel for schedule(dynamic, 4)
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        if (hole_.at<std::uint8_t>(v, u) != 0) next.at<cv::Vec4f>(v, u) = meanVote({u, v}, weights);
+      }
+    }
+    image_ = next;
+  }
+
+  cv::Mat origins() const {
+    cv::Mat origin(hole_.size(), CV_16SC2, cv::Scalar(-1, -1));
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        if (hole_.at<std::uint8_t>(v, u) == 0) continue;
+        const cv::Point p = centreFor({u, v});
+        origin.at<cv::Vec2s>(v, u) = shorts(match(p) + cv::Point(u, v) - p);
+      }
+    }
+    return origin;
+  }
+
+ private:
+  cv::Point match(const cv::Point& p) const { return point(to_.at<cv::Vec2s>(p)); }
+  bool hasMatch(const cv::Point& p) const { return to_.at<cv::Vec2s>(p)[0] >= 0; }
+  bool inside(const cv::Point& p) const { return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows; }
+  bool isWhole(const cv::Point& p) const { return inside(p) && whole_.at<std::uint8_t>(p) != 0; }
+  cv::Point anySource(const cv::Point& p, int salt) const { return sources_[random(p, salt) % sources_.size()]; }
+
+  // The nearest centre of a patch that lies within the picture.
+  cv::Point centreFor(const cv::Point& p) const {
+    return {std::clamp(p.x, kRadius, hole_.cols - 1 - kRadius), std::clamp(p.y, kRadius, hole_.rows - 1 - kRadius)};
+  }
+
+  template <typename Do>
+  void forEachPatch(Do act) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t b = 0; b < bands_.size(); ++b) {
+      for (const cv::Point& p : bands_[b]) act(p);
+    }
+  }
+
+  void searchBand(const std::vector<cv::Point>& band, bool backwards, int reach) {
+    const int step = backwards ? 1 : -1;
+    for (std::size_t i = 0; i < band.size(); ++i) {
+      const cv::Point p = band[backwards ? band.size() - 1 - i : i];
+      for (const cv::Point& d : {cv::Point(step, 0), cv::Point(0, step)}) {
+        if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d);
+      }
+      for (int r = reach; r >= 1; r /= 2) attempt(p, match(p) + jitter(p, r, r));
+    }
+  }
+
+  void attempt(const cv::Point& p, const cv::Point& q) {
+    if (!isWhole(q)) return;
+    float& least = cost_.at<float>(p);
+    const float cost = distance(p, q, least);
+    if (cost < least) least = cost, to_.at<cv::Vec2s>(p) = shorts(q);
+  }
+
+  // Among places all over the picture, its neighbours' and around the best.
+  void firstMatch(const cv::Point& p, const cv::Mat& known) {
+    cv::Point best = anySource(p, 0);
+    float least = partialDistance(p, best, known);
+    const auto attemptFirst = [&](const cv::Point& q) {
+      const float cost = isWhole(q) ? partialDistance(p, q, known) : least;
+      if (cost < least) least = cost, best = q;
+    };
+    for (int i = 1; i < kFirstGuesses; ++i) attemptFirst(anySource(p, i));
+    for (int dv = -2; dv <= 2; ++dv) {
+      for (int du = -2; du <= 2; ++du) {
+        const cv::Point d(du, dv);
+        if (inside(p + d) && hasMatch(p + d)) attemptFirst(match(p + d) - d);
+      }
+    }
+    for (int reach = 8; reach >= 1; reach /= 2) {
+      for (int i = 0; i < 6; ++i) attemptFirst(best + jitter(p, kFirstGuesses + 8 * i + reach, reach));
+    }
+    to_.at<cv::Vec2s>(p) = shorts(best);
+  }
+
+  cv::Vec4f meanVote(const cv::Point& pixel, const cv::Mat& weights) const {
+    cv::Vec4f sum;
+    float total = 0.0f;
+    for (int dv = -kRadius; dv <= kRadius; ++dv) {
+      for (int du = -kRadius; du <= kRadius; ++du) {
+        const cv::Point centre = pixel + cv::Point(du, dv);
+        const float w = inside(centre) ? weights.at<float>(centre) : 0.0f;
+        if (w > 0.0f) sum += w * image_.at<cv::Vec4f>(match(centre) - cv::Point(du, dv)), total += w;
+      }
+    }
+    return total > 0.0f ? cv::Vec4f(sum / total) : image_.at<cv::Vec4f>(pixel);
+  }
+
+  // Places are layered: what is at another height is seldom the same.
+  float awayCost(const cv::Point& p, const cv::Point& q) const {
+    return kSide * kSide * scale_ * (params_.away_row * std::abs(p.y - q.y) + params_.away_column * std::abs(p.x - q.x));
+  }
+
+  float distance(const cv::Point& p, const cv::Point& q, float bound) const {
+    using Row = Eigen::Map<const Eigen::Array<float, 4 * kSide, 1>>;
+    float sum = awayCost(p, q);
+    for (int dv = -kRadius; dv <= kRadius && sum < bound; ++dv) {
+      const Row a(image_.ptr<float>(p.y + dv) + 4 * (p.x - kRadius)), b(image_.ptr<float>(q.y + dv) + 4 * (q.x - kRadius));
+      sum += (a - b).square().sum();
+    }
+    return sum;
+  }
+
+  float partialDistance(const cv::Point& p, const cv::Point& q, const cv::Mat& known) const {
+    float sum = 0.0f;
+    int count = 0;
+    for (int dv = -kRadius; dv <= kRadius; ++dv) {
+      for (int du = -kRadius; du <= kRadius; ++du) {
+        const cv::Point d(du, dv);
+        if (known.at<std::uint8_t>(p + d) == 0) continue;
+        const cv::Vec4f difference = image_.at<cv::Vec4f>(p + d) - image_.at<cv::Vec4f>(q + d);
+        sum += difference.dot(difference), ++count;
+      }
+    }
+    return sum * (kSide * kSide) / std::max(1, count) + awayCost(p, q);
+  }
+
+  cv::Point jitter(const cv::Point& p, int salt, int reach) const {
+    const std::uint32_t h = random(p, 1024 + salt);
+    return {static_cast<int>((h & 0xffff) % (2 * reach + 1)) - reach, static_cast<int>((h >> 16) % (2 * reach + 1)) - reach};
+  }
+
+  std::uint32_t random(const cv::Point& p, int salt) const {
+    std::uint32_t h = params_.seed * 0x9e3779b9u ^ static_cast<std::uint32_t>(p.x) * 0x85ebca6bu ^ static_cast<std::uint32_t>(p.y) * 0xc2b2ae35u ^
+                      static_cast<std::uint32_t>(salt + 2048 * sweep_) * 0x27d4eb2fu;
+    h ^= h >> 15, h *= 0x2c1b3c6du, h ^= h >> 12, h *= 0x297a2d39u, h ^= h >> 15;
+    return h;
+  }
+
+  cv::Mat image_, hole_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
+  float scale_;                   // size of these pixels in the finest level's
+  InpaintParams params_;
+  cv::Mat to_, cost_;             // CV_16SC2, CV_32FC1, of the patch around every pixel
+  std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
+  std::vector<cv::Point> sources_;
+  int sweep_ = 0;
+};
+
+}  // namespace
+
+cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source, const InpaintParams& params) {
+  std::vector<Level> levels(1);
+  cv::merge(std::vector<cv::Mat>{image, kLively * liveliness(image, source)}, levels[0].image);
+  levels[0].hole = hole, levels[0].source = source;
+  while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side) levels.push_back(halved(levels.back()));
+  const int coarsest = static_cast<int>(levels.size()) - 1;
+  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), params);
+  if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
+  filling.peel(levels[coarsest].source);
+  for (int i = 0; i < params.coarsest_rounds; ++i) filling.search(std::max(hole.cols, hole.rows) >> coarsest), filling.vote();
+  for (int k = coarsest - 1; k >= 0; --k) {
+    Filling finer(levels[k], static_cast<float>(1 << k), params);
+    finer.startFrom(filling);
+    for (int i = 0; i < params.rounds && k > 0; ++i) finer.search(kFarthest), finer.vote();
+    if (k == 0) finer.search(kFinest);
+    filling = finer;
+  }
+  return filling.origins();
+}
+
+}  // namespace calipso::render
