@@ -72,11 +72,13 @@ void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, con
   const btTransform plane_from_hull = plane->getWorldTransform().inverseTimes(hull->getWorldTransform());
   const double reach = manifold_->getContactBreakingThreshold();
   result->setPersistentManifold(manifold_);
+  const btVector3 rise = normal * plane_from_hull.getBasis();  // of the height, in the hull's frame
+  const double level = normal.dot(plane_from_hull.getOrigin()) - ground.getPlaneConstant() - shape.getMargin();
   std::vector<Corner> near;
   for (int i = 0; i < shape.getNumPoints(); ++i) {
-    const btVector3 x = plane_from_hull * shape.getScaledPoint(i);
-    const double height = normal.dot(x) - ground.getPlaneConstant() - shape.getMargin();
-    if (height < reach) near.push_back({x, height});
+    const btVector3& x = shape.getUnscaledPoints()[i];
+    const double height = level + rise.dot(x);
+    if (height < reach) near.push_back({plane_from_hull * x, height});
   }
   const btTransform& world_from_plane = plane->getWorldTransform();
   const btVector3 up = world_from_plane.getBasis() * normal;
