@@ -4,6 +4,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 
@@ -13,14 +14,24 @@ extern "C" void dpotri_(const char* uplo, const int* n, double* a, const int* ld
 namespace calipso::fem {
 namespace {
 
-// CHOLMOD asks OpenMP for more threads than there are processors; its small supernodes lose by any.
+// CHOLMOD asks OpenMP for more threads than there are processors; its small supernodes lose by any. The level
+// is the process's: the first to come changes it, the last to go changes it back.
 class OneThread {
  public:
-  OneThread() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
-  ~OneThread() { omp_set_max_active_levels(levels_); }
+  OneThread() {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (users++ > 0) return;
+    levels = omp_get_max_active_levels();
+    omp_set_max_active_levels(0);
+  }
+  ~OneThread() {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (--users == 0) omp_set_max_active_levels(levels);
+  }
 
  private:
-  int levels_;
+  static inline std::mutex mutex;
+  static inline int users = 0, levels = 1;
 };
 
 }  // namespace

@@ -19,7 +19,13 @@ constexpr double kShortestStep = 1.0 / 100.0;       // s, for forces that do not
 constexpr double kShortestHeldStep = 1.0 / 500.0;   // s, for surfaces that are not held apart,
 constexpr double kShortestFastStep = 1.0 / 1000.0;  // s, for objects too fast for their size
 // Iterations that a renewal of a tangent costs.
-constexpr double kRenewal = 20.0;
+constexpr double kRenewal = 8.0;
+constexpr int kMostRenewals = 8;  // of a body's tangent in a step
+// Iterations after which a step may end further off balance, twice as far with each more, and so many times
+// further off the contacts' laws: crushed cells take many to the last digits.
+constexpr int kPatience = 6;
+constexpr double kLooser = 5.0;
+constexpr double kLoosest = 300.0;  // of the wanted residual: what a step may be off at most
 constexpr int kStraightenings = 3;  // of the gaps of a step
 constexpr double kFar = 3.0;  // of the wanted residual: from here on the iteration is accelerated
 
@@ -100,10 +106,9 @@ SoftContacts::~SoftContacts() = default;
 
 // Whether a step may be kept, be it not solved to the last digit.
 bool SoftContacts::acceptable(const Contacts& contacts, const StepMotion& motion) const {
-  constexpr double kResidual = 300.0;  // of what is wanted
   constexpr double kOff = 0.04;       // minimal distances
   for (const StepMotion::Body& b : motion.bodies())
-    if (motion.h() > kShortestStep && b.touched && !(b.residual <= kResidual * params_.residual))
+    if (motion.h() > kShortestStep && b.touched && !(b.residual <= kLoosest * params_.residual))
       return false;
   if (motion.h() <= kShortestHeldStep) return true;
   for (const auto& [key, c] : contacts)
@@ -111,11 +116,10 @@ bool SoftContacts::acceptable(const Contacts& contacts, const StepMotion& motion
   return true;
 }
 
-bool SoftContacts::unbalanced(const StepMotion& motion, size_t soft) const {
+bool SoftContacts::unbalanced(const StepMotion& motion, size_t soft, double wanted) const {
   const StepMotion::Body& b = motion.bodies()[soft];
-  const double wanted =
-      b.touched ? params_.residual : b.soft->body().options().newton_tolerance;
-  return !b.stuck && b.residual > wanted;
+  return !b.stuck &&
+         b.residual > (b.touched ? wanted : b.soft->body().options().newton_tolerance);
 }
 
 // Whether an object with something in its way would go further than its own size.
@@ -179,33 +183,48 @@ SoftContacts::Contacts SoftContacts::expectedContacts(const std::vector<Candidat
   return expected;
 }
 
+double SoftContacts::residualWanted(int iteration) const {
+  return params_.residual * std::min(kLoosest, std::pow(2.0, std::max(0, iteration - kPatience)));
+}
+
 // Whether a contact is off its law or a body out of balance.
-bool SoftContacts::isOpen(const Contacts& contacts, const StepMotion& motion) const {
+bool SoftContacts::isOpen(const Contacts& contacts, const StepMotion& motion, double wanted) const {
+  const double allowed = params_.allowed_depth * std::min(kLooser, wanted / params_.residual);
   for (const auto& [key, c] : contacts)
-    if (violation(rowOf(c, motion), motion.h()) > params_.allowed_depth) return true;
+    if (violation(rowOf(c, motion), motion.h()) > allowed) return true;
   for (size_t i = 0; i < motion.bodies().size(); ++i)
-    if (unbalanced(motion, i)) return true;
+    if (unbalanced(motion, i, wanted)) return true;
   return false;
 }
 
-// One body whose tangent has become too old gets a new one, once in a step. @return whether there was one
-bool SoftContacts::renewOne(const Contacts& contacts, StepMotion& motion, std::vector<char>& renewed) const {
-  for (size_t i = 0; i < renewed.size(); ++i) {
+// Bodies whose tangents are too old for them, and which are not much nearer to their balance than others, get
+// new ones. @return whether there were any
+bool SoftContacts::renewStale(const Contacts& contacts, double wanted, StepMotion& motion,
+                              std::vector<int>& renewals) const {
+  constexpr double kMuch = 0.1;
+  double worst = 0.0;
+  for (const StepMotion::Body& b : motion.bodies())
+    if (b.touched) worst = std::max(worst, b.residual);
+  std::vector<int> stale;
+  for (size_t i = 0; i < renewals.size(); ++i) {
     const StepMotion::Body& b = motion.bodies()[i];
-    if (!unbalanced(motion, i) || !b.touched || renewed[i] || !slow(b, params_.residual)) continue;
-    motion.renew(static_cast<int>(i), contacts);
-    renewed[i] = 1;
-    return true;
+    const bool behind = b.touched && unbalanced(motion, i, wanted) && b.residual >= kMuch * worst;
+    if (behind && renewals[i] < kMostRenewals && slow(b, wanted)) stale.push_back(static_cast<int>(i));
   }
-  return false;
+  motion.renew(stale, contacts);
+  for (const int soft : stale) ++renewals[soft];
+  return !stale.empty();
 }
 
 // The next direction of the bodies that something keeps from their balance, with the contacts' forces. @return sweeps
 int SoftContacts::direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid, bool first, ContactOperator& problem,
                          StepMotion& motion, Contacts& contacts) const {
   motion.touch(contacts);
+  std::vector<int> moving;
   for (size_t i = 0; i < softs.size(); ++i)
-    if (motion.bodies()[i].touched || first || unbalanced(motion, i)) motion.aim(motion.bodies()[i]);
+    if (motion.bodies()[i].touched || first || unbalanced(motion, i, params_.residual))
+      moving.push_back(static_cast<int>(i));
+  motion.aim(moving);
   if (contacts.empty()) return 0;
   problem.update(contacts, motion, softs, rigid);
   const int sweeps = solve(problem, motion, contacts);
@@ -225,7 +244,7 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
 
   ContactOperator problem;
   Anderson anderson;
-  std::vector<char> renewed(softs.size(), 0);
+  std::vector<int> renewals(softs.size(), 0);
   int undisturbed = 0;    // iterations with the same contacts and systems
   int straightened = 0;
   bool open = true;       // something is off its law
@@ -234,19 +253,19 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
     anderson.reset();
   };
   while (open && report.newton_iterations < params_.newton_iterations) {
-    ++report.newton_iterations;
+    const double wanted = residualWanted(++report.newton_iterations);
     report.iterations += direct(softs, rigid, report.newton_iterations == 1, problem, motion, contacts);
     const int added = grow(watched, obstacles, softs, motion, contacts);
     motion.advanceFree();
     ++undisturbed;
     if (added > 0) disturb();
     const bool far = std::any_of(motion.bodies().begin(), motion.bodies().end(), [&](const auto& b) {
-      return b.touched && b.residual > kFar * params_.residual;
+      return b.touched && b.residual > kFar * wanted;
     });
     if (undisturbed == 0 || !far || !accelerate(anderson, motion, contacts)) motion.advanceTouched();
 
-    open = added > 0 || isOpen(contacts, motion);
-    if (undisturbed >= 3 && renewOne(contacts, motion, renewed)) disturb();
+    open = added > 0 || isOpen(contacts, motion, wanted);
+    if (open && added == 0 && renewStale(contacts, wanted, motion, renewals)) disturb();
     const bool late = 2 * report.newton_iterations == params_.newton_iterations;
     if ((open && !late) || straightened == kStraightenings) continue;
     ++straightened;
@@ -255,7 +274,7 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
     problem.forget();
     disturb();
   }
-  report.renewals = std::accumulate(renewed.begin(), renewed.end(), 0);
+  report.renewals = std::accumulate(renewals.begin(), renewals.end(), 0);
   for (const auto& [key, c] : contacts) {
     report.deepest = std::max(report.deepest, c.offset - motion.gap(c));
     report.contacts += c.soft_a >= 0 && !c.force.isZero(0.0);

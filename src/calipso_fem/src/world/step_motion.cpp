@@ -6,6 +6,7 @@
 
 #include "contact_operator.hpp"
 #include "soft_system.hpp"
+#include "thread_team.hpp"
 
 namespace calipso::fem {
 namespace {
@@ -16,6 +17,14 @@ void addForce(Vec& surface, const SurfacePoint& point, const Eigen::Vector3d& fo
   for (int k = 0; k < 3; ++k)
     if (point.weights[k] != 0.0)
       surface.segment<3>(3 * point.vertices[k]) += point.weights[k] * force;
+}
+
+// work(k) for k below `count`; what one does must not concern another.
+void eachOnAThread(int count, const std::function<void(int)>& work) {
+  if (count == 1) return work(0);  // with threads of its own
+  runParallel([&](const Crew& crew) {
+    for (int k = crew.rank(); k < count; k += crew.count()) work(k);
+  });
 }
 
 constexpr double kOverlapShare = 0.2;
@@ -53,10 +62,18 @@ void StepMotion::measure(Body& body) {
   body.moved = Eigen::Map<const Vertices>(s.data(), s.size() / 3, 3) - body.start;
 }
 
+void StepMotion::forEachTouched(const std::function<void(Body&)>& work) {
+  std::vector<Body*> touched;
+  for (Body& b : bodies_)
+    if (b.touched) touched.push_back(&b);
+  eachOnAThread(static_cast<int>(touched.size()), [&](int k) { work(*touched[k]); });
+}
+
 void StepMotion::touch(const std::map<Contact::Key, Contact>& contacts) {
   for (const auto& [key, c] : contacts)
     for (const int soft : {c.soft_a, c.soft_b})
       if (soft >= 0) bodies_[soft].touched = true;
+  std::vector<int> unserved;
   for (size_t i = 0; i < bodies_.size(); ++i) {
     Body& b = bodies_[i];
     if (!b.touched) continue;
@@ -64,10 +81,11 @@ void StepMotion::touch(const std::map<Contact::Key, Contact>& contacts) {
     const std::vector<int> nodes = ContactOperator::nodesOf(static_cast<int>(i), contacts, *b.soft);
     const bool jumps = !b.soft->body().trialJump().isZero(0.0);
     if (jumps || !system.serves(nodes, h_))
-      renew(static_cast<int>(i), contacts);
+      unserved.push_back(static_cast<int>(i));
     else
       system.turnTo(b.soft->rotation(), b.soft->hasFixedNodes());
   }
+  renew(unserved, contacts);
 }
 
 void StepMotion::expect(const std::map<Contact::Key, Contact>& contacts) {
@@ -76,13 +94,25 @@ void StepMotion::expect(const std::map<Contact::Key, Contact>& contacts) {
         ContactOperator::nodesOf(static_cast<int>(i), contacts, *bodies_[i].soft);
 }
 
-void StepMotion::renew(int soft, const std::map<Contact::Key, Contact>& contacts) {
-  Body& b = bodies_[soft];
-  const std::vector<int> own = ContactOperator::nodesOf(soft, contacts, *b.soft);
-  std::vector<int> nodes;
-  std::set_union(own.begin(), own.end(), b.expected.begin(), b.expected.end(),
-                 std::back_inserter(nodes));
-  b.soft->system().renew(b.soft->body(), b.soft->rotation(), nodes, h_);
+void StepMotion::renew(const std::vector<int>& softs, const std::map<Contact::Key, Contact>& contacts) {
+  eachOnAThread(static_cast<int>(softs.size()), [&](int k) {
+    Body& b = bodies_[softs[k]];
+    const std::vector<int> own = ContactOperator::nodesOf(softs[k], contacts, *b.soft);
+    std::vector<int> nodes;
+    std::set_union(own.begin(), own.end(), b.expected.begin(), b.expected.end(),
+                   std::back_inserter(nodes));
+    b.soft->system().renew(b.soft->body(), b.soft->rotation(), nodes, h_);
+  });
+}
+
+void StepMotion::aim(const std::vector<int>& softs) {
+  std::vector<Body*> touched;
+  for (const int soft : softs)
+    if (bodies_[soft].touched)
+      touched.push_back(&bodies_[soft]);
+    else
+      aim(bodies_[soft]);
+  eachOnAThread(static_cast<int>(touched.size()), [&](int k) { aim(*touched[k]); });
 }
 
 void StepMotion::aim(Body& body) {
@@ -126,12 +156,11 @@ void StepMotion::setForces(const std::map<Contact::Key, Contact>& contacts) {
 
 void StepMotion::follow(const std::map<Contact::Key, Contact>& contacts) {
   setForces(contacts);
-  for (Body& b : bodies_) {
-    if (!b.touched) continue;
+  forEachTouched([&](Body& b) {
     DeformableBody& fem = b.soft->body();
     b.target = fem.trialPositions() + fem.trialJump() + b.soft->system().complete(b.forces);
     measure(b);
-  }
+  });
 }
 
 void StepMotion::advanceFree() {
@@ -150,11 +179,11 @@ void StepMotion::advanceFree() {
 }
 
 void StepMotion::advanceTouched() {
+  forEachTouched([](Body& b) { b.share = b.soft->body().trialStepLength(b.target, b.forces); });
   double share = 1.0;
   for (const Body& b : bodies_)
-    if (b.touched) share = std::min(share, b.soft->body().trialStepLength(b.target, b.forces));
-  for (Body& b : bodies_) {
-    if (!b.touched) continue;
+    if (b.touched) share = std::min(share, b.share);
+  forEachTouched([&](Body& b) {
     DeformableBody& fem = b.soft->body();
     if (share != 1.0) b.target = (1.0 - share) * fem.trialPositions() + share * b.target;
     fem.moveTrial(b.target);
@@ -162,7 +191,7 @@ void StepMotion::advanceTouched() {
     b.residual_before = b.residual;
     b.residual = fem.trialResidual(b.forces);
     b.stuck = share == 0.0;
-  }
+  });
 }
 
 Vec StepMotion::positions() const {
@@ -200,22 +229,22 @@ bool StepMotion::tryTargets(const Vec& targets, const std::map<Contact::Key, Con
   const Vec from = positions(), plain = this->targets();
   setForces(contacts);
   setTargets(targets);
-  double before = 0.0, after = 0.0;
-  std::vector<double> residuals;
-  for (Body& b : bodies_) {
-    if (!b.touched) continue;
+  forEachTouched([](Body& b) {
     b.soft->body().moveTrial(b.target);
-    residuals.push_back(b.soft->body().trialResidual(b.forces));
+    b.residual_there = b.soft->body().trialResidual(b.forces);
+  });
+  double before = 0.0, after = 0.0;
+  for (const Body& b : bodies_) {
+    if (!b.touched) continue;
     before = std::max(before, b.residual);
-    after = std::max(after, residuals.back());
+    after = std::max(after, b.residual_there);
   }
   const bool better = after < before;
-  size_t i = 0;
   if (!better) setTargets(from);
   for (Body& b : bodies_) {
     if (!b.touched) continue;
     if (!better) b.soft->body().moveTrial(b.target);
-    if (better) b.residual_before = std::exchange(b.residual, residuals[i++]);
+    if (better) b.residual_before = std::exchange(b.residual, b.residual_there);
   }
   if (!better) setTargets(plain);
   return better;

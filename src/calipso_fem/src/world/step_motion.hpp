@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -25,6 +26,8 @@ class StepMotion {
     std::vector<int> expected;              // nodes that may get contacts, ascending
     bool touched = false;                   // has contacts
     double residual = 0.0, residual_before = 0.0;
+    double residual_there = 0.0;            // at targets that are tried
+    double share = 1.0;                     // of the way to the target that its potential falls
     bool stuck = false;                     // the potential falls no more
   };
 
@@ -40,7 +43,7 @@ class StepMotion {
   // Bodies that contacts act on get a system whose contact nodes are among those it is condensed to.
   void touch(const std::map<Contact::Key, Contact>& contacts);
   // Without contacts, Newton's direction becomes the target; with them, its part without their forces.
-  void aim(Body& body);
+  void aim(const std::vector<int>& softs);
   // The forces of the contacts act from now on, and touched bodies get their targets.
   void follow(const std::map<Contact::Key, Contact>& contacts);
   // Moves towards the targets as far as the potentials fall: bodies without contacts each by itself,
@@ -52,8 +55,8 @@ class StepMotion {
   Vec targets() const;
   // Moves them to `targets` under the contacts' forces if that makes the largest residual smaller.
   bool tryTargets(const Vec& targets, const std::map<Contact::Key, Contact>& contacts);
-  // The body's system becomes that of where it is now.
-  void renew(int soft, const std::map<Contact::Key, Contact>& contacts);
+  // The bodies' systems become those of where they are now.
+  void renew(const std::vector<int>& softs, const std::map<Contact::Key, Contact>& contacts);
 
   Eigen::Vector3d way(int soft, const SurfacePoint& point) const;  // m, to the target
   Eigen::Vector3d rigidWay(RigidWorld::Id id, const Eigen::Vector3d& place) const;  // m
@@ -72,7 +75,10 @@ class StepMotion {
     Eigen::Vector3d linear = Eigen::Vector3d::Zero(), angular = Eigen::Vector3d::Zero();  // gained
   };
   std::vector<bool> grounded(const std::map<Contact::Key, Contact>& contacts) const;
+  void aim(Body& body);
   void measure(Body& body);
+  // Each touched body by itself, on as many threads as there are.
+  void forEachTouched(const std::function<void(Body&)>& work);
   void setTargets(const Vec& targets);
   void setForces(const std::map<Contact::Key, Contact>& contacts);
 

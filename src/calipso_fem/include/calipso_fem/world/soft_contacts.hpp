@@ -164,13 +164,15 @@ class SoftContacts {
   int solve(const ContactOperator& problem, const StepMotion& motion, Contacts& contacts) const;
   Contacts expectedContacts(const std::vector<Candidate>& watched, const Contacts& contacts,
                             const StepMotion& motion) const;
-  bool isOpen(const Contacts& contacts, const StepMotion& motion) const;
-  bool renewOne(const Contacts& contacts, StepMotion& motion, std::vector<char>& renewed) const;
+  double residualWanted(int iteration) const;  // of bodies with contacts
+  bool isOpen(const Contacts& contacts, const StepMotion& motion, double wanted) const;
+  bool renewStale(const Contacts& contacts, double wanted, StepMotion& motion,
+                  std::vector<int>& renewals) const;
   int direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid, bool first, ContactOperator& problem,
              StepMotion& motion, Contacts& contacts) const;
   bool tooFast(const std::vector<Candidate>& watched, const std::vector<SoftEntry>& softs,
                double h) const;
-  bool unbalanced(const StepMotion& motion, size_t soft) const;
+  bool unbalanced(const StepMotion& motion, size_t soft, double wanted) const;
   bool acceptable(const Contacts& contacts, const StepMotion& motion) const;
   void addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
                        Contacts& contacts) const;
