@@ -1,12 +1,12 @@
 #include "calipso_align/alignment.hpp"
 
-#include <Eigen/SVD>
 #include <chrono>
 #include <cmath>
 #include <functional>
 #include <future>
 
 #include "calipso_align/fit_problem.hpp"
+#include "calipso_align/rigid_part.hpp"
 #include "calipso_align/rough_fit.hpp"
 #include "calipso_align/schedule.hpp"
 #include "calipso_align/shape_uncertainty.hpp"
@@ -83,19 +83,6 @@ Points fitElasticStages(const TriangleMesh& cad, const FitProblem& problem, Plac
     clock.stop("elastic " + std::to_string(step.fit.nodes));
   }
   return placed(cad.vertices);
-}
-
-// The rigid motion that brings `from` closest to `to` (least squares, Kabsch).
-Eigen::Isometry3d bestRigid(const Points& from, const Points& to) {
-  const Eigen::RowVector3d a = from.colwise().mean(), b = to.colwise().mean();
-  const Eigen::Matrix3d cross = (to.rowwise() - b).transpose() * (from.rowwise() - a);
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign = Eigen::Vector3d::Ones();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) sign.z() = -1.0;
-  Eigen::Isometry3d best = Eigen::Isometry3d::Identity();
-  best.linear() = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  best.translation() = b.transpose() - best.linear() * a.transpose();
-  return best;
 }
 
 // Ratio of the mean distances from the centroid.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "calipso_align/rigid_part.hpp"
+
 namespace calipso::align {
 namespace {
 
@@ -41,7 +43,28 @@ NormalEquations assemble(const Points& X, const Rows& rows, const Map& map) {
   return normal;
 }
 
-// Adds the prior, and replaces held parameters by a unit row.
+// A measurement of one number of weight w, whose derivative is j and which is off by r.
+void addRow(const Eigen::Matrix<double, 1, Map::kParameters>& j, double r, double w,
+            NormalEquations& normal) {
+  if (w == 0.0 || std::isinf(w)) return;
+  normal.H += w * j.transpose() * j;
+  normal.gradient += w * r * j.transpose();
+}
+
+// The rough placement measures the rigid part of the map.
+void addPlacement(const Points& X, const LowOrderPrior& prior, const Map& map,
+                  NormalEquations& normal) {
+  const RigidPart rigid = rigidPart(X, map);
+  const Eigen::Vector3d deviation(prior.in_plane, prior.in_plane, prior.depth);
+  for (int k = 0; k < 3; ++k) {
+    addRow(rigid.rotation_by_parameters.row(k), rigid.rotation[k],
+           informationOf(prior.rotation_rad), normal);
+    addRow(rigid.translation_by_parameters.row(k), rigid.translation[k],
+           informationOf(deviation[k] * map.size()), normal);
+  }
+}
+
+// Adds the deformation's prior, and replaces held parameters by a unit row.
 void addPrior(const Map::Parameters& info, const Map::Parameters& off, NormalEquations& normal) {
   for (int i = 0; i < Map::kParameters; ++i) {
     if (std::isinf(info[i])) {
@@ -75,13 +98,15 @@ double estimateDeformation(const Map::Parameters& p, const Hessian& C, const Map
 
 }  // namespace
 
-Map::Parameters information(const LowOrderPrior& prior, const Map& map) {
+Map::Parameters information(const LowOrderPrior& prior) {
   Map::Parameters info;
+  const auto heldIf = [](bool held) {
+    return held ? std::numeric_limits<double>::infinity() : 0.0;
+  };
   const double a = prior.deformation;
-  info.segment<3>(Map::kRotation)
-      .setConstant(informationOf(std::sqrt(prior.rotation_rad * prior.rotation_rad + 0.5 * a * a)));
-  info.segment<2>(Map::kTranslation).setConstant(informationOf(prior.in_plane * map.size()));
-  info[Map::kTranslation + 2] = informationOf(prior.depth * map.size());
+  info.segment<3>(Map::kRotation).setConstant(heldIf(prior.rotation_rad == 0.0));
+  info.segment<2>(Map::kTranslation).setConstant(heldIf(prior.in_plane == 0.0));
+  info[Map::kTranslation + 2] = heldIf(prior.depth == 0.0);
   info[Map::kLogScale] = informationOf(prior.log_scale);
   for (int i = Map::kStrain; i < Map::kParameters; ++i) {
     const bool is_held = i >= Map::kQuadratic && !prior.quadratic;
@@ -101,10 +126,11 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
   LowOrderPrior prior = options.prior;
   LowOrderReport report;
   for (; report.iterations < options.iterations && !report.converged; ++report.iterations) {
-    const Map::Parameters info = information(prior, map);
+    const Map::Parameters info = information(prior);
     NormalEquations normal =
         assemble(X, observe(map.apply(X), report.iterations, prior.deformation), map);
     const Map::Parameters off = map.parameters() - expectation(prior);
+    addPlacement(X, prior, map, normal);
     addPrior(info, off, normal);
     const Eigen::LDLT<Hessian> factor(normal.H);
     const Map::Parameters step = -factor.solve(normal.gradient);
@@ -131,8 +157,9 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
 
 Eigen::MatrixXd covariance(const Points& X, const Rows& rows, const LowOrderPrior& prior,
                            const Map& map) {
-  const Map::Parameters info = information(prior, map);
+  const Map::Parameters info = information(prior);
   NormalEquations normal = assemble(X, rows, map);
+  addPlacement(X, prior, map, normal);
   addPrior(info, map.parameters() - expectation(prior), normal);
   Eigen::MatrixXd inverse = normal.H.ldlt().solve(Hessian::Identity());
   for (int i = 0; i < Map::kParameters; ++i) {
