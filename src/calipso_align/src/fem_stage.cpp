@@ -238,6 +238,8 @@ Vec ElasticFit::Impl::lineSearch(const Vec& step, const Rows& rows, double weigh
 fem::VoxelGrid gridOf(const TriangleMesh& cad, int nodes) {
   fem::VoxelizeOptions options;
   options.target_nodes = nodes;
+  options.node_tolerance = 0.1;    // only regularises: neither count nor filled parts need to be exact
+  options.samples_per_edge = 4;
   return fem::voxelize(cad, options);
 }
 

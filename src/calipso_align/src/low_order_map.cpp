@@ -77,6 +77,22 @@ LowOrderMap::Jacobian LowOrderMap::jacobian(const Eigen::Vector3d& X) const {
   return J;
 }
 
+LowOrderMap::Parameters LowOrderMap::gradient(const Eigen::Vector3d& X,
+                                              const Eigen::Vector3d& g) const {
+  const Eigen::Vector3d d = X - c_, y = d / l_;
+  const Eigen::Vector3d turned = s_ * (R_ * deformed(d));
+  const Eigen::Vector3d h = s_ * l_ * (R_.transpose() * g);
+  const Eigen::Matrix<double, 6, 1> m = monomials(y);
+  Parameters result;
+  result.segment<3>(kRotation) = turned.cross(g);
+  result.segment<3>(kTranslation) = g;
+  result[kLogScale] = turned.dot(g);
+  result.segment<6>(kStrain) << h.x() * y.x(), h.y() * y.y(), h.z() * y.z(),
+      h.x() * y.y() + h.y() * y.x(), h.x() * y.z() + h.z() * y.x(), h.y() * y.z() + h.z() * y.y();
+  for (int k = 0; k < 3; ++k) result.segment<6>(kQuadratic + 6 * k) = h[k] * m;
+  return result;
+}
+
 LowOrderMap::Parameters LowOrderMap::plus(const Parameters& step) const {
   Parameters p = p_ + step;
   const Eigen::AngleAxisd turned(rotationOf(step.segment<3>(kRotation)) * R_);

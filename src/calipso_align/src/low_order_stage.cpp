@@ -31,14 +31,24 @@ struct NormalEquations {
 };
 
 NormalEquations assemble(const Points& X, const Rows& rows, const Map& map) {
+  // J' W J of many rows at a time is one product of matrices.
+  constexpr int kPanel = 256;
+  Eigen::Matrix<double, Map::kParameters, Eigen::Dynamic> panel(Map::kParameters, kPanel);
   NormalEquations normal;
+  int filled = 0;
+  const auto flush = [&] {
+    normal.H.selfadjointView<Eigen::Lower>().rankUpdate(panel.leftCols(filled));
+    filled = 0;
+  };
   for (const PointRow& row : rows) {
     if (row.weight == 0.0) continue;
-    const Map::Parameters j = row.a0 * map.jacobian(X.row(row.v0)).transpose() * row.g +
-                              row.a1 * map.jacobian(X.row(row.v1)).transpose() * row.g;
-    normal.H.selfadjointView<Eigen::Lower>().rankUpdate(j, row.weight);
+    const Map::Parameters j =
+        map.gradient(X.row(row.v0), row.a0 * row.g) + map.gradient(X.row(row.v1), row.a1 * row.g);
+    panel.col(filled++) = std::sqrt(row.weight) * j;
     normal.gradient += row.weight * row.r * j;
+    if (filled == kPanel) flush();
   }
+  flush();
   normal.H = Hessian(normal.H.selfadjointView<Eigen::Lower>());
   return normal;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace calipso::align {
 namespace {
@@ -47,31 +48,66 @@ cv::Rect boundingRoi(const Pixels& pixels, const Camera& camera) {
   return {left, top, right - left, bottom - top};
 }
 
+// Columns of a picture's row within a triangle: between its left edges and its right ones, all of them
+// linear in the row.
+class TriangleSpans {
+ public:
+  explicit TriangleSpans(const Eigen::Vector2d (&p)[3]) {
+    const double area =
+        (p[1] - p[0]).x() * (p[2] - p[0]).y() - (p[1] - p[0]).y() * (p[2] - p[0]).x();
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector2d& from = p[k];
+      const Eigen::Vector2d along = p[(k + 1) % 3] - from;
+      const double rise = area > 0.0 ? along.y() : -along.y();
+      if (rise == 0.0) continue;   // the triangle's rows end here
+      const double slope = along.x() / along.y();
+      Edge& edge = rise > 0.0 ? right_[rights_++] : left_[lefts_++];
+      edge = {from.x() - slope * from.y(), slope};
+    }
+  }
+
+  // First and last column whose centre is inside; none when the last comes before the first.
+  std::pair<int, int> at(int v) const {
+    constexpr double kRounding = 1e-9;   // a pixel on the edge of two triangles belongs to both
+    double from = -1.0, to = 1e6;
+    for (int k = 0; k < lefts_; ++k) from = std::max(from, left_[k].u + left_[k].slope * v);
+    for (int k = 0; k < rights_; ++k) to = std::min(to, right_[k].u + right_[k].slope * v);
+    if (from > 1e6 || to < -1.0) return {0, -1};
+    return {static_cast<int>(std::ceil(from - kRounding)),
+            static_cast<int>(std::floor(to + kRounding))};
+  }
+
+ private:
+  struct Edge {
+    double u, slope;   // u + slope * v
+  };
+  Edge left_[3], right_[3];
+  int lefts_ = 0, rights_ = 0;
+};
+
 // Fills one triangle. 1/z is linear on the screen; the buffer holds the largest one.
 void fillTriangle(const Eigen::Vector2d (&p)[3], const double (&inverse_z)[3], const cv::Rect& roi,
                   cv::Mat1f& buffer) {
   const double area = (p[1] - p[0]).x() * (p[2] - p[0]).y() - (p[1] - p[0]).y() * (p[2] - p[0]).x();
   if (area == 0.0 || !std::isfinite(area)) return;
-  const auto [min_u, max_u] = std::minmax({p[0].x(), p[1].x(), p[2].x()});
   const auto [min_v, max_v] = std::minmax({p[0].y(), p[1].y(), p[2].y()});
-  const int u_begin = std::max(roi.x, static_cast<int>(std::ceil(std::max(min_u, -1.0))));
-  const int u_end = std::min<int>(roi.x + roi.width - 1, std::floor(std::min(max_u, 1e6)));
   const int v_begin = std::max(roi.y, static_cast<int>(std::ceil(std::max(min_v, -1.0))));
   const int v_end = std::min<int>(roi.y + roi.height - 1, std::floor(std::min(max_v, 1e6)));
+  if (v_end < v_begin) return;
 
-  // Barycentric weights b1, b2 are linear in (u, v); step them along the row.
-  const double b1_u = (p[2] - p[0]).y() / area, b1_v = -(p[2] - p[0]).x() / area;
-  const double b2_u = -(p[1] - p[0]).y() / area, b2_v = (p[1] - p[0]).x() / area;
+  const double d1 = (inverse_z[1] - inverse_z[0]) / area, d2 = (inverse_z[2] - inverse_z[0]) / area;
+  const double by_u = d1 * (p[2] - p[0]).y() - d2 * (p[1] - p[0]).y();
+  const double by_v = d2 * (p[1] - p[0]).x() - d1 * (p[2] - p[0]).x();
+  const TriangleSpans spans(p);
   for (int v = v_begin; v <= v_end; ++v) {
-    float* row = buffer[v - roi.y] - roi.x;
-    double b1 = b1_u * (u_begin - p[0].x()) + b1_v * (v - p[0].y());
-    double b2 = b2_u * (u_begin - p[0].x()) + b2_v * (v - p[0].y());
-    for (int u = u_begin; u <= u_end; ++u, b1 += b1_u, b2 += b2_u) {
-      if (b1 < 0.0 || b2 < 0.0 || b1 + b2 > 1.0) continue;
-      const double value =
-          inverse_z[0] + b1 * (inverse_z[1] - inverse_z[0]) + b2 * (inverse_z[2] - inverse_z[0]);
-      row[u] = std::max(row[u], static_cast<float>(value));
-    }
+    const auto [first, last] = spans.at(v);
+    const int u_begin = std::max(roi.x, first), u_end = std::min(roi.x + roi.width - 1, last);
+    if (u_end < u_begin) continue;
+    float* row = buffer[v - roi.y] + (u_begin - roi.x);
+    const float start = static_cast<float>(inverse_z[0] + by_u * (u_begin - p[0].x()) +
+                                           by_v * (v - p[0].y()));
+    const float step = static_cast<float>(by_u);
+    for (int i = 0; i <= u_end - u_begin; ++i) row[i] = std::max(row[i], start + step * i);
   }
 }
 
@@ -156,7 +192,10 @@ DepthRendering renderDepth(const Points& x, const Triangles& triangles, const Ca
     const double inverse_z[3] = {1.0 / x(v[0], 2), 1.0 / x(v[1], 2), 1.0 / x(v[2], 2)};
     fillTriangle(p, inverse_z, rendering.roi, rendering.depth);
   }
-  for (float& value : rendering.depth) value = value > 0.0f ? 1.0f / value : 0.0f;
+  for (int v = 0; v < rendering.depth.rows; ++v) {
+    float* row = rendering.depth[v];
+    for (int u = 0; u < rendering.depth.cols; ++u) row[u] = row[u] > 0.0f ? 1.0f / row[u] : 0.0f;
+  }
   return rendering;
 }
 

@@ -35,6 +35,8 @@ class LowOrderMap {
   Points apply(const Points& X) const;
   // dx/dp at X; the rotation's columns are for an increment exp([dw]) from the left.
   Jacobian jacobian(const Eigen::Vector3d& X) const;
+  // Derivative of g . x(X) by the parameters, g a fixed direction: jacobian(X)' g.
+  Parameters gradient(const Eigen::Vector3d& X, const Eigen::Vector3d& g) const;
   // p with the increment added: rotations are composed, all others summed.
   Parameters plus(const Parameters& step) const;
   // The same map with its scale counted as strain: s (1 + E) = 1 + E'.
