@@ -236,10 +236,12 @@ Vec ElasticFit::Impl::lineSearch(const Vec& step, const Rows& rows, double weigh
 }
 
 fem::VoxelGrid gridOf(const TriangleMesh& cad, int nodes) {
+  // The size of the cells is found with few sight lines, which count nearly the same nodes.
   fem::VoxelizeOptions options;
   options.target_nodes = nodes;
-  options.node_tolerance = 0.1;    // only regularises: neither count nor filled parts need to be exact
-  options.samples_per_edge = 4;
+  options.samples_per_edge = 2;
+  options.cell_size = fem::voxelize(cad, options).cell_size;
+  options.samples_per_edge = 6;
   return fem::voxelize(cad, options);
 }
 

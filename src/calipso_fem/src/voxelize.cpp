@@ -29,9 +29,6 @@ void checkInput(const TriangleMesh& surface, const VoxelizeOptions& o) {
   if (o.cell_size == 0.0 && o.target_nodes < 8)
     throw std::invalid_argument("voxelize: target_nodes is " + std::to_string(o.target_nodes) +
                                 ", allowed is >= 8");
-  if (!(o.node_tolerance > 0.0))
-    throw std::invalid_argument("voxelize: node_tolerance is " + std::to_string(o.node_tolerance) +
-                                ", allowed is > 0");
   if (o.has_anchor && !o.anchor.allFinite())
     throw std::invalid_argument("voxelize: the anchor is not finite");
   if (o.samples_per_edge < 1 || o.samples_per_edge > 16)
@@ -164,7 +161,7 @@ VoxelGrid voxelize(const TriangleMesh& given, const VoxelizeOptions& options) {
                             std::abs(std::log(static_cast<double>(best.nodeCount()) /
                                               options.target_nodes));
     if (better) best = std::move(grid);
-    if (std::abs(std::log(ratio)) < options.node_tolerance) break;
+    if (std::abs(std::log(ratio)) < 0.03) break;
     h *= std::cbrt(ratio);
   }
   return best;

@@ -29,7 +29,6 @@ struct VoxelGrid {
 struct VoxelizeOptions {
   double cell_size = 0.0;           // m; 0: chosen so that about target_nodes result
   int target_nodes = 1500;
-  double node_tolerance = 0.03;     // part of target_nodes that the count may be off
   int samples_per_edge = 6;         // sight lines per cell edge for the filled fraction
   double min_fraction = 1e-3;       // floor for cells that the surface only grazes
   bool separate_branches = true;    // parts that share a cell without touching are not welded
