@@ -70,19 +70,38 @@ Grids layGrids(const TriangleMesh& cad, const std::vector<ElasticStep>& steps) {
 }
 
 // Stage C: the elastic body on finer and finer grids.
-Points fitElasticStages(const TriangleMesh& cad, const FitProblem& problem, Placement placed,
-                        const std::vector<ElasticStep>& steps, Grids& grids, StageClock& clock) {
-  for (size_t k = 0; k < steps.size(); ++k) {
+struct ElasticOutcome {
+  Points x;               // where the vertices ended
+  std::string trouble;    // what went wrong; empty: nothing
+};
+
+ElasticOutcome fitElasticStages(const TriangleMesh& cad, const FitProblem& problem, Placement placed,
+                                const std::vector<ElasticStep>& steps, Grids& grids,
+                                StageClock& clock) {
+  std::string trouble;
+  for (size_t k = 0; k < steps.size() && trouble.empty(); ++k) {
     const ElasticStep& step = steps[k];
-    const auto fit = std::make_shared<ElasticFit>(cad, grids[k].get(), placed, step.fit);
+    const fem::VoxelGrid grid = grids[k].get();
+    std::shared_ptr<ElasticFit> fit;
+    try {
+      fit = std::make_shared<ElasticFit>(cad, grid, placed, step.fit);
+    } catch (const std::invalid_argument& flat) {
+      trouble = std::string("the fit has pressed the model flat (") + flat.what() +
+                "): place the model closer, or correct the contour";
+      break;
+    }
     clock.stop("grid of " + std::to_string(step.fit.nodes));
-    fit->fit([&](const Points& x, int k) {
+    const FemStageReport report = fit->fit([&](const Points& x, int k) {
       return measure(problem, x, settingsAt(step, problem, k));
     });
+    if (!report.solvable) {
+      trouble = "the elastic system of " + std::to_string(report.nodes) +
+                " nodes has no solution: place the model closer, or correct the contour";
+    }
     placed = [fit](const Points& points) { return fit->carry(points); };
     clock.stop("elastic " + std::to_string(step.fit.nodes));
   }
-  return placed(cad.vertices);
+  return {placed(cad.vertices), trouble};
 }
 
 // Ratio of the mean distances from the centroid.
@@ -208,8 +227,12 @@ AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
   const Placement placed = [&](const Points& points) {
     return low.map.apply(transformed(camera_from_object, points));
   };
-  const Points x = fitElasticStages(cad, problem, placed, steps, grids, clock);
-  describe(problem, cad, x, contour, low.last, result);
+  const ElasticOutcome end = fitElasticStages(cad, problem, placed, steps, grids, clock);
+  describe(problem, cad, end.x, contour, low.last, result);
+  if (!end.trouble.empty()) {
+    result.trusted = false;
+    result.reason = end.trouble + (result.reason.empty() ? "" : "; " + result.reason);
+  }
   clock.stop("result");
   return result;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace calipso::align {
 namespace {
@@ -128,8 +129,8 @@ struct ElasticFit::Impl {
     const auto& weights = options.elastic_weights;
     return weights[std::min<size_t>(iteration, weights.size() - 1)] / volume;
   }
-  double depthInformation() const {
-    return 1.0 / (options.depth_sigma * options.depth_sigma * size * size * grid.nodeCount());
+  double driftInformation() const {
+    return 1.0 / (options.drift_sigma * options.drift_sigma * size * size * grid.nodeCount());
   }
 
   // Adds the measurements' gradient J^T W r, and a bound of J^T W J that stays inside K's pattern:
@@ -137,7 +138,11 @@ struct ElasticFit::Impl {
   void addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) const;
   void addVertex(int vertex, double share, const PointRow& row, BlockMatrix& H) const;
   void makePattern();
-  Vec solve(const BlockMatrix& H, const Vec& gradient);
+  void addDrift(Vec& gradient, BlockMatrix& H) const;
+  // Nothing where the system is not positive definite.
+  std::optional<Vec> solve(const BlockMatrix& H, const Vec& gradient);
+  // Stiffens a system that is not positive definite until it is.
+  std::optional<Vec> dampedStep(BlockMatrix& H, const Vec& gradient, FemStageReport& report);
   double energy(const Vec& at, const Vec& from, const Rows& rows, double weight) const;
   Vec lineSearch(const Vec& step, const Rows& rows, double weight, double slope) const;
 };
@@ -184,10 +189,36 @@ void ElasticFit::Impl::makePattern() {
   }
   A.outerIndexPtr()[free * p.rows()] = count;
   std::fill_n(A.valuePtr(), count, 1.0);
+  solver.cholmod().print = 0;   // what it would print, the report says
   solver.analyzePattern(A);
 }
 
-Vec ElasticFit::Impl::solve(const BlockMatrix& H, const Vec& gradient) {
+void ElasticFit::Impl::addDrift(Vec& gradient, BlockMatrix& H) const {
+  const double information = driftInformation();
+  gradient += information * (x - x0);
+  for (int i = 0; i < grid.nodeCount(); ++i) {
+    H.block(H.pattern->diagonal[i]).diagonal().array() += information;
+  }
+}
+
+std::optional<Vec> ElasticFit::Impl::dampedStep(BlockMatrix& H, const Vec& gradient,
+                                                FemStageReport& report) {
+  std::optional<Vec> step = solve(H, gradient);
+  if (step) return step;
+  double mean = 0.0;
+  for (int i = 0; i < grid.nodeCount(); ++i) mean += H.block(H.pattern->diagonal[i]).trace();
+  mean /= 3.0 * grid.nodeCount();
+  for (double damping = 1e-6; damping < 10.0 && !step && std::isfinite(mean); damping *= 100.0) {
+    for (int i = 0; i < grid.nodeCount(); ++i) {
+      H.block(H.pattern->diagonal[i]).diagonal().array() += damping * mean;
+    }
+    step = solve(H, gradient);
+  }
+  if (step) ++report.damped;
+  return step;
+}
+
+std::optional<Vec> ElasticFit::Impl::solve(const BlockMatrix& H, const Vec& gradient) {
   const fem::BlockPattern& p = *H.pattern;
   double* value = A.valuePtr();
   for (int j = 0; j < p.rows(); ++j) {
@@ -198,12 +229,13 @@ Vec ElasticFit::Impl::solve(const BlockMatrix& H, const Vec& gradient) {
     }
   }
   solver.factorize(A);
-  if (solver.info() != Eigen::Success) return Vec::Constant(gradient.size(), std::nan(""));
+  if (solver.info() != Eigen::Success) return std::nullopt;
   Eigen::Map<const Points> g(gradient.data(), p.rows(), 3);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> b = -g.leftCols(free);
   const Vec solution = solver.solve(Eigen::Map<const Vec>(b.data(), b.size()));
   Points step = Points::Zero(p.rows(), 3);
   step.leftCols(free) = Eigen::Map<const decltype(b)>(solution.data(), p.rows(), free);
+  if (!step.allFinite()) return std::nullopt;
   return vectorOf(step);
 }
 
@@ -217,10 +249,7 @@ double ElasticFit::Impl::energy(const Vec& at, const Vec& from, const Rows& rows
                                        row.a1 * moved.segment<3>(3 * row.v1));
     sum += 0.5 * row.weight * r * r;
   }
-  for (int i = 2; i < at.size(); i += 3) {
-    sum += 0.5 * depthInformation() * (at[i] - x0[i]) * (at[i] - x0[i]);
-  }
-  return sum;
+  return sum + 0.5 * driftInformation() * (at - x0).squaredNorm();
 }
 
 // The longest of the steps 1, 1/2, 1/4 ... that lowers the energy enough (Armijo).
@@ -267,13 +296,11 @@ FemStageReport ElasticFit::fit(const std::function<Rows(const Points&, int)>& ob
     BlockMatrix H = m.K;
     for (double& value : H.values) value *= weight;
     m.addRows(rows, gradient, H);
-    for (int i = 0; i < m.grid.nodeCount(); ++i) {
-      H.block(H.pattern->diagonal[i])(2, 2) += m.depthInformation();
-      gradient[3 * i + 2] += m.depthInformation() * (m.x[3 * i + 2] - m.x0[3 * i + 2]);
-    }
-    const Vec step = m.solve(H, gradient);
-    if (!step.allFinite()) break;
-    const Vec taken = m.lineSearch(step, rows, weight, gradient.dot(step));
+    m.addDrift(gradient, H);
+    const std::optional<Vec> step = m.dampedStep(H, gradient, report);
+    report.solvable = step.has_value();
+    if (!step) break;
+    const Vec taken = m.lineSearch(*step, rows, weight, gradient.dot(*step));
     m.x += taken;
     const bool last_weight = report.iterations + 1 >= iterations ||
                              m.options.elastic_weights[report.iterations] ==

@@ -1,6 +1,5 @@
 #include "calipso_align/trust.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -171,32 +170,6 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
     return {true, reason.str()};
   }
   return {false, reason.str()};
-}
-
-std::optional<Eigen::Vector3d> spinAxis(const Points& X) {
-  constexpr double kSymmetric = 0.01;  // of the size: what the surface may differ after a turn
-  const Points d = X.rowwise() - X.colwise().mean();
-  const double size = std::sqrt(d.rowwise().squaredNorm().mean());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(d.transpose() * d);
-  const int step = std::max<int>(1, static_cast<int>(d.rows()) / 300);
-  double spacing = 0.0;
-  for (int i = 0; i < d.rows(); i += step) {
-    Eigen::VectorXd distances = (d.rowwise() - d.row(i)).rowwise().squaredNorm();
-    distances[i] = std::numeric_limits<double>::max();
-    spacing = std::max(spacing, std::sqrt(distances.minCoeff()));
-  }
-  const double allowed = spacing + kSymmetric * size;
-  for (int k = 0; k < 3; ++k) {
-    const Eigen::Vector3d axis = axes.eigenvectors().col(k);
-    const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, axis).toRotationMatrix();
-    double worst = 0.0;
-    for (int i = 0; i < d.rows() && worst < allowed; i += step) {
-      const Eigen::RowVector3d p = d.row(i) * turn.transpose();
-      worst = std::max(worst, std::sqrt((d.rowwise() - p).rowwise().squaredNorm().minCoeff()));
-    }
-    if (worst < allowed) return axis;
-  }
-  return std::nullopt;
 }
 
 }  // namespace calipso::align

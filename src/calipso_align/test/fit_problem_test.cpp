@@ -153,6 +153,20 @@ TEST(ContourTerm, AnUnknownEdgeOnlyPullsOutwards) {
   EXPECT_EQ(pulls(1.2), 0.0);
 }
 
+TEST(Trust, AVaseSpinsAndAPearDoesNot) {
+  TriangleMesh vase = test::pear(18, 48);
+  for (int i = 0; i < vase.vertexCount(); ++i) {
+    const double turn = 2.0 * M_PI * (i - 2) / 48, z = vase.vertices(i, 2);
+    const double radius = i < 2 ? 0.0 : (0.2 - 0.1 * z) * std::sqrt(std::max(0.0, 1.0 - 4.0 * z * z));
+    vase.vertices.row(i) << radius * std::cos(turn), radius * std::sin(turn), z;
+  }
+  const std::optional<Eigen::Vector3d> axis = spinAxis(vase.vertices);
+  ASSERT_TRUE(axis.has_value());
+  EXPECT_GT(std::abs(axis->z()), 0.99);
+  // Dense enough that the bump is more than what points are apart.
+  EXPECT_FALSE(spinAxis(test::pear(60, 120).vertices).has_value());
+}
+
 TEST(Trust, AModelThatSticksOutOrFallsShortIsNotTrusted) {
   const Seen seen;
   const FitProblem problem = seen.problem();

@@ -48,6 +48,15 @@ TEST(LowOrderMap, JacobianMatchesCentralDifferences) {
   }
 }
 
+TEST(LowOrderMap, GradientIsTheJacobianSeenFromOneDirection) {
+  const Points X = test::pear().vertices;
+  LowOrderMap map(X);
+  map.setParameters(someParameters());
+  const Eigen::Vector3d point = X.row(37), direction(0.3, -0.7, 0.5);
+  EXPECT_TRUE(map.gradient(point, direction)
+                  .isApprox(map.jacobian(point).transpose() * direction, 1e-13));
+}
+
 TEST(LowOrderMap, ScaleCanBeCountedAsStrain) {
   const Points X = test::pear().vertices;
   LowOrderMap map(X);

@@ -9,14 +9,15 @@
 #include "calipso_fem/embedding.hpp"
 
 // The model as an elastic body that measurements pull on (eq. 9):
-//   min over x   lambda Psi(x) / (E V) + 1/2 sum of w r(J x)^2 + eps/2 |z - z0|^2
+//   min over x   lambda Psi(x) / (E V) + 1/2 sum of w r(J x)^2 + eps/2 |x - x0|^2
 //  code    meaning                                                           unit
 //  x       nodal positions, 3n, camera frame                                 m
 //  Psi     the simulator's elastic energy; its rest shape is where the       J
 //          low-order stage ended
 //  E V     Young's modulus times volume, so that Psi / (E V) is a mean squared strain
 //  lambda  what a mean squared strain of one costs, in units of r^2 w
-//  eps     keeps nodes from drifting along the sight line; where nothing shows the depth, they are held
+//  eps     keeps nodes that nothing holds where they are, above all along the sight line; where nothing
+//          shows the depth, they are held there
 namespace calipso::align {
 
 struct FemStageOptions {
@@ -25,7 +26,7 @@ struct FemStageOptions {
   bool linear = false;             // constant K, as eq. 9 has it, instead of corotated elements
   std::vector<double> elastic_weights = {1e4};  // lambda, one per iteration: soft contour to stiff
   bool hold_depth = false;         // nodes only move across the optical axis
-  double depth_sigma = 1.0;        // of nodes along the sight line, in model sizes, all together
+  double drift_sigma = 1.0;        // of nodes that nothing holds, in model sizes, all together
   double smallest_step = 1e-4;     // of the model's size
 };
 
@@ -33,6 +34,8 @@ struct FemStageReport {
   int nodes = 0;
   int iterations = 0;
   bool converged = false;
+  int damped = 0;          // iterations whose system was not positive definite until it was stiffened
+  bool solvable = true;    // false: even then it was not, and the fit stands where it was
 };
 
 // Cubes that cover the model, object frame.

@@ -12,8 +12,10 @@ namespace calipso::align {
 // The deformation is a random field whose correlation length L is the object's size, the same in all
 // directions: the picture decides across the sight line, along it stays what the prior expects.
 // With y = d / l (LowOrderMap) its Taylor coefficients deviate by
-//   a                      linear, each entry of a 3 x 3 matrix; its skew part adds to the rotation
+//   a                      linear, each entry of a 3 x 3 matrix
 //   a l/L {sqrt(3)/2, 1}   quadratic, squares and products of two coordinates
+// The rough placement is one of the whole deformed object: what it is off by is the rigid part of the
+// map (rigid_part.hpp), whichever of the parameters that comes from.
 struct LowOrderPrior {
   double rotation_rad = 0.0;
   double in_plane = 0.0;       // translation across the sight line, in model sizes
