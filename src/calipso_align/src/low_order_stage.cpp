@@ -125,12 +125,6 @@ Map::Parameters information(const LowOrderPrior& prior) {
   return info;
 }
 
-Map::Parameters expectation(const LowOrderPrior& prior) {
-  Map::Parameters mean = Map::Parameters::Zero();
-  mean.segment<3>(Map::kStrain).setConstant(0.5 * prior.deformation * prior.deformation);
-  return mean;
-}
-
 LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
                            const LowOrderStageOptions& options, Map& map) {
   LowOrderPrior prior = options.prior;
@@ -139,9 +133,8 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
     const Map::Parameters info = information(prior);
     NormalEquations normal =
         assemble(X, observe(map.apply(X), report.iterations, prior.deformation), map);
-    const Map::Parameters off = map.parameters() - expectation(prior);
     addPlacement(X, prior, map, normal);
-    addPrior(info, off, normal);
+    addPrior(info, map.parameters(), normal);
     const Eigen::LDLT<Hessian> factor(normal.H);
     const Map::Parameters step = -factor.solve(normal.gradient);
     if (!step.allFinite()) break;
@@ -155,7 +148,7 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
     report.converged = length < options.smallest_step;
     if (options.estimate_deformation) {
       const double before = prior.deformation;
-      prior.deformation = estimateDeformation(map.parameters() - expectation(prior), factor.solve(Hessian::Identity()),
+      prior.deformation = estimateDeformation(map.parameters(), factor.solve(Hessian::Identity()),
                                               info, before);
       constexpr double kSettled = 0.05;
       report.converged &= std::abs(prior.deformation - before) < kSettled * before;
@@ -170,7 +163,7 @@ Eigen::MatrixXd covariance(const Points& X, const Rows& rows, const LowOrderPrio
   const Map::Parameters info = information(prior);
   NormalEquations normal = assemble(X, rows, map);
   addPlacement(X, prior, map, normal);
-  addPrior(info, map.parameters() - expectation(prior), normal);
+  addPrior(info, map.parameters(), normal);
   Eigen::MatrixXd inverse = normal.H.ldlt().solve(Hessian::Identity());
   for (int i = 0; i < Map::kParameters; ++i) {
     if (!std::isinf(info[i])) continue;

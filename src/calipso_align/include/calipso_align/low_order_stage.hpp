@@ -30,10 +30,6 @@ constexpr double kOrderRatio = 0.4;   // l / L: a body's size is two to three ti
 // Diagonal of the prior's information; infinite where a parameter is held.
 LowOrderMap::Parameters information(const LowOrderPrior& prior);
 
-// Mean of the prior. The symmetric part of (1 + A), A of independent entries, is longer than 1 by
-// -W W / 2 on average, W the skew part of A: a^2 / 2 in each direction.
-LowOrderMap::Parameters expectation(const LowOrderPrior& prior);
-
 struct LowOrderStageOptions {
   LowOrderPrior prior;
   int iterations = 15;
