@@ -104,12 +104,9 @@ ElasticOutcome fitElasticStages(const TriangleMesh& cad, const FitProblem& probl
   return {placed(cad.vertices), trouble};
 }
 
-// Ratio of the mean distances from the centroid.
+// Ratio of the root mean square distances from the centroid.
 double sizeRatio(const Points& to, const Points& from) {
-  const auto size = [](const Points& p) {
-    return std::sqrt((p.rowwise() - p.colwise().mean()).rowwise().squaredNorm().mean());
-  };
-  return size(to) / size(from);
+  return LowOrderMap(to).size() / LowOrderMap(from).size();
 }
 
 // Covariance of motion and low-order deformation at the end of the fit, all of them left free.
