@@ -42,21 +42,24 @@ struct Level {
   cv::Mat hole, source;  // CV_8UC1
 };
 
-// Half the size: the mean of what is known; a pixel is hole if any of its four was, source if all were.
+// Half the size: the mean of what is known. A pixel is source if all of its four were; hole if any was, unless half of it is
+// known and no source: lines drawn through the hole are to be seen at every level.
 Level halved(const Level& fine) {
   const cv::Size size((fine.hole.cols + 1) / 2, (fine.hole.rows + 1) / 2);
   Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_8U), cv::Mat(size, CV_8U, cv::Scalar(255))};
-  cv::Mat weight = cv::Mat::zeros(size, CV_32F);
+  cv::Mat weight = cv::Mat::zeros(size, CV_32F), drawn = cv::Mat::zeros(size, CV_8U);
   for (int v = 0; v < fine.hole.rows; ++v) {
     for (int u = 0; u < fine.hole.cols; ++u) {
-      const bool known = fine.source.at<std::uint8_t>(v, u) != 0;
-      const float w = known ? 1.0f : kUnknown;
+      const bool hole = fine.hole.at<std::uint8_t>(v, u) != 0, source = fine.source.at<std::uint8_t>(v, u) != 0;
+      const float w = hole ? kUnknown : 1.0f;
       half.hole.at<std::uint8_t>(v / 2, u / 2) |= fine.hole.at<std::uint8_t>(v, u);
-      half.source.at<std::uint8_t>(v / 2, u / 2) &= known ? 255 : 0;
+      half.source.at<std::uint8_t>(v / 2, u / 2) &= source ? 255 : 0;
       half.image.at<cv::Vec4f>(v / 2, u / 2) += w * fine.image.at<cv::Vec4f>(v, u);
       weight.at<float>(v / 2, u / 2) += w;
+      drawn.at<std::uint8_t>(v / 2, u / 2) += !hole && !source;
     }
   }
+  half.hole.setTo(0, drawn >= 2);
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) half.image.at<cv::Vec4f>(v, u) /= weight.at<float>(v, u);
   }
@@ -89,8 +92,8 @@ class Filling {
   }
 
   // From the rim inwards: a ring's patches are compared by what is known of them, then the ring is filled.
-  void peel(const cv::Mat& source) {
-    cv::Mat known = source.clone(), ring;
+  void peel() {
+    cv::Mat known = hole_ == 0, ring;
     for (;;) {
       cv::dilate(known, ring, cv::Mat::ones(3, 3, CV_8U));
       ring &= hole_ & (known == 0);
@@ -295,13 +298,13 @@ class Filling {
 
 cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source, const InpaintParams& params) {
   std::vector<Level> levels(1);
-  cv::merge(std::vector<cv::Mat>{image, kLively * liveliness(image, source)}, levels[0].image);
+  cv::merge(std::vector<cv::Mat>{image, kLively * liveliness(image, hole == 0)}, levels[0].image);
   levels[0].hole = hole, levels[0].source = source;
   while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side) levels.push_back(halved(levels.back()));
   const int coarsest = static_cast<int>(levels.size()) - 1;
   Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), params);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
-  filling.peel(levels[coarsest].source);
+  filling.peel();
   for (int i = 0; i < params.coarsest_rounds; ++i) filling.search(std::max(hole.cols, hole.rows) >> coarsest), filling.vote();
   for (int k = coarsest - 1; k >= 0; --k) {
     Filling finer(levels[k], static_cast<float>(1 << k), params);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "line_bridge.hpp"
 #include "patch_fill.hpp"
 #include "seam_blend.hpp"
 
@@ -55,6 +56,68 @@ TEST(PatchOrigins, AreWhereThePictureRepeatsItself) {
     }
   }
   EXPECT_EQ(elsewhere, 0);
+}
+
+// Dark lines over fine grain, hidden in a square.
+struct Lines {
+  cv::Mat image = 0.05 * grain(320, 200) + cv::Scalar::all(150.0), truth, hole = cv::Mat::zeros(200, 320, CV_8U);
+
+  void line(const cv::Point& a, const cv::Point& b, int dark = 30) {
+    cv::line(image, a, b, cv::Scalar::all(dark), 3, cv::LINE_AA);
+  }
+  LineBridges bridge() {
+    hole(cv::Rect(110, 50, 100, 100)).setTo(255);
+    truth = image.clone();
+    image.setTo(cv::Scalar::all(0), hole);
+    return bridgeLines(hole, hole == 0, image);
+  }
+};
+
+TEST(BridgeLines, ConnectTheTwoEndsOfALine) {
+  Lines l;
+  l.line({0, 80}, {319, 115});
+  const LineBridges b = l.bridge();
+  EXPECT_GT(cv::countNonZero(b.drawn), 700);  // nine rows of 100 px, less what the ends leave
+  EXPECT_EQ(cv::countNonZero(b.drawn & (l.hole == 0)), 0);
+  // Grain differs by 5 code values (12 % of 200) and a line's rim by a tenth of a pixel, which are 12.
+  EXPECT_LT(meanDifference(l.image, l.truth, b.drawn), 8.0);
+  for (int v = 50; v < 150; ++v) {
+    for (int u = 110; u < 210; ++u) {
+      const cv::Vec2s from = b.origin.at<cv::Vec2s>(v, u);
+      if (b.drawn.at<std::uint8_t>(v, u) != 0) {
+        EXPECT_EQ(l.hole.at<std::uint8_t>(from[1], from[0]), 0);
+      }
+    }
+  }
+}
+
+TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
+  Lines l;
+  l.line({0, 90}, {319, 90});
+  l.line({150, 199}, {170, 90});
+  const LineBridges b = l.bridge();
+  EXPECT_LT(meanDifference(l.image, l.truth, b.drawn), 8.0);
+  EXPECT_NE(b.drawn.at<std::uint8_t>(130, 163), 0);  // on the second line
+  EXPECT_EQ(b.drawn.at<std::uint8_t>(70, 174), 0);   // beyond the first
+}
+
+TEST(BridgeLines, LeaveALineThatHasNoOtherEnd) {
+  Lines l;
+  l.line({0, 90}, {160, 100});
+  EXPECT_EQ(cv::countNonZero(l.bridge().drawn), 0);
+}
+
+TEST(BridgeLines, LeaveLinesOfDifferentColour) {
+  Lines l;
+  l.line({0, 100}, {160, 100}, 30);
+  l.line({160, 100}, {319, 100}, 255);
+  EXPECT_EQ(cv::countNonZero(l.bridge().drawn), 0);
+}
+
+TEST(BridgeLines, LeaveTextureOfManyLines) {
+  Lines l;
+  for (int v = 4; v < 200; v += 9) l.line({0, v}, {319, v}, 60);
+  EXPECT_EQ(cv::countNonZero(l.bridge().drawn), 0);
 }
 
 TEST(PatchOrigins, ConnectALineThatEntersAtTwoPlaces) {
