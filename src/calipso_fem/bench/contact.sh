@@ -9,7 +9,8 @@ mkdir -p "$output"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cases="slope slope_soft sliding bounce resting_block hertz soft_soft_momentum soft_rigid_momentum cloth_on_edge stack
-  mass_ratio friction_extremes squeezed overlap_at_start two_cubes two_bodies pyramid asleep bullet_two_cubes_30
+  mass_ratio friction_extremes squeezed overlap_at_start two_cubes two_bodies pyramid asleep falling_cubes
+  bullet_cube_30 bullet_cube_60 bullet_cube_120 bullet_cube_240 bullet_two_cubes_30 bullet_two_cubes_60
   bullet_two_cubes_120 bullet_two_cubes_240 fast_block_thin_plate"
 for case in $cases "$@"; do
   status=0

@@ -20,7 +20,7 @@ constexpr double kShortestHeldStep = 1.0 / 500.0;   // s, for surfaces that are 
 constexpr double kShortestFastStep = 1.0 / 1000.0;  // s, for objects too fast for their size
 // Iterations that a renewal of a tangent costs.
 constexpr double kRenewal = 8.0;
-constexpr int kMostRenewals = 8;  // of a body's tangent in a step
+constexpr int kMostRenewals = 3;  // of a body's tangent in a step
 // Iterations after which a step may end further off balance, twice as far with each more, and so many times
 // further off the contacts' laws: crushed cells take many to the last digits.
 constexpr int kPatience = 6;

@@ -29,6 +29,17 @@ inline double processMs() {
   return 1e3 * t.tv_sec + 1e-6 * t.tv_nsec;
 }
 
+inline double wallMs() {
+  timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return 1e3 * t.tv_sec + 1e-6 * t.tv_nsec;
+}
+
+// How deep a vertex of one surface is in another, or below z = 0, m.
+double deepestOverlap(const std::vector<TriangleMesh>& surfaces);
+
+inline std::string cubes(int count) { return count == 1 ? "one soft cube" : "two soft cubes"; }
+
 // Plays a world and keeps what every case wants to know.
 struct Run {
   double deepest = 0.0, ms = 0.0, slowest_ms = 0.0;

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "../../src/world/obstacle_query.hpp"
 #include "contact_cases.hpp"
 
 namespace calipso::fem {
@@ -25,6 +26,22 @@ void Run::play(World& world, double seconds, const std::function<void(const Worl
     ++frames;
     if (look) look(state);
   }
+}
+
+double deepestOverlap(const std::vector<TriangleMesh>& surfaces) {
+  constexpr double kReach = 0.1;  // m
+  double deepest = 0.0;
+  for (const TriangleMesh& other : surfaces) {
+    deepest = std::max(deepest, -other.vertices.col(2).minCoeff());
+    const SurfaceTree tree(other);
+    for (const TriangleMesh& one : surfaces)
+      for (int v = 0; &one != &other && v < one.vertexCount(); ++v) {
+        if (!encloses(other, one.vertex(v))) continue;
+        if (const auto hit = tree.nearest(one.vertex(v), kReach))
+          deepest = std::max(deepest, -hit->distance);
+      }
+  }
+  return deepest;
 }
 
 namespace {
