@@ -73,6 +73,7 @@ struct DeformableBody::Impl {
   Vec viscous_velocity, viscous_forces;  // of the last applyViscosity(); empty: none
   bool system_valid = false;             // the solver holds the last step's system
   bool matrix_free = false;              // ... and it is hex_solver
+  int slow_solves = 0;                   // by hex_solver, one after the other
 
   // A step taken in parts (body_stepwise.cpp)
   struct Trial {
@@ -80,6 +81,7 @@ struct DeformableBody::Impl {
     Integrator integrator;
     Vec loads, targets, y;
     Vec slope;   // gradient at y without contact; empty when y has moved since
+    double residual_before = 0.0;   // norm at the last direction
     StepReport report;
   };
   std::optional<Trial> trial;
@@ -88,6 +90,7 @@ struct DeformableBody::Impl {
 
   void initialise(const Material& material);
   void chooseSolver();
+  void leaveSlowMultigrid();
   double damping() const { return model->cellMaterials().front().damping; }
 
   // y = M x for a 3n vector
@@ -132,6 +135,11 @@ struct DeformableBody::Impl {
   StepReport minimise(const Integrator& i, const Vec& loads, const Vec& targets, bool linearised,
                       Vec* y);
   Vec expectedMove(const Integrator& i) const;
+  // From the present positions to where the last two steps' motion leads, if the potential is lower there.
+  bool moveAhead(const Integrator& i, const Vec& loads, Vec* y);
+  // Relative residual to which Newton's direction number `iteration` (from 0) is worth solving for.
+  // residual_before: norm at the last one; 0 at the first
+  double forcing(int iteration, double residual, double residual_before) const;
   // One Newton direction; false when no positive definite system could be solved.
   bool newtonDirection(const Vec& y, const Integrator& i, const Vec& residual, const Vec& jump,
                        double linear_tolerance, StepReport* report, Vec* direction);

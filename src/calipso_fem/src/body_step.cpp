@@ -51,6 +51,14 @@ Vec DeformableBody::Impl::expectedMove(const Integrator& i) const {
   return move;
 }
 
+bool DeformableBody::Impl::moveAhead(const Integrator& i, const Vec& loads, Vec* y) {
+  if (!(i.inertia > 0.0)) return false;
+  const Vec ahead = *y + expectedMove(i);
+  if (!(potential(ahead, i, loads) < potential(*y, i, loads))) return false;
+  *y = ahead;
+  return true;
+}
+
 bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, const Vec& residual,
                                            const Vec& jump, double linear_tolerance,
                                            StepReport* report, Vec* direction) {
@@ -73,6 +81,14 @@ bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, co
   return false;
 }
 
+// Forcing terms (Eisenstat and Walker 1996, choice 2): no direction is solved for better than it is worth.
+// Steps that take long get exact ones: near-incompressible bodies would run out of iterations.
+double DeformableBody::Impl::forcing(int iteration, double residual, double residual_before) const {
+  if (iteration >= 2) return options.linear_tolerance;
+  const double ratio = residual_before > 0.0 ? residual / residual_before : 1.0;
+  return std::max(options.linear_tolerance, std::min(kLoosestForcing, 0.9 * ratio * ratio));
+}
+
 double DeformableBody::Impl::searchLine(const Vec& y, const Vec& direction, const Vec& residual,
                                         const Integrator& i, const Vec& loads,
                                         double energy) {
@@ -91,11 +107,7 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
                                           bool linearised, Vec* y) {
   StepReport report;
   Vec jump = targets - *y;
-  if (!linearised && i.inertia > 0.0 && jump.isZero(0.0)) {
-    const double before = potential(*y, i, loads);
-    const Vec start = *y + expectedMove(i);
-    if (potential(start, i, loads) < before) *y = start;
-  }
+  if (!linearised && jump.isZero(0.0)) moveAhead(i, loads, y);
   Vec r = gradient(*y, i, loads);
   Vec direction;
   double residual_before = 0.0;
@@ -105,13 +117,10 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
     maskResidual(&masked);
     report.residual = masked.norm() / forceScale(*y, i, loads);
     if (!linearised && jump.isZero(0.0) && report.residual <= options.newton_tolerance) break;
-    // Forcing terms (Eisenstat and Walker 1996, choice 2): no direction is solved for better than it is worth.
-    // Steps that take long get exact ones: near-incompressible bodies would run out of iterations.
-    double linear_tolerance = options.linear_tolerance;
-    if (!linearised && jump.isZero(0.0) && report.newton_iterations < 2) {
-      const double ratio = residual_before > 0.0 ? masked.norm() / residual_before : 1.0;
-      linear_tolerance = std::max(linear_tolerance, std::min(kLoosestForcing, 0.9 * ratio * ratio));
-    }
+    const double linear_tolerance =
+        linearised || !jump.isZero(0.0)
+            ? options.linear_tolerance
+            : forcing(report.newton_iterations, masked.norm(), residual_before);
     residual_before = masked.norm();
     if (!newtonDirection(*y, i, r, jump, linear_tolerance, &report, &direction)) {
       report.message = "no positive definite system: the body is free to move without resistance, "

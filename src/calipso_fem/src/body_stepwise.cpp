@@ -37,16 +37,30 @@ void DeformableBody::beginStep(double h) {
   m.trial = std::move(t);
 }
 
+void DeformableBody::predictTrial() {
+  Impl& m = *impl_;
+  Impl::Trial& t = m.runningTrial();
+  if (m.options.linearised) return;
+  for (const auto& [dof, p] : m.prescribed)
+    if (t.targets[dof] != t.y[dof]) return;
+  if (m.moveAhead(t.integrator, t.loads, &t.y)) t.slope.resize(0);
+}
+
 const Vec& DeformableBody::trialPositions() const { return impl_->runningTrial().y; }
 
 Vec DeformableBody::trialDirection(const Vec& contact_forces) {
   Impl& m = *impl_;
   Impl::Trial& t = m.runningTrial();
   Vec direction;
-  const Vec residual = m.trialGradient() - contact_forces;
+  const Vec residual = m.trialGradient() - contact_forces, jump = t.targets - t.y;
+  Vec masked = residual;
+  m.maskResidual(&masked);
+  const double tolerance =
+      jump.isZero(0.0) ? m.forcing(t.report.newton_iterations, masked.norm(), t.residual_before)
+                       : m.options.linear_tolerance;
+  t.residual_before = masked.norm();
   ++t.report.newton_iterations;
-  if (m.newtonDirection(t.y, t.integrator, residual, t.targets - t.y, m.options.linear_tolerance,
-                        &t.report, &direction))
+  if (m.newtonDirection(t.y, t.integrator, residual, jump, tolerance, &t.report, &direction))
     return direction;
   t.report.message = "no positive definite system: the body is free to move without resistance, "
                      "or its state is not finite";

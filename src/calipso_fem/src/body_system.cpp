@@ -258,6 +258,7 @@ bool DeformableBody::Impl::setMatrixFreeSystem(const Vec& y, const Integrator& i
 
 bool DeformableBody::Impl::setSystem(const Vec& y, const Integrator& i, Definiteness definiteness,
                                      const Vec* jump, Vec* AJ) {
+  leaveSlowMultigrid();
   // Recovery from inversion adds a material that only the assembled system knows.
   matrix_free = hex_solver && !(leastDilatation(y) < kRecoveryDilatation);
   if (matrix_free) {
@@ -272,9 +273,11 @@ bool DeformableBody::Impl::setSystem(const Vec& y, const Integrator& i, Definite
 }
 
 SolveReport DeformableBody::Impl::solveSystem(const Vec& b, double linear_tolerance, Vec* direction) {
-  return matrix_free
-             ? hex_solver->solve(b, linear_tolerance, options.linear_iterations, direction)
-             : solver->solve(b, linear_tolerance, options.linear_iterations, direction);
+  if (!matrix_free) return solver->solve(b, linear_tolerance, options.linear_iterations, direction);
+  constexpr int kSlow = 20;   // iterations
+  const SolveReport report = hex_solver->solve(b, linear_tolerance, options.linear_iterations, direction);
+  slow_solves = report.iterations > kSlow ? slow_solves + 1 : 0;
+  return report;
 }
 
 double DeformableBody::Impl::forceScale(const Vec& y, const Integrator& i, const Vec& loads) const {

@@ -13,27 +13,44 @@ using Eigen::Vector3i;
 
 constexpr int kMostBranches = 8;
 
-// Labels the parts of the solid within one cell: -1 empty, else the part, largest first.
+// The parts of the solid within one cell.
 struct Parts {
-  std::vector<int> label;   // s^3, x fastest
+  std::vector<int> label;   // s^3, x fastest: -1 empty, else the part
   std::vector<int> size;    // sub-voxels of each part
 };
 
-Parts labelParts(const CoveredCell& cell, const Occupancy& occupancy, int s) {
+// All of the cell's solid as one part.
+Parts onePart(const CoveredCell& cell, const Occupancy& occupancy, int s) {
   Parts parts;
-  parts.label.assign(s * s * s, -1);
+  parts.label.resize(s * s * s);
   const Vector3i low = cell.position * s;
-  const auto inside = [&](int i, int j, int k) {
-    return occupancy.get(low.x() + i, low.y() + j, low.z() + k);
-  };
+  int count = 0;
+  for (int k = 0, at = 0; k < s; ++k)
+    for (int j = 0; j < s; ++j)
+      for (int i = 0; i < s; ++i, ++at) {
+        const bool inside = occupancy.get(low.x() + i, low.y() + j, low.z() + k);
+        parts.label[at] = inside ? 0 : -1;
+        count += inside;
+      }
+  if (count > 0) parts.size.push_back(count);
+  return parts;
+}
+
+// Its connected parts, in the order of their first sub-voxels.
+Parts connectedParts(const CoveredCell& cell, const Occupancy& occupancy, int s) {
+  Parts parts = onePart(cell, occupancy, s);
+  if (parts.size.empty() || parts.size[0] == s * s * s) return parts;
+  constexpr int kUnseen = -2;
+  for (int& l : parts.label)
+    if (l == 0) l = kUnseen;
+  parts.size.clear();
   std::vector<Vector3i> stack;
   for (int seed = 0; seed < s * s * s; ++seed) {
-    const Vector3i start(seed % s, seed / s % s, seed / (s * s));
-    if (parts.label[seed] >= 0 || !inside(start.x(), start.y(), start.z())) continue;
+    if (parts.label[seed] != kUnseen) continue;
     const int label = static_cast<int>(parts.size.size());
     parts.size.push_back(0);
     parts.label[seed] = label;
-    stack.assign(1, start);
+    stack.assign(1, Vector3i(seed % s, seed / s % s, seed / (s * s)));
     while (!stack.empty()) {
       const Vector3i p = stack.back();
       stack.pop_back();
@@ -43,7 +60,7 @@ Parts labelParts(const CoveredCell& cell, const Occupancy& occupancy, int s) {
         const Vector3i n = p + Vector3i(around % 3 - 1, around / 3 % 3 - 1, around / 9 - 1);
         if (n.minCoeff() < 0 || n.maxCoeff() >= s) continue;
         int& l = parts.label[n.x() + s * (n.y() + s * n.z())];
-        if (l >= 0 || !inside(n.x(), n.y(), n.z())) continue;
+        if (l != kUnseen) continue;
         l = label;
         stack.push_back(n);
       }
@@ -52,8 +69,8 @@ Parts labelParts(const CoveredCell& cell, const Occupancy& occupancy, int s) {
   return parts;
 }
 
-// Specks below 2 % of the cell, and parts beyond `most`, are counted to the largest part.
-void mergeSpecks(Parts* parts, int s, int most) {
+// The largest part comes first; specks below 2 % of the cell, and parts beyond the most, are counted to it.
+void mergeSpecks(Parts* parts, int s) {
   const int n = static_cast<int>(parts->size.size());
   if (n < 2) return;
   std::vector<int> order(n), renamed(n, 0);
@@ -63,7 +80,7 @@ void mergeSpecks(Parts* parts, int s, int most) {
   std::vector<int> size;
   for (int rank = 0; rank < n; ++rank) {
     const int part = order[rank];
-    const bool keep = rank == 0 || (parts->size[part] * 50 > s * s * s && rank < most);
+    const bool keep = rank == 0 || (parts->size[part] * 50 > s * s * s && rank < kMostBranches);
     renamed[part] = keep ? static_cast<int>(size.size()) : 0;
     if (keep)
       size.push_back(parts->size[part]);
@@ -102,6 +119,7 @@ std::array<unsigned, kMostBranches> contacts(const Parts& a, const Parts& b, int
 constexpr double kLeastShare = 0.03;
 
 void spreadOverOctants(const Parts& parts, int part, int s, CoveredCell* cell) {
+  if (parts.size.size() == 1 && parts.size[0] == s * s * s) return;  // even, as it is
   double count[8] = {}, total = 0.0;
   // The middle sub-voxels of an odd count belong to both halves.
   const auto half = [s](int i, int side) {
@@ -135,9 +153,9 @@ std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
   std::vector<Parts> parts(cells.size());
   for (std::size_t c = 0; c < cells.size(); ++c) {
     const Vector3i& p = cells[c].position;
-    index[{p.x(), p.y(), p.z()}] = static_cast<int>(c);
-    parts[c] = labelParts(cells[c], occupancy, s);
-    mergeSpecks(&parts[c], s, separate ? kMostBranches : 1);
+    if (separate) index[{p.x(), p.y(), p.z()}] = static_cast<int>(c);
+    parts[c] = separate ? connectedParts(cells[c], occupancy, s) : onePart(cells[c], occupancy, s);
+    mergeSpecks(&parts[c], s);
   }
   std::vector<CoveredCell> result;
   for (std::size_t c = 0; c < cells.size(); ++c) {
@@ -149,7 +167,7 @@ std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
       if (n > 1) pieces[b].fraction *= parts[c].size[b] / total;
       spreadOverOctants(parts[c], b, s, &pieces[b]);
     }
-    for (int face = 0; face < 6; ++face) {
+    for (int face = 0; separate && face < 6; ++face) {
       const int other = neighbourOf(index, cells[c].position, face);
       if (other < 0 || (n == 1 && parts[other].size.size() <= 1)) continue;
       const auto touched = contacts(parts[c], parts[other], face, s);

@@ -31,6 +31,7 @@ Embedding identityEmbedding(int nodes) {
 
 // Below this, a kept Cholesky factor is faster.
 constexpr int kMatrixFreeNodes = 200;
+constexpr int kSlowSolves = 4;   // in a row
 
 VolumeMesh withElement(VolumeMesh hexes, ElementType element) {
   return element == ElementType::kTetP1 && !hexes.isTetrahedral() ? kuhnSplit(hexes)
@@ -41,6 +42,7 @@ VolumeMesh withElement(VolumeMesh hexes, ElementType element) {
 
 // Called again when the material has changed.
 void DeformableBody::Impl::chooseSolver() {
+  slow_solves = 0;
   const VolumeMesh& mesh = model->mesh();
   const bool automatic = options.solver == SolverKind::kAutomatic;
   const std::vector<Material>& materials = model->cellMaterials();
@@ -55,6 +57,14 @@ void DeformableBody::Impl::chooseSolver() {
     hex_solver->setHexes(*model->hexes());
   else
     hex_solver = std::make_unique<HexSolver>(mesh, *model->hexes());
+}
+
+// Multigrid sees badly what runs across its cells, as a folded sheet does: then a kept factor is faster, if it is small.
+void DeformableBody::Impl::leaveSlowMultigrid() {
+  if (!hex_solver || options.solver != SolverKind::kAutomatic || slow_solves < kSlowSolves) return;
+  if (!hasSmallFactor(model->mesh())) return;
+  hex_solver.reset();
+  solver = std::make_unique<LinearSolver>(model->mesh(), SolverKind::kStaleCholesky);
 }
 
 void DeformableBody::Impl::initialise(const Material& material) {

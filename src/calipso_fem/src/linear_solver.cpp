@@ -11,6 +11,7 @@ namespace {
 // Node counts up to which the choice was measured best; see the report.
 constexpr int kStaleCholeskyNodes = 1200;
 constexpr int kHardCholeskyNodes = 20000;         // where multigrid would need many iterations
+constexpr int kSolidFactorNodes = 1500, kSheetFactorNodes = 8000;   // the same once multigrid has proved slow
 constexpr double kMultigridContrast = 1e3;         // largest over smallest Young's modulus
 constexpr double kMultigridPoisson = 0.495;
 
@@ -37,6 +38,15 @@ bool suitsMultigrid(const std::vector<Material>& materials) {
     poisson = std::max(poisson, m.poissons_ratio);
   }
   return largest <= kMultigridContrast * least && poisson <= kMultigridPoisson;
+}
+
+bool hasSmallFactor(const VolumeMesh& mesh) {
+  std::vector<int> cells(mesh.nodeCount(), 0);
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c)
+    for (Eigen::Index k = 0; k < mesh.cells.cols(); ++k) ++cells[mesh.cells(c, k)];
+  // Of a sheet no node lies inside; its factor grows far more slowly.
+  const bool sheet = std::none_of(cells.begin(), cells.end(), [](int n) { return n >= 8; });
+  return mesh.nodeCount() <= (sheet ? kSheetFactorNodes : kSolidFactorNodes);
 }
 
 SolverKind chooseSolverKind(const VolumeMesh& mesh, const std::vector<Material>& materials) {

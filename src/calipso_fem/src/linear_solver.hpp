@@ -24,6 +24,8 @@ SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditio
 // Whether coarse grids see what matters: not where stiff and soft cells lie side by side, nor where the material
 // hardly changes its volume.
 bool suitsMultigrid(const std::vector<Material>& materials);
+// Whether a Cholesky factor costs no more than some twenty iterations of multigrid.
+bool hasSmallFactor(const VolumeMesh& mesh);
 // What automatic means where every solver works on an assembled matrix.
 SolverKind chooseSolverKind(const VolumeMesh& mesh, const std::vector<Material>& materials);
 

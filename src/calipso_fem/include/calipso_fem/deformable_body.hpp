@@ -117,6 +117,8 @@ class DeformableBody {
   // beginStep(), then trialDirection() and moveTrial() until trialResidual() is small, endStep().
   // contact_forces: 3n, N; they act in addition to the loads and may differ from call to call.
   void beginStep(double h);                // h > 0, s; the trial starts at the present positions
+  // Before the first direction: the trial goes on as the last two steps did, if that lowers the potential.
+  void predictTrial();
   const Vec& trialPositions() const;       // 3n, m
   // Newton direction d of the incremental potential with the forces held: A d = forces - gradient.
   Vec trialDirection(const Vec& contact_forces);

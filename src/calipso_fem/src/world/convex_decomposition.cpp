@@ -79,18 +79,21 @@ Triangles clip(const Triangles& triangles, int axis, double at, double sign) {
   return kept;
 }
 
-// Hull of the clipped surface and of those box corners that lie inside the solid; empty when flat.
-TriangleMesh hullOf(const Triangles& triangles, const Box& box, const Solid& solid) {
-  Points points;
-  for (const auto& t : triangles) points.insert(points.end(), t.begin(), t.end());
+// Adds those of the box's corners that lie inside the solid.
+void addCorners(const Box& box, const Solid& solid, Points& points) {
   for (int c = 0; c < 8; ++c) {
     const Eigen::Vector3d corner = box.corner(static_cast<Box::CornerType>(c));
     if (solid.contains(corner)) points.push_back(corner);
   }
+}
+
+// Empty when flat.
+TriangleMesh hullOf(const Points& points) {
+  if (points.size() < 4) return {};
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> rows(points.size(), 3);
   for (size_t i = 0; i < points.size(); ++i) rows.row(static_cast<Eigen::Index>(i)) = points[i];
   try {
-    return points.size() < 4 ? TriangleMesh{} : convexHull(rows);
+    return convexHull(rows);
   } catch (const std::invalid_argument&) {
     return {};  // a sliver without volume
   }
@@ -112,27 +115,81 @@ Box half(const Box& box, int axis, double at, double sign) {
   return b;
 }
 
+// The surface's points sorted between parallel planes.
+struct Slabs {
+  std::vector<Points> between;  // one more than planes
+  std::vector<Points> on;       // where the surface crosses a plane
+};
+
+Slabs sortInto(const Triangles& triangles, int axis, const std::vector<double>& planes) {
+  Slabs slabs{std::vector<Points>(planes.size() + 1), std::vector<Points>(planes.size())};
+  const auto slabOf = [&](const Eigen::Vector3d& p) {
+    return std::lower_bound(planes.begin(), planes.end(), p[axis]) - planes.begin();
+  };
+  for (const auto& t : triangles)
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d &a = t[k], &b = t[(k + 1) % 3];
+      const auto from = slabOf(a), to = slabOf(b);
+      slabs.between[from].push_back(a);
+      if (static_cast<size_t>(from) < planes.size() && a[axis] == planes[from]) slabs.on[from].push_back(a);
+      for (auto i = std::min(from, to); i < std::max(from, to); ++i)
+        slabs.on[i].push_back(a + (planes[i] - a[axis]) / (b[axis] - a[axis]) * (b - a));
+    }
+  return slabs;
+}
+
+// Volumes of the hulls of what lies on one side of each plane. From plane to plane a hull's corners stand for all that it
+// holds. @param sign 1: below the planes; -1: above
+std::vector<double> sweep(const Slabs& slabs, const std::vector<double>& planes, const Box& box, int axis, double sign, const Solid& solid) {
+  const int count = static_cast<int>(planes.size());
+  std::vector<double> volumes(count);
+  Points held;
+  for (int step = 0; step < count; ++step) {
+    const int i = sign > 0.0 ? step : count - 1 - step;
+    const Points &more = slabs.between[sign > 0.0 ? i : i + 1], &rim = slabs.on[i];
+    held.insert(held.end(), more.begin(), more.end());
+    held.insert(held.end(), rim.begin(), rim.end());
+    addCorners(half(box, axis, planes[i], sign), solid, held);
+    const TriangleMesh hull = hullOf(held);
+    volumes[i] = hullVolume(hull);
+    if (hull.triangleCount() == 0) continue;
+    held.clear();
+    for (int k = 0; k < hull.vertexCount(); ++k) held.push_back(hull.vertex(k));
+  }
+  return volumes;
+}
+
 Cut bestCut(const Part& part, const Solid& solid, int cuts_per_axis) {
-  Cut best;
   Box extent;
   for (const auto& t : part.triangles)
     for (const auto& p : t) extent.extend(p);
-  for (int axis = 0; axis < 3; ++axis)
+  std::vector<double> planes[3], volumes[6];
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int k = 0; k < 6; ++k) {
+    const int axis = k / 2;
+    std::vector<double> at;
     for (int i = 1; i <= cuts_per_axis; ++i) {
       const double s = i / (cuts_per_axis + 1.0);
-      const double at = (1.0 - s) * extent.min()[axis] + s * extent.max()[axis];
-      double volume = 0.0;
-      for (const double sign : {1.0, -1.0})
-        volume += hullVolume(
-            hullOf(clip(part.triangles, axis, at, sign), half(part.box, axis, at, sign), solid));
-      if (volume < best.volume) best = {axis, at, volume};
+      at.push_back((1.0 - s) * extent.min()[axis] + s * extent.max()[axis]);
+    }
+    volumes[k] = sweep(sortInto(part.triangles, axis, at), at, part.box, axis, k % 2 == 0 ? 1.0 : -1.0, solid);
+    if (k % 2 == 0) planes[axis] = at;
+  }
+  Cut best;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int i = 0; i < cuts_per_axis; ++i) {
+      const double volume = volumes[2 * axis][i] + volumes[2 * axis + 1][i];
+      if (volume < best.volume) best = {axis, planes[axis][i], volume};
     }
   return best;
 }
 
 Part makePart(Triangles triangles, const Box& box, const Solid& solid) {
   Part part{box, std::move(triangles), {}, 0.0};
-  part.hull = hullOf(part.triangles, box, solid);
+  Points points;
+  for (const auto& t : part.triangles) points.insert(points.end(), t.begin(), t.end());
+  addCorners(box, solid, points);
+  part.hull = hullOf(points);
   part.concavity = std::max(0.0, hullVolume(part.hull) - solid.volumeIn(box));
   return part;
 }

@@ -221,9 +221,11 @@ int SoftContacts::direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid,
                          StepMotion& motion, Contacts& contacts) const {
   motion.touch(contacts);
   std::vector<int> moving;
-  for (size_t i = 0; i < softs.size(); ++i)
+  for (size_t i = 0; i < softs.size(); ++i) {
+    if (first && !motion.bodies()[i].touched) softs[i].soft->body().predictTrial();
     if (motion.bodies()[i].touched || first || unbalanced(motion, i, params_.residual))
       moving.push_back(static_cast<int>(i));
+  }
   motion.aim(moving);
   if (contacts.empty()) return 0;
   problem.update(contacts, motion, softs, rigid);
