@@ -38,10 +38,10 @@ struct LowOrderFit {
   LowOrderStep last;   // with the prior that it ended with
 };
 
-LowOrderFit fitLowOrderStages(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-                              const AlignOptions& options, StageClock& clock) {
+LowOrderFit fitLowOrderStages(const FitProblem& problem, const AlignOptions& options,
+                              StageClock& clock) {
   LowOrderFit result{LowOrderMap(problem.X), {}};
-  placeRoughly(problem, contour, result.map);
+  placeRoughly(problem, result.map);
   clock.stop("placement");
   double deformation = 0.0;
   for (LowOrderStep step : lowOrderSteps(problem, options)) {
@@ -186,7 +186,7 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
                                                   problem.model_size, unseen);
   result.expected_error = error.mean;
   result.expected_rms = error.rms;
-  const FitQuality quality = assess(problem, contour, x);
+  const FitQuality quality = assess(problem, x);
   result.placed = true;
   result.met_mean_px = quality.met_mean_px;
   result.contour_mean_px = quality.mean_px;
@@ -218,7 +218,7 @@ AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
 
   const std::vector<ElasticStep> steps = elasticSteps(problem, options);
   Grids grids = layGrids(cad, steps);
-  const LowOrderFit low = fitLowOrderStages(problem, contour, options, clock);
+  const LowOrderFit low = fitLowOrderStages(problem, options, clock);
   const Eigen::Isometry3d camera_from_object =
       camera.world_from_camera.inverse() * initial_world_from_object;
   const Placement placed = [&](const Points& points) {

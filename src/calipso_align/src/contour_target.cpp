@@ -175,4 +175,12 @@ cv::Mat1b fillContour(const std::vector<ContourLoop>& loops, const cv::Size& siz
   return mask;
 }
 
+cv::Mat1b fillTarget(const ContourTarget& target, const std::vector<ContourLoop>& loops,
+                     const cv::Size& size) {
+  if (target.noise_px <= kSmoothableNoisePx) return fillContour(loops, size);
+  std::vector<ContourLoop> smooth(loops.size());
+  for (const TargetPoint& p : target.points) smooth[p.loop].points.push_back(p.pixel);
+  return fillContour(smooth, size);
+}
+
 }  // namespace calipso::align

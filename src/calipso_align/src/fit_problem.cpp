@@ -115,7 +115,7 @@ int narrowestRadius(const cv::Mat1b& silhouette) {
 
 // Spurs of the contour that are narrower than anything the model has are no part of it: what hides the
 // object or lies behind it was taken in.
-void markSpurs(const std::vector<ContourLoop>& contour, FitProblem& problem) {
+void markSpurs(FitProblem& problem) {
   constexpr double kInsidePx = 0.75;
   const Camera& camera = problem.camera;
   const cv::Mat1b silhouette =
@@ -123,8 +123,8 @@ void markSpurs(const std::vector<ContourLoop>& contour, FitProblem& problem) {
   const int radius = narrowestRadius(silhouette);
   if (radius == 0 || cv::countNonZero(silhouette) == 0) return;
   // A margin that continues the mask: the border of the picture makes nothing narrow.
-  cv::Mat1b inside = fillContour(contour, {camera.width, camera.height});
-  cv::copyMakeBorder(inside, inside, radius, radius, radius, radius, cv::BORDER_REPLICATE);
+  cv::Mat1b inside;
+  cv::copyMakeBorder(problem.inside, inside, radius, radius, radius, radius, cv::BORDER_REPLICATE);
   const cv::Mat1b spurs = inside & ~opened(inside, radius);
   for (TargetPoint& p : problem.target.points) {
     const Eigen::Vector2d within = p.pixel - kInsidePx * p.normal;
@@ -188,18 +188,19 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
                      camera,
                      targetOf(contour),
                      {},
+                     {},
                      makeSupportTargets(options.planes, camera),
                      0.0,
                      boundingDiagonal(cad)};
   problem.extent_px = extentOf(problem.target);
   problem.origin = camera_from_object.translation();
-  markSpurs(contour, problem);
+  problem.inside = fillTarget(problem.target, contour, {camera.width, camera.height});
+  markSpurs(problem);
   if (options.depth) {
     checkDepth(options.depth->depth, camera);
     markHidden(options.depth->depth, problem.target);
     markContacts(options.depth->depth, camera, problem.supports, problem.target);
-    problem.depth =
-        makeDepthTarget(options.depth->depth, fillContour(contour, {camera.width, camera.height}));
+    problem.depth = makeDepthTarget(options.depth->depth, problem.inside);
   }
   for (SupportTarget& support : problem.supports) {
     support.stands = problem.depth.empty() && standsOn(support, problem);

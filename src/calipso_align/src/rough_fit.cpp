@@ -95,14 +95,11 @@ RoughCheck checkPlacement(const FitProblem& problem) {
   return {};
 }
 
-void placeRoughly(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-                  LowOrderMap& map) {
+void placeRoughly(const FitProblem& problem, LowOrderMap& map) {
   constexpr int kRounds = 3;
-  const Camera& camera = problem.camera;
   const bool comparable =
       problem.target.known_length_px >= kLeastKnown * problem.target.length_px;
-  const Moments goal =
-      comparable ? momentsOf(fillContour(contour, {camera.width, camera.height})) : Moments{};
+  const Moments goal = comparable ? momentsOf(problem.inside) : Moments{};
   for (int round = 0; round < kRounds; ++round) {
     matchDepth(problem, map);
     if (goal.area > 0.0) matchMoments(problem, goal, map);

@@ -59,10 +59,10 @@ size_t nearestTarget(const ContourTarget& target, const Eigen::Vector2d& pixel) 
 
 // Area of the model outside of the contour by more than the tolerance, as part of the contour's area.
 // Beyond unknown parts of the contour it may well be there.
-double protrudingPart(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-                      const DepthRendering& rendering, double tolerance_px) {
+double protrudingPart(const FitProblem& problem, const DepthRendering& rendering,
+                      double tolerance_px) {
   constexpr int kStridePx = 2;
-  const cv::Mat1b inside = fillContour(contour, {problem.camera.width, problem.camera.height});
+  const cv::Mat1b& inside = problem.inside;
   cv::Mat1f distance;
   cv::distanceTransform(inside == 0, distance, cv::DIST_L2, cv::DIST_MASK_3);
   double outside = 0.0;
@@ -87,9 +87,8 @@ cv::Mat1b filledSilhouette(const FitProblem& problem, const DepthRendering& rend
 }
 
 // Area of the contour that the model leaves open by more than the tolerance, as part of its area.
-double openPart(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-                const DepthRendering& rendering, double tolerance_px) {
-  const cv::Mat1b inside = fillContour(contour, {problem.camera.width, problem.camera.height});
+double openPart(const FitProblem& problem, const DepthRendering& rendering, double tolerance_px) {
+  const cv::Mat1b& inside = problem.inside;
   cv::Mat1f distance;
   cv::distanceTransform(filledSilhouette(problem, rendering) == 0, distance, cv::DIST_L2,
                         cv::DIST_MASK_3);
@@ -99,8 +98,7 @@ double openPart(const FitProblem& problem, const std::vector<ContourLoop>& conto
 
 }  // namespace
 
-FitQuality assess(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-                  const Points& x) {
+FitQuality assess(const FitProblem& problem, const Points& x) {
   constexpr double kFineStepPx = 0.5;
   const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
   FitQuality quality;
@@ -123,8 +121,8 @@ FitQuality assess(const FitProblem& problem, const std::vector<ContourLoop>& con
   }
   quality.met_mean_px /= std::max(1, met);
   quality.met = static_cast<double>(met) / known;
-  quality.open = openPart(problem, contour, rendering, quality.tolerance_px);
-  quality.protruding = protrudingPart(problem, contour, rendering, quality.tolerance_px);
+  quality.open = openPart(problem, rendering, quality.tolerance_px);
+  quality.protruding = protrudingPart(problem, rendering, quality.tolerance_px);
   quality.mean_px = std::accumulate(sizes.begin(), sizes.end(), 0.0) / sizes.size();
   const auto p95 = sizes.begin() + static_cast<long>(0.95 * (sizes.size() - 1));
   std::nth_element(sizes.begin(), p95, sizes.end());

@@ -31,4 +31,9 @@ ContourTarget makeContourTarget(const std::vector<ContourLoop>& loops, double sp
 // 255 inside the outer loops and outside of the holes.
 cv::Mat1b fillContour(const std::vector<ContourLoop>& loops, const cv::Size& size);
 
+// The same without the contour's noise, which would fray the mask: where it had to be smoothed away, of
+// the target's points.
+cv::Mat1b fillTarget(const ContourTarget& target, const std::vector<ContourLoop>& loops,
+                     const cv::Size& size);
+
 }  // namespace calipso::align

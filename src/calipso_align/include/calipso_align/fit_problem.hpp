@@ -15,6 +15,7 @@ struct FitProblem {
   MeshTopology topology;
   Camera camera;
   ContourTarget target;
+  cv::Mat1b inside;         // 255 within the contour, whole picture
   DepthTarget depth;        // empty: none
   std::vector<SupportTarget> supports;
   double extent_px = 0.0;   // diagonal of the contour's bounding box

@@ -17,7 +17,6 @@ RoughCheck checkPlacement(const FitProblem& problem);
 // Shifts and scales the model so that the centroid and the area of its silhouette are those of the
 // contour, at the depth that the depth image has for it. Areas are left alone where much of the
 // contour is unknown: then they cannot be compared.
-void placeRoughly(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-                  LowOrderMap& map);
+void placeRoughly(const FitProblem& problem, LowOrderMap& map);
 
 }  // namespace calipso::align

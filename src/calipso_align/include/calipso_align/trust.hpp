@@ -16,8 +16,7 @@ struct FitQuality {
   double protruding = 0.0;         // area of the model outside of the contour, part of the contour's
 };
 
-FitQuality assess(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-                  const Points& x);
+FitQuality assess(const FitProblem& problem, const Points& x);
 
 struct Verdict {
   bool trusted = false;
