@@ -116,7 +116,9 @@ struct Posterior {
 };
 
 Posterior posterior(const FitProblem& problem, const Points& x, const LowOrderStep& last) {
-  const LowOrderPrior& prior = last.fit.prior;
+  // What is promised has to hold for placements that are as far off as they may be, too.
+  LowOrderPrior prior = last.fit.prior;
+  prior.depth *= std::sqrt(3.0);
   const MeasureSettings settings =
       settingsAt(last, problem, last.fit.iterations - 1, prior.deformation);
   const LowOrderMap here(x);

@@ -32,8 +32,10 @@ Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3
   return a + ab * (vb / sum) + ac * (vc / sum);
 }
 
-// Distance of every point of `from` to the surface.
-std::vector<double> distances(const Points& from, const Points& x, const Triangles& triangles) {
+}  // namespace
+
+std::vector<double> distancesToSurface(const Points& from, const Points& x,
+                                       const Triangles& triangles) {
   // Bounding spheres reject most triangles without a closer look.
   const int faces = static_cast<int>(triangles.rows());
   Points centre(faces, 3);
@@ -61,6 +63,8 @@ std::vector<double> distances(const Points& from, const Points& x, const Triangl
   }
   return result;
 }
+
+namespace {
 
 // Distance of p to the polygon's nearest segment.
 double distanceToLoops(const Eigen::Vector2d& p, const std::vector<ContourLoop>& loops, bool& known) {
@@ -155,7 +159,8 @@ ContourError hullError(const std::vector<ContourLoop>& contour, const Points& x,
 
 SurfaceError surfaceError(const Points& a, const Points& b, const Triangles& triangles_a,
                           const Triangles& triangles_b) {
-  const std::vector<double> ab = distances(a, b, triangles_b), ba = distances(b, a, triangles_a);
+  const std::vector<double> ab = distancesToSurface(a, b, triangles_b),
+                            ba = distancesToSurface(b, a, triangles_a);
   SurfaceError error;
   for (const std::vector<double>* side : {&ab, &ba}) {
     for (const double d : *side) {

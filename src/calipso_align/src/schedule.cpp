@@ -10,9 +10,10 @@ constexpr double kElasticWeight = 3e3;  // of the finished fit: see FemStageOpti
 
 constexpr double kTypicalDeformation = 0.15;   // a (LowOrderPrior) before anything is known
 
-// A rough placement is up to a twentieth of the distance off, in any direction.
+// A rough placement is up to a twentieth of the distance off, in any direction: of a length between
+// none and that, and of its part along the sight line, the mean square is a third each.
 double placementDepthSigma(const FitProblem& problem) {
-  return 0.05 / std::sqrt(3.0) * problem.X.col(2).mean() / LowOrderMap(problem.X).size();
+  return 0.05 / 3.0 * problem.X.col(2).mean() / LowOrderMap(problem.X).size();
 }
 
 // The model's size in the picture is made right before anything else; the distance is held meanwhile.

@@ -11,7 +11,9 @@ struct ShapeUncertainty {
   double rms = 0.0;
 };
 
-// A vertex whose position has covariance S is off its surface by N(0, n' S n) along the normal n.
+// Draws the parameters from their covariance, always the same ones, and measures how far points of the
+// surfaces that they make are from the surface at x: a thin body that is off along its normal is still
+// near its other side.
 // covariance  of the parameters of `here`, which is the identity at x (camera frame)
 // unseen      deviation along the sight line of what the parameters cannot follow, model sizes
 ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
