@@ -158,7 +158,7 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
 }
 
 // Where the place moves by itself: it spreads over time, or the key frame shows something else than the median does.
-// Its gaps belong to it. Empty if there is little of it: passing things.
+// Empty if there is little of it: passing things.
 cv::Mat movingPlaces(const ClipFrame& key, const Background& background) {
   const auto beyondNoise = [&](const cv::Mat& change) {
     cv::Mat smooth;
@@ -176,11 +176,16 @@ cv::Mat movingPlaces(const ClipFrame& key, const Background& background) {
       difference.at<float>(v, u) = std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
     }
   }
-  cv::Mat moving = spreads | beyondNoise(difference);
-  const cv::Mat gap = cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kMovingGap + 1, 2 * kMovingGap + 1});
-  cv::copyMakeBorder(moving, moving, kMovingGap, kMovingGap, kMovingGap, kMovingGap, cv::BORDER_REPLICATE);
-  cv::morphologyEx(moving, moving, cv::MORPH_CLOSE, gap);
-  return moving(cv::Rect(kMovingGap, kMovingGap, now.cols, now.rows)).clone();
+  return spreads | beyondNoise(difference);
+}
+
+// With the gaps between: there the key frame, and no median, belongs to what is around.
+cv::Mat closedGaps(const cv::Mat& moving) {
+  const int gap = kMovingGap;
+  cv::Mat closed;
+  cv::copyMakeBorder(moving, closed, gap, gap, gap, gap, cv::BORDER_REPLICATE);
+  cv::morphologyEx(closed, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * gap + 1, 2 * gap + 1}));
+  return closed(cv::Rect(gap, gap, moving.cols, moving.rows)).clone();
 }
 
 void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& background) {
@@ -191,7 +196,7 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& b
   if (any_moving) {
     cv::Mat now;
     key.bgr.convertTo(now, CV_32F);
-    now.copyTo(look, moving & (background.invented == 0) & (key.labels == 0));
+    now.copyTo(look, closedGaps(moving) & (background.invented == 0) & (key.labels == 0));
   }
   const InpaintResult filled = inpaint(look, background.invented, cv::Mat());
   filled.image.copyTo(background.plate, background.invented);

@@ -231,11 +231,7 @@ cv::Mat restingTraces(const Prepared& p, const cv::Mat& shadow, const cv::Mat& s
   for (const cv::Mat& f : p.footprints) {
     if (!f.empty()) traces |= grown(f, params.background.mask_margin_px);
   }
-  // What lies in a narrow gap of an object is darkened by it from both sides.
-  const int gap = params.background.gap_px;
-  cv::copyMakeBorder(traces, traces, gap, gap, gap, gap, cv::BORDER_REPLICATE);
-  cv::morphologyEx(traces, traces, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * gap + 1, 2 * gap + 1}));
-  return traces(cv::Rect(gap, gap, shadow.cols, shadow.rows)).clone();
+  return traces;
 }
 
 std::vector<Occluder> occluders(const std::vector<Actor>& actors) {

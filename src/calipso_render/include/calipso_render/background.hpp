@@ -21,7 +21,6 @@ struct Background {
 struct BackgroundParams {
   int mask_margin_px = 3;      // masks are grown by this: mixed pixels and compression belong to the object
   int shadow_margin_px = 7;    // predicted shadows are grown by this: penumbra, errors of light and model
-  int gap_px = 5;              // gaps of resting objects narrower than twice this are part of them
   double shadow_step = 0.06;   // a pixel darker by more than this fraction may be shaded by an object
 };
 
