@@ -6,6 +6,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
+#include "calipso_render/stage.hpp"
 
 namespace calipso::render {
 namespace {
@@ -188,7 +189,7 @@ cv::Mat closedGaps(const cv::Mat& moving) {
   return closed(cv::Rect(gap, gap, moving.cols, moving.rows)).clone();
 }
 
-void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& background) {
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
   const cv::Mat moving = movingPlaces(key, background);
   const bool any_moving = cv::countNonZero(moving) > 0;
@@ -198,7 +199,9 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& b
     key.bgr.convertTo(now, CV_32F);
     now.copyTo(look, closedGaps(moving) & (background.invented == 0) & (key.labels == 0));
   }
-  const InpaintResult filled = inpaint(look, background.invented, cv::Mat());
+  InpaintParams params;
+  params.nearness = nearness;
+  const InpaintResult filled = inpaint(look, background.invented, cv::Mat(), params);
   filled.image.copyTo(background.plate, background.invented);
   background.origin = filled.origin;
   if (!any_moving) return;
@@ -210,6 +213,23 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& b
     }
   }
   background.live = LiveFill(live_origin, background.invented);
+}
+
+cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& scenery) {
+  cv::Mat nearness = cv::Mat::zeros(camera.height, camera.width, CV_32F);
+  const Eigen::Isometry3d from_world = camera.world_from_camera.inverse();
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) {
+      const auto receiver = receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
+      if (!receiver) continue;
+      float& near = nearness.at<float>(v, u);
+      near = static_cast<float>(1.0 / (from_world * receiver->position.cast<double>()).z());
+      const float seen = scenery.empty() ? 0.0f : scenery.at<float>(v, u);
+      if (seen > 0.0f) near = std::min(near, seen);
+    }
+  }
+  return cv::countNonZero(nearness) > 0 ? nearness : cv::Mat();
 }
 
 cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness) {

@@ -19,6 +19,12 @@ cv::Rect windowAround(const cv::Mat& hole) {
   return grown & cv::Rect(0, 0, hole.cols, hole.rows);
 }
 
+InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
+  InpaintParams inner = params;
+  if (!params.nearness.empty()) inner.nearness = params.nearness(window).clone();
+  return inner;
+}
+
 cv::Mat smoothFill(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& known) {
   cv::Mat weight(hole.size(), CV_32F, cv::Scalar(0.0f)), filled = image.clone();
   weight.setTo(1.0f, known);
@@ -45,6 +51,7 @@ cv::Mat copyFrom(const cv::Mat& origin, const cv::Mat& image, cv::Mat& filled) {
 InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& banned,
                       const InpaintParams& params) {
   CV_Assert(image.type() == CV_32FC3 && hole.type() == CV_8UC1 && image.size() == hole.size());
+  CV_Assert(params.nearness.empty() || (params.nearness.type() == CV_32FC1 && params.nearness.size() == hole.size()));
   InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)), true};
   if (cv::countNonZero(hole) == 0) return result;
   const cv::Rect window = windowAround(hole);
@@ -55,7 +62,7 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   to_fill.setTo(0, bridges.drawn);
   const cv::Mat known = source | bridges.drawn;
   source.setTo(0, bridges.lines);
-  cv::Mat filled = smoothFill(look, to_fill, known), origin = patchOrigins(look, to_fill, source, params);
+  cv::Mat filled = smoothFill(look, to_fill, known), origin = patchOrigins(look, to_fill, source, within(window, params));
   const cv::Mat copied = copyFrom(origin, look, filled);
   result.patches_found = cv::countNonZero(copied) > 0;
   if (result.patches_found) blendSeams(to_fill, known, origin, filled);

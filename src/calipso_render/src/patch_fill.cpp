@@ -18,6 +18,9 @@ constexpr int kBandRows = 16;          // rows that one thread searches in order
 constexpr int kFirstGuesses = 200;     // places tried for a patch of the rim
 constexpr int kFarthest = 16, kFinest = 2;  // px around the best place in which levels, and the finest, look further
 constexpr int kSweeps = 2;             // of a search
+constexpr float kNearer = 2.5f;        // times that a source may be nearer or farther,
+constexpr float kHorizon = 6.0f;       // or px of height by which it may miss that
+constexpr float kMisplaced = 2000.0f;  // cost of one that does not, squared code values: such are taken for want of others only
 
 // Mean gradient around every pixel, of what is known.
 cv::Mat liveliness(const cv::Mat& image, const cv::Mat& known) {
@@ -40,13 +43,14 @@ cv::Mat liveliness(const cv::Mat& image, const cv::Mat& known) {
 struct Level {
   cv::Mat image;         // CV_32FC4: colour, and how lively it is around
   cv::Mat hole, source;  // CV_8UC1
+  cv::Mat nearness;      // CV_32FC1; may be empty
 };
 
 // Half the size: the mean of what is known. A pixel is source if all of its four were; hole if any was, unless half of it is
 // known and no source: lines drawn through the hole are to be seen at every level.
 Level halved(const Level& fine) {
   const cv::Size size((fine.hole.cols + 1) / 2, (fine.hole.rows + 1) / 2);
-  Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_8U), cv::Mat(size, CV_8U, cv::Scalar(255))};
+  Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_8U), cv::Mat(size, CV_8U, cv::Scalar(255)), {}};
   cv::Mat weight = cv::Mat::zeros(size, CV_32F), drawn = cv::Mat::zeros(size, CV_8U);
   for (int v = 0; v < fine.hole.rows; ++v) {
     for (int u = 0; u < fine.hole.cols; ++u) {
@@ -60,10 +64,25 @@ Level halved(const Level& fine) {
     }
   }
   half.hole.setTo(0, drawn >= 2);
+  if (!fine.nearness.empty()) cv::resize(fine.nearness, half.nearness, size, 0, 0, cv::INTER_NEAREST);
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) half.image.at<cv::Vec4f>(v, u) /= weight.at<float>(v, u);
   }
   return half;
+}
+
+// How much nearer the ground is a row farther down, in the median.
+float nearnessPerRow(const cv::Mat& nearness) {
+  std::vector<float> steps;
+  for (int v = 0; v + 1 < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; u += 8) {
+      const float here = nearness.at<float>(v, u), below = nearness.at<float>(v + 1, u);
+      if (here > 0.0f && below > 0.0f) steps.push_back(std::abs(below - here));
+    }
+  }
+  if (steps.empty()) return 0.0f;
+  std::nth_element(steps.begin(), steps.begin() + steps.size() / 2, steps.end());
+  return steps[steps.size() / 2];
 }
 
 cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
@@ -72,8 +91,9 @@ cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_c
 // One level's hole: the nearest source patch of every patch that touches it, and the picture that they make.
 class Filling {
  public:
-  Filling(const Level& level, float scale, const InpaintParams& params)
-      : image_(level.image.clone()), hole_(level.hole), scale_(scale), params_(params), to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
+  // @param horizon difference of nearness that does not count
+  Filling(const Level& level, float scale, float horizon, const InpaintParams& params)
+      : image_(level.image.clone()), hole_(level.hole), nearness_(level.nearness), scale_(scale), horizon_(horizon), params_(params), to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
         cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)), bands_((hole_.rows + kBandRows - 1) / kBandRows) {
     const cv::Mat patch = cv::Mat::ones(kSide, kSide, CV_8U);
     cv::Mat touched;
@@ -246,7 +266,12 @@ class Filling {
 
   // Places are layered: what is at another height is seldom the same.
   float awayCost(const cv::Point& p, const cv::Point& q) const {
-    return kSide * kSide * scale_ * (params_.away_row * std::abs(p.y - q.y) + params_.away_column * std::abs(p.x - q.x));
+    float cost = scale_ * (params_.away_row * std::abs(p.y - q.y) + params_.away_column * std::abs(p.x - q.x));
+    if (!nearness_.empty()) {
+      const float own = nearness_.at<float>(p), other = nearness_.at<float>(q);
+      if (other > kNearer * own + horizon_ || own > kNearer * other + horizon_) cost += kMisplaced;
+    }
+    return kSide * kSide * cost;
   }
 
   float distance(const cv::Point& p, const cv::Point& q, float bound) const {
@@ -285,8 +310,8 @@ class Filling {
     return h;
   }
 
-  cv::Mat image_, hole_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
-  float scale_;                   // size of these pixels in the finest level's
+  cv::Mat image_, hole_, nearness_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
+  float scale_, horizon_;         // size of these pixels in the finest level's
   InpaintParams params_;
   cv::Mat to_, cost_;             // CV_16SC2, CV_32FC1, of the patch around every pixel
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
@@ -299,15 +324,16 @@ class Filling {
 cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source, const InpaintParams& params) {
   std::vector<Level> levels(1);
   cv::merge(std::vector<cv::Mat>{image, kLively * liveliness(image, hole == 0)}, levels[0].image);
-  levels[0].hole = hole, levels[0].source = source;
+  levels[0].hole = hole, levels[0].source = source, levels[0].nearness = params.nearness;
+  const float horizon = params.nearness.empty() ? 0.0f : kHorizon * nearnessPerRow(params.nearness);
   while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side) levels.push_back(halved(levels.back()));
   const int coarsest = static_cast<int>(levels.size()) - 1;
-  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), params);
+  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, params);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   filling.peel();
   for (int i = 0; i < params.coarsest_rounds; ++i) filling.search(std::max(hole.cols, hole.rows) >> coarsest), filling.vote();
   for (int k = coarsest - 1; k >= 0; --k) {
-    Filling finer(levels[k], static_cast<float>(1 << k), params);
+    Filling finer(levels[k], static_cast<float>(1 << k), horizon, params);
     finer.startFrom(filling);
     for (int i = 0; i < params.rounds && k > 0; ++i) finer.search(kFarthest), finer.vote();
     if (k == 0) finer.search(kFinest);

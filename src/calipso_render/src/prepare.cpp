@@ -255,7 +255,7 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const Background& s
     }
     shaded = restingTraces(p, believed, sky_visibility, params);
   }
-  inventBackground(shaded, frames.front(), p.background);
+  inventBackground(shaded, frames.front(), groundNearness(params.planes, frames.front().camera, p.scenery), p.background);
   p.plate_linear = linearOf(p.background.plate);
   p.umbra = any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
                       : measureUmbra(picture, p.background.plate, visibility, sky_visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));

@@ -84,7 +84,7 @@ TEST(InventBackground, FillsOnlyTheHole) {
   Background b = seenBackground(wanderingSquare(1), false);
   const cv::Mat before = b.plate.clone(), hole = b.invented.clone();
   ASSERT_GT(cv::countNonZero(hole), 0);
-  inventBackground(cv::Mat(), wanderingSquare(1).front(), b);
+  inventBackground(cv::Mat(), wanderingSquare(1).front(), cv::Mat(), b);
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       if (hole.at<std::uint8_t>(v, u) == 0) {
@@ -171,6 +171,22 @@ TEST(ClipSample, RefusesAnotherSize) {
   sample.add({cv::Mat(4, 4, CV_8UC3), cv::Mat(4, 4, CV_8U), Camera()});
   EXPECT_THROW(sample.add({cv::Mat(4, 5, CV_8UC3), cv::Mat(4, 5, CV_8U), Camera()}), std::invalid_argument);
   EXPECT_THROW(sample.add({cv::Mat(4, 4, CV_8UC3), cv::Mat(3, 4, CV_8U), Camera()}), std::invalid_argument);
+}
+
+TEST(GroundNearness, IsThePlanesBelowTheHorizonAndWhatLiesBeyond) {
+  // 2 m above the ground, looking level: a pixel that looks down by (v - cy) / fy sees it at 2 fy / (v - cy).
+  Camera camera;
+  camera.width = 40, camera.height = 30, camera.fx = camera.fy = 50.0, camera.cx = 19.5, camera.cy = 10.0;
+  camera.world_from_camera.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  camera.world_from_camera.translation() = Eigen::Vector3d(0, 0, 2);
+  cv::Mat scenery = cv::Mat::zeros(30, 40, CV_32F);
+  scenery.at<float>(20, 5) = 0.02f, scenery.at<float>(20, 6) = 0.5f;
+  const cv::Mat nearness = groundNearness({SupportPlane()}, camera, scenery);
+  EXPECT_EQ(nearness.at<float>(4, 8), 0.0f);
+  EXPECT_NEAR(nearness.at<float>(20, 8), 0.1f, 1e-6f);
+  EXPECT_NEAR(nearness.at<float>(20, 5), 0.02f, 1e-6f);  // the plane has ended before
+  EXPECT_NEAR(nearness.at<float>(20, 6), 0.1f, 1e-6f);   // something stands on it
+  EXPECT_TRUE(groundNearness({}, camera, scenery).empty());
 }
 
 }  // namespace

@@ -149,6 +149,19 @@ TEST(PatchOrigins, StayInTheirLayer) {
   }
 }
 
+TEST(PatchOrigins, ComeFromWhereTheGroundIsAboutAsNear) {
+  const cv::Mat image = 0.2 * grain(240, 120) + cv::Scalar::all(100.0);
+  cv::Mat hole = cv::Mat::zeros(120, 240, CV_8U);
+  hole(cv::Rect(80, 40, 30, 30)).setTo(255);
+  InpaintParams params;
+  params.nearness = cv::Mat(120, 240, CV_32F, cv::Scalar(1.0f));
+  params.nearness(cv::Rect(128, 0, 112, 120)).setTo(0.2f);  // five times as far
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, params);
+  for (int v = 40; v < 70; ++v) {
+    for (int u = 80; u < 110; ++u) EXPECT_LT(origin.at<cv::Vec2s>(v, u)[0], 131) << u << ", " << v;  // the patch's middle, by its radius
+  }
+}
+
 TEST(PatchOrigins, DoNotDependOnTheNumberOfThreads) {
   const cv::Mat image = grain(200, 150);
   cv::Mat hole = cv::Mat::zeros(150, 200, CV_8U), first;

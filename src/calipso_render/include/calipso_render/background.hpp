@@ -5,6 +5,7 @@
 
 #include "calipso_render/clip_sample.hpp"
 #include "calipso_render/live_fill.hpp"
+#include "calipso_scene/scene.hpp"
 
 namespace calipso::render {
 
@@ -34,7 +35,13 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
 // Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects cover or
 // darken in every frame), from the surroundings. Where the place moves by itself, the median is no picture of
 // it: there the key frame is what the surroundings look like.
-void inventBackground(const cv::Mat& shaded, const ClipFrame& key, Background& background);
+// @param nearness of the ground, as groundNearness(); may be empty
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, Background& background);
+
+// CV_32FC1, 1/m along the optical axis, of the support plane that a pixel sees, or of what is seen of the scenery beyond it;
+// 0 where no plane is. Empty if none is seen at all.
+// @param scenery CV_32FC1, 1/m, 0: unknown; may be empty
+cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& scenery);
 
 // The key frame with its noise averaged away where the sample shows the same thing all the time
 // (same label, value within the noise); elsewhere the key frame itself. CV_32FC3, code values.

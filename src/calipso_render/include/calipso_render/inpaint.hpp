@@ -11,6 +11,8 @@ struct InpaintParams {
   int rounds = 4;             // at the finer ones
   float away_row = 4.0f, away_column = 0.2f;  // what a px of way to the source counts, squared code values: places are layered
   std::uint32_t seed = 1;
+  cv::Mat nearness;           // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the horizon. What is
+                              // copied comes from where the ground is about as near: there things have the same size.
 };
 
 struct InpaintResult {
