@@ -3,6 +3,7 @@
 #include <cmath>
 #include <map>
 #include <tuple>
+#include <utility>
 
 namespace calipso::fem::test {
 namespace {
@@ -69,6 +70,32 @@ TriangleMesh sphereSurface(double radius, int rings, int segments) {
     for (int i = 1; i + 1 < rings; ++i) {
       triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
       triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+  }
+  return meshOf(vertices, triangles);
+}
+
+TriangleMesh beaker() {
+  const double outer = 0.04, inner = 0.034, height = 0.09, floor = 0.006;
+  const int n = 24;
+  const std::vector<std::pair<double, double>> profile = {  // r, z from the bottom's centre round
+      {0.0, 0.0}, {outer, 0.0}, {outer, height}, {inner, height}, {inner, floor}, {0.0, floor}};
+  const int rings = static_cast<int>(profile.size()) - 2;
+  std::vector<Eigen::Vector3d> vertices = {{0, 0, -0.5 * height}, {0, 0, floor - 0.5 * height}};
+  std::vector<Eigen::Vector3i> triangles;
+  const auto at = [&](int ring, int j) { return 2 + ring * n + j % n; };
+  for (int r = 0; r < rings; ++r)
+    for (int j = 0; j < n; ++j) {
+      const auto& [radius, z] = profile[r + 1];
+      const double phi = 2 * M_PI * j / n;
+      vertices.push_back({radius * std::cos(phi), radius * std::sin(phi), z - 0.5 * height});
+    }
+  for (int j = 0; j < n; ++j) {
+    triangles.push_back({0, at(0, j + 1), at(0, j)});
+    triangles.push_back({1, at(rings - 1, j), at(rings - 1, j + 1)});
+    for (int r = 0; r + 1 < rings; ++r) {
+      triangles.push_back({at(r, j), at(r, j + 1), at(r + 1, j + 1)});
+      triangles.push_back({at(r, j), at(r + 1, j + 1), at(r + 1, j)});
     }
   }
   return meshOf(vertices, triangles);

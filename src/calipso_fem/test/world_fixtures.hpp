@@ -13,6 +13,9 @@ TriangleMesh boxSurface(const Eigen::Vector3d& size, int n);
 // A sphere by latitude and longitude.
 TriangleMesh sphereSurface(double radius, int rings, int segments);
 
+// A cup without its handle: open above, 9 cm high, 8 cm wide, centred at its middle.
+TriangleMesh beaker();
+
 // Bent rod of the size of a banana, lying in the xy plane, ends up to `size` apart.
 TriangleMesh bentRod(double size, double thickness);
 

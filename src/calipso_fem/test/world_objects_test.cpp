@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 
+#include "calipso_fem/world/rigid_world.hpp"
 #include "world_fixtures.hpp"
 
 // Objects and pairs changed while the world runs.
@@ -132,6 +134,128 @@ TEST(WorldObjects, FirstTouchIsToldWithItsTimeAndSpeed) {
   const double fall = std::sqrt(2.0 * 0.5 / kG);
   EXPECT_NEAR(events[0].time, fall, 2e-3);  // the margin of a collision shape takes 0.1 mm
   EXPECT_NEAR(events[0].approach_speed, kG * fall, 0.02 * kG * fall);
+}
+
+// Several closed parts as one mesh; where they overlap it is not a manifold's surface.
+TriangleMesh joined(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& boxes) {
+  TriangleMesh all;
+  for (const auto& [size, at] : boxes) {
+    TriangleMesh box = boxSurface(size, 1);
+    box.vertices.rowwise() += at.transpose();
+    const int v = all.vertexCount(), f = all.triangleCount();
+    all.vertices.conservativeResize(v + box.vertexCount(), 3);
+    all.vertices.bottomRows(box.vertexCount()) = box.vertices;
+    all.triangles.conservativeResize(f + box.triangleCount(), 3);
+    all.triangles.bottomRows(box.triangleCount()) = box.triangles.array() + v;
+  }
+  return all;
+}
+
+// Afloat before: with twice the gravity it falls with 1 g.
+Edit letGo(const std::string& object) {
+  Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);
+  edit.object = object;
+  edit.factor = 2.0;
+  return edit;
+}
+
+TEST(WorldObjects, ACupHoldsABall) {
+  WorldScene scene = sceneWith(beaker(), {0, 0, 0.045});
+  WorldObject ball = scene.objects.front();
+  ball.name = "ball";
+  ball.index = 2;
+  ball.mesh = sphereSurface(0.015, 8, 12);
+  ball.world_from_object.translation() = Eigen::Vector3d(0.012, 0, 0.2);
+  scene.objects.push_back(ball);
+  World world(scene, {});
+  world.submit(editOf(EditKind::kVelocity));  // the cup stands and may move
+  world.submit(letGo("ball"));
+  world.advanceTo(0.0);
+  play(world, 3.0);
+  const Eigen::Isometry3d cup = world.state().objects[0].world_from_object;
+  const Eigen::Vector3d at = cup.inverse() * centerOf(world.state(), 1);
+  EXPECT_LT(at.head<2>().norm(), 0.034 - 0.015 + 1e-3);
+  EXPECT_GT(at.z(), -0.045 + 0.006 + 0.015 - 1e-3);  // on its floor, not in it
+  EXPECT_LT(at.z(), 0.0);
+  EXPECT_GT(cup.linear()(2, 2), 0.99);
+}
+
+TEST(WorldObjects, ACupHangsByItsHandleOnAPeg) {
+  const TriangleMesh mug = joined({{{0.08, 0.08, 0.1}, {0, 0, 0}},
+                                   {{0.05, 0.012, 0.012}, {0.06, 0, 0.035}},
+                                   {{0.05, 0.012, 0.012}, {0.06, 0, -0.035}},
+                                   {{0.012, 0.012, 0.082}, {0.079, 0, 0}}});
+  WorldScene scene = sceneWith(mug, {0, 0, 1.0}, false);
+  TriangleMesh peg = boxSurface({0.01, 0.3, 0.01}, 1);
+  peg.vertices.rowwise() += Eigen::RowVector3d(0.0565, 0, 1.015);
+  scene.support_meshes.push_back({"peg", peg});
+  World world(scene, {});
+  world.submit(letGo("thing"));
+  world.advanceTo(0.0);
+  play(world, 4.0);
+  // It hangs from the peg, its body beside or below it; without the peg it would be 78 m lower.
+  const Eigen::Vector3d from_peg = centerOf(world.state()) - Eigen::Vector3d(0.0565, 0, 1.015);
+  EXPECT_LT(from_peg.norm(), 0.12);
+  EXPECT_LT(from_peg.z(), 0.0);
+}
+
+TEST(WorldObjects, WhatIsNoManifoldOrInsideOutFallsAndRests) {
+  TriangleMesh fin = boxSurface({0.2, 0.2, 0.2}, 1);  // a third triangle on one edge
+  fin.vertices.conservativeResize(fin.vertexCount() + 1, 3);
+  fin.vertices.bottomRows(1) << 0.0, 0.0, 0.12;
+  fin.triangles.conservativeResize(fin.triangleCount() + 1, 3);
+  fin.triangles.bottomRows(1) << fin.triangles(0, 0), fin.triangles(0, 1), fin.vertexCount() - 1;
+  TriangleMesh inward = boxSurface({0.2, 0.2, 0.2}, 2);
+  inward.triangles.col(1).swap(inward.triangles.col(2));
+  for (const TriangleMesh& mesh : {fin, inward})
+    for (const ObjectKind kind : {ObjectKind::kRigid, ObjectKind::kDeformable}) {
+      WorldParams params;
+      params.defaults.kind = kind;
+      params.defaults.cell_size = 0.05;
+      World world(sceneWith(mesh, {0, 0, 0.15}), params);
+      world.submit(letGo("thing"));
+      world.advanceTo(0.0);
+      play(world, 1.5);
+      EXPECT_NEAR(world.state().objects[0].vertices.col(2).minCoeff(), 0.0, 2e-3);
+      EXPECT_NE(world.plan()[0].reason.find('('), std::string::npos) << world.plan()[0].reason;
+    }
+}
+
+TEST(WorldObjects, OverlapAtTheStartIsSaid) {
+  for (const ObjectKind kind : {ObjectKind::kRigid, ObjectKind::kDeformable}) {
+    WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, 0.1});
+    scene.objects.push_back(scene.objects.front());
+    scene.objects[1].name = "other";
+    scene.objects[1].index = 2;
+    scene.objects[1].world_from_object.translation() += Eigen::Vector3d(0.18, 0.01, 0.0);
+    WorldParams params;
+    params.defaults.kind = kind;
+    World world(scene, params);
+    world.submit(editOf(EditKind::kVelocity));
+    world.advanceTo(0.0);
+    const std::string reason = world.plan()[0].reason;
+    EXPECT_NE(reason.find("mm inside other"), std::string::npos) << reason;
+    EXPECT_EQ(reason.find("inside table"), std::string::npos) << reason;
+  }
+}
+
+TEST(WorldObjects, MassWithoutBoundsIsRefused) {
+  RigidWorld world;
+  RigidBodySpec spec;
+  spec.name = "anvil";
+  spec.shapes = {boxSurface({1, 1, 1}, 1)};
+  for (const double mass : {0.0, std::numeric_limits<double>::infinity()}) {
+    spec.mass.mass = mass;
+    try {
+      world.add(spec);
+      FAIL() << mass << " kg were accepted";
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find("anvil: mass"), std::string::npos);
+    }
+  }
+  WorldParams params;
+  params.defaults.density = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(World(sceneWith(boxSurface({1, 1, 1}, 1), {0, 0, 1}), params), std::invalid_argument);
 }
 
 }  // namespace

@@ -194,6 +194,24 @@ Part makePart(Triangles triangles, const Box& box, const Solid& solid) {
   return part;
 }
 
+// Splits the worst part until all are convex enough, or there are as many as may be.
+std::vector<Part> split(Part whole, const Solid& solid, double tolerance, int max_hulls, int cuts_per_axis) {
+  std::vector<Part> parts = {std::move(whole)};
+  while (static_cast<int>(parts.size()) < max_hulls) {
+    const auto worst =
+        std::max_element(parts.begin(), parts.end(),
+                         [](const Part& a, const Part& b) { return a.concavity < b.concavity; });
+    if (worst->concavity < tolerance) break;
+    const Part part = std::move(*worst);
+    parts.erase(worst);
+    const Cut cut = bestCut(part, solid, cuts_per_axis);
+    for (const double sign : {1.0, -1.0})
+      parts.push_back(makePart(clip(part.triangles, cut.axis, cut.at, sign),
+                               half(part.box, cut.axis, cut.at, sign), solid));
+  }
+  return parts;
+}
+
 }  // namespace
 
 std::vector<TriangleMesh> decomposeConvex(const TriangleMesh& mesh,
@@ -212,18 +230,19 @@ std::vector<TriangleMesh> decomposeConvex(const TriangleMesh& mesh,
   for (int f = 0; f < mesh.triangleCount(); ++f)
     all.push_back({mesh.vertex(mesh.triangles(f, 0)), mesh.vertex(mesh.triangles(f, 1)),
                    mesh.vertex(mesh.triangles(f, 2))});
-  std::vector<Part> parts = {makePart(std::move(all), box, solid)};
-  while (static_cast<int>(parts.size()) < params.max_hulls) {
-    const auto worst =
-        std::max_element(parts.begin(), parts.end(),
-                         [](const Part& a, const Part& b) { return a.concavity < b.concavity; });
-    if (worst->concavity < tolerance) break;
-    const Part part = std::move(*worst);
-    parts.erase(worst);
-    const Cut cut = bestCut(part, solid, params.cuts_per_axis);
-    for (const double sign : {1.0, -1.0})
-      parts.push_back(makePart(clip(part.triangles, cut.axis, cut.at, sign),
-                               half(part.box, cut.axis, cut.at, sign), solid));
+  // Each cut is the best for the next two parts, not for all to come: planes elsewhere may end far better.
+  constexpr int kTries = 3;
+  std::vector<Part> parts;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0, cuts = params.cuts_per_axis; i < kTries && least > 0.0; ++i, cuts += (cuts + 1) / 2) {
+    std::vector<Part> tried = split(makePart(all, box, solid), solid, tolerance, params.max_hulls, cuts);
+    const bool done = static_cast<int>(tried.size()) < params.max_hulls;
+    double volume = 0.0;
+    for (const Part& part : tried) volume += hullVolume(part.hull);
+    if (done) volume = 0.0;
+    if (volume >= least) continue;
+    least = volume;
+    parts = std::move(tried);
   }
   std::vector<TriangleMesh> hulls;
   for (const Part& part : parts)

@@ -21,7 +21,7 @@ void validate(const RigidBodySpec& spec) {
   if (spec.motion == RigidMotion::kDynamic &&
       !(spec.mass.mass > 0.0 && std::isfinite(spec.mass.mass)))
     throw std::invalid_argument(spec.name + ": mass = " + std::to_string(spec.mass.mass) +
-                                " kg; must be positive and finite");
+                                " kg; must be positive and finite (what nothing can move is static)");
   validate(spec.surface, spec.name);
 }
 

@@ -203,6 +203,24 @@ const std::vector<TriangleMesh>& World::Impl::hullsOf(Actor& actor) {
   return actor.hulls = decompositions.back().hulls;
 }
 
+// Says which others the object is in where it starts: contacts push these apart slowly.
+void World::Impl::noteOverlaps(Actor& actor, const TriangleMesh& surface) {
+  constexpr double kNoted = 2e-3;  // of its size: alignment leaves as much
+  const double size = boundingDiagonal(surface);
+  for (const Obstacle& obstacle : obstacles(now, now, &actor)) {
+    if (!obstacle.plane && !obstacleBounds(obstacle).intersects({surface.vertices.colwise().minCoeff().transpose(),
+                                                                 surface.vertices.colwise().maxCoeff().transpose()}))
+      continue;
+    double deepest = 0.0;
+    for (int v = 0; v < surface.vertexCount(); ++v)
+      if (const auto hit = queryObstacle(obstacle, surface.vertex(v), 0.0, size))
+        deepest = std::max(deepest, -hit->gap);
+    if (deepest > kNoted * size)
+      actor.note += "starts " + std::to_string(1e3 * deepest) + " mm inside " + obstacle.name +
+                    ", is pushed out slowly; ";
+  }
+}
+
 void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
   addColliders();
   RigidBodySpec spec;
@@ -215,7 +233,8 @@ void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
   spec.angular = motion.angular;
   spec.asleep =
       actor.holder == Holder::kSupport && motion.linear.isZero() && motion.angular.isZero();
-  actor.note = spec.mass.note;
+  actor.note = spec.mass.note.empty() ? "" : spec.mass.note + "; ";
+  noteOverlaps(actor, placed(actor.object.mesh, motion.world_from_object));
   actor.body = rigid.add(spec);
   rigid.setAcceleration(*actor.body, actor.acceleration());
   applyRules(actor);
@@ -254,6 +273,7 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   actor.soft_from_object = motion.world_from_object;
   DeformableBody& body = actor.soft->body();
   for (const std::string& message : body.grid().messages) actor.note += message + "; ";
+  noteOverlaps(actor, surface);
   const auto attached =
       verticesInBoxes(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
   if (!attached.empty() && actor.holder == Holder::kAttachment) {

@@ -37,6 +37,7 @@ struct World::Impl {
   void findHolder(Actor& actor);
   void become(Actor& actor, ObjectKind kind, const std::string& reason);
   void rebuild(Actor& actor);
+  void noteOverlaps(Actor& actor, const TriangleMesh& surface);
   void makeRigid(Actor& actor, const BodyMotion& motion);
   void makeSoft(Actor& actor, const BodyMotion& motion, bool settle);
   void deformAsObserved(Actor& actor);  // shape and velocity as in the video at this instant

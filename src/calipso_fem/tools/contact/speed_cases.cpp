@@ -7,6 +7,7 @@
 namespace calipso::fem {
 namespace {
 
+using test::beaker;
 using test::boxSurface;
 using test::editOf;
 using test::movedMesh;
@@ -106,37 +107,6 @@ WorldScene pyramidOf(const TriangleMesh& mesh, double pitch) {
       scene.objects.push_back(o);
     }
   return scene;
-}
-
-// A cup without its handle: an open beaker with a wall.
-TriangleMesh beaker() {
-  const double outer = 0.04, inner = 0.034, height = 0.09, floor = 0.006;
-  const int n = 24;
-  const std::vector<std::pair<double, double>> profile = {  // r, z from the bottom's centre round
-      {0.0, 0.0}, {outer, 0.0}, {outer, height}, {inner, height}, {inner, floor}, {0.0, floor}};
-  TriangleMesh mesh;
-  const int rings = static_cast<int>(profile.size()) - 2;
-  mesh.vertices.resize(2 + rings * n, 3);
-  std::vector<Eigen::Vector3i> triangles;
-  mesh.vertices.row(0) << 0, 0, -0.5 * height;
-  mesh.vertices.row(1) << 0, 0, floor - 0.5 * height;
-  const auto at = [&](int ring, int j) { return 2 + ring * n + j % n; };
-  for (int r = 0; r < rings; ++r)
-    for (int j = 0; j < n; ++j)
-      mesh.vertices.row(at(r, j)) << profile[r + 1].first * std::cos(2 * M_PI * j / n),
-          profile[r + 1].first * std::sin(2 * M_PI * j / n), profile[r + 1].second - 0.5 * height;
-  for (int j = 0; j < n; ++j) {
-    triangles.push_back({0, at(0, j + 1), at(0, j)});
-    triangles.push_back({1, at(rings - 1, j), at(rings - 1, j + 1)});
-    for (int r = 0; r + 1 < rings; ++r) {
-      triangles.push_back({at(r, j), at(r, j + 1), at(r + 1, j + 1)});
-      triangles.push_back({at(r, j), at(r + 1, j + 1), at(r + 1, j)});
-    }
-  }
-  mesh.triangles.resize(static_cast<Eigen::Index>(triangles.size()), 3);
-  for (size_t f = 0; f < triangles.size(); ++f)
-    mesh.triangles.row(static_cast<Eigen::Index>(f)) = triangles[f].transpose();
-  return mesh;
 }
 
 // Afloat before: with twice the gravity they fall with 1 g.
