@@ -27,6 +27,12 @@ double areaOf(const TriangleMesh& mesh) {
   return 0.5 * doubled;
 }
 
+Material softened(const TriangleMesh& surface, const Eigen::Vector3d& gravity, double stiffness) {
+  Material material = defaultMaterial(boundingDiagonal(surface), gravity.norm());
+  material.youngs_modulus *= stiffness;
+  return material;
+}
+
 fem::FemOptions optionsFor(int nodes) {
   fem::FemOptions options;
   options.target_nodes = nodes;
@@ -39,11 +45,13 @@ fem::FemOptions optionsFor(int nodes) {
 }  // namespace
 
 SheetSimulation::SheetSimulation(const ObjectModel& model, const Eigen::Vector3d& gravity, int nodes,
-                                 double longest_step)
+                                 double longest_step, double stiffness)
     : longest_step_(longest_step),
       surface_(inWorld(model)),
       closed_(fem::isClosed(surface_)),
-      sheet_(surface_, defaultMaterial(boundingDiagonal(surface_), gravity.norm()), optionsFor(nodes)) {
+      sheet_(surface_, softened(surface_, gravity, stiffness), optionsFor(nodes)) {
+  const Material material = softened(surface_, gravity, stiffness);
+  stiffness_over_density_ = material.youngs_modulus / material.density;
   areal_density_ = sheet_.body().totalMass() / ((closed_ ? 0.5 : 1.0) * areaOf(surface_));
   if (!model.attached.empty()) sheet_.body().fixSurfaceVertices(model.attached);
   sheet_.setGravity(gravity);

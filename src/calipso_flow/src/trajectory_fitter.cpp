@@ -273,8 +273,9 @@ std::vector<MotionState> TrajectoryFitter::statesWithHonestRest(
 }
 
 // Variance by which errors that persist from frame to frame exceed independent ones: for a lag-one
-// correlation r of the residuals, (1 + r) / (1 - r).
-double TrajectoryFitter::persistence(const std::vector<MotionState>& states) const {
+// correlation r of the residuals, (1 + r) / (1 - r). A fit of p numbers to n frames takes the slowest errors, those
+// that persist most, into itself: what it leaves is correlated by about (p / n) (1 + r) less (fitted_share: p / n).
+double TrajectoryFitter::persistence(const std::vector<MotionState>& states, double fitted_share) const {
   constexpr double kLargest = 0.9;
   double product = 0.0, square = 0.0;
   Vector6d previous = Vector6d::Zero();
@@ -292,7 +293,8 @@ double TrajectoryFitter::persistence(const std::vector<MotionState>& states) con
     if (continued) product += whitened.dot(previous);
     previous = whitened;
   }
-  const double correlation = square > 0.0 ? std::clamp(product / square, 0.0, kLargest) : 0.0;
+  if (square == 0.0) return 1.0;
+  const double correlation = std::clamp((product / square + fitted_share) / (1.0 - fitted_share), 0.0, kLargest);
   return (1.0 + correlation) / (1.0 - correlation);
 }
 
@@ -313,19 +315,23 @@ std::optional<Trajectory::Gravity> TrajectoryFitter::fittedGravity() const {
   });
   const Eigen::Vector3d direction = state->acceleration.normalized();
   const double variance = direction.dot(state->accelerationCovariance() * direction);
-  return Trajectory::Gravity{state->acceleration, std::sqrt(std::max(0.0, variance))};
+  return Trajectory::Gravity{state->acceleration, std::sqrt(std::max(0.0, variance)), most};
 }
 
 Trajectory TrajectoryFitter::result() {
   Trajectory trajectory;
   const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
   trajectory.states = statesWithHonestRest(motion);
-  const double factor = persistence(motion.states);
+  const double factor = persistence(motion.states, 0.0);
   for (MotionState& state : trajectory.states) state.covariance *= factor;
   trajectory.pieces = pieces_;
   trajectory.noise_scale = noise_scale_;
   trajectory.gravity = fittedGravity();
-  if (trajectory.gravity) trajectory.gravity->deviation *= std::sqrt(factor);
+  if (trajectory.gravity) {
+    const size_t frames = trajectory.gravity->frames;
+    const double share = std::min(0.5, 2.0 / static_cast<double>(frames));  // a parabola's; where it starts is given
+    trajectory.gravity->deviation *= std::sqrt(persistence(motion.states, share));
+  }
   for (const Jump& jump : motion.jumps) {
     if (jump.cut) continue;
     const double time = jump.after.time;

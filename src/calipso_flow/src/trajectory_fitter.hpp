@@ -49,7 +49,7 @@ class TrajectoryFitter {
 
   void settleStillPieces();
   std::vector<MotionState> statesWithHonestRest(const SmoothedMotion& motion) const;
-  double persistence(const std::vector<MotionState>& states) const;
+  double persistence(const std::vector<MotionState>& states, double fitted_share) const;
   std::optional<Trajectory::Gravity> fittedGravity() const;
   Trajectory result();
 

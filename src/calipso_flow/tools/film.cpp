@@ -19,7 +19,6 @@ using Vertices = decltype(TriangleMesh::vertices);
 constexpr double kFps = 30.0;
 constexpr int kOver = 2;            // samples per pixel and direction
 constexpr double kTextureStep = 0.045;  // m, wavelength scale of the texture
-constexpr int kTruthSheetNodes = 120;
 constexpr int kTruthBeamNodes = 3000;
 constexpr int kSubsteps = 16;       // per frame: backward Euler shall not damp the beam
 
@@ -142,20 +141,21 @@ ObjectDynamics analyseFilm(const ObjectModel& model, const Camera& camera, const
   return analyser.finish().front();
 }
 
-FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames) {
+FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetSettings& settings) {
   FilmedSheet sheet;
   sheet.model.name = "sheet";
   sheet.model.index = 1;
   sheet.model.mesh = dividedBox({-0.35, -0.002, -0.8}, {0.35, 0.002, 0.0}, {14, 1, 16});
   sheet.model.world_from_object.translation().z() = 1.8;
   for (int i = 0; i < sheet.model.mesh.vertexCount(); ++i) {
-    if (sheet.model.mesh.vertices(i, 2) > -0.02) sheet.model.attached.push_back(i);
+    const bool corner = std::abs(sheet.model.mesh.vertices(i, 0)) > 0.29;
+    if (sheet.model.mesh.vertices(i, 2) > -0.02 && (corner || !settings.pegged)) sheet.model.attached.push_back(i);
   }
   sheet.gravity = {0.0, 0.0, -9.81};
   sheet.camera = lookingAt({1.5, -1.6, 1.5}, {0.0, 0.05, 1.4}, 480, 360, 620.0);
   sheet.times = frameTimes(frames);
   sheet.wind = wind;
-  SheetSimulation simulation(sheet.model, sheet.gravity, kTruthSheetNodes, 1.0 / 30.0);
+  SheetSimulation simulation(sheet.model, sheet.gravity, settings.nodes, settings.step, settings.stiffness);
   const int count = sheet.model.mesh.vertexCount();
   const Vertices rest = sheet.model.mesh.vertices.rowwise() +
                         sheet.model.world_from_object.translation().transpose();

@@ -38,8 +38,15 @@ struct FilmedSheet {
   Eigen::Vector3d wind;        // m/s
 };
 
+struct SheetSettings {
+  int nodes = 500;           // of the simulation's grid
+  double step = 1.0 / 120.0;  // s
+  double stiffness = 1.0;    // times the modulus that the simulator starts with
+  bool pegged = false;       // held at its upper corners only
+};
+
 // A sheet that hangs at rest by its upper edge, simulated in a steady wind that sets in with the first frame.
-FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames);
+FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetSettings& settings = {});
 
 struct FilmedBeam {
   ObjectModel model;

@@ -24,8 +24,8 @@ double shapeError(const ObjectModel& model, const Shapes& shapes, const ObjectDy
   return 100.0 * std::sqrt(error / motion);
 }
 
-std::string windEntry(const std::string& name, const Eigen::Vector3d& wind) {
-  const FilmedSheet sheet = filmedSheet(wind, 45);
+std::string windEntry(const std::string& name, const Eigen::Vector3d& wind, const SheetSettings& settings = {}) {
+  const FilmedSheet sheet = filmedSheet(wind, 45, settings);
   const ObjectDynamics found =
       analyseFilm(sheet.model, sheet.camera, sheet.shapes, sheet.times, sheet.gravity);
   JsonEntry entry;
@@ -41,6 +41,9 @@ std::string windEntry(const std::string& name, const Eigen::Vector3d& wind) {
     const Eigen::Vector3d error = w.mean - wind;
     covered = error.dot(w.mean_covariance.ldlt().solve(error)) < 7.815;
     entry.numbers("wind_m_s", {w.mean.x(), w.mean.y(), w.mean.z()});
+    const Eigen::Vector3d deviation = w.mean_covariance.diagonal().cwiseSqrt();
+    entry.numbers("wind_deviation_m_s", {deviation.x(), deviation.y(), deviation.z()});
+    entry.number("sheet_stiffness_m2_s2", w.stiffness_over_density);
   }
   entry.number("shape_error_percent", shapeError(sheet.model, sheet.shapes, found));
   entry.numbers("wind_true_m_s", {wind.x(), wind.y(), wind.z()});
@@ -77,8 +80,17 @@ std::string beamEntry(const std::string& name, double ratio) {
 }  // namespace
 
 std::vector<std::string> evaluateFilmed() {
+  SheetSettings as_coarse, default_grid, soft, pegged;
+  as_coarse.nodes = 120, as_coarse.step = 1.0 / 30.0;
+  default_grid.nodes = 1200, default_grid.step = 1.0 / 60.0;
+  soft.stiffness = 0.3;
+  pegged.pegged = true;
   return {windEntry("filmed_wind_ahead", {0.0, 4.0, 0.0}), windEntry("filmed_wind_aslant", {1.2, 4.0, 0.0}),
-          windEntry("filmed_wind_back", {-0.8, -3.0, 0.0}), beamEntry("filmed_beam", 15e3),
+          windEntry("filmed_wind_back", {-0.8, -3.0, 0.0}),
+          windEntry("filmed_wind_coarse", {0.0, 4.0, 0.0}, as_coarse),
+          windEntry("filmed_wind_simulator", {0.0, 4.0, 0.0}, default_grid),
+          windEntry("filmed_wind_soft", {0.0, 2.0, 0.0}, soft),
+          windEntry("filmed_wind_pegged", {2.0, 4.0, 0.0}, pegged), beamEntry("filmed_beam", 15e3),
           beamEntry("filmed_beam_stiff", 40e3)};
 }
 

@@ -37,6 +37,7 @@ struct Trajectory {
   struct Gravity {
     Eigen::Vector3d acceleration;  // m/s^2
     double deviation;              // m/s^2, of its length
+    size_t frames = 0;             // of the fall that it was seen in
   };
   std::optional<Gravity> gravity;
 

@@ -82,6 +82,10 @@ void addDeformation(const DeformationMotion& deformation, calipso_msgs::ObjectCl
     for (size_t i = 0; i < wind.knots.size(); ++i) {
       msg.wind.push_back(windMsg(wind.knots[i], wind.wind[i], wind.covariance[i]));
     }
+    if (!deformation.stiffness) {
+      msg.stiffness_over_density = wind.stiffness_over_density;
+      msg.stiffness_over_density_deviation = wind.stiffness_over_density_deviation;
+    }
     const double middle = 0.5 * (wind.knots.front() + wind.knots.back());
     msg.mean_wind.push_back(windMsg(middle, wind.mean, wind.mean_covariance));
   }
