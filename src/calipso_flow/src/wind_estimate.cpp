@@ -361,14 +361,17 @@ Eigen::Matrix3d WindEstimate::covarianceAt(double time) const {
   return sum;
 }
 
-// A motion that no hanging sheet makes, such as a wave that something else drives, leads stiffness and wind together
-// astray: then the wind alone is fitted.
+// A motion that no hanging sheet makes, such as a wave that something else drives, may lead stiffness and wind together
+// astray: then the wind alone is fitted as well, and what shows more of the motion is taken.
 std::optional<WindEstimate> estimateWind(const ObjectModel& model, const std::vector<double>& times,
                                          const DeformationModes& modes, const Eigen::Vector3d& gravity,
                                          std::string& note, const WindParams& params) {
   if (modes.count() == 0 || times.size() < 3) return std::nullopt;
   const auto free = fitWind(model, times, modes, gravity, false, note, params);
-  return free ? free : fitWind(model, times, modes, gravity, true, note, params);
+  if (free && free->explained > kWellShown) return free;
+  const auto given = fitWind(model, times, modes, gravity, true, note, params);
+  if (free || given) note.clear();
+  return !given || (free && free->explained > given->explained) ? free : given;
 }
 
 }  // namespace calipso::flow
