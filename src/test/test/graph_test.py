@@ -9,7 +9,11 @@ import unittest
 
 import numpy
 import rosgraph
+import rospy
 import rostest
+from calipso_msgs.msg import ClipInfo, Edit, EditReport, NodeStatus, SimulationState, Wind
+from geometry_msgs.msg import Vector3
+from sensor_msgs.msg import CameraInfo
 
 import clips
 import launching
@@ -27,6 +31,7 @@ def picture(message):
 class Graph(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        rospy.init_node("graph_test")
         cls.folder = tempfile.TemporaryDirectory()
         cls.scene = clips.make_scene(cls.folder.name, FRAMES)
         cls.bag = clips.make_bag(cls.scene, cls.path("in.bag"))
@@ -134,6 +139,62 @@ class Graph(unittest.TestCase):
         after = picture(clips.messages(out, EDITED)[-1])
         blue = (after[..., 0] > 2 * after[..., 2]) & (numpy.abs(before - after).max(axis=2) > 30.0)
         self.assertGreater(blue.sum(), 500, "the crate's pixels")
+
+    def simulated(self, bag, clip_dynamics, edit):
+        """States and edit reports of a simulator alone that hears what `bag` has recorded, but for the clip's dynamics."""
+        heard = {"state": [], "edits/applied": [], "status": []}
+        types = {"state": SimulationState, "edits/applied": EditReport, "status": NodeStatus}
+        subscribers = [rospy.Subscriber("/alone/" + name, types[name], heard[name].append) for name in heard]
+        stamps = clips.stamps(bag, EDITED)
+        info = ClipInfo(frames=len(stamps), fps=30.0, last_stamp=stamps[-1])
+        info.header.stamp = stamps[0]
+        edit.header.stamp = stamps[0]
+        sent = [("clip/info", info), ("models", clips.messages(bag, "/calipso/models")[0]), ("edits", edit),
+                ("clip/dynamics", clip_dynamics)]
+        publishers = [rospy.Publisher("/alone/" + name, type(message), latch=True, queue_size=1) for name, message in sent]
+        for publisher, (_, message) in zip(publishers, sent):
+            publisher.publish(message)
+        clock = rospy.Publisher("/alone/camera_info", CameraInfo, queue_size=len(stamps))
+        node = subprocess.Popen(["rosrun", "calipso_fem", "simulator_node", "__ns:=alone", "_scene:=" + self.scene],
+                                env=launching.with_messages())
+        try:
+            self.wait_until(lambda: heard["status"] and heard["status"][-1].state == NodeStatus.READY
+                            and heard["status"][-1].edits == 1 and clock.get_num_connections() > 0)
+            for stamp in stamps:
+                frame = CameraInfo()
+                frame.header.stamp = stamp
+                clock.publish(frame)
+            self.wait_until(lambda: len(heard["state"]) == len(stamps) and heard["edits/applied"])
+        finally:
+            node.terminate()
+            node.wait()
+            for end in subscribers + publishers + [clock]:
+                end.unregister()
+        return heard["state"], heard["edits/applied"]
+
+    def wait_until(self, condition, timeout_sec=60):
+        end = time.monotonic() + timeout_sec
+        while not condition():
+            self.assertLess(time.monotonic(), end, "it did not happen in time")
+            time.sleep(0.02)
+
+    def test_the_wind_of_the_video_moves_what_is_simulated(self):
+        edit = {"t": 0, "object": "banana1", "kind": "wind", "mode": "estimated", "factor": 2}
+        calm = self.edit("calm.bag", [edit])
+        report = clips.messages(calm, "/calipso/edits/applied")[0]
+        self.assertFalse(report.accepted)
+        self.assertIn("mode absolute", report.message)
+        self.assertEqual(clips.pixels(calm, EDITED), clips.pixels(self.bag, clips.IMAGE_TOPIC), "refused, so unedited")
+
+        # The same recording, but as if a cloth beside the bananas had shown a wind.
+        clip = clips.messages(calm, "/calipso/clip/dynamics")[0]
+        wind = Wind(stamp=clip.header.stamp, velocity=Vector3(0.0, 30.0, 0.0), covariance=[1, 0, 0, 0, 1, 0, 0, 0, 1])
+        [o for o in clip.objects if o.object == "banana2"][0].wind = [wind]
+        message = Edit(object="banana1", kind="wind", mode="estimated", factor=2.0)
+        states, reports = self.simulated(calm, clip, message)
+        self.assertTrue(reports[0].accepted, reports[0].message)
+        way = [[o for o in state.objects if o.object == "banana1"][0].pose.position.y for state in states]
+        self.assertGreater(way[-1], way[0] + 0.001, "blown along y")
 
     def test_edits_over_the_topic_while_playing(self):
         # Latched on the test's own master: there before the simulator is, effective with the next frame.
