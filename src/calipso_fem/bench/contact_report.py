@@ -73,7 +73,7 @@ def plot_error_against_time(results, path):
                 ax.annotate(label, (ms, max(FLOOR_MM, depth)), textcoords="offset points", xytext=(5, 5), fontsize=7)
         ax.set(xlabel="CPU ms per frame of 1/30 s", title=f"{count} soft cube{'s' if count == 'two' else ''}")
     axes[0].set(ylabel="deepest penetration, mm")
-    axes[0].legend()
+    axes[0].legend(loc="center")
     figure.tight_layout()
     figure.savefig(path, dpi=110)
 

@@ -20,7 +20,10 @@ constexpr double kShortestHeldStep = 1.0 / 500.0;   // s, for surfaces that are 
 constexpr double kShortestFastStep = 1.0 / 1000.0;  // s, for objects too fast for their size
 // Iterations that a renewal of a tangent costs.
 constexpr double kRenewal = 8.0;
-constexpr int kMostRenewals = 3;  // of a body's tangent in a step
+
+// Renewals of a body's tangent in a step: few of large bodies, whose factors cost more against an iteration.
+int mostRenewals(const SoftObject& soft) { return std::clamp(8000 / soft.body().nodeCount(), 1, 8); }
+
 // Iterations after which a step may end further off balance, twice as far with each more, and so many times
 // further off the contacts' laws: crushed cells take many to the last digits.
 constexpr int kPatience = 6;
@@ -209,7 +212,7 @@ bool SoftContacts::renewStale(const Contacts& contacts, double wanted, StepMotio
   for (size_t i = 0; i < renewals.size(); ++i) {
     const StepMotion::Body& b = motion.bodies()[i];
     const bool behind = b.touched && unbalanced(motion, i, wanted) && b.residual >= kMuch * worst;
-    if (behind && renewals[i] < kMostRenewals && slow(b, wanted)) stale.push_back(static_cast<int>(i));
+    if (behind && renewals[i] < mostRenewals(*b.soft) && slow(b, wanted)) stale.push_back(static_cast<int>(i));
   }
   motion.renew(stale, contacts);
   for (const int soft : stale) ++renewals[soft];
