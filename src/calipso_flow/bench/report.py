@@ -106,7 +106,7 @@ CLOTH = [("case", "case"), ("object", "object"), ("frequency_error_percent", "fr
          ("lower_edge_correlation", "lower edge, correlation"), ("ms_frame", "ms/frame"),
          ("cpu_ms_frame", "CPU ms/frame")]
 REPEATED = [("repeats", "repeats"), ("velocity_covered_95", "velocity in its 95 %"),
-            ("spin_covered_95", "spin in its 95 %"), ("gravity_covered_95", "g in its 95 %"),
+            ("spin_covered_95", "spin in its 95 %"), ("gravity_found", "g told"), ("gravity_covered_95", "g in its 95 %"),
             ("velocity_rms_m_s", "velocity error, m/s")]
 FLOW = [("method", "method"), ("endpoint_error_px", "end-point error, px"), ("ms_frame", "CPU ms")]
 

@@ -76,6 +76,7 @@ std::vector<std::string> evaluateRepeats(int repeats) {
   entry.number("velocity_covered_95", velocity / double(repeats));
   entry.number("spin_covered_95", spin / double(repeats));
   entry.number("gravity_covered_95", gravity / std::max(1.0, double(found)));
+  entry.number("gravity_found", found / double(repeats));
   entry.number("velocity_rms_m_s", std::sqrt(square / repeats));
   return {entry.str()};
 }
