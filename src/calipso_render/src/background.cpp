@@ -16,6 +16,7 @@ constexpr float kLit = 0.75f;           // quantile of brightness that stands fo
 constexpr std::size_t kFewestLit = 3;   // samples that a lit or shaded group must have
 constexpr double kGroupGap = 4.0;       // gap between two groups, in spreads of either
 constexpr float kShadowTint = 1.8f;     // a shadow's largest ratio of shaded to lit in a channel over its smallest
+constexpr int kAgree = 7;               // px; a shadow that stays covers most of such a square or nothing of it
 constexpr float kMovingSpread = 2.2f;   // times what still places have, and
 constexpr float kLeastMoving = 2.0f;    // code values: from there on a place moves by itself
 constexpr int kMovingGap = 12;          // px between moving places that move with them
@@ -28,10 +29,6 @@ cv::Mat grown(const cv::Mat& mask, int radius) {
   cv::dilate(mask, out, cv::getStructuringElement(cv::MORPH_ELLIPSE, side));
   return out;
 }
-
-struct Series {
-  std::vector<cv::Vec3b> values;  // of one pixel, in time order
-};
 
 int brightness(const cv::Vec3b& c) { return c[0] + 2 * c[1] + c[2]; }
 
@@ -82,13 +79,22 @@ double litBrightness(double step, Samples values) {
   return apart && darkenedAlike(shaded, lit) ? brightness(lit) : usual;
 }
 
-// Leaves out the darker group if the values fall into two.
-void dropShaded(double step, Samples& values) {
+// Leaves out the darker group if the values fall into two, and tells whether they do.
+bool dropShaded(double step, Samples& values) {
+  const std::size_t before = values.size();
   const double lit = litBrightness(step, values);
   const double limit = lit - std::max(step * lit, 4.0 * kNearMedian);
   values.erase(std::remove_if(values.begin(), values.end(),
                               [&](const cv::Vec3b& c) { return brightness(c) < limit; }),
                values.end());
+  return 2 * values.size() < before;
+}
+
+// Leaves out the darker of the two groups that the values fall into best.
+void keepBrighter(Samples& values) {
+  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) { return brightness(a) < brightness(b); };
+  std::stable_sort(values.begin(), values.end(), darker);
+  values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(bestSplit(values)));
 }
 
 // Median per channel, then the mean of what lies around it; `spread`: the largest channel's MAD.
@@ -140,18 +146,34 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
   b.count = cv::Mat::zeros(size, CV_8U);
   b.spread = cv::Mat::zeros(size, CV_32F);
   b.origin = cv::Mat(size, CV_16SC2, cv::Scalar(-1, -1));
+  const auto samplesAt = [&](int u, int v) {
+    Samples values;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (covered[i].at<std::uint8_t>(v, u) == 0) values.push_back(frames[i].bgr.at<cv::Vec3b>(v, u));
+    }
+    return values;
+  };
+  cv::Mat long_shaded = cv::Mat::zeros(size, CV_8U), agreed;
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < size.height; ++v) {
-    Series series;
     for (int u = 0; u < size.width; ++u) {
-      series.values.clear();
-      for (std::size_t i = 0; i < frames.size(); ++i) {
-        if (covered[i].at<std::uint8_t>(v, u) == 0) series.values.push_back(frames[i].bgr.at<cv::Vec3b>(v, u));
-      }
-      if (series.values.empty()) continue;
-      b.count.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::min<std::size_t>(255, series.values.size()));
-      if (objects_move) dropShaded(params.shadow_step, series.values);
-      b.plate.at<cv::Vec3f>(v, u) = robustMean(series.values, b.spread.at<float>(v, u));
+      Samples values = samplesAt(u, v);
+      if (values.empty()) continue;
+      b.count.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::min<std::size_t>(255, values.size()));
+      if (objects_move && dropShaded(params.shadow_step, values)) long_shaded.at<std::uint8_t>(v, u) = 255;
+      b.plate.at<cv::Vec3f>(v, u) = robustMean(values, b.spread.at<float>(v, u));
+    }
+  }
+  // Of a shadow that stays, single pixels can have too little contrast to tell.
+  cv::medianBlur(long_shaded, agreed, kAgree);
+  agreed &= long_shaded == 0;
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      if (agreed.at<std::uint8_t>(v, u) == 0) continue;
+      Samples values = samplesAt(u, v);
+      if (values.size() < 2) continue;
+      keepBrighter(values);
+      b.plate.at<cv::Vec3f>(v, u) = robustMean(values, b.spread.at<float>(v, u));
     }
   }
   b.invented = b.count == 0;

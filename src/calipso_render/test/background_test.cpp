@@ -69,6 +69,17 @@ TEST(SeenBackground, LeavesOutAShadowThatComesToRest) {
   EXPECT_LE(cv::norm(plate(place), emptyTable()(place), cv::NORM_INF), 5.0);
 }
 
+TEST(SeenBackground, SinglePixelsOfSuchAShadowGoWithThoseAroundThem) {
+  std::vector<ClipFrame> clip = wanderingSquare(12);
+  const cv::Rect place(60, 80, 20, 20), few(68, 88, 2, 1);
+  for (int k = 3; k < 12; ++k) cv::multiply(clip[k].bgr(place), cv::Scalar(0.77, 0.73, 0.68), clip[k].bgr(place));
+  cv::multiply(clip[0].bgr(few), cv::Scalar(0.77, 0.73, 0.68), clip[0].bgr(few));  // lit in two frames only: too few to tell by themselves
+  const Background b = seenBackground(clip, true);
+  cv::Mat plate;
+  b.plate.convertTo(plate, CV_8U);
+  EXPECT_LE(cv::norm(plate(few), emptyTable()(few), cv::NORM_INF), 2.0);
+}
+
 TEST(SeenBackground, BrightStrangersInFewFramesAreNoLight) {
   // Brighter in one channel alone: no shadow's colours, so what most frames show is the place.
   std::vector<ClipFrame> clip = wanderingSquare(12);
