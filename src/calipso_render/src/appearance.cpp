@@ -21,6 +21,7 @@ constexpr float kDepthTolerance = 0.012f;    // of the object's extent: a point 
 constexpr float kFlattest = 0.05f, kFull = 0.25f;  // cosine of the view from which a surface is seen, and well seen
 constexpr float kEnough = 0.3f;   // weight of a look that needs no other
 constexpr float kSeen = 1e-5f;    // sum of weights, cubed, below which a texel counts as not seen
+constexpr float kKnown = 0.5f;  // certainty, of the greatest there is, of what others are continued from
 constexpr float kSure = 0.2f;   // ... of which nothing else is needed
 constexpr float kLit = 0.7f;    // of the mean light: what has less of it shows its reflectance with less certainty
 constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exact
@@ -154,13 +155,14 @@ class TextureFill {
     a.texture = SurfaceTexture(surface_.key_vertices, surface_.triangles, depth / static_cast<float>(camera.fx), kMostTexels);
     const std::vector<MirrorPlane> planes = mirrorPlanes(surface_.key_vertices, surface_.triangles);
     std::vector<char> from(a.texture.size(), kFilled);
+    std::vector<float> certain(a.texture.size(), 0.0f);
 #pragma omp parallel for schedule(static)
     for (int t = 0; t < a.texture.triangleCount(); ++t) {
       for (std::size_t i = a.texture.firstOf(t); i < a.texture.firstOf(t + 1); ++i) {
-        from[i] = look(t, a.texture.weightsOf(t, i - a.texture.firstOf(t)), planes, a.albedo, a.texture.texels[i]);
+        from[i] = look(t, a.texture.weightsOf(t, i - a.texture.firstOf(t)), planes, a.albedo, a.texture.texels[i], certain[i]);
       }
     }
-    fillUnseen(from, a.texture);
+    fillUnseen(certain, a.texture);
     const auto part = [&](char kind) { return static_cast<float>(std::count(from.begin(), from.end(), kind)) / std::max<std::size_t>(1, from.size()); };
     a.seen_in_key = part(kKey), a.seen_elsewhere = part(kElsewhere), a.mirrored = part(kMirrored);
   }
@@ -194,7 +196,8 @@ class TextureFill {
     return look;
   }
 
-  From look(int triangle, const Eigen::Vector3f& w, const std::vector<MirrorPlane>& planes, const cv::Mat& key_albedo, cv::Vec4f& texel) const {
+  // @param certain out: 1 = the texel is known, 0 = nothing of it
+  From look(int triangle, const Eigen::Vector3f& w, const std::vector<MirrorPlane>& planes, const cv::Mat& key_albedo, cv::Vec4f& texel, float& certain) const {
     const Eigen::Vector3i& t = surface_.triangles[triangle];
     const auto mix = [&](const Points& x) -> Eigen::Vector3f { return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]]; };
     cv::Vec3f sum;
@@ -208,6 +211,7 @@ class TextureFill {
       if (i == 0) key = l.weight;
     }
     const float by_key = std::clamp(key / kEnough, 0.0f, 1.0f);
+    certain = 1.0f;
     if (total > kSure) {
       texel = cv::Vec4f(sum[0] / total, sum[1] / total, sum[2] / total, by_key);
       return key > 0.0f ? kKey : kElsewhere;
@@ -222,38 +226,43 @@ class TextureFill {
       texel = cv::Vec4f(c[0], c[1], c[2], by_key);
       return total > kSeen ? kKey : kMirrored;
     }
+    certain = 0.0f;
     if (total <= kSeen) return kFilled;
+    // What is seen at the mask's rim alone has the background's colour in it.
+    certain = std::min(1.0f, std::cbrt(total) / kEnough);
+    certain *= certain;
     texel = cv::Vec4f(sum[0] / total, sum[1] / total, sum[2] / total, by_key);
     return key > 0.0f ? kKey : kElsewhere;
   }
 
-  // What no picture shows continues the surface around it.
-  void fillUnseen(const std::vector<char>& from, SurfaceTexture& texture) const {
+  // What no picture shows, or none for certain, continues the surface around it.
+  void fillUnseen(const std::vector<float>& certain, SurfaceTexture& texture) const {
     const Triangles& triangles = surface_.triangles;
     std::vector<cv::Vec3f> values(surface_.key_vertices.size());
-    std::vector<int> parts(values.size(), 0);
+    std::vector<float> parts(values.size(), 0.0f), best(values.size(), 0.0f);
     for (int t = 0; t < texture.triangleCount(); ++t) {
       for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
-        if (from[i] == kFilled) continue;
         Eigen::Index corner;
         const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
         w.maxCoeff(&corner);
-        const cv::Vec4f& c = texture.texels[i];
-        values[triangles[t][corner]] += cv::Vec3f(c[0], c[1], c[2]), ++parts[triangles[t][corner]];
+        const int vertex = triangles[t][corner];
+        values[vertex] += colourOf(texture.texels[i]) * certain[i], parts[vertex] += certain[i], best[vertex] = std::max(best[vertex], certain[i]);
       }
     }
+    const float most = *std::max_element(best.begin(), best.end());
     std::vector<bool> known(values.size(), false);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      if (parts[i] > 0) values[i] *= 1.0f / parts[i], known[i] = true;
+      if (parts[i] > 0.0f) values[i] *= 1.0f / parts[i], known[i] = best[i] >= kKnown * most;
     }
-    if (std::find(known.begin(), known.end(), true) == known.end()) std::fill(values.begin(), values.end(), kUnknown);
+    if (most == 0.0f) std::fill(values.begin(), values.end(), kUnknown);
     else diffuseOverMesh(surface_.key_vertices, triangles, known, values);
     for (int t = 0; t < texture.triangleCount(); ++t) {
       for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
-        if (from[i] != kFilled) continue;
+        if (certain[i] >= 1.0f) continue;
         const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
-        const cv::Vec3f c = values[triangles[t][0]] * w[0] + values[triangles[t][1]] * w[1] + values[triangles[t][2]] * w[2];
-        texture.texels[i] = cv::Vec4f(c[0], c[1], c[2], 0.0f);
+        const cv::Vec3f around = values[triangles[t][0]] * w[0] + values[triangles[t][1]] * w[1] + values[triangles[t][2]] * w[2];
+        const cv::Vec3f c = certain[i] * colourOf(texture.texels[i]) + (1.0f - certain[i]) * around;
+        texture.texels[i] = cv::Vec4f(c[0], c[1], c[2], certain[i] * texture.texels[i][3]);
       }
     }
   }
