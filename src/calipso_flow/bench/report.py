@@ -176,7 +176,7 @@ def plot_filmed(entries, picture):
     axis.set_ylim(-5, 5)
     axis.set_xlabel("along the sheet, m/s")
     axis.set_ylabel("across the sheet, m/s")
-    axis.legend(fontsize=7)
+    axis.legend(loc="lower right", fontsize=6)
     figure.tight_layout()
     figure.savefig(picture, dpi=90)
     plt.close(figure)
