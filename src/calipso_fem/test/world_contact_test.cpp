@@ -43,6 +43,25 @@ TEST(Contact, ForcesOfABlockAtRestCarryItsWeight) {
   EXPECT_LT(depth, 5e-4);  // a tenth of the minimal distance
 }
 
+// No force moves what is held, so it must not keep the step from being solved.
+TEST(Contact, WhatIsHeldInsideASupportIsLeftThere) {
+  SoftScene scene;
+  scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
+  SoftObject& block = scene.addSoft(cube(0.2, 3, {0, 0, 0.095}), kSoft, 0.2 / 3);
+  std::vector<int> feet;
+  for (int v = 0; v < block.vertices().rows(); ++v)
+    if (block.vertices()(v, 2) < 0.0) feet.push_back(v);
+  block.body().fixSurfaceVertices(feet);
+  block.forgetSystem();
+  for (int k = 0; k < 10; ++k) {
+    scene.step(1.0 / 30.0);
+    ASSERT_EQ(scene.report().bodies.size(), 1u);  // taken whole
+    EXPECT_TRUE(scene.report().converged);
+    EXPECT_LT(scene.report().newton_iterations, 10);
+  }
+  EXPECT_NEAR(block.vertices().col(2).minCoeff(), -0.005, 1e-9);
+}
+
 TEST(Contact, TwoFallingCubesStayOnThePlaneWithoutGainOfEnergy) {
   SoftScene scene;
   scene.surface.friction = 0.1;

@@ -170,6 +170,9 @@ void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
   const double friction = frictionOf(entry, obstacle), size = sizeOf(*entry.soft);
   const int soft_b = obstacle.soft ? indexOf(softs, obstacle.soft) : -1;
   const auto watchVertex = [&](Contact contact, bool reversed, int vertex) {
+    // Between what is held and what does not move no force would change anything.
+    const bool other_held = soft_b < 0 || softs[soft_b].soft->isHeld(contact.other);
+    if (!contact.rigid_b && other_held && entry.soft->isHeld(contact.point)) return;
     contact.reach = reach;
     contact.friction = friction;
     contact = completed(contact);

@@ -91,6 +91,16 @@ bool SoftObject::hasFixedNodes() const {
   return false;
 }
 
+bool SoftObject::isHeld(const SurfacePoint& point) const {
+  const auto& weights = body_.embedding().weights;
+  for (int k = 0; k < 3; ++k) {
+    if (point.weights[k] == 0.0) continue;
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(weights, point.vertices[k]); it; ++it)
+      if (!body_.isFixed(static_cast<int>(it.col()))) return false;
+  }
+  return true;
+}
+
 SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold,
                                 double tolerance) {
   constexpr int kMaxIterations = 8;

@@ -80,6 +80,7 @@ class SoftObject {
   // Rigid motion that best maps the observed shape to the present one (Kabsch, by nodal mass).
   Eigen::Isometry3d motion() const;
   bool hasFixedNodes() const;
+  bool isHeld(const SurfacePoint& point) const;   // by fixed nodes alone
   void changed();  // the state was set from outside
 
  private:
