@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
 
 #include "obstacle_query.hpp"
 #include "world_impl.hpp"
@@ -13,6 +12,8 @@ namespace {
 // Rest: slower than this share of the own size per second, for so many frames.
 constexpr double kRestSpeed = 1e-3;
 constexpr int kCalmFrames = 15;
+constexpr int kGoodParts = 3;        // of a step; after so many in a row they are tried twice as long
+constexpr double kSameInstant = 1e-9;  // s
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -113,15 +114,18 @@ void World::Impl::substep(double from, double span) {
   if (!softs.empty()) {
     const auto start = std::chrono::steady_clock::now();
     ContactReport report;
-    // A step that does not converge is taken in halves; forces are given anew for each.
-    const std::function<void(double, double)> stepSofts = [&](double at, double part) {
+    // A part that does not converge is taken in halves; forces are given anew for each.
+    for (double at = from; at < to - kSameInstant;) {
+      const double rest = to - at, part = soft_part < 0.75 * rest ? soft_part : rest;
+      if (at > from || part < span) applyLoads(at + part, speed_scale * part);
       report = contacts.step(softs, obstacles(at, at + part), rigid, speed_scale * part);
-      if (!report.bodies.empty()) return;
-      stepSofts(at, 0.5 * part);
-      applyLoads(at + part, speed_scale * 0.5 * part);
-      stepSofts(at + 0.5 * part, 0.5 * part);
-    };
-    stepSofts(from, span);
+      if (report.bodies.empty()) {
+        soft_part = 0.5 * part, good_parts = 0;
+        continue;
+      }
+      at += part;
+      if (++good_parts >= kGoodParts) soft_part *= 2.0, good_parts = 0;
+    }
     double nodes = 0.0;
     for (const SoftEntry& entry : softs) nodes += entry.soft->body().nodeCount();
     for (size_t i = 0; i < softs.size(); ++i) {
