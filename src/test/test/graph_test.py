@@ -155,8 +155,7 @@ class Graph(unittest.TestCase):
         for publisher, (_, message) in zip(publishers, sent):
             publisher.publish(message)
         clock = rospy.Publisher("/alone/camera_info", CameraInfo, queue_size=len(stamps))
-        node = subprocess.Popen(["rosrun", "calipso_fem", "simulator_node", "__ns:=alone", "_scene:=" + self.scene],
-                                env=launching.with_messages())
+        node = subprocess.Popen(["rosrun", "calipso_fem", "simulator_node", "__ns:=alone", "_scene:=" + self.scene])
         try:
             self.wait_until(lambda: heard["status"] and heard["status"][-1].state == NodeStatus.READY
                             and heard["status"][-1].edits == 1 and clock.get_num_connections() > 0)
@@ -199,7 +198,7 @@ class Graph(unittest.TestCase):
     def test_edits_over_the_topic_while_playing(self):
         # Latched on the test's own master: there before the simulator is, effective with the next frame.
         sender = subprocess.Popen(["rostopic", "pub", "--latch", "/calipso/edits", "calipso_msgs/Edit",
-                                   "{object: banana1, kind: remove}"], env=launching.with_messages())
+                                   "{object: banana1, kind: remove}"])
         self.wait_for_publisher("/calipso/edits")
         launch = launching.Launch("calipso_launch", "edit.launch", os.environ["ROS_MASTER_URI"],
                                   **self.arguments("topic.bag", None))

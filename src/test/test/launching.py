@@ -13,14 +13,6 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def with_messages():
-    """This environment with the workspace's Python modules: catkin's cached one of a fresh build lacks them."""
-    modules = [os.path.join(prefix, "lib/python3/dist-packages")
-               for prefix in os.environ["CMAKE_PREFIX_PATH"].split(":")]
-    known = os.environ.get("PYTHONPATH", "")
-    return dict(os.environ, PYTHONPATH=":".join(modules + ([known] if known else [])))
-
-
 class Launch:
     """A launch file under way, by default with a ROS master of its own.
 
