@@ -12,7 +12,7 @@ namespace {
 // Rest: slower than this share of the own size per second, for so many frames.
 constexpr double kRestSpeed = 1e-3;
 constexpr int kCalmFrames = 15;
-constexpr int kGoodParts = 3;        // of a step; after so many in a row they are tried twice as long
+constexpr int kGoodParts = 2;        // of a step; after so many in a row they are tried twice as long
 constexpr double kSameInstant = 1e-9;  // s
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
