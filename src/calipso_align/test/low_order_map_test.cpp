@@ -8,12 +8,6 @@
 namespace calipso::align {
 namespace {
 
-LowOrderMap::Parameters someParameters() {
-  LowOrderMap::Parameters p;
-  for (int i = 0; i < p.size(); ++i) p[i] = 0.1 * std::sin(1.7 * i + 0.4);
-  return p;
-}
-
 TEST(LowOrderMap, IsIdentityWithoutParameters) {
   const Points X = test::pear().vertices;
   EXPECT_TRUE(LowOrderMap(X).apply(X).isApprox(X, 1e-14));
@@ -33,7 +27,7 @@ TEST(LowOrderMap, ScalesAboutTheCentroid) {
 TEST(LowOrderMap, JacobianMatchesCentralDifferences) {
   const Points X = test::pear().vertices;
   LowOrderMap map(X);
-  map.setParameters(someParameters());
+  map.setParameters(test::someParameters());
   const Eigen::Vector3d point = X.row(37);
   const LowOrderMap::Jacobian J = map.jacobian(point);
   constexpr double kStep = 1e-6;  // truncation and rounding both stay below 1e-9
@@ -51,7 +45,7 @@ TEST(LowOrderMap, JacobianMatchesCentralDifferences) {
 TEST(LowOrderMap, GradientIsTheJacobianSeenFromOneDirection) {
   const Points X = test::pear().vertices;
   LowOrderMap map(X);
-  map.setParameters(someParameters());
+  map.setParameters(test::someParameters());
   const Eigen::Vector3d point = X.row(37), direction(0.3, -0.7, 0.5);
   EXPECT_TRUE(map.gradient(point, direction)
                   .isApprox(map.jacobian(point).transpose() * direction, 1e-13));
@@ -60,7 +54,7 @@ TEST(LowOrderMap, GradientIsTheJacobianSeenFromOneDirection) {
 TEST(LowOrderMap, ScaleCanBeCountedAsStrain) {
   const Points X = test::pear().vertices;
   LowOrderMap map(X);
-  map.setParameters(someParameters());
+  map.setParameters(test::someParameters());
   const Points before = map.apply(X);
   map.absorbScale();
   EXPECT_EQ(map.parameters()[LowOrderMap::kLogScale], 0.0);

@@ -7,12 +7,6 @@
 namespace calipso::align {
 namespace {
 
-LowOrderMap::Parameters someParameters() {
-  LowOrderMap::Parameters p;
-  for (int i = 0; i < p.size(); ++i) p[i] = 0.1 * std::sin(1.7 * i + 0.4);
-  return p;
-}
-
 TEST(BestRigid, RecoversAMotionUnderAStrain) {
   const Points X = test::pear().vertices;
   const Eigen::Isometry3d motion =
@@ -42,7 +36,7 @@ TEST(RigidPart, IsTheMapWithoutDeformation) {
 TEST(RigidPart, DerivativesMatchCentralDifferences) {
   const Points X = test::pear().vertices;
   LowOrderMap map(X);
-  LowOrderMap::Parameters p = someParameters();
+  LowOrderMap::Parameters p = test::someParameters();
   p.head<3>().setZero();   // the rotation vector's derivative is exact about no turn
   map.setParameters(p);
   const RigidPart part = rigidPart(X, map);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "calipso_align/contour.hpp"
+#include "calipso_align/low_order_map.hpp"
 #include "calipso_align/silhouette.hpp"
 
 // A shape without symmetry, a camera that looks at it, and its contour as a picture would show it.
@@ -36,6 +37,13 @@ inline TriangleMesh pear(int rings = 18, int segments = 24) {
   mesh.triangles.resize(static_cast<int>(faces.size()), 3);
   for (size_t f = 0; f < faces.size(); ++f) mesh.triangles.row(static_cast<int>(f)) = faces[f];
   return mesh;
+}
+
+// Of every kind of deformation a little.
+inline LowOrderMap::Parameters someParameters() {
+  LowOrderMap::Parameters p;
+  for (int i = 0; i < p.size(); ++i) p[i] = 0.1 * std::sin(1.7 * i + 0.4);
+  return p;
 }
 
 // 3 m in front of the origin, looking along world y; z up.
