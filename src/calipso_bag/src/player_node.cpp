@@ -13,6 +13,7 @@ calipso::bag::Player::Params loadParams(const ros::NodeHandle& pnh) {
   pnh.getParam("edits", params.edits);
   pnh.getParam("poses", params.poses);
   pnh.getParam("nodes", params.nodes);
+  pnh.getParam("estimate_wind", params.estimate_wind);
   pnh.getParam("in_flight", params.in_flight);
   pnh.getParam("connect_timeout_sec", params.connect_timeout_sec);
   pnh.getParam("prepare_timeout_sec", params.prepare_timeout_sec);

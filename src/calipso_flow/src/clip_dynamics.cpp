@@ -167,13 +167,13 @@ void ClipAnalyser::beginDeformable(Followed& object) const {
   }
 }
 
-std::vector<ObjectDynamics> ClipAnalyser::finish() const {
+std::vector<ObjectDynamics> ClipAnalyser::finish(bool with_wind) const {
   std::vector<ObjectDynamics> result(objects_.size());
-  forEachObject([&](size_t i) { result[i] = finishObject(objects_[i]); });
+  forEachObject([&](size_t i) { result[i] = finishObject(objects_[i], with_wind); });
   return result;
 }
 
-ObjectDynamics ClipAnalyser::finishObject(const Followed& object) const {
+ObjectDynamics ClipAnalyser::finishObject(const Followed& object, bool with_wind) const {
   const ObjectTracker& tracker = object.tracker;
   ObjectDynamics dynamics;
   dynamics.name = tracker.model().name;
@@ -181,7 +181,7 @@ ObjectDynamics ClipAnalyser::finishObject(const Followed& object) const {
   dynamics.observations = object.observations;
   if (object.deformable) {
     dynamics.deformation =
-        describeDeformation(*object.deformable, object.deformations, gravity_);
+        describeDeformation(*object.deformable, object.deformations, gravity_, with_wind);
     if (dynamics.deformation->modes.count() == 0) dynamics.deformation.reset();
   }
   auto measurements = measurementsOf(dynamics.observations, tracker.centroid());

@@ -67,7 +67,7 @@ Eigen::Vector3d leanOf(const ObjectModel& model, const Vertices& mean_shape,
 
 DeformationMotion describeDeformation(const DeformableTracker& tracker,
                                       const std::vector<DeformationObservation>& observations,
-                                      const Eigen::Vector3d& gravity) {
+                                      const Eigen::Vector3d& gravity, bool with_wind) {
   DeformationMotion motion;
   for (const DeformationObservation& o : observations) motion.times.push_back(o.time);
   motion.modes = modesOf(observations, tracker.vertexWeights());
@@ -87,7 +87,7 @@ DeformationMotion describeDeformation(const DeformableTracker& tracker,
     if (own) motion.stiffness = stiffnessRatio(tracker.model(), line, shape, motion.note);
   }
   const ObjectModel& model = tracker.model();
-  if (tracker.fitter().field().sheetNormal()) {
+  if (with_wind && tracker.fitter().field().sheetNormal()) {
     std::string note;
     motion.wind = estimateWind(model, motion.times, modes, gravity, note);
     if (!note.empty()) motion.note += (motion.note.empty() ? "" : "; ") + note;

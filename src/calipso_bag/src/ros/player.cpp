@@ -45,6 +45,12 @@ std::vector<PlayedFrame> scheduleOf(const BagClip& clip, const std::vector<calip
   return playSchedule(frames, scales);
 }
 
+bool needsWind(const std::vector<calipso_msgs::Edit>& edits) {
+  return std::any_of(edits.begin(), edits.end(), [](const calipso_msgs::Edit& edit) {
+    return edit.kind == calipso_msgs::Edit::WIND && edit.mode == calipso_msgs::Edit::ESTIMATED;
+  });
+}
+
 }  // namespace
 
 Preparation::Roles Player::rolesOf(const std::vector<std::string>& nodes) {
@@ -175,6 +181,7 @@ void Player::announceClip() {
   info.fps = clip_.fps();
   info.last_stamp = clip_.stamps().back();
   info.played_frames = static_cast<std::uint32_t>(schedule_.size());
+  info.wind_wanted = params_.estimate_wind || needsWind(edits_);
   clip_info_.publish(info);
 }
 

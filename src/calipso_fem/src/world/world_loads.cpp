@@ -132,7 +132,8 @@ const WindTrack& World::Impl::windFor(const Actor& actor) const {
     if (!surest || other.wind.variance() < surest->variance()) surest = &other.wind;
   }
   if (!surest)
-    throw std::invalid_argument("no cloth of the video shows a wind; give one by mode absolute and a vector");
+    throw std::invalid_argument("the wind of the video is not known: no cloth shows one, or it was not asked for when the "
+                                "clip was analysed (estimate_wind:=true); give one by mode absolute and a vector");
   return *surest;
 }
 

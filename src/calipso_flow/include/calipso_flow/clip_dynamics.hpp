@@ -49,7 +49,8 @@ class ClipAnalyser {
 
   int frameCount() const { return static_cast<int>(times_.size()); }
   const std::vector<double>& cutTimes() const { return cut_times_; }  // s, between two frames
-  std::vector<ObjectDynamics> finish() const;
+  // @param with_wind  also estimate the wind that moves cloth
+  std::vector<ObjectDynamics> finish(bool with_wind = true) const;
 
  private:
   // One object as it is followed.
@@ -64,7 +65,7 @@ class ClipAnalyser {
   void forEachObject(const std::function<void(size_t)>& work) const;
   void follow(const Frame& frame, bool cut, Followed& object) const;
   void beginDeformable(Followed& object) const;
-  ObjectDynamics finishObject(const Followed& object) const;
+  ObjectDynamics finishObject(const Followed& object, bool with_wind) const;
 
   DynamicsParams params_;
   Eigen::Vector3d gravity_;  // m/s^2, world

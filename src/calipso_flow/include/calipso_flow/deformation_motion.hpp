@@ -25,14 +25,15 @@ struct DeformationMotion {
   std::vector<SurfaceLine> lines;  // strongest first
   Eigen::Vector3d lean = Eigen::Vector3d::Zero();  // m, world: see leanOf
   std::optional<StiffnessRatio> stiffness;
-  std::optional<WindEstimate> wind;  // of a thin sheet
+  std::optional<WindEstimate> wind;  // of a thin sheet, when it was wanted
   std::string note;            // what was refused, for the user
 };
 
 // @param observations  one per frame, the key frame first
+// @param with_wind     also simulate a thin sheet in search of the wind: takes far longer than all the rest
 DeformationMotion describeDeformation(const DeformableTracker& tracker,
                                       const std::vector<DeformationObservation>& observations,
-                                      const Eigen::Vector3d& gravity);
+                                      const Eigen::Vector3d& gravity, bool with_wind);
 
 // Horizontal way from what holds an object (or its upper end) to its far end, in its mean shape.
 // @param mean_shape  #V x 3, object frame

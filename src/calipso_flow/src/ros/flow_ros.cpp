@@ -142,7 +142,7 @@ void FlowNode::finishWhenComplete() {
   if (finished_ || !clip_ || !clip_analyser_ || clip_frames_ < clip_->frames) return;
   finished_ = true;
   try {
-    std::vector<ObjectDynamics> objects = clip_analyser_->finish();
+    std::vector<ObjectDynamics> objects = clip_analyser_->finish(clip_->wind_wanted);
     const calipso_msgs::ClipDynamics msg = 
         clipDynamicsMsg(scene_, objects, clip_analyser_->cutTimes(), headers_);
     for (const auto& frame : msg.frames) dynamics_[frame.header.stamp] = frame;
