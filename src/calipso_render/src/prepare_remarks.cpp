@@ -70,8 +70,8 @@ void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std:
   const Appearance& a = p.appearances[i];
   const double unseen = 1.0 - a.seen_in_key - a.seen_elsewhere;
   if (unseen > kMuchUnseen) {
-    p.remarks.push_back(who + ": " + std::to_string(percent(unseen)) + " % of its surface is seen in no frame; " + std::to_string(percent(a.mirrored)) +
-                        " % was mirrored, the rest continued smoothly");
+    p.remarks.push_back(who + ": " + std::to_string(percent(unseen)) + " % of its surface is seen in no frame; " + std::to_string(percent(a.copied)) +
+                        " % was copied from like places, the rest continued smoothly");
   }
 }
 

@@ -1,6 +1,5 @@
 #include "calipso_render/surface_texture.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
@@ -11,35 +10,12 @@ namespace calipso::render {
 namespace {
 
 constexpr int kMostSteps = 24;          // texels along an edge
-constexpr std::size_t kMirrorProbes = 300;
-constexpr float kMirrorTolerance = 0.03f;  // of the surface's extent
-constexpr float kMirrorPart = 0.95f;    // of the vertices that must find their image
-constexpr float kAlike = 0.9f;          // principal axes of nearly the same length: any axis between may be the one
-constexpr int kAnglesBetween = 12;      // tried there, over half a turn
 constexpr double kAnchor = 1e-4;        // pull towards the mean where nothing known is connected
 
 std::size_t texelCount(int steps) { return static_cast<std::size_t>(steps + 1) * (steps + 2) / 2; }
 
 float longestEdge(const Points& p, const Eigen::Vector3i& t) {
   return std::max({(p[t[1]] - p[t[0]]).norm(), (p[t[2]] - p[t[1]]).norm(), (p[t[0]] - p[t[2]]).norm()});
-}
-
-Eigen::AlignedBox3f boxOf(const Points& points) {
-  Eigen::AlignedBox3f box;
-  for (const Eigen::Vector3f& p : points) box.extend(p);
-  return box;
-}
-
-// Part of a spread of vertices whose mirror image lies near some vertex.
-float mirroredPart(const Points& vertices, const MirrorPlane& plane, float tolerance) {
-  const std::size_t step = std::max<std::size_t>(1, vertices.size() / kMirrorProbes);
-  int hits = 0, probes = 0;
-  for (std::size_t i = 0; i < vertices.size(); i += step, ++probes) {
-    const Eigen::Vector3f image = vertices[i] - 2.0f * (plane.normal.dot(vertices[i]) - plane.offset) * plane.normal;
-    const bool near = std::any_of(vertices.begin(), vertices.end(), [&](const Eigen::Vector3f& p) { return (p - image).squaredNorm() < tolerance * tolerance; });
-    hits += near;
-  }
-  return static_cast<float>(hits) / std::max(1, probes);
 }
 
 }  // namespace
@@ -79,38 +55,6 @@ cv::Vec4f SurfaceTexture::at(int triangle, const Eigen::Vector3f& weights) const
     return grid[index(i, j, n)] * (1.0f - fx - fy) + grid[index(i + 1, j, n)] * fx + grid[index(i, j + 1, n)] * fy;
   }
   return grid[index(i + 1, j + 1, n)] * (fx + fy - 1.0f) + grid[index(i + 1, j, n)] * (1.0f - fy) + grid[index(i, j + 1, n)] * (1.0f - fx);
-}
-
-std::vector<MirrorPlane> mirrorPlanes(const Points& vertices, const Triangles& triangles) {
-  // Middle and second moments of the surface, triangle by triangle.
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
-  double total = 0.0;
-  for (const Eigen::Vector3i& t : triangles) {
-    const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(), c = vertices[t[2]].cast<double>();
-    const double area = 0.5 * (b - a).cross(c - a).norm();
-    const Eigen::Vector3d centre = (a + b + c) / 3.0;
-    total += area, middle += area * centre, moments += area * centre * centre.transpose();
-  }
-  if (!(total > 0.0)) return {};
-  middle /= total;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments / total - middle * middle.transpose());
-  std::vector<Eigen::Vector3d> normals;
-  for (int k = 0; k < 3; ++k) normals.push_back(axes.eigenvectors().col(k));
-  for (int k = 0; k < 2; ++k) {
-    if (axes.eigenvalues()[k] < kAlike * axes.eigenvalues()[k + 1]) continue;
-    for (int i = 1; i < kAnglesBetween; ++i) {
-      const double angle = M_PI * i / kAnglesBetween;
-      normals.push_back(std::cos(angle) * normals[k] + std::sin(angle) * normals[k + 1]);
-    }
-  }
-  const float tolerance = kMirrorTolerance * boxOf(vertices).diagonal().norm();
-  std::vector<MirrorPlane> planes;
-  for (const Eigen::Vector3d& n : normals) {
-    const MirrorPlane plane{n.cast<float>(), static_cast<float>(n.dot(middle))};
-    if (mirroredPart(vertices, plane, tolerance) >= kMirrorPart) planes.push_back(plane);
-  }
-  return planes;
 }
 
 void diffuseOverMesh(const Points& vertices, const Triangles& triangles, const std::vector<bool>& known, std::vector<cv::Vec3f>& values) {

@@ -1,3 +1,4 @@
+#include "calipso_render/surface_symmetry.hpp"
 #include "calipso_render/surface_texture.hpp"
 
 #include <gtest/gtest.h>
@@ -57,6 +58,43 @@ TEST(MirrorPlanes, OfABoxAreItsThreeMiddlePlanes) {
 TEST(MirrorPlanes, OfALopsidedShapeAreNone) {
   const Points vertices = {{0, 0, 0}, {3, 0, 0}, {0, 1, 0}, {0.5f, 0.2f, 0.7f}};
   EXPECT_TRUE(mirrorPlanes(vertices, {{0, 1, 2}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}).empty());
+}
+
+// A vase turned about a slanting axis, with a plate stuck to its side as a handle.
+TEST(RevolutionAxis, IsFoundWhateverIsAttached) {
+  const Eigen::Vector3f point(0.3f, -0.2f, 1.0f), up = Eigen::Vector3f(0.3f, 0.2f, 1.0f).normalized();
+  const Eigen::Vector3f side = up.unitOrthogonal(), other = up.cross(side);
+  Points vertices;
+  Triangles triangles;
+  constexpr int kAround = 24, kAlong = 12;
+  for (int j = 0; j <= kAlong; ++j) {
+    const float height = 0.3f * j / kAlong, radius = 0.06f + 0.02f * std::sin(9.0f * height);
+    for (int i = 0; i < kAround; ++i) {
+      const float angle = 2.0f * static_cast<float>(M_PI) * i / kAround;
+      vertices.push_back(point + up * height + radius * (side * std::cos(angle) + other * std::sin(angle)));
+    }
+  }
+  for (int j = 0; j < kAlong; ++j) {
+    for (int i = 0; i < kAround; ++i) {
+      const int a = j * kAround + i, b = j * kAround + (i + 1) % kAround;
+      triangles.push_back({a, b, a + kAround}), triangles.push_back({b, b + kAround, a + kAround});
+    }
+  }
+  const int first = static_cast<int>(vertices.size());
+  for (const auto& [a, h] : {std::pair{0.08f, 0.1f}, {0.2f, 0.1f}, {0.2f, 0.2f}, {0.08f, 0.2f}}) vertices.push_back(point + up * h + side * a);
+  triangles.push_back({first, first + 1, first + 2}), triangles.push_back({first, first + 2, first + 3});
+
+  const std::optional<Axis> axis = revolutionAxis(vertices, triangles);
+  ASSERT_TRUE(axis);
+  EXPECT_GT(std::abs(axis->direction.dot(up)), 0.9999f);
+  EXPECT_LT((axis->point - point).cross(axis->direction).norm(), 1e-3f);
+}
+
+TEST(RevolutionAxis, OfABoxIsNone) {
+  Points vertices;
+  Triangles triangles;
+  makeBox(vertices, triangles);
+  EXPECT_FALSE(revolutionAxis(vertices, triangles));
 }
 
 // The values known at the ends of a strip run evenly between them; a second vertex at a known place is known too.

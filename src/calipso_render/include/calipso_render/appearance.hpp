@@ -11,7 +11,7 @@ namespace calipso::render {
 
 // An object's reflectance: a picture, the key frame with its highlights taken off divided by the light that fell on the
 // surface there, and a texture on the mesh. What the key frame's camera saw takes its colour from the picture, so that
-// drawn there it is the key frame again; the rest takes it from the texture: from further frames, by symmetry, or
+// drawn there it is the key frame again; the rest takes it from the texture: from further frames, from like places, or
 // smoothly from the surface around it.
 class Appearance {
  public:
@@ -25,7 +25,7 @@ class Appearance {
   Camera key_camera;
   cv::Vec3f mean_light;  // average shading over the seen surface: regularises the relighting
   Gloss gloss;
-  float seen_in_key = 0.0f, seen_elsewhere = 0.0f, mirrored = 0.0f;  // parts of the texture's texels; the rest is filled
+  float seen_in_key = 0.0f, seen_elsewhere = 0.0f, copied = 0.0f;  // parts of the texture's texels; the rest is filled
 
   void findSources();
 

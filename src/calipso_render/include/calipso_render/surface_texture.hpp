@@ -34,15 +34,6 @@ class SurfaceTexture {
   std::vector<int> steps_;          // per triangle: texels along an edge, minus one
 };
 
-// Mirror planes of a mesh: x is mirrored to x - 2 n (n.x - d).
-struct MirrorPlane {
-  Eigen::Vector3f normal;
-  float offset = 0.0f;
-};
-
-// Planes through the surface's middle, along its principal axes, that map it onto itself to within a few per cent of its size.
-std::vector<MirrorPlane> mirrorPlanes(const Points& vertices, const Triangles& triangles);
-
 // Fills vertices that have no value smoothly from those that have (harmonic on the mesh; vertices at one place are one).
 // @param known per vertex; at least one must be
 void diffuseOverMesh(const Points& vertices, const Triangles& triangles, const std::vector<bool>& known,

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <vector>
+
+#include "calipso_render/appearance.hpp"
+
+namespace calipso::render {
+
+// The reflectance that one picture shows of an object.
+struct Reflectance {
+  cv::Rect region;
+  cv::Mat albedo;    // CV_32FC4, extended beyond the silhouette; the fourth unused
+  cv::Mat nearness;  // CV_32FC1: 1 / depth of the object's front, 0 = none
+  cv::Mat normal;    // CV_32FC3: of the front, world, towards the camera
+  cv::Mat trust;     // CV_32FC1
+  cv::Vec3f mean_light;
+};
+
+// What is known of an object: the key frame first.
+struct SeenObject {
+  const std::vector<const View*>& views;
+  const std::vector<const Actor*>& actors;
+  const std::vector<Reflectance>& pictures;
+};
+
+// Makes the appearance's texture: every place of the surface as the pictures show it, one over the other by how well they do;
+// what they leave open, as they show the place's mirror image across the mesh's planes of symmetry; then the place turned
+// about its axis of revolution; then the front of the object at the same pixel, where the place is as if mirrored in the picture's
+// plane. What is left continues the surface around it.
+// @param a  has region and albedo
+void fillTexture(const SeenObject& object, Appearance& a);
+
+}  // namespace calipso::render
