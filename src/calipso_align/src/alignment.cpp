@@ -113,16 +113,33 @@ double sizeRatio(const Points& to, const Points& from) {
 struct Posterior {
   LowOrderMap here;   // the identity
   Eigen::MatrixXd covariance;
+  Eigen::MatrixXd without_placement;   // the same, with the distance left to what was measured
 };
 
 Posterior posterior(const FitProblem& problem, const Points& x, const LowOrderStep& last) {
   // What is promised has to hold for placements that are as far off as they may be, too.
-  LowOrderPrior prior = last.fit.prior;
+  LowOrderPrior prior = last.fit.prior, wide = prior;
   prior.depth *= std::sqrt(3.0);
+  wide.depth = 1.5 * kPlacementError * problem.X.col(2).mean() / LowOrderMap(problem.X).size();
   const MeasureSettings settings =
       settingsAt(last, problem, last.fit.iterations - 1, prior.deformation);
   const LowOrderMap here(x);
-  return {here, covariance(x, measure(problem, x, settings), prior, here)};
+  const Rows rows = measure(problem, x, settings);
+  return {here, covariance(x, rows, prior, here), covariance(x, rows, wide, here)};
+}
+
+// What may be off: all that the measurements leave open and the placement allows.
+ShapeUncertainty uncertaintyOf(const FitProblem& problem, const Points& x, const LowOrderStep& last,
+                               const Posterior& end) {
+  const PlacementPrior placement(problem.X.colwise().mean().transpose(), end.here.centroid());
+  const auto by_parameters = rigidPart(x, end.here).translation_by_parameters;
+  const auto likelihood = [&](const LowOrderMap::Parameters& step) {
+    return placement.density(end.here.centroid() + by_parameters * step);
+  };
+  const double unseen =
+      problem.depth.empty() ? unresolved(last.order, last.fit.prior.deformation) : 0.0;
+  return shapeUncertainty(x, problem.topology.triangles(), end.here, end.without_placement,
+                          problem.model_size, unseen, likelihood);
 }
 
 // From translation of the centroid and rotation about it to the object frame's origin, world axes.
@@ -183,11 +200,10 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
   const Posterior end = posterior(problem, x, last);
   result.covariance = poseCovariance(
       problem, end, problem.camera.world_from_camera.inverse() * result.world_from_object);
-  const double unseen = problem.depth.empty() ? unresolved(last.order, result.deformation) : 0.0;
-  const ShapeUncertainty error = shapeUncertainty(x, cad.triangles, end.here, end.covariance,
-                                                  problem.model_size, unseen);
-  result.expected_error = error.mean;
-  result.expected_rms = error.rms;
+  const ShapeUncertainty error = uncertaintyOf(problem, x, last, end);
+  result.expected_error = error.expected().mean;
+  result.expected_rms = error.expected().rms;
+  result.off_probability = error.beyond(kTrustedWithin);
   const FitQuality quality = assess(problem, x);
   result.placed = true;
   result.met_mean_px = quality.met_mean_px;

@@ -36,28 +36,47 @@ Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3
 
 std::vector<double> distancesToSurface(const Points& from, const Points& x,
                                        const Triangles& triangles) {
-  // Bounding spheres reject most triangles without a closer look.
+  // Faces in the order of their centres along the axis in which these spread most: a point looks at the
+  // nearest ones first, and no further than a nearer one can be. Bounding spheres reject most of them.
   const int faces = static_cast<int>(triangles.rows());
   Points centre(faces, 3);
-  Eigen::VectorXd radius(faces);
   for (int f = 0; f < faces; ++f) {
     centre.row(f) = (x.row(triangles(f, 0)) + x.row(triangles(f, 1)) + x.row(triangles(f, 2))) / 3.0;
-    radius[f] = 0.0;
-    for (int k = 0; k < 3; ++k) {
-      radius[f] = std::max(radius[f], (x.row(triangles(f, k)) - centre.row(f)).norm());
+  }
+  int axis = 0;
+  (centre.colwise().maxCoeff() - centre.colwise().minCoeff()).maxCoeff(&axis);
+  std::vector<int> order(faces);
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return centre(a, axis) < centre(b, axis); });
+  std::vector<double> along(faces), radius(faces, 0.0);
+  for (int k = 0; k < faces; ++k) {
+    along[k] = centre(order[k], axis);
+    for (int v = 0; v < 3; ++v) {
+      radius[k] = std::max(radius[k], (x.row(triangles(order[k], v)) - centre.row(order[k])).norm());
     }
   }
+  const double largest = faces > 0 ? *std::max_element(radius.begin(), radius.end()) : 0.0;
+
   std::vector<double> result(from.rows());
 #pragma omp parallel for schedule(static)
   for (int i = 0; i < from.rows(); ++i) {
     const Eigen::Vector3d p = from.row(i);
     double best = std::numeric_limits<double>::max();
-    for (int f = 0; f < faces; ++f) {
-      const double reach = best + radius[f];
-      if ((centre.row(f).transpose() - p).squaredNorm() > reach * reach) continue;
+    const auto look = [&](int k) {
+      const double reach = best + radius[k];
+      const int f = order[k];
+      if ((centre.row(f).transpose() - p).squaredNorm() > reach * reach) return;
       const Eigen::Vector3d q = closestOnTriangle(p, x.row(triangles(f, 0)), x.row(triangles(f, 1)),
                                                   x.row(triangles(f, 2)));
       best = std::min(best, (q - p).norm());
+    };
+    int up = static_cast<int>(std::lower_bound(along.begin(), along.end(), p[axis]) - along.begin());
+    int down = up - 1;
+    while (up < faces || down >= 0) {
+      const double above = up < faces ? along[up] - p[axis] : std::numeric_limits<double>::max();
+      const double below = down >= 0 ? p[axis] - along[down] : std::numeric_limits<double>::max();
+      if (std::min(above, below) > best + largest) break;
+      look(above < below ? up++ : down--);
     }
     result[i] = best;
   }

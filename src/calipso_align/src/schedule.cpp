@@ -13,7 +13,7 @@ constexpr double kTypicalDeformation = 0.15;   // a (LowOrderPrior) before anyth
 // A rough placement is up to a twentieth of the distance off, in any direction: of a length between
 // none and that, and of its part along the sight line, the mean square is a third each.
 double placementDepthSigma(const FitProblem& problem) {
-  return 0.05 / 3.0 * problem.X.col(2).mean() / LowOrderMap(problem.X).size();
+  return kPlacementError / 3.0 * problem.X.col(2).mean() / LowOrderMap(problem.X).size();
 }
 
 // The model's size in the picture is made right before anything else; the distance is held meanwhile.
@@ -93,6 +93,25 @@ ElasticStep literalElasticStep(const AlignOptions& options) {
 double Ramp::at(int k, int count) const {
   const double t = count < 2 ? 1.0 : std::min(1.0, static_cast<double>(k) / (count - 1));
   return from * std::pow(to / from, t);
+}
+
+PlacementPrior::PlacementPrior(const Eigen::Vector3d& placed, const Eigen::Vector3d& found)
+    : placed_(placed) {
+  // The centroid of what deforms is not known exactly itself.
+  constexpr double kLeastAlong = 1.0 / 3.0, kBroken = 1.25;
+  const Eigen::Vector3d sight = found.normalized();
+  const double across = (placed - sight * sight.dot(placed)).norm() / found.norm();
+  bound_ = across > kBroken * kPlacementError
+               ? std::sqrt(2.0) * across
+               : std::max(kPlacementError, std::hypot(across, kLeastAlong * kPlacementError));
+}
+
+double PlacementPrior::density(const Eigen::Vector3d& centroid) const {
+  constexpr double kGuided = 0.4;   // of the bound
+  const double r = (centroid - placed_).norm() / centroid.norm();
+  if (r > bound_) return 0.0;
+  const double at_least = std::max(r, kGuided * kPlacementError);
+  return 1.0 / (at_least * at_least);
 }
 
 double unresolved(int order, double deformation) {

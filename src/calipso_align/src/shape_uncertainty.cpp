@@ -10,14 +10,8 @@
 namespace calipso::align {
 namespace {
 
-constexpr int kDraws = 64;   // place the mean to a tenth
-
-// Points for one draw: few enough for the time, since every one is compared with all faces.
-int pointsPerDraw(const Triangles& triangles) {
-  constexpr double kComparisons = 5e6;
-  const double most = kComparisons / (kDraws * std::max<double>(1.0, triangles.rows()));
-  return std::clamp(static_cast<int>(most), 4, 20);
-}
+constexpr int kDraws = 128;
+constexpr int kPointsPerDraw = 32;   // place its mean to a tenth
 
 // Some matrix L with L L' = C, C positive semi-definite but for rounding.
 Eigen::MatrixXd squareRoot(const Eigen::MatrixXd& C) {
@@ -44,36 +38,68 @@ std::vector<int> facesByArea(const Points& x, const Triangles& triangles, int co
 
 }  // namespace
 
+SurfaceDistance ShapeUncertainty::expected() const {
+  SurfaceDistance all;
+  for (size_t k = 0; k < draws.size(); ++k) {
+    all.mean += weights[k] * draws[k].mean;
+    all.rms += weights[k] * draws[k].rms * draws[k].rms;
+  }
+  all.rms = std::sqrt(all.rms);
+  return all;
+}
+
+double ShapeUncertainty::beyond(const SurfaceDistance& limit) const {
+  double probability = 0.0;
+  for (size_t k = 0; k < draws.size(); ++k) {
+    if (draws[k].mean > limit.mean || draws[k].rms > limit.rms) probability += weights[k];
+  }
+  return probability;
+}
+
 ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
                                   const LowOrderMap& here, const Eigen::MatrixXd& covariance,
-                                  double model_size, double unseen) {
+                                  double model_size, double unseen,
+                                  const std::function<double(const LowOrderMap::Parameters&)>& likelihood) {
+  constexpr int kMostTries = 50 * kDraws;
   std::mt19937 generator(1);
   std::normal_distribution<double> normal;
   const Eigen::MatrixXd L = squareRoot(covariance);
-  const std::vector<int> faces = facesByArea(x, triangles, kDraws * pointsPerDraw(triangles));
+  const std::vector<int> faces = facesByArea(x, triangles, kDraws * kPointsPerDraw);
   if (faces.empty()) return {};
 
-  std::vector<LowOrderMap> draws(kDraws, here);
-  for (LowOrderMap& draw : draws) {
+  ShapeUncertainty error;
+  std::vector<LowOrderMap> maps;
+  double sum = 0.0;
+  for (int t = 0; t < kMostTries && maps.size() < kDraws; ++t) {
     LowOrderMap::Parameters z;
     for (int i = 0; i < z.size(); ++i) z[i] = normal(generator);
-    draw.setParameters(here.plus(L * z));
+    const LowOrderMap::Parameters step = L * z;
+    const double weight = likelihood(step);
+    if (!(weight > 0.0)) continue;
+    error.weights.push_back(weight);
+    sum += weight;
+    maps.push_back(here);
+    maps.back().setParameters(here.plus(step));
   }
   // Consecutive points are of different draws: each draw is seen all over the surface.
-  Points moved(faces.size(), 3);
+  const int count = static_cast<int>(maps.size());
+  Points moved(count * kPointsPerDraw, 3);
   for (int k = 0; k < moved.rows(); ++k) {
-    const int f = faces[k];
+    const int f = faces[k * static_cast<long>(faces.size()) / moved.rows()];
     const Eigen::Vector3d centre =
         (x.row(triangles(f, 0)) + x.row(triangles(f, 1)) + x.row(triangles(f, 2))).transpose() / 3.0;
     const double along = unseen * model_size * normal(generator);
-    moved.row(k) = (draws[k % kDraws](centre) + along * centre.normalized()).transpose();
+    moved.row(k) = (maps[k % count](centre) + along * centre.normalized()).transpose();
   }
-  ShapeUncertainty error;
-  for (const double distance : distancesToSurface(moved, x, triangles)) {
-    error.mean += distance / (model_size * moved.rows());
-    error.rms += distance * distance / (model_size * model_size * moved.rows());
+  error.draws.resize(count);
+  const std::vector<double> distances = distancesToSurface(moved, x, triangles);
+  for (size_t k = 0; k < distances.size(); ++k) {
+    const double part = distances[k] / model_size;
+    error.draws[k % count].mean += part / kPointsPerDraw;
+    error.draws[k % count].rms += part * part / kPointsPerDraw;
   }
-  error.rms = std::sqrt(error.rms);
+  for (double& weight : error.weights) weight /= sum;
+  for (SurfaceDistance& draw : error.draws) draw.rms = std::sqrt(draw.rms);
   return error;
 }
 

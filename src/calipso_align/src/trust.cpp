@@ -16,7 +16,7 @@ constexpr double kLeastMet = 0.8;        // part of the known contour: it may ha
 constexpr double kMostOff = 0.02;         // part of the area: thin parts may be missing on either side
 constexpr double kLargestMeanPx = 1.0;   // on top of half the contour's noise
 constexpr double kLargestScale = 2.5;
-constexpr double kLargestError = 0.04;   // expected in 3D, of the size
+constexpr double kLargestOff = 0.1;      // probability that the surface is further away than it should be
 
 std::string percent(double part) { return std::to_string(std::lround(100.0 * part)) + " %"; }
 
@@ -131,7 +131,7 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
 }
 
 Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-              const FitQuality& quality, double scale, const ShapeUncertainty& expected) {
+              const FitQuality& quality, double scale, const ShapeUncertainty& error) {
   std::ostringstream reason;
   reason.precision(3);
   const double known = problem.target.known_length_px / problem.target.length_px;
@@ -150,11 +150,12 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
   } else if (scale > kLargestScale || scale < 1.0 / kLargestScale) {
     reason << "size implausible: the model had to be scaled by " << scale
            << "; check its unit and its distance";
-  } else if (expected.mean > kLargestError) {
-    reason << "depth undetermined: the contour is met, but distance, turn and thickness along the sight "
-              "line are only known to a mean error of "
-           << 100.0 * expected.mean
-           << " % of the size; give a depth image or the plane that the object stands on";
+  } else if (error.beyond(kTrustedWithin) > kLargestOff) {
+    reason << "depth undetermined: the contour is met, but as to distance, turn and thickness along the "
+              "sight line the surface is off by more than "
+           << 100.0 * kTrustedWithin.mean << " % of the size with a probability of "
+           << percent(error.beyond(kTrustedWithin))
+           << "; give a depth image or the plane that the object stands on";
   } else {
     if (spinAxis(problem.X)) {
       reason << "spin about its axis undetermined: the shape is axisymmetric, so that the contour "

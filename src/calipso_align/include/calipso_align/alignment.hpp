@@ -61,6 +61,7 @@ struct AlignmentResult {
   double contour_p95_px = 0.0;
   double expected_error = 0.0;             // mean distance of the surface from the true one, predicted,
   double expected_rms = 0.0;               // in parts of the model's diagonal
+  double off_probability = 0.0;            // that it is further away than a result that is trusted may be
   double noise_px = 0.0;                   // estimated noise of the contour
   double scale = 1.0;                      // size of S* relative to S
   double deformation = 0.0;                // how far S had to be deformed: r.m.s. strain, estimated

@@ -17,6 +17,25 @@ struct Ramp {
   double at(int k, int count) const;
 };
 
+// How far a rough placement may be off: part of the distance, in any direction.
+constexpr double kPlacementError = 0.05;
+
+// Where a roughly placed object may be (centroids, camera frame). An offset of any length up to the bound and
+// any direction has a density of 1 / r^2: the picture shows how far the placement is off across the sight
+// line, and that says something of the distance. Not that it is right where the rest is, though: the
+// picture guides a hand across the sight line, not along it.
+class PlacementPrior {
+ public:
+  // @param found  where the fit has the object: a placement that was further off across the sight line than
+  //               it may be, may be as far off along it
+  PlacementPrior(const Eigen::Vector3d& placed, const Eigen::Vector3d& found);
+  double density(const Eigen::Vector3d& centroid) const;   // not normalised; 0 beyond the bound
+
+ private:
+  Eigen::Vector3d placed_;
+  double bound_;   // part of the distance
+};
+
 struct LowOrderStep {
   std::string name;
   LowOrderStageOptions fit;

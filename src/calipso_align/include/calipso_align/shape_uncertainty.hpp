@@ -1,14 +1,27 @@
 #pragma once
 
+#include <functional>
+#include <vector>
+
 #include "calipso_align/low_order_map.hpp"
 #include "calipso_align/silhouette.hpp"
 
 namespace calipso::align {
 
-// What a finished fit's surface is expected to be off in 3D, in parts of the model's size.
-struct ShapeUncertainty {
-  double mean = 0.0;   // of the distance from the surface
+// How far a surface is from another one, in parts of the model's size.
+struct SurfaceDistance {
+  double mean = 0.0;
   double rms = 0.0;
+};
+
+// What a finished fit's surface may be off in 3D: one distance per surface that may be the true one.
+struct ShapeUncertainty {
+  std::vector<SurfaceDistance> draws;
+  std::vector<double> weights;   // of the draws; they sum to 1
+
+  SurfaceDistance expected() const;
+  // Probability that the true surface is further away, by its mean or its r.m.s. distance.
+  double beyond(const SurfaceDistance& limit) const;
 };
 
 // Draws the parameters from their covariance, always the same ones, and measures how far points of the
@@ -16,8 +29,10 @@ struct ShapeUncertainty {
 // near its other side.
 // covariance  of the parameters of `here`, which is the identity at x (camera frame)
 // unseen      deviation along the sight line of what the parameters cannot follow, model sizes
+// likelihood  of a change of the parameters, by what is known of it besides; 0: impossible
 ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
                                   const LowOrderMap& here, const Eigen::MatrixXd& covariance,
-                                  double model_size, double unseen);
+                                  double model_size, double unseen,
+                                  const std::function<double(const LowOrderMap::Parameters&)>& likelihood);
 
 }  // namespace calipso::align

@@ -18,15 +18,18 @@ struct FitQuality {
 
 FitQuality assess(const FitProblem& problem, const Points& x);
 
+// Parts of the model's size that the surface of a trusted fit may be off in 3D.
+constexpr SurfaceDistance kTrustedWithin{0.04, 0.06};
+
 struct Verdict {
   bool trusted = false;
   std::string reason;   // why not; or what the user should know all the same
 };
 
 // @param scale     size of the fitted model relative to the stock model
-// @param expected  of the fitted surface
+// @param error     what the fitted surface may be off
 Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-              const FitQuality& quality, double scale, const ShapeUncertainty& expected);
+              const FitQuality& quality, double scale, const ShapeUncertainty& error);
 
 // Whether turning the model about one of its principal axes leaves it where it was: then no contour
 // shows that turn. Returns the axis in the frame of X.
