@@ -10,6 +10,7 @@ namespace calipso::render {
 namespace {
 
 constexpr float kSameRatio = 0.01f, kPlateRatio = 0.06f;  // change of light from which the plate is taken, and only it
+constexpr int kLeastChange = 3;  // px across
 constexpr int kRimReach = 4;  // mask margins around a surface at rest in which the frame's pixels stay
 
 }  // namespace
@@ -19,7 +20,8 @@ std::uint8_t changeOfLight(float before, float now) {
 }
 
 // Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by some
-// pixels, so what lies that near to both the shadow and the change is taken from the plate.
+// pixels, so what lies that near to both the shadow and the change is taken from the plate. A change of single pixels is
+// noise of the shadow's border and moves nothing.
 void FrameCompositor::findRelit() {
   relit_ = cv::Mat::zeros(region_.size(), CV_32F);
   const int reach = params_.background.shadow_margin_px, side = reach + 2;
@@ -38,6 +40,7 @@ void FrameCompositor::findRelit() {
       change.at<std::uint8_t>(v, u) = changeOfLight(before, now);
     }
   }
+  cv::morphologyEx(change, change, cv::MORPH_OPEN, cv::Mat::ones(kLeastChange, kLeastChange, CV_8U));
   cv::dilate(change, change, disc(reach));
   cv::min(change, shadows_.shaded(box), change);
   change.convertTo(relit, CV_32F, 1.0 / 255.0);

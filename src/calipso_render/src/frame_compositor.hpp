@@ -114,6 +114,7 @@ class FrameCompositor {
   Composed composedAt(int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool restsAt(int surface) const;
+  bool takesShadow(int u, int v) const { return plane_view_.sees(u, v) && (shadowless_.empty() || shadowless_.at<std::uint8_t>(v, u) == 0); }
   void prepareShadows();
   void cacheOriginals(const std::vector<Occluder>& originals);
   void cacheOthers(const std::vector<Occluder>& others);
@@ -173,6 +174,7 @@ class FrameCompositor {
   std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame
   cv::Mat labels_, plate_;            // of this frame's view
   cv::Mat invented_;
+  cv::Mat shadowless_;                // Prepared::shadowless, where the camera stands as at the key frame
   const LiveFill* live_ = nullptr;  // Background::live, where the camera stands as at the key frame
   std::vector<cv::Vec3f> live_corrections_;
   std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest

@@ -80,10 +80,9 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < whole.height; ++v) {
-    Receiver r;
     for (int u = 0; u < whole.width; ++u) {
       const float sun = valueOrOne(shadows_.originals_sun, u, v), sky = shadows_.originals_sky.at<float>(v, u);
-      if ((sun == 1.0f && sky == 1.0f) || !plane_view_.at(u, v, r)) continue;
+      if ((sun == 1.0f && sky == 1.0f) || !takesShadow(u, v)) continue;
       shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(1.0f, luminance(shadowRatio(sun, sky)));
     }
   }
@@ -180,7 +179,7 @@ void FrameCompositor::measureSun() {
     const float *others = rowOf(shadows_.others_sun), *originals = rowOf(shadows_.originals_sun);
     for (int u = 0; u < region_.width; ++u) {
       const float rest = others != nullptr ? others[u] : 1.0f;
-      const bool wanted = covered[u] == 0 && plane_view_.sees(u + region_.x, v + region_.y);
+      const bool wanted = covered[u] == 0 && takesShadow(u + region_.x, v + region_.y);
       now[u] = wanted ? now[u] * rest : -1.0f;
       before[u] = wanted ? (originals != nullptr ? originals[u] : 1.0f) * rest : -1.0f;
     }

@@ -102,6 +102,7 @@ void FrameCompositor::stage() {
   if (sameView(frame_.camera, prepared_.camera)) {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
     if (live_ != nullptr) live_corrections_ = live_->corrections(frame_.bgr, labels_);
+    shadowless_ = prepared_.shadowless;
     fronts_ = prepared_.fronts;
     footprints_ = prepared_.footprints;
   } else {

@@ -15,11 +15,10 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kShaded = 0.985f;       // visible fraction of the sun below which a pixel counts as shaded
-constexpr float kSkyShaded = 0.85f;     // the same for the sky: the dark line along a contact
 constexpr float kOpenSky = 0.4f;        // ... above which the dark of a shadow says how dark the sun's absence is
 constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and model are misfit
 constexpr std::size_t kFurtherViews = 5;  // beside the key frame
+constexpr float kOffPlane = 0.1f;       // part by which scenery is nearer or farther than the plane behind or before it
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
 
 std::vector<ClipFrame> inKeyView(const ClipSample& clip, const std::vector<SupportPlane>& planes) {
@@ -46,12 +45,21 @@ bool movesInVideo(const std::vector<ClipFrame>& frames, int index) {
   return false;
 }
 
-// Sun visibility on the support planes, 0..1, where a plane is seen and no object hides it; 1 elsewhere.
-cv::Mat planeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& planes, const ClipFrame& key) {
+// Where the depth image shows something else than a support plane.
+cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes, const Camera& camera) {
+  cv::Mat off = cv::Mat::zeros(camera.height, camera.width, CV_8U);
+  const cv::Mat ground = scenery.empty() ? cv::Mat() : groundNearness(planes, camera, cv::Mat());
+  if (!ground.empty()) off = (scenery > 0.0f) & ((scenery > (1.0f + kOffPlane) * ground) | ((1.0f + kOffPlane) * scenery < ground));
+  return off;
+}
+
+// Visibility of a light on the support planes, 0..1, where a plane is seen and no object hides it; 1 elsewhere.
+cv::Mat planeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& planes, const cv::Mat& off_planes, const ClipFrame& key) {
   cv::Mat visibility(key.bgr.size(), CV_32F, cv::Scalar(1.0f));
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < visibility.rows; ++v) {
     for (int u = 0; u < visibility.cols; ++u) {
+      if (off_planes.at<std::uint8_t>(v, u) != 0) continue;
       const auto receiver = receiverAt(planes, key.camera, u, v);
       if (receiver) visibility.at<float>(v, u) = sun.visibility(receiver->position, receiver->normal);
     }
@@ -226,8 +234,8 @@ std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepar
 }
 
 // What objects at rest cover or shade at the key frame, with soft edges and the predictions' errors.
-cv::Mat restingTraces(const Prepared& p, const cv::Mat& shadow, const cv::Mat& sky, const RenderParams& params) {
-  cv::Mat traces = grown(shadow | (sky < kSkyShaded), params.background.shadow_margin_px);
+cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const RenderParams& params) {
+  cv::Mat traces = grown(shadows.sun | shadows.sky, params.background.shadow_margin_px);
   for (const cv::Mat& f : p.footprints) {
     if (!f.empty()) traces |= grown(f, params.background.mask_margin_px);
   }
@@ -245,15 +253,19 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const Background& s
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const bool all_move = std::find(p.moves.begin(), p.moves.end(), false) == p.moves.end();
   p.background = seen;
-  const cv::Mat visibility = planeVisibility(sun, params.planes, frames.front());
-  const cv::Mat sky_visibility = planeVisibility(sky, params.planes, frames.front());
+  const cv::Mat off_planes = offPlanes(p.scenery, params.planes, p.camera);
+  p.shadowless = off_planes.clone();
+  const cv::Mat visibility = planeVisibility(sun, params.planes, off_planes, frames.front());
+  const cv::Mat sky_visibility = planeVisibility(sky, params.planes, off_planes, frames.front());
   cv::Mat shaded;
   if (!all_move) {
-    const cv::Mat believed = seenShadows(visibility < kShaded, picture, p.key_labels);
-    if (cv::countNonZero(believed) < cv::countNonZero(visibility < kShaded)) {
-      p.remarks.push_back("a shadow that the light predicts is not seen in the picture and stays as it is; give the light if it is wrong");
+    const SeenShadows seen_shadows = seenShadows(visibility, sky_visibility, picture, (p.key_labels != 0) | off_planes);
+    if (cv::countNonZero(seen_shadows.refuted) > 0) {
+      p.remarks.push_back("a shadow that the light predicts is not seen in the picture: none is taken out or drawn there; give the light if it is wrong");
     }
-    shaded = restingTraces(p, believed, sky_visibility, params);
+    shaded = restingTraces(p, seen_shadows, params);
+    p.shadowless |= grown(seen_shadows.refuted, params.background.shadow_margin_px);
+    if (seen_shadows.none) p.shadowless.setTo(255);
   }
   inventBackground(shaded, frames.front(), groundNearness(params.planes, frames.front().camera, p.scenery), p.background);
   p.plate_linear = linearOf(p.background.plate);

@@ -4,11 +4,18 @@
 
 namespace calipso::render {
 
-// The parts of a predicted shadow that the picture shows: along the part's border the inside is darker than the outside. A part
-// whose border cannot be judged (too short, or all of it beside objects) is believed.
-// @param predicted CV_8UC1, 255 = in shadow
-// @param picture CV_32FC3, code values
-// @param labels CV_8UC1; pixels of objects tell nothing of the ground
-cv::Mat seenShadows(const cv::Mat& predicted, const cv::Mat& picture, const cv::Mat& labels);
+// Which of the predicted shadows a picture shows, decided region by region: a connected part of the prediction as a whole.
+//   y' = b h' + e,   y: -log of brightness, h: hidden part of the light, ': less its mean around the pixel,
+//   b: how dark the shadow is. A shadow has its b at its border, whatever the scale of that mean; something that
+//   happens to be dark there, or to get darker, has not. A prediction may lie some pixels beside its shadow.
+struct SeenShadows {
+  cv::Mat sun, sky;   // CV_8UC1: the regions that are seen, or that nothing speaks against
+  cv::Mat refuted;    // CV_8UC1: the others
+  bool none = false;  // there are predictions, and all of them were refuted
+};
+
+// @param sun, sky CV_32FC1, visible part of them, 0..1, as predicted
+// @param picture CV_32FC3, code values; unknown CV_8UC1, != 0: says nothing (objects, things off the planes)
+SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& picture, const cv::Mat& unknown);
 
 }  // namespace calipso::render

@@ -7,7 +7,6 @@
 
 #include "calipso_render/renderer.hpp"
 #include "render_test_scene.hpp"
-#include "shadow_check.hpp"
 
 namespace calipso::render {
 namespace {
@@ -92,23 +91,6 @@ TEST(BadInput, AMeshWithoutItsVisibleSide) {
   const Prepared p = learn(key, model);
   EXPECT_TRUE(says(p, "the side that the camera sees is missing"));
   expectFrame(p, key);
-}
-
-TEST(SeenShadows, BelievesWhatIsDarkerThanItsSurroundings) {
-  cv::Mat picture(120, 160, CV_32FC3, cv::Scalar::all(150)), predicted = cv::Mat::zeros(picture.size(), CV_8U);
-  cv::RNG random(1);
-  cv::Mat grain(picture.size(), CV_32FC3);
-  random.fill(grain, cv::RNG::NORMAL, 0.0, 12.0);
-  picture += grain;
-  const cv::Rect real(20, 30, 40, 40), wrong(95, 30, 40, 40);
-  picture(real) *= 0.8f;
-  predicted(real).setTo(255), predicted(wrong).setTo(255);
-  const cv::Mat seen = seenShadows(predicted, picture, cv::Mat::zeros(picture.size(), CV_8U));
-  EXPECT_EQ(cv::countNonZero(seen(real)), real.area());
-  EXPECT_EQ(cv::countNonZero(seen(wrong)), 0);
-  // Beside objects alone nothing can be compared: then it is believed.
-  const cv::Mat objects = predicted == 0;
-  EXPECT_EQ(cv::countNonZero(seenShadows(predicted, picture, objects)), cv::countNonZero(predicted));
 }
 
 }  // namespace

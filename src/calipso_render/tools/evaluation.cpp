@@ -39,6 +39,7 @@ class Evaluation {
       : scene_(loadScene(directory)), truth_(loadTruth(scene_)), options_(options) {
     params_.planes = scene_.planes;
     params_.up = -scene_.gravity.normalized();
+    params_.depth = loadDepth(scene_);
     figures_.name = scene_.name;
   }
 

@@ -72,6 +72,15 @@ cv::Mat loadLabels(const Scene& scene, int k) {
   return labels;
 }
 
+cv::Mat loadDepth(const Scene& scene) {
+  cv::Mat depth;
+  if (scene.depth_path.empty()) return depth;
+  const cv::Mat coded = cv::imread(scene.depth_path, cv::IMREAD_UNCHANGED);
+  if (coded.type() != CV_16UC1) throw std::runtime_error(scene.depth_path + ": no picture with one channel of 16 bits");
+  coded.convertTo(depth, CV_32F, scene.depth_scale);
+  return depth;
+}
+
 std::optional<cv::Mat> loadPlate(const Scene& scene, int k) {
   cv::Mat plate = cv::imread(scene.directory + numbered("/plates/%06d.png", k), cv::IMREAD_COLOR);
   if (plate.empty()) plate = cv::imread(scene.directory + "/plates/000000.png", cv::IMREAD_COLOR);

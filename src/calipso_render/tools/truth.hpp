@@ -31,6 +31,9 @@ cv::Mat loadFrame(const Scene& scene, int k);
 // Labels of frame k from the true masks (the first frame's where there is only one), CV_8UC1.
 cv::Mat loadLabels(const Scene& scene, int k);
 
+// The user's depth image of the key frame, CV_32FC1, m, 0: unknown; empty where the folder has none.
+cv::Mat loadDepth(const Scene& scene);
+
 // The place without the objects at frame k; nullopt where the folder has none.
 std::optional<cv::Mat> loadPlate(const Scene& scene, int k);
 

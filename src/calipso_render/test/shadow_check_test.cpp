@@ -1,0 +1,78 @@
+#include "shadow_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+namespace calipso::render {
+namespace {
+
+// Grey ground with grain of twelve code values, and two predicted shadows; nothing hides the sky.
+struct Ground {
+  cv::Mat picture{120, 200, CV_32FC3, cv::Scalar::all(150)}, sun{120, 200, CV_32F, cv::Scalar(1.0f)}, sky = sun.clone();
+  cv::Mat unknown = cv::Mat::zeros(120, 200, CV_8U);
+  const cv::Rect left{25, 30, 40, 40}, right{125, 30, 40, 40};
+
+  Ground() {
+    cv::RNG random(1);
+    cv::Mat grain(picture.size(), CV_32FC3);
+    random.fill(grain, cv::RNG::NORMAL, 0.0, 12.0);
+    picture += grain;
+    sun(left).setTo(0.0f), sun(right).setTo(0.0f);
+  }
+  SeenShadows seen() const { return seenShadows(sun, sky, picture, unknown); }
+};
+
+TEST(SeenShadows, BelievesAWholeShadowThatIsDarkFromItsBorderOn) {
+  Ground g;
+  g.picture(g.left) *= 0.8f;
+  const SeenShadows s = g.seen();
+  EXPECT_EQ(cv::countNonZero(s.sun(g.left)), g.left.area());
+  EXPECT_EQ(cv::countNonZero(s.sun(g.right)), 0);
+  EXPECT_EQ(cv::countNonZero(s.refuted), g.right.area());
+  EXPECT_FALSE(s.none);
+}
+
+TEST(SeenShadows, ShadowsBesideTheirPlaceAreStillSeen) {
+  Ground g;  // light and model are off by some pixels
+  g.picture(g.left + cv::Point(4, 3)) *= 0.7f;
+  EXPECT_EQ(cv::countNonZero(g.seen().sun(g.left)), g.left.area());
+}
+
+TEST(SeenShadows, GettingDarkerIsNoShadow) {
+  Ground g;  // towards the prediction's middle, without an edge at its border
+  for (int v = 0; v < g.picture.rows; ++v) {
+    for (int u = 0; u < g.picture.cols; ++u) {
+      const float x = static_cast<float>(u - 45) / 40.0f, y = static_cast<float>(v - 50) / 40.0f;
+      g.picture.at<cv::Vec3f>(v, u) *= 1.0f - 0.4f * std::exp(-(x * x + y * y) / 2.0f);
+    }
+  }
+  const SeenShadows s = g.seen();
+  EXPECT_EQ(cv::countNonZero(s.sun), 0);
+  EXPECT_TRUE(s.none);
+}
+
+TEST(SeenShadows, WhatCannotBeComparedFollowsWhatCan) {
+  Ground g;
+  g.unknown.colRange(0, 100).setTo(255);
+  EXPECT_EQ(cv::countNonZero(g.seen().sun), 0);
+  g.picture(g.right) *= 0.7f;
+  EXPECT_EQ(cv::countNonZero(g.seen().sun(g.left)), g.left.area());
+  // Where nothing at all can be compared, predictions are believed.
+  g.unknown.setTo(255);
+  EXPECT_EQ(cv::countNonZero(g.seen().sun), 2 * g.left.area());
+}
+
+TEST(SeenShadows, TheHiddenSkyIsAskedLikewise) {
+  Ground g;
+  g.sun.setTo(1.0f);
+  g.sky(g.left).setTo(0.4f), g.sky(g.right).setTo(0.4f);
+  g.picture(g.right) *= 0.75f;
+  const SeenShadows s = g.seen();
+  EXPECT_EQ(cv::countNonZero(s.sky(g.left)), 0);
+  EXPECT_EQ(cv::countNonZero(s.sky(g.right)), g.right.area());
+  EXPECT_EQ(cv::countNonZero(s.sun), 0);
+}
+
+}  // namespace
+}  // namespace calipso::render
