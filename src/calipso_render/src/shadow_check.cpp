@@ -15,19 +15,18 @@ constexpr float kSunShaded = 0.985f;    // visible part of the sun below which a
 constexpr float kSkyShaded = 0.85f;     // the same for the sky: the dark line along a contact
 constexpr int kMargin = 3;              // px around what says nothing: mixed pixels
 // Regions are looked at in pixels of twice the size; px are those from here on.
-constexpr double kFine = 3.0, kCoarse = 6.0;  // px, deviations of the weights around a pixel
-constexpr double kReach = 1.5;          // of them, around a region that is looked at
+constexpr double kScale = 3.0;          // px, deviation of the weights around a pixel
+constexpr int kAround = 5;              // px around a region that are looked at
 constexpr int kAlike = 8;               // px of squares over which errors are alike
 constexpr int kSoft = 4;                // px around a region that are of its prediction
 constexpr int kFarthest = 4, kStep = 2;  // px by which a prediction may lie beside its shadow
-constexpr double kLeastEvidence = 4.0;  // sum of h'^2 from which a region is asked
-constexpr double kLeastDark = 0.2;      // -log of brightness that a shadow takes away, at least
-constexpr double kSurelyDark = 0.1;     // the same from which darkness is certain
-constexpr double kEdgeShare = 0.5;      // of the coarse b that the fine one has, at least
 constexpr int kFewest = 130;            // px of a region that is asked by itself
+constexpr int kLeastOpen = 30;          // px of a region away from what says nothing, for it to be asked
+constexpr double kLeastEvidence = 1.0;  // and sum of h'^2
+constexpr double kByChance = 0.12;      // deviation of b where there is no shadow: what else is dark
+constexpr double kDark = 0.8, kDarkVaries = 0.45;  // mean and deviation of b where there is one: it takes 5 to 6 tenths of the light
+constexpr double kDecided = 1.5;        // log of the odds from which a region is decided on by itself
 constexpr float kDarkest = 0.01f;       // linear; added before the logarithm
-
-enum class Verdict { kSeen, kUnseen, kOpen };
 
 struct Depth {
   double b, deviation, evidence;
@@ -39,10 +38,10 @@ cv::Mat grown(const cv::Mat& mask, int radius) {
   return out;
 }
 
-cv::Mat lessSurroundings(const cv::Mat& values, const cv::Mat& weight, double scale) {
+cv::Mat lessSurroundings(const cv::Mat& values, const cv::Mat& weight) {
   cv::Mat sum, total;
-  cv::GaussianBlur(values.mul(weight), sum, {}, scale);
-  cv::GaussianBlur(weight, total, {}, scale);
+  cv::GaussianBlur(values.mul(weight), sum, {}, kScale);
+  cv::GaussianBlur(weight, total, {}, kScale);
   return (values - sum / cv::max(total, 1e-6)).mul(weight);
 }
 
@@ -73,6 +72,14 @@ cv::Mat halved(const cv::Mat& values) {
   return half;
 }
 
+double logNormal(double x, double mean, double variance) { return -0.5 * ((x - mean) * (x - mean) / variance + std::log(variance)); }
+
+// Log of how much likelier b is of a shadow than of none.
+double logOdds(const Depth& d) {
+  const double variance = d.deviation * d.deviation;
+  return logNormal(d.b, kDark, kDarkVaries * kDarkVaries + variance) - logNormal(d.b, 0.0, kByChance * kByChance + variance);
+}
+
 class Test {
  public:
   Test(const cv::Mat& picture, const cv::Mat& unknown) : darkness_(picture.size(), CV_32F) {
@@ -87,44 +94,33 @@ class Test {
     cv::Mat(halved(grown(unknown, kMargin)) == 0).convertTo(weight_, CV_32F, 1.0 / 255.0);
   }
 
-  // @param region CV_8UC1; hidden CV_32FC1
-  Verdict of(const cv::Mat& region, const cv::Mat& hidden) const {
-    const int reach = static_cast<int>(kReach * kCoarse) + kFarthest + 1;
+  // Log of the odds that a shadow is there; 0: cannot be told. @param region CV_8UC1; hidden CV_32FC1
+  double of(const cv::Mat& region, const cv::Mat& hidden) const {
+    const int reach = kAround + kFarthest + 1;
     cv::Rect box = cv::boundingRect(region);
     box = cv::Rect(box.x / 2 - reach, box.y / 2 - reach, box.width / 2 + 2 * reach, box.height / 2 + 2 * reach) & cv::Rect({0, 0}, darkness_.size());
     const cv::Mat part = cv::Mat(halved(region) > 0)(box);
-    cv::Mat own = cv::Mat::zeros(box.size(), CV_32F);
+    cv::Mat open;
+    cv::erode(weight_(box) > 0.0f, open, cv::Mat::ones(2 * kFarthest + 1, 2 * kFarthest + 1, CV_8U));
+    if (cv::countNonZero(part & open) < kLeastOpen) return 0.0;
+    cv::Mat own = cv::Mat::zeros(box.size(), CV_32F), weight = own.clone();
     halved(hidden)(box).copyTo(own, grown(part, kSoft));
-    const cv::Point beside = bestPlace(part, own, box);
-    const Depth fine = at(kFine, part, shifted(own, beside), box), coarse = at(kCoarse, part, shifted(own, beside), box);
-    if (fine.evidence < kLeastEvidence) return Verdict::kOpen;
-    const bool edged = fine.b >= kEdgeShare * coarse.b;
-    if (fine.b + 2.0 * fine.deviation < kLeastDark || !edged) return Verdict::kUnseen;
-    return fine.b - 2.0 * fine.deviation > kSurelyDark ? Verdict::kSeen : Verdict::kOpen;
+    weight_(box).copyTo(weight, grown(part, kAround + kFarthest));
+    const cv::Mat y = lessSurroundings(darkness_(box), weight);
+    const Depth depth = depthOf(bestPlace(own, weight, y), y);
+    return depth.evidence >= kLeastEvidence ? logOdds(depth) : 0.0;
   }
 
  private:
-  cv::Mat weightAround(const cv::Mat& part, double scale, const cv::Rect& box) const {
-    cv::Mat weight = cv::Mat::zeros(box.size(), CV_32F);
-    weight_(box).copyTo(weight, grown(part, static_cast<int>(kReach * scale) + kFarthest));
-    return weight;
-  }
-
-  Depth at(double scale, const cv::Mat& part, const cv::Mat& hidden, const cv::Rect& box) const {
-    const cv::Mat weight = weightAround(part, scale, box);
-    return depthOf(lessSurroundings(hidden, weight, scale), lessSurroundings(darkness_(box), weight, scale));
-  }
-
-  // Where the prediction explains most.
-  cv::Point bestPlace(const cv::Mat& part, const cv::Mat& hidden, const cv::Rect& box) const {
-    const cv::Mat weight = weightAround(part, kFine, box), y = lessSurroundings(darkness_(box), weight, kFine);
-    cv::Point best;
+  // h' where the prediction explains most.
+  static cv::Mat bestPlace(const cv::Mat& hidden, const cv::Mat& weight, const cv::Mat& y) {
+    cv::Mat best;
     double most = 0.0;
     for (int dv = -kFarthest; dv <= kFarthest; dv += kStep) {
       for (int du = -kFarthest; du <= kFarthest; du += kStep) {
-        const cv::Mat h = lessSurroundings(shifted(hidden, {du, dv}), weight, kFine);
+        const cv::Mat h = lessSurroundings(shifted(hidden, {du, dv}), weight);
         const double hh = h.dot(h), explained = hh > 0.0 ? h.dot(y) / std::sqrt(hh) : 0.0;
-        if (explained > most) most = explained, best = {du, dv};
+        if (best.empty() || explained > most) most = explained, best = h;
       }
     }
     return best;
@@ -136,7 +132,7 @@ class Test {
 struct Region {
   cv::Mat mask;  // CV_8UC1
   bool of_sun;
-  Verdict verdict;
+  double odds;  // log
 };
 
 void addRegions(const Test& test, const cv::Mat& visible, float limit, bool of_sun, std::vector<Region>& regions) {
@@ -159,19 +155,19 @@ SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& p
   std::vector<Region> regions;
   addRegions(test, sun, kSunShaded, true, regions);
   addRegions(test, sky, kSkyShaded, false, regions);
-  int seen = 0, unseen = 0;  // px
-  for (const Region& r : regions) {
-    if (r.verdict == Verdict::kSeen) seen += cv::countNonZero(r.mask);
-    if (r.verdict == Verdict::kUnseen) unseen += cv::countNonZero(r.mask);
-  }
+  double all = 0.0;
+  bool any_seen = false;
+  for (const Region& r : regions) all += r.odds;
   const cv::Mat nothing = cv::Mat::zeros(picture.size(), CV_8U);
-  SeenShadows result{nothing.clone(), nothing.clone(), nothing.clone(), unseen > 0 && seen == 0};
-  // What cannot be told follows what can.
+  SeenShadows result{nothing.clone(), nothing.clone(), nothing.clone(), false};
+  // What cannot be decided by itself goes with all the others.
   for (const Region& r : regions) {
-    const bool believed = r.verdict == Verdict::kSeen || (r.verdict == Verdict::kOpen && unseen <= seen);
+    const bool believed = (std::abs(r.odds) > kDecided ? r.odds : all) >= 0.0;
     cv::Mat& of = !believed ? result.refuted : r.of_sun ? result.sun : result.sky;
     of |= r.mask;
+    any_seen = any_seen || believed;
   }
+  result.none = !regions.empty() && !any_seen;
   return result;
 }
 

@@ -6,8 +6,9 @@ namespace calipso::render {
 
 // Which of the predicted shadows a picture shows, decided region by region: a connected part of the prediction as a whole.
 //   y' = b h' + e,   y: -log of brightness, h: hidden part of the light, ': less its mean around the pixel,
-//   b: how dark the shadow is. A shadow has its b at its border, whatever the scale of that mean; something that
-//   happens to be dark there, or to get darker, has not. A prediction may lie some pixels beside its shadow.
+//   b: how dark the shadow is
+// A shadow is dark from its border on; something that happens to be dark there, or gets darker, has a small b. The odds are those
+// of b under a shadow and under none. A prediction may lie some pixels beside its shadow.
 struct SeenShadows {
   cv::Mat sun, sky;   // CV_8UC1: the regions that are seen, or that nothing speaks against
   cv::Mat refuted;    // CV_8UC1: the others
