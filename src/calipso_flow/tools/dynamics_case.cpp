@@ -8,10 +8,12 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "aligned_models.hpp"
 #include "calipso_flow/clip_dynamics.hpp"
 #include "calipso_scene/scene.hpp"
 #include "deformation_errors.hpp"
@@ -91,23 +93,31 @@ ObjectModel heldAtDepth(const SceneObject& object, const Camera& camera, ObjectM
   return model;
 }
 
+// The same surface with the true object's frame, so that poses compare.
+ObjectModel inFrame(const Eigen::Isometry3d& world_from_object, ObjectModel model) {
+  const Eigen::Isometry3d change = world_from_object.inverse() * model.world_from_object;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    model.mesh.vertices.row(i) = (change * model.mesh.vertex(i)).transpose();
+  }
+  model.world_from_object = world_from_object;
+  return model;
+}
+
+// @param aligned  of this object; read when `models` asks for it
 ObjectModel modelOf(const Scene& scene, const SceneObject& object, const TrueObject& truth,
-                    const std::string& models) {
+                    const std::string& models, const std::optional<AlignedModel>& aligned) {
+  const Eigen::Isometry3d& pose = truth.world_from_object.front();
+  if (aligned) return inFrame(pose, aligned->model);
   ObjectModel model;
   model.name = object.name;
   model.index = object.index;
-  model.world_from_object = truth.world_from_object.front();
   if (models == "true" || models == "held") {
+    model.world_from_object = pose;
     model.mesh = loadMesh(truth.mesh_path);
     return models == "true" ? model : heldAtDepth(object, scene.camera, model);
   }
-  // Given in world coordinates: brought into the true object frame, so that poses compare.
   model.mesh = loadMesh(models + "/" + object.name + ".obj");
-  const Eigen::Isometry3d object_from_world = model.world_from_object.inverse();
-  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
-    model.mesh.vertices.row(i) = (object_from_world * model.mesh.vertex(i)).transpose();
-  }
-  return model;
+  return inFrame(pose, model);
 }
 
 const Eigen::Vector3d& at(const std::vector<Eigen::Vector3d>& values, size_t k) {
@@ -288,13 +298,20 @@ std::vector<std::string> evaluateScene(const std::string& directory, const Dynam
   std::vector<cv::Mat> masks;
   std::vector<TrueObject> truths;
   const int scale = options.scale;
-  for (const SceneObject& object : scene.objects) {
+  std::vector<std::optional<AlignedModel>> aligned(scene.objects.size());
+  if (options.models == "aligned") {
+    std::vector<AlignedModel> fits = alignedModels(scene);
+    std::move(fits.begin(), fits.end(), aligned.begin());
+  }
+  for (size_t i = 0; i < scene.objects.size(); ++i) {
+    const SceneObject& object = scene.objects[i];
     const std::optional<TrueObject> truth = readTruth(directory, object.name);
     if (!truth) continue;
-    object_models.push_back(modelOf(scene, object, *truth, options.models));
+    object_models.push_back(modelOf(scene, object, *truth, options.models, aligned[i]));
     object_models.back().attached = verticesIn(object.attachments, object_models.back());
-    masks.push_back(truth->mask_path.empty() ? cv::Mat()
-                                             : cv::imread(truth->mask_path, cv::IMREAD_GRAYSCALE));
+    masks.push_back(aligned[i] ? aligned[i]->mask
+                    : truth->mask_path.empty() ? cv::Mat()
+                                               : cv::imread(truth->mask_path, cv::IMREAD_GRAYSCALE));
     if (!masks.back().empty()) {
       cv::resize(masks.back(), masks.back(), {}, scale, scale, cv::INTER_NEAREST);
     }

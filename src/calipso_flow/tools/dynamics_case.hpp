@@ -6,7 +6,7 @@
 namespace calipso::flow {
 
 struct DynamicsOptions {
-  std::string models = "held";  // "true", "held" or a folder of aligned meshes; see evaluate's usage
+  std::string models = "aligned";  // "aligned", "true", "held" or a folder of meshes; see evaluate's usage
   std::string trace;            // folder for one CSV file per object; empty: none
   int scale = 1;                // the frames are enlarged by this factor first
 };

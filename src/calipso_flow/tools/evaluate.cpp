@@ -13,13 +13,12 @@
 namespace {
 
 constexpr char kUsage[] =
-    "usage: evaluate [--models true|held|DIR] [--trace DIR] [--scale N] [--filmed] [--repeats N] PATH...\n"
+    "usage: evaluate [--models aligned|true|held|DIR] [--trace DIR] [--scale N] [--filmed] [--repeats N] PATH...\n"
     "  PATH      a scene folder (scene.yaml), or a folder with frame10.png, frame11.png, flow10.flo\n"
-    "  --models  true: true shape and pose; held (default): the true shape as an alignment sees it\n"
-    "            that holds the rough placement's depth; DIR: aligned models, <object>.obj in world\n"
-    "            coordinates\n"
+    "  --models  aligned (default): as calipso_align fits them to the key frame; true: true shape and\n"
+    "            pose; held: the true shape as a fit without any depth sees it, at the rough placement's\n"
+    "            distance; DIR: <object>.obj in world coordinates\n"
     "  --trace   writes one CSV file per object there: the estimate and the truth, frame by frame\n"
-    "  --filmed  adds bodies simulated in a known wind and with a known stiffness, filmed by this tool\n"
     "  --filmed  adds bodies simulated in a known wind or with a known stiffness, filmed by this tool\n"
     "  --repeats N noisy films of a thrown box: how often the stated intervals hold the truth\n"
     "  --scale   enlarges the frames first: 2 makes 1280x720 of 640x360\n";
