@@ -188,7 +188,7 @@ def degradation(program, scenes, changes):
         with tempfile.TemporaryDirectory() as folder:
             for scene in scenes:
                 copy = degraded_copy(scene, folder, change)
-                for entry in evaluate(program, [copy], "held"):
+                for entry in evaluate(program, [copy], "aligned"):
                     entries.append(dict(entry, degraded=title))
                 shutil.rmtree(copy)
     return entries
@@ -204,14 +204,14 @@ def main():
     os.makedirs(folder, exist_ok=True)
 
     with tempfile.TemporaryDirectory() as trace:
-        held = evaluate(arguments.evaluate, arguments.scenes, "held", trace)
+        aligned = evaluate(arguments.evaluate, arguments.scenes, "aligned", trace)
         pictures = []
-        for entry in (e for e in held if e.get("moving") and not e.get("deforms")):
+        for entry in (e for e in aligned if e.get("moving") and not e.get("deforms")):
             name = f"{entry['case']}_{entry['object']}"
             picture = f"dynamics_{name}.png"
             plot(os.path.join(trace, name + ".csv"), os.path.join(folder, picture))
             pictures.append(picture)
-        rigid = [os.path.join(trace, f"{e['case']}_{e['object']}.csv") for e in held
+        rigid = [os.path.join(trace, f"{e['case']}_{e['object']}.csv") for e in aligned
                  if e.get("moving") and not e.get("deforms")]
         if rigid:
             plot_errors(rigid, os.path.join(folder, "dynamics_errors.png"))
@@ -224,16 +224,16 @@ def main():
     with tempfile.TemporaryDirectory() as pair:
         flow_pair(pair)
         flow = run(arguments.evaluate, pair)
-    moving_names = {e["case"] for e in held if e["moving"] and not e["deforms"]}
+    moving_names = {e["case"] for e in aligned if e["moving"] and not e["deforms"]}
     moving = [s for s in arguments.scenes if os.path.basename(s.rstrip("/")) in moving_names]
     noisy = degradation(arguments.evaluate, moving,
                         [(f"noise {s} grey", add_noise(s)) for s in NOISE_GREY] +
                         [(f"blur {n} px", blur_down(n)) for n in BLUR_PX])
-    cloth = [e for e in held + exact if e.get("deforms")]
+    cloth = [e for e in aligned + exact if e.get("deforms")]
     with open(arguments.out, "w") as out:
         out.write("# Dynamics\nWritten by `calipso_flow/bench/run.sh`. Errors are root mean squares up to the "
                   "first true collision. ms/frame is wall time over all objects of a scene, tracking and fit.\n\n"
-                  "## Aligned model, depth held at the rough placement\n" + table(held) +
+                  "## Models and masks as calipso_align finds them\n" + table(aligned) +
                   "\n\n## True model and pose\n" + table(exact) +
                   "\n\n## Enlarged to twice the width and height\n" + table(large) +
                   "\n\n## Simulated and filmed: sheets in a steady wind, beams struck\n"
@@ -244,7 +244,7 @@ def main():
                   "## A thrown box, filmed with fresh noise\n" + columns(repeats, REPEATED) +
                   "\n\n## Dense flow and its peers on one pair of 640x360\n" + columns(flow, FLOW))
         if cloth:
-            out.write("\n\n## Cloth: held depth, then true model\n" + columns(cloth, CLOTH))
+            out.write("\n\n## Cloth: as aligned, then true model\n" + columns(cloth, CLOTH))
         if noisy:
             out.write("\n\n## Noise and blur added to the frames\n" + table(noisy, "frames"))
         if pictures:
