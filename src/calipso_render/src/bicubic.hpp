@@ -15,7 +15,7 @@ inline cv::v_float32x4 bicubicWeights(float t) {
 }
 
 inline cv::v_float32x4 bicubicAtBorder(const cv::Mat& image, float fu, float fv, cv::v_float32x4 wx, cv::v_float32x4 wy) {
-  const auto clampTo = [](float f, int limit) { return static_cast<int>(std::clamp(f, -8.0f, limit + 8.0f)); };
+  const auto clampTo = [](float f, int limit) { return f >= -8.0f ? static_cast<int>(std::min(f, limit + 8.0f)) : -8; };  // what is no number, too
   const int i = clampTo(fu, image.cols), j = clampTo(fv, image.rows);
   float x[4], y[4];
   cv::v_store(x, wx), cv::v_store(y, wy);
@@ -29,18 +29,20 @@ inline cv::v_float32x4 bicubicAtBorder(const cv::Mat& image, float fu, float fv,
   return cv::v_max(sum, cv::v_setzero_f32());
 }
 
-// sampleBicubic() of four channels in one register.
+// sampleBicubic() of four channels in one register. Even and odd columns are summed apart, as Kernels::sample does.
 inline cv::v_float32x4 bicubic(const cv::Mat& image, float u, float v) {
   const float fu = std::floor(u), fv = std::floor(v);
   const cv::v_float32x4 wx = bicubicWeights(u - fu), wy = bicubicWeights(v - fv);
   if (!(u >= 1.0f && v >= 1.0f && u < image.cols - 2.0f && v < image.rows - 2.0f)) return bicubicAtBorder(image, fu, fv, wx, wy);
   const cv::v_float32x4 x0 = cv::v_broadcast_element<0>(wx), x1 = cv::v_broadcast_element<1>(wx), x2 = cv::v_broadcast_element<2>(wx), x3 = cv::v_broadcast_element<3>(wx);
+  const cv::v_float32x4 y0 = cv::v_broadcast_element<0>(wy), y1 = cv::v_broadcast_element<1>(wy), y2 = cv::v_broadcast_element<2>(wy), y3 = cv::v_broadcast_element<3>(wy);
   const std::size_t step = image.step1();
   const float* p = image.ptr<float>(static_cast<int>(fv) - 1) + 4 * (static_cast<int>(fu) - 1);
-  const auto line = [&](const float* row) { return (x0 * cv::v_load(row) + x1 * cv::v_load(row + 4)) + (x2 * cv::v_load(row + 8) + x3 * cv::v_load(row + 12)); };
-  const cv::v_float32x4 upper = cv::v_broadcast_element<0>(wy) * line(p) + cv::v_broadcast_element<1>(wy) * line(p + step);
-  const cv::v_float32x4 lower = cv::v_broadcast_element<2>(wy) * line(p + 2 * step) + cv::v_broadcast_element<3>(wy) * line(p + 3 * step);
-  return cv::v_max(upper + lower, cv::v_setzero_f32());
+  const auto columns = [&](const float* q, const cv::v_float32x4& a, const cv::v_float32x4& b) {
+    const auto line = [&](const float* row) { return a * cv::v_load(row) + b * cv::v_load(row + 8); };
+    return (y0 * line(q) + y1 * line(q + step)) + (y2 * line(q + 2 * step) + y3 * line(q + 3 * step));
+  };
+  return cv::v_max(columns(p, x0, x2) + columns(p + 4, x1, x3), cv::v_setzero_f32());
 }
 
 }  // namespace calipso::render

@@ -9,59 +9,47 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kSameRatio = 0.01f, kPlateRatio = 0.06f;  // change of light from which the plate is taken, and only it
 constexpr int kLeastChange = 3;  // px across
 constexpr int kRimReach = 4;  // mask margins around a surface at rest in which the frame's pixels stay
 
 }  // namespace
 
-std::uint8_t changeOfLight(float before, float now) {
-  return static_cast<std::uint8_t>(255.0f * smoothStep(kSameRatio, kPlateRatio, std::abs(now - before)) + 0.5f);
+bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px) {
+  Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Array2f moved = (now[triangle[i]] - then[triangle[i]]).head<2>();
+    low = low.min(moved), high = high.max(moved);
+  }
+  return (low < px).all() && (high > -px).all();
 }
 
 // Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by some
 // pixels, so what lies that near to both the shadow and the change is taken from the plate. A change of single pixels is
 // noise of the shadow's border and moves nothing.
 void FrameCompositor::findRelit() {
-  relit_ = cv::Mat::zeros(region_.size(), CV_32F);
+  relit_ = cv::Mat::zeros(region_.size(), CV_8U);
   const int reach = params_.background.shadow_margin_px, side = reach + 2;
   cv::Rect box = shadows_.shaded_box;
   if (box.empty()) return;
   box = cv::Rect(box.x - side, box.y - side, box.width + 2 * side, box.height + 2 * side) & region_;
   if (box.empty()) return;
-  cv::Mat change = cv::Mat::zeros(box.size(), CV_8U), relit;
+  cv::Mat change(box.size(), CV_8U), relit;
+  const cv::Rect here = box - region_.tl();
+  const float umbra = luminance(prepared_.umbra), lit = 1.0f - umbra;
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < box.height; ++v) {
+    const auto rowOf = [&](const cv::Mat& picture) { return picture.ptr<float>(here.y + v) + here.x; };
+    const float *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
+    std::uint8_t* out = change.ptr<std::uint8_t>(v);
     for (int u = 0; u < box.width; ++u) {
-      const cv::Point at = cv::Point(u, v) + box.tl() - region_.tl();
-      const float sun = sun_now_.at<float>(at), sun_before = sun_before_.at<float>(at);
-      if (sun < 0.0f) continue;
-      const float now = luminance(shadowRatio(sun, sky_now_.at<float>(at))), before = luminance(shadowRatio(sun_before, sky_before_.at<float>(at)));
-      change.at<std::uint8_t>(v, u) = changeOfLight(before, now);
+      const float by = std::abs(umbra * (sky[u] - sky_before[u]) + lit * (sun[u] - sun_before[u]));
+      out[u] = sun[u] < 0.0f ? 0 : changeOfLight(by);
     }
   }
   cv::morphologyEx(change, change, cv::MORPH_OPEN, cv::Mat::ones(kLeastChange, kLeastChange, CV_8U));
   cv::dilate(change, change, disc(reach));
   cv::min(change, shadows_.shaded(box), change);
-  change.convertTo(relit, CV_32F, 1.0 / 255.0);
-  cv::blur(relit, relit_(cv::Rect(box.tl() - region_.tl(), box.size())), {3, 3}, {-1, -1}, cv::BORDER_DEFAULT | cv::BORDER_ISOLATED);
-}
-
-// Where no object hides a support plane whose light changes.
-void FrameCompositor::findChanged() {
-  changed_.create(region_.size(), CV_8U);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) {
-    const float *sun = sun_now_.ptr<float>(v), *sun_before = sun_before_.ptr<float>(v), *relit = relit_.ptr<float>(v);
-    const float *sky = sky_now_.ptr<float>(v), *sky_before = sky_before_.ptr<float>(v);
-    const std::uint8_t* labels = labels_.ptr<std::uint8_t>(region_.y + v) + region_.x;
-    std::uint8_t* changed = changed_.ptr<std::uint8_t>(v);
-    for (int u = 0; u < region_.width; ++u) {
-      const float change = std::abs(sun[u] - sun_before[u]) + std::abs(sky[u] - sky_before[u]);
-      const bool differs = (relit[u] > 0.0f) | (change >= kSameShadow);
-      changed[u] = (differs & (sun[u] >= 0.0f) & (labels[u] == 0)) ? 255 : 0;
-    }
-  }
+  cv::blur(change, relit_(here), {3, 3}, {-1, -1}, cv::BORDER_DEFAULT | cv::BORDER_ISOLATED);
 }
 
 // The rim of an original's pixels belongs to the surface beside it, not to another edited object's.
@@ -86,32 +74,26 @@ void FrameCompositor::keepRims(const cv::Mat& owner) {
   rims.copyTo(still_, owner < 0);
 }
 
-// The triangles with a point that may be at rest: the box around its corners' movements reaches zero.
+// The triangles with a point that may be at rest.
 bool FrameCompositor::findResting(int slot, std::vector<bool>& can_rest) const {
   const Actor& actor = actors_[slot];
   can_rest.assign(actor.surface->triangles.size(), false);
   if (observed_[slot].points.empty()) return false;
   bool any = false;
   for (std::size_t t = 0; t < can_rest.size(); ++t) {
-    Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
-    for (int i = 0; i < 3; ++i) {
-      const int vertex = actor.surface->triangles[t][i];
-      const Eigen::Array2f moved = (actor.screen.points[vertex] - observed_[slot].points[vertex]).head<2>();
-      low = low.min(moved), high = high.max(moved);
-    }
-    can_rest[t] = (low < kMovedPx).all() && (high > -kMovedPx).all();
+    can_rest[t] = mayMoveLess(actor.screen.points, observed_[slot].points, actor.surface->triangles[t], kMovedPx);
     any = any || can_rest[t];
   }
   return any;
 }
 
 void FrameCompositor::findStill() {
-  still_ = cv::Mat::zeros(region_.size(), CV_32F);
   if (!params_.keep_still) return;
   std::vector<std::vector<bool>> can_rest(actors_.size());
   bool any = false;
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) any = findResting(static_cast<int>(slot), can_rest[slot]) || any;
   if (!any) return;
+  still_ = cv::Mat::zeros(region_.size(), CV_32F);
   cv::Mat owner(region_.size(), CV_16S, cv::Scalar(-1));  // edited surface seen there
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) {

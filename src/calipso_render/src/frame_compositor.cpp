@@ -48,9 +48,9 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   const int slot = VisibilityBuffer::objectOf(id);
   const SurfacePoint p = surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_);
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
-  const Look look = lookOf(slot);
-  const Lit lit = lightAt(p, id, u, v);
-  const cv::Vec3f albedo = look.albedo.value_or(appearance.albedoAt(p)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
+  const Look& look = lookOf(slot);
+  const Lit lit = exactLight({p.position, p.normal, p.sky}, slot);
+  const cv::Vec3f albedo = (look.albedo ? *look.albedo : appearance.albedoAt(p)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
   const auto colour = [](const cv::Vec4f& c) { return cv::Vec3f(c[0], c[1], c[2]); };
   return appearance.radiance(albedo, colour(lit.diffuse), colour(lit.highlight));
 }
@@ -72,6 +72,7 @@ bool FrameCompositor::isDrawn(std::uint32_t id, int u, int v) const {
 
 FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
   Drawn drawn;
+  if (screenAt(u, v) == 1.0f) return drawn;
   const EdgeCoverage::Pixel* edge = edges_->at(u, v);
   if (edge == nullptr) {
     const std::uint32_t id = centre_->idAt(u, v);
@@ -117,7 +118,7 @@ FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
     return behind;
   }
   // Darkened further, a pixel keeps its own grain; what the original shaded must come from the plate.
-  const float from_plate = relit_.at<float>(at);
+  const float from_plate = relit_.at<std::uint8_t>(at) / 255.0f;
   if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameShadow) return behind;
   cv::Vec3f darkened = behind.colour;
   for (int c = 0; c < 3; ++c) darkened[c] *= std::min(1.0f, now[c] / std::max(before[c], kDarkest));

@@ -10,6 +10,7 @@
 #include "calipso_render/visibility.hpp"
 #include "line_codec.hpp"
 #include "plane_view.hpp"
+#include "point_light.hpp"
 #include "triangle_map.hpp"
 
 namespace calipso::render {
@@ -50,8 +51,15 @@ inline float smoothStep(float from, float to, float x) {
 
 inline cv::Mat disc(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
 
-// How much a change of brightness calls for the plate: 0 not visible .. 255 only it.
-std::uint8_t changeOfLight(float before, float now);
+// Has the triangle a point that moved less than `px` in the picture? The box around its corners' movements tells.
+bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px);
+
+// How much a change of brightness by `by` calls for the plate: 0 not visible .. 255 only it.
+inline std::uint8_t changeOfLight(float by) {
+  constexpr float kSameRatio = 0.01f, kPlateRatio = 0.06f;  // from which the plate is taken, and only it
+  const float t = std::clamp((by - kSameRatio) * (1.0f / (kPlateRatio - kSameRatio)), 0.0f, 1.0f);
+  return static_cast<std::uint8_t>(static_cast<int>(255.0f * (t * t * (3.0f - 2.0f * t)) + 0.5f));
+}
 
 // One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.
 class FrameCompositor {
@@ -81,12 +89,23 @@ class FrameCompositor {
     int slot = -1;        // -1: nothing is drawn here
   };
 
+  // What has to be done for a pixel: nothing; one drawn surface; what lies behind, in other light; more than one surface.
+  enum Kind : std::uint8_t { kNone = 0, kPlain, kBehind, kSpecial };
+
   // A row of the result over region_, on its way.
   struct Row {
     std::vector<cv::Vec4f> colour;     // linear; fourth: the part that carries no camera noise yet
     std::vector<std::uint8_t> source;  // Provenance
+    std::vector<Kind> kinds;
     std::vector<Lit> light;            // at the columns of lit_
+    std::vector<float> key_u, key_v;   // of what is drawn: place in Appearance::albedo
+    std::vector<int> uneven;           // pixels on which light has to be computed
+
+    void resize(std::size_t width) {
+      colour.resize(width), source.resize(width), kinds.resize(width), key_u.resize(width), key_v.resize(width);
+    }
   };
+
 
   // What drawing misses beyond the silhouette, where a surface's rim has come to.
   struct Rim {
@@ -105,12 +124,14 @@ class FrameCompositor {
   void prepareFrame();
   void stage();
   void findResidual();
-  void findMiss();
-  void findRims();
+  cv::Rect carriedBox() const;
+  void findMiss(const cv::Rect& carried);
+  void findRims(const cv::Rect& carried);
   void addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, cv::Vec4f& colour) const;
   void addRimResidual(int v, Row& row) const;
   cv::Vec4f missAt(float u, float v, int owner) const;
   static RestPicture restPicture(const Prepared& prepared, const RenderParams& params, const std::vector<bool>& edited);
+  void recordRow(int v, Row& row, RestPicture& picture) const;
   Composed composedAt(int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool restsAt(int surface) const;
@@ -119,7 +140,7 @@ class FrameCompositor {
   void cacheOriginals(const std::vector<Occluder>& originals);
   void cacheOthers(const std::vector<Occluder>& others);
   cv::Mat sunOver(const Visibility& shadow, const cv::Rect& bounds) const;
-  cv::Mat skyOver(const Visibility& shadow, const cv::Rect& region) const;
+  cv::Mat skyOver(const Visibility& shadow, const cv::Rect& region, const cv::Mat& skip) const;
   void chooseRegion();
   void findRemoved();
   void findPassingShadows();
@@ -131,8 +152,8 @@ class FrameCompositor {
   void findSurfaceLight();
   void measureSky();
   void measureSun();
+  void joinSun(int v, std::uint8_t* wanted);
   void findRelit();
-  void findChanged();
   void findMaps();
   void findShaded();
   void findScreened();
@@ -142,8 +163,11 @@ class FrameCompositor {
   cv::Mat originalOf(int surface) const;
   void composeRow(int v, Row& row, FrameOutput& out) const;
   void drawRow(int v, Row& row) const;
+  void findKinds(int v, Row& row) const;
   void lightRow(int v, Row& row) const;
-  void shadeRun(int v, int first, int last, std::uint32_t id, Row& row) const;
+  void reflectStretch(int v, int first, int last, int slot, Row& row) const;
+  void shadeStretch(int v, int first, int last, int slot, Row& row) const;
+  void drawStretch(int v, int first, int last, int slot, Row& row) const;
   void composeBehind(int u, int v, Row& row) const;
   void composeSpecial(int u, int v, Row& row) const;
   void keepStill(int v, Row& row) const;
@@ -155,9 +179,8 @@ class FrameCompositor {
   cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
   float stillness(std::uint32_t id, float u, float v) const;
   float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
-  Lit lightAt(const SurfacePoint& p, std::uint32_t id, float u, float v) const;
-  Lit exactLight(const SurfacePoint& p, int slot) const;
-  Look lookOf(int slot) const;
+  Lit exactLight(const LitPoint& p, int slot) const;
+  const Look& lookOf(int slot) const;
   bool isSmooth(int i, int j) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
@@ -168,6 +191,7 @@ class FrameCompositor {
   const FrameInput& frame_;
   ShadowCache& shadows_;
   const Light light_;  // of this frame; what the video shows was lit by Prepared::light
+  const PointLight point_light_;  // light_
   RestPicture& rest_;
 
   std::vector<cv::Mat> footprints_;   // Prepared::footprints, likewise
@@ -182,24 +206,27 @@ class FrameCompositor {
   std::vector<bool> at_rest_;                 // per surface: the video has it where the key frame has it
   std::vector<Actor> actors_;                 // visible ones, per slot
   std::vector<int> surface_of_slot_;
+  std::vector<Gloss> glosses_;                // per slot, as its look has it
   std::vector<ScreenMesh> observed_;          // per slot: where the video has it (edited objects at rest only)
   std::unique_ptr<Visibility> moved_shadow_;   // of the edited objects where they are now
   std::unique_ptr<Visibility> moved_sky_;
   cv::Rect region_, moved_bounds_;  // what an edit can change; what the edited objects can shade now
   cv::Mat passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
+  cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
   cv::Mat covered_;  // CV_8UC1 over region_: 255 = so deep behind drawn surfaces that light there does not matter
   cv::Mat sky_now_, sky_before_;  // CV_32FC1 over region_: part of the sky that a support plane sees
   cv::Mat sun_now_, sun_before_;  // CV_32FC1 over region_: the same of the sun; negative where there is no plane
-  cv::Mat relit_;    // CV_32FC1 over region_: 1 = the original's shadow, to be taken from the plate
+  cv::Mat relit_;    // CV_8UC1 over region_: 255 = the original's shadow, to be taken from the plate
   std::vector<Lit> lit_;           // at the corners of squares of kLightStep px over region_
   std::vector<std::uint8_t> smooth_;  // per square, by its first corner: light between the corners follows from theirs
   int lit_columns_ = 0;
-  cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here
-  cv::Mat changed_;  // CV_8UC1 over region_: 255 = light on a support plane changes
-  cv::Mat miss_;     // CV_32FC4 over rest_.box: what drawing misses of the video, linear, and 1 where that is known; may be empty
+  cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here; empty: everything did
+  cv::Rect miss_box_;
+  cv::Mat miss_;     // CV_32FC4 over miss_box_: what drawing misses of the video, linear, and 1 where that is known; may be empty
   std::vector<Rim> rims_;            // by rows
   std::vector<std::size_t> rim_rows_;  // per row of region_: its first in rims_, and one more
+  bool any_shaded_ = false;            // one of them is
   std::vector<bool> may_be_shaded_;    // per slot: not edited, and in the way of the sun that falls on edited ones
   cv::Mat screened_;                   // CV_8UC1 over region_: 255 = scenery hides what is drawn; may be empty
   std::vector<bool> always_drawn_;     // per slot: isDrawn() wherever it is seen

@@ -76,14 +76,14 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   for (const Occluder& o : originals) shadows_.bounds |= shadowBounds(*o.vertices, prepared_.light.light);
   shadows_.originals = originals.empty() ? nullptr : shadowOf(originals, prepared_.light.light, params_);
   shadows_.originals_sun = shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadows_.originals, shadows_.bounds);
-  shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_32F, cv::Scalar(1.0f)) : skyOver(*skyShadowOf(originals, params_), whole);
+  shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_32F, cv::Scalar(1.0f)) : skyOver(*skyShadowOf(originals, params_), whole, cv::Mat());
   shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < whole.height; ++v) {
     for (int u = 0; u < whole.width; ++u) {
       const float sun = valueOrOne(shadows_.originals_sun, u, v), sky = shadows_.originals_sky.at<float>(v, u);
       if ((sun == 1.0f && sky == 1.0f) || !takesShadow(u, v)) continue;
-      shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(1.0f, luminance(shadowRatio(sun, sky)));
+      shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(1.0f - luminance(shadowRatio(sun, sky)));
     }
   }
   cv::dilate(shadows_.shaded, shadows_.shaded, disc(params_.background.shadow_margin_px));
@@ -97,7 +97,8 @@ cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bound
 }
 
 // The sky changes slowly over a support plane: measured on a grid that hangs on the picture, interpolated between.
-cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region) const {
+// @param skip CV_8UC1 over `region`: 255 = not wanted; may be empty
+cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region, const cv::Mat& skip) const {
   const int step = skyStep(frame_.bgr.size());
   const cv::Point first(region.x / step, region.y / step);
   cv::Mat grid((region.br().y - 1) / step - first.y + 2, (region.br().x - 1) / step - first.x + 2, CV_32F, cv::Scalar(1.0f));
@@ -105,20 +106,26 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
   for (int j = 0; j < grid.rows; ++j) {
     Receiver r;
     for (int i = 0; i < grid.cols; ++i) {
-      if (plane_view_.at((first.x + i) * step, (first.y + j) * step, r)) grid.at<float>(j, i) = shadow.visibility(r.position, r.normal);
+      const int u = (first.x + i) * step, v = (first.y + j) * step;
+      const bool skipped = !skip.empty() && region.contains({u, v}) && skip.at<std::uint8_t>(v - region.y, u - region.x) != 0;
+      if (!skipped && plane_view_.at(u, v, r)) grid.at<float>(j, i) = shadow.visibility(r.position, r.normal);
     }
   }
-  cv::Mat sky(region.size(), CV_32F), line(1, grid.cols, CV_32F);
-  for (int v = 0; v < region.height; ++v) {
-    const int j = (region.y + v) / step - first.y;
-    const float y = static_cast<float>((region.y + v) % step) / step;
-    for (int i = 0; i < grid.cols; ++i) line.at<float>(i) = (1.0f - y) * grid.at<float>(j, i) + y * grid.at<float>(j + 1, i);
-    float* out = sky.ptr<float>(v);
-    int i = 0, rest = region.x % step;
-    for (int u = 0; u < region.width; ++u) {
-      const float x = static_cast<float>(rest) / step;
-      out[u] = (1.0f - x) * line.at<float>(i) + x * line.at<float>(i + 1);
-      if (++rest == step) rest = 0, ++i;
+  cv::Mat sky(region.size(), CV_32F);
+#pragma omp parallel
+  {
+    std::vector<float> line(grid.cols), whole(static_cast<std::size_t>(grid.cols) * step);
+#pragma omp for schedule(static)
+    for (int v = 0; v < region.height; ++v) {
+      const int j = (region.y + v) / step - first.y;
+      const float y = static_cast<float>((region.y + v) % step) / step;
+      const float *above = grid.ptr<float>(j), *below = grid.ptr<float>(j + 1);
+      for (int i = 0; i < grid.cols; ++i) line[i] = (1.0f - y) * above[i] + y * below[i];
+      for (int i = 0; i + 1 < grid.cols; ++i) {
+        const float left = line[i], rise = (line[i + 1] - left) / step;
+        for (int k = 0; k < step; ++k) whole[i * step + k] = left + rise * static_cast<float>(k);
+      }
+      std::copy_n(whole.begin() + region.x % step, region.width, sky.ptr<float>(v));
     }
   }
   return sky;
@@ -145,20 +152,24 @@ cv::Rect FrameCompositor::shadowBounds(const Points& vertices, const Light& ligh
 }
 
 void FrameCompositor::findCovered() {
-  covered_ = cv::Mat::zeros(region_.size(), CV_8U);
+  drawn_.create(region_.size(), CV_8U);
+  const bool all_drawn = std::all_of(always_drawn_.begin(), always_drawn_.end(), [](bool always) { return always; });
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) {
     const std::uint32_t* ids = centre_->ids(v);
-    for (int u = 0; u < region_.width; ++u) {
-      if (isDrawn(ids[u], u + region_.x, v + region_.y)) covered_.at<std::uint8_t>(v, u) = 255;
+    std::uint8_t* drawn = drawn_.ptr<std::uint8_t>(v);
+    if (all_drawn) {
+      for (int u = 0; u < region_.width; ++u) drawn[u] = ids[u] != VisibilityBuffer::kNothing ? 255 : 0;
+    } else {
+      for (int u = 0; u < region_.width; ++u) drawn[u] = isDrawn(ids[u], u + region_.x, v + region_.y) ? 255 : 0;
     }
   }
   const int side = 2 * (params_.background.shadow_margin_px + 2) + 1;
-  cv::erode(covered_, covered_, cv::Mat::ones(side, side, CV_8U));
+  cv::erode(drawn_, covered_, cv::Mat::ones(side, side, CV_8U));
 }
 
 void FrameCompositor::measureSky() {
-  sky_now_ = skyOver(*moved_sky_, region_);
+  sky_now_ = skyOver(*moved_sky_, region_, covered_);
   sky_before_ = shadows_.originals_sky(region_);
 }
 
@@ -171,35 +182,46 @@ void FrameCompositor::measureSun() {
     cv::Mat part = sun_now_(here);
     planesInLight(plane_view_, *moved_shadow_, bounds, covered_(here), part);
   }
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) {
-    float *now = sun_now_.ptr<float>(v), *before = sun_before_.ptr<float>(v);
-    const std::uint8_t* covered = covered_.ptr<std::uint8_t>(v);
-    const auto rowOf = [&](const cv::Mat& picture) { return picture.empty() ? nullptr : picture.ptr<float>(v + region_.y) + region_.x; };
-    const float *others = rowOf(shadows_.others_sun), *originals = rowOf(shadows_.originals_sun);
-    for (int u = 0; u < region_.width; ++u) {
-      const float rest = others != nullptr ? others[u] : 1.0f;
-      const bool wanted = covered[u] == 0 && takesShadow(u + region_.x, v + region_.y);
-      now[u] = wanted ? now[u] * rest : -1.0f;
-      before[u] = wanted ? (originals != nullptr ? originals[u] : 1.0f) * rest : -1.0f;
-    }
+#pragma omp parallel
+  {
+    std::vector<std::uint8_t> wanted(region_.width);
+#pragma omp for schedule(static)
+    for (int v = 0; v < region_.height; ++v) joinSun(v, wanted.data());
   }
 }
 
-Look FrameCompositor::lookOf(int slot) const {
-  const ObjectInFrame* state = states_[surface_of_slot_[slot]];
-  return state != nullptr ? state->look : Look();
+// Row v of what edited objects and others shade together, and of what was shaded before.
+void FrameCompositor::joinSun(int v, std::uint8_t* wanted) {
+  float *now = sun_now_.ptr<float>(v), *before = sun_before_.ptr<float>(v);
+  const std::uint8_t* covered = covered_.ptr<std::uint8_t>(v);
+  const auto rowOf = [&](const cv::Mat& picture) { return picture.empty() ? nullptr : picture.ptr<float>(v + region_.y) + region_.x; };
+  const float *others = rowOf(shadows_.others_sun), *originals = rowOf(shadows_.originals_sun);
+  const int width = region_.width;
+  if (originals != nullptr) std::copy_n(originals, width, before);
+  else std::fill_n(before, width, 1.0f);
+  for (int u = 0; others != nullptr && u < width; ++u) now[u] *= others[u], before[u] *= others[u];
+  plane_view_.seesRow(region_.x, v + region_.y, width, wanted);
+  if (!shadowless_.empty()) {
+    const std::uint8_t* none = shadowless_.ptr<std::uint8_t>(v + region_.y) + region_.x;
+    for (int u = 0; u < width; ++u) wanted[u] = none[u] == 0 ? wanted[u] : 0;
+  }
+  for (int u = 0; u < width; ++u) {
+    const bool both = (covered[u] == 0) & (wanted[u] != 0);
+    now[u] = both ? now[u] : -1.0f;
+    before[u] = both ? before[u] : -1.0f;
+  }
 }
 
-FrameCompositor::Lit FrameCompositor::exactLight(const SurfacePoint& p, int slot) const {
-  const Look look = lookOf(slot);
-  Gloss gloss = prepared_.appearances[surface_of_slot_[slot]].gloss;
-  gloss.specular = look.specular.value_or(gloss.specular);
-  gloss.roughness = look.roughness.value_or(gloss.roughness);
+const Look& FrameCompositor::lookOf(int slot) const {
+  static const Look as_it_is;
+  const ObjectInFrame* state = states_[surface_of_slot_[slot]];
+  return state != nullptr ? state->look : as_it_is;
+}
+
+FrameCompositor::Lit FrameCompositor::exactLight(const LitPoint& p, int slot) const {
   const float sun = p.normal.dot(light_.direction) > 0.0f ? newSun(p.position, p.normal) : 0.0f;
-  const cv::Vec3f diffuse = diffuseShading(light_, p.normal, sun, p.sky);
-  const cv::Vec3f highlight = specularShading(light_, gloss, p.normal, (eye_ - p.position).normalized(), sun, p.sky);
-  return {{diffuse[0], diffuse[1], diffuse[2], 0.0f}, {highlight[0], highlight[1], highlight[2], 0.0f}, slot};
+  const PointLight::Shading shading = point_light_.at(glosses_[slot], p.normal, (eye_ - p.position).normalized(), sun, p.sky);
+  return {shading.diffuse, shading.highlight, slot};
 }
 
 // Light at the corners of small squares; where a smooth piece of surface fills a square and the light changes little
@@ -217,7 +239,7 @@ void FrameCompositor::findSurfaceLight() {
       if (!region_.contains({u, v}) || !isDrawn(id, u, v)) continue;
       const int slot = VisibilityBuffer::objectOf(id);
       Lit& lit = lit_[static_cast<std::size_t>(j) * columns + i];
-      lit = exactLight(surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_), slot);
+      lit = exactLight(litPoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_), slot);
       lit.diffuse[3] = centre_->nearnessAt(u, v);
     }
   }
@@ -246,29 +268,11 @@ bool FrameCompositor::isSmooth(int i, int j) const {
   const int u = region_.x + i * kLightStep + kLightStep / 2, v = region_.y + j * kLightStep + kLightStep / 2;
   const std::uint32_t id = centre_->idAt(u, v);
   if (id == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(id) != a.slot) return false;
-  const Lit middle = exactLight(surfacePoint(actors_[a.slot], VisibilityBuffer::triangleOf(id), static_cast<float>(u), static_cast<float>(v), eye_), a.slot);
+  const Lit middle = exactLight(litPoint(actors_[a.slot], VisibilityBuffer::triangleOf(id), static_cast<float>(u), static_cast<float>(v), eye_), a.slot);
   for (int k = 0; k < 3; ++k) {
     if (std::abs(middle.diffuse[k] + middle.highlight[k] - mean[k]) > kSmoothLight * highest[k]) return false;
   }
   return true;
-}
-
-// @param u, v the pixel, or a place in it
-FrameCompositor::Lit FrameCompositor::lightAt(const SurfacePoint& p, std::uint32_t id, float u, float v) const {
-  const int slot = VisibilityBuffer::objectOf(id), iu = static_cast<int>(u), iv = static_cast<int>(v);
-  if (static_cast<float>(iu) != u || static_cast<float>(iv) != v) return exactLight(p, slot);
-  const int du = iu - region_.x, dv = iv - region_.y;
-  const std::size_t at = static_cast<std::size_t>(dv / kLightStep) * lit_columns_ + du / kLightStep;
-  const Lit& a = lit_[at];
-  if (smooth_[at] == 0 || a.slot != slot) return exactLight(p, slot);
-  const Lit &b = lit_[at + 1], &c = lit_[at + lit_columns_], &d = lit_[at + lit_columns_ + 1];
-  const float x = static_cast<float>(du % kLightStep) / kLightStep, y = static_cast<float>(dv % kLightStep) / kLightStep;
-  const float wa = (1.0f - x) * (1.0f - y), wb = x * (1.0f - y), wc = (1.0f - x) * y, wd = x * y;
-  const cv::Vec4f diffuse = wa * a.diffuse + wb * b.diffuse + wc * c.diffuse + wd * d.diffuse;
-  const float near = centre_->nearness(dv)[du];
-  // Another piece of the surface can look out between the corners.
-  if (std::abs(near - diffuse[3]) * frame_.camera.fx > kLightStep * near) return exactLight(p, slot);
-  return {diffuse, wa * a.highlight + wb * b.highlight + wc * c.highlight + wd * d.highlight, slot};
 }
 
 }  // namespace calipso::render

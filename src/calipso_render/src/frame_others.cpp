@@ -41,6 +41,7 @@ void FrameCompositor::findShaded() {
     for (std::size_t slot = 0; slot < actors_.size() && !may_be_shaded_[other]; ++slot) {
       if (edited_[surface_of_slot_[slot]]) may_be_shaded_[other] = boxes[slot].mayShade(boxes[other], static_cast<float>(params_.sun_radius));
     }
+    any_shaded_ = any_shaded_ || may_be_shaded_[other];
   }
 }
 

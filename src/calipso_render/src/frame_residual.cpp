@@ -14,6 +14,8 @@ namespace {
 
 constexpr float kWholePx = 0.5f, kNonePx = 5.0f;  // movement up to which the residual goes along, and from which none does
 
+constexpr int kCarried = 16;  // px around surfaces at rest in which their rims and what they take over lie
+
 constexpr float kDark = 1e-5f;  // linear; a plate darker than that says nothing of its shadow
 
 // For every pixel the nearest one of a set.
@@ -63,15 +65,12 @@ RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderP
   RestPicture picture{edited, cv::Mat(input.bgr.size(), CV_32FC3, cv::Scalar::all(-1)), cv::Mat::zeros(input.bgr.size(), CV_32FC3),
                       cv::Mat(input.bgr.size(), CV_16S, cv::Scalar(-1)), cv::Mat::zeros(input.bgr.size(), CV_8U), {}};
   if (r.empty()) return picture;
-#pragma omp parallel for schedule(dynamic, 8)
-  for (int v = r.y; v < r.y + r.height; ++v) {
-    for (int u = r.x; u < r.x + r.width; ++u) {
-      if (rest.removed_.at<std::uint8_t>(v - r.y, u - r.x) == 0) continue;
-      const Drawn drawn = rest.drawnAt(u, v);
-      const cv::Vec3f behind = rest.behindAt(u, v).colour, revealed = rest.revealedAt(u, v).colour;
-      picture.drawn.at<cv::Vec3f>(v, u) = drawn.cover * drawn.colour;
-      for (int c = 0; c < 3; ++c) picture.passing.at<cv::Vec3f>(v, u)[c] = (1.0f - drawn.cover) * (revealed[c] > kDark ? behind[c] / revealed[c] : 1.0f);
-    }
+  rest.findMaps();
+#pragma omp parallel
+  {
+    Row row;
+#pragma omp for schedule(dynamic, 8)
+    for (int v = r.y; v < r.y + r.height; ++v) rest.recordRow(v, row, picture);
   }
   cv::Mat owners(r.size(), CV_16S, cv::Scalar(-1));
   for (int v = 0; v < r.height; ++v) {
@@ -91,6 +90,22 @@ RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderP
   return picture;
 }
 
+// Row v of what is drawn and of what passes beside it.
+void FrameCompositor::recordRow(int v, Row& row, RestPicture& picture) const {
+  row.resize(region_.width);
+  drawRow(v, row);
+  for (int i = 0; i < region_.width; ++i) {
+    const int u = i + region_.x;
+    if (removed_.at<std::uint8_t>(v - region_.y, i) == 0) continue;
+    const cv::Vec4f& plain = row.colour[i];
+    const Drawn drawn = row.kinds[i] == kPlain ? Drawn{{plain[0], plain[1], plain[2]}, 1.0f} : drawnAt(u, v);
+    picture.drawn.at<cv::Vec3f>(v, u) = drawn.cover * drawn.colour;
+    if (drawn.cover == 1.0f) continue;
+    const cv::Vec3f behind = behindAt(u, v).colour, revealed = revealedAt(u, v).colour;
+    for (int c = 0; c < 3; ++c) picture.passing.at<cv::Vec3f>(v, u)[c] = (1.0f - drawn.cover) * (revealed[c] > kDark ? behind[c] / revealed[c] : 1.0f);
+  }
+}
+
 void FrameCompositor::findResidual() {
   if (!params_.carry_residual || !sameView(frame_.camera, prepared_.camera)) return;
   const auto seen = [](const ScreenMesh& m) { return !m.points.empty(); };
@@ -98,12 +113,34 @@ void FrameCompositor::findResidual() {
   std::vector<bool> resting(edited_.size());
   for (std::size_t i = 0; i < edited_.size(); ++i) resting[i] = edited_[i] && at_rest_[i];
   if (rest_.edited != resting) rest_ = restPicture(prepared_, params_, resting);
-  findMiss();
-  findRims();
+  const cv::Rect carried = carriedBox();
+  if (carried.empty()) return;
+  findMiss(carried);
+  findRims(carried);
 }
 
-void FrameCompositor::findMiss() {
-  const cv::Rect box = rest_.box;
+// Pixels that take something over: those of triangles with a point that moved little, and their surroundings.
+cv::Rect FrameCompositor::carriedBox() const {
+  cv::Rect carried;
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
+    if (observed_[slot].points.empty()) continue;
+    const Points &now = actors_[slot].screen.points, &then = observed_[slot].points;
+    Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
+    for (const Eigen::Vector3i& t : actors_[slot].surface->triangles) {
+      if (!mayMoveLess(now, then, t, kNonePx)) continue;
+      for (int i = 0; i < 3; ++i) low = low.min(now[t[i]].head<2>().array()), high = high.max(now[t[i]].head<2>().array());
+    }
+    if (!(low <= high).all()) continue;
+    const Eigen::Array2i first = low.max(-1.0f).min(1e6f).cast<int>() - kCarried, last = high.max(-1.0f).min(1e6f).cast<int>() + kCarried + 1;
+    carried |= cv::Rect(first.x(), first.y(), last.x() - first.x(), last.y() - first.y());
+  }
+  return carried & region_;
+}
+
+// @param carried pixels that may take over what is missed
+void FrameCompositor::findMiss(const cv::Rect& carried) {
+  miss_box_ = cv::Rect(carried.x - kCarried, carried.y - kCarried, carried.width + 2 * kCarried, carried.height + 2 * kCarried) & rest_.box;
+  const cv::Rect box = miss_box_;
   if (box.empty()) return;
   miss_ = cv::Mat(box.size(), CV_32FC4);
 #pragma omp parallel for schedule(static)
@@ -126,14 +163,15 @@ void FrameCompositor::findMiss() {
 
 // Pixels that no surface at rest is drawn in, but to which its rim may have come, each with the nearest drawn one: carried
 // from neighbour to neighbour, down and up again (Danielsson 1980).
-void FrameCompositor::findRims() {
+void FrameCompositor::findRims(const cv::Rect& carried) {
+  const cv::Rect box = carried - region_.tl();
   const auto isDrawnAtRest = [&](std::uint32_t id) { return id != VisibilityBuffer::kNothing && !observed_[VisibilityBuffer::objectOf(id)].points.empty(); };
   cv::Mat index(region_.size(), CV_32S, cv::Scalar(-1));
   for (int v = 0; v < region_.height; ++v) {
     rim_rows_.push_back(rims_.size());
     const std::uint32_t* ids = centre_->ids(v);
     const std::uint8_t* reach = rest_.reach.ptr<std::uint8_t>(v + region_.y) + region_.x;
-    for (int u = 0; u < region_.width; ++u) {
+    for (int u = box.x; v >= box.y && v < box.br().y && u < box.br().x; ++u) {
       if (reach[u] == 0 || isDrawnAtRest(ids[u])) continue;
       index.at<int>(v, u) = static_cast<int>(rims_.size());
       rims_.push_back({u, v, {-1, -1}});
@@ -180,13 +218,13 @@ void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved
 // @return 0 where nothing is known of this owner
 cv::Vec4f FrameCompositor::missAt(float u, float v, int owner) const {
   const float fu = std::floor(u), fv = std::floor(v), x = u - fu, y = v - fv;
-  const int i = static_cast<int>(fu) - rest_.box.x, j = static_cast<int>(fv) - rest_.box.y;
+  const int i = static_cast<int>(fu) - miss_box_.x, j = static_cast<int>(fv) - miss_box_.y;
   cv::Vec4f sum;
   for (int k = 0; k < 4; ++k) {
     const float weight = ((k & 1) != 0 ? x : 1.0f - x) * ((k & 2) != 0 ? y : 1.0f - y);
     const int column = i + (k & 1), row = j + (k >> 1);
     if (weight == 0.0f || column < 0 || row < 0 || column >= miss_.cols || row >= miss_.rows) continue;
-    if (rest_.owners.at<short>(row + rest_.box.y, column + rest_.box.x) == owner) sum += weight * miss_.at<cv::Vec4f>(row, column);
+    if (rest_.owners.at<short>(row + miss_box_.y, column + miss_box_.x) == owner) sum += weight * miss_.at<cv::Vec4f>(row, column);
   }
   return sum;
 }

@@ -1,12 +1,13 @@
-// The part of FrameCompositor that composes the picture row by row. Runs of pixels that see one triangle are shaded four
-// values at a time; silhouettes and what else is special go through composedAt().
+// The part of FrameCompositor that composes the picture row by row. Stretches of pixels that see one object are shaded together;
+// silhouettes and what else is special go through composedAt().
 
 #include <cmath>
+#include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
 
-#include "bicubic.hpp"
 #include "calipso_render/colour.hpp"
 #include "frame_compositor.hpp"
+#include "kernels.hpp"
 
 namespace calipso::render {
 namespace {
@@ -15,9 +16,53 @@ constexpr float kKept = 0.999f;  // of a pixel at rest: it keeps its bytes
 
 cv::v_float32x4 wide(const cv::Vec3f& c, float fourth = 0.0f) { return {c[0], c[1], c[2], fourth}; }
 
-cv::Vec4f linearOf(const cv::Vec3b& c) { return {linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2]), 0.0f}; }
+cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) { return {decoded[c[0]], decoded[c[1]], decoded[c[2]], 0.0f}; }
+
+// First place from `i` on whose byte is not 0.
+template <class Byte>
+int nextMarked(const Byte* bytes, int i, int end) {
+  for (std::uint64_t eight; i + 8 <= end; i += 8) {
+    std::memcpy(&eight, bytes + i, 8);
+    if (eight != 0) break;
+  }
+  while (i < end && bytes[i] == 0) ++i;
+  return i;
+}
 
 }  // namespace
+
+// What has to be done for every pixel of row v.
+void FrameCompositor::findKinds(int v, Row& row) const {
+  const int j = v - region_.y, width = region_.width;
+  const float *sun = sun_now_.ptr<float>(j), *sun_before = sun_before_.ptr<float>(j);
+  const float *sky = sky_now_.ptr<float>(j), *sky_before = sky_before_.ptr<float>(j);
+  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x, *drawn = drawn_.ptr<std::uint8_t>(j);
+  const std::uint8_t *removed = removed_.ptr<std::uint8_t>(j), *relit = relit_.ptr<std::uint8_t>(j);
+  const int* edges = edges_->slots(j);
+  const std::uint32_t* ids = centre_->ids(j);
+  Kind* kinds = row.kinds.data();
+  for (int i = 0; i < width; ++i) {
+    const float change = std::abs(sun[i] - sun_before[i]) + std::abs(sky[i] - sky_before[i]);
+    const bool differs = ((relit[i] != 0) | (change >= kSameShadow)) & (sun[i] >= 0.0f) & (labels[i] == 0);
+    const bool behind = differs | (removed[i] != 0);
+    kinds[i] = edges[i] >= 0 ? kSpecial : drawn[i] != 0 ? kPlain : behind ? kBehind : kNone;
+  }
+  if (!still_.empty()) {
+    const float* still = still_.ptr<float>(j);
+    for (int i = 0; i < width; ++i) {
+      if (still[i] >= kKept && kinds[i] != kNone) kinds[i] = removed[i] != 0 ? kNone : kinds[i] == kPlain ? kSpecial : kinds[i];
+    }
+  }
+  if (!screened_.empty()) {
+    const std::uint8_t* screened = screened_.ptr<std::uint8_t>(j);
+    for (int i = 0; i < width; ++i) kinds[i] = screened[i] != 0 && kinds[i] == kPlain ? kSpecial : kinds[i];
+  }
+  if (!any_shaded_) return;
+  for (int i = 0; i < width; ++i) {
+    const bool other = ids[i] != VisibilityBuffer::kNothing && drawn[i] == 0;
+    if (other && labels[i] != 0 && removed[i] == 0 && kinds[i] != kSpecial) kinds[i] = kSpecial;
+  }
+}
 
 // Light at the corners of row v's squares, interpolated between the corners above and below.
 void FrameCompositor::lightRow(int v, Row& row) const {
@@ -26,6 +71,7 @@ void FrameCompositor::lightRow(int v, Row& row) const {
   const cv::v_float32x4 part = cv::v_setall_f32(static_cast<float>(dv % kLightStep) / kLightStep);
   row.light.resize(lit_columns_);
   for (int i = 0; i < lit_columns_; ++i) {
+    if (above[i].slot < 0 && below[i].slot < 0) continue;
     const auto mix = [&](const cv::Vec4f& a, const cv::Vec4f& b, cv::Vec4f& out) {
       const cv::v_float32x4 x = cv::v_load(a.val);
       cv::v_store(out.val, x + part * (cv::v_load(b.val) - x));
@@ -35,51 +81,100 @@ void FrameCompositor::lightRow(int v, Row& row) const {
   }
 }
 
-// Pixels [first, last) of row v, all of which see the triangle `id` and nothing of what lies behind.
-void FrameCompositor::shadeRun(int v, int first, int last, std::uint32_t id, Row& row) const {
-  const int slot = VisibilityBuffer::objectOf(id), triangle = VisibilityBuffer::triangleOf(id), surface = surface_of_slot_[slot];
-  const TriangleMap& map = maps_[slot][triangle];
-  const Appearance& appearance = prepared_.appearances[surface];
-  const Look look = lookOf(slot);
-  const Appearance::Source source = appearance.sources[triangle];
-  const cv::v_float32x4 floor = wide(lightFloor(appearance.mean_light)), tint = wide(look.tint.value_or(cv::Vec3f(1, 1, 1)));
-  const cv::v_float32x4 across = cv::v_load(map.key[1]), start = cv::v_load(map.key[0]) + cv::v_load(map.key[2]) * cv::v_setall_f32(v - map.v);
+// Reflectance of the pixels [first, last) of row v, all of which see the object in `slot`, into row.colour; where they lie in the
+// key frame's picture into row.key_u, row.key_v.
+void FrameCompositor::reflectStretch(int v, int first, int last, int slot, Row& row) const {
+  const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
+  const std::uint32_t* ids = centre_->ids(v - region_.y);
+  const cv::Point corner = appearance.region.tl();
+  bool any_picture = false, any_texture = false;
+  for (int i = first; i < last;) {
+    const TriangleMap& map = maps_[slot][VisibilityBuffer::triangleOf(ids[i])];
+    const Appearance::Source source = appearance.sources[VisibilityBuffer::triangleOf(ids[i])];
+    any_picture |= source != Appearance::Source::kTexture, any_texture |= source != Appearance::Source::kPicture;
+    const float dv = static_cast<float>(v) - map.v, x = map.key[0][0] + map.key[2][0] * dv, y = map.key[0][1] + map.key[2][1] * dv, w = map.key[0][2] + map.key[2][2] * dv;
+    for (const std::uint32_t id = ids[i]; i < last && ids[i] == id; ++i) {
+      const float du = static_cast<float>(i + region_.x) - map.u, scale = 1.0f / (w + map.key[1][2] * du);
+      row.key_u[i] = (x + map.key[1][0] * du) * scale - corner.x;
+      row.key_v[i] = (y + map.key[1][1] * du) * scale - corner.y;
+    }
+  }
+  const std::optional<cv::Vec3f>& albedo = lookOf(slot).albedo;
+  if (albedo) {
+    std::fill(&row.colour[first], &row.colour[last - 1] + 1, cv::Vec4f((*albedo)[0], (*albedo)[1], (*albedo)[2], 0.0f));
+    return;
+  }
+  if (any_picture) kernels().sample(appearance.albedo, &row.key_u[first], &row.key_v[first], last - first, &row.colour[first]);
+  for (int i = first; any_texture && i < last; ++i) {
+    const int triangle = VisibilityBuffer::triangleOf(ids[i]);
+    const Appearance::Source source = appearance.sources[triangle];
+    if (source == Appearance::Source::kPicture || maps_[slot][triangle].thin) continue;
+    const cv::Vec4f texel = appearance.texture.at(triangle, maps_[slot][triangle].weightsAt(static_cast<float>(i + region_.x), static_cast<float>(v)));
+    row.colour[i] = source == Appearance::Source::kTexture ? texel : texel + texel[3] * (row.colour[i] - texel);
+  }
+}
+
+// Light from the corners on the pixels [first, last), whose reflectance row.colour has; row.uneven names those on which light has to be
+// computed.
+void FrameCompositor::shadeStretch(int v, int first, int last, int slot, Row& row) const {
+  const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
+  const cv::v_float32x4 floor = wide(lightFloor(appearance.mean_light)), tint = wide(lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)));
   const float* nearness = centre_->nearness(v - region_.y);
   const std::size_t squares = static_cast<std::size_t>((v - region_.y) / kLightStep) * lit_columns_;
-  const bool carries = !miss_.empty() && !observed_[slot].points.empty();
   const float tolerance = kLightStep / static_cast<float>(frame_.camera.fx);
-  for (int u = first; u < last; ++u) {
-    const int i = u - region_.x, square = i / kLightStep;
-    cv::Vec4f& out = row.colour[i];
-    const cv::v_float32x4 part = cv::v_setall_f32(static_cast<float>(i % kLightStep) / kLightStep);
-    const cv::v_float32x4 left = cv::v_load(row.light[square].diffuse.val), gloss = cv::v_load(row.light[square].highlight.val);
-    const cv::v_float32x4 diffuse = left + part * (cv::v_load(row.light[square + 1].diffuse.val) - left);
-    const float expected = cv::v_extract_n<3>(diffuse);
-    const bool even = smooth_[squares + square] != 0 && lit_[squares + square].slot == slot && std::abs(nearness[i] - expected) <= tolerance * nearness[i];
-    const cv::v_float32x4 key = start + across * cv::v_setall_f32(u - map.u), place = key / cv::v_broadcast_element<2>(key);
-    const float x = cv::v_extract_n<0>(place), y = cv::v_extract_n<1>(place);
-    if (map.thin || !even) {
-      const cv::Vec3f colour = shadeSurface(id, static_cast<float>(u), static_cast<float>(v));
-      out = {colour[0], colour[1], colour[2], 1.0f};
-    } else {
-      cv::v_float32x4 albedo;
-      if (look.albedo) {
-        albedo = wide(*look.albedo);
-      } else if (source == Appearance::Source::kPicture) {
-        albedo = bicubic(appearance.albedo, x - appearance.region.x, y - appearance.region.y);
-      } else {
-        const cv::Vec4f texel = appearance.texture.at(triangle, map.weightsAt(static_cast<float>(u), static_cast<float>(v)));
-        albedo = cv::v_load(texel.val);
-        if (source == Appearance::Source::kBoth && texel[3] > 0.001f) {
-          albedo += cv::v_setall_f32(texel[3]) * (bicubic(appearance.albedo, x - appearance.region.x, y - appearance.region.y) - albedo);
-        }
+  row.uneven.clear();
+  for (int i = first; i < last;) {
+    const int square = i / kLightStep, end = std::min(last, (square + 1) * kLightStep);
+    const bool smooth = smooth_[squares + square] != 0 && lit_[squares + square].slot == slot;
+    if (!smooth) {
+      for (; i < end; ++i) row.uneven.push_back(i);
+      continue;
+    }
+    const Lit &a = row.light[square], &b = row.light[square + 1];
+    const cv::v_float32x4 left = cv::v_load(a.diffuse.val), rise = cv::v_load(b.diffuse.val) - left;
+    const cv::v_float32x4 gloss = cv::v_load(a.highlight.val), gloss_rise = cv::v_load(b.highlight.val) - gloss;
+    for (; i < end; ++i) {
+      const cv::v_float32x4 part = cv::v_setall_f32(static_cast<float>(i % kLightStep) / kLightStep);
+      const cv::v_float32x4 diffuse = left + part * rise;
+      // Another piece of the surface can look out between the corners.
+      if (std::abs(nearness[i] - cv::v_extract_n<3>(diffuse)) > tolerance * nearness[i]) {
+        row.uneven.push_back(i);
+        continue;
       }
-      const cv::v_float32x4 highlight = gloss + part * (cv::v_load(row.light[square + 1].highlight.val) - gloss);
-      cv::v_store(out.val, albedo * tint * (diffuse + floor) + highlight);
+      cv::Vec4f& out = row.colour[i];
+      cv::v_store(out.val, cv::v_load(out.val) * tint * (diffuse + floor) + (gloss + part * gloss_rise));
       out[3] = 1.0f;
     }
-    row.source[i] = kRendered;
-    if (carries && !map.thin) addResidual(x, y, {u - x, v - y}, surface, out);
+  }
+}
+
+// Pixels [first, last) of row v, all of which see the object in `slot` and nothing of what lies behind.
+void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row) const {
+  const int surface = surface_of_slot_[slot];
+  const Appearance& appearance = prepared_.appearances[surface];
+  reflectStretch(v, first, last, slot, row);
+  shadeStretch(v, first, last, slot, row);
+  const cv::v_float32x4 floor = wide(lightFloor(appearance.mean_light)), tint = wide(lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)));
+  const std::uint32_t* ids = centre_->ids(v - region_.y);
+  for (const int i : row.uneven) {
+    const int triangle = VisibilityBuffer::triangleOf(ids[i]);
+    cv::Vec4f& out = row.colour[i];
+    if (maps_[slot][triangle].thin) {
+      const cv::Vec3f colour = shadeSurface(ids[i], static_cast<float>(i + region_.x), static_cast<float>(v));
+      out = {colour[0], colour[1], colour[2], 1.0f};
+      continue;
+    }
+    const Lit lit = exactLight(litPoint(actors_[slot], triangle, static_cast<float>(i + region_.x), static_cast<float>(v), eye_), slot);
+    cv::v_store(out.val, cv::v_load(out.val) * tint * (cv::v_load(lit.diffuse.val) + floor) + cv::v_load(lit.highlight.val));
+    out[3] = 1.0f;
+  }
+  std::memset(&row.source[first], kRendered, last - first);
+  if (miss_.empty() || observed_[slot].points.empty()) return;
+  const cv::Point corner = appearance.region.tl();
+  for (int i = first; i < last; ++i) {
+    if (maps_[slot][VisibilityBuffer::triangleOf(ids[i])].thin) continue;
+    const float x = row.key_u[i] + corner.x, y = row.key_v[i] + corner.y;
+    addResidual(x, y, {i + region_.x - x, v - y}, surface, row.colour[i]);
   }
 }
 
@@ -87,7 +182,7 @@ void FrameCompositor::shadeRun(int v, int first, int last, std::uint32_t id, Row
 void FrameCompositor::composeBehind(int u, int v, Row& row) const {
   const int i = u - region_.x, j = v - region_.y;
   const bool removed = removed_.at<std::uint8_t>(j, i) != 0;
-  const float sun = sun_now_.at<float>(j, i), from_plate = removed ? 1.0f : relit_.at<float>(j, i);
+  const float sun = sun_now_.at<float>(j, i), from_plate = removed ? 1.0f : relit_.at<std::uint8_t>(j, i) * (1.0f / 255.0f);
   const cv::v_float32x4 umbra = wide(prepared_.umbra), lit = cv::v_setall_f32(1.0f) - umbra;
   const cv::v_float32x4 now = sun < 0.0f ? cv::v_setall_f32(1.0f) : umbra * cv::v_setall_f32(sky_now_.at<float>(j, i)) + lit * cv::v_setall_f32(sun);
   cv::v_float32x4 colour = cv::v_setzero_f32();
@@ -103,7 +198,7 @@ void FrameCompositor::composeBehind(int u, int v, Row& row) const {
     // Darkened further, a pixel keeps its own grain; what the original shaded must come from the plate.
     const cv::v_float32x4 before = umbra * cv::v_setall_f32(sky_before_.at<float>(j, i)) + lit * cv::v_setall_f32(sun_before_.at<float>(j, i));
     const cv::v_float32x4 ratio = cv::v_min(cv::v_setall_f32(1.0f), now / cv::v_max(before, cv::v_setall_f32(kDarkest)));
-    colour += cv::v_setall_f32(1.0f - from_plate) * cv::v_load(linearOf(frame_.bgr.at<cv::Vec3b>(v, u)).val) * ratio;
+    colour += cv::v_setall_f32(1.0f - from_plate) * linearOf(decodeTable(), frame_.bgr.at<cv::Vec3b>(v, u)) * ratio;
   }
   cv::v_store(row.colour[i].val, colour);
   row.colour[i][3] = fresh;
@@ -125,35 +220,27 @@ void FrameCompositor::composeSpecial(int u, int v, Row& row) const {
 }
 
 void FrameCompositor::drawRow(int v, Row& row) const {
-  const int j = v - region_.y;
-  const std::uint32_t* ids = centre_->ids(j);
-  const int* edges = edges_->slots(j);
-  const std::uint8_t *removed = removed_.ptr<std::uint8_t>(j), *relit = changed_.ptr<std::uint8_t>(j);
-  const float* still = still_.ptr<float>(j);
-  std::fill(row.source.begin(), row.source.end(), static_cast<std::uint8_t>(kOriginal));
+  const std::uint32_t* ids = centre_->ids(v - region_.y);
+  findKinds(v, row);
   lightRow(v, row);
-  const auto isPlain = [&](int i) { return edges[i] < 0 && still[i] < kKept && isDrawn(ids[i], region_.x + i, v) && screenAt(region_.x + i, v) == 0.0f; };
-  for (int i = 0; i < region_.width;) {
-    const bool seen = ids[i] != VisibilityBuffer::kNothing;
-    if (!seen && edges[i] < 0 && (removed[i] | relit[i]) == 0) {
-      ++i;
-    } else if (isPlain(i)) {
-      int end = i + 1;
-      while (end < region_.width && ids[end] == ids[i] && isPlain(end)) ++end;
-      shadeRun(v, region_.x + i, region_.x + end, ids[i], row);
-      i = end;
-    } else if (!seen && edges[i] < 0) {
-      if (still[i] < kKept || removed[i] == 0) composeBehind(region_.x + i, v, row);
-      ++i;
+  std::memset(row.source.data(), kOriginal, row.source.size());
+  for (int i = nextMarked(row.kinds.data(), 0, region_.width); i < region_.width; i = nextMarked(row.kinds.data(), i, region_.width)) {
+    const int u = i + region_.x;
+    if (row.kinds[i] == kPlain) {
+      const int first = i, slot = VisibilityBuffer::objectOf(ids[i]);
+      while (i < region_.width && row.kinds[i] == kPlain && VisibilityBuffer::objectOf(ids[i]) == slot) ++i;
+      drawStretch(v, first, i, slot, row);
+    } else if (row.kinds[i++] == kBehind) {
+      composeBehind(u, v, row);
     } else {
-      if (still[i] < kKept || removed[i] == 0) composeSpecial(region_.x + i, v, row);
-      ++i;
+      composeSpecial(u, v, row);
     }
   }
 }
 
 // Where the surface rests, the frame's own pixel is the best picture of it.
 void FrameCompositor::keepStill(int v, Row& row) const {
+  if (still_.empty()) return;
   const int j = v - region_.y;
   const std::uint8_t* removed = removed_.ptr<std::uint8_t>(j);
   const float* still = still_.ptr<float>(j);
@@ -161,25 +248,23 @@ void FrameCompositor::keepStill(int v, Row& row) const {
   for (int i = 0; i < region_.width; ++i) {
     if (still[i] == 0.0f || row.source[i] == kOriginal || (removed[i] == 0 && row.source[i] != kRendered)) continue;
     if (still[i] >= kKept) row.source[i] = kOriginal;
-    else row.colour[i] = still[i] * linearOf(frame[i]) + (1.0f - still[i]) * row.colour[i];
+    else cv::v_store(row.colour[i].val, cv::v_setall_f32(still[i]) * linearOf(decodeTable(), frame[i]) + cv::v_setall_f32(1.0f - still[i]) * cv::v_load(row.colour[i].val));
   }
 }
 
 void FrameCompositor::composeRow(int v, Row& row, FrameOutput& out) const {
-  row.colour.resize(region_.width);
-  row.source.resize(region_.width);
+  row.resize(region_.width);
   drawRow(v, row);
   addRimResidual(v, row);
   keepStill(v, row);
   cv::Vec3b* codes = out.bgr.ptr<cv::Vec3b>(v) + region_.x;
-  std::uint8_t* provenance = out.provenance.ptr<std::uint8_t>(v) + region_.x;
-  for (int i = 0; i < region_.width;) {
-    int end = i;
-    while (end < region_.width && row.source[end] != kOriginal) ++end;
-    if (end > i) codec_.encode(&row.colour[i], region_.x + i, v, end - i, codes + i);
-    i = end + 1;
+  const std::uint8_t* source = row.source.data();
+  for (int i = nextMarked(source, 0, region_.width); i < region_.width; i = nextMarked(source, i, region_.width)) {
+    const int first = i;
+    while (i < region_.width && source[i] != kOriginal) ++i;
+    codec_.encode(&row.colour[first], region_.x + first, v, i - first, codes + first);
   }
-  std::copy(row.source.begin(), row.source.end(), provenance);
+  std::memcpy(out.provenance.ptr<std::uint8_t>(v) + region_.x, source, row.source.size());
 }
 
 }  // namespace calipso::render

@@ -18,11 +18,13 @@ constexpr int kRimShare = 50;          // of the picture's width: how far a mask
 constexpr int kInFront = 127;          // of a matte
 constexpr float kQuiet = 5.0f;         // code values of spread over time: the background rests
 
+Gloss glossOf(const Gloss& own, const Look& look) { return {look.specular.value_or(own.specular), look.roughness.value_or(own.roughness)}; }
+
 }  // namespace
 
 FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame,
                                  ShadowCache& shadows, RestPicture& rest)
-    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), light_(lightOf(frame)), rest_(rest),
+    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), light_(lightOf(frame)), point_light_(light_), rest_(rest),
       labels_(frame.labels.empty() ? prepared.key_labels : frame.labels), eye_(frame.camera.world_from_camera.translation().cast<float>()),
       plane_view_(params.planes, frame.camera), codec_(params.add_noise ? prepared.noise : NoiseModel(), frame.stamp_ns) {
   if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");
@@ -33,7 +35,6 @@ FrameOutput FrameCompositor::run() {
   FrameOutput out{frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
   if (region_.empty()) return out;
   findResidual();
-  findChanged();
   findMaps();
 #pragma omp parallel
   {
@@ -92,6 +93,7 @@ void FrameCompositor::stage() {
     }
     actors_.push_back(makeActor(surfaces[i], std::move(vertices), frame_.camera));
     surface_of_slot_.push_back(static_cast<int>(i));
+    glosses_.push_back(glossOf(prepared_.appearances[i].gloss, lookOf(static_cast<int>(glosses_.size()))));
     const bool as_seen = edited_[i] && at_rest_[i] && !o->look.changes();
     observed_.push_back(as_seen ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
   }

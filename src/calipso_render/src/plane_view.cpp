@@ -21,4 +21,13 @@ PlaneView::PlaneView(const std::vector<SupportPlane>& planes, const Camera& came
   }
 }
 
+void PlaneView::seesRow(int u, int v, int count, std::uint8_t* out) const {
+  if (planes_.size() == 1 && planes_[0].endless) {
+    const float start = planes_[0].slope_0 + static_cast<float>(v) * planes_[0].slope_v, slope = planes_[0].slope_u;
+    for (int i = 0; i < count; ++i) out[i] = start + static_cast<float>(u + i) * slope < -1e-9f ? 255 : 0;
+    return;
+  }
+  for (int i = 0; i < count; ++i) out[i] = sees(static_cast<float>(u + i), static_cast<float>(v)) ? 255 : 0;
+}
+
 }  // namespace calipso::render

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "calipso_render/stage.hpp"
@@ -16,6 +17,9 @@ class PlaneView {
     Receiver receiver;
     return at(u, v, receiver);
   }
+
+  // The same for `count` pixels of a row from (u, v) on: 255 where a plane is seen.
+  void seesRow(int u, int v, int count, std::uint8_t* out) const;
 
   // @return false where no plane is seen
   bool at(float u, float v, Receiver& receiver) const {

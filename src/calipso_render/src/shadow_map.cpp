@@ -1,8 +1,11 @@
 #include "calipso_render/shadow_map.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
+
+#include "kernels.hpp"
 
 namespace calipso::render {
 namespace {
@@ -11,20 +14,22 @@ constexpr float kGoldenAngle = 2.39996323f;
 constexpr int kMargin = 4;  // texels
 
 // Evenly spread points of the unit disc (Vogel's spiral): the same for every pixel, so no noise.
-std::vector<Eigen::Vector2f> discPattern(int count) {
-  std::vector<Eigen::Vector2f> points(count);
+std::shared_ptr<const ShadowTaps> discPattern(int count) {
+  assert(count > 0 && count % 8 == 0 && count <= ShadowTaps::kMost);
+  auto taps = std::make_shared<ShadowTaps>();
+  taps->count = count;
   for (int i = 0; i < count; ++i) {
     const float r = std::sqrt((i + 0.5f) / count), a = i * kGoldenAngle;
-    points[i] = {r * std::cos(a), r * std::sin(a)};
+    taps->x[i] = r * std::cos(a), taps->y[i] = r * std::sin(a);
   }
-  return points;
+  return taps;
 }
 
 }  // namespace
 
 ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector3d& direction,
                      const Params& params)
-    : angular_radius_(static_cast<float>(params.angular_radius)), pattern_(discPattern(params.taps)) {
+    : angular_radius_(static_cast<float>(params.angular_radius)), taps_(discPattern(params.taps)) {
   axis_h_ = direction.normalized().cast<float>();
   axis_s_ = axis_h_.unitOrthogonal();
   axis_t_ = axis_h_.cross(axis_s_);
@@ -37,7 +42,7 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
   }
   if (!(high.x() >= low.x())) return;  // nothing casts a shadow
   const float side = std::max({high.x() - low.x(), high.y() - low.y(), 1e-6f});
-  texel_ = side / (params.resolution - 2 * kMargin);
+  texel_ = side / (params.resolution - 2 * kMargin), per_texel_ = 1.0f / texel_;
   width_ = static_cast<int>((high.x() - low.x()) / texel_) + 2 * kMargin + 1;
   height_ = static_cast<int>((high.y() - low.y()) / texel_) + 2 * kMargin + 1;
   origin_ = Eigen::Vector3f(low.x() - kMargin * texel_, low.y() - kMargin * texel_, low.z());
@@ -51,7 +56,7 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
 #pragma omp parallel for schedule(static)
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
       const Eigen::Vector3f& p = (*o.vertices)[i];
-      mesh.points[i] = {(p.dot(axis_s_) - origin_.x()) / texel_, (p.dot(axis_t_) - origin_.y()) / texel_, p.dot(axis_h_) - origin_.z()};
+      mesh.points[i] = {(p.dot(axis_s_) - origin_.x()) * per_texel_, (p.dot(axis_t_) - origin_.y()) * per_texel_, p.dot(axis_h_) - origin_.z()};
     }
     buffer.draw(mesh, 0);
   }
@@ -108,39 +113,10 @@ ShadowMap::Extremes ShadowMap::around(float s, float t, float reach) const {
   return e;
 }
 
-// Blockers' mean height, then the covered fraction of the penumbra it sets. kInside: all taps are in the map.
-template <bool kInside>
-float ShadowMap::filtered(float s, float t, float h, float search) const {
-  const auto outside = [&](int i, int j, int more) { return i < 0 || j < 0 || i + more >= width_ || j + more >= height_; };
-  constexpr float kUp = 16384.0f;  // makes the truncation to int a floor
-  constexpr int kDown = 16384;
-  float sum = 0.0f;
-  int blockers = 0;
-  for (const Eigen::Vector2f& d : pattern_) {
-    const int i = static_cast<int>(s + search * d.x() + (kUp + 0.5f)) - kDown, j = static_cast<int>(t + search * d.y() + (kUp + 0.5f)) - kDown;
-    if (!kInside && outside(i, j, 0)) continue;
-    const float above = heights_[static_cast<std::size_t>(j) * width_ + i] - h;
-    if (above > 0.0f) sum += above, ++blockers;
-  }
-  if (blockers == 0) return 1.0f;
-  const float radius = std::max(1.0f, angular_radius_ * sum / blockers / texel_);
-  float covered = 0.0f;
-  for (const Eigen::Vector2f& d : pattern_) {
-    const float x = s + radius * d.x(), y = t + radius * d.y();
-    const int i = static_cast<int>(x + kUp) - kDown, j = static_cast<int>(y + kUp) - kDown;
-    if (!kInside && outside(i, j, 1)) continue;
-    const float* row = &heights_[static_cast<std::size_t>(j) * width_ + i];
-    const float a = row[0] > h, b = row[1] > h, c = row[width_] > h, e = row[width_ + 1] > h;
-    const float fx = x - i, fy = y - j;
-    covered += (a + (b - a) * fx) * (1.0f - fy) + (c + (e - c) * fx) * fy;
-  }
-  return 1.0f - covered / pattern_.size();
-}
-
 ShadowMap::Place ShadowMap::placeOf(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
   const float slope = 1.0f - std::clamp(n.dot(axis_h_), 0.0f, 1.0f);
   const Eigen::Vector3f q = p + n * texel_ * (1.0f + 2.0f * slope);
-  return {(q.dot(axis_s_) - origin_.x()) / texel_, (q.dot(axis_t_) - origin_.y()) / texel_, q.dot(axis_h_) - origin_.z() + 1.5f * texel_};
+  return {(q.dot(axis_s_) - origin_.x()) * per_texel_, (q.dot(axis_t_) - origin_.y()) * per_texel_, q.dot(axis_h_) - origin_.z() + 1.5f * texel_};
 }
 
 float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
@@ -148,14 +124,12 @@ float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   const auto [s, t, h] = placeOf(p, n);
   if (h > highest_) return 1.0f;
   // Blockers inside the cone that the disc spans up to the highest occluder.
-  const float search = std::max(1.5f, angular_radius_ * (highest_ - h) / texel_);
+  const float search = std::max(1.5f, angular_radius_ * (highest_ - h) * per_texel_);
   if (s < -search || t < -search || s > width_ + search || t > height_ + search) return 1.0f;
   const Extremes near = around(s, t, search + 2.0f);
   if (near.highest <= h) return 1.0f;
   if (near.lowest > h) return 0.0f;
-  const float reach = search + 2.0f;
-  const bool inside = s > reach && t > reach && s + reach < width_ && t + reach < height_;
-  return inside ? filtered<true>(s, t, h, search) : filtered<false>(s, t, h, search);
+  return kernels().visibleThrough({heights_.data(), width_, height_, angular_radius_ * per_texel_}, *taps_, s, t, h, search);
 }
 
 std::optional<float> ShadowMap::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const {
@@ -163,7 +137,7 @@ std::optional<float> ShadowMap::uniform(const Eigen::Vector3f& p, const Eigen::V
   const auto [s, t, h] = placeOf(p, n);
   const float lowest = h - radius, highest = h + radius;  // of the disc
   if (lowest > highest_) return 1.0f;
-  const float reach = std::max(1.5f, angular_radius_ * (highest_ - lowest) / texel_) + 2.0f + radius / texel_;
+  const float reach = std::max(1.5f, angular_radius_ * (highest_ - lowest) * per_texel_) + 2.0f + radius * per_texel_;
   if (s < -reach || t < -reach || s > width_ + reach || t > height_ + reach) return 1.0f;
   const Extremes near = around(s, t, reach);
   if (near.highest <= lowest) return 1.0f;

@@ -67,32 +67,42 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
   return actor;
 }
 
+namespace {
+
+Eigen::Vector3f mix(const Points& x, const Eigen::Vector3i& t, const Eigen::Vector3f& w) { return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]]; }
+
+Eigen::Vector3f unit(const Eigen::Vector3f& x) {
+  const float squared = x.squaredNorm();
+  return squared > 0.0f ? Eigen::Vector3f(x * (1.0f / std::sqrt(squared))) : x;
+}
+
+// Sheets are seen from both sides: has the one towards the viewer the other normal?
+bool seenFromBehind(const Actor& actor, const Eigen::Vector3i& t, const LitPoint& p, const Eigen::Vector3f& eye) {
+  if (p.normal.dot(eye - p.position) >= 0.0f) return false;
+  const Eigen::Vector3f &a = actor.vertices[t[0]], &b = actor.vertices[t[1]], &c = actor.vertices[t[2]];
+  return (b - a).cross(c - a).dot(eye - p.position) < 0.0f;
+}
+
+LitPoint litPoint(const Actor& actor, const Eigen::Vector3i& t, const Eigen::Vector3f& w) {
+  const std::vector<float>& sky = actor.surface->sky;
+  return {mix(actor.vertices, t, w), unit(mix(actor.normals, t, w)), w[0] * sky[t[0]] + w[1] * sky[t[1]] + w[2] * sky[t[2]]};
+}
+
+}  // namespace
+
+LitPoint litPoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye) {
+  const Eigen::Vector3i& t = actor.surface->triangles[triangle];
+  LitPoint p = litPoint(actor, t, barycentric(actor.screen, triangle, u, v));
+  if (seenFromBehind(actor, t, p, eye)) p.normal = -p.normal;
+  return p;
+}
+
 SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye) {
   const Eigen::Vector3i& t = actor.surface->triangles[triangle];
   const Eigen::Vector3f w = barycentric(actor.screen, triangle, u, v);
-  const Eigen::Vector3f &a = actor.vertices[t[0]], &b = actor.vertices[t[1]], &c = actor.vertices[t[2]];
-  const auto mix = [&](const Points& x) -> Eigen::Vector3f {
-    return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]];
-  };
-  const auto unit = [](const Eigen::Vector3f& x) -> Eigen::Vector3f {
-    const float squared = x.squaredNorm();
-    return squared > 0.0f ? Eigen::Vector3f(x * (1.0f / std::sqrt(squared))) : x;
-  };
-  SurfacePoint point;
-  point.triangle = triangle;
-  point.weights = w;
-  const std::vector<float>& sky = actor.surface->sky;
-  point.sky = w[0] * sky[t[0]] + w[1] * sky[t[1]] + w[2] * sky[t[2]];
-  point.position = w[0] * a + w[1] * b + w[2] * c;
-  point.normal = unit(mix(actor.normals));
-  point.key_position = mix(actor.surface->key_vertices);
-  point.key_normal = unit(mix(actor.surface->key_normals));
-  // Sheets are seen from both sides.
-  if (point.normal.dot(eye - point.position) < 0.0f) {
-    const Eigen::Vector3f face = (b - a).cross(c - a);
-    if (face.dot(eye - point.position) < 0.0f) point.normal = -point.normal, point.key_normal = -point.key_normal;
-  }
-  return point;
+  const LitPoint p = litPoint(actor, t, w);
+  const float side = seenFromBehind(actor, t, p, eye) ? -1.0f : 1.0f;
+  return {p.position, side * p.normal, mix(actor.surface->key_vertices, t, w), side * unit(mix(actor.surface->key_normals, t, w)), p.sky, triangle, w};
 }
 
 std::optional<Receiver> receiverAt(const std::vector<SupportPlane>& planes, const Camera& camera, float u, float v) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <opencv2/core.hpp>
 
@@ -7,6 +8,9 @@ namespace calipso::render {
 
 // Light adds up in linear RGB; pictures hold sRGB code values (IEC 61966-2-1). Linear values here are
 // in [0, 1], 1 = code value 255. Channel order is OpenCV's B, G, R.
+
+// Linear values of the 256 code values.
+const float* decodeTable();
 
 // Linear value of a code value.
 float linearFromCode(std::uint8_t code);
@@ -19,10 +23,10 @@ float codeFromLinear(float linear);
 
 // What codeFromLinear() interpolates: code value at sqrt(linear) = i / kEncodeSteps, and the rise to the next step.
 constexpr int kEncodeSteps = 1024;
-struct EncodeStep {
-  float code, rise;
+struct EncodeTables {
+  std::array<float, kEncodeSteps + 1> code, rise;
 };
-const EncodeStep* encodeSteps();  // kEncodeSteps + 1 of them
+const EncodeTables& encodeTables();
 
 // CV_8UC3 -> CV_32FC3 and back (rounded).
 cv::Mat linearFromCode(const cv::Mat& bgr);

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <vector>
 
 #include "calipso_render/visibility.hpp"
 
 namespace calipso::render {
+
+struct ShadowTaps;
 
 // Half the angle of the disc of sky that shades softly near contact, rad.
 constexpr double kSkyRadius = 0.8;
@@ -17,7 +20,7 @@ class ShadowMap : public Visibility {
   struct Params {
     int resolution = 768;          // texels along the longer side
     double angular_radius = 0.02;  // of the light, rad
-    int taps = 16;                 // samples of the filter
+    int taps = 16;                 // samples of the filter: 8, 16, 24 or 32
   };
 
   // @param direction unit vector towards the light, world
@@ -49,13 +52,11 @@ class ShadowMap : public Visibility {
 
   void buildLevels();
   Extremes around(float s, float t, float reach) const;
-  template <bool kInside>
-  float filtered(float s, float t, float h, float search) const;
 
   Eigen::Vector3f origin_, axis_s_, axis_t_, axis_h_;
-  float texel_ = 0.0f, angular_radius_ = 0.0f, highest_ = 0.0f;
+  float texel_ = 0.0f, per_texel_ = 0.0f, angular_radius_ = 0.0f, highest_ = 0.0f;
   int width_ = 0, height_ = 0;
-  std::vector<Eigen::Vector2f> pattern_;  // unit disc
+  std::shared_ptr<const ShadowTaps> taps_;
   std::vector<float> heights_;            // towards the light, m
   std::vector<Level> levels_;             // tell at once where all is lit or all is shaded
 };

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+
+namespace calipso::render {
+
+// Samples of a disc for a shadow map's filter. The number of taps is a multiple of 8.
+struct ShadowTaps {
+  static constexpr int kMost = 32;
+  int count = 0;
+  alignas(32) float x[kMost], y[kMost];  // unit disc
+};
+
+// A shadow map as its filter reads it. What lies in the corner blocks nothing.
+struct ShadowTexels {
+  const float* heights;  // towards the light, m
+  int width, height;
+  float spread;          // texels of penumbra per m above the receiver
+};
+
+// Tables by which linear colours become code values with noise: see LineCodec.
+struct CodeTables {
+  const float* code;          // at sqrt(linear) = i / kEncodeSteps
+  const float* rise;          // to the next step
+  const float* deviation[3];  // of the noise, per channel and code value
+};
+
+// Loops over which a frame spends its time, compiled for the processors that the build is for and for those with AVX2. Both give the
+// same bits: nothing is contracted or summed in another order.
+struct Kernels {
+  // Part of the light that a receiver at (s, t), texels, and height h sees: the mean height of the blockers within `search`, then the
+  // covered part of the penumbra that it sets (Fernando 2005).
+  float (*visibleThrough)(const ShadowTexels& map, const ShadowTaps& taps, float s, float t, float h, float search);
+
+  // sampleBicubic() at `count` places. @param image CV_32FC4, not empty
+  void (*sample)(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out);
+
+  // Code values of `count` linear colours (B, G, R, part without noise), with noise of unit variance scaled by the tables.
+  // @param noise a row of 256 places, read from `column` on, around its end
+  void (*encode)(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count, cv::Vec3b* codes);
+};
+
+const Kernels& plainKernels();
+const Kernels* avx2Kernels();  // nullptr: not on this processor
+const Kernels& kernels();      // the best of them
+
+}  // namespace calipso::render

@@ -1,0 +1,82 @@
+#include "kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <opencv2/core.hpp>
+
+#include "calipso_render/appearance.hpp"
+#include "calipso_render/colour.hpp"
+
+namespace calipso::render {
+namespace {
+
+// The kernels for newer processors give the bits of the plain ones; without such a processor there is nothing to compare.
+class Avx2 : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (avx2Kernels() == nullptr) GTEST_SKIP() << "no AVX2 on this processor";
+  }
+  cv::RNG random_{7};
+};
+
+TEST_F(Avx2, EncodesTheSameBytes) {
+  std::vector<cv::Vec4f> colours(1000), noise(256);
+  for (cv::Vec4f& c : colours) c = {random_.uniform(-0.1f, 1.2f), random_.uniform(0.0f, 0.02f), random_.uniform(0.0f, 1.0f), random_.uniform(0.0f, 1.0f)};
+  for (cv::Vec4f& n : noise) n = {random_.uniform(-3.0f, 3.0f), random_.uniform(-3.0f, 3.0f), random_.uniform(-3.0f, 3.0f), 0.0f};
+  std::vector<float> deviation(256);
+  for (float& d : deviation) d = random_.uniform(0.0f, 4.0f);
+  const CodeTables tables{encodeTables().code.data(), encodeTables().rise.data(), {deviation.data(), deviation.data(), deviation.data()}};
+  for (const int count : {1, 7, 64, 65, 1000}) {
+    std::vector<cv::Vec3b> plain(colours.size()), fast(colours.size());
+    plainKernels().encode(tables, colours.data(), noise.data(), 200, count, plain.data());
+    avx2Kernels()->encode(tables, colours.data(), noise.data(), 200, count, fast.data());
+    EXPECT_EQ(plain, fast) << count;
+  }
+}
+
+TEST_F(Avx2, SamplesTheSameValues) {
+  cv::Mat image(20, 30, CV_32FC4);
+  random_.fill(image, cv::RNG::UNIFORM, -0.2, 1.0);
+  std::vector<float> u, v;
+  for (int i = 0; i < 500; ++i) u.push_back(random_.uniform(-3.0f, 33.0f)), v.push_back(random_.uniform(-3.0f, 23.0f));
+  std::vector<cv::Vec4f> plain(u.size()), fast(u.size());
+  plainKernels().sample(image, u.data(), v.data(), 500, plain.data());
+  avx2Kernels()->sample(image, u.data(), v.data(), 500, fast.data());
+  EXPECT_EQ(std::memcmp(plain.data(), fast.data(), plain.size() * sizeof(cv::Vec4f)), 0);
+}
+
+TEST_F(Avx2, SeesTheSameLight) {
+  constexpr int kSide = 40;
+  std::vector<float> heights(kSide * kSide, -3e38f);
+  for (int j = 8; j < 32; ++j) {
+    for (int i = 8; i < 32; ++i) heights[j * kSide + i] = random_.uniform(0.0f, 1.0f);
+  }
+  ShadowTaps taps;
+  taps.count = 24;
+  for (int k = 0; k < taps.count; ++k) taps.x[k] = random_.uniform(-0.7f, 0.7f), taps.y[k] = random_.uniform(-0.7f, 0.7f);
+  int between = 0;
+  for (int i = 0; i < 500; ++i) {
+    const float s = random_.uniform(-5.0f, 45.0f), t = random_.uniform(-5.0f, 45.0f), h = random_.uniform(-0.2f, 1.0f);
+    const float plain = plainKernels().visibleThrough({heights.data(), kSide, kSide, 9.0f}, taps, s, t, h, 6.0f);
+    EXPECT_EQ(avx2Kernels()->visibleThrough({heights.data(), kSide, kSide, 9.0f}, taps, s, t, h, 6.0f), plain) << s << ", " << t;
+    between += plain > 0.0f && plain < 1.0f;
+  }
+  EXPECT_GT(between, 100);
+}
+
+// What is sampled in a row and what is sampled alone must not differ where the two meet.
+TEST(Kernels, SampleAsSampleBicubic) {
+  cv::RNG random(3);
+  cv::Mat image(20, 30, CV_32FC4);
+  random.fill(image, cv::RNG::UNIFORM, 0.0, 1.0);
+  for (int i = 0; i < 200; ++i) {
+    const float u = random.uniform(-3.0f, 33.0f), v = random.uniform(-3.0f, 23.0f);
+    cv::Vec4f out;
+    kernels().sample(image, &u, &v, 1, &out);
+    EXPECT_LT(cv::norm(out - sampleBicubic(image, u, v), cv::NORM_INF), 1e-6) << u << ", " << v;
+  }
+}
+
+}  // namespace
+}  // namespace calipso::render
