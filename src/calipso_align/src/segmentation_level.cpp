@@ -45,6 +45,18 @@ float surfaceCost(const LabelModel& model, const SegmentationLevel& level, size_
   return any - std::log(on_model + kDetails);
 }
 
+// Where the surface ends at this pixel, its colour is a mixture with that of what lies behind or before.
+bool isMixed(const SegmentationLevel& level, int x, int y) {
+  const auto ends = [&](const cv::Point& p, const cv::Point& step) {
+    const cv::Rect whole(cv::Point(), level.relief.state.size());
+    if (!whole.contains(p) || !whole.contains(p + step)) return false;
+    const float j = jump(level.relief, p, step);
+    return level.jump_scale * j * j > 1.0f;
+  };
+  return ends({x, y}, {1, 0}) || ends({x - 1, y}, {1, 0}) || ends({x, y}, {0, 1}) ||
+         ends({x, y - 1}, {0, 1});
+}
+
 // Strokes in a smaller picture, where a line of one pixel must not get lost: of the marks that fall
 // into a pixel the first counts.
 cv::Mat thinnedOut(const cv::Mat& strokes, const cv::Size& size) {
@@ -104,6 +116,11 @@ SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<Segmentation
   level.relief = resized(relief, view, size);
   const float mean = relief.empty() ? 0.0f : meanJump(level.relief, level.region);
   level.jump_scale = mean > 0.0f ? 0.5f / (mean * mean) : 0.0f;
+  if (level.relief.registered) {
+    level.mixed = cv::Mat::zeros(size, CV_8U);
+    for (int y = 0; y < size.height; ++y)
+      for (int x = 0; x < size.width; ++x) level.mixed.at<uchar>(y, x) = isMixed(level, x, y) ? 255 : 0;
+  }
   return level;
 }
 
@@ -139,6 +156,7 @@ void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int compone
 
 void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
                    SegmentationLevel& level) {
+  constexpr float kMixed = 0.25f;   // what a colour that is a mixture still counts
   level.costs.resize(models.size());
   for (size_t k = 0; k < models.size(); ++k) {
     cv::Mat& cost = level.costs[k];
@@ -156,6 +174,7 @@ void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
           if (colours)
             cost.at<float>(y, x) = std::min(
                 outlier_cost, colours->cost(cv::Vec3f(level.image.at<cv::Vec3b>(y, x))));
+          if (!level.mixed.empty() && level.mixed.at<uchar>(y, x)) cost.at<float>(y, x) *= kMixed;
           if (models[k].surfaces)
             cost.at<float>(y, x) += surfaceCost(models[k], level, k, x, y);
         }

@@ -6,7 +6,9 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 
+#include <algorithm>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "calipso_ros/topics.hpp"
@@ -17,35 +19,50 @@ namespace {
 constexpr double kTimeoutSec = 40.0;
 const ros::Time kStamp(2.5);
 
-// The outline of the scene's double pyramid, moved by a few pixels and a tenth larger.
-calipso_msgs::Segmentation keyFrame() {
-  calipso_msgs::Contour loop;
-  constexpr double kRadius = 33.0, kU = 82.0, kV = 58.0;
+constexpr int kWidth = 160, kHeight = 120;   // of the scene's pictures
+
+// A square on its tip, as far as it is in the picture: where the border cuts it, the contour is unknown.
+calipso_msgs::Contour tippedSquare(double centre_u, double centre_v, double radius) {
   constexpr int kPerSide = 40;
   const double corner_u[] = {1, 0, -1, 0}, corner_v[] = {0, 1, 0, -1};
+  calipso_msgs::Contour loop;
   for (int side = 0; side < 4; ++side) {
     for (int k = 0; k < kPerSide; ++k) {
       const double t = static_cast<double>(k) / kPerSide;
       const int next = (side + 1) % 4;
-      loop.u.push_back(kU + kRadius * ((1 - t) * corner_u[side] + t * corner_u[next]));
-      loop.v.push_back(kV + kRadius * ((1 - t) * corner_v[side] + t * corner_v[next]));
-      loop.known.push_back(true);
+      const double u = centre_u + radius * ((1 - t) * corner_u[side] + t * corner_u[next]);
+      const double v = centre_v + radius * ((1 - t) * corner_v[side] + t * corner_v[next]);
+      const double seen_u = std::min(std::max(u, -0.5), kWidth - 0.5);
+      const double seen_v = std::min(std::max(v, -0.5), kHeight - 0.5);
+      loop.u.push_back(seen_u);
+      loop.v.push_back(seen_v);
+      loop.known.push_back(seen_u == u && seen_v == v);
       loop.confidence.push_back(1.0f);
     }
   }
+  return loop;
+}
+
+calipso_msgs::Segmentation keyFrame(const ros::Time& stamp,
+                                    const std::vector<calipso_msgs::Contour>& loops,
+                                    const std::string& object = "disc") {
   calipso_msgs::Segmentation msg;
-  msg.header.stamp = kStamp;
+  msg.header.stamp = stamp;
   msg.contours.resize(1);
-  msg.contours[0].object = "disc";
+  msg.contours[0].object = object;
   msg.contours[0].index = 1;
-  msg.contours[0].loops.push_back(loop);
+  msg.contours[0].loops = loops;
   return msg;
 }
 
+// The outline of the scene's double pyramid, moved by a few pixels and a tenth larger.
+calipso_msgs::Segmentation keyFrame() { return keyFrame(kStamp, {tippedSquare(82.0, 58.0, 33.0)}); }
+
 class AlignNode : public ::testing::Test {
  protected:
-  AlignNode()
-      : segmentations_(nh_.advertise<calipso_msgs::Segmentation>(topics::kSegmentation, 1)),
+  explicit AlignNode(const std::string& name_space = "")
+      : nh_(name_space),
+        segmentations_(nh_.advertise<calipso_msgs::Segmentation>(topics::kSegmentation, 1)),
         poses_(nh_.advertise<geometry_msgs::PoseStamped>("align/initial_pose/disc", 1)),
         models_(nh_.subscribe(topics::kModels, 0, &AlignNode::onModels, this)) {}
 
@@ -60,40 +77,105 @@ class AlignNode : public ::testing::Test {
     }
   }
 
+  void waitForNode() {
+    waitFor([&] {
+      return segmentations_.getNumSubscribers() > 0 && poses_.getNumSubscribers() > 0 &&
+             models_.getNumPublishers() > 0;
+    }, "the node");
+  }
+
+  // What the node says of the model after a message, which makes it fit again.
+  template <class Message>
+  calipso_msgs::AlignedModel answerTo(const ros::Publisher& publisher, const Message& message,
+                                      const ros::Time& stamp) {
+    waitForNode();
+    // Results of another test's message may still be on their way.
+    const size_t before = received_.size();
+    publisher.publish(message);
+    waitFor([&] { return received_.size() > before && received_.back()->header.stamp == stamp; },
+            "the models");
+    if (received_.empty() || received_.back()->models.size() != 1) {
+      ADD_FAILURE() << "there is no model";
+      return {};
+    }
+    return received_.back()->models[0];
+  }
+
+  calipso_msgs::AlignedModel answerTo(const calipso_msgs::Segmentation& message) {
+    return answerTo(segmentations_, message, message.header.stamp);
+  }
+
   ros::NodeHandle nh_;
   ros::Publisher segmentations_, poses_;
   ros::Subscriber models_;
   std::vector<calipso_msgs::AlignedModelsConstPtr> received_;
 };
 
-TEST_F(AlignNode, AlignsTheKeyFrameAndAgainFromANewRoughPose) {
-  waitFor([&] {
-    return segmentations_.getNumSubscribers() > 0 && poses_.getNumSubscribers() > 0 &&
-           models_.getNumPublishers() > 0;
-  }, "the node");
-  segmentations_.publish(keyFrame());
-  waitFor([&] { return !received_.empty(); }, "the models");
-
-  const calipso_msgs::AlignedModels& first = *received_.back();
-  EXPECT_EQ(first.header.stamp, kStamp);
-  EXPECT_EQ(first.header.frame_id, "map");
-  ASSERT_EQ(first.models.size(), 1u);
-  EXPECT_EQ(first.models[0].object, "disc");
-  EXPECT_EQ(first.models[0].mesh.triangles, first.models[0].cad.triangles);
-  EXPECT_TRUE(first.models[0].trusted) << first.models[0].reason;
-  EXPECT_LT(first.models[0].contour_mean_px, 1.0f);  // straight edges against straight edges
-
-  // Behind the camera: published all the same, and marked.
+geometry_msgs::PoseStamped placedAt(double x, double y) {
   geometry_msgs::PoseStamped pose;
   pose.header.frame_id = "map";
-  pose.pose.position.y = -1.0;
+  pose.pose.position.x = x;
+  pose.pose.position.y = y;
   pose.pose.orientation.w = 1.0;
-  const size_t before = received_.size();
-  poses_.publish(pose);
-  waitFor([&] { return received_.size() > before; }, "the models after a new rough pose");
-  ASSERT_EQ(received_.back()->models.size(), 1u);
-  EXPECT_FALSE(received_.back()->models[0].trusted);
-  EXPECT_NE(received_.back()->models[0].reason.find("behind the camera"), std::string::npos);
+  return pose;
+}
+
+void expectFlag(const calipso_msgs::AlignedModel& model, const std::string& reason) {
+  EXPECT_FALSE(model.trusted);
+  EXPECT_NE(model.reason.find(reason), std::string::npos) << model.reason;
+  EXPECT_FALSE(model.mesh.vertices.empty());   // marked, never left out
+}
+
+TEST_F(AlignNode, AlignsTheKeyFrame) {
+  const calipso_msgs::AlignedModel model = answerTo(keyFrame());
+  EXPECT_EQ(received_.back()->header.frame_id, "map");
+  EXPECT_EQ(model.object, "disc");
+  EXPECT_EQ(model.mesh.triangles, model.cad.triangles);
+  EXPECT_TRUE(model.trusted) << model.reason;
+  EXPECT_LT(model.contour_mean_px, 1.0f);  // straight edges against straight edges
+}
+
+TEST_F(AlignNode, FlagsARoughPoseThatIsOfNoUse) {
+  const ros::Time stamp(3.0);
+  EXPECT_TRUE(answerTo(keyFrame(stamp, {tippedSquare(82.0, 58.0, 33.0)})).trusted);
+  expectFlag(answerTo(poses_, placedAt(0.0, -1.0), stamp), "behind the camera");
+  expectFlag(answerTo(poses_, placedAt(4.0, 1.0), stamp), "off the image");
+  EXPECT_TRUE(answerTo(poses_, placedAt(0.0, 1.0), stamp).trusted);
+}
+
+TEST_F(AlignNode, FlagsAMaskThatIsEmpty) {
+  expectFlag(answerTo(keyFrame(ros::Time(4.0), {tippedSquare(82.0, 58.0, 33.0)}, "something_else")),
+             "add strokes");
+}
+
+TEST_F(AlignNode, FlagsAMaskThatFillsTheImage) {
+  expectFlag(answerTo(keyFrame(ros::Time(5.0), {tippedSquare(79.5, 59.5, 400.0)})),
+             "contour mostly unknown");
+}
+
+TEST_F(AlignNode, FlagsAContourOfTwoPieces) {
+  expectFlag(answerTo(keyFrame(ros::Time(6.0), {tippedSquare(60.0, 58.0, 15.0),
+                                                tippedSquare(100.0, 58.0, 15.0)})),
+             "separate pieces");
+}
+
+TEST_F(AlignNode, SaysThatTheImageBorderCutsTheObject) {
+  const calipso_msgs::AlignedModel model =
+      answerTo(keyFrame(ros::Time(7.0), {tippedSquare(79.5, 100.0, 33.0)}));
+  EXPECT_NE(model.reason.find("cut by the image border"), std::string::npos) << model.reason;
+}
+
+class AlignNodeInMillimetres : public AlignNode {
+ protected:
+  AlignNodeInMillimetres() : AlignNode("in_mm") {}
+};
+
+TEST_F(AlignNodeInMillimetres, FlagsTheMeshAndOffersTheScale) {
+  const calipso_msgs::AlignedModel model = answerTo(keyFrame());
+  expectFlag(model, "size implausible");
+  const size_t at = model.reason.find("scaled by ");
+  ASSERT_NE(at, std::string::npos) << model.reason;
+  EXPECT_NEAR(std::stod(model.reason.substr(at + 10)), 1e-3, 3e-4);
 }
 
 }  // namespace

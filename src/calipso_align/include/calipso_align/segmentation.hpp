@@ -13,7 +13,7 @@ namespace calipso::align {
 
 struct SegmenterParams {
   int components = 6;             // Gaussians per colour model
-  int surfaces = 12;              // Gaussians per model of surfaces
+  int surfaces = 24;              // Gaussians per model of surfaces
   int rounds = 4;                 // of colour model and cut on the coarse picture
   int coarse_pixels = 40000;      // the coarse view has at most about this many
   int band_px = 2;                // half width of the band around the coarse boundary, coarse pixels

@@ -40,6 +40,7 @@ struct SegmentationLevel {
   std::vector<cv::Mat> expected; // CV_32F per label number, as the relief's inverse depth: where a fitted
                                  // model has its surface, 0 outside of it; or empty
   float jump_scale = 0.0f;       // of label_cut.hpp over the region
+  cv::Mat mixed;               // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
 };
 
 // Where the targets may lie in a picture and what is near.
