@@ -5,6 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calipso_align/planar_pieces.hpp"
+
 namespace calipso::align {
 namespace {
 
@@ -130,6 +132,7 @@ Relief makeRelief(const cv::Mat& image, const cv::Mat& depth) {
   relief.registered = error <= kRegistered;
   if (!relief.registered)
     relief.state.setTo(Relief::kUnusable, grown(across | down, static_cast<int>(std::ceil(error)) + 1));
+  if (relief.registered) relief.pieces = planarPieces(relief);
   return relief;
 }
 
@@ -138,6 +141,8 @@ Relief resized(const Relief& relief, const cv::Rect& view, const cv::Size& size)
   if (relief.empty()) return result;
   cv::resize(relief.surface(view), result.surface, size, 0, 0, cv::INTER_NEAREST);
   cv::resize(relief.state(view), result.state, size, 0, 0, cv::INTER_NEAREST);
+  if (!relief.pieces.empty())
+    cv::resize(relief.pieces(view), result.pieces, size, 0, 0, cv::INTER_NEAREST);
   result.units = relief.units;
   result.volume = relief.volume;
   result.registered = relief.registered;

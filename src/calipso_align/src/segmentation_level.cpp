@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_align/label_cut.hpp"
+#include "calipso_align/planar_pieces.hpp"
 
 namespace calipso::align {
 namespace {
@@ -127,6 +128,7 @@ SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<Segmentation
 void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& strokes,
               SegmentationLevel& level) {
   level.seeds = cv::Mat::zeros(level.image.size(), CV_8U);
+  level.stroked.release();
   if (strokes.empty()) return;
   const cv::Mat marks = thinnedOut(strokes, level.image.size());
   level.seeds.setTo(1, marks == kBackgroundStroke);
@@ -136,6 +138,7 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
     level.seeds.setTo(static_cast<double>(k + 2), own);
     level.labels.setTo(static_cast<double>(k + 1), own);
   }
+  if (!level.relief.pieces.empty()) level.stroked = strokesOfPieces(level.relief.pieces, level.seeds);
 }
 
 void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int components,
@@ -157,6 +160,7 @@ void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int compone
 void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
                    SegmentationLevel& level) {
   constexpr float kMixed = 0.25f;   // what a colour that is a mixture still counts
+  constexpr float kDivided = 10.0f;  // nats, of a pixel in a flat piece that has strokes of another label only
   level.costs.resize(models.size());
   for (size_t k = 0; k < models.size(); ++k) {
     cv::Mat& cost = level.costs[k];
@@ -175,6 +179,8 @@ void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
             cost.at<float>(y, x) = std::min(
                 outlier_cost, colours->cost(cv::Vec3f(level.image.at<cv::Vec3b>(y, x))));
           if (!level.mixed.empty() && level.mixed.at<uchar>(y, x)) cost.at<float>(y, x) *= kMixed;
+          const int stroke = level.stroked.empty() ? 0 : level.stroked.at<uchar>(y, x);
+          if (stroke != 0 && stroke != static_cast<int>(k + 1)) cost.at<float>(y, x) += kDivided;
           if (models[k].surfaces)
             cost.at<float>(y, x) += surfaceCost(models[k], level, k, x, y);
         }
