@@ -11,7 +11,6 @@ namespace {
 // faster than the largest is a collision.
 constexpr double kJerkShares[] = {0.003, 0.01, 0.03, 0.1, 0.3};
 constexpr double kSpinShares[] = {0.003, 0.01, 0.03, 0.1, 0.3};
-constexpr int kRounds = 2;
 
 // Fewer frames in a piece say nothing about how its acceleration or spin changes.
 constexpr int kLeastForForced = 5;
@@ -80,10 +79,13 @@ void chooseKind(const std::vector<PoseMeasurement>& measurements, size_t index,
   if (piece.turning == Turning::kForced && piece.spin_noise == 0.0) {
     piece.spin_noise = 0.3 * prior.spin;
   }
-  for (int round = 0; round < kRounds; ++round) {
-    takeBest(travelOptions(pieces[index], prior, few));
-    takeBest(turningOptions(pieces[index], prior, few));
+  // All pairs: travel and turning hang together where the measurements' errors do.
+  std::vector<MotionPiece> options;
+  for (const MotionPiece& travels : travelOptions(piece, prior, few)) {
+    const std::vector<MotionPiece> turns = turningOptions(travels, prior, few);
+    options.insert(options.end(), turns.begin(), turns.end());
   }
+  takeBest(options);
 }
 
 double chooseNoiseScale(const std::vector<PoseMeasurement>& measurements,

@@ -16,6 +16,7 @@ constexpr int kRefineRounds = 3;
 constexpr size_t kLeastFrames = 2;    // in a piece: fewer tell nothing about its velocity
 constexpr size_t kTriedAtOnce = 8;    // candidates that are fitted fully before giving up
 constexpr size_t kFramesAfter = 2;    // a first look goes no further: another collision may follow
+constexpr int kSplitRounds = 2;       // kinds of motion and instant hang together
 constexpr double kSplitReach = 0.4;   // frames by which a fit may move a candidate
 constexpr double kRefineReach = 0.6;
 
@@ -181,9 +182,11 @@ double TrajectoryFitter::splitAt(double time, std::vector<MotionPiece>& pieces) 
   const double before = likelihood();
   insertPiece(time, false);
   const size_t second = indexOfPieceAt(time);
-  fitKind(second - 1);
-  fitKind(second);
-  pieces_[second].start = bestTime(second, kSplitReach * frameSpacing());
+  for (int round = 0; round < kSplitRounds; ++round) {
+    fitKind(second - 1);
+    fitKind(second);
+    pieces_[second].start = bestTime(second, kSplitReach * frameSpacing());
+  }
   const double gain = likelihood() - before;
   pieces = pieces_;
   pieces_ = saved;
