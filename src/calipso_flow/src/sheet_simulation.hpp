@@ -2,13 +2,27 @@
 
 #include <calipso_fem/world/soft_object.hpp>
 #include <functional>
+#include <stdexcept>
 #include <vector>
 
 #include "calipso_flow/object_model.hpp"
+#include "calipso_flow/wind_course.hpp"
+#include "sheet_tangent.hpp"
 
 namespace calipso::flow {
 
 using SurfaceVector = Eigen::VectorXd;  // 3 #V
+
+// The sheet is too soft, or too badly held, to hang in its key-frame shape.
+struct NoEquilibrium : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// A sheet's motion as seen by K linear measurements of its surface, and how it depends on the wind.
+struct SheetMotion {
+  Eigen::MatrixXd amplitudes;            // T x K
+  std::vector<Eigen::MatrixXd> slopes;   // T x K each: by the wind at the knots, one component after the other, and
+};                                       // by the logarithm of the stiffness; empty when not asked for
 
 // A thin object of the video as the simulator moves it in the wind: with the material an object of
 // its size starts with, held where it is attached, in equilibrium in its key-frame shape.
@@ -16,7 +30,7 @@ class SheetSimulation {
  public:
   // @param longest_step  s
   // @param stiffness     times the modulus an object of its size starts with
-  // @throw std::invalid_argument as the simulator does; std::runtime_error without an equilibrium
+  // @throw std::invalid_argument as the simulator does; NoEquilibrium
   SheetSimulation(const ObjectModel& model, const Eigen::Vector3d& gravity, int nodes,
                   double longest_step, double stiffness = 1.0);
 
@@ -25,9 +39,23 @@ class SheetSimulation {
   // @param velocities  of the surface at the first time, world axes, m/s
   std::vector<SurfaceVector> run(const std::vector<double>& times, const SurfaceVector& velocities,
                                  const Wind& wind);
+  // The same, measured: amplitudes = measured * displacements of the surface.
+  // @param measured   K x 3 #V
+  // @param stiffer    null: no slopes; else the same sheet, by a factor exp(`by`) as stiff
+  SheetMotion measure(const std::vector<double>& times, const SurfaceVector& velocities, const WindCourse& wind,
+                      const Eigen::MatrixXd& measured, const SheetSimulation* stiffer, double by);
   double stiffnessRatio() const { return stiffness_over_density_; }  // E/rho, m^2/s^2
 
  private:
+  using AfterStep = std::function<void(const fem::Vec& x0, const fem::Vec& v0, double time, double h)>;
+  // Steps through all times, with the wind of the middle of each step, whose time is told to `after_step`.
+  void move(const std::vector<double>& times, const SurfaceVector& velocities, const Wind& wind,
+            const AfterStep& after_step, const std::function<void()>& after_frame);
+  void settle(const Eigen::Vector3d& gravity);
+  // Of the nodal forces, 3 #N x P. @param dw  of the wind, 3 x P
+  Eigen::MatrixXd windSlopes(const fem::Vec& x0, const fem::Vec& v0, const Eigen::Vector3d& wind, double h,
+                             const MotionTangent& tangent, const Eigen::MatrixXd& dw) const;
+  fem::Air airOf(const Eigen::Vector3d& wind) const;
   void blow(const Eigen::Vector3d& wind, double h);
 
   double longest_step_;   // s

@@ -19,8 +19,9 @@ namespace {
 
 constexpr int kIterations = 8;
 constexpr int kTrials = 3;             // halvings of a step that makes things worse
-constexpr double kProbe = 0.2;         // m/s, of the finite differences
+constexpr double kStiffer = 0.05;      // log s: how much stiffer the sheet is that shows what stiffness does
 constexpr double kSettled = 0.02;      // m/s, a smaller step is the last
+constexpr double kGained = 1e-3;       // of the cost: less gained, and it was the last step
 constexpr double kSeen = 3.0;          // the pictures' information over that beforehand: half of the deviation
 constexpr double kSeenShare = 0.03;    // of the best direction's
 constexpr double kWellShown = 0.95;    // of the motion's square: no other valley is looked for
@@ -28,17 +29,8 @@ constexpr double kHardlyShown = 0.5;
 constexpr double kStiffStart = 2.5;    // log s
 constexpr double kMostPersistent = 0.95;
 constexpr int kFiner = 4;              // times the nodes at most
+constexpr char kNoEquilibrium[] = "no wind: the sheet finds no equilibrium in its shape; see where it is held";
 constexpr double kFirstGuess = 0.5;    // m/s: still air has no derivative, drag being quadratic
-
-double hatAt(const std::vector<double>& knots, size_t i, double time) {
-  if (i > 0 && time < knots[i]) {
-    return std::max(0.0, (time - knots[i - 1]) / (knots[i] - knots[i - 1]));
-  }
-  if (i + 1 < knots.size() && time > knots[i]) {
-    return std::max(0.0, (knots[i + 1] - time) / (knots[i + 1] - knots[i]));
-  }
-  return 1.0;
-}
 
 std::vector<double> knotsOver(double begin, double end, double spacing) {
   const int intervals = std::max(1, static_cast<int>(std::lround((end - begin) / spacing)));
@@ -104,47 +96,43 @@ class WindFit {
       : sheets_(sheets), times_(times), modes_(modes), params_(params),
         down_(gravity.norm() > 0.0 ? Eigen::Vector3d(gravity.normalized()) : Eigen::Vector3d::Zero()) {
     const Eigen::Matrix3d R = model.world_from_object.linear();
-    world_shapes_.resize(modes.shapes.rows(), modes.count());
+    Eigen::MatrixXd shapes(modes.shapes.rows(), modes.count());
     for (int m = 0; m < modes.count(); ++m) {
       const Eigen::Map<const Eigen::Matrix3Xd> shape(modes.shapes.col(m).data(), 3,
                                                      modes.shapes.rows() / 3);
-      Eigen::Map<Eigen::Matrix3Xd>(world_shapes_.col(m).data(), 3, shape.cols()) = R * shape;
+      Eigen::Map<Eigen::Matrix3Xd>(shapes.col(m).data(), 3, shape.cols()) = R * shape;
     }
-    projector_ = (world_shapes_.transpose() * world_shapes_).ldlt();
-    velocities_ = world_shapes_ * modes.velocities.row(0).transpose();
+    measured_ = (shapes.transpose() * shapes).ldlt().solve(shapes.transpose());
+    velocities_ = shapes * modes.velocities.row(0).transpose();
     const double motion = std::sqrt(modes.amplitudes.squaredNorm() / modes.amplitudes.rows());
     deviations_ = (modes.deviations.array().square() + std::pow(params.model_error * motion, 2)).sqrt();
   }
 
-  // Amplitudes of the modes, T x K. @param w  the wind at the knots, one after the other, then log s
-  Eigen::MatrixXd simulated(const std::vector<double>& knots, const Eigen::VectorXd& w) const {
-    const auto wind = [&](double time) {
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      for (size_t i = 0; i < knots.size(); ++i) sum += hatAt(knots, i, time) * w.segment<3>(3 * i);
-      return sum;
-    };
-    const std::vector<SurfaceVector> moved = sheets_.at(w[3 * knots.size()]).run(times_, velocities_, wind);
-    Eigen::MatrixXd amplitudes(times_.size(), modes_.count());
-    for (size_t k = 0; k < moved.size(); ++k) {
-      amplitudes.row(k) = projector_.solve(world_shapes_.transpose() * moved[k]).transpose();
-    }
-    return amplitudes;
-  }
-
-  // Differences over their deviations, T x K flattened.
-  Eigen::VectorXd residuals(const std::vector<double>& knots, const Eigen::VectorXd& w) const {
-    const Eigen::MatrixXd difference =
-        ((simulated(knots, w) - modes_.amplitudes).array() / (spread_ * deviations_.array())).matrix();
-    return Eigen::Map<const Eigen::VectorXd>(difference.data(), difference.size());
-  }
-
-  // Empty where the sheet is too soft to hang in its shape.
-  Eigen::VectorXd residualsOrNone(const std::vector<double>& knots, const Eigen::VectorXd& w) const {
+  // Amplitudes of the modes and, if asked for, how they depend on w: the wind at the knots, one after the other, then
+  // log s. Nothing where the sheet is too soft to hang in its shape.
+  std::optional<SheetMotion> simulated(const std::vector<double>& knots, const Eigen::VectorXd& w, bool slopes) const {
+    WindCourse course{knots, {}};
+    for (size_t i = 0; i < knots.size(); ++i) course.wind.push_back(w.segment<3>(3 * i));
+    const double log_stiffness = w[3 * knots.size()];
     try {
-      return residuals(knots, w);
-    } catch (const std::exception&) {
-      return Eigen::VectorXd();
+      const SheetSimulation* stiffer = slopes ? &sheets_.at(log_stiffness + kStiffer) : nullptr;
+      return sheets_.at(log_stiffness).measure(times_, velocities_, course, measured_, stiffer, kStiffer);
+    } catch (const NoEquilibrium&) {
+      return std::nullopt;
     }
+  }
+
+  struct Linearised {
+    Eigen::VectorXd r;  // differences over their deviations, T x K flattened
+    Eigen::MatrixXd J;
+  };
+
+  Linearised linearise(const SheetMotion& motion) const {
+    Linearised at{flat(motion.amplitudes - modes_.amplitudes), {}};
+    at.J.resize(at.r.size(), motion.slopes.size());
+    for (size_t p = 0; p < motion.slopes.size(); ++p) at.J.col(p) = flat(motion.slopes[p]);
+    if (sheets_.given()) at.J.col(at.J.cols() - 1).setZero();
+    return at;
   }
 
   // Information of what is known beforehand: wind is not endless, and changes slowly.
@@ -167,34 +155,34 @@ class WindFit {
     return P;
   }
 
-  // Gauss-Newton from `w`; the Jacobian is carried on by Broyden's update, since each of its columns costs a
-  // simulation, and made anew where it no longer leads down. @return information at the end
-  Eigen::MatrixXd solve(const std::vector<double>& knots, Eigen::VectorXd& w) const {
+  struct Fitted {
+    Eigen::VectorXd w;
+    Eigen::MatrixXd information;
+    double cost = 0.0, left = 0.0;  // left: the residuals' part
+  };
+
+  // Gauss-Newton from `w`. Nothing where the sheet does not hang in its shape there.
+  std::optional<Fitted> solve(const std::vector<double>& knots, Eigen::VectorXd w) const {
     const Eigen::MatrixXd P = prior(knots);
-    Eigen::VectorXd r = residuals(knots, w);
-    double cost = r.squaredNorm() + w.dot(P * w);
-    Eigen::MatrixXd J = jacobian(knots, w, r);
-    bool fresh = true;
+    const std::optional<SheetMotion> start = simulated(knots, w, true);
+    if (!start) return std::nullopt;
+    Linearised at = linearise(*start);
+    double cost = at.r.squaredNorm() + w.dot(P * w);
     for (int iteration = 0; iteration < kIterations; ++iteration) {
-      const Eigen::VectorXd step = stepFrom(J, P, r, w);
+      const Eigen::VectorXd step = stepFrom(at.J, P, at.r, w);
+      const double before = cost;
       double share = 1.0;
-      bool better = false;
-      for (int trial = 0; trial < kTrials && !better; ++trial, share *= 0.4) {
-        const Eigen::VectorXd taken = share * step, tried = w + taken;
-        const Eigen::VectorXd left = residualsOrNone(knots, tried);
-        if (left.size() == 0) continue;
-        const double value = left.squaredNorm() + tried.dot(P * tried);
-        better = value < cost;
-        J += (left - r - J * taken) * taken.transpose() / taken.squaredNorm();
-        if (better) w = tried, r = left, cost = value;
+      for (int trial = 0; trial < kTrials && cost == before; ++trial, share *= 0.4) {
+        const Eigen::VectorXd tried = w + share * step;
+        const std::optional<SheetMotion> motion = simulated(knots, tried, true);
+        if (!motion) continue;
+        const Linearised there = linearise(*motion);
+        const double value = there.r.squaredNorm() + tried.dot(P * tried);
+        if (value < cost) w = tried, at = there, cost = value;
       }
-      if (better && step.cwiseAbs().maxCoeff() < kSettled) break;
-      if (!better && fresh) break;
-      fresh = !better;
-      if (fresh) J = jacobian(knots, w, r);
+      if (before - cost <= kGained * before || step.cwiseAbs().maxCoeff() < kSettled) break;
     }
-    w = seenPart(J, P, w);
-    return J.transpose() * J + P;
+    return Fitted{seenPart(at.J, P, w), at.J.transpose() * at.J + P, cost, at.r.squaredNorm()};
   }
 
   // Gauss-Newton's step. Where the picture says little more than what was known beforehand, as of wind along the
@@ -214,20 +202,20 @@ class WindFit {
 
   // Wind and log s. A stiff sheet in much wind and a soft one in little are two valleys: the better of both ends. Where
   // neither shows the motion, it is for a changing wind to do, on the stiff one, which answers it more evenly.
-  Eigen::VectorXd steady(const Eigen::Vector3d& guess) const {
-    const std::vector<double> knot{times_.front()};
-    const double motion = (modes_.amplitudes.array() / deviations_.array()).matrix().squaredNorm();
-    Eigen::VectorXd best, w(4);
-    double least = std::numeric_limits<double>::infinity(), shown = 0.0;
+  std::optional<Fitted> steady(const Eigen::Vector3d& guess) const {
+    const double motion = flat(modes_.amplitudes).squaredNorm();
+    std::optional<Fitted> best;
     for (const double log_stiffness : {0.0, kStiffStart}) {
+      Eigen::VectorXd w(4);
       w << guess, log_stiffness;
-      if (residualsOrNone(knot, w).size() == 0) continue;
-      solve(knot, w);
-      const double left = residuals(knot, w).squaredNorm(), cost = left + w.dot(prior(knot) * w);
-      if (cost < least) least = cost, best = w, shown = 1.0 - left / motion;
-      if (shown > kWellShown || sheets_.given()) break;
+      const std::optional<Fitted> fitted = solve({times_.front()}, w);
+      if (!fitted) continue;
+      const bool none_shown = best && fitted->left > (1.0 - kHardlyShown) * motion &&
+                              best->left > (1.0 - kHardlyShown) * motion;
+      if (!best || fitted->cost < best->cost || none_shown) best = fitted;
+      if (fitted->left < (1.0 - kWellShown) * motion || sheets_.given()) break;
     }
-    return shown < kHardlyShown && w[3] > 0.5 * kStiffStart ? w : best;
+    return best;
   }
 
   // w, as it was known beforehand where the pictures say no more.
@@ -240,8 +228,8 @@ class WindFit {
 
   // What the simulation cannot show persists from frame to frame, and would otherwise outvote what is known
   // beforehand: from here on residuals count as the fewer independent ones that they are.
-  void allowForPersistence(const std::vector<double>& knots, const Eigen::VectorXd& w) {
-    const Eigen::VectorXd r = residuals(knots, w);
+  void allowForPersistence(const SheetMotion& motion) {
+    const Eigen::VectorXd r = flat(motion.amplitudes - modes_.amplitudes);
     const int frames = static_cast<int>(times_.size());
     double square = 0.0, product = 0.0;
     for (int m = 0; m < modes_.count(); ++m) {
@@ -254,16 +242,10 @@ class WindFit {
   }
 
  private:
-  Eigen::MatrixXd jacobian(const std::vector<double>& knots, const Eigen::VectorXd& w,
-                           const Eigen::VectorXd& r) const {
-    Eigen::MatrixXd J(r.size(), w.size());
-    for (int p = 0; p < w.size(); ++p) {
-      const Eigen::VectorXd probe = kProbe * Eigen::VectorXd::Unit(w.size(), p);
-      const Eigen::VectorXd beyond = residualsOrNone(knots, w + probe);
-      J.col(p) = beyond.size() > 0 ? Eigen::VectorXd((beyond - r) / kProbe)
-                                   : Eigen::VectorXd((r - residuals(knots, w - probe)) / kProbe);
-    }
-    return J;
+  // Over the deviations.
+  Eigen::VectorXd flat(const Eigen::MatrixXd& amplitudes) const {
+    const Eigen::MatrixXd scaled = (amplitudes.array() / (spread_ * deviations_.array())).matrix();
+    return Eigen::Map<const Eigen::VectorXd>(scaled.data(), scaled.size());
   }
 
   double leastInformation(const Eigen::VectorXd& information) const {
@@ -275,8 +257,7 @@ class WindFit {
   const DeformationModes& modes_;
   const WindParams& params_;
   Eigen::Vector3d down_;          // unit; zero without gravity
-  Eigen::MatrixXd world_shapes_;  // 3 #V x K
-  Eigen::LDLT<Eigen::MatrixXd> projector_;
+  Eigen::MatrixXd measured_;      // Phi^+, K x 3 #V, world axes
   Eigen::VectorXd velocities_;    // of the surface in the key frame
   Eigen::MatrixXd deviations_;    // T x K
   double spread_ = 1.0;           // factor on them
@@ -298,29 +279,39 @@ std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<
   for (int nodes = params.nodes; !sheets && nodes <= kFiner * params.nodes; nodes *= 2) {
     try {
       sheets.emplace(model, gravity, nodes, params, given);
-    } catch (const std::exception& error) {
+    } catch (const NoEquilibrium& error) {
       note = std::string("no wind: ") + error.what();
+    } catch (const std::invalid_argument& error) {  // a mesh that the simulator refuses
+      note = std::string("no wind: ") + error.what();
+      return std::nullopt;
     }
   }
   if (!sheets) return std::nullopt;
   note.clear();
   WindFit fit(*sheets, model, times, modes, gravity, params);
   // A steady wind first, then a changing one from there.
-  Eigen::VectorXd steady = fit.steady(firstGuess(model, modes));
-  if (steady.size() == 0) {
-    note = "no wind: the sheet finds no equilibrium in its shape; see where it is held";
+  const std::optional<WindFit::Fitted> steady = fit.steady(firstGuess(model, modes));
+  const std::optional<SheetMotion> motion =
+      steady ? fit.simulated({times.front()}, steady->w, false) : std::nullopt;
+  if (!motion) {
+    note = kNoEquilibrium;
     return std::nullopt;
   }
-  fit.allowForPersistence({times.front()}, steady);
+  fit.allowForPersistence(*motion);
   WindEstimate estimate;
   estimate.knots = knotsOver(times.front(), times.back(), params.knot_spacing);
   const int count = static_cast<int>(estimate.knots.size());
   Eigen::VectorXd changing(3 * count + 1);
-  for (int i = 0; i < count; ++i) changing.segment<3>(3 * i) = steady.head<3>();
-  changing[3 * count] = steady[3];
-  const Eigen::MatrixXd information = fit.solve(estimate.knots, changing);
+  for (int i = 0; i < count; ++i) changing.segment<3>(3 * i) = steady->w.head<3>();
+  changing[3 * count] = steady->w[3];
+  const std::optional<WindFit::Fitted> fitted = fit.solve(estimate.knots, changing);
+  if (!fitted) {
+    note = kNoEquilibrium;
+    return std::nullopt;
+  }
+  changing = fitted->w;
   const Eigen::MatrixXd covariance =
-      information.ldlt().solve(Eigen::MatrixXd::Identity(3 * count + 1, 3 * count + 1));
+      fitted->information.ldlt().solve(Eigen::MatrixXd::Identity(3 * count + 1, 3 * count + 1));
   if (!given) estimate.stiffness_over_density = sheets->stiffnessOverDensity(changing[3 * count]);
   estimate.stiffness_over_density_deviation =
       estimate.stiffness_over_density * std::sqrt(covariance(3 * count, 3 * count));
@@ -333,7 +324,7 @@ std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<
   }
   estimate.mean = average * changing;
   estimate.mean_covariance = average * covariance * average.transpose();
-  estimate.amplitudes = fit.simulated(estimate.knots, changing);
+  estimate.amplitudes = fit.simulated(estimate.knots, changing, false)->amplitudes;
   estimate.explained = 1.0 - (estimate.amplitudes - modes.amplitudes).squaredNorm() /
                                  modes.amplitudes.squaredNorm();
   if (estimate.explained < params.least_explained) {
@@ -349,15 +340,9 @@ std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<
 
 }  // namespace
 
-Eigen::Vector3d WindEstimate::at(double time) const {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (size_t i = 0; i < knots.size(); ++i) sum += hatAt(knots, i, time) * wind[i];
-  return sum;
-}
-
 Eigen::Matrix3d WindEstimate::covarianceAt(double time) const {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (size_t i = 0; i < knots.size(); ++i) sum += hatAt(knots, i, time) * covariance[i];
+  for (size_t i = 0; i < knots.size(); ++i) sum += weight(i, time) * covariance[i];
   return sum;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calipso_flow/deformation_modes.hpp"
+#include "calipso_flow/wind_course.hpp"
 
 namespace calipso::flow {
 
@@ -15,9 +16,7 @@ namespace calipso::flow {
 //  w       velocity of the air, linear between knots; m/s, world axes
 //  s       the sheet's modulus over that which the simulator starts with. It is no less unknown than the wind, and on
 //          cubes of edge h that are thicker than the sheet its stiffness in bending goes with h^2: s takes up both.
-struct WindEstimate {
-  std::vector<double> knots;                 // s
-  std::vector<Eigen::Vector3d> wind;         // m/s, at the knots
+struct WindEstimate : WindCourse {
   std::vector<Eigen::Matrix3d> covariance;   // m^2/s^2, at the knots
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();  // m/s, over the clip
   Eigen::Matrix3d mean_covariance = Eigen::Matrix3d::Zero();
@@ -26,7 +25,6 @@ struct WindEstimate {
   double stiffness_over_density_deviation = 0.0;
   double explained = 0.0;  // share of the observed motion's mean square that the simulation shows
 
-  Eigen::Vector3d at(double time) const;
   Eigen::Matrix3d covarianceAt(double time) const;  // linear between the knots, as if their errors were one
 };
 
