@@ -9,22 +9,13 @@
 namespace calipso::flow {
 namespace {
 
-constexpr double kSag = 1e-3;    // of the diagonal, that the key frame's shape may give way by
+constexpr double kSkin = 0.5;  // edge of a coarse skin's cubes over that of a cell
 
 TriangleMesh inWorld(const ObjectModel& model) {
   TriangleMesh mesh = model.mesh;
   mesh.vertices = (mesh.vertices * model.world_from_object.linear().transpose()).rowwise() +
                   model.world_from_object.translation().transpose();
   return mesh;
-}
-
-double areaOf(const TriangleMesh& mesh) {
-  double doubled = 0.0;
-  for (int t = 0; t < mesh.triangleCount(); ++t) {
-    const Eigen::Vector3d a = mesh.vertex(mesh.triangles(t, 0));
-    doubled += (mesh.vertex(mesh.triangles(t, 1)) - a).cross(mesh.vertex(mesh.triangles(t, 2)) - a).norm();
-  }
-  return 0.5 * doubled;
 }
 
 Material softened(const TriangleMesh& surface, const Eigen::Vector3d& gravity, double stiffness) {
@@ -44,44 +35,41 @@ fem::FemOptions optionsFor(int nodes) {
 
 }  // namespace
 
-SheetSimulation::SheetSimulation(const ObjectModel& model, const Eigen::Vector3d& gravity, int nodes,
-                                 double longest_step, double stiffness)
-    : longest_step_(longest_step),
+SheetSimulation::SheetSimulation(const ObjectModel& model, const Eigen::Vector3d& gravity,
+                                 const SheetSettings& settings, const SheetSimulation* like)
+    : longest_step_(settings.longest_step),
       surface_(inWorld(model)),
-      closed_(fem::isClosed(surface_)),
-      sheet_(surface_, softened(surface_, gravity, stiffness), optionsFor(nodes)) {
-  const Material material = softened(surface_, gravity, stiffness);
+      sheet_(surface_, softened(surface_, gravity, settings.stiffness), optionsFor(settings.nodes)),
+      skin_(surface_, sheet_.body().grid(), settings.coarse_skin ? kSkin * sheet_.body().grid().cell_size : 0.0) {
+  const Material material = softened(surface_, gravity, settings.stiffness);
   stiffness_over_density_ = material.youngs_modulus / material.density;
-  areal_density_ = sheet_.body().totalMass() / ((closed_ ? 0.5 : 1.0) * areaOf(surface_));
+  areal_density_ = sheet_.body().totalMass() / ((fem::isClosed(surface_) ? 0.5 : 1.0) * surfaceArea(surface_));
   if (!model.attached.empty()) sheet_.body().fixSurfaceVertices(model.attached);
   sheet_.setGravity(gravity);
-  settle(gravity);
+  if (like) sheet_.body().setRestNodes(like->sheet_.body().model().mesh().nodes);
+  settle(gravity, settings.sag * boundingDiagonal(surface_));
   start_ = sheet_.body().positions();
 }
 
-void SheetSimulation::settle(const Eigen::Vector3d& gravity) {
+void SheetSimulation::settle(const Eigen::Vector3d& gravity, double sag) {
   std::vector<fem::HoldPoint> hold;
   try {
-    const fem::SettleReport report = sheet_.settle(gravity, hold, kSag * boundingDiagonal(surface_));
+    const fem::SettleReport report = sheet_.settle(gravity, hold, sag);
     if (!report.message.empty()) throw NoEquilibrium(report.message);
   } catch (const std::invalid_argument& inverted) {  // by a rest shape that would have to be folded
     throw NoEquilibrium(inverted.what());
   }
 }
 
-fem::Air SheetSimulation::airOf(const Eigen::Vector3d& wind) const {
-  return {wind, (closed_ ? 0.5 : 1.0) * fem::kAirDrag};
-}
-
 void SheetSimulation::blow(const Eigen::Vector3d& wind, double h) {
-  const Eigen::VectorXd positions = sheet_.body().surfaceVertices();
-  const Eigen::VectorXd velocities = sheet_.body().surfaceVelocities();
-  const Eigen::Index count = positions.size() / 3;
-  const fem::Vertices forces = fem::windForces(
-      Eigen::Map<const fem::Vertices>(positions.data(), count, 3),
-      Eigen::Map<const fem::Vertices>(velocities.data(), count, 3), surface_.triangles, airOf(wind),
-      areal_density_, h);
-  sheet_.body().setSurfaceForces(Eigen::Map<const Eigen::VectorXd>(forces.data(), forces.size()));
+  fem::DeformableBody& body = sheet_.body();
+  const Eigen::VectorXd x = skin_.embedding.apply(body.positions()), u = skin_.embedding.apply(body.velocities());
+  const Eigen::Index count = x.size() / 3;
+  const fem::Vertices forces = fem::windForces(Eigen::Map<const fem::Vertices>(x.data(), count, 3),
+                                               Eigen::Map<const fem::Vertices>(u.data(), count, 3), skin_.triangles,
+                                               {wind, skin_.drag}, areal_density_, h);
+  body.setNodalForces(
+      skin_.embedding.applyTransposed(Eigen::Map<const Eigen::VectorXd>(forces.data(), forces.size())));
 }
 
 void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector& velocities, const Wind& wind,
@@ -128,11 +116,11 @@ SheetMotion SheetSimulation::measure(const std::vector<double>& times, const Sur
   motion.slopes.assign(parameters, Eigen::MatrixXd(times.size(), measured.rows()));
   const Eigen::VectorXd viscosity = Eigen::VectorXd::Unit(std::max(1, parameters), std::max(0, parameters - 1));
   const AfterStep carry = [&](const fem::Vec& x0, const fem::Vec& v0, double time, double h) {
-    Eigen::MatrixXd dw = Eigen::MatrixXd::Zero(3, parameters);
+    Slopes dw = Slopes::Zero(3, parameters);
     for (size_t i = 0; i < wind.knots.size(); ++i) {
       dw.middleCols<3>(3 * i) = wind.weight(i, time) * Eigen::Matrix3d::Identity();
     }
-    Eigen::MatrixXd dF = windSlopes(x0, v0, wind.at(time), h, tangent, dw);
+    Slopes dF = windSlopes(x0, v0, wind.at(time), h, tangent, dw);
     fem::Vec own, other;
     body.model().gradient(body.positions(), own);
     stiffer->sheet_.body().model().gradient(body.positions(), other);
@@ -150,19 +138,24 @@ SheetMotion SheetSimulation::measure(const std::vector<double>& times, const Sur
   return motion;
 }
 
-Eigen::MatrixXd SheetSimulation::windSlopes(const fem::Vec& x0, const fem::Vec& v0, const Eigen::Vector3d& wind,
-                                            double h, const MotionTangent& tangent, const Eigen::MatrixXd& dw) const {
-  const fem::Embedding& embedding = sheet_.body().embedding();
-  Eigen::MatrixXd dx(3 * embedding.vertexCount(), dw.cols()), du(dx.rows(), dx.cols());
-  for (Eigen::Index p = 0; p < dw.cols(); ++p) {
-    dx.col(p) = embedding.apply(tangent.positions().col(p));
-    du.col(p) = embedding.apply(tangent.velocities().col(p));
+Slopes SheetSimulation::windSlopes(const fem::Vec& x0, const fem::Vec& v0, const Eigen::Vector3d& wind, double h,
+                                   const MotionTangent& tangent, const Slopes& dw) const {
+  const auto& weights = skin_.embedding.weights;
+  Slopes dx = Slopes::Zero(3 * weights.rows(), dw.cols()), du = dx;
+  using Entry = Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
+  for (int v = 0; v < weights.rows(); ++v) {
+    for (Entry it(weights, v); it; ++it) {
+      dx.middleRows<3>(3 * v) += it.value() * tangent.positions().middleRows<3>(3 * it.col());
+      du.middleRows<3>(3 * v) += it.value() * tangent.velocities().middleRows<3>(3 * it.col());
+    }
   }
-  const Eigen::MatrixXd forces = windForceSlopes(embedding.apply(x0), embedding.apply(v0), surface_.triangles,
-                                                 airOf(wind), areal_density_, h, dx, du, dw);
-  Eigen::MatrixXd result(x0.size(), dw.cols());
-  for (Eigen::Index p = 0; p < dw.cols(); ++p) result.col(p) = embedding.applyTransposed(forces.col(p));
-  return result;
+  const Slopes forces = windForceSlopes(skin_.embedding.apply(x0), skin_.embedding.apply(v0), skin_.triangles,
+                                        {wind, skin_.drag}, areal_density_, h, dx, du, dw);
+  Slopes nodal = Slopes::Zero(x0.size(), dw.cols());
+  for (int v = 0; v < weights.rows(); ++v) {
+    for (Entry it(weights, v); it; ++it) nodal.middleRows<3>(3 * it.col()) += it.value() * forces.middleRows<3>(3 * v);
+  }
+  return nodal;
 }
 
 }  // namespace calipso::flow

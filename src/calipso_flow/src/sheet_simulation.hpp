@@ -7,6 +7,7 @@
 
 #include "calipso_flow/object_model.hpp"
 #include "calipso_flow/wind_course.hpp"
+#include "sheet_skin.hpp"
 #include "sheet_tangent.hpp"
 
 namespace calipso::flow {
@@ -24,15 +25,22 @@ struct SheetMotion {
   std::vector<Eigen::MatrixXd> slopes;   // T x K each: by the wind at the knots, one component after the other, and
 };                                       // by the logarithm of the stiffness; empty when not asked for
 
+struct SheetSettings {
+  int nodes = 120;                   // of the grid
+  double longest_step = 1.0 / 30.0;  // s
+  double stiffness = 1.0;            // times the modulus that an object of its size starts with
+  double sag = 1e-3;                 // of the diagonal, that the key frame's shape may give way by
+  bool coarse_skin = false;          // the wind blows on triangles of half a cell instead of the surface's own
+};
+
 // A thin object of the video as the simulator moves it in the wind: with the material an object of
 // its size starts with, held where it is attached, in equilibrium in its key-frame shape.
 class SheetSimulation {
  public:
-  // @param longest_step  s
-  // @param stiffness     times the modulus an object of its size starts with
+  // @param like  the same sheet on the same grid, about as stiff, to start from; or null
   // @throw std::invalid_argument as the simulator does; NoEquilibrium
-  SheetSimulation(const ObjectModel& model, const Eigen::Vector3d& gravity, int nodes,
-                  double longest_step, double stiffness = 1.0);
+  SheetSimulation(const ObjectModel& model, const Eigen::Vector3d& gravity, const SheetSettings& settings,
+                  const SheetSimulation* like = nullptr);
 
   using Wind = std::function<Eigen::Vector3d(double time)>;  // m/s, world
   // Displacements of the surface from the key frame's shape at every time, world axes, m.
@@ -51,19 +59,18 @@ class SheetSimulation {
   // Steps through all times, with the wind of the middle of each step, whose time is told to `after_step`.
   void move(const std::vector<double>& times, const SurfaceVector& velocities, const Wind& wind,
             const AfterStep& after_step, const std::function<void()>& after_frame);
-  void settle(const Eigen::Vector3d& gravity);
+  void settle(const Eigen::Vector3d& gravity, double sag);
   // Of the nodal forces, 3 #N x P. @param dw  of the wind, 3 x P
-  Eigen::MatrixXd windSlopes(const fem::Vec& x0, const fem::Vec& v0, const Eigen::Vector3d& wind, double h,
-                             const MotionTangent& tangent, const Eigen::MatrixXd& dw) const;
-  fem::Air airOf(const Eigen::Vector3d& wind) const;
+  Slopes windSlopes(const fem::Vec& x0, const fem::Vec& v0, const Eigen::Vector3d& wind, double h,
+                    const MotionTangent& tangent, const Slopes& dw) const;
   void blow(const Eigen::Vector3d& wind, double h);
 
   double longest_step_;   // s
   TriangleMesh surface_;  // world
-  bool closed_;
   double areal_density_;  // kg/m^2
   double stiffness_over_density_;
   fem::SoftObject sheet_;
+  SheetSkin skin_;
   Eigen::VectorXd start_;  // 3 #N, nodes in the key frame
 };
 

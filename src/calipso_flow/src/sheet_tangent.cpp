@@ -3,28 +3,18 @@
 #include <cmath>
 
 namespace calipso::flow {
-namespace {
-
-using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic>;
-
-// Cross product of a vector with every column.
-Rows crossed(const Eigen::Vector3d& a, const Rows& b) {
-  Eigen::Matrix3d S;
-  S << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
-  return S * b;
-}
-
-}  // namespace
-
-Eigen::MatrixXd windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& u, const fem::Triangles& triangles,
-                                const fem::Air& air, double areal_density, double h, const Eigen::MatrixXd& dx,
-                                const Eigen::MatrixXd& du, const Eigen::MatrixXd& dw) {
-  Eigen::MatrixXd dF = Eigen::MatrixXd::Zero(x.size(), dw.cols());
+Slopes windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& u, const fem::Triangles& triangles,
+                       const fem::Air& air, double areal_density, double h, const Slopes& dx, const Slopes& du,
+                       const Slopes& dw) {
+  Slopes dF = Slopes::Zero(x.size(), dw.cols());
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> ab(3, dw.cols()), ac(3, dw.cols()), dS(3, dw.cols()),
+      third(3, dw.cols());
+  Eigen::RowVectorXd ds(dw.cols());
   const double softening = h > 0.0 ? h * air.drag / areal_density : 0.0;
   for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
     const int i = 3 * triangles(t, 0), j = 3 * triangles(t, 1), k = 3 * triangles(t, 2);
-    const Eigen::Vector3d ab = x.segment<3>(j) - x.segment<3>(i), ac = x.segment<3>(k) - x.segment<3>(i);
-    const Eigen::Vector3d S = 0.5 * ab.cross(ac);  // area times normal
+    const Eigen::Vector3d p = x.segment<3>(j) - x.segment<3>(i), q = x.segment<3>(k) - x.segment<3>(i);
+    const Eigen::Vector3d S = 0.5 * p.cross(q);  // area times normal
     const double area = S.norm();
     if (area == 0.0) continue;
     const Eigen::Vector3d n = S / area;
@@ -32,11 +22,16 @@ Eigen::MatrixXd windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd&
     const double s = wind.dot(n), strength = 1.0 + softening * std::abs(s);
     const double pressure = 0.5 * air.drag * s * std::abs(s) / strength;
     const double slope = 0.5 * air.drag * std::abs(s) * (1.0 + strength) / (strength * strength);
-    const Rows da = dx.middleRows<3>(i);
-    const Rows dS = 0.5 * (crossed(ab, dx.middleRows<3>(k) - da) - crossed(ac, dx.middleRows<3>(j) - da));
-    const Rows dwind = dw - (du.middleRows<3>(i) + du.middleRows<3>(j) + du.middleRows<3>(k)) / 3.0;
-    const Eigen::RowVectorXd ds = n.transpose() * dwind + (wind - s * n).transpose() * dS / area;
-    const Rows third = (pressure * dS + slope * S * ds) / 3.0;
+    const Eigen::Vector3d across = (wind - s * n) / area;
+    ab = dx.middleRows<3>(j) - dx.middleRows<3>(i);
+    ac = dx.middleRows<3>(k) - dx.middleRows<3>(i);
+    ds.setZero();
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, c = (a + 2) % 3;
+      dS.row(a) = 0.5 * (p[b] * ac.row(c) - p[c] * ac.row(b) - q[b] * ab.row(c) + q[c] * ab.row(b));
+      ds += across[a] * dS.row(a) + n[a] * (dw.row(a) - (du.row(i + a) + du.row(j + a) + du.row(k + a)) / 3.0);
+    }
+    for (int a = 0; a < 3; ++a) third.row(a) = (pressure * dS.row(a) + slope * S[a] * ds) / 3.0;
     for (const int corner : {i, j, k}) dF.middleRows<3>(corner) += third;
   }
   return dF;
@@ -72,7 +67,7 @@ MotionTangent::MotionTangent(const fem::DeformableBody& body, int parameters)
   for (Eigen::Index p = 0; p < A_.nonZeros(); ++p) place[static_cast<size_t>(A_.valuePtr()[p])] = static_cast<int>(p);
   for (const int entry : entry_of) slots_.push_back(entry < 0 ? -1 : place[entry]);
   factor_.analyzePattern(A_);
-  dx_ = dv_ = Eigen::MatrixXd::Zero(count, parameters);
+  dx_ = dv_ = Slopes::Zero(count, parameters);
 }
 
 void MotionTangent::factorise(const fem::Vec& x0, double h) {
@@ -86,19 +81,21 @@ void MotionTangent::factorise(const fem::Vec& x0, double h) {
   factor_.factorize(A_);
 }
 
-void MotionTangent::advance(const fem::Vec& x0, double h, const Eigen::MatrixXd& dF,
-                            const Eigen::VectorXd& viscosity) {
+void MotionTangent::advance(const fem::Vec& x0, double h, const Slopes& dF, const Eigen::VectorXd& viscosity) {
   factorise(x0, h);
-  const fem::Vec way = body_.positions() - x0;
-  Eigen::MatrixXd b(free_.size(), dF.cols());
-  fem::Vec Dx;
-  for (Eigen::Index p = 0; p < dF.cols(); ++p) {
-    D_.multiply(dx_.col(p) - viscosity[p] * way, Dx);
-    for (size_t f = 0; f < free_.size(); ++f) {
-      const int d = free_[f];
-      b(f, p) = mass_[d] * (dx_(d, p) / (h * h) + dv_(d, p) / h) + Dx[d] / h + dF(d, p);
+  const Slopes moving = dx_ - (body_.positions() - x0) * viscosity.transpose();
+  Slopes all = dF;
+  for (Eigen::Index d = 0; d < all.rows(); ++d) {
+    all.row(d) += mass_[d] * (dx_.row(d) / (h * h) + dv_.row(d) / h);
+  }
+  const fem::BlockPattern& pattern = *D_.pattern;
+  for (int i = 0; i < pattern.rows(); ++i) {
+    for (int b = pattern.row_start[i]; b < pattern.row_start[i + 1]; ++b) {
+      all.middleRows<3>(3 * i).noalias() += D_.block(b) / h * moving.middleRows<3>(3 * pattern.column[b]);
     }
   }
+  Eigen::MatrixXd b(free_.size(), dF.cols());
+  for (size_t f = 0; f < free_.size(); ++f) b.row(f) = all.row(free_[f]);
   const Eigen::MatrixXd moved = factor_.solve(b);
   for (size_t f = 0; f < free_.size(); ++f) {
     const int d = free_[f];

@@ -7,14 +7,15 @@
 
 namespace calipso::flow {
 
-// How the forces of fem::windForces change with wind, shape and velocity of the surface, for P directions at once:
+using Slopes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // one column per parameter
+
+// How the forces of fem::windForces change with wind, shape and velocity of the surface:
 //   dF = dF/dw dw + dF/dx dx + dF/du du
-// Faces take part in fem::windForces' order. All but the first three arguments are derivatives, one column per direction.
 // @param dx, du  3 #V x P
 // @param dw      3 x P
-Eigen::MatrixXd windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& u, const fem::Triangles& triangles,
-                                const fem::Air& air, double areal_density, double h, const Eigen::MatrixXd& dx,
-                                const Eigen::MatrixXd& du, const Eigen::MatrixXd& dw);
+Slopes windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& u, const fem::Triangles& triangles,
+                       const fem::Air& air, double areal_density, double h, const Slopes& dx, const Slopes& du,
+                       const Slopes& dw);
 
 // Derivatives of a body's motion, carried along with its steps by backward Euler:
 //   M (x1 - x0 - h v0) / h^2 + D(x0) (x1 - x0) / h + f(x1) = F(x0, v0)
@@ -25,12 +26,12 @@ class MotionTangent {
   // Nothing depends on the parameters at first. @pre steps of the body are by backward Euler with lumped masses
   MotionTangent(const fem::DeformableBody& body, int parameters);
 
-  const Eigen::MatrixXd& positions() const { return dx_; }   // 3 #N x P
-  const Eigen::MatrixXd& velocities() const { return dv_; }
+  const Slopes& positions() const { return dx_; }   // 3 #N x P
+  const Slopes& velocities() const { return dv_; }
   // The body has just gone from x0 to its present state within h.
   // @param dF  of external less elastic forces at the same positions, 3 #N x P
   // @param viscosity  relative change of D, P
-  void advance(const fem::Vec& x0, double h, const Eigen::MatrixXd& dF, const Eigen::VectorXd& viscosity);
+  void advance(const fem::Vec& x0, double h, const Slopes& dF, const Eigen::VectorXd& viscosity);
 
  private:
   void factorise(const fem::Vec& x0, double h);
@@ -42,7 +43,7 @@ class MotionTangent {
   Eigen::SparseMatrix<double> A_;  // of the free components, lower half
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
   fem::BlockMatrix K_, D_;
-  Eigen::MatrixXd dx_, dv_;
+  Slopes dx_, dv_;
 };
 
 }  // namespace calipso::flow

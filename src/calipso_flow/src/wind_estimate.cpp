@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -45,15 +44,18 @@ double cellSizeFor(const TriangleMesh& mesh, int nodes) {
   return fem::voxelize(mesh, options).cell_size;
 }
 
-// The sheet at any stiffness: the two last asked for are kept, since probing goes back and forth.
+// The sheet at any stiffness; those last asked for are kept, and what is asked for next starts from them.
 class SheetFamily {
  public:
   // @throw as SheetSimulation
   // @param given  every member is as stiff as the simulator starts with, on this grid
   SheetFamily(const ObjectModel& model, const Eigen::Vector3d& gravity, int nodes, const WindParams& params, bool given)
-      : model_(model), gravity_(gravity), nodes_(nodes), step_(params.longest_step), given_(given) {
+      : model_(model), gravity_(gravity), given_(given) {
     const double own = cellSizeFor(model.mesh, nodes), simulator = cellSizeFor(model.mesh, params.simulator_nodes);
     scale_ = std::pow(simulator / own, 2);
+    settings_.nodes = nodes;
+    settings_.longest_step = params.longest_step;
+    settings_.coarse_skin = true;
     at(kStiffStart);
     at(0.0);
   }
@@ -61,15 +63,14 @@ class SheetFamily {
   bool given() const { return given_; }
 
   // @param log_stiffness  of the modulus over that which the simulator starts with, on its grid
-  SheetSimulation& at(double log_stiffness) {
-    if (given_) log_stiffness = -std::log(scale_);
-    if (kept_[1].sheet && kept_[1].log_stiffness == log_stiffness) std::swap(kept_[0], kept_[1]);
-    if (!kept_[0].sheet || kept_[0].log_stiffness != log_stiffness) {
-      std::swap(kept_[0], kept_[1]);
-      kept_[0] = {log_stiffness, std::make_unique<SheetSimulation>(model_, gravity_, nodes_, step_,
-                                                                  scale_ * std::exp(log_stiffness))};
-    }
-    return *kept_[0].sheet;
+  SheetSimulation& at(double log_stiffness) { return keep(sheet_, log_stiffness, settings_, sheet_.sheet.get()); }
+
+  // The same by kStiffer stiffer, to tell what stiffness does: so much better settled than that changes the shape.
+  const SheetSimulation& stifferThan(double log_stiffness) {
+    if (given_) return at(log_stiffness);
+    SheetSettings settings = settings_;
+    settings.sag *= kStiffer;
+    return keep(stiffer_, log_stiffness + kStiffer, settings, &at(log_stiffness));
   }
 
   double stiffnessOverDensity(double log_stiffness) { return at(log_stiffness).stiffnessRatio() / scale_; }
@@ -79,13 +80,22 @@ class SheetFamily {
     double log_stiffness = 0.0;
     std::unique_ptr<SheetSimulation> sheet;
   };
+
+  SheetSimulation& keep(Kept& kept, double log_stiffness, SheetSettings settings, const SheetSimulation* like) {
+    if (given_) log_stiffness = -std::log(scale_);
+    if (!kept.sheet || kept.log_stiffness != log_stiffness) {
+      settings.stiffness = scale_ * std::exp(log_stiffness);
+      kept = {log_stiffness, std::make_unique<SheetSimulation>(model_, gravity_, settings, like)};
+    }
+    return *kept.sheet;
+  }
+
   const ObjectModel& model_;
   Eigen::Vector3d gravity_;
-  int nodes_;
-  double step_;
   bool given_;
+  SheetSettings settings_;
   double scale_;  // modulus with which this grid bends as the simulator's does, over the latter's
-  std::array<Kept, 2> kept_;
+  Kept sheet_, stiffer_;
 };
 
 // The least-squares problem: residuals of the simulated against the observed amplitudes.
@@ -115,7 +125,7 @@ class WindFit {
     for (size_t i = 0; i < knots.size(); ++i) course.wind.push_back(w.segment<3>(3 * i));
     const double log_stiffness = w[3 * knots.size()];
     try {
-      const SheetSimulation* stiffer = slopes ? &sheets_.at(log_stiffness + kStiffer) : nullptr;
+      const SheetSimulation* stiffer = slopes ? &sheets_.stifferThan(log_stiffness) : nullptr;
       return sheets_.at(log_stiffness).measure(times_, velocities_, course, measured_, stiffer, kStiffer);
     } catch (const NoEquilibrium&) {
       return std::nullopt;

@@ -27,8 +27,7 @@ TEST(WindForceSlopes, areThoseOfTheForces) {
   srand(1);
   const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(mesh.vertices.data(), 3 * count);
   const Eigen::VectorXd u = Eigen::VectorXd::Random(3 * count);
-  const Eigen::MatrixXd dx = Eigen::MatrixXd::Random(3 * count, 2), du = Eigen::MatrixXd::Random(3 * count, 2),
-                        dw = Eigen::MatrixXd::Random(3, 2);
+  const Slopes dx = Slopes::Random(3 * count, 2), du = Slopes::Random(3 * count, 2), dw = Slopes::Random(3, 2);
   const fem::Air air{{1.0, -3.0, 0.5}, 1.2};
   constexpr double kDensity = 2.0, kStep = 1.0 / 30.0, kEpsilon = 1e-6;
   const auto forces = [&](int p, double e) {
@@ -38,7 +37,7 @@ TEST(WindForceSlopes, areThoseOfTheForces) {
                                             {air.wind + e * dw.col(p), air.drag}, kDensity, kStep);
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(f.data(), f.size()));
   };
-  const Eigen::MatrixXd slopes = windForceSlopes(x, u, mesh.triangles, air, kDensity, kStep, dx, du, dw);
+  const Slopes slopes = windForceSlopes(x, u, mesh.triangles, air, kDensity, kStep, dx, du, dw);
   for (int p = 0; p < 2; ++p) {
     const Eigen::VectorXd difference = (forces(p, kEpsilon) - forces(p, -kEpsilon)) / (2.0 * kEpsilon);
     EXPECT_LT((slopes.col(p) - difference).norm(), 1e-6 * difference.norm()) << p;
@@ -56,8 +55,11 @@ TEST(SheetSimulation, slopesAreThoseOfItsMotion) {
   const Eigen::MatrixXd measured = Eigen::MatrixXd::Random(2, 3 * model.mesh.vertexCount());
   const SurfaceVector still = SurfaceVector::Zero(3 * model.mesh.vertexCount());
   constexpr double kBy = 0.05;
-  SheetSimulation sheet(model, kGravity, 60, 1.0 / 30.0), stiffer(model, kGravity, 60, 1.0 / 30.0, std::exp(kBy)),
-      softer(model, kGravity, 60, 1.0 / 30.0, std::exp(-kBy));
+  SheetSettings as_is, more_stiff, less_stiff;
+  as_is.nodes = more_stiff.nodes = less_stiff.nodes = 60;
+  as_is.coarse_skin = more_stiff.coarse_skin = less_stiff.coarse_skin = true;
+  more_stiff.stiffness = std::exp(kBy), less_stiff.stiffness = std::exp(-kBy);
+  SheetSimulation sheet(model, kGravity, as_is), stiffer(model, kGravity, more_stiff), softer(model, kGravity, less_stiff);
   const SheetMotion motion = sheet.measure(times, still, wind, measured, &stiffer, kBy);
   ASSERT_EQ(motion.slopes.size(), 10u);
   for (int p = 0; p < 9; ++p) {
@@ -76,8 +78,33 @@ TEST(SheetSimulation, slopesAreThoseOfItsMotion) {
   EXPECT_LT((motion.slopes[9] - difference).norm(), 0.1 * difference.norm());
 }
 
+// A coarse skin turns the same area to the wind: it pushes a still sheet as the surface itself does.
+TEST(SheetSkin, feelsTheSameForce) {
+  const ObjectModel model = hangingSheet();
+  SheetSettings settings;
+  fem::VoxelizeOptions voxels;
+  voxels.target_nodes = settings.nodes;
+  const fem::VoxelGrid grid = fem::voxelize(model.mesh, voxels);
+  const auto force = [&](double edge, size_t* triangles) {
+    const SheetSkin skin(model.mesh, grid, edge);
+    *triangles = skin.triangles.rows();
+    const fem::Vec x = skin.embedding.apply(fem::restPositions(grid.mesh()));
+    const fem::Vertices shape = Eigen::Map<const fem::Vertices>(x.data(), x.size() / 3, 3);
+    const fem::Vertices f = fem::windForces(shape, fem::Vertices::Zero(shape.rows(), 3), skin.triangles,
+                                            {{0.0, 3.0, 0.0}, skin.drag}, 1.0, 0.0);
+    return Eigen::Vector3d(f.colwise().sum().transpose());
+  };
+  size_t all = 0, few = 0;
+  const Eigen::Vector3d fine = force(0.0, &all), coarse = force(0.15, &few);
+  EXPECT_LT(3 * few, all);
+  EXPECT_NEAR(coarse.y(), fine.y(), 0.05 * fine.y());  // the surface's own narrow sides are area, too
+  EXPECT_THROW(SheetSkin(model.mesh, grid, 5.0), std::invalid_argument);
+}
+
 TEST(SheetSimulation, saysThatASheetIsTooSoftToHang) {
-  EXPECT_THROW(SheetSimulation(hangingSheet(), kGravity, 60, 1.0 / 30.0, 1e-9), NoEquilibrium);
+  SheetSettings soft;
+  soft.stiffness = 1e-9;
+  EXPECT_THROW(SheetSimulation(hangingSheet(), kGravity, soft), NoEquilibrium);
 }
 
 }  // namespace

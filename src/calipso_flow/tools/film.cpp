@@ -141,7 +141,7 @@ ObjectDynamics analyseFilm(const ObjectModel& model, const Camera& camera, const
   return analyser.finish().front();
 }
 
-FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetSettings& settings) {
+FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetTruth& settings) {
   FilmedSheet sheet;
   sheet.model.name = "sheet";
   sheet.model.index = 1;
@@ -155,7 +155,9 @@ FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetSett
   sheet.camera = lookingAt({1.5, -1.6, 1.5}, {0.0, 0.05, 1.4}, 480, 360, 620.0);
   sheet.times = frameTimes(frames);
   sheet.wind = wind;
-  SheetSimulation simulation(sheet.model, sheet.gravity, settings.nodes, settings.step, settings.stiffness);
+  SheetSettings simulated;
+  simulated.nodes = settings.nodes, simulated.longest_step = settings.step, simulated.stiffness = settings.stiffness;
+  SheetSimulation simulation(sheet.model, sheet.gravity, simulated);
   const int count = sheet.model.mesh.vertexCount();
   const Vertices rest = sheet.model.mesh.vertices.rowwise() +
                         sheet.model.world_from_object.translation().transpose();

@@ -38,7 +38,7 @@ struct FilmedSheet {
   Eigen::Vector3d wind;        // m/s
 };
 
-struct SheetSettings {
+struct SheetTruth {
   int nodes = 500;           // of the simulation's grid
   double step = 1.0 / 120.0;  // s
   double stiffness = 1.0;    // times the modulus that the simulator starts with
@@ -46,7 +46,7 @@ struct SheetSettings {
 };
 
 // A sheet that hangs at rest by its upper edge, simulated in a steady wind that sets in with the first frame.
-FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetSettings& settings = {});
+FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetTruth& settings = {});
 
 struct FilmedBeam {
   ObjectModel model;

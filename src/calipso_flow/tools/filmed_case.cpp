@@ -24,7 +24,7 @@ double shapeError(const ObjectModel& model, const Shapes& shapes, const ObjectDy
   return 100.0 * std::sqrt(error / motion);
 }
 
-std::string windEntry(const std::string& name, const Eigen::Vector3d& wind, const SheetSettings& settings = {}) {
+std::string windEntry(const std::string& name, const Eigen::Vector3d& wind, const SheetTruth& settings = {}) {
   const FilmedSheet sheet = filmedSheet(wind, 45, settings);
   const ObjectDynamics found =
       analyseFilm(sheet.model, sheet.camera, sheet.shapes, sheet.times, sheet.gravity);
@@ -80,7 +80,7 @@ std::string beamEntry(const std::string& name, double ratio) {
 }  // namespace
 
 std::vector<std::string> evaluateFilmed() {
-  SheetSettings as_coarse, default_grid, soft, pegged;
+  SheetTruth as_coarse, default_grid, soft, pegged;
   as_coarse.nodes = 120, as_coarse.step = 1.0 / 30.0;
   default_grid.nodes = 1200, default_grid.step = 1.0 / 60.0;
   soft.stiffness = 0.3;
