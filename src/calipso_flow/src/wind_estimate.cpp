@@ -16,11 +16,12 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kIterations = 8;
-constexpr int kTrials = 3;             // halvings of a step that makes things worse
+constexpr int kTrials = 8;             // steps of one fit, also those that make things worse
+constexpr int kFailures = 2;           // of these in a row
+constexpr double kLeastDamping = 0.3, kDamping = 5.0;
 constexpr double kStiffer = 0.05;      // log s: how much stiffer the sheet is that shows what stiffness does
 constexpr double kSettled = 0.02;      // m/s, a smaller step is the last
-constexpr double kGained = 1e-3;       // of the cost: less gained, and it was the last step
+constexpr double kGained = 1e-2;       // of the cost: less gained, and it was the last step
 constexpr double kSeen = 3.0;          // the pictures' information over that beforehand: half of the deviation
 constexpr double kSeenShare = 0.03;    // of the best direction's
 constexpr double kWellShown = 0.95;    // of the motion's square: no other valley is looked for
@@ -29,7 +30,7 @@ constexpr double kStiffStart = 2.5;    // log s
 constexpr double kMostPersistent = 0.95;
 constexpr int kFiner = 4;              // times the nodes at most
 constexpr char kNoEquilibrium[] = "no wind: the sheet finds no equilibrium in its shape; see where it is held";
-constexpr double kFirstGuess = 0.5;    // m/s: still air has no derivative, drag being quadratic
+constexpr double kGuesses[] = {1.0, 2.0, 4.0, 8.0};  // m/s: still air has no derivative, drag being quadratic
 
 std::vector<double> knotsOver(double begin, double end, double spacing) {
   const int intervals = std::max(1, static_cast<int>(std::lround((end - begin) / spacing)));
@@ -178,19 +179,21 @@ class WindFit {
     if (!start) return std::nullopt;
     Linearised at = linearise(*start);
     double cost = at.r.squaredNorm() + w.dot(P * w);
-    for (int iteration = 0; iteration < kIterations; ++iteration) {
-      const Eigen::VectorXd step = stepFrom(at.J, P, at.r, w);
+    double damping = 0.0;  // after Levenberg and Marquardt
+    for (int trial = 0, failed = 0; trial < kTrials && failed < kFailures; ++trial) {
+      const Eigen::VectorXd step = stepFrom(at.J, P, at.r, w, damping);
+      const std::optional<SheetMotion> motion = simulated(knots, w + step, true);
       const double before = cost;
-      double share = 1.0;
-      for (int trial = 0; trial < kTrials && cost == before; ++trial, share *= 0.4) {
-        const Eigen::VectorXd tried = w + share * step;
-        const std::optional<SheetMotion> motion = simulated(knots, tried, true);
-        if (!motion) continue;
+      if (motion) {
+        const Eigen::VectorXd tried = w + step;
         const Linearised there = linearise(*motion);
         const double value = there.r.squaredNorm() + tried.dot(P * tried);
+        
         if (value < cost) w = tried, at = there, cost = value;
       }
-      if (before - cost <= kGained * before || step.cwiseAbs().maxCoeff() < kSettled) break;
+      if (step.cwiseAbs().maxCoeff() < kSettled || (cost < before && before - cost < kGained * before)) break;
+      failed = cost < before ? 0 : failed + 1;
+      damping = cost < before ? (damping < kLeastDamping ? 0.0 : damping / kDamping) : std::max(kLeastDamping, damping * kDamping);
     }
     return Fitted{seenPart(at.J, P, w), at.J.transpose() * at.J + P, cost, at.r.squaredNorm()};
   }
@@ -198,32 +201,46 @@ class WindFit {
   // Gauss-Newton's step. Where the picture says little more than what was known beforehand, as of wind along the
   // sheet, it would follow the errors of the simulation: there w goes to what was known beforehand.
   Eigen::VectorXd stepFrom(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, const Eigen::VectorXd& r,
-                                  const Eigen::VectorXd& w) const {
+                           const Eigen::VectorXd& w, double damping) const {
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> seen(J.transpose() * J, P);
     const Eigen::MatrixXd& V = seen.eigenvectors();  // V' P V = 1
     const Eigen::VectorXd beforehand = V.transpose() * (P * w), pictures = V.transpose() * (J.transpose() * r);
     Eigen::VectorXd along(w.size());
     for (int i = 0; i < w.size(); ++i) {
       const double information = seen.eigenvalues()[i];
-      along[i] = information > leastInformation(seen.eigenvalues()) ? (pictures[i] + beforehand[i]) / (information + 1.0) : beforehand[i];
+      along[i] = information > leastInformation(seen.eigenvalues()) ? (pictures[i] + beforehand[i]) / ((1.0 + damping) * information + 1.0) : beforehand[i];
     }
     return -(V * along);
   }
 
   // Wind and log s. A stiff sheet in much wind and a soft one in little are two valleys: the better of both ends. Where
   // neither shows the motion, it is for a changing wind to do, on the stiff one, which answers it more evenly.
-  std::optional<Fitted> steady(const Eigen::Vector3d& guess) const {
+  // @param direction  unit vector, of the wind that is tried first
+  std::optional<Fitted> steady(const Eigen::Vector3d& direction) const {
     const double motion = flat(modes_.amplitudes).squaredNorm();
     std::optional<Fitted> best;
     for (const double log_stiffness : {0.0, kStiffStart}) {
-      Eigen::VectorXd w(4);
-      w << guess, log_stiffness;
-      const std::optional<Fitted> fitted = solve({times_.front()}, w);
+      const std::optional<Fitted> fitted = solve({times_.front()}, firstGuess(direction, log_stiffness));
       if (!fitted) continue;
       const bool none_shown = best && fitted->left > (1.0 - kHardlyShown) * motion &&
                               best->left > (1.0 - kHardlyShown) * motion;
       if (!best || fitted->cost < best->cost || none_shown) best = fitted;
       if (fitted->left < (1.0 - kWellShown) * motion || sheets_.given()) break;
+    }
+    return best;
+  }
+
+  // The strength in `direction` that shows most.
+  Eigen::VectorXd firstGuess(const Eigen::Vector3d& direction, double log_stiffness) const {
+    Eigen::VectorXd best(4);
+    double least = std::numeric_limits<double>::infinity();
+    for (const double strength : kGuesses) {
+      Eigen::VectorXd w(4);
+      w << strength * direction, log_stiffness;
+      const std::optional<SheetMotion> motion = simulated({times_.front()}, w, false);
+      const double left = motion ? flat(motion->amplitudes - modes_.amplitudes).squaredNorm() : least;
+      if (strength > kGuesses[0] && left >= least) break;
+      best = w, least = left;
     }
     return best;
   }
@@ -273,12 +290,12 @@ class WindFit {
   double spread_ = 1.0;           // factor on them
 };
 
-// Across the sheet, towards the side to which it moves: what pushes it must come from the other one.
-Eigen::Vector3d firstGuess(const ObjectModel& model, const DeformationModes& modes) {
+// Unit vector across the sheet, towards the side to which it moves: what pushes it must come from the other one.
+Eigen::Vector3d likelyDirection(const ObjectModel& model, const DeformationModes& modes) {
   const Eigen::VectorXd shape = modes.shapes * modes.amplitudes.colwise().mean().transpose();
   const Eigen::Map<const Eigen::Matrix3Xd> u(shape.data(), 3, shape.size() / 3);
   const Eigen::Vector3d mean = model.world_from_object.linear() * u.rowwise().mean();
-  return mean.norm() > 0.0 ? Eigen::Vector3d(kFirstGuess * mean.normalized()) : Eigen::Vector3d::Zero();
+  return mean.norm() > 0.0 ? Eigen::Vector3d(mean.normalized()) : Eigen::Vector3d::Zero();
 }
 
 // @param given  the sheet is as stiff as the simulator starts with; else that is fitted, too
@@ -300,7 +317,7 @@ std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<
   note.clear();
   WindFit fit(*sheets, model, times, modes, gravity, params);
   // A steady wind first, then a changing one from there.
-  const std::optional<WindFit::Fitted> steady = fit.steady(firstGuess(model, modes));
+  const std::optional<WindFit::Fitted> steady = fit.steady(likelyDirection(model, modes));
   const std::optional<SheetMotion> motion =
       steady ? fit.simulated({times.front()}, steady->w, false) : std::nullopt;
   if (!motion) {

@@ -29,7 +29,7 @@ struct WindEstimate : WindCourse {
 };
 
 struct WindParams {
-  int nodes = 120;              // of the simulated sheet's grid; more where it finds no equilibrium
+  int nodes = 90;              // of the simulated sheet's grid; more where it finds no equilibrium
   int simulator_nodes = 1200;   // of the grid for which the stiffness is told
   double longest_step = 1.0 / 30.0;  // s, of the simulation
   double knot_spacing = 0.5;    // s
