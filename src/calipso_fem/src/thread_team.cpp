@@ -175,6 +175,13 @@ void runParallel(const std::function<void(const Crew&)>& work) {
   work(Crew(0, 1));
 }
 
+void eachOnAThread(int count, const std::function<void(int)>& work) {
+  if (count == 1) return work(0);
+  runParallel([&](const Crew& crew) {
+    for (int k = crew.rank(); k < count; k += crew.count()) work(k);
+  });
+}
+
 void parallelFor(int n, int serial_below, const std::function<void(int, int)>& work) {
   if (n < serial_below) return work(0, n);
   runParallel([&](const Crew& crew) {

@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "dense_kernels.hpp"
 #include "soft_system.hpp"
 
 namespace calipso::fem {
@@ -47,51 +48,60 @@ ContactOperator::Side ContactOperator::sideOf(int soft, const std::optional<Rigi
 void ContactOperator::update(const std::map<Contact::Key, Contact>& contacts,
                              const StepMotion& motion, const std::vector<SoftEntry>& softs,
                              const RigidWorld& rigid) {
-  std::vector<int> versions;
-  for (const SoftEntry& entry : softs) versions.push_back(entry.soft->system().version());
-  if (contacts.size() == entries_.size() && versions == versions_) return;
-  versions_ = versions;
+  if (contacts.size() != entries_.size()) parts_.clear();
+  std::vector<int> renewed;
+  for (size_t s = 0; s < softs.size(); ++s) {
+    const auto part = parts_.find(static_cast<int>(s));
+    const bool known = part != parts_.end() && part->second.version == softs[s].soft->system().version();
+    if (motion.bodies()[s].touched && !known) renewed.push_back(static_cast<int>(s));
+  }
+  if (renewed.empty() && contacts.size() == entries_.size()) return;
   entries_.clear();
   for (const auto& [key, c] : contacts)
     entries_.push_back({{sideOf(c.soft_a, c.rigid_a, c.point, c.place, 1.0, softs),
                          sideOf(c.soft_b, c.rigid_b, c.other, c.place, -1.0, softs)},
                         contactFrame(c.normal),
                         c.motion});
+  for (const int soft : renewed) parts_[soft] = partOf(soft, softs[soft].soft->system(), motion.h());
   const auto n = static_cast<Eigen::Index>(entries_.size());
   W_.setZero(3 * n, 3 * n);
-  for (size_t s = 0; s < softs.size(); ++s)
-    if (motion.bodies()[s].touched)
-      addSoft(static_cast<int>(s), softs[s].soft->system(), motion.h());
+  for (const auto& [soft, part] : parts_)
+    for (size_t j = 0; j < part.contacts.size(); ++j)
+      for (size_t i = 0; i < part.contacts.size(); ++i)
+        W_.block<3, 3>(3 * part.contacts[i], 3 * part.contacts[j]) += part.W.block<3, 3>(3 * i, 3 * j);
   addRigid(rigid);
-  W_.triangularView<Eigen::StrictlyUpper>() = W_.transpose();
 }
 
-// Lower half of F_i R J_i C J_j^T R^T F_j^T / h^2 for all contacts of a body.
-void ContactOperator::addSoft(int soft, SoftSystem& system, double h) {
+// F_i R J_i C J_j^T R^T F_j^T / h^2 for all contacts of a body.
+ContactOperator::Part ContactOperator::partOf(int soft, SoftSystem& system, double h) const {
   const Eigen::MatrixXd& C = system.compliance();
-  struct Row {
-    int contact;
-    const Side* side;
-    Eigen::Matrix3d frame;
-  };
-  std::vector<Row> rows;
+  Part part;
+  part.version = system.version();
+  std::vector<int> start(1, 0), node;
+  std::vector<double> weight;
+  std::vector<Eigen::Matrix3d> frames;
   for (size_t i = 0; i < entries_.size(); ++i)
-    for (const Side& side : entries_[i].sides)
-      if (side.soft == soft)
-        rows.push_back({static_cast<int>(i), &side, side.sign / h * entries_[i].frame * system.turn()});
-  Eigen::Matrix<double, 3, Eigen::Dynamic> JC(3, C.cols());
-  for (const Row& at : rows) {
-    JC.setZero();
-    for (const auto& [k, w] : at.side->nodes)
-      JC += w * C.middleCols<3>(3 * k).transpose();  // C is symmetric
-    JC = (at.frame * JC).eval();
-    for (const Row& from : rows) {
-      if (from.contact > at.contact) break;
-      Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-      for (const auto& [k, w] : from.side->nodes) sum += w * JC.middleCols<3>(3 * k);
-      W_.block<3, 3>(3 * at.contact, 3 * from.contact) += sum * from.frame.transpose();
+    for (const Side& side : entries_[i].sides) {
+      if (side.soft != soft) continue;
+      for (const auto& [k, w] : side.nodes) node.push_back(k), weight.push_back(w);
+      start.push_back(static_cast<int>(node.size()));
+      frames.push_back(side.sign / h * entries_[i].frame * system.turn());
+      part.contacts.push_back(static_cast<int>(i));
     }
+  const auto n = static_cast<int>(frames.size());
+  const PlaceList places{start.data(), node.data(), weight.data(), n > 0 ? frames.front().data() : nullptr};
+  part.W.resize(3 * n, 3 * n);
+  Eigen::Matrix<double, 3, Eigen::Dynamic> FJC(3, C.cols()), row(3, 3 * n);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> CJ(C.rows(), 3);
+  for (int i = 0; i < n; ++i) {
+    CJ.setZero();
+    for (int k = start[i]; k < start[i + 1]; ++k) CJ += weight[k] * C.middleCols<3>(3 * node[k]);
+    FJC.noalias() = frames[i] * CJ.transpose();  // C is symmetric
+    projectOnto(places, i + 1, FJC.data(), row.data());
+    part.W.block(3 * i, 0, 3, 3 * (i + 1)) = row.leftCols(3 * (i + 1));
+    part.W.block(0, 3 * i, 3 * i, 3) = row.leftCols(3 * i).transpose();
   }
+  return part;
 }
 
 void ContactOperator::addRigid(const RigidWorld& rigid) {
@@ -99,10 +109,13 @@ void ContactOperator::addRigid(const RigidWorld& rigid) {
     for (size_t j = 0; j <= i; ++j)
       for (const Side& at : entries_[i].sides)
         for (const Side& from : entries_[j].sides)
-          if (at.rigid && at.rigid == from.rigid)
-            W_.block<3, 3>(3 * i, 3 * j) += at.sign * from.sign * entries_[i].frame *
-                                            rigid.compliance(*at.rigid, at.place, from.place) *
-                                            entries_[j].frame.transpose();
+          if (at.rigid && at.rigid == from.rigid) {
+            const Eigen::Matrix3d w = at.sign * from.sign * entries_[i].frame *
+                                      rigid.compliance(*at.rigid, at.place, from.place) *
+                                      entries_[j].frame.transpose();
+            W_.block<3, 3>(3 * i, 3 * j) += w;
+            if (i != j) W_.block<3, 3>(3 * j, 3 * i) += w.transpose();
+          }
 }
 
 Eigen::Vector3d ContactOperator::freeSlip(int contact, const StepMotion& motion) const {

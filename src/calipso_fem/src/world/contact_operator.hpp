@@ -15,7 +15,7 @@ class ContactOperator {
   // Takes over the contacts, which may have become more since the last call, and the systems of the bodies.
   void update(const std::map<Contact::Key, Contact>& contacts, const StepMotion& motion,
               const std::vector<SoftEntry>& softs, const RigidWorld& rigid);
-  void forget() { versions_.clear(); }  // contacts have changed
+  void forget() { parts_.clear(); }  // contacts have changed
   const Eigen::MatrixXd& W() const { return W_; }
   // d_a - d_b over the step under all forces but those of contacts, m.
   Eigen::Vector3d freeSlip(int contact, const StepMotion& motion) const;
@@ -40,11 +40,17 @@ class ContactOperator {
 
   Side sideOf(int soft, const std::optional<RigidWorld::Id>& rigid, const SurfacePoint& point,
               const Eigen::Vector3d& place, double sign, const std::vector<SoftEntry>& softs) const;
-  void addSoft(int soft, SoftSystem& system, double h);
+  // What a body contributes to W among the contacts it has part in.
+  struct Part {
+    int version = -1;           // of its system
+    std::vector<int> contacts;  // ascending; one may have both its sides here
+    Eigen::MatrixXd W;
+  };
+  Part partOf(int soft, SoftSystem& system, double h) const;
   void addRigid(const RigidWorld& rigid);
 
   std::vector<Entry> entries_;
-  std::vector<int> versions_;  // of the bodies' systems
+  std::map<int, Part> parts_;  // by body
   Eigen::MatrixXd W_;
 };
 

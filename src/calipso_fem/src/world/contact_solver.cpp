@@ -3,8 +3,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "dense_kernels.hpp"
+
 namespace calipso::fem {
 namespace {
+
+double frictionLimit(const ContactRow& row, double normal) {
+  return row.friction * (normal + row.held_normal) + row.held_tangential;
+}
 
 // One block: the normal part is solved exactly, then the tangential one inside its disk.
 Eigen::Vector3d solveBlock(const Eigen::Matrix3d& W, const Eigen::Vector3d& velocity,
@@ -17,10 +23,15 @@ Eigen::Vector3d solveBlock(const Eigen::Matrix3d& W, const Eigen::Vector3d& velo
   const double a = W(1, 1), b = W(1, 2), d = W(2, 2);
   const double stiffest = 0.5 * (a + d) + std::sqrt(0.25 * (a - d) * (a - d) + b * b);
   if (stiffest > 0.0) p.tail<2>() -= u_t / stiffest;
-  const double limit = row.friction * (p[0] + row.held_normal) + row.held_tangential;
-  const double length = p.tail<2>().norm();
+  const double limit = frictionLimit(row, p[0]), length = p.tail<2>().norm();
   if (length > limit) p.tail<2>() *= limit / length;
   return p;
+}
+
+// Pushes and sticks: the velocity that is left is what the last step was.
+bool isInsideCone(const ContactRow& row, const Eigen::Vector3d& p) {
+  constexpr double kInside = 1.0 - 1e-6;
+  return p[0] > -row.held_normal && p.tail<2>().norm() < kInside * frictionLimit(row, p[0]);
 }
 
 }  // namespace
@@ -36,6 +47,7 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
   velocity.noalias() += W * change;
   // While the first sweep changes a lot, the bodies are far from their end, and so is the problem.
   constexpr double kReduction = 0.02;
+  constexpr double kNegligible = 0.1;  // of the change that ends the sweeps: not worth telling the others
   double first = 0.0;
   ContactSolveReport report;
   report.converged = n == 0;
@@ -45,11 +57,15 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
       const Eigen::Matrix3d own = W.block<3, 3>(3 * i, 3 * i);
       const Eigen::Vector3d p = solveBlock(own, velocity.segment<3>(3 * i), rows[i]);
       const Eigen::Vector3d step = p - rows[i].impulse;
-      rows[i].impulse = p;
+      const double speed = (own * step).norm();
       largest_change = std::max(largest_change, step.norm());
       largest = std::max(largest, p.norm());
-      fastest = std::max(fastest, (own * step).norm());
-      if (!step.isZero(0.0)) velocity.noalias() += W.middleCols<3>(3 * i) * step;
+      fastest = std::max(fastest, speed);
+      if (step.isZero(0.0)) continue;
+      const bool negligible = speed < kNegligible * std::max(velocity_tolerance, kReduction * first);
+      if (negligible && isInsideCone(rows[i], p)) continue;
+      rows[i].impulse = p;
+      addThree(W.col(3 * i).data(), 3 * n, step.data(), 3 * n, velocity.data());
     }
     ++report.iterations;
     report.residual = largest > 0.0 ? largest_change / largest : 0.0;

@@ -149,21 +149,26 @@ std::vector<SoftContacts::Candidate> SoftContacts::candidates(
   return list;
 }
 
+double SoftContacts::watchOf(const SoftEntry& entry, const Obstacle& obstacle, const RigidWorld& rigid,
+                             double h) const {
+  const double reach = reachOf(entry, obstacle);
+  double watch = reach + travelOf(*entry.soft, obstacle, rigid, h);
+  // Observed gaps may be larger than the reach.
+  for (auto it = memory_.lower_bound({entry.id, obstacle.id, 0, 0});
+       it != memory_.end() && std::get<0>(it->first) == entry.id &&
+       std::get<1>(it->first) == obstacle.id;
+       ++it)
+    watch = std::max(watch, reach + it->second.offset);
+  return watch;
+}
+
 void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
                              const std::vector<Obstacle>& obstacles, int index,
                              const RigidWorld& rigid, double h,
                              std::vector<Candidate>& list) const {
   const SoftEntry& entry = softs[soft];
   const Obstacle& obstacle = obstacles[index];
-  const double reach = reachOf(entry, obstacle);
-  const double travel = travelOf(*entry.soft, obstacle, rigid, h);
-  // Observed gaps may be larger than the reach.
-  double watch = reach + travel;
-  for (auto it = memory_.lower_bound({entry.id, obstacle.id, 0, 0});
-       it != memory_.end() && std::get<0>(it->first) == entry.id &&
-       std::get<1>(it->first) == obstacle.id;
-       ++it)
-    watch = std::max(watch, reach + it->second.offset);
+  const double reach = reachOf(entry, obstacle), watch = watchOf(entry, obstacle, rigid, h);
   const Eigen::AlignedBox3d own = boxOf(*entry.soft, watch);
   Eigen::AlignedBox3d others = obstacleBounds(obstacle);
   if (!others.isEmpty() && !others.intersects(own)) return;

@@ -8,7 +8,8 @@
 
 #include "anderson.hpp"
 #include "contact_operator.hpp"
-#include "step_motion.hpp"
+#include "soft_island.hpp"
+#include "thread_team.hpp"
 
 namespace calipso::fem {
 namespace {
@@ -24,9 +25,10 @@ constexpr double kRenewal = 8.0;
 // Renewals of a body's tangent in a step: few of large bodies, whose factors cost more against an iteration.
 int mostRenewals(const SoftObject& soft) { return std::clamp(8000 / soft.body().nodeCount(), 1, 8); }
 
-// Iterations after which a step may end further off balance, twice as far with each more, and so many times
-// further off the contacts' laws: crushed cells take many to the last digits.
-constexpr int kPatience = 6;
+// Iterations after which a step may end further off balance, so many times as far with each more, and up to so
+// many times further off the contacts' laws: crushed cells take many to the last digits.
+constexpr int kPatience = 2;
+constexpr double kImpatience = 4.0;
 constexpr double kLooser = 5.0;
 constexpr double kLoosest = 300.0;  // of the wanted residual: what a step may be off at most
 constexpr int kStraightenings = 3;  // of the gaps of a step
@@ -103,6 +105,15 @@ Contact::Key atRest(Contact::Key key) {
 }
 
 }  // namespace
+
+void ContactReport::add(const ContactReport& other) {
+  contacts += other.contacts;
+  iterations += other.iterations;
+  newton_iterations = std::max(newton_iterations, other.newton_iterations);
+  renewals += other.renewals;
+  deepest = std::max(deepest, other.deepest);
+  converged = converged && other.converged;
+}
 
 SoftContacts::SoftContacts(const ContactParams& params) : params_(params) {}
 SoftContacts::~SoftContacts() = default;
@@ -187,7 +198,7 @@ SoftContacts::Contacts SoftContacts::expectedContacts(const std::vector<Candidat
 }
 
 double SoftContacts::residualWanted(int iteration) const {
-  return params_.residual * std::min(kLoosest, std::pow(2.0, std::max(0, iteration - kPatience)));
+  return params_.residual * std::min(kLoosest, std::pow(kImpatience, std::max(0, iteration - kPatience)));
 }
 
 // Whether a contact is off its law or a body out of balance.
@@ -237,14 +248,15 @@ int SoftContacts::direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid,
   return sweeps;
 }
 
-ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
-                                 const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
-                                 double h) {
-  ContactReport report;
+void SoftContacts::solveIsland(const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h, Island& island) const {
+  const std::vector<SoftEntry>& softs = island.softs;
+  ContactReport& report = island.report;
   const std::vector<Candidate> watched = candidates(softs, obstacles, rigid, h);
-  if (h > kShortestFastStep && tooFast(watched, softs, h)) return report;
-  StepMotion motion(softs, obstacles, rigid, h);
-  Contacts contacts = startingContacts(watched, obstacles, softs, rigid, motion);
+  if (h > kShortestFastStep && tooFast(watched, softs, h)) return;
+  island.motion = std::make_unique<StepMotion>(softs, obstacles, rigid, h);
+  StepMotion& motion = *island.motion;
+  Contacts& contacts = island.contacts;
+  contacts = startingContacts(watched, obstacles, softs, rigid, motion);
   motion.expect(expectedContacts(watched, contacts, motion));
 
   ContactOperator problem;
@@ -285,10 +297,30 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
     report.contacts += c.soft_a >= 0 && !c.force.isZero(0.0);
   }
   report.converged = !open;
-  if (!acceptable(contacts, motion)) return report;
-  remember(contacts, motion);
-  publish(contacts, motion, softs, obstacles);
-  report.bodies = motion.finish(contacts);
+  island.accepted = acceptable(contacts, motion);
+}
+
+ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
+                                 const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
+                                 double h) {
+  std::vector<Island> islands = islandsOf(softs, obstacles, rigid, h);
+  eachOnAThread(static_cast<int>(islands.size()), [&](int k) { solveIsland(obstacles, rigid, h, islands[k]); });
+  ContactReport report;
+  bool accepted = true;
+  for (const Island& island : islands) {
+    accepted = accepted && island.accepted;
+    report.add(island.report);
+  }
+  if (!accepted) return report;
+  forgetForces();
+  contacts_.clear();
+  report.bodies.resize(softs.size());
+  for (Island& island : islands) {
+    remember(island.contacts, *island.motion);
+    publish(island.contacts, *island.motion, island.softs, obstacles);
+    const std::vector<StepReport> bodies = island.motion->finish(island.contacts);
+    for (size_t k = 0; k < bodies.size(); ++k) report.bodies[island.members[k]] = bodies[k];
+  }
   return report;
 }
 
@@ -315,12 +347,15 @@ void SoftContacts::addRigidTouches(const std::vector<Candidate>& watched, const 
   }
 }
 
-void SoftContacts::remember(const Contacts& contacts, const StepMotion& motion) {
+void SoftContacts::forgetForces() {
   for (auto it = memory_.begin(); it != memory_.end();) {
     it->second.force.setZero();
     const bool empty = !it->second.holds && it->second.offset >= 0.0;
     it = empty ? memory_.erase(it) : std::next(it);
   }
+}
+
+void SoftContacts::remember(const Contacts& contacts, const StepMotion& motion) {
   for (const auto& [key, c] : contacts) {
     if (c.soft_a < 0) continue;
     Memory& m = memory_[atRest(key)];
@@ -339,7 +374,6 @@ void SoftContacts::remember(const Contacts& contacts, const StepMotion& motion) 
 void SoftContacts::publish(const Contacts& contacts, const StepMotion& motion,
                            const std::vector<SoftEntry>& softs,
                            const std::vector<Obstacle>& obstacles) {
-  contacts_.clear();
   for (const auto& [key, c] : contacts) {
     if (c.soft_a < 0 || c.force.isZero(0.0)) continue;
     ContactPoint p;

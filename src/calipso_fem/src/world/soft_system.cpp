@@ -30,10 +30,19 @@ void SoftSystem::renew(DeformableBody& body, const Eigen::Matrix3d& rotation,
     std::set_union(before.begin(), before.end(), nodes.begin(), nodes.end(), std::back_inserter(all));
     if (contained) all = before;
   }
-  for (const Definiteness definiteness : {Definiteness::kExact, Definiteness::kPositive}) {
-    body.trialSystem(definiteness, &A_, &pull_);
+  // An indefinite tangent is found out by the factor's failing: for a while it is expected to stay so.
+  constexpr int kExpectedIndefinite = 4;
+  valid_ = false;
+  if (indefinite_ == 0) {
+    body.trialSystem(Definiteness::kExact, &A_, &pull_);
     valid_ = factor_.update(A_, all);
-    if (valid_) break;
+    if (!valid_) indefinite_ = kExpectedIndefinite;
+  } else {
+    --indefinite_;
+  }
+  if (!valid_) {
+    body.trialSystem(Definiteness::kPositive, &A_, &pull_);
+    valid_ = factor_.update(A_, all);
   }
   if (!valid_) throw std::runtime_error("contact: the body's system is not positive definite");
   held_.clear();

@@ -44,6 +44,7 @@ class SoftSystem {
   Eigen::Matrix3d frozen_ = Eigen::Matrix3d::Identity(), turn_ = Eigen::Matrix3d::Identity();
   double h_ = 0.0;
   int version_ = 0;
+  int indefinite_ = 0;  // renewals to come for which the exact tangent is not tried
   bool valid_ = false;
 };
 

@@ -19,14 +19,6 @@ void addForce(Vec& surface, const SurfacePoint& point, const Eigen::Vector3d& fo
       surface.segment<3>(3 * point.vertices[k]) += point.weights[k] * force;
 }
 
-// work(k) for k below `count`; what one does must not concern another.
-void eachOnAThread(int count, const std::function<void(int)>& work) {
-  if (count == 1) return work(0);  // with threads of its own
-  runParallel([&](const Crew& crew) {
-    for (int k = crew.rank(); k < count; k += crew.count()) work(k);
-  });
-}
-
 constexpr double kOverlapShare = 0.2;
 constexpr double kPushOutRate = 10.0;  // 1/s
 

@@ -55,6 +55,8 @@ struct ContactReport {
   double deepest = 0.0;       // m, where the step ended
   bool converged = true;
   std::vector<StepReport> bodies;  // as the softs
+
+  void add(const ContactReport& other);  // of bodies beside these; `bodies` stays
 };
 
 // A contact of a step: the gap between a surface point of a deformable object (a) and a point of
@@ -106,6 +108,7 @@ class SoftContacts {
   void hold(const SoftEntry& entry, const Obstacle& obstacle, const HoldPoint& point, double reach);
 
   // One step of length h (s) of all `softs`; rigid bodies get their share as impulses.
+  // @return without bodies where the step is too long for them: nothing has changed then
   ContactReport step(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
                      RigidWorld& rigid, double h);
 
@@ -129,6 +132,16 @@ class SoftContacts {
     int vertex = 0;
     bool near = false;  // within the minimal distance at the start
   };
+
+  // Deformable objects that may act on each other in a step, and how it went for them.
+  struct Island;
+  // Whether contacts between the two are allowed does not count: that a pair which never touches is
+  // excluded must not change a bit.
+  std::vector<Island> islandsOf(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
+                                const RigidWorld& rigid, double h) const;
+  void solveIsland(const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h, Island& island) const;
+  // Distance from which on something may come within the minimal distance in the step, m.
+  double watchOf(const SoftEntry& entry, const Obstacle& obstacle, const RigidWorld& rigid, double h) const;
 
   using Neighbourhood = std::tuple<int, int, int, int>;
   Neighbourhood neighbourhoodOf(const Contact& c, const std::vector<SoftEntry>& softs) const;
@@ -176,6 +189,7 @@ class SoftContacts {
   bool acceptable(const Contacts& contacts, const StepMotion& motion) const;
   void addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
                        Contacts& contacts) const;
+  void forgetForces();
   void remember(const Contacts& contacts, const StepMotion& motion);
   void publish(const Contacts& contacts, const StepMotion& motion,
                const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles);
