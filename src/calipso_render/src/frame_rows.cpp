@@ -45,7 +45,8 @@ void FrameCompositor::findKinds(int v, Row& row) const {
     const float change = std::abs(sun[i] - sun_before[i]) + std::abs(sky[i] - sky_before[i]);
     const bool differs = ((relit[i] != 0) | (change >= kSameShadow)) & (sun[i] >= 0.0f) & (labels[i] == 0);
     const bool behind = differs | (removed[i] != 0);
-    kinds[i] = edges[i] >= 0 ? kSpecial : drawn[i] != 0 ? kPlain : behind ? kBehind : kNone;
+    const Kind rest = ids[i] == VisibilityBuffer::kNothing ? kBehind : kSpecial;  // what hides a surface at rest takes its residual
+    kinds[i] = edges[i] >= 0 ? kSpecial : drawn[i] != 0 ? kPlain : behind ? rest : kNone;
   }
   if (!still_.empty()) {
     const float* still = still_.ptr<float>(j);

@@ -83,6 +83,23 @@ TEST(Renderer, TheResidualGoesAlongWithSmallMovesOnly) {
   EXPECT_EQ(cv::norm(Renderer(s.prepared, drawn).composite(far).bgr, Renderer(s.prepared, plain).composite(far).bgr, cv::NORM_INF), 0.0);
 }
 
+// Something without a model hides a piece of the ball: the residual puts it back there, too.
+TEST(Renderer, WhatHidesAnObjectAtRestComesBackWithIt) {
+  RenderParams drawn = params();
+  drawn.keep_still = false;
+  ClipFrame key = frameWithBall(ballAt(kCentre));
+  const cv::Rect box = cv::boundingRect(key.labels), pole(box.x + box.width / 2 - 8, box.y + box.height / 2 - 7, 16, 14);
+  key.labels(pole).setTo(0), key.bgr(pole).setTo(cv::Scalar(30, 120, 40));
+  ClipSample clip;
+  clip.add(key);
+  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, drawn));
+  ASSERT_FALSE(prepared->fronts[0].empty());
+  ObjectInFrame ball;
+  ball.name = "ball", ball.edited = true, ball.vertices = prepared->surfaces[0].key_vertices;
+  const FrameOutput out = Renderer(prepared, drawn).composite({key.bgr, key.labels, key.camera, 7, {ball}, {}});
+  EXPECT_EQ(cv::norm(out.bgr, key.bgr, cv::NORM_INF), 0.0);
+}
+
 TEST(Renderer, UnmovedSurfaceDrawsBackToItsPixels) {
   RenderParams p = params();
   p.keep_still = false;  // so that every pixel is really drawn
