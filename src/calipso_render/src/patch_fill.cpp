@@ -14,6 +14,7 @@ constexpr int kSide = 2 * kRadius + 1;
 constexpr float kLively = 6.0f;        // weight of the mean gradient against colour
 constexpr int kLivelySide = 9;         // px of the square in which gradients are averaged
 constexpr float kUnknown = 1e-3f;      // weight of unknown pixels in coarser levels
+constexpr float kMostlyKnown = 0.5f;   // part of a coarser level's pixel from which it is no hole
 constexpr int kBandRows = 16;          // rows that one thread searches in order
 constexpr int kFirstGuesses = 200;     // places tried for a patch of the rim
 constexpr int kFarthest = 16, kFinest = 2;  // px around the best place in which levels, and the finest, look further
@@ -42,28 +43,28 @@ cv::Mat liveliness(const cv::Mat& image, const cv::Mat& known) {
 
 struct Level {
   cv::Mat image;         // CV_32FC4: colour, and how lively it is around
+  cv::Mat known;         // CV_32FC1: part of a pixel that is known
   cv::Mat hole, source;  // CV_8UC1
   cv::Mat nearness;      // CV_32FC1; may be empty
 };
 
-// Half the size: the mean of what is known. A pixel is source if all of its four were; hole if any was, unless half of it is
-// known and no source: lines drawn through the hole are to be seen at every level.
+// Half the size: the mean of what is known. A pixel is source if all of its four were, hole if less than half of it is known: what
+// shows through narrow gaps, and lines drawn through the hole, are to be met at every level.
 Level halved(const Level& fine) {
   const cv::Size size((fine.hole.cols + 1) / 2, (fine.hole.rows + 1) / 2);
-  Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_8U), cv::Mat(size, CV_8U, cv::Scalar(255)), {}};
-  cv::Mat weight = cv::Mat::zeros(size, CV_32F), drawn = cv::Mat::zeros(size, CV_8U);
+  Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_32F), {}, cv::Mat(size, CV_8U, cv::Scalar(255)), {}};
+  cv::Mat weight = cv::Mat::zeros(size, CV_32F), count = weight.clone();
   for (int v = 0; v < fine.hole.rows; ++v) {
     for (int u = 0; u < fine.hole.cols; ++u) {
-      const bool hole = fine.hole.at<std::uint8_t>(v, u) != 0, source = fine.source.at<std::uint8_t>(v, u) != 0;
-      const float w = hole ? kUnknown : 1.0f;
-      half.hole.at<std::uint8_t>(v / 2, u / 2) |= fine.hole.at<std::uint8_t>(v, u);
-      half.source.at<std::uint8_t>(v / 2, u / 2) &= source ? 255 : 0;
+      const float known = fine.known.at<float>(v, u), w = std::max(known, kUnknown);
+      half.source.at<std::uint8_t>(v / 2, u / 2) &= fine.source.at<std::uint8_t>(v, u);
       half.image.at<cv::Vec4f>(v / 2, u / 2) += w * fine.image.at<cv::Vec4f>(v, u);
-      weight.at<float>(v / 2, u / 2) += w;
-      drawn.at<std::uint8_t>(v / 2, u / 2) += !hole && !source;
+      half.known.at<float>(v / 2, u / 2) += known;
+      weight.at<float>(v / 2, u / 2) += w, count.at<float>(v / 2, u / 2) += 1.0f;
     }
   }
-  half.hole.setTo(0, drawn >= 2);
+  half.known /= count;
+  half.hole = half.known < kMostlyKnown;
   if (!fine.nearness.empty()) cv::resize(fine.nearness, half.nearness, size, 0, 0, cv::INTER_NEAREST);
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) half.image.at<cv::Vec4f>(v, u) /= weight.at<float>(v, u);
@@ -324,6 +325,7 @@ class Filling {
 cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source, const InpaintParams& params) {
   std::vector<Level> levels(1);
   cv::merge(std::vector<cv::Mat>{image, kLively * liveliness(image, hole == 0)}, levels[0].image);
+  cv::Mat(hole == 0).convertTo(levels[0].known, CV_32F, 1.0 / 255.0);
   levels[0].hole = hole, levels[0].source = source, levels[0].nearness = params.nearness;
   const float horizon = params.nearness.empty() ? 0.0f : kHorizon * nearnessPerRow(params.nearness);
   while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side) levels.push_back(halved(levels.back()));
