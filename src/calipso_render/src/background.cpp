@@ -21,6 +21,8 @@ constexpr float kMovingSpread = 2.2f;   // times what still places have, and
 constexpr float kLeastMoving = 2.0f;    // code values: from there on a place moves by itself
 constexpr int kMovingGap = 12;          // px between moving places that move with them
 constexpr int kFewestMoving = 50;       // one part in so many of the picture; fewer are passing things
+constexpr int kRowsAround = 2;          // on either side of a row, for what moves in it,
+constexpr float kResting = 0.15f;       // and the part of them up to which it rests
 constexpr int kSteadyDifference = 14;   // code values; about five deviations of the difference
 
 cv::Mat grown(const cv::Mat& mask, int radius) {
@@ -211,6 +213,20 @@ cv::Mat closedGaps(const cv::Mat& moving) {
   return closed(cv::Rect(gap, gap, moving.cols, moving.rows)).clone();
 }
 
+// Part of what is known in the rows around that moves; 0.5 where nothing is. Places are layered: where the rows around rest, what
+// is hidden rests as well.
+cv::Mat motionOfRows(const cv::Mat& moving, const cv::Mat& known) {
+  cv::Mat motion(moving.rows, 1, CV_32F), weight(moving.rows, 1, CV_32F);
+  for (int v = 0; v < moving.rows; ++v) {
+    motion.at<float>(v) = static_cast<float>(cv::countNonZero(moving.row(v) & known.row(v)));
+    weight.at<float>(v) = static_cast<float>(cv::countNonZero(known.row(v)));
+  }
+  const cv::Size around(1, 2 * kRowsAround + 1);
+  cv::blur(motion, motion, around, {-1, -1}, cv::BORDER_REPLICATE);
+  cv::blur(weight, weight, around, {-1, -1}, cv::BORDER_REPLICATE);
+  return (motion + 0.5f) / (weight + 1.0f);
+}
+
 void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
   const cv::Mat moving = movingPlaces(key, background);
@@ -227,8 +243,10 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat
   filled.image.copyTo(background.plate, background.invented);
   background.origin = filled.origin;
   if (!any_moving) return;
+  const cv::Mat rows = motionOfRows(moving, background.invented == 0);
   cv::Mat live_origin(moving.size(), CV_16SC2, cv::Scalar(-1, -1));
   for (int v = 0; v < moving.rows; ++v) {
+    if (rows.at<float>(v) < kResting) continue;
     for (int u = 0; u < moving.cols; ++u) {
       const cv::Vec2s from = background.origin.at<cv::Vec2s>(v, u);
       if (from[0] >= 0 && moving.at<std::uint8_t>(from[1], from[0]) != 0) live_origin.at<cv::Vec2s>(v, u) = from;

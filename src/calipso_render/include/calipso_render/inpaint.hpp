@@ -9,7 +9,7 @@ struct InpaintParams {
   int coarsest_side = 30;     // px; the pyramid ends where the picture's shorter side has no more
   int coarsest_rounds = 12;   // of search and vote at the coarsest level,
   int rounds = 4;             // at the finer ones
-  float away_row = 4.0f, away_column = 0.2f;  // what a px of way to the source counts, squared code values: places are layered
+  float away_row = 6.0f, away_column = 0.2f;  // what a px of way to the source counts, squared code values: places are layered
   std::uint32_t seed = 1;
   cv::Mat nearness;           // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the horizon. What is
                               // copied comes from where the ground is about as near: there things have the same size.
