@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kMean = 3;         // px around a place whose mean colour is compared
 constexpr int kSmooth = 3;       // px around a copied place over which noise is averaged
-constexpr float kNoiseReach = 3.5f;  // deviations of noise
+constexpr float kNoiseReach = 6.0f;  // deviations of noise
 constexpr float kFade = 7.0f;    // px over which a correction fades
 constexpr float kFarthest = 30.0f;  // px
 constexpr float kEdge = 30.0f;   // code values; what differs by much more is an edge of things

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "calipso_render/clip_sample.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "render_test_scene.hpp"
@@ -106,6 +108,36 @@ TEST(InventBackground, FillsOnlyTheHole) {
       }
     }
   }
+}
+
+// Water below row 60 waves, and what is above rests; an object hides some of both all the time.
+TEST(InventBackground, WhatIsHiddenRestsWhereTheRowsAroundRest) {
+  std::vector<ClipFrame> clip;
+  const cv::Rect object(70, 30, 30, 60);
+  for (int k = 0; k < 8; ++k) {
+    ClipFrame f{cv::Mat(kHeight, kWidth, CV_8UC3), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera()};
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const double wave = v < 60 ? std::sin(0.7 * u + 0.4 * v) : std::sin(0.3 * u + 1.9 * k + 0.5 * v);
+        f.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(cv::saturate_cast<std::uint8_t>(120.0 + 30.0 * wave));
+      }
+    }
+    f.bgr(object).setTo(cv::Scalar(0, 0, 255));
+    f.labels(object).setTo(kBallLabel);
+    clip.push_back(f);
+  }
+  addGrain(clip);
+  Background b = seenBackground(clip, false);
+  inventBackground(cv::Mat(), clip.front(), cv::Mat(), b);
+  ASSERT_FALSE(b.live.empty());
+  const auto live = [&](int u, int v) {
+    cv::Vec3f colour;
+    return b.live.at(clip[1].bgr, clip[1].labels, b.live.corrections(clip[1].bgr, clip[1].labels), 1.0f, u, v, colour);
+  };
+  int above = 0, below = 0;
+  for (int u = object.x; u < object.br().x; ++u) above += live(u, 45), below += live(u, 75);
+  EXPECT_EQ(above, 0);
+  EXPECT_GT(below, object.width * 8 / 10);
 }
 
 TEST(Inpaint, ContinuesStripes) {

@@ -162,6 +162,27 @@ TEST(PatchOrigins, ComeFromWhereTheGroundIsAboutAsNear) {
   }
 }
 
+// A dark tower stands at the left and shows again through slits of a hole at the right, too narrow for any patch.
+TEST(PatchOrigins, AgreeWithWhatShowsThroughNarrowGaps) {
+  cv::Mat image(160, 240, CV_32FC3, cv::Scalar::all(180.0)), hole = cv::Mat::zeros(160, 240, CV_8U);
+  image += 0.05 * (grain(240, 160) - cv::Scalar::all(120.0));
+  image(cv::Rect(20, 30, 60, 100)).setTo(cv::Scalar::all(60.0));
+  const cv::Rect around(130, 10, 100, 140);
+  const cv::Rect tower(150, 30, 60, 100);
+  image(tower).setTo(cv::Scalar::all(60.0));
+  for (int u = around.x; u < around.br().x; u += 12) hole(cv::Rect(u, around.y, 8, around.height)).setTo(255);  // slits of 4 px
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, {});
+  int wrong = 0, all = 0;
+  for (int v = tower.y + 10; v < tower.br().y - 10; ++v) {
+    for (int u = tower.x + 10; u < tower.br().x - 10; ++u) {
+      if (hole.at<std::uint8_t>(v, u) == 0) continue;
+      const cv::Vec2s from = origin.at<cv::Vec2s>(v, u);
+      ++all, wrong += image.at<cv::Vec3f>(from[1], from[0])[0] > 120.0f;
+    }
+  }
+  EXPECT_LT(wrong, all / 50);
+}
+
 TEST(PatchOrigins, DoNotDependOnTheNumberOfThreads) {
   const cv::Mat image = grain(200, 150);
   cv::Mat hole = cv::Mat::zeros(150, 200, CV_8U), first;
