@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "manifold_reduction.hpp"
+
 namespace calipso::fem {
 namespace {
 
@@ -84,9 +86,29 @@ void BulletWorld::adjust(btManifoldPoint& point, const btPersistentManifold& man
   point.setDistance(meet ? 0.0 : 1e3 * closing * h);
 }
 
+std::vector<btManifoldPoint*> BulletWorld::redundantContacts() {
+  std::vector<std::pair<Pair, btPersistentManifold*>> manifolds;
+  for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
+    btPersistentManifold* manifold = getDispatcher()->getManifoldByIndexInternal(i);
+    if (manifold->getNumContacts() > 0) manifolds.emplace_back(pairOf(*manifold), manifold);
+  }
+  std::stable_sort(manifolds.begin(), manifolds.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<btManifoldPoint*> redundant, contacts;
+  for (auto it = manifolds.begin(); it != manifolds.end();) {
+    contacts.clear();
+    for (const Pair pair = it->first; it != manifolds.end() && it->first == pair; ++it)
+      for (int k = 0; k < it->second->getNumContacts(); ++k)
+        contacts.push_back(&it->second->getContactPoint(k));
+    for (btManifoldPoint* point : fem::redundantContacts(contacts)) redundant.push_back(point);
+  }
+  return redundant;
+}
+
 void BulletWorld::solveConstraints(btContactSolverInfo& info) {
   std::map<Pair, double> depth;
   closing_.clear();
+  const std::vector<btManifoldPoint*> redundant = redundantContacts();
   for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
     btPersistentManifold& manifold = *getDispatcher()->getManifoldByIndexInternal(i);
     const auto found = forgiven_.find(pairOf(manifold));
@@ -102,6 +124,10 @@ void BulletWorld::solveConstraints(btContactSolverInfo& info) {
   for (auto it = forgiven_.begin(); it != forgiven_.end();) {
     it->second = std::min(it->second, depth[it->first]);
     it = it->second > 0.0 ? std::next(it) : forgiven_.erase(it);
+  }
+  for (btManifoldPoint* point : redundant) {
+    point->setDistance(2.0 * kIgnoredBeyond);
+    point->m_appliedImpulse = point->m_appliedImpulseLateral1 = point->m_appliedImpulseLateral2 = 0.0;
   }
   btDiscreteDynamicsWorld::solveConstraints(info);
 }

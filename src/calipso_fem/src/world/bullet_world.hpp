@@ -21,12 +21,16 @@ Eigen::Isometry3d fromBullet(const btTransform& pose);
 //  - overlap at the start is forgiven (alignment errors must not make objects jump);
 //  - a bounce takes place in the sub-step in which the surfaces meet; Bullet starts to brake bodies
 //    that are still apart, which costs most of the height of a bounce;
+//  - of a pair's many contacts, those that others stand for are left out (manifold_reduction.hpp);
 //  - free flight is exact: Bullet's x += h (v + h a) leads the parabola by h^2 a / 2.
 class BulletWorld : public btDiscreteDynamicsWorld {
  public:
   using Pair = std::pair<int, int>;  // user indices, smaller first
 
   using btDiscreteDynamicsWorld::btDiscreteDynamicsWorld;
+
+  // Contacts further apart than this are none: that of contacts that are left out is beyond. m
+  static constexpr double kIgnoredBeyond = 1e6;
 
   static Pair pairOf(const btPersistentManifold& manifold);
   static bool isDynamic(const btCollisionObject* object);
@@ -50,6 +54,7 @@ class BulletWorld : public btDiscreteDynamicsWorld {
   void solveConstraints(btContactSolverInfo& info) override;
   void adjust(btManifoldPoint& point, const btPersistentManifold& manifold, double h,
               double forgiven);
+  std::vector<btManifoldPoint*> redundantContacts();
   void findTouches();
 
   std::map<Pair, double> forgiven_;  // m

@@ -30,6 +30,7 @@ std::vector<RigidTouch> RigidWorld::touchesAround(std::set<Id> ids) const {
     const btPersistentManifold* m = dispatcher.getManifoldByIndexInternal(i);
     for (int k = 0; k < m->getNumContacts(); ++k) {
       const btManifoldPoint& p = m->getContactPoint(k);
+      if (p.getDistance() > BulletWorld::kIgnoredBeyond) continue;
       touches.push_back({dynamic(m->getBody0()), dynamic(m->getBody1()),
                          fromBullet(p.getPositionWorldOnB()), fromBullet(p.m_normalWorldOnB),
                          std::max(0.0, p.getDistance()), p.m_combinedFriction});

@@ -76,6 +76,7 @@ struct RigidWorld::Impl {
   Id enter(Body body) {
     const Id id = next++;
     body.body->setUserIndex(id);
+    body.body->setContactProcessingThreshold(BulletWorld::kIgnoredBeyond);
     world.addRigidBody(body.body.get());
     body.body->setGravity(btVector3(0, 0, 0));
     bodies.emplace(id, std::move(body));
