@@ -13,6 +13,8 @@ namespace {
 
 constexpr int kRefinements = 2;          // warp, match both ways, fit
 constexpr double kSettledPx = 0.05;      // a refinement that moves less than this is the last
+constexpr double kSameLookPx = 0.1;      // poses this close need no look of their own
+constexpr double kClearShare = 0.7;      // of the frame before's tracks: with so many no search is needed
 constexpr double kNearPx = 1.5;          // a prediction this close needs no half-size match
 constexpr double kLeastInlierShare = 0.35;    // of the matches
 constexpr double kLeastVisibleShare = 0.25;   // of the seeds inside the picture
@@ -143,9 +145,19 @@ Eigen::Isometry3d ObjectTracker::predict(double time) const {
   return movePose(to, centroid_, share * motion);
 }
 
+// The look of an object at rest serves for many frames.
+const ObjectTracker::Look& ObjectTracker::lookAt(const Frame& frame, const ReferenceView& reference,
+                                                 const Eigen::Isometry3d& pose) {
+  const bool same = look_.reference == &reference &&
+                    look_.world_from_camera.isApprox(frame.camera.world_from_camera, 0.0) &&
+                    imageMotion(frame.camera, look_.pose, pose, reference.seeds()) < kSameLookPx;
+  if (!same) look_ = {&reference, frame.camera.world_from_camera, pose, reference.warp(frame.camera, pose)};
+  return look_;
+}
+
 Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const ReferenceView& reference,
-                                                const Eigen::Isometry3d& predicted) const {
-  const ReferenceView::Warped look = reference.warp(frame.camera, predicted);
+                                                const Eigen::Isometry3d& predicted) {
+  const ReferenceView::Warped& look = lookAt(frame, reference, predicted).warped;
   if (look.coverage == 0.0) return predicted;
   // The object may have stopped, or turned round: look as far as twice back to where it was.
   const Eigen::Vector2d home = frame.camera.projectWorld(predicted * centroid_);
@@ -163,8 +175,9 @@ Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const Refere
 }
 
 Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& reference,
-                                  const Eigen::Isometry3d& start, bool near,
-                                  const TrackerParams& params) const {
+                                  const Eigen::Isometry3d& start, const TrackerParams& params) {
+  const bool near =
+      last_ && imageMotion(frame.camera, last_->world_from_object, start, reference.seeds()) < kNearPx;
   Observation observation;
   observation.time = frame.time;
   observation.world_from_object = start;
@@ -184,15 +197,15 @@ Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& refer
 
 Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceView& reference,
                                             Care care, const TrackerParams& params,
-                                            Observation& observation) const {
-  const Eigen::Isometry3d pose = observation.world_from_object;
+                                            Observation& observation) {
+  const Look& seen = lookAt(frame, reference, observation.world_from_object);
+  const Eigen::Isometry3d pose = seen.pose;
   observation.found = false;
   observation.tracks.clear();
-  const ReferenceView::Warped look = reference.warp(frame.camera, pose);
-  observation.coverage = look.coverage;
-  if (look.coverage == 0.0) return pose;
+  observation.coverage = seen.warped.coverage;
+  if (seen.warped.coverage == 0.0) return pose;
   std::vector<Correspondence> found;
-  observation.tracks = followSeeds(LookMatch(look, frame.gray, care), reference, frame.camera,
+  observation.tracks = followSeeds(LookMatch(seen.warped, frame.gray, care), reference, frame.camera,
                                    pose, params, found);
   const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params.pose);
   // Few agreeing matches where many are due are the background, not the object.
@@ -249,14 +262,18 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
   return best;
 }
 
+// What is found where it was expected needs no search.
 Observation ObjectTracker::attempt(const Frame& frame, const ReferenceView& reference,
-                                   const Eigen::Isometry3d& predicted,
-                                   const TrackerParams& params) const {
-  const Eigen::Isometry3d start = searchCoarsely(frame, reference, predicted);
-  const bool near =
-      last_ && imageMotion(frame.camera, last_->world_from_object, start, reference.seeds()) <
-                   kNearPx;
-  return refine(frame, reference, start, near, params);
+                                   const Eigen::Isometry3d& predicted, const TrackerParams& params) {
+  if (frames_lost_ == 0 && before_last_) {
+    Observation expected = refine(frame, reference, predicted, params);
+    if (isClear(expected)) return expected;
+  }
+  return refine(frame, reference, searchCoarsely(frame, reference, predicted), params);
+}
+
+bool ObjectTracker::isClear(const Observation& observation) const {
+  return observation.found && observation.inliers() >= std::max<double>(kWeakInliers, kClearShare * last_->inliers());
 }
 
 void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
@@ -271,6 +288,7 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   }
   references_.emplace_back(frame, model_, observation.world_from_object, cv::Mat(),
                            params_.seed_count);
+  look_ = {};  // the references may have moved
 }
 
 }  // namespace calipso::flow

@@ -65,15 +65,23 @@ class ObjectTracker {
 
  private:
   Eigen::Isometry3d predict(double time) const;
+  // A reference warped to a pose, as a camera sees it.
+  struct Look {
+    const ReferenceView* reference = nullptr;
+    Eigen::Isometry3d world_from_camera, pose;
+    ReferenceView::Warped warped;
+  };
+  const Look& lookAt(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose);
   Eigen::Isometry3d searchCoarsely(const Frame& frame, const ReferenceView& reference,
-                                   const Eigen::Isometry3d& predicted) const;
+                                   const Eigen::Isometry3d& predicted);
   Observation refine(const Frame& frame, const ReferenceView& reference,
-                     const Eigen::Isometry3d& start, bool near, const TrackerParams& params) const;
+                     const Eigen::Isometry3d& start, const TrackerParams& params);
   Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
-                               const TrackerParams& params, Observation& observation) const;
+                               const TrackerParams& params, Observation& observation);
   const ReferenceView& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) const;
   Observation attempt(const Frame& frame, const ReferenceView& reference,
-                      const Eigen::Isometry3d& predicted, const TrackerParams& params) const;
+                      const Eigen::Isometry3d& predicted, const TrackerParams& params);
+  bool isClear(const Observation& observation) const;
   void remember(const Frame& frame, const Observation& observation, bool cut);
 
   ObjectModel model_;
@@ -81,6 +89,7 @@ class ObjectTracker {
   TrackerParams wide_;  // the same with large patches, for frames whose noise or blur drowns small ones
   Eigen::Vector3d centroid_;
   std::vector<ReferenceView> references_;
+  Look look_;  // the last one, which often serves again
   Observation key_;
   std::optional<Observation> last_, before_last_;  // found, most recent first
   double last_seen_time_ = 0.0;                    // s; of the last frame, found in or not
