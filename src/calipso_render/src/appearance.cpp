@@ -52,7 +52,7 @@ struct Shaded {
 };
 
 Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light, const Gloss& gloss,
-             const ShadowMap& sun) {
+             const ShadowMap& sun, const cv::Vec3f& tint) {
   Shaded s{cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32F), cv::Mat::zeros(region.size(), CV_32FC3), {}};
   VisibilityBuffer buffer(region);
   buffer.draw(actor.screen, 0);
@@ -66,7 +66,7 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       if (id == VisibilityBuffer::kNothing) continue;
       const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
       const float visible = sun.visibility(p.position, p.normal);
-      const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.sky);
+      const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.sky, tint);
       s.light.at<cv::Vec3f>(v, u) = l;
       s.highlight.at<cv::Vec3f>(v, u) = specularShading(light, gloss, p.normal, (eye - p.position).normalized(), visible, p.sky);
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
@@ -83,14 +83,14 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
 
 // @param mean_light that of the key frame, where there is one
 Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light, const Gloss& gloss, const ShadowMap& sun,
-                          const std::optional<cv::Vec3f>& mean_light) {
+                          const std::optional<cv::Vec3f>& mean_light, const cv::Vec3f& tint) {
   Reflectance r;
   const cv::Rect all(0, 0, view.picture.cols, view.picture.rows);
   cv::Rect mask_box = cv::boundingRect(view.labels == actor.surface->index);
   mask_box = mask_box.empty() ? mask_box : (mask_box + cv::Size(2 * kMargin, 2 * kMargin) - cv::Point(kMargin, kMargin)) & all;
   r.region = boundsOf(actor.screen, kMargin, view.picture.size()) | mask_box;
   if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
-  const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun);
+  const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun, tint);
   r.nearness = shaded.nearness, r.normal = shaded.normal;
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);
@@ -113,6 +113,11 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
     }
   }
   return r;
+}
+
+cv::Vec3f meanReflectance(const Reflectance& r) {
+  const cv::Scalar mean = cv::countNonZero(r.trust) > 0 ? cv::mean(r.albedo, r.trust > 0.0f) : cv::Scalar();
+  return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
 }
 
 cv::Mat widened(const cv::Mat& colour) {
@@ -141,7 +146,8 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
     used.push_back(&views[i]);
     actors.push_back(&views[i].actors[object]);
     const std::optional<cv::Vec3f> mean = i == 0 ? std::nullopt : std::make_optional(a.mean_light);
-    pictures.push_back(reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean));
+    if (i == 0) a.tint = thrownBackTint(meanReflectance(reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, {})));
+    pictures.push_back(reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, a.tint));
     if (i == 0) a.mean_light = pictures[0].mean_light;
   }
   a.region = pictures[0].region;

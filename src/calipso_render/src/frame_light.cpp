@@ -221,7 +221,7 @@ const Look& FrameCompositor::lookOf(int slot) const {
 
 FrameCompositor::Lit FrameCompositor::exactLight(const LitPoint& p, int slot) const {
   const float sun = p.normal.dot(light_.direction) > 0.0f ? newSun(p.position, p.normal) : 0.0f;
-  const PointLight::Shading shading = point_light_.at(glosses_[slot], p.normal, (eye_ - p.position).normalized(), sun, p.sky);
+  const PointLight::Shading shading = point_light_.at(glosses_[slot], prepared_.appearances[surface_of_slot_[slot]].tint, p.normal, (eye_ - p.position).normalized(), sun, p.sky);
   return {shading.diffuse, shading.highlight, slot};
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calipso_render/colour.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -24,8 +26,19 @@ cv::Vec3f ambientAt(const Light& light, const Eigen::Vector3f& n) {
   return sum;
 }
 
-cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky) {
-  return ambientAt(light, n) * sky + light.sun * (std::max(0.0f, n.dot(light.direction)) * sun);
+cv::Vec3f thrownBackTint(const cv::Vec3f& reflectance) {
+  constexpr float kMostTint = 0.9f;  // of a channel's light: saturated colours are told with errors
+  cv::Vec3f tint;
+  const float grey = luminance(reflectance);
+  if (!(grey > 0.0f)) return tint;
+  // Of the hidden part h the surface's `sky` is 1 - (1 - kThrownBack) h.
+  for (int c = 0; c < 3; ++c) tint[c] = kThrownBack / (1.0f - kThrownBack) * (std::min(kMostTint / kThrownBack, reflectance[c] / grey) - 1.0f);
+  return tint;
+}
+
+cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky, const cv::Vec3f& tint) {
+  const cv::Vec3f reaching = cv::Vec3f::all(sky) + tint * (1.0f - sky);
+  return ambientAt(light, n).mul(reaching) + light.sun * (std::max(0.0f, n.dot(light.direction)) * sun);
 }
 
 float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v, float m) {

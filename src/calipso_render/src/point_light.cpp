@@ -26,10 +26,10 @@ cv::v_float32x4 PointLight::ambientAt(const Eigen::Vector3f& n) const {
   return cv::v_max(sum, least_);
 }
 
-PointLight::Shading PointLight::at(const Gloss& gloss, const Eigen::Vector3f& n, const Eigen::Vector3f& view, float sun, float sky) const {
+PointLight::Shading PointLight::at(const Gloss& gloss, const cv::Vec3f& tint, const Eigen::Vector3f& n, const Eigen::Vector3f& view, float sun, float sky) const {
   Shading shading;
   const float cosine = std::max(0.0f, n.dot(direction_));
-  cv::v_store(shading.diffuse.val, ambientAt(n) * cv::v_setall_f32(sky) + sun_ * cv::v_setall_f32(cosine * sun));
+  cv::v_store(shading.diffuse.val, ambientAt(n) * (cv::v_setall_f32(sky) + wide(tint) * cv::v_setall_f32(1.0f - sky)) + sun_ * cv::v_setall_f32(cosine * sun));
   if (gloss.specular <= 0.0f) return shading;
   const float n_v = n.dot(view);
   cv::v_float32x4 highlight = ambientAt(2.0f * n_v * n - view) * cv::v_setall_f32(gloss.specular * sky * grazing(n_v));

@@ -15,7 +15,8 @@ class PointLight {
   struct Shading {
     cv::Vec4f diffuse, highlight;  // B, G, R, 0
   };
-  Shading at(const Gloss& gloss, const Eigen::Vector3f& n, const Eigen::Vector3f& view, float sun, float sky) const;
+  // @param tint of what the object itself throws back
+  Shading at(const Gloss& gloss, const cv::Vec3f& tint, const Eigen::Vector3f& n, const Eigen::Vector3f& view, float sun, float sky) const;
 
  private:
   cv::v_float32x4 ambientAt(const Eigen::Vector3f& n) const;

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "calipso_render/light.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -17,7 +19,6 @@ constexpr float kGoldenAngle = 2.39996323f;
 constexpr float kLift = 1e-3f;       // of the scene's radius: rays start that far off the surface
 constexpr int kRayBudget = 120000;   // for the exposure of a whole mesh
 constexpr int kFewestRays = 12, kMostRays = 48;
-constexpr float kThrownBack = 0.3f;  // part of the hidden sky's light that comes back from what hides it
 
 // One single-threaded device for the process: the renderer's own loops use the cores.
 RTCDevice device() {

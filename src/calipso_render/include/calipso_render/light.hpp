@@ -30,8 +30,15 @@ std::array<float, 9> shBasis(const Eigen::Vector3f& n);
 
 cv::Vec3f ambientAt(const Light& light, const Eigen::Vector3f& n);
 
-// Radiance of a white diffuse surface with unit normal n; `sun`, `sky`: visible fraction of each.
-cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky = 1.0f);
+// Part of the hidden sky's light that comes back from what hides it; `sky` below, where it is a surface's own, has that in it.
+inline constexpr float kThrownBack = 0.3f;
+
+// The colour of what comes back: per channel, what is added to each unit of 1 - sky where the surface that hides the sky has
+// this reflectance. 0 where it is grey.
+cv::Vec3f thrownBackTint(const cv::Vec3f& reflectance);
+
+// Radiance of a white diffuse surface with unit normal n; `sun`, `sky`: visible fraction of each; `tint`: see thrownBackTint().
+cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky = 1.0f, const cv::Vec3f& tint = {});
 
 // D G / (4 n.v) of Torrance and Sparrow 1967 with unit ks, Beckmann's D times pi (the light's colour is
 // irradiance / pi). Zero where light or viewer are below the horizon. l, v: unit, towards light, viewer.
