@@ -23,6 +23,7 @@ constexpr double kSharp = 0.98;       // of the worst roughness' error: less mus
 constexpr double kBroad = 0.35;       // m from which a lobe looks like diffuse shading
 constexpr double kNarrowPart = 0.5;   // of its roughness, that a narrow one beside it has at most
 constexpr double kSeenBeside = 15.0;  // rows' mean errors by which the narrow one has to make the fit better
+constexpr double kAlike = 6.0;         // rows' mean errors within which another roughness explains the highlights as well
 constexpr double kExplained = 0.97;   // of the error without gloss: less must remain, or no highlight was seen
 
 struct NormalMap {
@@ -184,19 +185,32 @@ std::vector<double> lobesOf(const std::vector<HighlightSample>& highlights, cons
   return lobes;
 }
 
-// A lobe nearly as broad as diffuse shading explains that one's errors too. Where beside it a narrow one is seen, that is the gloss.
-std::optional<Gloss> narrowBeside(const Gloss& broad, const std::vector<Row>& rows, const std::vector<HighlightSample>& highlights,
-                                  const Eigen::Vector3f& light, int clusters) {
-  const std::vector<double> beside = lobesOf(highlights, light, broad.roughness);
-  const double without = solve(rows, {nullptr, &beside}, clusters).cost;
-  double best_cost = without * (1.0 - kSeenBeside / static_cast<double>(rows.size()));
-  std::optional<Gloss> best;
-  for (int i = 0; roughnessAt(i) < kNarrowPart * broad.roughness; ++i) {
+struct Found : SeenGloss {
+  double cost = 0.0;
+};
+
+// The best of the roughnesses below `limit`, and which others explain the rows as well. @param most error that it may leave
+// @param worst out: the worst error that any leaves
+std::optional<Found> bestRoughness(const std::vector<Row>& rows, const std::vector<HighlightSample>& highlights, const Eigen::Vector3f& light,
+                                       int clusters, const std::vector<double>* broad, double limit, double most, double& worst) {
+  std::vector<double> costs, strengths;
+  for (int i = 0; i <= kRoughnesses && roughnessAt(i) < limit; ++i) {
     const std::vector<double> own = lobesOf(highlights, light, roughnessAt(i));
-    const Solution s = solve(rows, {&own, &beside}, clusters);
-    if (s.strength > 0.0 && s.cost < best_cost) best_cost = s.cost, best = {static_cast<float>(s.strength), static_cast<float>(roughnessAt(i))};
+    const Solution s = solve(rows, {&own, broad}, clusters);
+    costs.push_back(s.strength > 0.0 ? s.cost : 1e30), strengths.push_back(s.strength);
+    worst = std::max(worst, s.cost);
   }
-  return best;
+  const std::size_t best = std::min_element(costs.begin(), costs.end()) - costs.begin();
+  if (costs.empty() || costs[best] >= most) return std::nullopt;
+  const double alike = costs[best] * (1.0 + kAlike / static_cast<double>(rows.size()));
+  std::size_t first = best, last = best;
+  while (first > 0 && costs[first - 1] <= alike) --first;
+  while (last + 1 < costs.size() && costs[last + 1] <= alike) ++last;
+  const auto roughness = [](std::size_t i) { return static_cast<float>(roughnessAt(static_cast<int>(i))); };
+  Found found;
+  found.gloss = {static_cast<float>(strengths[best]), roughness(best)};
+  found.smoothest = roughness(first), found.roughest = roughness(last), found.cost = costs[best];
+  return found;
 }
 
 }  // namespace
@@ -216,7 +230,7 @@ std::vector<HighlightSample> highlightSamples(const std::vector<View>& views, co
   return thinned;
 }
 
-std::optional<Gloss> fitGloss(const std::vector<HighlightSample>& highlights, const LightFit& fit,
+std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights, const LightFit& fit,
                               const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible) {
   if (highlights.size() < kFewest) return std::nullopt;
   const Light& light = fit.light;
@@ -231,20 +245,15 @@ std::optional<Gloss> fitGloss(const std::vector<HighlightSample>& highlights, co
   }
   const int clusters = static_cast<int>(fit.albedos.size());
   const double without = solve(rows, {}, clusters).cost;
-  Gloss best;
-  double best_cost = kExplained * without;
   double worst = 0.0;
-  bool found = false;
-  for (int i = 0; i <= kRoughnesses; ++i) {
-    const std::vector<double> lobe = lobesOf(highlights, light.direction, roughnessAt(i));
-    const Solution s = solve(rows, {&lobe, nullptr}, clusters);
-    worst = std::max(worst, s.cost);
-    if (s.strength > 0.0 && s.cost < best_cost) best_cost = s.cost, best = {static_cast<float>(s.strength), static_cast<float>(roughnessAt(i))}, found = true;
-  }
-  if (!found || best_cost >= kSharp * worst) return std::nullopt;
-  if (best.roughness < kBroad) return best;
-  const std::optional<Gloss> narrow = narrowBeside(best, rows, highlights, light.direction, clusters);
-  return narrow ? narrow : std::make_optional(best);
+  const std::optional<Found> best = bestRoughness(rows, highlights, light.direction, clusters, nullptr, 2.0 * kRoughest, kExplained * without, worst);
+  if (!best || best->cost >= kSharp * worst) return std::nullopt;
+  if (best->gloss.roughness < kBroad) return *best;
+  // A lobe nearly as broad as diffuse shading explains that one's errors too. Where beside it a narrow one is seen, that is the gloss.
+  const std::vector<double> beside = lobesOf(highlights, light.direction, best->gloss.roughness);
+  const double with_broad = solve(rows, {nullptr, &beside}, clusters).cost * (1.0 - kSeenBeside / static_cast<double>(rows.size()));
+  const std::optional<Found> narrow = bestRoughness(rows, highlights, light.direction, clusters, &beside, kNarrowPart * best->gloss.roughness, with_broad, worst);
+  return *(narrow ? narrow : best);
 }
 
 }  // namespace calipso::render

@@ -22,7 +22,7 @@ std::vector<HighlightSample> highlightSamples(const std::vector<View>& views, co
 // clusters (linear least squares, outliers weighed down), and of these the best. nullopt: no highlight
 // is seen, or any roughness explains it.
 // @param fit light and albedos so far; @param visible as in LightEvidence
-std::optional<Gloss> fitGloss(const std::vector<HighlightSample>& highlights, const LightFit& fit,
+std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights, const LightFit& fit,
                               const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible);
 
 }  // namespace calipso::render

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "ambient_fit.hpp"
 #include "light_search.hpp"
 #include "reflectance_cost.hpp"
 
@@ -191,8 +192,10 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up, cons
   // Shading alone may lead below the horizon: then the search's direction stands, if it stands out, as it does where
   // shadows tell it.
   if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling)) tryStart(evidence, up, starts.front(), false, best);
-  if (!best.determined || !evidence.gloss) return best;
-  if (const std::optional<Gloss> gloss = evidence.gloss(best)) best.gloss = *gloss;
+  if (!best.determined) return best;
+  best.seen_gloss = evidence.gloss ? evidence.gloss(best) : std::nullopt;
+  if (best.seen_gloss) best.gloss = best.seen_gloss->gloss;
+  best.second_order = refineAmbient(evidence, best);
   return best;
 }
 

@@ -42,6 +42,7 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
     p.remarks.push_back("the objects' masks cover " + std::to_string(percent(covered)) + " % of the key frame: little is left to tell the place and its light by; check the strokes");
   }
   if (!p.light.determined) p.remarks.push_back("too little of the objects is seen to tell the light; it is assumed high and frontal");
+  if (p.light.determined && !p.light.seen_gloss) p.remarks.push_back("no highlight is seen that tells the objects' gloss; it is what their shading leaves possible");
 }
 
 void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std::size_t i, Prepared& p) {

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "ambient_fit.hpp"
+#include "calipso_render/colour.hpp"
+
 #include <cmath>
 #include <random>
 
@@ -116,6 +119,56 @@ TEST(FitLight, BelievesCastShadows) {
   const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
   EXPECT_TRUE(fit.from_shadows);
   EXPECT_GT(fit.light.direction.dot(shadow), std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
+}
+
+// The ball's samples under an ambient light with these harmonics, with errors of 1 %.
+LightEvidence ballUnder(const Light& light) {
+  LightEvidence evidence;
+  cv::RNG random(5);
+  evidence.clusters = 1;
+  for (LightSample s : ballSamples(light.direction)) {
+    s.radiance = diffuseShading(light, s.normal, 1.0f).mul(cv::Vec3f(0.2f, 0.4f, 0.6f)) * static_cast<float>(1.0 + random.gaussian(0.01));
+    evidence.samples.push_back(s);
+  }
+  return evidence;
+}
+
+LightFit plainFit(const Light& light) {
+  LightFit fit;
+  fit.determined = true, fit.light = light, fit.gloss.specular = 0.0f, fit.albedos = {cv::Vec3f(0.2f, 0.4f, 0.6f)};
+  for (int j = 4; j < 9; ++j) fit.light.ambient[j] = {};
+  return fit;
+}
+
+TEST(RefineAmbient, FindsTheLightOfASkyThatIsNotEven) {
+  Light light;
+  light.direction = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
+  light.ambient[4] = {0.06f, 0.04f, 0.02f}, light.ambient[7] = {-0.08f, -0.05f, -0.03f};
+  LightFit fit = plainFit(light);
+  ASSERT_TRUE(refineAmbient(ballUnder(light), fit));
+  // On what is seen; harmonics that differ there by little trade places.
+  for (const LightSample& s : ballUnder(light).samples) {
+    const cv::Vec3f found = ambientAt(fit.light, s.normal), truth = ambientAt(light, s.normal);
+    const float level = found[1] / truth[1];  // shared with the albedo
+    EXPECT_NEAR(level, 1.0f, 0.08f);
+  }
+}
+
+TEST(RefineAmbient, LeavesAnEvenSkyAsItIs) {
+  Light light;
+  light.direction = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
+  LightFit fit = plainFit(light);
+  EXPECT_FALSE(refineAmbient(ballUnder(light), fit));
+  EXPECT_EQ(fit.light.ambient[4], cv::Vec3f());
+}
+
+TEST(ThrownBackTint, IsOfTheSurfacesColourAndNoBrighter) {
+  EXPECT_LT(cv::norm(thrownBackTint({0.4f, 0.4f, 0.4f})), 1e-6);
+  const cv::Vec3f blue = thrownBackTint({0.5f, 0.3f, 0.1f});
+  EXPECT_GT(blue[0], 0.0f);
+  EXPECT_LT(blue[2], 0.0f);
+  EXPECT_NEAR(luminance(blue), 0.0f, 1e-6f);
+  EXPECT_LT(cv::norm(thrownBackTint({0, 0, 0})), 1e-6);
 }
 
 TEST(SkyExposure, IsFullOutsideAndLessInABox) {

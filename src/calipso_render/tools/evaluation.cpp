@@ -150,6 +150,10 @@ class Evaluation {
       }
     }
     put("roughness_error_percent", roughness);
+    put("roughness_observed", prepared_->light.seen_gloss ? 1.0 : 0.0);
+    const auto& seen = prepared_->light.seen_gloss;
+    put("roughness_range", seen ? std::optional<double>(std::sqrt(seen->roughest / seen->smoothest)) : std::nullopt);
+    put("second_order_ambient", prepared_->light.second_order ? 1.0 : 0.0);
   }
 
   std::optional<double> albedoFigure() const {

@@ -27,6 +27,12 @@ std::vector<LightSample> lightSamples(const std::vector<View>& views, const std:
 
 struct LightFit;
 
+// Gloss as highlights show it. They do not tell roughnesses from `smoothest` to `roughest` apart.
+struct SeenGloss {
+  Gloss gloss;
+  float smoothest = 0.0f, roughest = 0.0f;
+};
+
 // All that the pictures show of the light.
 struct LightEvidence {
   std::vector<LightSample> samples;
@@ -37,7 +43,7 @@ struct LightEvidence {
   std::function<double(const Eigen::Vector3f& l)> shadow_misfit;
   std::vector<Eigen::Vector3f> shadow_candidates;  // directions that cast shadows speak for
   // Gloss from the pixels near the mirror direction, under a light found; may be empty, and find none.
-  std::function<std::optional<Gloss>(const LightFit&)> gloss;
+  std::function<std::optional<SeenGloss>(const LightFit&)> gloss;
 };
 
 // What views, one or several, show. @param plate what was seen of the place without the objects, from the key frame's
@@ -49,8 +55,10 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
 struct LightFit {
   Light light;
   Gloss gloss;                     // of all objects together
+  std::optional<SeenGloss> seen_gloss;  // nullopt: no highlight tells it, `gloss` is what the shading leaves possible
   std::vector<cv::Vec3f> albedos;  // per cluster, up to a common factor
   bool determined = false;         // false: too little was seen; the light is a default, high and frontal
+  bool second_order = false;       // ambient light in bands 1 and 2, too: held-out pixels spoke for it
   bool from_shadows = false;       // cast shadows decided on the direction
   double cost = 0.0;               // of the last pass, half the robust sum of squares
 };
