@@ -188,7 +188,7 @@ AlignmentResult unaligned(const TriangleMesh& cad, const Eigen::Isometry3d& pose
 
 // Fills in everything that follows from where the vertices ended.
 void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& x,
-              const std::vector<ContourLoop>& contour, const LowOrderStep& last,
+              const std::vector<ContourLoop>& contour, const LowOrderStep& last, bool judge_depth,
               AlignmentResult& result) {
   const Points world = transformed(problem.camera.world_from_camera, x);
   result.world_from_object = bestRigid(cad.vertices, world);
@@ -200,7 +200,8 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
   const Posterior end = posterior(problem, x, last);
   result.covariance = poseCovariance(
       problem, end, problem.camera.world_from_camera.inverse() * result.world_from_object);
-  const ShapeUncertainty error = uncertaintyOf(problem, x, last, end);
+  const ShapeUncertainty error =
+      judge_depth ? uncertaintyOf(problem, x, last, end) : ShapeUncertainty();
   result.expected_error = error.expected().mean;
   result.expected_rms = error.expected().rms;
   result.off_probability = error.beyond(kTrustedWithin);
@@ -243,7 +244,7 @@ AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
     return low.map.apply(transformed(camera_from_object, points));
   };
   const ElasticOutcome end = fitElasticStages(cad, problem, placed, steps, grids, clock);
-  describe(problem, cad, end.x, contour, low.last, result);
+  describe(problem, cad, end.x, contour, low.last, options.judge_depth, result);
   if (!end.trouble.empty()) {
     result.trusted = false;
     result.reason = end.trouble + (result.reason.empty() ? "" : "; " + result.reason);

@@ -35,6 +35,7 @@ ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
                         const std::optional<DepthObservation>& depth) {
   AlignOptions options;
   options.levels = {};
+  options.judge_depth = false;
   options.planes = scene.planes;
   options.depth = depth;
   return [mesh = loadMesh(object.cad_path), camera = scene.camera, options,

@@ -7,82 +7,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_align/contour_term.hpp"
+#include "calipso_align/surface_distance.hpp"
 
 namespace calipso::align {
-namespace {
-
-Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
-                                  const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-  // Regions of the triangle's plane, after Ericson, Real-Time Collision Detection, 5.1.5.
-  const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),
-               d6 = ac.dot(cp);
-  if (d1 <= 0 && d2 <= 0) return a;
-  if (d3 >= 0 && d4 <= d3) return b;
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  }
-  const double sum = va + vb + vc;
-  return a + ab * (vb / sum) + ac * (vc / sum);
-}
-
-}  // namespace
-
-std::vector<double> distancesToSurface(const Points& from, const Points& x,
-                                       const Triangles& triangles) {
-  // Faces in the order of their centres along the axis in which these spread most: a point looks at the
-  // nearest ones first, and no further than a nearer one can be. Bounding spheres reject most of them.
-  const int faces = static_cast<int>(triangles.rows());
-  Points centre(faces, 3);
-  for (int f = 0; f < faces; ++f) {
-    centre.row(f) = (x.row(triangles(f, 0)) + x.row(triangles(f, 1)) + x.row(triangles(f, 2))) / 3.0;
-  }
-  int axis = 0;
-  (centre.colwise().maxCoeff() - centre.colwise().minCoeff()).maxCoeff(&axis);
-  std::vector<int> order(faces);
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) { return centre(a, axis) < centre(b, axis); });
-  std::vector<double> along(faces), radius(faces, 0.0);
-  for (int k = 0; k < faces; ++k) {
-    along[k] = centre(order[k], axis);
-    for (int v = 0; v < 3; ++v) {
-      radius[k] = std::max(radius[k], (x.row(triangles(order[k], v)) - centre.row(order[k])).norm());
-    }
-  }
-  const double largest = faces > 0 ? *std::max_element(radius.begin(), radius.end()) : 0.0;
-
-  std::vector<double> result(from.rows());
-#pragma omp parallel for schedule(static)
-  for (int i = 0; i < from.rows(); ++i) {
-    const Eigen::Vector3d p = from.row(i);
-    double best = std::numeric_limits<double>::max();
-    const auto look = [&](int k) {
-      const double reach = best + radius[k];
-      const int f = order[k];
-      if ((centre.row(f).transpose() - p).squaredNorm() > reach * reach) return;
-      const Eigen::Vector3d q = closestOnTriangle(p, x.row(triangles(f, 0)), x.row(triangles(f, 1)),
-                                                  x.row(triangles(f, 2)));
-      best = std::min(best, (q - p).norm());
-    };
-    int up = static_cast<int>(std::lower_bound(along.begin(), along.end(), p[axis]) - along.begin());
-    int down = up - 1;
-    while (up < faces || down >= 0) {
-      const double above = up < faces ? along[up] - p[axis] : std::numeric_limits<double>::max();
-      const double below = down >= 0 ? p[axis] - along[down] : std::numeric_limits<double>::max();
-      if (std::min(above, below) > best + largest) break;
-      look(above < below ? up++ : down--);
-    }
-    result[i] = best;
-  }
-  return result;
-}
-
 namespace {
 
 // Distance of p to the polygon's nearest segment.

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <random>
 
-#include "calipso_align/metrics.hpp"
+#include "calipso_align/surface_distance.hpp"
 
 namespace calipso::align {
 namespace {
 
-constexpr int kDraws = 128;
-constexpr int kPointsPerDraw = 32;   // place its mean to a tenth
+constexpr int kDraws = 64;
+constexpr int kPointsPerDraw = 20;   // place its mean to some 15 %
 
 // Some matrix L with L L' = C, C positive semi-definite but for rounding.
 Eigen::MatrixXd squareRoot(const Eigen::MatrixXd& C) {

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "calipso_align/metrics.hpp"
 #include "calipso_align/schedule.hpp"
+#include "calipso_align/surface_distance.hpp"
 #include "synthetic_shape.hpp"
 
 namespace calipso::align {
@@ -39,9 +39,9 @@ double anything(const LowOrderMap::Parameters&) { return 1.0; }
 TEST(ShapeUncertainty, OfAShiftedSphereIsHalfItsShift) {
   constexpr double kDeviation = 0.1;
   const SurfaceDistance expected = ofSphere(kDeviation, anything).expected();
-  // 128 draws place the mean of a normal variable's size to 7 %, its r.m.s. to 6 %.
-  EXPECT_NEAR(expected.mean * kDiagonal, 0.5 * std::sqrt(2.0 / M_PI) * kDeviation, 0.007);
-  EXPECT_NEAR(expected.rms * kDiagonal, kDeviation / std::sqrt(3.0), 0.008);
+  // 64 draws place the mean of a normal variable's size to 9.4 %, its r.m.s. to 8.8 %: two deviations.
+  EXPECT_NEAR(expected.mean * kDiagonal, 0.5 * std::sqrt(2.0 / M_PI) * kDeviation, 0.0075);
+  EXPECT_NEAR(expected.rms * kDiagonal, kDeviation / std::sqrt(3.0), 0.0102);
 }
 
 TEST(ShapeUncertainty, LeavesOutWhatIsImpossible) {
@@ -51,8 +51,8 @@ TEST(ShapeUncertainty, LeavesOutWhatIsImpossible) {
   };
   const ShapeUncertainty error = ofSphere(0.1, bounded);
   ASSERT_FALSE(error.draws.empty());
-  // 32 points of each draw see its mean to some 10 %.
-  EXPECT_EQ(error.beyond({1.3 * 0.5 * kMost / kDiagonal, 1.0}), 0.0);
+  // 20 points of each draw see its mean to some 15 %.
+  EXPECT_EQ(error.beyond({1.5 * 0.5 * kMost / kDiagonal, 1.0}), 0.0);
   EXPECT_GT(error.beyond({0.1 * kMost / kDiagonal, 1.0}), 0.5);
 }
 

@@ -36,6 +36,7 @@ struct AlignOptions {
   std::vector<int> levels = {600, 2000};   // about how many nodes the grids have, coarse to fine
   double rotation_sigma_deg = 4.5;         // of the rough placement, per axis
   double poissons_ratio = 0.0;             // of the regulariser
+  bool judge_depth = true;                 // whether the result says how far it may be off in 3D
   double elastic_weight = 1.0;             // final stiffness of the model against the contour
   std::vector<SupportPlane> planes;        // world; the object does not go through them
   std::vector<AttachmentBox> attachments;  // world; the object keeps reaching into them
@@ -59,7 +60,7 @@ struct AlignmentResult {
   double met_mean_px = 0.0;                // of known points that the model meets
   double contour_mean_px = 0.0;            // of known points
   double contour_p95_px = 0.0;
-  double expected_error = 0.0;             // mean distance of the surface from the true one, predicted,
+  double expected_error = 0.0;             // if asked: mean distance of the surface from the true one, predicted,
   double expected_rms = 0.0;               // in parts of the model's diagonal
   double off_probability = 0.0;            // that it is further away than a result that is trusted may be
   double noise_px = 0.0;                   // estimated noise of the contour

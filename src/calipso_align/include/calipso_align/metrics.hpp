@@ -24,10 +24,6 @@ struct SurfaceError {
   double mean = 0.0, rms = 0.0, hausdorff = 0.0;   // m
 };
 
-// Distance of every point of `from` to the surface, m.
-std::vector<double> distancesToSurface(const Points& from, const Points& x,
-                                       const Triangles& triangles);
-
 // Distances between two surfaces, both ways: of each one's vertices to the nearest point of the other.
 SurfaceError surfaceError(const Points& a, const Points& b, const Triangles& triangles_a,
                           const Triangles& triangles_b);
