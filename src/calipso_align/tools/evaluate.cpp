@@ -193,14 +193,22 @@ void addErrors(const EvaluationCase& one, const Points& x, const std::string& su
   addSurfaceError(one, gauge * x, true_x, suffix + "_depth_removed", line);
   line.addNumber("depth_gauge" + suffix, gauge);
   if (!truth.visible.empty()) {
-    line.addNumber("mask_iou" + suffix, maskIou(truth, x, one.cad.triangles, one.camera));
+    line.addNumber("model_mask_iou" + suffix, maskIou(truth, x, one.cad.triangles, one.camera));
   }
+}
+
+// What the true shape itself would have, without the details that the stock model lacks.
+void addFloor(const EvaluationCase& one, JsonLine& line) {
+  const Truth& truth = *one.truth;
+  const MeshTopology topology(truth.mesh.triangles);
+  const Points x = inCamera(one.camera, truth.world_from_object, truth.mesh);
+  line.addNumber("contour_floor_px", contourError(truth.contour, x, topology, one.camera).mean_px);
+  line.addNumber("hull_floor_px", hullError(truth.contour, x, topology, one.camera).mean_px);
 }
 
 void addUnknown(JsonLine& line) {
   for (const char* key : {"contour_mean_px", "contour_p95_px", "contour_vertex_px", "all_vertex_px",
-                          "error3d_mean_percent", "error3d_rms_percent", "hausdorff_percent",
-                          "mask_iou"}) {
+                          "error3d_mean_percent", "error3d_rms_percent", "hausdorff_percent"}) {
     line.addNumber(key, std::optional<double>());
   }
 }
@@ -269,10 +277,11 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   if (one.truth) {
     addErrors(one, inCamera(one.camera, rough, one.cad), "_before", line);
     addErrors(one, inCamera(one.camera, result.world_from_object, result.mesh), "", line);
+    addFloor(one, line);
   } else {
     addUnknown(line);
   }
-  line.addNumber("segmentation_iou", one.segmentation_iou);
+  line.addNumber("mask_iou", one.segmentation_iou);
   line.addNumber("fit_mean_px", result.contour_mean_px);
   line.addNumber("expected3d_mean_percent", 100.0 * result.expected_error);
   line.addNumber("expected3d_rms_percent", 100.0 * result.expected_rms);
