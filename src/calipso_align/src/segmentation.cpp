@@ -300,7 +300,7 @@ std::vector<cv::Mat> Segmenter::guidedPixels() const {
 // A silhouette that does not fit what the colours say has no say. That of a fitted model is wrong about
 // a pixel as often as it was about those it was fitted to.
 void Segmenter::addShapeOdds(SegmentationLevel& level) const {
-  constexpr double kNoAgreement = 0.5, kFullAgreement = 0.8, kMostCertain = 0.99;
+  constexpr double kNoAgreement = 0.5, kFullAgreement = 0.8, kMostCertain = 0.95;
   const double scale = static_cast<double>(level.image.cols) / image_.cols;
   for (size_t k = 0; k < targets_.size(); ++k) {
     if (fitted_[k]) {
