@@ -295,7 +295,8 @@ TEST(WorldLoads, AnInsertedModelFallsOntoTheTable) {
   EXPECT_EQ(state.objects[1].look.color, insert.color);
   EXPECT_NEAR((centerOf(state, 1) - insert.translation).norm(), 0.0, 1e-9);
   for (const PlanEntry& entry : world.plan()) {
-    if (entry.object == "crate") EXPECT_NEAR(entry.mass, 700.0 * 2.0 * std::pow(0.05, 3), 1e-9);
+    if (entry.object != "crate") continue;
+    EXPECT_NEAR(entry.mass, 700.0 * 2.0 * std::pow(0.05, 3), 1e-9);
   }
   play(world, 1.5);
   state = world.state();

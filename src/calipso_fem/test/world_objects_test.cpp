@@ -199,6 +199,33 @@ TEST(WorldObjects, ACupHangsByItsHandleOnAPeg) {
   EXPECT_LT(from_peg.z(), 0.0);
 }
 
+// A support given as a mesh may be the top of an object (a bridge's deck): when that falls, nothing stays in the air.
+TEST(WorldObjects, AnObjectTakesTheSupportThatIsItsOwnTopWithIt) {
+  TriangleMesh deck;
+  deck.vertices.resize(4, 3);
+  deck.vertices << -0.2, -0.1, 1.052, 0.2, -0.1, 1.052, 0.2, 0.1, 1.052, -0.2, 0.1, 1.052;
+  deck.triangles.resize(2, 3);
+  deck.triangles << 0, 1, 2, 0, 2, 3;
+  for (const ObjectKind kind : {ObjectKind::kRigid, ObjectKind::kDeformable}) {
+    WorldScene scene = sceneWith(boxSurface({0.4, 0.2, 0.1}, 2), {0, 0, 1.0});
+    scene.support_meshes.push_back({"deck", deck});
+    scene.objects.push_back(scene.objects.front());
+    scene.objects[1].name = "load", scene.objects[1].index = 2;
+    scene.objects[1].mesh = boxSurface({0.05, 0.05, 0.05}, 1);
+    scene.objects[1].world_from_object.translation().z() = 1.08;
+    WorldParams params;
+    params.defaults.kind = kind;
+    params.objects["load"].kind = ObjectKind::kRigid;
+    World world(scene, params);
+    world.submit(letGo("thing"));
+    world.submit(letGo("load"));
+    world.advanceTo(0.0);
+    play(world, 2.0);
+    EXPECT_NE(world.plan()[0].reason.find("deck is its own surface"), std::string::npos) << world.plan()[0].reason;
+    EXPECT_LT(centerOf(world.state(), 1).z(), 0.3) << "rests on the fallen thing or beside it";
+  }
+}
+
 TEST(WorldObjects, WhatIsNoManifoldOrInsideOutFallsAndRests) {
   TriangleMesh fin = boxSurface({0.2, 0.2, 0.2}, 1);  // a third triangle on one edge
   fin.vertices.conservativeResize(fin.vertexCount() + 1, 3);

@@ -13,4 +13,13 @@ inline std::string describe(const Eigen::Vector3d& v) {
   return text.str();
 }
 
+// "3.2 mm", "1.54 m", for messages.
+inline std::string describeLength(double meters) {
+  std::ostringstream text;
+  text.precision(3);
+  if (meters < 1.0) text << 1e3 * meters << " mm";
+  else text << meters << " m";
+  return text.str();
+}
+
 }  // namespace calipso::fem

@@ -4,6 +4,7 @@
 #include "calipso_fem/world/convex_decomposition.hpp"
 #include "calipso_fem/world/region_selection.hpp"
 #include "obstacle_query.hpp"
+#include "describe.hpp"
 #include "world_impl.hpp"
 
 // How an object of the video becomes a body, and changes from one kind into another.
@@ -216,8 +217,7 @@ void World::Impl::noteOverlaps(Actor& actor, const TriangleMesh& surface) {
       if (const auto hit = queryObstacle(obstacle, surface.vertex(v), 0.0, size))
         deepest = std::max(deepest, -hit->gap);
     if (deepest > kNoted * size)
-      actor.note += "starts " + std::to_string(1e3 * deepest) + " mm inside " + obstacle.name +
-                    ", is pushed out slowly; ";
+      actor.note += "starts " + describeLength(deepest) + " inside " + obstacle.name + ", is pushed out slowly; ";
   }
 }
 
@@ -234,6 +234,7 @@ void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
   spec.asleep =
       actor.holder == Holder::kSupport && motion.linear.isZero() && motion.angular.isZero();
   actor.note = spec.mass.note.empty() ? "" : spec.mass.note + "; ";
+  leaveOwnSupports(actor);
   noteOverlaps(actor, placed(actor.object.mesh, motion.world_from_object));
   actor.body = rigid.add(spec);
   rigid.setAcceleration(*actor.body, actor.acceleration());
@@ -273,6 +274,7 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   actor.soft_from_object = motion.world_from_object;
   DeformableBody& body = actor.soft->body();
   for (const std::string& message : body.grid().messages) actor.note += message + "; ";
+  leaveOwnSupports(actor);
   noteOverlaps(actor, surface);
   const auto attached =
       verticesInBoxes(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);

@@ -52,6 +52,10 @@ struct World::Impl {
   void setPairContact(const std::string& a, const std::string& b, bool on);
   void setPairRule(const std::string& a, const std::string& b, const PairRule& rule);
   PairRule pairRule(const std::string& a, const std::string& b) const;
+  bool meet(int a, int b) const;  // ids
+  // The support meshes that are the object's own surface; nothing is to meet them once it moves.
+  std::vector<size_t> ownSupports(const Actor& actor) const;
+  void leaveOwnSupports(Actor& actor);
   // A new object takes part from now on, at its world_from_object; static until an edit touches it.
   Actor& addObject(const WorldObject& object, const ObjectSettings& settings);
   // A copy in the present state (shape, velocity, material, gravity), moved by `motion` (world).
@@ -66,6 +70,7 @@ struct World::Impl {
   void wake(Actor& actor);
 
   // Contacts and forces of a step (world_step.cpp)
+  // @param except  is left out, and what it is not to meet
   std::vector<Obstacle> obstacles(double from, double to, const Actor* except = nullptr);
   std::vector<SoftEntry> softEntries();
   void applyLoads(double at, double h);  // world_forces.cpp

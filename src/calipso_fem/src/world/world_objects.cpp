@@ -5,6 +5,27 @@
 
 // Objects and pairs of objects, changed while the world runs.
 namespace calipso::fem {
+namespace {
+
+// A support mesh is an object's own surface when most of it lies on that, facing as it does.
+constexpr double kOwnSurface = 0.02;  // of the object's diagonal: the alignment's error, and details
+constexpr double kOwnShare = 0.5;     // of the support's area
+
+// Part of the mesh's area whose triangles lie within `reach` of the surface and face the same way.
+double shareOn(const SurfaceTree& surface, const TriangleMesh& mesh, double reach) {
+  double on = 0.0, all = 0.0;
+  for (int t = 0; t < mesh.triangleCount(); ++t) {
+    const Eigen::Vector3d a = mesh.vertex(mesh.triangles(t, 0)), b = mesh.vertex(mesh.triangles(t, 1)),
+                          c = mesh.vertex(mesh.triangles(t, 2));
+    const Eigen::Vector3d across = (b - a).cross(c - a);
+    all += across.norm();
+    const auto hit = surface.nearest((a + b + c) / 3.0, reach);
+    if (hit && hit->normal.dot(across) > 0.5 * across.norm()) on += across.norm();
+  }
+  return all > 0.0 ? on / all : 0.0;
+}
+
+}  // namespace
 
 int World::Impl::idOf(const std::string& name) const {
   for (const Actor& actor : actors)
@@ -32,6 +53,30 @@ void World::Impl::setSurface(Actor& actor, const SurfaceSettings& surface) {
   actor.settings.surface = surface;
   if (actor.body) rigid.setSurface(*actor.body, surface);
   wake(actor);
+}
+
+bool World::Impl::meet(int a, int b) const {
+  const auto found = rules.find(std::minmax({a, b}));
+  return found == rules.end() || found->second.contact;
+}
+
+std::vector<size_t> World::Impl::ownSupports(const Actor& actor) const {
+  std::vector<size_t> own;
+  if (scene.support_meshes.empty()) return own;
+  const SurfaceTree surface(placed(actor.object.mesh, actor.object.world_from_object));
+  const double reach = kOwnSurface * boundingDiagonal(actor.object.mesh);
+  for (size_t k = 0; k < scene.support_meshes.size(); ++k)
+    if (shareOn(surface, scene.support_meshes[k].mesh, reach) > kOwnShare) own.push_back(k);
+  return own;
+}
+
+void World::Impl::leaveOwnSupports(Actor& actor) {
+  if (actor.inserted) return;
+  for (const size_t k : ownSupports(actor)) {
+    const std::string& support = scene.support_meshes[k].name;
+    setPairContact(support, "", false);
+    actor.note += support + " is its own surface and is left out; ";
+  }
 }
 
 PairRule World::Impl::pairRule(const std::string& a, const std::string& b) const {

@@ -10,7 +10,8 @@ PlanEntry entryOf(const Actor& actor, double time_step) {
   PlanEntry e;
   e.object = actor.object.name;
   e.kind = actor.kind;
-  e.reason = actor.reason + (actor.note.empty() ? "" : " (" + actor.note + ")");
+  const std::string note = actor.note.substr(0, actor.note.find_last_not_of("; ") + 1);
+  e.reason = actor.reason + (note.empty() ? "" : " (" + note + ")");
   e.material = actor.material;
   e.time_step = time_step;
   if (actor.soft) {

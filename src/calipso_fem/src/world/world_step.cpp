@@ -68,6 +68,9 @@ std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor
     }
     list.push_back(o);
   }
+  if (except)
+    list.erase(std::remove_if(list.begin(), list.end(), [&](const Obstacle& o) { return !meet(except->id, o.id); }),
+               list.end());
   return list;
 }
 
