@@ -10,6 +10,7 @@
 #include "calipso_render/shadow_map.hpp"
 #include "prepare_remarks.hpp"
 #include "shadow_check.hpp"
+#include "umbra.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -248,7 +249,7 @@ std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
   return all;
 }
 
-void prepareBackground(const std::vector<ClipFrame>& frames, const Background& seen, const cv::Mat& picture, const ShadowMap& sun,
+void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<View>& views, const Background& seen, const cv::Mat& picture, const ShadowMap& sun,
                        const ShadowMap& sky, const RenderParams& params, Prepared& p) {
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const bool all_move = std::find(p.moves.begin(), p.moves.end(), false) == p.moves.end();
@@ -269,7 +270,9 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const Background& s
   }
   inventBackground(shaded, frames.front(), groundNearness(params.planes, frames.front().camera, p.scenery), p.background);
   p.plate_linear = linearOf(p.background.plate);
-  p.umbra = any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
+  const std::optional<cv::Vec3f> umbra = any_moves ? umbraInViews(views, params.planes, p.background, p.light.light) : std::nullopt;
+  p.umbra = umbra     ? *umbra
+          : any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
                       : measureUmbra(picture, p.background.plate, visibility, sky_visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));
 }
 
@@ -323,7 +326,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.fronts = frontsOf(actors, p);
   p.footprints = footprintsOf(actors, p);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
-  prepareBackground(frames, seen, picture, sun, sky, params, p);
+  prepareBackground(frames, views, seen, picture, sun, sky, params, p);
   p.background_ms += watch.lap();
   p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   p.appearance_ms += watch.lap();

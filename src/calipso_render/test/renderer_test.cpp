@@ -9,6 +9,7 @@
 
 #include "plane_view.hpp"
 #include "render_test_scene.hpp"
+#include "umbra.hpp"
 
 namespace calipso::render {
 namespace {
@@ -145,6 +146,37 @@ TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
   cv::Mat left_over;
   cv::bitwise_and(ball != 0, out.provenance(missed) == kOriginal, left_over);
   EXPECT_EQ(cv::countNonZero(left_over), 0);
+}
+
+// The same for an object that moves: from the places that it shades in the views, against what was seen of the place.
+TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
+  const cv::Vec3f umbra(0.6f, 0.5f, 0.45f);
+  const Surface surface = makeSurface(ballAt({0.0, 0.1, kBallRadius}));
+  Background plate;
+  emptyTable().convertTo(plate.plate, CV_32F);
+  plate.count = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(9)), plate.spread = cv::Mat::zeros(kHeight, kWidth, CV_32F);
+  std::vector<View> views;
+  for (const float x : {-0.1f, 0.15f}) {
+    Points vertices = surface.key_vertices;
+    for (Eigen::Vector3f& p : vertices) p.x() += x;
+    views.push_back({plate.plate.clone(), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera(), {makeActor(surface, vertices, camera())}});
+    const std::vector<Occluder> occluder = {{&views.back().actors[0].vertices, &surface.triangles}};
+    const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}), sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const auto r = receiverAt(table(), camera(), u, v);
+        if (!r) continue;
+        const float part = sun.visibility(r->position, r->normal), open = sky.visibility(r->position, r->normal);
+        cv::Vec3f& code = views.back().picture.at<cv::Vec3f>(v, u);
+        for (int c = 0; c < 3; ++c) code[c] = codeFromLinear(linearFromRealCode(code[c]) * (umbra[c] * open + (1.0f - umbra[c]) * part));
+      }
+    }
+  }
+  const auto found = umbraInViews(views, table(), plate, sunlight());
+  ASSERT_TRUE(found);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR((*found)[c], umbra[c], 0.03f) << c;  // the maps have other resolutions
+  for (View& view : views) plate.plate.copyTo(view.picture);
+  EXPECT_FALSE(umbraInViews(views, table(), plate, sunlight()));  // no shadow where one is predicted
 }
 
 // Near the ball the shadow is darker than the sun's absence makes it: the ball hides sky, too.
