@@ -31,6 +31,61 @@ TEST(WorldMotion, FallingRigidBodyFollowsTheParabola) {
               0.0, 1e-6);
 }
 
+// A box that the video shows falling onto the ground and springing off aside, by 30 frames: where no simulation would
+// send it. Thrown on as it was, it does the same; changed in any way, it is simulated.
+class ObservedBounce : public ::testing::Test {
+ protected:
+  static constexpr int kImpact = 15;
+  static ObservedMotion at(int k) {
+    const double t = k / 30.0, impact = kImpact / 30.0, after = t - impact;
+    const double start = 0.05 + 0.5 * kG * impact * impact;
+    ObservedMotion m;
+    m.time = t;
+    m.moving = true;
+    m.acceleration = {0, 0, -kG};
+    m.linear = {0, 0, -kG * t};
+    m.centroid = {0, 0, start - 0.5 * kG * t * t};
+    if (k >= kImpact) {
+      m.linear = {0.7, -0.2, 1.5 - kG * after};
+      m.centroid = {0.7 * after, -0.2 * after, 0.05 + 1.5 * after - 0.5 * kG * after * after};
+      m.angular = {2, 1, 0};
+    }
+    m.world_from_object.translation() = m.centroid;
+    const Eigen::Vector3d angle = k < kImpact ? Eigen::Vector3d::Zero() : Eigen::Vector3d(after * m.angular);
+    if (!angle.isZero()) m.world_from_object.linear() = Eigen::AngleAxisd(angle.norm(), angle.normalized()).toRotationMatrix();
+    return m;
+  }
+  // Distance from the video's place after 24 frames, `edits` being made at the start.
+  static double missAfter(const std::vector<Edit>& edits, int samples = 30) {
+    World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 1), at(0).centroid, true), {});
+    for (int k = 0; k < samples; ++k) world.addObservedMotion("thing", at(k));
+    for (const Edit& edit : edits) world.submit(edit);
+    world.advanceTo(0.0);
+    play(world, 24 / 30.0);
+    return (world.state().objects[0].world_from_object.translation() - at(24).centroid).norm();
+  }
+};
+
+TEST_F(ObservedBounce, whatGoesOnAsItWasBouncesAsItDid) {
+  EXPECT_LT(missAfter({editOf(EditKind::kVelocity, EditMode::kEstimated)}), 2e-3);
+}
+
+TEST_F(ObservedBounce, whatIsEditedIsSimulated) {
+  const Edit goes_on = editOf(EditKind::kVelocity, EditMode::kEstimated);
+  Edit faster = goes_on, lighter = editOf(EditKind::kMaterial, EditMode::kFactor);
+  faster.factor = 1.3;
+  lighter.density = 0.5;
+  EXPECT_GT(missAfter({faster}), 0.05);
+  EXPECT_GT(missAfter({goes_on, lighter}), 0.05);
+  EXPECT_GT(missAfter({lighter, goes_on}), 0.05);
+}
+
+TEST_F(ObservedBounce, theUnseenIsSimulated) {
+  const double miss = missAfter({editOf(EditKind::kVelocity, EditMode::kEstimated)}, kImpact - 2);
+  EXPECT_GT(miss, 0.05);  // it bounces as boxes do ...
+  EXPECT_LT(miss, 0.6);   // ... instead of staying where it was seen last
+}
+
 TEST(WorldMotion, DeformableFlightIsExactToo) {
   WorldParams params;
   params.defaults.kind = ObjectKind::kDeformable;

@@ -65,6 +65,8 @@ struct Actor {
   std::optional<ObjectKind> forced_kind;
   std::string reason = "no edit touches it";
   bool edited = false, removed = false;
+  bool altered = false;    // by an edit that does more than to let it go on, or of its look
+  bool continues = false;  // as in the video, with the velocity it has there, and nothing else is edited
   bool inserted = false;  // not in the video
   std::string source;     // of a copy: the object of the video whose model it is drawn by
   Holder holder = Holder::kUnknown;

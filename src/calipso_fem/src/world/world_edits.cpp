@@ -79,6 +79,14 @@ void World::Impl::touch(Actor& actor, const Edit& edit) {
 }
 
 std::string World::Impl::apply(const Edit& edit) {
+  std::vector<bool> fresh;
+  for (const Actor& actor : actors) fresh.push_back(actor.kind == ObjectKind::kStatic);
+  const std::string done = carryOut(edit);
+  noteWhatContinues(edit, fresh);
+  return done;
+}
+
+std::string World::Impl::carryOut(const Edit& edit) {
   validate(edit, names());
   if (!edit.after.empty())
     throw std::invalid_argument("collision " + std::to_string(edit.collision) + " of " + edit.after +

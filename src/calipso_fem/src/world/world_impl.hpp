@@ -25,6 +25,18 @@ struct World::Impl {
 
   // Clock (world.cpp)
   void stepFrame(double h);
+
+  // Contacts that the video has seen (observed_contact.cpp)
+  struct Continued {
+    int id;
+    BodyMotion motion;
+    Eigen::Vector3d center;  // of mass, m
+  };
+  void noteWhatContinues(const Edit& edit, const std::vector<bool>& fresh);
+  bool agreesWithVideo(const Actor& actor) const;
+  std::vector<Continued> continued() const;
+  bool touchesInStep(Actor& actor) const;
+  void actAsObserved(const std::vector<Continued>& list, double from);
   void substep(double from, double span);
   void rememberFirstTouches();
   void noteTouch(const TouchEvent& touch);  // unless the pair has been noted in this frame
@@ -88,6 +100,7 @@ struct World::Impl {
   void enqueue(const Edit& edit);
   void releaseWaiting();
   std::string apply(const Edit& edit);
+  std::string carryOut(const Edit& edit);
   std::string applyToScene(const Edit& edit);
   std::string transform(Actor& actor, const Edit& edit);
   std::string pull(Actor& actor, const Edit& edit);

@@ -101,10 +101,13 @@ void World::Impl::stepFrame(double h) {
                                 [](const Actor& a) { return a.soft && !a.removed && !a.asleep; });
   const int parts = soft ? substepsPerFrame() : 1;
   for (Actor& actor : actors) actor.soft_ms = 0.0;
+  const std::vector<Continued> continuing = continued();
+  const double from = now;
   for (int k = 0; k < parts; ++k) {
     substep(now, h / parts);
     now += h / parts;
   }
+  actAsObserved(continuing, from);
   updateSleep();
 }
 
