@@ -1,12 +1,23 @@
 #include "frame_compositor.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "calipso_render/colour.hpp"
 
 namespace calipso::render {
 namespace {
+
+// Squared distance of a pixel's samples from its centre, in eighths of a pixel.
+constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
+  std::array<int, EdgeCoverage::kSamples> squared{};
+  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
+    const int x = 2 * (i % EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid, y = 2 * (i / EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid;
+    squared[i] = x * x + y * y;
+  }
+  return squared;
+}();
 
 constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
 
@@ -84,11 +95,11 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
   for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
     if (done[i] || !isDrawn(edge->ids[i], u, v)) continue;
     int count = 0, middle = i;
+    const int object = VisibilityBuffer::objectOf(edge->ids[i]);
     for (int j = i; j < EdgeCoverage::kSamples; ++j) {
-      const bool drawn_too = edge->ids[j] != VisibilityBuffer::kNothing;
-      if (!drawn_too || VisibilityBuffer::objectOf(edge->ids[j]) != VisibilityBuffer::objectOf(edge->ids[i])) continue;
+      if (edge->ids[j] == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(edge->ids[j]) != object) continue;
       done[j] = true, ++count;
-      if (EdgeCoverage::offset(j).squaredNorm() < EdgeCoverage::offset(middle).squaredNorm()) middle = j;
+      if (kFromCentre[j] < kFromCentre[middle]) middle = j;
     }
     const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(middle);
     const float part = static_cast<float>(count) / EdgeCoverage::kSamples;

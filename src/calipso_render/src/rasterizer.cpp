@@ -142,23 +142,30 @@ VisibilityBuffer::VisibilityBuffer(const cv::Rect& region)
 
 void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
   const int count = static_cast<int>(mesh.triangles->size());
-  std::vector<Span> spans(count);
+  std::vector<Span> parts[kBands];  // of the triangles, in their order
 #pragma omp parallel for schedule(static)
-  for (int t = 0; t < count; ++t) {
-    if (makeSpan(mesh, t, region_, spans[t])) spans[t].id = (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t);
-    else spans[t].row_max = -1;
+  for (int part = 0; part < kBands; ++part) {
+    const int begin = static_cast<int>(static_cast<long>(count) * part / kBands), end = static_cast<int>(static_cast<long>(count) * (part + 1) / kBands);
+    Span span;
+    for (int t = begin; t < end; ++t) {
+      if (!makeSpan(mesh, t, region_, span)) continue;
+      span.id = (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t);
+      if (parts[part].capacity() == 0) parts[part].reserve(end - t);
+      parts[part].push_back(span);
+    }
   }
-  spans.erase(std::remove_if(spans.begin(), spans.end(), [](const Span& s) { return s.row_max < 0; }), spans.end());
 #pragma omp parallel for schedule(static)
   for (int band = 0; band < kBands; ++band) {
     const int first = region_.height * band / kBands;
     const int last = region_.height * (band + 1) / kBands - 1;
-    for (const Span& s : spans) {
-      for (int row = std::max(first, s.row_min); row <= std::min(last, s.row_max); ++row) {
-        int from, to;
-        rowLimits(s, static_cast<float>(row), from, to);
-        const std::size_t start = static_cast<std::size_t>(row) * region_.width;
-        if (from <= to) fillRow(s, row, from, to, &ids_[start], &near_[start]);
+    for (const std::vector<Span>& part : parts) {
+      for (const Span& s : part) {
+        for (int row = std::max(first, s.row_min); row <= std::min(last, s.row_max); ++row) {
+          int from, to;
+          rowLimits(s, static_cast<float>(row), from, to);
+          const std::size_t start = static_cast<std::size_t>(row) * region_.width;
+          if (from <= to) fillRow(s, row, from, to, &ids_[start], &near_[start]);
+        }
       }
     }
   }
