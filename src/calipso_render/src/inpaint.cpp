@@ -59,15 +59,15 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   if (!banned.empty()) source.setTo(0, banned(window));
   const cv::Mat whole_hole = to_fill.clone();
   const LineBridges bridges = bridgeLines(to_fill, source, look);
-  to_fill.setTo(0, bridges.drawn);
-  const cv::Mat known = source | bridges.drawn;
+  to_fill.setTo(0, bridges.core);
+  const cv::Mat known = source | bridges.core;
   source.setTo(0, bridges.lines);
   cv::Mat filled = smoothFill(look, to_fill, known), origin = patchOrigins(look, to_fill, source, within(window, params));
   const cv::Mat copied = copyFrom(origin, look, filled);
   result.patches_found = cv::countNonZero(copied) > 0;
   if (result.patches_found) blendSeams(to_fill, known, origin, filled);
-  bridges.origin.copyTo(origin, bridges.drawn);
-  cv::Mat(origin + cv::Scalar(window.x, window.y)).copyTo(result.origin(window), copied | bridges.drawn);
+  bridges.origin.copyTo(origin, bridges.core);
+  cv::Mat(origin + cv::Scalar(window.x, window.y)).copyTo(result.origin(window), copied | bridges.core);
   filled.copyTo(result.image(window), whole_hole);
   return result;
 }

@@ -28,6 +28,7 @@ constexpr float kAlike = 0.4f;         // difference of colours across, to their
 constexpr float kBesideAlike = 0.5f;   // the same of what is beside it
 constexpr float kInHole = 0.7f;        // part of a connection that the hole hides
 constexpr float kLongest = 40.0f;      // px of a line that are mirrored
+constexpr float kNear = 2.5f;          // px on either side that its colours reach
 constexpr float kCore = 1.5f;          // px on either side that are the line itself
 constexpr float kSame = 0.2f;         // change of colours along a line, to their contrast, from which it is another
 constexpr float kCrossFade = 4.0f;     // px on either side of the middle
@@ -57,6 +58,7 @@ class Bridger {
   Bridger(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image) : hole_(hole), source_(source), image_(image) {
     cv::distanceTransform(hole == 0, away_, cv::DIST_L2, 3);
     result_.drawn = cv::Mat::zeros(hole.size(), CV_8U);
+    result_.core = cv::Mat::zeros(hole.size(), CV_8U);
     result_.lines = cv::Mat::zeros(hole.size(), CV_8U);
     result_.origin = cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   }
@@ -287,6 +289,7 @@ class Bridger {
     }
     image_.at<cv::Vec3f>(at) = colour;
     result_.drawn.at<std::uint8_t>(at) = 255;
+    if (std::abs(s) <= kNear) result_.core.at<std::uint8_t>(at) = 255;
     result_.origin.at<cv::Vec2s>(at) = cv::Vec2s(cv::saturate_cast<short>(origin.x), cv::saturate_cast<short>(origin.y));
   }
 

@@ -6,6 +6,7 @@ namespace calipso::render {
 
 struct LineBridges {
   cv::Mat drawn;   // CV_8UC1: 255 where a pixel of the hole was drawn
+  cv::Mat core;    // CV_8UC1: the part of it that is the line; what is beside it is better filled like everything else
   cv::Mat origin;  // CV_16SC2: where it was copied from; (-1, -1) elsewhere
   cv::Mat lines;   // CV_8UC1: 255 where those lines are seen; now that they are whole, nothing else should look like them
 };
