@@ -11,7 +11,9 @@ COLUMNS = [
     ("plate_psnr_seen_db", "plate, seen, dB"), ("plate_psnr_invented_db", "plate, invented, dB"),
     ("gradient_ratio", "gradient ratio"), ("flicker_ratio", "flicker ratio"),
     ("light_error_deg", "light, deg"), ("albedo_error_percent", "albedo, %"),
-    ("roughness_error_percent", "roughness, %"), ("undeformed_psnr_db", "unmoved, dB"),
+    ("roughness_error_percent", "roughness, %"), ("roughness_observed", "a highlight tells the roughness"),
+    ("roughness_range", "roughnesses it leaves, highest / lowest"), ("second_order_ambient", "ambient light of second order"),
+    ("undeformed_psnr_db", "unmoved, dB"),
     ("seam_psnr_db", "unmoved seam, dB"), ("undeformed_drawn_psnr_db", "unmoved, all drawn, dB"),
     ("seam_drawn_psnr_db", "seam, all drawn, dB"), ("moved_psnr_db", "moved, dB"),
     ("moved_from_clip_psnr_db", "moved, texture from the clip, dB"),
@@ -26,7 +28,7 @@ HEADER = """# Appearance
 Written by `src/calipso_render/bench/run.sh`. The true shape, pose and masks stand in for alignment and
 segmentation. "moved": later frames drawn again from the key frame's appearance with the true motion; the worst
 frame counts; "texture from the clip": further frames add what the key frame does not show, and frames between those are
-judged. "all drawn": no pixel of the frame is kept, what drawing misses goes along as a residual. "live" and "final": every object lifted, so that all of
+judged. 1: yes, 0: no. "all drawn": no pixel of the frame is kept, what drawing misses goes along as a residual. "live" and "final": every object lifted, so that all of
 it is drawn, shaded and replaced. Times of this table are wall times of the machine while it ran, best of five.
 
 """
