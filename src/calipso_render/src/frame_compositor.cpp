@@ -19,6 +19,7 @@ constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
   return squared;
 }();
 
+constexpr float kSameSheet = 0.015f;    // of the nearness: samples that differ by more see another part of an object
 constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
 
 cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
@@ -90,14 +91,15 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
     if (isDrawn(id, u, v)) drawn = {shadeSurface(id, u, v), 1.0f - screenAt(u, v)};
     return drawn;
   }
-  // One shaded point for each object in the pixel: the sample nearest to the pixel's centre.
+  // One shaded point for each sheet of each object in the pixel: the sample nearest to the pixel's centre.
   std::array<bool, EdgeCoverage::kSamples> done{};
   for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
     if (done[i] || !isDrawn(edge->ids[i], u, v)) continue;
     int count = 0, middle = i;
     const int object = VisibilityBuffer::objectOf(edge->ids[i]);
     for (int j = i; j < EdgeCoverage::kSamples; ++j) {
-      if (edge->ids[j] == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(edge->ids[j]) != object) continue;
+      if (done[j] || edge->ids[j] == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(edge->ids[j]) != object) continue;
+      if (std::abs(edge->nearness[j] - edge->nearness[i]) > kSameSheet * edge->nearness[i]) continue;
       done[j] = true, ++count;
       if (kFromCentre[j] < kFromCentre[middle]) middle = j;
     }
