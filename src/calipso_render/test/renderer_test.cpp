@@ -222,6 +222,53 @@ TEST(Renderer, AMovedShadowTakesItsWholeEdgeAlong) {
   EXPECT_LT(cv::countNonZero(kept), cv::countNonZero(edge) / 50);
 }
 
+// Water, or a light that was told wrongly: where the ball casts none in the video, it casts none when it is moved.
+TEST(Renderer, CastsShadowsOnlyWhereTheVideoShowsThem) {
+  const ObjectModel ball = ballAt(kCentre);
+  const Surface surface = makeSurface(ball);
+  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}}, sunlight().direction.cast<double>(), {512, 0.025, 16});
+  for (const bool shadow : {true, false}) {
+    ClipFrame key = frameWithBall(ball);
+    cv::RNG random(5);
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        if (key.labels.at<std::uint8_t>(v, u) != 0) continue;
+        const auto r = receiverAt(table(), key.camera, u, v);
+        const float light = shadow && r ? 0.4f + 0.6f * sun.visibility(r->position, r->normal) : 1.0f;
+        key.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(quantise(codeFromLinear(0.4f * light) + static_cast<float>(random.uniform(-3, 4))));
+      }
+    }
+    ClipSample clip;
+    clip.add(key);
+    const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball}, params()));
+    const bool remarked = std::any_of(prepared->remarks.begin(), prepared->remarks.end(),
+                                      [](const std::string& r) { return r.find("not seen in the picture") != std::string::npos; });
+    EXPECT_EQ(remarked, !shadow);
+    FrameInput in;
+    in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera;
+    ObjectInFrame moved;
+    moved.name = "ball", moved.edited = true, moved.vertices = prepared->surfaces[0].key_vertices;
+    for (Eigen::Vector3f& x : moved.vertices) x.x() -= 0.3f;
+    in.objects = {moved};
+    const FrameOutput out = Renderer(prepared, params()).composite(in);
+    const Actor now = makeActor(prepared->surfaces[0], moved.vertices, key.camera);
+    const ShadowMap cast({{&now.vertices, &now.surface->triangles}}, prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+    int dark = 0, all = 0;
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const auto r = receiverAt(table(), key.camera, u, v);
+        if (!r || cast.visibility(r->position, r->normal) > 0.1f || out.provenance.at<std::uint8_t>(v, u) == kInvented) continue;
+        const cv::Vec3b c = out.bgr.at<cv::Vec3b>(v, u);
+        if (std::abs(c[0] - c[2]) > 12) continue;  // the ball itself
+        ++all, dark += c[1] < 140;                  // the table has 168
+      }
+    }
+    ASSERT_GT(all, 50);
+    if (shadow) EXPECT_GT(dark, all / 2);
+    else EXPECT_LT(dark, all / 20);
+  }
+}
+
 TEST(Renderer, SameInputGivesSameBytes) {
   RenderParams p = params();
   p.add_noise = true;
