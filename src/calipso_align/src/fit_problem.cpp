@@ -126,6 +126,7 @@ void markSpurs(FitProblem& problem) {
   cv::Mat1b inside;
   cv::copyMakeBorder(problem.inside, inside, radius, radius, radius, radius, cv::BORDER_REPLICATE);
   const cv::Mat1b spurs = inside & ~opened(inside, radius);
+  problem.foreign = spurs(cv::Rect(radius, radius, problem.inside.cols, problem.inside.rows)).clone();
   for (TargetPoint& p : problem.target.points) {
     const Eigen::Vector2d within = p.pixel - kInsidePx * p.normal;
     const cv::Point at(static_cast<int>(std::lround(within.x())) + radius,
@@ -187,6 +188,7 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
                      MeshTopology(cad.triangles),
                      camera,
                      targetOf(contour),
+                     {},
                      {},
                      {},
                      makeSupportTargets(options.planes, camera),

@@ -104,6 +104,9 @@ PlacementPrior::PlacementPrior(const Eigen::Vector3d& placed, const Eigen::Vecto
   bound_ = across > kBroken * kPlacementError
                ? std::sqrt(2.0) * across
                : std::max(kPlacementError, std::hypot(across, kLeastAlong * kPlacementError));
+  // Measured further away: it is about where it was found.
+  const double off = (found - placed).norm() / found.norm();
+  if (off > bound_) bound_ = off + kLeastAlong * kPlacementError;
 }
 
 double PlacementPrior::density(const Eigen::Vector3d& centroid) const {

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "calipso_align/surface_distance.hpp"
@@ -80,6 +81,10 @@ ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
     sum += weight;
     maps.push_back(here);
     maps.back().setParameters(here.plus(step));
+  }
+  if (maps.empty()) {   // nothing agrees with what is known besides: it may be anywhere
+    const double anywhere = std::numeric_limits<double>::infinity();
+    return {{{anywhere, anywhere}}, {1.0}};
   }
   // Consecutive points are of different draws: each draw is seen all over the surface.
   const int count = static_cast<int>(maps.size());

@@ -86,9 +86,11 @@ cv::Mat1b filledSilhouette(const FitProblem& problem, const DepthRendering& rend
   return mask;
 }
 
-// Area of the contour that the model leaves open by more than the tolerance, as part of its area.
+// Area of the contour that the model leaves open by more than the tolerance, as part of its area. Details
+// that it has not are no part of it.
 double openPart(const FitProblem& problem, const DepthRendering& rendering, double tolerance_px) {
-  const cv::Mat1b& inside = problem.inside;
+  cv::Mat1b inside = problem.inside;
+  if (!problem.foreign.empty()) inside = inside & ~problem.foreign;
   cv::Mat1f distance;
   cv::distanceTransform(filledSilhouette(problem, rendering) == 0, distance, cv::DIST_L2,
                         cv::DIST_MASK_3);

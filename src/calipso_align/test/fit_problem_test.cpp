@@ -103,6 +103,7 @@ TEST(FitProblem, ASpurNarrowerThanTheModelIsNotItsOwn) {
       EXPECT_FALSE(p.foreign);
     }
   }
+  EXPECT_LT(assess(problem, problem.X).open, 0.005);   // nor does it count as left open
 }
 
 TEST(FitProblem, ContourOnASupportPlaneIsUnknown) {

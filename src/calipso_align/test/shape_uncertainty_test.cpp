@@ -56,6 +56,11 @@ TEST(ShapeUncertainty, LeavesOutWhatIsImpossible) {
   EXPECT_GT(error.beyond({0.1 * kMost / kDiagonal, 1.0}), 0.5);
 }
 
+TEST(ShapeUncertainty, WhatContradictsEverythingMayBeAnywhere) {
+  const auto nothing = [](const LowOrderMap::Parameters&) { return 0.0; };
+  EXPECT_EQ(ofSphere(0.1, nothing).beyond({0.04, 0.06}), 1.0);
+}
+
 TEST(ShapeUncertainty, CountsWhatIsLikely) {
   // Shifts beyond 0.1 m, a third of all, are made a hundred times as likely.
   const auto far = [](const LowOrderMap::Parameters& step) {
@@ -92,6 +97,8 @@ TEST(PlacementPrior, WhatIsOffAcrossLeavesLessAlong) {
   EXPECT_GT(along(0.04, 0.025), 0.0);
   EXPECT_GT(along(0.08, 0.06), 0.0);    // across, the bound was not kept
   EXPECT_GT(along(0.0, 0.01), along(0.0, 0.04));
+  // Measured at more than the bound away: there it may be.
+  EXPECT_GT(PlacementPrior({0.0, 0.0, 2.0}, {0.0, 0.0, 2.2}).density({0.0, 0.0, 2.2}), 0.0);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ struct FitProblem {
   Camera camera;
   ContourTarget target;
   cv::Mat1b inside;         // 255 within the contour, whole picture
+  cv::Mat1b foreign;        // 255 in spurs of it that no part of the model can be; or empty
   DepthTarget depth;        // empty: none
   std::vector<SupportTarget> supports;
   double extent_px = 0.0;   // diagonal of the contour's bounding box
