@@ -20,7 +20,6 @@ constexpr int kSkyMapSide = 128;       // the same for the sky, which is soft
 constexpr int kSkySteps = 160;         // places along the picture's width where the sky is measured
 constexpr float kEvenLight = 0.06f;    // of the light: between corners that differ by no more it is interpolated
 constexpr float kSmoothLight = 0.015f; // likewise where the light in their middle is their mean but for this
-constexpr float kBounced = 0.15f;      // of the sky's light that a plane gets from what is around, where no sky is seen at all
 constexpr int kShadowBoundsMargin = 8;     // px
 constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
 
@@ -109,7 +108,7 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
     for (int i = 0; i < grid.cols; ++i) {
       const int u = (first.x + i) * step, v = (first.y + j) * step;
       const bool skipped = !skip.empty() && region.contains({u, v}) && skip.at<std::uint8_t>(v - region.y, u - region.x) != 0;
-      if (!skipped && plane_view_.at(u, v, r)) grid.at<float>(j, i) = kBounced + (1.0f - kBounced) * shadow.visibility(r.position, r.normal);
+      if (!skipped && plane_view_.at(u, v, r)) grid.at<float>(j, i) = skyLight(shadow.visibility(r.position, r.normal));
     }
   }
   cv::Mat sky(region.size(), CV_32F);

@@ -78,7 +78,7 @@ cv::Vec3f measureUmbra(const cv::Mat& picture, const cv::Mat& plate, const cv::M
     for (int v = 0; v < picture.rows; ++v) {
       for (int u = 0; u < picture.cols; ++u) {
         if (sun.at<float>(v, u) > 0.15f || sky.at<float>(v, u) < kOpenSky || labels.at<std::uint8_t>(v, u) != 0) continue;
-        const float lit = linearFromRealCode(plate.at<cv::Vec3f>(v, u)[c]) * sky.at<float>(v, u);
+        const float lit = linearFromRealCode(plate.at<cv::Vec3f>(v, u)[c]) * skyLight(sky.at<float>(v, u));
         if (lit > 0.01f) ratios.push_back(linearFromRealCode(picture.at<cv::Vec3f>(v, u)[c]) / lit);
       }
     }
