@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "../src/world/manifold_reduction.hpp"
 #include "calipso_fem/world/rigid_world.hpp"
 #include "world_fixtures.hpp"
 
@@ -51,6 +53,33 @@ TEST(RigidWorld, BlockSticksBelowAndSlidesAboveTheFrictionAngle) {
 }
 
 // Whichever way it slides, over its edges or over a corner.
+// A ring of points as sixteen parts would give, two of them deeper and one far: the ring's outline stays.
+TEST(ManifoldReduction, KeepsTheDeepestAndTheOutline) {
+  std::vector<btManifoldPoint> points(64);
+  std::vector<btManifoldPoint*> contacts;
+  for (int k = 0; k < 64; ++k) {
+    const double angle = 2.0 * M_PI * k / 64, radius = k % 2 ? 0.9 : 1.0;
+    points[k].m_normalWorldOnB = btVector3(0, 0, 1);
+    points[k].m_positionWorldOnB = btVector3(radius * std::cos(angle), radius * std::sin(angle), 0);
+    points[k].m_distance1 = k == 5 ? -0.01 : 0.0;
+    contacts.push_back(&points[k]);
+  }
+  const auto redundant = redundantContacts(contacts);
+  EXPECT_GE(redundant.size(), 64u - 9u);
+  EXPECT_EQ(std::count(redundant.begin(), redundant.end(), &points[5]), 0);
+  for (int direction = 0; direction < 8; ++direction) {
+    const double angle = 2.0 * M_PI * direction / 8;
+    double furthest = 0.0;
+    for (const btManifoldPoint* p : contacts)
+      if (std::count(redundant.begin(), redundant.end(), p) == 0)
+        furthest = std::max(furthest, std::cos(angle) * p->m_positionWorldOnB.x() +
+                                          std::sin(angle) * p->m_positionWorldOnB.y());
+    EXPECT_GT(furthest, 0.9);
+  }
+  contacts.resize(8);
+  EXPECT_TRUE(redundantContacts(contacts).empty());
+}
+
 TEST(RigidWorld, FrictionIsTheSameInAllDirections) {
   const double v = 2.0, expected = v * v / (2.0 * kFriction * kG);
   for (const double direction : {0.0, 0.4, M_PI / 4}) {

@@ -183,6 +183,33 @@ TEST(Contact, OverlapAtTheStartIsUndoneGently) {
   EXPECT_LT(deepest, 2e-3);
 }
 
+// E I / L^2 of the light one carries three times the load that lies on it.
+TEST(Contact, HeavyOnLightStandsAndConverges) {
+  SoftScene scene;
+  scene.surface.friction = 0.5;
+  scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
+  SoftObject& light = scene.addSoft(cube(0.2, 3, {0, 0, 0.101}), {1e6, 0.3, 10.0, 0.02}, 0.2 / 3);
+  scene.addRigid(cube(0.2, 3, {0, 0, 0}), 1e4, Eigen::Isometry3d(Eigen::Translation3d(0, 0, 0.303)));
+  for (int k = 0; k < 60; ++k) scene.step(1.0 / 60.0);
+  EXPECT_TRUE(scene.report().converged);
+  // 785 N on 1e6 Pa and 0.04 m^2: 2 %, less at the corners.
+  const double height = light.vertices().col(2).maxCoeff() - light.vertices().col(2).minCoeff();
+  EXPECT_NEAR(height, 0.2 * (1.0 - 80.0 * kG / 4e4), 0.02 * 0.2);
+}
+
+// Each is solved by itself; beside another that it cannot meet it moves as if alone, to the last bit.
+TEST(Contact, BodiesThatCannotMeetDoNotDisturbEachOther) {
+  const auto run = [](bool together) {
+    SoftScene scene;
+    scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
+    SoftObject& a = scene.addSoft(cube(0.2, 2, {0, 0, 0.11}), kSoft, 0.1);
+    if (together) scene.addSoft(cube(0.2, 2, {1.0, 0, 0.3}), kSoft, 0.1);
+    for (int k = 0; k < 12; ++k) scene.step(1.0 / 30.0);
+    return Vec(a.body().positions());
+  };
+  EXPECT_EQ((run(true) - run(false)).cwiseAbs().maxCoeff(), 0.0);
+}
+
 TEST(Contact, ExcludingAPairThatNeverTouchesChangesNothing) {
   const auto run = [](bool excluded) {
     SoftScene scene;

@@ -70,8 +70,9 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
     ++report.iterations;
     report.residual = largest > 0.0 ? largest_change / largest : 0.0;
     if (report.iterations == 1 && velocity_tolerance > 0.0) first = fastest;
-    report.converged = report.residual <= tolerance || fastest <= velocity_tolerance ||
-                       fastest <= kReduction * first;
+    // Where a heavy body rests on a light one, impulses that hardly change move the light one a lot.
+    report.converged = velocity_tolerance > 0.0 ? fastest <= std::max(velocity_tolerance, kReduction * first)
+                                                : report.residual <= tolerance;
   }
   return report;
 }

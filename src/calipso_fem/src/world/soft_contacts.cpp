@@ -175,8 +175,8 @@ int SoftContacts::solve(const ContactOperator& problem, const StepMotion& motion
     velocity[0] += (c.start_gap + c.slack - c.offset + allowance(c, h)) / h;
     rows.push_back(rowOf(c, frame, velocity, h));
   }
-  const int sweeps = solveContacts(problem.W(), rows, params_.iterations, params_.tolerance,
-                                   0.5 * params_.allowed_depth / h)
+  const int sweeps = solveContacts(problem.W(), rows, params_.iterations, 0.0,
+                                   params_.tolerance * params_.allowed_depth / h)
                          .iterations;
   size_t i = 0;
   for (auto& [key, c] : contacts)

@@ -40,8 +40,8 @@ struct SoftEntry {
 
 struct ContactParams {
   double proximity = 5e-3;  // m, surfaces closer than this are watched
-  int iterations = 60;      // Gauss-Seidel sweeps per solve
-  double tolerance = 1e-4;  // relative change of the impulses that ends the sweeps
+  int iterations = 120;     // Gauss-Seidel sweeps per solve
+  double tolerance = 0.5;   // of allowed_depth: sweeps that change the ways of the surfaces by less are the last
   int newton_iterations = 30;
   double allowed_depth = 1e-5;  // m, remaining violation that ends a step's iteration,
   double residual = 1e-3;       // with this of bodies in contact, over their forces

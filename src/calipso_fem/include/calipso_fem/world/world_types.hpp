@@ -103,7 +103,7 @@ struct WorldParams {
   FemOptions fem;                    // cell_size and target_nodes are chosen per object
   double proximity = 0.0;  // m, minimal distance of surfaces; 0: a fiftieth of the smallest object
   int contact_iterations = 60;      // block Gauss-Seidel sweeps per solve
-  double contact_tolerance = 1e-4;  // relative change of the impulses at which sweeping stops
+  double contact_tolerance = 0.5;  // of the depth a step may end with: sweeps that change less are the last
   SurfaceSettings support;          // of planes and support meshes
   ObjectSettings defaults;
   std::map<std::string, ObjectSettings> objects;  // by object name; replaces the defaults
