@@ -234,6 +234,13 @@ void MotionState::addScaleUncertainty(double relative) {
   covariance.block<3, 3>(kA, kA) += variance * acceleration * acceleration.transpose();
 }
 
+void MotionState::addTwistCovariance(const Matrix6d& twist) {
+  covariance.block<3, 3>(kV, kV) += twist.topLeftCorner<3, 3>();
+  covariance.block<3, 3>(kV, kW) += twist.topRightCorner<3, 3>();
+  covariance.block<3, 3>(kW, kV) += twist.bottomLeftCorner<3, 3>();
+  covariance.block<3, 3>(kW, kW) += twist.bottomRightCorner<3, 3>();
+}
+
 MotionState initialState(double time, const MotionPiece& piece, const MotionPrior& prior,
                          const PoseMeasurement& first) {
   MotionState state;

@@ -50,7 +50,7 @@ std::vector<PoseMeasurement> measurementsOf(const std::vector<Observation>& obse
   for (const Observation& observation : observations) {
     measurements.push_back({observation.time, observation.world_from_object * centroid,
                             observation.world_from_object.linear(), observation.covariance,
-                            observation.found});
+                            observation.found, observation.common});
   }
   return measurements;
 }

@@ -215,6 +215,7 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   if (!observation.found) return pose;
   for (size_t i = 0; i < found.size(); ++i) observation.tracks[i].inlier = fit.inlier[i];
   observation.covariance = fit.covariance;
+  observation.common = fit.common;
   observation.deviation = fit.deviation;
   return fit.world_from_object;
 }

@@ -88,17 +88,19 @@ void judge(const Linearisation& lin, const PoseFitParams& params, PoseFit& fit) 
   const std::vector<double> all = lengths(lin);
   fit.deviation = robustDeviation(all);
   const double limit = params.inlier_sigma * std::max(1.0, fit.deviation);
-  Matrix6d information = Matrix6d::Zero();
+  Matrix6d information = Matrix6d::Zero(), geometry = information;
   for (size_t i = 0; i < all.size(); ++i) {
     fit.inlier.push_back(all[i] < limit);
     if (!fit.inlier.back()) continue;
     ++fit.inliers;
     information += lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
+    geometry += lin.jacobian[i].transpose() * lin.jacobian[i];
   }
   if (fit.inliers < params.least_inliers) return;
   const Eigen::LDLT<Matrix6d> factor(information);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0.0)) return;
   const double inflation = std::max(1.0, fit.deviation);
+  fit.common = fit.inliers * params.common_px * params.common_px * geometry.inverse();
   fit.covariance = inflation * inflation * factor.solve(Matrix6d::Identity());
   fit.converged = fit.covariance.allFinite();
 }

@@ -301,6 +301,21 @@ double TrajectoryFitter::persistence(const std::vector<MotionState>& states, dou
   return (1.0 + correlation) / (1.0 - correlation);
 }
 
+double TrajectoryFitter::pieceSpan(size_t piece) const {
+  const Measurements inside = measurementsOf(piece, piece);
+  return inside.size() < 2 ? frameSpacing() : inside.back().time - inside.front().time;
+}
+
+// Errors of deviation s at a piece's beginning and end make a velocity of sqrt(2) s / T. The mean over its poses, since the
+// piece's velocity is that of all of them.
+Matrix6d TrajectoryFitter::driftCovariance(double time) const {
+  const size_t piece = indexOfPieceAt(time);
+  const Measurements inside = measurementsOf(piece, piece);
+  Matrix6d sum = Matrix6d::Zero();
+  for (const PoseMeasurement& m : inside) sum += m.common / inside.size();
+  return 2.0 * sum / std::pow(pieceSpan(piece), 2);
+}
+
 // The longest free fall tells most about gravity: fitted again with nothing known of it.
 std::optional<Trajectory::Gravity> TrajectoryFitter::fittedGravity() const {
   constexpr size_t kLeastFall = 4;  // frames
@@ -318,22 +333,31 @@ std::optional<Trajectory::Gravity> TrajectoryFitter::fittedGravity() const {
   });
   const Eigen::Vector3d direction = state->acceleration.normalized();
   const double variance = direction.dot(state->accelerationCovariance() * direction);
-  return Trajectory::Gravity{state->acceleration, std::sqrt(std::max(0.0, variance)), most};
+  return Trajectory::Gravity{state->acceleration, std::sqrt(std::max(0.0, variance)), most, longest};
 }
 
 Trajectory TrajectoryFitter::result() {
   Trajectory trajectory;
   const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
   trajectory.states = statesWithHonestRest(motion);
-  const double factor = persistence(motion.states, 0.0);
-  for (MotionState& state : trajectory.states) state.covariance *= factor;
+  const double share = std::min(0.5, 2.0 * pieces_.size() / static_cast<double>(measurements_.size()));
+  const double factor = persistence(motion.states, share);
+  for (MotionState& state : trajectory.states) {
+    state.covariance *= factor;
+    state.addTwistCovariance(driftCovariance(state.time));
+  }
   trajectory.pieces = pieces_;
   trajectory.noise_scale = noise_scale_;
   trajectory.gravity = fittedGravity();
   if (trajectory.gravity) {
     const size_t frames = trajectory.gravity->frames;
     const double share = std::min(0.5, 2.0 / static_cast<double>(frames));  // a parabola's; where it starts is given
-    trajectory.gravity->deviation *= std::sqrt(persistence(motion.states, share));
+    // A bend of the poses by s over the time T of the fall is an acceleration of 8 s / T^2.
+    const double span = pieceSpan(trajectory.gravity->piece);
+    const Eigen::Vector3d along = trajectory.gravity->acceleration.normalized();
+    const double drift = along.dot(driftCovariance(measurementsOf(trajectory.gravity->piece, trajectory.gravity->piece).front().time).topLeftCorner<3, 3>() * along);
+    trajectory.gravity->deviation = std::sqrt(std::pow(trajectory.gravity->deviation, 2) * persistence(motion.states, share) +
+                                              32.0 * drift / (span * span));
   }
   for (const Jump& jump : motion.jumps) {
     if (jump.cut) continue;

@@ -49,6 +49,9 @@ class TrajectoryFitter {
 
   void settleStillPieces();
   std::vector<MotionState> statesWithHonestRest(const SmoothedMotion& motion) const;
+  // Of velocity and spin, by errors of the poses that change slowly over the piece at `time`.
+  Matrix6d driftCovariance(double time) const;
+  double pieceSpan(size_t piece) const;  // s, from its first measurement to its last
   double persistence(const std::vector<MotionState>& states, double fitted_share) const;
   std::optional<Trajectory::Gravity> fittedGravity() const;
   Trajectory result();

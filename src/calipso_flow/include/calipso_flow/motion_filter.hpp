@@ -33,6 +33,8 @@ struct MotionState {
   Eigen::Matrix3d accelerationCovariance() const;
   // Widens velocity and acceleration along themselves by a relative deviation of the scale.
   void addScaleUncertainty(double relative);
+  // Widens velocity and spin by the covariance of an error that they have besides.
+  void addTwistCovariance(const Matrix6d& twist);
   // Replaces one block by that of another covariance.
   void setVelocityCovariance(const StateMatrix& other);
   void setSpinCovariance(const StateMatrix& other);
@@ -42,8 +44,9 @@ struct PoseMeasurement {
   double time = 0.0;  // s
   Eigen::Vector3d position;
   Eigen::Matrix3d rotation;
-  Matrix6d covariance;  // of (m, rad)
+  Matrix6d covariance;  // of (m, rad), independent from time to time
   bool valid = false;   // false: nothing was seen at this time
+  Matrix6d common = Matrix6d::Zero();  // of errors that change slowly
 };
 
 enum class Travel { kRest, kUniform, kFreeFall, kAccelerated, kForced };

@@ -38,6 +38,7 @@ struct Observation {
   bool found = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
   Matrix6d covariance = Matrix6d::Zero();  // (m of the centroid, rad), world axes
+  Matrix6d common = Matrix6d::Zero();      // see PoseFit
   double deviation = 0.0;                  // see PoseFit
   double coverage = 0.0;                   // see ReferenceView::Warped
   std::vector<Track> tracks;

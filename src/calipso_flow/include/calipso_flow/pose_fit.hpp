@@ -21,6 +21,8 @@ struct PoseFitParams {
   double start_scale_px = 8.0;  // residuals up to this count fully at first, then less and less
   double floor_px = 0.03;       // no track is better than this: model error, compression
   double inlier_sigma = 4.0;    // a track further off than this many deviations does not count
+  double common_px = 0.006;     // error that all tracks of a frame may share, and that changes slowly: of how looks are
+                                // resampled and lit
   int max_iterations = 30;
   int least_inliers = 6;
 };
@@ -28,6 +30,7 @@ struct PoseFitParams {
 struct PoseFit {
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
   Matrix6d covariance = Matrix6d::Zero();  // of (m of the pivot, rad), world axes
+  Matrix6d common = Matrix6d::Zero();      // the same of the error that all tracks share; not part of covariance
   std::vector<bool> inlier;                // per correspondence
   int inliers = 0;
   double deviation = 0.0;  // robust deviation of the residuals over their own, 1 = as expected

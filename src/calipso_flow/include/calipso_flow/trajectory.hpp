@@ -38,6 +38,7 @@ struct Trajectory {
     Eigen::Vector3d acceleration;  // m/s^2
     double deviation;              // m/s^2, of its length
     size_t frames = 0;             // of the fall that it was seen in
+    size_t piece = 0;              // of the motion, that fall
   };
   std::optional<Gravity> gravity;
 
