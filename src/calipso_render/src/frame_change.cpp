@@ -106,6 +106,7 @@ void FrameCompositor::findStill() {
     }
   }
   keepRims(owner);
+  if (!elsewhere_.empty()) still_.setTo(0.0f, elsewhere_(region_));
 }
 
 }  // namespace calipso::render

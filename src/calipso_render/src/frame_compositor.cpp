@@ -39,7 +39,7 @@ cv::Vec3f FrameCompositor::shadowRatio(float sun, float sky) const {
 
 // How far a surface point of an edited object stays where the video shows it: 1 at rest, 0 moved.
 float FrameCompositor::stillness(std::uint32_t id, float u, float v) const {
-  if (observed_[VisibilityBuffer::objectOf(id)].points.empty()) return 0.0f;
+  if (observed_[VisibilityBuffer::objectOf(id)].points.empty() || isElsewhere(u, v)) return 0.0f;
   return 1.0f - smoothStep(kStillPx, kMovedPx, movement(id, u, v).norm());
 }
 
@@ -113,14 +113,29 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
   return drawn;
 }
 
+// The part of a pixel that objects which stay cover: of one on their outline less than all.
+float FrameCompositor::coverOfOthers(int u, int v) const {
+  const EdgeCoverage::Pixel* edge = edges_->at(u, v);
+  if (edge == nullptr) return labels_.at<std::uint8_t>(v, u) != 0 ? 1.0f : 0.0f;
+  const auto stays = [&](std::uint32_t id) { return id != VisibilityBuffer::kNothing && !isDrawn(id, u, v); };
+  return static_cast<float>(std::count_if(edge->ids.begin(), edge->ids.end(), stays)) / EdgeCoverage::kSamples;
+}
+
 FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
-  Behind behind{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
   const bool removed = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
+  const float others = removed ? 0.0f : coverOfOthers(u, v);
+  Behind own{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
+  if (others > 0.0f && labels_.at<std::uint8_t>(v, u) != 0) shadeOther(u, v, own);
+  if (others == 1.0f) return own;
+  const Behind ground = groundAt(u, v, removed);
+  if (others == 0.0f || ground.source == kOriginal) return others == 0.0f ? ground : own;
+  return {others * own.colour + (1.0f - others) * ground.colour, (1.0f - others) * ground.fresh, ground.source};
+}
+
+// What a pixel shows where no object is.
+FrameCompositor::Behind FrameCompositor::groundAt(int u, int v, bool removed) const {
+  Behind behind{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
   if (removed) behind = revealedAt(u, v);
-  if (!removed && labels_.at<std::uint8_t>(v, u) != 0) {
-    shadeOther(u, v, behind);
-    return behind;
-  }
   const cv::Point at = cv::Point(u, v) - region_.tl();
   const float sun = sun_now_.at<float>(at), sun_before = sun_before_.at<float>(at);
   const float sky = sky_now_.at<float>(at), sky_before = sky_before_.at<float>(at);

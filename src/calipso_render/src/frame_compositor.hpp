@@ -134,7 +134,7 @@ class FrameCompositor {
   void recordRow(int v, Row& row, RestPicture& picture) const;
   Composed composedAt(int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
-  bool restsAt(int surface) const;
+  bool findRest(int surface);
   bool takesShadow(int u, int v) const { return plane_view_.sees(u, v) && (shadowless_.empty() || shadowless_.at<std::uint8_t>(v, u) == 0); }
   void prepareShadows();
   void cacheOriginals(const std::vector<Occluder>& originals);
@@ -172,12 +172,15 @@ class FrameCompositor {
   void composeSpecial(int u, int v, Row& row) const;
   void keepStill(int v, Row& row) const;
   Behind behindAt(int u, int v) const;
+  Behind groundAt(int u, int v, bool removed) const;
+  float coverOfOthers(int u, int v) const;
   Behind revealedAt(int u, int v) const;
   Drawn drawnAt(int u, int v) const;
   bool hiddenByFront(int surface, int u, int v) const;
   bool isDrawn(std::uint32_t id, int u, int v) const;
   cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
   float stillness(std::uint32_t id, float u, float v) const;
+  bool isElsewhere(float u, float v) const { return !elsewhere_.empty() && elsewhere_.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u)) != 0; }
   float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
   Lit exactLight(const LitPoint& p, int slot) const;
   const Look& lookOf(int slot) const;
@@ -203,7 +206,8 @@ class FrameCompositor {
   std::vector<cv::Vec3f> live_corrections_;
   std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
   std::vector<bool> edited_;                  // per surface
-  std::vector<bool> at_rest_;                 // per surface: the video has it where the key frame has it
+  std::vector<bool> at_rest_;                 // per surface: the video has it, or a part of it, where the key frame has it
+  cv::Mat elsewhere_;                         // CV_8UC1, whole picture: where it does not; may be empty
   std::vector<Actor> actors_;                 // visible ones, per slot
   std::vector<int> surface_of_slot_;
   std::vector<Gloss> glosses_;                // per slot, as its look has it

@@ -150,7 +150,7 @@ void FrameCompositor::findMiss(const cv::Rect& carried) {
     const cv::Vec3f *drawn = rest_.drawn.ptr<cv::Vec3f>(v) + box.x, *passing = rest_.passing.ptr<cv::Vec3f>(v) + box.x;
     cv::Vec4f* miss = miss_.ptr<cv::Vec4f>(j);
     for (int i = 0; i < box.width; ++i) {
-      if (drawn[i][0] < 0.0f) {
+      if (drawn[i][0] < 0.0f || isElsewhere(box.x + i, v)) {
         miss[i] = {};
         continue;
       }

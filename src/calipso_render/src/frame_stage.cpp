@@ -12,7 +12,8 @@ namespace calipso::render {
 namespace {
 
 constexpr int kRegionMargin = 8;       // px
-constexpr double kRestOverlap = 0.95;  // of masks: the object is where the key frame has it
+constexpr int kRestReach = 6;           // px: what lies that near to a change may take part in it
+constexpr int kSameCodes = 4;           // code values, mean over 5 x 5 pixels, that noise may make
 constexpr float kDarker = 0.97f;       // of the plate's brightness: a passing shadow
 constexpr int kRimShare = 50;          // of the picture's width: how far a mask may miss a moving object
 constexpr int kInFront = 127;          // of a matte
@@ -80,7 +81,7 @@ void FrameCompositor::stage() {
     states_[it - surfaces.begin()] = &o;
     edited_[it - surfaces.begin()] = o.edited || o.removed;
   }
-  for (std::size_t i = 0; i < surfaces.size(); ++i) at_rest_.push_back(restsAt(static_cast<int>(i)));
+  for (std::size_t i = 0; i < surfaces.size(); ++i) at_rest_.push_back(findRest(static_cast<int>(i)));
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ObjectInFrame* o = states_[i];
     if (o != nullptr ? o->removed : !surfaces[i].in_video) continue;
@@ -116,13 +117,29 @@ void FrameCompositor::stage() {
   }
 }
 
-// An object at rest in the video, or one that moves but is seen where it was at the key frame.
-bool FrameCompositor::restsAt(int surface) const {
+// Whether the video has an object, or a part of one that moves, where the key frame has it. Adds to elsewhere_ where not.
+bool FrameCompositor::findRest(int surface) {
   if (!prepared_.surfaces[surface].in_video) return false;
   if (!prepared_.moves[surface]) return true;
+  if (!edited_[surface] || !sameView(frame_.camera, prepared_.camera)) return false;
   const int index = prepared_.surfaces[surface].index;
-  const cv::Mat now = labels_ == index, key = prepared_.key_labels == index;
-  return cv::countNonZero(now & key) > kRestOverlap * cv::countNonZero(now | key);
+  const cv::Mat now = labels_ == index, key = prepared_.key_labels == index, either = now | key;
+  cv::Rect box = cv::boundingRect(either);
+  if (box.empty()) return false;
+  box = cv::Rect(box.x - kRestReach, box.y - kRestReach, box.width + 2 * kRestReach, box.height + 2 * kRestReach) & cv::Rect(cv::Point(), either.size());
+  cv::Mat picture, key_picture, different;
+  cv::blur(frame_.bgr(box), picture, {5, 5});
+  cv::blur(prepared_.key_picture(box), key_picture, {5, 5});
+  cv::absdiff(picture, key_picture, picture);
+  cv::inRange(picture, cv::Scalar(), cv::Scalar::all(kSameCodes), different);
+  cv::bitwise_not(different, different);
+  cv::morphologyEx(different, different, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  cv::Mat elsewhere = cv::Mat::zeros(either.size(), CV_8U), same;
+  cv::dilate(different | (now(box) ^ key(box)), elsewhere(box), disc(kRestReach));
+  same = now & ~elsewhere;
+  if (cv::countNonZero(same) == 0) return false;
+  elsewhere_ = elsewhere_.empty() ? elsewhere : elsewhere_ | elsewhere;
+  return true;
 }
 
 void FrameCompositor::chooseRegion() {

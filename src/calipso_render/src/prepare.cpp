@@ -300,6 +300,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const std::vector<ClipFrame> frames = inKeyView(clip, params.planes);
   Prepared p;
   p.camera = frames.front().camera;
+  p.key_picture = frames.front().bgr;
   p.key_labels = frames.front().labels;
   for (const ObjectModel& m : models) {
     p.surfaces.push_back(makeSurface(m));

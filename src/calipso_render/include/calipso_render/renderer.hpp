@@ -79,6 +79,7 @@ struct RenderParams {
 // Everything learnt from the clip. Coordinates: the key frame's camera, the world.
 struct Prepared {
   Camera camera;                    // key frame
+  cv::Mat key_picture;              // CV_8UC3
   cv::Mat key_labels;
   std::vector<Surface> surfaces;
   std::vector<bool> moves;          // per surface: it moves in the video
