@@ -39,7 +39,7 @@ cv::Vec3f FrameCompositor::shadowRatio(float sun, float sky) const {
 
 // How far a surface point of an edited object stays where the video shows it: 1 at rest, 0 moved.
 float FrameCompositor::stillness(std::uint32_t id, float u, float v) const {
-  if (observed_[VisibilityBuffer::objectOf(id)].points.empty() || isElsewhere(u, v)) return 0.0f;
+  if (observed_[VisibilityBuffer::objectOf(id)].points.empty()) return 0.0f;
   return 1.0f - smoothStep(kStillPx, kMovedPx, movement(id, u, v).norm());
 }
 

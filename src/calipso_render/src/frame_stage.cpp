@@ -12,8 +12,8 @@ namespace calipso::render {
 namespace {
 
 constexpr int kRegionMargin = 8;       // px
-constexpr int kRestReach = 6;           // px: what lies that near to a change may take part in it
-constexpr int kSameCodes = 4;           // code values, mean over 5 x 5 pixels, that noise may make
+constexpr int kRestReach = 2;           // px: what lies that near to a change may take part in it
+constexpr int kSameCodes = 8;           // code values, mean over 3 x 3 pixels, that noise may make
 constexpr float kDarker = 0.97f;       // of the plate's brightness: a passing shadow
 constexpr int kRimShare = 50;          // of the picture's width: how far a mask may miss a moving object
 constexpr int kInFront = 127;          // of a matte
@@ -106,7 +106,10 @@ void FrameCompositor::stage() {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
     if (live_ != nullptr) live_corrections_ = live_->corrections(frame_.bgr, labels_);
     shadowless_ = prepared_.shadowless;
-    fronts_ = prepared_.fronts;
+    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+      if (prepared_.fronts[i].empty() || (prepared_.moves[i] && !at_rest_[i])) continue;
+      fronts_[i] = elsewhere_.empty() ? prepared_.fronts[i] : cv::Mat(prepared_.fronts[i] & ~elsewhere_);
+    }
     footprints_ = prepared_.footprints;
   } else {
     const cv::Mat map = viewWarp(params_.planes, prepared_.camera, frame_.camera);
@@ -128,14 +131,14 @@ bool FrameCompositor::findRest(int surface) {
   if (box.empty()) return false;
   box = cv::Rect(box.x - kRestReach, box.y - kRestReach, box.width + 2 * kRestReach, box.height + 2 * kRestReach) & cv::Rect(cv::Point(), either.size());
   cv::Mat picture, key_picture, different;
-  cv::blur(frame_.bgr(box), picture, {5, 5});
-  cv::blur(prepared_.key_picture(box), key_picture, {5, 5});
+  cv::blur(frame_.bgr(box), picture, {3, 3});
+  cv::blur(prepared_.key_picture(box), key_picture, {3, 3});
   cv::absdiff(picture, key_picture, picture);
   cv::inRange(picture, cv::Scalar(), cv::Scalar::all(kSameCodes), different);
   cv::bitwise_not(different, different);
   cv::morphologyEx(different, different, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   cv::Mat elsewhere = cv::Mat::zeros(either.size(), CV_8U), same;
-  cv::dilate(different | (now(box) ^ key(box)), elsewhere(box), disc(kRestReach));
+  cv::dilate(different, elsewhere(box), disc(kRestReach));
   same = now & ~elsewhere;
   if (cv::countNonZero(same) == 0) return false;
   elsewhere_ = elsewhere_.empty() ? elsewhere : elsewhere_ | elsewhere;
@@ -201,6 +204,9 @@ void FrameCompositor::findRemoved() {
   cv::dilate(own, removed_, disc(params_.background.mask_margin_px));
   if (!passing_.empty()) removed_ |= passing_(region_);
   removed_.setTo(0, others);  // what stands beside it keeps its own pixels, and what stands before it
+  for (const cv::Mat& front : fronts_) {
+    if (!front.empty()) removed_.setTo(0, front(region_));
+  }
   if (!params_.matte.empty() && sameView(frame_.camera, prepared_.camera)) removed_.setTo(0, params_.matte(region_) > kInFront);
 }
 

@@ -190,8 +190,7 @@ std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& 
       }
     }
     cv::morphologyEx(front, front, cv::MORPH_OPEN, cv::Mat::ones(kFrontOpening, kFrontOpening, CV_8U));
-    const bool usable = !p.moves[i] && cv::countNonZero(front) > 0;
-    fronts.push_back(usable ? front : cv::Mat());
+    fronts.push_back(cv::countNonZero(front) > 0 ? front : cv::Mat());
   }
   return fronts;
 }

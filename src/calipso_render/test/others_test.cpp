@@ -1,6 +1,7 @@
 // What no edit touches: objects in the shadow of edited ones, and scenery before them.
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/shadow_map.hpp"
@@ -66,6 +67,35 @@ TEST(Others, AnEditedObjectCastsItsShadowOnOneThatStays) {
     const float before = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[c]), now = linearFromCode(out.bgr.at<cv::Vec3b>(p)[c]);
     EXPECT_NEAR(now / before, diffuseShading(light, n, 0.0f)[c] / diffuseShading(light, n, 1.0f)[c], 0.06f) << c;  // codes are rounded
   }
+}
+
+// Of an object that moves in the video, the part that the frame shows as the key frame does is kept, byte by byte.
+TEST(Others, APartOfAMovingObjectMayRest) {
+  const RenderParams render = params();
+  const ObjectModel ball = ballAt(kCentre);
+  const ClipFrame key = frameWithBall(ball);
+  ClipSample clip;
+  clip.add(key);
+  clip.add(frameWithBall(ballAt(kOther)));
+  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball}, render));
+  ASSERT_TRUE(prepared->moves[0]);
+  const cv::Rect box = cv::boundingRect(key.labels != 0);
+  const int middle = box.y + box.height / 2;
+  cv::Mat lower = key.labels != 0;
+  lower.rowRange(0, middle).setTo(0);
+  FrameInput in;
+  in.bgr = key.bgr.clone(), in.labels = key.labels, in.camera = key.camera;
+  cv::subtract(in.bgr, cv::Scalar::all(50), in.bgr, lower);
+  ObjectInFrame state;
+  state.name = "ball", state.edited = true, state.vertices = prepared->surfaces[0].key_vertices;
+  in.objects = {state};
+  const FrameOutput out = Renderer(prepared, render).composite(in);
+  const int away = 6;  // px from the change
+  for (int v = box.y - 4; v < middle - away; ++v) {
+    for (int u = box.x - 4; u < box.br().x + 4; ++u) ASSERT_EQ(out.bgr.at<cv::Vec3b>(v, u), key.bgr.at<cv::Vec3b>(v, u)) << u << ", " << v;
+  }
+  cv::erode(lower, lower, cv::Mat::ones(2 * away + 1, 2 * away + 1, CV_8U));
+  EXPECT_GT(psnr(out.bgr, key.bgr, lower), 30.0);
 }
 
 TEST(Others, WhereNoShadowFallsTheirPixelsStay) {
