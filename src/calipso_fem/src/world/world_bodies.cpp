@@ -209,6 +209,7 @@ void World::Impl::noteOverlaps(Actor& actor, const TriangleMesh& surface) {
   constexpr double kNoted = 2e-3;  // of its size: alignment leaves as much
   const double size = boundingDiagonal(surface);
   for (const Obstacle& obstacle : obstacles(now, now, &actor)) {
+    if (!meet(actor.id, obstacle.id)) continue;
     if (!obstacle.plane && !obstacleBounds(obstacle).intersects({surface.vertices.colwise().minCoeff().transpose(),
                                                                  surface.vertices.colwise().maxCoeff().transpose()}))
       continue;

@@ -82,7 +82,7 @@ struct World::Impl {
   void wake(Actor& actor);
 
   // Contacts and forces of a step (world_step.cpp)
-  // @param except  is left out, and what it is not to meet
+  // @param except  is left out, with the supports that are its own surface
   std::vector<Obstacle> obstacles(double from, double to, const Actor* except = nullptr);
   std::vector<SoftEntry> softEntries();
   void applyLoads(double at, double h);  // world_forces.cpp

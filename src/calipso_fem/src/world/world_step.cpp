@@ -69,8 +69,10 @@ std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor
     list.push_back(o);
   }
   if (except)
-    list.erase(std::remove_if(list.begin(), list.end(), [&](const Obstacle& o) { return !meet(except->id, o.id); }),
-               list.end());
+    for (const size_t k : ownSupports(*except))
+      list.erase(std::remove_if(list.begin(), list.end(),
+                                [&](const Obstacle& o) { return o.id == supportId(scene.planes.size() + k); }),
+                 list.end());
   return list;
 }
 
