@@ -14,6 +14,8 @@ namespace {
 
 constexpr float kWholePx = 0.5f, kNonePx = 5.0f;  // movement up to which the residual goes along, and from which none does
 
+constexpr float kMostChange = 3.0f;  // factor: what is missed by more, where a surface has moved, is misfit and not its look
+
 constexpr int kCarried = 16;  // px around surfaces at rest in which their rims and what they take over lie
 
 constexpr float kDark = 1e-5f;  // linear; a plate darker than that says nothing of its shadow
@@ -211,7 +213,11 @@ void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved
   if (squared >= kNonePx * kNonePx) return;
   const float part = 1.0f - smoothStep(kWholePx, kNonePx, std::sqrt(squared));
   const cv::Vec4f miss = missAt(u, v, owner);
-  for (int c = 0; c < 3; ++c) colour[c] += part * miss[c];
+  const float moves = std::min(1.0f, squared / (kWholePx * kWholePx));  // unmoved, the video comes back whatever was drawn
+  for (int c = 0; c < 3; ++c) {
+    const float whole = colour[c] + part * miss[c];
+    colour[c] = whole + moves * (std::clamp(whole, colour[c] / kMostChange, colour[c] * kMostChange) - whole);
+  }
   colour[3] *= 1.0f - part * miss[3];
 }
 
