@@ -226,6 +226,28 @@ TEST(WorldObjects, AnObjectTakesTheSupportThatIsItsOwnTopWithIt) {
   }
 }
 
+// A cup on a box: it stays as the video has it while the box does, and falls when that is taken away or falls itself.
+TEST(WorldObjects, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
+  WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, 0.5}, false);
+  scene.objects.push_back(scene.objects.front());
+  scene.objects[1].name = "load", scene.objects[1].index = 2;
+  scene.objects[1].mesh = boxSurface({0.05, 0.05, 0.05}, 1);
+  scene.objects[1].world_from_object.translation().z() = 0.6255;
+  for (const EditKind kind : {EditKind::kRemove, EditKind::kGravity, EditKind::kAppearance}) {
+    World world(scene, {});
+    Edit edit = letGo("thing");
+    edit.kind = kind;
+    if (kind == EditKind::kAppearance) edit.color = {1, 0, 0}, edit.mode = EditMode::kAbsolute;
+    world.submit(edit);
+    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    play(world, 1.0);
+    const bool stays = kind == EditKind::kAppearance;
+    EXPECT_EQ(world.state().objects[1].kind, stays ? ObjectKind::kStatic : ObjectKind::kRigid) << toString(kind);
+    if (!stays) { EXPECT_LT(centerOf(world.state(), 1).z(), 0.3) << toString(kind); }
+    EXPECT_EQ(world.plan()[1].reason.find("thing, on which it rests") == std::string::npos, stays) << world.plan()[1].reason;
+  }
+}
+
 TEST(WorldObjects, WhatIsNoManifoldOrInsideOutFallsAndRests) {
   TriangleMesh fin = boxSurface({0.2, 0.2, 0.2}, 1);  // a third triangle on one edge
   fin.vertices.conservativeResize(fin.vertexCount() + 1, 3);

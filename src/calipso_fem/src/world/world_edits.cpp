@@ -81,6 +81,9 @@ void World::Impl::touch(Actor& actor, const Edit& edit) {
 std::string World::Impl::apply(const Edit& edit) {
   std::vector<bool> fresh;
   for (const Actor& actor : actors) fresh.push_back(actor.kind == ObjectKind::kStatic);
+  const bool look = edit.kind == EditKind::kAppearance || edit.kind == EditKind::kLight;
+  for (const Actor& actor : actors)
+    if (!look && (edit.object.empty() || edit.object == actor.object.name)) noteWhatRestsOn(actor);
   const std::string done = carryOut(edit);
   noteWhatContinues(edit, fresh);
   return done;

@@ -81,6 +81,10 @@ struct World::Impl {
   const std::vector<TriangleMesh>& hullsOf(Actor& actor);  // computed once per mesh
   void wake(Actor& actor);
 
+  // Objects that rest on others (world_rests.cpp)
+  void noteWhatRestsOn(const Actor& carrier);  // as the video has it, before an edit touches the carrier
+  void letGoWhatLostItsRest();
+
   // Contacts and forces of a step (world_step.cpp)
   // @param except  is left out, with the supports that are its own surface
   std::vector<Obstacle> obstacles(double from, double to, const Actor* except = nullptr);
@@ -137,6 +141,12 @@ struct World::Impl {
   std::vector<RigidWorld::Id> supports;  // planes and meshes in the rigid world
   std::vector<std::unique_ptr<SurfaceTree>> support_trees;
   bool has_colliders = false;
+  // An object that nothing but another one carries, and the place on that one's surface where it does.
+  struct Rest {
+    int actor, carrier, triangle;
+    Eigen::Vector3d barycentric, place;
+  };
+  std::vector<Rest> rests;
 
   double now = 0.0;          // video time, s
   std::optional<ObservedGravity> observed_gravity;

@@ -110,6 +110,7 @@ void World::Impl::stepFrame(double h) {
     now += h / parts;
   }
   actAsObserved(continuing, from);
+  letGoWhatLostItsRest();
   updateSleep();
 }
 

@@ -1,0 +1,80 @@
+#include "obstacle_query.hpp"
+#include "world_impl.hpp"
+
+// What rests on an object in the video: it goes on resting there while that stays, and is let go once that moves away.
+namespace calipso::fem {
+namespace {
+
+constexpr double kReach = 0.02;   // of the size: alignment leaves objects that far above or inside each other
+constexpr double kUpright = 0.3;  // cosine to the vertical of a normal that carries
+constexpr double kFollows = 0.01;  // of the size: by so much the place has to move
+
+// Vertex of the surface that lies deepest on what carries it there, within `reach`.
+std::optional<ObstacleHit> carriedBy(const Obstacle& obstacle, const TriangleMesh& surface, const Eigen::Vector3d& up, double reach,
+                                     double size) {
+  std::optional<ObstacleHit> deepest;
+  for (int v = 0; v < surface.vertexCount(); ++v) {
+    const auto hit = queryObstacle(obstacle, surface.vertex(v), reach, size);
+    if (hit && hit->normal.dot(up) > kUpright && (!deepest || hit->gap < deepest->gap)) deepest = hit;
+  }
+  return deepest;
+}
+
+}  // namespace
+
+void World::Impl::noteWhatRestsOn(const Actor& carrier) {
+  if (carrier.edited || carrier.removed || !(scene.gravity.norm() > 0.0)) return;
+  const Eigen::Vector3d up = -scene.gravity.normalized();
+  const std::vector<size_t> own = ownSupports(carrier);
+  const auto isOwn = [&](int id) {
+    return std::any_of(own.begin(), own.end(), [&](size_t k) { return id == supportId(scene.planes.size() + k); });
+  };
+  for (Actor& actor : actors) {
+    if (&actor == &carrier || actor.edited || actor.removed || actor.kind != ObjectKind::kStatic) continue;
+    if (!actor.object.attachments.empty() || actor.track.at(now).moving) continue;
+    const TriangleMesh surface = placed(actor.object.mesh, poseOf(actor, now));
+    const double size = boundingDiagonal(surface), reach = kReach * size;
+    bool carried_otherwise = false;
+    std::optional<ObstacleHit> on;
+    for (const Obstacle& obstacle : obstacles(now, now, &actor)) {
+      if (isOwn(obstacle.id)) continue;
+      const auto hit = carriedBy(obstacle, surface, up, reach, size);
+      if (obstacle.id == carrier.id) on = hit;
+      else carried_otherwise |= hit.has_value();
+    }
+    if (!on || carried_otherwise) continue;
+    const auto place = SurfaceTree(placed(carrier.object.mesh, poseOf(carrier, now))).nearest(on->place, size);
+    if (!place) continue;
+    rests.push_back({actor.id, carrier.id, place->triangle, place->barycentric, place->point});
+    actor.holder = Holder::kSupport;
+  }
+}
+
+void World::Impl::letGoWhatLostItsRest() {
+  const auto lost = [&](const Rest& rest) {
+    const Actor& carrier = actors[rest.carrier];
+    if (carrier.removed) return true;
+    const auto vertices = verticesOf(carrier);
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 3; ++i)
+      place += rest.barycentric[i] * vertices.row(carrier.object.mesh.triangles(rest.triangle, i)).transpose();
+    return (place - rest.place).norm() > kFollows * boundingDiagonal(actors[rest.actor].object.mesh);
+  };
+  for (size_t k = 0; k < rests.size();) {
+    Actor& actor = actors[rests[k].actor];
+    const bool over = actor.edited || actor.removed, falls = !over && lost(rests[k]);
+    if (!over && !falls) {
+      ++k;
+      continue;
+    }
+    const std::string& carrier = actors[rests[k].carrier].object.name;
+    rests.erase(rests.begin() + k);
+    if (!falls) continue;
+    noteWhatRestsOn(actor);
+    k = 0;  // the list has grown
+    become(actor, actor.settings.kind.value_or(ObjectKind::kRigid), carrier + ", on which it rests, moves");
+    wake(actor);
+  }
+}
+
+}  // namespace calipso::fem
