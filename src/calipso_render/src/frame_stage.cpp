@@ -157,7 +157,7 @@ void FrameCompositor::chooseRegion() {
     if (!edited_[surface_of_slot_[slot]] && !may_be_shaded_[slot]) continue;
     region_ |= boundsOf(actors_[slot].screen, kRegionMargin, size);
   }
-  region_ |= shadows_.bounds | moved_bounds_;
+  region_ |= shadows_.bounds | shadows_.shaded_box | moved_bounds_;
   if (!passing_.empty()) region_ |= cv::boundingRect(passing_);
   region_ &= all;
 }
