@@ -3,10 +3,10 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "calipso_align/relief.hpp"
+#include "calipso_scene/disjoint_sets.hpp"
 
 namespace calipso::align {
 namespace {
@@ -45,22 +45,6 @@ float creaseThreshold(const Relief& relief) {
   std::nth_element(bends.begin(), place, bends.end());
   return kBeyond * *place;
 }
-
-class DisjointSets {
- public:
-  explicit DisjointSets(int count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int find(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(int i, int j) {
-    const int a = find(i), b = find(j);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 // Least squares plane q = a + b u + c v.
 struct PlaneFit {

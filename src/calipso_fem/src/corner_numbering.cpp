@@ -1,7 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <numeric>
+
+#include <calipso_scene/disjoint_sets.hpp>
 
 #include "voxel_cells.hpp"
 
@@ -9,22 +10,6 @@ namespace calipso::fem {
 namespace {
 
 using Eigen::Vector3i;
-
-class DisjointSets {
- public:
-  explicit DisjointSets(int n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int find(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(int a, int b) {
-    a = find(a), b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 using Position = std::array<int, 3>;  // z, y, x: maps then run in lattice order
 
