@@ -239,7 +239,7 @@ def main():
                   "\n\n## Simulated and filmed: sheets in a steady wind, beams struck\n"
                   "What blows along a flat sheet does not move it, and cannot be seen. The sheets are simulated with 500 nodes at 1/120 s; "
                   "`coarse` with 120 at 1/30 s, `simulator` as an edited object is, `soft` at 0.3 of the stiffness, `pegged` by two "
-                  "corners; estimated with 120 nodes at 1/30 s.\n\n" +
+                  "corners; estimated with 90 nodes at 1/30 s.\n\n" +
                   columns(filmed, FILMED) + "\n\n![dynamics_wind.png](dynamics_wind.png)\n\n"
                   "## A thrown box, filmed with fresh noise\n" + columns(repeats, REPEATED) +
                   "\n\n## Dense flow and its peers on one pair of 640x360\n" + columns(flow, FLOW))
