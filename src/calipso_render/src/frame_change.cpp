@@ -65,10 +65,12 @@ void FrameCompositor::keepRims(const cv::Mat& owner) {
       if (edited_[j] && j != i) foreign |= originalOf(static_cast<int>(j));
     }
     cv::dilate(foreign, foreign, disc(margin));
-    cv::Mat own;
-    cv::dilate(originalOf(static_cast<int>(i)), own, disc(margin));
+    const cv::Mat original = originalOf(static_cast<int>(i));
+    cv::Mat own, inner;
+    cv::dilate(original, own, disc(margin));
+    cv::erode(original, inner, disc(margin));
     foreign.setTo(0, own);
-    rim.setTo(0.0f, foreign);
+    rim.setTo(0.0f, foreign | inner);  // what the object has left shows it in the video, and is no rim
     rims = cv::max(rims, rim);
   }
   rims.copyTo(still_, owner < 0);

@@ -200,6 +200,10 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
   for (std::size_t i = rim_rows_[v - region_.y]; i < rim_rows_[v - region_.y + 1]; ++i) {
     const Rim& rim = rims_[i];
     if (rim.nearest.x < 0 || row.source[rim.u] == kOriginal) continue;
+    // Where the surface has turned away from, its rim has not come to.
+    const cv::Point away = rim.nearest - cv::Point(rim.u, rim.v);
+    const float reach = params_.background.mask_margin_px + kNonePx;
+    if (away.dot(away) > reach * reach) continue;
     const std::uint32_t id = centre_->ids(rim.nearest.y)[rim.nearest.x];
     const cv::Point from = rim.nearest + region_.tl();
     const Eigen::Vector2f moved = movement(id, static_cast<float>(from.x), static_cast<float>(from.y));
