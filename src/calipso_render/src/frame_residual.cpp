@@ -14,6 +14,8 @@ namespace {
 
 constexpr float kWholePx = 0.5f, kNonePx = 5.0f;  // movement up to which the residual goes along, and from which none does
 
+constexpr float kRestsPx = 0.05f;   // moved less: not at all
+
 constexpr float kMostChange = 3.0f;  // factor: what is missed by more, where a surface has moved, is misfit and not its look
 
 constexpr int kCarried = 16;  // px around surfaces at rest in which their rims and what they take over lie
@@ -200,13 +202,13 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
   for (std::size_t i = rim_rows_[v - region_.y]; i < rim_rows_[v - region_.y + 1]; ++i) {
     const Rim& rim = rims_[i];
     if (rim.nearest.x < 0 || row.source[rim.u] == kOriginal) continue;
-    // Where the surface has turned away from, its rim has not come to.
-    const cv::Point away = rim.nearest - cv::Point(rim.u, rim.v);
-    const float reach = params_.background.mask_margin_px + kNonePx;
-    if (away.dot(away) > reach * reach) continue;
     const std::uint32_t id = centre_->ids(rim.nearest.y)[rim.nearest.x];
     const cv::Point from = rim.nearest + region_.tl();
     const Eigen::Vector2f moved = movement(id, static_cast<float>(from.x), static_cast<float>(from.y));
+    // Where a surface that moves has turned away from, its rim has not come to.
+    const cv::Point away = rim.nearest - cv::Point(rim.u, rim.v);
+    const float reach = params_.background.mask_margin_px + kNonePx;
+    if (away.dot(away) > reach * reach && moved.norm() > kRestsPx) continue;
     addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved, surface_of_slot_[VisibilityBuffer::objectOf(id)], row.colour[rim.u]);
   }
 }
