@@ -298,14 +298,14 @@ Eigen::Vector3d likelyDirection(const ObjectModel& model, const DeformationModes
   return mean.norm() > 0.0 ? Eigen::Vector3d(mean.normalized()) : Eigen::Vector3d::Zero();
 }
 
-// @param given  the sheet is as stiff as the simulator starts with; else that is fitted, too
-std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<double>& times,
-                                    const DeformationModes& modes, const Eigen::Vector3d& gravity, bool given,
-                                    std::string& note, const WindParams& params) {
+// On as coarse a grid as finds an equilibrium. @param note  why there is none
+std::optional<SheetFamily> sheetsOf(const ObjectModel& model, const Eigen::Vector3d& gravity, bool given, std::string& note,
+                                    const WindParams& params) {
   std::optional<SheetFamily> sheets;
   for (int nodes = params.nodes; !sheets && nodes <= kFiner * params.nodes; nodes *= 2) {
     try {
       sheets.emplace(model, gravity, nodes, params, given);
+      note.clear();
     } catch (const NoEquilibrium& error) {
       note = std::string("no wind: ") + error.what();
     } catch (const std::invalid_argument& error) {  // a mesh that the simulator refuses
@@ -313,8 +313,15 @@ std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<
       return std::nullopt;
     }
   }
+  return sheets;
+}
+
+// @param given  the sheet is as stiff as the simulator starts with; else that is fitted, too
+std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<double>& times,
+                                    const DeformationModes& modes, const Eigen::Vector3d& gravity, bool given,
+                                    std::string& note, const WindParams& params) {
+  std::optional<SheetFamily> sheets = sheetsOf(model, gravity, given, note, params);
   if (!sheets) return std::nullopt;
-  note.clear();
   WindFit fit(*sheets, model, times, modes, gravity, params);
   // A steady wind first, then a changing one from there.
   const std::optional<WindFit::Fitted> steady = fit.steady(likelyDirection(model, modes));

@@ -126,6 +126,17 @@ TEST(Renderer, MovedObjectLeavesTheTableBehind) {
   EXPECT_GT(double(new_place[2]) / new_place[0], 1.7);
 }
 
+// The key frame with its ball edited to lie 30 cm further left.
+FrameInput ballMovedLeft(const ClipFrame& key, const Prepared& prepared) {
+  FrameInput in;
+  in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera;
+  ObjectInFrame moved;
+  moved.name = "ball", moved.edited = true, moved.vertices = prepared.surfaces[0].key_vertices;
+  for (Eigen::Vector3f& x : moved.vertices) x.x() -= 0.3f;
+  in.objects = {moved};
+  return in;
+}
+
 TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
   // A mask that stops five pixels short of the ball's right side, as a stroke can leave it.
   ClipFrame key = frameWithBall(ballAt(kCentre));
@@ -136,12 +147,7 @@ TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
   ClipSample clip;
   clip.add(key);
   const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
-  FrameInput in;
-  in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera;
-  ObjectInFrame moved;
-  moved.name = "ball", moved.edited = true, moved.vertices = prepared->surfaces[0].key_vertices;
-  for (Eigen::Vector3f& x : moved.vertices) x.x() -= 0.3f;
-  in.objects = {moved};
+  const FrameInput in = ballMovedLeft(key, *prepared);
   const FrameOutput out = Renderer(prepared, params()).composite(in);
   cv::Mat left_over;
   cv::bitwise_and(ball != 0, out.provenance(missed) == kOriginal, left_over);
@@ -244,14 +250,9 @@ TEST(Renderer, CastsShadowsOnlyWhereTheVideoShowsThem) {
     const bool remarked = std::any_of(prepared->remarks.begin(), prepared->remarks.end(),
                                       [](const std::string& r) { return r.find("not seen in the picture") != std::string::npos; });
     EXPECT_EQ(remarked, !shadow);
-    FrameInput in;
-    in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera;
-    ObjectInFrame moved;
-    moved.name = "ball", moved.edited = true, moved.vertices = prepared->surfaces[0].key_vertices;
-    for (Eigen::Vector3f& x : moved.vertices) x.x() -= 0.3f;
-    in.objects = {moved};
+    const FrameInput in = ballMovedLeft(key, *prepared);
     const FrameOutput out = Renderer(prepared, params()).composite(in);
-    const Actor now = makeActor(prepared->surfaces[0], moved.vertices, key.camera);
+    const Actor now = makeActor(prepared->surfaces[0], in.objects[0].vertices, key.camera);
     const ShadowMap cast({{&now.vertices, &now.surface->triangles}}, prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
     int dark = 0, all = 0;
     for (int v = 0; v < kHeight; ++v) {

@@ -34,6 +34,24 @@ std::optional<ObstacleHit> queryObstacle(const Obstacle& obstacle, const Eigen::
   return result;
 }
 
+std::optional<ObstacleHit> carrying(const Obstacle& obstacle, const TriangleMesh& surface,
+                                    const Eigen::Vector3d& gravity, double reach) {
+  constexpr double kUpright = 0.3;  // cosine to the vertical of a normal that carries
+  std::optional<ObstacleHit> deepest;
+  if (!(gravity.norm() > 0.0)) return deepest;
+  const Eigen::Vector3d up = -gravity.normalized();
+  const Eigen::AlignedBox3d bounds(surface.vertices.colwise().minCoeff().transpose().array() - reach,
+                                   surface.vertices.colwise().maxCoeff().transpose().array() + reach);
+  const Eigen::AlignedBox3d box = obstacleBounds(obstacle);
+  if (!box.isEmpty() && !box.intersects(bounds)) return deepest;
+  const double size = boundingDiagonal(surface);
+  for (int v = 0; v < surface.vertexCount(); ++v) {
+    const auto hit = queryObstacle(obstacle, surface.vertex(v), reach, size);
+    if (hit && hit->normal.dot(up) > kUpright && (!deepest || hit->gap < deepest->gap)) deepest = hit;
+  }
+  return deepest;
+}
+
 Eigen::AlignedBox3d obstacleBounds(const Obstacle& obstacle) {
   Eigen::AlignedBox3d box;
   if (obstacle.plane) return box;

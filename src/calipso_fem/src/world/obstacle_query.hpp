@@ -19,6 +19,10 @@ struct ObstacleHit {
 std::optional<ObstacleHit> queryObstacle(const Obstacle& obstacle, const Eigen::Vector3d& point,
                                          double reach, double size);
 
+// Where an obstacle carries a surface against gravity: what lies deepest, if anything is within `reach` (m).
+std::optional<ObstacleHit> carrying(const Obstacle& obstacle, const TriangleMesh& surface,
+                                    const Eigen::Vector3d& gravity, double reach);
+
 // Box around everything the obstacle may touch; empty for planes, which are everywhere.
 Eigen::AlignedBox3d obstacleBounds(const Obstacle& obstacle);
 

@@ -66,6 +66,7 @@ World::Impl::Impl(WorldScene scene_in, WorldParams params_in)
   for (const WorldObject& object : scene.objects) {
     Actor actor(object);
     actor.id = static_cast<int>(actors.size());
+    actor.own_supports = ownSupports(object);
     actor.settings = params.settingsOf(object.name);
     actor.observed_material = actor.material =
         observedMaterial(object, actor.settings, scene.gravity);

@@ -3,18 +3,15 @@
 
 #include "calipso_fem/world/convex_decomposition.hpp"
 #include "calipso_fem/world/region_selection.hpp"
-#include "obstacle_query.hpp"
 #include "describe.hpp"
+#include "obstacle_query.hpp"
 #include "world_impl.hpp"
 
 // How an object of the video becomes a body, and changes from one kind into another.
 namespace calipso::fem {
 namespace {
 
-// Alignment leaves supported objects a little above or inside their support: gaps up to this share
-// of the object's diagonal count as contact.
-constexpr double kSupportGap = 0.02;
-// Surface up to this much (same unit) above the lowest point is what the object stands on.
+// Surface up to this share of the diagonal above the lowest point is what the object stands on.
 constexpr double kContactPatch = 0.01;
 // Sag that changes nothing: of the object's diagonal, and in pixels.
 constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
@@ -31,20 +28,8 @@ double pixelsPerMeter(const Camera& camera, const Eigen::Vector3d& at) {
 double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obstacles,
                   const Eigen::Vector3d& gravity, double reach) {
   double smallest = reach;
-  const Eigen::Vector3d up =
-      gravity.norm() > 0.0 ? Eigen::Vector3d(-gravity.normalized()) : Eigen::Vector3d::Zero();
-  const Eigen::AlignedBox3d bounds(
-      surface.vertices.colwise().minCoeff().transpose().array() - reach,
-      surface.vertices.colwise().maxCoeff().transpose().array() + reach);
-  for (const Obstacle& obstacle : obstacles) {
-    const Eigen::AlignedBox3d box = obstacleBounds(obstacle);
-    if (!box.isEmpty() && !box.intersects(bounds)) continue;
-    for (int v = 0; v < surface.vertexCount(); ++v) {
-      const Eigen::Vector3d x = surface.vertex(v);
-      const auto hit = queryObstacle(obstacle, x, reach, boundingDiagonal(surface));
-      if (hit && hit->normal.dot(up) > 0.3) smallest = std::min(smallest, hit->gap);
-    }
-  }
+  for (const Obstacle& obstacle : obstacles)
+    if (const auto hit = carrying(obstacle, surface, gravity, reach)) smallest = std::min(smallest, hit->gap);
   return smallest;
 }
 
@@ -329,6 +314,7 @@ void World::Impl::reset(Actor& actor) {
   Actor fresh(scene.objects[id]);
   fresh.id = id;
   fresh.track = actor.track;
+  fresh.own_supports = actor.own_supports;
   fresh.wind = actor.wind;
   fresh.modes = actor.modes;
   fresh.settings = actor.settings;

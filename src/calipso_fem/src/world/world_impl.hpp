@@ -65,9 +65,8 @@ struct World::Impl {
   void setPairRule(const std::string& a, const std::string& b, const PairRule& rule);
   PairRule pairRule(const std::string& a, const std::string& b) const;
   bool meet(int a, int b) const;  // ids
-  // The support meshes that are the object's own surface; nothing is to meet them once it moves.
-  std::vector<size_t> ownSupports(const Actor& actor) const;
-  void leaveOwnSupports(Actor& actor);
+  std::vector<int> ownSupports(const WorldObject& object) const;  // ids
+  void leaveOwnSupports(Actor& actor);  // nothing is to meet them once it moves
   // A new object takes part from now on, at its world_from_object; static until an edit touches it.
   Actor& addObject(const WorldObject& object, const ObjectSettings& settings);
   // A copy in the present state (shape, velocity, material, gravity), moved by `motion` (world).
@@ -179,6 +178,10 @@ Material observedMaterial(const WorldObject& object, const ObjectSettings& setti
 // @throw std::invalid_argument naming the object and what is wrong with it (world.cpp)
 void validateScene(const WorldScene& scene);
 TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose);  // world_bodies.cpp
+
+// Alignment leaves supported objects a little above or inside their support: gaps up to this share
+// of the object's diagonal count as contact.
+constexpr double kSupportGap = 0.02;
 
 // Lasting id of the k-th support, planes first; objects have ids from 0 up.
 constexpr int supportId(size_t k) { return -1 - static_cast<int>(k); }

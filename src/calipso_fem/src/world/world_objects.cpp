@@ -60,22 +60,22 @@ bool World::Impl::meet(int a, int b) const {
   return found == rules.end() || found->second.contact;
 }
 
-std::vector<size_t> World::Impl::ownSupports(const Actor& actor) const {
-  std::vector<size_t> own;
+std::vector<int> World::Impl::ownSupports(const WorldObject& object) const {
+  std::vector<int> own;
   if (scene.support_meshes.empty()) return own;
-  const SurfaceTree surface(placed(actor.object.mesh, actor.object.world_from_object));
-  const double reach = kOwnSurface * boundingDiagonal(actor.object.mesh);
+  const SurfaceTree surface(placed(object.mesh, object.world_from_object));
+  const double reach = kOwnSurface * boundingDiagonal(object.mesh);
   for (size_t k = 0; k < scene.support_meshes.size(); ++k)
-    if (shareOn(surface, scene.support_meshes[k].mesh, reach) > kOwnShare) own.push_back(k);
+    if (shareOn(surface, scene.support_meshes[k].mesh, reach) > kOwnShare) own.push_back(supportId(scene.planes.size() + k));
   return own;
 }
 
 void World::Impl::leaveOwnSupports(Actor& actor) {
-  if (actor.inserted) return;
-  for (const size_t k : ownSupports(actor)) {
-    const std::string& support = scene.support_meshes[k].name;
-    setPairContact(support, "", false);
-    actor.note += support + " is its own surface and is left out; ";
+  for (const SupportMesh& mesh : scene.support_meshes) {
+    const auto& own = actor.own_supports;
+    if (std::find(own.begin(), own.end(), idOf(mesh.name)) == own.end()) continue;
+    setPairContact(mesh.name, "", false);
+    actor.note += mesh.name + " is its own surface and is left out; ";
   }
 }
 

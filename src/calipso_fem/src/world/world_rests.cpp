@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "obstacle_query.hpp"
 #include "world_impl.hpp"
 
@@ -5,40 +7,28 @@
 namespace calipso::fem {
 namespace {
 
-constexpr double kReach = 0.02;   // of the size: alignment leaves objects that far above or inside each other
-constexpr double kUpright = 0.3;  // cosine to the vertical of a normal that carries
 constexpr double kFollows = 0.01;  // of the size: by so much the place has to move
-
-// Vertex of the surface that lies deepest on what carries it there, within `reach`.
-std::optional<ObstacleHit> carriedBy(const Obstacle& obstacle, const TriangleMesh& surface, const Eigen::Vector3d& up, double reach,
-                                     double size) {
-  std::optional<ObstacleHit> deepest;
-  for (int v = 0; v < surface.vertexCount(); ++v) {
-    const auto hit = queryObstacle(obstacle, surface.vertex(v), reach, size);
-    if (hit && hit->normal.dot(up) > kUpright && (!deepest || hit->gap < deepest->gap)) deepest = hit;
-  }
-  return deepest;
-}
 
 }  // namespace
 
 void World::Impl::noteWhatRestsOn(const Actor& carrier) {
-  if (carrier.edited || carrier.removed || !(scene.gravity.norm() > 0.0)) return;
-  const Eigen::Vector3d up = -scene.gravity.normalized();
-  const std::vector<size_t> own = ownSupports(carrier);
+  if (carrier.edited || carrier.removed) return;
   const auto isOwn = [&](int id) {
-    return std::any_of(own.begin(), own.end(), [&](size_t k) { return id == supportId(scene.planes.size() + k); });
+    return std::find(carrier.own_supports.begin(), carrier.own_supports.end(), id) != carrier.own_supports.end();
+  };
+  const auto isKnown = [&](int id) {
+    return std::any_of(rests.begin(), rests.end(), [&](const Rest& rest) { return rest.actor == id && rest.carrier == carrier.id; });
   };
   for (Actor& actor : actors) {
-    if (&actor == &carrier || actor.edited || actor.removed || actor.kind != ObjectKind::kStatic) continue;
+    if (&actor == &carrier || actor.edited || actor.removed || actor.kind != ObjectKind::kStatic || isKnown(actor.id)) continue;
     if (!actor.object.attachments.empty() || actor.track.at(now).moving) continue;
     const TriangleMesh surface = placed(actor.object.mesh, poseOf(actor, now));
-    const double size = boundingDiagonal(surface), reach = kReach * size;
+    const double size = boundingDiagonal(surface);
     bool carried_otherwise = false;
     std::optional<ObstacleHit> on;
     for (const Obstacle& obstacle : obstacles(now, now, &actor)) {
       if (isOwn(obstacle.id)) continue;
-      const auto hit = carriedBy(obstacle, surface, up, reach, size);
+      const auto hit = carrying(obstacle, surface, scene.gravity, kSupportGap * size);
       if (obstacle.id == carrier.id) on = hit;
       else carried_otherwise |= hit.has_value();
     }

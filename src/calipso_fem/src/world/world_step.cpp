@@ -68,11 +68,12 @@ std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor
     }
     list.push_back(o);
   }
-  if (except)
-    for (const size_t k : ownSupports(*except))
-      list.erase(std::remove_if(list.begin(), list.end(),
-                                [&](const Obstacle& o) { return o.id == supportId(scene.planes.size() + k); }),
-                 list.end());
+  if (except) {
+    const auto isOwn = [&](const Obstacle& o) {
+      return std::find(except->own_supports.begin(), except->own_supports.end(), o.id) != except->own_supports.end();
+    };
+    list.erase(std::remove_if(list.begin(), list.end(), isOwn), list.end());
+  }
   return list;
 }
 
