@@ -20,7 +20,6 @@ constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
 }();
 
 constexpr float kSameSheet = 0.015f;    // of the nearness: samples that differ by more see another part of an object
-constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
 
 cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
   const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);

@@ -11,6 +11,7 @@
 #include "line_codec.hpp"
 #include "plane_view.hpp"
 #include "point_light.hpp"
+#include "smooth_step.hpp"
 #include "triangle_map.hpp"
 
 namespace calipso::render {
@@ -42,12 +43,8 @@ struct RestPicture {
 constexpr int kLightStep = 4;     // px between the places where the light on a smooth surface is computed
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
 constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own pixels do not tell what it would be in more light
+constexpr float kStillPx = 0.05f;  // moved less: the frame's own pixels
 constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
-
-inline float smoothStep(float from, float to, float x) {
-  const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
-  return t * t * (3.0f - 2.0f * t);
-}
 
 inline cv::Mat disc(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
 

@@ -14,8 +14,6 @@ namespace {
 
 constexpr float kWholePx = 0.5f, kNonePx = 5.0f;  // movement up to which the residual goes along, and from which none does
 
-constexpr float kRestsPx = 0.05f;   // moved less: not at all
-
 constexpr float kMostChange = 3.0f;  // factor: what is missed by more, where a surface has moved, is misfit and not its look
 
 constexpr int kCarried = 16;  // px around surfaces at rest in which their rims and what they take over lie
@@ -208,7 +206,7 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
     // Where a surface that moves has turned away from, its rim has not come to.
     const cv::Point away = rim.nearest - cv::Point(rim.u, rim.v);
     const float reach = params_.background.mask_margin_px + kNonePx;
-    if (away.dot(away) > reach * reach && moved.norm() > kRestsPx) continue;
+    if (away.dot(away) > reach * reach && moved.norm() > kStillPx) continue;
     addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved, surface_of_slot_[VisibilityBuffer::objectOf(id)], row.colour[rim.u]);
   }
 }

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "calipso_render/surface_symmetry.hpp"
+#include "smooth_step.hpp"
 
 namespace calipso::render {
 namespace {
@@ -25,11 +26,6 @@ constexpr float kTurns[] = {0.0f, 0.5f, -0.5f};  // rad: middles of the part of 
 const cv::Vec3f kUnknown(0.3f, 0.3f, 0.3f);  // reflectance of an object that no picture shows
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
-
-float smoothStep(float low, float high, float x) {
-  const float t = std::clamp((x - low) / (high - low), 0.0f, 1.0f);
-  return t * t * (3.0f - 2.0f * t);
-}
 
 // A point of the surface, world axes, key frame.
 struct Place {
