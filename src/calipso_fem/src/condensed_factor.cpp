@@ -1,80 +1,94 @@
 #include "calipso_fem/condensed_factor.hpp"
 
 #include <cholmod.h>
-#include <omp.h>
 
 #include <algorithm>
-#include <mutex>
+#include <limits>
 #include <stdexcept>
-#include <string>
+#include <variant>
 
-// LAPACK: inverse of A from its Cholesky factor, lower triangle.
-extern "C" void dpotri_(const char* uplo, const int* n, double* a, const int* lda, int* info);
+#include "supernodal_factor.hpp"
 
 namespace calipso::fem {
 namespace {
 
-// CHOLMOD asks OpenMP for more threads than there are processors; its small supernodes lose by any. The level
-// is the process's: the first to come changes it, the last to go changes it back.
-class OneThread {
- public:
-  OneThread() {
-    const std::lock_guard<std::mutex> lock(mutex);
-    if (users++ > 0) return;
-    levels = omp_get_max_active_levels();
-    omp_set_max_active_levels(0);
-  }
-  ~OneThread() {
-    const std::lock_guard<std::mutex> lock(mutex);
-    if (--users == 0) omp_set_max_active_levels(levels);
-  }
+// The factor's numbers, and what is asked of them.
+template <typename Scalar>
+struct Numbers {
+  using Vector = typename SupernodalFactor<Scalar>::Vector;
 
- private:
-  static inline std::mutex mutex;
-  static inline int users = 0, levels = 1;
+  SupernodalFactor<Scalar> factor;
+  typename SupernodalFactor<Scalar>::Matrix last;  // L_cc
+  Vector reduced;                                  // L^-1 P b
+
+  bool update(const SupernodalPattern& pattern, const std::vector<int>& places, const std::vector<double>& entries,
+              int chosen);
+  Vec reduce(const SupernodalPattern& pattern, const std::vector<int>& permutation, const Vec& b);
+  Vec complete(const SupernodalPattern& pattern, const std::vector<int>& permutation, const Vec& forces) const;
 };
+
+template <typename Scalar>
+bool Numbers<Scalar>::update(const SupernodalPattern& pattern, const std::vector<int>& places,
+                             const std::vector<double>& entries, int chosen) {
+  std::vector<Scalar> values(pattern.first_value.back(), Scalar(0));
+  for (std::size_t k = 0; k < places.size(); ++k)
+    if (places[k] >= 0) values[places[k]] = static_cast<Scalar>(entries[k]);
+  if (!factor.factorize(pattern, std::move(values))) return false;
+  last = factor.lastOfLower(pattern, chosen);
+  return true;
+}
+
+template <typename Scalar>
+Vec Numbers<Scalar>::reduce(const SupernodalPattern& pattern, const std::vector<int>& permutation, const Vec& b) {
+  reduced.resize(b.size());
+  for (Eigen::Index k = 0; k < b.size(); ++k) reduced[k] = static_cast<Scalar>(b[permutation[k]]);
+  factor.solveLower(pattern, reduced);
+  Vector end = reduced.tail(last.rows());
+  last.template triangularView<Eigen::Lower>().transpose().solveInPlace(end);
+  return end.template cast<double>();
+}
+
+template <typename Scalar>
+Vec Numbers<Scalar>::complete(const SupernodalPattern& pattern, const std::vector<int>& permutation,
+                              const Vec& forces) const {
+  Vector z = reduced, pushed = forces.cast<Scalar>();
+  last.template triangularView<Eigen::Lower>().solveInPlace(pushed);
+  z.tail(last.rows()) += pushed;
+  factor.solveLowerTransposed(pattern, z);
+  Vec result(z.size());
+  for (Eigen::Index k = 0; k < z.size(); ++k) result[permutation[k]] = z[k];
+  return result;
+}
 
 }  // namespace
 
 struct CondensedFactor::Impl {
   cholmod_common common{};
-  cholmod_sparse* matrix = nullptr;
-  cholmod_factor* factor = nullptr;
-  cholmod_dense *solution = nullptr, *y = nullptr, *e = nullptr;
   std::shared_ptr<const BlockPattern> pattern;
   std::vector<int> order;                // of elimination, without chosen nodes: for any choice
   std::vector<int> nodes, index;         // index: by node
-  Eigen::MatrixXd last;                  // L_cc
+  SupernodalPattern blocks;
+  std::vector<int> permutation;          // components in the order of elimination
+  std::vector<int> places;               // by entry of A: where in L it belongs; -1: above the diagonal
+  std::variant<Numbers<float>, Numbers<double>> numbers;
+  bool analyzed = false;
   Eigen::MatrixXd compliance;            // empty: not yet asked for
-  Vec reduced;                           // L^-1 P b
 
   Impl() {
     cholmod_start(&common);
     common.print = 0;
     common.supernodal = CHOLMOD_SUPERNODAL;
-    common.final_ll = 1;
-    common.quick_return_if_not_posdef = 1;
     common.nmethods = 1;
     common.postorder = 0;  // would move the chosen nodes
+    common.method[0].ordering = CHOLMOD_GIVEN;
   }
-  ~Impl() {
-    release();
-    cholmod_finish(&common);
-  }
-
-  void release() {
-    cholmod_free_sparse(&matrix, &common);
-    cholmod_free_factor(&factor, &common);
-    cholmod_free_dense(&solution, &common);
-    cholmod_free_dense(&y, &common);
-    cholmod_free_dense(&e, &common);
-  }
+  ~Impl() { cholmod_finish(&common); }
 
   void orderNodes();
-  void analyze(const BlockMatrix& A);
-  void fill(const BlockMatrix& A);
-  void readLast();
-  Eigen::Map<const Vec> solve(int system, const Vec& b);
+  void analyze();
+  void placeEntries();
+  template <typename Scalar>
+  bool factorize(const BlockMatrix& A);
 };
 
 // Nested dissection of the graph of nodes.
@@ -99,15 +113,11 @@ void CondensedFactor::Impl::orderNodes() {
   if (components < 0) throw std::runtime_error("CHOLMOD: ordering failed (out of memory?)");
 }
 
-void CondensedFactor::Impl::analyze(const BlockMatrix& A) {
-  release();
-  if (A.pattern != pattern) {
-    pattern = A.pattern;
-    orderNodes();
-  }
+// CHOLMOD finds out which columns of L are alike; the numbers are not its.
+void CondensedFactor::Impl::analyze() {
   const int n = pattern->rows();
   const std::size_t entries = 9 * (static_cast<std::size_t>(pattern->blockCount()) - n) / 2 + 6 * n;
-  matrix = cholmod_allocate_sparse(3 * n, 3 * n, entries, 1, 1, -1, CHOLMOD_REAL, &common);
+  cholmod_sparse* matrix = cholmod_allocate_sparse(3 * n, 3 * n, entries, 1, 1, -1, CHOLMOD_PATTERN, &common);
   auto* outer = static_cast<int*>(matrix->p);
   auto* inner = static_cast<int*>(matrix->i);
   int next = 0;
@@ -119,73 +129,72 @@ void CondensedFactor::Impl::analyze(const BlockMatrix& A) {
           inner[next++] = 3 * pattern->column[k] + d;
     }
   outer[3 * n] = next;
-  std::vector<int> permutation;
+  permutation.clear();
   const auto append = [&](int node) {
     for (int c = 0; c < 3; ++c) permutation.push_back(3 * node + c);
   };
   for (const int node : order)
     if (index[node] < 0) append(node);
   for (const int node : nodes) append(node);
-  fill(A);
-  common.method[0].ordering = CHOLMOD_GIVEN;
-  factor = cholmod_analyze_p(matrix, permutation.data(), nullptr, 0, &common);
+  cholmod_factor* factor = cholmod_analyze_p(matrix, permutation.data(), nullptr, 0, &common);
+  cholmod_free_sparse(&matrix, &common);
   if (!factor) throw std::runtime_error("CHOLMOD: symbolic analysis failed (out of memory?)");
+  const auto copied = [](const void* from, std::size_t count) {
+    return std::vector<int>(static_cast<const int*>(from), static_cast<const int*>(from) + count);
+  };
+  blocks.size = 3 * n;
+  blocks.first_column = copied(factor->super, factor->nsuper + 1);
+  blocks.first_row = copied(factor->pi, factor->nsuper + 1);
+  blocks.first_value = copied(factor->px, factor->nsuper + 1);
+  blocks.rows = copied(factor->s, factor->ssize);
+  cholmod_free_factor(&factor, &common);
+  blocks.relate();
+  placeEntries();
 }
 
-// Lower triangle, column by column; row i of the symmetric A read to the right is column i.
-void CondensedFactor::Impl::fill(const BlockMatrix& A) {
-  auto* value = static_cast<double*>(matrix->x);
+void CondensedFactor::Impl::placeEntries() {
+  std::vector<int> rank(permutation.size());
+  for (std::size_t k = 0; k < permutation.size(); ++k) rank[permutation[k]] = static_cast<int>(k);
+  places.assign(9 * static_cast<std::size_t>(pattern->blockCount()), -1);
   for (int i = 0; i < pattern->rows(); ++i)
-    for (int c = 0; c < 3; ++c)
-      for (int k = pattern->diagonal[i]; k < pattern->row_start[i + 1]; ++k)
-        for (int d = k == pattern->diagonal[i] ? c : 0; d < 3; ++d)
-          *value++ = A.values[9 * static_cast<std::size_t>(k) + 3 * c + d];
-}
-
-void CondensedFactor::Impl::readLast() {
-  const int n = static_cast<int>(factor->n), m = 3 * static_cast<int>(nodes.size());
-  const auto *super = static_cast<int*>(factor->super), *pi = static_cast<int*>(factor->pi),
-             *px = static_cast<int*>(factor->px), *s = static_cast<int*>(factor->s);
-  const auto* x = static_cast<double*>(factor->x);
-  last.setZero(m, m);
-  for (std::size_t k = 0; k < factor->nsuper; ++k) {
-    const int rows = pi[k + 1] - pi[k];
-    for (int j = std::max(super[k], n - m); j < super[k + 1]; ++j)
-      for (int r = j - super[k]; r < rows; ++r)
-        last(s[pi[k] + r] - (n - m), j - (n - m)) = x[px[k] + (j - super[k]) * rows + r];
-  }
-}
-
-Eigen::Map<const Vec> CondensedFactor::Impl::solve(int system, const Vec& b) {
-  cholmod_dense right{};
-  right.nrow = right.d = right.nzmax = b.size();
-  right.ncol = 1;
-  right.x = const_cast<double*>(b.data());
-  right.xtype = CHOLMOD_REAL;
-  right.dtype = CHOLMOD_DOUBLE;
-  cholmod_solve2(system, factor, &right, nullptr, &solution, nullptr, &y, &e, &common);
-  if (!solution) throw std::runtime_error("CHOLMOD: solve failed (out of memory?)");
-  return {static_cast<const double*>(solution->x), b.size()};
+    for (int k = pattern->row_start[i]; k < pattern->row_start[i + 1]; ++k)
+      for (int c = 0; c < 3; ++c)
+        for (int d = 0; d < 3; ++d) {
+          const int row = rank[3 * i + c], column = rank[3 * pattern->column[k] + d];
+          if (row >= column) places[9 * static_cast<std::size_t>(k) + 3 * c + d] = blocks.valueAt(row, column);
+        }
 }
 
 CondensedFactor::CondensedFactor() : impl_(std::make_unique<Impl>()) {}
 CondensedFactor::~CondensedFactor() = default;
 
-bool CondensedFactor::update(const BlockMatrix& A, const std::vector<int>& nodes) {
+template <typename Scalar>
+bool CondensedFactor::Impl::factorize(const BlockMatrix& A) {
+  if (!std::holds_alternative<Numbers<Scalar>>(numbers)) numbers = Numbers<Scalar>();
+  return std::get<Numbers<Scalar>>(numbers).update(blocks, places, A.values, 3 * static_cast<int>(nodes.size()));
+}
+
+bool CondensedFactor::update(const BlockMatrix& A, const std::vector<int>& nodes, double tolerance) {
   Impl& m = *impl_;
-  if (A.pattern != m.pattern || nodes != m.nodes || !m.factor) {
+  if (A.pattern != m.pattern || nodes != m.nodes || !m.analyzed) {
+    m.analyzed = false;
     m.nodes = nodes;
     m.index.assign(A.pattern->rows(), -1);
     for (std::size_t k = 0; k < nodes.size(); ++k) m.index[nodes[k]] = static_cast<int>(k);
-    m.analyze(A);
+    if (A.pattern != m.pattern) {
+      m.pattern = A.pattern;
+      m.orderNodes();
+    }
+    m.analyze();
+    m.analyzed = true;
   }
-  m.fill(A);
   m.compliance.resize(0, 0);
-  const OneThread serial;
-  cholmod_factorize(m.matrix, m.factor, &m.common);
-  if (m.common.status != CHOLMOD_OK || m.factor->minor != m.factor->n) return false;
-  m.readLast();
-  return true;
+  if (tolerance > 0.0) {
+    const bool definite = m.factorize<float>(A);
+    const double cancellation = std::get<Numbers<float>>(m.numbers).factor.cancellation();
+    if (cancellation * std::numeric_limits<float>::epsilon() <= tolerance) return definite;
+  }
+  return m.factorize<double>(A);
 }
 
 const std::vector<int>& CondensedFactor::nodes() const { return impl_->nodes; }
@@ -196,36 +205,23 @@ int CondensedFactor::indexOf(int node) const {
 
 const Eigen::MatrixXd& CondensedFactor::compliance() {
   Impl& m = *impl_;
-  if (m.compliance.size() > 0 || m.last.size() == 0) return m.compliance;
-  m.compliance = m.last;
-  const int n = static_cast<int>(m.last.rows());
-  int info = 0;
-  dpotri_("L", &n, m.compliance.data(), &n, &info);
-  if (info != 0) throw std::runtime_error("LAPACK: dpotri failed (" + std::to_string(info) + ")");
-  m.compliance.triangularView<Eigen::StrictlyUpper>() = m.compliance.transpose();
+  if (m.compliance.size() == 0)
+    std::visit(
+        [&](const auto& numbers) {
+          m.compliance = numbers.factor.inverseFromLower(numbers.last).template cast<double>();
+        },
+        m.numbers);
   return m.compliance;
 }
 
 Vec CondensedFactor::reduce(const Vec& b) {
-  Impl& m = *impl_;
-  const auto* permutation = static_cast<const int*>(m.factor->Perm);
-  Vec permuted(b.size());
-  for (Eigen::Index k = 0; k < b.size(); ++k) permuted[k] = b[permutation[k]];
-  m.reduced = m.solve(CHOLMOD_L, permuted);
-  Vec end = m.reduced.tail(m.last.rows());
-  m.last.triangularView<Eigen::Lower>().transpose().solveInPlace(end);
-  return end;
+  return std::visit([&](auto& numbers) { return numbers.reduce(impl_->blocks, impl_->permutation, b); },
+                    impl_->numbers);
 }
 
 Vec CondensedFactor::complete(const Vec& forces) {
-  Impl& m = *impl_;
-  Vec z = m.reduced;
-  z.tail(m.last.rows()) += m.last.triangularView<Eigen::Lower>().solve(forces);
-  const auto x = m.solve(CHOLMOD_Lt, z);
-  const auto* permutation = static_cast<const int*>(m.factor->Perm);
-  Vec result(x.size());
-  for (Eigen::Index k = 0; k < x.size(); ++k) result[permutation[k]] = x[k];
-  return result;
+  return std::visit([&](auto& numbers) { return numbers.complete(impl_->blocks, impl_->permutation, forces); },
+                    impl_->numbers);
 }
 
 }  // namespace calipso::fem

@@ -18,8 +18,9 @@ class CondensedFactor {
   ~CondensedFactor();
 
   // nodes: ascending. The analysis is kept while pattern and nodes stay. False: A is not positive
-  // definite. @throw std::runtime_error when out of memory
-  bool update(const BlockMatrix& A, const std::vector<int>& nodes);
+  // definite. Single precision is taken where it leaves the pivots a relative error below `tolerance`.
+  // @throw std::runtime_error when out of memory
+  bool update(const BlockMatrix& A, const std::vector<int>& nodes, double tolerance = 0.0);
   const std::vector<int>& nodes() const;
   int indexOf(int node) const;  // among nodes(); -1: not there
 

@@ -6,9 +6,33 @@
 namespace calipso::fem {
 namespace {
 
+constexpr double kPivotError = 1e-3;  // relative: the iteration corrects what its matrix is off by
+
 void turnNodes(const Eigen::Matrix3d& R, Vec& v) {
   Eigen::Map<Eigen::Matrix3Xd> columns(v.data(), 3, v.size() / 3);
   columns = (R * columns).eval();
+}
+
+Eigen::Vector3d sumOfNodes(const Vec& v) {
+  return Eigen::Map<const Eigen::Matrix3Xd>(v.data(), 3, v.size() / 3).rowwise().sum();
+}
+
+bool holdsSomething(const DeformableBody& body) {
+  for (int node = 0; node < body.nodeCount(); ++node)
+    for (int axis = 0; axis < 3; ++axis)
+      if (body.isPrescribed(node, axis)) return true;
+  return false;
+}
+
+// A times a shift of all nodes along each axis.
+Eigen::MatrixX3d shiftedBy(const BlockMatrix& A) {
+  Eigen::MatrixX3d result(3 * A.pattern->rows(), 3);
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec y;
+    A.multiply(Eigen::Vector3d::Unit(axis).replicate(A.pattern->rows(), 1), y);
+    result.col(axis) = y;
+  }
+  return result;
 }
 
 }  // namespace
@@ -35,14 +59,14 @@ void SoftSystem::renew(DeformableBody& body, const Eigen::Matrix3d& rotation,
   valid_ = false;
   if (indefinite_ == 0) {
     body.trialSystem(Definiteness::kExact, &A_, &pull_);
-    valid_ = factor_.update(A_, all);
+    valid_ = factor_.update(A_, all, kPivotError);
     if (!valid_) indefinite_ = kExpectedIndefinite;
   } else {
     --indefinite_;
   }
   if (!valid_) {
     body.trialSystem(Definiteness::kPositive, &A_, &pull_);
-    valid_ = factor_.update(A_, all);
+    valid_ = factor_.update(A_, all, kPivotError);
   }
   if (!valid_) throw std::runtime_error("contact: the body's system is not positive definite");
   held_.clear();
@@ -50,6 +74,7 @@ void SoftSystem::renew(DeformableBody& body, const Eigen::Matrix3d& rotation,
   for (size_t k = 0; k < all.size(); ++k)
     for (int axis = 0; axis < 3; ++axis)
       if (body.isPrescribed(all[k], axis)) held_.push_back(3 * static_cast<int>(k) + axis);
+  shifted_ = holdsSomething(body) ? Eigen::MatrixX3d() : shiftedBy(A_);
   frozen_ = rotation;
   turn_.setIdentity();
   h_ = h;
@@ -75,6 +100,7 @@ const Eigen::MatrixXd& SoftSystem::compliance() {
 Vec SoftSystem::reduce(const Vec& forces) {
   Vec b = forces;
   turnNodes(turn_.transpose(), b);
+  push_ = sumOfNodes(b);
   Vec way = factor_.reduce(b);
   turnNodes(turn_, way);
   return way;
@@ -87,6 +113,12 @@ Vec SoftSystem::complete(const Vec& contact_forces) {
     f.segment<3>(3 * k) = turn_.transpose() * contact_forces.segment<3>(3 * nodes[k]);
   for (const int dof : held_) f[dof] = 0.0;
   Vec d = factor_.complete(f);
+  if (shifted_.size() > 0) {
+    const Eigen::Vector3d lacking = push_ + sumOfNodes(f) - shifted_.transpose() * d;
+    Eigen::Matrix3d inertia;
+    for (int axis = 0; axis < 3; ++axis) inertia.col(axis) = sumOfNodes(shifted_.col(axis));
+    d += inertia.ldlt().solve(lacking).replicate(d.size() / 3, 1);
+  }
   turnNodes(turn_, d);
   return d;
 }
