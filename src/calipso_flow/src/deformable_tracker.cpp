@@ -35,16 +35,16 @@ PatchParams patchParams(const PatchParams& rigid) {
   return params;
 }
 
-std::optional<PatchMatch> matchPoint(const LookMatch& look, const Eigen::Vector2d& at,
+std::optional<PatchMatch> matchPoint(const LookMatch& look, const LookMatch::Seed& seed,
                                      const TrackerParams& params) {
-  const auto there = look.find(at, params.patch);
+  const auto there = look.find(seed, params.patch);
   if (!there || there->correlation < params.least_correlation) return std::nullopt;
   if (look.care() == Care::kRough) return there;
   const double certain =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(there->covariance).eigenvalues()[0];
   if (std::sqrt(std::max(0.0, certain)) > params.largest_deviation_px) return std::nullopt;
   if (look.care() == Care::kForward) return there;
-  const auto miss = look.missOnReturn(at, *there, params.patch);
+  const auto miss = look.missOnReturn(seed.at, *there, params.patch);
   if (!miss) return std::nullopt;
   const double floor = params.forward_backward_px / kReturnDeviations;
   const Eigen::Matrix2d allowed =
@@ -104,15 +104,16 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
   const Eigen::Isometry3d camera_from_object =
       frame.camera.world_from_camera.inverse() * model_.world_from_object;
   std::vector<int> visible;
-  std::vector<Eigen::Vector2d> pixels;
+  std::vector<LookMatch::Seed> pixels;
   for (int i = 0; i < points.rows(); ++i) {
     const Eigen::Vector3d p = camera_from_object * points.row(i).transpose();
     if (p.z() <= 0.0) continue;
     visible.push_back(i);
-    pixels.push_back(frame.camera.project(p));
+    const Eigen::Vector2d pixel = frame.camera.project(p);
+    pixels.push_back({pixel, pixel});
   }
   const LookMatch::Matches found = LookMatch::forEach(
-      pixels, [&](const Eigen::Vector2d& at) { return matchPoint(pictures, at, params_); });
+      pixels, [&](const LookMatch::Seed& seed) { return matchPoint(pictures, seed, params_); });
   for (size_t i = 0; i < visible.size(); ++i) {
     if (!found[i]) continue;
     matches.push_back(
@@ -143,7 +144,7 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
     observation.deviation = fit.deviation;
     observation.tracks.clear();
     for (size_t i = 0; i < matches.size(); ++i) {
-      observation.tracks.push_back({matches[i].point, matches[i].pixel, 1.0, fit.inlier[i]});
+      observation.tracks.push_back({matches[i].point, matches[i].pixel, 1.0, std::sqrt(0.5 * matches[i].covariance.trace()), fit.inlier[i]});
     }
   }
   if (!observation.found) {

@@ -15,6 +15,7 @@ constexpr double kLeastPhase = 0.5;       // rad over the object's size
 constexpr double kEnd = 0.05;             // of the extent along gravity: what counts as the end
 constexpr double kLeftShare = 0.15;       // of the tracks that must have moved
 constexpr int kLeastLeft = 6;
+constexpr double kLeftDeviations = 8.0;   // of a track, which scatters by about twice its own account
 
 SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& modes,
                       const SpectralLine& line, Eigen::VectorXcd& shape) {
@@ -102,7 +103,8 @@ bool hasLeft(const Observation& observation, const Eigen::Isometry3d& still_pose
   for (const Track& track : observation.tracks) {
     const Eigen::Vector3d p = camera.world_from_camera.inverse() * (still_pose * track.point);
     if (p.z() <= 0.0) continue;
-    if ((camera.project(p) - track.pixel).norm() > 2.0 * rest_px) ++left;
+    const double apart = (camera.project(p) - track.pixel).norm();
+    if (apart > std::max(2.0 * rest_px, kLeftDeviations * track.deviation)) ++left;
   }
   return left >= std::max<double>(kLeastLeft, kLeftShare * observation.tracks.size());
 }

@@ -35,21 +35,19 @@ LookMatch::LookMatch(const ReferenceView::Warped& look, const cv::Mat& picture, 
   frame_ = halved(frame_);
 }
 
-std::optional<PatchMatch> LookMatch::find(const Eigen::Vector2d& at,
-                                          const PatchParams& params) const {
-  const Eigen::Vector2d scaled = scale_ * at;
-  auto match = matchPatch({look_, scaled, weight_, scaled}, frame_, scaled, params);
+std::optional<PatchMatch> LookMatch::find(const Seed& seed, const PatchParams& params) const {
+  const Eigen::Vector2d at = scale_ * seed.at;
+  auto match = matchPatch({look_, at, weight_, at}, frame_, scale_ * seed.expected, params);
   if (!match) return std::nullopt;
   match->position /= scale_;
   match->covariance /= scale_ * scale_;
   return match;
 }
 
-LookMatch::Matches LookMatch::forEach(const std::vector<Eigen::Vector2d>& points,
-                                      const Search& search) {
-  Matches matches(points.size());
-  cv::parallel_for_({0, static_cast<int>(points.size())}, [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) matches[i] = search(points[i]);
+LookMatch::Matches LookMatch::forEach(const std::vector<Seed>& seeds, const Search& search) {
+  Matches matches(seeds.size());
+  cv::parallel_for_({0, static_cast<int>(seeds.size())}, [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) matches[i] = search(seeds[i]);
   }, kStripes);
   return matches;
 }

@@ -12,15 +12,17 @@ namespace calipso::flow {
 namespace {
 
 constexpr int kRefinements = 2;          // warp, match both ways, fit
-constexpr double kSettledPx = 0.05;      // a refinement that moves less than this is the last
-constexpr double kSameLookPx = 0.1;      // poses this close need no look of their own
+constexpr double kSameLookShare = 0.025; // of a patch's radius: poses this close need no look of their own
 constexpr double kClearShare = 0.7;      // of the frame before's tracks: with so many no search is needed
 constexpr double kNearPx = 1.5;          // a prediction this close needs no half-size match
+constexpr double kSameShapePx = 1.0;     // looks that differ by this, but for where they are, serve for one another
+constexpr double kOtherView = 0.1;       // rad, or relative distance: looks from nearer show the same
 constexpr double kLeastInlierShare = 0.35;    // of the matches
 constexpr double kLeastVisibleShare = 0.25;   // of the seeds inside the picture
 constexpr double kFirstSearch = 0.2;     // of the picture's width, while no motion is known
 constexpr int kForgetAfter = 3;         // frames without the object before its motion is forgotten
 constexpr int kWeakInliers = 12;         // fewer tracks than this are worth another attempt
+constexpr double kStaysShare = 0.01;     // of the diagonal: what moves less has not moved
 constexpr double kReturnDeviations = 3.0;
 constexpr double kPatchShare = 1.0 / 160.0;  // of the picture's width: a patch's radius
 constexpr int kLargestRadius = 9;            // px
@@ -28,9 +30,9 @@ constexpr double kDrownedShare = 0.35;   // of the seeds in the picture: with fe
 constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
 
 // A match that is as likely and as certain as asked for, and comes back where that is checked.
-std::optional<PatchMatch> matchSeed(const LookMatch& match, const Eigen::Vector2d& at,
+std::optional<PatchMatch> matchSeed(const LookMatch& match, const LookMatch::Seed& seed,
                                     const TrackerParams& params) {
-  const auto there = match.find(at, params.patch);
+  const auto there = match.find(seed, params.patch);
   if (!there || there->correlation < params.least_correlation) return std::nullopt;
   if (match.care() == Care::kRough) return there;
   // A patch with little texture wanders with the noise, and is trusted accordingly.
@@ -38,47 +40,68 @@ std::optional<PatchMatch> matchSeed(const LookMatch& match, const Eigen::Vector2
   if (deviation > params.largest_deviation_px) return std::nullopt;
   if (match.care() == Care::kForward) return there;
   const double allowed = params.forward_backward_px + kReturnDeviations * deviation;
-  const auto back = match.missOnReturn(at, *there, params.patch);
+  const auto back = match.missOnReturn(seed.at, *there, params.patch);
   if (!back || back->norm() > allowed) return std::nullopt;
   return there;
 }
 
-// Follows the reference's seeds into the frame, the object's look being warped to `pose`.
+// Follows the reference's seeds into the frame, the object's look being warped to `look` and the object expected at `start`.
 std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& reference,
-                               const Camera& camera, const Eigen::Isometry3d& pose,
+                               const Camera& camera, const Eigen::Isometry3d& look, const Eigen::Isometry3d& start,
                                const TrackerParams& params, std::vector<Correspondence>& found) {
-  const Eigen::Isometry3d camera_from_object = camera.world_from_camera.inverse() * pose;
+  const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
   std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector2d> pixels;
+  std::vector<LookMatch::Seed> pixels;
   for (const Eigen::Vector3d& seed : reference.seeds()) {
-    const Eigen::Vector3d p_camera = camera_from_object * seed;
-    if (p_camera.z() <= 0.0) continue;
+    const Eigen::Vector3d in_look = camera_from_world * (look * seed), expected = camera_from_world * (start * seed);
+    if (in_look.z() <= 0.0 || expected.z() <= 0.0) continue;
     points.push_back(seed);
-    pixels.push_back(camera.project(p_camera));
+    pixels.push_back({camera.project(in_look), camera.project(expected)});
   }
   const LookMatch::Matches matches = LookMatch::forEach(
-      pixels, [&](const Eigen::Vector2d& at) { return matchSeed(match, at, params); });
+      pixels, [&](const LookMatch::Seed& seed) { return matchSeed(match, seed, params); });
   std::vector<Track> tracks;
   for (size_t i = 0; i < points.size(); ++i) {
     const auto& there = matches[i];
     if (!there) continue;
     found.push_back({points[i], there->position, there->covariance});
-    tracks.push_back({points[i], there->position, there->correlation, false});
+    tracks.push_back({points[i], there->position, there->correlation, std::sqrt(0.5 * there->covariance.trace()), false});
   }
   return tracks;
 }
 
-// Largest image motion of the points between two poses, px.
-double imageMotion(const Camera& camera, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
-                   const std::vector<Eigen::Vector3d>& points) {
+// Image motion of the points between two poses, px.
+struct ImageMotion {
+  double largest = 0.0;  // of a point
+  double bend = 0.0;     // largest deviation of a point from their mean
+};
+
+ImageMotion imageMotion(const Camera& camera, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
+                        const std::vector<Eigen::Vector3d>& points) {
   const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
-  double largest = 0.0;
+  std::vector<Eigen::Vector2d> motions;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (const Eigen::Vector3d& point : points) {
-    const Eigen::Vector3d pa = camera_from_world * a * point, pb = camera_from_world * b * point;
+    const Eigen::Vector3d pa = camera_from_world * (a * point), pb = camera_from_world * (b * point);
     if (pa.z() <= 0.0 || pb.z() <= 0.0) continue;
-    largest = std::max(largest, (camera.project(pa) - camera.project(pb)).norm());
+    motions.push_back(camera.project(pb) - camera.project(pa));
+    sum += motions.back();
   }
-  return largest;
+  ImageMotion motion;
+  for (const Eigen::Vector2d& each : motions) {
+    motion.largest = std::max(motion.largest, each.norm());
+    motion.bend = std::max(motion.bend, (each - sum / static_cast<double>(motions.size())).norm());
+  }
+  return motion;
+}
+
+// How differently a reference and a frame show an object: by the turn against the camera, rad, and by the distance, relative.
+double viewChange(const ReferenceView& reference, const Frame& frame, const Eigen::Isometry3d& pose,
+                  const Eigen::Vector3d& centroid) {
+  const Eigen::Isometry3d now = frame.camera.world_from_camera.inverse() * pose;
+  const Eigen::Isometry3d then = reference.frame().camera.world_from_camera.inverse() * reference.worldFromObject();
+  const double turn = vectorFromRotation(now.linear() * then.linear().transpose()).norm();
+  return std::hypot(turn, std::log((now * centroid).norm() / (then * centroid).norm()));
 }
 
 // Seeds that the camera would see inside the picture, hidden or not.
@@ -119,19 +142,20 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
   params_.patch.radius_px = std::max(params.patch.radius_px, std::min(scaled, kLargestRadius));
   wide_ = params_;
   wide_.patch.radius_px = std::max(params_.patch.radius_px, kLargestRadius);
-  references_.emplace_back(key_frame, model_, model.world_from_object, mask, params.seed_count);
+  references_.push_back({ReferenceView(key_frame, model_, model.world_from_object, mask, params.seed_count)});
   const double sigma = kKeySigma * boundingDiagonal(model.mesh);
   key_.time = key_frame.time;
   key_.found = true;
   key_.world_from_object = model.world_from_object;
   key_.covariance.diagonal() << Eigen::Vector3d::Constant(sigma * sigma),
       Eigen::Vector3d::Constant(kKeySigma * kKeySigma);
-  for (const Eigen::Vector3d& seed : references_.front().seeds()) {
+  for (const Eigen::Vector3d& seed : references_.front().view.seeds()) {
     key_.tracks.push_back(
-        {seed, key_frame.camera.projectWorld(model.world_from_object * seed), 1.0, true});
+        {seed, key_frame.camera.projectWorld(model.world_from_object * seed), 1.0, 0.0, true});
   }
   last_ = key_;
   last_seen_time_ = key_.time;
+  due_inliers_ = static_cast<int>(key_.tracks.size());
 }
 
 Eigen::Isometry3d ObjectTracker::predict(double time) const {
@@ -145,19 +169,26 @@ Eigen::Isometry3d ObjectTracker::predict(double time) const {
   return movePose(to, centroid_, share * motion);
 }
 
-// The look of an object at rest serves for many frames.
+// The look of an object at rest serves for many frames; where it need not be exact, so does one that is shifted.
 const ObjectTracker::Look& ObjectTracker::lookAt(const Frame& frame, const ReferenceView& reference,
-                                                 const Eigen::Isometry3d& pose) {
-  const bool same = look_.reference == &reference &&
-                    look_.world_from_camera.isApprox(frame.camera.world_from_camera, 0.0) &&
-                    imageMotion(frame.camera, look_.pose, pose, reference.seeds()) < kSameLookPx;
-  if (!same) look_ = {&reference, frame.camera.world_from_camera, pose, reference.warp(frame.camera, pose)};
+                                                 const Eigen::Isometry3d& pose, Care care) {
+  const bool shifted = care == Care::kForward && look_.reference == &reference &&
+                       imageMotion(frame.camera, look_.pose, pose, reference.seeds()).bend < kSameShapePx;
+  if (!shifted && !isLookOf(frame, reference, pose)) {
+    look_ = {&reference, frame.camera.world_from_camera, pose, reference.warp(frame.camera, pose)};
+  }
   return look_;
+}
+
+bool ObjectTracker::isLookOf(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose) const {
+  return look_.reference == &reference && look_.world_from_camera.isApprox(frame.camera.world_from_camera, 0.0) &&
+         imageMotion(frame.camera, look_.pose, pose, reference.seeds()).largest <
+             kSameLookShare * params_.patch.radius_px;
 }
 
 Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const ReferenceView& reference,
                                                 const Eigen::Isometry3d& predicted) {
-  const ReferenceView::Warped& look = lookAt(frame, reference, predicted).warped;
+  const ReferenceView::Warped& look = lookAt(frame, reference, predicted, Care::kRough).warped;
   if (look.coverage == 0.0) return predicted;
   // The object may have stopped, or turned round: look as far as twice back to where it was.
   const Eigen::Vector2d home = frame.camera.projectWorld(predicted * centroid_);
@@ -177,20 +208,18 @@ Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const Refere
 Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& reference,
                                   const Eigen::Isometry3d& start, const TrackerParams& params) {
   const bool near =
-      last_ && imageMotion(frame.camera, last_->world_from_object, start, reference.seeds()) < kNearPx;
+      imageMotion(frame.camera, last_->world_from_object, start, reference.seeds()).largest < kNearPx;
   Observation observation;
   observation.time = frame.time;
   observation.world_from_object = start;
-  if (!near) observation.world_from_object = refineOnce(frame, reference, Care::kRough, params, observation);
-  observation.world_from_object = refineOnce(frame, reference, Care::kForward, params, observation);
+  if (!near) {
+    observation.world_from_object = refineOnce(frame, reference, Care::kRough, params, observation);
+    observation.world_from_object = refineOnce(frame, reference, Care::kForward, params, observation);
+  }
   for (int round = 0; round < kRefinements; ++round) {
-    const Eigen::Isometry3d before = observation.world_from_object;
     observation.world_from_object = refineOnce(frame, reference, Care::kChecked, params, observation);
-    if (!observation.found) break;
-    if (imageMotion(frame.camera, before, observation.world_from_object, reference.seeds()) <
-        kSettledPx) {
-      break;
-    }
+    // The same look again would give the same pose.
+    if (!observation.found || isLookOf(frame, reference, observation.world_from_object)) break;
   }
   return observation;
 }
@@ -198,15 +227,16 @@ Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& refer
 Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceView& reference,
                                             Care care, const TrackerParams& params,
                                             Observation& observation) {
-  const Look& seen = lookAt(frame, reference, observation.world_from_object);
-  const Eigen::Isometry3d pose = seen.pose;
+  const Look& seen = lookAt(frame, reference, observation.world_from_object, care);
+  // The same place, but for what is too little to be told, gives the same numbers.
+  const Eigen::Isometry3d pose = care == Care::kForward ? observation.world_from_object : seen.pose;
   observation.found = false;
   observation.tracks.clear();
   observation.coverage = seen.warped.coverage;
   if (seen.warped.coverage == 0.0) return pose;
   std::vector<Correspondence> found;
   observation.tracks = followSeeds(LookMatch(seen.warped, frame.gray, care), reference, frame.camera,
-                                   pose, params, found);
+                                   seen.pose, pose, params, found);
   const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params.pose);
   // Few agreeing matches where many are due are the background, not the object.
   const int due = seedsInPicture(reference, frame.camera, fit.world_from_object);
@@ -220,18 +250,10 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   return fit.world_from_object;
 }
 
-const ReferenceView& ObjectTracker::nearestReference(const Frame& frame,
-                                                     const Eigen::Isometry3d& pose) const {
-  // The way the camera sees the object decides: compare rotations of object against camera.
-  const auto angle = [&](const ReferenceView& r) {
-    const Eigen::Matrix3d now = frame.camera.world_from_camera.linear().transpose() * pose.linear();
-    const Eigen::Matrix3d then = r.frame().camera.world_from_camera.linear().transpose() *
-                                 r.worldFromObject().linear();
-    return vectorFromRotation(now * then.transpose()).norm();
-  };
-  return *std::min_element(
-      references_.begin(), references_.end(),
-      [&](const ReferenceView& a, const ReferenceView& b) { return angle(a) < angle(b); });
+ObjectTracker::Reference& ObjectTracker::nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) {
+  return *std::min_element(references_.begin(), references_.end(), [&](const Reference& a, const Reference& b) {
+    return viewChange(a.view, frame, pose, centroid_) < viewChange(b.view, frame, pose, centroid_);
+  });
 }
 
 Observation ObjectTracker::track(const Frame& frame, bool cut) {
@@ -245,21 +267,31 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
   frames_lost_ = cut ? kForgetAfter : frames_lost_;
   const Eigen::Isometry3d predicted =
       frames_lost_ < kForgetAfter ? predict(frame.time) : last_->world_from_object;
-  const ReferenceView& nearest = nearestReference(frame, predicted);
-  Observation best = attempt(frame, nearest, predicted, params_);
+  const ReferenceView& nearest = nearestReference(frame, predicted).view;
+  Observation best = attempt(frame, nearest, predicted, drowned_ ? wide_ : params_);
+  if (!isClear(best)) best = tryOtherwise(frame, nearest, predicted, std::move(best));
+  frames_lost_ = best.found ? 0 : frames_lost_ + 1;
+  if (best.found) remember(frame, best, cut);
+  return best;
+}
+
+// The motion may have changed, the look, or the picture: tries every other way to recognise the object.
+Observation ObjectTracker::tryOtherwise(const Frame& frame, const ReferenceView& nearest,
+                                        const Eigen::Isometry3d& predicted, Observation best) {
   if (best.inliers() < kWeakInliers) {
-    // The motion may have changed, or the look: try every other way to recognise the object.
-    for (const ReferenceView& reference : references_) {
-      Observation other = attempt(frame, reference, last_->world_from_object, params_);
+    for (const Reference& reference : references_) {
+      Observation other = attempt(frame, reference.view, last_->world_from_object, drowned_ ? wide_ : params_);
       if (other.inliers() > best.inliers()) best = std::move(other);
     }
   }
   if (best.inliers() < kDrownedShare * seedsInPicture(nearest, frame.camera, predicted)) {
-    Observation wide = attempt(frame, nearest, predicted, wide_);
-    if (wide.inliers() > best.inliers()) best = std::move(wide);
+    Observation other = attempt(frame, nearest, predicted, drowned_ ? params_ : wide_);
+    if (other.inliers() > best.inliers()) {
+      best = std::move(other);
+      drowned_ = !drowned_;
+    }
   }
-  frames_lost_ = best.found ? 0 : frames_lost_ + 1;
-  if (best.found) remember(frame, best, cut);
+  due_inliers_ = best.inliers();
   return best;
 }
 
@@ -273,23 +305,30 @@ Observation ObjectTracker::attempt(const Frame& frame, const ReferenceView& refe
   return refine(frame, reference, searchCoarsely(frame, reference, predicted), params);
 }
 
+// As many tracks as are due; few are enough for an object that has not moved.
 bool ObjectTracker::isClear(const Observation& observation) const {
-  return observation.found && observation.inliers() >= std::max<double>(kWeakInliers, kClearShare * last_->inliers());
+  if (!observation.found || observation.inliers() < kClearShare * due_inliers_) return false;
+  if (observation.inliers() >= kWeakInliers) return true;
+  return (observation.world_from_object * centroid_ - last_->world_from_object * centroid_).norm() <
+         kStaysShare * boundingDiagonal(model_.mesh);
 }
 
 void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
   before_last_ = cut ? std::nullopt : last_;
   last_ = observation;
-  const ReferenceView& nearest = nearestReference(frame, observation.world_from_object);
-  const bool worn = observation.inliers() <
-                    params_.least_inliers * static_cast<double>(nearest.seeds().size());
+  due_inliers_ = std::max(due_inliers_, observation.inliers());
+  Reference& nearest = nearestReference(frame, observation.world_from_object);
+  nearest.most_inliers = std::max(nearest.most_inliers, observation.inliers());
+  // A reference that shows the object from the same side would have the same tracks, and this pose's errors.
+  if (viewChange(nearest.view, frame, observation.world_from_object, centroid_) < kOtherView) return;
+  const bool worn = observation.inliers() < params_.least_inliers * nearest.most_inliers;
   if (!worn && observation.coverage >= params_.least_coverage) return;
   if (static_cast<int>(references_.size()) >= params_.max_references) {
     references_.erase(references_.begin() + 1);  // the key frame stays
   }
-  references_.emplace_back(frame, model_, observation.world_from_object, cv::Mat(),
-                           params_.seed_count);
-  look_ = {};  // the references may have moved
+  references_.push_back({ReferenceView(frame, model_, observation.world_from_object, cv::Mat(), params_.seed_count)});
+  due_inliers_ = 0;  // not known yet
+  look_ = {};        // the references may have moved
 }
 
 }  // namespace calipso::flow

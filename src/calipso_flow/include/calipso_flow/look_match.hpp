@@ -20,12 +20,16 @@ class LookMatch {
   LookMatch(const ReferenceView::Warped& look, const cv::Mat& picture, Care care);
 
   Care care() const { return care_; }
-  // Where the patch of the look around `at` is found in the frame, in coordinates of the full size.
-  std::optional<PatchMatch> find(const Eigen::Vector2d& at, const PatchParams& params) const;
-  // The search at every point, by several threads.
+  // A point of the look, and where it is expected in the frame; px of the full size.
+  struct Seed {
+    Eigen::Vector2d at, expected;
+  };
+  // Where the patch of the look around a seed is found in the frame.
+  std::optional<PatchMatch> find(const Seed& seed, const PatchParams& params) const;
+  // The search at every seed, by several threads.
   using Matches = std::vector<std::optional<PatchMatch>>;
-  using Search = std::function<std::optional<PatchMatch>(const Eigen::Vector2d& at)>;
-  static Matches forEach(const std::vector<Eigen::Vector2d>& points, const Search& search);
+  using Search = std::function<std::optional<PatchMatch>(const Seed& seed)>;
+  static Matches forEach(const std::vector<Seed>& seeds, const Search& search);
   // By how much the match, followed back into the look, misses the point where it began.
   std::optional<Eigen::Vector2d> missOnReturn(const Eigen::Vector2d& at, const PatchMatch& there,
                                               const PatchParams& params) const;

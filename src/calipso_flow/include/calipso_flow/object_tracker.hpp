@@ -15,7 +15,7 @@ struct TrackerParams {
   double forward_backward_px = 0.3;  // a track that does not come back this close is dropped
   double largest_deviation_px = 0.5; // a track less certain than this is dropped
   double least_correlation = 0.4;    // of a patch with its reference
-  double least_inliers = 0.5;        // below this share of its seeds a reference is worn out
+  double least_inliers = 0.65;       // below this share of the most tracks it had a reference is worn out
   double least_coverage = 0.55;      // below this share of known surface a new reference is taken
   int max_references = 12;
   double search_px = 24.0;           // the coarse search looks this far beyond the prediction
@@ -29,6 +29,7 @@ struct Track {
   Eigen::Vector3d point;  // object frame, m
   Eigen::Vector2d pixel;  // px
   double confidence;      // 0..1: correlation with the reference
+  double deviation;       // px, of pixel, by the match's own account
   bool inlier;            // agrees with the rigid motion
 };
 
@@ -72,16 +73,24 @@ class ObjectTracker {
     Eigen::Isometry3d world_from_camera, pose;
     ReferenceView::Warped warped;
   };
-  const Look& lookAt(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose);
+  // @param care  kForward: the look may be of another place
+  const Look& lookAt(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose, Care care);
+  bool isLookOf(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose) const;
   Eigen::Isometry3d searchCoarsely(const Frame& frame, const ReferenceView& reference,
                                    const Eigen::Isometry3d& predicted);
   Observation refine(const Frame& frame, const ReferenceView& reference,
                      const Eigen::Isometry3d& start, const TrackerParams& params);
   Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
                                const TrackerParams& params, Observation& observation);
-  const ReferenceView& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) const;
+  struct Reference {
+    ReferenceView view;
+    int most_inliers = 0;  // that a frame had with it
+  };
+  Reference& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose);
   Observation attempt(const Frame& frame, const ReferenceView& reference,
                       const Eigen::Isometry3d& predicted, const TrackerParams& params);
+  Observation tryOtherwise(const Frame& frame, const ReferenceView& nearest, const Eigen::Isometry3d& predicted,
+                           Observation best);
   bool isClear(const Observation& observation) const;
   void remember(const Frame& frame, const Observation& observation, bool cut);
 
@@ -89,12 +98,14 @@ class ObjectTracker {
   TrackerParams params_;
   TrackerParams wide_;  // the same with large patches, for frames whose noise or blur drowns small ones
   Eigen::Vector3d centroid_;
-  std::vector<ReferenceView> references_;
+  bool drowned_ = false;  // `wide_` found more of late
+  std::vector<Reference> references_;
   Look look_;  // the last one, which often serves again
   Observation key_;
   std::optional<Observation> last_, before_last_;  // found, most recent first
   double last_seen_time_ = 0.0;                    // s; of the last frame, found in or not
   int frames_lost_ = 0;
+  int due_inliers_ = 0;  // tracks that a clear observation has
 };
 
 }  // namespace calipso::flow
