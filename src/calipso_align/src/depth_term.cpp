@@ -15,7 +15,21 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-Points unitVertexNormals(const Points& x, const Triangles& triangles) {
+// Vertices to measure at, no more than the depth image can tell apart by far: spread over the mesh
+// whatever pattern its order follows, as multiples of the golden ratio are over the unit interval.
+std::vector<int> spreadVertices(int count) {
+  constexpr int kMost = 3000;
+  const double golden = 0.5 * (std::sqrt(5.0) - 1.0), share = static_cast<double>(kMost) / count;
+  std::vector<int> chosen;
+  for (int i = 0; i < count; ++i) {
+    const double at = i * golden;
+    if (at - std::floor(at) < share) chosen.push_back(i);
+  }
+  return chosen;
+}
+
+// As long as the faces around are large.
+Points vertexNormals(const Points& x, const Triangles& triangles) {
   Points normals = Points::Zero(x.rows(), 3);
   for (int f = 0; f < triangles.rows(); ++f) {
     const Eigen::Vector3d a = x.row(triangles(f, 0)), b = x.row(triangles(f, 1)),
@@ -23,7 +37,6 @@ Points unitVertexNormals(const Points& x, const Triangles& triangles) {
     const Eigen::RowVector3d n = (b - a).cross(c - a).transpose();
     for (int k = 0; k < 3; ++k) normals.row(triangles(f, k)) += n;
   }
-  for (int i = 0; i < normals.rows(); ++i) normals.row(i) = normals.row(i).stableNormalized().eval();
   return normals;
 }
 
@@ -33,8 +46,7 @@ float observedDepth(const DepthTarget& target, const DepthRendering& rendering,
                     double tolerance) {
   if (p.z() <= 0.0 || -normal.dot(p.normalized()) < kLeastFacing) return 0.0f;
   const Eigen::Vector2d pixel = camera.project(p);
-  const cv::Point at(static_cast<int>(std::lround(pixel.x())),
-                     static_cast<int>(std::lround(pixel.y())));
+  const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
   if (!rendering.roi.contains(at)) return 0.0f;
   const float rendered = rendering.at(at.x, at.y);
   if (rendered <= 0.0f || p.z() > rendered + tolerance) return 0.0f;
@@ -67,9 +79,9 @@ Rows depthRows(const DepthTarget& target, const Points& x, const Triangles& tria
                const DepthTermOptions& options) {
   Rows rows;
   if (target.empty() || rendering.roi.empty()) return rows;
-  const Points normals = unitVertexNormals(x, triangles);
-  for (int i = 0; i < x.rows(); ++i) {
-    const Eigen::Vector3d p = x.row(i), n = normals.row(i);
+  const Points normals = vertexNormals(x, triangles);
+  for (const int i : spreadVertices(static_cast<int>(x.rows()))) {
+    const Eigen::Vector3d p = x.row(i), n = normals.row(i).stableNormalized();
     const float observed = observedDepth(target, rendering, camera, p, n, options.robust);
     if (observed <= 0.0f) continue;
     // The observed point on the vertex' own sight line.

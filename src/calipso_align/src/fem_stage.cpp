@@ -13,14 +13,16 @@ namespace {
 using fem::BlockMatrix;
 using fem::Vec;
 
-// Nodes and weights that carry one vertex.
+// Nodes and weights that carry one vertex, nodes ascending, and where the blocks of their pairs (i, j),
+// i <= j, are: row by row.
 struct Carrier {
   int nodes[8];
   double weights[8];
+  int blocks[36];
   int count = 0;
 };
 
-std::vector<Carrier> carriersOf(const fem::Embedding& embedding) {
+std::vector<Carrier> carriersOf(const fem::Embedding& embedding, const fem::BlockPattern& pattern) {
   std::vector<Carrier> carriers(embedding.vertexCount());
   for (int v = 0; v < embedding.vertexCount(); ++v) {
     Carrier& c = carriers[v];
@@ -29,6 +31,10 @@ std::vector<Carrier> carriersOf(const fem::Embedding& embedding) {
       if (it.value() == 0.0 || c.count == 8) continue;
       c.nodes[c.count] = static_cast<int>(it.col());
       c.weights[c.count++] = it.value();
+    }
+    int* block = c.blocks;
+    for (int i = 0; i < c.count; ++i) {
+      for (int j = i; j < c.count; ++j) *block++ = pattern.find(c.nodes[i], c.nodes[j]);
     }
   }
   return carriers;
@@ -91,11 +97,11 @@ struct ElasticFit::Impl {
   FemStageOptions options;
   fem::VoxelGrid grid;
   fem::Embedding embedding;
-  std::vector<Carrier> carriers;
   Vec x, x0;                 // current and starting nodal positions, 3n
   int free;                  // coordinates of a node that move: x, y, and z unless it is held
   fem::ElasticModel model;
   BlockMatrix K;             // of the linear model, which never changes; else of the last call
+  std::vector<Carrier> carriers;
   double volume, size;       // m^3, m
   Eigen::SparseMatrix<double> A;   // lower half of the free coordinates' system
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver;
@@ -105,7 +111,6 @@ struct ElasticFit::Impl {
       : options(o),
         grid(g),
         embedding(fem::embed(cad.vertices, grid)),
-        carriers(carriersOf(embedding)),
         x(vectorOf(placed(grid.nodes))),
         x0(x),
         free(o.hold_depth ? 2 : 3),
@@ -114,6 +119,7 @@ struct ElasticFit::Impl {
               o.linear ? fem::MaterialModel::kLinear : fem::MaterialModel::kCorotated,
               fem::ElementType::kHexQ1),
         K(model.pattern()),
+        carriers(carriersOf(embedding, *model.pattern())),
         volume(model.totalMass()),
         size(boundingDiagonal(cad)) {
     makePattern();
@@ -134,7 +140,8 @@ struct ElasticFit::Impl {
   }
 
   // Adds the measurements' gradient J^T W r, and a bound of J^T W J that stays inside K's pattern:
-  // (a0 x0 + a1 x1)^2 <= a0 x0^2 + a1 x1^2, each vertex in one cell.
+  // (a0 x0 + a1 x1)^2 <= a0 x0^2 + a1 x1^2, each vertex in one cell. Of H's blocks only those on and
+  // above the diagonal, which solve() reads.
   void addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) const;
   void addVertex(int vertex, double share, const PointRow& row, BlockMatrix& H) const;
   void makePattern();
@@ -151,10 +158,9 @@ void ElasticFit::Impl::addVertex(int vertex, double share, const PointRow& row,
                                  BlockMatrix& H) const {
   const Carrier& c = carriers[vertex];
   const Eigen::Matrix3d outer = share * row.weight * row.g * row.g.transpose();
+  const int* block = c.blocks;
   for (int i = 0; i < c.count; ++i) {
-    for (int j = 0; j < c.count; ++j) {
-      H.block(H.pattern->find(c.nodes[i], c.nodes[j])) += c.weights[i] * c.weights[j] * outer;
-    }
+    for (int j = i; j < c.count; ++j) H.block(*block++) += c.weights[i] * c.weights[j] * outer;
   }
 }
 

@@ -58,6 +58,7 @@ Eigen::Vector3d LowOrderMap::operator()(const Eigen::Vector3d& X) const {
 
 Points LowOrderMap::apply(const Points& X) const {
   Points x(X.rows(), 3);
+#pragma omp parallel for schedule(static)
   for (int i = 0; i < X.rows(); ++i) x.row(i) = (*this)(X.row(i).transpose()).transpose();
   return x;
 }

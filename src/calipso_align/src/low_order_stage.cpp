@@ -30,27 +30,36 @@ struct NormalEquations {
   Map::Parameters gradient = Map::Parameters::Zero();
 };
 
-NormalEquations assemble(const Points& X, const Rows& rows, const Map& map) {
+// Of the first `count` parameters: all others are held.
+NormalEquations assemble(const Points& X, const Rows& rows, const Map& map, int count) {
   // J' W J of many rows at a time is one product of matrices.
   constexpr int kPanel = 256;
-  Eigen::Matrix<double, Map::kParameters, Eigen::Dynamic> panel(Map::kParameters, kPanel);
+  Eigen::MatrixXd panel(count, kPanel);
   NormalEquations normal;
   int filled = 0;
   const auto flush = [&] {
-    normal.H.selfadjointView<Eigen::Lower>().rankUpdate(panel.leftCols(filled));
+    normal.H.topLeftCorner(count, count).selfadjointView<Eigen::Lower>().rankUpdate(
+        panel.leftCols(filled));
     filled = 0;
   };
   for (const PointRow& row : rows) {
     if (row.weight == 0.0) continue;
     const Map::Parameters j =
         map.gradient(X.row(row.v0), row.a0 * row.g) + map.gradient(X.row(row.v1), row.a1 * row.g);
-    panel.col(filled++) = std::sqrt(row.weight) * j;
+    panel.col(filled++) = std::sqrt(row.weight) * j.head(count);
     normal.gradient += row.weight * row.r * j;
     if (filled == kPanel) flush();
   }
   flush();
   normal.H = Hessian(normal.H.selfadjointView<Eigen::Lower>());
   return normal;
+}
+
+// How many parameters there are up to the last that is not held.
+int leadingFree(const Map::Parameters& info) {
+  int count = Map::kParameters;
+  while (count > 0 && std::isinf(info[count - 1])) --count;
+  return count;
 }
 
 // A measurement of one number of weight w, whose derivative is j and which is off by r.
@@ -132,7 +141,8 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
   for (; report.iterations < options.iterations && !report.converged; ++report.iterations) {
     const Map::Parameters info = information(prior);
     NormalEquations normal =
-        assemble(X, observe(map.apply(X), report.iterations, prior.deformation), map);
+        assemble(X, observe(map.apply(X), report.iterations, prior.deformation), map,
+                 leadingFree(info));
     addPlacement(X, prior, map, normal);
     addPrior(info, map.parameters(), normal);
     const Eigen::LDLT<Hessian> factor(normal.H);
@@ -161,7 +171,7 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
 Eigen::MatrixXd covariance(const Points& X, const Rows& rows, const LowOrderPrior& prior,
                            const Map& map) {
   const Map::Parameters info = information(prior);
-  NormalEquations normal = assemble(X, rows, map);
+  NormalEquations normal = assemble(X, rows, map, leadingFree(info));
   addPlacement(X, prior, map, normal);
   addPrior(info, map.parameters(), normal);
   Eigen::MatrixXd inverse = normal.H.ldlt().solve(Hessian::Identity());

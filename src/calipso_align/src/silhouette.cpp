@@ -9,16 +9,16 @@ namespace calipso::align {
 namespace {
 
 constexpr double kNear = 1e-6;           // m; nothing closer is drawn
+constexpr double kRounding = 1e-9;       // px; a pixel on the edge of two triangles belongs to both
 
-using Pixels = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
-
-// Pixels of all points; points behind the camera get NaN.
-Pixels projectAll(const Points& x, const Camera& camera) {
-  Pixels pixels(x.rows(), 2);
+// Pixels of all points in the first two columns, 1/z in the third; points behind the camera get NaN.
+Points projectAll(const Points& x, const Camera& camera) {
+  Points pixels(x.rows(), 3);
+#pragma omp parallel for schedule(static)
   for (int i = 0; i < x.rows(); ++i) {
     const Eigen::Vector3d p = x.row(i);
     if (p.z() > kNear) {
-      pixels.row(i) = camera.project(p);
+      pixels.row(i) << camera.project(p).transpose(), 1.0 / p.z();
     } else {
       pixels.row(i).setConstant(std::nan(""));
     }
@@ -27,7 +27,7 @@ Pixels projectAll(const Points& x, const Camera& camera) {
 }
 
 // The picture's part that holds all pixels, with a margin of background around it where there is room.
-cv::Rect boundingRoi(const Pixels& pixels, const Camera& camera) {
+cv::Rect boundingRoi(const Points& pixels, const Camera& camera) {
   constexpr int kMargin = 3;
   double u0 = 1e9, v0 = 1e9, u1 = -1e9, v1 = -1e9;
   for (int i = 0; i < pixels.rows(); ++i) {
@@ -68,13 +68,11 @@ class TriangleSpans {
 
   // First and last column whose centre is inside; none when the last comes before the first.
   std::pair<int, int> at(int v) const {
-    constexpr double kRounding = 1e-9;   // a pixel on the edge of two triangles belongs to both
     double from = -1.0, to = 1e6;
     for (int k = 0; k < lefts_; ++k) from = std::max(from, left_[k].u + left_[k].slope * v);
     for (int k = 0; k < rights_; ++k) to = std::min(to, right_[k].u + right_[k].slope * v);
     if (from > 1e6 || to < -1.0) return {0, -1};
-    return {static_cast<int>(std::ceil(from - kRounding)),
-            static_cast<int>(std::floor(to + kRounding))};
+    return {cvCeil(from - kRounding), cvFloor(to + kRounding)};
   }
 
  private:
@@ -85,17 +83,21 @@ class TriangleSpans {
   int lefts_ = 0, rights_ = 0;
 };
 
-// Fills one triangle. 1/z is linear on the screen; the buffer holds the largest one.
-void fillTriangle(const Eigen::Vector2d (&p)[3], const double (&inverse_z)[3], const cv::Rect& roi,
-                  cv::Mat1f& buffer) {
+// Fills one triangle, whose corners are as projectAll() has them. 1/z is linear on the screen; the
+// buffer holds the largest one.
+void fillTriangle(const Eigen::Vector3d (&c)[3], const cv::Rect& roi, cv::Mat1f& buffer) {
+  const Eigen::Vector2d p[3] = {c[0].head<2>(), c[1].head<2>(), c[2].head<2>()};
   const double area = (p[1] - p[0]).x() * (p[2] - p[0]).y() - (p[1] - p[0]).y() * (p[2] - p[0]).x();
   if (area == 0.0 || !std::isfinite(area)) return;
   const auto [min_v, max_v] = std::minmax({p[0].y(), p[1].y(), p[2].y()});
-  const int v_begin = std::max(roi.y, static_cast<int>(std::ceil(std::max(min_v, -1.0))));
-  const int v_end = std::min<int>(roi.y + roi.height - 1, std::floor(std::min(max_v, 1e6)));
-  if (v_end < v_begin) return;
+  const int v_begin = std::max(roi.y, cvCeil(std::max(min_v, -1.0)));
+  const int v_end = std::min(roi.y + roi.height - 1, cvFloor(std::min(max_v, 1e6)));
+  const auto [min_u, max_u] = std::minmax({p[0].x(), p[1].x(), p[2].x()});
+  const bool between_columns =
+      max_u < roi.x - 1.0 || min_u > roi.br().x || cvCeil(min_u - kRounding) > max_u + kRounding;
+  if (v_end < v_begin || between_columns) return;
 
-  const double d1 = (inverse_z[1] - inverse_z[0]) / area, d2 = (inverse_z[2] - inverse_z[0]) / area;
+  const double d1 = (c[1].z() - c[0].z()) / area, d2 = (c[2].z() - c[0].z()) / area;
   const double by_u = d1 * (p[2] - p[0]).y() - d2 * (p[1] - p[0]).y();
   const double by_v = d2 * (p[1] - p[0]).x() - d1 * (p[2] - p[0]).x();
   const TriangleSpans spans(p);
@@ -104,11 +106,31 @@ void fillTriangle(const Eigen::Vector2d (&p)[3], const double (&inverse_z)[3], c
     const int u_begin = std::max(roi.x, first), u_end = std::min(roi.x + roi.width - 1, last);
     if (u_end < u_begin) continue;
     float* row = buffer[v - roi.y] + (u_begin - roi.x);
-    const float start = static_cast<float>(inverse_z[0] + by_u * (u_begin - p[0].x()) +
-                                           by_v * (v - p[0].y()));
+    const float start =
+        static_cast<float>(c[0].z() + by_u * (u_begin - p[0].x()) + by_v * (v - p[0].y()));
     const float step = static_cast<float>(by_u);
     for (int i = 0; i <= u_end - u_begin; ++i) row[i] = std::max(row[i], start + step * i);
   }
+}
+
+// The largest 1/z of all triangles at every pixel of the roi; 0 where there is none.
+cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles, const cv::Rect& roi) {
+  cv::Mat1f all = cv::Mat1f::zeros(roi.size());
+  // Every thread draws its share of the triangles; the largest is the same in whatever order.
+#pragma omp parallel
+  {
+    cv::Mat1f own = cv::Mat1f::zeros(roi.size());
+#pragma omp for schedule(static) nowait
+    for (int f = 0; f < triangles.rows(); ++f) {
+      fillTriangle({pixels.row(triangles(f, 0)), pixels.row(triangles(f, 1)),
+                    pixels.row(triangles(f, 2))},
+                   roi, own);
+    }
+#pragma omp critical(largest_inverse_depth)
+    std::transform(own.begin(), own.end(), all.begin(), all.begin(),
+                   [](float a, float b) { return std::max(a, b); });
+  }
+  return all;
 }
 
 // Whether the mask ends at the edge: the pixel beyond it is uncovered.
@@ -116,13 +138,13 @@ bool bordersBackground(const DepthRendering& rendering, const Eigen::Vector2d& p
                        const Eigen::Vector2d& normal) {
   constexpr double kBeyondPx = 1.0;   // the pixel there has its centre beyond the edge for certain
   const Eigen::Vector2d beyond = pixel + kBeyondPx * normal;
-  return rendering.at(static_cast<int>(std::lround(beyond.x())),
-                      static_cast<int>(std::lround(beyond.y()))) <= 0.0f;
+  return rendering.at(cvRound(beyond.x()), cvRound(beyond.y())) <= 0.0f;
 }
 
 // Whether a face is seen from its front, for all faces.
 std::vector<char> frontFacing(const Points& x, const Triangles& triangles) {
   std::vector<char> front(triangles.rows());
+#pragma omp parallel for schedule(static)
   for (int f = 0; f < triangles.rows(); ++f) {
     const Eigen::Vector3d a = x.row(triangles(f, 0)), b = x.row(triangles(f, 1)),
                           c = x.row(triangles(f, 2));
@@ -155,6 +177,30 @@ int oppositeVertex(const Triangles& triangles, int face, const MeshTopology::Edg
   return edge.v0;
 }
 
+// Samples of an edge beyond which the mask ends, `inner` being the third corner of its face.
+void appendVisible(const Points& x, const MeshTopology::Edge& edge, int inner,
+                   const DepthRendering& rendering, const Camera& camera, double step_px,
+                   std::vector<OutlinePoint>& outline) {
+  const Eigen::Vector3d a = x.row(edge.v0), b = x.row(edge.v1), c = x.row(inner);
+  if (std::min({a.z(), b.z(), c.z()}) <= kNear) return;
+  const Eigen::Vector2d pa = camera.project(a), pb = camera.project(b);
+  const double length = (pb - pa).norm();
+  if (!(length > 1e-9) || length > 1e5) return;
+  const Eigen::Vector2d normal = outwardNormal(pa, pb, camera.project(c));
+
+  // Samples in the middle of equal parts of the edge.
+  const int parts = std::max(1, static_cast<int>(std::lround(length / step_px)));
+  for (int k = 0; k < parts; ++k) {
+    const double t = (k + 0.5) / parts;
+    const Eigen::Vector3d position = (1.0 - t) * a + t * b;
+    const Eigen::Vector2d pixel = camera.project(position);
+    const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
+    if (!rendering.roi.contains(at)) continue;
+    if (!bordersBackground(rendering, pixel, normal)) continue;
+    outline.push_back({edge.v0, edge.v1, 1.0 - t, t, position, pixel, normal, length / parts});
+  }
+}
+
 }  // namespace
 
 MeshTopology::MeshTopology(const Triangles& triangles) : triangles_(triangles) {
@@ -181,17 +227,11 @@ MeshTopology::MeshTopology(const Triangles& triangles) : triangles_(triangles) {
 }
 
 DepthRendering renderDepth(const Points& x, const Triangles& triangles, const Camera& camera) {
-  const Pixels pixels = projectAll(x, camera);
+  const Points pixels = projectAll(x, camera);
   DepthRendering rendering;
   rendering.roi = boundingRoi(pixels, camera);
   if (rendering.roi.empty()) return rendering;
-  rendering.depth = cv::Mat1f::zeros(rendering.roi.size());
-  for (int f = 0; f < triangles.rows(); ++f) {
-    const int v[3] = {triangles(f, 0), triangles(f, 1), triangles(f, 2)};
-    const Eigen::Vector2d p[3] = {pixels.row(v[0]), pixels.row(v[1]), pixels.row(v[2])};
-    const double inverse_z[3] = {1.0 / x(v[0], 2), 1.0 / x(v[1], 2), 1.0 / x(v[2], 2)};
-    fillTriangle(p, inverse_z, rendering.roi, rendering.depth);
-  }
+  rendering.depth = largestInverseDepth(pixels, triangles, rendering.roi);
   for (int v = 0; v < rendering.depth.rows; ++v) {
     float* row = rendering.depth[v];
     for (int u = 0; u < rendering.depth.cols; ++u) row[u] = row[u] > 0.0f ? 1.0f / row[u] : 0.0f;
@@ -208,34 +248,24 @@ cv::Mat1b maskOf(const DepthRendering& rendering, const Camera& camera) {
 std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& topology,
                                            const DepthRendering& rendering, const Camera& camera,
                                            double step_px) {
-  std::vector<OutlinePoint> outline;
-  if (rendering.roi.empty()) return outline;
+  if (rendering.roi.empty()) return {};
   const std::vector<char> front = frontFacing(x, topology.triangles());
-
-  for (const MeshTopology::Edge& edge : topology.edges()) {
-    const int face = innerFace(edge, front);
-    if (face < 0) continue;
-    const Eigen::Vector3d a = x.row(edge.v0), b = x.row(edge.v1);
-    const Eigen::Vector3d c = x.row(oppositeVertex(topology.triangles(), face, edge));
-    if (std::min({a.z(), b.z(), c.z()}) <= kNear) continue;
-    const Eigen::Vector2d pa = camera.project(a), pb = camera.project(b);
-    const double length = (pb - pa).norm();
-    if (!(length > 1e-9) || length > 1e5) continue;
-    const Eigen::Vector2d normal = outwardNormal(pa, pb, camera.project(c));
-
-    // Samples in the middle of equal parts of the edge.
-    const int parts = std::max(1, static_cast<int>(std::lround(length / step_px)));
-    for (int k = 0; k < parts; ++k) {
-      const double t = (k + 0.5) / parts;
-      const Eigen::Vector3d position = (1.0 - t) * a + t * b;
-      const Eigen::Vector2d pixel = camera.project(position);
-      const cv::Point at(static_cast<int>(std::lround(pixel.x())),
-                         static_cast<int>(std::lround(pixel.y())));
-      if (!rendering.roi.contains(at)) continue;
-      if (!bordersBackground(rendering, pixel, normal)) continue;
-      outline.push_back({edge.v0, edge.v1, 1.0 - t, t, position, pixel, normal, length / parts});
+  // Parts of the edges side by side, put together in their order.
+  constexpr int kParts = 16;
+  const size_t edges = topology.edges().size();
+  std::vector<std::vector<OutlinePoint>> parts(kParts);
+#pragma omp parallel for schedule(static)
+  for (int part = 0; part < kParts; ++part) {
+    for (size_t e = edges * part / kParts; e < edges * (part + 1) / kParts; ++e) {
+      const MeshTopology::Edge& edge = topology.edges()[e];
+      const int face = innerFace(edge, front);
+      if (face < 0) continue;
+      const int inner = oppositeVertex(topology.triangles(), face, edge);
+      appendVisible(x, edge, inner, rendering, camera, step_px, parts[part]);
     }
   }
+  std::vector<OutlinePoint> outline;
+  for (const auto& part : parts) outline.insert(outline.end(), part.begin(), part.end());
   return outline;
 }
 
