@@ -288,12 +288,12 @@ TEST(WorldObjects, OverlapAtTheStartIsSaid) {
   }
 }
 
-TEST(WorldObjects, MassWithoutBoundsIsRefused) {
+TEST(WorldObjects, MassMustBePositive) {
   RigidWorld world;
   RigidBodySpec spec;
   spec.name = "anvil";
   spec.shapes = {boxSurface({1, 1, 1}, 1)};
-  for (const double mass : {0.0, std::numeric_limits<double>::infinity()}) {
+  for (const double mass : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
     spec.mass.mass = mass;
     try {
       world.add(spec);
@@ -303,8 +303,50 @@ TEST(WorldObjects, MassWithoutBoundsIsRefused) {
     }
   }
   WorldParams params;
-  params.defaults.density = std::numeric_limits<double>::infinity();
+  params.defaults.density = 0.0;
   EXPECT_THROW(World(sceneWith(boxSurface({1, 1, 1}, 1), {0, 0, 1}), params), std::invalid_argument);
+}
+
+TEST(WorldObjects, NothingMovesWhatHasInfiniteMass) {
+  RigidWorld world;
+  RigidBodySpec spec;
+  spec.name = "anvil";
+  spec.shapes = {boxSurface({1, 1, 1}, 1)};
+  spec.mass.mass = std::numeric_limits<double>::infinity();
+  const RigidWorld::Id id = world.add(spec);
+  world.setAcceleration(id, {0, 0, -9.81});
+  world.push(id, {0, 0, -100}, {0.3, 0, 0.5});
+  for (int k = 0; k < 30; ++k) world.step(1.0 / 30.0);
+  EXPECT_TRUE(world.pose(id).matrix().isIdentity(0.0));
+}
+
+// A falling box stops on a floating one that an edit has made immovable; given a mass again, that falls.
+TEST(WorldObjects, AnEditMakesMassInfinite) {
+  WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.5});
+  scene.objects.push_back(scene.objects.front());
+  scene.objects[1].name = "above";
+  scene.objects[1].world_from_object.translation().z() = 0.7;
+  WorldParams params;
+  params.max_nodes = 150;
+  World world(scene, params);
+  Edit heavy = editOf(EditKind::kMaterial, EditMode::kFactor), thrown = editOf(EditKind::kVelocity, EditMode::kAbsolute);
+  heavy.density = std::numeric_limits<double>::infinity();
+  thrown.object = "above";
+  thrown.vector = {0, 0, -1};
+  Edit light = editOf(EditKind::kMaterial, EditMode::kAbsolute), falls = editOf(EditKind::kGravity, EditMode::kFactor);
+  light.density = 500.0;
+  light.time = 1.0;
+  falls.factor = 2.0;  // afloat before
+  falls.time = 1.0;
+  for (const Edit& edit : {heavy, thrown, light, falls}) world.submit(edit);
+  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  play(world, 0.9);
+  EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kKinematic);
+  EXPECT_NEAR(world.state().objects[0].world_from_object.translation().z(), 0.5, 1e-12);
+  EXPECT_GT(world.state().objects[1].world_from_object.translation().z(), 0.59);
+  play(world, 1.5);
+  EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kRigid);
+  EXPECT_LT(world.state().objects[0].world_from_object.translation().z(), 0.3);
 }
 
 }  // namespace

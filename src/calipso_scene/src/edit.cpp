@@ -75,7 +75,8 @@ void validateMaterial(const Edit& edit) {
     require(std::isnan(value) || (std::isfinite(value) && value > 0.0), field, value, range);
   };
   positive(edit.youngs_modulus, "youngs_modulus", factor ? "a factor > 0" : "> 0 Pa");
-  positive(edit.density, "density", factor ? "a factor > 0" : "> 0 kg/m^3");
+  require(std::isnan(edit.density) || edit.density > 0.0, "density", edit.density,
+          factor ? "a factor > 0; .inf: nothing moves it" : "> 0 kg/m^3; .inf: nothing moves it");
   require(std::isnan(edit.poissons_ratio) ||
               (edit.poissons_ratio > -1.0 && edit.poissons_ratio < 0.5),
           "poissons_ratio", edit.poissons_ratio, "in (-1, 0.5)");

@@ -68,6 +68,7 @@ struct Actor {
   bool altered = false;    // by an edit that does more than to let it go on, or of its look
   bool continues = false;  // as in the video, with the velocity it has there, and nothing else is edited
   bool inserted = false;  // not in the video
+  bool immovable = false;  // of infinite mass
   std::vector<int> own_supports;  // ids of the support meshes that are its own surface
   std::string source;     // of a copy: the object of the video whose model it is drawn by
   Holder holder = Holder::kUnknown;

@@ -18,10 +18,9 @@ Eigen::Matrix3d cross(const Eigen::Vector3d& r) {
 void validate(const RigidBodySpec& spec) {
   if (spec.shapes.empty() || spec.shapes.front().triangleCount() == 0)
     throw std::invalid_argument(spec.name + ": a body needs a collision shape; its mesh is empty");
-  if (spec.motion == RigidMotion::kDynamic &&
-      !(spec.mass.mass > 0.0 && std::isfinite(spec.mass.mass)))
+  if (spec.motion == RigidMotion::kDynamic && !(spec.mass.mass > 0.0))
     throw std::invalid_argument(spec.name + ": mass = " + std::to_string(spec.mass.mass) +
-                                " kg; must be positive and finite (what nothing can move is static)");
+                                " kg; must be positive (infinite: nothing moves it)");
   validate(spec.surface, spec.name);
 }
 
@@ -39,6 +38,11 @@ RigidWorld::~RigidWorld() = default;
 
 RigidWorld::Id RigidWorld::add(const RigidBodySpec& spec) {
   validate(spec);
+  if (spec.motion == RigidMotion::kDynamic && std::isinf(spec.mass.mass)) {
+    RigidBodySpec immovable = spec;
+    immovable.motion = RigidMotion::kStatic;
+    return add(immovable);
+  }
   BulletBody body;
   body.name = spec.name;
   body.motion = spec.motion;

@@ -34,7 +34,7 @@ Material observedMaterial(const WorldObject& object, const ObjectSettings& setti
   Material m = defaultMaterial(boundingDiagonal(object.mesh), gravity.norm());
   m.youngs_modulus = settings.youngs_modulus.value_or(m.youngs_modulus);
   m.poissons_ratio = settings.poissons_ratio.value_or(m.poissons_ratio);
-  m.density = settings.density.value_or(m.density);
+  if (settings.density && std::isfinite(*settings.density)) m.density = *settings.density;
   m.damping = settings.damping.value_or(m.damping);
   return m;
 }
@@ -70,6 +70,7 @@ World::Impl::Impl(WorldScene scene_in, WorldParams params_in)
     actor.settings = params.settingsOf(object.name);
     actor.observed_material = actor.material =
         observedMaterial(object, actor.settings, scene.gravity);
+    actor.immovable = actor.settings.immovable();
     actor.gravity = scene.gravity;
     actors.push_back(std::move(actor));
   }

@@ -139,8 +139,9 @@ void World::Impl::findHolder(Actor& actor) {
 void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reason) {
   if (kind != ObjectKind::kStatic && !actor.edited) findHolder(actor);
   // What is attached does not move as a whole.
-  const bool stays = kind == ObjectKind::kRigid && actor.holder == Holder::kAttachment;
-  if (stays) kind = ObjectKind::kKinematic;
+  const bool attached = kind == ObjectKind::kRigid && actor.holder == Holder::kAttachment;
+  const bool immovable = actor.immovable && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
+  if (attached || immovable) kind = ObjectKind::kKinematic;
   actor.edited = actor.edited || kind != ObjectKind::kStatic;
   if (actor.kind == kind) return;
   BodyMotion motion = motionOf(actor);
@@ -153,7 +154,8 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
     motion.world_from_object = seen = actor.object.world_from_object;
   }
   actor.kind = kind;
-  actor.reason = reason + (stays ? "; its attachments hold it in place" : "");
+  actor.reason =
+      reason + (immovable ? "; its mass is infinite" : attached ? "; its attachments hold it in place" : "");
   actor.placement = motion.world_from_object * seen.inverse();
   if (kind == ObjectKind::kRigid) makeRigid(actor, motion);
   if (kind == ObjectKind::kDeformable) makeSoft(actor, motion, as_observed);
@@ -318,6 +320,7 @@ void World::Impl::reset(Actor& actor) {
   fresh.wind = actor.wind;
   fresh.modes = actor.modes;
   fresh.settings = actor.settings;
+  fresh.immovable = actor.settings.immovable();
   fresh.observed_material = fresh.material = actor.observed_material;
   fresh.gravity = scene.gravity;
   actor = std::move(fresh);

@@ -171,6 +171,8 @@ void World::Impl::scale(Actor& actor, double factor) {
 std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   Material material = actor.material;
   material.youngs_modulus = changed(material.youngs_modulus, edit.youngs_modulus, edit.mode);
+  if (std::isinf(edit.density)) return makeImmovable(actor, edit);
+  if (edit.mode == EditMode::kAbsolute && !std::isnan(edit.density)) actor.immovable = false;
   material.density = changed(material.density, edit.density, edit.mode);
   material.poissons_ratio =
       changed(material.poissons_ratio, edit.poissons_ratio, EditMode::kAbsolute);
@@ -190,6 +192,14 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
        << " Pa, nu = " << material.poissons_ratio << ", density = " << material.density
        << " kg/m^3, damping = " << material.damping << " s";
   return text.str();
+}
+
+// Goes on as the video shows, or stays where an edit has put it, whatever pushes.
+std::string World::Impl::makeImmovable(Actor& actor, const Edit& edit) {
+  actor.immovable = true;
+  touch(actor, edit);
+  become(actor, ObjectKind::kKinematic, "its mass is infinite");
+  return actor.object.name + " has infinite mass: nothing moves it";
 }
 
 std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {

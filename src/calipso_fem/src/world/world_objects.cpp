@@ -140,6 +140,7 @@ Actor& World::Impl::addObject(const WorldObject& object, const ObjectSettings& s
   actor.inserted = true;
   actor.settings = settings;
   actor.observed_material = actor.material = observedMaterial(object, settings, scene.gravity);
+  actor.immovable = settings.immovable();
   actor.gravity = scene.gravity;
   actor.holder = Holder::kNothing;
   actor.edited = true;
@@ -166,6 +167,7 @@ Actor& World::Impl::duplicate(const std::string& source_name, const std::string&
   Actor& copy = addObject(object, source.settings);
   copy.observed_material = source.observed_material;
   copy.material = source.material;
+  copy.immovable = source.immovable;
   copy.gravity = source.gravity;
   if (source.holder == Holder::kBuoyancy) {
     copy.holder = source.holder;

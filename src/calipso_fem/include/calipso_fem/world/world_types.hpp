@@ -90,6 +90,7 @@ struct PairRule {
 // What the user may set per object. Empty: chosen automatically.
 struct ObjectSettings {
   std::optional<double> youngs_modulus, poissons_ratio, density, damping;
+  bool immovable() const { return density && std::isinf(*density); }
   std::optional<ObjectKind> kind;   // once an edit touches the object
   std::optional<double> cell_size;  // m
   SurfaceSettings surface;
