@@ -1,5 +1,6 @@
 // The part of FrameCompositor that tells what an edit changes: light on the support planes, and what stays.
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -10,6 +11,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kLeastChange = 3;  // px across
+constexpr float kSoftSky = 0.2f;  // of the sky: so much more or less of it only brightens or darkens a pixel
 constexpr int kRimReach = 4;  // mask margins around a surface at rest in which the frame's pixels stay
 
 }  // namespace
@@ -42,7 +44,8 @@ void FrameCompositor::findRelit() {
     const float *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
     std::uint8_t* out = change.ptr<std::uint8_t>(v);
     for (int u = 0; u < box.width; ++u) {
-      const float by = std::abs(umbra * (sky[u] - sky_before[u]) + lit * (sun[u] - sun_before[u]));
+      const float more_sky = sky[u] - sky_before[u];
+      const float by = std::abs(umbra * (more_sky - std::clamp(more_sky, -kSoftSky, kSoftSky)) + lit * (sun[u] - sun_before[u]));
       out[u] = sun[u] < 0.0f ? 0 : changeOfLight(by);
     }
   }

@@ -144,11 +144,11 @@ FrameCompositor::Behind FrameCompositor::groundAt(int u, int v, bool removed) co
     behind.colour = behind.colour.mul(now);
     return behind;
   }
-  // Darkened further, a pixel keeps its own grain; what the original shaded must come from the plate.
+  // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly reaches must come from the plate.
   const float from_plate = relit_.at<std::uint8_t>(at) / 255.0f;
   if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameShadow) return behind;
   cv::Vec3f darkened = behind.colour;
-  for (int c = 0; c < 3; ++c) darkened[c] *= std::min(1.0f, now[c] / std::max(before[c], kDarkest));
+  for (int c = 0; c < 3; ++c) darkened[c] *= std::min(kBrightest, now[c] / std::max(before[c], kDarkest));
   const Behind revealed = revealedAt(u, v);
   behind.colour = from_plate * revealed.colour.mul(now) + (1.0f - from_plate) * darkened;
   behind.fresh = from_plate * revealed.fresh;

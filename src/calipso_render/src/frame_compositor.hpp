@@ -24,7 +24,7 @@ struct ShadowCache {
   Eigen::Vector3f sun = Eigen::Vector3f::Zero();  // direction
   std::unique_ptr<Visibility> others;  // of what is not edited
   std::unique_ptr<Visibility> originals;  // of the edited objects where the video has them; null: of none
-  cv::Mat others_sun;                  // empty: nothing else casts a shadow
+  cv::Mat others_sun, others_sky;      // of the others; empty: nothing else casts a shadow
   cv::Mat originals_sun, originals_sky;  // of the edited objects where the video has them
   cv::Mat shaded;                      // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
   cv::Rect shaded_box, bounds;         // of `shaded`; of all that the originals' shadows can reach
@@ -43,6 +43,7 @@ struct RestPicture {
 constexpr int kLightStep = 4;     // px between the places where the light on a smooth surface is computed
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
 constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own pixels do not tell what it would be in more light
+constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
 constexpr float kStillPx = 0.05f;  // moved less: the frame's own pixels
 constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
 
@@ -138,6 +139,7 @@ class FrameCompositor {
   void cacheOthers(const std::vector<Occluder>& others);
   cv::Mat sunOver(const Visibility& shadow, const cv::Rect& bounds) const;
   cv::Mat skyOver(const Visibility& shadow, const cv::Rect& region, const cv::Mat& skip) const;
+  void leaveHidden(cv::Mat& sky, const cv::Rect& region) const;
   void chooseRegion();
   void findRemoved();
   void findPassingShadows();

@@ -58,8 +58,8 @@ void FrameCompositor::prepareShadows() {
   for (const Occluder& o : moved) moved_bounds_ |= shadowBounds(*o.vertices, light_);
   const bool same = shadows_.others && shadows_.edited == edited_ && shadows_.sun == light_.direction && sameView(shadows_.camera, frame_.camera);
   const bool others_rest = std::find(prepared_.moves.begin(), prepared_.moves.end(), true) == prepared_.moves.end();
-  if (!same) cacheOriginals(originals);
   if (!same || !others_rest) cacheOthers(others);
+  if (!same) cacheOriginals(originals);
   shadows_.edited = edited_, shadows_.camera = frame_.camera, shadows_.sun = light_.direction;
 }
 
@@ -68,6 +68,7 @@ void FrameCompositor::cacheOthers(const std::vector<Occluder>& others) {
   cv::Rect bounds;
   for (const Occluder& o : others) bounds |= shadowBounds(*o.vertices, light_);
   shadows_.others_sun = bounds.empty() ? cv::Mat() : sunOver(*shadows_.others, bounds);
+  shadows_.others_sky = others.empty() ? cv::Mat() : skyOver(*skyShadowOf(others, params_), {{0, 0}, frame_.bgr.size()}, cv::Mat());
 }
 
 void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
@@ -77,6 +78,7 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   shadows_.originals = originals.empty() ? nullptr : shadowOf(originals, prepared_.light.light, params_);
   shadows_.originals_sun = shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadows_.originals, shadows_.bounds);
   shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_32F, cv::Scalar(1.0f)) : skyOver(*skyShadowOf(originals, params_), whole, cv::Mat());
+  leaveHidden(shadows_.originals_sky, whole);
   shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < whole.height; ++v) {
@@ -88,6 +90,15 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   }
   cv::dilate(shadows_.shaded, shadows_.shaded, disc(params_.background.shadow_margin_px));
   shadows_.shaded_box = cv::boundingRect(shadows_.shaded);
+}
+
+// Edited objects hide only that part of the sky which others leave: the picture's pixels lack theirs already.
+// @param sky CV_32FC1 over `region`, with edited objects alone
+void FrameCompositor::leaveHidden(cv::Mat& sky, const cv::Rect& region) const {
+  if (shadows_.others_sky.empty()) return;
+  const float all_hidden = skyLight(0.0f);
+  cv::Mat seen = (shadows_.others_sky(region) - all_hidden) / (1.0f - all_hidden);
+  sky = 1.0f - (1.0f - sky).mul(seen);
 }
 
 cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds) const {
@@ -170,6 +181,7 @@ void FrameCompositor::findCovered() {
 
 void FrameCompositor::measureSky() {
   sky_now_ = skyOver(*moved_sky_, region_, covered_);
+  leaveHidden(sky_now_, region_);
   sky_before_ = shadows_.originals_sky(region_);
 }
 

@@ -196,9 +196,9 @@ void FrameCompositor::composeBehind(int u, int v, Row& row) const {
     if (from_plate > 0.5f) row.source[i] = revealed.source;
   }
   if (from_plate < 1.0f) {
-    // Darkened further, a pixel keeps its own grain; what the original shaded must come from the plate.
+    // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly reaches must come from the plate.
     const cv::v_float32x4 before = umbra * cv::v_setall_f32(sky_before_.at<float>(j, i)) + lit * cv::v_setall_f32(sun_before_.at<float>(j, i));
-    const cv::v_float32x4 ratio = cv::v_min(cv::v_setall_f32(1.0f), now / cv::v_max(before, cv::v_setall_f32(kDarkest)));
+    const cv::v_float32x4 ratio = cv::v_min(cv::v_setall_f32(kBrightest), now / cv::v_max(before, cv::v_setall_f32(kDarkest)));
     colour += cv::v_setall_f32(1.0f - from_plate) * linearOf(decodeTable(), frame_.bgr.at<cv::Vec3b>(v, u)) * ratio;
   }
   cv::v_store(row.colour[i].val, colour);
