@@ -100,6 +100,7 @@ void FrameCompositor::findStill() {
   if (!any) return;
   still_ = cv::Mat::zeros(region_.size(), CV_32F);
   cv::Mat owner(region_.size(), CV_16S, cv::Scalar(-1));  // edited surface seen there
+  cv::Mat repainted = cv::Mat::zeros(region_.size(), CV_8U);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) {
     for (int u = 0; u < region_.width; ++u) {
@@ -107,10 +108,13 @@ void FrameCompositor::findStill() {
       if (id == VisibilityBuffer::kNothing || !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]]) continue;
       owner.at<short>(v, u) = static_cast<short>(surface_of_slot_[VisibilityBuffer::objectOf(id)]);
       if (!can_rest[VisibilityBuffer::objectOf(id)][VisibilityBuffer::triangleOf(id)]) continue;
+      if (lookOf(VisibilityBuffer::objectOf(id)).changes()) repainted.at<std::uint8_t>(v, u) = 255;
       still_.at<float>(v, u) = stillness(id, u + region_.x, v + region_.y);
     }
   }
   keepRims(owner);
+  cv::dilate(repainted, repainted, disc(kRepaintReach));
+  still_.setTo(0.0f, repainted);
   if (!elsewhere_.empty()) still_.setTo(0.0f, elsewhere_(region_));
 }
 

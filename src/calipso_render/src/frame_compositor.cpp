@@ -61,7 +61,7 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
   const Look& look = lookOf(slot);
   const Lit lit = exactLight({p.position, p.normal, p.sky}, slot);
-  const cv::Vec3f albedo = (look.albedo ? *look.albedo : appearance.albedoAt(p)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
+  const cv::Vec3f albedo = (look.albedo ? *look.albedo : appearance.albedoAt(p)).mul(tintOf(slot));
   const auto colour = [](const cv::Vec4f& c) { return cv::Vec3f(c[0], c[1], c[2]); };
   return appearance.radiance(albedo, colour(lit.diffuse), colour(lit.highlight));
 }

@@ -43,6 +43,7 @@ struct RestPicture {
 constexpr int kLightStep = 4;     // px between the places where the light on a smooth surface is computed
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
 constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own pixels do not tell what it would be in more light
+constexpr int kRepaintReach = 2;  // px around a surface of a new look in which the frame has its old colour, too
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
 constexpr float kStillPx = 0.05f;  // moved less: the frame's own pixels
 constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
@@ -125,7 +126,7 @@ class FrameCompositor {
   cv::Rect carriedBox() const;
   void findMiss(const cv::Rect& carried);
   void findRims(const cv::Rect& carried);
-  void addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, cv::Vec4f& colour) const;
+  void addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, const cv::Vec3f& tint, cv::Vec4f& colour) const;
   void addRimResidual(int v, Row& row) const;
   cv::Vec4f missAt(float u, float v, int owner) const;
   static RestPicture restPicture(const Prepared& prepared, const RenderParams& params, const std::vector<bool>& edited);
@@ -183,6 +184,7 @@ class FrameCompositor {
   float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
   Lit exactLight(const LitPoint& p, int slot) const;
   const Look& lookOf(int slot) const;
+  cv::Vec3f tintOf(int slot) const { return lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)); }
   bool isSmooth(int i, int j) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;

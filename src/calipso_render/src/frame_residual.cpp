@@ -207,19 +207,26 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
     const cv::Point away = rim.nearest - cv::Point(rim.u, rim.v);
     const float reach = params_.background.mask_margin_px + kNonePx;
     if (away.dot(away) > reach * reach && moved.norm() > kStillPx) continue;
-    addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved, surface_of_slot_[VisibilityBuffer::objectOf(id)], row.colour[rim.u]);
+    cv::Vec4f& colour = row.colour[rim.u];
+    const cv::Vec3f plain(colour[0], colour[1], colour[2]);
+    addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved, surface_of_slot_[VisibilityBuffer::objectOf(id)], cv::Vec3f::all(1), colour);
+    if (away.dot(away) > kRepaintReach * kRepaintReach || !lookOf(VisibilityBuffer::objectOf(id)).changes()) continue;
+    // Beside a surface of a new look the video has the old one's hue.
+    const float brighter = luminance({colour[0], colour[1], colour[2]}) / std::max(luminance(plain), kDark);
+    for (int c = 0; c < 3; ++c) colour[c] = plain[c] * brighter;
   }
 }
 
 // What drawing misses of the video at (u, v), on a pixel to which the surface there has moved.
-void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, cv::Vec4f& colour) const {
+// @param tint of the surface's new look, which what was missed takes on
+void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, const cv::Vec3f& tint, cv::Vec4f& colour) const {
   const float squared = moved.squaredNorm();
   if (squared >= kNonePx * kNonePx) return;
   const float part = 1.0f - smoothStep(kWholePx, kNonePx, std::sqrt(squared));
   const cv::Vec4f miss = missAt(u, v, owner);
   const float moves = std::min(1.0f, squared / (kWholePx * kWholePx));  // unmoved, the video comes back whatever was drawn
   for (int c = 0; c < 3; ++c) {
-    const float whole = colour[c] + part * miss[c];
+    const float whole = colour[c] + part * tint[c] * miss[c];
     colour[c] = whole + moves * (std::clamp(whole, colour[c] / kMostChange, colour[c] * kMostChange) - whole);
   }
   colour[3] *= 1.0f - part * miss[3];

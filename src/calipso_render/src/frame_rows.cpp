@@ -119,7 +119,7 @@ void FrameCompositor::reflectStretch(int v, int first, int last, int slot, Row& 
 // computed.
 void FrameCompositor::shadeStretch(int v, int first, int last, int slot, Row& row) const {
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
-  const cv::v_float32x4 floor = wide(lightFloor(appearance.mean_light)), tint = wide(lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)));
+  const cv::v_float32x4 floor = wide(lightFloor(appearance.mean_light)), tint = wide(tintOf(slot));
   const float* nearness = centre_->nearness(v - region_.y);
   const std::size_t squares = static_cast<std::size_t>((v - region_.y) / kLightStep) * lit_columns_;
   const float tolerance = kLightStep / static_cast<float>(frame_.camera.fx);
@@ -155,7 +155,7 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
   const Appearance& appearance = prepared_.appearances[surface];
   reflectStretch(v, first, last, slot, row);
   shadeStretch(v, first, last, slot, row);
-  const cv::v_float32x4 floor = wide(lightFloor(appearance.mean_light)), tint = wide(lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)));
+  const cv::v_float32x4 floor = wide(lightFloor(appearance.mean_light)), tint = wide(tintOf(slot));
   const std::uint32_t* ids = centre_->ids(v - region_.y);
   for (const int i : row.uneven) {
     const int triangle = VisibilityBuffer::triangleOf(ids[i]);
@@ -170,12 +170,12 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
     out[3] = 1.0f;
   }
   std::memset(&row.source[first], kRendered, last - first);
-  if (miss_.empty() || observed_[slot].points.empty()) return;
+  if (miss_.empty() || observed_[slot].points.empty() || lookOf(slot).albedo) return;
   const cv::Point corner = appearance.region.tl();
   for (int i = first; i < last; ++i) {
     if (maps_[slot][VisibilityBuffer::triangleOf(ids[i])].thin) continue;
     const float x = row.key_u[i] + corner.x, y = row.key_v[i] + corner.y;
-    addResidual(x, y, {i + region_.x - x, v - y}, surface, row.colour[i]);
+    addResidual(x, y, {i + region_.x - x, v - y}, surface, tintOf(slot), row.colour[i]);
   }
 }
 
@@ -215,9 +215,9 @@ void FrameCompositor::composeSpecial(int u, int v, Row& row) const {
   const std::uint32_t id = centre_->idAt(u, v);
   if (miss_.empty() || pixel.source == kOriginal || id == VisibilityBuffer::kNothing) return;
   const int slot = VisibilityBuffer::objectOf(id);
-  if (observed_[slot].points.empty() || screenAt(u, v) > 0.0f) return;
+  if (observed_[slot].points.empty() || lookOf(slot).albedo || screenAt(u, v) > 0.0f) return;
   const Eigen::Vector2f moved = movement(id, static_cast<float>(u), static_cast<float>(v));
-  addResidual(u - moved.x(), v - moved.y(), moved, surface_of_slot_[slot], out);
+  addResidual(u - moved.x(), v - moved.y(), moved, surface_of_slot_[slot], tintOf(slot), out);
 }
 
 void FrameCompositor::drawRow(int v, Row& row) const {

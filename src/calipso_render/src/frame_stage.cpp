@@ -95,7 +95,7 @@ void FrameCompositor::stage() {
     actors_.push_back(makeActor(surfaces[i], std::move(vertices), frame_.camera));
     surface_of_slot_.push_back(static_cast<int>(i));
     glosses_.push_back(glossOf(prepared_.appearances[i].gloss, lookOf(static_cast<int>(glosses_.size()))));
-    const bool as_seen = edited_[i] && at_rest_[i] && !o->look.changes();
+    const bool as_seen = edited_[i] && at_rest_[i];
     observed_.push_back(as_seen ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
   }
   fronts_.assign(surfaces.size(), cv::Mat());

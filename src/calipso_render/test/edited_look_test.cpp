@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "calipso_render/renderer.hpp"
 #include "render_test_scene.hpp"
 
@@ -131,6 +133,19 @@ TEST(EditedLook, ATintMultipliesTheReflectance) {
     const float before = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[c]), now = linearFromCode(out.bgr.at<cv::Vec3b>(p)[c]);
     EXPECT_NEAR(now / before, (*in.objects[0].look.tint)[c], 0.06f) << c;  // codes are rounded
   }
+}
+
+TEST(EditedLook, AnotherLookLeavesThePlaceAround) {
+  const Setting s;
+  FrameInput in = s.input(true);
+  in.objects[0].look.tint = cv::Vec3f(0.2f, 0.5f, 1.0f);
+  const FrameOutput out = s.draw(in);
+  cv::Mat ball, changed;
+  cv::dilate(s.key.labels, ball, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
+  cv::absdiff(out.bgr, s.key.bgr, changed);
+  changed.setTo(cv::Scalar::all(0), ball);
+  EXPECT_EQ(cv::norm(changed, cv::NORM_INF), 0.0);
+  EXPECT_GT(cv::norm(out.bgr, s.key.bgr, cv::NORM_INF), 20.0);
 }
 
 TEST(EditedLook, AnAlbedoReplacesTheReflectance) {
