@@ -141,7 +141,7 @@ TEST(EditedLook, AnotherLookLeavesThePlaceAround) {
   in.objects[0].look.tint = cv::Vec3f(0.2f, 0.5f, 1.0f);
   const FrameOutput out = s.draw(in);
   cv::Mat ball, changed;
-  cv::dilate(s.key.labels, ball, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
+  cv::dilate(s.key.labels, ball, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
   cv::absdiff(out.bgr, s.key.bgr, changed);
   changed.setTo(cv::Scalar::all(0), ball);
   EXPECT_EQ(cv::norm(changed, cv::NORM_INF), 0.0);
