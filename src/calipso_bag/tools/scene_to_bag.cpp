@@ -20,13 +20,6 @@ constexpr char kUsage[] =
     "  --compressed  JPEG images";
 constexpr double kStillSeconds = 2.0;
 
-// The camera's pose at frame i; a clip that was continued keeps the last one.
-Eigen::Isometry3d poseAt(const Scene& scene, int i) {
-  const auto& moving = scene.world_from_camera_per_frame;
-  if (moving.empty()) return scene.camera.world_from_camera;
-  return moving[std::min<std::size_t>(static_cast<std::size_t>(i), moving.size() - 1)];
-}
-
 void convert(const Arguments& arguments) {
   const Scene scene = loadScene(arguments.word(0));
   const double seconds =
@@ -35,7 +28,9 @@ void convert(const Arguments& arguments) {
       holdLast(openSequence(scene.directory, scene.frame_pattern, scene.frame_count, scene.fps),
                static_cast<int>(std::lround(seconds * scene.fps)));
   ClipWriter writer(arguments.word(1), scene.camera, scene.fps, arguments.has("compressed"));
-  while (const auto image = frames->next()) writer.add(*image, poseAt(scene, writer.frameCount()));
+  while (const auto image = frames->next()) {
+    writer.add(*image, scene.cameraAt(writer.frameCount()).world_from_camera);
+  }
   writer.finish();
   std::cout << arguments.word(1) << ": " << writer.frameCount() << " frames at " << scene.fps
             << " per second\n";

@@ -61,13 +61,6 @@ Camera enlarged(Camera camera, int scale) {
   return camera;
 }
 
-Camera cameraOf(const Scene& scene, int k) {
-  Camera camera = scene.camera;
-  const auto& poses = scene.world_from_camera_per_frame;
-  if (!poses.empty()) camera.world_from_camera = poses.at(k);
-  return camera;
-}
-
 constexpr double kPlacementOff = 0.05;
 
 double meanDepth(const TriangleMesh& mesh, const Eigen::Isometry3d& camera_from_object) {
@@ -320,13 +313,13 @@ std::vector<std::string> evaluateScene(const std::string& directory, const Dynam
   if (truths.empty()) throw std::runtime_error(directory + " holds no truth to compare with");
   scene.camera = enlarged(scene.camera, scale);
 
-  ClipAnalyser analyser(makeFrame(0.0, readFrame(scene, 0, scale), cameraOf(scene, 0)),
+  ClipAnalyser analyser(makeFrame(0.0, readFrame(scene, 0, scale), scene.cameraAt(0)),
                         object_models, masks, scene.gravity);
   Costs costs;
   for (int k = 1; k < scene.frame_count; ++k) {
     const cv::Mat picture = readFrame(scene, k, scale);
     const Cost start = now();
-    analyser.add(makeFrame(k / scene.fps, picture, cameraOf(scene, k)));
+    analyser.add(makeFrame(k / scene.fps, picture, scene.cameraAt(k)));
     add(start, scene.frame_count, costs.track);
   }
   const Cost start = now();

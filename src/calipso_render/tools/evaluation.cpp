@@ -64,7 +64,7 @@ class Evaluation {
 
   void prepareClip() {
     ClipSample clip;
-    for (int k = 0; k < scene_.frame_count; ++k) clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.camera, posesAt(k)});
+    for (int k = 0; k < scene_.frame_count; ++k) clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.cameraAt(k), posesAt(k)});
     std::vector<ObjectModel> models;
     for (const Truth::Object& o : truth_.objects) models.push_back(o.model);
     const auto start = std::chrono::steady_clock::now();
@@ -83,7 +83,7 @@ class Evaluation {
   // Frame k with every object in the state that `change` gives it.
   template <typename Change>
   FrameInput frame(int k, Change change) const {
-    FrameInput in{loadFrame(scene_, k), loadLabels(scene_, k), scene_.camera, static_cast<std::int64_t>(1e9 * k / scene_.fps), {}, {}};
+    FrameInput in{loadFrame(scene_, k), loadLabels(scene_, k), scene_.cameraAt(k), static_cast<std::int64_t>(1e9 * k / scene_.fps), {}, {}};
     for (std::size_t i = 0; i < prepared_->surfaces.size(); ++i) {
       ObjectInFrame o;
       o.name = prepared_->surfaces[i].name;

@@ -1,5 +1,6 @@
 #include "calipso_scene/scene.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 #include <stdexcept>
@@ -111,6 +112,13 @@ void readObjects(const YAML::Node& root, const std::string& file, Scene& scene) 
 }
 
 }  // namespace
+
+Camera Scene::cameraAt(int k) const {
+  Camera at = camera;
+  const auto& moving = world_from_camera_per_frame;
+  if (!moving.empty()) at.world_from_camera = moving[std::min<std::size_t>(k, moving.size() - 1)];
+  return at;
+}
 
 const SceneObject& Scene::object(const std::string& wanted) const {
   std::string known;

@@ -52,6 +52,9 @@ struct Scene {
   double depth_scale = 0.001;                   // m per unit of the depth image
   std::vector<SceneObject> objects;
 
+  // The camera as it stands at frame k; past the last pose it stays there.
+  Camera cameraAt(int k) const;
+
   // @throw std::invalid_argument naming the object asked for and the ones there are
   const SceneObject& object(const std::string& name) const;
 };
