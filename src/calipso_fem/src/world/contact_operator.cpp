@@ -4,6 +4,7 @@
 
 #include "dense_kernels.hpp"
 #include "soft_system.hpp"
+#include "thread_team.hpp"
 
 namespace calipso::fem {
 
@@ -62,14 +63,25 @@ void ContactOperator::update(const std::map<Contact::Key, Contact>& contacts,
                          sideOf(c.soft_b, c.rigid_b, c.other, c.place, -1.0, softs)},
                         contactFrame(c.normal),
                         c.motion});
-  for (const int soft : renewed) parts_[soft] = partOf(soft, softs[soft].soft->system(), motion.h());
+  std::vector<Part> parts(renewed.size());
+  eachOnAThread(static_cast<int>(renewed.size()),
+                [&](int k) { parts[k] = partOf(renewed[k], softs[renewed[k]].soft->system(), motion.h()); });
+  for (size_t k = 0; k < renewed.size(); ++k) parts_[renewed[k]] = std::move(parts[k]);
   const auto n = static_cast<Eigen::Index>(entries_.size());
   W_.setZero(3 * n, 3 * n);
-  for (const auto& [soft, part] : parts_)
-    for (size_t j = 0; j < part.contacts.size(); ++j)
-      for (size_t i = 0; i < part.contacts.size(); ++i)
-        W_.block<3, 3>(3 * part.contacts[i], 3 * part.contacts[j]) += part.W.block<3, 3>(3 * i, 3 * j);
+  for (const auto& [soft, part] : parts_) addPart(part);
   addRigid(rigid);
+}
+
+// In runs of contacts that follow each other in W, too.
+void ContactOperator::addPart(const Part& part) {
+  const auto n = static_cast<int>(part.contacts.size());
+  for (int begin = 0, end = 0; begin < n; begin = end) {
+    while (end < n && part.contacts[end] - part.contacts[begin] == end - begin) ++end;
+    const int rows = 3 * (end - begin);
+    for (int j = 0; j < n; ++j)
+      W_.block(3 * part.contacts[begin], 3 * part.contacts[j], rows, 3) += part.W.block(3 * begin, 3 * j, rows, 3);
+  }
 }
 
 // F_i R J_i C J_j^T R^T F_j^T / h^2 for all contacts of a body.

@@ -47,6 +47,7 @@ class ContactOperator {
     Eigen::MatrixXd W;
   };
   Part partOf(int soft, SoftSystem& system, double h) const;
+  void addPart(const Part& part);
   void addRigid(const RigidWorld& rigid);
 
   std::vector<Entry> entries_;
