@@ -123,6 +123,22 @@ TEST(ContactSolver, SeparatingContactGivesNoImpulse) {
   EXPECT_EQ(rows[0].impulse.norm(), 0.0);
 }
 
+// A thousand units of mass on a light one, which stands on the ground, along a line: sweeps alone pass the weight on
+// by a thousandth each.
+TEST(ContactSolver, CarriesAHeavyBodyThroughALightOne) {
+  const double light = 1.0, heavy = 1000.0, step = 0.1;  // kg, kg, velocity gained by falling, m/s
+  std::vector<ContactRow> rows(2);  // light on the ground, heavy on light
+  rows[0].free_velocity = {-step, 0.0, 0.0};
+  Eigen::MatrixXd W = Eigen::MatrixXd::Zero(6, 6);
+  W.block<3, 3>(0, 0) = Eigen::Matrix3d::Identity() / light;
+  W.block<3, 3>(3, 3) = Eigen::Matrix3d::Identity() * (1.0 / light + 1.0 / heavy);
+  W.block<3, 3>(0, 3) = W.block<3, 3>(3, 0) = -Eigen::Matrix3d::Identity() / light;
+  const auto report = solveContacts(W, rows, 60, 0.0, 1e-9);
+  EXPECT_TRUE(report.converged) << report.iterations << " sweeps";
+  EXPECT_NEAR(rows[1].impulse[0], heavy * step, 1e-6 * heavy * step);
+  EXPECT_NEAR(rows[0].impulse[0], (heavy + light) * step, 1e-6 * heavy * step);
+}
+
 TEST(CondensedFactor, AgreesWithTheWholeSystem) {
   FemOptions options;
   options.cell_size = 0.1;

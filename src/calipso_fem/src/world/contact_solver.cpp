@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
 
+#include "anderson.hpp"
 #include "dense_kernels.hpp"
 
 namespace calipso::fem {
@@ -34,6 +36,32 @@ bool isInsideCone(const ContactRow& row, const Eigen::Vector3d& p) {
   return p[0] > -row.held_normal && p.tail<2>().norm() < kInside * frictionLimit(row, p[0]);
 }
 
+// Where the sweeps so far together point to (Anderson): a heavy body's weight goes through a light one only little by
+// little. A sweep that changes more than the one before makes a new start.
+class Extrapolation {
+ public:
+  // @param before, rows, velocity  before the last sweep, and after it
+  void apply(const Eigen::VectorXd& before, std::vector<ContactRow>& rows, Eigen::VectorXd& velocity) {
+    const Eigen::VectorXd after = impulsesOf(rows);
+    const double change = (after - before).norm();
+    if (change > last_change_) anderson_.reset();
+    last_change_ = change;
+    const auto next = anderson_.next(before, after, velocity);
+    if (!next) return;
+    for (size_t i = 0; i < rows.size(); ++i) rows[i].impulse = next->first.segment<3>(3 * i);
+    velocity = next->second;
+  }
+  static Eigen::VectorXd impulsesOf(const std::vector<ContactRow>& rows) {
+    Eigen::VectorXd p(3 * rows.size());
+    for (size_t i = 0; i < rows.size(); ++i) p.segment<3>(3 * i) = rows[i].impulse;
+    return p;
+  }
+
+ private:
+  Anderson anderson_;
+  double last_change_ = std::numeric_limits<double>::infinity();
+};
+
 }  // namespace
 
 ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRow>& rows,
@@ -51,7 +79,9 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
   double first = 0.0;
   ContactSolveReport report;
   report.converged = n == 0;
+  Extrapolation extrapolation;
   while (!report.converged && report.iterations < max_iterations) {
+    const Eigen::VectorXd before = Extrapolation::impulsesOf(rows);
     double largest_change = 0.0, largest = 0.0, fastest = 0.0;
     for (int i = 0; i < n; ++i) {
       const Eigen::Matrix3d own = W.block<3, 3>(3 * i, 3 * i);
@@ -73,6 +103,8 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
     // Where a heavy body rests on a light one, impulses that hardly change move the light one a lot.
     report.converged = velocity_tolerance > 0.0 ? fastest <= std::max(velocity_tolerance, kReduction * first)
                                                 : report.residual <= tolerance;
+    if (!report.converged && report.iterations < max_iterations)
+      extrapolation.apply(before, rows, velocity);
   }
   return report;
 }
