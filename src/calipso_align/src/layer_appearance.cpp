@@ -62,6 +62,7 @@ float Expectation::cost(const cv::Vec3f& seen, int x, int y) const {
 namespace {
 
 constexpr float kDarkest = 0.3f, kLightest = 0.97f;   // of a shadow, in the picture's own gamma
+constexpr float kDeep = 0.92f;   // darker than this: no change of exposure
 constexpr float kTint = 0.05f;   // of what a shadow takes in brightness: the sky that still lights it
 
 // What is left of a colour when the shadow that comes closest is put on it.
@@ -76,7 +77,16 @@ Darkened darkened(const cv::Vec3f& lit, const cv::Vec3f& seen) {
   return {s, rest.dot(rest), kTint * std::max(0.0f, 1.0f - s) * std::sqrt(squared)};
 }
 
+bool isDeep(const Darkened& d, double noise) {
+  const float allowed = static_cast<float>(9.0 * noise * noise) + 4.0f * d.tint * d.tint;
+  return d.factor >= kDarkest && d.factor <= kDeep && d.squared_rest <= allowed;
+}
+
 }  // namespace
+
+bool isShadowed(const cv::Vec3f& lit, const cv::Vec3f& seen, double noise) {
+  return isDeep(darkened(lit, seen), noise);
+}
 
 // Uniform over the factors that a shadow darkens by, Student's t across the line from black to the
 // colour: the sky that still lights a shadow has another tint than the sun.
@@ -97,15 +107,12 @@ float Shadow::cost(const cv::Vec3f& seen, int x, int y) const {
 Shadow shadowOn(const cv::Mat& background, const cv::Mat& view, const cv::Mat& clear, double noise,
                 const std::vector<const GaussianMixture*>& object) {
   const cv::Size kWindow(21, 21);   // px
-  constexpr float kDeep = 0.92f;    // darker than this: no change of exposure
   constexpr double kChance = 0.002;  // of the clear pixels: so few look shaded without any shadow
   constexpr float kFewest = 0.02f;  // share of the window that must be clear
   Shadow shadow{background, cv::Mat(view.size(), CV_8U, cv::Scalar(255)), noise};
   const auto isShaded = [&](int x, int y) {
     const cv::Vec3f colour(view.at<cv::Vec3b>(y, x));
-    const Darkened d = darkened(background.at<cv::Vec3b>(y, x), colour);
-    const float allowed = static_cast<float>(9.0 * noise * noise) + 4.0f * d.tint * d.tint;
-    if (d.factor < kDarkest || d.factor > kDeep || d.squared_rest > allowed) return false;
+    if (!isShadowed(background.at<cv::Vec3b>(y, x), colour, noise)) return false;
     const float cost = shadow.cost(colour, x, y);
     return std::all_of(object.begin(), object.end(),
                        [&](const GaussianMixture* colours) { return colours->cost(colour) > cost; });

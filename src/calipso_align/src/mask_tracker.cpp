@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "background_evidence.hpp"
 #include "calipso_align/layer_motion.hpp"
 #include "layer_appearance.hpp"
 
@@ -16,6 +17,8 @@ namespace {
 constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
 constexpr int kMeanSize = 4;  // px; blocks over which stillness averages the sensor's noise away
 constexpr size_t kMaxSamples = 2000;
+constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has proved wrong
+constexpr int kAnyShadow = 76;       // of 255: how likely a pixel may lie in a shadow where nothing is known of any
 constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
 
 cv::Mat blockMeans(const cv::Mat& image) {
@@ -263,10 +266,11 @@ cv::Mat MaskTracker::predict(const Object& object, const cv::Mat& flow, const cv
 
 // Costs of a pixel's being background [0] or object [1], over a band along the predicted outline.
 std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
-                                          const LayerAppearance& back, const LayerAppearance& fore) const {
+                                          const LayerAppearance& back, const LayerAppearance& fore,
+                                          float prior_limit) const {
   // Log odds of a pixel's centre lying across the outline although it was predicted at this distance.
   const auto prior = [&](float d) {
-    return std::clamp(params_.prior_cost * (d - 0.5f), 0.0f, params_.prior_limit);
+    return std::clamp(params_.prior_cost * (d - 0.5f), 0.0f, prior_limit);
   };
   std::vector<cv::Mat> costs = {cv::Mat::zeros(view.size(), CV_32F), cv::Mat::zeros(view.size(), CV_32F)};
   for (int y = 0; y < view.rows; ++y)
@@ -278,6 +282,21 @@ std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& ba
       costs[1].at<float>(y, x) = fore.cost(colour, x, y, params_.outlier_cost) + prior(d);
     }
   return costs;
+}
+
+// Pixels (CV_8U, of roi's size) that are rather another object's, near where one was.
+cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view, const cv::Rect& roi) const {
+  const cv::Mat near = grown(occupied_ & ~object.mask, params_.margin_px / 2)(roi);
+  cv::Mat others = cv::Mat::zeros(view.size(), CV_8U);
+  for (int y = 0; y < view.rows; ++y)
+    for (int x = 0; x < view.cols; ++x) {
+      if (!near.at<uchar>(y, x)) continue;
+      const cv::Vec3f colour = view.at<cv::Vec3b>(y, x);
+      const float own = object.colours.cost(colour);
+      for (const Object& other : objects_)
+        if (&other != &object && other.colours.cost(colour) < own) others.at<uchar>(y, x) = 255;
+    }
+  return others;
 }
 
 void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& flow,
@@ -318,9 +337,18 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
                              {&ring_colours},
                              shadow};
   cv::Mat labels = predicted / 255;
-  cutLabels(view, band, costsOf(view, band, distance, back, fore), params_.smoothness, labels);
+  cutLabels(view, band, costsOf(view, band, distance, back, fore, params_.prior_limit), params_.smoothness, labels);
 
   const double area = cv::countNonZero(labels);
+  const cv::Mat apart = othersIn(object, view, roi);
+  cv::Mat wrong = contradicted(view, labels, background, apart, back_noise);
+  if (!exact && cv::countNonZero(wrong) > params_.wrong_share * area) {
+    const cv::Mat free = (grown(wrong, 2) & background.known & ~apart) | band;
+    LayerAppearance known{{back.accounts[0], back.accounts[1]}, {&ring_colours}, shadow};
+    cv::max(known.shadow.share, background.known & kAnyShadow, known.shadow.share);
+    const LayerAppearance looks{{}, fore.colours};
+    cutLabels(view, free, costsOf(view, free, distance, known, looks, kLoosePrior), params_.smoothness, labels);
+  }
   const double flipped = cv::countNonZero((labels > 0) != (predicted > 0));
   object.confidence = static_cast<float>(std::clamp(1.0 - 4.0 * flipped / std::max(1.0, area), 0.0, 1.0));
   cv::Mat mask = labels > 0;

@@ -96,6 +96,53 @@ TEST(MaskTracker, AShadowThatComesAlongIsLeftOut) {
   EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(90, 60)), 0.95);
 }
 
+// A ball that rolls: its surface flows at up to twice the outline's speed, and turns new colours to the camera.
+TEST(MaskTracker, FollowsABallThatRolls) {
+  const double radius = 25.0;
+  const auto rolling = [&](double u0, int seed) {
+    cv::Mat image = picture(-100, -100, seed);
+    cv::Mat darker;
+    image.convertTo(darker, -1, 0.55);
+    darker.copyTo(image, maskOf(kSize, disc(u0 + 14, 80, 25)));
+    for (int v = 0; v < kSize.height; ++v)
+      for (int u = 0; u < kSize.width; ++u) {
+        const double x = (u - u0) / radius, y = (v - 60.0) / radius;
+        if (x * x + y * y > 1.0) continue;
+        const double turned = std::atan2(x, std::sqrt(1.0 - x * x - y * y)) - u0 / radius;
+        image.at<cv::Vec3b>(v, u) = std::sin(3.0 * turned) > 0.0 ? cv::Vec3b(60, 50, 170) : cv::Vec3b(205, 215, 220);
+      }
+    return image;
+  };
+  MaskTracker tracker(rolling(40, 1), truth(40, 60) / 255);
+  for (int k = 1; k <= 9; ++k) {
+    const double u = 40 + 12.0 * k;
+    const TrackedMask tracked = tracker.track(rolling(u, k + 1));
+    // What the ball hid in the key frame nobody has seen: the first strip it leaves is told by colour alone.
+    EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(u, 60)), k == 1 ? 0.85 : 0.95) << "frame " << k;
+  }
+}
+
+// A side that comes into view in a jump is the object's, although nothing moved there.
+TEST(MaskTracker, TakesInASideThatComesIntoView) {
+  const auto box = [](int width, int seed) {
+    cv::Mat image = picture(-100, -100, seed);
+    for (int u = 40; u < 40 + width; ++u)
+      image(cv::Rect(u, 40, 1, 60)).setTo(u / 6 % 2 ? cv::Scalar(60, 50, 170) : cv::Scalar(50, 90, 190));
+    return image;
+  };
+  const auto boxMask = [](int width) {
+    cv::Mat mask = cv::Mat::zeros(kSize, CV_8U);
+    mask(cv::Rect(40, 40, width, 60)).setTo(255);
+    return mask;
+  };
+  MaskTracker tracker(box(40, 1), boxMask(40) / 255);
+  for (int k = 1; k <= 4; ++k) {
+    const int width = 40 + 15 * k;
+    const TrackedMask tracked = tracker.track(box(width, k + 1));
+    EXPECT_GE(intersectionOverUnion(tracked.labels == 1, boxMask(width)), 0.96) << "frame " << k;
+  }
+}
+
 TEST(MaskTracker, APriorLeads) {
   MaskTracker tracker(picture(60, 60, 1), truth(60, 60) / 255);
   const cv::Mat prior = truth(141, 89) / 255;

@@ -1,0 +1,63 @@
+#include "background_evidence.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include "layer_appearance.hpp"
+
+namespace calipso::align {
+namespace {
+
+enum Account : uchar { kUnknown, kBackground, kOther };
+
+// What a pixel is as far as the background tells.
+cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, double noise) {
+  constexpr double kSame = 2.5, kDifferent = 6.0;  // deviations of a pixel's colour
+  const float same = static_cast<float>(3.0 * kSame * kSame * noise * noise);
+  const float different = static_cast<float>(3.0 * kDifferent * kDifferent * noise * noise);
+  cv::Mat accounts = cv::Mat::zeros(view.size(), CV_8U);
+  for (int y = 0; y < view.rows; ++y)
+    for (int x = 0; x < view.cols; ++x) {
+      if (!background.known.at<uchar>(y, x)) continue;
+      const cv::Vec3f behind(background.image.at<cv::Vec3b>(y, x)), seen(view.at<cv::Vec3b>(y, x));
+      const cv::Vec3f d = seen - behind;
+      // A shadow may have come, or gone that was there when the background was seen.
+      if (d.dot(d) < same || isShadowed(behind, seen, noise) || isShadowed(seen, behind, noise)) accounts.at<uchar>(y, x) = kBackground;
+      else if (d.dot(d) > different) accounts.at<uchar>(y, x) = kOther;
+    }
+  return accounts;
+}
+
+// The pieces of `pixels` that touch `mask`.
+cv::Mat connectedTo(const cv::Mat& mask, const cv::Mat& pixels) {
+  cv::Mat pieces, reached = cv::Mat::zeros(mask.size(), CV_8U);
+  const int count = cv::connectedComponents(pixels | mask, pieces, 8);
+  std::vector<uchar> touches(count, 0);
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (mask.at<uchar>(y, x)) touches[pieces.at<int>(y, x)] = 255;
+  touches[0] = 0;
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (pixels.at<uchar>(y, x)) reached.at<uchar>(y, x) = touches[pieces.at<int>(y, x)];
+  return reached;
+}
+
+}  // namespace
+
+cv::Mat contradicted(const cv::Mat& view, const cv::Mat& mask, const KnownBackground& background,
+                     const cv::Mat& apart, double noise) {
+  constexpr double kStray = 0.02;  // of what is known beside the object: so much may differ by chance
+  const cv::Mat accounts = accountsOf(view, background, noise);
+  const cv::Mat object = mask > 0, elsewhere = apart > 0;
+  // Single pixels that differ are noise, or the rim's mixtures.
+  cv::Mat other = (accounts == kOther) & ~object & ~elsewhere, opened;
+  cv::morphologyEx(other, opened, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  const cv::Mat gained = connectedTo(object, opened);
+  const cv::Mat beside = background.known & ~object & ~elsewhere & ~gained;
+  if (cv::countNonZero(opened & ~gained) > kStray * cv::countNonZero(beside)) return cv::Mat::zeros(view.size(), CV_8U);
+  cv::Mat lost;
+  cv::morphologyEx((accounts == kBackground) & object, lost, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  return gained | lost;
+}
+
+}  // namespace calipso::align
