@@ -343,7 +343,7 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   const cv::Mat apart = othersIn(object, view, roi);
   cv::Mat wrong = contradicted(view, labels, background, apart, back_noise);
   if (!exact && cv::countNonZero(wrong) > params_.wrong_share * area) {
-    const cv::Mat free = (grown(wrong, 2) & background.known & ~apart) | band;
+    const cv::Mat free = ((grown(wrong, 2) | ~background.known) & ~apart) | band;
     LayerAppearance known{{back.accounts[0], back.accounts[1]}, {&ring_colours}, shadow};
     cv::max(known.shadow.share, background.known & kAnyShadow, known.shadow.share);
     const LayerAppearance looks{{}, fore.colours};
