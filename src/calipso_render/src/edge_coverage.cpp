@@ -2,59 +2,48 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <unordered_map>
+
+#include "kernels.hpp"
+#include "marked.hpp"
+#include "triangle_span.hpp"
 
 namespace calipso::render {
 namespace {
-
-int objectOrNone(std::uint32_t id) {
-  return id == VisibilityBuffer::kNothing ? -1 : VisibilityBuffer::objectOf(id);
-}
 
 float signedArea(const ScreenMesh& mesh, const Eigen::Vector3i& t) {
   const Eigen::Vector3f &p = mesh.points[t[0]], &q = mesh.points[t[1]], &r = mesh.points[t[2]];
   return (q.x() - p.x()) * (r.y() - p.y()) - (r.x() - p.x()) * (q.y() - p.y());
 }
 
-// Edge functions and nearness of one triangle, linear in the picture, at all samples of a pixel at once.
-class Sampler {
- public:
-  Sampler() = default;
-  Sampler(const Eigen::Vector3f* p, float area) {
-    near_ = {0.0f, 0.0f, 0.0f};
-    for (int i = 0; i < 3; ++i) {
-      const Eigen::Vector3f &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
-      edges_[i] = {a.y() - b.y(), b.x() - a.x(), (b.y() - a.y()) * a.x() - (b.x() - a.x()) * a.y()};
-      near_ += edges_[i] * (p[i].z() / area);
-    }
+// @param area positive
+TriangleSamples samplesOf(const Eigen::Vector3f (&p)[3], float area) {
+  TriangleSamples t{};
+  const float per_area = 1.0f / area;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3f &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
+    t.edge_u[i] = a.y() - b.y(), t.edge_v[i] = b.x() - a.x(), t.edge_0[i] = (b.y() - a.y()) * a.x() - (b.x() - a.x()) * a.y();
+    const float weight = p[i].z() * per_area;
+    t.near_u += t.edge_u[i] * weight, t.near_v += t.edge_v[i] * weight, t.near_0 += t.edge_0[i] * weight;
   }
+  return t;
+}
 
-  void draw(int u, int v, std::uint32_t id, EdgeCoverage::Pixel& pixel) const {
-    constexpr float kReach = 0.375f;  // px from the centre to the outermost samples
-    float at_centre[3];
-    for (int i = 0; i < 3; ++i) {
-      at_centre[i] = edges_[i][0] * u + edges_[i][1] * v + edges_[i][2];
-      if (at_centre[i] < -kReach * (std::abs(edges_[i][0]) + std::abs(edges_[i][1]))) return;
-    }
-    const float near_centre = near_[0] * u + near_[1] * v + near_[2];
-    for (int s = 0; s < EdgeCoverage::kSamples; ++s) {
-      const Eigen::Vector2f d = EdgeCoverage::offset(s);
-      const float w0 = at_centre[0] + edges_[0][0] * d.x() + edges_[0][1] * d.y();
-      const float w1 = at_centre[1] + edges_[1][0] * d.x() + edges_[1][1] * d.y();
-      const float w2 = at_centre[2] + edges_[2][0] * d.x() + edges_[2][1] * d.y();
-      const float near = near_centre + near_[0] * d.x() + near_[1] * d.y();
-      const bool wins = (w0 >= 0.0f) & (w1 >= 0.0f) & (w2 >= 0.0f) & (near > pixel.nearness[s]);
-      pixel.nearness[s] = wins ? near : pixel.nearness[s];
-      pixel.ids[s] = wins ? id : pixel.ids[s];
-    }
-  }
-
- private:
-  Eigen::Vector3f edges_[3];  // a u + b v + c >= 0 inside
-  Eigen::Vector3f near_;
-};
+// Whether the object seen changes to the right of each pixel of a row, or below it.
+void markChanges(const std::uint32_t* row, const std::uint32_t* below, int width, std::uint8_t* right, std::uint8_t* down) {
+  for (int u = 0; u + 1 < width; ++u) right[u] = ((row[u] ^ row[u + 1]) >> 24) != 0;
+  for (int u = 0; u < width; ++u) down[u] = ((row[u] ^ below[u]) >> 24) != 0;
+}
 
 }  // namespace
+
+struct EdgeCoverage::Piece {
+  TriangleSamples samples;
+  int u0, v0, u1, v1;  // region coordinates
+  int tile;
+  std::uint32_t id;
+};
 
 std::vector<MeshEdge> meshEdges(const Triangles& triangles) {
   std::unordered_map<std::uint64_t, int> found;
@@ -74,29 +63,33 @@ std::vector<MeshEdge> meshEdges(const Triangles& triangles) {
 }
 
 EdgeCoverage::EdgeCoverage(const VisibilityBuffer& centre)
-    : region_(centre.region()), slots_(centre.region().area(), -1), tiles_across_(centre.region().width / kTile + 1),
-      tiles_(static_cast<std::size_t>(tiles_across_) * (centre.region().height / kTile + 1), 0) {
+    : region_(centre.region()), tiles_across_(centre.region().width / kTile + 1),
+      tiles_(static_cast<std::size_t>(tiles_across_) * (centre.region().height / kTile + 1), -1) {
   const int width = region_.width, height = region_.height;
+  std::vector<std::uint8_t> changes(2 * static_cast<std::size_t>(width) * height);
+  const auto changesOf = [&](int v) { return changes.data() + 2 * static_cast<std::size_t>(width) * v; };
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < height; ++v) {
     const std::uint32_t* row = centre.ids(v);
-    const std::uint32_t* below = v + 1 < height ? centre.ids(v + 1) : row;
-    for (int u = 0; u < width; ++u) {
-      const int here = objectOrNone(row[u]);
-      const bool right_differs = u + 1 < width && objectOrNone(row[u + 1]) != here;
-      const bool below_differs = objectOrNone(below[u]) != here;
-      if (right_differs || below_differs) choose(u, v);
-      if (right_differs) choose(u + 1, v);
-      if (below_differs) choose(u, v + 1);
-    }
+    markChanges(row, v + 1 < height ? centre.ids(v + 1) : row, width, changesOf(v), changesOf(v) + width);
+  }
+  for (int v = 0; v < height; ++v) {
+    const std::uint8_t *right = changesOf(v), *down = right + width;
+    for (int u = nextMarked(right, 0, width); u < width; u = nextMarked(right, u + 1, width)) choose(u, v), choose(u + 1, v);
+    for (int u = nextMarked(down, 0, width); u < width; u = nextMarked(down, u + 1, width)) choose(u, v), choose(u, v + 1);
   }
 }
 
 void EdgeCoverage::choose(int column, int row) {
   if (column < 0 || row < 0 || column >= region_.width || row >= region_.height) return;
-  int& slot = slots_[static_cast<std::size_t>(row) * region_.width + column];
+  int& tile = tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + column / kTile];
+  if (tile < 0) {
+    tile = static_cast<int>(slots_.size() / (kTile * kTile));
+    slots_.resize(slots_.size() + kTile * kTile, -1);
+  }
+  int& slot = slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile + column % kTile];
   if (slot >= 0) return;
   slot = static_cast<int>(pixels_.size());
-  tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + column / kTile] = 1;
   pixels_.emplace_back();
   pixels_.back().ids.fill(VisibilityBuffer::kNothing);
   pixels_.back().nearness.fill(VisibilityBuffer::kFar);
@@ -121,18 +114,34 @@ void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<Me
 
 void EdgeCoverage::draw(const ScreenMesh& mesh, int object) {
   if (pixels_.empty()) return;
-  for (int t = 0; t < static_cast<int>(mesh.triangles->size()); ++t) {
-    drawTriangle(mesh, t, (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t));
+  constexpr int kParts = 8;
+  const int count = static_cast<int>(mesh.triangles->size());
+  std::vector<Piece> pieces[kParts];  // of the triangles that touch a chosen pixel's tile, in their order
+#pragma omp parallel
+  {
+#pragma omp for schedule(static)
+    for (int part = 0; part < kParts; ++part) {
+      const int begin = static_cast<int>(static_cast<long>(count) * part / kParts), end = static_cast<int>(static_cast<long>(count) * (part + 1) / kParts);
+      for (int t = begin; t < end; ++t) addPieces(mesh, t, (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t), pieces[part]);
+    }
+#pragma omp for schedule(static)
+    for (int band = 0; band < kParts; ++band) {
+      for (const auto& part : pieces) {
+        for (const Piece& piece : part) {
+          if (piece.tile % kParts == band) drawPiece(piece);
+        }
+      }
+    }
   }
 }
 
-void EdgeCoverage::drawTriangle(const ScreenMesh& mesh, int triangle, std::uint32_t id) {
+void EdgeCoverage::addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id, std::vector<Piece>& pieces) const {
   const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
-  const Eigen::Vector3f offset(region_.x, region_.y, 0.0f);
-  Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset,
-                          mesh.points[t[2]] - offset};
   float area = signedArea(mesh, t);
-  if (mesh.hides(area) || std::isnan(p[0].z() + p[1].z() + p[2].z()) || !(std::abs(area) > 1e-9f)) return;
+  if (mesh.hides(area) || !(std::abs(area) > 1e-9f)) return;
+  const Eigen::Vector3f offset(region_.x, region_.y, 0.0f);
+  Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset, mesh.points[t[2]] - offset};
+  if (std::isnan(p[0].z() + p[1].z() + p[2].z())) return;
   if (area < 0.0f) std::swap(p[1], p[2]), area = -area;
   // From the pixel whose square holds the least coordinate to the one that holds the greatest.
   const auto low = [](float a, float b, float c) { return static_cast<int>(std::clamp(std::min({a, b, c}) + 0.5f, 0.0f, 1e6f)); };
@@ -141,33 +150,42 @@ void EdgeCoverage::drawTriangle(const ScreenMesh& mesh, int triangle, std::uint3
   };
   const int u0 = low(p[0].x(), p[1].x(), p[2].x()), u1 = high(p[0].x(), p[1].x(), p[2].x(), region_.width - 1);
   const int v0 = low(p[0].y(), p[1].y(), p[2].y()), v1 = high(p[0].y(), p[1].y(), p[2].y(), region_.height - 1);
-  if (!anyChosen(u0, v0, u1, v1)) return;
-  Sampler sampler;
-  bool ready = false;
-  for (int v = v0; v <= v1; ++v) {
-    const int* slots = &slots_[static_cast<std::size_t>(v) * region_.width];
-    for (int u = u0; u <= u1; ++u) {
-      if (slots[u] < 0) continue;
-      if (!ready) sampler = Sampler(p, area), ready = true;
-      sampler.draw(u, v, id, pixels_[slots[u]]);
+  std::optional<TriangleSamples> samples;
+  for (int j = v0 / kTile; j <= v1 / kTile && v0 <= v1; ++j) {
+    for (int i = u0 / kTile; i <= u1 / kTile && u0 <= u1; ++i) {
+      const int tile = tiles_[static_cast<std::size_t>(j) * tiles_across_ + i];
+      if (tile < 0) continue;
+      if (!samples) samples = samplesOf(p, area);
+      pieces.push_back({*samples, std::max(u0, i * kTile), std::max(v0, j * kTile), std::min(u1, (i + 1) * kTile - 1), std::min(v1, (j + 1) * kTile - 1), tile, id});
     }
   }
 }
 
-bool EdgeCoverage::anyChosen(int u0, int v0, int u1, int v1) const {
-  for (int j = v0 / kTile; j <= v1 / kTile && v0 <= v1; ++j) {
-    for (int i = u0 / kTile; i <= u1 / kTile && u0 <= u1; ++i) {
-      if (tiles_[static_cast<std::size_t>(j) * tiles_across_ + i] != 0) return true;
+void EdgeCoverage::drawPiece(const Piece& piece) {
+  for (int v = piece.v0; v <= piece.v1; ++v) {
+    const int* slots = &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile + (v % kTile) * kTile];
+    for (int u = piece.u0; u <= piece.u1; ++u) {
+      if (slots[u % kTile] >= 0) kernels().drawSamples(piece.samples, u, v, piece.id, pixels_[slots[u % kTile]]);
     }
   }
-  return false;
 }
 
 const EdgeCoverage::Pixel* EdgeCoverage::at(int u, int v) const {
   u -= region_.x, v -= region_.y;
   if (u < 0 || v < 0 || u >= region_.width || v >= region_.height) return nullptr;
-  const int slot = slots_[static_cast<std::size_t>(v) * region_.width + u];
+  const int slot = slotAt(u, v);
   return slot < 0 ? nullptr : &pixels_[slot];
+}
+
+std::vector<int> EdgeCoverage::columnsOf(int row) const {
+  std::vector<int> columns;
+  for (int i = 0; i < tiles_across_; ++i) {
+    if (tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + i] < 0) continue;
+    for (int u = i * kTile; u < std::min(region_.width, (i + 1) * kTile); ++u) {
+      if (slotAt(u, row) >= 0) columns.push_back(u);
+    }
+  }
+  return columns;
 }
 
 }  // namespace calipso::render

@@ -8,6 +8,7 @@
 #include "calipso_render/colour.hpp"
 #include "frame_compositor.hpp"
 #include "kernels.hpp"
+#include "marked.hpp"
 
 namespace calipso::render {
 namespace {
@@ -18,17 +19,6 @@ cv::v_float32x4 wide(const cv::Vec3f& c, float fourth = 0.0f) { return {c[0], c[
 
 cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) { return {decoded[c[0]], decoded[c[1]], decoded[c[2]], 0.0f}; }
 
-// First place from `i` on whose byte is not 0.
-template <class Byte>
-int nextMarked(const Byte* bytes, int i, int end) {
-  for (std::uint64_t eight; i + 8 <= end; i += 8) {
-    std::memcpy(&eight, bytes + i, 8);
-    if (eight != 0) break;
-  }
-  while (i < end && bytes[i] == 0) ++i;
-  return i;
-}
-
 }  // namespace
 
 // What has to be done for every pixel of row v.
@@ -38,7 +28,6 @@ void FrameCompositor::findKinds(int v, Row& row) const {
   const float *sky = sky_now_.ptr<float>(j), *sky_before = sky_before_.ptr<float>(j);
   const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x, *drawn = drawn_.ptr<std::uint8_t>(j);
   const std::uint8_t *removed = removed_.ptr<std::uint8_t>(j), *relit = relit_.ptr<std::uint8_t>(j);
-  const int* edges = edges_->slots(j);
   const std::uint32_t* ids = centre_->ids(j);
   Kind* kinds = row.kinds.data();
   for (int i = 0; i < width; ++i) {
@@ -46,8 +35,9 @@ void FrameCompositor::findKinds(int v, Row& row) const {
     const bool differs = ((relit[i] != 0) | (change >= kSameShadow)) & (sun[i] >= 0.0f) & (labels[i] == 0);
     const bool behind = differs | (removed[i] != 0);
     const Kind rest = ids[i] == VisibilityBuffer::kNothing ? kBehind : kSpecial;  // what hides a surface at rest takes its residual
-    kinds[i] = edges[i] >= 0 ? kSpecial : drawn[i] != 0 ? kPlain : behind ? rest : kNone;
+    kinds[i] = drawn[i] != 0 ? kPlain : behind ? rest : kNone;
   }
+  for (const int i : edges_->columnsOf(j)) kinds[i] = kSpecial;
   if (!still_.empty()) {
     const float* still = still_.ptr<float>(j);
     for (int i = 0; i < width; ++i) {

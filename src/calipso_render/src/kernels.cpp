@@ -5,11 +5,10 @@
 
 #include "bicubic.hpp"
 #include "calipso_render/colour.hpp"
+#include "raster_bodies.hpp"
 
 namespace calipso::render {
 namespace {
-
-#define CALIPSO_INLINE inline __attribute__((always_inline))
 
 constexpr float kUp = 16384.0f;  // makes the truncation to int a floor
 constexpr int kDown = 16384;
@@ -32,7 +31,7 @@ CALIPSO_INLINE float visibleThroughBody(const ShadowTexels& map, const ShadowTap
   for (int k = 0; k < n; ++k) {
     const int i = static_cast<int>(s + search * taps.x[k] + (kUp + 0.5f)) - kDown, j = static_cast<int>(t + search * taps.y[k] + (kUp + 0.5f)) - kDown;
     const bool inside = (static_cast<unsigned>(i) < width) & (static_cast<unsigned>(j) < height);
-    at[k] = inside ? j * map.width + i : 0;
+    at[k] = inside ? j * map.stride + i : 0;
   }
   for (int k = 0; k < n; ++k) above[k] = map.heights[at[k]];
   for (int k = 0; k < n; ++k) {
@@ -48,19 +47,15 @@ CALIPSO_INLINE float visibleThroughBody(const ShadowTexels& map, const ShadowTap
     const int i = static_cast<int>(x + kUp) - kDown, j = static_cast<int>(y + kUp) - kDown;
     const bool inside = (static_cast<unsigned>(i) < width - 1) & (static_cast<unsigned>(j) < height - 1);
     fx[k] = x - static_cast<float>(i), fy[k] = y - static_cast<float>(j);
-    at[k] = inside ? j * map.width + i : 0;
+    at[k] = inside ? j * map.stride + i : 0;
   }
   for (int k = 0; k < n; ++k) {
     const float* row = map.heights + at[k];
-    const float a = row[0] > h, b = row[1] > h, c = row[map.width] > h, e = row[map.width + 1] > h;
+    const float a = row[0] > h, b = row[1] > h, c = row[map.stride] > h, e = row[map.stride + 1] > h;
     hit[k] = (a + (b - a) * fx[k]) * (1.0f - fy[k]) + (c + (e - c) * fx[k]) * fy[k];
   }
   return 1.0f - sumOf(hit, n) / static_cast<float>(n);
 }
-
-// Eight floats in one register or two; adjacent pixels of four channels.
-typedef float Eight __attribute__((vector_size(32), aligned(4), may_alias));
-typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
 
 CALIPSO_INLINE void sampleBody(const cv::Mat& image, const float* us, const float* vs, int count, cv::Vec4f* out) {
   const std::size_t step = image.step1();
@@ -128,36 +123,41 @@ CALIPSO_INLINE void encodeBody(const CodeTables& tables, const cv::Vec4f* colour
   }
 }
 
-float plainVisibleThrough(const ShadowTexels& map, const ShadowTaps& taps, float s, float t, float h, float search) {
-  return visibleThroughBody(map, taps, s, t, h, search);
-}
-void plainSample(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out) { sampleBody(image, u, v, count, out); }
-void plainEncode(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count, cv::Vec3b* codes) {
-  encodeBody(tables, colours, noise, column, count, codes);
+CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTarget& target) {
+  if (target.ids != nullptr) fillSpansBody<true>(spans, count, target);
+  else fillSpansBody<false>(spans, count, target);
 }
 
+#define CALIPSO_KERNELS(name, attribute)                                                                                             \
+  attribute float name##VisibleThrough(const ShadowTexels& map, const ShadowTaps& taps, float s, float t, float h, float search) {   \
+    return visibleThroughBody(map, taps, s, t, h, search);                                                                           \
+  }                                                                                                                                  \
+  attribute void name##Sample(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out) {                     \
+    sampleBody(image, u, v, count, out);                                                                                             \
+  }                                                                                                                                  \
+  attribute void name##Encode(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count,     \
+                              cv::Vec3b* codes) {                                                                                    \
+    encodeBody(tables, colours, noise, column, count, codes);                                                                        \
+  }                                                                                                                                  \
+  attribute void name##Fill(const TriangleSpan* spans, int count, const SpanTarget& target) { fillBody(spans, count, target); }      \
+  attribute void name##DrawSamples(const TriangleSamples& t, int u, int v, std::uint32_t id, EdgeCoverage::Pixel& pixel) {           \
+    drawSamplesBody(t, u, v, id, pixel);                                                                                             \
+  }                                                                                                                                  \
+  const Kernels name##Table{name##VisibleThrough, name##Sample, name##Encode, name##Fill, name##DrawSamples};
+
+CALIPSO_KERNELS(plain, )
 #if defined(__x86_64__) && defined(__GNUC__)
 #define CALIPSO_AVX2 __attribute__((target("avx2")))
-CALIPSO_AVX2 float avx2VisibleThrough(const ShadowTexels& map, const ShadowTaps& taps, float s, float t, float h, float search) {
-  return visibleThroughBody(map, taps, s, t, h, search);
-}
-CALIPSO_AVX2 void avx2Sample(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out) { sampleBody(image, u, v, count, out); }
-CALIPSO_AVX2 void avx2Encode(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count, cv::Vec3b* codes) {
-  encodeBody(tables, colours, noise, column, count, codes);
-}
+CALIPSO_KERNELS(avx2, CALIPSO_AVX2)
 #endif
 
 }  // namespace
 
-const Kernels& plainKernels() {
-  static const Kernels kernels{plainVisibleThrough, plainSample, plainEncode};
-  return kernels;
-}
+const Kernels& plainKernels() { return plainTable; }
 
 const Kernels* avx2Kernels() {
 #ifdef CALIPSO_AVX2
-  static const Kernels kernels{avx2VisibleThrough, avx2Sample, avx2Encode};
-  return __builtin_cpu_supports("avx2") ? &kernels : nullptr;
+  return __builtin_cpu_supports("avx2") ? &avx2Table : nullptr;
 #else
   return nullptr;
 #endif

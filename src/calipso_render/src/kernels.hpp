@@ -3,6 +3,9 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
+#include "calipso_render/edge_coverage.hpp"
+#include "triangle_span.hpp"
+
 namespace calipso::render {
 
 // Samples of a disc for a shadow map's filter. The number of taps is a multiple of 8.
@@ -15,7 +18,7 @@ struct ShadowTaps {
 // A shadow map as its filter reads it. What lies in the corner blocks nothing.
 struct ShadowTexels {
   const float* heights;  // towards the light, m
-  int width, height;
+  int width, height, stride;
   float spread;          // texels of penumbra per m above the receiver
 };
 
@@ -39,6 +42,12 @@ struct Kernels {
   // Code values of `count` linear colours (B, G, R, part without noise), with noise of unit variance scaled by the tables.
   // @param noise a row of 256 places, read from `column` on, around its end
   void (*encode)(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count, cv::Vec3b* codes);
+
+  // Draws `count` triangles in their order.
+  void (*fill)(const TriangleSpan* spans, int count, const SpanTarget& target);
+
+  // Draws a triangle into the samples of pixel (u, v).
+  void (*drawSamples)(const TriangleSamples& t, int u, int v, std::uint32_t id, EdgeCoverage::Pixel& pixel);
 };
 
 const Kernels& plainKernels();

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels.hpp"
+#include "triangle_span.hpp"
+
 namespace calipso::render {
 namespace {
 
 constexpr double kNearPlane = 1e-6;     // m in front of the camera
-constexpr int kBands = 8;               // rows are split in fixed bands: the result knows no thread count
 constexpr float kEdgeTolerance = 1e-3f; // px; shared edges belong to both sides, so no cracks
 constexpr float kSmallestArea = 1e-9f;  // px^2
 
@@ -22,40 +24,32 @@ int ceilInt(float x) {
   return i + (static_cast<float>(i) < x);
 }
 
-// A triangle made ready for row spans. A row v lies inside from the greatest of `left` to the least of `right`, each
-// linear in v; nearness is a plane.
-struct Span {
-  struct Bound {
-    float column, row, slope;  // a point of it, and columns per row
-    float at(float v) const { return column + slope * (v - row); }
-  };
-  Bound left[3], right[3];
-  int lefts, rights;
-  float near_u, near_v, near_0;
-  int row_min, row_max, column_min, column_max;  // in the buffer's region
-  std::uint32_t id;
-};
-
-bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Span& span) {
-  const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
-  const Eigen::Vector3f offset(region.x, region.y, 0.0f);
-  Eigen::Vector3f p[3];
-  for (int i = 0; i < 3; ++i) p[i] = mesh.points[t[i]] - offset;
-  const float left = std::min({p[0].x(), p[1].x(), p[2].x()});
-  const float right = std::max({p[0].x(), p[1].x(), p[2].x()});
-  const float top = std::min({p[0].y(), p[1].y(), p[2].y()});
-  const float bottom = std::max({p[0].y(), p[1].y(), p[2].y()});
+// Rows and columns that a triangle can reach. @return false if there are none
+bool setLimits(const Eigen::Vector3f (&p)[3], const cv::Rect& region, TriangleSpan& span) {
+  const float left = std::min({p[0].x(), p[1].x(), p[2].x()}), right = std::max({p[0].x(), p[1].x(), p[2].x()});
+  const float top = std::min({p[0].y(), p[1].y(), p[2].y()}), bottom = std::max({p[0].y(), p[1].y(), p[2].y()});
   // Written so that NaN fails every comparison.
   if (!(right >= 0 && bottom >= 0 && left <= region.width - 1 && top <= region.height - 1)) return false;
-  const float area = (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) -
-                     (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
-  if (mesh.hides(area) || !(std::abs(area) > kSmallestArea) || std::isnan(p[0].z() + p[1].z() + p[2].z())) return false;
   span.row_min = ceilInt(std::max(0.0f, top - kEdgeTolerance));
   span.row_max = floorInt(std::min(region.height - 1.0f, bottom + kEdgeTolerance));
   span.column_min = ceilInt(std::max(0.0f, left - kEdgeTolerance));
   span.column_max = floorInt(std::min(region.width - 1.0f, right + kEdgeTolerance));
-  if (span.row_min > span.row_max || span.column_min > span.column_max) return false;
-  span.lefts = span.rights = 0;
+  return span.row_min <= span.row_max && span.column_min <= span.column_max;
+}
+
+bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, TriangleSpan& span) {
+  const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
+  const Eigen::Vector3f offset(region.x, region.y, 0.0f);
+  const Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset, mesh.points[t[2]] - offset};
+  const float area = (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) - (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
+  if (mesh.hides(area) || !(std::abs(area) > kSmallestArea) || std::isnan(p[0].z() + p[1].z() + p[2].z())) return false;
+  if (!setLimits(p, region, span)) return false;
+  for (int i = 0; i < 4; ++i) {
+    constexpr float kNoBound = 1e9f;
+    span.column[i] = i < 2 ? -kNoBound : kNoBound, span.row[i] = span.slope[i] = 0.0f;
+  }
+  // The edges that rise bound one side, those that fall the other: at most two, since they close.
+  int lefts = 0, rights = 2;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f& start = p[(i + 1) % 3];
     const Eigen::Vector3f& end = p[(i + 2) % 3];
@@ -64,37 +58,14 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Span
     // The edge is moved out by kEdgeTolerance: along the row by that times length / |dy|.
     const float slope = dx / dy, reach = kEdgeTolerance * std::sqrt(1.0f + slope * slope);
     const bool is_left = (area > 0.0f) == (dy < 0.0f);
-    if (is_left) span.left[span.lefts++] = {start.x() - reach, start.y(), slope};
-    else span.right[span.rights++] = {start.x() + reach, start.y(), slope};
+    const int k = is_left ? lefts++ : rights++;
+    span.column[k] = is_left ? start.x() - reach : start.x() + reach, span.row[k] = start.y(), span.slope[k] = slope;
   }
-  const float dz1 = p[1].z() - p[0].z(), dz2 = p[2].z() - p[0].z();
-  span.near_u = (dz1 * (p[2].y() - p[0].y()) - dz2 * (p[1].y() - p[0].y())) / area;
-  span.near_v = (dz2 * (p[1].x() - p[0].x()) - dz1 * (p[2].x() - p[0].x())) / area;
+  const float dz1 = p[1].z() - p[0].z(), dz2 = p[2].z() - p[0].z(), per_area = 1.0f / area;
+  span.near_u = (dz1 * (p[2].y() - p[0].y()) - dz2 * (p[1].y() - p[0].y())) * per_area;
+  span.near_v = (dz2 * (p[1].x() - p[0].x()) - dz1 * (p[2].x() - p[0].x())) * per_area;
   span.near_0 = p[0].z() - span.near_u * p[0].x() - span.near_v * p[0].y();
   return true;
-}
-
-// Columns of row v inside the triangle.
-void rowLimits(const Span& s, float v, int& from, int& to) {
-  float low = static_cast<float>(s.column_min), high = static_cast<float>(s.column_max);
-  for (int i = 0; i < s.lefts; ++i) low = std::max(low, s.left[i].at(v));
-  for (int i = 0; i < s.rights; ++i) high = std::min(high, s.right[i].at(v));
-  if (!(low <= high)) {  // far off, they might not fit an int
-    from = 0, to = -1;
-    return;
-  }
-  from = ceilInt(low);
-  to = floorInt(high);
-}
-
-void fillRow(const Span& s, int row, int from, int to, std::uint32_t* ids, float* nearest) {
-  const float base = s.near_0 + s.near_v * row;
-  for (int u = from; u <= to; ++u) {
-    const float z = base + s.near_u * u;
-    const bool closer = z > nearest[u];
-    nearest[u] = closer ? z : nearest[u];
-    ids[u] = closer ? s.id : ids[u];
-  }
 }
 
 }  // namespace
@@ -137,36 +108,30 @@ cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size) {
   return {u0, v0, std::max(0, u1 - u0), std::max(0, v1 - v0)};
 }
 
-VisibilityBuffer::VisibilityBuffer(const cv::Rect& region)
-    : region_(region), ids_(region.area(), kNothing), near_(region.area(), kFar) {}
+VisibilityBuffer::VisibilityBuffer(const cv::Rect& region, bool with_ids)
+    : region_(region), stride_(region.width + kPadding), ids_(with_ids ? static_cast<std::size_t>(stride_) * region.height : 0, kNothing),
+      near_(static_cast<std::size_t>(stride_) * region.height, kFar) {}
 
 void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
   const int count = static_cast<int>(mesh.triangles->size());
-  std::vector<Span> parts[kBands];  // of the triangles, in their order
-#pragma omp parallel for schedule(static)
-  for (int part = 0; part < kBands; ++part) {
-    const int begin = static_cast<int>(static_cast<long>(count) * part / kBands), end = static_cast<int>(static_cast<long>(count) * (part + 1) / kBands);
-    Span span;
-    for (int t = begin; t < end; ++t) {
-      if (!makeSpan(mesh, t, region_, span)) continue;
-      span.id = (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t);
-      if (parts[part].capacity() == 0) parts[part].reserve(end - t);
-      parts[part].push_back(span);
-    }
-  }
-#pragma omp parallel for schedule(static)
-  for (int band = 0; band < kBands; ++band) {
-    const int first = region_.height * band / kBands;
-    const int last = region_.height * (band + 1) / kBands - 1;
-    for (const std::vector<Span>& part : parts) {
-      for (const Span& s : part) {
-        for (int row = std::max(first, s.row_min); row <= std::min(last, s.row_max); ++row) {
-          int from, to;
-          rowLimits(s, static_cast<float>(row), from, to);
-          const std::size_t start = static_cast<std::size_t>(row) * region_.width;
-          if (from <= to) fillRow(s, row, from, to, &ids_[start], &near_[start]);
-        }
+  std::vector<TriangleSpan> parts[kBands];  // of the triangles, in their order
+#pragma omp parallel
+  {
+#pragma omp for schedule(static)
+    for (int part = 0; part < kBands; ++part) {
+      const int begin = static_cast<int>(static_cast<long>(count) * part / kBands), end = static_cast<int>(static_cast<long>(count) * (part + 1) / kBands);
+      parts[part].reserve(end - begin);
+      TriangleSpan span;
+      for (int t = begin; t < end; ++t) {
+        span.id = (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t);
+        if (makeSpan(mesh, t, region_, span)) parts[part].push_back(span);
       }
+    }
+#pragma omp for schedule(static)
+    for (int band = 0; band < kBands; ++band) {
+      const int first = region_.height * band / kBands, last = region_.height * (band + 1) / kBands - 1;
+      const SpanTarget target{ids_.empty() ? nullptr : ids_.data(), near_.data(), stride_, first, last};
+      for (const auto& part : parts) kernels().fill(part.data(), static_cast<int>(part.size()), target);
     }
   }
 }

@@ -47,7 +47,7 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
   height_ = static_cast<int>((high.y() - low.y()) / texel_) + 2 * kMargin + 1;
   origin_ = Eigen::Vector3f(low.x() - kMargin * texel_, low.y() - kMargin * texel_, low.z());
   highest_ = high.z() - low.z();
-  VisibilityBuffer buffer({0, 0, width_, height_});
+  map_.emplace(cv::Rect(0, 0, width_, height_), false);
   for (const Occluder& o : occluders) {
     ScreenMesh mesh;
     mesh.triangles = o.triangles;
@@ -58,46 +58,58 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
       const Eigen::Vector3f& p = (*o.vertices)[i];
       mesh.points[i] = {(p.dot(axis_s_) - origin_.x()) * per_texel_, (p.dot(axis_t_) - origin_.y()) * per_texel_, p.dot(axis_h_) - origin_.z()};
     }
-    buffer.draw(mesh, 0);
+    map_->draw(mesh, 0);
   }
-  heights_.assign(buffer.nearness(0), buffer.nearness(0) + static_cast<std::size_t>(width_) * height_);
   buildLevels();
 }
 
 void ShadowMap::buildLevels() {
-  const Extremes nothing{VisibilityBuffer::kFar, VisibilityBuffer::kFar};
-  const auto merge = [](Extremes& into, const Extremes& e) {
-    into.lowest = std::min(into.lowest, e.lowest), into.highest = std::max(into.highest, e.highest);
-  };
-  const Extremes none{std::numeric_limits<float>::max(), VisibilityBuffer::kFar};
-  std::vector<Extremes> own(heights_.size());
-  for (std::size_t i = 0; i < own.size(); ++i) own[i] = {heights_[i], heights_[i]};
-  int width = width_, height = height_, shrink = 1 << kFirstLevel;
-  while (levels_.empty() || std::max(levels_.back().width, levels_.back().height) > 2) {
-    const int w = (width + shrink - 1) / shrink, h = (height + shrink - 1) / shrink;
-    std::vector<Extremes> next(static_cast<std::size_t>(w) * h, none);
-#pragma omp parallel for schedule(static)
-    for (int b = 0; b < h; ++b) {
-      Extremes* out = &next[static_cast<std::size_t>(b) * w];
-      for (int j = b * shrink; j < std::min(height, (b + 1) * shrink); ++j) {
-        const Extremes* row = &own[static_cast<std::size_t>(j) * width];
-        for (int i = 0; i < width; ++i) merge(out[i / shrink], row[i]);
-      }
+  std::vector<Extremes> own = coarsened();
+  int width = (width_ + (1 << kFirstLevel) - 1) >> kFirstLevel, height = (height_ + (1 << kFirstLevel) - 1) >> kFirstLevel;
+  while (true) {
+    levels_.push_back(spread(own, width, height));
+    if (std::max(width, height) <= 2) return;
+    const int w = (width + 1) / 2, h = (height + 1) / 2;
+    std::vector<Extremes> next(static_cast<std::size_t>(w) * h);
+    for (int j = 0; j < height; ++j) {
+      for (int i = 0; i < width; ++i) next[static_cast<std::size_t>(j / 2) * w + i / 2].include(own[static_cast<std::size_t>(j) * width + i]);
     }
-    Level level{w, h, std::vector<Extremes>(next.size())};
-    for (int j = 0; j < h; ++j) {
-      for (int i = 0; i < w; ++i) {
-        const bool rim = i == 0 || j == 0 || i + 1 == w || j + 1 == h;
-        Extremes e = rim ? nothing : none;  // beyond the map there is nothing
-        for (int b = std::max(0, j - 1); b <= std::min(h - 1, j + 1); ++b) {
-          for (int a = std::max(0, i - 1); a <= std::min(w - 1, i + 1); ++a) merge(e, next[static_cast<std::size_t>(b) * w + a]);
-        }
-        level.cells[static_cast<std::size_t>(j) * w + i] = e;
-      }
-    }
-    levels_.push_back(std::move(level));
-    own = std::move(next), width = w, height = h, shrink = 2;
+    own = std::move(next), width = w, height = h;
   }
+}
+
+// Extremes of the first level's cells.
+std::vector<ShadowMap::Extremes> ShadowMap::coarsened() const {
+  constexpr int kCell = 1 << kFirstLevel;
+  const int width = (width_ + kCell - 1) / kCell, height = (height_ + kCell - 1) / kCell;
+  std::vector<Extremes> cells(static_cast<std::size_t>(width) * height);
+#pragma omp parallel for schedule(static)
+  for (int b = 0; b < height; ++b) {
+    std::vector<float> low(map_->stride(), std::numeric_limits<float>::max()), high(map_->stride(), VisibilityBuffer::kFar);
+    for (int j = b * kCell; j < std::min(height_, (b + 1) * kCell); ++j) {
+      const float* row = map_->nearness(j);
+      for (int i = 0; i < width_; ++i) low[i] = std::min(low[i], row[i]), high[i] = std::max(high[i], row[i]);
+    }
+    for (int i = 0; i < width_; ++i) cells[static_cast<std::size_t>(b) * width + i / kCell].include({low[i], high[i]});
+  }
+  return cells;
+}
+
+// Every cell with the eight around it.
+ShadowMap::Level ShadowMap::spread(const std::vector<Extremes>& cells, int width, int height) {
+  const Extremes nothing{VisibilityBuffer::kFar, VisibilityBuffer::kFar};
+  Level level{width, height, std::vector<Extremes>(cells.size())};
+  for (int j = 0; j < height; ++j) {
+    for (int i = 0; i < width; ++i) {
+      const bool rim = i == 0 || j == 0 || i + 1 == width || j + 1 == height;
+      Extremes e = rim ? nothing : Extremes();  // beyond the map there is nothing
+      for (int b = std::max(0, j - 1); b <= std::min(height - 1, j + 1); ++b) {
+        for (int a = std::max(0, i - 1); a <= std::min(width - 1, i + 1); ++a) e.include(cells[static_cast<std::size_t>(b) * width + a]);
+      }
+      level.cells[static_cast<std::size_t>(j) * width + i] = e;
+    }
+  }
+  return level;
 }
 
 // Bounds of the heights within `reach` texels.
@@ -120,7 +132,7 @@ ShadowMap::Place ShadowMap::placeOf(const Eigen::Vector3f& p, const Eigen::Vecto
 }
 
 float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
-  if (heights_.empty()) return 1.0f;
+  if (!map_) return 1.0f;
   const auto [s, t, h] = placeOf(p, n);
   if (h > highest_) return 1.0f;
   // Blockers inside the cone that the disc spans up to the highest occluder.
@@ -129,11 +141,11 @@ float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   const Extremes near = around(s, t, search + 2.0f);
   if (near.highest <= h) return 1.0f;
   if (near.lowest > h) return 0.0f;
-  return kernels().visibleThrough({heights_.data(), width_, height_, angular_radius_ * per_texel_}, *taps_, s, t, h, search);
+  return kernels().visibleThrough({map_->nearness(0), width_, height_, map_->stride(), angular_radius_ * per_texel_}, *taps_, s, t, h, search);
 }
 
 std::optional<float> ShadowMap::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const {
-  if (heights_.empty()) return 1.0f;
+  if (!map_) return 1.0f;
   const auto [s, t, h] = placeOf(p, n);
   const float lowest = h - radius, highest = h + radius;  // of the disc
   if (lowest > highest_) return 1.0f;

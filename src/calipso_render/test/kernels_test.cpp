@@ -58,8 +58,8 @@ TEST_F(Avx2, SeesTheSameLight) {
   int between = 0;
   for (int i = 0; i < 500; ++i) {
     const float s = random_.uniform(-5.0f, 45.0f), t = random_.uniform(-5.0f, 45.0f), h = random_.uniform(-0.2f, 1.0f);
-    const float plain = plainKernels().visibleThrough({heights.data(), kSide, kSide, 9.0f}, taps, s, t, h, 6.0f);
-    EXPECT_EQ(avx2Kernels()->visibleThrough({heights.data(), kSide, kSide, 9.0f}, taps, s, t, h, 6.0f), plain) << s << ", " << t;
+    const float plain = plainKernels().visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t, h, 6.0f);
+    EXPECT_EQ(avx2Kernels()->visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t, h, 6.0f), plain) << s << ", " << t;
     between += plain > 0.0f && plain < 1.0f;
   }
   EXPECT_GT(between, 100);

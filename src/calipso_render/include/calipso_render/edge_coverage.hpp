@@ -39,8 +39,8 @@ class EdgeCoverage {
   // nullptr where the pixel's centre speaks for it. Picture coordinates.
   const Pixel* at(int u, int v) const;
 
-  // Region coordinates: per pixel of a row, negative where the centre speaks for it.
-  const int* slots(int row) const { return &slots_[static_cast<std::size_t>(row) * region_.width]; }
+  // Columns of a row's chosen pixels, ascending. Region coordinates.
+  std::vector<int> columnsOf(int row) const;
 
   // Position of a sample against its pixel's centre, px.
   static Eigen::Vector2f offset(int sample) {
@@ -48,15 +48,22 @@ class EdgeCoverage {
   }
 
  private:
+  // A triangle over the pixels of a tile that it may touch.
+  struct Piece;
+
   void choose(int column, int row);  // region coordinates
-  bool anyChosen(int u0, int v0, int u1, int v1) const;  // within this rectangle, or near it
-  void drawTriangle(const ScreenMesh& mesh, int triangle, std::uint32_t id);
+  void addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id, std::vector<Piece>& pieces) const;
+  void drawPiece(const Piece& piece);
+  int slotAt(int column, int row) const {
+    const int tile = tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + column / kTile];
+    return tile < 0 ? -1 : slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile + column % kTile];
+  }
 
   cv::Rect region_;
-  std::vector<int> slots_;  // per pixel of the region: index into pixels_, -1 = none
   static constexpr int kTile = 8;  // px
   int tiles_across_;
-  std::vector<std::uint8_t> tiles_;  // 1: some pixel of the tile is chosen
+  std::vector<int> tiles_;  // index of the tile in slots_, -1: none of its pixels is chosen
+  std::vector<int> slots_;  // per pixel of those tiles: index into pixels_, -1 = none
   std::vector<Pixel> pixels_;
 };
 

@@ -37,15 +37,17 @@ class VisibilityBuffer {
   static constexpr std::uint32_t kNothing = 0xffffffffu;
 
   // @param region of the picture that is kept; everything outside is clipped
-  explicit VisibilityBuffer(const cv::Rect& region);
+  // @param with_ids false: only nearness is kept
+  explicit VisibilityBuffer(const cv::Rect& region, bool with_ids = true);
 
   // @param object 0..254, slot by which objectOf() names the mesh
   void draw(const ScreenMesh& mesh, int object);
 
   const cv::Rect& region() const { return region_; }
   // Region coordinates.
-  const std::uint32_t* ids(int row) const { return &ids_[static_cast<std::size_t>(row) * region_.width]; }
-  const float* nearness(int row) const { return &near_[static_cast<std::size_t>(row) * region_.width]; }
+  const std::uint32_t* ids(int row) const { return &ids_[static_cast<std::size_t>(row) * stride_]; }
+  const float* nearness(int row) const { return &near_[static_cast<std::size_t>(row) * stride_]; }
+  int stride() const { return stride_; }  // places from row to row
   // Picture coordinates; outside the region nothing is seen.
   std::uint32_t idAt(int u, int v) const {
     u -= region_.x, v -= region_.y;
@@ -63,7 +65,11 @@ class VisibilityBuffer {
   static constexpr float kFar = -3.0e38f;
 
  private:
+  static constexpr int kBands = 8;    // rows are split in fixed bands: the result knows no thread count
+  static constexpr int kPadding = 8;  // places after each row, which kernels may read and write back
+
   cv::Rect region_;
+  int stride_;
   std::vector<std::uint32_t> ids_;
   std::vector<float> near_;
 };

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "calipso_render/visibility.hpp"
@@ -38,7 +41,8 @@ class ShadowMap : public Visibility {
  private:
   // Lowest and highest of the 3 x 3 cells around a cell; cells of 2^(kFirstLevel + level) texels.
   struct Extremes {
-    float lowest, highest;
+    float lowest = std::numeric_limits<float>::max(), highest = VisibilityBuffer::kFar;
+    void include(const Extremes& e) { lowest = std::min(lowest, e.lowest), highest = std::max(highest, e.highest); }
   };
   struct Level {
     int width = 0, height = 0;
@@ -53,13 +57,15 @@ class ShadowMap : public Visibility {
   Place placeOf(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
 
   void buildLevels();
+  std::vector<Extremes> coarsened() const;
+  static Level spread(const std::vector<Extremes>& cells, int width, int height);
   Extremes around(float s, float t, float reach) const;
 
   Eigen::Vector3f origin_, axis_s_, axis_t_, axis_h_;
   float texel_ = 0.0f, per_texel_ = 0.0f, angular_radius_ = 0.0f, highest_ = 0.0f;
   int width_ = 0, height_ = 0;
   std::shared_ptr<const ShadowTaps> taps_;
-  std::vector<float> heights_;            // towards the light, m
+  std::optional<VisibilityBuffer> map_;   // of the heights towards the light, m; none: nothing casts a shadow
   std::vector<Level> levels_;             // tell at once where all is lit or all is shaded
 };
 

@@ -119,7 +119,11 @@ DrawingCase makeDrawingCase(Quality quality) {
   const ClipFrame key = keyFrame(model, c.params.planes);
   ClipSample clip;
   clip.add(key);
-  c.prepared = std::make_shared<const Prepared>(prepare(clip, {model}, c.params));
+  // Found in one frame the light is off by so much that its shadow would be refuted and not drawn: it is given.
+  auto prepared = std::make_shared<Prepared>(prepare(clip, {model}, c.params));
+  prepared->light.light = caseLight();
+  prepared->shadowless = cv::Mat::zeros(key.labels.size(), CV_8U);
+  c.prepared = prepared;
   c.frame = key.bgr;
   c.coverage = static_cast<double>(cv::countNonZero(key.labels)) / key.labels.total();
   c.triangles = model.mesh.triangleCount();
