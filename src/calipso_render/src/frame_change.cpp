@@ -11,7 +11,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kLeastChange = 3;  // px across
-constexpr float kSoftSky = 0.2f;  // of the sky: so much more or less of it only brightens or darkens a pixel
+constexpr float kSoftSky = 0.2f * 255.0f;  // levels of the sky: so much more or less of it only brightens or darkens a pixel
 constexpr int kRimReach = 4;  // mask margins around a surface at rest in which the frame's pixels stay
 
 }  // namespace
@@ -37,16 +37,16 @@ void FrameCompositor::findRelit() {
   if (box.empty()) return;
   cv::Mat change(box.size(), CV_8U), relit;
   const cv::Rect here = box - region_.tl();
-  const float umbra = luminance(prepared_.umbra), lit = 1.0f - umbra;
+  const float umbra = kPerLevel * luminance(prepared_.umbra), lit = kPerLevel - umbra;
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < box.height; ++v) {
-    const auto rowOf = [&](const cv::Mat& picture) { return picture.ptr<float>(here.y + v) + here.x; };
-    const float *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
+    const auto rowOf = [&](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(here.y + v) + here.x; };
+    const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_), *takes = rowOf(takes_light_);
     std::uint8_t* out = change.ptr<std::uint8_t>(v);
     for (int u = 0; u < box.width; ++u) {
-      const float more_sky = sky[u] - sky_before[u];
-      const float by = std::abs(umbra * (more_sky - std::clamp(more_sky, -kSoftSky, kSoftSky)) + lit * (sun[u] - sun_before[u]));
-      out[u] = sun[u] < 0.0f ? 0 : changeOfLight(by);
+      const float more_sky = static_cast<float>(sky[u] - sky_before[u]), more_sun = static_cast<float>(sun[u] - sun_before[u]);
+      const float by = std::abs(umbra * (more_sky - std::clamp(more_sky, -kSoftSky, kSoftSky)) + lit * more_sun);
+      out[u] = takes[u] == 0 ? 0 : changeOfLight(by);
     }
   }
   cv::morphologyEx(change, change, cv::MORPH_OPEN, cv::Mat::ones(kLeastChange, kLeastChange, CV_8U));

@@ -136,17 +136,17 @@ FrameCompositor::Behind FrameCompositor::groundAt(int u, int v, bool removed) co
   Behind behind{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
   if (removed) behind = revealedAt(u, v);
   const cv::Point at = cv::Point(u, v) - region_.tl();
-  const float sun = sun_now_.at<float>(at), sun_before = sun_before_.at<float>(at);
-  const float sky = sky_now_.at<float>(at), sky_before = sky_before_.at<float>(at);
-  if (sun < 0.0f) return behind;
-  const cv::Vec3f now = shadowRatio(sun, sky), before = shadowRatio(sun_before, sky_before);
+  if (takes_light_.at<std::uint8_t>(at) == 0) return behind;
+  const int sun = sun_now_.at<std::uint8_t>(at), sun_before = sun_before_.at<std::uint8_t>(at);
+  const int sky = sky_now_.at<std::uint8_t>(at), sky_before = sky_before_.at<std::uint8_t>(at);
+  const cv::Vec3f now = shadowRatio(kPerLevel * sun, kPerLevel * sky), before = shadowRatio(kPerLevel * sun_before, kPerLevel * sky_before);
   if (removed) {
     behind.colour = behind.colour.mul(now);
     return behind;
   }
   // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly reaches must come from the plate.
   const float from_plate = relit_.at<std::uint8_t>(at) / 255.0f;
-  if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameShadow) return behind;
+  if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameLevels) return behind;
   cv::Vec3f darkened = behind.colour;
   for (int c = 0; c < 3; ++c) darkened[c] *= std::min(kBrightest, now[c] / std::max(before[c], kDarkest));
   const Behind revealed = revealedAt(u, v);

@@ -16,8 +16,8 @@
 
 namespace calipso::render {
 
-// Light that stays the same while the same objects are edited under the same camera. Pictures are CV_32F of
-// the whole frame: the part of sun or sky that a support plane sees there.
+// Light that stays the same while the same objects are edited under the same camera. Pictures are CV_8U of
+// the whole frame: lightLevel() of sun or sky on a support plane there.
 struct ShadowCache {
   std::vector<bool> edited;            // per surface: which ones it is for
   Camera camera;
@@ -42,6 +42,8 @@ struct RestPicture {
 
 constexpr int kLightStep = 4;     // px between the places where the light on a smooth surface is computed
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
+constexpr int kSameLevels = 4;  // the same of a lightLevel()
+constexpr float kPerLevel = 1.0f / 255.0f;
 constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own pixels do not tell what it would be in more light
 constexpr int kRepaintReach = 2;  // px around a surface of a new look in which the frame has its old colour, too
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
@@ -152,7 +154,7 @@ class FrameCompositor {
   void findSurfaceLight();
   void measureSky();
   void measureSun();
-  void joinSun(int v, std::uint8_t* wanted);
+  void joinSun(int v);
   void findRelit();
   void findMaps();
   void findShaded();
@@ -168,7 +170,7 @@ class FrameCompositor {
   void reflectStretch(int v, int first, int last, int slot, Row& row) const;
   void shadeStretch(int v, int first, int last, int slot, Row& row) const;
   void drawStretch(int v, int first, int last, int slot, Row& row) const;
-  void composeBehind(int u, int v, Row& row) const;
+  void composeBehind(int v, int first, int last, Row& row) const;
   void composeSpecial(int u, int v, Row& row) const;
   void keepStill(int v, Row& row) const;
   Behind behindAt(int u, int v) const;
@@ -185,7 +187,9 @@ class FrameCompositor {
   Lit exactLight(const LitPoint& p, int slot) const;
   const Look& lookOf(int slot) const;
   cv::Vec3f tintOf(int slot) const { return lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)); }
-  bool isSmooth(int i, int j) const;
+  void lightCorner(int i, int j);
+  void interpolateCorner(int i, int j);
+  bool isSmooth(int i, int j, int size) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
   cv::Rect shadowBounds(const Points& vertices, const Light& light) const;
@@ -220,12 +224,13 @@ class FrameCompositor {
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
   cv::Mat covered_;  // CV_8UC1 over region_: 255 = so deep behind drawn surfaces that light there does not matter
-  cv::Mat sky_now_, sky_before_;  // CV_32FC1 over region_: part of the sky that a support plane sees
-  cv::Mat sun_now_, sun_before_;  // CV_32FC1 over region_: the same of the sun; negative where there is no plane
+  cv::Mat sky_now_, sky_before_;  // CV_8UC1 over region_: lightLevel() of the sky on a support plane
+  cv::Mat sun_now_, sun_before_;  // CV_8UC1 over region_: the same of the sun
+  cv::Mat takes_light_;           // CV_8UC1 over region_: 255 = a support plane is seen, on which light changes
   cv::Mat relit_;    // CV_8UC1 over region_: 255 = the original's shadow, to be taken from the plate
   std::vector<Lit> lit_;           // at the corners of squares of kLightStep px over region_
   std::vector<std::uint8_t> smooth_;  // per square, by its first corner: light between the corners follows from theirs
-  int lit_columns_ = 0;
+  int lit_columns_ = 0, lit_rows_ = 0;
   cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here; empty: everything did
   cv::Rect miss_box_;
   cv::Mat miss_;     // CV_32FC4 over miss_box_: what drawing misses of the video, linear, and 1 where that is known; may be empty
@@ -235,6 +240,7 @@ class FrameCompositor {
   std::vector<bool> may_be_shaded_;    // per slot: not edited, and in the way of the sun that falls on edited ones
   cv::Mat screened_;                   // CV_8UC1 over region_: 255 = scenery hides what is drawn; may be empty
   std::vector<bool> always_drawn_;     // per slot: isDrawn() wherever it is seen
+  bool all_drawn_ = false;             // every slot is
   std::vector<std::vector<TriangleMap>> maps_;  // per slot, per triangle; empty where the slot is not drawn
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;

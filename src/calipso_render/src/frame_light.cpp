@@ -19,7 +19,7 @@ constexpr int kShadowMapSide = 512;    // texels, live
 constexpr int kSkyMapSide = 128;       // the same for the sky, which is soft
 constexpr int kSkySteps = 160;         // places along the picture's width where the sky is measured
 constexpr float kEvenLight = 0.06f;    // of the light: between corners that differ by no more it is interpolated
-constexpr float kSmoothLight = 0.015f; // likewise where the light in their middle is their mean but for this
+constexpr float kSmoothLight = 0.015f; // likewise where the light in their middle is their mean but for this; half of it over two steps
 constexpr int kShadowBoundsMargin = 8;     // px
 constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
 
@@ -39,7 +39,13 @@ std::unique_ptr<Visibility> shadowOf(const std::vector<Occluder>& occluders, con
   return std::make_unique<ShadowMap>(occluders, direction, ShadowMap::Params{kShadowMapSide, params.sun_radius, 16});
 }
 
-float valueOrOne(const cv::Mat& picture, int u, int v) { return picture.empty() ? 1.0f : picture.at<float>(v, u); }
+std::uint8_t levelAt(const cv::Mat& picture, int u, int v) { return picture.empty() ? 255 : picture.at<std::uint8_t>(v, u); }
+
+// Product of two levels, 255 = 1.
+std::uint8_t both(std::uint8_t a, std::uint8_t b) {
+  const unsigned product = a * static_cast<unsigned>(b) + 128;
+  return static_cast<std::uint8_t>((product + (product >> 8)) >> 8);
+}
 
 }  // namespace
 
@@ -77,15 +83,15 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   for (const Occluder& o : originals) shadows_.bounds |= shadowBounds(*o.vertices, prepared_.light.light);
   shadows_.originals = originals.empty() ? nullptr : shadowOf(originals, prepared_.light.light, params_);
   shadows_.originals_sun = shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadows_.originals, shadows_.bounds);
-  shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_32F, cv::Scalar(1.0f)) : skyOver(*skyShadowOf(originals, params_), whole, cv::Mat());
+  shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_8U, cv::Scalar(255)) : skyOver(*skyShadowOf(originals, params_), whole, cv::Mat());
   leaveHidden(shadows_.originals_sky, whole);
   shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < whole.height; ++v) {
     for (int u = 0; u < whole.width; ++u) {
-      const float sun = valueOrOne(shadows_.originals_sun, u, v), sky = shadows_.originals_sky.at<float>(v, u);
-      if ((sun == 1.0f && sky == 1.0f) || !takesShadow(u, v)) continue;
-      shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(1.0f - luminance(shadowRatio(sun, sky)));
+      const std::uint8_t sun = levelAt(shadows_.originals_sun, u, v), sky = shadows_.originals_sky.at<std::uint8_t>(v, u);
+      if ((sun == 255 && sky == 255) || !takesShadow(u, v)) continue;
+      shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(1.0f - luminance(shadowRatio(kPerLevel * sun, kPerLevel * sky)));
     }
   }
   cv::dilate(shadows_.shaded, shadows_.shaded, disc(params_.background.shadow_margin_px));
@@ -93,16 +99,23 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
 }
 
 // Edited objects hide only that part of the sky which others leave: the picture's pixels lack theirs already.
-// @param sky CV_32FC1 over `region`, with edited objects alone
+// @param sky of edited objects alone, over `region`
 void FrameCompositor::leaveHidden(cv::Mat& sky, const cv::Rect& region) const {
   if (shadows_.others_sky.empty()) return;
-  const float all_hidden = skyLight(0.0f);
-  cv::Mat seen = (shadows_.others_sky(region) - all_hidden) / (1.0f - all_hidden);
-  sky = 1.0f - (1.0f - sky).mul(seen);
+  const float all_hidden = skyLight(0.0f), scale = kPerLevel / (1.0f - all_hidden), offset = all_hidden / (1.0f - all_hidden);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region.height; ++v) {
+    const std::uint8_t* others = shadows_.others_sky.ptr<std::uint8_t>(v + region.y) + region.x;
+    std::uint8_t* row = sky.ptr<std::uint8_t>(v);
+    for (int u = 0; u < region.width; ++u) {
+      const float left = std::clamp(scale * others[u] - offset, 0.0f, 1.0f);
+      row[u] = static_cast<std::uint8_t>(255.5f - left * static_cast<float>(255 - row[u]));
+    }
+  }
 }
 
 cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds) const {
-  cv::Mat sun(frame_.bgr.size(), CV_32F, cv::Scalar(1.0f)), part = sun(bounds);
+  cv::Mat sun(frame_.bgr.size(), CV_8U, cv::Scalar(255)), part = sun(bounds);
   planesInLight(plane_view_, shadow, bounds, cv::Mat(), part);
   return sun;
 }
@@ -122,10 +135,11 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
       if (!skipped && plane_view_.at(u, v, r)) grid.at<float>(j, i) = skyLight(shadow.visibility(r.position, r.normal));
     }
   }
-  cv::Mat sky(region.size(), CV_32F);
+  cv::Mat sky(region.size(), CV_8U);
 #pragma omp parallel
   {
-    std::vector<float> line(grid.cols), whole(static_cast<std::size_t>(grid.cols) * step);
+    std::vector<float> line(grid.cols);
+    std::vector<std::uint8_t> whole(static_cast<std::size_t>(grid.cols) * step);
 #pragma omp for schedule(static)
     for (int v = 0; v < region.height; ++v) {
       const int j = (region.y + v) / step - first.y;
@@ -134,9 +148,9 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
       for (int i = 0; i < grid.cols; ++i) line[i] = (1.0f - y) * above[i] + y * below[i];
       for (int i = 0; i + 1 < grid.cols; ++i) {
         const float left = line[i], rise = (line[i + 1] - left) / step;
-        for (int k = 0; k < step; ++k) whole[i * step + k] = left + rise * static_cast<float>(k);
+        for (int k = 0; k < step; ++k) whole[i * step + k] = lightLevel(left + rise * static_cast<float>(k));
       }
-      std::copy_n(whole.begin() + region.x % step, region.width, sky.ptr<float>(v));
+      std::copy_n(whole.begin() + region.x % step, region.width, sky.ptr<std::uint8_t>(v));
     }
   }
   return sky;
@@ -164,12 +178,12 @@ cv::Rect FrameCompositor::shadowBounds(const Points& vertices, const Light& ligh
 
 void FrameCompositor::findCovered() {
   drawn_.create(region_.size(), CV_8U);
-  const bool all_drawn = std::all_of(always_drawn_.begin(), always_drawn_.end(), [](bool always) { return always; });
+  all_drawn_ = std::all_of(always_drawn_.begin(), always_drawn_.end(), [](bool always) { return always; });
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) {
     const std::uint32_t* ids = centre_->ids(v);
     std::uint8_t* drawn = drawn_.ptr<std::uint8_t>(v);
-    if (all_drawn) {
+    if (all_drawn_) {
       for (int u = 0; u < region_.width; ++u) drawn[u] = ids[u] != VisibilityBuffer::kNothing ? 255 : 0;
     } else {
       for (int u = 0; u < region_.width; ++u) drawn[u] = isDrawn(ids[u], u + region_.x, v + region_.y) ? 255 : 0;
@@ -186,42 +200,32 @@ void FrameCompositor::measureSky() {
 }
 
 void FrameCompositor::measureSun() {
-  sun_now_ = cv::Mat(region_.size(), CV_32F, cv::Scalar(1.0f));
-  sun_before_.create(region_.size(), CV_32F);
+  sun_now_ = cv::Mat(region_.size(), CV_8U, cv::Scalar(255));
+  sun_before_.create(region_.size(), CV_8U);
+  takes_light_.create(region_.size(), CV_8U);
   const cv::Rect bounds = moved_bounds_ & region_;
   if (!bounds.empty()) {
     const cv::Rect here = bounds - region_.tl();
     cv::Mat part = sun_now_(here);
     planesInLight(plane_view_, *moved_shadow_, bounds, covered_(here), part);
   }
-#pragma omp parallel
-  {
-    std::vector<std::uint8_t> wanted(region_.width);
-#pragma omp for schedule(static)
-    for (int v = 0; v < region_.height; ++v) joinSun(v, wanted.data());
-  }
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region_.height; ++v) joinSun(v);
 }
 
 // Row v of what edited objects and others shade together, and of what was shaded before.
-void FrameCompositor::joinSun(int v, std::uint8_t* wanted) {
-  float *now = sun_now_.ptr<float>(v), *before = sun_before_.ptr<float>(v);
+void FrameCompositor::joinSun(int v) {
+  std::uint8_t *now = sun_now_.ptr<std::uint8_t>(v), *before = sun_before_.ptr<std::uint8_t>(v), *takes = takes_light_.ptr<std::uint8_t>(v);
+  const auto rowOf = [&](const cv::Mat& picture) { return picture.empty() ? nullptr : picture.ptr<std::uint8_t>(v + region_.y) + region_.x; };
+  const std::uint8_t *others = rowOf(shadows_.others_sun), *originals = rowOf(shadows_.originals_sun), *none = rowOf(shadowless_);
   const std::uint8_t* covered = covered_.ptr<std::uint8_t>(v);
-  const auto rowOf = [&](const cv::Mat& picture) { return picture.empty() ? nullptr : picture.ptr<float>(v + region_.y) + region_.x; };
-  const float *others = rowOf(shadows_.others_sun), *originals = rowOf(shadows_.originals_sun);
   const int width = region_.width;
   if (originals != nullptr) std::copy_n(originals, width, before);
-  else std::fill_n(before, width, 1.0f);
-  for (int u = 0; others != nullptr && u < width; ++u) now[u] *= others[u], before[u] *= others[u];
-  plane_view_.seesRow(region_.x, v + region_.y, width, wanted);
-  if (!shadowless_.empty()) {
-    const std::uint8_t* none = shadowless_.ptr<std::uint8_t>(v + region_.y) + region_.x;
-    for (int u = 0; u < width; ++u) wanted[u] = none[u] == 0 ? wanted[u] : 0;
-  }
-  for (int u = 0; u < width; ++u) {
-    const bool both = (covered[u] == 0) & (wanted[u] != 0);
-    now[u] = both ? now[u] : -1.0f;
-    before[u] = both ? before[u] : -1.0f;
-  }
+  else std::fill_n(before, width, 255);
+  for (int u = 0; others != nullptr && u < width; ++u) now[u] = both(now[u], others[u]), before[u] = both(before[u], others[u]);
+  plane_view_.seesRow(region_.x, v + region_.y, width, takes);
+  for (int u = 0; none != nullptr && u < width; ++u) takes[u] = none[u] == 0 ? takes[u] : 0;
+  for (int u = 0; u < width; ++u) takes[u] = covered[u] == 0 ? takes[u] : 0;
 }
 
 const Look& FrameCompositor::lookOf(int slot) const {
@@ -237,38 +241,68 @@ FrameCompositor::Lit FrameCompositor::exactLight(const LitPoint& p, int slot) co
 }
 
 // Light at the corners of small squares; where a smooth piece of surface fills a square and the light changes little
-// over it, the points between take it from the corners.
+// over it, the points between take it from the corners. Squares of twice the side are tried first.
 void FrameCompositor::findSurfaceLight() {
-  const int columns = region_.width / kLightStep + 2, rows = region_.height / kLightStep + 2;
+  const int columns = (region_.width / kLightStep + 3) | 1, rows = (region_.height / kLightStep + 3) | 1;
   lit_.assign(static_cast<std::size_t>(columns) * rows, {});
-  smooth_.assign(lit_.size(), false);
-  lit_columns_ = columns;
-#pragma omp parallel for schedule(dynamic, 2)
-  for (int j = 0; j < rows; ++j) {
-    for (int i = 0; i < columns; ++i) {
-      const int u = region_.x + i * kLightStep, v = region_.y + j * kLightStep;
-      const std::uint32_t id = centre_->idAt(u, v);
-      if (!region_.contains({u, v}) || !isDrawn(id, u, v)) continue;
-      const int slot = VisibilityBuffer::objectOf(id);
-      Lit& lit = lit_[static_cast<std::size_t>(j) * columns + i];
-      lit = exactLight(litPoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_), slot);
-      lit.diffuse[3] = centre_->nearnessAt(u, v);
+  smooth_.assign(lit_.size(), 0);
+  lit_columns_ = columns, lit_rows_ = rows;
+  const int across = columns / 2;
+  std::vector<std::uint8_t> smooth(static_cast<std::size_t>(across) * (rows / 2));  // per large square
+#pragma omp parallel
+  {
+#pragma omp for schedule(dynamic, 4)
+    for (int j = 0; j < rows; j += 2) {
+      for (int i = 0; i < columns; i += 2) lightCorner(i, j);
     }
-  }
-#pragma omp parallel for schedule(dynamic, 2)
-  for (int j = 0; j < rows - 1; ++j) {
-    for (int i = 0; i + 1 < columns; ++i) smooth_[static_cast<std::size_t>(j) * columns + i] = isSmooth(i, j) ? 1 : 0;
+#pragma omp for schedule(dynamic, 4)
+    for (int j = 0; j < rows / 2; ++j) {
+      for (int i = 0; i < across; ++i) smooth[static_cast<std::size_t>(j) * across + i] = isSmooth(2 * i, 2 * j, 2) ? 1 : 0;
+    }
+    const auto isLarge = [&](int i, int j) { return i < 0 || j < 0 || i >= across || j >= rows / 2 || smooth[static_cast<std::size_t>(j) * across + i] != 0; };
+    // Corners between those of large squares.
+#pragma omp for schedule(dynamic, 4)
+    for (int j = 0; j < rows; ++j) {
+      for (int i = j % 2 == 0 ? 1 : 0; i < columns; i += j % 2 == 0 ? 2 : 1) {
+        const bool follows = isLarge(i / 2, j / 2) && isLarge((i - 1) / 2, j / 2) && isLarge(i / 2, (j - 1) / 2) && isLarge((i - 1) / 2, (j - 1) / 2);
+        if (follows) interpolateCorner(i, j);
+        else lightCorner(i, j);
+      }
+    }
+#pragma omp for schedule(dynamic, 4)
+    for (int j = 0; j < rows - 1; ++j) {
+      for (int i = 0; i + 1 < columns; ++i) smooth_[static_cast<std::size_t>(j) * columns + i] = isLarge(i / 2, j / 2) || isSmooth(i, j, 1) ? 1 : 0;
+    }
   }
 }
 
-// Does the light in a square follow from that at its corners? Where they differ, its middle has to agree.
-bool FrameCompositor::isSmooth(int i, int j) const {
+void FrameCompositor::lightCorner(int i, int j) {
+  const int u = region_.x + i * kLightStep, v = region_.y + j * kLightStep;
+  const std::uint32_t id = centre_->idAt(u, v);
+  if (!region_.contains({u, v}) || !isDrawn(id, u, v)) return;
+  const int slot = VisibilityBuffer::objectOf(id);
+  Lit& lit = lit_[static_cast<std::size_t>(j) * lit_columns_ + i];
+  lit = exactLight(litPoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_), slot);
+  lit.diffuse[3] = centre_->nearnessAt(u, v);
+}
+
+// Between the corners of large squares that are smooth.
+void FrameCompositor::interpolateCorner(int i, int j) {
+  Lit* lit = &lit_[static_cast<std::size_t>(j) * lit_columns_ + i];
+  const std::ptrdiff_t du = i % 2, dv = (j % 2) * static_cast<std::ptrdiff_t>(lit_columns_);
+  const Lit &a = lit[-du - dv], &b = lit[du - dv], &c = lit[dv - du], &d = lit[du + dv];
+  *lit = {0.25f * (a.diffuse + b.diffuse + c.diffuse + d.diffuse), 0.25f * (a.highlight + b.highlight + c.highlight + d.highlight), a.slot};
+}
+
+// Does the light in a square of `size` steps follow from that at its corners? Where they differ, its middle has to agree.
+bool FrameCompositor::isSmooth(int i, int j, int size) const {
   const Lit* first = &lit_[static_cast<std::size_t>(j) * lit_columns_ + i];
-  const Lit &a = first[0], &b = first[1], &c = first[lit_columns_], &d = first[lit_columns_ + 1];
+  const std::size_t down = static_cast<std::size_t>(size) * lit_columns_;
+  const Lit &a = first[0], &b = first[size], &c = first[down], &d = first[down + size];
   if (a.slot < 0 || a.slot != b.slot || a.slot != c.slot || a.slot != d.slot) return false;
   if (std::abs(a.diffuse[3] + d.diffuse[3] - b.diffuse[3] - c.diffuse[3]) * frame_.camera.fx > kLightStep * a.diffuse[3]) return false;
   cv::Vec4f mean;
-  bool even = true;
+  bool even = size == 1;
   float highest[3];
   for (int k = 0; k < 3; ++k) {
     const float all[] = {a.diffuse[k] + a.highlight[k], b.diffuse[k] + b.highlight[k], c.diffuse[k] + c.highlight[k], d.diffuse[k] + d.highlight[k]};
@@ -277,12 +311,12 @@ bool FrameCompositor::isSmooth(int i, int j) const {
     even = even && *high - *low <= kEvenLight * *high;
   }
   if (even) return true;
-  const int u = region_.x + i * kLightStep + kLightStep / 2, v = region_.y + j * kLightStep + kLightStep / 2;
+  const int u = region_.x + i * kLightStep + size * kLightStep / 2, v = region_.y + j * kLightStep + size * kLightStep / 2;
   const std::uint32_t id = centre_->idAt(u, v);
   if (id == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(id) != a.slot) return false;
   const Lit middle = exactLight(litPoint(actors_[a.slot], VisibilityBuffer::triangleOf(id), static_cast<float>(u), static_cast<float>(v), eye_), a.slot);
   for (int k = 0; k < 3; ++k) {
-    if (std::abs(middle.diffuse[k] + middle.highlight[k] - mean[k]) > kSmoothLight * highest[k]) return false;
+    if (std::abs(middle.diffuse[k] + middle.highlight[k] - mean[k]) > kSmoothLight / static_cast<float>(size) * highest[k]) return false;
   }
   return true;
 }

@@ -93,7 +93,7 @@ void FrameCompositor::findScreened() {
       if (edited) drawn.at<float>(v, u) = centre_->nearness(v)[u];
       const float near = scenery.at<float>(v, u);
       const bool hides_plane = near > 0.0f && plane_view_.at(u + region_.x, v + region_.y, r) && near * axis.dot(r.position - eye_) > kNearer;
-      if (hides_plane) sun_now_.at<float>(v, u) = -1.0f;
+      if (hides_plane) takes_light_.at<std::uint8_t>(v, u) = 0;
     }
   }
   cv::dilate(drawn, drawn, cv::Mat::ones(3, 3, CV_8U));

@@ -1,6 +1,7 @@
 // The part of FrameCompositor that composes the picture row by row. Stretches of pixels that see one object are shaded together;
 // silhouettes and what else is special go through composedAt().
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <opencv2/core/hal/intrin.hpp>
@@ -24,19 +25,23 @@ cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) { return {dec
 // What has to be done for every pixel of row v.
 void FrameCompositor::findKinds(int v, Row& row) const {
   const int j = v - region_.y, width = region_.width;
-  const float *sun = sun_now_.ptr<float>(j), *sun_before = sun_before_.ptr<float>(j);
-  const float *sky = sky_now_.ptr<float>(j), *sky_before = sky_before_.ptr<float>(j);
-  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x, *drawn = drawn_.ptr<std::uint8_t>(j);
-  const std::uint8_t *removed = removed_.ptr<std::uint8_t>(j), *relit = relit_.ptr<std::uint8_t>(j);
+  const auto rowOf = [j](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j); };
+  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
+  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x, *drawn = rowOf(drawn_), *takes = rowOf(takes_light_);
+  const std::uint8_t *removed = rowOf(removed_), *relit = rowOf(relit_);
   const std::uint32_t* ids = centre_->ids(j);
   Kind* kinds = row.kinds.data();
+  std::uint8_t* out = reinterpret_cast<std::uint8_t*>(kinds);
   for (int i = 0; i < width; ++i) {
-    const float change = std::abs(sun[i] - sun_before[i]) + std::abs(sky[i] - sky_before[i]);
-    const bool differs = ((relit[i] != 0) | (change >= kSameShadow)) & (sun[i] >= 0.0f) & (labels[i] == 0);
-    const bool behind = differs | (removed[i] != 0);
-    const Kind rest = ids[i] == VisibilityBuffer::kNothing ? kBehind : kSpecial;  // what hides a surface at rest takes its residual
-    kinds[i] = drawn[i] != 0 ? kPlain : behind ? rest : kNone;
+    const std::uint8_t sun_change = std::max(sun[i], sun_before[i]) - std::min(sun[i], sun_before[i]);
+    const std::uint8_t sky_change = std::max(sky[i], sky_before[i]) - std::min(sky[i], sky_before[i]);
+    const std::uint8_t change = std::min<std::uint8_t>(sun_change, 100) + std::min<std::uint8_t>(sky_change, 100);
+    const std::uint8_t differs = ((relit[i] != 0) | (change >= kSameLevels)) & (takes[i] != 0) & (labels[i] == 0);
+    const std::uint8_t behind = (differs | (removed[i] != 0)) != 0 ? kBehind : kNone;
+    out[i] = drawn[i] != 0 ? static_cast<std::uint8_t>(kPlain) : behind;
   }
+  // What hides a surface at rest takes its residual.
+  for (int i = 0; !all_drawn_ && i < width; ++i) kinds[i] = kinds[i] == kBehind && ids[i] != VisibilityBuffer::kNothing ? kSpecial : kinds[i];
   for (const int i : edges_->columnsOf(j)) kinds[i] = kSpecial;
   if (!still_.empty()) {
     const float* still = still_.ptr<float>(j);
@@ -169,30 +174,39 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
   }
 }
 
-// A pixel that nothing is drawn in: behindAt(), four values at a time.
-void FrameCompositor::composeBehind(int u, int v, Row& row) const {
-  const int i = u - region_.x, j = v - region_.y;
-  const bool removed = removed_.at<std::uint8_t>(j, i) != 0;
-  const float sun = sun_now_.at<float>(j, i), from_plate = removed ? 1.0f : relit_.at<std::uint8_t>(j, i) * (1.0f / 255.0f);
-  const cv::v_float32x4 umbra = wide(prepared_.umbra), lit = cv::v_setall_f32(1.0f) - umbra;
-  const cv::v_float32x4 now = sun < 0.0f ? cv::v_setall_f32(1.0f) : umbra * cv::v_setall_f32(sky_now_.at<float>(j, i)) + lit * cv::v_setall_f32(sun);
-  cv::v_float32x4 colour = cv::v_setzero_f32();
-  float fresh = 0.0f;
-  row.source[i] = kRendered;
-  if (from_plate > 0.0f) {
-    const Behind revealed = revealedAt(u, v);
-    colour = cv::v_setall_f32(from_plate) * wide(revealed.colour) * now;
-    fresh = from_plate * revealed.fresh;
-    if (from_plate > 0.5f) row.source[i] = revealed.source;
+// Pixels [first, last) of row v that nothing is drawn in: behindAt(), four values at a time.
+void FrameCompositor::composeBehind(int v, int first, int last, Row& row) const {
+  const int j = v - region_.y;
+  const auto rowOf = [j](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j); };
+  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
+  const std::uint8_t *removed = rowOf(removed_), *relit = rowOf(relit_), *takes = rowOf(takes_light_), *invented = invented_.ptr<std::uint8_t>(v) + region_.x;
+  const cv::Vec3f* plate = plate_.ptr<cv::Vec3f>(v) + region_.x;
+  const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + region_.x;
+  const float* decoded = decodeTable();
+  const cv::v_float32x4 one = cv::v_setall_f32(1.0f), brightest = cv::v_setall_f32(kBrightest), umbra = wide(prepared_.umbra) * cv::v_setall_f32(kPerLevel), lit = cv::v_setall_f32(kPerLevel) - umbra;
+  const auto ratioOf = [&](std::uint8_t sun_level, std::uint8_t sky_level) { return umbra * cv::v_setall_f32(sky_level) + lit * cv::v_setall_f32(sun_level); };
+  for (int i = first; i < last; ++i) {
+    const float from_plate = removed[i] != 0 ? 1.0f : relit[i] * kPerLevel;
+    const cv::v_float32x4 now = takes[i] == 0 ? one : ratioOf(sun[i], sky[i]);
+    cv::v_float32x4 colour = cv::v_setzero_f32();
+    float fresh = 0.0f;
+    row.source[i] = kRendered;
+    if (from_plate > 0.0f) {
+      Behind revealed{plate[i], 1.0f, invented[i] != 0 ? kInvented : kSeenElsewhere};
+      if (invented[i] != 0 && live_ != nullptr) revealed = revealedAt(i + region_.x, v);
+      colour = cv::v_setall_f32(from_plate) * wide(revealed.colour) * now;
+      fresh = from_plate * revealed.fresh;
+      if (from_plate > 0.5f) row.source[i] = revealed.source;
+    }
+    if (from_plate < 1.0f) {
+      // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly reaches must come from the plate.
+      const cv::v_float32x4 before = ratioOf(sun_before[i], sky_before[i]);
+      const cv::v_float32x4 ratio = cv::v_min(brightest, now / cv::v_max(before, cv::v_setall_f32(kDarkest)));
+      colour += cv::v_setall_f32(1.0f - from_plate) * linearOf(decoded, frame[i]) * ratio;
+    }
+    cv::v_store(row.colour[i].val, colour);
+    row.colour[i][3] = fresh;
   }
-  if (from_plate < 1.0f) {
-    // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly reaches must come from the plate.
-    const cv::v_float32x4 before = umbra * cv::v_setall_f32(sky_before_.at<float>(j, i)) + lit * cv::v_setall_f32(sun_before_.at<float>(j, i));
-    const cv::v_float32x4 ratio = cv::v_min(cv::v_setall_f32(kBrightest), now / cv::v_max(before, cv::v_setall_f32(kDarkest)));
-    colour += cv::v_setall_f32(1.0f - from_plate) * linearOf(decodeTable(), frame_.bgr.at<cv::Vec3b>(v, u)) * ratio;
-  }
-  cv::v_store(row.colour[i].val, colour);
-  row.colour[i][3] = fresh;
 }
 
 // A pixel that needs more than one surface.
@@ -221,10 +235,13 @@ void FrameCompositor::drawRow(int v, Row& row) const {
       const int first = i, slot = VisibilityBuffer::objectOf(ids[i]);
       while (i < region_.width && row.kinds[i] == kPlain && VisibilityBuffer::objectOf(ids[i]) == slot) ++i;
       drawStretch(v, first, i, slot, row);
-    } else if (row.kinds[i++] == kBehind) {
-      composeBehind(u, v, row);
+    } else if (row.kinds[i] == kBehind) {
+      const int first = i;
+      while (i < region_.width && row.kinds[i] == kBehind) ++i;
+      composeBehind(v, first, i, row);
     } else {
       composeSpecial(u, v, row);
+      ++i;
     }
   }
 }

@@ -14,47 +14,41 @@ constexpr float kUp = 16384.0f;  // makes the truncation to int a floor
 constexpr int kDown = 16384;
 
 // Sum in a fixed order, whatever the width of a register.
-CALIPSO_INLINE float sumOf(float* x, int count) {
-  float lanes[8] = {};
-  for (int k = 0; k < count; k += 8) {
-    for (int i = 0; i < 8; ++i) lanes[i] += x[k + i];
-  }
-  for (int i = 0; i < 4; ++i) lanes[i] += lanes[i + 4];
-  return (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
+CALIPSO_INLINE float sumOf(const Eight& x) { return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7])); }
+
+CALIPSO_INLINE Eight gather(const float* from, const EightInts& at) {
+  return Eight{from[at[0]], from[at[1]], from[at[2]], from[at[3]], from[at[4]], from[at[5]], from[at[6]], from[at[7]]};
+}
+
+// Where the texels (i, j) are in the map; the corner for those outside [0, right) x [0, bottom).
+CALIPSO_INLINE EightInts texelsAt(const ShadowTexels& map, const EightInts& i, const EightInts& j, int right, int bottom) {
+  return (j * map.stride + i) & (i >= 0) & (j >= 0) & (i < right) & (j < bottom);
 }
 
 CALIPSO_INLINE float visibleThroughBody(const ShadowTexels& map, const ShadowTaps& taps, float s, float t, float h, float search) {
-  alignas(32) float above[ShadowTaps::kMost], hit[ShadowTaps::kMost], fx[ShadowTaps::kMost], fy[ShadowTaps::kMost];
-  alignas(32) int at[ShadowTaps::kMost];
-  const int n = taps.count;
-  const unsigned width = static_cast<unsigned>(map.width), height = static_cast<unsigned>(map.height);
-  for (int k = 0; k < n; ++k) {
-    const int i = static_cast<int>(s + search * taps.x[k] + (kUp + 0.5f)) - kDown, j = static_cast<int>(t + search * taps.y[k] + (kUp + 0.5f)) - kDown;
-    const bool inside = (static_cast<unsigned>(i) < width) & (static_cast<unsigned>(j) < height);
-    at[k] = inside ? j * map.stride + i : 0;
+  Eight above{}, hits{};
+  for (int k = 0; k < taps.count; k += 8) {
+    const Eight x = s + search * *reinterpret_cast<const Eight*>(&taps.x[k]) + (kUp + 0.5f), y = t + search * *reinterpret_cast<const Eight*>(&taps.y[k]) + (kUp + 0.5f);
+    const EightInts i = __builtin_convertvector(x, EightInts) - kDown, j = __builtin_convertvector(y, EightInts) - kDown;
+    const Eight over = gather(map.heights, texelsAt(map, i, j, map.width, map.height)) - h;
+    const EightInts blocks = over > 0.0f;
+    above += blocks ? over : Eight{}, hits += blocks ? Eight{} + 1.0f : Eight{};
   }
-  for (int k = 0; k < n; ++k) above[k] = map.heights[at[k]];
-  for (int k = 0; k < n; ++k) {
-    const float x = above[k] - h;
-    above[k] = x > 0.0f ? x : 0.0f;
-    hit[k] = x > 0.0f ? 1.0f : 0.0f;
-  }
-  const float blockers = sumOf(hit, n);
+  const float blockers = sumOf(hits);
   if (blockers == 0.0f) return 1.0f;
-  const float radius = std::max(1.0f, map.spread * sumOf(above, n) / blockers);
-  for (int k = 0; k < n; ++k) {
-    const float x = s + radius * taps.x[k], y = t + radius * taps.y[k];
-    const int i = static_cast<int>(x + kUp) - kDown, j = static_cast<int>(y + kUp) - kDown;
-    const bool inside = (static_cast<unsigned>(i) < width - 1) & (static_cast<unsigned>(j) < height - 1);
-    fx[k] = x - static_cast<float>(i), fy[k] = y - static_cast<float>(j);
-    at[k] = inside ? j * map.stride + i : 0;
+  const float radius = std::max(1.0f, map.spread * sumOf(above) / blockers);
+  Eight covered{};
+  for (int k = 0; k < taps.count; k += 8) {
+    const Eight x = s + radius * *reinterpret_cast<const Eight*>(&taps.x[k]), y = t + radius * *reinterpret_cast<const Eight*>(&taps.y[k]);
+    const EightInts i = __builtin_convertvector(x + kUp, EightInts) - kDown, j = __builtin_convertvector(y + kUp, EightInts) - kDown;
+    const Eight fx = x - __builtin_convertvector(i, Eight), fy = y - __builtin_convertvector(j, Eight);
+    const EightInts at = texelsAt(map, i, j, map.width - 1, map.height - 1);
+    const Eight one = Eight{} + 1.0f, none{};
+    const Eight a = gather(map.heights, at) > h ? one : none, b = gather(map.heights + 1, at) > h ? one : none;
+    const Eight c = gather(map.heights + map.stride, at) > h ? one : none, e = gather(map.heights + map.stride + 1, at) > h ? one : none;
+    covered += (a + (b - a) * fx) * (1.0f - fy) + (c + (e - c) * fx) * fy;
   }
-  for (int k = 0; k < n; ++k) {
-    const float* row = map.heights + at[k];
-    const float a = row[0] > h, b = row[1] > h, c = row[map.stride] > h, e = row[map.stride + 1] > h;
-    hit[k] = (a + (b - a) * fx[k]) * (1.0f - fy[k]) + (c + (e - c) * fx[k]) * fy[k];
-  }
-  return 1.0f - sumOf(hit, n) / static_cast<float>(n);
+  return 1.0f - sumOf(covered) / static_cast<float>(taps.count);
 }
 
 CALIPSO_INLINE void sampleBody(const cv::Mat& image, const float* us, const float* vs, int count, cv::Vec4f* out) {

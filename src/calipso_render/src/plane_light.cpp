@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace calipso::render {
 namespace {
 
 constexpr int kLargest = 16, kSquare = 8, kStep = 2;  // px: squares, and the places in the least of them
+constexpr float kEven = 0.05f; // of visibility: places that differ by no more speak for those between them
 constexpr float kSlow = 0.3f;  // of visibility: between places that differ by no more it is interpolated
 
 class Squares {
@@ -36,7 +38,7 @@ class Squares {
     }
     const std::optional<float> uniform = even ? light_.uniform(middle.position, middle.normal, radius) : std::nullopt;
     if (uniform) {
-      out_(here).setTo(*uniform);
+      for (int y = here.y; y < here.br().y; ++y) std::memset(out_.ptr<std::uint8_t>(y) + here.x, lightLevel(*uniform), here.width);
     } else if (square.width > kSquare) {
       const int half = square.width / 2;
       for (int k = 0; k < 4; ++k) fill({square.x + (k & 1) * half, square.y + (k >> 1) * half, half, half});
@@ -60,20 +62,38 @@ class Squares {
     return view_.at(u, v, r) ? light_.visibility(r.position, r.normal) : 1.0f;
   }
 
+  // Places two steps apart are looked at first; those between where they, or the one in their middle, differ.
   void refine(const cv::Rect& square, const cv::Rect& here) const {
     constexpr int kPlaces = kSquare / kStep + 1;
     float grid[kPlaces][kPlaces];
+    const auto set = [&](int i, int j) { grid[j][i] = exactly(square.x + i * kStep, square.y + j * kStep); };
+    bool uneven[kPlaces / 2][kPlaces / 2] = {};
+    for (int j = 0; j < kPlaces; j += 2) {
+      for (int i = 0; i < kPlaces; i += 2) set(i, j);
+    }
+    for (int j = 1; j < kPlaces; j += 2) {
+      for (int i = 1; i < kPlaces; i += 2) {
+        set(i, j);
+        const auto [low, high] = std::minmax({grid[j][i], grid[j - 1][i - 1], grid[j - 1][i + 1], grid[j + 1][i - 1], grid[j + 1][i + 1]});
+        uneven[j / 2][i / 2] = high - low > kEven;
+      }
+    }
+    const auto isUneven = [&](int i, int j) { return i >= 0 && j >= 0 && i < kPlaces / 2 && j < kPlaces / 2 && uneven[j][i]; };
     for (int j = 0; j < kPlaces; ++j) {
-      for (int i = 0; i < kPlaces; ++i) grid[j][i] = exactly(square.x + i * kStep, square.y + j * kStep);
+      for (int i = 1 - j % 2; i < kPlaces; i += 2) {
+        const bool level = j % 2 == 0;  // it lies between a left and a right one
+        if (isUneven(i / 2, j / 2) || (level ? isUneven(i / 2, j / 2 - 1) : isUneven(i / 2 - 1, j / 2))) set(i, j);
+        else grid[j][i] = level ? 0.5f * (grid[j][i - 1] + grid[j][i + 1]) : 0.5f * (grid[j - 1][i] + grid[j + 1][i]);
+      }
     }
     for (int y = here.y; y < here.br().y; ++y) {
-      float* row = out_.ptr<float>(y);
+      std::uint8_t* row = out_.ptr<std::uint8_t>(y);
       for (int x = here.x; x < here.br().x; ++x) {
         const int u = x + rect_.x - square.x, v = y + rect_.y - square.y, i = u / kStep, j = v / kStep;
         const float a = grid[j][i], b = grid[j][i + 1], c = grid[j + 1][i], d = grid[j + 1][i + 1];
         const auto [low, high] = std::minmax({a, b, c, d});
         const float s = static_cast<float>(u % kStep) / kStep, t = static_cast<float>(v % kStep) / kStep;
-        row[x] = high - low <= kSlow ? (a + (b - a) * s) * (1.0f - t) + (c + (d - c) * s) * t : exactly(x + rect_.x, y + rect_.y);
+        row[x] = lightLevel(high - low <= kSlow ? (a + (b - a) * s) * (1.0f - t) + (c + (d - c) * s) * t : exactly(x + rect_.x, y + rect_.y));
       }
     }
   }
@@ -82,7 +102,7 @@ class Squares {
     Receiver r;
     for (int y = here.y; y < here.br().y; ++y) {
       for (int x = here.x; x < here.br().x; ++x) {
-        if (view_.at(x + rect_.x, y + rect_.y, r)) out_.at<float>(y, x) = light_.visibility(r.position, r.normal);
+        if (view_.at(x + rect_.x, y + rect_.y, r)) out_.at<std::uint8_t>(y, x) = lightLevel(light_.visibility(r.position, r.normal));
       }
     }
   }

@@ -12,6 +12,10 @@ namespace {
 
 constexpr float kGoldenAngle = 2.39996323f;
 constexpr int kMargin = 4;  // texels
+constexpr int kCell = 4;    // texels: side of the cells whose extremes are kept
+constexpr int kFewCells = 4096;
+constexpr float kTapMargin = 2.0f;  // texels that a tap reads beyond its place
+constexpr float kWorthNarrowing = 0.8f;
 
 // Evenly spread points of the unit disc (Vogel's spiral): the same for every pixel, so no noise.
 std::shared_ptr<const ShadowTaps> discPattern(int count) {
@@ -63,66 +67,68 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
   buildLevels();
 }
 
+// Extremes of windows of 2^k x 2^k cells, from every cell on: any rectangle is four of them.
 void ShadowMap::buildLevels() {
-  std::vector<Extremes> own = coarsened();
-  int width = (width_ + (1 << kFirstLevel) - 1) >> kFirstLevel, height = (height_ + (1 << kFirstLevel) - 1) >> kFirstLevel;
-  while (true) {
-    levels_.push_back(spread(own, width, height));
-    if (std::max(width, height) <= 2) return;
-    const int w = (width + 1) / 2, h = (height + 1) / 2;
-    std::vector<Extremes> next(static_cast<std::size_t>(w) * h);
-    for (int j = 0; j < height; ++j) {
-      for (int i = 0; i < width; ++i) next[static_cast<std::size_t>(j / 2) * w + i / 2].include(own[static_cast<std::size_t>(j) * width + i]);
+  columns_ = (width_ + kCell - 1) / kCell, rows_ = (height_ + kCell - 1) / kCell;
+  levels_.push_back(coarsened());
+  for (int size = 2; size <= std::min(columns_, rows_); size *= 2) {
+    const Level& half = levels_.back();
+    Level level{std::vector<float>(half.low.size()), std::vector<float>(half.high.size())};
+    const int columns = columns_ - size + 1, step = size / 2;
+#pragma omp parallel for schedule(static) if (columns_ * rows_ > kFewCells)
+    for (int j = 0; j <= rows_ - size; ++j) {
+      const std::size_t at = static_cast<std::size_t>(j) * columns_, below = at + static_cast<std::size_t>(step) * columns_;
+      const float *low = &half.low[at], *low_below = &half.low[below], *high = &half.high[at], *high_below = &half.high[below];
+      for (int i = 0; i < columns; ++i) level.low[at + i] = std::min(std::min(low[i], low[i + step]), std::min(low_below[i], low_below[i + step]));
+      for (int i = 0; i < columns; ++i) level.high[at + i] = std::max(std::max(high[i], high[i + step]), std::max(high_below[i], high_below[i + step]));
     }
-    own = std::move(next), width = w, height = h;
+    levels_.push_back(std::move(level));
   }
 }
 
-// Extremes of the first level's cells.
-std::vector<ShadowMap::Extremes> ShadowMap::coarsened() const {
-  constexpr int kCell = 1 << kFirstLevel;
-  const int width = (width_ + kCell - 1) / kCell, height = (height_ + kCell - 1) / kCell;
-  std::vector<Extremes> cells(static_cast<std::size_t>(width) * height);
+ShadowMap::Level ShadowMap::coarsened() const {
+  Level cells{std::vector<float>(static_cast<std::size_t>(columns_) * rows_), std::vector<float>(static_cast<std::size_t>(columns_) * rows_)};
 #pragma omp parallel for schedule(static)
-  for (int b = 0; b < height; ++b) {
-    std::vector<float> low(map_->stride(), std::numeric_limits<float>::max()), high(map_->stride(), VisibilityBuffer::kFar);
+  for (int b = 0; b < rows_; ++b) {
+    std::vector<float> low(columns_ * kCell, std::numeric_limits<float>::max()), high(columns_ * kCell, VisibilityBuffer::kFar);
     for (int j = b * kCell; j < std::min(height_, (b + 1) * kCell); ++j) {
       const float* row = map_->nearness(j);
       for (int i = 0; i < width_; ++i) low[i] = std::min(low[i], row[i]), high[i] = std::max(high[i], row[i]);
     }
-    for (int i = 0; i < width_; ++i) cells[static_cast<std::size_t>(b) * width + i / kCell].include({low[i], high[i]});
+    for (int i = 0; i < columns_; ++i) {
+      cells.low[static_cast<std::size_t>(b) * columns_ + i] = *std::min_element(&low[i * kCell], &low[i * kCell] + kCell);
+      cells.high[static_cast<std::size_t>(b) * columns_ + i] = *std::max_element(&high[i * kCell], &high[i * kCell] + kCell);
+    }
   }
   return cells;
 }
 
-// Every cell with the eight around it.
-ShadowMap::Level ShadowMap::spread(const std::vector<Extremes>& cells, int width, int height) {
-  const Extremes nothing{VisibilityBuffer::kFar, VisibilityBuffer::kFar};
-  Level level{width, height, std::vector<Extremes>(cells.size())};
-  for (int j = 0; j < height; ++j) {
-    for (int i = 0; i < width; ++i) {
-      const bool rim = i == 0 || j == 0 || i + 1 == width || j + 1 == height;
-      Extremes e = rim ? nothing : Extremes();  // beyond the map there is nothing
-      for (int b = std::max(0, j - 1); b <= std::min(height - 1, j + 1); ++b) {
-        for (int a = std::max(0, i - 1); a <= std::min(width - 1, i + 1); ++a) e.include(cells[static_cast<std::size_t>(b) * width + a]);
-      }
-      level.cells[static_cast<std::size_t>(j) * width + i] = e;
-    }
-  }
-  return level;
+// Bounds of the heights within `reach` texels, or of some more; beyond the map there is nothing.
+ShadowMap::Extremes ShadowMap::around(float s, float t, float reach) const {
+  const float left = s - reach, top = t - reach, right = s + reach, bottom = t + reach;
+  if (!(right >= 0.0f && bottom >= 0.0f && left < width_ && top < height_)) return {VisibilityBuffer::kFar, VisibilityBuffer::kFar};
+  // Four windows of at least half the width cover the square; at the map's border they reach beyond it.
+  const int cells = static_cast<int>(2.0f * reach) / kCell + 2, k = 31 - __builtin_clz(cells), size = 1 << k;
+  if (k >= static_cast<int>(levels_.size())) return {VisibilityBuffer::kFar, highest_};
+  const Level& level = levels_[k];
+  const auto windowAt = [size](float x, int count) { return std::clamp(static_cast<int>(x) / kCell, 0, count - size); };
+  const int i0 = windowAt(left, columns_), i1 = windowAt(right - static_cast<float>((size - 1) * kCell), columns_);
+  const std::size_t above = static_cast<std::size_t>(windowAt(top, rows_)) * columns_;
+  const std::size_t below = static_cast<std::size_t>(windowAt(bottom - static_cast<float>((size - 1) * kCell), rows_)) * columns_;
+  const bool inside = left >= 0.0f && top >= 0.0f && right < width_ && bottom < height_;
+  return {inside ? std::min(std::min(level.low[above + i0], level.low[above + i1]), std::min(level.low[below + i0], level.low[below + i1])) : VisibilityBuffer::kFar,
+          std::max(std::max(level.high[above + i0], level.high[above + i1]), std::max(level.high[below + i0], level.high[below + i1]))};
 }
 
-// Bounds of the heights within `reach` texels.
-ShadowMap::Extremes ShadowMap::around(float s, float t, float reach) const {
-  std::size_t level = 0;
-  int shift = kFirstLevel;
-  while (level + 1 < levels_.size() && static_cast<float>(1 << shift) < reach) ++level, ++shift;
-  const Level& l = levels_[level];
-  if (static_cast<float>(1 << shift) < reach) return {VisibilityBuffer::kFar, highest_};
-  const int i = std::clamp(static_cast<int>(s) >> shift, 0, l.width - 1), j = std::clamp(static_cast<int>(t) >> shift, 0, l.height - 1);
-  Extremes e = l.cells[static_cast<std::size_t>(j) * l.width + i];
-  if (s < 0.0f || t < 0.0f || s >= width_ || t >= height_) e.lowest = VisibilityBuffer::kFar;
-  return e;
+// Bounds of the heights that can matter to a receiver at (s, t), of heights from `lowest` on: those in the cone that the disc spans up
+// to the highest around, not of the whole map.
+ShadowMap::Extremes ShadowMap::coneAround(float s, float t, float lowest, float margin) const {
+  const float least = 1.5f + margin, per_height = angular_radius_ * per_texel_;
+  const float reach = std::max(least, per_height * (highest_ - lowest) + margin);
+  const Extremes wide = around(s, t, reach);
+  if (wide.highest <= lowest) return wide;
+  const float nearer = std::max(least, per_height * (wide.highest - lowest) + margin);
+  return nearer < kWorthNarrowing * reach ? around(s, t, nearer) : wide;
 }
 
 ShadowMap::Place ShadowMap::placeOf(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
@@ -135,12 +141,11 @@ float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   if (!map_) return 1.0f;
   const auto [s, t, h] = placeOf(p, n);
   if (h > highest_) return 1.0f;
-  // Blockers inside the cone that the disc spans up to the highest occluder.
-  const float search = std::max(1.5f, angular_radius_ * (highest_ - h) * per_texel_);
-  if (s < -search || t < -search || s > width_ + search || t > height_ + search) return 1.0f;
-  const Extremes near = around(s, t, search + 2.0f);
+  const Extremes near = coneAround(s, t, h, kTapMargin);
   if (near.highest <= h) return 1.0f;
   if (near.lowest > h) return 0.0f;
+  // Blockers inside the cone that the disc spans up to the highest occluder.
+  const float search = std::max(1.5f, angular_radius_ * (highest_ - h) * per_texel_);
   return kernels().visibleThrough({map_->nearness(0), width_, height_, map_->stride(), angular_radius_ * per_texel_}, *taps_, s, t, h, search);
 }
 
@@ -149,9 +154,7 @@ std::optional<float> ShadowMap::uniform(const Eigen::Vector3f& p, const Eigen::V
   const auto [s, t, h] = placeOf(p, n);
   const float lowest = h - radius, highest = h + radius;  // of the disc
   if (lowest > highest_) return 1.0f;
-  const float reach = std::max(1.5f, angular_radius_ * (highest_ - lowest) * per_texel_) + 2.0f + radius * per_texel_;
-  if (s < -reach || t < -reach || s > width_ + reach || t > height_ + reach) return 1.0f;
-  const Extremes near = around(s, t, reach);
+  const Extremes near = coneAround(s, t, lowest, kTapMargin + radius * per_texel_);
   if (near.highest <= lowest) return 1.0f;
   if (near.lowest > highest) return 0.0f;
   return std::nullopt;

@@ -88,14 +88,14 @@ TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
   const ShadowMap sun({{&surface.key_vertices, &surface.triangles}}, sunlight().direction.cast<double>(), {512, 0.03, 16});
   const PlaneView view(table(), camera());
   const cv::Rect rect(13, 9, 120, 101);
-  cv::Mat fast(rect.size(), CV_32F, cv::Scalar(1.0f));
+  cv::Mat fast(rect.size(), CV_8U, cv::Scalar(255));
   planesInLight(view, sun, rect, cv::Mat(), fast);
   int shaded = 0;
   for (int v = 0; v < rect.height; ++v) {
     for (int u = 0; u < rect.width; ++u) {
       Receiver r;
       const float exact = view.at(u + rect.x, v + rect.y, r) ? sun.visibility(r.position, r.normal) : 1.0f;
-      ASSERT_NEAR(fast.at<float>(v, u), exact, 0.16f) << u << ", " << v;  // half of what may lie between two places
+      ASSERT_NEAR(fast.at<std::uint8_t>(v, u) / 255.0f, exact, 0.16f) << u << ", " << v;  // half of what may lie between two places
       shaded += exact < 0.5f;
     }
   }

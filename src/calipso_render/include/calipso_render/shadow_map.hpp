@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -39,16 +38,13 @@ class ShadowMap : public Visibility {
   float texel() const { return texel_; }
 
  private:
-  // Lowest and highest of the 3 x 3 cells around a cell; cells of 2^(kFirstLevel + level) texels.
   struct Extremes {
     float lowest = std::numeric_limits<float>::max(), highest = VisibilityBuffer::kFar;
-    void include(const Extremes& e) { lowest = std::min(lowest, e.lowest), highest = std::max(highest, e.highest); }
   };
+  // Lowest and highest of windows of cells, by their first cell.
   struct Level {
-    int width = 0, height = 0;
-    std::vector<Extremes> cells;
+    std::vector<float> low, high;
   };
-  static constexpr int kFirstLevel = 2;
 
   // A surface point in the map, lifted off so that it does not shade itself.
   struct Place {
@@ -57,15 +53,16 @@ class ShadowMap : public Visibility {
   Place placeOf(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
 
   void buildLevels();
-  std::vector<Extremes> coarsened() const;
-  static Level spread(const std::vector<Extremes>& cells, int width, int height);
+  Level coarsened() const;
   Extremes around(float s, float t, float reach) const;
+  Extremes coneAround(float s, float t, float lowest, float margin) const;
 
   Eigen::Vector3f origin_, axis_s_, axis_t_, axis_h_;
   float texel_ = 0.0f, per_texel_ = 0.0f, angular_radius_ = 0.0f, highest_ = 0.0f;
   int width_ = 0, height_ = 0;
   std::shared_ptr<const ShadowTaps> taps_;
   std::optional<VisibilityBuffer> map_;   // of the heights towards the light, m; none: nothing casts a shadow
+  int columns_ = 0, rows_ = 0;            // of cells
   std::vector<Level> levels_;             // tell at once where all is lit or all is shaded
 };
 
