@@ -99,7 +99,9 @@ std::vector<ObjectContour> extractContours(const cv::Mat& image, const cv::Mat& 
 Segmenter makeSegmenter(const cv::Mat& image, const Scene& scene, bool use_depth) {
   std::optional<DepthObservation> depth;
   if (use_depth) depth = loadDepth(scene);
-  return Segmenter(image, segmentationTargets(scene, depth), {}, depth ? cv::Mat(depth->depth) : cv::Mat());
+  if (!depth) return Segmenter(image, segmentationTargets(scene, depth));
+  return Segmenter(image, segmentationTargets(scene, depth), {}, depth->depth,
+                   supportDepths(scene.planes, scene.camera));
 }
 
 KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::Mat& strokes) {

@@ -93,9 +93,39 @@ cv::Mat grown(const cv::Mat& mask, int px) {
   return result;
 }
 
+// The step in which depth is stored, m: the least by which neighbours differ that do. What is not
+// quantised differs by next to nothing in some places.
+float quantumOf(const cv::Mat& depth) {
+  constexpr double kLeast = 0.05;   // quantile: whatever rounding makes of the step is passed over
+  std::vector<float> steps;
+  for (int y = 0; y + 1 < depth.rows; ++y)
+    for (int x = 0; x + 1 < depth.cols; ++x) {
+      const float here = depth.at<float>(y, x);
+      for (const float next : {depth.at<float>(y, x + 1), depth.at<float>(y + 1, x)})
+        if (here > 0.0f && next > 0.0f && next != here) steps.push_back(std::abs(next - here));
+    }
+  return steps.empty() ? 0.0f : quantile(steps, kLeast);
+}
+
+// Where depth is that of one of the planes.
+cv::Mat surfacesOf(const std::vector<cv::Mat>& supports, const cv::Mat& depth, float noise) {
+  constexpr float kDeviations = 3.0f;
+  const float quantum = quantumOf(depth);
+  cv::Mat same = cv::Mat::zeros(depth.size(), CV_8U);
+  for (const cv::Mat& support : supports)
+    for (int y = 0; y < same.rows; ++y)
+      for (int x = 0; x < same.cols; ++x) {
+        const float z = depth.at<float>(y, x), expected = support.at<float>(y, x);
+        if (!(z > 0.0f) || !(expected > 0.0f)) continue;
+        const float deviation = noise * expected * expected;   // of z, noise being that of 1 / z
+        if (std::abs(z - expected) <= std::max(kDeviations * deviation, quantum)) same.at<uchar>(y, x) = 255;
+      }
+  return same;
+}
+
 }  // namespace
 
-Relief makeRelief(const cv::Mat& image, const cv::Mat& depth) {
+Relief makeRelief(const cv::Mat& image, const cv::Mat& depth, const std::vector<cv::Mat>& supports) {
   constexpr double kRegistered = 2.0;  // px; an edge is blurred about as far
   constexpr float kClear = 5.0f * kNoiseUnits;
   Relief relief;
@@ -133,6 +163,7 @@ Relief makeRelief(const cv::Mat& image, const cv::Mat& depth) {
   if (!relief.registered)
     relief.state.setTo(Relief::kUnusable, grown(across | down, static_cast<int>(std::ceil(error)) + 1));
   if (relief.registered) relief.pieces = planarPieces(relief);
+  if (!supports.empty()) relief.on_support = surfacesOf(supports, depth, noise) & (relief.state == Relief::kSurface);
   return relief;
 }
 
@@ -143,6 +174,8 @@ Relief resized(const Relief& relief, const cv::Rect& view, const cv::Size& size)
   cv::resize(relief.state(view), result.state, size, 0, 0, cv::INTER_NEAREST);
   if (!relief.pieces.empty())
     cv::resize(relief.pieces(view), result.pieces, size, 0, 0, cv::INTER_NEAREST);
+  if (!relief.on_support.empty())
+    cv::resize(relief.on_support(view), result.on_support, size, 0, 0, cv::INTER_NEAREST);
   result.units = relief.units;
   result.volume = relief.volume;
   result.registered = relief.registered;

@@ -17,12 +17,14 @@ constexpr int kMinModelPixels = 20;
 }  // namespace
 
 Segmenter::Segmenter(const cv::Mat& image, std::vector<SegmentationTarget> targets,
-                     SegmenterParams params, const cv::Mat& depth)
+                     SegmenterParams params, const cv::Mat& depth,
+                     const std::vector<cv::Mat>& supports)
     : size_(image.size()), picture_(image), targets_(std::move(targets)), params_(params) {
   checkPicture(image);
   checkTargets(targets_, size_);
   checkDepth(depth, size_);
-  const Relief relief = makeRelief(image, depth);
+  for (const cv::Mat& support : supports) checkDepth(support, size_);
+  const Relief relief = makeRelief(image, depth, supports);
   view_ = viewOf(targets_, size_);
   image_ = image(view_);
   const double share = static_cast<double>(params_.coarse_pixels) / view_.area();
@@ -70,6 +72,8 @@ void Segmenter::learn() {
   }
   evaluate(coarse_);
   evaluate(fine_);
+  addSupportOdds(coarse_);
+  addSupportOdds(fine_);
 }
 
 // From strokes and from what lies outside of the rectangles.
@@ -200,9 +204,11 @@ void Segmenter::guide() {
   for (int round = 0; round < kRounds; ++round) {
     if (relearn) relearnColours();
     evaluate(coarse_);
+    addSupportOdds(coarse_);
     cut(freePixels(coarse_), coarse_);
   }
   evaluate(fine_);
+  addSupportOdds(fine_);
 }
 
 void Segmenter::relearnColours() {
@@ -317,6 +323,15 @@ void Segmenter::addShapeOdds(SegmentationLevel& level) const {
                                       static_cast<float>(params_.shape_tolerance * size_.width * scale));
     }
   }
+}
+
+// What carries objects is none of them.
+void Segmenter::addSupportOdds(SegmentationLevel& level) const {
+  constexpr double kCarries = 20.0;   // nats: more than any colour says
+  if (level.relief.on_support.empty()) return;
+  for (size_t k = 1; k < models_.size(); ++k)
+    if (!level.lies_flat[k])
+      cv::add(level.costs[k], cv::Scalar(kCarries), level.costs[k], level.relief.on_support);
 }
 
 void Segmenter::evaluate(SegmentationLevel& level) const {

@@ -127,8 +127,10 @@ SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<Segmentation
 
 void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& strokes,
               SegmentationLevel& level) {
+  constexpr double kFlat = 0.1;   // of the strokes
   level.seeds = cv::Mat::zeros(level.image.size(), CV_8U);
   level.stroked.release();
+  level.lies_flat.assign(targets.size() + 1, 0);
   if (strokes.empty()) return;
   const cv::Mat marks = thinnedOut(strokes, level.image.size());
   level.seeds.setTo(1, marks == kBackgroundStroke);
@@ -137,6 +139,10 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
     const cv::Mat own = marks == targets[k].label;
     level.seeds.setTo(static_cast<double>(k + 2), own);
     level.labels.setTo(static_cast<double>(k + 1), own);
+  }
+  for (size_t k = 0; k <= targets.size() && !level.relief.on_support.empty(); ++k) {
+    const cv::Mat own = level.seeds == static_cast<int>(k + 1);
+    level.lies_flat[k] = cv::countNonZero(own & level.relief.on_support) > kFlat * cv::countNonZero(own);
   }
   if (!level.relief.pieces.empty()) level.stroked = strokesOfPieces(level.relief.pieces, level.seeds);
 }

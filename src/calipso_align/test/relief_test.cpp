@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "calipso_align/depth_image.hpp"
 #include "calipso_align/segmentation.hpp"
 #include "synthetic_picture.hpp"
 
@@ -74,6 +75,76 @@ TEST(Segmenter, DepthFindsWhatColoursDoNot) {
   const cv::Mat truth = maskOf(kSize, kDisc);
   EXPECT_GE(intersectionOverUnion(with.segment(strokes) == 1, truth), 0.98);
   EXPECT_LT(intersectionOverUnion(without.segment(strokes) == 1, truth), 0.8);
+}
+
+// A cone on a plane 1 m away, in depth of steps of 1 mm, whose shadow to its right looks as the cone does.
+struct ConeWithShadow {
+  cv::Mat image, depth = cv::Mat(kSize, CV_32F), plane = cv::Mat(kSize, CV_32F, cv::Scalar(1.0));
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  std::vector<SegmentationTarget> targets = {{"cone", 1, cv::Rect(40, 20, 90, 80), {}, {}}};
+
+  ConeWithShadow() {
+    const auto shadow = disc(82.8, 60.7, 30.2);
+    const auto either = [=](double u, double v) { return std::min(kDisc(u, v), shadow(u, v)); };
+    image = paint(kSize, either, kGreen, kGrey, 3.0);
+    for (int v = 0; v < kSize.height; ++v)
+      for (int u = 0; u < kSize.width; ++u) {
+        const double inside = std::max(0.0, -kDisc(u, v) / 30.2);
+        const double height = inside > 0.0 ? 0.003 + 0.1 * inside : 0.0;
+        depth.at<float>(v, u) = static_cast<float>(std::round(1e3 * (1.0 - height)) / 1e3);
+      }
+    // A wall at the side, whose edge is where the picture has it.
+    const cv::Rect wall(0, 0, 20, kSize.height);
+    image(wall).setTo(cv::Scalar(20, 20, 20));
+    depth(wall).setTo(0.5f);
+    strokes(cv::Rect(60, 55, 40, 8)).setTo(1);
+  }
+};
+
+TEST(SupportDepths, OfAFloorThatEnds) {
+  Camera camera;
+  camera.width = 40, camera.height = 30;
+  camera.fx = camera.fy = 40.0, camera.cx = 20.0, camera.cy = 0.0;
+  // Level, 2 m above the floor, looking along world y.
+  camera.world_from_camera.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  camera.world_from_camera.translation() << 0, 0, 2.0;
+  const cv::Mat all = supportDepths({{"floor", Eigen::Vector3d::UnitZ(), 0.0, std::nullopt}}, camera)[0];
+  const cv::Mat half =
+      supportDepths({{"floor", Eigen::Vector3d::UnitZ(), 0.0, Eigen::Vector2d(0.0, 9.0)}}, camera)[0];
+  EXPECT_FLOAT_EQ(all.at<float>(20, 20), 4.0f);    // 2 m / (20 / 40)
+  EXPECT_EQ(all.at<float>(0, 20), 0.0f);           // the horizon
+  EXPECT_FLOAT_EQ(half.at<float>(20, 25), 4.0f);
+  EXPECT_EQ(half.at<float>(20, 15), 0.0f);
+}
+
+TEST(Relief, ASupportIsKnownToTheStepOfTheDepthImage) {
+  const ConeWithShadow scene;
+  const cv::Mat close = scene.plane + 0.0008, off = scene.plane + 0.003;
+  cv::Mat outside = maskOf(kSize, kDisc) == 0;
+  outside.colRange(0, 20).setTo(0);
+  const Relief relief = makeRelief(scene.image, scene.depth, {close});
+  EXPECT_EQ(cv::countNonZero(relief.on_support != outside), 0);
+  EXPECT_EQ(cv::countNonZero(makeRelief(scene.image, scene.depth, {off}).on_support), 0);
+  EXPECT_TRUE(makeRelief(scene.image, scene.depth).on_support.empty());
+}
+
+TEST(Segmenter, WhatLiesOnASupportIsNoObject) {
+  const ConeWithShadow scene;
+  Segmenter with(scene.image, scene.targets, {}, scene.depth, {scene.plane}),
+      without(scene.image, scene.targets, {}, scene.depth);
+  const cv::Mat truth = maskOf(kSize, kDisc);
+  EXPECT_GE(intersectionOverUnion(with.segment(scene.strokes) == 1, truth), 0.99);
+  EXPECT_LT(intersectionOverUnion(without.segment(scene.strokes) == 1, truth), 0.98);
+}
+
+// A cloth's own strokes lie where the plane is: it is kept all the same.
+TEST(Segmenter, AnObjectThatLiesFlatIsNotItsSupport) {
+  const cv::Mat image = paint(kSize, kDisc, kGreen, kGrey, 3.0), plane(kSize, CV_32F, cv::Scalar(1.0));
+  cv::Mat depth = plane.clone(), strokes = cv::Mat::zeros(kSize, CV_8U);
+  depth(cv::Rect(0, 0, 20, 120)).setTo(0.5);   // something else, for edges to be compared
+  strokes(cv::Rect(60, 55, 40, 8)).setTo(1);
+  Segmenter segmenter(image, {{"cloth", 1, cv::Rect(45, 25, 72, 72), {}, {}}}, {}, depth, {plane});
+  EXPECT_GE(intersectionOverUnion(segmenter.segment(strokes) == 1, maskOf(kSize, kDisc)), 0.98);
 }
 
 TEST(Segmenter, DepthThatDoesNotFitThePictureDoesNoHarm) {

@@ -15,6 +15,7 @@ struct Relief {
   cv::Mat surface;  // CV_32FC3: u, v (px) and inverse depth in half standard deviations of its noise
   cv::Mat state;    // CV_8U: kUnusable near edges when `registered` is false, kNone without depth
   cv::Mat pieces;   // CV_32S: planar_pieces.hpp; empty unless `registered`
+  cv::Mat on_support;  // CV_8U: the surface is that of a support plane, within its noise; or empty
   double units = 0.0;       // of `surface` per inverse metre
   double volume = 0.0;      // px x px x units of inverse depth: where a surface may be
   bool registered = false;  // its edges lie on the picture's edges to a pixel: measured
@@ -24,7 +25,8 @@ struct Relief {
 
 // image CV_8UC3; depth CV_32F along the optical axis, m, 0 where there is none; of equal size.
 // A relief without any depth, or without any picture edge to compare it with, is empty.
-Relief makeRelief(const cv::Mat& image, const cv::Mat& depth);
+// supports: as `depth`, of planes that carry objects.
+Relief makeRelief(const cv::Mat& image, const cv::Mat& depth, const std::vector<cv::Mat>& supports = {});
 
 // Part `view` of a relief in another size: nearest samples, so that no depth between two surfaces is
 // made up.

@@ -35,10 +35,11 @@ struct FittedShape {
 class Segmenter {
  public:
   // image: CV_8UC3 BGR, kept by reference count; depth: CV_32F, m, 0 unknown, of the same size, or
-  // empty.
+  // empty; supports: as `depth`, of each plane that carries objects.
   // @throw std::invalid_argument naming the target, the value and the remedy
   Segmenter(const cv::Mat& image, std::vector<SegmentationTarget> targets,
-            SegmenterParams params = {}, const cv::Mat& depth = {});
+            SegmenterParams params = {}, const cv::Mat& depth = {},
+            const std::vector<cv::Mat>& supports = {});
 
   // Segments with these strokes (CV_8U, the picture's size, or empty for none): all of them, not
   // only the new ones. Returns CV_8U: 0 none, else the object's label. The first call learns the
@@ -67,6 +68,7 @@ class Segmenter {
   void measureSurfaces();
   std::vector<cv::Mat> guidedPixels() const;
   void addShapeOdds(SegmentationLevel& level) const;
+  void addSupportOdds(SegmentationLevel& level) const;
   void evaluate(SegmentationLevel& level) const;
   void cut(const cv::Mat& free, SegmentationLevel& level) const;
   void cutFine();

@@ -42,6 +42,7 @@ struct SegmentationLevel {
   float jump_scale = 0.0f;       // of label_cut.hpp over the region
   cv::Mat mixed;                 // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
   cv::Mat stroked;               // CV_8U: as seeds, of the flat piece of the relief that a pixel is in; or empty
+  std::vector<char> lies_flat;   // per label number: its strokes lie on support planes themselves, as a cloth's do
 };
 
 // Where the targets may lie in a picture and what is near.
