@@ -133,7 +133,14 @@ FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
 
 // What a pixel shows where no object is.
 FrameCompositor::Behind FrameCompositor::groundAt(int u, int v, bool removed) const {
-  Behind behind{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
+  Behind behind = shadowedAt(u, v, removed);
+  addMirrored(u, v, behind);
+  return behind;
+}
+
+// The same without what the planes mirror now.
+FrameCompositor::Behind FrameCompositor::shadowedAt(int u, int v, bool removed) const {
+  Behind behind{unmirroredAt(u, v), 0.0f, kOriginal};
   if (removed) behind = revealedAt(u, v);
   const cv::Point at = cv::Point(u, v) - region_.tl();
   if (takes_light_.at<std::uint8_t>(at) == 0) return behind;
@@ -160,7 +167,7 @@ FrameCompositor::Behind FrameCompositor::groundAt(int u, int v, bool removed) co
 FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
   const bool invented = invented_.at<std::uint8_t>(v, u) != 0;
   cv::Vec3f now;
-  if (invented && live_ != nullptr && live_->at(frame_.bgr, labels_, live_corrections_, prepared_.noise.deviation(1, 128.0f), u, v, now)) {
+  if (invented && live_ != nullptr && live_->at(unmirrored_, labels_, live_corrections_, prepared_.noise.deviation(1, 128.0f), u, v, now)) {
     for (int c = 0; c < 3; ++c) now[c] = linearFromRealCode(now[c]);
     return {now, 1.0f, kInvented};
   }

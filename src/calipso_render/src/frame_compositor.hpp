@@ -47,6 +47,7 @@ constexpr float kPerLevel = 1.0f / 255.0f;
 constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own pixels do not tell what it would be in more light
 constexpr int kRepaintReach = 2;  // px around a surface of a new look in which the frame has its old colour, too
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
+constexpr std::uint8_t kChanged = 255;  // of FrameCompositor::remirrored_
 constexpr float kStillPx = 0.05f;  // moved less: the frame's own pixels
 constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
 
@@ -175,6 +176,11 @@ class FrameCompositor {
   void keepStill(int v, Row& row) const;
   Behind behindAt(int u, int v) const;
   Behind groundAt(int u, int v, bool removed) const;
+  Behind shadowedAt(int u, int v, bool removed) const;
+  void findMirrored();
+  void mirrorAnew();
+  cv::Vec3f unmirroredAt(int u, int v) const;
+  void addMirrored(int u, int v, Behind& behind) const;
   float coverOfOthers(int u, int v) const;
   Behind revealedAt(int u, int v) const;
   Drawn drawnAt(int u, int v) const;
@@ -220,6 +226,9 @@ class FrameCompositor {
   std::unique_ptr<Visibility> moved_shadow_;   // of the edited objects where they are now
   std::unique_ptr<Visibility> moved_sky_;
   cv::Rect region_, moved_bounds_;  // what an edit can change; what the edited objects can shade now
+  cv::Mat mirrored_;  // CV_32FC3, whole picture: what support planes mirror now; empty: as in the video
+  cv::Mat unmirrored_;  // CV_8UC3: the frame without what they mirrored of objects at rest
+  cv::Mat remirrored_;  // CV_8UC1, whole picture: 255 = it differs from what the video has, 1 = it does not; 0 = there is nothing
   cv::Mat passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre

@@ -53,6 +53,12 @@ void FrameCompositor::findKinds(int v, Row& row) const {
     const std::uint8_t* screened = screened_.ptr<std::uint8_t>(j);
     for (int i = 0; i < width; ++i) kinds[i] = screened[i] != 0 && kinds[i] == kPlain ? kSpecial : kinds[i];
   }
+  if (!remirrored_.empty()) {
+    const std::uint8_t* remirrored = remirrored_.ptr<std::uint8_t>(v) + region_.x;
+    for (int i = 0; i < width; ++i) {
+      if ((remirrored[i] != 0 && kinds[i] == kBehind) || (remirrored[i] == kChanged && kinds[i] == kNone && labels[i] == 0)) kinds[i] = kSpecial;
+    }
+  }
   if (!any_shaded_) return;
   for (int i = 0; i < width; ++i) {
     const bool other = ids[i] != VisibilityBuffer::kNothing && drawn[i] == 0;

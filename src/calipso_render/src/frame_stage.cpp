@@ -48,6 +48,7 @@ FrameOutput FrameCompositor::run() {
 
 void FrameCompositor::prepareFrame() {
   stage();
+  findMirrored();
   prepareShadows();
   findShaded();
   findPassingShadows();
@@ -104,7 +105,6 @@ void FrameCompositor::stage() {
   invented_ = prepared_.background.invented;
   if (sameView(frame_.camera, prepared_.camera)) {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
-    if (live_ != nullptr) live_corrections_ = live_->corrections(frame_.bgr, labels_);
     shadowless_ = prepared_.shadowless;
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
       if (prepared_.fronts[i].empty() || (prepared_.moves[i] && !at_rest_[i])) continue;
@@ -159,6 +159,7 @@ void FrameCompositor::chooseRegion() {
   }
   region_ |= shadows_.bounds | shadows_.shaded_box | moved_bounds_;
   if (!passing_.empty()) region_ |= cv::boundingRect(passing_);
+  if (!remirrored_.empty()) region_ |= cv::boundingRect(remirrored_ == kChanged);
   region_ &= all;
 }
 
@@ -168,7 +169,7 @@ void FrameCompositor::findPassingShadows() {
   for (std::size_t i = 0; i < edited_.size(); ++i) any = any || (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video);
   if (!any || !sameView(frame_.camera, prepared_.camera)) return;
   cv::Mat now, ratio_now, ratio_plate, plate;
-  cv::cvtColor(frame_.bgr, now, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(unmirrored_, now, cv::COLOR_BGR2GRAY);
   prepared_.background.plate.convertTo(plate, CV_8U);
   cv::cvtColor(plate, plate, cv::COLOR_BGR2GRAY);
   cv::blur(now, ratio_now, {5, 5});

@@ -8,6 +8,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "plane_mirror.hpp"
 #include "prepare_remarks.hpp"
 #include "shadow_check.hpp"
 #include "umbra.hpp"
@@ -17,6 +18,7 @@ namespace calipso::render {
 namespace {
 
 constexpr float kOpenSky = 0.4f;        // ... above which the dark of a shadow says how dark the sun's absence is
+constexpr float kUnshadedSun = 0.985f, kUnshadedSky = 0.85f;  // visible parts from which a place says how the planes mirror
 constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and model are misfit
 constexpr std::size_t kFurtherViews = 5;  // beside the key frame
 constexpr float kOffPlane = 0.1f;       // part by which scenery is nearer or farther than the plane behind or before it
@@ -248,8 +250,27 @@ std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
   return all;
 }
 
-void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<View>& views, const Background& seen, const cv::Mat& picture, const ShadowMap& sun,
-                       const ShadowMap& sky, const RenderParams& params, Prepared& p) {
+// What the support planes mirror, if the key frame shows it. Objects that move in the video have left their place in later frames.
+// @param unclear CV_8UC1, != 0: objects, shadows
+PlaneMirror findMirror(const std::vector<Actor>& actors, const cv::Mat& picture, const cv::Mat& unclear, const cv::Mat& off_planes,
+                       const RenderParams& params, const Prepared& p) {
+  std::vector<const Actor*> resting;
+  std::vector<std::size_t> surfaces;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    if (!p.moves[i]) resting.push_back(&actors[i]), surfaces.push_back(i);
+  }
+  const Radiance radiance = [&](int slot, const SurfacePoint& point) { return mirroredRadiance(p.appearances[surfaces[slot]], p.light.light, Look(), point); };
+  const MirrorImage image = mirrorImage(resting, radiance, params.planes, p.camera, off_planes);
+  if (image.empty()) return {};
+  PlaneMirror mirror = establishMirror(image, linearOf(picture), grown(unclear, params.background.mask_margin_px) == 0);
+  if (!mirror.established()) return mirror;
+  mirror.off = off_planes;
+  mirror.at_key = addedBy(mirror, image);
+  return mirror;
+}
+
+void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<View>& views, const std::vector<Actor>& actors, const Background& seen, const cv::Mat& picture,
+                       const ShadowMap& sun, const ShadowMap& sky, const RenderParams& params, Prepared& p) {
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const bool all_move = std::find(p.moves.begin(), p.moves.end(), false) == p.moves.end();
   p.background = seen;
@@ -266,8 +287,15 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<V
     shaded = restingTraces(p, seen_shadows, params);
     p.shadowless |= grown(seen_shadows.refuted, params.background.shadow_margin_px);
     if (seen_shadows.none) p.shadowless.setTo(255);
+    const cv::Mat dark = ((visibility < kUnshadedSun) | (sky_visibility < kUnshadedSky)) & (seen_shadows.refuted == 0);
+    p.mirror = findMirror(actors, picture, (p.key_labels != 0) | dark, off_planes, params, p);
   }
-  inventBackground(shaded, frames.front(), groundNearness(params.planes, frames.front().camera, p.scenery), p.background);
+  ClipFrame key = frames.front();
+  if (p.mirror.established()) {
+    p.background.plate = unmirrored(p.mirror, p.background.plate);
+    key.bgr = unmirroredCodes(p.mirror, key.bgr);
+  }
+  inventBackground(shaded, key, groundNearness(params.planes, frames.front().camera, p.scenery), p.background);
   p.plate_linear = linearOf(p.background.plate);
   const std::optional<cv::Vec3f> umbra = any_moves ? umbraInViews(views, params.planes, p.background, p.light.light) : std::nullopt;
   p.umbra = umbra     ? *umbra
@@ -322,14 +350,13 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const std::vector<Occluder> above = params.planes.empty() ? std::vector<Occluder>{} : occluders(actors);
   const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
   const ShadowMap sky(above, up, {256, kSkyRadius, 24});
+  p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   p.appearance_ms = watch.lap();
   p.fronts = frontsOf(actors, p);
   p.footprints = footprintsOf(actors, p);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
-  prepareBackground(frames, views, seen, picture, sun, sky, params, p);
+  prepareBackground(frames, views, actors, seen, picture, sun, sky, params, p);
   p.background_ms += watch.lap();
-  p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
-  p.appearance_ms += watch.lap();
   std::vector<cv::Mat> pictures;
   for (const ClipFrame& f : frames) pictures.push_back(f.bgr);
   p.noise = NoiseModel::estimate(pictures, steadiness > 1);

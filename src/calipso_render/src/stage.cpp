@@ -98,8 +98,11 @@ LitPoint litPoint(const Actor& actor, int triangle, float u, float v, const Eige
 }
 
 SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye) {
+  return surfacePoint(actor, triangle, barycentric(actor.screen, triangle, u, v), eye);
+}
+
+SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3f& w, const Eigen::Vector3f& eye) {
   const Eigen::Vector3i& t = actor.surface->triangles[triangle];
-  const Eigen::Vector3f w = barycentric(actor.screen, triangle, u, v);
   const LitPoint p = litPoint(actor, t, w);
   const float side = seenFromBehind(actor, t, p, eye) ? -1.0f : 1.0f;
   return {p.position, side * p.normal, mix(actor.surface->key_vertices, t, w), side * unit(mix(actor.surface->key_normals, t, w)), p.sky, triangle, w};

@@ -12,6 +12,7 @@
 #include "calipso_render/clip_sample.hpp"
 #include "calipso_render/light_fit.hpp"
 #include "calipso_render/noise.hpp"
+#include "calipso_render/plane_mirror.hpp"
 #include "calipso_render/stage.hpp"
 
 namespace calipso::render {
@@ -89,6 +90,7 @@ struct Prepared {
   std::vector<cv::Mat> footprints;  // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
   cv::Mat scenery;                  // CV_32FC1, 1/m: nearness of what is no object and may hide one; 0 unknown; may be empty
   cv::Mat shadowless;               // CV_8UC1: where objects cast no shadow: no plane is seen there, or it shows none in the video
+  PlaneMirror mirror;
   Background background;
   cv::Mat plate_linear;             // CV_32FC3
   cv::Vec3f umbra = {0.4f, 0.4f, 0.4f};  // what the sun's absence leaves of a support plane's brightness

@@ -65,6 +65,9 @@ struct SurfacePoint {
 // The point that pixel (u, v) sees of a triangle. @param eye world position of the camera
 SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye);
 
+// The same where its barycentric weights are known.
+SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3f& weights, const Eigen::Vector3f& eye);
+
 // One picture of the clip with its objects where they were.
 struct View {
   cv::Mat picture;  // CV_32FC3, code values

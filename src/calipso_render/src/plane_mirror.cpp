@@ -1,0 +1,343 @@
+#include "plane_mirror.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "calipso_render/colour.hpp"
+#include "calipso_render/inpaint.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kAtNormal = 0.03f;     // reflectance at normal incidence: between water and varnish
+constexpr int kTestedWidth = 192;      // px to which the picture is brought down for the test
+constexpr double kAround = 10.0;       // px of those: deviation of the weights around a pixel
+constexpr int kSquare = 8;             // px of the squares of which every other one is held out
+constexpr int kFarthest = 64;          // px by which the image is displaced for comparison
+constexpr double kAlike = 0.3;         // correlation with the image in place up to which a displaced one is another
+constexpr int kFewestOthers = 12;      // such displaced images, at least
+constexpr double kClear = 1.8;         // times what the best of them explains
+constexpr double kExplained = 0.04;    // of the squares around the image, at least
+constexpr double kFaintest = 0.3, kBrightest = 10.0;  // strengths, times what water and varnish mirror: dull ones, and polished steel
+constexpr int kMisplaced = 2;          // px by which the image may be displaced against its place
+constexpr float kSlopes[] = {0.0f, 0.01f, 0.02f, 0.04f, 0.08f, 0.16f};  // that are tried
+constexpr int kBlurs = 7;              // levels of blur, each twice the one before,
+constexpr float kLeastBlur = 0.5f;     // px, from this one on
+constexpr double kUsual = 1e-3;        // weight of the usual strength, to that of what is seen
+constexpr double kRidge = 1e-6;
+
+// The mirror image of a surface in a plane as the camera sees it; what lies below the plane is not mirrored.
+ScreenMesh mirrored(const Actor& actor, const SupportPlane& plane, const Camera& camera) {
+  const Eigen::Vector3f n = plane.normal.cast<float>();
+  Points points = actor.vertices;
+  for (Eigen::Vector3f& p : points) p -= (std::max(0.0f, n.dot(p) - static_cast<float>(plane.offset)) + n.dot(p) - static_cast<float>(plane.offset)) * n;
+  ScreenMesh mesh = projectMesh(points, actor.surface->triangles, camera);
+  const bool around_us = std::any_of(mesh.points.begin(), mesh.points.end(), [](const Eigen::Vector3f& p) { return std::isnan(p.z()); });
+  mesh.hidden_side = around_us ? 0 : -actor.surface->winding;
+  return mesh;
+}
+
+float schlick(float cosine) {
+  const float rest = 1.0f - std::clamp(cosine, 0.0f, 1.0f), squared = rest * rest;
+  return kAtNormal + (1.0f - kAtNormal) * squared * squared * rest;
+}
+
+void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance, const std::vector<SupportPlane>& planes, const SupportPlane& plane, const Camera& camera,
+              const cv::Mat& off, MirrorImage& image, cv::Mat& near) {
+  std::vector<ScreenMesh> meshes;
+  cv::Rect box;
+  for (const Actor* a : actors) {
+    meshes.push_back(mirrored(*a, plane, camera));
+    box |= boundsOf(meshes.back(), 1, {camera.width, camera.height});
+  }
+  if (box.empty()) return;
+  VisibilityBuffer buffer(box);
+  for (std::size_t slot = 0; slot < meshes.size(); ++slot) buffer.draw(meshes[slot], static_cast<int>(slot));
+  const Eigen::Vector3f n = plane.normal.cast<float>(), eye = camera.world_from_camera.translation().cast<float>();
+  const Eigen::Vector3f mirrored_eye = eye - 2.0f * (n.dot(eye) - static_cast<float>(plane.offset)) * n;
+  if (image.empty()) image = {cv::Mat::zeros(camera.height, camera.width, CV_32FC3), cv::Mat::zeros(camera.height, camera.width, CV_32F), {}, 1.0f};
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int v = box.y; v < box.br().y; ++v) {
+    for (int u = box.x; u < box.br().x; ++u) {
+      const std::uint32_t id = buffer.idAt(u, v);
+      if (id == VisibilityBuffer::kNothing || (!off.empty() && off.at<std::uint8_t>(v, u) != 0)) continue;
+      const auto receiver = receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
+      if (!receiver || receiver->normal.dot(n) < 0.999f || std::abs(n.dot(receiver->position) - static_cast<float>(plane.offset)) > 1e-3f * (eye - receiver->position).norm()) continue;
+      const int slot = VisibilityBuffer::objectOf(id), triangle = VisibilityBuffer::triangleOf(id);
+      const Eigen::Vector3f weights = barycentric(meshes[slot], triangle, static_cast<float>(u), static_cast<float>(v));
+      const float part = schlick(n.dot((eye - receiver->position).normalized()));
+      image.cover.at<float>(v, u) = part;
+      near.at<float>(v, u) = buffer.nearnessAt(u, v);
+      image.colour.at<cv::Vec3f>(v, u) = part * radiance(slot, surfacePoint(*actors[slot], triangle, weights, mirrored_eye));
+    }
+  }
+}
+
+// A facet that is tilted by s turns the mirrored ray by 2 s: behind it, over the way D2 to the object, by 2 s D2 px f / (D1 + D2); along a
+// row it is less by the cosine of incidence. The objects' distance is taken on smoothly beyond them.
+void findSpread(const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& near, MirrorImage& image) {
+  cv::Mat weight, known = near > 0.0f, filled;
+  known.convertTo(weight, CV_32F, 1.0 / 255.0);
+  cv::merge(std::vector<cv::Mat>(3, near), filled);
+  filled = pushPull(filled, weight);
+  image.spread = cv::Mat::zeros(near.size(), CV_32F);
+  const Eigen::Isometry3f from_world = camera.world_from_camera.inverse().cast<float>();
+  const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
+  double cosines = 0.0;
+  int count = 0;
+  for (int v = 0; v < near.rows; ++v) {
+    for (int u = 0; u < near.cols; ++u) {
+      const auto receiver = receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
+      if (!receiver) continue;
+      const float depth = (from_world * receiver->position).z(), behind = 1.0f - depth * filled.at<cv::Vec3f>(v, u)[0];
+      image.spread.at<float>(v, u) = 2.0f * static_cast<float>(camera.fy) * std::max(0.0f, behind);
+      if (known.at<std::uint8_t>(v, u) != 0) cosines += receiver->normal.dot((eye - receiver->position).normalized()), ++count;
+    }
+  }
+  if (count > 0) image.across = static_cast<float>(cosines / count);
+}
+
+// Values drawn out by `slope`: between levels of blur.
+class DrawnOut {
+ public:
+  DrawnOut(const cv::Mat& spread, float across, float slope) : across_(across) {
+    level_ = cv::Mat::zeros(spread.size(), CV_32F);
+    for (int v = 0; v < spread.rows; ++v) {
+      for (int u = 0; u < spread.cols; ++u) {
+        const float px = slope * spread.at<float>(v, u);
+        level_.at<float>(v, u) = std::clamp(std::log2(std::max(px, kLeastBlur) / kLeastBlur), 0.0f, kBlurs - 1.001f);
+      }
+    }
+    cv::minMaxLoc(level_, nullptr, &highest_);
+  }
+
+  // @param values CV_32FC4: colour and cover
+  cv::Mat operator()(const cv::Mat& values) const {
+    cv::Mat out(values.size(), CV_32FC4), lower, upper = blurred(values, 0);
+    for (int k = 0; k <= static_cast<int>(highest_); ++k) {
+      lower = upper, upper = blurred(values, k + 1);
+      for (int v = 0; v < out.rows; ++v) {
+        for (int u = 0; u < out.cols; ++u) {
+          const float part = level_.at<float>(v, u) - static_cast<float>(k);
+          if (part >= 0.0f && part < 1.0f) out.at<cv::Vec4f>(v, u) = (1.0f - part) * lower.at<cv::Vec4f>(v, u) + part * upper.at<cv::Vec4f>(v, u);
+        }
+      }
+    }
+    return out;
+  }
+
+ private:
+  cv::Mat blurred(const cv::Mat& values, int level) const {
+    cv::Mat out;
+    const float px = kLeastBlur * static_cast<float>(1 << level);
+    cv::GaussianBlur(values, out, {}, std::max(kLeastBlur, across_ * px), px, cv::BORDER_REPLICATE);
+    return out;
+  }
+
+  float across_;
+  double highest_ = 0.0;
+  cv::Mat level_;
+};
+
+cv::Mat withCover(const MirrorImage& image) {
+  cv::Mat out;
+  cv::merge(std::vector<cv::Mat>{image.colour, image.cover}, out);
+  return out;
+}
+
+// The test's pictures, brought down.
+class Trial {
+ public:
+  Trial(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known) : scale_(std::max(1.0f, static_cast<float>(picture.cols) / kTestedWidth)) {
+    const cv::Size size(cvRound(picture.cols / scale_), cvRound(picture.rows / scale_));
+    const auto brought = [&](const cv::Mat& values) {
+      cv::Mat out;
+      cv::resize(values, out, size, 0, 0, cv::INTER_AREA);
+      return out;
+    };
+    cv::Mat part;
+    known.convertTo(part, CV_32F, 1.0 / 255.0);
+    weight_ = cv::Mat::zeros(size, CV_32F);
+    weight_.setTo(1.0f, brought(part) > 0.99f);
+    cv::GaussianBlur(weight_, around_, {}, kAround);
+    around_ = cv::max(around_, 1e-6);
+    std::array<cv::Mat, 3> y;
+    cv::split(brought(picture), y);
+    for (int c = 0; c < 3; ++c) y_less_[c] = less(y[c]);
+    image_ = brought(withCover(image));
+    spread_ = brought(image.spread) / scale_, across_ = image.across;
+  }
+
+  struct Fit {
+    double explained = 0.0;      // squares of what is held out
+    std::array<double, 4> x{};   // strength; strength times the surroundings
+    cv::Mat cover;               // cover'
+
+    // What the objects' mirror image takes away was mirrored there.
+    bool plausible() const { return std::min({x[1], x[2], x[3]}) >= 0.0; }
+    double alike(const Fit& other) const {
+      return cover.dot(other.cover) / std::sqrt(std::max(1e-30, cover.dot(cover) * other.cover.dot(other.cover)));
+    }
+  };
+
+  // Drawn out by the planes' slope.
+  cv::Mat drawnOut(float slope) const { return DrawnOut(spread_, across_, slope)(image_); }
+
+  // @param drawn what drawnOut() gave; by px by which it is displaced
+  Fit fit(const cv::Mat& drawn, int by) const {
+    cv::Mat columns[4];
+    cv::split(displaced(drawn, by), columns);
+    for (cv::Mat& c : columns) c = less(c);
+    std::array<Eigen::Matrix4d, 2> G{Eigen::Matrix4d::Zero(), Eigen::Matrix4d::Zero()};
+    std::array<Eigen::Vector4d, 2> b{Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+    for (int v = 0; v < weight_.rows; ++v) {
+      for (int u = 0; u < weight_.cols; ++u) {
+        if (weight_.at<float>(v, u) == 0.0f) continue;
+        const int half = (u / kSquare + v / kSquare) % 2;
+        const double s = columns[3].at<float>(v, u);
+        for (int c = 0; c < 3; ++c) {
+          const double l = columns[c].at<float>(v, u), y = y_less_[c].at<float>(v, u);
+          G[half](0, 0) += l * l, G[half](0, c + 1) -= l * s, G[half](c + 1, 0) -= l * s, G[half](c + 1, c + 1) += s * s;
+          b[half][0] += l * y, b[half][c + 1] -= s * y;
+        }
+      }
+    }
+    Fit fit;
+    for (int half = 0; half < 2; ++half) {
+      const Eigen::Vector4d x = solve(G[1 - half], b[1 - half]);
+      fit.explained += 2.0 * x.dot(b[half]) - x.dot(G[half] * x);
+    }
+    const Eigen::Vector4d x = solve(G[0] + G[1], b[0] + b[1]);
+    std::copy_n(x.data(), 4, fit.x.begin());
+    fit.cover = columns[3];
+    return fit;
+  }
+
+  // What there is to explain around the image.
+  double squares() const {
+    cv::Mat cover, near;
+    cv::extractChannel(image_, cover, 3);
+    cv::dilate(cover > 0.0f, near, cv::Mat::ones(2 * kSquare + 1, 2 * kSquare + 1, CV_8U));
+    double sum = 0.0;
+    for (const cv::Mat& y : y_less_) {
+      cv::Mat part = cv::Mat::zeros(y.size(), CV_32F);
+      y.copyTo(part, near);
+      sum += part.dot(part);
+    }
+    return sum;
+  }
+
+
+ private:
+  // Of objects of one colour strength and surroundings are known together only: then the strength is that of water and varnish, 1.
+  static Eigen::Vector4d solve(const Eigen::Matrix4d& G, const Eigen::Vector4d& b) {
+    const double weight = kUsual * G(0, 0);
+    Eigen::Matrix4d A = G + 1e-12 * Eigen::Matrix4d::Identity();
+    A(0, 0) += weight;
+    for (int c = 1; c < 4; ++c) A(c, c) *= 1.0 + kRidge;
+    Eigen::Vector4d x = A.ldlt().solve(b + weight * Eigen::Vector4d::UnitX());
+    x[0] = std::clamp(x[0], kFaintest, kBrightest);
+    for (int c = 1; c < 4; ++c) x[c] = (b[c] - A(c, 0) * x[0]) / A(c, c);
+    return x;
+  }
+
+  static cv::Mat displaced(const cv::Mat& values, int by) {
+    cv::Mat out = cv::Mat::zeros(values.size(), values.type());
+    const int width = values.cols - std::abs(by);
+    values(cv::Rect(std::max(0, -by), 0, width, values.rows)).copyTo(out(cv::Rect(std::max(0, by), 0, width, values.rows)));
+    return out;
+  }
+
+  cv::Mat less(const cv::Mat& values) const {
+    cv::Mat sum;
+    cv::GaussianBlur(values.mul(weight_), sum, {}, kAround);
+    return (values - sum / around_).mul(weight_);
+  }
+
+  float scale_;
+  float across_ = 1.0f;
+  cv::Mat weight_, around_, image_, spread_;  // image_ CV_32FC4: colour and cover
+  std::array<cv::Mat, 3> y_less_;
+};
+
+}  // namespace
+
+cv::Vec3f mirroredRadiance(const Appearance& appearance, const Light& light, const Look& look, const SurfacePoint& point) {
+  const cv::Vec3f albedo = (look.albedo ? *look.albedo : appearance.albedoAt(point)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
+  return appearance.radiance(albedo, diffuseShading(light, point.normal, 1.0f, point.sky, appearance.tint), {});
+}
+
+MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance& radiance, const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& off) {
+  MirrorImage image;
+  cv::Mat near = cv::Mat::zeros(camera.height, camera.width, CV_32F);
+  for (const SupportPlane& plane : planes) {
+    if (plane.normal.dot(camera.world_from_camera.translation()) > plane.offset) addPlane(actors, radiance, planes, plane, camera, off, image, near);
+  }
+  if (!image.empty()) findSpread(planes, camera, near, image);
+  return image;
+}
+
+cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image) {
+  const cv::Mat drawn = DrawnOut(image.spread, image.across, mirror.slope)(withCover(image));
+  cv::Mat added(drawn.size(), CV_32FC3);
+  for (int v = 0; v < added.rows; ++v) {
+    for (int u = 0; u < added.cols; ++u) {
+      const cv::Vec4f& c = drawn.at<cv::Vec4f>(v, u);
+      added.at<cv::Vec3f>(v, u) = mirror.strength * (cv::Vec3f(c[0], c[1], c[2]) - c[3] * mirror.surroundings);
+    }
+  }
+  return added;
+}
+
+cv::Mat unmirrored(const PlaneMirror& mirror, const cv::Mat& picture) {
+  cv::Mat out = picture.clone();
+  for (int v = 0; v < out.rows; ++v) {
+    for (int u = 0; u < out.cols; ++u) {
+      const cv::Vec3f& added = mirror.at_key.at<cv::Vec3f>(v, u);
+      if (added == cv::Vec3f()) continue;
+      cv::Vec3f& c = out.at<cv::Vec3f>(v, u);
+      for (int k = 0; k < 3; ++k) c[k] = codeFromLinear(std::max(0.0f, linearFromRealCode(c[k]) - added[k]));
+    }
+  }
+  return out;
+}
+
+cv::Mat unmirroredCodes(const PlaneMirror& mirror, const cv::Mat& bgr) {
+  cv::Mat real, codes;
+  bgr.convertTo(real, CV_32F);
+  unmirrored(mirror, real).convertTo(codes, CV_8U);
+  return codes;
+}
+
+PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known) {
+  const Trial trial(image, picture, known);
+  Trial::Fit best;
+  cv::Mat best_drawn;
+  PlaneMirror mirror;
+  for (const float slope : kSlopes) {
+    const cv::Mat drawn = trial.drawnOut(slope);
+    const Trial::Fit fit = trial.fit(drawn, 0);
+    if (best.cover.empty() || fit.explained > best.explained) best = fit, best_drawn = drawn, mirror.slope = slope;
+  }
+  if (best.explained < kExplained * trial.squares() || !best.plausible()) return mirror;
+  double others = 0.0, elsewhere = 0.0;
+  int count = 0;
+  for (int by = -kFarthest; by <= kFarthest; ++by) {
+    if (by == 0) continue;
+    const Trial::Fit fit = trial.fit(best_drawn, by);
+    if (std::abs(by) > kMisplaced) elsewhere = std::max(elsewhere, fit.explained);
+    if (fit.alike(best) > kAlike) continue;
+    if (fit.plausible()) others = std::max(others, fit.explained);
+    ++count;
+  }
+  if (count < kFewestOthers || best.explained < kClear * others || best.explained < elsewhere) return mirror;
+  mirror.strength = static_cast<float>(best.x[0]);
+  for (int c = 0; c < 3; ++c) mirror.surroundings[c] = static_cast<float>(best.x[c + 1] / best.x[0]);
+  return mirror;
+}
+
+}  // namespace calipso::render
