@@ -8,7 +8,8 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kClearlyBetter = 0.02;  // of correlation, before the prediction is given up
-constexpr int kLeastTemplate = 12;       // px; a smaller template says too little
+constexpr int kLeastSide = 8;           // px; a smaller object says too little
+constexpr int kLeastTemplate = 12;       // px; it is not reduced to less
 
 // Reduction by which the object is still large enough to be recognised.
 int reduction(const cv::Size& object) {
@@ -64,14 +65,13 @@ int roundUp(double value, int factor) {
 
 }  // namespace
 
-Eigen::Vector2d coarseDisplacement(const ReferenceView::Warped& look, const cv::Mat& picture,
-                                   const Eigen::AlignedBox2d& reach) {
+CoarseMatch matchCoarsely(const ReferenceView::Warped& look, const cv::Mat& picture,
+                          const Eigen::AlignedBox2d& reach, int factor) {
   const cv::Rect known = boundingRect(look.weight.image);
-  const int factor = reduction(known.size());
   cv::Rect object(known.x, known.y, known.width / factor * factor,
                   known.height / factor * factor);
-  if (object.width < kLeastTemplate || object.height < kLeastTemplate) {
-    return Eigen::Vector2d::Zero();
+  if (object.width < kLeastSide || object.height < kLeastSide) {
+    return {};
   }
   const int left = roundUp(-reach.min().x(), factor), up = roundUp(-reach.min().y(), factor);
   const int right = roundUp(reach.max().x(), factor), down = roundUp(reach.max().y(), factor);
@@ -80,10 +80,10 @@ Eigen::Vector2d coarseDisplacement(const ReferenceView::Warped& look, const cv::
   const cv::Rect area(at.x - left, at.y - up, object.width + left + right,
                       object.height + up + down);
   const cv::Mat searched = cutOut(picture, area);
-  if (searched.empty()) return Eigen::Vector2d::Zero();
+  if (searched.empty()) return {};
 
   cv::Mat mask = shrink(look.weight.image(object), factor) > 0.99f;
-  if (cv::countNonZero(mask) < kLeastTemplate * kLeastTemplate / 4) return Eigen::Vector2d::Zero();
+  if (cv::countNonZero(mask) < kLeastSide * kLeastSide / 2) return {};
   cv::Mat mask_float, score;
   mask.convertTo(mask_float, CV_32F, 1.0 / 255.0);
   cv::matchTemplate(shrink(searched, factor), shrink(look.gray.image(object), factor), score,
@@ -93,8 +93,14 @@ Eigen::Vector2d coarseDisplacement(const ReferenceView::Warped& look, const cv::
   double best = 0.0;
   cv::minMaxLoc(score, nullptr, &best, nullptr, &peak);
   const cv::Point home(left / factor, up / factor);
-  if (best < score.at<float>(home) + kClearlyBetter) return Eigen::Vector2d::Zero();
-  return factor * (refinedPeak(score, peak) - Eigen::Vector2d(home.x, home.y));
+  return {factor * (refinedPeak(score, peak) - Eigen::Vector2d(home.x, home.y)), best, score.at<float>(home)};
+}
+
+Eigen::Vector2d coarseDisplacement(const ReferenceView::Warped& look, const cv::Mat& picture,
+                                   const Eigen::AlignedBox2d& reach) {
+  const CoarseMatch match =
+      matchCoarsely(look, picture, reach, reduction(boundingRect(look.weight.image).size()));
+  return match.correlation < match.at_home + kClearlyBetter ? Eigen::Vector2d::Zero() : match.displacement;
 }
 
 }  // namespace calipso::flow

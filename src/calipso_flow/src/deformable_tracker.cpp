@@ -1,7 +1,5 @@
 #include "calipso_flow/deformable_tracker.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -15,44 +13,12 @@ constexpr int kPoints = 150;              // surface points followed
 constexpr double kRoughScale = 30.0;      // deviations; residuals of a rough match
 constexpr double kFineScale = 40.0;
 constexpr double kLeastInlierShare = 0.35;
-constexpr double kReturnDeviations = 3.0;
 constexpr int kRadius = 5;                   // px, of a patch: a sheet is often plain
-constexpr double kStripeGradient = 2.0;      // grey levels per px; below, a direction is a stripe's
 
 DeformationField::Points matrixOf(const std::vector<Eigen::Vector3d>& points) {
   DeformationField::Points matrix(points.size(), 3);
   for (size_t i = 0; i < points.size(); ++i) matrix.row(i) = points[i].transpose();
   return matrix;
-}
-
-// A patch counts when it is certain in one direction at least; the other is weighted by its own
-// uncertainty.
-PatchParams patchParams(const PatchParams& rigid) {
-  PatchParams params = rigid;
-  params.least_gradient = kStripeGradient;
-  params.stripes = true;
-  params.radius_px = std::max(rigid.radius_px, kRadius);
-  return params;
-}
-
-std::optional<PatchMatch> matchPoint(const LookMatch& look, const LookMatch::Seed& seed,
-                                     const TrackerParams& params) {
-  const auto there = look.find(seed, params.patch);
-  if (!there || there->correlation < params.least_correlation) return std::nullopt;
-  if (look.care() == Care::kRough) return there;
-  const double certain =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(there->covariance).eigenvalues()[0];
-  if (std::sqrt(std::max(0.0, certain)) > params.largest_deviation_px) return std::nullopt;
-  if (look.care() == Care::kForward) return there;
-  const auto miss = look.missOnReturn(seed.at, *there, params.patch);
-  if (!miss) return std::nullopt;
-  const double floor = params.forward_backward_px / kReturnDeviations;
-  const Eigen::Matrix2d allowed =
-      there->covariance + floor * floor * Eigen::Matrix2d::Identity();
-  if (miss->dot(allowed.inverse() * *miss) > kReturnDeviations * kReturnDeviations) {
-    return std::nullopt;
-  }
-  return there;
 }
 
 }  // namespace
@@ -67,7 +33,8 @@ DeformableTracker::DeformableTracker(const ObjectModel& model, const Frame& key_
       vertex_weights_(fitter_.field().weightsAt(model.mesh.vertices)),
       points_(matrixOf(reference_.gridPoints(kPoints))) {
   point_weights_ = fitter_.field().weightsAt(points_);
-  params_.patch = patchParams(params.patch);
+  params_.patch = stripePatches(params.patch);
+  params_.patch.radius_px = std::max(params.patch.radius_px, kRadius);
   last_ = keyObservation();
   last_.time = key_frame.time;
 }
@@ -113,7 +80,7 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
     pixels.push_back({pixel, pixel});
   }
   const LookMatch::Matches found = LookMatch::forEach(
-      pixels, [&](const LookMatch::Seed& seed) { return matchPoint(pictures, seed, params_); });
+      pixels, [&](const LookMatch::Seed& seed) { return pictures.findSurely(seed, params_.patch, params_.trust); });
   for (size_t i = 0; i < visible.size(); ++i) {
     if (!found[i]) continue;
     matches.push_back(

@@ -46,4 +46,15 @@ Frame makeFrame(double time, const cv::Mat& picture, const Camera& camera) {
   return frame;
 }
 
+Frame reduced(const Frame& frame, int factor) {
+  Frame small = frame;
+  Camera& camera = small.camera;
+  camera.width /= factor, camera.height /= factor;
+  camera.fx /= factor, camera.fy /= factor;
+  camera.cx = (camera.cx + 0.5) / factor - 0.5, camera.cy = (camera.cy + 0.5) / factor - 0.5;
+  const cv::Rect whole(0, 0, camera.width * factor, camera.height * factor);
+  cv::resize(frame.gray(whole), small.gray, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return small;
+}
+
 }  // namespace calipso::flow

@@ -1,5 +1,7 @@
 #include "calipso_flow/look_match.hpp"
 
+#include <Eigen/LU>
+#include <cmath>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -8,6 +10,8 @@ namespace {
 
 constexpr int kSurrounding = 16;  // px of the frame around the object's window; even
 constexpr double kStripes = 8;    // in which points are shared out
+constexpr double kReturnDeviations = 3.0;
+constexpr double kStripeGradient = 2.0;  // grey levels per px; below, a direction is a stripe's
 
 ImageWindow halved(const ImageWindow& window) {
   ImageWindow half{{}, 0.5 * window.origin};
@@ -16,6 +20,12 @@ ImageWindow halved(const ImageWindow& window) {
 }
 
 }  // namespace
+
+PatchParams stripePatches(PatchParams params) {
+  params.least_gradient = kStripeGradient;
+  params.stripes = true;
+  return params;
+}
 
 LookMatch::LookMatch(const ReferenceView::Warped& look, const cv::Mat& picture, Care care)
     : care_(care),
@@ -41,7 +51,27 @@ std::optional<PatchMatch> LookMatch::find(const Seed& seed, const PatchParams& p
   if (!match) return std::nullopt;
   match->position /= scale_;
   match->covariance /= scale_ * scale_;
+  match->deviation /= scale_;
   return match;
+}
+
+std::optional<PatchMatch> LookMatch::findSurely(const Seed& seed, const PatchParams& params,
+                                                const MatchTrust& trust) const {
+  auto there = find(seed, params);
+  // A patch that is uncertain in one direction may be certain in the other.
+  const bool wanders = !there || there->deviation > trust.largest_deviation_px;
+  if (wanders && care_ != Care::kRough && !params.stripes) return findSurely(seed, stripePatches(params), trust);
+  if (!there || there->correlation < trust.least_correlation) return std::nullopt;
+  if (care_ == Care::kRough) return there;
+  // A patch counts when it is certain in one direction at least; the other is weighted by its own uncertainty.
+  if (there->deviation > trust.largest_deviation_px) return std::nullopt;
+  if (care_ == Care::kForward) return there;
+  const auto miss = missOnReturn(seed.at, *there, params);
+  if (!miss) return std::nullopt;
+  const double floor = trust.forward_backward_px / kReturnDeviations;
+  const Eigen::Matrix2d allowed = there->covariance + floor * floor * Eigen::Matrix2d::Identity();
+  if (miss->dot(allowed.inverse() * *miss) > kReturnDeviations * kReturnDeviations) return std::nullopt;
+  return there;
 }
 
 LookMatch::Matches LookMatch::forEach(const std::vector<Seed>& seeds, const Search& search) {

@@ -7,6 +7,7 @@
 #include "calipso_flow/coarse_search.hpp"
 #include "calipso_flow/look_match.hpp"
 #include "calipso_flow/rotation.hpp"
+#include "calipso_flow/turn_search.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -23,27 +24,13 @@ constexpr double kFirstSearch = 0.2;     // of the picture's width, while no mot
 constexpr int kForgetAfter = 3;         // frames without the object before its motion is forgotten
 constexpr int kWeakInliers = 12;         // fewer tracks than this are worth another attempt
 constexpr double kStaysShare = 0.01;     // of the diagonal: what moves less has not moved
-constexpr double kReturnDeviations = 3.0;
 constexpr double kPatchShare = 1.0 / 160.0;  // of the picture's width: a patch's radius
 constexpr int kLargestRadius = 9;            // px
 constexpr double kDrownedShare = 0.35;   // of the seeds in the picture: with fewer tracks noise or blur drowns small patches
+constexpr double kTurnedShare = 0.35;    // of the tracks due: with fewer the object may have turned
+constexpr size_t kTurnsTried = 6;
+constexpr double kFarView = 0.5;         // rad, or relative distance: seen from farther a look is drawn out
 constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
-
-// A match that is as likely and as certain as asked for, and comes back where that is checked.
-std::optional<PatchMatch> matchSeed(const LookMatch& match, const LookMatch::Seed& seed,
-                                    const TrackerParams& params) {
-  const auto there = match.find(seed, params.patch);
-  if (!there || there->correlation < params.least_correlation) return std::nullopt;
-  if (match.care() == Care::kRough) return there;
-  // A patch with little texture wanders with the noise, and is trusted accordingly.
-  const double deviation = std::sqrt(there->covariance.trace());
-  if (deviation > params.largest_deviation_px) return std::nullopt;
-  if (match.care() == Care::kForward) return there;
-  const double allowed = params.forward_backward_px + kReturnDeviations * deviation;
-  const auto back = match.missOnReturn(seed.at, *there, params.patch);
-  if (!back || back->norm() > allowed) return std::nullopt;
-  return there;
-}
 
 // Follows the reference's seeds into the frame, the object's look being warped to `look` and the object expected at `start`.
 std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& reference,
@@ -59,13 +46,13 @@ std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& refe
     pixels.push_back({camera.project(in_look), camera.project(expected)});
   }
   const LookMatch::Matches matches = LookMatch::forEach(
-      pixels, [&](const LookMatch::Seed& seed) { return matchSeed(match, seed, params); });
+      pixels, [&](const LookMatch::Seed& seed) { return match.findSurely(seed, params.patch, params.trust); });
   std::vector<Track> tracks;
   for (size_t i = 0; i < points.size(); ++i) {
     const auto& there = matches[i];
     if (!there) continue;
     found.push_back({points[i], there->position, there->covariance});
-    tracks.push_back({points[i], there->position, there->correlation, std::sqrt(0.5 * there->covariance.trace()), false});
+    tracks.push_back({points[i], there->position, there->correlation, there->deviation, false});
   }
   return tracks;
 }
@@ -117,16 +104,6 @@ int seedsInPicture(const ReferenceView& reference, const Camera& camera,
       }));
 }
 
-// Moves a pose parallel to the picture plane, so that its pivot moves by `pixels`.
-Eigen::Isometry3d shiftInPicture(const Camera& camera, const Eigen::Isometry3d& pose,
-                                 const Eigen::Vector3d& pivot, const Eigen::Vector2d& pixels) {
-  const double depth = (camera.world_from_camera.inverse() * (pose * pivot)).z();
-  const Eigen::Vector3d shift(pixels.x() * depth / camera.fx, pixels.y() * depth / camera.fy, 0.0);
-  Eigen::Isometry3d moved = pose;
-  moved.translation() += camera.world_from_camera.linear() * shift;
-  return moved;
-}
-
 }  // namespace
 
 int Observation::inliers() const {
@@ -139,7 +116,7 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
     : model_(model), params_(params), centroid_(flow::centroid(model.mesh)) {
   // What a larger picture shows larger is not seen sharper by as much.
   const int scaled = static_cast<int>(std::lround(kPatchShare * key_frame.camera.width));
-  params_.patch.radius_px = std::max(params.patch.radius_px, std::min(scaled, kLargestRadius));
+  params_.patch.radius_px = std::max(params_.patch.radius_px, std::min(scaled, kLargestRadius));
   wide_ = params_;
   wide_.patch.radius_px = std::max(params_.patch.radius_px, kLargestRadius);
   references_.push_back({ReferenceView(key_frame, model_, model.world_from_object, mask, params.seed_count)});
@@ -186,11 +163,8 @@ bool ObjectTracker::isLookOf(const Frame& frame, const ReferenceView& reference,
              kSameLookShare * params_.patch.radius_px;
 }
 
-Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const ReferenceView& reference,
-                                                const Eigen::Isometry3d& predicted) {
-  const ReferenceView::Warped& look = lookAt(frame, reference, predicted, Care::kRough).warped;
-  if (look.coverage == 0.0) return predicted;
-  // The object may have stopped, or turned round: look as far as twice back to where it was.
+// The object may have stopped, or turned round: look as far as twice back to where it was.
+Eigen::AlignedBox2d ObjectTracker::reachFrom(const Frame& frame, const Eigen::Isometry3d& predicted) const {
   const Eigen::Vector2d home = frame.camera.projectWorld(predicted * centroid_);
   const Eigen::Vector2d before = frame.camera.projectWorld(last_->world_from_object * centroid_);
   // Without a motion to go by, it may be anywhere near.
@@ -201,8 +175,15 @@ Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const Refere
   Eigen::AlignedBox2d reach(-margin, margin);
   const Eigen::Vector2d back = 1.5 * (before - home);
   reach.extend(Eigen::AlignedBox2d(back - margin, back + margin));
+  return reach;
+}
+
+Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const ReferenceView& reference,
+                                                const Eigen::Isometry3d& predicted) {
+  const ReferenceView::Warped& look = lookAt(frame, reference, predicted, Care::kRough).warped;
+  if (look.coverage == 0.0) return predicted;
   return shiftInPicture(frame.camera, predicted, centroid_,
-                        coarseDisplacement(look, frame.gray, reach));
+                        coarseDisplacement(look, frame.gray, reachFrom(frame, predicted)));
 }
 
 Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& reference,
@@ -291,6 +272,13 @@ Observation ObjectTracker::tryOtherwise(const Frame& frame, const ReferenceView&
       drowned_ = !drowned_;
     }
   }
+  if (best.inliers() < kTurnedShare * due_inliers_ && frames_lost_ < kForgetAfter && !stays(best)) {
+    for (const Eigen::Isometry3d& turned : searchTurned(
+             nearest, frame, {predicted, centroid_, reachFrom(frame, predicted)}, kTurnsTried)) {
+      Observation other = refine(frame, nearest, turned, drowned_ ? wide_ : params_);
+      if (other.inliers() > best.inliers()) best = std::move(other);
+    }
+  }
   due_inliers_ = best.inliers();
   return best;
 }
@@ -308,9 +296,12 @@ Observation ObjectTracker::attempt(const Frame& frame, const ReferenceView& refe
 // As many tracks as are due; few are enough for an object that has not moved.
 bool ObjectTracker::isClear(const Observation& observation) const {
   if (!observation.found || observation.inliers() < kClearShare * due_inliers_) return false;
-  if (observation.inliers() >= kWeakInliers) return true;
-  return (observation.world_from_object * centroid_ - last_->world_from_object * centroid_).norm() <
-         kStaysShare * boundingDiagonal(model_.mesh);
+  return observation.inliers() >= kWeakInliers || stays(observation);
+}
+
+bool ObjectTracker::stays(const Observation& observation) const {
+  return observation.found && (observation.world_from_object * centroid_ - last_->world_from_object * centroid_).norm() <
+                                  kStaysShare * boundingDiagonal(model_.mesh);
 }
 
 void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
@@ -320,14 +311,15 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   Reference& nearest = nearestReference(frame, observation.world_from_object);
   nearest.most_inliers = std::max(nearest.most_inliers, observation.inliers());
   // A reference that shows the object from the same side would have the same tracks, and this pose's errors.
-  if (viewChange(nearest.view, frame, observation.world_from_object, centroid_) < kOtherView) return;
+  const double change = viewChange(nearest.view, frame, observation.world_from_object, centroid_);
+  if (change < kOtherView) return;
   const bool worn = observation.inliers() < params_.least_inliers * nearest.most_inliers;
-  if (!worn && observation.coverage >= params_.least_coverage) return;
+  if (!worn && observation.coverage >= params_.least_coverage && change < kFarView) return;
   if (static_cast<int>(references_.size()) >= params_.max_references) {
     references_.erase(references_.begin() + 1);  // the key frame stays
   }
   references_.push_back({ReferenceView(frame, model_, observation.world_from_object, cv::Mat(), params_.seed_count)});
-  due_inliers_ = 0;  // not known yet
+  due_inliers_ = static_cast<int>(references_.back().view.seeds().size());
   look_ = {};        // the references may have moved
 }
 

@@ -133,6 +133,7 @@ PatchMatch makeMatch(const PatchModel& model, const Regression& fit,
   PatchMatch match;
   match.position = position;
   match.covariance = model.inverse.topLeftCorner<2, 2>() * noise / (gain * gain);
+  match.deviation = std::sqrt(model.striped ? match.covariance(0, 0) : 0.5 * match.covariance.trace());
   if (model.striped) {
     const Eigen::Vector2d along(-model.across.y(), model.across.x());
     match.covariance = match.covariance(0, 0) * model.across * model.across.transpose() +

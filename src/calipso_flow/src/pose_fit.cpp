@@ -107,6 +107,15 @@ void judge(const Linearisation& lin, const PoseFitParams& params, PoseFit& fit) 
 
 }  // namespace
 
+Eigen::Isometry3d shiftInPicture(const Camera& camera, const Eigen::Isometry3d& pose,
+                                 const Eigen::Vector3d& pivot, const Eigen::Vector2d& pixels) {
+  const double depth = (camera.world_from_camera.inverse() * (pose * pivot)).z();
+  const Eigen::Vector3d shift(pixels.x() * depth / camera.fx, pixels.y() * depth / camera.fy, 0.0);
+  Eigen::Isometry3d moved = pose;
+  moved.translation() += camera.world_from_camera.linear() * shift;
+  return moved;
+}
+
 Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object,
                            const Eigen::Vector3d& pivot, const Vector6d& motion) {
   const Eigen::Vector3d position = world_from_object * pivot + motion.head<3>();

@@ -159,6 +159,23 @@ ReferenceView::Warped ReferenceView::warp(const Camera& camera,
   return finish(map, visible, known);
 }
 
+ReferenceView ReferenceView::reduced(int factor) const {
+  if (factor == 1) return *this;
+  ReferenceView small = *this;
+  small.frame_ = flow::reduced(frame_, factor);
+  small.surface_ =
+      viewSurface(mesh_, small.frame_.camera, small.frame_.camera.world_from_camera.inverse() * world_from_object_);
+  if (surface_.empty() || small.surface_.empty()) return small;
+  cv::Mat all(frame_.gray.size(), CV_8U, cv::Scalar(0)), fewer;
+  usable_.copyTo(all(surface_.window));
+  const cv::Rect whole({0, 0}, small.frame_.gray.size() * factor);
+  cv::resize(all(whole), fewer, small.frame_.gray.size(), 0, 0, cv::INTER_AREA);
+  small.usable_ = (fewer(small.surface_.window) > 127) & (small.surface_.depth > 0.0f);
+  return small;
+}
+
+int ReferenceView::seenPixels() const { return usable_.empty() ? 0 : cv::countNonZero(usable_); }
+
 std::vector<Eigen::Vector3d> ReferenceView::gridPoints(int count) const {
   std::vector<Eigen::Vector3d> points;
   if (surface_.empty()) return points;

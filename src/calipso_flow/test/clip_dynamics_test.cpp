@@ -49,6 +49,34 @@ TEST(ClipDynamics, findsVelocityAndSpinOfARenderedBox) {
   EXPECT_NEAR(box.motions[6].state.spin.z(), 0.8, 0.08);
 }
 
+// 0.5 rad in a frame, while nothing is known of its motion: looks must be turned to find it.
+TEST(ClipDynamics, findsAFastSpinningBox) {
+  const Eigen::Vector3d velocity(0.5, 0.0, 0.3);
+  const double spin = 15.0;
+  ClipAnalyser analyser = analyserOf(frameOf(0.0, movedPose(0.0, velocity, spin), 1));
+  for (int k = 1; k < 10; ++k) analyser.add(frameOf(k / kFps, movedPose(k / kFps, velocity, spin), 1 + k));
+  const ObjectDynamics box = analyser.finish().front();
+  for (const ObjectMotion& motion : box.motions) EXPECT_GT(motion.tracks, 6);
+  EXPECT_NEAR(box.motions[5].state.spin.z(), spin, 0.03 * spin);
+  // Every second frame is the next ones' reference: their errors, some tenths of a pixel of 6.7, add up.
+  EXPECT_NEAR(box.motions[5].state.velocity.x(), 0.5, 0.07);
+  EXPECT_NEAR(box.motions[5].state.velocity.z(), 0.3, 0.07);
+}
+
+// Noise hides tracks from a reference; a new one from the same side would only add its pose's error.
+TEST(ClipDynamics, noiseWearsNoReferenceOut) {
+  constexpr double kHeavy = 30.0;  // grey levels
+  const Eigen::Vector3d velocity(0.3, 0.0, 0.0);
+  ClipAnalyser analyser = analyserOf(frameOf(0.0, movedPose(0.0, velocity, 0.0), 1, 0.0, kHeavy));
+  for (int k = 1; k < 16; ++k) {
+    analyser.add(frameOf(k / kFps, movedPose(k / kFps, velocity, 0.0), 1 + k, 0.0, kHeavy));
+  }
+  const ObjectDynamics box = analyser.finish().front();
+  // One frame's error, not the sum of fifteen.
+  const double x = movedPose(15 / kFps, velocity, 0.0).translation().x();
+  EXPECT_NEAR(box.observations[15].world_from_object.translation().x(), x, 0.002);
+}
+
 // A box with a strong texture is found all the same.
 TEST(ClipDynamics, heavyNoiseCostsCertaintyOnly) {
   constexpr double kHeavy = 40.0;  // grey levels

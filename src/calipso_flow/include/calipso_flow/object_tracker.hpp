@@ -12,14 +12,12 @@ namespace calipso::flow {
 
 struct TrackerParams {
   int seed_count = 120;              // surface points followed at a time
-  double forward_backward_px = 0.3;  // a track that does not come back this close is dropped
-  double largest_deviation_px = 0.5; // a track less certain than this is dropped
-  double least_correlation = 0.4;    // of a patch with its reference
   double least_inliers = 0.65;       // below this share of the most tracks it had a reference is worn out
   double least_coverage = 0.55;      // below this share of known surface a new reference is taken
   int max_references = 12;
   double search_px = 24.0;           // the coarse search looks this far beyond the prediction
   PatchParams patch;
+  MatchTrust trust;
   PoseFitParams pose;
   DeformationParams deformation;
 };
@@ -76,6 +74,7 @@ class ObjectTracker {
   // @param care  kForward: the look may be of another place
   const Look& lookAt(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose, Care care);
   bool isLookOf(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose) const;
+  Eigen::AlignedBox2d reachFrom(const Frame& frame, const Eigen::Isometry3d& predicted) const;
   Eigen::Isometry3d searchCoarsely(const Frame& frame, const ReferenceView& reference,
                                    const Eigen::Isometry3d& predicted);
   Observation refine(const Frame& frame, const ReferenceView& reference,
@@ -92,6 +91,7 @@ class ObjectTracker {
   Observation tryOtherwise(const Frame& frame, const ReferenceView& nearest, const Eigen::Isometry3d& predicted,
                            Observation best);
   bool isClear(const Observation& observation) const;
+  bool stays(const Observation& observation) const;  // found where it was
   void remember(const Frame& frame, const Observation& observation, bool cut);
 
   ObjectModel model_;

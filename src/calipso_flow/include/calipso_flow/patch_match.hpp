@@ -29,6 +29,7 @@ struct PatchParams {
 struct PatchMatch {
   Eigen::Vector2d position;    // where the patch's centre lies in the target, px
   Eigen::Matrix2d covariance;  // of position, from the residual's variance, px^2
+  double deviation;            // px, in the directions in which the position is known
   double correlation;          // weighted, normalised: 1 = the same up to gain and offset
 };
 

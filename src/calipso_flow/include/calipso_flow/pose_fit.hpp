@@ -45,6 +45,10 @@ PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera
                 const Eigen::Isometry3d& start, const Eigen::Vector3d& pivot,
                 const PoseFitParams& params = {});
 
+// Moves a pose parallel to the picture plane, so that its pivot (object frame, m) moves by `pixels`.
+Eigen::Isometry3d shiftInPicture(const Camera& camera, const Eigen::Isometry3d& pose, const Eigen::Vector3d& pivot,
+                                 const Eigen::Vector2d& pixels);
+
 // Moves a pose by (translation of the pivot, rotation vector about it), world axes.
 Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object,
                            const Eigen::Vector3d& pivot, const Vector6d& motion);

@@ -33,6 +33,10 @@ class ReferenceView {
   Warped warp(const Camera& camera, const Eigen::Isometry3d& world_from_object,
               const decltype(TriangleMesh::vertices)& deformed) const;
 
+  // The same from pictures `factor` times smaller, for a first look.
+  ReferenceView reduced(int factor) const;
+  int seenPixels() const;  // in which the reference knows the object
+
   // Surface points on a regular grid of the picture, about `count`, object frame, m.
   std::vector<Eigen::Vector3d> gridPoints(int count) const;
 
