@@ -47,7 +47,7 @@ Params loadParams(const ros::NodeHandle& pnh) {
   TrackerParams& tracker = params.dynamics.tracker;
   readNumber(pnh, "tracks", 8, 2000, tracker.seed_count);
   readNumber(pnh, "patch_radius_px", 3, kMostRadius, tracker.patch.radius_px);
-  readNumber(pnh, "forward_backward_px", 0.01, 10.0, tracker.forward_backward_px);
+  readNumber(pnh, "forward_backward_px", 0.01, 10.0, tracker.trust.forward_backward_px);
   readNumber(pnh, "search_px", 4.0, 500.0, tracker.search_px);
   readNumber(pnh, "collision_evidence", 0.0, 1000.0, params.dynamics.trajectory.least_evidence);
   readNumber(pnh, "cut_correlation", -1.0, 1.0, params.dynamics.cut_correlation);
