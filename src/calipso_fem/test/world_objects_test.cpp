@@ -199,20 +199,26 @@ TEST(WorldObjects, ACupHangsByItsHandleOnAPeg) {
   EXPECT_LT(from_peg.z(), 0.0);
 }
 
-// A support given as a mesh may be the top of an object (a bridge's deck): when that falls, nothing stays in the air.
-TEST(WorldObjects, AnObjectTakesTheSupportThatIsItsOwnTopWithIt) {
+// A thing whose top, 1.052 m high, is a support mesh as well (a bridge's deck), and a load on it.
+WorldScene thingWithDeck() {
   TriangleMesh deck;
   deck.vertices.resize(4, 3);
   deck.vertices << -0.2, -0.1, 1.052, 0.2, -0.1, 1.052, 0.2, 0.1, 1.052, -0.2, 0.1, 1.052;
   deck.triangles.resize(2, 3);
   deck.triangles << 0, 1, 2, 0, 2, 3;
+  WorldScene scene = sceneWith(boxSurface({0.4, 0.2, 0.1}, 2), {0, 0, 1.0});
+  scene.support_meshes.push_back({"deck", deck});
+  scene.objects.push_back(scene.objects.front());
+  scene.objects[1].name = "load", scene.objects[1].index = 2;
+  scene.objects[1].mesh = boxSurface({0.05, 0.05, 0.05}, 1);
+  scene.objects[1].world_from_object.translation().z() = 1.08;
+  return scene;
+}
+
+// When that falls, nothing stays in the air.
+TEST(WorldObjects, AnObjectTakesTheSupportThatIsItsOwnTopWithIt) {
   for (const ObjectKind kind : {ObjectKind::kRigid, ObjectKind::kDeformable}) {
-    WorldScene scene = sceneWith(boxSurface({0.4, 0.2, 0.1}, 2), {0, 0, 1.0});
-    scene.support_meshes.push_back({"deck", deck});
-    scene.objects.push_back(scene.objects.front());
-    scene.objects[1].name = "load", scene.objects[1].index = 2;
-    scene.objects[1].mesh = boxSurface({0.05, 0.05, 0.05}, 1);
-    scene.objects[1].world_from_object.translation().z() = 1.08;
+    const WorldScene scene = thingWithDeck();
     WorldParams params;
     params.defaults.kind = kind;
     params.objects["load"].kind = ObjectKind::kRigid;
@@ -223,6 +229,25 @@ TEST(WorldObjects, AnObjectTakesTheSupportThatIsItsOwnTopWithIt) {
     play(world, 2.0);
     EXPECT_NE(world.plan()[0].reason.find("deck is its own surface"), std::string::npos) << world.plan()[0].reason;
     EXPECT_LT(centerOf(world.state(), 1).z(), 0.3) << "rests on the fallen thing or beside it";
+  }
+}
+
+TEST(WorldObjects, ARemovedObjectTakesItsOwnTopWithItUntilItIsReset) {
+  for (const bool reset : {false, true}) {
+    WorldParams params;
+    params.objects["load"].kind = ObjectKind::kRigid;
+    World world(thingWithDeck(), params);
+    Edit edit = letGo("thing");
+    edit.kind = EditKind::kRemove;
+    world.submit(edit);
+    edit.kind = EditKind::kReset;
+    if (reset) world.submit(edit);
+    world.submit(letGo("load"));
+    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    play(world, 2.0);
+    const double height = centerOf(world.state(), 1).z();
+    if (reset) EXPECT_NEAR(height, 1.077, 0.01);
+    else EXPECT_LT(height, 0.1);
   }
 }
 

@@ -70,6 +70,7 @@ struct Actor {
   bool inserted = false;  // not in the video
   bool immovable = false;  // of infinite mass
   std::vector<int> own_supports;  // ids of the support meshes that are its own surface
+  bool meets_own_supports = true;  // something can
   std::string source;     // of a copy: the object of the video whose model it is drawn by
   Holder holder = Holder::kUnknown;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();            // m/s^2

@@ -222,7 +222,7 @@ void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
   spec.asleep =
       actor.holder == Holder::kSupport && motion.linear.isZero() && motion.angular.isZero();
   actor.note = spec.mass.note.empty() ? "" : spec.mass.note + "; ";
-  leaveOwnSupports(actor);
+  meetOwnSupports(actor, false);
   noteOverlaps(actor, placed(actor.object.mesh, motion.world_from_object));
   actor.body = rigid.add(spec);
   rigid.setAcceleration(*actor.body, actor.acceleration());
@@ -262,7 +262,7 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   actor.soft_from_object = motion.world_from_object;
   DeformableBody& body = actor.soft->body();
   for (const std::string& message : body.grid().messages) actor.note += message + "; ";
-  leaveOwnSupports(actor);
+  meetOwnSupports(actor, false);
   noteOverlaps(actor, surface);
   const auto attached =
       verticesInBoxes(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
@@ -307,6 +307,7 @@ void World::Impl::removeBodies(Actor& actor) {
 void World::Impl::reset(Actor& actor) {
   const int id = actor.id;
   removeBodies(actor);
+  meetOwnSupports(actor, true);
   if (actor.inserted) {  // the video does not have it
     actor.removed = actor.edited = true;
     actor.kind = ObjectKind::kStatic;

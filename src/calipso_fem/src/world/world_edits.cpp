@@ -243,6 +243,7 @@ std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
 
 std::string World::Impl::remove(Actor& actor) {
   removeBodies(actor);
+  meetOwnSupports(actor, false);
   actor.removed = actor.edited = true;
   actor.kind = ObjectKind::kStatic;
   actor.reason = "edit 'remove'";

@@ -66,7 +66,7 @@ struct World::Impl {
   PairRule pairRule(const std::string& a, const std::string& b) const;
   bool meet(int a, int b) const;  // ids
   std::vector<int> ownSupports(const WorldObject& object) const;  // ids
-  void leaveOwnSupports(Actor& actor);  // nothing is to meet them once it moves
+  void meetOwnSupports(Actor& actor, bool contact);  // nothing is to meet them once it moves or is gone
   // A new object takes part from now on, at its world_from_object; static until an edit touches it.
   Actor& addObject(const WorldObject& object, const ObjectSettings& settings);
   // A copy in the present state (shape, velocity, material, gravity), moved by `motion` (world).

@@ -70,12 +70,14 @@ std::vector<int> World::Impl::ownSupports(const WorldObject& object) const {
   return own;
 }
 
-void World::Impl::leaveOwnSupports(Actor& actor) {
+void World::Impl::meetOwnSupports(Actor& actor, bool contact) {
+  if (contact && actor.meets_own_supports) return;  // as they are
+  actor.meets_own_supports = contact;
   for (const SupportMesh& mesh : scene.support_meshes) {
     const auto& own = actor.own_supports;
     if (std::find(own.begin(), own.end(), idOf(mesh.name)) == own.end()) continue;
-    setPairContact(mesh.name, "", false);
-    actor.note += mesh.name + " is its own surface and is left out; ";
+    setPairContact(mesh.name, "", contact);
+    if (!contact) actor.note += mesh.name + " is its own surface and is left out; ";
   }
 }
 
