@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <unordered_map>
 
 #include "kernels.hpp"
@@ -30,10 +31,12 @@ TriangleSamples samplesOf(const Eigen::Vector3f (&p)[3], float area) {
   return t;
 }
 
-// Whether the object seen changes to the right of each pixel of a row, or below it.
-void markChanges(const std::uint32_t* row, const std::uint32_t* below, int width, std::uint8_t* right, std::uint8_t* down) {
-  for (int u = 0; u + 1 < width; ++u) right[u] = ((row[u] ^ row[u + 1]) >> 24) != 0;
-  for (int u = 0; u < width; ++u) down[u] = ((row[u] ^ below[u]) >> 24) != 0;
+constexpr std::uint8_t kRight = 1, kDown = 2;
+
+// Where the object seen changes to the right of a row's pixels, or below them.
+void markChanges(const std::uint32_t* row, const std::uint32_t* below, int width, std::uint8_t* changes) {
+  for (int u = 0; u < width; ++u) changes[u] = ((row[u] ^ below[u]) >> 24) != 0 ? kDown : 0;
+  for (int u = 0; u + 1 < width; ++u) changes[u] |= ((row[u] ^ row[u + 1]) >> 24) != 0 ? kRight : 0;
 }
 
 }  // namespace
@@ -66,17 +69,22 @@ EdgeCoverage::EdgeCoverage(const VisibilityBuffer& centre)
     : region_(centre.region()), tiles_across_(centre.region().width / kTile + 1),
       tiles_(static_cast<std::size_t>(tiles_across_) * (centre.region().height / kTile + 1), -1) {
   const int width = region_.width, height = region_.height;
-  std::vector<std::uint8_t> changes(2 * static_cast<std::size_t>(width) * height);
-  const auto changesOf = [&](int v) { return changes.data() + 2 * static_cast<std::size_t>(width) * v; };
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < height; ++v) {
-    const std::uint32_t* row = centre.ids(v);
-    markChanges(row, v + 1 < height ? centre.ids(v + 1) : row, width, changesOf(v), changesOf(v) + width);
+  std::vector<std::vector<std::pair<int, std::uint8_t>>> found(height);  // per row: columns, and where the object changes
+#pragma omp parallel
+  {
+    std::vector<std::uint8_t> changes(width);
+#pragma omp for schedule(static)
+    for (int v = 0; v < height; ++v) {
+      markChanges(centre.ids(v), centre.ids(std::min(v + 1, height - 1)), width, changes.data());
+      for (int u = nextMarked(changes.data(), 0, width); u < width; u = nextMarked(changes.data(), u + 1, width)) found[v].emplace_back(u, changes[u]);
+    }
   }
   for (int v = 0; v < height; ++v) {
-    const std::uint8_t *right = changesOf(v), *down = right + width;
-    for (int u = nextMarked(right, 0, width); u < width; u = nextMarked(right, u + 1, width)) choose(u, v), choose(u + 1, v);
-    for (int u = nextMarked(down, 0, width); u < width; u = nextMarked(down, u + 1, width)) choose(u, v), choose(u, v + 1);
+    for (const auto& [u, change] : found[v]) {
+      choose(u, v);
+      if ((change & kRight) != 0) choose(u + 1, v);
+      if ((change & kDown) != 0) choose(u, v + 1);
+    }
   }
 }
 

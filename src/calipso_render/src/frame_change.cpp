@@ -6,6 +6,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "frame_compositor.hpp"
+#include "tiled_filter.hpp"
 
 namespace calipso::render {
 namespace {
@@ -35,7 +36,7 @@ void FrameCompositor::findRelit() {
   if (box.empty()) return;
   box = cv::Rect(box.x - side, box.y - side, box.width + 2 * side, box.height + 2 * side) & region_;
   if (box.empty()) return;
-  cv::Mat change(box.size(), CV_8U), relit;
+  cv::Mat change(box.size(), CV_8U);
   const cv::Rect here = box - region_.tl();
   const float umbra = kPerLevel * luminance(prepared_.umbra), lit = kPerLevel - umbra;
 #pragma omp parallel for schedule(static)
@@ -49,10 +50,13 @@ void FrameCompositor::findRelit() {
       out[u] = takes[u] == 0 ? 0 : changeOfLight(by);
     }
   }
-  cv::morphologyEx(change, change, cv::MORPH_OPEN, cv::Mat::ones(kLeastChange, kLeastChange, CV_8U));
-  cv::dilate(change, change, disc(reach));
-  cv::min(change, shadows_.shaded(box), change);
-  cv::blur(change, relit_(here), {3, 3}, {-1, -1}, cv::BORDER_DEFAULT | cv::BORDER_ISOLATED);
+  cv::Mat eroded(box.size(), CV_8U), opened(box.size(), CV_8U), grown(box.size(), CV_8U);
+  const cv::Mat least = cv::Mat::ones(kLeastChange, kLeastChange, CV_8U), reached = disc(reach);
+  filterTiles(change, kLeastChange, eroded, [&](const cv::Mat& from, cv::Mat& to) { cv::erode(from, to, least); });
+  filterTiles(eroded, kLeastChange, opened, [&](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, least); });
+  filterTiles(opened, reach, grown, [&](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, reached); });
+  cv::min(grown, shadows_.shaded(box), grown);
+  filterTiles(grown, 1, relit_(here), [](const cv::Mat& from, cv::Mat& to) { cv::blur(from, to, {3, 3}); });
 }
 
 // The rim of an original's pixels belongs to the surface beside it, not to another edited object's.

@@ -10,6 +10,7 @@
 #include "calipso_render/shadow_map.hpp"
 #include "frame_compositor.hpp"
 #include "plane_light.hpp"
+#include "tiled_filter.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -190,7 +191,8 @@ void FrameCompositor::findCovered() {
     }
   }
   const int side = 2 * (params_.background.shadow_margin_px + 2) + 1;
-  cv::erode(drawn_, covered_, cv::Mat::ones(side, side, CV_8U));
+  covered_.create(region_.size(), CV_8U);
+  filterTiles(drawn_, side / 2, covered_, [side](const cv::Mat& from, cv::Mat& to) { cv::erode(from, to, cv::Mat::ones(side, side, CV_8U)); });
 }
 
 void FrameCompositor::measureSky() {

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "frame_compositor.hpp"
+#include "tiled_filter.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -33,15 +35,19 @@ FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& p
 
 FrameOutput FrameCompositor::run() {
   prepareFrame();
-  FrameOutput out{frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
-  if (region_.empty()) return out;
+  if (region_.empty()) return {frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
   findResidual();
   findMaps();
+  FrameOutput out{cv::Mat(frame_.bgr.size(), CV_8UC3), cv::Mat(frame_.bgr.size(), CV_8U)};
 #pragma omp parallel
   {
     Row row;
 #pragma omp for schedule(dynamic, 8)
-    for (int v = region_.y; v < region_.y + region_.height; ++v) composeRow(v, row, out);
+    for (int v = 0; v < frame_.bgr.rows; ++v) {
+      std::memcpy(out.bgr.ptr(v), frame_.bgr.ptr(v), 3 * static_cast<std::size_t>(frame_.bgr.cols));
+      std::memset(out.provenance.ptr(v), kOriginal, frame_.bgr.cols);
+      if (v >= region_.y && v < region_.br().y) composeRow(v, row, out);
+    }
   }
   return out;
 }
@@ -202,7 +208,9 @@ void FrameCompositor::findRemoved() {
     own |= originalOf(static_cast<int>(i));
     others &= labels_(region_) != prepared_.surfaces[i].index;
   }
-  cv::dilate(own, removed_, disc(params_.background.mask_margin_px));
+  removed_.create(region_.size(), CV_8U);
+  const int margin = params_.background.mask_margin_px;
+  filterTiles(own, margin, removed_, [kernel = disc(margin)](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, kernel); });
   if (!passing_.empty()) removed_ |= passing_(region_);
   removed_.setTo(0, others);  // what stands beside it keeps its own pixels, and what stands before it
   for (const cv::Mat& front : fronts_) {

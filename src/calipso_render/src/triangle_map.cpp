@@ -15,8 +15,10 @@ void addCorner(float (&map)[3][4], const float (&edge)[3], const Eigen::Vector4f
   }
 }
 
-void fill(const Eigen::Vector3f* p, const Eigen::Vector3f* key, TriangleMap& map) {
-  const float area = (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) - (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
+float areaOf(const Eigen::Vector3f (&p)[3]) { return (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) - (p[2].x() - p[0].x()) * (p[1].y() - p[0].y()); }
+
+void fill(const Eigen::Vector3f (&p)[3], const Eigen::Vector3f (&key)[3], TriangleMap& map) {
+  const float area = areaOf(p);
   const float longest = std::max({(p[1] - p[0]).head<2>().norm(), (p[2] - p[1]).head<2>().norm(), (p[0] - p[2]).head<2>().norm()});
   map.thin = !(std::abs(area) > kThinnest * longest);
   if (map.thin) return;
@@ -63,7 +65,7 @@ std::vector<TriangleMap> triangleMaps(const Actor& actor, const Appearance& appe
     for (std::size_t t = 0; t < triangles.size(); ++t) {
       Eigen::Vector3f p[3], k[3];
       for (int i = 0; i < 3; ++i) p[i] = actor.screen.points[triangles[t][i]], k[i] = key[triangles[t][i]];
-      fill(p, k, maps[t]);
+      if (!actor.screen.hides(areaOf(p))) fill(p, k, maps[t]);
     }
   }
   return maps;
