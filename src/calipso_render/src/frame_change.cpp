@@ -6,13 +6,14 @@
 
 #include "calipso_render/colour.hpp"
 #include "frame_compositor.hpp"
+#include "marked.hpp"
 #include "tiled_filter.hpp"
 
 namespace calipso::render {
 namespace {
 
 constexpr int kLeastChange = 3;  // px across
-constexpr float kSoftSky = 0.2f * 255.0f;  // levels of the sky: so much more or less of it only brightens or darkens a pixel
+constexpr std::uint8_t kSoftSky = 51;  // levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
 constexpr int kRimReach = 4;  // mask margins around a surface at rest in which the frame's pixels stay
 
 }  // namespace
@@ -45,9 +46,13 @@ void FrameCompositor::findRelit() {
     const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_), *takes = rowOf(takes_light_);
     std::uint8_t* out = change.ptr<std::uint8_t>(v);
     for (int u = 0; u < box.width; ++u) {
-      const float more_sky = static_cast<float>(sky[u] - sky_before[u]), more_sun = static_cast<float>(sun[u] - sun_before[u]);
-      const float by = std::abs(umbra * (more_sky - std::clamp(more_sky, -kSoftSky, kSoftSky)) + lit * more_sun);
-      out[u] = takes[u] == 0 ? 0 : changeOfLight(by);
+      const std::uint8_t more_sky = std::max(sky[u], sky_before[u]) - std::min(sky[u], sky_before[u]);
+      out[u] = ((sun[u] != sun_before[u]) | (more_sky > kSoftSky)) & (takes[u] != 0);
+    }
+    for (int u = nextMarked(out, 0, box.width); u < box.width; u = nextMarked(out, u + 1, box.width)) {
+      const int more_sky = sky[u] - sky_before[u], more_sun = sun[u] - sun_before[u];
+      const int beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
+      out[u] = changeOfLight(std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
     }
   }
   cv::Mat eroded(box.size(), CV_8U), opened(box.size(), CV_8U), grown(box.size(), CV_8U);

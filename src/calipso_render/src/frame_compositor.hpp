@@ -195,6 +195,7 @@ class FrameCompositor {
   cv::Vec3f tintOf(int slot) const { return lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)); }
   void lightCorner(int i, int j);
   void interpolateCorner(int i, int j);
+  Lit lightAt(int u, int v) const;
   bool isSmooth(int i, int j, int size) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;

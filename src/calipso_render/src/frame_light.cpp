@@ -253,47 +253,51 @@ void FrameCompositor::findSurfaceLight() {
   std::vector<std::uint8_t> smooth(static_cast<std::size_t>(across) * (rows / 2));  // per large square
 #pragma omp parallel
   {
+// Corners and middles of large squares.
 #pragma omp for schedule(dynamic, 4)
-    for (int j = 0; j < rows; j += 2) {
-      for (int i = 0; i < columns; i += 2) lightCorner(i, j);
+    for (int j = 0; j < rows; ++j) {
+      for (int i = j % 2; i < columns; i += 2) lightCorner(i, j);
     }
 #pragma omp for schedule(dynamic, 4)
     for (int j = 0; j < rows / 2; ++j) {
       for (int i = 0; i < across; ++i) smooth[static_cast<std::size_t>(j) * across + i] = isSmooth(2 * i, 2 * j, 2) ? 1 : 0;
     }
     const auto isLarge = [&](int i, int j) { return i < 0 || j < 0 || i >= across || j >= rows / 2 || smooth[static_cast<std::size_t>(j) * across + i] != 0; };
-    // Corners between those of large squares.
+    // The places on their sides.
 #pragma omp for schedule(dynamic, 4)
     for (int j = 0; j < rows; ++j) {
-      for (int i = j % 2 == 0 ? 1 : 0; i < columns; i += j % 2 == 0 ? 2 : 1) {
-        const bool follows = isLarge(i / 2, j / 2) && isLarge((i - 1) / 2, j / 2) && isLarge(i / 2, (j - 1) / 2) && isLarge((i - 1) / 2, (j - 1) / 2);
+      for (int i = 1 - j % 2; i < columns; i += 2) {
+        const bool follows = isLarge(i / 2, j / 2) && (j % 2 == 0 ? isLarge(i / 2, j / 2 - 1) : isLarge(i / 2 - 1, j / 2));
         if (follows) interpolateCorner(i, j);
         else lightCorner(i, j);
       }
     }
 #pragma omp for schedule(dynamic, 4)
     for (int j = 0; j < rows - 1; ++j) {
-      for (int i = 0; i + 1 < columns; ++i) smooth_[static_cast<std::size_t>(j) * columns + i] = isLarge(i / 2, j / 2) || isSmooth(i, j, 1) ? 1 : 0;
+      for (int i = 0; i + 1 < columns; ++i) smooth_[static_cast<std::size_t>(j) * columns + i] = smooth[static_cast<std::size_t>(j / 2) * across + i / 2] != 0 || isSmooth(i, j, 1) ? 1 : 0;
     }
   }
 }
 
 void FrameCompositor::lightCorner(int i, int j) {
-  const int u = region_.x + i * kLightStep, v = region_.y + j * kLightStep;
-  const std::uint32_t id = centre_->idAt(u, v);
-  if (!region_.contains({u, v}) || !isDrawn(id, u, v)) return;
-  const int slot = VisibilityBuffer::objectOf(id);
-  Lit& lit = lit_[static_cast<std::size_t>(j) * lit_columns_ + i];
-  lit = exactLight(litPoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_), slot);
-  lit.diffuse[3] = centre_->nearnessAt(u, v);
+  lit_[static_cast<std::size_t>(j) * lit_columns_ + i] = lightAt(region_.x + i * kLightStep, region_.y + j * kLightStep);
 }
 
-// Between the corners of large squares that are smooth.
+FrameCompositor::Lit FrameCompositor::lightAt(int u, int v) const {
+  const std::uint32_t id = centre_->idAt(u, v);
+  if (!region_.contains({u, v}) || !isDrawn(id, u, v)) return {};
+  const int slot = VisibilityBuffer::objectOf(id);
+  Lit lit = exactLight(litPoint(actors_[slot], VisibilityBuffer::triangleOf(id), static_cast<float>(u), static_cast<float>(v), eye_), slot);
+  lit.diffuse[3] = centre_->nearnessAt(u, v);
+  return lit;
+}
+
+// On a side of large squares that are smooth.
 void FrameCompositor::interpolateCorner(int i, int j) {
   Lit* lit = &lit_[static_cast<std::size_t>(j) * lit_columns_ + i];
-  const std::ptrdiff_t du = i % 2, dv = (j % 2) * static_cast<std::ptrdiff_t>(lit_columns_);
-  const Lit &a = lit[-du - dv], &b = lit[du - dv], &c = lit[dv - du], &d = lit[du + dv];
-  *lit = {0.25f * (a.diffuse + b.diffuse + c.diffuse + d.diffuse), 0.25f * (a.highlight + b.highlight + c.highlight + d.highlight), a.slot};
+  const std::ptrdiff_t to_end = i % 2 == 1 ? 1 : lit_columns_;
+  const Lit &a = lit[-to_end], &b = lit[to_end];
+  *lit = {0.5f * (a.diffuse + b.diffuse), 0.5f * (a.highlight + b.highlight), a.slot};
 }
 
 // Does the light in a square of `size` steps follow from that at its corners? Where they differ, its middle has to agree.
@@ -313,10 +317,8 @@ bool FrameCompositor::isSmooth(int i, int j, int size) const {
     even = even && *high - *low <= kEvenLight * *high;
   }
   if (even) return true;
-  const int u = region_.x + i * kLightStep + size * kLightStep / 2, v = region_.y + j * kLightStep + size * kLightStep / 2;
-  const std::uint32_t id = centre_->idAt(u, v);
-  if (id == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(id) != a.slot) return false;
-  const Lit middle = exactLight(litPoint(actors_[a.slot], VisibilityBuffer::triangleOf(id), static_cast<float>(u), static_cast<float>(v), eye_), a.slot);
+  const Lit middle = size == 2 ? first[lit_columns_ + 1] : lightAt(region_.x + i * kLightStep + kLightStep / 2, region_.y + j * kLightStep + kLightStep / 2);
+  if (middle.slot != a.slot) return false;
   for (int k = 0; k < 3; ++k) {
     if (std::abs(middle.diffuse[k] + middle.highlight[k] - mean[k]) > kSmoothLight / static_cast<float>(size) * highest[k]) return false;
   }

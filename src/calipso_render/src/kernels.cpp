@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "bicubic.hpp"
 #include "calipso_render/colour.hpp"
@@ -81,31 +82,43 @@ CALIPSO_INLINE void sampleBody(const cv::Mat& image, const float* us, const floa
 
 constexpr int kStretch = 64;  // pixels encoded at a time
 
+// Bytes of B, G, R, _ to B, G, R.
+CALIPSO_INLINE void packCodes(const std::int32_t* levels, int count, std::uint8_t* codes) {
+  typedef std::int32_t SixteenInts __attribute__((vector_size(64), aligned(4), may_alias));
+  typedef std::uint8_t SixteenBytes __attribute__((vector_size(16)));
+  int k = 0;
+  for (; k + 4 <= count; k += 4) {
+    const SixteenBytes bytes = __builtin_convertvector(*reinterpret_cast<const SixteenInts*>(levels + 4 * k), SixteenBytes);
+    const SixteenBytes packed = __builtin_shuffle(bytes, SixteenBytes{0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, 3, 7, 11, 15});
+    std::memcpy(codes + 3 * k, &packed, 12);
+  }
+  for (; k < count; ++k) {
+    for (int c = 0; c < 3; ++c) codes[3 * k + c] = static_cast<std::uint8_t>(levels[4 * k + c]);
+  }
+}
+
 CALIPSO_INLINE void encodeStretch(const CodeTables& tables, const float* colours, const float* noise, int count, std::uint8_t* codes) {
-  alignas(32) float part[4 * kStretch], code[4 * kStretch], deviation[4 * kStretch];
-  alignas(32) int step[4 * kStretch];
+  alignas(32) float part[4 * kStretch], code[4 * kStretch], fresh[4 * kStretch];
+  alignas(32) std::int32_t step[4 * kStretch];
   const int n = 4 * count;
   // As codeFromLinear(); what is no number becomes 0.
   for (int k = 0; k < n; ++k) {
     const float positive = colours[k] > 0.0f ? colours[k] : 0.0f;
     const float x = std::sqrt(positive < 1.0f ? positive : 1.0f) * kEncodeSteps;
-    step[k] = static_cast<int>(x);
+    step[k] = static_cast<std::int32_t>(x);
     part[k] = x - static_cast<float>(step[k]);
   }
   for (int k = 0; k < n; ++k) code[k] = tables.code[step[k]] + part[k] * tables.rise[step[k]];
   for (int k = 0; k < count; ++k) {
-    const float fresh = colours[4 * k + 3];
-    for (int c = 0; c < 3; ++c) deviation[4 * k + c] = fresh * tables.deviation[c][static_cast<int>(code[4 * k + c] + 0.5f)];
-    deviation[4 * k + 3] = 0.0f;
+    for (int c = 0; c < 4; ++c) fresh[4 * k + c] = colours[4 * k + 3];
   }
   for (int k = 0; k < n; ++k) {
-    const float x = code[k] + deviation[k] * noise[k];
+    const float deviation = tables.deviation[4 * static_cast<std::int32_t>(code[k] + 0.5f) + (k & 3)];
+    const float x = code[k] + fresh[k] * deviation * noise[k];
     const float positive = x > 0.0f ? x : 0.0f;
-    step[k] = static_cast<int>((positive < 255.0f ? positive : 255.0f) + 0.5f);
+    step[k] = static_cast<std::int32_t>((positive < 255.0f ? positive : 255.0f) + 0.5f);
   }
-  for (int k = 0; k < count; ++k) {
-    for (int c = 0; c < 3; ++c) codes[3 * k + c] = static_cast<std::uint8_t>(step[4 * k + c]);
-  }
+  packCodes(step, count, codes);
 }
 
 CALIPSO_INLINE void encodeBody(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count, cv::Vec3b* codes) {

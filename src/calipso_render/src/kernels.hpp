@@ -26,7 +26,7 @@ struct ShadowTexels {
 struct CodeTables {
   const float* code;          // at sqrt(linear) = i / kEncodeSteps
   const float* rise;          // to the next step
-  const float* deviation[3];  // of the noise, per channel and code value
+  const float* deviation;  // of the noise at each code value: B, G, R, 0
 };
 
 // Loops over which a frame spends its time, compiled for the processors that the build is for and for those with AVX2. Both give the

@@ -19,7 +19,7 @@ class LineCodec {
   void encode(const cv::Vec4f* colours, int u, int v, int count, cv::Vec3b* codes) const;
 
  private:
-  std::array<std::array<float, 256>, 3> deviation_;  // per channel and code value
+  std::array<cv::Vec4f, 256> deviation_;  // per code value: B, G, R, 0
   NoiseField field_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <opencv2/core.hpp>
 
@@ -24,9 +25,9 @@ TEST_F(Avx2, EncodesTheSameBytes) {
   std::vector<cv::Vec4f> colours(1000), noise(256);
   for (cv::Vec4f& c : colours) c = {random_.uniform(-0.1f, 1.2f), random_.uniform(0.0f, 0.02f), random_.uniform(0.0f, 1.0f), random_.uniform(0.0f, 1.0f)};
   for (cv::Vec4f& n : noise) n = {random_.uniform(-3.0f, 3.0f), random_.uniform(-3.0f, 3.0f), random_.uniform(-3.0f, 3.0f), 0.0f};
-  std::vector<float> deviation(256);
+  std::vector<float> deviation(4 * 256);
   for (float& d : deviation) d = random_.uniform(0.0f, 4.0f);
-  const CodeTables tables{encodeTables().code.data(), encodeTables().rise.data(), {deviation.data(), deviation.data(), deviation.data()}};
+  const CodeTables tables{encodeTables().code.data(), encodeTables().rise.data(), deviation.data()};
   for (const int count : {1, 7, 64, 65, 1000}) {
     std::vector<cv::Vec3b> plain(colours.size()), fast(colours.size());
     plainKernels().encode(tables, colours.data(), noise.data(), 200, count, plain.data());
@@ -63,6 +64,49 @@ TEST_F(Avx2, SeesTheSameLight) {
     between += plain > 0.0f && plain < 1.0f;
   }
   EXPECT_GT(between, 100);
+}
+
+TEST_F(Avx2, FillsTheSameTriangles) {
+  constexpr int kRows = 40, kStride = 48;
+  for (const bool narrow : {true, false}) {
+    std::vector<TriangleSpan> spans(200);
+    for (TriangleSpan& s : spans) {
+      s.column_min = random_.uniform(0, 20), s.column_max = s.column_min + (narrow ? random_.uniform(0, 8) : random_.uniform(8, 20));
+      s.row_min = random_.uniform(0, 30), s.row_max = s.row_min + random_.uniform(0, 10);
+      for (int k = 0; k < 4; ++k) s.column[k] = random_.uniform(0.0f, 20.0f) + (k < 2 ? 0.0f : 20.0f), s.row[k] = random_.uniform(0.0f, 40.0f), s.slope[k] = random_.uniform(-2.0f, 2.0f);
+      s.near_u = random_.uniform(-0.1f, 0.1f), s.near_v = random_.uniform(-0.1f, 0.1f), s.near_0 = random_.uniform(0.0f, 5.0f);
+      s.id = static_cast<std::uint32_t>(&s - spans.data());
+    }
+    const auto draw = [&](const Kernels& kernels, std::vector<std::uint32_t>& ids, std::vector<float>& nearness, std::vector<float>& alone) {
+      ids.assign(kRows * kStride, 999), nearness.assign(kRows * kStride, -1.0f), alone = nearness;
+      kernels.fill(spans.data(), 200, {ids.data(), nearness.data(), kStride, 3, 35});
+      kernels.fill(spans.data(), 200, {nullptr, alone.data(), kStride, 3, 35});
+    };
+    std::vector<std::uint32_t> plain_ids, ids;
+    std::vector<float> plain_near, near, plain_alone, alone;
+    draw(plainKernels(), plain_ids, plain_near, plain_alone), draw(*avx2Kernels(), ids, near, alone);
+    EXPECT_EQ(ids, plain_ids);
+    EXPECT_EQ(near, plain_near);
+    EXPECT_EQ(alone, plain_alone);
+    EXPECT_EQ(alone, near);
+    EXPECT_GT(std::count_if(ids.begin(), ids.end(), [](std::uint32_t id) { return id != 999; }), 300);
+  }
+}
+
+TEST_F(Avx2, DrawsTheSameSamples) {
+  EdgeCoverage::Pixel plain;
+  plain.ids.fill(VisibilityBuffer::kNothing), plain.nearness.fill(VisibilityBuffer::kFar);
+  EdgeCoverage::Pixel fast = plain;
+  for (std::uint32_t id = 0; id < 300; ++id) {
+    TriangleSamples t;
+    for (int k = 0; k < 3; ++k) t.edge_u[k] = random_.uniform(-1.0f, 1.0f), t.edge_v[k] = random_.uniform(-1.0f, 1.0f), t.edge_0[k] = random_.uniform(-1.0f, 3.0f);
+    t.near_u = random_.uniform(-0.1f, 0.1f), t.near_v = random_.uniform(-0.1f, 0.1f), t.near_0 = random_.uniform(0.0f, 5.0f) + 0.01f * static_cast<float>(id);
+    plainKernels().drawSamples(t, 1, 2, id, plain);
+    avx2Kernels()->drawSamples(t, 1, 2, id, fast);
+    ASSERT_EQ(plain.ids, fast.ids);
+    ASSERT_EQ(plain.nearness, fast.nearness);
+  }
+  EXPECT_NE(plain.ids[0], VisibilityBuffer::kNothing);
 }
 
 // What is sampled in a row and what is sampled alone must not differ where the two meet.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <utility>
 #include <opencv2/core.hpp>
 
 #include "calipso_render/edge_coverage.hpp"
@@ -149,6 +150,24 @@ TEST(ShadowMap, PenumbraGrowsWithTheBlockersHeight) {
   const Eigen::Vector3f up = Eigen::Vector3f::UnitZ();
   EXPECT_GT(map.visibility({0.95f, 0, 0}, up), 0.05f);        // 0.1 m wide half penumbra at the ground
   EXPECT_FLOAT_EQ(map.visibility({0.95f, 0, 0.9f}, up), 0.0f);  // 0.01 m just below the roof
+}
+
+// Where the map says at once that all of a disc is lit or shaded, every place in it is.
+TEST(ShadowMap, UniformDiscsAreUniform) {
+  const ShadowMap map({{&kRoof, &kRoofFaces}}, Eigen::Vector3d(0.3, -0.2, 1.0), {200, 0.1, 16});
+  const Eigen::Vector3f up = Eigen::Vector3f::UnitZ();
+  int told = 0;
+  for (float x = -3.0f; x <= 3.0f; x += 0.13f) {
+    for (float y = -3.0f; y <= 3.0f; y += 0.17f) {
+      const std::optional<float> uniform = map.uniform({x, y, 0.0f}, up, 0.1f);
+      if (!uniform) continue;
+      ++told;
+      for (const auto& [dx, dy] : {std::pair(0.0f, 0.0f), {0.1f, 0.0f}, {-0.1f, 0.0f}, {0.0f, 0.1f}, {0.0f, -0.1f}}) {
+        ASSERT_EQ(map.visibility({x + dx, y + dy, 0.0f}, up), *uniform) << x << ", " << y;
+      }
+    }
+  }
+  EXPECT_GT(told, 1000);  // of 1692
 }
 
 TEST(ShadowMap, WithoutOccludersNothingIsShaded) {
