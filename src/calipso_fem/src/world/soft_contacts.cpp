@@ -139,11 +139,12 @@ bool SoftContacts::unbalanced(const StepMotion& motion, size_t soft, double want
 // Whether an object with something in its way would go further than its own size.
 bool SoftContacts::tooFast(const std::vector<Candidate>& watched,
                            const std::vector<SoftEntry>& softs, double h) const {
-  return std::any_of(watched.begin(), watched.end(), [&](const Candidate& c) {
-    const SoftObject& soft = *softs[c.contact.soft_a].soft;
-    const auto extent = soft.vertices().colwise().maxCoeff() - soft.vertices().colwise().minCoeff();
-    return h * soft.fastest() > extent.norm();
-  });
+  std::vector<bool> fast;
+  for (const SoftEntry& entry : softs) {
+    const auto& vertices = entry.soft->vertices();
+    fast.push_back(h * entry.soft->fastest() > (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm());
+  }
+  return std::any_of(watched.begin(), watched.end(), [&](const Candidate& c) { return fast[c.contact.soft_a]; });
 }
 
 // What pushed in the last step pushes from the start, and is a contact as long as it is near; what is
