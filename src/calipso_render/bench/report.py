@@ -36,7 +36,7 @@ it is drawn, shaded and replaced. Times of this table are wall times of the mach
 DRAWING = """
 ## Drawing
 One object of {triangles} triangles that covers {percent:.0f} % of 1280 x 720, every vertex new in every frame, over a table that
-takes its shadow: what was there is taken out, the object drawn, shaded, put in with noise. llvmpipe: Mesa's
+takes its shadow (the light is given): what was there is taken out, the object drawn, shaded, put in with noise. llvmpipe: Mesa's
 rasteriser draws and shades the same mesh alone, without shadow. CPU: of all threads.
 
 | | wall, best, ms | CPU, best, ms | CPU, median, ms |
