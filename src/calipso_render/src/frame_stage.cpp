@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "frame_compositor.hpp"
+#include "place_depth.hpp"
 #include "tiled_filter.hpp"
 #include "view_warp.hpp"
 
@@ -118,7 +119,7 @@ void FrameCompositor::stage() {
     }
     footprints_ = prepared_.footprints;
   } else {
-    const cv::Mat map = viewWarp(params_.planes, prepared_.camera, frame_.camera);
+    const cv::Mat map = viewWarp(nearnessFrom(prepared_.nearness, prepared_.camera, frame_.camera), prepared_.camera, frame_.camera);
     cv::Mat plate, invented;
     cv::remap(plate_, plate, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
     cv::remap(invented_, invented, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));

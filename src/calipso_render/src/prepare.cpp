@@ -8,6 +8,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "place_depth.hpp"
 #include "plane_mirror.hpp"
 #include "prepare_remarks.hpp"
 #include "shadow_check.hpp"
@@ -24,18 +25,24 @@ constexpr std::size_t kFurtherViews = 5;  // beside the key frame
 constexpr float kOffPlane = 0.1f;       // part by which scenery is nearer or farther than the plane behind or before it
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
 
-std::vector<ClipFrame> inKeyView(const ClipSample& clip, const std::vector<SupportPlane>& planes) {
+// @param nearness of the place, from the key frame's camera
+std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness) {
   std::vector<ClipFrame> frames = clip.frames();
   const Camera& key = frames.front().camera;
   for (ClipFrame& f : frames) {
     if (sameView(f.camera, key)) continue;
-    const cv::Mat map = viewWarp(planes, f.camera, key);
+    const cv::Mat map = viewWarp(nearness, f.camera, key);
     cv::Mat bgr, labels;
     cv::remap(f.bgr, bgr, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
     cv::remap(f.labels, labels, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));
     f = {bgr, labels, key};
   }
   return frames;
+}
+
+bool cameraMoves(const ClipSample& clip) {
+  const Camera& key = clip.frames().front().camera;
+  return std::any_of(clip.frames().begin(), clip.frames().end(), [&](const ClipFrame& f) { return !sameView(f.camera, key); });
 }
 
 bool movesInVideo(const std::vector<ClipFrame>& frames, int index) {
@@ -324,8 +331,9 @@ bool anyMoves(const ClipSample& clip, const std::vector<ObjectModel>& models) {
 
 Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models, const RenderParams& params) {
   if (clip.frames().empty()) throw std::invalid_argument("no clip frame with a segmentation has arrived; send the key frame first");
-  const std::vector<ClipFrame> frames = inKeyView(clip, params.planes);
   Prepared p;
+  p.nearness = placeNearness(cameraMoves(clip) ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()}, params.planes, params.depth, params.background.mask_margin_px);
+  const std::vector<ClipFrame> frames = inKeyView(clip, p.nearness);
   p.camera = frames.front().camera;
   p.key_picture = frames.front().bgr;
   p.key_labels = frames.front().labels;

@@ -1,7 +1,5 @@
 #include "view_warp.hpp"
 
-#include "calipso_render/stage.hpp"
-
 namespace calipso::render {
 
 bool sameView(const Camera& a, const Camera& b) {
@@ -9,18 +7,13 @@ bool sameView(const Camera& a, const Camera& b) {
   return lens && a.world_from_camera.isApprox(b.world_from_camera, 1e-9);
 }
 
-cv::Mat viewWarp(const std::vector<SupportPlane>& planes, const Camera& from, const Camera& to) {
-  const Eigen::Isometry3d from_world = from.world_from_camera.inverse();
+cv::Mat viewWarp(const cv::Mat& nearness, const Camera& from, const Camera& to) {
+  const Eigen::Isometry3d way = from.world_from_camera.inverse() * to.world_from_camera;
   cv::Mat map(to.height, to.width, CV_32FC2);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < to.height; ++v) {
     for (int u = 0; u < to.width; ++u) {
-      Eigen::Vector3d p;
-      if (const auto receiver = receiverAt(planes, to, u, v)) {
-        p = from_world * receiver->position.cast<double>();
-      } else {
-        p = from_world.linear() * (to.world_from_camera.linear() * to.ray(u, v));
-      }
+      const Eigen::Vector3d p = way.linear() * to.ray(u, v) + nearness.at<float>(v, u) * way.translation();
       const Eigen::Vector2d q = p.z() > 1e-9 ? from.project(p) : Eigen::Vector2d(-1e4, -1e4);
       map.at<cv::Vec2f>(v, u) = cv::Vec2f(static_cast<float>(q.x()), static_cast<float>(q.y()));
     }

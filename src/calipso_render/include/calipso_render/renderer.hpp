@@ -90,6 +90,7 @@ struct Prepared {
   std::vector<cv::Mat> footprints;  // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
   cv::Mat scenery;                  // CV_32FC1, 1/m: nearness of what is no object and may hide one; 0 unknown; may be empty
   cv::Mat shadowless;               // CV_8UC1: where objects cast no shadow: no plane is seen there, or it shows none in the video
+  cv::Mat nearness;                 // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
   PlaneMirror mirror;
   Background background;
   cv::Mat plate_linear;             // CV_32FC3
