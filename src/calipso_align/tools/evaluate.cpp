@@ -167,8 +167,8 @@ void addSurfaceError(const EvaluationCase& one, const Points& x, const Points& t
   line.addNumber("hausdorff_percent" + suffix, percent * surface.hausdorff);
 }
 
-// Errors of the model at x; `suffix` tells before from after. In 3D also with the scale about the
-// camera's centre taken out, which one picture cannot show.
+// Errors of the model at x; `suffix` tells before from after. After, in 3D also with the scale about
+// the camera's centre taken out, which one picture cannot show.
 void addErrors(const EvaluationCase& one, const Points& x, const std::string& suffix,
                JsonLine& line) {
   const Truth& truth = *one.truth;
@@ -190,7 +190,8 @@ void addErrors(const EvaluationCase& one, const Points& x, const std::string& su
   line.addNumber("all_vertex_px" + suffix, all_vertex);
   const double gauge = depthGauge(x, true_x);
   addSurfaceError(one, x, true_x, suffix, line);
-  addSurfaceError(one, gauge * x, true_x, suffix + "_depth_removed", line);
+  const bool after = suffix.empty();   // what is left without the distance is of no interest before
+  if (after) addSurfaceError(one, gauge * x, true_x, "_depth_removed", line);
   line.addNumber("depth_gauge" + suffix, gauge);
   if (!truth.visible.empty()) {
     line.addNumber("model_mask_iou" + suffix, maskIou(truth, x, one.cad.triangles, one.camera));
