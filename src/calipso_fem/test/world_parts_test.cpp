@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "../src/world/obstacle_query.hpp"
 #include "calipso_fem/condensed_factor.hpp"
 #include "calipso_fem/deformable_body.hpp"
 #include "calipso_fem/world/contact_solver.hpp"
@@ -101,6 +102,28 @@ TEST(SurfaceTree, RefitFollowsTheVertices) {
   moved.rowwise() += Eigen::RowVector3d(0, 0, 5);
   tree.refit(moved);
   EXPECT_NEAR(tree.nearest({0, 0, 6.25}, 1.0)->distance, 0.25, 1e-12);
+}
+
+// A cavity is outside, and what two surfaces enclose is inside.
+TEST(Encloses, FollowsTheWindingNumber) {
+  const TriangleMesh box = boxSurface({2, 2, 2}, 3), small = boxSurface({1, 1, 1}, 2);
+  const auto joined = [](const TriangleMesh& a, const TriangleMesh& b, bool reversed) {
+    TriangleMesh m = a;
+    m.vertices.conservativeResize(a.vertices.rows() + b.vertices.rows(), 3);
+    m.vertices.bottomRows(b.vertices.rows()) = b.vertices;
+    m.triangles.conservativeResize(a.triangles.rows() + b.triangles.rows(), 3);
+    m.triangles.bottomRows(b.triangles.rows()) = b.triangles.array() + static_cast<int>(a.vertices.rows());
+    if (reversed) m.triangles.bottomRows(b.triangles.rows()).col(0).swap(m.triangles.bottomRows(b.triangles.rows()).col(1));
+    return m;
+  };
+  const TriangleMesh hollow = joined(box, small, true), doubled = joined(box, small, false);
+  for (int k = 0; k < 200; ++k) {
+    const Eigen::Vector3d p(1.3 * std::sin(1.7 * k), 1.3 * std::sin(2.3 * k + 1.0), 1.3 * std::cos(0.9 * k));
+    const double out = p.cwiseAbs().maxCoeff();
+    EXPECT_EQ(encloses(box, p), out < 1.0) << p.transpose();
+    EXPECT_EQ(encloses(doubled, p), out < 1.0) << p.transpose();
+    EXPECT_EQ(encloses(hollow, p), out < 1.0 && out > 0.5) << p.transpose();
+  }
 }
 
 TEST(ContactSolver, PointMassStopsAndSlidesAsCoulombSays) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 namespace calipso::fem {
 namespace {
@@ -62,18 +63,26 @@ Eigen::AlignedBox3d obstacleBounds(const Obstacle& obstacle) {
   return box;
 }
 
-// Sum of the triangles' solid angles (Van Oosterom and Strackee 1983).
+// Sum of the triangles' solid angles (Van Oosterom and Strackee 1983), above 2 pi inside. Each half of one is the
+// argument of a complex number; their product and its turns take the place of the sum.
 bool encloses(const TriangleMesh& surface, const Eigen::Vector3d& point) {
-  double sum = 0.0;
+  std::complex<double> product = 1.0;
+  int turns = 0;
   for (int f = 0; f < surface.triangles.rows(); ++f) {
     const Eigen::Vector3d a = surface.vertex(surface.triangles(f, 0)) - point,
                           b = surface.vertex(surface.triangles(f, 1)) - point,
                           c = surface.vertex(surface.triangles(f, 2)) - point;
     const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    sum += 2.0 * std::atan2(a.dot(b.cross(c)),
-                            la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+    const std::complex<double> half(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb, a.dot(b.cross(c)));
+    const double size = std::abs(half.real()) + std::abs(half.imag());
+    if (size == 0.0) continue;  // a triangle without area, or at one of its corners
+    const bool upper = product.imag() >= 0.0;
+    product *= half / size;
+    product /= std::abs(product.real()) + std::abs(product.imag());
+    if (upper && half.imag() > 0.0 && product.imag() < 0.0) ++turns;
+    if (!upper && half.imag() < 0.0 && product.imag() >= 0.0) --turns;
   }
-  return sum > 2.0 * M_PI;
+  return turns > 0;
 }
 
 }  // namespace calipso::fem
