@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <utility>
@@ -218,18 +219,25 @@ void Segmenter::relearnColours() {
       fitColours(coarse_, own[k], params_.components, models_[k]);
 }
 
+// Target k's model where the labels have it; nothing without a model or where it cannot be placed.
+std::optional<FittedShape> Segmenter::fitModel(size_t k) const {
+  if (!targets_[k].fit_model) return std::nullopt;
+  const ObjectContour contour = extractContour(picture_, labels_, targets_[k].label, targets_[k].name);
+  std::optional<ModelView> view = targets_[k].fit_model(contour.loops);
+  if (!view) return std::nullopt;
+  const cv::Mat silhouette = view->silhouette(view_), own = labels_(view_) == targets_[k].label;
+  const double agreement = cv::countNonZero(silhouette & own) /
+                           static_cast<double>(std::max(1, cv::countNonZero(silhouette | own)));
+  return FittedShape{{silhouette, view->depth(view_), view->tolerance_px}, agreement};
+}
+
+// Objects do not know of each other: side by side, the first in this thread.
 void Segmenter::fitModels() {
-  for (size_t k = 0; k < targets_.size(); ++k) {
-    if (!targets_[k].fit_model) continue;
-    const ObjectContour contour =
-        extractContour(picture_, labels_, targets_[k].label, targets_[k].name);
-    std::optional<ModelView> view = targets_[k].fit_model(contour.loops);
-    if (!view) continue;
-    const cv::Mat silhouette = view->silhouette(view_), own = labels_(view_) == targets_[k].label;
-    const double agreement = cv::countNonZero(silhouette & own) /
-                             static_cast<double>(std::max(1, cv::countNonZero(silhouette | own)));
-    fitted_[k] = FittedShape{{silhouette, view->depth(view_), view->tolerance_px}, agreement};
-  }
+  std::vector<std::future<std::optional<FittedShape>>> others;
+  for (size_t k = 1; k < targets_.size(); ++k)
+    others.push_back(std::async(std::launch::async, &Segmenter::fitModel, this, k));
+  fitted_[0] = fitModel(0);
+  for (size_t k = 1; k < targets_.size(); ++k) fitted_[k] = others[k - 1].get();
 }
 
 // Where fitted models have their surfaces, in the relief's units.

@@ -63,6 +63,7 @@ class Segmenter {
   cv::Mat placedSilhouette(size_t k, const cv::Size& size) const;
   void guide();
   void relearnColours();
+  std::optional<FittedShape> fitModel(size_t k) const;
   void fitModels();
   void expectSurfaces(SegmentationLevel& level) const;
   void measureSurfaces();
