@@ -189,10 +189,11 @@ std::vector<Result> squeezed() {
   watch.scale = most;
   const double squeezed_height = height;
   watch.play(scene, 3.0, 1.0 / 60.0);
-  height = soft.vertices().col(2).maxCoeff() - soft.vertices().col(2).minCoeff();
+  const Eigen::VectorXd along = soft.vertices() * soft.motion().linear().col(2);  // it has got some spin
+  height = along.maxCoeff() - along.minCoeff();
   return {resultOf("height of a block squeezed between plates 0.1 m apart, m", squeezed_height, 0.1002,
                    scene, watch, 4.5),
-          resultOf("its height 3 s after the plates have opened, m", height, 0.2, scene, watch, 4.5)};
+          resultOf("its height along its own axis 3 s after the plates have opened, m", height, 0.2, scene, watch, 4.5)};
 }
 
 // Two blocks that overlap by 2 cm from the start are pushed apart without a kick.
