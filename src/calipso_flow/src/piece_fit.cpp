@@ -1,5 +1,6 @@
 #include "piece_fit.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,8 @@ namespace {
 // faster than the largest is a collision.
 constexpr double kJerkShares[] = {0.003, 0.01, 0.03, 0.1, 0.3};
 constexpr double kSpinShares[] = {0.003, 0.01, 0.03, 0.1, 0.3};
+
+constexpr double kLeastNoiseScale = 0.3, kMostNoiseScale = 30.0;
 
 // Fewer frames in a piece say nothing about how its acceleration or spin changes.
 constexpr int kLeastForForced = 5;
@@ -94,10 +97,36 @@ double chooseNoiseScale(const std::vector<PoseMeasurement>& measurements,
   const auto score = [&](double log_scale) {
     return logLikelihood(measurements, pieces, prior, std::exp(log_scale));
   };
-  const double now = std::log(start), least = std::log(0.3), most = std::log(30.0);
+  const double now = std::log(start), least = std::log(kLeastNoiseScale), most = std::log(kMostNoiseScale);
   const Maximum best =
       maximise(score, std::max(least, now - 1.5), std::min(most, now + 1.5), 1.5);
   return std::exp(best.at);
+}
+
+double noiseScaleBetweenJumps(const std::vector<PoseMeasurement>& measurements) {
+  constexpr double kQuartile = 1.2125;  // of chi-squared with 3 degrees of freedom
+  constexpr size_t kLeastDifferences = 4;
+  std::vector<double> squares;
+  for (size_t k = 3; k < measurements.size(); ++k) {
+    const PoseMeasurement* m = &measurements[k - 3];
+    if (!(m[0].valid && m[1].valid && m[2].valid && m[3].valid)) continue;
+    // Newton's weights of the third divided difference, for frames that need not be evenly spaced.
+    Eigen::Vector3d difference = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    for (int i = 0; i < 4; ++i) {
+      double weight = 1.0;
+      for (int j = 0; j < 4; ++j) {
+        if (j != i) weight /= m[i].time - m[j].time;
+      }
+      difference += weight * m[i].position;
+      covariance += weight * weight * m[i].covariance.topLeftCorner<3, 3>();
+    }
+    squares.push_back(difference.dot(covariance.ldlt().solve(difference)));
+  }
+  if (squares.size() < kLeastDifferences) return 1.0;
+  const auto quartile = squares.begin() + squares.size() / 4;
+  std::nth_element(squares.begin(), quartile, squares.end());
+  return std::clamp(std::sqrt(*quartile / kQuartile), 1.0, kMostNoiseScale);
 }
 
 Maximum maximise(const std::function<double(double)>& score, double low, double high,

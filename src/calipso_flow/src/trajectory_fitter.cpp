@@ -1,56 +1,22 @@
 #include "trajectory_fitter.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "calipso_flow/rotation.hpp"
 #include "piece_fit.hpp"
+#include "piece_path.hpp"
 
 namespace calipso::flow {
 namespace {
 
 constexpr double kEver = std::numeric_limits<double>::infinity();
-constexpr double kFrameGrid[] = {0.125, 0.375, 0.625, 0.875};  // of a frame, first look
 constexpr int kRefineRounds = 3;
 constexpr size_t kLeastFrames = 2;    // in a piece: fewer tell nothing about its velocity
-constexpr size_t kTriedAtOnce = 8;    // candidates that are fitted fully before giving up
-constexpr size_t kFramesAfter = 2;    // a first look goes no further: another collision may follow
-constexpr int kSplitRounds = 2;       // kinds of motion and instant hang together
-constexpr double kSplitReach = 0.4;   // frames by which a fit may move a candidate
-constexpr double kRefineReach = 0.6;
-
-struct FirstLook {
-  double gain;    // of log likelihood, by a jump
-  double misfit;  // log likelihood that is missing, even with the jump, against noise alone
-};
-
-// What a jump of velocity and spin at `time` does for the frames around it, the acceleration going
-// on unchanged: an unknown one, or gravity, which a few frames cannot tell from a jump otherwise.
-FirstLook lookFirst(const std::vector<PoseMeasurement>& around, double time,
-                    const MotionPrior& prior, double noise_scale) {
-  double with = -kEver, without = -kEver;
-  for (const Travel travel : {Travel::kAccelerated, Travel::kFreeFall}) {
-    if (travel == Travel::kFreeFall && prior.gravity.isZero()) continue;
-    MotionPiece piece;
-    piece.travel = travel;
-    piece.turning = Turning::kSteady;
-    piece.start = around.front().time;
-    MotionPiece second = piece;
-    second.start = time;
-    second.same_acceleration = true;
-    with = std::max(with, logLikelihood(around, {piece, second}, prior, noise_scale));
-    without = std::max(without, logLikelihood(around, {piece}, prior, noise_scale));
-  }
-  double noise_alone = 0.0;
-  for (const PoseMeasurement& m : around) {
-    if (!m.valid) continue;
-    const double log_determinant =
-        m.covariance.ldlt().vectorD().array().log().sum() + 12.0 * std::log(noise_scale);
-    noise_alone -= 0.5 * (log_determinant + 6.0 * std::log(2.0 * M_PI) + 6.0);
-  }
-  return {with - without, noise_alone - with};
-}
+constexpr double kRefineReach = 0.6;   // frames by which a fit may move an instant
+constexpr double kDropReach = 1.2;     // the same when its neighbour is gone
 
 }  // namespace
 
@@ -59,18 +25,30 @@ TrajectoryFitter::TrajectoryFitter(const std::vector<PoseMeasurement>& measureme
     : measurements_(measurements), prior_(prior), params_(params) {}
 
 Trajectory TrajectoryFitter::run(const std::vector<double>& cut_times) {
-  pieces_ = {MotionPiece{}};
-  pieces_.front().start = measurements_.front().time;
-  for (double time : cut_times) insertPiece(time, true);
+  noise_scale_ = noiseScaleBetweenJumps(measurements_);
+  divide(cut_times);
   fitKindsAndNoise();
-  for (int n = 0; n < params_.max_collisions && splitOnce(); ++n) fitKindsAndNoise();
   for (int round = 0; round < kRefineRounds; ++round) {
     refineTimes();
     fitKindsAndNoise();
   }
   dropUnearnedPieces();
+  dropJumpsOfSpinAlone();
   settleStillPieces();
   return result();
+}
+
+// By collisions, no more than are allowed, and cuts.
+void TrajectoryFitter::divide(const std::vector<double>& cut_times) {
+  if (params_.max_collisions > 0) {
+    for (double evidence = params_.least_evidence;; evidence *= 2.0) {
+      pieces_ = likeliestPieces(measurements_, cut_times, prior_, noise_scale_, evidence);
+      if (pieces_.size() <= 1 + cut_times.size() + params_.max_collisions) return;
+    }
+  }
+  pieces_ = {MotionPiece{}};
+  pieces_.front().start = measurements_.front().time;
+  for (double time : cut_times) insertPiece(time, true);
 }
 
 double TrajectoryFitter::frameSpacing() const {
@@ -109,12 +87,6 @@ TrajectoryFitter::Neighbourhood TrajectoryFitter::neighbourhood(size_t piece) co
   return local;
 }
 
-bool TrajectoryFitter::isRejected(double time) const {
-  const double near = 0.5 * frameSpacing();
-  return std::any_of(rejected_.begin(), rejected_.end(),
-                     [&](double t) { return std::abs(t - time) < near; });
-}
-
 void TrajectoryFitter::insertPiece(double time, bool cut) {
   MotionPiece piece;
   piece.start = time;
@@ -132,65 +104,13 @@ void TrajectoryFitter::fitKind(size_t piece) {
   pieces_[piece] = local.pieces[local.index];
 }
 
-void TrajectoryFitter::fitKindsAndNoise() {
+void TrajectoryFitter::fitKinds() {
   for (size_t i = 0; i < pieces_.size(); ++i) fitKind(i);
+}
+
+void TrajectoryFitter::fitKindsAndNoise() {
+  fitKinds();
   noise_scale_ = chooseNoiseScale(measurements_, pieces_, prior_, noise_scale_);
-}
-
-// The most promising instant between every two frames of a piece.
-void TrajectoryFitter::addCandidates(size_t piece, std::vector<Candidate>& candidates) const {
-  const Measurements inside = measurementsOf(piece, piece);
-  const size_t window = params_.window_frames;
-  for (size_t k = kLeastFrames - 1; k + kLeastFrames < inside.size(); ++k) {
-    const size_t first = k + 1 > window ? k + 1 - window : 0;
-    const size_t end = std::min(inside.size(), k + 1 + kFramesAfter);
-    const Measurements around(inside.begin() + first, inside.begin() + end);
-    Candidate best{0.0, kEver};
-    for (double share : kFrameGrid) {
-      const double time = inside[k].time + share * (inside[k + 1].time - inside[k].time);
-      if (isRejected(time)) continue;
-      const FirstLook look = lookFirst(around, time, prior_, noise_scale_);
-      if (look.gain < params_.least_evidence) continue;
-      if (look.misfit < best.misfit) best = {time, look.misfit};
-    }
-    if (best.misfit < kEver) candidates.push_back(best);
-  }
-}
-
-// Takes the candidate whose surroundings are explained best, if it helps enough. The gain itself is
-// no guide to the place: one wrong split can make up for two collisions badly.
-bool TrajectoryFitter::splitOnce() {
-  std::vector<Candidate> candidates;
-  for (size_t i = 0; i < pieces_.size(); ++i) addCandidates(i, candidates);
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const auto& a, const auto& b) { return a.misfit < b.misfit; });
-  if (candidates.size() > kTriedAtOnce) candidates.resize(kTriedAtOnce);
-  for (const Candidate& candidate : candidates) {
-    std::vector<MotionPiece> split;
-    if (splitAt(candidate.time, split) > params_.least_evidence) {
-      pieces_ = split;
-      return true;
-    }
-    rejected_.push_back(candidate.time);
-  }
-  return false;
-}
-
-// Splits at `time`, fits kinds and instant. @return the log likelihood gained
-double TrajectoryFitter::splitAt(double time, std::vector<MotionPiece>& pieces) {
-  const std::vector<MotionPiece> saved = pieces_;
-  const double before = likelihood();
-  insertPiece(time, false);
-  const size_t second = indexOfPieceAt(time);
-  for (int round = 0; round < kSplitRounds; ++round) {
-    fitKind(second - 1);
-    fitKind(second);
-    pieces_[second].start = bestTime(second, kSplitReach * frameSpacing());
-  }
-  const double gain = likelihood() - before;
-  pieces = pieces_;
-  pieces_ = saved;
-  return gain;
 }
 
 // A later piece may have taken over what an earlier one was needed for.
@@ -201,7 +121,37 @@ void TrajectoryFitter::dropUnearnedPieces() {
     const double with = likelihood();
     pieces_.erase(pieces_.begin() + i);
     fitKind(i - 1);
+    // Two instants in a row may stand for one in between.
+    for (const size_t near : {i - 1, i}) {
+      if (near == 0 || near >= pieces_.size() || pieces_[near].cut) continue;
+      pieces_[near].start = bestTime(near, kDropReach * frameSpacing());
+      fitKind(near - 1);
+      fitKind(near);
+    }
     if (with - likelihood() > params_.least_evidence) pieces_ = saved;
+  }
+}
+
+// An impulse at a point of contact changes the velocity; where that goes on, a change of spin is an error of the
+// tracks. The least certain jump goes first: without it the others look different.
+void TrajectoryFitter::dropJumpsOfSpinAlone() {
+  constexpr double kSurprise = 16.27;  // chi-squared with 3 degrees of freedom, 99.9 %
+  while (true) {
+    const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
+    double least = kSurprise;
+    double time = 0.0;
+    for (const Jump& jump : motion.jumps) {
+      if (jump.cut) continue;
+      const Eigen::Vector3d change = jump.after.velocity - jump.before.velocity;
+      const Eigen::Matrix3d covariance = jump.before.twistCovariance().topLeftCorner<3, 3>() +
+                                         jump.after.twistCovariance().topLeftCorner<3, 3>();
+      const double surprise = change.dot(covariance.ldlt().solve(change));
+      if (surprise < least) least = surprise, time = jump.after.time;
+    }
+    if (least == kSurprise) return;
+    const size_t piece = indexOfPieceAt(time);
+    pieces_.erase(pieces_.begin() + piece);
+    fitKind(piece - 1);
   }
 }
 

@@ -20,7 +20,6 @@ struct Collision {
 
 struct TrajectoryParams {
   double least_evidence = 8.0;   // log of the odds a collision must raise the likelihood by
-  int window_frames = 5;         // frames on either side that a first look for a collision uses
   int max_collisions = 24;
   // Says of the states of one piece that their motion cannot be told from tracking errors; empty:
   // the likelihood alone decides.
