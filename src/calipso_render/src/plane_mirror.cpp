@@ -131,10 +131,15 @@ class DrawnOut {
   }
 
  private:
+  // Wide blurs of a smaller picture, whose pixels are half as wide as the blur at most.
   cv::Mat blurred(const cv::Mat& values, int level) const {
-    cv::Mat out;
-    const float px = kLeastBlur * static_cast<float>(1 << level);
-    cv::GaussianBlur(values, out, {}, std::max(kLeastBlur, across_ * px), px, cv::BORDER_REPLICATE);
+    const float along = kLeastBlur * static_cast<float>(1 << level), beside = std::max(kLeastBlur, across_ * along);
+    const int rows = std::max(1, static_cast<int>(along / 2.0f)), columns = std::max(1, static_cast<int>(beside / 2.0f));
+    cv::Mat small = values, out;
+    const bool smaller = rows > 1 || columns > 1;
+    if (smaller) cv::resize(values, small, {(values.cols + columns - 1) / columns, (values.rows + rows - 1) / rows}, 0, 0, cv::INTER_AREA);
+    cv::GaussianBlur(small, out, {}, beside / columns, along / rows, cv::BORDER_REPLICATE);
+    if (smaller) cv::resize(out, out, values.size(), 0, 0, cv::INTER_LINEAR);
     return out;
   }
 
