@@ -17,10 +17,14 @@ constexpr float kShortest = 14.0f;     // px of a line that is seen
 constexpr float kReach = 8.0f;         // px from where a line was lost to the hole
 constexpr float kClear = 4.0f;         // px from the hole at which the line must have been seen: it does not run along the rim
 constexpr int kFirst = 2, kLast = 14;  // px before the end over which its colours are averaged
+constexpr int kCentrings = 3;
+constexpr float kLineItself = 0.3f;    // of the contrast: what differs more from its surroundings is the line
+constexpr float kSameLine = 0.995f;    // cosine between the two edges of a line
 constexpr float kContrast = 12.0f;     // code values across a line, at least
 constexpr int kBesideFirst = kHalf + 2, kBesideLast = kHalf + 8;  // px beside a line that are not its own
 constexpr float kStandsOut = 3.0f;     // contrast of a line, in deviations of what is beside it
 constexpr float kAloneContrast = 30.0f;  // code values across a line that ends at another; it is thin:
+constexpr float kAsStrong = 0.5f;       // that has at least this part of its contrast
 constexpr float kThin = 0.35f;         // both sides differ by no more than this part of the contrast
 constexpr float kStray = 1.5f;         // px by which ends may miss each other,
 constexpr float kTurn = 0.04f;         // and part of the way between them
@@ -71,8 +75,9 @@ class Bridger {
       if (std::any_of(bridges.begin(), bridges.begin() + through, [&](const Bridge& b) { return b.from == &end || b.to == &end; })) continue;
       if (const auto gap = wayTo(end, bridges, through)) bridges.push_back({&end, nullptr, *gap, 0.0f});
     }
-    // What is led to another line comes first: the other goes through its end.
-    std::rotate(bridges.begin(), bridges.begin() + through, bridges.end());
+    // What is led to another line comes before it, which goes through its end; what is weaker comes first.
+    const auto strength = [](const Bridge& b) { return b.to == nullptr ? kAsStrong * b.from->contrast : std::min(b.from->contrast, b.to->contrast); };
+    std::stable_sort(bridges.begin(), bridges.end(), [&](const Bridge& a, const Bridge& b) { return strength(a) < strength(b); });
     const cv::Mat known = image_.clone();
     for (const Bridge& b : bridges) {
       draw(b, known);
@@ -99,6 +104,21 @@ class Bridger {
       addEnd({s[0], s[1]}, {s[2], s[3]});
       addEnd({s[2], s[3]}, {s[0], s[1]});
     }
+    dropDoubles();
+  }
+
+  // Both edges of a line were found and are now the same: the longer one stays.
+  void dropDoubles() {
+    const auto isSame = [](const End& a, const End& b) {
+      const cv::Point2f apart = b.at - a.at;
+      return a.into.dot(b.into) > kSameLine && std::abs(a.into.dot(apart)) < kReach && std::abs(render::cross(a.into, apart)) < kStray;
+    };
+    std::stable_sort(ends_.begin(), ends_.end(), [](const End& a, const End& b) { return a.length > b.length; });
+    std::vector<End> kept;
+    for (const End& end : ends_) {
+      if (std::none_of(kept.begin(), kept.end(), [&](const End& k) { return isSame(k, end); })) kept.push_back(end);
+    }
+    ends_ = std::move(kept);
   }
 
   void addEnd(cv::Point2f from, cv::Point2f to) {
@@ -113,7 +133,35 @@ class Bridger {
     while (reach <= kReach && !is(hole_, to + reach * into)) reach += 1.0f;
     if (reach > kReach) return;
     End end{to, into, length, {}, 0.0f, {}};
-    if (measure(end) && standsOut(end)) ends_.push_back(end);
+    if (measure(end) && standsOut(end) && centre(end)) ends_.push_back(end);
+  }
+
+  // An edge of a thin line goes to the line's middle, and along it: through its middles near the end and far from it.
+  bool centre(End& end) const {
+    for (int i = 0; i < kCentrings && isThin(end); ++i) {
+      const auto near = middleAt(end, kFirst, kLast), far = middleAt(end, static_cast<int>(end.length) - kLast, static_cast<int>(end.length) - kFirst);
+      if (!near) return true;
+      if (far && end.length > 2 * kLast) end.into = (*near - *far) / cv::norm(*near - *far);
+      end.at = *near + 0.5f * (kFirst + kLast) * end.into;
+      if (!measure(end) || !standsOut(end)) return false;
+    }
+    return true;
+  }
+
+  // Middle of a line `first` to `last` px before its end.
+  std::optional<cv::Point2f> middleAt(const End& end, int first, int last) const {
+    const cv::Vec3f around = 0.5f * (end.beside[0] + end.beside[1]);
+    float sum = 0.0f, weights = 0.0f;
+    for (int t = first; t <= last; ++t) {
+      for (int s = -kHalf; s <= kHalf; ++s) {
+        const cv::Point2f p = end.at - static_cast<float>(t) * end.into + static_cast<float>(s) * leftOf(end.into);
+        if (!is(source_, p)) continue;
+        const float weight = std::max(0.0f, rms(sample(image_, p) - around) - kLineItself * end.contrast);
+        sum += static_cast<float>(s) * weight, weights += weight;
+      }
+    }
+    if (weights == 0.0f) return std::nullopt;
+    return end.at - 0.5f * static_cast<float>(first + last) * end.into + (sum / weights) * leftOf(end.into);
   }
 
   static bool isThin(const End& end) { return rms(end.beside[0] - end.beside[1]) < kThin * end.contrast; }
@@ -240,6 +288,7 @@ class Bridger {
     if (end.contrast < kAloneContrast || !isThin(end)) return std::nullopt;
     std::optional<float> nearest;
     for (std::size_t i = 0; i < count; ++i) {
+      if (std::min(bridges[i].from->contrast, bridges[i].to->contrast) < kAsStrong * end.contrast) continue;
       const cv::Point2f start = bridges[i].from->at, along = bridges[i].to->at - start;
       const float sine = render::cross(end.into, along);
       if (std::abs(sine) < 0.2f * cv::norm(along)) continue;
@@ -267,7 +316,8 @@ class Bridger {
         const cv::Point2f d = cv::Point2f(static_cast<float>(u), static_cast<float>(v)) - start;
         const float t = d.dot(along), s = d.dot(leftOf(along));
         if (result_.drawn.at<std::uint8_t>(v, u) != 0 && std::abs(s) > kCore) continue;
-        if (std::abs(s) <= kHalf && t >= -kHalf && t <= b.gap + kHalf) drawPixel(b, known, {u, v}, std::clamp(t, 0.0f, b.gap), s);
+        const float beyond = b.to != nullptr ? kHalf : 0.0f;
+        if (std::abs(s) <= kHalf && t >= -kHalf && t <= b.gap + beyond) drawPixel(b, known, {u, v}, std::clamp(t, 0.0f, b.gap), s);
       }
     }
   }

@@ -62,8 +62,10 @@ TEST(PatchOrigins, AreWhereThePictureRepeatsItself) {
 struct Lines {
   cv::Mat image = 0.05 * grain(320, 200) + cv::Scalar::all(150.0), truth, hole = cv::Mat::zeros(200, 320, CV_8U);
 
-  void line(const cv::Point& a, const cv::Point& b, int dark = 30) {
-    cv::line(image, a, b, cv::Scalar::all(dark), 3, cv::LINE_AA);
+  void line(const cv::Point& a, const cv::Point& b, int dark = 30, int width = 3) {
+    cv::Mat covered(image.size(), CV_8U, cv::Scalar(0));
+    cv::line(covered, a, b, cv::Scalar(255), width, cv::LINE_AA);
+    image.forEach<cv::Vec3f>([&](cv::Vec3f& c, const int* at) { c += covered.at<std::uint8_t>(at[0], at[1]) / 255.0f * (cv::Vec3f::all(dark) - c); });
   }
   LineBridges bridge() {
     hole(cv::Rect(110, 50, 100, 100)).setTo(255);
@@ -99,6 +101,21 @@ TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
   EXPECT_LT(meanDifference(l.image, l.truth, b.drawn), 8.0);
   EXPECT_NE(b.drawn.at<std::uint8_t>(130, 163), 0);  // on the second line
   EXPECT_EQ(b.drawn.at<std::uint8_t>(70, 174), 0);   // beyond the first
+}
+
+// A broad line, of which both edges are found, goes on through what is faint to one of its like, whole and no further.
+TEST(BridgeLines, LeadABroadLineThroughAFaintOne) {
+  Lines l;
+  l.line({0, 115}, {319, 115}, 118);
+  l.line({150, 199}, {170, 80}, 30, 4);
+  l.line({0, 80}, {319, 80});
+  const LineBridges b = l.bridge();
+  for (int v = 82; v < 150; ++v) {
+    const int u = cvRound(150.0 + 20.0 * (199 - v) / 119.0);
+    ASSERT_NE(b.drawn.at<std::uint8_t>(v, u), 0) << v;
+    EXPECT_LT(l.image.at<cv::Vec3f>(v, u)[1], 70.0f) << v;
+  }
+  EXPECT_EQ(b.drawn.at<std::uint8_t>(72, 171), 0);
 }
 
 TEST(BridgeLines, LeaveALineThatHasNoOtherEnd) {
