@@ -137,6 +137,7 @@ class FrameCompositor {
   Composed composedAt(int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool findRest(int surface);
+  bool isSeenAt(int surface, const Points& vertices) const;
   bool takesShadow(int u, int v) const { return plane_view_.sees(u, v) && (shadowless_.empty() || shadowless_.at<std::uint8_t>(v, u) == 0); }
   void prepareShadows();
   void cacheOriginals(const std::vector<Occluder>& originals);
@@ -212,7 +213,7 @@ class FrameCompositor {
   std::vector<cv::Mat> footprints_;   // Prepared::footprints, likewise
   std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame
   cv::Mat labels_, plate_;            // of this frame's view
-  cv::Mat invented_;
+  cv::Mat invented_, quiet_;          // CV_8UC1; quiet: seen in other frames, always alike
   cv::Mat shadowless_;                // Prepared::shadowless, where the camera stands as at the key frame
   const LiveFill* live_ = nullptr;  // Background::live, where the camera stands as at the key frame
   std::vector<cv::Vec3f> live_corrections_;

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "calipso_render/colour.hpp"
 #include "frame_compositor.hpp"
 #include "place_depth.hpp"
 #include "tiled_filter.hpp"
@@ -17,7 +18,12 @@ namespace {
 constexpr int kRegionMargin = 8;       // px
 constexpr int kRestReach = 2;           // px: what lies that near to a change may take part in it
 constexpr int kSameCodes = 8;           // code values, mean over 3 x 3 pixels, that noise may make
-constexpr float kDarker = 0.97f;       // of the plate's brightness: a passing shadow
+constexpr float kDarker = 0.97f;       // of the plate's brightness: a passing shadow,
+constexpr float kDarkerElsewhere = 0.9f;  // likewise in another view, to which the plate is carried with small errors
+constexpr int kLeastPassing = 5;       // px across, and in another view
+constexpr int kLeastElsewhere = 9;     // that somewhere within
+constexpr int kPassingReach = 12;      // px: an edge that the plate misses looks like a narrow shadow
+constexpr float kSeenWithin = 0.8f;    // part of an object's mask that lies within its outline if that is right
 constexpr int kRimShare = 50;          // of the picture's width: how far a mask may miss a moving object
 constexpr int kInFront = 127;          // of a matte
 constexpr float kQuiet = 5.0f;         // code values of spread over time: the background rests
@@ -96,6 +102,7 @@ void FrameCompositor::stage() {
     Points vertices = surfaces[i].key_vertices;
     if (o != nullptr && o->edited) vertices = o->vertices;
     else if (o != nullptr && prepared_.moves[i]) vertices = transformed(surfaces[i].object_vertices, o->world_from_object);
+    if (!edited_[i] && prepared_.moves[i] && !isSeenAt(static_cast<int>(i), vertices)) continue;
     if (vertices.size() != surfaces[i].key_vertices.size()) {
       throw std::invalid_argument("object '" + surfaces[i].name + "': state has " + std::to_string(vertices.size()) +
                                   " vertices, its model " + std::to_string(surfaces[i].key_vertices.size()));
@@ -110,6 +117,7 @@ void FrameCompositor::stage() {
   footprints_.assign(surfaces.size(), cv::Mat());
   plate_ = prepared_.plate_linear;
   invented_ = prepared_.background.invented;
+  quiet_ = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
   if (sameView(frame_.camera, prepared_.camera)) {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
     shadowless_ = prepared_.shadowless;
@@ -120,11 +128,30 @@ void FrameCompositor::stage() {
     footprints_ = prepared_.footprints;
   } else {
     const cv::Mat map = viewWarp(nearnessFrom(prepared_.nearness, prepared_.camera, frame_.camera), prepared_.camera, frame_.camera);
-    cv::Mat plate, invented;
+    cv::Mat plate, invented, quiet;
     cv::remap(plate_, plate, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
     cv::remap(invented_, invented, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));
-    plate_ = plate, invented_ = invented;
+    cv::remap(quiet_, quiet, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
+    plate_ = plate, invented_ = invented, quiet_ = quiet;
   }
+}
+
+// Whether the video shows an object where its state has it: most of what is seen of it lies within its outline there.
+bool FrameCompositor::isSeenAt(int surface, const Points& vertices) const {
+  const cv::Mat seen = labels_ == prepared_.surfaces[surface].index;
+  const cv::Rect box = cv::boundingRect(seen);
+  if (box.empty()) return true;  // something hides it
+  VisibilityBuffer outline(box);
+  outline.draw(projectMesh(vertices, prepared_.surfaces[surface].triangles, frame_.camera), 0);
+  int within = 0, all = 0;
+  for (int v = 0; v < box.height; ++v) {
+    const std::uint8_t* row = seen.ptr<std::uint8_t>(box.y + v) + box.x;
+    for (int u = 0; u < box.width; ++u) {
+      if (row[u] == 0) continue;
+      ++all, within += outline.ids(v)[u] != VisibilityBuffer::kNothing;
+    }
+  }
+  return within >= kSeenWithin * all;
 }
 
 // Whether the video has an object, or a part of one that moves, where the key frame has it. Adds to elsewhere_ where not.
@@ -174,17 +201,25 @@ void FrameCompositor::chooseRegion() {
 void FrameCompositor::findPassingShadows() {
   bool any = false;
   for (std::size_t i = 0; i < edited_.size(); ++i) any = any || (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video);
-  if (!any || !sameView(frame_.camera, prepared_.camera)) return;
+  if (!any) return;
+  const bool same_view = sameView(frame_.camera, prepared_.camera);
   cv::Mat now, ratio_now, ratio_plate, plate;
   cv::cvtColor(unmirrored_, now, cv::COLOR_BGR2GRAY);
-  prepared_.background.plate.convertTo(plate, CV_8U);
+  if (same_view) prepared_.background.plate.convertTo(plate, CV_8U);
+  else plate = codeFromLinear(plate_);
   cv::cvtColor(plate, plate, cv::COLOR_BGR2GRAY);
   cv::blur(now, ratio_now, {5, 5});
   cv::blur(plate, ratio_plate, {5, 5});
-  ratio_plate.convertTo(ratio_plate, CV_8U, kDarker);
+  ratio_plate.convertTo(ratio_plate, CV_8U, same_view ? kDarker : kDarkerElsewhere);
   passing_ = ratio_now < ratio_plate;
-  passing_ &= (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet) & (labels_ == 0);
-  cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
+  passing_ &= quiet_ & (labels_ == 0);
+  cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN, cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));
+  if (!same_view) {
+    cv::Mat broad;
+    cv::morphologyEx(passing_, broad, cv::MORPH_OPEN, cv::Mat::ones(kLeastElsewhere, kLeastElsewhere, CV_8U));
+    cv::dilate(broad, broad, cv::Mat::ones(2 * kPassingReach + 1, 2 * kPassingReach + 1, CV_8U));
+    passing_ &= broad;
+  }
   cv::dilate(passing_, passing_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {13, 13}));
   // The rim that the mask of another moving object has missed is no shadow.
   for (std::size_t i = 0; i < edited_.size(); ++i) {
