@@ -98,6 +98,34 @@ TEST(Others, APartOfAMovingObjectMayRest) {
   EXPECT_GT(psnr(out.bgr, key.bgr, lower), 30.0);
 }
 
+// A pose that the tracking has lost is no reason to draw an object where its mask does not have it.
+TEST(Others, AMovingObjectIsNotDrawnAgainstItsMask) {
+  const RenderParams render = params();
+  const ObjectModel ball = ballAt(kCentre), other = ballAt(kOther, "other", 2);
+  const auto frameWith = [&](const Eigen::Vector3d& place) {
+    ClipFrame frame = frameWithBall(ball);
+    const ClipFrame behind = frameWithBall(ballAt(place, "other", 2));
+    behind.bgr.copyTo(frame.bgr, (behind.labels == 2) & (frame.labels == 0));
+    behind.labels.copyTo(frame.labels, (behind.labels == 2) & (frame.labels == 0));
+    return frame;
+  };
+  ClipSample clip;
+  const ClipFrame key = frameWith(kOther);
+  clip.add(key);
+  clip.add(frameWith(kOther + Eigen::Vector3d(0.1, 0.0, 0.0)));
+  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball, other}, render));
+  ASSERT_TRUE(prepared->moves[1]);
+  FrameInput in;
+  in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera;
+  ObjectInFrame taken, state;
+  taken.name = "ball", taken.removed = true;
+  state.name = "other", state.world_from_object = Eigen::Translation3d(kCentre - kOther) * other.world_from_object;
+  in.objects = {taken, state};
+  const FrameOutput out = Renderer(prepared, render).composite(in);
+  const Eigen::Vector2d p = key.camera.projectWorld(kCentre);
+  EXPECT_NE(out.provenance.at<std::uint8_t>(static_cast<int>(p.y()), static_cast<int>(p.x())), kRendered);
+}
+
 TEST(Others, WhereNoShadowFallsTheirPixelsStay) {
   const TwoBalls s(params());
   const FrameOutput out = s.drawn({-0.02, 0.0, 0.0});
