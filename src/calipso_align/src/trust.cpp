@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
+#include "unshown_holes.hpp"
+
 namespace calipso::align {
 namespace {
 
@@ -77,23 +79,14 @@ double protrudingPart(const FitProblem& problem, const DepthRendering& rendering
   return outside / std::max(1, cv::countNonZero(inside));
 }
 
-// The model's silhouette without its holes: of a lattice the contour often has none.
-cv::Mat1b filledSilhouette(const FitProblem& problem, const DepthRendering& rendering) {
-  cv::Mat1b mask = maskOf(rendering, problem.camera);
-  std::vector<std::vector<cv::Point>> outer;
-  cv::findContours(mask.clone(), outer, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
-  cv::drawContours(mask, outer, -1, cv::Scalar(255), cv::FILLED);
-  return mask;
-}
-
 // Area of the contour that the model leaves open by more than the tolerance, as part of its area. Details
 // that it has not are no part of it.
-double openPart(const FitProblem& problem, const DepthRendering& rendering, double tolerance_px) {
+// Nor are holes: of a lattice the contour often has none.
+double openPart(const FitProblem& problem, const cv::Mat1b& silhouette, double tolerance_px) {
   cv::Mat1b inside = problem.inside;
   if (!problem.foreign.empty()) inside = inside & ~problem.foreign;
   cv::Mat1f distance;
-  cv::distanceTransform(filledSilhouette(problem, rendering) == 0, distance, cv::DIST_L2,
-                        cv::DIST_MASK_3);
+  cv::distanceTransform(withoutHoles(silhouette) == 0, distance, cv::DIST_L2, cv::DIST_MASK_3);
   return static_cast<double>(cv::countNonZero(inside & (distance > tolerance_px))) /
          std::max(1, cv::countNonZero(inside));
 }
@@ -123,7 +116,12 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
   }
   quality.met_mean_px /= std::max(1, met);
   quality.met = static_cast<double>(met) / known;
-  quality.open = openPart(problem, rendering, quality.tolerance_px);
+  const cv::Mat1b silhouette = maskOf(rendering, problem.camera);
+  quality.open = openPart(problem, silhouette, quality.tolerance_px);
+  // A bar of a lattice may be off on either side of a hole.
+  const double hole_px = 2.0 * quality.tolerance_px;
+  quality.model_holes_px = unshownHoles(silhouette, problem.inside, hole_px);
+  quality.picture_holes_px = unshownHoles(problem.inside, silhouette, hole_px);
   quality.protruding = protrudingPart(problem, rendering, quality.tolerance_px);
   quality.mean_px = std::accumulate(sizes.begin(), sizes.end(), 0.0) / sizes.size();
   const auto p95 = sizes.begin() + static_cast<long>(0.95 * (sizes.size() - 1));
@@ -152,6 +150,14 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
   } else if (scale > kLargestScale || scale < 1.0 / kLargestScale) {
     reason << "size implausible: the model had to be scaled by " << scale
            << "; check its unit and its distance";
+  } else if (quality.model_holes_px > 0.0) {
+    reason << "the model shows a hole of " << quality.model_holes_px
+           << " px^2 that the picture does not: correct the contour if it was overlooked; one that the "
+              "object has closed stays open";
+  } else if (quality.picture_holes_px > 0.0) {
+    reason << "the picture shows a hole of " << quality.picture_holes_px
+           << " px^2 that the model does not: correct the contour if something hides the object there, "
+              "or place the model closer";
   } else if (error.beyond(kTrustedWithin) > kLargestOff) {
     reason << "depth undetermined: the contour is met, but as to distance, turn and thickness along the "
               "sight line the surface is off by more than "

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <numeric>
+#include <opencv2/imgproc.hpp>
 
 #include "calipso_align/metrics.hpp"
 #include "synthetic_shape.hpp"
@@ -161,6 +162,50 @@ TEST(Alignment, FlagsAContourOfTwoPieces) {
                                        contour, coarse());
   EXPECT_FALSE(result.trusted);
   EXPECT_NE(result.reason.find("separate pieces"), std::string::npos) << result.reason;
+}
+
+// The pear with a round window through it, along the sight line.
+TriangleMesh pearWithWindow(double radius) {
+  const TriangleMesh whole = test::pear(60, 80);
+  std::vector<Eigen::RowVector3i> faces;
+  for (int f = 0; f < whole.triangleCount(); ++f) {
+    Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
+    for (int k = 0; k < 3; ++k) middle += whole.vertices.row(whole.triangles(f, k)) / 3.0;
+    if (std::hypot(middle.x() - 0.05, middle.z() + 0.15) > radius) faces.push_back(whole.triangles.row(f));
+  }
+  TriangleMesh mesh = whole;
+  mesh.triangles.resize(static_cast<int>(faces.size()), 3);
+  for (size_t f = 0; f < faces.size(); ++f) mesh.triangles.row(static_cast<int>(f)) = faces[f];
+  return mesh;
+}
+
+TEST(Alignment, FlagsAHoleThatOnlyTheModelHas) {
+  const Camera camera = test::frontCamera();
+  const auto aligned = [&](const TriangleMesh& model, const TriangleMesh& truth) {
+    AlignOptions options = coarse();
+    options.depth = depthOf(truth, camera);
+    return align(model, camera, test::roughPose(),
+                 test::contourOf(truth, Eigen::Isometry3d::Identity(), camera), options);
+  };
+  const AlignmentResult same = aligned(pearWithWindow(0.08), pearWithWindow(0.08));
+  EXPECT_TRUE(same.trusted) << same.reason;
+  const AlignmentResult closed = aligned(pearWithWindow(0.08), test::pear(60, 80));
+  EXPECT_FALSE(closed.trusted);
+  // A window of 13 px radius; less where turned and filled up by the wall behind.
+  const size_t at = closed.reason.find("the model shows a hole of ");
+  ASSERT_NE(at, std::string::npos) << closed.reason;
+  EXPECT_NEAR(std::stod(closed.reason.substr(at + 26)), M_PI * 13.0 * 13.0, 150.0);
+}
+
+TEST(Alignment, FlagsAHoleThatOnlyThePictureHas) {
+  // 1.1 % of the area: too little for what protrudes, and too short for what is not met.
+  const std::vector<ContourLoop> contour = contourOfMask(
+      [](cv::Mat1b& mask) { cv::circle(mask, {165, 140}, 6, cv::Scalar(0), cv::FILLED); });
+  ASSERT_EQ(contour.size(), 2u);
+  const AlignmentResult result =
+      align(test::pear(), test::frontCamera(), test::roughPose(), contour, coarse());
+  EXPECT_FALSE(result.trusted);
+  EXPECT_NE(result.reason.find("the picture shows a hole of "), std::string::npos) << result.reason;
 }
 
 TEST(Alignment, FlagsAMaskThatFillsTheImage) {

@@ -14,6 +14,8 @@ struct FitQuality {
   double met_mean_px = 0.0;        // of that part
   double open = 0.0;               // part of the contour's area that the model leaves open
   double protruding = 0.0;         // area of the model outside of the contour, part of the contour's
+  double model_holes_px = 0.0;     // area of the model's holes that the contour has not, px^2
+  double picture_holes_px = 0.0;   // area of the contour's holes that the model has not, px^2
 };
 
 FitQuality assess(const FitProblem& problem, const Points& x);
