@@ -21,11 +21,6 @@ constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
 
 constexpr float kSameSheet = 0.015f;    // of the nearness: samples that differ by more see another part of an object
 
-cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
-  const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
-  return {linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2])};
-}
-
 }  // namespace
 
 float FrameCompositor::newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "calipso_render/colour.hpp"
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/visibility.hpp"
 #include "line_codec.hpp"
@@ -61,6 +62,11 @@ inline std::uint8_t changeOfLight(float by) {
   constexpr float kSameRatio = 0.01f, kPlateRatio = 0.06f;  // from which the plate is taken, and only it
   const float t = std::clamp((by - kSameRatio) * (1.0f / (kPlateRatio - kSameRatio)), 0.0f, 1.0f);
   return static_cast<std::uint8_t>(static_cast<int>(255.0f * (t * t * (3.0f - 2.0f * t)) + 0.5f));
+}
+
+inline cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
+  const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
+  return {linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2])};
 }
 
 // One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.

@@ -15,11 +15,6 @@ constexpr float kNoChange = 0.01f;  // of the brightness
 constexpr float kDark = 0.01f;      // linear
 constexpr int kInFront = 127;       // of a matte
 
-cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
-  const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
-  return {linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2])};
-}
-
 float strongest(const cv::Vec3f& c) { return std::max({std::abs(c[0]), std::abs(c[1]), std::abs(c[2])}); }
 
 }  // namespace
@@ -45,6 +40,7 @@ void FrameCompositor::mirrorAnew() {
   mirrored_ = image.empty() ? cv::Mat(frame_.bgr.size(), CV_32FC3, cv::Scalar()) : addedBy(mirror, image);
   remirrored_ = cv::Mat::zeros(frame_.bgr.size(), CV_8U);
   unmirrored_ = unmirroredCodes(mirror, frame_.bgr);
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < remirrored_.rows; ++v) {
     for (int u = 0; u < remirrored_.cols; ++u) {
       const cv::Vec3f &now = mirrored_.at<cv::Vec3f>(v, u), &before = mirror.at_key.at<cv::Vec3f>(v, u);

@@ -106,6 +106,7 @@ class DrawnOut {
  public:
   DrawnOut(const cv::Mat& spread, float across, float slope) : across_(across) {
     level_ = cv::Mat::zeros(spread.size(), CV_32F);
+#pragma omp parallel for schedule(static)
     for (int v = 0; v < spread.rows; ++v) {
       for (int u = 0; u < spread.cols; ++u) {
         const float px = slope * spread.at<float>(v, u);
@@ -120,6 +121,7 @@ class DrawnOut {
     cv::Mat out(values.size(), CV_32FC4), lower, upper = blurred(values, 0);
     for (int k = 0; k <= static_cast<int>(highest_); ++k) {
       lower = upper, upper = blurred(values, k + 1);
+#pragma omp parallel for schedule(static)
       for (int v = 0; v < out.rows; ++v) {
         for (int u = 0; u < out.cols; ++u) {
           const float part = level_.at<float>(v, u) - static_cast<float>(k);
@@ -236,7 +238,6 @@ class Trial {
     return sum;
   }
 
-
  private:
   // Of objects of one colour strength and surroundings are known together only: then the strength is that of water and varnish, 1.
   static Eigen::Vector4d solve(const Eigen::Matrix4d& G, const Eigen::Vector4d& b) {
@@ -289,6 +290,7 @@ MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance&
 cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image) {
   const cv::Mat drawn = DrawnOut(image.spread, image.across, mirror.slope)(withCover(image));
   cv::Mat added(drawn.size(), CV_32FC3);
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < added.rows; ++v) {
     for (int u = 0; u < added.cols; ++u) {
       const cv::Vec4f& c = drawn.at<cv::Vec4f>(v, u);
@@ -300,6 +302,7 @@ cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image) {
 
 cv::Mat unmirrored(const PlaneMirror& mirror, const cv::Mat& picture) {
   cv::Mat out = picture.clone();
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < out.rows; ++v) {
     for (int u = 0; u < out.cols; ++u) {
       const cv::Vec3f& added = mirror.at_key.at<cv::Vec3f>(v, u);
