@@ -111,7 +111,8 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
     observation.deviation = fit.deviation;
     observation.tracks.clear();
     for (size_t i = 0; i < matches.size(); ++i) {
-      observation.tracks.push_back({matches[i].point, matches[i].pixel, 1.0, std::sqrt(0.5 * matches[i].covariance.trace()), fit.inlier[i]});
+      const double deviation = std::sqrt(0.5 * matches[i].covariance.trace());
+      observation.tracks.push_back({matches[i].point, matches[i].pixel, 1.0, deviation, fit.inlier[i]});
     }
   }
   if (!observation.found) {

@@ -154,7 +154,6 @@ StateMatrix entryTransition(const MotionPiece& piece) {
   if (piece.cut) return F;
   F.block<3, 3>(kP, kP).setIdentity();
   F.block<3, 3>(kR, kR).setIdentity();
-  if (piece.same_acceleration) F.block<3, 3>(kA, kA).setIdentity();
   return F;
 }
 
@@ -264,10 +263,6 @@ MotionState enterPiece(const MotionState& before, const MotionPiece& piece,
     start.velocity = std::min(start.velocity, std::max(speed, kLeastSpeedShare * start.velocity));
   }
   applyStart(start, state);
-  if (piece.same_acceleration) {
-    state.acceleration = before.acceleration;
-    state.covariance.block<3, 3>(kA, kA) = before.covariance.block<3, 3>(kA, kA);
-  }
   if (piece.cut) {
     state.covariance.block<3, 3>(kP, kP) = scaledIdentity(prior.position * prior.position);
     state.covariance.block<3, 3>(kR, kR) = scaledIdentity(M_PI * M_PI);

@@ -163,9 +163,10 @@ ReferenceView ReferenceView::reduced(int factor) const {
   if (factor == 1) return *this;
   ReferenceView small = *this;
   small.frame_ = flow::reduced(frame_, factor);
+  if (surface_.empty()) return small;
   small.surface_ =
       viewSurface(mesh_, small.frame_.camera, small.frame_.camera.world_from_camera.inverse() * world_from_object_);
-  if (surface_.empty() || small.surface_.empty()) return small;
+  if (small.surface_.empty()) return small;
   cv::Mat all(frame_.gray.size(), CV_8U, cv::Scalar(0)), fewer;
   usable_.copyTo(all(surface_.window));
   const cv::Rect whole({0, 0}, small.frame_.gray.size() * factor);

@@ -41,7 +41,7 @@ Trajectory TrajectoryFitter::run(const std::vector<double>& cut_times) {
 // By collisions, no more than are allowed, and cuts.
 void TrajectoryFitter::divide(const std::vector<double>& cut_times) {
   if (params_.max_collisions > 0) {
-    for (double evidence = params_.least_evidence;; evidence *= 2.0) {
+    for (double evidence = params_.least_evidence;; evidence = std::max(1.0, 2.0 * evidence)) {
       pieces_ = likeliestPieces(measurements_, cut_times, prior_, noise_scale_, evidence);
       if (pieces_.size() <= 1 + cut_times.size() + params_.max_collisions) return;
     }
@@ -104,12 +104,8 @@ void TrajectoryFitter::fitKind(size_t piece) {
   pieces_[piece] = local.pieces[local.index];
 }
 
-void TrajectoryFitter::fitKinds() {
-  for (size_t i = 0; i < pieces_.size(); ++i) fitKind(i);
-}
-
 void TrajectoryFitter::fitKindsAndNoise() {
-  fitKinds();
+  for (size_t i = 0; i < pieces_.size(); ++i) fitKind(i);
   noise_scale_ = chooseNoiseScale(measurements_, pieces_, prior_, noise_scale_);
 }
 

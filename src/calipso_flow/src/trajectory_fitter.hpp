@@ -34,7 +34,6 @@ class TrajectoryFitter {
 
   void insertPiece(double time, bool cut);
   void fitKind(size_t piece);
-  void fitKinds();
   void fitKindsAndNoise();
   void dropUnearnedPieces();
   void dropJumpsOfSpinAlone();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "calipso_flow/rotation.hpp"
@@ -105,6 +106,17 @@ TEST(Trajectory, findsTheInstantOfCollisionWithinAFrame) {
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[10], 0.03);
   EXPECT_LT(errors[18], 0.1);
+}
+
+// Where any gain would do for a collision, only as many are told as are allowed.
+TEST(Trajectory, tellsNoMoreCollisionsThanAllowed) {
+  const auto zigzag = [](double t) { return Eigen::Vector3d(std::abs(std::fmod(2.0 * t, 1.0) - 0.5), 0.0, 0.0); };
+  const auto data = measure(45, 0.001, 0.01, 10, zigzag, still);
+  EXPECT_EQ(fitTrajectory(data, {}, testPrior()).collisions.size(), 5u);
+  TrajectoryParams params;
+  params.least_evidence = 0.0;
+  params.max_collisions = 1;
+  EXPECT_LE(fitTrajectory(data, {}, testPrior(), params).collisions.size(), 1u);
 }
 
 TEST(Trajectory, doesNotTakeACutForMotion) {

@@ -56,7 +56,6 @@ enum class Turning { kNone, kSteady, kForced };
 struct MotionPiece {
   double start = 0.0;     // s; the first piece's start is not read
   bool cut = false;       // the video was cut here: nothing carries over
-  bool same_acceleration = false;  // the acceleration of the piece before goes on: gravity
   Travel travel = Travel::kForced;
   Turning turning = Turning::kForced;
   double jerk = 0.0;        // m/s^3 per square root of Hz; kForced only
