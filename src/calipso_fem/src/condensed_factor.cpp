@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <string>
 #include <variant>
 
 #include "supernodal_factor.hpp"
@@ -96,6 +97,7 @@ void CondensedFactor::Impl::orderNodes() {
   const int n = pattern->rows();
   cholmod_sparse* graph =
       cholmod_allocate_sparse(n, n, pattern->blockCount(), 1, 1, 1, CHOLMOD_PATTERN, &common);
+  if (!graph) throw std::runtime_error("CHOLMOD: no room for the graph of " + std::to_string(n) + " nodes");
   auto* outer = static_cast<int*>(graph->p);
   auto* inner = static_cast<int*>(graph->i);
   int next = 0;
@@ -118,6 +120,7 @@ void CondensedFactor::Impl::analyze() {
   const int n = pattern->rows();
   const std::size_t entries = 9 * (static_cast<std::size_t>(pattern->blockCount()) - n) / 2 + 6 * n;
   cholmod_sparse* matrix = cholmod_allocate_sparse(3 * n, 3 * n, entries, 1, 1, -1, CHOLMOD_PATTERN, &common);
+  if (!matrix) throw std::runtime_error("CHOLMOD: no room for the pattern of " + std::to_string(n) + " nodes");
   auto* outer = static_cast<int*>(matrix->p);
   auto* inner = static_cast<int*>(matrix->i);
   int next = 0;

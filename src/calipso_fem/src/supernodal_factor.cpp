@@ -172,6 +172,7 @@ typename SupernodalFactor<Scalar>::Matrix SupernodalFactor<Scalar>::lastOfLower(
 template <typename Scalar>
 typename SupernodalFactor<Scalar>::Matrix SupernodalFactor<Scalar>::inverseFromLower(const Matrix& L) {
   Matrix inverse = L;
+  if (L.rows() == 0) return inverse;  // LAPACK wants a row at least
   const int info = invertInPlace(static_cast<int>(L.rows()), inverse.data());
   if (info != 0) throw std::runtime_error("LAPACK: potri failed (" + std::to_string(info) + ")");
   inverse.template triangularView<Eigen::StrictlyUpper>() = inverse.transpose();

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -177,9 +178,18 @@ void runParallel(const std::function<void(const Crew&)>& work) {
 
 void eachOnAThread(int count, const std::function<void(int)>& work) {
   if (count == 1) return work(0);
+  std::vector<std::exception_ptr> failures(count);
   runParallel([&](const Crew& crew) {
-    for (int k = crew.rank(); k < count; k += crew.count()) work(k);
+    for (int k = crew.rank(); k < count; k += crew.count()) {
+      try {
+        work(k);
+      } catch (...) {
+        failures[k] = std::current_exception();
+      }
+    }
   });
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
 }
 
 void parallelFor(int n, int serial_below, const std::function<void(int, int)>& work) {

@@ -33,7 +33,8 @@ void runParallel(const std::function<void(const Crew&)>& work);
 // work(begin, end) for shares of 0..n; on the calling thread where n is below `serial_below`.
 void parallelFor(int n, int serial_below, const std::function<void(int, int)>& work);
 
-// work(k) for k below `count`, one after the other on each thread; a single one may use all threads itself.
+// work(k) for k below `count`, one after the other on each thread; a single one may use all threads itself. What the
+// first k throws that does is thrown once all are through.
 void eachOnAThread(int count, const std::function<void(int)>& work);
 
 }  // namespace calipso::fem

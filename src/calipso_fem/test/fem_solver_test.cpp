@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <numeric>
 #include <random>
+#include <stdexcept>
 
 #include "calipso_fem/deformable_body.hpp"
 #include "hex_solver.hpp"
@@ -166,6 +168,24 @@ TEST(ThreadTeam, EveryShareIsWorkedOnOnceAndBarriersHold) {
       for (int k = begin; k < end; ++k) sum[k] += value[k] + value[kCount - 1 - k];
     });
     for (int k = 0; k < kCount; ++k) ASSERT_EQ(sum[k], kCount - 1 + 2 * round);
+  }
+}
+
+// Whichever thread meets it, and the threads go on serving.
+TEST(ThreadTeam, WhatAShareThrowsComesToTheCaller) {
+  for (int round = 0; round < 50; ++round) {
+    std::vector<int> done(7, 0);
+    const auto work = [&](int k) {
+      if (k == 3 || k == 4) throw std::runtime_error("share " + std::to_string(k));
+      done[k] = 1;
+    };
+    try {
+      eachOnAThread(7, work);
+      FAIL() << "nothing was thrown";
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "share 3");
+    }
+    EXPECT_EQ(std::accumulate(done.begin(), done.end(), 0), 5);
   }
 }
 

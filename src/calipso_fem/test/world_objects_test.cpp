@@ -345,6 +345,25 @@ TEST(WorldObjects, NothingMovesWhatHasInfiniteMass) {
   EXPECT_TRUE(world.pose(id).matrix().isIdentity(0.0));
 }
 
+// What else the edit that makes it immovable says holds once it has a mass again.
+TEST(WorldObjects, AnImmovableObjectKeepsTheRestOfItsMaterial) {
+  std::vector<std::string> said;
+  for (const double density : {std::numeric_limits<double>::infinity(), 2.0}) {
+    World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.5}), {});
+    Edit first = editOf(EditKind::kMaterial, EditMode::kFactor), second = editOf(EditKind::kMaterial, EditMode::kAbsolute);
+    first.density = density;
+    first.youngs_modulus = 0.5;
+    second.density = 500.0;
+    world.submit(first);
+    world.submit(second);
+    const std::vector<EditOutcome> outcomes = world.advanceTo(0.0);
+    ASSERT_EQ(outcomes.size(), 2u);
+    for (const EditOutcome& outcome : outcomes) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    said.push_back(outcomes[1].message);
+  }
+  EXPECT_EQ(said[0], said[1]);
+}
+
 // A falling box stops on a floating one that an edit has made immovable; given a mass again, that falls.
 TEST(WorldObjects, AnEditMakesMassInfinite) {
   WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.5});

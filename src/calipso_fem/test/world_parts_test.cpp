@@ -217,6 +217,23 @@ TEST(CondensedFactor, IsAsExactAsAskedFor) {
   }
 }
 
+TEST(CondensedFactor, SolvesWithoutChosenNodes) {
+  FemOptions options;
+  options.cell_size = 0.1;
+  DeformableBody body(boxSurface({0.2, 0.2, 0.2}, 2), {1e5, 0.3, 1000.0, 0.0}, options);
+  BlockMatrix A;
+  body.model().hessian(body.positions(), Definiteness::kPositive, A);
+  for (const int k : A.pattern->diagonal) A.block(k).diagonal().array() += 1e3;
+  CondensedFactor factor;
+  ASSERT_TRUE(factor.update(A, {}));
+  EXPECT_EQ(factor.compliance().size(), 0);
+  const Vec b = Vec::LinSpaced(3 * body.nodeCount(), -1.0, 2.0);
+  EXPECT_EQ(factor.reduce(b).size(), 0);
+  Vec back;
+  A.multiply(factor.complete(Vec()), back);
+  EXPECT_LT((back - b).norm(), 1e-10 * b.norm());  // round-off, as above
+}
+
 TEST(CondensedFactor, SaysThatAMatrixIsIndefinite) {
   FemOptions options;
   options.cell_size = 0.1;

@@ -171,13 +171,14 @@ void World::Impl::scale(Actor& actor, double factor) {
 std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   Material material = actor.material;
   material.youngs_modulus = changed(material.youngs_modulus, edit.youngs_modulus, edit.mode);
-  if (std::isinf(edit.density)) return makeImmovable(actor, edit);
-  if (edit.mode == EditMode::kAbsolute && !std::isnan(edit.density)) actor.immovable = false;
-  material.density = changed(material.density, edit.density, edit.mode);
+  const bool immovable = std::isinf(edit.density);
+  if (!immovable) material.density = changed(material.density, edit.density, edit.mode);
   material.poissons_ratio =
       changed(material.poissons_ratio, edit.poissons_ratio, EditMode::kAbsolute);
   material.damping = changed(material.damping, edit.damping, EditMode::kAbsolute);
   validate(material);
+  if (immovable) return makeImmovable(actor, edit, material);
+  if (edit.mode == EditMode::kAbsolute && !std::isnan(edit.density)) actor.immovable = false;
   touch(actor, edit);
   actor.material = material;
   if (actor.soft) {
@@ -195,9 +196,10 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
 }
 
 // Goes on as the video shows, or stays where an edit has put it, whatever pushes.
-std::string World::Impl::makeImmovable(Actor& actor, const Edit& edit) {
+std::string World::Impl::makeImmovable(Actor& actor, const Edit& edit, const Material& material) {
   actor.immovable = true;
   touch(actor, edit);
+  actor.material = material;  // for when it is given a mass again
   become(actor, ObjectKind::kKinematic, "its mass is infinite");
   return actor.object.name + " has infinite mass: nothing moves it";
 }

@@ -121,7 +121,7 @@ struct World::Impl {
   std::string changeContact(Actor& actor, const Edit& edit);
   std::string changeLook(Actor& actor, const Edit& edit);
   std::string changeMaterial(Actor& actor, const Edit& edit);
-  std::string makeImmovable(Actor& actor, const Edit& edit);
+  std::string makeImmovable(Actor& actor, const Edit& edit, const Material& material);
   std::string changeGravity(const Edit& edit);
   std::string changeVelocity(Actor& actor, const Edit& edit);
   void touch(Actor& actor, const Edit& edit);
