@@ -6,6 +6,7 @@
 
 #include "calipso_render/surface_symmetry.hpp"
 #include "smooth_step.hpp"
+#include "texture_seams.hpp"
 
 namespace calipso::render {
 namespace {
@@ -75,11 +76,14 @@ std::vector<Fold> foldsOf(const Axis& axis, const Eigen::Vector3f& eye) {
 // Colours laid one over the other: each takes up a part of what those before it left open.
 struct Layers {
   cv::Vec3f sum;
-  float open = 1.0f;
+  float open = 1.0f, most = 0.0f;
+  int count = 0, strongest = -1;  // layers so far; the one that took up most
 
   void add(const cv::Vec3f& colour, float part) {
     sum += colour * (open * part);
+    if (open * part > most) most = open * part, strongest = count;
     open *= 1.0f - part;
+    ++count;
   }
 };
 
@@ -110,12 +114,14 @@ class TextureFill {
     a.texture = SurfaceTexture(surface_.key_vertices, surface_.triangles, depth / static_cast<float>(camera.fx), kMostTexels);
     std::vector<char> from(a.texture.size(), kFilled);
     std::vector<float> certain(a.texture.size(), 0.0f);
+    std::vector<signed char> layer(a.texture.size(), -1);
 #pragma omp parallel for schedule(static)
     for (int t = 0; t < a.texture.triangleCount(); ++t) {
       for (std::size_t i = a.texture.firstOf(t); i < a.texture.firstOf(t + 1); ++i) {
-        from[i] = texelAt(t, a.texture.weightsOf(t, i - a.texture.firstOf(t)), a.albedo, a.texture.texels[i], certain[i]);
+        from[i] = texelAt(t, a.texture.weightsOf(t, i - a.texture.firstOf(t)), a.albedo, a.texture.texels[i], certain[i], layer[i]);
       }
     }
+    levelSeams(surface_.key_vertices, surface_.triangles, layer, a.texture);
     fillUnseen(certain, a.texture);
     const auto part = [&](char kind) { return static_cast<float>(std::count(from.begin(), from.end(), kind)) / std::max<std::size_t>(1, from.size()); };
     a.seen_in_key = part(kKey), a.seen_elsewhere = part(kElsewhere), a.copied = part(kCopied);
@@ -177,8 +183,8 @@ class TextureFill {
     return *look;
   }
 
-  // @param certain out: 1 = the texel is known, 0 = nothing of it
-  From texelAt(int triangle, const Eigen::Vector3f& w, const cv::Mat& key_albedo, cv::Vec4f& texel, float& certain) const {
+  // @param certain out: 1 = the texel is known, 0 = nothing of it; layer out: where most of it comes from, 0 = the place itself, -1 = nowhere
+  From texelAt(int triangle, const Eigen::Vector3f& w, const cv::Mat& key_albedo, cv::Vec4f& texel, float& certain, signed char& layer) const {
     const Eigen::Vector3i& t = surface_.triangles[triangle];
     const auto mix = [&](const Points& x) -> Eigen::Vector3f { return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]]; };
     cv::Vec3f sum;
@@ -196,6 +202,7 @@ class TextureFill {
     layers.add(sum, std::min(1.0f, total / kSure));
     if (layers.open > 0.0f) addLikePlaces({mix(surface_.key_vertices), mix(surface_.key_normals).normalized()}, key_albedo, sum, total, layers);
     certain = 1.0f - layers.open;
+    layer = static_cast<signed char>(layers.strongest);
     const cv::Vec3f c = certain > 0.0f ? layers.sum / certain : cv::Vec3f();
     texel = cv::Vec4f(c[0], c[1], c[2], std::clamp(key / kEnough, 0.0f, 1.0f));
     if (total > kSeen) return key > 0.0f ? kKey : kElsewhere;
@@ -206,7 +213,7 @@ class TextureFill {
   // @param own, total the place's own colour as far as it is seen, and the weight of that
   void addLikePlaces(const Place& place, const cv::Mat& key_albedo, const cv::Vec3f& own, float total, Layers& layers) const {
     const auto add = [&](const Look& l, float part) {
-      if (part > 0.0f) layers.add(colourOf(sampleBicubic(key_albedo, l.u, l.v)), part);
+      layers.add(part > 0.0f ? colourOf(sampleBicubic(key_albedo, l.u, l.v)) : cv::Vec3f(), part);
     };
     const auto addPlace = [&](const Place& like) {
       const Look l = lookAt(0, like, kOffSurface);

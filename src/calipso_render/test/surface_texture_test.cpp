@@ -1,5 +1,6 @@
 #include "calipso_render/surface_symmetry.hpp"
 #include "calipso_render/surface_texture.hpp"
+#include "../src/texture_seams.hpp"
 
 #include <gtest/gtest.h>
 
@@ -113,6 +114,29 @@ TEST(DiffuseOverMesh, IsHarmonic) {
   EXPECT_LT(values[2][0], values[4][0]);
   EXPECT_LT(values[4][0], values[6][0]);
   EXPECT_FLOAT_EQ(values[10][0], 1.0f);
+}
+
+// A strip whose left third is seen, and the others copied: one is darker than what it continues, the other has another pattern.
+TEST(LevelSeams, ShiftsACopyToWhatItContinuesAndLeavesPatterns) {
+  Points vertices;
+  Triangles triangles;
+  for (int i = 0; i <= 30; ++i) vertices.emplace_back(i, 0, 0), vertices.emplace_back(i, 1, 0);
+  for (int i = 0; i < 30; ++i) triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1}), triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+  SurfaceTexture texture(vertices, triangles, 0.25f, 100000);
+  const float colours[] = {0.5f, 0.4f, 0.9f};
+  std::vector<signed char> part(texture.size());
+  for (int t = 0; t < texture.triangleCount(); ++t) {
+    for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
+      part[i] = static_cast<signed char>(t / 20);
+      texture.texels[i] = cv::Vec4f::all(colours[t / 20] + (i % 2 == 0 ? 0.01f : -0.01f));
+    }
+  }
+  const SurfaceTexture before = texture;
+  levelSeams(vertices, triangles, part, texture);
+  for (std::size_t i = 0; i < texture.size(); ++i) {
+    if (part[i] != 1) EXPECT_EQ(texture.texels[i], before.texels[i]) << i;
+    else EXPECT_NEAR(texture.texels[i][0] - before.texels[i][0], 0.1f, 0.01f) << i;  // grain stays
+  }
 }
 
 }  // namespace
