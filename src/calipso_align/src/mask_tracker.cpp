@@ -299,6 +299,16 @@ cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view, const c
   return others;
 }
 
+// Cuts where a prediction has proved wrong: by what is known of the background, in a shadow or not, and
+// by the object's colours.
+void MaskTracker::cutByLooks(const cv::Mat& view, const cv::Mat& free, const cv::Mat& distance, const cv::Mat& known,
+                             LayerAppearance back, const std::vector<const GaussianMixture*>& colours,
+                             cv::Mat& labels) const {
+  back.shadow.share = cv::max(back.shadow.share, known & kAnyShadow);
+  const LayerAppearance looks{{}, colours};
+  cutLabels(view, free, costsOf(view, free, distance, back, looks, kLoosePrior), params_.smoothness, labels);
+}
+
 void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& flow,
                          const cv::Mat& rough, bool exact, const cv::Rect& roi) {
   const cv::Mat view = image(roi);
@@ -340,14 +350,14 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   cutLabels(view, band, costsOf(view, band, distance, back, fore, params_.prior_limit), params_.smoothness, labels);
 
   const double area = cv::countNonZero(labels);
-  const cv::Mat apart = othersIn(object, view, roi);
-  cv::Mat wrong = contradicted(view, labels, background, apart, back_noise);
-  if (!exact && cv::countNonZero(wrong) > params_.wrong_share * area) {
-    const cv::Mat free = ((grown(wrong, 2) | ~background.known) & ~apart) | band;
-    LayerAppearance known{{back.accounts[0], back.accounts[1]}, {&ring_colours}, shadow};
-    cv::max(known.shadow.share, background.known & kAnyShadow, known.shadow.share);
-    const LayerAppearance looks{{}, fore.colours};
-    cutLabels(view, free, costsOf(view, free, distance, known, looks, kLoosePrior), params_.smoothness, labels);
+  if (!exact) {
+    const cv::Mat apart = othersIn(object, view, roi);
+    const cv::Mat wrong = contradicted(view, labels, background, apart, back_noise);
+    if (cv::countNonZero(wrong) > params_.wrong_share * area) {
+      const cv::Mat free = ((grown(wrong, 2) | ~background.known) & ~apart) | band;
+      const LayerAppearance known{{back.accounts[0], back.accounts[1]}, {&ring_colours}, shadow};
+      cutByLooks(view, free, distance, background.known, known, fore.colours, labels);
+    }
   }
   const double flipped = cv::countNonZero((labels > 0) != (predicted > 0));
   object.confidence = static_cast<float>(std::clamp(1.0 - 4.0 * flipped / std::max(1.0, area), 0.0, 1.0));

@@ -77,6 +77,9 @@ class MaskTracker {
   std::vector<cv::Mat> costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
                                const LayerAppearance& back, const LayerAppearance& fore,
                                float prior_limit) const;
+  void cutByLooks(const cv::Mat& view, const cv::Mat& free, const cv::Mat& distance, const cv::Mat& known,
+                  LayerAppearance back, const std::vector<const GaussianMixture*>& colours,
+                  cv::Mat& labels) const;
   cv::Mat othersIn(const Object& object, const cv::Mat& view, const cv::Rect& roi) const;
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
 
