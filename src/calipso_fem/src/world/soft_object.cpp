@@ -3,6 +3,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 
+#include "prestress.hpp"
 #include "soft_system.hpp"
 
 namespace calipso::fem {
@@ -103,14 +104,33 @@ bool SoftObject::isHeld(const SurfacePoint& point) const {
 
 SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold,
                                 double tolerance) {
-  constexpr int kMaxIterations = 8;
-  SettleReport report;
   const Vec goal = body_.positions();
-  Vec rest = restPositions(body_.model().mesh());
-  // A contact gives way by a hundredth of what the whole body would; the rest shape absorbs it.
+  const NodeMatrix relaxed = body_.model().mesh().nodes;
   const Material& material = body_.model().cellMaterials().front();
+  // A contact gives way by a hundredth of what the whole body would; the rest shape absorbs it.
   const double stiffness = 100.0 * material.youngs_modulus * boundingDiagonal(surface_) /
                            std::max<size_t>(1, hold.size());
+  body_.setGravity(gravity);
+  SettleReport report = findRestShape(goal, stiffness, hold, tolerance);
+  body_.setSoftConstraints({});
+  body_.setState(goal, Vec::Zero(goal.size()));
+  body_.setGravity(gravity_);
+  if (!report.converged) {
+    body_.setRestNodes(relaxed);
+    prestress_ = prestressAgainst(gravity, body_, stiffness, &hold);
+    prestress_modulus_ = material.youngs_modulus;
+    report.message = "no rest shape found that gravity would bend into the observed one: it is relaxed as observed, "
+                     "and inner forces carry its weight there; they fade as it is made softer";
+  }
+  changed();
+  return report;
+}
+
+SettleReport SoftObject::findRestShape(const Vec& goal, double stiffness, std::vector<HoldPoint>& hold,
+                                       double tolerance) {
+  constexpr int kMaxIterations = 8;
+  SettleReport report;
+  Vec rest = restPositions(body_.model().mesh());
   std::vector<SoftConstraint> constraints;
   for (const HoldPoint& h : hold) {
     SoftConstraint c;
@@ -119,15 +139,10 @@ SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<Hold
     c.stiffness = stiffness;
     constraints.push_back(c);
   }
-  body_.setGravity(gravity);
   body_.setSoftConstraints(constraints);
   while (report.iterations < kMaxIterations) {
     const StepReport equilibrium = body_.solveStatic();
-    if (!equilibrium.converged) {
-      report.message = "no equilibrium found for the observed shape";
-      if (!equilibrium.message.empty()) report.message += ": " + equilibrium.message;
-      break;
-    }
+    if (!equilibrium.converged) break;
     for (size_t i = 0; i < hold.size(); ++i)
       hold[i].force = body_.softConstraintForce(static_cast<int>(i));
     const Vec error = body_.positions() - goal;
@@ -140,11 +155,28 @@ SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<Hold
     body_.setRestNodes(Eigen::Map<const NodeMatrix>(rest.data(), rest.size() / 3, 3));
     ++report.iterations;
   }
-  body_.setSoftConstraints({});
-  body_.setState(goal, Vec::Zero(goal.size()));
-  body_.setGravity(gravity_);
-  changed();
   return report;
+}
+
+void SoftObject::setMaterial(const Material& material) {
+  body_.setMaterial(material);
+  forgetSystem();
+}
+
+void SoftObject::copyPrestress(const SoftObject& other) {
+  prestress_ = other.prestress_;
+  prestress_modulus_ = other.prestress_modulus_;
+}
+
+// The inner forces are stresses of the body's material: they turn with it, and fall as it is made softer. A stiffer one
+// needs no more than what carries the weight.
+void SoftObject::applyPrestress() {
+  if (prestress_.size() == 0) return;
+  const double share = std::min(1.0, body_.model().cellMaterials().front().youngs_modulus / prestress_modulus_);
+  Vec forces = share * prestress_;
+  Eigen::Map<Eigen::Matrix3Xd> columns(forces.data(), 3, forces.size() / 3);
+  columns = (rotation_ * columns).eval();
+  body_.setNodalForces(forces);
 }
 
 void SoftObject::setGravity(const Eigen::Vector3d& gravity) {
@@ -160,6 +192,7 @@ void SoftObject::addForce(const SurfacePoint& point, const Eigen::Vector3d& forc
 void SoftObject::beginStep(double h) {
   before_ = body_.momentum();
   body_.setSurfaceForces(forces_);
+  applyPrestress();
   body_.beginStep(h);
 }
 

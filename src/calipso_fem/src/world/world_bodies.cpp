@@ -273,7 +273,7 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   for (const auto& region : actor.fixed) body.fixSurfaceVertices(region);
   actor.soft->setGravity(actor.acceleration());
   if (settle) settleAsObserved(actor, surface);
-  body.setMaterial(actor.material);
+  actor.soft->setMaterial(actor.material);
   if (!motion.linear.isZero() || !motion.angular.isZero())
     body.setRigidVelocity(motion.linear, motion.angular);
   actor.soft->changed();

@@ -181,10 +181,7 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   if (edit.mode == EditMode::kAbsolute && !std::isnan(edit.density)) actor.immovable = false;
   touch(actor, edit);
   actor.material = material;
-  if (actor.soft) {
-    actor.soft->body().setMaterial(material);
-    actor.soft->forgetSystem();
-  }
+  if (actor.soft) actor.soft->setMaterial(material);
   if (actor.kind == ObjectKind::kRigid)
     rigid.setMass(*actor.body, massProperties(actor.object.mesh, material.density));
   plan_changed = true;

@@ -197,7 +197,8 @@ void World::Impl::copySoft(Actor& copy, const Actor& source, const Eigen::Isomet
   copy.soft_from_object = source.soft_from_object;
   DeformableBody& body = copy.soft->body();
   body.setRestNodes(from.model().mesh().nodes);
-  body.setMaterial(copy.material);
+  copy.soft->copyPrestress(*source.soft);
+  copy.soft->setMaterial(copy.material);
   body.setState(from.positions(), from.velocities());
   body.applyRigidTransform(motion);
   copy.soft->setGravity(copy.acceleration());

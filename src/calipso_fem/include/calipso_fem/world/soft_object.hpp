@@ -23,7 +23,7 @@ struct HoldPoint {
 struct SettleReport {
   double sag = 0.0;    // largest displacement under gravity if the shape were the rest shape, m
   int iterations = 0;  // of the rest shape; 0: the sag is below the tolerance
-  bool converged = false;
+  bool converged = false;  // false: a prestress carries the weight
   std::string message;  // empty unless something has to be said
 };
 
@@ -43,9 +43,13 @@ class SoftObject {
 
   // Makes the present shape the equilibrium under `gravity`, the hard constraints and the given
   // points of contact: the rest shape X is corrected by X -= x(X) - x_observed until the sag of the
-  // remainder is below `tolerance` (m).
+  // remainder is below `tolerance` (m). Where there is no such X, the body is relaxed as observed, and a
+  // prestress (prestress.hpp) of the present material carries its weight.
   SettleReport settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold,
                       double tolerance);
+  void setMaterial(const Material& material);
+  // The prestress of another body with the same nodes.
+  void copyPrestress(const SoftObject& other);
 
   // One step under gravity, all forces given since the last one, and contacts: whoever solves for
   // these drives the body's trial in between. `gained`: impulse and, about the centre of mass
@@ -84,6 +88,8 @@ class SoftObject {
   void changed();  // the state was set from outside
 
  private:
+  SettleReport findRestShape(const Vec& goal, double stiffness, std::vector<HoldPoint>& hold, double tolerance);
+  void applyPrestress();
   void setMomentum(const Momentum& target);
   Eigen::Vector3d gather(const Vec& nodal, const SurfacePoint& point) const;
 
@@ -92,6 +98,8 @@ class SoftObject {
   Vec forces_;  // 3 #V, for the next step
   bool forced_ = false;
   Vec observed_;  // 3 #N, nodes at construction
+  Vec prestress_;  // 3 #N, N, at the observed shape; empty: none
+  double prestress_modulus_ = 0.0;  // Pa, of the material with which it carries the weight
   std::vector<int> carrier_;
   decltype(TriangleMesh::vertices) vertices_;
   double fastest_ = 0.0;
