@@ -13,6 +13,8 @@ namespace {
 
 // Surface up to this share of the diagonal above the lowest point is what the object stands on.
 constexpr double kContactPatch = 0.01;
+// A model's feet seldom end at one height: where it would tip over so, the patch grows up to this.
+constexpr double kLargestContactPatch = 0.08;
 // Sag that changes nothing: of the object's diagonal, and in pixels.
 constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
 
@@ -31,6 +33,22 @@ double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obst
   for (const Obstacle& obstacle : obstacles)
     if (const auto hit = carrying(obstacle, surface, gravity, reach)) smallest = std::min(smallest, hit->gap);
   return smallest;
+}
+
+// Whether no axis across `down` has all points on one side of the centre of mass.
+bool standsOn(const std::vector<std::pair<HoldPoint, int>>& points, const SoftObject& soft, const Eigen::Vector3d& down) {
+  const Eigen::Vector3d center = soft.body().momentum().center;
+  const Eigen::Vector3d a = down.unitOrthogonal(), b = down.normalized().cross(a);
+  std::vector<double> angles;
+  for (const auto& [point, obstacle] : points) {
+    const Eigen::Vector3d arm = soft.position(SurfacePoint::vertex(point.vertex)) - center;
+    angles.push_back(std::atan2(arm.dot(b), arm.dot(a)));
+  }
+  if (angles.empty()) return false;
+  std::sort(angles.begin(), angles.end());
+  double widest = angles.front() + 2.0 * M_PI - angles.back();
+  for (size_t i = 1; i < angles.size(); ++i) widest = std::max(widest, angles[i] - angles[i - 1]);
+  return widest < M_PI;
 }
 
 }  // namespace
@@ -239,8 +257,12 @@ void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface) {
   std::vector<int> by;
   if (actor.holder == Holder::kSupport) {
     const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
-    const double reach = std::max(0.0, gap) + kContactPatch * size;
-    for (const auto& [point, obstacle] : contacts.touching(entry, around, reach)) {
+    std::vector<std::pair<HoldPoint, int>> touching;
+    for (double patch = kContactPatch; patch <= kLargestContactPatch; patch *= 2.0) {
+      touching = contacts.touching(entry, around, std::max(0.0, gap) + patch * size);
+      if (standsOn(touching, *actor.soft, scene.gravity)) break;
+    }
+    for (const auto& [point, obstacle] : touching) {
       hold.push_back(point);
       by.push_back(obstacle);
     }
@@ -252,7 +274,7 @@ void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface) {
   const SettleReport report = actor.soft->settle(scene.gravity + actor.buoyancy, hold, tolerance);
   if (!report.message.empty()) actor.note += report.message + "; ";
   for (size_t i = 0; i < hold.size(); ++i)
-    contacts.hold(entry, around[by[i]], hold[i], 2.0 * kSupportGap * size);
+    contacts.hold(entry, around[by[i]], hold[i], (kSupportGap + kLargestContactPatch) * size);
 }
 
 void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) {
