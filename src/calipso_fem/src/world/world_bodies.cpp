@@ -11,47 +11,15 @@
 namespace calipso::fem {
 namespace {
 
-// Surface up to this share of the diagonal above the lowest point is what the object stands on.
-constexpr double kContactPatch = 0.01;
-// A model's feet seldom end at one height: where it would tip over so, the patch grows up to this.
-constexpr double kLargestContactPatch = 0.08;
-// Sag that changes nothing: of the object's diagonal, and in pixels.
-constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
-
 // An object that starts to be simulated must not keep the video waiting.
 constexpr int kSettlingLoadSteps = 4;
+
+}  // namespace
 
 double pixelsPerMeter(const Camera& camera, const Eigen::Vector3d& at) {
   const double depth = (camera.world_from_camera.inverse() * at).z();
   return depth > 0.0 && camera.fx > 0.0 ? camera.fx / depth : 0.0;
 }
-
-// Smallest gap to any obstacle that pushes against gravity.
-double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obstacles,
-                  const Eigen::Vector3d& gravity, double reach) {
-  double smallest = reach;
-  for (const Obstacle& obstacle : obstacles)
-    if (const auto hit = carrying(obstacle, surface, gravity, reach)) smallest = std::min(smallest, hit->gap);
-  return smallest;
-}
-
-// Whether no axis across `down` has all points on one side of the centre of mass.
-bool standsOn(const std::vector<std::pair<HoldPoint, int>>& points, const SoftObject& soft, const Eigen::Vector3d& down) {
-  const Eigen::Vector3d center = soft.body().momentum().center;
-  const Eigen::Vector3d a = down.unitOrthogonal(), b = down.normalized().cross(a);
-  std::vector<double> angles;
-  for (const auto& [point, obstacle] : points) {
-    const Eigen::Vector3d arm = soft.position(SurfacePoint::vertex(point.vertex)) - center;
-    angles.push_back(std::atan2(arm.dot(b), arm.dot(a)));
-  }
-  if (angles.empty()) return false;
-  std::sort(angles.begin(), angles.end());
-  double widest = angles.front() + 2.0 * M_PI - angles.back();
-  for (size_t i = 1; i < angles.size(); ++i) widest = std::max(widest, angles[i] - angles[i - 1]);
-  return widest < M_PI;
-}
-
-}  // namespace
 
 TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose) {
   TriangleMesh m = mesh;
@@ -130,28 +98,6 @@ decltype(TriangleMesh::vertices) World::Impl::verticesOf(const Actor& actor) con
 
 Eigen::Vector3d World::Impl::centroidOf(const Actor& actor) const {
   return verticesOf(actor).colwise().mean().transpose();
-}
-
-// What holds the object in the video, and with what buoyancy.
-void World::Impl::findHolder(Actor& actor) {
-  if (actor.holder != Holder::kUnknown) return;
-  actor.buoyancy.setZero();
-  const auto boxes = actor.object.attachments;
-  if (!verticesInBoxes(actor.object.mesh, actor.object.world_from_object, boxes).empty()) {
-    actor.holder = Holder::kAttachment;
-    return;
-  }
-  const TriangleMesh surface = placed(actor.object.mesh, poseOf(actor, now));
-  const double reach = kSupportGap * boundingDiagonal(surface);
-  if (supportGap(surface, obstacles(now, now, &actor), scene.gravity, reach) < reach) {
-    actor.holder = Holder::kSupport;
-    return;
-  }
-  const ObservedMotion seen = actor.track.at(now);
-  const bool falls =
-      seen.moving && seen.acceleration.dot(scene.gravity) > 0.5 * scene.gravity.squaredNorm();
-  actor.holder = falls ? Holder::kNothing : Holder::kBuoyancy;
-  if (!falls) actor.buoyancy = -scene.gravity;
 }
 
 void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reason) {
@@ -245,36 +191,6 @@ void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
   actor.body = rigid.add(spec);
   rigid.setAcceleration(*actor.body, actor.acceleration());
   applyRules(actor);
-}
-
-// Makes the observed shape the equilibrium under what held the object in the video. Buoyancy and
-// free fall leave nothing to balance.
-void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface) {
-  const double size = boundingDiagonal(surface);
-  const auto around = obstacles(now, now, &actor);
-  const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
-  std::vector<HoldPoint> hold;
-  std::vector<int> by;
-  if (actor.holder == Holder::kSupport) {
-    const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
-    std::vector<std::pair<HoldPoint, int>> touching;
-    for (double patch = kContactPatch; patch <= kLargestContactPatch; patch *= 2.0) {
-      touching = contacts.touching(entry, around, std::max(0.0, gap) + patch * size);
-      if (standsOn(touching, *actor.soft, scene.gravity)) break;
-    }
-    for (const auto& [point, obstacle] : touching) {
-      hold.push_back(point);
-      by.push_back(obstacle);
-    }
-  }
-  if (hold.empty() && actor.holder != Holder::kAttachment) return;
-  const double px = pixelsPerMeter(scene.camera, surface.vertices.colwise().mean().transpose());
-  const double tolerance =
-      std::min(kSagOfSize * size, px > 0.0 ? kSagPixels / px : kSagOfSize * size);
-  const SettleReport report = actor.soft->settle(scene.gravity + actor.buoyancy, hold, tolerance);
-  if (!report.message.empty()) actor.note += report.message + "; ";
-  for (size_t i = 0; i < hold.size(); ++i)
-    contacts.hold(entry, around[by[i]], hold[i], (kSupportGap + kLargestContactPatch) * size);
 }
 
 void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) {

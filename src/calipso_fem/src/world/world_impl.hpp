@@ -47,7 +47,6 @@ struct World::Impl {
   BodyMotion motionOf(const Actor& actor) const;
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> verticesOf(const Actor& actor) const;
   Eigen::Vector3d centroidOf(const Actor& actor) const;
-  void findHolder(Actor& actor);
   void become(Actor& actor, ObjectKind kind, const std::string& reason);
   void rebuild(Actor& actor);
   void noteOverlaps(Actor& actor, const TriangleMesh& surface);
@@ -55,7 +54,6 @@ struct World::Impl {
   void makeSoft(Actor& actor, const BodyMotion& motion, bool settle);
   void deformAsObserved(Actor& actor);  // shape and velocity as in the video at this instant
   Vec nodalModes(const Actor& actor, const Vec& amplitudes) const;
-  void settleAsObserved(Actor& actor, const TriangleMesh& surface);
   void removeBodies(Actor& actor);
   void reset(Actor& actor);
   // Friction, restitution and proximity of one object's surface, in all its contacts.
@@ -79,6 +77,10 @@ struct World::Impl {
   void addCollider(Actor& actor);
   const std::vector<TriangleMesh>& hullsOf(Actor& actor);  // computed once per mesh
   void wake(Actor& actor);
+
+  // What held an object in the video (world_settle.cpp)
+  void findHolder(Actor& actor);
+  void settleAsObserved(Actor& actor, const TriangleMesh& surface);
 
   // Objects that rest on others (world_rests.cpp)
   void noteWhatRestsOn(const Actor& carrier);  // as the video has it, before an edit touches the carrier
@@ -186,6 +188,8 @@ constexpr double kSupportGap = 0.02;
 
 // Lasting id of the k-th support, planes first; objects have ids from 0 up.
 constexpr int supportId(size_t k) { return -1 - static_cast<int>(k); }
+
+double pixelsPerMeter(const Camera& camera, const Eigen::Vector3d& at);  // 0 where it cannot be seen
 
 // Edge length of the cells and all other FEM options for an object, from its size in the picture.
 FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const WorldParams& params,

@@ -1,0 +1,128 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "calipso_fem/world/region_selection.hpp"
+#include "obstacle_query.hpp"
+#include "world_impl.hpp"
+
+// What holds an object in the video, and how it becomes the equilibrium it is there.
+namespace calipso::fem {
+namespace {
+
+// Surface up to this share of the diagonal above the lowest point is what the object stands on.
+constexpr double kContactPatch = 0.01;
+// A model's feet seldom end at one height: where it would tip over so, or nearly, the patch grows up to this, as long
+// as that helps.
+constexpr double kLargestContactPatch = 0.08, kTippingGap = 0.75 * M_PI, kGapGained = 0.2,
+                 kOtherFoot = 0.1;
+// Sag that changes nothing: of the object's diagonal, and in pixels.
+constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
+
+// Smallest gap to any obstacle that pushes against gravity.
+double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obstacles,
+                  const Eigen::Vector3d& gravity, double reach) {
+  double smallest = reach;
+  for (const Obstacle& obstacle : obstacles)
+    if (const auto hit = carrying(obstacle, surface, gravity, reach)) smallest = std::min(smallest, hit->gap);
+  return smallest;
+}
+
+// Widest angle about the centre of mass, seen along `down`, in which none of the points lies: from pi on the object
+// tips over. rad
+double widestGap(const std::vector<std::pair<HoldPoint, int>>& points, const SoftObject& soft, const Eigen::Vector3d& down) {
+  const Eigen::Vector3d center = soft.body().momentum().center;
+  const Eigen::Vector3d a = down.unitOrthogonal(), b = down.normalized().cross(a);
+  std::vector<double> angles;
+  for (const auto& [point, obstacle] : points) {
+    const Eigen::Vector3d arm = soft.position(SurfacePoint::vertex(point.vertex)) - center;
+    angles.push_back(std::atan2(arm.dot(b), arm.dot(a)));
+  }
+  if (angles.empty()) return 2.0 * M_PI;
+  std::sort(angles.begin(), angles.end());
+  double widest = angles.front() + 2.0 * M_PI - angles.back();
+  for (size_t i = 1; i < angles.size(); ++i) widest = std::max(widest, angles[i] - angles[i - 1]);
+  return widest;
+}
+
+using Touching = std::vector<std::pair<HoldPoint, int>>;
+
+// The lowest points, and, where the object would tip over on these or nearly, its other feet.
+// @param within  what touches up to a share of the size above the lowest point
+// @param apart   m, across `down`: from there on it is another foot
+Touching standingPoints(const SoftObject& soft, const Eigen::Vector3d& down,
+                        const std::function<Touching(double)>& within, double apart) {
+  const Touching lowest = within(kContactPatch);
+  Touching best = lowest;
+  double widest = widestGap(best, soft, down);
+  for (double patch = 2.0 * kContactPatch; widest > kTippingGap && patch <= kLargestContactPatch; patch *= 2.0) {
+    Touching more = lowest;
+    for (const auto& point : within(patch)) {
+      const Eigen::Vector3d at = soft.position(SurfacePoint::vertex(point.first.vertex));
+      const bool other = std::all_of(lowest.begin(), lowest.end(), [&](const auto& known) {
+        const Eigen::Vector3d arm = at - soft.position(SurfacePoint::vertex(known.first.vertex));
+        return arm.cross(down.normalized()).norm() > apart;
+      });
+      if (other) more.push_back(point);
+    }
+    const double left = widestGap(more, soft, down);
+    if (left > widest - kGapGained) continue;
+    widest = left;
+    best = std::move(more);
+  }
+  return best;
+}
+
+}  // namespace
+
+// What holds the object in the video, and with what buoyancy.
+void World::Impl::findHolder(Actor& actor) {
+  if (actor.holder != Holder::kUnknown) return;
+  actor.buoyancy.setZero();
+  const auto boxes = actor.object.attachments;
+  if (!verticesInBoxes(actor.object.mesh, actor.object.world_from_object, boxes).empty()) {
+    actor.holder = Holder::kAttachment;
+    return;
+  }
+  const TriangleMesh surface = placed(actor.object.mesh, poseOf(actor, now));
+  const double reach = kSupportGap * boundingDiagonal(surface);
+  if (supportGap(surface, obstacles(now, now, &actor), scene.gravity, reach) < reach) {
+    actor.holder = Holder::kSupport;
+    return;
+  }
+  const ObservedMotion seen = actor.track.at(now);
+  const bool falls =
+      seen.moving && seen.acceleration.dot(scene.gravity) > 0.5 * scene.gravity.squaredNorm();
+  actor.holder = falls ? Holder::kNothing : Holder::kBuoyancy;
+  if (!falls) actor.buoyancy = -scene.gravity;
+}
+
+// Makes the observed shape the equilibrium under what held the object in the video. Buoyancy and
+// free fall leave nothing to balance.
+void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface) {
+  const double size = boundingDiagonal(surface);
+  const auto around = obstacles(now, now, &actor);
+  const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
+  std::vector<HoldPoint> hold;
+  std::vector<int> by;
+  if (actor.holder == Holder::kSupport) {
+    const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
+    const auto touching = standingPoints(*actor.soft, scene.gravity, [&](double patch) {
+      return contacts.touching(entry, around, std::max(0.0, gap) + patch * size);
+    }, kOtherFoot * size);
+    for (const auto& [point, obstacle] : touching) {
+      hold.push_back(point);
+      by.push_back(obstacle);
+    }
+  }
+  if (hold.empty() && actor.holder != Holder::kAttachment) return;
+  const double px = pixelsPerMeter(scene.camera, surface.vertices.colwise().mean().transpose());
+  const double tolerance =
+      std::min(kSagOfSize * size, px > 0.0 ? kSagPixels / px : kSagOfSize * size);
+  const SettleReport report = actor.soft->settle(scene.gravity + actor.buoyancy, hold, tolerance);
+  if (!report.message.empty()) actor.note += report.message + "; ";
+  for (size_t i = 0; i < hold.size(); ++i)
+    contacts.hold(entry, around[by[i]], hold[i], (kSupportGap + kLargestContactPatch) * size);
+}
+
+}  // namespace calipso::fem
