@@ -142,19 +142,33 @@ ShapeUncertainty uncertaintyOf(const FitProblem& problem, const Points& x, const
                           problem.model_size, unseen, likelihood);
 }
 
-// From translation of the centroid and rotation about it to the object frame's origin, world axes.
-Eigen::Matrix<double, 6, 6> poseCovariance(const FitProblem& problem, const Posterior& end,
+// Of translation of the centroid (camera axes, m) and rotation about it (rad): what the deformation leaves open
+// moves and turns the best rigid motion, too.
+Eigen::Matrix<double, 6, 6> rigidCovariance(const Points& x, const Posterior& end) {
+  const RigidPart rigid = rigidPart(x, end.here);
+  Eigen::Matrix<double, 6, LowOrderMap::kParameters> by_parameters;
+  by_parameters << rigid.translation_by_parameters, rigid.rotation_by_parameters;
+  return by_parameters * end.covariance * by_parameters.transpose();
+}
+
+// The same of the object frame's origin, world axes.
+Eigen::Matrix<double, 6, 6> poseCovariance(const FitProblem& problem,
+                                           const Eigen::Matrix<double, 6, 6>& rigid,
+                                           const Eigen::Vector3d& centroid,
                                            const Eigen::Isometry3d& camera_from_object) {
-  const Eigen::MatrixXd& all = end.covariance;
-  const Eigen::Vector3d arm = camera_from_object.translation() - end.here.centroid();
+  const Eigen::Vector3d arm = camera_from_object.translation() - centroid;
   Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Zero();
   const Eigen::Matrix3d R = problem.camera.world_from_camera.linear();
   J.topLeftCorner<3, 3>() = R;
   for (int k = 0; k < 3; ++k) J.block<3, 1>(0, 3 + k) = R * Eigen::Vector3d::Unit(k).cross(arm);
   J.bottomRightCorner<3, 3>() = R;
-  Eigen::Matrix<double, 6, 6> local;
-  local << all.block<3, 3>(3, 3), all.block<3, 3>(3, 0), all.block<3, 3>(0, 3), all.block<3, 3>(0, 0);
-  return J * local * J.transpose();
+  return J * rigid * J.transpose();
+}
+
+// Deviation of the distance, as part of it.
+double distanceSigma(const Eigen::Matrix<double, 6, 6>& rigid, const Eigen::Vector3d& centroid) {
+  const Eigen::Vector3d sight = centroid.normalized();
+  return std::sqrt(sight.dot(rigid.topLeftCorner<3, 3>() * sight)) / centroid.norm();
 }
 
 // Residuals of the target's points, handed to the contour points that they stand for.
@@ -198,8 +212,11 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
   result.deformation = last.fit.prior.deformation;
   result.noise_px = problem.target.noise_px;
   const Posterior end = posterior(problem, x, last);
-  result.covariance = poseCovariance(
-      problem, end, problem.camera.world_from_camera.inverse() * result.world_from_object);
+  const Eigen::Matrix<double, 6, 6> rigid = rigidCovariance(x, end);
+  result.covariance =
+      poseCovariance(problem, rigid, end.here.centroid(),
+                     problem.camera.world_from_camera.inverse() * result.world_from_object);
+  result.distance_sigma = distanceSigma(rigid, end.here.centroid());
   const ShapeUncertainty error =
       judge_depth ? uncertaintyOf(problem, x, last, end) : ShapeUncertainty();
   result.expected_error = error.expected().mean;
@@ -211,7 +228,7 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
   result.contour_mean_px = quality.mean_px;
   result.contour_p95_px = quality.p95_px;
   result.residual_px = residualsPerLoop(problem, quality, contour);
-  const Verdict verdict = judge(problem, contour, quality, result.scale, error);
+  const Verdict verdict = judge(problem, contour, quality, result.scale, result.distance_sigma, error);
   result.trusted = verdict.trusted;
   result.reason = verdict.reason;
 }

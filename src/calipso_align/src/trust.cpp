@@ -18,6 +18,7 @@ constexpr double kLeastMet = 0.8;        // part of the known contour: it may ha
 constexpr double kMostOff = 0.02;         // part of the area: thin parts may be missing on either side
 constexpr double kLargestMeanPx = 1.0;   // on top of half the contour's noise
 constexpr double kLargestScale = 2.5;
+constexpr double kDistanceKnown = 0.01;  // part of the distance: what is more uncertain is worth a word
 constexpr double kLargestOff = 0.1;      // probability that the surface is further away than it should be
 
 std::string percent(double part) { return std::to_string(std::lround(100.0 * part)) + " %"; }
@@ -91,6 +92,43 @@ double openPart(const FitProblem& problem, const cv::Mat1b& silhouette, double t
          std::max(1, cv::countNonZero(inside));
 }
 
+// What the user should know of a fit that can be trusted.
+std::string remarks(const FitProblem& problem, double known, double distance_sigma) {
+  std::vector<std::string> all;
+  if (spinAxis(problem.X)) {
+    all.push_back("spin about its axis undetermined: the shape is axisymmetric, so that the contour "
+                  "leaves it as it was placed");
+  }
+  if (known < kMostlyKnown) {
+    all.push_back("part of the contour is unknown: " + percent(1.0 - known) +
+                  " of it is hidden or cut by the image border, and the model there is as it was drawn");
+  }
+  if (distance_sigma > kDistanceKnown) {
+    std::ostringstream distance;
+    distance.precision(2);
+    distance << "distance uncertain by " << 100.0 * distance_sigma
+             << " % (standard deviation): a contour does not show it, it is about as placed";
+    all.push_back(distance.str());
+  }
+  std::string text;
+  for (const std::string& remark : all) text += (text.empty() ? "" : "; ") + remark;
+  return text;
+}
+
+// The model's silhouette without what is covered by something else: holes of the picture that are known to
+// be an occluder's are none that the model lacks.
+cv::Mat1b surelySeen(const FitProblem& problem, const cv::Mat1b& silhouette) {
+  cv::Mat1b seen = silhouette.clone();
+  if (problem.target.known_length_px >= problem.target.length_px) return seen;
+  std::vector<cv::Point> covered;
+  cv::findNonZero(withoutHoles(problem.inside) & ~problem.inside & silhouette, covered);
+  for (const cv::Point& p : covered) {
+    const size_t nearest = nearestTarget(problem.target, {p.x, p.y});
+    if (!problem.target.points[nearest].known) seen(p) = 0;
+  }
+  return seen;
+}
+
 }  // namespace
 
 FitQuality assess(const FitProblem& problem, const Points& x) {
@@ -121,7 +159,7 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
   // A bar of a lattice may be off on either side of a hole.
   const double hole_px = 2.0 * quality.tolerance_px;
   quality.model_holes_px = unshownHoles(silhouette, problem.inside, hole_px);
-  quality.picture_holes_px = unshownHoles(problem.inside, silhouette, hole_px);
+  quality.picture_holes_px = unshownHoles(problem.inside, surelySeen(problem, silhouette), hole_px);
   quality.protruding = protrudingPart(problem, rendering, quality.tolerance_px);
   quality.mean_px = std::accumulate(sizes.begin(), sizes.end(), 0.0) / sizes.size();
   const auto p95 = sizes.begin() + static_cast<long>(0.95 * (sizes.size() - 1));
@@ -131,7 +169,8 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
 }
 
 Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-              const FitQuality& quality, double scale, const ShapeUncertainty& error) {
+              const FitQuality& quality, double scale, double distance_sigma,
+              const ShapeUncertainty& error) {
   std::ostringstream reason;
   reason.precision(3);
   const double known = problem.target.known_length_px / problem.target.length_px;
@@ -162,19 +201,10 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
     reason << "depth undetermined: the contour is met, but as to distance, turn and thickness along the "
               "sight line the surface is off by more than "
            << 100.0 * kTrustedWithin.mean << " % of the size with a probability of "
-           << percent(error.beyond(kTrustedWithin))
-           << "; give a depth image or the plane that the object stands on";
+           << percent(error.beyond(kTrustedWithin)) << "; its distance is uncertain by "
+           << 100.0 * distance_sigma << " % (standard deviation); give a depth image or the plane that the object stands on";
   } else {
-    if (spinAxis(problem.X)) {
-      reason << "spin about its axis undetermined: the shape is axisymmetric, so that the contour "
-                "leaves it as it was placed";
-    }
-    if (known < kMostlyKnown) {
-      reason << (reason.tellp() > 0 ? "; " : "") << "part of the contour is unknown: "
-             << percent(1.0 - known)
-             << " of it is hidden or cut by the image border, and the model there is as it was drawn";
-    }
-    return {true, reason.str()};
+    return {true, remarks(problem, known, distance_sigma)};
   }
   return {false, reason.str()};
 }

@@ -92,6 +92,29 @@ TEST(Alignment, DepthImageFixesTheDistance) {
   EXPECT_NEAR(x.col(2).mean(), true_x.col(2).mean(), 0.02);
 }
 
+TEST(Alignment, SaysHowUncertainTheDistanceIs) {
+  const Camera camera = test::frontCamera();
+  const TriangleMesh truth = deformedPear();
+  const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
+  const std::vector<ContourLoop> contour = test::contourOf(truth, identity, camera);
+  const double distance = test::inCamera(camera, identity, truth.vertices).colwise().mean().norm();
+  for (const bool with_depth : {false, true}) {
+    AlignOptions options = coarse();
+    if (with_depth) options.depth = depthOf(truth, camera);
+    for (const double off : {-0.05, 0.0, 0.05}) {
+      Eigen::Isometry3d rough = test::roughPose();
+      rough.translation().y() += off * distance;
+      const AlignmentResult result = align(test::pear(), camera, rough, contour, options);
+      const Points x = test::inCamera(camera, result.world_from_object, result.mesh.vertices);
+      const double error = x.colwise().mean().norm() / distance - 1.0;
+      EXPECT_LT(std::abs(error), 3.0 * result.distance_sigma) << off << " " << with_depth;
+      // A placement that is at most a twentieth off is the least that is known.
+      EXPECT_LT(result.distance_sigma, with_depth ? 0.01 : 0.05);
+      if (!with_depth) EXPECT_GT(result.distance_sigma, 0.02);
+    }
+  }
+}
+
 TEST(Alignment, DoesNotGoThroughTheTable) {
   const Camera camera = test::frontCamera();
   const TriangleMesh mesh = test::pear();
@@ -206,6 +229,20 @@ TEST(Alignment, FlagsAHoleThatOnlyThePictureHas) {
       align(test::pear(), test::frontCamera(), test::roughPose(), contour, coarse());
   EXPECT_FALSE(result.trusted);
   EXPECT_NE(result.reason.find("the picture shows a hole of "), std::string::npos) << result.reason;
+}
+
+TEST(Alignment, AnOccludersHoleIsNoneThatTheModelLacks) {
+  const cv::Point at(165, 140);
+  const auto hide = [&](cv::Mat& picture, double value) {
+    cv::circle(picture, at, 8, cv::Scalar(value), cv::FILLED);
+  };
+  const std::vector<ContourLoop> contour = contourOfMask([&](cv::Mat1b& mask) { hide(mask, 0.0); });
+  AlignOptions options = coarse();
+  options.depth = depthOf(test::pear(), test::frontCamera());
+  hide(options.depth->depth, 2.0);   // a ball in front
+  const AlignmentResult result =
+      align(test::pear(), test::frontCamera(), test::roughPose(), contour, options);
+  EXPECT_TRUE(result.trusted) << result.reason;
 }
 
 TEST(Alignment, FlagsAMaskThatFillsTheImage) {

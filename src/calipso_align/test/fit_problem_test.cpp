@@ -162,7 +162,7 @@ TEST(Trust, NoiseOpensNothing) {
   // The true placement: what is open or sticks out is the noise that smoothing leaves, under a pixel.
   EXPECT_LT(quality.open, 0.005);
   EXPECT_LT(quality.protruding, 0.005);
-  EXPECT_TRUE(judge(problem, seen.contour, quality, 1.0, {}).trusted);
+  EXPECT_TRUE(judge(problem, seen.contour, quality, 1.0, 0.0, {}).trusted);
 }
 
 TEST(Trust, AVaseSpinsAndAPearDoesNot) {
@@ -179,13 +179,23 @@ TEST(Trust, AVaseSpinsAndAPearDoesNot) {
   EXPECT_FALSE(spinAxis(test::pear(60, 120).vertices).has_value());
 }
 
+TEST(Trust, AnUncertainDistanceIsRemarked) {
+  const Seen seen;
+  const FitProblem problem = seen.problem();
+  const FitQuality fits = assess(problem, problem.X);
+  EXPECT_EQ(judge(problem, seen.contour, fits, 1.0, 0.009, {}).reason.find("distance"), std::string::npos);
+  const Verdict verdict = judge(problem, seen.contour, fits, 1.0, 0.025, {});
+  EXPECT_TRUE(verdict.trusted);
+  EXPECT_NE(verdict.reason.find("distance uncertain by 2.5 %"), std::string::npos) << verdict.reason;
+}
+
 TEST(Trust, AModelThatSticksOutOrFallsShortIsNotTrusted) {
   const Seen seen;
   const FitProblem problem = seen.problem();
   const FitQuality fits = assess(problem, problem.X);
   EXPECT_GT(fits.met, 0.99);
   EXPECT_EQ(fits.protruding, 0.0);
-  EXPECT_TRUE(judge(problem, seen.contour, fits, 1.0, {}).trusted);
+  EXPECT_TRUE(judge(problem, seen.contour, fits, 1.0, 0.0, {}).trusted);
 
   // One end drawn out: most of the contour is still met.
   Points x = problem.X;
@@ -195,14 +205,14 @@ TEST(Trust, AModelThatSticksOutOrFallsShortIsNotTrusted) {
   }
   const FitQuality drawn = assess(problem, x);
   EXPECT_GT(drawn.protruding, 0.02);
-  EXPECT_FALSE(judge(problem, seen.contour, drawn, 1.0, {}).trusted);
+  EXPECT_FALSE(judge(problem, seen.contour, drawn, 1.0, 0.0, {}).trusted);
 
   // One end pushed in.
   for (int i = 0; i < x.rows(); ++i) x(i, 1) = std::max(problem.X(i, 1), 0.7 * end);
   const FitQuality pushed = assess(problem, x);
   EXPECT_GT(pushed.open, 0.02);
   EXPECT_EQ(pushed.protruding, 0.0);
-  EXPECT_FALSE(judge(problem, seen.contour, pushed, 1.0, {}).trusted);
+  EXPECT_FALSE(judge(problem, seen.contour, pushed, 1.0, 0.0, {}).trusted);
 }
 
 }  // namespace

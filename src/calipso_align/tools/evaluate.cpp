@@ -286,6 +286,7 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   line.addNumber("fit_mean_px", result.contour_mean_px);
   line.addNumber("expected3d_mean_percent", 100.0 * result.expected_error);
   line.addNumber("expected3d_rms_percent", 100.0 * result.expected_rms);
+  line.addNumber("distance_sigma_percent", 100.0 * result.distance_sigma);
   line.addNumber("off_probability", result.off_probability);
   line.addNumber("deformation_found", result.deformation);
   line.addNumber("clearance_mm",

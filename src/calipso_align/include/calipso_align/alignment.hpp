@@ -56,6 +56,7 @@ struct AlignmentResult {
   TriangleMesh rest;                       // S, as given
   std::vector<std::vector<float>> residual_px;  // per loop and point; positive: the model reaches
                                                 // too far out; NaN: unknown or without counterpart
+  double distance_sigma = 0.0;             // deviation of the centroid's distance, as part of it
   bool placed = false;                     // false: the rough placement was of no use, nothing was fitted
   double met_mean_px = 0.0;                // of known points that the model meets
   double contour_mean_px = 0.0;            // of known points

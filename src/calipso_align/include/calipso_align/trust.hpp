@@ -29,9 +29,11 @@ struct Verdict {
 };
 
 // @param scale     size of the fitted model relative to the stock model
+// @param distance_sigma  deviation of its distance, as part of it
 // @param error     what the fitted surface may be off
 Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour,
-              const FitQuality& quality, double scale, const ShapeUncertainty& error);
+              const FitQuality& quality, double scale, double distance_sigma,
+              const ShapeUncertainty& error);
 
 // Whether turning the model about one of its principal axes leaves it where it was: then no contour
 // shows that turn. Returns the axis in the frame of X.
