@@ -251,6 +251,19 @@ TEST(WorldObjects, ARemovedObjectTakesItsOwnTopWithItUntilItIsReset) {
   }
 }
 
+TEST(WorldObjects, AResetLeavesContactsThatTheUserHasEnded) {
+  World world(thingWithDeck(), {});
+  world.setPairContact("load", "deck", false);
+  Edit edit = letGo("thing");
+  for (const EditKind kind : {EditKind::kRemove, EditKind::kReset}) {
+    edit.kind = kind;
+    world.submit(edit);
+    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    EXPECT_FALSE(world.pairRule("load", "deck").contact);
+    EXPECT_EQ(world.pairRule("thing", "deck").contact, kind == EditKind::kReset);
+  }
+}
+
 // A cup on a box: it stays as the video has it while the box does, and falls when that is taken away or falls itself.
 TEST(WorldObjects, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
   WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, 0.5}, false);

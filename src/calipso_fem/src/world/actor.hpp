@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calipso_fem/world/observed_track.hpp"
@@ -70,7 +71,8 @@ struct Actor {
   bool inserted = false;  // not in the video
   bool immovable = false;  // of infinite mass
   std::vector<int> own_supports;  // ids of the support meshes that are its own surface
-  bool meets_own_supports = true;  // something can
+  // Contacts of own supports that it has put an end to; others' wishes stay.
+  std::vector<std::pair<std::string, std::string>> ended_contacts;
   std::string source;     // of a copy: the object of the video whose model it is drawn by
   Holder holder = Holder::kUnknown;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();            // m/s^2

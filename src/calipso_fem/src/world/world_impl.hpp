@@ -60,6 +60,7 @@ struct World::Impl {
   void setSurface(Actor& actor, const SurfaceSettings& surface);
   // Objects or supports by name. Empty b: a and everything; then a rule already given stays.
   void setPairContact(const std::string& a, const std::string& b, bool on);
+  std::vector<std::string> allBut(const std::string& name) const;  // objects and supports
   void setPairRule(const std::string& a, const std::string& b, const PairRule& rule);
   PairRule pairRule(const std::string& a, const std::string& b) const;
   bool meet(int a, int b) const;  // ids

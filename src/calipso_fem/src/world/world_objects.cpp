@@ -71,13 +71,20 @@ std::vector<int> World::Impl::ownSupports(const WorldObject& object) const {
 }
 
 void World::Impl::meetOwnSupports(Actor& actor, bool contact) {
-  if (contact && actor.meets_own_supports) return;  // as they are
-  actor.meets_own_supports = contact;
+  if (contact) {
+    for (const auto& [support, other] : actor.ended_contacts) setPairContact(support, other, true);
+    actor.ended_contacts.clear();
+    return;
+  }
   for (const SupportMesh& mesh : scene.support_meshes) {
     const auto& own = actor.own_supports;
     if (std::find(own.begin(), own.end(), idOf(mesh.name)) == own.end()) continue;
-    setPairContact(mesh.name, "", contact);
-    if (!contact) actor.note += mesh.name + " is its own surface and is left out; ";
+    for (const std::string& other : allBut(mesh.name)) {
+      if (!pairRule(mesh.name, other).contact) continue;
+      setPairContact(mesh.name, other, false);
+      actor.ended_contacts.emplace_back(mesh.name, other);
+    }
+    actor.note += mesh.name + " is its own surface and is left out; ";
   }
 }
 
@@ -99,15 +106,16 @@ void World::Impl::setPairRule(const std::string& a, const std::string& b, const 
     if (id >= 0) wake(actors[id]);
 }
 
+std::vector<std::string> World::Impl::allBut(const std::string& name) const {
+  std::vector<std::string> others = names();
+  for (const SupportPlane& plane : scene.planes) others.push_back(plane.name);
+  for (const SupportMesh& mesh : scene.support_meshes) others.push_back(mesh.name);
+  others.erase(std::remove(others.begin(), others.end(), name), others.end());
+  return others;
+}
+
 void World::Impl::setPairContact(const std::string& a, const std::string& b, bool on) {
-  std::vector<std::string> others = {b};
-  if (b.empty()) {
-    others = names();
-    for (const SupportPlane& plane : scene.planes) others.push_back(plane.name);
-    for (const SupportMesh& mesh : scene.support_meshes) others.push_back(mesh.name);
-    others.erase(std::remove(others.begin(), others.end(), a), others.end());
-  }
-  for (const std::string& other : others) {
+  for (const std::string& other : b.empty() ? allBut(a) : std::vector<std::string>{b}) {
     PairRule rule = pairRule(a, other);
     rule.contact = on;
     setPairRule(a, other, rule);
