@@ -20,7 +20,9 @@ namespace {
 
 constexpr float kOpenSky = 0.4f;        // ... above which the dark of a shadow says how dark the sun's absence is
 constexpr float kUnshadedSun = 0.985f, kUnshadedSky = 0.85f;  // visible parts from which a place says how the planes mirror
-constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and model are misfit
+constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and model are misfit, unless they reach
+constexpr int kNarrowFront = 3;         // ... so much of them
+constexpr float kDeepFront = 6.0f;      // ... that far inside the model's outline: a peg on a towel
 constexpr std::size_t kFurtherViews = 5;  // beside the key frame
 constexpr float kOffPlane = 0.1f;       // part by which scenery is nearer or farther than the plane behind or before it
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
@@ -187,19 +189,38 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
 
 // Where an object's surface should be seen at the key frame but no mask is, something stands before it.
 // The rim is left out: there the fit is not exact.
+cv::Mat frontOf(const cv::Mat& outline, const cv::Mat& labels) {
+  const cv::Mat gaps = outline & (labels == 0);
+  cv::Mat front, narrow, inside, parts;
+  cv::morphologyEx(gaps, front, cv::MORPH_OPEN, cv::Mat::ones(kFrontOpening, kFrontOpening, CV_8U));
+  cv::morphologyEx(gaps, narrow, cv::MORPH_OPEN, cv::Mat::ones(kNarrowFront, kNarrowFront, CV_8U));
+  cv::distanceTransform(outline, inside, cv::DIST_L2, cv::DIST_MASK_3);
+  std::vector<bool> deep(cv::connectedComponents(narrow, parts, 8, CV_32S), false);
+  for (int v = 0; v < parts.rows; ++v) {
+    for (int u = 0; u < parts.cols; ++u) {
+      if (inside.at<float>(v, u) >= kDeepFront) deep[parts.at<int>(v, u)] = true;
+    }
+  }
+  for (int v = 0; v < parts.rows; ++v) {
+    for (int u = 0; u < parts.cols; ++u) {
+      if (parts.at<int>(v, u) > 0 && deep[parts.at<int>(v, u)]) front.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return cv::countNonZero(front) > 0 ? front : cv::Mat();
+}
+
 std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p) {
   std::vector<cv::Mat> fronts;
   for (std::size_t i = 0; i < actors.size(); ++i) {
-    cv::Mat front = cv::Mat::zeros(p.key_labels.size(), CV_8U);
-    VisibilityBuffer buffer({0, 0, front.cols, front.rows});
+    cv::Mat outline = cv::Mat::zeros(p.key_labels.size(), CV_8U);
+    VisibilityBuffer buffer({0, 0, outline.cols, outline.rows});
     buffer.draw(actors[i].screen, 0);
-    for (int v = 0; v < front.rows; ++v) {
-      for (int u = 0; u < front.cols; ++u) {
-        if (buffer.ids(v)[u] != VisibilityBuffer::kNothing && p.key_labels.at<std::uint8_t>(v, u) == 0) front.at<std::uint8_t>(v, u) = 255;
+    for (int v = 0; v < outline.rows; ++v) {
+      for (int u = 0; u < outline.cols; ++u) {
+        if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) outline.at<std::uint8_t>(v, u) = 255;
       }
     }
-    cv::morphologyEx(front, front, cv::MORPH_OPEN, cv::Mat::ones(kFrontOpening, kFrontOpening, CV_8U));
-    fronts.push_back(cv::countNonZero(front) > 0 ? front : cv::Mat());
+    fronts.push_back(frontOf(outline, p.key_labels));
   }
   return fronts;
 }

@@ -98,6 +98,22 @@ TEST(Others, APartOfAMovingObjectMayRest) {
   EXPECT_GT(psnr(out.bgr, key.bgr, lower), 30.0);
 }
 
+// A peg on a towel: narrow, but deep within the outline. A gap along the rim is misfit.
+TEST(Others, WhatIsNarrowStandsInFrontIfItReachesIn) {
+  ClipFrame key = frameWithBall(ballAt(kCentre));
+  const cv::Rect box = cv::boundingRect(key.labels != 0);
+  const cv::Point middle = (box.tl() + box.br()) / 2;
+  ASSERT_GT(box.height, 20);
+  key.labels(cv::Rect(middle.x - 2, box.y, 5, box.height / 2)).setTo(0);
+  key.labels(cv::Rect(box.x, box.y, 4, box.height)).setTo(0);
+  ClipSample clip;
+  clip.add(key);
+  const Prepared prepared = prepare(clip, {ballAt(kCentre)}, params());
+  ASSERT_FALSE(prepared.fronts[0].empty());
+  EXPECT_NE(prepared.fronts[0].at<std::uint8_t>(middle.y - 4, middle.x), 0);
+  EXPECT_EQ(prepared.fronts[0].at<std::uint8_t>(middle.y, box.x + 1), 0);
+}
+
 // A pose that the tracking has lost is no reason to draw an object where its mask does not have it.
 TEST(Others, AMovingObjectIsNotDrawnAgainstItsMask) {
   const RenderParams render = params();
