@@ -132,13 +132,13 @@ cv::Mat1b surelySeen(const FitProblem& problem, const cv::Mat1b& silhouette) {
 }  // namespace
 
 FitQuality assess(const FitProblem& problem, const Points& x) {
-  constexpr double kFineStepPx = 0.5;
+  constexpr double kFineStepPx = 0.5, kMetPx = 2.0;
   const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
   FitQuality quality;
   const std::vector<OutlinePoint> outline =
       occludingContour(x, problem.topology, rendering, problem.camera, kFineStepPx);
   quality.residuals = contourResiduals(problem.target, outline);
-  quality.tolerance_px = 2.0 + problem.target.noise_px;
+  quality.tolerance_px = kMetPx + problem.target.noise_px;
   std::vector<double> sizes;
   int known = 0;
   for (size_t k = 0; k < quality.residuals.size(); ++k) {
@@ -156,10 +156,10 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
   quality.met = static_cast<double>(met) / known;
   const cv::Mat1b silhouette = maskOf(rendering, problem.camera);
   quality.open = openPart(problem, silhouette, quality.tolerance_px);
-  // A bar of a lattice may be off on either side of a hole.
-  const double hole_px = 2.0 * quality.tolerance_px;
-  quality.model_holes_px = unshownHoles(silhouette, problem.inside, hole_px);
-  quality.picture_holes_px = unshownHoles(problem.inside, surelySeen(problem, silhouette), hole_px);
+  // A bar of a lattice may be off on either side of a hole; of the contour's noise the mask has next to none.
+  constexpr double kHolePx = 2.0 * kMetPx;
+  quality.model_holes_px = unshownHoles(silhouette, problem.inside, kHolePx);
+  quality.picture_holes_px = unshownHoles(problem.inside, surelySeen(problem, silhouette), kHolePx);
   quality.protruding = protrudingPart(problem, rendering, quality.tolerance_px);
   quality.mean_px = std::accumulate(sizes.begin(), sizes.end(), 0.0) / sizes.size();
   const auto p95 = sizes.begin() + static_cast<long>(0.95 * (sizes.size() - 1));
