@@ -30,4 +30,12 @@ void play(World& world, double seconds);
 
 Eigen::Vector3d centerOf(const WorldState& state, int object = 0);
 
+// Afloat before: with twice the gravity it falls with 1 g.
+inline Edit letGo(const std::string& object) {
+  Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);
+  edit.object = object;
+  edit.factor = 2.0;
+  return edit;
+}
+
 }  // namespace calipso::fem::test

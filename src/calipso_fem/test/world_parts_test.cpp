@@ -162,13 +162,23 @@ TEST(ContactSolver, CarriesAHeavyBodyThroughALightOne) {
   EXPECT_NEAR(rows[0].impulse[0], (heavy + light) * step, 1e-6 * heavy * step);
 }
 
-TEST(CondensedFactor, AgreesWithTheWholeSystem) {
-  FemOptions options;
-  options.cell_size = 0.1;
-  DeformableBody body(boxSurface({0.2, 0.2, 0.2}, 2), {1e5, 0.3, 1000.0, 0.0}, options);
+// The block's stiffness, held by `inertia` at every node.
+BlockMatrix heldStiffness(const DeformableBody& body, double inertia) {
   BlockMatrix A;
   body.model().hessian(body.positions(), Definiteness::kPositive, A);
-  for (const int k : A.pattern->diagonal) A.block(k).diagonal().array() += 1e3;
+  for (const int k : A.pattern->diagonal) A.block(k).diagonal().array() += inertia;
+  return A;
+}
+
+DeformableBody smallBlock() {
+  FemOptions options;
+  options.cell_size = 0.1;
+  return DeformableBody(boxSurface({0.2, 0.2, 0.2}, 2), {1e5, 0.3, 1000.0, 0.0}, options);
+}
+
+TEST(CondensedFactor, AgreesWithTheWholeSystem) {
+  const DeformableBody body = smallBlock();
+  const BlockMatrix A = heldStiffness(body, 1e3);
   const Eigen::MatrixXd inverse = Eigen::MatrixXd(A.toSparse()).inverse();
   const std::vector<int> nodes = {0, 5, 13};
   CondensedFactor factor;
@@ -196,16 +206,11 @@ TEST(CondensedFactor, AgreesWithTheWholeSystem) {
 
 // In single precision where that leaves the pivots what is asked of them: as A is, their rounding counts a few times.
 TEST(CondensedFactor, IsAsExactAsAskedFor) {
-  FemOptions options;
-  options.cell_size = 0.1;
-  DeformableBody body(boxSurface({0.2, 0.2, 0.2}, 2), {1e5, 0.3, 1000.0, 0.0}, options);
-  BlockMatrix stiffness;
-  body.model().hessian(body.positions(), Definiteness::kPositive, stiffness);
+  const DeformableBody body = smallBlock();
   const Vec b = Vec::LinSpaced(3 * body.nodeCount(), -1.0, 2.0), none = Vec::Zero(9);
   // Hardly held, the last pivots are small differences of large numbers: single precision would lose them.
   for (const double inertia : {1e3, 1e-2}) {
-    BlockMatrix A = stiffness;
-    for (const int k : A.pattern->diagonal) A.block(k).diagonal().array() += inertia;
+    const BlockMatrix A = heldStiffness(body, inertia);
     CondensedFactor factor;
     ASSERT_TRUE(factor.update(A, {0, 5, 13}, 1e-4));
     factor.reduce(b);
@@ -218,12 +223,8 @@ TEST(CondensedFactor, IsAsExactAsAskedFor) {
 }
 
 TEST(CondensedFactor, SolvesWithoutChosenNodes) {
-  FemOptions options;
-  options.cell_size = 0.1;
-  DeformableBody body(boxSurface({0.2, 0.2, 0.2}, 2), {1e5, 0.3, 1000.0, 0.0}, options);
-  BlockMatrix A;
-  body.model().hessian(body.positions(), Definiteness::kPositive, A);
-  for (const int k : A.pattern->diagonal) A.block(k).diagonal().array() += 1e3;
+  const DeformableBody body = smallBlock();
+  const BlockMatrix A = heldStiffness(body, 1e3);
   CondensedFactor factor;
   ASSERT_TRUE(factor.update(A, {}));
   EXPECT_EQ(factor.compliance().size(), 0);

@@ -187,6 +187,19 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
   return views;
 }
 
+// CV_8UC1: 255 where the model covers the picture.
+cv::Mat outlineOf(const Actor& actor, const cv::Size& size) {
+  cv::Mat outline = cv::Mat::zeros(size, CV_8U);
+  VisibilityBuffer buffer({0, 0, size.width, size.height});
+  buffer.draw(actor.screen, 0);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) outline.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return outline;
+}
+
 // Where an object's surface should be seen at the key frame but no mask is, something stands before it.
 // The rim is left out: there the fit is not exact.
 cv::Mat frontOf(const cv::Mat& outline, const cv::Mat& labels) {
@@ -212,15 +225,7 @@ cv::Mat frontOf(const cv::Mat& outline, const cv::Mat& labels) {
 std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p) {
   std::vector<cv::Mat> fronts;
   for (std::size_t i = 0; i < actors.size(); ++i) {
-    cv::Mat outline = cv::Mat::zeros(p.key_labels.size(), CV_8U);
-    VisibilityBuffer buffer({0, 0, outline.cols, outline.rows});
-    buffer.draw(actors[i].screen, 0);
-    for (int v = 0; v < outline.rows; ++v) {
-      for (int u = 0; u < outline.cols; ++u) {
-        if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) outline.at<std::uint8_t>(v, u) = 255;
-      }
-    }
-    fronts.push_back(frontOf(outline, p.key_labels));
+    fronts.push_back(frontOf(outlineOf(actors[i], p.key_labels.size()), p.key_labels));
   }
   return fronts;
 }
@@ -249,14 +254,7 @@ cv::Mat grown(const cv::Mat& mask, int radius) {
 std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepared& p) {
   std::vector<cv::Mat> footprints;
   for (std::size_t i = 0; i < actors.size(); ++i) {
-    cv::Mat footprint = p.key_labels == p.surfaces[i].index;
-    VisibilityBuffer buffer({0, 0, footprint.cols, footprint.rows});
-    buffer.draw(actors[i].screen, 0);
-    for (int v = 0; v < footprint.rows; ++v) {
-      for (int u = 0; u < footprint.cols; ++u) {
-        if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) footprint.at<std::uint8_t>(v, u) = 255;
-      }
-    }
+    cv::Mat footprint = (p.key_labels == p.surfaces[i].index) | outlineOf(actors[i], p.key_labels.size());
     if (!p.fronts[i].empty()) footprint.setTo(0, p.fronts[i]);
     footprints.push_back(p.moves[i] ? cv::Mat() : footprint);
   }

@@ -1,0 +1,99 @@
+#include <gtest/gtest.h>
+
+#include "world_fixtures.hpp"
+
+// What rests on an object, and supports that are its own surface.
+namespace calipso::fem {
+namespace {
+
+using namespace test;
+
+// A thing whose top, 1.052 m high, is a support mesh as well (a bridge's deck), and a load on it.
+WorldScene thingWithDeck() {
+  TriangleMesh deck;
+  deck.vertices.resize(4, 3);
+  deck.vertices << -0.2, -0.1, 1.052, 0.2, -0.1, 1.052, 0.2, 0.1, 1.052, -0.2, 0.1, 1.052;
+  deck.triangles.resize(2, 3);
+  deck.triangles << 0, 1, 2, 0, 2, 3;
+  WorldScene scene = sceneWith(boxSurface({0.4, 0.2, 0.1}, 2), {0, 0, 1.0});
+  scene.support_meshes.push_back({"deck", deck});
+  scene.objects.push_back(scene.objects.front());
+  scene.objects[1].name = "load", scene.objects[1].index = 2;
+  scene.objects[1].mesh = boxSurface({0.05, 0.05, 0.05}, 1);
+  scene.objects[1].world_from_object.translation().z() = 1.08;
+  return scene;
+}
+
+// When that falls, nothing stays in the air.
+TEST(WorldRests, AnObjectTakesTheSupportThatIsItsOwnTopWithIt) {
+  for (const ObjectKind kind : {ObjectKind::kRigid, ObjectKind::kDeformable}) {
+    const WorldScene scene = thingWithDeck();
+    WorldParams params;
+    params.defaults.kind = kind;
+    params.objects["load"].kind = ObjectKind::kRigid;
+    World world(scene, params);
+    world.submit(letGo("thing"));
+    world.submit(letGo("load"));
+    world.advanceTo(0.0);
+    play(world, 2.0);
+    EXPECT_NE(world.plan()[0].reason.find("deck is its own surface"), std::string::npos) << world.plan()[0].reason;
+    EXPECT_LT(centerOf(world.state(), 1).z(), 0.3) << "rests on the fallen thing or beside it";
+  }
+}
+
+TEST(WorldRests, ARemovedObjectTakesItsOwnTopWithItUntilItIsReset) {
+  for (const bool reset : {false, true}) {
+    WorldParams params;
+    params.objects["load"].kind = ObjectKind::kRigid;
+    World world(thingWithDeck(), params);
+    Edit edit = letGo("thing");
+    edit.kind = EditKind::kRemove;
+    world.submit(edit);
+    edit.kind = EditKind::kReset;
+    if (reset) world.submit(edit);
+    world.submit(letGo("load"));
+    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    play(world, 2.0);
+    const double height = centerOf(world.state(), 1).z();
+    if (reset) EXPECT_NEAR(height, 1.077, 0.01);
+    else EXPECT_LT(height, 0.1);
+  }
+}
+
+TEST(WorldRests, AResetLeavesContactsThatTheUserHasEnded) {
+  World world(thingWithDeck(), {});
+  world.setPairContact("load", "deck", false);
+  Edit edit = letGo("thing");
+  for (const EditKind kind : {EditKind::kRemove, EditKind::kReset}) {
+    edit.kind = kind;
+    world.submit(edit);
+    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    EXPECT_FALSE(world.pairRule("load", "deck").contact);
+    EXPECT_EQ(world.pairRule("thing", "deck").contact, kind == EditKind::kReset);
+  }
+}
+
+// A cup on a box: it stays as the video has it while the box does, and falls when that is taken away or falls itself.
+TEST(WorldRests, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
+  WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, 0.5}, false);
+  scene.objects.push_back(scene.objects.front());
+  scene.objects[1].name = "load", scene.objects[1].index = 2;
+  scene.objects[1].mesh = boxSurface({0.05, 0.05, 0.05}, 1);
+  scene.objects[1].world_from_object.translation().z() = 0.6255;
+  for (const EditKind kind : {EditKind::kRemove, EditKind::kGravity, EditKind::kAppearance}) {
+    World world(scene, {});
+    Edit edit = letGo("thing");
+    edit.kind = kind;
+    if (kind == EditKind::kAppearance) edit.color = {1, 0, 0}, edit.mode = EditMode::kAbsolute;
+    world.submit(edit);
+    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    play(world, 1.0);
+    const bool stays = kind == EditKind::kAppearance;
+    EXPECT_EQ(world.state().objects[1].kind, stays ? ObjectKind::kStatic : ObjectKind::kRigid) << toString(kind);
+    if (!stays) { EXPECT_LT(centerOf(world.state(), 1).z(), 0.3) << toString(kind); }
+    EXPECT_EQ(world.plan()[1].reason.find("thing, on which it rests") == std::string::npos, stays) << world.plan()[1].reason;
+  }
+}
+
+}  // namespace
+}  // namespace calipso::fem
