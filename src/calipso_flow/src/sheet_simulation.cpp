@@ -24,9 +24,10 @@ Material softened(const TriangleMesh& surface, const Eigen::Vector3d& gravity, d
   return material;
 }
 
-fem::FemOptions optionsFor(int nodes) {
+fem::FemOptions optionsFor(const SheetSettings& settings) {
   fem::FemOptions options;
-  options.target_nodes = nodes;
+  options.target_nodes = settings.nodes;
+  options.cell_size = settings.cell_size;
   options.threads = 1;
   options.newton_tolerance = 1e-3;
   options.newton_iterations = 8;
@@ -39,7 +40,7 @@ SheetSimulation::SheetSimulation(const ObjectModel& model, const Eigen::Vector3d
                                  const SheetSettings& settings, const SheetSimulation* like)
     : longest_step_(settings.longest_step),
       surface_(inWorld(model)),
-      sheet_(surface_, softened(surface_, gravity, settings.stiffness), optionsFor(settings.nodes)),
+      sheet_(surface_, softened(surface_, gravity, settings.stiffness), optionsFor(settings)),
       skin_(surface_, sheet_.body().grid(), settings.coarse_skin ? kSkin * sheet_.body().grid().cell_size : 0.0) {
   const Material material = softened(surface_, gravity, settings.stiffness);
   stiffness_over_density_ = material.youngs_modulus / material.density;

@@ -26,7 +26,8 @@ struct SheetMotion {
 };                                       // by the logarithm of the stiffness; empty when not asked for
 
 struct SheetSettings {
-  int nodes = 120;                   // of the grid
+  int nodes = 120;                   // of the grid, about
+  double cell_size = 0.0;            // m; > 0 overrides nodes
   double longest_step = 1.0 / 30.0;  // s
   double stiffness = 1.0;            // times the modulus that an object of its size starts with
   double sag = 1e-3;                 // of the diagonal, that the key frame's shape may give way by

@@ -49,13 +49,13 @@ double cellSizeFor(const TriangleMesh& mesh, int nodes) {
 class SheetFamily {
  public:
   // @throw as SheetSimulation
+  // @param cell, simulator_cell  edges of this grid's cubes and of the simulator's, m
   // @param given  every member is as stiff as the simulator starts with, on this grid
-  SheetFamily(const ObjectModel& model, const Eigen::Vector3d& gravity, int nodes, const WindParams& params, bool given)
-      : model_(model), gravity_(gravity), given_(given) {
-    const double own = cellSizeFor(model.mesh, nodes), simulator = cellSizeFor(model.mesh, params.simulator_nodes);
-    scale_ = std::pow(simulator / own, 2);
-    settings_.nodes = nodes;
-    settings_.longest_step = params.longest_step;
+  SheetFamily(const ObjectModel& model, const Eigen::Vector3d& gravity, double cell, double simulator_cell,
+              double longest_step, bool given)
+      : model_(model), gravity_(gravity), given_(given), scale_(std::pow(simulator_cell / cell, 2)) {
+    settings_.cell_size = cell;
+    settings_.longest_step = longest_step;
     settings_.coarse_skin = true;
     at(kStiffStart);
     at(0.0);
@@ -168,6 +168,7 @@ class WindFit {
 
   struct Fitted {
     Eigen::VectorXd w;
+    Eigen::MatrixXd amplitudes;  // T x K, with the w that the steps ended at
     Eigen::MatrixXd information;
     double cost = 0.0, left = 0.0;  // left: the residuals' part
   };
@@ -175,27 +176,26 @@ class WindFit {
   // Gauss-Newton from `w`. Nothing where the sheet does not hang in its shape there.
   std::optional<Fitted> solve(const std::vector<double>& knots, Eigen::VectorXd w) const {
     const Eigen::MatrixXd P = prior(knots);
-    const std::optional<SheetMotion> start = simulated(knots, w, true);
-    if (!start) return std::nullopt;
-    Linearised at = linearise(*start);
+    std::optional<SheetMotion> reached = simulated(knots, w, true);
+    if (!reached) return std::nullopt;
+    Linearised at = linearise(*reached);
     double cost = at.r.squaredNorm() + w.dot(P * w);
     double damping = 0.0;  // after Levenberg and Marquardt
     for (int trial = 0, failed = 0; trial < kTrials && failed < kFailures; ++trial) {
       const Eigen::VectorXd step = stepFrom(at.J, P, at.r, w, damping);
-      const std::optional<SheetMotion> motion = simulated(knots, w + step, true);
+      std::optional<SheetMotion> motion = simulated(knots, w + step, true);
       const double before = cost;
       if (motion) {
         const Eigen::VectorXd tried = w + step;
         const Linearised there = linearise(*motion);
         const double value = there.r.squaredNorm() + tried.dot(P * tried);
-        
-        if (value < cost) w = tried, at = there, cost = value;
+        if (value < cost) w = tried, at = there, cost = value, reached.swap(motion);
       }
       if (step.cwiseAbs().maxCoeff() < kSettled || (cost < before && before - cost < kGained * before)) break;
       failed = cost < before ? 0 : failed + 1;
       damping = cost < before ? (damping < kLeastDamping ? 0.0 : damping / kDamping) : std::max(kLeastDamping, damping * kDamping);
     }
-    return Fitted{seenPart(at.J, P, w), at.J.transpose() * at.J + P, cost, at.r.squaredNorm()};
+    return Fitted{seenPart(at.J, P, w), reached->amplitudes, at.J.transpose() * at.J + P, cost, at.r.squaredNorm()};
   }
 
   // Gauss-Newton's step. Where the picture says little more than what was known beforehand, as of wind along the
@@ -255,8 +255,8 @@ class WindFit {
 
   // What the simulation cannot show persists from frame to frame, and would otherwise outvote what is known
   // beforehand: from here on residuals count as the fewer independent ones that they are.
-  void allowForPersistence(const SheetMotion& motion) {
-    const Eigen::VectorXd r = flat(motion.amplitudes - modes_.amplitudes);
+  void allowForPersistence(const Eigen::MatrixXd& amplitudes) {
+    const Eigen::VectorXd r = flat(amplitudes - modes_.amplitudes);
     const int frames = static_cast<int>(times_.size());
     double square = 0.0, product = 0.0;
     for (int m = 0; m < modes_.count(); ++m) {
@@ -298,19 +298,24 @@ Eigen::Vector3d likelyDirection(const ObjectModel& model, const DeformationModes
   return mean.norm() > 0.0 ? Eigen::Vector3d(mean.normalized()) : Eigen::Vector3d::Zero();
 }
 
-// On as coarse a grid as finds an equilibrium. @param note  why there is none
-std::optional<SheetFamily> sheetsOf(const ObjectModel& model, const Eigen::Vector3d& gravity, bool given, std::string& note,
-                                    const WindParams& params) {
+// Edges of the cubes that are tried first, and of the simulator's, m.
+struct CellSizes {
+  double first, simulator;
+};
+
+// On as coarse a grid as finds an equilibrium. A sheet of unknown stiffness must also hang in its shape when it is soft;
+// where it does not, finer grids hardly help, and would cost most of the time. @param note  why there is none
+std::optional<SheetFamily> sheetsOf(const ObjectModel& model, const Eigen::Vector3d& gravity, const CellSizes& cells,
+                                    bool given, std::string& note, const WindParams& params) {
   std::optional<SheetFamily> sheets;
-  for (int nodes = params.nodes; !sheets && nodes <= kFiner * params.nodes; nodes *= 2) {
+  double cell = cells.first;
+  for (int finer = 1; !sheets && finer <= (given ? kFiner : 1); finer *= 2) {
+    if (finer > 1) cell = cellSizeFor(model.mesh, finer * params.nodes);
     try {
-      sheets.emplace(model, gravity, nodes, params, given);
+      sheets.emplace(model, gravity, cell, cells.simulator, params.longest_step, given);
       note.clear();
     } catch (const NoEquilibrium& error) {
       note = std::string("no wind: ") + error.what();
-    } catch (const std::invalid_argument& error) {  // a mesh that the simulator refuses
-      note = std::string("no wind: ") + error.what();
-      return std::nullopt;
     }
   }
   return sheets;
@@ -318,20 +323,18 @@ std::optional<SheetFamily> sheetsOf(const ObjectModel& model, const Eigen::Vecto
 
 // @param given  the sheet is as stiff as the simulator starts with; else that is fitted, too
 std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<double>& times,
-                                    const DeformationModes& modes, const Eigen::Vector3d& gravity, bool given,
-                                    std::string& note, const WindParams& params) {
-  std::optional<SheetFamily> sheets = sheetsOf(model, gravity, given, note, params);
+                                    const DeformationModes& modes, const Eigen::Vector3d& gravity,
+                                    const CellSizes& cells, bool given, std::string& note, const WindParams& params) {
+  std::optional<SheetFamily> sheets = sheetsOf(model, gravity, cells, given, note, params);
   if (!sheets) return std::nullopt;
   WindFit fit(*sheets, model, times, modes, gravity, params);
   // A steady wind first, then a changing one from there.
   const std::optional<WindFit::Fitted> steady = fit.steady(likelyDirection(model, modes));
-  const std::optional<SheetMotion> motion =
-      steady ? fit.simulated({times.front()}, steady->w, false) : std::nullopt;
-  if (!motion) {
+  if (!steady) {
     note = kNoEquilibrium;
     return std::nullopt;
   }
-  fit.allowForPersistence(*motion);
+  fit.allowForPersistence(steady->amplitudes);
   WindEstimate estimate;
   estimate.knots = knotsOver(times.front(), times.back(), params.knot_spacing);
   const int count = static_cast<int>(estimate.knots.size());
@@ -386,11 +389,17 @@ std::optional<WindEstimate> estimateWind(const ObjectModel& model, const std::ve
                                          const DeformationModes& modes, const Eigen::Vector3d& gravity,
                                          std::string& note, const WindParams& params) {
   if (modes.count() == 0 || times.size() < 3) return std::nullopt;
-  const auto free = fitWind(model, times, modes, gravity, false, note, params);
-  if (free && free->explained > kWellShown) return free;
-  const auto given = fitWind(model, times, modes, gravity, true, note, params);
-  if (free || given) note.clear();
-  return !given || (free && free->explained > given->explained) ? free : given;
+  try {
+    const CellSizes cells{cellSizeFor(model.mesh, params.nodes), cellSizeFor(model.mesh, params.simulator_nodes)};
+    const auto free = fitWind(model, times, modes, gravity, cells, false, note, params);
+    if (free && free->explained > kWellShown) return free;
+    const auto given = fitWind(model, times, modes, gravity, cells, true, note, params);
+    if (free || given) note.clear();
+    return !given || (free && free->explained > given->explained) ? free : given;
+  } catch (const std::invalid_argument& error) {  // a mesh that the simulator refuses
+    note = std::string("no wind: ") + error.what();
+    return std::nullopt;
+  }
 }
 
 }  // namespace calipso::flow
