@@ -9,7 +9,7 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kMostSteps = 24;          // texels along an edge
+constexpr int kMostSteps = 256;         // texels along an edge
 constexpr double kAnchor = 1e-4;        // pull towards the mean where nothing known is connected
 
 std::size_t texelCount(int steps) { return static_cast<std::size_t>(steps + 1) * (steps + 2) / 2; }
@@ -30,6 +30,7 @@ SurfaceTexture::SurfaceTexture(const Points& vertices, const Triangles& triangle
     }
     if (count <= std::max(most, 3 * triangles.size())) break;
   }
+  spacing_ = texel;
   texels.assign(count, cv::Vec4f());
   count = 0;
   for (const int steps : steps_) first_.push_back(count), count += texelCount(steps);

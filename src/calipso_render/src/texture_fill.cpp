@@ -6,6 +6,7 @@
 
 #include "calipso_render/surface_symmetry.hpp"
 #include "smooth_step.hpp"
+#include "texture_patches.hpp"
 #include "texture_seams.hpp"
 
 namespace calipso::render {
@@ -110,6 +111,7 @@ class TextureFill {
 
   void run(Appearance& a) const {
     const Camera& camera = views_[0]->camera;
+    const Eigen::Vector3f down = camera.world_from_camera.linear().col(1).cast<float>();
     const float depth = std::max(1e-6f, (camera_from_world_[0] * surface_.key_vertices.front()).z());
     a.texture = SurfaceTexture(surface_.key_vertices, surface_.triangles, depth / static_cast<float>(camera.fx), kMostTexels);
     std::vector<char> from(a.texture.size(), kFilled);
@@ -122,6 +124,7 @@ class TextureFill {
       }
     }
     levelSeams(surface_.key_vertices, surface_.triangles, layer, a.texture);
+    continuePattern(surface_.key_vertices, surface_.triangles, down, certain, a.texture);
     fillUnseen(certain, a.texture);
     const auto part = [&](char kind) { return static_cast<float>(std::count(from.begin(), from.end(), kind)) / std::max<std::size_t>(1, from.size()); };
     a.seen_in_key = part(kKey), a.seen_elsewhere = part(kElsewhere), a.copied = part(kCopied);

@@ -11,8 +11,8 @@ namespace calipso::render {
 
 // An object's reflectance: a picture, the key frame with its highlights taken off divided by the light that fell on the
 // surface there, and a texture on the mesh. What the key frame's camera saw takes its colour from the picture, so that
-// drawn there it is the key frame again; the rest takes it from the texture: from further frames, from like places, or
-// smoothly from the surface around it.
+// drawn there it is the key frame again; the rest takes it from the texture: from further frames, from like places, from the
+// pattern that is all over the object, or smoothly from the surface around it.
 class Appearance {
  public:
   enum class Source : std::uint8_t { kPicture, kTexture, kBoth };

@@ -17,6 +17,7 @@ class SurfaceTexture {
   SurfaceTexture() = default;
 
   std::size_t size() const { return texels.size(); }
+  float spacing() const { return spacing_; }  // m, of texels, about
   int triangleCount() const { return static_cast<int>(first_.size()); }
   // Texels of a triangle: [firstOf(t), firstOf(t + 1)).
   std::size_t firstOf(int triangle) const { return triangle < triangleCount() ? first_[triangle] : texels.size(); }
@@ -32,6 +33,7 @@ class SurfaceTexture {
 
   std::vector<std::size_t> first_;  // per triangle
   std::vector<int> steps_;          // per triangle: texels along an edge, minus one
+  float spacing_ = 0.0f;
 };
 
 // Fills vertices that have no value smoothly from those that have (harmonic on the mesh; vertices at one place are one).
