@@ -19,6 +19,7 @@ constexpr int kBandRows = 16;          // rows that one thread searches in order
 constexpr int kFirstGuesses = 200;     // places tried for a patch of the rim
 constexpr int kFarthest = 16, kFinest = 2;  // px around the best place in which levels, and the finest, look further
 constexpr int kSweeps = 2;             // of a search
+constexpr float kJump = 1.6f;          // times better than what continues a neighbour's copy a place beside it must be: pieces stay large
 constexpr float kNearer = 2.5f;        // times that a source may be nearer or farther,
 constexpr float kHorizon = 6.0f;       // or px of height by which it may miss that
 constexpr float kMisplaced = 2000.0f;  // cost of one that does not, squared code values: such are taken for want of others only
@@ -130,7 +131,8 @@ class Filling {
     }
   }
 
-  // Takes over, twice as far, what half the size found.
+  // Takes over, twice as far, what half the size found. At the finest level it is copied at once: means of patches would be blurred,
+  // and resemble bland places most.
   void startFrom(const Filling& coarse) {
     forEachPatch([&](const cv::Point& p) {
       const cv::Point c = coarse.centreFor({p.x / 2, p.y / 2});
@@ -142,7 +144,8 @@ class Filling {
         if (isWhole(near)) to_.at<cv::Vec2s>(p) = shorts(near);
       }
     });
-    vote();
+    if (scale_ > 1.0f) vote();
+    else copy();
   }
 
   // @param reach px around the best place found so far in which others are tried
@@ -181,13 +184,26 @@ class Filling {
     image_ = next;
   }
 
+  // Every hole pixel becomes what the patch around it has there.
+  void copy() {
+    const cv::Mat from = origins();
+    cv::Mat next = image_.clone();
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        const cv::Vec2s q = from.at<cv::Vec2s>(v, u);
+        if (q[0] >= 0) next.at<cv::Vec4f>(v, u) = image_.at<cv::Vec4f>(q[1], q[0]);
+      }
+    }
+    image_ = next;
+  }
+
   cv::Mat origins() const {
     cv::Mat origin(hole_.size(), CV_16SC2, cv::Scalar(-1, -1));
     for (int v = 0; v < hole_.rows; ++v) {
       for (int u = 0; u < hole_.cols; ++u) {
         if (hole_.at<std::uint8_t>(v, u) == 0) continue;
         const cv::Point p = centreFor({u, v});
-        origin.at<cv::Vec2s>(v, u) = shorts(match(p) + cv::Point(u, v) - p);
+        if (hasMatch(p)) origin.at<cv::Vec2s>(v, u) = shorts(match(p) + cv::Point(u, v) - p);
       }
     }
     return origin;
@@ -218,16 +234,17 @@ class Filling {
     for (std::size_t i = 0; i < band.size(); ++i) {
       const cv::Point p = band[backwards ? band.size() - 1 - i : i];
       for (const cv::Point& d : {cv::Point(step, 0), cv::Point(0, step)}) {
-        if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d);
+        if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d, 1.0f);
       }
-      for (int r = reach; r >= 1; r /= 2) attempt(p, match(p) + jitter(p, r, r));
+      for (int r = reach; r >= 1; r /= 2) attempt(p, match(p) + jitter(p, r, r), kJump);
     }
   }
 
-  void attempt(const cv::Point& p, const cv::Point& q) {
+  // @param better how many times the cost must be lower
+  void attempt(const cv::Point& p, const cv::Point& q, float better) {
     if (!isWhole(q)) return;
     float& least = cost_.at<float>(p);
-    const float cost = distance(p, q, least);
+    const float cost = better * distance(p, q, least / better);
     if (cost < least) least = cost, to_.at<cv::Vec2s>(p) = shorts(q);
   }
 
