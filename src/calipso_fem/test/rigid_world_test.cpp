@@ -5,6 +5,7 @@
 
 #include "../src/world/manifold_reduction.hpp"
 #include "calipso_fem/world/rigid_world.hpp"
+#include "soft_scene.hpp"
 #include "world_fixtures.hpp"
 
 // Rigid bodies by themselves: analytic cases.
@@ -52,7 +53,6 @@ TEST(RigidWorld, BlockSticksBelowAndSlidesAboveTheFrictionAngle) {
   }
 }
 
-// Whichever way it slides, over its edges or over a corner.
 // A ring of points as sixteen parts would give, two of them deeper and one far: the ring's outline stays.
 TEST(ManifoldReduction, KeepsTheDeepestAndTheOutline) {
   std::vector<btManifoldPoint> points(64);
@@ -80,6 +80,7 @@ TEST(ManifoldReduction, KeepsTheDeepestAndTheOutline) {
   EXPECT_TRUE(redundantContacts(contacts).empty());
 }
 
+// Whichever way it slides, over its edges or over a corner.
 TEST(RigidWorld, FrictionIsTheSameInAllDirections) {
   const double v = 2.0, expected = v * v / (2.0 * kFriction * kG);
   for (const double direction : {0.0, 0.4, M_PI / 4}) {
@@ -109,6 +110,32 @@ TEST(RigidWorld, ForcesOfASlidingBlockLieInTheConeAndAreAllThatBrakesIt) {
   const Eigen::Vector3d weight(0, 0, -200 * h * mass * kG);
   const Eigen::Vector3d gained = mass * (block.world.linearVelocity(block.id) - before);
   EXPECT_LT((impulse + weight - gained).norm(), 1e-6 * gained.norm());
+}
+
+// A slab of two halves that lie side by side.
+RigidBodySpec twoPartSlab(const std::string& name, double height) {
+  RigidBodySpec spec;
+  spec.name = name;
+  for (const double x : {-0.1, 0.1})
+    spec.shapes.push_back(test::movedMesh(test::boxSurface({0.2, 0.2, 0.1}, 1), {x, 0, 0}));
+  spec.mass = massProperties(test::boxSurface({0.4, 0.2, 0.1}, 1), 1000.0);
+  spec.world_from_object.translation().z() = height;
+  return spec;
+}
+
+// Thrown up from the plane and from each other, they meet again where they had parted.
+TEST(RigidWorld, BodiesOfSeveralPartsMeetAgainAfterTheyWereApart) {
+  RigidWorld world;
+  world.addPlane({"plane", Eigen::Vector3d::UnitZ(), 0.0, std::nullopt}, {});
+  const RigidWorld::Id low = world.add(twoPartSlab("low", 0.06)), high = world.add(twoPartSlab("high", 0.3));
+  for (const RigidWorld::Id id : {low, high}) world.setAcceleration(id, {0, 0, -kG});
+  for (const double thrown : {0.0, 3.0}) {
+    world.setVelocity(low, {0, 0, thrown}, {0, 0, 0});
+    world.setVelocity(high, {0, 0, 2.0 * thrown}, {0, 0, 0});
+    for (int k = 0; k < 120; ++k) world.step(kStep);
+    EXPECT_NEAR(world.center(low).z(), 0.05, 1e-3) << thrown;
+    EXPECT_NEAR(world.center(high).z(), 0.15, 2e-3) << thrown;
+  }
 }
 
 }  // namespace

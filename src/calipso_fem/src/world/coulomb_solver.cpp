@@ -1,75 +1,81 @@
 #include "coulomb_solver.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 namespace calipso::fem {
 namespace {
 
-// What the row's velocity lacks of its target, times -1.
-double slipOf(const btSolverConstraint& row, btSolverBody& a, btSolverBody& b) {
-  return row.m_contactNormal1.dot(a.internalGetDeltaLinearVelocity()) +
-         row.m_relpos1CrossNormal.dot(a.internalGetDeltaAngularVelocity()) +
-         row.m_contactNormal2.dot(b.internalGetDeltaLinearVelocity()) +
-         row.m_relpos2CrossNormal.dot(b.internalGetDeltaAngularVelocity()) -
-         row.m_rhs / row.m_jacDiagABInv;
-}
-
-void apply(btSolverConstraint& row, btSolverBody& a, btSolverBody& b, double impulse) {
-  const double change = impulse - row.m_appliedImpulse;
-  row.m_appliedImpulse = impulse;
-  a.internalApplyImpulse(row.m_contactNormal1 * a.internalGetInvMass(), row.m_angularComponentA, change);
-  b.internalApplyImpulse(row.m_contactNormal2 * b.internalGetInvMass(), row.m_angularComponentB, change);
-}
+Four packed(const btVector3& v) { return Four{v.x(), v.y(), v.z(), 0.0}; }
+btVector3 unpacked(const Four& v) { return {v[0], v[1], v[2]}; }
 
 }  // namespace
 
-btScalar CoulombSolver::solveNormal(btSolverConstraint& contact) {
-  const double off = resolveSingleConstraintRowLowerLimit(
-      m_tmpSolverBodyPool[contact.m_solverBodyIdA], m_tmpSolverBodyPool[contact.m_solverBodyIdB], contact);
-  return off * off;
+RigidRow CoulombSolver::packed(const btSolverConstraint& row) {
+  RigidRow r;
+  r.normal = fem::packed(row.m_contactNormal1);
+  r.turn_a = fem::packed(row.m_relpos1CrossNormal);
+  r.turn_b = fem::packed(row.m_relpos2CrossNormal);
+  r.angular_a = fem::packed(row.m_angularComponentA);
+  r.angular_b = fem::packed(row.m_angularComponentB);
+  r.inverse = row.m_jacDiagABInv;
+  r.target = row.m_rhs / row.m_jacDiagABInv;
+  r.softness = row.m_cfm / row.m_jacDiagABInv;
+  r.impulse = row.m_appliedImpulse;
+  r.a = row.m_solverBodyIdA;
+  r.b = row.m_solverBodyIdB;
+  return r;
 }
 
-// p <- projection of p - r u onto the disk: r not above the smaller of the two inverse masses makes it a
-// contraction, and r alike for both makes the friction of what slides opposite to the slip.
-btScalar CoulombSolver::solveFriction(btSolverConstraint& u, btSolverConstraint& v, double limit) {
-  if (limit <= 0.0 && u.m_appliedImpulse == 0.0 && v.m_appliedImpulse == 0.0) return 0.0;
-  btSolverBody &a = m_tmpSolverBodyPool[u.m_solverBodyIdA], &b = m_tmpSolverBodyPool[u.m_solverBodyIdB];
-  const double r = std::min(u.m_jacDiagABInv, v.m_jacDiagABInv);
-  double p = u.m_appliedImpulse - r * slipOf(u, a, b), q = v.m_appliedImpulse - r * slipOf(v, a, b);
-  const double length = std::sqrt(p * p + q * q);
-  if (length > limit) p *= limit / length, q *= limit / length;
-  const double dp = p - u.m_appliedImpulse, dq = q - v.m_appliedImpulse;
-  apply(u, a, b, p);
-  apply(v, a, b, q);
-  return (dp * dp + dq * dq) / (r * r);
-}
-
-btScalar CoulombSolver::solveRolling(btSolverConstraint& row, double normal) {
-  const double limit = std::min<double>(row.m_friction, row.m_friction * normal);
-  row.m_lowerLimit = -limit;
-  row.m_upperLimit = limit;
-  const double off = resolveSingleConstraintRowGeneric(m_tmpSolverBodyPool[row.m_solverBodyIdA],
-                                                       m_tmpSolverBodyPool[row.m_solverBodyIdB], row);
-  return off * off;
-}
-
-btScalar CoulombSolver::solveSingleIteration(int, btCollisionObject**, int, btPersistentManifold**, int,
-                                             btTypedConstraint**, int, const btContactSolverInfo&,
-                                             btIDebugDraw*) {
-  btScalar off = 0.0;
-  auto& contacts = m_tmpSolverContactConstraintPool;
-  auto& friction = m_tmpSolverContactFrictionConstraintPool;
-  for (int i = 0; i < contacts.size(); ++i) off = std::max(off, solveNormal(contacts[i]));
-  for (int i = 0; i + 1 < friction.size(); i += 2) {
-    const btSolverConstraint& contact = contacts[friction[i].m_frictionIndex];
-    off = std::max(off, solveFriction(friction[i], friction[i + 1],
-                                      friction[i].m_friction * contact.m_appliedImpulse));
+void CoulombSolver::pack() {
+  rows_.bodies.clear();
+  for (int i = 0; i < m_tmpSolverBodyPool.size(); ++i) {
+    btSolverBody& body = m_tmpSolverBodyPool[i];
+    rows_.bodies.push_back({fem::packed(body.internalGetDeltaLinearVelocity()),
+                            fem::packed(body.internalGetDeltaAngularVelocity()), body.internalGetInvMass().x()});
   }
-  auto& rolling = m_tmpSolverContactRollingFrictionConstraintPool;
+  const auto& friction = m_tmpSolverContactFrictionConstraintPool;
+  const auto& rolling = m_tmpSolverContactRollingFrictionConstraintPool;
+  rows_.contacts.resize(m_tmpSolverContactConstraintPool.size());
+  for (size_t i = 0; i < rows_.contacts.size(); ++i)
+    rows_.contacts[i].normal = packed(m_tmpSolverContactConstraintPool[static_cast<int>(i)]);
+  for (int i = 0; i + 1 < friction.size(); i += 2) {
+    RigidContact& contact = rows_.contacts[friction[i].m_frictionIndex];
+    contact.u = packed(friction[i]);
+    contact.v = packed(friction[i + 1]);
+    contact.friction = friction[i].m_friction;
+  }
+  rows_.rolling.clear();
   for (int i = 0; i < rolling.size(); ++i)
-    off = std::max(off, solveRolling(rolling[i], contacts[rolling[i].m_frictionIndex].m_appliedImpulse));
-  return off;
+    rows_.rolling.push_back({packed(rolling[i]), rolling[i].m_friction, rolling[i].m_frictionIndex});
+}
+
+void CoulombSolver::unpack() {
+  for (size_t i = 0; i < rows_.bodies.size(); ++i) {
+    btSolverBody& body = m_tmpSolverBodyPool[static_cast<int>(i)];
+    body.internalGetDeltaLinearVelocity() = unpacked(rows_.bodies[i].linear);
+    body.internalGetDeltaAngularVelocity() = unpacked(rows_.bodies[i].angular);
+  }
+  auto& friction = m_tmpSolverContactFrictionConstraintPool;
+  auto& rolling = m_tmpSolverContactRollingFrictionConstraintPool;
+  for (size_t i = 0; i < rows_.contacts.size(); ++i)
+    m_tmpSolverContactConstraintPool[static_cast<int>(i)].m_appliedImpulse = rows_.contacts[i].normal.impulse;
+  for (int i = 0; i + 1 < friction.size(); i += 2) {
+    const RigidContact& contact = rows_.contacts[friction[i].m_frictionIndex];
+    friction[i].m_appliedImpulse = contact.u.impulse;
+    friction[i + 1].m_appliedImpulse = contact.v.impulse;
+  }
+  for (int i = 0; i < rolling.size(); ++i) rolling[i].m_appliedImpulse = rows_.rolling[i].row.impulse;
+}
+
+btScalar CoulombSolver::solveGroupCacheFriendlyIterations(btCollisionObject** bodies, int body_count,
+                                                          btPersistentManifold** manifolds, int manifold_count,
+                                                          btTypedConstraint** constraints, int constraint_count,
+                                                          const btContactSolverInfo& info, btIDebugDraw* drawer) {
+  solveGroupCacheFriendlySplitImpulseIterations(bodies, body_count, manifolds, manifold_count, constraints,
+                                                constraint_count, info, drawer);
+  pack();
+  for (int k = 0; k < info.m_numIterations; ++k)
+    if (sweepRows(rows_) <= info.m_leastSquaresResidualThreshold) break;
+  unpack();
+  return 0.0;
 }
 
 }  // namespace calipso::fem

@@ -1,7 +1,6 @@
 #include "manifold_reduction.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace calipso::fem {
 namespace {
@@ -9,7 +8,9 @@ namespace {
 constexpr size_t kFew = 8;
 constexpr double kSameNormal = 0.98;  // cosine
 constexpr double kOutPerApart = 10.0;
-constexpr int kDirections = 8;
+constexpr double kDiagonal = 0.70710678118654752;
+constexpr double kDirections[][2] = {{1, 0},  {kDiagonal, kDiagonal},   {0, 1},  {-kDiagonal, kDiagonal},
+                                     {-1, 0}, {-kDiagonal, -kDiagonal}, {0, -1}, {kDiagonal, -kDiagonal}};
 
 using Contacts = std::vector<btManifoldPoint*>;
 using Group = std::vector<size_t>;  // of contacts
@@ -26,9 +27,8 @@ void keepSpanning(const Contacts& contacts, const Group& group, std::vector<bool
   keepMost([](const btManifoldPoint& p) { return -p.getDistance(); });
   btVector3 u, v;
   btPlaneSpace1(contacts[group.front()]->m_normalWorldOnB, u, v);
-  for (int k = 0; k < kDirections; ++k) {
-    const double angle = 2.0 * M_PI * k / kDirections;
-    const btVector3 out = std::cos(angle) * u + std::sin(angle) * v;
+  for (const auto& [cosine, sine] : kDirections) {
+    const btVector3 out = cosine * u + sine * v;
     keepMost([&](const btManifoldPoint& p) {
       return out.dot(p.getPositionWorldOnB()) - kOutPerApart * p.getDistance();
     });

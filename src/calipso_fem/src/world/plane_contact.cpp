@@ -38,40 +38,43 @@ std::vector<const Corner*> spanning(const std::vector<Corner>& corners, const bt
   return chosen;
 }
 
+// Contacts are kept up to this distance, m.
+double reachOf(const btCollisionObject* body) {
+  return body->getCollisionShape()->getContactBreakingThreshold(gContactBreakingThreshold);
+}
+
 }  // namespace
 
 btCollisionAlgorithm* HullPlaneAlgorithm::Creator::CreateCollisionAlgorithm(
-    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
-    const btCollisionObjectWrapper* b) {
+    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper*, const btCollisionObjectWrapper*) {
   void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(HullPlaneAlgorithm));
-  return new (memory) HullPlaneAlgorithm(info, a, b, m_swapped);
+  return new (memory) HullPlaneAlgorithm(info, m_swapped);
 }
 
-HullPlaneAlgorithm::HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
-                                       const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
-                                       bool swapped)
-    : btCollisionAlgorithm(info), swapped_(swapped), manifold_(info.m_manifold) {
-  const btCollisionObjectWrapper *hull = swapped ? b : a, *plane = swapped ? a : b;
-  if (manifold_ || !m_dispatcher->needsCollision(hull->getCollisionObject(), plane->getCollisionObject()))
-    return;
-  manifold_ = m_dispatcher->getNewManifold(hull->getCollisionObject(), plane->getCollisionObject());
-  owner_ = true;
-}
+HullPlaneAlgorithm::HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info, bool swapped)
+    : btCollisionAlgorithm(info), swapped_(swapped), manifold_(info.m_manifold) {}
 
 HullPlaneAlgorithm::~HullPlaneAlgorithm() {
   if (owner_) m_dispatcher->releaseManifold(manifold_);
 }
 
+btPersistentManifold* HullPlaneAlgorithm::manifoldOf(const btCollisionObjectWrapper* hull,
+                                                     const btCollisionObjectWrapper* plane) {
+  if (!manifold_ && m_dispatcher->needsCollision(hull->getCollisionObject(), plane->getCollisionObject())) {
+    manifold_ = m_dispatcher->getNewManifold(hull->getCollisionObject(), plane->getCollisionObject());
+    owner_ = true;
+  }
+  return manifold_;
+}
+
 void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                                           const btDispatcherInfo&, btManifoldResult* result) {
-  if (!manifold_) return;
   const btCollisionObjectWrapper *hull = swapped_ ? b : a, *plane = swapped_ ? a : b;
   const auto& shape = *static_cast<const btConvexHullShape*>(hull->getCollisionShape());
   const auto& ground = *static_cast<const btStaticPlaneShape*>(plane->getCollisionShape());
   const btVector3& normal = ground.getPlaneNormal();
   const btTransform plane_from_hull = plane->getWorldTransform().inverseTimes(hull->getWorldTransform());
-  const double reach = manifold_->getContactBreakingThreshold();
-  result->setPersistentManifold(manifold_);
+  const double reach = reachOf(hull->getCollisionObject());
   const btVector3 rise = normal * plane_from_hull.getBasis();  // of the height, in the hull's frame
   const double level = normal.dot(plane_from_hull.getOrigin()) - ground.getPlaneConstant() - shape.getMargin();
   std::vector<Corner> near;
@@ -80,6 +83,8 @@ void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, con
     const double height = level + rise.dot(x);
     if (height < reach) near.push_back({plane_from_hull * x, height});
   }
+  if ((near.empty() && !manifold_) || !manifoldOf(hull, plane)) return;
+  result->setPersistentManifold(manifold_);
   const btTransform& world_from_plane = plane->getWorldTransform();
   const btVector3 up = world_from_plane.getBasis() * normal;
   for (const Corner* c : spanning(near, normal))
@@ -90,6 +95,26 @@ void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, con
 
 void HullPlaneAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
   if (manifold_ && owner_) manifolds.push_back(manifold_);
+}
+
+btCollisionAlgorithm* CompoundPlaneAlgorithm::Creator::CreateCollisionAlgorithm(
+    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b) {
+  void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(CompoundPlaneAlgorithm));
+  return new (memory) CompoundPlaneAlgorithm(info, a, b, m_swapped);
+}
+
+void CompoundPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                                              const btDispatcherInfo& info, btManifoldResult* result) {
+  const btCollisionObjectWrapper *hulls = m_isSwapped ? b : a, *plane = m_isSwapped ? a : b;
+  const auto& ground = *static_cast<const btStaticPlaneShape*>(plane->getCollisionShape());
+  btVector3 low, high;
+  hulls->getCollisionShape()->getAabb(plane->getWorldTransform().inverseTimes(hulls->getWorldTransform()), low, high);
+  const btVector3 &normal = ground.getPlaneNormal(), half = 0.5 * (high - low);
+  const double height = normal.dot(0.5 * (low + high)) - normal.absolute().dot(half) - ground.getPlaneConstant();
+  const bool far = height > reachOf(hulls->getCollisionObject());
+  if (far && clear_) return;
+  btCompoundCollisionAlgorithm::processCollision(a, b, info, result);
+  clear_ = far;
 }
 
 }  // namespace calipso::fem

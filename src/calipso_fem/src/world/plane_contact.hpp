@@ -1,5 +1,6 @@
 #pragma once
 
+#include <BulletCollision/CollisionDispatch/btCompoundCollisionAlgorithm.h>
 #include <btBulletCollisionCommon.h>
 
 // Private to the rigid world.
@@ -16,8 +17,7 @@ class HullPlaneAlgorithm : public btCollisionAlgorithm {
   };
 
   // swapped: the plane is the first of the two
-  HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
-                     const btCollisionObjectWrapper* b, bool swapped);
+  HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info, bool swapped);
   ~HullPlaneAlgorithm() override;
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;
@@ -28,8 +28,28 @@ class HullPlaneAlgorithm : public btCollisionAlgorithm {
   void getAllContactManifolds(btManifoldArray& manifolds) override;
 
  private:
+  btPersistentManifold* manifoldOf(const btCollisionObjectWrapper* hull, const btCollisionObjectWrapper* plane);
+
   bool swapped_, owner_ = false;
   btPersistentManifold* manifold_;
+};
+
+// Several hulls against a plane: none of them is looked at while their box is clear of it. Every plane's own box
+// is boundless, so that Bullet looks at all the hulls of all bodies at all times.
+class CompoundPlaneAlgorithm : public btCompoundCollisionAlgorithm {
+ public:
+  struct Creator : btCollisionAlgorithmCreateFunc {
+    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
+                                                   const btCollisionObjectWrapper* a,
+                                                   const btCollisionObjectWrapper* b) override;
+  };
+
+  using btCompoundCollisionAlgorithm::btCompoundCollisionAlgorithm;
+  void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                        const btDispatcherInfo& info, btManifoldResult* result) override;
+
+ private:
+  bool clear_ = false;  // of the plane, with no contact left
 };
 
 }  // namespace calipso::fem

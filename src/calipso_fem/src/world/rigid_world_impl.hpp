@@ -10,6 +10,7 @@
 #include "bullet_world.hpp"
 #include "calipso_fem/world/rigid_world.hpp"
 #include "coulomb_solver.hpp"
+#include "hull_contact.hpp"
 #include "plane_contact.hpp"
 
 namespace calipso::fem {
@@ -28,8 +29,20 @@ struct PairFilter : btOverlapFilterCallback {
 struct RigidWorld::Impl {
   using Body = BulletBody;
 
-  btDefaultCollisionConfiguration configuration;
+  // Bullet's pool has room for its own algorithms only, and does not check.
+  static btDefaultCollisionConstructionInfo withOwnAlgorithms() {
+    btDefaultCollisionConstructionInfo info;
+    info.m_customCollisionAlgorithmMaxElementSize = static_cast<int>(
+        std::max({sizeof(HullPlaneAlgorithm), sizeof(CompoundPlaneAlgorithm), sizeof(HullHullAlgorithm),
+                  sizeof(CompoundPairAlgorithm)}));
+    return info;
+  }
+
+  btDefaultCollisionConfiguration configuration{withOwnAlgorithms()};
   HullPlaneAlgorithm::Creator on_plane, under_hull;
+  HullHullAlgorithm::Creator hull_on_hull;
+  CompoundPairAlgorithm::Creator hulls_on_hulls;
+  CompoundPlaneAlgorithm::Creator hulls_on_plane, under_hulls;
   btCollisionDispatcher dispatcher{&configuration};
   btDbvtBroadphase broadphase;
   CoulombSolver solver;
@@ -41,10 +54,13 @@ struct RigidWorld::Impl {
   std::vector<TouchEvent> touches;
 
   Impl() {
-    on_plane.m_swapped = false;
-    under_hull.m_swapped = true;
+    under_hull.m_swapped = under_hulls.m_swapped = true;
     dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, &on_plane);
     dispatcher.registerCollisionCreateFunc(STATIC_PLANE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, &under_hull);
+    dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, &hull_on_hull);
+    dispatcher.registerCollisionCreateFunc(COMPOUND_SHAPE_PROXYTYPE, COMPOUND_SHAPE_PROXYTYPE, &hulls_on_hulls);
+    dispatcher.registerCollisionCreateFunc(COMPOUND_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, &hulls_on_plane);
+    dispatcher.registerCollisionCreateFunc(STATIC_PLANE_PROXYTYPE, COMPOUND_SHAPE_PROXYTYPE, &under_hulls);
     world.setGravity(btVector3(0, 0, 0));
     world.getPairCache()->setOverlapFilterCallback(&filter);
     btContactSolverInfo& info = world.getSolverInfo();

@@ -42,12 +42,13 @@ inline std::string cubes(int count) { return count == 1 ? "one soft cube" : "two
 
 // Plays a world and keeps what every case wants to know.
 struct Run {
-  double deepest = 0.0, ms = 0.0, slowest_ms = 0.0;
+  double deepest = 0.0, ms = 0.0, slowest_ms = 0.0, wall_ms = 0.0, slowest_wall_ms = 0.0;
   int frames = 0;
   double period = kFrame;
 
   void play(World& world, double seconds, const std::function<void(const WorldState&)>& look = {});
   double msPerFrame() const { return frames ? ms / frames : 0.0; }
+  double wallMsPerFrame() const { return frames ? wall_ms / frames : 0.0; }
 };
 
 using Cases = std::map<std::string, std::function<std::vector<Result>()>>;

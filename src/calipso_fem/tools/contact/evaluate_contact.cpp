@@ -16,13 +16,15 @@ namespace calipso::fem {
 void Run::play(World& world, double seconds, const std::function<void(const WorldState&)>& look) {
   const double start = world.time();
   for (int k = 1; k <= std::lround(seconds / period); ++k) {
-    const double before = processMs();
+    const double before = processMs(), wall_before = wallMs();
     world.advanceTo(start + k * period);
-    const double took = processMs() - before;
+    const double took = processMs() - before, wall = wallMs() - wall_before;
     const WorldState state = world.state();
     for (const ContactPoint& c : state.contacts) deepest = std::max(deepest, c.depth);
     ms += took;
     slowest_ms = std::max(slowest_ms, took);
+    wall_ms += wall;
+    slowest_wall_ms = std::max(slowest_wall_ms, wall);
     ++frames;
     if (look) look(state);
   }
