@@ -9,8 +9,6 @@ namespace {
 
 double decode(double s) { return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4); }
 
-double encode(double l) { return l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1.0 / 2.4) - 0.055; }
-
 }  // namespace
 
 const float* decodeTable() {
@@ -31,25 +29,14 @@ float linearFromRealCode(float code) {
   return table[i] + (x - i) * (table[i + 1] - table[i]);
 }
 
-// Tabulated over sqrt(linear), in which the curve is nearly straight, so that dark values keep their
-// precision (largest error 0.001 code values).
-const EncodeTables& encodeTables() {
-  static const EncodeTables tables = [] {
-    EncodeTables t{};
-    const auto code = [](int i) { return static_cast<float>(255.0 * encode(std::pow(static_cast<double>(i) / kEncodeSteps, 2))); };
-    for (int i = 0; i < kEncodeSteps; ++i) t.code[i] = code(i), t.rise[i] = code(i + 1) - code(i);
-    t.code[kEncodeSteps] = 255.0f, t.rise[kEncodeSteps] = 0.0f;
-    return t;
-  }();
-  return tables;
-}
-
 float codeFromLinear(float linear) {
   if (!(linear > 0.0f)) return 0.0f;  // also NaN
   if (linear >= 1.0f) return 255.0f;
-  const float x = std::sqrt(linear) * kEncodeSteps;
-  const int i = static_cast<int>(x);
-  return encodeTables().code[i] + (x - i) * encodeTables().rise[i];
+  if (linear <= kStraight) return kStraightRise * linear;
+  const float root = std::sqrt(std::sqrt(linear));
+  float code = kCurve[6];
+  for (int k = 5; k >= 0; --k) code = code * root + kCurve[k];
+  return code;
 }
 
 cv::Mat linearFromCode(const cv::Mat& bgr) {

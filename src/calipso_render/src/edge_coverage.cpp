@@ -93,7 +93,7 @@ void EdgeCoverage::choose(int column, int row) {
   int& tile = tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + column / kTile];
   if (tile < 0) {
     tile = static_cast<int>(slots_.size() / (kTile * kTile));
-    slots_.resize(slots_.size() + kTile * kTile, -1);
+    slots_.resize(slots_.size() + kTile * kTile, kNone);
   }
   int& slot = slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile + column % kTile];
   if (slot >= 0) return;
@@ -185,15 +185,25 @@ const EdgeCoverage::Pixel* EdgeCoverage::at(int u, int v) const {
   return slot < 0 ? nullptr : &pixels_[slot];
 }
 
-std::vector<int> EdgeCoverage::columnsOf(int row) const {
-  std::vector<int> columns;
-  for (int i = 0; i < tiles_across_; ++i) {
-    if (tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + i] < 0) continue;
-    for (int u = i * kTile; u < std::min(region_.width, (i + 1) * kTile); ++u) {
-      if (slotAt(u, row) >= 0) columns.push_back(u);
+void EdgeCoverage::settle(const VisibilityBuffer& centre) {
+  const auto agrees = [](const Pixel& pixel, std::uint32_t id) {
+    for (const std::uint32_t sample : pixel.ids) {
+      if (((sample ^ id) >> 24) != 0) return false;
+    }
+    const auto [farthest, nearest] = std::minmax_element(pixel.nearness.begin(), pixel.nearness.end());
+    return id == VisibilityBuffer::kNothing || isOneSheet(*nearest, *farthest);
+  };
+  const int down = static_cast<int>(tiles_.size()) / tiles_across_;
+#pragma omp parallel for schedule(dynamic, 2)
+  for (int j = 0; j < down; ++j) {
+    for (int i = 0; i < tiles_across_; ++i) {
+      const int tile = tiles_[static_cast<std::size_t>(j) * tiles_across_ + i];
+      int* slots = &slots_[static_cast<std::size_t>(std::max(tile, 0)) * kTile * kTile];
+      for (int k = 0; tile >= 0 && k < kTile * kTile; ++k) {
+        if (slots[k] >= 0 && agrees(pixels_[slots[k]], centre.ids(j * kTile + k / kTile)[i * kTile + k % kTile])) slots[k] = kSettled;
+      }
     }
   }
-  return columns;
 }
 
 }  // namespace calipso::render

@@ -19,8 +19,6 @@ constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
   return squared;
 }();
 
-constexpr float kSameSheet = 0.015f;    // of the nearness: samples that differ by more see another part of an object
-
 }  // namespace
 
 float FrameCompositor::newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
@@ -93,7 +91,8 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
     const int object = VisibilityBuffer::objectOf(edge->ids[i]);
     for (int j = i; j < EdgeCoverage::kSamples; ++j) {
       if (done[j] || edge->ids[j] == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(edge->ids[j]) != object) continue;
-      if (std::abs(edge->nearness[j] - edge->nearness[i]) > kSameSheet * edge->nearness[i]) continue;
+      const auto [farthest, nearest] = std::minmax(edge->nearness[i], edge->nearness[j]);
+      if (!EdgeCoverage::isOneSheet(nearest, farthest)) continue;
       done[j] = true, ++count;
       if (kFromCentre[j] < kFromCentre[middle]) middle = j;
     }

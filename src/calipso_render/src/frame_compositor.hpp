@@ -97,8 +97,10 @@ class FrameCompositor {
     int slot = -1;        // -1: nothing is drawn here
   };
 
-  // What has to be done for a pixel: nothing; one drawn surface; what lies behind, in other light; more than one surface.
-  enum Kind : std::uint8_t { kNone = 0, kPlain, kBehind, kSpecial };
+  // What has to be done for a pixel: nothing; one drawn surface, the same where it ends or folds; what lies behind, in other light;
+  // more than one surface.
+  enum Kind : std::uint8_t { kNone = 0, kPlain, kPlainEdge, kBehind, kSpecial };
+  static bool isPlain(Kind kind) { return kind == kPlain || kind == kPlainEdge; }
 
   // A row of the result over region_, on its way.
   struct Row {

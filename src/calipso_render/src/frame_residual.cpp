@@ -100,7 +100,7 @@ void FrameCompositor::recordRow(int v, Row& row, RestPicture& picture) const {
     const int u = i + region_.x;
     if (removed_.at<std::uint8_t>(v - region_.y, i) == 0) continue;
     const cv::Vec4f& plain = row.colour[i];
-    const Drawn drawn = row.kinds[i] == kPlain ? Drawn{{plain[0], plain[1], plain[2]}, 1.0f} : drawnAt(u, v);
+    const Drawn drawn = isPlain(row.kinds[i]) ? Drawn{{plain[0], plain[1], plain[2]}, 1.0f} : drawnAt(u, v);
     picture.drawn.at<cv::Vec3f>(v, u) = drawn.cover * drawn.colour;
     if (drawn.cover == 1.0f) continue;
     const cv::Vec3f behind = behindAt(u, v).colour, revealed = revealedAt(u, v).colour;

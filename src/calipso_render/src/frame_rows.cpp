@@ -42,16 +42,19 @@ void FrameCompositor::findKinds(int v, Row& row) const {
   }
   // What hides a surface at rest takes its residual.
   for (int i = 0; !all_drawn_ && i < width; ++i) kinds[i] = kinds[i] == kBehind && ids[i] != VisibilityBuffer::kNothing ? kSpecial : kinds[i];
-  for (const int i : edges_->columnsOf(j)) kinds[i] = kSpecial;
+  edges_->visitRow(j, [kinds](int i, bool settled) {
+    if (!settled) kinds[i] = kSpecial;
+    else if (kinds[i] == kPlain) kinds[i] = kPlainEdge;
+  });
   if (!still_.empty()) {
     const float* still = still_.ptr<float>(j);
     for (int i = 0; i < width; ++i) {
-      if (still[i] >= kKept && kinds[i] != kNone) kinds[i] = removed[i] != 0 ? kNone : kinds[i] == kPlain ? kSpecial : kinds[i];
+      if (still[i] >= kKept && kinds[i] != kNone) kinds[i] = removed[i] != 0 ? kNone : isPlain(kinds[i]) ? kSpecial : kinds[i];
     }
   }
   if (!screened_.empty()) {
     const std::uint8_t* screened = screened_.ptr<std::uint8_t>(j);
-    for (int i = 0; i < width; ++i) kinds[i] = screened[i] != 0 && kinds[i] == kPlain ? kSpecial : kinds[i];
+    for (int i = 0; i < width; ++i) kinds[i] = screened[i] != 0 && isPlain(kinds[i]) ? kSpecial : kinds[i];
   }
   if (!remirrored_.empty()) {
     const std::uint8_t* remirrored = remirrored_.ptr<std::uint8_t>(v) + region_.x;
@@ -136,6 +139,10 @@ void FrameCompositor::shadeStretch(int v, int first, int last, int slot, Row& ro
     const cv::v_float32x4 left = cv::v_load(a.diffuse.val), rise = cv::v_load(b.diffuse.val) - left;
     const cv::v_float32x4 gloss = cv::v_load(a.highlight.val), gloss_rise = cv::v_load(b.highlight.val) - gloss;
     for (; i < end; ++i) {
+      if (row.kinds[i] == kPlainEdge) {
+        row.uneven.push_back(i);
+        continue;
+      }
       const cv::v_float32x4 part = cv::v_setall_f32(static_cast<float>(i % kLightStep) / kLightStep);
       const cv::v_float32x4 diffuse = left + part * rise;
       // Another piece of the surface can look out between the corners.
@@ -161,7 +168,7 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
   for (const int i : row.uneven) {
     const int triangle = VisibilityBuffer::triangleOf(ids[i]);
     cv::Vec4f& out = row.colour[i];
-    if (maps_[slot][triangle].thin) {
+    if (maps_[slot][triangle].thin || row.kinds[i] == kPlainEdge) {
       const cv::Vec3f colour = shadeSurface(ids[i], static_cast<float>(i + region_.x), static_cast<float>(v));
       out = {colour[0], colour[1], colour[2], 1.0f};
       continue;
@@ -237,9 +244,9 @@ void FrameCompositor::drawRow(int v, Row& row) const {
   std::memset(row.source.data(), kOriginal, row.source.size());
   for (int i = nextMarked(row.kinds.data(), 0, region_.width); i < region_.width; i = nextMarked(row.kinds.data(), i, region_.width)) {
     const int u = i + region_.x;
-    if (row.kinds[i] == kPlain) {
+    if (isPlain(row.kinds[i])) {
       const int first = i, slot = VisibilityBuffer::objectOf(ids[i]);
-      while (i < region_.width && row.kinds[i] == kPlain && VisibilityBuffer::objectOf(ids[i]) == slot) ++i;
+      while (i < region_.width && isPlain(row.kinds[i]) && VisibilityBuffer::objectOf(ids[i]) == slot) ++i;
       drawStretch(v, first, i, slot, row);
     } else if (row.kinds[i] == kBehind) {
       const int first = i;

@@ -272,6 +272,7 @@ void FrameCompositor::drawVisibility() {
     if (edited_[surface_of_slot_[slot]]) edges_->chooseSilhouette(actors_[slot].screen, actors_[slot].surface->edges);
   }
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) edges_->draw(actors_[slot].screen, static_cast<int>(slot));
+  edges_->settle(*centre_);
 }
 
 }  // namespace calipso::render

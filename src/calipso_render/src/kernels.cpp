@@ -6,6 +6,7 @@
 
 #include "bicubic.hpp"
 #include "calipso_render/colour.hpp"
+#include "calipso_render/noise.hpp"
 #include "raster_bodies.hpp"
 
 namespace calipso::render {
@@ -52,82 +53,95 @@ CALIPSO_INLINE float visibleThroughBody(const ShadowTexels& map, const ShadowTap
   return 1.0f - sumOf(covered) / static_cast<float>(taps.count);
 }
 
+typedef std::int32_t LaneChoice __attribute__((vector_size(32)));
+
+CALIPSO_INLINE Eight& eightAt(float* at) { return *reinterpret_cast<Eight*>(at); }
+CALIPSO_INLINE const Eight& eightAt(const float* at) { return *reinterpret_cast<const Eight*>(at); }
+
+// Sums of a place's taps in even (B, G, R, _) and odd columns (B, G, R, _). @pre 1 <= u < columns - 2, likewise v
+CALIPSO_INLINE Eight bicubicSums(const cv::Mat& image, std::size_t step, float u, float v) {
+  const int i = static_cast<int>(u), j = static_cast<int>(v);
+  const float t = u - static_cast<float>(i), s = v - static_cast<float>(j);
+  const Eight a01 = {0.0f, 0.0f, 0.0f, 0.0f, 1.0f, 1.0f, 1.0f, 1.0f}, b01 = {-0.5f, -0.5f, -0.5f, -0.5f}, c01 = {1.0f, 1.0f, 1.0f, 1.0f, -2.5f, -2.5f, -2.5f, -2.5f};
+  const Eight d01 = {-0.5f, -0.5f, -0.5f, -0.5f, 1.5f, 1.5f, 1.5f, 1.5f}, b23 = {0.5f, 0.5f, 0.5f, 0.5f}, c23 = {2.0f, 2.0f, 2.0f, 2.0f, -0.5f, -0.5f, -0.5f, -0.5f};
+  const Eight first = a01 + t * (b01 + t * (c01 + t * d01)), second = t * (b23 + t * (c23 - t * d01));
+  const Four a = {0.0f, 1.0f, 0.0f, 0.0f}, b = {-0.5f, 0.0f, 0.5f, 0.0f}, c = {1.0f, -2.5f, 2.0f, -0.5f}, d = {-0.5f, 1.5f, -1.5f, 0.5f};
+  const Four wy = a + s * (b + s * (c + s * d));
+  const float* p = image.ptr<float>(j - 1) + 4 * (i - 1);
+  const auto line = [&](int r) { return wy[r] * (first * eightAt(p + r * step) + second * eightAt(p + r * step + 8)); };
+  return (line(0) + line(1)) + (line(2) + line(3));
+}
+
 CALIPSO_INLINE void sampleBody(const cv::Mat& image, const float* us, const float* vs, int count, cv::Vec4f* out) {
   const std::size_t step = image.step1();
   const float right = static_cast<float>(image.cols) - 2.0f, bottom = static_cast<float>(image.rows) - 2.0f;
-  for (int k = 0; k < count; ++k) {
-    const float u = us[k], v = vs[k];
-    if (!((u >= 1.0f) & (v >= 1.0f) & (u < right) & (v < bottom))) {
-      cv::v_store(out[k].val, bicubic(image, u, v));
-      continue;
-    }
-    const int i = static_cast<int>(u), j = static_cast<int>(v);
-    const Four a = {0.0f, 1.0f, 0.0f, 0.0f}, b = {-0.5f, 0.0f, 0.5f, 0.0f}, c = {1.0f, -2.5f, 2.0f, -0.5f}, d = {-0.5f, 1.5f, -1.5f, 0.5f};
-    const float tx = u - static_cast<float>(i), ty = v - static_cast<float>(j);
-    const Four wx = a + tx * (b + tx * (c + tx * d)), wy = a + ty * (b + ty * (c + ty * d));
-    const Eight first = {wx[0], wx[0], wx[0], wx[0], wx[1], wx[1], wx[1], wx[1]}, second = {wx[2], wx[2], wx[2], wx[2], wx[3], wx[3], wx[3], wx[3]};
-    const float* p = image.ptr<float>(j - 1) + 4 * (i - 1);
-    Eight line[4];
-    for (int r = 0; r < 4; ++r) {
-      const float* row = p + r * step;
-      line[r] = wy[r] * (first * *reinterpret_cast<const Eight*>(row) + second * *reinterpret_cast<const Eight*>(row + 8));
-    }
-    const Eight sum = (line[0] + line[1]) + (line[2] + line[3]);
-    for (int ch = 0; ch < 4; ++ch) {
-      const float x = sum[ch] + sum[ch + 4];
-      out[k][ch] = x > 0.0f ? x : 0.0f;
-    }
-  }
-}
-
-constexpr int kStretch = 64;  // pixels encoded at a time
-
-// Bytes of B, G, R, _ to B, G, R.
-CALIPSO_INLINE void packCodes(const std::int32_t* levels, int count, std::uint8_t* codes) {
-  typedef std::int32_t SixteenInts __attribute__((vector_size(64), aligned(4), may_alias));
-  typedef std::uint8_t SixteenBytes __attribute__((vector_size(16)));
+  const auto isInside = [&](int k) { return (us[k] >= 1.0f) & (vs[k] >= 1.0f) & (us[k] < right) & (vs[k] < bottom); };
   int k = 0;
-  for (; k + 4 <= count; k += 4) {
-    const SixteenBytes bytes = __builtin_convertvector(*reinterpret_cast<const SixteenInts*>(levels + 4 * k), SixteenBytes);
-    const SixteenBytes packed = __builtin_shuffle(bytes, SixteenBytes{0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, 3, 7, 11, 15});
-    std::memcpy(codes + 3 * k, &packed, 12);
-  }
-  for (; k < count; ++k) {
-    for (int c = 0; c < 3; ++c) codes[3 * k + c] = static_cast<std::uint8_t>(levels[4 * k + c]);
+  while (k < count) {
+    if (k + 1 < count && isInside(k) && isInside(k + 1)) {
+      const Eight a = bicubicSums(image, step, us[k], vs[k]), b = bicubicSums(image, step, us[k + 1], vs[k + 1]);
+      const Eight sum = __builtin_shuffle(a, b, LaneChoice{0, 1, 2, 3, 8, 9, 10, 11}) + __builtin_shuffle(a, b, LaneChoice{4, 5, 6, 7, 12, 13, 14, 15});
+      eightAt(out[k].val) = sum > 0.0f ? sum : Eight{};
+      k += 2;
+    } else {
+      cv::v_store(out[k].val, bicubic(image, us[k], vs[k]));
+      ++k;
+    }
   }
 }
 
-CALIPSO_INLINE void encodeStretch(const CodeTables& tables, const float* colours, const float* noise, int count, std::uint8_t* codes) {
-  alignas(32) float part[4 * kStretch], code[4 * kStretch], fresh[4 * kStretch];
-  alignas(32) std::int32_t step[4 * kStretch];
-  const int n = 4 * count;
-  // As codeFromLinear(); what is no number becomes 0.
-  for (int k = 0; k < n; ++k) {
-    const float positive = colours[k] > 0.0f ? colours[k] : 0.0f;
-    const float x = std::sqrt(positive < 1.0f ? positive : 1.0f) * kEncodeSteps;
-    step[k] = static_cast<std::int32_t>(x);
-    part[k] = x - static_cast<float>(step[k]);
-  }
-  for (int k = 0; k < n; ++k) code[k] = tables.code[step[k]] + part[k] * tables.rise[step[k]];
-  for (int k = 0; k < count; ++k) {
-    for (int c = 0; c < 4; ++c) fresh[4 * k + c] = colours[4 * k + 3];
-  }
-  for (int k = 0; k < n; ++k) {
-    const float deviation = tables.deviation[4 * static_cast<std::int32_t>(code[k] + 0.5f) + (k & 3)];
-    const float x = code[k] + fresh[k] * deviation * noise[k];
-    const float positive = x > 0.0f ? x : 0.0f;
-    step[k] = static_cast<std::int32_t>((positive < 255.0f ? positive : 255.0f) + 0.5f);
-  }
-  packCodes(step, count, codes);
+CALIPSO_INLINE Eight squareRoot(const Eight& x) {
+  Eight root;
+  for (int k = 0; k < 8; ++k) root[k] = std::sqrt(x[k]);
+  return root;
 }
 
-CALIPSO_INLINE void encodeBody(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count, cv::Vec3b* codes) {
-  constexpr int kSide = 256;
-  while (count > 0) {
-    const int n = std::min({count, kStretch, kSide - column});
-    encodeStretch(tables, colours->val, noise[column].val, n, reinterpret_cast<std::uint8_t*>(codes));
-    colours += n, codes += n, count -= n, column = (column + n) % kSide;
-  }
+// codeFromLinear(); what is no number becomes 0.
+CALIPSO_INLINE Eight codesOf(const Eight& linear) {
+  const Eight one = Eight{} + 1.0f, positive = linear > 0.0f ? linear : Eight{}, x = positive < one ? positive : one;
+  const Eight root = squareRoot(squareRoot(x));
+  Eight curve = Eight{} + kCurve[6];
+  for (int k = 5; k >= 0; --k) curve = curve * root + kCurve[k];
+  return x > kStraight ? curve : kStraightRise * x;
+}
+
+// With noise of unit variance, rounded.
+CALIPSO_INLINE EightInts noisyCodes(const Eight& linear, const Eight& fresh, const float* start, const float* rise, const float* noise) {
+  const Eight code = codesOf(linear);
+  const LaneChoice piece = __builtin_convertvector(code * (1.0f / 32.0f), LaneChoice);
+  const Eight deviation = __builtin_shuffle(eightAt(start), piece) + __builtin_shuffle(eightAt(rise), piece) * code;
+  const Eight x = code + fresh * deviation * eightAt(noise), most = Eight{} + 255.0f;
+  const Eight positive = x > 0.0f ? x : Eight{};
+  return __builtin_convertvector((positive < most ? positive : most) + 0.5f, EightInts);
+}
+
+// Code values of eight colours.
+CALIPSO_INLINE void encodeEight(const NoiseCurves& curves, const float* colours, const NoiseRows& noise, int column, std::uint8_t* codes) {
+  typedef std::uint8_t Bytes __attribute__((vector_size(32)));
+  const Eight a = eightAt(colours), b = eightAt(colours + 8), c = eightAt(colours + 16), d = eightAt(colours + 24);
+  // Channels of places 0, 2, 1, 3, and of 4, 6, 5, 7; then of all.
+  const LaneChoice low = {0, 8, 1, 9, 4, 12, 5, 13}, high = {2, 10, 3, 11, 6, 14, 7, 15}, in_order = {0, 4, 1, 5, 2, 6, 3, 7};
+  const Eight bg = __builtin_shuffle(a, b, low), rf = __builtin_shuffle(a, b, high), bg4 = __builtin_shuffle(c, d, low), rf4 = __builtin_shuffle(c, d, high);
+  const LaneChoice halves = {0, 1, 8, 9, 4, 5, 12, 13}, others = {2, 3, 10, 11, 6, 7, 14, 15};
+  const auto channel = [&](const Eight& x, const Eight& y, const LaneChoice& which) { return __builtin_shuffle(__builtin_shuffle(x, y, which), in_order); };
+  const Eight fresh = channel(rf, rf4, others);
+  const EightInts blue = noisyCodes(channel(bg, bg4, halves), fresh, curves.start[0], curves.rise[0], noise.channel[0] + column);
+  const EightInts green = noisyCodes(channel(bg, bg4, others), fresh, curves.start[1], curves.rise[1], noise.channel[1] + column);
+  const EightInts red = noisyCodes(channel(rf, rf4, halves), fresh, curves.start[2], curves.rise[2], noise.channel[2] + column);
+  const Bytes bytes = (Bytes)(blue | (green << 8) | (red << 16));
+  const Bytes packed = __builtin_shuffle(bytes, Bytes{0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, 3, 7, 11, 15, 16, 17, 18, 20, 21, 22, 24, 25, 26, 28, 29, 30, 19, 23, 27, 31});
+  std::memcpy(codes, &packed, 12), std::memcpy(codes + 12, reinterpret_cast<const std::uint8_t*>(&packed) + 16, 12);
+}
+
+CALIPSO_INLINE void encodeBody(const NoiseCurves& curves, const cv::Vec4f* colours, const NoiseRows& noise, int column, int count, cv::Vec3b* codes) {
+  constexpr int kSide = NoiseField::kSide;
+  for (; count >= 8; colours += 8, codes += 8, count -= 8, column = (column + 8) % kSide) encodeEight(curves, colours->val, noise, column, codes->val);
+  if (count == 0) return;
+  cv::Vec4f rest[8];
+  cv::Vec3b rest_codes[8];
+  std::copy_n(colours, count, rest);
+  encodeEight(curves, rest[0].val, noise, column, rest_codes[0].val);
+  std::copy_n(rest_codes, count, codes);
 }
 
 CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTarget& target) {
@@ -142,9 +156,9 @@ CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTar
   attribute void name##Sample(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out) {                     \
     sampleBody(image, u, v, count, out);                                                                                             \
   }                                                                                                                                  \
-  attribute void name##Encode(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count,     \
+  attribute void name##Encode(const NoiseCurves& curves, const cv::Vec4f* colours, const NoiseRows& noise, int column, int count,    \
                               cv::Vec3b* codes) {                                                                                    \
-    encodeBody(tables, colours, noise, column, count, codes);                                                                        \
+    encodeBody(curves, colours, noise, column, count, codes);                                                                        \
   }                                                                                                                                  \
   attribute void name##Fill(const TriangleSpan* spans, int count, const SpanTarget& target) { fillBody(spans, count, target); }      \
   attribute void name##DrawSamples(const TriangleSamples& t, int u, int v, std::uint32_t id, EdgeCoverage::Pixel& pixel) {           \

@@ -22,11 +22,14 @@ struct ShadowTexels {
   float spread;          // texels of penumbra per m above the receiver
 };
 
-// Tables by which linear colours become code values with noise: see LineCodec.
-struct CodeTables {
-  const float* code;          // at sqrt(linear) = i / kEncodeSteps
-  const float* rise;          // to the next step
-  const float* deviation;  // of the noise at each code value: B, G, R, 0
+// The camera's noise: per channel its deviation, start + rise * code, in eight pieces of 32 code values.
+struct NoiseCurves {
+  alignas(32) float start[3][8], rise[3][8];
+};
+
+// Per channel a row of NoiseField.
+struct NoiseRows {
+  const float* channel[3];
 };
 
 // Loops over which a frame spends its time, compiled for the processors that the build is for and for those with AVX2. Both give the
@@ -39,9 +42,9 @@ struct Kernels {
   // sampleBicubic() at `count` places. @param image CV_32FC4, not empty
   void (*sample)(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out);
 
-  // Code values of `count` linear colours (B, G, R, part without noise), with noise of unit variance scaled by the tables.
-  // @param noise a row of 256 places, read from `column` on, around its end
-  void (*encode)(const CodeTables& tables, const cv::Vec4f* colours, const cv::Vec4f* noise, int column, int count, cv::Vec3b* codes);
+  // Code values of `count` linear colours (B, G, R, part without noise), with noise.
+  // @param column of the first in the rows of noise, which are read around their end
+  void (*encode)(const NoiseCurves& curves, const cv::Vec4f* colours, const NoiseRows& noise, int column, int count, cv::Vec3b* codes);
 
   // Draws `count` triangles in their order.
   void (*fill)(const TriangleSpan* spans, int count, const SpanTarget& target);

@@ -1,19 +1,22 @@
 #include "line_codec.hpp"
 
-#include "calipso_render/colour.hpp"
-#include "kernels.hpp"
+#include <algorithm>
 
 namespace calipso::render {
 
 LineCodec::LineCodec(const NoiseModel& noise, std::int64_t stamp_ns) : field_(stamp_ns) {
+  constexpr float step = NoiseModel::kKnotStep;
   for (int c = 0; c < 3; ++c) {
-    for (int code = 0; code < 256; ++code) deviation_[code][c] = noise.deviation(c, static_cast<float>(code));
+    for (int k = 0; k + 1 < NoiseModel::kKnots; ++k) {
+      const float code = step * static_cast<float>(k), here = noise.deviation(c, code), next = noise.deviation(c, code + step);
+      curves_.rise[c][k] = (next - here) / (std::min(code + step, 255.0f) - code);
+      curves_.start[c][k] = here - curves_.rise[c][k] * code;
+    }
   }
 }
 
 void LineCodec::encode(const cv::Vec4f* colours, int u, int v, int count, cv::Vec3b* codes) const {
-  const CodeTables tables{encodeTables().code.data(), encodeTables().rise.data(), deviation_[0].val};
-  kernels().encode(tables, colours, field_.row(v), field_.column(u), count, codes);
+  kernels().encode(curves_, colours, {field_.row(v, 0), field_.row(v, 1), field_.row(v, 2)}, field_.column(u), count, codes);
 }
 
 }  // namespace calipso::render

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <opencv2/core.hpp>
 
 #include "calipso_render/noise.hpp"
+#include "kernels.hpp"
 
 namespace calipso::render {
 
@@ -19,7 +19,7 @@ class LineCodec {
   void encode(const cv::Vec4f* colours, int u, int v, int count, cv::Vec3b* codes) const;
 
  private:
-  std::array<cv::Vec4f, 256> deviation_;  // per code value: B, G, R, 0
+  NoiseCurves curves_;
   NoiseField field_;
 };
 

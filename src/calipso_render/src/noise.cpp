@@ -109,7 +109,7 @@ NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames, const cv::Ma
 }
 
 float NoiseModel::deviation(int channel, float code) const {
-  const float x = std::clamp(code, 0.0f, 255.0f) / 32.0f;
+  const float x = std::clamp(code, 0.0f, 255.0f) / kKnotStep;
   const int i = static_cast<int>(x);
   const auto& d = deviation_[channel];
   return d[i] + (x - i) * (d[i + 1] - d[i]);
@@ -121,8 +121,8 @@ NoiseField::NoiseField(std::int64_t stamp_ns) {
   shift_v_ = static_cast<int>((h >> 20) & (kSide - 1));
 }
 
-const std::vector<cv::Vec4f>& NoiseField::tile() {
-  static const std::vector<cv::Vec4f> field = [] {
+const std::vector<float>& NoiseField::tile() {
+  static const std::vector<float> field = [] {
     cv::Mat white(kSide, kSide, CV_32FC3), other(kSide, kSide, CV_32FC3), smooth;
     cv::RNG random(0x5eed);
     random.fill(white, cv::RNG::NORMAL, 0.0, 1.0);
@@ -131,10 +131,12 @@ const std::vector<cv::Vec4f>& NoiseField::tile() {
     cv::Mat mix = white * std::sqrt(0.5) + smooth;  // smooth keeps about half of its variance
     cv::Scalar mean, deviation;
     cv::meanStdDev(mix, mean, deviation);
-    std::vector<cv::Vec4f> values;
-    for (auto x = mix.begin<cv::Vec3f>(); x != mix.end<cv::Vec3f>(); ++x) {
-      values.emplace_back();
-      for (int c = 0; c < 3; ++c) values.back()[c] = static_cast<float>(((*x)[c] - mean[c]) / deviation[c]);
+    std::vector<float> values;
+    values.reserve(3 * kSide * (kSide + kWrapped));
+    for (int c = 0; c < 3; ++c) {
+      for (int v = 0; v < kSide; ++v) {
+        for (int u = 0; u < kSide + kWrapped; ++u) values.push_back(static_cast<float>((mix.at<cv::Vec3f>(v, u % kSide)[c] - mean[c]) / deviation[c]));
+      }
     }
     return values;
   }();

@@ -8,6 +8,7 @@
 
 #include "calipso_render/appearance.hpp"
 #include "calipso_render/colour.hpp"
+#include "calipso_render/noise.hpp"
 
 namespace calipso::render {
 namespace {
@@ -22,16 +23,16 @@ class Avx2 : public ::testing::Test {
 };
 
 TEST_F(Avx2, EncodesTheSameBytes) {
-  std::vector<cv::Vec4f> colours(1000), noise(256);
+  std::vector<cv::Vec4f> colours(1000);
   for (cv::Vec4f& c : colours) c = {random_.uniform(-0.1f, 1.2f), random_.uniform(0.0f, 0.02f), random_.uniform(0.0f, 1.0f), random_.uniform(0.0f, 1.0f)};
-  for (cv::Vec4f& n : noise) n = {random_.uniform(-3.0f, 3.0f), random_.uniform(-3.0f, 3.0f), random_.uniform(-3.0f, 3.0f), 0.0f};
-  std::vector<float> deviation(4 * 256);
-  for (float& d : deviation) d = random_.uniform(0.0f, 4.0f);
-  const CodeTables tables{encodeTables().code.data(), encodeTables().rise.data(), deviation.data()};
+  const NoiseField field(3);
+  const NoiseRows noise{{field.row(5, 0), field.row(5, 1), field.row(5, 2)}};
+  NoiseCurves curves;
+  for (int i = 0; i < 24; ++i) curves.start[i / 8][i % 8] = random_.uniform(0.0f, 4.0f), curves.rise[i / 8][i % 8] = random_.uniform(-0.01f, 0.01f);
   for (const int count : {1, 7, 64, 65, 1000}) {
     std::vector<cv::Vec3b> plain(colours.size()), fast(colours.size());
-    plainKernels().encode(tables, colours.data(), noise.data(), 200, count, plain.data());
-    avx2Kernels()->encode(tables, colours.data(), noise.data(), 200, count, fast.data());
+    plainKernels().encode(curves, colours.data(), noise, 200, count, plain.data());
+    avx2Kernels()->encode(curves, colours.data(), noise, 200, count, fast.data());
     EXPECT_EQ(plain, fast) << count;
   }
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <opencv2/core.hpp>
 
@@ -21,12 +20,10 @@ float linearFromRealCode(float code);
 // Code value as a real number in [0, 255] of a linear value; clamps to [0, 1] first.
 float codeFromLinear(float linear);
 
-// What codeFromLinear() interpolates: code value at sqrt(linear) = i / kEncodeSteps, and the rise to the next step.
-constexpr int kEncodeSteps = 1024;
-struct EncodeTables {
-  std::array<float, kEncodeSteps + 1> code, rise;
-};
-const EncodeTables& encodeTables();
+// Above kStraight the curve of code values is a polynomial in the fourth root of the linear value (largest error 0.001 code
+// values), below it a line.
+constexpr float kStraight = 0.0031308f, kStraightRise = 255.0f * 12.92f;
+constexpr float kCurve[] = {-15.233448f, 36.199356f, 345.41602f, -210.44641f, 158.35558f, -75.03315f, 15.742248f};
 
 // CV_8UC3 -> CV_32FC3 and back (rounded).
 cv::Mat linearFromCode(const cv::Mat& bgr);

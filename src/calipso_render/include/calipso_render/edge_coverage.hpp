@@ -36,11 +36,27 @@ class EdgeCoverage {
   // Draws into the chosen pixels. @pre nothing is chosen after the first draw
   void draw(const ScreenMesh& mesh, int object);
 
+  // Once all is drawn: lets the centre speak for pixels whose samples see what it sees, and all of them one sheet.
+  void settle(const VisibilityBuffer& centre);
+
   // nullptr where the pixel's centre speaks for it. Picture coordinates.
   const Pixel* at(int u, int v) const;
 
-  // Columns of a row's chosen pixels, ascending. Region coordinates.
-  std::vector<int> columnsOf(int row) const;
+  // Calls visit(column, settled) for a row's chosen pixels, ascending. Region coordinates.
+  template <class Visit>
+  void visitRow(int row, const Visit& visit) const {
+    for (int i = 0; i < tiles_across_; ++i) {
+      const int tile = tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + i];
+      if (tile < 0) continue;
+      const int* slots = &slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile];
+      for (int k = 0; k < kTile; ++k) {
+        if (slots[k] != kNone) visit(i * kTile + k, slots[k] == kSettled);
+      }
+    }
+  }
+
+  // Do samples of one object, of these nearnesses, see one sheet of it?
+  static bool isOneSheet(float nearest, float farthest) { return nearest - farthest <= kSameSheet * farthest; }
 
   // Position of a sample against its pixel's centre, px.
   static Eigen::Vector2f offset(int sample) {
@@ -48,6 +64,8 @@ class EdgeCoverage {
   }
 
  private:
+  static constexpr float kSameSheet = 0.015f;  // of the nearness: samples that differ by more see another part of an object
+
   // A triangle over the pixels of a tile that it may touch.
   struct Piece;
 
@@ -56,14 +74,16 @@ class EdgeCoverage {
   void drawPiece(const Piece& piece);
   int slotAt(int column, int row) const {
     const int tile = tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + column / kTile];
-    return tile < 0 ? -1 : slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile + column % kTile];
+    return tile < 0 ? kNone : slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile + column % kTile];
   }
 
-  cv::Rect region_;
   static constexpr int kTile = 8;  // px
+  static constexpr int kNone = -1, kSettled = -2;
+
+  cv::Rect region_;
   int tiles_across_;
   std::vector<int> tiles_;  // index of the tile in slots_, -1: none of its pixels is chosen
-  std::vector<int> slots_;  // per pixel of those tiles: index into pixels_, -1 = none
+  std::vector<int> slots_;  // per pixel of those tiles: index into pixels_, kNone or kSettled
   std::vector<Pixel> pixels_;
 };
 

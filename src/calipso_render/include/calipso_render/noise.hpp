@@ -20,8 +20,10 @@ class NoiseModel {
   // Code values, >= 0.
   float deviation(int channel, float code) const;
 
+  static constexpr int kKnots = 9;  // at code values 0, 32, .. 256; linear between them
+  static constexpr float kKnotStep = 32.0f;
+
  private:
-  static constexpr int kKnots = 9;  // at code values 0, 32, .. 256
   std::array<std::array<float, kKnots>, 3> deviation_;
 };
 
@@ -30,15 +32,17 @@ class NoiseModel {
 class NoiseField {
  public:
   explicit NoiseField(std::int64_t stamp_ns);
-  float at(int u, int v, int channel) const { return row(v)[column(u)][channel]; }
+  float at(int u, int v, int channel) const { return row(v, channel)[column(u)]; }
 
-  // Row v of the picture, as columns say; the fourth value is 0.
-  const cv::Vec4f* row(int v) const { return &tile()[static_cast<std::size_t>((v + shift_v_) & (kSide - 1)) * kSide]; }
+  static constexpr int kSide = 256, kWrapped = 8;  // columns, and how many of the first stand once more after the last
+  // A channel's row v of the picture, as columns say.
+  const float* row(int v, int channel) const {
+    return &tile()[static_cast<std::size_t>(channel * kSide + ((v + shift_v_) & (kSide - 1))) * (kSide + kWrapped)];
+  }
   int column(int u) const { return (u + shift_u_) & (kSide - 1); }
 
  private:
-  static constexpr int kSide = 256;
-  static const std::vector<cv::Vec4f>& tile();
+  static const std::vector<float>& tile();
   int shift_u_, shift_v_;
 };
 
