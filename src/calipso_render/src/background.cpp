@@ -227,7 +227,7 @@ cv::Mat motionOfRows(const cv::Mat& moving, const cv::Mat& known) {
   return (motion + 0.5f) / (weight + 1.0f);
 }
 
-void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, Background& background) {
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, const cv::Mat& surface, Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
   const cv::Mat moving = movingPlaces(key, background);
   const bool any_moving = cv::countNonZero(moving) > 0;
@@ -238,7 +238,7 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat
     now.copyTo(look, closedGaps(moving) & (background.invented == 0) & (key.labels == 0));
   }
   InpaintParams params;
-  params.nearness = nearness;
+  params.nearness = nearness, params.surface = surface;
   const InpaintResult filled = inpaint(look, background.invented, cv::Mat(), params);
   filled.image.copyTo(background.plate, background.invented);
   background.origin = filled.origin;

@@ -10,7 +10,7 @@
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/visibility.hpp"
 #include "line_codec.hpp"
-#include "plane_view.hpp"
+#include "place_view.hpp"
 #include "point_light.hpp"
 #include "smooth_step.hpp"
 #include "triangle_map.hpp"
@@ -18,7 +18,7 @@
 namespace calipso::render {
 
 // Light that stays the same while the same objects are edited under the same camera. Pictures are CV_8U of
-// the whole frame: lightLevel() of sun or sky on a support plane there.
+// the whole frame: lightLevel() of sun or sky on support plane or relief there.
 struct ShadowCache {
   std::vector<bool> edited;            // per surface: which ones it is for
   Camera camera;
@@ -146,7 +146,7 @@ class FrameCompositor {
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool findRest(int surface);
   bool isSeenAt(int surface, const Points& vertices) const;
-  bool takesShadow(int u, int v) const { return plane_view_.sees(u, v) && (shadowless_.empty() || shadowless_.at<std::uint8_t>(v, u) == 0); }
+  bool takesShadow(int u, int v) const { return place_view_.sees(u, v) && (shadowless_.empty() || shadowless_.at<std::uint8_t>(v, u) == 0); }
   void prepareShadows();
   void cacheOriginals(const std::vector<Occluder>& originals);
   void cacheOthers(const std::vector<Occluder>& others);
@@ -165,6 +165,8 @@ class FrameCompositor {
   void measureSky();
   void measureSun();
   void joinSun(int v);
+  void takeReliefInPlaneTerms();
+  float darkeningAt(int u, int v, std::uint8_t sun, std::uint8_t sky) const;
   void findRelit();
   void findMaps();
   void findShaded();
@@ -208,6 +210,7 @@ class FrameCompositor {
   bool isSmooth(int i, int j, int size) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
+  void addReliefBounds(const Points& vertices, const Eigen::Vector3f& sun, Points& shadow) const;
   cv::Rect shadowBounds(const Points& vertices, const Light& light) const;
 
   const Prepared& prepared_;
@@ -243,9 +246,9 @@ class FrameCompositor {
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
   cv::Mat covered_;  // CV_8UC1 over region_: 255 = so deep behind drawn surfaces that light there does not matter
-  cv::Mat sky_now_, sky_before_;  // CV_8UC1 over region_: lightLevel() of the sky on a support plane
+  cv::Mat sky_now_, sky_before_;  // CV_8UC1 over region_: lightLevel() of the sky on support plane or relief, this in plane terms
   cv::Mat sun_now_, sun_before_;  // CV_8UC1 over region_: the same of the sun
-  cv::Mat takes_light_;           // CV_8UC1 over region_: 255 = a support plane is seen, on which light changes
+  cv::Mat takes_light_;           // CV_8UC1 over region_: 255 = support plane or relief is seen, on which light changes
   cv::Mat relit_;    // CV_8UC1 over region_: 255 = the original's shadow, to be taken from the plate
   std::vector<Lit> lit_;           // at the corners of squares of kLightStep px over region_
   std::vector<std::uint8_t> smooth_;  // per square, by its first corner: light between the corners follows from theirs
@@ -264,7 +267,7 @@ class FrameCompositor {
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;
   Eigen::Vector3f eye_;
-  PlaneView plane_view_;
+  PlaceView place_view_;
   LineCodec codec_;
 };
 

@@ -9,6 +9,7 @@
 #include "calipso_render/ray_shadow.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "frame_compositor.hpp"
+#include "marked.hpp"
 #include "plane_light.hpp"
 #include "tiled_filter.hpp"
 #include "view_warp.hpp"
@@ -22,6 +23,7 @@ constexpr int kSkySteps = 160;         // places along the picture's width where
 constexpr float kEvenLight = 0.06f;    // of the light: between corners that differ by no more it is interpolated
 constexpr float kSmoothLight = 0.015f; // likewise where the light in their middle is their mean but for this; half of it over two steps
 constexpr int kShadowBoundsMargin = 8;     // px
+constexpr float kReliefMargin = 0.01f;      // m: planes have boxes without thickness
 constexpr float kHeightTolerance = 0.02f;  // of the height: a vertex that far below its plane still shades it
 
 int skyStep(const cv::Size& picture) { return std::max(4, picture.width / kSkySteps); }
@@ -92,11 +94,17 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
     for (int u = 0; u < whole.width; ++u) {
       const std::uint8_t sun = levelAt(shadows_.originals_sun, u, v), sky = shadows_.originals_sky.at<std::uint8_t>(v, u);
       if ((sun == 255 && sky == 255) || !takesShadow(u, v)) continue;
-      shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(1.0f - luminance(shadowRatio(kPerLevel * sun, kPerLevel * sky)));
+      shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(darkeningAt(u, v, sun, sky));
     }
   }
   cv::dilate(shadows_.shaded, shadows_.shaded, disc(params_.background.shadow_margin_px));
   shadows_.shaded_box = cv::boundingRect(shadows_.shaded);
+}
+
+// Part of its brightness that a pixel loses which gets these levels of sun and sky.
+float FrameCompositor::darkeningAt(int u, int v, std::uint8_t sun, std::uint8_t sky) const {
+  if (place_view_.relief().at(u, v)) return (1.0f - place_view_.relief().umbra.at<float>(v, u)) * (1.0f - kPerLevel * sun);
+  return 1.0f - luminance(shadowRatio(kPerLevel * sun, kPerLevel * sky));
 }
 
 // Edited objects hide only that part of the sky which others leave: the picture's pixels lack theirs already.
@@ -117,7 +125,7 @@ void FrameCompositor::leaveHidden(cv::Mat& sky, const cv::Rect& region) const {
 
 cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds) const {
   cv::Mat sun(frame_.bgr.size(), CV_8U, cv::Scalar(255)), part = sun(bounds);
-  planesInLight(plane_view_, shadow, bounds, cv::Mat(), part);
+  planesInLight(place_view_, shadow, bounds, cv::Mat(), part);
   return sun;
 }
 
@@ -133,7 +141,7 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
     for (int i = 0; i < grid.cols; ++i) {
       const int u = (first.x + i) * step, v = (first.y + j) * step;
       const bool skipped = !skip.empty() && region.contains({u, v}) && skip.at<std::uint8_t>(v - region.y, u - region.x) != 0;
-      if (!skipped && plane_view_.at(u, v, r)) grid.at<float>(j, i) = skyLight(shadow.visibility(r.position, r.normal));
+      if (!skipped && place_view_.planes().at(u, v, r)) grid.at<float>(j, i) = skyLight(shadow.visibility(r.position, r.normal));
     }
   }
   cv::Mat sky(region.size(), CV_8U);
@@ -157,7 +165,26 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
   return sky;
 }
 
-// Pixels onto which the sun can cast the vertices' shadow on a support plane.
+// Where the sun's rays through the vertices pass through the box that the relief is in.
+void FrameCompositor::addReliefBounds(const Points& vertices, const Eigen::Vector3f& sun, Points& shadow) const {
+  const Relief& relief = place_view_.relief();
+  if (relief.empty() || relief.box.isEmpty()) return;
+  const Eigen::Array3f low = relief.box.min().array() - kReliefMargin, high = relief.box.max().array() + kReliefMargin;
+  const Eigen::Array3f way = -sun.array();
+  for (const Eigen::Vector3f& p : vertices) {
+    float enter = 0.0f, leave = 1e9f;
+    for (int k = 0; k < 3; ++k) {
+      const float slope = std::abs(way[k]) > 1e-6f ? way[k] : 1e-6f, a = (low[k] - p[k]) / slope, b = (high[k] - p[k]) / slope;
+      enter = std::max(enter, std::min(a, b)), leave = std::min(leave, std::max(a, b));
+    }
+    if (enter >= leave) continue;
+    const float spread = static_cast<float>(params_.sun_radius) * leave;
+    const Eigen::Vector3f side = sun.unitOrthogonal(), other = sun.cross(side), far = p - leave * sun;
+    shadow.insert(shadow.end(), {p - enter * sun, far + spread * side, far - spread * side, far + spread * other, far - spread * other});
+  }
+}
+
+// Pixels onto which the sun can cast the vertices' shadow.
 cv::Rect FrameCompositor::shadowBounds(const Points& vertices, const Light& light) const {
   const Eigen::Vector3f l = light.direction;
   Points shadow;
@@ -174,6 +201,7 @@ cv::Rect FrameCompositor::shadowBounds(const Points& vertices, const Light& ligh
       shadow.insert(shadow.end(), {foot + spread * side, foot - spread * side, foot + spread * other, foot - spread * other});
     }
   }
+  addReliefBounds(vertices, l, shadow);
   return boundsOf(projectMesh(shadow, {}, frame_.camera), kShadowBoundsMargin, frame_.bgr.size());
 }
 
@@ -209,10 +237,33 @@ void FrameCompositor::measureSun() {
   if (!bounds.empty()) {
     const cv::Rect here = bounds - region_.tl();
     cv::Mat part = sun_now_(here);
-    planesInLight(plane_view_, *moved_shadow_, bounds, covered_(here), part);
+    planesInLight(place_view_, *moved_shadow_, bounds, covered_(here), part);
   }
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) joinSun(v);
+  takeReliefInPlaneTerms();
+}
+
+// The sun alone shades the relief; what its levels do to the support planes they do not do to it.
+void FrameCompositor::takeReliefInPlaneTerms() {
+  const Relief& relief = place_view_.relief();
+  if (relief.empty()) return;
+  sky_before_ = sky_before_.clone();  // it is the cache's
+  const float planes_umbra = luminance(prepared_.umbra);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region_.height; ++v) {
+    std::uint8_t *sun_now = sun_now_.ptr<std::uint8_t>(v), *sky_now = sky_now_.ptr<std::uint8_t>(v);
+    std::uint8_t *sun_before = sun_before_.ptr<std::uint8_t>(v), *sky_before = sky_before_.ptr<std::uint8_t>(v);
+    const float* umbra = relief.umbra.ptr<float>(v + region_.y) + region_.x;
+    const std::uint8_t* seen = relief.seen.ptr<std::uint8_t>(v + region_.y) + region_.x;
+    const auto take = [&](int u, std::uint8_t& sun, std::uint8_t& sky) {
+      const PlaneTerms terms = inPlaneTerms(kPerLevel * sun, umbra[u], planes_umbra);
+      sun = lightLevel(terms.sun), sky = lightLevel(terms.sky);
+    };
+    for (int u = nextMarked(seen, 0, region_.width); u < region_.width; u = nextMarked(seen, u + 1, region_.width)) {
+      take(u, sun_now[u], sky_now[u]), take(u, sun_before[u], sky_before[u]);
+    }
+  }
 }
 
 // Row v of what edited objects and others shade together, and of what was shaded before.
@@ -225,7 +276,7 @@ void FrameCompositor::joinSun(int v) {
   if (originals != nullptr) std::copy_n(originals, width, before);
   else std::fill_n(before, width, 255);
   for (int u = 0; others != nullptr && u < width; ++u) now[u] = both(now[u], others[u]), before[u] = both(before[u], others[u]);
-  plane_view_.seesRow(region_.x, v + region_.y, width, takes);
+  place_view_.seesRow(region_.x, v + region_.y, width, takes);
   for (int u = 0; none != nullptr && u < width; ++u) takes[u] = none[u] == 0 ? takes[u] : 0;
   for (int u = 0; u < width; ++u) takes[u] = covered[u] == 0 ? takes[u] : 0;
 }

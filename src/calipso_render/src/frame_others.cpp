@@ -92,7 +92,7 @@ void FrameCompositor::findScreened() {
       const bool edited = ids[u] != VisibilityBuffer::kNothing && edited_[surface_of_slot_[VisibilityBuffer::objectOf(ids[u])]];
       if (edited) drawn.at<float>(v, u) = centre_->nearness(v)[u];
       const float near = scenery.at<float>(v, u);
-      const bool hides_plane = near > 0.0f && plane_view_.at(u + region_.x, v + region_.y, r) && near * axis.dot(r.position - eye_) > kNearer;
+      const bool hides_plane = near > 0.0f && place_view_.at(u + region_.x, v + region_.y, r) && near * axis.dot(r.position - eye_) > kNearer;
       if (hides_plane) takes_light_.at<std::uint8_t>(v, u) = 0;
     }
   }

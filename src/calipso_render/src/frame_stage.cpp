@@ -36,7 +36,7 @@ FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& p
                                  ShadowCache& shadows, RestPicture& rest)
     : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), light_(lightOf(frame)), point_light_(light_), rest_(rest),
       labels_(frame.labels.empty() ? prepared.key_labels : frame.labels), eye_(frame.camera.world_from_camera.translation().cast<float>()),
-      plane_view_(params.planes, frame.camera), codec_(params.add_noise ? prepared.noise : NoiseModel(), frame.stamp_ns) {
+      place_view_(PlaneView(params.planes, frame.camera)), codec_(params.add_noise ? prepared.noise : NoiseModel(), frame.stamp_ns) {
   if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");
 }
 
@@ -121,6 +121,7 @@ void FrameCompositor::stage() {
   if (sameView(frame_.camera, prepared_.camera)) {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
     shadowless_ = prepared_.shadowless;
+    place_view_ = PlaceView(place_view_.planes(), prepared_.relief);
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
       if (prepared_.fronts[i].empty() || (prepared_.moves[i] && !at_rest_[i])) continue;
       fronts_[i] = elsewhere_.empty() ? prepared_.fronts[i] : cv::Mat(prepared_.fronts[i] & ~elsewhere_);
@@ -133,6 +134,7 @@ void FrameCompositor::stage() {
     cv::remap(invented_, invented, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));
     cv::remap(quiet_, quiet, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
     plate_ = plate, invented_ = invented, quiet_ = quiet;
+    place_view_ = PlaceView(place_view_.planes(), warped(prepared_.relief, map));
   }
 }
 

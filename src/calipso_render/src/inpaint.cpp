@@ -22,6 +22,7 @@ cv::Rect windowAround(const cv::Mat& hole) {
 InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
   InpaintParams inner = params;
   if (!params.nearness.empty()) inner.nearness = params.nearness(window).clone();
+  if (!params.surface.empty()) inner.surface = params.surface(window).clone();
   return inner;
 }
 

@@ -46,14 +46,14 @@ struct Level {
   cv::Mat image;         // CV_32FC4: colour, and how lively it is around
   cv::Mat known;         // CV_32FC1: part of a pixel that is known
   cv::Mat hole, source;  // CV_8UC1
-  cv::Mat nearness;      // CV_32FC1; may be empty
+  cv::Mat nearness, surface;  // CV_32FC1, CV_8UC1; may be empty
 };
 
 // Half the size: the mean of what is known. A pixel is source if all of its four were, hole if less than half of it is known: what
 // shows through narrow gaps, and lines drawn through the hole, are to be met at every level.
 Level halved(const Level& fine) {
   const cv::Size size((fine.hole.cols + 1) / 2, (fine.hole.rows + 1) / 2);
-  Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_32F), {}, cv::Mat(size, CV_8U, cv::Scalar(255)), {}};
+  Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_32F), {}, cv::Mat(size, CV_8U, cv::Scalar(255)), {}, {}};
   cv::Mat weight = cv::Mat::zeros(size, CV_32F), count = weight.clone();
   for (int v = 0; v < fine.hole.rows; ++v) {
     for (int u = 0; u < fine.hole.cols; ++u) {
@@ -67,6 +67,7 @@ Level halved(const Level& fine) {
   half.known /= count;
   half.hole = half.known < kMostlyKnown;
   if (!fine.nearness.empty()) cv::resize(fine.nearness, half.nearness, size, 0, 0, cv::INTER_NEAREST);
+  if (!fine.surface.empty()) cv::resize(fine.surface, half.surface, size, 0, 0, cv::INTER_NEAREST);
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) half.image.at<cv::Vec4f>(v, u) /= weight.at<float>(v, u);
   }
@@ -95,7 +96,7 @@ class Filling {
  public:
   // @param horizon difference of nearness that does not count
   Filling(const Level& level, float scale, float horizon, const InpaintParams& params)
-      : image_(level.image.clone()), hole_(level.hole), nearness_(level.nearness), scale_(scale), horizon_(horizon), params_(params), to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
+      : image_(level.image.clone()), hole_(level.hole), nearness_(level.nearness), surface_(level.surface), scale_(scale), horizon_(horizon), params_(params), to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
         cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)), bands_((hole_.rows + kBandRows - 1) / kBandRows) {
     const cv::Mat patch = cv::Mat::ones(kSide, kSide, CV_8U);
     cv::Mat touched;
@@ -282,12 +283,16 @@ class Filling {
     return total > 0.0f ? cv::Vec4f(sum / total) : image_.at<cv::Vec4f>(pixel);
   }
 
-  // Places are layered: what is at another height is seldom the same.
+  // Places are layered: what is at another height is seldom the same, what is of another surface never.
   float awayCost(const cv::Point& p, const cv::Point& q) const {
     float cost = scale_ * (params_.away_row * std::abs(p.y - q.y) + params_.away_column * std::abs(p.x - q.x));
     if (!nearness_.empty()) {
       const float own = nearness_.at<float>(p), other = nearness_.at<float>(q);
       if (other > kNearer * own + horizon_ || own > kNearer * other + horizon_) cost += kMisplaced;
+    }
+    if (!surface_.empty()) {
+      const std::uint8_t own = surface_.at<std::uint8_t>(p), other = surface_.at<std::uint8_t>(q);
+      if (own != 0 && other != 0 && own != other) cost += kMisplaced;
     }
     return kSide * kSide * cost;
   }
@@ -328,7 +333,7 @@ class Filling {
     return h;
   }
 
-  cv::Mat image_, hole_, nearness_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
+  cv::Mat image_, hole_, nearness_, surface_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
   float scale_, horizon_;         // size of these pixels in the finest level's
   InpaintParams params_;
   cv::Mat to_, cost_;             // CV_16SC2, CV_32FC1, of the patch around every pixel
@@ -343,7 +348,7 @@ cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& s
   std::vector<Level> levels(1);
   cv::merge(std::vector<cv::Mat>{image, kLively * liveliness(image, hole == 0)}, levels[0].image);
   cv::Mat(hole == 0).convertTo(levels[0].known, CV_32F, 1.0 / 255.0);
-  levels[0].hole = hole, levels[0].source = source, levels[0].nearness = params.nearness;
+  levels[0].hole = hole, levels[0].source = source, levels[0].nearness = params.nearness, levels[0].surface = params.surface;
   const float horizon = params.nearness.empty() ? 0.0f : kHorizon * nearnessPerRow(params.nearness);
   while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side) levels.push_back(halved(levels.back()));
   const int coarsest = static_cast<int>(levels.size()) - 1;

@@ -13,7 +13,7 @@ constexpr float kSlow = 0.3f;  // of visibility: between places that differ by n
 
 class Squares {
  public:
-  Squares(const PlaneView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out)
+  Squares(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out)
       : view_(view), light_(light), rect_(rect), skip_(skip), out_(out) {}
 
   // Squares hang on the picture, not on the rectangle: pixels are the same whatever else is asked for.
@@ -30,7 +30,7 @@ class Squares {
     const cv::Rect here = (square & rect_) - rect_.tl();
     if (here.empty() || (!skip_.empty() && isSkipped(here))) return;
     Receiver middle, corner;
-    bool even = view_.at(square.x + 0.5f * square.width, square.y + 0.5f * square.height, middle);
+    bool even = !view_.relief().touches(square.x, square.y, square.width) && view_.at(square.x + 0.5f * square.width, square.y + 0.5f * square.height, middle);
     float radius = 0.0f;
     for (int k = 0; k < 4 && even; ++k) {
       even = view_.at(square.x + (k & 1) * square.width, square.y + (k >> 1) * square.height, corner) && corner.normal == middle.normal;
@@ -107,7 +107,7 @@ class Squares {
     }
   }
 
-  const PlaneView& view_;
+  const PlaceView& view_;
   const Visibility& light_;
   const cv::Rect rect_;
   const cv::Mat& skip_;
@@ -116,7 +116,7 @@ class Squares {
 
 }  // namespace
 
-void planesInLight(const PlaneView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out) {
+void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out) {
   if (!rect.empty()) Squares(view, light, rect, skip, out).run();
 }
 

@@ -9,6 +9,7 @@
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "place_depth.hpp"
+#include "place_relief.hpp"
 #include "plane_mirror.hpp"
 #include "prepare_remarks.hpp"
 #include "shadow_check.hpp"
@@ -65,14 +66,14 @@ cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& plane
   return off;
 }
 
-// Visibility of a light on the support planes, 0..1, where a plane is seen and no object hides it; 1 elsewhere.
-cv::Mat planeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& planes, const cv::Mat& off_planes, const ClipFrame& key) {
+// Visibility of a light on the support planes and on the relief, 0..1, where one is seen; 1 elsewhere.
+cv::Mat placeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& planes, const Relief& relief, const cv::Mat& off_planes, const ClipFrame& key) {
   cv::Mat visibility(key.bgr.size(), CV_32F, cv::Scalar(1.0f));
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < visibility.rows; ++v) {
     for (int u = 0; u < visibility.cols; ++u) {
       if (off_planes.at<std::uint8_t>(v, u) != 0) continue;
-      const auto receiver = receiverAt(planes, key.camera, u, v);
+      const std::optional<Receiver> receiver = relief.at(u, v) ? relief.receiver(u, v) : receiverAt(planes, key.camera, u, v);
       if (receiver) visibility.at<float>(v, u) = sun.visibility(receiver->position, receiver->normal);
     }
   }
@@ -300,10 +301,13 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<V
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const bool all_move = std::find(p.moves.begin(), p.moves.end(), false) == p.moves.end();
   p.background = seen;
-  const cv::Mat off_planes = offPlanes(p.scenery, params.planes, p.camera);
+  const PlaceSurfaces surfaces = findSurfaces(p.scenery, params.depth, p.key_labels, params.planes, p.camera);
+  p.relief = findRelief(surfaces, p.light.light.direction);
+  cv::Mat off_planes = offPlanes(p.scenery, params.planes, p.camera), no_sky = off_planes;
+  if (!p.relief.empty()) no_sky = off_planes | p.relief.seen, off_planes = off_planes & ~p.relief.seen;
   p.shadowless = off_planes.clone();
-  const cv::Mat visibility = planeVisibility(sun, params.planes, off_planes, frames.front());
-  const cv::Mat sky_visibility = planeVisibility(sky, params.planes, off_planes, frames.front());
+  const cv::Mat visibility = placeVisibility(sun, params.planes, p.relief, off_planes, frames.front());
+  const cv::Mat sky_visibility = placeVisibility(sky, params.planes, p.relief, no_sky, frames.front());
   cv::Mat shaded;
   if (!all_move) {
     const SeenShadows seen_shadows = seenShadows(visibility, sky_visibility, picture, (p.key_labels != 0) | off_planes);
@@ -321,12 +325,14 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<V
     p.background.plate = unmirrored(p.mirror, p.background.plate);
     key.bgr = unmirroredCodes(p.mirror, key.bgr);
   }
-  inventBackground(shaded, key, groundNearness(params.planes, frames.front().camera, p.scenery), p.background);
+  inventBackground(shaded, key, groundNearness(params.planes, frames.front().camera, p.scenery), surfaces.label, p.background);
   p.plate_linear = linearOf(p.background.plate);
+  const cv::Mat off_the_planes = (p.key_labels != 0) | no_sky;
   const std::optional<cv::Vec3f> umbra = any_moves ? umbraInViews(views, params.planes, p.background, p.light.light) : std::nullopt;
   p.umbra = umbra     ? *umbra
           : any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
-                      : measureUmbra(picture, p.background.plate, visibility, sky_visibility, p.key_labels, predictedUmbra(p.light.light, params.planes));
+                      : measureUmbra(picture, p.background.plate, visibility, sky_visibility, off_the_planes, predictedUmbra(p.light.light, params.planes));
+  findUmbra(p.light.light, picture, p.background.plate, visibility, p.key_labels, params.planes, p.umbra, p.relief);
 }
 
 class Stopwatch {

@@ -86,7 +86,7 @@ TEST(OutsideWinding, LeavesOutOnlyWhatIsHidden) {
 TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
   const Surface surface = makeSurface(ballAt(kCentre));
   const ShadowMap sun({{&surface.key_vertices, &surface.triangles}}, sunlight().direction.cast<double>(), {512, 0.03, 16});
-  const PlaneView view(table(), camera());
+  const PlaceView view(PlaneView(table(), camera()));
   const cv::Rect rect(13, 9, 120, 101);
   cv::Mat fast(rect.size(), CV_8U, cv::Scalar(255));
   planesInLight(view, sun, rect, cv::Mat(), fast);

@@ -35,8 +35,8 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
 // Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects cover or
 // darken in every frame), from the surroundings. Where the place moves by itself, the median is no picture of
 // it: there the key frame is what the surroundings look like.
-// @param nearness of the ground, as groundNearness(); may be empty
-void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, Background& background);
+// @param nearness of the ground, as groundNearness(); @param surface as InpaintParams::surface; both may be empty
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, const cv::Mat& surface, Background& background);
 
 // CV_32FC1, 1/m along the optical axis, of the support plane that a pixel sees, or of what is seen of the scenery beyond it;
 // 0 where no plane is. Empty if none is seen at all.

@@ -13,6 +13,7 @@
 #include "calipso_render/light_fit.hpp"
 #include "calipso_render/noise.hpp"
 #include "calipso_render/plane_mirror.hpp"
+#include "calipso_render/relief.hpp"
 #include "calipso_render/stage.hpp"
 
 namespace calipso::render {
@@ -89,7 +90,8 @@ struct Prepared {
   std::vector<cv::Mat> fronts;      // per surface, CV_8UC1: places where something unmodelled stands before it
   std::vector<cv::Mat> footprints;  // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
   cv::Mat scenery;                  // CV_32FC1, 1/m: nearness of what is no object and may hide one; 0 unknown; may be empty
-  cv::Mat shadowless;               // CV_8UC1: where objects cast no shadow: no plane is seen there, or it shows none in the video
+  cv::Mat shadowless;               // CV_8UC1: where objects cast no shadow: neither plane nor relief is seen there, or shows none in the video
+  Relief relief;                    // of the place, takes shadows; may be empty
   cv::Mat nearness;                 // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
   PlaneMirror mirror;
   Background background;

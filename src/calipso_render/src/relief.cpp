@@ -1,0 +1,51 @@
+#include "calipso_render/relief.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+namespace calipso::render {
+namespace {
+
+Eigen::Vector3f vectorAt(const cv::Mat& picture, int u, int v) {
+  const cv::Vec3f& x = picture.at<cv::Vec3f>(v, u);
+  return {x[0], x[1], x[2]};
+}
+
+}  // namespace
+
+Receiver Relief::receiver(int u, int v) const { return {vectorAt(position, u, v), vectorAt(normal, u, v)}; }
+
+bool Relief::touches(int u, int v, int size) const {
+  if (empty()) return false;
+  const cv::Rect here = cv::Rect(u / kTile, v / kTile, size / kTile, size / kTile) & cv::Rect({0, 0}, tiles.size());
+  return !here.empty() && cv::countNonZero(tiles(here)) > 0;
+}
+
+void Relief::index() {
+  tiles = cv::Mat::zeros((seen.rows + kTile - 1) / kTile, (seen.cols + kTile - 1) / kTile, CV_8U);
+  box.setEmpty();
+  for (int v = 0; v < seen.rows; ++v) {
+    for (int u = 0; u < seen.cols; ++u) {
+      if (seen.at<std::uint8_t>(v, u) == 0) continue;
+      tiles.at<std::uint8_t>(v / kTile, u / kTile) = 255;
+      box.extend(vectorAt(position, u, v));
+    }
+  }
+}
+
+Relief warped(const Relief& relief, const cv::Mat& map) {
+  Relief out;
+  if (relief.empty()) return out;
+  const auto carry = [&](const cv::Mat& from, cv::Mat& to) { cv::remap(from, to, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT); };
+  carry(relief.seen, out.seen), carry(relief.position, out.position), carry(relief.normal, out.normal), carry(relief.umbra, out.umbra);
+  out.index();
+  return out;
+}
+
+PlaneTerms inPlaneTerms(float sun, float umbra, float planes_umbra) {
+  // planes_umbra sky + (1 - planes_umbra) sun' = umbra + (1 - umbra) sun, one of the two levels being that of the planes
+  if (umbra <= planes_umbra) return {sun, sun + (1.0f - sun) * umbra / planes_umbra};
+  return {(umbra - planes_umbra + (1.0f - umbra) * sun) / (1.0f - planes_umbra), 1.0f};
+}
+
+}  // namespace calipso::render

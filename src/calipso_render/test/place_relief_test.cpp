@@ -1,0 +1,166 @@
+#include "../src/place_relief.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "../src/place_view.hpp"
+#include "calipso_render/colour.hpp"
+#include "calipso_render/inpaint.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kWide = 160, kHigh = 120;
+constexpr float kWallAway = 3.0f;      // m, along y
+const cv::Rect kObject(60, 40, 40, 60);  // across the edge between floor and wall
+constexpr float kObjectAway = 2.0f;
+
+// 1 m over the floor z = 0, looking along y.
+Camera camera() {
+  Camera c;
+  c.width = kWide, c.height = kHigh, c.fx = c.fy = 120.0, c.cx = 79.5, c.cy = 59.5;
+  Eigen::Matrix3d R;
+  R.col(0) = Eigen::Vector3d::UnitX(), R.col(1) = -Eigen::Vector3d::UnitZ(), R.col(2) = Eigen::Vector3d::UnitY();
+  c.world_from_camera.linear() = R, c.world_from_camera.translation() = Eigen::Vector3d(0.0, 0.0, 1.0);
+  return c;
+}
+
+std::vector<SupportPlane> floorPlane() {
+  SupportPlane plane;
+  plane.normal = Eigen::Vector3d::UnitZ(), plane.offset = 0.0;
+  return {plane};
+}
+
+bool isWall(int v) { return static_cast<float>(camera().ray(0, v).y()) * kWallAway < 1.0f; }
+
+struct Room {
+  cv::Mat depth = cv::Mat(kHigh, kWide, CV_32F), scenery = depth.clone(), labels = cv::Mat::zeros(kHigh, kWide, CV_8U);
+
+  Room() {
+    for (int v = 0; v < kHigh; ++v) {
+      const float floor = 1.0f / std::max(1e-6f, static_cast<float>(camera().ray(0, v).y()));
+      depth.row(v) = isWall(v) ? kWallAway : floor;
+    }
+    scenery = 1.0f / depth;
+    depth(kObject) = kObjectAway, scenery(kObject) = 0.0f, labels(kObject) = 1;
+  }
+  PlaceSurfaces surfaces() const { return findSurfaces(scenery, depth, labels, floorPlane(), camera()); }
+};
+
+const Eigen::Vector3f kSun = Eigen::Vector3f(-0.3f, -0.6f, 0.7f).normalized();
+
+TEST(PlaceRelief, AWallGoesOnBehindAnObjectAndMeetsTheFloorThere) {
+  const PlaceSurfaces surfaces = Room().surfaces();
+  for (int v = 0; v < kHigh; ++v) {
+    for (int u = 0; u < kWide; ++u) {
+      const double edge = std::abs(camera().ray(u, v).y() * kWallAway - 1.0);
+      if (edge < 0.01) continue;
+      ASSERT_EQ(surfaces.label.at<std::uint8_t>(v, u), isWall(v) ? 2 : 1) << u << ", " << v;
+    }
+  }
+  const Relief relief = findRelief(surfaces, kSun);
+  const Receiver behind = relief.receiver(80, 45);
+  EXPECT_NEAR(behind.position.y(), kWallAway, 1e-3);
+  EXPECT_NEAR((behind.normal - Eigen::Vector3f(0, -1, 0)).norm(), 0.0, 1e-3);
+}
+
+TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereTheSunComesFromBehind) {
+  EXPECT_TRUE(findRelief(findSurfaces(cv::Mat(), cv::Mat(), Room().labels, floorPlane(), camera()), kSun).empty());
+  EXPECT_TRUE(findRelief(Room().surfaces(), Eigen::Vector3f(0.0f, 0.6f, 0.8f)).empty());
+}
+
+TEST(PlaceRelief, WhatIsBehindAnObjectIsNotBeforeIt) {
+  Room room;
+  room.depth(kObject) = 3.5f;  // seen through a hole in the wall
+  const PlaceSurfaces surfaces = room.surfaces();
+  EXPECT_EQ(surfaces.label.at<std::uint8_t>(45, 80), PlaceSurfaces::kUnknown);  // above the floor's horizon
+}
+
+TEST(PlaceRelief, DepthNoiseMovesAWallLittle) {
+  Room room;
+  cv::Mat noise(room.depth.size(), CV_32F);
+  cv::RNG random(3);
+  random.fill(noise, cv::RNG::NORMAL, 0.0, 0.003);
+  room.depth = room.depth.mul(1.0f + noise);
+  cv::Mat(1.0 / room.depth).copyTo(room.scenery, room.labels == 0);
+  const Relief relief = findRelief(room.surfaces(), kSun);
+  ASSERT_TRUE(relief.at(80, 45));
+  EXPECT_NEAR(relief.receiver(80, 45).position.y(), kWallAway, 0.01);
+  EXPECT_GT(-relief.receiver(80, 45).normal.y(), 0.999f);
+}
+
+TEST(PlaceRelief, ItsUmbraIsMeasuredWhereItsShadeIsSeen) {
+  Relief relief = findRelief(Room().surfaces(), kSun);
+  const cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar::all(180.0));
+  cv::Mat picture = plate.clone(), sun(kHigh, kWide, CV_32F, cv::Scalar(1.0f));
+  const cv::Rect shade(110, 20, 20, 20);
+  sun(shade) = 0.0f;
+  picture(shade).setTo(cv::Scalar::all(codeFromLinear(0.3f * linearFromRealCode(180.0f))));
+  Light light;
+  light.direction = kSun;
+  findUmbra(light, picture, plate, sun, Room().labels, floorPlane(), {0.5f, 0.5f, 0.5f}, relief);
+  EXPECT_NEAR(relief.umbra.at<float>(25, 20), 0.3f, 0.01f);
+}
+
+TEST(PlaceRelief, UnseenShadeIsPredictedFromThatOfThePlanes) {
+  Relief relief = findRelief(Room().surfaces(), kSun);
+  const cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar::all(180.0)), sun(kHigh, kWide, CV_32F, cv::Scalar(1.0f));
+  Light light;  // even ambient light
+  light.direction = kSun;
+  findUmbra(light, plate, plate, sun, Room().labels, floorPlane(), {0.5f, 0.5f, 0.5f}, relief);
+  // as much sun as ambient light on the floor; on the wall it comes under another angle
+  EXPECT_NEAR(relief.umbra.at<float>(25, 20), 1.0f / (1.0f + -kSun.y() / kSun.z()), 0.01f);
+}
+
+TEST(PlaceRelief, PlaneTermsGiveItsOwnLight) {
+  for (const float planes : {0.3f, 0.6f}) {
+    for (const float umbra : {0.1f, 0.45f, 0.9f}) {
+      for (const float sun : {0.0f, 0.4f, 1.0f}) {
+        const PlaneTerms t = inPlaneTerms(sun, umbra, planes);
+        EXPECT_NEAR(planes * t.sky + (1.0f - planes) * t.sun, umbra + (1.0f - umbra) * sun, 1e-5);
+        EXPECT_TRUE(t.sun >= 0.0f && t.sun <= 1.0f && t.sky >= 0.0f && t.sky <= 1.0f);
+      }
+    }
+  }
+}
+
+TEST(PlaceView, SeesTheReliefBeforeThePlanesBehindIt) {
+  const Relief relief = findRelief(Room().surfaces(), kSun);
+  const PlaceView view(PlaneView(floorPlane(), camera()), relief);
+  Receiver r;
+  ASSERT_TRUE(view.at(20.0f, 70.0f, r));  // the floor goes on behind the wall
+  EXPECT_NEAR(r.position.y(), kWallAway, 1e-3);
+  ASSERT_TRUE(view.at(20.0f, 110.0f, r));
+  EXPECT_NEAR(r.position.z(), 0.0f, 1e-3);
+  std::uint8_t row[kWide];
+  view.seesRow(0, 30, kWide, row);
+  EXPECT_EQ(row[20], 255);  // above the horizon of the floor
+  EXPECT_TRUE(relief.touches(0, 0, 16));
+  EXPECT_FALSE(relief.touches(0, 112, 8));
+}
+
+TEST(Inpaint, CopiesComeFromTheSameSurface) {
+  cv::Mat picture(96, 96, CV_32FC3), surface(96, 96, CV_8U, cv::Scalar(1)), hole = cv::Mat::zeros(96, 96, CV_8U);
+  cv::RNG random(1);
+  random.fill(picture, cv::RNG::NORMAL, 100.0, 4.0);
+  picture(cv::Rect(0, 40, 96, 56)) += cv::Scalar::all(80.0);
+  surface(cv::Rect(0, 56, 96, 40)) = 2;  // the paint changes elsewhere than the surface
+  hole(cv::Rect(30, 20, 36, 60)) = 255;
+  InpaintParams params;
+  params.surface = surface;
+  const InpaintResult filled = inpaint(picture, hole, cv::Mat(), params);
+  int foreign = 0, copied = 0;
+  for (int v = 0; v < 96; ++v) {
+    for (int u = 0; u < 96; ++u) {
+      const cv::Vec2s from = filled.origin.at<cv::Vec2s>(v, u);
+      if (from[0] < 0) continue;
+      ++copied, foreign += surface.at<std::uint8_t>(from[1], from[0]) != surface.at<std::uint8_t>(v, u) && std::abs(v - 56) > 3;
+    }
+  }
+  EXPECT_GT(copied, 1000);
+  EXPECT_LT(foreign, copied / 50);  // patches that lie across the border
+}
+
+}  // namespace
+}  // namespace calipso::render
