@@ -21,6 +21,7 @@ constexpr float kSeen = 1e-5f;    // sum of weights, cubed, below which a texel 
 constexpr float kKnown = 0.5f;    // certainty, of the greatest there is, of what others are continued from
 constexpr float kSure = 0.2f;     // ... of which nothing else is needed
 constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exact
+constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;  // the key frame's share in a colour with which it counts for nothing, and alone
 constexpr float kPoor = 0.15f, kGood = 0.45f;  // weight of a look at a like place that counts for nothing, and in full
 constexpr float kAskew = 0.6f, kAlike = 0.9f;  // cosine between normals that are not, and are, mirror images
 constexpr float kQuarter = 0.25f * static_cast<float>(M_PI);
@@ -91,6 +92,7 @@ struct Layers {
 // How well a picture shows a place: 0 not at all, 1 straight on and well inside the mask.
 struct Look {
   float weight = 0.0f;
+  float detail = 0.0f;         // pixels per area of surface, 1 = straight on from where the key frame's camera is
   float u = 0.0f, v = 0.0f;  // in Reflectance::region
 };
 
@@ -103,6 +105,7 @@ class TextureFill {
     extent_ = box.diagonal().norm();
     two_sided_ = std::any_of(surface_.edges.begin(), surface_.edges.end(), [](const MeshEdge& e) { return e.b < 0; });
     for (const View* v : views_) camera_from_world_.push_back(v->camera.world_from_camera.inverse().cast<float>());
+    key_depth_ = std::max(1e-6f, (camera_from_world_[0] * surface_.key_vertices.front()).z());
     planes_ = mirrorPlanes(surface_.key_vertices, surface_.triangles);
     if (const auto axis = revolutionAxis(surface_.key_vertices, surface_.triangles)) {
       folds_ = foldsOf(*axis, views_[0]->camera.world_from_camera.translation().cast<float>());
@@ -112,8 +115,7 @@ class TextureFill {
   void run(Appearance& a) const {
     const Camera& camera = views_[0]->camera;
     const Eigen::Vector3f down = camera.world_from_camera.linear().col(1).cast<float>();
-    const float depth = std::max(1e-6f, (camera_from_world_[0] * surface_.key_vertices.front()).z());
-    a.texture = SurfaceTexture(surface_.key_vertices, surface_.triangles, depth / static_cast<float>(camera.fx), kMostTexels);
+    a.texture = SurfaceTexture(surface_.key_vertices, surface_.triangles, key_depth_ / static_cast<float>(camera.fx), kMostTexels);
     std::vector<char> from(a.texture.size(), kFilled);
     std::vector<float> certain(a.texture.size(), 0.0f);
     std::vector<signed char> layer(a.texture.size(), -1);
@@ -138,7 +140,7 @@ class TextureFill {
     if (!(in_camera.z() > 0.0f)) return std::nullopt;
     const Eigen::Vector2d pixel = views_[view]->camera.project(in_camera.cast<double>());
     const cv::Rect& region = pictures_[view].region;
-    return Look{0.0f, static_cast<float>(pixel.x()) - region.x, static_cast<float>(pixel.y()) - region.y};
+    return Look{0.0f, 0.0f, static_cast<float>(pixel.x()) - region.x, static_cast<float>(pixel.y()) - region.y};
   }
 
   // The best trust around a pixel among fronts of the object that `accepts` takes, by depth (m).
@@ -170,6 +172,7 @@ class TextureFill {
       return q.z() <= depth + kDepthTolerance * extent_ && q.z() >= depth - before * extent_;
     });
     look.weight = trust * std::min(1.0f, (cosine - kFlattest) / (kFull - kFlattest));
+    look.detail = cosine * static_cast<float>(std::pow(views_[view]->camera.fx / views_[0]->camera.fx, 2)) * std::pow(key_depth_ / q.z(), 2.0f);
     return look;
   }
 
@@ -186,28 +189,29 @@ class TextureFill {
     return *look;
   }
 
+  // Of the pictures that show a place, those count most that show it in most detail.
   // @param certain out: 1 = the texel is known, 0 = nothing of it; layer out: where most of it comes from, 0 = the place itself, -1 = nowhere
   From texelAt(int triangle, const Eigen::Vector3f& w, const cv::Mat& key_albedo, cv::Vec4f& texel, float& certain, signed char& layer) const {
     const Eigen::Vector3i& t = surface_.triangles[triangle];
     const auto mix = [&](const Points& x) -> Eigen::Vector3f { return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]]; };
     cv::Vec3f sum;
-    float total = 0.0f, key = 0.0f;
+    float total = 0.0f, shares = 0.0f, key = 0.0f, key_share = 0.0f;
     for (std::size_t i = 0; i < views_.size(); ++i) {
       const Look l = lookAt(i, {mix(actors_[i]->vertices), mix(actors_[i]->normals).normalized()}, 1.0f);
       if (l.weight <= 0.0f) continue;
-      const float weight = l.weight * l.weight * l.weight * (i == 0 ? 1.0f : kFurther);
-      sum += colourOf(sampleBicubic(i == 0 ? key_albedo : pictures_[i].albedo, l.u, l.v)) * weight;
-      total += weight;
-      if (i == 0) key = l.weight;
+      const float weight = l.weight * l.weight * l.weight, share = weight * l.detail * l.detail;
+      sum += colourOf(sampleBicubic(i == 0 ? key_albedo : pictures_[i].albedo, l.u, l.v)) * share;
+      total += weight * (i == 0 ? 1.0f : kFurther), shares += share;
+      if (i == 0) key = l.weight, key_share = share;
     }
-    if (total > 0.0f) sum *= 1.0f / total;
+    if (shares > 0.0f) sum *= 1.0f / shares, key_share *= 1.0f / shares;
     Layers layers;
     layers.add(sum, std::min(1.0f, total / kSure));
     if (layers.open > 0.0f) addLikePlaces({mix(surface_.key_vertices), mix(surface_.key_normals).normalized()}, key_albedo, sum, total, layers);
     certain = 1.0f - layers.open;
     layer = static_cast<signed char>(layers.strongest);
     const cv::Vec3f c = certain > 0.0f ? layers.sum / certain : cv::Vec3f();
-    texel = cv::Vec4f(c[0], c[1], c[2], std::clamp(key / kEnough, 0.0f, 1.0f));
+    texel = cv::Vec4f(c[0], c[1], c[2], std::clamp(key / kEnough, 0.0f, 1.0f) * smoothStep(kOwnLow, kOwnHigh, key_share));
     if (total > kSeen) return key > 0.0f ? kKey : kElsewhere;
     return certain > 0.5f ? kCopied : kFilled;
   }
@@ -269,7 +273,7 @@ class TextureFill {
   std::vector<Eigen::Isometry3f> camera_from_world_;
   std::vector<MirrorPlane> planes_;
   std::vector<Fold> folds_;
-  float extent_ = 0.0f;     // m
+  float extent_ = 0.0f, key_depth_ = 1.0f;  // m
   bool two_sided_ = false;  // an open sheet is seen from both sides
 };
 

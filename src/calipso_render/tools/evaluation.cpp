@@ -243,7 +243,10 @@ class Evaluation {
       const auto relit = psnr(drawn, in.bgr, inside), copy = psnr(copier.composite(in).bgr, in.bgr, inside);
       keepLowest(moved, relit), keepLowest(copied, copy);
       if (relit && copy) keepLowest(gain, *relit - *copy);
-      keepLowest(from_clip, psnr(clip_renderer.composite(in).bgr, in.bgr, inside));
+      if (std::getenv("DBG")) fprintf(stderr, "%d relit %.2f copy %.2f\n", k, *relit, *copy);
+      const cv::Mat with_clip = clip_renderer.composite(in).bgr;
+      keepLowest(from_clip, psnr(with_clip, in.bgr, inside));
+      picture("clip_moved_" + std::to_string(k), with_clip);
       keepLowest(around, psnr(drawn, in.bgr, grow(mask, kAround) & ~grow(mask, 2)));
       picture("moved_" + std::to_string(k), drawn);
     }
