@@ -92,6 +92,30 @@ TEST(Settle, WhatStandsOnUnevenFeetDoesNotTipOver) {
   EXPECT_LT(more, 0.2);
 }
 
+// A pole that sticks out from a wall.
+WorldScene pole() {
+  WorldScene scene = sceneWith(boxSurface({1.0, 0.04, 0.04}, 4), {0, 0, 1.0}, false);
+  AttachmentBox wall;
+  wall.min = {-0.6, -1, -1};
+  wall.max = {-0.45, 1, 3};
+  scene.objects[0].attachments.push_back(wall);
+  return scene;
+}
+
+// Half as stiff, it gets the sag once more that it has in the video: a few hundredths of its size, whatever its shape.
+TEST(Settle, ASlenderObjectOfDefaultStiffnessBearsItsWeight) {
+  const Way slender = follow(pole(), 0.5, 2.0);
+  EXPECT_NE(slender.reason.find("slender"), std::string::npos) << slender.reason;
+  EXPECT_GT(slender.largest, 0.01);
+  EXPECT_LT(slender.largest, 0.1);
+  const double by_size = defaultMaterial(boundingDiagonal(pole().objects[0].mesh), kG).youngs_modulus;
+  const Way given = follow(pole(), 0.5, 2.0, by_size);
+  EXPECT_EQ(given.reason.find("slender"), std::string::npos) << given.reason;
+  EXPECT_GT(given.largest, 2.0 * slender.largest);
+  const Way compact = follow(sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, 0.1}), 0.5, 0.1);
+  EXPECT_EQ(compact.reason.find("slender"), std::string::npos) << compact.reason;
+}
+
 struct Bar {  // held at one end, its material far too soft to be bent into this shape by gravity
   Bar() : soft(surface(), material(), options()) {
     DeformableBody& body = soft.body();

@@ -46,6 +46,16 @@ MassProperties fromMoments(const Moments& m, const Eigen::Vector3d& origin, doub
 
 }  // namespace
 
+double surfaceArea(const TriangleMesh& mesh) {
+  double doubled = 0.0;
+  for (int t = 0; t < mesh.triangleCount(); ++t) {
+    const Eigen::RowVector3i face = mesh.triangles.row(t);
+    const Eigen::Vector3d a = mesh.vertex(face[0]);
+    doubled += (mesh.vertex(face[1]) - a).cross(mesh.vertex(face[2]) - a).norm();
+  }
+  return 0.5 * doubled;
+}
+
 bool isClosed(const TriangleMesh& mesh) {
   std::map<std::pair<int, int>, int> balance;
   for (int f = 0; f < mesh.triangleCount(); ++f)

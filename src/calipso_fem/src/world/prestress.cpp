@@ -1,5 +1,7 @@
 #include "prestress.hpp"
 
+#include <cmath>
+
 #include "../preconditioner.hpp"
 
 namespace calipso::fem {
@@ -49,32 +51,66 @@ void holdFixed(const DeformableBody& body, BlockMatrix* A) {
         }
 }
 
+// Less the translation and the small rotation that are nearest to it, by mass.
+Vec withoutRigidMotion(const Vec& u, const DeformableBody& body) {
+  const Eigen::VectorXd& mass = body.model().lumpedMass();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero(), shift = center, moment = center;
+  for (int i = 0; i < mass.size(); ++i) {
+    center += mass[i] / mass.sum() * body.positions().segment<3>(3 * i);
+    shift += mass[i] / mass.sum() * u.segment<3>(3 * i);
+  }
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < mass.size(); ++i) {
+    const Eigen::Vector3d r = body.positions().segment<3>(3 * i) - center;
+    inertia += mass[i] * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+    moment += mass[i] * r.cross(u.segment<3>(3 * i));
+  }
+  const Eigen::Vector3d turn = inertia.ldlt().solve(moment);
+  Vec bend = u;
+  for (int i = 0; i < mass.size(); ++i)
+    bend.segment<3>(3 * i) -= shift + turn.cross(body.positions().segment<3>(3 * i) - center);
+  return bend;
+}
+
 }  // namespace
 
-Vec prestressAgainst(const Eigen::Vector3d& gravity, const DeformableBody& body, double stiffness,
-                     std::vector<HoldPoint>* hold) {
-  BlockMatrix K;
-  body.model().hessian(body.positions(), Definiteness::kExact, K);
-  BlockMatrix A = K;
-  std::vector<Weights> points;
-  for (const HoldPoint& h : *hold) {
-    points.push_back(body.embedding().pointWeights(SurfacePoint::vertex(h.vertex)));
-    addSpring(points.back(), stiffness, &A);
+Sag::Sag(const Eigen::Vector3d& gravity, const DeformableBody& body, double stiffness,
+         const std::vector<HoldPoint>& hold)
+    : stiffness_(stiffness) {
+  body.model().hessian(body.positions(), Definiteness::kExact, K_);
+  BlockMatrix A = K_;
+  for (const HoldPoint& h : hold) {
+    points_.push_back(body.embedding().pointWeights(SurfacePoint::vertex(h.vertex)));
+    addSpring(points_.back(), stiffness, &A);
   }
   addInertia(body, &A);
   holdFixed(body, &A);
   const auto factor = makeCholesky();
-  Vec sag;
-  if (!factor->update(A)) return Vec::Zero(3 * body.nodeCount());
-  factor->apply(weightOf(body, gravity), sag);
+  displacement_.setZero(3 * body.nodeCount());
+  known_ = factor->update(A);
+  if (known_) factor->apply(weightOf(body, gravity), displacement_);
+}
+
+Vec Sag::prestress(std::vector<HoldPoint>* hold) const {
+  if (!known_) return displacement_;
   for (size_t i = 0; i < hold->size(); ++i) {
     (*hold)[i].force.setZero();
-    for (Weights::InnerIterator it(points[i]); it; ++it)
-      (*hold)[i].force -= stiffness * it.value() * sag.segment<3>(3 * it.index());
+    for (Weights::InnerIterator it(points_[i]); it; ++it)
+      (*hold)[i].force -= stiffness_ * it.value() * displacement_.segment<3>(3 * it.index());
   }
   Vec inner;
-  K.multiply(sag, inner);
+  K_.multiply(displacement_, inner);
   return -inner;
+}
+
+std::optional<double> Sag::largest(const DeformableBody& body) const {
+  constexpr double kTips = 100.0;  // of the bending: what moves as a whole by as much is not held
+  const auto most = [](const Vec& u) {
+    return Eigen::Map<const NodeMatrix>(u.data(), u.size() / 3, 3).rowwise().norm().maxCoeff();
+  };
+  const double all = most(displacement_), bend = most(withoutRigidMotion(displacement_, body));
+  if (!known_ || !std::isfinite(all) || all > kTips * bend) return std::nullopt;
+  return all;
 }
 
 }  // namespace calipso::fem

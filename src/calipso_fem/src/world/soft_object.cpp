@@ -102,14 +102,22 @@ bool SoftObject::isHeld(const SurfacePoint& point) const {
   return true;
 }
 
+// A contact gives way by a hundredth of what the whole body would; the rest shape absorbs it.
+double SoftObject::holdStiffness(size_t points) const {
+  const Material& material = body_.model().cellMaterials().front();
+  return 100.0 * material.youngs_modulus * boundingDiagonal(surface_) / std::max<size_t>(1, points);
+}
+
+std::optional<double> SoftObject::linearSag(const Eigen::Vector3d& gravity, const std::vector<HoldPoint>& hold) const {
+  return Sag(gravity, body_, holdStiffness(hold.size()), hold).largest(body_);
+}
+
 SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold,
                                 double tolerance) {
   const Vec goal = body_.positions();
   const NodeMatrix relaxed = body_.model().mesh().nodes;
   const Material& material = body_.model().cellMaterials().front();
-  // A contact gives way by a hundredth of what the whole body would; the rest shape absorbs it.
-  const double stiffness = 100.0 * material.youngs_modulus * boundingDiagonal(surface_) /
-                           std::max<size_t>(1, hold.size());
+  const double stiffness = holdStiffness(hold.size());
   body_.setGravity(gravity);
   SettleReport report = findRestShape(goal, stiffness, hold, tolerance);
   body_.setSoftConstraints({});
@@ -117,7 +125,7 @@ SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<Hold
   body_.setGravity(gravity_);
   if (!report.converged) {
     body_.setRestNodes(relaxed);
-    prestress_ = prestressAgainst(gravity, body_, stiffness, &hold);
+    prestress_ = Sag(gravity, body_, stiffness, hold).prestress(&hold);
     prestress_modulus_ = material.youngs_modulus;
     report.message = "no rest shape found that gravity would bend into the observed one: it is relaxed as observed, "
                      "and inner forces carry its weight there; they fade as it is made softer";

@@ -210,7 +210,10 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   }
   for (const auto& region : actor.fixed) body.fixSurfaceVertices(region);
   actor.soft->setGravity(actor.acceleration());
-  if (settle) settleAsObserved(actor, surface);
+  const std::vector<Obstacle> around = obstacles(now, now, &actor);
+  const Touching touching = settle ? supportPoints(actor, surface, around) : Touching();
+  limitSag(actor, surface, pointsOf(touching));
+  if (settle) settleAsObserved(actor, surface, around, touching);
   actor.soft->setMaterial(actor.material);
   if (!motion.linear.isZero() || !motion.angular.isZero())
     body.setRigidVelocity(motion.linear, motion.angular);

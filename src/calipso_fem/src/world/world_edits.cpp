@@ -179,7 +179,8 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   validate(material);
   if (immovable) return makeImmovable(actor, edit, material);
   if (edit.mode == EditMode::kAbsolute && !std::isnan(edit.density)) actor.immovable = false;
-  touch(actor, edit);
+  touch(actor, edit);  // may find a default stiffness that carries it
+  material.youngs_modulus = changed(actor.material.youngs_modulus, edit.youngs_modulus, edit.mode);
   actor.material = material;
   if (actor.soft) actor.soft->setMaterial(material);
   if (actor.kind == ObjectKind::kRigid)

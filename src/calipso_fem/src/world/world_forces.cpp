@@ -10,16 +10,6 @@ namespace {
 
 constexpr double kPullFrequency = 2.0 * M_PI * 4.0;  // rad/s, a quarter of a second to follow a target
 
-double surfaceArea(const TriangleMesh& mesh) {
-  double doubled = 0.0;
-  for (int t = 0; t < mesh.triangleCount(); ++t) {
-    const Eigen::RowVector3i face = mesh.triangles.row(t);
-    const Eigen::Vector3d a = mesh.vertex(face[0]);
-    doubled += (mesh.vertex(face[1]) - a).cross(mesh.vertex(face[2]) - a).norm();
-  }
-  return 0.5 * doubled;
-}
-
 }  // namespace
 
 void World::Impl::applyLoads(double at, double h) {

@@ -20,6 +20,10 @@ struct ObservedGravity {
   double deviation;        // of its length
 };
 
+// Points of an object's surface, each with the index of the obstacle it touches.
+using Touching = std::vector<std::pair<HoldPoint, int>>;
+std::vector<HoldPoint> pointsOf(const Touching& touching);
+
 struct World::Impl {
   Impl(WorldScene scene, WorldParams params);
 
@@ -81,7 +85,10 @@ struct World::Impl {
 
   // What held an object in the video (world_settle.cpp)
   void findHolder(Actor& actor);
-  void settleAsObserved(Actor& actor, const TriangleMesh& surface);
+  Touching supportPoints(const Actor& actor, const TriangleMesh& surface, const std::vector<Obstacle>& around) const;
+  void limitSag(Actor& actor, const TriangleMesh& surface, std::vector<HoldPoint> hold);
+  void settleAsObserved(Actor& actor, const TriangleMesh& surface, const std::vector<Obstacle>& around,
+                        const Touching& touching);
 
   // Objects that rest on others (world_rests.cpp)
   void noteWhatRestsOn(const Actor& carrier);  // as the video has it, before an edit touches the carrier

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <sstream>
 
 #include "calipso_fem/world/region_selection.hpp"
 #include "obstacle_query.hpp"
@@ -18,6 +20,8 @@ constexpr double kLargestContactPatch = 0.08, kTippingGap = 0.75 * M_PI, kGapGai
                  kOtherFoot = 0.1;
 // Sag that changes nothing: of the object's diagonal, and in pixels.
 constexpr double kSagOfSize = 1e-4, kSagPixels = 0.05;
+// Sag of an object of default stiffness under its weight, of its diagonal.
+constexpr double kLargestSag = 0.03;
 
 // Smallest gap to any obstacle that pushes against gravity.
 double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obstacles,
@@ -45,8 +49,6 @@ double widestGap(const std::vector<std::pair<HoldPoint, int>>& points, const Sof
   return widest;
 }
 
-using Touching = std::vector<std::pair<HoldPoint, int>>;
-
 // The lowest points, and, where the object would tip over on these or nearly, its other feet.
 // @param within  what touches up to a share of the size above the lowest point
 // @param apart   m, across `down`: from there on it is another foot
@@ -73,7 +75,37 @@ Touching standingPoints(const SoftObject& soft, const Eigen::Vector3d& down,
   return best;
 }
 
+// Points on which the object would stand.
+std::vector<HoldPoint> lowestPoints(const SoftObject& soft, const Eigen::Vector3d& gravity) {
+  const Eigen::VectorXd depth = soft.vertices() * gravity.normalized();
+  const auto& x = soft.vertices();
+  const double patch = kContactPatch * (x.colwise().maxCoeff() - x.colwise().minCoeff()).norm();
+  std::map<int, int> lowest;  // by carrier node
+  for (int v = 0; v < depth.size(); ++v) {
+    if (depth[v] < depth.maxCoeff() - patch) continue;
+    const auto [at, is_new] = lowest.emplace(soft.carrier(v), v);
+    if (!is_new && depth[v] > depth[at->second]) at->second = v;
+  }
+  std::vector<HoldPoint> points;
+  for (const auto& [carrier, v] : lowest) points.push_back({v, Eigen::Vector3d::Zero()});
+  return points;
+}
+
+// A sheet that is meant to bend: thin, and large for its volume.
+bool isCloth(const TriangleMesh& surface, const DeformableBody& body) {
+  constexpr double kThin = 0.01, kLarge = 0.1;  // of the size, and of its square
+  const double size = boundingDiagonal(surface), area = (isClosed(surface) ? 0.5 : 1.0) * surfaceArea(surface);
+  const double volume = body.totalMass() / body.model().cellMaterials().front().density;
+  return volume < kThin * size * area && area > kLarge * size * size;
+}
+
 }  // namespace
+
+std::vector<HoldPoint> pointsOf(const Touching& touching) {
+  std::vector<HoldPoint> points;
+  for (const auto& [point, obstacle] : touching) points.push_back(point);
+  return points;
+}
 
 // What holds the object in the video, and with what buoyancy.
 void World::Impl::findHolder(Actor& actor) {
@@ -97,32 +129,51 @@ void World::Impl::findHolder(Actor& actor) {
   if (!falls) actor.buoyancy = -scene.gravity;
 }
 
+// What the object stands on in the video: points of its surface, each with the index of the obstacle.
+Touching World::Impl::supportPoints(const Actor& actor, const TriangleMesh& surface,
+                                    const std::vector<Obstacle>& around) const {
+  if (actor.holder != Holder::kSupport) return {};
+  const double size = boundingDiagonal(surface);
+  const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
+  const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
+  return standingPoints(*actor.soft, scene.gravity, [&](double patch) {
+    return contacts.touching(entry, around, std::max(0.0, gap) + patch * size);
+  }, kOtherFoot * size);
+}
+
+// A default stiffness is a guess by size alone. Slender objects would collapse under their weight with it: they get
+// what keeps their sag at a few per cent, where they stand, hang or, put down, would stand.
+void World::Impl::limitSag(Actor& actor, const TriangleMesh& surface, std::vector<HoldPoint> hold) {
+  if (actor.settings.youngs_modulus || isCloth(surface, actor.soft->body())) return;
+  if (hold.empty() && !actor.soft->hasFixedNodes()) hold = lowestPoints(*actor.soft, scene.gravity);
+  const auto sag = actor.soft->linearSag(scene.gravity, hold);
+  const double factor = sag ? *sag / (kLargestSag * boundingDiagonal(surface)) : 1.0;
+  if (!(factor > 1.0) || !std::isfinite(factor)) return;
+  actor.observed_material.youngs_modulus *= factor;
+  actor.material.youngs_modulus *= factor;
+  actor.soft->setMaterial(actor.observed_material);
+  std::ostringstream text;
+  text.precision(2);
+  text << "slender: its default stiffness is " << factor << " times that of compact objects, or it would sag by "
+       << *sag / boundingDiagonal(surface) << " of its size; give youngs_modulus for another; ";
+  actor.note += text.str();
+}
+
 // Makes the observed shape the equilibrium under what held the object in the video. Buoyancy and
 // free fall leave nothing to balance.
-void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface) {
+void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface, const std::vector<Obstacle>& around,
+                                   const Touching& touching) {
   const double size = boundingDiagonal(surface);
-  const auto around = obstacles(now, now, &actor);
-  const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
-  std::vector<HoldPoint> hold;
-  std::vector<int> by;
-  if (actor.holder == Holder::kSupport) {
-    const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
-    const auto touching = standingPoints(*actor.soft, scene.gravity, [&](double patch) {
-      return contacts.touching(entry, around, std::max(0.0, gap) + patch * size);
-    }, kOtherFoot * size);
-    for (const auto& [point, obstacle] : touching) {
-      hold.push_back(point);
-      by.push_back(obstacle);
-    }
-  }
+  std::vector<HoldPoint> hold = pointsOf(touching);
   if (hold.empty() && actor.holder != Holder::kAttachment) return;
   const double px = pixelsPerMeter(scene.camera, surface.vertices.colwise().mean().transpose());
   const double tolerance =
       std::min(kSagOfSize * size, px > 0.0 ? kSagPixels / px : kSagOfSize * size);
   const SettleReport report = actor.soft->settle(scene.gravity + actor.buoyancy, hold, tolerance);
   if (!report.message.empty()) actor.note += report.message + "; ";
+  const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
   for (size_t i = 0; i < hold.size(); ++i)
-    contacts.hold(entry, around[by[i]], hold[i], (kSupportGap + kLargestContactPatch) * size);
+    contacts.hold(entry, around[touching[i].second], hold[i], (kSupportGap + kLargestContactPatch) * size);
 }
 
 }  // namespace calipso::fem

@@ -23,6 +23,7 @@ MassProperties massProperties(const TriangleMesh& mesh, double density);
 
 // True when every edge joins exactly two triangles that run along it in opposite directions.
 bool isClosed(const TriangleMesh& mesh);
+double surfaceArea(const TriangleMesh& mesh);  // m^2
 
 // Convex hull, triangulated. @throw std::invalid_argument if the vertices lie in one plane
 TriangleMesh convexHull(const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>& points);

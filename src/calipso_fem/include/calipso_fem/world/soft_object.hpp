@@ -47,6 +47,9 @@ class SoftObject {
   // prestress (prestress.hpp) of the present material carries its weight.
   SettleReport settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold,
                       double tolerance);
+  // Largest way (m) that it would sag by linear elasticity, were it relaxed in its present shape and held by
+  // its fixed nodes and the points; nothing where it would tip over on these.
+  std::optional<double> linearSag(const Eigen::Vector3d& gravity, const std::vector<HoldPoint>& hold) const;
   void setMaterial(const Material& material);
   // The prestress of another body with the same nodes.
   void copyPrestress(const SoftObject& other);
@@ -88,6 +91,7 @@ class SoftObject {
   void changed();  // the state was set from outside
 
  private:
+  double holdStiffness(size_t points) const;  // N/m, of each
   SettleReport findRestShape(const Vec& goal, double stiffness, std::vector<HoldPoint>& hold, double tolerance);
   void applyPrestress();
   void setMomentum(const Momentum& target);
