@@ -261,6 +261,8 @@ MotionState enterPiece(const MotionState& before, const MotionPiece& piece,
     const double variance = before.covariance.block<3, 3>(kV, kV).trace();
     const double speed = std::sqrt(before.velocity.squaredNorm() + variance);
     start.velocity = std::min(start.velocity, std::max(speed, kLeastSpeedShare * start.velocity));
+    state.covariance.block<3, 3>(kP, kP) += scaledIdentity(std::pow(speed * piece.contact, 2));
+    state.covariance.block<3, 3>(kR, kR) += scaledIdentity(std::pow(prior.spin * piece.contact, 2));
   }
   applyStart(start, state);
   if (piece.cut) {

@@ -119,7 +119,7 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
   params_.patch.radius_px = std::max(params_.patch.radius_px, std::min(scaled, kLargestRadius));
   wide_ = params_;
   wide_.patch.radius_px = std::max(params_.patch.radius_px, kLargestRadius);
-  references_.push_back({ReferenceView(key_frame, model_, model.world_from_object, mask, params.seed_count)});
+  references_.push_back({ReferenceView(key_frame, model_, model.world_from_object, mask, params.seed_count), Matrix6d::Zero()});
   const double sigma = kKeySigma * boundingDiagonal(model.mesh);
   key_.time = key_frame.time;
   key_.found = true;
@@ -186,22 +186,24 @@ Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const Refere
                         coarseDisplacement(look, frame.gray, reachFrom(frame, predicted)));
 }
 
-Observation ObjectTracker::refine(const Frame& frame, const ReferenceView& reference,
+Observation ObjectTracker::refine(const Frame& frame, const Reference& reference,
                                   const Eigen::Isometry3d& start, const TrackerParams& params) {
   const bool near =
-      imageMotion(frame.camera, last_->world_from_object, start, reference.seeds()).largest < kNearPx;
+      imageMotion(frame.camera, last_->world_from_object, start, reference.view.seeds()).largest < kNearPx;
   Observation observation;
   observation.time = frame.time;
   observation.world_from_object = start;
   if (!near) {
-    observation.world_from_object = refineOnce(frame, reference, Care::kRough, params, observation);
-    observation.world_from_object = refineOnce(frame, reference, Care::kForward, params, observation);
+    observation.world_from_object = refineOnce(frame, reference.view, Care::kRough, params, observation);
+    observation.world_from_object = refineOnce(frame, reference.view, Care::kForward, params, observation);
   }
   for (int round = 0; round < kRefinements; ++round) {
-    observation.world_from_object = refineOnce(frame, reference, Care::kChecked, params, observation);
+    observation.world_from_object = refineOnce(frame, reference.view, Care::kChecked, params, observation);
     // The same look again would give the same pose.
-    if (!observation.found || isLookOf(frame, reference, observation.world_from_object)) break;
+    if (!observation.found || isLookOf(frame, reference.view, observation.world_from_object)) break;
   }
+  // The reference's own error is all of its frames': too far away there, the object is taken for too far away here.
+  observation.covariance += reference.covariance;
   return observation;
 }
 
@@ -248,7 +250,7 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
   frames_lost_ = cut ? kForgetAfter : frames_lost_;
   const Eigen::Isometry3d predicted =
       frames_lost_ < kForgetAfter ? predict(frame.time) : last_->world_from_object;
-  const ReferenceView& nearest = nearestReference(frame, predicted).view;
+  const Reference& nearest = nearestReference(frame, predicted);
   Observation best = attempt(frame, nearest, predicted, drowned_ ? wide_ : params_);
   if (!isClear(best)) best = tryOtherwise(frame, nearest, predicted, std::move(best));
   frames_lost_ = best.found ? 0 : frames_lost_ + 1;
@@ -257,15 +259,15 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
 }
 
 // The motion may have changed, the look, or the picture: tries every other way to recognise the object.
-Observation ObjectTracker::tryOtherwise(const Frame& frame, const ReferenceView& nearest,
+Observation ObjectTracker::tryOtherwise(const Frame& frame, const Reference& nearest,
                                         const Eigen::Isometry3d& predicted, Observation best) {
   if (best.inliers() < kWeakInliers) {
     for (const Reference& reference : references_) {
-      Observation other = attempt(frame, reference.view, last_->world_from_object, drowned_ ? wide_ : params_);
+      Observation other = attempt(frame, reference, last_->world_from_object, drowned_ ? wide_ : params_);
       if (other.inliers() > best.inliers()) best = std::move(other);
     }
   }
-  if (best.inliers() < kDrownedShare * seedsInPicture(nearest, frame.camera, predicted)) {
+  if (best.inliers() < kDrownedShare * seedsInPicture(nearest.view, frame.camera, predicted)) {
     Observation other = attempt(frame, nearest, predicted, drowned_ ? params_ : wide_);
     if (other.inliers() > best.inliers()) {
       best = std::move(other);
@@ -274,7 +276,7 @@ Observation ObjectTracker::tryOtherwise(const Frame& frame, const ReferenceView&
   }
   if (best.inliers() < kTurnedShare * due_inliers_ && frames_lost_ < kForgetAfter && !stays(best)) {
     for (const Eigen::Isometry3d& turned : searchTurned(
-             nearest, frame, {predicted, centroid_, reachFrom(frame, predicted)}, kTurnsTried)) {
+             nearest.view, frame, {predicted, centroid_, reachFrom(frame, predicted)}, kTurnsTried)) {
       Observation other = refine(frame, nearest, turned, drowned_ ? wide_ : params_);
       if (other.inliers() > best.inliers()) best = std::move(other);
     }
@@ -284,13 +286,13 @@ Observation ObjectTracker::tryOtherwise(const Frame& frame, const ReferenceView&
 }
 
 // What is found where it was expected needs no search.
-Observation ObjectTracker::attempt(const Frame& frame, const ReferenceView& reference,
+Observation ObjectTracker::attempt(const Frame& frame, const Reference& reference,
                                    const Eigen::Isometry3d& predicted, const TrackerParams& params) {
   if (frames_lost_ == 0 && before_last_) {
     Observation expected = refine(frame, reference, predicted, params);
     if (isClear(expected)) return expected;
   }
-  return refine(frame, reference, searchCoarsely(frame, reference, predicted), params);
+  return refine(frame, reference, searchCoarsely(frame, reference.view, predicted), params);
 }
 
 // As many tracks as are due; few are enough for an object that has not moved.
@@ -318,7 +320,8 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   if (static_cast<int>(references_.size()) >= params_.max_references) {
     references_.erase(references_.begin() + 1);  // the key frame stays
   }
-  references_.push_back({ReferenceView(frame, model_, observation.world_from_object, cv::Mat(), params_.seed_count)});
+  references_.push_back({ReferenceView(frame, model_, observation.world_from_object, cv::Mat(), params_.seed_count),
+                         observation.covariance});
   due_inliers_ = static_cast<int>(references_.back().view.seeds().size());
   look_ = {};        // the references may have moved
 }

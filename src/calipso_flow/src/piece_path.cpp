@@ -87,6 +87,10 @@ class PathSearch {
         piece.cut = cut.has_value();
         follow(s, enterPiece(arrived, piece, prior_), piece,
                stages_[s].log_likelihood - (cut ? 0.0 : least_evidence_));
+        if (cut || piece.travel == Travel::kRest) continue;
+        piece.contact = kContactShare * span;
+        follow(s, enterPiece(arrived, piece, prior_), piece,
+               stages_[s].log_likelihood - least_evidence_ - kContactEvidence);
       }
     }
   }

@@ -1,14 +1,20 @@
 #include "calipso_flow/pose_fit.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calipso_flow/rotation.hpp"
 
 namespace calipso::flow {
 namespace {
+
+constexpr double kShapeLength = 2.5;     // see ShapeError
+constexpr double kShapeReach = 4.0;      // of 2 l^2: farther apart tracks do not err together
+constexpr double kShapeAbsorbed = 2.0;    // 12 / (12 - 6): a pose takes up six of the errors of six such patches
 
 // Residuals and their derivatives by the motion of movePose(), for one pose.
 struct Linearisation {
@@ -84,7 +90,61 @@ Vector6d solveStep(const NormalEquations& normal) {
   return damped.ldlt().solve(normal.right);
 }
 
-void judge(const Linearisation& lin, const PoseFitParams& params, PoseFit& fit) {
+// The inliers of a fit as least squares has them: residuals and Jacobians in units of the tracks' deviations.
+struct Whitened {
+  std::vector<Eigen::Vector2d> pixel, residual;
+  std::vector<Eigen::Matrix<double, 2, 6>> jacobian;
+};
+
+Whitened whitened(const std::vector<Correspondence>& correspondences, const Linearisation& lin,
+                  const std::vector<bool>& inlier) {
+  Whitened result;
+  for (size_t i = 0; i < inlier.size(); ++i) {
+    if (!inlier[i]) continue;
+    const Eigen::Matrix2d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(lin.information[i]).operatorSqrt();
+    result.pixel.push_back(correspondences[i].pixel);
+    result.residual.push_back(root * lin.residual[i]);
+    result.jacobian.push_back(root * lin.jacobian[i]);
+  }
+  return result;
+}
+
+// A model whose shape is not the true one puts neighbouring tracks off together, and such errors do not average out.
+// Covariance between tracks  c exp(-d^2 / 2 l^2), l the kShapeLength-th part of their spread; c from nearest neighbours.
+struct ShapeError {
+  double variance = 0.0;                  // c, per component, of the whitened residuals
+  Matrix6d pose = Matrix6d::Zero();       // H^-1 (sum_ij c k_ij A_i^T A_j) H^-1
+};
+
+ShapeError shapeError(const Whitened& tracks, const Matrix6d& inverse) {
+  const size_t count = tracks.pixel.size();
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& pixel : tracks.pixel) mean += pixel / count;
+  double spread = 0.0;
+  for (const Eigen::Vector2d& pixel : tracks.pixel) spread += (pixel - mean).squaredNorm() / count;
+  const double twice_length = 2.0 * spread / (kShapeLength * kShapeLength);
+  double product = 0.0;
+  Matrix6d sum = Matrix6d::Zero();
+  for (size_t i = 0; i < count; ++i) {
+    double nearest = std::numeric_limits<double>::infinity();
+    size_t neighbour = i;
+    Eigen::Matrix<double, 2, 6> around = Eigen::Matrix<double, 2, 6>::Zero();
+    for (size_t j = 0; j < count; ++j) {
+      const double squared = (tracks.pixel[i] - tracks.pixel[j]).squaredNorm();
+      if (j != i && squared < nearest) nearest = squared, neighbour = j;
+      if (squared < kShapeReach * twice_length) around += std::exp(-squared / twice_length) * tracks.jacobian[j];
+    }
+    sum += tracks.jacobian[i].transpose() * around;
+    const double correlation = std::exp(-nearest / twice_length);
+    if (neighbour != i) product += 0.5 * correlation * tracks.residual[i].dot(tracks.residual[neighbour]) / count;
+  }
+  ShapeError error;
+  error.variance = std::max(0.0, kShapeAbsorbed * product);
+  error.pose = error.variance * inverse * sum * inverse;
+  return error;
+}
+
+void judge(const std::vector<Correspondence>& correspondences, const Linearisation& lin, const PoseFitParams& params, PoseFit& fit) {
   const std::vector<double> all = lengths(lin);
   fit.deviation = robustDeviation(all);
   const double limit = params.inlier_sigma * std::max(1.0, fit.deviation);
@@ -99,9 +159,10 @@ void judge(const Linearisation& lin, const PoseFitParams& params, PoseFit& fit) 
   if (fit.inliers < params.least_inliers) return;
   const Eigen::LDLT<Matrix6d> factor(information);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0.0)) return;
-  const double inflation = std::max(1.0, fit.deviation);
   fit.common = fit.inliers * params.common_px * params.common_px * geometry.inverse();
-  fit.covariance = inflation * inflation * factor.solve(Matrix6d::Identity());
+  const Matrix6d inverse = factor.solve(Matrix6d::Identity());
+  const ShapeError shape = shapeError(whitened(correspondences, lin, fit.inlier), inverse);
+  fit.covariance = std::max(1.0, fit.deviation * fit.deviation - shape.variance) * inverse + shape.pose;
   fit.converged = fit.covariance.allFinite();
 }
 
@@ -145,7 +206,7 @@ PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera
     if (annealed && change < 1e-4) break;
     scale = std::max(noise_scale, 0.5 * scale);
   }
-  judge(lin, params, fit);
+  judge(correspondences, lin, params, fit);
   return fit;
 }
 

@@ -30,6 +30,7 @@ Trajectory TrajectoryFitter::run(const std::vector<double>& cut_times) {
   fitKindsAndNoise();
   for (int round = 0; round < kRefineRounds; ++round) {
     refineTimes();
+    chooseContacts();
     fitKindsAndNoise();
   }
   dropUnearnedPieces();
@@ -154,6 +155,24 @@ void TrajectoryFitter::dropJumpsOfSpinAlone() {
 void TrajectoryFitter::refineTimes() {
   for (size_t i = 1; i < pieces_.size(); ++i) {
     if (!pieces_[i].cut) pieces_[i].start = bestTime(i, kRefineReach * frameSpacing());
+  }
+}
+
+// One impact, or several within a part of a frame: whichever is likelier at its own best instant.
+void TrajectoryFitter::chooseContacts() {
+  for (size_t i = 1; i < pieces_.size(); ++i) {
+    if (pieces_[i].cut) continue;
+    MotionPiece best = pieces_[i];
+    double most = -kEver;
+    for (const double share : {0.0, kContactShare}) {
+      pieces_[i].contact = share * frameSpacing();
+      pieces_[i].start = bestTime(i, kRefineReach * frameSpacing());
+      const Neighbourhood local = neighbourhood(i);
+      const double value = logLikelihood(local.measurements, local.pieces, prior_, noise_scale_) -
+                           (share > 0.0 ? kContactEvidence : 0.0);
+      if (value > most) most = value, best = pieces_[i];
+    }
+    pieces_[i] = best;
   }
 }
 

@@ -38,6 +38,7 @@ class TrajectoryFitter {
   void dropUnearnedPieces();
   void dropJumpsOfSpinAlone();
   void refineTimes();
+  void chooseContacts();
   double bestTime(size_t piece, double reach) const;
   double timeDeviation(size_t piece) const;
 

@@ -70,6 +70,25 @@ TEST(PoseFit, covarianceIsCalibrated) {
   EXPECT_LE(inside, 0.99 * kRepeats);
 }
 
+// A shape that bulges where the model does not: smooth over it, so that it does not average out over the points.
+TEST(PoseFit, covarianceHoldsTheErrorOfAWrongShape) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  int inside = 0;
+  constexpr int kRepeats = 200;
+  for (int i = 0; i < kRepeats; ++i) {
+    auto points = correspondences(somePose(), 0.05, 500 + i);
+    const Eigen::Vector3d wave(14.0 * normal(random), 14.0 * normal(random), 14.0 * normal(random));
+    const double phase = 3.0 * normal(random), amplitude = 0.5 * normal(random);
+    for (Correspondence& c : points) c.pixel += amplitude * std::sin(wave.dot(c.point) + phase) * Eigen::Vector2d(0.8, 0.6);
+    const PoseFit fit = fitPose(points, test::testCamera(), somePose(), Eigen::Vector3d::Zero());
+    ASSERT_TRUE(fit.converged);
+    const Eigen::Vector3d error = fit.world_from_object.translation() - somePose().translation();
+    inside += error.dot(fit.covariance.topLeftCorner<3, 3>().ldlt().solve(error)) < 7.815;
+  }
+  EXPECT_GE(inside, 0.8 * kRepeats);  // as if the errors were independent: less than half of them
+}
+
 TEST(PoseFit, saysSoWhenThereAreTooFewPoints) {
   auto points = correspondences(somePose(), 0.0, 3);
   points.resize(4);

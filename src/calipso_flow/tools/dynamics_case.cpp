@@ -185,13 +185,18 @@ std::vector<double> collisionErrors(const Scene& scene, const TrueObject& truth,
   return errors;
 }
 
+// Vertical, of the first impact; true impacts less than a frame apart, which no frame lies between, count as one.
 double restitutionError(const Scene& scene, const TrueObject& truth,
                         const Trajectory& trajectory) {
   if (truth.collisions.empty() || trajectory.collisions.empty()) return kNone;
   const Eigen::Vector3d up = -scene.gravity.normalized();
   const TrueCollision& t = truth.collisions.front();
+  const TrueCollision* last = &t;
+  for (const TrueCollision& next : truth.collisions) {
+    if (next.time - last->time < 1.0 / scene.fps) last = &next;
+  }
   const Collision& e = trajectory.collisions.front();
-  const double real = -t.velocity_after.dot(up) / t.velocity_before.dot(up);
+  const double real = -last->velocity_after.dot(up) / t.velocity_before.dot(up);
   const double found = -e.after.velocity.dot(up) / e.before.velocity.dot(up);
   return 100.0 * std::abs(found / real - 1.0);
 }

@@ -77,18 +77,19 @@ class ObjectTracker {
   Eigen::AlignedBox2d reachFrom(const Frame& frame, const Eigen::Isometry3d& predicted) const;
   Eigen::Isometry3d searchCoarsely(const Frame& frame, const ReferenceView& reference,
                                    const Eigen::Isometry3d& predicted);
-  Observation refine(const Frame& frame, const ReferenceView& reference,
+  struct Reference {
+    ReferenceView view;
+    Matrix6d covariance = Matrix6d::Zero();  // of its pose, world axes; the key frame's is given
+    int most_inliers = 0;  // that a frame had with it
+  };
+  Observation refine(const Frame& frame, const Reference& reference,
                      const Eigen::Isometry3d& start, const TrackerParams& params);
   Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
                                const TrackerParams& params, Observation& observation);
-  struct Reference {
-    ReferenceView view;
-    int most_inliers = 0;  // that a frame had with it
-  };
   Reference& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose);
-  Observation attempt(const Frame& frame, const ReferenceView& reference,
+  Observation attempt(const Frame& frame, const Reference& reference,
                       const Eigen::Isometry3d& predicted, const TrackerParams& params);
-  Observation tryOtherwise(const Frame& frame, const ReferenceView& nearest, const Eigen::Isometry3d& predicted,
+  Observation tryOtherwise(const Frame& frame, const Reference& nearest, const Eigen::Isometry3d& predicted,
                            Observation best);
   bool isClear(const Observation& observation) const;
   bool stays(const Observation& observation) const;  // found where it was
