@@ -69,39 +69,64 @@ Grids layGrids(const TriangleMesh& cad, const std::vector<ElasticStep>& steps) {
   return grids;
 }
 
-// Stage C: the elastic body on finer and finer grids.
+// Where a stage left the model.
 struct ElasticOutcome {
-  Points x;               // where the vertices ended
+  Placement placed;
   std::string trouble;    // what went wrong; empty: nothing
 };
 
-ElasticOutcome fitElasticStages(const TriangleMesh& cad, const FitProblem& problem, Placement placed,
+ElasticOutcome fitOnGrid(const TriangleMesh& cad, const FitProblem& problem, const fem::VoxelGrid& grid,
+                         const Placement& placed, const ElasticStep& step) {
+  std::shared_ptr<ElasticFit> fit;
+  try {
+    fit = std::make_shared<ElasticFit>(cad, grid, placed, step.fit);
+  } catch (const std::invalid_argument& flat) {
+    return {placed, std::string("the fit has pressed the model flat (") + flat.what() +
+                        "): place the model closer, or correct the contour"};
+  }
+  const FemStageReport report = fit->fit(
+      [&](const Points& x, int k) { return measure(problem, x, settingsAt(step, problem, k)); });
+  const Placement moved = [fit](const Points& points) { return fit->carry(points); };
+  if (report.solvable) return {moved, ""};
+  return {moved, "the elastic system of " + std::to_string(report.nodes) +
+                     " nodes has no solution: place the model closer, or correct the contour"};
+}
+
+// A model that is still far off somewhere starts again from where it is, with pairs from further away, as long
+// as it comes closer. Most are where they belong at once.
+Placement comeCloser(const TriangleMesh& cad, const FitProblem& problem, const fem::VoxelGrid& grid,
+                     Placement placed, const ElasticStep& step) {
+  constexpr int kMostRounds = 5;
+  constexpr double kFarOff = 0.015, kClose = 0.003;   // misfit
+  constexpr double kCloser = 0.9;                     // of what it was
+  double before = misfit(assess(problem, placed(cad.vertices)));
+  if (before < kFarOff) return placed;
+  for (int round = 0; round < kMostRounds && before > kClose; ++round) {
+    const ElasticOutcome outcome = fitOnGrid(cad, problem, grid, placed, step);
+    if (!outcome.trouble.empty()) break;
+    const double now = misfit(assess(problem, outcome.placed(cad.vertices)));
+    if (now > kCloser * before) break;
+    before = now;
+    placed = outcome.placed;
+  }
+  return placed;
+}
+
+// Stage C: the elastic body on finer and finer grids.
+ElasticOutcome fitElasticStages(const TriangleMesh& cad, const FitProblem& problem, const Placement& placed,
                                 const std::vector<ElasticStep>& steps, Grids& grids,
                                 StageClock& clock) {
-  std::string trouble;
-  for (size_t k = 0; k < steps.size() && trouble.empty(); ++k) {
-    const ElasticStep& step = steps[k];
+  ElasticOutcome outcome{placed, ""};
+  for (size_t k = 0; k < steps.size() && outcome.trouble.empty(); ++k) {
     const fem::VoxelGrid grid = grids[k].get();
-    std::shared_ptr<ElasticFit> fit;
-    try {
-      fit = std::make_shared<ElasticFit>(cad, grid, placed, step.fit);
-    } catch (const std::invalid_argument& flat) {
-      trouble = std::string("the fit has pressed the model flat (") + flat.what() +
-                "): place the model closer, or correct the contour";
-      break;
-    }
-    clock.stop("grid of " + std::to_string(step.fit.nodes));
-    const FemStageReport report = fit->fit([&](const Points& x, int k) {
-      return measure(problem, x, settingsAt(step, problem, k));
-    });
-    if (!report.solvable) {
-      trouble = "the elastic system of " + std::to_string(report.nodes) +
-                " nodes has no solution: place the model closer, or correct the contour";
-    }
-    placed = [fit](const Points& points) { return fit->carry(points); };
-    clock.stop("elastic " + std::to_string(step.fit.nodes));
+    clock.stop("grid of " + std::to_string(steps[k].fit.nodes));
+    outcome = fitOnGrid(cad, problem, grid, outcome.placed, steps[k]);
+    clock.stop("elastic " + std::to_string(steps[k].fit.nodes));
+    if (k > 0 || steps[k].literal || !outcome.trouble.empty()) continue;
+    outcome.placed = comeCloser(cad, problem, grid, outcome.placed, farReaching(steps[k], problem));
+    clock.stop("coming closer");
   }
-  return {placed(cad.vertices), trouble};
+  return outcome;
 }
 
 // Ratio of the root mean square distances from the centroid.
@@ -261,7 +286,7 @@ AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
     return low.map.apply(transformed(camera_from_object, points));
   };
   const ElasticOutcome end = fitElasticStages(cad, problem, placed, steps, grids, clock);
-  describe(problem, cad, end.x, contour, low.last, options.judge_depth, result);
+  describe(problem, cad, end.placed(cad.vertices), contour, low.last, options.judge_depth, result);
   if (!end.trouble.empty()) {
     result.trusted = false;
     result.reason = end.trouble + (result.reason.empty() ? "" : "; " + result.reason);

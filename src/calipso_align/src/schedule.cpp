@@ -183,6 +183,19 @@ std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOpti
   return steps;
 }
 
+ElasticStep farReaching(const ElasticStep& step, const FitProblem& problem) {
+  constexpr int kIterations = 8;
+  constexpr double kReach = 0.1;      // of the contour's extent
+  constexpr double kStiffest = 10.0;  // of the weight that it ends with
+  ElasticStep again = step;
+  again.robust_px.from = std::max(step.robust_px.from, kReach * problem.extent_px);
+  const double end = step.fit.elastic_weights.back();
+  const Ramp stiffness{kStiffest * end, end};
+  again.fit.elastic_weights.clear();
+  for (int k = 0; k < kIterations; ++k) again.fit.elastic_weights.push_back(stiffness.at(k, kIterations - 2));
+  return again;
+}
+
 MeasureSettings settingsAt(const ElasticStep& step, const FitProblem& problem, int iteration) {
   const int iterations = static_cast<int>(step.fit.elastic_weights.size());
   MeasureSettings settings;

@@ -168,6 +168,11 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
   return quality;
 }
 
+double misfit(const FitQuality& quality) {
+  constexpr double kUnmet = 0.05;
+  return quality.open + quality.protruding + kUnmet * (1.0 - quality.met);
+}
+
 Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour,
               const FitQuality& quality, double scale, double distance_sigma,
               const ShapeUncertainty& error) {

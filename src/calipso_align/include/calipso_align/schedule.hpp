@@ -64,4 +64,7 @@ struct ElasticStep {
 std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOptions& options);
 MeasureSettings settingsAt(const ElasticStep& step, const FitProblem& problem, int iteration);
 
+// The same once more, for what the step left far off: softer, and with pairs from further away.
+ElasticStep farReaching(const ElasticStep& step, const FitProblem& problem);
+
 }  // namespace calipso::align

@@ -20,6 +20,10 @@ struct FitQuality {
 
 FitQuality assess(const FitProblem& problem, const Points& x);
 
+// How far the model is from the contour as a whole: area that is open or protrudes, as part of the contour's,
+// and what is not met of its length, which counts less, for a lattice's holes may not be those of the picture.
+double misfit(const FitQuality& quality);
+
 // Parts of the model's size that the surface of a trusted fit may be off in 3D.
 constexpr SurfaceDistance kTrustedWithin{0.04, 0.06};
 
