@@ -77,6 +77,18 @@ TEST(Alignment, FollowsABentContour) {
   }
 }
 
+// No quadratic map comes near a snake: pairs of nearest points lead its bends astray until it is close.
+TEST(Alignment, ComesCloserToAContourThatIsFarOff) {
+  const Camera camera = test::frontCamera();
+  TriangleMesh snake = test::pear();
+  for (int i = 0; i < snake.vertexCount(); ++i)
+    snake.vertices(i, 0) = 0.5 * snake.vertices(i, 0) + 0.25 * std::sin(4.0 * snake.vertices(i, 2));
+  const std::vector<ContourLoop> contour = test::contourOf(snake, Eigen::Isometry3d::Identity(), camera);
+  const AlignmentResult result = align(test::pear(), camera, test::roughPose(), contour, coarse());
+  const Points x = test::inCamera(camera, result.world_from_object, result.mesh.vertices);
+  EXPECT_LT(contourError(contour, x, MeshTopology(result.mesh.triangles), camera).mean_px, 0.7);
+}
+
 TEST(Alignment, DepthImageFixesTheDistance) {
   const Camera camera = test::frontCamera();
   const TriangleMesh mesh = test::pear();
