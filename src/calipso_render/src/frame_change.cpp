@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
+#include "disc_dilation.hpp"
 #include "frame_compositor.hpp"
 #include "marked.hpp"
 #include "tiled_filter.hpp"
@@ -56,10 +57,10 @@ void FrameCompositor::findRelit() {
     }
   }
   cv::Mat eroded(box.size(), CV_8U), opened(box.size(), CV_8U), grown(box.size(), CV_8U);
-  const cv::Mat least = cv::Mat::ones(kLeastChange, kLeastChange, CV_8U), reached = disc(reach);
+  const cv::Mat least = cv::Mat::ones(kLeastChange, kLeastChange, CV_8U);
   filterTiles(change, kLeastChange, eroded, [&](const cv::Mat& from, cv::Mat& to) { cv::erode(from, to, least); });
   filterTiles(eroded, kLeastChange, opened, [&](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, least); });
-  filterTiles(opened, reach, grown, [&](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, reached); });
+  filterTiles(opened, reach, grown, [&](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, reach, to); });
   cv::min(grown, shadows_.shaded(box), grown);
   filterTiles(grown, 1, relit_(here), [](const cv::Mat& from, cv::Mat& to) { cv::blur(from, to, {3, 3}); });
 }

@@ -13,6 +13,7 @@
 #include "place_view.hpp"
 #include "point_light.hpp"
 #include "smooth_step.hpp"
+#include "square_mask.hpp"
 #include "triangle_map.hpp"
 
 namespace calipso::render {
@@ -108,11 +109,11 @@ class FrameCompositor {
     std::vector<std::uint8_t> source;  // Provenance
     std::vector<Kind> kinds;
     std::vector<Lit> light;            // at the columns of lit_
-    std::vector<float> key_u, key_v;   // of what is drawn: place in Appearance::albedo
+    std::vector<float> key_u, key_v;   // of what is drawn: place in Appearance::albedo; up to seven more
     std::vector<int> uneven;           // pixels on which light has to be computed
 
     void resize(std::size_t width) {
-      colour.resize(width), source.resize(width), kinds.resize(width), key_u.resize(width), key_v.resize(width);
+      colour.resize(width), source.resize(width), kinds.resize(width), key_u.resize(width + 7), key_v.resize(width + 7);
     }
   };
 
@@ -151,10 +152,12 @@ class FrameCompositor {
   void cacheOriginals(const std::vector<Occluder>& originals);
   void cacheOthers(const std::vector<Occluder>& others);
   cv::Mat sunOver(const Visibility& shadow, const cv::Rect& bounds) const;
-  cv::Mat skyOver(const Visibility& shadow, const cv::Rect& region, const cv::Mat& skip) const;
+  cv::Mat skyOver(const Visibility& shadow, const cv::Rect& region, const SquareMask& skip) const;
   void leaveHidden(cv::Mat& sky, const cv::Rect& region) const;
   void chooseRegion();
+  void findShown(int v, std::uint8_t* own, std::uint8_t* others) const;
   void findRemoved();
+  cv::Mat quietPlaces() const;
   void findPassingShadows();
   void drawVisibility();
   void findStill();
@@ -224,7 +227,8 @@ class FrameCompositor {
   std::vector<cv::Mat> footprints_;   // Prepared::footprints, likewise
   std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame
   cv::Mat labels_, plate_;            // of this frame's view
-  cv::Mat invented_, quiet_;          // CV_8UC1; quiet: seen in other frames, always alike
+  cv::Mat invented_;                  // CV_8UC1
+  cv::Mat view_from_key_;             // viewWarp(); empty: the key frame's view
   cv::Mat shadowless_;                // Prepared::shadowless, where the camera stands as at the key frame
   const LiveFill* live_ = nullptr;  // Background::live, where the camera stands as at the key frame
   std::vector<cv::Vec3f> live_corrections_;
@@ -245,7 +249,7 @@ class FrameCompositor {
   cv::Mat passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
-  cv::Mat covered_;  // CV_8UC1 over region_: 255 = so deep behind drawn surfaces that light there does not matter
+  SquareMask covered_;  // over region_: so deep behind drawn surfaces that light there does not matter
   cv::Mat sky_now_, sky_before_;  // CV_8UC1 over region_: lightLevel() of the sky on support plane or relief, this in plane terms
   cv::Mat sun_now_, sun_before_;  // CV_8UC1 over region_: the same of the sun
   cv::Mat takes_light_;           // CV_8UC1 over region_: 255 = support plane or relief is seen, on which light changes

@@ -11,7 +11,6 @@
 #include "frame_compositor.hpp"
 #include "marked.hpp"
 #include "plane_light.hpp"
-#include "tiled_filter.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -77,7 +76,7 @@ void FrameCompositor::cacheOthers(const std::vector<Occluder>& others) {
   cv::Rect bounds;
   for (const Occluder& o : others) bounds |= shadowBounds(*o.vertices, light_);
   shadows_.others_sun = bounds.empty() ? cv::Mat() : sunOver(*shadows_.others, bounds);
-  shadows_.others_sky = others.empty() ? cv::Mat() : skyOver(*skyShadowOf(others, params_), {{0, 0}, frame_.bgr.size()}, cv::Mat());
+  shadows_.others_sky = others.empty() ? cv::Mat() : skyOver(*skyShadowOf(others, params_), {{0, 0}, frame_.bgr.size()}, SquareMask());
 }
 
 void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
@@ -86,7 +85,7 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   for (const Occluder& o : originals) shadows_.bounds |= shadowBounds(*o.vertices, prepared_.light.light);
   shadows_.originals = originals.empty() ? nullptr : shadowOf(originals, prepared_.light.light, params_);
   shadows_.originals_sun = shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadows_.originals, shadows_.bounds);
-  shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_8U, cv::Scalar(255)) : skyOver(*skyShadowOf(originals, params_), whole, cv::Mat());
+  shadows_.originals_sky = originals.empty() ? cv::Mat(whole.size(), CV_8U, cv::Scalar(255)) : skyOver(*skyShadowOf(originals, params_), whole, SquareMask());
   leaveHidden(shadows_.originals_sky, whole);
   shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
 #pragma omp parallel for schedule(static)
@@ -125,13 +124,13 @@ void FrameCompositor::leaveHidden(cv::Mat& sky, const cv::Rect& region) const {
 
 cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds) const {
   cv::Mat sun(frame_.bgr.size(), CV_8U, cv::Scalar(255)), part = sun(bounds);
-  planesInLight(place_view_, shadow, bounds, cv::Mat(), part);
+  planesInLight(place_view_, shadow, bounds, SquareMask(), part);
   return sun;
 }
 
 // The sky changes slowly over a support plane: measured on a grid that hangs on the picture, interpolated between.
-// @param skip CV_8UC1 over `region`: 255 = not wanted; may be empty
-cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region, const cv::Mat& skip) const {
+// @param skip where it is not wanted
+cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region, const SquareMask& skip) const {
   const int step = skyStep(frame_.bgr.size());
   const cv::Point first(region.x / step, region.y / step);
   cv::Mat grid((region.br().y - 1) / step - first.y + 2, (region.br().x - 1) / step - first.x + 2, CV_32F, cv::Scalar(1.0f));
@@ -140,8 +139,7 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
     Receiver r;
     for (int i = 0; i < grid.cols; ++i) {
       const int u = (first.x + i) * step, v = (first.y + j) * step;
-      const bool skipped = !skip.empty() && region.contains({u, v}) && skip.at<std::uint8_t>(v - region.y, u - region.x) != 0;
-      if (!skipped && place_view_.planes().at(u, v, r)) grid.at<float>(j, i) = skyLight(shadow.visibility(r.position, r.normal));
+      if (!skip.at(u, v) && place_view_.planes().at(u, v, r)) grid.at<float>(j, i) = skyLight(shadow.visibility(r.position, r.normal));
     }
   }
   cv::Mat sky(region.size(), CV_8U);
@@ -157,7 +155,8 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
       for (int i = 0; i < grid.cols; ++i) line[i] = (1.0f - y) * above[i] + y * below[i];
       for (int i = 0; i + 1 < grid.cols; ++i) {
         const float left = line[i], rise = (line[i + 1] - left) / step;
-        for (int k = 0; k < step; ++k) whole[i * step + k] = lightLevel(left + rise * static_cast<float>(k));
+        if (rise == 0.0f) std::fill_n(&whole[i * step], step, lightLevel(left));
+        else for (int k = 0; k < step; ++k) whole[i * step + k] = lightLevel(left + rise * static_cast<float>(k));
       }
       std::copy_n(whole.begin() + region.x % step, region.width, sky.ptr<std::uint8_t>(v));
     }
@@ -218,9 +217,7 @@ void FrameCompositor::findCovered() {
       for (int u = 0; u < region_.width; ++u) drawn[u] = isDrawn(ids[u], u + region_.x, v + region_.y) ? 255 : 0;
     }
   }
-  const int side = 2 * (params_.background.shadow_margin_px + 2) + 1;
-  covered_.create(region_.size(), CV_8U);
-  filterTiles(drawn_, side / 2, covered_, [side](const cv::Mat& from, cv::Mat& to) { cv::erode(from, to, cv::Mat::ones(side, side, CV_8U)); });
+  covered_ = SquareMask(drawn_, region_, params_.background.shadow_margin_px + 2);
 }
 
 void FrameCompositor::measureSky() {
@@ -235,9 +232,8 @@ void FrameCompositor::measureSun() {
   takes_light_.create(region_.size(), CV_8U);
   const cv::Rect bounds = moved_bounds_ & region_;
   if (!bounds.empty()) {
-    const cv::Rect here = bounds - region_.tl();
-    cv::Mat part = sun_now_(here);
-    planesInLight(place_view_, *moved_shadow_, bounds, covered_(here), part);
+    cv::Mat part = sun_now_(bounds - region_.tl());
+    planesInLight(place_view_, *moved_shadow_, bounds, covered_, part);
   }
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) joinSun(v);
@@ -271,14 +267,17 @@ void FrameCompositor::joinSun(int v) {
   std::uint8_t *now = sun_now_.ptr<std::uint8_t>(v), *before = sun_before_.ptr<std::uint8_t>(v), *takes = takes_light_.ptr<std::uint8_t>(v);
   const auto rowOf = [&](const cv::Mat& picture) { return picture.empty() ? nullptr : picture.ptr<std::uint8_t>(v + region_.y) + region_.x; };
   const std::uint8_t *others = rowOf(shadows_.others_sun), *originals = rowOf(shadows_.originals_sun), *none = rowOf(shadowless_);
-  const std::uint8_t* covered = covered_.ptr<std::uint8_t>(v);
   const int width = region_.width;
   if (originals != nullptr) std::copy_n(originals, width, before);
   else std::fill_n(before, width, 255);
   for (int u = 0; others != nullptr && u < width; ++u) now[u] = both(now[u], others[u]), before[u] = both(before[u], others[u]);
   place_view_.seesRow(region_.x, v + region_.y, width, takes);
   for (int u = 0; none != nullptr && u < width; ++u) takes[u] = none[u] == 0 ? takes[u] : 0;
-  for (int u = 0; u < width; ++u) takes[u] = covered[u] == 0 ? takes[u] : 0;
+  for (int u = 0; u < width;) {
+    const int end = std::min(width, u + SquareMask::kSide - (region_.x + u) % SquareMask::kSide);
+    if (covered_.at(region_.x + u, region_.y + v)) std::fill(takes + u, takes + end, 0);
+    u = end;
+  }
 }
 
 const Look& FrameCompositor::lookOf(int slot) const {

@@ -91,19 +91,14 @@ void FrameCompositor::lightRow(int v, Row& row) const {
 void FrameCompositor::reflectStretch(int v, int first, int last, int slot, Row& row) const {
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
   const std::uint32_t* ids = centre_->ids(v - region_.y);
-  const cv::Point corner = appearance.region.tl();
   bool any_picture = false, any_texture = false;
   for (int i = first; i < last;) {
-    const TriangleMap& map = maps_[slot][VisibilityBuffer::triangleOf(ids[i])];
-    const Appearance::Source source = appearance.sources[VisibilityBuffer::triangleOf(ids[i])];
+    const std::uint32_t id = ids[i];
+    const Appearance::Source source = appearance.sources[VisibilityBuffer::triangleOf(id)];
     any_picture |= source != Appearance::Source::kTexture, any_texture |= source != Appearance::Source::kPicture;
-    const float dv = static_cast<float>(v) - map.v, x = map.key[0][0] + map.key[2][0] * dv, y = map.key[0][1] + map.key[2][1] * dv, w = map.key[0][2] + map.key[2][2] * dv;
-    for (const std::uint32_t id = ids[i]; i < last && ids[i] == id; ++i) {
-      const float du = static_cast<float>(i + region_.x) - map.u, scale = 1.0f / (w + map.key[1][2] * du);
-      row.key_u[i] = (x + map.key[1][0] * du) * scale - corner.x;
-      row.key_v[i] = (y + map.key[1][1] * du) * scale - corner.y;
-    }
+    while (i < last && ids[i] == id) ++i;
   }
+  kernels().locate(maps_[slot].data(), &ids[first], first + region_.x, v, last - first, appearance.region.tl(), &row.key_u[first], &row.key_v[first]);
   const std::optional<cv::Vec3f>& albedo = lookOf(slot).albedo;
   if (albedo) {
     std::fill(&row.colour[first], &row.colour[last - 1] + 1, cv::Vec4f((*albedo)[0], (*albedo)[1], (*albedo)[2], 0.0f));

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "calipso_render/colour.hpp"
+#include "disc_dilation.hpp"
 #include "frame_compositor.hpp"
 #include "place_depth.hpp"
 #include "tiled_filter.hpp"
@@ -117,7 +118,6 @@ void FrameCompositor::stage() {
   footprints_.assign(surfaces.size(), cv::Mat());
   plate_ = prepared_.plate_linear;
   invented_ = prepared_.background.invented;
-  quiet_ = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
   if (sameView(frame_.camera, prepared_.camera)) {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
     shadowless_ = prepared_.shadowless;
@@ -129,11 +129,10 @@ void FrameCompositor::stage() {
     footprints_ = prepared_.footprints;
   } else {
     const cv::Mat map = viewWarp(nearnessFrom(prepared_.nearness, prepared_.camera, frame_.camera), prepared_.camera, frame_.camera);
-    cv::Mat plate, invented, quiet;
+    cv::Mat plate, invented;
     cv::remap(plate_, plate, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
     cv::remap(invented_, invented, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));
-    cv::remap(quiet_, quiet, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
-    plate_ = plate, invented_ = invented, quiet_ = quiet;
+    plate_ = plate, invented_ = invented, view_from_key_ = map;
     place_view_ = PlaceView(place_view_.planes(), warped(prepared_.relief, map));
   }
 }
@@ -199,6 +198,15 @@ void FrameCompositor::chooseRegion() {
   region_ &= all;
 }
 
+// CV_8UC1: seen in other frames, always alike.
+cv::Mat FrameCompositor::quietPlaces() const {
+  const cv::Mat at_key = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
+  if (view_from_key_.empty()) return at_key;
+  cv::Mat here;
+  cv::remap(at_key, here, view_from_key_, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
+  return here;
+}
+
 // The shadow of an object that moves in the video shows as darkening against the plate.
 void FrameCompositor::findPassingShadows() {
   bool any = false;
@@ -214,7 +222,7 @@ void FrameCompositor::findPassingShadows() {
   cv::blur(plate, ratio_plate, {5, 5});
   ratio_plate.convertTo(ratio_plate, CV_8U, same_view ? kDarker : kDarkerElsewhere);
   passing_ = ratio_now < ratio_plate;
-  passing_ &= quiet_ & (labels_ == 0);
+  passing_ &= quietPlaces() & (labels_ == 0);
   cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN, cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));
   if (!same_view) {
     cv::Mat broad;
@@ -239,18 +247,30 @@ cv::Mat FrameCompositor::originalOf(int surface) const {
   return original;
 }
 
-void FrameCompositor::findRemoved() {
-  cv::Mat own = cv::Mat::zeros(region_.size(), CV_8U), others = labels_(region_) != 0;
+// Row v of the pixels that show an edited object in the video, and of those that show another one.
+void FrameCompositor::findShown(int v, std::uint8_t* own, std::uint8_t* others) const {
+  const int width = region_.width;
+  const std::uint8_t* labels = labels_.ptr<std::uint8_t>(v + region_.y) + region_.x;
+  for (int u = 0; u < width; ++u) own[u] = 0, others[u] = labels[u] != 0 ? 255 : 0;
   for (std::size_t i = 0; i < edited_.size(); ++i) {
-    if (!edited_[i]) continue;
-    own |= originalOf(static_cast<int>(i));
-    others &= labels_(region_) != prepared_.surfaces[i].index;
+    if (!edited_[i] || !prepared_.surfaces[i].in_video) continue;
+    const std::uint8_t index = static_cast<std::uint8_t>(prepared_.surfaces[i].index);
+    for (int u = 0; u < width; ++u) own[u] |= labels[u] == index ? 255 : 0, others[u] &= labels[u] == index ? 0 : 255;
+    if (footprints_[i].empty()) continue;
+    const std::uint8_t* footprint = footprints_[i].ptr<std::uint8_t>(v + region_.y) + region_.x;
+    for (int u = 0; u < width; ++u) own[u] |= footprint[u];
   }
+}
+
+void FrameCompositor::findRemoved() {
+  cv::Mat own(region_.size(), CV_8U), others(region_.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region_.height; ++v) findShown(v, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
   removed_.create(region_.size(), CV_8U);
   const int margin = params_.background.mask_margin_px;
-  filterTiles(own, margin, removed_, [kernel = disc(margin)](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, kernel); });
+  filterTiles(own, margin, removed_, [margin](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, margin, to); });
   if (!passing_.empty()) removed_ |= passing_(region_);
-  removed_.setTo(0, others);  // what stands beside it keeps its own pixels, and what stands before it
+  removed_ &= ~others;  // what stands beside it keeps its own pixels, and what stands before it
   for (const cv::Mat& front : fronts_) {
     if (!front.empty()) removed_.setTo(0, front(region_));
   }

@@ -58,6 +58,26 @@ typedef std::int32_t LaneChoice __attribute__((vector_size(32)));
 CALIPSO_INLINE Eight& eightAt(float* at) { return *reinterpret_cast<Eight*>(at); }
 CALIPSO_INLINE const Eight& eightAt(const float* at) { return *reinterpret_cast<const Eight*>(at); }
 
+CALIPSO_INLINE void locateBody(const TriangleMap* maps, const std::uint32_t* ids, int u, int v, int count, const cv::Point& corner, float* key_u,
+                               float* key_v) {
+  const Eight lanes = {0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f};
+  const float left = static_cast<float>(corner.x), top = static_cast<float>(corner.y);
+  for (int k = 0; k < count;) {
+    const std::uint32_t id = ids[k];
+    const TriangleMap& map = maps[VisibilityBuffer::triangleOf(id)];
+    const float dv = static_cast<float>(v) - map.v;
+    const Four start = *reinterpret_cast<const Four*>(map.key[0]) + *reinterpret_cast<const Four*>(map.key[2]) * dv;
+    const float *rise = map.key[1];
+    do {
+      const Eight du = static_cast<float>(u + k) - map.u + lanes, scale = 1.0f / (start[2] + rise[2] * du);
+      eightAt(key_u + k) = (start[0] + rise[0] * du) * scale - left;
+      eightAt(key_v + k) = (start[1] + rise[1] * du) * scale - top;
+      const int end = std::min(k + 8, count);
+      while (k < end && ids[k] == id) ++k;
+    } while (k < count && ids[k] == id);
+  }
+}
+
 // Sums of a place's taps in even (B, G, R, _) and odd columns (B, G, R, _). @pre 1 <= u < columns - 2, likewise v
 CALIPSO_INLINE Eight bicubicSums(const cv::Mat& image, std::size_t step, float u, float v) {
   const int i = static_cast<int>(u), j = static_cast<int>(v);
@@ -153,6 +173,10 @@ CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTar
   attribute float name##VisibleThrough(const ShadowTexels& map, const ShadowTaps& taps, float s, float t, float h, float search) {   \
     return visibleThroughBody(map, taps, s, t, h, search);                                                                           \
   }                                                                                                                                  \
+  attribute void name##Locate(const TriangleMap* maps, const std::uint32_t* ids, int u, int v, int count, const cv::Point& corner,   \
+                              float* key_u, float* key_v) {                                                                          \
+    locateBody(maps, ids, u, v, count, corner, key_u, key_v);                                                                        \
+  }                                                                                                                                  \
   attribute void name##Sample(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out) {                     \
     sampleBody(image, u, v, count, out);                                                                                             \
   }                                                                                                                                  \
@@ -164,7 +188,7 @@ CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTar
   attribute void name##DrawSamples(const TriangleSamples& t, int u, int v, std::uint32_t id, EdgeCoverage::Pixel& pixel) {           \
     drawSamplesBody(t, u, v, id, pixel);                                                                                             \
   }                                                                                                                                  \
-  const Kernels name##Table{name##VisibleThrough, name##Sample, name##Encode, name##Fill, name##DrawSamples};
+  const Kernels name##Table{name##VisibleThrough, name##Locate, name##Sample, name##Encode, name##Fill, name##DrawSamples};
 
 CALIPSO_KERNELS(plain, )
 #if defined(__x86_64__) && defined(__GNUC__)

@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "calipso_render/edge_coverage.hpp"
+#include "triangle_map.hpp"
 #include "triangle_span.hpp"
 
 namespace calipso::render {
@@ -38,6 +39,10 @@ struct Kernels {
   // Part of the light that a receiver at (s, t), texels, and height h sees: the mean height of the blockers within `search`, then the
   // covered part of the penumbra that it sets (Fernando 2005).
   float (*visibleThrough)(const ShadowTexels& map, const ShadowTaps& taps, float s, float t, float h, float search);
+
+  // The key picture's places that pixels (u + k, v), k < count, show, by their triangles' maps. Up to seven places more are written.
+  // @param ids of the pixels' triangles; corner of the key picture
+  void (*locate)(const TriangleMap* maps, const std::uint32_t* ids, int u, int v, int count, const cv::Point& corner, float* key_u, float* key_v);
 
   // sampleBicubic() at `count` places. @param image CV_32FC4, not empty
   void (*sample)(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out);

@@ -7,13 +7,13 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kLargest = 16, kSquare = 8, kStep = 2;  // px: squares, and the places in the least of them
+constexpr int kLargest = 64, kSquare = SquareMask::kSide, kStep = 2;  // px: squares, and the places in the least of them
 constexpr float kEven = 0.05f; // of visibility: places that differ by no more speak for those between them
 constexpr float kSlow = 0.3f;  // of visibility: between places that differ by no more it is interpolated
 
 class Squares {
  public:
-  Squares(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out)
+  Squares(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const SquareMask& skip, cv::Mat& out)
       : view_(view), light_(light), rect_(rect), skip_(skip), out_(out) {}
 
   // Squares hang on the picture, not on the rectangle: pixels are the same whatever else is asked for.
@@ -28,7 +28,7 @@ class Squares {
  private:
   void fill(const cv::Rect& square) const {
     const cv::Rect here = (square & rect_) - rect_.tl();
-    if (here.empty() || (!skip_.empty() && isSkipped(here))) return;
+    if (here.empty() || skip_.all(square & rect_)) return;
     Receiver middle, corner;
     bool even = !view_.relief().touches(square.x, square.y, square.width) && view_.at(square.x + 0.5f * square.width, square.y + 0.5f * square.height, middle);
     float radius = 0.0f;
@@ -47,14 +47,6 @@ class Squares {
     } else {
       fillExactly(here);
     }
-  }
-
-  bool isSkipped(const cv::Rect& here) const {
-    for (int v = here.y; v < here.br().y; ++v) {
-      const std::uint8_t* row = skip_.ptr<std::uint8_t>(v);
-      if (std::find(row + here.x, row + here.br().x, 0) != row + here.br().x) return false;
-    }
-    return true;
   }
 
   float exactly(int u, int v) const {
@@ -110,13 +102,13 @@ class Squares {
   const PlaceView& view_;
   const Visibility& light_;
   const cv::Rect rect_;
-  const cv::Mat& skip_;
+  const SquareMask& skip_;
   cv::Mat& out_;
 };
 
 }  // namespace
 
-void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out) {
+void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const SquareMask& skip, cv::Mat& out) {
   if (!rect.empty()) Squares(view, light, rect, skip, out).run();
 }
 

@@ -5,6 +5,7 @@
 
 #include "calipso_render/visibility.hpp"
 #include "place_view.hpp"
+#include "square_mask.hpp"
 
 namespace calipso::render {
 
@@ -13,8 +14,8 @@ inline std::uint8_t lightLevel(float visible) { return static_cast<std::uint8_t>
 
 // What support planes and relief see of a light, pixel by pixel: exactly where it changes quickly, interpolated over two pixels where
 // it changes slowly, and at once for squares that are all lit or all shaded.
-// @param skip CV_8UC1 over `rect`: 255 = not wanted; may be empty
+// @param skip squares that are not wanted
 // @param out CV_8UC1 over `rect`, lightLevel(); keeps its values where neither is seen, and where not wanted
-void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const cv::Mat& skip, cv::Mat& out);
+void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const SquareMask& skip, cv::Mat& out);
 
 }  // namespace calipso::render

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <opencv2/core.hpp>
 
 namespace calipso::render {
@@ -13,7 +14,7 @@ namespace calipso::render {
 // @param target CV_8UC1 of the same size, not the source
 template <class Filter>
 void filterTiles(const cv::Mat& source, int reach, cv::Mat target, const Filter& filter) {
-  constexpr int kWidth = 128, kHeight = 64;
+  constexpr int kWidth = 64, kHeight = 32;
   const int across = (source.cols + kWidth - 1) / kWidth, down = (source.rows + kHeight - 1) / kHeight;
   const cv::Rect all(cv::Point(), source.size());
 #pragma omp parallel for schedule(dynamic, 2)
@@ -26,8 +27,8 @@ void filterTiles(const cv::Mat& source, int reach, cv::Mat target, const Filter&
       for (int u = around.x; u < around.br().x; ++u) low = std::min(low, row[u]), high = std::max(high, row[u]);
     }
     cv::Mat out = target(tile);
-    if (low == high) out.setTo(low);
-    else filter(source(tile), out);
+    if (low != high) filter(source(tile), out);
+    for (int v = 0; low == high && v < out.rows; ++v) std::memset(out.ptr(v), low, out.cols);
   }
 }
 

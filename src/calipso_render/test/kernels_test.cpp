@@ -48,6 +48,27 @@ TEST_F(Avx2, SamplesTheSameValues) {
   EXPECT_EQ(std::memcmp(plain.data(), fast.data(), plain.size() * sizeof(cv::Vec4f)), 0);
 }
 
+TEST_F(Avx2, LocatesTheSamePlaces) {
+  std::vector<TriangleMap> maps(40);
+  for (TriangleMap& map : maps) {
+    for (auto& line : map.key) {
+      for (float& x : line) x = random_.uniform(0.1f, 1.0f);
+    }
+    map.u = random_.uniform(0.0f, 50.0f), map.v = random_.uniform(0.0f, 50.0f);
+  }
+  std::vector<std::uint32_t> ids;
+  for (std::uint32_t id = 0; id < maps.size(); ++id) ids.insert(ids.end(), random_.uniform(1, 20), id);
+  const int count = static_cast<int>(ids.size());
+  std::vector<float> plain_u(count + 7), plain_v(count + 7), u(count + 7), v(count + 7);
+  plainKernels().locate(maps.data(), ids.data(), 3, 20, count, {5, 6}, plain_u.data(), plain_v.data());
+  avx2Kernels()->locate(maps.data(), ids.data(), 3, 20, count, {5, 6}, u.data(), v.data());
+  for (int k = 0; k < count; ++k) {
+    ASSERT_EQ(plain_u[k], u[k]) << k;
+    ASSERT_EQ(plain_v[k], v[k]) << k;
+    ASSERT_NEAR(u[k], maps[ids[k]].keyAt(3.0f + k, 20.0f).x() - 5.0f, 1e-3f * (1.0f + std::abs(u[k]))) << k;
+  }
+}
+
 TEST_F(Avx2, SeesTheSameLight) {
   constexpr int kSide = 40;
   std::vector<float> heights(kSide * kSide, -3e38f);

@@ -1,11 +1,15 @@
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "disc_dilation.hpp"
 #include "line_codec.hpp"
 #include "mesh_topology.hpp"
 #include "plane_light.hpp"
 #include "render_test_scene.hpp"
+#include "square_mask.hpp"
 #include "triangle_map.hpp"
 
 namespace calipso::render {
@@ -89,7 +93,7 @@ TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
   const PlaceView view(PlaneView(table(), camera()));
   const cv::Rect rect(13, 9, 120, 101);
   cv::Mat fast(rect.size(), CV_8U, cv::Scalar(255));
-  planesInLight(view, sun, rect, cv::Mat(), fast);
+  planesInLight(view, sun, rect, SquareMask(), fast);
   int shaded = 0;
   for (int v = 0; v < rect.height; ++v) {
     for (int u = 0; u < rect.width; ++u) {
@@ -100,6 +104,42 @@ TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
     }
   }
   EXPECT_GT(shaded, 100);
+}
+
+// Squares stand within what is set, and all those do that lie far enough inside.
+TEST(SquareMask, IsTheMaskLessItsRim) {
+  const cv::Rect part(13, 9, 120, 101), set(20, 15, 70, 95);  // which reaches the part's lower border
+  cv::Mat pixels = cv::Mat::zeros(part.size(), CV_8U), eroded;
+  pixels(set & cv::Rect(0, 0, part.width, part.height)).setTo(255);
+  const SquareMask mask(pixels, part, 5);
+  cv::erode(pixels, eroded, cv::Mat::ones(11, 11, CV_8U));
+  int count = 0;
+  for (int v = 0; v < part.height; ++v) {
+    for (int u = 0; u < part.width; ++u) {
+      const bool on = mask.at(u + part.x, v + part.y);
+      count += on;
+      ASSERT_TRUE(!on || eroded.at<std::uint8_t>(v, u) != 0) << u << ", " << v;
+    }
+  }
+  EXPECT_GT(count, 70 * 95 / 3);
+  EXPECT_FALSE(mask.at(part.x - 20, part.y));
+  EXPECT_TRUE(mask.all({part.x + 48, part.y + 47, 16, 16}));
+  EXPECT_FALSE(mask.all({part.x, part.y, 64, 64}));
+  EXPECT_FALSE(SquareMask().all({0, 0, 8, 8}));
+}
+
+TEST(DilateByDisc, DoesWhatOpenCVDoes) {
+  cv::Mat picture(60, 90, CV_8U), expected;
+  cv::RNG(5).fill(picture, cv::RNG::UNIFORM, 0, 1000);
+  picture.setTo(0, picture < 253);
+  for (const int radius : {1, 3, 7}) {
+    cv::dilate(picture, expected, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+    for (const cv::Rect& part : {cv::Rect(0, 0, 90, 60), cv::Rect(20, 10, 40, 30), cv::Rect(60, 5, 30, 55)}) {
+      cv::Mat out(part.size(), CV_8U);
+      dilateByDisc(picture(part), radius, out);
+      EXPECT_EQ(cv::norm(out, expected(part), cv::NORM_INF), 0.0) << radius << " " << part;
+    }
+  }
 }
 
 }  // namespace
