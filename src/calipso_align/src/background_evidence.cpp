@@ -21,8 +21,8 @@ cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, doubl
       const cv::Vec3f behind(background.image.at<cv::Vec3b>(y, x)), seen(view.at<cv::Vec3b>(y, x));
       const cv::Vec3f d = seen - behind;
       // A shadow may have come, or gone that was there when the background was seen.
-      const bool shaded = isShadowed(behind, seen, noise) || isShadowed(seen, behind, noise);
-      if (shaded || d.dot(d) < same) accounts.at<uchar>(y, x) = kBackground;
+      const auto isShaded = [&] { return isShadowed(behind, seen, noise) || isShadowed(seen, behind, noise); };
+      if (d.dot(d) < same || isShaded()) accounts.at<uchar>(y, x) = kBackground;
       else if (d.dot(d) > different) accounts.at<uchar>(y, x) = kOther;
     }
   return accounts;

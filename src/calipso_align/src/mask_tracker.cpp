@@ -15,6 +15,7 @@ namespace calipso::align {
 namespace {
 
 constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
+constexpr int kLargeView = 200;      // px; from here on half the resolution tells how a layer moves nearly as well
 constexpr int kMeanSize = 4;  // px; blocks over which stillness averages the sensor's noise away
 constexpr size_t kMaxSamples = 2000;
 constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has proved wrong
@@ -249,8 +250,14 @@ cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey, const Object& object,
   const cv::Matx23d back(1, 0, -shift.x + view.x, 0, 1, -shift.y + view.y);
   cv::warpAffine(previous_grey_, before, back, view.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
                  cv::BORDER_REPLICATE);
-  cv::Mat rest;
-  object.flow->calc(grey(view).clone(), before, rest);  // wants whole rows
+  cv::Mat rest, now = grey(view).clone();  // flow wants whole rows
+  const bool large = std::min(view.width, view.height) >= kLargeView;
+  if (large) {
+    cv::resize(now, now, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
+    cv::resize(before, before, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
+  }
+  object.flow->calc(now, before, rest);
+  if (large) cv::resize(2.0 * rest, rest, view.size());
   flow(view) += rest;
   return flow;
 }
