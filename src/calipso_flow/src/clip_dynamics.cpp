@@ -6,6 +6,8 @@
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
+#include "calipso_flow/rotation.hpp"
+
 namespace calipso::flow {
 
 namespace {
@@ -41,6 +43,15 @@ double scaleDeviation(const ObjectModel& model, const Eigen::Vector3d& position,
   const Eigen::Vector3d direction = sight.normalized();
   const double variance = direction.dot(model.position_covariance * direction);
   return variance > 0.0 ? std::sqrt(variance) / sight.norm() : 0.0;
+}
+
+// Of the velocity: the alignment places the centre of mass only so well in the body, and it goes round with its spin.
+Matrix6d offCentre(const ObjectModel& model, const MotionState& state) {
+  const Eigen::Matrix3d round = skew(state.spin);
+  const Eigen::Matrix3d turned = state.rotation * model.world_from_object.linear().transpose();
+  Matrix6d twist = Matrix6d::Zero();
+  twist.topLeftCorner<3, 3>() = round * turned * model.position_covariance * turned.transpose() * round.transpose();
+  return twist;
 }
 
 std::string summaryOf(const DeformationMotion& deformation) {
@@ -203,6 +214,7 @@ ObjectDynamics ClipAnalyser::finishObject(const Followed& object, bool with_wind
   const double scale = scaleDeviation(tracker.model(), measurements.front().position, camera);
   for (size_t k = 0; k < measurements.size(); ++k) {
     dynamics.trajectory.states[k].addScaleUncertainty(scale);
+    dynamics.trajectory.states[k].addTwistCovariance(offCentre(tracker.model(), dynamics.trajectory.states[k]));
     const bool moving =
         dynamics.deformation || dynamics.trajectory.movingAt(measurements[k].time);
     dynamics.motions.push_back(motionFrom(dynamics.trajectory.states[k], tracker.centroid(), moving,
