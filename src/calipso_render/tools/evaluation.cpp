@@ -20,6 +20,7 @@ constexpr int kRim = 3;              // px of a mask's rim that "inside" leaves 
 constexpr int kAround = 40;          // px around a moved object in which its shadow is judged
 constexpr int kMovedFirst = 3, kMovedStep = 4;  // frames of a moving object that are drawn again: odd ones, which a
                                                 // clip sample of more than 24 frames leaves out
+constexpr double kTurned = 10.0 * M_PI / 180.0;  // rad against the key frame, from which copying texture is wrong
 constexpr int kFlickerFrames = 8;
 constexpr int kSummaryWidth = 1440;  // px
 constexpr int kSheetFrames = 4;      // of a clip on a blind sheet
@@ -184,15 +185,16 @@ class Evaluation {
     put("seam_drawn_psnr_db", psnr(drawn, in.bgr, seam));
   }
 
-  // Crops of the video and of the same frames with everything edited but nothing moved, all of it drawn, with noise.
+  // Crops of the video and of the same frames with everything edited but moving and deforming as it does, all of it drawn, with noise.
   void writeSheet() const {
     Renderer renderer(prepared_, without(true, false));
     BlindSheet sheet(scene_.name);
     for (int k = 0; k < scene_.frame_count; k += std::max(1, scene_.frame_count / kSheetFrames)) {
       const FrameInput in = frame(k, [&](std::size_t i, ObjectInFrame& o) {
         o.edited = true;
-        const auto& poses = truth_.objects[i].poses;
-        if (poses.size() > 1) o.vertices = transformed(prepared_->surfaces[i].object_vertices, poses[k]);
+        const auto& [model, poses, shapes, roughness] = truth_.objects[i];
+        if (!shapes.empty()) o.vertices = shapes[k];
+        else if (poses.size() > 1) o.vertices = transformed(prepared_->surfaces[i].object_vertices, poses[k]);
       });
       const cv::Mat drawn = renderer.composite(in).bgr;
       for (const Truth::Object& o : truth_.objects) sheet.add(in.bgr, drawn, cv::boundingRect(in.labels == o.model.index), k);
@@ -227,8 +229,17 @@ class Evaluation {
     return flat;
   }
 
+  // rad: the least turn of an object that moves, from the key frame to frame k.
+  double turnedBy(int k) const {
+    std::optional<double> least;
+    for (const Truth::Object& o : truth_.objects) {
+      if (o.poses.size() > 1) keepLowest(least, Eigen::AngleAxisd(o.poses[0].linear().transpose() * o.poses[k].linear()).angle());
+    }
+    return least.value_or(0.0);
+  }
+
   void judgeMoved() {
-    std::optional<double> moved, around, copied, gain, from_clip;
+    std::optional<double> moved, around, copied, gain, turned_gain, from_clip;
     const RenderParams bare = without(false, false);
     Renderer renderer(fromKeyFrame(), bare), clip_renderer(prepared_, bare), copier(unlit(), bare);
     for (int k = kMovedFirst; k < scene_.frame_count; k += kMovedStep) {
@@ -243,7 +254,7 @@ class Evaluation {
       const auto relit = psnr(drawn, in.bgr, inside), copy = psnr(copier.composite(in).bgr, in.bgr, inside);
       keepLowest(moved, relit), keepLowest(copied, copy);
       if (relit && copy) keepLowest(gain, *relit - *copy);
-      if (std::getenv("DBG")) fprintf(stderr, "%d relit %.2f copy %.2f\n", k, *relit, *copy);
+      if (relit && copy && turnedBy(k) >= kTurned) keepLowest(turned_gain, *relit - *copy);
       const cv::Mat with_clip = clip_renderer.composite(in).bgr;
       keepLowest(from_clip, psnr(with_clip, in.bgr, inside));
       picture("clip_moved_" + std::to_string(k), with_clip);
@@ -255,6 +266,7 @@ class Evaluation {
     put("moved_from_clip_psnr_db", from_clip);
     put("moved_copied_psnr_db", copied);
     put("relighting_gain_db", gain);
+    put("relighting_gain_turned_db", turned_gain);
   }
 
   // Every object lifted by a twentieth of the distance: drawn, shaded and replaced in full.

@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cstdio>
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
@@ -25,6 +26,29 @@ std::string numbered(const std::string& pattern, int k) {
   return name;
 }
 
+// The shapes of a deforming object, from an array of NumPy's format 1.0: little-endian floats, frames x vertices x 3.
+std::vector<Points> loadShapes(const std::string& file, int vertices, const Eigen::Isometry3d& world_from_object) {
+  std::ifstream in(file, std::ios::binary);
+  char start[10] = {};
+  in.read(start, sizeof(start));
+  std::string header(static_cast<unsigned char>(start[8]) + 256 * static_cast<unsigned char>(start[9]), ' ');
+  in.read(header.data(), static_cast<std::streamsize>(header.size()));
+  int frames = 0, count = 0;
+  const std::size_t shape = header.find("'shape': (");
+  const bool floats = header.find("'<f4'") != std::string::npos && header.find("'fortran_order': False") != std::string::npos;
+  if (!in || !floats || shape == std::string::npos || std::sscanf(header.c_str() + shape, "'shape': (%d, %d, 3)", &frames, &count) != 2) {
+    throw std::runtime_error(file + ": no array of 32-bit floats, frames x vertices x 3");
+  }
+  if (count != vertices) throw std::runtime_error(file + ": has " + std::to_string(count) + " vertices, the true mesh " + std::to_string(vertices));
+  std::vector<Points> shapes(frames, Points(count));
+  for (Points& points : shapes) {
+    in.read(reinterpret_cast<char*>(points.data()), static_cast<std::streamsize>(sizeof(Eigen::Vector3f) * points.size()));
+    points = transformed(points, world_from_object);
+  }
+  if (!in) throw std::runtime_error(file + ": ends too early");
+  return shapes;
+}
+
 Truth::Object toObject(const Scene& scene, const YAML::Node& node) {
   Truth::Object object;
   object.model.name = node["name"].as<std::string>();
@@ -32,6 +56,9 @@ Truth::Object toObject(const Scene& scene, const YAML::Node& node) {
   object.model.mesh = loadMesh(scene.directory + "/" + node["true_mesh"].as<std::string>());
   for (const YAML::Node& pose : node["world_T_object"]) object.poses.push_back(toIsometry(pose));
   object.model.world_from_object = object.poses.front();
+  if (const YAML::Node file = node["true_vertices_per_frame"]) {
+    object.shapes = loadShapes(scene.directory + "/" + file.as<std::string>(), object.model.mesh.vertexCount(), object.poses.front());
+  }
   const YAML::Node material = node["material"];
   if (material && material.size() > 0 && material[0]["roughness"]) object.roughness = material[0]["roughness"].as<double>();
   return object;

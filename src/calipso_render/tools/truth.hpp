@@ -16,6 +16,7 @@ struct Truth {
   struct Object {
     ObjectModel model;                          // true shape and pose at frame 0
     std::vector<Eigen::Isometry3d> poses;       // one, or one per frame
+    std::vector<Points> shapes;                 // per frame, world; empty unless it deforms
     std::optional<double> roughness;            // of the first material slot
   };
   std::vector<Object> objects;
