@@ -14,6 +14,8 @@ namespace {
 
 constexpr float kWholePx = 0.5f, kNonePx = 5.0f;  // movement up to which the residual goes along, and from which none does
 
+constexpr float kWholeSwaying = 0.05f, kNoneSwaying = 0.3f;  // ... of what moves or sways in the video, too: what is missed is how it did
+
 constexpr float kMostChange = 3.0f;  // factor: what is missed by more, where a surface has moved, is misfit and not its look
 
 constexpr int kCarried = 16;  // px around surfaces at rest in which their rims and what they take over lie
@@ -221,8 +223,10 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
 // @param tint of the surface's new look, which what was missed takes on
 void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, const cv::Vec3f& tint, cv::Vec4f& colour) const {
   const float squared = moved.squaredNorm();
-  if (squared >= kNonePx * kNonePx) return;
-  const float part = 1.0f - smoothStep(kWholePx, kNonePx, std::sqrt(squared));
+  const bool sways = prepared_.moves[owner] || prepared_.sways[owner];
+  const float none = sways ? kNoneSwaying : kNonePx;
+  if (squared >= none * none) return;
+  const float part = 1.0f - smoothStep(sways ? kWholeSwaying : kWholePx, none, std::sqrt(squared));
   const cv::Vec4f miss = missAt(u, v, owner);
   const float moves = std::min(1.0f, squared / (kWholePx * kWholePx));  // unmoved, the video comes back whatever was drawn
   for (int c = 0; c < 3; ++c) {

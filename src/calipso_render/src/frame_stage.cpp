@@ -155,11 +155,12 @@ bool FrameCompositor::isSeenAt(int surface, const Points& vertices) const {
   return within >= kSeenWithin * all;
 }
 
-// Whether the video has an object, or a part of one that moves, where the key frame has it. Adds to elsewhere_ where not.
+// Whether the video has an object, or a part of one that moves or sways, where the key frame has it. Adds to elsewhere_ where not.
 bool FrameCompositor::findRest(int surface) {
   if (!prepared_.surfaces[surface].in_video) return false;
-  if (!prepared_.moves[surface]) return true;
-  if (!edited_[surface] || !sameView(frame_.camera, prepared_.camera)) return false;
+  const bool moves = prepared_.moves[surface];
+  if (!moves && !prepared_.sways[surface]) return true;
+  if (!edited_[surface] || !sameView(frame_.camera, prepared_.camera)) return !moves;
   const int index = prepared_.surfaces[surface].index;
   const cv::Mat now = labels_ == index, key = prepared_.key_labels == index, either = now | key;
   cv::Rect box = cv::boundingRect(either);

@@ -27,6 +27,8 @@ constexpr float kDeepFront = 6.0f;      // ... that far inside the model's outli
 constexpr std::size_t kFurtherViews = 5;  // beside the key frame
 constexpr float kOffPlane = 0.1f;       // part by which scenery is nearer or farther than the plane behind or before it
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
+constexpr int kSameCodes = 8;           // code values, mean over 3 x 3 pixels, that noise may make
+constexpr double kSwayed = 0.15;        // part of an object in which the picture changes by more if it sways
 
 // @param nearness of the place, from the key frame's camera
 std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness) {
@@ -54,6 +56,20 @@ bool movesInVideo(const std::vector<ClipFrame>& frames, int index) {
     const cv::Mat now = f.labels == index;
     const int both = cv::countNonZero(now & key), either = cv::countNonZero(now | key);
     if (both < kStillOverlap * either) return true;
+  }
+  return false;
+}
+
+// What keeps its outline may yet bend within: then the picture of it changes.
+bool swaysInVideo(const std::vector<ClipFrame>& frames, int index) {
+  cv::Mat key_picture, picture, same;
+  cv::blur(frames.front().bgr, key_picture, {3, 3});
+  for (const ClipFrame& f : frames) {
+    const cv::Mat both = (f.labels == index) & (frames.front().labels == index);
+    cv::blur(f.bgr, picture, {3, 3});
+    cv::absdiff(picture, key_picture, picture);
+    cv::inRange(picture, cv::Scalar(), cv::Scalar::all(kSameCodes), same);
+    if (cv::countNonZero(both & ~same) > kSwayed * cv::countNonZero(both)) return true;
   }
   return false;
 }
@@ -365,6 +381,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   for (const ObjectModel& m : models) {
     p.surfaces.push_back(makeSurface(m));
     p.moves.push_back(movesInVideo(frames, m.index));
+    p.sways.push_back(!p.moves.back() && swaysInVideo(frames, m.index));
   }
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);

@@ -85,6 +85,7 @@ struct Prepared {
   cv::Mat key_labels;
   std::vector<Surface> surfaces;
   std::vector<bool> moves;          // per surface: it moves in the video
+  std::vector<bool> sways;          // per surface: it does not, but what is seen within its outline changes: it hangs or bends
   std::vector<Appearance> appearances;
   LightFit light;
   std::vector<cv::Mat> fronts;      // per surface, CV_8UC1: places where something unmodelled stands before it
