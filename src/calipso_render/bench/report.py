@@ -18,7 +18,8 @@ COLUMNS = [
     ("seam_drawn_psnr_db", "seam, all drawn, dB"), ("moved_psnr_db", "moved, dB"),
     ("moved_from_clip_psnr_db", "moved, texture from the clip, dB"),
     ("shadow_psnr_db", "around moved, dB"), ("moved_copied_psnr_db", "moved, not relit, dB"),
-    ("relighting_gain_db", "gain over copying, dB"), ("ms_prepare", "prepare, ms"),
+    ("relighting_gain_db", "gain over copying, dB"), ("relighting_gain_turned_db", "the same where turned by 10 degrees or more, dB"),
+    ("ms_prepare", "prepare, ms"),
     ("ms_prepare_background", "of it the background, ms"), ("ms_prepare_appearance", "light and texture, ms"),
     ("ms_inpaint", "filling the hole, ms"), ("ms_frame_live", "live, ms"), ("ms_frame_final", "final, ms"),
 ]
