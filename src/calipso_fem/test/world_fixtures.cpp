@@ -1,5 +1,6 @@
 #include "world_fixtures.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <tuple>
@@ -21,6 +22,10 @@ TriangleMesh meshOf(const std::vector<Eigen::Vector3d>& vertices,
 }  // namespace
 
 TriangleMesh boxSurface(const Eigen::Vector3d& size, int n) {
+  return boxSurface(size, Eigen::Vector3i::Constant(n));
+}
+
+TriangleMesh boxSurface(const Eigen::Vector3d& size, const Eigen::Vector3i& n) {
   std::map<std::tuple<int, int, int>, int> ids;
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector3i> triangles;
@@ -28,13 +33,13 @@ TriangleMesh boxSurface(const Eigen::Vector3d& size, int n) {
     const auto [it, fresh] =
         ids.emplace(std::make_tuple(l.x(), l.y(), l.z()), static_cast<int>(vertices.size()));
     if (fresh)
-      vertices.push_back(size.cwiseProduct(l.cast<double>() / n - Eigen::Vector3d::Constant(0.5)));
+      vertices.push_back(size.cwiseProduct(l.cast<double>().cwiseQuotient(n.cast<double>()) - Eigen::Vector3d::Constant(0.5)));
     return it->second;
   };
   for (int axis = 0; axis < 3; ++axis)
-    for (const int side : {0, n})
-      for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) {
+    for (const int side : {0, n[axis]})
+      for (int i = 0; i < n[(axis + 1) % 3]; ++i)
+        for (int j = 0; j < n[(axis + 2) % 3]; ++j) {
           const auto at = [&](int a, int b) {
             Eigen::Vector3i l;
             l[axis] = side;
@@ -111,6 +116,19 @@ TriangleMesh bentRod(double size, double thickness) {
     mesh.vertices.row(i) << x, r * p.x() + 1.2 * x * x / size, r * p.y();
   }
   // The map (x, y, z) -> (z, x, y) keeps the orientation.
+  return mesh;
+}
+
+TriangleMesh horseshoe(double length, double radius, double thickness, double width, const Eigen::Vector3i& n) {
+  const double bend = M_PI * radius;
+  TriangleMesh mesh = boxSurface({2.0 * length + bend, width, thickness}, n);
+  for (int i = 0; i < mesh.vertexCount(); ++i) {
+    const Eigen::Vector3d p = mesh.vertex(i);
+    const double along = std::clamp(p.x(), -0.5 * bend, 0.5 * bend), beyond = p.x() - along;
+    const double phi = along / radius, r = radius + p.z();
+    const Eigen::Vector3d out(std::sin(phi), 0.0, std::cos(phi)), on(std::cos(phi), 0.0, -std::sin(phi));
+    mesh.vertices.row(i) = (r * out + beyond * on + p.y() * Eigen::Vector3d::UnitY()).transpose();
+  }
   return mesh;
 }
 

@@ -107,7 +107,7 @@ TEST(WorldObjects, BadNamesAndValuesAreRefused) {
   };
   EXPECT_NE(message([&] { world->setPairContact("thing", "nothing", false); }).find("table"),
             std::string::npos);
-  EXPECT_NE(message([&] { world->setPairContact("thing", "thing", false); }).find("no pair"),
+  EXPECT_NE(message([&] { world->setPairContact("table", "table", false); }).find("no pair"),
             std::string::npos);
   EXPECT_NE(message([&] { world->duplicate("thing", "thing", Eigen::Isometry3d::Identity()); })
                 .find("two objects"),

@@ -25,6 +25,10 @@ ObjectSettings readSettings(XmlRpc::XmlRpcValue& map, ObjectSettings settings,
       if (value.getType() != XmlRpc::XmlRpcValue::TypeString)
         throw std::invalid_argument("parameter " + name + " is no text");
       settings.kind = objectKindFromString(static_cast<std::string>(value));
+    } else if (key == "self_contact") {
+      if (value.getType() != XmlRpc::XmlRpcValue::TypeBoolean)
+        throw std::invalid_argument("parameter " + name + " is neither true nor false");
+      settings.self_contact = static_cast<bool>(value);
     } else if (key == "youngs_modulus")
       settings.youngs_modulus = number(value, name);
     else if (key == "poissons_ratio")

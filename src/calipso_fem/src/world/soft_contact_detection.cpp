@@ -9,9 +9,6 @@
 namespace calipso::fem {
 namespace {
 
-// How a contact was found; part of its key.
-enum Found { kNearest = 0, kNearestReversed = 1, kCrossing = 2, kCrossingReversed = 3 };
-
 double sizeOf(const SoftObject& soft) {
   return (soft.vertices().colwise().maxCoeff() - soft.vertices().colwise().minCoeff()).norm();
 }
@@ -138,7 +135,7 @@ std::vector<SoftContacts::Candidate> SoftContacts::candidates(
     const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
     const RigidWorld& rigid, double h) const {
   std::vector<Candidate> list;
-  for (size_t s = 0; s < softs.size(); ++s)
+  for (size_t s = 0; s < softs.size(); ++s) {
     for (size_t o = 0; o < obstacles.size(); ++o) {
       // Each pair of moving deformable objects is looked at once.
       const bool twin = obstacles[o].soft && obstacles[o].id < softs[s].id &&
@@ -146,6 +143,8 @@ std::vector<SoftContacts::Candidate> SoftContacts::candidates(
       if (meets(softs[s].id, obstacles[o].id) && !twin)
         watchPair(softs, static_cast<int>(s), obstacles, static_cast<int>(o), rigid, h, list);
     }
+    if (softs[s].soft->selfProximity()) watchSelf(softs, static_cast<int>(s), obstacles, h, list);
+  }
   return list;
 }
 
@@ -194,7 +193,7 @@ void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
     if (!everywhere && !others.contains(x)) continue;
     const auto hit = queryObstacle(obstacle, x, watch, size);
     if (!hit || (obstacle.soft && misjudged(*hit, *obstacle.tree, x, reach))) continue;
-    watchVertex(contactAt({entry.id, obstacle.id, v, kNearest}, soft, index, obstacle, soft_b,
+    watchVertex(contactAt({entry.id, obstacle.id, v, Contact::kNearest}, soft, index, obstacle, soft_b,
                           SurfacePoint::vertex(v), *hit),
                 false, v);
   }
@@ -209,7 +208,7 @@ void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
     const auto hit = queryObstacle(self, x, watch, size);
     if (!hit || misjudged(*hit, *self.tree, x, reach)) continue;
     const ObstacleHit turned{hit->gap, -hit->normal, x, SurfacePoint::vertex(v)};
-    watchVertex(contactAt({entry.id, obstacle.id, v, kNearestReversed}, soft, index, obstacle,
+    watchVertex(contactAt({entry.id, obstacle.id, v, Contact::kNearestReversed}, soft, index, obstacle,
                           soft_b, hit->other, turned),
                 true, v);
   }
@@ -222,6 +221,7 @@ std::optional<Contact> SoftContacts::crossing(const Candidate& c,
                                               const StepMotion& motion) const {
   const Obstacle& obstacle = obstacles[c.contact.obstacle];
   if (obstacle.plane) return std::nullopt;
+  if (c.contact.ofOneBody()) return crossingItself(c, softs, motion);
   const SoftEntry& entry = softs[c.contact.soft_a];
   Contact::Key key = c.contact.key;
   const Eigen::Vector3d slip = motion.slip(c.contact);
@@ -229,7 +229,7 @@ std::optional<Contact> SoftContacts::crossing(const Candidate& c,
   if (c.reversed) {
     const auto hit = entry.soft->tree().firstEntry(c.contact.place, c.contact.place - slip);
     if (!hit) return std::nullopt;
-    std::get<3>(key) = kCrossingReversed;
+    std::get<3>(key) = Contact::kCrossingReversed;
     const ObstacleHit at = toWorld(*hit, entry.soft->tree(), Eigen::Isometry3d::Identity());
     const double gap = at.normal.dot(c.contact.place - at.place);
     found = contactAt(key, c.contact.soft_a, c.contact.obstacle, obstacle, c.contact.soft_b,
@@ -239,7 +239,7 @@ std::optional<Contact> SoftContacts::crossing(const Candidate& c,
     const Eigen::Isometry3d to_tree = obstacle.previous_pose.inverse();
     const auto hit = obstacle.tree->firstEntry(to_tree * x, to_tree * Eigen::Vector3d(x + slip));
     if (!hit) return std::nullopt;
-    std::get<3>(key) = kCrossing;
+    std::get<3>(key) = Contact::kCrossing;
     ObstacleHit at = toWorld(*hit, *obstacle.tree, obstacle.previous_pose);
     at.gap = at.normal.dot(x - at.place);
     found = contactAt(key, c.contact.soft_a, c.contact.obstacle, obstacle, c.contact.soft_b,
@@ -323,7 +323,7 @@ void SoftContacts::hold(const SoftEntry& entry, const Obstacle& obstacle, const 
   // What else is inside is forgiven, as far as it is.
   for (int v = 0; first && v < vertices.rows(); ++v) {
     const auto hit = queryObstacle(obstacle, vertices.row(v).transpose(), 0.0, size);
-    if (hit && hit->gap < 0.0) memory_[{entry.id, obstacle.id, v, kNearest}].offset = hit->gap;
+    if (hit && hit->gap < 0.0) memory_[{entry.id, obstacle.id, v, Contact::kNearest}].offset = hit->gap;
   }
   const auto hit =
       queryObstacle(obstacle, entry.soft->position(SurfacePoint::vertex(point.vertex)), reach, size);
@@ -337,7 +337,7 @@ void SoftContacts::hold(const SoftEntry& entry, const Obstacle& obstacle, const 
   m.held_normal = std::max(0.0, -normal);
   m.held_tangential = std::max(
       0.0, (point.force - normal * hit->normal).norm() - friction * (normal + m.held_normal));
-  memory_[{entry.id, obstacle.id, point.vertex, kNearest}] = m;
+  memory_[{entry.id, obstacle.id, point.vertex, Contact::kNearest}] = m;
 }
 
 }  // namespace calipso::fem

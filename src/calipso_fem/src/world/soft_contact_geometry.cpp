@@ -3,6 +3,7 @@
 
 #include "calipso_fem/world/soft_contacts.hpp"
 #include "obstacle_query.hpp"
+#include "self_proximity.hpp"
 #include "step_motion.hpp"
 
 // Gaps are linear in the motion from the start of a step on. Where surfaces turn and bend on their way,
@@ -21,6 +22,10 @@ class SurfacesAtTargets {
     const StepMotion::Body& b = motion_.bodies()[soft];
     if (is_new) at->second.refit(b.start + b.moved);
     return at->second;
+  }
+  std::optional<SurfaceHit> nearestOfItself(const Contact& c, const Eigen::Vector3d& x, double reach) {
+    const double depth = std::max(0.0, -motion_.gap(c));
+    return softs_[c.soft_a].soft->selfProximity()->nearest(of(c.soft_a), std::get<2>(c.key), x, reach, c.reach, depth);
   }
   Eigen::Vector3d position(int soft, const SurfacePoint& point) const {
     Eigen::Vector3d sum = motion_.way(soft, point);
@@ -49,10 +54,10 @@ std::optional<double> gapAtTargets(const Contact& c, const Obstacle& obstacle,
   const Eigen::Vector3d x = !reversed         ? surfaces.position(c.soft_a, c.point)
                             : c.soft_b >= 0 ? surfaces.position(c.soft_b, c.other)
                                             : Eigen::Vector3d(c.place + c.motion);
-  const auto hit = tree.nearest(pose.inverse() * x, reach);
+  const auto hit = c.ofOneBody() ? surfaces.nearestOfItself(c, x, reach) : tree.nearest(pose.inverse() * x, reach);
   if (!hit) return std::nullopt;
   const double same = (reversed ? -1.0 : 1.0) * c.normal.dot(pose.linear() * hit->normal);
-  if (same < kSameSide || (bends && hit->distance < -0.1 * c.reach && !encloses(tree.mesh(), x)))
+  if (same < kSameSide || (bends && !c.ofOneBody() && hit->distance < -0.1 * c.reach && !encloses(tree.mesh(), x)))
     return std::nullopt;
   return hit->distance / same;
 }
@@ -69,9 +74,11 @@ int SoftContacts::straighten(const std::vector<Candidate>& watched,
   int changed = 0;
   for (const Candidate& candidate : watched) {
     const Obstacle& obstacle = obstacles[candidate.contact.obstacle];
-    if (obstacle.plane || obstacle.rigid || !candidate.near) continue;
+    if (obstacle.plane || obstacle.rigid) continue;
     const auto known = contacts.find(candidate.contact.key);
     const bool is_new = known == contacts.end();
+    // What crosses a surface of its own body turns with it on the way.
+    if (!candidate.near && (is_new || !candidate.contact.ofOneBody())) continue;
     const Contact& c = is_new ? candidate.contact : known->second;
     const double clearance = motion.clearance(c);
     if (clearance > c.reach || (!is_new && c.force.isZero(0.0) && clearance > kOff * c.reach))

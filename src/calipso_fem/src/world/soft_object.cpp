@@ -2,8 +2,11 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
+#include <stdexcept>
 
+#include "calipso_fem/world/mass_properties.hpp"
 #include "prestress.hpp"
+#include "self_proximity.hpp"
 #include "soft_system.hpp"
 
 namespace calipso::fem {
@@ -57,6 +60,18 @@ const SurfaceTree& SoftObject::tree() {
   }
   tree_stale_ = false;
   return *tree_;
+}
+
+void SoftObject::setSelfContact(bool on) {
+  if (on == (self_ != nullptr)) return;
+  self_.reset();
+  if (!on) return;
+  TriangleMesh rest = surface_;
+  rest.vertices = asRows(body_.embedding().apply(restPositions(body_.model().mesh())));
+  if (!isClosed(rest) || signedVolume(rest) <= 0.0)
+    throw std::invalid_argument("a surface that is open or faces inwards cannot meet itself; give a closed one "
+                                "whose faces look outwards");
+  self_ = std::make_unique<SelfProximity>(rest, body_.embedding());
 }
 
 Vec SoftObject::nodalField(const Vec& surface) const {

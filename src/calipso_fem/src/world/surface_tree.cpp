@@ -12,7 +12,24 @@ namespace {
 
 constexpr int kLeafSize = 4;
 
-// Barycentric coordinates of the point of triangle abc nearest to p (Ericson 2005, section 5.1.5).
+std::vector<Eigen::Vector3i> neighbours(const TriangleMesh& mesh) {
+  std::map<std::pair<int, int>, int> half_edge;  // directed edge -> triangle
+  for (int f = 0; f < mesh.triangleCount(); ++f)
+    for (int k = 0; k < 3; ++k)
+      half_edge[{mesh.triangles(f, (k + 1) % 3), mesh.triangles(f, (k + 2) % 3)}] = f;
+  std::vector<Eigen::Vector3i> across(mesh.triangleCount(), Eigen::Vector3i::Constant(-1));
+  for (int f = 0; f < mesh.triangleCount(); ++f)
+    for (int k = 0; k < 3; ++k) {
+      const auto twin =
+          half_edge.find({mesh.triangles(f, (k + 2) % 3), mesh.triangles(f, (k + 1) % 3)});
+      if (twin != half_edge.end()) across[f][k] = twin->second;
+    }
+  return across;
+}
+
+}  // namespace
+
+// Ericson 2005, section 5.1.5.
 Eigen::Vector3d closestBarycentric(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                    const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -34,23 +51,6 @@ Eigen::Vector3d closestBarycentric(const Eigen::Vector3d& p, const Eigen::Vector
   const double sum = va + vb + vc;
   return {va / sum, vb / sum, vc / sum};
 }
-
-std::vector<Eigen::Vector3i> neighbours(const TriangleMesh& mesh) {
-  std::map<std::pair<int, int>, int> half_edge;  // directed edge -> triangle
-  for (int f = 0; f < mesh.triangleCount(); ++f)
-    for (int k = 0; k < 3; ++k)
-      half_edge[{mesh.triangles(f, (k + 1) % 3), mesh.triangles(f, (k + 2) % 3)}] = f;
-  std::vector<Eigen::Vector3i> across(mesh.triangleCount(), Eigen::Vector3i::Constant(-1));
-  for (int f = 0; f < mesh.triangleCount(); ++f)
-    for (int k = 0; k < 3; ++k) {
-      const auto twin =
-          half_edge.find({mesh.triangles(f, (k + 2) % 3), mesh.triangles(f, (k + 1) % 3)});
-      if (twin != half_edge.end()) across[f][k] = twin->second;
-    }
-  return across;
-}
-
-}  // namespace
 
 SurfaceTree::SurfaceTree(TriangleMesh mesh)
     : mesh_(std::move(mesh)), order_(mesh_.triangleCount()) {
@@ -146,17 +146,16 @@ void SurfaceTree::improve(int f, const Eigen::Vector3d& point, double& squared,
   hit.point = q;
 }
 
-std::optional<SurfaceHit> SurfaceTree::nearest(const Eigen::Vector3d& point, double reach) const {
-  double squared = reach * reach;
-  SurfaceHit hit;
+// Triangles that may be nearer to the point than `squared`, which the visits lower.
+template <class Visit>
+void SurfaceTree::approach(const Eigen::Vector3d& point, const double& squared, const Visit& visit) const {
   std::vector<int> stack = {0};
   while (!stack.empty()) {
     const Node& node = nodes_[stack.back()];
     stack.pop_back();
     if (node.box.squaredExteriorDistance(point) >= squared) continue;
     if (node.left < 0) {
-      for (int i = node.first; i < node.first + node.count; ++i)
-        improve(order_[i], point, squared, hit);
+      for (int i = node.first; i < node.first + node.count; ++i) visit(order_[i]);
       continue;
     }
     // The nearer child is searched first.
@@ -165,19 +164,50 @@ std::optional<SurfaceHit> SurfaceTree::nearest(const Eigen::Vector3d& point, dou
     stack.push_back(left_first ? node.right : node.left);
     stack.push_back(left_first ? node.left : node.right);
   }
-  if (hit.triangle < 0) return std::nullopt;
+}
+
+// Side and normal of a hit. @return false on a triangle without area
+bool SurfaceTree::orient(const Eigen::Vector3d& point, double reach, SurfaceHit& hit) const {
   const Eigen::Vector3d offset = point - hit.point;
   const Eigen::Vector3d pseudo = pseudoNormal(hit.triangle, hit.barycentric);
   const double sign = offset.dot(pseudo) < 0.0 ? -1.0 : 1.0;
   hit.distance = sign * offset.norm();
   hit.normal =
       std::abs(hit.distance) > 1e-6 * reach ? Eigen::Vector3d(offset / hit.distance) : pseudo;
-  if (hit.normal.squaredNorm() < 0.5) return std::nullopt;  // on a triangle without area
+  return hit.normal.squaredNorm() >= 0.5;
+}
+
+void SurfaceTree::eachAround(const Eigen::Vector3d& point, double reach, const std::function<void(int)>& visit) const {
+  approach(point, reach * reach, visit);
+}
+
+std::optional<SurfaceHit> SurfaceTree::nearest(const Eigen::Vector3d& point, double reach) const {
+  double squared = reach * reach;
+  SurfaceHit hit;
+  approach(point, squared, [&](int f) { improve(f, point, squared, hit); });
+  if (hit.triangle < 0 || !orient(point, reach, hit)) return std::nullopt;
   return hit;
 }
 
-std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from,
-                                                  const Eigen::Vector3d& to) const {
+std::optional<SurfaceHit> SurfaceTree::nearest(const Eigen::Vector3d& point, double reach,
+                                               const SurfaceFilter& filter) const {
+  double squared = reach * reach;
+  std::optional<SurfaceHit> best;
+  approach(point, squared, [&](int f) {
+    if (!filter.regards(f)) return;
+    SurfaceHit hit;
+    double nearer = squared;
+    improve(f, point, nearer, hit);
+    if (hit.triangle < 0 || !orient(point, reach, hit) || !filter.accepts(hit)) return;
+    squared = nearer;
+    best = hit;
+  });
+  return best;
+}
+
+template <class Filter>
+std::optional<SurfaceHit> SurfaceTree::firstEntryOf(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                                    const Filter& accepts) const {
   const Eigen::Vector3d d = to - from;
   Eigen::AlignedBox3d sweep(from.cwiseMin(to), from.cwiseMax(to));
   SurfaceHit hit;
@@ -203,13 +233,22 @@ std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from,
                             c = mesh_.vertex(mesh_.triangles(f, 2));
       const Eigen::Vector3d w = closestBarycentric(q, a, b, c);
       const double size = (b - a).norm() + (c - a).norm();
-      if ((w[0] * a + w[1] * b + w[2] * c - q).norm() > 1e-9 * size) continue;
+      if ((w[0] * a + w[1] * b + w[2] * c - q).norm() > 1e-9 * size || !accepts(f)) continue;
       first = height / fall;
       hit = {f, w, q, n, height - fall};
     }
   }
   if (hit.triangle < 0) return std::nullopt;
   return hit;
+}
+
+std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+  return firstEntryOf(from, to, [](int) { return true; });
+}
+
+std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                                                  const std::function<bool(int)>& accepts) const {
+  return firstEntryOf(from, to, accepts);
 }
 
 }  // namespace calipso::fem

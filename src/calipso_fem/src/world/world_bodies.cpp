@@ -218,6 +218,7 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   if (!motion.linear.isZero() || !motion.angular.isZero())
     body.setRigidVelocity(motion.linear, motion.angular);
   actor.soft->changed();
+  watchItself(actor);
   actor.asleep = false;
   actor.calm_frames = 0;
 }

@@ -68,6 +68,9 @@ struct World::Impl {
   void setPairRule(const std::string& a, const std::string& b, const PairRule& rule);
   PairRule pairRule(const std::string& a, const std::string& b) const;
   bool meet(int a, int b) const;  // ids
+  bool meetsItself(const Actor& actor) const;
+  void watchItself(Actor& actor);  // or not, as meetsItself() says
+  void setSelfRule(Actor& actor, const PairRule& rule);
   std::vector<int> ownSupports(const WorldObject& object) const;  // ids
   void meetOwnSupports(Actor& actor, bool contact);  // nothing is to meet them once it moves or is gone
   // A new object takes part from now on, at its world_from_object; static until an edit touches it.

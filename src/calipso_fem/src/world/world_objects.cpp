@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "calipso_fem/world/mass_properties.hpp"
+#include "fold_test.hpp"
+#include "self_proximity.hpp"
 #include "world_impl.hpp"
 
 // Objects and pairs of objects, changed while the world runs.
@@ -89,21 +92,55 @@ void World::Impl::meetOwnSupports(Actor& actor, bool contact) {
 }
 
 PairRule World::Impl::pairRule(const std::string& a, const std::string& b) const {
-  const auto found = rules.find(std::minmax({idOf(a), idOf(b)}));
-  return found == rules.end() ? PairRule{} : found->second;
+  const int ia = idOf(a), ib = idOf(b);
+  const auto found = rules.find(std::minmax({ia, ib}));
+  if (found != rules.end()) return found->second;
+  PairRule rule;
+  if (ia == ib && ia >= 0) rule.contact = meetsItself(actors[ia]);
+  return rule;
 }
 
 void World::Impl::setPairRule(const std::string& a, const std::string& b, const PairRule& rule) {
   validate(rule, a + " and " + b);
   const int ia = idOf(a), ib = idOf(b);
-  if (ia == ib)
-    throw std::invalid_argument("'" + a + "' with itself is no pair; name two objects or supports");
+  if (ia == ib && ia < 0)
+    throw std::invalid_argument("the support '" + a + "' with itself is no pair, it does not deform; name two objects or supports");
+  if (ia == ib) return setSelfRule(actors[ia], rule);
   rules[std::minmax({ia, ib})] = rule;
   contacts.setRule(ia, ib, rule);
   const auto ra = rigidIdOf(ia), rb = rigidIdOf(ib);
   if (ra && rb) rigid.setRule(*ra, *rb, rule);
   for (const int id : {ia, ib})
     if (id >= 0) wake(actors[id]);
+}
+
+bool World::Impl::meetsItself(const Actor& actor) const {
+  const auto rule = rules.find({actor.id, actor.id});
+  if (rule != rules.end()) return rule->second.contact;
+  const TriangleMesh& mesh = actor.object.mesh;
+  return actor.settings.self_contact.value_or(isThin(mesh) && isClosed(mesh) && signedVolume(mesh) > 0.0);
+}
+
+void World::Impl::setSelfRule(Actor& actor, const PairRule& rule) {
+  if (rule.contact && actor.soft) actor.soft->setSelfContact(true);  // throws where it cannot
+  rules[{actor.id, actor.id}] = rule;
+  contacts.setRule(actor.id, actor.id, rule);
+  watchItself(actor);
+  wake(actor);
+}
+
+void World::Impl::watchItself(Actor& actor) {
+  if (!actor.soft) return;
+  try {
+    actor.soft->setSelfContact(meetsItself(actor));
+  } catch (const std::invalid_argument& error) {
+    actor.note += std::string(error.what()) + "; ";
+    return;
+  }
+  if (SelfProximity* self = actor.soft->selfProximity())
+    if (const int count = crossings(actor.soft->tree(), self->shallow(boundingDiagonal(actor.object.mesh))))
+      actor.note += "starts passing through itself along " + std::to_string(count) +
+                    " edges: there it is one piece and is not held apart; ";
 }
 
 std::vector<std::string> World::Impl::allBut(const std::string& name) const {
@@ -211,6 +248,7 @@ void World::Impl::copySoft(Actor& copy, const Actor& source, const Eigen::Isomet
   body.applyRigidTransform(motion);
   copy.soft->setGravity(copy.acceleration());
   copy.soft->changed();
+  watchItself(copy);
 }
 
 void World::setPairContact(const std::string& a, const std::string& b, bool on) {

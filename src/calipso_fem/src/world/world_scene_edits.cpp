@@ -102,8 +102,8 @@ std::string World::Impl::changeContact(Actor& actor, const Edit& edit) {
   std::string message;
   if (std::isnan(edit.friction) && std::isnan(edit.restitution)) {
     setPairContact(actor.object.name, edit.other, edit.meet);
-    return actor.object.name + (edit.meet ? " meets " : " does not meet ") +
-           (edit.other.empty() ? "anything" : edit.other);
+    const std::string other = edit.other == actor.object.name ? "itself" : edit.other;
+    return actor.object.name + (edit.meet ? " meets " : " does not meet ") + (other.empty() ? "anything" : other);
   }
   if (edit.other.empty()) {
     SurfaceSettings surface = actor.settings.surface;

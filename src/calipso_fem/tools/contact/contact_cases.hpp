@@ -57,6 +57,7 @@ Cases analyticCases();
 Cases momentumCases();
 Cases hardCases();
 Cases speedCases();
+Cases selfCases();    // bodies that meet themselves
 Cases bulletCases();  // the same scenes in Bullet's own deformable contact
 // A folder as in scenes/FORMAT.md whose truth is known.
 std::vector<Result> sceneCase(const std::string& directory);

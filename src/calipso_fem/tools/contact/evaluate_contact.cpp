@@ -68,7 +68,7 @@ void print(const std::string& name, const Result& r) {
 Cases allCases() {
   Cases all;
   for (const Cases& part :
-       {analyticCases(), momentumCases(), hardCases(), speedCases(), bulletCases()})
+       {analyticCases(), momentumCases(), hardCases(), selfCases(), speedCases(), bulletCases()})
     all.insert(part.begin(), part.end());
   return all;
 }

@@ -62,12 +62,15 @@ struct ContactReport {
 // A contact of a step: the gap between a surface point of a deformable object (a) and a point of
 // what it meets (b), linear in their motion, gap = start_gap + slack + normal . (d_a - d_b).
 struct Contact {
+  // Crossings of a surface by itself count the triangles, in steps of four.
+  enum Found { kNearest = 0, kNearestReversed = 1, kCrossing = 2, kCrossingReversed = 3 };
   // (deformable, obstacle, vertex, how it was found): one vertex may touch two sides of a corner.
   using Key = std::tuple<int, int, int, int>;
   Key key;
   int soft_a = -1, soft_b = -1;                  // indices of the step's list
   int obstacle = -1;                             // index
   std::optional<RigidWorld::Id> rigid_a, rigid_b;
+  bool ofOneBody() const { return soft_a >= 0 && soft_a == soft_b; }
   SurfacePoint point, other;                     // on a; on b if it is deformable
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of b at the start, world; force acts here
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // from b to a
@@ -157,6 +160,11 @@ class SoftContacts {
   void watchPair(const std::vector<SoftEntry>& softs, int soft,
                  const std::vector<Obstacle>& obstacles, int obstacle, const RigidWorld& rigid,
                  double h, std::vector<Candidate>& list) const;
+  // The surface of a deformable object against itself (self_contact_detection.cpp).
+  void watchSelf(const std::vector<SoftEntry>& softs, int soft, const std::vector<Obstacle>& obstacles, double h,
+                 std::vector<Candidate>& list) const;
+  std::optional<Contact> crossingItself(const Candidate& c, const std::vector<SoftEntry>& softs,
+                                        const StepMotion& motion) const;
   // Candidates that the trial motion violates become contacts. @return how many were added
   int grow(const std::vector<Candidate>& list, const std::vector<Obstacle>& obstacles,
            const std::vector<SoftEntry>& softs, const StepMotion& motion, Contacts& contacts) const;

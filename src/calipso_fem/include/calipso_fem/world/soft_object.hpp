@@ -27,6 +27,7 @@ struct SettleReport {
   std::string message;  // empty unless something has to be said
 };
 
+class SelfProximity;
 class SoftSystem;
 
 // A deformable object in the simulated world: the FEM body and what the world needs around it:
@@ -79,6 +80,9 @@ class SoftObject {
   double fastest() const { return fastest_; }  // surface vertex, m/s
   const Eigen::Vector3d& gravity() const { return gravity_; }
   const SurfaceTree& tree();
+  // Whether the surface meets itself. @throw std::invalid_argument unless it is closed and faces outwards
+  void setSelfContact(bool on);
+  SelfProximity* selfProximity() { return self_.get(); }  // of one that does
 
   // A field on the surface (3 #V) as the nodes move that carry it: each goes as its surface does on average. Zero at
   // nodes that are fixed or carry none.
@@ -112,6 +116,7 @@ class SoftObject {
   bool tree_stale_ = true;
   TriangleMesh surface_;
   std::unique_ptr<SoftSystem> system_;
+  std::unique_ptr<SelfProximity> self_;
   Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();  // of motion(), renewed by changed()
 };
 

@@ -93,6 +93,7 @@ struct ObjectSettings {
   bool immovable() const { return density && std::isinf(*density); }
   std::optional<ObjectKind> kind;   // once an edit touches the object
   std::optional<double> cell_size;  // m
+  std::optional<bool> self_contact;  // of a deformable one; empty: where it is thin enough to fold
   SurfaceSettings surface;
 };
 
