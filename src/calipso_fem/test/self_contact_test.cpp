@@ -240,7 +240,8 @@ TEST(SelfContact, ASurfaceThatStartsInItselfIsReported) {
   for (int v = 0; v < knot.vertexCount(); ++v) {
     const double t = 1.55 + knot.vertices(v, 0) / 0.13;
     const Eigen::Vector2d across = Eigen::Vector2d(-0.2 * std::cos(2.0 * t), 0.15 * std::cos(t)).normalized();
-    const Eigen::Vector2d at = Eigen::Vector2d(0.15 * std::sin(t), 0.1 * std::sin(2.0 * t)) + knot.vertices(v, 2) * across;
+    const Eigen::Vector2d middle(0.15 * std::sin(t), 0.1 * std::sin(2.0 * t));
+    const Eigen::Vector2d at = middle + knot.vertices(v, 2) * across;
     knot.vertices(v, 0) = at.x();
     knot.vertices(v, 2) = at.y();
   }

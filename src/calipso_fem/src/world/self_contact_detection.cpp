@@ -95,6 +95,7 @@ void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft, cons
   if (index < 0) return;
   SelfProximity& self = *entry.soft->selfProximity();
   const SurfaceTree& tree = entry.soft->tree();
+  if (self.isUnfolded(tree)) return;
   const double reach = reachOf(entry, obstacles[index]), friction = frictionOf(entry, obstacles[index]);
   // What meets something else may be stopped by it while the rest goes on.
   const bool free = std::none_of(list.begin(), list.end(), [&](const Candidate& c) {
@@ -103,7 +104,7 @@ void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft, cons
   const Eigen::VectorXd speeds = speedsOf(*entry.soft, free);
   const double most = speeds.maxCoeff();
   const Eigen::Isometry3d motion = entry.soft->motion();
-  if (self.isApart(tree, motion, 2.0 * h * most)) return;
+  if (self.staysFar(tree, motion, 2.0 * h * most)) return;
 
   const auto watch = [&](const SurfaceHit& hit, int vertex, int found) {
     Contact contact = contactOf(hit, tree, id, soft, index, vertex);

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "obstacle_query.hpp"
+
 namespace calipso::fem {
 namespace {
 
 constexpr int kNone = -1;
+constexpr double kOutwards = 1e-3;  // thicknesses: off the vertex's own surface
 
 std::vector<std::array<int, 8>> carriers(const Embedding& embedding) {
   std::vector<std::array<int, 8>> all(embedding.vertexCount());
@@ -66,8 +69,8 @@ int countCrossings(const SurfaceTree& surface, double depth, const OnePiece& are
 
 }  // namespace
 
-// NOTE: a face that looks away from a vertex beside it has to turn before it can meet it, and moves its corners by about
-// half an edge: a surface that has moved by less than `spare` since has not.
+// NOTE: a face that looks away from a vertex beside it has to turn before it can meet it, and moves its corners by
+// about half an edge: a surface that has moved by less than `spare` since has not.
 SelfProximity::SelfProximity(const TriangleMesh& rest, const Embedding& embedding)
     : rest_(rest),
       nodes_(carriers(embedding)),
@@ -101,16 +104,23 @@ double SelfProximity::shallow(double apart) const {
 
 std::optional<SurfaceHit> SelfProximity::nearest(const SurfaceTree& surface, int vertex, const Eigen::Vector3d& at,
                                                  double reach, double apart, double depth) const {
-  constexpr double kBlunt = 0.02;
-  const double deepest = shallow(apart) + depth;
+  constexpr double kBlunt = 0.02;  // minimal distances
+  const double known = shallow(apart) + depth, deepest = std::max(known, 0.5 * thickness_);
   const Eigen::Vector3d& looks = surface.vertexNormal(vertex);
+  // What got in deeper than that unnoticed, at a rim, is found again as long as it is in the nearer half.
+  std::optional<bool> inside;
+  const auto isInside = [&] {
+    if (!inside) inside = encloses(surface.mesh(), at + kOutwards * thickness_ * looks.normalized());
+    return *inside;
+  };
   SurfaceFilter filter;
   filter.regards = [&](int f) {
     const Eigen::Vector3d& n = surface.faceNormal(f);
     return n.dot(looks) < 0.0 && n.dot(at - surface.mesh().vertex(surface.mesh().triangles(f, 0))) >= -deepest;
   };
   filter.accepts = [&](const SurfaceHit& hit) {
-    return hit.distance >= -deepest && !onePiece(vertex, hit.triangle, apart);
+    if (hit.distance < -deepest || onePiece(vertex, hit.triangle, apart)) return false;
+    return hit.distance >= -known || isInside();
   };
   std::optional<SurfaceHit> hit = surface.nearest(at, std::max(reach, deepest), filter);
   if (hit && std::abs(hit->distance) < kBlunt * apart) hit->normal = normalOfTouch(surface, vertex, *hit);
@@ -143,8 +153,9 @@ int crossings(const SurfaceTree& surface, double depth) {
   });
 }
 
-bool SelfProximity::isApart(const SurfaceTree& surface, const Eigen::Isometry3d& motion, double travel) {
-  if (fold_.isUnfolded(surface)) return true;
+bool SelfProximity::isUnfolded(const SurfaceTree& surface) { return fold_.isUnfolded(surface); }
+
+bool SelfProximity::staysFar(const SurfaceTree& surface, const Eigen::Isometry3d& motion, double travel) const {
   if (!far_ || !(travel < spare_)) return false;
   const Eigen::Isometry3d since = motion * far_->motion.inverse();
   const Vertices carried = (far_->vertices * since.linear().transpose()).rowwise() + since.translation().transpose();

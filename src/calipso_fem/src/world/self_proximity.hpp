@@ -32,9 +32,11 @@ class SelfProximity {
   // What depths count up to, m.
   double shallow(double apart) const;
 
-  // Whether nothing can meet itself in a step in which no two points approach by more than `travel` (m): a sheet
-  // is not folded, or the surface has hardly changed its shape since it was last found to be far from itself.
-  bool isApart(const SurfaceTree& surface, const Eigen::Isometry3d& motion, double travel);
+  // Nothing can meet itself: a sheet that is not folded,
+  bool isUnfolded(const SurfaceTree& surface);
+  // or a surface that has hardly changed its shape since it was last found to be far from itself, in a step in which no
+  // two of its points approach by more than `travel` (m).
+  bool staysFar(const SurfaceTree& surface, const Eigen::Isometry3d& motion, double travel) const;
   // The surface, searched as far as `spare()` beyond what matters, was found to be far from itself or not.
   void searched(const SurfaceTree& surface, const Eigen::Isometry3d& motion, bool far);
   double spare() const { return spare_; }

@@ -48,6 +48,7 @@ Overlap overlapOf(const TriangleMesh& mesh, const SelfProximity& self) {
 struct Course {
   Overlap worst, last;
   double growth = 0.0, lowest = 0.0, scale = 1.0;
+  double driven = 0.0;  // s, until when something from outside does work
   bool finite = true;
 
   void play(SoftScene& scene, double seconds) {
@@ -60,8 +61,9 @@ struct Course {
       scene.step(kStep);
       const double e = scene.energy();
       finite = std::isfinite(e);
-      growth = std::max(growth, (e - lowest) / scale);
-      lowest = std::min(lowest, e);
+      const bool left_alone = scene.time() > driven + 1.5 * kStep;
+      if (left_alone) growth = std::max(growth, (e - lowest) / scale);
+      lowest = left_alone ? std::min(lowest, e) : e;
       if (k % kEvery == 0) look(surface, soft.vertices(), self);
     }
   }
@@ -87,11 +89,12 @@ std::vector<Result> resultsOf(const std::string& what, const Course& c, SoftScen
 }
 
 template <class Build>
-std::vector<Result> offAndOn(const std::string& what, double seconds, const Build& build) {
+std::vector<Result> offAndOn(const std::string& what, double seconds, const Build& build, double driven = 0.0) {
   std::vector<Result> results;
   for (const bool on : {false, true}) {
     SoftScene scene;
     Course course;
+    course.driven = driven;
     SoftObject& soft = build(scene);
     soft.setSelfContact(on);
     course.scale = soft.body().totalMass() * kG * 0.1;
@@ -107,8 +110,8 @@ const Material kCloth{3e4, 0.3, 300.0, 0.02};
 std::vector<Result> clothOverBar() {
   return offAndOn("cloth over a bar", 4.0, [](SoftScene& scene) -> SoftObject& {
     scene.surface.friction = 0.5;
-    SoftObject& cloth = scene.addSoft(movedMesh(boxSurface({0.6, 0.3, 0.004}, Eigen::Vector3i(30, 15, 1)), {0.01, 0, 0.004}),
-                                      {5e3, 0.3, 300.0, 0.02}, 0.02);
+    const TriangleMesh sheet = boxSurface({0.6, 0.3, 0.004}, Eigen::Vector3i(30, 15, 1));
+    SoftObject& cloth = scene.addSoft(movedMesh(sheet, {0.01, 0, 0.004}), {5e3, 0.3, 300.0, 0.02}, 0.02);
     scene.addMoving(movedMesh(boxSurface({0.006, 0.5, 0.02}, Eigen::Vector3i(1, 25, 1)), {0, 0, -0.01}),
                     [](double) { return Eigen::Isometry3d::Identity(); });
     return cloth;
@@ -119,7 +122,8 @@ std::vector<Result> ribbonOnTable() {
   return offAndOn("ribbon set down on end", 3.0, [](SoftScene& scene) -> SoftObject& {
     scene.surface.friction = 0.4;
     scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
-    const TriangleMesh ribbon = turned(boxSurface({0.6, 0.2, 0.004}, Eigen::Vector3i(30, 10, 1)), -1.55, Eigen::Vector3d::UnitY());
+    const TriangleMesh ribbon =
+        turned(boxSurface({0.6, 0.2, 0.004}, Eigen::Vector3i(30, 10, 1)), -1.55, Eigen::Vector3d::UnitY());
     return scene.addSoft(movedMesh(ribbon, {0, 0, 0.31}), kCloth, 0.02);
   });
 }
@@ -128,17 +132,18 @@ std::vector<Result> horseshoeSqueezed() {
   return offAndOn("horseshoe squeezed between plates", 3.0, [](SoftScene& scene) -> SoftObject& {
     scene.gravity.setZero();
     scene.surface.friction = 0.3;
-    SoftObject& soft = scene.addSoft(horseshoe(0.15, 0.05, 0.03, 0.06, Eigen::Vector3i(32, 4, 2)), {1e5, 0.3, 1000.0, 0.02}, 0.015);
+    SoftObject& soft = scene.addSoft(horseshoe(0.15, 0.05, 0.03, 0.06, Eigen::Vector3i(32, 4, 2)),
+                                     {1e5, 0.3, 1000.0, 0.02}, 0.015);
     for (const double side : {1.0, -1.0})
-      scene.addMoving(movedMesh(boxSurface({0.02, 0.3, 0.12}, Eigen::Vector3i(1, 12, 6)), {0, 0, -0.12}), [side](double t) {
+      scene.addMoving(movedMesh(boxSurface({0.02, 0.3, 0.12}, {1, 12, 6}), {0, 0, -0.12}), [side](double t) {
         const double close = std::min(1.0, t / 1.5);
         return Eigen::Isometry3d(Eigen::Translation3d(side * (0.0755 - 0.05 * close), 0, 0));
       });
     return soft;
-  });
+  }, 1.5);
 }
 
-// A flag at its pole: wind from one side, then from the other, which folds it over the pole.
+// A flag whose middle line is held: wind folds its halves onto each other behind it.
 std::vector<Result> flagInWind() {
   std::vector<Result> results;
   const double seconds = 3.0;
@@ -147,7 +152,7 @@ std::vector<Result> flagInWind() {
   flag.triangles.col(1).swap(flag.triangles.col(2));
   for (const bool on : {false, true}) {
     WorldScene scene = test::sceneWith(flag, {0, 0, 1}, false);
-    scene.objects[0].attachments.push_back({"pole", {-0.31, -0.1, 0.7}, {-0.29, 0.1, 1.3}});
+    scene.objects[0].attachments.push_back({"pole", {-0.011, -0.1, 0.7}, {0.011, 0.1, 1.3}});
     WorldParams params;
     params.proximity = kProximity;
     params.defaults.youngs_modulus = 5e4;
@@ -155,11 +160,9 @@ std::vector<Result> flagInWind() {
     params.defaults.cell_size = 0.02;
     params.defaults.self_contact = on;
     World world(scene, params);
-    for (const auto& [time, x] : {std::pair(0.0, 6.0), std::pair(1.0, -9.0)}) {
-      Edit wind = test::editOf(EditKind::kWind, EditMode::kAbsolute, time);
-      wind.vector = {x, 1.0, 0.0};
-      world.submit(wind);
-    }
+    Edit wind = test::editOf(EditKind::kWind);
+    wind.vector = {0.3, 9.0, 0.0};
+    world.submit(wind);
     FemOptions options;
     options.cell_size = 0.02;
     const SelfProximity self(flag, DeformableBody(flag, kCloth, options).embedding());
@@ -169,7 +172,7 @@ std::vector<Result> flagInWind() {
     run.play(world, seconds, [&](const WorldState& state) {
       if (run.frames % 4 == 0) course.look(flag, state.objects[0].vertices, self);
     });
-    const std::string with = std::string("a flag folded over its pole by wind, self-contact ") + (on ? "on" : "off");
+    const std::string with = std::string("flag folded by wind, self-contact ") + (on ? "on" : "off");
     for (const auto& [what, value] : course.figures())
       results.push_back({what + with, value, 0.0, course.worst.depth / kProximity, NAN, run.msPerFrame()});
   }
