@@ -58,9 +58,7 @@ void FrameCompositor::findKinds(int v, Row& row) const {
   }
   if (!remirrored_.empty()) {
     const std::uint8_t* remirrored = remirrored_.ptr<std::uint8_t>(v) + region_.x;
-    for (int i = 0; i < width; ++i) {
-      if ((remirrored[i] != 0 && kinds[i] == kBehind) || (remirrored[i] == kChanged && kinds[i] == kNone && labels[i] == 0)) kinds[i] = kSpecial;
-    }
+    for (int i = 0; i < width; ++i) kinds[i] = remirrored[i] == kChanged && kinds[i] == kNone && labels[i] == 0 ? kBehind : kinds[i];
   }
   if (!any_shaded_) return;
   for (int i = 0; i < width; ++i) {
@@ -193,7 +191,13 @@ void FrameCompositor::composeBehind(int v, int first, int last, Row& row) const 
   const float* decoded = decodeTable();
   const cv::v_float32x4 one = cv::v_setall_f32(1.0f), brightest = cv::v_setall_f32(kBrightest), umbra = wide(prepared_.umbra) * cv::v_setall_f32(kPerLevel), lit = cv::v_setall_f32(kPerLevel) - umbra;
   const auto ratioOf = [&](std::uint8_t sun_level, std::uint8_t sky_level) { return umbra * cv::v_setall_f32(sky_level) + lit * cv::v_setall_f32(sun_level); };
+  const std::uint8_t* mirrored = remirrored_.empty() ? nullptr : remirrored_.ptr<std::uint8_t>(v) + region_.x;
   for (int i = first; i < last; ++i) {
+    if (mirrored != nullptr && mirrored[i] != 0) {
+      const Behind behind = groundAt(i + region_.x, v, removed[i] != 0);
+      row.colour[i] = {behind.colour[0], behind.colour[1], behind.colour[2], behind.fresh}, row.source[i] = behind.source;
+      continue;
+    }
     const float from_plate = removed[i] != 0 ? 1.0f : relit[i] * kPerLevel;
     const cv::v_float32x4 now = takes[i] == 0 ? one : ratioOf(sun[i], sky[i]);
     cv::v_float32x4 colour = cv::v_setzero_f32();

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
+#include <vector>
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
+#include "plane_view.hpp"
 
 namespace calipso::render {
 namespace {
@@ -27,6 +29,7 @@ constexpr int kMisplaced = 2;          // px by which the image may be displaced
 constexpr float kSlopes[] = {0.0f, 0.01f, 0.02f, 0.04f, 0.08f, 0.16f};  // that are tried
 constexpr int kBlurs = 7;              // levels of blur, each twice the one before,
 constexpr float kLeastBlur = 0.5f;     // px, from this one on
+constexpr int kSpreadStep = 4;         // px between the places where the spread is found
 constexpr double kUsual = 1e-3;        // weight of the usual strength, to that of what is seen
 constexpr double kRidge = 1e-6;
 
@@ -46,8 +49,8 @@ float schlick(float cosine) {
   return kAtNormal + (1.0f - kAtNormal) * squared * squared * rest;
 }
 
-void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance, const std::vector<SupportPlane>& planes, const SupportPlane& plane, const Camera& camera,
-              const cv::Mat& off, MirrorImage& image, cv::Mat& near) {
+void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance, const PlaneView& view, const SupportPlane& plane,
+              const Camera& camera, const cv::Mat& off, MirrorImage& image, cv::Mat& near) {
   std::vector<ScreenMesh> meshes;
   cv::Rect box;
   for (const Actor* a : actors) {
@@ -65,11 +68,13 @@ void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance,
     for (int u = box.x; u < box.br().x; ++u) {
       const std::uint32_t id = buffer.idAt(u, v);
       if (id == VisibilityBuffer::kNothing || (!off.empty() && off.at<std::uint8_t>(v, u) != 0)) continue;
-      const auto receiver = receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
-      if (!receiver || receiver->normal.dot(n) < 0.999f || std::abs(n.dot(receiver->position) - static_cast<float>(plane.offset)) > 1e-3f * (eye - receiver->position).norm()) continue;
+      Receiver receiver;
+      if (!view.at(static_cast<float>(u), static_cast<float>(v), receiver) || receiver.normal.dot(n) < 0.999f) continue;
+      const float above = n.dot(receiver.position) - static_cast<float>(plane.offset);
+      if (std::abs(above) > 1e-3f * (eye - receiver.position).norm()) continue;  // another plane
       const int slot = VisibilityBuffer::objectOf(id), triangle = VisibilityBuffer::triangleOf(id);
       const Eigen::Vector3f weights = barycentric(meshes[slot], triangle, static_cast<float>(u), static_cast<float>(v));
-      const float part = schlick(n.dot((eye - receiver->position).normalized()));
+      const float part = schlick(n.dot((eye - receiver.position).normalized()));
       image.cover.at<float>(v, u) = part;
       near.at<float>(v, u) = buffer.nearnessAt(u, v);
       image.colour.at<cv::Vec3f>(v, u) = part * radiance(slot, surfacePoint(*actors[slot], triangle, weights, mirrored_eye));
@@ -77,77 +82,133 @@ void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance,
   }
 }
 
-// A facet that is tilted by s turns the mirrored ray by 2 s: behind it, over the way D2 to the object, by 2 s D2 px f / (D1 + D2); along a
-// row it is less by the cosine of incidence. The objects' distance is taken on smoothly beyond them.
-void findSpread(const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& near, MirrorImage& image) {
-  cv::Mat weight, known = near > 0.0f, filled;
-  known.convertTo(weight, CV_32F, 1.0 / 255.0);
-  cv::merge(std::vector<cv::Mat>(3, near), filled);
-  filled = pushPull(filled, weight);
-  image.spread = cv::Mat::zeros(near.size(), CV_32F);
+// Means of what is known in squares of kSpreadStep px, for pushPull(), and how far they are known.
+void bringDown(const cv::Mat& near, cv::Mat& mean, cv::Mat& weight) {
+  const cv::Size size((near.cols + kSpreadStep - 1) / kSpreadStep, (near.rows + kSpreadStep - 1) / kSpreadStep);
+  mean = cv::Mat::zeros(size, CV_32FC3), weight = cv::Mat::zeros(size, CV_32F);
+#pragma omp parallel for schedule(static)
+  for (int j = 0; j < size.height; ++j) {
+    for (int i = 0; i < size.width; ++i) {
+      float sum = 0.0f;
+      int count = 0;
+      for (int v = j * kSpreadStep; v < std::min(near.rows, (j + 1) * kSpreadStep); ++v) {
+        for (int u = i * kSpreadStep; u < std::min(near.cols, (i + 1) * kSpreadStep); ++u) {
+          sum += near.at<float>(v, u), count += near.at<float>(v, u) > 0.0f;
+        }
+      }
+      if (count > 0) mean.at<cv::Vec3f>(j, i) = cv::Vec3f::all(sum / static_cast<float>(count)), weight.at<float>(j, i) = 1.0f;
+    }
+  }
+}
+
+// A facet that is tilted by s turns the mirrored ray by 2 s: behind it, over the way D2 to the object, by
+// 2 s D2 px f / (D1 + D2); along a row it is less by the cosine of incidence. The objects' distance is taken on smoothly
+// beyond them. All of it changes slowly over the picture.
+void findSpread(const PlaneView& view, const Camera& camera, const cv::Mat& near, MirrorImage& image) {
+  cv::Mat mean, weight;
+  bringDown(near, mean, weight);
+  const cv::Mat filled = pushPull(mean, weight);
+  cv::Mat spread = cv::Mat::zeros(weight.size(), CV_32F), whole;
   const Eigen::Isometry3f from_world = camera.world_from_camera.inverse().cast<float>();
   const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
   double cosines = 0.0;
   int count = 0;
-  for (int v = 0; v < near.rows; ++v) {
-    for (int u = 0; u < near.cols; ++u) {
-      const auto receiver = receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
-      if (!receiver) continue;
-      const float depth = (from_world * receiver->position).z(), behind = 1.0f - depth * filled.at<cv::Vec3f>(v, u)[0];
-      image.spread.at<float>(v, u) = 2.0f * static_cast<float>(camera.fy) * std::max(0.0f, behind);
-      if (known.at<std::uint8_t>(v, u) != 0) cosines += receiver->normal.dot((eye - receiver->position).normalized()), ++count;
+  for (int j = 0; j < spread.rows; ++j) {
+    for (int i = 0; i < spread.cols; ++i) {
+      constexpr float kMiddle = 0.5f * (kSpreadStep - 1);
+      Receiver receiver;
+      if (!view.at(static_cast<float>(i * kSpreadStep) + kMiddle, static_cast<float>(j * kSpreadStep) + kMiddle, receiver)) continue;
+      const float depth = (from_world * receiver.position).z(), behind = 1.0f - depth * filled.at<cv::Vec3f>(j, i)[0];
+      spread.at<float>(j, i) = 2.0f * static_cast<float>(camera.fy) * std::max(0.0f, behind);
+      if (weight.at<float>(j, i) > 0.0f) cosines += receiver.normal.dot((eye - receiver.position).normalized()), ++count;
     }
   }
+  cv::resize(spread, whole, spread.size() * kSpreadStep, 0, 0, cv::INTER_LINEAR);
+  image.spread = whole(cv::Rect({0, 0}, near.size())).clone();
   if (count > 0) image.across = static_cast<float>(cosines / count);
 }
+
+// A level of blur: wide ones of a smaller picture, whose pixels are half as wide as the blur at most.
+struct Blurred {
+  cv::Mat picture;    // CV_32FC4
+  float columns, rows;  // of it, per pixel
+  int first;          // row that it begins with, where it is as large
+
+  cv::v_float32x4 at(int u, int v) const {
+    if (columns == 1.0f && rows == 1.0f) return cv::v_load(picture.at<cv::Vec4f>(v - first, u).val);
+    const float x = std::clamp((static_cast<float>(u) + 0.5f) * columns - 0.5f, 0.0f, static_cast<float>(picture.cols - 1));
+    const float y = std::clamp((static_cast<float>(v) + 0.5f) * rows - 0.5f, 0.0f, static_cast<float>(picture.rows - 1));
+    const int i = static_cast<int>(x), j = static_cast<int>(y), right = std::min(i + 1, picture.cols - 1);
+    const cv::Vec4f *above = picture.ptr<cv::Vec4f>(j), *below = picture.ptr<cv::Vec4f>(std::min(j + 1, picture.rows - 1));
+    const auto mix = [](const cv::v_float32x4& a, const cv::v_float32x4& b, float part) { return a + cv::v_setall_f32(part) * (b - a); };
+    const auto along = [&](const cv::Vec4f* row) { return mix(cv::v_load(row[i].val), cv::v_load(row[right].val), x - static_cast<float>(i)); };
+    return mix(along(above), along(below), y - static_cast<float>(j));
+  }
+};
 
 // Values drawn out by `slope`: between levels of blur.
 class DrawnOut {
  public:
-  DrawnOut(const cv::Mat& spread, float across, float slope) : across_(across) {
-    level_ = cv::Mat::zeros(spread.size(), CV_32F);
+  DrawnOut(const cv::Mat& spread, float across, float slope) : across_(across), level_(spread.size(), CV_32F), lowest_(spread.rows), highest_(spread.rows) {
 #pragma omp parallel for schedule(static)
     for (int v = 0; v < spread.rows; ++v) {
+      float* levels = level_.ptr<float>(v);
       for (int u = 0; u < spread.cols; ++u) {
         const float px = slope * spread.at<float>(v, u);
-        level_.at<float>(v, u) = std::clamp(std::log2(std::max(px, kLeastBlur) / kLeastBlur), 0.0f, kBlurs - 1.001f);
+        levels[u] = std::clamp(std::log2(std::max(px, kLeastBlur) / kLeastBlur), 0.0f, kBlurs - 1.001f);
       }
+      const auto [low, high] = std::minmax_element(levels, levels + spread.cols);
+      lowest_[v] = static_cast<int>(*low), highest_[v] = static_cast<int>(*high);
     }
-    cv::minMaxLoc(level_, nullptr, &highest_);
   }
 
   // @param values CV_32FC4: colour and cover
   cv::Mat operator()(const cv::Mat& values) const {
-    cv::Mat out(values.size(), CV_32FC4), lower, upper = blurred(values, 0);
-    for (int k = 0; k <= static_cast<int>(highest_); ++k) {
-      lower = upper, upper = blurred(values, k + 1);
+    std::vector<Blurred> levels;
+    for (int k = 0; k <= *std::max_element(highest_.begin(), highest_.end()) + 1; ++k) levels.push_back(blurred(values, k));
+    cv::Mat out(values.size(), CV_32FC4);
 #pragma omp parallel for schedule(static)
-      for (int v = 0; v < out.rows; ++v) {
-        for (int u = 0; u < out.cols; ++u) {
-          const float part = level_.at<float>(v, u) - static_cast<float>(k);
-          if (part >= 0.0f && part < 1.0f) out.at<cv::Vec4f>(v, u) = (1.0f - part) * lower.at<cv::Vec4f>(v, u) + part * upper.at<cv::Vec4f>(v, u);
-        }
+    for (int v = 0; v < out.rows; ++v) {
+      for (int u = 0; u < out.cols; ++u) {
+        const float level = level_.at<float>(v, u);
+        const int k = static_cast<int>(level);
+        const cv::v_float32x4 lower = levels[k].at(u, v), part = cv::v_setall_f32(level - static_cast<float>(k));
+        cv::v_store(out.at<cv::Vec4f>(v, u).val, lower + part * (levels[k + 1].at(u, v) - lower));
       }
     }
     return out;
   }
 
  private:
-  // Wide blurs of a smaller picture, whose pixels are half as wide as the blur at most.
-  cv::Mat blurred(const cv::Mat& values, int level) const {
+  Blurred blurred(const cv::Mat& values, int level) const {
     const float along = kLeastBlur * static_cast<float>(1 << level), beside = std::max(kLeastBlur, across_ * along);
     const int rows = std::max(1, static_cast<int>(along / 2.0f)), columns = std::max(1, static_cast<int>(beside / 2.0f));
-    cv::Mat small = values, out;
-    const bool smaller = rows > 1 || columns > 1;
-    if (smaller) cv::resize(values, small, {(values.cols + columns - 1) / columns, (values.rows + rows - 1) / rows}, 0, 0, cv::INTER_AREA);
-    cv::GaussianBlur(small, out, {}, beside / columns, along / rows, cv::BORDER_REPLICATE);
-    if (smaller) cv::resize(out, out, values.size(), 0, 0, cv::INTER_LINEAR);
+    Blurred out{{}, 1.0f, 1.0f, 0};
+    cv::Mat from = values;
+    if (rows > 1 || columns > 1) {
+      cv::resize(values, from, {(values.cols + columns - 1) / columns, (values.rows + rows - 1) / rows}, 0, 0, cv::INTER_AREA);
+      out.columns = static_cast<float>(from.cols) / values.cols, out.rows = static_cast<float>(from.rows) / values.rows;
+    } else {
+      const cv::Range used = rowsAt(level);
+      if (used.empty()) return out;
+      from = values.rowRange(used), out.first = used.start;
+    }
+    cv::GaussianBlur(from, out.picture, {}, beside / columns, along / rows, cv::BORDER_REPLICATE);
     return out;
   }
 
+  // The rows that need a level of blur, and those between them.
+  cv::Range rowsAt(int level) const {
+    int first = 0, last = static_cast<int>(lowest_.size());
+    const auto needs = [&](int v) { return lowest_[v] <= level && highest_[v] >= level - 1; };
+    while (first < last && !needs(first)) ++first;
+    while (last > first && !needs(last - 1)) --last;
+    return {first, last};
+  }
+
   float across_;
-  double highest_ = 0.0;
-  cv::Mat level_;
+  cv::Mat level_;                      // CV_32F
+  std::vector<int> lowest_, highest_;  // per row, whole levels
 };
 
 cv::Mat withCover(const MirrorImage& image) {
@@ -279,11 +340,12 @@ cv::Vec3f mirroredRadiance(const Appearance& appearance, const Light& light, con
 
 MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance& radiance, const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& off) {
   MirrorImage image;
+  const PlaneView view(planes, camera);
   cv::Mat near = cv::Mat::zeros(camera.height, camera.width, CV_32F);
   for (const SupportPlane& plane : planes) {
-    if (plane.normal.dot(camera.world_from_camera.translation()) > plane.offset) addPlane(actors, radiance, planes, plane, camera, off, image, near);
+    if (plane.normal.dot(camera.world_from_camera.translation()) > plane.offset) addPlane(actors, radiance, view, plane, camera, off, image, near);
   }
-  if (!image.empty()) findSpread(planes, camera, near, image);
+  if (!image.empty()) findSpread(view, camera, near, image);
   return image;
 }
 
@@ -315,10 +377,17 @@ cv::Mat unmirrored(const PlaneMirror& mirror, const cv::Mat& picture) {
 }
 
 cv::Mat unmirroredCodes(const PlaneMirror& mirror, const cv::Mat& bgr) {
-  cv::Mat real, codes;
-  bgr.convertTo(real, CV_32F);
-  unmirrored(mirror, real).convertTo(codes, CV_8U);
-  return codes;
+  cv::Mat out = bgr.clone();
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < out.rows; ++v) {
+    for (int u = 0; u < out.cols; ++u) {
+      const cv::Vec3f& added = mirror.at_key.at<cv::Vec3f>(v, u);
+      if (added == cv::Vec3f()) continue;
+      cv::Vec3b& c = out.at<cv::Vec3b>(v, u);
+      for (int k = 0; k < 3; ++k) c[k] = quantise(codeFromLinear(linearFromCode(c[k]) - added[k]));
+    }
+  }
+  return out;
 }
 
 PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known) {
