@@ -87,8 +87,9 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
         {points_.row(visible[i]).transpose(), found[i]->position, found[i]->covariance});
   }
   if (care == Care::kRough) return matches;
-  const auto outline = matchOutline(edges_, model_.mesh, surface, look, frame, model_.world_from_object);
-  matches.insert(matches.end(), outline.begin(), outline.end());
+  for (const OutlineStep& step : findOutline(edges_, model_.mesh, surface, look, frame, model_.world_from_object)) {
+    matches.push_back(step.match());
+  }
   return matches;
 }
 

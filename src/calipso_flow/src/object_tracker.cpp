@@ -30,6 +30,8 @@ constexpr double kDrownedShare = 0.35;   // of the seeds in the picture: with fe
 constexpr double kTurnedShare = 0.35;    // of the tracks due: with fewer the object may have turned
 constexpr size_t kTurnsTried = 6;
 constexpr double kFarView = 0.5;         // rad, or relative distance: seen from farther a look is drawn out
+constexpr double kShapeError = 0.01;     // of the object's extent, of its outline seen from another side
+constexpr double kIndependent = 1.5;     // errors along an outline: they are off nearly as one
 constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
 
 // Follows the reference's seeds into the frame, the object's look being warped to `look` and the object expected at `start`.
@@ -113,7 +115,7 @@ int Observation::inliers() const {
 
 ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, const cv::Mat& mask,
                              const TrackerParams& params)
-    : model_(model), params_(params), centroid_(flow::centroid(model.mesh)) {
+    : model_(model), edges_(edgesOf(model.mesh)), params_(params), centroid_(flow::centroid(model.mesh)) {
   // What a larger picture shows larger is not seen sharper by as much.
   const int scaled = static_cast<int>(std::lround(kPatchShare * key_frame.camera.width));
   params_.patch.radius_px = std::max(params_.patch.radius_px, std::min(scaled, kLargestRadius));
@@ -130,6 +132,9 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
     key_.tracks.push_back(
         {seed, key_frame.camera.projectWorld(model.world_from_object * seed), 1.0, 0.0, true});
   }
+  outline_bias_ = OutlineBias(
+      findOutline(edges_, model.mesh, model.mesh.vertices,
+                  references_.front().view.warp(key_frame.camera, model.world_from_object), key_frame, model.world_from_object));
   last_ = key_;
   last_seen_time_ = key_.time;
   due_inliers_ = static_cast<int>(key_.tracks.size());
@@ -220,17 +225,36 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   std::vector<Correspondence> found;
   observation.tracks = followSeeds(LookMatch(seen.warped, frame.gray, care), reference, frame.camera,
                                    seen.pose, pose, params, found);
+  const size_t tracks = found.size();
+  if (care != Care::kRough) addOutline(frame, seen, found);
   const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params.pose);
   // Few agreeing matches where many are due are the background, not the object.
   const int due = seedsInPicture(reference, frame.camera, fit.world_from_object);
-  observation.found = fit.converged && fit.inliers >= kLeastInlierShare * found.size() &&
+  observation.found = fit.converged && fit.inliers >= kLeastInlierShare * tracks &&
                       fit.inliers >= kLeastVisibleShare * due;
   if (!observation.found) return pose;
-  for (size_t i = 0; i < found.size(); ++i) observation.tracks[i].inlier = fit.inlier[i];
+  for (size_t i = 0; i < tracks; ++i) observation.tracks[i].inlier = fit.inlier[i];
   observation.covariance = fit.covariance;
   observation.common = fit.common;
   observation.deviation = fit.deviation;
   return fit.world_from_object;
+}
+
+void ObjectTracker::addOutline(const Frame& frame, const Look& seen, std::vector<Correspondence>& found) const {
+  const Eigen::Isometry3d camera_from_object = frame.camera.world_from_camera.inverse() * seen.pose;
+  const double extent_px = frame.camera.fx * boundingDiagonal(model_.mesh) / (camera_from_object * centroid_).z();
+  // The shape was fitted to the key frame's outline; from other sides it is less certain.
+  const double turned = viewChange(references_.front().view, frame, seen.pose, centroid_);
+  const double shape_px = kShapeError * extent_px * std::min(1.0, turned);
+  const std::vector<OutlineStep> steps =
+      findOutline(edges_, model_.mesh, model_.mesh.vertices, seen.warped, frame, seen.pose);
+  // Their errors are the shape's and its surroundings', which neighbours share.
+  const double shared = std::max(1.0, steps.size() / kIndependent);
+  for (const OutlineStep& step : steps) {
+    const SurfaceMatch match = step.match(outline_bias_.towards(step.outward));
+    const Eigen::Matrix2d shape = shape_px * shape_px * Eigen::Matrix2d::Identity();
+    found.push_back({match.point, match.pixel, shared * (match.covariance + shape), true});
+  }
 }
 
 ObjectTracker::Reference& ObjectTracker::nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) {

@@ -1,5 +1,6 @@
 #include "calipso_flow/outline_match.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,6 +16,8 @@ constexpr int kHalfLength = 3;         // px along the outline that are averaged
 constexpr double kSpacing = 8.0;       // px between points of the outline
 constexpr double kLeastContrast = 12.0;  // grey levels between the two sides
 constexpr double kAlongPx = 1e3;      // deviation along the outline: nothing is known
+constexpr int kBiasRounds = 5;
+constexpr double kUsualBias = 0.3;     // px
 constexpr double kInside = 3.0;        // px within the outline that the object's look is taken from
 
 struct OutlinePoint {
@@ -165,27 +168,44 @@ std::vector<SurfaceEdge> edgesOf(const TriangleMesh& mesh) {
   return edges;
 }
 
-std::vector<SurfaceMatch> matchOutline(const std::vector<SurfaceEdge>& edges,
-                                       const TriangleMesh& mesh,
-                                       const decltype(TriangleMesh::vertices)& deformed,
-                                       const ReferenceView::Warped& look, const Frame& frame,
-                                       const Eigen::Isometry3d& world_from_object) {
-  const Eigen::Isometry3d camera_from_object =
-      frame.camera.world_from_camera.inverse() * world_from_object;
-  std::vector<SurfaceMatch> matches;
+SurfaceMatch OutlineStep::match(double expected) const {
+  const Eigen::Vector2d along(-outward.y(), outward.x());
+  return {rest, pixel + (distance - expected) * outward,
+          variance * outward * outward.transpose() + kAlongPx * kAlongPx * along * along.transpose()};
+}
+
+std::vector<OutlineStep> findOutline(const std::vector<SurfaceEdge>& edges, const TriangleMesh& mesh,
+                                     const decltype(TriangleMesh::vertices)& deformed, const ReferenceView::Warped& look,
+                                     const Frame& frame, const Eigen::Isometry3d& world_from_object) {
+  const Eigen::Isometry3d camera_from_object = frame.camera.world_from_camera.inverse() * world_from_object;
+  std::vector<OutlineStep> steps;
   std::vector<double> values;
-  for (const OutlinePoint& point :
-       outlinePoints(edges, mesh, deformed, look, frame.camera, camera_from_object)) {
+  for (const OutlinePoint& point : outlinePoints(edges, mesh, deformed, look, frame.camera, camera_from_object)) {
     if (!profile(frame.gray, point, values)) continue;
     const auto step = locateStep(values);
-    if (!step) continue;
-    const Eigen::Vector2d& n = point.outward;
-    const Eigen::Vector2d along(-n.y(), n.x());
-    matches.push_back({point.rest, point.pixel + step->first * n,
-                       step->second * n * n.transpose() +
-                           kAlongPx * kAlongPx * along * along.transpose()});
+    if (step) steps.push_back({point.rest, point.pixel, point.outward, step->first, step->second});
   }
-  return matches;
+  return steps;
+}
+
+OutlineBias::OutlineBias(const std::vector<OutlineStep>& steps) {
+  for (int round = 0; round < kBiasRounds; ++round) {
+    Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    // Around zero, unless the steps say otherwise.
+    matrix.diagonal().setConstant(1.0 / (kUsualBias * kUsualBias));
+    for (const OutlineStep& step : steps) {
+      const Eigen::Vector3d basis(1.0, step.outward.x(), step.outward.y());
+      const double off = step.distance - towards(step.outward);
+      const double weight = 1.0 / (step.variance + off * off);  // Cauchy's
+      matrix += weight * basis * basis.transpose(), right += weight * step.distance * basis;
+    }
+    harmonics_ = matrix.ldlt().solve(right);
+  }
+}
+
+double OutlineBias::towards(const Eigen::Vector2d& outward) const {
+  return harmonics_.dot(Eigen::Vector3d(1.0, outward.x(), outward.y()));
 }
 
 }  // namespace calipso::flow

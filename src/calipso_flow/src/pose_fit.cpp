@@ -15,12 +15,14 @@ namespace {
 constexpr double kShapeLength = 2.5;     // see ShapeError
 constexpr double kShapeReach = 4.0;      // of 2 l^2: farther apart tracks do not err together
 constexpr double kShapeAbsorbed = 2.0;    // 12 / (12 - 6): a pose takes up six of the errors of six such patches
+constexpr double kRobust = 3.0;  // deviations: residuals beyond count less and less
 
 // Residuals and their derivatives by the motion of movePose(), for one pose.
 struct Linearisation {
   std::vector<Eigen::Vector2d> residual;            // px
   std::vector<Eigen::Matrix<double, 2, 6>> jacobian;
   std::vector<Eigen::Matrix2d> information;         // 1/px^2
+  std::vector<bool> outline;
 };
 
 Linearisation linearise(const std::vector<Correspondence>& correspondences, const Camera& camera,
@@ -41,6 +43,7 @@ Linearisation linearise(const std::vector<Correspondence>& correspondences, cons
     }
     const Eigen::Matrix2d covariance = c.covariance + floor * floor * Eigen::Matrix2d::Identity();
     lin.information.push_back(covariance.inverse());
+    lin.outline.push_back(c.outline);
   }
   return lin;
 }
@@ -61,22 +64,34 @@ std::vector<double> lengths(const Linearisation& lin) {
   return result;
 }
 
-// The median of a two-dimensional standard normal's length is 1.1774.
-double robustDeviation(const std::vector<double>& lengths) { return median(lengths) / 1.1774; }
+// Robust deviations of the residuals over their own, points and outline apart: a picture that is compressed, noisy or
+// blurred spoils the texture by more than matches say of themselves, and the outline less.
+struct Deviations {
+  double points = 0.0, outline = 0.0;
+  double of(bool on_outline) const { return std::max(1.0, on_outline ? outline : points); }
+};
+
+// The median of a standard normal's length is 1.1774 in two dimensions, 0.6745 in one.
+Deviations robustDeviations(const Linearisation& lin, const std::vector<double>& lengths) {
+  std::vector<double> points, outline;
+  for (size_t i = 0; i < lengths.size(); ++i) (lin.outline[i] ? outline : points).push_back(lengths[i]);
+  return {median(points) / 1.1774, median(outline) / 0.6745};
+}
 
 struct NormalEquations {
   Matrix6d matrix = Matrix6d::Zero();
   Vector6d right = Vector6d::Zero();
 };
 
-// Geman-McClure: weight (s^2 / (s^2 + r^2))^2 with r in deviations.
-NormalEquations weightedNormal(const Linearisation& lin, const std::vector<double>& lengths,
+// Geman-McClure: weight (s^2 / (s^2 + r^2))^2 with r in the deviations found.
+NormalEquations weightedNormal(const Linearisation& lin, const std::vector<double>& lengths, const Deviations& found,
                                double scale) {
   NormalEquations normal;
   for (size_t i = 0; i < lin.residual.size(); ++i) {
-    const double ratio = scale * scale / (scale * scale + lengths[i] * lengths[i]);
-    const Eigen::Matrix<double, 6, 2> weighted =
-        ratio * ratio * lin.jacobian[i].transpose() * lin.information[i];
+    const double deviation = found.of(lin.outline[i]), length = lengths[i] / deviation;
+    const double ratio = scale * scale / (scale * scale + length * length);
+    const double weight = ratio * ratio / (deviation * deviation);
+    const Eigen::Matrix<double, 6, 2> weighted = weight * lin.jacobian[i].transpose() * lin.information[i];
     normal.matrix += weighted * lin.jacobian[i];
     normal.right -= weighted * lin.residual[i];
   }
@@ -90,7 +105,7 @@ Vector6d solveStep(const NormalEquations& normal) {
   return damped.ldlt().solve(normal.right);
 }
 
-// The inliers of a fit as least squares has them: residuals and Jacobians in units of the tracks' deviations.
+// A fit's inliers that are not of the outline, as least squares has them: residuals and Jacobians in units of their deviations.
 struct Whitened {
   std::vector<Eigen::Vector2d> pixel, residual;
   std::vector<Eigen::Matrix<double, 2, 6>> jacobian;
@@ -100,7 +115,7 @@ Whitened whitened(const std::vector<Correspondence>& correspondences, const Line
                   const std::vector<bool>& inlier) {
   Whitened result;
   for (size_t i = 0; i < inlier.size(); ++i) {
-    if (!inlier[i]) continue;
+    if (!inlier[i] || lin.outline[i]) continue;
     const Eigen::Matrix2d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(lin.information[i]).operatorSqrt();
     result.pixel.push_back(correspondences[i].pixel);
     result.residual.push_back(root * lin.residual[i]);
@@ -112,11 +127,11 @@ Whitened whitened(const std::vector<Correspondence>& correspondences, const Line
 // A model whose shape is not the true one puts neighbouring tracks off together, and such errors do not average out.
 // Covariance between tracks  c exp(-d^2 / 2 l^2), l the kShapeLength-th part of their spread; c from nearest neighbours.
 struct ShapeError {
-  double variance = 0.0;                  // c, per component, of the whitened residuals
-  Matrix6d pose = Matrix6d::Zero();       // H^-1 (sum_ij c k_ij A_i^T A_j) H^-1
+  double variance = 0.0;                     // c, per component, of the whitened residuals
+  Matrix6d gradient = Matrix6d::Zero();      // sum_ij c k_ij A_i^T A_j: covariance of sum_i A_i^T r_i
 };
 
-ShapeError shapeError(const Whitened& tracks, const Matrix6d& inverse) {
+ShapeError shapeError(const Whitened& tracks) {
   const size_t count = tracks.pixel.size();
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& pixel : tracks.pixel) mean += pixel / count;
@@ -140,29 +155,46 @@ ShapeError shapeError(const Whitened& tracks, const Matrix6d& inverse) {
   }
   ShapeError error;
   error.variance = std::max(0.0, kShapeAbsorbed * product);
-  error.pose = error.variance * inverse * sum * inverse;
+  error.gradient = error.variance * sum;
   return error;
+}
+
+// Sums of A^T A over the inliers, A = Jacobian in units of its own deviation.
+struct Information {
+  Matrix6d points = Matrix6d::Zero(), outline = Matrix6d::Zero();
+  Matrix6d geometry = Matrix6d::Zero();  // of points, each counted alike, 1/px^2
+};
+
+Information chooseInliers(const Linearisation& lin, const std::vector<double>& lengths, const Deviations& found,
+                          double limit, PoseFit& fit) {
+  Information sum;
+  for (size_t i = 0; i < lengths.size(); ++i) {
+    fit.inlier.push_back(lengths[i] < limit * found.of(lin.outline[i]));
+    if (!fit.inlier.back()) continue;
+    (lin.outline[i] ? sum.outline : sum.points) += lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
+    if (lin.outline[i]) continue;
+    ++fit.inliers;
+    sum.geometry += lin.jacobian[i].transpose() * lin.jacobian[i];
+  }
+  return sum;
 }
 
 void judge(const std::vector<Correspondence>& correspondences, const Linearisation& lin, const PoseFitParams& params, PoseFit& fit) {
   const std::vector<double> all = lengths(lin);
-  fit.deviation = robustDeviation(all);
-  const double limit = params.inlier_sigma * std::max(1.0, fit.deviation);
-  Matrix6d information = Matrix6d::Zero(), geometry = information;
-  for (size_t i = 0; i < all.size(); ++i) {
-    fit.inlier.push_back(all[i] < limit);
-    if (!fit.inlier.back()) continue;
-    ++fit.inliers;
-    information += lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
-    geometry += lin.jacobian[i].transpose() * lin.jacobian[i];
-  }
+  const Deviations found = robustDeviations(lin, all);
+  fit.deviation = found.points;
+  const Information sum = chooseInliers(lin, all, found, params.inlier_sigma, fit);
   if (fit.inliers < params.least_inliers) return;
-  const Eigen::LDLT<Matrix6d> factor(information);
+  const double of_points = found.of(false) * found.of(false), of_outline = found.of(true) * found.of(true);
+  const Eigen::LDLT<Matrix6d> factor(sum.points / of_points + sum.outline / of_outline);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0.0)) return;
-  fit.common = fit.inliers * params.common_px * params.common_px * geometry.inverse();
+  fit.common = fit.inliers * params.common_px * params.common_px * sum.geometry.inverse();
+  // Points err apart by what their shared error leaves of their deviation, and together by that.
+  const ShapeError shape = shapeError(whitened(correspondences, lin, fit.inlier));
+  const double apart = std::max(1.0, of_points - shape.variance);
+  const Matrix6d gradient = (apart * sum.points + shape.gradient) / (of_points * of_points) + sum.outline / of_outline;
   const Matrix6d inverse = factor.solve(Matrix6d::Identity());
-  const ShapeError shape = shapeError(whitened(correspondences, lin, fit.inlier), inverse);
-  fit.covariance = std::max(1.0, fit.deviation * fit.deviation - shape.variance) * inverse + shape.pose;
+  fit.covariance = inverse * gradient * inverse;
   fit.converged = fit.covariance.allFinite();
 }
 
@@ -196,15 +228,14 @@ PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera
   double scale = std::max(4.0, params.start_scale_px / params.floor_px);
   for (int iteration = 0; iteration < params.max_iterations; ++iteration) {
     const std::vector<double> residuals = lengths(lin);
-    const Vector6d step = solveStep(weightedNormal(lin, residuals, scale));
+    const Vector6d step = solveStep(weightedNormal(lin, residuals, robustDeviations(lin, residuals), scale));
     if (!step.allFinite()) return fit;
     fit.world_from_object = movePose(fit.world_from_object, pivot, step);
     lin = linearise(correspondences, camera, fit.world_from_object, pivot, params.floor_px);
-    const double noise_scale = 3.0 * std::max(1.0, robustDeviation(lengths(lin)));
-    const bool annealed = scale <= noise_scale;
+    const bool annealed = scale <= kRobust;
     const double change = (lin.jacobian[0] * step).norm();
     if (annealed && change < 1e-4) break;
-    scale = std::max(noise_scale, 0.5 * scale);
+    scale = std::max(kRobust, 0.5 * scale);
   }
   judge(correspondences, lin, params, fit);
   return fit;

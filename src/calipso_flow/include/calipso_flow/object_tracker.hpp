@@ -5,6 +5,7 @@
 
 #include "calipso_flow/deformation_fit.hpp"
 #include "calipso_flow/look_match.hpp"
+#include "calipso_flow/outline_match.hpp"
 #include "calipso_flow/pose_fit.hpp"
 #include "calipso_flow/reference_view.hpp"
 
@@ -95,7 +96,12 @@ class ObjectTracker {
   bool stays(const Observation& observation) const;  // found where it was
   void remember(const Frame& frame, const Observation& observation, bool cut);
 
+  // Where the object's outline is found in the frame, as far as the model is known from this side.
+  void addOutline(const Frame& frame, const Look& seen, std::vector<Correspondence>& found) const;
+
   ObjectModel model_;
+  std::vector<SurfaceEdge> edges_;
+  OutlineBias outline_bias_;  // of the key frame, where the pose is known
   TrackerParams params_;
   TrackerParams wide_;  // the same with large patches, for frames whose noise or blur drowns small ones
   Eigen::Vector3d centroid_;

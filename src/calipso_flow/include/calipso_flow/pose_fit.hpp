@@ -15,6 +15,7 @@ struct Correspondence {
   Eigen::Vector3d point;       // object frame, m
   Eigen::Vector2d pixel;       // px
   Eigen::Matrix2d covariance;  // of pixel, px^2
+  bool outline = false;        // found across the outline only; how well such are found is judged apart
 };
 
 struct PoseFitParams {
@@ -32,8 +33,8 @@ struct PoseFit {
   Matrix6d covariance = Matrix6d::Zero();  // of (m of the pivot, rad), world axes
   Matrix6d common = Matrix6d::Zero();      // the same of the error that all tracks share; not part of covariance
   std::vector<bool> inlier;                // per correspondence
-  int inliers = 0;
-  double deviation = 0.0;  // robust deviation of the residuals over their own, 1 = as expected
+  int inliers = 0;                         // of those that are not of the outline
+  double deviation = 0.0;  // robust deviation of their residuals over their own, 1 = as expected
   bool converged = false;
 };
 
