@@ -13,11 +13,14 @@ namespace {
 constexpr int kStride = 4;             // px between pixels that planes are sought among
 constexpr int kSeedStep = 16, kSeedReach = 7;  // px: places where planes are begun, and the square they are begun from
 constexpr int kMostPlanes = 10;
-constexpr double kLeastPart = 0.004;   // of the picture, for a plane
-constexpr double kOnPlane = 0.01, kSeedSpread = 0.005;  // of the nearness
+constexpr double kLeastPart = 0.01;    // of the picture, for a plane: walls, not the sides of things
+constexpr float kOnPlane = 0.01f;      // of the nearness
+constexpr double kSeedSpread = 0.005;  // likewise
 constexpr float kOffSupport = 0.02f;   // of the nearness: what is farther from the support planes is relief
-constexpr double kBehind = 1.02;       // of an object's nearness: what it hides is no nearer
-constexpr double kLeastPiece = 0.05;   // of a plane's pixels, for a connected piece to widen its hull
+constexpr float kBehind = 1.02f;       // of an object's nearness: what it hides is no nearer
+constexpr double kLeastPiece = 0.05;   // of a plane's pixels, for a connected piece of it to count
+constexpr double kBeyond = 0.25;       // of the side of a square as large as what is seen of a plane: so far it may go on beyond that
+constexpr float kFarther = 0.97f;      // of a plane's nearness: where that is seen the plane is not
 constexpr int kCurvedReach = 4;        // px of the square that tells the normal of what is not plane
 constexpr float kSameSurface = 0.05f;  // of the nearness within it
 constexpr float kLeastSlope = 0.05f;   // cosine between normal and sun of what is lit
@@ -26,7 +29,7 @@ constexpr std::size_t kFewest = 50;    // px
 constexpr float kDark = 0.01f;         // linear
 constexpr float kNoShade = 0.9f;       // hardly darker: the shade was not where it was predicted
 
-constexpr int kSupport = -1, kNoPlane = -2;
+constexpr int kNoPlane = -1;
 
 struct Pixel {
   int u, v;
@@ -85,46 +88,64 @@ std::vector<Pixel> onPlane(const Eigen::Vector3d& abc, const std::vector<Pixel>&
   return on;
 }
 
-// Hull of the pixels on the plane that lie together.
-cv::Mat hullOf(const Eigen::Vector3d& abc, const cv::Mat& nearness, const cv::Mat& known) {
-  cv::Mat on = cv::Mat::zeros(known.size(), CV_8U), pieces, stats, centres;
-  for (const Pixel& p : pixelsIn(nearness, known, {{0, 0}, known.size()}, 1)) {
-    if (errorAt(abc, p) < kOnPlane) on.at<std::uint8_t>(p.v, p.u) = 255;
-  }
-  const int count = cv::connectedComponentsWithStats(on, pieces, stats, centres, 8, CV_32S), all = cv::countNonZero(on);
+// Where a plane may be at most: in the hull of its larger pieces, and beyond by a part of its size.
+cv::Mat reachOf(const cv::Mat& on) {
+  cv::Mat pieces, stats, centres, reach = cv::Mat::zeros(on.size(), CV_8U), beyond;
+  cv::connectedComponentsWithStats(on, pieces, stats, centres, 8, CV_32S);
+  const int all = cv::countNonZero(on);
   std::vector<cv::Point> points, hull;
   for (int v = 0; v < on.rows; ++v) {
     for (int u = 0; u < on.cols; ++u) {
       const int piece = pieces.at<int>(v, u);
-      if (piece > 0 && piece < count && stats.at<int>(piece, cv::CC_STAT_AREA) >= kLeastPiece * all) points.push_back({u, v});
+      if (piece > 0 && stats.at<int>(piece, cv::CC_STAT_AREA) >= kLeastPiece * all) points.push_back({u, v});
     }
   }
-  cv::Mat region = cv::Mat::zeros(known.size(), CV_8U);
-  if (points.empty()) return region;
+  if (points.empty()) return reach;
   cv::convexHull(points, hull);
-  cv::fillConvexPoly(region, hull, 255);
-  return region;
+  cv::fillConvexPoly(reach, hull, 255);
+  cv::distanceTransform(reach == 0, beyond, cv::DIST_L2, cv::DIST_MASK_5);
+  return beyond <= kBeyond * std::sqrt(static_cast<double>(all));
 }
 
-// How near the support planes are, and which of them is seen.
-struct Supports {
-  cv::Mat nearness, label;  // CV_32FC1, 0: none; CV_8UC1, from 1 on
+// A plane all over the picture.
+struct Extent {
+  cv::Mat nearness;  // CV_32FC1, 0: not there
+  cv::Mat goes_on;   // CV_8UC1: 255 where it may be behind objects
+};
 
-  Supports(const std::vector<SupportPlane>& planes, const Camera& camera)
-      : nearness(cv::Mat::zeros(camera.height, camera.width, CV_32F)), label(cv::Mat::zeros(camera.height, camera.width, CV_8U)) {
-    const Eigen::Isometry3d from_world = camera.world_from_camera.inverse();
-    for (std::size_t k = 0; k < planes.size(); ++k) {
+// Where a plane goes on that is hidden: in its reach, and nearer to where it is seen than to where something farther is seen in its place.
+cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& scenery) {
+  const cv::Mat known = (scenery > 0.0f) & (plane > 0.0f), on = known & (cv::abs(plane - scenery) < kOnPlane * plane);
+  cv::Mat absent = known & (scenery < kFarther * plane), to_on, to_absent;
+  cv::morphologyEx(absent, absent, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  if (cv::countNonZero(on) == 0) return cv::Mat::zeros(plane.size(), CV_8U);
+  const cv::Mat reach = reachOf(on);
+  if (cv::countNonZero(absent) == 0) return reach & (plane > 0.0f);
+  cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
+  cv::distanceTransform(absent == 0, to_absent, cv::DIST_L2, cv::DIST_MASK_5);
+  return (to_on < to_absent) & reach & (plane > 0.0f);
+}
+
+cv::Mat supportNearness(const SupportPlane& plane, const Camera& camera) {
+  cv::Mat nearness = cv::Mat::zeros(camera.height, camera.width, CV_32F);
+  const Eigen::Isometry3d from_world = camera.world_from_camera.inverse();
 #pragma omp parallel for schedule(static)
-      for (int v = 0; v < nearness.rows; ++v) {
-        for (int u = 0; u < nearness.cols; ++u) {
-          const auto r = receiverAt({planes[k]}, camera, static_cast<float>(u), static_cast<float>(v));
-          const float near = r ? static_cast<float>(1.0 / (from_world * r->position.cast<double>()).z()) : 0.0f;
-          if (near > nearness.at<float>(v, u)) nearness.at<float>(v, u) = near, label.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(k + 1);
-        }
-      }
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) {
+      const auto r = receiverAt({plane}, camera, static_cast<float>(u), static_cast<float>(v));
+      if (r) nearness.at<float>(v, u) = static_cast<float>(1.0 / (from_world * r->position.cast<double>()).z());
     }
   }
-};
+  return nearness;
+}
+
+cv::Mat nearnessOf(const PicturePlane& plane, const cv::Size& size) {
+  cv::Mat nearness(size, CV_32F);
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) nearness.at<float>(v, u) = static_cast<float>(std::max(0.0, plane.nearnessAt(u, v)));
+  }
+  return nearness;
+}
 
 // The normal of a surface that is not plane, from its pixels around.
 std::optional<PicturePlane> curvedAt(const cv::Mat& nearness, int u, int v) {
@@ -135,7 +156,7 @@ std::optional<PicturePlane> curvedAt(const cv::Mat& nearness, int u, int v) {
     if (std::abs(p.nearness - own) < kSameSurface * own) same.push_back(p);
   }
   const auto abc = affineThrough(same);
-  return abc ? std::optional<PicturePlane>({*abc, {}}) : std::nullopt;
+  return abc ? std::optional<PicturePlane>({*abc}) : std::nullopt;
 }
 
 void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const Camera& camera, PlaceSurfaces& surfaces) {
@@ -144,27 +165,26 @@ void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const C
   surfaces.normal.at<cv::Vec3f>(v, u) = {normal.x(), normal.y(), normal.z()};
 }
 
-// The plane nearest to what the depth image shows at a pixel: or kSupport, kNoPlane.
-int planeSeen(const std::vector<PicturePlane>& found, double seen, double support, int u, int v) {
-  const double off_support = support > 0.0 ? std::abs(support - seen) / seen : 1e9;
-  int best = kNoPlane;
-  double least = std::min(off_support, kOnPlane);
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    const double error = errorAt(found[k].abc, {u, v, seen});
-    if (error < least && found[k].region.at<std::uint8_t>(v, u) != 0) least = error, best = static_cast<int>(k);
+// The plane that the depth image shows at a pixel, or kNoPlane: support planes are met less exactly.
+int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u, int v) {
+  int best = kNoPlane, support = kNoPlane;
+  float least = kOnPlane, least_support = kOffSupport;
+  for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
+    const float error = std::abs(planes[k].nearness.at<float>(v, u) - seen) / seen;
+    if (error < least) least = error, best = k;
+    if (k < supports && error < least_support) least_support = error, support = k;
   }
-  if (best == kNoPlane && off_support < kOffSupport) best = kSupport;
-  return best;
+  return best == kNoPlane ? support : best;
 }
 
-// The plane seen if the object were not there: the nearest behind it.
-int planeBehind(const std::vector<PicturePlane>& found, double object, double support, int u, int v) {
-  const double limit = object > 0.0 ? kBehind * object : 1e9;
-  int best = kSupport;
-  double nearest = support > 0.0 && support < limit ? support : 0.0;
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    const double near = found[k].nearnessAt(u, v);
-    if (near > nearest && near < limit && found[k].region.at<std::uint8_t>(v, u) != 0) nearest = near, best = static_cast<int>(k);
+// The plane seen if the object were not there: the nearest behind it. @param object nearness of the object, 0 unknown
+int planeBehind(const std::vector<Extent>& planes, float object, int u, int v) {
+  const float limit = object > 0.0f ? kBehind * object : 1e9f;
+  int best = kNoPlane;
+  float nearest = 0.0f;
+  for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
+    const float near = planes[k].nearness.at<float>(v, u);
+    if (near > nearest && near < limit && planes[k].goes_on.at<std::uint8_t>(v, u) != 0) nearest = near, best = k;
   }
   return best;
 }
@@ -198,7 +218,7 @@ std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& 
     }
     if (most.size() < fewest) break;
     const Eigen::Vector3d first = *affineThrough(most), abc = *affineThrough(onPlane(first, left));
-    found.push_back({abc, hullOf(abc, nearness, nearness > 0.0f)});
+    found.push_back({abc});
     left.erase(std::remove_if(left.begin(), left.end(), [&](const Pixel& p) { return errorAt(abc, p) < kOnPlane; }), left.end());
   }
   return found;
@@ -206,23 +226,27 @@ std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& 
 
 PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels, const std::vector<SupportPlane>& planes, const Camera& camera) {
   if (scenery.empty()) return {};
-  const Supports support(planes, camera);
-  const cv::Mat off = (scenery > 0.0f) & (cv::abs(scenery - support.nearness) > kOffSupport * scenery);
-  const std::vector<PicturePlane> found = picturePlanes(scenery, off);
-  std::vector<Eigen::Vector3f> normals;
-  for (const PicturePlane& p : found) normals.push_back(p.normal(camera));
   const int supports = static_cast<int>(planes.size());
+  std::vector<Extent> extents;
+  cv::Mat off = scenery > 0.0f;
+  for (const SupportPlane& plane : planes) {
+    extents.push_back({supportNearness(plane, camera), {}});
+    off &= cv::abs(scenery - extents.back().nearness) > kOffSupport * scenery;
+  }
+  std::vector<Eigen::Vector3f> normals(planes.size());
+  for (const PicturePlane& plane : picturePlanes(scenery, off)) extents.push_back({nearnessOf(plane, scenery.size()), {}}), normals.push_back(plane.normal(camera));
+  for (Extent& e : extents) e.goes_on = goesOn(e.nearness, scenery);
   PlaceSurfaces surfaces{cv::Mat::zeros(scenery.size(), CV_8U), cv::Mat(scenery.size(), CV_32FC3), cv::Mat(scenery.size(), CV_32FC3), supports};
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < scenery.rows; ++v) {
     for (int u = 0; u < scenery.cols; ++u) {
-      const float seen = scenery.at<float>(v, u), near = support.nearness.at<float>(v, u), d = depth.at<float>(v, u);
+      const float seen = scenery.at<float>(v, u), d = depth.at<float>(v, u);
       if (seen == 0.0f && d == 0.0f && labels.at<std::uint8_t>(v, u) == 0) continue;  // nothing is known
-      const int plane = seen > 0.0f ? planeSeen(found, seen, near, u, v) : planeBehind(found, d > 0.0f ? 1.0 / d : 0.0, near, u, v);
+      const int plane = seen > 0.0f ? planeSeen(extents, supports, seen, u, v) : planeBehind(extents, d > 0.0f ? 1.0f / d : 0.0f, u, v);
       std::uint8_t& label = surfaces.label.at<std::uint8_t>(v, u);
-      if (plane == kSupport) label = support.label.at<std::uint8_t>(v, u);
-      if (plane >= 0) label = static_cast<std::uint8_t>(supports + 1 + plane), setAt(u, v, found[plane].nearnessAt(u, v), normals[plane], camera, surfaces);
-      if (plane != kNoPlane) continue;
+      if (plane != kNoPlane) label = static_cast<std::uint8_t>(plane + 1);
+      if (plane >= supports) setAt(u, v, extents[plane].nearness.at<float>(v, u), normals[plane], camera, surfaces);
+      if (plane != kNoPlane || seen == 0.0f) continue;
       if (const auto curved = curvedAt(scenery, u, v)) label = PlaceSurfaces::kCurved, setAt(u, v, seen, curved->normal(camera), camera, surfaces);
     }
   }
@@ -231,7 +255,8 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
 
 Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun) {
   if (surfaces.empty()) return {};
-  Relief relief{surfaces.label > surfaces.supports, surfaces.position, surfaces.normal, {}, {}, {}};
+  Relief relief;
+  relief.seen = surfaces.label > surfaces.supports, relief.position = surfaces.position, relief.normal = surfaces.normal;
   for (int v = 0; v < relief.seen.rows; ++v) {
     for (int u = 0; u < relief.seen.cols; ++u) {
       if (relief.at(u, v) && relief.receiver(u, v).normal.dot(sun) < kLeastSlope) relief.seen.at<std::uint8_t>(v, u) = 0;

@@ -11,7 +11,6 @@ namespace calipso::render {
 // A plane of the place in a camera's picture: the nearness of its pixels is affine, 1 / z = a u + b v + c.
 struct PicturePlane {
   Eigen::Vector3d abc;
-  cv::Mat region;  // CV_8UC1: the hull of where it is seen
 
   double nearnessAt(int u, int v) const { return abc[0] * u + abc[1] * v + abc[2]; }
   // World; towards the camera.
@@ -32,8 +31,8 @@ struct PlaceSurfaces {
   bool empty() const { return label.empty(); }
 };
 
-// By the depth image. Behind objects planes go on as far as the hull of what is seen of them; of those and the support planes the
-// nearest that lies behind the object is seen. Empty without a depth image.
+// By the depth image. Behind objects a plane goes on as long as it is seen nearer by than what shows that it has ended; of the planes that
+// do and lie behind the object the nearest is seen. Empty without a depth image.
 // @param scenery CV_32FC1, 1/m, of what is no object; 0 unknown. @param depth CV_32FC1, m, with the objects; 0 unknown
 // @param labels CV_8UC1, != 0 on objects
 PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels, const std::vector<SupportPlane>& planes, const Camera& camera);

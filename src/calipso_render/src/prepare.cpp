@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <stdexcept>
 
 #include "calipso_render/clip_poses.hpp"
@@ -25,6 +26,7 @@ constexpr int kFrontOpening = 7;        // px; narrower gaps between mask and mo
 constexpr int kNarrowFront = 3;         // ... so much of them
 constexpr float kDeepFront = 6.0f;      // ... that far inside the model's outline: a peg on a towel
 constexpr std::size_t kFurtherViews = 5;  // beside the key frame
+constexpr float kNearerBeside = 1.02f;  // times as near: before an object
 constexpr float kOffPlane = 0.1f;       // part by which scenery is nearer or farther than the plane behind or before it
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
 constexpr int kSameCodes = 8;           // code values, mean over 3 x 3 pixels, that noise may make
@@ -50,12 +52,38 @@ bool cameraMoves(const ClipSample& clip) {
   return std::any_of(clip.frames().begin(), clip.frames().end(), [&](const ClipFrame& f) { return !sameView(f.camera, key); });
 }
 
-bool movesInVideo(const std::vector<ClipFrame>& frames, int index) {
-  const cv::Mat key = frames.front().labels == index;
+// CV_8UC1: 255 where the model covers the picture.
+cv::Mat outlineOf(const Actor& actor, const cv::Size& size) {
+  cv::Mat outline = cv::Mat::zeros(size, CV_8U);
+  VisibilityBuffer buffer({0, 0, size.width, size.height});
+  buffer.draw(actor.screen, 0);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) outline.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return outline;
+}
+
+// Part that two masks share of what either covers.
+double overlap(const cv::Mat& a, const cv::Mat& b) {
+  const int either = cv::countNonZero(a | b);
+  return either > 0 ? static_cast<double>(cv::countNonZero(a & b)) / either : 1.0;
+}
+
+cv::Mat outlineAtRest(const Surface& surface, const Camera& camera) { return outlineOf(makeActor(surface, surface.key_vertices, camera), {camera.width, camera.height}); }
+
+// A moving camera sees an object at rest where its model at rest is, as well as they agree at the key frame.
+// @param frames as they were taken
+bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface) {
+  const Camera& camera = frames.front().camera;
+  const cv::Mat key = frames.front().labels == surface.index;
+  std::optional<double> fit;
   for (const ClipFrame& f : frames) {
-    const cv::Mat now = f.labels == index;
-    const int both = cv::countNonZero(now & key), either = cv::countNonZero(now | key);
-    if (both < kStillOverlap * either) return true;
+    const cv::Mat now = f.labels == surface.index;
+    if (!sameView(f.camera, camera) && !fit) fit = overlap(key, outlineAtRest(surface, camera));
+    const bool rests = sameView(f.camera, camera) ? overlap(now, key) >= kStillOverlap : overlap(now, outlineAtRest(surface, f.camera)) >= kStillOverlap * *fit;
+    if (!rests) return true;
   }
   return false;
 }
@@ -204,19 +232,6 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
   return views;
 }
 
-// CV_8UC1: 255 where the model covers the picture.
-cv::Mat outlineOf(const Actor& actor, const cv::Size& size) {
-  cv::Mat outline = cv::Mat::zeros(size, CV_8U);
-  VisibilityBuffer buffer({0, 0, size.width, size.height});
-  buffer.draw(actor.screen, 0);
-  for (int v = 0; v < size.height; ++v) {
-    for (int u = 0; u < size.width; ++u) {
-      if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) outline.at<std::uint8_t>(v, u) = 255;
-    }
-  }
-  return outline;
-}
-
 // Where an object's surface should be seen at the key frame but no mask is, something stands before it.
 // The rim is left out: there the fit is not exact.
 cv::Mat frontOf(const cv::Mat& outline, const cv::Mat& labels) {
@@ -239,10 +254,28 @@ cv::Mat frontOf(const cv::Mat& outline, const cv::Mat& labels) {
   return cv::countNonZero(front) > 0 ? front : cv::Mat();
 }
 
-std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p) {
+// What the depth image shows just beside an object, off the planes and nearer: it stands before it.
+// @param ground nearness of the support planes
+cv::Mat nearerBeside(const cv::Mat& mask, const cv::Mat& labels, const cv::Mat& depth, const cv::Mat& ground, int margin) {
+  cv::Mat nearness = cv::Mat::zeros(depth.size(), CV_32F), own = nearness.clone();
+  cv::Mat(1.0 / depth).copyTo(nearness, depth > 0.0f);
+  nearness.copyTo(own, mask);
+  cv::dilate(own, own, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
+  cv::Mat nearer = (labels == 0) & (own > 0.0f) & (nearness > kNearerBeside * own);
+  if (!ground.empty()) nearer &= cv::abs(nearness - ground) > (kNearerBeside - 1.0f) * nearness;
+  return nearer;
+}
+
+std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p, const RenderParams& params) {
   std::vector<cv::Mat> fronts;
+  const cv::Mat ground = params.depth.empty() ? cv::Mat() : groundNearness(params.planes, p.camera, cv::Mat());
   for (std::size_t i = 0; i < actors.size(); ++i) {
-    fronts.push_back(frontOf(outlineOf(actors[i], p.key_labels.size()), p.key_labels));
+    cv::Mat front = frontOf(outlineOf(actors[i], p.key_labels.size()), p.key_labels);
+    if (!params.depth.empty() && !p.moves[i]) {
+      const cv::Mat beside = nearerBeside(p.key_labels == p.surfaces[i].index, p.key_labels, params.depth, ground, params.background.mask_margin_px + 1);
+      if (cv::countNonZero(beside) > 0) front = front.empty() ? beside : cv::Mat(front | beside);
+    }
+    fronts.push_back(front);
   }
   return fronts;
 }
@@ -250,7 +283,6 @@ std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& 
 // What the depth image shows beside the objects, as near as all of its surroundings: its edges are not exact.
 cv::Mat sceneryOf(const cv::Mat& depth, const Prepared& p, int margin) {
   if (depth.empty()) return {};
-  if (depth.size() != p.key_labels.size()) throw std::invalid_argument("the depth image is not of the key frame's size; scale it or leave it out");
   cv::Mat objects = p.key_labels != 0, nearness = cv::Mat::zeros(depth.size(), CV_32F);
   for (const cv::Mat& f : p.footprints) {
     if (!f.empty()) objects |= f;
@@ -279,10 +311,14 @@ std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepar
 }
 
 // What objects at rest cover or shade at the key frame, with soft edges and the predictions' errors.
-cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const RenderParams& params) {
+// @param curved CV_8UC1, != 0: keeps its shadows; may be empty
+cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const cv::Mat& curved, const RenderParams& params) {
   cv::Mat traces = grown(shadows.sun | shadows.sky, params.background.shadow_margin_px);
-  for (const cv::Mat& f : p.footprints) {
-    if (!f.empty()) traces |= grown(f, params.background.mask_margin_px);
+  if (!curved.empty()) traces.setTo(0, curved);
+  for (std::size_t i = 0; i < p.footprints.size(); ++i) {
+    if (p.footprints[i].empty()) continue;
+    traces |= grown(p.footprints[i], params.background.mask_margin_px);
+    if (!p.fronts[i].empty()) traces.setTo(0, p.fronts[i]);
   }
   return traces;
 }
@@ -319,18 +355,21 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<V
   p.background = seen;
   const PlaceSurfaces surfaces = findSurfaces(p.scenery, params.depth, p.key_labels, params.planes, p.camera);
   p.relief = findRelief(surfaces, p.light.light.direction);
-  cv::Mat off_planes = offPlanes(p.scenery, params.planes, p.camera), no_sky = off_planes;
-  if (!p.relief.empty()) no_sky = off_planes | p.relief.seen, off_planes = off_planes & ~p.relief.seen;
-  p.shadowless = off_planes.clone();
-  const cv::Mat visibility = placeVisibility(sun, params.planes, p.relief, off_planes, frames.front());
-  const cv::Mat sky_visibility = placeVisibility(sky, params.planes, p.relief, no_sky, frames.front());
+  cv::Mat off_planes = offPlanes(p.scenery, params.planes, p.camera), blind = off_planes.clone();
+  if (!p.relief.empty()) blind = off_planes & ~p.relief.seen, off_planes |= p.relief.seen;
+  p.shadowless = blind.clone();
+  // What is not plane has no like to be filled from: a shadow stays there.
+  const cv::Mat curved = surfaces.empty() ? cv::Mat() : cv::Mat(surfaces.label == PlaceSurfaces::kCurved);
+  if (!curved.empty()) blind |= curved;
+  const cv::Mat visibility = placeVisibility(sun, params.planes, p.relief, blind, frames.front());
+  const cv::Mat sky_visibility = placeVisibility(sky, params.planes, p.relief, off_planes, frames.front());
   cv::Mat shaded;
   if (!all_move) {
-    const SeenShadows seen_shadows = seenShadows(visibility, sky_visibility, picture, (p.key_labels != 0) | off_planes);
+    const SeenShadows seen_shadows = seenShadows(visibility, sky_visibility, picture, (p.key_labels != 0) | blind);
     if (cv::countNonZero(seen_shadows.refuted) > 0) {
       p.remarks.push_back("a shadow that the light predicts is not seen in the picture: none is taken out or drawn there; give the light if it is wrong");
     }
-    shaded = restingTraces(p, seen_shadows, params);
+    shaded = restingTraces(p, seen_shadows, curved, params);
     p.shadowless |= grown(seen_shadows.refuted, params.background.shadow_margin_px);
     if (seen_shadows.none) p.shadowless.setTo(255);
     const cv::Mat dark = ((visibility < kUnshadedSun) | (sky_visibility < kUnshadedSky)) & (seen_shadows.refuted == 0);
@@ -343,7 +382,7 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<V
   }
   inventBackground(shaded, key, groundNearness(params.planes, frames.front().camera, p.scenery), surfaces.label, p.background);
   p.plate_linear = linearOf(p.background.plate);
-  const cv::Mat off_the_planes = (p.key_labels != 0) | no_sky;
+  const cv::Mat off_the_planes = (p.key_labels != 0) | off_planes;
   const std::optional<cv::Vec3f> umbra = any_moves ? umbraInViews(views, params.planes, p.background, p.light.light) : std::nullopt;
   p.umbra = umbra     ? *umbra
           : any_moves ? umbraOfPassing(frames, params.planes, p.background, predictedUmbra(p.light.light, params.planes))
@@ -367,11 +406,14 @@ class Stopwatch {
 }  // namespace
 
 bool anyMoves(const ClipSample& clip, const std::vector<ObjectModel>& models) {
-  return std::any_of(models.begin(), models.end(), [&](const ObjectModel& m) { return movesInVideo(clip.frames(), m.index); });
+  return std::any_of(models.begin(), models.end(), [&](const ObjectModel& m) { return movesInVideo(clip.frames(), makeSurface(m)); });
 }
 
 Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models, const RenderParams& params) {
   if (clip.frames().empty()) throw std::invalid_argument("no clip frame with a segmentation has arrived; send the key frame first");
+  if (!params.depth.empty() && params.depth.size() != clip.frames().front().bgr.size()) {
+    throw std::invalid_argument("the depth image is not of the key frame's size; scale it or leave it out");
+  }
   Prepared p;
   p.nearness = placeNearness(cameraMoves(clip) ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()}, params.planes, params.depth, params.background.mask_margin_px);
   const std::vector<ClipFrame> frames = inKeyView(clip, p.nearness);
@@ -380,8 +422,8 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.key_labels = frames.front().labels;
   for (const ObjectModel& m : models) {
     p.surfaces.push_back(makeSurface(m));
-    p.moves.push_back(movesInVideo(frames, m.index));
-    p.sways.push_back(!p.moves.back() && swaysInVideo(frames, m.index));
+    p.moves.push_back(movesInVideo(clip.frames(), p.surfaces.back()));
+    p.sways.push_back(!p.moves.back() && !cameraMoves(clip) && swaysInVideo(frames, m.index));
   }
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);
@@ -402,7 +444,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const ShadowMap sky(above, up, {256, kSkyRadius, 24});
   p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   p.appearance_ms = watch.lap();
-  p.fronts = frontsOf(actors, p);
+  p.fronts = frontsOf(actors, p, params);
   p.footprints = footprintsOf(actors, p);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
   prepareBackground(frames, views, actors, seen, picture, sun, sky, params, p);

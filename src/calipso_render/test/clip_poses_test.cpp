@@ -54,6 +54,20 @@ TEST(AnyMoves, TellsRestFromMotion) {
   EXPECT_TRUE(anyMoves(rollingBall(), {ballAt(kStart)}));
 }
 
+// The ball as a camera `right` m beside the key frame's sees it.
+ClipFrame seenFrom(double right, const Eigen::Vector3d& centre) {
+  ClipFrame frame = frameWithBall(ballAt(centre - Eigen::Vector3d(right, 0, 0)));
+  frame.camera.world_from_camera.translation().x() += right;
+  return frame;
+}
+
+TEST(AnyMoves, ACameraThatMovesDoesNotMoveTheObject) {
+  ClipSample shaken, followed;
+  for (const double right : {0.0, 0.03, -0.05}) shaken.add(seenFrom(right, kStart)), followed.add(seenFrom(right, kStart + Eigen::Vector3d(right, 0, 0)));
+  EXPECT_FALSE(anyMoves(shaken, {ballAt(kStart)}));
+  EXPECT_TRUE(anyMoves(followed, {ballAt(kStart)}));  // its masks are all the same
+}
+
 // Poses that were taken make further frames count.
 TEST(Prepare, UsesTheFramesWhosePosesAreKnown) {
   ClipSample clip = rollingBall();

@@ -77,6 +77,22 @@ TEST(PlaceRelief, WhatIsBehindAnObjectIsNotBeforeIt) {
   EXPECT_EQ(surfaces.label.at<std::uint8_t>(45, 80), PlaceSurfaces::kUnknown);  // above the floor's horizon
 }
 
+TEST(PlaceRelief, APlaneDoesNotGoOnBetweenItsPiecesWhereSomethingFartherIsSeen) {
+  Room room;  // of the wall two pieces are left, 5 m behind it is another one; an object stands before all of them
+  const cv::Rect gap(40, 0, 80, kHigh), object(0, 20, kWide, 10);
+  for (int v = 0; v < kHigh; ++v) {
+    for (int u = gap.x; u < gap.br().x; ++u) room.depth.at<float>(v, u) = std::min(8.0f, room.depth.at<float>(v, u) == kObjectAway ? 8.0f : isWall(v) ? 8.0f : kWallAway);
+  }
+  room.labels = 0, room.labels(object) = 1;
+  room.scenery = 1.0f / room.depth;
+  room.scenery(object) = 0.0f, room.depth(object) = kObjectAway;
+  const PlaceSurfaces surfaces = room.surfaces();
+  const auto labelAt = [&](int u) { return surfaces.label.at<std::uint8_t>(25, u); };
+  EXPECT_NE(labelAt(20), labelAt(80));
+  EXPECT_EQ(labelAt(20), labelAt(140));
+  EXPECT_EQ(labelAt(80), surfaces.label.at<std::uint8_t>(10, 80));
+}
+
 TEST(PlaceRelief, DepthNoiseMovesAWallLittle) {
   Room room;
   cv::Mat noise(room.depth.size(), CV_32F);
