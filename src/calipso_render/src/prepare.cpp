@@ -367,7 +367,7 @@ void prepareBackground(const std::vector<ClipFrame>& frames, const std::vector<V
   if (!all_move) {
     const SeenShadows seen_shadows = seenShadows(visibility, sky_visibility, picture, (p.key_labels != 0) | blind);
     if (cv::countNonZero(seen_shadows.refuted) > 0) {
-      p.remarks.push_back("a shadow that the light predicts is not seen in the picture: none is taken out or drawn there; give the light if it is wrong");
+      p.remarks.push_back("a shadow that the light predicts is not seen in the picture: none is taken out or drawn there; give the light if it is wrong, a depth image if a wall or a step is in its way");
     }
     shaded = restingTraces(p, seen_shadows, curved, params);
     p.shadowless |= grown(seen_shadows.refuted, params.background.shadow_margin_px);
