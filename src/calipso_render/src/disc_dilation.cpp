@@ -30,18 +30,24 @@ void dilateByDisc(const cv::Mat& from, int radius, cv::Mat& to) {
   cv::Size whole;
   cv::Point corner;
   from.locateROI(whole, corner);
-  const int width = from.cols, left = std::min(radius, corner.x), right = std::min(radius, whole.width - corner.x - width);
+  const int width = from.cols, left = std::min(radius, corner.x),
+            right = std::min(radius, whole.width - corner.x - width);
   std::vector<std::uint8_t> row(width + 2 * radius), run(width);
   for (int v = 0; v < to.rows; ++v) std::memset(to.ptr(v), 0, to.cols);
-  for (int v = -std::min(radius, corner.y); v < from.rows + std::min(radius, whole.height - corner.y - from.rows); ++v) {
-    std::memcpy(&row[radius - left], from.data + static_cast<std::ptrdiff_t>(v) * static_cast<std::ptrdiff_t>(from.step) - left, left + width + right);
+  for (int v = -std::min(radius, corner.y); v < from.rows + std::min(radius, whole.height - corner.y - from.rows);
+       ++v) {
+    std::memcpy(&row[radius - left],
+                from.data + static_cast<std::ptrdiff_t>(v) * static_cast<std::ptrdiff_t>(from.step) - left,
+                left + width + right);
     if (nextMarked(row.data(), 0, width + 2 * radius) == width + 2 * radius) continue;
     std::copy_n(&row[radius], width, run.begin());
     for (int reach = 0; reach <= radius; ++reach) {
-      if (reach > 0) takeGreater(&row[radius - reach], width, run.data()), takeGreater(&row[radius + reach], width, run.data());
+      if (reach > 0)
+        takeGreater(&row[radius - reach], width, run.data()), takeGreater(&row[radius + reach], width, run.data());
       for (int j = 0; j <= 2 * radius; ++j) {
         const int target = v + j - radius;
-        if (runs[j] == reach && target >= 0 && target < to.rows) takeGreater(run.data(), width, to.ptr<std::uint8_t>(target));
+        if (runs[j] == reach && target >= 0 && target < to.rows)
+          takeGreater(run.data(), width, to.ptr<std::uint8_t>(target));
       }
     }
   }

@@ -15,31 +15,35 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kAtNormal = 0.03f;     // reflectance at normal incidence: between water and varnish
-constexpr int kTestedWidth = 192;      // px to which the picture is brought down for the test
-constexpr double kAround = 10.0;       // px of those: deviation of the weights around a pixel
-constexpr int kSquare = 8;             // px of the squares of which every other one is held out
-constexpr int kFarthest = 64;          // px by which the image is displaced for comparison
-constexpr double kAlike = 0.3;         // correlation with the image in place up to which a displaced one is another
-constexpr int kFewestOthers = 12;      // such displaced images, at least
-constexpr double kClear = 1.8;         // times what the best of them explains
-constexpr double kExplained = 0.04;    // of the squares around the image, at least
-constexpr double kFaintest = 0.3, kBrightest = 10.0;  // strengths, times what water and varnish mirror: dull ones, and polished steel
-constexpr int kMisplaced = 2;          // px by which the image may be displaced against its place
+constexpr float kAtNormal = 0.03f;   // reflectance at normal incidence: between water and varnish
+constexpr int kTestedWidth = 192;    // px to which the picture is brought down for the test
+constexpr double kAround = 10.0;     // px of those: deviation of the weights around a pixel
+constexpr int kSquare = 8;           // px of the squares of which every other one is held out
+constexpr int kFarthest = 64;        // px by which the image is displaced for comparison
+constexpr double kAlike = 0.3;       // correlation with the image in place up to which a displaced one is another
+constexpr int kFewestOthers = 12;    // such displaced images, at least
+constexpr double kClear = 1.8;       // times what the best of them explains
+constexpr double kExplained = 0.04;  // of the squares around the image, at least
+constexpr double kFaintest = 0.3,
+                 kBrightest = 10.0;  // strengths, times what water and varnish mirror: dull ones, and polished steel
+constexpr int kMisplaced = 2;        // px by which the image may be displaced against its place
 constexpr float kSlopes[] = {0.0f, 0.01f, 0.02f, 0.04f, 0.08f, 0.16f};  // that are tried
-constexpr int kBlurs = 7;              // levels of blur, each twice the one before,
-constexpr float kLeastBlur = 0.5f;     // px, from this one on
-constexpr int kSpreadStep = 4;         // px between the places where the spread is found
-constexpr double kUsual = 1e-3;        // weight of the usual strength, to that of what is seen
+constexpr int kBlurs = 7;                                               // levels of blur, each twice the one before,
+constexpr float kLeastBlur = 0.5f;                                      // px, from this one on
+constexpr int kSpreadStep = 4;   // px between the places where the spread is found
+constexpr double kUsual = 1e-3;  // weight of the usual strength, to that of what is seen
 constexpr double kRidge = 1e-6;
 
 // The mirror image of a surface in a plane as the camera sees it; what lies below the plane is not mirrored.
 ScreenMesh mirrored(const Actor& actor, const SupportPlane& plane, const Camera& camera) {
   const Eigen::Vector3f n = plane.normal.cast<float>();
   Points points = actor.vertices;
-  for (Eigen::Vector3f& p : points) p -= (std::max(0.0f, n.dot(p) - static_cast<float>(plane.offset)) + n.dot(p) - static_cast<float>(plane.offset)) * n;
+  for (Eigen::Vector3f& p : points)
+    p -=
+        (std::max(0.0f, n.dot(p) - static_cast<float>(plane.offset)) + n.dot(p) - static_cast<float>(plane.offset)) * n;
   ScreenMesh mesh = projectMesh(points, actor.surface->triangles, camera);
-  const bool around_us = std::any_of(mesh.points.begin(), mesh.points.end(), [](const Eigen::Vector3f& p) { return std::isnan(p.z()); });
+  const bool around_us =
+      std::any_of(mesh.points.begin(), mesh.points.end(), [](const Eigen::Vector3f& p) { return std::isnan(p.z()); });
   mesh.hidden_side = around_us ? 0 : -actor.surface->winding;
   return mesh;
 }
@@ -49,8 +53,8 @@ float schlick(float cosine) {
   return kAtNormal + (1.0f - kAtNormal) * squared * squared * rest;
 }
 
-void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance, const PlaneView& view, const SupportPlane& plane,
-              const Camera& camera, const cv::Mat& off, MirrorImage& image, cv::Mat& near) {
+void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance, const PlaneView& view,
+              const SupportPlane& plane, const Camera& camera, const cv::Mat& off, MirrorImage& image, cv::Mat& near) {
   std::vector<ScreenMesh> meshes;
   cv::Rect box;
   for (const Actor* a : actors) {
@@ -62,7 +66,11 @@ void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance,
   for (std::size_t slot = 0; slot < meshes.size(); ++slot) buffer.draw(meshes[slot], static_cast<int>(slot));
   const Eigen::Vector3f n = plane.normal.cast<float>(), eye = camera.world_from_camera.translation().cast<float>();
   const Eigen::Vector3f mirrored_eye = eye - 2.0f * (n.dot(eye) - static_cast<float>(plane.offset)) * n;
-  if (image.empty()) image = {cv::Mat::zeros(camera.height, camera.width, CV_32FC3), cv::Mat::zeros(camera.height, camera.width, CV_32F), {}, 1.0f};
+  if (image.empty())
+    image = {cv::Mat::zeros(camera.height, camera.width, CV_32FC3),
+             cv::Mat::zeros(camera.height, camera.width, CV_32F),
+             {},
+             1.0f};
 #pragma omp parallel for schedule(dynamic, 4)
   for (int v = box.y; v < box.br().y; ++v) {
     for (int u = box.x; u < box.br().x; ++u) {
@@ -77,7 +85,8 @@ void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance,
       const float part = schlick(n.dot((eye - receiver.position).normalized()));
       image.cover.at<float>(v, u) = part;
       near.at<float>(v, u) = buffer.nearnessAt(u, v);
-      image.colour.at<cv::Vec3f>(v, u) = part * radiance(slot, surfacePoint(*actors[slot], triangle, weights, mirrored_eye));
+      image.colour.at<cv::Vec3f>(v, u) =
+          part * radiance(slot, surfacePoint(*actors[slot], triangle, weights, mirrored_eye));
     }
   }
 }
@@ -96,14 +105,15 @@ void bringDown(const cv::Mat& near, cv::Mat& mean, cv::Mat& weight) {
           sum += near.at<float>(v, u), count += near.at<float>(v, u) > 0.0f;
         }
       }
-      if (count > 0) mean.at<cv::Vec3f>(j, i) = cv::Vec3f::all(sum / static_cast<float>(count)), weight.at<float>(j, i) = 1.0f;
+      if (count > 0)
+        mean.at<cv::Vec3f>(j, i) = cv::Vec3f::all(sum / static_cast<float>(count)), weight.at<float>(j, i) = 1.0f;
     }
   }
 }
 
 // A facet that is tilted by s turns the mirrored ray by 2 s: behind it, over the way D2 to the object, by
-// 2 s D2 px f / (D1 + D2); along a row it is less by the cosine of incidence. The objects' distance is taken on smoothly
-// beyond them. All of it changes slowly over the picture.
+// 2 s D2 px f / (D1 + D2); along a row it is less by the cosine of incidence. The objects' distance is taken on
+// smoothly beyond them. All of it changes slowly over the picture.
 void findSpread(const PlaneView& view, const Camera& camera, const cv::Mat& near, MirrorImage& image) {
   cv::Mat mean, weight;
   bringDown(near, mean, weight);
@@ -117,10 +127,13 @@ void findSpread(const PlaneView& view, const Camera& camera, const cv::Mat& near
     for (int i = 0; i < spread.cols; ++i) {
       constexpr float kMiddle = 0.5f * (kSpreadStep - 1);
       Receiver receiver;
-      if (!view.at(static_cast<float>(i * kSpreadStep) + kMiddle, static_cast<float>(j * kSpreadStep) + kMiddle, receiver)) continue;
+      if (!view.at(static_cast<float>(i * kSpreadStep) + kMiddle, static_cast<float>(j * kSpreadStep) + kMiddle,
+                   receiver))
+        continue;
       const float depth = (from_world * receiver.position).z(), behind = 1.0f - depth * filled.at<cv::Vec3f>(j, i)[0];
       spread.at<float>(j, i) = 2.0f * static_cast<float>(camera.fy) * std::max(0.0f, behind);
-      if (weight.at<float>(j, i) > 0.0f) cosines += receiver.normal.dot((eye - receiver.position).normalized()), ++count;
+      if (weight.at<float>(j, i) > 0.0f)
+        cosines += receiver.normal.dot((eye - receiver.position).normalized()), ++count;
     }
   }
   cv::resize(spread, whole, spread.size() * kSpreadStep, 0, 0, cv::INTER_LINEAR);
@@ -130,18 +143,25 @@ void findSpread(const PlaneView& view, const Camera& camera, const cv::Mat& near
 
 // A level of blur: wide ones of a smaller picture, whose pixels are half as wide as the blur at most.
 struct Blurred {
-  cv::Mat picture;    // CV_32FC4
+  cv::Mat picture;      // CV_32FC4
   float columns, rows;  // of it, per pixel
-  int first;          // row that it begins with, where it is as large
+  int first;            // row that it begins with, where it is as large
 
   cv::v_float32x4 at(int u, int v) const {
     if (columns == 1.0f && rows == 1.0f) return cv::v_load(picture.at<cv::Vec4f>(v - first, u).val);
-    const float x = std::clamp((static_cast<float>(u) + 0.5f) * columns - 0.5f, 0.0f, static_cast<float>(picture.cols - 1));
-    const float y = std::clamp((static_cast<float>(v) + 0.5f) * rows - 0.5f, 0.0f, static_cast<float>(picture.rows - 1));
+    const float x =
+        std::clamp((static_cast<float>(u) + 0.5f) * columns - 0.5f, 0.0f, static_cast<float>(picture.cols - 1));
+    const float y =
+        std::clamp((static_cast<float>(v) + 0.5f) * rows - 0.5f, 0.0f, static_cast<float>(picture.rows - 1));
     const int i = static_cast<int>(x), j = static_cast<int>(y), right = std::min(i + 1, picture.cols - 1);
-    const cv::Vec4f *above = picture.ptr<cv::Vec4f>(j), *below = picture.ptr<cv::Vec4f>(std::min(j + 1, picture.rows - 1));
-    const auto mix = [](const cv::v_float32x4& a, const cv::v_float32x4& b, float part) { return a + cv::v_setall_f32(part) * (b - a); };
-    const auto along = [&](const cv::Vec4f* row) { return mix(cv::v_load(row[i].val), cv::v_load(row[right].val), x - static_cast<float>(i)); };
+    const cv::Vec4f *above = picture.ptr<cv::Vec4f>(j),
+                    *below = picture.ptr<cv::Vec4f>(std::min(j + 1, picture.rows - 1));
+    const auto mix = [](const cv::v_float32x4& a, const cv::v_float32x4& b, float part) {
+      return a + cv::v_setall_f32(part) * (b - a);
+    };
+    const auto along = [&](const cv::Vec4f* row) {
+      return mix(cv::v_load(row[i].val), cv::v_load(row[right].val), x - static_cast<float>(i));
+    };
     return mix(along(above), along(below), y - static_cast<float>(j));
   }
 };
@@ -149,7 +169,8 @@ struct Blurred {
 // Values drawn out by `slope`: between levels of blur.
 class DrawnOut {
  public:
-  DrawnOut(const cv::Mat& spread, float across, float slope) : across_(across), level_(spread.size(), CV_32F), lowest_(spread.rows), highest_(spread.rows) {
+  DrawnOut(const cv::Mat& spread, float across, float slope)
+      : across_(across), level_(spread.size(), CV_32F), lowest_(spread.rows), highest_(spread.rows) {
 #pragma omp parallel for schedule(static)
     for (int v = 0; v < spread.rows; ++v) {
       float* levels = level_.ptr<float>(v);
@@ -165,7 +186,8 @@ class DrawnOut {
   // @param values CV_32FC4: colour and cover
   cv::Mat operator()(const cv::Mat& values) const {
     std::vector<Blurred> levels;
-    for (int k = 0; k <= *std::max_element(highest_.begin(), highest_.end()) + 1; ++k) levels.push_back(blurred(values, k));
+    for (int k = 0; k <= *std::max_element(highest_.begin(), highest_.end()) + 1; ++k)
+      levels.push_back(blurred(values, k));
     cv::Mat out(values.size(), CV_32FC4);
 #pragma omp parallel for schedule(static)
     for (int v = 0; v < out.rows; ++v) {
@@ -182,11 +204,13 @@ class DrawnOut {
  private:
   Blurred blurred(const cv::Mat& values, int level) const {
     const float along = kLeastBlur * static_cast<float>(1 << level), beside = std::max(kLeastBlur, across_ * along);
-    const int rows = std::max(1, static_cast<int>(along / 2.0f)), columns = std::max(1, static_cast<int>(beside / 2.0f));
+    const int rows = std::max(1, static_cast<int>(along / 2.0f)),
+              columns = std::max(1, static_cast<int>(beside / 2.0f));
     Blurred out{{}, 1.0f, 1.0f, 0};
     cv::Mat from = values;
     if (rows > 1 || columns > 1) {
-      cv::resize(values, from, {(values.cols + columns - 1) / columns, (values.rows + rows - 1) / rows}, 0, 0, cv::INTER_AREA);
+      cv::resize(values, from, {(values.cols + columns - 1) / columns, (values.rows + rows - 1) / rows}, 0, 0,
+                 cv::INTER_AREA);
       out.columns = static_cast<float>(from.cols) / values.cols, out.rows = static_cast<float>(from.rows) / values.rows;
     } else {
       const cv::Range used = rowsAt(level);
@@ -220,7 +244,8 @@ cv::Mat withCover(const MirrorImage& image) {
 // The test's pictures, brought down.
 class Trial {
  public:
-  Trial(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known) : scale_(std::max(1.0f, static_cast<float>(picture.cols) / kTestedWidth)) {
+  Trial(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known)
+      : scale_(std::max(1.0f, static_cast<float>(picture.cols) / kTestedWidth)) {
     const cv::Size size(cvRound(picture.cols / scale_), cvRound(picture.rows / scale_));
     const auto brought = [&](const cv::Mat& values) {
       cv::Mat out;
@@ -241,9 +266,9 @@ class Trial {
   }
 
   struct Fit {
-    double explained = 0.0;      // squares of what is held out
-    std::array<double, 4> x{};   // strength; strength times the surroundings
-    cv::Mat cover;               // cover'
+    double explained = 0.0;     // squares of what is held out
+    std::array<double, 4> x{};  // strength; strength times the surroundings
+    cv::Mat cover;              // cover'
 
     // What the objects' mirror image takes away was mirrored there.
     bool plausible() const { return std::min({x[1], x[2], x[3]}) >= 0.0; }
@@ -269,7 +294,8 @@ class Trial {
         const double s = columns[3].at<float>(v, u);
         for (int c = 0; c < 3; ++c) {
           const double l = columns[c].at<float>(v, u), y = y_less_[c].at<float>(v, u);
-          G[half](0, 0) += l * l, G[half](0, c + 1) -= l * s, G[half](c + 1, 0) -= l * s, G[half](c + 1, c + 1) += s * s;
+          G[half](0, 0) += l * l, G[half](0, c + 1) -= l * s, G[half](c + 1, 0) -= l * s,
+              G[half](c + 1, c + 1) += s * s;
           b[half][0] += l * y, b[half][c + 1] -= s * y;
         }
       }
@@ -300,7 +326,8 @@ class Trial {
   }
 
  private:
-  // Of objects of one colour strength and surroundings are known together only: then the strength is that of water and varnish, 1.
+  // Of objects of one colour strength and surroundings are known together only: then the strength is that of water and
+  // varnish, 1.
   static Eigen::Vector4d solve(const Eigen::Matrix4d& G, const Eigen::Vector4d& b) {
     const double weight = kUsual * G(0, 0);
     Eigen::Matrix4d A = G + 1e-12 * Eigen::Matrix4d::Identity();
@@ -315,7 +342,8 @@ class Trial {
   static cv::Mat displaced(const cv::Mat& values, int by) {
     cv::Mat out = cv::Mat::zeros(values.size(), values.type());
     const int width = values.cols - std::abs(by);
-    values(cv::Rect(std::max(0, -by), 0, width, values.rows)).copyTo(out(cv::Rect(std::max(0, by), 0, width, values.rows)));
+    values(cv::Rect(std::max(0, -by), 0, width, values.rows))
+        .copyTo(out(cv::Rect(std::max(0, by), 0, width, values.rows)));
     return out;
   }
 
@@ -333,17 +361,21 @@ class Trial {
 
 }  // namespace
 
-cv::Vec3f mirroredRadiance(const Appearance& appearance, const Light& light, const Look& look, const SurfacePoint& point) {
-  const cv::Vec3f albedo = (look.albedo ? *look.albedo : appearance.albedoAt(point)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
+cv::Vec3f mirroredRadiance(const Appearance& appearance, const Light& light, const Look& look,
+                           const SurfacePoint& point) {
+  const cv::Vec3f albedo =
+      (look.albedo ? *look.albedo : appearance.albedoAt(point)).mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
   return appearance.radiance(albedo, diffuseShading(light, point.normal, 1.0f, point.sky, appearance.tint), {});
 }
 
-MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance& radiance, const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& off) {
+MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance& radiance,
+                        const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& off) {
   MirrorImage image;
   const PlaneView view(planes, camera);
   cv::Mat near = cv::Mat::zeros(camera.height, camera.width, CV_32F);
   for (const SupportPlane& plane : planes) {
-    if (plane.normal.dot(camera.world_from_camera.translation()) > plane.offset) addPlane(actors, radiance, view, plane, camera, off, image, near);
+    if (plane.normal.dot(camera.world_from_camera.translation()) > plane.offset)
+      addPlane(actors, radiance, view, plane, camera, off, image, near);
   }
   if (!image.empty()) findSpread(view, camera, near, image);
   return image;

@@ -21,7 +21,9 @@ class SquareMask {
     const int i = u / kSide - first_.x, j = v / kSide - first_.y;
     return i >= 0 && j >= 0 && i < set_.cols && j < set_.rows && set_.at<std::uint8_t>(j, i) != 0;
   }
-  bool all(const cv::Rect& rect) const { return !set_.empty() && cv::countNonZero(set_(squaresOf(rect))) == squaresOf(rect).area(); }
+  bool all(const cv::Rect& rect) const {
+    return !set_.empty() && cv::countNonZero(set_(squaresOf(rect))) == squaresOf(rect).area();
+  }
 
  private:
   cv::Rect squaresOf(const cv::Rect& rect) const {

@@ -13,7 +13,8 @@
 namespace calipso::render {
 namespace {
 
-// The kernels for newer processors give the bits of the plain ones; without such a processor there is nothing to compare.
+// The kernels for newer processors give the bits of the plain ones; without such a processor there is nothing to
+// compare.
 class Avx2 : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -24,11 +25,15 @@ class Avx2 : public ::testing::Test {
 
 TEST_F(Avx2, EncodesTheSameBytes) {
   std::vector<cv::Vec4f> colours(1000);
-  for (cv::Vec4f& c : colours) c = {random_.uniform(-0.1f, 1.2f), random_.uniform(0.0f, 0.02f), random_.uniform(0.0f, 1.0f), random_.uniform(0.0f, 1.0f)};
+  for (cv::Vec4f& c : colours)
+    c = {random_.uniform(-0.1f, 1.2f), random_.uniform(0.0f, 0.02f), random_.uniform(0.0f, 1.0f),
+         random_.uniform(0.0f, 1.0f)};
   const NoiseField field(3);
   const NoiseRows noise{{field.row(5, 0), field.row(5, 1), field.row(5, 2)}};
   NoiseCurves curves;
-  for (int i = 0; i < 24; ++i) curves.start[i / 8][i % 8] = random_.uniform(0.0f, 4.0f), curves.rise[i / 8][i % 8] = random_.uniform(-0.01f, 0.01f);
+  for (int i = 0; i < 24; ++i)
+    curves.start[i / 8][i % 8] = random_.uniform(0.0f, 4.0f),
+                            curves.rise[i / 8][i % 8] = random_.uniform(-0.01f, 0.01f);
   for (const int count : {1, 7, 64, 65, 1000}) {
     std::vector<cv::Vec3b> plain(colours.size()), fast(colours.size());
     plainKernels().encode(curves, colours.data(), noise, 200, count, plain.data());
@@ -77,12 +82,14 @@ TEST_F(Avx2, SeesTheSameLight) {
   }
   ShadowTaps taps;
   taps.count = 24;
-  for (int k = 0; k < taps.count; ++k) taps.x[k] = random_.uniform(-0.7f, 0.7f), taps.y[k] = random_.uniform(-0.7f, 0.7f);
+  for (int k = 0; k < taps.count; ++k)
+    taps.x[k] = random_.uniform(-0.7f, 0.7f), taps.y[k] = random_.uniform(-0.7f, 0.7f);
   int between = 0;
   for (int i = 0; i < 500; ++i) {
     const float s = random_.uniform(-5.0f, 45.0f), t = random_.uniform(-5.0f, 45.0f), h = random_.uniform(-0.2f, 1.0f);
     const float plain = plainKernels().visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t, h, 6.0f);
-    EXPECT_EQ(avx2Kernels()->visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t, h, 6.0f), plain) << s << ", " << t;
+    EXPECT_EQ(avx2Kernels()->visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t, h, 6.0f), plain)
+        << s << ", " << t;
     between += plain > 0.0f && plain < 1.0f;
   }
   EXPECT_GT(between, 100);
@@ -93,13 +100,18 @@ TEST_F(Avx2, FillsTheSameTriangles) {
   for (const bool narrow : {true, false}) {
     std::vector<TriangleSpan> spans(200);
     for (TriangleSpan& s : spans) {
-      s.column_min = random_.uniform(0, 20), s.column_max = s.column_min + (narrow ? random_.uniform(0, 8) : random_.uniform(8, 20));
+      s.column_min = random_.uniform(0, 20),
+      s.column_max = s.column_min + (narrow ? random_.uniform(0, 8) : random_.uniform(8, 20));
       s.row_min = random_.uniform(0, 30), s.row_max = s.row_min + random_.uniform(0, 10);
-      for (int k = 0; k < 4; ++k) s.column[k] = random_.uniform(0.0f, 20.0f) + (k < 2 ? 0.0f : 20.0f), s.row[k] = random_.uniform(0.0f, 40.0f), s.slope[k] = random_.uniform(-2.0f, 2.0f);
-      s.near_u = random_.uniform(-0.1f, 0.1f), s.near_v = random_.uniform(-0.1f, 0.1f), s.near_0 = random_.uniform(0.0f, 5.0f);
+      for (int k = 0; k < 4; ++k)
+        s.column[k] = random_.uniform(0.0f, 20.0f) + (k < 2 ? 0.0f : 20.0f), s.row[k] = random_.uniform(0.0f, 40.0f),
+        s.slope[k] = random_.uniform(-2.0f, 2.0f);
+      s.near_u = random_.uniform(-0.1f, 0.1f), s.near_v = random_.uniform(-0.1f, 0.1f),
+      s.near_0 = random_.uniform(0.0f, 5.0f);
       s.id = static_cast<std::uint32_t>(&s - spans.data());
     }
-    const auto draw = [&](const Kernels& kernels, std::vector<std::uint32_t>& ids, std::vector<float>& nearness, std::vector<float>& alone) {
+    const auto draw = [&](const Kernels& kernels, std::vector<std::uint32_t>& ids, std::vector<float>& nearness,
+                          std::vector<float>& alone) {
       ids.assign(kRows * kStride, 999), nearness.assign(kRows * kStride, -1.0f), alone = nearness;
       kernels.fill(spans.data(), 200, {ids.data(), nearness.data(), kStride, 3, 35});
       kernels.fill(spans.data(), 200, {nullptr, alone.data(), kStride, 3, 35});
@@ -121,8 +133,11 @@ TEST_F(Avx2, DrawsTheSameSamples) {
   EdgeCoverage::Pixel fast = plain;
   for (std::uint32_t id = 0; id < 300; ++id) {
     TriangleSamples t;
-    for (int k = 0; k < 3; ++k) t.edge_u[k] = random_.uniform(-1.0f, 1.0f), t.edge_v[k] = random_.uniform(-1.0f, 1.0f), t.edge_0[k] = random_.uniform(-1.0f, 3.0f);
-    t.near_u = random_.uniform(-0.1f, 0.1f), t.near_v = random_.uniform(-0.1f, 0.1f), t.near_0 = random_.uniform(0.0f, 5.0f) + 0.01f * static_cast<float>(id);
+    for (int k = 0; k < 3; ++k)
+      t.edge_u[k] = random_.uniform(-1.0f, 1.0f), t.edge_v[k] = random_.uniform(-1.0f, 1.0f),
+      t.edge_0[k] = random_.uniform(-1.0f, 3.0f);
+    t.near_u = random_.uniform(-0.1f, 0.1f), t.near_v = random_.uniform(-0.1f, 0.1f),
+    t.near_0 = random_.uniform(0.0f, 5.0f) + 0.01f * static_cast<float>(id);
     plainKernels().drawSamples(t, 1, 2, id, plain);
     avx2Kernels()->drawSamples(t, 1, 2, id, fast);
     ASSERT_EQ(plain.ids, fast.ids);

@@ -23,7 +23,8 @@ const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
 TEST(TriangleMap, TellsWhatThePixelsShow) {
   const Surface surface = makeSurface(ballAt(kCentre));
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
-  turn.translate(kCentre + Eigen::Vector3d(0.05, 0.1, 0.02)).rotate(Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, 3).normalized()));
+  turn.translate(kCentre + Eigen::Vector3d(0.05, 0.1, 0.02))
+      .rotate(Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, 3).normalized()));
   const Actor actor = makeActor(surface, transformed(surface.object_vertices, turn), camera());
   Appearance appearance;
   appearance.key_camera = camera();
@@ -38,7 +39,8 @@ TEST(TriangleMap, TellsWhatThePixelsShow) {
       if (id == VisibilityBuffer::kNothing || maps[VisibilityBuffer::triangleOf(id)].thin) continue;
       const TriangleMap& map = maps[VisibilityBuffer::triangleOf(id)];
       const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u, v, eye);
-      ASSERT_LT((map.keyAt(u, v).cast<double>() - camera().projectWorld(p.key_position.cast<double>())).norm(), 0.01) << u << ", " << v;
+      ASSERT_LT((map.keyAt(u, v).cast<double>() - camera().projectWorld(p.key_position.cast<double>())).norm(), 0.01)
+          << u << ", " << v;
       ASSERT_LT((map.weightsAt(u, v) - p.weights).norm(), 2e-3f) << u << ", " << v;
       ++seen;
     }
@@ -83,13 +85,18 @@ TEST(OutsideWinding, LeavesOutOnlyWhatIsHidden) {
   }
   EXPECT_LE(different, 4);  // on the silhouette the two sides meet within the edges' tolerance
   const Eigen::Vector3d light(0.3, 0.2, 1.0);
-  const ShadowMap with({{&actor.vertices, &surface.triangles, surface.winding}}, light, {256, 0.02, 16}), without({{&actor.vertices, &surface.triangles}}, light, {256, 0.02, 16});
-  for (float x = -0.3f; x < 0.3f; x += 0.01f) EXPECT_NEAR(with.visibility({x, 0.1f, 0.0f}, Eigen::Vector3f::UnitZ()), without.visibility({x, 0.1f, 0.0f}, Eigen::Vector3f::UnitZ()), 0.02f) << x;
+  const ShadowMap with({{&actor.vertices, &surface.triangles, surface.winding}}, light, {256, 0.02, 16}),
+      without({{&actor.vertices, &surface.triangles}}, light, {256, 0.02, 16});
+  for (float x = -0.3f; x < 0.3f; x += 0.01f)
+    EXPECT_NEAR(with.visibility({x, 0.1f, 0.0f}, Eigen::Vector3f::UnitZ()),
+                without.visibility({x, 0.1f, 0.0f}, Eigen::Vector3f::UnitZ()), 0.02f)
+        << x;
 }
 
 TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
   const Surface surface = makeSurface(ballAt(kCentre));
-  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}}, sunlight().direction.cast<double>(), {512, 0.03, 16});
+  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}}, sunlight().direction.cast<double>(),
+                      {512, 0.03, 16});
   const PlaceView view(PlaneView(table(), camera()));
   const cv::Rect rect(13, 9, 120, 101);
   cv::Mat fast(rect.size(), CV_8U, cv::Scalar(255));
@@ -99,7 +106,8 @@ TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
     for (int u = 0; u < rect.width; ++u) {
       Receiver r;
       const float exact = view.at(u + rect.x, v + rect.y, r) ? sun.visibility(r.position, r.normal) : 1.0f;
-      ASSERT_NEAR(fast.at<std::uint8_t>(v, u) / 255.0f, exact, 0.16f) << u << ", " << v;  // half of what may lie between two places
+      ASSERT_NEAR(fast.at<std::uint8_t>(v, u) / 255.0f, exact, 0.16f)
+          << u << ", " << v;  // half of what may lie between two places
       shaded += exact < 0.5f;
     }
   }
