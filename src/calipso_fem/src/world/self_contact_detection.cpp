@@ -15,12 +15,12 @@ namespace {
 
 using Vertices = decltype(TriangleMesh::vertices);
 
-// Speeds of the vertices, m/s: against the body's motion as a rigid one where nothing stops a part of it.
-Eigen::VectorXd speedsOf(const SoftObject& soft, bool free) {
+// Speeds of the vertices against the body's motion as a rigid one, m/s; of their own speed so much is added as a
+// part of the body may lose at once.
+Eigen::VectorXd speedsOf(const SoftObject& soft, double stopped) {
   const Vec v = soft.body().surfaceVelocities();
   const Vertices& x = soft.vertices();
   const Eigen::Map<const Vertices> velocities(v.data(), x.rows(), 3);
-  if (!free) return velocities.rowwise().norm();
   const Eigen::RowVector3d center = x.colwise().mean(), mean = velocities.colwise().mean();
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
@@ -33,7 +33,8 @@ Eigen::VectorXd speedsOf(const SoftObject& soft, bool free) {
   Eigen::VectorXd speeds(x.rows());
   for (int i = 0; i < x.rows(); ++i) {
     const Eigen::Vector3d r = (x.row(i) - center).transpose();
-    speeds[i] = ((velocities.row(i) - mean).transpose() - spin.cross(r)).norm();
+    speeds[i] = ((velocities.row(i) - mean).transpose() - spin.cross(r)).norm() +
+                std::min(stopped, velocities.row(i).norm());
   }
   return speeds;
 }
@@ -101,7 +102,8 @@ void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft, cons
   const bool free = std::none_of(list.begin(), list.end(), [&](const Candidate& c) {
     return c.contact.soft_a == soft || c.contact.soft_b == soft;
   });
-  const Eigen::VectorXd speeds = speedsOf(*entry.soft, free);
+  constexpr double kStopped = 3.0;  // minimal distances in a step
+  const Eigen::VectorXd speeds = speedsOf(*entry.soft, free ? 0.0 : kStopped * reach / h);
   const double most = speeds.maxCoeff();
   const Eigen::Isometry3d motion = entry.soft->motion();
   if (self.staysFar(tree, motion, 2.0 * h * most)) return;
