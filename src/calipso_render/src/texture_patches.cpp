@@ -87,14 +87,19 @@ class PatternFill {
     return best;
   }
 
-  // An unknown triangle whose chart reaches what is known; where nothing known is connected, any.
+  // An unknown triangle whose chart reaches what is known, or else the nearest; none of a part of which nothing is known: it may
+  // be another thing (a balloon's ropes).
   int nextSeed(const std::vector<bool>& unknown) const {
     std::vector<bool> known = unknown;
     known.flip();
-    const int seed = farthest(unfolder_.distances(known), 0.5f * kRadius * pixel_);
+    const std::vector<float> distances = unfolder_.distances(known);
+    const int seed = farthest(distances, 0.5f * kRadius * pixel_);
     if (seed >= 0) return seed;
-    const auto any = std::find(unknown.begin(), unknown.end(), true);
-    return any == unknown.end() ? -1 : static_cast<int>(any - unknown.begin());
+    int nearest = -1;
+    for (std::size_t t = 0; t < unknown.size(); ++t) {
+      if (unknown[t] && std::isfinite(distances[t]) && (nearest < 0 || distances[t] < distances[nearest])) nearest = static_cast<int>(t);
+    }
+    return nearest;
   }
 
   ChartPicture draw(std::vector<FlatTriangle> triangles) const {
