@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kWholePx = 0.5f, kNonePx = 5.0f;  // movement up to which the residual goes along, and from which none does
 
-constexpr float kWholeSwaying = 0.05f, kNoneSwaying = 0.3f;  // ... of what moves or sways in the video, too: what is missed is how it did
+constexpr float kWholeSwaying = 0.05f, kNoneSwaying = 0.3f;  // ... of what sways in the video: what is missed is how it did
 
 constexpr float kMostChange = 3.0f;  // factor: what is missed by more, where a surface has moved, is misfit and not its look
 
@@ -223,7 +223,7 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
 // @param tint of the surface's new look, which what was missed takes on
 void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, const cv::Vec3f& tint, cv::Vec4f& colour) const {
   const float squared = moved.squaredNorm();
-  const bool sways = prepared_.moves[owner] || prepared_.sways[owner];
+  const bool sways = prepared_.sways[owner];
   const float none = sways ? kNoneSwaying : kNonePx;
   if (squared >= none * none) return;
   const float part = 1.0f - smoothStep(sways ? kWholeSwaying : kWholePx, none, std::sqrt(squared));
