@@ -88,7 +88,7 @@ class PatternFill {
   }
 
   // An unknown triangle whose chart reaches what is known, or else the nearest; none of a part of which nothing is known: it may
-  // be another thing (a balloon's ropes).
+  // be another thing.
   int nextSeed(const std::vector<bool>& unknown) const {
     std::vector<bool> known = unknown;
     known.flip();
