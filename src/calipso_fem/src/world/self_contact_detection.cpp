@@ -102,7 +102,7 @@ void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft, cons
   const bool free = std::none_of(list.begin(), list.end(), [&](const Candidate& c) {
     return c.contact.soft_a == soft || c.contact.soft_b == soft;
   });
-  constexpr double kStopped = 3.0;  // minimal distances in a step
+  constexpr double kStopped = 1.0;  // minimal distances in a step
   const Eigen::VectorXd speeds = speedsOf(*entry.soft, free ? 0.0 : kStopped * reach / h);
   const double most = speeds.maxCoeff();
   const Eigen::Isometry3d motion = entry.soft->motion();
