@@ -19,15 +19,17 @@ void addForce(Vec& surface, const SurfacePoint& point, const Eigen::Vector3d& fo
       surface.segment<3>(3 * point.vertices[k]) += point.weights[k] * force;
 }
 
-constexpr double kOverlapShare = 0.2;
-constexpr double kPushOutRate = 10.0;  // 1/s
+// Overlap that is undone: this share of it in a step, not faster than so many minimal distances a second. What is
+// left of a few hundredths of these stays: to push it out again and again would lift what lies there.
+constexpr double kOverlapShare = 0.2, kPushOutRate = 4.0, kOverlapLeft = 0.04;
 
 }  // namespace
 
 double allowance(const Contact& c, double h) {
   const double depth = c.offset - c.start_gap;
   if (depth <= 0.0) return 0.0;
-  return depth - std::min(kOverlapShare * depth, h * kPushOutRate * c.reach);
+  const double excess = std::max(0.0, depth - kOverlapLeft * c.reach);
+  return depth - std::min(kOverlapShare * excess, h * kPushOutRate * c.reach);
 }
 
 StepMotion::StepMotion(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,

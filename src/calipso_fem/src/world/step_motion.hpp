@@ -10,7 +10,7 @@
 namespace calipso::fem {
 
 // Violation at the start that may be left at the end, m: overlap from before the step is undone by a
-// share of it per step, and no faster than so many minimal distances per second, without a kick.
+// share of it per step, without a kick, but for a rest that stays.
 double allowance(const Contact& c, double h);
 
 // Where everything goes in the step that is being solved: the target of each deformable body, and

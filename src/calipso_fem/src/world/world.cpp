@@ -23,7 +23,7 @@ ContactParams contactParams(const WorldScene& scene, const WorldParams& params) 
   c.proximity = params.proximity > 0.0 ? params.proximity : 0.02 * size;
   c.iterations = params.contact_iterations;
   c.tolerance = params.contact_tolerance;
-  c.allowed_depth = 2e-3 * c.proximity;
+  c.allowed_depth = 6e-4 * c.proximity;
   return c;
 }
 
