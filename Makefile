@@ -10,7 +10,7 @@ JOBS := $(shell nproc)
 SOURCES := $(shell find src -type f)
 CATKIN := catkin_make -DCMAKE_BUILD_TYPE=Release -j$(JOBS)
 
-.PHONY: deps build demo test bench lint clean
+.PHONY: deps build demo test bench lint format clean
 
 deps:
 	@scripts/install_dependencies
@@ -41,6 +41,10 @@ bench: build
 
 lint: deps
 	catkin_lint src
+
+# As .clang-format says.
+format:
+	git ls-files 'src/*.cpp' 'src/*.hpp' 'src/*.inl' | xargs clang-format -i
 
 clean:
 	rm -rf build devel out

@@ -1,4 +1,5 @@
-// Segmentation against cv::grabCut with five iterations, on a textured 1280 x 720 picture drawn here.
+// Segmentation against cv::grabCut with five iterations, on a textured 1280 x 720 picture drawn
+// here.
 #include <benchmark/benchmark.h>
 
 #include <cmath>

@@ -35,7 +35,7 @@ class StageClock {
 // Stages A and B: similarity, affine, quadratic.
 struct LowOrderFit {
   LowOrderMap map;
-  LowOrderStep last;   // with the prior that it ended with
+  LowOrderStep last;  // with the prior that it ended with
 };
 
 LowOrderFit fitLowOrderStages(const FitProblem& problem, const AlignOptions& options,
@@ -72,11 +72,12 @@ Grids layGrids(const TriangleMesh& cad, const std::vector<ElasticStep>& steps) {
 // Where a stage left the model.
 struct ElasticOutcome {
   Placement placed;
-  std::string trouble;    // what went wrong; empty: nothing
+  std::string trouble;  // what went wrong; empty: nothing
 };
 
-ElasticOutcome fitOnGrid(const TriangleMesh& cad, const FitProblem& problem, const fem::VoxelGrid& grid,
-                         const Placement& placed, const ElasticStep& step) {
+ElasticOutcome fitOnGrid(const TriangleMesh& cad, const FitProblem& problem,
+                         const fem::VoxelGrid& grid, const Placement& placed,
+                         const ElasticStep& step) {
   std::shared_ptr<ElasticFit> fit;
   try {
     fit = std::make_shared<ElasticFit>(cad, grid, placed, step.fit);
@@ -92,13 +93,13 @@ ElasticOutcome fitOnGrid(const TriangleMesh& cad, const FitProblem& problem, con
                      " nodes has no solution: place the model closer, or correct the contour"};
 }
 
-// A model that is still far off somewhere starts again from where it is, with pairs from further away, as long
-// as it comes closer. Most are where they belong at once.
+// A model that is still far off somewhere starts again from where it is, with pairs from further
+// away, as long as it comes closer. Most are where they belong at once.
 Placement comeCloser(const TriangleMesh& cad, const FitProblem& problem, const fem::VoxelGrid& grid,
                      Placement placed, const ElasticStep& step) {
   constexpr int kMostRounds = 5;
-  constexpr double kFarOff = 0.015, kClose = 0.003;   // misfit
-  constexpr double kCloser = 0.9;                     // of what it was
+  constexpr double kFarOff = 0.015, kClose = 0.003;  // misfit
+  constexpr double kCloser = 0.9;                    // of what it was
   double before = misfit(assess(problem, placed(cad.vertices)));
   if (before < kFarOff) return placed;
   for (int round = 0; round < kMostRounds && before > kClose; ++round) {
@@ -113,9 +114,9 @@ Placement comeCloser(const TriangleMesh& cad, const FitProblem& problem, const f
 }
 
 // Stage C: the elastic body on finer and finer grids.
-ElasticOutcome fitElasticStages(const TriangleMesh& cad, const FitProblem& problem, const Placement& placed,
-                                const std::vector<ElasticStep>& steps, Grids& grids,
-                                StageClock& clock) {
+ElasticOutcome fitElasticStages(const TriangleMesh& cad, const FitProblem& problem,
+                                const Placement& placed, const std::vector<ElasticStep>& steps,
+                                Grids& grids, StageClock& clock) {
   ElasticOutcome outcome{placed, ""};
   for (size_t k = 0; k < steps.size() && outcome.trouble.empty(); ++k) {
     const fem::VoxelGrid grid = grids[k].get();
@@ -136,9 +137,9 @@ double sizeRatio(const Points& to, const Points& from) {
 
 // Covariance of motion and low-order deformation at the end of the fit, all of them left free.
 struct Posterior {
-  LowOrderMap here;   // the identity
+  LowOrderMap here;  // the identity
   Eigen::MatrixXd covariance;
-  Eigen::MatrixXd without_placement;   // the same, with the distance left to what was measured
+  Eigen::MatrixXd without_placement;  // the same, with the distance left to what was measured
 };
 
 Posterior posterior(const FitProblem& problem, const Points& x, const LowOrderStep& last) {
@@ -167,8 +168,8 @@ ShapeUncertainty uncertaintyOf(const FitProblem& problem, const Points& x, const
                           problem.model_size, unseen, likelihood);
 }
 
-// Of translation of the centroid (camera axes, m) and rotation about it (rad): what the deformation leaves open
-// moves and turns the best rigid motion, too.
+// Of translation of the centroid (camera axes, m) and rotation about it (rad): what the deformation
+// leaves open moves and turns the best rigid motion, too.
 Eigen::Matrix<double, 6, 6> rigidCovariance(const Points& x, const Posterior& end) {
   const RigidPart rigid = rigidPart(x, end.here);
   Eigen::Matrix<double, 6, LowOrderMap::kParameters> by_parameters;
@@ -253,7 +254,8 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
   result.contour_mean_px = quality.mean_px;
   result.contour_p95_px = quality.p95_px;
   result.residual_px = residualsPerLoop(problem, quality, contour);
-  const Verdict verdict = judge(problem, contour, quality, result.scale, result.distance_sigma, error);
+  const Verdict verdict =
+      judge(problem, contour, quality, result.scale, result.distance_sigma, error);
   result.trusted = verdict.trusted;
   result.reason = verdict.reason;
 }

@@ -21,9 +21,13 @@ cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, doubl
       const cv::Vec3f behind(background.image.at<cv::Vec3b>(y, x)), seen(view.at<cv::Vec3b>(y, x));
       const cv::Vec3f d = seen - behind;
       // A shadow may have come, or gone that was there when the background was seen.
-      const auto isShaded = [&] { return isShadowed(behind, seen, noise) || isShadowed(seen, behind, noise); };
-      if (d.dot(d) < same || isShaded()) accounts.at<uchar>(y, x) = kBackground;
-      else if (d.dot(d) > different) accounts.at<uchar>(y, x) = kOther;
+      const auto isShaded = [&] {
+        return isShadowed(behind, seen, noise) || isShadowed(seen, behind, noise);
+      };
+      if (d.dot(d) < same || isShaded())
+        accounts.at<uchar>(y, x) = kBackground;
+      else if (d.dot(d) > different)
+        accounts.at<uchar>(y, x) = kOther;
     }
   return accounts;
 }
@@ -47,7 +51,8 @@ cv::Mat connectedTo(const cv::Mat& mask, const cv::Mat& pixels) {
 
 cv::Mat contradicted(const cv::Mat& view, const cv::Mat& mask, const KnownBackground& background,
                      const cv::Mat& apart, double noise) {
-  constexpr double kStray = 0.02;  // of what is known beside the object: so much may differ by chance
+  constexpr double kStray =
+      0.02;  // of what is known beside the object: so much may differ by chance
   const cv::Mat accounts = accountsOf(view, background, noise);
   const cv::Mat object = mask > 0, elsewhere = apart > 0;
   // Single pixels that differ are noise, or the rim's mixtures.
@@ -55,9 +60,11 @@ cv::Mat contradicted(const cv::Mat& view, const cv::Mat& mask, const KnownBackgr
   cv::morphologyEx(other, opened, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   const cv::Mat gained = connectedTo(object, opened);
   const cv::Mat beside = background.known & ~object & ~elsewhere & ~gained;
-  if (cv::countNonZero(opened & ~gained) > kStray * cv::countNonZero(beside)) return cv::Mat::zeros(view.size(), CV_8U);
+  if (cv::countNonZero(opened & ~gained) > kStray * cv::countNonZero(beside))
+    return cv::Mat::zeros(view.size(), CV_8U);
   cv::Mat lost;
-  cv::morphologyEx((accounts == kBackground) & object, lost, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  cv::morphologyEx((accounts == kBackground) & object, lost, cv::MORPH_OPEN,
+                   cv::Mat::ones(3, 3, CV_8U));
   return gained | lost;
 }
 

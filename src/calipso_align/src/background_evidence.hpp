@@ -6,11 +6,11 @@
 
 namespace calipso::align {
 
-// Where a background that is known contradicts a mask: pixels beside it, in one piece with it, that the
-// background cannot be, and pixels of it that are the background, lit or in a shadow.
-// view   CV_8UC3; mask, apart: CV_8U, non-zero: the object, what belongs to something else
-// noise  of the background, grey levels
-// Returns CV_8U 0 or 255; nothing where so much else differs that the background cannot be relied on.
+// Where a background that is known contradicts a mask: pixels beside it, in one piece with it, that
+// the background cannot be, and pixels of it that are the background, lit or in a shadow. view
+// CV_8UC3; mask, apart: CV_8U, non-zero: the object, what belongs to something else noise  of the
+// background, grey levels Returns CV_8U 0 or 255; nothing where so much else differs that the
+// background cannot be relied on.
 cv::Mat contradicted(const cv::Mat& view, const cv::Mat& mask, const KnownBackground& background,
                      const cv::Mat& apart, double noise);
 

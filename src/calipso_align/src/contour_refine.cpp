@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 using Points = std::vector<Vector2d>;
 
 constexpr double kProfileStep = 0.5;  // px
-constexpr double kFlank = 2.0;        // px; further out than this a sample is pure fore- or background
+constexpr double kFlank = 2.0;  // px; further out than this a sample is pure fore- or background
 
 int wrap(int i, int n) { return ((i % n) + n) % n; }
 
@@ -83,8 +83,8 @@ Vector3d colourAt(const cv::Mat& image, const Vector2d& p) {
   const int x = static_cast<int>(u), y = static_cast<int>(v);
   const double a = u - x, b = v - y;
   const auto at = [&](int dx, int dy) {
-    const cv::Vec3b& c = image.at<cv::Vec3b>(std::min(y + dy, image.rows - 1),
-                                             std::min(x + dx, image.cols - 1));
+    const cv::Vec3b& c =
+        image.at<cv::Vec3b>(std::min(y + dy, image.rows - 1), std::min(x + dx, image.cols - 1));
     return Vector3d(c[0], c[1], c[2]);
   };
   return (1 - b) * ((1 - a) * at(0, 0) + a * at(1, 0)) + b * ((1 - a) * at(0, 1) + a * at(1, 1));
@@ -101,7 +101,8 @@ struct EdgeEstimate {
   double confidence;  // 0..1
 };
 
-// Mean colours on both sides of the edge, from samples that the mask gives to the object and to none.
+// Mean colours on both sides of the edge, from samples that the mask gives to the object and to
+// none.
 struct Sides {
   Vector3d fore = Vector3d::Zero(), back = Vector3d::Zero();
   int fore_count = 0, back_count = 0;
@@ -121,7 +122,8 @@ Sides sampleSides(const cv::Mat& image, const cv::Mat& labels, int label, double
 }
 
 // Centroid of the steepest fall of a profile alpha(s), 1 inside and 0 outside: unlike the integral
-// of alpha it does not follow the slow shading on either side. `share`: how much of the fall is there.
+// of alpha it does not follow the slow shading on either side. `share`: how much of the fall is
+// there.
 struct Fall {
   double position = 0.0, share = 0.0;
 };

@@ -51,8 +51,7 @@ double whiteNoise(const std::vector<Eigen::Vector2d>& p) {
   std::vector<double> differences;
   differences.reserve(2 * n);
   for (int i = 0; i < n; ++i) {
-    const Eigen::Vector2d d =
-        p[i] - 3.0 * p[(i + 1) % n] + 3.0 * p[(i + 2) % n] - p[(i + 3) % n];
+    const Eigen::Vector2d d = p[i] - 3.0 * p[(i + 1) % n] + 3.0 * p[(i + 2) % n] - p[(i + 3) % n];
     differences.push_back(std::abs(d.x()));
     differences.push_back(std::abs(d.y()));
   }
@@ -124,8 +123,7 @@ double appendLoop(const ContourLoop& loop, int index, double spacing, double noi
     const int source = static_cast<int>(s);
     const LocalFit fit = localQuadratic(loop.points, s, half);
     const Eigen::Vector2d tangent = fit.tangent.stableNormalized();
-    const Eigen::Vector2d pixel =
-        noise_px > kSmoothableNoisePx ? fit.point : loop.points[source];
+    const Eigen::Vector2d pixel = noise_px > kSmoothableNoisePx ? fit.point : loop.points[source];
     target.points.push_back({pixel, side * Eigen::Vector2d(tangent.y(), -tangent.x()),
                              length / count * loop.confidence[source], loop.known[source], index,
                              source});

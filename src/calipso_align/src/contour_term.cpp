@@ -10,7 +10,8 @@ namespace calipso::align {
 namespace {
 
 // For every query, the nearest candidate that is close enough and looks the same way; -1 for none.
-std::vector<int> nearest(const std::vector<Feature>& queries, const std::vector<Feature>& candidates,
+std::vector<int> nearest(const std::vector<Feature>& queries,
+                         const std::vector<Feature>& candidates,
                          const ContourTermOptions& options) {
   const float scale = static_cast<float>(options.normal_scale_px);
   // n.n >= cosine  <=>  |s n - s n'|^2 <= 2 s^2 (1 - cosine); without scale normals do not count.
@@ -57,8 +58,8 @@ void appendPair(const TargetPoint& data, const OutlinePoint& model, const Camera
   }
 }
 
-// Points of the outline at equal distances along it, so that neither short edges nor lattices of many
-// bars count for more than their length.
+// Points of the outline at equal distances along it, so that neither short edges nor lattices of
+// many bars count for more than their length.
 std::vector<int> spreadEvenly(const std::vector<OutlinePoint>& outline) {
   constexpr double kFinestPx = 2.0, kMostPoints = 800.0;
   double length = 0.0;

@@ -10,7 +10,8 @@ std::optional<DepthObservation> loadDepth(const Scene& scene) {
   if (scene.depth_path.empty()) return std::nullopt;
   const cv::Mat raw = cv::imread(scene.depth_path, cv::IMREAD_UNCHANGED);
   if (raw.empty()) {
-    throw std::runtime_error(scene.depth_path + " cannot be read as a picture: replace or remove it");
+    throw std::runtime_error(scene.depth_path +
+                             " cannot be read as a picture: replace or remove it");
   }
   if (raw.type() != CV_16UC1 || raw.cols != scene.camera.width || raw.rows != scene.camera.height) {
     throw std::runtime_error(scene.depth_path + " is " + std::to_string(raw.cols) + "x" +

@@ -92,10 +92,9 @@ Rows depthRows(const DepthTarget& target, const Points& x, const Triangles& tria
 
   std::vector<double> sizes;
   for (const PointRow& row : rows) sizes.push_back(std::abs(row.r));
-  const double deviation = std::clamp(1.4826 * median(sizes),
-                                      std::max(options.sigma, target.quantum), options.robust);
-  const double information =
-      std::min(1.0, options.samples / rows.size()) / (deviation * deviation);
+  const double deviation =
+      std::clamp(1.4826 * median(sizes), std::max(options.sigma, target.quantum), options.robust);
+  const double information = std::min(1.0, options.samples / rows.size()) / (deviation * deviation);
   for (PointRow& row : rows) row.weight = information * gemanMcClure(row.r, options.robust);
   return rows;
 }

@@ -13,8 +13,8 @@ namespace {
 using fem::BlockMatrix;
 using fem::Vec;
 
-// Nodes and weights that carry one vertex, nodes ascending, and where the blocks of their pairs (i, j),
-// i <= j, are: row by row.
+// Nodes and weights that carry one vertex, nodes ascending, and where the blocks of their pairs (i,
+// j), i <= j, are: row by row.
 struct Carrier {
   int nodes[8];
   double weights[8];
@@ -97,13 +97,13 @@ struct ElasticFit::Impl {
   FemStageOptions options;
   fem::VoxelGrid grid;
   fem::Embedding embedding;
-  Vec x, x0;                 // current and starting nodal positions, 3n
-  int free;                  // coordinates of a node that move: x, y, and z unless it is held
+  Vec x, x0;  // current and starting nodal positions, 3n
+  int free;   // coordinates of a node that move: x, y, and z unless it is held
   fem::ElasticModel model;
-  BlockMatrix K;             // of the linear model, which never changes; else of the last call
+  BlockMatrix K;  // of the linear model, which never changes; else of the last call
   std::vector<Carrier> carriers;
-  double volume, size;       // m^3, m
-  Eigen::SparseMatrix<double> A;   // lower half of the free coordinates' system
+  double volume, size;            // m^3, m
+  Eigen::SparseMatrix<double> A;  // lower half of the free coordinates' system
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver;
 
   Impl(const TriangleMesh& cad, const fem::VoxelGrid& g,
@@ -140,8 +140,8 @@ struct ElasticFit::Impl {
   }
 
   // Adds the measurements' gradient J^T W r, and a bound of J^T W J that stays inside K's pattern:
-  // (a0 x0 + a1 x1)^2 <= a0 x0^2 + a1 x1^2, each vertex in one cell. Of H's blocks only those on and
-  // above the diagonal, which solve() reads.
+  // (a0 x0 + a1 x1)^2 <= a0 x0^2 + a1 x1^2, each vertex in one cell. Of H's blocks only those on
+  // and above the diagonal, which solve() reads.
   void addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) const;
   void addVertex(int vertex, double share, const PointRow& row, BlockMatrix& H) const;
   void makePattern();
@@ -177,7 +177,8 @@ void ElasticFit::Impl::addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) 
   }
 }
 
-// The lower half's pattern: column `free j + c` holds the blocks (i, j), i >= j, from its diagonal down.
+// The lower half's pattern: column `free j + c` holds the blocks (i, j), i >= j, from its diagonal
+// down.
 void ElasticFit::Impl::makePattern() {
   const fem::BlockPattern& p = *model.pattern();
   A.resize(free * p.rows(), free * p.rows());
@@ -195,7 +196,7 @@ void ElasticFit::Impl::makePattern() {
   }
   A.outerIndexPtr()[free * p.rows()] = count;
   std::fill_n(A.valuePtr(), count, 1.0);
-  solver.cholmod().print = 0;   // what it would print, the report says
+  solver.cholmod().print = 0;  // what it would print, the report says
   solver.analyzePattern(A);
 }
 
@@ -262,7 +263,7 @@ double ElasticFit::Impl::energy(const Vec& at, const Vec& from, const Rows& rows
 Vec ElasticFit::Impl::lineSearch(const Vec& step, const Rows& rows, double weight,
                                  double slope) const {
   constexpr double kArmijo = 1e-4;
-  if (options.linear) return step;   // the energy is the quadratic form that the step minimises
+  if (options.linear) return step;  // the energy is the quadratic form that the step minimises
   const double start = energy(x, x, rows, weight);
   for (double t = 1.0; t > 0.01; t *= 0.5) {
     if (energy(x + t * step, x, rows, weight) <= start + kArmijo * t * slope) return t * step;
@@ -308,9 +309,9 @@ FemStageReport ElasticFit::fit(const std::function<Rows(const Points&, int)>& ob
     if (!step) break;
     const Vec taken = m.lineSearch(*step, rows, weight, gradient.dot(*step));
     m.x += taken;
-    const bool last_weight = report.iterations + 1 >= iterations ||
-                             m.options.elastic_weights[report.iterations] ==
-                                 m.options.elastic_weights.back();
+    const bool last_weight =
+        report.iterations + 1 >= iterations ||
+        m.options.elastic_weights[report.iterations] == m.options.elastic_weights.back();
     report.converged =
         last_weight && taken.lpNorm<Eigen::Infinity>() < m.options.smallest_step * m.size;
   }

@@ -98,14 +98,16 @@ void makeUnknown(TargetPoint& p, ContourTarget& target) {
 cv::Mat1b opened(const cv::Mat1b& mask, int radius) {
   cv::Mat1b result;
   const cv::Size size(2 * radius + 1, 2 * radius + 1);
-  cv::morphologyEx(mask, result, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_ELLIPSE, size));
+  cv::morphologyEx(mask, result, cv::MORPH_OPEN,
+                   cv::getStructuringElement(cv::MORPH_ELLIPSE, size));
   return result;
 }
 
-// Largest radius of an opening that leaves the model's silhouette as it is, give or take its corners.
+// Largest radius of an opening that leaves the model's silhouette as it is, give or take its
+// corners.
 int narrowestRadius(const cv::Mat1b& silhouette) {
   constexpr int kLargest = 4;
-  constexpr double kCorners = 0.003;   // of the area
+  constexpr double kCorners = 0.003;  // of the area
   const double area = cv::countNonZero(silhouette);
   for (int radius = kLargest; radius > 0; --radius) {
     if (cv::countNonZero(opened(silhouette, radius)) >= (1.0 - kCorners) * area) return radius;
@@ -113,8 +115,8 @@ int narrowestRadius(const cv::Mat1b& silhouette) {
   return 0;
 }
 
-// Spurs of the contour that are narrower than anything the model has are no part of it: what hides the
-// object or lies behind it was taken in.
+// Spurs of the contour that are narrower than anything the model has are no part of it: what hides
+// the object or lies behind it was taken in.
 void markSpurs(FitProblem& problem) {
   constexpr double kInsidePx = 0.75;
   const Camera& camera = problem.camera;
@@ -126,7 +128,8 @@ void markSpurs(FitProblem& problem) {
   cv::Mat1b inside;
   cv::copyMakeBorder(problem.inside, inside, radius, radius, radius, radius, cv::BORDER_REPLICATE);
   const cv::Mat1b spurs = inside & ~opened(inside, radius);
-  problem.foreign = spurs(cv::Rect(radius, radius, problem.inside.cols, problem.inside.rows)).clone();
+  problem.foreign =
+      spurs(cv::Rect(radius, radius, problem.inside.cols, problem.inside.rows)).clone();
   for (TargetPoint& p : problem.target.points) {
     const Eigen::Vector2d within = p.pixel - kInsidePx * p.normal;
     const cv::Point at(static_cast<int>(std::lround(within.x())) + radius,
@@ -138,10 +141,10 @@ void markSpurs(FitProblem& problem) {
 }
 
 // Where the surroundings are nearer than the object, the contour is the edge of what hides it. What
-// the object stands on is nearer too, but reaches the contour at the object's depth: the inverse depth
-// of a plane is linear in the picture.
+// the object stands on is nearer too, but reaches the contour at the object's depth: the inverse
+// depth of a plane is linear in the picture.
 void markHidden(const cv::Mat1f& depth, ContourTarget& target) {
-  constexpr double kReachPx = 4.0;     // beyond the pixels that mix two surfaces
+  constexpr double kReachPx = 4.0;  // beyond the pixels that mix two surfaces
   constexpr double kNearer = 1.05;
   for (TargetPoint& p : target.points) {
     const double inside = inverseDepth(depth, p.pixel - kReachPx * p.normal);
@@ -152,8 +155,8 @@ void markHidden(const cv::Mat1f& depth, ContourTarget& target) {
   }
 }
 
-// Where the object meets a support plane it may go on below, as a pier does under water: seen is only
-// that it reaches the plane.
+// Where the object meets a support plane it may go on below, as a pier does under water: seen is
+// only that it reaches the plane.
 void markContacts(const cv::Mat1f& depth, const Camera& camera,
                   const std::vector<SupportTarget>& supports, ContourTarget& target) {
   constexpr double kReachPx = 4.0, kSameDepth = 0.03;
@@ -162,7 +165,7 @@ void markContacts(const cv::Mat1f& depth, const Camera& camera,
                               (p.pixel.y() - camera.cy) / camera.fy, 1.0);
     const double inside = inverseDepth(depth, p.pixel - kReachPx * p.normal);
     for (const SupportTarget& support : supports) {
-      const double of_plane = support.normal.dot(ray) / support.offset;   // 1 / depth
+      const double of_plane = support.normal.dot(ray) / support.offset;  // 1 / depth
       if (inside > 0.0 && std::abs(of_plane / inside - 1.0) < kSameDepth) makeUnknown(p, target);
     }
   }
@@ -213,10 +216,10 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
 Rows measure(const FitProblem& problem, const Points& x, const MeasureSettings& settings) {
   constexpr double kOutlineStepPx = 2.0;
   const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
-  Rows rows = contourRows(
-      problem.target,
-      occludingContour(x, problem.topology, rendering, problem.camera, kOutlineStepPx),
-      problem.camera, settings.contour);
+  Rows rows =
+      contourRows(problem.target,
+                  occludingContour(x, problem.topology, rendering, problem.camera, kOutlineStepPx),
+                  problem.camera, settings.contour);
   const double information = 1.0 / (settings.contour_sigma_px * settings.contour_sigma_px *
                                     settings.contour_correlation_px);
   for (PointRow& row : rows) row.weight *= information;
@@ -225,8 +228,8 @@ Rows measure(const FitProblem& problem, const Points& x, const MeasureSettings& 
       depthRows(problem.depth, x, problem.topology.triangles(), rendering, problem.camera,
                 {settings.depth_robust * problem.model_size,
                  settings.depth_sigma * problem.model_size, settings.depth_samples});
-  const Rows support = supportRows(problem.supports, x, problem.camera,
-                                   settings.support_sigma * problem.model_size);
+  const Rows support =
+      supportRows(problem.supports, x, problem.camera, settings.support_sigma * problem.model_size);
   rows.insert(rows.end(), depth.begin(), depth.end());
   rows.insert(rows.end(), support.begin(), support.end());
   return rows;

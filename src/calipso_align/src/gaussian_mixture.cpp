@@ -64,7 +64,7 @@ std::vector<Cluster> splitByPrincipalAxis(const std::vector<cv::Vec3f>& samples,
       if (clusters[k].count < 2 * kMinSamples) continue;
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(clusters[k].covariance);
       const double thickness = eigen.eigenvalues()[0];
-      const double spread = split == Split::kWidest ? eigen.eigenvalues()[2]
+      const double spread = split == Split::kWidest            ? eigen.eigenvalues()[2]
                             : thickness > 2.0 * kNoiseVariance ? thickness * clusters[k].count
                                                                : 0.0;
       if (spread <= largest) continue;
@@ -107,7 +107,12 @@ GaussianMixture GaussianMixture::fit(const std::vector<cv::Vec3f>& samples, int 
       const double offset = -std::log(weight) + std::log(factor.diagonal().prod());
       model.components_.push_back({{static_cast<float>(c.mean[0]), static_cast<float>(c.mean[1]),
                                     static_cast<float>(c.mean[2])},
-                                   l(0, 0), l(1, 0), l(1, 1), l(2, 0), l(2, 1), l(2, 2),
+                                   l(0, 0),
+                                   l(1, 0),
+                                   l(1, 1),
+                                   l(2, 0),
+                                   l(2, 1),
+                                   l(2, 2),
                                    static_cast<float>(offset)});
     }
   };
@@ -130,7 +135,8 @@ GaussianMixture GaussianMixture::fit(const std::vector<cv::Vec3f>& samples, int 
 
 float GaussianMixture::cost(const cv::Vec3f& sample) const {
   float best = std::numeric_limits<float>::max();
-  for (const Component& c : components_) best = std::min(best, c.offset + 0.5f * squaredDistance(c, sample));
+  for (const Component& c : components_)
+    best = std::min(best, c.offset + 0.5f * squaredDistance(c, sample));
   return best;
 }
 

@@ -14,7 +14,8 @@ namespace calipso::align {
 namespace {
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
 }
 
 cv::Mat readImage(const std::string& path, int flags) {
@@ -44,8 +45,8 @@ ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
     constexpr double kLeastTolerancePx = 1.5;
     const AlignmentResult fit = align(mesh, camera, rough, contour, options);
     if (!fit.placed) return std::nullopt;
-    const Points x = transformed(camera.world_from_camera.inverse() * fit.world_from_object,
-                                 fit.mesh.vertices);
+    const Points x =
+        transformed(camera.world_from_camera.inverse() * fit.world_from_object, fit.mesh.vertices);
     const DepthRendering rendering = renderDepth(x, mesh.triangles, camera);
     ModelView view{maskOf(rendering, camera), cv::Mat1f::zeros(camera.height, camera.width),
                    std::max(kLeastTolerancePx, 2.0 * fit.met_mean_px)};
@@ -76,16 +77,23 @@ std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
   std::vector<SegmentationTarget> targets;
   for (const SceneObject& object : scene.objects) {
     const cv::Rect rect(object.rect[0], object.rect[1], object.rect[2], object.rect[3]);
-    targets.push_back({object.name, object.index, rect, {}, placedSilhouette(scene, object),
+    targets.push_back({object.name,
+                       object.index,
+                       rect,
+                       {},
+                       placedSilhouette(scene, object),
                        modelFitter(scene, object, depth)});
   }
   return targets;
 }
 
-cv::Mat loadKeyImage(const Scene& scene) { return readImage(framePath(scene, 0), cv::IMREAD_COLOR); }
+cv::Mat loadKeyImage(const Scene& scene) {
+  return readImage(framePath(scene, 0), cv::IMREAD_COLOR);
+}
 
 cv::Mat loadStrokes(const Scene& scene) {
-  return scene.strokes_path.empty() ? cv::Mat() : readImage(scene.strokes_path, cv::IMREAD_GRAYSCALE);
+  return scene.strokes_path.empty() ? cv::Mat()
+                                    : readImage(scene.strokes_path, cv::IMREAD_GRAYSCALE);
 }
 
 std::vector<ObjectContour> extractContours(const cv::Mat& image, const cv::Mat& labels,

@@ -21,7 +21,10 @@ class ExpansionMove {
  public:
   ExpansionMove(const cv::Mat& image, const cv::Mat& free, const std::vector<cv::Mat>& costs,
                 const SmoothnessParams& params, const Relief* relief)
-      : image_(image), free_(free), costs_(costs), params_(params),
+      : image_(image),
+        free_(free),
+        costs_(costs),
+        params_(params),
         relief_(relief && relief->registered ? relief : nullptr),
         beta_(params.contrast_scale > 0.0f ? params.contrast_scale : contrastScale(image, free)),
         node_(free.size(), CV_32S) {}
@@ -52,7 +55,8 @@ class ExpansionMove {
   }
 
   float weight(int x, int y, int dx, int dy) const {
-    const float d = squaredDistance(image_.at<cv::Vec3b>(y, x), image_.at<cv::Vec3b>(y + dy, x + dx));
+    const float d =
+        squaredDistance(image_.at<cv::Vec3b>(y, x), image_.at<cv::Vec3b>(y + dy, x + dx));
     float similarity = params_.floor + (1.0f - params_.floor) * std::exp(-beta_ * d);
     if (relief_) {
       const float j = jump(*relief_, {x, y}, {dx, dy});

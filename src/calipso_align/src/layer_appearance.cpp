@@ -28,7 +28,7 @@ double noiseOf(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
 }
 
 cv::Mat relit(const cv::Mat& image, const cv::Mat& other, const cv::Mat& same) {
-  const cv::Size kWindow(13, 13);  // px; light changes slowly
+  const cv::Size kWindow(13, 13);                           // px; light changes slowly
   const float kFaint = static_cast<float>(kWindow.area());  // one grey level all over the window
   cv::Mat here = cv::Mat::zeros(image.size(), CV_8UC3), there = here.clone(), from, to;
   image.copyTo(here, same);
@@ -61,13 +61,14 @@ float Expectation::cost(const cv::Vec3f& seen, int x, int y) const {
 
 namespace {
 
-constexpr float kDarkest = 0.3f, kLightest = 0.97f;   // of a shadow, in the picture's own gamma
-constexpr float kDeep = 0.92f;   // darker than this: no change of exposure
-constexpr float kTint = 0.05f;   // of what a shadow takes in brightness: the sky that still lights it
+constexpr float kDarkest = 0.3f, kLightest = 0.97f;  // of a shadow, in the picture's own gamma
+constexpr float kDeep = 0.92f;                       // darker than this: no change of exposure
+constexpr float kTint =
+    0.05f;  // of what a shadow takes in brightness: the sky that still lights it
 
 // What is left of a colour when the shadow that comes closest is put on it.
 struct Darkened {
-  float factor, squared_rest, tint;   // tint: how far off the rest may be, grey levels
+  float factor, squared_rest, tint;  // tint: how far off the rest may be, grey levels
 };
 
 Darkened darkened(const cv::Vec3f& lit, const cv::Vec3f& seen) {
@@ -92,7 +93,8 @@ bool isShadowed(const cv::Vec3f& lit, const cv::Vec3f& seen, double noise) {
 // colour: the sky that still lights a shadow has another tint than the sun.
 float Shadow::cost(const cv::Vec3f& seen, int x, int y) const {
   if (colour.empty()) return kForbidden;
-  constexpr float kFreedom = 3.0f, kNormaliser = 1.84f;  // -log of the density's constant in the plane
+  constexpr float kFreedom = 3.0f,
+                  kNormaliser = 1.84f;  // -log of the density's constant in the plane
   const float likely = share.at<uchar>(y, x) / 255.0f;
   if (!(likely > 0.0f)) return kForbidden;
   const cv::Vec3f lit(colour.at<cv::Vec3b>(y, x));
@@ -106,16 +108,17 @@ float Shadow::cost(const cv::Vec3f& seen, int x, int y) const {
 
 Shadow shadowOn(const cv::Mat& background, const cv::Mat& view, const cv::Mat& clear, double noise,
                 const std::vector<const GaussianMixture*>& object) {
-  const cv::Size kWindow(21, 21);   // px
+  const cv::Size kWindow(21, 21);    // px
   constexpr double kChance = 0.002;  // of the clear pixels: so few look shaded without any shadow
-  constexpr float kFewest = 0.02f;  // share of the window that must be clear
+  constexpr float kFewest = 0.02f;   // share of the window that must be clear
   Shadow shadow{background, cv::Mat(view.size(), CV_8U, cv::Scalar(255)), noise};
   const auto isShaded = [&](int x, int y) {
     const cv::Vec3f colour(view.at<cv::Vec3b>(y, x));
     if (!isShadowed(background.at<cv::Vec3b>(y, x), colour, noise)) return false;
     const float cost = shadow.cost(colour, x, y);
-    return std::all_of(object.begin(), object.end(),
-                       [&](const GaussianMixture* colours) { return colours->cost(colour) > cost; });
+    return std::all_of(object.begin(), object.end(), [&](const GaussianMixture* colours) {
+      return colours->cost(colour) > cost;
+    });
   };
   cv::Mat seen, shaded(view.size(), CV_32F, cv::Scalar(0));
   cv::Mat(clear > 0).convertTo(seen, CV_32F, 1.0 / 255.0);

@@ -19,7 +19,8 @@ struct Sample {
 
 using Affine = Eigen::Matrix<double, 2, 3>;
 
-std::vector<Sample> samplesUnder(const cv::Mat& support, const cv::Mat& flow, const cv::Point2d& centre) {
+std::vector<Sample> samplesUnder(const cv::Mat& support, const cv::Mat& flow,
+                                 const cv::Point2d& centre) {
   const int total = cv::countNonZero(support);
   const int step = std::max<int>(1, total / static_cast<int>(kMaxSamples));
   std::vector<Sample> samples;

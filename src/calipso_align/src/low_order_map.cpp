@@ -14,9 +14,7 @@ Eigen::Matrix<double, 6, 1> monomials(const Eigen::Vector3d& y) {
 // Column k is d(E y)/dE_k for E = (xx, yy, zz, xy, xz, yz).
 Eigen::Matrix<double, 3, 6> strainBasis(const Eigen::Vector3d& y) {
   Eigen::Matrix<double, 3, 6> b;
-  b << y.x(), 0, 0, y.y(), y.z(), 0,
-       0, y.y(), 0, y.x(), 0, y.z(),
-       0, 0, y.z(), 0, y.x(), y.y();
+  b << y.x(), 0, 0, y.y(), y.z(), 0, 0, y.y(), 0, y.x(), 0, y.z(), 0, 0, y.z(), 0, y.x(), y.y();
   return b;
 }
 

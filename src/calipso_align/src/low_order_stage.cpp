@@ -14,8 +14,7 @@ using Map = LowOrderMap;
 using Hessian = Eigen::Matrix<double, Map::kParameters, Map::kParameters>;
 
 double informationOf(double deviation) {
-  return deviation > 0.0 ? 1.0 / (deviation * deviation)
-                         : std::numeric_limits<double>::infinity();
+  return deviation > 0.0 ? 1.0 / (deviation * deviation) : std::numeric_limits<double>::infinity();
 }
 
 // s_i of a coefficient of the deformation: what it deviates by, in units of a.
@@ -38,8 +37,9 @@ NormalEquations assemble(const Points& X, const Rows& rows, const Map& map, int 
   NormalEquations normal;
   int filled = 0;
   const auto flush = [&] {
-    normal.H.topLeftCorner(count, count).selfadjointView<Eigen::Lower>().rankUpdate(
-        panel.leftCols(filled));
+    normal.H.topLeftCorner(count, count)
+        .selfadjointView<Eigen::Lower>()
+        .rankUpdate(panel.leftCols(filled));
     filled = 0;
   };
   for (const PointRow& row : rows) {
@@ -111,7 +111,8 @@ double estimateDeformation(const Map::Parameters& p, const Hessian& C, const Map
   }
   if (!(gamma > 0.0)) return a;
   const double count = std::max(gamma - 2.0, gamma / 3.0);
-  const double estimate = std::clamp(std::sqrt(sum / count), a / kLargestChange, a * kLargestChange);
+  const double estimate =
+      std::clamp(std::sqrt(sum / count), a / kLargestChange, a * kLargestChange);
   return std::clamp(estimate, kLeast, kLargest);
 }
 
@@ -140,9 +141,8 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
   LowOrderReport report;
   for (; report.iterations < options.iterations && !report.converged; ++report.iterations) {
     const Map::Parameters info = information(prior);
-    NormalEquations normal =
-        assemble(X, observe(map.apply(X), report.iterations, prior.deformation), map,
-                 leadingFree(info));
+    NormalEquations normal = assemble(
+        X, observe(map.apply(X), report.iterations, prior.deformation), map, leadingFree(info));
     addPlacement(X, prior, map, normal);
     addPrior(info, map.parameters(), normal);
     const Eigen::LDLT<Hessian> factor(normal.H);
@@ -158,8 +158,8 @@ LowOrderReport fitLowOrder(const Points& X, const Observe& observe,
     report.converged = length < options.smallest_step;
     if (options.estimate_deformation) {
       const double before = prior.deformation;
-      prior.deformation = estimateDeformation(map.parameters(), factor.solve(Hessian::Identity()),
-                                              info, before);
+      prior.deformation =
+          estimateDeformation(map.parameters(), factor.solve(Hessian::Identity()), info, before);
       constexpr double kSettled = 0.05;
       report.converged &= std::abs(prior.deformation - before) < kSettled * before;
     }

@@ -15,11 +15,13 @@ namespace calipso::align {
 namespace {
 
 constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
-constexpr int kLargeView = 200;      // px; from here on half the resolution tells how a layer moves nearly as well
+constexpr int kLargeView =
+    200;  // px; from here on half the resolution tells how a layer moves nearly as well
 constexpr int kMeanSize = 4;  // px; blocks over which stillness averages the sensor's noise away
 constexpr size_t kMaxSamples = 2000;
 constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has proved wrong
-constexpr int kAnyShadow = 76;       // of 255: how likely a pixel may lie in a shadow where nothing is known of any
+constexpr int kAnyShadow =
+    76;  // of 255: how likely a pixel may lie in a shadow where nothing is known of any
 constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
 
 cv::Mat blockMeans(const cv::Mat& image) {
@@ -67,7 +69,8 @@ cv::Mat signedDistance(const cv::Mat& mask) {
 cv::Mat insideOf(const cv::Mat& mask) {
   for (const int rim : {4, 2, 1}) {
     cv::Mat core;
-    cv::erode(mask, core, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * rim + 1, 2 * rim + 1)));
+    cv::erode(mask, core,
+              cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * rim + 1, 2 * rim + 1)));
     if (4 * cv::countNonZero(core) > cv::countNonZero(mask)) return core;
   }
   return mask;
@@ -138,8 +141,8 @@ TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
     const cv::Point shift = coarseShift(*object, means);
     const cv::Mat flow = backwardFlow(grey, *object, shift);
     const bool told = !prior.empty() && cv::countNonZero(prior == object->label) > 0;
-    follow(*object, image, flow, told ? cv::Mat(prior == object->label) : predict(*object, flow, shift),
-           told);
+    follow(*object, image, flow,
+           told ? cv::Mat(prior == object->label) : predict(*object, flow, shift), told);
     object->reference_mean = means;
   }
   rememberBackground(image);
@@ -161,8 +164,10 @@ TrackedMask MaskTracker::combine(int moved) const {
 void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& flow,
                          const cv::Mat& rough, bool exact) {
   const cv::Rect roi = around(rough, params_.margin_px);
-  if (roi.empty()) lose(object);
-  else settle(object, image, flow, rough(roi), exact, roi);
+  if (roi.empty())
+    lose(object);
+  else
+    settle(object, image, flow, rough(roi), exact, roi);
 }
 
 void MaskTracker::lose(Object& object) const {
@@ -192,10 +197,12 @@ KnownBackground MaskTracker::backgroundIn(const cv::Rect& roi, const cv::Mat& im
   const KnownBackground remembered{background_.image(roi), background_.known(roi)};
   const cv::Mat free = ~grown(occupied_, kClearance), visible = free(roi);
   constexpr double kSensorNoise = 4.0;  // grey levels; not more differs where nothing moves
-  if (cv::countNonZero(visible) == 0 || noiseOf(image(roi), remembered.image, visible) <= kSensorNoise)
+  if (cv::countNonZero(visible) == 0 ||
+      noiseOf(image(roi), remembered.image, visible) <= kSensorNoise)
     return remembered;
   const cv::Mat motion = layerMotion(flow, free, roi);
-  const KnownBackground moved{movedBack(previous_image_, motion, roi), movedBack(free, motion, roi) > 250};
+  const KnownBackground moved{movedBack(previous_image_, motion, roi),
+                              movedBack(free, motion, roi) > 250};
   return meanDifference(image(roi), remembered.image, visible) <=
                  meanDifference(image(roi), moved.image, visible)
              ? remembered
@@ -223,8 +230,8 @@ bool MaskTracker::isStill(const Object& object, const cv::Mat& means) const {
 cv::Point MaskTracker::coarseShift(const Object& object, const cv::Mat& means) const {
   const cv::Rect box = cv::boundingRect(object.mask);
   if (box.empty()) return {};
-  const cv::Rect cells = cv::Rect(box.tl() / kMeanSize, box.size() / kMeanSize) &
-                         cv::Rect(cv::Point(), means.size());
+  const cv::Rect cells =
+      cv::Rect(box.tl() / kMeanSize, box.size() / kMeanSize) & cv::Rect(cv::Point(), means.size());
   if (cells.width < 2 || cells.height < 2) return {};
   const int reach = params_.search_px / kMeanSize;
   const cv::Rect search = grown(cells, reach) & cv::Rect(cv::Point(), means.size());
@@ -238,8 +245,8 @@ cv::Point MaskTracker::coarseShift(const Object& object, const cv::Mat& means) c
   return std::abs(moved.x) > 2 || std::abs(moved.y) > 2 ? moved * kMeanSize : cv::Point();
 }
 
-// Backward flow, current to previous frame, near where an object went; zero elsewhere. What the object
-// moved as a whole is taken out first: the flow then has only the rest to find.
+// Backward flow, current to previous frame, near where an object went; zero elsewhere. What the
+// object moved as a whole is taken out first: the flow then has only the rest to find.
 cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey, const Object& object,
                                   const cv::Point& shift) const {
   const cv::Rect whole(cv::Point(), size_);
@@ -262,9 +269,10 @@ cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey, const Object& object,
   return flow;
 }
 
-// Roughly where an object is now: where its pixels flowed, or where it went as a whole if that is far,
-// for then the background's own flow leads back to where the object was.
-cv::Mat MaskTracker::predict(const Object& object, const cv::Mat& flow, const cv::Point& shift) const {
+// Roughly where an object is now: where its pixels flowed, or where it went as a whole if that is
+// far, for then the background's own flow leads back to where the object was.
+cv::Mat MaskTracker::predict(const Object& object, const cv::Mat& flow,
+                             const cv::Point& shift) const {
   if (shift == cv::Point()) return movedBack(object.mask, flow, cv::Rect(cv::Point(), size_)) > 127;
   cv::Mat moved;
   cv::warpAffine(object.mask, moved, cv::Matx23d(1, 0, shift.x, 0, 1, shift.y), size_);
@@ -272,14 +280,16 @@ cv::Mat MaskTracker::predict(const Object& object, const cv::Mat& flow, const cv
 }
 
 // Costs of a pixel's being background [0] or object [1], over a band along the predicted outline.
-std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
-                                          const LayerAppearance& back, const LayerAppearance& fore,
-                                          float prior_limit) const {
-  // Log odds of a pixel's centre lying across the outline although it was predicted at this distance.
+std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& band,
+                                          const cv::Mat& distance, const LayerAppearance& back,
+                                          const LayerAppearance& fore, float prior_limit) const {
+  // Log odds of a pixel's centre lying across the outline although it was predicted at this
+  // distance.
   const auto prior = [&](float d) {
     return std::clamp(params_.prior_cost * (d - 0.5f), 0.0f, prior_limit);
   };
-  std::vector<cv::Mat> costs = {cv::Mat::zeros(view.size(), CV_32F), cv::Mat::zeros(view.size(), CV_32F)};
+  std::vector<cv::Mat> costs = {cv::Mat::zeros(view.size(), CV_32F),
+                                cv::Mat::zeros(view.size(), CV_32F)};
   for (int y = 0; y < view.rows; ++y)
     for (int x = 0; x < view.cols; ++x) {
       if (!band.at<uchar>(y, x)) continue;
@@ -292,7 +302,8 @@ std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& ba
 }
 
 // Pixels (CV_8U, of roi's size) that are rather another object's, near where one was.
-cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view, const cv::Rect& roi) const {
+cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view,
+                              const cv::Rect& roi) const {
   const cv::Mat near = grown(occupied_ & ~object.mask, params_.margin_px / 2)(roi);
   cv::Mat others = cv::Mat::zeros(view.size(), CV_8U);
   for (int y = 0; y < view.rows; ++y)
@@ -306,14 +317,16 @@ cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view, const c
   return others;
 }
 
-// Cuts where a prediction has proved wrong: by what is known of the background, in a shadow or not, and
-// by the object's colours.
-void MaskTracker::cutByLooks(const cv::Mat& view, const cv::Mat& free, const cv::Mat& distance, const cv::Mat& known,
-                             LayerAppearance back, const std::vector<const GaussianMixture*>& colours,
+// Cuts where a prediction has proved wrong: by what is known of the background, in a shadow or not,
+// and by the object's colours.
+void MaskTracker::cutByLooks(const cv::Mat& view, const cv::Mat& free, const cv::Mat& distance,
+                             const cv::Mat& known, LayerAppearance back,
+                             const std::vector<const GaussianMixture*>& colours,
                              cv::Mat& labels) const {
   back.shadow.share = cv::max(back.shadow.share, known & kAnyShadow);
   const LayerAppearance looks{{}, colours};
-  cutLabels(view, free, costsOf(view, free, distance, back, looks, kLoosePrior), params_.smoothness, labels);
+  cutLabels(view, free, costsOf(view, free, distance, back, looks, kLoosePrior), params_.smoothness,
+            labels);
 }
 
 void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& flow,
@@ -348,13 +361,15 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   const double back_noise = noiseOf(view, background.image, clear);
   // What hides the object may move along with it.
   const Shadow shadow = shadowOn(background.image, view, clear, back_noise, fore.colours);
-  const LayerAppearance back{{{background.image, background.known, 0.6f, back_noise},
-                              {relit(background.image, view, clear), background.known, 0.37f, back_noise},
-                              {moved, ~coverage, 0.02f, noise}},
-                             {&ring_colours},
-                             shadow};
+  const LayerAppearance back{
+      {{background.image, background.known, 0.6f, back_noise},
+       {relit(background.image, view, clear), background.known, 0.37f, back_noise},
+       {moved, ~coverage, 0.02f, noise}},
+      {&ring_colours},
+      shadow};
   cv::Mat labels = predicted / 255;
-  cutLabels(view, band, costsOf(view, band, distance, back, fore, params_.prior_limit), params_.smoothness, labels);
+  cutLabels(view, band, costsOf(view, band, distance, back, fore, params_.prior_limit),
+            params_.smoothness, labels);
 
   const double area = cv::countNonZero(labels);
   if (!exact) {
@@ -367,14 +382,16 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
     }
   }
   const double flipped = cv::countNonZero((labels > 0) != (predicted > 0));
-  object.confidence = static_cast<float>(std::clamp(1.0 - 4.0 * flipped / std::max(1.0, area), 0.0, 1.0));
+  object.confidence =
+      static_cast<float>(std::clamp(1.0 - 4.0 * flipped / std::max(1.0, area), 0.0, 1.0));
   cv::Mat mask = labels > 0;
   object.coverage = cv::Mat::zeros(size_, CV_8U);
   settleEdge(view, cv::Mat(), background, back_noise, mask).copyTo(object.coverage(roi));
   object.mask = cv::Mat::zeros(size_, CV_8U);
   mask.copyTo(object.mask(roi));
   if (object.confidence > kSureEnough && cv::countNonZero(mask) > 0)
-    object.recent_colours = GaussianMixture::fit(coloursUnder(view, insideOf(mask)), params_.components);
+    object.recent_colours =
+        GaussianMixture::fit(coloursUnder(view, insideOf(mask)), params_.components);
 }
 
 }  // namespace calipso::align

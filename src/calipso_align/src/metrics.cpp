@@ -13,7 +13,8 @@ namespace calipso::align {
 namespace {
 
 // Distance of p to the polygon's nearest segment.
-double distanceToLoops(const Eigen::Vector2d& p, const std::vector<ContourLoop>& loops, bool& known) {
+double distanceToLoops(const Eigen::Vector2d& p, const std::vector<ContourLoop>& loops,
+                       bool& known) {
   double best = std::numeric_limits<double>::max();
   for (const ContourLoop& loop : loops) {
     const size_t n = loop.points.size();
@@ -65,7 +66,7 @@ ContourError errorBetween(const std::vector<ContourLoop>& contour,
   return error;
 }
 
-constexpr double kOutlineStepPx = 0.25;   // an eighth of a pixel at most is added
+constexpr double kOutlineStepPx = 0.25;  // an eighth of a pixel at most is added
 
 // 255 where the background is joined to the picture's border.
 cv::Mat1b openBackground(const cv::Mat1b& mask) {
@@ -89,8 +90,7 @@ ContourError hullError(const std::vector<ContourLoop>& contour, const Points& x,
   const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
   const cv::Mat1b open = openBackground(maskOf(rendering, camera));
   std::vector<OutlinePoint> hull;
-  for (const OutlinePoint& p :
-       occludingContour(x, topology, rendering, camera, kOutlineStepPx)) {
+  for (const OutlinePoint& p : occludingContour(x, topology, rendering, camera, kOutlineStepPx)) {
     const Eigen::Vector2d beyond = p.pixel + p.normal;
     const cv::Point at(static_cast<int>(std::lround(beyond.x())) + 1,
                        static_cast<int>(std::lround(beyond.y())) + 1);

@@ -22,7 +22,8 @@ float inverseDepth(const Relief& relief, const cv::Point& p) {
 
 // How far the inverse depth bends at a pixel; negative: it or a neighbour has no surface.
 float bend(const Relief& relief, const cv::Point& p, const cv::Point& step) {
-  if (!isSurface(relief, p - step) || !isSurface(relief, p) || !isSurface(relief, p + step)) return -1.0f;
+  if (!isSurface(relief, p - step) || !isSurface(relief, p) || !isSurface(relief, p + step))
+    return -1.0f;
   return std::abs(inverseDepth(relief, p - step) - 2.0f * inverseDepth(relief, p) +
                   inverseDepth(relief, p + step));
 }
@@ -58,7 +59,7 @@ struct PlaneFit {
     qq += q * q;
   }
   double count() const { return A(0, 0); }
-  double deviation() const {   // r.m.s.
+  double deviation() const {  // r.m.s.
     return std::sqrt(std::max(0.0, qq - b.dot(A.ldlt().solve(b))) / count());
   }
 };
@@ -73,7 +74,7 @@ cv::Mat withRims(const Relief& relief, const cv::Mat& pieces, float crease) {
       for (const cv::Point& step : {kRight, -kRight, kDown, -kDown}) {
         const cv::Point inner = p + step;
         if (!isSurface(relief, inner) || pieces.at<int>(inner) == 0) continue;
-        const float b = bend(relief, inner, step);   // of p, inner and the one behind it
+        const float b = bend(relief, inner, step);  // of p, inner and the one behind it
         if (b < 0.0f || b > crease) continue;
         result.at<int>(p) = pieces.at<int>(inner);
         break;
@@ -100,12 +101,14 @@ cv::Mat planarPieces(const Relief& relief) {
     for (int x = 0; x < cols; ++x)
       for (const cv::Point& step : {kRight, kDown}) {
         const cv::Point next = cv::Point(x, y) + step;
-        if (next.x >= cols || next.y >= rows || !flat.at<uchar>(y, x) || !flat.at<uchar>(next)) continue;
+        if (next.x >= cols || next.y >= rows || !flat.at<uchar>(y, x) || !flat.at<uchar>(next))
+          continue;
         sets.join(y * cols + x, next.y * cols + next.x);
       }
 
   std::vector<PlaneFit> planes(static_cast<size_t>(rows) * cols);
-  std::vector<double> first(planes.size());   // q relative to the piece's first pixel keeps its digits
+  std::vector<double> first(
+      planes.size());  // q relative to the piece's first pixel keeps its digits
   const auto each = [&](const auto& action) {
     for (int y = 0; y < rows; ++y)
       for (int x = 0; x < cols; ++x)
@@ -113,7 +116,8 @@ cv::Mat planarPieces(const Relief& relief) {
   };
   each([&](int x, int y, int piece) {
     if (planes[piece].count() == 0.0) first[piece] = inverseDepth(relief, {x, y});
-    planes[piece].add(x - piece % cols, y - piece / cols, inverseDepth(relief, {x, y}) - first[piece]);
+    planes[piece].add(x - piece % cols, y - piece / cols,
+                      inverseDepth(relief, {x, y}) - first[piece]);
   });
   std::vector<int> number(planes.size(), 0);
   int count = 0;

@@ -10,9 +10,9 @@
 namespace calipso::align {
 namespace {
 
-constexpr float kNoiseUnits = 2.0f;      // GaussianMixture's noise
+constexpr float kNoiseUnits = 2.0f;  // GaussianMixture's noise
 constexpr size_t kMaxSamples = 3000;
-constexpr float kOpenJump = 1e6f;        // between a surface and nothing
+constexpr float kOpenJump = 1e6f;  // between a surface and nothing
 
 float quantile(std::vector<float>& values, double share) {
   const auto place = values.begin() + static_cast<size_t>(share * (values.size() - 1));
@@ -21,8 +21,9 @@ float quantile(std::vector<float>& values, double share) {
 }
 
 // Standard deviation of inverse depth: second differences of a plane are noise alone (variance 6),
-// and most triples of neighbours lie on something flat. Where depth is quantised most of them are zero,
-// and the smallest of the others tell the quantum, unless they are so few that they are edges.
+// and most triples of neighbours lie on something flat. Where depth is quantised most of them are
+// zero, and the smallest of the others tell the quantum, unless they are so few that they are
+// edges.
 float noiseOf(const cv::Mat& inverse) {
   constexpr double kMoreThanEdges = 0.03;
   std::vector<float> bends;
@@ -46,8 +47,7 @@ float noiseOf(const cv::Mat& inverse) {
   const size_t all = bends.size();
   bends.erase(std::remove_if(bends.begin(), bends.end(), [&](float b) { return b < finest; }),
               bends.end());
-  const float quantum =
-      bends.size() > kMoreThanEdges * all ? scale * quantile(bends, 0.1) : 0.0f;
+  const float quantum = bends.size() > kMoreThanEdges * all ? scale * quantile(bends, 0.1) : 0.0f;
   return std::max({noise, quantum, finest});
 }
 
@@ -89,14 +89,15 @@ double registrationError(const cv::Mat& image, const cv::Mat& across, const cv::
 
 cv::Mat grown(const cv::Mat& mask, int px) {
   cv::Mat result;
-  cv::dilate(mask, result, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1)));
+  cv::dilate(mask, result,
+             cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1)));
   return result;
 }
 
 // The step in which depth is stored, m: the least by which neighbours differ that do. What is not
 // quantised differs by next to nothing in some places.
 float quantumOf(const cv::Mat& depth) {
-  constexpr double kLeast = 0.05;   // quantile: whatever rounding makes of the step is passed over
+  constexpr double kLeast = 0.05;  // quantile: whatever rounding makes of the step is passed over
   std::vector<float> steps;
   for (int y = 0; y + 1 < depth.rows; ++y)
     for (int x = 0; x + 1 < depth.cols; ++x) {
@@ -117,15 +118,17 @@ cv::Mat surfacesOf(const std::vector<cv::Mat>& supports, const cv::Mat& depth, f
       for (int x = 0; x < same.cols; ++x) {
         const float z = depth.at<float>(y, x), expected = support.at<float>(y, x);
         if (!(z > 0.0f) || !(expected > 0.0f)) continue;
-        const float deviation = noise * expected * expected;   // of z, noise being that of 1 / z
-        if (std::abs(z - expected) <= std::max(kDeviations * deviation, quantum)) same.at<uchar>(y, x) = 255;
+        const float deviation = noise * expected * expected;  // of z, noise being that of 1 / z
+        if (std::abs(z - expected) <= std::max(kDeviations * deviation, quantum))
+          same.at<uchar>(y, x) = 255;
       }
   return same;
 }
 
 }  // namespace
 
-Relief makeRelief(const cv::Mat& image, const cv::Mat& depth, const std::vector<cv::Mat>& supports) {
+Relief makeRelief(const cv::Mat& image, const cv::Mat& depth,
+                  const std::vector<cv::Mat>& supports) {
   constexpr double kRegistered = 2.0;  // px; an edge is blurred about as far
   constexpr float kClear = 5.0f * kNoiseUnits;
   Relief relief;
@@ -161,9 +164,11 @@ Relief makeRelief(const cv::Mat& image, const cv::Mat& depth, const std::vector<
   const double error = registrationError(image, across, down);
   relief.registered = error <= kRegistered;
   if (!relief.registered)
-    relief.state.setTo(Relief::kUnusable, grown(across | down, static_cast<int>(std::ceil(error)) + 1));
+    relief.state.setTo(Relief::kUnusable,
+                       grown(across | down, static_cast<int>(std::ceil(error)) + 1));
   if (relief.registered) relief.pieces = planarPieces(relief);
-  if (!supports.empty()) relief.on_support = surfacesOf(supports, depth, noise) & (relief.state == Relief::kSurface);
+  if (!supports.empty())
+    relief.on_support = surfacesOf(supports, depth, noise) & (relief.state == Relief::kSurface);
   return relief;
 }
 
@@ -242,12 +247,14 @@ SurfaceModel SurfaceModel::fit(const Relief& relief, const cv::Mat& samples, dou
 
 float SurfaceModel::cost(const Relief& relief, int x, int y) const {
   switch (relief.state.at<uchar>(y, x)) {
-    case Relief::kNone: return none_cost_;
+    case Relief::kNone:
+      return none_cost_;
     case Relief::kSurface:
       if (surfaces_.empty()) return outlier_cost_;
       return std::min(outlier_cost_,
                       some_cost_ + surfaces_[0].cost(relief.surface.at<cv::Vec3f>(y, x)));
-    default: return 0.0f;
+    default:
+      return 0.0f;
   }
 }
 

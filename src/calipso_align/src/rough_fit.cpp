@@ -97,8 +97,7 @@ RoughCheck checkPlacement(const FitProblem& problem) {
 
 void placeRoughly(const FitProblem& problem, LowOrderMap& map) {
   constexpr int kRounds = 3;
-  const bool comparable =
-      problem.target.known_length_px >= kLeastKnown * problem.target.length_px;
+  const bool comparable = problem.target.known_length_px >= kLeastKnown * problem.target.length_px;
   const Moments goal = comparable ? momentsOf(problem.inside) : Moments{};
   for (int round = 0; round < kRounds; ++round) {
     matchDepth(problem, map);

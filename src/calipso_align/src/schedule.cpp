@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kElasticWeight = 3e3;  // of the finished fit: see FemStageOptions
 
-constexpr double kTypicalDeformation = 0.15;   // a (LowOrderPrior) before anything is known
+constexpr double kTypicalDeformation = 0.15;  // a (LowOrderPrior) before anything is known
 
 // A rough placement is up to a twentieth of the distance off, in any direction: of a length between
 // none and that, and of its part along the sight line, the mean square is a third each.
@@ -16,7 +16,8 @@ double placementDepthSigma(const FitProblem& problem) {
   return kPlacementError / 3.0 * problem.X.col(2).mean() / LowOrderMap(problem.X).size();
 }
 
-// The model's size in the picture is made right before anything else; the distance is held meanwhile.
+// The model's size in the picture is made right before anything else; the distance is held
+// meanwhile.
 LowOrderPrior similarityPrior(const FitProblem& problem, const AlignOptions& options) {
   LowOrderPrior prior;
   prior.rotation_rad = options.rotation_sigma_deg * M_PI / 180.0;
@@ -78,7 +79,8 @@ LowOrderStep literalRigidStep(const FitProblem& problem, const AlignOptions& opt
 }
 
 ElasticStep literalElasticStep(const AlignOptions& options) {
-  constexpr double kFixedWeight = 3e4;   // of 3e1 .. 3e4 what met the contours best; softer bodies break
+  constexpr double kFixedWeight =
+      3e4;  // of 3e1 .. 3e4 what met the contours best; softer bodies break
   ElasticStep step;
   step.fit.nodes = options.levels.empty() ? 600 : options.levels.front();
   step.fit.poissons_ratio = options.poissons_ratio;
@@ -110,7 +112,7 @@ PlacementPrior::PlacementPrior(const Eigen::Vector3d& placed, const Eigen::Vecto
 }
 
 double PlacementPrior::density(const Eigen::Vector3d& centroid) const {
-  constexpr double kGuided = 0.4;   // of the bound
+  constexpr double kGuided = 0.4;  // of the bound
   const double r = (centroid - placed_).norm() / centroid.norm();
   if (r > bound_) return 0.0;
   const double at_least = std::max(r, kGuided * kPlacementError);
@@ -139,16 +141,16 @@ MeasureSettings settingsAt(const LowOrderStep& step, const FitProblem& problem, 
                kNarrowestPx + 2.0 * noise);
   settings.contour.reject_px = 3.0 * settings.contour.robust_px;
 
-  // What the stage's model cannot follow changes slowly along the contour, the picture's noise quickly.
-  const double misfit =
-      unresolved(step.order, step.order == 0 ? kTypicalDeformation : deformation);
+  // What the stage's model cannot follow changes slowly along the contour, the picture's noise
+  // quickly.
+  const double misfit = unresolved(step.order, step.order == 0 ? kTypicalDeformation : deformation);
   const double misfit_px = misfit * problem.extent_px, noise_px = 0.5 + 0.5 * noise;
   const double misfit_correlation_px = problem.extent_px / 8.0, noise_correlation_px = 10.0;
   const double variance = misfit_px * misfit_px + noise_px * noise_px;
   settings.contour_sigma_px = std::sqrt(variance);
-  settings.contour_correlation_px = (misfit_px * misfit_px * misfit_correlation_px +
-                                     noise_px * noise_px * noise_correlation_px) /
-                                    variance;
+  settings.contour_correlation_px =
+      (misfit_px * misfit_px * misfit_correlation_px + noise_px * noise_px * noise_correlation_px) /
+      variance;
   // It is the same in all measurements: none may drag the model out of another's reach.
   settings.depth_robust = step.depth_robust.at(iteration, step.fit.iterations);
   settings.depth_sigma = std::max(settings.depth_sigma, misfit);
@@ -171,7 +173,7 @@ std::vector<ElasticStep> elasticSteps(const FitProblem& problem, const AlignOpti
     step.fit.nodes = options.levels[level];
     step.fit.poissons_ratio = options.poissons_ratio;
     step.fit.hold_depth = problem.depth.empty();
-    step.fit.linear = !first || options.levels.size()==1;
+    step.fit.linear = !first || options.levels.size() == 1;
     for (int k = 0; k < iterations; ++k) {
       step.fit.elastic_weights.push_back(stiffness.at(k, iterations - 2));
     }
@@ -192,7 +194,8 @@ ElasticStep farReaching(const ElasticStep& step, const FitProblem& problem) {
   const double end = step.fit.elastic_weights.back();
   const Ramp stiffness{kStiffest * end, end};
   again.fit.elastic_weights.clear();
-  for (int k = 0; k < kIterations; ++k) again.fit.elastic_weights.push_back(stiffness.at(k, kIterations - 2));
+  for (int k = 0; k < kIterations; ++k)
+    again.fit.elastic_weights.push_back(stiffness.at(k, kIterations - 2));
   return again;
 }
 

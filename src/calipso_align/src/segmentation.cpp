@@ -51,8 +51,8 @@ const cv::Mat& Segmenter::segment(const cv::Mat& strokes) {
   return labels_;
 }
 
-// Alternates colour models and cuts on the coarse picture, as GrabCut does; silhouettes join once the
-// first cut says where the objects are.
+// Alternates colour models and cuts on the coarse picture, as GrabCut does; silhouettes join once
+// the first cut says where the objects are.
 void Segmenter::learn() {
   constexpr int kPlacements = 2;
   coarse_.labels.setTo(0);
@@ -120,7 +120,8 @@ std::vector<cv::Mat> Segmenter::certainPixels(const cv::Mat& contradicted) const
     certain[0].setTo(0, grown(placed, shapes_[k] ? margin : 0));
     certain.push_back(placed & ~contradicted);
   }
-  for (size_t k = 0; k < certain.size(); ++k) certain[k] |= coarse_.seeds == static_cast<int>(k + 1);
+  for (size_t k = 0; k < certain.size(); ++k)
+    certain[k] |= coarse_.seeds == static_cast<int>(k + 1);
   return certain;
 }
 
@@ -191,11 +192,12 @@ cv::Mat Segmenter::placedSilhouette(size_t k, const cv::Size& size) const {
   return resized;
 }
 
-// Models fitted to what was found say where the objects end beyond what a rough placement can, which
-// colours are theirs where strokes did not go, and how deep in the scene they lie.
+// Models fitted to what was found say where the objects end beyond what a rough placement can,
+// which colours are theirs where strokes did not go, and how deep in the scene they lie.
 void Segmenter::guide() {
   fitModels();
-  if (std::none_of(fitted_.begin(), fitted_.end(), [](const auto& f) { return f.has_value(); })) return;
+  if (std::none_of(fitted_.begin(), fitted_.end(), [](const auto& f) { return f.has_value(); }))
+    return;
   expectSurfaces(coarse_);
   expectSurfaces(fine_);
   measureSurfaces();
@@ -222,7 +224,8 @@ void Segmenter::relearnColours() {
 // Target k's model where the labels have it; nothing without a model or where it cannot be placed.
 std::optional<FittedShape> Segmenter::fitModel(size_t k) const {
   if (!targets_[k].fit_model) return std::nullopt;
-  const ObjectContour contour = extractContour(picture_, labels_, targets_[k].label, targets_[k].name);
+  const ObjectContour contour =
+      extractContour(picture_, labels_, targets_[k].label, targets_[k].name);
   std::optional<ModelView> view = targets_[k].fit_model(contour.loops);
   if (!view) return std::nullopt;
   const cv::Mat silhouette = view->silhouette(view_), own = labels_(view_) == targets_[k].label;
@@ -253,14 +256,13 @@ void Segmenter::expectSurfaces(SegmentationLevel& level) const {
     for (int y = 0; y < depth.rows; ++y)
       for (int x = 0; x < depth.cols; ++x)
         if (depth.at<float>(y, x) > 0.0f)
-          expected.at<float>(y, x) =
-              static_cast<float>(level.relief.units) / depth.at<float>(y, x);
+          expected.at<float>(y, x) = static_cast<float>(level.relief.units) / depth.at<float>(y, x);
   }
 }
 
 // How far the relief is off the models' surfaces where the labels have the objects.
 void Segmenter::measureSurfaces() {
-  constexpr float kLeastSigma = 2.0f;   // the relief's own noise
+  constexpr float kLeastSigma = 2.0f;  // the relief's own noise
   for (size_t k = 1; k < models_.size(); ++k) {
     models_[k].expected.reset();
     const cv::Mat& expected = coarse_.expected[k];
@@ -283,8 +285,9 @@ void Segmenter::measureSurfaces() {
   }
 }
 
-// What is each label's beyond doubt now that its model stands: deep inside of the silhouette and not
-// another's, or found there and not contradicted; of the background what is clear of all silhouettes.
+// What is each label's beyond doubt now that its model stands: deep inside of the silhouette and
+// not another's, or found there and not contradicted; of the background what is clear of all
+// silhouettes.
 std::vector<cv::Mat> Segmenter::guidedPixels() const {
   const cv::Size size = coarse_.image.size();
   const double scale = static_cast<double>(size.width) / image_.cols;
@@ -300,7 +303,8 @@ std::vector<cv::Mat> Segmenter::guidedPixels() const {
     cv::resize(fitted_[k]->view.silhouette, silhouette, size, 0, 0, cv::INTER_NEAREST);
     cv::distanceTransform(silhouette, depth, cv::DIST_L2, 3);
     const double tolerance = std::max(1.0, fitted_[k]->view.tolerance_px * scale);
-    const cv::Mat deep = (depth > tolerance) & ((coarse_.labels == 0) | (coarse_.labels == static_cast<int>(k + 1)));
+    const cv::Mat deep =
+        (depth > tolerance) & ((coarse_.labels == 0) | (coarse_.labels == static_cast<int>(k + 1)));
     own.push_back(deep | (found & silhouette));
     own[0] &= ~grown(silhouette, static_cast<int>(std::ceil(tolerance)));
   }
@@ -311,8 +315,8 @@ std::vector<cv::Mat> Segmenter::guidedPixels() const {
   return own;
 }
 
-// A silhouette that does not fit what the colours say has no say. That of a fitted model is wrong about
-// a pixel as often as it was about those it was fitted to.
+// A silhouette that does not fit what the colours say has no say. That of a fitted model is wrong
+// about a pixel as often as it was about those it was fitted to.
 void Segmenter::addShapeOdds(SegmentationLevel& level) const {
   constexpr double kNoAgreement = 0.5, kFullAgreement = 0.8, kMostCertain = 0.95;
   const double scale = static_cast<double>(level.image.cols) / image_.cols;
@@ -326,16 +330,17 @@ void Segmenter::addShapeOdds(SegmentationLevel& level) const {
     } else if (shapes_[k]) {
       const double trust = std::clamp(
           (shapes_[k]->agreement - kNoAgreement) / (kFullAgreement - kNoAgreement), 0.0, 1.0);
-      level.costs[k + 1] -= shapeOdds(placedSilhouette(k, level.image.size()) > 127,
-                                      static_cast<float>(trust * params_.shape_weight),
-                                      static_cast<float>(params_.shape_tolerance * size_.width * scale));
+      level.costs[k + 1] -=
+          shapeOdds(placedSilhouette(k, level.image.size()) > 127,
+                    static_cast<float>(trust * params_.shape_weight),
+                    static_cast<float>(params_.shape_tolerance * size_.width * scale));
     }
   }
 }
 
 // What carries objects is none of them.
 void Segmenter::addSupportOdds(SegmentationLevel& level) const {
-  constexpr double kCarries = 20.0;   // nats: more than any colour says
+  constexpr double kCarries = 20.0;  // nats: more than any colour says
   if (level.relief.on_support.empty()) return;
   for (size_t k = 1; k < models_.size(); ++k)
     if (!level.lies_flat[k])

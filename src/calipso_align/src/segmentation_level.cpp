@@ -32,21 +32,24 @@ cv::Mat resized(const cv::Mat& mask, const cv::Size& size) {
   return result;
 }
 
-// Cost of a label's surface at a pixel: a fitted model's, which may lack details, or any of the label's.
+// Cost of a label's surface at a pixel: a fitted model's, which may lack details, or any of the
+// label's.
 float surfaceCost(const LabelModel& model, const SegmentationLevel& level, size_t k, int x, int y) {
-  constexpr float kDetails = 0.2f;   // part of a label's pixels that its model does not know
+  constexpr float kDetails = 0.2f;  // part of a label's pixels that its model does not know
   const float any = model.surfaces->cost(level.relief, x, y);
   if (!model.expected || level.relief.state.at<uchar>(y, x) != Relief::kSurface) return any;
   const float expected = level.expected[k].at<float>(y, x);
   float on_model = 0.0f;
   if (expected > 0.0f) {
-    const float r = (level.relief.surface.at<cv::Vec3f>(y, x)[2] - expected) / model.expected->sigma;
+    const float r =
+        (level.relief.surface.at<cv::Vec3f>(y, x)[2] - expected) / model.expected->sigma;
     on_model = (1.0f - kDetails) * std::exp(any - model.expected->nearest_cost - 0.5f * r * r);
   }
   return any - std::log(on_model + kDetails);
 }
 
-// Where the surface ends at this pixel, its colour is a mixture with that of what lies behind or before.
+// Where the surface ends at this pixel, its colour is a mixture with that of what lies behind or
+// before.
 bool isMixed(const SegmentationLevel& level, int x, int y) {
   const auto ends = [&](const cv::Point& p, const cv::Point& step) {
     const cv::Rect whole(cv::Point(), level.relief.state.size());
@@ -93,7 +96,8 @@ cv::Rect viewOf(const std::vector<SegmentationTarget>& targets, const cv::Size& 
   }
   const int margin = nearReach(size.width);
   return cv::Rect(view.x - margin, view.y - margin, view.width + 2 * margin,
-                  view.height + 2 * margin) & whole;
+                  view.height + 2 * margin) &
+         whole;
 }
 
 SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<SegmentationTarget>& targets,
@@ -120,14 +124,15 @@ SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<Segmentation
   if (level.relief.registered) {
     level.mixed = cv::Mat::zeros(size, CV_8U);
     for (int y = 0; y < size.height; ++y)
-      for (int x = 0; x < size.width; ++x) level.mixed.at<uchar>(y, x) = isMixed(level, x, y) ? 255 : 0;
+      for (int x = 0; x < size.width; ++x)
+        level.mixed.at<uchar>(y, x) = isMixed(level, x, y) ? 255 : 0;
   }
   return level;
 }
 
 void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& strokes,
               SegmentationLevel& level) {
-  constexpr double kFlat = 0.1;   // of the strokes
+  constexpr double kFlat = 0.1;  // of the strokes
   level.seeds = cv::Mat::zeros(level.image.size(), CV_8U);
   level.stroked.release();
   level.lies_flat.assign(targets.size() + 1, 0);
@@ -142,9 +147,11 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
   }
   for (size_t k = 0; k <= targets.size() && !level.relief.on_support.empty(); ++k) {
     const cv::Mat own = level.seeds == static_cast<int>(k + 1);
-    level.lies_flat[k] = cv::countNonZero(own & level.relief.on_support) > kFlat * cv::countNonZero(own);
+    level.lies_flat[k] =
+        cv::countNonZero(own & level.relief.on_support) > kFlat * cv::countNonZero(own);
   }
-  if (!level.relief.pieces.empty()) level.stroked = strokesOfPieces(level.relief.pieces, level.seeds);
+  if (!level.relief.pieces.empty())
+    level.stroked = strokesOfPieces(level.relief.pieces, level.seeds);
 }
 
 void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int components,
@@ -165,8 +172,9 @@ void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int compone
 
 void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
                    SegmentationLevel& level) {
-  constexpr float kMixed = 0.25f;   // what a colour that is a mixture still counts
-  constexpr float kDivided = 10.0f;  // nats, of a pixel in a flat piece that has strokes of another label only
+  constexpr float kMixed = 0.25f;  // what a colour that is a mixture still counts
+  constexpr float kDivided =
+      10.0f;  // nats, of a pixel in a flat piece that has strokes of another label only
   level.costs.resize(models.size());
   for (size_t k = 0; k < models.size(); ++k) {
     cv::Mat& cost = level.costs[k];
@@ -182,13 +190,12 @@ void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
               open ? models[k].open_colours : models[k].colours;
           cost.at<float>(y, x) = outlier_cost;
           if (colours)
-            cost.at<float>(y, x) = std::min(
-                outlier_cost, colours->cost(cv::Vec3f(level.image.at<cv::Vec3b>(y, x))));
+            cost.at<float>(y, x) =
+                std::min(outlier_cost, colours->cost(cv::Vec3f(level.image.at<cv::Vec3b>(y, x))));
           if (!level.mixed.empty() && level.mixed.at<uchar>(y, x)) cost.at<float>(y, x) *= kMixed;
           const int stroke = level.stroked.empty() ? 0 : level.stroked.at<uchar>(y, x);
           if (stroke != 0 && stroke != static_cast<int>(k + 1)) cost.at<float>(y, x) += kDivided;
-          if (models[k].surfaces)
-            cost.at<float>(y, x) += surfaceCost(models[k], level, k, x, y);
+          if (models[k].surfaces) cost.at<float>(y, x) += surfaceCost(models[k], level, k, x, y);
         }
   }
 }
@@ -226,8 +233,6 @@ std::vector<cv::Vec3f> sampleColours(const cv::Mat& image, const cv::Mat& mask) 
   return few;
 }
 
-cv::Mat surroundings(const SegmentationLevel& level) {
-  return grown(level.region, level.near_px);
-}
+cv::Mat surroundings(const SegmentationLevel& level) { return grown(level.region, level.near_px); }
 
 }  // namespace calipso::align

@@ -8,7 +8,8 @@
 namespace calipso::align {
 namespace {
 
-// Change of a map, about the silhouette's centre: shift (px), turn (rad), log scale, log aspect, shear.
+// Change of a map, about the silhouette's centre: shift (px), turn (rad), log scale, log aspect,
+// shear.
 using Change = std::array<double, 6>;
 
 class SilhouetteScore {
@@ -25,8 +26,8 @@ class SilhouetteScore {
   cv::Matx23d map(const Change& change) const {
     const double c = std::cos(change[2]), d = std::sin(change[2]), s = std::exp(change[3]);
     const double stretch = std::exp(change[4]);
-    const cv::Matx22d linear = cv::Matx22d(c, -d, d, c) *
-                               cv::Matx22d(s * stretch, change[5], 0.0, s / stretch);
+    const cv::Matx22d linear =
+        cv::Matx22d(c, -d, d, c) * cv::Matx22d(s * stretch, change[5], 0.0, s / stretch);
     const cv::Matx22d first(start_(0, 0), start_(0, 1), start_(1, 0), start_(1, 1));
     const cv::Matx22d a = linear * first;
     const cv::Vec2d t = linear * (cv::Vec2d(start_(0, 2), start_(1, 2)) - centre_) + centre_ +

@@ -12,7 +12,7 @@ namespace calipso::align {
 namespace {
 
 constexpr int kDraws = 64;
-constexpr int kPointsPerDraw = 20;   // place its mean to some 15 %
+constexpr int kPointsPerDraw = 20;  // place its mean to some 15 %
 
 // Some matrix L with L L' = C, C positive semi-definite but for rounding.
 Eigen::MatrixXd squareRoot(const Eigen::MatrixXd& C) {
@@ -57,10 +57,10 @@ double ShapeUncertainty::beyond(const SurfaceDistance& limit) const {
   return probability;
 }
 
-ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
-                                  const LowOrderMap& here, const Eigen::MatrixXd& covariance,
-                                  double model_size, double unseen,
-                                  const std::function<double(const LowOrderMap::Parameters&)>& likelihood) {
+ShapeUncertainty shapeUncertainty(
+    const Points& x, const Triangles& triangles, const LowOrderMap& here,
+    const Eigen::MatrixXd& covariance, double model_size, double unseen,
+    const std::function<double(const LowOrderMap::Parameters&)>& likelihood) {
   constexpr int kMostTries = 50 * kDraws;
   std::mt19937 generator(1);
   std::normal_distribution<double> normal;
@@ -82,7 +82,7 @@ ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
     maps.push_back(here);
     maps.back().setParameters(here.plus(step));
   }
-  if (maps.empty()) {   // nothing agrees with what is known besides: it may be anywhere
+  if (maps.empty()) {  // nothing agrees with what is known besides: it may be anywhere
     const double anywhere = std::numeric_limits<double>::infinity();
     return {{{anywhere, anywhere}}, {1.0}};
   }
@@ -92,7 +92,8 @@ ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
   for (int k = 0; k < moved.rows(); ++k) {
     const int f = faces[k * static_cast<long>(faces.size()) / moved.rows()];
     const Eigen::Vector3d centre =
-        (x.row(triangles(f, 0)) + x.row(triangles(f, 1)) + x.row(triangles(f, 2))).transpose() / 3.0;
+        (x.row(triangles(f, 0)) + x.row(triangles(f, 1)) + x.row(triangles(f, 2))).transpose() /
+        3.0;
     const double along = unseen * model_size * normal(generator);
     moved.row(k) = (maps[k % count](centre) + along * centre.normalized()).transpose();
   }

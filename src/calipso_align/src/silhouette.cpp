@@ -8,10 +8,11 @@
 namespace calipso::align {
 namespace {
 
-constexpr double kNear = 1e-6;           // m; nothing closer is drawn
-constexpr double kRounding = 1e-9;       // px; a pixel on the edge of two triangles belongs to both
+constexpr double kNear = 1e-6;      // m; nothing closer is drawn
+constexpr double kRounding = 1e-9;  // px; a pixel on the edge of two triangles belongs to both
 
-// Pixels of all points in the first two columns, 1/z in the third; points behind the camera get NaN.
+// Pixels of all points in the first two columns, 1/z in the third; points behind the camera get
+// NaN.
 Points projectAll(const Points& x, const Camera& camera) {
   Points pixels(x.rows(), 3);
 #pragma omp parallel for schedule(static)
@@ -26,7 +27,8 @@ Points projectAll(const Points& x, const Camera& camera) {
   return pixels;
 }
 
-// The picture's part that holds all pixels, with a margin of background around it where there is room.
+// The picture's part that holds all pixels, with a margin of background around it where there is
+// room.
 cv::Rect boundingRoi(const Points& pixels, const Camera& camera) {
   constexpr int kMargin = 3;
   double u0 = 1e9, v0 = 1e9, u1 = -1e9, v1 = -1e9;
@@ -48,8 +50,8 @@ cv::Rect boundingRoi(const Points& pixels, const Camera& camera) {
   return {left, top, right - left, bottom - top};
 }
 
-// Columns of a picture's row within a triangle: between its left edges and its right ones, all of them
-// linear in the row.
+// Columns of a picture's row within a triangle: between its left edges and its right ones, all of
+// them linear in the row.
 class TriangleSpans {
  public:
   explicit TriangleSpans(const Eigen::Vector2d (&p)[3]) {
@@ -59,7 +61,7 @@ class TriangleSpans {
       const Eigen::Vector2d& from = p[k];
       const Eigen::Vector2d along = p[(k + 1) % 3] - from;
       const double rise = area > 0.0 ? along.y() : -along.y();
-      if (rise == 0.0) continue;   // the triangle's rows end here
+      if (rise == 0.0) continue;  // the triangle's rows end here
       const double slope = along.x() / along.y();
       Edge& edge = rise > 0.0 ? right_[rights_++] : left_[lefts_++];
       edge = {from.x() - slope * from.y(), slope};
@@ -77,7 +79,7 @@ class TriangleSpans {
 
  private:
   struct Edge {
-    double u, slope;   // u + slope * v
+    double u, slope;  // u + slope * v
   };
   Edge left_[3], right_[3];
   int lefts_ = 0, rights_ = 0;
@@ -114,7 +116,8 @@ void fillTriangle(const Eigen::Vector3d (&c)[3], const cv::Rect& roi, cv::Mat1f&
 }
 
 // The largest 1/z of all triangles at every pixel of the roi; 0 where there is none.
-cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles, const cv::Rect& roi) {
+cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles,
+                              const cv::Rect& roi) {
   cv::Mat1f all = cv::Mat1f::zeros(roi.size());
   // Every thread draws its share of the triangles; the largest is the same in whatever order.
 #pragma omp parallel
@@ -122,9 +125,9 @@ cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles, 
     cv::Mat1f own = cv::Mat1f::zeros(roi.size());
 #pragma omp for schedule(static) nowait
     for (int f = 0; f < triangles.rows(); ++f) {
-      fillTriangle({pixels.row(triangles(f, 0)), pixels.row(triangles(f, 1)),
-                    pixels.row(triangles(f, 2))},
-                   roi, own);
+      fillTriangle(
+          {pixels.row(triangles(f, 0)), pixels.row(triangles(f, 1)), pixels.row(triangles(f, 2))},
+          roi, own);
     }
 #pragma omp critical(largest_inverse_depth)
     std::transform(own.begin(), own.end(), all.begin(), all.begin(),
@@ -136,7 +139,7 @@ cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles, 
 // Whether the mask ends at the edge: the pixel beyond it is uncovered.
 bool bordersBackground(const DepthRendering& rendering, const Eigen::Vector2d& pixel,
                        const Eigen::Vector2d& normal) {
-  constexpr double kBeyondPx = 1.0;   // the pixel there has its centre beyond the edge for certain
+  constexpr double kBeyondPx = 1.0;  // the pixel there has its centre beyond the edge for certain
   const Eigen::Vector2d beyond = pixel + kBeyondPx * normal;
   return rendering.at(cvRound(beyond.x()), cvRound(beyond.y())) <= 0.0f;
 }

@@ -25,7 +25,7 @@ class NearestPoint {
   // Distance of the nearest point, of the second nearest one if `other`.
   double distance(const Eigen::RowVector3d& p, bool other) const {
     const int n = static_cast<int>(sorted_.rows());
-    int first = 0, count = n;   // lower bound of p along the axis
+    int first = 0, count = n;  // lower bound of p along the axis
     while (count > 0) {
       const int half = count / 2;
       if (sorted_(first + half, axis_) < p[axis_]) {

@@ -5,7 +5,7 @@
 namespace calipso::align {
 namespace {
 
-constexpr double kReachesThrough = 5.0;   // deviations
+constexpr double kReachesThrough = 5.0;  // deviations
 
 // Whether the plane reaches under the point.
 bool reachesUnder(const SupportPlane& plane, const Camera& camera, const Eigen::Vector3d& p) {

@@ -76,7 +76,7 @@ class FaceGrid {
   }
 
  private:
-  struct Ball {   // around a face; its centre lies on the face
+  struct Ball {  // around a face; its centre lies on the face
     Eigen::Vector3d centre;
     double radius;
     int face;
@@ -105,12 +105,14 @@ class FaceGrid {
 
   Ball ballOf(int f) const {
     Ball ball{(corner(f, 0) + corner(f, 1) + corner(f, 2)) / 3.0, 0.0, f};
-    for (int k = 0; k < 3; ++k) ball.radius = std::max(ball.radius, (corner(f, k) - ball.centre).norm());
+    for (int k = 0; k < 3; ++k)
+      ball.radius = std::max(ball.radius, (corner(f, k) - ball.centre).norm());
     return ball;
   }
 
   // Faces that may be nearer than `best`, which their centres bring down meanwhile.
-  void collect(const Eigen::Vector3d& p, size_t cell, double& best, std::vector<const Ball*>& near) const {
+  void collect(const Eigen::Vector3d& p, size_t cell, double& best,
+               std::vector<const Ball*>& near) const {
     for (int i = start_[cell]; i < start_[cell + 1]; ++i) {
       const Ball& ball = faces_[i];
       const double squared = (ball.centre - p).squaredNorm(), reach = best + ball.radius;
@@ -125,7 +127,7 @@ class FaceGrid {
   Eigen::Vector3d low_;
   double cell_;
   Eigen::Vector3i size_;
-  std::vector<int> start_;    // of cell c: faces_[start_[c]] ... faces_[start_[c + 1] - 1]
+  std::vector<int> start_;  // of cell c: faces_[start_[c]] ... faces_[start_[c + 1] - 1]
   std::vector<Ball> faces_;
 };
 

@@ -12,14 +12,16 @@
 namespace calipso::align {
 namespace {
 
-constexpr double kLeastKnown = 0.3;      // part of the contour
-constexpr double kMostlyKnown = 0.95;    // less is worth a word
-constexpr double kLeastMet = 0.8;        // part of the known contour: it may have spurs and details
-constexpr double kMostOff = 0.02;         // part of the area: thin parts may be missing on either side
-constexpr double kLargestMeanPx = 1.0;   // on top of half the contour's noise
+constexpr double kLeastKnown = 0.3;    // part of the contour
+constexpr double kMostlyKnown = 0.95;  // less is worth a word
+constexpr double kLeastMet = 0.8;      // part of the known contour: it may have spurs and details
+constexpr double kMostOff = 0.02;      // part of the area: thin parts may be missing on either side
+constexpr double kLargestMeanPx = 1.0;  // on top of half the contour's noise
 constexpr double kLargestScale = 2.5;
-constexpr double kDistanceKnown = 0.01;  // part of the distance: what is more uncertain is worth a word
-constexpr double kLargestOff = 0.1;      // probability that the surface is further away than it should be
+constexpr double kDistanceKnown =
+    0.01;  // part of the distance: what is more uncertain is worth a word
+constexpr double kLargestOff =
+    0.1;  // probability that the surface is further away than it should be
 
 std::string percent(double part) { return std::to_string(std::lround(100.0 * part)) + " %"; }
 
@@ -60,8 +62,8 @@ size_t nearestTarget(const ContourTarget& target, const Eigen::Vector2d& pixel) 
   return best;
 }
 
-// Area of the model outside of the contour by more than the tolerance, as part of the contour's area.
-// Beyond unknown parts of the contour it may well be there.
+// Area of the model outside of the contour by more than the tolerance, as part of the contour's
+// area. Beyond unknown parts of the contour it may well be there.
 double protrudingPart(const FitProblem& problem, const DepthRendering& rendering,
                       double tolerance_px) {
   constexpr int kStridePx = 2;
@@ -80,9 +82,9 @@ double protrudingPart(const FitProblem& problem, const DepthRendering& rendering
   return outside / std::max(1, cv::countNonZero(inside));
 }
 
-// Area of the contour that the model leaves open by more than the tolerance, as part of its area. Details
-// that it has not are no part of it.
-// Nor are holes: of a lattice the contour often has none.
+// Area of the contour that the model leaves open by more than the tolerance, as part of its area.
+// Details that it has not are no part of it. Nor are holes: of a lattice the contour often has
+// none.
 double openPart(const FitProblem& problem, const cv::Mat1b& silhouette, double tolerance_px) {
   cv::Mat1b inside = problem.inside;
   if (!problem.foreign.empty()) inside = inside & ~problem.foreign;
@@ -96,12 +98,14 @@ double openPart(const FitProblem& problem, const cv::Mat1b& silhouette, double t
 std::string remarks(const FitProblem& problem, double known, double distance_sigma) {
   std::vector<std::string> all;
   if (spinAxis(problem.X)) {
-    all.push_back("spin about its axis undetermined: the shape is axisymmetric, so that the contour "
-                  "leaves it as it was placed");
+    all.push_back(
+        "spin about its axis undetermined: the shape is axisymmetric, so that the contour "
+        "leaves it as it was placed");
   }
   if (known < kMostlyKnown) {
-    all.push_back("part of the contour is unknown: " + percent(1.0 - known) +
-                  " of it is hidden or cut by the image border, and the model there is as it was drawn");
+    all.push_back(
+        "part of the contour is unknown: " + percent(1.0 - known) +
+        " of it is hidden or cut by the image border, and the model there is as it was drawn");
   }
   if (distance_sigma > kDistanceKnown) {
     std::ostringstream distance;
@@ -115,8 +119,8 @@ std::string remarks(const FitProblem& problem, double known, double distance_sig
   return text;
 }
 
-// The model's silhouette without what is covered by something else: holes of the picture that are known to
-// be an occluder's are none that the model lacks.
+// The model's silhouette without what is covered by something else: holes of the picture that are
+// known to be an occluder's are none that the model lacks.
 cv::Mat1b surelySeen(const FitProblem& problem, const cv::Mat1b& silhouette) {
   cv::Mat1b seen = silhouette.clone();
   if (problem.target.known_length_px >= problem.target.length_px) return seen;
@@ -156,7 +160,8 @@ FitQuality assess(const FitProblem& problem, const Points& x) {
   quality.met = static_cast<double>(met) / known;
   const cv::Mat1b silhouette = maskOf(rendering, problem.camera);
   quality.open = openPart(problem, silhouette, quality.tolerance_px);
-  // A bar of a lattice may be off on either side of a hole; of the contour's noise the mask has next to none.
+  // A bar of a lattice may be off on either side of a hole; of the contour's noise the mask has
+  // next to none.
   constexpr double kHolePx = 2.0 * kMetPx;
   quality.model_holes_px = unshownHoles(silhouette, problem.inside, kHolePx);
   quality.picture_holes_px = unshownHoles(problem.inside, surelySeen(problem, silhouette), kHolePx);
@@ -187,27 +192,30 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
              quality.met_mean_px > allowed) {
     reason << "did not converge: the contour is off by " << quality.mean_px << " px on average, "
            << percent(quality.met) << " of it is met within " << quality.tolerance_px << " px, "
-           << percent(quality.protruding)
-           << " of its area the model has besides, " << percent(quality.open)
-           << " it leaves open; place the model closer";
+           << percent(quality.protruding) << " of its area the model has besides, "
+           << percent(quality.open) << " it leaves open; place the model closer";
     if (isInPieces(contour)) reason << ", or correct the contour: it is in separate pieces";
   } else if (scale > kLargestScale || scale < 1.0 / kLargestScale) {
     reason << "size implausible: the model had to be scaled by " << scale
            << "; check its unit and its distance";
   } else if (quality.model_holes_px > 0.0) {
     reason << "the model shows a hole of " << quality.model_holes_px
-           << " px^2 that the picture does not: correct the contour if it was overlooked; one that the "
+           << " px^2 that the picture does not: correct the contour if it was overlooked; one that "
+              "the "
               "object has closed stays open";
   } else if (quality.picture_holes_px > 0.0) {
     reason << "the picture shows a hole of " << quality.picture_holes_px
-           << " px^2 that the model does not: correct the contour if something hides the object there, "
+           << " px^2 that the model does not: correct the contour if something hides the object "
+              "there, "
               "or place the model closer";
   } else if (error.beyond(kTrustedWithin) > kLargestOff) {
-    reason << "depth undetermined: the contour is met, but as to distance, turn and thickness along the "
+    reason << "depth undetermined: the contour is met, but as to distance, turn and thickness "
+              "along the "
               "sight line the surface is off by more than "
            << 100.0 * kTrustedWithin.mean << " % of the size with a probability of "
            << percent(error.beyond(kTrustedWithin)) << "; its distance is uncertain by "
-           << 100.0 * distance_sigma << " % (standard deviation); give a depth image or the plane that the object stands on";
+           << 100.0 * distance_sigma
+           << " % (standard deviation); give a depth image or the plane that the object stands on";
   } else {
     return {true, remarks(problem, known, distance_sigma)};
   }

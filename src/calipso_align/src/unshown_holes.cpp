@@ -15,7 +15,7 @@ cv::Mat1b withoutHoles(const cv::Mat1b& mask) {
 }
 
 double unshownHoles(const cv::Mat1b& mask, const cv::Mat1b& other, double tolerance_px) {
-  constexpr double kRimPx = 0.5;   // from a pixel's middle to its side
+  constexpr double kRimPx = 0.5;  // from a pixel's middle to its side
   const cv::Mat1b holes = withoutHoles(mask) & ~mask;
   cv::Mat1f to_rim, to_open;
   cv::distanceTransform(holes, to_rim, cv::DIST_L2, cv::DIST_MASK_5);

@@ -19,9 +19,10 @@ namespace {
 constexpr double kTimeoutSec = 40.0;
 const ros::Time kStamp(2.5);
 
-constexpr int kWidth = 160, kHeight = 120;   // of the scene's pictures
+constexpr int kWidth = 160, kHeight = 120;  // of the scene's pictures
 
-// A square on its tip, as far as it is in the picture: where the border cuts it, the contour is unknown.
+// A square on its tip, as far as it is in the picture: where the border cuts it, the contour is
+// unknown.
 calipso_msgs::Contour tippedSquare(double centre_u, double centre_v, double radius) {
   constexpr int kPerSide = 40;
   const double corner_u[] = {1, 0, -1, 0}, corner_v[] = {0, 1, 0, -1};
@@ -78,10 +79,12 @@ class AlignNode : public ::testing::Test {
   }
 
   void waitForNode() {
-    waitFor([&] {
-      return segmentations_.getNumSubscribers() > 0 && poses_.getNumSubscribers() > 0 &&
-             models_.getNumPublishers() > 0;
-    }, "the node");
+    waitFor(
+        [&] {
+          return segmentations_.getNumSubscribers() > 0 && poses_.getNumSubscribers() > 0 &&
+                 models_.getNumPublishers() > 0;
+        },
+        "the node");
   }
 
   // What the node says of the model after a message, which makes it fit again.
@@ -123,7 +126,7 @@ geometry_msgs::PoseStamped placedAt(double x, double y) {
 void expectFlag(const calipso_msgs::AlignedModel& model, const std::string& reason) {
   EXPECT_FALSE(model.trusted);
   EXPECT_NE(model.reason.find(reason), std::string::npos) << model.reason;
-  EXPECT_FALSE(model.mesh.vertices.empty());   // marked, never left out
+  EXPECT_FALSE(model.mesh.vertices.empty());  // marked, never left out
 }
 
 TEST_F(AlignNode, AlignsTheKeyFrame) {
@@ -154,8 +157,8 @@ TEST_F(AlignNode, FlagsAMaskThatFillsTheImage) {
 }
 
 TEST_F(AlignNode, FlagsAContourOfTwoPieces) {
-  expectFlag(answerTo(keyFrame(ros::Time(6.0), {tippedSquare(60.0, 58.0, 15.0),
-                                                tippedSquare(100.0, 58.0, 15.0)})),
+  expectFlag(answerTo(keyFrame(ros::Time(6.0),
+                               {tippedSquare(60.0, 58.0, 15.0), tippedSquare(100.0, 58.0, 15.0)})),
              "separate pieces");
 }
 

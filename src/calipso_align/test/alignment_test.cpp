@@ -30,9 +30,9 @@ TriangleMesh deformedPear() {
 
 std::string reasonOf(const TriangleMesh& mesh, const Eigen::Isometry3d& rough) {
   const Camera camera = test::frontCamera();
-  const AlignmentResult result = align(
-      mesh, camera, rough,
-      test::contourOf(test::pear(), Eigen::Isometry3d::Identity(), camera), coarse());
+  const AlignmentResult result =
+      align(mesh, camera, rough,
+            test::contourOf(test::pear(), Eigen::Isometry3d::Identity(), camera), coarse());
   EXPECT_FALSE(result.trusted);
   return result.reason;
 }
@@ -51,8 +51,9 @@ TEST(Alignment, FindsAModelThatOnlyHasToBeMoved) {
 
 // What a depth camera at the picture's place sees.
 DepthObservation depthOf(const TriangleMesh& truth, const Camera& camera) {
-  const DepthRendering rendering = renderDepth(
-      test::inCamera(camera, Eigen::Isometry3d::Identity(), truth.vertices), truth.triangles, camera);
+  const DepthRendering rendering =
+      renderDepth(test::inCamera(camera, Eigen::Isometry3d::Identity(), truth.vertices),
+                  truth.triangles, camera);
   cv::Mat1f depth = cv::Mat1f::zeros(camera.height, camera.width);
   rendering.depth.copyTo(depth(rendering.roi));
   return {depth};
@@ -66,8 +67,8 @@ TEST(Alignment, FollowsABentContour) {
     AlignOptions options = coarse();
     if (with_depth) options.depth = depthOf(deformedPear(), camera);
     const AlignmentResult result = align(test::pear(), camera, test::roughPose(), contour, options);
-    // Three times its size away, the twentieth of the distance that a placement may be off is 13 % of the
-    // size: only what shows the distance makes a model that deforms one to be trusted.
+    // Three times its size away, the twentieth of the distance that a placement may be off is 13 %
+    // of the size: only what shows the distance makes a model that deforms one to be trusted.
     EXPECT_EQ(result.trusted, with_depth) << result.reason;
     if (!with_depth) {
       EXPECT_NE(result.reason.find("depth undetermined"), std::string::npos) << result.reason;
@@ -77,13 +78,15 @@ TEST(Alignment, FollowsABentContour) {
   }
 }
 
-// No quadratic map comes near a snake: pairs of nearest points lead its bends astray until it is close.
+// No quadratic map comes near a snake: pairs of nearest points lead its bends astray until it is
+// close.
 TEST(Alignment, ComesCloserToAContourThatIsFarOff) {
   const Camera camera = test::frontCamera();
   TriangleMesh snake = test::pear();
   for (int i = 0; i < snake.vertexCount(); ++i)
     snake.vertices(i, 0) = 0.5 * snake.vertices(i, 0) + 0.25 * std::sin(4.0 * snake.vertices(i, 2));
-  const std::vector<ContourLoop> contour = test::contourOf(snake, Eigen::Isometry3d::Identity(), camera);
+  const std::vector<ContourLoop> contour =
+      test::contourOf(snake, Eigen::Isometry3d::Identity(), camera);
   const AlignmentResult result = align(test::pear(), camera, test::roughPose(), contour, coarse());
   const Points x = test::inCamera(camera, result.world_from_object, result.mesh.vertices);
   EXPECT_LT(contourError(contour, x, MeshTopology(result.mesh.triangles), camera).mean_px, 0.7);
@@ -193,8 +196,8 @@ TEST(Alignment, FlagsAContourOfTwoPieces) {
   const std::vector<ContourLoop> contour =
       contourOfMask([](cv::Mat1b& mask) { mask.rowRange(105, 135).setTo(0); });
   ASSERT_EQ(contour.size(), 2u);
-  const AlignmentResult result = align(test::pear(), test::frontCamera(), test::roughPose(),
-                                       contour, coarse());
+  const AlignmentResult result =
+      align(test::pear(), test::frontCamera(), test::roughPose(), contour, coarse());
   EXPECT_FALSE(result.trusted);
   EXPECT_NE(result.reason.find("separate pieces"), std::string::npos) << result.reason;
 }
@@ -206,7 +209,8 @@ TriangleMesh pearWithWindow(double radius) {
   for (int f = 0; f < whole.triangleCount(); ++f) {
     Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
     for (int k = 0; k < 3; ++k) middle += whole.vertices.row(whole.triangles(f, k)) / 3.0;
-    if (std::hypot(middle.x() - 0.05, middle.z() + 0.15) > radius) faces.push_back(whole.triangles.row(f));
+    if (std::hypot(middle.x() - 0.05, middle.z() + 0.15) > radius)
+      faces.push_back(whole.triangles.row(f));
   }
   TriangleMesh mesh = whole;
   mesh.triangles.resize(static_cast<int>(faces.size()), 3);
@@ -234,8 +238,9 @@ TEST(Alignment, FlagsAHoleThatOnlyTheModelHas) {
 
 TEST(Alignment, FlagsAHoleThatOnlyThePictureHas) {
   // 1.1 % of the area: too little for what protrudes, and too short for what is not met.
-  const std::vector<ContourLoop> contour = contourOfMask(
-      [](cv::Mat1b& mask) { cv::circle(mask, {165, 140}, 6, cv::Scalar(0), cv::FILLED); });
+  const std::vector<ContourLoop> contour = contourOfMask([](cv::Mat1b& mask) {
+    cv::circle(mask, {165, 140}, 6, cv::Scalar(0), cv::FILLED);
+  });
   ASSERT_EQ(contour.size(), 2u);
   const AlignmentResult result =
       align(test::pear(), test::frontCamera(), test::roughPose(), contour, coarse());
@@ -251,7 +256,7 @@ TEST(Alignment, AnOccludersHoleIsNoneThatTheModelLacks) {
   const std::vector<ContourLoop> contour = contourOfMask([&](cv::Mat1b& mask) { hide(mask, 0.0); });
   AlignOptions options = coarse();
   options.depth = depthOf(test::pear(), test::frontCamera());
-  hide(options.depth->depth, 2.0);   // a ball in front
+  hide(options.depth->depth, 2.0);  // a ball in front
   const AlignmentResult result =
       align(test::pear(), test::frontCamera(), test::roughPose(), contour, options);
   EXPECT_TRUE(result.trusted) << result.reason;
@@ -259,8 +264,8 @@ TEST(Alignment, AnOccludersHoleIsNoneThatTheModelLacks) {
 
 TEST(Alignment, FlagsAMaskThatFillsTheImage) {
   const std::vector<ContourLoop> contour = contourOfMask([](cv::Mat1b& mask) { mask.setTo(255); });
-  const AlignmentResult result = align(test::pear(), test::frontCamera(), test::roughPose(),
-                                       contour, coarse());
+  const AlignmentResult result =
+      align(test::pear(), test::frontCamera(), test::roughPose(), contour, coarse());
   EXPECT_FALSE(result.trusted);
   EXPECT_NE(result.reason.find("contour mostly unknown"), std::string::npos) << result.reason;
 }

@@ -53,8 +53,8 @@ TEST(Contour, JoinsDiagonalPixels) {
 
 TEST(Contour, DiscIsFoundToATenthOfAPixel) {
   const auto shape = disc(60.37, 49.61, 30.42);
-  const auto contour = extractContour(paint(kSize, shape, kDark, kLight, 2.0), labelsOf(shape), 1,
-                                      "disc");
+  const auto contour =
+      extractContour(paint(kSize, shape, kDark, kLight, 2.0), labelsOf(shape), 1, "disc");
   ASSERT_EQ(contour.loops.size(), 1u);
   const Deviation d = deviation(contour.loops[0], shape);
   EXPECT_LT(d.mean, 0.1);
@@ -80,8 +80,8 @@ TEST(Contour, WithoutContrastTheMaskCounts) {
 
 TEST(Contour, CornersDoNotShrink) {
   const auto shape = box(30.3, 25.2, 85.6, 74.7);
-  const auto contour = extractContour(paint(kSize, shape, kDark, kLight, 2.0), labelsOf(shape), 1,
-                                      "box");
+  const auto contour =
+      extractContour(paint(kSize, shape, kDark, kLight, 2.0), labelsOf(shape), 1, "box");
   const std::vector<Eigen::Vector2d> corners = {
       {30.3, 25.2}, {85.6, 25.2}, {85.6, 74.7}, {30.3, 74.7}};
   for (const Eigen::Vector2d& corner : corners) {
@@ -98,8 +98,8 @@ TEST(Contour, HolesAreInnerLoops) {
     const double r = std::hypot(u - 60.2, v - 50.1);
     return std::max(r - 40.3, 20.4 - r);
   };
-  const auto contour = extractContour(paint(kSize, ring, kDark, kLight, 2.0), labelsOf(ring), 1,
-                                      "ring");
+  const auto contour =
+      extractContour(paint(kSize, ring, kDark, kLight, 2.0), labelsOf(ring), 1, "ring");
   ASSERT_EQ(contour.loops.size(), 2u);
   EXPECT_FALSE(contour.loops[0].hole);
   EXPECT_TRUE(contour.loops[1].hole);
@@ -108,7 +108,8 @@ TEST(Contour, HolesAreInnerLoops) {
 
 TEST(Contour, UnknownAtTheImageBorder) {
   const auto shape = disc(5, 50, 25);
-  const auto contour = extractContour(paint(kSize, shape, kDark, kLight), labelsOf(shape), 1, "cut");
+  const auto contour =
+      extractContour(paint(kSize, shape, kDark, kLight), labelsOf(shape), 1, "cut");
   const ContourLoop& loop = contour.loops[0];
   for (size_t i = 0; i < loop.points.size(); ++i)
     EXPECT_EQ(loop.known[i], loop.points[i].x() > 0.5) << loop.points[i].transpose();

@@ -37,8 +37,8 @@ TriangleMesh twoPieces() {
 Rows pull(const TriangleMesh& mesh, const Points& x, int count, double by, double weight) {
   Rows rows;
   for (int i = 0; i < count; ++i) {
-    rows.push_back({i, i, 1.0, 0.0, Eigen::Vector3d::UnitX(), x(i, 0) - mesh.vertices(i, 0) - by,
-                    weight});
+    rows.push_back(
+        {i, i, 1.0, 0.0, Eigen::Vector3d::UnitX(), x(i, 0) - mesh.vertices(i, 0) - by, weight});
   }
   return rows;
 }
@@ -71,10 +71,10 @@ TEST(ElasticFit, AnIndefiniteSystemIsStiffenedAndReported) {
 TEST(ElasticFit, AMeasurementThatIsNoNumberIsReported) {
   const TriangleMesh mesh = test::pear();
   ElasticFit fit(mesh, gridOf(mesh, kNodes), kAsItIs, options());
-  const FemStageReport report = fit.fit(
-      [&](const Points& x, int) { return pull(mesh, x, 10, 0.1, std::nan("")); });
+  const FemStageReport report =
+      fit.fit([&](const Points& x, int) { return pull(mesh, x, 10, 0.1, std::nan("")); });
   EXPECT_FALSE(report.solvable);
-  EXPECT_TRUE(fit.vertices().isApprox(mesh.vertices, 1e-9));   // where it was put
+  EXPECT_TRUE(fit.vertices().isApprox(mesh.vertices, 1e-9));  // where it was put
 }
 
 TEST(ElasticFit, RejectsABodyWithoutVolume) {

@@ -12,7 +12,7 @@
 namespace calipso::align {
 namespace {
 
-constexpr float kWallDepth = 6.0f;   // m, behind the pear at 3 m
+constexpr float kWallDepth = 6.0f;  // m, behind the pear at 3 m
 
 struct Seen {
   Camera camera = test::frontCamera();
@@ -34,10 +34,9 @@ struct Seen {
 };
 
 long knownPoints(const FitProblem& problem, bool right, double middle) {
-  return std::count_if(problem.target.points.begin(), problem.target.points.end(),
-                       [&](const TargetPoint& p) {
-                         return p.known && (p.pixel.x() > middle) == right;
-                       });
+  return std::count_if(
+      problem.target.points.begin(), problem.target.points.end(),
+      [&](const TargetPoint& p) { return p.known && (p.pixel.x() > middle) == right; });
 }
 
 // Points in between, each off by noise: what a hand drawn or scattered contour looks like.
@@ -67,7 +66,7 @@ TEST(FitProblem, NoiseDoesNotThinTheTarget) {
   seen.contour = denseAndNoisy(seen.contour, 3.0);
   const ContourTarget target = seen.problem().target;
   EXPECT_NEAR(target.noise_px, 3.0, 0.5);
-  EXPECT_NEAR(target.points.size(), clean, 0.15 * clean);   // the contour's corners are cut a little
+  EXPECT_NEAR(target.points.size(), clean, 0.15 * clean);  // the contour's corners are cut a little
 }
 
 TEST(FitProblem, ContourOfAnOccluderIsUnknown) {
@@ -103,17 +102,17 @@ TEST(FitProblem, ASpurNarrowerThanTheModelIsNotItsOwn) {
       EXPECT_FALSE(p.foreign);
     }
   }
-  EXPECT_LT(assess(problem, problem.X).open, 0.005);   // nor does it count as left open
+  EXPECT_LT(assess(problem, problem.X).open, 0.005);  // nor does it count as left open
 }
 
 TEST(FitProblem, ContourOnASupportPlaneIsUnknown) {
   Seen seen;
-  const double water = -0.2;   // m; the pear reaches down to -0.5
+  const double water = -0.2;  // m; the pear reaches down to -0.5
   cv::Mat1f depth = seen.depth();
   cv::Mat1b mask = fillContour(seen.contour, depth.size());
-  int line = 0;   // the lowest row where the pear is seen
+  int line = 0;  // the lowest row where the pear is seen
   for (int v = 0; v < depth.rows; ++v) {
-    const double below = (v - seen.camera.cy) / seen.camera.fy;   // of a ray of depth 1
+    const double below = (v - seen.camera.cy) / seen.camera.fy;  // of a ray of depth 1
     const float surface = below > 0.0 ? static_cast<float>(-water / below) : kWallDepth;
     for (int u = 0; u < depth.cols; ++u) {
       if (surface < depth(v, u)) mask(v, u) = 0;
@@ -142,10 +141,9 @@ TEST(ContourTerm, AnUnknownEdgeOnlyPullsOutwards) {
     const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
     ContourTermOptions options;
     options.tangential = 0.0;
-    const Rows rows =
-        contourRows(problem.target,
-                    occludingContour(x, problem.topology, rendering, problem.camera, 2.0),
-                    problem.camera, options);
+    const Rows rows = contourRows(
+        problem.target, occludingContour(x, problem.topology, rendering, problem.camera, 2.0),
+        problem.camera, options);
     double sum = 0.0;
     for (const PointRow& row : rows) sum += row.weight * std::abs(row.r);
     return sum;
@@ -159,7 +157,8 @@ TEST(Trust, NoiseOpensNothing) {
   seen.contour = denseAndNoisy(seen.contour, 4.0);
   const FitProblem problem = seen.problem();
   const FitQuality quality = assess(problem, problem.X);
-  // The true placement: what is open or sticks out is the noise that smoothing leaves, under a pixel.
+  // The true placement: what is open or sticks out is the noise that smoothing leaves, under a
+  // pixel.
   EXPECT_LT(quality.open, 0.005);
   EXPECT_LT(quality.protruding, 0.005);
   EXPECT_TRUE(judge(problem, seen.contour, quality, 1.0, 0.0, {}).trusted);
@@ -169,7 +168,8 @@ TEST(Trust, AVaseSpinsAndAPearDoesNot) {
   TriangleMesh vase = test::pear(18, 48);
   for (int i = 0; i < vase.vertexCount(); ++i) {
     const double turn = 2.0 * M_PI * (i - 2) / 48, z = vase.vertices(i, 2);
-    const double radius = i < 2 ? 0.0 : (0.2 - 0.1 * z) * std::sqrt(std::max(0.0, 1.0 - 4.0 * z * z));
+    const double radius =
+        i < 2 ? 0.0 : (0.2 - 0.1 * z) * std::sqrt(std::max(0.0, 1.0 - 4.0 * z * z));
     vase.vertices.row(i) << radius * std::cos(turn), radius * std::sin(turn), z;
   }
   const std::optional<Eigen::Vector3d> axis = spinAxis(vase.vertices);
@@ -183,10 +183,12 @@ TEST(Trust, AnUncertainDistanceIsRemarked) {
   const Seen seen;
   const FitProblem problem = seen.problem();
   const FitQuality fits = assess(problem, problem.X);
-  EXPECT_EQ(judge(problem, seen.contour, fits, 1.0, 0.009, {}).reason.find("distance"), std::string::npos);
+  EXPECT_EQ(judge(problem, seen.contour, fits, 1.0, 0.009, {}).reason.find("distance"),
+            std::string::npos);
   const Verdict verdict = judge(problem, seen.contour, fits, 1.0, 0.025, {});
   EXPECT_TRUE(verdict.trusted);
-  EXPECT_NE(verdict.reason.find("distance uncertain by 2.5 %"), std::string::npos) << verdict.reason;
+  EXPECT_NE(verdict.reason.find("distance uncertain by 2.5 %"), std::string::npos)
+      << verdict.reason;
 }
 
 TEST(Trust, AModelThatSticksOutOrFallsShortIsNotTrusted) {

@@ -8,8 +8,8 @@
 namespace calipso::align {
 namespace {
 
-// The energy of label_cut.hpp, written out for an image of one colour (all weights w_pq equal gamma,
-// or gamma / sqrt 2 on diagonals).
+// The energy of label_cut.hpp, written out for an image of one colour (all weights w_pq equal
+// gamma, or gamma / sqrt 2 on diagonals).
 double energy(const cv::Mat& labels, const std::vector<cv::Mat>& costs, double gamma) {
   double sum = 0.0;
   for (int y = 0; y < labels.rows; ++y)

@@ -47,8 +47,8 @@ TEST(LowOrderMap, GradientIsTheJacobianSeenFromOneDirection) {
   LowOrderMap map(X);
   map.setParameters(test::someParameters());
   const Eigen::Vector3d point = X.row(37), direction(0.3, -0.7, 0.5);
-  EXPECT_TRUE(map.gradient(point, direction)
-                  .isApprox(map.jacobian(point).transpose() * direction, 1e-13));
+  EXPECT_TRUE(
+      map.gradient(point, direction).isApprox(map.jacobian(point).transpose() * direction, 1e-13));
 }
 
 TEST(LowOrderMap, ScaleCanBeCountedAsStrain) {
@@ -87,7 +87,7 @@ TEST(LowOrderStage, FindsHowFarTheModelIsDeformed) {
   LowOrderMap::Parameters p = LowOrderMap::Parameters::Zero();
   p[LowOrderMap::kRotation] = 0.15;
   moved.setParameters(p);
-  EXPECT_LT(deformationOf(X, moved), 0.003);   // the least that is estimated is 0.002
+  EXPECT_LT(deformationOf(X, moved), 0.003);  // the least that is estimated is 0.002
 
   // Six coefficients of one deviation 0.2, signs mixed: the estimate is their r.m.s. about the mean
   // a^2 / 2 of the first three, with 4 for 6 in the denominator.

@@ -35,7 +35,8 @@ TEST(MaskEdge, CoverageIsTheShareOfThePixel) {
   cv::Mat mask = maskOf(kSize, kDisc);
   const cv::Mat coverage = settleEdge(image, {}, {}, 2.0, mask);
   for (int x = 25; x < 36; ++x)
-    EXPECT_NEAR(coverage.at<uchar>(50, x) / 255.0, std::clamp(0.5 - kDisc(x, 50), 0.0, 1.0), 0.03) << x;
+    EXPECT_NEAR(coverage.at<uchar>(50, x) / 255.0, std::clamp(0.5 - kDisc(x, 50), 0.0, 1.0), 0.03)
+        << x;
 }
 
 TEST(MaskEdge, WithoutContrastTheMaskStays) {

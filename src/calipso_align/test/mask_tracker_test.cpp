@@ -25,8 +25,8 @@ cv::Mat picture(double u0, double v0, int seed) {
       const double stripe = 30.0 * std::sin(0.5 * (u - u0) + 0.3 * (v - v0));
       const cv::Vec3d fore(50, 90 + stripe, 190), back(150 + 0.2 * u, 150 + 0.2 * v, 140);
       for (int c = 0; c < 3; ++c)
-        image.at<cv::Vec3b>(v, u)[c] = cv::saturate_cast<uchar>(
-            alpha * fore[c] + (1.0 - alpha) * back[c] + rng.gaussian(2.0));
+        image.at<cv::Vec3b>(v, u)[c] =
+            cv::saturate_cast<uchar>(alpha * fore[c] + (1.0 - alpha) * back[c] + rng.gaussian(2.0));
     }
   return image;
 }
@@ -84,7 +84,8 @@ TEST(MaskTracker, ARememberedBackgroundIsNotTakenIn) {
 TEST(MaskTracker, AShadowThatComesAlongIsLeftOut) {
   const auto withShadow = [](double u0, int seed) {
     cv::Mat image = picture(u0, 60, seed);
-    const cv::Mat object = maskOf(kSize, disc(u0, 60, 26.5)), shade = maskOf(kSize, disc(u0 + 20, 80, 25)) & ~object;
+    const cv::Mat object = maskOf(kSize, disc(u0, 60, 26.5)),
+                  shade = maskOf(kSize, disc(u0 + 20, 80, 25)) & ~object;
     cv::Mat darker;
     image.convertTo(darker, -1, 0.6);
     darker.copyTo(image, shade);
@@ -96,7 +97,8 @@ TEST(MaskTracker, AShadowThatComesAlongIsLeftOut) {
   EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(90, 60)), 0.95);
 }
 
-// A ball that rolls: its surface flows at up to twice the outline's speed, and turns new colours to the camera.
+// A ball that rolls: its surface flows at up to twice the outline's speed, and turns new colours to
+// the camera.
 TEST(MaskTracker, FollowsABallThatRolls) {
   const double radius = 25.0;
   const auto rolling = [&](double u0, int seed) {
@@ -109,7 +111,8 @@ TEST(MaskTracker, FollowsABallThatRolls) {
         const double x = (u - u0) / radius, y = (v - 60.0) / radius;
         if (x * x + y * y > 1.0) continue;
         const double turned = std::atan2(x, std::sqrt(1.0 - x * x - y * y)) - u0 / radius;
-        image.at<cv::Vec3b>(v, u) = std::sin(3.0 * turned) > 0.0 ? cv::Vec3b(60, 50, 170) : cv::Vec3b(205, 215, 220);
+        image.at<cv::Vec3b>(v, u) =
+            std::sin(3.0 * turned) > 0.0 ? cv::Vec3b(60, 50, 170) : cv::Vec3b(205, 215, 220);
       }
     return image;
   };
@@ -117,8 +120,10 @@ TEST(MaskTracker, FollowsABallThatRolls) {
   for (int k = 1; k <= 9; ++k) {
     const double u = 40 + 12.0 * k;
     const TrackedMask tracked = tracker.track(rolling(u, k + 1));
-    // What the ball hid in the key frame nobody has seen: the first strip it leaves is told by colour alone.
-    EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(u, 60)), k == 1 ? 0.85 : 0.95) << "frame " << k;
+    // What the ball hid in the key frame nobody has seen: the first strip it leaves is told by
+    // colour alone.
+    EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(u, 60)), k == 1 ? 0.85 : 0.95)
+        << "frame " << k;
   }
 }
 
@@ -127,7 +132,8 @@ TEST(MaskTracker, TakesInASideThatComesIntoView) {
   const auto box = [](int width, int seed) {
     cv::Mat image = picture(-100, -100, seed);
     for (int u = 40; u < 40 + width; ++u)
-      image(cv::Rect(u, 40, 1, 60)).setTo(u / 6 % 2 ? cv::Scalar(60, 50, 170) : cv::Scalar(50, 90, 190));
+      image(cv::Rect(u, 40, 1, 60))
+          .setTo(u / 6 % 2 ? cv::Scalar(60, 50, 170) : cv::Scalar(50, 90, 190));
     return image;
   };
   const auto boxMask = [](int width) {

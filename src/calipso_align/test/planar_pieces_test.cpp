@@ -36,13 +36,15 @@ Relief corner() {
 
 TEST(PlanarPieces, CreasesAndJumpsPartThem) {
   const cv::Mat pieces = planarPieces(corner());
-  const int left = pieces.at<int>(30, 10), right = pieces.at<int>(30, 42), behind = pieces.at<int>(30, 56);
+  const int left = pieces.at<int>(30, 10), right = pieces.at<int>(30, 42),
+            behind = pieces.at<int>(30, 56);
   EXPECT_GT(left, 0);
   EXPECT_GT(right, 0);
   EXPECT_GT(behind, 0);
   EXPECT_NE(left, right);
   EXPECT_NE(right, behind);
-  // The middle rows of the left wall, off the picture's border and the crease, are one piece but for noise.
+  // The middle rows of the left wall, off the picture's border and the crease, are one piece but
+  // for noise.
   const cv::Mat inner = pieces(cv::Rect(3, 5, 18, 50)) == left;
   EXPECT_GT(cv::countNonZero(inner), 0.95 * inner.total());
 }
@@ -63,8 +65,8 @@ TEST(PlanarPieces, WithoutDepthThereAreNone) {
 TEST(StrokesOfPieces, OnlyStrokesThatAgreeCount) {
   const cv::Mat pieces = planarPieces(corner());
   cv::Mat strokes = cv::Mat::zeros(kSize, kSize, CV_8U);
-  strokes(cv::Rect(8, 20, 5, 5)).setTo(2);     // left wall
-  strokes(cv::Rect(40, 20, 3, 3)).setTo(2);    // right wall, of two kinds
+  strokes(cv::Rect(8, 20, 5, 5)).setTo(2);   // left wall
+  strokes(cv::Rect(40, 20, 3, 3)).setTo(2);  // right wall, of two kinds
   strokes(cv::Rect(40, 30, 3, 3)).setTo(1);
   const cv::Mat of_pieces = strokesOfPieces(pieces, strokes);
   EXPECT_EQ(of_pieces.at<uchar>(45, 10), 2);

@@ -33,8 +33,8 @@ cv::Mat depthOfDisc(double shift) {
 
 TEST(Relief, APlaneHasNoJumpAndAStepHasOne) {
   const Relief relief = makeRelief(paint(kSize, kDisc, kGreen, kGrey, 2.0), depthOfDisc(0));
-  EXPECT_LT(jump(relief, {10, 60}, {1, 0}), 0.1f);            // rounding of floats
-  EXPECT_GT(jump(relief, {50, 60}, {1, 0}), 100.0f);          // the disc's left edge
+  EXPECT_LT(jump(relief, {10, 60}, {1, 0}), 0.1f);    // rounding of floats
+  EXPECT_GT(jump(relief, {50, 60}, {1, 0}), 100.0f);  // the disc's left edge
   EXPECT_FLOAT_EQ(jump(relief, {50, 60}, {1, 0}), jump(relief, {51, 60}, {-1, 0}));
 }
 
@@ -77,7 +77,8 @@ TEST(Segmenter, DepthFindsWhatColoursDoNot) {
   EXPECT_LT(intersectionOverUnion(without.segment(strokes) == 1, truth), 0.8);
 }
 
-// A cone on a plane 1 m away, in depth of steps of 1 mm, whose shadow to its right looks as the cone does.
+// A cone on a plane 1 m away, in depth of steps of 1 mm, whose shadow to its right looks as the
+// cone does.
 struct ConeWithShadow {
   cv::Mat image, depth = cv::Mat(kSize, CV_32F), plane = cv::Mat(kSize, CV_32F, cv::Scalar(1.0));
   cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
@@ -108,11 +109,12 @@ TEST(SupportDepths, OfAFloorThatEnds) {
   // Level, 2 m above the floor, looking along world y.
   camera.world_from_camera.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   camera.world_from_camera.translation() << 0, 0, 2.0;
-  const cv::Mat all = supportDepths({{"floor", Eigen::Vector3d::UnitZ(), 0.0, std::nullopt}}, camera)[0];
-  const cv::Mat half =
-      supportDepths({{"floor", Eigen::Vector3d::UnitZ(), 0.0, Eigen::Vector2d(0.0, 9.0)}}, camera)[0];
-  EXPECT_FLOAT_EQ(all.at<float>(20, 20), 4.0f);    // 2 m / (20 / 40)
-  EXPECT_EQ(all.at<float>(0, 20), 0.0f);           // the horizon
+  const cv::Mat all =
+      supportDepths({{"floor", Eigen::Vector3d::UnitZ(), 0.0, std::nullopt}}, camera)[0];
+  const cv::Mat half = supportDepths(
+      {{"floor", Eigen::Vector3d::UnitZ(), 0.0, Eigen::Vector2d(0.0, 9.0)}}, camera)[0];
+  EXPECT_FLOAT_EQ(all.at<float>(20, 20), 4.0f);  // 2 m / (20 / 40)
+  EXPECT_EQ(all.at<float>(0, 20), 0.0f);         // the horizon
   EXPECT_FLOAT_EQ(half.at<float>(20, 25), 4.0f);
   EXPECT_EQ(half.at<float>(20, 15), 0.0f);
 }
@@ -139,9 +141,10 @@ TEST(Segmenter, WhatLiesOnASupportIsNoObject) {
 
 // A cloth's own strokes lie where the plane is: it is kept all the same.
 TEST(Segmenter, AnObjectThatLiesFlatIsNotItsSupport) {
-  const cv::Mat image = paint(kSize, kDisc, kGreen, kGrey, 3.0), plane(kSize, CV_32F, cv::Scalar(1.0));
+  const cv::Mat image = paint(kSize, kDisc, kGreen, kGrey, 3.0),
+                plane(kSize, CV_32F, cv::Scalar(1.0));
   cv::Mat depth = plane.clone(), strokes = cv::Mat::zeros(kSize, CV_8U);
-  depth(cv::Rect(0, 0, 20, 120)).setTo(0.5);   // something else, for edges to be compared
+  depth(cv::Rect(0, 0, 20, 120)).setTo(0.5);  // something else, for edges to be compared
   strokes(cv::Rect(60, 55, 40, 8)).setTo(1);
   Segmenter segmenter(image, {{"cloth", 1, cv::Rect(45, 25, 72, 72), {}, {}}}, {}, depth, {plane});
   EXPECT_GE(intersectionOverUnion(segmenter.segment(strokes) == 1, maskOf(kSize, kDisc)), 0.98);
@@ -166,7 +169,8 @@ TEST(Segmenter, ALineOfOnePixelIsSeenInALargePicture) {
 TEST(Segmenter, NamesADepthImageOfAnotherSize) {
   const cv::Mat image = paint(kSize, kDisc, kGreen, kGrey, 3.0);
   try {
-    Segmenter(image, {{"disc", 1, cv::Rect(45, 25, 72, 72), {}, {}}}, {}, cv::Mat::ones(5, 7, CV_32F));
+    Segmenter(image, {{"disc", 1, cv::Rect(45, 25, 72, 72), {}, {}}}, {},
+              cv::Mat::ones(5, 7, CV_32F));
     FAIL() << "nothing was thrown";
   } catch (const std::invalid_argument& error) {
     EXPECT_NE(std::string(error.what()).find("7x5"), std::string::npos) << error.what();

@@ -18,7 +18,8 @@ TEST(BestRigid, RecoversAMotionUnderAStrain) {
   const Points d = X.rowwise() - X.colwise().mean();
   const Eigen::Matrix3d C = d.transpose() * d;
   const Points stretched = d * (Eigen::Matrix3d::Identity() + 0.3 * C / C.trace());
-  EXPECT_TRUE(bestRigid(d, transformed(motion, stretched)).linear().isApprox(motion.linear(), 1e-12));
+  EXPECT_TRUE(
+      bestRigid(d, transformed(motion, stretched)).linear().isApprox(motion.linear(), 1e-12));
 }
 
 TEST(RigidPart, IsTheMapWithoutDeformation) {
@@ -37,7 +38,7 @@ TEST(RigidPart, DerivativesMatchCentralDifferences) {
   const Points X = test::pear().vertices;
   LowOrderMap map(X);
   LowOrderMap::Parameters p = test::someParameters();
-  p.head<3>().setZero();   // the rotation vector's derivative is exact about no turn
+  p.head<3>().setZero();  // the rotation vector's derivative is exact about no turn
   map.setParameters(p);
   const RigidPart part = rigidPart(X, map);
   constexpr double kStep = 1e-6;
@@ -48,14 +49,16 @@ TEST(RigidPart, DerivativesMatchCentralDifferences) {
     plus.setParameters(map.plus(step));
     minus.setParameters(map.plus(-step));
     const RigidPart a = rigidPart(X, plus), b = rigidPart(X, minus);
-    // The deformation's own turn, some hundredths, times the derivative: see NOTE in rigid_part.hpp.
-    EXPECT_LT(((a.rotation - b.rotation) / (2.0 * kStep) - part.rotation_by_parameters.col(i)).norm(),
-              0.6 * part.rotation.norm() * (1.0 + part.rotation_by_parameters.col(i).norm()))
+    // The deformation's own turn, some hundredths, times the derivative: see NOTE in
+    // rigid_part.hpp.
+    EXPECT_LT(
+        ((a.rotation - b.rotation) / (2.0 * kStep) - part.rotation_by_parameters.col(i)).norm(),
+        0.6 * part.rotation.norm() * (1.0 + part.rotation_by_parameters.col(i).norm()))
         << "parameter " << i;
-    EXPECT_LT(((a.translation - b.translation) / (2.0 * kStep) -
-               part.translation_by_parameters.col(i))
-                  .norm(),
-              1e-8)
+    EXPECT_LT(
+        ((a.translation - b.translation) / (2.0 * kStep) - part.translation_by_parameters.col(i))
+            .norm(),
+        1e-8)
         << "parameter " << i;
   }
 }

@@ -1,8 +1,8 @@
 #include "ros/segmentation_conversions.hpp"
 
-#include <boost/make_shared.hpp>
 #include <gtest/gtest.h>
 
+#include <boost/make_shared.hpp>
 #include <string>
 
 namespace calipso::align {

@@ -2,11 +2,11 @@
 #include <calipso_msgs/NodeStatus.h>
 #include <calipso_msgs/Segmentation.h>
 #include <cv_bridge/cv_bridge.h>
-#include <boost/make_shared.hpp>
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 
+#include <boost/make_shared.hpp>
 #include <functional>
 #include <vector>
 
@@ -94,11 +94,13 @@ TEST_F(SegmentationNode, SegmentsTheKeyFrameTracksTheRestAndServesLateSubscriber
   const auto broken = boost::make_shared<sensor_msgs::Image>();
   broken->header.stamp = ros::Time(1.3);
   images_.publish(broken);
-  waitFor([&] { return status_.clip_frames == 4 && received_.size() >= 2; }, "the broken frame to be counted");
+  waitFor([&] { return status_.clip_frames == 4 && received_.size() >= 2; },
+          "the broken frame to be counted");
   EXPECT_EQ(status_.state, calipso_msgs::NodeStatus::READY);
   EXPECT_EQ(received_[1]->header.stamp, ros::Time(1.3));
   EXPECT_EQ(received_[1]->confidence, 0.0f);
-  EXPECT_GT(cv::countNonZero(labelsFromMsg(received_[1]->labels)), 0) << "the labels of the frame before";
+  EXPECT_GT(cv::countNonZero(labelsFromMsg(received_[1]->labels)), 0)
+      << "the labels of the frame before";
 
   cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
   strokes(cv::Rect(70, 50, 20, 20)).setTo(1);

@@ -140,18 +140,22 @@ TEST(Segmenter, NamesWhatIsWrongWithTheInput) {
   const std::vector<SegmentationTarget> good = {{"disc", 1, cv::Rect(40, 20, 80, 80), {}}};
   expectContains(messageOf([&] { Segmenter(cv::Mat(), good); }), "empty");
   expectContains(messageOf([&] { Segmenter(image, {}); }), "no object");
-  expectContains(messageOf([&] { Segmenter(image, {{"far", 1, {500, 5, 9, 9}, {}}}); }),
-                      "object 'far': rectangle 500 5 9 9 does not meet the picture");
-  expectContains(messageOf([&] { Segmenter(image, {{"odd", 255, {5, 5, 9, 9}, {}}}); }),
-                      "index 255 is not in 1..254");
-  expectContains(
-      messageOf([&] { Segmenter(image, {{"a", 1, {5, 5, 9, 9}, {}}, {"b", 1, {5, 5, 9, 9}, {}}}); }),
-      "also another object's");
+  expectContains(messageOf([&] {
+                   Segmenter(image, {{"far", 1, {500, 5, 9, 9}, {}}});
+                 }),
+                 "object 'far': rectangle 500 5 9 9 does not meet the picture");
+  expectContains(messageOf([&] {
+                   Segmenter(image, {{"odd", 255, {5, 5, 9, 9}, {}}});
+                 }),
+                 "index 255 is not in 1..254");
+  expectContains(messageOf([&] {
+                   Segmenter(image, {{"a", 1, {5, 5, 9, 9}, {}}, {"b", 1, {5, 5, 9, 9}, {}}});
+                 }),
+                 "also another object's");
   Segmenter segmenter(image, good);
   expectContains(messageOf([&] { segmenter.segment(cv::Mat::zeros(5, 5, CV_8U)); }), "5x5");
-  expectContains(
-      messageOf([&] { segmenter.segment(cv::Mat(kSize, CV_8U, cv::Scalar(3))); }),
-      "value 3 names no object");
+  expectContains(messageOf([&] { segmenter.segment(cv::Mat(kSize, CV_8U, cv::Scalar(3))); }),
+                 "value 3 names no object");
 }
 
 TEST(Segmenter, StrokesThatLeaveNoForegroundNameTheObject) {

@@ -34,12 +34,13 @@ ShapeUncertainty ofSphere(double deviation,
 
 double anything(const LowOrderMap::Parameters&) { return 1.0; }
 
-// A sphere shifted by d is off by |d cos| over itself: d / 2 on average, d / sqrt(3) r.m.s.; the mean size of
-// a normally distributed shift is sqrt(2 / pi) of its deviation.
+// A sphere shifted by d is off by |d cos| over itself: d / 2 on average, d / sqrt(3) r.m.s.; the
+// mean size of a normally distributed shift is sqrt(2 / pi) of its deviation.
 TEST(ShapeUncertainty, OfAShiftedSphereIsHalfItsShift) {
   constexpr double kDeviation = 0.1;
   const SurfaceDistance expected = ofSphere(kDeviation, anything).expected();
-  // 64 draws place the mean of a normal variable's size to 9.4 %, its r.m.s. to 8.8 %: two deviations.
+  // 64 draws place the mean of a normal variable's size to 9.4 %, its r.m.s. to 8.8 %: two
+  // deviations.
   EXPECT_NEAR(expected.mean * kDiagonal, 0.5 * std::sqrt(2.0 / M_PI) * kDeviation, 0.0075);
   EXPECT_NEAR(expected.rms * kDiagonal, kDeviation / std::sqrt(3.0), 0.0102);
 }
@@ -77,9 +78,10 @@ TEST(DistancesToSurface, AreThoseOfTheNearestFace) {
   Points from = 1.5 * mesh.vertices;
   const std::vector<double> all = distancesToSurface(from, mesh.vertices, mesh.triangles);
   for (int i = 0; i < from.rows(); i += 17) {
-    double least = 1e9;   // face by face
+    double least = 1e9;  // face by face
     for (int f = 0; f < mesh.triangleCount(); ++f) {
-      least = std::min(least, distancesToSurface(from.row(i), mesh.vertices, mesh.triangles.row(f))[0]);
+      least =
+          std::min(least, distancesToSurface(from.row(i), mesh.vertices, mesh.triangles.row(f))[0]);
     }
     EXPECT_DOUBLE_EQ(all[i], least);
   }
@@ -92,10 +94,10 @@ TEST(PlacementPrior, WhatIsOffAcrossLeavesLessAlong) {
     return PlacementPrior(placed, found).density(found + Eigen::Vector3d(0.0, 0.0, depth * 2.0));
   };
   EXPECT_GT(along(0.0, 0.045), 0.0);
-  EXPECT_EQ(along(0.0, 0.055), 0.0);    // further than a placement may be off
-  EXPECT_EQ(along(0.04, 0.045), 0.0);   // 0.03 remain
+  EXPECT_EQ(along(0.0, 0.055), 0.0);   // further than a placement may be off
+  EXPECT_EQ(along(0.04, 0.045), 0.0);  // 0.03 remain
   EXPECT_GT(along(0.04, 0.025), 0.0);
-  EXPECT_GT(along(0.08, 0.06), 0.0);    // across, the bound was not kept
+  EXPECT_GT(along(0.08, 0.06), 0.0);  // across, the bound was not kept
   EXPECT_GT(along(0.0, 0.01), along(0.0, 0.04));
   // Measured at more than the bound away: there it may be.
   EXPECT_GT(PlacementPrior({0.0, 0.0, 2.0}, {0.0, 0.0, 2.2}).density({0.0, 0.0, 2.2}), 0.0);

@@ -30,7 +30,7 @@ TEST(Silhouette, DepthOfAPlateIsItsDistance) {
   const Frame frame;
   const DepthRendering rendering = renderDepth(frame.x, frame.triangles, test::frontCamera());
   EXPECT_NEAR(rendering.at(159 - 80, 119), 2.0f, 1e-5f);
-  EXPECT_EQ(rendering.at(159, 119), 0.0f);   // through the hole
+  EXPECT_EQ(rendering.at(159, 119), 0.0f);  // through the hole
   EXPECT_EQ(rendering.at(5, 5), 0.0f);
 }
 
@@ -46,8 +46,8 @@ TEST(Silhouette, OutlineHasTheHoleAndPointsOutwards) {
   const Frame frame;
   const Camera camera = test::frontCamera();
   const MeshTopology topology(frame.triangles);
-  const auto outline =
-      occludingContour(frame.x, topology, renderDepth(frame.x, frame.triangles, camera), camera, 2.0);
+  const auto outline = occludingContour(frame.x, topology,
+                                        renderDepth(frame.x, frame.triangles, camera), camera, 2.0);
   int hole = 0;
   for (const OutlinePoint& p : outline) {
     const Eigen::Vector2d from_centre = p.pixel - Eigen::Vector2d(camera.cx, camera.cy);
@@ -133,7 +133,7 @@ TEST(ContourTarget, SmoothingTakesNoiseOutAndKeepsTheCircle) {
     mean += error / target.points.size();
     square += error * error / target.points.size();
   }
-  EXPECT_LT(std::abs(mean), 0.15);           // it does not shrink
+  EXPECT_LT(std::abs(mean), 0.15);  // it does not shrink
   EXPECT_LT(std::sqrt(square), 0.3 * kNoise);
 }
 

@@ -14,8 +14,8 @@ using SignedDistance = std::function<double(double u, double v)>;
 // grey levels.
 inline cv::Mat paint(const cv::Size& size, const SignedDistance& shape, const cv::Vec3b& fore,
                      const cv::Vec3b& back, double noise = 0.0, const cv::Mat& onto = {}) {
-  cv::Mat image = onto.empty() ? cv::Mat(size, CV_8UC3, cv::Scalar(back[0], back[1], back[2]))
-                               : onto.clone();
+  cv::Mat image =
+      onto.empty() ? cv::Mat(size, CV_8UC3, cv::Scalar(back[0], back[1], back[2])) : onto.clone();
   cv::RNG rng(7);
   for (int v = 0; v < size.height; ++v)
     for (int u = 0; u < size.width; ++u) {

@@ -19,8 +19,10 @@ inline TriangleMesh pear(int rings = 18, int segments = 24) {
     const double polar = M_PI * (i + 1) / (rings + 1), z = -0.5 * std::cos(polar);
     for (int j = 0; j < segments; ++j) {
       const double turn = 2.0 * M_PI * j / segments;
-      const double radius = (0.28 - 0.16 * z) * std::sin(polar) * (1.0 + 0.25 * std::cos(turn - 1.0));
-      mesh.vertices.row(2 + i * segments + j) << radius * std::cos(turn) + 0.12 * (z + 0.5) * (z + 0.5),
+      const double radius =
+          (0.28 - 0.16 * z) * std::sin(polar) * (1.0 + 0.25 * std::cos(turn - 1.0));
+      mesh.vertices.row(2 + i * segments + j)
+          << radius * std::cos(turn) + 0.12 * (z + 0.5) * (z + 0.5),
           radius * std::sin(turn), z;
     }
   }

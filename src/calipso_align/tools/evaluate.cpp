@@ -59,16 +59,24 @@ Arguments parse(int argc, char** argv) {
     const bool takes_value = word == "--noise" || word == "--seeds" || word == "--nodes" ||
                              word == "--deformation" || word == "--pictures";
     if (takes_value && ++i >= argc) throw std::invalid_argument(word + " needs a value\n" + kUsage);
-    if (word == "--noise") arguments.noise = listOf<double>(argv[i]);
-    else if (word == "--seeds") arguments.seeds = std::stoi(argv[i]);
-    else if (word == "--deformation") arguments.deformations = listOf<double>(argv[i]);
-    else if (word == "--pictures") arguments.pictures = argv[i];
-    else if (word == "--nodes") arguments.nodes = listOf<int>(argv[i]);
-    else if (word == "--no-depth") arguments.use_depth = false;
-    else if (word == "--literal") arguments.literal = true;
+    if (word == "--noise")
+      arguments.noise = listOf<double>(argv[i]);
+    else if (word == "--seeds")
+      arguments.seeds = std::stoi(argv[i]);
+    else if (word == "--deformation")
+      arguments.deformations = listOf<double>(argv[i]);
+    else if (word == "--pictures")
+      arguments.pictures = argv[i];
+    else if (word == "--nodes")
+      arguments.nodes = listOf<int>(argv[i]);
+    else if (word == "--no-depth")
+      arguments.use_depth = false;
+    else if (word == "--literal")
+      arguments.literal = true;
     else if (word.rfind("--", 0) == 0)
       throw std::invalid_argument("unknown option " + word + "\n" + kUsage);
-    else arguments.paths.push_back(word);
+    else
+      arguments.paths.push_back(word);
   }
   if (arguments.paths.empty()) throw std::invalid_argument(kUsage);
   return arguments;
@@ -161,14 +169,15 @@ double maskIou(const Truth& truth, const Points& x, const Triangles& triangles,
 void addSurfaceError(const EvaluationCase& one, const Points& x, const Points& true_x,
                      const std::string& suffix, JsonLine& line) {
   const double percent = 100.0 / boundingDiagonal(one.truth->mesh);
-  const SurfaceError surface = surfaceError(x, true_x, one.cad.triangles, one.truth->mesh.triangles);
+  const SurfaceError surface =
+      surfaceError(x, true_x, one.cad.triangles, one.truth->mesh.triangles);
   line.addNumber("error3d_mean_percent" + suffix, percent * surface.mean);
   line.addNumber("error3d_rms_percent" + suffix, percent * surface.rms);
   line.addNumber("hausdorff_percent" + suffix, percent * surface.hausdorff);
 }
 
-// Errors of the model at x; `suffix` tells before from after. After, in 3D also with the scale about
-// the camera's centre taken out, which one picture cannot show.
+// Errors of the model at x; `suffix` tells before from after. After, in 3D also with the scale
+// about the camera's centre taken out, which one picture cannot show.
 void addErrors(const EvaluationCase& one, const Points& x, const std::string& suffix,
                JsonLine& line) {
   const Truth& truth = *one.truth;
@@ -190,7 +199,7 @@ void addErrors(const EvaluationCase& one, const Points& x, const std::string& su
   line.addNumber("all_vertex_px" + suffix, all_vertex);
   const double gauge = depthGauge(x, true_x);
   addSurfaceError(one, x, true_x, suffix, line);
-  const bool after = suffix.empty();   // what is left without the distance is of no interest before
+  const bool after = suffix.empty();  // what is left without the distance is of no interest before
   if (after) addSurfaceError(one, gauge * x, true_x, "_depth_removed", line);
   line.addNumber("depth_gauge" + suffix, gauge);
   if (!truth.visible.empty()) {
@@ -218,17 +227,17 @@ void addUnknown(JsonLine& line) {
 void drawOutline(const EvaluationCase& one, const Points& x, const std::string& directory) {
   constexpr int kTimes = 2, kMarginPx = 20, kShift = 4;
   const DepthRendering rendering = renderDepth(x, one.cad.triangles, one.camera);
-  const cv::Rect roi = cv::Rect(rendering.roi.x - kMarginPx, rendering.roi.y - kMarginPx,
-                                rendering.roi.width + 2 * kMarginPx,
-                                rendering.roi.height + 2 * kMarginPx) &
-                       cv::Rect({}, one.image.size());
+  const cv::Rect roi =
+      cv::Rect(rendering.roi.x - kMarginPx, rendering.roi.y - kMarginPx,
+               rendering.roi.width + 2 * kMarginPx, rendering.roi.height + 2 * kMarginPx) &
+      cv::Rect({}, one.image.size());
   if (roi.empty()) return;
   cv::Mat picture;
   cv::resize(one.image(roi), picture, cv::Size(), kTimes, kTimes, cv::INTER_CUBIC);
   for (const OutlinePoint& p :
        occludingContour(x, MeshTopology(one.cad.triangles), rendering, one.camera, 0.5)) {
-    const Eigen::Vector2d at = kTimes * (p.pixel - Eigen::Vector2d(roi.x - 0.5, roi.y - 0.5)) -
-                               Eigen::Vector2d(0.5, 0.5);
+    const Eigen::Vector2d at =
+        kTimes * (p.pixel - Eigen::Vector2d(roi.x - 0.5, roi.y - 0.5)) - Eigen::Vector2d(0.5, 0.5);
     const cv::Point centre(static_cast<int>(std::lround(at.x() * (1 << kShift))),
                            static_cast<int>(std::lround(at.y() * (1 << kShift))));
     cv::circle(picture, centre, 1 << (kShift - 1), cv::Scalar(0, 0, 255), cv::FILLED, cv::LINE_AA,

@@ -42,13 +42,18 @@ Arguments parse(int argc, char** argv) {
   Arguments arguments;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
-    if (word == "--grabcut") arguments.grabcut = true;
-    else if (word == "--track") arguments.track = true;
-    else if (word == "--no-depth") arguments.use_depth = false;
-    else if (word == "--pictures" && i + 1 < argc) arguments.pictures = argv[++i];
+    if (word == "--grabcut")
+      arguments.grabcut = true;
+    else if (word == "--track")
+      arguments.track = true;
+    else if (word == "--no-depth")
+      arguments.use_depth = false;
+    else if (word == "--pictures" && i + 1 < argc)
+      arguments.pictures = argv[++i];
     else if (word.rfind("--", 0) == 0)
       throw std::invalid_argument("unknown option or missing value: " + word + "\n" + kUsage);
-    else arguments.paths.push_back(word);
+    else
+      arguments.paths.push_back(word);
   }
   if (arguments.paths.empty()) throw std::invalid_argument(kUsage);
   return arguments;
@@ -93,7 +98,8 @@ cv::Mat trueLabels(const Scene& scene, int frame) {
 std::vector<double> contourDistances(const std::vector<ContourLoop>& a,
                                      const std::vector<ContourLoop>& b) {
   std::vector<double> distances;
-  const auto oneWay = [&](const std::vector<ContourLoop>& from, const std::vector<ContourLoop>& to) {
+  const auto oneWay = [&](const std::vector<ContourLoop>& from,
+                          const std::vector<ContourLoop>& to) {
     for (const ContourLoop& loop : from)
       for (size_t i = 0; i < loop.points.size(); ++i) {
         if (!loop.known[i]) continue;
@@ -102,8 +108,8 @@ std::vector<double> contourDistances(const std::vector<ContourLoop>& a,
           for (size_t j = 0; j < other.points.size(); ++j) {
             const Eigen::Vector2d p = other.points[j];
             const Eigen::Vector2d d = other.points[(j + 1) % other.points.size()] - p;
-            const double t =
-                std::clamp((loop.points[i] - p).dot(d) / std::max(1e-12, d.squaredNorm()), 0.0, 1.0);
+            const double t = std::clamp(
+                (loop.points[i] - p).dot(d) / std::max(1e-12, d.squaredNorm()), 0.0, 1.0);
             nearest = std::min(nearest, (loop.points[i] - p - t * d).squaredNorm());
           }
         distances.push_back(std::sqrt(nearest));
@@ -139,8 +145,10 @@ void writeErrors(const std::string& path, const cv::Mat& image, const cv::Mat& f
   cv::Mat plain, marked, both;
   cv::resize(image(roi), plain, cv::Size(), 3, 3, cv::INTER_NEAREST);
   cv::resize(tinted(roi), marked, cv::Size(), 3, 3, cv::INTER_NEAREST);
-  if (roi.width > roi.height) cv::vconcat(plain, marked, both);
-  else cv::hconcat(plain, marked, both);
+  if (roi.width > roi.height)
+    cv::vconcat(plain, marked, both);
+  else
+    cv::hconcat(plain, marked, both);
   cv::imwrite(path, both);
 }
 
@@ -177,8 +185,8 @@ void putTracking(const char* suffix, const Tracking& tracking, int label) {
   const auto found = tracking.iou.find(label);
   if (found == tracking.iou.end()) return;
   const std::vector<double>& iou = found->second;
-  std::printf(", \"tracked_iou%s\": %.4f, \"tracked_iou_min%s\": %.4f, \"ms_track%s\": %.1f", suffix,
-              std::accumulate(iou.begin(), iou.end(), 0.0) / iou.size(), suffix,
+  std::printf(", \"tracked_iou%s\": %.4f, \"tracked_iou_min%s\": %.4f, \"ms_track%s\": %.1f",
+              suffix, std::accumulate(iou.begin(), iou.end(), 0.0) / iou.size(), suffix,
               *std::min_element(iou.begin(), iou.end()), suffix, tracking.ms_per_frame);
 }
 
@@ -192,7 +200,8 @@ void evaluate(const std::string& path, const Arguments& arguments) {
     segmenter->segment(strokes);
   });
   const double ms_stroke = cpuMsOf([&] { segmenter->segment(strokes); });
-  const double ms_contour = cpuMsOf([&] { key = segmentKeyFrame(image, *segmenter, strokes); }) - ms_stroke;
+  const double ms_contour =
+      cpuMsOf([&] { key = segmentKeyFrame(image, *segmenter, strokes); }) - ms_stroke;
   const std::vector<SegmentationTarget>& targets = segmenter->targets();
   const cv::Mat truth = trueLabels(scene, 0);
   const bool track_it = arguments.track && !truth.empty();
@@ -200,8 +209,10 @@ void evaluate(const std::string& path, const Arguments& arguments) {
   const Tracking ideal = track_it ? track(scene, truth, "") : Tracking();
 
   for (size_t k = 0; k < targets.size(); ++k) {
-    std::printf("{\"case\": \"%s\", \"object\": \"%s\", \"ms_segment\": %.1f, \"ms_stroke\": %.1f, \"ms_contour\": %.1f",
-                scene.name.c_str(), targets[k].name.c_str(), ms_first, ms_stroke, ms_contour);
+    std::printf(
+        "{\"case\": \"%s\", \"object\": \"%s\", \"ms_segment\": %.1f, \"ms_stroke\": %.1f, "
+        "\"ms_contour\": %.1f",
+        scene.name.c_str(), targets[k].name.c_str(), ms_first, ms_stroke, ms_contour);
     const cv::Mat found = key.labels == targets[k].label;
     if (!truth.empty()) {
       const cv::Mat right = truth == targets[k].label;
@@ -212,11 +223,13 @@ void evaluate(const std::string& path, const Arguments& arguments) {
                   std::accumulate(d.begin(), d.end(), 0.0) / std::max<size_t>(1, d.size()),
                   d.empty() ? 0.0 : d[d.size() * 95 / 100]);
       if (!arguments.pictures.empty())
-        writeErrors(arguments.pictures + "/" + scene.name + "_" + targets[k].name + ".png", image, found, right);
+        writeErrors(arguments.pictures + "/" + scene.name + "_" + targets[k].name + ".png", image,
+                    found, right);
       if (arguments.grabcut) {
         cv::Mat other;
         const double ms = cpuMsOf([&] { other = grabCut(image, targets[k], strokes); });
-        std::printf(", \"grabcut_iou\": %.4f, \"ms_grabcut\": %.1f", intersectionOverUnion(other, right), ms);
+        std::printf(", \"grabcut_iou\": %.4f, \"ms_grabcut\": %.1f",
+                    intersectionOverUnion(other, right), ms);
       }
     }
     putTracking("", tracked, targets[k].label);

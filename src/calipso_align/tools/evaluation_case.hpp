@@ -11,12 +11,12 @@ namespace calipso::align {
 
 // What is known to be true of a case. Read by evaluators only.
 struct Truth {
-  TriangleMesh mesh;                    // true shape, object frame
+  TriangleMesh mesh;  // true shape, object frame
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
-  bool correspondence = false;          // vertex i is the model's vertex i
-  std::vector<ContourLoop> contour;     // empty: unknown
-  cv::Mat1b visible;                    // 255 where the object is seen; empty: unknown
-  cv::Mat1b ignored;                    // 255 where something hides the object or may do so
+  bool correspondence = false;       // vertex i is the model's vertex i
+  std::vector<ContourLoop> contour;  // empty: unknown
+  cv::Mat1b visible;                 // 255 where the object is seen; empty: unknown
+  cv::Mat1b ignored;                 // 255 where something hides the object or may do so
 };
 
 // One object to be fitted, with everything a user has.
@@ -27,8 +27,8 @@ struct EvaluationCase {
   TriangleMesh cad;
   Eigen::Isometry3d rough = Eigen::Isometry3d::Identity();
   std::vector<ContourLoop> contour;
-  cv::Mat image;                        // the key frame; empty: none
-  AlignOptions options;                 // planes, attachments and depth of the scene
+  cv::Mat image;         // the key frame; empty: none
+  AlignOptions options;  // planes, attachments and depth of the scene
   std::optional<double> ms_segment;
   std::optional<double> segmentation_iou;
   std::optional<Truth> truth;

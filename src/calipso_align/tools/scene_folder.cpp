@@ -35,8 +35,8 @@ cv::Mat1b hiddenPart(const Truth& truth, const Camera& camera) {
   return maskOf(renderDepth(x, truth.mesh.triangles, camera), camera) & ~truth.visible;
 }
 
-std::optional<Truth> readTruth(const Scene& scene, const SceneObject& object, const YAML::Node& entry,
-                               const cv::Mat1b& labels, int cad_vertices) {
+std::optional<Truth> readTruth(const Scene& scene, const SceneObject& object,
+                               const YAML::Node& entry, const cv::Mat1b& labels, int cad_vertices) {
   if (!entry["true_mesh"] || !entry["world_T_object"] || labels.empty()) return std::nullopt;
   Truth truth;
   truth.mesh = loadMesh(scene.directory + "/" + entry["true_mesh"].as<std::string>());

@@ -5,7 +5,8 @@
 
 namespace calipso::bag {
 
-std::vector<PlayedFrame> playSchedule(const std::vector<std::int64_t>& frames_ns, std::vector<TimeScale> scales) {
+std::vector<PlayedFrame> playSchedule(const std::vector<std::int64_t>& frames_ns,
+                                      std::vector<TimeScale> scales) {
   std::stable_sort(scales.begin(), scales.end(),
                    [](const TimeScale& a, const TimeScale& b) { return a.time_ns < b.time_ns; });
   std::vector<PlayedFrame> played;

@@ -10,8 +10,8 @@ namespace {
 
 Arguments parse(std::vector<const char*> words) {
   words.insert(words.begin(), "tool");
-  return Arguments(static_cast<int>(words.size()), const_cast<char**>(words.data()), 2,
-                   {"seconds"}, {"compressed"}, "usage: tool A B");
+  return Arguments(static_cast<int>(words.size()), const_cast<char**>(words.data()), 2, {"seconds"},
+                   {"compressed"}, "usage: tool A B");
 }
 
 }  // namespace

@@ -19,7 +19,8 @@ namespace {
 class BagClipTest : public ::testing::Test {
  protected:
   // What opening a bag complains about, after `fill` has written it.
-  std::string complaint(const std::function<void(rosbag::Bag&)>& fill, BagClip::Params params = {}) {
+  std::string complaint(const std::function<void(rosbag::Bag&)>& fill,
+                        BagClip::Params params = {}) {
     write(fill);
     params.path = path_;
     return messageOf([&] { BagClip clip(params); });

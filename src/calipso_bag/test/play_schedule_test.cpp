@@ -13,7 +13,8 @@ TEST(PlaySchedule, WithoutScalesTheClipIsPlayedAsItIs) {
 
 TEST(PlaySchedule, SlowMotionDividesTheIntervalsFromItsInstantOn) {
   const auto played = playSchedule({0, 100, 200, 300}, {{100, 0.5}});
-  const std::vector<std::pair<int, std::int64_t>> expected = {{0, 0}, {1, 100}, {1, 150}, {2, 200}, {2, 250}, {3, 300}};
+  const std::vector<std::pair<int, std::int64_t>> expected = {{0, 0},   {1, 100}, {1, 150},
+                                                              {2, 200}, {2, 250}, {3, 300}};
   ASSERT_EQ(played.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_EQ(played[i].source, expected[i].first);
@@ -28,5 +29,6 @@ TEST(PlaySchedule, TheLatestScaleCountsInWhateverOrderTheyCome) {
 TEST(PlaySchedule, StampsStayAscendingWhenThePartsDoNotDivideTheInterval) {
   const auto played = playSchedule({0, 100}, {{0, 1.0 / 3.0}});
   ASSERT_EQ(played.size(), 4u);
-  for (std::size_t i = 1; i < played.size(); ++i) EXPECT_LT(played[i - 1].time_ns, played[i].time_ns);
+  for (std::size_t i = 1; i < played.size(); ++i)
+    EXPECT_LT(played[i - 1].time_ns, played[i].time_ns);
 }

@@ -140,8 +140,8 @@ TEST(ReadEdits, AnEditedBagRepeatsWhatWasApplied) {
 TEST(ReadEdits, NamesFileAndUnknownObject) {
   const TemporaryFolder folder;
   std::ofstream(folder / "edits.yaml") << "- {t: 0, object: plum, kind: remove}\n";
-  const std::string text = messageOf(
-      [&] { readEdits(folder / "edits.yaml", sceneWithPear(), ros::Time(10.0)); });
+  const std::string text =
+      messageOf([&] { readEdits(folder / "edits.yaml", sceneWithPear(), ros::Time(10.0)); });
   EXPECT_NE(text.find("edits.yaml"), std::string::npos) << text;
   EXPECT_NE(text.find("plum"), std::string::npos) << text;
   EXPECT_NE(text.find("pear"), std::string::npos) << text;

@@ -23,12 +23,13 @@ double fpsOf(const std::vector<ros::Time>& stamps) {
 
 // H.264 where the codec is installed, else MPEG-4.
 cv::VideoWriter openWriter(const std::string& path, double fps, const cv::Size& size) {
-  for (const int codec : {cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
-                          cv::VideoWriter::fourcc('m', 'p', '4', 'v')}) {
+  for (const int codec :
+       {cv::VideoWriter::fourcc('a', 'v', 'c', '1'), cv::VideoWriter::fourcc('m', 'p', '4', 'v')}) {
     cv::VideoWriter writer(path, cv::CAP_FFMPEG, codec, fps, size);
     if (writer.isOpened()) return writer;
   }
-  throw std::runtime_error(path + ": cannot be written as MP4; check the folder and OpenCV's FFmpeg");
+  throw std::runtime_error(path +
+                           ": cannot be written as MP4; check the folder and OpenCV's FFmpeg");
 }
 
 // Both codecs store colour at half resolution and want even sizes.

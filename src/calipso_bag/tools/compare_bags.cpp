@@ -49,8 +49,8 @@ void compare(const Arguments& arguments) {
   const int rows = std::max(1, static_cast<int>(arguments.number("rows", 3)));
   std::vector<cv::Mat> sheet;
   for (int i = 1; i <= rows; ++i) {
-    const std::size_t step = (edited.size() - 1) * static_cast<std::size_t>(i) /
-                             static_cast<std::size_t>(rows);
+    const std::size_t step =
+        (edited.size() - 1) * static_cast<std::size_t>(i) / static_cast<std::size_t>(rows);
     const auto frame = std::next(edited.begin(), static_cast<std::ptrdiff_t>(step));
     const auto before = original.find(frame->first);
     if (before == original.end()) throw std::runtime_error("the bags' stamps differ");

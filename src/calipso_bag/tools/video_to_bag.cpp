@@ -38,8 +38,8 @@ void convert(const Arguments& arguments) {
   const Calibration calibration = calibrationFor(arguments, *first);
 
   const double seconds = arguments.number("seconds", still ? kStillSeconds : 0.0);
-  const auto frames = holdLast(openVideo(arguments.word(0)),
-                               static_cast<int>(std::lround(seconds * look->fps())));
+  const auto frames =
+      holdLast(openVideo(arguments.word(0)), static_cast<int>(std::lround(seconds * look->fps())));
   ClipWriter writer(arguments.word(1), calibration.camera, look->fps(),
                     arguments.has("compressed"));
   while (const auto image = frames->next()) {

@@ -12,26 +12,26 @@ namespace calipso::fem {
 
 // x(t) = prescribed displacement of one component, from its rest position.
 struct PrescribedDof {
-  DisplacementOverTime displacement;   // m
+  DisplacementOverTime displacement;  // m
 };
 
 // v1 = rate (x1 - base); inertia acts as inertia M (x1 - predicted).
 struct Integrator {
-  double inertia = 0.0;   // 1/s^2
-  double rate = 0.0;      // 1/s
-  Vec predicted, base;    // m
+  double inertia = 0.0;  // 1/s^2
+  double rate = 0.0;     // 1/s
+  Vec predicted, base;   // m
 };
 
 struct SoftTerm {
   SoftConstraint constraint;
-  Eigen::SparseVector<double> weights;   // on the nodes
+  Eigen::SparseVector<double> weights;  // on the nodes
 };
 
 // The elastic energy and its gradient at y, each when first asked for.
 struct ElasticState {
   Vec y;
   bool has_energy = false, has_forces = false, has_dilatation = false;
-  bool has_stresses = false, positive = false;   // in `hex`, for the system at y
+  bool has_stresses = false, positive = false;  // in `hex`, for the system at y
   double energy = 0.0, dilatation = 0.0;
   Vec forces;
   HexEvaluation hex;
@@ -41,13 +41,13 @@ struct DeformableBody::Impl {
   FemOptions options;
   VoxelGrid grid;
   Embedding embedding;
-  CellMatrix surface_triangles;          // #F x 3
+  CellMatrix surface_triangles;  // #F x 3
   std::unique_ptr<ElasticModel> model;
   std::unique_ptr<LinearSolver> solver;
-  std::unique_ptr<HexSolver> hex_solver;   // without a matrix; null where not possible or not wanted
+  std::unique_ptr<HexSolver> hex_solver;  // without a matrix; null where not possible or not wanted
 
   // State
-  Vec x, v, a;                           // m, m/s, m/s^2 (trapezoidal)
+  Vec x, v, a;                                  // m, m/s, m/s^2 (trapezoidal)
   std::optional<std::pair<Vec, Vec>> previous;  // x, v of the step before (BDF2)
   double previous_h = 0.0;
   bool acceleration_known = false;
@@ -55,19 +55,19 @@ struct DeformableBody::Impl {
 
   // Loads and constraints
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
-  Vec nodal_forces, surface_forces;      // empty: none
+  Vec nodal_forces, surface_forces;  // empty: none
   double pressure = 0.0;
   std::vector<SoftTerm> soft;
-  std::map<int, PrescribedDof> prescribed;   // by dof
-  Vec reactions;                         // 3n, N
-  Vec soft_forces;                       // 3 per soft constraint, N
+  std::map<int, PrescribedDof> prescribed;  // by dof
+  Vec reactions;                            // 3n, N
+  Vec soft_forces;                          // 3 per soft constraint, N
 
   // Work space of the current step
-  std::optional<BlockMatrix> mass;       // consistent only
+  std::optional<BlockMatrix> mass;  // consistent only
   mutable ElasticState elastic;
   HexEvaluation elastic_scratch;
   BlockMatrix A;
-  Vec viscosity_at;                      // damping acts as D(viscosity_at) v
+  Vec viscosity_at;  // damping acts as D(viscosity_at) v
   BlockMatrix viscosity;
   bool viscosity_valid = false;          // viscosity is D(viscosity_at)
   Vec viscous_velocity, viscous_forces;  // of the last applyViscosity(); empty: none
@@ -80,8 +80,8 @@ struct DeformableBody::Impl {
     double h = 0.0;
     Integrator integrator;
     Vec loads, targets, y;
-    Vec slope;   // gradient at y without contact; empty when y has moved since
-    double residual_before = 0.0;   // norm at the last direction
+    Vec slope;                     // gradient at y without contact; empty when y has moved since
+    double residual_before = 0.0;  // norm at the last direction
     StepReport report;
   };
   std::optional<Trial> trial;
@@ -95,7 +95,7 @@ struct DeformableBody::Impl {
 
   // y = M x for a 3n vector
   Vec applyMass(const Vec& y) const;
-  Vec externalForces() const;            // gravity, nodal, surface, pressure; at the present state
+  Vec externalForces() const;  // gravity, nodal, surface, pressure; at the present state
   Vec pressureForces() const;
 
   // Of the elastic energy at y; what is asked for again is not computed again.
@@ -105,10 +105,10 @@ struct DeformableBody::Impl {
   void prepareElastic(const Vec& y) const;
   void evaluateHexes(const Vec& y, bool stresses, bool positive) const;
   void setViscosity(const Vec& y);
-  Vec applyViscosity(const Vec& w);           // D w, damping included
+  Vec applyViscosity(const Vec& w);  // D w, damping included
   const BlockMatrix& assembledViscosity();
 
-  Vec prescribedTargets(double t) const; // 3n; meaningful at prescribed dofs
+  Vec prescribedTargets(double t) const;  // 3n; meaningful at prescribed dofs
   void maskResidual(Vec* r) const;
 
   // Springs: energy, force (gradient), stiffness, at positions y with velocities rate (y - base).
@@ -122,9 +122,10 @@ struct DeformableBody::Impl {
   double potential(const Vec& y, const Integrator& i, const Vec& loads);
   Vec gradient(const Vec& y, const Integrator& i, const Vec& loads);
   void assemble(const Vec& y, const Integrator& i, Definiteness definiteness);  // all dofs
-  // The system at y, solved without a matrix where that is possible. AJ: A jump, when jump is given.
-  // False: not positive definite.
-  bool setSystem(const Vec& y, const Integrator& i, Definiteness definiteness, const Vec* jump, Vec* AJ);
+  // The system at y, solved without a matrix where that is possible. AJ: A jump, when jump is
+  // given. False: not positive definite.
+  bool setSystem(const Vec& y, const Integrator& i, Definiteness definiteness, const Vec* jump,
+                 Vec* AJ);
   bool setMatrixFreeSystem(const Vec& y, const Integrator& i, Definiteness definiteness);
   SolveReport solveSystem(const Vec& b, double linear_tolerance, Vec* direction);
   // Size of the terms that have to balance, N.
@@ -135,7 +136,8 @@ struct DeformableBody::Impl {
   StepReport minimise(const Integrator& i, const Vec& loads, const Vec& targets, bool linearised,
                       Vec* y);
   Vec expectedMove(const Integrator& i) const;
-  // From the present positions to where the last two steps' motion leads, if the potential is lower there.
+  // From the present positions to where the last two steps' motion leads, if the potential is lower
+  // there.
   bool moveAhead(const Integrator& i, const Vec& loads, Vec* y);
   // Relative residual to which Newton's direction number `iteration` (from 0) is worth solving for.
   // residual_before: norm at the last one; 0 at the first
@@ -155,7 +157,7 @@ struct DeformableBody::Impl {
   }
   void keepAngularMomentum(const Momentum& before, const Vec& loads, double h);
   void invalidateSystem();
-  void modelChanged();                   // material or rest shape
+  void modelChanged();  // material or rest shape
   // A^-1 of the last step's system times impulses on the nodes (N s): change of velocity, m/s.
   Vec velocityChange(Vec impulses, double h);
   Vec nodalImpulse(const SurfacePoint& point, const Eigen::Vector3d& impulse) const;

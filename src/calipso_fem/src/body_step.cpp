@@ -12,7 +12,8 @@ namespace calipso::fem {
 namespace {
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
 }
 
 // Largest relative residual of a Newton direction.
@@ -81,8 +82,9 @@ bool DeformableBody::Impl::newtonDirection(const Vec& y, const Integrator& i, co
   return false;
 }
 
-// Forcing terms (Eisenstat and Walker 1996, choice 2): no direction is solved for better than it is worth.
-// Steps that take long get exact ones: near-incompressible bodies would run out of iterations.
+// Forcing terms (Eisenstat and Walker 1996, choice 2): no direction is solved for better than it is
+// worth. Steps that take long get exact ones: near-incompressible bodies would run out of
+// iterations.
 double DeformableBody::Impl::forcing(int iteration, double residual, double residual_before) const {
   if (iteration >= 2) return options.linear_tolerance;
   const double ratio = residual_before > 0.0 ? residual / residual_before : 1.0;
@@ -90,8 +92,7 @@ double DeformableBody::Impl::forcing(int iteration, double residual, double resi
 }
 
 double DeformableBody::Impl::searchLine(const Vec& y, const Vec& direction, const Vec& residual,
-                                        const Integrator& i, const Vec& loads,
-                                        double energy) {
+                                        const Integrator& i, const Vec& loads, double energy) {
   constexpr double kSufficientDecrease = 1e-4;
   constexpr double kSmallestStep = 1e-8;
   const double slope = residual.dot(direction);
@@ -123,8 +124,9 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
             : forcing(report.newton_iterations, masked.norm(), residual_before);
     residual_before = masked.norm();
     if (!newtonDirection(*y, i, r, jump, linear_tolerance, &report, &direction)) {
-      report.message = "no positive definite system: the body is free to move without resistance, "
-                       "or its state is not finite";
+      report.message =
+          "no positive definite system: the body is free to move without resistance, "
+          "or its state is not finite";
       return report;
     }
     const double noise = roundOff(*y);
@@ -134,8 +136,8 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
     }
     const bool moved_boundary = !jump.isZero(0.0);
     double t = 1.0;
-    if (!linearised && !moved_boundary) t = searchLine(*y, direction, masked, i, loads,
-                                                       potential(*y, i, loads));
+    if (!linearised && !moved_boundary)
+      t = searchLine(*y, direction, masked, i, loads, potential(*y, i, loads));
     if (t == 0.0) break;
     *y += t * direction;
     jump.setZero();
@@ -144,8 +146,7 @@ StepReport DeformableBody::Impl::minimise(const Integrator& i, const Vec& loads,
   Vec masked = r;
   maskResidual(&masked);
   report.residual = masked.norm() / forceScale(*y, i, loads);
-  report.converged =
-      report.converged || linearised || report.residual <= options.newton_tolerance;
+  report.converged = report.converged || linearised || report.residual <= options.newton_tolerance;
   reactions.setZero(x.size());
   for (const auto& [dof, p] : prescribed) reactions[dof] = r[dof];
   return report;
@@ -155,7 +156,8 @@ void DeformableBody::Impl::finishReport(StepReport* report) const {
   report->kinetic_energy = 0.5 * v.dot(applyMass(v));
   report->elastic_energy = elasticEnergy(x);
   const Eigen::VectorXd& m = model->lumpedMass();
-  for (int k = 0; k < m.size(); ++k) report->gravity_energy -= m[k] * gravity.dot(x.segment<3>(3 * k));
+  for (int k = 0; k < m.size(); ++k)
+    report->gravity_energy -= m[k] * gravity.dot(x.segment<3>(3 * k));
   report->solver = toString(matrix_free ? SolverKind::kMultigrid : solver->kind());
   report->recovering = model->model() == MaterialModel::kStVenantKirchhoff &&
                        leastDilatation(x) < kRecoveryDilatation;
@@ -183,9 +185,9 @@ Vec DeformableBody::Impl::startAcceleration(const Vec& loads) {
 }
 
 // NOTE: backward Euler slows the turning of a free body by (omega h)^2 in every step. Its change of
-// angular momentum is set to what the external forces give it. (y - x) / h is the velocity in the middle of the
-// step, along the chord: it is turned by half the step's rotation; then a rigid rotation about the centre of mass is
-// added.
+// angular momentum is set to what the external forces give it. (y - x) / h is the velocity in the
+// middle of the step, along the chord: it is turned by half the step's rotation; then a rigid
+// rotation about the centre of mass is added.
 void DeformableBody::Impl::keepAngularMomentum(const Momentum& before, const Vec& loads, double h) {
   Momentum now = momentum();
   Vec force = -loads;
@@ -214,7 +216,8 @@ void DeformableBody::Impl::keepAngularMomentum(const Momentum& before, const Vec
   const Eigen::Vector3d half = 0.5 * h * solver.solve(target);
   if (!half.allFinite()) return;
   const Eigen::Vector3d drift = now.linear / model->totalMass();
-  const Eigen::Matrix3d R = Eigen::AngleAxisd(half.norm(), half.stableNormalized()).toRotationMatrix();
+  const Eigen::Matrix3d R =
+      Eigen::AngleAxisd(half.norm(), half.stableNormalized()).toRotationMatrix();
   for (Eigen::Index k = 0; k < v.size(); k += 3)
     v.segment<3>(k) = drift + R * (Eigen::Vector3d(v.segment<3>(k)) - drift);
   now = momentum();
@@ -266,7 +269,8 @@ StepReport DeformableBody::solveStatic() {
   const Vec from = m.x, loads = m.externalForces(), targets = m.prescribedTargets(m.time);
   StepReport report;
   // Load stepping: all loads and prescribed displacements grow together.
-  for (int steps = m.options.static_load_steps; steps <= m.options.static_most_load_steps; steps *= 2) {
+  for (int steps = m.options.static_load_steps; steps <= m.options.static_most_load_steps;
+       steps *= 2) {
     Vec y = from;
     StepReport attempt;
     for (int k = 1; k <= steps; ++k) {

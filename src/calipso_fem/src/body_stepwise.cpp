@@ -62,8 +62,9 @@ Vec DeformableBody::trialDirection(const Vec& contact_forces) {
   ++t.report.newton_iterations;
   if (m.newtonDirection(t.y, t.integrator, residual, jump, tolerance, &t.report, &direction))
     return direction;
-  t.report.message = "no positive definite system: the body is free to move without resistance, "
-                     "or its state is not finite";
+  t.report.message =
+      "no positive definite system: the body is free to move without resistance, "
+      "or its state is not finite";
   return Vec::Zero(t.y.size());
 }
 

@@ -246,13 +246,13 @@ bool DeformableBody::Impl::setMatrixFreeSystem(const Vec& y, const Integrator& i
     SpringBlock spring;
     for (Eigen::SparseVector<double>::InnerIterator it(term.weights); it; ++it)
       spring.weights.emplace_back(static_cast<int>(it.index()), it.value());
-    spring.block = (term.constraint.stiffness + i.rate * term.constraint.damping) *
-                   projector(term.constraint);
+    spring.block =
+        (term.constraint.stiffness + i.rate * term.constraint.damping) * projector(term.constraint);
     system.springs.push_back(std::move(spring));
   }
   std::vector<int> fixed;
   for (const auto& [dof, unused] : prescribed) fixed.push_back(dof);
-  elastic.has_stresses = false;   // the solver takes them
+  elastic.has_stresses = false;  // the solver takes them
   return hex_solver->setSystem(&elastic.hex, std::move(system), model->lumpedMass(), fixed);
 }
 
@@ -272,10 +272,12 @@ bool DeformableBody::Impl::setSystem(const Vec& y, const Integrator& i, Definite
   return solver->setMatrix(A, definiteness == Definiteness::kPositive);
 }
 
-SolveReport DeformableBody::Impl::solveSystem(const Vec& b, double linear_tolerance, Vec* direction) {
+SolveReport DeformableBody::Impl::solveSystem(const Vec& b, double linear_tolerance,
+                                              Vec* direction) {
   if (!matrix_free) return solver->solve(b, linear_tolerance, options.linear_iterations, direction);
-  constexpr int kSlow = 20;   // iterations
-  const SolveReport report = hex_solver->solve(b, linear_tolerance, options.linear_iterations, direction);
+  constexpr int kSlow = 20;  // iterations
+  const SolveReport report =
+      hex_solver->solve(b, linear_tolerance, options.linear_iterations, direction);
   slow_solves = report.iterations > kSlow ? slow_solves + 1 : 0;
   return report;
 }

@@ -15,8 +15,8 @@ constexpr int kMostBranches = 8;
 
 // The parts of the solid within one cell.
 struct Parts {
-  std::vector<int> label;   // s^3, x fastest: -1 empty, else the part
-  std::vector<int> size;    // sub-voxels of each part
+  std::vector<int> label;  // s^3, x fastest: -1 empty, else the part
+  std::vector<int> size;   // sub-voxels of each part
 };
 
 // All of the cell's solid as one part.
@@ -69,7 +69,8 @@ Parts connectedParts(const CoveredCell& cell, const Occupancy& occupancy, int s)
   return parts;
 }
 
-// The largest part comes first; specks below 2 % of the cell, and parts beyond the most, are counted to it.
+// The largest part comes first; specks below 2 % of the cell, and parts beyond the most, are
+// counted to it.
 void mergeSpecks(Parts* parts, int s) {
   const int n = static_cast<int>(parts->size.size());
   if (n < 2) return;
@@ -92,8 +93,8 @@ void mergeSpecks(Parts* parts, int s) {
     if (l >= 0) l = renamed[l];
 }
 
-// For every part of `a`: the set of parts of `b` behind the face that it touches, over edges and corners of the
-// sub-voxels too.
+// For every part of `a`: the set of parts of `b` behind the face that it touches, over edges and
+// corners of the sub-voxels too.
 std::array<unsigned, kMostBranches> contacts(const Parts& a, const Parts& b, int face, int s) {
   std::array<unsigned, kMostBranches> touched{};
   const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;

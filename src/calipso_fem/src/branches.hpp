@@ -23,8 +23,8 @@ struct Occupancy {
 };
 
 // Splits cells in which the solid falls into parts (face-connected sub-voxels, `s` per cell edge)
-// into one cell per part, and notes which parts of neighbouring cells touch. `separate` false: parts
-// stay together. Either way notes how each cell's filling is spread over its octants.
+// into one cell per part, and notes which parts of neighbouring cells touch. `separate` false:
+// parts stay together. Either way notes how each cell's filling is spread over its octants.
 std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
                                           const Occupancy& occupancy, int s, bool separate);
 

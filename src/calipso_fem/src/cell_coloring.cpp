@@ -8,8 +8,7 @@ namespace {
 
 // Lowest colour that no corner of the cell has seen. 128 colours suffice: a corner of the Kuhn
 // split has 24 cells.
-int freeColor(const CellMatrix& cells, int cell,
-              const std::vector<std::vector<bool>>& used) {
+int freeColor(const CellMatrix& cells, int cell, const std::vector<std::vector<bool>>& used) {
   for (int color = 0;; ++color) {
     bool taken = false;
     for (int c = 0; c < cells.cols() && !taken; ++c) {

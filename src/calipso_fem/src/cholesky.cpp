@@ -7,7 +7,8 @@
 namespace calipso::fem {
 namespace {
 
-// CHOLMOD's lower triangle of a block matrix; the symbolic analysis is kept while the pattern stays.
+// CHOLMOD's lower triangle of a block matrix; the symbolic analysis is kept while the pattern
+// stays.
 class Cholesky : public Preconditioner {
  public:
   Cholesky() {
@@ -62,7 +63,8 @@ class Cholesky : public Preconditioner {
     release();
     pattern_ = A.pattern;
     const int n = pattern_->rows();
-    const std::size_t entries = 9 * (static_cast<std::size_t>(pattern_->blockCount()) - n) / 2 + 6 * n;
+    const std::size_t entries =
+        9 * (static_cast<std::size_t>(pattern_->blockCount()) - n) / 2 + 6 * n;
     matrix_ = cholmod_allocate_sparse(3 * n, 3 * n, entries, 1, 1, -1, CHOLMOD_REAL, &common_);
     auto* outer = static_cast<int*>(matrix_->p);
     auto* inner = static_cast<int*>(matrix_->i);

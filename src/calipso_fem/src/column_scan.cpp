@@ -21,7 +21,7 @@ int side(Vector2d a, Vector2d b, const Vector2d& p) {
 }
 
 struct Projected {
-  Vector2d p[3];      // u, v
+  Vector2d p[3];  // u, v
   double depth[3];
 };
 
@@ -39,8 +39,8 @@ double depthAt(const Projected& t, const Vector2d& p) {
 
 std::vector<std::vector<Crossing>> scanColumns(const TriangleMesh& surface,
                                                const ColumnLayout& layout, int orientation) {
-  std::vector<std::vector<Crossing>> columns(
-      static_cast<std::size_t>(layout.u_count) * layout.v_count);
+  std::vector<std::vector<Crossing>> columns(static_cast<std::size_t>(layout.u_count) *
+                                             layout.v_count);
   const Vector2d origin(layout.origin[layout.u()], layout.origin[layout.v()]);
   for (int face = 0; face < surface.triangleCount(); ++face) {
     Projected t;

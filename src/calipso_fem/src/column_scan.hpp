@@ -10,9 +10,9 @@ namespace calipso::fem {
 // A regular set of sight lines parallel to one axis. Line (i, j) passes through
 // (u, v) = origin + (spacing (i + 1/2), spacing (j + 1/2)) in the plane of the two other axes.
 struct ColumnLayout {
-  int axis = 2;                                   // direction of the lines; u, v: the next two, cyclic
+  int axis = 2;  // direction of the lines; u, v: the next two, cyclic
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  double spacing = 1.0;                           // m
+  double spacing = 1.0;  // m
   int u_count = 0, v_count = 0;
 
   int u() const { return (axis + 1) % 3; }
@@ -20,8 +20,8 @@ struct ColumnLayout {
 };
 
 struct Crossing {
-  double depth;   // coordinate along the axis, m
-  int sign;       // +1 into the solid, -1 out of it
+  double depth;  // coordinate along the axis, m
+  int sign;      // +1 into the solid, -1 out of it
 };
 
 // The crossings of every line with the surface, ascending, at index i + u_count * j. Lines that hit

@@ -22,10 +22,11 @@ struct Numbers {
   typename SupernodalFactor<Scalar>::Matrix last;  // L_cc
   Vector reduced;                                  // L^-1 P b
 
-  bool update(const SupernodalPattern& pattern, const std::vector<int>& places, const std::vector<double>& entries,
-              int chosen);
+  bool update(const SupernodalPattern& pattern, const std::vector<int>& places,
+              const std::vector<double>& entries, int chosen);
   Vec reduce(const SupernodalPattern& pattern, const std::vector<int>& permutation, const Vec& b);
-  Vec complete(const SupernodalPattern& pattern, const std::vector<int>& permutation, const Vec& forces) const;
+  Vec complete(const SupernodalPattern& pattern, const std::vector<int>& permutation,
+               const Vec& forces) const;
 };
 
 template <typename Scalar>
@@ -40,7 +41,8 @@ bool Numbers<Scalar>::update(const SupernodalPattern& pattern, const std::vector
 }
 
 template <typename Scalar>
-Vec Numbers<Scalar>::reduce(const SupernodalPattern& pattern, const std::vector<int>& permutation, const Vec& b) {
+Vec Numbers<Scalar>::reduce(const SupernodalPattern& pattern, const std::vector<int>& permutation,
+                            const Vec& b) {
   reduced.resize(b.size());
   for (Eigen::Index k = 0; k < b.size(); ++k) reduced[k] = static_cast<Scalar>(b[permutation[k]]);
   factor.solveLower(pattern, reduced);
@@ -66,14 +68,14 @@ Vec Numbers<Scalar>::complete(const SupernodalPattern& pattern, const std::vecto
 struct CondensedFactor::Impl {
   cholmod_common common{};
   std::shared_ptr<const BlockPattern> pattern;
-  std::vector<int> order;                // of elimination, without chosen nodes: for any choice
-  std::vector<int> nodes, index;         // index: by node
+  std::vector<int> order;         // of elimination, without chosen nodes: for any choice
+  std::vector<int> nodes, index;  // index: by node
   SupernodalPattern blocks;
-  std::vector<int> permutation;          // components in the order of elimination
-  std::vector<int> places;               // by entry of A: where in L it belongs; -1: above the diagonal
+  std::vector<int> permutation;  // components in the order of elimination
+  std::vector<int> places;       // by entry of A: where in L it belongs; -1: above the diagonal
   std::variant<Numbers<float>, Numbers<double>> numbers;
   bool analyzed = false;
-  Eigen::MatrixXd compliance;            // empty: not yet asked for
+  Eigen::MatrixXd compliance;  // empty: not yet asked for
 
   Impl() {
     cholmod_start(&common);
@@ -97,7 +99,8 @@ void CondensedFactor::Impl::orderNodes() {
   const int n = pattern->rows();
   cholmod_sparse* graph =
       cholmod_allocate_sparse(n, n, pattern->blockCount(), 1, 1, 1, CHOLMOD_PATTERN, &common);
-  if (!graph) throw std::runtime_error("CHOLMOD: no room for the graph of " + std::to_string(n) + " nodes");
+  if (!graph)
+    throw std::runtime_error("CHOLMOD: no room for the graph of " + std::to_string(n) + " nodes");
   auto* outer = static_cast<int*>(graph->p);
   auto* inner = static_cast<int*>(graph->i);
   int next = 0;
@@ -109,8 +112,8 @@ void CondensedFactor::Impl::orderNodes() {
   outer[n] = next;
   order.resize(n);
   std::vector<int> parent(n), member(n);
-  const auto components =
-      cholmod_nested_dissection(graph, nullptr, 0, order.data(), parent.data(), member.data(), &common);
+  const auto components = cholmod_nested_dissection(graph, nullptr, 0, order.data(), parent.data(),
+                                                    member.data(), &common);
   cholmod_free_sparse(&graph, &common);
   if (components < 0) throw std::runtime_error("CHOLMOD: ordering failed (out of memory?)");
 }
@@ -119,8 +122,10 @@ void CondensedFactor::Impl::orderNodes() {
 void CondensedFactor::Impl::analyze() {
   const int n = pattern->rows();
   const std::size_t entries = 9 * (static_cast<std::size_t>(pattern->blockCount()) - n) / 2 + 6 * n;
-  cholmod_sparse* matrix = cholmod_allocate_sparse(3 * n, 3 * n, entries, 1, 1, -1, CHOLMOD_PATTERN, &common);
-  if (!matrix) throw std::runtime_error("CHOLMOD: no room for the pattern of " + std::to_string(n) + " nodes");
+  cholmod_sparse* matrix =
+      cholmod_allocate_sparse(3 * n, 3 * n, entries, 1, 1, -1, CHOLMOD_PATTERN, &common);
+  if (!matrix)
+    throw std::runtime_error("CHOLMOD: no room for the pattern of " + std::to_string(n) + " nodes");
   auto* outer = static_cast<int*>(matrix->p);
   auto* inner = static_cast<int*>(matrix->i);
   int next = 0;
@@ -164,7 +169,8 @@ void CondensedFactor::Impl::placeEntries() {
       for (int c = 0; c < 3; ++c)
         for (int d = 0; d < 3; ++d) {
           const int row = rank[3 * i + c], column = rank[3 * pattern->column[k] + d];
-          if (row >= column) places[9 * static_cast<std::size_t>(k) + 3 * c + d] = blocks.valueAt(row, column);
+          if (row >= column)
+            places[9 * static_cast<std::size_t>(k) + 3 * c + d] = blocks.valueAt(row, column);
         }
 }
 
@@ -174,10 +180,12 @@ CondensedFactor::~CondensedFactor() = default;
 template <typename Scalar>
 bool CondensedFactor::Impl::factorize(const BlockMatrix& A) {
   if (!std::holds_alternative<Numbers<Scalar>>(numbers)) numbers = Numbers<Scalar>();
-  return std::get<Numbers<Scalar>>(numbers).update(blocks, places, A.values, 3 * static_cast<int>(nodes.size()));
+  return std::get<Numbers<Scalar>>(numbers).update(blocks, places, A.values,
+                                                   3 * static_cast<int>(nodes.size()));
 }
 
-bool CondensedFactor::update(const BlockMatrix& A, const std::vector<int>& nodes, double tolerance) {
+bool CondensedFactor::update(const BlockMatrix& A, const std::vector<int>& nodes,
+                             double tolerance) {
   Impl& m = *impl_;
   if (A.pattern != m.pattern || nodes != m.nodes || !m.analyzed) {
     m.analyzed = false;
@@ -218,13 +226,15 @@ const Eigen::MatrixXd& CondensedFactor::compliance() {
 }
 
 Vec CondensedFactor::reduce(const Vec& b) {
-  return std::visit([&](auto& numbers) { return numbers.reduce(impl_->blocks, impl_->permutation, b); },
-                    impl_->numbers);
+  return std::visit(
+      [&](auto& numbers) { return numbers.reduce(impl_->blocks, impl_->permutation, b); },
+      impl_->numbers);
 }
 
 Vec CondensedFactor::complete(const Vec& forces) {
-  return std::visit([&](auto& numbers) { return numbers.complete(impl_->blocks, impl_->permutation, forces); },
-                    impl_->numbers);
+  return std::visit(
+      [&](auto& numbers) { return numbers.complete(impl_->blocks, impl_->permutation, forces); },
+      impl_->numbers);
 }
 
 }  // namespace calipso::fem

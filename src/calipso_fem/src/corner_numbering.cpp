@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <array>
-#include <map>
-
 #include <calipso_scene/disjoint_sets.hpp>
+#include <map>
 
 #include "voxel_cells.hpp"
 

@@ -31,7 +31,7 @@ Embedding identityEmbedding(int nodes) {
 
 // Below this, a kept Cholesky factor is faster.
 constexpr int kMatrixFreeNodes = 200;
-constexpr int kSlowSolves = 4;   // in a row
+constexpr int kSlowSolves = 4;  // in a row
 
 VolumeMesh withElement(VolumeMesh hexes, ElementType element) {
   return element == ElementType::kTetP1 && !hexes.isTetrahedral() ? kuhnSplit(hexes)
@@ -59,7 +59,8 @@ void DeformableBody::Impl::chooseSolver() {
     hex_solver = std::make_unique<HexSolver>(mesh, *model->hexes());
 }
 
-// Multigrid sees badly what runs across its cells, as a folded sheet does: then a kept factor is faster, if it is small.
+// Multigrid sees badly what runs across its cells, as a folded sheet does: then a kept factor is
+// faster, if it is small.
 void DeformableBody::Impl::leaveSlowMultigrid() {
   if (!hex_solver || options.solver != SolverKind::kAutomatic || slow_solves < kSlowSolves) return;
   if (!hasSmallFactor(model->mesh())) return;
@@ -229,7 +230,8 @@ void DeformableBody::setSoftConstraints(std::vector<SoftConstraint> constraints)
 }
 
 void DeformableBody::setPressure(double pressure) {
-  if (!std::isfinite(pressure)) throw std::invalid_argument("pressure is " + std::to_string(pressure) +
+  if (!std::isfinite(pressure))
+    throw std::invalid_argument("pressure is " + std::to_string(pressure) +
                                 " Pa, allowed is any finite value");
   impl_->pressure = pressure;
 }

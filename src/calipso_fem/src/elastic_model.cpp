@@ -223,9 +223,8 @@ BlockMatrix ElasticModel::consistentMass() const {
     const double density = m.materials[cell].density * m.mesh.fraction[cell];
     for (int a = 0; a < n; ++a)
       for (int b = 0; b < n; ++b)
-        M.block(m.block_of[(static_cast<std::size_t>(cell) * n + a) * n + b])
-            .diagonal()
-            .array() += density * unit(a, b);
+        M.block(m.block_of[(static_cast<std::size_t>(cell) * n + a) * n + b]).diagonal().array() +=
+            density * unit(a, b);
   }
   return M;
 }

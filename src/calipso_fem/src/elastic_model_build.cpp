@@ -24,7 +24,8 @@ StvkBatchKind makeBatchKind(const ElementKind& kind) {
   b.enhanced = kind.type == ElementType::kHexEnhanced;
   if (!b.enhanced) return b;
   for (int i = 0; i < kGradientModes; ++i)
-    for (int j = 0; j < kGradientModes; ++j) b.mode_inverse[i][j] = kind.mode_stiffness_inverse(i, j);
+    for (int j = 0; j < kGradientModes; ++j)
+      b.mode_inverse[i][j] = kind.mode_stiffness_inverse(i, j);
   return b;
 }
 
@@ -68,8 +69,8 @@ void ElasticModel::Impl::buildKinds() {
   std::map<std::tuple<int, double, double>, int> known;
   for (int cell = 0; cell < mesh.cellCount(); ++cell) {
     const Material& m = materials[cell];
-    const auto [it, is_new] = known.try_emplace(
-        {reference_of[cell], m.youngs_modulus, m.poissons_ratio}, kinds.size());
+    const auto [it, is_new] =
+        known.try_emplace({reference_of[cell], m.youngs_modulus, m.poissons_ratio}, kinds.size());
     if (is_new)
       kinds.push_back(
           makeElementKind(*references[reference_of[cell]], type, model, lameParameters(m)));
@@ -95,7 +96,8 @@ void ElasticModel::Impl::buildMass() {
     const Eigen::VectorXd rows =
         unitMass(cornersOf(mesh.cells, cell, mesh.nodes.data())).rowwise().sum();
     const double density = materials[cell].density * mesh.fraction[cell];
-    for (int c = 0; c < mesh.cells.cols(); ++c) lumped_mass[mesh.cells(cell, c)] += density * rows[c];
+    for (int c = 0; c < mesh.cells.cols(); ++c)
+      lumped_mass[mesh.cells(cell, c)] += density * rows[c];
   }
 }
 

@@ -27,23 +27,23 @@ struct ElasticModel::Impl {
   VolumeMesh mesh;
   MaterialModel model;
   ElementType type;
-  std::vector<Material> materials;             // per cell
+  std::vector<Material> materials;  // per cell
   std::vector<std::unique_ptr<ReferenceElement>> references;
-  std::vector<int> reference_of;               // per cell
+  std::vector<int> reference_of;  // per cell
   std::vector<ElementKind> kinds;
-  std::vector<int> kind_of;                    // per cell
+  std::vector<int> kind_of;  // per cell
   std::shared_ptr<const BlockPattern> pattern;
-  std::vector<int> block_of;                   // per cell, corners x corners
+  std::vector<int> block_of;  // per cell, corners x corners
   CellColoring coloring;
   // Cells of one colour and kind, four by four, where the batch kernel can take them.
   struct Batch {
-    std::array<int, kLanes> cell;   // the last one repeats where fewer are left
+    std::array<int, kLanes> cell;  // the last one repeats where fewer are left
     int count;
   };
-  std::vector<StvkBatchKind> batch_kinds;      // as kinds
+  std::vector<StvkBatchKind> batch_kinds;  // as kinds
   std::vector<Batch> batches;
-  std::vector<int> batch_start;                // by colour
-  std::unique_ptr<StvkHexes> hexes;            // beside the batches
+  std::vector<int> batch_start;      // by colour
+  std::unique_ptr<StvkHexes> hexes;  // beside the batches
   Eigen::VectorXd lumped_mass;
 
   void buildReferences();

@@ -69,9 +69,10 @@ struct Activation {
   }
 };
 
-// NOTE: St. Venant-Kirchhoff depends on F^T F only, cannot tell an inverted element from a sound one, and has no
-// force in a collapsed one. Below J0, far below what it is valid for, kappa/2 (J - J0)^2 + s(J) psi_corot pushes it
-// back: the first raises J, the second has a force at any F but a rotation.
+// NOTE: St. Venant-Kirchhoff depends on F^T F only, cannot tell an inverted element from a sound
+// one, and has no force in a collapsed one. Below J0, far below what it is valid for, kappa/2 (J -
+// J0)^2 + s(J) psi_corot pushes it back: the first raises J, the second has a force at any F but a
+// rotation.
 void addRecovery(const ElementKind& kind, const CornerMatrix& x, int derivatives, Part part,
                  ElementResult* r) {
   const ReferenceElement& ref = *kind.reference;
@@ -85,15 +86,17 @@ void addRecovery(const ElementKind& kind, const CornerMatrix& x, int derivatives
     if (J >= kRecoveryDilatation) continue;
     const Lame lame{kind.lame.lambda + 2.0 * kind.lame.mu, 0.0};
     MaterialSplit d = evaluateSplit(MaterialModel::kStableNeoHookeanNoLog, lame, F, derivatives);
-    d.g += 1.0 - kRecoveryDilatation;   // J - J0
+    d.g += 1.0 - kRecoveryDilatation;  // J - J0
     const MaterialSplit c = evaluateSplit(MaterialModel::kCorotated, kind.lame, F, derivatives);
     const Activation a(J);
     r->energy += w * (0.5 * d.kappa * d.g * d.g + a.s * c.energy());
     if (derivatives < 1) continue;
-    addForce(ref.gradient[q], (d.kappa * d.g + a.ds * c.energy()) * d.dg + a.s * c.stress(), w, &r->f);
+    addForce(ref.gradient[q], (d.kappa * d.g + a.ds * c.energy()) * d.dg + a.s * c.stress(), w,
+             &r->f);
     if (derivatives < 2) continue;
-    const Matrix9d H = d.tangent() + a.dds * c.energy() * outer(d.dg, d.dg) + a.ds * c.energy() * d.ddg +
-                       a.ds * (outer(d.dg, c.stress()) + outer(c.stress(), d.dg)) + a.s * c.tangent();
+    const Matrix9d H =
+        d.tangent() + a.dds * c.energy() * outer(d.dg, d.dg) + a.ds * c.energy() * d.ddg +
+        a.ds * (outer(d.dg, c.stress()) + outer(c.stress(), d.dg)) + a.s * c.tangent();
     addTangent(ref.gradient[q], part == Part::kPositive ? projectPositive(H) : H, w, &r->K);
   }
 }
@@ -118,12 +121,12 @@ void addTangent(const CornerMatrix& G, const Matrix9d& H, double w, ElementMatri
   const int n = static_cast<int>(G.rows());
   for (int b = 0; b < n; ++b) {
     Eigen::Matrix<double, 9, 3> HB;  // dP per displacement of corner b
-    HB.noalias() = H.middleCols<3>(0) * G(b, 0) + H.middleCols<3>(3) * G(b, 1) +
-                   H.middleCols<3>(6) * G(b, 2);
+    HB.noalias() =
+        H.middleCols<3>(0) * G(b, 0) + H.middleCols<3>(3) * G(b, 1) + H.middleCols<3>(6) * G(b, 2);
     for (int a = 0; a < n; ++a)
-      K->block<3, 3>(3 * a, 3 * b) += w * (HB.middleRows<3>(0) * G(a, 0) +
-                                           HB.middleRows<3>(3) * G(a, 1) +
-                                           HB.middleRows<3>(6) * G(a, 2));
+      K->block<3, 3>(3 * a, 3 * b) +=
+          w * (HB.middleRows<3>(0) * G(a, 0) + HB.middleRows<3>(3) * G(a, 1) +
+               HB.middleRows<3>(6) * G(a, 2));
   }
 }
 

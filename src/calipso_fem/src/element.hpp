@@ -20,9 +20,9 @@ struct ElementKind {
   ElementType type = ElementType::kHexQ1;
   MaterialModel model = MaterialModel::kStVenantKirchhoff;
   Lame lame;
-  ModeMatrix mode_stiffness;          // K_aa at rest (enhanced elements only)
-  // St. Venant-Kirchhoff: inverse for the modes it uses, the gradient modes. NOTE: the volumetric ones
-  // would cost it an eighth of its time, for 0.04 % of the error at nu = 0.3.
+  ModeMatrix mode_stiffness;  // K_aa at rest (enhanced elements only)
+  // St. Venant-Kirchhoff: inverse for the modes it uses, the gradient modes. NOTE: the volumetric
+  // ones would cost it an eighth of its time, for 0.04 % of the error at nu = 0.3.
   GradientModeMatrix mode_stiffness_inverse;
 };
 
@@ -31,21 +31,21 @@ ElementKind makeElementKind(const ReferenceElement& reference, ElementType type,
 
 struct ElementResult {
   double energy = 0.0;
-  ElementVector f;     // corners x 3, node by node
+  ElementVector f;  // corners x 3, node by node
   ElementMatrix K;
 };
 
 enum class Part { kFull, kPositive, kMaterialOnly };
 
-// Energy (zero at rest), force and, with derivatives == 2, stiffness of one filled cell whose corners
-// are at x (corners x 3, m). Part: the whole tangent, a positive semi-definite one, or (StVK
-// elements) the part without geometric stiffness.
+// Energy (zero at rest), force and, with derivatives == 2, stiffness of one filled cell whose
+// corners are at x (corners x 3, m). Part: the whole tangent, a positive semi-definite one, or
+// (StVK elements) the part without geometric stiffness.
 void evaluateElement(const ElementKind& kind, const CornerMatrix& x, int derivatives, Part part,
                      ElementResult* result);
 
 // The same of enhanced hexahedra.
-void evaluateEnhancedStvk(const ElementKind& kind, const CornerMatrix& x, int derivatives, Part part,
-                          ElementResult* result);
+void evaluateEnhancedStvk(const ElementKind& kind, const CornerMatrix& x, int derivatives,
+                          Part part, ElementResult* result);
 void evaluateEnhanced(const ElementKind& kind, const CornerMatrix& x, int derivatives, Part part,
                       ElementResult* result);
 

@@ -26,7 +26,8 @@ class CellFinder {
     if (const auto it = cells_.find(key(cell)); it != cells_.end()) return fullest(it->second);
     int best = -1;
     double least = std::numeric_limits<double>::infinity();
-    for (int reach = 1; reach <= 2 && best < 0; ++reach) best = nearestWithin(p, cell, reach, &least);
+    for (int reach = 1; reach <= 2 && best < 0; ++reach)
+      best = nearestWithin(p, cell, reach, &least);
     for (int c = 0; best < 0 && c < grid_.cellCount(); ++c)
       if (const double d = squaredDistance(p, c); d < least) least = d, nearest_ = c;
     return best >= 0 ? best : nearest_;

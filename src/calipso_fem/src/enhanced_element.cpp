@@ -100,7 +100,7 @@ ModeSystem modeSystem(const ElementKind& kind, const CornerMatrix& x, const Mode
 // Amplitudes that minimise the element's energy at corners x: damped Newton from zero.
 ModeVector solveModes(const ElementKind& kind, const CornerMatrix& x) {
   constexpr int kMaxIterations = 200;
-  constexpr double kExact = 1e-11, kSmall = 1e-5;   // of an amplitude
+  constexpr double kExact = 1e-11, kSmall = 1e-5;  // of an amplitude
   ModeVector a = ModeVector::Zero();
   double energy = modeEnergy(kind, x, a);
   for (int it = 0; it < kMaxIterations; ++it) {
@@ -135,8 +135,8 @@ ModeVector solveModes(const ElementKind& kind, const CornerMatrix& x) {
 // NOTE: the modes are added to the Green strain, E_q + sum_i a_i sym(m_iq), not to F. W is then
 // quadratic in a with a constant K_aa: the condensation is exact, needs no inner iteration, and the
 // condensed energy is a non-negative quadratic form of the Green strains.
-void evaluateEnhancedStvk(const ElementKind& kind, const CornerMatrix& x, int derivatives, Part part,
-                          ElementResult* r) {
+void evaluateEnhancedStvk(const ElementKind& kind, const CornerMatrix& x, int derivatives,
+                          Part part, ElementResult* r) {
   const ReferenceElement& ref = *kind.reference;
   std::array<Matrix3d, kMaxPoints> F, E;
   GradientModeVector load = GradientModeVector::Zero();
@@ -162,7 +162,8 @@ void evaluateEnhancedStvk(const ElementKind& kind, const CornerMatrix& x, int de
     const Matrix3d geometric = part == Part::kMaterialOnly ? Matrix3d(Matrix3d::Zero())
                                : part == Part::kPositive   ? positivePart(S)
                                                            : S;
-    // p_a = F grad N_a;  K_ab = lambda p_a p_b^T + mu p_b p_a^T + mu (g_a.g_b) F F^T + (g_a.S g_b) I
+    // p_a = F grad N_a;  K_ab = lambda p_a p_b^T + mu p_b p_a^T + mu (g_a.g_b) F F^T + (g_a.S g_b)
+    // I
     const CornerMatrix& G = ref.gradient[q];
     const CornerMatrix p = G * F[q].transpose();
     const Matrix3d B = F[q] * F[q].transpose();

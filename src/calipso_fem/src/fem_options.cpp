@@ -62,10 +62,13 @@ void validate(const FemOptions& o) {
   require(o.cell_size > 0.0 || o.target_nodes >= 8, "target_nodes", o.target_nodes, ">= 8");
   require(o.cell_size >= 0.0 && std::isfinite(o.cell_size), "cell_size", o.cell_size, ">= 0 m");
   if (o.has_anchor && !o.anchor.allFinite())
-    throw std::invalid_argument("FEM option anchor: a component is not finite, allowed is any point");
-  require(o.mass_damping >= 0.0 && std::isfinite(o.mass_damping), "mass_damping", o.mass_damping, ">= 0 1/s");
+    throw std::invalid_argument(
+        "FEM option anchor: a component is not finite, allowed is any point");
+  require(o.mass_damping >= 0.0 && std::isfinite(o.mass_damping), "mass_damping", o.mass_damping,
+          ">= 0 1/s");
   require(o.newton_iterations >= 1, "newton_iterations", o.newton_iterations, ">= 1");
-  require(o.newton_tolerance > 0.0 && std::isfinite(o.newton_tolerance), "newton_tolerance", o.newton_tolerance, "> 0");
+  require(o.newton_tolerance > 0.0 && std::isfinite(o.newton_tolerance), "newton_tolerance",
+          o.newton_tolerance, "> 0");
   require(o.linear_tolerance > 0.0 && o.linear_tolerance < 1.0, "linear_tolerance",
           o.linear_tolerance, "(0, 1)");
   require(o.linear_iterations >= 1, "linear_iterations", o.linear_iterations, ">= 1");

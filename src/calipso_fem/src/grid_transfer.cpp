@@ -55,8 +55,7 @@ GridTransfer makeGridTransfer(const LatticeMatrix& fine_lattice) {
   return t;
 }
 
-std::shared_ptr<const BlockPattern> coarsePattern(const BlockPattern& fine,
-                                                  const GridTransfer& t) {
+std::shared_ptr<const BlockPattern> coarsePattern(const BlockPattern& fine, const GridTransfer& t) {
   auto pattern = std::make_shared<BlockPattern>();
   pattern->row_start.push_back(0);
   std::vector<int> row;

@@ -14,11 +14,11 @@ using LatticeMatrix = Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>;
 struct GridTransfer {
   struct Entry {
     int node;
-    float weight;   // exact: a power of two
+    float weight;  // exact: a power of two
   };
   std::vector<int> parent_start, child_start;
-  std::vector<Entry> parents;    // of each fine node: coarse nodes
-  std::vector<Entry> children;   // of each coarse node: fine nodes, ascending
+  std::vector<Entry> parents;   // of each fine node: coarse nodes
+  std::vector<Entry> children;  // of each coarse node: fine nodes, ascending
   LatticeMatrix coarse_lattice;
 
   int fineCount() const { return static_cast<int>(parent_start.size()) - 1; }
@@ -30,9 +30,10 @@ class LatticeIndex {
  public:
   explicit LatticeIndex(const Eigen::RowVector3i& size);
   int& at(int x, int y, int z) {
-    return id_[x + static_cast<std::size_t>(size_.x()) * (y + static_cast<std::size_t>(size_.y()) * z)];
+    return id_[x +
+               static_cast<std::size_t>(size_.x()) * (y + static_cast<std::size_t>(size_.y()) * z)];
   }
-  std::vector<int>& all() { return id_; }   // x runs fastest, then y
+  std::vector<int>& all() { return id_; }  // x runs fastest, then y
   const Eigen::RowVector3i& size() const { return size_; }
 
  private:

@@ -1,5 +1,5 @@
-// Included by hex_kernel_*.cpp inside their namespaces. Symmetric 3x3 tensors are stored as xx, yy, zz, xy,
-// yz, zx. Point and corner q has the bits qx + 2 qy + 4 qz. Formulas: enhanced_element.cpp.
+// Included by hex_kernel_*.cpp inside their namespaces. Symmetric 3x3 tensors are stored as xx, yy,
+// zz, xy, yz, zx. Point and corner q has the bits qx + 2 qy + 4 qz. Formulas: enhanced_element.cpp.
 
 template <class Real>
 struct Simd;
@@ -75,7 +75,8 @@ inline void scatter(const LaneOf<Real> f[3], Real* slots) {
 }
 #endif
 
-// ---- Gradients ------------------------------------------------------------------------------------
+// ---- Gradients
+// ------------------------------------------------------------------------------------
 
 // Derivative along parent axis k is constant along k: one value per pair of the other two bits.
 inline int pairOf(int axis, int q) {
@@ -109,7 +110,7 @@ inline void interpolatePairs(V e[4]) {
 
 template <class V>
 struct Gradients {
-  V g[3][3][4];   // [parent axis][component][pair]
+  V g[3][3][4];  // [parent axis][component][pair]
 };
 
 // Constants of one batch.
@@ -121,9 +122,9 @@ struct Constants {
   V twoMu() const { return c[1]; }
   V weight(int q) const { return c[2 + q]; }
   const V* modeInverse() const { return c + 10; }
-  V scale(int axis) const { return c[kHexCommon + axis]; }                       // boxes
-  V mode(int q, int k) const { return c[kHexCommon + 3 + 3 * q + k]; }            // boxes
-  const V* jacobian(int q) const { return c + kHexCommon + 9 * q; }               // [parent axis][axis]
+  V scale(int axis) const { return c[kHexCommon + axis]; }              // boxes
+  V mode(int q, int k) const { return c[kHexCommon + 3 + 3 * q + k]; }  // boxes
+  const V* jacobian(int q) const { return c + kHexCommon + 9 * q; }     // [parent axis][axis]
   const V* modeVector(int q, int k) const { return c + kHexCommon + 72 + 9 * q + 3 * k; }
 };
 
@@ -197,12 +198,14 @@ inline void scatterCorners(const LaneOf<Real> f[8][3], Real* slots) {
 }
 
 template <class Real>
-inline void loadCorners(const HexBatches<Real>& b, int batch, const Real* x, LaneOf<Real> out[8][3]) {
+inline void loadCorners(const HexBatches<Real>& b, int batch, const Real* x,
+                        LaneOf<Real> out[8][3]) {
   constexpr int kLanes = kHexLanes<Real>;
   for (int c = 0; c < 8; ++c) gather(x, b.node + (8L * batch + c) * kLanes, out[c]);
 }
 
-// ---- Strains and stresses -------------------------------------------------------------------------
+// ---- Strains and stresses
+// -------------------------------------------------------------------------
 
 template <class V>
 inline void hooke(V lambda, V two_mu, const V E[6], V S[6]) {
@@ -296,7 +299,8 @@ inline double negativeEigenvalue(double a, double b, double c, double d, double 
   return least < 0.0 ? least : 0.0;
 }
 
-// ---- Batches ----------------------------------------------------------------------------------------
+// ---- Batches
+// ----------------------------------------------------------------------------------------
 
 // Tangent at x applied to u: from the gradients of both to the adjoint gradients h.
 template <class Real, bool kBox>
@@ -311,8 +315,7 @@ inline void multiplyGradients(const Constants<Real, kBox>& k, bool enhanced,
     V F[3][3], D[3][3];
     pointGradient(k, of_x, q, F);
     pointGradient(k, of_u, q, D);
-    for (int c = 0; c < 3; ++c)
-      E[q][c] = F[0][c] * D[0][c] + F[1][c] * D[1][c] + F[2][c] * D[2][c];
+    for (int c = 0; c < 3; ++c) E[q][c] = F[0][c] * D[0][c] + F[1][c] * D[1][c] + F[2][c] * D[2][c];
     for (int c = 0; c < 3; ++c) {
       const int i = c, j = (c + 1) % 3;
       E[q][3 + c] = Real(0.5) * (F[0][i] * D[0][j] + F[1][i] * D[1][j] + F[2][i] * D[2][j] +
@@ -363,8 +366,8 @@ inline void multiplyBatch(const HexBatches<Real>& b, int batch, const Real* x, c
   scatterCorners<Real>(corner, slots);
 }
 
-// Along one axis, from a fine cell's two corners to those of the coarse cell around it, of which it is
-// the first (even = 1) or second half (even = 0).
+// Along one axis, from a fine cell's two corners to those of the coarse cell around it, of which it
+// is the first (even = 1) or second half (even = 0).
 template <class V>
 inline void toCoarse(V even, V& a, V& b) {
   const V coarse_a = 0.5f * ((1.0f + even) * a + even * b);
@@ -373,8 +376,9 @@ inline void toCoarse(V even, V& a, V& b) {
 }
 
 template <bool kBox>
-inline void stiffnessBatch(const HexBatches<float>& b, int batch, const float* x, const float* stress,
-                           float factor, const float* free, HexStiffness* out) {
+inline void stiffnessBatch(const HexBatches<float>& b, int batch, const float* x,
+                           const float* stress, float factor, const float* free,
+                           HexStiffness* out) {
   typedef LaneOf<float> V;
   const Constants<float, kBox> k{reinterpret_cast<const V*>(b.constants + b.block[batch])};
   Gradients<V> of_x, of_u, h;
@@ -409,8 +413,8 @@ inline void stiffnessBatch(const HexBatches<float>& b, int batch, const float* x
 }
 
 template <class Real>
-void multiplyBatches(const HexBatches<Real>& b, int begin, int end, const Real* x, const Real* stress,
-                     Real factor, const Real* u, Real* slots) {
+void multiplyBatches(const HexBatches<Real>& b, int begin, int end, const Real* x,
+                     const Real* stress, Real factor, const Real* u, Real* slots) {
   constexpr int kLanes = kHexLanes<Real>;
   for (int k = begin; k < end; ++k) {
     const Real* s = stress ? stress + static_cast<long>(k) * kHexStress * kLanes : nullptr;
@@ -462,8 +466,9 @@ inline void evaluateBatch(const HexBatches<double>& b, int batch, const double* 
     hooke(k.lambda(), k.twoMu(), E[q], S);
     const V* e = E[q];
     const V w = k.weight(q);
-    energy += 0.5 * w * (S[0] * e[0] + S[1] * e[1] + S[2] * e[2] +
-                         2.0 * (S[3] * e[3] + S[4] * e[4] + S[5] * e[5]));
+    energy +=
+        0.5 * w *
+        (S[0] * e[0] + S[1] * e[1] + S[2] * e[2] + 2.0 * (S[3] * e[3] + S[4] * e[4] + S[5] * e[5]));
     for (V& s : S) s *= w;
     if (slots) {
       pointGradient(k, of_x, q, F);
@@ -473,7 +478,8 @@ inline void evaluateBatch(const HexBatches<double>& b, int batch, const double* 
     if (!geometric) continue;
     if (state.positive)
       for (int l = 0; l < kHexLanes<double>; ++l) {
-        const double shift = negativeEigenvalue(S[0][l], S[1][l], S[2][l], S[3][l], S[4][l], S[5][l]);
+        const double shift =
+            negativeEigenvalue(S[0][l], S[1][l], S[2][l], S[3][l], S[4][l], S[5][l]);
         for (int c = 0; c < 3; ++c) S[c][l] -= shift;
       }
     for (int c = 0; c < 6; ++c) geometric[6 * q + c] = S[c];
@@ -487,15 +493,15 @@ inline void evaluateBatch(const HexBatches<double>& b, int batch, const double* 
   if (state.dilatation) *reinterpret_cast<V*>(state.dilatation) = least;
 }
 
-void evaluateBatches(const HexBatches<double>& b, int begin, int end, const double* x, HexState state,
-                     double* slots) {
+void evaluateBatches(const HexBatches<double>& b, int begin, int end, const double* x,
+                     HexState state, double* slots) {
   constexpr int kLanes = kHexLanes<double>;
   for (int k = begin; k < end; ++k) {
-    const HexState here{state.energy ? state.energy + static_cast<long>(k) * kLanes : nullptr,
-                        state.dilatation ? state.dilatation + static_cast<long>(k) * kLanes : nullptr,
-                        state.stress ? state.stress + static_cast<long>(k) * kHexStress * kLanes
-                                     : nullptr,
-                        state.positive};
+    const HexState here{
+        state.energy ? state.energy + static_cast<long>(k) * kLanes : nullptr,
+        state.dilatation ? state.dilatation + static_cast<long>(k) * kLanes : nullptr,
+        state.stress ? state.stress + static_cast<long>(k) * kHexStress * kLanes : nullptr,
+        state.positive};
     double* out = slots ? slots + 32L * kLanes * k : nullptr;
     if (k < b.boxes)
       evaluateBatch<true>(b, k, x, here, out);
@@ -504,8 +510,8 @@ void evaluateBatches(const HexBatches<double>& b, int begin, int end, const doub
   }
 }
 
-void stiffness(const HexBatches<float>& b, int batch, const float* x, const float* stress, float factor,
-               const float* free, HexStiffness* out) {
+void stiffness(const HexBatches<float>& b, int batch, const float* x, const float* stress,
+               float factor, const float* free, HexStiffness* out) {
   const float* s = stress + static_cast<long>(batch) * kHexStress * kHexLanes<float>;
   if (batch < b.boxes)
     stiffnessBatch<true>(b, batch, x, s, factor, free, out);
@@ -513,5 +519,5 @@ void stiffness(const HexBatches<float>& b, int batch, const float* x, const floa
     stiffnessBatch<false>(b, batch, x, s, factor, free, out);
 }
 
-extern const HexKernel kHexKernel = {evaluateBatches, multiplyBatches<double>, multiplyBatches<float>,
-                                     stiffness};
+extern const HexKernel kHexKernel = {evaluateBatches, multiplyBatches<double>,
+                                     multiplyBatches<float>, stiffness};

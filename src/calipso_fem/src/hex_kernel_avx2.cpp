@@ -1,6 +1,6 @@
-#include "hex_kernel.hpp"
-
 #include <type_traits>
+
+#include "hex_kernel.hpp"
 
 #if defined(__x86_64__)
 #include <immintrin.h>

@@ -15,11 +15,12 @@ struct SpringBlock {
   Eigen::Matrix3d block;
 };
 
-// A = factor K_material(x) + K_geometric(x) + inertia M + springs, rows and columns of fixed components out.
+// A = factor K_material(x) + K_geometric(x) + inertia M + springs, rows and columns of fixed
+// components out.
 struct HexSystem {
-  bool positive = false;          // known to be positive definite
-  double factor = 1.0;            // 1 + rate * stiffness damping
-  double inertia = 0.0;           // 1/s^2, times the lumped mass
+  bool positive = false;  // known to be positive definite
+  double factor = 1.0;    // 1 + rate * stiffness damping
+  double inertia = 0.0;   // 1/s^2, times the lumped mass
   std::vector<SpringBlock> springs;
 };
 
@@ -60,8 +61,9 @@ class SpringForces {
   AlignedBuffer<Real> force_;
 };
 
-// A product without a matrix: multiply(first, last) fills the slots of some batches, row(node) sums up nodes
-// begin .. end of this thread. `early`: a row is made as soon as its cells are done, while they are in the cache.
+// A product without a matrix: multiply(first, last) fills the slots of some batches, row(node) sums
+// up nodes begin .. end of this thread. `early`: a row is made as soon as its cells are done, while
+// they are in the cache.
 template <class Real, class Multiply, class Row>
 void sweepRows(const Crew& crew, const StvkHexes& hexes, int begin, int end, bool early,
                const Multiply& multiply, const Row& row) {
@@ -83,8 +85,8 @@ void sweepRows(const Crew& crew, const StvkHexes& hexes, int begin, int end, boo
   for (int i = next; i < end; ++i) row(i);
 }
 
-// The finest level of the multigrid, in single precision: the system's operator without its matrix. Used inside
-// parallel regions.
+// The finest level of the multigrid, in single precision: the system's operator without its matrix.
+// Used inside parallel regions.
 class HexLevel {
  public:
   // Calls work(node, row of A x) for nodes begin .. end of this thread; x is complete.
@@ -100,9 +102,11 @@ class HexLevel {
   }
 
   void allocate(const StvkHexes& hexes);
-  // Positions and stresses as in HexEvaluation; mass: inertia times mass; fixed: dofs of the mesh taken out.
+  // Positions and stresses as in HexEvaluation; mass: inertia times mass; fixed: dofs of the mesh
+  // taken out.
   void load(const AlignedBuffer<double>& at, const AlignedBuffer<double>& at_stress,
-            const HexSystem& system, const AlignedBuffer<double>& mass, const std::vector<int>& fixed);
+            const HexSystem& system, const AlignedBuffer<double>& mass,
+            const std::vector<int>& fixed);
 
   const StvkHexes* hexes = nullptr;
   AlignedBuffer<float> x, stress, free, mass, slots;

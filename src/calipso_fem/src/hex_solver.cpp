@@ -75,8 +75,9 @@ HexCoarsening makeCoarsening(const StvkHexes& hexes, const GridTransfer& t) {
   c.coarse_cells.resize(corners.size(), 8);
   for (std::size_t k = 0; k < corners.size(); ++k)
     for (int b = 0; b < 8; ++b)
-      c.coarse_cells(k, b) = node.at(corners[k].x() + (b >> axes[0] & 1), corners[k].y() + (b >> axes[1] & 1),
-                                     corners[k].z() + (b >> axes[2] & 1));
+      c.coarse_cells(k, b) =
+          node.at(corners[k].x() + (b >> axes[0] & 1), corners[k].y() + (b >> axes[1] & 1),
+                  corners[k].z() + (b >> axes[2] & 1));
   return c;
 }
 
@@ -89,7 +90,9 @@ const LatticeMatrix& checkedLattice(const VolumeMesh& mesh, const StvkHexes& hex
 }  // namespace
 
 HexSolver::HexSolver(const VolumeMesh& mesh, const StvkHexes& hexes)
-    : hexes_(nullptr), fine_(std::make_unique<HexLevel>()), vectors_(std::make_unique<Vectors>()),
+    : hexes_(nullptr),
+      fine_(std::make_unique<HexLevel>()),
+      vectors_(std::make_unique<Vectors>()),
       multigrid_(checkedLattice(mesh, hexes)) {
   setHexes(hexes);
 }
@@ -146,8 +149,8 @@ bool HexSolver::refresh() {
   return current_;
 }
 
-// Element stiffness of some batches at a time by all threads; then every thread sums up what belongs to its rows,
-// in the order of the cells.
+// Element stiffness of some batches at a time by all threads; then every thread sums up what
+// belongs to its rows, in the order of the cells.
 void HexSolver::sumCoarse() {
   constexpr int kBatches = 16;
   std::vector<HexStiffness, AlignedAllocator<HexStiffness>> some(kBatches);
@@ -217,7 +220,8 @@ void HexSolver::addMassAndSprings() {
           for (int k = 0; k < 9; ++k) diagonal_[9L * i + k] += block(k / 3, k % 3);
         for (int p = t.parent_start[i]; p < t.parent_start[i + 1]; ++p)
           for (int q = t.parent_start[j]; q < t.parent_start[j + 1]; ++q) {
-            // What the coarse pattern has no place for only makes the preconditioner a little stiffer.
+            // What the coarse pattern has no place for only makes the preconditioner a little
+            // stiffer.
             const int k = Ac.pattern->tryFind(t.parents[p].node, t.parents[q].node);
             Ac.block(k >= 0 ? k : Ac.pattern->diagonal[t.parents[p].node]) +=
                 t.parents[p].weight * t.parents[q].weight * block;
@@ -284,15 +288,15 @@ SolveReport HexSolver::solve(const Vec& b, double tolerance, int most_iterations
     return solve(b, tolerance, most_iterations, x);
   }
   if (!report.preconditioner_positive && system_.positive && multigrid_.widen()) {
-    stale_ = true;   // the next system gets its own smoothers
+    stale_ = true;  // the next system gets its own smoothers
     x->setZero();
     return solve(b, tolerance, most_iterations, x);
   }
   return report;
 }
 
-// One thread's part in preconditioned conjugate gradients on nodes begin .. end. Sums run over blocks of kGrain
-// nodes, then over the blocks, whatever the number of threads.
+// One thread's part in preconditioned conjugate gradients on nodes begin .. end. Sums run over
+// blocks of kGrain nodes, then over the blocks, whatever the number of threads.
 class HexSolver::Iteration {
  public:
   Iteration(HexSolver* solver, const Crew& crew)
@@ -309,17 +313,18 @@ class HexSolver::Iteration {
     if (!from_zero) s_.product(crew_, begin_, end_, v_.x.data(), v_.Ap.data());
     double residual = firstResidual(from_zero);
     if (from_zero || !(residual > scale)) return residual;
-    crew_.barrier();   // every thread has read the sums
+    crew_.barrier();  // every thread has read the sums
     std::fill(v_.x.begin() + 4L * begin_, v_.x.begin() + 4L * end_, 0.0);
     return firstResidual(true);
   }
 
-  // z ~ A^-1 r; p = z + (r z / previous r z) p. The residual's size is taken out for the cycle, so that single
-  // precision has room.
+  // z ~ A^-1 r; p = z + (r z / previous r z) p. The residual's size is taken out for the cycle, so
+  // that single precision has room.
   bool turn(double residual, bool first) {
     float* right_side = s_.multigrid_.rightSide();
     const double inverse = 1.0 / residual;
-    for (long k = 4L * begin_; k < 4L * end_; ++k) right_side[k] = static_cast<float>(v_.r[k] * inverse);
+    for (long k = 4L * begin_; k < 4L * end_; ++k)
+      right_side[k] = static_cast<float>(v_.r[k] * inverse);
     crew_.barrier();
     s_.multigrid_.cycle(crew_);
     crew_.barrier();
@@ -331,9 +336,10 @@ class HexSolver::Iteration {
     return rz_ > 0.0;
   }
 
-  // x += t p, r -= t A p with the t that minimises. Returns |r|; nothing where A is not positive along p.
+  // x += t p, r -= t A p with the t that minimises. Returns |r|; nothing where A is not positive
+  // along p.
   std::optional<double> advance() {
-    crew_.barrier();   // p is complete
+    crew_.barrier();  // p is complete
     s_.product(crew_, begin_, end_, v_.p.data(), v_.Ap.data());
     const double curvature = sum(&v_.pAp, [&](long k) {
       v_.Ap[k] *= free_[k];
@@ -387,7 +393,8 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
     double residual = first;
     int iteration = 0;
     bool positive = true, turned = true;
-    for (; positive && iteration < most_iterations && !(residual <= tolerance * scale); ++iteration) {
+    for (; positive && iteration < most_iterations && !(residual <= tolerance * scale);
+         ++iteration) {
       turned = cg.turn(residual, iteration == 0);
       const std::optional<double> next = turned ? cg.advance() : std::nullopt;
       positive = next.has_value();

@@ -15,11 +15,13 @@ struct HexCoarsening {
   std::vector<int> coarse_of;         // per place in StvkHexes::order(); -1: no cell
   std::vector<unsigned char> parity;  // bits: odd along x, y, z
   std::vector<int> block_of;          // per coarse cell, 8 x 8, in the coarse pattern
-  std::vector<int> parent_blocks;     // per fine node, every pair of its parents, in the coarse pattern
+  std::vector<int>
+      parent_blocks;  // per fine node, every pair of its parents, in the coarse pattern
 };
 
-// Solves A x = b without assembling A: CG in double precision, multigrid in single. The multigrid's fine level
-// follows x at every setSystem(); its diagonal and coarse levels are renewed when that has become worth it.
+// Solves A x = b without assembling A: CG in double precision, multigrid in single. The multigrid's
+// fine level follows x at every setSystem(); its diagonal and coarse levels are renewed when that
+// has become worth it.
 class HexSolver {
  public:
   // mesh and hexes must outlive this. @throw std::invalid_argument for a mesh without lattice
@@ -31,8 +33,8 @@ class HexSolver {
 
   // The cells have been packed anew.
   void setHexes(const StvkHexes& hexes);
-  // fixed: dofs taken out. Takes positions and stresses out of `at`. False: the matrix has shown not to
-  // be positive definite.
+  // fixed: dofs taken out. Takes positions and stresses out of `at`. False: the matrix has shown
+  // not to be positive definite.
   bool setSystem(HexEvaluation* at, HexSystem system, const Eigen::VectorXd& lumped_mass,
                  const std::vector<int>& fixed);
   // y = A x, the fixed components included.
@@ -54,19 +56,19 @@ class HexSolver {
   SolveReport iterate(const Vec& b, double tolerance, int most_iterations, Vec* x);
 
   const StvkHexes* hexes_;
-  AlignedBuffer<double> x_, stress_;   // as in HexEvaluation
-  AlignedBuffer<double> diagonal_;     // blocks, 9 per node
-  AlignedBuffer<double> mass_;         // inertia times mass, kg/s^2
-  HexSystem system_;                   // springs in the numbering of hexes_
+  AlignedBuffer<double> x_, stress_;  // as in HexEvaluation
+  AlignedBuffer<double> diagonal_;    // blocks, 9 per node
+  AlignedBuffer<double> mass_;        // inertia times mass, kg/s^2
+  HexSystem system_;                  // springs in the numbering of hexes_
   HexCoarsening coarsening_;
   std::unique_ptr<HexLevel> fine_;
   std::unique_ptr<Vectors> vectors_;
   Multigrid multigrid_;
   bool stale_ = true;
-  bool current_ = false;          // the multigrid was renewed for this system
-  double decades_ = 0.0;          // of residual in the last solve
-  double fresh_rate_ = 0.0;       // CG iterations per decade in the first solve after the last renewal
-  double wasted_iterations_ = 0.0;   // those above that rate since then
+  bool current_ = false;     // the multigrid was renewed for this system
+  double decades_ = 0.0;     // of residual in the last solve
+  double fresh_rate_ = 0.0;  // CG iterations per decade in the first solve after the last renewal
+  double wasted_iterations_ = 0.0;  // those above that rate since then
 };
 
 }  // namespace calipso::fem

@@ -40,8 +40,12 @@ class IncompleteCholesky : public Preconditioner {
   }
 
  private:
-  Eigen::Map<Block> block(int k) { return Eigen::Map<Block>(values_.data() + 9 * static_cast<std::size_t>(k)); }
-  Eigen::Map<Block> inverse(int i) { return Eigen::Map<Block>(inverse_.data() + 9 * static_cast<std::size_t>(i)); }
+  Eigen::Map<Block> block(int k) {
+    return Eigen::Map<Block>(values_.data() + 9 * static_cast<std::size_t>(k));
+  }
+  Eigen::Map<Block> inverse(int i) {
+    return Eigen::Map<Block>(inverse_.data() + 9 * static_cast<std::size_t>(i));
+  }
 
   // values_: L's blocks left of the diagonal; inverse_: inverses of its diagonal blocks.
   bool factorize(const BlockMatrix& A, double shift) {

@@ -10,17 +10,22 @@ namespace {
 
 // Node counts up to which the choice was measured best; see the report.
 constexpr int kStaleCholeskyNodes = 1200;
-constexpr int kHardCholeskyNodes = 20000;         // where multigrid would need many iterations
-constexpr int kSolidFactorNodes = 1500, kSheetFactorNodes = 8000;   // the same once multigrid has proved slow
-constexpr double kMultigridContrast = 1e3;         // largest over smallest Young's modulus
+constexpr int kHardCholeskyNodes = 20000;  // where multigrid would need many iterations
+constexpr int kSolidFactorNodes = 1500,
+              kSheetFactorNodes = 8000;     // the same once multigrid has proved slow
+constexpr double kMultigridContrast = 1e3;  // largest over smallest Young's modulus
 constexpr double kMultigridPoisson = 0.495;
 
 std::unique_ptr<Preconditioner> makePreconditioner(const VolumeMesh& mesh, SolverKind kind) {
   switch (kind) {
-    case SolverKind::kJacobi: return makeJacobi();
-    case SolverKind::kIncompleteCholesky: return makeIncompleteCholesky();
-    case SolverKind::kMultigrid: return makeMultigrid(mesh);
-    default: return makeCholesky();
+    case SolverKind::kJacobi:
+      return makeJacobi();
+    case SolverKind::kIncompleteCholesky:
+      return makeIncompleteCholesky();
+    case SolverKind::kMultigrid:
+      return makeMultigrid(mesh);
+    default:
+      return makeCholesky();
   }
 }
 
@@ -88,8 +93,7 @@ SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditio
 }
 
 LinearSolver::LinearSolver(const VolumeMesh& mesh, SolverKind kind)
-    : kind_(kind),
-      preconditioner_(makePreconditioner(mesh, kind_)) {}
+    : kind_(kind), preconditioner_(makePreconditioner(mesh, kind_)) {}
 
 bool LinearSolver::refresh() {
   if (!preconditioner_->update(*A_)) {
@@ -118,8 +122,7 @@ SolveReport LinearSolver::solve(const Vec& b, double tolerance, int most_iterati
     exact.converged = true;
     return exact;
   }
-  SolveReport report =
-      conjugateGradients(*A_, *preconditioner_, b, tolerance, most_iterations, x);
+  SolveReport report = conjugateGradients(*A_, *preconditioner_, b, tolerance, most_iterations, x);
   last_iterations_ = report.iterations;
   if (fresh_iterations_ == 0) fresh_iterations_ = std::max(1, report.iterations);
   // A worn preconditioner can make CG stall; a fresh one gets a second chance.

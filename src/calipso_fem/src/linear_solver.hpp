@@ -10,19 +10,19 @@
 namespace calipso::fem {
 
 struct SolveReport {
-  bool positive = true;      // false: A has shown a direction of negative curvature
+  bool positive = true;  // false: A has shown a direction of negative curvature
   bool preconditioner_positive = true;
   bool converged = false;
   int iterations = 0;
-  double residual = 0.0;     // |b - A x| / |b|
+  double residual = 0.0;  // |b - A x| / |b|
 };
 
 // Preconditioned conjugate gradients for A x = b, A symmetric. x is the start value on entry.
 SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditioner, const Vec& b,
                                double tolerance, int most_iterations, Vec* x);
 
-// Whether coarse grids see what matters: not where stiff and soft cells lie side by side, nor where the material
-// hardly changes its volume.
+// Whether coarse grids see what matters: not where stiff and soft cells lie side by side, nor where
+// the material hardly changes its volume.
 bool suitsMultigrid(const std::vector<Material>& materials);
 // Whether a Cholesky factor costs no more than some twenty iterations of multigrid.
 bool hasSmallFactor(const VolumeMesh& mesh);
@@ -49,10 +49,10 @@ class LinearSolver {
   SolverKind kind_;
   std::unique_ptr<Preconditioner> preconditioner_;
   const BlockMatrix* A_ = nullptr;
-  bool positive_ = false;   // A is known to be positive definite
-  bool stale_ = true;          // nothing usable in the preconditioner
-  bool current_ = false;       // the preconditioner belongs to A_
-  int fresh_iterations_ = 0;   // CG iterations of the first solve after the last refresh
+  bool positive_ = false;     // A is known to be positive definite
+  bool stale_ = true;         // nothing usable in the preconditioner
+  bool current_ = false;      // the preconditioner belongs to A_
+  int fresh_iterations_ = 0;  // CG iterations of the first solve after the last refresh
   int last_iterations_ = 0;
 };
 

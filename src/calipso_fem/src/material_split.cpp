@@ -92,7 +92,8 @@ MaterialSplit stVenantKirchhoff(const Lame& lame, const Matrix3d& F, int derivat
 }
 
 // Volume term kappa/2 (J - alpha)^2 of both neo-Hookean forms.
-void addVolumeTerm(double kappa, double alpha, const Matrix3d& F, int derivatives, MaterialSplit* s) {
+void addVolumeTerm(double kappa, double alpha, const Matrix3d& F, int derivatives,
+                   MaterialSplit* s) {
   s->kappa = kappa;
   s->g = F.determinant() - alpha;
   s->dg = cofactor(F);
@@ -100,7 +101,8 @@ void addVolumeTerm(double kappa, double alpha, const Matrix3d& F, int derivative
 }
 
 MaterialSplit stableNeoHookean(const Lame& lame, const Matrix3d& F, int derivatives) {
-  // Lame parameters that make the rest tangent that of linear elasticity (Smith et al., section 3.4).
+  // Lame parameters that make the rest tangent that of linear elasticity (Smith et al.,
+  // section 3.4).
   const double mu = 4.0 / 3.0 * lame.mu;
   const double lambda = lame.lambda + 5.0 / 6.0 * lame.mu;
   const double Ic = F.squaredNorm();
@@ -179,18 +181,22 @@ Matrix9d MaterialSplit::tangent() const {
 MaterialSplit evaluateSplit(MaterialModel model, const Lame& lame, const Matrix3d& F,
                             int derivatives) {
   switch (model) {
-    case MaterialModel::kLinear: return linear(lame, F);
-    case MaterialModel::kStVenantKirchhoff: return stVenantKirchhoff(lame, F, derivatives);
-    case MaterialModel::kStableNeoHookean: return stableNeoHookean(lame, F, derivatives);
-    case MaterialModel::kStableNeoHookeanNoLog: return stableNeoHookeanNoLog(lame, F, derivatives);
-    case MaterialModel::kCorotated: return corotated(lame, F, derivatives);
+    case MaterialModel::kLinear:
+      return linear(lame, F);
+    case MaterialModel::kStVenantKirchhoff:
+      return stVenantKirchhoff(lame, F, derivatives);
+    case MaterialModel::kStableNeoHookean:
+      return stableNeoHookean(lame, F, derivatives);
+    case MaterialModel::kStableNeoHookeanNoLog:
+      return stableNeoHookeanNoLog(lame, F, derivatives);
+    case MaterialModel::kCorotated:
+      return corotated(lame, F, derivatives);
   }
   return linear(lame, F);
 }
 
 Matrix9d stvkMaterialTangent(const Lame& lame, const Matrix3d& F) {
-  return stvkShapeTangent(lame.mu, F, Matrix3d::Zero()) +
-         lame.lambda * vec(F) * vec(F).transpose();
+  return stvkShapeTangent(lame.mu, F, Matrix3d::Zero()) + lame.lambda * vec(F) * vec(F).transpose();
 }
 
 Matrix3d polarRotation(const Matrix3d& F) {

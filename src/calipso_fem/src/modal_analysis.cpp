@@ -10,7 +10,7 @@ namespace calipso::fem {
 namespace {
 
 constexpr int kMostIterations = 200;
-constexpr double kTolerance = 1e-11;   // relative change of omega^2
+constexpr double kTolerance = 1e-11;  // relative change of omega^2
 constexpr double kTwoPi = 6.28318530717958647692;
 
 Eigen::MatrixXd startBlock(int rows, int columns) {

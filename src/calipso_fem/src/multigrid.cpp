@@ -9,8 +9,8 @@ namespace calipso::fem {
 namespace {
 
 constexpr int kCoarsestNodes = 60;
-constexpr int kSerialNodes = 200;         // below: not worth a barrier
-constexpr float kSmootherRange = 8.0f;    // Chebyshev on [lambda_max / range, lambda_max]
+constexpr int kSerialNodes = 200;       // below: not worth a barrier
+constexpr float kSmootherRange = 8.0f;  // Chebyshev on [lambda_max / range, lambda_max]
 constexpr int kPowerIterations = 8;
 
 // Chebyshev polynomial of degree 2 (Saad, Iterative methods, algorithm 12.1):
@@ -165,7 +165,8 @@ bool Multigrid::updateCoarse() {
   for (std::size_t l = 1; l < levels_.size(); ++l) {
     Level& level = levels_[l];
     const Vec free = freeComponents(level.own);
-    if (!invertDiagonal(diagonalBlocks(level.own, Vec::Ones(free.size())).data(), &level)) return false;
+    if (!invertDiagonal(diagonalBlocks(level.own, Vec::Ones(free.size())).data(), &level))
+      return false;
     if (l + 1 == levels_.size()) break;
     level.A.assign(level.own);
     galerkin(level.own, level.to_coarse, free, &levels_[l + 1].own);
@@ -232,12 +233,14 @@ void Multigrid::estimate(Level* level) const {
     const auto [begin, end] = crew.share(level->nodes, kGrain);
     // A fixed start that is no smooth function of the node number.
     if (fresh)
-      for (int k = 4 * begin; k < 4 * end; ++k) x[k] = k % 4 < 3 ? std::sin(1.7f + 2.3f * (k % 4099)) : 0.0f;
+      for (int k = 4 * begin; k < 4 * end; ++k)
+        x[k] = k % 4 < 3 ? std::sin(1.7f + 2.3f * (k % 4099)) : 0.0f;
     float scale = 1.0f, lambda = 1.0f;
     crew.barrier();
     for (int it = 0; it < iterations; ++it) {
       product(crew, *level, x, [&](int i, Quad Ax) {
-        const Quad y = splat(scale) * multiplyBlock(level->inverse.data() + 12 * static_cast<std::size_t>(i), Ax);
+        const Quad y = splat(scale) *
+                       multiplyBlock(level->inverse.data() + 12 * static_cast<std::size_t>(i), Ax);
         storeQuad(level->e.data() + 4 * static_cast<std::size_t>(i), y);
       });
       for (int first = begin; first < end; first += kGrain) {
@@ -304,8 +307,8 @@ void Multigrid::cycle(const Crew& crew, std::size_t l) {
   }
   pass(crew, l, level.b.data(), true);
   if (l == 0) return;
-  // A second one on the coarse levels, where trilinear interpolation is too stiff in bending and one leaves
-  // much of the error: a W-cycle.
+  // A second one on the coarse levels, where trilinear interpolation is too stiff in bending and
+  // one leaves much of the error: a W-cycle.
   crew.barrier();
   product(crew, level, level.z.data(), [&](long i, Quad Az) {
     storeQuad(level.r.data() + 4 * i, loadQuad(level.b.data() + 4 * i) - Az);
@@ -361,7 +364,8 @@ namespace {
 
 class AssembledMultigrid : public Preconditioner {
  public:
-  explicit AssembledMultigrid(const VolumeMesh& mesh) : cycle_(mesh.lattice), nodes_(mesh.nodeCount()) {}
+  explicit AssembledMultigrid(const VolumeMesh& mesh)
+      : cycle_(mesh.lattice), nodes_(mesh.nodeCount()) {}
 
   bool update(const BlockMatrix& A) override { return cycle_.update(A); }
 

@@ -55,7 +55,8 @@ ReferenceElement makeHex(const CornerMatrix& X) {
         r.mode[q][3 * k + c].row(c) = xi[k] * j0 / j * J0_inverse.row(k);
       }
     for (int k = 0; k < 3; ++k)
-      r.mode[q][kGradientModes + k] = xi[k] * xi[(k + 1) % 3] * j0 / j * Eigen::Matrix3d::Identity();
+      r.mode[q][kGradientModes + k] =
+          xi[k] * xi[(k + 1) % 3] * j0 / j * Eigen::Matrix3d::Identity();
   }
   return r;
 }

@@ -5,15 +5,15 @@
 namespace calipso::fem {
 
 constexpr int kLanes = 4;
-constexpr int kPairs = 36;   // corner pairs a <= b, row by row
+constexpr int kPairs = 36;  // corner pairs a <= b, row by row
 
 // What the lanes of a batch share.
 struct StvkBatchKind {
-  double gradient[8][8][3];     // [point][corner], 1/m
-  double weight[8];             // m^3
-  double mode[8][3][3];         // [point][k]: xi_k (j0/j) J0^-T e_k
-  double mode_inverse[9][9];    // K_aa^-1
-  double lambda, mu;            // Pa
+  double gradient[8][8][3];   // [point][corner], 1/m
+  double weight[8];           // m^3
+  double mode[8][3][3];       // [point][k]: xi_k (j0/j) J0^-T e_k
+  double mode_inverse[9][9];  // K_aa^-1
+  double lambda, mu;          // Pa
   bool enhanced;
 };
 
@@ -21,9 +21,9 @@ enum class StvkPart { kFull, kPositive, kMaterialOnly };
 
 struct StvkBatchResult {
   alignas(32) double energy[kLanes];
-  alignas(32) double smallest_dilatation[kLanes];   // least det F
+  alignas(32) double smallest_dilatation[kLanes];  // least det F
   alignas(32) double f[24][kLanes];
-  alignas(32) double K[kPairs][9][kLanes];          // rows of corner a, columns of corner b
+  alignas(32) double K[kPairs][9][kLanes];  // rows of corner a, columns of corner b
 };
 
 // x: positions [3 corner + component][lane], m. derivatives: 0 energy, 1 also f, 2 also K.

@@ -42,20 +42,20 @@ inline double negativeEigenvalue(double a, double b, double c, double d, double 
 
 inline void shiftPositive(Symmetric* S) {
   for (int l = 0; l < kLanes; ++l) {
-    const double shift = negativeEigenvalue(S->v[0][l], S->v[1][l], S->v[2][l], S->v[3][l],
-                                            S->v[4][l], S->v[5][l]);
+    const double shift =
+        negativeEigenvalue(S->v[0][l], S->v[1][l], S->v[2][l], S->v[3][l], S->v[4][l], S->v[5][l]);
     for (int c = 0; c < 3; ++c) S->v[c][l] -= shift;
   }
 }
 
 struct Point {
   Lane F[3][3];
-  Symmetric E, B;   // Green strain; F F^T
+  Symmetric E, B;  // Green strain; F F^T
 };
 
 struct Work {
   Point point[8];
-  Lane coupling[24][9];   // K_xa
+  Lane coupling[24][9];  // K_xa
 };
 
 inline Lane evaluatePoint(const StvkBatchKind& kind, int q, const double x[24][kLanes], Point* p) {

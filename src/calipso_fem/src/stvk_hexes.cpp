@@ -12,8 +12,8 @@
 namespace calipso::fem {
 namespace {
 
-constexpr int kGroup = 8;             // cells that are packed together
-constexpr int kSerialCells = 64;      // below: waking a second thread costs more than it saves
+constexpr int kGroup = 8;         // cells that are packed together
+constexpr int kSerialCells = 64;  // below: waking a second thread costs more than it saves
 
 CornerMatrix restCorners(const VolumeMesh& mesh, int cell) {
   CornerMatrix corners(8, 3);
@@ -27,7 +27,8 @@ bool isBox(const CornerMatrix& X) {
   const double unit = 1e-12 * size.cwiseAbs().maxCoeff();
   for (int c = 0; c < 8; ++c) {
     const Eigen::RowVector3d sides(c & 1, (c >> 1) & 1, c >> 2);
-    if (((X.row(c) - X.row(0)) - size.cwiseProduct(sides)).cwiseAbs().maxCoeff() > unit) return false;
+    if (((X.row(c) - X.row(0)) - size.cwiseProduct(sides)).cwiseAbs().maxCoeff() > unit)
+      return false;
   }
   return true;
 }
@@ -36,7 +37,10 @@ bool isBox(const CornerMatrix& X) {
 
 StvkHexes::StvkHexes(const VolumeMesh& mesh, const std::vector<ElementKind>& kinds,
                      const std::vector<int>& kind_of)
-    : mesh_(mesh), kinds_(kinds), kind_of_(kind_of), nodes_(mesh.nodeCount()),
+    : mesh_(mesh),
+      kinds_(kinds),
+      kind_of_(kind_of),
+      nodes_(mesh.nodeCount()),
       enhanced_(kinds.front().type == ElementType::kHexEnhanced) {
   std::map<const ReferenceElement*, bool> known;
   std::vector<bool> is_box(mesh.cellCount());
@@ -71,12 +75,14 @@ void StvkHexes::numberNodes() {
   if (mesh_.lattice.rows() == nodes_) {
     const Eigen::RowVector3i low = mesh_.lattice.colwise().minCoeff();
     const Eigen::RowVector3i extent = mesh_.lattice.colwise().maxCoeff() - low;
-    std::stable_sort(axes_.begin(), axes_.end(), [&](int a, int b) { return extent[a] < extent[b]; });
+    std::stable_sort(axes_.begin(), axes_.end(),
+                     [&](int a, int b) { return extent[a] < extent[b]; });
     lattice_.resize(nodes_, 3);
     std::vector<std::array<int, 3>> place(nodes_);
     for (int i = 0; i < nodes_; ++i)
       for (int k = 0; k < 3; ++k) place[i][2 - k] = mesh_.lattice(i, axes_[k]) - low[axes_[k]];
-    std::stable_sort(mesh_node_.begin(), mesh_node_.end(), [&](int a, int b) { return place[a] < place[b]; });
+    std::stable_sort(mesh_node_.begin(), mesh_node_.end(),
+                     [&](int a, int b) { return place[a] < place[b]; });
     for (int i = 0; i < nodes_; ++i)
       for (int k = 0; k < 3; ++k) lattice_(i, k) = place[mesh_node_[i]][2 - k];
   }
@@ -152,7 +158,7 @@ std::vector<double> StvkHexes::cellConstants(int cell, bool box) const {
 template <class Real>
 void StvkHexes::pack(Packed<Real>* p) const {
   constexpr int kLanes = kHexLanes<Real>;
-  std::map<std::pair<int, double>, long> shared;   // blocks of batches of equal cells
+  std::map<std::pair<int, double>, long> shared;  // blocks of batches of equal cells
   p->slot.resize(slot_start_.back());
   std::vector<int> next(slot_start_.begin(), slot_start_.end() - 1);
   for (int first = 0; first < static_cast<int>(order_.size()); first += kLanes) {
@@ -171,14 +177,13 @@ void StvkHexes::pack(Packed<Real>* p) const {
     const bool box = first < boxes_;
     const int numbers = box ? kBoxConstants : kHexConstants;
     const long here = static_cast<long>(p->constants.size());
-    if (some < 0) {   // a batch of nothing
+    if (some < 0) {  // a batch of nothing
       p->block.push_back(here);
       p->constants.resize(here + static_cast<long>(numbers) * kLanes, Real(0));
       continue;
     }
     if (equal) {
-      const auto [it, is_new] =
-          shared.try_emplace({kind_of_[some], mesh_.fraction[some]}, here);
+      const auto [it, is_new] = shared.try_emplace({kind_of_[some], mesh_.fraction[some]}, here);
       p->block.push_back(it->second);
       if (!is_new) continue;
     } else {

@@ -14,18 +14,19 @@ namespace calipso::fem {
 
 // What one evaluation of the elastic energy at x has found.
 struct HexEvaluation {
-  AlignedBuffer<double> x;        // four per node
-  AlignedBuffer<double> stress;   // geometric stresses, as the kernel stores them; empty unless asked for
-  AlignedBuffer<double> slots, energies, dilatations;   // work space
-  Vec forces;                     // 3n, N
-  double energy = 0.0;            // J
-  double dilatation = 0.0;        // least det F
+  AlignedBuffer<double> x;  // four per node
+  AlignedBuffer<double>
+      stress;  // geometric stresses, as the kernel stores them; empty unless asked for
+  AlignedBuffer<double> slots, energies, dilatations;  // work space
+  Vec forces;                                          // 3n, N
+  double energy = 0.0;                                 // J
+  double dilatation = 0.0;                             // least det F
 };
 
-// The cells of a mesh of St. Venant-Kirchhoff hexahedra (Q1 or enhanced), packed for hex_kernel.hpp:
-// eight cells a batch in single, four in double precision, in the same order. Nodes and cells are numbered anew, slice
-// by slice across the longest side of the lattice: what neighbouring slices share stays in the cache, and threads
-// share the smallest of them. Immutable.
+// The cells of a mesh of St. Venant-Kirchhoff hexahedra (Q1 or enhanced), packed for
+// hex_kernel.hpp: eight cells a batch in single, four in double precision, in the same order. Nodes
+// and cells are numbered anew, slice by slice across the longest side of the lattice: what
+// neighbouring slices share stays in the cache, and threads share the smallest of them. Immutable.
 class StvkHexes {
  public:
   // cell -> its kind; the kinds' references must outlive this.
@@ -38,7 +39,8 @@ class StvkHexes {
   int nodeOf(int mesh_node) const { return node_of_[mesh_node]; }
   // Corners of the mesh's cells, in the new numbering.
   const CellMatrix& cells() const { return cells_; }
-  // Lattice of the nodes; its column k runs along the mesh's axis axes()[k]. Empty where the mesh has none.
+  // Lattice of the nodes; its column k runs along the mesh's axis axes()[k]. Empty where the mesh
+  // has none.
   const LatticeMatrix& lattice() const { return lattice_; }
   const std::array<int, 3>& axes() const { return axes_; }
 
@@ -49,11 +51,15 @@ class StvkHexes {
   // Cells of the batches; -1 marks a lane without one. A multiple of 8.
   const std::vector<int>& order() const { return order_; }
   template <class Real>
-  int batchCount() const { return static_cast<int>(order_.size()) / kHexLanes<Real>; }
+  int batchCount() const {
+    return static_cast<int>(order_.size()) / kHexLanes<Real>;
+  }
   template <class Real>
   HexBatches<Real> batches() const;
   template <class Real>
-  std::size_t slotNumbers() const { return 32 * order_.size(); }
+  std::size_t slotNumbers() const {
+    return 32 * order_.size();
+  }
 
   // First and last place in order() of a node's cells.
   int firstPlace(int node) const { return first_place_[node]; }
@@ -75,7 +81,7 @@ class StvkHexes {
     std::vector<int> node;
     AlignedBuffer<Real> constants;
     std::vector<long> block;
-    std::vector<int> slot;        // per node, in the order of slot_start_
+    std::vector<int> slot;  // per node, in the order of slot_start_
   };
 
   void numberNodes();
@@ -95,7 +101,7 @@ class StvkHexes {
   std::vector<int> mesh_node_, node_of_;
   LatticeMatrix lattice_;
   CellMatrix cells_;
-  int boxes_ = 0;                 // cells of order_ that stand in batches of boxes
+  int boxes_ = 0;  // cells of order_ that stand in batches of boxes
   bool enhanced_ = false;
   std::vector<int> order_;
   std::vector<int> first_place_, last_place_;
@@ -105,9 +111,13 @@ class StvkHexes {
 };
 
 template <>
-inline const StvkHexes::Packed<float>& StvkHexes::packed<float>() const { return single_; }
+inline const StvkHexes::Packed<float>& StvkHexes::packed<float>() const {
+  return single_;
+}
 template <>
-inline const StvkHexes::Packed<double>& StvkHexes::packed<double>() const { return double_; }
+inline const StvkHexes::Packed<double>& StvkHexes::packed<double>() const {
+  return double_;
+}
 
 template <class Real>
 HexBatches<Real> StvkHexes::batches() const {
@@ -123,7 +133,8 @@ inline void StvkHexes::sumSlots(const Real* slots, int node, Real* y) const {
   const int* slot = packed<Real>().slot.data();
   Part sum[kParts] = {};
   for (int k = slot_start_[node]; k < slot_start_[node + 1]; ++k)
-    for (int p = 0; p < kParts; ++p) sum[p] += reinterpret_cast<const Part*>(slots + 4L * slot[k])[p];
+    for (int p = 0; p < kParts; ++p)
+      sum[p] += reinterpret_cast<const Part*>(slots + 4L * slot[k])[p];
   for (int p = 0; p < kParts; ++p) reinterpret_cast<Part*>(y)[p] = sum[p];
 }
 

@@ -7,16 +7,17 @@
 
 // BLAS and LAPACK, in single and double precision.
 extern "C" {
-#define CALIPSO_DECLARE(T, p)                                                                                \
-  void p##potrf_(const char*, const int*, T*, const int*, int*);                                            \
-  void p##potri_(const char*, const int*, T*, const int*, int*);                                            \
-  void p##trsm_(const char*, const char*, const char*, const char*, const int*, const int*, const T*,       \
-                const T*, const int*, T*, const int*);                                                      \
-  void p##syrk_(const char*, const char*, const int*, const int*, const T*, const T*, const int*, const T*, \
-                T*, const int*);                                                                            \
-  void p##trsv_(const char*, const char*, const char*, const int*, const T*, const int*, T*, const int*);   \
-  void p##gemv_(const char*, const int*, const int*, const T*, const T*, const int*, const T*, const int*,  \
-                const T*, T*, const int*);
+#define CALIPSO_DECLARE(T, p)                                                                     \
+  void p##potrf_(const char*, const int*, T*, const int*, int*);                                  \
+  void p##potri_(const char*, const int*, T*, const int*, int*);                                  \
+  void p##trsm_(const char*, const char*, const char*, const char*, const int*, const int*,       \
+                const T*, const T*, const int*, T*, const int*);                                  \
+  void p##syrk_(const char*, const char*, const int*, const int*, const T*, const T*, const int*, \
+                const T*, T*, const int*);                                                        \
+  void p##trsv_(const char*, const char*, const char*, const int*, const T*, const int*, T*,      \
+                const int*);                                                                      \
+  void p##gemv_(const char*, const int*, const int*, const T*, const T*, const int*, const T*,    \
+                const int*, const T*, T*, const int*);
 CALIPSO_DECLARE(float, s)
 CALIPSO_DECLARE(double, d)
 #undef CALIPSO_DECLARE
@@ -27,34 +28,34 @@ namespace {
 
 const int kOne = 1;
 
-#define CALIPSO_OVERLOAD(T, p)                                                                                   \
-  int choleskyInPlace(int n, T* a, int stride) {                                                                 \
-    int info = 0;                                                                                                \
-    p##potrf_("L", &n, a, &stride, &info);                                                                       \
-    return info;                                                                                                 \
-  }                                                                                                              \
-  int invertInPlace(int n, T* a) {                                                                               \
-    int info = 0;                                                                                                \
-    p##potri_("L", &n, a, &n, &info);                                                                            \
-    return info;                                                                                                 \
-  }                                                                                                              \
-  /* b <- b L^-T */                                                                                              \
-  void divideByTransposed(int rows, int columns, const T* L, T* b, int stride) {                                 \
-    const T one = 1;                                                                                             \
-    p##trsm_("R", "L", "T", "N", &rows, &columns, &one, L, &stride, b, &stride);                                 \
-  }                                                                                                              \
-  /* c = a a^T, lower triangle */                                                                                \
-  void square(int rows, int columns, const T* a, int stride, T* c) {                                             \
-    const T one = 1, zero = 0;                                                                                   \
-    p##syrk_("L", "N", &rows, &columns, &one, a, &stride, &zero, c, &rows);                                      \
-  }                                                                                                              \
-  void solveTriangle(const char* transposed, int n, const T* L, int stride, T* x) {                              \
-    p##trsv_("L", transposed, "N", &n, L, &stride, x, &kOne);                                                    \
-  }                                                                                                              \
-  /* y = factor_x a x + factor_y y, or with a^T */                                                               \
-  void multiply(const char* transposed, int rows, int columns, T factor_x, const T* a, int stride, const T* x,   \
-                T factor_y, T* y) {                                                                              \
-    p##gemv_(transposed, &rows, &columns, &factor_x, a, &stride, x, &kOne, &factor_y, y, &kOne);                 \
+#define CALIPSO_OVERLOAD(T, p)                                                                     \
+  int choleskyInPlace(int n, T* a, int stride) {                                                   \
+    int info = 0;                                                                                  \
+    p##potrf_("L", &n, a, &stride, &info);                                                         \
+    return info;                                                                                   \
+  }                                                                                                \
+  int invertInPlace(int n, T* a) {                                                                 \
+    int info = 0;                                                                                  \
+    p##potri_("L", &n, a, &n, &info);                                                              \
+    return info;                                                                                   \
+  }                                                                                                \
+  /* b <- b L^-T */                                                                                \
+  void divideByTransposed(int rows, int columns, const T* L, T* b, int stride) {                   \
+    const T one = 1;                                                                               \
+    p##trsm_("R", "L", "T", "N", &rows, &columns, &one, L, &stride, b, &stride);                   \
+  }                                                                                                \
+  /* c = a a^T, lower triangle */                                                                  \
+  void square(int rows, int columns, const T* a, int stride, T* c) {                               \
+    const T one = 1, zero = 0;                                                                     \
+    p##syrk_("L", "N", &rows, &columns, &one, a, &stride, &zero, c, &rows);                        \
+  }                                                                                                \
+  void solveTriangle(const char* transposed, int n, const T* L, int stride, T* x) {                \
+    p##trsv_("L", transposed, "N", &n, L, &stride, x, &kOne);                                      \
+  }                                                                                                \
+  /* y = factor_x a x + factor_y y, or with a^T */                                                 \
+  void multiply(const char* transposed, int rows, int columns, T factor_x, const T* a, int stride, \
+                const T* x, T factor_y, T* y) {                                                    \
+    p##gemv_(transposed, &rows, &columns, &factor_x, a, &stride, x, &kOne, &factor_y, y, &kOne);   \
   }
 CALIPSO_OVERLOAD(float, s)
 CALIPSO_OVERLOAD(double, d)
@@ -96,13 +97,15 @@ bool SupernodalFactor<Scalar>::factorize(const SupernodalPattern& p, std::vector
   cancellation_ = 1.0;
   std::vector<Scalar> diagonal;
   for (int b = 0; b < p.blocks(); ++b)
-    for (int j = 0; j < p.columnsOf(b); ++j) diagonal.push_back(values_[p.first_value[b] + j * (p.rowsOf(b) + 1)]);
+    for (int j = 0; j < p.columnsOf(b); ++j)
+      diagonal.push_back(values_[p.first_value[b] + j * (p.rowsOf(b) + 1)]);
   for (int b = 0; b < p.blocks(); ++b) {
     const int rows = p.rowsOf(b), columns = p.columnsOf(b), below = rows - columns;
     Scalar* L = values_.data() + p.first_value[b];
     const int failed = choleskyInPlace(columns, L, rows);
     for (int j = 0; j < (failed ? failed : columns); ++j) {
-      const double entry = L[j * (rows + 1)], pivot = j + 1 == failed ? std::abs(entry) : entry * entry;
+      const double entry = L[j * (rows + 1)],
+                   pivot = j + 1 == failed ? std::abs(entry) : entry * entry;
       cancellation_ = std::max(cancellation_, std::abs(diagonal[p.first_column[b] + j]) / pivot);
     }
     if (failed) return false;
@@ -116,7 +119,8 @@ bool SupernodalFactor<Scalar>::factorize(const SupernodalPattern& p, std::vector
       const int* place = p.places.data() + to.first_place - to.begin;
       for (int j = to.begin; j < to.end; ++j) {
         Scalar* target = values_.data() + p.first_value[to.block] + place[j] * stride;
-        const Scalar* column = update_.data() + static_cast<std::size_t>(j - columns) * below - columns;
+        const Scalar* column =
+            update_.data() + static_cast<std::size_t>(j - columns) * below - columns;
         for (int i = j; i < rows; ++i) target[place[i]] -= column[i];
       }
     }
@@ -156,21 +160,23 @@ void SupernodalFactor<Scalar>::solveLowerTransposed(const SupernodalPattern& p, 
 }
 
 template <typename Scalar>
-typename SupernodalFactor<Scalar>::Matrix SupernodalFactor<Scalar>::lastOfLower(const SupernodalPattern& p,
-                                                                                int n) const {
+typename SupernodalFactor<Scalar>::Matrix SupernodalFactor<Scalar>::lastOfLower(
+    const SupernodalPattern& p, int n) const {
   Matrix last = Matrix::Zero(n, n);
   const int before = p.size - n;
   for (int b = 0; b < p.blocks(); ++b)
     for (int j = std::max(p.first_column[b], before); j < p.first_column[b + 1]; ++j) {
       const int own = j - p.first_column[b];
       const Scalar* column = values_.data() + p.first_value[b] + own * p.rowsOf(b);
-      for (int k = own; k < p.rowsOf(b); ++k) last(p.rows[p.first_row[b] + k] - before, j - before) = column[k];
+      for (int k = own; k < p.rowsOf(b); ++k)
+        last(p.rows[p.first_row[b] + k] - before, j - before) = column[k];
     }
   return last;
 }
 
 template <typename Scalar>
-typename SupernodalFactor<Scalar>::Matrix SupernodalFactor<Scalar>::inverseFromLower(const Matrix& L) {
+typename SupernodalFactor<Scalar>::Matrix SupernodalFactor<Scalar>::inverseFromLower(
+    const Matrix& L) {
   Matrix inverse = L;
   if (L.rows() == 0) return inverse;  // LAPACK wants a row at least
   const int info = invertInPlace(static_cast<int>(L.rows()), inverse.data());

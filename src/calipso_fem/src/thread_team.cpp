@@ -76,15 +76,16 @@ class Barrier {
   Signal passed_;
 };
 
-// Where other processes keep the processors busy, threads sleep waiting for each other for about as long as the
-// work takes: then the caller works alone for a while, and tries again after ever longer ones.
+// Where other processes keep the processors busy, threads sleep waiting for each other for about as
+// long as the work takes: then the caller works alone for a while, and tries again after ever
+// longer ones.
 class Concurrency {
  public:
   bool isWorthwhile() const { return Clock::now() >= alone_until_; }
 
   void judge(Clock::duration passed, Clock::duration slept, int count) {
     constexpr Clock::duration kEnoughToJudge = std::chrono::milliseconds(2);
-    constexpr double kWorthwhile = 0.6;   // share of the helpers' time that may be slept
+    constexpr double kWorthwhile = 0.6;  // share of the helpers' time that may be slept
     passed_ += passed;
     slept_ += slept;
     if (passed_ < kEnoughToJudge) return;
@@ -139,7 +140,7 @@ class Team {
       start_.waitPast(seen);
       if (!work_) return;
       if (rank < count_) (*work_)(Crew(rank, count_));
-      end_.wait(static_cast<int>(threads_.size()) + 1);   // of idle threads, too
+      end_.wait(static_cast<int>(threads_.size()) + 1);  // of idle threads, too
     }
   }
 

@@ -15,7 +15,9 @@ class Crew {
   // This thread's share [first, second) of 0..n, in blocks of `grain`.
   std::pair<int, int> share(int n, int grain = 1) const {
     const long blocks = (n + grain - 1) / grain;
-    const auto cut = [&](long k) { return static_cast<int>(std::min<long>(n, blocks * k / count_ * grain)); };
+    const auto cut = [&](long k) {
+      return static_cast<int>(std::min<long>(n, blocks * k / count_ * grain));
+    };
     return {cut(rank_), cut(rank_ + 1)};
   }
   // Returns when every thread of the region has come here.
@@ -33,8 +35,8 @@ void runParallel(const std::function<void(const Crew&)>& work);
 // work(begin, end) for shares of 0..n; on the calling thread where n is below `serial_below`.
 void parallelFor(int n, int serial_below, const std::function<void(int, int)>& work);
 
-// work(k) for k below `count`, one after the other on each thread; a single one may use all threads itself. What the
-// first k throws that does is thrown once all are through.
+// work(k) for k below `count`, one after the other on each thread; a single one may use all threads
+// itself. What the first k throws that does is thrown once all are through.
 void eachOnAThread(int count, const std::function<void(int)>& work);
 
 }  // namespace calipso::fem

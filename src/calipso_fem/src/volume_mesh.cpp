@@ -7,7 +7,8 @@
 namespace calipso::fem {
 namespace {
 
-// Corner triples of the Kuhn split; with corner 0 and 7 they make six positively oriented tetrahedra.
+// Corner triples of the Kuhn split; with corner 0 and 7 they make six positively oriented
+// tetrahedra.
 constexpr int kKuhn[6][4] = {{0, 1, 3, 7}, {0, 5, 1, 7}, {0, 3, 2, 7},
                              {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 6, 4, 7}};
 
@@ -25,7 +26,8 @@ VolumeMesh boxMesh(const Eigen::Vector3d& min, const Eigen::Vector3d& max,
   for (int k = 0; k < n.z(); ++k)
     for (int j = 0; j < n.y(); ++j)
       for (int i = 0; i < n.x(); ++i) {
-        const Eigen::Vector3d t(double(i) / count.x(), double(j) / count.y(), double(k) / count.z());
+        const Eigen::Vector3d t(double(i) / count.x(), double(j) / count.y(),
+                                double(k) / count.z());
         mesh.nodes.row(id(i, j, k)) = (min + t.cwiseProduct(max - min)).transpose();
         mesh.lattice.row(id(i, j, k)) << i, j, k;
       }
@@ -73,7 +75,9 @@ Vec restPositions(const VolumeMesh& mesh) {
 }
 
 void validate(const VolumeMesh& mesh) {
-  const auto fail = [](const std::string& what) { throw std::invalid_argument("volume mesh: " + what); };
+  const auto fail = [](const std::string& what) {
+    throw std::invalid_argument("volume mesh: " + what);
+  };
   if (mesh.nodes.rows() == 0 || mesh.cells.rows() == 0) fail("has no nodes or no cells");
   if (mesh.cells.cols() != 8 && mesh.cells.cols() != 4)
     fail("cells need 8 or 4 corners, not " + std::to_string(mesh.cells.cols()));

@@ -15,14 +15,14 @@ using Eigen::Vector3i;
 
 // What the sight lines along one axis say about every cell.
 struct AxisCover {
-  std::vector<double> length;     // inside the solid, over all balanced lines, in cell sizes
-  std::vector<int> lines;         // balanced lines through the cell
-  std::vector<int> crossings;     // of balanced lines, within the cell
+  std::vector<double> length;  // inside the solid, over all balanced lines, in cell sizes
+  std::vector<int> lines;      // balanced lines through the cell
+  std::vector<int> crossings;  // of balanced lines, within the cell
 };
 
 struct Coverage {
   AxisCover axis[3];
-  Occupancy occupancy;            // sub-voxels, from the lines along z
+  Occupancy occupancy;  // sub-voxels, from the lines along z
   long open_lines = 0, lines = 0;
 };
 
@@ -75,8 +75,7 @@ void scanAxis(const TriangleMesh& surface, const VoxelLayout& layout, int s, int
       for (cell[axis] = 0; cell[axis] < layout.count[axis]; ++cell[axis])
         ++cover.lines[layout.index(cell.x(), cell.y(), cell.z())];
       for (const Crossing& c : column) {
-        cell[axis] =
-            std::clamp(static_cast<int>(toLattice(c.depth)), 0, layout.count[axis] - 1);
+        cell[axis] = std::clamp(static_cast<int>(toLattice(c.depth)), 0, layout.count[axis] - 1);
         ++cover.crossings[layout.index(cell.x(), cell.y(), cell.z())];
       }
       forEachInterval(column, [&](double from, double to) {
@@ -122,10 +121,11 @@ std::vector<bool> touchedCells(const TriangleMesh& surface, const VoxelLayout& l
 void report(const Coverage& coverage, double filled, std::size_t cells,
             std::vector<std::string>* messages) {
   if (coverage.open_lines > 0)
-    messages->push_back("the surface is not closed (" +
-                        std::to_string(100.0 * coverage.open_lines / coverage.lines) +
-                        " % of the sight lines do not leave it as often as they enter); cells there "
-                        "follow the other lines, or the surface alone. Close the mesh for exact volumes");
+    messages->push_back(
+        "the surface is not closed (" +
+        std::to_string(100.0 * coverage.open_lines / coverage.lines) +
+        " % of the sight lines do not leave it as often as they enter); cells there "
+        "follow the other lines, or the surface alone. Close the mesh for exact volumes");
   if (filled < 0.02 * cells)
     messages->push_back("the surface encloses only " + std::to_string(100.0 * filled / cells) +
                         " % of its cells: the object is modelled as a layer of surface cells. Take "
@@ -135,7 +135,8 @@ void report(const Coverage& coverage, double filled, std::size_t cells,
 }  // namespace
 
 std::vector<CoveredCell> coverSurface(const TriangleMesh& surface, const VoxelLayout& layout,
-                                      const VoxelizeOptions& o, std::vector<std::string>* messages) {
+                                      const VoxelizeOptions& o,
+                                      std::vector<std::string>* messages) {
   Coverage coverage;
   const int orientation = signedVolume(surface) < 0.0 ? -1 : 1;
   if (orientation < 0)

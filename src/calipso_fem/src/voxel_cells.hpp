@@ -11,7 +11,7 @@ namespace calipso::fem {
 struct VoxelLayout {
   double cell_size = 0.0;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  Eigen::Vector3i count = Eigen::Vector3i::Zero();   // cells along each axis
+  Eigen::Vector3i count = Eigen::Vector3i::Zero();  // cells along each axis
 
   int index(int i, int j, int k) const { return i + count.x() * (j + count.y() * k); }
 };
@@ -22,7 +22,7 @@ struct CoveredCell {
   Eigen::Vector3i position = Eigen::Vector3i::Zero();
   int branch = 0;
   double fraction = 0.0;
-  double share[8] = {1, 1, 1, 1, 1, 1, 1, 1};   // of the filled part in each octant, mean one
+  double share[8] = {1, 1, 1, 1, 1, 1, 1, 1};  // of the filled part in each octant, mean one
   // Branches of the neighbour across each face (-x, +x, -y, +y, -z, +z) that this part touches,
   // as a set of bits; all ones where nothing is known.
   unsigned neighbours[6] = {~0u, ~0u, ~0u, ~0u, ~0u, ~0u};

@@ -1,5 +1,3 @@
-#include "calipso_fem/voxel_grid.hpp"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -7,6 +5,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "calipso_fem/voxel_grid.hpp"
 #include "column_scan.hpp"
 #include "voxel_cells.hpp"
 
@@ -39,8 +38,8 @@ void checkInput(const TriangleMesh& surface, const VoxelizeOptions& o) {
                                 ", allowed is (0, 1]");
 }
 
-// Without faces that have no area and without second copies of a face, whichever way they are turned:
-// either would make sight lines enter the solid more often than they leave it.
+// Without faces that have no area and without second copies of a face, whichever way they are
+// turned: either would make sight lines enter the solid more often than they leave it.
 TriangleMesh withoutBadFaces(const TriangleMesh& surface, std::vector<std::string>* messages) {
   TriangleMesh clean = surface;
   std::set<std::array<int, 3>> known;
@@ -108,8 +107,8 @@ VoxelGrid makeGrid(const VoxelLayout& layout, const std::vector<CoveredCell>& ce
     grid.fraction[c] = std::clamp(cells[c].fraction, min_fraction, 1.0);
   }
   grid.node_lattice = numbering.node_lattice;
-  grid.nodes = (grid.node_lattice.cast<double>() * layout.cell_size).rowwise() +
-               layout.origin.transpose();
+  grid.nodes =
+      (grid.node_lattice.cast<double>() * layout.cell_size).rowwise() + layout.origin.transpose();
   return grid;
 }
 
@@ -156,10 +155,10 @@ VoxelGrid voxelize(const TriangleMesh& given, const VoxelizeOptions& options) {
   for (int i = 0; i < kTries; ++i) {
     VoxelGrid grid = voxelizeAt(surface, h, options, repairs);
     const double ratio = static_cast<double>(grid.nodeCount()) / options.target_nodes;
-    const bool better = best.nodeCount() == 0 ||
-                        std::abs(std::log(ratio)) <
-                            std::abs(std::log(static_cast<double>(best.nodeCount()) /
-                                              options.target_nodes));
+    const bool better =
+        best.nodeCount() == 0 ||
+        std::abs(std::log(ratio)) <
+            std::abs(std::log(static_cast<double>(best.nodeCount()) / options.target_nodes));
     if (better) best = std::move(grid);
     if (std::abs(std::log(ratio)) < 0.03) break;
     h *= std::cbrt(ratio);

@@ -48,7 +48,8 @@ TEST(Statics, ReactionsBalanceWeightAndLoads) {
   for (const ElementType element : kElements)
     for (const MaterialModel material :
          {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
-          MaterialModel::kStableNeoHookeanNoLog, MaterialModel::kCorotated, MaterialModel::kLinear}) {
+          MaterialModel::kStableNeoHookeanNoLog, MaterialModel::kCorotated,
+          MaterialModel::kLinear}) {
       FemOptions options = exact();
       options.element = element;
       options.material_model = material;
@@ -247,8 +248,8 @@ TEST(Compliance, PredictsTheEffectOfAnImpulse) {
   pushed.step(h);
   const Vec column = plain.complianceColumn(point, impulse, h);
   EXPECT_LT((pushed.velocities() - column).norm(), 1e-8 * column.norm());
-  const Eigen::MatrixXd W = plain.compliance({point, SurfacePoint::vertex(70)},
-                                             {Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX()}, h);
+  const Eigen::MatrixXd W = plain.compliance(
+      {point, SurfacePoint::vertex(70)}, {Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX()}, h);
   EXPECT_GT(W(0, 0), 0.0);
   EXPECT_GT(W.determinant(), 0.0);
 }
@@ -277,7 +278,9 @@ TEST(Input, ErrorsNameParameterValueAndRange) {
   };
   EXPECT_NE(message([&] { body.step(0.0); }).find("h is 0"), std::string::npos);
   EXPECT_NE(message([&] { body.step(std::nan("")); }).find("allowed"), std::string::npos);
-  EXPECT_NE(message([&] { body.setGravity({0, std::nan(""), 0}); }).find("gravity"),
+  EXPECT_NE(message([&] {
+              body.setGravity({0, std::nan(""), 0});
+            }).find("gravity"),
             std::string::npos);
   EXPECT_NE(message([&] { body.setMaterial({1e6, 0.6, 1000, 0}); }).find("0.6"), std::string::npos);
   EXPECT_NE(message([&] { body.fixNode(-1); }).find("-1"), std::string::npos);

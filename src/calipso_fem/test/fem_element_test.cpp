@@ -49,8 +49,9 @@ TEST(MaterialModelTest, DerivativesMatchDifferencesUpToExtremeDeformation) {
       const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + randomMatrix(&random, size);
       const Eigen::Matrix3d dF = randomMatrix(&random, 1.0);
       const double e = 1e-5 * F.norm();
-      const double slope = (energyDensity(model, lame, F + e * dF) -
-                            energyDensity(model, lame, F - e * dF)) / (2.0 * e);
+      const double slope =
+          (energyDensity(model, lame, F + e * dF) - energyDensity(model, lame, F - e * dF)) /
+          (2.0 * e);
       const Eigen::Matrix3d P = stress(model, lame, F);
       // Central differences: truncation e^2 |F|^2, rounding 1e-16 / e.
       EXPECT_NEAR(P.cwiseProduct(dF).sum(), slope, 1e-6 * P.norm() * dF.norm())
@@ -58,7 +59,8 @@ TEST(MaterialModelTest, DerivativesMatchDifferencesUpToExtremeDeformation) {
       const Eigen::Matrix3d dP =
           (stress(model, lame, F + e * dF) - stress(model, lame, F - e * dF)) / (2.0 * e);
       const Matrix9d H = tangent(model, lame, F);
-      const Eigen::Matrix<double, 9, 1> v = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(dF.data());
+      const Eigen::Matrix<double, 9, 1> v =
+          Eigen::Map<const Eigen::Matrix<double, 9, 1>>(dF.data());
       EXPECT_LT((H * v - Eigen::Map<const Eigen::Matrix<double, 9, 1>>(dP.data())).norm(),
                 1e-6 * H.norm() * dF.norm())
           << toString(model) << " " << size;
@@ -105,7 +107,8 @@ TEST(ElementTest, DerivativesMatchDifferencesAtExtremeDeformation) {
   for (const ElementType element : kElements)
     for (const MaterialModel model : kModels)
       for (const Eigen::Vector3d& stretch : stretches) {
-        // Its modes are undetermined where the cell's F is singular: the force is off by 2e-5 there.
+        // Its modes are undetermined where the cell's F is singular: the force is off by 2e-5
+        // there.
         if (element == ElementType::kHexEnhanced && model == MaterialModel::kCorotated &&
             stretch.y() < 0.01)
           continue;
@@ -145,7 +148,8 @@ TEST(ElementTest, RigidMotionStoresNoEnergyAndViscosityIgnoresIt) {
       Vec x(elastic.dofCount()), v(elastic.dofCount());
       for (int i = 0; i < mesh.nodeCount(); ++i) {
         x.segment<3>(3 * i) = R * mesh.node(i) + Eigen::Vector3d(5, -3, 1);
-        v.segment<3>(3 * i) = Eigen::Vector3d(1, -2, 0.5).cross(Eigen::Vector3d(x.segment<3>(3 * i)));
+        v.segment<3>(3 * i) =
+            Eigen::Vector3d(1, -2, 0.5).cross(Eigen::Vector3d(x.segment<3>(3 * i)));
       }
       EXPECT_NEAR(elastic.energy(x), 0.0, 1e-9) << toString(element) << " " << toString(model);
       BlockMatrix D;
@@ -156,7 +160,8 @@ TEST(ElementTest, RigidMotionStoresNoEnergyAndViscosityIgnoresIt) {
     }
 }
 
-// An affine displacement of the boundary must be followed by the inside, whatever the cells' shapes.
+// An affine displacement of the boundary must be followed by the inside, whatever the cells'
+// shapes.
 TEST(ElementTest, PatchTestOnSkewedCells) {
   for (const ElementType element : kElements) {
     const VolumeMesh mesh = skewedMesh(element);
@@ -168,8 +173,7 @@ TEST(ElementTest, PatchTestOnSkewedCells) {
     Vec x(elastic.dofCount()), f;
     for (int i = 0; i < full.nodeCount(); ++i) x.segment<3>(3 * i) = F * full.node(i);
     const double volume = elastic.totalMass() / kRubber.density;
-    const double expected =
-        volume * energyDensity(elastic.model(), lameParameters(kRubber), F);
+    const double expected = volume * energyDensity(elastic.model(), lameParameters(kRubber), F);
     EXPECT_NEAR(elastic.energy(x), expected, 1e-10 * expected) << toString(element);
   }
 }

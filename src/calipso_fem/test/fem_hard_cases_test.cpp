@@ -17,13 +17,13 @@ TEST_P(HardCase, StaysFiniteGainsNoEnergyAndComesBack) {
   EXPECT_LT(r.momentum_error, 1e-6);
 }
 
-// All of them with the default material on 81 and 425 nodes, a short one with another: the benchmark runs them all
-// with three.
+// All of them with the default material on 81 and 425 nodes, a short one with another: the
+// benchmark runs them all with three.
 std::vector<std::tuple<std::string, MaterialModel, int>> allCases() {
   std::vector<std::tuple<std::string, MaterialModel, int>> cases;
   for (const int across : {2, 4})
     for (const std::string& name : hardCaseNames())
-      if (across == 4 || name.find("unconstrained") == std::string::npos)   // has a grid of its own
+      if (across == 4 || name.find("unconstrained") == std::string::npos)  // has a grid of its own
         cases.emplace_back(name, MaterialModel::kStVenantKirchhoff, across);
   cases.emplace_back("squashed flat", MaterialModel::kCorotated, 4);
   // 756 nodes are solved without a matrix: its smoother has to be widened on the way.
@@ -31,14 +31,15 @@ std::vector<std::tuple<std::string, MaterialModel, int>> allCases() {
   return cases;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    AllMaterials, HardCase, testing::ValuesIn(allCases()), [](const auto& info) {
-      std::string name = std::get<0>(info.param) + "_" + toString(std::get<1>(info.param)) + "_" +
-                         std::to_string(std::get<2>(info.param));
-      for (char& c : name)
-        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(AllMaterials, HardCase, testing::ValuesIn(allCases()),
+                         [](const auto& info) {
+                           std::string name = std::get<0>(info.param) + "_" +
+                                              toString(std::get<1>(info.param)) + "_" +
+                                              std::to_string(std::get<2>(info.param));
+                           for (char& c : name)
+                             if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+                           return name;
+                         });
 
 // The same motion at 1 mm, 1 m and 100 m, with the time step in proportion: nothing depends on the
 // absolute size.

@@ -62,7 +62,7 @@ TEST_P(MatrixFree, ProductsEqualThoseOfTheAssembledTangent) {
     Vec expected, product;
     K.multiply(u, expected);
     solver.multiply(u, &product);
-    EXPECT_LT((product - expected).norm(), 1e-12 * expected.norm());   // round-off of 24 sums
+    EXPECT_LT((product - expected).norm(), 1e-12 * expected.norm());  // round-off of 24 sums
   }
   BlockMatrix D;
   model.viscosity(x, D);
@@ -81,8 +81,10 @@ TEST_P(MatrixFree, ForcesAreTheDerivativeOfTheEnergy) {
   Vec f;
   model.gradient(x, f);
   constexpr double kDelta = 1e-6;
-  const double slope = (model.energy(x + kDelta * u) - model.energy(x - kDelta * u)) / (2.0 * kDelta);
-  EXPECT_NEAR(slope, f.dot(u), 1e-6 * f.norm() * u.norm());   // second order in kDelta, and its rounding
+  const double slope =
+      (model.energy(x + kDelta * u) - model.energy(x - kDelta * u)) / (2.0 * kDelta);
+  EXPECT_NEAR(slope, f.dot(u),
+              1e-6 * f.norm() * u.norm());  // second order in kDelta, and its rounding
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -10,8 +10,9 @@ namespace calipso::fem {
 namespace {
 
 void appendBox(const Eigen::Vector3d& low, const Eigen::Vector3d& high, TriangleMesh* mesh) {
-  static const int kFaces[12][3] = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
-                                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  static const int kFaces[12][3] = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5},
+                                    {0, 1, 5}, {0, 5, 4}, {2, 6, 7}, {2, 7, 3},
+                                    {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
   const int first = mesh->vertexCount(), face = mesh->triangleCount();
   mesh->vertices.conservativeResize(first + 8, 3);
   mesh->triangles.conservativeResize(face + 12, 3);
@@ -19,7 +20,8 @@ void appendBox(const Eigen::Vector3d& low, const Eigen::Vector3d& high, Triangle
     mesh->vertices.row(first + c) << (c & 1 ? high : low).x(), (c & 2 ? high : low).y(),
         (c & 4 ? high : low).z();
   for (int t = 0; t < 12; ++t)
-    mesh->triangles.row(face + t) << first + kFaces[t][0], first + kFaces[t][1], first + kFaces[t][2];
+    mesh->triangles.row(face + t) << first + kFaces[t][0], first + kFaces[t][1],
+        first + kFaces[t][2];
 }
 
 double filledVolume(const VoxelGrid& grid) {
@@ -32,7 +34,7 @@ TEST(GradedBox, KeepsItsSidesAndGetsFinerTowardsItsEnds) {
   gradeBox(0, GradedEnds::kBoth, &both);
   for (int i = 0; i <= 8; ++i) {
     EXPECT_NEAR(low.nodes(i, 0), 1.0 + 2.0 * std::pow(i / 8.0, 1.5), 1e-14);
-    EXPECT_NEAR(both.nodes(i, 0) - 1.0, 3.0 - both.nodes(8 - i, 0), 1e-14);   // symmetric
+    EXPECT_NEAR(both.nodes(i, 0) - 1.0, 3.0 - both.nodes(8 - i, 0), 1e-14);  // symmetric
   }
   EXPECT_NEAR(both.nodes(1, 0), 1.0 + std::pow(0.25, 1.5), 1e-14);
   EXPECT_EQ(low.nodes(0, 1), 0.0);
@@ -111,9 +113,9 @@ TEST(Voxelize, FacesWithoutAreaAndCopiesAreLeftOutWithAMessage) {
   appendBox({0, 0, 0}, {1, 1, 1}, &clean);
   TriangleMesh mesh = clean;
   mesh.triangles.conservativeResize(16, 3);
-  mesh.triangles.row(12) << 0, 0, 1;                       // a corner named twice
-  mesh.triangles.row(13) = clean.triangles.row(3);         // a copy
-  mesh.triangles.row(14) = clean.triangles.row(5).reverse();   // a copy turned round
+  mesh.triangles.row(12) << 0, 0, 1;                          // a corner named twice
+  mesh.triangles.row(13) = clean.triangles.row(3);            // a copy
+  mesh.triangles.row(14) = clean.triangles.row(5).reverse();  // a copy turned round
   mesh.triangles.row(15) << 0, 7, 7;
   VoxelizeOptions options;
   options.cell_size = 0.25;

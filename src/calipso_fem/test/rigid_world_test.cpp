@@ -1,10 +1,11 @@
+#include "calipso_fem/world/rigid_world.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "../src/world/manifold_reduction.hpp"
-#include "calipso_fem/world/rigid_world.hpp"
 #include "soft_scene.hpp"
 #include "world_fixtures.hpp"
 
@@ -48,12 +49,14 @@ TEST(RigidWorld, BlockSticksBelowAndSlidesAboveTheFrictionAngle) {
   for (const double factor : {0.99, 1.01, 1.3}) {
     const double angle = factor * std::atan(kFriction);
     Block block({std::sin(angle), 0, std::cos(angle)}, {0, 0, 0});
-    const double expected = std::max(0.0, 0.5 * kG * (std::sin(angle) - kFriction * std::cos(angle)));
+    const double expected =
+        std::max(0.0, 0.5 * kG * (std::sin(angle) - kFriction * std::cos(angle)));
     EXPECT_NEAR(block.way(1.0).norm(), expected, 0.005 * expected + 1e-5) << factor;
   }
 }
 
-// A ring of points as sixteen parts would give, two of them deeper and one far: the ring's outline stays.
+// A ring of points as sixteen parts would give, two of them deeper and one far: the ring's outline
+// stays.
 TEST(ManifoldReduction, KeepsTheDeepestAndTheOutline) {
   std::vector<btManifoldPoint> points(64);
   std::vector<btManifoldPoint*> contacts;
@@ -127,7 +130,8 @@ RigidBodySpec twoPartSlab(const std::string& name, double height) {
 TEST(RigidWorld, BodiesOfSeveralPartsMeetAgainAfterTheyWereApart) {
   RigidWorld world;
   world.addPlane({"plane", Eigen::Vector3d::UnitZ(), 0.0, std::nullopt}, {});
-  const RigidWorld::Id low = world.add(twoPartSlab("low", 0.06)), high = world.add(twoPartSlab("high", 0.3));
+  const RigidWorld::Id low = world.add(twoPartSlab("low", 0.06)),
+                       high = world.add(twoPartSlab("high", 0.3));
   for (const RigidWorld::Id id : {low, high}) world.setAcceleration(id, {0, 0, -kG});
   for (const double thrown : {0.0, 3.0}) {
     world.setVelocity(low, {0, 0, thrown}, {0, 0, 0});

@@ -28,7 +28,8 @@ SoftObject& addHorseshoe(SoftScene& scene) {
 void squeeze(SoftScene& scene) {
   for (const double side : {1.0, -1.0})
     scene.addMoving(movedMesh(boxSurface({0.02, 0.2, 0.1}, 4), {0, 0, -0.1}), [side](double t) {
-      return Eigen::Isometry3d(Eigen::Translation3d(side * (0.0755 - 0.045 * std::min(1.0, t / 0.8)), 0, 0));
+      return Eigen::Isometry3d(
+          Eigen::Translation3d(side * (0.0755 - 0.045 * std::min(1.0, t / 0.8)), 0, 0));
     });
 }
 
@@ -40,14 +41,16 @@ double depthInItself(SoftObject& soft) {
   for (int v = 0; v < tree.mesh().vertexCount(); ++v) {
     const Eigen::Vector3d x = tree.mesh().vertex(v);
     if (!encloses(tree.mesh(), x + 1e-6 * tree.vertexNormal(v).normalized())) continue;
-    if (const auto hit = self.nearest(tree, v, x, 0.05, 0.0, 0.05)) deepest = std::max(deepest, -hit->distance);
+    if (const auto hit = self.nearest(tree, v, x, 0.05, 0.0, 0.05))
+      deepest = std::max(deepest, -hit->distance);
   }
   return deepest;
 }
 
 int selfContacts(SoftScene& scene) {
   const auto& all = scene.contacts().contacts();
-  return static_cast<int>(std::count_if(all.begin(), all.end(), [](const auto& c) { return c.a == c.b; }));
+  return static_cast<int>(
+      std::count_if(all.begin(), all.end(), [](const auto& c) { return c.a == c.b; }));
 }
 
 TriangleMesh cloth(double length, double width, const Eigen::Vector3i& n) {
@@ -113,9 +116,11 @@ TEST(SelfContact, LayersOfAFoldingRibbonStayOnTheirSides) {
   scene.surface.friction = 0.4;
   scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
   TriangleMesh ribbon = cloth(0.4, 0.1, {20, 5, 1});
-  ribbon.vertices = ribbon.vertices *
-                    Eigen::AngleAxisd(-1.55, Eigen::Vector3d::UnitY()).toRotationMatrix().transpose();
-  SoftObject& soft = scene.addSoft(movedMesh(ribbon, {0, 0, 0.21}), {3e4, 0.3, 300.0, 0.02}, 0.02, {0, 0, -1.0});
+  ribbon.vertices =
+      ribbon.vertices *
+      Eigen::AngleAxisd(-1.55, Eigen::Vector3d::UnitY()).toRotationMatrix().transpose();
+  SoftObject& soft =
+      scene.addSoft(movedMesh(ribbon, {0, 0, 0.21}), {3e4, 0.3, 300.0, 0.02}, 0.02, {0, 0, -1.0});
   soft.setSelfContact(true);
   int contacts = 0;
   for (int k = 0; k < 40; ++k) {
@@ -132,8 +137,9 @@ TEST(SelfContact, WhereNothingMeetsItselfNothingChanges) {
   const auto run = [](bool on) {
     SoftScene scene;
     scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
-    SoftObject& soft = scene.addSoft(movedMesh(horseshoe(0.12, 0.05, 0.03, 0.045, {12, 3, 2}), {0, 0, 0.2}), kRubber,
-                                     0.02, {0, 0, -1});
+    SoftObject& soft =
+        scene.addSoft(movedMesh(horseshoe(0.12, 0.05, 0.03, 0.045, {12, 3, 2}), {0, 0, 0.2}),
+                      kRubber, 0.02, {0, 0, -1});
     soft.setSelfContact(on);
     for (int k = 0; k < 15; ++k) scene.step(kStep);
     return Vec(soft.body().positions());
@@ -144,10 +150,12 @@ TEST(SelfContact, WhereNothingMeetsItselfNothingChanges) {
 // A sheet that is not folded is never searched, however it moves; arms that are far apart are once.
 TEST(SelfContact, WhatCannotMeetItselfIsNotSearched) {
   SoftScene scene;
-  SoftObject& sheet = scene.addSoft(cloth(0.4, 0.2, {20, 10, 1}), {1e5, 0.3, 300.0, 0.02}, 0.02, {3, 0, 0}, {1, 2, 0});
+  SoftObject& sheet = scene.addSoft(cloth(0.4, 0.2, {20, 10, 1}), {1e5, 0.3, 300.0, 0.02}, 0.02,
+                                    {3, 0, 0}, {1, 2, 0});
   scene.gravity.setZero();
-  SoftObject& arms = scene.addSoft(movedMesh(horseshoe(0.12, 0.05, 0.03, 0.045, {16, 3, 2}), {0, 2, 0}), kRubber, 0.015,
-                                   {5, 0, 0}, {0, 1, 1});
+  SoftObject& arms =
+      scene.addSoft(movedMesh(horseshoe(0.12, 0.05, 0.03, 0.045, {16, 3, 2}), {0, 2, 0}), kRubber,
+                    0.015, {5, 0, 0}, {0, 1, 1});
   sheet.setSelfContact(true);
   arms.setSelfContact(true);
   for (int k = 0; k < 30; ++k) scene.step(kStep);
@@ -162,13 +170,15 @@ TEST(SelfContact, AFoldedSheetIsTold) {
   const auto rolled = [&](double angle) {  // about y, by `angle` from its middle to either end
     TriangleMesh mesh = flat;
     for (int v = 0; v < mesh.vertexCount(); ++v) {
-      const double radius = 0.2 / angle, phi = mesh.vertices(v, 0) / radius, r = radius + mesh.vertices(v, 2);
+      const double radius = 0.2 / angle, phi = mesh.vertices(v, 0) / radius,
+                   r = radius + mesh.vertices(v, 2);
       mesh.vertices(v, 0) = r * std::sin(phi);
       mesh.vertices(v, 2) = r * std::cos(phi);
     }
     return SurfaceTree(mesh);
   };
-  for (const auto& [angle, unfolded] : {std::pair(0.1, true), std::pair(0.9, true), std::pair(1.2, false)}) {
+  for (const auto& [angle, unfolded] :
+       {std::pair(0.1, true), std::pair(0.9, true), std::pair(1.2, false)}) {
     const SurfaceTree tree = rolled(angle);
     fold.isUnfolded(tree);  // how fast it turns counts, too
     EXPECT_EQ(fold.isUnfolded(tree), unfolded) << angle;
@@ -231,7 +241,8 @@ TEST(SelfContact, AnOpenSurfaceIsRefusedWithTheRemedy) {
   world.submit(selfEdit(true));
   const auto outcomes = world.advanceTo(0.0);
   ASSERT_FALSE(outcomes.back().accepted);
-  EXPECT_NE(outcomes.back().message.find("give a closed one"), std::string::npos) << outcomes.back().message;
+  EXPECT_NE(outcomes.back().message.find("give a closed one"), std::string::npos)
+      << outcomes.back().message;
 }
 
 TEST(SelfContact, ASurfaceThatStartsInItselfIsReported) {
@@ -239,7 +250,8 @@ TEST(SelfContact, ASurfaceThatStartsInItselfIsReported) {
   TriangleMesh knot = cloth(0.6, 0.2, {24, 8, 1});
   for (int v = 0; v < knot.vertexCount(); ++v) {
     const double t = 1.55 + knot.vertices(v, 0) / 0.13;
-    const Eigen::Vector2d across = Eigen::Vector2d(-0.2 * std::cos(2.0 * t), 0.15 * std::cos(t)).normalized();
+    const Eigen::Vector2d across =
+        Eigen::Vector2d(-0.2 * std::cos(2.0 * t), 0.15 * std::cos(t)).normalized();
     const Eigen::Vector2d middle(0.15 * std::sin(t), 0.1 * std::sin(2.0 * t));
     const Eigen::Vector2d at = middle + knot.vertices(v, 2) * across;
     knot.vertices(v, 0) = at.x();
@@ -251,7 +263,8 @@ TEST(SelfContact, ASurfaceThatStartsInItselfIsReported) {
   world.submit(letGo("thing"));
   const auto outcomes = world.advanceTo(0.0);
   ASSERT_TRUE(outcomes.front().accepted) << outcomes.front().message;
-  EXPECT_NE(noteOf(world).find("starts passing through itself"), std::string::npos) << noteOf(world);
+  EXPECT_NE(noteOf(world).find("starts passing through itself"), std::string::npos)
+      << noteOf(world);
 }
 
 }  // namespace

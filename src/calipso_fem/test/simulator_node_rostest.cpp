@@ -57,8 +57,8 @@ class SimulatorNodeTest : public ::testing::Test {
 
   bool connected() const {
     return camera_.getNumSubscribers() > 0 && edits_.getNumSubscribers() > 0 &&
-           status_.getNumSubscribers() > 1 && subscribers_.front().getNumPublishers() > 0 && subscribers_[1].getNumPublishers() > 0 &&
-           subscribers_.back().getNumPublishers() > 0;
+           status_.getNumSubscribers() > 1 && subscribers_.front().getNumPublishers() > 0 &&
+           subscribers_[1].getNumPublishers() > 0 && subscribers_.back().getNumPublishers() > 0;
   }
 
   void sendClip() {
@@ -124,9 +124,11 @@ TEST_F(SimulatorNodeTest, OneStatePerFrameAndEditsAreReported) {
   edits_.publish(bad);
   ASSERT_TRUE(waitFor([&] { return own().edits == 2; }));
   sendClip();
-  ASSERT_TRUE(waitFor([&] { return own().state == calipso_msgs::NodeStatus::PREPARING; })) << own().message;
+  ASSERT_TRUE(waitFor([&] { return own().state == calipso_msgs::NodeStatus::PREPARING; }))
+      << own().message;
   sayThatFlowFailed();
-  ASSERT_TRUE(waitFor([&] { return own().state == calipso_msgs::NodeStatus::READY; })) << own().message;
+  ASSERT_TRUE(waitFor([&] { return own().state == calipso_msgs::NodeStatus::READY; }))
+      << own().message;
 
   for (int k = 0; k < kFrames; ++k) sendFrame(k);
   ASSERT_TRUE(waitFor([&] { return states_.size() == kFrames && reports_.size() == 2; }));

@@ -37,7 +37,7 @@ class SoftScene {
   RigidWorld& rigid() { return rigid_; }
   SoftContacts& contacts() { return contacts_; }
   double time() const { return time_; }
-  double energy() const;                 // kinetic, elastic, in gravity; J
+  double energy() const;                       // kinetic, elastic, in gravity; J
   double deepest() const { return deepest_; }  // over all steps, m
   double cpuMs() const { return cpu_ms_; }     // of all steps
   const ContactReport& report() const { return report_; }

@@ -32,7 +32,8 @@ struct EnergyWatch {
 TEST(Contact, ForcesOfABlockAtRestCarryItsWeight) {
   SoftScene scene;
   scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
-  SoftObject& block = scene.addSoft(cube(0.2, 3, {0, 0, 0.1001}), {1e5, 0.3, 1000.0, 0.03}, 0.2 / 3);
+  SoftObject& block =
+      scene.addSoft(cube(0.2, 3, {0, 0, 0.1001}), {1e5, 0.3, 1000.0, 0.03}, 0.2 / 3);
   for (int k = 0; k < 60; ++k) scene.step(1.0 / 30.0);
   double sum = 0.0, depth = 0.0;
   for (const ContactPoint& c : scene.contacts().contacts()) {
@@ -117,9 +118,8 @@ TEST(Contact, CollisionWithARigidBlockKeepsMomentum) {
 TEST(Contact, FastBlockDoesNotPassAThinPlate) {
   SoftScene scene;
   SoftObject& block = scene.addSoft(cube(0.2, 3, {0, 0, 0.5}), kSoft, 0.2 / 3, {0, 0, -50});
-  scene.addMoving(boxSurface({1, 1, 0.002}, 4), [](double) {
-    return Eigen::Isometry3d(Eigen::Translation3d(0, 0, -0.001));
-  });
+  scene.addMoving(boxSurface({1, 1, 0.002}, 4),
+                  [](double) { return Eigen::Isometry3d(Eigen::Translation3d(0, 0, -0.001)); });
   for (int k = 0; k < 6; ++k) {
     scene.step(1.0 / 60.0);
     ASSERT_GT(block.vertices().col(2).minCoeff(), -1e-3) << "step " << k;
@@ -134,8 +134,9 @@ TEST(Contact, BlockSticksBelowAndSlidesAboveTheFrictionAngle) {
     scene.surface.friction = 0.5;
     scene.addPlane(normal, 0.0);
     TriangleMesh mesh = boxSurface({0.2, 0.2, 0.1}, 2);
-    mesh.vertices = mesh.vertices *
-                    Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix().transpose();
+    mesh.vertices =
+        mesh.vertices *
+        Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix().transpose();
     SoftObject& block =
         scene.addSoft(movedMesh(mesh, 0.05 * normal), {1e7, 0.3, 1000.0, 0.01}, 0.1);
     const Eigen::Vector3d start = block.body().momentum().center;
@@ -189,7 +190,8 @@ TEST(Contact, HeavyOnLightStandsAndConverges) {
   scene.surface.friction = 0.5;
   scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
   SoftObject& light = scene.addSoft(cube(0.2, 3, {0, 0, 0.101}), {1e6, 0.3, 10.0, 0.02}, 0.2 / 3);
-  scene.addRigid(cube(0.2, 3, {0, 0, 0}), 1e4, Eigen::Isometry3d(Eigen::Translation3d(0, 0, 0.303)));
+  scene.addRigid(cube(0.2, 3, {0, 0, 0}), 1e4,
+                 Eigen::Isometry3d(Eigen::Translation3d(0, 0, 0.303)));
   for (int k = 0; k < 60; ++k) scene.step(1.0 / 60.0);
   EXPECT_TRUE(scene.report().converged);
   // 785 N on 1e6 Pa and 0.04 m^2: 2 %, less at the corners.
@@ -197,7 +199,8 @@ TEST(Contact, HeavyOnLightStandsAndConverges) {
   EXPECT_NEAR(height, 0.2 * (1.0 - 80.0 * kG / 4e4), 0.02 * 0.2);
 }
 
-// Each is solved by itself; beside another that it cannot meet it moves as if alone, to the last bit.
+// Each is solved by itself; beside another that it cannot meet it moves as if alone, to the last
+// bit.
 TEST(Contact, BodiesThatCannotMeetDoNotDisturbEachOther) {
   const auto run = [](bool together) {
     SoftScene scene;

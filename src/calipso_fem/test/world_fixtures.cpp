@@ -33,7 +33,8 @@ TriangleMesh boxSurface(const Eigen::Vector3d& size, const Eigen::Vector3i& n) {
     const auto [it, fresh] =
         ids.emplace(std::make_tuple(l.x(), l.y(), l.z()), static_cast<int>(vertices.size()));
     if (fresh)
-      vertices.push_back(size.cwiseProduct(l.cast<double>().cwiseQuotient(n.cast<double>()) - Eigen::Vector3d::Constant(0.5)));
+      vertices.push_back(size.cwiseProduct(l.cast<double>().cwiseQuotient(n.cast<double>()) -
+                                           Eigen::Vector3d::Constant(0.5)));
     return it->second;
   };
   for (int axis = 0; axis < 3; ++axis)
@@ -83,7 +84,8 @@ TriangleMesh sphereSurface(double radius, int rings, int segments) {
 TriangleMesh beaker() {
   const double outer = 0.04, inner = 0.034, height = 0.09, floor = 0.006;
   const int n = 24;
-  const std::vector<std::pair<double, double>> profile = {  // r, z from the bottom's centre round
+  const std::vector<std::pair<double, double>> profile = {
+      // r, z from the bottom's centre round
       {0.0, 0.0}, {outer, 0.0}, {outer, height}, {inner, height}, {inner, floor}, {0.0, floor}};
   const int rings = static_cast<int>(profile.size()) - 2;
   std::vector<Eigen::Vector3d> vertices = {{0, 0, -0.5 * height}, {0, 0, floor - 0.5 * height}};
@@ -119,14 +121,16 @@ TriangleMesh bentRod(double size, double thickness) {
   return mesh;
 }
 
-TriangleMesh horseshoe(double length, double radius, double thickness, double width, const Eigen::Vector3i& n) {
+TriangleMesh horseshoe(double length, double radius, double thickness, double width,
+                       const Eigen::Vector3i& n) {
   const double bend = M_PI * radius;
   TriangleMesh mesh = boxSurface({2.0 * length + bend, width, thickness}, n);
   for (int i = 0; i < mesh.vertexCount(); ++i) {
     const Eigen::Vector3d p = mesh.vertex(i);
     const double along = std::clamp(p.x(), -0.5 * bend, 0.5 * bend), beyond = p.x() - along;
     const double phi = along / radius, r = radius + p.z();
-    const Eigen::Vector3d out(std::sin(phi), 0.0, std::cos(phi)), on(std::cos(phi), 0.0, -std::sin(phi));
+    const Eigen::Vector3d out(std::sin(phi), 0.0, std::cos(phi)),
+        on(std::cos(phi), 0.0, -std::sin(phi));
     mesh.vertices.row(i) = (r * out + beyond * on + p.y() * Eigen::Vector3d::UnitY()).transpose();
   }
   return mesh;

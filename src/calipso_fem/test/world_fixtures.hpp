@@ -10,10 +10,13 @@ namespace calipso::fem::test {
 // Axis-aligned box around `center`, each side cut into n x n quads of two triangles.
 TriangleMesh boxSurface(const Eigen::Vector3d& size, int n);
 
-TriangleMesh boxSurface(const Eigen::Vector3d& size, const Eigen::Vector3i& n);  // quads along x, y, z
+TriangleMesh boxSurface(const Eigen::Vector3d& size,
+                        const Eigen::Vector3i& n);  // quads along x, y, z
 
-// A slab of two arms of `length` and half a ring of `radius` (of its middle) between them: open towards -z.
-TriangleMesh horseshoe(double length, double radius, double thickness, double width, const Eigen::Vector3i& n);
+// A slab of two arms of `length` and half a ring of `radius` (of its middle) between them: open
+// towards -z.
+TriangleMesh horseshoe(double length, double radius, double thickness, double width,
+                       const Eigen::Vector3i& n);
 
 // A sphere by latitude and longitude.
 TriangleMesh sphereSurface(double radius, int rings, int segments);

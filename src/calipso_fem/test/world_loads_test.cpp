@@ -44,7 +44,8 @@ TEST(Wind, PressesOnAPlateByTheSquareOfTheSpeedAcrossIt) {
   const Air air{{3.0, 4.0, 0.0}, 1.2};
   const Eigen::Vector3d force =
       windForces(mesh.vertices, still, mesh.triangles, air, 1.0, 0.0).colwise().sum().transpose();
-  EXPECT_NEAR(force.x(), 0.5 * 1.2 * 9.0 * 4.0, 1e-12);  // p A, the speed along the plate does not count
+  EXPECT_NEAR(force.x(), 0.5 * 1.2 * 9.0 * 4.0,
+              1e-12);  // p A, the speed along the plate does not count
   EXPECT_NEAR(force.tail<2>().norm(), 0.0, 1e-12);
 }
 
@@ -52,14 +53,18 @@ TEST(Wind, DoesNothingToASheetThatMovesWithIt) {
   const TriangleMesh mesh = plate(1.0);
   Vertices with(4, 3);
   with.rowwise() = Eigen::RowVector3d(3, 4, 0);
-  EXPECT_EQ(windForces(mesh.vertices, with, mesh.triangles, {{3, 4, 0}, 1.2}, 1.0, 0.0).norm(), 0.0);
+  EXPECT_EQ(windForces(mesh.vertices, with, mesh.triangles, {{3, 4, 0}, 1.2}, 1.0, 0.0).norm(),
+            0.0);
 }
 
 TEST(Wind, AClosedSheetCountsOnce) {
   const TriangleMesh thin = boxSurface({1e-6, 2.0, 2.0}, 2);
   const Vertices still = Vertices::Zero(thin.vertices.rows(), 3);
   const Eigen::Vector3d force =
-      windForces(thin.vertices, still, thin.triangles, {{3, 0, 0}, 0.5 * 1.2}, 1.0, 0.0).colwise().sum().transpose();
+      windForces(thin.vertices, still, thin.triangles, {{3, 0, 0}, 0.5 * 1.2}, 1.0, 0.0)
+          .colwise()
+          .sum()
+          .transpose();
   EXPECT_NEAR(force.x(), 0.5 * 1.2 * 9.0 * 4.0, 1e-9);
 }
 
@@ -116,21 +121,24 @@ TEST(WorldLoads, ATwistToATargetTurnsTheRegionOfADeformableObject) {
   twist.vector = {0, 0, 0.4};
   twist.ramp = 0.2;
   world.submit(twist);
-  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   const auto start = boxSurface({0.1, 0.1, 0.1}, 3).vertices;
   play(world, 1.0);
   const auto now = world.state().objects[0].vertices;
   int seen = 0;
   for (Eigen::Index v = 0; v < start.rows(); ++v) {
     if (start(v, 2) < 0.0499 || start.row(v).head<2>().norm() < 1e-6) continue;
-    const double before = std::atan2(start(v, 1), start(v, 0)), after = std::atan2(now(v, 1), now(v, 0));
+    const double before = std::atan2(start(v, 1), start(v, 0)),
+                 after = std::atan2(now(v, 1), now(v, 0));
     EXPECT_NEAR(std::remainder(after - before, 2.0 * M_PI), 0.4, 0.02);  // of the embedding
     ++seen;
   }
   EXPECT_GE(seen, 12);
 }
 
-// At half the pace the same way takes twice as long: a thrown body is where it would be after half the time.
+// At half the pace the same way takes twice as long: a thrown body is where it would be after half
+// the time.
 TEST(WorldLoads, SlowDynamicsRunTheSameWaySlower) {
   const auto wayAfter = [](double seconds, double pace) {
     World world = boxInTheAir();
@@ -195,7 +203,8 @@ TEST(WorldLoads, WhatTheVideoShowsOfGravityCanBeTaken) {
   world.addObservedGravity({0, 0, -5.0}, 0.5);  // less sure
   world.submit(rigidKind());
   world.submit(edit);
-  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   play(world, 0.5);
   // Afloat: buoyancy holds the weight under the scene's 9.81 m/s^2. 0.04: of the time step.
   EXPECT_NEAR(centerOf(world.state()).z(), 5.0 + 0.5 * (9.81 - 6.0) * 0.25, 0.04);
@@ -216,7 +225,8 @@ TEST(WorldLoads, TheWindOfTheVideoCanBeTaken) {
     choose(world, chosen);
     world.submit(rigidKind());
     world.submit(chosen);
-    for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+    for (const EditOutcome& outcome : world.advanceTo(0.0))
+      EXPECT_TRUE(outcome.accepted) << outcome.message;
     const Eigen::Vector3d start = centerOf(world.state());
     play(world, 0.5);
     return Eigen::Vector3d(centerOf(world.state()) - start);
@@ -226,12 +236,15 @@ TEST(WorldLoads, TheWindOfTheVideoCanBeTaken) {
     world.addObservedWind("thing", {1.0, late, Eigen::Matrix3d::Identity()});
     world.addObservedWind("thing", {0.0, velocity, Eigen::Matrix3d::Identity()});
   };
-  const Eigen::Vector3d given = drift([&](World&, Edit& e) { e.mode = EditMode::kAbsolute, e.vector = velocity; });
+  const Eigen::Vector3d given =
+      drift([&](World&, Edit& e) { e.mode = EditMode::kAbsolute, e.vector = velocity; });
   const Eigen::Vector3d taken = drift([&](World& w, Edit&) { show(w, velocity); });
-  const Eigen::Vector3d doubled = drift([&](World& w, Edit& e) { show(w, velocity), e.factor = 2.0; });
+  const Eigen::Vector3d doubled =
+      drift([&](World& w, Edit& e) { show(w, velocity), e.factor = 2.0; });
   const Eigen::Vector3d dying = drift([&](World& w, Edit&) { show(w, -velocity); });
   EXPECT_EQ(taken, given);
-  EXPECT_NEAR(doubled.x(), 4.0 * taken.x(), 0.1 * taken.x());  // drag is quadratic; less what it drifts with the air
+  EXPECT_NEAR(doubled.x(), 4.0 * taken.x(),
+              0.1 * taken.x());  // drag is quadratic; less what it drifts with the air
   EXPECT_GT(dying.x(), 0.0);
   EXPECT_LT(dying.x(), 0.8 * taken.x());
 }
@@ -258,7 +271,8 @@ TEST(WorldLoads, ACopyLivesOnItsOwn) {
   drop.object = "twin";
   drop.object_kind = ObjectKind::kRigid;
   world.submit(drop);
-  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   WorldState state = world.state();
   ASSERT_EQ(state.objects.size(), 2u);
   EXPECT_EQ(state.objects[1].source, "thing");
@@ -287,7 +301,8 @@ TEST(WorldLoads, AnInsertedModelFallsOntoTheTable) {
   insert.density = 700.0;
   insert.color = {0.8, 0.1, 0.1};
   world.submit(insert);
-  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   WorldState state = world.state();
   ASSERT_EQ(state.objects.size(), 2u);
   EXPECT_EQ(state.objects[1].kind, ObjectKind::kRigid);
@@ -328,7 +343,8 @@ TEST(WorldLoads, WhatDoesNotMeetTheTableFallsThroughIt) {
   Edit push = editOf(EditKind::kVelocity);
   push.vector = {0, 0, 0.1};
   world.submit(push);
-  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   play(world, 0.5);
   EXPECT_LT(centerOf(world.state()).z(), -0.5);
 }
@@ -342,7 +358,8 @@ TEST(WorldLoads, ALookIsHandedOn) {
   sun.object.clear();
   sun.vector = {1, 0, 1};
   world.submit(sun);
-  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   const WorldState state = world.state();
   EXPECT_TRUE(state.objects[0].edited);
   EXPECT_EQ(state.objects[0].look.color, look.color);

@@ -31,8 +31,9 @@ TEST(WorldMotion, FallingRigidBodyFollowsTheParabola) {
               0.0, 1e-6);
 }
 
-// A box that the video shows falling onto the ground and springing off aside, by 30 frames: where no simulation would
-// send it. Thrown on as it was, it does the same; changed in any way, it is simulated.
+// A box that the video shows falling onto the ground and springing off aside, by 30 frames: where
+// no simulation would send it. Thrown on as it was, it does the same; changed in any way, it is
+// simulated.
 class ObservedBounce : public ::testing::Test {
  protected:
   static constexpr int kImpact = 15;
@@ -51,8 +52,11 @@ class ObservedBounce : public ::testing::Test {
       m.angular = {2, 1, 0};
     }
     m.world_from_object.translation() = m.centroid;
-    const Eigen::Vector3d angle = k < kImpact ? Eigen::Vector3d::Zero() : Eigen::Vector3d(after * m.angular);
-    if (!angle.isZero()) m.world_from_object.linear() = Eigen::AngleAxisd(angle.norm(), angle.normalized()).toRotationMatrix();
+    const Eigen::Vector3d angle =
+        k < kImpact ? Eigen::Vector3d::Zero() : Eigen::Vector3d(after * m.angular);
+    if (!angle.isZero())
+      m.world_from_object.linear() =
+          Eigen::AngleAxisd(angle.norm(), angle.normalized()).toRotationMatrix();
     return m;
   }
   // Distance from the video's place after 24 frames, `edits` being made at the start.
@@ -109,7 +113,8 @@ TEST(WorldMotion, DeformableFlightIsExactToo) {
   EXPECT_NEAR((centerOf(world.state()) - expected).norm(), 0.0, 2e-3);
 }
 
-// A plate, held by one end, that the video shows bending upwards: touched in the midst of it, it goes on from there.
+// A plate, held by one end, that the video shows bending upwards: touched in the midst of it, it
+// goes on from there.
 TEST(WorldMotion, ADeformingObjectStartsWithItsShapeAndVelocity) {
   WorldParams params;
   params.max_nodes = 300;
@@ -119,7 +124,8 @@ TEST(WorldMotion, ADeformingObjectStartsWithItsShapeAndVelocity) {
   scene.objects[0].attachments.push_back({"end", {-0.51, -1, 1}, {-0.49, 1, 3}});
   const TriangleMesh& mesh = scene.objects[0].mesh;
   Eigen::MatrixXd bending = Eigen::MatrixXd::Zero(3 * mesh.vertexCount(), 1);
-  for (int i = 0; i < mesh.vertexCount(); ++i) bending(3 * i + 2, 0) = std::pow(mesh.vertex(i).x() + 0.5, 2);
+  for (int i = 0; i < mesh.vertexCount(); ++i)
+    bending(3 * i + 2, 0) = std::pow(mesh.vertex(i).x() + 0.5, 2);
   World world(scene, params);
   EXPECT_THROW(world.addObservedModes("thing", bending.topRows(3)), std::invalid_argument);
   world.addObservedModes("thing", bending);
@@ -135,13 +141,15 @@ TEST(WorldMotion, ADeformingObjectStartsWithItsShapeAndVelocity) {
   soft.object_kind = ObjectKind::kDeformable;
   world.submit(soft);
   world.advanceTo(0.0);
-  for (const EditOutcome& outcome : world.advanceTo(0.1)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.1))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   const double h = 1.0 / 240.0;
   const auto at_once = world.state().objects.at(0).vertices;
   world.advanceTo(0.1 + h);
   const auto later = world.state().objects.at(0).vertices;
   for (int i = 0; i < mesh.vertexCount(); ++i) {
-    const double way = at_once(i, 2) - (mesh.vertex(i).z() + 2.0), speed = (later(i, 2) - at_once(i, 2)) / h;
+    const double way = at_once(i, 2) - (mesh.vertex(i).z() + 2.0),
+                 speed = (later(i, 2) - at_once(i, 2)) / h;
     // A node goes as its surroundings do on average, over cells of 0.1 m.
     EXPECT_NEAR(way, 0.02 * bending(3 * i + 2, 0), 2e-3) << i;
     if (mesh.vertex(i).x() > 0.4) {
@@ -185,8 +193,8 @@ TEST(WorldMotion, HundredfoldSofterSagsAndStaysOnTheTable) {
   const double before = world.state().objects[0].vertices.col(2).maxCoeff();
   play(world, 2.0);
   const auto after = world.state().objects[0].vertices;
-  // Its own weight shortens a column of height H by rho g H^2 / 2E, here 0.8 mm; half of it is asked
-  // for, since a bent rod does not stand on the table all along.
+  // Its own weight shortens a column of height H by rho g H^2 / 2E, here 0.8 mm; half of it is
+  // asked for, since a bent rod does not stand on the table all along.
   EXPECT_LT(after.col(2).maxCoeff(), before - 4e-4);
   EXPECT_GT(after.col(2).minCoeff(), -1e-3);
 }
@@ -290,7 +298,7 @@ TEST(WorldMotion, ResolutionFollowsThePixelErrorAskedFor) {
   };
   EXPECT_GT(nodes(8.0), 0);
   EXPECT_GT(nodes(0.5), nodes(8.0));
-  EXPECT_LE(nodes(1e-3), 1.25 * WorldParams().max_nodes);   // what NodeCountFollowsTheTarget allows
+  EXPECT_LE(nodes(1e-3), 1.25 * WorldParams().max_nodes);  // what NodeCountFollowsTheTarget allows
 }
 
 TEST(WorldMotion, DeformableObjectSleepsWhenStillAndWakesForAnEdit) {

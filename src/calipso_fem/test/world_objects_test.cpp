@@ -31,9 +31,7 @@ std::unique_ptr<World> dropped(double height, std::optional<ObjectKind> kind = s
   return world;
 }
 
-double heightOf(const World& world, int object = 0) {
-  return centerOf(world.state(), object).z();
-}
+double heightOf(const World& world, int object = 0) { return centerOf(world.state(), object).z(); }
 
 TEST(WorldObjects, ExcludedPairFallsThrough) {
   const auto world = dropped(0.05);
@@ -109,8 +107,9 @@ TEST(WorldObjects, BadNamesAndValuesAreRefused) {
             std::string::npos);
   EXPECT_NE(message([&] { world->setPairContact("table", "table", false); }).find("no pair"),
             std::string::npos);
-  EXPECT_NE(message([&] { world->duplicate("thing", "thing", Eigen::Isometry3d::Identity()); })
-                .find("two objects"),
+  EXPECT_NE(message([&] {
+              world->duplicate("thing", "thing", Eigen::Isometry3d::Identity());
+            }).find("two objects"),
             std::string::npos);
   PairRule rule;
   rule.friction = -0.1;
@@ -247,7 +246,8 @@ TEST(WorldObjects, MassMustBePositive) {
   }
   WorldParams params;
   params.defaults.density = 0.0;
-  EXPECT_THROW(World(sceneWith(boxSurface({1, 1, 1}, 1), {0, 0, 1}), params), std::invalid_argument);
+  EXPECT_THROW(World(sceneWith(boxSurface({1, 1, 1}, 1), {0, 0, 1}), params),
+               std::invalid_argument);
 }
 
 TEST(WorldObjects, NothingMovesWhatHasInfiniteMass) {
@@ -268,7 +268,8 @@ TEST(WorldObjects, AnImmovableObjectKeepsTheRestOfItsMaterial) {
   std::vector<std::string> said;
   for (const double density : {std::numeric_limits<double>::infinity(), 2.0}) {
     World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.5}), {});
-    Edit first = editOf(EditKind::kMaterial, EditMode::kFactor), second = editOf(EditKind::kMaterial, EditMode::kAbsolute);
+    Edit first = editOf(EditKind::kMaterial, EditMode::kFactor),
+         second = editOf(EditKind::kMaterial, EditMode::kAbsolute);
     first.density = density;
     first.youngs_modulus = 0.5;
     second.density = 500.0;
@@ -282,7 +283,8 @@ TEST(WorldObjects, AnImmovableObjectKeepsTheRestOfItsMaterial) {
   EXPECT_EQ(said[0], said[1]);
 }
 
-// A falling box stops on a floating one that an edit has made immovable; given a mass again, that falls.
+// A falling box stops on a floating one that an edit has made immovable; given a mass again, that
+// falls.
 TEST(WorldObjects, AnEditMakesMassInfinite) {
   WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.5});
   scene.objects.push_back(scene.objects.front());
@@ -291,17 +293,20 @@ TEST(WorldObjects, AnEditMakesMassInfinite) {
   WorldParams params;
   params.max_nodes = 150;
   World world(scene, params);
-  Edit heavy = editOf(EditKind::kMaterial, EditMode::kFactor), thrown = editOf(EditKind::kVelocity, EditMode::kAbsolute);
+  Edit heavy = editOf(EditKind::kMaterial, EditMode::kFactor),
+       thrown = editOf(EditKind::kVelocity, EditMode::kAbsolute);
   heavy.density = std::numeric_limits<double>::infinity();
   thrown.object = "above";
   thrown.vector = {0, 0, -1};
-  Edit light = editOf(EditKind::kMaterial, EditMode::kAbsolute), falls = editOf(EditKind::kGravity, EditMode::kFactor);
+  Edit light = editOf(EditKind::kMaterial, EditMode::kAbsolute),
+       falls = editOf(EditKind::kGravity, EditMode::kFactor);
   light.density = 500.0;
   light.time = 1.0;
   falls.factor = 2.0;  // afloat before
   falls.time = 1.0;
   for (const Edit& edit : {heavy, thrown, light, falls}) world.submit(edit);
-  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   play(world, 0.9);
   EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kKinematic);
   EXPECT_NEAR(world.state().objects[0].world_from_object.translation().z(), 0.5, 1e-12);

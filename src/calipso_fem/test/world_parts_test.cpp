@@ -112,13 +112,18 @@ TEST(Encloses, FollowsTheWindingNumber) {
     m.vertices.conservativeResize(a.vertices.rows() + b.vertices.rows(), 3);
     m.vertices.bottomRows(b.vertices.rows()) = b.vertices;
     m.triangles.conservativeResize(a.triangles.rows() + b.triangles.rows(), 3);
-    m.triangles.bottomRows(b.triangles.rows()) = b.triangles.array() + static_cast<int>(a.vertices.rows());
-    if (reversed) m.triangles.bottomRows(b.triangles.rows()).col(0).swap(m.triangles.bottomRows(b.triangles.rows()).col(1));
+    m.triangles.bottomRows(b.triangles.rows()) =
+        b.triangles.array() + static_cast<int>(a.vertices.rows());
+    if (reversed)
+      m.triangles.bottomRows(b.triangles.rows())
+          .col(0)
+          .swap(m.triangles.bottomRows(b.triangles.rows()).col(1));
     return m;
   };
   const TriangleMesh hollow = joined(box, small, true), doubled = joined(box, small, false);
   for (int k = 0; k < 200; ++k) {
-    const Eigen::Vector3d p(1.3 * std::sin(1.7 * k), 1.3 * std::sin(2.3 * k + 1.0), 1.3 * std::cos(0.9 * k));
+    const Eigen::Vector3d p(1.3 * std::sin(1.7 * k), 1.3 * std::sin(2.3 * k + 1.0),
+                            1.3 * std::cos(0.9 * k));
     const double out = p.cwiseAbs().maxCoeff();
     EXPECT_EQ(encloses(box, p), out < 1.0) << p.transpose();
     EXPECT_EQ(encloses(doubled, p), out < 1.0) << p.transpose();
@@ -146,11 +151,11 @@ TEST(ContactSolver, SeparatingContactGivesNoImpulse) {
   EXPECT_EQ(rows[0].impulse.norm(), 0.0);
 }
 
-// A thousand units of mass on a light one, which stands on the ground, along a line: sweeps alone pass the weight on
-// by a thousandth each.
+// A thousand units of mass on a light one, which stands on the ground, along a line: sweeps alone
+// pass the weight on by a thousandth each.
 TEST(ContactSolver, CarriesAHeavyBodyThroughALightOne) {
   const double light = 1.0, heavy = 1000.0, step = 0.1;  // kg, kg, velocity gained by falling, m/s
-  std::vector<ContactRow> rows(2);  // light on the ground, heavy on light
+  std::vector<ContactRow> rows(2);                       // light on the ground, heavy on light
   rows[0].free_velocity = {-step, 0.0, 0.0};
   Eigen::MatrixXd W = Eigen::MatrixXd::Zero(6, 6);
   W.block<3, 3>(0, 0) = Eigen::Matrix3d::Identity() / light;
@@ -204,11 +209,13 @@ TEST(CondensedFactor, AgreesWithTheWholeSystem) {
   EXPECT_EQ(factor.indexOf(6), -1);
 }
 
-// In single precision where that leaves the pivots what is asked of them: as A is, their rounding counts a few times.
+// In single precision where that leaves the pivots what is asked of them: as A is, their rounding
+// counts a few times.
 TEST(CondensedFactor, IsAsExactAsAskedFor) {
   const DeformableBody body = smallBlock();
   const Vec b = Vec::LinSpaced(3 * body.nodeCount(), -1.0, 2.0), none = Vec::Zero(9);
-  // Hardly held, the last pivots are small differences of large numbers: single precision would lose them.
+  // Hardly held, the last pivots are small differences of large numbers: single precision would
+  // lose them.
   for (const double inertia : {1e3, 1e-2}) {
     const BlockMatrix A = heldStiffness(body, inertia);
     CondensedFactor factor;

@@ -36,7 +36,8 @@ TEST(WorldRests, AnObjectTakesTheSupportThatIsItsOwnTopWithIt) {
     world.submit(letGo("load"));
     world.advanceTo(0.0);
     play(world, 2.0);
-    EXPECT_NE(world.plan()[0].reason.find("deck is its own surface"), std::string::npos) << world.plan()[0].reason;
+    EXPECT_NE(world.plan()[0].reason.find("deck is its own surface"), std::string::npos)
+        << world.plan()[0].reason;
     EXPECT_LT(centerOf(world.state(), 1).z(), 0.3) << "rests on the fallen thing or beside it";
   }
 }
@@ -52,11 +53,14 @@ TEST(WorldRests, ARemovedObjectTakesItsOwnTopWithItUntilItIsReset) {
     edit.kind = EditKind::kReset;
     if (reset) world.submit(edit);
     world.submit(letGo("load"));
-    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    for (const EditOutcome& outcome : world.advanceTo(0.0))
+      ASSERT_TRUE(outcome.accepted) << outcome.message;
     play(world, 2.0);
     const double height = centerOf(world.state(), 1).z();
-    if (reset) EXPECT_NEAR(height, 1.077, 0.01);
-    else EXPECT_LT(height, 0.1);
+    if (reset)
+      EXPECT_NEAR(height, 1.077, 0.01);
+    else
+      EXPECT_LT(height, 0.1);
   }
 }
 
@@ -67,13 +71,15 @@ TEST(WorldRests, AResetLeavesContactsThatTheUserHasEnded) {
   for (const EditKind kind : {EditKind::kRemove, EditKind::kReset}) {
     edit.kind = kind;
     world.submit(edit);
-    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    for (const EditOutcome& outcome : world.advanceTo(0.0))
+      ASSERT_TRUE(outcome.accepted) << outcome.message;
     EXPECT_FALSE(world.pairRule("load", "deck").contact);
     EXPECT_EQ(world.pairRule("thing", "deck").contact, kind == EditKind::kReset);
   }
 }
 
-// A cup on a box: it stays as the video has it while the box does, and falls when that is taken away or falls itself.
+// A cup on a box: it stays as the video has it while the box does, and falls when that is taken
+// away or falls itself.
 TEST(WorldRests, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
   WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, 0.5}, false);
   scene.objects.push_back(scene.objects.front());
@@ -86,12 +92,17 @@ TEST(WorldRests, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
     edit.kind = kind;
     if (kind == EditKind::kAppearance) edit.color = {1, 0, 0}, edit.mode = EditMode::kAbsolute;
     world.submit(edit);
-    for (const EditOutcome& outcome : world.advanceTo(0.0)) ASSERT_TRUE(outcome.accepted) << outcome.message;
+    for (const EditOutcome& outcome : world.advanceTo(0.0))
+      ASSERT_TRUE(outcome.accepted) << outcome.message;
     play(world, 1.0);
     const bool stays = kind == EditKind::kAppearance;
-    EXPECT_EQ(world.state().objects[1].kind, stays ? ObjectKind::kStatic : ObjectKind::kRigid) << toString(kind);
-    if (!stays) { EXPECT_LT(centerOf(world.state(), 1).z(), 0.3) << toString(kind); }
-    EXPECT_EQ(world.plan()[1].reason.find("thing, on which it rests") == std::string::npos, stays) << world.plan()[1].reason;
+    EXPECT_EQ(world.state().objects[1].kind, stays ? ObjectKind::kStatic : ObjectKind::kRigid)
+        << toString(kind);
+    if (!stays) {
+      EXPECT_LT(centerOf(world.state(), 1).z(), 0.3) << toString(kind);
+    }
+    EXPECT_EQ(world.plan()[1].reason.find("thing, on which it rests") == std::string::npos, stays)
+        << world.plan()[1].reason;
   }
 }
 

@@ -36,20 +36,23 @@ struct Way {
   std::string reason;
 };
 
-Way follow(const WorldScene& scene, double factor, double seconds, std::optional<double> modulus = std::nullopt) {
+Way follow(const WorldScene& scene, double factor, double seconds,
+           std::optional<double> modulus = std::nullopt) {
   WorldParams params;
   params.max_nodes = 300;
   params.defaults.youngs_modulus = modulus;
   World world(scene, params);
   world.submit(softer(factor));
-  for (const EditOutcome& outcome : world.advanceTo(0.0)) EXPECT_TRUE(outcome.accepted) << outcome.message;
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
   const WorldObject& object = scene.objects[0];
   const decltype(TriangleMesh::vertices) start =
       object.mesh.vertices.rowwise() + object.world_from_object.translation().transpose();
   Way way;
   for (int frame = 1; frame <= std::lround(30.0 * seconds); ++frame) {
     world.advanceTo(frame / 30.0);
-    way.end = (world.state().objects[0].vertices - start).rowwise().norm().maxCoeff() / boundingDiagonal(object.mesh);
+    way.end = (world.state().objects[0].vertices - start).rowwise().norm().maxCoeff() /
+              boundingDiagonal(object.mesh);
     way.largest = std::max(way.largest, way.end);
   }
   way.reason = world.plan()[0].reason;
@@ -60,7 +63,8 @@ TEST(Settle, AShapeWithoutARestShapeStaysAsItIsAndSagsMoreTheSofterItIs) {
   const Way same = follow(banner(), 1.0, 1.0, kLimp);
   EXPECT_NE(same.reason.find("no rest shape"), std::string::npos) << same.reason;
   EXPECT_LT(same.largest, 1e-3);
-  const double little = follow(banner(), 0.9, 0.3, kLimp).end, more = follow(banner(), 0.5, 0.3, kLimp).end;
+  const double little = follow(banner(), 0.9, 0.3, kLimp).end,
+               more = follow(banner(), 0.5, 0.3, kLimp).end;
   EXPECT_GT(little, 1e-3);
   EXPECT_GT(more, 1.5 * little);
   EXPECT_LT(follow(banner(), 10.0, 1.0, kLimp).largest, 1e-3);  // stiffer: nothing pushes it
@@ -102,13 +106,15 @@ WorldScene pole() {
   return scene;
 }
 
-// Half as stiff, it gets the sag once more that it has in the video: a few hundredths of its size, whatever its shape.
+// Half as stiff, it gets the sag once more that it has in the video: a few hundredths of its size,
+// whatever its shape.
 TEST(Settle, ASlenderObjectOfDefaultStiffnessBearsItsWeight) {
   const Way slender = follow(pole(), 0.5, 2.0);
   EXPECT_NE(slender.reason.find("slender"), std::string::npos) << slender.reason;
   EXPECT_GT(slender.largest, 0.01);
   EXPECT_LT(slender.largest, 0.1);
-  const double by_size = defaultMaterial(boundingDiagonal(pole().objects[0].mesh), kG).youngs_modulus;
+  const double by_size =
+      defaultMaterial(boundingDiagonal(pole().objects[0].mesh), kG).youngs_modulus;
   const Way given = follow(pole(), 0.5, 2.0, by_size);
   EXPECT_EQ(given.reason.find("slender"), std::string::npos) << given.reason;
   EXPECT_GT(given.largest, 2.0 * slender.largest);
@@ -152,12 +158,14 @@ TEST(Settle, APrestressedBodyGainsNoEnergy) {
   bar.soft.setMaterial(material);
   DeformableBody& body = bar.soft.body();
   const Vec x = body.positions(), none = Vec::Zero(x.size());
-  double fastest[2] = {0.0, 0.0}, lowest[2] = {0.0, 0.0};  // J and m, of the first and of the second swing
+  double fastest[2] = {0.0, 0.0},
+         lowest[2] = {0.0, 0.0};  // J and m, of the first and of the second swing
   for (int step = 0; step < kSteps; ++step) {
     bar.soft.beginStep(kH);
     for (int k = 0; k < 4; ++k) body.moveTrial(body.trialPositions() + body.trialDirection(none));
     const int half = 2 * step / kSteps;
-    fastest[half] = std::max(fastest[half], bar.soft.endStep(none, kH, std::nullopt).kinetic_energy);
+    fastest[half] =
+        std::max(fastest[half], bar.soft.endStep(none, kH, std::nullopt).kinetic_energy);
     lowest[half] = std::max(lowest[half], (body.positions() - x).cwiseAbs().maxCoeff());
   }
   EXPECT_GT(lowest[0], 0.05);

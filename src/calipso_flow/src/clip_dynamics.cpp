@@ -15,8 +15,9 @@ namespace {
 constexpr size_t kRecentFrames = 8;  // kept, to be looked at again when an object starts to deform
 constexpr int kLeftFrames = 2;       // in which an object must have left its place
 
-// Image motion between the first state and the farthest other one, px, were the camera at rest: the mean over the
-// object's followed points, since errors of the pose are largest at single points far out.
+// Image motion between the first state and the farthest other one, px, were the camera at rest: the
+// mean over the object's followed points, since errors of the pose are largest at single points far
+// out.
 double largestImageMotion(const std::vector<MotionState>& states, const Camera& camera,
                           const ObjectTracker& tracker) {
   const std::vector<Track>& tracks = tracker.keyObservation().tracks;
@@ -28,7 +29,8 @@ double largestImageMotion(const std::vector<MotionState>& states, const Camera& 
         motionFrom(state, tracker.centroid(), false, 0).world_from_object;
     double sum = 0.0;
     for (const Track& track : tracks) {
-      sum += (camera.projectWorld(pose * track.point) - camera.projectWorld(first * track.point)).norm();
+      sum += (camera.projectWorld(pose * track.point) - camera.projectWorld(first * track.point))
+                 .norm();
     }
     largest = std::max(largest, sum / std::max<size_t>(1, tracks.size()));
   }
@@ -45,12 +47,14 @@ double scaleDeviation(const ObjectModel& model, const Eigen::Vector3d& position,
   return variance > 0.0 ? std::sqrt(variance) / sight.norm() : 0.0;
 }
 
-// Of the velocity: the alignment places the centre of mass only so well in the body, and it goes round with its spin.
+// Of the velocity: the alignment places the centre of mass only so well in the body, and it goes
+// round with its spin.
 Matrix6d offCentre(const ObjectModel& model, const MotionState& state) {
   const Eigen::Matrix3d round = skew(state.spin);
   const Eigen::Matrix3d turned = state.rotation * model.world_from_object.linear().transpose();
   Matrix6d twist = Matrix6d::Zero();
-  twist.topLeftCorner<3, 3>() = round * turned * model.position_covariance * turned.transpose() * round.transpose();
+  twist.topLeftCorner<3, 3>() =
+      round * turned * model.position_covariance * turned.transpose() * round.transpose();
   return twist;
 }
 
@@ -105,11 +109,14 @@ std::string summary(const std::vector<ObjectDynamics>& objects) {
 ClipAnalyser::ClipAnalyser(const Frame& key_frame, const std::vector<ObjectModel>& models,
                            const std::vector<cv::Mat>& masks, const Eigen::Vector3d& gravity,
                            const DynamicsParams& params)
-    : params_(params), gravity_(gravity), key_(key_frame), last_(key_frame),
+    : params_(params),
+      gravity_(gravity),
+      key_(key_frame),
+      last_(key_frame),
       times_{key_frame.time} {
   if (models.size() != masks.size()) {
-    throw std::invalid_argument("clip analyser: " + std::to_string(models.size()) +
-                                " models but " + std::to_string(masks.size()) +
+    throw std::invalid_argument("clip analyser: " + std::to_string(models.size()) + " models but " +
+                                std::to_string(masks.size()) +
                                 " masks; give one mask (or an empty one) per model");
   }
   for (size_t i = 0; i < models.size(); ++i) {
@@ -121,10 +128,10 @@ ClipAnalyser::ClipAnalyser(const Frame& key_frame, const std::vector<ObjectModel
 
 void ClipAnalyser::add(const Frame& frame) {
   if (!(frame.time > times_.back())) {
-    throw std::invalid_argument("clip analyser: frame " + std::to_string(times_.size()) + " at " +
-                                std::to_string(frame.time) +
-                                " s is not later than the one before (" +
-                                std::to_string(times_.back()) + " s); give frames in order of time");
+    throw std::invalid_argument(
+        "clip analyser: frame " + std::to_string(times_.size()) + " at " +
+        std::to_string(frame.time) + " s is not later than the one before (" +
+        std::to_string(times_.back()) + " s); give frames in order of time");
   }
   const bool cut = isCut(last_, frame, params_.cut_correlation);
   if (cut) cut_times_.push_back(0.5 * (times_.back() + frame.time));
@@ -151,9 +158,9 @@ void ClipAnalyser::follow(const Frame& frame, bool cut, Followed& object) const 
   }
   object.observations.push_back(object.tracker.track(frame, cut));
   const ObjectModel& model = object.tracker.model();
-  const bool left = !model.attached.empty() &&
-                    hasLeft(object.observations.back(), model.world_from_object, frame.camera,
-                            params_.rest_px);
+  const bool left =
+      !model.attached.empty() &&
+      hasLeft(object.observations.back(), model.world_from_object, frame.camera, params_.rest_px);
   object.frames_left = left ? object.frames_left + 1 : 0;
   if (object.frames_left >= kLeftFrames) beginDeformable(object);
 }
@@ -196,14 +203,13 @@ ObjectDynamics ClipAnalyser::finishObject(const Followed& object, bool with_wind
     if (dynamics.deformation->modes.count() == 0) dynamics.deformation.reset();
   }
   auto measurements = measurementsOf(dynamics.observations, tracker.centroid());
-  // All frames are compared with the key frame: its noise is an error that they share, so that it is the key
-  // pose that errs against them.
+  // All frames are compared with the key frame: its noise is an error that they share, so that it
+  // is the key pose that errs against them.
   const auto first = std::find_if(measurements.begin() + 1, measurements.end(),
                                   [](const PoseMeasurement& m) { return m.valid; });
   if (first != measurements.end()) measurements.front().covariance = first->covariance;
   const Camera& camera = last_.camera;
-  const double depth =
-      (camera.world_from_camera.inverse() * measurements.front().position).norm();
+  const double depth = (camera.world_from_camera.inverse() * measurements.front().position).norm();
   TrajectoryParams trajectory = params_.trajectory;
   if (object.deformable) trajectory.max_collisions = 0;  // a swing is no collision
   trajectory.still = [&](const std::vector<MotionState>& states) {
@@ -214,9 +220,9 @@ ObjectDynamics ClipAnalyser::finishObject(const Followed& object, bool with_wind
   const double scale = scaleDeviation(tracker.model(), measurements.front().position, camera);
   for (size_t k = 0; k < measurements.size(); ++k) {
     dynamics.trajectory.states[k].addScaleUncertainty(scale);
-    dynamics.trajectory.states[k].addTwistCovariance(offCentre(tracker.model(), dynamics.trajectory.states[k]));
-    const bool moving =
-        dynamics.deformation || dynamics.trajectory.movingAt(measurements[k].time);
+    dynamics.trajectory.states[k].addTwistCovariance(
+        offCentre(tracker.model(), dynamics.trajectory.states[k]));
+    const bool moving = dynamics.deformation || dynamics.trajectory.movingAt(measurements[k].time);
     dynamics.motions.push_back(motionFrom(dynamics.trajectory.states[k], tracker.centroid(), moving,
                                           dynamics.observations[k].inliers()));
   }

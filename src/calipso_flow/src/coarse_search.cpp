@@ -8,7 +8,7 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kClearlyBetter = 0.02;  // of correlation, before the prediction is given up
-constexpr int kLeastSide = 8;           // px; a smaller object says too little
+constexpr int kLeastSide = 8;            // px; a smaller object says too little
 constexpr int kLeastTemplate = 12;       // px; it is not reduced to less
 
 // Reduction by which the object is still large enough to be recognised.
@@ -68,8 +68,7 @@ int roundUp(double value, int factor) {
 CoarseMatch matchCoarsely(const ReferenceView::Warped& look, const cv::Mat& picture,
                           const Eigen::AlignedBox2d& reach, int factor) {
   const cv::Rect known = boundingRect(look.weight.image);
-  cv::Rect object(known.x, known.y, known.width / factor * factor,
-                  known.height / factor * factor);
+  cv::Rect object(known.x, known.y, known.width / factor * factor, known.height / factor * factor);
   if (object.width < kLeastSide || object.height < kLeastSide) {
     return {};
   }
@@ -93,14 +92,16 @@ CoarseMatch matchCoarsely(const ReferenceView::Warped& look, const cv::Mat& pict
   double best = 0.0;
   cv::minMaxLoc(score, nullptr, &best, nullptr, &peak);
   const cv::Point home(left / factor, up / factor);
-  return {factor * (refinedPeak(score, peak) - Eigen::Vector2d(home.x, home.y)), best, score.at<float>(home)};
+  return {factor * (refinedPeak(score, peak) - Eigen::Vector2d(home.x, home.y)), best,
+          score.at<float>(home)};
 }
 
 Eigen::Vector2d coarseDisplacement(const ReferenceView::Warped& look, const cv::Mat& picture,
                                    const Eigen::AlignedBox2d& reach) {
   const CoarseMatch match =
       matchCoarsely(look, picture, reach, reduction(boundingRect(look.weight.image).size()));
-  return match.correlation < match.at_home + kClearlyBetter ? Eigen::Vector2d::Zero() : match.displacement;
+  return match.correlation < match.at_home + kClearlyBetter ? Eigen::Vector2d::Zero()
+                                                            : match.displacement;
 }
 
 }  // namespace calipso::flow

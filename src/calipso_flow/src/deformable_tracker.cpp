@@ -9,11 +9,11 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kPoints = 150;              // surface points followed
-constexpr double kRoughScale = 30.0;      // deviations; residuals of a rough match
+constexpr int kPoints = 150;          // surface points followed
+constexpr double kRoughScale = 30.0;  // deviations; residuals of a rough match
 constexpr double kFineScale = 40.0;
 constexpr double kLeastInlierShare = 0.35;
-constexpr int kRadius = 5;                   // px, of a patch: a sheet is often plain
+constexpr int kRadius = 5;  // px, of a patch: a sheet is often plain
 
 DeformationField::Points matrixOf(const std::vector<Eigen::Vector3d>& points) {
   DeformationField::Points matrix(points.size(), 3);
@@ -79,15 +79,17 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
     const Eigen::Vector2d pixel = frame.camera.project(p);
     pixels.push_back({pixel, pixel});
   }
-  const LookMatch::Matches found = LookMatch::forEach(
-      pixels, [&](const LookMatch::Seed& seed) { return pictures.findSurely(seed, params_.patch, params_.trust); });
+  const LookMatch::Matches found = LookMatch::forEach(pixels, [&](const LookMatch::Seed& seed) {
+    return pictures.findSurely(seed, params_.patch, params_.trust);
+  });
   for (size_t i = 0; i < visible.size(); ++i) {
     if (!found[i]) continue;
     matches.push_back(
         {points_.row(visible[i]).transpose(), found[i]->position, found[i]->covariance});
   }
   if (care == Care::kRough) return matches;
-  for (const OutlineStep& step : findOutline(edges_, model_.mesh, surface, look, frame, model_.world_from_object)) {
+  for (const OutlineStep& step :
+       findOutline(edges_, model_.mesh, surface, look, frame, model_.world_from_object)) {
     matches.push_back(step.match());
   }
   return matches;
@@ -113,7 +115,8 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
     observation.tracks.clear();
     for (size_t i = 0; i < matches.size(); ++i) {
       const double deviation = std::sqrt(0.5 * matches[i].covariance.trace());
-      observation.tracks.push_back({matches[i].point, matches[i].pixel, 1.0, deviation, fit.inlier[i]});
+      observation.tracks.push_back(
+          {matches[i].point, matches[i].pixel, 1.0, deviation, fit.inlier[i]});
     }
   }
   if (!observation.found) {

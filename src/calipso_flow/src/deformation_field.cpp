@@ -9,8 +9,8 @@
 namespace calipso::flow {
 namespace {
 
-constexpr double kSheet = 0.1;   // of the middle extent: a thinner object is a sheet
-constexpr double kShort = 0.3;   // of the longest extent: shorter axes deform linearly
+constexpr double kSheet = 0.1;  // of the middle extent: a thinner object is a sheet
+constexpr double kShort = 0.3;  // of the longest extent: shorter axes deform linearly
 
 // Covariance of the surface about its centre, by the triangles' centres and areas.
 Eigen::Matrix3d surfaceCovariance(const TriangleMesh& mesh) {
@@ -38,9 +38,9 @@ double thickness(const TriangleMesh& mesh) {
   double area = 0.0;
   for (int t = 0; t < mesh.triangleCount(); ++t) {
     const Eigen::Vector3d a = mesh.vertex(mesh.triangles(t, 0));
-    area += 0.5 * (mesh.vertex(mesh.triangles(t, 1)) - a)
-                      .cross(mesh.vertex(mesh.triangles(t, 2)) - a)
-                      .norm();
+    area +=
+        0.5 *
+        (mesh.vertex(mesh.triangles(t, 1)) - a).cross(mesh.vertex(mesh.triangles(t, 2)) - a).norm();
   }
   TriangleMesh centred = mesh;  // an open surface's volume depends on the origin
   centred.vertices.rowwise() -= mesh.vertices.colwise().mean();
@@ -105,7 +105,8 @@ DeformationField::Weights DeformationField::weightsAt(const Points& points) cons
   for (int i = 0; i < points.rows(); ++i) {
     const Eigen::Vector3d along = axes_.transpose() * points.row(i).transpose() - low_;
     AxisWeights w[3];
-    for (int a = 0; a < 3; ++a) w[a] = axisWeights(along[a] / std::max(size_[a], 1e-300), counts_[a]);
+    for (int a = 0; a < 3; ++a)
+      w[a] = axisWeights(along[a] / std::max(size_[a], 1e-300), counts_[a]);
     for (int z = 0; z < w[2].count; ++z) {
       for (int y = 0; y < w[1].count; ++y) {
         for (int x = 0; x < w[0].count; ++x) {

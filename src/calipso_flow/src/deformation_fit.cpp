@@ -10,12 +10,12 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kSpringEnds = 48;      // surface points whose distances are kept
-constexpr int kNeighbours = 5;       // springs per point
+constexpr int kSpringEnds = 48;  // surface points whose distances are kept
+constexpr int kNeighbours = 5;   // springs per point
 constexpr int kMostAnchors = 24;
-constexpr double kAcross = 0.15;     // of a sheet's in-plane deviation: across the way to its hold
+constexpr double kAcross = 0.15;  // of a sheet's in-plane deviation: across the way to its hold
 constexpr int kIterations = 6;
-constexpr double kSettled = 2e-5;    // of the diagonal: a smaller step is the last
+constexpr double kSettled = 2e-5;  // of the diagonal: a smaller step is the last
 
 // Vertices spread over the surface: each the farthest from those before it.
 std::vector<int> spreadVertices(const TriangleMesh& mesh, int count) {
@@ -106,8 +106,7 @@ Eigen::MatrixXd DeformationFitter::Normal::matrix() const {
   return full;
 }
 
-DeformationFitter::DeformationFitter(const ObjectModel& model,
-                                     const DeformationParams& params)
+DeformationFitter::DeformationFitter(const ObjectModel& model, const DeformationParams& params)
     : params_(params),
       diagonal_(boundingDiagonal(model.mesh)),
       strain_(params.strain),
@@ -121,7 +120,8 @@ DeformationFitter::DeformationFitter(const ObjectModel& model,
   const std::vector<int>& attached = model.attached;
   const int stride = std::max<int>(1, attached.size() / kMostAnchors);
   DeformationField::Points anchors(attached.empty() ? 0 : (attached.size() - 1) / stride + 1, 3);
-  for (int i = 0; i < anchors.rows(); ++i) anchors.row(i) = model.mesh.vertices.row(attached[i * stride]);
+  for (int i = 0; i < anchors.rows(); ++i)
+    anchors.row(i) = model.mesh.vertices.row(attached[i * stride]);
   const Eigen::MatrixXd w = field_.weightsAt(anchors);
   const double anchor = params.anchor * diagonal_;
   scalar += w.transpose() * w / (anchor * anchor);
@@ -228,8 +228,7 @@ void DeformationFitter::addMatches(const DeformationField::Weights& weights,
   for (size_t i = 0; i < residuals.size(); ++i) {
     if (trust[i] == 0.0) continue;
     const Residual& r = residuals[i];
-    const Eigen::Matrix<double, 3, 2> weighted =
-        trust[i] * r.jacobian.transpose() * r.information;
+    const Eigen::Matrix<double, 3, 2> weighted = trust[i] * r.jacobian.transpose() * r.information;
     const Eigen::Matrix3d A = weighted * r.jacobian;
     const Eigen::Vector3d b = weighted * r.value;
     const DeformationField::Weights::InnerIterator row(weights, i);
@@ -291,7 +290,8 @@ DeformationFit DeformationFitter::fit(const std::vector<SurfaceMatch>& matches,
   if (fit.inliers < params_.least_inliers) return fit;
   const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(normalAt(fit.controls).matrix());
   if (factor.info() != Eigen::Success) return fit;
-  fit.covariance = factor.solve(Eigen::MatrixXd::Identity(fit.controls.size(), fit.controls.size()));
+  fit.covariance =
+      factor.solve(Eigen::MatrixXd::Identity(fit.controls.size(), fit.controls.size()));
   fit.converged = fit.covariance.allFinite();
   return fit;
 }

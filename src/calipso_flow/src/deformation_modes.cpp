@@ -9,10 +9,10 @@ namespace calipso::flow {
 namespace {
 
 constexpr int kMostModes = 8;
-constexpr double kLeastSignal = 3.0;   // root mean square amplitude over its deviation
-constexpr double kLeastShare = 0.02;   // of the strongest mode's amplitude
-constexpr int kHalfWindow = 2;         // frames on either side that a velocity is taken from
-constexpr double kRidge = 1e-9;        // controls that no vertex sees have no length of their own
+constexpr double kLeastSignal = 3.0;  // root mean square amplitude over its deviation
+constexpr double kLeastShare = 0.02;  // of the strongest mode's amplitude
+constexpr int kHalfWindow = 2;        // frames on either side that a velocity is taken from
+constexpr double kRidge = 1e-9;       // controls that no vertex sees have no length of their own
 
 // G of the mean square displacement over the vertices, c^T G c.
 Eigen::MatrixXd meanSquare(const DeformationField::Weights& weights) {
@@ -28,7 +28,8 @@ Eigen::MatrixXd meanSquare(const DeformationField::Weights& weights) {
   return G;
 }
 
-Eigen::VectorXd vertexShape(const DeformationField::Weights& weights, const Eigen::VectorXd& controls) {
+Eigen::VectorXd vertexShape(const DeformationField::Weights& weights,
+                            const Eigen::VectorXd& controls) {
   const Eigen::Map<const DeformationField::Points> c(controls.data(), controls.size() / 3, 3);
   const DeformationField::Points shape = weights * c;
   return Eigen::Map<const Eigen::VectorXd>(shape.data(), shape.size());

@@ -15,7 +15,8 @@ constexpr double kLeastPhase = 0.5;       // rad over the object's size
 constexpr double kEnd = 0.05;             // of the extent along gravity: what counts as the end
 constexpr double kLeftShare = 0.15;       // of the tracks that must have moved
 constexpr int kLeastLeft = 6;
-constexpr double kLeftDeviations = 8.0;   // of a track, which scatters by about twice its own account
+constexpr double kLeftDeviations =
+    8.0;  // of a track, which scatters by about twice its own account
 
 SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& modes,
                       const SpectralLine& line, Eigen::VectorXcd& shape) {
@@ -77,9 +78,9 @@ DeformationMotion describeDeformation(const DeformableTracker& tracker,
 
   SpectrumParams params;
   params.noise = std::sqrt(modes.deviations.squaredNorm() / modes.deviations.size());
-  const Spectrum spectrum = findLines(
-      Eigen::Map<const Eigen::VectorXd>(motion.times.data(), motion.times.size()),
-      modes.amplitudes, params);
+  const Spectrum spectrum =
+      findLines(Eigen::Map<const Eigen::VectorXd>(motion.times.data(), motion.times.size()),
+                modes.amplitudes, params);
   for (const SpectralLine& line : spectrum.lines) {
     Eigen::VectorXcd shape;
     motion.lines.push_back(onSurface(tracker, modes, line, shape));
@@ -127,8 +128,8 @@ Observation rigidPart(const DeformableTracker& tracker, const DeformationObserva
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
   Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
-  moved.linear() = svd.matrixU() * Eigen::Vector3d(1.0, 1.0, sign).asDiagonal() *
-                   svd.matrixV().transpose();
+  moved.linear() =
+      svd.matrixU() * Eigen::Vector3d(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
   moved.translation() = mean_to.transpose() - moved.linear() * mean_from.transpose();
   rigid.world_from_object = tracker.model().world_from_object * moved;
 
@@ -140,9 +141,10 @@ Observation rigidPart(const DeformableTracker& tracker, const DeformationObserva
   for (int m = 0; m < mean.size(); ++m) {
     B.block<3, 3>(0, 3 * m) = mean[m] * tracker.model().world_from_object.linear();
   }
-  const Eigen::Matrix3d position = observation.covariance.size() == 0
-                                       ? Eigen::Matrix3d(1e-12 * Eigen::Matrix3d::Identity())
-                                       : Eigen::Matrix3d(B * observation.covariance * B.transpose());
+  const Eigen::Matrix3d position =
+      observation.covariance.size() == 0
+          ? Eigen::Matrix3d(1e-12 * Eigen::Matrix3d::Identity())
+          : Eigen::Matrix3d(B * observation.covariance * B.transpose());
   const double radius =
       std::sqrt((from.rowwise() - centroid.transpose()).rowwise().squaredNorm().mean());
   rigid.covariance.topLeftCorner<3, 3>() = position;

@@ -33,9 +33,12 @@ cv::Rect enlarged(const cv::Rect& region, const cv::Size& picture) {
 
 int disPreset(DenseFlow::Preset preset) {
   switch (preset) {
-    case DenseFlow::Preset::kUltrafast: return cv::DISOpticalFlow::PRESET_ULTRAFAST;
-    case DenseFlow::Preset::kFast: return cv::DISOpticalFlow::PRESET_FAST;
-    case DenseFlow::Preset::kMedium: return cv::DISOpticalFlow::PRESET_MEDIUM;
+    case DenseFlow::Preset::kUltrafast:
+      return cv::DISOpticalFlow::PRESET_ULTRAFAST;
+    case DenseFlow::Preset::kFast:
+      return cv::DISOpticalFlow::PRESET_FAST;
+    case DenseFlow::Preset::kMedium:
+      return cv::DISOpticalFlow::PRESET_MEDIUM;
   }
   throw std::invalid_argument("dense flow: unknown preset");
 }

@@ -28,8 +28,8 @@ void checkPicture(const cv::Mat& picture, const Camera& camera) {
   if (picture.cols != camera.width || picture.rows != camera.height) {
     throw std::invalid_argument("frame: the picture is " + std::to_string(picture.cols) + "x" +
                                 std::to_string(picture.rows) + " but its camera is " +
-                                std::to_string(camera.width) + "x" +
-                                std::to_string(camera.height) + "; give matching camera info");
+                                std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                                "; give matching camera info");
   }
 }
 

@@ -15,7 +15,8 @@ constexpr double kSpinShare = 0.1;
 constexpr double kNoiseScale = 2.0;
 // Squared surprise (6 degrees of freedom) that chance exceeds once in ten million frames.
 constexpr double kCollisionSurprise = 45.0;
-// Squared speed in deviations (6 degrees of freedom) below which an object counts as at rest: 99.9 %.
+// Squared speed in deviations (6 degrees of freedom) below which an object counts as at rest: 99.9
+// %.
 constexpr double kRestSurprise = 22.5;
 
 bool clearlyMoves(const MotionState& state) {
@@ -31,14 +32,13 @@ LiveAnalyser::LiveAnalyser(const Frame& key_frame, const std::vector<ObjectModel
                            const DynamicsParams& params)
     : params_(params), last_(key_frame) {
   if (models.size() != masks.size()) {
-    throw std::invalid_argument("live analyser: " + std::to_string(models.size()) +
-                                " models but " + std::to_string(masks.size()) +
+    throw std::invalid_argument("live analyser: " + std::to_string(models.size()) + " models but " +
+                                std::to_string(masks.size()) +
                                 " masks; give one mask (or an empty one) per model");
   }
   for (size_t i = 0; i < models.size(); ++i) {
     ObjectTracker tracker(models[i], key_frame, masks[i], params.tracker);
-    const auto measurement =
-        measurementsOf({tracker.keyObservation()}, tracker.centroid()).front();
+    const auto measurement = measurementsOf({tracker.keyObservation()}, tracker.centroid()).front();
     const Eigen::Vector3d p_camera =
         key_frame.camera.world_from_camera.inverse() * measurement.position;
     const MotionPrior prior = priorFor(key_frame.camera, p_camera.norm(), gravity);
@@ -74,9 +74,9 @@ NamedMotion LiveAnalyser::follow(const Frame& frame, bool cut, Followed& object)
       MotionPiece fresh = object.piece;
       fresh.cut = cut;
       const double between = 0.5 * (object.state.time + frame.time);
-      next = predicted(enterPiece(predicted(object.state, between, object.piece), fresh,
-                                  object.prior),
-                       frame.time, object.piece);
+      next =
+          predicted(enterPiece(predicted(object.state, between, object.piece), fresh, object.prior),
+                    frame.time, object.piece);
     }
     correct(next, measurement, kNoiseScale);
   }

@@ -60,25 +60,31 @@ std::optional<PatchMatch> LookMatch::findSurely(const Seed& seed, const PatchPar
   auto there = find(seed, params);
   // A patch that is uncertain in one direction may be certain in the other.
   const bool wanders = !there || there->deviation > trust.largest_deviation_px;
-  if (wanders && care_ != Care::kRough && !params.stripes) return findSurely(seed, stripePatches(params), trust);
+  if (wanders && care_ != Care::kRough && !params.stripes)
+    return findSurely(seed, stripePatches(params), trust);
   if (!there || there->correlation < trust.least_correlation) return std::nullopt;
   if (care_ == Care::kRough) return there;
-  // A patch counts when it is certain in one direction at least; the other is weighted by its own uncertainty.
+  // A patch counts when it is certain in one direction at least; the other is weighted by its own
+  // uncertainty.
   if (there->deviation > trust.largest_deviation_px) return std::nullopt;
   if (care_ == Care::kForward) return there;
   const auto miss = missOnReturn(seed.at, *there, params);
   if (!miss) return std::nullopt;
   const double floor = trust.forward_backward_px / kReturnDeviations;
   const Eigen::Matrix2d allowed = there->covariance + floor * floor * Eigen::Matrix2d::Identity();
-  if (miss->dot(allowed.inverse() * *miss) > kReturnDeviations * kReturnDeviations) return std::nullopt;
+  if (miss->dot(allowed.inverse() * *miss) > kReturnDeviations * kReturnDeviations)
+    return std::nullopt;
   return there;
 }
 
 LookMatch::Matches LookMatch::forEach(const std::vector<Seed>& seeds, const Search& search) {
   Matches matches(seeds.size());
-  cv::parallel_for_({0, static_cast<int>(seeds.size())}, [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) matches[i] = search(seeds[i]);
-  }, kStripes);
+  cv::parallel_for_(
+      {0, static_cast<int>(seeds.size())},
+      [&](const cv::Range& range) {
+        for (int i = range.start; i < range.end; ++i) matches[i] = search(seeds[i]);
+      },
+      kStripes);
   return matches;
 }
 

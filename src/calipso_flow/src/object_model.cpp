@@ -51,7 +51,8 @@ Eigen::Vector3d centroid(const TriangleMesh& mesh) {
     throw std::invalid_argument("object model: the mesh has no triangles; give a surface mesh");
   }
   if (!mesh.vertices.allFinite()) {
-    throw std::invalid_argument("object model: a vertex of the mesh is not finite; repair the mesh");
+    throw std::invalid_argument(
+        "object model: a vertex of the mesh is not finite; repair the mesh");
   }
   // Signed tetrahedra from a point near the surface: a far origin would cancel digits.
   const Eigen::Vector3d origin = surfaceCentre(mesh);

@@ -12,43 +12,53 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kRefinements = 2;          // warp, match both ways, fit
-constexpr double kSameLookShare = 0.025; // of a patch's radius: poses this close need no look of their own
-constexpr double kClearShare = 0.7;      // of the frame before's tracks: with so many no search is needed
-constexpr double kNearPx = 1.5;          // a prediction this close needs no half-size match
-constexpr double kSameShapePx = 1.0;     // looks that differ by this, but for where they are, serve for one another
-constexpr double kOtherView = 0.1;       // rad, or relative distance: looks from nearer show the same
-constexpr double kLeastInlierShare = 0.35;    // of the matches
-constexpr double kLeastVisibleShare = 0.25;   // of the seeds inside the picture
-constexpr double kFirstSearch = 0.2;     // of the picture's width, while no motion is known
-constexpr int kForgetAfter = 3;         // frames without the object before its motion is forgotten
-constexpr int kWeakInliers = 12;         // fewer tracks than this are worth another attempt
-constexpr double kStaysShare = 0.01;     // of the diagonal: what moves less has not moved
+constexpr int kRefinements = 2;  // warp, match both ways, fit
+constexpr double kSameLookShare =
+    0.025;  // of a patch's radius: poses this close need no look of their own
+constexpr double kClearShare =
+    0.7;                         // of the frame before's tracks: with so many no search is needed
+constexpr double kNearPx = 1.5;  // a prediction this close needs no half-size match
+constexpr double kSameShapePx =
+    1.0;  // looks that differ by this, but for where they are, serve for one another
+constexpr double kOtherView = 0.1;  // rad, or relative distance: looks from nearer show the same
+constexpr double kLeastInlierShare = 0.35;   // of the matches
+constexpr double kLeastVisibleShare = 0.25;  // of the seeds inside the picture
+constexpr double kFirstSearch = 0.2;         // of the picture's width, while no motion is known
+constexpr int kForgetAfter = 3;       // frames without the object before its motion is forgotten
+constexpr int kWeakInliers = 12;      // fewer tracks than this are worth another attempt
+constexpr double kStaysShare = 0.01;  // of the diagonal: what moves less has not moved
 constexpr double kPatchShare = 1.0 / 160.0;  // of the picture's width: a patch's radius
 constexpr int kLargestRadius = 9;            // px
-constexpr double kDrownedShare = 0.35;   // of the seeds in the picture: with fewer tracks noise or blur drowns small patches
-constexpr double kTurnedShare = 0.35;    // of the tracks due: with fewer the object may have turned
+constexpr double kDrownedShare =
+    0.35;  // of the seeds in the picture: with fewer tracks noise or blur drowns small patches
+constexpr double kTurnedShare = 0.35;  // of the tracks due: with fewer the object may have turned
 constexpr size_t kTurnsTried = 6;
-constexpr double kFarView = 0.5;         // rad, or relative distance: seen from farther a look is drawn out
-constexpr double kShapeError = 0.01;     // of the object's extent, of its outline seen from another side
-constexpr double kIndependent = 1.5;     // errors along an outline: they are off nearly as one
-constexpr double kKeySigma = 1e-4;       // of the diagonal: the key pose is given, not measured
+constexpr double kFarView =
+    0.5;  // rad, or relative distance: seen from farther a look is drawn out
+constexpr double kShapeError =
+    0.01;  // of the object's extent, of its outline seen from another side
+constexpr double kIndependent = 1.5;  // errors along an outline: they are off nearly as one
+constexpr double kKeySigma = 1e-4;    // of the diagonal: the key pose is given, not measured
 
-// Follows the reference's seeds into the frame, the object's look being warped to `look` and the object expected at `start`.
+// Follows the reference's seeds into the frame, the object's look being warped to `look` and the
+// object expected at `start`.
 std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& reference,
-                               const Camera& camera, const Eigen::Isometry3d& look, const Eigen::Isometry3d& start,
-                               const TrackerParams& params, std::vector<Correspondence>& found) {
+                               const Camera& camera, const Eigen::Isometry3d& look,
+                               const Eigen::Isometry3d& start, const TrackerParams& params,
+                               std::vector<Correspondence>& found) {
   const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
   std::vector<Eigen::Vector3d> points;
   std::vector<LookMatch::Seed> pixels;
   for (const Eigen::Vector3d& seed : reference.seeds()) {
-    const Eigen::Vector3d in_look = camera_from_world * (look * seed), expected = camera_from_world * (start * seed);
+    const Eigen::Vector3d in_look = camera_from_world * (look * seed),
+                          expected = camera_from_world * (start * seed);
     if (in_look.z() <= 0.0 || expected.z() <= 0.0) continue;
     points.push_back(seed);
     pixels.push_back({camera.project(in_look), camera.project(expected)});
   }
-  const LookMatch::Matches matches = LookMatch::forEach(
-      pixels, [&](const LookMatch::Seed& seed) { return match.findSurely(seed, params.patch, params.trust); });
+  const LookMatch::Matches matches = LookMatch::forEach(pixels, [&](const LookMatch::Seed& seed) {
+    return match.findSurely(seed, params.patch, params.trust);
+  });
   std::vector<Track> tracks;
   for (size_t i = 0; i < points.size(); ++i) {
     const auto& there = matches[i];
@@ -65,13 +75,14 @@ struct ImageMotion {
   double bend = 0.0;     // largest deviation of a point from their mean
 };
 
-ImageMotion imageMotion(const Camera& camera, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
-                        const std::vector<Eigen::Vector3d>& points) {
+ImageMotion imageMotion(const Camera& camera, const Eigen::Isometry3d& a,
+                        const Eigen::Isometry3d& b, const std::vector<Eigen::Vector3d>& points) {
   const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
   std::vector<Eigen::Vector2d> motions;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (const Eigen::Vector3d& point : points) {
-    const Eigen::Vector3d pa = camera_from_world * (a * point), pb = camera_from_world * (b * point);
+    const Eigen::Vector3d pa = camera_from_world * (a * point),
+                          pb = camera_from_world * (b * point);
     if (pa.z() <= 0.0 || pb.z() <= 0.0) continue;
     motions.push_back(camera.project(pb) - camera.project(pa));
     sum += motions.back();
@@ -84,11 +95,13 @@ ImageMotion imageMotion(const Camera& camera, const Eigen::Isometry3d& a, const 
   return motion;
 }
 
-// How differently a reference and a frame show an object: by the turn against the camera, rad, and by the distance, relative.
+// How differently a reference and a frame show an object: by the turn against the camera, rad, and
+// by the distance, relative.
 double viewChange(const ReferenceView& reference, const Frame& frame, const Eigen::Isometry3d& pose,
                   const Eigen::Vector3d& centroid) {
   const Eigen::Isometry3d now = frame.camera.world_from_camera.inverse() * pose;
-  const Eigen::Isometry3d then = reference.frame().camera.world_from_camera.inverse() * reference.worldFromObject();
+  const Eigen::Isometry3d then =
+      reference.frame().camera.world_from_camera.inverse() * reference.worldFromObject();
   const double turn = vectorFromRotation(now.linear() * then.linear().transpose()).norm();
   return std::hypot(turn, std::log((now * centroid).norm() / (then * centroid).norm()));
 }
@@ -115,13 +128,18 @@ int Observation::inliers() const {
 
 ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, const cv::Mat& mask,
                              const TrackerParams& params)
-    : model_(model), edges_(edgesOf(model.mesh)), params_(params), centroid_(flow::centroid(model.mesh)) {
+    : model_(model),
+      edges_(edgesOf(model.mesh)),
+      params_(params),
+      centroid_(flow::centroid(model.mesh)) {
   // What a larger picture shows larger is not seen sharper by as much.
   const int scaled = static_cast<int>(std::lround(kPatchShare * key_frame.camera.width));
   params_.patch.radius_px = std::max(params_.patch.radius_px, std::min(scaled, kLargestRadius));
   wide_ = params_;
   wide_.patch.radius_px = std::max(params_.patch.radius_px, kLargestRadius);
-  references_.push_back({ReferenceView(key_frame, model_, model.world_from_object, mask, params.seed_count), Matrix6d::Zero()});
+  references_.push_back(
+      {ReferenceView(key_frame, model_, model.world_from_object, mask, params.seed_count),
+       Matrix6d::Zero()});
   const double sigma = kKeySigma * boundingDiagonal(model.mesh);
   key_.time = key_frame.time;
   key_.found = true;
@@ -134,7 +152,8 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
   }
   outline_bias_ = OutlineBias(
       findOutline(edges_, model.mesh, model.mesh.vertices,
-                  references_.front().view.warp(key_frame.camera, model.world_from_object), key_frame, model.world_from_object));
+                  references_.front().view.warp(key_frame.camera, model.world_from_object),
+                  key_frame, model.world_from_object));
   last_ = key_;
   last_seen_time_ = key_.time;
   due_inliers_ = static_cast<int>(key_.tracks.size());
@@ -151,31 +170,36 @@ Eigen::Isometry3d ObjectTracker::predict(double time) const {
   return movePose(to, centroid_, share * motion);
 }
 
-// The look of an object at rest serves for many frames; where it need not be exact, so does one that is shifted.
+// The look of an object at rest serves for many frames; where it need not be exact, so does one
+// that is shifted.
 const ObjectTracker::Look& ObjectTracker::lookAt(const Frame& frame, const ReferenceView& reference,
                                                  const Eigen::Isometry3d& pose, Care care) {
-  const bool shifted = care == Care::kForward && look_.reference == &reference &&
-                       imageMotion(frame.camera, look_.pose, pose, reference.seeds()).bend < kSameShapePx;
+  const bool shifted =
+      care == Care::kForward && look_.reference == &reference &&
+      imageMotion(frame.camera, look_.pose, pose, reference.seeds()).bend < kSameShapePx;
   if (!shifted && !isLookOf(frame, reference, pose)) {
     look_ = {&reference, frame.camera.world_from_camera, pose, reference.warp(frame.camera, pose)};
   }
   return look_;
 }
 
-bool ObjectTracker::isLookOf(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose) const {
-  return look_.reference == &reference && look_.world_from_camera.isApprox(frame.camera.world_from_camera, 0.0) &&
+bool ObjectTracker::isLookOf(const Frame& frame, const ReferenceView& reference,
+                             const Eigen::Isometry3d& pose) const {
+  return look_.reference == &reference &&
+         look_.world_from_camera.isApprox(frame.camera.world_from_camera, 0.0) &&
          imageMotion(frame.camera, look_.pose, pose, reference.seeds()).largest <
              kSameLookShare * params_.patch.radius_px;
 }
 
 // The object may have stopped, or turned round: look as far as twice back to where it was.
-Eigen::AlignedBox2d ObjectTracker::reachFrom(const Frame& frame, const Eigen::Isometry3d& predicted) const {
+Eigen::AlignedBox2d ObjectTracker::reachFrom(const Frame& frame,
+                                             const Eigen::Isometry3d& predicted) const {
   const Eigen::Vector2d home = frame.camera.projectWorld(predicted * centroid_);
   const Eigen::Vector2d before = frame.camera.projectWorld(last_->world_from_object * centroid_);
   // Without a motion to go by, it may be anywhere near.
   const bool known = before_last_ && frames_lost_ < kForgetAfter;
-  const double search = known ? params_.search_px
-                              : std::max(params_.search_px, kFirstSearch * frame.camera.width);
+  const double search =
+      known ? params_.search_px : std::max(params_.search_px, kFirstSearch * frame.camera.width);
   const Eigen::Vector2d margin(search, search);
   Eigen::AlignedBox2d reach(-margin, margin);
   const Eigen::Vector2d back = 1.5 * (before - home);
@@ -194,20 +218,25 @@ Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const Refere
 Observation ObjectTracker::refine(const Frame& frame, const Reference& reference,
                                   const Eigen::Isometry3d& start, const TrackerParams& params) {
   const bool near =
-      imageMotion(frame.camera, last_->world_from_object, start, reference.view.seeds()).largest < kNearPx;
+      imageMotion(frame.camera, last_->world_from_object, start, reference.view.seeds()).largest <
+      kNearPx;
   Observation observation;
   observation.time = frame.time;
   observation.world_from_object = start;
   if (!near) {
-    observation.world_from_object = refineOnce(frame, reference.view, Care::kRough, params, observation);
-    observation.world_from_object = refineOnce(frame, reference.view, Care::kForward, params, observation);
+    observation.world_from_object =
+        refineOnce(frame, reference.view, Care::kRough, params, observation);
+    observation.world_from_object =
+        refineOnce(frame, reference.view, Care::kForward, params, observation);
   }
   for (int round = 0; round < kRefinements; ++round) {
-    observation.world_from_object = refineOnce(frame, reference.view, Care::kChecked, params, observation);
+    observation.world_from_object =
+        refineOnce(frame, reference.view, Care::kChecked, params, observation);
     // The same look again would give the same pose.
     if (!observation.found || isLookOf(frame, reference.view, observation.world_from_object)) break;
   }
-  // The reference's own error is all of its frames': too far away there, the object is taken for too far away here.
+  // The reference's own error is all of its frames': too far away there, the object is taken for
+  // too far away here.
   observation.covariance += reference.covariance;
   return observation;
 }
@@ -223,8 +252,8 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   observation.coverage = seen.warped.coverage;
   if (seen.warped.coverage == 0.0) return pose;
   std::vector<Correspondence> found;
-  observation.tracks = followSeeds(LookMatch(seen.warped, frame.gray, care), reference, frame.camera,
-                                   seen.pose, pose, params, found);
+  observation.tracks = followSeeds(LookMatch(seen.warped, frame.gray, care), reference,
+                                   frame.camera, seen.pose, pose, params, found);
   const size_t tracks = found.size();
   if (care != Care::kRough) addOutline(frame, seen, found);
   const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params.pose);
@@ -240,9 +269,11 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   return fit.world_from_object;
 }
 
-void ObjectTracker::addOutline(const Frame& frame, const Look& seen, std::vector<Correspondence>& found) const {
+void ObjectTracker::addOutline(const Frame& frame, const Look& seen,
+                               std::vector<Correspondence>& found) const {
   const Eigen::Isometry3d camera_from_object = frame.camera.world_from_camera.inverse() * seen.pose;
-  const double extent_px = frame.camera.fx * boundingDiagonal(model_.mesh) / (camera_from_object * centroid_).z();
+  const double extent_px =
+      frame.camera.fx * boundingDiagonal(model_.mesh) / (camera_from_object * centroid_).z();
   // The shape was fitted to the key frame's outline; from other sides it is less certain.
   const double turned = viewChange(references_.front().view, frame, seen.pose, centroid_);
   const double shape_px = kShapeError * extent_px * std::min(1.0, turned);
@@ -257,10 +288,13 @@ void ObjectTracker::addOutline(const Frame& frame, const Look& seen, std::vector
   }
 }
 
-ObjectTracker::Reference& ObjectTracker::nearestReference(const Frame& frame, const Eigen::Isometry3d& pose) {
-  return *std::min_element(references_.begin(), references_.end(), [&](const Reference& a, const Reference& b) {
-    return viewChange(a.view, frame, pose, centroid_) < viewChange(b.view, frame, pose, centroid_);
-  });
+ObjectTracker::Reference& ObjectTracker::nearestReference(const Frame& frame,
+                                                          const Eigen::Isometry3d& pose) {
+  return *std::min_element(references_.begin(), references_.end(),
+                           [&](const Reference& a, const Reference& b) {
+                             return viewChange(a.view, frame, pose, centroid_) <
+                                    viewChange(b.view, frame, pose, centroid_);
+                           });
 }
 
 Observation ObjectTracker::track(const Frame& frame, bool cut) {
@@ -282,12 +316,14 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
   return best;
 }
 
-// The motion may have changed, the look, or the picture: tries every other way to recognise the object.
+// The motion may have changed, the look, or the picture: tries every other way to recognise the
+// object.
 Observation ObjectTracker::tryOtherwise(const Frame& frame, const Reference& nearest,
                                         const Eigen::Isometry3d& predicted, Observation best) {
   if (best.inliers() < kWeakInliers) {
     for (const Reference& reference : references_) {
-      Observation other = attempt(frame, reference, last_->world_from_object, drowned_ ? wide_ : params_);
+      Observation other =
+          attempt(frame, reference, last_->world_from_object, drowned_ ? wide_ : params_);
       if (other.inliers() > best.inliers()) best = std::move(other);
     }
   }
@@ -299,8 +335,9 @@ Observation ObjectTracker::tryOtherwise(const Frame& frame, const Reference& nea
     }
   }
   if (best.inliers() < kTurnedShare * due_inliers_ && frames_lost_ < kForgetAfter && !stays(best)) {
-    for (const Eigen::Isometry3d& turned : searchTurned(
-             nearest.view, frame, {predicted, centroid_, reachFrom(frame, predicted)}, kTurnsTried)) {
+    for (const Eigen::Isometry3d& turned :
+         searchTurned(nearest.view, frame, {predicted, centroid_, reachFrom(frame, predicted)},
+                      kTurnsTried)) {
       Observation other = refine(frame, nearest, turned, drowned_ ? wide_ : params_);
       if (other.inliers() > best.inliers()) best = std::move(other);
     }
@@ -311,7 +348,8 @@ Observation ObjectTracker::tryOtherwise(const Frame& frame, const Reference& nea
 
 // What is found where it was expected needs no search.
 Observation ObjectTracker::attempt(const Frame& frame, const Reference& reference,
-                                   const Eigen::Isometry3d& predicted, const TrackerParams& params) {
+                                   const Eigen::Isometry3d& predicted,
+                                   const TrackerParams& params) {
   if (frames_lost_ == 0 && before_last_) {
     Observation expected = refine(frame, reference, predicted, params);
     if (isClear(expected)) return expected;
@@ -326,8 +364,9 @@ bool ObjectTracker::isClear(const Observation& observation) const {
 }
 
 bool ObjectTracker::stays(const Observation& observation) const {
-  return observation.found && (observation.world_from_object * centroid_ - last_->world_from_object * centroid_).norm() <
-                                  kStaysShare * boundingDiagonal(model_.mesh);
+  return observation.found &&
+         (observation.world_from_object * centroid_ - last_->world_from_object * centroid_).norm() <
+             kStaysShare * boundingDiagonal(model_.mesh);
 }
 
 void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
@@ -336,7 +375,8 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   due_inliers_ = std::max(due_inliers_, observation.inliers());
   Reference& nearest = nearestReference(frame, observation.world_from_object);
   nearest.most_inliers = std::max(nearest.most_inliers, observation.inliers());
-  // A reference that shows the object from the same side would have the same tracks, and this pose's errors.
+  // A reference that shows the object from the same side would have the same tracks, and this
+  // pose's errors.
   const double change = viewChange(nearest.view, frame, observation.world_from_object, centroid_);
   if (change < kOtherView) return;
   const bool worn = observation.inliers() < params_.least_inliers * nearest.most_inliers;
@@ -344,10 +384,11 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   if (static_cast<int>(references_.size()) >= params_.max_references) {
     references_.erase(references_.begin() + 1);  // the key frame stays
   }
-  references_.push_back({ReferenceView(frame, model_, observation.world_from_object, cv::Mat(), params_.seed_count),
-                         observation.covariance});
+  references_.push_back(
+      {ReferenceView(frame, model_, observation.world_from_object, cv::Mat(), params_.seed_count),
+       observation.covariance});
   due_inliers_ = static_cast<int>(references_.back().view.seeds().size());
-  look_ = {};        // the references may have moved
+  look_ = {};  // the references may have moved
 }
 
 }  // namespace calipso::flow

@@ -9,19 +9,19 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kReach = 7;              // px on either side of the outline that are looked at
-constexpr int kOuter = 3;              // outermost of these show one side only
-constexpr double kStep = 0.5;          // px between samples across the outline
-constexpr int kHalfLength = 3;         // px along the outline that are averaged
-constexpr double kSpacing = 8.0;       // px between points of the outline
+constexpr int kReach = 7;                // px on either side of the outline that are looked at
+constexpr int kOuter = 3;                // outermost of these show one side only
+constexpr double kStep = 0.5;            // px between samples across the outline
+constexpr int kHalfLength = 3;           // px along the outline that are averaged
+constexpr double kSpacing = 8.0;         // px between points of the outline
 constexpr double kLeastContrast = 12.0;  // grey levels between the two sides
-constexpr double kAlongPx = 1e3;      // deviation along the outline: nothing is known
+constexpr double kAlongPx = 1e3;         // deviation along the outline: nothing is known
 constexpr int kBiasRounds = 5;
-constexpr double kUsualBias = 0.3;     // px
-constexpr double kInside = 3.0;        // px within the outline that the object's look is taken from
+constexpr double kUsualBias = 0.3;  // px
+constexpr double kInside = 3.0;     // px within the outline that the object's look is taken from
 
 struct OutlinePoint {
-  Eigen::Vector3d rest;     // object frame
+  Eigen::Vector3d rest;  // object frame
   Eigen::Vector2d pixel;
   Eigen::Vector2d outward;  // unit, in the picture
 };
@@ -32,7 +32,8 @@ bool bilinear(const cv::Mat& image, const Eigen::Vector2d& at, double& value) {
   const double fx = at.x() - x, fy = at.y() - y;
   const float* top = image.ptr<float>(y) + x;
   const float* bottom = image.ptr<float>(y + 1) + x;
-  value = (1 - fy) * ((1 - fx) * top[0] + fx * top[1]) + fy * ((1 - fx) * bottom[0] + fx * bottom[1]);
+  value =
+      (1 - fy) * ((1 - fx) * top[0] + fx * top[1]) + fy * ((1 - fx) * bottom[0] + fx * bottom[1]);
   return true;
 }
 
@@ -101,13 +102,13 @@ std::vector<OutlinePoint> outlinePoints(const std::vector<SurfaceEdge>& edges,
     const auto outward = outwardOf(look, at, edge.normalized());
     if (!outward) continue;
     cell = true;
-    points.push_back(
-        {0.5 * (mesh.vertex(i) + mesh.vertex(j)), at, *outward});
+    points.push_back({0.5 * (mesh.vertex(i) + mesh.vertex(j)), at, *outward});
   }
   return points;
 }
 
-// Means over a short stretch along the outline, from inside to outside; false at the picture's edge.
+// Means over a short stretch along the outline, from inside to outside; false at the picture's
+// edge.
 bool profile(const cv::Mat& gray, const OutlinePoint& point, std::vector<double>& values) {
   const Eigen::Vector2d along(-point.outward.y(), point.outward.x());
   values.clear();
@@ -162,25 +163,30 @@ std::vector<SurfaceEdge> edgesOf(const TriangleMesh& mesh) {
   std::vector<SurfaceEdge> edges;
   for (const auto& [edge, triangles] : beside) {
     if (triangles.size() > 2) continue;
-    edges.push_back({edge.first, edge.second, triangles[0],
-                     triangles.size() == 2 ? triangles[1] : -1});
+    edges.push_back(
+        {edge.first, edge.second, triangles[0], triangles.size() == 2 ? triangles[1] : -1});
   }
   return edges;
 }
 
 SurfaceMatch OutlineStep::match(double expected) const {
   const Eigen::Vector2d along(-outward.y(), outward.x());
-  return {rest, pixel + (distance - expected) * outward,
-          variance * outward * outward.transpose() + kAlongPx * kAlongPx * along * along.transpose()};
+  return {
+      rest, pixel + (distance - expected) * outward,
+      variance * outward * outward.transpose() + kAlongPx * kAlongPx * along * along.transpose()};
 }
 
-std::vector<OutlineStep> findOutline(const std::vector<SurfaceEdge>& edges, const TriangleMesh& mesh,
-                                     const decltype(TriangleMesh::vertices)& deformed, const ReferenceView::Warped& look,
-                                     const Frame& frame, const Eigen::Isometry3d& world_from_object) {
-  const Eigen::Isometry3d camera_from_object = frame.camera.world_from_camera.inverse() * world_from_object;
+std::vector<OutlineStep> findOutline(const std::vector<SurfaceEdge>& edges,
+                                     const TriangleMesh& mesh,
+                                     const decltype(TriangleMesh::vertices)& deformed,
+                                     const ReferenceView::Warped& look, const Frame& frame,
+                                     const Eigen::Isometry3d& world_from_object) {
+  const Eigen::Isometry3d camera_from_object =
+      frame.camera.world_from_camera.inverse() * world_from_object;
   std::vector<OutlineStep> steps;
   std::vector<double> values;
-  for (const OutlinePoint& point : outlinePoints(edges, mesh, deformed, look, frame.camera, camera_from_object)) {
+  for (const OutlinePoint& point :
+       outlinePoints(edges, mesh, deformed, look, frame.camera, camera_from_object)) {
     if (!profile(frame.gray, point, values)) continue;
     const auto step = locateStep(values);
     if (step) steps.push_back({point.rest, point.pixel, point.outward, step->first, step->second});

@@ -72,8 +72,8 @@ void multiplyTerms(const PatchTerms& terms, int count, float sums[kTerms][kTerms
     oo += o[p], orx += rx[p], ory += ry[p];
     rr += rx[p] * rx[p], rs += rx[p] * ry[p], ss += ry[p] * ry[p];
   }
-  const float upper[kTerms][kTerms] = {{xx, xy, xv, xo, xr, xs}, {xy, yy, yv, yo, yr, ys},
-                                       {xv, yv, vv, vo, vr, vs}, {xo, yo, vo, oo, orx, ory},
+  const float upper[kTerms][kTerms] = {{xx, xy, xv, xo, xr, xs},  {xy, yy, yv, yo, yr, ys},
+                                       {xv, yv, vv, vo, vr, vs},  {xo, yo, vo, oo, orx, ory},
                                        {xr, yr, vr, orx, rr, rs}, {xs, ys, vs, ory, rs, ss}};
   std::copy(&upper[0][0], &upper[0][0] + kTerms * kTerms, &sums[0][0]);
 }

@@ -4,8 +4,9 @@
 
 namespace calipso::flow {
 
-// The sums over a patch's pixels on which Lucas-Kanade spends its time. Fixed order, so that the same
-// pixels give the same bits; compiled for the processor's vector width besides the portable one.
+// The sums over a patch's pixels on which Lucas-Kanade spends its time. Fixed order, so that the
+// same pixels give the same bits; compiled for the processor's vector width besides the portable
+// one.
 
 constexpr int kPatchSide = 2 * kMostRadius + 1;
 // Floats of one term, a whole number of vectors.
@@ -24,7 +25,8 @@ struct PatchTerms {
 void sampleRows(const float* picture, long row, float fx, float fy, int side, float* out);
 
 // Fills the terms from grey values and weights of a square with one more ring than the patch, for
-// central differences; a pixel counts when it and its four neighbours do. @param count  padded pixels
+// central differences; a pixel counts when it and its four neighbours do. @param count  padded
+// pixels
 // @return the pixels that count, and the sum of their grey values
 struct PatchFill {
   float support, sum;

@@ -55,8 +55,8 @@ bool sampleSquare(const ImageWindow& window, const Eigen::Vector2d& at, int radi
   return true;
 }
 
-// Gradient energy in the picture's directions that is left after gain, offset and ramp are taken out.
-// Nothing when the patch is flat.
+// Gradient energy in the picture's directions that is left after gain, offset and ramp are taken
+// out. Nothing when the patch is flat.
 std::optional<Eigen::Matrix2d> gradientEnergy(const TermsMatrix& inverse) {
   const Eigen::Matrix2d covariance = inverse.topLeftCorner<2, 2>();
   if (!covariance.allFinite() || covariance.determinant() <= 0.0) return std::nullopt;
@@ -133,14 +133,15 @@ PatchMatch makeMatch(const PatchModel& model, const Regression& fit,
   PatchMatch match;
   match.position = position;
   match.covariance = model.inverse.topLeftCorner<2, 2>() * noise / (gain * gain);
-  match.deviation = std::sqrt(model.striped ? match.covariance(0, 0) : 0.5 * match.covariance.trace());
+  match.deviation =
+      std::sqrt(model.striped ? match.covariance(0, 0) : 0.5 * match.covariance.trace());
   if (model.striped) {
     const Eigen::Vector2d along(-model.across.y(), model.across.x());
     match.covariance = match.covariance(0, 0) * model.across * model.across.transpose() +
                        kAlongPx * kAlongPx * along * along.transpose();
   }
-  match.correlation = std::sqrt(
-      std::max(0.0, 1.0 - fit.squared_residual / std::max(1e-9, fit.squared_signal)));
+  match.correlation =
+      std::sqrt(std::max(0.0, 1.0 - fit.squared_residual / std::max(1e-9, fit.squared_signal)));
   return match;
 }
 
@@ -149,8 +150,8 @@ PatchMatch makeMatch(const PatchModel& model, const Regression& fit,
 std::optional<PatchMatch> matchPatch(const PatchSource& source, const ImageWindow& target,
                                      const Eigen::Vector2d& start, const PatchParams& params) {
   if (params.radius_px < 1 || params.radius_px > kMostRadius) {
-    throw std::invalid_argument("patch radius is " + std::to_string(params.radius_px) + " px; give 1 to " +
-                                std::to_string(kMostRadius));
+    throw std::invalid_argument("patch radius is " + std::to_string(params.radius_px) +
+                                " px; give 1 to " + std::to_string(kMostRadius));
   }
   PatchModel model;
   if (!buildModel(source, params, model)) return std::nullopt;

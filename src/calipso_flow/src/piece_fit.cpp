@@ -97,9 +97,9 @@ double chooseNoiseScale(const std::vector<PoseMeasurement>& measurements,
   const auto score = [&](double log_scale) {
     return logLikelihood(measurements, pieces, prior, std::exp(log_scale));
   };
-  const double now = std::log(start), least = std::log(kLeastNoiseScale), most = std::log(kMostNoiseScale);
-  const Maximum best =
-      maximise(score, std::max(least, now - 1.5), std::min(most, now + 1.5), 1.5);
+  const double now = std::log(start), least = std::log(kLeastNoiseScale),
+               most = std::log(kMostNoiseScale);
+  const Maximum best = maximise(score, std::max(least, now - 1.5), std::min(most, now + 1.5), 1.5);
   return std::exp(best.at);
 }
 
@@ -129,8 +129,7 @@ double noiseScaleBetweenJumps(const std::vector<PoseMeasurement>& measurements) 
   return std::clamp(std::sqrt(*quartile / kQuartile), 1.0, kMostNoiseScale);
 }
 
-Maximum maximise(const std::function<double(double)>& score, double low, double high,
-                 double step) {
+Maximum maximise(const std::function<double(double)>& score, double low, double high, double step) {
   Maximum best{0.5 * (low + high), -std::numeric_limits<double>::infinity()};
   if (!(high > low)) return {best.at, score(best.at)};
   const double grid = 0.1 * step;

@@ -17,8 +17,9 @@ double chooseNoiseScale(const std::vector<PoseMeasurement>& measurements,
                         const std::vector<MotionPiece>& pieces, const MotionPrior& prior,
                         double start);
 
-// The factor by what a constant acceleration leaves of four successive positions, at the lower quartile: that of
-// frames between which nothing happens. Not below 1, and 1 when there are too few to tell.
+// The factor by what a constant acceleration leaves of four successive positions, at the lower
+// quartile: that of frames between which nothing happens. Not below 1, and 1 when there are too few
+// to tell.
 double noiseScaleBetweenJumps(const std::vector<PoseMeasurement>& measurements);
 
 struct Maximum {

@@ -9,10 +9,11 @@ namespace {
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kInstants[] = {0.125, 0.375, 0.625, 0.875};  // of a frame
-constexpr int kLeastFrames = 2;      // in a piece: fewer tell nothing about its velocity
-constexpr double kHopeless = 60.0;   // log odds by which a path lies behind that never catches up
+constexpr int kLeastFrames = 2;     // in a piece: fewer tell nothing about its velocity
+constexpr double kHopeless = 60.0;  // log odds by which a path lies behind that never catches up
 
-// The kinds that are told apart here; a finer choice comes after. Shares are of the prior's deviations.
+// The kinds that are told apart here; a finer choice comes after. Shares are of the prior's
+// deviations.
 std::vector<MotionPiece> plainKinds(const MotionPrior& prior) {
   const auto kind = [&](Travel travel, Turning turning, double jerk_share, double spin_share) {
     MotionPiece piece;
@@ -45,8 +46,13 @@ class PathSearch {
  public:
   PathSearch(const std::vector<PoseMeasurement>& measurements, const std::vector<double>& cut_times,
              const MotionPrior& prior, double noise_scale, double least_evidence)
-      : measurements_(measurements), cut_times_(cut_times), prior_(prior), noise_scale_(noise_scale),
-        least_evidence_(least_evidence), kinds_(plainKinds(prior)), stages_(measurements.size()) {}
+      : measurements_(measurements),
+        cut_times_(cut_times),
+        prior_(prior),
+        noise_scale_(noise_scale),
+        least_evidence_(least_evidence),
+        kinds_(plainKinds(prior)),
+        stages_(measurements.size()) {}
 
   std::vector<MotionPiece> run() {
     const double begin = measurements_.front().time;
@@ -78,8 +84,10 @@ class PathSearch {
     const double from = measurements_[s].time, span = measurements_[s + 1].time - from;
     std::vector<double> instants;
     const std::optional<double> cut = cutAfter(s);
-    if (cut) instants = {*cut};
-    else for (const double share : kInstants) instants.push_back(from + share * span);
+    if (cut)
+      instants = {*cut};
+    else
+      for (const double share : kInstants) instants.push_back(from + share * span);
     for (const double time : instants) {
       const MotionState arrived = predicted(stages_[s].state, time, stages_[s].piece);
       for (MotionPiece piece : kinds_) {
@@ -124,8 +132,9 @@ class PathSearch {
 }  // namespace
 
 std::vector<MotionPiece> likeliestPieces(const std::vector<PoseMeasurement>& measurements,
-                                         const std::vector<double>& cut_times, const MotionPrior& prior,
-                                         double noise_scale, double least_evidence) {
+                                         const std::vector<double>& cut_times,
+                                         const MotionPrior& prior, double noise_scale,
+                                         double least_evidence) {
   return PathSearch(measurements, cut_times, prior, noise_scale, least_evidence).run();
 }
 

@@ -12,16 +12,17 @@
 namespace calipso::flow {
 namespace {
 
-constexpr double kShapeLength = 2.5;     // see ShapeError
-constexpr double kShapeReach = 4.0;      // of 2 l^2: farther apart tracks do not err together
-constexpr double kShapeAbsorbed = 2.0;    // 12 / (12 - 6): a pose takes up six of the errors of six such patches
+constexpr double kShapeLength = 2.5;  // see ShapeError
+constexpr double kShapeReach = 4.0;   // of 2 l^2: farther apart tracks do not err together
+constexpr double kShapeAbsorbed =
+    2.0;  // 12 / (12 - 6): a pose takes up six of the errors of six such patches
 constexpr double kRobust = 3.0;  // deviations: residuals beyond count less and less
 
 // Residuals and their derivatives by the motion of movePose(), for one pose.
 struct Linearisation {
-  std::vector<Eigen::Vector2d> residual;            // px
+  std::vector<Eigen::Vector2d> residual;  // px
   std::vector<Eigen::Matrix<double, 2, 6>> jacobian;
-  std::vector<Eigen::Matrix2d> information;         // 1/px^2
+  std::vector<Eigen::Matrix2d> information;  // 1/px^2
   std::vector<bool> outline;
 };
 
@@ -64,8 +65,9 @@ std::vector<double> lengths(const Linearisation& lin) {
   return result;
 }
 
-// Robust deviations of the residuals over their own, points and outline apart: a picture that is compressed, noisy or
-// blurred spoils the texture by more than matches say of themselves, and the outline less.
+// Robust deviations of the residuals over their own, points and outline apart: a picture that is
+// compressed, noisy or blurred spoils the texture by more than matches say of themselves, and the
+// outline less.
 struct Deviations {
   double points = 0.0, outline = 0.0;
   double of(bool on_outline) const { return std::max(1.0, on_outline ? outline : points); }
@@ -74,7 +76,8 @@ struct Deviations {
 // The median of a standard normal's length is 1.1774 in two dimensions, 0.6745 in one.
 Deviations robustDeviations(const Linearisation& lin, const std::vector<double>& lengths) {
   std::vector<double> points, outline;
-  for (size_t i = 0; i < lengths.size(); ++i) (lin.outline[i] ? outline : points).push_back(lengths[i]);
+  for (size_t i = 0; i < lengths.size(); ++i)
+    (lin.outline[i] ? outline : points).push_back(lengths[i]);
   return {median(points) / 1.1774, median(outline) / 0.6745};
 }
 
@@ -84,14 +87,15 @@ struct NormalEquations {
 };
 
 // Geman-McClure: weight (s^2 / (s^2 + r^2))^2 with r in the deviations found.
-NormalEquations weightedNormal(const Linearisation& lin, const std::vector<double>& lengths, const Deviations& found,
-                               double scale) {
+NormalEquations weightedNormal(const Linearisation& lin, const std::vector<double>& lengths,
+                               const Deviations& found, double scale) {
   NormalEquations normal;
   for (size_t i = 0; i < lin.residual.size(); ++i) {
     const double deviation = found.of(lin.outline[i]), length = lengths[i] / deviation;
     const double ratio = scale * scale / (scale * scale + length * length);
     const double weight = ratio * ratio / (deviation * deviation);
-    const Eigen::Matrix<double, 6, 2> weighted = weight * lin.jacobian[i].transpose() * lin.information[i];
+    const Eigen::Matrix<double, 6, 2> weighted =
+        weight * lin.jacobian[i].transpose() * lin.information[i];
     normal.matrix += weighted * lin.jacobian[i];
     normal.right -= weighted * lin.residual[i];
   }
@@ -105,7 +109,8 @@ Vector6d solveStep(const NormalEquations& normal) {
   return damped.ldlt().solve(normal.right);
 }
 
-// A fit's inliers that are not of the outline, as least squares has them: residuals and Jacobians in units of their deviations.
+// A fit's inliers that are not of the outline, as least squares has them: residuals and Jacobians
+// in units of their deviations.
 struct Whitened {
   std::vector<Eigen::Vector2d> pixel, residual;
   std::vector<Eigen::Matrix<double, 2, 6>> jacobian;
@@ -116,7 +121,8 @@ Whitened whitened(const std::vector<Correspondence>& correspondences, const Line
   Whitened result;
   for (size_t i = 0; i < inlier.size(); ++i) {
     if (!inlier[i] || lin.outline[i]) continue;
-    const Eigen::Matrix2d root = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(lin.information[i]).operatorSqrt();
+    const Eigen::Matrix2d root =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(lin.information[i]).operatorSqrt();
     result.pixel.push_back(correspondences[i].pixel);
     result.residual.push_back(root * lin.residual[i]);
     result.jacobian.push_back(root * lin.jacobian[i]);
@@ -124,11 +130,12 @@ Whitened whitened(const std::vector<Correspondence>& correspondences, const Line
   return result;
 }
 
-// A model whose shape is not the true one puts neighbouring tracks off together, and such errors do not average out.
-// Covariance between tracks  c exp(-d^2 / 2 l^2), l the kShapeLength-th part of their spread; c from nearest neighbours.
+// A model whose shape is not the true one puts neighbouring tracks off together, and such errors do
+// not average out. Covariance between tracks  c exp(-d^2 / 2 l^2), l the kShapeLength-th part of
+// their spread; c from nearest neighbours.
 struct ShapeError {
-  double variance = 0.0;                     // c, per component, of the whitened residuals
-  Matrix6d gradient = Matrix6d::Zero();      // sum_ij c k_ij A_i^T A_j: covariance of sum_i A_i^T r_i
+  double variance = 0.0;                 // c, per component, of the whitened residuals
+  Matrix6d gradient = Matrix6d::Zero();  // sum_ij c k_ij A_i^T A_j: covariance of sum_i A_i^T r_i
 };
 
 ShapeError shapeError(const Whitened& tracks) {
@@ -147,11 +154,13 @@ ShapeError shapeError(const Whitened& tracks) {
     for (size_t j = 0; j < count; ++j) {
       const double squared = (tracks.pixel[i] - tracks.pixel[j]).squaredNorm();
       if (j != i && squared < nearest) nearest = squared, neighbour = j;
-      if (squared < kShapeReach * twice_length) around += std::exp(-squared / twice_length) * tracks.jacobian[j];
+      if (squared < kShapeReach * twice_length)
+        around += std::exp(-squared / twice_length) * tracks.jacobian[j];
     }
     sum += tracks.jacobian[i].transpose() * around;
     const double correlation = std::exp(-nearest / twice_length);
-    if (neighbour != i) product += 0.5 * correlation * tracks.residual[i].dot(tracks.residual[neighbour]) / count;
+    if (neighbour != i)
+      product += 0.5 * correlation * tracks.residual[i].dot(tracks.residual[neighbour]) / count;
   }
   ShapeError error;
   error.variance = std::max(0.0, kShapeAbsorbed * product);
@@ -165,13 +174,14 @@ struct Information {
   Matrix6d geometry = Matrix6d::Zero();  // of points, each counted alike, 1/px^2
 };
 
-Information chooseInliers(const Linearisation& lin, const std::vector<double>& lengths, const Deviations& found,
-                          double limit, PoseFit& fit) {
+Information chooseInliers(const Linearisation& lin, const std::vector<double>& lengths,
+                          const Deviations& found, double limit, PoseFit& fit) {
   Information sum;
   for (size_t i = 0; i < lengths.size(); ++i) {
     fit.inlier.push_back(lengths[i] < limit * found.of(lin.outline[i]));
     if (!fit.inlier.back()) continue;
-    (lin.outline[i] ? sum.outline : sum.points) += lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
+    (lin.outline[i] ? sum.outline : sum.points) +=
+        lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
     if (lin.outline[i]) continue;
     ++fit.inliers;
     sum.geometry += lin.jacobian[i].transpose() * lin.jacobian[i];
@@ -179,20 +189,23 @@ Information chooseInliers(const Linearisation& lin, const std::vector<double>& l
   return sum;
 }
 
-void judge(const std::vector<Correspondence>& correspondences, const Linearisation& lin, const PoseFitParams& params, PoseFit& fit) {
+void judge(const std::vector<Correspondence>& correspondences, const Linearisation& lin,
+           const PoseFitParams& params, PoseFit& fit) {
   const std::vector<double> all = lengths(lin);
   const Deviations found = robustDeviations(lin, all);
   fit.deviation = found.points;
   const Information sum = chooseInliers(lin, all, found, params.inlier_sigma, fit);
   if (fit.inliers < params.least_inliers) return;
-  const double of_points = found.of(false) * found.of(false), of_outline = found.of(true) * found.of(true);
+  const double of_points = found.of(false) * found.of(false),
+               of_outline = found.of(true) * found.of(true);
   const Eigen::LDLT<Matrix6d> factor(sum.points / of_points + sum.outline / of_outline);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0.0)) return;
   fit.common = fit.inliers * params.common_px * params.common_px * sum.geometry.inverse();
   // Points err apart by what their shared error leaves of their deviation, and together by that.
   const ShapeError shape = shapeError(whitened(correspondences, lin, fit.inlier));
   const double apart = std::max(1.0, of_points - shape.variance);
-  const Matrix6d gradient = (apart * sum.points + shape.gradient) / (of_points * of_points) + sum.outline / of_outline;
+  const Matrix6d gradient =
+      (apart * sum.points + shape.gradient) / (of_points * of_points) + sum.outline / of_outline;
   const Matrix6d inverse = factor.solve(Matrix6d::Identity());
   fit.covariance = inverse * gradient * inverse;
   fit.converged = fit.covariance.allFinite();
@@ -209,8 +222,8 @@ Eigen::Isometry3d shiftInPicture(const Camera& camera, const Eigen::Isometry3d& 
   return moved;
 }
 
-Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object,
-                           const Eigen::Vector3d& pivot, const Vector6d& motion) {
+Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object, const Eigen::Vector3d& pivot,
+                           const Vector6d& motion) {
   const Eigen::Vector3d position = world_from_object * pivot + motion.head<3>();
   Eigen::Isometry3d moved = Eigen::Isometry3d::Identity();
   moved.linear() = rotationFromVector(motion.tail<3>()) * world_from_object.linear();
@@ -228,7 +241,8 @@ PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera
   double scale = std::max(4.0, params.start_scale_px / params.floor_px);
   for (int iteration = 0; iteration < params.max_iterations; ++iteration) {
     const std::vector<double> residuals = lengths(lin);
-    const Vector6d step = solveStep(weightedNormal(lin, residuals, robustDeviations(lin, residuals), scale));
+    const Vector6d step =
+        solveStep(weightedNormal(lin, residuals, robustDeviations(lin, residuals), scale));
     if (!step.allFinite()) return fit;
     fit.world_from_object = movePose(fit.world_from_object, pivot, step);
     lin = linearise(correspondences, camera, fit.world_from_object, pivot, params.floor_px);

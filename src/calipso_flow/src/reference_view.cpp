@@ -8,7 +8,7 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kMargin = 20;           // px around the surface's window in a warped view
+constexpr int kMargin = 20;            // px around the surface's window in a warped view
 constexpr double kSameSurface = 0.02;  // of the diagonal: depths closer than this agree
 
 // Pixels well inside the object, whose smoothed grey holds nothing of the background.
@@ -65,8 +65,8 @@ void ReferenceView::chooseSeeds(int count) {
 }
 
 struct ReferenceView::WarpMap {
-  cv::Mat source;  // CV_32FC2: pixel of the reference
-  cv::Mat weight;  // CV_32F
+  cv::Mat source;   // CV_32FC2: pixel of the reference
+  cv::Mat weight;   // CV_32F
   cv::Mat covered;  // CV_8U
   // @param window  of the view; the map gets a margin and starts at even pixels, so that its
   //   half-size copy keeps simple coordinates
@@ -86,7 +86,8 @@ bool ReferenceView::note(const Eigen::Vector3d& p_reference, int x, int y, WarpM
   if (p_reference.z() <= 0.0) return false;
   const Eigen::Vector2d pixel = frame_.camera.project(p_reference);
   const double u = pixel.x() - surface_.window.x + 0.5, v = pixel.y() - surface_.window.y + 0.5;
-  if (!(u >= 0.0 && v >= 0.0 && u < surface_.window.width && v < surface_.window.height)) return false;
+  if (!(u >= 0.0 && v >= 0.0 && u < surface_.window.width && v < surface_.window.height))
+    return false;
   const int nearest_u = static_cast<int>(u), nearest_v = static_cast<int>(v);
   const float there = surface_.depth.ptr<float>(nearest_v)[nearest_u];
   if (there <= 0.0f || std::abs(there - p_reference.z()) > kSameSurface * diagonal_) return false;
@@ -115,9 +116,8 @@ ReferenceView::Warped ReferenceView::warp(const Camera& camera,
   const SurfaceView view = viewSurface(mesh_, camera, camera_from_object);
   if (view.empty() || surface_.empty()) return {};
   WarpMap map(view.window);
-  const Eigen::Isometry3d reference_from_camera = frame_.camera.world_from_camera.inverse() *
-                                                  world_from_object_ *
-                                                  camera_from_object.inverse();
+  const Eigen::Isometry3d reference_from_camera =
+      frame_.camera.world_from_camera.inverse() * world_from_object_ * camera_from_object.inverse();
   int visible = 0, known = 0;
   const Eigen::Vector3d ray_step = reference_from_camera.linear().col(0) / camera.fx;
   const Eigen::Vector3d origin = reference_from_camera.translation();
@@ -165,7 +165,8 @@ ReferenceView ReferenceView::reduced(int factor) const {
   small.frame_ = flow::reduced(frame_, factor);
   if (surface_.empty()) return small;
   small.surface_ =
-      viewSurface(mesh_, small.frame_.camera, small.frame_.camera.world_from_camera.inverse() * world_from_object_);
+      viewSurface(mesh_, small.frame_.camera,
+                  small.frame_.camera.world_from_camera.inverse() * world_from_object_);
   if (small.surface_.empty()) return small;
   cv::Mat all(frame_.gray.size(), CV_8U, cv::Scalar(0)), fewer;
   usable_.copyTo(all(surface_.window));

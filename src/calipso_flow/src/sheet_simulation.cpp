@@ -41,10 +41,12 @@ SheetSimulation::SheetSimulation(const ObjectModel& model, const Eigen::Vector3d
     : longest_step_(settings.longest_step),
       surface_(inWorld(model)),
       sheet_(surface_, softened(surface_, gravity, settings.stiffness), optionsFor(settings)),
-      skin_(surface_, sheet_.body().grid(), settings.coarse_skin ? kSkin * sheet_.body().grid().cell_size : 0.0) {
+      skin_(surface_, sheet_.body().grid(),
+            settings.coarse_skin ? kSkin * sheet_.body().grid().cell_size : 0.0) {
   const Material material = softened(surface_, gravity, settings.stiffness);
   stiffness_over_density_ = material.youngs_modulus / material.density;
-  areal_density_ = sheet_.body().totalMass() / ((fem::isClosed(surface_) ? 0.5 : 1.0) * surfaceArea(surface_));
+  areal_density_ =
+      sheet_.body().totalMass() / ((fem::isClosed(surface_) ? 0.5 : 1.0) * surfaceArea(surface_));
   if (!model.attached.empty()) sheet_.body().fixSurfaceVertices(model.attached);
   sheet_.setGravity(gravity);
   if (like) sheet_.body().setRestNodes(like->sheet_.body().model().mesh().nodes);
@@ -64,17 +66,20 @@ void SheetSimulation::settle(const Eigen::Vector3d& gravity, double sag) {
 
 void SheetSimulation::blow(const Eigen::Vector3d& wind, double h) {
   fem::DeformableBody& body = sheet_.body();
-  const Eigen::VectorXd x = skin_.embedding.apply(body.positions()), u = skin_.embedding.apply(body.velocities());
+  const Eigen::VectorXd x = skin_.embedding.apply(body.positions()),
+                        u = skin_.embedding.apply(body.velocities());
   const Eigen::Index count = x.size() / 3;
-  const fem::Vertices forces = fem::windForces(Eigen::Map<const fem::Vertices>(x.data(), count, 3),
-                                               Eigen::Map<const fem::Vertices>(u.data(), count, 3), skin_.triangles,
-                                               {wind, skin_.drag}, areal_density_, h);
-  body.setNodalForces(
-      skin_.embedding.applyTransposed(Eigen::Map<const Eigen::VectorXd>(forces.data(), forces.size())));
+  const fem::Vertices forces =
+      fem::windForces(Eigen::Map<const fem::Vertices>(x.data(), count, 3),
+                      Eigen::Map<const fem::Vertices>(u.data(), count, 3), skin_.triangles,
+                      {wind, skin_.drag}, areal_density_, h);
+  body.setNodalForces(skin_.embedding.applyTransposed(
+      Eigen::Map<const Eigen::VectorXd>(forces.data(), forces.size())));
 }
 
-void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector& velocities, const Wind& wind,
-                           const AfterStep& after_step, const std::function<void()>& after_frame) {
+void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector& velocities,
+                           const Wind& wind, const AfterStep& after_step,
+                           const std::function<void()>& after_frame) {
   fem::DeformableBody& body = sheet_.body();
   body.setState(start_, sheet_.nodalField(velocities));
   after_frame();
@@ -96,17 +101,20 @@ void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector
 std::vector<SurfaceVector> SheetSimulation::run(const std::vector<double>& times,
                                                 const SurfaceVector& velocities, const Wind& wind) {
   std::vector<SurfaceVector> shapes;
-  move(times, velocities, wind, nullptr, [&] { shapes.push_back(sheet_.body().surfaceVertices()); });
+  move(times, velocities, wind, nullptr,
+       [&] { shapes.push_back(sheet_.body().surfaceVertices()); });
   const SurfaceVector first = shapes.front();
   for (SurfaceVector& shape : shapes) shape -= first;
   return shapes;
 }
 
-SheetMotion SheetSimulation::measure(const std::vector<double>& times, const SurfaceVector& velocities,
-                                     const WindCourse& wind, const Eigen::MatrixXd& measured,
+SheetMotion SheetSimulation::measure(const std::vector<double>& times,
+                                     const SurfaceVector& velocities, const WindCourse& wind,
+                                     const Eigen::MatrixXd& measured,
                                      const SheetSimulation* stiffer, double by) {
   const fem::DeformableBody& body = sheet_.body();
-  const int winds = stiffer ? 3 * static_cast<int>(wind.knots.size()) : 0, parameters = stiffer ? winds + 1 : 0;
+  const int winds = stiffer ? 3 * static_cast<int>(wind.knots.size()) : 0,
+            parameters = stiffer ? winds + 1 : 0;
   Eigen::MatrixXd nodal(measured.rows(), 3 * body.nodeCount());
   for (Eigen::Index m = 0; m < measured.rows(); ++m) {
     nodal.row(m) = body.embedding().applyTransposed(measured.row(m).transpose()).transpose();
@@ -115,7 +123,8 @@ SheetMotion SheetSimulation::measure(const std::vector<double>& times, const Sur
   SheetMotion motion;
   motion.amplitudes.resize(times.size(), measured.rows());
   motion.slopes.assign(parameters, Eigen::MatrixXd(times.size(), measured.rows()));
-  const Eigen::VectorXd viscosity = Eigen::VectorXd::Unit(std::max(1, parameters), std::max(0, parameters - 1));
+  const Eigen::VectorXd viscosity =
+      Eigen::VectorXd::Unit(std::max(1, parameters), std::max(0, parameters - 1));
   const AfterStep carry = [&](const fem::Vec& x0, const fem::Vec& v0, double time, double h) {
     Slopes dw = Slopes::Zero(3, parameters);
     for (size_t i = 0; i < wind.knots.size(); ++i) {
@@ -135,11 +144,14 @@ SheetMotion SheetSimulation::measure(const std::vector<double>& times, const Sur
     for (int p = 0; p < parameters; ++p) motion.slopes[p].row(frame) = seen.col(p).transpose();
     ++frame;
   };
-  move(times, velocities, [&](double time) { return wind.at(time); }, stiffer ? carry : AfterStep(), see);
+  move(
+      times, velocities, [&](double time) { return wind.at(time); }, stiffer ? carry : AfterStep(),
+      see);
   return motion;
 }
 
-Slopes SheetSimulation::windSlopes(const fem::Vec& x0, const fem::Vec& v0, const Eigen::Vector3d& wind, double h,
+Slopes SheetSimulation::windSlopes(const fem::Vec& x0, const fem::Vec& v0,
+                                   const Eigen::Vector3d& wind, double h,
                                    const MotionTangent& tangent, const Slopes& dw) const {
   const auto& weights = skin_.embedding.weights;
   Slopes dx = Slopes::Zero(3 * weights.rows(), dw.cols()), du = dx;
@@ -150,11 +162,13 @@ Slopes SheetSimulation::windSlopes(const fem::Vec& x0, const fem::Vec& v0, const
       du.middleRows<3>(3 * v) += it.value() * tangent.velocities().middleRows<3>(3 * it.col());
     }
   }
-  const Slopes forces = windForceSlopes(skin_.embedding.apply(x0), skin_.embedding.apply(v0), skin_.triangles,
-                                        {wind, skin_.drag}, areal_density_, h, dx, du, dw);
+  const Slopes forces =
+      windForceSlopes(skin_.embedding.apply(x0), skin_.embedding.apply(v0), skin_.triangles,
+                      {wind, skin_.drag}, areal_density_, h, dx, du, dw);
   Slopes nodal = Slopes::Zero(x0.size(), dw.cols());
   for (int v = 0; v < weights.rows(); ++v) {
-    for (Entry it(weights, v); it; ++it) nodal.middleRows<3>(3 * it.col()) += it.value() * forces.middleRows<3>(3 * v);
+    for (Entry it(weights, v); it; ++it)
+      nodal.middleRows<3>(3 * it.col()) += it.value() * forces.middleRows<3>(3 * v);
   }
   return nodal;
 }

@@ -21,9 +21,10 @@ struct NoEquilibrium : std::runtime_error {
 
 // A sheet's motion as seen by K linear measurements of its surface, and how it depends on the wind.
 struct SheetMotion {
-  Eigen::MatrixXd amplitudes;            // T x K
-  std::vector<Eigen::MatrixXd> slopes;   // T x K each: by the wind at the knots, one component after the other, and
-};                                       // by the logarithm of the stiffness; empty when not asked for
+  Eigen::MatrixXd amplitudes;  // T x K
+  std::vector<Eigen::MatrixXd>
+      slopes;  // T x K each: by the wind at the knots, one component after the other, and
+};             // by the logarithm of the stiffness; empty when not asked for
 
 struct SheetSettings {
   int nodes = 120;                   // of the grid, about
@@ -31,7 +32,8 @@ struct SheetSettings {
   double longest_step = 1.0 / 30.0;  // s
   double stiffness = 1.0;            // times the modulus that an object of its size starts with
   double sag = 1e-3;                 // of the diagonal, that the key frame's shape may give way by
-  bool coarse_skin = false;          // the wind blows on triangles of half a cell instead of the surface's own
+  bool coarse_skin =
+      false;  // the wind blows on triangles of half a cell instead of the surface's own
 };
 
 // A thin object of the video as the simulator moves it in the wind: with the material an object of
@@ -40,8 +42,8 @@ class SheetSimulation {
  public:
   // @param like  the same sheet on the same grid, about as stiff, to start from; or null
   // @throw std::invalid_argument as the simulator does; NoEquilibrium
-  SheetSimulation(const ObjectModel& model, const Eigen::Vector3d& gravity, const SheetSettings& settings,
-                  const SheetSimulation* like = nullptr);
+  SheetSimulation(const ObjectModel& model, const Eigen::Vector3d& gravity,
+                  const SheetSettings& settings, const SheetSimulation* like = nullptr);
 
   using Wind = std::function<Eigen::Vector3d(double time)>;  // m/s, world
   // Displacements of the surface from the key frame's shape at every time, world axes, m.
@@ -51,13 +53,16 @@ class SheetSimulation {
   // The same, measured: amplitudes = measured * displacements of the surface.
   // @param measured   K x 3 #V
   // @param stiffer    null: no slopes; else the same sheet, by a factor exp(`by`) as stiff
-  SheetMotion measure(const std::vector<double>& times, const SurfaceVector& velocities, const WindCourse& wind,
-                      const Eigen::MatrixXd& measured, const SheetSimulation* stiffer, double by);
+  SheetMotion measure(const std::vector<double>& times, const SurfaceVector& velocities,
+                      const WindCourse& wind, const Eigen::MatrixXd& measured,
+                      const SheetSimulation* stiffer, double by);
   double stiffnessRatio() const { return stiffness_over_density_; }  // E/rho, m^2/s^2
 
  private:
-  using AfterStep = std::function<void(const fem::Vec& x0, const fem::Vec& v0, double time, double h)>;
-  // Steps through all times, with the wind of the middle of each step, whose time is told to `after_step`.
+  using AfterStep =
+      std::function<void(const fem::Vec& x0, const fem::Vec& v0, double time, double h)>;
+  // Steps through all times, with the wind of the middle of each step, whose time is told to
+  // `after_step`.
   void move(const std::vector<double>& times, const SurfaceVector& velocities, const Wind& wind,
             const AfterStep& after_step, const std::function<void()>& after_frame);
   void settle(const Eigen::Vector3d& gravity, double sag);

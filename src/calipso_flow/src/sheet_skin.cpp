@@ -23,7 +23,8 @@ std::vector<int> clustered(const TriangleMesh& surface, double edge, fem::NodeMa
   const Eigen::RowVector3d low = surface.vertices.colwise().minCoeff();
   for (int i = 0; i < surface.vertexCount(); ++i) {
     const Eigen::RowVector3d cell = (surface.vertices.row(i) - low) / edge;
-    const std::array<long, 3> key{std::lround(cell.x()), std::lround(cell.y()), std::lround(cell.z())};
+    const std::array<long, 3> key{std::lround(cell.x()), std::lround(cell.y()),
+                                  std::lround(cell.z())};
     const auto [at, added] = index.try_emplace(key, static_cast<int>(sums.size()));
     if (added) sums.push_back(Eigen::Vector3d::Zero()), counts.push_back(0);
     cluster_of.push_back(at->second);
@@ -41,7 +42,8 @@ double surfaceArea(const TriangleMesh& mesh) {
   double doubled = 0.0;
   for (int t = 0; t < mesh.triangleCount(); ++t) {
     const Eigen::Vector3d a = mesh.vertex(mesh.triangles(t, 0));
-    doubled += (mesh.vertex(mesh.triangles(t, 1)) - a).cross(mesh.vertex(mesh.triangles(t, 2)) - a).norm();
+    doubled +=
+        (mesh.vertex(mesh.triangles(t, 1)) - a).cross(mesh.vertex(mesh.triangles(t, 2)) - a).norm();
   }
   return 0.5 * doubled;
 }
@@ -62,10 +64,13 @@ SheetSkin::SheetSkin(const TriangleMesh& surface, const fem::VoxelGrid& grid, do
     skin.vertices = means;
     skin.triangles.resize(kept.size(), 3);
     Eigen::Index t = 0;
-    for (const Corners& corners : kept) skin.triangles.row(t++) << corners[0], corners[1], corners[2];
+    for (const Corners& corners : kept)
+      skin.triangles.row(t++) << corners[0], corners[1], corners[2];
   }
   const double area = surfaceArea(skin);
-  if (!(area > 0.0)) throw std::invalid_argument("sheet: cubes of " + std::to_string(edge) + " m leave no surface of it");
+  if (!(area > 0.0))
+    throw std::invalid_argument("sheet: cubes of " + std::to_string(edge) +
+                                " m leave no surface of it");
   triangles = skin.triangles;
   embedding = fem::embed(skin.vertices, grid);
   drag = fem::kAirDrag * sheet_area / area;

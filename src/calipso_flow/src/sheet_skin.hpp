@@ -5,8 +5,9 @@
 
 namespace calipso::flow {
 
-// What of a sheet stands in the wind, in few triangles: its vertices are put together in cubes of the given edge. Front and
-// back, which feel the same, become one. The area that this costs is made up for by the drag.
+// What of a sheet stands in the wind, in few triangles: its vertices are put together in cubes of
+// the given edge. Front and back, which feel the same, become one. The area that this costs is made
+// up for by the drag.
 struct SheetSkin {
   // @param edge  m; 0: the surface as it is
   // @throw std::invalid_argument where nothing of the surface is left

@@ -7,15 +7,16 @@
 
 namespace calipso::flow {
 
-using Slopes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;  // one column per parameter
+using Slopes = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic,
+                             Eigen::RowMajor>;  // one column per parameter
 
 // How the forces of fem::windForces change with wind, shape and velocity of the surface:
 //   dF = dF/dw dw + dF/dx dx + dF/du du
 // @param dx, du  3 #V x P
 // @param dw      3 x P
-Slopes windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& u, const fem::Triangles& triangles,
-                       const fem::Air& air, double areal_density, double h, const Slopes& dx, const Slopes& du,
-                       const Slopes& dw);
+Slopes windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& u,
+                       const fem::Triangles& triangles, const fem::Air& air, double areal_density,
+                       double h, const Slopes& dx, const Slopes& du, const Slopes& dw);
 
 // Derivatives of a body's motion, carried along with its steps by backward Euler:
 //   M (x1 - x0 - h v0) / h^2 + D(x0) (x1 - x0) / h + f(x1) = F(x0, v0)
@@ -23,10 +24,11 @@ Slopes windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& u, const
 // NOTE: how D changes with x0 is left out; D is a small part of A.
 class MotionTangent {
  public:
-  // Nothing depends on the parameters at first. @pre steps of the body are by backward Euler with lumped masses
+  // Nothing depends on the parameters at first. @pre steps of the body are by backward Euler with
+  // lumped masses
   MotionTangent(const fem::DeformableBody& body, int parameters);
 
-  const Slopes& positions() const { return dx_; }   // 3 #N x P
+  const Slopes& positions() const { return dx_; }  // 3 #N x P
   const Slopes& velocities() const { return dv_; }
   // The body has just gone from x0 to its present state within h.
   // @param dF  of external less elastic forces at the same positions, 3 #N x P
@@ -37,9 +39,9 @@ class MotionTangent {
   void factorise(const fem::Vec& x0, double h);
 
   const fem::DeformableBody& body_;
-  Eigen::VectorXd mass_;      // 3 #N, kg
-  std::vector<int> free_;     // components that are not fixed
-  std::vector<int> slots_;    // where in values_ each entry of the blocks goes, -1: nowhere
+  Eigen::VectorXd mass_;           // 3 #N, kg
+  std::vector<int> free_;          // components that are not fixed
+  std::vector<int> slots_;         // where in values_ each entry of the blocks goes, -1: nowhere
   Eigen::SparseMatrix<double> A_;  // of the free components, lower half
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
   fem::BlockMatrix K_, D_;

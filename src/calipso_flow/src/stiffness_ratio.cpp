@@ -46,8 +46,9 @@ double groupAgreement(const Eigen::VectorXd& observed, const Eigen::MatrixXd& sh
 std::optional<StiffnessRatio> stiffnessRatio(const ObjectModel& model, const SpectralLine& line,
                                              const Eigen::VectorXcd& shape, std::string& note) {
   if (model.attached.empty()) {
-    note = "no stiffness from the vibration: nothing says where the object is held; give an "
-           "attachment hint";
+    note =
+        "no stiffness from the vibration: nothing says where the object is held; give an "
+        "attachment hint";
     return std::nullopt;
   }
   Material nominal;
@@ -79,8 +80,9 @@ std::optional<StiffnessRatio> stiffnessRatio(const ObjectModel& model, const Spe
     if (agreement > best.agreement + 1e-9) best.agreement = agreement, best.mode = m;
   }
   if (!(best.agreement >= kLeastAgreement)) {
-    note = "no stiffness from the vibration: its shape is none of the model's lowest; it may be "
-           "driven, or held elsewhere";
+    note =
+        "no stiffness from the vibration: its shape is none of the model's lowest; it may be "
+        "driven, or held elsewhere";
     return std::nullopt;
   }
   const double ratio = line.naturalFrequency() / modal.frequencies[best.mode];

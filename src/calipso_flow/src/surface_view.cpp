@@ -10,8 +10,8 @@ namespace {
 constexpr double kNear = 1e-6;  // m; nothing nearer is projected
 
 struct ProjectedVertex {
-  double u, v;        // px
-  double inverse_z;   // 1/m; 0 = behind the camera
+  double u, v;       // px
+  double inverse_z;  // 1/m; 0 = behind the camera
 };
 
 using Vertices = decltype(TriangleMesh::vertices);

@@ -15,8 +15,8 @@ namespace {
 constexpr double kEver = std::numeric_limits<double>::infinity();
 constexpr int kRefineRounds = 3;
 constexpr size_t kLeastFrames = 2;    // in a piece: fewer tell nothing about its velocity
-constexpr double kRefineReach = 0.6;   // frames by which a fit may move an instant
-constexpr double kDropReach = 1.2;     // the same when its neighbour is gone
+constexpr double kRefineReach = 0.6;  // frames by which a fit may move an instant
+constexpr double kDropReach = 1.2;    // the same when its neighbour is gone
 
 }  // namespace
 
@@ -92,9 +92,8 @@ void TrajectoryFitter::insertPiece(double time, bool cut) {
   MotionPiece piece;
   piece.start = time;
   piece.cut = cut;
-  const auto place =
-      std::upper_bound(pieces_.begin(), pieces_.end(), time,
-                       [](double t, const MotionPiece& p) { return t < p.start; });
+  const auto place = std::upper_bound(pieces_.begin(), pieces_.end(), time,
+                                      [](double t, const MotionPiece& p) { return t < p.start; });
   pieces_.insert(place, piece);
 }
 
@@ -129,8 +128,8 @@ void TrajectoryFitter::dropUnearnedPieces() {
   }
 }
 
-// An impulse at a point of contact changes the velocity; where that goes on, a change of spin is an error of the
-// tracks. The least certain jump goes first: without it the others look different.
+// An impulse at a point of contact changes the velocity; where that goes on, a change of spin is an
+// error of the tracks. The least certain jump goes first: without it the others look different.
 void TrajectoryFitter::dropJumpsOfSpinAlone() {
   constexpr double kSurprise = 16.27;  // chi-squared with 3 degrees of freedom, 99.9 %
   while (true) {
@@ -241,9 +240,11 @@ std::vector<MotionState> TrajectoryFitter::statesWithHonestRest(
 }
 
 // Variance by which errors that persist from frame to frame exceed independent ones: for a lag-one
-// correlation r of the residuals, (1 + r) / (1 - r). A fit of p numbers to n frames takes the slowest errors, those
-// that persist most, into itself: what it leaves is correlated by about (p / n) (1 + r) less (fitted_share: p / n).
-double TrajectoryFitter::persistence(const std::vector<MotionState>& states, double fitted_share) const {
+// correlation r of the residuals, (1 + r) / (1 - r). A fit of p numbers to n frames takes the
+// slowest errors, those that persist most, into itself: what it leaves is correlated by about (p /
+// n) (1 + r) less (fitted_share: p / n).
+double TrajectoryFitter::persistence(const std::vector<MotionState>& states,
+                                     double fitted_share) const {
   constexpr double kLargest = 0.9;
   double product = 0.0, square = 0.0;
   Vector6d previous = Vector6d::Zero();
@@ -262,7 +263,8 @@ double TrajectoryFitter::persistence(const std::vector<MotionState>& states, dou
     previous = whitened;
   }
   if (square == 0.0) return 1.0;
-  const double correlation = std::clamp((product / square + fitted_share) / (1.0 - fitted_share), 0.0, kLargest);
+  const double correlation =
+      std::clamp((product / square + fitted_share) / (1.0 - fitted_share), 0.0, kLargest);
   return (1.0 + correlation) / (1.0 - correlation);
 }
 
@@ -271,8 +273,8 @@ double TrajectoryFitter::pieceSpan(size_t piece) const {
   return inside.size() < 2 ? frameSpacing() : inside.back().time - inside.front().time;
 }
 
-// Errors of deviation s at a piece's beginning and end make a velocity of sqrt(2) s / T. The mean over its poses, since the
-// piece's velocity is that of all of them.
+// Errors of deviation s at a piece's beginning and end make a velocity of sqrt(2) s / T. The mean
+// over its poses, since the piece's velocity is that of all of them.
 Matrix6d TrajectoryFitter::driftCovariance(double time) const {
   const size_t piece = indexOfPieceAt(time);
   const Measurements inside = measurementsOf(piece, piece);
@@ -293,19 +295,20 @@ std::optional<Trajectory::Gravity> TrajectoryFitter::fittedGravity() const {
   std::vector<MotionPiece> free = pieces_;
   free[longest].travel = Travel::kAccelerated;
   const SmoothedMotion motion = smooth(measurements_, free, prior_, noise_scale_);
-  const auto state = std::find_if(motion.states.begin(), motion.states.end(), [&](const auto& s) {
-    return indexOfPieceAt(s.time) == longest;
-  });
+  const auto state = std::find_if(motion.states.begin(), motion.states.end(),
+                                  [&](const auto& s) { return indexOfPieceAt(s.time) == longest; });
   const Eigen::Vector3d direction = state->acceleration.normalized();
   const double variance = direction.dot(state->accelerationCovariance() * direction);
-  return Trajectory::Gravity{state->acceleration, std::sqrt(std::max(0.0, variance)), most, longest};
+  return Trajectory::Gravity{state->acceleration, std::sqrt(std::max(0.0, variance)), most,
+                             longest};
 }
 
 Trajectory TrajectoryFitter::result() {
   Trajectory trajectory;
   const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
   trajectory.states = statesWithHonestRest(motion);
-  const double share = std::min(0.5, 2.0 * pieces_.size() / static_cast<double>(measurements_.size()));
+  const double share =
+      std::min(0.5, 2.0 * pieces_.size() / static_cast<double>(measurements_.size()));
   const double factor = persistence(motion.states, share);
   for (MotionState& state : trajectory.states) {
     state.covariance *= factor;
@@ -316,13 +319,19 @@ Trajectory TrajectoryFitter::result() {
   trajectory.gravity = fittedGravity();
   if (trajectory.gravity) {
     const size_t frames = trajectory.gravity->frames;
-    const double share = std::min(0.5, 2.0 / static_cast<double>(frames));  // a parabola's; where it starts is given
+    const double share =
+        std::min(0.5, 2.0 / static_cast<double>(frames));  // a parabola's; where it starts is given
     // A bend of the poses by s over the time T of the fall is an acceleration of 8 s / T^2.
     const double span = pieceSpan(trajectory.gravity->piece);
     const Eigen::Vector3d along = trajectory.gravity->acceleration.normalized();
-    const double drift = along.dot(driftCovariance(measurementsOf(trajectory.gravity->piece, trajectory.gravity->piece).front().time).topLeftCorner<3, 3>() * along);
-    trajectory.gravity->deviation = std::sqrt(std::pow(trajectory.gravity->deviation, 2) * persistence(motion.states, share) +
-                                              32.0 * drift / (span * span));
+    const double drift = along.dot(
+        driftCovariance(
+            measurementsOf(trajectory.gravity->piece, trajectory.gravity->piece).front().time)
+            .topLeftCorner<3, 3>() *
+        along);
+    trajectory.gravity->deviation =
+        std::sqrt(std::pow(trajectory.gravity->deviation, 2) * persistence(motion.states, share) +
+                  32.0 * drift / (span * span));
   }
   for (const Jump& jump : motion.jumps) {
     if (jump.cut) continue;

@@ -10,12 +10,13 @@
 namespace calipso::flow {
 namespace {
 
-constexpr double kStep = 0.25;         // rad, of the grid: half of it is what a rough match still finds
-constexpr double kFirstSide = 12.0;    // px, to twice this: the object's size in the first look
+constexpr double kStep = 0.25;  // rad, of the grid: half of it is what a rough match still finds
+constexpr double kFirstSide = 12.0;  // px, to twice this: the object's size in the first look
 constexpr int kMostReduced = 16;
 constexpr size_t kLookedAtAgain = 40;  // hypotheses, at twice the size
 constexpr double kAgainReach = 2.0;    // px of the first look
-constexpr double kTurnPenalty = 0.02;  // of correlation per rad: of looks that are alike, the less turned
+constexpr double kTurnPenalty =
+    0.02;  // of correlation per rad: of looks that are alike, the less turned
 
 struct Hypothesis {
   Eigen::Isometry3d pose;
@@ -52,19 +53,21 @@ std::vector<Hypothesis> turnedPoses(const TurnSearch& search) {
 // @param reach  px of the full size
 void place(const Pictures& pictures, const Eigen::AlignedBox2d& reach, const Eigen::Vector3d& pivot,
            Hypothesis& hypothesis) {
-  const ReferenceView::Warped look = pictures.reference.warp(pictures.frame.camera, hypothesis.pose);
+  const ReferenceView::Warped look =
+      pictures.reference.warp(pictures.frame.camera, hypothesis.pose);
   hypothesis.score = -1.0;
   if (look.coverage == 0.0) return;
   const double factor = pictures.factor;
   const CoarseMatch match =
       matchCoarsely(look, pictures.frame.gray, {reach.min() / factor, reach.max() / factor}, 1);
-  hypothesis.pose = shiftInPicture(pictures.frame.camera, hypothesis.pose, pivot, match.displacement);
+  hypothesis.pose =
+      shiftInPicture(pictures.frame.camera, hypothesis.pose, pivot, match.displacement);
   hypothesis.score = match.correlation - kTurnPenalty * hypothesis.turn;
 }
 
 // Places all hypotheses and sorts them, the likeliest first.
-void placeAll(const Pictures& pictures, const Eigen::AlignedBox2d& reach, const Eigen::Vector3d& pivot,
-              std::vector<Hypothesis>& hypotheses) {
+void placeAll(const Pictures& pictures, const Eigen::AlignedBox2d& reach,
+              const Eigen::Vector3d& pivot, std::vector<Hypothesis>& hypotheses) {
   cv::parallel_for_({0, static_cast<int>(hypotheses.size())}, [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) place(pictures, reach, pivot, hypotheses[i]);
   });

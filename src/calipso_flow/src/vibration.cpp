@@ -14,10 +14,10 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kTwoPi = 6.28318530717958647692;
-constexpr int kGridPerBin = 8;        // candidates per resolvable frequency
+constexpr int kGridPerBin = 8;  // candidates per resolvable frequency
 constexpr int kRefinements = 40;
 constexpr double kNyquistShare = 0.95;
-constexpr double kMostDecay = 3.0;    // e-foldings within the clip
+constexpr double kMostDecay = 3.0;  // e-foldings within the clip
 
 // Frequency and decay of one line.
 struct Pole {
@@ -113,9 +113,8 @@ Poles refine(const Eigen::VectorXd& t, const Eigen::MatrixXd& Y, Poles poles, do
         -H.ldlt().solve(J.transpose() * Eigen::Map<const Eigen::VectorXd>(r.data(), r.size()));
     if (!step.allFinite()) break;
     const Poles next = moved(poles, step);
-    const double left = allowed(next, lowest, highest, span(t))
-                            ? residual(t, Y, next).squaredNorm()
-                            : 2.0 * power + 1.0;
+    const double left = allowed(next, lowest, highest, span(t)) ? residual(t, Y, next).squaredNorm()
+                                                                : 2.0 * power + 1.0;
     if (left < power) {
       poles = next, power = left, damping *= 0.3;
       if (step.cwiseAbs().maxCoeff() * span(t) < 1e-7) break;
@@ -145,9 +144,9 @@ void check(const Eigen::VectorXd& times, const Eigen::MatrixXd& series) {
   }
   for (int k = 1; k < times.size(); ++k) {
     if (!(times[k] > times[k - 1])) {
-      throw std::invalid_argument("vibration: sample " + std::to_string(k) + " at " +
-                                  std::to_string(times[k]) +
-                                  " s is not later than the one before; give them in order of time");
+      throw std::invalid_argument(
+          "vibration: sample " + std::to_string(k) + " at " + std::to_string(times[k]) +
+          " s is not later than the one before; give them in order of time");
     }
   }
 }
@@ -188,9 +187,7 @@ Spectrum describe(const Eigen::VectorXd& t, const Eigen::MatrixXd& Y, const Pole
 
 }  // namespace
 
-double SpectralLine::naturalFrequency() const {
-  return std::hypot(frequency, decay / kTwoPi);
-}
+double SpectralLine::naturalFrequency() const { return std::hypot(frequency, decay / kTwoPi); }
 
 Spectrum findLines(const Eigen::VectorXd& times, const Eigen::MatrixXd& series,
                    const SpectrumParams& params) {
@@ -241,11 +238,10 @@ CrestTravel crestTravel(const TriangleMesh& mesh, const Eigen::VectorXcd& shape)
     const Eigen::Vector3d normal = (b - a).cross(d - a);
     const double doubled = normal.squaredNorm();
     if (doubled <= 0.0) continue;
-    const Eigen::Vector3cd gradient =
-        (normal.cross(d - b).cast<std::complex<double>>() * s(c[0]) +
-         normal.cross(a - d).cast<std::complex<double>>() * s(c[1]) +
-         normal.cross(b - a).cast<std::complex<double>>() * s(c[2])) /
-        doubled;
+    const Eigen::Vector3cd gradient = (normal.cross(d - b).cast<std::complex<double>>() * s(c[0]) +
+                                       normal.cross(a - d).cast<std::complex<double>>() * s(c[1]) +
+                                       normal.cross(b - a).cast<std::complex<double>>() * s(c[2])) /
+                                      doubled;
     const std::complex<double> mean = (s(c[0]) + s(c[1]) + s(c[2])) / 3.0;
     const double area = std::sqrt(doubled);
     sum -= area * (std::conj(mean) * gradient).imag();

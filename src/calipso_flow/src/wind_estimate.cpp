@@ -3,34 +3,37 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <calipso_fem/voxel_grid.hpp>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <memory>
 #include <stdexcept>
 
-#include <calipso_fem/voxel_grid.hpp>
-
 #include "sheet_simulation.hpp"
 
 namespace calipso::flow {
 namespace {
 
-constexpr int kTrials = 8;             // steps of one fit, also those that make things worse
-constexpr int kFailures = 2;           // of these in a row
+constexpr int kTrials = 8;    // steps of one fit, also those that make things worse
+constexpr int kFailures = 2;  // of these in a row
 constexpr double kLeastDamping = 0.3, kDamping = 5.0;
-constexpr double kStiffer = 0.05;      // log s: how much stiffer the sheet is that shows what stiffness does
-constexpr double kSettled = 0.02;      // m/s, a smaller step is the last
-constexpr double kGained = 1e-2;       // of the cost: less gained, and it was the last step
-constexpr double kSeen = 3.0;          // the pictures' information over that beforehand: half of the deviation
-constexpr double kSeenShare = 0.03;    // of the best direction's
-constexpr double kWellShown = 0.95;    // of the motion's square: no other valley is looked for
+constexpr double kStiffer =
+    0.05;  // log s: how much stiffer the sheet is that shows what stiffness does
+constexpr double kSettled = 0.02;  // m/s, a smaller step is the last
+constexpr double kGained = 1e-2;   // of the cost: less gained, and it was the last step
+constexpr double kSeen =
+    3.0;  // the pictures' information over that beforehand: half of the deviation
+constexpr double kSeenShare = 0.03;  // of the best direction's
+constexpr double kWellShown = 0.95;  // of the motion's square: no other valley is looked for
 constexpr double kHardlyShown = 0.5;
-constexpr double kStiffStart = 2.5;    // log s
+constexpr double kStiffStart = 2.5;  // log s
 constexpr double kMostPersistent = 0.95;
-constexpr int kFiner = 4;              // times the nodes at most
-constexpr char kNoEquilibrium[] = "no wind: the sheet finds no equilibrium in its shape; see where it is held";
-constexpr double kGuesses[] = {1.0, 2.0, 4.0, 8.0};  // m/s: still air has no derivative, drag being quadratic
+constexpr int kFiner = 4;  // times the nodes at most
+constexpr char kNoEquilibrium[] =
+    "no wind: the sheet finds no equilibrium in its shape; see where it is held";
+constexpr double kGuesses[] = {1.0, 2.0, 4.0,
+                               8.0};  // m/s: still air has no derivative, drag being quadratic
 
 std::vector<double> knotsOver(double begin, double end, double spacing) {
   const int intervals = std::max(1, static_cast<int>(std::lround((end - begin) / spacing)));
@@ -45,15 +48,19 @@ double cellSizeFor(const TriangleMesh& mesh, int nodes) {
   return fem::voxelize(mesh, options).cell_size;
 }
 
-// The sheet at any stiffness; those last asked for are kept, and what is asked for next starts from them.
+// The sheet at any stiffness; those last asked for are kept, and what is asked for next starts from
+// them.
 class SheetFamily {
  public:
   // @throw as SheetSimulation
   // @param cell, simulator_cell  edges of this grid's cubes and of the simulator's, m
   // @param given  every member is as stiff as the simulator starts with, on this grid
-  SheetFamily(const ObjectModel& model, const Eigen::Vector3d& gravity, double cell, double simulator_cell,
-              double longest_step, bool given)
-      : model_(model), gravity_(gravity), given_(given), scale_(std::pow(simulator_cell / cell, 2)) {
+  SheetFamily(const ObjectModel& model, const Eigen::Vector3d& gravity, double cell,
+              double simulator_cell, double longest_step, bool given)
+      : model_(model),
+        gravity_(gravity),
+        given_(given),
+        scale_(std::pow(simulator_cell / cell, 2)) {
     settings_.cell_size = cell;
     settings_.longest_step = longest_step;
     settings_.coarse_skin = true;
@@ -64,9 +71,12 @@ class SheetFamily {
   bool given() const { return given_; }
 
   // @param log_stiffness  of the modulus over that which the simulator starts with, on its grid
-  SheetSimulation& at(double log_stiffness) { return keep(sheet_, log_stiffness, settings_, sheet_.sheet.get()); }
+  SheetSimulation& at(double log_stiffness) {
+    return keep(sheet_, log_stiffness, settings_, sheet_.sheet.get());
+  }
 
-  // The same by kStiffer stiffer, to tell what stiffness does: so much better settled than that changes the shape.
+  // The same by kStiffer stiffer, to tell what stiffness does: so much better settled than that
+  // changes the shape.
   const SheetSimulation& stifferThan(double log_stiffness) {
     if (given_) return at(log_stiffness);
     SheetSettings settings = settings_;
@@ -74,7 +84,9 @@ class SheetFamily {
     return keep(stiffer_, log_stiffness + kStiffer, settings, &at(log_stiffness));
   }
 
-  double stiffnessOverDensity(double log_stiffness) { return at(log_stiffness).stiffnessRatio() / scale_; }
+  double stiffnessOverDensity(double log_stiffness) {
+    return at(log_stiffness).stiffnessRatio() / scale_;
+  }
 
  private:
   struct Kept {
@@ -82,7 +94,8 @@ class SheetFamily {
     std::unique_ptr<SheetSimulation> sheet;
   };
 
-  SheetSimulation& keep(Kept& kept, double log_stiffness, SheetSettings settings, const SheetSimulation* like) {
+  SheetSimulation& keep(Kept& kept, double log_stiffness, SheetSettings settings,
+                        const SheetSimulation* like) {
     if (given_) log_stiffness = -std::log(scale_);
     if (!kept.sheet || kept.log_stiffness != log_stiffness) {
       settings.stiffness = scale_ * std::exp(log_stiffness);
@@ -104,8 +117,12 @@ class WindFit {
  public:
   WindFit(SheetFamily& sheets, const ObjectModel& model, const std::vector<double>& times,
           const DeformationModes& modes, const Eigen::Vector3d& gravity, const WindParams& params)
-      : sheets_(sheets), times_(times), modes_(modes), params_(params),
-        down_(gravity.norm() > 0.0 ? Eigen::Vector3d(gravity.normalized()) : Eigen::Vector3d::Zero()) {
+      : sheets_(sheets),
+        times_(times),
+        modes_(modes),
+        params_(params),
+        down_(gravity.norm() > 0.0 ? Eigen::Vector3d(gravity.normalized())
+                                   : Eigen::Vector3d::Zero()) {
     const Eigen::Matrix3d R = model.world_from_object.linear();
     Eigen::MatrixXd shapes(modes.shapes.rows(), modes.count());
     for (int m = 0; m < modes.count(); ++m) {
@@ -116,18 +133,21 @@ class WindFit {
     measured_ = (shapes.transpose() * shapes).ldlt().solve(shapes.transpose());
     velocities_ = shapes * modes.velocities.row(0).transpose();
     const double motion = std::sqrt(modes.amplitudes.squaredNorm() / modes.amplitudes.rows());
-    deviations_ = (modes.deviations.array().square() + std::pow(params.model_error * motion, 2)).sqrt();
+    deviations_ =
+        (modes.deviations.array().square() + std::pow(params.model_error * motion, 2)).sqrt();
   }
 
-  // Amplitudes of the modes and, if asked for, how they depend on w: the wind at the knots, one after the other, then
-  // log s. Nothing where the sheet is too soft to hang in its shape.
-  std::optional<SheetMotion> simulated(const std::vector<double>& knots, const Eigen::VectorXd& w, bool slopes) const {
+  // Amplitudes of the modes and, if asked for, how they depend on w: the wind at the knots, one
+  // after the other, then log s. Nothing where the sheet is too soft to hang in its shape.
+  std::optional<SheetMotion> simulated(const std::vector<double>& knots, const Eigen::VectorXd& w,
+                                       bool slopes) const {
     WindCourse course{knots, {}};
     for (size_t i = 0; i < knots.size(); ++i) course.wind.push_back(w.segment<3>(3 * i));
     const double log_stiffness = w[3 * knots.size()];
     try {
       const SheetSimulation* stiffer = slopes ? &sheets_.stifferThan(log_stiffness) : nullptr;
-      return sheets_.at(log_stiffness).measure(times_, velocities_, course, measured_, stiffer, kStiffer);
+      return sheets_.at(log_stiffness)
+          .measure(times_, velocities_, course, measured_, stiffer, kStiffer);
     } catch (const NoEquilibrium&) {
       return std::nullopt;
     }
@@ -153,8 +173,8 @@ class WindFit {
     P(3 * n, 3 * n) = 1.0 / (params_.stiffness * params_.stiffness);
     const double level = 1.0 / (n * params_.strongest * params_.strongest);
     const double upright = 1.0 / (n * params_.rising * params_.rising);
-    const Eigen::Matrix3d weight = level * Eigen::Matrix3d::Identity() +
-                                   (upright - level) * down_ * down_.transpose();
+    const Eigen::Matrix3d weight =
+        level * Eigen::Matrix3d::Identity() + (upright - level) * down_ * down_.transpose();
     for (int i = 0; i < n; ++i) P.block<3, 3>(3 * i, 3 * i) = weight;
     for (int i = 0; i + 1 < n; ++i) {
       const double weight = 1.0 / (params_.change * params_.change * (knots[i + 1] - knots[i]));
@@ -191,36 +211,47 @@ class WindFit {
         const double value = there.r.squaredNorm() + tried.dot(P * tried);
         if (value < cost) w = tried, at = there, cost = value, reached.swap(motion);
       }
-      if (step.cwiseAbs().maxCoeff() < kSettled || (cost < before && before - cost < kGained * before)) break;
+      if (step.cwiseAbs().maxCoeff() < kSettled ||
+          (cost < before && before - cost < kGained * before))
+        break;
       failed = cost < before ? 0 : failed + 1;
-      damping = cost < before ? (damping < kLeastDamping ? 0.0 : damping / kDamping) : std::max(kLeastDamping, damping * kDamping);
+      damping = cost < before ? (damping < kLeastDamping ? 0.0 : damping / kDamping)
+                              : std::max(kLeastDamping, damping * kDamping);
     }
-    return Fitted{seenPart(at.J, P, w), reached->amplitudes, at.J.transpose() * at.J + P, cost, at.r.squaredNorm()};
+    return Fitted{seenPart(at.J, P, w), reached->amplitudes, at.J.transpose() * at.J + P, cost,
+                  at.r.squaredNorm()};
   }
 
-  // Gauss-Newton's step. Where the picture says little more than what was known beforehand, as of wind along the
-  // sheet, it would follow the errors of the simulation: there w goes to what was known beforehand.
-  Eigen::VectorXd stepFrom(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, const Eigen::VectorXd& r,
-                           const Eigen::VectorXd& w, double damping) const {
+  // Gauss-Newton's step. Where the picture says little more than what was known beforehand, as of
+  // wind along the sheet, it would follow the errors of the simulation: there w goes to what was
+  // known beforehand.
+  Eigen::VectorXd stepFrom(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P,
+                           const Eigen::VectorXd& r, const Eigen::VectorXd& w,
+                           double damping) const {
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> seen(J.transpose() * J, P);
     const Eigen::MatrixXd& V = seen.eigenvectors();  // V' P V = 1
-    const Eigen::VectorXd beforehand = V.transpose() * (P * w), pictures = V.transpose() * (J.transpose() * r);
+    const Eigen::VectorXd beforehand = V.transpose() * (P * w),
+                          pictures = V.transpose() * (J.transpose() * r);
     Eigen::VectorXd along(w.size());
     for (int i = 0; i < w.size(); ++i) {
       const double information = seen.eigenvalues()[i];
-      along[i] = information > leastInformation(seen.eigenvalues()) ? (pictures[i] + beforehand[i]) / ((1.0 + damping) * information + 1.0) : beforehand[i];
+      along[i] = information > leastInformation(seen.eigenvalues())
+                     ? (pictures[i] + beforehand[i]) / ((1.0 + damping) * information + 1.0)
+                     : beforehand[i];
     }
     return -(V * along);
   }
 
-  // Wind and log s. A stiff sheet in much wind and a soft one in little are two valleys: the better of both ends. Where
-  // neither shows the motion, it is for a changing wind to do, on the stiff one, which answers it more evenly.
+  // Wind and log s. A stiff sheet in much wind and a soft one in little are two valleys: the better
+  // of both ends. Where neither shows the motion, it is for a changing wind to do, on the stiff
+  // one, which answers it more evenly.
   // @param direction  unit vector, of the wind that is tried first
   std::optional<Fitted> steady(const Eigen::Vector3d& direction) const {
     const double motion = flat(modes_.amplitudes).squaredNorm();
     std::optional<Fitted> best;
     for (const double log_stiffness : {0.0, kStiffStart}) {
-      const std::optional<Fitted> fitted = solve({times_.front()}, firstGuess(direction, log_stiffness));
+      const std::optional<Fitted> fitted =
+          solve({times_.front()}, firstGuess(direction, log_stiffness));
       if (!fitted) continue;
       const bool none_shown = best && fitted->left > (1.0 - kHardlyShown) * motion &&
                               best->left > (1.0 - kHardlyShown) * motion;
@@ -238,7 +269,8 @@ class WindFit {
       Eigen::VectorXd w(4);
       w << strength * direction, log_stiffness;
       const std::optional<SheetMotion> motion = simulated({times_.front()}, w, false);
-      const double left = motion ? flat(motion->amplitudes - modes_.amplitudes).squaredNorm() : least;
+      const double left =
+          motion ? flat(motion->amplitudes - modes_.amplitudes).squaredNorm() : least;
       if (strength > kGuesses[0] && left >= least) break;
       best = w, least = left;
     }
@@ -246,15 +278,18 @@ class WindFit {
   }
 
   // w, as it was known beforehand where the pictures say no more.
-  Eigen::VectorXd seenPart(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, const Eigen::VectorXd& w) const {
+  Eigen::VectorXd seenPart(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P,
+                           const Eigen::VectorXd& w) const {
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> seen(J.transpose() * J, P);
     const Eigen::MatrixXd& V = seen.eigenvectors();
-    const Eigen::VectorXd along = (seen.eigenvalues().array() > leastInformation(seen.eigenvalues())).select(V.transpose() * (P * w), 0.0);
+    const Eigen::VectorXd along =
+        (seen.eigenvalues().array() > leastInformation(seen.eigenvalues()))
+            .select(V.transpose() * (P * w), 0.0);
     return V * along;
   }
 
-  // What the simulation cannot show persists from frame to frame, and would otherwise outvote what is known
-  // beforehand: from here on residuals count as the fewer independent ones that they are.
+  // What the simulation cannot show persists from frame to frame, and would otherwise outvote what
+  // is known beforehand: from here on residuals count as the fewer independent ones that they are.
   void allowForPersistence(const Eigen::MatrixXd& amplitudes) {
     const Eigen::VectorXd r = flat(amplitudes - modes_.amplitudes);
     const int frames = static_cast<int>(times_.size());
@@ -264,8 +299,10 @@ class WindFit {
       square += series.squaredNorm();
       product += series.tail(frames - 1).dot(series.head(frames - 1));
     }
-    const double correlation = square > 0.0 ? std::clamp(product / square, 0.0, kMostPersistent) : 0.0;
-    spread_ *= std::sqrt(std::max(1.0, square / r.size()) * (1.0 + correlation) / (1.0 - correlation));
+    const double correlation =
+        square > 0.0 ? std::clamp(product / square, 0.0, kMostPersistent) : 0.0;
+    spread_ *=
+        std::sqrt(std::max(1.0, square / r.size()) * (1.0 + correlation) / (1.0 - correlation));
   }
 
  private:
@@ -283,14 +320,15 @@ class WindFit {
   const std::vector<double>& times_;
   const DeformationModes& modes_;
   const WindParams& params_;
-  Eigen::Vector3d down_;          // unit; zero without gravity
-  Eigen::MatrixXd measured_;      // Phi^+, K x 3 #V, world axes
-  Eigen::VectorXd velocities_;    // of the surface in the key frame
-  Eigen::MatrixXd deviations_;    // T x K
-  double spread_ = 1.0;           // factor on them
+  Eigen::Vector3d down_;        // unit; zero without gravity
+  Eigen::MatrixXd measured_;    // Phi^+, K x 3 #V, world axes
+  Eigen::VectorXd velocities_;  // of the surface in the key frame
+  Eigen::MatrixXd deviations_;  // T x K
+  double spread_ = 1.0;         // factor on them
 };
 
-// Unit vector across the sheet, towards the side to which it moves: what pushes it must come from the other one.
+// Unit vector across the sheet, towards the side to which it moves: what pushes it must come from
+// the other one.
 Eigen::Vector3d likelyDirection(const ObjectModel& model, const DeformationModes& modes) {
   const Eigen::VectorXd shape = modes.shapes * modes.amplitudes.colwise().mean().transpose();
   const Eigen::Map<const Eigen::Matrix3Xd> u(shape.data(), 3, shape.size() / 3);
@@ -303,10 +341,12 @@ struct CellSizes {
   double first, simulator;
 };
 
-// On as coarse a grid as finds an equilibrium. A sheet of unknown stiffness must also hang in its shape when it is soft;
-// where it does not, finer grids hardly help, and would cost most of the time. @param note  why there is none
-std::optional<SheetFamily> sheetsOf(const ObjectModel& model, const Eigen::Vector3d& gravity, const CellSizes& cells,
-                                    bool given, std::string& note, const WindParams& params) {
+// On as coarse a grid as finds an equilibrium. A sheet of unknown stiffness must also hang in its
+// shape when it is soft; where it does not, finer grids hardly help, and would cost most of the
+// time. @param note  why there is none
+std::optional<SheetFamily> sheetsOf(const ObjectModel& model, const Eigen::Vector3d& gravity,
+                                    const CellSizes& cells, bool given, std::string& note,
+                                    const WindParams& params) {
   std::optional<SheetFamily> sheets;
   double cell = cells.first;
   for (int finer = 1; !sheets && finer <= (given ? kFiner : 1); finer *= 2) {
@@ -324,7 +364,8 @@ std::optional<SheetFamily> sheetsOf(const ObjectModel& model, const Eigen::Vecto
 // @param given  the sheet is as stiff as the simulator starts with; else that is fitted, too
 std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<double>& times,
                                     const DeformationModes& modes, const Eigen::Vector3d& gravity,
-                                    const CellSizes& cells, bool given, std::string& note, const WindParams& params) {
+                                    const CellSizes& cells, bool given, std::string& note,
+                                    const WindParams& params) {
   std::optional<SheetFamily> sheets = sheetsOf(model, gravity, cells, given, note, params);
   if (!sheets) return std::nullopt;
   WindFit fit(*sheets, model, times, modes, gravity, params);
@@ -362,13 +403,15 @@ std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<
   estimate.mean = average * changing;
   estimate.mean_covariance = average * covariance * average.transpose();
   estimate.amplitudes = fit.simulated(estimate.knots, changing, false)->amplitudes;
-  estimate.explained = 1.0 - (estimate.amplitudes - modes.amplitudes).squaredNorm() /
-                                 modes.amplitudes.squaredNorm();
+  estimate.explained =
+      1.0 - (estimate.amplitudes - modes.amplitudes).squaredNorm() / modes.amplitudes.squaredNorm();
   if (estimate.explained < params.least_explained) {
     char text[160];
-    std::snprintf(text, sizeof text,
-                  "no wind: the simulated sheet shows %.0f %% of the motion at best; another material "
-                  "or hold may", 100.0 * std::max(0.0, estimate.explained));
+    std::snprintf(
+        text, sizeof text,
+        "no wind: the simulated sheet shows %.0f %% of the motion at best; another material "
+        "or hold may",
+        100.0 * std::max(0.0, estimate.explained));
     note = text;
     return std::nullopt;
   }
@@ -383,14 +426,17 @@ Eigen::Matrix3d WindEstimate::covarianceAt(double time) const {
   return sum;
 }
 
-// A motion that no hanging sheet makes, such as a wave that something else drives, may lead stiffness and wind together
-// astray: then the wind alone is fitted as well, and what shows more of the motion is taken.
+// A motion that no hanging sheet makes, such as a wave that something else drives, may lead
+// stiffness and wind together astray: then the wind alone is fitted as well, and what shows more of
+// the motion is taken.
 std::optional<WindEstimate> estimateWind(const ObjectModel& model, const std::vector<double>& times,
-                                         const DeformationModes& modes, const Eigen::Vector3d& gravity,
-                                         std::string& note, const WindParams& params) {
+                                         const DeformationModes& modes,
+                                         const Eigen::Vector3d& gravity, std::string& note,
+                                         const WindParams& params) {
   if (modes.count() == 0 || times.size() < 3) return std::nullopt;
   try {
-    const CellSizes cells{cellSizeFor(model.mesh, params.nodes), cellSizeFor(model.mesh, params.simulator_nodes)};
+    const CellSizes cells{cellSizeFor(model.mesh, params.nodes),
+                          cellSizeFor(model.mesh, params.simulator_nodes)};
     const auto free = fitWind(model, times, modes, gravity, cells, false, note, params);
     if (free && free->explained > kWellShown) return free;
     const auto given = fitWind(model, times, modes, gravity, cells, true, note, params);

@@ -15,8 +15,7 @@ const Eigen::Vector3d kGravity(0.0, 0.0, -9.81);
 Frame frameOf(double time, const Eigen::Isometry3d& pose, uint64_t seed, double scroll = 0.0,
               double noise = kNoise) {
   const Camera camera = test::testCamera();
-  return makeFrame(time, test::render(test::boxModel(), pose, camera, noise, seed, scroll),
-                   camera);
+  return makeFrame(time, test::render(test::boxModel(), pose, camera, noise, seed, scroll), camera);
 }
 
 ClipAnalyser analyserOf(const Frame& key) {
@@ -26,8 +25,8 @@ ClipAnalyser analyserOf(const Frame& key) {
 // The box's pose after moving with constant velocity and spin about the world's vertical.
 Eigen::Isometry3d movedPose(double t, const Eigen::Vector3d& velocity, double spin) {
   Eigen::Isometry3d pose = test::boxModel().world_from_object;
-  pose.linear() = Eigen::AngleAxisd(spin * t, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
-                  pose.linear();
+  pose.linear() =
+      Eigen::AngleAxisd(spin * t, Eigen::Vector3d::UnitZ()).toRotationMatrix() * pose.linear();
   pose.translation() += velocity * t;
   return pose;
 }
@@ -54,16 +53,19 @@ TEST(ClipDynamics, findsAFastSpinningBox) {
   const Eigen::Vector3d velocity(0.5, 0.0, 0.3);
   const double spin = 15.0;
   ClipAnalyser analyser = analyserOf(frameOf(0.0, movedPose(0.0, velocity, spin), 1));
-  for (int k = 1; k < 10; ++k) analyser.add(frameOf(k / kFps, movedPose(k / kFps, velocity, spin), 1 + k));
+  for (int k = 1; k < 10; ++k)
+    analyser.add(frameOf(k / kFps, movedPose(k / kFps, velocity, spin), 1 + k));
   const ObjectDynamics box = analyser.finish().front();
   for (const ObjectMotion& motion : box.motions) EXPECT_GT(motion.tracks, 6);
   EXPECT_NEAR(box.motions[5].state.spin.z(), spin, 0.03 * spin);
-  // Every second frame is the next ones' reference: their errors, some tenths of a pixel of 6.7, add up.
+  // Every second frame is the next ones' reference: their errors, some tenths of a pixel of 6.7,
+  // add up.
   EXPECT_NEAR(box.motions[5].state.velocity.x(), 0.5, 0.07);
   EXPECT_NEAR(box.motions[5].state.velocity.z(), 0.3, 0.07);
 }
 
-// Noise hides tracks from a reference; a new one from the same side would only add its pose's error.
+// Noise hides tracks from a reference; a new one from the same side would only add its pose's
+// error.
 TEST(ClipDynamics, noiseWearsNoReferenceOut) {
   constexpr double kHeavy = 30.0;  // grey levels
   const Eigen::Vector3d velocity(0.3, 0.0, 0.0);
@@ -123,8 +125,7 @@ TEST(ClipDynamics, keyFrameHasTheAlignedPoseExactly) {
   ClipAnalyser analyser = analyserOf(frameOf(0.0, movedPose(0.0, {1, 0, 0}, 0.0), 1));
   analyser.add(frameOf(1 / kFps, movedPose(1 / kFps, {1, 0, 0}, 0.0), 2));
   const ObjectDynamics box = analyser.finish().front();
-  EXPECT_EQ(box.motions[0].world_from_object.matrix(),
-            test::boxModel().world_from_object.matrix());
+  EXPECT_EQ(box.motions[0].world_from_object.matrix(), test::boxModel().world_from_object.matrix());
 }
 
 TEST(ClipDynamics, staticBoxBeforeAMovingBackgroundIsAtRest) {
@@ -145,8 +146,8 @@ TEST(ClipDynamics, cameraMotionIsNotObjectMotion) {
   const auto frameFrom = [&](int k) {
     Camera camera = test::testCamera();
     camera.world_from_camera.translation() += Eigen::Vector3d(0.01 * k, 0.0, 0.004 * k);
-    return makeFrame(k / kFps,
-                     test::render(model, model.world_from_object, camera, kNoise, 40 + k), camera);
+    return makeFrame(k / kFps, test::render(model, model.world_from_object, camera, kNoise, 40 + k),
+                     camera);
   };
   ClipAnalyser analyser = analyserOf(frameFrom(0));
   for (int k = 1; k < 10; ++k) analyser.add(frameFrom(k));
@@ -226,8 +227,8 @@ TEST(ClipDynamics, repeatsToTheByte) {
 
 TEST(LiveDynamics, followsARenderedBoxCausally) {
   const Eigen::Vector3d velocity(0.6, 0.0, 0.2);
-  LiveAnalyser live(frameOf(0.0, movedPose(0.0, velocity, 0.0), 1), {test::boxModel()},
-                    {cv::Mat()}, kGravity);
+  LiveAnalyser live(frameOf(0.0, movedPose(0.0, velocity, 0.0), 1), {test::boxModel()}, {cv::Mat()},
+                    kGravity);
   std::vector<NamedMotion> motions;
   for (int k = 1; k < 15; ++k) {
     motions = live.add(frameOf(k / kFps, movedPose(k / kFps, velocity, 0.0), 1 + k));

@@ -125,7 +125,8 @@ TEST(DeformationModes, nothingMovesNothingFound) {
   EXPECT_EQ(modesOf(observations, fitter.field().weightsAt(model.mesh.vertices)).count(), 0);
 }
 
-// A cantilever's first frequency after Euler and Bernoulli:  omega = 1.8751^2 sqrt(E I / (rho A L^4)).
+// A cantilever's first frequency after Euler and Bernoulli:  omega = 1.8751^2 sqrt(E I / (rho A
+// L^4)).
 TEST(StiffnessRatio, ofACantileverIsTheBeams) {
   constexpr double kLength = 0.6, kHeight = 0.05, kRatio = 4000.0;
   ObjectModel model;
@@ -142,15 +143,15 @@ TEST(StiffnessRatio, ofACantileverIsTheBeams) {
   for (int i = 0; i < model.mesh.vertexCount(); ++i) {
     const double s = beta * model.mesh.vertices(i, 0) / kLength;
     const double sigma = 0.734096;
-    shape[3 * i + 2] = std::polar(
-        0.01 * (std::cosh(s) - std::cos(s) - sigma * (std::sinh(s) - std::sin(s))), 0.3);
+    shape[3 * i + 2] =
+        std::polar(0.01 * (std::cosh(s) - std::cos(s) - sigma * (std::sinh(s) - std::sin(s))), 0.3);
   }
   std::string note;
   const auto ratio = stiffnessRatio(model, line, shape, note);
   ASSERT_TRUE(ratio.has_value()) << note;
   EXPECT_GT(ratio->agreement, 0.95);
-  // Euler and Bernoulli leave out shear, 1 % of the frequency here. The rest is the grid's error in the
-  // beam's stiffness: measured as 1.10 with 1000 nodes, not derived.
+  // Euler and Bernoulli leave out shear, 1 % of the frequency here. The rest is the grid's error in
+  // the beam's stiffness: measured as 1.10 with 1000 nodes, not derived.
   EXPECT_NEAR(ratio->value / kRatio, 1.0, 0.13);
   EXPECT_NEAR(ratio->deviation, 0.02 * ratio->value, 1e-6 * ratio->value);
   model.attached.clear();

@@ -28,7 +28,7 @@ TEST(Filmed, windAcrossASheetIsFound) {
 TEST(Filmed, beamVibratesAtItsFrequency) {
   const FilmedBeam beam = filmedBeam(15e3, 40);
   const ObjectDynamics found = analyseFilm(beam.model, beam.camera, beam.shapes, beam.times,
-                                       Eigen::Vector3d(0.0, 0.0, -9.81));
+                                           Eigen::Vector3d(0.0, 0.0, -9.81));
   ASSERT_TRUE(found.deformation);
   ASSERT_FALSE(found.deformation->lines.empty());
   // 1 % over two seconds; here over 1.3.

@@ -5,8 +5,8 @@
 #include <calipso_msgs/Segmentation.h>
 #include <cv_bridge/cv_bridge.h>
 #include <gtest/gtest.h>
-#include <ros/ros.h>
 #include <ros/callback_queue.h>
+#include <ros/ros.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 
 #include "calipso_ros/conversions.hpp"
@@ -52,10 +52,10 @@ class FlowNodeTest : public testing::Test {
     tf.transform = toTransformMsg(camera_.world_from_camera);
     broadcaster_.sendTransform(tf);
     subscribers_ = {
-        nh_.subscribe<calipso_msgs::NodeStatus>(
-            topics::kStatus, 100, [this](const auto& msg) { status_ = *msg; }),
-        nh_.subscribe<calipso_msgs::ClipDynamics>(
-            topics::kClipDynamics, 1, [this](const auto& msg) { clip_ = *msg; }),
+        nh_.subscribe<calipso_msgs::NodeStatus>(topics::kStatus, 100,
+                                                [this](const auto& msg) { status_ = *msg; }),
+        nh_.subscribe<calipso_msgs::ClipDynamics>(topics::kClipDynamics, 1,
+                                                  [this](const auto& msg) { clip_ = *msg; }),
         nh_.subscribe<calipso_msgs::Dynamics>(
             topics::kDynamics, 100, [this](const auto& msg) { dynamics_.push_back(*msg); }),
         nh_.subscribe<sensor_msgs::Image>(topics::kFlow, 100,
@@ -94,9 +94,8 @@ class FlowNodeTest : public testing::Test {
     calipso_msgs::Segmentation msg;
     msg.header = headerOf(0);
     cv::Mat labels(camera_.height, camera_.width, CV_8U, cv::Scalar(0));
-    const SurfaceView view =
-        viewSurface(model_.mesh, camera_,
-                    camera_.world_from_camera.inverse() * model_.world_from_object);
+    const SurfaceView view = viewSurface(
+        model_.mesh, camera_, camera_.world_from_camera.inverse() * model_.world_from_object);
     labels(view.window).setTo(1, view.depth > 0.0f);
     cv_bridge::CvImage(headerOf(0), "mono8", labels).toImageMsg(msg.labels);
     return msg;

@@ -14,7 +14,8 @@ std::vector<OutlineStep> steps(double all, double right, double down) {
     const double angle = 2.0 * M_PI * i / 70.0;
     OutlineStep step;
     step.outward = {std::cos(angle), std::sin(angle)};
-    step.distance = all + right * step.outward.x() + down * step.outward.y() + (i % 7 == 0 ? 3.5 : 0.0);
+    step.distance =
+        all + right * step.outward.x() + down * step.outward.y() + (i % 7 == 0 ? 3.5 : 0.0);
     step.variance = 0.04;
     result.push_back(step);
   }
@@ -23,12 +24,15 @@ std::vector<OutlineStep> steps(double all, double right, double down) {
 
 TEST(OutlineBias, isFoundByDirection) {
   const OutlineBias bias(steps(-0.35, 0.2, 0.4));
-  // Strangers at 3.5 px, 17 deviations, weigh under one in 300, and pull by less than a tenth of a pixel.
+  // Strangers at 3.5 px, 17 deviations, weigh under one in 300, and pull by less than a tenth of a
+  // pixel.
   EXPECT_NEAR(bias.towards({1.0, 0.0}), -0.15, 0.1);
   EXPECT_NEAR(bias.towards({0.0, -1.0}), -0.75, 0.1);
 }
 
-TEST(OutlineBias, ofNoStepsIsNone) { EXPECT_EQ(OutlineBias(std::vector<OutlineStep>{}).towards({0.6, 0.8}), 0.0); }
+TEST(OutlineBias, ofNoStepsIsNone) {
+  EXPECT_EQ(OutlineBias(std::vector<OutlineStep>{}).towards({0.6, 0.8}), 0.0);
+}
 
 TEST(OutlineStep, saysNothingAlongTheOutline) {
   OutlineStep step;

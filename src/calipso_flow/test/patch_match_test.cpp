@@ -14,7 +14,8 @@ cv::Mat picture(double dx, double dy, double gain, double offset, double ramp) {
   for (int y = 0; y < 80; ++y) {
     for (int x = 0; x < 80; ++x) {
       const double u = x - dx, v = y - dy;
-      const double grey = 100 + 40 * std::sin(0.4 * u) * std::cos(0.3 * v) + 20 * std::sin(0.25 * v);
+      const double grey =
+          100 + 40 * std::sin(0.4 * u) * std::cos(0.3 * v) + 20 * std::sin(0.25 * v);
       image.at<float>(y, x) = static_cast<float>(gain * grey + offset + ramp * x);
     }
   }
@@ -64,7 +65,8 @@ TEST(PatchMatch, refusesARadiusItHasNoRoomFor) {
   PatchParams params;
   for (const int radius : {0, kMostRadius + 1}) {
     params.radius_px = radius;
-    EXPECT_THROW(matchPatch(sourceAt(image, {40, 40}), {image, {}}, {40, 40}, params), std::invalid_argument);
+    EXPECT_THROW(matchPatch(sourceAt(image, {40, 40}), {image, {}}, {40, 40}, params),
+                 std::invalid_argument);
   }
 }
 

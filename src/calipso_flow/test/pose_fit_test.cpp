@@ -34,8 +34,8 @@ Eigen::Isometry3d somePose() {
 
 TEST(PoseFit, isExactWithoutNoise) {
   const auto points = correspondences(somePose(), 0.0, 1);
-  const PoseFit fit = fitPose(points, test::testCamera(), Eigen::Isometry3d::Identity(),
-                              Eigen::Vector3d::Zero());
+  const PoseFit fit =
+      fitPose(points, test::testCamera(), Eigen::Isometry3d::Identity(), Eigen::Vector3d::Zero());
   ASSERT_TRUE(fit.converged);
   EXPECT_TRUE(fit.world_from_object.isApprox(somePose(), 1e-7));
 }
@@ -70,7 +70,8 @@ TEST(PoseFit, covarianceIsCalibrated) {
   EXPECT_LE(inside, 0.99 * kRepeats);
 }
 
-// A shape that bulges where the model does not: smooth over it, so that it does not average out over the points.
+// A shape that bulges where the model does not: smooth over it, so that it does not average out
+// over the points.
 TEST(PoseFit, covarianceHoldsTheErrorOfAWrongShape) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
@@ -80,7 +81,8 @@ TEST(PoseFit, covarianceHoldsTheErrorOfAWrongShape) {
     auto points = correspondences(somePose(), 0.05, 500 + i);
     const Eigen::Vector3d wave(14.0 * normal(random), 14.0 * normal(random), 14.0 * normal(random));
     const double phase = 3.0 * normal(random), amplitude = 0.5 * normal(random);
-    for (Correspondence& c : points) c.pixel += amplitude * std::sin(wave.dot(c.point) + phase) * Eigen::Vector2d(0.8, 0.6);
+    for (Correspondence& c : points)
+      c.pixel += amplitude * std::sin(wave.dot(c.point) + phase) * Eigen::Vector2d(0.8, 0.6);
     const PoseFit fit = fitPose(points, test::testCamera(), somePose(), Eigen::Vector3d::Zero());
     ASSERT_TRUE(fit.converged);
     const Eigen::Vector3d error = fit.world_from_object.translation() - somePose().translation();
@@ -97,12 +99,14 @@ TEST(PoseFit, theOutlineHelpsWhereTextureIsSpoiled) {
     for (Correspondence& c : points) c.covariance = 0.05 * 0.05 * Eigen::Matrix2d::Identity();
     const auto error = [&] {
       const PoseFit fit = fitPose(points, test::testCamera(), somePose(), Eigen::Vector3d::Zero());
-      return fit.converged ? (fit.world_from_object.translation() - somePose().translation()).norm() : 1.0;
+      return fit.converged ? (fit.world_from_object.translation() - somePose().translation()).norm()
+                           : 1.0;
     };
     without += error();
     auto outline = correspondences(somePose(), 0.2, 900 + i);
     for (Correspondence& c : outline) {
-      const Eigen::Vector2d across = Eigen::Vector2d(c.point.x(), c.point.z()).normalized(), along(-across.y(), across.x());
+      const Eigen::Vector2d across = Eigen::Vector2d(c.point.x(), c.point.z()).normalized(),
+                            along(-across.y(), across.x());
       c.covariance += 1e6 * along * along.transpose();
       c.outline = true;
       points.push_back(c);
@@ -116,7 +120,8 @@ TEST(PoseFit, theOutlineHelpsWhereTextureIsSpoiled) {
 TEST(PoseFit, theOutlineIsWeighedByHowWellItFits) {
   auto points = correspondences(somePose(), 0.02, 7);
   for (Correspondence& c : correspondences(somePose(), 2.0, 8)) {
-    c.covariance = 0.05 * 0.05 * Eigen::Matrix2d::Identity() + Eigen::Vector2d(0.0, 1e3).asDiagonal().toDenseMatrix();
+    c.covariance = 0.05 * 0.05 * Eigen::Matrix2d::Identity() +
+                   Eigen::Vector2d(0.0, 1e3).asDiagonal().toDenseMatrix();
     c.outline = true;
     points.push_back(c);
   }

@@ -30,8 +30,8 @@ inline TriangleMesh boxMesh(const Eigen::Vector3d& size) {
         (i & 4 ? 0.5 : -0.5) * size.z();
   }
   mesh.triangles.resize(12, 3);
-  mesh.triangles << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4,
-      2, 2, 4, 6, 1, 3, 5, 3, 7, 5;
+  mesh.triangles << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2,
+      2, 4, 6, 1, 3, 5, 3, 7, 5;
   return mesh;
 }
 
@@ -73,9 +73,9 @@ inline cv::Mat render(const ObjectModel& model, const Eigen::Isometry3d& world_f
   for (int v = 0; v < fine.height; ++v) {
     for (int u = 0; u < fine.width; ++u) {
       const float depth = view.empty() ? 0.0f : view.depthAt(u, v);
-      const double grey =
-          depth > 0.0f ? textureAt(camera_from_object.inverse() * (depth * fine.ray(u, v)))
-                       : backgroundAt(u / 2.0, v / 2.0, scroll);
+      const double grey = depth > 0.0f
+                              ? textureAt(camera_from_object.inverse() * (depth * fine.ray(u, v)))
+                              : backgroundAt(u / 2.0, v / 2.0, scroll);
       big.at<float>(v, u) = static_cast<float>(grey);
     }
   }

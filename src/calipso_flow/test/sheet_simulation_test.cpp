@@ -1,9 +1,10 @@
+#include "../src/sheet_simulation.hpp"
+
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <calipso_fem/world/wind.hpp>
+#include <cmath>
 
-#include "../src/sheet_simulation.hpp"
 #include "../tools/film.hpp"
 
 namespace calipso::flow {
@@ -27,25 +28,28 @@ TEST(WindForceSlopes, areThoseOfTheForces) {
   srand(1);
   const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(mesh.vertices.data(), 3 * count);
   const Eigen::VectorXd u = Eigen::VectorXd::Random(3 * count);
-  const Slopes dx = Slopes::Random(3 * count, 2), du = Slopes::Random(3 * count, 2), dw = Slopes::Random(3, 2);
+  const Slopes dx = Slopes::Random(3 * count, 2), du = Slopes::Random(3 * count, 2),
+               dw = Slopes::Random(3, 2);
   const fem::Air air{{1.0, -3.0, 0.5}, 1.2};
   constexpr double kDensity = 2.0, kStep = 1.0 / 30.0, kEpsilon = 1e-6;
   const auto forces = [&](int p, double e) {
     const Eigen::VectorXd at = x + e * dx.col(p), moving = u + e * du.col(p);
-    const fem::Vertices f = fem::windForces(Eigen::Map<const fem::Vertices>(at.data(), count, 3),
-                                            Eigen::Map<const fem::Vertices>(moving.data(), count, 3), mesh.triangles,
-                                            {air.wind + e * dw.col(p), air.drag}, kDensity, kStep);
+    const fem::Vertices f =
+        fem::windForces(Eigen::Map<const fem::Vertices>(at.data(), count, 3),
+                        Eigen::Map<const fem::Vertices>(moving.data(), count, 3), mesh.triangles,
+                        {air.wind + e * dw.col(p), air.drag}, kDensity, kStep);
     return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(f.data(), f.size()));
   };
   const Slopes slopes = windForceSlopes(x, u, mesh.triangles, air, kDensity, kStep, dx, du, dw);
   for (int p = 0; p < 2; ++p) {
-    const Eigen::VectorXd difference = (forces(p, kEpsilon) - forces(p, -kEpsilon)) / (2.0 * kEpsilon);
+    const Eigen::VectorXd difference =
+        (forces(p, kEpsilon) - forces(p, -kEpsilon)) / (2.0 * kEpsilon);
     EXPECT_LT((slopes.col(p) - difference).norm(), 1e-6 * difference.norm()) << p;
   }
 }
 
-// Of every parameter, against the difference of two simulations. What the tangent leaves out (how viscosity turns with
-// the sheet) and the tolerance to which steps are solved are a few percent.
+// Of every parameter, against the difference of two simulations. What the tangent leaves out (how
+// viscosity turns with the sheet) and the tolerance to which steps are solved are a few percent.
 TEST(SheetSimulation, slopesAreThoseOfItsMotion) {
   const ObjectModel model = hangingSheet();
   std::vector<double> times;
@@ -59,26 +63,30 @@ TEST(SheetSimulation, slopesAreThoseOfItsMotion) {
   as_is.nodes = more_stiff.nodes = less_stiff.nodes = 60;
   as_is.coarse_skin = more_stiff.coarse_skin = less_stiff.coarse_skin = true;
   more_stiff.stiffness = std::exp(kBy), less_stiff.stiffness = std::exp(-kBy);
-  SheetSimulation sheet(model, kGravity, as_is), stiffer(model, kGravity, more_stiff), softer(model, kGravity, less_stiff);
+  SheetSimulation sheet(model, kGravity, as_is), stiffer(model, kGravity, more_stiff),
+      softer(model, kGravity, less_stiff);
   const SheetMotion motion = sheet.measure(times, still, wind, measured, &stiffer, kBy);
   ASSERT_EQ(motion.slopes.size(), 10u);
   for (int p = 0; p < 9; ++p) {
     constexpr double kEpsilon = 0.05;  // m/s
     WindCourse more = wind, less = wind;
     more.wind[p / 3][p % 3] += kEpsilon, less.wind[p / 3][p % 3] -= kEpsilon;
-    const Eigen::MatrixXd difference = (sheet.measure(times, still, more, measured, nullptr, 0.0).amplitudes -
-                                        sheet.measure(times, still, less, measured, nullptr, 0.0).amplitudes) /
-                                       (2.0 * kEpsilon);
+    const Eigen::MatrixXd difference =
+        (sheet.measure(times, still, more, measured, nullptr, 0.0).amplitudes -
+         sheet.measure(times, still, less, measured, nullptr, 0.0).amplitudes) /
+        (2.0 * kEpsilon);
     const double scale = std::max(difference.norm(), 0.01 * motion.slopes[4].norm());
     EXPECT_LT((motion.slopes[p] - difference).norm(), 0.05 * scale) << p;
   }
-  const Eigen::MatrixXd difference = (stiffer.measure(times, still, wind, measured, nullptr, 0.0).amplitudes -
-                                      softer.measure(times, still, wind, measured, nullptr, 0.0).amplitudes) /
-                                     (2.0 * kBy);
+  const Eigen::MatrixXd difference =
+      (stiffer.measure(times, still, wind, measured, nullptr, 0.0).amplitudes -
+       softer.measure(times, still, wind, measured, nullptr, 0.0).amplitudes) /
+      (2.0 * kBy);
   EXPECT_LT((motion.slopes[9] - difference).norm(), 0.1 * difference.norm());
 }
 
-// A coarse skin turns the same area to the wind: it pushes a still sheet as the surface itself does.
+// A coarse skin turns the same area to the wind: it pushes a still sheet as the surface itself
+// does.
 TEST(SheetSkin, feelsTheSameForce) {
   const ObjectModel model = hangingSheet();
   SheetSettings settings;
@@ -90,14 +98,15 @@ TEST(SheetSkin, feelsTheSameForce) {
     *triangles = skin.triangles.rows();
     const fem::Vec x = skin.embedding.apply(fem::restPositions(grid.mesh()));
     const fem::Vertices shape = Eigen::Map<const fem::Vertices>(x.data(), x.size() / 3, 3);
-    const fem::Vertices f = fem::windForces(shape, fem::Vertices::Zero(shape.rows(), 3), skin.triangles,
-                                            {{0.0, 3.0, 0.0}, skin.drag}, 1.0, 0.0);
+    const fem::Vertices f = fem::windForces(shape, fem::Vertices::Zero(shape.rows(), 3),
+                                            skin.triangles, {{0.0, 3.0, 0.0}, skin.drag}, 1.0, 0.0);
     return Eigen::Vector3d(f.colwise().sum().transpose());
   };
   size_t all = 0, few = 0;
   const Eigen::Vector3d fine = force(0.0, &all), coarse = force(0.15, &few);
   EXPECT_LT(3 * few, all);
-  EXPECT_NEAR(coarse.y(), fine.y(), 0.05 * fine.y());  // the surface's own narrow sides are area, too
+  EXPECT_NEAR(coarse.y(), fine.y(),
+              0.05 * fine.y());  // the surface's own narrow sides are area, too
   EXPECT_THROW(SheetSkin(model.mesh, grid, 5.0), std::invalid_argument);
 }
 

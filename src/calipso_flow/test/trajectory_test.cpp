@@ -56,23 +56,28 @@ Eigen::Vector3d bouncing(double t, double tc, double restitution) {
   return 0.5 * g * tc * tc + after * (t - tc) + 0.5 * g * (t - tc) * (t - tc);
 }
 
-// Comes down on a corner, turns fast for a third of a frame, and leaves from an edge: one collision, whose velocities
-// are those before and after both.
+// Comes down on a corner, turns fast for a third of a frame, and leaves from an edge: one
+// collision, whose velocities are those before and after both.
 TEST(Trajectory, tellsTwoImpactsWithinAFrameAsOne) {
   const double first = 10.1 / kFps, second = 10.4 / kFps;
-  const Eigen::Vector3d g(0.0, 0.0, -9.81), v(1.0, 0.0, 0.3), between(0.8, -0.3, -2.2), after(0.8, -0.7, 1.4);
-  const Eigen::Vector3d arrived = v * first + 0.5 * g * first * first, left = arrived + between * (second - first);
+  const Eigen::Vector3d g(0.0, 0.0, -9.81), v(1.0, 0.0, 0.3), between(0.8, -0.3, -2.2),
+      after(0.8, -0.7, 1.4);
+  const Eigen::Vector3d arrived = v * first + 0.5 * g * first * first,
+                        left = arrived + between * (second - first);
   const Eigen::Vector3d spin(0.0, 4.0, 0.0);
   const auto position = [&](double t) -> Eigen::Vector3d {
     if (t < first) return v * t + 0.5 * g * t * t;
     const double s = t - second;
-    return s < 0.0 ? Eigen::Vector3d(arrived + between * (t - first)) : Eigen::Vector3d(left + after * s + 0.5 * g * s * s);
+    return s < 0.0 ? Eigen::Vector3d(arrived + between * (t - first))
+                   : Eigen::Vector3d(left + after * s + 0.5 * g * s * s);
   };
   const auto rotation = [&](double t) -> Eigen::Vector3d {
-    const double fast = std::clamp(t, first, second) - first, slow = std::min(t, first), later = std::max(0.0, t - second);
+    const double fast = std::clamp(t, first, second) - first, slow = std::min(t, first),
+                 later = std::max(0.0, t - second);
     return spin * slow + 6.0 * spin * fast + 1.5 * spin * later;
   };
-  const Trajectory fit = fitTrajectory(measure(20, 0.001, 0.003, 5, position, rotation), {}, testPrior());
+  const Trajectory fit =
+      fitTrajectory(measure(20, 0.001, 0.003, 5, position, rotation), {}, testPrior());
   ASSERT_EQ(fit.collisions.size(), 1u);
   const Collision& impact = fit.collisions.front();
   EXPECT_GT(fit.pieces.back().contact, 0.0);
@@ -136,7 +141,9 @@ TEST(Trajectory, findsTheInstantOfCollisionWithinAFrame) {
 
 // Where any gain would do for a collision, only as many are told as are allowed.
 TEST(Trajectory, tellsNoMoreCollisionsThanAllowed) {
-  const auto zigzag = [](double t) { return Eigen::Vector3d(std::abs(std::fmod(2.0 * t, 1.0) - 0.5), 0.0, 0.0); };
+  const auto zigzag = [](double t) {
+    return Eigen::Vector3d(std::abs(std::fmod(2.0 * t, 1.0) - 0.5), 0.0, 0.0);
+  };
   const auto data = measure(45, 0.001, 0.01, 10, zigzag, still);
   EXPECT_EQ(fitTrajectory(data, {}, testPrior()).collisions.size(), 5u);
   TrajectoryParams params;

@@ -8,8 +8,8 @@
 
 namespace calipso::flow {
 
-// A model as calipso_align fits it to the scene's key frame, from strokes, rough placement and, where there is one, the
-// depth image; and where the object was found.
+// A model as calipso_align fits it to the scene's key frame, from strokes, rough placement and,
+// where there is one, the depth image; and where the object was found.
 struct AlignedModel {
   ObjectModel model;
   cv::Mat mask;  // CV_8U

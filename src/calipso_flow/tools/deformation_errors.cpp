@@ -10,12 +10,11 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kTwoPi = 6.28318530717958647692;
 
-double percent(double estimate, double truth) {
-  return 100.0 * std::abs(estimate / truth - 1.0);
-}
+double percent(double estimate, double truth) { return 100.0 * std::abs(estimate / truth - 1.0); }
 
 // Root mean square error of the vertices over that of their true motion.
-double shapeError(const ObjectModel& model, const TrueObject& truth, const DeformationModes& modes) {
+double shapeError(const ObjectModel& model, const TrueObject& truth,
+                  const DeformationModes& modes) {
   double error = 0.0, motion = 0.0;
   for (int k = 0; k < modes.amplitudes.rows(); ++k) {
     const auto moved = modes.surface(model.mesh, modes.amplitudes.row(k).transpose());
@@ -26,10 +25,10 @@ double shapeError(const ObjectModel& model, const TrueObject& truth, const Defor
   return 100.0 * std::sqrt(error / motion);
 }
 
-// Correlation of the way of the lower edge (within 5 % of the height) with that of the sheet simulated in the
-// estimated wind, over frames and axes.
-double edgeCorrelation(const ObjectModel& model, const TrueObject& truth, const Eigen::Vector3d& gravity,
-                       const DeformationMotion& motion) {
+// Correlation of the way of the lower edge (within 5 % of the height) with that of the sheet
+// simulated in the estimated wind, over frames and axes.
+double edgeCorrelation(const ObjectModel& model, const TrueObject& truth,
+                       const Eigen::Vector3d& gravity, const DeformationMotion& motion) {
   const Eigen::Vector3d down = model.world_from_object.linear().transpose() * gravity.normalized();
   const Eigen::VectorXd depth = model.mesh.vertices * down;
   const double edge = depth.maxCoeff() - 0.05 * (depth.maxCoeff() - depth.minCoeff());
@@ -49,8 +48,9 @@ double edgeCorrelation(const ObjectModel& model, const TrueObject& truth, const 
 
 }  // namespace
 
-void addDeformationErrors(const ObjectModel& model, const TrueObject& truth, const ObjectDynamics& dynamics,
-                          const Eigen::Vector3d& gravity, JsonEntry& entry) {
+void addDeformationErrors(const ObjectModel& model, const TrueObject& truth,
+                          const ObjectDynamics& dynamics, const Eigen::Vector3d& gravity,
+                          JsonEntry& entry) {
   double edge = kNone, explained = kNone;
   double frequency = kNone, travel = kNone, lean = kNone, shape = kNone, estimate = kNone,
          deviation = kNone;
@@ -66,8 +66,9 @@ void addDeformationErrors(const ObjectModel& model, const TrueObject& truth, con
       if (!motion.lines.empty() && !motion.lines[0].wave_vector.isZero()) {
         const Eigen::Vector3d k =
             model.world_from_object.linear().transpose() * motion.lines[0].wave_vector;
-        travel = 360.0 / kTwoPi *
-                 std::acos(std::clamp(k.normalized().dot(truth.wave->vector.normalized()), -1.0, 1.0));
+        travel =
+            360.0 / kTwoPi *
+            std::acos(std::clamp(k.normalized().dot(truth.wave->vector.normalized()), -1.0, 1.0));
       }
     }
     if (truth.vertices.size() == motion.times.size()) {

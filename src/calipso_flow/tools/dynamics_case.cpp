@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <optional>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <stdexcept>
 
 #include "aligned_models.hpp"
@@ -73,8 +73,8 @@ double meanDepth(const TriangleMesh& mesh, const Eigen::Isometry3d& camera_from_
 // fit to the picture can do while the depth is held.
 ObjectModel heldAtDepth(const SceneObject& object, const Camera& camera, ObjectModel model) {
   const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
-  const double held = meanDepth(loadMesh(object.cad_path),
-                                camera_from_world * object.initial_world_from_object);
+  const double held =
+      meanDepth(loadMesh(object.cad_path), camera_from_world * object.initial_world_from_object);
   const double factor = held / meanDepth(model.mesh, camera_from_world * model.world_from_object);
   const Eigen::Vector3d eye = camera.world_from_camera.translation();
   const Eigen::Vector3d sight = model.world_from_object.translation() - eye;
@@ -150,8 +150,7 @@ MotionErrors motionErrors(const Scene& scene, const TrueObject& truth,
         truth.velocity.empty() ? Eigen::Vector3d::Zero() : at(truth.velocity, k);
     const Eigen::Vector3d w = truth.spin.empty() ? Eigen::Vector3d::Zero() : at(truth.spin, k);
     const Eigen::Vector3d difference = motion.state.velocity - v;
-    const double depth =
-        (scene.camera.world_from_camera.inverse() * motion.state.position).z();
+    const double depth = (scene.camera.world_from_camera.inverse() * motion.state.position).z();
     error += difference.squaredNorm();
     speed += v.squaredNorm();
     pixels += difference.norm() * scene.camera.fx / depth / scene.fps;
@@ -185,9 +184,9 @@ std::vector<double> collisionErrors(const Scene& scene, const TrueObject& truth,
   return errors;
 }
 
-// Vertical, of the first impact; true impacts less than a frame apart, which no frame lies between, count as one.
-double restitutionError(const Scene& scene, const TrueObject& truth,
-                        const Trajectory& trajectory) {
+// Vertical, of the first impact; true impacts less than a frame apart, which no frame lies between,
+// count as one.
+double restitutionError(const Scene& scene, const TrueObject& truth, const Trajectory& trajectory) {
   if (truth.collisions.empty() || trajectory.collisions.empty()) return kNone;
   const Eigen::Vector3d up = -scene.gravity.normalized();
   const TrueCollision& t = truth.collisions.front();
@@ -292,7 +291,8 @@ std::string describe(const Scene& scene, const ObjectModel& model, const TrueObj
 
 }  // namespace
 
-std::vector<std::string> evaluateScene(const std::string& directory, const DynamicsOptions& options) {
+std::vector<std::string> evaluateScene(const std::string& directory,
+                                       const DynamicsOptions& options) {
   Scene scene = loadScene(directory);
   std::vector<ObjectModel> object_models;
   std::vector<cv::Mat> masks;
@@ -310,8 +310,9 @@ std::vector<std::string> evaluateScene(const std::string& directory, const Dynam
     object_models.push_back(modelOf(scene, object, *truth, options.models, aligned[i]));
     object_models.back().attached = verticesIn(object.attachments, object_models.back());
     masks.push_back(aligned[i] ? aligned[i]->mask
-                    : truth->mask_path.empty() ? cv::Mat()
-                                               : cv::imread(truth->mask_path, cv::IMREAD_GRAYSCALE));
+                    : truth->mask_path.empty()
+                        ? cv::Mat()
+                        : cv::imread(truth->mask_path, cv::IMREAD_GRAYSCALE));
     if (!masks.back().empty()) {
       cv::resize(masks.back(), masks.back(), {}, scale, scale, cv::INTER_NEAREST);
     }
@@ -332,8 +333,9 @@ std::vector<std::string> evaluateScene(const std::string& directory, const Dynam
   const Cost start = now();
   std::vector<ObjectDynamics> dynamics = analyser.finish(false);
   add(start, scene.frame_count, costs.fit);
-  const bool deforms = std::any_of(dynamics.begin(), dynamics.end(),
-                                   [](const ObjectDynamics& d) { return d.deformation.has_value(); });
+  const bool deforms = std::any_of(dynamics.begin(), dynamics.end(), [](const ObjectDynamics& d) {
+    return d.deformation.has_value();
+  });
   if (deforms) {  // what the wind costs is what all of it costs more
     const Cost again = now();
     dynamics = analyser.finish(true);

@@ -6,12 +6,14 @@
 namespace calipso::flow {
 
 struct DynamicsOptions {
-  std::string models = "aligned";  // "aligned", "true", "held" or a folder of meshes; see evaluate's usage
-  std::string trace;            // folder for one CSV file per object; empty: none
-  int scale = 1;                // the frames are enlarged by this factor first
+  std::string models =
+      "aligned";      // "aligned", "true", "held" or a folder of meshes; see evaluate's usage
+  std::string trace;  // folder for one CSV file per object; empty: none
+  int scale = 1;      // the frames are enlarged by this factor first
 };
 
 // Runs the dynamics on a scene folder and compares with its truth: one JSON object per object.
-std::vector<std::string> evaluateScene(const std::string& directory, const DynamicsOptions& options);
+std::vector<std::string> evaluateScene(const std::string& directory,
+                                       const DynamicsOptions& options);
 
 }  // namespace calipso::flow

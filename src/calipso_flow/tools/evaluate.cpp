@@ -7,19 +7,24 @@
 
 #include "dynamics_case.hpp"
 #include "filmed_case.hpp"
-#include "repeat_case.hpp"
 #include "flow_case.hpp"
+#include "repeat_case.hpp"
 
 namespace {
 
 constexpr char kUsage[] =
-    "usage: evaluate [--models aligned|true|held|DIR] [--trace DIR] [--scale N] [--filmed] [--repeats N] PATH...\n"
-    "  PATH      a scene folder (scene.yaml), or a folder with frame10.png, frame11.png, flow10.flo\n"
-    "  --models  aligned (default): as calipso_align fits them to the key frame; true: true shape and\n"
-    "            pose; held: the true shape as a fit without any depth sees it, at the rough placement's\n"
+    "usage: evaluate [--models aligned|true|held|DIR] [--trace DIR] [--scale N] [--filmed] "
+    "[--repeats N] PATH...\n"
+    "  PATH      a scene folder (scene.yaml), or a folder with frame10.png, frame11.png, "
+    "flow10.flo\n"
+    "  --models  aligned (default): as calipso_align fits them to the key frame; true: true shape "
+    "and\n"
+    "            pose; held: the true shape as a fit without any depth sees it, at the rough "
+    "placement's\n"
     "            distance; DIR: <object>.obj in world coordinates\n"
     "  --trace   writes one CSV file per object there: the estimate and the truth, frame by frame\n"
-    "  --filmed  adds bodies simulated in a known wind or with a known stiffness, filmed by this tool\n"
+    "  --filmed  adds bodies simulated in a known wind or with a known stiffness, filmed by this "
+    "tool\n"
     "  --repeats N noisy films of a thrown box: how often the stated intervals hold the truth\n"
     "  --scale   enlarges the frames first: 2 makes 1280x720 of 640x360\n";
 
@@ -60,8 +65,8 @@ int main(int argc, char** argv) {
   for (const std::string& path : paths) {
     try {
       const bool is_flow = std::filesystem::exists(path + "/flow10.flo");
-      const std::vector<std::string> found = is_flow ? calipso::flow::evaluateFlow(path)
-                                                     : calipso::flow::evaluateScene(path, options);
+      const std::vector<std::string> found =
+          is_flow ? calipso::flow::evaluateFlow(path) : calipso::flow::evaluateScene(path, options);
       entries.insert(entries.end(), found.begin(), found.end());
     } catch (const std::exception& error) {
       std::cerr << "evaluate: " << path << ": " << error.what() << "\n";

@@ -17,10 +17,10 @@ namespace {
 using Vertices = decltype(TriangleMesh::vertices);
 
 constexpr double kFps = 30.0;
-constexpr int kOver = 2;            // samples per pixel and direction
+constexpr int kOver = 2;                // samples per pixel and direction
 constexpr double kTextureStep = 0.045;  // m, wavelength scale of the texture
 constexpr int kTruthBeamNodes = 3000;
-constexpr int kSubsteps = 16;       // per frame: backward Euler shall not damp the beam
+constexpr int kSubsteps = 16;  // per frame: backward Euler shall not damp the beam
 
 double textureAt(const Eigen::Vector3d& p) {
   const Eigen::Vector3d q = p / kTextureStep;
@@ -51,7 +51,8 @@ TriangleMesh dividedBox(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector3i> triangles;
   const auto vertexAt = [&](const Eigen::Vector3i& g) {
-    const auto [at, added] = index.try_emplace({g.x(), g.y(), g.z()}, static_cast<int>(vertices.size()));
+    const auto [at, added] =
+        index.try_emplace({g.x(), g.y(), g.z()}, static_cast<int>(vertices.size()));
     if (added) {
       const Eigen::Vector3d share = g.cast<double>().cwiseQuotient(cells.cast<double>());
       vertices.push_back(low + share.cwiseProduct(high - low));
@@ -117,7 +118,8 @@ cv::Mat film(const ObjectModel& model, const Vertices& moved, const Camera& came
       double grey = wallAt(u / double(kOver), v / double(kOver));
       if (view.window.contains({u, v})) {
         const cv::Vec3f p = view.position.at<cv::Vec3f>(v - view.window.y, u - view.window.x);
-        if (p != cv::Vec3f()) grey = textureAt(Eigen::Vector3d(p[0], p[1], p[2]) - shift.transpose());
+        if (p != cv::Vec3f())
+          grey = textureAt(Eigen::Vector3d(p[0], p[1], p[2]) - shift.transpose());
       }
       big.at<float>(v, u) = static_cast<float>(grey);
     }
@@ -149,18 +151,20 @@ FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetTrut
   sheet.model.world_from_object.translation().z() = 1.8;
   for (int i = 0; i < sheet.model.mesh.vertexCount(); ++i) {
     const bool corner = std::abs(sheet.model.mesh.vertices(i, 0)) > 0.29;
-    if (sheet.model.mesh.vertices(i, 2) > -0.02 && (corner || !settings.pegged)) sheet.model.attached.push_back(i);
+    if (sheet.model.mesh.vertices(i, 2) > -0.02 && (corner || !settings.pegged))
+      sheet.model.attached.push_back(i);
   }
   sheet.gravity = {0.0, 0.0, -9.81};
   sheet.camera = lookingAt({1.5, -1.6, 1.5}, {0.0, 0.05, 1.4}, 480, 360, 620.0);
   sheet.times = frameTimes(frames);
   sheet.wind = wind;
   SheetSettings simulated;
-  simulated.nodes = settings.nodes, simulated.longest_step = settings.step, simulated.stiffness = settings.stiffness;
+  simulated.nodes = settings.nodes, simulated.longest_step = settings.step,
+  simulated.stiffness = settings.stiffness;
   SheetSimulation simulation(sheet.model, sheet.gravity, simulated);
   const int count = sheet.model.mesh.vertexCount();
-  const Vertices rest = sheet.model.mesh.vertices.rowwise() +
-                        sheet.model.world_from_object.translation().transpose();
+  const Vertices rest =
+      sheet.model.mesh.vertices.rowwise() + sheet.model.world_from_object.translation().transpose();
   for (const SurfaceVector& u :
        simulation.run(sheet.times, SurfaceVector::Zero(3 * count), [&](double) { return wind; })) {
     sheet.shapes.push_back(rest + reshaped(u));
@@ -192,7 +196,8 @@ FilmedBeam filmedBeam(double stiffness_ratio, int frames) {
   for (const int node : body.nodesOfSurfaceVertices(beam.model.attached)) {
     for (int axis = 0; axis < 3; ++axis) fixed.push_back(3 * node + axis);
   }
-  const fem::ModalResult modal = fem::naturalFrequencies(body.model(), fixed, 2, options.lumped_mass);
+  const fem::ModalResult modal =
+      fem::naturalFrequencies(body.model(), fixed, 2, options.lumped_mass);
   beam.frequency = modal.frequencies[0];
   // Struck upwards: the first mode's shape, with the tip at 1.5 cm of amplitude.
   Eigen::VectorXd velocity = Eigen::VectorXd::Zero(3 * body.nodeCount());

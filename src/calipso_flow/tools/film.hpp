@@ -20,8 +20,8 @@ TriangleMesh dividedBox(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
 Camera lookingAt(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, int width, int height,
                  double focal_px);
 
-// An 8-bit picture of a surface that carries a smooth texture from its rest shape, before a textured
-// wall, with Gaussian noise. @param moved  #V x 3, world
+// An 8-bit picture of a surface that carries a smooth texture from its rest shape, before a
+// textured wall, with Gaussian noise. @param moved  #V x 3, world
 cv::Mat film(const ObjectModel& model, const decltype(TriangleMesh::vertices)& moved,
              const Camera& camera, double noise_grey, uint64_t seed);
 
@@ -33,19 +33,20 @@ struct FilmedSheet {
   ObjectModel model;
   Camera camera;
   Eigen::Vector3d gravity;
-  std::vector<double> times;   // s
+  std::vector<double> times;  // s
   Shapes shapes;
-  Eigen::Vector3d wind;        // m/s
+  Eigen::Vector3d wind;  // m/s
 };
 
 struct SheetTruth {
-  int nodes = 500;           // of the simulation's grid
+  int nodes = 500;            // of the simulation's grid
   double step = 1.0 / 120.0;  // s
-  double stiffness = 1.0;    // times the modulus that the simulator starts with
-  bool pegged = false;       // held at its upper corners only
+  double stiffness = 1.0;     // times the modulus that the simulator starts with
+  bool pegged = false;        // held at its upper corners only
 };
 
-// A sheet that hangs at rest by its upper edge, simulated in a steady wind that sets in with the first frame.
+// A sheet that hangs at rest by its upper edge, simulated in a steady wind that sets in with the
+// first frame.
 FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetTruth& settings = {});
 
 struct FilmedBeam {
@@ -53,8 +54,8 @@ struct FilmedBeam {
   Camera camera;
   std::vector<double> times;
   Shapes shapes;
-  double frequency;            // Hz, lowest
-  double stiffness_ratio;      // m^2/s^2
+  double frequency;        // Hz, lowest
+  double stiffness_ratio;  // m^2/s^2
 };
 
 // A beam that is held at one end, struck at the first frame, without weight.

@@ -24,18 +24,19 @@ double shapeError(const ObjectModel& model, const Shapes& shapes, const ObjectDy
   return 100.0 * std::sqrt(error / motion);
 }
 
-std::string windEntry(const std::string& name, const Eigen::Vector3d& wind, const SheetTruth& settings = {}) {
+std::string windEntry(const std::string& name, const Eigen::Vector3d& wind,
+                      const SheetTruth& settings = {}) {
   const FilmedSheet sheet = filmedSheet(wind, 45, settings);
   const ObjectDynamics found =
       analyseFilm(sheet.model, sheet.camera, sheet.shapes, sheet.times, sheet.gravity);
   JsonEntry entry;
   entry.text("case", name).text("object", sheet.model.name);
   entry.flag("deforms", found.deformation.has_value());
-  double direction = std::nan(""), strength = std::nan(""), explained = std::nan(""), covered = std::nan("");
+  double direction = std::nan(""), strength = std::nan(""), explained = std::nan(""),
+         covered = std::nan("");
   if (found.deformation && found.deformation->wind) {
     const WindEstimate& w = *found.deformation->wind;
-    direction = 180.0 / M_PI *
-                std::acos(std::min(1.0, w.mean.normalized().dot(wind.normalized())));
+    direction = 180.0 / M_PI * std::acos(std::min(1.0, w.mean.normalized().dot(wind.normalized())));
     strength = 100.0 * std::abs(w.mean.norm() / wind.norm() - 1.0);
     explained = w.explained;
     const Eigen::Vector3d error = w.mean - wind;
@@ -56,8 +57,8 @@ std::string windEntry(const std::string& name, const Eigen::Vector3d& wind, cons
 
 std::string beamEntry(const std::string& name, double ratio) {
   const FilmedBeam beam = filmedBeam(ratio, 60);
-  const ObjectDynamics found =
-      analyseFilm(beam.model, beam.camera, beam.shapes, beam.times, Eigen::Vector3d(0.0, 0.0, -9.81));
+  const ObjectDynamics found = analyseFilm(beam.model, beam.camera, beam.shapes, beam.times,
+                                           Eigen::Vector3d(0.0, 0.0, -9.81));
   JsonEntry entry;
   entry.text("case", name).text("object", beam.model.name);
   entry.flag("deforms", found.deformation.has_value());
@@ -65,7 +66,8 @@ std::string beamEntry(const std::string& name, double ratio) {
   if (found.deformation && !found.deformation->lines.empty()) {
     const SpectralLine& line = found.deformation->lines.front().line;
     frequency = 100.0 * std::abs(line.naturalFrequency() / beam.frequency - 1.0);
-    entry.number("frequency_hz", line.naturalFrequency()).number("frequency_true_hz", beam.frequency);
+    entry.number("frequency_hz", line.naturalFrequency())
+        .number("frequency_true_hz", beam.frequency);
     if (found.deformation->stiffness) {
       stiffness = 100.0 * std::abs(found.deformation->stiffness->value / ratio - 1.0);
     }
@@ -85,12 +87,14 @@ std::vector<std::string> evaluateFilmed() {
   default_grid.nodes = 1200, default_grid.step = 1.0 / 60.0;
   soft.stiffness = 0.3;
   pegged.pegged = true;
-  return {windEntry("filmed_wind_ahead", {0.0, 4.0, 0.0}), windEntry("filmed_wind_aslant", {1.2, 4.0, 0.0}),
+  return {windEntry("filmed_wind_ahead", {0.0, 4.0, 0.0}),
+          windEntry("filmed_wind_aslant", {1.2, 4.0, 0.0}),
           windEntry("filmed_wind_back", {-0.8, -3.0, 0.0}),
           windEntry("filmed_wind_coarse", {0.0, 4.0, 0.0}, as_coarse),
           windEntry("filmed_wind_simulator", {0.0, 4.0, 0.0}, default_grid),
           windEntry("filmed_wind_soft", {0.0, 2.0, 0.0}, soft),
-          windEntry("filmed_wind_pegged", {2.0, 4.0, 0.0}, pegged), beamEntry("filmed_beam", 15e3),
+          windEntry("filmed_wind_pegged", {2.0, 4.0, 0.0}, pegged),
+          beamEntry("filmed_beam", 15e3),
           beamEntry("filmed_beam_stiff", 40e3)};
 }
 

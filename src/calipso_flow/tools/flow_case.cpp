@@ -15,8 +15,8 @@
 namespace calipso::flow {
 namespace {
 
-constexpr float kFloTag = 202021.25f;   // spells PIEH
-constexpr float kUnknownFlow = 1e9f;    // larger values mark unknown pixels
+constexpr float kFloTag = 202021.25f;  // spells PIEH
+constexpr float kUnknownFlow = 1e9f;   // larger values mark unknown pixels
 constexpr int kLargestSide = 1 << 15;
 
 cv::Mat readPicture(const std::string& path) {
@@ -62,7 +62,8 @@ cv::Mat readFlo(const std::string& path) {
   }
   cv::Mat flow(height, width, CV_32FC2);
   file.read(reinterpret_cast<char*>(flow.data), flow.total() * flow.elemSize());
-  if (!file) throw std::runtime_error(path + " ends before its " + std::to_string(height) + " rows");
+  if (!file)
+    throw std::runtime_error(path + " ends before its " + std::to_string(height) + " rows");
   return flow;
 }
 

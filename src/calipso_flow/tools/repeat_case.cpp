@@ -12,8 +12,8 @@ namespace {
 
 constexpr int kFrames = 14;
 constexpr double kFps = 30.0;
-constexpr double kNoise = 4.0;          // grey levels
-constexpr double kChiSquared95 = 7.815; // three degrees of freedom
+constexpr double kNoise = 4.0;           // grey levels
+constexpr double kChiSquared95 = 7.815;  // three degrees of freedom
 
 struct Throw {
   ObjectModel model;

@@ -12,7 +12,8 @@ fem::WorldScene worldOf(const Scene& scene, const ObjectModel& model) {
   world.camera = scene.camera;
   world.gravity = scene.gravity;
   world.planes = scene.planes;
-  for (const std::string& path : scene.support_meshes) world.support_meshes.push_back({path, loadMesh(path)});
+  for (const std::string& path : scene.support_meshes)
+    world.support_meshes.push_back({path, loadMesh(path)});
   fem::WorldObject object;
   object.name = model.name;
   object.index = model.index;
@@ -24,19 +25,21 @@ fem::WorldScene worldOf(const Scene& scene, const ObjectModel& model) {
 }
 
 fem::ObservedMotion observed(const ObjectMotion& motion, double begin) {
-  return {motion.state.time - begin, motion.moving,       motion.world_from_object, motion.state.position,
-          motion.state.velocity,     motion.state.spin,   motion.state.acceleration};
+  return {motion.state.time - begin, motion.moving,         motion.world_from_object,
+          motion.state.position,     motion.state.velocity, motion.state.spin,
+          motion.state.acceleration};
 }
 
 }  // namespace
 
-void addThrow(const Scene& scene, const ObjectModel& model, const TrueObject& truth, const ObjectDynamics& dynamics,
-              JsonEntry& entry) {
+void addThrow(const Scene& scene, const ObjectModel& model, const TrueObject& truth,
+              const ObjectDynamics& dynamics, JsonEntry& entry) {
   fem::WorldParams params;
   params.frame_period = 1.0 / scene.fps;
   params.defaults.kind = ObjectKind::kRigid;
   fem::World world(worldOf(scene, model), params);
-  for (const ObjectMotion& motion : dynamics.motions) world.addObservedMotion(model.name, observed(motion, 0.0));
+  for (const ObjectMotion& motion : dynamics.motions)
+    world.addObservedMotion(model.name, observed(motion, 0.0));
   Edit edit;
   edit.object = model.name;
   edit.kind = EditKind::kVelocity;
@@ -49,12 +52,14 @@ void addThrow(const Scene& scene, const ObjectModel& model, const TrueObject& tr
     const double time = dynamics.motions[k].state.time;
     world.advanceTo(time);
     const Eigen::Vector3d thrown = world.state().objects.front().world_from_object * centre;
-    const Eigen::Vector3d real = truth.world_from_object[std::min(k, truth.world_from_object.size() - 1)] *
-                                 centre;
+    const Eigen::Vector3d real =
+        truth.world_from_object[std::min(k, truth.world_from_object.size() - 1)] * centre;
     last = (scene.camera.projectWorld(thrown) - scene.camera.projectWorld(real)).norm();
     (time < impact ? before : after) = std::max(time < impact ? before : after, last);
   }
-  entry.number("thrown_before_px", before).number("thrown_after_px", after).number("thrown_last_px", last);
+  entry.number("thrown_before_px", before)
+      .number("thrown_after_px", after)
+      .number("thrown_last_px", last);
 }
 
 }  // namespace calipso::flow

@@ -46,10 +46,10 @@ std::vector<Eigen::MatrixXd> readVertices(const std::string& path) {
   file.read(header.data(), length);
   int frames = 0, count = 0;
   const size_t shape = header.find("'shape': (");
-  const bool known = file && magic[6] == 1 && header.find("'<f4'") != std::string::npos &&
-                     header.find("'fortran_order': False") != std::string::npos &&
-                     shape != std::string::npos &&
-                     std::sscanf(header.c_str() + shape, "'shape': (%d, %d, 3)", &frames, &count) == 2;
+  const bool known =
+      file && magic[6] == 1 && header.find("'<f4'") != std::string::npos &&
+      header.find("'fortran_order': False") != std::string::npos && shape != std::string::npos &&
+      std::sscanf(header.c_str() + shape, "'shape': (%d, %d, 3)", &frames, &count) == 2;
   if (!known) throw std::runtime_error(path + " is no array of <f4 with shape (frames, N, 3)");
   std::vector<Eigen::MatrixXd> result;
   Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> values(count, 3);
@@ -75,10 +75,10 @@ TrueObject readObject(const std::string& directory, const YAML::Node& node) {
                                 readVector(c["com_velocity_after"])});
   }
   if (const YAML::Node wave = node["wave"]) {
-    truth.wave = {wave["om"].as<double>(),
-                  wave["lean"].as<double>(),
-                  {wave["sgn"].as<double>() * wave["kx"].as<double>(), 0.0,
-                   -wave["kz"].as<double>()}};
+    truth.wave = {
+        wave["om"].as<double>(),
+        wave["lean"].as<double>(),
+        {wave["sgn"].as<double>() * wave["kx"].as<double>(), 0.0, -wave["kz"].as<double>()}};
   }
   if (const YAML::Node vertices = node["true_vertices_per_frame"]) {
     truth.vertices = readVertices(directory + "/" + vertices.as<std::string>());

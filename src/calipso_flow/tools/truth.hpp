@@ -9,7 +9,7 @@
 namespace calipso::flow {
 
 struct TrueCollision {
-  double time;                              // s
+  double time;                                      // s
   Eigen::Vector3d velocity_before, velocity_after;  // m/s, of the centre of mass
 };
 
@@ -26,7 +26,7 @@ struct TrueObject {
   };
   std::optional<Wave> wave;
   std::vector<Eigen::MatrixXd> vertices;  // of a deforming object: per frame #V x 3, object frame
-  std::string mask_path;                             // of frame 0; empty when there is none
+  std::string mask_path;                  // of frame 0; empty when there is none
 };
 
 // The truth of the object called `name`; nothing when the scene folder holds no truth about it.

@@ -5,23 +5,24 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "bicubic.hpp"
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/shadow_map.hpp"
-#include "bicubic.hpp"
 #include "texture_fill.hpp"
 
 namespace calipso::render {
 namespace {
 
 constexpr float kMatt = 0.25f;  // part of a pixel's light that is never taken for a highlight
-constexpr int kMargin = 12;  // px around the object that albedo is extended by
+constexpr int kMargin = 12;     // px around the object that albedo is extended by
 constexpr int kShadowMapSide = 768;
-constexpr float kLit = 0.7f;    // of the mean light: what has less of it shows its reflectance with less certainty
+constexpr float kLit =
+    0.7f;  // of the mean light: what has less of it shows its reflectance with less certainty
 constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
 
-// Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the first
-// pixels mix with the background and with what compression spreads.
+// Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the
+// first pixels mix with the background and with what compression spreads.
 float rimTrust(float depth) {
   if (depth <= 1.0f) return 0.02f;
   return std::clamp((depth - 1.0f) / 1.5f, 0.05f, 1.0f);
@@ -51,9 +52,13 @@ struct Shaded {
   cv::Vec3f mean;
 };
 
-Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light, const Gloss& gloss,
-             const ShadowMap& sun, const cv::Vec3f& tint) {
-  Shaded s{cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32F), cv::Mat::zeros(region.size(), CV_32FC3), {}};
+Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
+             const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& tint) {
+  Shaded s{cv::Mat::zeros(region.size(), CV_32FC3),
+           cv::Mat::zeros(region.size(), CV_32FC3),
+           cv::Mat::zeros(region.size(), CV_32F),
+           cv::Mat::zeros(region.size(), CV_32FC3),
+           {}};
   VisibilityBuffer buffer(region);
   buffer.draw(actor.screen, 0);
   const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
@@ -64,11 +69,13 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
     for (int u = 0; u < region.width; ++u) {
       const std::uint32_t id = buffer.ids(v)[u];
       if (id == VisibilityBuffer::kNothing) continue;
-      const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
+      const SurfacePoint p =
+          surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
       const float visible = sun.visibility(p.position, p.normal);
       const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.sky, tint);
       s.light.at<cv::Vec3f>(v, u) = l;
-      s.highlight.at<cv::Vec3f>(v, u) = specularShading(light, gloss, p.normal, (eye - p.position).normalized(), visible, p.sky);
+      s.highlight.at<cv::Vec3f>(v, u) =
+          specularShading(light, gloss, p.normal, (eye - p.position).normalized(), visible, p.sky);
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];
@@ -82,12 +89,16 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
 }
 
 // @param mean_light that of the key frame, where there is one
-Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light, const Gloss& gloss, const ShadowMap& sun,
+Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light,
+                          const Gloss& gloss, const ShadowMap& sun,
                           const std::optional<cv::Vec3f>& mean_light, const cv::Vec3f& tint) {
   Reflectance r;
   const cv::Rect all(0, 0, view.picture.cols, view.picture.rows);
   cv::Rect mask_box = cv::boundingRect(view.labels == actor.surface->index);
-  mask_box = mask_box.empty() ? mask_box : (mask_box + cv::Size(2 * kMargin, 2 * kMargin) - cv::Point(kMargin, kMargin)) & all;
+  mask_box =
+      mask_box.empty()
+          ? mask_box
+          : (mask_box + cv::Size(2 * kMargin, 2 * kMargin) - cv::Point(kMargin, kMargin)) & all;
   r.region = boundsOf(actor.screen, kMargin, view.picture.size()) | mask_box;
   if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
   const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun, tint);
@@ -116,7 +127,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
 }
 
 cv::Vec3f meanReflectance(const Reflectance& r) {
-  const cv::Scalar mean = cv::countNonZero(r.trust) > 0 ? cv::mean(r.albedo, r.trust > 0.0f) : cv::Scalar();
+  const cv::Scalar mean =
+      cv::countNonZero(r.trust) > 0 ? cv::mean(r.albedo, r.trust > 0.0f) : cv::Scalar();
   return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
 }
 
@@ -129,13 +141,16 @@ cv::Mat widened(const cv::Mat& colour) {
 Appearance::Source sourceOf(const SurfaceTexture& texture, int triangle) {
   bool picture = true, filled = true;
   for (std::size_t i = texture.firstOf(triangle); i < texture.firstOf(triangle + 1); ++i) {
-    picture = picture && texture.texels[i][3] > kOnlyPicture, filled = filled && texture.texels[i][3] < kOnlyTexture;
+    picture = picture && texture.texels[i][3] > kOnlyPicture,
+    filled = filled && texture.texels[i][3] < kOnlyTexture;
   }
-  return picture ? Appearance::Source::kPicture : filled ? Appearance::Source::kTexture : Appearance::Source::kBoth;
+  return picture  ? Appearance::Source::kPicture
+         : filled ? Appearance::Source::kTexture
+                  : Appearance::Source::kBoth;
 }
 
-Appearance makeAppearance(const std::vector<View>& views, const std::vector<ShadowMap>& suns, std::size_t object, bool moves,
-                          const Light& light, const Gloss& gloss) {
+Appearance makeAppearance(const std::vector<View>& views, const std::vector<ShadowMap>& suns,
+                          std::size_t object, bool moves, const Light& light, const Gloss& gloss) {
   Appearance a;
   a.gloss = gloss;
   a.key_camera = views[0].camera;
@@ -146,8 +161,11 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
     used.push_back(&views[i]);
     actors.push_back(&views[i].actors[object]);
     const std::optional<cv::Vec3f> mean = i == 0 ? std::nullopt : std::make_optional(a.mean_light);
-    if (i == 0) a.tint = thrownBackTint(meanReflectance(reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, {})));
-    pictures.push_back(reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, a.tint));
+    if (i == 0)
+      a.tint = thrownBackTint(meanReflectance(
+          reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, {})));
+    pictures.push_back(
+        reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, a.tint));
     if (i == 0) a.mean_light = pictures[0].mean_light;
   }
   a.region = pictures[0].region;
@@ -160,15 +178,20 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
 
 }  // namespace
 
-std::vector<Appearance> makeAppearances(const std::vector<View>& views, const std::vector<bool>& moves, const Light& light, const Gloss& gloss) {
+std::vector<Appearance> makeAppearances(const std::vector<View>& views,
+                                        const std::vector<bool>& moves, const Light& light,
+                                        const Gloss& gloss) {
   std::vector<ShadowMap> suns;
   for (const View& view : views) {
     std::vector<Occluder> occluders;
-    for (const Actor& a : view.actors) occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-    suns.emplace_back(occluders, light.direction.cast<double>(), ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
+    for (const Actor& a : view.actors)
+      occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+    suns.emplace_back(occluders, light.direction.cast<double>(),
+                      ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
   }
   std::vector<Appearance> appearances;
-  for (std::size_t i = 0; i < moves.size(); ++i) appearances.push_back(makeAppearance(views, suns, i, moves[i], light, gloss));
+  for (std::size_t i = 0; i < moves.size(); ++i)
+    appearances.push_back(makeAppearance(views, suns, i, moves[i], light, gloss));
   return appearances;
 }
 
@@ -179,7 +202,8 @@ void Appearance::findSources() {
 
 cv::Vec3f Appearance::pictureAt(const Eigen::Vector3f& key_position) const {
   const Eigen::Vector2d q = key_camera.projectWorld(key_position.cast<double>());
-  const cv::Vec4f c = sampleBicubic(albedo, static_cast<float>(q.x()) - region.x, static_cast<float>(q.y()) - region.y);
+  const cv::Vec4f c = sampleBicubic(albedo, static_cast<float>(q.x()) - region.x,
+                                    static_cast<float>(q.y()) - region.y);
   return {c[0], c[1], c[2]};
 }
 
@@ -187,10 +211,13 @@ cv::Vec3f Appearance::albedoAt(const SurfacePoint& point) const {
   const cv::Vec4f texel = texture.at(point.triangle, point.weights);
   if (texel[3] > kOnlyPicture) return pictureAt(point.key_position);
   const cv::Vec3f filled(texel[0], texel[1], texel[2]);
-  return texel[3] < kOnlyTexture ? filled : filled * (1.0f - texel[3]) + pictureAt(point.key_position) * texel[3];
+  return texel[3] < kOnlyTexture
+             ? filled
+             : filled * (1.0f - texel[3]) + pictureAt(point.key_position) * texel[3];
 }
 
-cv::Vec3f Appearance::radiance(const cv::Vec3f& albedo_at, const cv::Vec3f& now, const cv::Vec3f& highlight) const {
+cv::Vec3f Appearance::radiance(const cv::Vec3f& albedo_at, const cv::Vec3f& now,
+                               const cv::Vec3f& highlight) const {
   return albedo_at.mul(now + lightFloor(mean_light)) + highlight;
 }
 

@@ -11,19 +11,20 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kNearMedian = 6.0f;     // code values; farther ones do not enter the mean
-constexpr float kLit = 0.75f;           // quantile of brightness that stands for the unshaded value
-constexpr std::size_t kFewestLit = 3;   // samples that a lit or shaded group must have
-constexpr double kGroupGap = 4.0;       // gap between two groups, in spreads of either
-constexpr float kShadowTint = 1.8f;     // a shadow's largest ratio of shaded to lit in a channel over its smallest
-constexpr int kAgree = 7;               // px; a shadow that stays covers most of such a square or nothing of it
-constexpr float kMovingSpread = 2.2f;   // times what still places have, and
-constexpr float kLeastMoving = 2.0f;    // code values: from there on a place moves by itself
-constexpr int kMovingGap = 12;          // px between moving places that move with them
-constexpr int kFewestMoving = 50;       // one part in so many of the picture; fewer are passing things
-constexpr int kRowsAround = 2;          // on either side of a row, for what moves in it,
-constexpr float kResting = 0.15f;       // and the part of them up to which it rests
-constexpr int kSteadyDifference = 14;   // code values; about five deviations of the difference
+constexpr float kNearMedian = 6.0f;    // code values; farther ones do not enter the mean
+constexpr float kLit = 0.75f;          // quantile of brightness that stands for the unshaded value
+constexpr std::size_t kFewestLit = 3;  // samples that a lit or shaded group must have
+constexpr double kGroupGap = 4.0;      // gap between two groups, in spreads of either
+constexpr float kShadowTint =
+    1.8f;  // a shadow's largest ratio of shaded to lit in a channel over its smallest
+constexpr int kAgree = 7;  // px; a shadow that stays covers most of such a square or nothing of it
+constexpr float kMovingSpread = 2.2f;  // times what still places have, and
+constexpr float kLeastMoving = 2.0f;   // code values: from there on a place moves by itself
+constexpr int kMovingGap = 12;         // px between moving places that move with them
+constexpr int kFewestMoving = 50;  // one part in so many of the picture; fewer are passing things
+constexpr int kRowsAround = 2;     // on either side of a row, for what moves in it,
+constexpr float kResting = 0.15f;  // and the part of them up to which it rests
+constexpr int kSteadyDifference = 14;  // code values; about five deviations of the difference
 
 cv::Mat grown(const cv::Mat& mask, int radius) {
   cv::Mat out;
@@ -36,7 +37,8 @@ int brightness(const cv::Vec3b& c) { return c[0] + 2 * c[1] + c[2]; }
 
 using Samples = std::vector<cv::Vec3b>;
 
-// Where values in order of brightness fall apart best: the least sum of squares within two groups (Otsu).
+// Where values in order of brightness fall apart best: the least sum of squares within two groups
+// (Otsu).
 std::size_t bestSplit(const Samples& sorted) {
   double total = 0.0, below = 0.0, best = -1.0;
   for (const cv::Vec3b& c : sorted) total += brightness(c);
@@ -53,7 +55,8 @@ std::size_t bestSplit(const Samples& sorted) {
 // Half the range that the middle half of a group covers, at least the camera's noise.
 double groupSpread(const Samples& sorted, std::size_t from, std::size_t to) {
   const std::size_t quarter = (to - from) / 4;
-  return std::max(0.5 * (brightness(sorted[to - 1 - quarter]) - brightness(sorted[from + quarter])), 1.0 * kNearMedian);
+  return std::max(0.5 * (brightness(sorted[to - 1 - quarter]) - brightness(sorted[from + quarter])),
+                  1.0 * kNearMedian);
 }
 
 // A shadow darkens all channels, and to about the same part of their linear values.
@@ -69,7 +72,9 @@ bool darkenedAlike(const cv::Vec3b& shaded, const cv::Vec3b& lit) {
 // Brightness without shade. A shadow that stays can hold most of the samples; two clear groups
 // that differ as shade does tell it, however few the bright ones are.
 double litBrightness(double step, Samples values) {
-  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) { return brightness(a) < brightness(b); };
+  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) {
+    return brightness(a) < brightness(b);
+  };
   std::stable_sort(values.begin(), values.end(), darker);
   const std::size_t n = values.size(), split = bestSplit(values);
   const double usual = brightness(values[static_cast<std::size_t>(kLit * (n - 1))]);
@@ -94,7 +99,9 @@ bool dropShaded(double step, Samples& values) {
 
 // Leaves out the darker of the two groups that the values fall into best.
 void keepBrighter(Samples& values) {
-  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) { return brightness(a) < brightness(b); };
+  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) {
+    return brightness(a) < brightness(b);
+  };
   std::stable_sort(values.begin(), values.end(), darker);
   values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(bestSplit(values)));
 }
@@ -151,7 +158,8 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
   const auto samplesAt = [&](int u, int v) {
     Samples values;
     for (std::size_t i = 0; i < frames.size(); ++i) {
-      if (covered[i].at<std::uint8_t>(v, u) == 0) values.push_back(frames[i].bgr.at<cv::Vec3b>(v, u));
+      if (covered[i].at<std::uint8_t>(v, u) == 0)
+        values.push_back(frames[i].bgr.at<cv::Vec3b>(v, u));
     }
     return values;
   };
@@ -161,8 +169,10 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
     for (int u = 0; u < size.width; ++u) {
       Samples values = samplesAt(u, v);
       if (values.empty()) continue;
-      b.count.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::min<std::size_t>(255, values.size()));
-      if (objects_move && dropShaded(params.shadow_step, values)) long_shaded.at<std::uint8_t>(v, u) = 255;
+      b.count.at<std::uint8_t>(v, u) =
+          static_cast<std::uint8_t>(std::min<std::size_t>(255, values.size()));
+      if (objects_move && dropShaded(params.shadow_step, values))
+        long_shaded.at<std::uint8_t>(v, u) = 255;
       b.plate.at<cv::Vec3f>(v, u) = robustMean(values, b.spread.at<float>(v, u));
     }
   }
@@ -182,21 +192,24 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
   return b;
 }
 
-// Where the place moves by itself: it spreads over time, or the key frame shows something else than the median does.
-// Empty if there is little of it: passing things.
+// Where the place moves by itself: it spreads over time, or the key frame shows something else than
+// the median does. Empty if there is little of it: passing things.
 cv::Mat movingPlaces(const ClipFrame& key, const Background& background) {
   const auto beyondNoise = [&](const cv::Mat& change) {
     cv::Mat smooth;
     cv::blur(change, smooth, {5, 5});
-    return cv::Mat(smooth > std::max(kLeastMoving, kMovingSpread * lowerQuartile(smooth, background.count > 0)));
+    return cv::Mat(smooth > std::max(kLeastMoving,
+                                     kMovingSpread * lowerQuartile(smooth, background.count > 0)));
   };
   const cv::Mat spreads = beyondNoise(background.spread);
-  if (kFewestMoving * static_cast<std::size_t>(cv::countNonZero(spreads)) <= spreads.total()) return cv::Mat::zeros(spreads.size(), CV_8U);
+  if (kFewestMoving * static_cast<std::size_t>(cv::countNonZero(spreads)) <= spreads.total())
+    return cv::Mat::zeros(spreads.size(), CV_8U);
   cv::Mat now, difference(spreads.size(), CV_32F, cv::Scalar(0.0f));
   key.bgr.convertTo(now, CV_32F);
   for (int v = 0; v < now.rows; ++v) {
     for (int u = 0; u < now.cols; ++u) {
-      if (background.count.at<std::uint8_t>(v, u) == 0 || key.labels.at<std::uint8_t>(v, u) != 0) continue;
+      if (background.count.at<std::uint8_t>(v, u) == 0 || key.labels.at<std::uint8_t>(v, u) != 0)
+        continue;
       const cv::Vec3f d = now.at<cv::Vec3f>(v, u) - background.plate.at<cv::Vec3f>(v, u);
       difference.at<float>(v, u) = std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
     }
@@ -209,12 +222,13 @@ cv::Mat closedGaps(const cv::Mat& moving) {
   const int gap = kMovingGap;
   cv::Mat closed;
   cv::copyMakeBorder(moving, closed, gap, gap, gap, gap, cv::BORDER_REPLICATE);
-  cv::morphologyEx(closed, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * gap + 1, 2 * gap + 1}));
+  cv::morphologyEx(closed, closed, cv::MORPH_CLOSE,
+                   cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * gap + 1, 2 * gap + 1}));
   return closed(cv::Rect(gap, gap, moving.cols, moving.rows)).clone();
 }
 
-// Part of what is known in the rows around that moves; 0.5 where nothing is. Places are layered: where the rows around rest, what
-// is hidden rests as well.
+// Part of what is known in the rows around that moves; 0.5 where nothing is. Places are layered:
+// where the rows around rest, what is hidden rests as well.
 cv::Mat motionOfRows(const cv::Mat& moving, const cv::Mat& known) {
   cv::Mat motion(moving.rows, 1, CV_32F), weight(moving.rows, 1, CV_32F);
   for (int v = 0; v < moving.rows; ++v) {
@@ -227,7 +241,8 @@ cv::Mat motionOfRows(const cv::Mat& moving, const cv::Mat& known) {
   return (motion + 0.5f) / (weight + 1.0f);
 }
 
-void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, const cv::Mat& surface, Background& background) {
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness,
+                      const cv::Mat& surface, Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
   const cv::Mat moving = movingPlaces(key, background);
   const bool any_moving = cv::countNonZero(moving) > 0;
@@ -249,19 +264,22 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat
     if (rows.at<float>(v) < kResting) continue;
     for (int u = 0; u < moving.cols; ++u) {
       const cv::Vec2s from = background.origin.at<cv::Vec2s>(v, u);
-      if (from[0] >= 0 && moving.at<std::uint8_t>(from[1], from[0]) != 0) live_origin.at<cv::Vec2s>(v, u) = from;
+      if (from[0] >= 0 && moving.at<std::uint8_t>(from[1], from[0]) != 0)
+        live_origin.at<cv::Vec2s>(v, u) = from;
     }
   }
   background.live = LiveFill(live_origin, background.invented);
 }
 
-cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& scenery) {
+cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& camera,
+                       const cv::Mat& scenery) {
   cv::Mat nearness = cv::Mat::zeros(camera.height, camera.width, CV_32F);
   const Eigen::Isometry3d from_world = camera.world_from_camera.inverse();
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u) {
-      const auto receiver = receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
+      const auto receiver =
+          receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
       if (!receiver) continue;
       float& near = nearness.at<float>(v, u);
       near = static_cast<float>(1.0 / (from_world * receiver->position.cast<double>()).z());
@@ -285,14 +303,19 @@ cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness
       int same = 0;
       for (const ClipFrame& f : frames) {
         const cv::Vec3b x = f.bgr.at<cv::Vec3b>(v, u);
-        const int difference = std::max({std::abs(x[0] - k[0]), std::abs(x[1] - k[1]), std::abs(x[2] - k[2])});
-        if (difference > kSteadyDifference || f.labels.at<std::uint8_t>(v, u) != key.labels.at<std::uint8_t>(v, u)) continue;
+        const int difference =
+            std::max({std::abs(x[0] - k[0]), std::abs(x[1] - k[1]), std::abs(x[2] - k[2])});
+        if (difference > kSteadyDifference ||
+            f.labels.at<std::uint8_t>(v, u) != key.labels.at<std::uint8_t>(v, u))
+          continue;
         sum += cv::Vec3f(x[0], x[1], x[2]), ++same;
       }
-      // Something that moves agrees with the key frame by chance only: then the key frame alone counts.
+      // Something that moves agrees with the key frame by chance only: then the key frame alone
+      // counts.
       const bool still = 4 * same >= 3 * static_cast<int>(frames.size());
       steady.at<cv::Vec3f>(v, u) = still ? cv::Vec3f(sum / same) : cv::Vec3f(k[0], k[1], k[2]);
-      steadiness.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(still ? std::min(same, 255) : 1);
+      steadiness.at<std::uint8_t>(v, u) =
+          static_cast<std::uint8_t>(still ? std::min(same, 255) : 1);
     }
   }
   return steady;

@@ -7,12 +7,15 @@
 namespace calipso::render {
 namespace {
 
-// Of the model drawn at a pose with the object's mask; what another object's mask covers does not count.
+// Of the model drawn at a pose with the object's mask; what another object's mask covers does not
+// count.
 double overlap(const ObjectModel& model, const ObjectPose& pose, const ClipFrame& frame) {
   Points vertices;
   Triangles triangles;
-  for (int i = 0; i < model.mesh.vertexCount(); ++i) vertices.push_back((pose.world_from_object * model.mesh.vertex(i)).cast<float>());
-  for (int t = 0; t < model.mesh.triangleCount(); ++t) triangles.push_back(model.mesh.triangles.row(t));
+  for (int i = 0; i < model.mesh.vertexCount(); ++i)
+    vertices.push_back((pose.world_from_object * model.mesh.vertex(i)).cast<float>());
+  for (int t = 0; t < model.mesh.triangleCount(); ++t)
+    triangles.push_back(model.mesh.triangles.row(t));
   VisibilityBuffer buffer({0, 0, frame.labels.cols, frame.labels.rows});
   buffer.draw(projectMesh(vertices, triangles, frame.camera), 0);
   long both = 0, either = 0;
@@ -30,7 +33,8 @@ double overlap(const ObjectModel& model, const ObjectPose& pose, const ClipFrame
 
 }  // namespace
 
-PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& models, ClipSample& clip, double least) {
+PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& models,
+                     ClipSample& clip, double least) {
   PosesTaken taken;
   for (std::size_t i = 0; i < clip.frames().size(); ++i) {
     const ClipFrame& frame = clip.frames()[i];
@@ -38,7 +42,8 @@ PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& 
     if (here == poses.end()) continue;
     std::vector<ObjectPose> fitting;
     for (const ObjectPose& pose : here->second) {
-      const auto model = std::find_if(models.begin(), models.end(), [&](const ObjectModel& m) { return m.index == pose.index; });
+      const auto model = std::find_if(models.begin(), models.end(),
+                                      [&](const ObjectModel& m) { return m.index == pose.index; });
       if (model == models.end()) continue;
       ++taken.offered;
       const double fit = overlap(*model, pose, frame);

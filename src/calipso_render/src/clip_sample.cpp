@@ -29,7 +29,8 @@ void ClipSample::add(const ClipFrame& frame) {
     stride_ *= 2;
     if ((seen_ - 1) % stride_ != 0) return;
   }
-  frames_.push_back({frame.bgr.clone(), frame.labels.clone(), frame.camera, frame.poses, frame.stamp_ns});
+  frames_.push_back(
+      {frame.bgr.clone(), frame.labels.clone(), frame.camera, frame.poses, frame.stamp_ns});
 }
 
 }  // namespace calipso::render

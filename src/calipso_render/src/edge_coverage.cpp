@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <utility>
 #include <unordered_map>
+#include <utility>
 
 #include "kernels.hpp"
 #include "marked.hpp"
@@ -24,9 +24,11 @@ TriangleSamples samplesOf(const Eigen::Vector3f (&p)[3], float area) {
   const float per_area = 1.0f / area;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
-    t.edge_u[i] = a.y() - b.y(), t.edge_v[i] = b.x() - a.x(), t.edge_0[i] = (b.y() - a.y()) * a.x() - (b.x() - a.x()) * a.y();
+    t.edge_u[i] = a.y() - b.y(), t.edge_v[i] = b.x() - a.x(),
+    t.edge_0[i] = (b.y() - a.y()) * a.x() - (b.x() - a.x()) * a.y();
     const float weight = p[i].z() * per_area;
-    t.near_u += t.edge_u[i] * weight, t.near_v += t.edge_v[i] * weight, t.near_0 += t.edge_0[i] * weight;
+    t.near_u += t.edge_u[i] * weight, t.near_v += t.edge_v[i] * weight,
+        t.near_0 += t.edge_0[i] * weight;
   }
   return t;
 }
@@ -34,7 +36,8 @@ TriangleSamples samplesOf(const Eigen::Vector3f (&p)[3], float area) {
 constexpr std::uint8_t kRight = 1, kDown = 2;
 
 // Where the object seen changes to the right of a row's pixels, or below them.
-void markChanges(const std::uint32_t* row, const std::uint32_t* below, int width, std::uint8_t* changes) {
+void markChanges(const std::uint32_t* row, const std::uint32_t* below, int width,
+                 std::uint8_t* changes) {
   for (int u = 0; u < width; ++u) changes[u] = ((row[u] ^ below[u]) >> 24) != 0 ? kDown : 0;
   for (int u = 0; u + 1 < width; ++u) changes[u] |= ((row[u] ^ row[u + 1]) >> 24) != 0 ? kRight : 0;
 }
@@ -56,27 +59,34 @@ std::vector<MeshEdge> meshEdges(const Triangles& triangles) {
     for (int i = 0; i < 3; ++i) {
       const int from = std::min(triangles[t][i], triangles[t][(i + 1) % 3]);
       const int to = std::max(triangles[t][i], triangles[t][(i + 1) % 3]);
-      const std::uint64_t key = (static_cast<std::uint64_t>(from) << 32) | static_cast<unsigned>(to);
+      const std::uint64_t key =
+          (static_cast<std::uint64_t>(from) << 32) | static_cast<unsigned>(to);
       const auto [it, inserted] = found.try_emplace(key, static_cast<int>(edges.size()));
-      if (inserted) edges.push_back({from, to, t, -1});
-      else if (edges[it->second].b < 0) edges[it->second].b = t;
+      if (inserted)
+        edges.push_back({from, to, t, -1});
+      else if (edges[it->second].b < 0)
+        edges[it->second].b = t;
     }
   }
   return edges;
 }
 
 EdgeCoverage::EdgeCoverage(const VisibilityBuffer& centre)
-    : region_(centre.region()), tiles_across_(centre.region().width / kTile + 1),
+    : region_(centre.region()),
+      tiles_across_(centre.region().width / kTile + 1),
       tiles_(static_cast<std::size_t>(tiles_across_) * (centre.region().height / kTile + 1), -1) {
   const int width = region_.width, height = region_.height;
-  std::vector<std::vector<std::pair<int, std::uint8_t>>> found(height);  // per row: columns, and where the object changes
+  std::vector<std::vector<std::pair<int, std::uint8_t>>> found(
+      height);  // per row: columns, and where the object changes
 #pragma omp parallel
   {
     std::vector<std::uint8_t> changes(width);
 #pragma omp for schedule(static)
     for (int v = 0; v < height; ++v) {
       markChanges(centre.ids(v), centre.ids(std::min(v + 1, height - 1)), width, changes.data());
-      for (int u = nextMarked(changes.data(), 0, width); u < width; u = nextMarked(changes.data(), u + 1, width)) found[v].emplace_back(u, changes[u]);
+      for (int u = nextMarked(changes.data(), 0, width); u < width;
+           u = nextMarked(changes.data(), u + 1, width))
+        found[v].emplace_back(u, changes[u]);
     }
   }
   for (int v = 0; v < height; ++v) {
@@ -95,7 +105,8 @@ void EdgeCoverage::choose(int column, int row) {
     tile = static_cast<int>(slots_.size() / (kTile * kTile));
     slots_.resize(slots_.size() + kTile * kTile, kNone);
   }
-  int& slot = slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile + column % kTile];
+  int& slot = slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile +
+                     column % kTile];
   if (slot >= 0) return;
   slot = static_cast<int>(pixels_.size());
   pixels_.emplace_back();
@@ -105,12 +116,14 @@ void EdgeCoverage::choose(int column, int row) {
 
 void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges) {
   std::vector<char> turned(mesh.triangles->size());
-  for (std::size_t t = 0; t < turned.size(); ++t) turned[t] = signedArea(mesh, (*mesh.triangles)[t]) > 0.0f;
+  for (std::size_t t = 0; t < turned.size(); ++t)
+    turned[t] = signedArea(mesh, (*mesh.triangles)[t]) > 0.0f;
   for (const MeshEdge& edge : edges) {
     if (edge.b >= 0 && turned[edge.a] == turned[edge.b]) continue;
     const Eigen::Vector3f &p = mesh.points[edge.from], &q = mesh.points[edge.to];
     if (std::isnan(p.z() + q.z())) continue;
-    const float length = std::min((q - p).head<2>().norm(), 2.0f * (region_.width + region_.height));
+    const float length =
+        std::min((q - p).head<2>().norm(), 2.0f * (region_.width + region_.height));
     const int steps = 1 + static_cast<int>(2.0f * length);
     for (int i = 0; i <= steps; ++i) {
       const Eigen::Vector3f s = p + (q - p) * (static_cast<float>(i) / steps);
@@ -124,13 +137,18 @@ void EdgeCoverage::draw(const ScreenMesh& mesh, int object) {
   if (pixels_.empty()) return;
   constexpr int kParts = 8;
   const int count = static_cast<int>(mesh.triangles->size());
-  std::vector<Piece> pieces[kParts];  // of the triangles that touch a chosen pixel's tile, in their order
+  std::vector<Piece>
+      pieces[kParts];  // of the triangles that touch a chosen pixel's tile, in their order
 #pragma omp parallel
   {
 #pragma omp for schedule(static)
     for (int part = 0; part < kParts; ++part) {
-      const int begin = static_cast<int>(static_cast<long>(count) * part / kParts), end = static_cast<int>(static_cast<long>(count) * (part + 1) / kParts);
-      for (int t = begin; t < end; ++t) addPieces(mesh, t, (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t), pieces[part]);
+      const int begin = static_cast<int>(static_cast<long>(count) * part / kParts),
+                end = static_cast<int>(static_cast<long>(count) * (part + 1) / kParts);
+      for (int t = begin; t < end; ++t)
+        addPieces(mesh, t,
+                  (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t),
+                  pieces[part]);
     }
 #pragma omp for schedule(static)
     for (int band = 0; band < kParts; ++band) {
@@ -143,37 +161,48 @@ void EdgeCoverage::draw(const ScreenMesh& mesh, int object) {
   }
 }
 
-void EdgeCoverage::addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id, std::vector<Piece>& pieces) const {
+void EdgeCoverage::addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id,
+                             std::vector<Piece>& pieces) const {
   const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
   float area = signedArea(mesh, t);
   if (mesh.hides(area) || !(std::abs(area) > 1e-9f)) return;
   const Eigen::Vector3f offset(region_.x, region_.y, 0.0f);
-  Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset, mesh.points[t[2]] - offset};
+  Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset,
+                          mesh.points[t[2]] - offset};
   if (std::isnan(p[0].z() + p[1].z() + p[2].z())) return;
   if (area < 0.0f) std::swap(p[1], p[2]), area = -area;
   // From the pixel whose square holds the least coordinate to the one that holds the greatest.
-  const auto low = [](float a, float b, float c) { return static_cast<int>(std::clamp(std::min({a, b, c}) + 0.5f, 0.0f, 1e6f)); };
-  const auto high = [](float a, float b, float c, int ceiling) {
-    return std::min(ceiling, static_cast<int>(std::clamp(std::max({a, b, c}) + 1.5f, 0.0f, 1e6f)) - 1);
+  const auto low = [](float a, float b, float c) {
+    return static_cast<int>(std::clamp(std::min({a, b, c}) + 0.5f, 0.0f, 1e6f));
   };
-  const int u0 = low(p[0].x(), p[1].x(), p[2].x()), u1 = high(p[0].x(), p[1].x(), p[2].x(), region_.width - 1);
-  const int v0 = low(p[0].y(), p[1].y(), p[2].y()), v1 = high(p[0].y(), p[1].y(), p[2].y(), region_.height - 1);
+  const auto high = [](float a, float b, float c, int ceiling) {
+    return std::min(ceiling,
+                    static_cast<int>(std::clamp(std::max({a, b, c}) + 1.5f, 0.0f, 1e6f)) - 1);
+  };
+  const int u0 = low(p[0].x(), p[1].x(), p[2].x()),
+            u1 = high(p[0].x(), p[1].x(), p[2].x(), region_.width - 1);
+  const int v0 = low(p[0].y(), p[1].y(), p[2].y()),
+            v1 = high(p[0].y(), p[1].y(), p[2].y(), region_.height - 1);
   std::optional<TriangleSamples> samples;
   for (int j = v0 / kTile; j <= v1 / kTile && v0 <= v1; ++j) {
     for (int i = u0 / kTile; i <= u1 / kTile && u0 <= u1; ++i) {
       const int tile = tiles_[static_cast<std::size_t>(j) * tiles_across_ + i];
       if (tile < 0) continue;
       if (!samples) samples = samplesOf(p, area);
-      pieces.push_back({*samples, std::max(u0, i * kTile), std::max(v0, j * kTile), std::min(u1, (i + 1) * kTile - 1), std::min(v1, (j + 1) * kTile - 1), tile, id});
+      pieces.push_back({*samples, std::max(u0, i * kTile), std::max(v0, j * kTile),
+                        std::min(u1, (i + 1) * kTile - 1), std::min(v1, (j + 1) * kTile - 1), tile,
+                        id});
     }
   }
 }
 
 void EdgeCoverage::drawPiece(const Piece& piece) {
   for (int v = piece.v0; v <= piece.v1; ++v) {
-    const int* slots = &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile + (v % kTile) * kTile];
+    const int* slots =
+        &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile + (v % kTile) * kTile];
     for (int u = piece.u0; u <= piece.u1; ++u) {
-      if (slots[u % kTile] >= 0) kernels().drawSamples(piece.samples, u, v, piece.id, pixels_[slots[u % kTile]]);
+      if (slots[u % kTile] >= 0)
+        kernels().drawSamples(piece.samples, u, v, piece.id, pixels_[slots[u % kTile]]);
     }
   }
 }
@@ -190,7 +219,8 @@ void EdgeCoverage::settle(const VisibilityBuffer& centre) {
     for (const std::uint32_t sample : pixel.ids) {
       if (((sample ^ id) >> 24) != 0) return false;
     }
-    const auto [farthest, nearest] = std::minmax_element(pixel.nearness.begin(), pixel.nearness.end());
+    const auto [farthest, nearest] =
+        std::minmax_element(pixel.nearness.begin(), pixel.nearness.end());
     return id == VisibilityBuffer::kNothing || isOneSheet(*nearest, *farthest);
   };
   const int down = static_cast<int>(tiles_.size()) / tiles_across_;
@@ -200,7 +230,9 @@ void EdgeCoverage::settle(const VisibilityBuffer& centre) {
       const int tile = tiles_[static_cast<std::size_t>(j) * tiles_across_ + i];
       int* slots = &slots_[static_cast<std::size_t>(std::max(tile, 0)) * kTile * kTile];
       for (int k = 0; tile >= 0 && k < kTile * kTile; ++k) {
-        if (slots[k] >= 0 && agrees(pixels_[slots[k]], centre.ids(j * kTile + k / kTile)[i * kTile + k % kTile])) slots[k] = kSettled;
+        if (slots[k] >= 0 &&
+            agrees(pixels_[slots[k]], centre.ids(j * kTile + k / kTile)[i * kTile + k % kTile]))
+          slots[k] = kSettled;
       }
     }
   }

@@ -1,4 +1,5 @@
-// The part of FrameCompositor that tells what an edit changes: light on the support planes, and what stays.
+// The part of FrameCompositor that tells what an edit changes: light on the support planes, and
+// what stays.
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +15,10 @@ namespace calipso::render {
 namespace {
 
 constexpr int kLeastChange = 3;  // px across
-constexpr std::uint8_t kSoftSky = 51;  // levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
-constexpr int kRimReach = 4;  // mask margins around a surface at rest in which the frame's pixels stay
+constexpr std::uint8_t kSoftSky =
+    51;  // levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
+constexpr int kRimReach =
+    4;  // mask margins around a surface at rest in which the frame's pixels stay
 
 }  // namespace
 
@@ -28,9 +31,9 @@ bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& t
   return (low < px).all() && (high > -px).all();
 }
 
-// Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by some
-// pixels, so what lies that near to both the shadow and the change is taken from the plate. A change of single pixels is
-// noise of the shadow's border and moves nothing.
+// Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by
+// some pixels, so what lies that near to both the shadow and the change is taken from the plate. A
+// change of single pixels is noise of the shadow's border and moves nothing.
 void FrameCompositor::findRelit() {
   relit_ = cv::Mat::zeros(region_.size(), CV_8U);
   const int reach = params_.background.shadow_margin_px, side = reach + 2;
@@ -43,26 +46,38 @@ void FrameCompositor::findRelit() {
   const float umbra = kPerLevel * luminance(prepared_.umbra), lit = kPerLevel - umbra;
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < box.height; ++v) {
-    const auto rowOf = [&](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(here.y + v) + here.x; };
-    const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_), *takes = rowOf(takes_light_);
+    const auto rowOf = [&](const cv::Mat& picture) {
+      return picture.ptr<std::uint8_t>(here.y + v) + here.x;
+    };
+    const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
+                       *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_),
+                       *takes = rowOf(takes_light_);
     std::uint8_t* out = change.ptr<std::uint8_t>(v);
     for (int u = 0; u < box.width; ++u) {
-      const std::uint8_t more_sky = std::max(sky[u], sky_before[u]) - std::min(sky[u], sky_before[u]);
+      const std::uint8_t more_sky =
+          std::max(sky[u], sky_before[u]) - std::min(sky[u], sky_before[u]);
       out[u] = ((sun[u] != sun_before[u]) | (more_sky > kSoftSky)) & (takes[u] != 0);
     }
-    for (int u = nextMarked(out, 0, box.width); u < box.width; u = nextMarked(out, u + 1, box.width)) {
+    for (int u = nextMarked(out, 0, box.width); u < box.width;
+         u = nextMarked(out, u + 1, box.width)) {
       const int more_sky = sky[u] - sky_before[u], more_sun = sun[u] - sun_before[u];
       const int beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
-      out[u] = changeOfLight(std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
+      out[u] = changeOfLight(
+          std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
     }
   }
   cv::Mat eroded(box.size(), CV_8U), opened(box.size(), CV_8U), grown(box.size(), CV_8U);
   const cv::Mat least = cv::Mat::ones(kLeastChange, kLeastChange, CV_8U);
-  filterTiles(change, kLeastChange, eroded, [&](const cv::Mat& from, cv::Mat& to) { cv::erode(from, to, least); });
-  filterTiles(eroded, kLeastChange, opened, [&](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, least); });
-  filterTiles(opened, reach, grown, [&](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, reach, to); });
+  filterTiles(change, kLeastChange, eroded,
+              [&](const cv::Mat& from, cv::Mat& to) { cv::erode(from, to, least); });
+  filterTiles(eroded, kLeastChange, opened,
+              [&](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, least); });
+  filterTiles(opened, reach, grown,
+              [&](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, reach, to); });
   cv::min(grown, shadows_.shaded(box), grown);
-  filterTiles(grown, 1, relit_(here), [](const cv::Mat& from, cv::Mat& to) { cv::blur(from, to, {3, 3}); });
+  filterTiles(grown, 1, relit_(here), [](const cv::Mat& from, cv::Mat& to) {
+    cv::blur(from, to, {3, 3});
+  });
 }
 
 // The rim of an original's pixels belongs to the surface beside it, not to another edited object's.
@@ -71,7 +86,8 @@ void FrameCompositor::keepRims(const cv::Mat& owner) {
   const int margin = params_.background.mask_margin_px, side = 2 * kRimReach * margin + 1;
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     if (!edited_[i]) continue;
-    cv::Mat rim = cv::Mat::zeros(region_.size(), CV_32F), foreign = cv::Mat::zeros(region_.size(), CV_8U);
+    cv::Mat rim = cv::Mat::zeros(region_.size(), CV_32F),
+            foreign = cv::Mat::zeros(region_.size(), CV_8U);
     still_.copyTo(rim, owner == static_cast<int>(i));
     cv::dilate(rim, rim, cv::Mat::ones(side, side, CV_8U));
     for (std::size_t j = 0; j < edited_.size(); ++j) {
@@ -83,7 +99,8 @@ void FrameCompositor::keepRims(const cv::Mat& owner) {
     cv::dilate(original, own, disc(margin));
     cv::erode(original, inner, disc(margin));
     foreign.setTo(0, own);
-    rim.setTo(0.0f, foreign | inner);  // what the object has left shows it in the video, and is no rim
+    rim.setTo(0.0f,
+              foreign | inner);  // what the object has left shows it in the video, and is no rim
     rims = cv::max(rims, rim);
   }
   rims.copyTo(still_, owner < 0);
@@ -96,7 +113,8 @@ bool FrameCompositor::findResting(int slot, std::vector<bool>& can_rest) const {
   if (observed_[slot].points.empty()) return false;
   bool any = false;
   for (std::size_t t = 0; t < can_rest.size(); ++t) {
-    can_rest[t] = mayMoveLess(actor.screen.points, observed_[slot].points, actor.surface->triangles[t], kMovedPx);
+    can_rest[t] = mayMoveLess(actor.screen.points, observed_[slot].points,
+                              actor.surface->triangles[t], kMovedPx);
     any = any || can_rest[t];
   }
   return any;
@@ -106,7 +124,8 @@ void FrameCompositor::findStill() {
   if (!params_.keep_still) return;
   std::vector<std::vector<bool>> can_rest(actors_.size());
   bool any = false;
-  for (std::size_t slot = 0; slot < actors_.size(); ++slot) any = findResting(static_cast<int>(slot), can_rest[slot]) || any;
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot)
+    any = findResting(static_cast<int>(slot), can_rest[slot]) || any;
   if (!any) return;
   still_ = cv::Mat::zeros(region_.size(), CV_32F);
   cv::Mat owner(region_.size(), CV_16S, cv::Scalar(-1));  // edited surface seen there
@@ -115,7 +134,9 @@ void FrameCompositor::findStill() {
   for (int v = 0; v < region_.height; ++v) {
     for (int u = 0; u < region_.width; ++u) {
       const std::uint32_t id = centre_->ids(v)[u];
-      if (id == VisibilityBuffer::kNothing || !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]]) continue;
+      if (id == VisibilityBuffer::kNothing ||
+          !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]])
+        continue;
       owner.at<short>(v, u) = static_cast<short>(surface_of_slot_[VisibilityBuffer::objectOf(id)]);
       if (!can_rest[VisibilityBuffer::objectOf(id)][VisibilityBuffer::triangleOf(id)]) continue;
       if (lookOf(VisibilityBuffer::objectOf(id)).changes()) repainted.at<std::uint8_t>(v, u) = 255;

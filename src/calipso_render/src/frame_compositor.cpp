@@ -13,7 +13,8 @@ namespace {
 constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
   std::array<int, EdgeCoverage::kSamples> squared{};
   for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
-    const int x = 2 * (i % EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid, y = 2 * (i / EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid;
+    const int x = 2 * (i % EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid,
+              y = 2 * (i / EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid;
     squared[i] = x * x + y * y;
   }
   return squared;
@@ -35,7 +36,8 @@ float FrameCompositor::stillness(std::uint32_t id, float u, float v) const {
   return 1.0f - smoothStep(kStillPx, kMovedPx, movement(id, u, v).norm());
 }
 
-// How far from its place in the video a surface point is seen, px. @pre the video has its object at rest
+// How far from its place in the video a surface point is seen, px. @pre the video has its object at
+// rest
 Eigen::Vector2f FrameCompositor::movement(std::uint32_t id, float u, float v) const {
   const int slot = VisibilityBuffer::objectOf(id), triangle = VisibilityBuffer::triangleOf(id);
   const Actor& actor = actors_[slot];
@@ -59,7 +61,8 @@ cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) cons
   return appearance.radiance(albedo, colour(lit.diffuse), colour(lit.highlight));
 }
 
-// Something without a model stands in front: it hid the object at the key frame, and goes on doing so.
+// Something without a model stands in front: it hid the object at the key frame, and goes on doing
+// so.
 bool FrameCompositor::hiddenByFront(int surface, int u, int v) const {
   const cv::Mat& front = fronts_[surface];
   return !front.empty() && front.at<std::uint8_t>(v, u) != 0;
@@ -83,14 +86,17 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
     if (isDrawn(id, u, v)) drawn = {shadeSurface(id, u, v), 1.0f - screenAt(u, v)};
     return drawn;
   }
-  // One shaded point for each sheet of each object in the pixel: the sample nearest to the pixel's centre.
+  // One shaded point for each sheet of each object in the pixel: the sample nearest to the pixel's
+  // centre.
   std::array<bool, EdgeCoverage::kSamples> done{};
   for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
     if (done[i] || !isDrawn(edge->ids[i], u, v)) continue;
     int count = 0, middle = i;
     const int object = VisibilityBuffer::objectOf(edge->ids[i]);
     for (int j = i; j < EdgeCoverage::kSamples; ++j) {
-      if (done[j] || edge->ids[j] == VisibilityBuffer::kNothing || VisibilityBuffer::objectOf(edge->ids[j]) != object) continue;
+      if (done[j] || edge->ids[j] == VisibilityBuffer::kNothing ||
+          VisibilityBuffer::objectOf(edge->ids[j]) != object)
+        continue;
       const auto [farthest, nearest] = std::minmax(edge->nearness[i], edge->nearness[j]);
       if (!EdgeCoverage::isOneSheet(nearest, farthest)) continue;
       done[j] = true, ++count;
@@ -110,8 +116,11 @@ FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
 float FrameCompositor::coverOfOthers(int u, int v) const {
   const EdgeCoverage::Pixel* edge = edges_->at(u, v);
   if (edge == nullptr) return labels_.at<std::uint8_t>(v, u) != 0 ? 1.0f : 0.0f;
-  const auto stays = [&](std::uint32_t id) { return id != VisibilityBuffer::kNothing && !isDrawn(id, u, v); };
-  return static_cast<float>(std::count_if(edge->ids.begin(), edge->ids.end(), stays)) / EdgeCoverage::kSamples;
+  const auto stays = [&](std::uint32_t id) {
+    return id != VisibilityBuffer::kNothing && !isDrawn(id, u, v);
+  };
+  return static_cast<float>(std::count_if(edge->ids.begin(), edge->ids.end(), stays)) /
+         EdgeCoverage::kSamples;
 }
 
 FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
@@ -122,7 +131,8 @@ FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
   if (others == 1.0f) return own;
   const Behind ground = groundAt(u, v, removed);
   if (others == 0.0f || ground.source == kOriginal) return others == 0.0f ? ground : own;
-  return {others * own.colour + (1.0f - others) * ground.colour, (1.0f - others) * ground.fresh, ground.source};
+  return {others * own.colour + (1.0f - others) * ground.colour, (1.0f - others) * ground.fresh,
+          ground.source};
 }
 
 // What a pixel shows where no object is.
@@ -140,16 +150,20 @@ FrameCompositor::Behind FrameCompositor::shadowedAt(int u, int v, bool removed) 
   if (takes_light_.at<std::uint8_t>(at) == 0) return behind;
   const int sun = sun_now_.at<std::uint8_t>(at), sun_before = sun_before_.at<std::uint8_t>(at);
   const int sky = sky_now_.at<std::uint8_t>(at), sky_before = sky_before_.at<std::uint8_t>(at);
-  const cv::Vec3f now = shadowRatio(kPerLevel * sun, kPerLevel * sky), before = shadowRatio(kPerLevel * sun_before, kPerLevel * sky_before);
+  const cv::Vec3f now = shadowRatio(kPerLevel * sun, kPerLevel * sky),
+                  before = shadowRatio(kPerLevel * sun_before, kPerLevel * sky_before);
   if (removed) {
     behind.colour = behind.colour.mul(now);
     return behind;
   }
-  // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly reaches must come from the plate.
+  // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly
+  // reaches must come from the plate.
   const float from_plate = relit_.at<std::uint8_t>(at) / 255.0f;
-  if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameLevels) return behind;
+  if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameLevels)
+    return behind;
   cv::Vec3f darkened = behind.colour;
-  for (int c = 0; c < 3; ++c) darkened[c] *= std::min(kBrightest, now[c] / std::max(before[c], kDarkest));
+  for (int c = 0; c < 3; ++c)
+    darkened[c] *= std::min(kBrightest, now[c] / std::max(before[c], kDarkest));
   const Behind revealed = revealedAt(u, v);
   behind.colour = from_plate * revealed.colour.mul(now) + (1.0f - from_plate) * darkened;
   behind.fresh = from_plate * revealed.fresh;
@@ -161,7 +175,9 @@ FrameCompositor::Behind FrameCompositor::shadowedAt(int u, int v, bool removed) 
 FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
   const bool invented = invented_.at<std::uint8_t>(v, u) != 0;
   cv::Vec3f now;
-  if (invented && live_ != nullptr && live_->at(unmirrored_, labels_, live_corrections_, prepared_.noise.deviation(1, 128.0f), u, v, now)) {
+  if (invented && live_ != nullptr &&
+      live_->at(unmirrored_, labels_, live_corrections_, prepared_.noise.deviation(1, 128.0f), u, v,
+                now)) {
     for (int c = 0; c < 3; ++c) now[c] = linearFromRealCode(now[c]);
     return {now, 1.0f, kInvented};
   }
@@ -172,7 +188,8 @@ FrameCompositor::Composed FrameCompositor::composedAt(int u, int v) const {
   const Drawn drawn = drawnAt(u, v);
   const Behind behind = drawn.cover < 1.0f ? behindAt(u, v) : Behind{};
   return {drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour,
-          drawn.cover + (1.0f - drawn.cover) * behind.fresh, drawn.cover > 0.0f ? kRendered : behind.source};
+          drawn.cover + (1.0f - drawn.cover) * behind.fresh,
+          drawn.cover > 0.0f ? kRendered : behind.source};
 }
 
 }  // namespace calipso::render

@@ -18,49 +18,59 @@
 
 namespace calipso::render {
 
-// Light that stays the same while the same objects are edited under the same camera. Pictures are CV_8U of
-// the whole frame: lightLevel() of sun or sky on support plane or relief there.
+// Light that stays the same while the same objects are edited under the same camera. Pictures are
+// CV_8U of the whole frame: lightLevel() of sun or sky on support plane or relief there.
 struct ShadowCache {
-  std::vector<bool> edited;            // per surface: which ones it is for
+  std::vector<bool> edited;  // per surface: which ones it is for
   Camera camera;
   Eigen::Vector3f sun = Eigen::Vector3f::Zero();  // direction
-  std::unique_ptr<Visibility> others;  // of what is not edited
-  std::unique_ptr<Visibility> originals;  // of the edited objects where the video has them; null: of none
-  cv::Mat others_sun, others_sky;      // of the others; empty: nothing else casts a shadow
+  std::unique_ptr<Visibility> others;             // of what is not edited
+  std::unique_ptr<Visibility>
+      originals;                   // of the edited objects where the video has them; null: of none
+  cv::Mat others_sun, others_sky;  // of the others; empty: nothing else casts a shadow
   cv::Mat originals_sun, originals_sky;  // of the edited objects where the video has them
-  cv::Mat shaded;                      // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
-  cv::Rect shaded_box, bounds;         // of `shaded`; of all that the originals' shadows can reach
+  cv::Mat shaded;               // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
+  cv::Rect shaded_box, bounds;  // of `shaded`; of all that the originals' shadows can reach
 };
 
-// Edited objects drawn where the video has them, which stays the same while the same ones are edited.
+// Edited objects drawn where the video has them, which stays the same while the same ones are
+// edited.
 struct RestPicture {
   std::vector<bool> edited;
-  cv::Mat drawn;    // CV_32FC3: what they add to a pixel, linear; negative where the video does not show them
+  cv::Mat drawn;    // CV_32FC3: what they add to a pixel, linear; negative where the video does not
+                    // show them
   cv::Mat passing;  // CV_32FC3: part of the background's light that passes beside them
   cv::Mat owners;   // CV_16SC1: surface that is seen there, or nearest; -1 = none
   cv::Mat reach;    // CV_8UC1: 255 where what drawing misses can be carried to
   cv::Rect box;     // of what `drawn` has
 };
 
-constexpr int kLightStep = 4;     // px between the places where the light on a smooth surface is computed
+constexpr int kLightStep =
+    4;  // px between the places where the light on a smooth surface is computed
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
-constexpr int kSameLevels = 4;  // the same of a lightLevel()
+constexpr int kSameLevels = 4;            // the same of a lightLevel()
 constexpr float kPerLevel = 1.0f / 255.0f;
-constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own pixels do not tell what it would be in more light
-constexpr int kRepaintReach = 2;  // px around a surface of a new look in which the frame has its old colour, too
+constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own
+                                   // pixels do not tell what it would be in more light
+constexpr int kRepaintReach =
+    2;  // px around a surface of a new look in which the frame has its old colour, too
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
 constexpr std::uint8_t kChanged = 255;  // of FrameCompositor::remirrored_
-constexpr float kStillPx = 0.05f;  // moved less: the frame's own pixels
-constexpr float kMovedPx = 0.3f;  // an edited surface that moved more is drawn
+constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
+constexpr float kMovedPx = 0.3f;        // an edited surface that moved more is drawn
 
-inline cv::Mat disc(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
+inline cv::Mat disc(int radius) {
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
+}
 
-// Has the triangle a point that moved less than `px` in the picture? The box around its corners' movements tells.
+// Has the triangle a point that moved less than `px` in the picture? The box around its corners'
+// movements tells.
 bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px);
 
 // How much a change of brightness by `by` calls for the plate: 0 not visible .. 255 only it.
 inline std::uint8_t changeOfLight(float by) {
-  constexpr float kSameRatio = 0.01f, kPlateRatio = 0.06f;  // from which the plate is taken, and only it
+  constexpr float kSameRatio = 0.01f,
+                  kPlateRatio = 0.06f;  // from which the plate is taken, and only it
   const float t = std::clamp((by - kSameRatio) * (1.0f / (kPlateRatio - kSameRatio)), 0.0f, 1.0f);
   return static_cast<std::uint8_t>(static_cast<int>(255.0f * (t * t * (3.0f - 2.0f * t)) + 0.5f));
 }
@@ -70,19 +80,20 @@ inline cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
   return {linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2])};
 }
 
-// One frame on its way: stages the objects, finds what an edit can change, and composes those pixels.
+// One frame on its way: stages the objects, finds what an edit can change, and composes those
+// pixels.
 class FrameCompositor {
  public:
-  FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame, ShadowCache& shadows,
-                  RestPicture& rest);
+  FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame,
+                  ShadowCache& shadows, RestPicture& rest);
 
   FrameOutput run();
 
  private:
   // What lies behind the drawn objects at a pixel.
   struct Behind {
-    cv::Vec3f colour;        // linear
-    float fresh = 0.0f;      // part of it that carries no camera noise yet
+    cv::Vec3f colour;    // linear
+    float fresh = 0.0f;  // part of it that carries no camera noise yet
     Provenance source = kOriginal;
   };
   // What a drawn surface adds to a pixel.
@@ -98,8 +109,8 @@ class FrameCompositor {
     int slot = -1;        // -1: nothing is drawn here
   };
 
-  // What has to be done for a pixel: nothing; one drawn surface, the same where it ends or folds; what lies behind, in other light;
-  // more than one surface.
+  // What has to be done for a pixel: nothing; one drawn surface, the same where it ends or folds;
+  // what lies behind, in other light; more than one surface.
   enum Kind : std::uint8_t { kNone = 0, kPlain, kPlainEdge, kBehind, kSpecial };
   static bool isPlain(Kind kind) { return kind == kPlain || kind == kPlainEdge; }
 
@@ -108,15 +119,16 @@ class FrameCompositor {
     std::vector<cv::Vec4f> colour;     // linear; fourth: the part that carries no camera noise yet
     std::vector<std::uint8_t> source;  // Provenance
     std::vector<Kind> kinds;
-    std::vector<Lit> light;            // at the columns of lit_
-    std::vector<float> key_u, key_v;   // of what is drawn: place in Appearance::albedo; up to seven more
-    std::vector<int> uneven;           // pixels on which light has to be computed
+    std::vector<Lit> light;  // at the columns of lit_
+    std::vector<float> key_u,
+        key_v;                // of what is drawn: place in Appearance::albedo; up to seven more
+    std::vector<int> uneven;  // pixels on which light has to be computed
 
     void resize(std::size_t width) {
-      colour.resize(width), source.resize(width), kinds.resize(width), key_u.resize(width + 7), key_v.resize(width + 7);
+      colour.resize(width), source.resize(width), kinds.resize(width), key_u.resize(width + 7),
+          key_v.resize(width + 7);
     }
   };
-
 
   // What drawing misses beyond the silhouette, where a surface's rim has come to.
   struct Rim {
@@ -127,8 +139,8 @@ class FrameCompositor {
   Light lightOf(const FrameInput& frame) const;
   // A pixel of the result.
   struct Composed {
-    cv::Vec3f colour;     // linear
-    float fresh = 0.0f;   // part of it that carries no camera noise yet
+    cv::Vec3f colour;    // linear
+    float fresh = 0.0f;  // part of it that carries no camera noise yet
     Provenance source = kOriginal;
   };
 
@@ -138,16 +150,21 @@ class FrameCompositor {
   cv::Rect carriedBox() const;
   void findMiss(const cv::Rect& carried);
   void findRims(const cv::Rect& carried);
-  void addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, const cv::Vec3f& tint, cv::Vec4f& colour) const;
+  void addResidual(float u, float v, const Eigen::Vector2f& moved, int owner, const cv::Vec3f& tint,
+                   cv::Vec4f& colour) const;
   void addRimResidual(int v, Row& row) const;
   cv::Vec4f missAt(float u, float v, int owner) const;
-  static RestPicture restPicture(const Prepared& prepared, const RenderParams& params, const std::vector<bool>& edited);
+  static RestPicture restPicture(const Prepared& prepared, const RenderParams& params,
+                                 const std::vector<bool>& edited);
   void recordRow(int v, Row& row, RestPicture& picture) const;
   Composed composedAt(int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool findRest(int surface);
   bool isSeenAt(int surface, const Points& vertices) const;
-  bool takesShadow(int u, int v) const { return place_view_.sees(u, v) && (shadowless_.empty() || shadowless_.at<std::uint8_t>(v, u) == 0); }
+  bool takesShadow(int u, int v) const {
+    return place_view_.sees(u, v) &&
+           (shadowless_.empty() || shadowless_.at<std::uint8_t>(v, u) == 0);
+  }
   void prepareShadows();
   void cacheOriginals(const std::vector<Occluder>& originals);
   void cacheOthers(const std::vector<Occluder>& others);
@@ -174,7 +191,10 @@ class FrameCompositor {
   void findMaps();
   void findShaded();
   void findScreened();
-  float screenAt(int u, int v) const { return screened_.empty() ? 0.0f : screened_.at<std::uint8_t>(v - region_.y, u - region_.x) / 255.0f; }
+  float screenAt(int u, int v) const {
+    return screened_.empty() ? 0.0f
+                             : screened_.at<std::uint8_t>(v - region_.y, u - region_.x) / 255.0f;
+  }
   std::optional<SurfacePoint> otherAt(int u, int v) const;
   void shadeOther(int u, int v, Behind& behind) const;
   cv::Mat originalOf(int surface) const;
@@ -202,7 +222,10 @@ class FrameCompositor {
   bool isDrawn(std::uint32_t id, int u, int v) const;
   cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
   float stillness(std::uint32_t id, float u, float v) const;
-  bool isElsewhere(float u, float v) const { return !elsewhere_.empty() && elsewhere_.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u)) != 0; }
+  bool isElsewhere(float u, float v) const {
+    return !elsewhere_.empty() &&
+           elsewhere_.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u)) != 0;
+  }
   float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
   Lit exactLight(const LitPoint& p, int slot) const;
   const Look& lookOf(int slot) const;
@@ -220,54 +243,67 @@ class FrameCompositor {
   const RenderParams& params_;
   const FrameInput& frame_;
   ShadowCache& shadows_;
-  const Light light_;  // of this frame; what the video shows was lit by Prepared::light
+  const Light light_;             // of this frame; what the video shows was lit by Prepared::light
   const PointLight point_light_;  // light_
   RestPicture& rest_;
 
-  std::vector<cv::Mat> footprints_;   // Prepared::footprints, likewise
-  std::vector<cv::Mat> fronts_;       // Prepared::fronts, where the camera stands as at the key frame
-  cv::Mat labels_, plate_;            // of this frame's view
-  cv::Mat invented_;                  // CV_8UC1
-  cv::Mat view_from_key_;             // viewWarp(); empty: the key frame's view
-  cv::Mat shadowless_;                // Prepared::shadowless, where the camera stands as at the key frame
+  std::vector<cv::Mat> footprints_;  // Prepared::footprints, likewise
+  std::vector<cv::Mat> fronts_;  // Prepared::fronts, where the camera stands as at the key frame
+  cv::Mat labels_, plate_;       // of this frame's view
+  cv::Mat invented_;             // CV_8UC1
+  cv::Mat view_from_key_;        // viewWarp(); empty: the key frame's view
+  cv::Mat shadowless_;  // Prepared::shadowless, where the camera stands as at the key frame
   const LiveFill* live_ = nullptr;  // Background::live, where the camera stands as at the key frame
   std::vector<cv::Vec3f> live_corrections_;
   std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
   std::vector<bool> edited_;                  // per surface
-  std::vector<bool> at_rest_;                 // per surface: the video has it, or a part of it, where the key frame has it
-  cv::Mat elsewhere_;                         // CV_8UC1, whole picture: where it does not; may be empty
-  std::vector<Actor> actors_;                 // visible ones, per slot
+  std::vector<bool>
+      at_rest_;        // per surface: the video has it, or a part of it, where the key frame has it
+  cv::Mat elsewhere_;  // CV_8UC1, whole picture: where it does not; may be empty
+  std::vector<Actor> actors_;  // visible ones, per slot
   std::vector<int> surface_of_slot_;
-  std::vector<Gloss> glosses_;                // per slot, as its look has it
-  std::vector<ScreenMesh> observed_;          // per slot: where the video has it (edited objects at rest only)
-  std::unique_ptr<Visibility> moved_shadow_;   // of the edited objects where they are now
+  std::vector<Gloss> glosses_;  // per slot, as its look has it
+  std::vector<ScreenMesh>
+      observed_;  // per slot: where the video has it (edited objects at rest only)
+  std::unique_ptr<Visibility> moved_shadow_;  // of the edited objects where they are now
   std::unique_ptr<Visibility> moved_sky_;
-  cv::Rect region_, moved_bounds_;  // what an edit can change; what the edited objects can shade now
-  cv::Mat mirrored_;  // CV_32FC3, whole picture: what support planes mirror now; empty: as in the video
+  cv::Rect region_,
+      moved_bounds_;  // what an edit can change; what the edited objects can shade now
+  cv::Mat
+      mirrored_;  // CV_32FC3, whole picture: what support planes mirror now; empty: as in the video
   cv::Mat unmirrored_;  // CV_8UC3: the frame without what they mirrored of objects at rest
-  cv::Mat remirrored_;  // CV_8UC1, whole picture: 255 = it differs from what the video has, 1 = it does not; 0 = there is nothing
-  cv::Mat passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
+  cv::Mat remirrored_;  // CV_8UC1, whole picture: 255 = it differs from what the video has, 1 = it
+                        // does not; 0 = there is nothing
+  cv::Mat
+      passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
-  SquareMask covered_;  // over region_: so deep behind drawn surfaces that light there does not matter
-  cv::Mat sky_now_, sky_before_;  // CV_8UC1 over region_: lightLevel() of the sky on support plane or relief, this in plane terms
+  SquareMask
+      covered_;  // over region_: so deep behind drawn surfaces that light there does not matter
+  cv::Mat sky_now_, sky_before_;  // CV_8UC1 over region_: lightLevel() of the sky on support plane
+                                  // or relief, this in plane terms
   cv::Mat sun_now_, sun_before_;  // CV_8UC1 over region_: the same of the sun
-  cv::Mat takes_light_;           // CV_8UC1 over region_: 255 = support plane or relief is seen, on which light changes
-  cv::Mat relit_;    // CV_8UC1 over region_: 255 = the original's shadow, to be taken from the plate
-  std::vector<Lit> lit_;           // at the corners of squares of kLightStep px over region_
-  std::vector<std::uint8_t> smooth_;  // per square, by its first corner: light between the corners follows from theirs
+  cv::Mat takes_light_;  // CV_8UC1 over region_: 255 = support plane or relief is seen, on which
+                         // light changes
+  cv::Mat relit_;  // CV_8UC1 over region_: 255 = the original's shadow, to be taken from the plate
+  std::vector<Lit> lit_;  // at the corners of squares of kLightStep px over region_
+  std::vector<std::uint8_t>
+      smooth_;  // per square, by its first corner: light between the corners follows from theirs
   int lit_columns_ = 0, lit_rows_ = 0;
-  cv::Mat still_;    // CV_32FC1 over region_: 1 = nothing moved here; empty: everything did
+  cv::Mat still_;  // CV_32FC1 over region_: 1 = nothing moved here; empty: everything did
   cv::Rect miss_box_;
-  cv::Mat miss_;     // CV_32FC4 over miss_box_: what drawing misses of the video, linear, and 1 where that is known; may be empty
-  std::vector<Rim> rims_;            // by rows
+  cv::Mat miss_;  // CV_32FC4 over miss_box_: what drawing misses of the video, linear, and 1 where
+                  // that is known; may be empty
+  std::vector<Rim> rims_;              // by rows
   std::vector<std::size_t> rim_rows_;  // per row of region_: its first in rims_, and one more
   bool any_shaded_ = false;            // one of them is
-  std::vector<bool> may_be_shaded_;    // per slot: not edited, and in the way of the sun that falls on edited ones
-  cv::Mat screened_;                   // CV_8UC1 over region_: 255 = scenery hides what is drawn; may be empty
-  std::vector<bool> always_drawn_;     // per slot: isDrawn() wherever it is seen
-  bool all_drawn_ = false;             // every slot is
-  std::vector<std::vector<TriangleMap>> maps_;  // per slot, per triangle; empty where the slot is not drawn
+  std::vector<bool>
+      may_be_shaded_;  // per slot: not edited, and in the way of the sun that falls on edited ones
+  cv::Mat screened_;   // CV_8UC1 over region_: 255 = scenery hides what is drawn; may be empty
+  std::vector<bool> always_drawn_;  // per slot: isDrawn() wherever it is seen
+  bool all_drawn_ = false;          // every slot is
+  std::vector<std::vector<TriangleMap>>
+      maps_;  // per slot, per triangle; empty where the slot is not drawn
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;
   Eigen::Vector3f eye_;

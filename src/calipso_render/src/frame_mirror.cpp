@@ -15,7 +15,9 @@ constexpr float kNoChange = 0.01f;  // of the brightness
 constexpr float kDark = 0.01f;      // linear
 constexpr int kInFront = 127;       // of a matte
 
-float strongest(const cv::Vec3f& c) { return std::max({std::abs(c[0]), std::abs(c[1]), std::abs(c[2])}); }
+float strongest(const cv::Vec3f& c) {
+  return std::max({std::abs(c[0]), std::abs(c[1]), std::abs(c[2])});
+}
 
 }  // namespace
 
@@ -31,21 +33,27 @@ void FrameCompositor::mirrorAnew() {
   std::vector<int> slots;
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     const int surface = surface_of_slot_[slot];
-    if (edited_[surface] || !prepared_.moves[surface]) actors.push_back(&actors_[slot]), slots.push_back(static_cast<int>(slot));
+    if (edited_[surface] || !prepared_.moves[surface])
+      actors.push_back(&actors_[slot]), slots.push_back(static_cast<int>(slot));
   }
   const Radiance radiance = [&](int i, const SurfacePoint& point) {
-    return mirroredRadiance(prepared_.appearances[surface_of_slot_[slots[i]]], light_, lookOf(slots[i]), point);
+    return mirroredRadiance(prepared_.appearances[surface_of_slot_[slots[i]]], light_,
+                            lookOf(slots[i]), point);
   };
-  const MirrorImage image = mirrorImage(actors, radiance, params_.planes, frame_.camera, mirror.off);
-  mirrored_ = image.empty() ? cv::Mat(frame_.bgr.size(), CV_32FC3, cv::Scalar()) : addedBy(mirror, image);
+  const MirrorImage image =
+      mirrorImage(actors, radiance, params_.planes, frame_.camera, mirror.off);
+  mirrored_ =
+      image.empty() ? cv::Mat(frame_.bgr.size(), CV_32FC3, cv::Scalar()) : addedBy(mirror, image);
   remirrored_ = cv::Mat::zeros(frame_.bgr.size(), CV_8U);
   unmirrored_ = unmirroredCodes(mirror, frame_.bgr);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < remirrored_.rows; ++v) {
     for (int u = 0; u < remirrored_.cols; ++u) {
-      const cv::Vec3f &now = mirrored_.at<cv::Vec3f>(v, u), &before = mirror.at_key.at<cv::Vec3f>(v, u);
+      const cv::Vec3f &now = mirrored_.at<cv::Vec3f>(v, u),
+                      &before = mirror.at_key.at<cv::Vec3f>(v, u);
       if (now == cv::Vec3f() && before == cv::Vec3f()) continue;
-      const bool changed = strongest(now - before) > kNoChange * (strongest(linearPixel(frame_.bgr, u, v)) + kDark);
+      const bool changed =
+          strongest(now - before) > kNoChange * (strongest(linearPixel(frame_.bgr, u, v)) + kDark);
       remirrored_.at<std::uint8_t>(v, u) = changed ? kChanged : 1;
     }
   }
@@ -59,7 +67,8 @@ cv::Vec3f FrameCompositor::unmirroredAt(int u, int v) const {
   return {std::max(0.0f, colour[0]), std::max(0.0f, colour[1]), std::max(0.0f, colour[2])};
 }
 
-// Adds what the planes mirror now to what a pixel shows without it. Where nothing changed it is the frame's own.
+// Adds what the planes mirror now to what a pixel shows without it. Where nothing changed it is the
+// frame's own.
 void FrameCompositor::addMirrored(int u, int v, Behind& behind) const {
   if (mirrored_.empty() || remirrored_.at<std::uint8_t>(v, u) == 0) return;
   if (behind.source == kOriginal && remirrored_.at<std::uint8_t>(v, u) != kChanged) {

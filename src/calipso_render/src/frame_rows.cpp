@@ -1,5 +1,5 @@
-// The part of FrameCompositor that composes the picture row by row. Stretches of pixels that see one object are shaded together;
-// silhouettes and what else is special go through composedAt().
+// The part of FrameCompositor that composes the picture row by row. Stretches of pixels that see
+// one object are shaded together; silhouettes and what else is special go through composedAt().
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,9 @@ constexpr float kKept = 0.999f;  // of a pixel at rest: it keeps its bytes
 
 cv::v_float32x4 wide(const cv::Vec3f& c, float fourth = 0.0f) { return {c[0], c[1], c[2], fourth}; }
 
-cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) { return {decoded[c[0]], decoded[c[1]], decoded[c[2]], 0.0f}; }
+cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) {
+  return {decoded[c[0]], decoded[c[1]], decoded[c[2]], 0.0f};
+}
 
 }  // namespace
 
@@ -26,39 +28,52 @@ cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) { return {dec
 void FrameCompositor::findKinds(int v, Row& row) const {
   const int j = v - region_.y, width = region_.width;
   const auto rowOf = [j](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j); };
-  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
-  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x, *drawn = rowOf(drawn_), *takes = rowOf(takes_light_);
+  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
+                     *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
+  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x, *drawn = rowOf(drawn_),
+                     *takes = rowOf(takes_light_);
   const std::uint8_t *removed = rowOf(removed_), *relit = rowOf(relit_);
   const std::uint32_t* ids = centre_->ids(j);
   Kind* kinds = row.kinds.data();
   std::uint8_t* out = reinterpret_cast<std::uint8_t*>(kinds);
   for (int i = 0; i < width; ++i) {
-    const std::uint8_t sun_change = std::max(sun[i], sun_before[i]) - std::min(sun[i], sun_before[i]);
-    const std::uint8_t sky_change = std::max(sky[i], sky_before[i]) - std::min(sky[i], sky_before[i]);
-    const std::uint8_t change = std::min<std::uint8_t>(sun_change, 100) + std::min<std::uint8_t>(sky_change, 100);
-    const std::uint8_t differs = ((relit[i] != 0) | (change >= kSameLevels)) & (takes[i] != 0) & (labels[i] == 0);
+    const std::uint8_t sun_change =
+        std::max(sun[i], sun_before[i]) - std::min(sun[i], sun_before[i]);
+    const std::uint8_t sky_change =
+        std::max(sky[i], sky_before[i]) - std::min(sky[i], sky_before[i]);
+    const std::uint8_t change =
+        std::min<std::uint8_t>(sun_change, 100) + std::min<std::uint8_t>(sky_change, 100);
+    const std::uint8_t differs =
+        ((relit[i] != 0) | (change >= kSameLevels)) & (takes[i] != 0) & (labels[i] == 0);
     const std::uint8_t behind = (differs | (removed[i] != 0)) != 0 ? kBehind : kNone;
     out[i] = drawn[i] != 0 ? static_cast<std::uint8_t>(kPlain) : behind;
   }
   // What hides a surface at rest takes its residual.
-  for (int i = 0; !all_drawn_ && i < width; ++i) kinds[i] = kinds[i] == kBehind && ids[i] != VisibilityBuffer::kNothing ? kSpecial : kinds[i];
+  for (int i = 0; !all_drawn_ && i < width; ++i)
+    kinds[i] = kinds[i] == kBehind && ids[i] != VisibilityBuffer::kNothing ? kSpecial : kinds[i];
   edges_->visitRow(j, [kinds](int i, bool settled) {
-    if (!settled) kinds[i] = kSpecial;
-    else if (kinds[i] == kPlain) kinds[i] = kPlainEdge;
+    if (!settled)
+      kinds[i] = kSpecial;
+    else if (kinds[i] == kPlain)
+      kinds[i] = kPlainEdge;
   });
   if (!still_.empty()) {
     const float* still = still_.ptr<float>(j);
     for (int i = 0; i < width; ++i) {
-      if (still[i] >= kKept && kinds[i] != kNone) kinds[i] = removed[i] != 0 ? kNone : isPlain(kinds[i]) ? kSpecial : kinds[i];
+      if (still[i] >= kKept && kinds[i] != kNone)
+        kinds[i] = removed[i] != 0 ? kNone : isPlain(kinds[i]) ? kSpecial : kinds[i];
     }
   }
   if (!screened_.empty()) {
     const std::uint8_t* screened = screened_.ptr<std::uint8_t>(j);
-    for (int i = 0; i < width; ++i) kinds[i] = screened[i] != 0 && isPlain(kinds[i]) ? kSpecial : kinds[i];
+    for (int i = 0; i < width; ++i)
+      kinds[i] = screened[i] != 0 && isPlain(kinds[i]) ? kSpecial : kinds[i];
   }
   if (!remirrored_.empty()) {
     const std::uint8_t* remirrored = remirrored_.ptr<std::uint8_t>(v) + region_.x;
-    for (int i = 0; i < width; ++i) kinds[i] = remirrored[i] == kChanged && kinds[i] == kNone && labels[i] == 0 ? kBehind : kinds[i];
+    for (int i = 0; i < width; ++i)
+      kinds[i] =
+          remirrored[i] == kChanged && kinds[i] == kNone && labels[i] == 0 ? kBehind : kinds[i];
   }
   if (!any_shaded_) return;
   for (int i = 0; i < width; ++i) {
@@ -70,7 +85,8 @@ void FrameCompositor::findKinds(int v, Row& row) const {
 // Light at the corners of row v's squares, interpolated between the corners above and below.
 void FrameCompositor::lightRow(int v, Row& row) const {
   const int dv = v - region_.y;
-  const Lit *above = &lit_[static_cast<std::size_t>(dv / kLightStep) * lit_columns_], *below = above + lit_columns_;
+  const Lit *above = &lit_[static_cast<std::size_t>(dv / kLightStep) * lit_columns_],
+            *below = above + lit_columns_;
   const cv::v_float32x4 part = cv::v_setall_f32(static_cast<float>(dv % kLightStep) / kLightStep);
   row.light.resize(lit_columns_);
   for (int i = 0; i < lit_columns_; ++i) {
@@ -84,8 +100,8 @@ void FrameCompositor::lightRow(int v, Row& row) const {
   }
 }
 
-// Reflectance of the pixels [first, last) of row v, all of which see the object in `slot`, into row.colour; where they lie in the
-// key frame's picture into row.key_u, row.key_v.
+// Reflectance of the pixels [first, last) of row v, all of which see the object in `slot`, into
+// row.colour; where they lie in the key frame's picture into row.key_u, row.key_v.
 void FrameCompositor::reflectStretch(int v, int first, int last, int slot, Row& row) const {
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
   const std::uint32_t* ids = centre_->ids(v - region_.y);
@@ -93,27 +109,35 @@ void FrameCompositor::reflectStretch(int v, int first, int last, int slot, Row& 
   for (int i = first; i < last;) {
     const std::uint32_t id = ids[i];
     const Appearance::Source source = appearance.sources[VisibilityBuffer::triangleOf(id)];
-    any_picture |= source != Appearance::Source::kTexture, any_texture |= source != Appearance::Source::kPicture;
+    any_picture |= source != Appearance::Source::kTexture,
+        any_texture |= source != Appearance::Source::kPicture;
     while (i < last && ids[i] == id) ++i;
   }
-  kernels().locate(maps_[slot].data(), &ids[first], first + region_.x, v, last - first, appearance.region.tl(), &row.key_u[first], &row.key_v[first]);
+  kernels().locate(maps_[slot].data(), &ids[first], first + region_.x, v, last - first,
+                   appearance.region.tl(), &row.key_u[first], &row.key_v[first]);
   const std::optional<cv::Vec3f>& albedo = lookOf(slot).albedo;
   if (albedo) {
-    std::fill(&row.colour[first], &row.colour[last - 1] + 1, cv::Vec4f((*albedo)[0], (*albedo)[1], (*albedo)[2], 0.0f));
+    std::fill(&row.colour[first], &row.colour[last - 1] + 1,
+              cv::Vec4f((*albedo)[0], (*albedo)[1], (*albedo)[2], 0.0f));
     return;
   }
-  if (any_picture) kernels().sample(appearance.albedo, &row.key_u[first], &row.key_v[first], last - first, &row.colour[first]);
+  if (any_picture)
+    kernels().sample(appearance.albedo, &row.key_u[first], &row.key_v[first], last - first,
+                     &row.colour[first]);
   for (int i = first; any_texture && i < last; ++i) {
     const int triangle = VisibilityBuffer::triangleOf(ids[i]);
     const Appearance::Source source = appearance.sources[triangle];
     if (source == Appearance::Source::kPicture || maps_[slot][triangle].thin) continue;
-    const cv::Vec4f texel = appearance.texture.at(triangle, maps_[slot][triangle].weightsAt(static_cast<float>(i + region_.x), static_cast<float>(v)));
-    row.colour[i] = source == Appearance::Source::kTexture ? texel : texel + texel[3] * (row.colour[i] - texel);
+    const cv::Vec4f texel = appearance.texture.at(
+        triangle,
+        maps_[slot][triangle].weightsAt(static_cast<float>(i + region_.x), static_cast<float>(v)));
+    row.colour[i] =
+        source == Appearance::Source::kTexture ? texel : texel + texel[3] * (row.colour[i] - texel);
   }
 }
 
-// Light from the corners on the pixels [first, last), whose reflectance row.colour has; row.uneven names those on which light has to be
-// computed.
+// Light from the corners on the pixels [first, last), whose reflectance row.colour has; row.uneven
+// names those on which light has to be computed.
 void FrameCompositor::shadeStretch(int v, int first, int last, int slot, Row& row) const {
   const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
   const cv::v_float32x4 floor = wide(lightFloor(appearance.mean_light)), tint = wide(tintOf(slot));
@@ -130,13 +154,15 @@ void FrameCompositor::shadeStretch(int v, int first, int last, int slot, Row& ro
     }
     const Lit &a = row.light[square], &b = row.light[square + 1];
     const cv::v_float32x4 left = cv::v_load(a.diffuse.val), rise = cv::v_load(b.diffuse.val) - left;
-    const cv::v_float32x4 gloss = cv::v_load(a.highlight.val), gloss_rise = cv::v_load(b.highlight.val) - gloss;
+    const cv::v_float32x4 gloss = cv::v_load(a.highlight.val),
+                          gloss_rise = cv::v_load(b.highlight.val) - gloss;
     for (; i < end; ++i) {
       if (row.kinds[i] == kPlainEdge) {
         row.uneven.push_back(i);
         continue;
       }
-      const cv::v_float32x4 part = cv::v_setall_f32(static_cast<float>(i % kLightStep) / kLightStep);
+      const cv::v_float32x4 part =
+          cv::v_setall_f32(static_cast<float>(i % kLightStep) / kLightStep);
       const cv::v_float32x4 diffuse = left + part * rise;
       // Another piece of the surface can look out between the corners.
       if (std::abs(nearness[i] - cv::v_extract_n<3>(diffuse)) > tolerance * nearness[i]) {
@@ -144,13 +170,15 @@ void FrameCompositor::shadeStretch(int v, int first, int last, int slot, Row& ro
         continue;
       }
       cv::Vec4f& out = row.colour[i];
-      cv::v_store(out.val, cv::v_load(out.val) * tint * (diffuse + floor) + (gloss + part * gloss_rise));
+      cv::v_store(out.val,
+                  cv::v_load(out.val) * tint * (diffuse + floor) + (gloss + part * gloss_rise));
       out[3] = 1.0f;
     }
   }
 }
 
-// Pixels [first, last) of row v, all of which see the object in `slot` and nothing of what lies behind.
+// Pixels [first, last) of row v, all of which see the object in `slot` and nothing of what lies
+// behind.
 void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row) const {
   const int surface = surface_of_slot_[slot];
   const Appearance& appearance = prepared_.appearances[surface];
@@ -162,12 +190,16 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
     const int triangle = VisibilityBuffer::triangleOf(ids[i]);
     cv::Vec4f& out = row.colour[i];
     if (maps_[slot][triangle].thin || row.kinds[i] == kPlainEdge) {
-      const cv::Vec3f colour = shadeSurface(ids[i], static_cast<float>(i + region_.x), static_cast<float>(v));
+      const cv::Vec3f colour =
+          shadeSurface(ids[i], static_cast<float>(i + region_.x), static_cast<float>(v));
       out = {colour[0], colour[1], colour[2], 1.0f};
       continue;
     }
-    const Lit lit = exactLight(litPoint(actors_[slot], triangle, static_cast<float>(i + region_.x), static_cast<float>(v), eye_), slot);
-    cv::v_store(out.val, cv::v_load(out.val) * tint * (cv::v_load(lit.diffuse.val) + floor) + cv::v_load(lit.highlight.val));
+    const Lit lit = exactLight(litPoint(actors_[slot], triangle, static_cast<float>(i + region_.x),
+                                        static_cast<float>(v), eye_),
+                               slot);
+    cv::v_store(out.val, cv::v_load(out.val) * tint * (cv::v_load(lit.diffuse.val) + floor) +
+                             cv::v_load(lit.highlight.val));
     out[3] = 1.0f;
   }
   std::memset(&row.source[first], kRendered, last - first);
@@ -184,18 +216,27 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
 void FrameCompositor::composeBehind(int v, int first, int last, Row& row) const {
   const int j = v - region_.y;
   const auto rowOf = [j](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j); };
-  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
-  const std::uint8_t *removed = rowOf(removed_), *relit = rowOf(relit_), *takes = rowOf(takes_light_), *invented = invented_.ptr<std::uint8_t>(v) + region_.x;
+  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
+                     *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
+  const std::uint8_t *removed = rowOf(removed_), *relit = rowOf(relit_),
+                     *takes = rowOf(takes_light_),
+                     *invented = invented_.ptr<std::uint8_t>(v) + region_.x;
   const cv::Vec3f* plate = plate_.ptr<cv::Vec3f>(v) + region_.x;
   const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + region_.x;
   const float* decoded = decodeTable();
-  const cv::v_float32x4 one = cv::v_setall_f32(1.0f), brightest = cv::v_setall_f32(kBrightest), umbra = wide(prepared_.umbra) * cv::v_setall_f32(kPerLevel), lit = cv::v_setall_f32(kPerLevel) - umbra;
-  const auto ratioOf = [&](std::uint8_t sun_level, std::uint8_t sky_level) { return umbra * cv::v_setall_f32(sky_level) + lit * cv::v_setall_f32(sun_level); };
-  const std::uint8_t* mirrored = remirrored_.empty() ? nullptr : remirrored_.ptr<std::uint8_t>(v) + region_.x;
+  const cv::v_float32x4 one = cv::v_setall_f32(1.0f), brightest = cv::v_setall_f32(kBrightest),
+                        umbra = wide(prepared_.umbra) * cv::v_setall_f32(kPerLevel),
+                        lit = cv::v_setall_f32(kPerLevel) - umbra;
+  const auto ratioOf = [&](std::uint8_t sun_level, std::uint8_t sky_level) {
+    return umbra * cv::v_setall_f32(sky_level) + lit * cv::v_setall_f32(sun_level);
+  };
+  const std::uint8_t* mirrored =
+      remirrored_.empty() ? nullptr : remirrored_.ptr<std::uint8_t>(v) + region_.x;
   for (int i = first; i < last; ++i) {
     if (mirrored != nullptr && mirrored[i] != 0) {
       const Behind behind = groundAt(i + region_.x, v, removed[i] != 0);
-      row.colour[i] = {behind.colour[0], behind.colour[1], behind.colour[2], behind.fresh}, row.source[i] = behind.source;
+      row.colour[i] = {behind.colour[0], behind.colour[1], behind.colour[2], behind.fresh},
+      row.source[i] = behind.source;
       continue;
     }
     const float from_plate = removed[i] != 0 ? 1.0f : relit[i] * kPerLevel;
@@ -211,9 +252,11 @@ void FrameCompositor::composeBehind(int v, int first, int last, Row& row) const 
       if (from_plate > 0.5f) row.source[i] = revealed.source;
     }
     if (from_plate < 1.0f) {
-      // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly reaches must come from the plate.
+      // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun
+      // newly reaches must come from the plate.
       const cv::v_float32x4 before = ratioOf(sun_before[i], sky_before[i]);
-      const cv::v_float32x4 ratio = cv::v_min(brightest, now / cv::v_max(before, cv::v_setall_f32(kDarkest)));
+      const cv::v_float32x4 ratio =
+          cv::v_min(brightest, now / cv::v_max(before, cv::v_setall_f32(kDarkest)));
       colour += cv::v_setall_f32(1.0f - from_plate) * linearOf(decoded, frame[i]) * ratio;
     }
     cv::v_store(row.colour[i].val, colour);
@@ -241,11 +284,14 @@ void FrameCompositor::drawRow(int v, Row& row) const {
   findKinds(v, row);
   lightRow(v, row);
   std::memset(row.source.data(), kOriginal, row.source.size());
-  for (int i = nextMarked(row.kinds.data(), 0, region_.width); i < region_.width; i = nextMarked(row.kinds.data(), i, region_.width)) {
+  for (int i = nextMarked(row.kinds.data(), 0, region_.width); i < region_.width;
+       i = nextMarked(row.kinds.data(), i, region_.width)) {
     const int u = i + region_.x;
     if (isPlain(row.kinds[i])) {
       const int first = i, slot = VisibilityBuffer::objectOf(ids[i]);
-      while (i < region_.width && isPlain(row.kinds[i]) && VisibilityBuffer::objectOf(ids[i]) == slot) ++i;
+      while (i < region_.width && isPlain(row.kinds[i]) &&
+             VisibilityBuffer::objectOf(ids[i]) == slot)
+        ++i;
       drawStretch(v, first, i, slot, row);
     } else if (row.kinds[i] == kBehind) {
       const int first = i;
@@ -266,9 +312,15 @@ void FrameCompositor::keepStill(int v, Row& row) const {
   const float* still = still_.ptr<float>(j);
   const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + region_.x;
   for (int i = 0; i < region_.width; ++i) {
-    if (still[i] == 0.0f || row.source[i] == kOriginal || (removed[i] == 0 && row.source[i] != kRendered)) continue;
-    if (still[i] >= kKept) row.source[i] = kOriginal;
-    else cv::v_store(row.colour[i].val, cv::v_setall_f32(still[i]) * linearOf(decodeTable(), frame[i]) + cv::v_setall_f32(1.0f - still[i]) * cv::v_load(row.colour[i].val));
+    if (still[i] == 0.0f || row.source[i] == kOriginal ||
+        (removed[i] == 0 && row.source[i] != kRendered))
+      continue;
+    if (still[i] >= kKept)
+      row.source[i] = kOriginal;
+    else
+      cv::v_store(row.colour[i].val,
+                  cv::v_setall_f32(still[i]) * linearOf(decodeTable(), frame[i]) +
+                      cv::v_setall_f32(1.0f - still[i]) * cv::v_load(row.colour[i].val));
   }
 }
 
@@ -279,7 +331,8 @@ void FrameCompositor::composeRow(int v, Row& row, FrameOutput& out) const {
   keepStill(v, row);
   cv::Vec3b* codes = out.bgr.ptr<cv::Vec3b>(v) + region_.x;
   const std::uint8_t* source = row.source.data();
-  for (int i = nextMarked(source, 0, region_.width); i < region_.width; i = nextMarked(source, i, region_.width)) {
+  for (int i = nextMarked(source, 0, region_.width); i < region_.width;
+       i = nextMarked(source, i, region_.width)) {
     const int first = i;
     while (i < region_.width && source[i] != kOriginal) ++i;
     codec_.encode(&row.colour[first], region_.x + first, v, i - first, codes + first);

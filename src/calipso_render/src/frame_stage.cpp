@@ -16,29 +16,42 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kRegionMargin = 8;       // px
-constexpr int kRestReach = 2;           // px: what lies that near to a change may take part in it
-constexpr int kSameCodes = 8;           // code values, mean over 3 x 3 pixels, that noise may make
-constexpr float kDarker = 0.97f;       // of the plate's brightness: a passing shadow,
-constexpr float kDarkerElsewhere = 0.9f;  // likewise in another view, to which the plate is carried with small errors
-constexpr int kLeastPassing = 5;       // px across, and in another view
-constexpr int kLeastElsewhere = 9;     // that somewhere within
-constexpr int kPassingReach = 12;      // px: an edge that the plate misses looks like a narrow shadow
-constexpr float kSeenWithin = 0.8f;    // part of an object's mask that lies within its outline if that is right
-constexpr int kRimShare = 50;          // of the picture's width: how far a mask may miss a moving object
-constexpr int kInFront = 127;          // of a matte
-constexpr float kQuiet = 5.0f;         // code values of spread over time: the background rests
+constexpr int kRegionMargin = 8;  // px
+constexpr int kRestReach = 2;     // px: what lies that near to a change may take part in it
+constexpr int kSameCodes = 8;     // code values, mean over 3 x 3 pixels, that noise may make
+constexpr float kDarker = 0.97f;  // of the plate's brightness: a passing shadow,
+constexpr float kDarkerElsewhere =
+    0.9f;  // likewise in another view, to which the plate is carried with small errors
+constexpr int kLeastPassing = 5;    // px across, and in another view
+constexpr int kLeastElsewhere = 9;  // that somewhere within
+constexpr int kPassingReach = 12;   // px: an edge that the plate misses looks like a narrow shadow
+constexpr float kSeenWithin =
+    0.8f;  // part of an object's mask that lies within its outline if that is right
+constexpr int kRimShare = 50;   // of the picture's width: how far a mask may miss a moving object
+constexpr int kInFront = 127;   // of a matte
+constexpr float kQuiet = 5.0f;  // code values of spread over time: the background rests
 
-Gloss glossOf(const Gloss& own, const Look& look) { return {look.specular.value_or(own.specular), look.roughness.value_or(own.roughness)}; }
+Gloss glossOf(const Gloss& own, const Look& look) {
+  return {look.specular.value_or(own.specular), look.roughness.value_or(own.roughness)};
+}
 
 }  // namespace
 
-FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& params, const FrameInput& frame,
-                                 ShadowCache& shadows, RestPicture& rest)
-    : prepared_(prepared), params_(params), frame_(frame), shadows_(shadows), light_(lightOf(frame)), point_light_(light_), rest_(rest),
-      labels_(frame.labels.empty() ? prepared.key_labels : frame.labels), eye_(frame.camera.world_from_camera.translation().cast<float>()),
-      place_view_(PlaneView(params.planes, frame.camera)), codec_(params.add_noise ? prepared.noise : NoiseModel(), frame.stamp_ns) {
-  if (labels_.size() != frame.bgr.size()) throw std::invalid_argument("segmentation and frame differ in size");
+FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& params,
+                                 const FrameInput& frame, ShadowCache& shadows, RestPicture& rest)
+    : prepared_(prepared),
+      params_(params),
+      frame_(frame),
+      shadows_(shadows),
+      light_(lightOf(frame)),
+      point_light_(light_),
+      rest_(rest),
+      labels_(frame.labels.empty() ? prepared.key_labels : frame.labels),
+      eye_(frame.camera.world_from_camera.translation().cast<float>()),
+      place_view_(PlaneView(params.planes, frame.camera)),
+      codec_(params.add_noise ? prepared.noise : NoiseModel(), frame.stamp_ns) {
+  if (labels_.size() != frame.bgr.size())
+    throw std::invalid_argument("segmentation and frame differ in size");
 }
 
 FrameOutput FrameCompositor::run() {
@@ -91,28 +104,37 @@ void FrameCompositor::stage() {
   states_.assign(surfaces.size(), nullptr);
   edited_.assign(surfaces.size(), false);
   for (const ObjectInFrame& o : frame_.objects) {
-    const auto it = std::find_if(surfaces.begin(), surfaces.end(), [&](const Surface& s) { return s.name == o.name; });
-    if (it == surfaces.end()) throw std::invalid_argument("state names object '" + o.name + "', which has no model");
+    const auto it = std::find_if(surfaces.begin(), surfaces.end(),
+                                 [&](const Surface& s) { return s.name == o.name; });
+    if (it == surfaces.end())
+      throw std::invalid_argument("state names object '" + o.name + "', which has no model");
     states_[it - surfaces.begin()] = &o;
     edited_[it - surfaces.begin()] = o.edited || o.removed;
   }
-  for (std::size_t i = 0; i < surfaces.size(); ++i) at_rest_.push_back(findRest(static_cast<int>(i)));
+  for (std::size_t i = 0; i < surfaces.size(); ++i)
+    at_rest_.push_back(findRest(static_cast<int>(i)));
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ObjectInFrame* o = states_[i];
     if (o != nullptr ? o->removed : !surfaces[i].in_video) continue;
     Points vertices = surfaces[i].key_vertices;
-    if (o != nullptr && o->edited) vertices = o->vertices;
-    else if (o != nullptr && prepared_.moves[i]) vertices = transformed(surfaces[i].object_vertices, o->world_from_object);
+    if (o != nullptr && o->edited)
+      vertices = o->vertices;
+    else if (o != nullptr && prepared_.moves[i])
+      vertices = transformed(surfaces[i].object_vertices, o->world_from_object);
     if (!edited_[i] && prepared_.moves[i] && !isSeenAt(static_cast<int>(i), vertices)) continue;
     if (vertices.size() != surfaces[i].key_vertices.size()) {
-      throw std::invalid_argument("object '" + surfaces[i].name + "': state has " + std::to_string(vertices.size()) +
-                                  " vertices, its model " + std::to_string(surfaces[i].key_vertices.size()));
+      throw std::invalid_argument("object '" + surfaces[i].name + "': state has " +
+                                  std::to_string(vertices.size()) + " vertices, its model " +
+                                  std::to_string(surfaces[i].key_vertices.size()));
     }
     actors_.push_back(makeActor(surfaces[i], std::move(vertices), frame_.camera));
     surface_of_slot_.push_back(static_cast<int>(i));
-    glosses_.push_back(glossOf(prepared_.appearances[i].gloss, lookOf(static_cast<int>(glosses_.size()))));
+    glosses_.push_back(
+        glossOf(prepared_.appearances[i].gloss, lookOf(static_cast<int>(glosses_.size()))));
     const bool as_seen = edited_[i] && at_rest_[i];
-    observed_.push_back(as_seen ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera) : ScreenMesh{});
+    observed_.push_back(
+        as_seen ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera)
+                : ScreenMesh{});
   }
   fronts_.assign(surfaces.size(), cv::Mat());
   footprints_.assign(surfaces.size(), cv::Mat());
@@ -124,20 +146,24 @@ void FrameCompositor::stage() {
     place_view_ = PlaceView(place_view_.planes(), prepared_.relief);
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
       if (prepared_.fronts[i].empty() || (prepared_.moves[i] && !at_rest_[i])) continue;
-      fronts_[i] = elsewhere_.empty() ? prepared_.fronts[i] : cv::Mat(prepared_.fronts[i] & ~elsewhere_);
+      fronts_[i] =
+          elsewhere_.empty() ? prepared_.fronts[i] : cv::Mat(prepared_.fronts[i] & ~elsewhere_);
     }
     footprints_ = prepared_.footprints;
   } else {
-    const cv::Mat map = viewWarp(nearnessFrom(prepared_.nearness, prepared_.camera, frame_.camera), prepared_.camera, frame_.camera);
+    const cv::Mat map = viewWarp(nearnessFrom(prepared_.nearness, prepared_.camera, frame_.camera),
+                                 prepared_.camera, frame_.camera);
     cv::Mat plate, invented;
     cv::remap(plate_, plate, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-    cv::remap(invented_, invented, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(255));
+    cv::remap(invented_, invented, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
+              cv::Scalar(255));
     plate_ = plate, invented_ = invented, view_from_key_ = map;
     place_view_ = PlaceView(place_view_.planes(), warped(prepared_.relief, map));
   }
 }
 
-// Whether the video shows an object where its state has it: most of what is seen of it lies within its outline there.
+// Whether the video shows an object where its state has it: most of what is seen of it lies within
+// its outline there.
 bool FrameCompositor::isSeenAt(int surface, const Points& vertices) const {
   const cv::Mat seen = labels_ == prepared_.surfaces[surface].index;
   const cv::Rect box = cv::boundingRect(seen);
@@ -155,7 +181,8 @@ bool FrameCompositor::isSeenAt(int surface, const Points& vertices) const {
   return within >= kSeenWithin * all;
 }
 
-// Whether the video has an object, or a part of one that moves or sways, where the key frame has it. Adds to elsewhere_ where not.
+// Whether the video has an object, or a part of one that moves or sways, where the key frame has
+// it. Adds to elsewhere_ where not.
 bool FrameCompositor::findRest(int surface) {
   if (!prepared_.surfaces[surface].in_video) return false;
   const bool moves = prepared_.moves[surface];
@@ -165,7 +192,9 @@ bool FrameCompositor::findRest(int surface) {
   const cv::Mat now = labels_ == index, key = prepared_.key_labels == index, either = now | key;
   cv::Rect box = cv::boundingRect(either);
   if (box.empty()) return false;
-  box = cv::Rect(box.x - kRestReach, box.y - kRestReach, box.width + 2 * kRestReach, box.height + 2 * kRestReach) & cv::Rect(cv::Point(), either.size());
+  box = cv::Rect(box.x - kRestReach, box.y - kRestReach, box.width + 2 * kRestReach,
+                 box.height + 2 * kRestReach) &
+        cv::Rect(cv::Point(), either.size());
   cv::Mat picture, key_picture, different;
   cv::blur(frame_.bgr(box), picture, {3, 3});
   cv::blur(prepared_.key_picture(box), key_picture, {3, 3});
@@ -187,7 +216,9 @@ void FrameCompositor::chooseRegion() {
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     if (!edited_[i]) continue;
     const cv::Rect box = cv::boundingRect(labels_ == prepared_.surfaces[i].index);
-    if (!box.empty()) region_ |= cv::Rect(box.x - kRegionMargin, box.y - kRegionMargin, box.width + 2 * kRegionMargin, box.height + 2 * kRegionMargin);
+    if (!box.empty())
+      region_ |= cv::Rect(box.x - kRegionMargin, box.y - kRegionMargin,
+                          box.width + 2 * kRegionMargin, box.height + 2 * kRegionMargin);
   }
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     if (!edited_[surface_of_slot_[slot]] && !may_be_shaded_[slot]) continue;
@@ -204,30 +235,36 @@ cv::Mat FrameCompositor::quietPlaces() const {
   const cv::Mat at_key = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
   if (view_from_key_.empty()) return at_key;
   cv::Mat here;
-  cv::remap(at_key, here, view_from_key_, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::remap(at_key, here, view_from_key_, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
+            cv::Scalar(0));
   return here;
 }
 
 // The shadow of an object that moves in the video shows as darkening against the plate.
 void FrameCompositor::findPassingShadows() {
   bool any = false;
-  for (std::size_t i = 0; i < edited_.size(); ++i) any = any || (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video);
+  for (std::size_t i = 0; i < edited_.size(); ++i)
+    any = any || (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video);
   if (!any) return;
   const bool same_view = sameView(frame_.camera, prepared_.camera);
   cv::Mat now, ratio_now, ratio_plate, plate;
   cv::cvtColor(unmirrored_, now, cv::COLOR_BGR2GRAY);
-  if (same_view) prepared_.background.plate.convertTo(plate, CV_8U);
-  else plate = codeFromLinear(plate_);
+  if (same_view)
+    prepared_.background.plate.convertTo(plate, CV_8U);
+  else
+    plate = codeFromLinear(plate_);
   cv::cvtColor(plate, plate, cv::COLOR_BGR2GRAY);
   cv::blur(now, ratio_now, {5, 5});
   cv::blur(plate, ratio_plate, {5, 5});
   ratio_plate.convertTo(ratio_plate, CV_8U, same_view ? kDarker : kDarkerElsewhere);
   passing_ = ratio_now < ratio_plate;
   passing_ &= quietPlaces() & (labels_ == 0);
-  cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN, cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));
+  cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN,
+                   cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));
   if (!same_view) {
     cv::Mat broad;
-    cv::morphologyEx(passing_, broad, cv::MORPH_OPEN, cv::Mat::ones(kLeastElsewhere, kLeastElsewhere, CV_8U));
+    cv::morphologyEx(passing_, broad, cv::MORPH_OPEN,
+                     cv::Mat::ones(kLeastElsewhere, kLeastElsewhere, CV_8U));
     cv::dilate(broad, broad, cv::Mat::ones(2 * kPassingReach + 1, 2 * kPassingReach + 1, CV_8U));
     passing_ &= broad;
   }
@@ -236,7 +273,8 @@ void FrameCompositor::findPassingShadows() {
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     if (edited_[i] || !prepared_.moves[i]) continue;
     cv::Mat near;
-    cv::dilate(labels_ == prepared_.surfaces[i].index, near, disc(std::max(2, labels_.cols / kRimShare)));
+    cv::dilate(labels_ == prepared_.surfaces[i].index, near,
+               disc(std::max(2, labels_.cols / kRimShare)));
     passing_.setTo(0, near);
   }
 }
@@ -256,7 +294,8 @@ void FrameCompositor::findShown(int v, std::uint8_t* own, std::uint8_t* others) 
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     if (!edited_[i] || !prepared_.surfaces[i].in_video) continue;
     const std::uint8_t index = static_cast<std::uint8_t>(prepared_.surfaces[i].index);
-    for (int u = 0; u < width; ++u) own[u] |= labels[u] == index ? 255 : 0, others[u] &= labels[u] == index ? 0 : 255;
+    for (int u = 0; u < width; ++u)
+      own[u] |= labels[u] == index ? 255 : 0, others[u] &= labels[u] == index ? 0 : 255;
     if (footprints_[i].empty()) continue;
     const std::uint8_t* footprint = footprints_[i].ptr<std::uint8_t>(v + region_.y) + region_.x;
     for (int u = 0; u < width; ++u) own[u] |= footprint[u];
@@ -266,35 +305,44 @@ void FrameCompositor::findShown(int v, std::uint8_t* own, std::uint8_t* others) 
 void FrameCompositor::findRemoved() {
   cv::Mat own(region_.size(), CV_8U), others(region_.size(), CV_8U);
 #pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) findShown(v, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
+  for (int v = 0; v < region_.height; ++v)
+    findShown(v, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
   removed_.create(region_.size(), CV_8U);
   const int margin = params_.background.mask_margin_px;
-  filterTiles(own, margin, removed_, [margin](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, margin, to); });
+  filterTiles(own, margin, removed_,
+              [margin](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, margin, to); });
   if (!passing_.empty()) removed_ |= passing_(region_);
   removed_ &= ~others;  // what stands beside it keeps its own pixels, and what stands before it
   for (const cv::Mat& front : fronts_) {
     if (!front.empty()) removed_.setTo(0, front(region_));
   }
-  if (!params_.matte.empty() && sameView(frame_.camera, prepared_.camera)) removed_.setTo(0, params_.matte(region_) > kInFront);
+  if (!params_.matte.empty() && sameView(frame_.camera, prepared_.camera))
+    removed_.setTo(0, params_.matte(region_) > kInFront);
 }
 
 void FrameCompositor::findMaps() {
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     const int surface = surface_of_slot_[slot];
-    const bool seen = edited_[surface] || !(boundsOf(actors_[slot].screen, 0, frame_.bgr.size()) & region_).empty();
-    maps_.push_back(seen ? triangleMaps(actors_[slot], prepared_.appearances[surface]) : std::vector<TriangleMap>{});
+    const bool seen = edited_[surface] ||
+                      !(boundsOf(actors_[slot].screen, 0, frame_.bgr.size()) & region_).empty();
+    maps_.push_back(seen ? triangleMaps(actors_[slot], prepared_.appearances[surface])
+                         : std::vector<TriangleMap>{});
   }
 }
 
 void FrameCompositor::drawVisibility() {
-  for (const int surface : surface_of_slot_) always_drawn_.push_back(edited_[surface] && fronts_[surface].empty());
+  for (const int surface : surface_of_slot_)
+    always_drawn_.push_back(edited_[surface] && fronts_[surface].empty());
   centre_.emplace(region_);
-  for (std::size_t slot = 0; slot < actors_.size(); ++slot) centre_->draw(actors_[slot].screen, static_cast<int>(slot));
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot)
+    centre_->draw(actors_[slot].screen, static_cast<int>(slot));
   edges_.emplace(*centre_);
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
-    if (edited_[surface_of_slot_[slot]]) edges_->chooseSilhouette(actors_[slot].screen, actors_[slot].surface->edges);
+    if (edited_[surface_of_slot_[slot]])
+      edges_->chooseSilhouette(actors_[slot].screen, actors_[slot].surface->edges);
   }
-  for (std::size_t slot = 0; slot < actors_.size(); ++slot) edges_->draw(actors_[slot].screen, static_cast<int>(slot));
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot)
+    edges_->draw(actors_[slot].screen, static_cast<int>(slot));
   edges_->settle(*centre_);
 }
 

@@ -18,13 +18,17 @@ constexpr std::size_t kFewest = 30;
 constexpr double kSmoothest = 0.03, kRoughest = 0.7;  // m
 constexpr int kRoughnesses = 24;
 constexpr int kReweightings = 3;
-constexpr double kOutlier = 0.15;     // of the cluster's brightness
-constexpr double kSharp = 0.98;       // of the worst roughness' error: less must remain, or the roughness is not told
-constexpr double kBroad = 0.35;       // m from which a lobe looks like diffuse shading
-constexpr double kNarrowPart = 0.5;   // of its roughness, that a narrow one beside it has at most
-constexpr double kSeenBeside = 15.0;  // rows' mean errors by which the narrow one has to make the fit better
-constexpr double kAlike = 6.0;         // rows' mean errors within which another roughness explains the highlights as well
-constexpr double kExplained = 0.97;   // of the error without gloss: less must remain, or no highlight was seen
+constexpr double kOutlier = 0.15;  // of the cluster's brightness
+constexpr double kSharp =
+    0.98;  // of the worst roughness' error: less must remain, or the roughness is not told
+constexpr double kBroad = 0.35;      // m from which a lobe looks like diffuse shading
+constexpr double kNarrowPart = 0.5;  // of its roughness, that a narrow one beside it has at most
+constexpr double kSeenBeside =
+    15.0;  // rows' mean errors by which the narrow one has to make the fit better
+constexpr double kAlike =
+    6.0;  // rows' mean errors within which another roughness explains the highlights as well
+constexpr double kExplained =
+    0.97;  // of the error without gloss: less must remain, or no highlight was seen
 
 struct NormalMap {
   cv::Rect region;
@@ -44,7 +48,9 @@ NormalMap normalMap(const View& view, const Actor& actor, const Eigen::Vector3f&
       const std::uint32_t id = buffer.ids(v)[u];
       if (id == VisibilityBuffer::kNothing) continue;
       map.triangles.at<int>(v, u) = VisibilityBuffer::triangleOf(id);
-      const Eigen::Vector3f n = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + map.region.x, v + map.region.y, eye).normal;
+      const Eigen::Vector3f n = surfacePoint(actor, VisibilityBuffer::triangleOf(id),
+                                             u + map.region.x, v + map.region.y, eye)
+                                    .normal;
       map.normals.at<cv::Vec3f>(v, u) = {n.x(), n.y(), n.z()};
     }
   }
@@ -77,20 +83,25 @@ int nearestCluster(const std::vector<LightSample>& samples, int picture, const E
   return cluster;
 }
 
-void collect(const View& view, int picture, const Actor& actor, const Eigen::Vector3f& light, std::vector<HighlightSample>& highlights) {
+void collect(const View& view, int picture, const Actor& actor, const Eigen::Vector3f& light,
+             std::vector<HighlightSample>& highlights) {
   const Eigen::Vector3f eye = view.camera.world_from_camera.translation().cast<float>();
   const NormalMap map = normalMap(view, actor, eye);
   cv::Mat inside;
-  cv::erode(view.labels == actor.surface->index, inside, cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
+  cv::erode(view.labels == actor.surface->index, inside,
+            cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
   for (int v = 0; v < map.region.height; ++v) {
     for (int u = 0; u < map.region.width; ++u) {
       const int triangle = map.triangles.at<int>(v, u);
-      if (triangle < 0 || inside.at<std::uint8_t>(v + map.region.y, u + map.region.x) == 0) continue;
+      if (triangle < 0 || inside.at<std::uint8_t>(v + map.region.y, u + map.region.x) == 0)
+        continue;
       const SurfacePoint s = surfacePoint(actor, triangle, u + map.region.x, v + map.region.y, eye);
       const Eigen::Vector3f towards = (eye - s.position).normalized();
-      if (s.normal.dot((light + towards).normalized()) < kNearMirror || s.normal.dot(light) <= 0.0f) continue;
+      if (s.normal.dot((light + towards).normalized()) < kNearMirror || s.normal.dot(light) <= 0.0f)
+        continue;
       const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v + map.region.y, u + map.region.x);
-      HighlightSample h{{s.position, s.normal, towards, {}, -1, s.sky, picture}, spreadAt(map.normals, u, v)};
+      HighlightSample h{{s.position, s.normal, towards, {}, -1, s.sky, picture},
+                        spreadAt(map.normals, u, v)};
       for (int c = 0; c < 3; ++c) h.at.radiance[c] = linearFromRealCode(code[c]);
       highlights.push_back(h);
     }
@@ -108,27 +119,34 @@ struct Solution {
   double strength = 0.0, cost = 1e30;
 };
 
-// Lobes of the rows whose strengths are unknown: the one in question, and a broad one beside it. nullptr: there is none.
+// Lobes of the rows whose strengths are unknown: the one in question, and a broad one beside it.
+// nullptr: there is none.
 struct Lobes {
   const std::vector<double>* own = nullptr;
   const std::vector<double>* broad = nullptr;
 };
 
-// Normal equations of the lobes' strengths, the clusters' brightness eliminated: each cluster meets only itself and them.
+// Normal equations of the lobes' strengths, the clusters' brightness eliminated: each cluster meets
+// only itself and them.
 struct Reduced {
   std::vector<double> dd, di;
   std::vector<Eigen::Vector2d> dg;
   Eigen::Matrix2d gg = 1e-12 * Eigen::Matrix2d::Identity();
   Eigen::Vector2d gi = Eigen::Vector2d::Zero();
-  explicit Reduced(int clusters) : dd(clusters, 1e-9), di(clusters, 0.0), dg(clusters, Eigen::Vector2d::Zero()) {}
+  explicit Reduced(int clusters)
+      : dd(clusters, 1e-9), di(clusters, 0.0), dg(clusters, Eigen::Vector2d::Zero()) {}
   void add(int k, double w, double d, const Eigen::Vector2d& g, double x) {
-    dd[k] += w * d * d, dg[k] += w * d * g, di[k] += w * d * x, gg += w * g * g.transpose(), gi += w * g * x;
+    dd[k] += w * d * d, dg[k] += w * d * g, di[k] += w * d * x, gg += w * g * g.transpose(),
+        gi += w * g * x;
   }
   Eigen::Vector2d strengths() const {
     Eigen::Matrix2d left = gg;
     Eigen::Vector2d right = gi;
-    for (std::size_t k = 0; k < dd.size(); ++k) left -= dg[k] * dg[k].transpose() / dd[k], right -= dg[k] * di[k] / dd[k];
-    const auto alone = [&](int i) { return left(i, i) > 1e-12 ? std::max(0.0, right[i] / left(i, i)) : 0.0; };
+    for (std::size_t k = 0; k < dd.size(); ++k)
+      left -= dg[k] * dg[k].transpose() / dd[k], right -= dg[k] * di[k] / dd[k];
+    const auto alone = [&](int i) {
+      return left(i, i) > 1e-12 ? std::max(0.0, right[i] / left(i, i)) : 0.0;
+    };
     const double determinant = left.determinant();
     if (determinant > 1e-9 * left(0, 0) * left(1, 1)) {
       const Eigen::Vector2d both = left.inverse() * right;
@@ -145,14 +163,18 @@ Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
   Solution solution;
   const auto glossOf = [&](std::size_t i, int c) {
     const double mirrored = rows[i].mirrored[c];  // goes with the broader one
-    const double own = lobes.own == nullptr ? 0.0 : rows[i].sun[c] * (*lobes.own)[i] + (lobes.broad == nullptr ? mirrored : 0.0);
-    return Eigen::Vector2d(own, lobes.broad == nullptr ? 0.0 : rows[i].sun[c] * (*lobes.broad)[i] + mirrored);
+    const double own = lobes.own == nullptr ? 0.0
+                                            : rows[i].sun[c] * (*lobes.own)[i] +
+                                                  (lobes.broad == nullptr ? mirrored : 0.0);
+    return Eigen::Vector2d(
+        own, lobes.broad == nullptr ? 0.0 : rows[i].sun[c] * (*lobes.broad)[i] + mirrored);
   };
   for (int round = 0; round < kReweightings; ++round) {
     Reduced sums(clusters);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double w = weights[i] / (rows[i].scale * rows[i].scale);
-      for (int c = 0; c < 3; ++c) sums.add(rows[i].cluster, w, rows[i].diffuse[c], glossOf(i, c), rows[i].radiance[c]);
+      for (int c = 0; c < 3; ++c)
+        sums.add(rows[i].cluster, w, rows[i].diffuse[c], glossOf(i, c), rows[i].radiance[c]);
     }
     const Eigen::Vector2d strengths = sums.strengths();
     solution.strength = strengths[0], solution.cost = 0.0;
@@ -161,7 +183,9 @@ Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
       const double brightness = (sums.di[k] - strengths.dot(sums.dg[k])) / sums.dd[k];
       double squared = 0.0;
       for (int c = 0; c < 3; ++c) {
-        const double r = (brightness * rows[i].diffuse[c] + strengths.dot(glossOf(i, c)) - rows[i].radiance[c]) / rows[i].scale;
+        const double r =
+            (brightness * rows[i].diffuse[c] + strengths.dot(glossOf(i, c)) - rows[i].radiance[c]) /
+            rows[i].scale;
         if (r < 0.0 || rows[i].radiance[c] < kSaturated) squared += r * r;
       }
       // Cauchy's loss: a highlight that is not explained goes on counting.
@@ -173,10 +197,14 @@ Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
   return solution;
 }
 
-double roughnessAt(int i) { return kSmoothest * std::pow(kRoughest / kSmoothest, static_cast<double>(i) / kRoughnesses); }
+double roughnessAt(int i) {
+  return kSmoothest * std::pow(kRoughest / kSmoothest, static_cast<double>(i) / kRoughnesses);
+}
 
-// The pixel averages the lobe: its width and the normals' spread add up (Beckmann's variance per axis is m^2 / 2).
-std::vector<double> lobesOf(const std::vector<HighlightSample>& highlights, const Eigen::Vector3f& light, double m) {
+// The pixel averages the lobe: its width and the normals' spread add up (Beckmann's variance per
+// axis is m^2 / 2).
+std::vector<double> lobesOf(const std::vector<HighlightSample>& highlights,
+                            const Eigen::Vector3f& light, double m) {
   std::vector<double> lobes;
   for (const HighlightSample& h : highlights) {
     const double wide = std::sqrt(m * m + 2.0 * h.spread * h.spread);
@@ -189,10 +217,14 @@ struct Found : SeenGloss {
   double cost = 0.0;
 };
 
-// The best of the roughnesses below `limit`, and which others explain the rows as well. @param most error that it may leave
+// The best of the roughnesses below `limit`, and which others explain the rows as well. @param most
+// error that it may leave
 // @param worst out: the worst error that any leaves
-std::optional<Found> bestRoughness(const std::vector<Row>& rows, const std::vector<HighlightSample>& highlights, const Eigen::Vector3f& light,
-                                       int clusters, const std::vector<double>* broad, double limit, double most, double& worst) {
+std::optional<Found> bestRoughness(const std::vector<Row>& rows,
+                                   const std::vector<HighlightSample>& highlights,
+                                   const Eigen::Vector3f& light, int clusters,
+                                   const std::vector<double>* broad, double limit, double most,
+                                   double& worst) {
   std::vector<double> costs, strengths;
   for (int i = 0; i <= kRoughnesses && roughnessAt(i) < limit; ++i) {
     const std::vector<double> own = lobesOf(highlights, light, roughnessAt(i));
@@ -206,7 +238,9 @@ std::optional<Found> bestRoughness(const std::vector<Row>& rows, const std::vect
   std::size_t first = best, last = best;
   while (first > 0 && costs[first - 1] <= alike) --first;
   while (last + 1 < costs.size() && costs[last + 1] <= alike) ++last;
-  const auto roughness = [](std::size_t i) { return static_cast<float>(roughnessAt(static_cast<int>(i))); };
+  const auto roughness = [](std::size_t i) {
+    return static_cast<float>(roughnessAt(static_cast<int>(i)));
+  };
   Found found;
   found.gloss = {static_cast<float>(strengths[best]), roughness(best)};
   found.smoothest = roughness(first), found.roughest = roughness(last), found.cost = costs[best];
@@ -215,11 +249,14 @@ std::optional<Found> bestRoughness(const std::vector<Row>& rows, const std::vect
 
 }  // namespace
 
-std::vector<HighlightSample> highlightSamples(const std::vector<View>& views, const std::vector<bool>& moves,
-                                              const std::vector<LightSample>& samples, const Eigen::Vector3f& light) {
+std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
+                                              const std::vector<bool>& moves,
+                                              const std::vector<LightSample>& samples,
+                                              const Eigen::Vector3f& light) {
   std::vector<HighlightSample> all, thinned;
   for (std::size_t object = 0; object < moves.size(); ++object) {
-    for (std::size_t i = 0; i < (moves[object] ? views.size() : 1); ++i) collect(views[i], static_cast<int>(i), views[i].actors[object], light, all);
+    for (std::size_t i = 0; i < (moves[object] ? views.size() : 1); ++i)
+      collect(views[i], static_cast<int>(i), views[i].actors[object], light, all);
   }
   const std::size_t step = std::max<std::size_t>(1, all.size() / kMost);
   for (std::size_t i = 0; i < all.size(); i += step) {
@@ -230,29 +267,43 @@ std::vector<HighlightSample> highlightSamples(const std::vector<View>& views, co
   return thinned;
 }
 
-std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights, const LightFit& fit,
-                              const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible) {
+std::optional<SeenGloss> fitGloss(
+    const std::vector<HighlightSample>& highlights, const LightFit& fit,
+    const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible) {
   if (highlights.size() < kFewest) return std::nullopt;
   const Light& light = fit.light;
   std::vector<Row> rows;
   for (const HighlightSample& h : highlights) {
-    const float sun = visible ? visible(h.at, light.direction) : 1.0f, n_v = h.at.normal.dot(h.at.view);
+    const float sun = visible ? visible(h.at, light.direction) : 1.0f,
+                n_v = h.at.normal.dot(h.at.view);
     const cv::Vec3f& a = fit.albedos[h.at.cluster];
-    Row row{h.at.cluster, a.mul(diffuseShading(light, h.at.normal, sun, h.at.sky)), h.at.radiance, light.sun * sun, {}, 1.0};
-    row.mirrored = ambientAt(light, 2.0f * n_v * h.at.normal - h.at.view) * (h.at.sky * grazing(n_v));
+    Row row{h.at.cluster,
+            a.mul(diffuseShading(light, h.at.normal, sun, h.at.sky)),
+            h.at.radiance,
+            light.sun * sun,
+            {},
+            1.0};
+    row.mirrored =
+        ambientAt(light, 2.0f * n_v * h.at.normal - h.at.view) * (h.at.sky * grazing(n_v));
     row.scale = (row.diffuse[0] + row.diffuse[1] + row.diffuse[2]) / 3.0 + 1e-3;
     rows.push_back(row);
   }
   const int clusters = static_cast<int>(fit.albedos.size());
   const double without = solve(rows, {}, clusters).cost;
   double worst = 0.0;
-  const std::optional<Found> best = bestRoughness(rows, highlights, light.direction, clusters, nullptr, 2.0 * kRoughest, kExplained * without, worst);
+  const std::optional<Found> best =
+      bestRoughness(rows, highlights, light.direction, clusters, nullptr, 2.0 * kRoughest,
+                    kExplained * without, worst);
   if (!best || best->cost >= kSharp * worst) return std::nullopt;
   if (best->gloss.roughness < kBroad) return *best;
-  // A lobe nearly as broad as diffuse shading explains that one's errors too. Where beside it a narrow one is seen, that is the gloss.
+  // A lobe nearly as broad as diffuse shading explains that one's errors too. Where beside it a
+  // narrow one is seen, that is the gloss.
   const std::vector<double> beside = lobesOf(highlights, light.direction, best->gloss.roughness);
-  const double with_broad = solve(rows, {nullptr, &beside}, clusters).cost * (1.0 - kSeenBeside / static_cast<double>(rows.size()));
-  const std::optional<Found> narrow = bestRoughness(rows, highlights, light.direction, clusters, &beside, kNarrowPart * best->gloss.roughness, with_broad, worst);
+  const double with_broad = solve(rows, {nullptr, &beside}, clusters).cost *
+                            (1.0 - kSeenBeside / static_cast<double>(rows.size()));
+  const std::optional<Found> narrow =
+      bestRoughness(rows, highlights, light.direction, clusters, &beside,
+                    kNarrowPart * best->gloss.roughness, with_broad, worst);
   return *(narrow ? narrow : best);
 }
 

@@ -15,7 +15,8 @@ constexpr int kLeastMargin = 48;  // px around the hole that are looked at, at l
 cv::Rect windowAround(const cv::Mat& hole) {
   const cv::Rect box = cv::boundingRect(hole);
   const int margin = std::max({kLeastMargin, box.width / 2, box.height / 2});
-  const cv::Rect grown(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin);
+  const cv::Rect grown(box.x - margin, box.y - margin, box.width + 2 * margin,
+                       box.height + 2 * margin);
   return grown & cv::Rect(0, 0, hole.cols, hole.rows);
 }
 
@@ -52,7 +53,8 @@ cv::Mat copyFrom(const cv::Mat& origin, const cv::Mat& image, cv::Mat& filled) {
 InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& banned,
                       const InpaintParams& params) {
   CV_Assert(image.type() == CV_32FC3 && hole.type() == CV_8UC1 && image.size() == hole.size());
-  CV_Assert(params.nearness.empty() || (params.nearness.type() == CV_32FC1 && params.nearness.size() == hole.size()));
+  CV_Assert(params.nearness.empty() ||
+            (params.nearness.type() == CV_32FC1 && params.nearness.size() == hole.size()));
   InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)), true};
   if (cv::countNonZero(hole) == 0) return result;
   const cv::Rect window = windowAround(hole);
@@ -63,12 +65,14 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   to_fill.setTo(0, bridges.core);
   const cv::Mat known = source | bridges.core;
   source.setTo(0, bridges.lines);
-  cv::Mat filled = smoothFill(look, to_fill, known), origin = patchOrigins(look, to_fill, source, within(window, params));
+  cv::Mat filled = smoothFill(look, to_fill, known),
+          origin = patchOrigins(look, to_fill, source, within(window, params));
   const cv::Mat copied = copyFrom(origin, look, filled);
   result.patches_found = cv::countNonZero(copied) > 0;
   if (result.patches_found) blendSeams(to_fill, known, origin, filled);
   bridges.origin.copyTo(origin, bridges.core);
-  cv::Mat(origin + cv::Scalar(window.x, window.y)).copyTo(result.origin(window), copied | bridges.core);
+  cv::Mat(origin + cv::Scalar(window.x, window.y))
+      .copyTo(result.origin(window), copied | bridges.core);
   filled.copyTo(result.image(window), whole_hole);
   return result;
 }

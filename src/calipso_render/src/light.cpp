@@ -32,26 +32,33 @@ cv::Vec3f thrownBackTint(const cv::Vec3f& reflectance) {
   const float grey = luminance(reflectance);
   if (!(grey > 0.0f)) return tint;
   // Of the hidden part h the surface's `sky` is 1 - (1 - kThrownBack) h.
-  for (int c = 0; c < 3; ++c) tint[c] = kThrownBack / (1.0f - kThrownBack) * (std::min(kMostTint / kThrownBack, reflectance[c] / grey) - 1.0f);
+  for (int c = 0; c < 3; ++c)
+    tint[c] = kThrownBack / (1.0f - kThrownBack) *
+              (std::min(kMostTint / kThrownBack, reflectance[c] / grey) - 1.0f);
   return tint;
 }
 
-cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky, const cv::Vec3f& tint) {
+cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky,
+                         const cv::Vec3f& tint) {
   const cv::Vec3f reaching = cv::Vec3f::all(sky) + tint * (1.0f - sky);
-  return ambientAt(light, n).mul(reaching) + light.sun * (std::max(0.0f, n.dot(light.direction)) * sun);
+  return ambientAt(light, n).mul(reaching) +
+         light.sun * (std::max(0.0f, n.dot(light.direction)) * sun);
 }
 
-float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v, float m) {
+float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v,
+                      float m) {
   const float nl = n.dot(l), nv = n.dot(v);
   if (nl <= kHorizon || nv <= kHorizon) return 0.0f;
   const Eigen::Vector3f sum = l + v;
-  const float length = sum.norm(), c = n.dot(sum) / length, vh = 0.5f * length, c2 = c * c, m2 = m * m;
+  const float length = sum.norm(), c = n.dot(sum) / length, vh = 0.5f * length, c2 = c * c,
+              m2 = m * m;
   const float D = std::exp((c2 - 1.0f) / (c2 * m2)) / (m2 * c2 * c2);
   const float G = std::min({1.0f, 2.0f * c * nv / vh, 2.0f * c * nl / vh});
   return D * G / (4.0f * nv);
 }
 
-Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l, const Eigen::Vector3d& v, double m) {
+Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
+                         const Eigen::Vector3d& v, double m) {
   const double nl = n.dot(l), nv = n.dot(v);
   if (nl <= kHorizon || nv <= kHorizon) return {};
   // For unit vectors v.h = l.h = |l + v| / 2.
@@ -59,22 +66,26 @@ Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l, con
   const double length = sum.norm(), c = n.dot(sum) / length, vh = 0.5 * length;
   const Eigen::Vector3d h = sum / length, dc = (n - c * h) / length, dvh = 0.5 * h;
   const double c2 = c * c, m2 = m * m, D = std::exp((c2 - 1.0) / (c2 * m2)) / (m2 * c2 * c2);
-  const double dD_dc = D * (2.0 / (c * c2 * m2) - 4.0 / c), dD_dm = D * (2.0 * (1.0 - c2) / (c2 * m2 * m) - 2.0 / m);
+  const double dD_dc = D * (2.0 / (c * c2 * m2) - 4.0 / c),
+               dD_dm = D * (2.0 * (1.0 - c2) / (c2 * m2 * m) - 2.0 / m);
   double G = 1.0;
   Eigen::Vector3d dG = Eigen::Vector3d::Zero();
   if (2.0 * c * nv / vh < G) G = 2.0 * c * nv / vh, dG = 2.0 * nv * (dc * vh - c * dvh) / (vh * vh);
-  if (2.0 * c * nl / vh < G) G = 2.0 * c * nl / vh, dG = 2.0 * ((dc * nl + c * n) * vh - c * nl * dvh) / (vh * vh);
+  if (2.0 * c * nl / vh < G)
+    G = 2.0 * c * nl / vh, dG = 2.0 * ((dc * nl + c * n) * vh - c * nl * dvh) / (vh * vh);
   const double scale = 1.0 / (4.0 * nv);
   return {D * G * scale, (dD_dc * dc * G + D * dG) * scale, dD_dm * G * scale};
 }
 
-cv::Vec3f specularShading(const Light& light, const Gloss& gloss, const Eigen::Vector3f& n, const Eigen::Vector3f& view,
-                          float sun, float sky) {
+cv::Vec3f specularShading(const Light& light, const Gloss& gloss, const Eigen::Vector3f& n,
+                          const Eigen::Vector3f& view, float sun, float sky) {
   if (gloss.specular <= 0.0f) return {};
   const float n_v = n.dot(view);
   const Eigen::Vector3f mirrored = 2.0f * n_v * n - view;
   cv::Vec3f radiance = ambientAt(light, mirrored) * (gloss.specular * sky * grazing(n_v));
-  if (sun > 0.0f) radiance += light.sun * (gloss.specular * sun * torranceSparrow(n, light.direction, view, gloss.roughness));
+  if (sun > 0.0f)
+    radiance += light.sun *
+                (gloss.specular * sun * torranceSparrow(n, light.direction, view, gloss.roughness));
   return radiance;
 }
 

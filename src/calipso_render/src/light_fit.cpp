@@ -15,11 +15,13 @@ namespace {
 
 constexpr int kFewestSamples = 60;
 constexpr std::size_t kStarts = 3;
-constexpr double kTelling = 3.0;        // of log-likelihood: a direction is better than most
-constexpr double kShadowsSpeak = 12.0;  // of log-likelihood: cast shadows are seen where this light casts them
-constexpr double kRobust = 0.15;        // relative residual beyond which a pixel counts less
-constexpr double kLogRange = 4.0;       // of a light's colour: e^4 times brighter or darker than the unit
-constexpr double kPriorWeight = 0.05;   // of one prior, as a part of all pixels
+constexpr double kTelling = 3.0;  // of log-likelihood: a direction is better than most
+constexpr double kShadowsSpeak =
+    12.0;  // of log-likelihood: cast shadows are seen where this light casts them
+constexpr double kRobust = 0.15;  // relative residual beyond which a pixel counts less
+constexpr double kLogRange =
+    4.0;  // of a light's colour: e^4 times brighter or darker than the unit
+constexpr double kPriorWeight = 0.05;  // of one prior, as a part of all pixels
 
 // Every parameter of the model; blocks as in ReflectanceCost.
 struct Unknowns {
@@ -61,17 +63,21 @@ class GlossPrior : public ceres::SizedCostFunction<2, 2> {
   double weight_;
 };
 
-Eigen::Vector3d logOf(const cv::Vec3f& c) { return Eigen::Vector3d(c[0], c[1], c[2]).array().max(1e-4).log(); }
+Eigen::Vector3d logOf(const cv::Vec3f& c) {
+  return Eigen::Vector3d(c[0], c[1], c[2]).array().max(1e-4).log();
+}
 
 cv::Vec3f expOf(const Eigen::Vector3d& x) {
-  return {static_cast<float>(std::exp(x[0])), static_cast<float>(std::exp(x[1])), static_cast<float>(std::exp(x[2]))};
+  return {static_cast<float>(std::exp(x[0])), static_cast<float>(std::exp(x[1])),
+          static_cast<float>(std::exp(x[2]))};
 }
 
 std::vector<cv::Vec3f> meanRadiance(const std::vector<LightSample>& samples, int clusters) {
   std::vector<cv::Vec3f> sums(clusters);
   std::vector<int> counts(clusters, 0);
   for (const LightSample& s : samples) sums[s.cluster] += s.radiance, ++counts[s.cluster];
-  for (int k = 0; k < clusters; ++k) sums[k] = sums[k] * (1.0f / std::max(1, counts[k])) + cv::Vec3f::all(1e-3f);
+  for (int k = 0; k < clusters; ++k)
+    sums[k] = sums[k] * (1.0f / std::max(1, counts[k])) + cv::Vec3f::all(1e-3f);
   return sums;
 }
 
@@ -79,7 +85,9 @@ class Fit {
  public:
   // @param direction_free false: cast shadows know it better
   Fit(const LightEvidence& evidence, const Eigen::Vector3f& up, bool direction_free)
-      : evidence_(evidence), direction_free_(direction_free), up_(up.cast<double>()),
+      : evidence_(evidence),
+        direction_free_(direction_free),
+        up_(up.cast<double>()),
         means_(meanRadiance(evidence.samples, evidence.clusters)) {}
 
   // Four passes, then everything; twice, since the shadows hang on the direction found.
@@ -92,7 +100,10 @@ class Fit {
       using Blocks = std::array<bool, 3>;  // light, albedo, gloss free?
       ceres::Problem problem;
       build(problem, x);
-      for (const Blocks& free : {Blocks{true, false, false}, {false, true, false}, {false, false, true}, {true, true, true}}) {
+      for (const Blocks& free : {Blocks{true, false, false},
+                                 {false, true, false},
+                                 {false, false, true},
+                                 {true, true, true}}) {
         cost = solve(problem, x, free);
       }
     }
@@ -109,16 +120,19 @@ class Fit {
       r.visible = evidence_.visible ? evidence_.visible(s, l) : 1.0f;
       r.sky = s.sky;
       r.scale = (means_[s.cluster][0] + means_[s.cluster][1] + means_[s.cluster][2]) / 3.0;
-      problem.AddResidualBlock(new ReflectanceCost(r), new ceres::SoftLOneLoss(kRobust), x.direction.data(), x.ambient.data(),
-                               x.sun.data(), &x.gradient, x.albedos[s.cluster].data(), x.gloss.data());
+      problem.AddResidualBlock(new ReflectanceCost(r), new ceres::SoftLOneLoss(kRobust),
+                               x.direction.data(), x.ambient.data(), x.sun.data(), &x.gradient,
+                               x.albedos[s.cluster].data(), x.gloss.data());
     }
     const double weight = std::sqrt(kPriorWeight * evidence_.samples.size());
     problem.AddResidualBlock(new Prior(kSkyGradient, 0.5 * weight), nullptr, &x.gradient);
     problem.AddResidualBlock(new GlossPrior(0.05 * weight), nullptr, x.gloss.data());
     problem.SetManifold(x.direction.data(), new ceres::SphereManifold<3>);
     for (int c = 0; c < 3; ++c) {
-      problem.SetParameterLowerBound(x.sun.data(), c, -kLogRange), problem.SetParameterUpperBound(x.sun.data(), c, kLogRange);
-      problem.SetParameterLowerBound(x.ambient.data(), c, -kLogRange), problem.SetParameterUpperBound(x.ambient.data(), c, kLogRange);
+      problem.SetParameterLowerBound(x.sun.data(), c, -kLogRange),
+          problem.SetParameterUpperBound(x.sun.data(), c, kLogRange);
+      problem.SetParameterLowerBound(x.ambient.data(), c, -kLogRange),
+          problem.SetParameterUpperBound(x.ambient.data(), c, kLogRange);
     }
     problem.SetParameterLowerBound(&x.gradient, 0, 0.0);
     problem.SetParameterUpperBound(&x.gradient, 0, 0.9);
@@ -130,10 +144,13 @@ class Fit {
   double solve(ceres::Problem& problem, Unknowns& x, const std::array<bool, 3>& free) const {
     const auto hold = [&](double* block, bool is_free) {
       if (!problem.HasParameterBlock(block)) return;
-      if (is_free) problem.SetParameterBlockVariable(block);
-      else problem.SetParameterBlockConstant(block);
+      if (is_free)
+        problem.SetParameterBlockVariable(block);
+      else
+        problem.SetParameterBlockConstant(block);
     };
-    hold(x.direction.data(), free[0] && direction_free_), hold(x.sun.data(), free[0]), hold(&x.gradient, free[0]);
+    hold(x.direction.data(), free[0] && direction_free_), hold(x.sun.data(), free[0]),
+        hold(&x.gradient, free[0]);
     // Brightness is shared between light and albedo: the ambient light is the unit.
     hold(x.ambient.data(), free[0] && !free[1]);
     for (Eigen::Vector3d& a : x.albedos) hold(a.data(), free[1]);
@@ -161,14 +178,17 @@ LightFit toFit(const Unknowns& x, const Eigen::Vector3f& up, double cost) {
   fit.light.direction = x.direction.cast<float>();
   fit.light.sun = expOf(x.sun), fit.light.ambient[0] = expOf(x.ambient);
   // Band 1 of the harmonics is ordered y, z, x.
-  for (int i = 0; i < 3; ++i) fit.light.ambient[1 + i] = fit.light.ambient[0] * (static_cast<float>(x.gradient) * up[(i + 1) % 3]);
+  for (int i = 0; i < 3; ++i)
+    fit.light.ambient[1 + i] =
+        fit.light.ambient[0] * (static_cast<float>(x.gradient) * up[(i + 1) % 3]);
   fit.gloss = {static_cast<float>(std::exp(x.gloss[0])), static_cast<float>(std::exp(x.gloss[1]))};
   for (const Eigen::Vector3d& a : x.albedos) fit.albedos.push_back(expOf(a));
   return fit;
 }
 
 // Fits from one start and keeps the result if it is the best so far.
-void tryStart(const LightEvidence& evidence, const Eigen::Vector3f& up, const LightCandidate& start, bool direction_free, LightFit& best) {
+void tryStart(const LightEvidence& evidence, const Eigen::Vector3f& up, const LightCandidate& start,
+              bool direction_free, LightFit& best) {
   Unknowns x;
   const double cost = Fit(evidence, up, direction_free).run(start, x);
   if (x.direction.dot(up.cast<double>()) <= 0.0 || (best.determined && cost >= best.cost)) return;
@@ -179,19 +199,23 @@ void tryStart(const LightEvidence& evidence, const Eigen::Vector3f& up, const Li
 
 }  // namespace
 
-LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up, const Eigen::Vector3f& view) {
+LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
+                  const Eigen::Vector3f& view) {
   LightFit best;
   best.light.direction = (up + 0.4f * view).normalized();
   if (static_cast<int>(evidence.samples.size()) < kFewestSamples) return best;
   const std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
-  const auto shadows = [&](const LightCandidate& c) { return evidence.shadow_misfit ? evidence.shadow_misfit(c.direction) : 0.0; };
+  const auto shadows = [&](const LightCandidate& c) {
+    return evidence.shadow_misfit ? evidence.shadow_misfit(c.direction) : 0.0;
+  };
   best.from_shadows = shadows(starts.front()) < -kShadowsSpeak;
   if (!best.from_shadows) {
     for (const LightCandidate& start : starts) tryStart(evidence, up, start, true, best);
   }
-  // Shading alone may lead below the horizon: then the search's direction stands, if it stands out, as it does where
-  // shadows tell it.
-  if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling)) tryStart(evidence, up, starts.front(), false, best);
+  // Shading alone may lead below the horizon: then the search's direction stands, if it stands out,
+  // as it does where shadows tell it.
+  if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling))
+    tryStart(evidence, up, starts.front(), false, best);
   if (!best.determined) return best;
   best.seen_gloss = evidence.gloss ? evidence.gloss(best) : std::nullopt;
   if (best.seen_gloss) best.gloss = best.seen_gloss->gloss;

@@ -11,23 +11,27 @@
 namespace calipso::render {
 namespace {
 
-constexpr std::size_t kPerObject = 1500;       // samples at most
-constexpr int kRim = 3;                // px of the mask's rim that are left out
-constexpr float kSaturated = 250.0f;   // code value
+constexpr std::size_t kPerObject = 1500;  // samples at most
+constexpr int kRim = 3;                   // px of the mask's rim that are left out
+constexpr float kSaturated = 250.0f;      // code value
 constexpr int kClustersPerObject = 4;
-constexpr float kGrazingView = 0.25f;  // cosine to the viewer; flatter ones mirror more than the model knows
+constexpr float kGrazingView =
+    0.25f;  // cosine to the viewer; flatter ones mirror more than the model knows
 
 struct Pixel {
   int u, v;
 };
 
 // Pixels well inside the object's mask that its surface covers, thinned evenly.
-std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const cv::Mat& picture, const cv::Mat& inside, std::size_t limit) {
+std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const cv::Mat& picture,
+                                const cv::Mat& inside, std::size_t limit) {
   std::vector<Pixel> pixels;
   const cv::Rect& r = buffer.region();
   for (int v = 0; v < r.height; ++v) {
     for (int u = 0; u < r.width; ++u) {
-      if (buffer.ids(v)[u] == VisibilityBuffer::kNothing || inside.at<std::uint8_t>(v + r.y, u + r.x) == 0) continue;
+      if (buffer.ids(v)[u] == VisibilityBuffer::kNothing ||
+          inside.at<std::uint8_t>(v + r.y, u + r.x) == 0)
+        continue;
       const cv::Vec3f& x = picture.at<cv::Vec3f>(v + r.y, u + r.x);
       if (std::max({x[0], x[1], x[2]}) < kSaturated) pixels.push_back({u + r.x, v + r.y});
     }
@@ -49,21 +53,25 @@ int clusterByColour(std::vector<LightSample>& samples, std::size_t first, int ba
   const int count = static_cast<int>(samples.size() - first);
   if (count < 8 * kClustersPerObject) return count > 0 ? 1 : 0;
   cv::Mat points(count, 1, CV_32FC2), labels;
-  for (int i = 0; i < count; ++i) points.at<cv::Vec2f>(i) = chromaticity(samples[first + i].radiance);
+  for (int i = 0; i < count; ++i)
+    points.at<cv::Vec2f>(i) = chromaticity(samples[first + i].radiance);
   cv::theRNG().state = 1;  // k-means draws its starts from the shared generator
-  cv::kmeans(points, kClustersPerObject, labels, {cv::TermCriteria::MAX_ITER | cv::TermCriteria::EPS, 20, 1e-4}, 2,
+  cv::kmeans(points, kClustersPerObject, labels,
+             {cv::TermCriteria::MAX_ITER | cv::TermCriteria::EPS, 20, 1e-4}, 2,
              cv::KMEANS_PP_CENTERS);
   for (int i = 0; i < count; ++i) samples[first + i].cluster = base + labels.at<int>(i);
   return kClustersPerObject;
 }
 
-void sampleView(const View& view, int picture, std::size_t object, std::size_t limit, std::vector<LightSample>& samples) {
+void sampleView(const View& view, int picture, std::size_t object, std::size_t limit,
+                std::vector<LightSample>& samples) {
   const Actor& actor = view.actors[object];
   const Eigen::Vector3f eye = view.camera.world_from_camera.translation().cast<float>();
   VisibilityBuffer buffer(boundsOf(actor.screen, 0, view.picture.size()));
   buffer.draw(actor.screen, 0);
   cv::Mat inside;
-  cv::erode(view.labels == actor.surface->index, inside, cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
+  cv::erode(view.labels == actor.surface->index, inside,
+            cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
   for (const Pixel& p : usablePixels(buffer, view.picture, inside, limit)) {
     const int triangle = VisibilityBuffer::triangleOf(buffer.idAt(p.u, p.v));
     const SurfacePoint s = surfacePoint(actor, triangle, p.u, p.v, eye);
@@ -78,13 +86,15 @@ void sampleView(const View& view, int picture, std::size_t object, std::size_t l
 
 }  // namespace
 
-std::vector<LightSample> lightSamples(const std::vector<View>& views, const std::vector<bool>& moves, int& clusters) {
+std::vector<LightSample> lightSamples(const std::vector<View>& views,
+                                      const std::vector<bool>& moves, int& clusters) {
   std::vector<LightSample> samples;
   clusters = 0;
   for (std::size_t object = 0; object < moves.size(); ++object) {
     const std::size_t first = samples.size();
     const std::size_t pictures = moves[object] ? views.size() : 1;
-    for (std::size_t i = 0; i < pictures; ++i) sampleView(views[i], static_cast<int>(i), object, kPerObject / pictures, samples);
+    for (std::size_t i = 0; i < pictures; ++i)
+      sampleView(views[i], static_cast<int>(i), object, kPerObject / pictures, samples);
     for (std::size_t i = first; i < samples.size(); ++i) samples[i].cluster = clusters;
     clusters += clusterByColour(samples, first, clusters);
   }
@@ -99,7 +109,8 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
   const auto clues = std::make_shared<std::vector<ShadowClue>>();
   for (const View& view : views) {
     std::vector<Occluder> occluders;
-    for (const Actor& a : view.actors) occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+    for (const Actor& a : view.actors)
+      occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
     scenes->emplace_back(occluders);
     if (!planes.empty()) clues->emplace_back(view, planes, plate);
   }
@@ -111,7 +122,8 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
     for (std::size_t i = 0; i < clues->size(); ++i) sum += (*clues)[i].misfit((*scenes)[i], l);
     return sum;
   };
-  evidence.gloss = [&views, moves, samples = evidence.samples, visible = evidence.visible](const LightFit& fit) {
+  evidence.gloss = [&views, moves, samples = evidence.samples,
+                    visible = evidence.visible](const LightFit& fit) {
     return fitGloss(highlightSamples(views, moves, samples, fit.light.direction), fit, visible);
   };
   for (const ShadowClue& clue : *clues) {

@@ -7,10 +7,12 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kDirections = 400;     // tried over the upper hemisphere, without the objects' own shadows
-constexpr std::size_t kKept = 10;    // of those, tried with them
-constexpr float kApart = 0.94f;      // cosine of the angle between two of them
-constexpr float kShadowApart = 0.9976f;  // the same between two that cast shadows speak for: 4 degrees
+constexpr int kDirections =
+    400;  // tried over the upper hemisphere, without the objects' own shadows
+constexpr std::size_t kKept = 10;  // of those, tried with them
+constexpr float kApart = 0.94f;    // cosine of the angle between two of them
+constexpr float kShadowApart =
+    0.9976f;                         // the same between two that cast shadows speak for: 4 degrees
 constexpr float kLowestSun = 0.08f;  // sine of its elevation
 constexpr double kLeastRatio = 0.1, kMostRatio = 10.0;  // of sun to ambient light
 constexpr int kRatios = 20;
@@ -24,22 +26,27 @@ using Visible = std::function<float(const LightSample&, const Eigen::Vector3f&)>
 std::vector<Eigen::Vector3f> candidateDirections(const Eigen::Vector3f& up) {
   std::vector<Eigen::Vector3f> directions;
   for (int i = 0; i < kDirections * 2; ++i) {
-    const float z = 1.0f - (2 * i + 1.0f) / (2 * kDirections), r = std::sqrt(1.0f - z * z), a = i * 2.39996323f;
+    const float z = 1.0f - (2 * i + 1.0f) / (2 * kDirections), r = std::sqrt(1.0f - z * z),
+                a = i * 2.39996323f;
     const Eigen::Vector3f d(r * std::cos(a), r * std::sin(a), z);
     if (d.dot(up) > kLowestSun) directions.push_back(d);
   }
   return directions;
 }
 
-// Sums of one cluster's channel for I = a (p + q s): p the ambient light's profile, s = V max(0, n.l).
+// Sums of one cluster's channel for I = a (p + q s): p the ambient light's profile, s = V max(0,
+// n.l).
 struct LineSums {
   double n = 0, i = 0, pp = 0, ps = 0, ss = 0, ip = 0, is = 0, ii = 0;
 
-  double albedo(double q) const { return std::max(0.0, ip + q * is) / std::max(pp + q * (2.0 * ps + q * ss), 1e-12); }
+  double albedo(double q) const {
+    return std::max(0.0, ip + q * is) / std::max(pp + q * (2.0 * ps + q * ss), 1e-12);
+  }
   // Sum of squares at the best a, relative to the mean brightness.
   double error(double q) const {
     const double a = albedo(q), mean = i / n + 1e-4;
-    return std::max(0.0, ii - 2.0 * a * (ip + q * is) + a * a * (pp + q * (2.0 * ps + q * ss))) / (mean * mean);
+    return std::max(0.0, ii - 2.0 * a * (ip + q * is) + a * a * (pp + q * (2.0 * ps + q * ss))) /
+           (mean * mean);
   }
 };
 
@@ -57,7 +64,8 @@ double errorOf(const ClusterSums& sums, int channel, double q) {
 double bestRatio(const ClusterSums& sums, int channel) {
   double best = 0.0, best_error = errorOf(sums, channel, 0.0);
   for (int i = 0; i <= kRatios; ++i) {
-    const double q = kLeastRatio * std::pow(kMostRatio / kLeastRatio, static_cast<double>(i) / kRatios);
+    const double q =
+        kLeastRatio * std::pow(kMostRatio / kLeastRatio, static_cast<double>(i) / kRatios);
     const double error = errorOf(sums, channel, q);
     if (error < best_error) best = q, best_error = error;
   }
@@ -68,7 +76,8 @@ class Search {
  public:
   Search(const LightEvidence& evidence, const Eigen::Vector3f& up) : evidence_(evidence), up_(up) {
     const std::size_t step = std::max<std::size_t>(1, evidence.samples.size() / kSearchSamples);
-    for (std::size_t i = 0; i < evidence.samples.size(); i += step) samples_.push_back(evidence.samples[i]);
+    for (std::size_t i = 0; i < evidence.samples.size(); i += step)
+      samples_.push_back(evidence.samples[i]);
   }
 
   // One albedo per cluster and channel; the errors count relative to the cluster's brightness.
@@ -81,7 +90,8 @@ class Search {
       for (int c = 0; c < 3; ++c) {
         LineSums& m = sums[x.cluster][c];
         const double i = x.radiance[c];
-        m.n += 1, m.i += i, m.pp += p * p, m.ps += p * s, m.ss += s * s, m.ip += i * p, m.is += i * s, m.ii += i * i;
+        m.n += 1, m.i += i, m.pp += p * p, m.ps += p * s, m.ss += s * s, m.ip += i * p,
+            m.is += i * s, m.ii += i * i;
       }
     }
     LightCandidate total;
@@ -109,7 +119,8 @@ class Search {
     for (float step = kFirstStep; step > kLastStep; step *= 0.5f) {
       for (bool better = true; better;) {
         better = false;
-        const Eigen::Vector3f centre = best.direction, s = centre.unitOrthogonal(), t = centre.cross(s);
+        const Eigen::Vector3f centre = best.direction, s = centre.unitOrthogonal(),
+                              t = centre.cross(s);
         for (const Eigen::Vector3f& d : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)}) {
           const Eigen::Vector3f l = (centre + step * d).normalized();
           if (l.dot(up_) < kLowestSun) continue;
@@ -130,11 +141,14 @@ class Search {
 bool better(const LightCandidate& a, const LightCandidate& b) { return a.misfit < b.misfit; }
 
 // The first `count` of them that are apart from each other.
-std::vector<LightCandidate> spread(const std::vector<LightCandidate>& sorted, float apart, std::size_t count) {
+std::vector<LightCandidate> spread(const std::vector<LightCandidate>& sorted, float apart,
+                                   std::size_t count) {
   std::vector<LightCandidate> chosen;
   for (const LightCandidate& candidate : sorted) {
     if (chosen.size() == count) break;
-    const bool far = std::all_of(chosen.begin(), chosen.end(), [&](const LightCandidate& b) { return b.direction.dot(candidate.direction) < apart; });
+    const bool far = std::all_of(chosen.begin(), chosen.end(), [&](const LightCandidate& b) {
+      return b.direction.dot(candidate.direction) < apart;
+    });
     if (far) chosen.push_back(candidate);
   }
   return chosen;
@@ -142,13 +156,15 @@ std::vector<LightCandidate> spread(const std::vector<LightCandidate>& sorted, fl
 
 }  // namespace
 
-std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up, std::size_t count) {
+std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
+                                        std::size_t count) {
   const Search search(evidence, up);
   std::vector<LightCandidate> all;
   for (const Eigen::Vector3f& l : candidateDirections(up)) all.push_back(search.byShading(l, {}));
   std::stable_sort(all.begin(), all.end(), better);
   std::vector<LightCandidate> kept;
-  for (const LightCandidate& c : spread(all, kApart, kKept)) kept.push_back(search.byAll(c.direction));
+  for (const LightCandidate& c : spread(all, kApart, kKept))
+    kept.push_back(search.byAll(c.direction));
   std::vector<LightCandidate> from_shadows;
   for (const Eigen::Vector3f& l : evidence.shadow_candidates) {
     if (l.dot(up) > kLowestSun) from_shadows.push_back(search.byAll(l));

@@ -6,17 +6,20 @@
 
 namespace calipso::render {
 
-// A direction of the sun with the light I = a (ambient (1 + kSkyGradient n.up) + sun max(0, n.l)) that fits best under it.
+// A direction of the sun with the light I = a (ambient (1 + kSkyGradient n.up) + sun max(0, n.l))
+// that fits best under it.
 struct LightCandidate {
   Eigen::Vector3f direction;
-  double misfit = 0.0;      // minus a log-likelihood of shading and cast shadows
-  double contrast = 0.0;    // of shading alone: how much better the best direction is than half of all; 0: nothing tells
-  cv::Vec3f ambient, sun;   // their sum is 1
+  double misfit = 0.0;     // minus a log-likelihood of shading and cast shadows
+  double contrast = 0.0;   // of shading alone: how much better the best direction is than half of
+                           // all; 0: nothing tells
+  cv::Vec3f ambient, sun;  // their sum is 1
 };
 
-// Tries directions over the whole upper hemisphere and those that cast shadows speak for, and refines the best ones;
-// at least 20 degrees apart at first, best first.
-std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up, std::size_t count);
+// Tries directions over the whole upper hemisphere and those that cast shadows speak for, and
+// refines the best ones; at least 20 degrees apart at first, best first.
+std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
+                                        std::size_t count);
 
 // Ambient light's assumed profile: 1 + kSkyGradient n.up.
 inline constexpr float kSkyGradient = 0.45f;

@@ -8,8 +8,8 @@
 
 namespace calipso::render {
 
-// Linear colours to code values with the camera's noise, a stretch of a row at a time. Colours are four floats: linear B, G,
-// R, and the part of the pixel that carries no noise yet.
+// Linear colours to code values with the camera's noise, a stretch of a row at a time. Colours are
+// four floats: linear B, G, R, and the part of the pixel that carries no noise yet.
 class LineCodec {
  public:
   // @param noise of the camera; a model without deviations adds none

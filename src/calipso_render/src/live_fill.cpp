@@ -7,15 +7,17 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kMean = 3;         // px around a place whose mean colour is compared
-constexpr int kSmooth = 3;       // px around a copied place over which noise is averaged
+constexpr int kMean = 3;             // px around a place whose mean colour is compared
+constexpr int kSmooth = 3;           // px around a copied place over which noise is averaged
 constexpr float kNoiseReach = 6.0f;  // deviations of noise
-constexpr float kFade = 7.0f;    // px over which a correction fades
-constexpr float kFarthest = 30.0f;  // px
-constexpr float kEdge = 30.0f;   // code values; what differs by much more is an edge of things
+constexpr float kFade = 7.0f;        // px over which a correction fades
+constexpr float kFarthest = 30.0f;   // px
+constexpr float kEdge = 30.0f;       // code values; what differs by much more is an edge of things
 const cv::Point kNeighbours[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 
-bool inside(const cv::Mat& m, const cv::Point& p) { return p.x >= 0 && p.y >= 0 && p.x < m.cols && p.y < m.rows; }
+bool inside(const cv::Mat& m, const cv::Point& p) {
+  return p.x >= 0 && p.y >= 0 && p.x < m.cols && p.y < m.rows;
+}
 
 bool meanAround(const cv::Mat& bgr, const cv::Mat& labels, const cv::Point& p, cv::Vec3f& mean) {
   cv::Vec3f sum;
@@ -38,7 +40,8 @@ cv::Vec3f denoised(const cv::Mat& bgr, const cv::Mat& labels, const cv::Point& p
   for (int v = std::max(0, p.y - kSmooth); v <= std::min(bgr.rows - 1, p.y + kSmooth); ++v) {
     for (int u = std::max(0, p.x - kSmooth); u <= std::min(bgr.cols - 1, p.x + kSmooth); ++u) {
       const cv::Vec3b c = bgr.at<cv::Vec3b>(v, u);
-      const int difference = std::max({std::abs(c[0] - own[0]), std::abs(c[1] - own[1]), std::abs(c[2] - own[2])});
+      const int difference =
+          std::max({std::abs(c[0] - own[0]), std::abs(c[1] - own[1]), std::abs(c[2] - own[2])});
       if (difference <= limit && labels.at<std::uint8_t>(v, u) == 0) sum += cv::Vec3i(c), ++count;
     }
   }
@@ -48,14 +51,19 @@ cv::Vec3f denoised(const cv::Mat& bgr, const cv::Mat& labels, const cv::Point& p
 }  // namespace
 
 LiveFill::LiveFill(const cv::Mat& origin, const cv::Mat& hole)
-    : origin_(origin), seam_(origin.size(), CV_32S, cv::Scalar(-1)), weight_(origin.size(), CV_32F, cv::Scalar(0.0f)) {
+    : origin_(origin),
+      seam_(origin.size(), CV_32S, cv::Scalar(-1)),
+      weight_(origin.size(), CV_32F, cv::Scalar(0.0f)) {
   addSeams(hole);
 }
 
 void LiveFill::addSeams(const cv::Mat& hole) {
-  const auto offset = [&](const cv::Point& p) { return cv::Point(origin_.at<cv::Vec2s>(p)[0], origin_.at<cv::Vec2s>(p)[1]) - p; };
+  const auto offset = [&](const cv::Point& p) {
+    return cv::Point(origin_.at<cv::Vec2s>(p)[0], origin_.at<cv::Vec2s>(p)[1]) - p;
+  };
   const auto filled = [&](const cv::Point& p) { return origin_.at<cv::Vec2s>(p)[0] >= 0; };
-  cv::Mat away(origin_.size(), CV_8U, cv::Scalar(255)), index(origin_.size(), CV_32S, cv::Scalar(-1));
+  cv::Mat away(origin_.size(), CV_8U, cv::Scalar(255)),
+      index(origin_.size(), CV_32S, cv::Scalar(-1));
   for (int v = 0; v < origin_.rows; ++v) {
     for (int u = 0; u < origin_.cols; ++u) {
       const cv::Point p(u, v);
@@ -100,14 +108,18 @@ std::vector<cv::Vec3f> LiveFill::corrections(const cv::Mat& bgr, const cv::Mat& 
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < seams_.size(); ++i) {
     cv::Vec3f other, own;
-    if (!meanAround(bgr, labels, seams_[i].other, other) || !meanAround(bgr, labels, seams_[i].own, own)) continue;
+    if (!meanAround(bgr, labels, seams_[i].other, other) ||
+        !meanAround(bgr, labels, seams_[i].own, own))
+      continue;
     const cv::Vec3f miss = other - own;
     all[i] = seams_[i].share * miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
   }
   return all;
 }
 
-bool LiveFill::at(const cv::Mat& bgr, const cv::Mat& labels, const std::vector<cv::Vec3f>& corrections, float noise, int u, int v, cv::Vec3f& colour) const {
+bool LiveFill::at(const cv::Mat& bgr, const cv::Mat& labels,
+                  const std::vector<cv::Vec3f>& corrections, float noise, int u, int v,
+                  cv::Vec3f& colour) const {
   const cv::Vec2s from = origin_.at<cv::Vec2s>(v, u);
   if (from[0] < 0 || labels.at<std::uint8_t>(from[1], from[0]) != 0) return false;
   colour = denoised(bgr, labels, {from[0], from[1]}, noise);

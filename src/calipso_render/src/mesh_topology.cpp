@@ -19,7 +19,9 @@ using DirectedEdge = std::pair<int, int>;
 bool isClosed(std::vector<DirectedEdge> edges) {
   std::sort(edges.begin(), edges.end());
   if (std::adjacent_find(edges.begin(), edges.end()) != edges.end()) return false;
-  return std::all_of(edges.begin(), edges.end(), [&](const DirectedEdge& e) { return std::binary_search(edges.begin(), edges.end(), DirectedEdge(e.second, e.first)); });
+  return std::all_of(edges.begin(), edges.end(), [&](const DirectedEdge& e) {
+    return std::binary_search(edges.begin(), edges.end(), DirectedEdge(e.second, e.first));
+  });
 }
 
 int rootOf(std::vector<int>& parents, int i) {
@@ -58,11 +60,14 @@ int outsideWinding(const Points& vertices, const Triangles& triangles) {
   if (edges.empty() || !isClosed(edges)) return 0;
   std::map<int, double> volumes;  // of the connected parts, six times
   for (const Eigen::Vector3i& t : triangles) {
-    const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(), c = vertices[t[2]].cast<double>();
+    const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(),
+                          c = vertices[t[2]].cast<double>();
     volumes[rootOf(parents, place[t[0]])] += a.dot(b.cross(c));
   }
-  const bool outward = std::all_of(volumes.begin(), volumes.end(), [](const auto& v) { return v.second >= 0.0; });
-  const bool inward = std::all_of(volumes.begin(), volumes.end(), [](const auto& v) { return v.second <= 0.0; });
+  const bool outward =
+      std::all_of(volumes.begin(), volumes.end(), [](const auto& v) { return v.second >= 0.0; });
+  const bool inward =
+      std::all_of(volumes.begin(), volumes.end(), [](const auto& v) { return v.second <= 0.0; });
   return outward == inward ? 0 : outward ? 1 : -1;
 }
 

@@ -48,8 +48,10 @@ void fillGaps(std::array<float, N>& values) {
   std::array<float, N> filled = values;
   for (int i = 0; i < static_cast<int>(N); ++i) {
     for (int d = 0; d < static_cast<int>(N) && filled[i] < 0.0f; ++d) {
-      if (i - d >= 0 && values[i - d] >= 0.0f) filled[i] = values[i - d];
-      else if (i + d < static_cast<int>(N) && values[i + d] >= 0.0f) filled[i] = values[i + d];
+      if (i - d >= 0 && values[i - d] >= 0.0f)
+        filled[i] = values[i - d];
+      else if (i + d < static_cast<int>(N) && values[i + d] >= 0.0f)
+        filled[i] = values[i + d];
     }
     filled[i] = std::max(filled[i], 0.0f);
   }
@@ -101,7 +103,8 @@ NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames, const cv::Ma
     }
     if (frames.size() == 1) addDetail(frames[0], channel, differences);
     for (int knot = 0; knot < kKnots; ++knot) {
-      model.deviation_[channel][knot] = static_cast<float>(kMedianToSigma * differences.median(knot));
+      model.deviation_[channel][knot] =
+          static_cast<float>(kMedianToSigma * differences.median(knot));
     }
     fillGaps(model.deviation_[channel]);
   }
@@ -135,7 +138,9 @@ const std::vector<float>& NoiseField::tile() {
     values.reserve(3 * kSide * (kSide + kWrapped));
     for (int c = 0; c < 3; ++c) {
       for (int v = 0; v < kSide; ++v) {
-        for (int u = 0; u < kSide + kWrapped; ++u) values.push_back(static_cast<float>((mix.at<cv::Vec3f>(v, u % kSide)[c] - mean[c]) / deviation[c]));
+        for (int u = 0; u < kSide + kWrapped; ++u)
+          values.push_back(
+              static_cast<float>((mix.at<cv::Vec3f>(v, u % kSide)[c] - mean[c]) / deviation[c]));
       }
     }
     return values;

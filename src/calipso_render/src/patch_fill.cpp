@@ -11,29 +11,37 @@ namespace {
 
 constexpr int kRadius = 3;  // px; patches are squares of 7
 constexpr int kSide = 2 * kRadius + 1;
-constexpr float kLively = 6.0f;        // weight of the mean gradient against colour
-constexpr int kLivelySide = 9;         // px of the square in which gradients are averaged
-constexpr float kUnknown = 1e-3f;      // weight of unknown pixels in coarser levels
-constexpr float kMostlyKnown = 0.5f;   // part of a coarser level's pixel from which it is no hole
-constexpr int kBandRows = 16;          // rows that one thread searches in order
-constexpr int kFirstGuesses = 200;     // places tried for a patch of the rim
-constexpr int kFarthest = 16, kFinest = 2;  // px around the best place in which levels, and the finest, look further
-constexpr int kSweeps = 2;             // of a search
-constexpr float kJump = 1.6f;          // times better than what continues a neighbour's copy a place beside it must be: pieces stay large
+constexpr float kLively = 6.0f;       // weight of the mean gradient against colour
+constexpr int kLivelySide = 9;        // px of the square in which gradients are averaged
+constexpr float kUnknown = 1e-3f;     // weight of unknown pixels in coarser levels
+constexpr float kMostlyKnown = 0.5f;  // part of a coarser level's pixel from which it is no hole
+constexpr int kBandRows = 16;         // rows that one thread searches in order
+constexpr int kFirstGuesses = 200;    // places tried for a patch of the rim
+constexpr int kFarthest = 16,
+              kFinest =
+                  2;  // px around the best place in which levels, and the finest, look further
+constexpr int kSweeps = 2;     // of a search
+constexpr float kJump = 1.6f;  // times better than what continues a neighbour's copy a place beside
+                               // it must be: pieces stay large
 constexpr float kNearer = 2.5f;        // times that a source may be nearer or farther,
 constexpr float kHorizon = 6.0f;       // or px of height by which it may miss that
-constexpr float kMisplaced = 2000.0f;  // cost of one that does not, squared code values: such are taken for want of others only
+constexpr float kMisplaced = 2000.0f;  // cost of one that does not, squared code values: such are
+                                       // taken for want of others only
 
 // Mean gradient around every pixel, of what is known.
 cv::Mat liveliness(const cv::Mat& image, const cv::Mat& known) {
-  cv::Mat grey, strength = cv::Mat::zeros(image.size(), CV_32F), weight = cv::Mat::zeros(image.size(), CV_32F);
+  cv::Mat grey, strength = cv::Mat::zeros(image.size(), CV_32F),
+                weight = cv::Mat::zeros(image.size(), CV_32F);
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   for (int v = 0; v + 1 < image.rows; ++v) {
     for (int u = 0; u + 1 < image.cols; ++u) {
-      const bool whole = known.at<std::uint8_t>(v, u) != 0 && known.at<std::uint8_t>(v + 1, u) != 0 && known.at<std::uint8_t>(v, u + 1) != 0;
+      const bool whole = known.at<std::uint8_t>(v, u) != 0 &&
+                         known.at<std::uint8_t>(v + 1, u) != 0 &&
+                         known.at<std::uint8_t>(v, u + 1) != 0;
       if (!whole) continue;
       const float g = grey.at<float>(v, u);
-      strength.at<float>(v, u) = std::abs(grey.at<float>(v, u + 1) - g) + std::abs(grey.at<float>(v + 1, u) - g);
+      strength.at<float>(v, u) =
+          std::abs(grey.at<float>(v, u + 1) - g) + std::abs(grey.at<float>(v + 1, u) - g);
       weight.at<float>(v, u) = 1.0f;
     }
   }
@@ -43,17 +51,23 @@ cv::Mat liveliness(const cv::Mat& image, const cv::Mat& known) {
 }
 
 struct Level {
-  cv::Mat image;         // CV_32FC4: colour, and how lively it is around
-  cv::Mat known;         // CV_32FC1: part of a pixel that is known
-  cv::Mat hole, source;  // CV_8UC1
+  cv::Mat image;              // CV_32FC4: colour, and how lively it is around
+  cv::Mat known;              // CV_32FC1: part of a pixel that is known
+  cv::Mat hole, source;       // CV_8UC1
   cv::Mat nearness, surface;  // CV_32FC1, CV_8UC1; may be empty
 };
 
-// Half the size: the mean of what is known. A pixel is source if all of its four were, hole if less than half of it is known: what
-// shows through narrow gaps, and lines drawn through the hole, are to be met at every level.
+// Half the size: the mean of what is known. A pixel is source if all of its four were, hole if less
+// than half of it is known: what shows through narrow gaps, and lines drawn through the hole, are
+// to be met at every level.
 Level halved(const Level& fine) {
   const cv::Size size((fine.hole.cols + 1) / 2, (fine.hole.rows + 1) / 2);
-  Level half{cv::Mat::zeros(size, CV_32FC4), cv::Mat::zeros(size, CV_32F), {}, cv::Mat(size, CV_8U, cv::Scalar(255)), {}, {}};
+  Level half{cv::Mat::zeros(size, CV_32FC4),
+             cv::Mat::zeros(size, CV_32F),
+             {},
+             cv::Mat(size, CV_8U, cv::Scalar(255)),
+             {},
+             {}};
   cv::Mat weight = cv::Mat::zeros(size, CV_32F), count = weight.clone();
   for (int v = 0; v < fine.hole.rows; ++v) {
     for (int u = 0; u < fine.hole.cols; ++u) {
@@ -66,7 +80,8 @@ Level halved(const Level& fine) {
   }
   half.known /= count;
   half.hole = half.known < kMostlyKnown;
-  if (!fine.nearness.empty()) cv::resize(fine.nearness, half.nearness, size, 0, 0, cv::INTER_NEAREST);
+  if (!fine.nearness.empty())
+    cv::resize(fine.nearness, half.nearness, size, 0, 0, cv::INTER_NEAREST);
   if (!fine.surface.empty()) cv::resize(fine.surface, half.surface, size, 0, 0, cv::INTER_NEAREST);
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) half.image.at<cv::Vec4f>(v, u) /= weight.at<float>(v, u);
@@ -91,13 +106,22 @@ float nearnessPerRow(const cv::Mat& nearness) {
 cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
 cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_cast<short>(p.y)}; }
 
-// One level's hole: the nearest source patch of every patch that touches it, and the picture that they make.
+// One level's hole: the nearest source patch of every patch that touches it, and the picture that
+// they make.
 class Filling {
  public:
   // @param horizon difference of nearness that does not count
   Filling(const Level& level, float scale, float horizon, const InpaintParams& params)
-      : image_(level.image.clone()), hole_(level.hole), nearness_(level.nearness), surface_(level.surface), scale_(scale), horizon_(horizon), params_(params), to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
-        cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)), bands_((hole_.rows + kBandRows - 1) / kBandRows) {
+      : image_(level.image.clone()),
+        hole_(level.hole),
+        nearness_(level.nearness),
+        surface_(level.surface),
+        scale_(scale),
+        horizon_(horizon),
+        params_(params),
+        to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
+        cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)),
+        bands_((hole_.rows + kBandRows - 1) / kBandRows) {
     const cv::Mat patch = cv::Mat::ones(kSide, kSide, CV_8U);
     cv::Mat touched;
     cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
@@ -111,10 +135,12 @@ class Filling {
   }
 
   bool possible() const {
-    return !sources_.empty() && std::any_of(bands_.begin(), bands_.end(), [](const auto& band) { return !band.empty(); });
+    return !sources_.empty() && std::any_of(bands_.begin(), bands_.end(),
+                                            [](const auto& band) { return !band.empty(); });
   }
 
-  // From the rim inwards: a ring's patches are compared by what is known of them, then the ring is filled.
+  // From the rim inwards: a ring's patches are compared by what is known of them, then the ring is
+  // filled.
   void peel() {
     cv::Mat known = hole_ == 0, ring;
     for (;;) {
@@ -132,8 +158,8 @@ class Filling {
     }
   }
 
-  // Takes over, twice as far, what half the size found. At the finest level it is copied at once: means of patches would be blurred,
-  // and resemble bland places most.
+  // Takes over, twice as far, what half the size found. At the finest level it is copied at once:
+  // means of patches would be blurred, and resemble bland places most.
   void startFrom(const Filling& coarse) {
     forEachPatch([&](const cv::Point& p) {
       const cv::Point c = coarse.centreFor({p.x / 2, p.y / 2});
@@ -145,8 +171,10 @@ class Filling {
         if (isWhole(near)) to_.at<cv::Vec2s>(p) = shorts(near);
       }
     });
-    if (scale_ > 1.0f) vote();
-    else copy();
+    if (scale_ > 1.0f)
+      vote();
+    else
+      copy();
   }
 
   // @param reach px around the best place found so far in which others are tried
@@ -160,7 +188,8 @@ class Filling {
       // Bands beside each other never at the same time: they read each other's rims.
       for (int first = 0; first < 2; ++first) {
 #pragma omp parallel for schedule(dynamic, 1)
-        for (int b = first; b < static_cast<int>(bands_.size()); b += 2) searchBand(bands_[b], sweep_ % 2 == 0, reach);
+        for (int b = first; b < static_cast<int>(bands_.size()); b += 2)
+          searchBand(bands_[b], sweep_ % 2 == 0, reach);
       }
     }
   }
@@ -175,7 +204,9 @@ class Filling {
     std::nth_element(costs.begin(), costs.begin() + part, costs.end());
     const float scale = -0.5f / std::max(costs[part], 1.0f);
     cv::Mat weights(hole_.size(), CV_32F, cv::Scalar(0.0f)), next = image_.clone();
-    forEachPatch([&](const cv::Point& p) { weights.at<float>(p) = hasMatch(p) ? std::exp(scale * cost_.at<float>(p)) + 1e-6f : 0.0f; });
+    forEachPatch([&](const cv::Point& p) {
+      weights.at<float>(p) = hasMatch(p) ? std::exp(scale * cost_.at<float>(p)) + 1e-6f : 0.0f;
+    });
 #pragma omp parallel for schedule(dynamic, 4)
     for (int v = 0; v < hole_.rows; ++v) {
       for (int u = 0; u < hole_.cols; ++u) {
@@ -213,13 +244,18 @@ class Filling {
  private:
   cv::Point match(const cv::Point& p) const { return point(to_.at<cv::Vec2s>(p)); }
   bool hasMatch(const cv::Point& p) const { return to_.at<cv::Vec2s>(p)[0] >= 0; }
-  bool inside(const cv::Point& p) const { return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows; }
+  bool inside(const cv::Point& p) const {
+    return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
+  }
   bool isWhole(const cv::Point& p) const { return inside(p) && whole_.at<std::uint8_t>(p) != 0; }
-  cv::Point anySource(const cv::Point& p, int salt) const { return sources_[random(p, salt) % sources_.size()]; }
+  cv::Point anySource(const cv::Point& p, int salt) const {
+    return sources_[random(p, salt) % sources_.size()];
+  }
 
   // The nearest centre of a patch that lies within the picture.
   cv::Point centreFor(const cv::Point& p) const {
-    return {std::clamp(p.x, kRadius, hole_.cols - 1 - kRadius), std::clamp(p.y, kRadius, hole_.rows - 1 - kRadius)};
+    return {std::clamp(p.x, kRadius, hole_.cols - 1 - kRadius),
+            std::clamp(p.y, kRadius, hole_.rows - 1 - kRadius)};
   }
 
   template <typename Do>
@@ -265,7 +301,8 @@ class Filling {
       }
     }
     for (int reach = 8; reach >= 1; reach /= 2) {
-      for (int i = 0; i < 6; ++i) attemptFirst(best + jitter(p, kFirstGuesses + 8 * i + reach, reach));
+      for (int i = 0; i < 6; ++i)
+        attemptFirst(best + jitter(p, kFirstGuesses + 8 * i + reach, reach));
     }
     to_.at<cv::Vec2s>(p) = shorts(best);
   }
@@ -277,15 +314,18 @@ class Filling {
       for (int du = -kRadius; du <= kRadius; ++du) {
         const cv::Point centre = pixel + cv::Point(du, dv);
         const float w = inside(centre) ? weights.at<float>(centre) : 0.0f;
-        if (w > 0.0f) sum += w * image_.at<cv::Vec4f>(match(centre) - cv::Point(du, dv)), total += w;
+        if (w > 0.0f)
+          sum += w * image_.at<cv::Vec4f>(match(centre) - cv::Point(du, dv)), total += w;
       }
     }
     return total > 0.0f ? cv::Vec4f(sum / total) : image_.at<cv::Vec4f>(pixel);
   }
 
-  // Places are layered: what is at another height is seldom the same, what is of another surface never.
+  // Places are layered: what is at another height is seldom the same, what is of another surface
+  // never.
   float awayCost(const cv::Point& p, const cv::Point& q) const {
-    float cost = scale_ * (params_.away_row * std::abs(p.y - q.y) + params_.away_column * std::abs(p.x - q.x));
+    float cost = scale_ * (params_.away_row * std::abs(p.y - q.y) +
+                           params_.away_column * std::abs(p.x - q.x));
     if (!nearness_.empty()) {
       const float own = nearness_.at<float>(p), other = nearness_.at<float>(q);
       if (other > kNearer * own + horizon_ || own > kNearer * other + horizon_) cost += kMisplaced;
@@ -301,7 +341,8 @@ class Filling {
     using Row = Eigen::Map<const Eigen::Array<float, 4 * kSide, 1>>;
     float sum = awayCost(p, q);
     for (int dv = -kRadius; dv <= kRadius && sum < bound; ++dv) {
-      const Row a(image_.ptr<float>(p.y + dv) + 4 * (p.x - kRadius)), b(image_.ptr<float>(q.y + dv) + 4 * (q.x - kRadius));
+      const Row a(image_.ptr<float>(p.y + dv) + 4 * (p.x - kRadius)),
+          b(image_.ptr<float>(q.y + dv) + 4 * (q.x - kRadius));
       sum += (a - b).square().sum();
     }
     return sum;
@@ -323,20 +364,23 @@ class Filling {
 
   cv::Point jitter(const cv::Point& p, int salt, int reach) const {
     const std::uint32_t h = random(p, 1024 + salt);
-    return {static_cast<int>((h & 0xffff) % (2 * reach + 1)) - reach, static_cast<int>((h >> 16) % (2 * reach + 1)) - reach};
+    return {static_cast<int>((h & 0xffff) % (2 * reach + 1)) - reach,
+            static_cast<int>((h >> 16) % (2 * reach + 1)) - reach};
   }
 
   std::uint32_t random(const cv::Point& p, int salt) const {
-    std::uint32_t h = params_.seed * 0x9e3779b9u ^ static_cast<std::uint32_t>(p.x) * 0x85ebca6bu ^ static_cast<std::uint32_t>(p.y) * 0xc2b2ae35u ^
+    std::uint32_t h = params_.seed * 0x9e3779b9u ^ static_cast<std::uint32_t>(p.x) * 0x85ebca6bu ^
+                      static_cast<std::uint32_t>(p.y) * 0xc2b2ae35u ^
                       static_cast<std::uint32_t>(salt + 2048 * sweep_) * 0x27d4eb2fu;
     h ^= h >> 15, h *= 0x2c1b3c6du, h ^= h >> 12, h *= 0x297a2d39u, h ^= h >> 15;
     return h;
   }
 
-  cv::Mat image_, hole_, nearness_, surface_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
-  float scale_, horizon_;         // size of these pixels in the finest level's
+  cv::Mat image_, hole_, nearness_, surface_,
+      whole_;              // whole_ CV_8UC1: all of the patch around it may be copied
+  float scale_, horizon_;  // size of these pixels in the finest level's
   InpaintParams params_;
-  cv::Mat to_, cost_;             // CV_16SC2, CV_32FC1, of the patch around every pixel
+  cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   std::vector<cv::Point> sources_;
   int sweep_ = 0;
@@ -344,18 +388,22 @@ class Filling {
 
 }  // namespace
 
-cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source, const InpaintParams& params) {
+cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
+                     const InpaintParams& params) {
   std::vector<Level> levels(1);
   cv::merge(std::vector<cv::Mat>{image, kLively * liveliness(image, hole == 0)}, levels[0].image);
   cv::Mat(hole == 0).convertTo(levels[0].known, CV_32F, 1.0 / 255.0);
-  levels[0].hole = hole, levels[0].source = source, levels[0].nearness = params.nearness, levels[0].surface = params.surface;
+  levels[0].hole = hole, levels[0].source = source, levels[0].nearness = params.nearness,
+  levels[0].surface = params.surface;
   const float horizon = params.nearness.empty() ? 0.0f : kHorizon * nearnessPerRow(params.nearness);
-  while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side) levels.push_back(halved(levels.back()));
+  while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side)
+    levels.push_back(halved(levels.back()));
   const int coarsest = static_cast<int>(levels.size()) - 1;
   Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, params);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   filling.peel();
-  for (int i = 0; i < params.coarsest_rounds; ++i) filling.search(std::max(hole.cols, hole.rows) >> coarsest), filling.vote();
+  for (int i = 0; i < params.coarsest_rounds; ++i)
+    filling.search(std::max(hole.cols, hole.rows) >> coarsest), filling.vote();
   for (int k = coarsest - 1; k >= 0; --k) {
     Filling finer(levels[k], static_cast<float>(1 << k), horizon, params);
     finer.startFrom(filling);

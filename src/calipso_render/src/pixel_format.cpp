@@ -29,10 +29,14 @@ void writePixel(const cv::Vec3b& c, PixelFormat format, std::uint8_t* out) {
 
 int conversionCode(PixelFormat format) {
   switch (format) {
-    case PixelFormat::kRgb8: return cv::COLOR_RGB2BGR;
-    case PixelFormat::kMono8: return cv::COLOR_GRAY2BGR;
-    case PixelFormat::kBgra8: return cv::COLOR_BGRA2BGR;
-    default: return cv::COLOR_RGBA2BGR;
+    case PixelFormat::kRgb8:
+      return cv::COLOR_RGB2BGR;
+    case PixelFormat::kMono8:
+      return cv::COLOR_GRAY2BGR;
+    case PixelFormat::kBgra8:
+      return cv::COLOR_BGRA2BGR;
+    default:
+      return cv::COLOR_RGBA2BGR;
   }
 }
 
@@ -44,8 +48,9 @@ PixelFormat pixelFormat(const std::string& encoding) {
   if (encoding == "mono8" || encoding == "8UC1") return PixelFormat::kMono8;
   if (encoding == "bgra8" || encoding == "8UC4") return PixelFormat::kBgra8;
   if (encoding == "rgba8") return PixelFormat::kRgba8;
-  throw std::invalid_argument("image encoding '" + encoding +
-                              "' cannot be edited; convert the images to bgr8, rgb8, mono8, bgra8 or rgba8");
+  throw std::invalid_argument(
+      "image encoding '" + encoding +
+      "' cannot be edited; convert the images to bgr8, rgb8, mono8, bgra8 or rgba8");
 }
 
 int channels(PixelFormat format) {

@@ -10,20 +10,23 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kDepths = 24;        // tried behind an object
-constexpr int kFewestViews = 3;    // that must look behind it
-constexpr int kAround = 15;        // px of the square whose spread is compared
+constexpr int kDepths = 24;      // tried behind an object
+constexpr int kFewestViews = 3;  // that must look behind it
+constexpr int kAround = 15;      // px of the square whose spread is compared
 constexpr float kNoSpread = 1e9f;
 
 cv::Mat grown(const cv::Mat& mask, int radius) {
   cv::Mat out;
-  cv::dilate(mask, out, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+  cv::dilate(mask, out,
+             cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
   return out;
 }
 
-float planeNearness(const std::vector<SupportPlane>& planes, const Camera& camera, const Eigen::Isometry3d& from_world, int u, int v) {
+float planeNearness(const std::vector<SupportPlane>& planes, const Camera& camera,
+                    const Eigen::Isometry3d& from_world, int u, int v) {
   const auto receiver = receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
-  return receiver ? static_cast<float>(1.0 / (from_world * receiver->position.cast<double>()).z()) : 0.0f;
+  return receiver ? static_cast<float>(1.0 / (from_world * receiver->position.cast<double>()).z())
+                  : 0.0f;
 }
 
 // One frame, with the way from the key frame's pixels into it.
@@ -35,9 +38,11 @@ struct Sight {
 
   Sight(const ClipFrame& f, const Camera& key, int margin) : covered(grown(f.labels != 0, margin)) {
     cv::cvtColor(f.bgr, grey, cv::COLOR_BGR2GRAY);
-    const Eigen::Isometry3f way = (f.camera.world_from_camera.inverse() * key.world_from_camera).cast<float>();
+    const Eigen::Isometry3f way =
+        (f.camera.world_from_camera.inverse() * key.world_from_camera).cast<float>();
     turn = way.linear(), shift = way.translation();
-    fx = static_cast<float>(f.camera.fx), fy = static_cast<float>(f.camera.fy), cx = static_cast<float>(f.camera.cx), cy = static_cast<float>(f.camera.cy);
+    fx = static_cast<float>(f.camera.fx), fy = static_cast<float>(f.camera.fy),
+    cx = static_cast<float>(f.camera.cx), cy = static_cast<float>(f.camera.cy);
   }
 
   // @return -1 where the frame does not show it
@@ -45,13 +50,15 @@ struct Sight {
     const Eigen::Vector3f p = turn * ray + nearness * shift;
     if (p.z() < 1e-6f) return -1;
     const int u = cvRound(fx * p.x() / p.z() + cx), v = cvRound(fy * p.y() / p.z() + cy);
-    if (u < 0 || v < 0 || u >= grey.cols || v >= grey.rows || covered.at<std::uint8_t>(v, u) != 0) return -1;
+    if (u < 0 || v < 0 || u >= grey.cols || v >= grey.rows || covered.at<std::uint8_t>(v, u) != 0)
+      return -1;
     return grey.at<std::uint8_t>(v, u);
   }
 };
 
 // Mean deviation from the median of what the frames show there.
-float spreadAt(const std::vector<Sight>& sights, const Eigen::Vector3f& ray, float nearness, std::vector<int>& values) {
+float spreadAt(const std::vector<Sight>& sights, const Eigen::Vector3f& ray, float nearness,
+               std::vector<int>& values) {
   values.clear();
   for (const Sight& s : sights) {
     const int value = s.at(ray, nearness);
@@ -68,7 +75,10 @@ float spreadAt(const std::vector<Sight>& sights, const Eigen::Vector3f& ray, flo
 
 // Depths of what is seen around, evenly spaced among its pixels, and infinity.
 std::vector<float> depthsAround(const cv::Mat& nearness, const cv::Mat& hidden) {
-  const cv::Rect box = cv::boundingRect(hidden), around = cv::Rect(box.x - box.width / 2, box.y - box.height / 2, 2 * box.width, 2 * box.height) & cv::Rect({0, 0}, hidden.size());
+  const cv::Rect box = cv::boundingRect(hidden),
+                 around = cv::Rect(box.x - box.width / 2, box.y - box.height / 2, 2 * box.width,
+                                   2 * box.height) &
+                          cv::Rect({0, 0}, hidden.size());
   std::vector<float> seen, depths = {0.0f};
   for (int v = around.y; v < around.br().y; ++v) {
     for (int u = around.x; u < around.br().x; ++u) {
@@ -77,11 +87,13 @@ std::vector<float> depthsAround(const cv::Mat& nearness, const cv::Mat& hidden) 
     }
   }
   std::sort(seen.begin(), seen.end());
-  for (int i = 0; i < kDepths && !seen.empty(); ++i) depths.push_back(seen[(2 * i + 1) * seen.size() / (2 * kDepths)]);
+  for (int i = 0; i < kDepths && !seen.empty(); ++i)
+    depths.push_back(seen[(2 * i + 1) * seen.size() / (2 * kDepths)]);
   return depths;
 }
 
-void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int margin, cv::Mat& nearness) {
+void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int margin,
+           cv::Mat& nearness) {
   const cv::Rect box = cv::boundingRect(hidden);
   const Camera& key = frames.front().camera;
   std::vector<Sight> sights;
@@ -94,7 +106,8 @@ void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int marg
       std::vector<int> values;
       for (int u = 0; u < box.width; ++u) {
         if (hidden.at<std::uint8_t>(v + box.y, u + box.x) == 0) continue;
-        const float s = spreadAt(sights, key.ray(u + box.x, v + box.y).cast<float>(), depth, values);
+        const float s =
+            spreadAt(sights, key.ray(u + box.x, v + box.y).cast<float>(), depth, values);
         if (s < kNoSpread) spread.at<float>(v, u) = s, counted.at<float>(v, u) = 1.0f;
       }
     }
@@ -105,7 +118,8 @@ void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int marg
         if (counted.at<float>(v, u) == 0.0f) continue;
         const float s = spread.at<float>(v, u) / total.at<float>(v, u);
         if (s >= least.at<float>(v, u)) continue;
-        least.at<float>(v, u) = s, nearness.at<float>(v + box.y, u + box.x) = depth, known.at<std::uint8_t>(v + box.y, u + box.x) = 255;
+        least.at<float>(v, u) = s, nearness.at<float>(v + box.y, u + box.x) = depth,
+                           known.at<std::uint8_t>(v + box.y, u + box.x) = 255;
       }
     }
   }
@@ -118,7 +132,8 @@ void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int marg
 
 }  // namespace
 
-cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<SupportPlane>& planes, const cv::Mat& depth, int margin) {
+cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<SupportPlane>& planes,
+                      const cv::Mat& depth, int margin) {
   const ClipFrame& key = frames.front();
   const Eigen::Isometry3d from_world = key.camera.world_from_camera.inverse();
   cv::Mat nearness(key.bgr.size(), CV_32F);
@@ -126,7 +141,8 @@ cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<Su
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u) {
       const float d = depth.empty() ? 0.0f : depth.at<float>(v, u);
-      nearness.at<float>(v, u) = d > 0.0f ? 1.0f / d : planeNearness(planes, key.camera, from_world, u, v);
+      nearness.at<float>(v, u) =
+          d > 0.0f ? 1.0f / d : planeNearness(planes, key.camera, from_world, u, v);
     }
   }
   const cv::Mat hidden = grown(key.labels != 0, margin);
@@ -135,21 +151,25 @@ cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<Su
 }
 
 cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& to) {
-  const Eigen::Isometry3f way = (to.world_from_camera.inverse() * key.world_from_camera).cast<float>();
+  const Eigen::Isometry3f way =
+      (to.world_from_camera.inverse() * key.world_from_camera).cast<float>();
   cv::Mat out(to.height, to.width, CV_32F, cv::Scalar(-1.0f)), farthest;
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u) {
       const float near = nearness.at<float>(v, u);
-      const Eigen::Vector3f p = way.linear() * key.ray(u, v).cast<float>() + near * way.translation();
+      const Eigen::Vector3f p =
+          way.linear() * key.ray(u, v).cast<float>() + near * way.translation();
       if (p.z() < 1e-6f) continue;
       // Every pixel is drawn as a square of two, so that a place that grows has no gaps.
-      const int x = cvFloor(to.fx * p.x() / p.z() + to.cx), y = cvFloor(to.fy * p.y() / p.z() + to.cy);
+      const int x = cvFloor(to.fx * p.x() / p.z() + to.cx),
+                y = cvFloor(to.fy * p.y() / p.z() + to.cy);
       for (int j = std::max(0, y); j <= std::min(to.height - 1, y + 1); ++j) {
-        for (int i = std::max(0, x); i <= std::min(to.width - 1, x + 1); ++i) out.at<float>(j, i) = std::max(out.at<float>(j, i), near / p.z());
+        for (int i = std::max(0, x); i <= std::min(to.width - 1, x + 1); ++i)
+          out.at<float>(j, i) = std::max(out.at<float>(j, i), near / p.z());
       }
     }
   }
-  for (cv::Mat unseen = out < 0.0f; cv::countNonZero(unseen) > 0; unseen = out < 0.0f) {
+  for (cv::Mat unseen = out<0.0f; cv::countNonZero(unseen)> 0; unseen = out < 0.0f) {
     cv::Mat near = out.clone();
     near.setTo(1e9f, unseen);
     cv::erode(near, farthest, cv::Mat::ones(3, 3, CV_8U));

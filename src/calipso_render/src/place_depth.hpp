@@ -8,15 +8,19 @@
 
 namespace calipso::render {
 
-// How near the place without the objects is: CV_32FC1, 1/m along the optical axis, 0 infinitely far. By the depth image where it says
-// something of the place, else by the support planes, else infinitely far. What objects hide takes that of the depths around it at which the
-// frames that look behind them agree best (plane sweep, Collins 1996), where three do; the rest continues smoothly.
+// How near the place without the objects is: CV_32FC1, 1/m along the optical axis, 0 infinitely
+// far. By the depth image where it says something of the place, else by the support planes, else
+// infinitely far. What objects hide takes that of the depths around it at which the frames that
+// look behind them agree best (plane sweep, Collins 1996), where three do; the rest continues
+// smoothly.
 // @param frames the key frame first, each with its own camera
 // @param depth CV_32FC1, m, of the key frame; 0: unknown
 // @param margin px around masks that belong to the objects
-cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<SupportPlane>& planes, const cv::Mat& depth, int margin);
+cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<SupportPlane>& planes,
+                      const cv::Mat& depth, int margin);
 
-// The same from another camera's view; what the key frame does not show is as near as the farthest beside it.
+// The same from another camera's view; what the key frame does not show is as near as the farthest
+// beside it.
 cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& to);
 
 }  // namespace calipso::render

@@ -10,18 +10,22 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kStride = 4;             // px between pixels that planes are sought among
-constexpr int kSeedStep = 16, kSeedReach = 7;  // px: places where planes are begun, and the square they are begun from
+constexpr int kStride = 4;  // px between pixels that planes are sought among
+constexpr int kSeedStep = 16,
+              kSeedReach =
+                  7;  // px: places where planes are begun, and the square they are begun from
 constexpr int kMostPlanes = 10;
-constexpr double kLeastPart = 0.01;    // of the picture, for a plane: walls, not the sides of things
-constexpr float kOnPlane = 0.01f;      // of the nearness
+constexpr double kLeastPart = 0.01;  // of the picture, for a plane: walls, not the sides of things
+constexpr float kOnPlane = 0.01f;    // of the nearness
 constexpr double kSeedSpread = 0.005;  // likewise
-constexpr float kOffSupport = 0.02f;   // of the nearness: what is farther from the support planes is relief
-constexpr float kBehind = 1.02f;       // of an object's nearness: what it hides is no nearer
-constexpr double kLeastPiece = 0.05;   // of a plane's pixels, for a connected piece of it to count
-constexpr double kBeyond = 0.25;       // of the side of a square as large as what is seen of a plane: so far it may go on beyond that
-constexpr float kFarther = 0.97f;      // of a plane's nearness: where that is seen the plane is not
-constexpr int kCurvedReach = 4;        // px of the square that tells the normal of what is not plane
+constexpr float kOffSupport =
+    0.02f;  // of the nearness: what is farther from the support planes is relief
+constexpr float kBehind = 1.02f;      // of an object's nearness: what it hides is no nearer
+constexpr double kLeastPiece = 0.05;  // of a plane's pixels, for a connected piece of it to count
+constexpr double kBeyond = 0.25;  // of the side of a square as large as what is seen of a plane: so
+                                  // far it may go on beyond that
+constexpr float kFarther = 0.97f;  // of a plane's nearness: where that is seen the plane is not
+constexpr int kCurvedReach = 4;    // px of the square that tells the normal of what is not plane
 constexpr float kSameSurface = 0.05f;  // of the nearness within it
 constexpr float kLeastSlope = 0.05f;   // cosine between normal and sun of what is lit
 constexpr float kFullShade = 0.15f;    // of the sun
@@ -51,9 +55,12 @@ std::optional<Eigen::Vector3d> affineThrough(const std::vector<Pixel>& pixels) {
   return abc;
 }
 
-double errorAt(const Eigen::Vector3d& abc, const Pixel& p) { return std::abs(abc[0] * p.u + abc[1] * p.v + abc[2] - p.nearness) / p.nearness; }
+double errorAt(const Eigen::Vector3d& abc, const Pixel& p) {
+  return std::abs(abc[0] * p.u + abc[1] * p.v + abc[2] - p.nearness) / p.nearness;
+}
 
-std::vector<Pixel> pixelsIn(const cv::Mat& nearness, const cv::Mat& wanted, const cv::Rect& rect, int step) {
+std::vector<Pixel> pixelsIn(const cv::Mat& nearness, const cv::Mat& wanted, const cv::Rect& rect,
+                            int step) {
   std::vector<Pixel> pixels;
   const cv::Rect here = rect & cv::Rect({0, 0}, wanted.size());
   for (int v = here.y; v < here.br().y; v += step) {
@@ -70,13 +77,15 @@ std::vector<Eigen::Vector3d> seeds(const cv::Mat& nearness, const cv::Mat& wante
   const int side = 2 * kSeedReach + 1;
   for (int v = kSeedReach; v < wanted.rows; v += kSeedStep) {
     for (int u = kSeedReach; u < wanted.cols; u += kSeedStep) {
-      const std::vector<Pixel> pixels = pixelsIn(nearness, wanted, {u - kSeedReach, v - kSeedReach, side, side}, 2);
+      const std::vector<Pixel> pixels =
+          pixelsIn(nearness, wanted, {u - kSeedReach, v - kSeedReach, side, side}, 2);
       if (10 * pixels.size() < 6 * static_cast<std::size_t>((side + 1) * (side + 1) / 4)) continue;
       const auto abc = affineThrough(pixels);
       if (!abc) continue;
       double squares = 0.0;
       for (const Pixel& p : pixels) squares += errorAt(*abc, p) * errorAt(*abc, p);
-      if (squares < kSeedSpread * kSeedSpread * static_cast<double>(pixels.size())) found.push_back(*abc);
+      if (squares < kSeedSpread * kSeedSpread * static_cast<double>(pixels.size()))
+        found.push_back(*abc);
     }
   }
   return found;
@@ -84,7 +93,8 @@ std::vector<Eigen::Vector3d> seeds(const cv::Mat& nearness, const cv::Mat& wante
 
 std::vector<Pixel> onPlane(const Eigen::Vector3d& abc, const std::vector<Pixel>& pixels) {
   std::vector<Pixel> on;
-  std::copy_if(pixels.begin(), pixels.end(), std::back_inserter(on), [&](const Pixel& p) { return errorAt(abc, p) < kOnPlane; });
+  std::copy_if(pixels.begin(), pixels.end(), std::back_inserter(on),
+               [&](const Pixel& p) { return errorAt(abc, p) < kOnPlane; });
   return on;
 }
 
@@ -97,7 +107,8 @@ cv::Mat reachOf(const cv::Mat& on) {
   for (int v = 0; v < on.rows; ++v) {
     for (int u = 0; u < on.cols; ++u) {
       const int piece = pieces.at<int>(v, u);
-      if (piece > 0 && stats.at<int>(piece, cv::CC_STAT_AREA) >= kLeastPiece * all) points.push_back({u, v});
+      if (piece > 0 && stats.at<int>(piece, cv::CC_STAT_AREA) >= kLeastPiece * all)
+        points.push_back({u, v});
     }
   }
   if (points.empty()) return reach;
@@ -113,9 +124,11 @@ struct Extent {
   cv::Mat goes_on;   // CV_8UC1: 255 where it may be behind objects
 };
 
-// Where a plane goes on that is hidden: in its reach, and nearer to where it is seen than to where something farther is seen in its place.
+// Where a plane goes on that is hidden: in its reach, and nearer to where it is seen than to where
+// something farther is seen in its place.
 cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& scenery) {
-  const cv::Mat known = (scenery > 0.0f) & (plane > 0.0f), on = known & (cv::abs(plane - scenery) < kOnPlane * plane);
+  const cv::Mat known = (scenery > 0.0f) & (plane > 0.0f),
+                on = known & (cv::abs(plane - scenery) < kOnPlane * plane);
   cv::Mat absent = known & (scenery < kFarther * plane), to_on, to_absent;
   cv::morphologyEx(absent, absent, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   if (cv::countNonZero(on) == 0) return cv::Mat::zeros(plane.size(), CV_8U);
@@ -133,7 +146,9 @@ cv::Mat supportNearness(const SupportPlane& plane, const Camera& camera) {
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u) {
       const auto r = receiverAt({plane}, camera, static_cast<float>(u), static_cast<float>(v));
-      if (r) nearness.at<float>(v, u) = static_cast<float>(1.0 / (from_world * r->position.cast<double>()).z());
+      if (r)
+        nearness.at<float>(v, u) =
+            static_cast<float>(1.0 / (from_world * r->position.cast<double>()).z());
     }
   }
   return nearness;
@@ -142,7 +157,8 @@ cv::Mat supportNearness(const SupportPlane& plane, const Camera& camera) {
 cv::Mat nearnessOf(const PicturePlane& plane, const cv::Size& size) {
   cv::Mat nearness(size, CV_32F);
   for (int v = 0; v < nearness.rows; ++v) {
-    for (int u = 0; u < nearness.cols; ++u) nearness.at<float>(v, u) = static_cast<float>(std::max(0.0, plane.nearnessAt(u, v)));
+    for (int u = 0; u < nearness.cols; ++u)
+      nearness.at<float>(v, u) = static_cast<float>(std::max(0.0, plane.nearnessAt(u, v)));
   }
   return nearness;
 }
@@ -150,22 +166,27 @@ cv::Mat nearnessOf(const PicturePlane& plane, const cv::Size& size) {
 // The normal of a surface that is not plane, from its pixels around.
 std::optional<PicturePlane> curvedAt(const cv::Mat& nearness, int u, int v) {
   const float own = nearness.at<float>(v, u);
-  const cv::Rect around(u - kCurvedReach, v - kCurvedReach, 2 * kCurvedReach + 1, 2 * kCurvedReach + 1);
+  const cv::Rect around(u - kCurvedReach, v - kCurvedReach, 2 * kCurvedReach + 1,
+                        2 * kCurvedReach + 1);
   std::vector<Pixel> same;
-  for (const Pixel& p : pixelsIn(nearness, nearness > 0.0f, around & cv::Rect({0, 0}, nearness.size()), 1)) {
+  for (const Pixel& p :
+       pixelsIn(nearness, nearness > 0.0f, around & cv::Rect({0, 0}, nearness.size()), 1)) {
     if (std::abs(p.nearness - own) < kSameSurface * own) same.push_back(p);
   }
   const auto abc = affineThrough(same);
   return abc ? std::optional<PicturePlane>({*abc}) : std::nullopt;
 }
 
-void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const Camera& camera, PlaceSurfaces& surfaces) {
-  const Eigen::Vector3f p = (camera.world_from_camera * Eigen::Vector3d(camera.ray(u, v) / nearness)).cast<float>();
+void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const Camera& camera,
+           PlaceSurfaces& surfaces) {
+  const Eigen::Vector3f p =
+      (camera.world_from_camera * Eigen::Vector3d(camera.ray(u, v) / nearness)).cast<float>();
   surfaces.position.at<cv::Vec3f>(v, u) = {p.x(), p.y(), p.z()};
   surfaces.normal.at<cv::Vec3f>(v, u) = {normal.x(), normal.y(), normal.z()};
 }
 
-// The plane that the depth image shows at a pixel, or kNoPlane: support planes are met less exactly.
+// The plane that the depth image shows at a pixel, or kNoPlane: support planes are met less
+// exactly.
 int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u, int v) {
   int best = kNoPlane, support = kNoPlane;
   float least = kOnPlane, least_support = kOffSupport;
@@ -177,30 +198,37 @@ int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u
   return best == kNoPlane ? support : best;
 }
 
-// The plane seen if the object were not there: the nearest behind it. @param object nearness of the object, 0 unknown
+// The plane seen if the object were not there: the nearest behind it. @param object nearness of the
+// object, 0 unknown
 int planeBehind(const std::vector<Extent>& planes, float object, int u, int v) {
   const float limit = object > 0.0f ? kBehind * object : 1e9f;
   int best = kNoPlane;
   float nearest = 0.0f;
   for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
     const float near = planes[k].nearness.at<float>(v, u);
-    if (near > nearest && near < limit && planes[k].goes_on.at<std::uint8_t>(v, u) != 0) nearest = near, best = k;
+    if (near > nearest && near < limit && planes[k].goes_on.at<std::uint8_t>(v, u) != 0)
+      nearest = near, best = k;
   }
   return best;
 }
 
-float brightness(const cv::Vec3f& code) { return luminance({linearFromRealCode(code[0]), linearFromRealCode(code[1]), linearFromRealCode(code[2])}); }
+float brightness(const cv::Vec3f& code) {
+  return luminance(
+      {linearFromRealCode(code[0]), linearFromRealCode(code[1]), linearFromRealCode(code[2])});
+}
 
 // Sun over ambient light that a surface facing so gets.
 float sunShare(const Light& light, const Eigen::Vector3f& normal) {
-  const float shaded = luminance(diffuseShading(light, normal, 0.0f)), lit = luminance(diffuseShading(light, normal, 1.0f));
+  const float shaded = luminance(diffuseShading(light, normal, 0.0f)),
+              lit = luminance(diffuseShading(light, normal, 1.0f));
   return (lit - shaded) / std::max(shaded, 1e-4f);
 }
 
 }  // namespace
 
 Eigen::Vector3f PicturePlane::normal(const Camera& camera) const {
-  const Eigen::Vector3d m(abc[0] * camera.fx, abc[1] * camera.fy, abc[2] + abc[0] * camera.cx + abc[1] * camera.cy);
+  const Eigen::Vector3d m(abc[0] * camera.fx, abc[1] * camera.fy,
+                          abc[2] + abc[0] * camera.cx + abc[1] * camera.cy);
   return (camera.world_from_camera.linear() * -m.normalized()).cast<float>();
 }
 
@@ -219,12 +247,15 @@ std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& 
     if (most.size() < fewest) break;
     const Eigen::Vector3d first = *affineThrough(most), abc = *affineThrough(onPlane(first, left));
     found.push_back({abc});
-    left.erase(std::remove_if(left.begin(), left.end(), [&](const Pixel& p) { return errorAt(abc, p) < kOnPlane; }), left.end());
+    left.erase(std::remove_if(left.begin(), left.end(),
+                              [&](const Pixel& p) { return errorAt(abc, p) < kOnPlane; }),
+               left.end());
   }
   return found;
 }
 
-PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels, const std::vector<SupportPlane>& planes, const Camera& camera) {
+PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels,
+                           const std::vector<SupportPlane>& planes, const Camera& camera) {
   if (scenery.empty()) return {};
   const int supports = static_cast<int>(planes.size());
   std::vector<Extent> extents;
@@ -234,20 +265,27 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
     off &= cv::abs(scenery - extents.back().nearness) > kOffSupport * scenery;
   }
   std::vector<Eigen::Vector3f> normals(planes.size());
-  for (const PicturePlane& plane : picturePlanes(scenery, off)) extents.push_back({nearnessOf(plane, scenery.size()), {}}), normals.push_back(plane.normal(camera));
+  for (const PicturePlane& plane : picturePlanes(scenery, off))
+    extents.push_back({nearnessOf(plane, scenery.size()), {}}),
+        normals.push_back(plane.normal(camera));
   for (Extent& e : extents) e.goes_on = goesOn(e.nearness, scenery);
-  PlaceSurfaces surfaces{cv::Mat::zeros(scenery.size(), CV_8U), cv::Mat(scenery.size(), CV_32FC3), cv::Mat(scenery.size(), CV_32FC3), supports};
+  PlaceSurfaces surfaces{cv::Mat::zeros(scenery.size(), CV_8U), cv::Mat(scenery.size(), CV_32FC3),
+                         cv::Mat(scenery.size(), CV_32FC3), supports};
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < scenery.rows; ++v) {
     for (int u = 0; u < scenery.cols; ++u) {
       const float seen = scenery.at<float>(v, u), d = depth.at<float>(v, u);
-      if (seen == 0.0f && d == 0.0f && labels.at<std::uint8_t>(v, u) == 0) continue;  // nothing is known
-      const int plane = seen > 0.0f ? planeSeen(extents, supports, seen, u, v) : planeBehind(extents, d > 0.0f ? 1.0f / d : 0.0f, u, v);
+      if (seen == 0.0f && d == 0.0f && labels.at<std::uint8_t>(v, u) == 0)
+        continue;  // nothing is known
+      const int plane = seen > 0.0f ? planeSeen(extents, supports, seen, u, v)
+                                    : planeBehind(extents, d > 0.0f ? 1.0f / d : 0.0f, u, v);
       std::uint8_t& label = surfaces.label.at<std::uint8_t>(v, u);
       if (plane != kNoPlane) label = static_cast<std::uint8_t>(plane + 1);
-      if (plane >= supports) setAt(u, v, extents[plane].nearness.at<float>(v, u), normals[plane], camera, surfaces);
+      if (plane >= supports)
+        setAt(u, v, extents[plane].nearness.at<float>(v, u), normals[plane], camera, surfaces);
       if (plane != kNoPlane || seen == 0.0f) continue;
-      if (const auto curved = curvedAt(scenery, u, v)) label = PlaceSurfaces::kCurved, setAt(u, v, seen, curved->normal(camera), camera, surfaces);
+      if (const auto curved = curvedAt(scenery, u, v))
+        label = PlaceSurfaces::kCurved, setAt(u, v, seen, curved->normal(camera), camera, surfaces);
     }
   }
   return surfaces;
@@ -256,21 +294,27 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
 Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun) {
   if (surfaces.empty()) return {};
   Relief relief;
-  relief.seen = surfaces.label > surfaces.supports, relief.position = surfaces.position, relief.normal = surfaces.normal;
+  relief.seen = surfaces.label > surfaces.supports, relief.position = surfaces.position,
+  relief.normal = surfaces.normal;
   for (int v = 0; v < relief.seen.rows; ++v) {
     for (int u = 0; u < relief.seen.cols; ++u) {
-      if (relief.at(u, v) && relief.receiver(u, v).normal.dot(sun) < kLeastSlope) relief.seen.at<std::uint8_t>(v, u) = 0;
+      if (relief.at(u, v) && relief.receiver(u, v).normal.dot(sun) < kLeastSlope)
+        relief.seen.at<std::uint8_t>(v, u) = 0;
     }
   }
   relief.index();
   return relief.box.isEmpty() ? Relief() : relief;
 }
 
-void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun, const cv::Mat& labels,
-                 const std::vector<SupportPlane>& planes, const cv::Vec3f& umbra, Relief& relief) {
+void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,
+               const cv::Mat& labels, const std::vector<SupportPlane>& planes,
+               const cv::Vec3f& umbra, Relief& relief) {
   if (relief.empty()) return;
   relief.umbra = cv::Mat(relief.seen.size(), CV_32F, cv::Scalar(1.0f));
-  const float own = luminance(umbra), of_planes = sunShare(light, planes.empty() ? Eigen::Vector3f::UnitZ() : Eigen::Vector3f(planes.front().normal.cast<float>()));
+  const float own = luminance(umbra),
+              of_planes = sunShare(
+                  light, planes.empty() ? Eigen::Vector3f::UnitZ()
+                                        : Eigen::Vector3f(planes.front().normal.cast<float>()));
   std::vector<float> scales;  // of the sun's share, seen over predicted
   for (int v = 0; v < relief.seen.rows; ++v) {
     for (int u = 0; u < relief.seen.cols; ++u) {
@@ -278,7 +322,8 @@ void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate,
       const Eigen::Vector3f normal = relief.receiver(u, v).normal;
       const float share = sunShare(light, normal), lit = brightness(plate.at<cv::Vec3f>(v, u));
       relief.umbra.at<float>(v, u) = share;
-      if (sun.at<float>(v, u) > kFullShade || labels.at<std::uint8_t>(v, u) != 0 || lit < kDark) continue;
+      if (sun.at<float>(v, u) > kFullShade || labels.at<std::uint8_t>(v, u) != 0 || lit < kDark)
+        continue;
       const float ratio = brightness(picture.at<cv::Vec3f>(v, u)) / lit;
       scales.push_back((1.0f / std::clamp(ratio, 0.05f, 1.0f) - 1.0f) / share);
     }

@@ -8,7 +8,8 @@
 
 namespace calipso::render {
 
-// A plane of the place in a camera's picture: the nearness of its pixels is affine, 1 / z = a u + b v + c.
+// A plane of the place in a camera's picture: the nearness of its pixels is affine, 1 / z = a u + b
+// v + c.
 struct PicturePlane {
   Eigen::Vector3d abc;
 
@@ -24,27 +25,35 @@ std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& 
 struct PlaceSurfaces {
   static constexpr int kUnknown = 0, kCurved = 255;
 
-  cv::Mat label;             // CV_8UC1: kUnknown; the support planes from 1 on, then other planes; kCurved: what is none of them
+  cv::Mat label;  // CV_8UC1: kUnknown; the support planes from 1 on, then other planes; kCurved:
+                  // what is none of them
   cv::Mat position, normal;  // CV_32FC3, world, off the support planes
   int supports = 0;          // support planes
 
   bool empty() const { return label.empty(); }
 };
 
-// By the depth image. Behind objects a plane goes on as long as it is seen nearer by than what shows that it has ended; of the planes that
-// do and lie behind the object the nearest is seen. Empty without a depth image.
-// @param scenery CV_32FC1, 1/m, of what is no object; 0 unknown. @param depth CV_32FC1, m, with the objects; 0 unknown
+// By the depth image. Behind objects a plane goes on as long as it is seen nearer by than what
+// shows that it has ended; of the planes that do and lie behind the object the nearest is seen.
+// Empty without a depth image.
+// @param scenery CV_32FC1, 1/m, of what is no object; 0 unknown. @param depth CV_32FC1, m, with the
+// objects; 0 unknown
 // @param labels CV_8UC1, != 0 on objects
-PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels, const std::vector<SupportPlane>& planes, const Camera& camera);
+PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels,
+                           const std::vector<SupportPlane>& planes, const Camera& camera);
 
-// What of them lies off the support planes. @param sun unit, towards it: what faces away from it takes no shadow
+// What of them lies off the support planes. @param sun unit, towards it: what faces away from it
+// takes no shadow
 Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun);
 
-// What the sun's absence leaves of the relief: from how bright it is in the objects' full shade where that is seen, else as the light
-// has it for a surface that faces so, on the scale of the support planes.
-// @param picture, plate CV_32FC3, code values, with the shade and without; @param sun CV_32FC1, its visible part
+// What the sun's absence leaves of the relief: from how bright it is in the objects' full shade
+// where that is seen, else as the light has it for a surface that faces so, on the scale of the
+// support planes.
+// @param picture, plate CV_32FC3, code values, with the shade and without; @param sun CV_32FC1, its
+// visible part
 // @param umbra what the sun's absence leaves of the support planes
-void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun, const cv::Mat& labels,
-                 const std::vector<SupportPlane>& planes, const cv::Vec3f& umbra, Relief& relief);
+void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,
+               const cv::Mat& labels, const std::vector<SupportPlane>& planes,
+               const cv::Vec3f& umbra, Relief& relief);
 
 }  // namespace calipso::render

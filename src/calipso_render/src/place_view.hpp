@@ -11,9 +11,12 @@ namespace calipso::render {
 // What takes shadows, as one camera sees it: the support planes, and the relief where that is seen.
 class PlaceView {
  public:
-  PlaceView(PlaneView planes, Relief relief = {}) : planes_(std::move(planes)), relief_(std::move(relief)) {}
+  PlaceView(PlaneView planes, Relief relief = {})
+      : planes_(std::move(planes)), relief_(std::move(relief)) {}
 
-  bool sees(int u, int v) const { return relief_.at(u, v) || planes_.sees(static_cast<float>(u), static_cast<float>(v)); }
+  bool sees(int u, int v) const {
+    return relief_.at(u, v) || planes_.sees(static_cast<float>(u), static_cast<float>(v));
+  }
 
   // sees() for `count` pixels of a row from (u, v) on, which the picture has: 255 or 0.
   void seesRow(int u, int v, int count, std::uint8_t* out) const {

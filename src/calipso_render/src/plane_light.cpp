@@ -7,21 +7,27 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kLargest = 64, kSquare = SquareMask::kSide, kStep = 2;  // px: squares, and the places in the least of them
-constexpr float kEven = 0.05f; // of visibility: places that differ by no more speak for those between them
-constexpr float kSlow = 0.3f;  // of visibility: between places that differ by no more it is interpolated
+constexpr int kLargest = 64, kSquare = SquareMask::kSide,
+              kStep = 2;  // px: squares, and the places in the least of them
+constexpr float kEven =
+    0.05f;  // of visibility: places that differ by no more speak for those between them
+constexpr float kSlow =
+    0.3f;  // of visibility: between places that differ by no more it is interpolated
 
 class Squares {
  public:
-  Squares(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const SquareMask& skip, cv::Mat& out)
+  Squares(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
+          const SquareMask& skip, cv::Mat& out)
       : view_(view), light_(light), rect_(rect), skip_(skip), out_(out) {}
 
-  // Squares hang on the picture, not on the rectangle: pixels are the same whatever else is asked for.
+  // Squares hang on the picture, not on the rectangle: pixels are the same whatever else is asked
+  // for.
   void run() const {
     const int first_row = rect_.y / kLargest, rows = (rect_.br().y - 1) / kLargest - first_row + 1;
 #pragma omp parallel for schedule(dynamic, 1)
     for (int j = 0; j < rows; ++j) {
-      for (int u = rect_.x / kLargest * kLargest; u < rect_.br().x; u += kLargest) fill({u, (first_row + j) * kLargest, kLargest, kLargest});
+      for (int u = rect_.x / kLargest * kLargest; u < rect_.br().x; u += kLargest)
+        fill({u, (first_row + j) * kLargest, kLargest, kLargest});
     }
   }
 
@@ -30,18 +36,24 @@ class Squares {
     const cv::Rect here = (square & rect_) - rect_.tl();
     if (here.empty() || skip_.all(square & rect_)) return;
     Receiver middle, corner;
-    bool even = !view_.relief().touches(square.x, square.y, square.width) && view_.at(square.x + 0.5f * square.width, square.y + 0.5f * square.height, middle);
+    bool even = !view_.relief().touches(square.x, square.y, square.width) &&
+                view_.at(square.x + 0.5f * square.width, square.y + 0.5f * square.height, middle);
     float radius = 0.0f;
     for (int k = 0; k < 4 && even; ++k) {
-      even = view_.at(square.x + (k & 1) * square.width, square.y + (k >> 1) * square.height, corner) && corner.normal == middle.normal;
+      even = view_.at(square.x + (k & 1) * square.width, square.y + (k >> 1) * square.height,
+                      corner) &&
+             corner.normal == middle.normal;
       radius = std::max(radius, (corner.position - middle.position).norm());
     }
-    const std::optional<float> uniform = even ? light_.uniform(middle.position, middle.normal, radius) : std::nullopt;
+    const std::optional<float> uniform =
+        even ? light_.uniform(middle.position, middle.normal, radius) : std::nullopt;
     if (uniform) {
-      for (int y = here.y; y < here.br().y; ++y) std::memset(out_.ptr<std::uint8_t>(y) + here.x, lightLevel(*uniform), here.width);
+      for (int y = here.y; y < here.br().y; ++y)
+        std::memset(out_.ptr<std::uint8_t>(y) + here.x, lightLevel(*uniform), here.width);
     } else if (square.width > kSquare) {
       const int half = square.width / 2;
-      for (int k = 0; k < 4; ++k) fill({square.x + (k & 1) * half, square.y + (k >> 1) * half, half, half});
+      for (int k = 0; k < 4; ++k)
+        fill({square.x + (k & 1) * half, square.y + (k >> 1) * half, half, half});
     } else if (even) {
       refine(square, here);
     } else {
@@ -54,11 +66,14 @@ class Squares {
     return view_.at(u, v, r) ? light_.visibility(r.position, r.normal) : 1.0f;
   }
 
-  // Places two steps apart are looked at first; those between where they, or the one in their middle, differ.
+  // Places two steps apart are looked at first; those between where they, or the one in their
+  // middle, differ.
   void refine(const cv::Rect& square, const cv::Rect& here) const {
     constexpr int kPlaces = kSquare / kStep + 1;
     float grid[kPlaces][kPlaces];
-    const auto set = [&](int i, int j) { grid[j][i] = exactly(square.x + i * kStep, square.y + j * kStep); };
+    const auto set = [&](int i, int j) {
+      grid[j][i] = exactly(square.x + i * kStep, square.y + j * kStep);
+    };
     bool uneven[kPlaces / 2][kPlaces / 2] = {};
     for (int j = 0; j < kPlaces; j += 2) {
       for (int i = 0; i < kPlaces; i += 2) set(i, j);
@@ -66,26 +81,37 @@ class Squares {
     for (int j = 1; j < kPlaces; j += 2) {
       for (int i = 1; i < kPlaces; i += 2) {
         set(i, j);
-        const auto [low, high] = std::minmax({grid[j][i], grid[j - 1][i - 1], grid[j - 1][i + 1], grid[j + 1][i - 1], grid[j + 1][i + 1]});
+        const auto [low, high] = std::minmax({grid[j][i], grid[j - 1][i - 1], grid[j - 1][i + 1],
+                                              grid[j + 1][i - 1], grid[j + 1][i + 1]});
         uneven[j / 2][i / 2] = high - low > kEven;
       }
     }
-    const auto isUneven = [&](int i, int j) { return i >= 0 && j >= 0 && i < kPlaces / 2 && j < kPlaces / 2 && uneven[j][i]; };
+    const auto isUneven = [&](int i, int j) {
+      return i >= 0 && j >= 0 && i < kPlaces / 2 && j < kPlaces / 2 && uneven[j][i];
+    };
     for (int j = 0; j < kPlaces; ++j) {
       for (int i = 1 - j % 2; i < kPlaces; i += 2) {
         const bool level = j % 2 == 0;  // it lies between a left and a right one
-        if (isUneven(i / 2, j / 2) || (level ? isUneven(i / 2, j / 2 - 1) : isUneven(i / 2 - 1, j / 2))) set(i, j);
-        else grid[j][i] = level ? 0.5f * (grid[j][i - 1] + grid[j][i + 1]) : 0.5f * (grid[j - 1][i] + grid[j + 1][i]);
+        if (isUneven(i / 2, j / 2) ||
+            (level ? isUneven(i / 2, j / 2 - 1) : isUneven(i / 2 - 1, j / 2)))
+          set(i, j);
+        else
+          grid[j][i] = level ? 0.5f * (grid[j][i - 1] + grid[j][i + 1])
+                             : 0.5f * (grid[j - 1][i] + grid[j + 1][i]);
       }
     }
     for (int y = here.y; y < here.br().y; ++y) {
       std::uint8_t* row = out_.ptr<std::uint8_t>(y);
       for (int x = here.x; x < here.br().x; ++x) {
-        const int u = x + rect_.x - square.x, v = y + rect_.y - square.y, i = u / kStep, j = v / kStep;
+        const int u = x + rect_.x - square.x, v = y + rect_.y - square.y, i = u / kStep,
+                  j = v / kStep;
         const float a = grid[j][i], b = grid[j][i + 1], c = grid[j + 1][i], d = grid[j + 1][i + 1];
         const auto [low, high] = std::minmax({a, b, c, d});
-        const float s = static_cast<float>(u % kStep) / kStep, t = static_cast<float>(v % kStep) / kStep;
-        row[x] = lightLevel(high - low <= kSlow ? (a + (b - a) * s) * (1.0f - t) + (c + (d - c) * s) * t : exactly(x + rect_.x, y + rect_.y));
+        const float s = static_cast<float>(u % kStep) / kStep,
+                    t = static_cast<float>(v % kStep) / kStep;
+        row[x] =
+            lightLevel(high - low <= kSlow ? (a + (b - a) * s) * (1.0f - t) + (c + (d - c) * s) * t
+                                           : exactly(x + rect_.x, y + rect_.y));
       }
     }
   }
@@ -94,7 +120,8 @@ class Squares {
     Receiver r;
     for (int y = here.y; y < here.br().y; ++y) {
       for (int x = here.x; x < here.br().x; ++x) {
-        if (view_.at(x + rect_.x, y + rect_.y, r)) out_.at<std::uint8_t>(y, x) = lightLevel(light_.visibility(r.position, r.normal));
+        if (view_.at(x + rect_.x, y + rect_.y, r))
+          out_.at<std::uint8_t>(y, x) = lightLevel(light_.visibility(r.position, r.normal));
       }
     }
   }
@@ -108,7 +135,8 @@ class Squares {
 
 }  // namespace
 
-void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect, const SquareMask& skip, cv::Mat& out) {
+void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
+                   const SquareMask& skip, cv::Mat& out) {
   if (!rect.empty()) Squares(view, light, rect, skip, out).run();
 }
 

@@ -14,20 +14,25 @@ namespace calipso::render {
 using Radiance = std::function<cv::Vec3f(int slot, const SurfacePoint& point)>;
 
 // The same without shadows and highlights, which a blurred reflection hardly shows.
-cv::Vec3f mirroredRadiance(const Appearance& appearance, const Light& light, const Look& look, const SurfacePoint& point);
+cv::Vec3f mirroredRadiance(const Appearance& appearance, const Light& light, const Look& look,
+                           const SurfacePoint& point);
 
 // What even mirrors in place of the support planes would show of some objects.
 struct MirrorImage {
   cv::Mat colour;  // CV_32FC3: linear, times the reflectance; 0 where no object is seen
-  cv::Mat cover;   // CV_32FC1: the reflectance (Schlick 1994, relative to a whole mirror) where an object is seen, 0 elsewhere
-  cv::Mat spread;  // CV_32FC1: px along a column by which it is drawn out for each unit of the planes' slopes
+  cv::Mat cover;   // CV_32FC1: the reflectance (Schlick 1994, relative to a whole mirror) where an
+                   // object is seen, 0 elsewhere
+  cv::Mat spread;  // CV_32FC1: px along a column by which it is drawn out for each unit of the
+                   // planes' slopes
   float across = 1.0f;  // how much less it is along a row
   bool empty() const { return colour.empty(); }
 };
 
 // @param off CV_8UC1, != 0: no plane is seen there; may be empty
 // @return empty if nothing of them is mirrored
-MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance& radiance, const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& off);
+MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance& radiance,
+                        const std::vector<SupportPlane>& planes, const Camera& camera,
+                        const cv::Mat& off);
 
 // What `image` adds to the picture, CV_32FC3, linear.
 cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image);
@@ -39,8 +44,9 @@ cv::Mat unmirroredCodes(const PlaneMirror& mirror, const cv::Mat& bgr);
 
 // Does the picture show the reflection? By least squares on what it differs from around it,
 //   y' = strength (colour' - surroundings cover') + e,   ': less its mean around the pixel,
-// strength and surroundings found in one half of the picture's squares and judged in the other, and both the same way for mirror
-// images displaced sideways. Established if the one in place explains far more than any of those.
+// strength and surroundings found in one half of the picture's squares and judged in the other, and
+// both the same way for mirror images displaced sideways. Established if the one in place explains
+// far more than any of those.
 // @param picture CV_32FC3, linear; known CV_8UC1: pixels that may be looked at
 // @return strength 0 if it is not established
 PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known);

@@ -13,7 +13,8 @@ class PlaneView {
   PlaneView(const std::vector<SupportPlane>& planes, const Camera& camera);
 
   bool sees(float u, float v) const {
-    if (planes_.size() == 1 && planes_[0].endless) return planes_[0].slope_0 + u * planes_[0].slope_u + v * planes_[0].slope_v < -1e-9f;
+    if (planes_.size() == 1 && planes_[0].endless)
+      return planes_[0].slope_0 + u * planes_[0].slope_u + v * planes_[0].slope_v < -1e-9f;
     Receiver receiver;
     return at(u, v, receiver);
   }
@@ -44,10 +45,11 @@ class PlaneView {
     float height;        // of the plane over the eye, m (negative: the eye is above it)
     float x_min, x_max;  // world, m
     float slope_0, slope_u, slope_v;  // of a pixel's sight line against it
-    bool endless;        // below the eye, without limits
+    bool endless;                     // below the eye, without limits
   };
   std::vector<Plane> planes_;
-  Eigen::Vector3f eye_, ray_0_, ray_u_, ray_v_;  // world; a pixel's sight line is ray_0 + u ray_u + v ray_v
+  Eigen::Vector3f eye_, ray_0_, ray_u_,
+      ray_v_;  // world; a pixel's sight line is ray_0 + u ray_u + v ray_v
 };
 
 }  // namespace calipso::render

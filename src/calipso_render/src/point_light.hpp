@@ -7,7 +7,8 @@
 
 namespace calipso::render {
 
-// A light laid out for many points: diffuseShading() and specularShading() with the channels in one register.
+// A light laid out for many points: diffuseShading() and specularShading() with the channels in one
+// register.
 class PointLight {
  public:
   explicit PointLight(const Light& light);
@@ -16,7 +17,8 @@ class PointLight {
     cv::Vec4f diffuse, highlight;  // B, G, R, 0
   };
   // @param tint of what the object itself throws back
-  Shading at(const Gloss& gloss, const cv::Vec3f& tint, const Eigen::Vector3f& n, const Eigen::Vector3f& view, float sun, float sky) const;
+  Shading at(const Gloss& gloss, const cv::Vec3f& tint, const Eigen::Vector3f& n,
+             const Eigen::Vector3f& view, float sun, float sky) const;
 
  private:
   cv::v_float32x4 ambientAt(const Eigen::Vector3f& n) const;

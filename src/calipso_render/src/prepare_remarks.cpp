@@ -9,10 +9,10 @@ namespace calipso::render {
 namespace {
 
 constexpr double kMostInvented = 0.5, kMostCovered = 0.8;  // parts of the picture
-constexpr double kMostClipped = 0.3;   // part of an object's pixels that is saturated or black
+constexpr double kMostClipped = 0.3;  // part of an object's pixels that is saturated or black
 constexpr double kSaturated = 250.0, kBlack = 3.0;  // code values
-constexpr double kLeastModelled = 0.7;  // part of a mask that the model must cover
-constexpr double kMuchUnseen = 0.25;   // part of an object's surface
+constexpr double kLeastModelled = 0.7;              // part of a mask that the model must cover
+constexpr double kMuchUnseen = 0.25;                // part of an object's surface
 
 int percent(double part) { return static_cast<int>(std::lround(100.0 * part)); }
 
@@ -27,25 +27,38 @@ cv::Mat drawn(const Actor& actor, const cv::Size& size) {
   buffer.draw(actor.screen, 0);
   cv::Mat out = cv::Mat::zeros(size, CV_8U);
   for (int v = 0; v < size.height; ++v) {
-    for (int u = 0; u < size.width; ++u) out.at<std::uint8_t>(v, u) = buffer.ids(v)[u] != VisibilityBuffer::kNothing ? 255 : 0;
+    for (int u = 0; u < size.width; ++u)
+      out.at<std::uint8_t>(v, u) = buffer.ids(v)[u] != VisibilityBuffer::kNothing ? 255 : 0;
   }
   return out;
 }
 
 void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
-  if (frames.size() == 1) p.remarks.push_back("the clip has one frame: all of the background is invented");
-  const double invented = cv::mean(p.background.invented)[0] / 255.0, covered = cv::mean(p.key_labels != 0)[0] / 255.0;
+  if (frames.size() == 1)
+    p.remarks.push_back("the clip has one frame: all of the background is invented");
+  const double invented = cv::mean(p.background.invented)[0] / 255.0,
+               covered = cv::mean(p.key_labels != 0)[0] / 255.0;
   if (invented > kMostInvented) {
-    p.remarks.push_back(std::to_string(percent(invented)) + " % of the background is hidden in every frame and was invented; check the strokes");
+    p.remarks.push_back(
+        std::to_string(percent(invented)) +
+        " % of the background is hidden in every frame and was invented; check the strokes");
   }
   if (covered > kMostCovered) {
-    p.remarks.push_back("the objects' masks cover " + std::to_string(percent(covered)) + " % of the key frame: little is left to tell the place and its light by; check the strokes");
+    p.remarks.push_back("the objects' masks cover " + std::to_string(percent(covered)) +
+                        " % of the key frame: little is left to tell the place and its light by; "
+                        "check the strokes");
   }
-  if (!p.light.determined) p.remarks.push_back("too little of the objects is seen to tell the light; it is assumed high and frontal");
-  if (p.light.determined && !p.light.seen_gloss) p.remarks.push_back("no highlight is seen that tells the objects' gloss; it is what their shading leaves possible");
+  if (!p.light.determined)
+    p.remarks.push_back(
+        "too little of the objects is seen to tell the light; it is assumed high and frontal");
+  if (p.light.determined && !p.light.seen_gloss)
+    p.remarks.push_back(
+        "no highlight is seen that tells the objects' gloss; it is what their shading leaves "
+        "possible");
 }
 
-void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std::size_t i, Prepared& p) {
+void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std::size_t i,
+                  Prepared& p) {
   const Surface& s = p.surfaces[i];
   const std::string who = "object '" + s.name + "'";
   const cv::Mat mask = p.key_labels == s.index;
@@ -54,33 +67,41 @@ void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std:
     return;
   }
   if (frames.size() > 1 && partOf(p.background.invented, mask) > 0.99) {
-    p.remarks.push_back(who + " hides the same place in every frame: what is behind it was invented");
+    p.remarks.push_back(who +
+                        " hides the same place in every frame: what is behind it was invented");
   }
   cv::Mat grey;
   cv::cvtColor(frames.front().bgr, grey, cv::COLOR_BGR2GRAY);
   const double saturated = partOf(grey > kSaturated, mask), black = partOf(grey < kBlack, mask);
   if (std::max(saturated, black) > kMostClipped) {
-    p.remarks.push_back(who + (saturated > black ? " is saturated in " : " is black in ") + std::to_string(percent(std::max(saturated, black))) +
-                        " % of its pixels: neither texture nor light can be told there; take another exposure");
+    p.remarks.push_back(
+        who + (saturated > black ? " is saturated in " : " is black in ") +
+        std::to_string(percent(std::max(saturated, black))) +
+        " % of its pixels: neither texture nor light can be told there; take another exposure");
   }
   const double modelled = partOf(drawn(actor, mask.size()), mask);
   if (modelled < kLeastModelled) {
     p.remarks.push_back(who + ": its model covers " + std::to_string(percent(modelled)) +
-                        " % of its mask; the side that the camera sees is missing or misplaced, and is left out when the object is drawn elsewhere");
+                        " % of its mask; the side that the camera sees is missing or misplaced, "
+                        "and is left out when the object is drawn elsewhere");
   }
   const Appearance& a = p.appearances[i];
   const double unseen = 1.0 - a.seen_in_key - a.seen_elsewhere;
   if (unseen > kMuchUnseen) {
-    p.remarks.push_back(who + ": " + std::to_string(percent(unseen)) + " % of its surface is seen in no frame; " + std::to_string(percent(a.copied)) +
+    p.remarks.push_back(who + ": " + std::to_string(percent(unseen)) +
+                        " % of its surface is seen in no frame; " +
+                        std::to_string(percent(a.copied)) +
                         " % was copied from like places, the rest continued smoothly");
   }
 }
 
 }  // namespace
 
-void addRemarks(const std::vector<ClipFrame>& frames, const std::vector<Actor>& key_actors, Prepared& prepared) {
+void addRemarks(const std::vector<ClipFrame>& frames, const std::vector<Actor>& key_actors,
+                Prepared& prepared) {
   remarkPlace(frames, prepared);
-  for (std::size_t i = 0; i < prepared.surfaces.size(); ++i) remarkObject(frames, key_actors[i], i, prepared);
+  for (std::size_t i = 0; i < prepared.surfaces.size(); ++i)
+    remarkObject(frames, key_actors[i], i, prepared);
 }
 
 }  // namespace calipso::render

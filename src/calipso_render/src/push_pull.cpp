@@ -6,7 +6,8 @@ namespace calipso::render {
 namespace {
 
 // image and weight of half the size: averages weighted by trust.
-void pull(const cv::Mat& weighted, const cv::Mat& weight, cv::Mat& weighted_half, cv::Mat& weight_half) {
+void pull(const cv::Mat& weighted, const cv::Mat& weight, cv::Mat& weighted_half,
+          cv::Mat& weight_half) {
   const cv::Size half((weight.cols + 1) / 2, (weight.rows + 1) / 2);
   cv::pyrDown(weighted, weighted_half, half, cv::BORDER_REPLICATE);
   cv::pyrDown(weight, weight_half, half, cv::BORDER_REPLICATE);
@@ -17,7 +18,8 @@ cv::Mat normalised(const cv::Mat& weighted, const cv::Mat& weight) {
   for (int v = 0; v < out.rows; ++v) {
     for (int u = 0; u < out.cols; ++u) {
       const float w = weight.at<float>(v, u);
-      out.at<cv::Vec3f>(v, u) = w > 1e-6f ? cv::Vec3f(weighted.at<cv::Vec3f>(v, u) / w) : cv::Vec3f();
+      out.at<cv::Vec3f>(v, u) =
+          w > 1e-6f ? cv::Vec3f(weighted.at<cv::Vec3f>(v, u) / w) : cv::Vec3f();
     }
   }
   return out;
@@ -47,7 +49,8 @@ cv::Mat pushPull(const cv::Mat& image, const cv::Mat& weight) {
   for (int v = 0; v < out.rows; ++v) {
     for (int u = 0; u < out.cols; ++u) {
       const float w = std::min(1.0f, weight.at<float>(v, u));
-      out.at<cv::Vec3f>(v, u) = image.at<cv::Vec3f>(v, u) * w + coarse.at<cv::Vec3f>(v, u) * (1.0f - w);
+      out.at<cv::Vec3f>(v, u) =
+          image.at<cv::Vec3f>(v, u) * w + coarse.at<cv::Vec3f>(v, u) * (1.0f - w);
     }
   }
   return out;

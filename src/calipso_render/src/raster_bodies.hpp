@@ -17,7 +17,9 @@ typedef std::int32_t EightInts __attribute__((vector_size(32), aligned(4), may_a
 
 // Columns of row v inside the triangle. @return false if there are none
 CALIPSO_INLINE bool rowLimits(const TriangleSpan& s, float v, int& from, int& to) {
-  const Four bound = *reinterpret_cast<const Four*>(s.column) + *reinterpret_cast<const Four*>(s.slope) * (v - *reinterpret_cast<const Four*>(s.row));
+  const Four bound =
+      *reinterpret_cast<const Four*>(s.column) +
+      *reinterpret_cast<const Four*>(s.slope) * (v - *reinterpret_cast<const Four*>(s.row));
   float low = static_cast<float>(s.column_min), high = static_cast<float>(s.column_max);
   low = bound[0] > low ? bound[0] : low, high = bound[2] < high ? bound[2] : high;
   low = bound[1] > low ? bound[1] : low, high = bound[3] < high ? bound[3] : high;
@@ -28,7 +30,8 @@ CALIPSO_INLINE bool rowLimits(const TriangleSpan& s, float v, int& from, int& to
 }
 
 template <bool kIds>
-CALIPSO_INLINE void setWhereCloser(const Eight& z, const EightInts& inside, std::uint32_t id, const SpanTarget& target, std::size_t at) {
+CALIPSO_INLINE void setWhereCloser(const Eight& z, const EightInts& inside, std::uint32_t id,
+                                   const SpanTarget& target, std::size_t at) {
   Eight& nearest = *reinterpret_cast<Eight*>(target.nearness + at);
   const EightInts closer = (z > nearest) & inside;
   nearest = closer ? z : nearest;
@@ -39,15 +42,20 @@ CALIPSO_INLINE void setWhereCloser(const Eight& z, const EightInts& inside, std:
 
 // A triangle of at most eight columns.
 template <bool kIds>
-CALIPSO_INLINE void fillNarrow(const TriangleSpan& s, int first, int last, const SpanTarget& target) {
+CALIPSO_INLINE void fillNarrow(const TriangleSpan& s, int first, int last,
+                               const SpanTarget& target) {
   const EightInts lanes = {0, 1, 2, 3, 4, 5, 6, 7}, columns = s.column_min + lanes;
   const Eight u = __builtin_convertvector(columns, Eight), slope = s.near_u * u;
   const EightInts within = columns <= s.column_max;
   for (int row = first; row <= last; ++row) {
     const float v = static_cast<float>(row);
-    const Four bound = *reinterpret_cast<const Four*>(s.column) + *reinterpret_cast<const Four*>(s.slope) * (v - *reinterpret_cast<const Four*>(s.row));
-    const EightInts inside = within & (u >= bound[0]) & (u >= bound[1]) & (u <= bound[2]) & (u <= bound[3]);
-    setWhereCloser<kIds>(s.near_0 + s.near_v * v + slope, inside, s.id, target, static_cast<std::size_t>(row) * target.stride + s.column_min);
+    const Four bound =
+        *reinterpret_cast<const Four*>(s.column) +
+        *reinterpret_cast<const Four*>(s.slope) * (v - *reinterpret_cast<const Four*>(s.row));
+    const EightInts inside =
+        within & (u >= bound[0]) & (u >= bound[1]) & (u <= bound[2]) & (u <= bound[3]);
+    setWhereCloser<kIds>(s.near_0 + s.near_v * v + slope, inside, s.id, target,
+                         static_cast<std::size_t>(row) * target.stride + s.column_min);
   }
 }
 
@@ -61,7 +69,8 @@ CALIPSO_INLINE void fillWide(const TriangleSpan& s, int first, int last, const S
     for (int u = from; u <= to; u += 8) {
       const EightInts columns = u + lanes;
       const Eight z = base + s.near_u * __builtin_convertvector(columns, Eight);
-      setWhereCloser<kIds>(z, columns <= to, s.id, target, static_cast<std::size_t>(row) * target.stride + u);
+      setWhereCloser<kIds>(z, columns <= to, s.id, target,
+                           static_cast<std::size_t>(row) * target.stride + u);
     }
   }
 }
@@ -69,21 +78,27 @@ CALIPSO_INLINE void fillWide(const TriangleSpan& s, int first, int last, const S
 template <bool kIds>
 CALIPSO_INLINE void fillSpansBody(const TriangleSpan* spans, int count, const SpanTarget& target) {
   for (const TriangleSpan* s = spans; s != spans + count; ++s) {
-    const int first = s->row_min > target.first ? s->row_min : target.first, last = s->row_max < target.last ? s->row_max : target.last;
+    const int first = s->row_min > target.first ? s->row_min : target.first,
+              last = s->row_max < target.last ? s->row_max : target.last;
     if (first > last) continue;
-    if (s->column_max - s->column_min < 8) fillNarrow<kIds>(*s, first, last, target);
-    else fillWide<kIds>(*s, first, last, target);
+    if (s->column_max - s->column_min < 8)
+      fillNarrow<kIds>(*s, first, last, target);
+    else
+      fillWide<kIds>(*s, first, last, target);
   }
 }
 
-CALIPSO_INLINE void drawSamplesBody(const TriangleSamples& t, int u, int v, std::uint32_t id, EdgeCoverage::Pixel& pixel) {
+CALIPSO_INLINE void drawSamplesBody(const TriangleSamples& t, int u, int v, std::uint32_t id,
+                                    EdgeCoverage::Pixel& pixel) {
   constexpr float kReach = 0.375f;  // px from the centre to the outermost samples
   float centre[3];
   for (int i = 0; i < 3; ++i) {
-    centre[i] = t.edge_u[i] * static_cast<float>(u) + t.edge_v[i] * static_cast<float>(v) + t.edge_0[i];
+    centre[i] =
+        t.edge_u[i] * static_cast<float>(u) + t.edge_v[i] * static_cast<float>(v) + t.edge_0[i];
     if (centre[i] < -kReach * (std::fabs(t.edge_u[i]) + std::fabs(t.edge_v[i]))) return;
   }
-  const float near_centre = t.near_u * static_cast<float>(u) + t.near_v * static_cast<float>(v) + t.near_0;
+  const float near_centre =
+      t.near_u * static_cast<float>(u) + t.near_v * static_cast<float>(v) + t.near_0;
   const Eight x = {-0.375f, -0.125f, 0.125f, 0.375f, -0.375f, -0.125f, 0.125f, 0.375f};
   for (int half = 0; half < 2; ++half) {
     const Eight upper = {-0.375f, -0.375f, -0.375f, -0.375f, -0.125f, -0.125f, -0.125f, -0.125f};

@@ -10,9 +10,9 @@
 namespace calipso::render {
 namespace {
 
-constexpr double kNearPlane = 1e-6;     // m in front of the camera
-constexpr float kEdgeTolerance = 1e-3f; // px; shared edges belong to both sides, so no cracks
-constexpr float kSmallestArea = 1e-9f;  // px^2
+constexpr double kNearPlane = 1e-6;      // m in front of the camera
+constexpr float kEdgeTolerance = 1e-3f;  // px; shared edges belong to both sides, so no cracks
+constexpr float kSmallestArea = 1e-9f;   // px^2
 
 // Without SSE 4.1 std::floor and std::ceil are calls; |x| must fit an int.
 int floorInt(float x) {
@@ -26,10 +26,13 @@ int ceilInt(float x) {
 
 // Rows and columns that a triangle can reach. @return false if there are none
 bool setLimits(const Eigen::Vector3f (&p)[3], const cv::Rect& region, TriangleSpan& span) {
-  const float left = std::min({p[0].x(), p[1].x(), p[2].x()}), right = std::max({p[0].x(), p[1].x(), p[2].x()});
-  const float top = std::min({p[0].y(), p[1].y(), p[2].y()}), bottom = std::max({p[0].y(), p[1].y(), p[2].y()});
+  const float left = std::min({p[0].x(), p[1].x(), p[2].x()}),
+              right = std::max({p[0].x(), p[1].x(), p[2].x()});
+  const float top = std::min({p[0].y(), p[1].y(), p[2].y()}),
+              bottom = std::max({p[0].y(), p[1].y(), p[2].y()});
   // Written so that NaN fails every comparison.
-  if (!(right >= 0 && bottom >= 0 && left <= region.width - 1 && top <= region.height - 1)) return false;
+  if (!(right >= 0 && bottom >= 0 && left <= region.width - 1 && top <= region.height - 1))
+    return false;
   span.row_min = ceilInt(std::max(0.0f, top - kEdgeTolerance));
   span.row_max = floorInt(std::min(region.height - 1.0f, bottom + kEdgeTolerance));
   span.column_min = ceilInt(std::max(0.0f, left - kEdgeTolerance));
@@ -40,9 +43,13 @@ bool setLimits(const Eigen::Vector3f (&p)[3], const cv::Rect& region, TriangleSp
 bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, TriangleSpan& span) {
   const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
   const Eigen::Vector3f offset(region.x, region.y, 0.0f);
-  const Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset, mesh.points[t[2]] - offset};
-  const float area = (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) - (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
-  if (mesh.hides(area) || !(std::abs(area) > kSmallestArea) || std::isnan(p[0].z() + p[1].z() + p[2].z())) return false;
+  const Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset,
+                                mesh.points[t[2]] - offset};
+  const float area =
+      (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) - (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
+  if (mesh.hides(area) || !(std::abs(area) > kSmallestArea) ||
+      std::isnan(p[0].z() + p[1].z() + p[2].z()))
+    return false;
   if (!setLimits(p, region, span)) return false;
   for (int i = 0; i < 4; ++i) {
     constexpr float kNoBound = 1e9f;
@@ -59,7 +66,8 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Tria
     const float slope = dx / dy, reach = kEdgeTolerance * std::sqrt(1.0f + slope * slope);
     const bool is_left = (area > 0.0f) == (dy < 0.0f);
     const int k = is_left ? lefts++ : rights++;
-    span.column[k] = is_left ? start.x() - reach : start.x() + reach, span.row[k] = start.y(), span.slope[k] = slope;
+    span.column[k] = is_left ? start.x() - reach : start.x() + reach, span.row[k] = start.y(),
+    span.slope[k] = slope;
   }
   const float dz1 = p[1].z() - p[0].z(), dz2 = p[2].z() - p[0].z(), per_area = 1.0f / area;
   span.near_u = (dz1 * (p[2].y() - p[0].y()) - dz2 * (p[1].y() - p[0].y())) * per_area;
@@ -109,7 +117,9 @@ cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size) {
 }
 
 VisibilityBuffer::VisibilityBuffer(const cv::Rect& region, bool with_ids)
-    : region_(region), stride_(region.width + kPadding), ids_(with_ids ? static_cast<std::size_t>(stride_) * region.height : 0, kNothing),
+    : region_(region),
+      stride_(region.width + kPadding),
+      ids_(with_ids ? static_cast<std::size_t>(stride_) * region.height : 0, kNothing),
       near_(static_cast<std::size_t>(stride_) * region.height, kFar) {}
 
 void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
@@ -119,7 +129,8 @@ void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
   {
 #pragma omp for schedule(static)
     for (int part = 0; part < kBands; ++part) {
-      const int begin = static_cast<int>(static_cast<long>(count) * part / kBands), end = static_cast<int>(static_cast<long>(count) * (part + 1) / kBands);
+      const int begin = static_cast<int>(static_cast<long>(count) * part / kBands),
+                end = static_cast<int>(static_cast<long>(count) * (part + 1) / kBands);
       parts[part].reserve(end - begin);
       TriangleSpan span;
       for (int t = begin; t < end; ++t) {
@@ -129,9 +140,12 @@ void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
     }
 #pragma omp for schedule(static)
     for (int band = 0; band < kBands; ++band) {
-      const int first = region_.height * band / kBands, last = region_.height * (band + 1) / kBands - 1;
-      const SpanTarget target{ids_.empty() ? nullptr : ids_.data(), near_.data(), stride_, first, last};
-      for (const auto& part : parts) kernels().fill(part.data(), static_cast<int>(part.size()), target);
+      const int first = region_.height * band / kBands,
+                last = region_.height * (band + 1) / kBands - 1;
+      const SpanTarget target{ids_.empty() ? nullptr : ids_.data(), near_.data(), stride_, first,
+                              last};
+      for (const auto& part : parts)
+        kernels().fill(part.data(), static_cast<int>(part.size()), target);
     }
   }
 }

@@ -16,14 +16,16 @@ namespace calipso::render {
 namespace {
 
 constexpr float kGoldenAngle = 2.39996323f;
-constexpr float kLift = 1e-3f;       // of the scene's radius: rays start that far off the surface
-constexpr int kRayBudget = 120000;   // for the exposure of a whole mesh
+constexpr float kLift = 1e-3f;      // of the scene's radius: rays start that far off the surface
+constexpr int kRayBudget = 120000;  // for the exposure of a whole mesh
 constexpr int kFewestRays = 12, kMostRays = 48;
 
 // One single-threaded device for the process: the renderer's own loops use the cores.
 RTCDevice device() {
   static const RTCDevice shared = rtcNewDevice("threads=1");
-  if (shared == nullptr) throw std::runtime_error("Embree has no device on this machine: neither light nor final frames are possible");
+  if (shared == nullptr)
+    throw std::runtime_error(
+        "Embree has no device on this machine: neither light nor final frames are possible");
   return shared;
 }
 
@@ -35,9 +37,13 @@ struct RayScene::Handle {
   void add(const Occluder& occluder) const {
     RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
     const std::size_t points = occluder.vertices->size(), faces = occluder.triangles->size();
-    void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), points);
-    void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), faces);
-    if (vertices == nullptr || indices == nullptr) throw std::runtime_error("Embree could not take a mesh of " + std::to_string(faces) + " triangles");
+    void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                             3 * sizeof(float), points);
+    void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                            3 * sizeof(unsigned), faces);
+    if (vertices == nullptr || indices == nullptr)
+      throw std::runtime_error("Embree could not take a mesh of " + std::to_string(faces) +
+                               " triangles");
     std::memcpy(vertices, occluder.vertices->data(), points * 3 * sizeof(float));
     std::memcpy(indices, occluder.triangles->data(), faces * 3 * sizeof(unsigned));
     rtcCommitGeometry(geometry);
@@ -64,7 +70,8 @@ RayScene::RayScene(const std::vector<Occluder>& occluders) {
 RayScene::~RayScene() = default;
 RayScene::RayScene(RayScene&&) noexcept = default;
 
-bool RayScene::blocked(const Eigen::Vector3f& p, const Eigen::Vector3f& n, const Eigen::Vector3f& d) const {
+bool RayScene::blocked(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
+                       const Eigen::Vector3f& d) const {
   if (!handle_) return false;
   const Eigen::Vector3f from = p + n * (kLift * radius_), to_centre = centre_ - from;
   const float along = to_centre.dot(d);
@@ -84,7 +91,8 @@ bool RayScene::blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& d) co
   return r.tfar < 0.0f;
 }
 
-std::vector<float> skyExposure(const Points& vertices, const Points& normals, const Triangles& triangles) {
+std::vector<float> skyExposure(const Points& vertices, const Points& normals,
+                               const Triangles& triangles) {
   const RayScene scene({{&vertices, &triangles}});
   const int count = static_cast<int>(vertices.size());
   const int rays = std::clamp(kRayBudget / std::max(1, count), kFewestRays, kMostRays);
@@ -98,7 +106,8 @@ std::vector<float> skyExposure(const Points& vertices, const Points& normals, co
     // Evenly spread over the disc below the hemisphere: the cosine weighs by itself (Malley).
     for (int k = 0; k < rays; ++k) {
       const float r2 = (k + 0.5f) / rays, r = std::sqrt(r2), a = k * kGoldenAngle;
-      hits += scene.blocked(vertices[i], n, r * std::cos(a) * s + r * std::sin(a) * t + std::sqrt(1.0f - r2) * n);
+      hits += scene.blocked(vertices[i], n,
+                            r * std::cos(a) * s + r * std::sin(a) * t + std::sqrt(1.0f - r2) * n);
     }
     exposure[i] = 1.0f - (1.0f - kThrownBack) * hits / rays;
   }

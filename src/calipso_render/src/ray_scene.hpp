@@ -8,7 +8,8 @@
 
 namespace calipso::render {
 
-// Meshes in the world at one instant, asked by rays of any direction (Embree). Thread-safe once built.
+// Meshes in the world at one instant, asked by rays of any direction (Embree). Thread-safe once
+// built.
 class RayScene {
  public:
   // Copies what it needs. @throw std::runtime_error if Embree cannot build the scene
@@ -28,11 +29,12 @@ class RayScene {
   struct Handle;
   std::unique_ptr<Handle> handle_;  // empty: nothing is in the way
   Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();
-  float radius_ = 0.0f;             // m, of a ball around everything
+  float radius_ = 0.0f;  // m, of a ball around everything
 };
 
-// Part of the sky that each vertex of a mesh sees past the mesh itself, weighted by the cosine, plus what the mesh
-// throws back of the rest. 0..1.
-std::vector<float> skyExposure(const Points& vertices, const Points& normals, const Triangles& triangles);
+// Part of the sky that each vertex of a mesh sees past the mesh itself, weighted by the cosine,
+// plus what the mesh throws back of the rest. 0..1.
+std::vector<float> skyExposure(const Points& vertices, const Points& normals,
+                               const Triangles& triangles);
 
 }  // namespace calipso::render

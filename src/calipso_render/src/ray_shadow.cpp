@@ -11,13 +11,15 @@ namespace calipso::render {
 namespace {
 
 constexpr float kGoldenAngle = 2.39996323f;
-constexpr int kFirstRays = 6;        // if these agree, so do the others
-constexpr float kLiftPart = 2e-4f;   // of the occluders' extent
+constexpr int kFirstRays = 6;       // if these agree, so do the others
+constexpr float kLiftPart = 2e-4f;  // of the occluders' extent
 
 }  // namespace
 
-RayShadow::RayShadow(const std::vector<Occluder>& occluders, const Eigen::Vector3d& direction, const Params& params)
-    : scene_(std::make_unique<const RayScene>(occluders)), spread_(static_cast<float>(std::tan(params.angular_radius))) {
+RayShadow::RayShadow(const std::vector<Occluder>& occluders, const Eigen::Vector3d& direction,
+                     const Params& params)
+    : scene_(std::make_unique<const RayScene>(occluders)),
+      spread_(static_cast<float>(std::tan(params.angular_radius))) {
   axis_h_ = direction.normalized().cast<float>();
   axis_s_ = axis_h_.unitOrthogonal();
   axis_t_ = axis_h_.cross(axis_s_);
@@ -41,11 +43,15 @@ RayShadow::RayShadow(const std::vector<Occluder>& occluders, const Eigen::Vector
 
 RayShadow::~RayShadow() = default;
 
-std::optional<float> RayShadow::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f&, float radius) const {
+std::optional<float> RayShadow::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f&,
+                                        float radius) const {
   if (scene_->empty()) return 1.0f;
   const Eigen::Vector3f q(p.dot(axis_s_), p.dot(axis_t_), p.dot(axis_h_));
-  const float around = radius + 4.0f * lift_, reach = around + spread_ * (high_.z() - q.z() + around);
-  const bool clear = high_.z() < q.z() - around || q.x() + reach < low_.x() || q.x() - reach > high_.x() || q.y() + reach < low_.y() || q.y() - reach > high_.y();
+  const float around = radius + 4.0f * lift_,
+              reach = around + spread_ * (high_.z() - q.z() + around);
+  const bool clear = high_.z() < q.z() - around || q.x() + reach < low_.x() ||
+                     q.x() - reach > high_.x() || q.y() + reach < low_.y() ||
+                     q.y() - reach > high_.y();
   return clear ? std::make_optional(1.0f) : std::nullopt;
 }
 
@@ -54,7 +60,8 @@ float RayShadow::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   const Eigen::Vector3f from = p + n * lift_ * 4.0f;
   const Eigen::Vector3f q(from.dot(axis_s_), from.dot(axis_t_), from.dot(axis_h_));
   const float reach = spread_ * (high_.z() - q.z());
-  const bool clear = reach < 0.0f || q.x() + reach < low_.x() || q.x() - reach > high_.x() || q.y() + reach < low_.y() || q.y() - reach > high_.y();
+  const bool clear = reach < 0.0f || q.x() + reach < low_.x() || q.x() - reach > high_.x() ||
+                     q.y() + reach < low_.y() || q.y() - reach > high_.y();
   if (clear) return 1.0f;
   const int all = static_cast<int>(rays_.size()), first = std::min(kFirstRays, all);
   int hits = 0;

@@ -7,22 +7,26 @@
 
 namespace calipso::render {
 
-bool ReflectanceCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
+bool ReflectanceCost::Evaluate(double const* const* parameters, double* residuals,
+                               double** jacobians) const {
   using Map = Eigen::Map<const Eigen::Vector3d>;
   using Column = Eigen::Map<Eigen::Array3d>;
   using Square = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
   const Eigen::Vector3d l = Map(parameters[0]);
   const Eigen::Array3d A = Map(parameters[1]).array().exp(), L = Map(parameters[2]).array().exp();
-  const double g = parameters[3][0], ks = std::exp(parameters[5][0]), m = std::exp(parameters[5][1]);
+  const double g = parameters[3][0], ks = std::exp(parameters[5][0]),
+               m = std::exp(parameters[5][1]);
   const Eigen::Array3d a = Map(parameters[4]).array().exp();
   const double nl = std::max(0.0, s_.normal.dot(l)), height = s_.normal.dot(s_.up);
   const Lobe T = torranceSparrowLobe(s_.normal, l, s_.view, m);
 
-  const double nv = s_.normal.dot(s_.view), mirrored_height = (2.0 * nv * s_.normal - s_.view).dot(s_.up);
+  const double nv = s_.normal.dot(s_.view),
+               mirrored_height = (2.0 * nv * s_.normal - s_.view).dot(s_.up);
   const double mirrored = ks * s_.sky * grazing(static_cast<float>(nv));
 
   const Eigen::Array3d ambient = A * (s_.sky * (1.0 + g * height)), sun = L * (s_.visible * nl);
-  const Eigen::Array3d highlight = ks * T.value * s_.visible * L, surroundings = A * (mirrored * (1.0 + g * mirrored_height));
+  const Eigen::Array3d highlight = ks * T.value * s_.visible * L,
+                       surroundings = A * (mirrored * (1.0 + g * mirrored_height));
   Column r(residuals);
   r = (a * (ambient + sun) + highlight + surroundings - s_.radiance.array()) / s_.scale;
   if (jacobians == nullptr) return true;

@@ -7,8 +7,9 @@
 namespace calipso::render {
 
 // What one pixel's three channels say about light and material (paper: section 6, eqs. 10, 11).
-//   r = (a E + ks (T L V + F A (1 + g r.up) S) - I) / scale,  E = A (1 + g n.up) S + L V max(0, n.l),
-//   T: torranceSparrow(n, l, v, m),  F: grazing(n.v),  r: v mirrored at n,  V, S: visible part of sun and sky
+//   r = (a E + ks (T L V + F A (1 + g r.up) S) - I) / scale,  E = A (1 + g n.up) S + L V max(0,
+//   n.l), T: torranceSparrow(n, l, v, m),  F: grazing(n.v),  r: v mirrored at n,  V, S: visible
+//   part of sun and sky
 // Parameter blocks, colours as logarithms so that they stay positive:
 //   0  l   direction to the sun, unit, world   3
 //   1  A   ambient light                       3
@@ -26,7 +27,8 @@ class ReflectanceCost : public ceres::SizedCostFunction<3, 3, 3, 3, 1, 3, 2> {
   };
   explicit ReflectanceCost(const Sample& sample) : s_(sample) {}
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
 
  private:
   Sample s_;

@@ -13,11 +13,14 @@ Eigen::Vector3f vectorAt(const cv::Mat& picture, int u, int v) {
 
 }  // namespace
 
-Receiver Relief::receiver(int u, int v) const { return {vectorAt(position, u, v), vectorAt(normal, u, v)}; }
+Receiver Relief::receiver(int u, int v) const {
+  return {vectorAt(position, u, v), vectorAt(normal, u, v)};
+}
 
 bool Relief::touches(int u, int v, int size) const {
   if (empty()) return false;
-  const cv::Rect here = cv::Rect(u / kTile, v / kTile, size / kTile, size / kTile) & cv::Rect({0, 0}, tiles.size());
+  const cv::Rect here =
+      cv::Rect(u / kTile, v / kTile, size / kTile, size / kTile) & cv::Rect({0, 0}, tiles.size());
   return !here.empty() && cv::countNonZero(tiles(here)) > 0;
 }
 
@@ -36,14 +39,18 @@ void Relief::index() {
 Relief warped(const Relief& relief, const cv::Mat& map) {
   Relief out;
   if (relief.empty()) return out;
-  const auto carry = [&](const cv::Mat& from, cv::Mat& to) { cv::remap(from, to, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT); };
-  carry(relief.seen, out.seen), carry(relief.position, out.position), carry(relief.normal, out.normal), carry(relief.umbra, out.umbra);
+  const auto carry = [&](const cv::Mat& from, cv::Mat& to) {
+    cv::remap(from, to, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT);
+  };
+  carry(relief.seen, out.seen), carry(relief.position, out.position),
+      carry(relief.normal, out.normal), carry(relief.umbra, out.umbra);
   out.index();
   return out;
 }
 
 PlaneTerms inPlaneTerms(float sun, float umbra, float planes_umbra) {
-  // planes_umbra sky + (1 - planes_umbra) sun' = umbra + (1 - umbra) sun, one of the two levels being that of the planes
+  // planes_umbra sky + (1 - planes_umbra) sun' = umbra + (1 - umbra) sun, one of the two levels
+  // being that of the planes
   if (umbra <= planes_umbra) return {sun, sun + (1.0f - sun) * umbra / planes_umbra};
   return {(umbra - planes_umbra + (1.0f - umbra) * sun) / (1.0f - planes_umbra), 1.0f};
 }

@@ -8,7 +8,10 @@
 namespace calipso::render {
 
 Renderer::Renderer(std::shared_ptr<const Prepared> prepared, const RenderParams& params)
-    : prepared_(std::move(prepared)), params_(params), shadows_(std::make_unique<ShadowCache>()), rest_(std::make_unique<RestPicture>()) {}
+    : prepared_(std::move(prepared)),
+      params_(params),
+      shadows_(std::make_unique<ShadowCache>()),
+      rest_(std::make_unique<RestPicture>()) {}
 
 Renderer::~Renderer() = default;
 
@@ -19,14 +22,17 @@ Surface surfaceOf(const ObjectInFrame& o) {
   ObjectModel model{o.name, -1, {}, Eigen::Isometry3d::Identity()};
   model.mesh.vertices.resize(static_cast<Eigen::Index>(o.vertices.size()), 3);
   model.mesh.triangles.resize(static_cast<Eigen::Index>(o.triangles.size()), 3);
-  for (std::size_t i = 0; i < o.vertices.size(); ++i) model.mesh.vertices.row(i) = o.vertices[i].cast<double>().transpose();
-  for (std::size_t t = 0; t < o.triangles.size(); ++t) model.mesh.triangles.row(t) = o.triangles[t].transpose();
+  for (std::size_t i = 0; i < o.vertices.size(); ++i)
+    model.mesh.vertices.row(i) = o.vertices[i].cast<double>().transpose();
+  for (std::size_t t = 0; t < o.triangles.size(); ++t)
+    model.mesh.triangles.row(t) = o.triangles[t].transpose();
   return makeSurface(model);
 }
 
 Appearance plainAppearance(const Surface& surface, const Camera& camera) {
   Appearance plain;
-  plain.texture = SurfaceTexture(surface.key_vertices, surface.triangles, 1.0f, surface.triangles.size());
+  plain.texture =
+      SurfaceTexture(surface.key_vertices, surface.triangles, 1.0f, surface.triangles.size());
   plain.texture.texels.assign(plain.texture.size(), cv::Vec4f(0.5f, 0.5f, 0.5f, 0.0f));
   plain.key_camera = camera;
   plain.mean_light = cv::Vec3f(1.0f, 1.0f, 1.0f);
@@ -40,20 +46,25 @@ Appearance plainAppearance(const Surface& surface, const Camera& camera) {
 void Renderer::addNewcomers(const FrameInput& frame) {
   const auto find = [this](const std::string& name) {
     const std::vector<Surface>& all = prepared_->surfaces;
-    return std::find_if(all.begin(), all.end(), [&](const Surface& s) { return s.name == name; }) - all.begin();
+    return std::find_if(all.begin(), all.end(), [&](const Surface& s) { return s.name == name; }) -
+           all.begin();
   };
   for (const ObjectInFrame& o : frame.objects) {
     const std::size_t count = prepared_->surfaces.size();
     const bool copied = !o.source.empty();
-    if ((!copied && o.triangles.empty()) || static_cast<std::size_t>(find(o.name)) < count) continue;
+    if ((!copied && o.triangles.empty()) || static_cast<std::size_t>(find(o.name)) < count)
+      continue;
     const std::size_t from = static_cast<std::size_t>(find(o.source));
-    if (copied && from == count) throw std::invalid_argument("'" + o.name + "' is a copy of '" + o.source + "', which has no model");
+    if (copied && from == count)
+      throw std::invalid_argument("'" + o.name + "' is a copy of '" + o.source +
+                                  "', which has no model");
     auto more = std::make_shared<Prepared>(*prepared_);
     Surface surface = copied ? more->surfaces[from] : surfaceOf(o);
     surface.name = o.name;
     surface.index = -1;
     surface.in_video = false;
-    more->appearances.push_back(copied ? more->appearances[from] : plainAppearance(surface, more->camera));
+    more->appearances.push_back(copied ? more->appearances[from]
+                                       : plainAppearance(surface, more->camera));
     more->surfaces.push_back(std::move(surface));
     more->moves.push_back(true);
     more->fronts.emplace_back();
@@ -68,8 +79,9 @@ FrameOutput Renderer::composite(const FrameInput& frame) {
   if (!touched) return {frame.bgr.clone(), cv::Mat::zeros(frame.bgr.size(), CV_8U)};
   const cv::Size expected(prepared_->camera.width, prepared_->camera.height);
   if (frame.bgr.size() != expected) {
-    throw std::invalid_argument("frame is " + std::to_string(frame.bgr.cols) + " x " + std::to_string(frame.bgr.rows) +
-                                ", but the clip was " + std::to_string(expected.width) + " x " +
+    throw std::invalid_argument("frame is " + std::to_string(frame.bgr.cols) + " x " +
+                                std::to_string(frame.bgr.rows) + ", but the clip was " +
+                                std::to_string(expected.width) + " x " +
                                 std::to_string(expected.height) + "; play both at one size");
   }
   addNewcomers(frame);

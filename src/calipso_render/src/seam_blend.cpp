@@ -5,9 +5,11 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kScreen = 0.003f;  // inverse square of the distance, px, over which a seam is spread
-constexpr float kEdge = 25.0f;     // code values; what misses by much more is an edge of things, not a seam to be spread
-constexpr float kRelax = 1.8f;     // of Gauss-Seidel
+constexpr float kScreen =
+    0.003f;  // inverse square of the distance, px, over which a seam is spread
+constexpr float kEdge =
+    25.0f;  // code values; what misses by much more is an edge of things, not a seam to be spread
+constexpr float kRelax = 1.8f;  // of Gauss-Seidel
 constexpr int kIterations = 30;
 const cv::Point kAround[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 
@@ -49,11 +51,14 @@ class Seams {
   }
 
  private:
-  bool inside(const cv::Point& p) const { return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows; }
+  bool inside(const cv::Point& p) const {
+    return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
+  }
   bool isSource(const cv::Point& p) const { return inside(p) && source_.at<std::uint8_t>(p) != 0; }
   const cv::Vec3f& colour(const cv::Point& p) const { return image_.at<cv::Vec3f>(p); }
 
-  // The difference from p to its neighbour q in the places that they are copies of, as far as it can be seen there.
+  // The difference from p to its neighbour q in the places that they are copies of, as far as it
+  // can be seen there.
   cv::Vec3f wanted(const cv::Point& p, const cv::Point& q) const {
     cv::Vec3f sum;
     int seen = 0;
@@ -76,7 +81,8 @@ void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origi
   const std::vector<Node> nodes = Seams(hole, source, origin, image).nodes();
 #pragma omp parallel for schedule(static)
   for (int c = 0; c < 3; ++c) {
-    std::vector<float> change(nodes.size() + 1, 0.0f);  // the last one stands for known pixels: always 0
+    std::vector<float> change(nodes.size() + 1,
+                              0.0f);  // the last one stands for known pixels: always 0
     for (int k = 0; k < kIterations; ++k) {
       for (std::size_t i = 0; i < nodes.size(); ++i) {
         const Node& n = nodes[i];

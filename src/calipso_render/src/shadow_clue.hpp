@@ -10,23 +10,25 @@
 
 namespace calipso::render {
 
-// What shadows on the support planes say about the sun: log-darkness of the planes' pixels against the part
-// of the sun that the objects hide from them.
+// What shadows on the support planes say about the sun: log-darkness of the planes' pixels against
+// the part of the sun that the objects hide from them.
 //   y = b (1 - V(l)) + e_g,   y: -log of brightness, b >= 0: depth of the shadow,
-//   V: visible part of a sun in direction l, e_g: brightness of the pixel's group (0 where the plate is known)
+//   V: visible part of a sun in direction l, e_g: brightness of the pixel's group (0 where the
+//   plate is known)
 class ShadowClue {
  public:
   struct Sample {
     Eigen::Vector3f position, normal;  // world
     float darkness;                    // y
-    int group;                         // pixels of one material; all of them 0 where the plate is known
+    int group;  // pixels of one material; all of them 0 where the plate is known
   };
 
-  // @param plate what was seen of the place, from the same camera; empty: nothing is known, and the plane's own
-  // pixels are compared with each other, grouped by colour
+  // @param plate what was seen of the place, from the same camera; empty: nothing is known, and the
+  // plane's own pixels are compared with each other, grouped by colour
   ShadowClue(const View& view, const std::vector<SupportPlane>& planes, const Background& plate);
 
-  // How badly a sun in direction l explains the pixels, at its best b: minus a log-likelihood, 0 without any shadow.
+  // How badly a sun in direction l explains the pixels, at its best b: minus a log-likelihood, 0
+  // without any shadow.
   double misfit(const RayScene& objects, const Eigen::Vector3f& l) const;
 
   // Directions in which darkened pixels would lie in an object's shadow.

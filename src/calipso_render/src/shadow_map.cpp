@@ -60,7 +60,8 @@ ShadowMap::ShadowMap(const std::vector<Occluder>& occluders, const Eigen::Vector
 #pragma omp parallel for schedule(static)
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
       const Eigen::Vector3f& p = (*o.vertices)[i];
-      mesh.points[i] = {(p.dot(axis_s_) - origin_.x()) * per_texel_, (p.dot(axis_t_) - origin_.y()) * per_texel_, p.dot(axis_h_) - origin_.z()};
+      mesh.points[i] = {(p.dot(axis_s_) - origin_.x()) * per_texel_,
+                        (p.dot(axis_t_) - origin_.y()) * per_texel_, p.dot(axis_h_) - origin_.z()};
     }
     map_->draw(mesh, 0);
   }
@@ -77,27 +78,38 @@ void ShadowMap::buildLevels() {
     const int columns = columns_ - size + 1, step = size / 2;
 #pragma omp parallel for schedule(static) if (columns_ * rows_ > kFewCells)
     for (int j = 0; j <= rows_ - size; ++j) {
-      const std::size_t at = static_cast<std::size_t>(j) * columns_, below = at + static_cast<std::size_t>(step) * columns_;
-      const float *low = &half.low[at], *low_below = &half.low[below], *high = &half.high[at], *high_below = &half.high[below];
-      for (int i = 0; i < columns; ++i) level.low[at + i] = std::min(std::min(low[i], low[i + step]), std::min(low_below[i], low_below[i + step]));
-      for (int i = 0; i < columns; ++i) level.high[at + i] = std::max(std::max(high[i], high[i + step]), std::max(high_below[i], high_below[i + step]));
+      const std::size_t at = static_cast<std::size_t>(j) * columns_,
+                        below = at + static_cast<std::size_t>(step) * columns_;
+      const float *low = &half.low[at], *low_below = &half.low[below], *high = &half.high[at],
+                  *high_below = &half.high[below];
+      for (int i = 0; i < columns; ++i)
+        level.low[at + i] =
+            std::min(std::min(low[i], low[i + step]), std::min(low_below[i], low_below[i + step]));
+      for (int i = 0; i < columns; ++i)
+        level.high[at + i] = std::max(std::max(high[i], high[i + step]),
+                                      std::max(high_below[i], high_below[i + step]));
     }
     levels_.push_back(std::move(level));
   }
 }
 
 ShadowMap::Level ShadowMap::coarsened() const {
-  Level cells{std::vector<float>(static_cast<std::size_t>(columns_) * rows_), std::vector<float>(static_cast<std::size_t>(columns_) * rows_)};
+  Level cells{std::vector<float>(static_cast<std::size_t>(columns_) * rows_),
+              std::vector<float>(static_cast<std::size_t>(columns_) * rows_)};
 #pragma omp parallel for schedule(static)
   for (int b = 0; b < rows_; ++b) {
-    std::vector<float> low(columns_ * kCell, std::numeric_limits<float>::max()), high(columns_ * kCell, VisibilityBuffer::kFar);
+    std::vector<float> low(columns_ * kCell, std::numeric_limits<float>::max()),
+        high(columns_ * kCell, VisibilityBuffer::kFar);
     for (int j = b * kCell; j < std::min(height_, (b + 1) * kCell); ++j) {
       const float* row = map_->nearness(j);
-      for (int i = 0; i < width_; ++i) low[i] = std::min(low[i], row[i]), high[i] = std::max(high[i], row[i]);
+      for (int i = 0; i < width_; ++i)
+        low[i] = std::min(low[i], row[i]), high[i] = std::max(high[i], row[i]);
     }
     for (int i = 0; i < columns_; ++i) {
-      cells.low[static_cast<std::size_t>(b) * columns_ + i] = *std::min_element(&low[i * kCell], &low[i * kCell] + kCell);
-      cells.high[static_cast<std::size_t>(b) * columns_ + i] = *std::max_element(&high[i * kCell], &high[i * kCell] + kCell);
+      cells.low[static_cast<std::size_t>(b) * columns_ + i] =
+          *std::min_element(&low[i * kCell], &low[i * kCell] + kCell);
+      cells.high[static_cast<std::size_t>(b) * columns_ + i] =
+          *std::max_element(&high[i * kCell], &high[i * kCell] + kCell);
     }
   }
   return cells;
@@ -106,22 +118,33 @@ ShadowMap::Level ShadowMap::coarsened() const {
 // Bounds of the heights within `reach` texels, or of some more; beyond the map there is nothing.
 ShadowMap::Extremes ShadowMap::around(float s, float t, float reach) const {
   const float left = s - reach, top = t - reach, right = s + reach, bottom = t + reach;
-  if (!(right >= 0.0f && bottom >= 0.0f && left < width_ && top < height_)) return {VisibilityBuffer::kFar, VisibilityBuffer::kFar};
-  // Four windows of at least half the width cover the square; at the map's border they reach beyond it.
-  const int cells = static_cast<int>(2.0f * reach) / kCell + 2, k = 31 - __builtin_clz(cells), size = 1 << k;
+  if (!(right >= 0.0f && bottom >= 0.0f && left < width_ && top < height_))
+    return {VisibilityBuffer::kFar, VisibilityBuffer::kFar};
+  // Four windows of at least half the width cover the square; at the map's border they reach beyond
+  // it.
+  const int cells = static_cast<int>(2.0f * reach) / kCell + 2, k = 31 - __builtin_clz(cells),
+            size = 1 << k;
   if (k >= static_cast<int>(levels_.size())) return {VisibilityBuffer::kFar, highest_};
   const Level& level = levels_[k];
-  const auto windowAt = [size](float x, int count) { return std::clamp(static_cast<int>(x) / kCell, 0, count - size); };
-  const int i0 = windowAt(left, columns_), i1 = windowAt(right - static_cast<float>((size - 1) * kCell), columns_);
+  const auto windowAt = [size](float x, int count) {
+    return std::clamp(static_cast<int>(x) / kCell, 0, count - size);
+  };
+  const int i0 = windowAt(left, columns_),
+            i1 = windowAt(right - static_cast<float>((size - 1) * kCell), columns_);
   const std::size_t above = static_cast<std::size_t>(windowAt(top, rows_)) * columns_;
-  const std::size_t below = static_cast<std::size_t>(windowAt(bottom - static_cast<float>((size - 1) * kCell), rows_)) * columns_;
+  const std::size_t below =
+      static_cast<std::size_t>(windowAt(bottom - static_cast<float>((size - 1) * kCell), rows_)) *
+      columns_;
   const bool inside = left >= 0.0f && top >= 0.0f && right < width_ && bottom < height_;
-  return {inside ? std::min(std::min(level.low[above + i0], level.low[above + i1]), std::min(level.low[below + i0], level.low[below + i1])) : VisibilityBuffer::kFar,
-          std::max(std::max(level.high[above + i0], level.high[above + i1]), std::max(level.high[below + i0], level.high[below + i1]))};
+  return {inside ? std::min(std::min(level.low[above + i0], level.low[above + i1]),
+                            std::min(level.low[below + i0], level.low[below + i1]))
+                 : VisibilityBuffer::kFar,
+          std::max(std::max(level.high[above + i0], level.high[above + i1]),
+                   std::max(level.high[below + i0], level.high[below + i1]))};
 }
 
-// Bounds of the heights that can matter to a receiver at (s, t), of heights from `lowest` on: those in the cone that the disc spans up
-// to the highest around, not of the whole map.
+// Bounds of the heights that can matter to a receiver at (s, t), of heights from `lowest` on: those
+// in the cone that the disc spans up to the highest around, not of the whole map.
 ShadowMap::Extremes ShadowMap::coneAround(float s, float t, float lowest, float margin) const {
   const float least = 1.5f + margin, per_height = angular_radius_ * per_texel_;
   const float reach = std::max(least, per_height * (highest_ - lowest) + margin);
@@ -134,7 +157,8 @@ ShadowMap::Extremes ShadowMap::coneAround(float s, float t, float lowest, float 
 ShadowMap::Place ShadowMap::placeOf(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
   const float slope = 1.0f - std::clamp(n.dot(axis_h_), 0.0f, 1.0f);
   const Eigen::Vector3f q = p + n * texel_ * (1.0f + 2.0f * slope);
-  return {(q.dot(axis_s_) - origin_.x()) * per_texel_, (q.dot(axis_t_) - origin_.y()) * per_texel_, q.dot(axis_h_) - origin_.z() + 1.5f * texel_};
+  return {(q.dot(axis_s_) - origin_.x()) * per_texel_, (q.dot(axis_t_) - origin_.y()) * per_texel_,
+          q.dot(axis_h_) - origin_.z() + 1.5f * texel_};
 }
 
 float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
@@ -146,10 +170,13 @@ float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   if (near.lowest > h) return 0.0f;
   // Blockers inside the cone that the disc spans up to the highest occluder.
   const float search = std::max(1.5f, angular_radius_ * (highest_ - h) * per_texel_);
-  return kernels().visibleThrough({map_->nearness(0), width_, height_, map_->stride(), angular_radius_ * per_texel_}, *taps_, s, t, h, search);
+  return kernels().visibleThrough(
+      {map_->nearness(0), width_, height_, map_->stride(), angular_radius_ * per_texel_}, *taps_, s,
+      t, h, search);
 }
 
-std::optional<float> ShadowMap::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const {
+std::optional<float> ShadowMap::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
+                                        float radius) const {
   if (!map_) return 1.0f;
   const auto [s, t, h] = placeOf(p, n);
   const float lowest = h - radius, highest = h + radius;  // of the disc

@@ -8,9 +8,11 @@ namespace calipso::render {
 
 SquareMask::SquareMask(const cv::Mat& pixels, const cv::Rect& part, int margin)
     : first_(part.x / kSide, part.y / kSide) {
-  const int across = (part.br().x - 1) / kSide - first_.x + 1, down = (part.br().y - 1) / kSide - first_.y + 1;
+  const int across = (part.br().x - 1) / kSide - first_.x + 1,
+            down = (part.br().y - 1) / kSide - first_.y + 1;
   cv::Mat full(down, across, CV_8U);
-  const int before = part.x - first_.x * kSide;  // columns of the first square that lie before the part
+  const int before =
+      part.x - first_.x * kSide;  // columns of the first square that lie before the part
 #pragma omp parallel for schedule(static)
   for (int j = 0; j < down; ++j) {
     const int first = std::max(0, (first_.y + j) * kSide - part.y),
@@ -18,10 +20,12 @@ SquareMask::SquareMask(const cv::Mat& pixels, const cv::Rect& part, int margin)
     std::vector<std::uint8_t> columns(static_cast<std::size_t>(across) * kSide, 255);
     for (int v = first; v < last; ++v) {
       const std::uint8_t* row = pixels.ptr<std::uint8_t>(v);
-      for (int u = 0; u < part.width; ++u) columns[before + u] = std::min(columns[before + u], row[u]);
+      for (int u = 0; u < part.width; ++u)
+        columns[before + u] = std::min(columns[before + u], row[u]);
     }
     for (int i = 0; i < across; ++i)
-      full.at<std::uint8_t>(j, i) = *std::min_element(&columns[i * kSide], &columns[i * kSide] + kSide);
+      full.at<std::uint8_t>(j, i) =
+          *std::min_element(&columns[i * kSide], &columns[i * kSide] + kSide);
   }
   const int reach = (margin + kSide - 1) / kSide;
   cv::erode(full, set_, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));

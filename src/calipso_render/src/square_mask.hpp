@@ -27,7 +27,8 @@ class SquareMask {
 
  private:
   cv::Rect squaresOf(const cv::Rect& rect) const {
-    const cv::Point low(rect.x / kSide, rect.y / kSide), high((rect.br().x - 1) / kSide, (rect.br().y - 1) / kSide);
+    const cv::Point low(rect.x / kSide, rect.y / kSide),
+        high((rect.br().x - 1) / kSide, (rect.br().y - 1) / kSide);
     return (cv::Rect(low, high + cv::Point(1, 1)) - first_) & cv::Rect({0, 0}, set_.size());
   }
 

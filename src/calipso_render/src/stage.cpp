@@ -12,7 +12,8 @@ namespace calipso::render {
 Points vertexNormals(const Points& vertices, const Triangles& triangles) {
   Points normals(vertices.size(), Eigen::Vector3f::Zero());
   for (const Eigen::Vector3i& t : triangles) {
-    const Eigen::Vector3f n = (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
+    const Eigen::Vector3f n =
+        (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
     for (int i = 0; i < 3; ++i) normals[t[i]] += n;
   }
   for (Eigen::Vector3f& n : normals) {
@@ -24,26 +25,31 @@ Points vertexNormals(const Points& vertices, const Triangles& triangles) {
 
 Points transformed(const Points& points, const Eigen::Isometry3d& transform) {
   Points out(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) out[i] = (transform * points[i].cast<double>()).cast<float>();
+  for (std::size_t i = 0; i < points.size(); ++i)
+    out[i] = (transform * points[i].cast<double>()).cast<float>();
   return out;
 }
 
 Surface makeSurface(const ObjectModel& model) {
   if (model.mesh.triangleCount() == 0) {
-    throw std::invalid_argument("object '" + model.name + "': its mesh has no triangles, nothing can be drawn");
+    throw std::invalid_argument("object '" + model.name +
+                                "': its mesh has no triangles, nothing can be drawn");
   }
   if (!model.mesh.vertices.allFinite()) {
-    throw std::invalid_argument("object '" + model.name + "': its mesh has vertices that are not finite");
+    throw std::invalid_argument("object '" + model.name +
+                                "': its mesh has vertices that are not finite");
   }
   Surface surface;
   surface.name = model.name;
   surface.index = model.index;
-  for (int i = 0; i < model.mesh.vertexCount(); ++i) surface.object_vertices.push_back(model.mesh.vertex(i).cast<float>());
+  for (int i = 0; i < model.mesh.vertexCount(); ++i)
+    surface.object_vertices.push_back(model.mesh.vertex(i).cast<float>());
   for (int t = 0; t < model.mesh.triangleCount(); ++t) {
     const Eigen::Vector3i triangle = model.mesh.triangles.row(t);
     if (triangle.minCoeff() < 0 || triangle.maxCoeff() >= model.mesh.vertexCount()) {
       throw std::invalid_argument("object '" + model.name + "': triangle " + std::to_string(t) +
-                                  " names a vertex outside 0.." + std::to_string(model.mesh.vertexCount() - 1));
+                                  " names a vertex outside 0.." +
+                                  std::to_string(model.mesh.vertexCount() - 1));
     }
     surface.triangles.push_back(triangle);
   }
@@ -62,14 +68,17 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
   actor.normals = vertexNormals(actor.vertices, surface.triangles);
   actor.screen = projectMesh(actor.vertices, surface.triangles, camera);
   const auto behind = [](const Eigen::Vector3f& p) { return std::isnan(p.z()); };
-  const bool around_us = std::any_of(actor.screen.points.begin(), actor.screen.points.end(), behind);
+  const bool around_us =
+      std::any_of(actor.screen.points.begin(), actor.screen.points.end(), behind);
   actor.screen.hidden_side = around_us ? 0 : surface.winding;
   return actor;
 }
 
 namespace {
 
-Eigen::Vector3f mix(const Points& x, const Eigen::Vector3i& t, const Eigen::Vector3f& w) { return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]]; }
+Eigen::Vector3f mix(const Points& x, const Eigen::Vector3i& t, const Eigen::Vector3f& w) {
+  return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]];
+}
 
 Eigen::Vector3f unit(const Eigen::Vector3f& x) {
   const float squared = x.squaredNorm();
@@ -77,15 +86,18 @@ Eigen::Vector3f unit(const Eigen::Vector3f& x) {
 }
 
 // Sheets are seen from both sides: has the one towards the viewer the other normal?
-bool seenFromBehind(const Actor& actor, const Eigen::Vector3i& t, const LitPoint& p, const Eigen::Vector3f& eye) {
+bool seenFromBehind(const Actor& actor, const Eigen::Vector3i& t, const LitPoint& p,
+                    const Eigen::Vector3f& eye) {
   if (p.normal.dot(eye - p.position) >= 0.0f) return false;
-  const Eigen::Vector3f &a = actor.vertices[t[0]], &b = actor.vertices[t[1]], &c = actor.vertices[t[2]];
+  const Eigen::Vector3f &a = actor.vertices[t[0]], &b = actor.vertices[t[1]],
+                        &c = actor.vertices[t[2]];
   return (b - a).cross(c - a).dot(eye - p.position) < 0.0f;
 }
 
 LitPoint litPoint(const Actor& actor, const Eigen::Vector3i& t, const Eigen::Vector3f& w) {
   const std::vector<float>& sky = actor.surface->sky;
-  return {mix(actor.vertices, t, w), unit(mix(actor.normals, t, w)), w[0] * sky[t[0]] + w[1] * sky[t[1]] + w[2] * sky[t[2]]};
+  return {mix(actor.vertices, t, w), unit(mix(actor.normals, t, w)),
+          w[0] * sky[t[0]] + w[1] * sky[t[1]] + w[2] * sky[t[2]]};
 }
 
 }  // namespace
@@ -97,18 +109,27 @@ LitPoint litPoint(const Actor& actor, int triangle, float u, float v, const Eige
   return p;
 }
 
-SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye) {
+SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v,
+                          const Eigen::Vector3f& eye) {
   return surfacePoint(actor, triangle, barycentric(actor.screen, triangle, u, v), eye);
 }
 
-SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3f& w, const Eigen::Vector3f& eye) {
+SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3f& w,
+                          const Eigen::Vector3f& eye) {
   const Eigen::Vector3i& t = actor.surface->triangles[triangle];
   const LitPoint p = litPoint(actor, t, w);
   const float side = seenFromBehind(actor, t, p, eye) ? -1.0f : 1.0f;
-  return {p.position, side * p.normal, mix(actor.surface->key_vertices, t, w), side * unit(mix(actor.surface->key_normals, t, w)), p.sky, triangle, w};
+  return {p.position,
+          side * p.normal,
+          mix(actor.surface->key_vertices, t, w),
+          side * unit(mix(actor.surface->key_normals, t, w)),
+          p.sky,
+          triangle,
+          w};
 }
 
-std::optional<Receiver> receiverAt(const std::vector<SupportPlane>& planes, const Camera& camera, float u, float v) {
+std::optional<Receiver> receiverAt(const std::vector<SupportPlane>& planes, const Camera& camera,
+                                   float u, float v) {
   const Eigen::Vector3d eye = camera.world_from_camera.translation();
   const Eigen::Vector3d ray = camera.world_from_camera.linear() * camera.ray(u, v);
   std::optional<Receiver> nearest;

@@ -18,13 +18,19 @@ namespace {
 
 constexpr float kStretch = 1.35f;  // of an edge laid flat, at most; and 1 / that at least
 constexpr float kCell = 0.05f;     // of the radius: squares by which laid triangles are found
-constexpr float kUpright = 0.1f;   // part of `down` that must lie in the seed's plane to be a direction there
+constexpr float kUpright =
+    0.1f;  // part of `down` that must lie in the seed's plane to be a direction there
 
-float cross(const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.x() * b.y() - a.y() * b.x(); }
+float cross(const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
 
-Eigen::Vector2f middleOf(const std::array<Eigen::Vector2f, 3>& c) { return (c[0] + c[1] + c[2]) / 3.0f; }
+Eigen::Vector2f middleOf(const std::array<Eigen::Vector2f, 3>& c) {
+  return (c[0] + c[1] + c[2]) / 3.0f;
+}
 
-// The third corner of a triangle whose first two lie at p and q, on the left of the way from p to q.
+// The third corner of a triangle whose first two lie at p and q, on the left of the way from p to
+// q.
 // @param a, b, c the corners in space
 Eigen::Vector2f hinged(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c,
                        const Eigen::Vector2f& p, const Eigen::Vector2f& q) {
@@ -46,14 +52,16 @@ class FlatPatches {
     Eigen::AlignedBox2f box;
     for (const Eigen::Vector2f& c : corners) box.extend(c);
     for (int y = row(box.min().y()); y <= row(box.max().y()); ++y) {
-      for (int x = row(box.min().x()); x <= row(box.max().x()); ++x) cells_[key(x, y)].push_back(id);
+      for (int x = row(box.min().x()); x <= row(box.max().x()); ++x)
+        cells_[key(x, y)].push_back(id);
     }
   }
 
   bool covers(const Eigen::Vector2f& point) const {
     const auto cell = cells_.find(key(row(point.x()), row(point.y())));
     if (cell == cells_.end()) return false;
-    return std::any_of(cell->second.begin(), cell->second.end(), [&](int id) { return contains(all_[id], point); });
+    return std::any_of(cell->second.begin(), cell->second.end(),
+                       [&](int id) { return contains(all_[id], point); });
   }
 
  private:
@@ -76,11 +84,17 @@ class ChartBuilder {
  public:
   ChartBuilder(const Points& vertices, const Triangles& triangles, const std::vector<int>& place,
                const std::vector<std::array<int, 3>>& neighbours, float radius)
-      : vertices_(vertices), triangles_(triangles), place_(place), neighbours_(neighbours), radius_(radius),
-        done_(triangles.size(), false), covered_(kCell * radius) {}
+      : vertices_(vertices),
+        triangles_(triangles),
+        place_(place),
+        neighbours_(neighbours),
+        radius_(radius),
+        done_(triangles.size(), false),
+        covered_(kCell * radius) {}
 
   std::vector<FlatTriangle> build(int seed, const Eigen::Vector3f& down) {
-    const Eigen::Vector3f across = (corner(seed, 1) - corner(seed, 0)).cross(corner(seed, 2) - corner(seed, 0));
+    const Eigen::Vector3f across =
+        (corner(seed, 1) - corner(seed, 0)).cross(corner(seed, 2) - corner(seed, 0));
     if (!(across.squaredNorm() > 0.0f)) return {};
     lay(seed, seedCorners(seed, across.normalized(), down));
     while (!front_.empty()) {
@@ -94,21 +108,27 @@ class ChartBuilder {
   }
 
  private:
-  // A triangle that can be laid, and its side by which it is reached; the nearest to the origin comes first.
+  // A triangle that can be laid, and its side by which it is reached; the nearest to the origin
+  // comes first.
   struct Reached {
     float distance;
     int triangle, side;
-    bool operator>(const Reached& o) const { return std::pair(distance, triangle) > std::pair(o.distance, o.triangle); }
+    bool operator>(const Reached& o) const {
+      return std::pair(distance, triangle) > std::pair(o.distance, o.triangle);
+    }
   };
 
   const Eigen::Vector3f& corner(int t, int k) const { return vertices_[triangles_[t][k]]; }
 
-  std::array<Eigen::Vector2f, 3> seedCorners(int seed, const Eigen::Vector3f& normal, const Eigen::Vector3f& down) const {
+  std::array<Eigen::Vector2f, 3> seedCorners(int seed, const Eigen::Vector3f& normal,
+                                             const Eigen::Vector3f& down) const {
     Eigen::Vector3f y = down - normal * normal.dot(down);
     y = y.norm() < kUpright * down.norm() ? normal.unitOrthogonal() : y.normalized();
-    const Eigen::Vector3f x = y.cross(normal), middle = (corner(seed, 0) + corner(seed, 1) + corner(seed, 2)) / 3.0f;
+    const Eigen::Vector3f x = y.cross(normal),
+                          middle = (corner(seed, 0) + corner(seed, 1) + corner(seed, 2)) / 3.0f;
     std::array<Eigen::Vector2f, 3> corners;
-    for (int k = 0; k < 3; ++k) corners[k] = {x.dot(corner(seed, k) - middle), y.dot(corner(seed, k) - middle)};
+    for (int k = 0; k < 3; ++k)
+      corners[k] = {x.dot(corner(seed, k) - middle), y.dot(corner(seed, k) - middle)};
     return corners;
   }
 
@@ -119,7 +139,8 @@ class ChartBuilder {
     for (int k = 0; k < 3; ++k) laid_.try_emplace(place_[triangles_[t][k]], corners[k]);
     for (const int n : neighbours_[t]) {
       if (n < 0 || done_[n]) continue;
-      const auto side = std::find(neighbours_[n].begin(), neighbours_[n].end(), t) - neighbours_[n].begin();
+      const auto side =
+          std::find(neighbours_[n].begin(), neighbours_[n].end(), t) - neighbours_[n].begin();
       const float distance = middleOf(placed(n, static_cast<int>(side))).norm();
       if (distance <= radius_) front_.push({distance, n, static_cast<int>(side)});
     }
@@ -132,13 +153,16 @@ class ChartBuilder {
     std::array<Eigen::Vector2f, 3> corners;
     corners[a] = laid_.at(place_[v[a]]), corners[b] = laid_.at(place_[v[b]]);
     const auto third = laid_.find(place_[v[c]]);
-    corners[c] = third != laid_.end() ? third->second : hinged(corner(t, a), corner(t, b), corner(t, c), corners[a], corners[b]);
+    corners[c] = third != laid_.end()
+                     ? third->second
+                     : hinged(corner(t, a), corner(t, b), corner(t, c), corners[a], corners[b]);
     return corners;
   }
 
   bool fits(int t, const std::array<Eigen::Vector2f, 3>& c) const {
     for (int k = 0; k < 3; ++k) {
-      const float flat = (c[(k + 1) % 3] - c[k]).norm(), real = (corner(t, (k + 1) % 3) - corner(t, k)).norm();
+      const float flat = (c[(k + 1) % 3] - c[k]).norm(),
+                  real = (corner(t, (k + 1) % 3) - corner(t, k)).norm();
       if (flat > kStretch * real || real > kStretch * flat) return false;
     }
     return cross(c[1] - c[0], c[2] - c[0]) > 0.0f && !covered_.covers(middleOf(c));
@@ -159,8 +183,12 @@ class ChartBuilder {
 }  // namespace
 
 SurfaceUnfolder::SurfaceUnfolder(const Points& vertices, const Triangles& triangles)
-    : vertices_(vertices), triangles_(triangles), place_(weld(vertices)), neighbours_(triangles.size(), {-1, -1, -1}) {
-  std::map<std::pair<int, int>, std::vector<std::pair<int, int>>> sides;  // by edge: triangle and side
+    : vertices_(vertices),
+      triangles_(triangles),
+      place_(weld(vertices)),
+      neighbours_(triangles.size(), {-1, -1, -1}) {
+  std::map<std::pair<int, int>, std::vector<std::pair<int, int>>>
+      sides;  // by edge: triangle and side
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (int k = 0; k < 3; ++k) {
       const int a = place_[triangles[t][k]], b = place_[triangles[t][(k + 1) % 3]];
@@ -198,7 +226,8 @@ std::vector<float> SurfaceUnfolder::distances(const std::vector<bool>& goal) con
   return way;
 }
 
-std::vector<FlatTriangle> SurfaceUnfolder::around(int seed, const Eigen::Vector3f& down, float radius) const {
+std::vector<FlatTriangle> SurfaceUnfolder::around(int seed, const Eigen::Vector3f& down,
+                                                  float radius) const {
   ChartBuilder builder(vertices_, triangles_, place_, neighbours_, radius);
   return builder.build(seed, down);
 }

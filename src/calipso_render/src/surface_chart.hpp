@@ -13,9 +13,9 @@ struct FlatTriangle {
   std::array<Eigen::Vector2f, 3> corners;
 };
 
-// Lays parts of a surface flat: from a triangle outwards, each is hinged into the plane at the edge by which it is reached, as
-// long as that stretches none by much and none comes to lie on another (a discrete exponential map). A developable surface
-// keeps its lengths.
+// Lays parts of a surface flat: from a triangle outwards, each is hinged into the plane at the edge
+// by which it is reached, as long as that stretches none by much and none comes to lie on another
+// (a discrete exponential map). A developable surface keeps its lengths.
 class SurfaceUnfolder {
  public:
   SurfaceUnfolder(const Points& vertices, const Triangles& triangles);
@@ -30,7 +30,8 @@ class SurfaceUnfolder {
   const std::array<int, 3>& neighbours(int triangle) const { return neighbours_[triangle]; }
   Eigen::Vector3f middle(int triangle) const;
 
-  // Way along the surface to the nearest triangle with goal[triangle], from middle to middle, m; infinite where there is none.
+  // Way along the surface to the nearest triangle with goal[triangle], from middle to middle, m;
+  // infinite where there is none.
   std::vector<float> distances(const std::vector<bool>& goal) const;
 
  private:

@@ -13,9 +13,10 @@ namespace {
 
 constexpr std::size_t kMirrorProbes = 300;
 constexpr float kMirrorTolerance = 0.03f;  // of the surface's extent
-constexpr float kMirrorPart = 0.95f;    // of the vertices that must find their image
-constexpr float kAlike = 0.9f;          // principal axes of nearly the same length: any axis between may be the one
-constexpr int kAnglesBetween = 12;      // tried there, over half a turn
+constexpr float kMirrorPart = 0.95f;       // of the vertices that must find their image
+constexpr float kAlike =
+    0.9f;  // principal axes of nearly the same length: any axis between may be the one
+constexpr int kAnglesBetween = 12;  // tried there, over half a turn
 
 Eigen::AlignedBox3f boxOf(const Points& points) {
   Eigen::AlignedBox3f box;
@@ -29,23 +30,26 @@ float mirroredPart(const Points& vertices, const MirrorPlane& plane, float toler
   int hits = 0, probes = 0;
   for (std::size_t i = 0; i < vertices.size(); i += step, ++probes) {
     const Eigen::Vector3f image = plane.point(vertices[i]);
-    const bool near = std::any_of(vertices.begin(), vertices.end(), [&](const Eigen::Vector3f& p) { return (p - image).squaredNorm() < tolerance * tolerance; });
+    const bool near = std::any_of(vertices.begin(), vertices.end(), [&](const Eigen::Vector3f& p) {
+      return (p - image).squaredNorm() < tolerance * tolerance;
+    });
     hits += near;
   }
   return static_cast<float>(hits) / std::max(1, probes);
 }
 
-constexpr int kAxisTrials = 200;        // each with an axis through five normals
+constexpr int kAxisTrials = 200;              // each with an axis through five normals
 constexpr std::size_t kAxisTriangles = 2000;  // looked at
-constexpr float kCrease = 0.85f;        // cosine between the normals of vertex and triangle
+constexpr float kCrease = 0.85f;              // cosine between the normals of vertex and triangle
 constexpr int kRefinements = 4;
-constexpr float kAxisMiss = 0.015f;     // of the extent: how far a normal may pass by the axis
-constexpr float kTurned = 0.25f;        // sine between normal and axis; what faces along the axis says nothing
-constexpr float kAxisPart = 0.5f;       // of the area that says something, which must agree
-constexpr float kAxisNear = 0.5f;       // of the extent: how far the axis may run from the middle
+constexpr float kAxisMiss = 0.015f;  // of the extent: how far a normal may pass by the axis
+constexpr float kTurned =
+    0.25f;  // sine between normal and axis; what faces along the axis says nothing
+constexpr float kAxisPart = 0.5f;  // of the area that says something, which must agree
+constexpr float kAxisNear = 0.5f;  // of the extent: how far the axis may run from the middle
 
-// A normal of the surface as a line, about the surface's middle and in units of its extent. A line (a, m) of direction a and
-// moment m meets it where row . (m, a) = 0 (Pluecker coordinates).
+// A normal of the surface as a line, about the surface's middle and in units of its extent. A line
+// (a, m) of direction a and moment m meets it where row . (m, a) = 0 (Pluecker coordinates).
 struct NormalLine {
   Eigen::Vector3d normal, moment;
   double area = 0.0;
@@ -57,21 +61,28 @@ struct NormalLine {
   }
 };
 
-// Three per triangle, of the smooth surface that the mesh stands for: vertex normals count where they are no crease's.
-std::vector<NormalLine> normalLines(const Points& vertices, const Triangles& triangles, const Eigen::Vector3f& middle, double extent) {
+// Three per triangle, of the smooth surface that the mesh stands for: vertex normals count where
+// they are no crease's.
+std::vector<NormalLine> normalLines(const Points& vertices, const Triangles& triangles,
+                                    const Eigen::Vector3f& middle, double extent) {
   const Points normals = vertexNormals(vertices, triangles);
   const std::size_t step = 1 + triangles.size() / kAxisTriangles;
   std::vector<NormalLine> lines;
   for (std::size_t i = 0; i < triangles.size(); i += step) {
     const Eigen::Vector3i& t = triangles[i];
-    const Eigen::Vector3f across = (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
+    const Eigen::Vector3f across =
+        (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
     if (!(across.norm() > 0.0f)) continue;
     const Eigen::Vector3f flat = across.normalized();
-    const auto normalAt = [&](int k) -> Eigen::Vector3f { return normals[t[k]].dot(flat) > kCrease ? normals[t[k]] : flat; };
+    const auto normalAt = [&](int k) -> Eigen::Vector3f {
+      return normals[t[k]].dot(flat) > kCrease ? normals[t[k]] : flat;
+    };
     for (int k = 0; k < 3; ++k) {
       const int next = (k + 1) % 3, last = (k + 2) % 3;
-      const Eigen::Vector3d n = (4.0f * normalAt(k) + normalAt(next) + normalAt(last)).normalized().cast<double>();
-      const Eigen::Vector3f p = (4.0f * vertices[t[k]] + vertices[t[next]] + vertices[t[last]]) / 6.0f;
+      const Eigen::Vector3d n =
+          (4.0f * normalAt(k) + normalAt(next) + normalAt(last)).normalized().cast<double>();
+      const Eigen::Vector3f p =
+          (4.0f * vertices[t[k]] + vertices[t[next]] + vertices[t[last]]) / 6.0f;
       const Eigen::Vector3d x = (p - middle).cast<double>() / extent;
       lines.push_back({n, x.cross(n), across.norm()});
     }
@@ -83,7 +94,8 @@ struct AxisLine {
   Eigen::Vector3d direction, moment;
 };
 
-// The line (m, a) made a proper one; nothing when it runs far off (as the common line of parallel normals does).
+// The line (m, a) made a proper one; nothing when it runs far off (as the common line of parallel
+// normals does).
 std::optional<AxisLine> axisLine(const Eigen::Matrix<double, 6, 1>& line) {
   const Eigen::Vector3d m = line.head<3>(), a = line.tail<3>();
   if (!(a.norm() * kAxisNear > m.norm())) return std::nullopt;
@@ -96,7 +108,8 @@ std::optional<AxisLine> axisLine(const Eigen::Matrix<double, 6, 1>& line) {
 int agrees(const NormalLine& line, const AxisLine& axis) {
   const double turned = line.normal.cross(axis.direction).norm();
   if (turned < kTurned) return -1;
-  return std::abs(line.normal.dot(axis.moment) + line.moment.dot(axis.direction)) < kAxisMiss * turned;
+  return std::abs(line.normal.dot(axis.moment) + line.moment.dot(axis.direction)) <
+         kAxisMiss * turned;
 }
 
 double agreeingPart(const std::vector<NormalLine>& lines, const AxisLine& axis) {
@@ -116,7 +129,8 @@ std::optional<AxisLine> refined(const std::vector<NormalLine>& lines, const Axis
   for (const NormalLine& line : lines) {
     if (agrees(line, axis) > 0) sum += line.area * line.row() * line.row().transpose();
   }
-  return axisLine(Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(sum).eigenvectors().col(0));
+  return axisLine(
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(sum).eigenvectors().col(0));
 }
 
 }  // namespace
@@ -127,14 +141,16 @@ std::vector<MirrorPlane> mirrorPlanes(const Points& vertices, const Triangles& t
   Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
   double total = 0.0;
   for (const Eigen::Vector3i& t : triangles) {
-    const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(), c = vertices[t[2]].cast<double>();
+    const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(),
+                          c = vertices[t[2]].cast<double>();
     const double area = 0.5 * (b - a).cross(c - a).norm();
     const Eigen::Vector3d centre = (a + b + c) / 3.0;
     total += area, middle += area * centre, moments += area * centre * centre.transpose();
   }
   if (!(total > 0.0)) return {};
   middle /= total;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments / total - middle * middle.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments / total -
+                                                            middle * middle.transpose());
   std::vector<Eigen::Vector3d> normals;
   for (int k = 0; k < 3; ++k) normals.push_back(axes.eigenvectors().col(k));
   for (int k = 0; k < 2; ++k) {

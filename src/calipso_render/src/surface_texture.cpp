@@ -9,23 +9,26 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kMostSteps = 256;         // texels along an edge
-constexpr double kAnchor = 1e-4;        // pull towards the mean where nothing known is connected
+constexpr int kMostSteps = 256;   // texels along an edge
+constexpr double kAnchor = 1e-4;  // pull towards the mean where nothing known is connected
 
 std::size_t texelCount(int steps) { return static_cast<std::size_t>(steps + 1) * (steps + 2) / 2; }
 
 float longestEdge(const Points& p, const Eigen::Vector3i& t) {
-  return std::max({(p[t[1]] - p[t[0]]).norm(), (p[t[2]] - p[t[1]]).norm(), (p[t[0]] - p[t[2]]).norm()});
+  return std::max(
+      {(p[t[1]] - p[t[0]]).norm(), (p[t[2]] - p[t[1]]).norm(), (p[t[0]] - p[t[2]]).norm()});
 }
 
 }  // namespace
 
-SurfaceTexture::SurfaceTexture(const Points& vertices, const Triangles& triangles, float texel, std::size_t most) {
+SurfaceTexture::SurfaceTexture(const Points& vertices, const Triangles& triangles, float texel,
+                               std::size_t most) {
   std::size_t count = 0;
   for (;; texel *= 1.4f) {
     steps_.clear(), count = 0;
     for (const Eigen::Vector3i& t : triangles) {
-      steps_.push_back(std::clamp(static_cast<int>(std::ceil(longestEdge(vertices, t) / texel)), 1, kMostSteps));
+      steps_.push_back(
+          std::clamp(static_cast<int>(std::ceil(longestEdge(vertices, t) / texel)), 1, kMostSteps));
       count += texelCount(steps_.back());
     }
     if (count <= std::max(most, 3 * triangles.size())) break;
@@ -47,18 +50,22 @@ Eigen::Vector3f SurfaceTexture::weightsOf(int triangle, std::size_t texel) const
 cv::Vec4f SurfaceTexture::at(int triangle, const Eigen::Vector3f& weights) const {
   const int n = steps_[triangle];
   const cv::Vec4f* grid = &texels[first_[triangle]];
-  const float x = std::clamp(weights[0], 0.0f, 1.0f) * n, y = std::clamp(weights[1], 0.0f, 1.0f) * n;
+  const float x = std::clamp(weights[0], 0.0f, 1.0f) * n,
+              y = std::clamp(weights[1], 0.0f, 1.0f) * n;
   const int i = std::min(static_cast<int>(x), n - 1), j = std::min(static_cast<int>(y), n - 1 - i);
   float fx = x - i, fy = y - j;
   if (fx + fy <= 1.0f || i + j + 2 > n) {
     const float sum = std::max(1.0f, fx + fy);
     fx /= sum, fy /= sum;
-    return grid[index(i, j, n)] * (1.0f - fx - fy) + grid[index(i + 1, j, n)] * fx + grid[index(i, j + 1, n)] * fy;
+    return grid[index(i, j, n)] * (1.0f - fx - fy) + grid[index(i + 1, j, n)] * fx +
+           grid[index(i, j + 1, n)] * fy;
   }
-  return grid[index(i + 1, j + 1, n)] * (fx + fy - 1.0f) + grid[index(i + 1, j, n)] * (1.0f - fy) + grid[index(i, j + 1, n)] * (1.0f - fx);
+  return grid[index(i + 1, j + 1, n)] * (fx + fy - 1.0f) + grid[index(i + 1, j, n)] * (1.0f - fy) +
+         grid[index(i, j + 1, n)] * (1.0f - fx);
 }
 
-void diffuseOverMesh(const Points& vertices, const Triangles& triangles, const std::vector<bool>& known, std::vector<cv::Vec3f>& values) {
+void diffuseOverMesh(const Points& vertices, const Triangles& triangles,
+                     const std::vector<bool>& known, std::vector<cv::Vec3f>& values) {
   const std::vector<int> welded = weld(vertices);
   const int count = static_cast<int>(vertices.size());
   std::vector<bool> fixed(count, false);
@@ -67,7 +74,9 @@ void diffuseOverMesh(const Points& vertices, const Triangles& triangles, const s
   cv::Vec3d mean;
   int all = 0;
   for (int i = 0; i < count; ++i) {
-    if (known[i]) fixed[welded[i]] = true, sums[welded[i]] += cv::Vec3d(values[i]), ++parts[welded[i]], mean += cv::Vec3d(values[i]), ++all;
+    if (known[i])
+      fixed[welded[i]] = true, sums[welded[i]] += cv::Vec3d(values[i]), ++parts[welded[i]],
+      mean += cv::Vec3d(values[i]), ++all;
   }
   mean *= 1.0 / std::max(1, all);
   int rows = 0;
@@ -84,8 +93,10 @@ void diffuseOverMesh(const Points& vertices, const Triangles& triangles, const s
   const auto link = [&](int a, int b) {
     if (row[a] < 0) return;
     entries.emplace_back(row[a], row[a], 1.0);
-    if (row[b] >= 0) entries.emplace_back(row[a], row[b], -1.0);
-    else for (int c = 0; c < 3; ++c) right(row[a], c) += sums[b][c] / parts[b];
+    if (row[b] >= 0)
+      entries.emplace_back(row[a], row[b], -1.0);
+    else
+      for (int c = 0; c < 3; ++c) right(row[a], c) += sums[b][c] / parts[b];
   };
   for (const Eigen::Vector3i& t : triangles) {
     for (int k = 0; k < 3; ++k) {
@@ -100,8 +111,10 @@ void diffuseOverMesh(const Points& vertices, const Triangles& triangles, const s
   const Eigen::MatrixXd x = solver.solve(right);
   for (int i = 0; i < count; ++i) {
     const int r = row[welded[i]];
-    if (!known[i] && r >= 0) values[i] = cv::Vec3f(x(r, 0), x(r, 1), x(r, 2));
-    else if (!known[i]) values[i] = cv::Vec3f(sums[welded[i]] * (1.0 / parts[welded[i]]));
+    if (!known[i] && r >= 0)
+      values[i] = cv::Vec3f(x(r, 0), x(r, 1), x(r, 2));
+    else if (!known[i])
+      values[i] = cv::Vec3f(sums[welded[i]] * (1.0 / parts[welded[i]]));
   }
 }
 

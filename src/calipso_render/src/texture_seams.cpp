@@ -20,7 +20,9 @@ struct Part {
   bool reaches(std::size_t vertex) const { return texels[vertex] >= kFewest; }
 };
 
-std::vector<Part> partsAtVertices(const std::vector<int>& welded, const Triangles& triangles, const std::vector<signed char>& part, const SurfaceTexture& texture) {
+std::vector<Part> partsAtVertices(const std::vector<int>& welded, const Triangles& triangles,
+                                  const std::vector<signed char>& part,
+                                  const SurfaceTexture& texture) {
   const int count = 1 + std::max<int>(0, *std::max_element(part.begin(), part.end()));
   std::vector<Part> parts(count, Part(welded.size()));
   for (int t = 0; t < texture.triangleCount(); ++t) {
@@ -30,7 +32,8 @@ std::vector<Part> partsAtVertices(const std::vector<int>& welded, const Triangle
       const cv::Vec4f& c = texture.texels[i];
       for (int k = 0; k < 3; ++k) {
         const int vertex = welded[triangles[t][k]];
-        parts[part[i]].colour[vertex] += w[k] * cv::Vec3f(c[0], c[1], c[2]), parts[part[i]].texels[vertex] += w[k];
+        parts[part[i]].colour[vertex] += w[k] * cv::Vec3f(c[0], c[1], c[2]),
+            parts[part[i]].texels[vertex] += w[k];
       }
     }
   }
@@ -42,15 +45,16 @@ std::vector<Part> partsAtVertices(const std::vector<int>& welded, const Triangle
   return parts;
 }
 
-// What part `own` lacks at a vertex where others meet it that differ from it by their light. The seen part keeps its colour,
-// others meet in the middle.
+// What part `own` lacks at a vertex where others meet it that differ from it by their light. The
+// seen part keeps its colour, others meet in the middle.
 // @return whether there is a step to be evened out
 bool lacking(const std::vector<Part>& parts, int own, std::size_t vertex, cv::Vec3f& lacks) {
   if (!parts[own].reaches(vertex)) return false;
   const cv::Vec3f& colour = parts[own].colour[vertex];
   const auto continues = [&](const Part& other) {
     const cv::Vec3f& c = other.colour[vertex];
-    return other.reaches(vertex) && cv::norm(c - colour) <= kLargest * std::max(cv::norm(c), cv::norm(colour));
+    return other.reaches(vertex) &&
+           cv::norm(c - colour) <= kLargest * std::max(cv::norm(c), cv::norm(colour));
   };
   if (continues(parts[0])) {
     lacks = parts[0].colour[vertex] - colour;
@@ -68,7 +72,8 @@ bool lacking(const std::vector<Part>& parts, int own, std::size_t vertex, cv::Ve
 
 }  // namespace
 
-void levelSeams(const Points& vertices, const Triangles& triangles, const std::vector<signed char>& part, SurfaceTexture& texture) {
+void levelSeams(const Points& vertices, const Triangles& triangles,
+                const std::vector<signed char>& part, SurfaceTexture& texture) {
   if (part.empty()) return;
   const std::vector<int> welded = weld(vertices);
   const std::vector<Part> parts = partsAtVertices(welded, triangles, part, texture);
@@ -76,7 +81,8 @@ void levelSeams(const Points& vertices, const Triangles& triangles, const std::v
   for (std::size_t own = 1; own < parts.size(); ++own) {
     std::vector<cv::Vec3f> shift(vertices.size());
     std::vector<bool> known(vertices.size(), false);
-    for (std::size_t v = 0; v < vertices.size(); ++v) known[v] = lacking(parts, static_cast<int>(own), welded[v], shift[v]);
+    for (std::size_t v = 0; v < vertices.size(); ++v)
+      known[v] = lacking(parts, static_cast<int>(own), welded[v], shift[v]);
     if (std::find(known.begin(), known.end(), true) == known.end()) continue;
     diffuseOverMesh(vertices, triangles, known, shift);
     shifts[own] = std::move(shift);
@@ -86,8 +92,10 @@ void levelSeams(const Points& vertices, const Triangles& triangles, const std::v
       if (part[i] <= 0 || shifts[part[i]].empty()) continue;
       const std::vector<cv::Vec3f>& shift = shifts[part[i]];
       const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
-      const cv::Vec3f by = w[0] * shift[triangles[t][0]] + w[1] * shift[triangles[t][1]] + w[2] * shift[triangles[t][2]];
-      for (int c = 0; c < 3; ++c) texture.texels[i][c] = std::max(0.0f, texture.texels[i][c] + by[c]);
+      const cv::Vec3f by = w[0] * shift[triangles[t][0]] + w[1] * shift[triangles[t][1]] +
+                           w[2] * shift[triangles[t][2]];
+      for (int c = 0; c < 3; ++c)
+        texture.texels[i][c] = std::max(0.0f, texture.texels[i][c] + by[c]);
     }
   }
 }

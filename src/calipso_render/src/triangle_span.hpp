@@ -4,8 +4,9 @@
 
 namespace calipso::render {
 
-// A triangle made ready for row spans, in the buffer's coordinates. Row v lies inside from the greater of the first two bounds to the
-// lesser of the last two, each linear in v, within the columns' limits; nearness is a plane.
+// A triangle made ready for row spans, in the buffer's coordinates. Row v lies inside from the
+// greater of the first two bounds to the lesser of the last two, each linear in v, within the
+// columns' limits; nearness is a plane.
 struct TriangleSpan {
   float column[4], row[4], slope[4];  // a point of each bound, and columns per row
   float near_u, near_v, near_0;
@@ -13,15 +14,17 @@ struct TriangleSpan {
   std::uint32_t id;
 };
 
-// Rows [first, last] of a buffer that triangles are drawn into; nearer wins, at a tie what was drawn first.
+// Rows [first, last] of a buffer that triangles are drawn into; nearer wins, at a tie what was
+// drawn first.
 struct SpanTarget {
   std::uint32_t* ids;  // null: only nearness is kept
   float* nearness;
-  int stride;          // places per row: the width, and at least 7 more
+  int stride;  // places per row: the width, and at least 7 more
   int first, last;
 };
 
-// A triangle at all samples of a pixel at once: edge functions (inside: none is negative) and nearness, linear in the picture.
+// A triangle at all samples of a pixel at once: edge functions (inside: none is negative) and
+// nearness, linear in the picture.
 struct TriangleSamples {
   float edge_u[3], edge_v[3], edge_0[3];
   float near_u, near_v, near_0;

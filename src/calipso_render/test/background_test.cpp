@@ -63,7 +63,8 @@ void addGrain(std::vector<ClipFrame>& clip) {
 TEST(SeenBackground, LeavesOutAShadowThatComesToRest) {
   std::vector<ClipFrame> clip = wanderingSquare(12);
   const cv::Rect place(60, 80, 20, 20);
-  for (int k = 3; k < 12; ++k) cv::multiply(clip[k].bgr(place), cv::Scalar(0.77, 0.73, 0.68), clip[k].bgr(place));
+  for (int k = 3; k < 12; ++k)
+    cv::multiply(clip[k].bgr(place), cv::Scalar(0.77, 0.73, 0.68), clip[k].bgr(place));
   addGrain(clip);
   const Background b = seenBackground(clip, true);
   cv::Mat plate;
@@ -74,8 +75,10 @@ TEST(SeenBackground, LeavesOutAShadowThatComesToRest) {
 TEST(SeenBackground, SinglePixelsOfSuchAShadowGoWithThoseAroundThem) {
   std::vector<ClipFrame> clip = wanderingSquare(12);
   const cv::Rect place(60, 80, 20, 20), few(68, 88, 2, 1);
-  for (int k = 3; k < 12; ++k) cv::multiply(clip[k].bgr(place), cv::Scalar(0.77, 0.73, 0.68), clip[k].bgr(place));
-  cv::multiply(clip[0].bgr(few), cv::Scalar(0.77, 0.73, 0.68), clip[0].bgr(few));  // lit in two frames only: too few to tell by themselves
+  for (int k = 3; k < 12; ++k)
+    cv::multiply(clip[k].bgr(place), cv::Scalar(0.77, 0.73, 0.68), clip[k].bgr(place));
+  cv::multiply(clip[0].bgr(few), cv::Scalar(0.77, 0.73, 0.68),
+               clip[0].bgr(few));  // lit in two frames only: too few to tell by themselves
   const Background b = seenBackground(clip, true);
   cv::Mat plate;
   b.plate.convertTo(plate, CV_8U);
@@ -115,11 +118,14 @@ TEST(InventBackground, WhatIsHiddenRestsWhereTheRowsAroundRest) {
   std::vector<ClipFrame> clip;
   const cv::Rect object(70, 30, 30, 60);
   for (int k = 0; k < 8; ++k) {
-    ClipFrame f{cv::Mat(kHeight, kWidth, CV_8UC3), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera()};
+    ClipFrame f{cv::Mat(kHeight, kWidth, CV_8UC3), cv::Mat::zeros(kHeight, kWidth, CV_8U),
+                camera()};
     for (int v = 0; v < kHeight; ++v) {
       for (int u = 0; u < kWidth; ++u) {
-        const double wave = v < 60 ? std::sin(0.7 * u + 0.4 * v) : std::sin(0.3 * u + 1.9 * k + 0.5 * v);
-        f.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(cv::saturate_cast<std::uint8_t>(120.0 + 30.0 * wave));
+        const double wave =
+            v < 60 ? std::sin(0.7 * u + 0.4 * v) : std::sin(0.3 * u + 1.9 * k + 0.5 * v);
+        f.bgr.at<cv::Vec3b>(v, u) =
+            cv::Vec3b::all(cv::saturate_cast<std::uint8_t>(120.0 + 30.0 * wave));
       }
     }
     f.bgr(object).setTo(cv::Scalar(0, 0, 255));
@@ -132,7 +138,8 @@ TEST(InventBackground, WhatIsHiddenRestsWhereTheRowsAroundRest) {
   ASSERT_FALSE(b.live.empty());
   const auto live = [&](int u, int v) {
     cv::Vec3f colour;
-    return b.live.at(clip[1].bgr, clip[1].labels, b.live.corrections(clip[1].bgr, clip[1].labels), 1.0f, u, v, colour);
+    return b.live.at(clip[1].bgr, clip[1].labels, b.live.corrections(clip[1].bgr, clip[1].labels),
+                     1.0f, u, v, colour);
   };
   int above = 0, below = 0;
   for (int u = object.x; u < object.br().x; ++u) above += live(u, 45), below += live(u, 75);
@@ -144,7 +151,8 @@ TEST(Inpaint, ContinuesStripes) {
   // Vertical stripes with a period of 8 px leave one way to fill the hole.
   cv::Mat image(96, 96, CV_32FC3), hole = cv::Mat::zeros(96, 96, CV_8U);
   for (int v = 0; v < 96; ++v) {
-    for (int u = 0; u < 96; ++u) image.at<cv::Vec3f>(v, u) = cv::Vec3f::all(u % 8 < 4 ? 60.0f : 180.0f);
+    for (int u = 0; u < 96; ++u)
+      image.at<cv::Vec3f>(v, u) = cv::Vec3f::all(u % 8 < 4 ? 60.0f : 180.0f);
   }
   const cv::Mat truth = image.clone();
   const cv::Rect square(40, 40, 14, 14);
@@ -154,12 +162,14 @@ TEST(Inpaint, ContinuesStripes) {
   EXPECT_TRUE(r.patches_found);
   int wrong = 0;
   for (int v = square.y; v < square.br().y; ++v) {
-    for (int u = square.x; u < square.br().x; ++u) wrong += std::abs(r.image.at<cv::Vec3f>(v, u)[0] - truth.at<cv::Vec3f>(v, u)[0]) > 1.0f;
+    for (int u = square.x; u < square.br().x; ++u)
+      wrong += std::abs(r.image.at<cv::Vec3f>(v, u)[0] - truth.at<cv::Vec3f>(v, u)[0]) > 1.0f;
   }
   EXPECT_LE(wrong, square.area() / 20);
 }
 
-// A grey picture with grain whose left half's copy, `step` code values darker, fills a hole in the right half.
+// A grey picture with grain whose left half's copy, `step` code values darker, fills a hole in the
+// right half.
 struct LiveCase {
   cv::Mat frame = cv::Mat(60, 120, CV_8UC3), labels = cv::Mat::zeros(60, 120, CV_8U);
   LiveFill fill;
@@ -170,7 +180,8 @@ struct LiveCase {
     labels(cv::Rect(75, 15, 30, 30)).setTo(1);
     cv::Mat origin(60, 120, CV_16SC2, cv::Scalar(-1, -1));
     for (int v = 15; v < 45; ++v) {
-      for (int u = 75; u < 105; ++u) origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 65), short(v));
+      for (int u = 75; u < 105; ++u)
+        origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 65), short(v));
     }
     fill = LiveFill(origin, labels);
   }
@@ -194,8 +205,10 @@ TEST(LiveFill, HasNothingWhereTheFrameHidesTheOrigin) {
   LiveCase c(0);
   c.labels(cv::Rect(10, 15, 30, 30)).setTo(2);
   cv::Vec3f colour;
-  EXPECT_FALSE(c.fill.at(c.frame, c.labels, c.fill.corrections(c.frame, c.labels), 0.0f, 90, 30, colour));
-  EXPECT_FALSE(c.fill.at(c.frame, c.labels, c.fill.corrections(c.frame, c.labels), 0.0f, 5, 5, colour));
+  EXPECT_FALSE(
+      c.fill.at(c.frame, c.labels, c.fill.corrections(c.frame, c.labels), 0.0f, 90, 30, colour));
+  EXPECT_FALSE(
+      c.fill.at(c.frame, c.labels, c.fill.corrections(c.frame, c.labels), 0.0f, 5, 5, colour));
 }
 
 TEST(ClipSample, KeepsTheKeyFrameAndItsBound) {
@@ -212,14 +225,18 @@ TEST(ClipSample, KeepsTheKeyFrameAndItsBound) {
 TEST(ClipSample, RefusesAnotherSize) {
   ClipSample sample;
   sample.add({cv::Mat(4, 4, CV_8UC3), cv::Mat(4, 4, CV_8U), Camera()});
-  EXPECT_THROW(sample.add({cv::Mat(4, 5, CV_8UC3), cv::Mat(4, 5, CV_8U), Camera()}), std::invalid_argument);
-  EXPECT_THROW(sample.add({cv::Mat(4, 4, CV_8UC3), cv::Mat(3, 4, CV_8U), Camera()}), std::invalid_argument);
+  EXPECT_THROW(sample.add({cv::Mat(4, 5, CV_8UC3), cv::Mat(4, 5, CV_8U), Camera()}),
+               std::invalid_argument);
+  EXPECT_THROW(sample.add({cv::Mat(4, 4, CV_8UC3), cv::Mat(3, 4, CV_8U), Camera()}),
+               std::invalid_argument);
 }
 
 TEST(GroundNearness, IsThePlanesBelowTheHorizonAndWhatLiesBeyond) {
-  // 2 m above the ground, looking level: a pixel that looks down by (v - cy) / fy sees it at 2 fy / (v - cy).
+  // 2 m above the ground, looking level: a pixel that looks down by (v - cy) / fy sees it at 2 fy /
+  // (v - cy).
   Camera camera;
-  camera.width = 40, camera.height = 30, camera.fx = camera.fy = 50.0, camera.cx = 19.5, camera.cy = 10.0;
+  camera.width = 40, camera.height = 30, camera.fx = camera.fy = 50.0, camera.cx = 19.5,
+  camera.cy = 10.0;
   camera.world_from_camera.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   camera.world_from_camera.translation() = Eigen::Vector3d(0, 0, 2);
   cv::Mat scenery = cv::Mat::zeros(30, 40, CV_32F);

@@ -28,7 +28,8 @@ Prepared learn(const ClipFrame& frame, const ObjectModel& model, int frames = 3)
 }
 
 bool says(const Prepared& p, const std::string& what) {
-  return std::any_of(p.remarks.begin(), p.remarks.end(), [&](const std::string& r) { return r.find(what) != std::string::npos; });
+  return std::any_of(p.remarks.begin(), p.remarks.end(),
+                     [&](const std::string& r) { return r.find(what) != std::string::npos; });
 }
 
 // Moved away, the object must leave a complete picture.
@@ -86,7 +87,8 @@ TEST(BadInput, AMeshWithoutItsVisibleSide) {
     if (model.mesh.vertex(model.mesh.triangles(t, 0)).z() < -0.05) kept.push_back(t);
   }
   decltype(model.mesh.triangles) triangles(kept.size(), 3);
-  for (std::size_t i = 0; i < kept.size(); ++i) triangles.row(i) = model.mesh.triangles.row(kept[i]);
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    triangles.row(i) = model.mesh.triangles.row(kept[i]);
   model.mesh.triangles = triangles;
   const Prepared p = learn(key, model);
   EXPECT_TRUE(says(p, "the side that the camera sees is missing"));

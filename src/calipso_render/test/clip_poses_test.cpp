@@ -23,11 +23,15 @@ ClipSample rollingBall() {
   return clip;
 }
 
-ObjectPose poseAt(const Eigen::Vector3d& centre) { return {kBallLabel, ballAt(centre).world_from_object}; }
+ObjectPose poseAt(const Eigen::Vector3d& centre) {
+  return {kBallLabel, ballAt(centre).world_from_object};
+}
 
 TEST(TakePoses, AcceptsWhatFitsTheMaskAtItsStamp) {
   ClipSample clip = rollingBall();
-  const PosesTaken taken = takePoses({{1001, {poseAt(0.5 * (kStart + kEnd))}}, {1002, {poseAt(kStart)}}, {5, {poseAt(kStart)}}}, {ballAt(kStart)}, clip);
+  const PosesTaken taken = takePoses(
+      {{1001, {poseAt(0.5 * (kStart + kEnd))}}, {1002, {poseAt(kStart)}}, {5, {poseAt(kStart)}}},
+      {ballAt(kStart)}, clip);
   EXPECT_EQ(taken.offered, 2);
   EXPECT_EQ(taken.accepted, 1);
   EXPECT_GT(taken.worst_accepted_overlap, 0.97);
@@ -63,7 +67,9 @@ ClipFrame seenFrom(double right, const Eigen::Vector3d& centre) {
 
 TEST(AnyMoves, ACameraThatMovesDoesNotMoveTheObject) {
   ClipSample shaken, followed;
-  for (const double right : {0.0, 0.03, -0.05}) shaken.add(seenFrom(right, kStart)), followed.add(seenFrom(right, kStart + Eigen::Vector3d(right, 0, 0)));
+  for (const double right : {0.0, 0.03, -0.05})
+    shaken.add(seenFrom(right, kStart)),
+        followed.add(seenFrom(right, kStart + Eigen::Vector3d(right, 0, 0)));
   EXPECT_FALSE(anyMoves(shaken, {ballAt(kStart)}));
   EXPECT_TRUE(anyMoves(followed, {ballAt(kStart)}));  // its masks are all the same
 }
@@ -74,7 +80,8 @@ TEST(Prepare, UsesTheFramesWhosePosesAreKnown) {
   RenderParams params;
   params.planes = table();
   EXPECT_EQ(prepare(clip, {ballAt(kStart)}, params).views, 1);
-  takePoses({{1001, {poseAt(0.5 * (kStart + kEnd))}}, {1002, {poseAt(kEnd)}}}, {ballAt(kStart)}, clip);
+  takePoses({{1001, {poseAt(0.5 * (kStart + kEnd))}}, {1002, {poseAt(kEnd)}}}, {ballAt(kStart)},
+            clip);
   EXPECT_EQ(prepare(clip, {ballAt(kStart)}, params).views, 3);
 }
 

@@ -39,7 +39,9 @@ struct Setting {
     in.objects = {ball};
     return in;
   }
-  FrameOutput draw(const FrameInput& in) const { return Renderer(prepared, params()).composite(in); }
+  FrameOutput draw(const FrameInput& in) const {
+    return Renderer(prepared, params()).composite(in);
+  }
   cv::Point at(const Eigen::Vector3d& x) const {
     const Eigen::Vector2d p = key.camera.projectWorld(x);
     return {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))};
@@ -63,8 +65,11 @@ TEST(EditedLook, ACopyIsDrawnBesideAnUntouchedOriginal) {
   EXPECT_EQ(out.provenance.at<std::uint8_t>(original), kOriginal);
   EXPECT_EQ(out.provenance.at<std::uint8_t>(twin), kRendered);
   // The same matt ball in the same light looks the same.
-  const auto around = [](const cv::Mat& bgr, const cv::Point& p) { return cv::mean(bgr(cv::Rect(p.x - 1, p.y - 1, 3, 3))); };  // noise averaged
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(around(out.bgr, twin)[c], around(s.key.bgr, original)[c], 12);
+  const auto around = [](const cv::Mat& bgr, const cv::Point& p) {
+    return cv::mean(bgr(cv::Rect(p.x - 1, p.y - 1, 3, 3)));
+  };  // noise averaged
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(around(out.bgr, twin)[c], around(s.key.bgr, original)[c], 12);
 }
 
 TEST(EditedLook, ACopyThatAStateDoesNotHaveIsNotDrawn) {
@@ -95,7 +100,8 @@ ObjectInFrame card(const Eigen::Vector3d& centre) {
   ObjectInFrame o;
   o.name = "card", o.edited = true;
   const Eigen::Vector3f c = centre.cast<float>();
-  for (const auto& [x, z] : {std::pair{-0.03f, -0.03f}, {0.03f, -0.03f}, {0.03f, 0.03f}, {-0.03f, 0.03f}})
+  for (const auto& [x, z] :
+       {std::pair{-0.03f, -0.03f}, {0.03f, -0.03f}, {0.03f, 0.03f}, {-0.03f, 0.03f}})
     o.vertices.push_back(c + Eigen::Vector3f(x, 0.0f, z));
   o.triangles = {{0, 1, 2}, {0, 2, 3}};
   o.look.albedo = cv::Vec3f(0.02f, 0.02f, 0.6f);
@@ -131,7 +137,8 @@ TEST(EditedLook, ATintMultipliesTheReflectance) {
   const FrameOutput out = s.draw(in);
   const cv::Point p = s.at(kCentre);
   for (int c = 0; c < 3; ++c) {
-    const float before = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[c]), now = linearFromCode(out.bgr.at<cv::Vec3b>(p)[c]);
+    const float before = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[c]),
+                now = linearFromCode(out.bgr.at<cv::Vec3b>(p)[c]);
     EXPECT_NEAR(now / before, (*in.objects[0].look.tint)[c], 0.06f) << c;  // codes are rounded
   }
 }
@@ -158,7 +165,8 @@ TEST(EditedLook, AnAlbedoReplacesTheReflectance) {
   };
   const cv::Vec3b bright = pixelAt(0.3f), dark = pixelAt(0.15f);
   for (int c = 0; c < 3; ++c) {
-    EXPECT_NEAR(linearFromCode(dark[c]) / linearFromCode(bright[c]), 0.5f, 0.06f) << c;  // codes are rounded
+    EXPECT_NEAR(linearFromCode(dark[c]) / linearFromCode(bright[c]), 0.5f, 0.06f)
+        << c;  // codes are rounded
   }
 }
 
@@ -167,7 +175,8 @@ TEST(EditedLook, AnotherSunLightsTheOtherSide) {
   FrameInput in = s.input(true);
   for (Eigen::Vector3f& x : in.objects[0].vertices) x.z() += 0.02f;
   const Eigen::Vector3d centre = kCentre + Eigen::Vector3d(0, 0, 0.02);
-  const cv::Point left = s.at(centre + Eigen::Vector3d(-0.07, -0.05, 0)), right = s.at(centre + Eigen::Vector3d(0.07, -0.05, 0));
+  const cv::Point left = s.at(centre + Eigen::Vector3d(-0.07, -0.05, 0)),
+                  right = s.at(centre + Eigen::Vector3d(0.07, -0.05, 0));
   in.sun.direction = Eigen::Vector3f(-1.0f, -0.4f, 0.5f).normalized();
   const FrameOutput from_left = s.draw(in);
   in.sun.direction = Eigen::Vector3f(1.0f, -0.4f, 0.5f).normalized();

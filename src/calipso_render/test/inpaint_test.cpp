@@ -51,8 +51,10 @@ TEST(PatchOrigins, AreWhereThePictureRepeatsItself) {
   for (int v = 0; v < 120; ++v) {
     for (int u = 0; u < 160; ++u) {
       const cv::Vec2s from = origin.at<cv::Vec2s>(v, u);
-      if (hole.at<std::uint8_t>(v, u) == 0) EXPECT_EQ(from, cv::Vec2s(-1, -1));
-      else elsewhere += std::abs(from[0] - u) != 52 || from[1] != v;
+      if (hole.at<std::uint8_t>(v, u) == 0)
+        EXPECT_EQ(from, cv::Vec2s(-1, -1));
+      else
+        elsewhere += std::abs(from[0] - u) != 52 || from[1] != v;
     }
   }
   EXPECT_EQ(elsewhere, 0);
@@ -60,12 +62,15 @@ TEST(PatchOrigins, AreWhereThePictureRepeatsItself) {
 
 // Dark lines over fine grain, hidden in a square.
 struct Lines {
-  cv::Mat image = 0.05 * grain(320, 200) + cv::Scalar::all(150.0), truth, hole = cv::Mat::zeros(200, 320, CV_8U);
+  cv::Mat image = 0.05 * grain(320, 200) + cv::Scalar::all(150.0), truth,
+          hole = cv::Mat::zeros(200, 320, CV_8U);
 
   void line(const cv::Point& a, const cv::Point& b, int dark = 30, int width = 3) {
     cv::Mat covered(image.size(), CV_8U, cv::Scalar(0));
     cv::line(covered, a, b, cv::Scalar(255), width, cv::LINE_AA);
-    image.forEach<cv::Vec3f>([&](cv::Vec3f& c, const int* at) { c += covered.at<std::uint8_t>(at[0], at[1]) / 255.0f * (cv::Vec3f::all(dark) - c); });
+    image.forEach<cv::Vec3f>([&](cv::Vec3f& c, const int* at) {
+      c += covered.at<std::uint8_t>(at[0], at[1]) / 255.0f * (cv::Vec3f::all(dark) - c);
+    });
   }
   LineBridges bridge() {
     hole(cv::Rect(110, 50, 100, 100)).setTo(255);
@@ -81,7 +86,8 @@ TEST(BridgeLines, ConnectTheTwoEndsOfALine) {
   const LineBridges b = l.bridge();
   EXPECT_GT(cv::countNonZero(b.drawn), 700);  // nine rows of 100 px, less what the ends leave
   EXPECT_EQ(cv::countNonZero(b.drawn & (l.hole == 0)), 0);
-  // Grain differs by 5 code values (12 % of 200) and a line's rim by a tenth of a pixel, which are 12.
+  // Grain differs by 5 code values (12 % of 200) and a line's rim by a tenth of a pixel, which
+  // are 12.
   EXPECT_LT(meanDifference(l.image, l.truth, b.drawn), 8.0);
   for (int v = 50; v < 150; ++v) {
     for (int u = 110; u < 210; ++u) {
@@ -103,7 +109,8 @@ TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
   EXPECT_EQ(b.drawn.at<std::uint8_t>(70, 174), 0);   // beyond the first
 }
 
-// A broad line, of which both edges are found, goes on through what is faint to one of its like, whole and no further.
+// A broad line, of which both edges are found, goes on through what is faint to one of its like,
+// whole and no further.
 TEST(BridgeLines, LeadABroadLineThroughAFaintOne) {
   Lines l;
   l.line({0, 115}, {319, 115}, 118);
@@ -139,7 +146,8 @@ TEST(BridgeLines, LeaveTextureOfManyLines) {
 
 TEST(PatchOrigins, ConnectALineThatEntersAtTwoPlaces) {
   // A dark line that falls by 1 px in 12 over grain, hidden in the middle.
-  cv::Mat image = 0.1 * grain(320, 160) + cv::Scalar::all(150.0), hole = cv::Mat::zeros(160, 320, CV_8U);
+  cv::Mat image = 0.1 * grain(320, 160) + cv::Scalar::all(150.0),
+          hole = cv::Mat::zeros(160, 320, CV_8U);
   for (int u = 0; u < 320; ++u) image(cv::Rect(u, 60 + u / 12, 1, 4)).setTo(cv::Scalar::all(30));
   hole(cv::Rect(120, 40, 70, 70)).setTo(255);
   const InpaintResult r = inpaint(image, hole, cv::Mat());
@@ -155,14 +163,18 @@ TEST(PatchOrigins, ConnectALineThatEntersAtTwoPlaces) {
 }
 
 TEST(PatchOrigins, StayInTheirLayer) {
-  // Two grains that differ in colour alone, one above the other: nothing from below comes above the border.
-  cv::Mat image = 0.2 * grain(240, 160) + cv::Scalar(120, 90, 60), hole = cv::Mat::zeros(160, 240, CV_8U);
-  cv::add(image(cv::Rect(0, 80, 240, 80)), cv::Scalar(-60, 20, 20), image(cv::Rect(0, 80, 240, 80)));
+  // Two grains that differ in colour alone, one above the other: nothing from below comes above the
+  // border.
+  cv::Mat image = 0.2 * grain(240, 160) + cv::Scalar(120, 90, 60),
+          hole = cv::Mat::zeros(160, 240, CV_8U);
+  cv::add(image(cv::Rect(0, 80, 240, 80)), cv::Scalar(-60, 20, 20),
+          image(cv::Rect(0, 80, 240, 80)));
   hole(cv::Rect(80, 30, 60, 100)).setTo(255);
   const cv::Mat origin = patchOrigins(image, hole, hole == 0, {});
   for (int v = 30; v < 130; ++v) {
     if (std::abs(v - 80) < 6) continue;  // the border may waver by a patch
-    for (int u = 80; u < 140; ++u) EXPECT_EQ(origin.at<cv::Vec2s>(v, u)[1] < 80, v < 80) << u << ", " << v;
+    for (int u = 80; u < 140; ++u)
+      EXPECT_EQ(origin.at<cv::Vec2s>(v, u)[1] < 80, v < 80) << u << ", " << v;
   }
 }
 
@@ -175,11 +187,14 @@ TEST(PatchOrigins, ComeFromWhereTheGroundIsAboutAsNear) {
   params.nearness(cv::Rect(128, 0, 112, 120)).setTo(0.2f);  // five times as far
   const cv::Mat origin = patchOrigins(image, hole, hole == 0, params);
   for (int v = 40; v < 70; ++v) {
-    for (int u = 80; u < 110; ++u) EXPECT_LT(origin.at<cv::Vec2s>(v, u)[0], 131) << u << ", " << v;  // the patch's middle, by its radius
+    for (int u = 80; u < 110; ++u)
+      EXPECT_LT(origin.at<cv::Vec2s>(v, u)[0], 131)
+          << u << ", " << v;  // the patch's middle, by its radius
   }
 }
 
-// A dark tower stands at the left and shows again through slits of a hole at the right, too narrow for any patch.
+// A dark tower stands at the left and shows again through slits of a hole at the right, too narrow
+// for any patch.
 TEST(PatchOrigins, AgreeWithWhatShowsThroughNarrowGaps) {
   cv::Mat image(160, 240, CV_32FC3, cv::Scalar::all(180.0)), hole = cv::Mat::zeros(160, 240, CV_8U);
   image += 0.05 * (grain(240, 160) - cv::Scalar::all(120.0));
@@ -187,7 +202,8 @@ TEST(PatchOrigins, AgreeWithWhatShowsThroughNarrowGaps) {
   const cv::Rect around(130, 10, 100, 140);
   const cv::Rect tower(150, 30, 60, 100);
   image(tower).setTo(cv::Scalar::all(60.0));
-  for (int u = around.x; u < around.br().x; u += 12) hole(cv::Rect(u, around.y, 8, around.height)).setTo(255);  // slits of 4 px
+  for (int u = around.x; u < around.br().x; u += 12)
+    hole(cv::Rect(u, around.y, 8, around.height)).setTo(255);  // slits of 4 px
   const cv::Mat origin = patchOrigins(image, hole, hole == 0, {});
   int wrong = 0, all = 0;
   for (int v = tower.y + 10; v < tower.br().y - 10; ++v) {
@@ -215,7 +231,8 @@ TEST(PatchOrigins, DoNotDependOnTheNumberOfThreads) {
 }
 
 TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
-  const cv::Mat image = grain(40, 40), hole(40, 40, CV_8U, cv::Scalar(255)), source = cv::Mat::zeros(40, 40, CV_8U);
+  const cv::Mat image = grain(40, 40), hole(40, 40, CV_8U, cv::Scalar(255)),
+                source = cv::Mat::zeros(40, 40, CV_8U);
   const cv::Mat origin = patchOrigins(image, hole, source, {});
   EXPECT_EQ(cv::countNonZero(origin.reshape(1) != -1), 0);
 }
@@ -223,7 +240,8 @@ TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
 TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
   // A copy of the left part, 3 code values too dark, between two parts that fit.
   const cv::Mat truth = repeated(grain(120, 30), 40);
-  cv::Mat hole = cv::Mat::zeros(30, 120, CV_8U), origin(30, 120, CV_16SC2, cv::Scalar(-1, -1)), image = truth.clone();
+  cv::Mat hole = cv::Mat::zeros(30, 120, CV_8U), origin(30, 120, CV_16SC2, cv::Scalar(-1, -1)),
+          image = truth.clone();
   hole(cv::Rect(50, 5, 20, 20)).setTo(255);
   for (int v = 5; v < 25; ++v) {
     for (int u = 50; u < 70; ++u) origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 40), short(v));

@@ -13,8 +13,8 @@
 namespace calipso::render {
 namespace {
 
-// The kernels for newer processors give the bits of the plain ones; without such a processor there is nothing to
-// compare.
+// The kernels for newer processors give the bits of the plain ones; without such a processor there
+// is nothing to compare.
 class Avx2 : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -46,7 +46,8 @@ TEST_F(Avx2, SamplesTheSameValues) {
   cv::Mat image(20, 30, CV_32FC4);
   random_.fill(image, cv::RNG::UNIFORM, -0.2, 1.0);
   std::vector<float> u, v;
-  for (int i = 0; i < 500; ++i) u.push_back(random_.uniform(-3.0f, 33.0f)), v.push_back(random_.uniform(-3.0f, 23.0f));
+  for (int i = 0; i < 500; ++i)
+    u.push_back(random_.uniform(-3.0f, 33.0f)), v.push_back(random_.uniform(-3.0f, 23.0f));
   std::vector<cv::Vec4f> plain(u.size()), fast(u.size());
   plainKernels().sample(image, u.data(), v.data(), 500, plain.data());
   avx2Kernels()->sample(image, u.data(), v.data(), 500, fast.data());
@@ -62,15 +63,19 @@ TEST_F(Avx2, LocatesTheSamePlaces) {
     map.u = random_.uniform(0.0f, 50.0f), map.v = random_.uniform(0.0f, 50.0f);
   }
   std::vector<std::uint32_t> ids;
-  for (std::uint32_t id = 0; id < maps.size(); ++id) ids.insert(ids.end(), random_.uniform(1, 20), id);
+  for (std::uint32_t id = 0; id < maps.size(); ++id)
+    ids.insert(ids.end(), random_.uniform(1, 20), id);
   const int count = static_cast<int>(ids.size());
   std::vector<float> plain_u(count + 7), plain_v(count + 7), u(count + 7), v(count + 7);
-  plainKernels().locate(maps.data(), ids.data(), 3, 20, count, {5, 6}, plain_u.data(), plain_v.data());
+  plainKernels().locate(maps.data(), ids.data(), 3, 20, count, {5, 6}, plain_u.data(),
+                        plain_v.data());
   avx2Kernels()->locate(maps.data(), ids.data(), 3, 20, count, {5, 6}, u.data(), v.data());
   for (int k = 0; k < count; ++k) {
     ASSERT_EQ(plain_u[k], u[k]) << k;
     ASSERT_EQ(plain_v[k], v[k]) << k;
-    ASSERT_NEAR(u[k], maps[ids[k]].keyAt(3.0f + k, 20.0f).x() - 5.0f, 1e-3f * (1.0f + std::abs(u[k]))) << k;
+    ASSERT_NEAR(u[k], maps[ids[k]].keyAt(3.0f + k, 20.0f).x() - 5.0f,
+                1e-3f * (1.0f + std::abs(u[k])))
+        << k;
   }
 }
 
@@ -86,9 +91,13 @@ TEST_F(Avx2, SeesTheSameLight) {
     taps.x[k] = random_.uniform(-0.7f, 0.7f), taps.y[k] = random_.uniform(-0.7f, 0.7f);
   int between = 0;
   for (int i = 0; i < 500; ++i) {
-    const float s = random_.uniform(-5.0f, 45.0f), t = random_.uniform(-5.0f, 45.0f), h = random_.uniform(-0.2f, 1.0f);
-    const float plain = plainKernels().visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t, h, 6.0f);
-    EXPECT_EQ(avx2Kernels()->visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t, h, 6.0f), plain)
+    const float s = random_.uniform(-5.0f, 45.0f), t = random_.uniform(-5.0f, 45.0f),
+                h = random_.uniform(-0.2f, 1.0f);
+    const float plain = plainKernels().visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f},
+                                                      taps, s, t, h, 6.0f);
+    EXPECT_EQ(avx2Kernels()->visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t,
+                                            h, 6.0f),
+              plain)
         << s << ", " << t;
     between += plain > 0.0f && plain < 1.0f;
   }
@@ -104,26 +113,28 @@ TEST_F(Avx2, FillsTheSameTriangles) {
       s.column_max = s.column_min + (narrow ? random_.uniform(0, 8) : random_.uniform(8, 20));
       s.row_min = random_.uniform(0, 30), s.row_max = s.row_min + random_.uniform(0, 10);
       for (int k = 0; k < 4; ++k)
-        s.column[k] = random_.uniform(0.0f, 20.0f) + (k < 2 ? 0.0f : 20.0f), s.row[k] = random_.uniform(0.0f, 40.0f),
-        s.slope[k] = random_.uniform(-2.0f, 2.0f);
+        s.column[k] = random_.uniform(0.0f, 20.0f) + (k < 2 ? 0.0f : 20.0f),
+        s.row[k] = random_.uniform(0.0f, 40.0f), s.slope[k] = random_.uniform(-2.0f, 2.0f);
       s.near_u = random_.uniform(-0.1f, 0.1f), s.near_v = random_.uniform(-0.1f, 0.1f),
       s.near_0 = random_.uniform(0.0f, 5.0f);
       s.id = static_cast<std::uint32_t>(&s - spans.data());
     }
-    const auto draw = [&](const Kernels& kernels, std::vector<std::uint32_t>& ids, std::vector<float>& nearness,
-                          std::vector<float>& alone) {
+    const auto draw = [&](const Kernels& kernels, std::vector<std::uint32_t>& ids,
+                          std::vector<float>& nearness, std::vector<float>& alone) {
       ids.assign(kRows * kStride, 999), nearness.assign(kRows * kStride, -1.0f), alone = nearness;
       kernels.fill(spans.data(), 200, {ids.data(), nearness.data(), kStride, 3, 35});
       kernels.fill(spans.data(), 200, {nullptr, alone.data(), kStride, 3, 35});
     };
     std::vector<std::uint32_t> plain_ids, ids;
     std::vector<float> plain_near, near, plain_alone, alone;
-    draw(plainKernels(), plain_ids, plain_near, plain_alone), draw(*avx2Kernels(), ids, near, alone);
+    draw(plainKernels(), plain_ids, plain_near, plain_alone),
+        draw(*avx2Kernels(), ids, near, alone);
     EXPECT_EQ(ids, plain_ids);
     EXPECT_EQ(near, plain_near);
     EXPECT_EQ(alone, plain_alone);
     EXPECT_EQ(alone, near);
-    EXPECT_GT(std::count_if(ids.begin(), ids.end(), [](std::uint32_t id) { return id != 999; }), 300);
+    EXPECT_GT(std::count_if(ids.begin(), ids.end(), [](std::uint32_t id) { return id != 999; }),
+              300);
   }
 }
 

@@ -2,12 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include "ambient_fit.hpp"
-#include "calipso_render/colour.hpp"
-
 #include <cmath>
 #include <random>
 
+#include "ambient_fit.hpp"
+#include "calipso_render/colour.hpp"
 #include "calipso_render/light_fit.hpp"
 #include "calipso_render/ray_shadow.hpp"
 #include "ray_scene.hpp"
@@ -18,7 +17,9 @@ namespace {
 
 const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 
-Eigen::Vector3d direction(double x, double y, double z) { return Eigen::Vector3d(x, y, z).normalized(); }
+Eigen::Vector3d direction(double x, double y, double z) {
+  return Eigen::Vector3d(x, y, z).normalized();
+}
 
 TEST(DiffuseShading, SunAddsItsCosine) {
   Light light;
@@ -31,12 +32,15 @@ TEST(DiffuseShading, SunAddsItsCosine) {
 
 TEST(TorranceSparrow, PeaksAtTheMirrorDirectionOfSmoothSurfaces) {
   const Eigen::Vector3f n = Eigen::Vector3f::UnitZ(), l = Eigen::Vector3f(0.6f, 0, 0.8f);
-  EXPECT_GT(torranceSparrow(n, l, {-0.6f, 0, 0.8f}, 0.1f), 100.0f * torranceSparrow(n, l, {0.6f, 0, 0.8f}, 0.1f));
-  EXPECT_EQ(torranceSparrow(n, {0.6f, 0, -0.8f}, {-0.6f, 0, 0.8f}, 0.1f), 0.0f);  // light from below
+  EXPECT_GT(torranceSparrow(n, l, {-0.6f, 0, 0.8f}, 0.1f),
+            100.0f * torranceSparrow(n, l, {0.6f, 0, 0.8f}, 0.1f));
+  EXPECT_EQ(torranceSparrow(n, {0.6f, 0, -0.8f}, {-0.6f, 0, 0.8f}, 0.1f),
+            0.0f);  // light from below
 }
 
 TEST(TorranceSparrow, LobeAgreesWithItsFloatTwin) {
-  const Eigen::Vector3d n = direction(0.1, 0.2, 1), l = direction(0.5, -0.3, 0.8), v = direction(-0.4, 0.5, 0.7);
+  const Eigen::Vector3d n = direction(0.1, 0.2, 1), l = direction(0.5, -0.3, 0.8),
+                        v = direction(-0.4, 0.5, 0.7);
   const double twin = torranceSparrow(n.cast<float>(), l.cast<float>(), v.cast<float>(), 0.3f);
   EXPECT_NEAR(torranceSparrowLobe(n, l, v, 0.3).value, twin, 1e-5 * twin + 1e-7);
 }
@@ -49,7 +53,9 @@ TEST(ReflectanceCost, DerivativesMatchDifferences) {
   const ReflectanceCost cost(s);
   const int sizes[] = {3, 3, 3, 1, 3, 2};
   for (const double m : {0.15, 0.5}) {
-    std::vector<std::vector<double>> x = {{0, 0, 0}, {-1.0, -1.1, -0.9}, {-0.3, -0.4, -0.6}, {0.4}, {-0.7, -1.2, -0.5}, {std::log(0.1), std::log(m)}};
+    std::vector<std::vector<double>> x = {{0, 0, 0},          {-1.0, -1.1, -0.9},
+                                          {-0.3, -0.4, -0.6}, {0.4},
+                                          {-0.7, -1.2, -0.5}, {std::log(0.1), std::log(m)}};
     const Eigen::Vector3d l = direction(0.4, -0.1, 0.8);
     for (int i = 0; i < 3; ++i) x[0][i] = l[i];
     std::vector<double*> blocks, jacobians;
@@ -69,7 +75,8 @@ TEST(ReflectanceCost, DerivativesMatchDifferences) {
       };
       at(h, plus), at(-h, minus), at(0.0, r);
       for (int c = 0; c < 3; ++c) {
-        const double analytic = J[0][3 * c] * t[0] + J[0][3 * c + 1] * t[1] + J[0][3 * c + 2] * t[2];
+        const double analytic =
+            J[0][3 * c] * t[0] + J[0][3 * c + 1] * t[1] + J[0][3 * c + 2] * t[2];
         EXPECT_NEAR(analytic, (plus[c] - minus[c]) / (2 * h), 1e-5) << "direction, m = " << m;
       }
     }
@@ -79,7 +86,9 @@ TEST(ReflectanceCost, DerivativesMatchDifferences) {
         x[b][i] = kept + h, cost.Evaluate(blocks.data(), plus, nullptr);
         x[b][i] = kept - h, cost.Evaluate(blocks.data(), minus, nullptr);
         x[b][i] = kept;
-        for (int c = 0; c < 3; ++c) EXPECT_NEAR(J[b][c * sizes[b] + i], (plus[c] - minus[c]) / (2 * h), 1e-6) << b << ", " << i;
+        for (int c = 0; c < 3; ++c)
+          EXPECT_NEAR(J[b][c * sizes[b] + i], (plus[c] - minus[c]) / (2 * h), 1e-6)
+              << b << ", " << i;
       }
     }
   }
@@ -105,20 +114,25 @@ TEST(FitLight, FindsTheSunOfABall) {
   evidence.samples = ballSamples(sun), evidence.clusters = 1;
   const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
   ASSERT_TRUE(fit.determined);
-  EXPECT_GT(fit.light.direction.dot(sun), std::cos(2.0 * M_PI / 180.0));  // 2 degrees: the gloss prior's pull
+  EXPECT_GT(fit.light.direction.dot(sun),
+            std::cos(2.0 * M_PI / 180.0));  // 2 degrees: the gloss prior's pull
   EXPECT_NEAR(fit.light.sun[1] / fit.light.ambient[0][1], 2.0f, 0.2f);
 }
 
 // A shadow of known direction outweighs shading that says otherwise.
 TEST(FitLight, BelievesCastShadows) {
-  const Eigen::Vector3f shading = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized(), shadow = Eigen::Vector3f(0.2f, -0.5f, 0.8f).normalized();
+  const Eigen::Vector3f shading = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized(),
+                        shadow = Eigen::Vector3f(0.2f, -0.5f, 0.8f).normalized();
   LightEvidence evidence;
   evidence.samples = ballSamples(shading), evidence.clusters = 1;
-  evidence.shadow_misfit = [&](const Eigen::Vector3f& l) { return -2000.0 * std::max(0.0f, l.dot(shadow) - 0.99f) / 0.01; };
+  evidence.shadow_misfit = [&](const Eigen::Vector3f& l) {
+    return -2000.0 * std::max(0.0f, l.dot(shadow) - 0.99f) / 0.01;
+  };
   evidence.shadow_candidates = {Eigen::Vector3f(0.25f, -0.5f, 0.8f).normalized()};
   const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
   EXPECT_TRUE(fit.from_shadows);
-  EXPECT_GT(fit.light.direction.dot(shadow), std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
+  EXPECT_GT(fit.light.direction.dot(shadow),
+            std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
 }
 
 // The ball's samples under an ambient light with these harmonics, with errors of 1 %.
@@ -127,7 +141,8 @@ LightEvidence ballUnder(const Light& light) {
   cv::RNG random(5);
   evidence.clusters = 1;
   for (LightSample s : ballSamples(light.direction)) {
-    s.radiance = diffuseShading(light, s.normal, 1.0f).mul(cv::Vec3f(0.2f, 0.4f, 0.6f)) * static_cast<float>(1.0 + random.gaussian(0.01));
+    s.radiance = diffuseShading(light, s.normal, 1.0f).mul(cv::Vec3f(0.2f, 0.4f, 0.6f)) *
+                 static_cast<float>(1.0 + random.gaussian(0.01));
     evidence.samples.push_back(s);
   }
   return evidence;
@@ -135,7 +150,8 @@ LightEvidence ballUnder(const Light& light) {
 
 LightFit plainFit(const Light& light) {
   LightFit fit;
-  fit.determined = true, fit.light = light, fit.gloss.specular = 0.0f, fit.albedos = {cv::Vec3f(0.2f, 0.4f, 0.6f)};
+  fit.determined = true, fit.light = light, fit.gloss.specular = 0.0f,
+  fit.albedos = {cv::Vec3f(0.2f, 0.4f, 0.6f)};
   for (int j = 4; j < 9; ++j) fit.light.ambient[j] = {};
   return fit;
 }
@@ -173,13 +189,15 @@ TEST(ThrownBackTint, IsOfTheSurfacesColourAndNoBrighter) {
 
 TEST(SkyExposure, IsFullOutsideAndLessInABox) {
   // An open box: its floor sees part of the sky, its walls' outsides all of it.
-  const Points box = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 2}, {1, -1, 2}, {1, 1, 2}, {-1, 1, 2}, {0, 0, 0}};
-  const Triangles faces = {{8, 0, 1}, {8, 1, 2}, {8, 2, 3}, {8, 3, 0}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+  const Points box = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0},  {-1, 1, 0}, {-1, -1, 2},
+                      {1, -1, 2},  {1, 1, 2},  {-1, 1, 2}, {0, 0, 0}};
+  const Triangles faces = {{8, 0, 1}, {8, 1, 2}, {8, 2, 3}, {8, 3, 0}, {0, 1, 5}, {0, 5, 4},
+                           {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
   Points normals(box.size(), Eigen::Vector3f::UnitZ());
   normals[4] = Eigen::Vector3f(-1, -1, 0).normalized();
   const std::vector<float> sky = skyExposure(box, normals, faces);
   EXPECT_FLOAT_EQ(sky[4], 1.0f);
-  EXPECT_LT(sky[8], 0.6f);   // form factor of the opening: 0.24, the rest partly thrown back
+  EXPECT_LT(sky[8], 0.6f);  // form factor of the opening: 0.24, the rest partly thrown back
   EXPECT_GT(sky[8], 0.3f);
 }
 

@@ -1,6 +1,7 @@
 // What no edit touches: objects in the shadow of edited ones, and scenery before them.
 
 #include <gtest/gtest.h>
+
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/renderer.hpp"
@@ -41,7 +42,8 @@ struct TwoBalls {
     in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera, in.stamp_ns = 7;
     ObjectInFrame ball, other;
     ball.name = "ball", ball.edited = true;
-    for (const Eigen::Vector3f& x : prepared->surfaces[0].key_vertices) ball.vertices.push_back(x + move.cast<float>());
+    for (const Eigen::Vector3f& x : prepared->surfaces[0].key_vertices)
+      ball.vertices.push_back(x + move.cast<float>());
     other.name = "other";
     in.objects = {ball, other};
     return Renderer(prepared, render).composite(in);
@@ -55,7 +57,8 @@ struct TwoBalls {
 TEST(Others, AnEditedObjectCastsItsShadowOnOneThatStays) {
   const TwoBalls s(params());
   const Eigen::Vector3d sun = s.prepared->light.light.direction.cast<double>();
-  const FrameOutput out = s.drawn(kOther + 2.6 * kBallRadius * sun - kCentre);  // between the sun and the other ball
+  const FrameOutput out =
+      s.drawn(kOther + 2.6 * kBallRadius * sun - kCentre);  // between the sun and the other ball
   // The point of the other ball's front that looks at the sun as far as the camera sees it.
   const Eigen::Vector3d eye = s.key.camera.world_from_camera.translation();
   const Eigen::Vector3d facing = (sun + (eye - kOther).normalized()).normalized();
@@ -64,12 +67,16 @@ TEST(Others, AnEditedObjectCastsItsShadowOnOneThatStays) {
   const Light& light = s.prepared->light.light;
   const Eigen::Vector3f n = facing.cast<float>();
   for (int c = 0; c < 3; ++c) {
-    const float before = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[c]), now = linearFromCode(out.bgr.at<cv::Vec3b>(p)[c]);
-    EXPECT_NEAR(now / before, diffuseShading(light, n, 0.0f)[c] / diffuseShading(light, n, 1.0f)[c], 0.06f) << c;  // codes are rounded
+    const float before = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[c]),
+                now = linearFromCode(out.bgr.at<cv::Vec3b>(p)[c]);
+    EXPECT_NEAR(now / before, diffuseShading(light, n, 0.0f)[c] / diffuseShading(light, n, 1.0f)[c],
+                0.06f)
+        << c;  // codes are rounded
   }
 }
 
-// Of an object that moves in the video, the part that the frame shows as the key frame does is kept, byte by byte.
+// Of an object that moves in the video, the part that the frame shows as the key frame does is
+// kept, byte by byte.
 TEST(Others, APartOfAMovingObjectMayRest) {
   const RenderParams render = params();
   const ObjectModel ball = ballAt(kCentre);
@@ -92,7 +99,8 @@ TEST(Others, APartOfAMovingObjectMayRest) {
   const FrameOutput out = Renderer(prepared, render).composite(in);
   const int away = 6;  // px from the change
   for (int v = box.y - 4; v < middle - away; ++v) {
-    for (int u = box.x - 4; u < box.br().x + 4; ++u) ASSERT_EQ(out.bgr.at<cv::Vec3b>(v, u), key.bgr.at<cv::Vec3b>(v, u)) << u << ", " << v;
+    for (int u = box.x - 4; u < box.br().x + 4; ++u)
+      ASSERT_EQ(out.bgr.at<cv::Vec3b>(v, u), key.bgr.at<cv::Vec3b>(v, u)) << u << ", " << v;
   }
   cv::erode(lower, lower, cv::Mat::ones(2 * away + 1, 2 * away + 1, CV_8U));
   EXPECT_GT(psnr(out.bgr, key.bgr, lower), 30.0);
@@ -135,11 +143,13 @@ TEST(Others, AMovingObjectIsNotDrawnAgainstItsMask) {
   in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera;
   ObjectInFrame taken, state;
   taken.name = "ball", taken.removed = true;
-  state.name = "other", state.world_from_object = Eigen::Translation3d(kCentre - kOther) * other.world_from_object;
+  state.name = "other",
+  state.world_from_object = Eigen::Translation3d(kCentre - kOther) * other.world_from_object;
   in.objects = {taken, state};
   const FrameOutput out = Renderer(prepared, render).composite(in);
   const Eigen::Vector2d p = key.camera.projectWorld(kCentre);
-  EXPECT_NE(out.provenance.at<std::uint8_t>(static_cast<int>(p.y()), static_cast<int>(p.x())), kRendered);
+  EXPECT_NE(out.provenance.at<std::uint8_t>(static_cast<int>(p.y()), static_cast<int>(p.x())),
+            kRendered);
 }
 
 TEST(Others, WhereNoShadowFallsTheirPixelsStay) {
@@ -156,7 +166,8 @@ TEST(Others, WhereNoShadowFallsTheirPixelsStay) {
 TEST(Others, WhatTheDepthImageHasNearerStaysInFront) {
   RenderParams p = params();
   p.depth = cv::Mat(kHeight, kWidth, CV_32F, cv::Scalar(5.0));
-  const Eigen::Vector3d place = kCentre + Eigen::Vector3d(0.0, 0.0, 0.22);  // above the table's far end
+  const Eigen::Vector3d place =
+      kCentre + Eigen::Vector3d(0.0, 0.0, 0.22);  // above the table's far end
   const cv::Point middle = TwoBalls(params()).at(place);
   p.depth(cv::Rect(0, 0, middle.x, kHeight)).setTo(0.3);
   const TwoBalls s(p);
@@ -178,11 +189,13 @@ TEST(Others, AMatteStaysInFrontAndItsGreysMix) {
   p.matte(cv::Rect(middle.x, 0, 6, kHeight)).setTo(128);
   const TwoBalls s(p);
   const FrameOutput out = s.drawn(place - kCentre), free = bare.drawn(place - kCentre);
-  const cv::Point full = middle - cv::Point(3, 0), half = middle + cv::Point(3, 0), open = middle + cv::Point(9, 0);
+  const cv::Point full = middle - cv::Point(3, 0), half = middle + cv::Point(3, 0),
+                  open = middle + cv::Point(9, 0);
   EXPECT_EQ(out.bgr.at<cv::Vec3b>(full), s.key.bgr.at<cv::Vec3b>(full));
   EXPECT_EQ(out.bgr.at<cv::Vec3b>(open), free.bgr.at<cv::Vec3b>(open));
   for (int c = 0; c < 3; ++c) {
-    const float mixed = 0.5f * (linearFromCode(s.key.bgr.at<cv::Vec3b>(half)[c]) + linearFromCode(free.bgr.at<cv::Vec3b>(half)[c]));
+    const float mixed = 0.5f * (linearFromCode(s.key.bgr.at<cv::Vec3b>(half)[c]) +
+                                linearFromCode(free.bgr.at<cv::Vec3b>(half)[c]));
     EXPECT_NEAR(linearFromCode(out.bgr.at<cv::Vec3b>(half)[c]), mixed, 0.01f) << c;
   }
 }

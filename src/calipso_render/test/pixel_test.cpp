@@ -34,11 +34,16 @@ TEST(PixelFormat, RefusesWhatItCannotEdit) {
 }
 
 TEST(PixelFormat, WritesOnlyChangedPixelsAndKeepsAlpha) {
-  for (const auto& [name, count] : {std::pair<std::string, int>{"bgr8", 3}, {"rgb8", 3}, {"mono8", 1}, {"bgra8", 4}, {"rgba8", 4}}) {
+  for (const auto& [name, count] : {std::pair<std::string, int>{"bgr8", 3},
+                                    {"rgb8", 3},
+                                    {"mono8", 1},
+                                    {"bgra8", 4},
+                                    {"rgba8", 4}}) {
     const PixelFormat format = pixelFormat(name);
     ASSERT_EQ(channels(format), count);
     cv::Mat image(2, 2, CV_8UC(count));
-    for (std::size_t i = 0; i < image.total() * count; ++i) image.data[i] = static_cast<std::uint8_t>(40 + 3 * i);
+    for (std::size_t i = 0; i < image.total() * count; ++i)
+      image.data[i] = static_cast<std::uint8_t>(40 + 3 * i);
     const cv::Mat before = image.clone();
     cv::Mat bgr = toBgr(image, format).clone();
     bgr.at<cv::Vec3b>(1, 0) = {9, 9, 9};
@@ -64,13 +69,17 @@ TEST(Noise, EstimatesWhatWasAdded) {
     frames.push_back(frame);
   }
   const cv::Mat everywhere(120, 120, CV_8U, cv::Scalar(255));
-  EXPECT_NEAR(NoiseModel::estimate(frames, everywhere).deviation(1, 100.0f), 3.0f, 0.3f);       // 10 %: sampling
-  EXPECT_NEAR(NoiseModel::estimate({frames[0]}, everywhere).deviation(1, 100.0f), 3.0f, 0.3f);  // one picture
+  EXPECT_NEAR(NoiseModel::estimate(frames, everywhere).deviation(1, 100.0f), 3.0f,
+              0.3f);  // 10 %: sampling
+  EXPECT_NEAR(NoiseModel::estimate({frames[0]}, everywhere).deviation(1, 100.0f), 3.0f,
+              0.3f);  // one picture
 }
 
 TEST(Noise, StillPicturesHaveNone) {
   const std::vector<cv::Mat> frames(3, cv::Mat(64, 64, CV_8UC3, cv::Scalar::all(90)));
-  EXPECT_LT(NoiseModel::estimate(frames, cv::Mat(64, 64, CV_8U, cv::Scalar(255))).deviation(0, 90.0f), 0.4f);  // rounding
+  EXPECT_LT(
+      NoiseModel::estimate(frames, cv::Mat(64, 64, CV_8U, cv::Scalar(255))).deviation(0, 90.0f),
+      0.4f);  // rounding
 }
 
 TEST(NoiseField, HangsOnStampAndPixelAlone) {
@@ -92,16 +101,23 @@ TEST(NoiseField, HangsOnStampAndPixelAlone) {
 TEST(SampleBicubic, ReproducesAPlaneAndThePixelsThemselves) {
   cv::Mat plane(12, 15, CV_32FC4), random(12, 15, CV_32FC4);
   for (int v = 0; v < 12; ++v) {
-    for (int u = 0; u < 15; ++u) plane.at<cv::Vec4f>(v, u) = cv::Vec4f(1.0f + 2.0f * u, 3.0f + v, 50.0f + u - v, 4.0f);
+    for (int u = 0; u < 15; ++u)
+      plane.at<cv::Vec4f>(v, u) = cv::Vec4f(1.0f + 2.0f * u, 3.0f + v, 50.0f + u - v, 4.0f);
   }
   cv::RNG numbers(2);
   numbers.fill(random, cv::RNG::UNIFORM, 0.0, 1.0);
   for (int v = 0; v < 12; ++v) {
-    for (int u = 0; u < 15; ++u) EXPECT_LT(cv::norm(sampleBicubic(random, float(u), float(v)) - random.at<cv::Vec4f>(v, u)), 1e-6) << u << ", " << v;
+    for (int u = 0; u < 15; ++u)
+      EXPECT_LT(cv::norm(sampleBicubic(random, float(u), float(v)) - random.at<cv::Vec4f>(v, u)),
+                1e-6)
+          << u << ", " << v;
   }
   for (float v = 1.0f; v < 10.0f; v += 0.37f) {
     for (float u = 1.0f; u < 13.0f; u += 0.41f) {
-      EXPECT_LT(cv::norm(sampleBicubic(plane, u, v) - cv::Vec4f(1.0f + 2.0f * u, 3.0f + v, 50.0f + u - v, 4.0f)), 1e-4) << u << ", " << v;
+      EXPECT_LT(cv::norm(sampleBicubic(plane, u, v) -
+                         cv::Vec4f(1.0f + 2.0f * u, 3.0f + v, 50.0f + u - v, 4.0f)),
+                1e-4)
+          << u << ", " << v;
     }
   }
 }

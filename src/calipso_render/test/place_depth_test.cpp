@@ -22,18 +22,24 @@ Camera cameraAt(double right) {
   return c;
 }
 
-std::uint8_t wallColour(double x, double y) { return cv::saturate_cast<std::uint8_t>(120.0 + 50.0 * std::sin(23.0 * x) * std::cos(17.0 * y) + 40.0 * std::sin(7.0 * x + 5.0 * y)); }
+std::uint8_t wallColour(double x, double y) {
+  return cv::saturate_cast<std::uint8_t>(120.0 + 50.0 * std::sin(23.0 * x) * std::cos(17.0 * y) +
+                                         40.0 * std::sin(7.0 * x + 5.0 * y));
+}
 
-// A painted wall, and before it, in every picture at another place of the wall, an object that is 1 m away.
+// A painted wall, and before it, in every picture at another place of the wall, an object that is 1
+// m away.
 ClipFrame frameFrom(double right) {
   ClipFrame f{cv::Mat(kHigh, kWide, CV_8UC3), cv::Mat::zeros(kHigh, kWide, CV_8U), cameraAt(right)};
   for (int v = 0; v < kHigh; ++v) {
     for (int u = 0; u < kWide; ++u) {
-      const Eigen::Vector3d p = kWall * f.camera.ray(u, v) + f.camera.world_from_camera.translation();
+      const Eigen::Vector3d p =
+          kWall * f.camera.ray(u, v) + f.camera.world_from_camera.translation();
       f.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(wallColour(p.x(), p.y()));
     }
   }
-  const cv::Rect object(kObject.x - cvRound(right * f.camera.fx / kPost), kObject.y, kObject.width, kObject.height);
+  const cv::Rect object(kObject.x - cvRound(right * f.camera.fx / kPost), kObject.y, kObject.width,
+                        kObject.height);
   cv::rectangle(f.bgr, object, cv::Scalar::all(255), cv::FILLED);
   cv::rectangle(f.labels, object, cv::Scalar(1), cv::FILLED);
   return f;
@@ -62,7 +68,8 @@ TEST(PlaceDepth, FramesThatLookBehindAnObjectTellIt) {
   depth.colRange(0, 20).setTo(2.0f);  // another depth that could be behind it
   const cv::Mat nearness = placeNearness(clip, {}, depth, 2);
   for (int v = kObject.y; v < kObject.br().y; ++v) {
-    for (int u = kObject.x; u < kObject.br().x; ++u) ASSERT_FLOAT_EQ(nearness.at<float>(v, u), 1.0f / kWall) << u << ", " << v;
+    for (int u = kObject.x; u < kObject.br().x; ++u)
+      ASSERT_FLOAT_EQ(nearness.at<float>(v, u), 1.0f / kWall) << u << ", " << v;
   }
 }
 
@@ -70,12 +77,14 @@ TEST(PlaceDepth, OtherFramesComeIntoTheKeyViewByIt) {
   const ClipFrame key = frameFrom(0.0), other = frameFrom(0.3);
   const cv::Mat nearness(kHigh, kWide, CV_32F, cv::Scalar(1.0f / kWall));
   cv::Mat warped;
-  cv::remap(other.bgr, warped, viewWarp(nearness, other.camera, key.camera), cv::noArray(), cv::INTER_LINEAR);
+  cv::remap(other.bgr, warped, viewWarp(nearness, other.camera, key.camera), cv::noArray(),
+            cv::INTER_LINEAR);
   const cv::Rect behind(kObject.x, kObject.y, 20, 20);
   for (int v = behind.y; v < behind.br().y; ++v) {
     for (int u = behind.x; u < behind.br().x; ++u) {
       const Eigen::Vector3d p = kWall * key.camera.ray(u, v);
-      ASSERT_NEAR(warped.at<cv::Vec3b>(v, u)[0], wallColour(p.x(), p.y()), 6);  // what linear interpolation leaves
+      ASSERT_NEAR(warped.at<cv::Vec3b>(v, u)[0], wallColour(p.x(), p.y()),
+                  6);  // what linear interpolation leaves
     }
   }
 }
@@ -83,12 +92,14 @@ TEST(PlaceDepth, OtherFramesComeIntoTheKeyViewByIt) {
 TEST(PlaceDepth, FromAnotherCameraANearPlaceHidesAFarOne) {
   cv::Mat nearness(kHigh, kWide, CV_32F, cv::Scalar(1.0f / kWall));
   nearness.colRange(60, 80).setTo(1.0f / kPost);
-  EXPECT_LE(cv::countNonZero(nearnessFrom(nearness, cameraAt(0.0), cameraAt(0.0)) != nearness), kHigh);  // squares of two: a column more at most
-  // 0.2 m to the right the post is seen 30 px farther left, the wall 7.5 px: beside the post the wall goes on.
+  EXPECT_LE(cv::countNonZero(nearnessFrom(nearness, cameraAt(0.0), cameraAt(0.0)) != nearness),
+            kHigh);  // squares of two: a column more at most
+  // 0.2 m to the right the post is seen 30 px farther left, the wall 7.5 px: beside the post the
+  // wall goes on.
   const cv::Mat from = nearnessFrom(nearness, cameraAt(0.0), cameraAt(0.2));
   EXPECT_FLOAT_EQ(from.at<float>(40, 40), 1.0f / kPost);
   EXPECT_FLOAT_EQ(from.at<float>(40, 28), 1.0f / kWall);
-  EXPECT_FLOAT_EQ(from.at<float>(40, 60), 1.0f / kWall);  // the post hid it
+  EXPECT_FLOAT_EQ(from.at<float>(40, 60), 1.0f / kWall);         // the post hid it
   EXPECT_FLOAT_EQ(from.at<float>(40, kWide - 1), 1.0f / kWall);  // outside the key frame
 }
 

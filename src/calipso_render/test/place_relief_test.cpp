@@ -12,7 +12,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kWide = 160, kHigh = 120;
-constexpr float kWallAway = 3.0f;      // m, along y
+constexpr float kWallAway = 3.0f;        // m, along y
 const cv::Rect kObject(60, 40, 40, 60);  // across the edge between floor and wall
 constexpr float kObjectAway = 2.0f;
 
@@ -21,8 +21,10 @@ Camera camera() {
   Camera c;
   c.width = kWide, c.height = kHigh, c.fx = c.fy = 120.0, c.cx = 79.5, c.cy = 59.5;
   Eigen::Matrix3d R;
-  R.col(0) = Eigen::Vector3d::UnitX(), R.col(1) = -Eigen::Vector3d::UnitZ(), R.col(2) = Eigen::Vector3d::UnitY();
-  c.world_from_camera.linear() = R, c.world_from_camera.translation() = Eigen::Vector3d(0.0, 0.0, 1.0);
+  R.col(0) = Eigen::Vector3d::UnitX(), R.col(1) = -Eigen::Vector3d::UnitZ(),
+  R.col(2) = Eigen::Vector3d::UnitY();
+  c.world_from_camera.linear() = R,
+  c.world_from_camera.translation() = Eigen::Vector3d(0.0, 0.0, 1.0);
   return c;
 }
 
@@ -35,7 +37,8 @@ std::vector<SupportPlane> floorPlane() {
 bool isWall(int v) { return static_cast<float>(camera().ray(0, v).y()) * kWallAway < 1.0f; }
 
 struct Room {
-  cv::Mat depth = cv::Mat(kHigh, kWide, CV_32F), scenery = depth.clone(), labels = cv::Mat::zeros(kHigh, kWide, CV_8U);
+  cv::Mat depth = cv::Mat(kHigh, kWide, CV_32F), scenery = depth.clone(),
+          labels = cv::Mat::zeros(kHigh, kWide, CV_8U);
 
   Room() {
     for (int v = 0; v < kHigh; ++v) {
@@ -45,7 +48,9 @@ struct Room {
     scenery = 1.0f / depth;
     depth(kObject) = kObjectAway, scenery(kObject) = 0.0f, labels(kObject) = 1;
   }
-  PlaceSurfaces surfaces() const { return findSurfaces(scenery, depth, labels, floorPlane(), camera()); }
+  PlaceSurfaces surfaces() const {
+    return findSurfaces(scenery, depth, labels, floorPlane(), camera());
+  }
 };
 
 const Eigen::Vector3f kSun = Eigen::Vector3f(-0.3f, -0.6f, 0.7f).normalized();
@@ -66,7 +71,9 @@ TEST(PlaceRelief, AWallGoesOnBehindAnObjectAndMeetsTheFloorThere) {
 }
 
 TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereTheSunComesFromBehind) {
-  EXPECT_TRUE(findRelief(findSurfaces(cv::Mat(), cv::Mat(), Room().labels, floorPlane(), camera()), kSun).empty());
+  EXPECT_TRUE(
+      findRelief(findSurfaces(cv::Mat(), cv::Mat(), Room().labels, floorPlane(), camera()), kSun)
+          .empty());
   EXPECT_TRUE(findRelief(Room().surfaces(), Eigen::Vector3f(0.0f, 0.6f, 0.8f)).empty());
 }
 
@@ -74,14 +81,19 @@ TEST(PlaceRelief, WhatIsBehindAnObjectIsNotBeforeIt) {
   Room room;
   room.depth(kObject) = 3.5f;  // seen through a hole in the wall
   const PlaceSurfaces surfaces = room.surfaces();
-  EXPECT_EQ(surfaces.label.at<std::uint8_t>(45, 80), PlaceSurfaces::kUnknown);  // above the floor's horizon
+  EXPECT_EQ(surfaces.label.at<std::uint8_t>(45, 80),
+            PlaceSurfaces::kUnknown);  // above the floor's horizon
 }
 
 TEST(PlaceRelief, APlaneDoesNotGoOnBetweenItsPiecesWhereSomethingFartherIsSeen) {
-  Room room;  // of the wall two pieces are left, 5 m behind it is another one; an object stands before all of them
+  Room room;  // of the wall two pieces are left, 5 m behind it is another one; an object stands
+              // before all of them
   const cv::Rect gap(40, 0, 80, kHigh), object(0, 20, kWide, 10);
   for (int v = 0; v < kHigh; ++v) {
-    for (int u = gap.x; u < gap.br().x; ++u) room.depth.at<float>(v, u) = std::min(8.0f, room.depth.at<float>(v, u) == kObjectAway ? 8.0f : isWall(v) ? 8.0f : kWallAway);
+    for (int u = gap.x; u < gap.br().x; ++u)
+      room.depth.at<float>(v, u) = std::min(8.0f, room.depth.at<float>(v, u) == kObjectAway ? 8.0f
+                                                  : isWall(v)                               ? 8.0f
+                                                              : kWallAway);
   }
   room.labels = 0, room.labels(object) = 1;
   room.scenery = 1.0f / room.depth;
@@ -121,7 +133,8 @@ TEST(PlaceRelief, ItsUmbraIsMeasuredWhereItsShadeIsSeen) {
 
 TEST(PlaceRelief, UnseenShadeIsPredictedFromThatOfThePlanes) {
   Relief relief = findRelief(Room().surfaces(), kSun);
-  const cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar::all(180.0)), sun(kHigh, kWide, CV_32F, cv::Scalar(1.0f));
+  const cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar::all(180.0)),
+      sun(kHigh, kWide, CV_32F, cv::Scalar(1.0f));
   Light light;  // even ambient light
   light.direction = kSun;
   findUmbra(light, plate, plate, sun, Room().labels, floorPlane(), {0.5f, 0.5f, 0.5f}, relief);
@@ -157,7 +170,8 @@ TEST(PlaceView, SeesTheReliefBeforeThePlanesBehindIt) {
 }
 
 TEST(Inpaint, CopiesComeFromTheSameSurface) {
-  cv::Mat picture(96, 96, CV_32FC3), surface(96, 96, CV_8U, cv::Scalar(1)), hole = cv::Mat::zeros(96, 96, CV_8U);
+  cv::Mat picture(96, 96, CV_32FC3), surface(96, 96, CV_8U, cv::Scalar(1)),
+      hole = cv::Mat::zeros(96, 96, CV_8U);
   cv::RNG random(1);
   random.fill(picture, cv::RNG::NORMAL, 100.0, 4.0);
   picture(cv::Rect(0, 40, 96, 56)) += cv::Scalar::all(80.0);
@@ -171,7 +185,9 @@ TEST(Inpaint, CopiesComeFromTheSameSurface) {
     for (int u = 0; u < 96; ++u) {
       const cv::Vec2s from = filled.origin.at<cv::Vec2s>(v, u);
       if (from[0] < 0) continue;
-      ++copied, foreign += surface.at<std::uint8_t>(from[1], from[0]) != surface.at<std::uint8_t>(v, u) && std::abs(v - 56) > 3;
+      ++copied,
+          foreign += surface.at<std::uint8_t>(from[1], from[0]) != surface.at<std::uint8_t>(v, u) &&
+                     std::abs(v - 56) > 3;
     }
   }
   EXPECT_GT(copied, 1000);

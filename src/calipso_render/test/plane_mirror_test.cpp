@@ -21,7 +21,8 @@ const cv::Vec3f kSky(0.6f, 0.5f, 0.4f), kObject(0.05f, 0.1f, 0.3f);
 struct Mirrored {
   Surface surface = makeSurface(ballAt(kCentre));
   Actor actor = makeActor(surface, surface.key_vertices, camera());
-  MirrorImage image = mirrorImage({&actor}, [](int, const SurfacePoint&) { return kObject; }, table(), camera(), cv::Mat());
+  MirrorImage image = mirrorImage(
+      {&actor}, [](int, const SurfacePoint&) { return kObject; }, table(), camera(), cv::Mat());
   cv::Mat known = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255));
 
   Mirrored() {
@@ -54,11 +55,15 @@ cv::Mat tablePicture(const cv::Mat& added) {
 TEST(PlaneMirror, ImageLiesWhereAPointsMirrorImageIsSeen) {
   const Mirrored m;
   // The lowest point of the ball, 10 cm over the table, is mirrored 10 cm below it.
-  const Eigen::Vector2d below = camera().project(Eigen::Vector3d(camera().world_from_camera.inverse() * Eigen::Vector3d(0.0, 0.4, -0.2)));
+  const Eigen::Vector2d below = camera().project(
+      Eigen::Vector3d(camera().world_from_camera.inverse() * Eigen::Vector3d(0.0, 0.4, -0.2)));
   EXPECT_GT(m.image.cover.at<float>(cvRound(below.y()), cvRound(below.x())), 0.0f);
-  // All of it is seen through the table: below the lowest row of which the plane shows what is behind the ball nothing is mirrored.
-  const Eigen::Vector2d lowest = camera().project(Eigen::Vector3d(camera().world_from_camera.inverse() * Eigen::Vector3d(0.0, 0.4, -0.2 - 1.5 * kBallRadius)));
-  for (int v = cvRound(lowest.y()) + 1; v < kHeight; ++v) EXPECT_EQ(cv::countNonZero(m.image.cover.row(v)), 0);
+  // All of it is seen through the table: below the lowest row of which the plane shows what is
+  // behind the ball nothing is mirrored.
+  const Eigen::Vector2d lowest = camera().project(Eigen::Vector3d(
+      camera().world_from_camera.inverse() * Eigen::Vector3d(0.0, 0.4, -0.2 - 1.5 * kBallRadius)));
+  for (int v = cvRound(lowest.y()) + 1; v < kHeight; ++v)
+    EXPECT_EQ(cv::countNonZero(m.image.cover.row(v)), 0);
 }
 
 TEST(PlaneMirror, ReflectanceGrowsTowardsGrazing) {
@@ -73,12 +78,14 @@ TEST(PlaneMirror, FindsStrengthAndSurroundingsOfAPolishedTable) {
   const Mirrored m;
   PlaneMirror truth;
   truth.strength = kTrueStrength, truth.surroundings = kSky, truth.slope = 0.02f;
-  const PlaneMirror found = establishMirror(m.image, tablePicture(addedBy(truth, m.image)), m.known);
+  const PlaneMirror found =
+      establishMirror(m.image, tablePicture(addedBy(truth, m.image)), m.known);
   ASSERT_TRUE(found.established());
   EXPECT_FLOAT_EQ(found.slope, 0.02f);
   // What it adds is one colour: strength and surroundings are known together only.
   const cv::Mat cover = m.image.cover > 0.0f;
-  const cv::Scalar wanted = cv::mean(addedBy(truth, m.image), cover), got = cv::mean(addedBy(found, m.image), cover);
+  const cv::Scalar wanted = cv::mean(addedBy(truth, m.image), cover),
+                   got = cv::mean(addedBy(found, m.image), cover);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], wanted[c], 0.15 * std::abs(wanted[c]));
 }
 
@@ -164,9 +171,11 @@ TEST(PlaneMirror, GoesWithTheObject) {
   ASSERT_GT(cv::countNonZero(inner), 50);
   const cv::Mat before = bgr.clone();
   const cv::Vec3b plain = tableColour(60, 60);
-  const cv::Scalar was = cv::mean(bgr, inner), gone = cv::mean(renderer.composite(frameOf(bgr, *p, 0.0, true)).bgr, inner);
+  const cv::Scalar was = cv::mean(bgr, inner),
+                   gone = cv::mean(renderer.composite(frameOf(bgr, *p, 0.0, true)).bgr, inner);
   EXPECT_EQ(cv::norm(bgr, before, cv::NORM_INF), 0.0);
-  for (int c = 0; c < 3; ++c) EXPECT_LT(std::abs(gone[c] - plain[c]), 0.35 * std::abs(was[c] - plain[c])) << "channel " << c;
+  for (int c = 0; c < 3; ++c)
+    EXPECT_LT(std::abs(gone[c] - plain[c]), 0.35 * std::abs(was[c] - plain[c])) << "channel " << c;
   // At rest every pixel is the video's; moved by 15 cm the reflection is there and no longer here.
   EXPECT_EQ(cv::norm(renderer.composite(frameOf(bgr, *p, 0.0, false)).bgr, bgr, cv::NORM_INF), 0.0);
   const cv::Mat moved = renderer.composite(frameOf(bgr, *p, 0.15, false)).bgr;

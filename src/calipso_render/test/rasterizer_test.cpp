@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <utility>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "calipso_render/edge_coverage.hpp"
 #include "calipso_render/shadow_map.hpp"
@@ -13,7 +13,8 @@ namespace calipso::render {
 namespace {
 
 // A triangle on the picture plane with nearness z.
-ScreenMesh triangle(const Triangles& triangles, Eigen::Vector2f a, Eigen::Vector2f b, Eigen::Vector2f c, float z) {
+ScreenMesh triangle(const Triangles& triangles, Eigen::Vector2f a, Eigen::Vector2f b,
+                    Eigen::Vector2f c, float z) {
   ScreenMesh mesh;
   mesh.points = {{a.x(), a.y(), z}, {b.x(), b.y(), z}, {c.x(), c.y(), z}};
   mesh.triangles = &triangles;
@@ -25,7 +26,8 @@ const Triangles kOne = {{0, 1, 2}};
 TEST(VisibilityBuffer, NearerSurfaceWinsWhateverTheOrder) {
   for (const bool near_first : {true, false}) {
     VisibilityBuffer buffer({0, 0, 20, 20});
-    const ScreenMesh near = triangle(kOne, {0, 0}, {19, 0}, {0, 19}, 2.0f), far = triangle(kOne, {0, 0}, {19, 0}, {0, 19}, 1.0f);
+    const ScreenMesh near = triangle(kOne, {0, 0}, {19, 0}, {0, 19}, 2.0f),
+                     far = triangle(kOne, {0, 0}, {19, 0}, {0, 19}, 1.0f);
     buffer.draw(near_first ? near : far, near_first ? 0 : 1);
     buffer.draw(near_first ? far : near, near_first ? 1 : 0);
     EXPECT_EQ(VisibilityBuffer::objectOf(buffer.idAt(3, 3)), 0);
@@ -42,18 +44,21 @@ TEST(VisibilityBuffer, SharedEdgesHaveNoCracks) {
   VisibilityBuffer buffer({0, 0, 21, 21});
   buffer.draw(mesh, 0);
   for (int v = 0; v <= 20; ++v) {
-    for (int u = 0; u <= 20; ++u) EXPECT_NE(buffer.idAt(u, v), VisibilityBuffer::kNothing) << u << ", " << v;
+    for (int u = 0; u <= 20; ++u)
+      EXPECT_NE(buffer.idAt(u, v), VisibilityBuffer::kNothing) << u << ", " << v;
   }
 }
 
 TEST(VisibilityBuffer, CoversWhatTheEdgesEnclose) {
-  // Against the edges' signs at every pixel, for triangles of all shapes: slivers, nearly level, far beyond the picture.
+  // Against the edges' signs at every pixel, for triangles of all shapes: slivers, nearly level,
+  // far beyond the picture.
   cv::RNG random(5);
   for (int k = 0; k < 300; ++k) {
     Eigen::Vector2f p[3];
     for (Eigen::Vector2f& x : p) {
       const float spread = k % 4 == 0 ? 3000.0f : 40.0f;
-      x = {random.uniform(-spread, spread), k % 5 == 0 ? 17.3f + random.uniform(-0.01f, 0.01f) : random.uniform(-spread, spread)};
+      x = {random.uniform(-spread, spread),
+           k % 5 == 0 ? 17.3f + random.uniform(-0.01f, 0.01f) : random.uniform(-spread, spread)};
     }
     const ScreenMesh mesh = triangle(kOne, p[0], p[1], p[2], 1.0f);
     VisibilityBuffer buffer({0, 0, 33, 29});
@@ -62,7 +67,8 @@ TEST(VisibilityBuffer, CoversWhatTheEdgesEnclose) {
       for (int u = 0; u < 33; ++u) {
         double least = 1e30, greatest = -1e30;  // signed distances to the edges, px
         for (int i = 0; i < 3; ++i) {
-          const Eigen::Vector2d a = p[i].cast<double>(), e = p[(i + 1) % 3].cast<double>() - a, x = Eigen::Vector2d(u, v) - a;
+          const Eigen::Vector2d a = p[i].cast<double>(), e = p[(i + 1) % 3].cast<double>() - a,
+                                x = Eigen::Vector2d(u, v) - a;
           const double distance = (e.x() * x.y() - e.y() * x.x()) / (e.norm() + 1e-12);
           least = std::min(least, distance), greatest = std::max(greatest, distance);
         }
@@ -93,7 +99,8 @@ TEST(Barycentric, IsPerspectiveCorrect) {
   const Eigen::Vector3f w(0.2f, 0.5f, 0.3f);
   const Eigen::Vector3f p = w[0] * world[0] + w[1] * world[1] + w[2] * world[2];
   const Eigen::Vector2d q = camera.project(p.cast<double>());
-  EXPECT_LT((barycentric(mesh, 0, float(q.x()), float(q.y())) - w).norm(), 1e-4f);  // float round-off
+  EXPECT_LT((barycentric(mesh, 0, float(q.x()), float(q.y())) - w).norm(),
+            1e-4f);  // float round-off
 }
 
 TEST(EdgeCoverage, MeasuresAreaWithinAPixel) {
@@ -141,14 +148,14 @@ TEST(ShadowMap, FullShadeFullLightAndHalfAtTheEdge) {
   const Eigen::Vector3f up = Eigen::Vector3f::UnitZ();
   EXPECT_FLOAT_EQ(map.visibility({0, 0, 0}, up), 0.0f);
   EXPECT_FLOAT_EQ(map.visibility({2, 0, 0}, up), 1.0f);
-  EXPECT_FLOAT_EQ(map.visibility({0, 0, 2}, up), 1.0f);      // above the roof
-  EXPECT_NEAR(map.visibility({1, 0, 0}, up), 0.5f, 0.1f);    // half of the disc, by symmetry
+  EXPECT_FLOAT_EQ(map.visibility({0, 0, 2}, up), 1.0f);    // above the roof
+  EXPECT_NEAR(map.visibility({1, 0, 0}, up), 0.5f, 0.1f);  // half of the disc, by symmetry
 }
 
 TEST(ShadowMap, PenumbraGrowsWithTheBlockersHeight) {
   const ShadowMap map({{&kRoof, &kRoofFaces}}, Eigen::Vector3d::UnitZ(), {400, 0.1, 32});
   const Eigen::Vector3f up = Eigen::Vector3f::UnitZ();
-  EXPECT_GT(map.visibility({0.95f, 0, 0}, up), 0.05f);        // 0.1 m wide half penumbra at the ground
+  EXPECT_GT(map.visibility({0.95f, 0, 0}, up), 0.05f);  // 0.1 m wide half penumbra at the ground
   EXPECT_FLOAT_EQ(map.visibility({0.95f, 0, 0.9f}, up), 0.0f);  // 0.01 m just below the roof
 }
 
@@ -162,7 +169,8 @@ TEST(ShadowMap, UniformDiscsAreUniform) {
       const std::optional<float> uniform = map.uniform({x, y, 0.0f}, up, 0.1f);
       if (!uniform) continue;
       ++told;
-      for (const auto& [dx, dy] : {std::pair(0.0f, 0.0f), {0.1f, 0.0f}, {-0.1f, 0.0f}, {0.0f, 0.1f}, {0.0f, -0.1f}}) {
+      for (const auto& [dx, dy] :
+           {std::pair(0.0f, 0.0f), {0.1f, 0.0f}, {-0.1f, 0.0f}, {0.0f, 0.1f}, {0.0f, -0.1f}}) {
         ASSERT_EQ(map.visibility({x + dx, y + dy, 0.0f}, up), *uniform) << x << ", " << y;
       }
     }
@@ -171,7 +179,9 @@ TEST(ShadowMap, UniformDiscsAreUniform) {
 }
 
 TEST(ShadowMap, WithoutOccludersNothingIsShaded) {
-  EXPECT_FLOAT_EQ(ShadowMap({}, Eigen::Vector3d::UnitZ(), {}).visibility({0, 0, 0}, Eigen::Vector3f::UnitZ()), 1.0f);
+  EXPECT_FLOAT_EQ(
+      ShadowMap({}, Eigen::Vector3d::UnitZ(), {}).visibility({0, 0, 0}, Eigen::Vector3f::UnitZ()),
+      1.0f);
 }
 
 }  // namespace

@@ -32,7 +32,9 @@ constexpr int kClipFrames = 3;
 class RenderNodeTest : public ::testing::Test {
  protected:
   // @param step the ball's way from frame to frame
-  explicit RenderNodeTest(const std::string& space = "", const Eigen::Vector3d& step = Eigen::Vector3d::Zero()) : nh_(space), step_(step) {
+  explicit RenderNodeTest(const std::string& space = "",
+                          const Eigen::Vector3d& step = Eigen::Vector3d::Zero())
+      : nh_(space), step_(step) {
     namespace t = topics;
     info_ = nh_.advertise<calipso_msgs::ClipInfo>(t::kClipInfo, 1, true);
     clip_ = nh_.advertise<sensor_msgs::Image>(t::kClipImage, 10);
@@ -42,17 +44,23 @@ class RenderNodeTest : public ::testing::Test {
     image_ = nh_.advertise<sensor_msgs::Image>(t::kImage, 10);
     camera_ = nh_.advertise<sensor_msgs::CameraInfo>(t::kCameraInfo, 10);
     state_ = nh_.advertise<calipso_msgs::SimulationState>(t::kState, 10);
-    edited_sub_ = nh_.subscribe<sensor_msgs::Image>(t::kImageEdited, 10, [this](const sensor_msgs::ImageConstPtr& m) { edited_.push_back(*m); });
-    provenance_sub_ = nh_.subscribe<sensor_msgs::Image>(t::kProvenance, 10, [this](const sensor_msgs::ImageConstPtr& m) { provenance_.push_back(*m); });
-    status_sub_ = nh_.subscribe<calipso_msgs::NodeStatus>(t::kStatus, 10, [this](const calipso_msgs::NodeStatusConstPtr& m) {
-      if (m->node == "render") status_ = *m;
-    });
+    edited_sub_ = nh_.subscribe<sensor_msgs::Image>(
+        t::kImageEdited, 10,
+        [this](const sensor_msgs::ImageConstPtr& m) { edited_.push_back(*m); });
+    provenance_sub_ = nh_.subscribe<sensor_msgs::Image>(
+        t::kProvenance, 10,
+        [this](const sensor_msgs::ImageConstPtr& m) { provenance_.push_back(*m); });
+    status_sub_ = nh_.subscribe<calipso_msgs::NodeStatus>(
+        t::kStatus, 10, [this](const calipso_msgs::NodeStatusConstPtr& m) {
+          if (m->node == "render") status_ = *m;
+        });
     sendCameraPose();
   }
 
   static bool waitFor(const std::function<bool()>& condition, double seconds = 60.0) {
     const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
-    while (ros::ok() && !condition() && ros::WallTime::now() < end) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.02));
+    while (ros::ok() && !condition() && ros::WallTime::now() < end)
+      ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.02));
     return condition();
   }
 
@@ -160,7 +168,8 @@ class RenderNodeWithMotionTest : public RenderNodeTest {
       d.header = header(k);
       d.objects.resize(1);
       d.objects[0].object = "ball", d.objects[0].tracks = 20;
-      d.objects[0].world_from_object = toMsg(ballAt(kCentre + (k == kClipFrames - 1 ? 0 : k) * step_).world_from_object);
+      d.objects[0].world_from_object =
+          toMsg(ballAt(kCentre + (k == kClipFrames - 1 ? 0 : k) * step_).world_from_object);
       all.frames.push_back(d);
     }
     return all;
@@ -170,23 +179,33 @@ class RenderNodeWithMotionTest : public RenderNodeTest {
 };
 
 TEST_F(RenderNodeWithMotionTest, LearnsFromFramesWhosePosesFit) {
-  ASSERT_TRUE(waitFor([&] { return clip_.getNumSubscribers() > 0 && clip_camera_.getNumSubscribers() > 0 && segmentation_.getNumSubscribers() > 0 &&
-                                   flow_status_.getNumSubscribers() > 1 && dynamics_.getNumSubscribers() > 0; }));
+  ASSERT_TRUE(waitFor([&] {
+    return clip_.getNumSubscribers() > 0 && clip_camera_.getNumSubscribers() > 0 &&
+           segmentation_.getNumSubscribers() > 0 && flow_status_.getNumSubscribers() > 1 &&
+           dynamics_.getNumSubscribers() > 0;
+  }));
   sendFlowStatus(calipso_msgs::NodeStatus::PREPARING);
   sendClip();
-  ASSERT_TRUE(waitFor([&] { return status_.message.find("motion in the clip") != std::string::npos; })) << status_.message;
+  ASSERT_TRUE(waitFor([&] {
+    return status_.message.find("motion in the clip") != std::string::npos;
+  })) << status_.message;
   dynamics_.publish(dynamics());
-  ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; })) << status_.message;
+  ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; }))
+      << status_.message;
   EXPECT_NE(status_.message.find("from 2 frames"), std::string::npos) << status_.message;
   EXPECT_NE(status_.message.find("2 of 3 poses"), std::string::npos) << status_.message;
 }
 
 TEST_F(RenderNodeTest, PreparesAndEditsInOrder) {
-  ASSERT_TRUE(waitFor([&] { return image_.getNumSubscribers() > 0 && clip_.getNumSubscribers() > 0 && clip_camera_.getNumSubscribers() > 0 &&
-                                   segmentation_.getNumSubscribers() > 0 && state_.getNumSubscribers() > 0 && edited_sub_.getNumPublishers() > 0 &&
-                                   provenance_sub_.getNumPublishers() > 0; }));
+  ASSERT_TRUE(waitFor([&] {
+    return image_.getNumSubscribers() > 0 && clip_.getNumSubscribers() > 0 &&
+           clip_camera_.getNumSubscribers() > 0 && segmentation_.getNumSubscribers() > 0 &&
+           state_.getNumSubscribers() > 0 && edited_sub_.getNumPublishers() > 0 &&
+           provenance_sub_.getNumPublishers() > 0;
+  }));
   sendClip();
-  ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; })) << status_.message;
+  ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; }))
+      << status_.message;
   EXPECT_EQ(status_.clip_frames, static_cast<unsigned>(kClipFrames));
 
   // The later frame's state comes first: nothing may overtake.
@@ -198,13 +217,17 @@ TEST_F(RenderNodeTest, PreparesAndEditsInOrder) {
   state_.publish(state(1, true));
   state_.publish(state(2, true));
   state_.publish(state(0, false));
-  ASSERT_TRUE(waitFor([&] { return edited_.size() == 3 && provenance_.size() == 3; })) << edited_.size();
+  ASSERT_TRUE(waitFor([&] { return edited_.size() == 3 && provenance_.size() == 3; }))
+      << edited_.size();
   for (int k = 0; k < 3; ++k) EXPECT_EQ(edited_[k].header.stamp, stamp(k));
 
   EXPECT_EQ(edited_[0].data, picture(0).data);
   EXPECT_NE(edited_[1].data, picture(1).data);
   EXPECT_EQ(edited_[2].data, deep.data);  // cannot be edited: passes as it came
-  const auto changed = [&](int k) { return std::count_if(provenance_[k].data.begin(), provenance_[k].data.end(), [](int p) { return p != 0; }); };
+  const auto changed = [&](int k) {
+    return std::count_if(provenance_[k].data.begin(), provenance_[k].data.end(),
+                         [](int p) { return p != 0; });
+  };
   EXPECT_EQ(changed(0), 0);
   EXPECT_GT(changed(1), 1000);  // the ball covers about 1900 px
   EXPECT_EQ(changed(2), 0);

@@ -36,17 +36,22 @@ inline TriangleMesh ball(int rings = 24) {
   for (int i = 0; i <= rings; ++i) {
     for (int j = 0; j < columns; ++j) {
       const double a = M_PI * i / rings, b = 2.0 * M_PI * j / columns;
-      m.vertices.row(i * columns + j) = kBallRadius * Eigen::RowVector3d(std::sin(a) * std::cos(b), std::sin(a) * std::sin(b), std::cos(a));
+      m.vertices.row(i * columns + j) =
+          kBallRadius *
+          Eigen::RowVector3d(std::sin(a) * std::cos(b), std::sin(a) * std::sin(b), std::cos(a));
       if (i == rings) continue;
       const int k = (j + 1) % columns;
-      m.triangles.row(t++) = Eigen::RowVector3i(i * columns + j, (i + 1) * columns + j, (i + 1) * columns + k);
-      m.triangles.row(t++) = Eigen::RowVector3i(i * columns + j, (i + 1) * columns + k, i * columns + k);
+      m.triangles.row(t++) =
+          Eigen::RowVector3i(i * columns + j, (i + 1) * columns + j, (i + 1) * columns + k);
+      m.triangles.row(t++) =
+          Eigen::RowVector3i(i * columns + j, (i + 1) * columns + k, i * columns + k);
     }
   }
   return m;
 }
 
-inline ObjectModel ballAt(const Eigen::Vector3d& centre, const std::string& name = "ball", int index = kBallLabel) {
+inline ObjectModel ballAt(const Eigen::Vector3d& centre, const std::string& name = "ball",
+                          int index = kBallLabel) {
   ObjectModel model{name, index, ball(), Eigen::Isometry3d::Identity()};
   model.world_from_object.translation() = centre;
   return model;
@@ -68,7 +73,8 @@ inline std::vector<SupportPlane> table() {
 
 inline cv::Vec3b tableColour(int u, int v) {
   const double x = 120.0 + 40.0 * std::sin(0.35 * u + 0.1 * v) + 20.0 * std::sin(0.23 * v);
-  return cv::Vec3b(quantise(static_cast<float>(0.7 * x)), quantise(static_cast<float>(0.9 * x)), quantise(static_cast<float>(x)));
+  return cv::Vec3b(quantise(static_cast<float>(0.7 * x)), quantise(static_cast<float>(0.9 * x)),
+                   quantise(static_cast<float>(x)));
 }
 
 inline cv::Mat emptyTable() {
@@ -94,7 +100,8 @@ inline ClipFrame frameWithBall(const ObjectModel& model) {
       const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u, v, eye);
       const cv::Vec3f shade = diffuseShading(sunlight(), p.normal, 1.0f);
       const cv::Vec3f albedo(0.15f, 0.3f, 0.6f);
-      for (int c = 0; c < 3; ++c) frame.bgr.at<cv::Vec3b>(v, u)[c] = quantise(codeFromLinear(albedo[c] * shade[c]));
+      for (int c = 0; c < 3; ++c)
+        frame.bgr.at<cv::Vec3b>(v, u)[c] = quantise(codeFromLinear(albedo[c] * shade[c]));
       frame.labels.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(model.index);
     }
   }

@@ -1,12 +1,11 @@
 #include "calipso_render/renderer.hpp"
-#include "calipso_render/shadow_map.hpp"
 
 #include <gtest/gtest.h>
-
 #include <omp.h>
 
 #include <opencv2/imgproc.hpp>
 
+#include "calipso_render/shadow_map.hpp"
 #include "plane_view.hpp"
 #include "render_test_scene.hpp"
 #include "umbra.hpp"
@@ -51,7 +50,9 @@ int changedPixels(const FrameOutput& out) { return cv::countNonZero(out.provenan
 bool sameWhereOriginal(const FrameOutput& out, const cv::Mat& input) {
   for (int v = 0; v < input.rows; ++v) {
     for (int u = 0; u < input.cols; ++u) {
-      if (out.provenance.at<std::uint8_t>(v, u) == kOriginal && out.bgr.at<cv::Vec3b>(v, u) != input.at<cv::Vec3b>(v, u)) return false;
+      if (out.provenance.at<std::uint8_t>(v, u) == kOriginal &&
+          out.bgr.at<cv::Vec3b>(v, u) != input.at<cv::Vec3b>(v, u))
+        return false;
     }
   }
   return true;
@@ -59,29 +60,37 @@ bool sameWhereOriginal(const FrameOutput& out, const cv::Mat& input) {
 
 TEST(Renderer, NoEditLeavesEveryByte) {
   const Setting s(params());
-  const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(false, Eigen::Vector3f::Zero()));
+  const FrameOutput out =
+      Renderer(s.prepared, params()).composite(s.input(false, Eigen::Vector3f::Zero()));
   EXPECT_EQ(changedPixels(out), 0);
   EXPECT_EQ(cv::norm(out.bgr, s.key.bgr, cv::NORM_INF), 0.0);
 }
 
 TEST(Renderer, AnEditThatMovesNothingLeavesTheObject) {
   const Setting s(params());
-  const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(true, Eigen::Vector3f::Zero()));
+  const FrameOutput out =
+      Renderer(s.prepared, params()).composite(s.input(true, Eigen::Vector3f::Zero()));
   cv::Mat ball;
   cv::dilate(s.key.labels, ball, cv::Mat::ones(7, 7, CV_8U));
   EXPECT_GT(psnr(out.bgr, s.key.bgr, ball), 40.0);
   EXPECT_TRUE(sameWhereOriginal(out, s.key.bgr));
 }
 
-// With nothing kept, the residual makes up for all that drawing misses; farther away none of it is left.
+// With nothing kept, the residual makes up for all that drawing misses; farther away none of it is
+// left.
 TEST(Renderer, TheResidualGoesAlongWithSmallMovesOnly) {
   RenderParams drawn = params(), plain = params();
   drawn.keep_still = plain.keep_still = plain.carry_residual = false;
   const Setting s(drawn);
-  const FrameInput rest = s.input(true, Eigen::Vector3f::Zero()), far = s.input(true, {0.1f, 0.0f, 0.0f});
-  EXPECT_EQ(cv::norm(Renderer(s.prepared, drawn).composite(rest).bgr, s.key.bgr, cv::NORM_INF), 0.0);
-  EXPECT_GT(cv::norm(Renderer(s.prepared, plain).composite(rest).bgr, s.key.bgr, cv::NORM_INF), 0.0);
-  EXPECT_EQ(cv::norm(Renderer(s.prepared, drawn).composite(far).bgr, Renderer(s.prepared, plain).composite(far).bgr, cv::NORM_INF), 0.0);
+  const FrameInput rest = s.input(true, Eigen::Vector3f::Zero()),
+                   far = s.input(true, {0.1f, 0.0f, 0.0f});
+  EXPECT_EQ(cv::norm(Renderer(s.prepared, drawn).composite(rest).bgr, s.key.bgr, cv::NORM_INF),
+            0.0);
+  EXPECT_GT(cv::norm(Renderer(s.prepared, plain).composite(rest).bgr, s.key.bgr, cv::NORM_INF),
+            0.0);
+  EXPECT_EQ(cv::norm(Renderer(s.prepared, drawn).composite(far).bgr,
+                     Renderer(s.prepared, plain).composite(far).bgr, cv::NORM_INF),
+            0.0);
 }
 
 // Something without a model hides a piece of the ball: the residual puts it back there, too.
@@ -89,7 +98,8 @@ TEST(Renderer, WhatHidesAnObjectAtRestComesBackWithIt) {
   RenderParams drawn = params();
   drawn.keep_still = false;
   ClipFrame key = frameWithBall(ballAt(kCentre));
-  const cv::Rect box = cv::boundingRect(key.labels), pole(box.x + box.width / 2 - 8, box.y + box.height / 2 - 7, 16, 14);
+  const cv::Rect box = cv::boundingRect(key.labels),
+                 pole(box.x + box.width / 2 - 8, box.y + box.height / 2 - 7, 16, 14);
   key.labels(pole).setTo(0), key.bgr(pole).setTo(cv::Scalar(30, 120, 40));
   ClipSample clip;
   clip.add(key);
@@ -97,7 +107,8 @@ TEST(Renderer, WhatHidesAnObjectAtRestComesBackWithIt) {
   ASSERT_FALSE(prepared->fronts[0].empty());
   ObjectInFrame ball;
   ball.name = "ball", ball.edited = true, ball.vertices = prepared->surfaces[0].key_vertices;
-  const FrameOutput out = Renderer(prepared, drawn).composite({key.bgr, key.labels, key.camera, 7, {ball}, {}});
+  const FrameOutput out =
+      Renderer(prepared, drawn).composite({key.bgr, key.labels, key.camera, 7, {ball}, {}});
   EXPECT_EQ(cv::norm(out.bgr, key.bgr, cv::NORM_INF), 0.0);
 }
 
@@ -113,7 +124,8 @@ TEST(Renderer, UnmovedSurfaceDrawsBackToItsPixels) {
 
 TEST(Renderer, MovedObjectLeavesTheTableBehind) {
   const Setting s(params());
-  const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(true, {0.25f, 0.0f, 0.0f}));
+  const FrameOutput out =
+      Renderer(s.prepared, params()).composite(s.input(true, {0.25f, 0.0f, 0.0f}));
   EXPECT_TRUE(sameWhereOriginal(out, s.key.bgr));
   // Its centre has become table-like: no longer red against blue as the ball is.
   const Eigen::Vector2d q = camera().projectWorld(kCentre);
@@ -146,7 +158,8 @@ TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
   key.labels(missed).setTo(0);
   ClipSample clip;
   clip.add(key);
-  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
+  const auto prepared =
+      std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
   const FrameInput in = ballMovedLeft(key, *prepared);
   const FrameOutput out = Renderer(prepared, params()).composite(in);
   cv::Mat left_over;
@@ -154,35 +167,46 @@ TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
   EXPECT_EQ(cv::countNonZero(left_over), 0);
 }
 
-// The same for an object that moves: from the places that it shades in the views, against what was seen of the place.
+// The same for an object that moves: from the places that it shades in the views, against what was
+// seen of the place.
 TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
   const cv::Vec3f umbra(0.6f, 0.5f, 0.45f);
   const Surface surface = makeSurface(ballAt({0.0, 0.1, kBallRadius}));
   Background plate;
   emptyTable().convertTo(plate.plate, CV_32F);
-  plate.count = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(9)), plate.spread = cv::Mat::zeros(kHeight, kWidth, CV_32F);
+  plate.count = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(9)),
+  plate.spread = cv::Mat::zeros(kHeight, kWidth, CV_32F);
   std::vector<View> views;
   for (const float x : {-0.1f, 0.15f}) {
     Points vertices = surface.key_vertices;
     for (Eigen::Vector3f& p : vertices) p.x() += x;
-    views.push_back({plate.plate.clone(), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera(), {makeActor(surface, vertices, camera())}});
+    views.push_back({plate.plate.clone(),
+                     cv::Mat::zeros(kHeight, kWidth, CV_8U),
+                     camera(),
+                     {makeActor(surface, vertices, camera())}});
     const std::vector<Occluder> occluder = {{&views.back().actors[0].vertices, &surface.triangles}};
-    const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}), sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
+    const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}),
+        sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
     for (int v = 0; v < kHeight; ++v) {
       for (int u = 0; u < kWidth; ++u) {
         const auto r = receiverAt(table(), camera(), u, v);
         if (!r) continue;
-        const float part = sun.visibility(r->position, r->normal), open = sky.visibility(r->position, r->normal);
+        const float part = sun.visibility(r->position, r->normal),
+                    open = sky.visibility(r->position, r->normal);
         cv::Vec3f& code = views.back().picture.at<cv::Vec3f>(v, u);
-        for (int c = 0; c < 3; ++c) code[c] = codeFromLinear(linearFromRealCode(code[c]) * (umbra[c] * open + (1.0f - umbra[c]) * part));
+        for (int c = 0; c < 3; ++c)
+          code[c] = codeFromLinear(linearFromRealCode(code[c]) *
+                                   (umbra[c] * open + (1.0f - umbra[c]) * part));
       }
     }
   }
   const auto found = umbraInViews(views, table(), plate, sunlight());
   ASSERT_TRUE(found);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR((*found)[c], umbra[c], 0.03f) << c;  // the maps have other resolutions
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR((*found)[c], umbra[c], 0.03f) << c;  // the maps have other resolutions
   for (View& view : views) plate.plate.copyTo(view.picture);
-  EXPECT_FALSE(umbraInViews(views, table(), plate, sunlight()));  // no shadow where one is predicted
+  EXPECT_FALSE(
+      umbraInViews(views, table(), plate, sunlight()));  // no shadow where one is predicted
 }
 
 // Near the ball the shadow is darker than the sun's absence makes it: the ball hides sky, too.
@@ -192,34 +216,42 @@ TEST(Renderer, TheDarkOfAShadowIsToldFromTheHiddenSky) {
   ClipFrame frame = frameWithBall(ball);
   const Surface surface = makeSurface(ball);
   const std::vector<Occluder> occluder = {{&surface.key_vertices, &surface.triangles}};
-  const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}), sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
+  const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}),
+      sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       const auto r = receiverAt(table(), frame.camera, u, v);
       if (frame.labels.at<std::uint8_t>(v, u) != 0 || !r) continue;
-      const float part = sun.visibility(r->position, r->normal), open = sky.visibility(r->position, r->normal);
+      const float part = sun.visibility(r->position, r->normal),
+                  open = sky.visibility(r->position, r->normal);
       for (int c = 0; c < 3; ++c) {
         std::uint8_t& code = frame.bgr.at<cv::Vec3b>(v, u)[c];
-        code = quantise(codeFromLinear(linearFromCode(code) * (umbra[c] * open + (1.0f - umbra[c]) * part)));
+        code = quantise(
+            codeFromLinear(linearFromCode(code) * (umbra[c] * open + (1.0f - umbra[c]) * part)));
       }
     }
   }
   ClipSample clip;
   clip.add(frame);
   const Prepared prepared = prepare(clip, {ball}, params());
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(prepared.umbra[c], umbra[c], 0.05f) << c;  // the table behind it is invented
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(prepared.umbra[c], umbra[c], 0.05f) << c;  // the table behind it is invented
 }
 
 TEST(Renderer, AMovedShadowTakesItsWholeEdgeAlong) {
   const Setting s(params());
-  const FrameOutput out = Renderer(s.prepared, params()).composite(s.input(true, {0.25f, 0.0f, 0.0f}));
-  const Actor original = makeActor(s.prepared->surfaces[0], s.prepared->surfaces[0].key_vertices, camera());
-  const ShadowMap sun({{&original.vertices, &original.surface->triangles}}, s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+  const FrameOutput out =
+      Renderer(s.prepared, params()).composite(s.input(true, {0.25f, 0.0f, 0.0f}));
+  const Actor original =
+      makeActor(s.prepared->surfaces[0], s.prepared->surfaces[0].key_vertices, camera());
+  const ShadowMap sun({{&original.vertices, &original.surface->triangles}},
+                      s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
   cv::Mat shaded = cv::Mat::zeros(kHeight, kWidth, CV_8U), edge;
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       const auto receiver = receiverAt(params().planes, camera(), u, v);
-      if (receiver && sun.visibility(receiver->position, receiver->normal) < 0.5f) shaded.at<std::uint8_t>(v, u) = 255;
+      if (receiver && sun.visibility(receiver->position, receiver->normal) < 0.5f)
+        shaded.at<std::uint8_t>(v, u) = 255;
     }
   }
   ASSERT_GT(cv::countNonZero(shaded), 50);
@@ -228,11 +260,13 @@ TEST(Renderer, AMovedShadowTakesItsWholeEdgeAlong) {
   EXPECT_LT(cv::countNonZero(kept), cv::countNonZero(edge) / 50);
 }
 
-// Water, or a light that was told wrongly: where the ball casts none in the video, it casts none when it is moved.
+// Water, or a light that was told wrongly: where the ball casts none in the video, it casts none
+// when it is moved.
 TEST(Renderer, CastsShadowsOnlyWhereTheVideoShowsThem) {
   const ObjectModel ball = ballAt(kCentre);
   const Surface surface = makeSurface(ball);
-  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}}, sunlight().direction.cast<double>(), {512, 0.025, 16});
+  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}},
+                      sunlight().direction.cast<double>(), {512, 0.025, 16});
   for (const bool shadow : {true, false}) {
     ClipFrame key = frameWithBall(ball);
     cv::RNG random(5);
@@ -240,33 +274,42 @@ TEST(Renderer, CastsShadowsOnlyWhereTheVideoShowsThem) {
       for (int u = 0; u < kWidth; ++u) {
         if (key.labels.at<std::uint8_t>(v, u) != 0) continue;
         const auto r = receiverAt(table(), key.camera, u, v);
-        const float light = shadow && r ? 0.4f + 0.6f * sun.visibility(r->position, r->normal) : 1.0f;
-        key.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(quantise(codeFromLinear(0.4f * light) + static_cast<float>(random.uniform(-3, 4))));
+        const float light =
+            shadow && r ? 0.4f + 0.6f * sun.visibility(r->position, r->normal) : 1.0f;
+        key.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(
+            quantise(codeFromLinear(0.4f * light) + static_cast<float>(random.uniform(-3, 4))));
       }
     }
     ClipSample clip;
     clip.add(key);
     const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball}, params()));
-    const bool remarked = std::any_of(prepared->remarks.begin(), prepared->remarks.end(),
-                                      [](const std::string& r) { return r.find("not seen in the picture") != std::string::npos; });
+    const bool remarked =
+        std::any_of(prepared->remarks.begin(), prepared->remarks.end(), [](const std::string& r) {
+          return r.find("not seen in the picture") != std::string::npos;
+        });
     EXPECT_EQ(remarked, !shadow);
     const FrameInput in = ballMovedLeft(key, *prepared);
     const FrameOutput out = Renderer(prepared, params()).composite(in);
     const Actor now = makeActor(prepared->surfaces[0], in.objects[0].vertices, key.camera);
-    const ShadowMap cast({{&now.vertices, &now.surface->triangles}}, prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+    const ShadowMap cast({{&now.vertices, &now.surface->triangles}},
+                         prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
     int dark = 0, all = 0;
     for (int v = 0; v < kHeight; ++v) {
       for (int u = 0; u < kWidth; ++u) {
         const auto r = receiverAt(table(), key.camera, u, v);
-        if (!r || cast.visibility(r->position, r->normal) > 0.1f || out.provenance.at<std::uint8_t>(v, u) == kInvented) continue;
+        if (!r || cast.visibility(r->position, r->normal) > 0.1f ||
+            out.provenance.at<std::uint8_t>(v, u) == kInvented)
+          continue;
         const cv::Vec3b c = out.bgr.at<cv::Vec3b>(v, u);
         if (std::abs(c[0] - c[2]) > 12) continue;  // the ball itself
-        ++all, dark += c[1] < 140;                  // the table has 168
+        ++all, dark += c[1] < 140;                 // the table has 168
       }
     }
     ASSERT_GT(all, 50);
-    if (shadow) EXPECT_GT(dark, all / 2);
-    else EXPECT_LT(dark, all / 20);
+    if (shadow)
+      EXPECT_GT(dark, all / 2);
+    else
+      EXPECT_LT(dark, all / 20);
   }
 }
 
@@ -298,7 +341,8 @@ TEST(Renderer, SameBytesForAnyNumberOfThreads) {
 
 TEST(PlaneView, AgreesWithTheReceiverOfEveryPixel) {
   SupportPlane shelf;
-  shelf.normal = Eigen::Vector3d(0.2, 0.0, 1.0).normalized(), shelf.offset = 0.05, shelf.x_range = Eigen::Vector2d(-0.1, 0.2);
+  shelf.normal = Eigen::Vector3d(0.2, 0.0, 1.0).normalized(), shelf.offset = 0.05,
+  shelf.x_range = Eigen::Vector2d(-0.1, 0.2);
   std::vector<SupportPlane> planes = table();
   planes.push_back(shelf);
   const PlaneView view(planes, camera());
@@ -309,14 +353,17 @@ TEST(PlaneView, AgreesWithTheReceiverOfEveryPixel) {
       const auto expected = receiverAt(planes, camera(), u, v);
       ASSERT_EQ(seen, expected.has_value()) << u << ", " << v;
       if (!seen) continue;
-      ASSERT_LT((found.position - expected->position).norm(), 1e-5f * (1.0f + expected->position.norm())) << u << ", " << v;
+      ASSERT_LT((found.position - expected->position).norm(),
+                1e-5f * (1.0f + expected->position.norm()))
+          << u << ", " << v;
       ASSERT_LT((found.normal - expected->normal).norm(), 1e-6f) << u << ", " << v;
     }
   }
 }
 
 TEST(Renderer, NearerObjectHidesTheOther) {
-  const ObjectModel front = ballAt({0.0, -0.15, 0.12}, "front", 1), back = ballAt({0.0, 0.25, 0.12}, "back", 2);
+  const ObjectModel front = ballAt({0.0, -0.15, 0.12}, "front", 1),
+                    back = ballAt({0.0, 0.25, 0.12}, "back", 2);
   ClipSample clip;
   const ClipFrame key = frameWithBall(front);
   clip.add(key);

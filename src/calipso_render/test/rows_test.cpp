@@ -19,7 +19,8 @@ using namespace testing;
 
 const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
 
-// Against the surface point of every pixel, of a ball that has turned and moved since the key frame.
+// Against the surface point of every pixel, of a ball that has turned and moved since the key
+// frame.
 TEST(TriangleMap, TellsWhatThePixelsShow) {
   const Surface surface = makeSurface(ballAt(kCentre));
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
@@ -39,7 +40,10 @@ TEST(TriangleMap, TellsWhatThePixelsShow) {
       if (id == VisibilityBuffer::kNothing || maps[VisibilityBuffer::triangleOf(id)].thin) continue;
       const TriangleMap& map = maps[VisibilityBuffer::triangleOf(id)];
       const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u, v, eye);
-      ASSERT_LT((map.keyAt(u, v).cast<double>() - camera().projectWorld(p.key_position.cast<double>())).norm(), 0.01)
+      ASSERT_LT(
+          (map.keyAt(u, v).cast<double>() - camera().projectWorld(p.key_position.cast<double>()))
+              .norm(),
+          0.01)
           << u << ", " << v;
       ASSERT_LT((map.weightsAt(u, v) - p.weights).norm(), 2e-3f) << u << ", " << v;
       ++seen;
@@ -50,11 +54,14 @@ TEST(TriangleMap, TellsWhatThePixelsShow) {
 
 TEST(LineCodec, EncodesAsCodeFromLinear) {
   std::vector<cv::Vec4f> colours;
-  for (int i = 0; i <= 2000; ++i) colours.emplace_back(i / 1990.0f - 0.001f, 0.3f * i / 2000.0f, std::nanf(""), 1.0f);
+  for (int i = 0; i <= 2000; ++i)
+    colours.emplace_back(i / 1990.0f - 0.001f, 0.3f * i / 2000.0f, std::nanf(""), 1.0f);
   std::vector<cv::Vec3b> codes(colours.size());
-  LineCodec(NoiseModel(), 3).encode(colours.data(), 5, 7, static_cast<int>(colours.size()), codes.data());
+  LineCodec(NoiseModel(), 3)
+      .encode(colours.data(), 5, 7, static_cast<int>(colours.size()), codes.data());
   for (std::size_t i = 0; i < codes.size(); ++i) {
-    for (int c = 0; c < 3; ++c) ASSERT_EQ(codes[i][c], quantise(codeFromLinear(colours[i][c]))) << i << ", " << c;
+    for (int c = 0; c < 3; ++c)
+      ASSERT_EQ(codes[i][c], quantise(codeFromLinear(colours[i][c]))) << i << ", " << c;
   }
 }
 
@@ -70,7 +77,8 @@ TEST(OutsideWinding, KnowsClosedMeshesFromOpenOnes) {
   EXPECT_EQ(outsideWinding(surface.object_vertices, disagreeing), 0);
 }
 
-// What lies on the far side of a closed mesh is hidden by its near side: leaving it out changes nothing.
+// What lies on the far side of a closed mesh is hidden by its near side: leaving it out changes
+// nothing.
 TEST(OutsideWinding, LeavesOutOnlyWhatIsHidden) {
   Surface surface = makeSurface(ballAt(kCentre));
   const Actor actor = makeActor(surface, surface.key_vertices, camera());
@@ -85,7 +93,8 @@ TEST(OutsideWinding, LeavesOutOnlyWhatIsHidden) {
   }
   EXPECT_LE(different, 4);  // on the silhouette the two sides meet within the edges' tolerance
   const Eigen::Vector3d light(0.3, 0.2, 1.0);
-  const ShadowMap with({{&actor.vertices, &surface.triangles, surface.winding}}, light, {256, 0.02, 16}),
+  const ShadowMap with({{&actor.vertices, &surface.triangles, surface.winding}}, light,
+                       {256, 0.02, 16}),
       without({{&actor.vertices, &surface.triangles}}, light, {256, 0.02, 16});
   for (float x = -0.3f; x < 0.3f; x += 0.01f)
     EXPECT_NEAR(with.visibility({x, 0.1f, 0.0f}, Eigen::Vector3f::UnitZ()),
@@ -95,8 +104,8 @@ TEST(OutsideWinding, LeavesOutOnlyWhatIsHidden) {
 
 TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
   const Surface surface = makeSurface(ballAt(kCentre));
-  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}}, sunlight().direction.cast<double>(),
-                      {512, 0.03, 16});
+  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}},
+                      sunlight().direction.cast<double>(), {512, 0.03, 16});
   const PlaceView view(PlaneView(table(), camera()));
   const cv::Rect rect(13, 9, 120, 101);
   cv::Mat fast(rect.size(), CV_8U, cv::Scalar(255));
@@ -105,7 +114,8 @@ TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
   for (int v = 0; v < rect.height; ++v) {
     for (int u = 0; u < rect.width; ++u) {
       Receiver r;
-      const float exact = view.at(u + rect.x, v + rect.y, r) ? sun.visibility(r.position, r.normal) : 1.0f;
+      const float exact =
+          view.at(u + rect.x, v + rect.y, r) ? sun.visibility(r.position, r.normal) : 1.0f;
       ASSERT_NEAR(fast.at<std::uint8_t>(v, u) / 255.0f, exact, 0.16f)
           << u << ", " << v;  // half of what may lie between two places
       shaded += exact < 0.5f;
@@ -116,7 +126,8 @@ TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
 
 // Squares stand within what is set, and all those do that lie far enough inside.
 TEST(SquareMask, IsTheMaskLessItsRim) {
-  const cv::Rect part(13, 9, 120, 101), set(20, 15, 70, 95);  // which reaches the part's lower border
+  const cv::Rect part(13, 9, 120, 101),
+      set(20, 15, 70, 95);  // which reaches the part's lower border
   cv::Mat pixels = cv::Mat::zeros(part.size(), CV_8U), eroded;
   pixels(set & cv::Rect(0, 0, part.width, part.height)).setTo(255);
   const SquareMask mask(pixels, part, 5);
@@ -141,8 +152,10 @@ TEST(DilateByDisc, DoesWhatOpenCVDoes) {
   cv::RNG(5).fill(picture, cv::RNG::UNIFORM, 0, 1000);
   picture.setTo(0, picture < 253);
   for (const int radius : {1, 3, 7}) {
-    cv::dilate(picture, expected, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
-    for (const cv::Rect& part : {cv::Rect(0, 0, 90, 60), cv::Rect(20, 10, 40, 30), cv::Rect(60, 5, 30, 55)}) {
+    cv::dilate(picture, expected,
+               cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+    for (const cv::Rect& part :
+         {cv::Rect(0, 0, 90, 60), cv::Rect(20, 10, 40, 30), cv::Rect(60, 5, 30, 55)}) {
       cv::Mat out(part.size(), CV_8U);
       dilateByDisc(picture(part), radius, out);
       EXPECT_EQ(cv::norm(out, expected(part), cv::NORM_INF), 0.0) << radius << " " << part;

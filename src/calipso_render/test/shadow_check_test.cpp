@@ -9,7 +9,8 @@ namespace {
 
 // Grey ground with grain of twelve code values, and two predicted shadows; nothing hides the sky.
 struct Ground {
-  cv::Mat picture{120, 200, CV_32FC3, cv::Scalar::all(150)}, sun{120, 200, CV_32F, cv::Scalar(1.0f)}, sky = sun.clone();
+  cv::Mat picture{120, 200, CV_32FC3, cv::Scalar::all(150)},
+      sun{120, 200, CV_32F, cv::Scalar(1.0f)}, sky = sun.clone();
   cv::Mat unknown = cv::Mat::zeros(120, 200, CV_8U);
   const cv::Rect left{25, 30, 40, 40}, right{125, 30, 40, 40};
 

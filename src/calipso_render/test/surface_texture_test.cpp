@@ -1,10 +1,11 @@
-#include "calipso_render/surface_symmetry.hpp"
 #include "calipso_render/surface_texture.hpp"
-#include "../src/texture_seams.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "../src/texture_seams.hpp"
+#include "calipso_render/surface_symmetry.hpp"
 
 namespace calipso::render {
 namespace {
@@ -30,10 +31,16 @@ TEST(SurfaceTexture, InterpolatesALinearFunctionExactly) {
   const Triangles triangles = {{0, 1, 2}};
   SurfaceTexture texture(vertices, triangles, 0.3f, 1000);
   ASSERT_GT(texture.size(), 10u);
-  const auto value = [](const Eigen::Vector3f& w) { return cv::Vec4f(w[0], 2.0f * w[1], w[0] - w[2], 1.0f); };
-  for (std::size_t i = 0; i < texture.size(); ++i) texture.texels[i] = value(texture.weightsOf(0, i));
-  for (const Eigen::Vector3f& w : {Eigen::Vector3f(1, 0, 0), Eigen::Vector3f(0, 0, 1), Eigen::Vector3f(0.31f, 0.33f, 0.36f), Eigen::Vector3f(0.05f, 0.9f, 0.05f)}) {
-    for (int c = 0; c < 4; ++c) EXPECT_NEAR(texture.at(0, w)[c], value(w)[c], 1e-5f) << w.transpose();
+  const auto value = [](const Eigen::Vector3f& w) {
+    return cv::Vec4f(w[0], 2.0f * w[1], w[0] - w[2], 1.0f);
+  };
+  for (std::size_t i = 0; i < texture.size(); ++i)
+    texture.texels[i] = value(texture.weightsOf(0, i));
+  for (const Eigen::Vector3f& w :
+       {Eigen::Vector3f(1, 0, 0), Eigen::Vector3f(0, 0, 1), Eigen::Vector3f(0.31f, 0.33f, 0.36f),
+        Eigen::Vector3f(0.05f, 0.9f, 0.05f)}) {
+    for (int c = 0; c < 4; ++c)
+      EXPECT_NEAR(texture.at(0, w)[c], value(w)[c], 1e-5f) << w.transpose();
   }
 }
 
@@ -63,7 +70,8 @@ TEST(MirrorPlanes, OfALopsidedShapeAreNone) {
 
 // A vase turned about a slanting axis, with a plate stuck to its side as a handle.
 TEST(RevolutionAxis, IsFoundWhateverIsAttached) {
-  const Eigen::Vector3f point(0.3f, -0.2f, 1.0f), up = Eigen::Vector3f(0.3f, 0.2f, 1.0f).normalized();
+  const Eigen::Vector3f point(0.3f, -0.2f, 1.0f),
+      up = Eigen::Vector3f(0.3f, 0.2f, 1.0f).normalized();
   const Eigen::Vector3f side = up.unitOrthogonal(), other = up.cross(side);
   Points vertices;
   Triangles triangles;
@@ -72,7 +80,8 @@ TEST(RevolutionAxis, IsFoundWhateverIsAttached) {
     const float height = 0.3f * j / kAlong, radius = 0.06f + 0.02f * std::sin(9.0f * height);
     for (int i = 0; i < kAround; ++i) {
       const float angle = 2.0f * static_cast<float>(M_PI) * i / kAround;
-      vertices.push_back(point + up * height + radius * (side * std::cos(angle) + other * std::sin(angle)));
+      vertices.push_back(point + up * height +
+                         radius * (side * std::cos(angle) + other * std::sin(angle)));
     }
   }
   for (int j = 0; j < kAlong; ++j) {
@@ -82,8 +91,10 @@ TEST(RevolutionAxis, IsFoundWhateverIsAttached) {
     }
   }
   const int first = static_cast<int>(vertices.size());
-  for (const auto& [a, h] : {std::pair{0.08f, 0.1f}, {0.2f, 0.1f}, {0.2f, 0.2f}, {0.08f, 0.2f}}) vertices.push_back(point + up * h + side * a);
-  triangles.push_back({first, first + 1, first + 2}), triangles.push_back({first, first + 2, first + 3});
+  for (const auto& [a, h] : {std::pair{0.08f, 0.1f}, {0.2f, 0.1f}, {0.2f, 0.2f}, {0.08f, 0.2f}})
+    vertices.push_back(point + up * h + side * a);
+  triangles.push_back({first, first + 1, first + 2}),
+      triangles.push_back({first, first + 2, first + 3});
 
   const std::optional<Axis> axis = revolutionAxis(vertices, triangles);
   ASSERT_TRUE(axis);
@@ -98,30 +109,37 @@ TEST(RevolutionAxis, OfABoxIsNone) {
   EXPECT_FALSE(revolutionAxis(vertices, triangles));
 }
 
-// The values known at the ends of a strip run evenly between them; a second vertex at a known place is known too.
+// The values known at the ends of a strip run evenly between them; a second vertex at a known place
+// is known too.
 TEST(DiffuseOverMesh, IsHarmonic) {
   Points vertices;
   Triangles triangles;
   for (int i = 0; i < 5; ++i) vertices.emplace_back(i, 0, 0), vertices.emplace_back(i, 1, 0);
-  for (int i = 0; i < 4; ++i) triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1}), triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+  for (int i = 0; i < 4; ++i)
+    triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1}),
+        triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
   vertices.emplace_back(4, 0, 0);
   std::vector<bool> known(vertices.size(), false);
   std::vector<cv::Vec3f> values(vertices.size());
   known[0] = known[1] = known[8] = known[9] = true;
   values[8] = values[9] = {1, 1, 1};
   diffuseOverMesh(vertices, triangles, known, values);
-  EXPECT_NEAR(values[4][0] + values[5][0], 1.0f, 0.02f);  // the middle; the pull to the mean is 1e-4
+  EXPECT_NEAR(values[4][0] + values[5][0], 1.0f,
+              0.02f);  // the middle; the pull to the mean is 1e-4
   EXPECT_LT(values[2][0], values[4][0]);
   EXPECT_LT(values[4][0], values[6][0]);
   EXPECT_FLOAT_EQ(values[10][0], 1.0f);
 }
 
-// A strip whose left third is seen, and the others copied: one is darker than what it continues, the other has another pattern.
+// A strip whose left third is seen, and the others copied: one is darker than what it continues,
+// the other has another pattern.
 TEST(LevelSeams, ShiftsACopyToWhatItContinuesAndLeavesPatterns) {
   Points vertices;
   Triangles triangles;
   for (int i = 0; i <= 30; ++i) vertices.emplace_back(i, 0, 0), vertices.emplace_back(i, 1, 0);
-  for (int i = 0; i < 30; ++i) triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1}), triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+  for (int i = 0; i < 30; ++i)
+    triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1}),
+        triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
   SurfaceTexture texture(vertices, triangles, 0.25f, 100000);
   const float colours[] = {0.5f, 0.4f, 0.9f};
   std::vector<signed char> part(texture.size());
@@ -134,8 +152,10 @@ TEST(LevelSeams, ShiftsACopyToWhatItContinuesAndLeavesPatterns) {
   const SurfaceTexture before = texture;
   levelSeams(vertices, triangles, part, texture);
   for (std::size_t i = 0; i < texture.size(); ++i) {
-    if (part[i] != 1) EXPECT_EQ(texture.texels[i], before.texels[i]) << i;
-    else EXPECT_NEAR(texture.texels[i][0] - before.texels[i][0], 0.1f, 0.01f) << i;  // grain stays
+    if (part[i] != 1)
+      EXPECT_EQ(texture.texels[i], before.texels[i]) << i;
+    else
+      EXPECT_NEAR(texture.texels[i][0] - before.texels[i][0], 0.1f, 0.01f) << i;  // grain stays
   }
 }
 

@@ -1,4 +1,3 @@
-#include "surface_chart.hpp"
 #include "texture_patches.hpp"
 
 #include <gtest/gtest.h>
@@ -6,6 +5,7 @@
 #include <cmath>
 
 #include "calipso_render/colour.hpp"
+#include "surface_chart.hpp"
 
 namespace calipso::render {
 namespace {
@@ -20,7 +20,8 @@ template <typename Map>
 void addSheet(Mesh& mesh, int n, Map map) {
   const int first = static_cast<int>(mesh.vertices.size());
   for (int j = 0; j <= n; ++j) {
-    for (int i = 0; i <= n; ++i) mesh.vertices.push_back(map(static_cast<float>(i) / n, static_cast<float>(j) / n));
+    for (int i = 0; i <= n; ++i)
+      mesh.vertices.push_back(map(static_cast<float>(i) / n, static_cast<float>(j) / n));
   }
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i < n; ++i) {
@@ -38,7 +39,8 @@ Mesh cube(int n) {
     for (const float side : {0.0f, 1.0f}) {
       addSheet(mesh, n, [&](float s, float t) {
         Eigen::Vector3f p;
-        p[axis] = side, p[(axis + 1) % 3] = side > 0.5f ? s : t, p[(axis + 2) % 3] = side > 0.5f ? t : s;
+        p[axis] = side, p[(axis + 1) % 3] = side > 0.5f ? s : t,
+        p[(axis + 2) % 3] = side > 0.5f ? t : s;
         return p;
       });
     }
@@ -62,12 +64,14 @@ float area(const std::array<Eigen::Vector2f, 3>& c) {
 
 TEST(SurfaceChart, ADevelopableSurfaceKeepsItsLengths) {
   const Mesh m = quarterOfACylinder();
-  const std::vector<FlatTriangle> chart = SurfaceUnfolder(m.vertices, m.triangles).around(130, {0, 0, -1}, 10.0f);
+  const std::vector<FlatTriangle> chart =
+      SurfaceUnfolder(m.vertices, m.triangles).around(130, {0, 0, -1}, 10.0f);
   ASSERT_EQ(chart.size(), m.triangles.size());
   for (const FlatTriangle& t : chart) {
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector3i& v = m.triangles[t.triangle];
-      EXPECT_NEAR((t.corners[(k + 1) % 3] - t.corners[k]).norm(), (m.vertices[v[(k + 1) % 3]] - m.vertices[v[k]]).norm(), 1e-4f);
+      EXPECT_NEAR((t.corners[(k + 1) % 3] - t.corners[k]).norm(),
+                  (m.vertices[v[(k + 1) % 3]] - m.vertices[v[k]]).norm(), 1e-4f);
     }
     EXPECT_GT(area(t.corners), 0.0f);
   }
@@ -77,7 +81,8 @@ TEST(SurfaceChart, ADevelopableSurfaceKeepsItsLengths) {
 TEST(SurfaceChart, ACubeUnfoldsAcrossItsEdges) {
   const Mesh m = cube(8);
   const float radius = 0.8f;
-  const std::vector<FlatTriangle> chart = SurfaceUnfolder(m.vertices, m.triangles).around(72, {0, 0, -1}, radius);
+  const std::vector<FlatTriangle> chart =
+      SurfaceUnfolder(m.vertices, m.triangles).around(72, {0, 0, -1}, radius);
   float sum = 0.0f;
   for (const FlatTriangle& t : chart) sum += area(t.corners);
   EXPECT_GT(sum, 1.3f);
@@ -91,7 +96,8 @@ TEST(SurfaceChart, DownStaysDown) {
     for (int a = 0; a < 3; ++a) {
       for (int b = 0; b < 3; ++b) {
         const Eigen::Vector3i& v = m.triangles[t.triangle];
-        EXPECT_NEAR((t.corners[a] - t.corners[b]).y(), m.vertices[v[b]].z() - m.vertices[v[a]].z(), 1e-4f);
+        EXPECT_NEAR((t.corners[a] - t.corners[b]).y(), m.vertices[v[b]].z() - m.vertices[v[a]].z(),
+                    1e-4f);
       }
     }
   }
@@ -116,14 +122,20 @@ struct Patterned {
         const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
         Eigen::Vector3f p = Eigen::Vector3f::Zero();
         for (int k = 0; k < 3; ++k) p += w[k] * mesh.vertices[mesh.triangles[t][k]];
-        const bool odd = (static_cast<int>(p.x() * 7.99f) + static_cast<int>(p.y() * 7.99f) + static_cast<int>(p.z() * 7.99f)) % 2 != 0;
+        const bool odd = (static_cast<int>(p.x() * 7.99f) + static_cast<int>(p.y() * 7.99f) +
+                          static_cast<int>(p.z() * 7.99f)) %
+                             2 !=
+                         0;
         const float value = !pattern ? 0.3f : odd ? kDark : kBright;
         texture.texels[i] = cv::Vec4f(value, value, value, 1.0f);
         if (unknown(t)) certain[i] = 0.0f, texture.texels[i] = cv::Vec4f();
       }
     }
   }
-  bool unknown(int t) const { return mesh.vertices[mesh.triangles[t].minCoeff()].x() > 0.99f && mesh.vertices[mesh.triangles[t].maxCoeff()].x() > 0.99f; }
+  bool unknown(int t) const {
+    return mesh.vertices[mesh.triangles[t].minCoeff()].x() > 0.99f &&
+           mesh.vertices[mesh.triangles[t].maxCoeff()].x() > 0.99f;
+  }
   void fill() { continuePattern(mesh.vertices, mesh.triangles, {0, 0, -1}, certain, texture); }
 };
 
@@ -132,7 +144,8 @@ TEST(TexturePatches, AnUnseenSideShowsThePatternOfTheOthers) {
   cube.fill();
   int dark = 0, bright = 0, all = 0;
   for (int t = 0; t < cube.texture.triangleCount(); ++t) {
-    for (std::size_t i = cube.texture.firstOf(t); cube.unknown(t) && i < cube.texture.firstOf(t + 1); ++i, ++all) {
+    for (std::size_t i = cube.texture.firstOf(t);
+         cube.unknown(t) && i < cube.texture.firstOf(t + 1); ++i, ++all) {
       EXPECT_EQ(cube.certain[i], 1.0f);
       const float value = cube.texture.texels[i][1];
       dark += std::abs(value - kDark) < 0.05f, bright += std::abs(value - kBright) < 0.1f;
@@ -149,7 +162,9 @@ TEST(TexturePatches, WhatIsKnownStays) {
   const std::vector<cv::Vec4f> before = cube.texture.texels;
   cube.fill();
   for (int t = 0; t < cube.texture.triangleCount(); ++t) {
-    for (std::size_t i = cube.texture.firstOf(t); !cube.unknown(t) && i < cube.texture.firstOf(t + 1); ++i) ASSERT_EQ(cube.texture.texels[i], before[i]);
+    for (std::size_t i = cube.texture.firstOf(t);
+         !cube.unknown(t) && i < cube.texture.firstOf(t + 1); ++i)
+      ASSERT_EQ(cube.texture.texels[i], before[i]);
   }
 }
 

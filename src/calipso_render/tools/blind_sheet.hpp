@@ -7,8 +7,8 @@
 
 namespace calipso::render {
 
-// Pairs of crops, one of the video and one composed, side by side in random order: somebody who does not know the key is to
-// tell which is which. The key goes to another file.
+// Pairs of crops, one of the video and one composed, side by side in random order: somebody who
+// does not know the key is to tell which is which. The key goes to another file.
 class BlindSheet {
  public:
   explicit BlindSheet(const std::string& name) : name_(name) {}

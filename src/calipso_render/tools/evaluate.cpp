@@ -5,26 +5,37 @@
 
 #include "evaluation.hpp"
 
-// Usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] [--appearance-only] SCENE_DIR...   One line of JSON per scene folder with ground truth.
+// Usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] [--appearance-only]
+// SCENE_DIR...   One line of JSON per scene folder with ground truth.
 int main(int argc, char** argv) {
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
+  cv::utils::logging::setLogLevel(
+      cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
   calipso::render::EvaluationOptions options;
   int first = 1;
   for (; first < argc && std::strncmp(argv[first], "--", 2) == 0; ++first) {
-    if (std::strcmp(argv[first], "--appearance-only") == 0) options.appearance_only = true;
-    else if (std::strcmp(argv[first], "--pictures") == 0 && first + 1 < argc) options.pictures = argv[++first];
-    else if (std::strcmp(argv[first], "--summaries") == 0 && first + 1 < argc) options.summaries = argv[++first];
-    else if (std::strcmp(argv[first], "--sheets") == 0 && first + 1 < argc) options.sheets = argv[++first];
-    else first = argc;
+    if (std::strcmp(argv[first], "--appearance-only") == 0)
+      options.appearance_only = true;
+    else if (std::strcmp(argv[first], "--pictures") == 0 && first + 1 < argc)
+      options.pictures = argv[++first];
+    else if (std::strcmp(argv[first], "--summaries") == 0 && first + 1 < argc)
+      options.summaries = argv[++first];
+    else if (std::strcmp(argv[first], "--sheets") == 0 && first + 1 < argc)
+      options.sheets = argv[++first];
+    else
+      first = argc;
   }
   if (first >= argc) {
-    std::fprintf(stderr, "usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] [--appearance-only] SCENE_DIR...\n");
+    std::fprintf(stderr,
+                 "usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] "
+                 "[--appearance-only] SCENE_DIR...\n");
     return 1;
   }
   int status = 0;
   for (int i = first; i < argc; ++i) {
     try {
-      std::printf("%s\n", calipso::render::toJson(calipso::render::evaluateScene(argv[i], options)).c_str());
+      std::printf(
+          "%s\n",
+          calipso::render::toJson(calipso::render::evaluateScene(argv[i], options)).c_str());
       std::fflush(stdout);
     } catch (const std::exception& error) {
       std::fprintf(stderr, "%s: %s\n", argv[i], error.what());

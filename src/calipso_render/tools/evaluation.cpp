@@ -15,19 +15,22 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kSeam = 3;             // px on either side of the silhouette
-constexpr int kRim = 3;              // px of a mask's rim that "inside" leaves out
-constexpr int kAround = 40;          // px around a moved object in which its shadow is judged
-constexpr int kMovedFirst = 3, kMovedStep = 4;  // frames of a moving object that are drawn again: odd ones, which a
-                                                // clip sample of more than 24 frames leaves out
-constexpr double kTurned = 10.0 * M_PI / 180.0;  // rad against the key frame, from which copying texture is wrong
+constexpr int kSeam = 3;     // px on either side of the silhouette
+constexpr int kRim = 3;      // px of a mask's rim that "inside" leaves out
+constexpr int kAround = 40;  // px around a moved object in which its shadow is judged
+constexpr int kMovedFirst = 3,
+              kMovedStep = 4;  // frames of a moving object that are drawn again: odd ones, which a
+                               // clip sample of more than 24 frames leaves out
+constexpr double kTurned =
+    10.0 * M_PI / 180.0;  // rad against the key frame, from which copying texture is wrong
 constexpr int kFlickerFrames = 8;
 constexpr int kSummaryWidth = 1440;  // px
 constexpr int kSheetFrames = 4;      // of a clip on a blind sheet
 constexpr double kFlickers = 0.3;    // code values of true change from which flicker is judged
 
 double elapsedMs(std::chrono::steady_clock::time_point since) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since)
+      .count();
 }
 
 void keepLowest(std::optional<double>& lowest, std::optional<double> value) {
@@ -57,15 +60,19 @@ class Evaluation {
   }
 
  private:
-  void put(const std::string& key, std::optional<double> value) { figures_.values.emplace_back(key, value); }
+  void put(const std::string& key, std::optional<double> value) {
+    figures_.values.emplace_back(key, value);
+  }
 
   void picture(const std::string& what, const cv::Mat& image) const {
-    if (!options_.pictures.empty()) cv::imwrite(options_.pictures + "/" + scene_.name + "_" + what + ".png", image);
+    if (!options_.pictures.empty())
+      cv::imwrite(options_.pictures + "/" + scene_.name + "_" + what + ".png", image);
   }
 
   void prepareClip() {
     ClipSample clip;
-    for (int k = 0; k < scene_.frame_count; ++k) clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.cameraAt(k), posesAt(k)});
+    for (int k = 0; k < scene_.frame_count; ++k)
+      clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.cameraAt(k), posesAt(k)});
     std::vector<ObjectModel> models;
     for (const Truth::Object& o : truth_.objects) models.push_back(o.model);
     const auto start = std::chrono::steady_clock::now();
@@ -84,7 +91,12 @@ class Evaluation {
   // Frame k with every object in the state that `change` gives it.
   template <typename Change>
   FrameInput frame(int k, Change change) const {
-    FrameInput in{loadFrame(scene_, k), loadLabels(scene_, k), scene_.cameraAt(k), static_cast<std::int64_t>(1e9 * k / scene_.fps), {}, {}};
+    FrameInput in{loadFrame(scene_, k),
+                  loadLabels(scene_, k),
+                  scene_.cameraAt(k),
+                  static_cast<std::int64_t>(1e9 * k / scene_.fps),
+                  {},
+                  {}};
     for (std::size_t i = 0; i < prepared_->surfaces.size(); ++i) {
       ObjectInFrame o;
       o.name = prepared_->surfaces[i].name;
@@ -114,7 +126,8 @@ class Evaluation {
     const auto truth = loadPlate(scene_, 0);
     const cv::Mat hidden = loadLabels(scene_, 0) != 0;
     const cv::Mat seen = hidden & (invented == 0);
-    const cv::Mat emptied = Renderer(prepared_, without(false, true)).composite(removedFrame(0)).bgr;
+    const cv::Mat emptied =
+        Renderer(prepared_, without(false, true)).composite(removedFrame(0)).bgr;
     picture("removed", emptied);
     summary_ = {loadFrame(scene_, 0), Renderer(prepared_, params_).composite(removedFrame(0)).bgr};
     put("plate_psnr_seen_db", truth ? psnr(plate, *truth, seen) : std::nullopt);
@@ -130,8 +143,11 @@ class Evaluation {
     for (int k = 0; k < std::min(kFlickerFrames, scene_.frame_count); ++k) {
       const auto truth = loadPlate(scene_, k);
       if (!truth) return std::nullopt;
-      const cv::Mat now = renderer.composite(removedFrame(k)).bgr, hidden = shrink(loadLabels(scene_, k) != 0, kRim);
-      if (!before.empty()) own += change(before, now, hidden).value_or(0.0), reference += change(truth_before, *truth, hidden).value_or(0.0);
+      const cv::Mat now = renderer.composite(removedFrame(k)).bgr,
+                    hidden = shrink(loadLabels(scene_, k) != 0, kRim);
+      if (!before.empty())
+        own += change(before, now, hidden).value_or(0.0),
+            reference += change(truth_before, *truth, hidden).value_or(0.0);
       before = now, truth_before = *truth;
     }
     return reference > kFlickers ? std::optional<double>(own / reference) : std::nullopt;
@@ -140,30 +156,36 @@ class Evaluation {
   void judgeAppearance() {
     const Eigen::Vector3d found = prepared_->light.light.direction.cast<double>();
     std::optional<double> angle, roughness;
-    if (truth_.to_sun) angle = std::acos(std::clamp(found.dot(truth_.to_sun->normalized()), -1.0, 1.0)) * 180.0 / M_PI;
+    if (truth_.to_sun)
+      angle =
+          std::acos(std::clamp(found.dot(truth_.to_sun->normalized()), -1.0, 1.0)) * 180.0 / M_PI;
     put("light_error_deg", angle);
     put("albedo_error_percent", albedoFigure());
     // Beckmann's slope m is the square of the roughness that Principled shaders ask for.
     for (std::size_t i = 0; i < truth_.objects.size() && !roughness; ++i) {
       const Gloss& gloss = prepared_->appearances[i].gloss;
       if (truth_.objects[i].roughness && gloss.specular > 0.0f) {
-        roughness = 100.0 * std::abs(std::sqrt(gloss.roughness) / *truth_.objects[i].roughness - 1.0);
+        roughness =
+            100.0 * std::abs(std::sqrt(gloss.roughness) / *truth_.objects[i].roughness - 1.0);
       }
     }
     put("roughness_error_percent", roughness);
     put("roughness_observed", prepared_->light.seen_gloss ? 1.0 : 0.0);
     const auto& seen = prepared_->light.seen_gloss;
-    put("roughness_range", seen ? std::optional<double>(std::sqrt(seen->roughest / seen->smoothest)) : std::nullopt);
+    put("roughness_range",
+        seen ? std::optional<double>(std::sqrt(seen->roughest / seen->smoothest)) : std::nullopt);
     put("second_order_ambient", prepared_->light.second_order ? 1.0 : 0.0);
   }
 
   std::optional<double> albedoFigure() const {
     const auto truth = loadAlbedo(scene_);
     if (!truth) return std::nullopt;
-    cv::Mat albedo = cv::Mat::zeros(truth->size(), CV_32FC3), known = cv::Mat::zeros(truth->size(), CV_8U);
+    cv::Mat albedo = cv::Mat::zeros(truth->size(), CV_32FC3),
+            known = cv::Mat::zeros(truth->size(), CV_8U);
     for (std::size_t i = 0; i < prepared_->surfaces.size(); ++i) {
       const Appearance& a = prepared_->appearances[i];
-      const cv::Mat mask = shrink(prepared_->key_labels == prepared_->surfaces[i].index, kRim)(a.region);
+      const cv::Mat mask =
+          shrink(prepared_->key_labels == prepared_->surfaces[i].index, kRim)(a.region);
       cv::Mat colour;
       cv::cvtColor(a.albedo, colour, cv::COLOR_BGRA2BGR);
       colour.copyTo(albedo(a.region), mask);
@@ -175,7 +197,8 @@ class Evaluation {
   void judgeUndeformed() {
     const auto everything = [](std::size_t, ObjectInFrame& o) { o.edited = true; };
     const FrameInput in = frame(0, everything);
-    const cv::Mat mask = in.labels != 0, inside = shrink(mask, kRim), seam = grow(mask, kSeam) & ~shrink(mask, kSeam);
+    const cv::Mat mask = in.labels != 0, inside = shrink(mask, kRim),
+                  seam = grow(mask, kSeam) & ~shrink(mask, kSeam);
     const cv::Mat kept = Renderer(prepared_, params_).composite(in).bgr;
     const cv::Mat drawn = Renderer(prepared_, without(false, false)).composite(in).bgr;
     picture("undeformed", drawn);
@@ -185,7 +208,8 @@ class Evaluation {
     put("seam_drawn_psnr_db", psnr(drawn, in.bgr, seam));
   }
 
-  // Crops of the video and of the same frames with everything edited but moving and deforming as it does, all of it drawn, with noise.
+  // Crops of the video and of the same frames with everything edited but moving and deforming as it
+  // does, all of it drawn, with noise.
   void writeSheet() const {
     Renderer renderer(prepared_, without(true, false));
     BlindSheet sheet(scene_.name);
@@ -193,11 +217,14 @@ class Evaluation {
       const FrameInput in = frame(k, [&](std::size_t i, ObjectInFrame& o) {
         o.edited = true;
         const auto& [model, poses, shapes, roughness] = truth_.objects[i];
-        if (!shapes.empty()) o.vertices = shapes[k];
-        else if (poses.size() > 1) o.vertices = transformed(prepared_->surfaces[i].object_vertices, poses[k]);
+        if (!shapes.empty())
+          o.vertices = shapes[k];
+        else if (poses.size() > 1)
+          o.vertices = transformed(prepared_->surfaces[i].object_vertices, poses[k]);
       });
       const cv::Mat drawn = renderer.composite(in).bgr;
-      for (const Truth::Object& o : truth_.objects) sheet.add(in.bgr, drawn, cv::boundingRect(in.labels == o.model.index), k);
+      for (const Truth::Object& o : truth_.objects)
+        sheet.add(in.bgr, drawn, cv::boundingRect(in.labels == o.model.index), k);
     }
     sheet.write(options_.sheets);
   }
@@ -207,7 +234,8 @@ class Evaluation {
     std::vector<View> views(1);
     loadFrame(scene_, 0).convertTo(views[0].picture, CV_32F);
     views[0].labels = p.key_labels, views[0].camera = scene_.camera;
-    for (const Surface& s : p.surfaces) views[0].actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
+    for (const Surface& s : p.surfaces)
+      views[0].actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
     return makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   }
 
@@ -233,7 +261,10 @@ class Evaluation {
   double turnedBy(int k) const {
     std::optional<double> least;
     for (const Truth::Object& o : truth_.objects) {
-      if (o.poses.size() > 1) keepLowest(least, Eigen::AngleAxisd(o.poses[0].linear().transpose() * o.poses[k].linear()).angle());
+      if (o.poses.size() > 1)
+        keepLowest(
+            least,
+            Eigen::AngleAxisd(o.poses[0].linear().transpose() * o.poses[k].linear()).angle());
     }
     return least.value_or(0.0);
   }
@@ -249,9 +280,13 @@ class Evaluation {
         if (o.edited) o.vertices = transformed(prepared_->surfaces[i].object_vertices, poses[k]);
       };
       const FrameInput in = frame(k, followTruth);
-      if (std::none_of(in.objects.begin(), in.objects.end(), [](const ObjectInFrame& o) { return o.edited; })) break;
-      const cv::Mat drawn = renderer.composite(in).bgr, mask = in.labels != 0, inside = shrink(mask, 2);
-      const auto relit = psnr(drawn, in.bgr, inside), copy = psnr(copier.composite(in).bgr, in.bgr, inside);
+      if (std::none_of(in.objects.begin(), in.objects.end(),
+                       [](const ObjectInFrame& o) { return o.edited; }))
+        break;
+      const cv::Mat drawn = renderer.composite(in).bgr, mask = in.labels != 0,
+                    inside = shrink(mask, 2);
+      const auto relit = psnr(drawn, in.bgr, inside),
+                 copy = psnr(copier.composite(in).bgr, in.bgr, inside);
       keepLowest(moved, relit), keepLowest(copied, copy);
       if (relit && copy) keepLowest(gain, *relit - *copy);
       if (relit && copy && turnedBy(k) >= kTurned) keepLowest(turned_gain, *relit - *copy);
@@ -274,7 +309,9 @@ class Evaluation {
     RenderParams p = params_;
     p.quality = quality;
     Renderer renderer(prepared_, p);
-    const double distance = (prepared_->surfaces[0].key_vertices[0].cast<double>() - scene_.camera.world_from_camera.translation()).norm();
+    const double distance = (prepared_->surfaces[0].key_vertices[0].cast<double>() -
+                             scene_.camera.world_from_camera.translation())
+                                .norm();
     const Eigen::Vector3f lift = (0.05 * distance * params_.up).cast<float>();
     const FrameInput in = frame(0, [&](std::size_t, ObjectInFrame& o) {
       o.edited = true;
@@ -296,7 +333,8 @@ class Evaluation {
     cv::hconcat(summary_, all);
     const double scale = static_cast<double>(kSummaryWidth) / all.cols;
     cv::resize(all, all, {}, scale, scale, cv::INTER_AREA);
-    cv::imwrite(options_.summaries + "/" + scene_.name + ".jpg", all, {cv::IMWRITE_JPEG_QUALITY, 85});
+    cv::imwrite(options_.summaries + "/" + scene_.name + ".jpg", all,
+                {cv::IMWRITE_JPEG_QUALITY, 85});
   }
 
   // The hole that the plate has, filled from what is around it.

@@ -8,7 +8,9 @@
 namespace calipso::render {
 namespace {
 
-cv::Mat disc(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
+cv::Mat disc(int radius) {
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
+}
 
 double gradientEnergy(const cv::Mat& picture, const cv::Mat& mask) {
   cv::Mat grey, along_u, along_v;
@@ -31,7 +33,8 @@ std::optional<double> psnr(const cv::Mat& a, const cv::Mat& b, const cv::Mat& ma
   return error > 0.0 ? std::min(99.0, 10.0 * std::log10(255.0 * 255.0 / error)) : 99.0;
 }
 
-std::optional<double> gradientRatio(const cv::Mat& picture, const cv::Mat& truth, const cv::Mat& mask) {
+std::optional<double> gradientRatio(const cv::Mat& picture, const cv::Mat& truth,
+                                    const cv::Mat& mask) {
   if (cv::countNonZero(mask) == 0) return std::nullopt;
   const double reference = gradientEnergy(truth, mask);
   if (reference <= 0.0) return std::nullopt;
@@ -46,7 +49,8 @@ std::optional<double> change(const cv::Mat& a, const cv::Mat& b, const cv::Mat& 
   return (mean[0] + mean[1] + mean[2]) / 3.0;
 }
 
-std::optional<double> albedoError(const cv::Mat& albedo, const cv::Mat& truth, const cv::Mat& mask) {
+std::optional<double> albedoError(const cv::Mat& albedo, const cv::Mat& truth,
+                                  const cv::Mat& mask) {
   if (cv::countNonZero(mask) == 0) return std::nullopt;
   double error = 0.0, total = 0.0;
   for (int c = 0; c < 3; ++c) {
@@ -57,8 +61,10 @@ std::optional<double> albedoError(const cv::Mat& albedo, const cv::Mat& truth, c
         for (int u = 0; u < mask.cols; ++u) {
           if (mask.at<std::uint8_t>(v, u) == 0) continue;
           const double a = albedo.at<cv::Vec3f>(v, u)[c], t = truth.at<cv::Vec3f>(v, u)[c];
-          if (pass == 0) own += a, reference += t;
-          else error += std::abs(gain * a - t), total += t;
+          if (pass == 0)
+            own += a, reference += t;
+          else
+            error += std::abs(gain * a - t), total += t;
         }
       }
     }

@@ -11,13 +11,14 @@ namespace calipso::render {
 std::optional<double> psnr(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask);
 
 // Gradient energy of `picture` over that of `truth`: 1 = as textured.
-std::optional<double> gradientRatio(const cv::Mat& picture, const cv::Mat& truth, const cv::Mat& mask);
+std::optional<double> gradientRatio(const cv::Mat& picture, const cv::Mat& truth,
+                                    const cv::Mat& mask);
 
 // Mean absolute change between two pictures, code values.
 std::optional<double> change(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask);
 
-// Mean |a - truth| over mean truth, per cent, after the one gain per channel that fits best (an albedo
-// is known up to the light's brightness).
+// Mean |a - truth| over mean truth, per cent, after the one gain per channel that fits best (an
+// albedo is known up to the light's brightness).
 std::optional<double> albedoError(const cv::Mat& albedo, const cv::Mat& truth, const cv::Mat& mask);
 
 cv::Mat grow(const cv::Mat& mask, int radius);

@@ -26,23 +26,31 @@ std::string numbered(const std::string& pattern, int k) {
   return name;
 }
 
-// The shapes of a deforming object, from an array of NumPy's format 1.0: little-endian floats, frames x vertices x 3.
-std::vector<Points> loadShapes(const std::string& file, int vertices, const Eigen::Isometry3d& world_from_object) {
+// The shapes of a deforming object, from an array of NumPy's format 1.0: little-endian floats,
+// frames x vertices x 3.
+std::vector<Points> loadShapes(const std::string& file, int vertices,
+                               const Eigen::Isometry3d& world_from_object) {
   std::ifstream in(file, std::ios::binary);
   char start[10] = {};
   in.read(start, sizeof(start));
-  std::string header(static_cast<unsigned char>(start[8]) + 256 * static_cast<unsigned char>(start[9]), ' ');
+  std::string header(
+      static_cast<unsigned char>(start[8]) + 256 * static_cast<unsigned char>(start[9]), ' ');
   in.read(header.data(), static_cast<std::streamsize>(header.size()));
   int frames = 0, count = 0;
   const std::size_t shape = header.find("'shape': (");
-  const bool floats = header.find("'<f4'") != std::string::npos && header.find("'fortran_order': False") != std::string::npos;
-  if (!in || !floats || shape == std::string::npos || std::sscanf(header.c_str() + shape, "'shape': (%d, %d, 3)", &frames, &count) != 2) {
+  const bool floats = header.find("'<f4'") != std::string::npos &&
+                      header.find("'fortran_order': False") != std::string::npos;
+  if (!in || !floats || shape == std::string::npos ||
+      std::sscanf(header.c_str() + shape, "'shape': (%d, %d, 3)", &frames, &count) != 2) {
     throw std::runtime_error(file + ": no array of 32-bit floats, frames x vertices x 3");
   }
-  if (count != vertices) throw std::runtime_error(file + ": has " + std::to_string(count) + " vertices, the true mesh " + std::to_string(vertices));
+  if (count != vertices)
+    throw std::runtime_error(file + ": has " + std::to_string(count) + " vertices, the true mesh " +
+                             std::to_string(vertices));
   std::vector<Points> shapes(frames, Points(count));
   for (Points& points : shapes) {
-    in.read(reinterpret_cast<char*>(points.data()), static_cast<std::streamsize>(sizeof(Eigen::Vector3f) * points.size()));
+    in.read(reinterpret_cast<char*>(points.data()),
+            static_cast<std::streamsize>(sizeof(Eigen::Vector3f) * points.size()));
     points = transformed(points, world_from_object);
   }
   if (!in) throw std::runtime_error(file + ": ends too early");
@@ -57,10 +65,12 @@ Truth::Object toObject(const Scene& scene, const YAML::Node& node) {
   for (const YAML::Node& pose : node["world_T_object"]) object.poses.push_back(toIsometry(pose));
   object.model.world_from_object = object.poses.front();
   if (const YAML::Node file = node["true_vertices_per_frame"]) {
-    object.shapes = loadShapes(scene.directory + "/" + file.as<std::string>(), object.model.mesh.vertexCount(), object.poses.front());
+    object.shapes = loadShapes(scene.directory + "/" + file.as<std::string>(),
+                               object.model.mesh.vertexCount(), object.poses.front());
   }
   const YAML::Node material = node["material"];
-  if (material && material.size() > 0 && material[0]["roughness"]) object.roughness = material[0]["roughness"].as<double>();
+  if (material && material.size() > 0 && material[0]["roughness"])
+    object.roughness = material[0]["roughness"].as<double>();
   return object;
 }
 
@@ -73,7 +83,8 @@ Truth loadTruth(const Scene& scene) {
     Truth truth;
     for (const YAML::Node& node : root["objects"]) truth.objects.push_back(toObject(scene, node));
     const YAML::Node sun = root["lights"]["sun"]["direction_to_sun_world"];
-    if (sun) truth.to_sun = Eigen::Vector3d(sun[0].as<double>(), sun[1].as<double>(), sun[2].as<double>());
+    if (sun)
+      truth.to_sun = Eigen::Vector3d(sun[0].as<double>(), sun[1].as<double>(), sun[2].as<double>());
     return truth;
   } catch (const YAML::Exception& error) {
     throw std::runtime_error(file + ": no ground truth to evaluate against (" + error.what() + ")");
@@ -103,7 +114,8 @@ cv::Mat loadDepth(const Scene& scene) {
   cv::Mat depth;
   if (scene.depth_path.empty()) return depth;
   const cv::Mat coded = cv::imread(scene.depth_path, cv::IMREAD_UNCHANGED);
-  if (coded.type() != CV_16UC1) throw std::runtime_error(scene.depth_path + ": no picture with one channel of 16 bits");
+  if (coded.type() != CV_16UC1)
+    throw std::runtime_error(scene.depth_path + ": no picture with one channel of 16 bits");
   coded.convertTo(depth, CV_32F, scene.depth_scale);
   return depth;
 }
@@ -116,7 +128,8 @@ std::optional<cv::Mat> loadPlate(const Scene& scene, int k) {
 }
 
 std::optional<cv::Mat> loadAlbedo(const Scene& scene) {
-  const cv::Mat coded = cv::imread(scene.directory + "/truth/albedo_000000.png", cv::IMREAD_UNCHANGED);
+  const cv::Mat coded =
+      cv::imread(scene.directory + "/truth/albedo_000000.png", cv::IMREAD_UNCHANGED);
   if (coded.type() != CV_16UC3) return std::nullopt;
   cv::Mat albedo;
   coded.convertTo(albedo, CV_32F, 1.0 / 65535.0);

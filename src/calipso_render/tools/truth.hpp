@@ -14,13 +14,13 @@ namespace calipso::render {
 // The truth of a scene folder, as far as this evaluator needs it. Never read by a node.
 struct Truth {
   struct Object {
-    ObjectModel model;                          // true shape and pose at frame 0
-    std::vector<Eigen::Isometry3d> poses;       // one, or one per frame
-    std::vector<Points> shapes;                 // per frame, world; empty unless it deforms
-    std::optional<double> roughness;            // of the first material slot
+    ObjectModel model;                     // true shape and pose at frame 0
+    std::vector<Eigen::Isometry3d> poses;  // one, or one per frame
+    std::vector<Points> shapes;            // per frame, world; empty unless it deforms
+    std::optional<double> roughness;       // of the first material slot
   };
   std::vector<Object> objects;
-  std::optional<Eigen::Vector3d> to_sun;        // world
+  std::optional<Eigen::Vector3d> to_sun;  // world
 };
 
 // @throw std::runtime_error naming file and key
@@ -32,7 +32,8 @@ cv::Mat loadFrame(const Scene& scene, int k);
 // Labels of frame k from the true masks (the first frame's where there is only one), CV_8UC1.
 cv::Mat loadLabels(const Scene& scene, int k);
 
-// The user's depth image of the key frame, CV_32FC1, m, 0: unknown; empty where the folder has none.
+// The user's depth image of the key frame, CV_32FC1, m, 0: unknown; empty where the folder has
+// none.
 cv::Mat loadDepth(const Scene& scene);
 
 // The place without the objects at frame k; nullopt where the folder has none.

@@ -14,7 +14,8 @@ Eigen::Isometry3d poseOf(const Translation& t, const Rotation& r) {
   const Eigen::Quaterniond q(r.w, r.x, r.y, r.z);
   const Eigen::Vector3d translation(t.x, t.y, t.z);
   if (!q.coeffs().allFinite() || !translation.allFinite() || q.norm() < 1e-6) {
-    throw std::invalid_argument("a pose is not finite or its quaternion is zero; set w = 1 for none");
+    throw std::invalid_argument(
+        "a pose is not finite or its quaternion is zero; set w = 1 for none");
   }
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = q.normalized().toRotationMatrix();
@@ -113,14 +114,16 @@ sensor_msgs::CameraInfo toMsg(const Camera& camera) {
 }
 
 Camera fromMsg(const sensor_msgs::CameraInfo& info, const Eigen::Isometry3d& world_from_camera) {
-  const bool distorted = std::any_of(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; });
+  const bool distorted =
+      std::any_of(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; });
   if (distorted) {
-    throw std::invalid_argument("camera_info.D is not zero; undistort the images first (image_proc)");
+    throw std::invalid_argument(
+        "camera_info.D is not zero; undistort the images first (image_proc)");
   }
   if (!(info.K[0] > 0.0) || !(info.K[4] > 0.0) || info.width == 0 || info.height == 0) {
-    throw std::invalid_argument("camera_info has fx = " + std::to_string(info.K[0]) + ", fy = " +
-                                std::to_string(info.K[4]) + ", size " + std::to_string(info.width) +
-                                " x " + std::to_string(info.height) +
+    throw std::invalid_argument("camera_info has fx = " + std::to_string(info.K[0]) +
+                                ", fy = " + std::to_string(info.K[4]) + ", size " +
+                                std::to_string(info.width) + " x " + std::to_string(info.height) +
                                 "; all must be > 0: calibrate the camera");
   }
   Camera camera;

@@ -72,7 +72,8 @@ std::string valueOf(const Edit& edit) {
 void setValue(const calipso_msgs::Edit& msg, Edit& edit) {
   if (edit.kind == EditKind::kObjectKind) edit.object_kind = objectKindFromString(msg.value);
   if (edit.kind == EditKind::kContact) edit.meet = meetFromString(msg.value);
-  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert) edit.new_name = msg.value;
+  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert)
+    edit.new_name = msg.value;
 }
 
 // A message that leaves the quaternion out holds zeros.

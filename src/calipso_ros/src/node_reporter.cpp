@@ -20,7 +20,9 @@ NodeReporter::NodeReporter(ros::NodeHandle& nh, const std::string& node) {
 }
 
 void NodeReporter::starting(const std::string& message) { publish(NodeStatus::STARTING, message); }
-void NodeReporter::preparing(const std::string& message) { publish(NodeStatus::PREPARING, message); }
+void NodeReporter::preparing(const std::string& message) {
+  publish(NodeStatus::PREPARING, message);
+}
 void NodeReporter::ready(const std::string& message) { publish(NodeStatus::READY, message); }
 
 void NodeReporter::failed(const std::string& message) {

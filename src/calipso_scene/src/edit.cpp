@@ -35,7 +35,8 @@ bool concernsScene(EditKind kind) {
   }
 }
 
-void requireKnown(const std::string& name, const char* field, const std::vector<std::string>& objects) {
+void requireKnown(const std::string& name, const char* field,
+                  const std::vector<std::string>& objects) {
   if (std::find(objects.begin(), objects.end(), name) != objects.end()) return;
   std::string known;
   for (const auto& object : objects) known += (known.empty() ? "" : ", ") + object;
@@ -44,9 +45,11 @@ void requireKnown(const std::string& name, const char* field, const std::vector<
 }
 
 void validateObject(const Edit& edit, const std::vector<std::string>& objects) {
-  if (!edit.object.empty() || !concernsScene(edit.kind)) requireKnown(edit.object, "object", objects);
+  if (!edit.object.empty() || !concernsScene(edit.kind))
+    requireKnown(edit.object, "object", objects);
   if (!edit.after.empty()) requireKnown(edit.after, "after", objects);
-  require(edit.collision >= 1, "collision", edit.collision, "1 for the first, 2 for the second, ...");
+  require(edit.collision >= 1, "collision", edit.collision,
+          "1 for the first, 2 for the second, ...");
 }
 
 // A share, or NaN for "unchanged".
@@ -77,9 +80,9 @@ void validateMaterial(const Edit& edit) {
   positive(edit.youngs_modulus, "youngs_modulus", factor ? "a factor > 0" : "> 0 Pa");
   require(std::isnan(edit.density) || edit.density > 0.0, "density", edit.density,
           factor ? "a factor > 0; .inf: nothing moves it" : "> 0 kg/m^3; .inf: nothing moves it");
-  require(std::isnan(edit.poissons_ratio) ||
-              (edit.poissons_ratio > -1.0 && edit.poissons_ratio < 0.5),
-          "poissons_ratio", edit.poissons_ratio, "in (-1, 0.5)");
+  require(
+      std::isnan(edit.poissons_ratio) || (edit.poissons_ratio > -1.0 && edit.poissons_ratio < 0.5),
+      "poissons_ratio", edit.poissons_ratio, "in (-1, 0.5)");
   require(std::isnan(edit.damping) || (std::isfinite(edit.damping) && edit.damping >= 0.0),
           "damping", edit.damping, "finite and >= 0 s");
 }
@@ -109,7 +112,8 @@ void validateLook(const Edit& edit) {
 void validateScale(const Edit& edit) {
   const bool slower = edit.kind == EditKind::kTimeScale;
   if (slower && !edit.after.empty()) {
-    throw std::invalid_argument("a time_scale edit cannot wait for a collision (after is '" + edit.after +
+    throw std::invalid_argument("a time_scale edit cannot wait for a collision (after is '" +
+                                edit.after +
                                 "'): the video is laid out before it plays; give its time t");
   }
   require(edit.factor > 0.0 && (!slower || edit.factor <= 1.0), "factor", edit.factor,
@@ -121,17 +125,20 @@ void validateNewName(const Edit& edit, const std::vector<std::string>& objects) 
     throw std::invalid_argument("value is empty; give the new object's name");
   }
   if (std::find(objects.begin(), objects.end(), edit.new_name) != objects.end()) {
-    throw std::invalid_argument("value is '" + edit.new_name +
-                                "', which the scene has already; give the new object a name of its own");
+    throw std::invalid_argument(
+        "value is '" + edit.new_name +
+        "', which the scene has already; give the new object a name of its own");
   }
 }
 
 void validateInsert(const Edit& edit) {
   if (!edit.object.empty()) {
-    throw std::invalid_argument("object is '" + edit.object +
-                                "', but an insert is of the scene; leave it out and name the new object in value");
+    throw std::invalid_argument(
+        "object is '" + edit.object +
+        "', but an insert is of the scene; leave it out and name the new object in value");
   }
-  if (edit.model_path.empty()) throw std::invalid_argument("model is empty; give the path of a CAD file");
+  if (edit.model_path.empty())
+    throw std::invalid_argument("model is empty; give the path of a CAD file");
 }
 
 }  // namespace
@@ -154,7 +161,8 @@ void validate(const Edit& edit, const std::vector<std::string>& objects) {
   validateLook(edit);
   validateMaterial(edit);
   if (edit.kind == EditKind::kMaterial) requireAnyChange(edit);
-  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert) validateNewName(edit, objects);
+  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert)
+    validateNewName(edit, objects);
   if (edit.kind == EditKind::kInsert) validateInsert(edit);
   if (edit.kind == EditKind::kSpeedScale || edit.kind == EditKind::kTimeScale) validateScale(edit);
   if (edit.kind == EditKind::kLight) require(edit.factor > 0.0, "factor", edit.factor, "> 0");

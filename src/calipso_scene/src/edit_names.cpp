@@ -11,21 +11,31 @@ namespace {
 template <typename Enum, std::size_t N>
 using Names = std::pair<Enum, const char*>[N];
 
-constexpr Names<EditKind, 20> kEditKinds = {
-    {EditKind::kTransform, "transform"}, {EditKind::kPull, "pull"},
-    {EditKind::kFix, "fix"}, {EditKind::kRelease, "release"},
-    {EditKind::kMaterial, "material"}, {EditKind::kGravity, "gravity"},
-    {EditKind::kVelocity, "velocity"}, {EditKind::kObjectKind, "kind"},
-    {EditKind::kRemove, "remove"}, {EditKind::kReset, "reset"},
-    {EditKind::kDuplicate, "duplicate"}, {EditKind::kInsert, "insert"},
-    {EditKind::kContact, "contact"}, {EditKind::kWind, "wind"},
-    {EditKind::kPressure, "pressure"}, {EditKind::kTwist, "twist"},
-    {EditKind::kSpeedScale, "speed_scale"}, {EditKind::kTimeScale, "time_scale"},
-    {EditKind::kAppearance, "appearance"}, {EditKind::kLight, "light"}};
+constexpr Names<EditKind, 20> kEditKinds = {{EditKind::kTransform, "transform"},
+                                            {EditKind::kPull, "pull"},
+                                            {EditKind::kFix, "fix"},
+                                            {EditKind::kRelease, "release"},
+                                            {EditKind::kMaterial, "material"},
+                                            {EditKind::kGravity, "gravity"},
+                                            {EditKind::kVelocity, "velocity"},
+                                            {EditKind::kObjectKind, "kind"},
+                                            {EditKind::kRemove, "remove"},
+                                            {EditKind::kReset, "reset"},
+                                            {EditKind::kDuplicate, "duplicate"},
+                                            {EditKind::kInsert, "insert"},
+                                            {EditKind::kContact, "contact"},
+                                            {EditKind::kWind, "wind"},
+                                            {EditKind::kPressure, "pressure"},
+                                            {EditKind::kTwist, "twist"},
+                                            {EditKind::kSpeedScale, "speed_scale"},
+                                            {EditKind::kTimeScale, "time_scale"},
+                                            {EditKind::kAppearance, "appearance"},
+                                            {EditKind::kLight, "light"}};
 
 constexpr Names<EditMode, 6> kEditModes = {
-    {EditMode::kForce, "force"},   {EditMode::kTarget, "target"}, {EditMode::kAbsolute, "absolute"},
-    {EditMode::kFactor, "factor"}, {EditMode::kAdd, "add"},       {EditMode::kEstimated, "estimated"}};
+    {EditMode::kForce, "force"},       {EditMode::kTarget, "target"},
+    {EditMode::kAbsolute, "absolute"}, {EditMode::kFactor, "factor"},
+    {EditMode::kAdd, "add"},           {EditMode::kEstimated, "estimated"}};
 
 constexpr Names<ObjectKind, 4> kObjectKinds = {{ObjectKind::kStatic, "static"},
                                                {ObjectKind::kKinematic, "kinematic"},
@@ -66,7 +76,8 @@ bool allows(EditKind kind, EditMode mode) {
     case EditKind::kTwist:
       return mode == EditMode::kForce || mode == EditMode::kTarget;
     case EditKind::kGravity:
-      return mode == EditMode::kAbsolute || mode == EditMode::kFactor || mode == EditMode::kEstimated;
+      return mode == EditMode::kAbsolute || mode == EditMode::kFactor ||
+             mode == EditMode::kEstimated;
     case EditKind::kMaterial:
     case EditKind::kAppearance:
       return mode == EditMode::kAbsolute || mode == EditMode::kFactor;

@@ -10,11 +10,11 @@ namespace {
 
 const std::vector<std::string>& editKeys() {
   static const std::vector<std::string> keys = {
-      "t",      "object", "kind",  "mode",           "region",         "vector",  "angular",
-      "translation",      "rotation", "scale",       "factor",         "ramp",    "duration",
-      "youngs_modulus",   "poissons_ratio",          "density",        "damping", "value",   "model",
-      "other",  "friction", "restitution", "pressure", "color", "specular", "roughness",
-      "after",  "collision"};
+      "t",        "object",         "kind",           "mode",        "region",   "vector",
+      "angular",  "translation",    "rotation",       "scale",       "factor",   "ramp",
+      "duration", "youngs_modulus", "poissons_ratio", "density",     "damping",  "value",
+      "model",    "other",          "friction",       "restitution", "pressure", "color",
+      "specular", "roughness",      "after",          "collision"};
   return keys;
 }
 
@@ -77,7 +77,8 @@ Edit readEdit(const YAML::Node& node, const YamlReader& reader) {
   if (edit.kind == EditKind::kObjectKind) {
     edit.object_kind = objectKindFromString(reader.text(node, "value"));
   }
-  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert) edit.new_name = reader.text(node, "value");
+  if (edit.kind == EditKind::kDuplicate || edit.kind == EditKind::kInsert)
+    edit.new_name = reader.text(node, "value");
   if (edit.kind == EditKind::kInsert) edit.model_path = reader.text(node, "model");
   edit.other = reader.text(node, "other", "");
   edit.friction = reader.number(node, "friction", kUnchanged);

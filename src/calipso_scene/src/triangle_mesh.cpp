@@ -1,11 +1,11 @@
 #include "calipso_scene/triangle_mesh.hpp"
 
-#include <Eigen/Geometry>
-#include <assimp/Importer.hpp>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <Eigen/Geometry>
 #include <array>
+#include <assimp/Importer.hpp>
 #include <cmath>
 #include <fstream>
 #include <iomanip>

@@ -30,9 +30,10 @@ std::string errorOf(const std::string& yaml) {
 
 TEST(Edit, readsEveryFieldAndSortsByTime) {
   const auto edits = loadEdits(
-      writeFile("- {t: 0.5, object: banana2, kind: material, mode: factor, youngs_modulus: 0.01}\n"
-                "- {t: 0.1, object: banana1, kind: pull, mode: target, vector: [0, 0, 0.08],\n"
-                "   region: {kind: pixel, u: 420, v: 110, radius: 0.02}, ramp: 0.3, duration: 1}\n"),
+      writeFile(
+          "- {t: 0.5, object: banana2, kind: material, mode: factor, youngs_modulus: 0.01}\n"
+          "- {t: 0.1, object: banana1, kind: pull, mode: target, vector: [0, 0, 0.08],\n"
+          "   region: {kind: pixel, u: 420, v: 110, radius: 0.02}, ramp: 0.3, duration: 1}\n"),
       kObjects);
   ASSERT_EQ(edits.size(), 2u);
   EXPECT_EQ(edits[0].kind, EditKind::kPull);
@@ -48,11 +49,12 @@ TEST(Edit, readsEveryFieldAndSortsByTime) {
 
 TEST(Edit, readsWhatTheKindsNeed) {
   const auto edits = loadEdits(
-      writeFile("- {t: 0, object: banana1, kind: duplicate, value: twin, translation: [0, 0, 0.1]}\n"
-                "- {t: 0, object: twin, kind: appearance, color: [1, 0.5, 0.2], roughness: 0.4}\n"
-                "- {t: 0, object: twin, other: banana2, kind: contact, value: exclude}\n"
-                "- {t: 0, object: banana2, kind: contact, friction: 0, restitution: 0.9}\n"
-                "- {t: 0.1, after: banana1, collision: 2, kind: speed_scale, factor: 0.5}\n"),
+      writeFile(
+          "- {t: 0, object: banana1, kind: duplicate, value: twin, translation: [0, 0, 0.1]}\n"
+          "- {t: 0, object: twin, kind: appearance, color: [1, 0.5, 0.2], roughness: 0.4}\n"
+          "- {t: 0, object: twin, other: banana2, kind: contact, value: exclude}\n"
+          "- {t: 0, object: banana2, kind: contact, friction: 0, restitution: 0.9}\n"
+          "- {t: 0.1, after: banana1, collision: 2, kind: speed_scale, factor: 0.5}\n"),
       kObjects);
   ASSERT_EQ(edits.size(), 5u);
   EXPECT_EQ(edits[0].new_name, "twin");
@@ -69,9 +71,10 @@ TEST(Edit, readsWhatTheKindsNeed) {
 }
 
 TEST(Edit, windIsGivenOrAsInTheVideo) {
-  const auto edits = loadEdits(writeFile("- {t: 0, object: banana1, kind: wind, vector: [3, 0, 0]}\n"
-                                         "- {t: 0, kind: wind, mode: estimated, factor: 2}\n"),
-                               kObjects);
+  const auto edits =
+      loadEdits(writeFile("- {t: 0, object: banana1, kind: wind, vector: [3, 0, 0]}\n"
+                          "- {t: 0, kind: wind, mode: estimated, factor: 2}\n"),
+                kObjects);
   ASSERT_EQ(edits.size(), 2u);
   EXPECT_EQ(edits[0].mode, EditMode::kAbsolute);
   EXPECT_EQ(edits[1].mode, EditMode::kEstimated);
@@ -84,9 +87,10 @@ TEST(Edit, emptyListsAreValid) {
 }
 
 TEST(Edit, namesRoundTrip) {
-  for (const char* name : {"transform", "pull", "fix", "release", "material", "gravity", "velocity",
-                           "kind", "remove", "reset", "duplicate", "insert", "contact", "wind", "pressure",
-                           "twist", "speed_scale", "time_scale", "appearance", "light"}) {
+  for (const char* name :
+       {"transform", "pull",   "fix",         "release",    "material",   "gravity", "velocity",
+        "kind",      "remove", "reset",       "duplicate",  "insert",     "contact", "wind",
+        "pressure",  "twist",  "speed_scale", "time_scale", "appearance", "light"}) {
     EXPECT_EQ(toString(editKindFromString(name)), name);
   }
   EXPECT_EQ(editModeFromString("", EditKind::kPull), EditMode::kForce);

@@ -54,10 +54,10 @@ TEST(Scene, aPointAheadProjectsToThePrincipalPoint) {
 TEST(Scene, theCameraStandsWhereItsPathHasItAndStaysAtTheEnd) {
   const Scene still = loadScene(writeScene(kHead + kPose + kObject));
   EXPECT_EQ(still.cameraAt(1).world_from_camera.translation(), Eigen::Vector3d(0, -2, 1));
-  const Scene scene = loadScene(writeScene(
-      kHead + kPose + kObject + "world_T_camera_per_frame:\n" +
-      "- [[1, 0, 0, 0], [0, 0, 1, -2], [0, -1, 0, 1], [0, 0, 0, 1]]\n" +
-      "- [[1, 0, 0, 3], [0, 0, 1, -2], [0, -1, 0, 1], [0, 0, 0, 1]]\n"));
+  const Scene scene =
+      loadScene(writeScene(kHead + kPose + kObject + "world_T_camera_per_frame:\n" +
+                           "- [[1, 0, 0, 0], [0, 0, 1, -2], [0, -1, 0, 1], [0, 0, 0, 1]]\n" +
+                           "- [[1, 0, 0, 3], [0, 0, 1, -2], [0, -1, 0, 1], [0, 0, 0, 1]]\n"));
   EXPECT_EQ(scene.cameraAt(0).world_from_camera.translation(), Eigen::Vector3d(0, -2, 1));
   EXPECT_EQ(scene.cameraAt(1).world_from_camera.translation(), Eigen::Vector3d(3, -2, 1));
   EXPECT_EQ(scene.cameraAt(7).world_from_camera.translation(), Eigen::Vector3d(3, -2, 1));

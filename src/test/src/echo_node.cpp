@@ -16,7 +16,8 @@ namespace {
 using calipso_msgs::NodeStatus;
 
 // Stands in for the whole graph between player and recorder: is ready at once and gives every frame
-// back as it came. ~swallow: index of a frame to lose; ~die_at: index of a frame to end the process at.
+// back as it came. ~swallow: index of a frame to lose; ~die_at: index of a frame to end the process
+// at.
 class EchoNode {
  public:
   EchoNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)

@@ -22,13 +22,13 @@
 namespace calipso::align {
 
 enum class Method {
-  kStaged,   // similarity, low-order deformation, then elements with re-linearised correspondences
-  kLiteral   // eq. 9 as it stands: constant linear K, nearest points, constant kappa
+  kStaged,  // similarity, low-order deformation, then elements with re-linearised correspondences
+  kLiteral  // eq. 9 as it stands: constant linear K, nearest points, constant kappa
 };
 
 // Depth of the scene along the optical axis, registered with the picture.
 struct DepthObservation {
-  cv::Mat1f depth;   // m; 0 or NaN: unknown
+  cv::Mat1f depth;  // m; 0 or NaN: unknown
 };
 
 struct AlignOptions {
@@ -45,36 +45,38 @@ struct AlignOptions {
 
 struct StageTime {
   std::string stage;
-  double ms = 0.0;       // wall time
+  double ms = 0.0;  // wall time
 };
 
 struct AlignmentResult {
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-                                           // of translation (m) and rotation vector (rad), world axes
-  TriangleMesh mesh;                       // S*, object frame, the order of the stock model
-  TriangleMesh rest;                       // S, as given
+  // of translation (m) and rotation vector (rad), world axes
+  TriangleMesh mesh;                            // S*, object frame, the order of the stock model
+  TriangleMesh rest;                            // S, as given
   std::vector<std::vector<float>> residual_px;  // per loop and point; positive: the model reaches
                                                 // too far out; NaN: unknown or without counterpart
-  double distance_sigma = 0.0;             // deviation of the centroid's distance, as part of it
-  bool placed = false;                     // false: the rough placement was of no use, nothing was fitted
-  double met_mean_px = 0.0;                // of known points that the model meets
-  double contour_mean_px = 0.0;            // of known points
+  double distance_sigma = 0.0;   // deviation of the centroid's distance, as part of it
+  bool placed = false;           // false: the rough placement was of no use, nothing was fitted
+  double met_mean_px = 0.0;      // of known points that the model meets
+  double contour_mean_px = 0.0;  // of known points
   double contour_p95_px = 0.0;
-  double expected_error = 0.0;             // if asked: mean distance of the surface from the true one, predicted,
-  double expected_rms = 0.0;               // in parts of the model's diagonal
-  double off_probability = 0.0;            // that it is further away than a result that is trusted may be
-  double noise_px = 0.0;                   // estimated noise of the contour
-  double scale = 1.0;                      // size of S* relative to S
-  double deformation = 0.0;                // how far S had to be deformed: r.m.s. strain, estimated
+  double expected_error =
+      0.0;  // if asked: mean distance of the surface from the true one, predicted,
+  double expected_rms = 0.0;     // in parts of the model's diagonal
+  double off_probability = 0.0;  // that it is further away than a result that is trusted may be
+  double noise_px = 0.0;         // estimated noise of the contour
+  double scale = 1.0;            // size of S* relative to S
+  double deformation = 0.0;      // how far S had to be deformed: r.m.s. strain, estimated
   bool trusted = false;
-  std::string reason;                      // why not, and what to do
+  std::string reason;  // why not, and what to do
   std::vector<StageTime> times;
 };
 
 // @param initial_world_from_object  rough placement: some 10 degrees and 5 % of the distance off
 // @param contour                    loops of one object, sub-pixel
-// @throw std::invalid_argument naming what is wrong with mesh, camera, pose or contour, and the remedy
+// @throw std::invalid_argument naming what is wrong with mesh, camera, pose or contour, and the
+// remedy
 AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
                       const Eigen::Isometry3d& initial_world_from_object,
                       const std::vector<ContourLoop>& contour, const AlignOptions& options = {});

@@ -24,12 +24,12 @@ struct ObjectContour {
 };
 
 struct ContourParams {
-  int min_loop_points = 12;       // shorter loops are specks
-  double occluder_px = 2.0;       // an edge this close to another object is unknown
-  double window_px = 5.0;         // half length of the colour profile across the edge
-  double smoothing_px = 4.0;      // half width of the moving least squares fit along the edge
-  double max_offset_px = 0.7;     // a refinement that moves the edge further is not believed
-  double min_contrast = 12.0;     // grey levels; weaker edges are left where the mask has them
+  int min_loop_points = 12;    // shorter loops are specks
+  double occluder_px = 2.0;    // an edge this close to another object is unknown
+  double window_px = 5.0;      // half length of the colour profile across the edge
+  double smoothing_px = 4.0;   // half width of the moving least squares fit along the edge
+  double max_offset_px = 0.7;  // a refinement that moves the edge further is not believed
+  double min_contrast = 12.0;  // grey levels; weaker edges are left where the mask has them
 };
 
 // Outlines of one label in `labels` (CV_8U), on the cracks between pixels, about one point per

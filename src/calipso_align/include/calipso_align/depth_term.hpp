@@ -7,8 +7,8 @@ namespace calipso::align {
 
 // Observed depth inside of an object's silhouette, away from its edge where two surfaces mix.
 struct DepthTarget {
-  cv::Mat1f depth;        // m, the whole picture; 0: unknown or not the object
-  double quantum = 0.0;   // m; smallest deviation that is believed
+  cv::Mat1f depth;       // m, the whole picture; 0: unknown or not the object
+  double quantum = 0.0;  // m; smallest deviation that is believed
 
   bool empty() const { return depth.empty(); }
 };
@@ -18,9 +18,9 @@ struct DepthTarget {
 DepthTarget makeDepthTarget(const cv::Mat1f& depth, const cv::Mat1b& silhouette);
 
 struct DepthTermOptions {
-  double robust = 0.0;        // m; residuals beyond are occluders, holes or other surfaces
-  double sigma = 0.0;         // m; least deviation of one sample
-  double samples = 200.0;     // how many independent measurements the picture is worth
+  double robust = 0.0;     // m; residuals beyond are occluders, holes or other surfaces
+  double sigma = 0.0;      // m; least deviation of one sample
+  double samples = 200.0;  // how many independent measurements the picture is worth
 };
 
 // Visible vertices against the observed surface, along the vertices' normals (point to plane), m.

@@ -16,26 +16,27 @@
 //          low-order stage ended
 //  E V     Young's modulus times volume, so that Psi / (E V) is a mean squared strain
 //  lambda  what a mean squared strain of one costs, in units of r^2 w
-//  eps     keeps nodes that nothing holds where they are, above all along the sight line; where nothing
+//  eps     keeps nodes that nothing holds where they are, above all along the sight line; where
+//  nothing
 //          shows the depth, they are held there
 namespace calipso::align {
 
 struct FemStageOptions {
-  int nodes = 600;                 // about
+  int nodes = 600;  // about
   double poissons_ratio = 0.0;
-  bool linear = false;             // constant K, as eq. 9 has it, instead of corotated elements
+  bool linear = false;  // constant K, as eq. 9 has it, instead of corotated elements
   std::vector<double> elastic_weights = {1e4};  // lambda, one per iteration: soft contour to stiff
-  bool hold_depth = false;         // nodes only move across the optical axis
-  double drift_sigma = 1.0;        // of nodes that nothing holds, in model sizes, all together
-  double smallest_step = 1e-4;     // of the model's size
+  bool hold_depth = false;                      // nodes only move across the optical axis
+  double drift_sigma = 1.0;     // of nodes that nothing holds, in model sizes, all together
+  double smallest_step = 1e-4;  // of the model's size
 };
 
 struct FemStageReport {
   int nodes = 0;
   int iterations = 0;
   bool converged = false;
-  int damped = 0;          // iterations whose system was not positive definite until it was stiffened
-  bool solvable = true;    // false: even then it was not, and the fit stands where it was
+  int damped = 0;        // iterations whose system was not positive definite until it was stiffened
+  bool solvable = true;  // false: even then it was not, and the fit stands where it was
 };
 
 // Cubes that cover the model, object frame.
@@ -54,7 +55,7 @@ class ElasticFit {
   // Newton steps with re-linearised measurements; `observe` as in fitLowOrder().
   FemStageReport fit(const std::function<Rows(const Points&, int)>& observe);
 
-  Points vertices() const;   // where the model's vertices stand, camera frame
+  Points vertices() const;  // where the model's vertices stand, camera frame
   // Where points of the object frame stand, carried by the grid.
   Points carry(const Points& object_points) const;
 

@@ -11,19 +11,19 @@ namespace calipso::align {
 
 // What all stages of one fit share; camera frame throughout.
 struct FitProblem {
-  Points X;                 // #V x 3, the model at the rough pose, m
+  Points X;  // #V x 3, the model at the rough pose, m
   MeshTopology topology;
   Camera camera;
   ContourTarget target;
-  cv::Mat1b inside;         // 255 within the contour, whole picture
-  cv::Mat1b foreign;        // 255 in spurs of it that no part of the model can be; or empty
-  DepthTarget depth;        // empty: none
+  cv::Mat1b inside;   // 255 within the contour, whole picture
+  cv::Mat1b foreign;  // 255 in spurs of it that no part of the model can be; or empty
+  DepthTarget depth;  // empty: none
   std::vector<SupportTarget> supports;
-  double extent_px = 0.0;   // diagonal of the contour's bounding box
-  double model_size = 0.0;  // diagonal of the model, m
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();   // of the object frame, at the rough pose
+  double extent_px = 0.0;                            // diagonal of the contour's bounding box
+  double model_size = 0.0;                           // diagonal of the model, m
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // of the object frame, at the rough pose
 
-  bool depthIsKnown() const;   // from a depth image, or because the object stands on something
+  bool depthIsKnown() const;  // from a depth image, or because the object stands on something
 };
 
 // @throw std::invalid_argument as align()

@@ -29,7 +29,7 @@ class LowOrderMap {
   const Parameters& parameters() const { return p_; }
   void setParameters(const Parameters& p);
   const Eigen::Vector3d& centroid() const { return c_; }
-  double size() const { return l_; }   // root mean square distance from the centroid, m
+  double size() const { return l_; }  // root mean square distance from the centroid, m
 
   Eigen::Vector3d operator()(const Eigen::Vector3d& X) const;
   Points apply(const Points& X) const;

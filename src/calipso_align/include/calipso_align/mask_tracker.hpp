@@ -14,31 +14,33 @@ namespace calipso::align {
 struct LayerAppearance;
 
 struct TrackerParams {
-  int components = 5;              // Gaussians per colour model
-  int margin_px = 40;              // surroundings of an object that are looked at
-  int band_px = 5;                 // the outline is looked for this close to where the flow puts it
-  int search_px = 96;              // how far an object can go from one frame to the next
-  float still_levels = 5.0f;       // grey levels; what changes less than this (4 x 4 px mean) is still
-  float still_share = 0.002f;      // ... in all but this share of the object and its rim
-  float prior_cost = 2.0f;         // nats per pixel of distance from the predicted outline
-  float prior_limit = 9.0f;        // nats; the most that the prediction says, unless the background contradicts it
-  float wrong_share = 0.02f;       // of the object: what a known background contradicts is cut anew
-  float outlier_cost = 18.0f;      // nats; cost of a colour that a model does not know
+  int components = 5;          // Gaussians per colour model
+  int margin_px = 40;          // surroundings of an object that are looked at
+  int band_px = 5;             // the outline is looked for this close to where the flow puts it
+  int search_px = 96;          // how far an object can go from one frame to the next
+  float still_levels = 5.0f;   // grey levels; what changes less than this (4 x 4 px mean) is still
+  float still_share = 0.002f;  // ... in all but this share of the object and its rim
+  float prior_cost = 2.0f;     // nats per pixel of distance from the predicted outline
+  float prior_limit =
+      9.0f;  // nats; the most that the prediction says, unless the background contradicts it
+  float wrong_share = 0.02f;   // of the object: what a known background contradicts is cut anew
+  float outlier_cost = 18.0f;  // nats; cost of a colour that a model does not know
   SmoothnessParams smoothness{4.0f, 0.02f, 0.0f, 0.0f};
 };
 
 struct TrackedMask {
-  cv::Mat labels;          // CV_8U: 0 none, else the object's label
-  float confidence = 1.0f; // 0..1, of the least certain object
-  int moved = 0;           // objects that were looked for anew; the others kept their mask
+  cv::Mat labels;           // CV_8U: 0 none, else the object's label
+  float confidence = 1.0f;  // 0..1, of the least certain object
+  int moved = 0;            // objects that were looked for anew; the others kept their mask
 };
 
 // Carries a label image through a video. Each object is a layer that moves by itself in front of a
 // background that is remembered: a pixel near the predicted outline is the object's when the object
 // of the previous frame, moved along, explains it better than the background does. What neither
 // explains is left to colour models. A cut settles the labels, the coverage of the edge pixels the
-// outline. An object whose surroundings do not change keeps its mask at hardly any cost. Objects of one
-// frame are followed in parallel, each from where the others were. One caller at a time; frames in order.
+// outline. An object whose surroundings do not change keeps its mask at hardly any cost. Objects of
+// one frame are followed in parallel, each from where the others were. One caller at a time; frames
+// in order.
 class MaskTracker {
  public:
   // image: CV_8UC3, labels: CV_8U, of equal size.
@@ -55,7 +57,7 @@ class MaskTracker {
     int label = 0;
     GaussianMixture colours;         // of the key frame
     GaussianMixture recent_colours;  // of the last frame in which its mask was certain
-    cv::Mat mask;            // CV_8U, the whole picture
+    cv::Mat mask;                    // CV_8U, the whole picture
     cv::Mat coverage;        // CV_8U, as `mask` but with the share of the pixels along its edge
     cv::Mat reference_mean;  // 4 x 4 px means of the frame in which `mask` was found
     float confidence = 1.0f;
@@ -67,7 +69,8 @@ class MaskTracker {
   cv::Mat backwardFlow(const cv::Mat& grey, const Object& object, const cv::Point& shift) const;
   cv::Mat predict(const Object& object, const cv::Mat& flow, const cv::Point& shift) const;
   void rememberBackground(const cv::Mat& image);
-  KnownBackground backgroundIn(const cv::Rect& roi, const cv::Mat& image, const cv::Mat& flow) const;
+  KnownBackground backgroundIn(const cv::Rect& roi, const cv::Mat& image,
+                               const cv::Mat& flow) const;
   void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
               bool exact);
   void lose(Object& object) const;
@@ -77,9 +80,9 @@ class MaskTracker {
   std::vector<cv::Mat> costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
                                const LayerAppearance& back, const LayerAppearance& fore,
                                float prior_limit) const;
-  void cutByLooks(const cv::Mat& view, const cv::Mat& free, const cv::Mat& distance, const cv::Mat& known,
-                  LayerAppearance back, const std::vector<const GaussianMixture*>& colours,
-                  cv::Mat& labels) const;
+  void cutByLooks(const cv::Mat& view, const cv::Mat& free, const cv::Mat& distance,
+                  const cv::Mat& known, LayerAppearance back,
+                  const std::vector<const GaussianMixture*>& colours, cv::Mat& labels) const;
   cv::Mat othersIn(const Object& object, const cv::Mat& view, const cv::Rect& roi) const;
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
 

@@ -16,15 +16,17 @@ struct ContourError {
 ContourError contourError(const std::vector<ContourLoop>& contour, const Points& x,
                           const MeshTopology& topology, const Camera& camera);
 
-// The same between the outer hulls: loops that are no holes, and the outline towards the picture's border.
+// The same between the outer hulls: loops that are no holes, and the outline towards the picture's
+// border.
 ContourError hullError(const std::vector<ContourLoop>& contour, const Points& x,
                        const MeshTopology& topology, const Camera& camera);
 
 struct SurfaceError {
-  double mean = 0.0, rms = 0.0, hausdorff = 0.0;   // m
+  double mean = 0.0, rms = 0.0, hausdorff = 0.0;  // m
 };
 
-// Distances between two surfaces, both ways: of each one's vertices to the nearest point of the other.
+// Distances between two surfaces, both ways: of each one's vertices to the nearest point of the
+// other.
 SurfaceError surfaceError(const Points& a, const Points& b, const Triangles& triangles_a,
                           const Triangles& triangles_b);
 

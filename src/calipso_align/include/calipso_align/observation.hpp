@@ -11,9 +11,9 @@ namespace calipso::align {
 struct PointRow {
   int v0, v1;
   double a0, a1;
-  Eigen::Vector3d g;   // unit of r per m
+  Eigen::Vector3d g;  // unit of r per m
   double r;
-  double weight;       // 1 / (unit of r)^2
+  double weight;  // 1 / (unit of r)^2
 };
 
 using Rows = std::vector<PointRow>;

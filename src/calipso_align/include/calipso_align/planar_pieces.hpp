@@ -6,9 +6,9 @@ namespace calipso::align {
 
 struct Relief;
 
-// Connected parts of a relief that are one plane: no jump, no crease, and flat as a whole. An object does
-// not end in the middle of one as a rule, whatever its colours do there.
-// Returns CV_32S: the piece's number from 1, 0 where a pixel is in none.
+// Connected parts of a relief that are one plane: no jump, no crease, and flat as a whole. An
+// object does not end in the middle of one as a rule, whatever its colours do there. Returns
+// CV_32S: the piece's number from 1, 0 where a pixel is in none.
 cv::Mat planarPieces(const Relief& relief);
 
 // Per pixel the value of the strokes that its piece bears, 0 where it bears none or different ones.

@@ -12,12 +12,13 @@ namespace calipso::align {
 // setting.
 struct Relief {
   enum State : uchar { kUnusable = 0, kNone = 1, kSurface = 2 };
-  cv::Mat surface;  // CV_32FC3: u, v (px) and inverse depth in half standard deviations of its noise
-  cv::Mat state;    // CV_8U: kUnusable near edges when `registered` is false, kNone without depth
-  cv::Mat pieces;   // CV_32S: planar_pieces.hpp; empty unless `registered`
-  cv::Mat on_support;  // CV_8U: the surface is that of a support plane, within its noise; or empty
-  double units = 0.0;       // of `surface` per inverse metre
-  double volume = 0.0;      // px x px x units of inverse depth: where a surface may be
+  cv::Mat
+      surface;     // CV_32FC3: u, v (px) and inverse depth in half standard deviations of its noise
+  cv::Mat state;   // CV_8U: kUnusable near edges when `registered` is false, kNone without depth
+  cv::Mat pieces;  // CV_32S: planar_pieces.hpp; empty unless `registered`
+  cv::Mat on_support;   // CV_8U: the surface is that of a support plane, within its noise; or empty
+  double units = 0.0;   // of `surface` per inverse metre
+  double volume = 0.0;  // px x px x units of inverse depth: where a surface may be
   bool registered = false;  // its edges lie on the picture's edges to a pixel: measured
 
   bool empty() const { return state.empty(); }
@@ -26,21 +27,23 @@ struct Relief {
 // image CV_8UC3; depth CV_32F along the optical axis, m, 0 where there is none; of equal size.
 // A relief without any depth, or without any picture edge to compare it with, is empty.
 // supports: as `depth`, of planes that carry objects.
-Relief makeRelief(const cv::Mat& image, const cv::Mat& depth, const std::vector<cv::Mat>& supports = {});
+Relief makeRelief(const cv::Mat& image, const cv::Mat& depth,
+                  const std::vector<cv::Mat>& supports = {});
 
-// Part `view` of a relief in another size: nearest samples, so that no depth between two surfaces is
-// made up.
+// Part `view` of a relief in another size: nearest samples, so that no depth between two surfaces
+// is made up.
 Relief resized(const Relief& relief, const cv::Rect& view, const cv::Size& size);
 
 // How a label change between p and p + step counts as an occlusion: inverse depth there minus what
-// the surface on either side continues to, the smaller of the two; huge where one side has no depth.
+// the surface on either side continues to, the smaller of the two; huge where one side has no
+// depth.
 float jump(const Relief& relief, const cv::Point& p, const cv::Point& step);
 
 // Mean jump between horizontal neighbours under a mask (CV_8U).
 float meanJump(const Relief& relief, const cv::Mat& mask);
 
-// Where the surfaces of a label lie, and how often it has none (sky, a sensor's blind spots). Places
-// in the picture count, so that it is an intensity: a small object claims little of it.
+// Where the surfaces of a label lie, and how often it has none (sky, a sensor's blind spots).
+// Places in the picture count, so that it is an intensity: a small object claims little of it.
 class SurfaceModel {
  public:
   // samples: pixels that are the label's (CV_8U); share: of the picture's part in question that is.

@@ -8,7 +8,7 @@ namespace calipso::align {
 // How well the rough placement can be started from.
 struct RoughCheck {
   bool usable = true;
-  std::string reason;   // what is wrong with it, and what to do
+  std::string reason;  // what is wrong with it, and what to do
 };
 
 // Whether the placement is in front of the camera, on the picture, and of the contour's size.

@@ -7,8 +7,8 @@
 #include "calipso_align/fit_problem.hpp"
 #include "calipso_align/low_order_stage.hpp"
 
-// The order of a fit: which freedom the model has in which stage, and how strictly it is held to the
-// picture meanwhile. Lengths are parts of the contour's extent (px) or of the model's size (m).
+// The order of a fit: which freedom the model has in which stage, and how strictly it is held to
+// the picture meanwhile. Lengths are parts of the contour's extent (px) or of the model's size (m).
 namespace calipso::align {
 
 // A quantity that goes geometrically from one value to another during a stage.
@@ -20,29 +20,30 @@ struct Ramp {
 // How far a rough placement may be off: part of the distance, in any direction.
 constexpr double kPlacementError = 0.05;
 
-// Where a roughly placed object may be (centroids, camera frame). An offset of any length up to the bound and
-// any direction has a density of 1 / r^2: the picture shows how far the placement is off across the sight
-// line, and that says something of the distance. Not that it is right where the rest is, though: the
-// picture guides a hand across the sight line, not along it.
+// Where a roughly placed object may be (centroids, camera frame). An offset of any length up to the
+// bound and any direction has a density of 1 / r^2: the picture shows how far the placement is off
+// across the sight line, and that says something of the distance. Not that it is right where the
+// rest is, though: the picture guides a hand across the sight line, not along it.
 class PlacementPrior {
  public:
-  // @param found  where the fit has the object: a placement that was further off across the sight line than
+  // @param found  where the fit has the object: a placement that was further off across the sight
+  // line than
   //               it may be, may be as far off along it
   PlacementPrior(const Eigen::Vector3d& placed, const Eigen::Vector3d& found);
-  double density(const Eigen::Vector3d& centroid) const;   // not normalised; 0 beyond the bound
+  double density(const Eigen::Vector3d& centroid) const;  // not normalised; 0 beyond the bound
 
  private:
   Eigen::Vector3d placed_;
-  double bound_;   // part of the distance
+  double bound_;  // part of the distance
 };
 
 struct LowOrderStep {
   std::string name;
   LowOrderStageOptions fit;
-  Ramp robust{0.10, 0.06};         // of the contour, parts of its extent
-  Ramp depth_robust{0.15, 0.10};   // model sizes
-  int order = 0;                   // of the deformation: none, affine, quadratic
-  bool literal = false; // eq. 9 as it stands
+  Ramp robust{0.10, 0.06};        // of the contour, parts of its extent
+  Ramp depth_robust{0.15, 0.10};  // model sizes
+  int order = 0;                  // of the deformation: none, affine, quadratic
+  bool literal = false;           // eq. 9 as it stands
 };
 
 // What a deformation of this size has beyond this order, about a third of the size away from the

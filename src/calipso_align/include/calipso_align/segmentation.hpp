@@ -12,13 +12,13 @@
 namespace calipso::align {
 
 struct SegmenterParams {
-  int components = 6;             // Gaussians per colour model
-  int surfaces = 24;              // Gaussians per model of surfaces
-  int rounds = 4;                 // of colour model and cut on the coarse picture
-  int coarse_pixels = 40000;      // the coarse view has at most about this many
-  int band_px = 2;                // half width of the band around the coarse boundary, coarse pixels
-  float outlier_cost = 18.0f;     // nats; cost of a colour that a model does not know
-  float shape_weight = 4.0f;      // nats; the most that a silhouette says about a pixel
+  int components = 6;          // Gaussians per colour model
+  int surfaces = 24;           // Gaussians per model of surfaces
+  int rounds = 4;              // of colour model and cut on the coarse picture
+  int coarse_pixels = 40000;   // the coarse view has at most about this many
+  int band_px = 2;             // half width of the band around the coarse boundary, coarse pixels
+  float outlier_cost = 18.0f;  // nats; cost of a colour that a model does not know
+  float shape_weight = 4.0f;   // nats; the most that a silhouette says about a pixel
   float shape_tolerance = 0.04f;  // of the picture's width; how wrong its outline may be
   SmoothnessParams smoothness;
 };
@@ -26,12 +26,13 @@ struct SegmenterParams {
 // A model that was fitted to the first contour, in pixels of the view.
 struct FittedShape {
   ModelView view;
-  double agreement = 0.0;   // 0..1: overlap with the labels it was fitted to
+  double agreement = 0.0;  // 0..1: overlap with the labels it was fitted to
 };
 
 // Interactive segmentation of one picture into several objects and the background (after GrabCut,
-// Rother et al. 2004): coarse first, then a narrow band with the colour models frozen. Colour models
-// are kept between calls, so that a further stroke costs two cuts only. One thread at a time.
+// Rother et al. 2004): coarse first, then a narrow band with the colour models frozen. Colour
+// models are kept between calls, so that a further stroke costs two cuts only. One thread at a
+// time.
 class Segmenter {
  public:
   // image: CV_8UC3 BGR, kept by reference count; depth: CV_32F, m, 0 unknown, of the same size, or
@@ -75,10 +76,10 @@ class Segmenter {
   void cutFine();
   void adoptLabels();
 
-  cv::Size size_;          // of the picture
+  cv::Size size_;  // of the picture
   cv::Mat picture_;
-  cv::Rect view_;          // what matters of it: where targets may lie and what is near
-  cv::Mat image_;          // the view
+  cv::Rect view_;  // what matters of it: where targets may lie and what is near
+  cv::Mat image_;  // the view
   std::vector<SegmentationTarget> targets_;
   SegmenterParams params_;
   SegmentationLevel coarse_, fine_;

@@ -11,7 +11,8 @@
 
 namespace calipso::align {
 
-// What the user marks in a stroke image (CV_8U): 0 nothing, kBackgroundStroke, or an object's label.
+// What the user marks in a stroke image (CV_8U): 0 nothing, kBackgroundStroke, or an object's
+// label.
 constexpr int kBackgroundStroke = 255;
 
 // An object to be found in the picture, and where the user says that it lies.
@@ -28,28 +29,29 @@ struct SegmentationTarget {
 // The picture at one resolution and all that a cut needs there. Label number 0 is the background,
 // number k is targets[k - 1].
 struct SegmentationLevel {
-  cv::Mat image;                 // CV_8UC3
-  std::vector<cv::Mat> allowed;  // CV_8U per target: where it may lie
-  cv::Mat region;                // CV_8U: where any target may lie
-  int near_px = 3;               // what is this close to the region counts as its surroundings
-  cv::Mat seeds;                 // CV_8U: label number + 1 where a stroke says so, else 0
-  cv::Mat labels;                // CV_8U: label numbers
-  std::vector<cv::Mat> costs;    // CV_32F per label number, nats
-  float contrast_scale = 0.0f;   // beta of label_cut.hpp over the region
-  Relief relief;                 // empty without a depth image
-  std::vector<cv::Mat> expected; // CV_32F per label number, as the relief's inverse depth: where a fitted
-                                 // model has its surface, 0 outside of it; or empty
-  float jump_scale = 0.0f;       // of label_cut.hpp over the region
-  cv::Mat mixed;                 // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
-  cv::Mat stroked;               // CV_8U: as seeds, of the flat piece of the relief that a pixel is in; or empty
-  std::vector<char> lies_flat;   // per label number: its strokes lie on support planes themselves, as a cloth's do
+  cv::Mat image;                  // CV_8UC3
+  std::vector<cv::Mat> allowed;   // CV_8U per target: where it may lie
+  cv::Mat region;                 // CV_8U: where any target may lie
+  int near_px = 3;                // what is this close to the region counts as its surroundings
+  cv::Mat seeds;                  // CV_8U: label number + 1 where a stroke says so, else 0
+  cv::Mat labels;                 // CV_8U: label numbers
+  std::vector<cv::Mat> costs;     // CV_32F per label number, nats
+  float contrast_scale = 0.0f;    // beta of label_cut.hpp over the region
+  Relief relief;                  // empty without a depth image
+  std::vector<cv::Mat> expected;  // CV_32F per label number, as the relief's inverse depth: where a
+                                  // fitted model has its surface, 0 outside of it; or empty
+  float jump_scale = 0.0f;  // of label_cut.hpp over the region
+  cv::Mat mixed;    // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
+  cv::Mat stroked;  // CV_8U: as seeds, of the flat piece of the relief that a pixel is in; or empty
+  std::vector<char>
+      lies_flat;  // per label number: its strokes lie on support planes themselves, as a cloth's do
 };
 
 // Where the targets may lie in a picture and what is near.
 cv::Rect viewOf(const std::vector<SegmentationTarget>& targets, const cv::Size& size);
 
-// Takes part `view` of the picture. scale: of the level's picture to the view, at most 1; relief: of
-// the picture, or empty.
+// Takes part `view` of the picture. scale: of the level's picture to the view, at most 1; relief:
+// of the picture, or empty.
 SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<SegmentationTarget>& targets,
                             const Relief& relief, const cv::Rect& view, double scale);
 
@@ -65,7 +67,7 @@ struct ExpectedSurface {
 
 // What a label looks like, and where its surfaces lie once that is known.
 struct LabelModel {
-  std::optional<GaussianMixture> colours;       // all of them, or of surfaces where a relief tells them
+  std::optional<GaussianMixture> colours;  // all of them, or of surfaces where a relief tells them
   std::optional<GaussianMixture> open_colours;  // where a registered relief has no surface: sky
   std::optional<SurfaceModel> surfaces;
   std::optional<ExpectedSurface> expected;
@@ -75,7 +77,8 @@ struct LabelModel {
 void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int components,
                 LabelModel& model);
 
-// Costs of every label number, of colours at most `outlier_cost`, kForbidden where a label may not be.
+// Costs of every label number, of colours at most `outlier_cost`, kForbidden where a label may not
+// be.
 void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
                    SegmentationLevel& level);
 
@@ -85,8 +88,8 @@ cv::Mat freePixels(const SegmentationLevel& level);
 // Pixels that would cost less with another label.
 cv::Mat contradictedPixels(const SegmentationLevel& level);
 
-// Free pixels near a change of label, or whose colour speaks against their label: what a finer level
-// has to decide anew, thin parts included.
+// Free pixels near a change of label, or whose colour speaks against their label: what a finer
+// level has to decide anew, thin parts included.
 cv::Mat uncertainPixels(const SegmentationLevel& level, int band_px);
 
 // The colours under a mask, evenly thinned out to what a model needs.

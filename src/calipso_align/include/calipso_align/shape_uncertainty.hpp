@@ -14,25 +14,26 @@ struct SurfaceDistance {
   double rms = 0.0;
 };
 
-// What a finished fit's surface may be off in 3D: one distance per surface that may be the true one.
+// What a finished fit's surface may be off in 3D: one distance per surface that may be the true
+// one.
 struct ShapeUncertainty {
   std::vector<SurfaceDistance> draws;
-  std::vector<double> weights;   // of the draws; they sum to 1
+  std::vector<double> weights;  // of the draws; they sum to 1
 
   SurfaceDistance expected() const;
   // Probability that the true surface is further away, by its mean or its r.m.s. distance.
   double beyond(const SurfaceDistance& limit) const;
 };
 
-// Draws the parameters from their covariance, always the same ones, and measures how far points of the
-// surfaces that they make are from the surface at x: a thin body that is off along its normal is still
-// near its other side.
-// covariance  of the parameters of `here`, which is the identity at x (camera frame)
-// unseen      deviation along the sight line of what the parameters cannot follow, model sizes
-// likelihood  of a change of the parameters, by what is known of it besides; 0: impossible
-ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
-                                  const LowOrderMap& here, const Eigen::MatrixXd& covariance,
-                                  double model_size, double unseen,
-                                  const std::function<double(const LowOrderMap::Parameters&)>& likelihood);
+// Draws the parameters from their covariance, always the same ones, and measures how far points of
+// the surfaces that they make are from the surface at x: a thin body that is off along its normal
+// is still near its other side. covariance  of the parameters of `here`, which is the identity at x
+// (camera frame) unseen      deviation along the sight line of what the parameters cannot follow,
+// model sizes likelihood  of a change of the parameters, by what is known of it besides; 0:
+// impossible
+ShapeUncertainty shapeUncertainty(
+    const Points& x, const Triangles& triangles, const LowOrderMap& here,
+    const Eigen::MatrixXd& covariance, double model_size, double unseen,
+    const std::function<double(const LowOrderMap::Parameters&)>& likelihood);
 
 }  // namespace calipso::align

@@ -32,7 +32,8 @@ calipso_msgs::AlignedModel toMsg(const SceneObject& object, const AlignmentResul
   msg.object = object.name;
   msg.index = static_cast<std::uint8_t>(object.index);
   msg.world_from_object.pose = calipso::toMsg(result.world_from_object);
-  for (int i = 0; i < 36; ++i) msg.world_from_object.covariance[i] = result.covariance(i / 6, i % 6);
+  for (int i = 0; i < 36; ++i)
+    msg.world_from_object.covariance[i] = result.covariance(i / 6, i % 6);
   msg.mesh = calipso::toMsg(result.mesh);
   msg.cad = calipso::toMsg(result.rest);
   msg.contour_mean_px = static_cast<float>(result.contour_mean_px);
@@ -49,7 +50,8 @@ calipso_msgs::AlignedModel toMsg(const SceneObject& object, const AlignmentResul
 AlignmentResult fromMsg(const calipso_msgs::AlignedModel& msg) {
   AlignmentResult result;
   result.world_from_object = calipso::fromMsg(msg.world_from_object.pose);
-  for (int i = 0; i < 36; ++i) result.covariance(i / 6, i % 6) = msg.world_from_object.covariance[i];
+  for (int i = 0; i < 36; ++i)
+    result.covariance(i / 6, i % 6) = msg.world_from_object.covariance[i];
   result.mesh = calipso::fromMsg(msg.mesh);
   result.rest = calipso::fromMsg(msg.cad);
   result.contour_mean_px = msg.contour_mean_px;

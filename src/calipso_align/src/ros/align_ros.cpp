@@ -96,7 +96,8 @@ void AlignRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& msg) {
   }
 }
 
-// Only key frames carry contours. The same one can come twice to a subscriber that connects while it is published.
+// Only key frames carry contours. The same one can come twice to a subscriber that connects while
+// it is published.
 void AlignRos::onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) {
   if (msg->contours.empty() || (key_ && *key_ == *msg)) return;
   key_ = msg;
@@ -162,8 +163,8 @@ calipso_msgs::AlignedModel AlignRos::fitObject(int object) {
   try {
     const calipso_msgs::ObjectContour* contour = findContour(*key_, description.name);
     if (!contour) throw std::invalid_argument("the segmentation has no contour of it: add strokes");
-    return toMsg(description, align(models_[object], scene_.camera, rough,
-                                    fromMsg(*contour).loops, options_));
+    return toMsg(description,
+                 align(models_[object], scene_.camera, rough, fromMsg(*contour).loops, options_));
   } catch (const std::exception& error) {
     return toMsg(description, unaligned(models_[object], rough, error.what()));
   }

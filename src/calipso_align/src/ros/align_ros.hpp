@@ -20,9 +20,9 @@
 namespace calipso::align {
 
 struct AlignNodeParams {
-  std::string scene;         // directory with scene.yaml
-  std::vector<int> levels;   // about how many nodes the grids have, coarse to fine
-  bool use_depth = true;     // the scene's depth image, where it has one
+  std::string scene;        // directory with scene.yaml
+  std::vector<int> levels;  // about how many nodes the grids have, coarse to fine
+  bool use_depth = true;    // the scene's depth image, where it has one
 };
 
 // @throw std::invalid_argument naming parameter, value and what is allowed
@@ -42,13 +42,13 @@ class AlignRos {
   bool onRerun(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
 
   void fitAll();
-  void fit(const std::vector<int>& objects);   // indices into scene_.objects
+  void fit(const std::vector<int>& objects);  // indices into scene_.objects
   calipso_msgs::AlignedModel fitObject(int object);
   void publish();
 
   AlignNodeParams params_;
   Scene scene_;
-  std::vector<TriangleMesh> models_;              // like scene_.objects
+  std::vector<TriangleMesh> models_;  // like scene_.objects
   AlignOptions options_;
   NodeReporter reporter_;
   ros::Publisher models_publisher_, markers_publisher_;
@@ -56,8 +56,8 @@ class AlignRos {
   std::vector<ros::Subscriber> pose_subscribers_;
   ros::ServiceServer rerun_service_;
   std::unique_ptr<PoseMarkers> pose_markers_;
-  calipso_msgs::SegmentationConstPtr key_;        // null before the first one with contours
-  std::map<int, calipso_msgs::AlignedModel> aligned_;   // by index into scene_.objects
+  calipso_msgs::SegmentationConstPtr key_;             // null before the first one with contours
+  std::map<int, calipso_msgs::AlignedModel> aligned_;  // by index into scene_.objects
 };
 
 }  // namespace calipso::align

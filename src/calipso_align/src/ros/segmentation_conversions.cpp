@@ -12,10 +12,9 @@ namespace {
 void checkSize(const sensor_msgs::Image& image) {
   if (image.width == 0 || image.height == 0 ||
       image.data.size() < static_cast<size_t>(image.step) * image.height)
-    throw std::invalid_argument("image of " + std::to_string(image.width) + "x" +
-                                std::to_string(image.height) + " with " +
-                                std::to_string(image.data.size()) +
-                                " bytes is empty or cut short; publish whole frames");
+    throw std::invalid_argument(
+        "image of " + std::to_string(image.width) + "x" + std::to_string(image.height) + " with " +
+        std::to_string(image.data.size()) + " bytes is empty or cut short; publish whole frames");
 }
 
 calipso_msgs::Contour toMsg(const ContourLoop& loop) {
@@ -87,8 +86,9 @@ cv::Mat colourImageFromMsg(const sensor_msgs::ImageConstPtr& image) {
 cv::Mat labelsFromMsg(const sensor_msgs::Image& image) {
   checkSize(image);
   if (image.encoding != sensor_msgs::image_encodings::MONO8)
-    throw std::invalid_argument("label image has encoding '" + image.encoding +
-                                "'; publish mono8 (0 none, 255 background, else the object's index)");
+    throw std::invalid_argument(
+        "label image has encoding '" + image.encoding +
+        "'; publish mono8 (0 none, 255 background, else the object's index)");
   return cv_bridge::toCvCopy(image)->image;
 }
 

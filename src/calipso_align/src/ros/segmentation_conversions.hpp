@@ -21,7 +21,8 @@ calipso_msgs::Segmentation toMsg(const std_msgs::Header& header, const cv::Mat& 
                                  const std::vector<ObjectContour>& contours, float confidence);
 
 // CV_8UC3, BGR; shares the message's memory where the encoding allows.
-// @throw std::invalid_argument naming encoding or size of a message that is no colour or grey picture
+// @throw std::invalid_argument naming encoding or size of a message that is no colour or grey
+// picture
 cv::Mat colourImageFromMsg(const sensor_msgs::ImageConstPtr& image);
 
 // CV_8U. @throw std::invalid_argument naming the encoding when it is not mono8

@@ -14,12 +14,14 @@
 namespace calipso::align {
 namespace {
 
-// Every clip frame counts, so the queues of bag mode have no limit; a live camera's frames may drop.
+// Every clip frame counts, so the queues of bag mode have no limit; a live camera's frames may
+// drop.
 constexpr unsigned kUnlimited = 0, kLiveQueue = 2;
 constexpr bool kLatched = true;
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
 }
 
 }  // namespace
@@ -90,8 +92,8 @@ void SegmentationRos::segment() {
   try {
     if (!segmenter_)
       // A live camera's first frame is not the picture that the scene's depth image was taken with.
-      segmenter_ = std::make_unique<Segmenter>(
-          makeSegmenter(key_image_, scene_, params_.mode == "bag"));
+      segmenter_ =
+          std::make_unique<Segmenter>(makeSegmenter(key_image_, scene_, params_.mode == "bag"));
     const KeyFrame key = segmentKeyFrame(key_image_, *segmenter_, strokes_);
     tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels);
     labels_ = key.labels;
@@ -106,7 +108,8 @@ void SegmentationRos::segment() {
   reporter_.timing(key_header_.stamp, millisecondsSince(start));
 }
 
-// Who waits for the labels of a frame gets some, even if the frame cannot be read: those of the frame before.
+// Who waits for the labels of a frame gets some, even if the frame cannot be read: those of the
+// frame before.
 void SegmentationRos::trackFrame(const sensor_msgs::ImageConstPtr& msg) {
   const auto start = std::chrono::steady_clock::now();
   TrackedMask tracked{labels_, 0.0f};

@@ -47,7 +47,7 @@ class SegmentationRos {
   cv::Mat strokes_;
   ros::Time last_stamp_;
   std_msgs::Header key_header_;
-  cv::Mat key_image_;                               // empty before the first frame
+  cv::Mat key_image_;  // empty before the first frame
   std::unique_ptr<Segmenter> segmenter_;
   cv::Mat labels_;                                  // of the newest frame that could be read
   std::unique_ptr<MaskTracker> tracker_;            // null while there is no segmentation

@@ -10,8 +10,9 @@ namespace calipso::bag {
 
 // What a camera's calibration file says.
 struct Calibration {
-  Camera camera;                    // pose: identity
-  std::vector<double> distortion;   // k1 k2 p1 p2 [k3 ...] (plumb_bob, rational_polynomial); may be empty
+  Camera camera;  // pose: identity
+  std::vector<double>
+      distortion;  // k1 k2 p1 p2 [k3 ...] (plumb_bob, rational_polynomial); may be empty
 
   bool distorted() const;
 };

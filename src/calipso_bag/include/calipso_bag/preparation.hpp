@@ -25,7 +25,8 @@ class Preparation {
   struct Roles {
     std::vector<std::string> key_frame = {"segmentation", "align"};
     std::vector<std::string> clip = {"segmentation", "flow", "render"};
-    std::vector<std::string> all = {"segmentation", "align", "flow", "simulator", "render", "recorder"};
+    std::vector<std::string> all = {"segmentation", "align",  "flow",
+                                    "simulator",    "render", "recorder"};
   };
 
   Preparation() : Preparation(Roles()) {}

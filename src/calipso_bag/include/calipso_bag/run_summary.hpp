@@ -8,7 +8,7 @@ namespace calipso::bag {
 
 // How one object was fitted and is modelled.
 struct ObjectSummary {
-  std::string kind;    // static, kinematic, rigid, deformable; empty: the simulator said nothing
+  std::string kind;  // static, kinematic, rigid, deformable; empty: the simulator said nothing
   std::string reason;
   int nodes = 0;
   int elements = 0;
@@ -19,7 +19,7 @@ struct ObjectSummary {
   double contour_mean_px = 0.0;
   double contour_p95_px = 0.0;
   bool trusted = true;
-  std::string doubt;       // why the fit is not trusted
+  std::string doubt;  // why the fit is not trusted
 };
 
 // What a run did, for the person who started it.
@@ -27,12 +27,12 @@ struct RunSummary {
   int frames_in = 0;
   int frames_out = 0;
   int edits_accepted = 0;
-  std::vector<std::string> edits_refused;        // one message each
-  std::map<std::string, ObjectSummary> objects;  // by name
+  std::vector<std::string> edits_refused;                   // one message each
+  std::map<std::string, ObjectSummary> objects;             // by name
   std::map<std::string, std::vector<double>> ms_per_frame;  // by node
-  std::map<std::string, std::string> failed;     // node -> why
-  double edit_seconds = 0.0;                     // first edited frame to last, wall time
-  std::string output;                            // path of the bag
+  std::map<std::string, std::string> failed;                // node -> why
+  double edit_seconds = 0.0;                                // first edited frame to last, wall time
+  std::string output;                                       // path of the bag
 };
 
 // @pre !values.empty()

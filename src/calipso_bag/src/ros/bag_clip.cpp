@@ -46,7 +46,8 @@ std::string choose(const std::set<std::string>& topics, const std::string& wante
                    const std::string& argument, const std::string& what) {
   if (wanted.empty() && topics.size() == 1) return *topics.begin();
   if (topics.count(wanted) > 0) return wanted;
-  throw std::runtime_error(what + (wanted.empty() ? ": not exactly one topic" : ": no topic " + wanted) +
+  throw std::runtime_error(what +
+                           (wanted.empty() ? ": not exactly one topic" : ": no topic " + wanted) +
                            "; there: " + listed(topics) + ". Choose with " + argument + ":=");
 }
 
@@ -54,7 +55,8 @@ void openForReading(rosbag::Bag& bag, const std::string& path) {
   try {
     bag.open(path, rosbag::bagmode::Read);
   } catch (const rosbag::BagUnindexedException&) {
-    throw std::runtime_error(path + ": the bag has no index, so its recording was cut short; "
+    throw std::runtime_error(path +
+                             ": the bag has no index, so its recording was cut short; "
                              "'rosbag reindex' recovers what is readable");
   } catch (const rosbag::BagException& e) {
     throw std::runtime_error(path + ": cannot be read as a bag (" + e.what() +
@@ -83,8 +85,8 @@ double BagClip::fps() const {
 }
 
 void BagClip::chooseTopics(const Params& params) {
-  image_topic_ = choose(topicsOf(bag_, kImageTypes), params.image_topic, "image_topic",
-                        path_ + ": images");
+  image_topic_ =
+      choose(topicsOf(bag_, kImageTypes), params.image_topic, "image_topic", path_ + ": images");
   const std::set<std::string> infos = topicsOf(bag_, kInfoTypes);
   if (infos.empty()) {
     throw std::runtime_error(path_ + ": no camera_info for " + image_topic_ +

@@ -23,13 +23,13 @@ std_msgs::Header headerAt(const ros::Time& stamp, const std::string& frame) {
 ClipWriter::ClipWriter(const std::string& path, const Camera& camera, double fps, bool compressed)
     : output_(path), camera_(camera), fps_(fps), compressed_(compressed) {}
 
-void ClipWriter::add(const cv::Mat& bgr, const std::optional<Eigen::Isometry3d>& world_from_camera) {
+void ClipWriter::add(const cv::Mat& bgr,
+                     const std::optional<Eigen::Isometry3d>& world_from_camera) {
   if (bgr.cols != camera_.width || bgr.rows != camera_.height) {
     throw std::runtime_error("frame " + std::to_string(frames_) + " is " +
                              std::to_string(bgr.cols) + "x" + std::to_string(bgr.rows) +
-                             ", but the camera is calibrated for " +
-                             std::to_string(camera_.width) + "x" +
-                             std::to_string(camera_.height) + "; scale one to the other");
+                             ", but the camera is calibrated for " + std::to_string(camera_.width) +
+                             "x" + std::to_string(camera_.height) + "; scale one to the other");
   }
   const ros::Time stamp(kFirstStampSec + frames_ / fps_);
   writeImage(bgr, stamp);

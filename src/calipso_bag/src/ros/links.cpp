@@ -12,7 +12,8 @@ Subscriptions registeredSubscriptions() {
   XmlRpc::XmlRpcValue request, response, state;
   request[0] = ros::this_node::getName();
   Subscriptions registered;
-  if (!ros::master::execute("getSystemState", request, response, state, kKeepAsking)) return registered;
+  if (!ros::master::execute("getSystemState", request, response, state, kKeepAsking))
+    return registered;
   XmlRpc::XmlRpcValue& topics = state[kSubscribers];
   for (int i = 0; i < topics.size(); ++i) {
     XmlRpc::XmlRpcValue& nodes = topics[i][1];
@@ -23,7 +24,8 @@ Subscriptions registeredSubscriptions() {
   return registered;
 }
 
-std::vector<std::string> Links::missing(const Subscriptions& registered, const std::set<std::string>& topics,
+std::vector<std::string> Links::missing(const Subscriptions& registered,
+                                        const std::set<std::string>& topics,
                                         const std::set<std::string>& nodes) const {
   std::vector<std::string> names;
   for (const auto& [topic, subscribers] : registered) {

@@ -41,7 +41,7 @@ class NodeWatch {
   void onStatus(const ros::MessageEvent<calipso_msgs::NodeStatus const>& event);
 
   Preparation preparation_;
-  std::map<std::string, std::string> node_of_;   // ROS name -> name in NodeStatus
+  std::map<std::string, std::string> node_of_;  // ROS name -> name in NodeStatus
   std::map<std::string, std::string> last_said_;
   std::set<std::string> ended_;
   int activity_ = 0;

@@ -1,10 +1,10 @@
 #include "player.hpp"
 
-#include <boost/make_shared.hpp>
 #include <calipso_msgs/ClipInfo.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <algorithm>
+#include <boost/make_shared.hpp>
 #include <iomanip>
 #include <stdexcept>
 
@@ -34,9 +34,11 @@ std::vector<std::string> common(const std::vector<std::string>& a,
   return both;
 }
 
-std::vector<PlayedFrame> scheduleOf(const BagClip& clip, const std::vector<calipso_msgs::Edit>& edits) {
+std::vector<PlayedFrame> scheduleOf(const BagClip& clip,
+                                    const std::vector<calipso_msgs::Edit>& edits) {
   std::vector<std::int64_t> frames;
-  for (const ros::Time& stamp : clip.stamps()) frames.push_back(static_cast<std::int64_t>(stamp.toNSec()));
+  for (const ros::Time& stamp : clip.stamps())
+    frames.push_back(static_cast<std::int64_t>(stamp.toNSec()));
   std::vector<TimeScale> scales;
   for (const calipso_msgs::Edit& edit : edits) {
     if (edit.kind != calipso_msgs::Edit::TIME_SCALE) continue;
@@ -84,11 +86,11 @@ void Player::checkScene() const {
   const sensor_msgs::CameraInfo& info = clip_.firstInfo();
   if (static_cast<int>(info.width) != scene_.camera.width ||
       static_cast<int>(info.height) != scene_.camera.height) {
-    throw std::runtime_error(
-        params_.clip.path + ": images are " + std::to_string(info.width) + "x" +
-        std::to_string(info.height) + ", but " + params_.scene + "/scene.yaml is for " +
-        std::to_string(scene_.camera.width) + "x" + std::to_string(scene_.camera.height) +
-        "; use the scene of this video");
+    throw std::runtime_error(params_.clip.path + ": images are " + std::to_string(info.width) +
+                             "x" + std::to_string(info.height) + ", but " + params_.scene +
+                             "/scene.yaml is for " + std::to_string(scene_.camera.width) + "x" +
+                             std::to_string(scene_.camera.height) +
+                             "; use the scene of this video");
   }
   for (const SceneObject& object : scene_.objects) loadMesh(object.cad_path);
   const ros::Time last = clip_.stamps().back();
@@ -104,14 +106,15 @@ void Player::checkScene() const {
 template <typename M>
 ros::Publisher Player::advertise(const std::string& topic, bool latched) {
   ros::AdvertiseOptions options;
-  options.init<M>(topic, kQueue,
-                  [this](const ros::SingleSubscriberPublisher& subscriber) {
-                    links_.opened(subscriber.getTopic(), subscriber.getSubscriberName());
-                  },
-                  [this](const ros::SingleSubscriberPublisher& subscriber) {
-                    links_.closed(subscriber.getTopic(), subscriber.getSubscriberName());
-                    watch_.connectionLost(subscriber.getSubscriberName());
-                  });
+  options.init<M>(
+      topic, kQueue,
+      [this](const ros::SingleSubscriberPublisher& subscriber) {
+        links_.opened(subscriber.getTopic(), subscriber.getSubscriberName());
+      },
+      [this](const ros::SingleSubscriberPublisher& subscriber) {
+        links_.closed(subscriber.getTopic(), subscriber.getSubscriberName());
+        watch_.connectionLost(subscriber.getSubscriberName());
+      });
   options.latch = latched;
   advertised_.insert(nh_.resolveName(topic));
   return nh_.advertise(options);
@@ -143,7 +146,8 @@ void Player::run() {
 std::vector<std::string> Player::silent() const {
   std::vector<std::string> names;
   for (const std::string& node : watch_.preparation().unsettled()) {
-    if (node == "recorder" || watch_.preparation().standing(node).message.empty()) names.push_back(node);
+    if (node == "recorder" || watch_.preparation().standing(node).message.empty())
+      names.push_back(node);
   }
   return names;
 }
@@ -264,14 +268,14 @@ void Player::playFrame(const BagFrame& frame, const ros::Time& stamp) {
 }
 
 void Player::waitForEdited(const std::function<bool()>& done) {
-  const bool in_time = waitFor([&] { return done() || watch_.ended("render"); },
-                               params_.frame_timeout_sec);
+  const bool in_time =
+      waitFor([&] { return done() || watch_.ended("render"); }, params_.frame_timeout_sec);
   if (done()) return;
   throw std::runtime_error(
       (in_time ? "the renderer's process ended"
                : "no edited frame for " + std::to_string(params_.frame_timeout_sec) + " s") +
-      " after " + std::to_string(window_.returned()) + " of " +
-      std::to_string(schedule_.size()) + " frames; look for the renderer's messages above");
+      " after " + std::to_string(window_.returned()) + " of " + std::to_string(schedule_.size()) +
+      " frames; look for the renderer's messages above");
 }
 
 void Player::onEdited(const sensor_msgs::CameraInfoConstPtr& info) {

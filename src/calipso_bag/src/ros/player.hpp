@@ -26,12 +26,12 @@ class Player {
  public:
   struct Params {
     BagClip::Params clip;
-    std::string scene;                 // folder
-    std::string edits;                 // YAML file, edited bag, or none
-    std::string poses = "auto";        // where the camera's poses come from: auto, bag, scene
-    std::vector<std::string> nodes;    // the ones to wait for; empty: the whole graph
-    bool estimate_wind = false;        // also when none of the edits needs it
-    int in_flight = 4;                 // frames under way, >= 1
+    std::string scene;                   // folder
+    std::string edits;                   // YAML file, edited bag, or none
+    std::string poses = "auto";          // where the camera's poses come from: auto, bag, scene
+    std::vector<std::string> nodes;      // the ones to wait for; empty: the whole graph
+    bool estimate_wind = false;          // also when none of the edits needs it
+    int in_flight = 4;                   // frames under way, >= 1
     double connect_timeout_sec = 60.0;   // for every node to report
     double prepare_timeout_sec = 600.0;  // without any progress of the preparation
     double frame_timeout_sec = 120.0;    // for one edited frame to come back

@@ -16,8 +16,9 @@
 namespace calipso::bag {
 namespace {
 
-constexpr unsigned kQueue = 10000;    // nothing may be lost before it is written
-constexpr std::size_t kLagFrames = 8;  // messages of a frame may come this much later than its image
+constexpr unsigned kQueue = 10000;  // nothing may be lost before it is written
+constexpr std::size_t kLagFrames =
+    8;  // messages of a frame may come this much later than its image
 
 std::string seconds(const ros::Time& stamp) { return std::to_string(stamp.toSec()) + " s"; }
 
@@ -146,7 +147,9 @@ bool Recorder::connected() const {
   });
 }
 
-bool Recorder::allEdited() const { return clip_.played_frames > 0 && edited_.size() >= clip_.played_frames; }
+bool Recorder::allEdited() const {
+  return clip_.played_frames > 0 && edited_.size() >= clip_.played_frames;
+}
 
 // What a failed node would have said is not waited for.
 bool Recorder::allExplained() const {

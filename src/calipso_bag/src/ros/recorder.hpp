@@ -78,9 +78,9 @@ class Recorder {
   NodeReporter reporter_;
   RunSummary summary_;
   std::vector<ros::Subscriber> subscribers_;
-  calipso_msgs::ClipInfo clip_;             // frames == 0 until the player has announced it
-  std::vector<ros::Time> input_, edited_;   // stamps, in the order they came
-  std::map<std::string, int> count_;        // messages recorded, by topic
+  calipso_msgs::ClipInfo clip_;            // frames == 0 until the player has announced it
+  std::vector<ros::Time> input_, edited_;  // stamps, in the order they came
+  std::map<std::string, int> count_;       // messages recorded, by topic
   int rank_ = 0;
   ros::WallTime first_edited_;
 };

@@ -22,9 +22,8 @@ class StampedWriter {
   void add(const std::string& topic, const ros::Time& stamp, const std::string& rank,
            const boost::shared_ptr<M const>& message,
            const boost::shared_ptr<ros::M_string>& connection = nullptr) {
-    waiting_.emplace(Key(stamp, topic, rank), [=](rosbag::Bag& bag) {
-      bag.write(topic, stamp, message, connection);
-    });
+    waiting_.emplace(Key(stamp, topic, rank),
+                     [=](rosbag::Bag& bag) { bag.write(topic, stamp, message, connection); });
   }
 
   // Writes everything up to and including this stamp.

@@ -8,12 +8,12 @@
 
 namespace calipso::fem {
 
-// Which 3x3 blocks of a symmetric matrix are stored: those of every pair of nodes that share a cell.
-// Columns of a row ascend.
+// Which 3x3 blocks of a symmetric matrix are stored: those of every pair of nodes that share a
+// cell. Columns of a row ascend.
 struct BlockPattern {
-  std::vector<int> row_start;   // #N + 1
-  std::vector<int> column;      // #blocks
-  std::vector<int> diagonal;    // #N, index of block (i, i)
+  std::vector<int> row_start;  // #N + 1
+  std::vector<int> column;     // #blocks
+  std::vector<int> diagonal;   // #N, index of block (i, i)
 
   int rows() const { return static_cast<int>(row_start.size()) - 1; }
   int blockCount() const { return static_cast<int>(column.size()); }
@@ -28,7 +28,7 @@ std::shared_ptr<const BlockPattern> makeBlockPattern(const CellMatrix& cells, in
 // A symmetric matrix of 3x3 blocks (row-major inside) in compressed rows. Both halves are stored.
 struct BlockMatrix {
   std::shared_ptr<const BlockPattern> pattern;
-  std::vector<double> values;   // 9 per block
+  std::vector<double> values;  // 9 per block
 
   explicit BlockMatrix(std::shared_ptr<const BlockPattern> p = nullptr);
 

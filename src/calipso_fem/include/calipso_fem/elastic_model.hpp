@@ -21,8 +21,8 @@ class StvkHexes;
 enum class ElementType {
   kHexQ1,              // trilinear, 2x2x2 Gauss points
   kHexMeanDilatation,  // trilinear, one dilatation per element (F-bar): for nu near 0.5
-  kHexEnhanced,        // enhanced strain modes, condensed: locks neither in bending nor near nu = 0.5
-  kTetP1               // linear tetrahedron
+  kHexEnhanced,  // enhanced strain modes, condensed: locks neither in bending nor near nu = 0.5
+  kTetP1         // linear tetrahedron
 };
 
 std::string toString(ElementType element);
@@ -33,7 +33,8 @@ enum class Definiteness { kExact, kPositive };  // kPositive: each element's par
 // The elastic energy of one body. Holds its own copy of the mesh. Const calls may run in parallel.
 class ElasticModel {
  public:
-  // @throw std::invalid_argument for a bad mesh or material, or an element that does not fit the mesh
+  // @throw std::invalid_argument for a bad mesh or material, or an element that does not fit the
+  // mesh
   ElasticModel(VolumeMesh mesh, const Material& material, MaterialModel model, ElementType element);
   ~ElasticModel();
   ElasticModel(ElasticModel&&) noexcept;
@@ -58,8 +59,8 @@ class ElasticModel {
   // coefficient. Positive semi-definite; rigid velocities give no force.
   void viscosity(const Vec& x, BlockMatrix& D) const;
 
-  // The cells packed for products without a matrix; null where material or element have none. Built anew by
-  // every change of material or rest shape.
+  // The cells packed for products without a matrix; null where material or element have none. Built
+  // anew by every change of material or rest shape.
   const StvkHexes* hexes() const;
 
   const std::shared_ptr<const BlockPattern>& pattern() const;

@@ -13,7 +13,8 @@ struct SurfacePoint {
   Eigen::Vector3d weights = Eigen::Vector3d::UnitX();
 
   static SurfacePoint vertex(int i) { return {{i, i, i}, Eigen::Vector3d::UnitX()}; }
-  static SurfacePoint onTriangle(const Eigen::Vector3i& corners, const Eigen::Vector3d& barycentric) {
+  static SurfacePoint onTriangle(const Eigen::Vector3i& corners,
+                                 const Eigen::Vector3d& barycentric) {
     return {corners, barycentric};
   }
 };

@@ -15,11 +15,11 @@
 namespace calipso::fem {
 
 enum class MaterialModel {
-  kLinear,               // mu eps:eps + lambda/2 tr(eps)^2
-  kStVenantKirchhoff,    // mu E:E + lambda/2 tr(E)^2, E = (F^T F - I) / 2
-  kStableNeoHookean,     // Smith, de Goes, Kim 2018, eq. 13 with the log barrier, rest-consistent
+  kLinear,                 // mu eps:eps + lambda/2 tr(eps)^2
+  kStVenantKirchhoff,      // mu E:E + lambda/2 tr(E)^2, E = (F^T F - I) / 2
+  kStableNeoHookean,       // Smith, de Goes, Kim 2018, eq. 13 with the log barrier, rest-consistent
   kStableNeoHookeanNoLog,  // mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2
-  kCorotated             // mu |F - R|^2 + lambda/2 tr(R^T F - I)^2
+  kCorotated               // mu |F - R|^2 + lambda/2 tr(R^T F - I)^2
 };
 
 struct Lame {

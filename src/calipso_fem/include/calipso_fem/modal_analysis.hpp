@@ -8,8 +8,8 @@ namespace calipso::fem {
 
 // Small vibrations about the rest shape: K phi = omega^2 M phi.
 struct ModalResult {
-  Eigen::VectorXd frequencies;   // Hz, ascending
-  Eigen::MatrixXd modes;         // 3n x count, M-orthonormal; zero at fixed components
+  Eigen::VectorXd frequencies;  // Hz, ascending
+  Eigen::MatrixXd modes;        // 3n x count, M-orthonormal; zero at fixed components
   int iterations = 0;
   bool converged = false;
 };

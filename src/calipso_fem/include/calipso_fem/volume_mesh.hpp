@@ -13,9 +13,9 @@ using CellMatrix = Eigen::Matrix<int, Eigen::Dynamic, Eigen::Dynamic, Eigen::Row
 // A volume mesh of hexahedra (8 corners) or tetrahedra (4 corners).
 // Hexahedron corner c = bx + 2 by + 4 bz lies at parent coordinates (2 bx - 1, 2 by - 1, 2 bz - 1).
 struct VolumeMesh {
-  NodeMatrix nodes;           // #N x 3, rest positions, m
-  CellMatrix cells;           // #C x 8 or #C x 4
-  Eigen::VectorXd fraction;   // #C, filled part of each cell, in (0, 1]
+  NodeMatrix nodes;          // #N x 3, rest positions, m
+  CellMatrix cells;          // #C x 8 or #C x 4
+  Eigen::VectorXd fraction;  // #C, filled part of each cell, in (0, 1]
   // How the filled part of each hexahedron is spread over the octants around its Gauss points, mean
   // one per row; empty: evenly. #C x 8
   PointMatrix point_share;
@@ -33,9 +33,10 @@ struct VolumeMesh {
 VolumeMesh boxMesh(const Eigen::Vector3d& min, const Eigen::Vector3d& max,
                    const Eigen::Vector3i& count);
 
-// Draws the lattice planes of a box mesh along one axis towards its low end, or towards both: distances t from the
-// end, as shares of the side (or of half of it), become t^1.5. The stress at a clamped edge grows like r^-0.3 to
-// r^-0.4, and on such a grid (Babuska's radical mesh) that corner costs no more than the rest of the body.
+// Draws the lattice planes of a box mesh along one axis towards its low end, or towards both:
+// distances t from the end, as shares of the side (or of half of it), become t^1.5. The stress at a
+// clamped edge grows like r^-0.3 to r^-0.4, and on such a grid (Babuska's radical mesh) that corner
+// costs no more than the rest of the body.
 enum class GradedEnds { kLow, kBoth };
 void gradeBox(int axis, GradedEnds ends, VolumeMesh* box);
 

@@ -68,8 +68,10 @@ void SimulatorRos::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip
 
 // Without the flow nothing is known to move, and every other edit still works.
 void SimulatorRos::onStatus(const calipso_msgs::NodeStatusConstPtr& status) {
-  if (status->node != "flow" || status->state != calipso_msgs::NodeStatus::FAILED || clip_dynamics_) return;
-  reporter_.warn(status->header.stamp, "how things move in the video is not known, flow failed: " + status->message);
+  if (status->node != "flow" || status->state != calipso_msgs::NodeStatus::FAILED || clip_dynamics_)
+    return;
+  reporter_.warn(status->header.stamp,
+                 "how things move in the video is not known, flow failed: " + status->message);
   clip_dynamics_ = boost::make_shared<const calipso_msgs::ClipDynamics>();
   prepare();
 }
@@ -120,8 +122,10 @@ void SimulatorRos::take(const calipso_msgs::ObjectClipDynamics& object) {
   } catch (const std::invalid_argument& error) {
     reporter_.warn(clip_dynamics_->header.stamp, error.what());
   }
-  if (object.falls) world_->addObservedGravity(calipso::fromMsg(object.gravity), object.gravity_deviation);
-  for (const auto& wind : object.wind) world_->addObservedWind(object.object, fromMsg(wind, *first_stamp_));
+  if (object.falls)
+    world_->addObservedGravity(calipso::fromMsg(object.gravity), object.gravity_deviation);
+  for (const auto& wind : object.wind)
+    world_->addObservedWind(object.object, fromMsg(wind, *first_stamp_));
   for (const auto& collision : object.collisions)
     world_->addCollision(object.object, (collision.stamp - *first_stamp_).toSec());
 }

@@ -120,7 +120,8 @@ ObservedWind fromMsg(const calipso_msgs::Wind& wind, const ros::Time& first_stam
   ObservedWind w;
   w.time = (wind.stamp - first_stamp).toSec();
   w.velocity = calipso::fromMsg(wind.velocity);
-  w.covariance = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(wind.covariance.data());
+  w.covariance =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(wind.covariance.data());
   return w;
 }
 
@@ -130,8 +131,8 @@ Eigen::MatrixXd shapesOf(const std::vector<calipso_msgs::DeformationMode>& modes
   for (size_t m = 0; m < modes.size(); ++m) {
     if (modes[m].displacements.size() != rows)
       throw std::invalid_argument("mode " + std::to_string(m) + " has " +
-                                  std::to_string(modes[m].displacements.size()) + " numbers, the first one " +
-                                  std::to_string(rows));
+                                  std::to_string(modes[m].displacements.size()) +
+                                  " numbers, the first one " + std::to_string(rows));
     shapes.col(m) = toVector(modes[m].displacements);
   }
   return shapes;

@@ -25,7 +25,7 @@ struct Pull {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // object frame, centre of the region
   Eigen::Vector3d start = Eigen::Vector3d::Zero();   // world, where the anchor was
   Eigen::Matrix3d start_rotation = Eigen::Matrix3d::Identity();  // of the object
-  double begin = 0.0, ramp = 0.0, duration = 0.0;    // s
+  double begin = 0.0, ramp = 0.0, duration = 0.0;                // s
 
   double share(double time) const {  // 0..1 along the ramp
     return ramp > 0.0 ? std::min(1.0, std::max(0.0, (time - begin) / ramp)) : 1.0;
@@ -56,9 +56,10 @@ struct Actor {
 
   WorldObject object;  // its mesh is rescaled by edits
   ObservedTrack track;
-  Eigen::MatrixXd modes;  // 3 #V x K, object frame: in which it deforms in the video; empty: as a rigid body
+  Eigen::MatrixXd
+      modes;  // 3 #V x K, object frame: in which it deforms in the video; empty: as a rigid body
   WindTrack wind;  // that its cloth shows in the video
-  int id = 0;  // index among the actors; also its obstacle's id
+  int id = 0;      // index among the actors; also its obstacle's id
   ObjectSettings settings;
   Material observed_material;  // with which the observed shape is at rest
   Material material;
@@ -66,14 +67,15 @@ struct Actor {
   std::optional<ObjectKind> forced_kind;
   std::string reason = "no edit touches it";
   bool edited = false, removed = false;
-  bool altered = false;    // by an edit that does more than to let it go on, or of its look
-  bool continues = false;  // as in the video, with the velocity it has there, and nothing else is edited
-  bool inserted = false;  // not in the video
-  bool immovable = false;  // of infinite mass
+  bool altered = false;  // by an edit that does more than to let it go on, or of its look
+  bool continues =
+      false;  // as in the video, with the velocity it has there, and nothing else is edited
+  bool inserted = false;          // not in the video
+  bool immovable = false;         // of infinite mass
   std::vector<int> own_supports;  // ids of the support meshes that are its own surface
   // Contacts of own supports that it has put an end to; others' wishes stay.
   std::vector<std::pair<std::string, std::string>> ended_contacts;
-  std::string source;     // of a copy: the object of the video whose model it is drawn by
+  std::string source;  // of a copy: the object of the video whose model it is drawn by
   Holder holder = Holder::kUnknown;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();            // m/s^2
   Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();           // m/s^2
@@ -88,9 +90,9 @@ struct Actor {
     bool closed = false;
     double areal_density = 0.0;  // kg/m^2
   };
-  std::optional<Sheet> sheet;  // how the surface meets the air; made when it is needed
-  WindTrack air;                            // around it, by edits
-  std::vector<double> collisions;           // instants in the video, s, ascending
+  std::optional<Sheet> sheet;      // how the surface meets the air; made when it is needed
+  WindTrack air;                   // around it, by edits
+  std::vector<double> collisions;  // instants in the video, s, ascending
   Look look;
   std::vector<std::vector<int>> fixed;  // vertices per fixed region
   bool asleep = false;

@@ -6,8 +6,8 @@
 
 namespace calipso::fem {
 
-// Anderson acceleration of a fixed-point iteration x -> g(x): the next x is the combination of the last
-// g's for which the same combination of g(x) - x is least (Walker and Ni 2011, type II).
+// Anderson acceleration of a fixed-point iteration x -> g(x): the next x is the combination of the
+// last g's for which the same combination of g(x) - x is least (Walker and Ni 2011, type II).
 class Anderson {
  public:
   // What comes along (same length every time) is combined like g.

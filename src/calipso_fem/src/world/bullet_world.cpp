@@ -127,7 +127,8 @@ void BulletWorld::solveConstraints(btContactSolverInfo& info) {
   }
   for (btManifoldPoint* point : redundant) {
     point->setDistance(2.0 * kIgnoredBeyond);
-    point->m_appliedImpulse = point->m_appliedImpulseLateral1 = point->m_appliedImpulseLateral2 = 0.0;
+    point->m_appliedImpulse = point->m_appliedImpulseLateral1 = point->m_appliedImpulseLateral2 =
+        0.0;
   }
   btDiscreteDynamicsWorld::solveConstraints(info);
 }

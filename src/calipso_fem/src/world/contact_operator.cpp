@@ -53,7 +53,8 @@ void ContactOperator::update(const std::map<Contact::Key, Contact>& contacts,
   std::vector<int> renewed;
   for (size_t s = 0; s < softs.size(); ++s) {
     const auto part = parts_.find(static_cast<int>(s));
-    const bool known = part != parts_.end() && part->second.version == softs[s].soft->system().version();
+    const bool known =
+        part != parts_.end() && part->second.version == softs[s].soft->system().version();
     if (motion.bodies()[s].touched && !known) renewed.push_back(static_cast<int>(s));
   }
   if (renewed.empty() && contacts.size() == entries_.size()) return;
@@ -64,8 +65,9 @@ void ContactOperator::update(const std::map<Contact::Key, Contact>& contacts,
                         contactFrame(c.normal),
                         c.motion});
   std::vector<Part> parts(renewed.size());
-  eachOnAThread(static_cast<int>(renewed.size()),
-                [&](int k) { parts[k] = partOf(renewed[k], softs[renewed[k]].soft->system(), motion.h()); });
+  eachOnAThread(static_cast<int>(renewed.size()), [&](int k) {
+    parts[k] = partOf(renewed[k], softs[renewed[k]].soft->system(), motion.h());
+  });
   for (size_t k = 0; k < renewed.size(); ++k) parts_[renewed[k]] = std::move(parts[k]);
   const auto n = static_cast<Eigen::Index>(entries_.size());
   W_.setZero(3 * n, 3 * n);
@@ -80,7 +82,8 @@ void ContactOperator::addPart(const Part& part) {
     while (end < n && part.contacts[end] - part.contacts[begin] == end - begin) ++end;
     const int rows = 3 * (end - begin);
     for (int j = 0; j < n; ++j)
-      W_.block(3 * part.contacts[begin], 3 * part.contacts[j], rows, 3) += part.W.block(3 * begin, 3 * j, rows, 3);
+      W_.block(3 * part.contacts[begin], 3 * part.contacts[j], rows, 3) +=
+          part.W.block(3 * begin, 3 * j, rows, 3);
   }
 }
 
@@ -101,7 +104,8 @@ ContactOperator::Part ContactOperator::partOf(int soft, SoftSystem& system, doub
       part.contacts.push_back(static_cast<int>(i));
     }
   const auto n = static_cast<int>(frames.size());
-  const PlaceList places{start.data(), node.data(), weight.data(), n > 0 ? frames.front().data() : nullptr};
+  const PlaceList places{start.data(), node.data(), weight.data(),
+                         n > 0 ? frames.front().data() : nullptr};
   part.W.resize(3 * n, 3 * n);
   Eigen::Matrix<double, 3, Eigen::Dynamic> FJC(3, C.cols()), row(3, 3 * n);
   Eigen::Matrix<double, Eigen::Dynamic, 3> CJ(C.rows(), 3);

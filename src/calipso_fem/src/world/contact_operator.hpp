@@ -12,7 +12,8 @@ namespace calipso::fem {
 // W = H A^-1 H^T in their frames (normal first), m/s per N s.
 class ContactOperator {
  public:
-  // Takes over the contacts, which may have become more since the last call, and the systems of the bodies.
+  // Takes over the contacts, which may have become more since the last call, and the systems of the
+  // bodies.
   void update(const std::map<Contact::Key, Contact>& contacts, const StepMotion& motion,
               const std::vector<SoftEntry>& softs, const RigidWorld& rigid);
   void forget() { parts_.clear(); }  // contacts have changed

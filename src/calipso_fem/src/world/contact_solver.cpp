@@ -36,12 +36,13 @@ bool isInsideCone(const ContactRow& row, const Eigen::Vector3d& p) {
   return p[0] > -row.held_normal && p.tail<2>().norm() < kInside * frictionLimit(row, p[0]);
 }
 
-// Where the sweeps so far together point to (Anderson): a heavy body's weight goes through a light one only little by
-// little. A sweep that changes more than the one before makes a new start.
+// Where the sweeps so far together point to (Anderson): a heavy body's weight goes through a light
+// one only little by little. A sweep that changes more than the one before makes a new start.
 class Extrapolation {
  public:
   // @param before, rows, velocity  before the last sweep, and after it
-  void apply(const Eigen::VectorXd& before, std::vector<ContactRow>& rows, Eigen::VectorXd& velocity) {
+  void apply(const Eigen::VectorXd& before, std::vector<ContactRow>& rows,
+             Eigen::VectorXd& velocity) {
     const Eigen::VectorXd after = impulsesOf(rows);
     const double change = (after - before).norm();
     if (change > last_change_) anderson_.reset();
@@ -75,7 +76,8 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
   velocity.noalias() += W * change;
   // While the first sweep changes a lot, the bodies are far from their end, and so is the problem.
   constexpr double kReduction = 0.02;
-  constexpr double kNegligible = 0.1;  // of the change that ends the sweeps: not worth telling the others
+  constexpr double kNegligible =
+      0.1;  // of the change that ends the sweeps: not worth telling the others
   double first = 0.0;
   ContactSolveReport report;
   report.converged = n == 0;
@@ -92,7 +94,8 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
       largest = std::max(largest, p.norm());
       fastest = std::max(fastest, speed);
       if (step.isZero(0.0)) continue;
-      const bool negligible = speed < kNegligible * std::max(velocity_tolerance, kReduction * first);
+      const bool negligible =
+          speed < kNegligible * std::max(velocity_tolerance, kReduction * first);
       if (negligible && isInsideCone(rows[i], p)) continue;
       rows[i].impulse = p;
       addThree(W.col(3 * i).data(), 3 * n, step.data(), 3 * n, velocity.data());
@@ -100,9 +103,11 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
     ++report.iterations;
     report.residual = largest > 0.0 ? largest_change / largest : 0.0;
     if (report.iterations == 1 && velocity_tolerance > 0.0) first = fastest;
-    // Where a heavy body rests on a light one, impulses that hardly change move the light one a lot.
-    report.converged = velocity_tolerance > 0.0 ? fastest <= std::max(velocity_tolerance, kReduction * first)
-                                                : report.residual <= tolerance;
+    // Where a heavy body rests on a light one, impulses that hardly change move the light one a
+    // lot.
+    report.converged = velocity_tolerance > 0.0
+                           ? fastest <= std::max(velocity_tolerance, kReduction * first)
+                           : report.residual <= tolerance;
     if (!report.converged && report.iterations < max_iterations)
       extrapolation.apply(before, rows, velocity);
   }

@@ -131,16 +131,18 @@ Slabs sortInto(const Triangles& triangles, int axis, const std::vector<double>& 
       const Eigen::Vector3d &a = t[k], &b = t[(k + 1) % 3];
       const auto from = slabOf(a), to = slabOf(b);
       slabs.between[from].push_back(a);
-      if (static_cast<size_t>(from) < planes.size() && a[axis] == planes[from]) slabs.on[from].push_back(a);
+      if (static_cast<size_t>(from) < planes.size() && a[axis] == planes[from])
+        slabs.on[from].push_back(a);
       for (auto i = std::min(from, to); i < std::max(from, to); ++i)
         slabs.on[i].push_back(a + (planes[i] - a[axis]) / (b[axis] - a[axis]) * (b - a));
     }
   return slabs;
 }
 
-// Volumes of the hulls of what lies on one side of each plane. From plane to plane a hull's corners stand for all that it
-// holds. @param sign 1: below the planes; -1: above
-std::vector<double> sweep(const Slabs& slabs, const std::vector<double>& planes, const Box& box, int axis, double sign, const Solid& solid) {
+// Volumes of the hulls of what lies on one side of each plane. From plane to plane a hull's corners
+// stand for all that it holds. @param sign 1: below the planes; -1: above
+std::vector<double> sweep(const Slabs& slabs, const std::vector<double>& planes, const Box& box,
+                          int axis, double sign, const Solid& solid) {
   const int count = static_cast<int>(planes.size());
   std::vector<double> volumes(count);
   Points held;
@@ -172,7 +174,8 @@ Cut bestCut(const Part& part, const Solid& solid, int cuts_per_axis) {
       const double s = i / (cuts_per_axis + 1.0);
       at.push_back((1.0 - s) * extent.min()[axis] + s * extent.max()[axis]);
     }
-    volumes[k] = sweep(sortInto(part.triangles, axis, at), at, part.box, axis, k % 2 == 0 ? 1.0 : -1.0, solid);
+    volumes[k] = sweep(sortInto(part.triangles, axis, at), at, part.box, axis,
+                       k % 2 == 0 ? 1.0 : -1.0, solid);
     if (k % 2 == 0) planes[axis] = at;
   }
   Cut best;
@@ -195,7 +198,8 @@ Part makePart(Triangles triangles, const Box& box, const Solid& solid) {
 }
 
 // Splits the worst part until all are convex enough, or there are as many as may be.
-std::vector<Part> split(Part whole, const Solid& solid, double tolerance, int max_hulls, int cuts_per_axis) {
+std::vector<Part> split(Part whole, const Solid& solid, double tolerance, int max_hulls,
+                        int cuts_per_axis) {
   std::vector<Part> parts = {std::move(whole)};
   while (static_cast<int>(parts.size()) < max_hulls) {
     const auto worst =
@@ -230,12 +234,15 @@ std::vector<TriangleMesh> decomposeConvex(const TriangleMesh& mesh,
   for (int f = 0; f < mesh.triangleCount(); ++f)
     all.push_back({mesh.vertex(mesh.triangles(f, 0)), mesh.vertex(mesh.triangles(f, 1)),
                    mesh.vertex(mesh.triangles(f, 2))});
-  // Each cut is the best for the next two parts, not for all to come: planes elsewhere may end far better.
+  // Each cut is the best for the next two parts, not for all to come: planes elsewhere may end far
+  // better.
   constexpr int kTries = 3;
   std::vector<Part> parts;
   double least = std::numeric_limits<double>::infinity();
-  for (int i = 0, cuts = params.cuts_per_axis; i < kTries && least > 0.0; ++i, cuts += (cuts + 1) / 2) {
-    std::vector<Part> tried = split(makePart(all, box, solid), solid, tolerance, params.max_hulls, cuts);
+  for (int i = 0, cuts = params.cuts_per_axis; i < kTries && least > 0.0;
+       ++i, cuts += (cuts + 1) / 2) {
+    std::vector<Part> tried =
+        split(makePart(all, box, solid), solid, tolerance, params.max_hulls, cuts);
     const bool done = static_cast<int>(tried.size()) < params.max_hulls;
     double volume = 0.0;
     for (const Part& part : tried) volume += hullVolume(part.hull);

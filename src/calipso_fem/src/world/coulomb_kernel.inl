@@ -3,7 +3,8 @@
 #define ROW_INLINE TARGET inline __attribute__((always_inline))
 
 ROW_INLINE double slipOf(const RigidRow& row, const RowBody& a, const RowBody& b) {
-  const Four s = row.normal * (a.linear - b.linear) + row.turn_a * a.angular + row.turn_b * b.angular;
+  const Four s =
+      row.normal * (a.linear - b.linear) + row.turn_a * a.angular + row.turn_b * b.angular;
   return s[0] + s[1] + s[2] - row.target;
 }
 
@@ -24,8 +25,8 @@ ROW_INLINE double solveWithin(double low, double high, RigidRow& row, RowBody& a
   return change * change;
 }
 
-// p <- projection of p - r u onto the disk: r not above the smaller of the two inverse masses makes it a
-// contraction, and r alike for both makes the friction of what slides opposite to the slip.
+// p <- projection of p - r u onto the disk: r not above the smaller of the two inverse masses makes
+// it a contraction, and r alike for both makes the friction of what slides opposite to the slip.
 ROW_INLINE double solveFriction(RigidRow& u, RigidRow& v, double limit, RowBody& a, RowBody& b) {
   if (limit <= 0.0 && u.impulse == 0.0 && v.impulse == 0.0) return 0.0;
   const double r = std::min(u.inverse, v.inverse);
@@ -43,9 +44,11 @@ TARGET double sweepRows(RigidRows& rows) {
   RowBody* bodies = rows.bodies.data();
   double off = 0.0;
   for (RigidContact& c : rows.contacts)
-    off = std::max(off, solveWithin(0.0, kUnbounded, c.normal, bodies[c.normal.a], bodies[c.normal.b]));
+    off = std::max(off,
+                   solveWithin(0.0, kUnbounded, c.normal, bodies[c.normal.a], bodies[c.normal.b]));
   for (RigidContact& c : rows.contacts)
-    off = std::max(off, solveFriction(c.u, c.v, c.friction * c.normal.impulse, bodies[c.u.a], bodies[c.u.b]));
+    off = std::max(
+        off, solveFriction(c.u, c.v, c.friction * c.normal.impulse, bodies[c.u.a], bodies[c.u.b]));
   for (RollingRow& r : rows.rolling) {
     const double limit = r.friction * std::min(1.0, rows.contacts[r.contact].normal.impulse);
     off = std::max(off, solveWithin(-limit, limit, r.row, bodies[r.row.a], bodies[r.row.b]));

@@ -29,7 +29,8 @@ void CoulombSolver::pack() {
   for (int i = 0; i < m_tmpSolverBodyPool.size(); ++i) {
     btSolverBody& body = m_tmpSolverBodyPool[i];
     rows_.bodies.push_back({fem::packed(body.internalGetDeltaLinearVelocity()),
-                            fem::packed(body.internalGetDeltaAngularVelocity()), body.internalGetInvMass().x()});
+                            fem::packed(body.internalGetDeltaAngularVelocity()),
+                            body.internalGetInvMass().x()});
   }
   const auto& friction = m_tmpSolverContactFrictionConstraintPool;
   const auto& rolling = m_tmpSolverContactRollingFrictionConstraintPool;
@@ -44,7 +45,8 @@ void CoulombSolver::pack() {
   }
   rows_.rolling.clear();
   for (int i = 0; i < rolling.size(); ++i)
-    rows_.rolling.push_back({packed(rolling[i]), rolling[i].m_friction, rolling[i].m_frictionIndex});
+    rows_.rolling.push_back(
+        {packed(rolling[i]), rolling[i].m_friction, rolling[i].m_frictionIndex});
 }
 
 void CoulombSolver::unpack() {
@@ -56,21 +58,23 @@ void CoulombSolver::unpack() {
   auto& friction = m_tmpSolverContactFrictionConstraintPool;
   auto& rolling = m_tmpSolverContactRollingFrictionConstraintPool;
   for (size_t i = 0; i < rows_.contacts.size(); ++i)
-    m_tmpSolverContactConstraintPool[static_cast<int>(i)].m_appliedImpulse = rows_.contacts[i].normal.impulse;
+    m_tmpSolverContactConstraintPool[static_cast<int>(i)].m_appliedImpulse =
+        rows_.contacts[i].normal.impulse;
   for (int i = 0; i + 1 < friction.size(); i += 2) {
     const RigidContact& contact = rows_.contacts[friction[i].m_frictionIndex];
     friction[i].m_appliedImpulse = contact.u.impulse;
     friction[i + 1].m_appliedImpulse = contact.v.impulse;
   }
-  for (int i = 0; i < rolling.size(); ++i) rolling[i].m_appliedImpulse = rows_.rolling[i].row.impulse;
+  for (int i = 0; i < rolling.size(); ++i)
+    rolling[i].m_appliedImpulse = rows_.rolling[i].row.impulse;
 }
 
-btScalar CoulombSolver::solveGroupCacheFriendlyIterations(btCollisionObject** bodies, int body_count,
-                                                          btPersistentManifold** manifolds, int manifold_count,
-                                                          btTypedConstraint** constraints, int constraint_count,
-                                                          const btContactSolverInfo& info, btIDebugDraw* drawer) {
-  solveGroupCacheFriendlySplitImpulseIterations(bodies, body_count, manifolds, manifold_count, constraints,
-                                                constraint_count, info, drawer);
+btScalar CoulombSolver::solveGroupCacheFriendlyIterations(
+    btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
+    int manifold_count, btTypedConstraint** constraints, int constraint_count,
+    const btContactSolverInfo& info, btIDebugDraw* drawer) {
+  solveGroupCacheFriendlySplitImpulseIterations(bodies, body_count, manifolds, manifold_count,
+                                                constraints, constraint_count, info, drawer);
   pack();
   for (int k = 0; k < info.m_numIterations; ++k)
     if (sweepRows(rows_) <= info.m_leastSquaresResidualThreshold) break;

@@ -1,6 +1,7 @@
 // Included by dense_kernels.cpp, once for each instruction set.
 
-TARGET void addThree(const double* __restrict x, long stride, const double* a, int n, double* __restrict y) {
+TARGET void addThree(const double* __restrict x, long stride, const double* a, int n,
+                     double* __restrict y) {
   const double *x1 = x + stride, *x2 = x + 2 * stride;
   const double a0 = a[0], a1 = a[1], a2 = a[2];
   for (int i = 0; i < n; ++i) y[i] += a0 * x[i] + a1 * x1[i] + a2 * x2[i];
@@ -17,6 +18,7 @@ TARGET void projectOnto(const PlaceList& places, int count, const double* __rest
     }
     const double* F = places.frames + 9 * j;
     for (int c = 0; c < 3; ++c)
-      for (int r = 0; r < 3; ++r) out[3 * c + r] = sum[r] * F[c] + sum[3 + r] * F[3 + c] + sum[6 + r] * F[6 + c];
+      for (int r = 0; r < 3; ++r)
+        out[3 * c + r] = sum[r] * F[c] + sum[3 + r] * F[3 + c] + sum[6 + r] * F[6 + c];
   }
 }

@@ -17,8 +17,10 @@ inline std::string describe(const Eigen::Vector3d& v) {
 inline std::string describeLength(double meters) {
   std::ostringstream text;
   text.precision(3);
-  if (meters < 1.0) text << 1e3 * meters << " mm";
-  else text << meters << " m";
+  if (meters < 1.0)
+    text << 1e3 * meters << " mm";
+  else
+    text << meters << " m";
   return text.str();
 }
 

@@ -37,7 +37,8 @@ double hullArea(std::vector<Eigen::Vector2d> points) {
   for (int pass = 0; pass < 2; ++pass, std::reverse(points.begin(), points.end())) {
     const size_t start = hull.size();
     for (const Eigen::Vector2d& p : points) {
-      while (hull.size() >= start + 2 && cross(hull[hull.size() - 2], hull.back(), p) <= 0.0) hull.pop_back();
+      while (hull.size() >= start + 2 && cross(hull[hull.size() - 2], hull.back(), p) <= 0.0)
+        hull.pop_back();
       hull.push_back(p);
     }
     hull.pop_back();
@@ -50,7 +51,8 @@ double hullArea(std::vector<Eigen::Vector2d> points) {
 double outlineArea(const TriangleMesh& mesh, const Eigen::Vector3d& axis) {
   const Eigen::Vector3d u = axis.unitOrthogonal(), v = axis.cross(u);
   std::vector<Eigen::Vector2d> points;
-  for (int i = 0; i < mesh.vertexCount(); ++i) points.emplace_back(u.dot(mesh.vertex(i)), v.dot(mesh.vertex(i)));
+  for (int i = 0; i < mesh.vertexCount(); ++i)
+    points.emplace_back(u.dot(mesh.vertex(i)), v.dot(mesh.vertex(i)));
   return hullArea(points);
 }
 

@@ -15,7 +15,8 @@ const btConvexHullShape& hullOf(const btCollisionObjectWrapper* body) {
 
 // Contacts of a body are kept up to this distance, m.
 double reachOf(const btCollisionObjectWrapper* body) {
-  return body->getCollisionObject()->getCollisionShape()->getContactBreakingThreshold(gContactBreakingThreshold);
+  return body->getCollisionObject()->getCollisionShape()->getContactBreakingThreshold(
+      gContactBreakingThreshold);
 }
 
 // How far the hull goes along a world direction, without its margin.
@@ -31,15 +32,16 @@ double extent(const btCollisionObjectWrapper* body, const btVector3& direction) 
 
 }  // namespace
 
-btCollisionAlgorithm* HullHullAlgorithm::Creator::CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
-                                                                           const btCollisionObjectWrapper* a,
-                                                                           const btCollisionObjectWrapper* b) {
+btCollisionAlgorithm* HullHullAlgorithm::Creator::CreateCollisionAlgorithm(
+    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
+    const btCollisionObjectWrapper* b) {
   void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(HullHullAlgorithm));
   return new (memory) HullHullAlgorithm(info, a, b);
 }
 
 HullHullAlgorithm::HullHullAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
-                                     const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b)
+                                     const btCollisionObjectWrapper* a,
+                                     const btCollisionObjectWrapper* b)
     : btActivatingCollisionAlgorithm(info, a, b), manifold_(info.m_manifold) {}
 
 HullHullAlgorithm::~HullHullAlgorithm() {
@@ -54,8 +56,8 @@ bool HullHullAlgorithm::apart(const btCollisionObjectWrapper* a, const btCollisi
   return -extent(a, -axis) - extent(b, axis) > margins + reach;
 }
 
-void HullHullAlgorithm::search(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, double reach,
-                               btManifoldResult* result) {
+void HullHullAlgorithm::search(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                               double reach, btManifoldResult* result) {
   btVoronoiSimplexSolver simplex;
   btGjkEpaPenetrationDepthSolver penetration;
   btGjkPairDetector pair(&hullOf(a), &hullOf(b), &simplex, &penetration);
@@ -66,11 +68,13 @@ void HullHullAlgorithm::search(const btCollisionObjectWrapper* a, const btCollis
   input.m_transformB = b->getWorldTransform();
   pair.getClosestPoints(input, *result, nullptr);
   const btVector3& axis = pair.getCachedSeparatingAxis();
-  axis_ = axis.fuzzyZero() ? btVector3(0, 0, 0) : axis.normalized() * a->getWorldTransform().getBasis();
+  axis_ =
+      axis.fuzzyZero() ? btVector3(0, 0, 0) : axis.normalized() * a->getWorldTransform().getBasis();
 }
 
-void HullHullAlgorithm::processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
-                                         const btDispatcherInfo&, btManifoldResult* result) {
+void HullHullAlgorithm::processCollision(const btCollisionObjectWrapper* a,
+                                         const btCollisionObjectWrapper* b, const btDispatcherInfo&,
+                                         btManifoldResult* result) {
   const double reach = std::min(reachOf(a), reachOf(b));
   const bool touching = manifold_ && manifold_->getNumContacts() > 0;
   if (!touching && apart(a, b, reach)) return;
@@ -88,13 +92,16 @@ void HullHullAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
 }
 
 btCollisionAlgorithm* CompoundPairAlgorithm::Creator::CreateCollisionAlgorithm(
-    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b) {
+    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
+    const btCollisionObjectWrapper* b) {
   void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(CompoundPairAlgorithm));
   return new (memory) CompoundPairAlgorithm(info, a, b, false);
 }
 
-void CompoundPairAlgorithm::processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
-                                             const btDispatcherInfo& info, btManifoldResult* result) {
+void CompoundPairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
+                                             const btCollisionObjectWrapper* b,
+                                             const btDispatcherInfo& info,
+                                             btManifoldResult* result) {
   btVector3 low_a, high_a, low_b, high_b;
   a->getCollisionShape()->getAabb(a->getWorldTransform(), low_a, high_a);
   b->getCollisionShape()->getAabb(b->getWorldTransform(), low_b, high_b);

@@ -6,8 +6,8 @@
 // Private to the rigid world.
 namespace calipso::fem {
 
-// Two convex hulls. The direction in which they were found to be apart is tried first the next time: it often still
-// tells that they are, at a tenth of the cost of a search.
+// Two convex hulls. The direction in which they were found to be apart is tried first the next
+// time: it often still tells that they are, at a tenth of the cost of a search.
 class HullHullAlgorithm : public btActivatingCollisionAlgorithm {
  public:
   struct Creator : btCollisionAlgorithmCreateFunc {
@@ -16,8 +16,8 @@ class HullHullAlgorithm : public btActivatingCollisionAlgorithm {
                                                    const btCollisionObjectWrapper* b) override;
   };
 
-  HullHullAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
-                    const btCollisionObjectWrapper* b);
+  HullHullAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
+                    const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b);
   ~HullHullAlgorithm() override;
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;
@@ -28,7 +28,8 @@ class HullHullAlgorithm : public btActivatingCollisionAlgorithm {
   void getAllContactManifolds(btManifoldArray& manifolds) override;
 
  private:
-  bool apart(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, double reach) const;
+  bool apart(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+             double reach) const;
   void search(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, double reach,
               btManifoldResult* result);
 
@@ -37,8 +38,8 @@ class HullHullAlgorithm : public btActivatingCollisionAlgorithm {
   bool owner_ = false;
 };
 
-// Two bodies of several hulls: none is looked at while their boxes are apart. Bullet's broad phase looks 2 cm
-// around every body.
+// Two bodies of several hulls: none is looked at while their boxes are apart. Bullet's broad phase
+// looks 2 cm around every body.
 class CompoundPairAlgorithm : public btCompoundCompoundCollisionAlgorithm {
  public:
   struct Creator : btCollisionAlgorithmCreateFunc {

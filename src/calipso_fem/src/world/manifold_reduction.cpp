@@ -9,8 +9,9 @@ constexpr size_t kFew = 8;
 constexpr double kSameNormal = 0.98;  // cosine
 constexpr double kOutPerApart = 10.0;
 constexpr double kDiagonal = 0.70710678118654752;
-constexpr double kDirections[][2] = {{1, 0},  {kDiagonal, kDiagonal},   {0, 1},  {-kDiagonal, kDiagonal},
-                                     {-1, 0}, {-kDiagonal, -kDiagonal}, {0, -1}, {kDiagonal, -kDiagonal}};
+constexpr double kDirections[][2] = {
+    {1, 0},  {kDiagonal, kDiagonal},   {0, 1},  {-kDiagonal, kDiagonal},
+    {-1, 0}, {-kDiagonal, -kDiagonal}, {0, -1}, {kDiagonal, -kDiagonal}};
 
 using Contacts = std::vector<btManifoldPoint*>;
 using Group = std::vector<size_t>;  // of contacts

@@ -96,8 +96,9 @@ TriangleMesh convexHull(const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::Ro
 
 MassProperties massProperties(const TriangleMesh& mesh, double density) {
   if (!(density > 0.0 && std::isfinite(density)))
-    throw std::invalid_argument("density = " + std::to_string(density) +
-                                " kg/m^3; must be > 0 and finite (what nothing can move is static)");
+    throw std::invalid_argument(
+        "density = " + std::to_string(density) +
+        " kg/m^3; must be > 0 and finite (what nothing can move is static)");
   const Eigen::Vector3d origin = mesh.vertices.colwise().mean().transpose();
   Moments m = moments(mesh, origin);
   const bool inside_out = m.volume < 0.0;

@@ -29,8 +29,9 @@ void ObservedTrack::add(const ObservedMotion& sample) {
 }
 
 ObservedMotion ObservedTrack::at(double time) const {
-  const bool moves = std::any_of(samples_.begin(), samples_.end(),
-                                 [](const ObservedMotion& s) { return s.moving || s.mode_amplitudes.size() > 0; });
+  const bool moves = std::any_of(samples_.begin(), samples_.end(), [](const ObservedMotion& s) {
+    return s.moving || s.mode_amplitudes.size() > 0;
+  });
   ObservedMotion m;
   m.world_from_object = key_pose_;
   m.time = time;

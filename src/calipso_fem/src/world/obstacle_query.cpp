@@ -26,8 +26,7 @@ std::optional<ObstacleHit> queryObstacle(const Obstacle& obstacle, const Eigen::
   if (obstacle.plane) return queryPlane(*obstacle.plane, point, reach, size);
   const Eigen::Isometry3d& pose = obstacle.previous_pose;
   // Depths are searched further than gaps, so that what got in is found again.
-  const auto hit =
-      obstacle.tree->nearest(pose.inverse() * point, std::max(reach, 0.1 * size));
+  const auto hit = obstacle.tree->nearest(pose.inverse() * point, std::max(reach, 0.1 * size));
   if (!hit || hit->distance > reach) return std::nullopt;
   ObstacleHit result{hit->distance, pose.linear() * hit->normal, pose * hit->point, {}};
   result.other = SurfacePoint::onTriangle(
@@ -41,14 +40,16 @@ std::optional<ObstacleHit> carrying(const Obstacle& obstacle, const TriangleMesh
   std::optional<ObstacleHit> deepest;
   if (!(gravity.norm() > 0.0)) return deepest;
   const Eigen::Vector3d up = -gravity.normalized();
-  const Eigen::AlignedBox3d bounds(surface.vertices.colwise().minCoeff().transpose().array() - reach,
-                                   surface.vertices.colwise().maxCoeff().transpose().array() + reach);
+  const Eigen::AlignedBox3d bounds(
+      surface.vertices.colwise().minCoeff().transpose().array() - reach,
+      surface.vertices.colwise().maxCoeff().transpose().array() + reach);
   const Eigen::AlignedBox3d box = obstacleBounds(obstacle);
   if (!box.isEmpty() && !box.intersects(bounds)) return deepest;
   const double size = boundingDiagonal(surface);
   for (int v = 0; v < surface.vertexCount(); ++v) {
     const auto hit = queryObstacle(obstacle, surface.vertex(v), reach, size);
-    if (hit && hit->normal.dot(up) > kUpright && (!deepest || hit->gap < deepest->gap)) deepest = hit;
+    if (hit && hit->normal.dot(up) > kUpright && (!deepest || hit->gap < deepest->gap))
+      deepest = hit;
   }
   return deepest;
 }
@@ -63,8 +64,9 @@ Eigen::AlignedBox3d obstacleBounds(const Obstacle& obstacle) {
   return box;
 }
 
-// Sum of the triangles' solid angles (Van Oosterom and Strackee 1983), above 2 pi inside. Each half of one is the
-// argument of a complex number; their product and its turns take the place of the sum.
+// Sum of the triangles' solid angles (Van Oosterom and Strackee 1983), above 2 pi inside. Each half
+// of one is the argument of a complex number; their product and its turns take the place of the
+// sum.
 bool encloses(const TriangleMesh& surface, const Eigen::Vector3d& point) {
   std::complex<double> product = 1.0;
   int turns = 0;
@@ -73,7 +75,8 @@ bool encloses(const TriangleMesh& surface, const Eigen::Vector3d& point) {
                           b = surface.vertex(surface.triangles(f, 1)) - point,
                           c = surface.vertex(surface.triangles(f, 2)) - point;
     const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    const std::complex<double> half(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb, a.dot(b.cross(c)));
+    const std::complex<double> half(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb,
+                                    a.dot(b.cross(c)));
     const double size = std::abs(half.real()) + std::abs(half.imag());
     if (size == 0.0) continue;  // a triangle without area, or at one of its corners
     const bool upper = product.imag() >= 0.0;

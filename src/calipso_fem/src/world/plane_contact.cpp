@@ -13,7 +13,8 @@ struct Corner {
 };
 
 // Where `gain` is most, if it is anything there.
-const Corner* best(const std::vector<Corner>& corners, const std::function<double(const Corner&)>& gain) {
+const Corner* best(const std::vector<Corner>& corners,
+                   const std::function<double(const Corner&)>& gain) {
   const Corner* found = nullptr;
   double most = 0.0;
   for (const Corner& c : corners)
@@ -33,7 +34,8 @@ std::vector<const Corner*> spanning(const std::vector<Corner>& corners, const bt
   chosen.push_back(far);
   const btVector3 across = normal.cross(far->point - first);
   for (const double side : {1.0, -1.0})
-    if (const Corner* c = best(corners, [&](const Corner& k) { return side * across.dot(k.point - first); }))
+    if (const Corner* c =
+            best(corners, [&](const Corner& k) { return side * across.dot(k.point - first); }))
       chosen.push_back(c);
   return chosen;
 }
@@ -46,12 +48,14 @@ double reachOf(const btCollisionObject* body) {
 }  // namespace
 
 btCollisionAlgorithm* HullPlaneAlgorithm::Creator::CreateCollisionAlgorithm(
-    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper*, const btCollisionObjectWrapper*) {
+    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper*,
+    const btCollisionObjectWrapper*) {
   void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(HullPlaneAlgorithm));
   return new (memory) HullPlaneAlgorithm(info, m_swapped);
 }
 
-HullPlaneAlgorithm::HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info, bool swapped)
+HullPlaneAlgorithm::HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
+                                       bool swapped)
     : btCollisionAlgorithm(info), swapped_(swapped), manifold_(info.m_manifold) {}
 
 HullPlaneAlgorithm::~HullPlaneAlgorithm() {
@@ -60,23 +64,28 @@ HullPlaneAlgorithm::~HullPlaneAlgorithm() {
 
 btPersistentManifold* HullPlaneAlgorithm::manifoldOf(const btCollisionObjectWrapper* hull,
                                                      const btCollisionObjectWrapper* plane) {
-  if (!manifold_ && m_dispatcher->needsCollision(hull->getCollisionObject(), plane->getCollisionObject())) {
-    manifold_ = m_dispatcher->getNewManifold(hull->getCollisionObject(), plane->getCollisionObject());
+  if (!manifold_ &&
+      m_dispatcher->needsCollision(hull->getCollisionObject(), plane->getCollisionObject())) {
+    manifold_ =
+        m_dispatcher->getNewManifold(hull->getCollisionObject(), plane->getCollisionObject());
     owner_ = true;
   }
   return manifold_;
 }
 
-void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a,
+                                          const btCollisionObjectWrapper* b,
                                           const btDispatcherInfo&, btManifoldResult* result) {
   const btCollisionObjectWrapper *hull = swapped_ ? b : a, *plane = swapped_ ? a : b;
   const auto& shape = *static_cast<const btConvexHullShape*>(hull->getCollisionShape());
   const auto& ground = *static_cast<const btStaticPlaneShape*>(plane->getCollisionShape());
   const btVector3& normal = ground.getPlaneNormal();
-  const btTransform plane_from_hull = plane->getWorldTransform().inverseTimes(hull->getWorldTransform());
+  const btTransform plane_from_hull =
+      plane->getWorldTransform().inverseTimes(hull->getWorldTransform());
   const double reach = reachOf(hull->getCollisionObject());
   const btVector3 rise = normal * plane_from_hull.getBasis();  // of the height, in the hull's frame
-  const double level = normal.dot(plane_from_hull.getOrigin()) - ground.getPlaneConstant() - shape.getMargin();
+  const double level =
+      normal.dot(plane_from_hull.getOrigin()) - ground.getPlaneConstant() - shape.getMargin();
   std::vector<Corner> near;
   for (int i = 0; i < shape.getNumPoints(); ++i) {
     const btVector3& x = shape.getUnscaledPoints()[i];
@@ -88,8 +97,8 @@ void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, con
   const btTransform& world_from_plane = plane->getWorldTransform();
   const btVector3 up = world_from_plane.getBasis() * normal;
   for (const Corner* c : spanning(near, normal))
-    result->addContactPoint(up, world_from_plane * (c->point - (c->height + shape.getMargin()) * normal),
-                            c->height);
+    result->addContactPoint(
+        up, world_from_plane * (c->point - (c->height + shape.getMargin()) * normal), c->height);
   if (owner_ && manifold_->getNumContacts()) result->refreshContactPoints();
 }
 
@@ -98,19 +107,24 @@ void HullPlaneAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
 }
 
 btCollisionAlgorithm* CompoundPlaneAlgorithm::Creator::CreateCollisionAlgorithm(
-    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b) {
+    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
+    const btCollisionObjectWrapper* b) {
   void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(CompoundPlaneAlgorithm));
   return new (memory) CompoundPlaneAlgorithm(info, a, b, m_swapped);
 }
 
-void CompoundPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
-                                              const btDispatcherInfo& info, btManifoldResult* result) {
+void CompoundPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a,
+                                              const btCollisionObjectWrapper* b,
+                                              const btDispatcherInfo& info,
+                                              btManifoldResult* result) {
   const btCollisionObjectWrapper *hulls = m_isSwapped ? b : a, *plane = m_isSwapped ? a : b;
   const auto& ground = *static_cast<const btStaticPlaneShape*>(plane->getCollisionShape());
   btVector3 low, high;
-  hulls->getCollisionShape()->getAabb(plane->getWorldTransform().inverseTimes(hulls->getWorldTransform()), low, high);
+  hulls->getCollisionShape()->getAabb(
+      plane->getWorldTransform().inverseTimes(hulls->getWorldTransform()), low, high);
   const btVector3 &normal = ground.getPlaneNormal(), half = 0.5 * (high - low);
-  const double height = normal.dot(0.5 * (low + high)) - normal.absolute().dot(half) - ground.getPlaneConstant();
+  const double height =
+      normal.dot(0.5 * (low + high)) - normal.absolute().dot(half) - ground.getPlaneConstant();
   const bool far = height > reachOf(hulls->getCollisionObject());
   if (far && clear_) return;
   btCompoundCollisionAlgorithm::processCollision(a, b, info, result);

@@ -6,8 +6,9 @@
 // Private to the rigid world.
 namespace calipso::fem {
 
-// Convex hull against a plane: up to four vertices, the deepest and those that span the most with it. Bullet
-// finds one per step, so that a body put down flat rocks until it has found all its corners.
+// Convex hull against a plane: up to four vertices, the deepest and those that span the most with
+// it. Bullet finds one per step, so that a body put down flat rocks until it has found all its
+// corners.
 class HullPlaneAlgorithm : public btCollisionAlgorithm {
  public:
   struct Creator : btCollisionAlgorithmCreateFunc {
@@ -28,14 +29,15 @@ class HullPlaneAlgorithm : public btCollisionAlgorithm {
   void getAllContactManifolds(btManifoldArray& manifolds) override;
 
  private:
-  btPersistentManifold* manifoldOf(const btCollisionObjectWrapper* hull, const btCollisionObjectWrapper* plane);
+  btPersistentManifold* manifoldOf(const btCollisionObjectWrapper* hull,
+                                   const btCollisionObjectWrapper* plane);
 
   bool swapped_, owner_ = false;
   btPersistentManifold* manifold_;
 };
 
-// Several hulls against a plane: none of them is looked at while their box is clear of it. Every plane's own box
-// is boundless, so that Bullet looks at all the hulls of all bodies at all times.
+// Several hulls against a plane: none of them is looked at while their box is clear of it. Every
+// plane's own box is boundless, so that Bullet looks at all the hulls of all bodies at all times.
 class CompoundPlaneAlgorithm : public btCompoundCollisionAlgorithm {
  public:
   struct Creator : btCollisionAlgorithmCreateFunc {

@@ -9,7 +9,8 @@ namespace {
 
 using Weights = Eigen::SparseVector<double>;
 
-// A rigid motion that nothing holds is held by inertia: of the stiffness of a cube of the body's size.
+// A rigid motion that nothing holds is held by inertia: of the stiffness of a cube of the body's
+// size.
 constexpr double kInertia = 1e-9;
 
 // Work of gravity in the unit motion of each component, zero where the component is fixed.
@@ -25,7 +26,9 @@ Vec weightOf(const DeformableBody& body, const Eigen::Vector3d& gravity) {
 void addSpring(const Weights& weights, double stiffness, BlockMatrix* A) {
   for (Weights::InnerIterator p(weights); p; ++p)
     for (Weights::InnerIterator q(weights); q; ++q)
-      if (const int k = A->pattern->tryFind(static_cast<int>(p.index()), static_cast<int>(q.index())); k >= 0)
+      if (const int k =
+              A->pattern->tryFind(static_cast<int>(p.index()), static_cast<int>(q.index()));
+          k >= 0)
         A->block(k).diagonal().array() += stiffness * p.value() * q.value();
 }
 
@@ -33,9 +36,11 @@ void addInertia(const DeformableBody& body, BlockMatrix* A) {
   const Material& material = body.model().cellMaterials().front();
   const NodeMatrix& nodes = body.model().mesh().nodes;
   const double size = (nodes.colwise().maxCoeff() - nodes.colwise().minCoeff()).norm();
-  const double rate = kInertia * material.youngs_modulus / (material.density * size * size);  // 1/s^2
+  const double rate =
+      kInertia * material.youngs_modulus / (material.density * size * size);  // 1/s^2
   const Eigen::VectorXd& mass = body.model().lumpedMass();
-  for (int i = 0; i < mass.size(); ++i) A->block(A->pattern->diagonal[i]).diagonal().array() += rate * mass[i];
+  for (int i = 0; i < mass.size(); ++i)
+    A->block(A->pattern->diagonal[i]).diagonal().array() += rate * mass[i];
 }
 
 // Fixed components do not move: their rows and columns become those of a diagonal matrix.

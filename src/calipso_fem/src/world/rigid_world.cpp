@@ -226,7 +226,8 @@ Eigen::Matrix3d RigidWorld::inertia(Id id) const {
 std::pair<Eigen::Vector3d, Eigen::Vector3d> RigidWorld::velocityChange(
     Id id, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) const {
   const btRigidBody& body = *impl_->at(id).body;
-  const btVector3 moment = (toBullet(point) - body.getCenterOfMassPosition()).cross(toBullet(impulse));
+  const btVector3 moment =
+      (toBullet(point) - body.getCenterOfMassPosition()).cross(toBullet(impulse));
   return {body.getInvMass() * impulse, fromBullet(body.getInvInertiaTensorWorld() * moment)};
 }
 

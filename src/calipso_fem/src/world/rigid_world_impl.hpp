@@ -32,9 +32,9 @@ struct RigidWorld::Impl {
   // Bullet's pool has room for its own algorithms only, and does not check.
   static btDefaultCollisionConstructionInfo withOwnAlgorithms() {
     btDefaultCollisionConstructionInfo info;
-    info.m_customCollisionAlgorithmMaxElementSize = static_cast<int>(
-        std::max({sizeof(HullPlaneAlgorithm), sizeof(CompoundPlaneAlgorithm), sizeof(HullHullAlgorithm),
-                  sizeof(CompoundPairAlgorithm)}));
+    info.m_customCollisionAlgorithmMaxElementSize =
+        static_cast<int>(std::max({sizeof(HullPlaneAlgorithm), sizeof(CompoundPlaneAlgorithm),
+                                   sizeof(HullHullAlgorithm), sizeof(CompoundPairAlgorithm)}));
     return info;
   }
 
@@ -55,17 +55,23 @@ struct RigidWorld::Impl {
 
   Impl() {
     under_hull.m_swapped = under_hulls.m_swapped = true;
-    dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, &on_plane);
-    dispatcher.registerCollisionCreateFunc(STATIC_PLANE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, &under_hull);
-    dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE, &hull_on_hull);
-    dispatcher.registerCollisionCreateFunc(COMPOUND_SHAPE_PROXYTYPE, COMPOUND_SHAPE_PROXYTYPE, &hulls_on_hulls);
-    dispatcher.registerCollisionCreateFunc(COMPOUND_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, &hulls_on_plane);
-    dispatcher.registerCollisionCreateFunc(STATIC_PLANE_PROXYTYPE, COMPOUND_SHAPE_PROXYTYPE, &under_hulls);
+    dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE,
+                                           &on_plane);
+    dispatcher.registerCollisionCreateFunc(STATIC_PLANE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE,
+                                           &under_hull);
+    dispatcher.registerCollisionCreateFunc(CONVEX_HULL_SHAPE_PROXYTYPE, CONVEX_HULL_SHAPE_PROXYTYPE,
+                                           &hull_on_hull);
+    dispatcher.registerCollisionCreateFunc(COMPOUND_SHAPE_PROXYTYPE, COMPOUND_SHAPE_PROXYTYPE,
+                                           &hulls_on_hulls);
+    dispatcher.registerCollisionCreateFunc(COMPOUND_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE,
+                                           &hulls_on_plane);
+    dispatcher.registerCollisionCreateFunc(STATIC_PLANE_PROXYTYPE, COMPOUND_SHAPE_PROXYTYPE,
+                                           &under_hulls);
     world.setGravity(btVector3(0, 0, 0));
     world.getPairCache()->setOverlapFilterCallback(&filter);
     btContactSolverInfo& info = world.getSolverInfo();
     info.m_numIterations = 40;
-    info.m_leastSquaresResidualThreshold = 1e-12;  // (m/s)^2
+    info.m_leastSquaresResidualThreshold = 1e-12;   // (m/s)^2
     info.m_splitImpulsePenetrationThreshold = 0.0;  // depth is mended without giving velocity
     info.m_restitutionVelocityThreshold = 0.02;     // m/s
     info.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;

@@ -8,15 +8,15 @@
 #include "self_proximity.hpp"
 #include "step_motion.hpp"
 
-// Where the surface of a deformable object may meet itself in a step. Both sides of such a contact are points of one
-// body: for the rest it is a contact like any other.
+// Where the surface of a deformable object may meet itself in a step. Both sides of such a contact
+// are points of one body: for the rest it is a contact like any other.
 namespace calipso::fem {
 namespace {
 
 using Vertices = decltype(TriangleMesh::vertices);
 
-// Speeds of the vertices against the body's motion as a rigid one, m/s; of their own speed so much is added as a
-// part of the body may lose at once.
+// Speeds of the vertices against the body's motion as a rigid one, m/s; of their own speed so much
+// is added as a part of the body may lose at once.
 Eigen::VectorXd speedsOf(const SoftObject& soft, double stopped) {
   const Vec v = soft.body().surfaceVelocities();
   const Vertices& x = soft.vertices();
@@ -40,21 +40,25 @@ Eigen::VectorXd speedsOf(const SoftObject& soft, double stopped) {
 }
 
 double fastestCorner(const Eigen::VectorXd& speeds, const TriangleMesh& mesh, int f) {
-  return std::max({speeds[mesh.triangles(f, 0)], speeds[mesh.triangles(f, 1)], speeds[mesh.triangles(f, 2)]});
+  return std::max(
+      {speeds[mesh.triangles(f, 0)], speeds[mesh.triangles(f, 1)], speeds[mesh.triangles(f, 2)]});
 }
 
 int indexOf(const std::vector<Obstacle>& obstacles, const SoftObject* soft) {
-  const auto found = std::find_if(obstacles.begin(), obstacles.end(), [&](const auto& o) { return o.soft == soft; });
+  const auto found = std::find_if(obstacles.begin(), obstacles.end(),
+                                  [&](const auto& o) { return o.soft == soft; });
   return found == obstacles.end() ? -1 : static_cast<int>(found - obstacles.begin());
 }
 
-Contact contactOf(const SurfaceHit& hit, const SurfaceTree& tree, int id, int soft, int index, int vertex) {
+Contact contactOf(const SurfaceHit& hit, const SurfaceTree& tree, int id, int soft, int index,
+                  int vertex) {
   Contact c;
   c.key = {id, id, vertex, Contact::kNearest};
   c.soft_a = c.soft_b = soft;
   c.obstacle = index;
   c.point = SurfacePoint::vertex(vertex);
-  c.other = SurfacePoint::onTriangle(tree.mesh().triangles.row(hit.triangle).transpose(), hit.barycentric);
+  c.other = SurfacePoint::onTriangle(tree.mesh().triangles.row(hit.triangle).transpose(),
+                                     hit.barycentric);
   c.place = hit.point;
   c.normal = hit.normal;
   c.start_gap = hit.distance;
@@ -71,8 +75,10 @@ Eigen::Vector3d normalOf(const Eigen::Matrix3d& corners) {
   return (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).normalized();
 }
 
-// Where a point that goes from x0 to x1 enters the triangle. @return barycentric coordinates, and the normal there
-std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>> entry(const Eigen::Vector3d& x0, const Eigen::Vector3d& x1,
+// Where a point that goes from x0 to x1 enters the triangle. @return barycentric coordinates, and
+// the normal there
+std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>> entry(const Eigen::Vector3d& x0,
+                                                                 const Eigen::Vector3d& x1,
                                                                  const MovingTriangle& triangle) {
   constexpr double kBeside = 1e-2;  // of a side
   const double before = normalOf(triangle.start).dot(x0 - triangle.start.col(0)),
@@ -82,22 +88,26 @@ std::optional<std::pair<Eigen::Vector3d, Eigen::Vector3d>> entry(const Eigen::Ve
   const Eigen::Matrix3d corners = triangle.at(t);
   const Eigen::Vector3d x = (1.0 - t) * x0 + t * x1, n = normalOf(corners);
   const Eigen::Vector3d foot = x - n.dot(x - corners.col(0)) * n;
-  const Eigen::Vector3d w = closestBarycentric(foot, corners.col(0), corners.col(1), corners.col(2));
-  if ((corners * w - foot).norm() > kBeside * (corners.col(1) - corners.col(0)).norm()) return std::nullopt;
+  const Eigen::Vector3d w =
+      closestBarycentric(foot, corners.col(0), corners.col(1), corners.col(2));
+  if ((corners * w - foot).norm() > kBeside * (corners.col(1) - corners.col(0)).norm())
+    return std::nullopt;
   return std::make_pair(w, n);
 }
 
 }  // namespace
 
-void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft, const std::vector<Obstacle>& obstacles,
-                             double h, std::vector<Candidate>& list) const {
+void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft,
+                             const std::vector<Obstacle>& obstacles, double h,
+                             std::vector<Candidate>& list) const {
   const SoftEntry& entry = softs[soft];
   const int index = indexOf(obstacles, entry.soft), id = entry.id;
   if (index < 0) return;
   SelfProximity& self = *entry.soft->selfProximity();
   const SurfaceTree& tree = entry.soft->tree();
   if (self.isUnfolded(tree)) return;
-  const double reach = reachOf(entry, obstacles[index]), friction = frictionOf(entry, obstacles[index]);
+  const double reach = reachOf(entry, obstacles[index]),
+               friction = frictionOf(entry, obstacles[index]);
   // What meets something else may be stopped by it while the rest goes on.
   const bool free = std::none_of(list.begin(), list.end(), [&](const Candidate& c) {
     return c.contact.soft_a == soft || c.contact.soft_b == soft;
@@ -124,7 +134,8 @@ void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft, cons
     const auto known = memory_.find({id, id, v, Contact::kNearest});
     const double depth = known == memory_.end() ? 0.0 : -known->second.offset;
     const double around = reach + h * (speeds[v] + most);
-    const auto nearest = self.nearest(tree, v, tree.mesh().vertex(v), around + self.spare(), reach, depth);
+    const auto nearest =
+        self.nearest(tree, v, tree.mesh().vertex(v), around + self.spare(), reach, depth);
     if (!nearest) continue;
     far = false;
     if (nearest->distance <= reach + depth) watch(*nearest, v, Contact::kNearest);
@@ -136,7 +147,8 @@ void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft, cons
   self.searched(tree, motion, far);
 }
 
-std::optional<Contact> SoftContacts::crossingItself(const Candidate& c, const std::vector<SoftEntry>& softs,
+std::optional<Contact> SoftContacts::crossingItself(const Candidate& c,
+                                                    const std::vector<SoftEntry>& softs,
                                                     const StepMotion& motion) const {
   const int soft = c.contact.soft_a;
   const SurfaceTree& tree = softs[soft].soft->tree();
@@ -144,7 +156,8 @@ std::optional<Contact> SoftContacts::crossingItself(const Candidate& c, const st
   MovingTriangle triangle;
   for (int k = 0; k < 3; ++k) {
     triangle.start.col(k) = tree.mesh().vertex(corners[k]);
-    triangle.end.col(k) = triangle.start.col(k) + motion.way(soft, SurfacePoint::vertex(corners[k]));
+    triangle.end.col(k) =
+        triangle.start.col(k) + motion.way(soft, SurfacePoint::vertex(corners[k]));
   }
   const Eigen::Vector3d x = tree.mesh().vertex(c.vertex);
   const auto found = entry(x, x + motion.way(soft, c.contact.point), triangle);

@@ -148,8 +148,8 @@ std::vector<SoftContacts::Candidate> SoftContacts::candidates(
   return list;
 }
 
-double SoftContacts::watchOf(const SoftEntry& entry, const Obstacle& obstacle, const RigidWorld& rigid,
-                             double h) const {
+double SoftContacts::watchOf(const SoftEntry& entry, const Obstacle& obstacle,
+                             const RigidWorld& rigid, double h) const {
   const double reach = reachOf(entry, obstacle);
   double watch = reach + travelOf(*entry.soft, obstacle, rigid, h);
   // Observed gaps may be larger than the reach.
@@ -193,8 +193,8 @@ void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
     if (!everywhere && !others.contains(x)) continue;
     const auto hit = queryObstacle(obstacle, x, watch, size);
     if (!hit || (obstacle.soft && misjudged(*hit, *obstacle.tree, x, reach))) continue;
-    watchVertex(contactAt({entry.id, obstacle.id, v, Contact::kNearest}, soft, index, obstacle, soft_b,
-                          SurfacePoint::vertex(v), *hit),
+    watchVertex(contactAt({entry.id, obstacle.id, v, Contact::kNearest}, soft, index, obstacle,
+                          soft_b, SurfacePoint::vertex(v), *hit),
                 false, v);
   }
   if (obstacle.plane) return;
@@ -208,13 +208,14 @@ void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
     const auto hit = queryObstacle(self, x, watch, size);
     if (!hit || misjudged(*hit, *self.tree, x, reach)) continue;
     const ObstacleHit turned{hit->gap, -hit->normal, x, SurfacePoint::vertex(v)};
-    watchVertex(contactAt({entry.id, obstacle.id, v, Contact::kNearestReversed}, soft, index, obstacle,
-                          soft_b, hit->other, turned),
+    watchVertex(contactAt({entry.id, obstacle.id, v, Contact::kNearestReversed}, soft, index,
+                          obstacle, soft_b, hit->other, turned),
                 true, v);
   }
 }
 
-// The way of the vertex relative to the other surface, followed where that surface was at the start.
+// The way of the vertex relative to the other surface, followed where that surface was at the
+// start.
 std::optional<Contact> SoftContacts::crossing(const Candidate& c,
                                               const std::vector<Obstacle>& obstacles,
                                               const std::vector<SoftEntry>& softs,
@@ -287,8 +288,7 @@ int SoftContacts::grow(const std::vector<Candidate>& list, const std::vector<Obs
     const auto [at, is_new] = deepest.emplace(place, std::make_pair(depth, contact));
     if (!is_new && depth > at->second.first) at->second = {depth, contact};
   }
-  for (const auto& [place, found] : deepest)
-    contacts.emplace(found.second.key, found.second);
+  for (const auto& [place, found] : deepest) contacts.emplace(found.second.key, found.second);
   return static_cast<int>(deepest.size());
 }
 
@@ -303,8 +303,7 @@ std::vector<std::pair<HoldPoint, int>> SoftContacts::touching(
     for (int v = 0; v < vertices.rows(); ++v) {
       const auto hit = queryObstacle(obstacles[o], vertices.row(v).transpose(), reach, size);
       if (!hit) continue;
-      const auto [at, is_new] =
-          lowest.emplace(entry.soft->carrier(v), std::make_pair(hit->gap, v));
+      const auto [at, is_new] = lowest.emplace(entry.soft->carrier(v), std::make_pair(hit->gap, v));
       if (!is_new) at->second = std::min(at->second, std::make_pair(hit->gap, v));
     }
     for (const auto& [carrier, found] : lowest)
@@ -323,10 +322,11 @@ void SoftContacts::hold(const SoftEntry& entry, const Obstacle& obstacle, const 
   // What else is inside is forgiven, as far as it is.
   for (int v = 0; first && v < vertices.rows(); ++v) {
     const auto hit = queryObstacle(obstacle, vertices.row(v).transpose(), 0.0, size);
-    if (hit && hit->gap < 0.0) memory_[{entry.id, obstacle.id, v, Contact::kNearest}].offset = hit->gap;
+    if (hit && hit->gap < 0.0)
+      memory_[{entry.id, obstacle.id, v, Contact::kNearest}].offset = hit->gap;
   }
-  const auto hit =
-      queryObstacle(obstacle, entry.soft->position(SurfacePoint::vertex(point.vertex)), reach, size);
+  const auto hit = queryObstacle(obstacle, entry.soft->position(SurfacePoint::vertex(point.vertex)),
+                                 reach, size);
   if (!hit) return;
   Memory m;
   m.holds = true;

@@ -6,8 +6,8 @@
 #include "self_proximity.hpp"
 #include "step_motion.hpp"
 
-// Gaps are linear in the motion from the start of a step on. Where surfaces turn and bend on their way,
-// that is not how they end: here contacts get the gaps that they have at the targets.
+// Gaps are linear in the motion from the start of a step on. Where surfaces turn and bend on their
+// way, that is not how they end: here contacts get the gaps that they have at the targets.
 namespace calipso::fem {
 namespace {
 
@@ -23,9 +23,11 @@ class SurfacesAtTargets {
     if (is_new) at->second.refit(b.start + b.moved);
     return at->second;
   }
-  std::optional<SurfaceHit> nearestOfItself(const Contact& c, const Eigen::Vector3d& x, double reach) {
+  std::optional<SurfaceHit> nearestOfItself(const Contact& c, const Eigen::Vector3d& x,
+                                            double reach) {
     const double depth = std::max(0.0, -motion_.gap(c));
-    return softs_[c.soft_a].soft->selfProximity()->nearest(of(c.soft_a), std::get<2>(c.key), x, reach, c.reach, depth);
+    return softs_[c.soft_a].soft->selfProximity()->nearest(of(c.soft_a), std::get<2>(c.key), x,
+                                                           reach, c.reach, depth);
   }
   Eigen::Vector3d position(int soft, const SurfacePoint& point) const {
     Eigen::Vector3d sum = motion_.way(soft, point);
@@ -40,24 +42,27 @@ class SurfacesAtTargets {
   std::map<int, SurfaceTree> trees_;
 };
 
-// Gap at the targets along the contact's normal; nothing where its surface is out of reach or has turned
-// away.
+// Gap at the targets along the contact's normal; nothing where its surface is out of reach or has
+// turned away.
 std::optional<double> gapAtTargets(const Contact& c, const Obstacle& obstacle,
                                    SurfacesAtTargets& surfaces, const StepMotion& motion) {
   constexpr double kSameSide = 0.7;  // cosine
   const bool reversed = std::get<3>(c.key) & 1;
   const double reach = 2.0 * c.reach + std::abs(motion.gap(c));
   const bool bends = reversed || c.soft_b >= 0;  // the surface is that of a deformable object
-  const SurfaceTree& tree =
-      reversed ? surfaces.of(c.soft_a) : bends ? surfaces.of(c.soft_b) : *obstacle.tree;
+  const SurfaceTree& tree = reversed ? surfaces.of(c.soft_a)
+                            : bends  ? surfaces.of(c.soft_b)
+                                     : *obstacle.tree;
   const Eigen::Isometry3d pose = bends ? Eigen::Isometry3d::Identity() : obstacle.pose;
-  const Eigen::Vector3d x = !reversed         ? surfaces.position(c.soft_a, c.point)
+  const Eigen::Vector3d x = !reversed       ? surfaces.position(c.soft_a, c.point)
                             : c.soft_b >= 0 ? surfaces.position(c.soft_b, c.other)
                                             : Eigen::Vector3d(c.place + c.motion);
-  const auto hit = c.ofOneBody() ? surfaces.nearestOfItself(c, x, reach) : tree.nearest(pose.inverse() * x, reach);
+  const auto hit = c.ofOneBody() ? surfaces.nearestOfItself(c, x, reach)
+                                 : tree.nearest(pose.inverse() * x, reach);
   if (!hit) return std::nullopt;
   const double same = (reversed ? -1.0 : 1.0) * c.normal.dot(pose.linear() * hit->normal);
-  if (same < kSameSide || (bends && !c.ofOneBody() && hit->distance < -0.1 * c.reach && !encloses(tree.mesh(), x)))
+  if (same < kSameSide ||
+      (bends && !c.ofOneBody() && hit->distance < -0.1 * c.reach && !encloses(tree.mesh(), x)))
     return std::nullopt;
   return hit->distance / same;
 }
@@ -86,7 +91,8 @@ int SoftContacts::straighten(const std::vector<Candidate>& watched,
     const auto gap = gapAtTargets(c, obstacle, surfaces, motion);
     if (!gap) continue;
     const double off = *gap - motion.gap(c);
-    if (is_new ? clearance + off > -kOff * c.reach : off > -kOff * c.reach && off < kTooFar * c.reach)
+    if (is_new ? clearance + off > -kOff * c.reach
+               : off > -kOff * c.reach && off < kTooFar * c.reach)
       continue;
     Contact turned = c;
     turned.slack += off;

@@ -22,11 +22,15 @@ constexpr double kShortestFastStep = 1.0 / 1000.0;  // s, for objects too fast f
 // Iterations that a renewal of a tangent costs.
 constexpr double kRenewal = 8.0;
 
-// Renewals of a body's tangent in a step: few of large bodies, whose factors cost more against an iteration.
-int mostRenewals(const SoftObject& soft) { return std::clamp(8000 / soft.body().nodeCount(), 1, 8); }
+// Renewals of a body's tangent in a step: few of large bodies, whose factors cost more against an
+// iteration.
+int mostRenewals(const SoftObject& soft) {
+  return std::clamp(8000 / soft.body().nodeCount(), 1, 8);
+}
 
-// Iterations after which a step may end further off balance, so many times as far with each more, and up to so
-// many times further off the contacts' laws: crushed cells take many to the last digits.
+// Iterations after which a step may end further off balance, so many times as far with each more,
+// and up to so many times further off the contacts' laws: crushed cells take many to the last
+// digits.
 constexpr int kPatience = 2;
 constexpr double kImpatience = 4.0;
 constexpr double kLooser = 5.0;
@@ -35,7 +39,8 @@ constexpr int kStraightenings = 3;  // of the gaps of a step
 constexpr double kFar = 3.0;  // of the wanted residual: from here on the iteration is accelerated
 
 // @param velocity  of the surfaces against each other: along the normal, and two ways across
-ContactRow rowOf(const Contact& c, const Eigen::Matrix3d& frame, const Eigen::Vector3d& velocity, double h) {
+ContactRow rowOf(const Contact& c, const Eigen::Matrix3d& frame, const Eigen::Vector3d& velocity,
+                 double h) {
   ContactRow row;
   row.free_velocity = velocity;
   row.impulse = h * (frame * c.force);
@@ -57,9 +62,8 @@ ContactRow rowOf(const Contact& c, const StepMotion& motion) {
 
 // How far a contact is from its law, m.
 double violation(const ContactRow& row, double h) {
-  const double normal = row.impulse[0] > -row.held_normal
-                            ? std::abs(row.free_velocity[0])
-                            : std::max(0.0, -row.free_velocity[0]);
+  const double normal = row.impulse[0] > -row.held_normal ? std::abs(row.free_velocity[0])
+                                                          : std::max(0.0, -row.free_velocity[0]);
   const double limit = row.friction * (row.impulse[0] + row.held_normal) + row.held_tangential;
   const bool sticks = row.impulse.tail<2>().norm() < (1.0 - 1e-6) * limit;
   return h * std::max(normal, sticks ? row.free_velocity.tail<2>().norm() : 0.0);
@@ -84,10 +88,10 @@ void setForces(std::map<Contact::Key, Contact>& contacts, const Vec& forces) {
   for (auto& [key, c] : contacts) c.force = forces.segment<3>(3 * at++);
 }
 
-// Moves the bodies to where the last directions together point, if that is better than where they are.
-// Contacts obey their laws only nearly there, so that the last iterations of a step do without.
-bool accelerate(Anderson& anderson, StepMotion& motion,
-                std::map<Contact::Key, Contact>& contacts) {
+// Moves the bodies to where the last directions together point, if that is better than where they
+// are. Contacts obey their laws only nearly there, so that the last iterations of a step do
+// without.
+bool accelerate(Anderson& anderson, StepMotion& motion, std::map<Contact::Key, Contact>& contacts) {
   const Vec plain = forcesOf(contacts);
   const auto next = anderson.next(motion.positions(), motion.targets(), plain);
   if (!next) return false;
@@ -120,7 +124,7 @@ SoftContacts::~SoftContacts() = default;
 
 // Whether a step may be kept, be it not solved to the last digit.
 bool SoftContacts::acceptable(const Contacts& contacts, const StepMotion& motion) const {
-  constexpr double kOff = 0.04;       // minimal distances
+  constexpr double kOff = 0.04;  // minimal distances
   for (const StepMotion::Body& b : motion.bodies())
     if (motion.h() > kShortestStep && b.touched && !(b.residual <= kLoosest * params_.residual))
       return false;
@@ -132,8 +136,7 @@ bool SoftContacts::acceptable(const Contacts& contacts, const StepMotion& motion
 
 bool SoftContacts::unbalanced(const StepMotion& motion, size_t soft, double wanted) const {
   const StepMotion::Body& b = motion.bodies()[soft];
-  return !b.stuck &&
-         b.residual > (b.touched ? wanted : b.soft->body().options().newton_tolerance);
+  return !b.stuck && b.residual > (b.touched ? wanted : b.soft->body().options().newton_tolerance);
 }
 
 // Whether an object with something in its way would go further than its own size.
@@ -142,13 +145,15 @@ bool SoftContacts::tooFast(const std::vector<Candidate>& watched,
   std::vector<bool> fast;
   for (const SoftEntry& entry : softs) {
     const auto& vertices = entry.soft->vertices();
-    fast.push_back(h * entry.soft->fastest() > (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm());
+    fast.push_back(h * entry.soft->fastest() >
+                   (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm());
   }
-  return std::any_of(watched.begin(), watched.end(), [&](const Candidate& c) { return fast[c.contact.soft_a]; });
+  return std::any_of(watched.begin(), watched.end(),
+                     [&](const Candidate& c) { return fast[c.contact.soft_a]; });
 }
 
-// What pushed in the last step pushes from the start, and is a contact as long as it is near; what is
-// in the way of the present motion may become one.
+// What pushed in the last step pushes from the start, and is a contact as long as it is near; what
+// is in the way of the present motion may become one.
 SoftContacts::Contacts SoftContacts::startingContacts(const std::vector<Candidate>& watched,
                                                       const std::vector<Obstacle>& obstacles,
                                                       const std::vector<SoftEntry>& softs,
@@ -185,8 +190,10 @@ int SoftContacts::solve(const ContactOperator& problem, const StepMotion& motion
   return sweeps;
 }
 
-// Contacts that will act again. A pair that does not touch must not change a bit of what is computed.
-SoftContacts::Contacts SoftContacts::expectedContacts(const std::vector<Candidate>& watched, const Contacts& contacts,
+// Contacts that will act again. A pair that does not touch must not change a bit of what is
+// computed.
+SoftContacts::Contacts SoftContacts::expectedContacts(const std::vector<Candidate>& watched,
+                                                      const Contacts& contacts,
                                                       const StepMotion& motion) const {
   std::set<std::pair<int, int>> touching;
   for (const auto& [key, c] : contacts) touching.emplace(std::get<0>(key), std::get<1>(key));
@@ -199,7 +206,8 @@ SoftContacts::Contacts SoftContacts::expectedContacts(const std::vector<Candidat
 }
 
 double SoftContacts::residualWanted(int iteration) const {
-  return params_.residual * std::min(kLoosest, std::pow(kImpatience, std::max(0, iteration - kPatience)));
+  return params_.residual *
+         std::min(kLoosest, std::pow(kImpatience, std::max(0, iteration - kPatience)));
 }
 
 // Whether a contact is off its law or a body out of balance.
@@ -212,8 +220,8 @@ bool SoftContacts::isOpen(const Contacts& contacts, const StepMotion& motion, do
   return false;
 }
 
-// Bodies whose tangents are too old for them, and which are not much nearer to their balance than others, get
-// new ones. @return whether there were any
+// Bodies whose tangents are too old for them, and which are not much nearer to their balance than
+// others, get new ones. @return whether there were any
 bool SoftContacts::renewStale(const Contacts& contacts, double wanted, StepMotion& motion,
                               std::vector<int>& renewals) const {
   constexpr double kMuch = 0.1;
@@ -224,16 +232,18 @@ bool SoftContacts::renewStale(const Contacts& contacts, double wanted, StepMotio
   for (size_t i = 0; i < renewals.size(); ++i) {
     const StepMotion::Body& b = motion.bodies()[i];
     const bool behind = b.touched && unbalanced(motion, i, wanted) && b.residual >= kMuch * worst;
-    if (behind && renewals[i] < mostRenewals(*b.soft) && slow(b, wanted)) stale.push_back(static_cast<int>(i));
+    if (behind && renewals[i] < mostRenewals(*b.soft) && slow(b, wanted))
+      stale.push_back(static_cast<int>(i));
   }
   motion.renew(stale, contacts);
   for (const int soft : stale) ++renewals[soft];
   return !stale.empty();
 }
 
-// The next direction of the bodies that something keeps from their balance, with the contacts' forces. @return sweeps
-int SoftContacts::direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid, bool first, ContactOperator& problem,
-                         StepMotion& motion, Contacts& contacts) const {
+// The next direction of the bodies that something keeps from their balance, with the contacts'
+// forces. @return sweeps
+int SoftContacts::direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid, bool first,
+                         ContactOperator& problem, StepMotion& motion, Contacts& contacts) const {
   motion.touch(contacts);
   std::vector<int> moving;
   for (size_t i = 0; i < softs.size(); ++i) {
@@ -249,7 +259,8 @@ int SoftContacts::direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid,
   return sweeps;
 }
 
-void SoftContacts::solveIsland(const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h, Island& island) const {
+void SoftContacts::solveIsland(const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h,
+                               Island& island) const {
   const std::vector<SoftEntry>& softs = island.softs;
   ContactReport& report = island.report;
   const std::vector<Candidate> watched = candidates(softs, obstacles, rigid, h);
@@ -263,24 +274,26 @@ void SoftContacts::solveIsland(const std::vector<Obstacle>& obstacles, RigidWorl
   ContactOperator problem;
   Anderson anderson;
   std::vector<int> renewals(softs.size(), 0);
-  int undisturbed = 0;    // iterations with the same contacts and systems
+  int undisturbed = 0;  // iterations with the same contacts and systems
   int straightened = 0;
-  bool open = true;       // something is off its law
+  bool open = true;  // something is off its law
   const auto disturb = [&] {
     undisturbed = 0;
     anderson.reset();
   };
   while (open && report.newton_iterations < params_.newton_iterations) {
     const double wanted = residualWanted(++report.newton_iterations);
-    report.iterations += direct(softs, rigid, report.newton_iterations == 1, problem, motion, contacts);
+    report.iterations +=
+        direct(softs, rigid, report.newton_iterations == 1, problem, motion, contacts);
     const int added = grow(watched, obstacles, softs, motion, contacts);
     motion.advanceFree();
     ++undisturbed;
     if (added > 0) disturb();
-    const bool far = std::any_of(motion.bodies().begin(), motion.bodies().end(), [&](const auto& b) {
-      return b.touched && b.residual > kFar * wanted;
-    });
-    if (undisturbed == 0 || !far || !accelerate(anderson, motion, contacts)) motion.advanceTouched();
+    const bool far =
+        std::any_of(motion.bodies().begin(), motion.bodies().end(),
+                    [&](const auto& b) { return b.touched && b.residual > kFar * wanted; });
+    if (undisturbed == 0 || !far || !accelerate(anderson, motion, contacts))
+      motion.advanceTouched();
 
     open = added > 0 || isOpen(contacts, motion, wanted);
     if (open && added == 0 && renewStale(contacts, wanted, motion, renewals)) disturb();
@@ -305,7 +318,8 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
                                  const std::vector<Obstacle>& obstacles, RigidWorld& rigid,
                                  double h) {
   std::vector<Island> islands = islandsOf(softs, obstacles, rigid, h);
-  eachOnAThread(static_cast<int>(islands.size()), [&](int k) { solveIsland(obstacles, rigid, h, islands[k]); });
+  eachOnAThread(static_cast<int>(islands.size()),
+                [&](int k) { solveIsland(obstacles, rigid, h, islands[k]); });
   ContactReport report;
   bool accepted = true;
   for (const Island& island : islands) {
@@ -325,8 +339,9 @@ ContactReport SoftContacts::step(const std::vector<SoftEntry>& softs,
   return report;
 }
 
-// What rigid bodies near a deformable one rest on holds against its push. Bullet solves these contacts
-// itself afterwards; here they only keep the deformable side from pushing the rigid one through.
+// What rigid bodies near a deformable one rest on holds against its push. Bullet solves these
+// contacts itself afterwards; here they only keep the deformable side from pushing the rigid one
+// through.
 void SoftContacts::addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
                                    Contacts& contacts) const {
   constexpr int kNoSoft = std::numeric_limits<int>::max();

@@ -1,9 +1,8 @@
 #include "soft_island.hpp"
 
 #include <algorithm>
-#include <map>
-
 #include <calipso_scene/disjoint_sets.hpp>
+#include <map>
 
 #include "obstacle_query.hpp"
 

@@ -69,8 +69,9 @@ void SoftObject::setSelfContact(bool on) {
   TriangleMesh rest = surface_;
   rest.vertices = asRows(body_.embedding().apply(restPositions(body_.model().mesh())));
   if (!isClosed(rest) || signedVolume(rest) <= 0.0)
-    throw std::invalid_argument("a surface that is open or faces inwards cannot meet itself; give a closed one "
-                                "whose faces look outwards");
+    throw std::invalid_argument(
+        "a surface that is open or faces inwards cannot meet itself; give a closed one "
+        "whose faces look outwards");
   self_ = std::make_unique<SelfProximity>(rest, body_.embedding());
 }
 
@@ -111,7 +112,8 @@ bool SoftObject::isHeld(const SurfacePoint& point) const {
   const auto& weights = body_.embedding().weights;
   for (int k = 0; k < 3; ++k) {
     if (point.weights[k] == 0.0) continue;
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(weights, point.vertices[k]); it; ++it)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(weights, point.vertices[k]);
+         it; ++it)
       if (!body_.isFixed(static_cast<int>(it.col()))) return false;
   }
   return true;
@@ -123,7 +125,8 @@ double SoftObject::holdStiffness(size_t points) const {
   return 100.0 * material.youngs_modulus * boundingDiagonal(surface_) / std::max<size_t>(1, points);
 }
 
-std::optional<double> SoftObject::linearSag(const Eigen::Vector3d& gravity, const std::vector<HoldPoint>& hold) const {
+std::optional<double> SoftObject::linearSag(const Eigen::Vector3d& gravity,
+                                            const std::vector<HoldPoint>& hold) const {
   return Sag(gravity, body_, holdStiffness(hold.size()), hold).largest(body_);
 }
 
@@ -142,15 +145,17 @@ SettleReport SoftObject::settle(const Eigen::Vector3d& gravity, std::vector<Hold
     body_.setRestNodes(relaxed);
     prestress_ = Sag(gravity, body_, stiffness, hold).prestress(&hold);
     prestress_modulus_ = material.youngs_modulus;
-    report.message = "no rest shape found that gravity would bend into the observed one: it is relaxed as observed, "
-                     "and inner forces carry its weight there; they fade as it is made softer";
+    report.message =
+        "no rest shape found that gravity would bend into the observed one: it is relaxed as "
+        "observed, "
+        "and inner forces carry its weight there; they fade as it is made softer";
   }
   changed();
   return report;
 }
 
-SettleReport SoftObject::findRestShape(const Vec& goal, double stiffness, std::vector<HoldPoint>& hold,
-                                       double tolerance) {
+SettleReport SoftObject::findRestShape(const Vec& goal, double stiffness,
+                                       std::vector<HoldPoint>& hold, double tolerance) {
   constexpr int kMaxIterations = 8;
   SettleReport report;
   Vec rest = restPositions(body_.model().mesh());
@@ -191,11 +196,12 @@ void SoftObject::copyPrestress(const SoftObject& other) {
   prestress_modulus_ = other.prestress_modulus_;
 }
 
-// The inner forces are stresses of the body's material: they turn with it, and fall as it is made softer. A stiffer one
-// needs no more than what carries the weight.
+// The inner forces are stresses of the body's material: they turn with it, and fall as it is made
+// softer. A stiffer one needs no more than what carries the weight.
 void SoftObject::applyPrestress() {
   if (prestress_.size() == 0) return;
-  const double share = std::min(1.0, body_.model().cellMaterials().front().youngs_modulus / prestress_modulus_);
+  const double share =
+      std::min(1.0, body_.model().cellMaterials().front().youngs_modulus / prestress_modulus_);
   Vec forces = share * prestress_;
   Eigen::Map<Eigen::Matrix3Xd> columns(forces.data(), 3, forces.size() / 3);
   columns = (rotation_ * columns).eval();

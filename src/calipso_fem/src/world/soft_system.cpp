@@ -51,10 +51,12 @@ void SoftSystem::renew(DeformableBody& body, const Eigen::Matrix3d& rotation,
   const bool contained = std::includes(before.begin(), before.end(), nodes.begin(), nodes.end());
   if (before.size() <= 2 * nodes.size()) {
     all.clear();
-    std::set_union(before.begin(), before.end(), nodes.begin(), nodes.end(), std::back_inserter(all));
+    std::set_union(before.begin(), before.end(), nodes.begin(), nodes.end(),
+                   std::back_inserter(all));
     if (contained) all = before;
   }
-  // An indefinite tangent is found out by the factor's failing: for a while it is expected to stay so.
+  // An indefinite tangent is found out by the factor's failing: for a while it is expected to stay
+  // so.
   constexpr int kExpectedIndefinite = 4;
   valid_ = false;
   if (indefinite_ == 0) {

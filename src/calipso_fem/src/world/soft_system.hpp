@@ -30,8 +30,8 @@ class SoftSystem {
 
   // Way of the contact nodes under `forces` (3n, N) alone, 3m, m. What contact forces add comes by:
   Vec reduce(const Vec& forces);
-  // The direction under the forces of reduce() and these, 3n, N; zero at all but contact nodes. What nothing holds
-  // gets its momentum exactly, whatever the factor's rounding.
+  // The direction under the forces of reduce() and these, 3n, N; zero at all but contact nodes.
+  // What nothing holds gets its momentum exactly, whatever the factor's rounding.
   Vec complete(const Vec& contact_forces);
   // What the last renewal's prescribed way asks of the others, N; for the first direction after it.
   const Vec& pull() const { return pull_; }
@@ -40,10 +40,11 @@ class SoftSystem {
   CondensedFactor factor_;
   BlockMatrix A_;
   Vec pull_;
-  Eigen::MatrixX3d shifted_;      // A times a shift along each axis
-  Eigen::Vector3d push_ = Eigen::Vector3d::Zero();  // sum of the forces of reduce(), in the factor's axes
-  std::vector<int> held_;         // prescribed components among those of the contact nodes
-  Eigen::MatrixXd compliance_;    // of a body that has some
+  Eigen::MatrixX3d shifted_;  // A times a shift along each axis
+  Eigen::Vector3d push_ =
+      Eigen::Vector3d::Zero();  // sum of the forces of reduce(), in the factor's axes
+  std::vector<int> held_;       // prescribed components among those of the contact nodes
+  Eigen::MatrixXd compliance_;  // of a body that has some
   Eigen::Matrix3d frozen_ = Eigen::Matrix3d::Identity(), turn_ = Eigen::Matrix3d::Identity();
   double h_ = 0.0;
   int version_ = 0;

@@ -19,8 +19,9 @@ void addForce(Vec& surface, const SurfacePoint& point, const Eigen::Vector3d& fo
       surface.segment<3>(3 * point.vertices[k]) += point.weights[k] * force;
 }
 
-// Overlap that is undone: this share of it in a step, not faster than so many minimal distances a second. What is
-// left of a few hundredths of these stays: to push it out again and again would lift what lies there.
+// Overlap that is undone: this share of it in a step, not faster than so many minimal distances a
+// second. What is left of a few hundredths of these stays: to push it out again and again would
+// lift what lies there.
 constexpr double kOverlapShare = 0.2, kPushOutRate = 4.0, kOverlapLeft = 0.04;
 
 }  // namespace
@@ -84,11 +85,11 @@ void StepMotion::touch(const std::map<Contact::Key, Contact>& contacts) {
 
 void StepMotion::expect(const std::map<Contact::Key, Contact>& contacts) {
   for (size_t i = 0; i < bodies_.size(); ++i)
-    bodies_[i].expected =
-        ContactOperator::nodesOf(static_cast<int>(i), contacts, *bodies_[i].soft);
+    bodies_[i].expected = ContactOperator::nodesOf(static_cast<int>(i), contacts, *bodies_[i].soft);
 }
 
-void StepMotion::renew(const std::vector<int>& softs, const std::map<Contact::Key, Contact>& contacts) {
+void StepMotion::renew(const std::vector<int>& softs,
+                       const std::map<Contact::Key, Contact>& contacts) {
   eachOnAThread(static_cast<int>(softs.size()), [&](int k) {
     Body& b = bodies_[softs[k]];
     const std::vector<int> own = ContactOperator::nodesOf(softs[k], contacts, *b.soft);
@@ -323,8 +324,8 @@ std::vector<StepReport> StepMotion::finish(const std::map<Contact::Key, Contact>
   std::vector<StepReport> reports;
   for (size_t i = 0; i < bodies_.size(); ++i) {
     Body& b = bodies_[i];
-    reports.push_back(b.soft->endStep(
-        b.forces, h_, held[i] ? std::nullopt : std::optional<Momentum>(gained[i])));
+    reports.push_back(
+        b.soft->endStep(b.forces, h_, held[i] ? std::nullopt : std::optional<Momentum>(gained[i])));
     reports.back().residual = b.residual;
     reports.back().converged =
         reports.back().converged && b.residual <= b.soft->body().options().newton_tolerance;

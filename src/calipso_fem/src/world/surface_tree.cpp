@@ -148,7 +148,8 @@ void SurfaceTree::improve(int f, const Eigen::Vector3d& point, double& squared,
 
 // Triangles that may be nearer to the point than `squared`, which the visits lower.
 template <class Visit>
-void SurfaceTree::approach(const Eigen::Vector3d& point, const double& squared, const Visit& visit) const {
+void SurfaceTree::approach(const Eigen::Vector3d& point, const double& squared,
+                           const Visit& visit) const {
   std::vector<int> stack = {0};
   while (!stack.empty()) {
     const Node& node = nodes_[stack.back()];
@@ -177,7 +178,8 @@ bool SurfaceTree::orient(const Eigen::Vector3d& point, double reach, SurfaceHit&
   return hit.normal.squaredNorm() >= 0.5;
 }
 
-void SurfaceTree::eachAround(const Eigen::Vector3d& point, double reach, const std::function<void(int)>& visit) const {
+void SurfaceTree::eachAround(const Eigen::Vector3d& point, double reach,
+                             const std::function<void(int)>& visit) const {
   approach(point, reach * reach, visit);
 }
 
@@ -206,7 +208,8 @@ std::optional<SurfaceHit> SurfaceTree::nearest(const Eigen::Vector3d& point, dou
 }
 
 template <class Filter>
-std::optional<SurfaceHit> SurfaceTree::firstEntryOf(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+std::optional<SurfaceHit> SurfaceTree::firstEntryOf(const Eigen::Vector3d& from,
+                                                    const Eigen::Vector3d& to,
                                                     const Filter& accepts) const {
   const Eigen::Vector3d d = to - from;
   Eigen::AlignedBox3d sweep(from.cwiseMin(to), from.cwiseMax(to));
@@ -242,11 +245,13 @@ std::optional<SurfaceHit> SurfaceTree::firstEntryOf(const Eigen::Vector3d& from,
   return hit;
 }
 
-std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from,
+                                                  const Eigen::Vector3d& to) const {
   return firstEntryOf(from, to, [](int) { return true; });
 }
 
-std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+std::optional<SurfaceHit> SurfaceTree::firstEntry(const Eigen::Vector3d& from,
+                                                  const Eigen::Vector3d& to,
                                                   const std::function<bool(int)>& accepts) const {
   return firstEntryOf(from, to, accepts);
 }

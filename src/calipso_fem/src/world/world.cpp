@@ -91,7 +91,8 @@ Actor& World::Impl::known(const std::string& object, const char* what) {
   if (Actor* actor = find(object)) return *actor;
   std::string all;
   for (const std::string& name : names()) all += (all.empty() ? "" : ", ") + name;
-  throw std::invalid_argument(std::string(what) + " of '" + object + "': there is no such object; known: " + all);
+  throw std::invalid_argument(std::string(what) + " of '" + object +
+                              "': there is no such object; known: " + all);
 }
 
 void World::Impl::enqueue(const Edit& edit) {
@@ -102,8 +103,8 @@ void World::Impl::enqueue(const Edit& edit) {
                  edit);
 }
 
-// Edits that wait for a collision get its instant once it is known. What waits for one that the video does not have
-// is handed on as it is, to be refused.
+// Edits that wait for a collision get its instant once it is known. What waits for one that the
+// video does not have is handed on as it is, to be refused.
 void World::Impl::releaseWaiting() {
   const std::vector<Edit> all = std::move(waiting);
   waiting.clear();
@@ -134,9 +135,9 @@ void World::addObservedWind(const std::string& object, const ObservedWind& wind)
 void World::addObservedModes(const std::string& object, const Eigen::MatrixXd& shapes) {
   Actor& actor = impl_->known(object, "observed modes");
   if (shapes.rows() != 3 * actor.object.mesh.vertexCount())
-    throw std::invalid_argument("observed modes of '" + object + "' have " + std::to_string(shapes.rows() / 3) +
-                                " vertices, but its model has " +
-                                std::to_string(actor.object.mesh.vertexCount()));
+    throw std::invalid_argument(
+        "observed modes of '" + object + "' have " + std::to_string(shapes.rows() / 3) +
+        " vertices, but its model has " + std::to_string(actor.object.mesh.vertexCount()));
   actor.modes = shapes;
 }
 

@@ -104,7 +104,8 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
   if (kind != ObjectKind::kStatic && !actor.edited) findHolder(actor);
   // What is attached does not move as a whole.
   const bool attached = kind == ObjectKind::kRigid && actor.holder == Holder::kAttachment;
-  const bool immovable = actor.immovable && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
+  const bool immovable =
+      actor.immovable && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
   if (attached || immovable) kind = ObjectKind::kKinematic;
   actor.edited = actor.edited || kind != ObjectKind::kStatic;
   if (actor.kind == kind) return;
@@ -118,8 +119,9 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
     motion.world_from_object = seen = actor.object.world_from_object;
   }
   actor.kind = kind;
-  actor.reason =
-      reason + (immovable ? "; its mass is infinite" : attached ? "; its attachments hold it in place" : "");
+  actor.reason = reason + (immovable  ? "; its mass is infinite"
+                           : attached ? "; its attachments hold it in place"
+                                      : "");
   actor.placement = motion.world_from_object * seen.inverse();
   if (kind == ObjectKind::kRigid) makeRigid(actor, motion);
   if (kind == ObjectKind::kDeformable) makeSoft(actor, motion, as_observed);
@@ -161,15 +163,17 @@ void World::Impl::noteOverlaps(Actor& actor, const TriangleMesh& surface) {
   const double size = boundingDiagonal(surface);
   for (const Obstacle& obstacle : obstacles(now, now, &actor)) {
     if (!meet(actor.id, obstacle.id)) continue;
-    if (!obstacle.plane && !obstacleBounds(obstacle).intersects({surface.vertices.colwise().minCoeff().transpose(),
-                                                                 surface.vertices.colwise().maxCoeff().transpose()}))
+    if (!obstacle.plane &&
+        !obstacleBounds(obstacle).intersects({surface.vertices.colwise().minCoeff().transpose(),
+                                              surface.vertices.colwise().maxCoeff().transpose()}))
       continue;
     double deepest = 0.0;
     for (int v = 0; v < surface.vertexCount(); ++v)
       if (const auto hit = queryObstacle(obstacle, surface.vertex(v), 0.0, size))
         deepest = std::max(deepest, -hit->gap);
     if (deepest > kNoted * size)
-      actor.note += "starts " + describeLength(deepest) + " inside " + obstacle.name + ", is pushed out slowly; ";
+      actor.note += "starts " + describeLength(deepest) + " inside " + obstacle.name +
+                    ", is pushed out slowly; ";
   }
 }
 
@@ -235,7 +239,8 @@ void World::Impl::deformAsObserved(Actor& actor) {
   const ObservedMotion seen = actor.track.at(now);
   if (seen.mode_amplitudes.size() != actor.modes.cols()) return;
   DeformableBody& body = actor.soft->body();
-  body.setState(body.positions() + nodalModes(actor, seen.mode_amplitudes), nodalModes(actor, seen.mode_velocities));
+  body.setState(body.positions() + nodalModes(actor, seen.mode_amplitudes),
+                nodalModes(actor, seen.mode_velocities));
   actor.soft->changed();
 }
 

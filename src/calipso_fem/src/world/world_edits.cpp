@@ -6,7 +6,8 @@
 #include "describe.hpp"
 #include "world_impl.hpp"
 
-// What an edit does to an object as a whole. Each function returns what was done, or throws what is wrong.
+// What an edit does to an object as a whole. Each function returns what was done, or throws what is
+// wrong.
 namespace calipso::fem {
 namespace {
 
@@ -92,8 +93,8 @@ std::string World::Impl::apply(const Edit& edit) {
 std::string World::Impl::carryOut(const Edit& edit) {
   validate(edit, names());
   if (!edit.after.empty())
-    throw std::invalid_argument("collision " + std::to_string(edit.collision) + " of " + edit.after +
-                                " is not in the video, which shows " +
+    throw std::invalid_argument("collision " + std::to_string(edit.collision) + " of " +
+                                edit.after + " is not in the video, which shows " +
                                 std::to_string(find(edit.after)->collisions.size()));
   if (edit.object.empty()) return applyToScene(edit);
   if (edit.kind == EditKind::kGravity) return changeGravity(edit);
@@ -230,8 +231,10 @@ std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
     body.setState(x, v);
   } else if (actor.soft && edit.mode == EditMode::kEstimated && actor.modes.cols() > 0) {
     DeformableBody& body = actor.soft->body();
-    body.setState(body.positions(), edit.factor * nodalModes(actor, actor.track.at(now).mode_velocities));
-    return actor.object.name + " moves with " + std::to_string(edit.factor) + " of the velocity it deforms with";
+    body.setState(body.positions(),
+                  edit.factor * nodalModes(actor, actor.track.at(now).mode_velocities));
+    return actor.object.name + " moves with " + std::to_string(edit.factor) +
+           " of the velocity it deforms with";
   } else if (actor.soft) {
     actor.soft->body().setRigidVelocity(linear, angular);
   } else {
@@ -275,7 +278,8 @@ std::string World::Impl::changeLook(Actor& actor, const Edit& edit) {
   Look& look = actor.look;
   if (edit.color.allFinite()) {
     const bool replaces = edit.mode == EditMode::kAbsolute;
-    look.color = look.absolute && !replaces ? look.color.cwiseProduct(edit.color).eval() : edit.color;
+    look.color =
+        look.absolute && !replaces ? look.color.cwiseProduct(edit.color).eval() : edit.color;
     look.absolute |= replaces;
   }
   if (!std::isnan(edit.specular)) look.specular = edit.specular;

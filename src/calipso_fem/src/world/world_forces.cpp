@@ -8,7 +8,8 @@
 namespace calipso::fem {
 namespace {
 
-constexpr double kPullFrequency = 2.0 * M_PI * 4.0;  // rad/s, a quarter of a second to follow a target
+constexpr double kPullFrequency =
+    2.0 * M_PI * 4.0;  // rad/s, a quarter of a second to follow a target
 
 }  // namespace
 
@@ -32,8 +33,8 @@ void World::Impl::pullSoft(Actor& actor, const Pull& pull, double at) {
   for (const int v : pull.vertices) actor.soft->addForce(SurfacePoint::vertex(v), force);
 }
 
-// A torque T about the axis a: forces f = T (a x r) / sum |a x r|^2 about the region's middle, which add up to
-// no force along the axis and to T about it.
+// A torque T about the axis a: forces f = T (a x r) / sum |a x r|^2 about the region's middle,
+// which add up to no force along the axis and to T about it.
 void World::Impl::twistSoft(Actor& actor, const Pull& pull, double at) {
   const double torque = pull.share(at) * pull.vector.norm();
   if (torque == 0.0) return;
@@ -55,7 +56,8 @@ void World::Impl::twistSoft(Actor& actor, const Pull& pull, double at) {
 Eigen::Vector3d World::Impl::twistOf(const Actor& actor, const Pull& pull, double at) const {
   const Eigen::Vector3d wanted = pull.share(at) * pull.vector;
   if (!pull.to_target) return wanted;
-  const Eigen::AngleAxisd turned(rigid.pose(*actor.body).linear() * pull.start_rotation.transpose());
+  const Eigen::AngleAxisd turned(rigid.pose(*actor.body).linear() *
+                                 pull.start_rotation.transpose());
   const Eigen::Vector3d error = wanted - turned.angle() * turned.axis();
   const Eigen::Matrix3d inertia = rigid.inertia(*actor.body);
   return inertia * (kPullFrequency * kPullFrequency * error -
@@ -79,8 +81,8 @@ void World::Impl::loadRigid(Actor& actor, double at, double h) {
           rigid.linearVelocity(*actor.body) + rigid.angularVelocity(*actor.body).cross(arm);
       const Eigen::Matrix3d mass =
           rigid.compliance(*actor.body, center + arm, center + arm).inverse();
-      f = mass *
-          (kPullFrequency * kPullFrequency * (pull.start + f - center - arm) - 2.0 * kPullFrequency * velocity);
+      f = mass * (kPullFrequency * kPullFrequency * (pull.start + f - center - arm) -
+                  2.0 * kPullFrequency * velocity);
     }
     force += f;
     torque += arm.cross(f);
@@ -102,7 +104,8 @@ void World::Impl::loadRigid(Actor& actor, double at, double h) {
   rigid.setForce(*actor.body, force, torque);
 }
 
-Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, double at, double h) {
+Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, double at,
+                            double h) {
   if (!actor.sheet) {
     const TriangleMesh& mesh = actor.object.mesh;
     Actor::Sheet sheet;

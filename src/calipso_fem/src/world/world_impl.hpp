@@ -72,7 +72,8 @@ struct World::Impl {
   void watchItself(Actor& actor);  // or not, as meetsItself() says
   void setSelfRule(Actor& actor, const PairRule& rule);
   std::vector<int> ownSupports(const WorldObject& object) const;  // ids
-  void meetOwnSupports(Actor& actor, bool contact);  // nothing is to meet them once it moves or is gone
+  void meetOwnSupports(Actor& actor,
+                       bool contact);  // nothing is to meet them once it moves or is gone
   // A new object takes part from now on, at its world_from_object; static until an edit touches it.
   Actor& addObject(const WorldObject& object, const ObjectSettings& settings);
   // A copy in the present state (shape, velocity, material, gravity), moved by `motion` (world).
@@ -88,13 +89,15 @@ struct World::Impl {
 
   // What held an object in the video (world_settle.cpp)
   void findHolder(Actor& actor);
-  Touching supportPoints(const Actor& actor, const TriangleMesh& surface, const std::vector<Obstacle>& around) const;
+  Touching supportPoints(const Actor& actor, const TriangleMesh& surface,
+                         const std::vector<Obstacle>& around) const;
   void limitSag(Actor& actor, const TriangleMesh& surface, std::vector<HoldPoint> hold);
-  void settleAsObserved(Actor& actor, const TriangleMesh& surface, const std::vector<Obstacle>& around,
-                        const Touching& touching);
+  void settleAsObserved(Actor& actor, const TriangleMesh& surface,
+                        const std::vector<Obstacle>& around, const Touching& touching);
 
   // Objects that rest on others (world_rests.cpp)
-  void noteWhatRestsOn(const Actor& carrier);  // as the video has it, before an edit touches the carrier
+  void noteWhatRestsOn(
+      const Actor& carrier);  // as the video has it, before an edit touches the carrier
   void letGoWhatLostItsRest();
 
   // Contacts and forces of a step (world_step.cpp)
@@ -125,7 +128,8 @@ struct World::Impl {
   std::string press(Actor& actor, const Edit& edit);
   std::string blow(Actor& actor, const Edit& edit);
   std::string blowEverywhere(const Edit& edit);
-  const WindTrack& windFor(const Actor& actor) const;  // @throw std::invalid_argument when the video shows none
+  const WindTrack& windFor(
+      const Actor& actor) const;  // @throw std::invalid_argument when the video shows none
   std::string insert(const Edit& edit);
   void lead(Actor& actor, Pull& pull);
   void scale(Actor& actor, double factor);
@@ -143,7 +147,8 @@ struct World::Impl {
   std::optional<RigidWorld::Id> rigidIdOf(int id) const;
   void applyRules(const Actor& actor);
   Actor* find(const std::string& name);
-  Actor& known(const std::string& object, const char* what);  // @throw std::invalid_argument: what of an unknown one
+  Actor& known(const std::string& object,
+               const char* what);  // @throw std::invalid_argument: what of an unknown one
   std::vector<std::string> names() const;
 
   WorldScene scene;
@@ -154,27 +159,29 @@ struct World::Impl {
   std::vector<RigidWorld::Id> supports;  // planes and meshes in the rigid world
   std::vector<std::unique_ptr<SurfaceTree>> support_trees;
   bool has_colliders = false;
-  // An object that nothing but another one carries, and the place on that one's surface where it does.
+  // An object that nothing but another one carries, and the place on that one's surface where it
+  // does.
   struct Rest {
     int actor, carrier, triangle;
     Eigen::Vector3d barycentric, place;
   };
   std::vector<Rest> rests;
 
-  double now = 0.0;          // video time, s
+  double now = 0.0;  // video time, s
   std::optional<ObservedGravity> observed_gravity;
   double speed_scale = 1.0;  // simulated seconds per second of the video
   Sun sun;
   bool started = false;
   double step_ms = 0.0;
   int substeps = 0;
-  double soft_part = std::numeric_limits<double>::infinity();  // s, of a step, at which deformable objects converge
+  double soft_part = std::numeric_limits<double>::infinity();  // s, of a step, at which deformable
+                                                               // objects converge
   int good_parts = 0;                                          // in a row, of that length
   std::vector<ContactPoint> shown_contacts;
   std::set<std::pair<std::string, std::string>> touching;
   std::vector<TouchEvent> first_touches;
   std::map<std::pair<int, int>, PairRule> rules;  // by ids, smaller first
-  std::deque<Edit> pending;   // by time
+  std::deque<Edit> pending;                       // by time
   std::vector<Edit> waiting;  // for a collision in the video that is not known yet
   bool collisions_known = false;
   bool plan_changed = true;
@@ -200,7 +207,8 @@ constexpr double kSupportGap = 0.02;
 // Lasting id of the k-th support, planes first; objects have ids from 0 up.
 constexpr int supportId(size_t k) { return -1 - static_cast<int>(k); }
 
-double pixelsPerMeter(const Camera& camera, const Eigen::Vector3d& at);  // 0 where it cannot be seen
+double pixelsPerMeter(const Camera& camera,
+                      const Eigen::Vector3d& at);  // 0 where it cannot be seen
 
 // Edge length of the cells and all other FEM options for an object, from its size in the picture.
 FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const WorldParams& params,

@@ -6,7 +6,8 @@
 #include "describe.hpp"
 #include "world_impl.hpp"
 
-// Edits that hold, draw or press an object. Each function returns what was done, or throws what is wrong.
+// Edits that hold, draw or press an object. Each function returns what was done, or throws what is
+// wrong.
 namespace calipso::fem {
 namespace {
 
@@ -43,7 +44,8 @@ std::string World::Impl::pull(Actor& actor, const Edit& edit) {
   pull.start_rotation = poseOf(actor, now).linear();
   if (actor.soft && pull.to_target) lead(actor, pull);
   actor.pulls.push_back(pull);
-  const char* unit = pull.twists ? (pull.to_target ? " rad" : " N m") : (pull.to_target ? " m" : " N");
+  const char* unit =
+      pull.twists ? (pull.to_target ? " rad" : " N m") : (pull.to_target ? " m" : " N");
   return actor.object.name + " (" + toString(actor.kind) + ") is " +
          (pull.twists ? "turned" : "pulled") + " by " + describe(edit.vector) + unit + " at " +
          std::to_string(pull.vertices.size()) + " vertices";
@@ -124,7 +126,8 @@ std::string World::Impl::press(Actor& actor, const Edit& edit) {
   return actor.object.name + " is under " + std::to_string(edit.pressure) + " Pa";
 }
 
-// Wind is the scene's: cloth that shows none of its own, and what the video does not have, take the surest.
+// Wind is the scene's: cloth that shows none of its own, and what the video does not have, take the
+// surest.
 const WindTrack& World::Impl::windFor(const Actor& actor) const {
   const WindTrack* surest = actor.wind.empty() ? nullptr : &actor.wind;
   for (const Actor& other : actors) {
@@ -132,16 +135,19 @@ const WindTrack& World::Impl::windFor(const Actor& actor) const {
     if (!surest || other.wind.variance() < surest->variance()) surest = &other.wind;
   }
   if (!surest)
-    throw std::invalid_argument("the wind of the video is not known: no cloth shows one, or it was not asked for when the "
-                                "clip was analysed (estimate_wind:=true); give one by mode absolute and a vector");
+    throw std::invalid_argument(
+        "the wind of the video is not known: no cloth shows one, or it was not asked for when the "
+        "clip was analysed (estimate_wind:=true); give one by mode absolute and a vector");
   return *surest;
 }
 
 std::string World::Impl::blow(Actor& actor, const Edit& edit) {
   const bool estimated = edit.mode == EditMode::kEstimated;
   WindTrack air;
-  if (estimated) air = windFor(actor).times(edit.factor);
-  else air.add({now, edit.vector, Eigen::Matrix3d::Zero()});
+  if (estimated)
+    air = windFor(actor).times(edit.factor);
+  else
+    air.add({now, edit.vector, Eigen::Matrix3d::Zero()});
   touch(actor, edit);
   if (!actor.simulated())
     throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +

@@ -11,14 +11,16 @@ namespace calipso::fem {
 namespace {
 
 // A support mesh is an object's own surface when most of it lies on that, facing as it does.
-constexpr double kOwnSurface = 0.02;  // of the object's diagonal: the alignment's error, and details
-constexpr double kOwnShare = 0.5;     // of the support's area
+constexpr double kOwnSurface =
+    0.02;                          // of the object's diagonal: the alignment's error, and details
+constexpr double kOwnShare = 0.5;  // of the support's area
 
 // Part of the mesh's area whose triangles lie within `reach` of the surface and face the same way.
 double shareOn(const SurfaceTree& surface, const TriangleMesh& mesh, double reach) {
   double on = 0.0, all = 0.0;
   for (int t = 0; t < mesh.triangleCount(); ++t) {
-    const Eigen::Vector3d a = mesh.vertex(mesh.triangles(t, 0)), b = mesh.vertex(mesh.triangles(t, 1)),
+    const Eigen::Vector3d a = mesh.vertex(mesh.triangles(t, 0)),
+                          b = mesh.vertex(mesh.triangles(t, 1)),
                           c = mesh.vertex(mesh.triangles(t, 2));
     const Eigen::Vector3d across = (b - a).cross(c - a);
     all += across.norm();
@@ -69,7 +71,8 @@ std::vector<int> World::Impl::ownSupports(const WorldObject& object) const {
   const SurfaceTree surface(placed(object.mesh, object.world_from_object));
   const double reach = kOwnSurface * boundingDiagonal(object.mesh);
   for (size_t k = 0; k < scene.support_meshes.size(); ++k)
-    if (shareOn(surface, scene.support_meshes[k].mesh, reach) > kOwnShare) own.push_back(supportId(scene.planes.size() + k));
+    if (shareOn(surface, scene.support_meshes[k].mesh, reach) > kOwnShare)
+      own.push_back(supportId(scene.planes.size() + k));
   return own;
 }
 
@@ -104,7 +107,9 @@ void World::Impl::setPairRule(const std::string& a, const std::string& b, const 
   validate(rule, a + " and " + b);
   const int ia = idOf(a), ib = idOf(b);
   if (ia == ib && ia < 0)
-    throw std::invalid_argument("the support '" + a + "' with itself is no pair, it does not deform; name two objects or supports");
+    throw std::invalid_argument(
+        "the support '" + a +
+        "' with itself is no pair, it does not deform; name two objects or supports");
   if (ia == ib) return setSelfRule(actors[ia], rule);
   rules[std::minmax({ia, ib})] = rule;
   contacts.setRule(ia, ib, rule);
@@ -118,7 +123,8 @@ bool World::Impl::meetsItself(const Actor& actor) const {
   const auto rule = rules.find({actor.id, actor.id});
   if (rule != rules.end()) return rule->second.contact;
   const TriangleMesh& mesh = actor.object.mesh;
-  return actor.settings.self_contact.value_or(isThin(mesh) && isClosed(mesh) && signedVolume(mesh) > 0.0);
+  return actor.settings.self_contact.value_or(isThin(mesh) && isClosed(mesh) &&
+                                              signedVolume(mesh) > 0.0);
 }
 
 void World::Impl::setSelfRule(Actor& actor, const PairRule& rule) {
@@ -138,7 +144,8 @@ void World::Impl::watchItself(Actor& actor) {
     return;
   }
   if (SelfProximity* self = actor.soft->selfProximity())
-    if (const int count = crossings(actor.soft->tree(), self->shallow(boundingDiagonal(actor.object.mesh))))
+    if (const int count =
+            crossings(actor.soft->tree(), self->shallow(boundingDiagonal(actor.object.mesh))))
       actor.note += "starts passing through itself along " + std::to_string(count) +
                     " edges: there it is one piece and is not held apart; ";
 }

@@ -3,7 +3,8 @@
 #include "obstacle_query.hpp"
 #include "world_impl.hpp"
 
-// What rests on an object in the video: it goes on resting there while that stays, and is let go once that moves away.
+// What rests on an object in the video: it goes on resting there while that stays, and is let go
+// once that moves away.
 namespace calipso::fem {
 namespace {
 
@@ -14,13 +15,18 @@ constexpr double kFollows = 0.01;  // of the size: by so much the place has to m
 void World::Impl::noteWhatRestsOn(const Actor& carrier) {
   if (carrier.edited || carrier.removed) return;
   const auto isOwn = [&](int id) {
-    return std::find(carrier.own_supports.begin(), carrier.own_supports.end(), id) != carrier.own_supports.end();
+    return std::find(carrier.own_supports.begin(), carrier.own_supports.end(), id) !=
+           carrier.own_supports.end();
   };
   const auto isKnown = [&](int id) {
-    return std::any_of(rests.begin(), rests.end(), [&](const Rest& rest) { return rest.actor == id && rest.carrier == carrier.id; });
+    return std::any_of(rests.begin(), rests.end(), [&](const Rest& rest) {
+      return rest.actor == id && rest.carrier == carrier.id;
+    });
   };
   for (Actor& actor : actors) {
-    if (&actor == &carrier || actor.edited || actor.removed || actor.kind != ObjectKind::kStatic || isKnown(actor.id)) continue;
+    if (&actor == &carrier || actor.edited || actor.removed || actor.kind != ObjectKind::kStatic ||
+        isKnown(actor.id))
+      continue;
     if (!actor.object.attachments.empty() || actor.track.at(now).moving) continue;
     const TriangleMesh surface = placed(actor.object.mesh, poseOf(actor, now));
     const double size = boundingDiagonal(surface);
@@ -29,11 +35,14 @@ void World::Impl::noteWhatRestsOn(const Actor& carrier) {
     for (const Obstacle& obstacle : obstacles(now, now, &actor)) {
       if (isOwn(obstacle.id)) continue;
       const auto hit = carrying(obstacle, surface, scene.gravity, kSupportGap * size);
-      if (obstacle.id == carrier.id) on = hit;
-      else carried_otherwise |= hit.has_value();
+      if (obstacle.id == carrier.id)
+        on = hit;
+      else
+        carried_otherwise |= hit.has_value();
     }
     if (!on || carried_otherwise) continue;
-    const auto place = SurfaceTree(placed(carrier.object.mesh, poseOf(carrier, now))).nearest(on->place, size);
+    const auto place =
+        SurfaceTree(placed(carrier.object.mesh, poseOf(carrier, now))).nearest(on->place, size);
     if (!place) continue;
     rests.push_back({actor.id, carrier.id, place->triangle, place->barycentric, place->point});
     actor.holder = Holder::kSupport;
@@ -47,8 +56,10 @@ void World::Impl::letGoWhatLostItsRest() {
     const auto vertices = verticesOf(carrier);
     Eigen::Vector3d place = Eigen::Vector3d::Zero();
     for (int i = 0; i < 3; ++i)
-      place += rest.barycentric[i] * vertices.row(carrier.object.mesh.triangles(rest.triangle, i)).transpose();
-    return (place - rest.place).norm() > kFollows * boundingDiagonal(actors[rest.actor].object.mesh);
+      place += rest.barycentric[i] *
+               vertices.row(carrier.object.mesh.triangles(rest.triangle, i)).transpose();
+    return (place - rest.place).norm() >
+           kFollows * boundingDiagonal(actors[rest.actor].object.mesh);
   };
   for (size_t k = 0; k < rests.size();) {
     Actor& actor = actors[rests[k].actor];
@@ -62,7 +73,8 @@ void World::Impl::letGoWhatLostItsRest() {
     if (!falls) continue;
     noteWhatRestsOn(actor);
     k = 0;  // the list has grown
-    become(actor, actor.settings.kind.value_or(ObjectKind::kRigid), carrier + ", on which it rests, moves");
+    become(actor, actor.settings.kind.value_or(ObjectKind::kRigid),
+           carrier + ", on which it rests, moves");
     wake(actor);
   }
 }

@@ -35,8 +35,10 @@ std::string World::Impl::applyToScene(const Edit& edit) {
 
 std::string World::Impl::changeGravity(const Edit& edit) {
   if (edit.mode == EditMode::kEstimated && !observed_gravity)
-    throw std::invalid_argument("nothing was seen to fall in the video; give gravity by mode absolute or factor");
-  const Eigen::Vector3d replaced = edit.mode == EditMode::kEstimated ? observed_gravity->vector : edit.vector;
+    throw std::invalid_argument(
+        "nothing was seen to fall in the video; give gravity by mode absolute or factor");
+  const Eigen::Vector3d replaced =
+      edit.mode == EditMode::kEstimated ? observed_gravity->vector : edit.vector;
   std::string changed_objects;
   for (Actor& actor : actors) {
     if (actor.removed || (!edit.object.empty() && actor.object.name != edit.object)) continue;
@@ -84,7 +86,9 @@ std::string World::Impl::insert(const Edit& edit) {
       edit.translation -
       object.world_from_object.linear() * object.mesh.vertices.colwise().mean().transpose();
   ObjectSettings settings = params.settingsOf(object.name);
-  const auto give = [](double value, std::optional<double>& to) { if (!std::isnan(value)) to = value; };
+  const auto give = [](double value, std::optional<double>& to) {
+    if (!std::isnan(value)) to = value;
+  };
   give(edit.youngs_modulus, settings.youngs_modulus);
   give(edit.poissons_ratio, settings.poissons_ratio);
   give(edit.density, settings.density);
@@ -103,7 +107,8 @@ std::string World::Impl::changeContact(Actor& actor, const Edit& edit) {
   if (std::isnan(edit.friction) && std::isnan(edit.restitution)) {
     setPairContact(actor.object.name, edit.other, edit.meet);
     const std::string other = edit.other == actor.object.name ? "itself" : edit.other;
-    return actor.object.name + (edit.meet ? " meets " : " does not meet ") + (other.empty() ? "anything" : other);
+    return actor.object.name + (edit.meet ? " meets " : " does not meet ") +
+           (other.empty() ? "anything" : other);
   }
   if (edit.other.empty()) {
     SurfaceSettings surface = actor.settings.surface;

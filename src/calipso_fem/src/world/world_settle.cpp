@@ -14,8 +14,8 @@ namespace {
 
 // Surface up to this share of the diagonal above the lowest point is what the object stands on.
 constexpr double kContactPatch = 0.01;
-// A model's feet seldom end at one height: where it would tip over so, or nearly, the patch grows up to this, as long
-// as that helps.
+// A model's feet seldom end at one height: where it would tip over so, or nearly, the patch grows
+// up to this, as long as that helps.
 constexpr double kLargestContactPatch = 0.08, kTippingGap = 0.75 * M_PI, kGapGained = 0.2,
                  kOtherFoot = 0.1;
 // Sag that changes nothing: of the object's diagonal, and in pixels.
@@ -28,13 +28,15 @@ double supportGap(const TriangleMesh& surface, const std::vector<Obstacle>& obst
                   const Eigen::Vector3d& gravity, double reach) {
   double smallest = reach;
   for (const Obstacle& obstacle : obstacles)
-    if (const auto hit = carrying(obstacle, surface, gravity, reach)) smallest = std::min(smallest, hit->gap);
+    if (const auto hit = carrying(obstacle, surface, gravity, reach))
+      smallest = std::min(smallest, hit->gap);
   return smallest;
 }
 
-// Widest angle about the centre of mass, seen along `down`, in which none of the points lies: from pi on the object
-// tips over. rad
-double widestGap(const std::vector<std::pair<HoldPoint, int>>& points, const SoftObject& soft, const Eigen::Vector3d& down) {
+// Widest angle about the centre of mass, seen along `down`, in which none of the points lies: from
+// pi on the object tips over. rad
+double widestGap(const std::vector<std::pair<HoldPoint, int>>& points, const SoftObject& soft,
+                 const Eigen::Vector3d& down) {
   const Eigen::Vector3d center = soft.body().momentum().center;
   const Eigen::Vector3d a = down.unitOrthogonal(), b = down.normalized().cross(a);
   std::vector<double> angles;
@@ -57,7 +59,8 @@ Touching standingPoints(const SoftObject& soft, const Eigen::Vector3d& down,
   const Touching lowest = within(kContactPatch);
   Touching best = lowest;
   double widest = widestGap(best, soft, down);
-  for (double patch = 2.0 * kContactPatch; widest > kTippingGap && patch <= kLargestContactPatch; patch *= 2.0) {
+  for (double patch = 2.0 * kContactPatch; widest > kTippingGap && patch <= kLargestContactPatch;
+       patch *= 2.0) {
     Touching more = lowest;
     for (const auto& point : within(patch)) {
       const Eigen::Vector3d at = soft.position(SurfacePoint::vertex(point.first.vertex));
@@ -94,7 +97,8 @@ std::vector<HoldPoint> lowestPoints(const SoftObject& soft, const Eigen::Vector3
 // A sheet that is meant to bend: thin, and large for its volume.
 bool isCloth(const TriangleMesh& surface, const DeformableBody& body) {
   constexpr double kThin = 0.01, kLarge = 0.1;  // of the size, and of its square
-  const double size = boundingDiagonal(surface), area = (isClosed(surface) ? 0.5 : 1.0) * surfaceArea(surface);
+  const double size = boundingDiagonal(surface),
+               area = (isClosed(surface) ? 0.5 : 1.0) * surfaceArea(surface);
   const double volume = body.totalMass() / body.model().cellMaterials().front().density;
   return volume < kThin * size * area && area > kLarge * size * size;
 }
@@ -129,20 +133,25 @@ void World::Impl::findHolder(Actor& actor) {
   if (!falls) actor.buoyancy = -scene.gravity;
 }
 
-// What the object stands on in the video: points of its surface, each with the index of the obstacle.
+// What the object stands on in the video: points of its surface, each with the index of the
+// obstacle.
 Touching World::Impl::supportPoints(const Actor& actor, const TriangleMesh& surface,
                                     const std::vector<Obstacle>& around) const {
   if (actor.holder != Holder::kSupport) return {};
   const double size = boundingDiagonal(surface);
   const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
   const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
-  return standingPoints(*actor.soft, scene.gravity, [&](double patch) {
-    return contacts.touching(entry, around, std::max(0.0, gap) + patch * size);
-  }, kOtherFoot * size);
+  return standingPoints(
+      *actor.soft, scene.gravity,
+      [&](double patch) {
+        return contacts.touching(entry, around, std::max(0.0, gap) + patch * size);
+      },
+      kOtherFoot * size);
 }
 
-// A default stiffness is a guess by size alone. Slender objects would collapse under their weight with it: they get
-// what keeps their sag at a few per cent, where they stand, hang or, put down, would stand.
+// A default stiffness is a guess by size alone. Slender objects would collapse under their weight
+// with it: they get what keeps their sag at a few per cent, where they stand, hang or, put down,
+// would stand.
 void World::Impl::limitSag(Actor& actor, const TriangleMesh& surface, std::vector<HoldPoint> hold) {
   if (actor.settings.youngs_modulus || isCloth(surface, actor.soft->body())) return;
   if (hold.empty() && !actor.soft->hasFixedNodes()) hold = lowestPoints(*actor.soft, scene.gravity);
@@ -154,15 +163,16 @@ void World::Impl::limitSag(Actor& actor, const TriangleMesh& surface, std::vecto
   actor.soft->setMaterial(actor.observed_material);
   std::ostringstream text;
   text.precision(2);
-  text << "slender: its default stiffness is " << factor << " times that of compact objects, or it would sag by "
-       << *sag / boundingDiagonal(surface) << " of its size; give youngs_modulus for another; ";
+  text << "slender: its default stiffness is " << factor
+       << " times that of compact objects, or it would sag by " << *sag / boundingDiagonal(surface)
+       << " of its size; give youngs_modulus for another; ";
   actor.note += text.str();
 }
 
 // Makes the observed shape the equilibrium under what held the object in the video. Buoyancy and
 // free fall leave nothing to balance.
-void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface, const std::vector<Obstacle>& around,
-                                   const Touching& touching) {
+void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface,
+                                   const std::vector<Obstacle>& around, const Touching& touching) {
   const double size = boundingDiagonal(surface);
   std::vector<HoldPoint> hold = pointsOf(touching);
   if (hold.empty() && actor.holder != Holder::kAttachment) return;
@@ -173,7 +183,8 @@ void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface, co
   if (!report.message.empty()) actor.note += report.message + "; ";
   const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
   for (size_t i = 0; i < hold.size(); ++i)
-    contacts.hold(entry, around[touching[i].second], hold[i], (kSupportGap + kLargestContactPatch) * size);
+    contacts.hold(entry, around[touching[i].second], hold[i],
+                  (kSupportGap + kLargestContactPatch) * size);
 }
 
 }  // namespace calipso::fem

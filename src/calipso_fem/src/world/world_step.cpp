@@ -12,7 +12,7 @@ namespace {
 // Rest: slower than this share of the own size per second, for so many frames.
 constexpr double kRestSpeed = 1e-3;
 constexpr int kCalmFrames = 15;
-constexpr int kGoodParts = 2;        // of a step; after so many in a row they are tried twice as long
+constexpr int kGoodParts = 2;  // of a step; after so many in a row they are tried twice as long
 constexpr double kSameInstant = 1e-9;  // s
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
@@ -70,7 +70,8 @@ std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor
   }
   if (except) {
     const auto isOwn = [&](const Obstacle& o) {
-      return std::find(except->own_supports.begin(), except->own_supports.end(), o.id) != except->own_supports.end();
+      return std::find(except->own_supports.begin(), except->own_supports.end(), o.id) !=
+             except->own_supports.end();
     };
     list.erase(std::remove_if(list.begin(), list.end(), isOwn), list.end());
   }
@@ -81,8 +82,7 @@ std::vector<SoftEntry> World::Impl::softEntries() {
   std::vector<SoftEntry> list;
   for (Actor& actor : actors)
     if (actor.soft && !actor.removed && !actor.asleep)
-      list.push_back(
-          {actor.id, actor.object.name, actor.settings.surface, actor.soft.get()});
+      list.push_back({actor.id, actor.object.name, actor.settings.surface, actor.soft.get()});
   return list;
 }
 
@@ -189,7 +189,8 @@ void World::Impl::updateSleep() {
       }
       continue;
     }
-    const bool calm = actor.pulls.empty() && actor.air.empty() && actor.soft->body().isAtRest(kRestSpeed * size);
+    const bool calm =
+        actor.pulls.empty() && actor.air.empty() && actor.soft->body().isAtRest(kRestSpeed * size);
     actor.calm_frames = calm ? actor.calm_frames + 1 : 0;
     actor.asleep = actor.calm_frames >= kCalmFrames;
   }

@@ -21,7 +21,8 @@ void validate(const ObjectSettings& s, const std::string& name) {
     require(*s.poissons_ratio > -1.0 && *s.poissons_ratio < 0.5, name + "/poissons_ratio",
             *s.poissons_ratio, "in (-1, 0.5)");
   if (s.density)
-    require(*s.density > 0.0, name + "/density", *s.density, "> 0 (kg/m^3); .inf: nothing moves it");
+    require(*s.density > 0.0, name + "/density", *s.density,
+            "> 0 (kg/m^3); .inf: nothing moves it");
   if (s.damping) require(*s.damping >= 0.0, name + "/damping", *s.damping, ">= 0 (s)");
   if (s.cell_size) require(*s.cell_size > 0.0, name + "/cell_size", *s.cell_size, "> 0 (m)");
   validate(s.surface, name);

@@ -1,6 +1,6 @@
 // Measures the finite element core on the reference beam and prints one JSON object per line:
-// steps of several sizes, elements and solvers, error against time beside Bullet's deformable body, and the hard
-// cases. Arguments: any of steps, newton, rest, trajectories, hard (default: all).
+// steps of several sizes, elements and solvers, error against time beside Bullet's deformable body,
+// and the hard cases. Arguments: any of steps, newton, rest, trajectories, hard (default: all).
 #include <malloc.h>
 #include <unistd.h>
 
@@ -45,7 +45,8 @@ void measureBeam(const std::string& kind, int n, FemOptions options, int steps) 
   std::printf(
       "{\"kind\": \"%s\", \"nodes\": %d, \"element\": \"%s\", \"solver\": \"%s\", \"steps\": %d, "
       "\"cpu_ms_per_step\": %.4g, \"wall_ms_per_step\": %.4g, \"cg_iterations\": %.4g, "
-      "\"newton_iterations\": %.4g, \"tip\": %.6g, \"build_cpu_ms\": %.4g, \"kb_per_node\": %.3g}\n",
+      "\"newton_iterations\": %.4g, \"tip\": %.6g, \"build_cpu_ms\": %.4g, \"kb_per_node\": "
+      "%.3g}\n",
       kind.c_str(), body.nodeCount(), toString(options.element).c_str(), report.solver.c_str(),
       steps, (cpuMilliseconds() - cpu) / steps, wall_ms / steps, double(iterations) / steps,
       double(newton) / steps, tipHeight(body), build_ms,
@@ -77,7 +78,8 @@ void measureNewton() {
   for (const int n : {4, 7, 12, 20, 29, 39}) measureBeam("newton", n, options, n > 20 ? 5 : 20);
 }
 
-void measureHardCase(const std::string& name, MaterialModel material, int across, double most_seconds) {
+void measureHardCase(const std::string& name, MaterialModel material, int across,
+                     double most_seconds) {
   const HardCaseResult r = runHardCase(name, material, across, most_seconds);
   std::printf(
       "{\"kind\": \"hard\", \"case\": \"%s\", \"nodes\": %d, \"material\": \"%s\", \"h\": %.4g, "
@@ -90,13 +92,13 @@ void measureHardCase(const std::string& name, MaterialModel material, int across
   std::fflush(stdout);
 }
 
-// The default material to the end; the others, which take up to a hundred times as long, on the coarser grid and for
-// some seconds each.
+// The default material to the end; the others, which take up to a hundred times as long, on the
+// coarser grid and for some seconds each.
 void measureHardCases() {
   constexpr double kSeconds = 2.0;
   for (const std::string& name : hardCaseNames())
     for (const int across : {2, 4})
-      if (across == 4 || name.find("unconstrained") == std::string::npos)   // has a grid of its own
+      if (across == 4 || name.find("unconstrained") == std::string::npos)  // has a grid of its own
         measureHardCase(name, MaterialModel::kStVenantKirchhoff, across, 60.0);
   for (const MaterialModel material : {MaterialModel::kStableNeoHookean, MaterialModel::kCorotated})
     for (const std::string& name : hardCaseNames()) measureHardCase(name, material, 2, kSeconds);

@@ -31,7 +31,7 @@ struct World {
   std::unique_ptr<btDeformableMultiBodyDynamicsWorld> world;
   btDeformableLinearElasticityForce elasticity{
       btScalar(kYoung / (2.0 * (1.0 + kPoisson))),
-      btScalar(kYoung * kPoisson / ((1.0 + kPoisson) * (1.0 - 2.0 * kPoisson))), 0, 0};
+      btScalar(kYoung* kPoisson / ((1.0 + kPoisson) * (1.0 - 2.0 * kPoisson))), 0, 0};
   btDeformableGravityForce gravity{btVector3(0, btScalar(-9.81), 0)};
 
   World() {
@@ -56,7 +56,8 @@ std::unique_ptr<btSoftBody> makeBody(World& w, const VolumeMesh& tets) {
     const auto c = tets.cells.row(cell);
     body->appendTetra(c[0], c[1], c[2], c[3]);
     const Eigen::Vector3d a = tets.node(c[0]);
-    const double volume = (tets.node(c[1]) - a).cross(tets.node(c[2]) - a).dot(tets.node(c[3]) - a) / 6;
+    const double volume =
+        (tets.node(c[1]) - a).cross(tets.node(c[2]) - a).dot(tets.node(c[3]) - a) / 6;
     for (int k = 0; k < 4; ++k) mass[c[k]] += 0.25 * kDensity * volume;
   }
   for (int i = 0; i < tets.nodeCount(); ++i)

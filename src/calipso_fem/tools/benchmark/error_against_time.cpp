@@ -37,23 +37,25 @@ double equilibriumTip(MaterialModel material) {
 }
 
 void printRest(const std::string& engine, const Run& r, int steps, double reference) {
-  std::printf("{\"kind\": \"rest\", \"engine\": \"%s\", \"nodes\": %d, \"cpu_ms_per_step\": %.4g, "
-              "\"wall_ms_per_step\": %.4g, \"tip\": %.6g, \"rel_error\": %.4g}\n",
-              engine.c_str(), r.nodes, r.cpu_ms / steps, r.wall_ms / steps, r.tip,
-              std::abs(r.tip / reference - 1.0));
+  std::printf(
+      "{\"kind\": \"rest\", \"engine\": \"%s\", \"nodes\": %d, \"cpu_ms_per_step\": %.4g, "
+      "\"wall_ms_per_step\": %.4g, \"tip\": %.6g, \"rel_error\": %.4g}\n",
+      engine.c_str(), r.nodes, r.cpu_ms / steps, r.wall_ms / steps, r.tip,
+      std::abs(r.tip / reference - 1.0));
   std::fflush(stdout);
 }
 
-void printTrajectory(const std::string& what, const FemOptions& o, double h, const Run& r, double seconds,
-                     double reference) {
-  std::printf("{\"kind\": \"trajectory\", \"varied\": \"%s\", \"nodes\": %d, \"element\": \"%s\", "
-              "\"material\": \"%s\", \"solver\": \"%s\", \"scheme\": \"%s\", \"linearised\": %s, "
-              "\"linear_tolerance\": %.1g, \"h\": %.4g, \"cpu_ms_per_second\": %.4g, "
-              "\"wall_ms_per_second\": %.4g, \"rel_error\": %.4g}\n",
-              what.c_str(), r.nodes, toString(o.element).c_str(), toString(o.material_model).c_str(),
-              toString(o.solver).c_str(), toString(o.scheme).c_str(), o.linearised ? "true" : "false",
-              o.linear_tolerance, h, r.cpu_ms / seconds, r.wall_ms / seconds,
-              std::abs(r.tip / reference - 1.0));
+void printTrajectory(const std::string& what, const FemOptions& o, double h, const Run& r,
+                     double seconds, double reference) {
+  std::printf(
+      "{\"kind\": \"trajectory\", \"varied\": \"%s\", \"nodes\": %d, \"element\": \"%s\", "
+      "\"material\": \"%s\", \"solver\": \"%s\", \"scheme\": \"%s\", \"linearised\": %s, "
+      "\"linear_tolerance\": %.1g, \"h\": %.4g, \"cpu_ms_per_second\": %.4g, "
+      "\"wall_ms_per_second\": %.4g, \"rel_error\": %.4g}\n",
+      what.c_str(), r.nodes, toString(o.element).c_str(), toString(o.material_model).c_str(),
+      toString(o.solver).c_str(), toString(o.scheme).c_str(), o.linearised ? "true" : "false",
+      o.linear_tolerance, h, r.cpu_ms / seconds, r.wall_ms / seconds,
+      std::abs(r.tip / reference - 1.0));
   std::fflush(stdout);
 }
 
@@ -72,26 +74,31 @@ double trajectoryReference(MaterialModel material, int n, int steps_per_second) 
   options.material_model = material;
   options.scheme = TimeScheme::kBdf2;
   options.newton_tolerance = 1e-6;
-  return runBeam(n, options, 1.0 / steps_per_second, static_cast<int>(kSeconds * steps_per_second)).tip;
+  return runBeam(n, options, 1.0 / steps_per_second, static_cast<int>(kSeconds * steps_per_second))
+      .tip;
 }
 
 }  // namespace
 
 void measureRest() {
-  constexpr int kSteps = 480;   // the swinging has died down to a thousandth
+  constexpr int kSteps = 480;  // the swinging has died down to a thousandth
   const double reference = equilibriumTip(MaterialModel::kStVenantKirchhoff);
   FemOptions options;
   options.linearised = true;
-  for (const ElementType element : {ElementType::kHexEnhanced, ElementType::kHexQ1, ElementType::kTetP1})
+  for (const ElementType element :
+       {ElementType::kHexEnhanced, ElementType::kHexQ1, ElementType::kTetP1})
     for (const int n : {1, 2, 3, 4, 7}) {
       options.element = element;
-      printRest("calipso " + toString(element), runBeam(n, options, kStep, kSteps), kSteps, reference);
+      printRest("calipso " + toString(element), runBeam(n, options, kStep, kSteps), kSteps,
+                reference);
     }
   for (const int n : {1, 2, 3, 4, 5}) {
     const auto wall = std::chrono::steady_clock::now();
     const BulletResult b = runBulletBeam(n, kStep, kSteps);
-    const std::chrono::duration<double, std::milli> passed = std::chrono::steady_clock::now() - wall;
-    printRest("bullet", {b.nodes, b.tip, b.cpu_ms_per_step * kSteps, passed.count()}, kSteps, reference);
+    const std::chrono::duration<double, std::milli> passed =
+        std::chrono::steady_clock::now() - wall;
+    printRest("bullet", {b.nodes, b.tip, b.cpu_ms_per_step * kSteps, passed.count()}, kSteps,
+              reference);
   }
 }
 
@@ -129,7 +136,8 @@ void measureTrajectories() {
       trajectory("tolerance", 4, options, 60, reference);
     }
   for (const MaterialModel material :
-       {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean, MaterialModel::kCorotated}) {
+       {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
+        MaterialModel::kCorotated}) {
     const double own = trajectoryReference(material, 4, 120);
     FemOptions options;
     options.material_model = material;

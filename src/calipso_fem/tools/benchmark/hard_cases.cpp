@@ -25,11 +25,12 @@ struct Setup {
   Material material{1e6, 0.3, 1000.0, 0.0};
   FemOptions options;
   double h = 1.0 / 30.0;
-  int steps = 600, least_steps = 0;   // ends sooner when at rest
+  int steps = 600, least_steps = 0;  // ends sooner when at rest
   bool clamped = true;
   std::function<void(DeformableBody*)> start = [](DeformableBody*) {};
   // May set `load`, the dead nodal forces (3n, N) the body is under from this step on.
-  std::function<void(DeformableBody*, Vec* load, int)> before_step = [](DeformableBody*, Vec*, int) {};
+  std::function<void(DeformableBody*, Vec* load, int)> before_step = [](DeformableBody*, Vec*,
+                                                                        int) {};
 };
 
 double sizeOf(const VolumeMesh& mesh) {
@@ -37,7 +38,8 @@ double sizeOf(const VolumeMesh& mesh) {
 }
 
 // Moves every free node: rest position -> new position.
-void deform(DeformableBody* body, const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& map) {
+void deform(DeformableBody* body,
+            const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& map) {
   Vec x = body->positions();
   for (int i = 0; i < body->nodeCount(); ++i)
     if (!body->isFixed(i)) x.segment<3>(3 * i) = map(body->model().mesh().node(i));
@@ -51,8 +53,8 @@ void stretch(DeformableBody* body) {
 void twist(DeformableBody* body) {
   const Eigen::Vector3d axis(0.0, 0.125, 0.125);
   deform(body, [axis](const Eigen::Vector3d& p) {
-    return Eigen::Vector3d(Eigen::AngleAxisd(4.0 * kPi * p.x(), Eigen::Vector3d::UnitX()) *
-                               (p - axis) + axis);
+    return Eigen::Vector3d(
+        Eigen::AngleAxisd(4.0 * kPi * p.x(), Eigen::Vector3d::UnitX()) * (p - axis) + axis);
   });
 }
 
@@ -156,12 +158,24 @@ const std::map<std::string, std::function<Setup(int)>>& setups() {
       {"squashed flat", with([](Setup* s) { s->start = squash; })},
       {"every node at random", with([](Setup* s) { s->start = scramble; })},
       {"inverted elements", with([](Setup* s) { s->start = invert; })},
-      {"nu = 0.499", with([](Setup* s) { s->material.poissons_ratio = 0.499; s->start = stretch; })},
+      {"nu = 0.499", with([](Setup* s) {
+         s->material.poissons_ratio = 0.499;
+         s->start = stretch;
+       })},
       {"stiffness ratio 1e6", with([](Setup* s) { s->start = stiffnessRatio; })},
-      {"mass x 1000, E x 0.001 and back",
-       with([](Setup* s) { s->start = bump; s->before_step = changeOnline; s->least_steps = 41; })},
-      {"h = 0.2 s", with([](Setup* s) { s->h = 0.2; s->start = stretch; })},
-      {"pulled by 1000 times its weight", with([](Setup* s) { s->before_step = pullHard; s->least_steps = 61; })},
+      {"mass x 1000, E x 0.001 and back", with([](Setup* s) {
+         s->start = bump;
+         s->before_step = changeOnline;
+         s->least_steps = 41;
+       })},
+      {"h = 0.2 s", with([](Setup* s) {
+         s->h = 0.2;
+         s->start = stretch;
+       })},
+      {"pulled by 1000 times its weight", with([](Setup* s) {
+         s->before_step = pullHard;
+         s->least_steps = 61;
+       })},
       {"filled fraction 1e-4", almostEmptyCells},
       {"1 mm object", [](int across) { return scaled(across, 1e-3); }},
       {"100 m object", [](int across) { return scaled(across, 100.0); }},
@@ -180,7 +194,8 @@ double largestDistance(const Vec& a, const Vec& b) {
 bool isAtRest(const DeformableBody& body, double h) {
   const VolumeMesh& mesh = body.model().mesh();
   const double near = 1e-4 * sizeOf(mesh);
-  return largestDistance(body.positions(), restPositions(mesh)) < near && body.isAtRest(near / (30.0 * h));
+  return largestDistance(body.positions(), restPositions(mesh)) < near &&
+         body.isAtRest(near / (30.0 * h));
 }
 
 // Kinetic, elastic, and that of a dead load.
@@ -215,7 +230,9 @@ HardCaseResult runHardCase(const std::string& name, MaterialModel material, int 
   const Momentum start = body.momentum();
   double largest = 0.0;
   const std::clock_t begin = std::clock();
-  const auto seconds = [begin] { return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC; };
+  const auto seconds = [begin] {
+    return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  };
   for (; r.steps < s.steps && r.finite && seconds() < most_cpu_seconds; ++r.steps) {
     // What changes between two steps may change the energy; the step itself may not add any.
     s.before_step(&body, &load, r.steps);
@@ -235,11 +252,11 @@ HardCaseResult runHardCase(const std::string& name, MaterialModel material, int 
   } else {
     const Momentum end = body.momentum();
     const double seconds = r.steps * s.h;
-    r.displacement = (end.center - start.center - seconds * start.linear / body.totalMass()).norm() /
-                     (seconds * start.linear.norm() / body.totalMass());
-    r.momentum_error =
-        std::max((end.linear - start.linear).norm() / start.linear.norm(),
-                 (end.angular - start.angular).norm() / start.angular.norm());
+    r.displacement =
+        (end.center - start.center - seconds * start.linear / body.totalMass()).norm() /
+        (seconds * start.linear.norm() / body.totalMass());
+    r.momentum_error = std::max((end.linear - start.linear).norm() / start.linear.norm(),
+                                (end.angular - start.angular).norm() / start.angular.norm());
   }
   r.recovered = r.finite && r.displacement < 1e-3 && r.momentum_error < 1e-6;
   return r;

@@ -36,9 +36,9 @@ double slideSoftly(double angle, Run& run) {
   scene.surface.friction = kFriction;
   scene.addPlane(normal, 0.0);
   TriangleMesh block = boxSurface({0.2, 0.2, 0.1}, 4);
-  block.vertices = block.vertices * Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY())
-                                        .toRotationMatrix()
-                                        .transpose();
+  block.vertices =
+      block.vertices *
+      Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix().transpose();
   block.vertices.rowwise() += 0.05 * normal.transpose();
   SoftObject& soft = scene.addSoft(block, {1e7, 0.3, 1000.0, 0.01}, 0.05);
   const Eigen::Vector3d start = soft.body().momentum().center;
@@ -96,8 +96,8 @@ std::vector<Result> bounce() {
     params.support.restitution = params.defaults.surface.restitution = e;
     World world(sceneWith(sphereSurface(0.1, 12, 16), {0, 0, 1.1}), params);
     const Eigen::Isometry3d pose(Eigen::Translation3d(0, 0, 1.1));
-    world.addObservedMotion(
-        "thing", {0.0, true, pose, {0, 0, 1.1}, {0, 0, 0}, {0, 0, 0}, {0, 0, -kG}});
+    world.addObservedMotion("thing",
+                            {0.0, true, pose, {0, 0, 1.1}, {0, 0, 0}, {0, 0, 0}, {0, 0, -kG}});
     world.submit(editOf(EditKind::kVelocity, EditMode::kEstimated));
     world.advanceTo(0.0);
     Run run;
@@ -168,9 +168,8 @@ Result hertzWith(int cells) {
   SoftScene scene({5e-3, 200, 1e-8, 12, 1e-7});
   scene.gravity.setZero();
   scene.surface.friction = 0.0;
-  SoftObject& soft = scene.addSoft(
-      test::movedMesh(boxSurface({L, L, L}, cells), {0, 0, -0.5 * L}), {E, nu, 1000.0, 0.0},
-      L / cells);
+  SoftObject& soft = scene.addSoft(test::movedMesh(boxSurface({L, L, L}, cells), {0, 0, -0.5 * L}),
+                                   {E, nu, 1000.0, 0.0}, L / cells);
   DeformableBody& body = soft.body();
   const double start = body.time(), press = 5.0;  // s
   for (int i = 0; i < body.nodeCount(); ++i) {
@@ -185,8 +184,7 @@ Result hertzWith(int cells) {
       });
   }
   scene.addMoving(sphereCap(R, 0.08, 48), [&](double t) {
-    return Eigen::Isometry3d(
-        Eigen::Translation3d(0, 0, -depth * std::min(1.0, t / press)));
+    return Eigen::Isometry3d(Eigen::Translation3d(0, 0, -depth * std::min(1.0, t / press)));
   });
   const int steps = 8;
   for (int k = 0; k < steps; ++k) scene.step(1.0);
@@ -194,7 +192,11 @@ Result hertzWith(int cells) {
   for (const ContactPoint& c : scene.contacts().contacts()) sum -= c.force.z();
   return {"force on a sphere pressed 4 mm into a half-space, " + std::to_string(cells) +
               " cells a side, N",
-          sum, force, scene.deepest() / 5e-3, 0.0, scene.cpuMs() / steps};
+          sum,
+          force,
+          scene.deepest() / 5e-3,
+          0.0,
+          scene.cpuMs() / steps};
 }
 
 std::vector<Result> hertz() { return {hertzWith(8), hertzWith(14), hertzWith(22)}; }

@@ -82,7 +82,7 @@ struct BulletScene {
     cube->m_cfg.kCHR = 1;
     cube->m_cfg.kDF = 0.1;
     cube->m_cfg.collisions = btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN |
-                              btSoftBody::fCollision::VF_DD;
+                             btSoftBody::fCollision::VF_DD;
     cube->getCollisionShape()->setMargin(0.005);
     cube->m_sleepingThreshold = 0;
     world.addSoftBody(cube);
@@ -97,7 +97,10 @@ struct BulletScene {
     std::vector<int> nodes;
     for (int v = 0; v < boundary.vertexCount(); ++v) {
       Eigen::Index node = 0;
-      (mesh.nodes.rowwise() - (boundary.vertex(v) + at).transpose()).rowwise().squaredNorm().minCoeff(&node);
+      (mesh.nodes.rowwise() - (boundary.vertex(v) + at).transpose())
+          .rowwise()
+          .squaredNorm()
+          .minCoeff(&node);
       nodes.push_back(static_cast<int>(node));
     }
     boundary_nodes.push_back(nodes);
@@ -133,7 +136,8 @@ std::vector<Result> cubesAt(int count, int rate) {
     ms += processMs() - before;
     const std::vector<TriangleMesh> surfaces = scene.surfaces();
     for (const TriangleMesh& surface : surfaces) {
-      finite = finite && surface.vertices.allFinite() && surface.vertices.cwiseAbs().maxCoeff() < 100.0;
+      finite =
+          finite && surface.vertices.allFinite() && surface.vertices.cwiseAbs().maxCoeff() < 100.0;
       lowest = std::min(lowest, surface.vertices.col(2).minCoeff());
     }
     if (finite) overlap = std::max(overlap, deepestOverlap(surfaces));

@@ -12,7 +12,7 @@
 // Contact cases with known answers, on the simulator's own code.
 namespace calipso::fem {
 
-constexpr double kG = 9.81;           // m/s^2
+constexpr double kG = 9.81;            // m/s^2
 constexpr double kFrame = 1.0 / 30.0;  // s
 
 struct Result {

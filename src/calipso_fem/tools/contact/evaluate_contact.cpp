@@ -1,6 +1,6 @@
 // Contact cases with known answers, on the simulator's own code. Without arguments all of them run;
-// with arguments, those named; a folder is a scene with its truth (scenes/FORMAT.md). Prints one JSON
-// object per result.
+// with arguments, those named; a folder is a scene with its truth (scenes/FORMAT.md). Prints one
+// JSON object per result.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>

@@ -40,9 +40,12 @@ struct Watch {
 
 Result resultOf(const std::string& quantity, double value, double reference, SoftScene& scene,
                 const Watch& watch, double seconds) {
-  return {quantity,       watch.finite ? value : NAN,
-          reference,      scene.deepest() / kProximity,
-          watch.highest_growth, scene.cpuMs() / (seconds / kFrame)};
+  return {quantity,
+          watch.finite ? value : NAN,
+          reference,
+          scene.deepest() / kProximity,
+          watch.highest_growth,
+          scene.cpuMs() / (seconds / kFrame)};
 }
 
 double lowestVertex(SoftObject& soft) { return soft.vertices().col(2).minCoeff(); }
@@ -51,9 +54,8 @@ std::vector<Result> fastBlockOnThinPlate() {
   SoftScene scene;
   SoftObject& block = scene.addSoft(movedMesh(boxSurface({0.2, 0.2, 0.2}, 12), {0, 0, 0.5}),
                                     {1e5, 0.3, 1000.0, 0.005}, 0.2 / 12, {0, 0, -50});
-  scene.addMoving(boxSurface({1.0, 1.0, 0.002}, 8), [](double) {
-    return Eigen::Isometry3d(Eigen::Translation3d(0, 0, -0.001));
-  });
+  scene.addMoving(boxSurface({1.0, 1.0, 0.002}, 8),
+                  [](double) { return Eigen::Isometry3d(Eigen::Translation3d(0, 0, -0.001)); });
   Watch watch;
   watch.scale = scene.energy();
   double lowest = 1.0;
@@ -69,12 +71,13 @@ std::vector<Result> clothOnEdge() {
   scene.surface.friction = 0.6;
   TriangleMesh cloth = boxSurface({0.4, 0.4, 0.4}, 16);
   cloth.vertices.col(2) *= 0.01;
-  SoftObject& soft = scene.addSoft(movedMesh(cloth, {0.02, 0, 0.006}), {2e5, 0.3, 300.0, 0.02}, 0.025);
+  SoftObject& soft =
+      scene.addSoft(movedMesh(cloth, {0.02, 0, 0.006}), {2e5, 0.3, 300.0, 0.02}, 0.025);
   // A wedge whose edge carries it, along y.
   TriangleMesh box = boxSurface({0.2, 0.6, 0.2}, 6);
-  box.vertices = box.vertices * Eigen::AngleAxisd(M_PI / 4, Eigen::Vector3d::UnitY())
-                                    .toRotationMatrix()
-                                    .transpose();
+  box.vertices =
+      box.vertices *
+      Eigen::AngleAxisd(M_PI / 4, Eigen::Vector3d::UnitY()).toRotationMatrix().transpose();
   scene.addMoving(movedMesh(box, {0, 0, -0.1 * std::sqrt(2.0)}),
                   [](double) { return Eigen::Isometry3d::Identity(); });
   Watch watch;
@@ -83,19 +86,22 @@ std::vector<Result> clothOnEdge() {
   // Nothing of it is inside the wedge |x| < -z.
   double deepest = 0.0;
   for (int v = 0; v < soft.vertices().rows(); ++v)
-    deepest = std::max(deepest, (-soft.vertices()(v, 2) - std::abs(soft.vertices()(v, 0))) /
-                                    std::sqrt(2.0));
-  return {resultOf("depth of a cloth in the edge it hangs over, m", deepest, 0.0, scene, watch, 3.0)};
+    deepest = std::max(deepest,
+                       (-soft.vertices()(v, 2) - std::abs(soft.vertices()(v, 0))) / std::sqrt(2.0));
+  return {
+      resultOf("depth of a cloth in the edge it hangs over, m", deepest, 0.0, scene, watch, 3.0)};
 }
 
-// NOTE: a column of one piece buckles under its own weight above (7.84 E I / q)^(1/3): 1.4 m for these.
+// NOTE: a column of one piece buckles under its own weight above (7.84 E I / q)^(1/3): 1.4 m for
+// these.
 std::vector<Result> stackOfFive() {
   SoftScene scene;
   scene.surface.friction = 0.5;
   scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
   for (int i = 0; i < 5; ++i)
-    scene.addSoft(movedMesh(boxSurface({0.2, 0.2, 0.2}, 4), {0.005 * (i % 2), 0, 0.101 + 0.201 * i}),
-                  {5e5, 0.3, 500.0, 0.02}, 0.05);
+    scene.addSoft(
+        movedMesh(boxSurface({0.2, 0.2, 0.2}, 4), {0.005 * (i % 2), 0, 0.101 + 0.201 * i}),
+        {5e5, 0.3, 500.0, 0.02}, 0.05);
   Watch watch;
   watch.scale = 5 * 4.0 * kG * 0.5;
   watch.play(scene, 60.0, kFrame);
@@ -110,9 +116,10 @@ std::vector<Result> stackOfFive() {
           resultOf("speed of the fastest of them then, m/s", slowest, 0.0, scene, watch, 60.0)};
 }
 
-// A heavy block lies on a light one of a thousandth of its density, both as stiff as needed to carry it.
-// NOTE: with E = 2e5 the light one would buckle: a column of length L that carries its load P half as far again
-// above its end holds up to P = z^2 E I / L^2, z tan z = 2, z = 1.077, less for its shearing: 620 N of the 785 N.
+// A heavy block lies on a light one of a thousandth of its density, both as stiff as needed to
+// carry it. NOTE: with E = 2e5 the light one would buckle: a column of length L that carries its
+// load P half as far again above its end holds up to P = z^2 E I / L^2, z tan z = 2, z = 1.077,
+// less for its shearing: 620 N of the 785 N.
 std::vector<Result> heavyOnLight() {
   constexpr double kLight = 1e6;  // Pa
   std::vector<Result> results;
@@ -145,8 +152,8 @@ std::vector<Result> frictionExtremes() {
   };
   std::vector<Result> results;
   // The way of a soft block comes near the rigid one's as it becomes stiff.
-  for (const auto& [mu, youngs_modulus, rate] :
-       {Case{0.0, 1e6, 480.0}, Case{2.0, 1e6, 480.0}, Case{2.0, 1e7, 1920.0}, Case{2.0, 1e8, 1920.0}}) {
+  for (const auto& [mu, youngs_modulus, rate] : {Case{0.0, 1e6, 480.0}, Case{2.0, 1e6, 480.0},
+                                                 Case{2.0, 1e7, 1920.0}, Case{2.0, 1e8, 1920.0}}) {
     SoftScene scene;
     scene.surface.friction = mu;
     scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
@@ -159,9 +166,10 @@ std::vector<Result> frictionExtremes() {
     const double way = soft.body().momentum().center.x();
     // Without friction 1 m; with friction 2 the block stands after v^2 / 2 mu g if it does not tip.
     std::ostringstream what;
-    what << "way of a block of " << youngs_modulus << " Pa at 1 m/s in 1 s, friction " << mu << ", m";
-    results.push_back(resultOf(what.str(),
-                               way, mu == 0.0 ? 1.0 : 1.0 / (4.0 * kG), scene, watch, 1.0));
+    what << "way of a block of " << youngs_modulus << " Pa at 1 m/s in 1 s, friction " << mu
+         << ", m";
+    results.push_back(
+        resultOf(what.str(), way, mu == 0.0 ? 1.0 : 1.0 / (4.0 * kG), scene, watch, 1.0));
   }
   return results;
 }
@@ -170,8 +178,7 @@ std::vector<Result> squeezed() {
   SoftScene scene;
   scene.gravity.setZero();
   scene.surface.friction = 0.3;
-  SoftObject& soft =
-      scene.addSoft(boxSurface({0.2, 0.2, 0.2}, 5), {1e5, 0.3, 1000.0, 0.02}, 0.04);
+  SoftObject& soft = scene.addSoft(boxSurface({0.2, 0.2, 0.2}, 5), {1e5, 0.3, 1000.0, 0.02}, 0.04);
   const TriangleMesh plate = boxSurface({0.5, 0.5, 0.02}, 8);
   for (const double side : {1.0, -1.0})
     scene.addMoving(plate, [side](double t) {
@@ -189,11 +196,13 @@ std::vector<Result> squeezed() {
   watch.scale = most;
   const double squeezed_height = height;
   watch.play(scene, 3.0, 1.0 / 60.0);
-  const Eigen::VectorXd along = soft.vertices() * soft.motion().linear().col(2);  // it has got some spin
+  const Eigen::VectorXd along =
+      soft.vertices() * soft.motion().linear().col(2);  // it has got some spin
   height = along.maxCoeff() - along.minCoeff();
-  return {resultOf("height of a block squeezed between plates 0.1 m apart, m", squeezed_height, 0.1002,
-                   scene, watch, 4.5),
-          resultOf("its height along its own axis 3 s after the plates have opened, m", height, 0.2, scene, watch, 4.5)};
+  return {resultOf("height of a block squeezed between plates 0.1 m apart, m", squeezed_height,
+                   0.1002, scene, watch, 4.5),
+          resultOf("its height along its own axis 3 s after the plates have opened, m", height, 0.2,
+                   scene, watch, 4.5)};
 }
 
 // Two blocks that overlap by 2 cm from the start are pushed apart without a kick.
@@ -205,13 +214,15 @@ std::vector<Result> overlapAtStart() {
                                 {1e5, 0.3, 1000.0, 0.02}, 0.05);
   Watch watch;
   double fastest = 0.0;
-  watch.play(scene, 2.0, 1.0 / 60.0,
-             [&](double) { fastest = std::max({fastest, a.fastest(), b.fastest()}); });
+  watch.play(scene, 2.0, 1.0 / 60.0, [&](double) {
+    fastest = std::max({fastest, a.fastest(), b.fastest()});
+  });
   double deepest = 0.0;
   for (int v = 0; v < a.vertices().rows(); ++v)
     if (const auto hit = b.tree().nearest(a.vertices().row(v).transpose(), 0.1))
       deepest = std::max(deepest, -hit->distance);
-  return {resultOf("fastest vertex while overlapping blocks part, m/s", fastest, 0.0, scene, watch, 2.0),
+  return {resultOf("fastest vertex while overlapping blocks part, m/s", fastest, 0.0, scene, watch,
+                   2.0),
           resultOf("their overlap after 2 s, m", deepest, 0.0, scene, watch, 2.0)};
 }
 

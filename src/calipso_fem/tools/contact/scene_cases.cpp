@@ -7,7 +7,8 @@
 #include "calipso_scene/scene.hpp"
 #include "contact_cases.hpp"
 
-// A scene folder whose truth is known: shapes, poses and, of thrown objects, motion are the true ones.
+// A scene folder whose truth is known: shapes, poses and, of thrown objects, motion are the true
+// ones.
 namespace calipso::fem {
 namespace {
 
@@ -65,10 +66,10 @@ std::vector<Result> follow(const Scene& scene, const YAML::Node& truth, size_t k
   params.support.restitution = params.defaults.surface.restitution = restitution;
   World world(start, params);
   const std::string name = start.objects[k].name;
-  world.addObservedMotion(name, {0.0, true, start.objects[k].world_from_object,
-                                 vectorOf(t["com_position_world"][0]),
-                                 vectorOf(t["linear_velocity_com"][0]),
-                                 vectorOf(t["angular_velocity_world"][0]), scene.gravity});
+  world.addObservedMotion(
+      name, {0.0, true, start.objects[k].world_from_object, vectorOf(t["com_position_world"][0]),
+             vectorOf(t["linear_velocity_com"][0]), vectorOf(t["angular_velocity_world"][0]),
+             scene.gravity});
   Edit simulate = editOf(EditKind::kVelocity, EditMode::kEstimated);
   simulate.object = name;
   world.submit(simulate);
@@ -79,9 +80,8 @@ std::vector<Result> follow(const Scene& scene, const YAML::Node& truth, size_t k
   double worst = 0.0, touched = NAN, late = 0.0;
   int frame = 0;
   run.play(world, (scene.frame_count - 1) / scene.fps, [&](const WorldState& s) {
-    const double error =
-        meanPixelError(scene.camera, s.objects[k].vertices, start.objects[k].mesh,
-                       poseOf(t["world_T_object"][++frame]));
+    const double error = meanPixelError(scene.camera, s.objects[k].vertices, start.objects[k].mesh,
+                                        poseOf(t["world_T_object"][++frame]));
     (s.time < impact ? worst : late) = std::max(s.time < impact ? worst : late, error);
     if (std::isnan(touched) && !s.first_touches.empty()) touched = s.first_touches.front().time;
   });
@@ -122,11 +122,13 @@ std::vector<Result> drop(const Scene& scene, const YAML::Node& truth) {
   run.play(world, 1.0 / scene.fps);
   const WorldState next = world.state();
   for (const int k : {0, 1}) {
-    fastest = std::max(fastest, scene.fps * (next.objects[k].vertices - end.objects[k].vertices)
-                                                .rowwise().norm().maxCoeff());
+    fastest = std::max(
+        fastest,
+        scene.fps *
+            (next.objects[k].vertices - end.objects[k].vertices).rowwise().norm().maxCoeff());
     for (const SupportPlane& plane : scene.planes)
-      lowest = std::min(lowest, ((end.objects[k].vertices * plane.normal).array() - plane.offset)
-                                    .minCoeff());
+      lowest = std::min(
+          lowest, ((end.objects[k].vertices * plane.normal).array() - plane.offset).minCoeff());
   }
   double overlap = 0.0;
   TriangleMesh under = start.objects[1].mesh;
@@ -157,7 +159,8 @@ std::vector<Result> sceneCase(const std::string& directory) {
     }
   if (results.empty() && scene.objects.size() >= 2) results = drop(scene, truth);
   if (results.empty())
-    throw std::invalid_argument(directory + ": nothing in it is thrown, and there are no two objects");
+    throw std::invalid_argument(directory +
+                                ": nothing in it is thrown, and there are no two objects");
   return results;
 }
 

@@ -67,7 +67,8 @@ struct Course {
       if (k % kEvery == 0) look(surface, soft.vertices(), self);
     }
   }
-  void look(TriangleMesh surface, const decltype(TriangleMesh::vertices)& vertices, const SelfProximity& self) {
+  void look(TriangleMesh surface, const decltype(TriangleMesh::vertices)& vertices,
+            const SelfProximity& self) {
     surface.vertices = vertices;
     last = overlapOf(surface, self);
     worst = {std::max(worst.depth, last.depth), std::max(worst.edges, last.edges)};
@@ -89,7 +90,8 @@ std::vector<Result> resultsOf(const std::string& what, const Course& c, SoftScen
 }
 
 template <class Build>
-std::vector<Result> offAndOn(const std::string& what, double seconds, const Build& build, double driven = 0.0) {
+std::vector<Result> offAndOn(const std::string& what, double seconds, const Build& build,
+                             double driven = 0.0) {
   std::vector<Result> results;
   for (const bool on : {false, true}) {
     SoftScene scene;
@@ -111,9 +113,11 @@ std::vector<Result> clothOverBar() {
   return offAndOn("cloth over a bar", 4.0, [](SoftScene& scene) -> SoftObject& {
     scene.surface.friction = 0.5;
     const TriangleMesh sheet = boxSurface({0.6, 0.3, 0.004}, Eigen::Vector3i(30, 15, 1));
-    SoftObject& cloth = scene.addSoft(movedMesh(sheet, {0.01, 0, 0.004}), {5e3, 0.3, 300.0, 0.02}, 0.02);
-    scene.addMoving(movedMesh(boxSurface({0.006, 0.5, 0.02}, Eigen::Vector3i(1, 25, 1)), {0, 0, -0.01}),
-                    [](double) { return Eigen::Isometry3d::Identity(); });
+    SoftObject& cloth =
+        scene.addSoft(movedMesh(sheet, {0.01, 0, 0.004}), {5e3, 0.3, 300.0, 0.02}, 0.02);
+    scene.addMoving(
+        movedMesh(boxSurface({0.006, 0.5, 0.02}, Eigen::Vector3i(1, 25, 1)), {0, 0, -0.01}),
+        [](double) { return Eigen::Isometry3d::Identity(); });
     return cloth;
   });
 }
@@ -122,25 +126,31 @@ std::vector<Result> ribbonOnTable() {
   return offAndOn("ribbon set down on end", 3.0, [](SoftScene& scene) -> SoftObject& {
     scene.surface.friction = 0.4;
     scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
-    const TriangleMesh ribbon =
-        turned(boxSurface({0.6, 0.2, 0.004}, Eigen::Vector3i(30, 10, 1)), -1.55, Eigen::Vector3d::UnitY());
+    const TriangleMesh ribbon = turned(boxSurface({0.6, 0.2, 0.004}, Eigen::Vector3i(30, 10, 1)),
+                                       -1.55, Eigen::Vector3d::UnitY());
     return scene.addSoft(movedMesh(ribbon, {0, 0, 0.31}), kCloth, 0.02);
   });
 }
 
 std::vector<Result> horseshoeSqueezed() {
-  return offAndOn("horseshoe squeezed between plates", 3.0, [](SoftScene& scene) -> SoftObject& {
-    scene.gravity.setZero();
-    scene.surface.friction = 0.3;
-    SoftObject& soft = scene.addSoft(horseshoe(0.15, 0.05, 0.03, 0.06, Eigen::Vector3i(32, 4, 2)),
-                                     {1e5, 0.3, 1000.0, 0.02}, 0.015);
-    for (const double side : {1.0, -1.0})
-      scene.addMoving(movedMesh(boxSurface({0.02, 0.3, 0.12}, {1, 12, 6}), {0, 0, -0.12}), [side](double t) {
-        const double close = std::min(1.0, t / 1.5);
-        return Eigen::Isometry3d(Eigen::Translation3d(side * (0.0755 - 0.05 * close), 0, 0));
-      });
-    return soft;
-  }, 1.5);
+  return offAndOn(
+      "horseshoe squeezed between plates", 3.0,
+      [](SoftScene& scene) -> SoftObject& {
+        scene.gravity.setZero();
+        scene.surface.friction = 0.3;
+        SoftObject& soft =
+            scene.addSoft(horseshoe(0.15, 0.05, 0.03, 0.06, Eigen::Vector3i(32, 4, 2)),
+                          {1e5, 0.3, 1000.0, 0.02}, 0.015);
+        for (const double side : {1.0, -1.0})
+          scene.addMoving(movedMesh(boxSurface({0.02, 0.3, 0.12}, {1, 12, 6}), {0, 0, -0.12}),
+                          [side](double t) {
+                            const double close = std::min(1.0, t / 1.5);
+                            return Eigen::Isometry3d(
+                                Eigen::Translation3d(side * (0.0755 - 0.05 * close), 0, 0));
+                          });
+        return soft;
+      },
+      1.5);
 }
 
 // A flag whose middle line is held: wind folds its halves onto each other behind it.
@@ -172,9 +182,11 @@ std::vector<Result> flagInWind() {
     run.play(world, seconds, [&](const WorldState& state) {
       if (run.frames % 4 == 0) course.look(flag, state.objects[0].vertices, self);
     });
-    const std::string with = std::string("flag folded by wind, self-contact ") + (on ? "on" : "off");
+    const std::string with =
+        std::string("flag folded by wind, self-contact ") + (on ? "on" : "off");
     for (const auto& [what, value] : course.figures())
-      results.push_back({what + with, value, 0.0, course.worst.depth / kProximity, NAN, run.msPerFrame()});
+      results.push_back(
+          {what + with, value, 0.0, course.worst.depth / kProximity, NAN, run.msPerFrame()});
   }
   return results;
 }

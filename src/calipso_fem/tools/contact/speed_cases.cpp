@@ -18,8 +18,8 @@ void addCubes(SoftScene& scene, int count) {
   scene.surface.friction = 0.1;
   scene.addPlane(Eigen::Vector3d::UnitZ(), 0.0);
   for (int i = 0; i < count; ++i)
-    scene.addSoft(movedMesh(boxSurface({0.5, 0.5, 0.5}, 7), i == 0 ? Eigen::Vector3d(0, 0, 0.5)
-                                                                   : Eigen::Vector3d(0.03, 0.02, 1.2)),
+    scene.addSoft(movedMesh(boxSurface({0.5, 0.5, 0.5}, 7),
+                            i == 0 ? Eigen::Vector3d(0, 0, 0.5) : Eigen::Vector3d(0.03, 0.02, 1.2)),
                   {1e5, 0.3, 1000.0, 0.01}, 0.5 / 7);
 }
 
@@ -102,8 +102,8 @@ WorldScene pyramidOf(const TriangleMesh& mesh, double pitch) {
     for (int i = 0; i < 10 - row; ++i) {
       WorldObject o = first;
       o.name = "cup" + std::to_string(id++);
-      o.world_from_object.translation() = Eigen::Vector3d(
-          pitch * size.x() * (i + 0.5 * row), 0, 0.6 * size.z() + 1.1 * size.z() * row);
+      o.world_from_object.translation() = Eigen::Vector3d(pitch * size.x() * (i + 0.5 * row), 0,
+                                                          0.6 * size.z() + 1.1 * size.z() * row);
       scene.objects.push_back(o);
     }
   return scene;
@@ -135,8 +135,8 @@ std::vector<Result> pyramidAt(double rate) {
   for (const ObjectSnapshot& o : world.state().objects)
     lowest = std::min(lowest, o.vertices.col(2).minCoeff());
   const std::string h = ", h = 1/" + std::to_string(std::lround(rate)) + ", ms";
-  return {{"55 cups falling as a pyramid, wall time per frame" + h, falling.wallMsPerFrame(), 15.0, 0, 0,
-           falling.msPerFrame()},
+  return {{"55 cups falling as a pyramid, wall time per frame" + h, falling.wallMsPerFrame(), 15.0,
+           0, 0, falling.msPerFrame()},
           {"slowest frame of it" + h, falling.slowest_wall_ms, 15.0, 0, 0, falling.slowest_ms},
           {"lowest point of the cups after 6 s, m", lowest, 0.0, 0, 0, settling.msPerFrame()}};
 }
@@ -166,9 +166,9 @@ std::vector<Result> asleep() {
   resting.play(world, 2.0);
   int awake = 0;
   for (const ObjectSnapshot& o : world.state().objects) awake += !o.sleeping;
-  return {{"100 sleeping bodies, ms per frame", resting.msPerFrame(), 0.3, 0, 0,
-           resting.msPerFrame()},
-          {"of them awake", static_cast<double>(awake), 0.0, 0, 0, resting.msPerFrame()}};
+  return {
+      {"100 sleeping bodies, ms per frame", resting.msPerFrame(), 0.3, 0, 0, resting.msPerFrame()},
+      {"of them awake", static_cast<double>(awake), 0.0, 0, 0, resting.msPerFrame()}};
 }
 
 }  // namespace

@@ -15,7 +15,8 @@ Eigen::Vector3d readTraction(const CaseFile& file) {
   throw std::runtime_error(file.path + ": traction: no dead_traction_per_reference_area");
 }
 
-// The last part of a quantity's name tells of the grid: equal cells, or "@graded" towards the clamped end.
+// The last part of a quantity's name tells of the grid: equal cells, or "@graded" towards the
+// clamped end.
 void runBox(const CaseFile& file, const std::string& kind, ElementType element,
             const Eigen::Vector3i& cells, const YAML::Node& reference, bool graded = false) {
   const Box box = readBox(file);
@@ -51,7 +52,8 @@ void evaluateBoxLoads(const CaseFile& file) {
              readCells(file, r), r);
     });
   if (!converged(file).IsMap()) return;
-  // Parts of different stiffness meet at cell faces of the equal grid; a graded one would move them.
+  // Parts of different stiffness meet at cell faces of the equal grid; a graded one would move
+  // them.
   const bool uniform = readText(file, file.root, "family") == "H";
   for (const Eigen::Vector3i& cells : gridsOf(file))
     for (const bool graded : {false, true})

@@ -12,7 +12,7 @@ namespace {
 // extruded along z. Its first and third side run along y.
 struct Panel {
   Eigen::Matrix<double, 4, 2> corners;
-  double low = 0.0, high = 1.0;   // z
+  double low = 0.0, high = 1.0;  // z
 };
 
 // Reads "corners (0,0),(48,44),(48,60),(0,44) in x-y, extruded z in [0,1]".
@@ -31,7 +31,8 @@ Panel readPanel(const CaseFile& file) {
     panel.corners.row(k) << std::stod((*it)[1]), std::stod((*it)[2]);
   }
   if (!std::regex_search(text, z, range))
-    throw std::runtime_error(file.path + ": geometry: expected 'z in [low,high]' in '" + text + "'");
+    throw std::runtime_error(file.path + ": geometry: expected 'z in [low,high]' in '" + text +
+                             "'");
   panel.low = std::stod(z[1]);
   panel.high = std::stod(z[2]);
   return panel;
@@ -53,7 +54,8 @@ void support(const CaseFile& file, const Panel& panel, DeformableBody* body) {
   const VolumeMesh& mesh = body->model().mesh();
   const std::string bc = readText(file, file.root, "bc");
   const std::size_t at = bc.find("u_z=0");
-  const std::string rule = at == std::string::npos ? "" : bc.substr(at, bc.find_first_of(";,(", at) - at);
+  const std::string rule =
+      at == std::string::npos ? "" : bc.substr(at, bc.find_first_of(";,(", at) - at);
   const auto slide = [&](double z) {
     for (int node : nodesOnPlane(mesh, 2, z)) body->prescribe(node, 2, [](double) { return 0.0; });
   };

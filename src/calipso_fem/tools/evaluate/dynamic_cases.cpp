@@ -32,8 +32,8 @@ Scheme parseScheme(const std::string& key, MaterialModel model) {
 }
 
 struct Trajectory {
-  NodeMatrix center, corner;   // samples x 3, m
-  double kinetic = 0.0, elastic = 0.0;   // at the end, J
+  NodeMatrix center, corner;            // samples x 3, m
+  double kinetic = 0.0, elastic = 0.0;  // at the end, J
   ResultLine line;
 };
 
@@ -74,8 +74,8 @@ void printTrajectory(ResultLine line, const NodeMatrix& value, const YAML::Node&
                              std::to_string(value.rows()) + " samples of three numbers");
   line.value = value.row(value.rows() - 1).transpose();
   line.reference = reference.row(reference.rows() - 1).transpose();
-  line.error = (value - reference).rowwise().norm().maxCoeff() /
-               reference.rowwise().norm().maxCoeff();
+  line.error =
+      (value - reference).rowwise().norm().maxCoeff() / reference.rowwise().norm().maxCoeff();
   print(line);
 }
 
@@ -120,9 +120,9 @@ void evaluateDynamics(const CaseFile& file) {
     });
   }
   if (!converged(file).IsMap()) return;
-  for (const char* key : {"lumped_IE_h1/30_newton", "lumped_IE_h1/120_newton",
-                          "lumped_trapezoidal_dt1/120", "consistent_trapezoidal_dt1/120",
-                          "lumped_trapezoidal_dt1/480"})
+  for (const char* key :
+       {"lumped_IE_h1/30_newton", "lumped_IE_h1/120_newton", "lumped_trapezoidal_dt1/120",
+        "consistent_trapezoidal_dt1/120", "lumped_trapezoidal_dt1/480"})
     attempt(file.path, [&] { runDefault(file, key, "space_time_converged"); });
   for (const char* step : {"h1/30", "h1/120"})
     attempt(file.path, [&] {

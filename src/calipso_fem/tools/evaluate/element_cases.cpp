@@ -38,8 +38,8 @@ void show(const ElementCase& c, const std::string& model, const std::string& qua
     throw std::runtime_error(c.file.path + ": " + model + ": " + quantity + ": expected " +
                              std::to_string(value.rows()) + " x " + std::to_string(value.cols()) +
                              " numbers");
-  ResultLine line = lineFor(c.file, "same_discretisation", c.element, MaterialModel::kLinear,
-                            c.mesh.nodeCount());
+  ResultLine line =
+      lineFor(c.file, "same_discretisation", c.element, MaterialModel::kLinear, c.mesh.nodeCount());
   line.material = model;
   line.solver = "none";
   line.steps = 0;
@@ -52,9 +52,8 @@ void show(const ElementCase& c, const std::string& model, const std::string& qua
 void checkModel(const ElementCase& c, const std::string& name, MaterialModel model,
                 const YAML::Node& expected) {
   const ElasticModel elastic(c.mesh, c.material, model, c.element);
-  const double rest =
-      restEnergyDensity(model, lameParameters(c.material)) * elastic.totalMass() /
-      c.material.density;
+  const double rest = restEnergyDensity(model, lameParameters(c.material)) * elastic.totalMass() /
+                      c.material.density;
   show(c, name, "energy", scalar(elastic.energy(c.x) + rest), expected["energy"]);
   Vec f;
   elastic.gradient(c.x, f);
@@ -83,19 +82,19 @@ void evaluateElements(const CaseFile& file) {
   const Eigen::MatrixXd displacement = readMatrix(file.at("displacement_u"));
   if ((nodes.rows() != 8 && nodes.rows() != 4) || nodes.cols() != 3 ||
       displacement.rows() != nodes.rows() || displacement.cols() != 3)
-    throw std::runtime_error(file.path + ": nodes_X and displacement_u: expected 4 or 8 points each");
+    throw std::runtime_error(file.path +
+                             ": nodes_X and displacement_u: expected 4 or 8 points each");
   const NodeMatrix moved = nodes + displacement;
   ElementCase c{file, oneCell(nodes), Eigen::Map<const Vec>(moved.data(), moved.size()),
-                readMaterial(file),
-                nodes.rows() == 8 ? ElementType::kHexQ1 : ElementType::kTetP1};
+                readMaterial(file), nodes.rows() == 8 ? ElementType::kHexQ1 : ElementType::kTetP1};
   for (const auto& entry : file.at("models"))
     attempt(file.path, [&] {
       const std::string name = entry.first.as<std::string>();
       if (name == "corotated_warped_stiffness") return checkWarped(c, entry.second);
-      checkModel(c, name,
-                 name == "corotated_energy" ? MaterialModel::kCorotated
-                                            : materialModelFromString(name),
-                 entry.second);
+      checkModel(
+          c, name,
+          name == "corotated_energy" ? MaterialModel::kCorotated : materialModelFromString(name),
+          entry.second);
     });
   const ElasticModel elastic(c.mesh, c.material, MaterialModel::kLinear, c.element);
   show(c, "linear", "rest_stiffness", Eigen::MatrixXd(elastic.linearStiffness()),

@@ -1,6 +1,6 @@
 // Runs reference cases (files or folders of JSON) through the finite element core and prints one
-// JSON object per result. What cannot be read or solved is named on standard error, the rest goes on;
-// the exit code is then 1.
+// JSON object per result. What cannot be read or solved is named on standard error, the rest goes
+// on; the exit code is then 1.
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
@@ -26,9 +26,9 @@ std::vector<std::string> caseFiles(const std::string& path) {
 void evaluateFile(const std::string& path) {
   using Evaluator = void (*)(const CaseFile&);
   static const std::map<std::string, Evaluator> kFamilies = {
-      {"A", evaluateBoxLoads}, {"B", evaluateBoxLoads},    {"C", evaluateTorsion},
+      {"A", evaluateBoxLoads},    {"B", evaluateBoxLoads}, {"C", evaluateTorsion},
       {"D", evaluateHomogeneous}, {"E", evaluateCook},     {"F", evaluateDynamics},
-      {"G", evaluateModes},    {"H", evaluateBoxLoads},    {"I", evaluateShapes},
+      {"G", evaluateModes},       {"H", evaluateBoxLoads}, {"I", evaluateShapes},
       {"J", evaluateElements}};
   const CaseFile file = readCase(path);
   const std::string family = readText(file, file.root, "family");

@@ -45,8 +45,7 @@ void runState(const CaseFile& file, const std::string& kind, ElementType element
   Material material = readMaterial(file);
   material.poissons_ratio = readNumber(file, state, "nu");
   const MaterialModel model = materialModelFromString(readText(file, state, "model"));
-  DeformableBody body(boxMesh(box.min, box.max, {4, 2, 2}), material,
-                      exactOptions(model, element));
+  DeformableBody body(boxMesh(box.min, box.max, {4, 2, 2}), material, exactOptions(model, element));
   support(file, state, box, &body);
   const StepReport report = body.solveStatic();
 
@@ -60,8 +59,8 @@ void runState(const CaseFile& file, const std::string& kind, ElementType element
     if (state[name]) printQuantity(line, name + suffix, scalar(value), state[name]);
   };
   const double force = faceForce(body, 0, box.max.x()), volume = extent.prod();
-  const double energy = body.elasticEnergy() +
-                        restEnergyDensity(model, lameParameters(material)) * volume;
+  const double energy =
+      body.elasticEnergy() + restEnergyDensity(model, lameParameters(material)) * volume;
   const Eigen::Vector3d u = displacementAt(mesh, body.positions(), box.max) -
                             displacementAt(mesh, body.positions(), box.min);
   show("axial_force", force);

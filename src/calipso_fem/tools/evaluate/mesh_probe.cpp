@@ -35,9 +35,10 @@ Vector3d invertMap(const Eigen::MatrixXd& corners, const Vector3d& p) {
     Eigen::Matrix3d J;
     constexpr double kStep = 1e-3;
     for (int a = 0; a < 3; ++a)
-      J.col(a) = corners.transpose() *
-                 (shape(xi + kStep * Vector3d::Unit(a), n) - shape(xi - kStep * Vector3d::Unit(a), n)) /
-                 (2.0 * kStep);
+      J.col(a) =
+          corners.transpose() *
+          (shape(xi + kStep * Vector3d::Unit(a), n) - shape(xi - kStep * Vector3d::Unit(a), n)) /
+          (2.0 * kStep);
     const Vector3d d = J.inverse() * r;
     xi -= d;
     if (d.norm() < 1e-14) break;
@@ -51,9 +52,10 @@ Eigen::MatrixXd cornersOf(const VolumeMesh& mesh, int cell) {
   return corners;
 }
 
-// Area-weighted load of one face with the given corners, equally to all of them: exact for triangles
-// and parallelograms.
-void addFace(const VolumeMesh& mesh, const std::vector<int>& face, const Vector3d& traction, Vec* f) {
+// Area-weighted load of one face with the given corners, equally to all of them: exact for
+// triangles and parallelograms.
+void addFace(const VolumeMesh& mesh, const std::vector<int>& face, const Vector3d& traction,
+             Vec* f) {
   const auto at = [&](int k) { return mesh.node(face[k]); };
   double area = 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
   // The four corners of a lattice face come in the order 00, 10, 01, 11.

@@ -26,8 +26,8 @@ void runModes(const CaseFile& file, const std::string& kind, ElementType element
   line.reference = reference;
   line.newton_iterations = modes.iterations;
   line.error = (modes.frequencies - reference).cwiseQuotient(reference).cwiseAbs().maxCoeff();
-  line.ms_per_step = std::chrono::duration<double, std::milli>(
-                         std::chrono::steady_clock::now() - start).count();
+  line.ms_per_step =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   print(line);
 }
 

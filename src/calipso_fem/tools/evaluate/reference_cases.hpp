@@ -18,7 +18,7 @@ void evaluateShapes(const CaseFile& file);       // I
 void evaluateElements(const CaseFile& file);     // J
 
 // The two ways the elements of the reference tables are named.
-ElementType referenceElement(const std::string& name);   // Q1 or P1
+ElementType referenceElement(const std::string& name);  // Q1 or P1
 
 // Options for comparison with tables: converged far beyond what they list.
 FemOptions exactOptions(MaterialModel model, ElementType element);

@@ -12,9 +12,9 @@ constexpr double kPi = 3.14159265358979323846;
 // A shape in the world, and where it is held and looked at.
 struct EmbeddedShape {
   TriangleMesh surface;
-  std::function<double(const Eigen::Vector3d&)> beyond_clamp;   // <= 0: held
-  Eigen::Vector3d clamp_point, clamp_normal;                    // of the clamped face
-  bool clamp_on_lattice = false;                                // the face lies in a lattice plane
+  std::function<double(const Eigen::Vector3d&)> beyond_clamp;  // <= 0: held
+  Eigen::Vector3d clamp_point, clamp_normal;                   // of the clamped face
+  bool clamp_on_lattice = false;                               // the face lies in a lattice plane
   Eigen::Vector3d tip;
 };
 
@@ -81,7 +81,8 @@ EmbeddedShape rotatedBox(const CaseFile& file, const YAML::Node& g) {
   const char* axes[] = {"x", "y", "z"};
   for (int a = 0; a < 3; ++a) {
     const Eigen::VectorXd range = readVector(require(file, b, axes[a]));
-    if (range.size() != 2) throw std::runtime_error(file.path + ": local_box: expected [low, high]");
+    if (range.size() != 2)
+      throw std::runtime_error(file.path + ": local_box: expected [low, high]");
     low[a] = range[0];
     high[a] = range[1];
   }
@@ -122,8 +123,9 @@ EmbeddedShape surfaceFile(const CaseFile& file, const YAML::Node& g) {
   return shape;
 }
 
-// A node belongs to the clamped face when the face lies nearer to it than to the next node along the
-// lattice axis closest to the face's normal: held nodes end on average in the face, not before it.
+// A node belongs to the clamped face when the face lies nearer to it than to the next node along
+// the lattice axis closest to the face's normal: held nodes end on average in the face, not before
+// it.
 void holdClamp(const EmbeddedShape& shape, DeformableBody* body) {
   const VolumeMesh& mesh = body->model().mesh();
   const double half =
@@ -144,8 +146,8 @@ void runShape(const CaseFile& file, const EmbeddedShape& shape, int target_nodes
   NodeMatrix tip(1, 3);
   tip.row(0) = shape.tip.transpose();
   const Embedding probe = embed(tip, body.grid());
-  ResultLine line = lineFor(file, "default", options.element, options.material_model,
-                            body.nodeCount());
+  ResultLine line =
+      lineFor(file, "default", options.element, options.material_model, body.nodeCount());
   addReport(report, &line);
   const YAML::Node reference = file.at("reference");
   if (reference["tip"])

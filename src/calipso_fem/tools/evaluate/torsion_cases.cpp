@@ -25,8 +25,7 @@ void printTorsion(const TorsionRun& run, const DeformableBody& body, const std::
     torque += x.cross(f).x();
     axial += f.x();
   }
-  ResultLine line =
-      lineFor(run.file, run.kind, run.element, readModel(run.file), body.nodeCount());
+  ResultLine line = lineFor(run.file, run.kind, run.element, readModel(run.file), body.nodeCount());
   addReport(report, &line);
   const std::string suffix = "@" + std::to_string(std::lround(degrees)) + "deg";
   const auto show = [&](const std::string& name, const Eigen::VectorXd& value,
@@ -42,8 +41,8 @@ void printTorsion(const TorsionRun& run, const DeformableBody& body, const std::
   show("mid_corner", displacementAt(body.model().mesh(), body.positions(), corner), expected);
 }
 
-// Twists in equal parts of at most 15 degrees; a trial state turned by the whole angle at once would
-// start inverted.
+// Twists in equal parts of at most 15 degrees; a trial state turned by the whole angle at once
+// would start inverted.
 void runTorsion(const TorsionRun& run, const std::vector<YAML::Node>& references) {
   const Box box = readBox(run.file);
   DeformableBody body(boxMesh(box.min, box.max, run.cells), readMaterial(run.file),
@@ -52,7 +51,8 @@ void runTorsion(const TorsionRun& run, const std::vector<YAML::Node>& references
   const std::vector<int> end = nodesOnPlane(mesh, 0, box.max.x());
   for (int node : nodesOnPlane(mesh, 0, box.min.x())) body.fixNode(node);
   double angle = 0.0;
-  body.twist(end, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(), [&angle](double) { return angle; });
+  body.twist(end, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitX(),
+             [&angle](double) { return angle; });
   double degrees = 0.0;
   for (const YAML::Node& reference : references) {
     const double goal = readNumber(run.file, reference, "angle_deg");
@@ -99,8 +99,9 @@ void evaluateTorsion(const CaseFile& file) {
   if (!list || !list.IsSequence()) return;
   const std::vector<YAML::Node> reference(list.begin(), list.end());
   for (const Eigen::Vector3i& cells : gridsOf(file))
-    attempt(file.path,
-            [&] { runTorsion({file, "default", FemOptions().element, cells}, reference); });
+    attempt(file.path, [&] {
+      runTorsion({file, "default", FemOptions().element, cells}, reference);
+    });
 }
 
 }  // namespace calipso::fem

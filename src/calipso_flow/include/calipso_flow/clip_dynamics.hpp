@@ -24,7 +24,7 @@ struct DynamicsParams {
 struct ObjectDynamics {
   std::string name;
   double diagonal = 0.0;                  // m, of the model
-  std::vector<ObjectMotion> motions;     // one per frame
+  std::vector<ObjectMotion> motions;      // one per frame
   std::vector<Observation> observations;  // one per frame
   Trajectory trajectory;                  // of a deforming object: of its closest rigid motion
   std::optional<DeformationMotion> deformation;  // nothing: the object moves as a rigid body
@@ -34,8 +34,8 @@ struct ObjectDynamics {
 std::string summary(const std::vector<ObjectDynamics>& objects);
 
 // Analyses a clip: follows every object through the frames as they come, then fits one trajectory
-// per object over all of them. An object is rigid until it is held somewhere and is seen to move: from
-// then on its deformation is followed. Not thread-safe.
+// per object over all of them. An object is rigid until it is held somewhere and is seen to move:
+// from then on its deformation is followed. Not thread-safe.
 class ClipAnalyser {
  public:
   // @param masks  per object in `models`: CV_8U where it is seen in the key frame; or empty
@@ -59,7 +59,7 @@ class ClipAnalyser {
     cv::Mat mask;
     std::vector<Observation> observations;  // one per frame
     int frames_left = 0;                    // successive frames in which it had left its place
-    std::unique_ptr<DeformableTracker> deformable;      // once it is seen to deform
+    std::unique_ptr<DeformableTracker> deformable;     // once it is seen to deform
     std::vector<DeformationObservation> deformations;  // one per frame, then
   };
   void forEachObject(const std::function<void(size_t)>& work) const;

@@ -16,8 +16,8 @@ Eigen::Vector2d coarseDisplacement(const ReferenceView::Warped& look, const cv::
 // The best place within reach, however it compares with the prediction.
 struct CoarseMatch {
   Eigen::Vector2d displacement = Eigen::Vector2d::Zero();  // px
-  double correlation = -1.0;                               // there; -1: too small or too flat to tell
-  double at_home = -1.0;                                   // where it was predicted
+  double correlation = -1.0;  // there; -1: too small or too flat to tell
+  double at_home = -1.0;      // where it was predicted
 };
 // @param factor  by which look and picture are reduced first
 CoarseMatch matchCoarsely(const ReferenceView::Warped& look, const cv::Mat& picture,

@@ -20,9 +20,9 @@ struct DeformationObservation {
 };
 
 // Follows an object that deforms from its shape in the key frame: its look is warped along the
-// deformed surface to the predicted shape, patches are matched from there to the frame, and a smooth
-// deformation is fitted to them. The reference is always the key frame, so that errors do not add up.
-// Not thread-safe; frames come in order of time.
+// deformed surface to the predicted shape, patches are matched from there to the frame, and a
+// smooth deformation is fitted to them. The reference is always the key frame, so that errors do
+// not add up. Not thread-safe; frames come in order of time.
 class DeformableTracker {
  public:
   // @param mask  as ObjectTracker's

@@ -1,18 +1,18 @@
 #pragma once
 
-#include <calipso_scene/triangle_mesh.hpp>
 #include <Eigen/Geometry>
 #include <Eigen/SparseCore>
+#include <calipso_scene/triangle_mesh.hpp>
 #include <optional>
 
 namespace calipso::flow {
 
-// Smooth displacements of an object, by a coarse lattice of control points over its box of principal
-// axes:  u(X) = sum_m w_m(X) c_m.  Cubic B-splines along axes that are long, linear along short ones,
-// constant through a sheet.
+// Smooth displacements of an object, by a coarse lattice of control points over its box of
+// principal axes:  u(X) = sum_m w_m(X) c_m.  Cubic B-splines along axes that are long, linear along
+// short ones, constant through a sheet.
 class DeformationField {
  public:
-  using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;    // #points x size()
+  using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;  // #points x size()
   using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
   // @param spans  B-spline intervals along the longest axis, >= 1

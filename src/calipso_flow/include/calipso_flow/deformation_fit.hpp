@@ -11,14 +11,14 @@ namespace calipso::flow {
 
 // Deviations of what is assumed about a deforming body, relative to its diagonal where lengths.
 struct DeformationParams {
-  int spans = 3;               // control intervals along the longest axis
-  double strain = 0.03;        // of a distance between neighbouring surface points
-  double sheet_strain = 0.3;   // the same of a thin sheet, which is held in its plane by:
-  double in_plane = 0.006;     // a sheet's controls within its plane: second order in its bending
-  double roughness = 0.2;      // second difference of neighbouring controls
-  double innovation = 0.05;    // of a control point, from the constant-velocity prediction
-  double anchor = 1e-3;        // of a point that is attached
-  double floor_px = 0.05;      // no track is better than this
+  int spans = 3;              // control intervals along the longest axis
+  double strain = 0.03;       // of a distance between neighbouring surface points
+  double sheet_strain = 0.3;  // the same of a thin sheet, which is held in its plane by:
+  double in_plane = 0.006;    // a sheet's controls within its plane: second order in its bending
+  double roughness = 0.2;     // second difference of neighbouring controls
+  double innovation = 0.05;   // of a control point, from the constant-velocity prediction
+  double anchor = 1e-3;       // of a point that is attached
+  double floor_px = 0.05;     // no track is better than this
   double inlier_sigma = 5.0;
   int least_inliers = 12;
 };
@@ -35,7 +35,7 @@ struct DeformationFit {
   Eigen::MatrixXd covariance;  // of controls, m^2
   std::vector<bool> inlier;    // per match
   int inliers = 0;
-  double deviation = 0.0;      // robust deviation of the residuals over their own, 1 = as expected
+  double deviation = 0.0;  // robust deviation of the residuals over their own, 1 = as expected
   bool converged = false;
 };
 
@@ -70,10 +70,10 @@ class DeformationFitter {
     Eigen::MatrixXd matrix() const;  // lower triangle
   };
   struct Residual {
-    Eigen::Vector2d value;                     // px
-    Eigen::Matrix<double, 2, 3> jacobian;      // by the point's displacement
+    Eigen::Vector2d value;                 // px
+    Eigen::Matrix<double, 2, 3> jacobian;  // by the point's displacement
     Eigen::Matrix2d information;
-    double length;                             // Mahalanobis
+    double length;  // Mahalanobis
   };
   std::vector<Residual> residuals(const std::vector<SurfaceMatch>& matches,
                                   const DeformationField::Weights& weights, const Camera& camera,
@@ -81,7 +81,8 @@ class DeformationFitter {
   // Of the springs, linearised at `controls`.
   Normal springNormal(const Eigen::VectorXd& controls) const;
   // Adds what is quadratic in the controls.
-  void addPriors(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted, Normal& normal) const;
+  void addPriors(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted,
+                 Normal& normal) const;
   // @param trust  weight of each match
   static void addMatches(const DeformationField::Weights& weights,
                          const std::vector<Residual>& residuals, const std::vector<double>& trust,

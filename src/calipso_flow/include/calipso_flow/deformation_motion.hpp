@@ -13,24 +13,25 @@ namespace calipso::flow {
 
 // A line of the motion's spectrum as it shows on the surface. World axes.
 struct SurfaceLine {
-  SpectralLine line;          // amplitudes are the modes'
-  double amplitude = 0.0;     // m, root mean square over the surface, at the first frame
+  SpectralLine line;       // amplitudes are the modes'
+  double amplitude = 0.0;  // m, root mean square over the surface, at the first frame
   Eigen::Vector3d wave_vector = Eigen::Vector3d::Zero();  // rad/m; zero: a standing vibration
 };
 
 // How an object deforms over a clip, and what follows from it.
 struct DeformationMotion {
-  std::vector<double> times;   // s
+  std::vector<double> times;  // s
   DeformationModes modes;
-  std::vector<SurfaceLine> lines;  // strongest first
+  std::vector<SurfaceLine> lines;                  // strongest first
   Eigen::Vector3d lean = Eigen::Vector3d::Zero();  // m, world: see leanOf
   std::optional<StiffnessRatio> stiffness;
   std::optional<WindEstimate> wind;  // of a thin sheet, when it was wanted
-  std::string note;            // what was refused, for the user
+  std::string note;                  // what was refused, for the user
 };
 
 // @param observations  one per frame, the key frame first
-// @param with_wind     also simulate a thin sheet in search of the wind: takes far longer than all the rest
+// @param with_wind     also simulate a thin sheet in search of the wind: takes far longer than all
+// the rest
 DeformationMotion describeDeformation(const DeformableTracker& tracker,
                                       const std::vector<DeformationObservation>& observations,
                                       const Eigen::Vector3d& gravity, bool with_wind);

@@ -19,7 +19,8 @@ struct Frame {
 //   `camera` says
 Frame makeFrame(double time, const cv::Mat& picture, const Camera& camera);
 
-// The frame at a size `factor` times smaller (what does not fill a pixel is cut off), its thumbnail the same.
+// The frame at a size `factor` times smaller (what does not fill a pixel is cut off), its thumbnail
+// the same.
 Frame reduced(const Frame& frame, int factor);
 
 }  // namespace calipso::flow

@@ -12,9 +12,9 @@ struct NamedMotion {
   ObjectMotion motion;
 };
 
-// The motion of every object as the frames come: the tracker of ClipAnalyser with a filter that only
-// looks back. A pose that the filter finds too surprising is taken for a collision between the last
-// frame and this one. Not thread-safe.
+// The motion of every object as the frames come: the tracker of ClipAnalyser with a filter that
+// only looks back. A pose that the filter finds too surprising is taken for a collision between the
+// last frame and this one. Not thread-safe.
 class LiveAnalyser {
  public:
   // As ClipAnalyser's. @throw std::invalid_argument

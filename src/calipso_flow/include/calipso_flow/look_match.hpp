@@ -9,14 +9,15 @@
 
 namespace calipso::flow {
 
-// How much a match is worth: a rough one, at half size, reaches far; a forward one is precise but may
-// show another surface; a checked one has been followed back.
+// How much a match is worth: a rough one, at half size, reaches far; a forward one is precise but
+// may show another surface; a checked one has been followed back.
 enum class Care { kRough, kForward, kChecked };
 
 // What makes a match count.
 struct MatchTrust {
-  double forward_backward_px = 0.3;   // a match followed back misses its origin by less, beside its own uncertainty
-  double largest_deviation_px = 0.5; // a match less certain than this is dropped
+  double forward_backward_px =
+      0.3;  // a match followed back misses its origin by less, beside its own uncertainty
+  double largest_deviation_px = 0.5;  // a match less certain than this is dropped
   double least_correlation = 0.4;     // of the patch with its reference
 };
 
@@ -37,7 +38,8 @@ class LookMatch {
   // Where the patch of the look around a seed is found in the frame.
   std::optional<PatchMatch> find(const Seed& seed, const PatchParams& params) const;
   // The same as far as the match is to be trusted, followed back where `care` asks for it.
-  std::optional<PatchMatch> findSurely(const Seed& seed, const PatchParams& params, const MatchTrust& trust) const;
+  std::optional<PatchMatch> findSurely(const Seed& seed, const PatchParams& params,
+                                       const MatchTrust& trust) const;
   // The search at every seed, by several threads.
   using Matches = std::vector<std::optional<PatchMatch>>;
   using Search = std::function<std::optional<PatchMatch>(const Seed& seed)>;

@@ -44,8 +44,8 @@ struct PoseMeasurement {
   double time = 0.0;  // s
   Eigen::Vector3d position;
   Eigen::Matrix3d rotation;
-  Matrix6d covariance;  // of (m, rad), independent from time to time
-  bool valid = false;   // false: nothing was seen at this time
+  Matrix6d covariance;                 // of (m, rad), independent from time to time
+  bool valid = false;                  // false: nothing was seen at this time
   Matrix6d common = Matrix6d::Zero();  // of errors that change slowly
 };
 
@@ -54,9 +54,10 @@ enum class Turning { kNone, kSteady, kForced };
 
 // One piece of the motion and what is assumed about it.
 struct MotionPiece {
-  double start = 0.0;     // s; the first piece's start is not read
-  bool cut = false;       // the video was cut here: nothing carries over
-  double contact = 0.0;   // s; > 0: several impacts within about so long, between which it moves at an unknown rate
+  double start = 0.0;    // s; the first piece's start is not read
+  bool cut = false;      // the video was cut here: nothing carries over
+  double contact = 0.0;  // s; > 0: several impacts within about so long, between which it moves at
+                         // an unknown rate
   Travel travel = Travel::kForced;
   Turning turning = Turning::kForced;
   double jerk = 0.0;        // m/s^3 per square root of Hz; kForced only
@@ -65,12 +66,12 @@ struct MotionPiece {
 
 // What is known before anything is seen: standard deviations about zero, and gravity.
 struct MotionPrior {
-  double position = 1e3;       // m
-  double velocity = 10.0;      // m/s
-  double acceleration = 100.0; // m/s^2
-  double spin = 30.0;          // rad/s
+  double position = 1e3;                        // m
+  double velocity = 10.0;                       // m/s
+  double acceleration = 100.0;                  // m/s^2
+  double spin = 30.0;                           // rad/s
   Eigen::Vector3d gravity = {0.0, 0.0, -9.81};  // m/s^2
-  double gravity_share = 0.05;  // relative uncertainty of free fall: scale, drag
+  double gravity_share = 0.05;                  // relative uncertainty of free fall: scale, drag
 };
 
 // A jump between two pieces, with the state on either side of it.

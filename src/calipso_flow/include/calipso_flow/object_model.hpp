@@ -1,8 +1,8 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <calipso_scene/scene.hpp>
 #include <calipso_scene/triangle_mesh.hpp>
-#include <Eigen/Geometry>
 #include <string>
 #include <vector>
 
@@ -11,8 +11,8 @@ namespace calipso::flow {
 // An object as aligned to the key frame: its surface and where it stands.
 struct ObjectModel {
   std::string name;
-  int index = 0;      // label in masks
-  TriangleMesh mesh;  // object frame, m
+  int index = 0;                                                        // label in masks
+  TriangleMesh mesh;                                                    // object frame, m
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // at the key frame
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();  // of the placement, world, m^2
   std::vector<int> attached;  // vertices that are held by something that does not move

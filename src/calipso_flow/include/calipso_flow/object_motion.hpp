@@ -12,8 +12,8 @@ namespace calipso::flow {
 struct ObjectMotion {
   bool moving = false;  // false: at rest within its uncertainty
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
-  MotionState state;    // of the centroid
-  int tracks = 0;       // inliers in this frame; 0: the state is carried over from other frames
+  MotionState state;  // of the centroid
+  int tracks = 0;     // inliers in this frame; 0: the state is carried over from other frames
 };
 
 // @param centroid  object frame, m

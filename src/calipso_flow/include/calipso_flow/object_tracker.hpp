@@ -12,11 +12,12 @@
 namespace calipso::flow {
 
 struct TrackerParams {
-  int seed_count = 120;              // surface points followed at a time
-  double least_inliers = 0.65;       // below this share of the most tracks it had a reference is worn out
-  double least_coverage = 0.55;      // below this share of known surface a new reference is taken
+  int seed_count = 120;  // surface points followed at a time
+  double least_inliers =
+      0.65;  // below this share of the most tracks it had a reference is worn out
+  double least_coverage = 0.55;  // below this share of known surface a new reference is taken
   int max_references = 12;
-  double search_px = 24.0;           // the coarse search looks this far beyond the prediction
+  double search_px = 24.0;  // the coarse search looks this far beyond the prediction
   PatchParams patch;
   MatchTrust trust;
   PoseFitParams pose;
@@ -73,25 +74,27 @@ class ObjectTracker {
     ReferenceView::Warped warped;
   };
   // @param care  kForward: the look may be of another place
-  const Look& lookAt(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose, Care care);
-  bool isLookOf(const Frame& frame, const ReferenceView& reference, const Eigen::Isometry3d& pose) const;
+  const Look& lookAt(const Frame& frame, const ReferenceView& reference,
+                     const Eigen::Isometry3d& pose, Care care);
+  bool isLookOf(const Frame& frame, const ReferenceView& reference,
+                const Eigen::Isometry3d& pose) const;
   Eigen::AlignedBox2d reachFrom(const Frame& frame, const Eigen::Isometry3d& predicted) const;
   Eigen::Isometry3d searchCoarsely(const Frame& frame, const ReferenceView& reference,
                                    const Eigen::Isometry3d& predicted);
   struct Reference {
     ReferenceView view;
     Matrix6d covariance = Matrix6d::Zero();  // of its pose, world axes; the key frame's is given
-    int most_inliers = 0;  // that a frame had with it
+    int most_inliers = 0;                    // that a frame had with it
   };
-  Observation refine(const Frame& frame, const Reference& reference,
-                     const Eigen::Isometry3d& start, const TrackerParams& params);
+  Observation refine(const Frame& frame, const Reference& reference, const Eigen::Isometry3d& start,
+                     const TrackerParams& params);
   Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
                                const TrackerParams& params, Observation& observation);
   Reference& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose);
   Observation attempt(const Frame& frame, const Reference& reference,
                       const Eigen::Isometry3d& predicted, const TrackerParams& params);
-  Observation tryOtherwise(const Frame& frame, const Reference& nearest, const Eigen::Isometry3d& predicted,
-                           Observation best);
+  Observation tryOtherwise(const Frame& frame, const Reference& nearest,
+                           const Eigen::Isometry3d& predicted, Observation best);
   bool isClear(const Observation& observation) const;
   bool stays(const Observation& observation) const;  // found where it was
   void remember(const Frame& frame, const Observation& observation, bool cut);
@@ -103,7 +106,8 @@ class ObjectTracker {
   std::vector<SurfaceEdge> edges_;
   OutlineBias outline_bias_;  // of the key frame, where the pose is known
   TrackerParams params_;
-  TrackerParams wide_;  // the same with large patches, for frames whose noise or blur drowns small ones
+  TrackerParams
+      wide_;  // the same with large patches, for frames whose noise or blur drowns small ones
   Eigen::Vector3d centroid_;
   bool drowned_ = false;  // `wide_` found more of late
   std::vector<Reference> references_;

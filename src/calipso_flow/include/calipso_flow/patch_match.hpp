@@ -1,21 +1,22 @@
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <Eigen/Core>
+#include <opencv2/core.hpp>
 #include <optional>
 
 namespace calipso::flow {
 
 // A part of a picture that keeps the picture's pixel coordinates.
 struct ImageWindow {
-  cv::Mat image;      // CV_32F
+  cv::Mat image;       // CV_32F
   cv::Point2d origin;  // picture coordinates of image(0, 0)
 };
 
 constexpr int kMostRadius = 10;  // px, of a patch
 
 struct PatchParams {
-  int radius_px = 4;            // 1..kMostRadius; the patch is a square of 2 r + 1 pixels: small, since shading bends large ones
+  int radius_px = 4;  // 1..kMostRadius; the patch is a square of 2 r + 1 pixels: small, since
+                      // shading bends large ones
   int max_iterations = 12;
   double least_support = 0.4;   // share of the patch's pixels that must carry weight
   double converged_px = 0.005;  // an update smaller than this ends the iteration

@@ -15,15 +15,15 @@ struct Correspondence {
   Eigen::Vector3d point;       // object frame, m
   Eigen::Vector2d pixel;       // px
   Eigen::Matrix2d covariance;  // of pixel, px^2
-  bool outline = false;        // found across the outline only; how well such are found is judged apart
+  bool outline = false;  // found across the outline only; how well such are found is judged apart
 };
 
 struct PoseFitParams {
   double start_scale_px = 8.0;  // residuals up to this count fully at first, then less and less
   double floor_px = 0.03;       // no track is better than this: model error, compression
   double inlier_sigma = 4.0;    // a track further off than this many deviations does not count
-  double common_px = 0.006;     // error that all tracks of a frame may share, and that changes slowly: of how looks are
-                                // resampled and lit
+  double common_px = 0.006;  // error that all tracks of a frame may share, and that changes slowly:
+                             // of how looks are resampled and lit
   int max_iterations = 30;
   int least_inliers = 6;
 };
@@ -31,10 +31,11 @@ struct PoseFitParams {
 struct PoseFit {
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
   Matrix6d covariance = Matrix6d::Zero();  // of (m of the pivot, rad), world axes
-  Matrix6d common = Matrix6d::Zero();      // the same of the error that all tracks share; not part of covariance
-  std::vector<bool> inlier;                // per correspondence
-  int inliers = 0;                         // of those that are not of the outline
-  double deviation = 0.0;  // robust deviation of their residuals over their own, 1 = as expected
+  Matrix6d common =
+      Matrix6d::Zero();      // the same of the error that all tracks share; not part of covariance
+  std::vector<bool> inlier;  // per correspondence
+  int inliers = 0;           // of those that are not of the outline
+  double deviation = 0.0;    // robust deviation of their residuals over their own, 1 = as expected
   bool converged = false;
 };
 
@@ -46,12 +47,13 @@ PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera
                 const Eigen::Isometry3d& start, const Eigen::Vector3d& pivot,
                 const PoseFitParams& params = {});
 
-// Moves a pose parallel to the picture plane, so that its pivot (object frame, m) moves by `pixels`.
-Eigen::Isometry3d shiftInPicture(const Camera& camera, const Eigen::Isometry3d& pose, const Eigen::Vector3d& pivot,
-                                 const Eigen::Vector2d& pixels);
+// Moves a pose parallel to the picture plane, so that its pivot (object frame, m) moves by
+// `pixels`.
+Eigen::Isometry3d shiftInPicture(const Camera& camera, const Eigen::Isometry3d& pose,
+                                 const Eigen::Vector3d& pivot, const Eigen::Vector2d& pixels);
 
 // Moves a pose by (translation of the pivot, rotation vector about it), world axes.
-Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object,
-                           const Eigen::Vector3d& pivot, const Vector6d& motion);
+Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object, const Eigen::Vector3d& pivot,
+                           const Vector6d& motion);
 
 }  // namespace calipso::flow

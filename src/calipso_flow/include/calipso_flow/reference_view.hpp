@@ -46,8 +46,8 @@ class ReferenceView {
 
  private:
   void chooseSeeds(int count);
-  // Notes where the reference shows a surface point (p_reference, its camera frame) for pixel (x, y)
-  // of the warped view. False where it does not show it.
+  // Notes where the reference shows a surface point (p_reference, its camera frame) for pixel (x,
+  // y) of the warped view. False where it does not show it.
   struct WarpMap;
   bool note(const Eigen::Vector3d& p_reference, int x, int y, WarpMap& map) const;
   Warped finish(const WarpMap& map, int visible, int known) const;

@@ -9,8 +9,8 @@
 
 namespace calipso::flow {
 
-// E / rho with which the aligned model vibrates as the object in the video does: frequencies go with
-// the square root of it.
+// E / rho with which the aligned model vibrates as the object in the video does: frequencies go
+// with the square root of it.
 struct StiffnessRatio {
   double value = 0.0;      // m^2/s^2
   double deviation = 0.0;  // from the frequency's

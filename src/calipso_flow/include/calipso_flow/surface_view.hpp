@@ -23,7 +23,8 @@ struct CarriedView {
   cv::Mat position;  // CV_32FC3, window-sized: the carried coordinates; (0, 0, 0) = not covered
 };
 
-// Draws the triangles of `mesh`, moved to `moved` (camera frame, #V x 3), and interpolates `carried`
+// Draws the triangles of `mesh`, moved to `moved` (camera frame, #V x 3), and interpolates
+// `carried`
 // (#V x 3, not zero where it counts) over them.
 CarriedView carrySurface(const TriangleMesh& mesh, const Camera& camera,
                          const decltype(TriangleMesh::vertices)& moved,

@@ -19,7 +19,7 @@ struct Collision {
 };
 
 struct TrajectoryParams {
-  double least_evidence = 8.0;   // log of the odds a collision must raise the likelihood by
+  double least_evidence = 8.0;  // log of the odds a collision must raise the likelihood by
   int max_collisions = 24;
   // Says of the states of one piece that their motion cannot be told from tracking errors; empty:
   // the likelihood alone decides.
@@ -28,7 +28,7 @@ struct TrajectoryParams {
 
 // The motion of one object over a clip.
 struct Trajectory {
-  std::vector<MotionState> states;    // one per measurement
+  std::vector<MotionState> states;  // one per measurement
   std::vector<MotionPiece> pieces;
   std::vector<Collision> collisions;  // in order of time; empty: none found
   double noise_scale = 1.0;           // of the measurements, as found

@@ -17,8 +17,8 @@ struct TurnSearch {
 };
 
 // The likeliest poses, best first, over a grid of turns and all places within reach: by masked,
-// normalised correlation of the reference's look with the frame, both at reduced size. They are good to half
-// a step of the grid, for a finer match to start from.
+// normalised correlation of the reference's look with the frame, both at reduced size. They are
+// good to half a step of the grid, for a finer match to start from.
 std::vector<Eigen::Isometry3d> searchTurned(const ReferenceView& reference, const Frame& frame,
                                             const TurnSearch& search, size_t count);
 

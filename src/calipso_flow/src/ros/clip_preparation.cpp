@@ -20,9 +20,9 @@ std::optional<ros::Time> KeyCollector::keyStamp() const {
 
 std::optional<KeyKnowledge> KeyCollector::knowledge(const Scene& scene) const {
   if (!models_) return std::nullopt;
-  const auto of_key = std::find_if(
-      segmentations_.begin(), segmentations_.end(),
-      [&](const auto& s) { return s->header.stamp == models_->header.stamp; });
+  const auto of_key =
+      std::find_if(segmentations_.begin(), segmentations_.end(),
+                   [&](const auto& s) { return s->header.stamp == models_->header.stamp; });
   if (of_key == segmentations_.end()) return std::nullopt;
   KeyKnowledge knowledge;
   for (const calipso_msgs::AlignedModel& model : models_->models) {

@@ -39,7 +39,8 @@ calipso_msgs::Collision toMsg(const Collision& collision) {
   return msg;
 }
 
-calipso_msgs::Wind windMsg(double time, const Eigen::Vector3d& velocity, const Eigen::Matrix3d& covariance) {
+calipso_msgs::Wind windMsg(double time, const Eigen::Vector3d& velocity,
+                           const Eigen::Matrix3d& covariance) {
   calipso_msgs::Wind msg;
   msg.stamp = ros::Time(time);
   msg.velocity = toVectorMsg(velocity);
@@ -110,8 +111,12 @@ Frame frameFromMsg(const calipso::Frame& frame) {
 }
 
 ObjectModel modelFromMsg(const calipso_msgs::AlignedModel& model, const Scene& scene) {
-  ObjectModel result{model.object, model.index, fromMsg(model.mesh),
-                     fromMsg(model.world_from_object.pose), Eigen::Matrix3d::Zero(), {}};
+  ObjectModel result{model.object,
+                     model.index,
+                     fromMsg(model.mesh),
+                     fromMsg(model.world_from_object.pose),
+                     Eigen::Matrix3d::Zero(),
+                     {}};
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) {
       result.position_covariance(r, c) = model.world_from_object.covariance[6 * r + c];

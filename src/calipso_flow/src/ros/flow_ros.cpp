@@ -30,10 +30,9 @@ FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       flow_publisher_(nh.advertise<sensor_msgs::Image>(topics::kFlow, 10)),
       markers_(nh),
       dense_flow_(params_.flow_preset) {
-  subscribers_ = {
-      nh.subscribe(topics::kModels, 1, &FlowNode::onModels, this),
-      nh.subscribe(topics::kSegmentation, kKeepAll, &FlowNode::onSegmentation, this),
-      nh.subscribe(topics::kStatus, 100, &FlowNode::onStatus, this)};
+  subscribers_ = {nh.subscribe(topics::kModels, 1, &FlowNode::onModels, this),
+                  nh.subscribe(topics::kSegmentation, kKeepAll, &FlowNode::onSegmentation, this),
+                  nh.subscribe(topics::kStatus, 100, &FlowNode::onStatus, this)};
   if (!params_.live) {
     subscribers_.push_back(nh.subscribe(topics::kClipInfo, 1, &FlowNode::onClipInfo, this));
     clip_frames_source_ = std::make_unique<FrameSource>(
@@ -143,7 +142,7 @@ void FlowNode::finishWhenComplete() {
   finished_ = true;
   try {
     std::vector<ObjectDynamics> objects = clip_analyser_->finish(clip_->wind_wanted);
-    const calipso_msgs::ClipDynamics msg = 
+    const calipso_msgs::ClipDynamics msg =
         clipDynamicsMsg(scene_, objects, clip_analyser_->cutTimes(), headers_);
     for (const auto& frame : msg.frames) dynamics_[frame.header.stamp] = frame;
     clip_dynamics_publisher_.publish(msg);

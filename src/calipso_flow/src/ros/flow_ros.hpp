@@ -48,9 +48,9 @@ class FlowNode {
 
   calipso_msgs::ClipInfoConstPtr clip_;
   KeyCollector key_;
-  std::vector<calipso::Frame> waiting_;   // frames that came before the models
+  std::vector<calipso::Frame> waiting_;    // frames that came before the models
   std::vector<std_msgs::Header> headers_;  // of the frames the analyser has taken in
-  unsigned clip_frames_ = 0;              // received, usable or not
+  unsigned clip_frames_ = 0;               // received, usable or not
   std::unique_ptr<ClipAnalyser> clip_analyser_;
   std::unique_ptr<LiveAnalyser> live_analyser_;
   std::map<ros::Time, calipso_msgs::Dynamics> dynamics_;

@@ -26,11 +26,10 @@ visualization_msgs::Marker makeMarker(const std_msgs::Header& header, const std:
 
 visualization_msgs::Marker trackMarker(const ObjectDynamics& object, size_t index,
                                        const std_msgs::Header& header, double size) {
-  auto marker = makeMarker(header, object.name + "/tracks",
-                           visualization_msgs::Marker::SPHERE_LIST, size);
+  auto marker =
+      makeMarker(header, object.name + "/tracks", visualization_msgs::Marker::SPHERE_LIST, size);
   for (const Track& track : object.observations[index].tracks) {
-    marker.points.push_back(
-        toPointMsg(object.motions[index].world_from_object * track.point));
+    marker.points.push_back(toPointMsg(object.motions[index].world_from_object * track.point));
     const float* colour = track.inlier ? kConfident : kOutlier;
     std_msgs::ColorRGBA rgba;
     rgba.r = colour[0], rgba.g = colour[1], rgba.b = colour[2];
@@ -82,18 +81,21 @@ visualization_msgs::Marker uncertaintyMarker(const ObjectMotion& motion, const s
   return marker;
 }
 
-// The way the air goes in a tenth of a second, from the middle of the cloth that shows it, and one deviation about its tip.
+// The way the air goes in a tenth of a second, from the middle of the cloth that shows it, and one
+// deviation about its tip.
 std::vector<visualization_msgs::Marker> windMarkers(const ObjectDynamics& object, size_t index,
                                                     const std_msgs::Header& header, double size) {
   if (!object.deformation || !object.deformation->wind) return {};
   const WindEstimate& wind = *object.deformation->wind;
   const double time = object.deformation->times.at(index);
-  const Eigen::Vector3d from = object.motions[index].state.position, tip = from + 0.1 * wind.at(time);
+  const Eigen::Vector3d from = object.motions[index].state.position,
+                        tip = from + 0.1 * wind.at(time);
   auto arrow = makeMarker(header, object.name + "/wind", visualization_msgs::Marker::ARROW, size);
   arrow.scale.y = 3.0 * size, arrow.scale.z = 3.0 * size;
   arrow.color.r = 0.3f, arrow.color.b = 1.0f;
   arrow.points = {toPointMsg(from), toPointMsg(tip)};
-  auto ball = makeMarker(header, object.name + "/wind uncertainty", visualization_msgs::Marker::SPHERE, 1.0);
+  auto ball = makeMarker(header, object.name + "/wind uncertainty",
+                         visualization_msgs::Marker::SPHERE, 1.0);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(0.01 * wind.covarianceAt(time));
   ball.scale = toVectorMsg(2.0 * axes.eigenvalues().cwiseMax(1e-12).cwiseSqrt());
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -129,12 +131,12 @@ visualization_msgs::MarkerArray markersOf(const ObjectDynamics& object, size_t i
   const double size = 0.02 * object.diagonal;
   const ObjectMotion& motion = object.motions.at(index);
   visualization_msgs::MarkerArray markers;
-  markers.markers = {trackMarker(object, index, header, size),
-                     trajectoryMarker(object, header, size),
-                     velocityMarker(motion, object.name, header, size),
-                     collisionMarker(object, header, size),
-                     uncertaintyMarker(motion, object.name, header)};
-  for (const auto& marker : windMarkers(object, index, header, size)) markers.markers.push_back(marker);
+  markers.markers = {
+      trackMarker(object, index, header, size), trajectoryMarker(object, header, size),
+      velocityMarker(motion, object.name, header, size), collisionMarker(object, header, size),
+      uncertaintyMarker(motion, object.name, header)};
+  for (const auto& marker : windMarkers(object, index, header, size))
+    markers.markers.push_back(marker);
   return markers;
 }
 

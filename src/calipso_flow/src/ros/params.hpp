@@ -11,7 +11,7 @@ namespace calipso::flow {
 
 // The node's parameters; config/flow.yaml explains each.
 struct Params {
-  std::string scene;         // directory
+  std::string scene;  // directory
   bool live = false;
   DenseFlow::Preset flow_preset = DenseFlow::Preset::kUltrafast;
   DynamicsParams dynamics;

@@ -11,37 +11,44 @@ namespace calipso::render {
 
 // The place without the objects, seen from the key frame's camera.
 struct Background {
-  cv::Mat plate;   // CV_32FC3, code values
-  cv::Mat count;   // CV_8UC1: frames of the sample in which the pixel was seen (at most 255)
-  cv::Mat spread;  // CV_32FC1: median absolute deviation over time, code values
+  cv::Mat plate;     // CV_32FC3, code values
+  cv::Mat count;     // CV_8UC1: frames of the sample in which the pixel was seen (at most 255)
+  cv::Mat spread;    // CV_32FC1: median absolute deviation over time, code values
   cv::Mat invented;  // CV_8UC1: 255 where no frame shows it
-  cv::Mat origin;  // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
-  LiveFill live;   // where an invented pixel's origin moves by itself; empty if nothing moves
+  cv::Mat origin;    // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
+  LiveFill live;     // where an invented pixel's origin moves by itself; empty if nothing moves
 };
 
 struct BackgroundParams {
-  int mask_margin_px = 3;      // masks are grown by this: mixed pixels and compression belong to the object
-  int shadow_margin_px = 7;    // predicted shadows are grown by this: penumbra, errors of light and model
-  double shadow_step = 0.06;   // a pixel darker by more than this fraction may be shaded by an object
+  int mask_margin_px =
+      3;  // masks are grown by this: mixed pixels and compression belong to the object
+  int shadow_margin_px =
+      7;  // predicted shadows are grown by this: penumbra, errors of light and model
+  double shadow_step =
+      0.06;  // a pixel darker by more than this fraction may be shaded by an object
 };
 
-// Temporal median of every pixel over the frames in which no object covers it (masks grown), refined
-// to the mean of the values around the median. `objects_move`: darker groups of values are taken for
-// the passing objects' shadows and left out. Nothing is invented: where count is 0 the plate is 0.
+// Temporal median of every pixel over the frames in which no object covers it (masks grown),
+// refined to the mean of the values around the median. `objects_move`: darker groups of values are
+// taken for the passing objects' shadows and left out. Nothing is invented: where count is 0 the
+// plate is 0.
 // @param frames all as seen from the key frame's camera; outside the picture labels are 255
 Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_move,
                           const BackgroundParams& params = {});
 
 // Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects cover or
-// darken in every frame), from the surroundings. Where the place moves by itself, the median is no picture of
-// it: there the key frame is what the surroundings look like.
-// @param nearness of the ground, as groundNearness(); @param surface as InpaintParams::surface; both may be empty
-void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness, const cv::Mat& surface, Background& background);
+// darken in every frame), from the surroundings. Where the place moves by itself, the median is no
+// picture of it: there the key frame is what the surroundings look like.
+// @param nearness of the ground, as groundNearness(); @param surface as InpaintParams::surface;
+// both may be empty
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness,
+                      const cv::Mat& surface, Background& background);
 
-// CV_32FC1, 1/m along the optical axis, of the support plane that a pixel sees, or of what is seen of the scenery beyond it;
-// 0 where no plane is. Empty if none is seen at all.
+// CV_32FC1, 1/m along the optical axis, of the support plane that a pixel sees, or of what is seen
+// of the scenery beyond it; 0 where no plane is. Empty if none is seen at all.
 // @param scenery CV_32FC1, 1/m, 0: unknown; may be empty
-cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& camera, const cv::Mat& scenery);
+cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& camera,
+                       const cv::Mat& scenery);
 
 // The key frame with its noise averaged away where the sample shows the same thing all the time
 // (same label, value within the noise); elsewhere the key frame itself. CV_32FC3, code values.

@@ -12,7 +12,8 @@ namespace calipso::render {
 // Where the objects were, by the frame's stamp, as somebody else estimated it.
 using PosesByStamp = std::map<std::int64_t, std::vector<ObjectPose>>;
 
-// Does any of the objects move in the clip? Only then do further frames show more of them than the key frame.
+// Does any of the objects move in the clip? Only then do further frames show more of them than the
+// key frame.
 bool anyMoves(const ClipSample& clip, const std::vector<ObjectModel>& models);
 
 // What became of them.
@@ -21,8 +22,9 @@ struct PosesTaken {
   double worst_accepted_overlap = 1.0;
 };
 
-// Gives the clip's frames the poses that fit their pictures: the model drawn there has to overlap its mask by `least`
-// (intersection over union), where no other object's mask stands before it.
-PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& models, ClipSample& clip, double least = 0.9);
+// Gives the clip's frames the poses that fit their pictures: the model drawn there has to overlap
+// its mask by `least` (intersection over union), where no other object's mask stands before it.
+PosesTaken takePoses(const PosesByStamp& poses, const std::vector<ObjectModel>& models,
+                     ClipSample& clip, double least = 0.9);
 
 }  // namespace calipso::render

@@ -26,8 +26,9 @@ struct ClipFrame {
   std::int64_t stamp_ns = 0;
 };
 
-// An evenly spaced sample of a clip of unknown length in bounded memory: when the store is full, every
-// other frame goes and from then on half as many come in. The first frame (the key frame) stays.
+// An evenly spaced sample of a clip of unknown length in bounded memory: when the store is full,
+// every other frame goes and from then on half as many come in. The first frame (the key frame)
+// stays.
 class ClipSample {
  public:
   explicit ClipSample(std::size_t capacity = 24) : capacity_(capacity) {}
@@ -35,7 +36,9 @@ class ClipSample {
   // Keeps or drops the frame. Pictures are copied. @throw std::invalid_argument if sizes differ
   void add(const ClipFrame& frame);
 
-  void setPoses(std::size_t frame, std::vector<ObjectPose> poses) { frames_.at(frame).poses = std::move(poses); }
+  void setPoses(std::size_t frame, std::vector<ObjectPose> poses) {
+    frames_.at(frame).poses = std::move(poses);
+  }
 
   const std::vector<ClipFrame>& frames() const { return frames_; }
   std::size_t seen() const { return seen_; }

@@ -36,7 +36,8 @@ class EdgeCoverage {
   // Draws into the chosen pixels. @pre nothing is chosen after the first draw
   void draw(const ScreenMesh& mesh, int object);
 
-  // Once all is drawn: lets the centre speak for pixels whose samples see what it sees, and all of them one sheet.
+  // Once all is drawn: lets the centre speak for pixels whose samples see what it sees, and all of
+  // them one sheet.
   void settle(const VisibilityBuffer& centre);
 
   // nullptr where the pixel's centre speaks for it. Picture coordinates.
@@ -48,7 +49,8 @@ class EdgeCoverage {
     for (int i = 0; i < tiles_across_; ++i) {
       const int tile = tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + i];
       if (tile < 0) continue;
-      const int* slots = &slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile];
+      const int* slots =
+          &slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile];
       for (int k = 0; k < kTile; ++k) {
         if (slots[k] != kNone) visit(i * kTile + k, slots[k] == kSettled);
       }
@@ -56,7 +58,9 @@ class EdgeCoverage {
   }
 
   // Do samples of one object, of these nearnesses, see one sheet of it?
-  static bool isOneSheet(float nearest, float farthest) { return nearest - farthest <= kSameSheet * farthest; }
+  static bool isOneSheet(float nearest, float farthest) {
+    return nearest - farthest <= kSameSheet * farthest;
+  }
 
   // Position of a sample against its pixel's centre, px.
   static Eigen::Vector2f offset(int sample) {
@@ -64,17 +68,21 @@ class EdgeCoverage {
   }
 
  private:
-  static constexpr float kSameSheet = 0.015f;  // of the nearness: samples that differ by more see another part of an object
+  static constexpr float kSameSheet =
+      0.015f;  // of the nearness: samples that differ by more see another part of an object
 
   // A triangle over the pixels of a tile that it may touch.
   struct Piece;
 
   void choose(int column, int row);  // region coordinates
-  void addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id, std::vector<Piece>& pieces) const;
+  void addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id,
+                 std::vector<Piece>& pieces) const;
   void drawPiece(const Piece& piece);
   int slotAt(int column, int row) const {
     const int tile = tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + column / kTile];
-    return tile < 0 ? kNone : slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile + column % kTile];
+    return tile < 0 ? kNone
+                    : slots_[static_cast<std::size_t>(tile) * kTile * kTile +
+                             (row % kTile) * kTile + column % kTile];
   }
 
   static constexpr int kTile = 8;  // px

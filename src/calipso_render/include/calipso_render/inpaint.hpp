@@ -6,24 +6,30 @@
 namespace calipso::render {
 
 struct InpaintParams {
-  int coarsest_side = 30;     // px; the pyramid ends where the picture's shorter side has no more
-  int coarsest_rounds = 12;   // of search and vote at the coarsest level,
-  int rounds = 4;             // at the finer ones
-  float away_row = 6.0f, away_column = 0.2f;  // what a px of way to the source counts, squared code values: places are layered
+  int coarsest_side = 30;    // px; the pyramid ends where the picture's shorter side has no more
+  int coarsest_rounds = 12;  // of search and vote at the coarsest level,
+  int rounds = 4;            // at the finer ones
+  float away_row = 6.0f,
+        away_column =
+            0.2f;  // what a px of way to the source counts, squared code values: places are layered
   std::uint32_t seed = 1;
-  cv::Mat nearness;           // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the horizon. What is
-                              // copied comes from where the ground is about as near: there things have the same size.
-  cv::Mat surface;            // CV_8UC1, may be empty: number of the surface that a pixel sees, 0 unknown. What is copied comes from the same one.
+  cv::Mat nearness;  // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the
+                     // horizon. What is copied comes from where the ground is about as near: there
+                     // things have the same size.
+  cv::Mat surface;  // CV_8UC1, may be empty: number of the surface that a pixel sees, 0 unknown.
+                    // What is copied comes from the same one.
 };
 
 struct InpaintResult {
   cv::Mat image;   // CV_32FC3, as the input outside the hole
-  cv::Mat origin;  // CV_16SC2: (u, v) in the input that each hole pixel is a copy of; (-1, -1) elsewhere
+  cv::Mat origin;  // CV_16SC2: (u, v) in the input that each hole pixel is a copy of; (-1, -1)
+                   // elsewhere
   bool patches_found = true;  // false: nothing to copy from, the hole was filled smoothly
 };
 
-// Fills a hole with copies of its surroundings so that every patch of the result resembles one of them, coarse to fine,
-// with seams evened out in the gradient domain. Copies keep the surroundings' grain.
+// Fills a hole with copies of its surroundings so that every patch of the result resembles one of
+// them, coarse to fine, with seams evened out in the gradient domain. Copies keep the surroundings'
+// grain.
 // @param image CV_32FC3, code values
 // @param hole CV_8UC1, != 0: to be filled
 // @param banned CV_8UC1, != 0: neither filled nor copied from; may be empty

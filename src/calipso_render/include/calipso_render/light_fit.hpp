@@ -1,8 +1,8 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "calipso_render/background.hpp"
@@ -20,10 +20,11 @@ struct LightSample {
   int picture = 0;                         // view that it is from
 };
 
-// Pixels of the objects away from rims, grazing views and saturation, clustered by chromaticity per object. Later
-// views add the objects that `moves` says are somewhere else in them.
+// Pixels of the objects away from rims, grazing views and saturation, clustered by chromaticity per
+// object. Later views add the objects that `moves` says are somewhere else in them.
 // @param clusters out: number of clusters
-std::vector<LightSample> lightSamples(const std::vector<View>& views, const std::vector<bool>& moves, int& clusters);
+std::vector<LightSample> lightSamples(const std::vector<View>& views,
+                                      const std::vector<bool>& moves, int& clusters);
 
 struct LightFit;
 
@@ -39,35 +40,40 @@ struct LightEvidence {
   int clusters = 0;
   // Visible part (0 or 1) of a sun in direction l from a sample; empty: nothing is in the way.
   std::function<float(const LightSample&, const Eigen::Vector3f& l)> visible;
-  // How badly cast shadows agree with a sun in direction l: minus a log-likelihood, 0 = no shadow was seen; may be empty.
+  // How badly cast shadows agree with a sun in direction l: minus a log-likelihood, 0 = no shadow
+  // was seen; may be empty.
   std::function<double(const Eigen::Vector3f& l)> shadow_misfit;
   std::vector<Eigen::Vector3f> shadow_candidates;  // directions that cast shadows speak for
-  // Gloss from the pixels near the mirror direction, under a light found; may be empty, and find none.
+  // Gloss from the pixels near the mirror direction, under a light found; may be empty, and find
+  // none.
   std::function<std::optional<SeenGloss>(const LightFit&)> gloss;
 };
 
-// What views, one or several, show. @param plate what was seen of the place without the objects, from the key frame's
-// camera; empty where nothing moves
+// What views, one or several, show. @param plate what was seen of the place without the objects,
+// from the key frame's camera; empty where nothing moves
 // @pre the views outlive the evidence
 LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bool>& moves,
                             const std::vector<SupportPlane>& planes, const Background& plate);
 
 struct LightFit {
   Light light;
-  Gloss gloss;                     // of all objects together
-  std::optional<SeenGloss> seen_gloss;  // nullopt: no highlight tells it, `gloss` is what the shading leaves possible
+  Gloss gloss;  // of all objects together
+  std::optional<SeenGloss>
+      seen_gloss;  // nullopt: no highlight tells it, `gloss` is what the shading leaves possible
   std::vector<cv::Vec3f> albedos;  // per cluster, up to a common factor
-  bool determined = false;         // false: too little was seen; the light is a default, high and frontal
-  bool second_order = false;       // ambient light in bands 1 and 2, too: held-out pixels spoke for it
-  bool from_shadows = false;       // cast shadows decided on the direction
-  double cost = 0.0;               // of the last pass, half the robust sum of squares
+  bool determined = false;  // false: too little was seen; the light is a default, high and frontal
+  bool second_order = false;  // ambient light in bands 1 and 2, too: held-out pixels spoke for it
+  bool from_shadows = false;  // cast shadows decided on the direction
+  double cost = 0.0;          // of the last pass, half the robust sum of squares
 };
 
-// Sun direction, sun and ambient colour, albedos and gloss from shading and cast shadows: a search over directions, then
-// four passes (light, diffuse, specular, roughness) and one with everything free, from each of the best
-// directions (paper: section 6). The objects shade themselves and each other.
+// Sun direction, sun and ambient colour, albedos and gloss from shading and cast shadows: a search
+// over directions, then four passes (light, diffuse, specular, roughness) and one with everything
+// free, from each of the best directions (paper: section 6). The objects shade themselves and each
+// other.
 // @param up unit vector against gravity: the sun is not below the horizon
 // @param view unit vector towards the camera, for the default
-LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up, const Eigen::Vector3f& view);
+LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
+                  const Eigen::Vector3f& view);
 
 }  // namespace calipso::render

@@ -5,13 +5,15 @@
 
 namespace calipso::render {
 
-// Fills holes of a place that moves by itself (clouds, water) from the frame at hand: every hole pixel shows what this
-// frame shows at its origin, so that it moves like its surroundings. Where copies of different places meet, or a copy and
-// the picture, their mean colours are drawn together.
+// Fills holes of a place that moves by itself (clouds, water) from the frame at hand: every hole
+// pixel shows what this frame shows at its origin, so that it moves like its surroundings. Where
+// copies of different places meet, or a copy and the picture, their mean colours are drawn
+// together.
 class LiveFill {
  public:
   LiveFill() = default;
-  // @param origin CV_16SC2: what a hole pixel is a copy of; (-1, -1): it is no hole, or nothing that moves
+  // @param origin CV_16SC2: what a hole pixel is a copy of; (-1, -1): it is no hole, or nothing
+  // that moves
   // @param hole CV_8UC1, all that is not seen
   LiveFill(const cv::Mat& origin, const cv::Mat& hole);
 
@@ -21,14 +23,17 @@ class LiveFill {
   // @param bgr CV_8UC3; labels CV_8UC1, 0: the place itself is seen
   std::vector<cv::Vec3f> corrections(const cv::Mat& bgr, const cv::Mat& labels) const;
 
-  // The pixel's colour in code values, with the camera's noise smoothed away. @param noise its deviation, code values
+  // The pixel's colour in code values, with the camera's noise smoothed away. @param noise its
+  // deviation, code values
   // @return false where this fill has none, or the frame hides its origin
-  bool at(const cv::Mat& bgr, const cv::Mat& labels, const std::vector<cv::Vec3f>& corrections, float noise, int u, int v, cv::Vec3f& colour) const;
+  bool at(const cv::Mat& bgr, const cv::Mat& labels, const std::vector<cv::Vec3f>& corrections,
+          float noise, int u, int v, cv::Vec3f& colour) const;
 
  private:
   struct Seam {
-    cv::Point other, own;  // places that should look alike: beyond the seam, and what this side's copy has there
-    float share;           // of the difference that this side takes
+    cv::Point other,
+        own;  // places that should look alike: beyond the seam, and what this side's copy has there
+    float share;  // of the difference that this side takes
   };
   void addSeams(const cv::Mat& hole);
 

@@ -12,8 +12,8 @@ class NoiseModel {
  public:
   NoiseModel();  // a camera without noise
 
-  // From pictures of the same place: spread over time per code value, where `steady` (CV_8UC1) is not
-  // 0. With a single picture: from its finest detail, by the median, which edges do not move.
+  // From pictures of the same place: spread over time per code value, where `steady` (CV_8UC1) is
+  // not 0. With a single picture: from its finest detail, by the median, which edges do not move.
   // @pre frames: CV_8UC3, all of one size, at least one
   static NoiseModel estimate(const std::vector<cv::Mat>& frames, const cv::Mat& steady);
 
@@ -28,16 +28,20 @@ class NoiseModel {
 };
 
 // Noise of unit variance per channel, half of it correlated between neighbours as demosaicing and
-// compression leave it. The same stamp and pixel always get the same value, whatever is drawn first.
+// compression leave it. The same stamp and pixel always get the same value, whatever is drawn
+// first.
 class NoiseField {
  public:
   explicit NoiseField(std::int64_t stamp_ns);
   float at(int u, int v, int channel) const { return row(v, channel)[column(u)]; }
 
-  static constexpr int kSide = 256, kWrapped = 8;  // columns, and how many of the first stand once more after the last
+  static constexpr int kSide = 256,
+                       kWrapped =
+                           8;  // columns, and how many of the first stand once more after the last
   // A channel's row v of the picture, as columns say.
   const float* row(int v, int channel) const {
-    return &tile()[static_cast<std::size_t>(channel * kSide + ((v + shift_v_) & (kSide - 1))) * (kSide + kWrapped)];
+    return &tile()[static_cast<std::size_t>(channel * kSide + ((v + shift_v_) & (kSide - 1))) *
+                   (kSide + kWrapped)];
   }
   int column(int u) const { return (u + shift_u_) & (kSide - 1); }
 

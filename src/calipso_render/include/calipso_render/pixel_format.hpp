@@ -8,7 +8,8 @@ namespace calipso::render {
 enum class PixelFormat { kBgr8, kRgb8, kMono8, kBgra8, kRgba8 };
 
 // Format of a ROS image encoding.
-// @throw std::invalid_argument naming the encoding and those that can be edited (16-bit ones cannot)
+// @throw std::invalid_argument naming the encoding and those that can be edited (16-bit ones
+// cannot)
 PixelFormat pixelFormat(const std::string& encoding);
 
 int channels(PixelFormat format);

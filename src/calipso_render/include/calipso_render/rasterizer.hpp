@@ -12,14 +12,15 @@ namespace calipso::render {
 using Points = std::vector<Eigen::Vector3f>;
 using Triangles = std::vector<Eigen::Vector3i>;
 
-// A mesh on a picture plane: x, y in pixels, z = nearness. Nearness is any quantity that is linear in
-// the picture and grows towards the viewer: 1 / depth (1/m) for a pinhole camera, height towards the
-// light (m) for a parallel projection. A vertex that cannot be projected has nearness NaN.
+// A mesh on a picture plane: x, y in pixels, z = nearness. Nearness is any quantity that is linear
+// in the picture and grows towards the viewer: 1 / depth (1/m) for a pinhole camera, height towards
+// the light (m) for a parallel projection. A vertex that cannot be projected has nearness NaN.
 struct ScreenMesh {
   Points points;
   const Triangles* triangles = nullptr;
-  // Sign of the area in the picture (rows downwards: positive is clockwise) of triangles that others are known to hide: those
-  // on the far side of a mesh that encloses space. They are left out. 0: all can be seen.
+  // Sign of the area in the picture (rows downwards: positive is clockwise) of triangles that
+  // others are known to hide: those on the far side of a mesh that encloses space. They are left
+  // out. 0: all can be seen.
   int hidden_side = 0;
 
   bool hides(float area) const { return static_cast<float>(hidden_side) * area > 0.0f; }
@@ -65,8 +66,10 @@ class VisibilityBuffer {
   static constexpr float kFar = -3.0e38f;
 
  private:
-  static constexpr int kBands = 8;    // rows are split in fixed bands: the result knows no thread count
-  static constexpr int kPadding = 8;  // places after each row, which kernels may read and write back
+  static constexpr int kBands =
+      8;  // rows are split in fixed bands: the result knows no thread count
+  static constexpr int kPadding =
+      8;  // places after each row, which kernels may read and write back
 
   cv::Rect region_;
   int stride_;

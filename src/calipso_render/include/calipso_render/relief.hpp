@@ -8,7 +8,8 @@
 
 namespace calipso::render {
 
-// Walls, steps and whatever else of the place lies off its support planes, per pixel of one view. It takes shadows as they do.
+// Walls, steps and whatever else of the place lies off its support planes, per pixel of one view.
+// It takes shadows as they do.
 struct Relief {
   static constexpr int kTile = 8;  // px
 
@@ -19,18 +20,24 @@ struct Relief {
   Eigen::AlignedBox3f box;   // of all positions
 
   bool empty() const { return seen.empty(); }
-  bool at(int u, int v) const { return !empty() && u >= 0 && v >= 0 && u < seen.cols && v < seen.rows && seen.at<std::uint8_t>(v, u) != 0; }
+  bool at(int u, int v) const {
+    return !empty() && u >= 0 && v >= 0 && u < seen.cols && v < seen.rows &&
+           seen.at<std::uint8_t>(v, u) != 0;
+  }
   Receiver receiver(int u, int v) const;
-  // Is any of it seen in the square that begins at (u, v)? @pre u, v and size are multiples of kTile
+  // Is any of it seen in the square that begins at (u, v)? @pre u, v and size are multiples of
+  // kTile
   bool touches(int u, int v, int size) const;
   // Fills tiles and box from what is seen.
   void index();
 };
 
-// The relief as another picture has it. @param map CV_32FC2: where the other's pixels lie in this view
+// The relief as another picture has it. @param map CV_32FC2: where the other's pixels lie in this
+// view
 Relief warped(const Relief& relief, const cv::Mat& map);
 
-// A relief's light in the terms of the support planes, so that `planes_umbra` makes of these levels what its own umbra makes of the sun.
+// A relief's light in the terms of the support planes, so that `planes_umbra` makes of these levels
+// what its own umbra makes of the sun.
 // @param sun its visible part, 0..1
 struct PlaneTerms {
   float sun, sky;

@@ -38,18 +38,18 @@ struct SunChange {
 // One object in one frame, as the simulator has it.
 struct ObjectInFrame {
   std::string name;
-  std::string source;    // a copy: the object whose model and look it has; empty: its own
+  std::string source;  // a copy: the object whose model and look it has; empty: its own
   Look look;
-  bool edited = false;   // false: as in the video, its pixels stay the original ones
+  bool edited = false;  // false: as in the video, its pixels stay the original ones
   bool removed = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
-  Points vertices;       // world, m, one per model vertex; only read where edited
-  Triangles triangles;   // of an object that no model describes; empty: its model's
+  Points vertices;      // world, m, one per model vertex; only read where edited
+  Triangles triangles;  // of an object that no model describes; empty: its model's
 };
 
 struct FrameInput {
-  cv::Mat bgr;           // CV_8UC3
-  cv::Mat labels;        // CV_8UC1; empty: the key frame's stand in
+  cv::Mat bgr;     // CV_8UC3
+  cv::Mat labels;  // CV_8UC1; empty: the key frame's stand in
   Camera camera;
   std::int64_t stamp_ns = 0;
   std::vector<ObjectInFrame> objects;
@@ -70,49 +70,57 @@ struct RenderParams {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   BackgroundParams background;
   // What stands before edited objects, seen from the key frame's camera. Either may be empty.
-  cv::Mat depth;                // CV_32FC1, m along the optical axis; 0: unknown
-  cv::Mat matte;                // CV_8UC1, 255: stays in front
-  double sun_radius = 0.025;    // rad; the angular radius of the sun's disc with its glare
-  bool add_noise = true;        // on rendered and invented pixels
-  bool carry_residual = true;   // what drawing misses goes along with what moves little
-  bool keep_still = true;       // what an edit does not move keeps the frame's own pixels
+  cv::Mat depth;               // CV_32FC1, m along the optical axis; 0: unknown
+  cv::Mat matte;               // CV_8UC1, 255: stays in front
+  double sun_radius = 0.025;   // rad; the angular radius of the sun's disc with its glare
+  bool add_noise = true;       // on rendered and invented pixels
+  bool carry_residual = true;  // what drawing misses goes along with what moves little
+  bool keep_still = true;      // what an edit does not move keeps the frame's own pixels
 };
 
 // Everything learnt from the clip. Coordinates: the key frame's camera, the world.
 struct Prepared {
-  Camera camera;                    // key frame
-  cv::Mat key_picture;              // CV_8UC3
+  Camera camera;        // key frame
+  cv::Mat key_picture;  // CV_8UC3
   cv::Mat key_labels;
   std::vector<Surface> surfaces;
-  std::vector<bool> moves;          // per surface: it moves in the video
-  std::vector<bool> sways;          // per surface: it does not, but what is seen within its outline changes: it hangs or bends
+  std::vector<bool> moves;  // per surface: it moves in the video
+  std::vector<bool> sways;  // per surface: it does not, but what is seen within its outline
+                            // changes: it hangs or bends
   std::vector<Appearance> appearances;
   LightFit light;
-  std::vector<cv::Mat> fronts;      // per surface, CV_8UC1: places where something unmodelled stands before it
-  std::vector<cv::Mat> footprints;  // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
-  cv::Mat scenery;                  // CV_32FC1, 1/m: nearness of what is no object and may hide one; 0 unknown; may be empty
-  cv::Mat shadowless;               // CV_8UC1: where objects cast no shadow: neither plane nor relief is seen there, or shows none in the video
-  Relief relief;                    // of the place, takes shadows; may be empty
-  cv::Mat nearness;                 // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
+  std::vector<cv::Mat>
+      fronts;  // per surface, CV_8UC1: places where something unmodelled stands before it
+  std::vector<cv::Mat>
+      footprints;   // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
+  cv::Mat scenery;  // CV_32FC1, 1/m: nearness of what is no object and may hide one; 0 unknown; may
+                    // be empty
+  cv::Mat shadowless;  // CV_8UC1: where objects cast no shadow: neither plane nor relief is seen
+                       // there, or shows none in the video
+  Relief relief;       // of the place, takes shadows; may be empty
+  cv::Mat nearness;    // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
   PlaneMirror mirror;
   Background background;
-  cv::Mat plate_linear;             // CV_32FC3
-  cv::Vec3f umbra = {0.4f, 0.4f, 0.4f};  // what the sun's absence leaves of a support plane's brightness
+  cv::Mat plate_linear;  // CV_32FC3
+  cv::Vec3f umbra = {0.4f, 0.4f,
+                     0.4f};  // what the sun's absence leaves of a support plane's brightness
   NoiseModel noise;
-  int views = 1;                     // frames that light and texture come from
-  double background_ms = 0.0, appearance_ms = 0.0;  // wall time that plate, and light with appearances, took
+  int views = 1;  // frames that light and texture come from
+  double background_ms = 0.0,
+         appearance_ms = 0.0;        // wall time that plate, and light with appearances, took
   std::vector<std::string> remarks;  // what had to be assumed or invented, for a diagnostic
 };
 
 // Learns a clip.
 // @throw std::invalid_argument if there is no frame, or a model's mesh cannot be drawn
-Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models, const RenderParams& params);
+Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
+                 const RenderParams& params);
 
 struct ShadowCache;
 struct RestPicture;
 
-// Draws edited frames. Every frame's result depends on that frame alone. Not thread-safe: shadow maps
-// of objects that rest, and the models of copies, are kept from frame to frame.
+// Draws edited frames. Every frame's result depends on that frame alone. Not thread-safe: shadow
+// maps of objects that rest, and the models of copies, are kept from frame to frame.
 class Renderer {
  public:
   Renderer(std::shared_ptr<const Prepared> prepared, const RenderParams& params);

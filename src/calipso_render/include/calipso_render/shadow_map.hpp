@@ -14,7 +14,8 @@ struct ShadowTaps;
 
 // Half the angle of the disc of sky that shades softly near contact, rad.
 constexpr double kSkyRadius = 0.8;
-// Part of the sky's light that a plane gets where `seen` of the sky is visible: some comes from what is around, also where none is.
+// Part of the sky's light that a plane gets where `seen` of the sky is visible: some comes from
+// what is around, also where none is.
 inline float skyLight(float seen) { return 0.15f + 0.85f * seen; }
 
 // How much of a distant disc of light each point sees, from one depth map towards the disc's centre
@@ -32,7 +33,8 @@ class ShadowMap : public Visibility {
             const Params& params);
 
   float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const override;
-  std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const override;
+  std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
+                               float radius) const override;
 
   // Length of a texel, m.
   float texel() const { return texel_; }
@@ -61,9 +63,10 @@ class ShadowMap : public Visibility {
   float texel_ = 0.0f, per_texel_ = 0.0f, angular_radius_ = 0.0f, highest_ = 0.0f;
   int width_ = 0, height_ = 0;
   std::shared_ptr<const ShadowTaps> taps_;
-  std::optional<VisibilityBuffer> map_;   // of the heights towards the light, m; none: nothing casts a shadow
-  int columns_ = 0, rows_ = 0;            // of cells
-  std::vector<Level> levels_;             // tell at once where all is lit or all is shaded
+  std::optional<VisibilityBuffer>
+      map_;                     // of the heights towards the light, m; none: nothing casts a shadow
+  int columns_ = 0, rows_ = 0;  // of cells
+  std::vector<Level> levels_;   // tell at once where all is lit or all is shaded
 };
 
 }  // namespace calipso::render

@@ -16,8 +16,8 @@ namespace calipso::render {
 // An object's surface as fitted to the key frame.
 struct ObjectModel {
   std::string name;
-  int index = 0;                 // label in the masks
-  TriangleMesh mesh;             // object frame, m
+  int index = 0;                                                        // label in the masks
+  TriangleMesh mesh;                                                    // object frame, m
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // at the key frame
 };
 
@@ -31,7 +31,8 @@ struct Surface {
   Points object_vertices;  // object frame, m
   Points key_vertices;     // world, key frame, m
   Points key_normals;      // world, unit
-  int winding = 0;         // of its triangles seen from outside: 1 counterclockwise, -1 clockwise, 0 it is open
+  int winding =
+      0;  // of its triangles seen from outside: 1 counterclockwise, -1 clockwise, 0 it is open
   std::vector<float> sky;  // part of the ambient light that a vertex gets past its own object
 };
 
@@ -63,10 +64,12 @@ struct SurfacePoint {
 };
 
 // The point that pixel (u, v) sees of a triangle. @param eye world position of the camera
-SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye);
+SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v,
+                          const Eigen::Vector3f& eye);
 
 // The same where its barycentric weights are known.
-SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3f& weights, const Eigen::Vector3f& eye);
+SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3f& weights,
+                          const Eigen::Vector3f& eye);
 
 // One picture of the clip with its objects where they were.
 struct View {
@@ -87,6 +90,7 @@ LitPoint litPoint(const Actor& actor, int triangle, float u, float v, const Eige
 struct Receiver {
   Eigen::Vector3f position, normal;  // world
 };
-std::optional<Receiver> receiverAt(const std::vector<SupportPlane>& planes, const Camera& camera, float u, float v);
+std::optional<Receiver> receiverAt(const std::vector<SupportPlane>& planes, const Camera& camera,
+                                   float u, float v);
 
 }  // namespace calipso::render

@@ -11,7 +11,7 @@ namespace calipso::render {
 struct Occluder {
   const Points* vertices;  // world, m
   const Triangles* triangles;
-  int winding = 0;         // Surface::winding
+  int winding = 0;  // Surface::winding
 };
 
 // How much of a distant disc of light the points of the scene see.
@@ -23,7 +23,8 @@ class Visibility {
   virtual float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const = 0;
 
   // What visibility() is all over the disc of `radius` around p, where that is known to be 0 or 1.
-  virtual std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n, float radius) const = 0;
+  virtual std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
+                                       float radius) const = 0;
 };
 
 }  // namespace calipso::render

@@ -16,12 +16,14 @@ cv::Mat viewOf(const sensor_msgs::Image& image, PixelFormat format) {
   const std::size_t row = static_cast<std::size_t>(image.width) * channels(format);
   if (image.width == 0 || image.height == 0 || image.step < row ||
       image.data.size() < static_cast<std::size_t>(image.step) * (image.height - 1) + row) {
-    throw std::invalid_argument("image of " + std::to_string(image.width) + " x " + std::to_string(image.height) + ", " +
-                                image.encoding + ", step " + std::to_string(image.step) + " has " +
-                                std::to_string(image.data.size()) + " bytes, which do not fit; check the source");
+    throw std::invalid_argument(
+        "image of " + std::to_string(image.width) + " x " + std::to_string(image.height) + ", " +
+        image.encoding + ", step " + std::to_string(image.step) + " has " +
+        std::to_string(image.data.size()) + " bytes, which do not fit; check the source");
   }
-  return cv::Mat(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC(channels(format)),
-                 const_cast<std::uint8_t*>(image.data.data()), image.step);
+  return cv::Mat(static_cast<int>(image.height), static_cast<int>(image.width),
+                 CV_8UC(channels(format)), const_cast<std::uint8_t*>(image.data.data()),
+                 image.step);
 }
 
 cv::Mat bgrFromMsg(const sensor_msgs::Image& image) {
@@ -31,7 +33,8 @@ cv::Mat bgrFromMsg(const sensor_msgs::Image& image) {
 
 cv::Mat labelsFromMsg(const sensor_msgs::Image& image) {
   if (image.encoding != sensor_msgs::image_encodings::MONO8) {
-    throw std::invalid_argument("segmentation labels are " + image.encoding + "; they must be mono8");
+    throw std::invalid_argument("segmentation labels are " + image.encoding +
+                                "; they must be mono8");
   }
   return viewOf(image, PixelFormat::kMono8).clone();
 }
@@ -50,17 +53,20 @@ sensor_msgs::Image imageMsg(const std_msgs::Header& header, const cv::Mat& image
   msg.header = header;
   msg.width = image.cols;
   msg.height = image.rows;
-  msg.encoding = image.channels() == 1 ? sensor_msgs::image_encodings::MONO8 : sensor_msgs::image_encodings::BGR8;
+  msg.encoding = image.channels() == 1 ? sensor_msgs::image_encodings::MONO8
+                                       : sensor_msgs::image_encodings::BGR8;
   msg.step = image.cols * image.channels();
   msg.data.resize(static_cast<std::size_t>(msg.step) * msg.height);
-  for (int v = 0; v < image.rows; ++v) std::memcpy(&msg.data[static_cast<std::size_t>(v) * msg.step], image.ptr(v), msg.step);
+  for (int v = 0; v < image.rows; ++v)
+    std::memcpy(&msg.data[static_cast<std::size_t>(v) * msg.step], image.ptr(v), msg.step);
   return msg;
 }
 
 std::vector<ObjectModel> fromMsg(const calipso_msgs::AlignedModels& models) {
   std::vector<ObjectModel> out;
   for (const calipso_msgs::AlignedModel& m : models.models) {
-    out.push_back({m.object, m.index, calipso::fromMsg(m.mesh), calipso::fromMsg(m.world_from_object.pose)});
+    out.push_back(
+        {m.object, m.index, calipso::fromMsg(m.mesh), calipso::fromMsg(m.world_from_object.pose)});
   }
   return out;
 }
@@ -73,8 +79,10 @@ std::optional<float> ifGiven(double value) {
 
 Look fromMsg(const calipso_msgs::Look& msg) {
   Look look;
-  const cv::Vec3f color(static_cast<float>(msg.color[2]), static_cast<float>(msg.color[1]), static_cast<float>(msg.color[0]));
-  const bool given = !std::isnan(msg.color[0]) && !std::isnan(msg.color[1]) && !std::isnan(msg.color[2]);
+  const cv::Vec3f color(static_cast<float>(msg.color[2]), static_cast<float>(msg.color[1]),
+                        static_cast<float>(msg.color[0]));
+  const bool given =
+      !std::isnan(msg.color[0]) && !std::isnan(msg.color[1]) && !std::isnan(msg.color[2]);
   if (given) (msg.color_is_absolute ? look.albedo : look.tint) = color;
   look.specular = ifGiven(msg.specular);
   look.roughness = ifGiven(msg.roughness);
@@ -83,14 +91,17 @@ Look fromMsg(const calipso_msgs::Look& msg) {
 
 }  // namespace
 
-PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics, const std::vector<ObjectModel>& models) {
+PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics,
+                          const std::vector<ObjectModel>& models) {
   PosesByStamp poses;
   for (const calipso_msgs::Dynamics& frame : dynamics.frames) {
     std::vector<ObjectPose>& here = poses[static_cast<std::int64_t>(frame.header.stamp.toNSec())];
     for (const calipso_msgs::ObjectDynamics& o : frame.objects) {
-      const auto model = std::find_if(models.begin(), models.end(), [&](const ObjectModel& m) { return m.name == o.object; });
+      const auto model = std::find_if(models.begin(), models.end(),
+                                      [&](const ObjectModel& m) { return m.name == o.object; });
       const bool rigid = o.tracks > 0 && o.mode_amplitudes.empty();
-      if (rigid && model != models.end()) here.push_back({model->index, calipso::fromMsg(o.world_from_object)});
+      if (rigid && model != models.end())
+        here.push_back({model->index, calipso::fromMsg(o.world_from_object)});
     }
   }
   return poses;
@@ -116,7 +127,8 @@ ObjectInFrame fromMsg(const calipso_msgs::ObjectState& state) {
     object.vertices.emplace_back(state.vertices[i], state.vertices[i + 1], state.vertices[i + 2]);
   }
   for (std::size_t i = 0; i + 2 < state.triangles.size(); i += 3) {
-    object.triangles.emplace_back(state.triangles[i], state.triangles[i + 1], state.triangles[i + 2]);
+    object.triangles.emplace_back(state.triangles[i], state.triangles[i + 1],
+                                  state.triangles[i + 2]);
   }
   return object;
 }

@@ -34,7 +34,8 @@ sensor_msgs::Image imageMsg(const std_msgs::Header& header, const cv::Mat& image
 std::vector<ObjectModel> fromMsg(const calipso_msgs::AlignedModels& models);
 
 // Of the objects that were followed as rigid bodies.
-PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics, const std::vector<ObjectModel>& models);
+PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics,
+                          const std::vector<ObjectModel>& models);
 
 SunChange sunFromMsg(const calipso_msgs::SimulationState& state);
 ObjectInFrame fromMsg(const calipso_msgs::ObjectState& state);

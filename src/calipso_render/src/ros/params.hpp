@@ -11,11 +11,11 @@ namespace calipso::render {
 enum class Mode { kBag, kLive };
 
 struct NodeParams {
-  std::string scene;        // folder with scene.yaml: supports, gravity
+  std::string scene;  // folder with scene.yaml: supports, gravity
   Mode mode = Mode::kBag;
   RenderParams render;
-  int clip_samples = 24;    // frames of the clip that are kept for the background, 2 .. 200
-  int live_queue = 10;      // frames that wait for their state in live mode, 1 .. 1000
+  int clip_samples = 24;  // frames of the clip that are kept for the background, 2 .. 200
+  int live_queue = 10;    // frames that wait for their state in live mode, 1 .. 1000
 };
 
 // Reads the private parameters; what the scene gives is filled into `render`.

@@ -13,13 +13,16 @@ constexpr std::size_t kLiveLabels = 300;  // label images kept in live mode
 constexpr std::uint32_t kLatchedQueue = 10000;
 
 double milliseconds(std::chrono::steady_clock::time_point since) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since).count();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since)
+      .count();
 }
 
 }  // namespace
 
 RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
-    : params_(loadParams(pnh)), reporter_(nh, "render"), clip_(params_.clip_samples),
+    : params_(loadParams(pnh)),
+      reporter_(nh, "render"),
+      clip_(params_.clip_samples),
       labels_(params_.mode == Mode::kLive ? kLiveLabels : 0) {
   edited_ = nh.advertise<sensor_msgs::Image>(topics::kImageEdited, 10);
   edited_info_ = nh.advertise<sensor_msgs::CameraInfo>(topics::kImageEditedCameraInfo, 10);
@@ -34,11 +37,12 @@ RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       nh.subscribe(topics::kStatus, 100, &RenderNode::onStatus, this),
   };
   clip_source_ = std::make_unique<FrameSource>(
-      nh, topics::kClipImage, topics::kClipCameraInfo, 0, poses_, [this](const Frame& f) { onClipFrame(f); },
+      nh, topics::kClipImage, topics::kClipCameraInfo, 0, poses_,
+      [this](const Frame& f) { onClipFrame(f); },
       [this](const sensor_msgs::ImageConstPtr& i, const std::string& r) { onBadClipFrame(i, r); });
   source_ = std::make_unique<FrameSource>(
-      nh, topics::kImage, topics::kCameraInfo, params_.mode == Mode::kLive ? params_.live_queue : 0, poses_,
-      [this](const Frame& f) { onFrame(f); },
+      nh, topics::kImage, topics::kCameraInfo, params_.mode == Mode::kLive ? params_.live_queue : 0,
+      poses_, [this](const Frame& f) { onFrame(f); },
       [this](const sensor_msgs::ImageConstPtr& i, const std::string& r) { onBadFrame(i, r); });
   reporter_.starting("waiting for clip, segmentation and models");
 }
@@ -50,14 +54,16 @@ void RenderNode::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
 
 void RenderNode::onClipFrame(const Frame& frame) {
   ++clip_frames_;
-  if (reporter_.state() == calipso_msgs::NodeStatus::STARTING) reporter_.preparing("taking in the clip");
+  if (reporter_.state() == calipso_msgs::NodeStatus::STARTING)
+    reporter_.preparing("taking in the clip");
   unlabelled_.push_back(frame);
   pairClipFrames(ros::Time(0));
   reporter_.clipFrameDone();
   prepareIfComplete();
 }
 
-void RenderNode::onBadClipFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason) {
+void RenderNode::onBadClipFrame(const sensor_msgs::ImageConstPtr& image,
+                                const std::string& reason) {
   ++clip_frames_;
   reporter_.warn(image->header.stamp, "clip frame left out of the background: " + reason);
   reporter_.clipFrameDone();
@@ -82,16 +88,24 @@ void RenderNode::pairClipFrames(const ros::Time& segmented) {
     const bool labelled = labels_.has(frame.stamp());
     if (!labelled && frame.stamp() >= segmented) return;
     unlabelled_.pop_front();
-    if (labelled) addClipFrame(frame, labels_.at(frame.stamp()));
-    else reporter_.warn(frame.stamp(), "clip frame left out of the background: it has no segmentation");
+    if (labelled)
+      addClipFrame(frame, labels_.at(frame.stamp()));
+    else
+      reporter_.warn(frame.stamp(),
+                     "clip frame left out of the background: it has no segmentation");
   }
 }
 
 void RenderNode::addClipFrame(const Frame& frame, const cv::Mat& labels) {
   try {
-    clip_.add({bgrFromMsg(*frame.image), labels, frame.camera, {}, static_cast<std::int64_t>(frame.stamp().toNSec())});
+    clip_.add({bgrFromMsg(*frame.image),
+               labels,
+               frame.camera,
+               {},
+               static_cast<std::int64_t>(frame.stamp().toNSec())});
   } catch (const std::exception& error) {
-    reporter_.warn(frame.stamp(), std::string("clip frame left out of the background: ") + error.what());
+    reporter_.warn(frame.stamp(),
+                   std::string("clip frame left out of the background: ") + error.what());
   }
 }
 
@@ -110,7 +124,8 @@ void RenderNode::onModels(const calipso_msgs::AlignedModelsConstPtr& msg) {
   prepareIfComplete();
 }
 
-// The light and the sides that the key frame does not show are learnt once: what comes later is not used.
+// The light and the sides that the key frame does not show are learnt once: what comes later is not
+// used.
 void RenderNode::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& msg) {
   dynamics_ = msg;
   prepareIfComplete();
@@ -122,7 +137,8 @@ void RenderNode::onStatus(const calipso_msgs::NodeStatusConstPtr& msg) {
     flow_works_ = msg->state != calipso_msgs::NodeStatus::FAILED;
     prepareIfComplete();
   }
-  const bool needed = msg->node == "segmentation" || msg->node == "align" || msg->node == "simulator";
+  const bool needed =
+      msg->node == "segmentation" || msg->node == "align" || msg->node == "simulator";
   if (!needed) return;
   failed_.erase(msg->node);
   if (msg->state == calipso_msgs::NodeStatus::FAILED) failed_[msg->node] = msg->message;
@@ -141,9 +157,11 @@ void RenderNode::prepareIfComplete() {
   if (!renderer_ && clipComplete() && !mustWaitForPoses()) prepareNow();
 }
 
-// Where objects move, further frames show more of them; the poses that this takes come from the flow.
+// Where objects move, further frames show more of them; the poses that this takes come from the
+// flow.
 bool RenderNode::mustWaitForPoses() {
-  if (params_.mode == Mode::kLive || dynamics_ || !flow_works_ || !anyMoves(clip_, models_)) return false;
+  if (params_.mode == Mode::kLive || dynamics_ || !flow_works_ || !anyMoves(clip_, models_))
+    return false;
   reporter_.preparing("waiting for the objects' motion in the clip");
   return true;
 }
@@ -163,9 +181,11 @@ void RenderNode::prepareNow() {
     plate_.publish(imageMsg(header, plate));
     for (const std::string& remark : prepared->remarks) reporter_.warn(ros::Time(0), remark);
     reporter_.ready("prepared from " + std::to_string(clip_.frames().size()) + " frames in " +
-                    std::to_string(static_cast<int>(milliseconds(start))) + " ms; light and texture from " +
-                    std::to_string(prepared->views) + (prepared->views == 1 ? " frame" : " frames") + ", " +
-                    std::to_string(taken.accepted) + " of " + std::to_string(taken.offered) + " poses fit their masks");
+                    std::to_string(static_cast<int>(milliseconds(start))) +
+                    " ms; light and texture from " + std::to_string(prepared->views) +
+                    (prepared->views == 1 ? " frame" : " frames") + ", " +
+                    std::to_string(taken.accepted) + " of " + std::to_string(taken.offered) +
+                    " poses fit their masks");
   } catch (const std::exception& error) {
     reporter_.failed(error.what());
   }
@@ -196,7 +216,8 @@ void RenderNode::onState(const calipso_msgs::SimulationStateConstPtr& msg) {
 
 // Live: the newest frame that has a state goes out; those before it are too late.
 void RenderNode::skipOlderThan(const ros::Time& stamp) {
-  const bool here = std::any_of(frames_.begin(), frames_.end(), [&](const Waiting& w) { return w.image->header.stamp == stamp; });
+  const bool here = std::any_of(frames_.begin(), frames_.end(),
+                                [&](const Waiting& w) { return w.image->header.stamp == stamp; });
   if (!here) return;
   while (!frames_.empty() && frames_.front().image->header.stamp < stamp) {
     reporter_.warn(frames_.front().image->header.stamp, "frame skipped, the machine is too slow; " +
@@ -205,11 +226,14 @@ void RenderNode::skipOlderThan(const ros::Time& stamp) {
   }
 }
 
-// Empty: frames can be edited. Otherwise the reason why they pass unedited, "" while they must wait.
+// Empty: frames can be edited. Otherwise the reason why they pass unedited, "" while they must
+// wait.
 std::string RenderNode::whyUnedited() const {
   if (!failed_.empty()) return failed_.begin()->first + " failed: " + failed_.begin()->second;
-  if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) return "the renderer could not be prepared";
-  if (params_.mode == Mode::kLive && !renderer_) return "not ready yet: waiting for segmentation and models";
+  if (reporter_.state() == calipso_msgs::NodeStatus::FAILED)
+    return "the renderer could not be prepared";
+  if (params_.mode == Mode::kLive && !renderer_)
+    return "not ready yet: waiting for segmentation and models";
   return "";
 }
 
@@ -218,7 +242,8 @@ void RenderNode::workOff() {
   }
   if (params_.mode != Mode::kLive) return;
   while (frames_.size() > static_cast<std::size_t>(params_.live_queue)) {
-    reporter_.warn(frames_.front().image->header.stamp, "frame skipped, no state came; " + std::to_string(++skipped_) + " so far");
+    reporter_.warn(frames_.front().image->header.stamp,
+                   "frame skipped, no state came; " + std::to_string(++skipped_) + " so far");
     frames_.pop_front();
   }
 }
@@ -230,8 +255,10 @@ bool RenderNode::workOffFront() {
   const auto state = states_.find(frame.image->header.stamp);
   if (reason.empty() && (!renderer_ || state == states_.end())) return false;
   frames_.pop_front();
-  if (reason.empty()) edit(frame, *state->second);
-  else passUnedited(frame, reason);
+  if (reason.empty())
+    edit(frame, *state->second);
+  else
+    passUnedited(frame, reason);
   states_.erase(states_.begin(), states_.upper_bound(frame.image->header.stamp));
   return true;
 }
@@ -266,7 +293,8 @@ void RenderNode::passUnedited(const Waiting& frame, const std::string& reason) {
   publish(frame, *frame.image, cv::Mat::zeros(frame.image->height, frame.image->width, CV_8U));
 }
 
-void RenderNode::publish(const Waiting& frame, const sensor_msgs::Image& edited, const cv::Mat& provenance) {
+void RenderNode::publish(const Waiting& frame, const sensor_msgs::Image& edited,
+                         const cv::Mat& provenance) {
   provenance_.publish(imageMsg(frame.image->header, provenance));
   if (frame.info) edited_info_.publish(*frame.info);
   edited_.publish(edited);

@@ -22,9 +22,9 @@
 
 namespace calipso::render {
 
-// Wires the renderer to topics. Preparation: clip frames, their segmentation and the models. Editing:
-// every image leaves once, in order, composed with the state of its stamp. All callbacks run in one
-// thread, which is what protects everything below.
+// Wires the renderer to topics. Preparation: clip frames, their segmentation and the models.
+// Editing: every image leaves once, in order, composed with the state of its stamp. All callbacks
+// run in one thread, which is what protects everything below.
 class RenderNode {
  public:
   RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh);
@@ -70,19 +70,20 @@ class RenderNode {
 
   ClipSample clip_;
   LabelStore labels_;
-  std::deque<Frame> unlabelled_;               // clip frames that wait for their segmentation
+  std::deque<Frame> unlabelled_;  // clip frames that wait for their segmentation
   std::optional<std::uint32_t> clip_length_;
-  std::uint32_t clip_frames_ = 0;              // seen, good or bad
+  std::uint32_t clip_frames_ = 0;  // seen, good or bad
   calipso_msgs::AlignedModelsConstPtr models_msg_;
   std::vector<ObjectModel> models_;
-  calipso_msgs::ClipDynamicsConstPtr dynamics_;  // of the clip; empty: not there yet, or nobody estimates it
-  bool flow_works_ = false;                    // somebody estimates it, and has not failed
+  calipso_msgs::ClipDynamicsConstPtr
+      dynamics_;             // of the clip; empty: not there yet, or nobody estimates it
+  bool flow_works_ = false;  // somebody estimates it, and has not failed
   std::map<std::string, std::string> failed_;  // node -> why
   std::unique_ptr<Renderer> renderer_;
 
   std::deque<Waiting> frames_;
   std::map<ros::Time, calipso_msgs::SimulationStateConstPtr> states_;
-  std::uint64_t skipped_ = 0;                  // live mode: frames that a newer one overtook
+  std::uint64_t skipped_ = 0;  // live mode: frames that a newer one overtook
 
   std::unique_ptr<FrameSource> clip_source_, source_;
   std::vector<ros::Subscriber> subscribers_;

@@ -20,7 +20,11 @@
 namespace calipso::render {
 namespace {
 
-double wallMs() { return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double wallMs() {
+  return std::chrono::duration<double, std::milli>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
 
 // Of all threads.
 double cpuMs() {
@@ -33,12 +37,13 @@ struct Options {
   std::string pictures;  // folder; empty: none are written
   int frames = 12;
   bool drawing = true;
-  std::string only;      // one way of drawing; empty: all
+  std::string only;  // one way of drawing; empty: all
   std::vector<std::string> scenes;
 };
 
 // Best and median of the frames after the first two.
-void timeFrames(const std::string& name, const DrawingCase& drawing, const Options& options, const std::function<cv::Mat(int)>& draw) {
+void timeFrames(const std::string& name, const DrawingCase& drawing, const Options& options,
+                const std::function<cv::Mat(int)>& draw) {
   std::vector<double> wall, cpu;
   cv::Mat last;
   for (int k = 0; k < options.frames + 2; ++k) {
@@ -48,28 +53,35 @@ void timeFrames(const std::string& name, const DrawingCase& drawing, const Optio
   }
   std::sort(wall.begin(), wall.end()), std::sort(cpu.begin(), cpu.end());
   if (!options.pictures.empty()) cv::imwrite(options.pictures + "/" + name + ".png", last);
-  std::printf("{\"case\": \"%s\", \"triangles\": %d, \"coverage\": %.3f, \"wall_ms\": %.2f, \"cpu_ms\": %.2f, \"cpu_median_ms\": %.2f}\n", name.c_str(),
-              drawing.triangles, drawing.coverage, wall.front(), cpu.front(), cpu[cpu.size() / 2]);
+  std::printf(
+      "{\"case\": \"%s\", \"triangles\": %d, \"coverage\": %.3f, \"wall_ms\": %.2f, \"cpu_ms\": "
+      "%.2f, \"cpu_median_ms\": %.2f}\n",
+      name.c_str(), drawing.triangles, drawing.coverage, wall.front(), cpu.front(),
+      cpu[cpu.size() / 2]);
   std::fflush(stdout);
 }
 
 void timeDrawing(const Options& options) {
   const DrawingCase live = makeDrawingCase(Quality::kLive);
-  const auto wanted = [&](const char* name) { return options.only.empty() || options.only == name; };
+  const auto wanted = [&](const char* name) {
+    return options.only.empty() || options.only == name;
+  };
   for (const Quality quality : {Quality::kLive, Quality::kFinal}) {
     const char* name = quality == Quality::kLive ? "drawing_live" : "drawing_final";
     if (!wanted(name)) continue;
     DrawingCase drawing = live;
     drawing.params.quality = quality;
     Renderer renderer(drawing.prepared, drawing.params);
-    timeFrames(name, drawing, options, [&](int k) { return renderer.composite(drawing.input(k)).bgr; });
+    timeFrames(name, drawing, options,
+               [&](int k) { return renderer.composite(drawing.input(k)).bgr; });
   }
   if (!wanted("drawing_llvmpipe")) return;
 #ifdef CALIPSO_HAVE_EGL
   try {
     LlvmpipeDrawing peer(live);
     std::fprintf(stderr, "OpenGL: %s\n", peer.renderer().c_str());
-    timeFrames("drawing_llvmpipe", live, options, [&](int k) { return peer.draw(live.verticesAt(k)); });
+    timeFrames("drawing_llvmpipe", live, options,
+               [&](int k) { return peer.draw(live.verticesAt(k)); });
   } catch (const std::exception& error) {
     std::fprintf(stderr, "drawing_llvmpipe left out: %s\n", error.what());
   }
@@ -79,10 +91,15 @@ void timeDrawing(const Options& options) {
 }
 
 void compareScene(const std::string& scene, const Options& options) {
-  const auto text = [](const std::optional<double>& value) { return value ? std::to_string(*value) : std::string("null"); };
+  const auto text = [](const std::optional<double>& value) {
+    return value ? std::to_string(*value) : std::string("null");
+  };
   for (const FillingResult& r : compareFilling(scene, options.pictures, cpuMs)) {
-    std::printf("{\"case\": \"filling\", \"scene\": \"%s\", \"method\": \"%s\", \"hole\": %.3f, \"psnr_db\": %s, \"gradient_ratio\": %s, \"cpu_ms\": %.1f}\n",
-                scene.c_str(), r.method.c_str(), r.hole, text(r.psnr_db).c_str(), text(r.gradient_ratio).c_str(), r.cpu_ms);
+    std::printf(
+        "{\"case\": \"filling\", \"scene\": \"%s\", \"method\": \"%s\", \"hole\": %.3f, "
+        "\"psnr_db\": %s, \"gradient_ratio\": %s, \"cpu_ms\": %.1f}\n",
+        scene.c_str(), r.method.c_str(), r.hole, text(r.psnr_db).c_str(),
+        text(r.gradient_ratio).c_str(), r.cpu_ms);
     std::fflush(stdout);
   }
 }
@@ -90,18 +107,25 @@ void compareScene(const std::string& scene, const Options& options) {
 }  // namespace
 }  // namespace calipso::render
 
-// Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only drawing_live|drawing_final|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per case.
+// Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only
+// drawing_live|drawing_final|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per case.
 int main(int argc, char** argv) {
   using namespace calipso::render;
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
+  cv::utils::logging::setLogLevel(
+      cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
   Options options;
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;
-    if (std::strcmp(argv[i], "--pictures") == 0 && has_value) options.pictures = argv[++i];
-    else if (std::strcmp(argv[i], "--frames") == 0 && has_value) options.frames = std::max(1, std::atoi(argv[++i]));
-    else if (std::strcmp(argv[i], "--only") == 0 && has_value) options.only = argv[++i];
-    else if (std::strcmp(argv[i], "--no-drawing") == 0) options.drawing = false;
-    else options.scenes.push_back(argv[i]);
+    if (std::strcmp(argv[i], "--pictures") == 0 && has_value)
+      options.pictures = argv[++i];
+    else if (std::strcmp(argv[i], "--frames") == 0 && has_value)
+      options.frames = std::max(1, std::atoi(argv[++i]));
+    else if (std::strcmp(argv[i], "--only") == 0 && has_value)
+      options.only = argv[++i];
+    else if (std::strcmp(argv[i], "--no-drawing") == 0)
+      options.drawing = false;
+    else
+      options.scenes.push_back(argv[i]);
   }
   try {
     if (options.drawing) timeDrawing(options);

@@ -9,7 +9,7 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kRings = 71, kColumns = 142;  // 2 * 71 * 142 = 20164 triangles
+constexpr int kRings = 71, kColumns = 142;     // 2 * 71 * 142 = 20164 triangles
 constexpr double kRadius = 0.1, kLift = 0.02;  // m
 constexpr int kLabel = 1;
 
@@ -23,7 +23,8 @@ Camera caseCamera() {
   axes.col(1) = Eigen::Vector3d(0, -s, -k);
   axes.col(2) = Eigen::Vector3d(0, k, -s);
   c.world_from_camera.linear() = axes;
-  c.world_from_camera.translation() = Eigen::Vector3d(0, 0, kRadius + kLift) - distance * axes.col(2);
+  c.world_from_camera.translation() =
+      Eigen::Vector3d(0, 0, kRadius + kLift) - distance * axes.col(2);
   return c;
 }
 
@@ -36,11 +37,14 @@ TriangleMesh bumpyBall() {
     for (int j = 0; j < kColumns; ++j) {
       const double a = M_PI * i / kRings, b = 2.0 * M_PI * j / kColumns;
       const double r = kRadius * (1.0 + 0.03 * std::sin(9.0 * a) * std::sin(8.0 * b));
-      m.vertices.row(i * kColumns + j) = r * Eigen::RowVector3d(std::sin(a) * std::cos(b), std::sin(a) * std::sin(b), std::cos(a));
+      m.vertices.row(i * kColumns + j) =
+          r * Eigen::RowVector3d(std::sin(a) * std::cos(b), std::sin(a) * std::sin(b), std::cos(a));
       if (i == kRings) continue;
       const int k = (j + 1) % kColumns;
-      m.triangles.row(t++) = Eigen::RowVector3i(i * kColumns + j, (i + 1) * kColumns + j, (i + 1) * kColumns + k);
-      m.triangles.row(t++) = Eigen::RowVector3i(i * kColumns + j, (i + 1) * kColumns + k, i * kColumns + k);
+      m.triangles.row(t++) =
+          Eigen::RowVector3i(i * kColumns + j, (i + 1) * kColumns + j, (i + 1) * kColumns + k);
+      m.triangles.row(t++) =
+          Eigen::RowVector3i(i * kColumns + j, (i + 1) * kColumns + k, i * kColumns + k);
     }
   }
   return m;
@@ -63,13 +67,15 @@ Light caseLight() {
 // Table and ball in exact light and shadow.
 ClipFrame keyFrame(const ObjectModel& model, const std::vector<SupportPlane>& planes) {
   const Camera camera = caseCamera();
-  ClipFrame frame{cv::Mat(camera.height, camera.width, CV_8UC3), cv::Mat::zeros(camera.height, camera.width, CV_8U), camera};
+  ClipFrame frame{cv::Mat(camera.height, camera.width, CV_8UC3),
+                  cv::Mat::zeros(camera.height, camera.width, CV_8U), camera};
   const Surface surface = makeSurface(model);
   const Actor actor = makeActor(surface, surface.key_vertices, camera);
   VisibilityBuffer buffer({0, 0, camera.width, camera.height});
   buffer.draw(actor.screen, 0);
   const Light light = caseLight();
-  const ShadowMap sun({{&actor.vertices, &surface.triangles}}, light.direction.cast<double>(), {768, 0.025, 16});
+  const ShadowMap sun({{&actor.vertices, &surface.triangles}}, light.direction.cast<double>(),
+                      {768, 0.025, 16});
   const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
@@ -83,8 +89,10 @@ ClipFrame keyFrame(const ObjectModel& model, const std::vector<SupportPlane>& pl
         p = receiver->position;
       }
       const cv::Vec3f shade = diffuseShading(light, n, sun.visibility(p, n));
-      const float grain = 0.3f + 0.1f * std::sin(160.0f * p.x() + 60.0f * p.z()) * std::sin(140.0f * p.y());
-      for (int c = 0; c < 3; ++c) frame.bgr.at<cv::Vec3b>(v, u)[c] = quantise(codeFromLinear(shade[c] * (grain + 0.1f * c)));
+      const float grain =
+          0.3f + 0.1f * std::sin(160.0f * p.x() + 60.0f * p.z()) * std::sin(140.0f * p.y());
+      for (int c = 0; c < 3; ++c)
+        frame.bgr.at<cv::Vec3b>(v, u)[c] = quantise(codeFromLinear(shade[c] * (grain + 0.1f * c)));
     }
   }
   return frame;
@@ -94,10 +102,12 @@ ClipFrame keyFrame(const ObjectModel& model, const std::vector<SupportPlane>& pl
 
 Points DrawingCase::verticesAt(int k) const {
   const Surface& s = prepared->surfaces.front();
-  const float swell = 1.0f + 0.01f * static_cast<float>(std::sin(0.7 * k)), sink = 0.004f * static_cast<float>(std::cos(0.5 * k));
+  const float swell = 1.0f + 0.01f * static_cast<float>(std::sin(0.7 * k)),
+              sink = 0.004f * static_cast<float>(std::cos(0.5 * k));
   const Eigen::Vector3f centre(0, 0, kRadius + kLift);
   Points out = s.key_vertices;
-  for (Eigen::Vector3f& p : out) p = centre + swell * (p - centre) + Eigen::Vector3f(0.003f, 0, sink);
+  for (Eigen::Vector3f& p : out)
+    p = centre + swell * (p - centre) + Eigen::Vector3f(0.003f, 0, sink);
   return out;
 }
 
@@ -119,7 +129,8 @@ DrawingCase makeDrawingCase(Quality quality) {
   const ClipFrame key = keyFrame(model, c.params.planes);
   ClipSample clip;
   clip.add(key);
-  // Found in one frame the light is off by so much that its shadow would be refuted and not drawn: it is given.
+  // Found in one frame the light is off by so much that its shadow would be refuted and not drawn:
+  // it is given.
   auto prepared = std::make_shared<Prepared>(prepare(clip, {model}, c.params));
   prepared->light.light = caseLight();
   prepared->shadowless = cv::Mat::zeros(key.labels.size(), CV_8U);

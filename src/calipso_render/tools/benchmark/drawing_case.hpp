@@ -12,12 +12,13 @@ namespace calipso::render {
 struct DrawingCase {
   RenderParams params;
   std::shared_ptr<const Prepared> prepared;
-  cv::Mat frame;            // CV_8UC3, the ball at rest
-  double coverage = 0.0;    // part of the picture
+  cv::Mat frame;          // CV_8UC3, the ball at rest
+  double coverage = 0.0;  // part of the picture
   int triangles = 0;
 
-  FrameInput input(int k) const;       // frame k: the ball swells and sinks a little, so that every vertex moves
-  Points verticesAt(int k) const;      // world, m
+  FrameInput input(
+      int k) const;  // frame k: the ball swells and sinks a little, so that every vertex moves
+  Points verticesAt(int k) const;  // world, m
 };
 
 DrawingCase makeDrawingCase(Quality quality);

@@ -38,7 +38,9 @@ cv::Mat frequencySelective(const cv::Mat& bgr, const cv::Mat& hole) {
 
 }  // namespace
 
-std::vector<FillingResult> compareFilling(const std::string& scene_directory, const std::string& pictures, const std::function<double()>& clock_ms) {
+std::vector<FillingResult> compareFilling(const std::string& scene_directory,
+                                          const std::string& pictures,
+                                          const std::function<double()>& clock_ms) {
   const Scene scene = loadScene(scene_directory);
   const cv::Mat objects = loadLabels(scene, 0) != 0, hole = grow(objects, kMargin);
   cv::Mat bgr = loadFrame(scene, 0).clone();
@@ -53,9 +55,13 @@ std::vector<FillingResult> compareFilling(const std::string& scene_directory, co
   for (const auto& [name, fill] : methods) {
     const double start = clock_ms();
     const cv::Mat filled = fill();
-    FillingResult r{name, std::nullopt, std::nullopt, static_cast<double>(cv::countNonZero(hole)) / hole.total(), clock_ms() - start};
-    if (truth) r.psnr_db = psnr(filled, *truth, objects), r.gradient_ratio = gradientRatio(filled, *truth, objects);
-    if (!pictures.empty()) cv::imwrite(pictures + "/" + scene.name + "_filled_" + name + ".png", filled);
+    FillingResult r{name, std::nullopt, std::nullopt,
+                    static_cast<double>(cv::countNonZero(hole)) / hole.total(), clock_ms() - start};
+    if (truth)
+      r.psnr_db = psnr(filled, *truth, objects),
+      r.gradient_ratio = gradientRatio(filled, *truth, objects);
+    if (!pictures.empty())
+      cv::imwrite(pictures + "/" + scene.name + "_filled_" + name + ".png", filled);
     results.push_back(r);
   }
   return results;

@@ -1,15 +1,15 @@
 #pragma once
 
 #include <functional>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <opencv2/core.hpp>
-
 namespace calipso::render {
 
-// One way to fill the holes that a scene's objects leave in its key frame, against the scene's true plate.
+// One way to fill the holes that a scene's objects leave in its key frame, against the scene's true
+// plate.
 struct FillingResult {
   std::string method;
   std::optional<double> psnr_db, gradient_ratio;  // without a true plate: none
@@ -19,6 +19,8 @@ struct FillingResult {
 
 // Ours and OpenCV's: Telea, Navier-Stokes, xphoto's fast frequency selective reconstruction.
 // @param pictures folder for the filled pictures; empty: none
-std::vector<FillingResult> compareFilling(const std::string& scene_directory, const std::string& pictures, const std::function<double()>& clock_ms);
+std::vector<FillingResult> compareFilling(const std::string& scene_directory,
+                                          const std::string& pictures,
+                                          const std::function<double()>& clock_ms);
 
 }  // namespace calipso::render

@@ -74,28 +74,34 @@ struct LlvmpipeDrawing::Context {
   void open() {
     setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
     display = eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
-    demand(display != EGL_NO_DISPLAY && eglInitialize(display, nullptr, nullptr), "no EGL display; Mesa's EGL is needed");
+    demand(display != EGL_NO_DISPLAY && eglInitialize(display, nullptr, nullptr),
+           "no EGL display; Mesa's EGL is needed");
     demand(eglBindAPI(EGL_OPENGL_API), "EGL offers no OpenGL");
     const EGLint version[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_CONTEXT_MINOR_VERSION, 3, EGL_NONE};
     context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, version);
-    demand(context != EGL_NO_CONTEXT && eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context), "no context of version 3.3");
+    demand(context != EGL_NO_CONTEXT &&
+               eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context),
+           "no context of version 3.3");
   }
 };
 
-LlvmpipeDrawing::LlvmpipeDrawing(const DrawingCase& drawing) : context_(new Context), drawing_(drawing) {
+LlvmpipeDrawing::LlvmpipeDrawing(const DrawingCase& drawing)
+    : context_(new Context), drawing_(drawing) {
   Context& c = *context_;
   c.open();
   const Camera& camera = drawing.prepared->camera;
   GLuint frame, targets[2], array;
   glGenFramebuffers(1, &frame), glBindFramebuffer(GL_FRAMEBUFFER, frame);
   glGenRenderbuffers(2, targets);
-  const GLenum formats[] = {GL_RGBA8, GL_DEPTH_COMPONENT24}, places[] = {GL_COLOR_ATTACHMENT0, GL_DEPTH_ATTACHMENT};
+  const GLenum formats[] = {GL_RGBA8, GL_DEPTH_COMPONENT24},
+               places[] = {GL_COLOR_ATTACHMENT0, GL_DEPTH_ATTACHMENT};
   for (int i = 0; i < 2; ++i) {
     glBindRenderbuffer(GL_RENDERBUFFER, targets[i]);
     glRenderbufferStorage(GL_RENDERBUFFER, formats[i], camera.width, camera.height);
     glFramebufferRenderbuffer(GL_FRAMEBUFFER, places[i], GL_RENDERBUFFER, targets[i]);
   }
-  demand(glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE, "the picture's buffer is incomplete");
+  demand(glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE,
+         "the picture's buffer is incomplete");
   glViewport(0, 0, camera.width, camera.height);
   glEnable(GL_DEPTH_TEST);
   glGenVertexArrays(1, &array), glBindVertexArray(array);
@@ -108,12 +114,15 @@ LlvmpipeDrawing::LlvmpipeDrawing(const DrawingCase& drawing) : context_(new Cont
     glVertexAttribPointer(i, 3, GL_FLOAT, GL_FALSE, 0, nullptr), glEnableVertexAttribArray(i);
   }
   glGenBuffers(1, &c.indices), glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, c.indices);
-  glBufferData(GL_ELEMENT_ARRAY_BUFFER, surface.triangles.size() * sizeof(Eigen::Vector3i), surface.triangles.data(), GL_STATIC_DRAW);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, surface.triangles.size() * sizeof(Eigen::Vector3i),
+               surface.triangles.data(), GL_STATIC_DRAW);
   const GLuint program = glCreateProgram();
-  glAttachShader(program, compiled(GL_VERTEX_SHADER, kVertexShader)), glAttachShader(program, compiled(GL_FRAGMENT_SHADER, kFragmentShader));
+  glAttachShader(program, compiled(GL_VERTEX_SHADER, kVertexShader)),
+      glAttachShader(program, compiled(GL_FRAGMENT_SHADER, kFragmentShader));
   glLinkProgram(program), glUseProgram(program);
   const Eigen::Matrix4f clip = clipFromWorld(camera);
-  const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>(), sun = drawing.prepared->light.light.direction;
+  const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>(),
+                        sun = drawing.prepared->light.light.direction;
   glUniformMatrix4fv(glGetUniformLocation(program, "clip_from_world"), 1, GL_FALSE, clip.data());
   glUniform3fv(glGetUniformLocation(program, "eye"), 1, eye.data());
   glUniform3fv(glGetUniformLocation(program, "to_sun"), 1, sun.data());
@@ -129,17 +138,22 @@ cv::Mat LlvmpipeDrawing::draw(const Points& vertices) {
   const Surface& surface = drawing_.prepared->surfaces.front();
   const Points normals = vertexNormals(vertices, surface.triangles);
   const std::size_t bytes = vertices.size() * sizeof(Eigen::Vector3f);
-  glBindBuffer(GL_ARRAY_BUFFER, context_->vertices), glBufferSubData(GL_ARRAY_BUFFER, 0, bytes, vertices.data());
-  glBindBuffer(GL_ARRAY_BUFFER, context_->normals), glBufferSubData(GL_ARRAY_BUFFER, 0, bytes, normals.data());
+  glBindBuffer(GL_ARRAY_BUFFER, context_->vertices),
+      glBufferSubData(GL_ARRAY_BUFFER, 0, bytes, vertices.data());
+  glBindBuffer(GL_ARRAY_BUFFER, context_->normals),
+      glBufferSubData(GL_ARRAY_BUFFER, 0, bytes, normals.data());
   glClearColor(0, 0, 0, 1);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * surface.triangles.size()), GL_UNSIGNED_INT, nullptr);
+  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * surface.triangles.size()), GL_UNSIGNED_INT,
+                 nullptr);
   cv::Mat picture(drawing_.prepared->camera.height, drawing_.prepared->camera.width, CV_8UC4), bgr;
   glReadPixels(0, 0, picture.cols, picture.rows, GL_BGRA, GL_UNSIGNED_BYTE, picture.data);
   cv::cvtColor(picture, bgr, cv::COLOR_BGRA2BGR);
   return bgr;
 }
 
-std::string LlvmpipeDrawing::renderer() const { return reinterpret_cast<const char*>(glGetString(GL_RENDERER)); }
+std::string LlvmpipeDrawing::renderer() const {
+  return reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+}
 
 }  // namespace calipso::render

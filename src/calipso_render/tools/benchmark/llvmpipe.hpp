@@ -7,8 +7,8 @@
 
 namespace calipso::render {
 
-// The drawing case's mesh by OpenGL without a window, on whatever software rasteriser Mesa has (llvmpipe): microfacet
-// shading per pixel, no shadow. A frame: new vertices in, picture out.
+// The drawing case's mesh by OpenGL without a window, on whatever software rasteriser Mesa has
+// (llvmpipe): microfacet shading per pixel, no shadow. A frame: new vertices in, picture out.
 class LlvmpipeDrawing {
  public:
   // @throw std::runtime_error naming what OpenGL lacks

@@ -15,7 +15,8 @@
 #include "calipso_scene/edit.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
 
-// Pure functions between messages and the plain types of calipso_scene. Each fromMsg undoes its toMsg.
+// Pure functions between messages and the plain types of calipso_scene. Each fromMsg undoes its
+// toMsg.
 namespace calipso {
 
 geometry_msgs::Point toPointMsg(const Eigen::Vector3d& p);

@@ -17,13 +17,14 @@
 
 namespace calipso {
 
-// The camera's pose in the world over time, from tf. Keeps the whole clip, so that a second pass over
-// the same stamps finds it again. Listens in its own thread; lookups may come from any thread.
+// The camera's pose in the world over time, from tf. Keeps the whole clip, so that a second pass
+// over the same stamps finds it again. Listens in its own thread; lookups may come from any thread.
 class CameraPoses {
  public:
   CameraPoses();
 
-  // @throw std::runtime_error naming frames, stamp and remedy when tf does not know the pose in time
+  // @throw std::runtime_error naming frames, stamp and remedy when tf does not know the pose in
+  // time
   Eigen::Isometry3d worldFromCamera(const std::string& camera_frame, const ros::Time& stamp) const;
 
  private:
@@ -53,8 +54,7 @@ class FrameSource {
               unsigned queue, const CameraPoses& poses, OnFrame on_frame, OnBadFrame on_bad_frame);
 
  private:
-  void onPair(const sensor_msgs::ImageConstPtr& image,
-              const sensor_msgs::CameraInfoConstPtr& info);
+  void onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
 
   const CameraPoses& poses_;
   OnFrame on_frame_;

@@ -15,7 +15,8 @@ class NodeReporter {
   // node: the name the player and the summary know it by (calipso_msgs/NodeStatus).
   NodeReporter(ros::NodeHandle& nh, const std::string& node);
 
-  // To be called after the node has subscribed: the player then waits for the connections and sends.
+  // To be called after the node has subscribed: the player then waits for the connections and
+  // sends.
   void starting(const std::string& message);
   void preparing(const std::string& message);
   void ready(const std::string& message);

@@ -2,7 +2,8 @@
 
 namespace calipso::topics {
 
-// Relative names; launch files put them into a namespace. docs/ARCHITECTURE.md says who talks to whom.
+// Relative names; launch files put them into a namespace. docs/ARCHITECTURE.md says who talks to
+// whom.
 constexpr char kClipInfo[] = "clip/info";
 constexpr char kClipImage[] = "clip/image";
 constexpr char kClipCameraInfo[] = "clip/camera_info";

@@ -7,8 +7,8 @@ namespace calipso {
 // Pinhole camera without distortion. Camera frame: x right, y down, z forward (REP 103 optical).
 // Pixels are u (column), v (row); pixel centres at integer coordinates, as in OpenCV.
 struct Camera {
-  int width = 0;   // px
-  int height = 0;  // px
+  int width = 0;                                  // px
+  int height = 0;                                 // px
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  // px
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
 

@@ -9,7 +9,9 @@ namespace calipso {
 // Sets of 0..count-1, each its own at first. The smallest member stands for its set.
 class DisjointSets {
  public:
-  explicit DisjointSets(int count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
+  explicit DisjointSets(int count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+  }
 
   int find(int i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];

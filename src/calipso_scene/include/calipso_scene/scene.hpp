@@ -14,7 +14,7 @@ namespace calipso {
 struct SupportPlane {
   std::string name;
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  double offset = 0.0;  // d, m
+  double offset = 0.0;                     // d, m
   std::optional<Eigen::Vector2d> x_range;  // m, world x; the plane ends there
 };
 
@@ -26,30 +26,30 @@ struct AttachmentBox {
 
 struct SceneObject {
   std::string name;
-  int index = 0;                // label in strokes.png and in masks, 1..254
-  std::string cad_path;         // absolute
+  int index = 0;         // label in strokes.png and in masks, 1..254
+  std::string cad_path;  // absolute
   Eigen::Isometry3d initial_world_from_object = Eigen::Isometry3d::Identity();  // rough placement
   Eigen::Vector4i rect = Eigen::Vector4i::Zero();  // x, y, width, height, px
   std::vector<AttachmentBox> attachments;
 };
 
-// What a user gives about a clip (scene.yaml): camera, gravity, supports, objects. Reads nothing else
-// of a scene folder: a folder without its ground truth gives the same Scene.
+// What a user gives about a clip (scene.yaml): camera, gravity, supports, objects. Reads nothing
+// else of a scene folder: a folder without its ground truth gives the same Scene.
 struct Scene {
   std::string name;
   std::string directory;
   double fps = 0.0;
   int frame_count = 0;
-  std::string frame_pattern;    // printf style, relative to directory
-  Camera camera;                // pose: frame 0
+  std::string frame_pattern;  // printf style, relative to directory
+  Camera camera;              // pose: frame 0
   std::vector<Eigen::Isometry3d> world_from_camera_per_frame;  // empty when the camera stands still
-  Eigen::Vector3d gravity = {0.0, 0.0, -9.81};  // m/s^2, world
+  Eigen::Vector3d gravity = {0.0, 0.0, -9.81};                 // m/s^2, world
   std::vector<SupportPlane> planes;
-  std::vector<std::string> support_meshes;      // absolute paths, world frame
-  std::string strokes_path;                     // empty when there are none
-  std::string matte_path;                       // frame 0: white stays before edited objects; empty: none
-  std::string depth_path;                       // frame 0, 16 bit; empty when there is none
-  double depth_scale = 0.001;                   // m per unit of the depth image
+  std::vector<std::string> support_meshes;  // absolute paths, world frame
+  std::string strokes_path;                 // empty when there are none
+  std::string matte_path;      // frame 0: white stays before edited objects; empty: none
+  std::string depth_path;      // frame 0, 16 bit; empty when there is none
+  double depth_scale = 0.001;  // m per unit of the depth image
   std::vector<SceneObject> objects;
 
   // The camera as it stands at frame k; past the last pose it stays there.

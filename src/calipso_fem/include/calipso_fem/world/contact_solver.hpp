@@ -30,8 +30,8 @@ struct ContactSolveReport {
   bool converged = false;
 };
 
-// Ends when no relative velocity changes by more than velocity_tolerance (m/s) in a sweep; without one, when the
-// impulses change by less than `tolerance` (relative).
+// Ends when no relative velocity changes by more than velocity_tolerance (m/s) in a sweep; without
+// one, when the impulses change by less than `tolerance` (relative).
 // @pre W is symmetric, positive semi-definite, with positive diagonal blocks
 ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRow>& rows,
                                  int max_iterations, double tolerance,

@@ -9,8 +9,9 @@ namespace calipso::fem {
 struct DecompositionParams {
   double concavity = 0.02;  // stop when the hulls exceed the solid by this share of its volume
   int max_hulls = 24;
-  int cuts_per_axis = 7;  // candidate planes per axis and split; if that does not do, half as many more, twice
-  int grid = 48;          // cells along the longest side, for volumes and inside tests
+  int cuts_per_axis =
+      7;  // candidate planes per axis and split; if that does not do, half as many more, twice
+  int grid = 48;  // cells along the longest side, for volumes and inside tests
 };
 
 // Approximate convex decomposition: the bounding box is split by axis-aligned planes, always the

@@ -16,7 +16,9 @@ class ObservedTrack {
   // Keeps samples sorted by time; one of the same time is replaced.
   void add(const ObservedMotion& sample);
   bool empty() const { return samples_.empty(); }
-  bool reaches(double time) const { return !samples_.empty() && samples_.back().time >= time - 1e-9; }  // s
+  bool reaches(double time) const {
+    return !samples_.empty() && samples_.back().time >= time - 1e-9;
+  }  // s
 
   // At rest in the key-frame pose where nothing better is known.
   ObservedMotion at(double time) const;

@@ -7,9 +7,9 @@ namespace calipso::fem {
 
 // Velocity of the air at one instant (calipso_msgs/Wind).
 struct ObservedWind {
-  double time = 0.0;                                      // s since the clip's first frame
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();     // m/s
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();   // m^2/s^2
+  double time = 0.0;                                     // s since the clip's first frame
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    // m/s
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // m^2/s^2
 };
 
 // A wind that changes slowly: linear between its samples, outside of them as in the nearest one.

@@ -32,7 +32,7 @@ struct RigidBodySpec {
 struct RigidTouch {
   std::optional<int> a, b;  // dynamic bodies; empty: it stands
   Eigen::Vector3d place = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();  // b to a
-  double gap = 0.0;  // m
+  double gap = 0.0;                                                                    // m
   double friction = 0.0;
 };
 

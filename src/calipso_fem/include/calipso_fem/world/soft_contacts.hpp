@@ -23,8 +23,8 @@ struct Obstacle {
   std::string name;
   SurfaceSettings surface;
   const SupportPlane* plane = nullptr;
-  const SurfaceTree* tree = nullptr;                                // in its own frame, at the start
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();           // world_from_tree, end of step
+  const SurfaceTree* tree = nullptr;                       // in its own frame, at the start
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // world_from_tree, end of step
   Eigen::Isometry3d previous_pose = Eigen::Isometry3d::Identity();  // start of step
   std::optional<RigidWorld::Id> rigid;  // dynamic rigid body: both poses are those at the start
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  // of the rigid body, m/s^2
@@ -41,7 +41,8 @@ struct SoftEntry {
 struct ContactParams {
   double proximity = 5e-3;  // m, surfaces closer than this are watched
   int iterations = 120;     // Gauss-Seidel sweeps per solve
-  double tolerance = 0.5;   // of allowed_depth: sweeps that change the ways of the surfaces by less are the last
+  double tolerance =
+      0.5;  // of allowed_depth: sweeps that change the ways of the surfaces by less are the last
   int newton_iterations = 30;
   double allowed_depth = 3e-6;  // m, remaining violation that ends a step's iteration,
   double residual = 1e-3;       // with this of bodies in contact, over their forces
@@ -49,10 +50,10 @@ struct ContactParams {
 
 struct ContactReport {
   int contacts = 0;
-  int iterations = 0;         // Gauss-Seidel sweeps of the step
+  int iterations = 0;  // Gauss-Seidel sweeps of the step
   int newton_iterations = 0;
-  int renewals = 0;           // of kept tangents
-  double deepest = 0.0;       // m, where the step ended
+  int renewals = 0;      // of kept tangents
+  double deepest = 0.0;  // m, where the step ended
   bool converged = true;
   std::vector<StepReport> bodies;  // as the softs
 
@@ -67,21 +68,21 @@ struct Contact {
   // (deformable, obstacle, vertex, how it was found): one vertex may touch two sides of a corner.
   using Key = std::tuple<int, int, int, int>;
   Key key;
-  int soft_a = -1, soft_b = -1;                  // indices of the step's list
-  int obstacle = -1;                             // index
+  int soft_a = -1, soft_b = -1;  // indices of the step's list
+  int obstacle = -1;             // index
   std::optional<RigidWorld::Id> rigid_a, rigid_b;
   bool ofOneBody() const { return soft_a >= 0 && soft_a == soft_b; }
-  SurfacePoint point, other;                     // on a; on b if it is deformable
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of b at the start, world; force acts here
+  SurfacePoint point, other;                          // on a; on b if it is deformable
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();    // of b at the start, world; force acts here
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // from b to a
   Eigen::Vector3d motion = Eigen::Vector3d::Zero();   // d_b where b is moved by nobody's force, m
   double start_gap = 0.0;                             // m
   double slack = 0.0;  // what the linear gap was wrong by where the step ends, m
-  double reach = 0.0;                                 // m, minimal distance of the pair
+  double reach = 0.0;  // m, minimal distance of the pair
   double friction = 0.0;
-  double offset = 0.0;                                // gap at which the surfaces touch, m
-  double held_normal = 0.0, held_tangential = 0.0;    // N
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();    // on a, N
+  double offset = 0.0;                              // gap at which the surfaces touch, m
+  double held_normal = 0.0, held_tangential = 0.0;  // N
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  // on a, N
 };
 
 class Anderson;
@@ -93,9 +94,9 @@ class StepMotion;
 // Newton on the incremental potentials of all bodies with kept tangents. Each direction solves the
 // contacts' laws by block Gauss-Seidel with the compliance H A^-1 H^T (Saupin et al. 2008) of the
 // same tangents, so that it obeys them however old these are; a tangent is renewed when the
-// iteration would take longer than that. Gaps are measured at the start of the step and taken along, and
-// measured again where the step ends; a point that is further away becomes a contact when its way
-// crosses a surface.
+// iteration would take longer than that. Gaps are measured at the start of the step and taken
+// along, and measured again where the step ends; a point that is further away becomes a contact
+// when its way crosses a surface.
 class SoftContacts {
  public:
   explicit SoftContacts(const ContactParams& params);
@@ -140,11 +141,14 @@ class SoftContacts {
   struct Island;
   // Whether contacts between the two are allowed does not count: that a pair which never touches is
   // excluded must not change a bit.
-  std::vector<Island> islandsOf(const std::vector<SoftEntry>& softs, const std::vector<Obstacle>& obstacles,
-                                const RigidWorld& rigid, double h) const;
-  void solveIsland(const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h, Island& island) const;
+  std::vector<Island> islandsOf(const std::vector<SoftEntry>& softs,
+                                const std::vector<Obstacle>& obstacles, const RigidWorld& rigid,
+                                double h) const;
+  void solveIsland(const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h,
+                   Island& island) const;
   // Distance from which on something may come within the minimal distance in the step, m.
-  double watchOf(const SoftEntry& entry, const Obstacle& obstacle, const RigidWorld& rigid, double h) const;
+  double watchOf(const SoftEntry& entry, const Obstacle& obstacle, const RigidWorld& rigid,
+                 double h) const;
 
   using Neighbourhood = std::tuple<int, int, int, int>;
   Neighbourhood neighbourhoodOf(const Contact& c, const std::vector<SoftEntry>& softs) const;
@@ -161,7 +165,8 @@ class SoftContacts {
                  const std::vector<Obstacle>& obstacles, int obstacle, const RigidWorld& rigid,
                  double h, std::vector<Candidate>& list) const;
   // The surface of a deformable object against itself (self_contact_detection.cpp).
-  void watchSelf(const std::vector<SoftEntry>& softs, int soft, const std::vector<Obstacle>& obstacles, double h,
+  void watchSelf(const std::vector<SoftEntry>& softs, int soft,
+                 const std::vector<Obstacle>& obstacles, double h,
                  std::vector<Candidate>& list) const;
   std::optional<Contact> crossingItself(const Candidate& c, const std::vector<SoftEntry>& softs,
                                         const StepMotion& motion) const;
@@ -171,7 +176,8 @@ class SoftContacts {
   std::optional<Contact> crossing(const Candidate& c, const std::vector<Obstacle>& obstacles,
                                   const std::vector<SoftEntry>& softs,
                                   const StepMotion& motion) const;
-  // Gaps and normals become those at the targets (soft_contact_geometry.cpp). @return how many were off
+  // Gaps and normals become those at the targets (soft_contact_geometry.cpp). @return how many were
+  // off
   int straighten(const std::vector<Candidate>& watched, const std::vector<Obstacle>& obstacles,
                  const std::vector<SoftEntry>& softs, const StepMotion& motion,
                  Contacts& contacts) const;
@@ -189,8 +195,8 @@ class SoftContacts {
   bool isOpen(const Contacts& contacts, const StepMotion& motion, double wanted) const;
   bool renewStale(const Contacts& contacts, double wanted, StepMotion& motion,
                   std::vector<int>& renewals) const;
-  int direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid, bool first, ContactOperator& problem,
-             StepMotion& motion, Contacts& contacts) const;
+  int direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid, bool first,
+             ContactOperator& problem, StepMotion& motion, Contacts& contacts) const;
   bool tooFast(const std::vector<Candidate>& watched, const std::vector<SoftEntry>& softs,
                double h) const;
   bool unbalanced(const StepMotion& motion, size_t soft, double wanted) const;

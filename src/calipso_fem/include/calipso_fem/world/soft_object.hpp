@@ -21,18 +21,18 @@ struct HoldPoint {
 };
 
 struct SettleReport {
-  double sag = 0.0;    // largest displacement under gravity if the shape were the rest shape, m
-  int iterations = 0;  // of the rest shape; 0: the sag is below the tolerance
+  double sag = 0.0;        // largest displacement under gravity if the shape were the rest shape, m
+  int iterations = 0;      // of the rest shape; 0: the sag is below the tolerance
   bool converged = false;  // false: a prestress carries the weight
-  std::string message;  // empty unless something has to be said
+  std::string message;     // empty unless something has to be said
 };
 
 class SelfProximity;
 class SoftSystem;
 
 // A deformable object in the simulated world: the FEM body and what the world needs around it:
-// loads added up from several sources, its rigid motion, the surface for contacts, the system contacts
-// are solved with.
+// loads added up from several sources, its rigid motion, the surface for contacts, the system
+// contacts are solved with.
 class SoftObject {
  public:
   // surface: world frame, as observed.
@@ -44,13 +44,14 @@ class SoftObject {
 
   // Makes the present shape the equilibrium under `gravity`, the hard constraints and the given
   // points of contact: the rest shape X is corrected by X -= x(X) - x_observed until the sag of the
-  // remainder is below `tolerance` (m). Where there is no such X, the body is relaxed as observed, and a
-  // prestress (prestress.hpp) of the present material carries its weight.
+  // remainder is below `tolerance` (m). Where there is no such X, the body is relaxed as observed,
+  // and a prestress (prestress.hpp) of the present material carries its weight.
   SettleReport settle(const Eigen::Vector3d& gravity, std::vector<HoldPoint>& hold,
                       double tolerance);
-  // Largest way (m) that it would sag by linear elasticity, were it relaxed in its present shape and held by
-  // its fixed nodes and the points; nothing where it would tip over on these.
-  std::optional<double> linearSag(const Eigen::Vector3d& gravity, const std::vector<HoldPoint>& hold) const;
+  // Largest way (m) that it would sag by linear elasticity, were it relaxed in its present shape
+  // and held by its fixed nodes and the points; nothing where it would tip over on these.
+  std::optional<double> linearSag(const Eigen::Vector3d& gravity,
+                                  const std::vector<HoldPoint>& hold) const;
   void setMaterial(const Material& material);
   // The prestress of another body with the same nodes.
   void copyPrestress(const SoftObject& other);
@@ -80,23 +81,25 @@ class SoftObject {
   double fastest() const { return fastest_; }  // surface vertex, m/s
   const Eigen::Vector3d& gravity() const { return gravity_; }
   const SurfaceTree& tree();
-  // Whether the surface meets itself. @throw std::invalid_argument unless it is closed and faces outwards
+  // Whether the surface meets itself. @throw std::invalid_argument unless it is closed and faces
+  // outwards
   void setSelfContact(bool on);
   SelfProximity* selfProximity() { return self_.get(); }  // of one that does
 
-  // A field on the surface (3 #V) as the nodes move that carry it: each goes as its surface does on average. Zero at
-  // nodes that are fixed or carry none.
+  // A field on the surface (3 #V) as the nodes move that carry it: each goes as its surface does on
+  // average. Zero at nodes that are fixed or carry none.
   Vec nodalField(const Vec& surface) const;
 
   // Rigid motion that best maps the observed shape to the present one (Kabsch, by nodal mass).
   Eigen::Isometry3d motion() const;
   bool hasFixedNodes() const;
-  bool isHeld(const SurfacePoint& point) const;   // by fixed nodes alone
-  void changed();  // the state was set from outside
+  bool isHeld(const SurfacePoint& point) const;  // by fixed nodes alone
+  void changed();                                // the state was set from outside
 
  private:
   double holdStiffness(size_t points) const;  // N/m, of each
-  SettleReport findRestShape(const Vec& goal, double stiffness, std::vector<HoldPoint>& hold, double tolerance);
+  SettleReport findRestShape(const Vec& goal, double stiffness, std::vector<HoldPoint>& hold,
+                             double tolerance);
   void applyPrestress();
   void setMomentum(const Momentum& target);
   Eigen::Vector3d gather(const Vec& nodal, const SurfacePoint& point) const;
@@ -105,8 +108,8 @@ class SoftObject {
   Eigen::Vector3d gravity_ = Eigen::Vector3d::Zero();
   Vec forces_;  // 3 #V, for the next step
   bool forced_ = false;
-  Vec observed_;  // 3 #N, nodes at construction
-  Vec prestress_;  // 3 #N, N, at the observed shape; empty: none
+  Vec observed_;                    // 3 #N, nodes at construction
+  Vec prestress_;                   // 3 #N, N, at the observed shape; empty: none
   double prestress_modulus_ = 0.0;  // Pa, of the material with which it carries the weight
   std::vector<int> carrier_;
   decltype(TriangleMesh::vertices) vertices_;

@@ -24,8 +24,8 @@ struct SurfaceFilter {
 };
 
 // Barycentric coordinates of the point of triangle abc nearest to p.
-Eigen::Vector3d closestBarycentric(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                   const Eigen::Vector3d& c);
+Eigen::Vector3d closestBarycentric(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                   const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
 // Bounding-volume hierarchy over a triangle surface: signed distances (angle-weighted
 // pseudo-normals, Baerentzen and Aanaes 2005) and swept points. Vertices may move; then refit().
@@ -43,16 +43,20 @@ class SurfaceTree {
   std::optional<SurfaceHit> firstEntry(const Eigen::Vector3d& from,
                                        const Eigen::Vector3d& to) const;
   // The same among some of the triangles.
-  std::optional<SurfaceHit> nearest(const Eigen::Vector3d& point, double reach, const SurfaceFilter& filter) const;
+  std::optional<SurfaceHit> nearest(const Eigen::Vector3d& point, double reach,
+                                    const SurfaceFilter& filter) const;
   std::optional<SurfaceHit> firstEntry(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
                                        const std::function<bool(int triangle)>& accepts) const;
 
   // Triangles whose boxes are within `reach` (m) of the point's.
-  void eachAround(const Eigen::Vector3d& point, double reach, const std::function<void(int triangle)>& visit) const;
+  void eachAround(const Eigen::Vector3d& point, double reach,
+                  const std::function<void(int triangle)>& visit) const;
 
   const TriangleMesh& mesh() const { return mesh_; }
   const Eigen::Vector3d& faceNormal(int triangle) const { return face_normal_[triangle]; }
-  const Eigen::Vector3d& vertexNormal(int vertex) const { return vertex_normal_[vertex]; }  // not of unit length
+  const Eigen::Vector3d& vertexNormal(int vertex) const {
+    return vertex_normal_[vertex];
+  }  // not of unit length
   const Eigen::AlignedBox3d& bounds() const { return nodes_.front().box; }
 
  private:

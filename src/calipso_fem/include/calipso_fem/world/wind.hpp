@@ -14,7 +14,8 @@ using Triangles = decltype(TriangleMesh::triangles);
 //  symbol  code       meaning                                        unit
 //  w       wind       velocity of the air                            m/s
 //          drag       density of the air times coefficient of drag;  kg/m^3
-//                     half of it for a closed mesh, which turns two faces to the wind for each sheet
+//                     half of it for a closed mesh, which turns two faces to the wind for each
+//                     sheet
 struct Air {
   Eigen::Vector3d wind = Eigen::Vector3d::Zero();
   double drag = 0.0;
@@ -22,9 +23,11 @@ struct Air {
 
 // Forces on the vertices, #V x 3, N.
 // @param x, u positions (m) and velocities (m/s) of the vertices, #V x 3
-// @param areal_density kg/m^2 of the sheet, and h (s): the force is damped by the change of u that it brings about
-//   within a step, so that a light sheet takes on the wind's speed instead of overshooting it; h = 0: undamped
-Vertices windForces(const Vertices& x, const Vertices& u, const Triangles& triangles, const Air& air,
-                    double areal_density, double h);
+// @param areal_density kg/m^2 of the sheet, and h (s): the force is damped by the change of u that
+// it brings about
+//   within a step, so that a light sheet takes on the wind's speed instead of overshooting it; h =
+//   0: undamped
+Vertices windForces(const Vertices& x, const Vertices& u, const Triangles& triangles,
+                    const Air& air, double areal_density, double h);
 
 }  // namespace calipso::fem

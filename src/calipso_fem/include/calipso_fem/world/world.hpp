@@ -28,15 +28,16 @@ class World {
   // @param deviation standard deviation of its length, m/s^2
   void addObservedGravity(const Eigen::Vector3d& gravity, double deviation);
 
-  // The wind at one instant as the cloth of an object shows it. Objects that are not there are passed over.
+  // The wind at one instant as the cloth of an object shows it. Objects that are not there are
+  // passed over.
   void addObservedWind(const std::string& object, const ObservedWind& wind);
 
-  // The shapes phi (3 #V x K, object frame) in which an object deforms in the video; ObservedMotion has their
-  // amplitudes. @throw std::invalid_argument: no such object, or shapes of another mesh
+  // The shapes phi (3 #V x K, object frame) in which an object deforms in the video; ObservedMotion
+  // has their amplitudes. @throw std::invalid_argument: no such object, or shapes of another mesh
   void addObservedModes(const std::string& object, const Eigen::MatrixXd& shapes);
 
-  // The instant (s) of an object's next collision in the video; they come in order. Objects that are not there are
-  // passed over.
+  // The instant (s) of an object's next collision in the video; they come in order. Objects that
+  // are not there are passed over.
   void addCollision(const std::string& object, double time);
   // No more collisions will come: an edit that waits for another one is refused.
   void allCollisionsKnown();

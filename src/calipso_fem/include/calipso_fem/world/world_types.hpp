@@ -50,7 +50,8 @@ struct ObservedMotion {
   Eigen::Vector3d linear = Eigen::Vector3d::Zero();        // m/s
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();       // rad/s
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  // m/s^2
-  // Of a deforming object: amplitudes of its modes (m) from the shape in the key frame, and their velocities (m/s).
+  // Of a deforming object: amplitudes of its modes (m) from the shape in the key frame, and their
+  // velocities (m/s).
   Eigen::VectorXd mode_amplitudes = {}, mode_velocities = {};
 };
 
@@ -91,8 +92,8 @@ struct PairRule {
 struct ObjectSettings {
   std::optional<double> youngs_modulus, poissons_ratio, density, damping;
   bool immovable() const { return density && std::isinf(*density); }
-  std::optional<ObjectKind> kind;   // once an edit touches the object
-  std::optional<double> cell_size;  // m
+  std::optional<ObjectKind> kind;    // once an edit touches the object
+  std::optional<double> cell_size;   // m
   std::optional<bool> self_contact;  // of a deformable one; empty: where it is thin enough to fold
   SurfaceSettings surface;
 };
@@ -104,9 +105,10 @@ struct WorldParams {
   int max_substeps = 2;              // of deformable objects, per frame
   FemOptions fem;                    // cell_size and target_nodes are chosen per object
   double proximity = 0.0;  // m, minimal distance of surfaces; 0: a fiftieth of the smallest object
-  int contact_iterations = 60;      // block Gauss-Seidel sweeps per solve
-  double contact_tolerance = 0.5;  // of the depth a step may end with: sweeps that change less are the last
-  SurfaceSettings support;          // of planes and support meshes
+  int contact_iterations = 60;  // block Gauss-Seidel sweeps per solve
+  double contact_tolerance =
+      0.5;  // of the depth a step may end with: sweeps that change less are the last
+  SurfaceSettings support;  // of planes and support meshes
   ObjectSettings defaults;
   std::map<std::string, ObjectSettings> objects;  // by object name; replaces the defaults
 
@@ -128,7 +130,7 @@ struct ObjectSnapshot {
   bool sleeping = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // best rigid motion
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>
-      vertices;                 // #V x 3; empty unless edited
+      vertices;  // #V x 3; empty unless edited
   Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>
       triangles;                // #F x 3, of a model that the video does not have; else empty
   Eigen::VectorXd von_mises;    // #V, Pa; empty unless deformable
@@ -149,7 +151,7 @@ struct ContactPoint {
 
 // Two things have met that were apart.
 struct TouchEvent {
-  std::string a, b;  // b: an object or a support
+  std::string a, b;   // b: an object or a support
   double time = 0.0;  // s since the first frame, finer than a frame
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // from b towards a
