@@ -92,8 +92,8 @@ CALIPSO_INLINE void locateBody(const TriangleMap* maps, const std::uint32_t* ids
   }
 }
 
-// Sums of a place's taps in even (B, G, R, _) and odd columns (B, G, R, _). @pre 1 <= u < columns -
-// 2, likewise v
+// Sums of a place's taps in even (B, G, R, _) and odd columns (B, G, R, _).
+// @pre 1 <= u < columns - 2, likewise v
 CALIPSO_INLINE Eight bicubicSums(const cv::Mat& image, std::size_t step, float u, float v) {
   const int i = static_cast<int>(u), j = static_cast<int>(v);
   const float t = u - static_cast<float>(i), s = v - static_cast<float>(j);
@@ -102,9 +102,10 @@ CALIPSO_INLINE Eight bicubicSums(const cv::Mat& image, std::size_t step, float u
               c01 = {1.0f, 1.0f, 1.0f, 1.0f, -2.5f, -2.5f, -2.5f, -2.5f};
   const Eight d01 = {-0.5f, -0.5f, -0.5f, -0.5f, 1.5f, 1.5f, 1.5f, 1.5f},
               b23 = {0.5f, 0.5f, 0.5f, 0.5f},
-              c23 = {2.0f, 2.0f, 2.0f, 2.0f, -0.5f, -0.5f, -0.5f, -0.5f};
+              c23 = {2.0f, 2.0f, 2.0f, 2.0f, -0.5f, -0.5f, -0.5f, -0.5f},
+              d23 = {-1.5f, -1.5f, -1.5f, -1.5f, 0.5f, 0.5f, 0.5f, 0.5f};
   const Eight first = a01 + t * (b01 + t * (c01 + t * d01)),
-              second = t * (b23 + t * (c23 - t * d01));
+              second = t * (b23 + t * (c23 + t * d23));
   const Four a = {0.0f, 1.0f, 0.0f, 0.0f}, b = {-0.5f, 0.0f, 0.5f, 0.0f},
              c = {1.0f, -2.5f, 2.0f, -0.5f}, d = {-0.5f, 1.5f, -1.5f, 0.5f};
   const Four wy = a + s * (b + s * (c + s * d));

@@ -159,14 +159,18 @@ TEST_F(Avx2, DrawsTheSameSamples) {
 
 // What is sampled in a row and what is sampled alone must not differ where the two meet.
 TEST(Kernels, SampleAsSampleBicubic) {
+  constexpr int kCount = 200;
   cv::RNG random(3);
   cv::Mat image(20, 30, CV_32FC4);
   random.fill(image, cv::RNG::UNIFORM, 0.0, 1.0);
-  for (int i = 0; i < 200; ++i) {
-    const float u = random.uniform(-3.0f, 33.0f), v = random.uniform(-3.0f, 23.0f);
-    cv::Vec4f out;
-    kernels().sample(image, &u, &v, 1, &out);
-    EXPECT_LT(cv::norm(out - sampleBicubic(image, u, v), cv::NORM_INF), 1e-6) << u << ", " << v;
+  std::vector<float> u(kCount), v(kCount);
+  for (int i = 0; i < kCount; ++i)
+    u[i] = random.uniform(-3.0f, 33.0f), v[i] = random.uniform(-3.0f, 23.0f);
+  std::vector<cv::Vec4f> out(kCount);
+  kernels().sample(image, u.data(), v.data(), kCount, out.data());
+  for (int i = 0; i < kCount; ++i) {
+    EXPECT_LT(cv::norm(out[i] - sampleBicubic(image, u[i], v[i]), cv::NORM_INF), 1e-6)
+        << u[i] << ", " << v[i];
   }
 }
 
