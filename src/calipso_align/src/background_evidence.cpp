@@ -51,8 +51,8 @@ cv::Mat connectedTo(const cv::Mat& mask, const cv::Mat& pixels) {
 
 cv::Mat contradicted(const cv::Mat& view, const cv::Mat& mask, const KnownBackground& background,
                      const cv::Mat& apart, double noise) {
-  constexpr double kStray =
-      0.02;  // of what is known beside the object: so much may differ by chance
+  // of what is known beside the object: so much may differ by chance
+  constexpr double kStray = 0.02;
   const cv::Mat accounts = accountsOf(view, background, noise);
   const cv::Mat object = mask > 0, elsewhere = apart > 0;
   // Single pixels that differ are noise, or the rim's mixtures.

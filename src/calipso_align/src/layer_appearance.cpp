@@ -63,8 +63,8 @@ namespace {
 
 constexpr float kDarkest = 0.3f, kLightest = 0.97f;  // of a shadow, in the picture's own gamma
 constexpr float kDeep = 0.92f;                       // darker than this: no change of exposure
-constexpr float kTint =
-    0.05f;  // of what a shadow takes in brightness: the sky that still lights it
+// of what a shadow takes in brightness: the sky that still lights it
+constexpr float kTint = 0.05f;
 
 // What is left of a colour when the shadow that comes closest is put on it.
 struct Darkened {

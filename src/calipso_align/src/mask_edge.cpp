@@ -29,8 +29,8 @@ std::optional<cv::Vec3f> meanNear(const cv::Mat& image, const cv::Mat& pure, con
 // Coverage of a pixel, or nothing where the colours do not tell.
 std::optional<float> coverage(const cv::Vec3f& colour, const cv::Vec3f& fore, const cv::Vec3f& back,
                               double noise) {
-  constexpr double kClear =
-      6.0;  // of the noise: contrast that places an edge to a sixth of a pixel
+  // of the noise: contrast that places an edge to a sixth of a pixel
+  constexpr double kClear = 6.0;
   constexpr double kOffLine = 0.35;  // of the contrast; further off no mixture explains the pixel
   const cv::Vec3f difference = fore - back, value = colour - back;
   const double squared = difference.dot(difference);

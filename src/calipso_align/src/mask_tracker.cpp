@@ -15,13 +15,13 @@ namespace calipso::align {
 namespace {
 
 constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
-constexpr int kLargeView =
-    200;  // px; from here on half the resolution tells how a layer moves nearly as well
+// px; from here on half the resolution tells how a layer moves nearly as well
+constexpr int kLargeView = 200;
 constexpr int kMeanSize = 4;  // px; blocks over which stillness averages the sensor's noise away
 constexpr size_t kMaxSamples = 2000;
 constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has proved wrong
-constexpr int kAnyShadow =
-    76;  // of 255: how likely a pixel may lie in a shadow where nothing is known of any
+// of 255: how likely a pixel may lie in a shadow where nothing is known of any
+constexpr int kAnyShadow = 76;
 constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
 
 cv::Mat blockMeans(const cv::Mat& image) {

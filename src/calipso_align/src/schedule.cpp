@@ -79,8 +79,8 @@ LowOrderStep literalRigidStep(const FitProblem& problem, const AlignOptions& opt
 }
 
 ElasticStep literalElasticStep(const AlignOptions& options) {
-  constexpr double kFixedWeight =
-      3e4;  // of 3e1 .. 3e4 what met the contours best; softer bodies break
+  // of 3e1 .. 3e4 what met the contours best; softer bodies break
+  constexpr double kFixedWeight = 3e4;
   ElasticStep step;
   step.fit.nodes = options.levels.empty() ? 600 : options.levels.front();
   step.fit.poissons_ratio = options.poissons_ratio;

@@ -173,8 +173,8 @@ void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int compone
 void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
                    SegmentationLevel& level) {
   constexpr float kMixed = 0.25f;  // what a colour that is a mixture still counts
-  constexpr float kDivided =
-      10.0f;  // nats, of a pixel in a flat piece that has strokes of another label only
+  // nats, of a pixel in a flat piece that has strokes of another label only
+  constexpr float kDivided = 10.0f;
   level.costs.resize(models.size());
   for (size_t k = 0; k < models.size(); ++k) {
     cv::Mat& cost = level.costs[k];

@@ -18,10 +18,10 @@ constexpr double kLeastMet = 0.8;      // part of the known contour: it may have
 constexpr double kMostOff = 0.02;      // part of the area: thin parts may be missing on either side
 constexpr double kLargestMeanPx = 1.0;  // on top of half the contour's noise
 constexpr double kLargestScale = 2.5;
-constexpr double kDistanceKnown =
-    0.01;  // part of the distance: what is more uncertain is worth a word
-constexpr double kLargestOff =
-    0.1;  // probability that the surface is further away than it should be
+// part of the distance: what is more uncertain is worth a word
+constexpr double kDistanceKnown = 0.01;
+// probability that the surface is further away than it should be
+constexpr double kLargestOff = 0.1;
 
 std::string percent(double part) { return std::to_string(std::lround(100.0 * part)) + " %"; }
 

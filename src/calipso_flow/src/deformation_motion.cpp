@@ -15,8 +15,8 @@ constexpr double kLeastPhase = 0.5;       // rad over the object's size
 constexpr double kEnd = 0.05;             // of the extent along gravity: what counts as the end
 constexpr double kLeftShare = 0.15;       // of the tracks that must have moved
 constexpr int kLeastLeft = 6;
-constexpr double kLeftDeviations =
-    8.0;  // of a track, which scatters by about twice its own account
+// of a track, which scatters by about twice its own account
+constexpr double kLeftDeviations = 8.0;
 
 SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& modes,
                       const SpectralLine& line, Eigen::VectorXcd& shape) {

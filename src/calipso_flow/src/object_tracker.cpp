@@ -13,13 +13,13 @@ namespace calipso::flow {
 namespace {
 
 constexpr int kRefinements = 2;  // warp, match both ways, fit
-constexpr double kSameLookShare =
-    0.025;  // of a patch's radius: poses this close need no look of their own
+// of a patch's radius: poses this close need no look of their own
+constexpr double kSameLookShare = 0.025;
 constexpr double kClearShare =
     0.7;                         // of the frame before's tracks: with so many no search is needed
 constexpr double kNearPx = 1.5;  // a prediction this close needs no half-size match
-constexpr double kSameShapePx =
-    1.0;  // looks that differ by this, but for where they are, serve for one another
+// looks that differ by this, but for where they are, serve for one another
+constexpr double kSameShapePx = 1.0;
 constexpr double kOtherView = 0.1;  // rad, or relative distance: looks from nearer show the same
 constexpr double kLeastInlierShare = 0.35;   // of the matches
 constexpr double kLeastVisibleShare = 0.25;  // of the seeds inside the picture
@@ -29,14 +29,14 @@ constexpr int kWeakInliers = 12;      // fewer tracks than this are worth anothe
 constexpr double kStaysShare = 0.01;  // of the diagonal: what moves less has not moved
 constexpr double kPatchShare = 1.0 / 160.0;  // of the picture's width: a patch's radius
 constexpr int kLargestRadius = 9;            // px
-constexpr double kDrownedShare =
-    0.35;  // of the seeds in the picture: with fewer tracks noise or blur drowns small patches
+// of the seeds in the picture: with fewer tracks noise or blur drowns small patches
+constexpr double kDrownedShare = 0.35;
 constexpr double kTurnedShare = 0.35;  // of the tracks due: with fewer the object may have turned
 constexpr size_t kTurnsTried = 6;
-constexpr double kFarView =
-    0.5;  // rad, or relative distance: seen from farther a look is drawn out
-constexpr double kShapeError =
-    0.01;  // of the object's extent, of its outline seen from another side
+// rad, or relative distance: seen from farther a look is drawn out
+constexpr double kFarView = 0.5;
+// of the object's extent, of its outline seen from another side
+constexpr double kShapeError = 0.01;
 constexpr double kIndependent = 1.5;  // errors along an outline: they are off nearly as one
 constexpr double kKeySigma = 1e-4;    // of the diagonal: the key pose is given, not measured
 

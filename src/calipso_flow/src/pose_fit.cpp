@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kShapeLength = 2.5;  // see ShapeError
 constexpr double kShapeReach = 4.0;   // of 2 l^2: farther apart tracks do not err together
-constexpr double kShapeAbsorbed =
-    2.0;  // 12 / (12 - 6): a pose takes up six of the errors of six such patches
+// 12 / (12 - 6): a pose takes up six of the errors of six such patches
+constexpr double kShapeAbsorbed = 2.0;
 constexpr double kRobust = 3.0;  // deviations: residuals beyond count less and less
 
 // Residuals and their derivatives by the motion of movePose(), for one pose.

@@ -15,8 +15,8 @@ constexpr double kFirstSide = 12.0;  // px, to twice this: the object's size in 
 constexpr int kMostReduced = 16;
 constexpr size_t kLookedAtAgain = 40;  // hypotheses, at twice the size
 constexpr double kAgainReach = 2.0;    // px of the first look
-constexpr double kTurnPenalty =
-    0.02;  // of correlation per rad: of looks that are alike, the less turned
+// of correlation per rad: of looks that are alike, the less turned
+constexpr double kTurnPenalty = 0.02;
 
 struct Hypothesis {
   Eigen::Isometry3d pose;

@@ -18,12 +18,12 @@ namespace {
 constexpr int kTrials = 8;    // steps of one fit, also those that make things worse
 constexpr int kFailures = 2;  // of these in a row
 constexpr double kLeastDamping = 0.3, kDamping = 5.0;
-constexpr double kStiffer =
-    0.05;  // log s: how much stiffer the sheet is that shows what stiffness does
+// log s: how much stiffer the sheet is that shows what stiffness does
+constexpr double kStiffer = 0.05;
 constexpr double kSettled = 0.02;  // m/s, a smaller step is the last
 constexpr double kGained = 1e-2;   // of the cost: less gained, and it was the last step
-constexpr double kSeen =
-    3.0;  // the pictures' information over that beforehand: half of the deviation
+// the pictures' information over that beforehand: half of the deviation
+constexpr double kSeen = 3.0;
 constexpr double kSeenShare = 0.03;  // of the best direction's
 constexpr double kWellShown = 0.95;  // of the motion's square: no other valley is looked for
 constexpr double kHardlyShown = 0.5;

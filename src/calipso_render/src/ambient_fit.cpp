@@ -13,8 +13,8 @@ constexpr std::size_t kStrips = 16;  // dealt out to the folds in turn
 constexpr int kRounds = 6;           // albedos and harmonics in turn
 constexpr double kPrior = 0.01;      // weight of the light as it was, as a part of all samples
 constexpr double kRobust = 0.15;     // relative residual beyond which a sample counts less
-constexpr double kBetter =
-    0.97;  // of the other light's error on all that was held out: less must remain
+// of the other light's error on all that was held out: less must remain
+constexpr double kBetter = 0.97;
 constexpr std::size_t kFewest = 200;
 
 using Terms = Eigen::Matrix<double, kTerms, 1>;

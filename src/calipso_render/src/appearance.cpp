@@ -17,8 +17,8 @@ namespace {
 constexpr float kMatt = 0.25f;  // part of a pixel's light that is never taken for a highlight
 constexpr int kMargin = 12;     // px around the object that albedo is extended by
 constexpr int kShadowMapSide = 768;
-constexpr float kLit =
-    0.7f;  // of the mean light: what has less of it shows its reflectance with less certainty
+// of the mean light: what has less of it shows its reflectance with less certainty
+constexpr float kLit = 0.7f;
 constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
 
 // Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the

@@ -15,8 +15,8 @@ constexpr float kNearMedian = 6.0f;    // code values; farther ones do not enter
 constexpr float kLit = 0.75f;          // quantile of brightness that stands for the unshaded value
 constexpr std::size_t kFewestLit = 3;  // samples that a lit or shaded group must have
 constexpr double kGroupGap = 4.0;      // gap between two groups, in spreads of either
-constexpr float kShadowTint =
-    1.8f;  // a shadow's largest ratio of shaded to lit in a channel over its smallest
+// a shadow's largest ratio of shaded to lit in a channel over its smallest
+constexpr float kShadowTint = 1.8f;
 constexpr int kAgree = 7;  // px; a shadow that stays covers most of such a square or nothing of it
 constexpr float kMovingSpread = 2.2f;  // times what still places have, and
 constexpr float kLeastMoving = 2.0f;   // code values: from there on a place moves by itself

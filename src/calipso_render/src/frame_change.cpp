@@ -15,10 +15,10 @@ namespace calipso::render {
 namespace {
 
 constexpr int kLeastChange = 3;  // px across
-constexpr std::uint8_t kSoftSky =
-    51;  // levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
-constexpr int kRimReach =
-    4;  // mask margins around a surface at rest in which the frame's pixels stay
+// levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
+constexpr std::uint8_t kSoftSky = 51;
+// mask margins around a surface at rest in which the frame's pixels stay
+constexpr int kRimReach = 4;
 
 }  // namespace
 

@@ -52,8 +52,8 @@ constexpr int kSameLevels = 4;            // the same of a lightLevel()
 constexpr float kPerLevel = 1.0f / 255.0f;
 constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own
                                    // pixels do not tell what it would be in more light
-constexpr int kRepaintReach =
-    2;  // px around a surface of a new look in which the frame has its old colour, too
+// px around a surface of a new look in which the frame has its old colour, too
+constexpr int kRepaintReach = 2;
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
 constexpr std::uint8_t kChanged = 255;  // of FrameCompositor::remirrored_
 constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels

@@ -19,14 +19,14 @@ namespace {
 constexpr int kShadowMapSide = 512;  // texels, live
 constexpr int kSkyMapSide = 128;     // the same for the sky, which is soft
 constexpr int kSkySteps = 160;       // places along the picture's width where the sky is measured
-constexpr float kEvenLight =
-    0.06f;  // of the light: between corners that differ by no more it is interpolated
+// of the light: between corners that differ by no more it is interpolated
+constexpr float kEvenLight = 0.06f;
 constexpr float kSmoothLight = 0.015f;  // likewise where the light in their middle is their mean
                                         // but for this; half of it over two steps
 constexpr int kShadowBoundsMargin = 8;  // px
 constexpr float kReliefMargin = 0.01f;  // m: planes have boxes without thickness
-constexpr float kHeightTolerance =
-    0.02f;  // of the height: a vertex that far below its plane still shades it
+// of the height: a vertex that far below its plane still shades it
+constexpr float kHeightTolerance = 0.02f;
 
 int skyStep(const cv::Size& picture) { return std::max(4, picture.width / kSkySteps); }
 

@@ -13,13 +13,11 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kWholePx = 0.5f,
-                kNonePx =
-                    5.0f;  // movement up to which the residual goes along, and from which none does
+// movement up to which the residual goes along, and from which none does
+constexpr float kWholePx = 0.5f, kNonePx = 5.0f;
 
-constexpr float kWholeSwaying = 0.05f,
-                kNoneSwaying =
-                    0.3f;  // ... of what sways in the video: what is missed is how it did
+// ... of what sways in the video: what is missed is how it did
+constexpr float kWholeSwaying = 0.05f, kNoneSwaying = 0.3f;
 
 constexpr float kMostChange =
     3.0f;  // factor: what is missed by more, where a surface has moved, is misfit and not its look

@@ -20,13 +20,13 @@ constexpr int kRegionMargin = 8;  // px
 constexpr int kRestReach = 2;     // px: what lies that near to a change may take part in it
 constexpr int kSameCodes = 8;     // code values, mean over 3 x 3 pixels, that noise may make
 constexpr float kDarker = 0.97f;  // of the plate's brightness: a passing shadow,
-constexpr float kDarkerElsewhere =
-    0.9f;  // likewise in another view, to which the plate is carried with small errors
+// likewise in another view, to which the plate is carried with small errors
+constexpr float kDarkerElsewhere = 0.9f;
 constexpr int kLeastPassing = 5;    // px across, and in another view
 constexpr int kLeastElsewhere = 9;  // that somewhere within
 constexpr int kPassingReach = 12;   // px: an edge that the plate misses looks like a narrow shadow
-constexpr float kSeenWithin =
-    0.8f;  // part of an object's mask that lies within its outline if that is right
+// part of an object's mask that lies within its outline if that is right
+constexpr float kSeenWithin = 0.8f;
 constexpr int kRimShare = 50;   // of the picture's width: how far a mask may miss a moving object
 constexpr int kInFront = 127;   // of a matte
 constexpr float kQuiet = 5.0f;  // code values of spread over time: the background rests

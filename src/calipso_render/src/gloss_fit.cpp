@@ -19,16 +19,16 @@ constexpr double kSmoothest = 0.03, kRoughest = 0.7;  // m
 constexpr int kRoughnesses = 24;
 constexpr int kReweightings = 3;
 constexpr double kOutlier = 0.15;  // of the cluster's brightness
-constexpr double kSharp =
-    0.98;  // of the worst roughness' error: less must remain, or the roughness is not told
+// of the worst roughness' error: less must remain, or the roughness is not told
+constexpr double kSharp = 0.98;
 constexpr double kBroad = 0.35;      // m from which a lobe looks like diffuse shading
 constexpr double kNarrowPart = 0.5;  // of its roughness, that a narrow one beside it has at most
-constexpr double kSeenBeside =
-    15.0;  // rows' mean errors by which the narrow one has to make the fit better
-constexpr double kAlike =
-    6.0;  // rows' mean errors within which another roughness explains the highlights as well
-constexpr double kExplained =
-    0.97;  // of the error without gloss: less must remain, or no highlight was seen
+// rows' mean errors by which the narrow one has to make the fit better
+constexpr double kSeenBeside = 15.0;
+// rows' mean errors within which another roughness explains the highlights as well
+constexpr double kAlike = 6.0;
+// of the error without gloss: less must remain, or no highlight was seen
+constexpr double kExplained = 0.97;
 
 struct NormalMap {
   cv::Rect region;

@@ -16,11 +16,11 @@ namespace {
 constexpr int kFewestSamples = 60;
 constexpr std::size_t kStarts = 3;
 constexpr double kTelling = 3.0;  // of log-likelihood: a direction is better than most
-constexpr double kShadowsSpeak =
-    12.0;  // of log-likelihood: cast shadows are seen where this light casts them
+// of log-likelihood: cast shadows are seen where this light casts them
+constexpr double kShadowsSpeak = 12.0;
 constexpr double kRobust = 0.15;  // relative residual beyond which a pixel counts less
-constexpr double kLogRange =
-    4.0;  // of a light's colour: e^4 times brighter or darker than the unit
+// of a light's colour: e^4 times brighter or darker than the unit
+constexpr double kLogRange = 4.0;
 constexpr double kPriorWeight = 0.05;  // of one prior, as a part of all pixels
 
 // Every parameter of the model; blocks as in ReflectanceCost.

@@ -15,8 +15,8 @@ constexpr std::size_t kPerObject = 1500;  // samples at most
 constexpr int kRim = 3;                   // px of the mask's rim that are left out
 constexpr float kSaturated = 250.0f;      // code value
 constexpr int kClustersPerObject = 4;
-constexpr float kGrazingView =
-    0.25f;  // cosine to the viewer; flatter ones mirror more than the model knows
+// cosine to the viewer; flatter ones mirror more than the model knows
+constexpr float kGrazingView = 0.25f;
 
 struct Pixel {
   int u, v;

@@ -15,12 +15,12 @@ namespace {
 constexpr int kHalf = 4;            // px on either side of a line that are drawn with it
 constexpr float kShortest = 14.0f;  // px of a line that is seen
 constexpr float kReach = 8.0f;      // px from where a line was lost to the hole
-constexpr float kClear =
-    4.0f;  // px from the hole at which the line must have been seen: it does not run along the rim
+// px from the hole at which the line must have been seen: it does not run along the rim
+constexpr float kClear = 4.0f;
 constexpr int kFirst = 2, kLast = 14;  // px before the end over which its colours are averaged
 constexpr int kCentrings = 3;
-constexpr float kLineItself =
-    0.3f;  // of the contrast: what differs more from its surroundings is the line
+// of the contrast: what differs more from its surroundings is the line
+constexpr float kLineItself = 0.3f;
 constexpr float kSameLine = 0.995f;  // cosine between the two edges of a line
 constexpr float kContrast = 12.0f;   // code values across a line, at least
 constexpr int kBesideFirst = kHalf + 2,
@@ -38,8 +38,8 @@ constexpr float kInHole = 0.7f;       // part of a connection that the hole hide
 constexpr float kLongest = 40.0f;     // px of a line that are mirrored
 constexpr float kNear = 4.0f;         // px on either side that its colours reach
 constexpr float kCore = 1.5f;         // px on either side that are the line itself
-constexpr float kSame =
-    0.2f;  // change of colours along a line, to their contrast, from which it is another
+// change of colours along a line, to their contrast, from which it is another
+constexpr float kSame = 0.2f;
 constexpr float kCrossFade = 4.0f;  // px on either side of the middle
 
 using Profile = std::array<cv::Vec3f, 2 * kHalf + 1>;  // colours across a line

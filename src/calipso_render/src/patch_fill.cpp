@@ -17,9 +17,8 @@ constexpr float kUnknown = 1e-3f;     // weight of unknown pixels in coarser lev
 constexpr float kMostlyKnown = 0.5f;  // part of a coarser level's pixel from which it is no hole
 constexpr int kBandRows = 16;         // rows that one thread searches in order
 constexpr int kFirstGuesses = 200;    // places tried for a patch of the rim
-constexpr int kFarthest = 16,
-              kFinest =
-                  2;  // px around the best place in which levels, and the finest, look further
+// px around the best place in which levels, and the finest, look further
+constexpr int kFarthest = 16, kFinest = 2;
 constexpr int kSweeps = 2;     // of a search
 constexpr float kJump = 1.6f;  // times better than what continues a neighbour's copy a place beside
                                // it must be: pieces stay large

@@ -11,15 +11,14 @@ namespace calipso::render {
 namespace {
 
 constexpr int kStride = 4;  // px between pixels that planes are sought among
-constexpr int kSeedStep = 16,
-              kSeedReach =
-                  7;  // px: places where planes are begun, and the square they are begun from
+// px: places where planes are begun, and the square they are begun from
+constexpr int kSeedStep = 16, kSeedReach = 7;
 constexpr int kMostPlanes = 10;
 constexpr double kLeastPart = 0.01;  // of the picture, for a plane: walls, not the sides of things
 constexpr float kOnPlane = 0.01f;    // of the nearness
 constexpr double kSeedSpread = 0.005;  // likewise
-constexpr float kOffSupport =
-    0.02f;  // of the nearness: what is farther from the support planes is relief
+// of the nearness: what is farther from the support planes is relief
+constexpr float kOffSupport = 0.02f;
 constexpr float kBehind = 1.02f;      // of an object's nearness: what it hides is no nearer
 constexpr double kLeastPiece = 0.05;  // of a plane's pixels, for a connected piece of it to count
 constexpr double kBeyond = 0.25;  // of the side of a square as large as what is seen of a plane: so

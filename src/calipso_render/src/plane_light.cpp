@@ -9,10 +9,10 @@ namespace {
 
 constexpr int kLargest = 64, kSquare = SquareMask::kSide,
               kStep = 2;  // px: squares, and the places in the least of them
-constexpr float kEven =
-    0.05f;  // of visibility: places that differ by no more speak for those between them
-constexpr float kSlow =
-    0.3f;  // of visibility: between places that differ by no more it is interpolated
+// of visibility: places that differ by no more speak for those between them
+constexpr float kEven = 0.05f;
+// of visibility: between places that differ by no more it is interpolated
+constexpr float kSlow = 0.3f;
 
 class Squares {
  public:

@@ -20,15 +20,13 @@ constexpr int kTestedWidth = 192;   // px to which the picture is brought down f
 constexpr double kAround = 10.0;    // px of those: deviation of the weights around a pixel
 constexpr int kSquare = 8;          // px of the squares of which every other one is held out
 constexpr int kFarthest = 64;       // px by which the image is displaced for comparison
-constexpr double kAlike =
-    0.3;  // correlation with the image in place up to which a displaced one is another
+// correlation with the image in place up to which a displaced one is another
+constexpr double kAlike = 0.3;
 constexpr int kFewestOthers = 12;    // such displaced images, at least
 constexpr double kClear = 1.8;       // times what the best of them explains
 constexpr double kExplained = 0.04;  // of the squares around the image, at least
-constexpr double
-    kFaintest = 0.3,
-    kBrightest =
-        10.0;  // strengths, times what water and varnish mirror: dull ones, and polished steel
+// strengths, times what water and varnish mirror: dull ones, and polished steel
+constexpr double kFaintest = 0.3, kBrightest = 10.0;
 constexpr int kMisplaced = 2;  // px by which the image may be displaced against its place
 constexpr float kSlopes[] = {0.0f, 0.01f, 0.02f, 0.04f, 0.08f, 0.16f};  // that are tried
 constexpr int kBlurs = 7;           // levels of blur, each twice the one before,

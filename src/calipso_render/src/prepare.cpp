@@ -22,21 +22,20 @@ namespace {
 
 constexpr float kOpenSky =
     0.4f;  // ... above which the dark of a shadow says how dark the sun's absence is
-constexpr float kUnshadedSun = 0.985f,
-                kUnshadedSky =
-                    0.85f;  // visible parts from which a place says how the planes mirror
-constexpr int kFrontOpening =
-    7;  // px; narrower gaps between mask and model are misfit, unless they reach
+// visible parts from which a place says how the planes mirror
+constexpr float kUnshadedSun = 0.985f, kUnshadedSky = 0.85f;
+// px; narrower gaps between mask and model are misfit, unless they reach
+constexpr int kFrontOpening = 7;
 constexpr int kNarrowFront = 3;     // ... so much of them
 constexpr float kDeepFront = 6.0f;  // ... that far inside the model's outline: a peg on a towel
 constexpr std::size_t kFurtherViews = 5;  // beside the key frame
 constexpr float kNearerBeside = 1.02f;    // times as near: before an object
-constexpr float kOffPlane =
-    0.1f;  // part by which scenery is nearer or farther than the plane behind or before it
+// part by which scenery is nearer or farther than the plane behind or before it
+constexpr float kOffPlane = 0.1f;
 constexpr double kStillOverlap = 0.93;  // masks of an object at rest overlap by more than this
 constexpr int kSameCodes = 8;           // code values, mean over 3 x 3 pixels, that noise may make
-constexpr double kSwayed =
-    0.15;  // part of an object in which the picture changes by more if it sways
+// part of an object in which the picture changes by more if it sways
+constexpr double kSwayed = 0.15;
 
 // @param nearness of the place, from the key frame's camera
 std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness) {

@@ -7,8 +7,8 @@ namespace {
 
 constexpr float kScreen =
     0.003f;  // inverse square of the distance, px, over which a seam is spread
-constexpr float kEdge =
-    25.0f;  // code values; what misses by much more is an edge of things, not a seam to be spread
+// code values; what misses by much more is an edge of things, not a seam to be spread
+constexpr float kEdge = 25.0f;
 constexpr float kRelax = 1.8f;  // of Gauss-Seidel
 constexpr int kIterations = 30;
 const cv::Point kAround[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};

@@ -18,8 +18,8 @@ namespace {
 
 constexpr float kStretch = 1.35f;  // of an edge laid flat, at most; and 1 / that at least
 constexpr float kCell = 0.05f;     // of the radius: squares by which laid triangles are found
-constexpr float kUpright =
-    0.1f;  // part of `down` that must lie in the seed's plane to be a direction there
+// part of `down` that must lie in the seed's plane to be a direction there
+constexpr float kUpright = 0.1f;
 
 float cross(const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
   return a.x() * b.y() - a.y() * b.x();

@@ -14,8 +14,8 @@ namespace {
 constexpr std::size_t kMirrorProbes = 300;
 constexpr float kMirrorTolerance = 0.03f;  // of the surface's extent
 constexpr float kMirrorPart = 0.95f;       // of the vertices that must find their image
-constexpr float kAlike =
-    0.9f;  // principal axes of nearly the same length: any axis between may be the one
+// principal axes of nearly the same length: any axis between may be the one
+constexpr float kAlike = 0.9f;
 constexpr int kAnglesBetween = 12;  // tried there, over half a turn
 
 Eigen::AlignedBox3f boxOf(const Points& points) {
@@ -43,8 +43,8 @@ constexpr std::size_t kAxisTriangles = 2000;  // looked at
 constexpr float kCrease = 0.85f;              // cosine between the normals of vertex and triangle
 constexpr int kRefinements = 4;
 constexpr float kAxisMiss = 0.015f;  // of the extent: how far a normal may pass by the axis
-constexpr float kTurned =
-    0.25f;  // sine between normal and axis; what faces along the axis says nothing
+// sine between normal and axis; what faces along the axis says nothing
+constexpr float kTurned = 0.25f;
 constexpr float kAxisPart = 0.5f;  // of the area that says something, which must agree
 constexpr float kAxisNear = 0.5f;  // of the extent: how far the axis may run from the middle
 

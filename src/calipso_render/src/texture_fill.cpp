@@ -13,23 +13,22 @@ namespace calipso::render {
 namespace {
 
 constexpr std::size_t kMostTexels = 300000;  // per object
-constexpr float kDepthTolerance =
-    0.012f;  // of the object's extent: a point that far behind the front is hidden
-constexpr float kOffSurface =
-    0.03f;  // ... a like place that far before the front is not on the object
+// of the object's extent: a point that far behind the front is hidden
+constexpr float kDepthTolerance = 0.012f;
+// ... a like place that far before the front is not on the object
+constexpr float kOffSurface = 0.03f;
 constexpr float kFlattest = 0.05f,
                 kFull = 0.25f;   // cosine of the view from which a surface is seen, and well seen
 constexpr float kEnough = 0.3f;  // weight of a look that needs no other
 constexpr float kSeen = 1e-5f;   // sum of weights, cubed, below which a texel counts as not seen
-constexpr float kKnown =
-    0.5f;  // certainty, of the greatest there is, of what others are continued from
+// certainty, of the greatest there is, of what others are continued from
+constexpr float kKnown = 0.5f;
 constexpr float kSure = 0.2f;                     // ... of which nothing else is needed
 constexpr float kFurther = 0.3f;                  // of further frames, whose poses are less exact
 constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;  // the key frame's share in a colour with which it
                                                   // counts for nothing, and alone
-constexpr float kPoor = 0.15f,
-                kGood =
-                    0.45f;  // weight of a look at a like place that counts for nothing, and in full
+// weight of a look at a like place that counts for nothing, and in full
+constexpr float kPoor = 0.15f, kGood = 0.45f;
 constexpr float kAskew = 0.6f,
                 kAlike = 0.9f;  // cosine between normals that are not, and are, mirror images
 constexpr float kQuarter = 0.25f * static_cast<float>(M_PI);

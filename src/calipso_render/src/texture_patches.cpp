@@ -15,15 +15,15 @@ namespace {
 
 constexpr float kAcross = 200.0f;  // px of a chart's picture that the surface's extent has, at most
 constexpr float kRadius = 70.0f;   // px, of a chart
-constexpr float kKnown =
-    0.5f;  // certainty, of the greatest there is, from which a texel is copied from and stays
+// certainty, of the greatest there is, from which a texel is copied from and stays
+constexpr float kKnown = 0.5f;
 constexpr float kBlend = 0.2f;  // ... on either side of which both colours mix
 constexpr int kMargin = 4;      // px around a chart
 constexpr int kGap = 8;         // px between two charts in one picture: more than a patch
-constexpr double kPatternSize =
-    3.0;  // px: standard deviation of the blur that takes a pattern away
-constexpr double kPlain =
-    6.0;  // code values r.m.s. of what it takes: no more than a picture's noise
+// px: standard deviation of the blur that takes a pattern away
+constexpr double kPatternSize = 3.0;
+// code values r.m.s. of what it takes: no more than a picture's noise
+constexpr double kPlain = 6.0;
 constexpr int kPatternSide = 25;  // px of the square in which that is looked at
 constexpr double kAllOver = 0.8;  // of the best seen part on which there must be more
 constexpr int kMostCharts = 60;

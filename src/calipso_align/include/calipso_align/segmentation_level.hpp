@@ -40,7 +40,7 @@ struct SegmentationLevel {
   Relief relief;                  // empty without a depth image
   std::vector<cv::Mat> expected;  // CV_32F per label number, as the relief's inverse depth: where a
                                   // fitted model has its surface, 0 outside of it; or empty
-  float jump_scale = 0.0f;  // of label_cut.hpp over the region
+  float jump_scale = 0.0f;        // of label_cut.hpp over the region
   cv::Mat mixed;    // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
   cv::Mat stroked;  // CV_8U: as seeds, of the flat piece of the relief that a pixel is in; or empty
   std::vector<char>

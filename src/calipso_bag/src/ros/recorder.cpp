@@ -17,8 +17,8 @@ namespace calipso::bag {
 namespace {
 
 constexpr unsigned kQueue = 10000;  // nothing may be lost before it is written
-constexpr std::size_t kLagFrames =
-    8;  // messages of a frame may come this much later than its image
+// messages of a frame may come this much later than its image
+constexpr std::size_t kLagFrames = 8;
 
 std::string seconds(const ros::Time& stamp) { return std::to_string(stamp.toSec()) + " s"; }
 

@@ -76,8 +76,8 @@ ContactSolveReport solveContacts(const Eigen::MatrixXd& W, std::vector<ContactRo
   velocity.noalias() += W * change;
   // While the first sweep changes a lot, the bodies are far from their end, and so is the problem.
   constexpr double kReduction = 0.02;
-  constexpr double kNegligible =
-      0.1;  // of the change that ends the sweeps: not worth telling the others
+  // of the change that ends the sweeps: not worth telling the others
+  constexpr double kNegligible = 0.1;
   double first = 0.0;
   ContactSolveReport report;
   report.converged = n == 0;

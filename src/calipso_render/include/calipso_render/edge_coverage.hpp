@@ -68,8 +68,8 @@ class EdgeCoverage {
   }
 
  private:
-  static constexpr float kSameSheet =
-      0.015f;  // of the nearness: samples that differ by more see another part of an object
+  // of the nearness: samples that differ by more see another part of an object
+  static constexpr float kSameSheet = 0.015f;
 
   // A triangle over the pixels of a tile that it may touch.
   struct Piece;

@@ -16,8 +16,8 @@ struct InpaintParams {
   cv::Mat nearness;  // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the
                      // horizon. What is copied comes from where the ground is about as near: there
                      // things have the same size.
-  cv::Mat surface;  // CV_8UC1, may be empty: number of the surface that a pixel sees, 0 unknown.
-                    // What is copied comes from the same one.
+  cv::Mat surface;   // CV_8UC1, may be empty: number of the surface that a pixel sees, 0 unknown.
+                     // What is copied comes from the same one.
 };
 
 struct InpaintResult {

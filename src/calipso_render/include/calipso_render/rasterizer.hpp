@@ -66,10 +66,10 @@ class VisibilityBuffer {
   static constexpr float kFar = -3.0e38f;
 
  private:
-  static constexpr int kBands =
-      8;  // rows are split in fixed bands: the result knows no thread count
-  static constexpr int kPadding =
-      8;  // places after each row, which kernels may read and write back
+  // rows are split in fixed bands: the result knows no thread count
+  static constexpr int kBands = 8;
+  // places after each row, which kernels may read and write back
+  static constexpr int kPadding = 8;
 
   cv::Rect region_;
   int stride_;
