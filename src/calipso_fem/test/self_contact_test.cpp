@@ -186,6 +186,39 @@ TEST(SelfContact, AFoldedSheetIsTold) {
   EXPECT_FALSE(FoldTest(boxSurface({0.2, 0.2, 0.2}, 4)).appliesTo());
 }
 
+// A sheet bent by half a turn about y; its arms are 2 * `radius` apart.
+TriangleMesh hairpin(const TriangleMesh& flat, double radius) {
+  TriangleMesh mesh = flat;
+  for (int v = 0; v < mesh.vertexCount(); ++v) {
+    const double x = flat.vertices(v, 0), bent = 0.5 * M_PI * radius,
+                 phi = std::clamp(x, -bent, bent) / radius, arm = std::abs(x) - bent,
+                 r = radius + flat.vertices(v, 2);
+    mesh.vertices(v, 0) = r * std::sin(phi);
+    mesh.vertices(v, 2) = r * std::cos(phi) - std::max(0.0, arm);
+  }
+  return mesh;
+}
+
+TEST(SelfContact, OnlyPartsThatComeNearEachOtherAreSearched) {
+  const TriangleMesh flat = cloth(0.4, 0.2, {40, 20, 1});
+  const auto meeting = [&](double radius, double margin) {
+    FoldTest fold(flat);
+    const SurfaceTree tree(hairpin(flat, radius));
+    EXPECT_FALSE(fold.isUnfolded(tree));
+    fold.isUnfolded(tree);  // it does not turn on
+    return fold.mayMeet(tree, Eigen::VectorXd::Zero(flat.vertexCount()), margin);
+  };
+  // Arms that are 10 cm apart: at most what is bent.
+  const std::vector<int> bent = meeting(0.05, 0.01);
+  EXPECT_LT(bent.size(), flat.vertexCount() / 10u);
+  for (const int v : bent) EXPECT_LT(std::abs(flat.vertices(v, 0)), 0.1) << v;
+  // 1 cm apart: all of them.
+  const std::vector<int> near = meeting(0.005, 0.012);
+  for (int v = 0; v < flat.vertexCount(); ++v)
+    if (std::abs(flat.vertices(v, 0)) > 0.03)
+      EXPECT_TRUE(std::binary_search(near.begin(), near.end(), v)) << v;
+}
+
 TEST(SelfContact, ThinOnesMeetThemselvesUnlessToldNotTo) {
   EXPECT_TRUE(isThin(cloth(0.4, 0.3, {8, 6, 1})));
   EXPECT_FALSE(isThin(boxSurface({0.4, 0.3, 0.05}, 4)));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <calipso_scene/disjoint_sets.hpp>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace calipso::fem {
@@ -73,22 +74,21 @@ FoldTest::FoldTest(const TriangleMesh& rest) {
     if (flat) sides[along > 0.0] += std::abs(along);
   }
   const double outline = outlineArea(rest, axis);
-  if (std::min(sides[0], sides[1]) > kFilled * outline) side_ = std::move(side);
+  if (std::min(sides[0], sides[1]) > kFilled * outline) patches_.emplace(rest, std::move(side));
 }
 
 bool FoldTest::isUnfolded(const SurfaceTree& surface) {
-  constexpr double kWidest = M_PI / 3.0, kUpright = M_PI / 2.0;
-  if (side_.empty()) return false;
-  const int faces = static_cast<int>(side_.size());
-  Eigen::Vector3d axis = Eigen::Vector3d::Zero();
-  for (int f = 0; f < faces; ++f) axis += side_[f] * surface.faceNormal(f);
-  axis.normalize();
-  double least = 1.0;
-  for (int f = 0; f < faces; ++f)
-    if (side_[f] != 0) least = std::min(least, side_[f] * axis.dot(surface.faceNormal(f)));
-  const double before = std::exchange(angle_, std::acos(std::max(-1.0, least)));
-  // It may go on turning as it has since it was last asked, twice as fast.
-  return angle_ < kWidest && angle_ + 2.0 * std::abs(angle_ - before) < kUpright;
+  if (!patches_) return false;
+  patches_->turn(surface);
+  return patches_->isUnfolded();
+}
+
+std::vector<int> FoldTest::mayMeet(const SurfaceTree& surface, const Eigen::VectorXd& ways,
+                                   double margin) {
+  if (patches_) return patches_->mayMeet(surface, ways, margin);
+  std::vector<int> all(surface.mesh().vertexCount());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
 }
 
 bool isThin(const TriangleMesh& mesh) {

@@ -1,25 +1,28 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "calipso_fem/world/surface_tree.hpp"
+#include "sheet_patches.hpp"
 
 namespace calipso::fem {
 
-// Tells of a sheet - flat at rest, its outline without deep bays - that it is not folded: as long
-// as all its faces look within 60 degrees of one direction or its opposite, it is a graph over the
-// plane across, and does not meet itself (normal cone, Volino and Magnenat-Thalmann 1994).
+// Tells where a sheet - flat at rest, its outline without deep bays - is not folded, and therefore
+// does not meet itself.
 class FoldTest {
  public:
   explicit FoldTest(const TriangleMesh& rest);
-  bool appliesTo() const { return !side_.empty(); }
+  bool appliesTo() const { return patches_.has_value(); }
   // Of the sheet as it is. @return false where it may be folded before the next step ends, and for
   // what is no sheet
   bool isUnfolded(const SurfaceTree& surface);
+  // Vertices that may meet the surface in a step in which none goes further than its `ways`, with
+  // `margin` (m) between; all of what is no sheet. Asked after isUnfolded().
+  std::vector<int> mayMeet(const SurfaceTree& surface, const Eigen::VectorXd& ways, double margin);
 
  private:
-  std::vector<signed char> side_;  // by face: +1, -1, 0 at the rim; empty: no sheet
-  double angle_ = 0.0;             // rad, of the face that looks away most, when last asked
+  std::optional<SheetPatches> patches_;  // none: no sheet
 };
 
 // Whether a closed surface is thin enough to fold onto itself: one piece whose thickness is under a

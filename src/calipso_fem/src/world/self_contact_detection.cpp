@@ -130,7 +130,8 @@ void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft,
     list.push_back({contact, false, vertex, near});
   };
   bool far = true;
-  for (int v = 0; v < speeds.size(); ++v) {
+  const std::vector<int> vertices = self.mayMeet(tree, h * speeds, reach + self.spare());
+  for (const int v : vertices) {
     const auto known = memory_.find({id, id, v, Contact::kNearest});
     const double depth = known == memory_.end() ? 0.0 : -known->second.offset;
     const double around = reach + h * (speeds[v] + most);
@@ -144,7 +145,7 @@ void SoftContacts::watchSelf(const std::vector<SoftEntry>& softs, int soft,
       if (hit.distance < h * (speeds[v] + fastestCorner(speeds, tree.mesh(), hit.triangle)))
         watch(hit, v, Contact::kCrossing + 4 * hit.triangle);
   }
-  self.searched(tree, motion, far);
+  self.searched(tree, motion, vertices.size(), far);
 }
 
 std::optional<Contact> SoftContacts::crossingItself(const Candidate& c,

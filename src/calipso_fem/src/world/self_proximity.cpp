@@ -183,8 +183,8 @@ bool SelfProximity::staysFar(const SurfaceTree& surface, const Eigen::Isometry3d
 }
 
 void SelfProximity::searched(const SurfaceTree& surface, const Eigen::Isometry3d& motion,
-                             bool far) {
-  searches_ += surface.mesh().vertexCount();
+                             size_t vertices, bool far) {
+  searches_ += static_cast<long>(vertices);
   far_.reset();
   if (far) far_ = Far{surface.mesh().vertices, motion};
 }

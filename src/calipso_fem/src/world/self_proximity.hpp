@@ -38,12 +38,18 @@ class SelfProximity {
 
   // Nothing can meet itself: a sheet that is not folded,
   bool isUnfolded(const SurfaceTree& surface);
+  // vertices outside of the folded patches of one, when none goes further than its `ways` (m) and
+  // others matter within `margin` (m),
+  std::vector<int> mayMeet(const SurfaceTree& surface, const Eigen::VectorXd& ways, double margin) {
+    return fold_.mayMeet(surface, ways, margin);
+  }
   // or a surface that has hardly changed its shape since it was last found to be far from itself,
   // in a step in which no two of its points approach by more than `travel` (m).
   bool staysFar(const SurfaceTree& surface, const Eigen::Isometry3d& motion, double travel) const;
-  // The surface, searched as far as `spare()` beyond what matters, was found to be far from itself
-  // or not.
-  void searched(const SurfaceTree& surface, const Eigen::Isometry3d& motion, bool far);
+  // The surface, `vertices` of it searched as far as `spare()` beyond what matters, was found to be
+  // far from itself or not.
+  void searched(const SurfaceTree& surface, const Eigen::Isometry3d& motion, size_t vertices,
+                bool far);
   double spare() const { return spare_; }
   long searches() const { return searches_; }
 
