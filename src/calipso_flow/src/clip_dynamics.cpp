@@ -13,7 +13,7 @@ namespace calipso::flow {
 namespace {
 
 constexpr size_t kRecentFrames = 8;  // kept, to be looked at again when an object starts to deform
-constexpr int kLeftFrames = 2;       // in which an object must have left its place
+constexpr int kLeftFrames = 2;       // in which an object must have left its shape
 
 // Image motion between the first state and the farthest other one, px, were the camera at rest: the
 // mean over the object's followed points, since errors of the pose are largest at single points far
@@ -158,10 +158,11 @@ void ClipAnalyser::follow(const Frame& frame, bool cut, Followed& object) const 
   }
   object.observations.push_back(object.tracker.track(frame, cut));
   const ObjectModel& model = object.tracker.model();
-  const bool left =
+  const bool bent =
       !model.attached.empty() &&
-      hasLeft(object.observations.back(), model.world_from_object, frame.camera, params_.rest_px);
-  object.frames_left = left ? object.frames_left + 1 : 0;
+      hasLeft(object.observations.back(), model.world_from_object, frame.camera, params_.rest_px) &&
+      !movesRigidly(object.observations, model.world_from_object, frame.camera);
+  object.frames_left = bent ? object.frames_left + 1 : 0;
   if (object.frames_left >= kLeftFrames) beginDeformable(object);
 }
 

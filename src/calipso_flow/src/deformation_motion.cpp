@@ -17,6 +17,9 @@ constexpr double kLeftShare = 0.15;       // of the tracks that must have moved
 constexpr int kLeastLeft = 6;
 // of a track, which scatters by about twice its own account
 constexpr double kLeftDeviations = 8.0;
+constexpr double kRigidShare = 0.1;  // of the way: a clamped beam's bend leaves 0.17 and more
+// by so much of their own account do rigid tracks scatter
+constexpr double kRigidDeviations = 2.0;
 
 SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& modes,
                       const SpectralLine& line, Eigen::VectorXcd& shape) {
@@ -32,6 +35,23 @@ SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& 
     result.wave_vector = tracker.model().world_from_object.linear() * travel.wave_vector;
   }
   return result;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// How far the tracks' points are apart in the picture in two poses, px.
+double medianWay(const std::vector<Track>& tracks, const Eigen::Isometry3d& from,
+                 const Eigen::Isometry3d& to, const Camera& camera) {
+  std::vector<double> way;
+  for (const Track& track : tracks) {
+    const Eigen::Vector3d start = from * track.point, end = to * track.point;
+    way.push_back((camera.projectWorld(end) - camera.projectWorld(start)).norm());
+  }
+  return median(std::move(way));
 }
 
 Vertices inWorld(const ObjectModel& model, const Vertices& vertices) {
@@ -108,6 +128,24 @@ bool hasLeft(const Observation& observation, const Eigen::Isometry3d& still_pose
     if (apart > std::max(2.0 * rest_px, kLeftDeviations * track.deviation)) ++left;
   }
   return left >= std::max<double>(kLeastLeft, kLeftShare * observation.tracks.size());
+}
+
+bool movesRigidly(const std::vector<Observation>& observations, const Eigen::Isometry3d& still_pose,
+                  const Camera& camera) {
+  const Observation& last = observations.back();
+  if (!last.found || last.tracks.empty() || last.deviation > kRigidDeviations) return false;
+  std::vector<double> left_over;  // px
+  for (const Track& track : last.tracks) {
+    const Eigen::Vector3d moved = last.world_from_object * track.point;
+    left_over.push_back((camera.projectWorld(moved) - track.pixel).norm());
+  }
+  double farthest = 0.0;  // px: a swing comes through its place again
+  for (const Observation& observation : observations) {
+    if (!observation.found) continue;
+    const Eigen::Isometry3d& pose = observation.world_from_object;
+    farthest = std::max(farthest, medianWay(last.tracks, still_pose, pose, camera));
+  }
+  return median(left_over) < kRigidShare * farthest;
 }
 
 Observation rigidPart(const DeformableTracker& tracker, const DeformationObservation& observation,

@@ -5,6 +5,8 @@
 
 #include "calipso_flow/deformation_fit.hpp"
 #include "calipso_flow/deformation_modes.hpp"
+#include "calipso_flow/deformation_motion.hpp"
+#include "calipso_flow/rotation.hpp"
 #include "calipso_flow/stiffness_ratio.hpp"
 #include "rendered_scene.hpp"
 
@@ -123,6 +125,48 @@ TEST(DeformationModes, nothingMovesNothingFound) {
     observations[k].covariance = 1e-6 * Eigen::MatrixXd::Identity(size, size);
   }
   EXPECT_EQ(modesOf(observations, fitter.field().weightsAt(model.mesh.vertices)).count(), 0);
+}
+
+// The sheet's vertices found where `moved` has them, with 0.05 px of noise, and the pose fitted to
+// them.
+template <class Moved>
+Observation observed(const ObjectModel& model, const Moved& moved) {
+  const Camera camera = test::testCamera();
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0.0, 0.05);
+  std::vector<Correspondence> found;
+  Observation observation;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    const Eigen::Vector3d point = model.mesh.vertices.row(i).transpose();
+    const Eigen::Vector2d pixel =
+        camera.projectWorld(moved(Eigen::Vector3d(model.world_from_object * point))) +
+        Eigen::Vector2d(noise(random), noise(random));
+    found.push_back({point, pixel, 0.0025 * Eigen::Matrix2d::Identity()});
+    observation.tracks.push_back({point, pixel, 1.0, 0.05, true});
+  }
+  const PoseFit fit = fitPose(found, camera, model.world_from_object, Eigen::Vector3d::Zero());
+  observation.found = fit.converged;
+  observation.deviation = fit.deviation;
+  observation.world_from_object = fit.world_from_object;
+  return observation;
+}
+
+// Held at its upper edge, it may swing as a board does, or bend as a beam.
+TEST(MovesRigidly, aSwingDoesAndABendDoesNot) {
+  const ObjectModel model = sheet();
+  const Eigen::Vector3d hinge(0.0, 0.0, 0.4);
+  const Eigen::Matrix3d turn = rotationFromVector({0.0, 0.1, 0.0});
+  const Observation swung = observed(
+      model, [&](const Eigen::Vector3d& p) { return (hinge + turn * (p - hinge)).eval(); });
+  const Observation bent = observed(model, [&](const Eigen::Vector3d& p) {
+    return (p + 0.15 * std::pow(hinge.z() - p.z(), 2) * Eigen::Vector3d::UnitX()).eval();
+  });
+  const Camera camera = test::testCamera();
+  ASSERT_TRUE(swung.found && bent.found);
+  EXPECT_TRUE(hasLeft(swung, model.world_from_object, camera, 0.6));
+  EXPECT_TRUE(hasLeft(bent, model.world_from_object, camera, 0.6));
+  EXPECT_TRUE(movesRigidly({swung}, model.world_from_object, camera));
+  EXPECT_FALSE(movesRigidly({bent}, model.world_from_object, camera));
 }
 
 // A cantilever's first frequency after Euler and Bernoulli:  omega = 1.8751^2 sqrt(E I / (rho A

@@ -42,9 +42,13 @@ Eigen::Vector3d leanOf(const ObjectModel& model, const decltype(TriangleMesh::ve
                        const Eigen::Vector3d& gravity);
 
 // True when tracks that a still object would leave in place have moved: of an object that is held
-// somewhere this means that it deforms.
+// somewhere this means that it deforms, unless it swings as a whole (movesRigidly).
 bool hasLeft(const Observation& observation, const Eigen::Isometry3d& still_pose,
              const Camera& camera, double rest_px);
+
+// True when the poses found so far explain how the tracks of the last one have left their place.
+bool movesRigidly(const std::vector<Observation>& observations, const Eigen::Isometry3d& still_pose,
+                  const Camera& camera);
 
 // The rigid motion closest to the deformation, as an observation of the object's pose.
 Observation rigidPart(const DeformableTracker& tracker, const DeformationObservation& observation,
