@@ -6,6 +6,7 @@
 #include "line_bridge.hpp"
 #include "patch_fill.hpp"
 #include "seam_blend.hpp"
+#include "seam_cut.hpp"
 
 namespace calipso::render {
 namespace {
@@ -65,8 +66,10 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   to_fill.setTo(0, bridges.core);
   const cv::Mat known = source | bridges.core;
   source.setTo(0, bridges.lines);
+  const InpaintParams inner = within(window, params);
   cv::Mat filled = smoothFill(look, to_fill, known),
-          origin = patchOrigins(look, to_fill, source, within(window, params));
+          origin = patchOrigins(look, to_fill, source, inner);
+  cutSeams(look, to_fill, source, known, inner.surface, origin);
   const cv::Mat copied = copyFrom(origin, look, filled);
   result.patches_found = cv::countNonZero(copied) > 0;
   if (result.patches_found) blendSeams(to_fill, known, origin, filled);

@@ -9,14 +9,15 @@ constexpr float kScreen =
     0.003f;  // inverse square of the distance, px, over which a seam is spread
 // code values; what misses by much more is an edge of things, not a seam to be spread
 constexpr float kEdge = 25.0f;
-constexpr float kRelax = 1.8f;  // of Gauss-Seidel
+constexpr float kScreenEdge = 0.3f;  // kScreen of what an edge misses
+constexpr float kRelax = 1.8f;       // of Gauss-Seidel
 constexpr int kIterations = 30;
 const cv::Point kAround[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 
 struct Node {
   int neighbours[4] = {-1, -1, -1, -1};  // -1: no unknown there
   int count = 0;                         // neighbours that pull, known ones included
-  cv::Vec3f mismatch;                    // what the copies' differences leave over
+  cv::Vec3f mismatch, edge;  // what the copies' differences leave over, as a seam and as an edge
   cv::Point at;
 };
 
@@ -44,7 +45,8 @@ class Seams {
         node.neighbours[i] = index.at<int>(q);
         ++node.count;
         const cv::Vec3f miss = colour(q) - colour(node.at) - wanted(node.at, q);
-        node.mismatch += miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
+        const cv::Vec3f seam = miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
+        node.mismatch += seam, node.edge += miss - seam;
       }
     }
     return nodes;
@@ -75,25 +77,33 @@ class Seams {
   const cv::Mat &hole_, &source_, &origin_, &image_;
 };
 
+// What is added to a channel: mismatches spread by a screened Poisson equation. Known pixels, for
+// which the last node stands, get nothing.
+std::vector<float> spread(const std::vector<Node>& nodes, cv::Vec3f Node::*mismatch, int channel,
+                          float screen) {
+  std::vector<float> change(nodes.size() + 1, 0.0f);
+  for (int k = 0; k < kIterations; ++k) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const Node& n = nodes[i];
+      float sum = (n.*mismatch)[channel];
+      for (const int j : n.neighbours) sum += j >= 0 ? change[j] : 0.0f;
+      change[i] += kRelax * (sum / (n.count + screen) - change[i]);
+    }
+  }
+  return change;
+}
+
 }  // namespace
 
 void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, cv::Mat& image) {
   const std::vector<Node> nodes = Seams(hole, source, origin, image).nodes();
 #pragma omp parallel for schedule(static)
   for (int c = 0; c < 3; ++c) {
-    std::vector<float> change(nodes.size() + 1,
-                              0.0f);  // the last one stands for known pixels: always 0
-    for (int k = 0; k < kIterations; ++k) {
-      for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const Node& n = nodes[i];
-        float sum = n.mismatch[c];
-        for (const int j : n.neighbours) sum += j >= 0 ? change[j] : 0.0f;
-        change[i] += kRelax * (sum / (n.count + kScreen) - change[i]);
-      }
-    }
+    const std::vector<float> wide = spread(nodes, &Node::mismatch, c, kScreen),
+                             narrow = spread(nodes, &Node::edge, c, kScreenEdge);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       float& value = image.at<cv::Vec3f>(nodes[i].at)[c];
-      value = std::min(255.0f, std::max(0.0f, value + change[i]));
+      value = std::min(255.0f, std::max(0.0f, value + wide[i] + narrow[i]));
     }
   }
 }

@@ -10,6 +10,7 @@
 #include "line_bridge.hpp"
 #include "patch_fill.hpp"
 #include "seam_blend.hpp"
+#include "seam_cut.hpp"
 
 namespace calipso::render {
 namespace {
@@ -235,6 +236,47 @@ TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
                 source = cv::Mat::zeros(40, 40, CV_8U);
   const cv::Mat origin = patchOrigins(image, hole, source, {});
   EXPECT_EQ(cv::countNonZero(origin.reshape(1) != -1), 0);
+}
+
+// A hole at columns 100 to 139 that two copies fill, which are alike in columns 117 to 119 alone.
+TEST(CutSeams, MoveToWhereCopiesAreAlike) {
+  cv::Mat image = grain(240, 24);
+  const int way = 60, first = 100, last = 139;
+  for (int u = 117; u <= 119; ++u) image.col(u - way).copyTo(image.col(u + way));
+  image.col(first - 1).copyTo(image.col(first - 1 - way));
+  image.col(last + 1).copyTo(image.col(last + 1 + way));
+  cv::Mat hole = cv::Mat::zeros(image.size(), CV_8U), origin(image.size(), CV_16SC2, {-1, -1});
+  hole.colRange(first, last + 1).setTo(255);
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = first; u <= last; ++u)
+      origin.at<cv::Vec2s>(v, u) = {static_cast<short>(u < 113 ? u - way : u + way),
+                                    static_cast<short>(v)};
+  }
+  cutSeams(image, hole, hole == 0, hole == 0, cv::Mat(), origin);
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = first; u <= last; ++u) {
+      const bool from_left = origin.at<cv::Vec2s>(v, u)[0] < u;
+      const bool alike = u >= 117 && u <= 119;
+      EXPECT_TRUE(alike || from_left == (u < 117)) << u << ", " << v;
+    }
+  }
+}
+
+// A step that is too high for a seam keeps its place, but not its edge.
+TEST(BlendSeams, SoftenAStepBetweenThings) {
+  cv::Mat image(40, 120, CV_32FC3, cv::Scalar::all(50)), hole = cv::Mat::zeros(40, 120, CV_8U);
+  image.colRange(60, 120).setTo(cv::Scalar::all(200));
+  hole.colRange(30, 90).setTo(255);
+  cv::Mat origin(40, 120, CV_16SC2, {-1, -1});
+  for (int v = 0; v < 40; ++v) {
+    for (int u = 30; u < 90; ++u)
+      origin.at<cv::Vec2s>(v, u) = {static_cast<short>(u < 60 ? 10 : 105), static_cast<short>(v)};
+  }
+  blendSeams(hole, hole == 0, origin, image);
+  const auto at = [&](int u) { return image.at<cv::Vec3f>(20, u)[0]; };
+  EXPECT_LT(at(60) - at(59), 75.0f);
+  EXPECT_NEAR(at(50), 50.0f, 12.0f);
+  EXPECT_NEAR(at(70), 200.0f, 12.0f);
 }
 
 TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
