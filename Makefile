@@ -42,7 +42,7 @@ bench: build
 lint: deps
 	catkin_lint src
 
-# As .clang-format says.
+# As .clang-format says; asks for clang-format, which nothing else needs.
 format:
 	git ls-files 'src/*.cpp' 'src/*.hpp' 'src/*.inl' | xargs clang-format -i
 
