@@ -384,9 +384,13 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   const double flipped = cv::countNonZero((labels > 0) != (predicted > 0));
   object.confidence =
       static_cast<float>(std::clamp(1.0 - 4.0 * flipped / std::max(1.0, area), 0.0, 1.0));
-  cv::Mat mask = labels > 0;
+  accept(object, view, background, back_noise, labels > 0, roi);
+}
+
+void MaskTracker::accept(Object& object, const cv::Mat& view, const KnownBackground& background,
+                         double noise, cv::Mat mask, const cv::Rect& roi) const {
   object.coverage = cv::Mat::zeros(size_, CV_8U);
-  settleEdge(view, cv::Mat(), background, back_noise, mask).copyTo(object.coverage(roi));
+  settleEdge(view, cv::Mat(), background, noise, mask).copyTo(object.coverage(roi));
   object.mask = cv::Mat::zeros(size_, CV_8U);
   mask.copyTo(object.mask(roi));
   if (object.confidence > kSureEnough && cv::countNonZero(mask) > 0)

@@ -146,6 +146,9 @@ class FrameCompositor {
 
   void prepareFrame();
   void stage();
+  void stageStates();
+  void stageActors();
+  void stagePlace();
   void findResidual();
   cv::Rect carriedBox() const;
   void findMiss(const cv::Rect& carried);

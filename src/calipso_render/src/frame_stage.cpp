@@ -100,6 +100,12 @@ Light FrameCompositor::lightOf(const FrameInput& frame) const {
 }
 
 void FrameCompositor::stage() {
+  stageStates();
+  stageActors();
+  stagePlace();
+}
+
+void FrameCompositor::stageStates() {
   const std::vector<Surface>& surfaces = prepared_.surfaces;
   states_.assign(surfaces.size(), nullptr);
   edited_.assign(surfaces.size(), false);
@@ -113,6 +119,10 @@ void FrameCompositor::stage() {
   }
   for (std::size_t i = 0; i < surfaces.size(); ++i)
     at_rest_.push_back(findRest(static_cast<int>(i)));
+}
+
+void FrameCompositor::stageActors() {
+  const std::vector<Surface>& surfaces = prepared_.surfaces;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ObjectInFrame* o = states_[i];
     if (o != nullptr ? o->removed : !surfaces[i].in_video) continue;
@@ -136,15 +146,20 @@ void FrameCompositor::stage() {
         as_seen ? projectMesh(surfaces[i].key_vertices, surfaces[i].triangles, frame_.camera)
                 : ScreenMesh{});
   }
-  fronts_.assign(surfaces.size(), cv::Mat());
-  footprints_.assign(surfaces.size(), cv::Mat());
+}
+
+// The place as this frame's camera sees it.
+void FrameCompositor::stagePlace() {
+  const std::size_t count = prepared_.surfaces.size();
+  fronts_.assign(count, cv::Mat());
+  footprints_.assign(count, cv::Mat());
   plate_ = prepared_.plate_linear;
   invented_ = prepared_.background.invented;
   if (sameView(frame_.camera, prepared_.camera)) {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
     shadowless_ = prepared_.shadowless;
     place_view_ = PlaceView(place_view_.planes(), prepared_.relief);
-    for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       if (prepared_.fronts[i].empty() || (prepared_.moves[i] && !at_rest_[i])) continue;
       fronts_[i] =
           elsewhere_.empty() ? prepared_.fronts[i] : cv::Mat(prepared_.fronts[i] & ~elsewhere_);

@@ -77,6 +77,9 @@ class MaskTracker {
   TrackedMask combine(int moved) const;
   void settle(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
               bool exact, const cv::Rect& roi);
+  // Takes a mask as where the object is, with its edge settled.
+  void accept(Object& object, const cv::Mat& view, const KnownBackground& background, double noise,
+              cv::Mat mask, const cv::Rect& roi) const;
   std::vector<cv::Mat> costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
                                const LayerAppearance& back, const LayerAppearance& fore,
                                float prior_limit) const;

@@ -32,16 +32,9 @@ double extent(const btCollisionObjectWrapper* body, const btVector3& direction) 
 
 }  // namespace
 
-btCollisionAlgorithm* HullHullAlgorithm::Creator::CreateCollisionAlgorithm(
-    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
-    const btCollisionObjectWrapper* b) {
-  void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(HullHullAlgorithm));
-  return new (memory) HullHullAlgorithm(info, a, b);
-}
-
 HullHullAlgorithm::HullHullAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
                                      const btCollisionObjectWrapper* a,
-                                     const btCollisionObjectWrapper* b)
+                                     const btCollisionObjectWrapper* b, bool)
     : btActivatingCollisionAlgorithm(info, a, b), manifold_(info.m_manifold) {}
 
 HullHullAlgorithm::~HullHullAlgorithm() {
@@ -89,13 +82,6 @@ void HullHullAlgorithm::processCollision(const btCollisionObjectWrapper* a,
 
 void HullHullAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
   if (manifold_ && owner_) manifolds.push_back(manifold_);
-}
-
-btCollisionAlgorithm* CompoundPairAlgorithm::Creator::CreateCollisionAlgorithm(
-    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
-    const btCollisionObjectWrapper* b) {
-  void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(CompoundPairAlgorithm));
-  return new (memory) CompoundPairAlgorithm(info, a, b, false);
 }
 
 void CompoundPairAlgorithm::processCollision(const btCollisionObjectWrapper* a,

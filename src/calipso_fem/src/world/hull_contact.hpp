@@ -10,14 +10,9 @@ namespace calipso::fem {
 // time: it often still tells that they are, at a tenth of the cost of a search.
 class HullHullAlgorithm : public btActivatingCollisionAlgorithm {
  public:
-  struct Creator : btCollisionAlgorithmCreateFunc {
-    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
-                                                   const btCollisionObjectWrapper* a,
-                                                   const btCollisionObjectWrapper* b) override;
-  };
-
   HullHullAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
-                    const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b);
+                    const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                    bool swapped);
   ~HullHullAlgorithm() override;
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;
@@ -42,12 +37,6 @@ class HullHullAlgorithm : public btActivatingCollisionAlgorithm {
 // looks 2 cm around every body.
 class CompoundPairAlgorithm : public btCompoundCompoundCollisionAlgorithm {
  public:
-  struct Creator : btCollisionAlgorithmCreateFunc {
-    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
-                                                   const btCollisionObjectWrapper* a,
-                                                   const btCollisionObjectWrapper* b) override;
-  };
-
   using btCompoundCompoundCollisionAlgorithm::btCompoundCompoundCollisionAlgorithm;
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;

@@ -47,15 +47,9 @@ double reachOf(const btCollisionObject* body) {
 
 }  // namespace
 
-btCollisionAlgorithm* HullPlaneAlgorithm::Creator::CreateCollisionAlgorithm(
-    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper*,
-    const btCollisionObjectWrapper*) {
-  void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(HullPlaneAlgorithm));
-  return new (memory) HullPlaneAlgorithm(info, m_swapped);
-}
-
 HullPlaneAlgorithm::HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
-                                       bool swapped)
+                                       const btCollisionObjectWrapper*,
+                                       const btCollisionObjectWrapper*, bool swapped)
     : btCollisionAlgorithm(info), swapped_(swapped), manifold_(info.m_manifold) {}
 
 HullPlaneAlgorithm::~HullPlaneAlgorithm() {
@@ -104,13 +98,6 @@ void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a,
 
 void HullPlaneAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
   if (manifold_ && owner_) manifolds.push_back(manifold_);
-}
-
-btCollisionAlgorithm* CompoundPlaneAlgorithm::Creator::CreateCollisionAlgorithm(
-    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
-    const btCollisionObjectWrapper* b) {
-  void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(CompoundPlaneAlgorithm));
-  return new (memory) CompoundPlaneAlgorithm(info, a, b, m_swapped);
 }
 
 void CompoundPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a,

@@ -11,14 +11,10 @@ namespace calipso::fem {
 // corners.
 class HullPlaneAlgorithm : public btCollisionAlgorithm {
  public:
-  struct Creator : btCollisionAlgorithmCreateFunc {
-    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
-                                                   const btCollisionObjectWrapper* a,
-                                                   const btCollisionObjectWrapper* b) override;
-  };
-
   // swapped: the plane is the first of the two
-  HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info, bool swapped);
+  HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
+                     const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                     bool swapped);
   ~HullPlaneAlgorithm() override;
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;
@@ -40,12 +36,6 @@ class HullPlaneAlgorithm : public btCollisionAlgorithm {
 // plane's own box is boundless, so that Bullet looks at all the hulls of all bodies at all times.
 class CompoundPlaneAlgorithm : public btCompoundCollisionAlgorithm {
  public:
-  struct Creator : btCollisionAlgorithmCreateFunc {
-    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
-                                                   const btCollisionObjectWrapper* a,
-                                                   const btCollisionObjectWrapper* b) override;
-  };
-
   using btCompoundCollisionAlgorithm::btCompoundCollisionAlgorithm;
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "algorithm_creator.hpp"
 #include "bullet_body.hpp"
 #include "bullet_world.hpp"
 #include "calipso_fem/world/rigid_world.hpp"
@@ -39,10 +40,10 @@ struct RigidWorld::Impl {
   }
 
   btDefaultCollisionConfiguration configuration{withOwnAlgorithms()};
-  HullPlaneAlgorithm::Creator on_plane, under_hull;
-  HullHullAlgorithm::Creator hull_on_hull;
-  CompoundPairAlgorithm::Creator hulls_on_hulls;
-  CompoundPlaneAlgorithm::Creator hulls_on_plane, under_hulls;
+  AlgorithmCreator<HullPlaneAlgorithm> on_plane, under_hull;
+  AlgorithmCreator<HullHullAlgorithm> hull_on_hull;
+  AlgorithmCreator<CompoundPairAlgorithm> hulls_on_hulls;
+  AlgorithmCreator<CompoundPlaneAlgorithm> hulls_on_plane, under_hulls;
   btCollisionDispatcher dispatcher{&configuration};
   btDbvtBroadphase broadphase;
   CoulombSolver solver;
