@@ -1,0 +1,164 @@
+// Shadows that edited objects cast, and how dark they are told to be.
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "ball_setting.hpp"
+#include "calipso_render/colour.hpp"
+#include "calipso_render/shadow_map.hpp"
+#include "umbra.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+// The same for an object that moves: from the places that it shades in the views, against what was
+// seen of the place.
+TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
+  const cv::Vec3f umbra(0.6f, 0.5f, 0.45f);
+  const Surface surface = makeSurface(ballAt({0.0, 0.1, kBallRadius}));
+  Background plate;
+  emptyTable().convertTo(plate.plate, CV_32F);
+  plate.count = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(9)),
+  plate.spread = cv::Mat::zeros(kHeight, kWidth, CV_32F);
+  std::vector<View> views;
+  for (const float x : {-0.1f, 0.15f}) {
+    Points vertices = surface.key_vertices;
+    for (Eigen::Vector3f& p : vertices) p.x() += x;
+    views.push_back({plate.plate.clone(),
+                     cv::Mat::zeros(kHeight, kWidth, CV_8U),
+                     camera(),
+                     {makeActor(surface, vertices, camera())}});
+    const std::vector<Occluder> occluder = {{&views.back().actors[0].vertices, &surface.triangles}};
+    const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}),
+        sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const auto r = receiverAt(table(), camera(), u, v);
+        if (!r) continue;
+        const float part = sun.visibility(r->position, r->normal),
+                    open = sky.visibility(r->position, r->normal);
+        cv::Vec3f& code = views.back().picture.at<cv::Vec3f>(v, u);
+        for (int c = 0; c < 3; ++c)
+          code[c] = codeFromLinear(linearFromRealCode(code[c]) *
+                                   (umbra[c] * open + (1.0f - umbra[c]) * part));
+      }
+    }
+  }
+  const auto found = umbraInViews(views, table(), plate, sunlight());
+  ASSERT_TRUE(found);
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR((*found)[c], umbra[c], 0.03f) << c;  // the maps have other resolutions
+  for (View& view : views) plate.plate.copyTo(view.picture);
+  EXPECT_FALSE(
+      umbraInViews(views, table(), plate, sunlight()));  // no shadow where one is predicted
+}
+
+// Near the ball the shadow is darker than the sun's absence makes it: the ball hides sky, too.
+TEST(Renderer, TheDarkOfAShadowIsToldFromTheHiddenSky) {
+  const cv::Vec3f umbra(0.45f, 0.4f, 0.35f);
+  const ObjectModel ball = ballAt({0.0, 0.1, kBallRadius});
+  ClipFrame frame = frameWithBall(ball);
+  const Surface surface = makeSurface(ball);
+  const std::vector<Occluder> occluder = {{&surface.key_vertices, &surface.triangles}};
+  const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}),
+      sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = receiverAt(table(), frame.camera, u, v);
+      if (frame.labels.at<std::uint8_t>(v, u) != 0 || !r) continue;
+      const float part = sun.visibility(r->position, r->normal),
+                  open = sky.visibility(r->position, r->normal);
+      for (int c = 0; c < 3; ++c) {
+        std::uint8_t& code = frame.bgr.at<cv::Vec3b>(v, u)[c];
+        code = quantise(
+            codeFromLinear(linearFromCode(code) * (umbra[c] * open + (1.0f - umbra[c]) * part)));
+      }
+    }
+  }
+  ClipSample clip;
+  clip.add(frame);
+  const Prepared prepared = prepare(clip, {ball}, params());
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(prepared.umbra[c], umbra[c], 0.05f) << c;  // the table behind it is invented
+}
+
+TEST(Renderer, AMovedShadowTakesItsWholeEdgeAlong) {
+  const Setting s(params());
+  const FrameOutput out =
+      Renderer(s.prepared, params()).composite(s.input(true, {0.25f, 0.0f, 0.0f}));
+  const Actor original =
+      makeActor(s.prepared->surfaces[0], s.prepared->surfaces[0].key_vertices, camera());
+  const ShadowMap sun({{&original.vertices, &original.surface->triangles}},
+                      s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+  cv::Mat shaded = cv::Mat::zeros(kHeight, kWidth, CV_8U), edge;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto receiver = receiverAt(params().planes, camera(), u, v);
+      if (receiver && sun.visibility(receiver->position, receiver->normal) < 0.5f)
+        shaded.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  ASSERT_GT(cv::countNonZero(shaded), 50);
+  cv::dilate(shaded, edge, cv::Mat::ones(7, 7, CV_8U));  // three pixels beyond the predicted shadow
+  cv::Mat kept = edge & (out.provenance == kOriginal);
+  EXPECT_LT(cv::countNonZero(kept), cv::countNonZero(edge) / 50);
+}
+
+// Water, or a light that was told wrongly: where the ball casts none in the video, it casts none
+// when it is moved.
+TEST(Renderer, CastsShadowsOnlyWhereTheVideoShowsThem) {
+  const ObjectModel ball = ballAt(kCentre);
+  const Surface surface = makeSurface(ball);
+  const ShadowMap sun({{&surface.key_vertices, &surface.triangles}},
+                      sunlight().direction.cast<double>(), {512, 0.025, 16});
+  for (const bool shadow : {true, false}) {
+    ClipFrame key = frameWithBall(ball);
+    cv::RNG random(5);
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        if (key.labels.at<std::uint8_t>(v, u) != 0) continue;
+        const auto r = receiverAt(table(), key.camera, u, v);
+        const float light =
+            shadow && r ? 0.4f + 0.6f * sun.visibility(r->position, r->normal) : 1.0f;
+        key.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(
+            quantise(codeFromLinear(0.4f * light) + static_cast<float>(random.uniform(-3, 4))));
+      }
+    }
+    ClipSample clip;
+    clip.add(key);
+    const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball}, params()));
+    const bool remarked =
+        std::any_of(prepared->remarks.begin(), prepared->remarks.end(), [](const std::string& r) {
+          return r.find("not seen in the picture") != std::string::npos;
+        });
+    EXPECT_EQ(remarked, !shadow);
+    const FrameInput in = ballMovedLeft(key, *prepared);
+    const FrameOutput out = Renderer(prepared, params()).composite(in);
+    const Actor now = makeActor(prepared->surfaces[0], in.objects[0].vertices, key.camera);
+    const ShadowMap cast({{&now.vertices, &now.surface->triangles}},
+                         prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+    int dark = 0, all = 0;
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const auto r = receiverAt(table(), key.camera, u, v);
+        if (!r || cast.visibility(r->position, r->normal) > 0.1f ||
+            out.provenance.at<std::uint8_t>(v, u) == kInvented)
+          continue;
+        const cv::Vec3b c = out.bgr.at<cv::Vec3b>(v, u);
+        if (std::abs(c[0] - c[2]) > 12) continue;  // the ball itself
+        ++all, dark += c[1] < 140;                 // the table has 168
+      }
+    }
+    ASSERT_GT(all, 50);
+    if (shadow)
+      EXPECT_GT(dark, all / 2);
+    else
+      EXPECT_LT(dark, all / 20);
+  }
+}
+
+}  // namespace
+}  // namespace calipso::render
