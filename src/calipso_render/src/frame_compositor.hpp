@@ -160,6 +160,7 @@ class FrameCompositor {
   static RestPicture restPicture(const Prepared& prepared, const RenderParams& params,
                                  const std::vector<bool>& edited);
   void recordRow(int v, Row& row, RestPicture& picture) const;
+  void recordOwners(RestPicture& picture) const;
   Composed composedAt(int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool findRest(int surface);

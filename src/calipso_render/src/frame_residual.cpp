@@ -51,11 +51,7 @@ Nearest nearestWhere(const cv::Mat& set) {
   return nearest;
 }
 
-}  // namespace
-
-// The objects in question drawn where the video has them, from what was prepared alone.
-RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderParams& params,
-                                         const std::vector<bool>& edited) {
+FrameInput frameAtRest(const Prepared& prepared, const std::vector<bool>& edited) {
   FrameInput input;
   prepared.background.plate.convertTo(input.bgr, CV_8U);
   input.labels = prepared.key_labels;
@@ -67,19 +63,28 @@ RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderP
     o.vertices = prepared.surfaces[i].key_vertices;
     input.objects.push_back(o);
   }
+  return input;
+}
+
+}  // namespace
+
+// The objects in question drawn where the video has them, from what was prepared alone.
+RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderParams& params,
+                                         const std::vector<bool>& edited) {
+  const FrameInput input = frameAtRest(prepared, edited);
   RenderParams plain = params;
   plain.add_noise = plain.keep_still = plain.carry_residual = false;
   ShadowCache shadows;
   RestPicture none;
   FrameCompositor rest(prepared, plain, input, shadows, none);
   rest.prepareFrame();
-  const cv::Rect& r = rest.region_;
   RestPicture picture{edited,
                       cv::Mat(input.bgr.size(), CV_32FC3, cv::Scalar::all(-1)),
                       cv::Mat::zeros(input.bgr.size(), CV_32FC3),
                       cv::Mat(input.bgr.size(), CV_16S, cv::Scalar(-1)),
                       cv::Mat::zeros(input.bgr.size(), CV_8U),
                       {}};
+  const cv::Rect& r = rest.region_;
   if (r.empty()) return picture;
   rest.findMaps();
 #pragma omp parallel
@@ -88,24 +93,30 @@ RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderP
 #pragma omp for schedule(dynamic, 8)
     for (int v = r.y; v < r.y + r.height; ++v) rest.recordRow(v, row, picture);
   }
+  rest.recordOwners(picture);
+  return picture;
+}
+
+// The nearest object of every pixel, and how far what is missed can reach.
+void FrameCompositor::recordOwners(RestPicture& picture) const {
+  const cv::Rect& r = region_;
   cv::Mat owners(r.size(), CV_16S, cv::Scalar(-1));
   for (int v = 0; v < r.height; ++v) {
     for (int u = 0; u < r.width; ++u) {
-      const std::uint32_t id = rest.centre_->ids(v)[u];
+      const std::uint32_t id = centre_->ids(v)[u];
       if (id != VisibilityBuffer::kNothing)
         owners.at<short>(v, u) =
-            static_cast<short>(rest.surface_of_slot_[VisibilityBuffer::objectOf(id)]);
+            static_cast<short>(surface_of_slot_[VisibilityBuffer::objectOf(id)]);
     }
   }
   const Nearest nearest = nearestWhere(owners >= 0);
-  if (nearest.place.empty()) return picture;
-  cv::dilate(rest.removed_, picture.reach(r), disc(static_cast<int>(kNonePx)));
-  picture.box = cv::boundingRect(rest.removed_) + r.tl();
+  if (nearest.place.empty()) return;
+  cv::dilate(removed_, picture.reach(r), disc(static_cast<int>(kNonePx)));
+  picture.box = cv::boundingRect(removed_) + r.tl();
   cv::Mat out = picture.owners(r);
   for (int v = 0; v < r.height; ++v) {
     for (int u = 0; u < r.width; ++u) out.at<short>(v, u) = owners.at<short>(nearest.at(v, u));
   }
-  return picture;
 }
 
 // Row v of what is drawn and of what passes beside it.

@@ -34,6 +34,9 @@ MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance&
                         const std::vector<SupportPlane>& planes, const Camera& camera,
                         const cv::Mat& off);
 
+// CV_32FC4: colour and cover.
+cv::Mat withCover(const MirrorImage& image);
+
 // What `image` adds to the picture, CV_32FC3, linear.
 cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image);
 

@@ -19,6 +19,63 @@ float longestEdge(const Points& p, const Eigen::Vector3i& t) {
       {(p[t[1]] - p[t[0]]).norm(), (p[t[2]] - p[t[1]]).norm(), (p[t[0]] - p[t[2]]).norm()});
 }
 
+// Vertices at one place are one: the first of them stands for all.
+struct WeldedValues {
+  std::vector<int> place, row;  // per vertex: who stands for it; its unknown, -1 if it has a value
+  std::vector<cv::Vec3d> mean;  // per place
+  cv::Vec3d mean_of_all;
+  int rows = 0;
+
+  WeldedValues(const Points& vertices, const std::vector<bool>& known,
+               const std::vector<cv::Vec3f>& values)
+      : place(weld(vertices)), row(vertices.size(), -1), mean(vertices.size()) {
+    std::vector<int> parts(vertices.size(), 0);
+    int all = 0;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      if (!known[i]) continue;
+      mean[place[i]] += cv::Vec3d(values[i]), ++parts[place[i]];
+      mean_of_all += cv::Vec3d(values[i]), ++all;
+    }
+    mean_of_all *= 1.0 / std::max(1, all);
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      if (parts[i] > 0)
+        mean[i] *= 1.0 / parts[i];
+      else if (place[i] == static_cast<int>(i))
+        row[i] = rows++;
+    }
+  }
+};
+
+// Graph Laplacian with a weak pull to the mean. @return one row per unknown
+Eigen::MatrixXd harmonicValues(const WeldedValues& welded, const Triangles& triangles) {
+  std::vector<Eigen::Triplet<double>> entries;
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(welded.rows, 3);
+  if (welded.rows == 0) return right;
+  for (int r = 0; r < welded.rows; ++r) {
+    entries.emplace_back(r, r, kAnchor);
+    for (int c = 0; c < 3; ++c) right(r, c) = kAnchor * welded.mean_of_all[c];
+  }
+  const auto link = [&](int a, int b) {
+    const int row = welded.row[a], other = welded.row[b];
+    if (row < 0) return;
+    entries.emplace_back(row, row, 1.0);
+    if (other >= 0)
+      entries.emplace_back(row, other, -1.0);
+    else
+      for (int c = 0; c < 3; ++c) right(row, c) += welded.mean[b][c];
+  };
+  for (const Eigen::Vector3i& t : triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = welded.place[t[k]], b = welded.place[t[(k + 1) % 3]];
+      if (a != b) link(a, b), link(b, a);
+    }
+  }
+  Eigen::SparseMatrix<double> L(welded.rows, welded.rows);
+  L.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(L);
+  return solver.solve(right);
+}
+
 }  // namespace
 
 SurfaceTexture::SurfaceTexture(const Points& vertices, const Triangles& triangles, float texel,
@@ -66,55 +123,12 @@ cv::Vec4f SurfaceTexture::at(int triangle, const Eigen::Vector3f& weights) const
 
 void diffuseOverMesh(const Points& vertices, const Triangles& triangles,
                      const std::vector<bool>& known, std::vector<cv::Vec3f>& values) {
-  const std::vector<int> welded = weld(vertices);
-  const int count = static_cast<int>(vertices.size());
-  std::vector<bool> fixed(count, false);
-  std::vector<cv::Vec3d> sums(count);
-  std::vector<int> parts(count, 0), row(count, -1);
-  cv::Vec3d mean;
-  int all = 0;
-  for (int i = 0; i < count; ++i) {
-    if (known[i])
-      fixed[welded[i]] = true, sums[welded[i]] += cv::Vec3d(values[i]), ++parts[welded[i]],
-      mean += cv::Vec3d(values[i]), ++all;
-  }
-  mean *= 1.0 / std::max(1, all);
-  int rows = 0;
-  for (int i = 0; i < count; ++i) {
-    if (welded[i] == i && !fixed[i]) row[i] = rows++;
-  }
-  // Graph Laplacian with a weak pull to the mean.
-  std::vector<Eigen::Triplet<double>> entries;
-  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(rows, 3);
-  for (int r = 0; r < rows; ++r) {
-    entries.emplace_back(r, r, kAnchor);
-    for (int c = 0; c < 3; ++c) right(r, c) = kAnchor * mean[c];
-  }
-  const auto link = [&](int a, int b) {
-    if (row[a] < 0) return;
-    entries.emplace_back(row[a], row[a], 1.0);
-    if (row[b] >= 0)
-      entries.emplace_back(row[a], row[b], -1.0);
-    else
-      for (int c = 0; c < 3; ++c) right(row[a], c) += sums[b][c] / parts[b];
-  };
-  for (const Eigen::Vector3i& t : triangles) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = welded[t[k]], b = welded[t[(k + 1) % 3]];
-      if (a != b) link(a, b), link(b, a);
-    }
-  }
-  if (rows == 0) return;
-  Eigen::SparseMatrix<double> L(rows, rows);
-  L.setFromTriplets(entries.begin(), entries.end());
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(L);
-  const Eigen::MatrixXd x = solver.solve(right);
-  for (int i = 0; i < count; ++i) {
-    const int r = row[welded[i]];
-    if (!known[i] && r >= 0)
-      values[i] = cv::Vec3f(x(r, 0), x(r, 1), x(r, 2));
-    else if (!known[i])
-      values[i] = cv::Vec3f(sums[welded[i]] * (1.0 / parts[welded[i]]));
+  const WeldedValues welded(vertices, known, values);
+  const Eigen::MatrixXd x = harmonicValues(welded, triangles);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (known[i]) continue;
+    const int place = welded.place[i], r = welded.row[place];
+    values[i] = r >= 0 ? cv::Vec3f(x(r, 0), x(r, 1), x(r, 2)) : cv::Vec3f(welded.mean[place]);
   }
 }
 

@@ -18,4 +18,18 @@ std::optional<cv::Vec3f> umbraInViews(const std::vector<View>& views,
                                       const std::vector<SupportPlane>& planes,
                                       const Background& plate, const Light& light);
 
+// What the light itself says of that, on the first plane.
+cv::Vec3f predictedUmbra(const Light& light, const std::vector<SupportPlane>& planes);
+
+// Median of picture / plate per channel over pixels of the full shadow, where all of the sky would
+// be seen; `predicted` if there are too few.
+// @param sun, sky CV_32FC1, visible parts of them on the support planes
+cv::Vec3f umbraInPicture(const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,
+                         const cv::Mat& sky, const cv::Mat& labels, const cv::Vec3f& predicted);
+
+// The same from shadows that pass over the plate: the dark end of what darkens it.
+cv::Vec3f umbraOfPassing(const std::vector<ClipFrame>& frames,
+                         const std::vector<SupportPlane>& planes, const Background& background,
+                         const cv::Vec3f& predicted);
+
 }  // namespace calipso::render

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "calipso_render/renderer.hpp"
+
+namespace calipso::render {
+
+// How camera and objects move in a clip, judged by pictures and masks alone.
+
+bool cameraMoves(const ClipSample& clip);
+
+// The frames as the key frame's camera would see them; labels 255 where they do not show it.
+// @param nearness of the place, from the key frame's camera
+std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness);
+
+// A moving camera sees an object at rest where its model at rest is, as well as they agree at the
+// key frame.
+// @param frames as they were taken
+bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface);
+
+// What keeps its outline may yet bend within: then the picture of it changes.
+bool swaysInVideo(const std::vector<ClipFrame>& frames, int index);
+
+}  // namespace calipso::render

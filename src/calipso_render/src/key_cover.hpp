@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include "calipso_render/renderer.hpp"
+
+namespace calipso::render {
+
+// What covers what at the key frame, by models, masks and the depth image.
+
+// CV_8UC1: 255 where the model covers the picture.
+cv::Mat outlineOf(const Actor& actor, const cv::Size& size);
+
+// Grown by a disc, px.
+cv::Mat grown(const cv::Mat& mask, int radius);
+
+// Per actor, CV_8UC1: where something that has no model stands before it; empty if nothing does.
+std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p,
+                              const RenderParams& params);
+
+// All that a resting object covers at the key frame: its mask, which can miss thin or dark ends,
+// and its model. Empty for those that move.
+std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepared& p);
+
+// CV_32FC1, 1/m: what the depth image shows beside the objects, as near as all of its surroundings:
+// its edges are not exact.
+cv::Mat sceneryOf(const cv::Mat& depth, const Prepared& p, int margin);
+
+}  // namespace calipso::render

@@ -1,0 +1,175 @@
+#include "prepare_background.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+#include "key_cover.hpp"
+#include "place_relief.hpp"
+#include "plane_mirror.hpp"
+#include "shadow_check.hpp"
+#include "umbra.hpp"
+
+namespace calipso::render {
+namespace {
+
+// visible parts from which a place says how the planes mirror
+constexpr float kUnshadedSun = 0.985f, kUnshadedSky = 0.85f;
+// part by which scenery is nearer or farther than the plane behind or before it
+constexpr float kOffPlane = 0.1f;
+
+// Where the depth image shows something else than a support plane.
+cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes,
+                  const Camera& camera) {
+  cv::Mat off = cv::Mat::zeros(camera.height, camera.width, CV_8U);
+  const cv::Mat ground = scenery.empty() ? cv::Mat() : groundNearness(planes, camera, cv::Mat());
+  if (!ground.empty())
+    off = (scenery > 0.0f) &
+          ((scenery > (1.0f + kOffPlane) * ground) | ((1.0f + kOffPlane) * scenery < ground));
+  return off;
+}
+
+// Visibility of a light on the support planes and on the relief, 0..1, where one is seen; 1
+// elsewhere.
+cv::Mat placeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& planes,
+                        const Relief& relief, const cv::Mat& off_planes, const ClipFrame& key) {
+  cv::Mat visibility(key.bgr.size(), CV_32F, cv::Scalar(1.0f));
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < visibility.rows; ++v) {
+    for (int u = 0; u < visibility.cols; ++u) {
+      if (off_planes.at<std::uint8_t>(v, u) != 0) continue;
+      const std::optional<Receiver> receiver =
+          relief.at(u, v) ? relief.receiver(u, v) : receiverAt(planes, key.camera, u, v);
+      if (receiver)
+        visibility.at<float>(v, u) = sun.visibility(receiver->position, receiver->normal);
+    }
+  }
+  return visibility;
+}
+
+cv::Mat linearOf(const cv::Mat& codes) {
+  cv::Mat linear(codes.size(), CV_32FC3);
+  for (int v = 0; v < codes.rows; ++v) {
+    const float* in = codes.ptr<float>(v);
+    float* out = linear.ptr<float>(v);
+    for (int i = 0; i < 3 * codes.cols; ++i) out[i] = linearFromRealCode(in[i]);
+  }
+  return linear;
+}
+
+// What objects at rest cover or shade at the key frame, with soft edges and the predictions'
+// errors.
+// @param curved CV_8UC1, != 0: keeps its shadows; may be empty
+cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const cv::Mat& curved,
+                      const RenderParams& params) {
+  cv::Mat traces = grown(shadows.sun | shadows.sky, params.background.shadow_margin_px);
+  if (!curved.empty()) traces.setTo(0, curved);
+  for (std::size_t i = 0; i < p.footprints.size(); ++i) {
+    if (p.footprints[i].empty()) continue;
+    traces |= grown(p.footprints[i], params.background.mask_margin_px);
+    if (!p.fronts[i].empty()) traces.setTo(0, p.fronts[i]);
+  }
+  return traces;
+}
+
+// What the support planes mirror, if the key frame shows it. Objects that move in the video have
+// left their place in later frames.
+// @param unclear CV_8UC1, != 0: objects, shadows
+PlaneMirror findMirror(const std::vector<Actor>& actors, const cv::Mat& picture,
+                       const cv::Mat& unclear, const cv::Mat& off_planes,
+                       const RenderParams& params, const Prepared& p) {
+  std::vector<const Actor*> resting;
+  std::vector<std::size_t> surfaces;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    if (!p.moves[i]) resting.push_back(&actors[i]), surfaces.push_back(i);
+  }
+  const Radiance radiance = [&](int slot, const SurfacePoint& point) {
+    return mirroredRadiance(p.appearances[surfaces[slot]], p.light.light, Look(), point);
+  };
+  const MirrorImage image = mirrorImage(resting, radiance, params.planes, p.camera, off_planes);
+  if (image.empty()) return {};
+  PlaneMirror mirror = establishMirror(image, linearOf(picture),
+                                       grown(unclear, params.background.mask_margin_px) == 0);
+  if (!mirror.established()) return mirror;
+  mirror.off = off_planes;
+  mirror.at_key = addedBy(mirror, image);
+  return mirror;
+}
+
+// Where the key frame shows support planes, the relief, and neither.
+struct SeenPlace {
+  cv::Mat off_planes;  // CV_8UC1: 255 where something else than a support plane is seen
+  cv::Mat blind;       // ... what is neither plane nor relief, or curved: takes no shadow
+  cv::Mat curved;      // ... has no like to be filled from: a shadow stays there; may be empty
+};
+
+SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, Prepared& p) {
+  SeenPlace place{offPlanes(p.scenery, params.planes, p.camera), {}, {}};
+  place.blind = place.off_planes.clone();
+  p.relief = findRelief(surfaces, p.light.light.direction);
+  if (!p.relief.empty())
+    place.blind = place.off_planes & ~p.relief.seen, place.off_planes |= p.relief.seen;
+  p.shadowless = place.blind.clone();
+  if (!surfaces.empty()) {
+    place.curved = surfaces.label == PlaceSurfaces::kCurved;
+    place.blind |= place.curved;
+  }
+  return place;
+}
+
+// What the objects at rest leave on the place, to be taken out; what of it is mirrored goes to `p`.
+cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
+                   const cv::Mat& sky, const RenderParams& params, Prepared& p) {
+  const cv::Mat objects = p.key_labels != 0;
+  const SeenShadows shadows = seenShadows(sun, sky, e.picture, objects | place.blind);
+  if (cv::countNonZero(shadows.refuted) > 0) {
+    p.remarks.push_back(
+        "a shadow that the light predicts is not seen in the picture: none is taken out or drawn "
+        "there; give the light if it is wrong, a depth image if a wall or a step is in its way");
+  }
+  p.shadowless |= grown(shadows.refuted, params.background.shadow_margin_px);
+  if (shadows.none) p.shadowless.setTo(255);
+  const cv::Mat dark = ((sun < kUnshadedSun) | (sky < kUnshadedSky)) & (shadows.refuted == 0);
+  p.mirror = findMirror(e.actors, e.picture, objects | dark, place.off_planes, params, p);
+  return restingTraces(p, shadows, place.curved, params);
+}
+
+void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,
+                    const cv::Mat& off_planes, const RenderParams& params, Prepared& p) {
+  const Light& light = p.light.light;
+  const cv::Vec3f predicted = predictedUmbra(light, params.planes);
+  if (std::find(p.moves.begin(), p.moves.end(), true) == p.moves.end()) {
+    p.umbra = umbraInPicture(e.picture, p.background.plate, sun, sky,
+                             (p.key_labels != 0) | off_planes, predicted);
+  } else {
+    const auto in_views = umbraInViews(e.views, params.planes, p.background, light);
+    p.umbra =
+        in_views ? *in_views : umbraOfPassing(e.frames, params.planes, p.background, predicted);
+  }
+  findUmbra(light, e.picture, p.background.plate, sun, p.key_labels, params.planes, p.umbra,
+            p.relief);
+}
+
+}  // namespace
+
+void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepared& p) {
+  ClipFrame key = e.frames.front();
+  p.background = e.seen;
+  const PlaceSurfaces surfaces =
+      findSurfaces(p.scenery, params.depth, p.key_labels, params.planes, p.camera);
+  const SeenPlace place = findPlace(surfaces, params, p);
+  const cv::Mat sun = placeVisibility(e.sun, params.planes, p.relief, place.blind, key),
+                sky = placeVisibility(e.sky, params.planes, p.relief, place.off_planes, key);
+  const bool any_rests = std::find(p.moves.begin(), p.moves.end(), false) != p.moves.end();
+  const cv::Mat traces = any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat();
+  if (p.mirror.established()) {
+    p.background.plate = unmirrored(p.mirror, p.background.plate);
+    key.bgr = unmirroredCodes(p.mirror, key.bgr);
+  }
+  inventBackground(traces, key, groundNearness(params.planes, key.camera, p.scenery),
+                   surfaces.label, p.background);
+  p.plate_linear = linearOf(p.background.plate);
+  findPlaceUmbra(e, sun, sky, place.off_planes, params, p);
+}
+
+}  // namespace calipso::render
