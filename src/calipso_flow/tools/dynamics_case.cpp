@@ -4,7 +4,6 @@
 #include <chrono>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
 
 #include "calipso_flow/clip_dynamics.hpp"
 #include "clip_case.hpp"
@@ -12,6 +11,7 @@
 #include "json_entry.hpp"
 #include "motion_errors.hpp"
 #include "throw_case.hpp"
+#include "trace.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -31,35 +31,6 @@ void add(const Cost& since, int frames, Cost& cost) {
   const Cost end = now();
   cost.wall += (end.wall - since.wall) / frames;
   cost.cpu += (end.cpu - since.cpu) / frames;
-}
-
-// One line per frame: estimate, its deviations and the truth, for plots.
-void writeTrace(const std::string& folder, const Scene& scene, const TrueObject& truth,
-                const ObjectDynamics& dynamics) {
-  const std::string name = std::filesystem::path(scene.directory).filename().string();
-  std::ofstream file(folder + "/" + name + "_" + dynamics.name + ".csv");
-  file << "t,tracks,moving,x,y,z,vx,vy,vz,wx,wy,wz,ax,ay,az,sx,sy,sz,tvx,tvy,tvz,twx,twy,twz\n";
-  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-  for (size_t k = 0; k < dynamics.motions.size(); ++k) {
-    const ObjectMotion& m = dynamics.motions[k];
-    const Eigen::Vector3d sigma = m.state.twistCovariance().diagonal().head<3>().cwiseSqrt();
-    file << m.state.time << "," << m.tracks << "," << m.moving;
-    for (const Eigen::Vector3d& v :
-         {m.state.position, m.state.velocity, m.state.spin, m.state.acceleration, sigma,
-          truth.velocity.empty() ? zero : valueAt(truth.velocity, k),
-          truth.spin.empty() ? zero : valueAt(truth.spin, k)}) {
-      file << "," << v.x() << "," << v.y() << "," << v.z();
-    }
-    file << "\n";
-  }
-  for (const Collision& c : dynamics.trajectory.collisions) {
-    file << "# collision at " << c.time << " s +- " << c.time_deviation << ", speed "
-         << c.before.velocity.transpose() << " -> " << c.after.velocity.transpose() << "\n";
-  }
-  for (const MotionPiece& piece : dynamics.trajectory.pieces) {
-    file << "# piece from " << piece.start << " s, travel " << static_cast<int>(piece.travel)
-         << ", turning " << static_cast<int>(piece.turning) << "\n";
-  }
 }
 
 // Per frame, for all objects together.
@@ -126,7 +97,8 @@ std::vector<std::string> evaluateScene(const std::string& directory,
   std::vector<std::string> entries;
   for (size_t i = 0; i < dynamics.size(); ++i) {
     entries.push_back(describe(clip, i, dynamics[i], costs));
-    if (!options.trace.empty()) writeTrace(options.trace, clip.scene, clip.truths[i], dynamics[i]);
+    if (!options.trace.empty())
+      writeTrace(options.trace, clip.scene, clip.models[i], clip.truths[i], dynamics[i]);
   }
   return entries;
 }

@@ -28,55 +28,71 @@ constexpr char kUsage[] =
     "  --repeats N noisy films of a thrown box: how often the stated intervals hold the truth\n"
     "  --scale   enlarges the frames first: 2 makes 1280x720 of 640x360\n";
 
-}  // namespace
-
-int main(int argc, char** argv) {
+struct Arguments {
   calipso::flow::DynamicsOptions options;
   bool filmed = false;
   int repeats = 0;
   std::vector<std::string> paths;
+};
+
+Arguments parse(int argc, char** argv) {
+  Arguments arguments;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--models" && i + 1 < argc) {
-      options.models = argv[++i];
+      arguments.options.models = argv[++i];
     } else if (argument == "--trace" && i + 1 < argc) {
-      options.trace = argv[++i];
+      arguments.options.trace = argv[++i];
     } else if (argument == "--repeats" && i + 1 < argc) {
-      repeats = std::max(0, std::atoi(argv[++i]));
+      arguments.repeats = std::max(0, std::atoi(argv[++i]));
     } else if (argument == "--filmed") {
-      filmed = true;
+      arguments.filmed = true;
     } else if (argument == "--scale" && i + 1 < argc) {
-      options.scale = std::max(1, std::atoi(argv[++i]));
+      arguments.options.scale = std::max(1, std::atoi(argv[++i]));
     } else {
-      paths.push_back(argument);
+      arguments.paths.push_back(argument);
     }
   }
-  if (paths.empty() && !filmed && repeats == 0) {
-    std::cerr << kUsage;
-    return 2;
-  }
-  std::vector<std::string> entries;
-  bool good = true;
-  if (filmed) entries = calipso::flow::evaluateFilmed();
-  if (repeats > 0) {
-    const auto found = calipso::flow::evaluateRepeats(repeats);
-    entries.insert(entries.end(), found.begin(), found.end());
-  }
-  for (const std::string& path : paths) {
-    try {
-      const bool is_flow = std::filesystem::exists(path + "/flow10.flo");
-      const std::vector<std::string> found =
-          is_flow ? calipso::flow::evaluateFlow(path) : calipso::flow::evaluateScene(path, options);
-      entries.insert(entries.end(), found.begin(), found.end());
-    } catch (const std::exception& error) {
-      std::cerr << "evaluate: " << path << ": " << error.what() << "\n";
-      good = false;
-    }
-  }
+  return arguments;
+}
+
+std::vector<std::string> evaluatePath(const std::string& path,
+                                      const calipso::flow::DynamicsOptions& options) {
+  const bool is_flow = std::filesystem::exists(path + "/flow10.flo");
+  return is_flow ? calipso::flow::evaluateFlow(path) : calipso::flow::evaluateScene(path, options);
+}
+
+void print(const std::vector<std::string>& entries) {
   std::cout << "[\n";
   for (size_t i = 0; i < entries.size(); ++i) {
     std::cout << "  " << entries[i] << (i + 1 < entries.size() ? ",\n" : "\n");
   }
   std::cout << "]\n";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Arguments arguments = parse(argc, argv);
+  if (arguments.paths.empty() && !arguments.filmed && arguments.repeats == 0) {
+    std::cerr << kUsage;
+    return 2;
+  }
+  std::vector<std::string> entries;
+  const auto append = [&](const std::vector<std::string>& more) {
+    entries.insert(entries.end(), more.begin(), more.end());
+  };
+  bool good = true;
+  if (arguments.filmed) append(calipso::flow::evaluateFilmed());
+  if (arguments.repeats > 0) append(calipso::flow::evaluateRepeats(arguments.repeats));
+  for (const std::string& path : arguments.paths) {
+    try {
+      append(evaluatePath(path, arguments.options));
+    } catch (const std::exception& error) {
+      std::cerr << "evaluate: " << path << ": " << error.what() << "\n";
+      good = false;
+    }
+  }
+  print(entries);
   return good ? 0 : 1;
 }

@@ -76,6 +76,43 @@ std::vector<double> collisionErrors(const Scene& scene, const TrueObject& truth,
   return errors;
 }
 
+// Impacts of which no frame lies between two are one, told at any instant from its first to its
+// last, or within a frame of these.
+struct ImpactCount {
+  int present = 0, found = 0;
+  int wrong = 0;  // told where there is none
+};
+
+ImpactCount countImpacts(const Scene& scene, const TrueObject& truth,
+                         const Trajectory& trajectory) {
+  struct Impact {
+    double first, last;  // frames
+    bool found = false;
+  };
+  std::vector<Impact> impacts;
+  for (const TrueCollision& collision : truth.collisions) {
+    const double at = scene.fps * collision.time;
+    if (impacts.empty() || at - impacts.back().last >= 1.0) impacts.push_back({at, at});
+    impacts.back().last = at;
+  }
+  ImpactCount count;
+  for (const Collision& told : trajectory.collisions) {
+    const double at = scene.fps * told.time;
+    const auto met = std::find_if(impacts.begin(), impacts.end(), [&](const Impact& impact) {
+      return at > impact.first - 1.0 && at < impact.last + 1.0;
+    });
+    if (met == impacts.end()) {
+      ++count.wrong;
+    } else {
+      met->found = true;
+    }
+  }
+  count.present = static_cast<int>(impacts.size());
+  count.found = static_cast<int>(
+      std::count_if(impacts.begin(), impacts.end(), [](const Impact& i) { return i.found; }));
+  return count;
+}
+
 // Vertical, of the first impact; true impacts less than a frame apart, which no frame lies between,
 // count as one.
 double restitutionError(const Scene& scene, const TrueObject& truth, const Trajectory& trajectory) {
@@ -131,6 +168,9 @@ void addMotionErrors(const Scene& scene, const TrueObject& truth, const ObjectDy
   entry.number("g_error_percent", gravityError(scene, trajectory));
   entry.numbers("collision_errors_frames", collisionErrors(scene, truth, trajectory));
   entry.number("collisions_found", static_cast<double>(trajectory.collisions.size()));
+  const ImpactCount impacts = countImpacts(scene, truth, trajectory);
+  entry.number("impacts_present", impacts.present).number("impacts_found", impacts.found);
+  entry.number("impacts_false", impacts.wrong);
   entry.number("sign_change_error_frames", signChangeError(scene, truth, dynamics));
   entry.number("restitution_error_percent", restitutionError(scene, truth, trajectory));
   entry.number("covered_95", errors.covered);
