@@ -3,21 +3,12 @@
 #include <memory>
 #include <vector>
 
+#include "hex_coarsening.hpp"
 #include "hex_level.hpp"
 #include "linear_solver.hpp"
 #include "multigrid.hpp"
 
 namespace calipso::fem {
-
-// Which coarse cell of the next level each fine cell lies in.
-struct HexCoarsening {
-  CellMatrix coarse_cells;            // #coarse cells x 8
-  std::vector<int> coarse_of;         // per place in StvkHexes::order(); -1: no cell
-  std::vector<unsigned char> parity;  // bits: odd along x, y, z
-  std::vector<int> block_of;          // per coarse cell, 8 x 8, in the coarse pattern
-  std::vector<int>
-      parent_blocks;  // per fine node, every pair of its parents, in the coarse pattern
-};
 
 // Solves A x = b without assembling A: CG in double precision, multigrid in single. The multigrid's
 // fine level follows x at every setSystem(); its diagonal and coarse levels are renewed when that

@@ -2,15 +2,11 @@
 
 #include <algorithm>
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define CALIPSO_FLOW_CLONES __attribute__((target_clones("default", "arch=haswell")))
-#else
-#define CALIPSO_FLOW_CLONES
-#endif
+#include "calipso_scene/processor_clones.hpp"
 
 namespace calipso::flow {
 
-CALIPSO_FLOW_CLONES
+CALIPSO_CLONES
 void sampleRows(const float* picture, long row, float fx, float fy, int side, float* out) {
   const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
   for (int j = 0; j < side; ++j) {
@@ -24,7 +20,7 @@ void sampleRows(const float* picture, long row, float fx, float fy, int side, fl
   }
 }
 
-CALIPSO_FLOW_CLONES
+CALIPSO_CLONES
 PatchFill fillTerms(const float* values, const float* weights, int radius, int count,
                     PatchTerms& terms) {
   const int side = 2 * radius + 1, wide = side + 2;
@@ -54,7 +50,7 @@ PatchFill fillTerms(const float* values, const float* weights, int radius, int c
   return {support, sum};
 }
 
-CALIPSO_FLOW_CLONES
+CALIPSO_CLONES
 void multiplyTerms(const PatchTerms& terms, int count, float sums[kTerms][kTerms]) {
   const float *x = terms.at[kGradientX], *y = terms.at[kGradientY], *v = terms.at[kValue],
               *o = terms.at[kOne], *rx = terms.at[kRampX], *ry = terms.at[kRampY];
@@ -78,7 +74,7 @@ void multiplyTerms(const PatchTerms& terms, int count, float sums[kTerms][kTerms
   std::copy(&upper[0][0], &upper[0][0] + kTerms * kTerms, &sums[0][0]);
 }
 
-CALIPSO_FLOW_CLONES
+CALIPSO_CLONES
 void multiplyTarget(const PatchTerms& terms, int count, float mean, const float* target,
                     float sums[kTerms + 1]) {
   const float *x = terms.at[kGradientX], *y = terms.at[kGradientY], *v = terms.at[kValue],

@@ -144,8 +144,17 @@ class SoftContacts {
   std::vector<Island> islandsOf(const std::vector<SoftEntry>& softs,
                                 const std::vector<Obstacle>& obstacles, const RigidWorld& rigid,
                                 double h) const;
+  // The iteration of a step (soft_contact_iteration.cpp)
+  struct Surroundings {
+    const std::vector<Candidate>& watched;
+    const std::vector<Obstacle>& obstacles;
+    RigidWorld& rigid;
+  };
+  struct Progress;
   void solveIsland(const std::vector<Obstacle>& obstacles, RigidWorld& rigid, double h,
                    Island& island) const;
+  void iterate(const Surroundings& around, Island& island, Progress& p) const;
+  void straightenWhereDue(const Surroundings& around, Island& island, Progress& p) const;
   // Distance from which on something may come within the minimal distance in the step, m.
   double watchOf(const SoftEntry& entry, const Obstacle& obstacle, const RigidWorld& rigid,
                  double h) const;
