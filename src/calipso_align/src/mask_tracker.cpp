@@ -10,36 +10,16 @@
 #include "background_evidence.hpp"
 #include "calipso_align/layer_motion.hpp"
 #include "layer_appearance.hpp"
+#include "layer_search.hpp"
 
 namespace calipso::align {
 namespace {
 
-constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
-// px; from here on half the resolution tells how a layer moves nearly as well
-constexpr int kLargeView = 200;
-constexpr int kMeanSize = 4;  // px; blocks over which stillness averages the sensor's noise away
 constexpr size_t kMaxSamples = 2000;
 constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has proved wrong
 // of 255: how likely a pixel may lie in a shadow where nothing is known of any
 constexpr int kAnyShadow = 76;
 constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
-
-cv::Mat blockMeans(const cv::Mat& image) {
-  cv::Mat means;
-  cv::resize(image, means, cv::Size(), 1.0 / kMeanSize, 1.0 / kMeanSize, cv::INTER_AREA);
-  return means;
-}
-
-cv::Mat grown(const cv::Mat& mask, int px) {
-  cv::Mat result;
-  cv::dilate(mask, result,
-             cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1)));
-  return result;
-}
-
-cv::Rect grown(const cv::Rect& rect, int px) {
-  return {rect.x - px, rect.y - px, rect.width + 2 * px, rect.height + 2 * px};
-}
 
 std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {
   const int total = cv::countNonZero(mask);
@@ -50,11 +30,6 @@ std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {
     for (int x = 0; x < mask.cols; ++x)
       if (mask.at<uchar>(y, x) && met++ % step == 0) colours.push_back(image.at<cv::Vec3b>(y, x));
   return colours;
-}
-
-cv::Rect around(const cv::Mat& mask, int margin) {
-  const cv::Rect box = cv::boundingRect(mask);
-  return box.empty() ? box : grown(box, margin) & cv::Rect(cv::Point(), mask.size());
 }
 
 // Signed distance from the outline of a mask, px; negative inside.
@@ -87,6 +62,12 @@ double meanDifference(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
 }
 
 }  // namespace
+
+// What object and background look like on a part of the picture.
+struct MaskTracker::Layers {
+  LayerAppearance fore, back;
+  double back_noise;  // grey levels
+};
 
 MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerParams params)
     : params_(params), size_(image.size()) {
@@ -131,18 +112,20 @@ TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   std::vector<Object*> moving;
   for (Object& object : objects_)
-    if (!isStill(object, means)) moving.push_back(&object);
+    if (!isStill(object.mask, means, object.reference_mean, params_)) moving.push_back(&object);
 
   occupied_ = cv::Mat::zeros(size_, CV_8U);
   for (const Object& object : objects_) occupied_ |= object.mask;
 #pragma omp parallel for schedule(dynamic)
   for (size_t k = 0; k < moving.size(); ++k) {
     Object* object = moving[k];
-    const cv::Point shift = coarseShift(*object, means);
-    const cv::Mat flow = backwardFlow(grey, *object, shift);
+    const cv::Point shift = coarseShift(object->mask, means, previous_means_, params_.search_px);
+    const cv::Mat flow =
+        backwardFlow(grey, previous_grey_, object->mask, shift, params_.margin_px, *object->flow);
     const bool told = !prior.empty() && cv::countNonZero(prior == object->label) > 0;
-    follow(*object, image, flow,
-           told ? cv::Mat(prior == object->label) : predict(*object, flow, shift), told);
+    const cv::Mat rough =
+        told ? cv::Mat(prior == object->label) : roughlyMoved(object->mask, flow, shift);
+    follow(*object, image, flow, rough, told);
     object->reference_mean = means;
   }
   rememberBackground(image);
@@ -209,76 +192,6 @@ KnownBackground MaskTracker::backgroundIn(const cv::Rect& roi, const cv::Mat& im
              : moved;
 }
 
-bool MaskTracker::isStill(const Object& object, const cv::Mat& means) const {
-  const cv::Rect roi = around(object.mask, params_.band_px + kMeanSize);
-  if (roi.empty()) return true;
-  const cv::Rect cells((roi.x + kMeanSize - 1) / kMeanSize, (roi.y + kMeanSize - 1) / kMeanSize,
-                       roi.width / kMeanSize - 1, roi.height / kMeanSize - 1);
-  const cv::Rect part = cells & cv::Rect(cv::Point(), means.size());
-  if (part.empty()) return false;
-  cv::Mat difference, changed;
-  cv::absdiff(means(part), object.reference_mean(part), difference);
-  cv::Mat cell_mask;
-  cv::resize(grown(object.mask, params_.band_px), cell_mask, means.size(), 0, 0, cv::INTER_NEAREST);
-  cv::inRange(difference, cv::Scalar::all(0), cv::Scalar::all(params_.still_levels), changed);
-  changed = (changed == 0) & cell_mask(part);
-  const int counted = cv::countNonZero(cell_mask(part));
-  return cv::countNonZero(changed) <= params_.still_share * counted;
-}
-
-// Translation of an object since the previous frame: best match of its pixels on a coarse picture.
-cv::Point MaskTracker::coarseShift(const Object& object, const cv::Mat& means) const {
-  const cv::Rect box = cv::boundingRect(object.mask);
-  if (box.empty()) return {};
-  const cv::Rect cells =
-      cv::Rect(box.tl() / kMeanSize, box.size() / kMeanSize) & cv::Rect(cv::Point(), means.size());
-  if (cells.width < 2 || cells.height < 2) return {};
-  const int reach = params_.search_px / kMeanSize;
-  const cv::Rect search = grown(cells, reach) & cv::Rect(cv::Point(), means.size());
-  cv::Mat weight, score;
-  cv::resize(object.mask, weight, means.size(), 0, 0, cv::INTER_AREA);
-  cv::matchTemplate(means(search), previous_means_(cells), score, cv::TM_SQDIFF, weight(cells));
-  cv::Point best;
-  cv::minMaxLoc(score, nullptr, nullptr, &best);
-  const cv::Point moved = search.tl() + best - cells.tl();
-  // Motion of a cell or two is the flow's to find.
-  return std::abs(moved.x) > 2 || std::abs(moved.y) > 2 ? moved * kMeanSize : cv::Point();
-}
-
-// Backward flow, current to previous frame, near where an object went; zero elsewhere. What the
-// object moved as a whole is taken out first: the flow then has only the rest to find.
-cv::Mat MaskTracker::backwardFlow(const cv::Mat& grey, const Object& object,
-                                  const cv::Point& shift) const {
-  const cv::Rect whole(cv::Point(), size_);
-  const cv::Rect view = grown(cv::boundingRect(object.mask) + shift, params_.margin_px) & whole;
-  cv::Mat flow(size_, CV_32FC2, cv::Scalar(-shift.x, -shift.y));
-  if (view.width < kLeastFlowWidth || view.height < kLeastFlowWidth) return flow;
-  cv::Mat before;
-  const cv::Matx23d back(1, 0, -shift.x + view.x, 0, 1, -shift.y + view.y);
-  cv::warpAffine(previous_grey_, before, back, view.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
-                 cv::BORDER_REPLICATE);
-  cv::Mat rest, now = grey(view).clone();  // flow wants whole rows
-  const bool large = std::min(view.width, view.height) >= kLargeView;
-  if (large) {
-    cv::resize(now, now, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
-    cv::resize(before, before, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
-  }
-  object.flow->calc(now, before, rest);
-  if (large) cv::resize(2.0 * rest, rest, view.size());
-  flow(view) += rest;
-  return flow;
-}
-
-// Roughly where an object is now: where its pixels flowed, or where it went as a whole if that is
-// far, for then the background's own flow leads back to where the object was.
-cv::Mat MaskTracker::predict(const Object& object, const cv::Mat& flow,
-                             const cv::Point& shift) const {
-  if (shift == cv::Point()) return movedBack(object.mask, flow, cv::Rect(cv::Point(), size_)) > 127;
-  cv::Mat moved;
-  cv::warpAffine(object.mask, moved, cv::Matx23d(1, 0, shift.x, 0, 1, shift.y), size_);
-  return moved > 127;
-}
-
 // Costs of a pixel's being background [0] or object [1], over a band along the predicted outline.
 std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& band,
                                           const cv::Mat& distance, const LayerAppearance& back,
@@ -317,74 +230,82 @@ cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view,
   return others;
 }
 
-// Cuts where a prediction has proved wrong: by what is known of the background, in a shadow or not,
-// and by the object's colours.
-void MaskTracker::cutByLooks(const cv::Mat& view, const cv::Mat& free, const cv::Mat& distance,
-                             const cv::Mat& known, LayerAppearance back,
-                             const std::vector<const GaussianMixture*>& colours,
-                             cv::Mat& labels) const {
-  back.shadow.share = cv::max(back.shadow.share, known & kAnyShadow);
-  const LayerAppearance looks{{}, colours};
-  cutLabels(view, free, costsOf(view, free, distance, back, looks, kLoosePrior), params_.smoothness,
-            labels);
+MaskTracker::Prediction MaskTracker::predict(const Object& object, const cv::Mat& flow,
+                                             const cv::Mat& rough, bool exact,
+                                             const cv::Rect& roi) const {
+  Prediction p;
+  p.core = insideOf(rough);
+  cv::Mat support = cv::Mat::zeros(size_, CV_8U);
+  p.core.copyTo(support(roi));
+  p.motion = layerMotion(flow, support, roi);
+  p.coverage = movedBack(object.coverage, p.motion, roi);
+  p.mask = exact ? rough.clone() : cv::Mat(p.coverage > 127);
+  if (cv::countNonZero(p.mask) == 0) return p;
+  p.distance = signedDistance(p.mask);
+  p.band = cv::abs(p.distance) <= params_.band_px;
+  return p;
+}
+
+MaskTracker::Layers MaskTracker::layersOf(const Object& object, const cv::Mat& view,
+                                          const Prediction& p, const KnownBackground& background,
+                                          const GaussianMixture& surroundings,
+                                          const cv::Rect& roi) const {
+  const cv::Mat moved = movedBack(previous_image_, p.motion, roi);
+  const cv::Mat moved_relit = relit(moved, view, p.core);
+  const double noise = noiseOf(view, moved_relit, p.core);
+  const std::vector<const GaussianMixture*> colours = {&object.colours, &object.recent_colours};
+  const cv::Mat clear = background.known & (p.distance > 1.0);
+  const double back_noise = noiseOf(view, background.image, clear);
+  return {{{{moved, p.coverage, 0.5f, noise}, {moved_relit, p.coverage, 0.3f, noise}}, colours},
+          {{{background.image, background.known, 0.6f, back_noise},
+            {relit(background.image, view, clear), background.known, 0.37f, back_noise},
+            // What hides the object may move along with it.
+            {moved, ~p.coverage, 0.02f, noise}},
+           {&surroundings},
+           shadowOn(background.image, view, clear, back_noise, colours)},
+          back_noise};
+}
+
+// Where the background contradicts what was found, cuts by what is known of the background, in a
+// shadow or not, and by the object's colours.
+void MaskTracker::cutContradicted(const Object& object, const cv::Mat& view, const Prediction& p,
+                                  const KnownBackground& background, const Layers& layers,
+                                  const cv::Rect& roi, cv::Mat& labels) const {
+  const cv::Mat apart = othersIn(object, view, roi);
+  const cv::Mat wrong = contradicted(view, labels, background, apart, layers.back_noise);
+  if (cv::countNonZero(wrong) <= params_.wrong_share * cv::countNonZero(labels)) return;
+  const cv::Mat free = ((grown(wrong, 2) | ~background.known) & ~apart) | p.band;
+  LayerAppearance back = layers.back;
+  back.accounts.resize(2);  // those of the known background
+  back.shadow.share = cv::max(back.shadow.share, background.known & kAnyShadow);
+  const LayerAppearance looks{{}, layers.fore.colours};
+  cutLabels(view, free, costsOf(view, free, p.distance, back, looks, kLoosePrior),
+            params_.smoothness, labels);
 }
 
 void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& flow,
                          const cv::Mat& rough, bool exact, const cv::Rect& roi) {
   const cv::Mat view = image(roi);
-  const cv::Mat core = insideOf(rough);
-  cv::Mat support = cv::Mat::zeros(size_, CV_8U);
-  core.copyTo(support(roi));
-  const cv::Mat motion = layerMotion(flow, support, roi);
-  const cv::Mat coverage = movedBack(object.coverage, motion, roi);
-  const cv::Mat predicted = exact ? rough.clone() : cv::Mat(coverage > 127);
-  if (cv::countNonZero(predicted) == 0) {
-    lose(object);
-    return;
-  }
-  const cv::Mat distance = signedDistance(predicted);
-  const cv::Mat band = cv::abs(distance) <= params_.band_px;
-  const cv::Mat ring = (distance > params_.band_px) & (distance < params_.margin_px);
-  const std::vector<cv::Vec3f> surroundings = coloursUnder(view, ring);
+  const Prediction p = predict(object, flow, rough, exact, roi);
+  if (p.distance.empty()) return lose(object);
+  const std::vector<cv::Vec3f> surroundings =
+      coloursUnder(view, (p.distance > params_.band_px) & (p.distance < params_.margin_px));
   if (surroundings.empty()) {
     object.confidence = 0.0f;
     return;
   }
   const KnownBackground background = backgroundIn(roi, image, flow);
-  const cv::Mat moved = movedBack(previous_image_, motion, roi);
-  const cv::Mat moved_relit = relit(moved, view, core);
-  const double noise = noiseOf(view, moved_relit, core);
-  const LayerAppearance fore{{{moved, coverage, 0.5f, noise}, {moved_relit, coverage, 0.3f, noise}},
-                             {&object.colours, &object.recent_colours}};
   const GaussianMixture ring_colours = GaussianMixture::fit(surroundings, params_.components);
-  const cv::Mat clear = background.known & (distance > 1.0);
-  const double back_noise = noiseOf(view, background.image, clear);
-  // What hides the object may move along with it.
-  const Shadow shadow = shadowOn(background.image, view, clear, back_noise, fore.colours);
-  const LayerAppearance back{
-      {{background.image, background.known, 0.6f, back_noise},
-       {relit(background.image, view, clear), background.known, 0.37f, back_noise},
-       {moved, ~coverage, 0.02f, noise}},
-      {&ring_colours},
-      shadow};
-  cv::Mat labels = predicted / 255;
-  cutLabels(view, band, costsOf(view, band, distance, back, fore, params_.prior_limit),
+  const Layers layers = layersOf(object, view, p, background, ring_colours, roi);
+  cv::Mat labels = p.mask / 255;
+  cutLabels(view, p.band,
+            costsOf(view, p.band, p.distance, layers.back, layers.fore, params_.prior_limit),
             params_.smoothness, labels);
-
-  const double area = cv::countNonZero(labels);
-  if (!exact) {
-    const cv::Mat apart = othersIn(object, view, roi);
-    const cv::Mat wrong = contradicted(view, labels, background, apart, back_noise);
-    if (cv::countNonZero(wrong) > params_.wrong_share * area) {
-      const cv::Mat free = ((grown(wrong, 2) | ~background.known) & ~apart) | band;
-      const LayerAppearance known{{back.accounts[0], back.accounts[1]}, {&ring_colours}, shadow};
-      cutByLooks(view, free, distance, background.known, known, fore.colours, labels);
-    }
-  }
-  const double flipped = cv::countNonZero((labels > 0) != (predicted > 0));
-  object.confidence =
-      static_cast<float>(std::clamp(1.0 - 4.0 * flipped / std::max(1.0, area), 0.0, 1.0));
-  accept(object, view, background, back_noise, labels > 0, roi);
+  const double area = std::max(1, cv::countNonZero(labels));
+  if (!exact) cutContradicted(object, view, p, background, layers, roi, labels);
+  const double flipped = cv::countNonZero((labels > 0) != (p.mask > 0));
+  object.confidence = static_cast<float>(std::clamp(1.0 - 4.0 * flipped / area, 0.0, 1.0));
+  accept(object, view, background, layers.back_noise, labels > 0, roi);
 }
 
 void MaskTracker::accept(Object& object, const cv::Mat& view, const KnownBackground& background,

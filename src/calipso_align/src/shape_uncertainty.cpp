@@ -37,6 +37,39 @@ std::vector<int> facesByArea(const Points& x, const Triangles& triangles, int co
   return faces;
 }
 
+// Maps drawn from the fit's covariance, with what else is known as their weights.
+struct Draws {
+  std::vector<LowOrderMap> maps;
+  std::vector<double> weights;  // sum to one
+};
+
+Draws drawMaps(const LowOrderMap& here, const Eigen::MatrixXd& covariance,
+               const Likelihood& likelihood, std::mt19937& generator,
+               std::normal_distribution<double>& normal) {
+  constexpr int kMostTries = 50 * kDraws;
+  const Eigen::MatrixXd L = squareRoot(covariance);
+  Draws draws;
+  double sum = 0.0;
+  for (int t = 0; t < kMostTries && draws.maps.size() < kDraws; ++t) {
+    LowOrderMap::Parameters z;
+    for (int i = 0; i < z.size(); ++i) z[i] = normal(generator);
+    const LowOrderMap::Parameters step = L * z;
+    const double weight = likelihood(step);
+    if (!(weight > 0.0)) continue;
+    draws.weights.push_back(weight);
+    sum += weight;
+    draws.maps.push_back(here);
+    draws.maps.back().setParameters(here.plus(step));
+  }
+  for (double& weight : draws.weights) weight /= sum;
+  return draws;
+}
+
+Eigen::Vector3d centreOf(const Points& x, const Triangles& triangles, int f) {
+  return (x.row(triangles(f, 0)) + x.row(triangles(f, 1)) + x.row(triangles(f, 2))).transpose() /
+         3.0;
+}
+
 }  // namespace
 
 SurfaceDistance ShapeUncertainty::expected() const {
@@ -57,54 +90,34 @@ double ShapeUncertainty::beyond(const SurfaceDistance& limit) const {
   return probability;
 }
 
-ShapeUncertainty shapeUncertainty(
-    const Points& x, const Triangles& triangles, const LowOrderMap& here,
-    const Eigen::MatrixXd& covariance, double model_size, double unseen,
-    const std::function<double(const LowOrderMap::Parameters&)>& likelihood) {
-  constexpr int kMostTries = 50 * kDraws;
+ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
+                                  const LowOrderMap& here, const Eigen::MatrixXd& covariance,
+                                  double model_size, double unseen, const Likelihood& likelihood) {
   std::mt19937 generator(1);
   std::normal_distribution<double> normal;
-  const Eigen::MatrixXd L = squareRoot(covariance);
   const std::vector<int> faces = facesByArea(x, triangles, kDraws * kPointsPerDraw);
   if (faces.empty()) return {};
-
-  ShapeUncertainty error;
-  std::vector<LowOrderMap> maps;
-  double sum = 0.0;
-  for (int t = 0; t < kMostTries && maps.size() < kDraws; ++t) {
-    LowOrderMap::Parameters z;
-    for (int i = 0; i < z.size(); ++i) z[i] = normal(generator);
-    const LowOrderMap::Parameters step = L * z;
-    const double weight = likelihood(step);
-    if (!(weight > 0.0)) continue;
-    error.weights.push_back(weight);
-    sum += weight;
-    maps.push_back(here);
-    maps.back().setParameters(here.plus(step));
-  }
-  if (maps.empty()) {  // nothing agrees with what is known besides: it may be anywhere
+  const Draws draws = drawMaps(here, covariance, likelihood, generator, normal);
+  if (draws.maps.empty()) {  // nothing agrees with what is known besides: it may be anywhere
     const double anywhere = std::numeric_limits<double>::infinity();
     return {{{anywhere, anywhere}}, {1.0}};
   }
   // Consecutive points are of different draws: each draw is seen all over the surface.
-  const int count = static_cast<int>(maps.size());
+  const int count = static_cast<int>(draws.maps.size());
   Points moved(count * kPointsPerDraw, 3);
   for (int k = 0; k < moved.rows(); ++k) {
     const int f = faces[k * static_cast<long>(faces.size()) / moved.rows()];
-    const Eigen::Vector3d centre =
-        (x.row(triangles(f, 0)) + x.row(triangles(f, 1)) + x.row(triangles(f, 2))).transpose() /
-        3.0;
+    const Eigen::Vector3d centre = centreOf(x, triangles, f);
     const double along = unseen * model_size * normal(generator);
-    moved.row(k) = (maps[k % count](centre) + along * centre.normalized()).transpose();
+    moved.row(k) = (draws.maps[k % count](centre) + along * centre.normalized()).transpose();
   }
-  error.draws.resize(count);
+  ShapeUncertainty error{std::vector<SurfaceDistance>(count), draws.weights};
   const std::vector<double> distances = distancesToSurface(moved, x, triangles);
   for (size_t k = 0; k < distances.size(); ++k) {
     const double part = distances[k] / model_size;
     error.draws[k % count].mean += part / kPointsPerDraw;
     error.draws[k % count].rms += part * part / kPointsPerDraw;
   }
-  for (double& weight : error.weights) weight /= sum;
   for (SurfaceDistance& draw : error.draws) draw.rms = std::sqrt(draw.rms);
   return error;
 }

@@ -237,58 +237,100 @@ void DeformationFitter::addMatches(const DeformationField::Weights& weights,
   }
 }
 
+// Linearised about where the fit starts; the matches enter with what they are trusted.
+class DeformationFitter::Iterations {
+ public:
+  Iterations(const DeformationFitter& fitter, const std::vector<SurfaceMatch>& matches,
+             const Camera& camera, const Eigen::VectorXd& start, const Eigen::VectorXd& predicted)
+      : fitter_(fitter),
+        matches_(matches),
+        camera_(camera),
+        start_(start),
+        predicted_(predicted),
+        weights_(fitter.field_.weightsAt(pointsOf(matches))),
+        springs_(fitter.springNormal(start)),
+        spring_matrix_(springs_.matrix()),
+        trust_(matches.size()) {
+    observe(start);
+  }
+
+  void observe(const Eigen::VectorXd& controls) {
+    found_ = fitter_.residuals(matches_, weights_, camera_, controls);
+  }
+  // Deviation of the matches, in units of what they say of themselves.
+  double deviation() const {
+    std::vector<double> lengths;
+    for (const Residual& r : found_) lengths.push_back(r.length);
+    // The median of a two-dimensional standard normal's length is 1.1774.
+    return median(lengths) / 1.1774;
+  }
+  void trustWithin(double scale, double noise) {
+    for (size_t i = 0; i < found_.size(); ++i) {
+      const double ratio = scale * scale / (scale * scale + found_[i].length * found_[i].length);
+      trust_[i] = ratio * ratio / (noise * noise);
+    }
+  }
+  std::vector<bool> trustInliers(double noise) {
+    std::vector<bool> inlier;
+    for (size_t i = 0; i < found_.size(); ++i) {
+      inlier.push_back(found_[i].length < fitter_.params_.inlier_sigma * noise);
+      trust_[i] = inlier.back() ? 1.0 / (noise * noise) : 0.0;
+    }
+    return inlier;
+  }
+  // Distances along the surface change little within a frame: their springs are linearised once, at
+  // c0, and pull with  right - H (c - c0)  elsewhere.
+  Normal normalAt(const Eigen::VectorXd& controls) const {
+    Normal normal = springs_;
+    normal.right -= spring_matrix_.selfadjointView<Eigen::Lower>() * (controls - start_);
+    fitter_.addPriors(controls, predicted_, normal);
+    addMatches(weights_, found_, trust_, normal);
+    return normal;
+  }
+
+ private:
+  static DeformationField::Points pointsOf(const std::vector<SurfaceMatch>& matches) {
+    DeformationField::Points points(matches.size(), 3);
+    for (size_t i = 0; i < matches.size(); ++i) points.row(i) = matches[i].point.transpose();
+    return points;
+  }
+
+  const DeformationFitter& fitter_;
+  const std::vector<SurfaceMatch>& matches_;
+  const Camera& camera_;
+  const Eigen::VectorXd &start_, &predicted_;
+  const DeformationField::Weights weights_;
+  const Normal springs_;
+  const Eigen::MatrixXd spring_matrix_;
+  std::vector<Residual> found_;
+  std::vector<double> trust_;
+};
+
 DeformationFit DeformationFitter::fit(const std::vector<SurfaceMatch>& matches,
                                       const Camera& camera, const Eigen::VectorXd& start,
                                       const Eigen::VectorXd& predicted, double scale) const {
   DeformationFit fit;
   fit.controls = start;
   if (static_cast<int>(matches.size()) < params_.least_inliers) return fit;
-  DeformationField::Points points(matches.size(), 3);
-  for (size_t i = 0; i < matches.size(); ++i) points.row(i) = matches[i].point.transpose();
-  const DeformationField::Weights weights = field_.weightsAt(points);
-  std::vector<Residual> found = residuals(matches, weights, camera, fit.controls);
-  const auto lengths = [&] {
-    std::vector<double> result;
-    for (const Residual& r : found) result.push_back(r.length);
-    return result;
-  };
-  std::vector<double> trust(matches.size());
-  // Distances along the surface change little within a frame: their springs are linearised once, at
-  // c0, and pull with  right - H (c - c0)  elsewhere.
-  const Normal springs = springNormal(start);
-  const Eigen::MatrixXd spring_matrix = springs.matrix();
-  const auto normalAt = [&](const Eigen::VectorXd& controls) {
-    Normal normal = springs;
-    normal.right -= spring_matrix.selfadjointView<Eigen::Lower>() * (controls - start);
-    addPriors(controls, predicted, normal);
-    addMatches(weights, found, trust, normal);
-    return normal;
-  };
+  Iterations iterations(*this, matches, camera, start, predicted);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    // The median of a two-dimensional standard normal's length is 1.1774.
-    const double noise = std::max(1.0, median(lengths()) / 1.1774);
+    const double noise = std::max(1.0, iterations.deviation());
     scale = std::max(3.0 * noise, 0.4 * scale);
-    for (size_t i = 0; i < matches.size(); ++i) {
-      const double ratio = scale * scale / (scale * scale + found[i].length * found[i].length);
-      trust[i] = ratio * ratio / (noise * noise);
-    }
-    const Normal normal = normalAt(fit.controls);
+    iterations.trustWithin(scale, noise);
+    const Normal normal = iterations.normalAt(fit.controls);
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(normal.matrix());
     const Eigen::VectorXd step = factor.solve(normal.right);
     if (factor.info() != Eigen::Success || !step.allFinite()) return fit;
     fit.controls += step;
-    found = residuals(matches, weights, camera, fit.controls);
+    iterations.observe(fit.controls);
     if (scale <= 3.01 * noise && step.cwiseAbs().maxCoeff() < kSettled * diagonal_) break;
   }
-  fit.deviation = std::max(1e-9, median(lengths()) / 1.1774);
-  const double noise = std::max(1.0, fit.deviation);
-  for (size_t i = 0; i < matches.size(); ++i) {
-    fit.inlier.push_back(found[i].length < params_.inlier_sigma * noise);
-    trust[i] = fit.inlier.back() ? 1.0 / (noise * noise) : 0.0;
-    fit.inliers += fit.inlier.back();
-  }
+  fit.deviation = std::max(1e-9, iterations.deviation());
+  fit.inlier = iterations.trustInliers(std::max(1.0, fit.deviation));
+  fit.inliers = static_cast<int>(std::count(fit.inlier.begin(), fit.inlier.end(), true));
   if (fit.inliers < params_.least_inliers) return fit;
-  const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(normalAt(fit.controls).matrix());
+  const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(
+      iterations.normalAt(fit.controls).matrix());
   if (factor.info() != Eigen::Success) return fit;
   fit.covariance =
       factor.solve(Eigen::MatrixXd::Identity(fit.controls.size(), fit.controls.size()));

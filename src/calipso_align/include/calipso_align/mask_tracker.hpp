@@ -64,10 +64,17 @@ class MaskTracker {
     cv::Ptr<cv::DISOpticalFlow> flow;  // has buffers of its own
   };
 
-  bool isStill(const Object& object, const cv::Mat& means) const;
-  cv::Point coarseShift(const Object& object, const cv::Mat& means) const;
-  cv::Mat backwardFlow(const cv::Mat& grey, const Object& object, const cv::Point& shift) const;
-  cv::Mat predict(const Object& object, const cv::Mat& flow, const cv::Point& shift) const;
+  // Where the motion of an object's layer puts it, on a part of the picture.
+  struct Prediction {
+    cv::Mat core;      // CV_8U, surely the object's
+    cv::Mat motion;    // CV_32FC2, backward
+    cv::Mat coverage;  // CV_8U, the previous frame's, moved along
+    cv::Mat mask;      // CV_8U 0 or 255
+    cv::Mat distance;  // from its outline, px, negative inside; empty where there is no mask
+    cv::Mat band;      // CV_8U, where the outline is looked for
+  };
+  struct Layers;
+
   void rememberBackground(const cv::Mat& image);
   KnownBackground backgroundIn(const cv::Rect& roi, const cv::Mat& image,
                                const cv::Mat& flow) const;
@@ -83,9 +90,14 @@ class MaskTracker {
   std::vector<cv::Mat> costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
                                const LayerAppearance& back, const LayerAppearance& fore,
                                float prior_limit) const;
-  void cutByLooks(const cv::Mat& view, const cv::Mat& free, const cv::Mat& distance,
-                  const cv::Mat& known, LayerAppearance back,
-                  const std::vector<const GaussianMixture*>& colours, cv::Mat& labels) const;
+  Prediction predict(const Object& object, const cv::Mat& flow, const cv::Mat& rough, bool exact,
+                     const cv::Rect& roi) const;
+  Layers layersOf(const Object& object, const cv::Mat& view, const Prediction& prediction,
+                  const KnownBackground& background, const GaussianMixture& surroundings,
+                  const cv::Rect& roi) const;
+  void cutContradicted(const Object& object, const cv::Mat& view, const Prediction& prediction,
+                       const KnownBackground& background, const Layers& layers, const cv::Rect& roi,
+                       cv::Mat& labels) const;
   cv::Mat othersIn(const Object& object, const cv::Mat& view, const cv::Rect& roi) const;
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
 

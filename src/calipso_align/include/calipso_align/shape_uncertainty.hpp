@@ -25,15 +25,17 @@ struct ShapeUncertainty {
   double beyond(const SurfaceDistance& limit) const;
 };
 
+// Of a change of the parameters, by what is known of it besides; 0: impossible.
+using Likelihood = std::function<double(const LowOrderMap::Parameters&)>;
+
 // Draws the parameters from their covariance, always the same ones, and measures how far points of
 // the surfaces that they make are from the surface at x: a thin body that is off along its normal
-// is still near its other side. covariance  of the parameters of `here`, which is the identity at x
-// (camera frame) unseen      deviation along the sight line of what the parameters cannot follow,
-// model sizes likelihood  of a change of the parameters, by what is known of it besides; 0:
-// impossible
-ShapeUncertainty shapeUncertainty(
-    const Points& x, const Triangles& triangles, const LowOrderMap& here,
-    const Eigen::MatrixXd& covariance, double model_size, double unseen,
-    const std::function<double(const LowOrderMap::Parameters&)>& likelihood);
+// is still near its other side.
+// @param covariance  of the parameters of `here`, which is the identity at x (camera frame)
+// @param unseen      deviation along the sight line of what the parameters cannot follow, model
+//                    sizes
+ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
+                                  const LowOrderMap& here, const Eigen::MatrixXd& covariance,
+                                  double model_size, double unseen, const Likelihood& likelihood);
 
 }  // namespace calipso::align

@@ -75,6 +75,7 @@ class DeformationFitter {
     Eigen::Matrix2d information;
     double length;  // Mahalanobis
   };
+  class Iterations;
   std::vector<Residual> residuals(const std::vector<SurfaceMatch>& matches,
                                   const DeformationField::Weights& weights, const Camera& camera,
                                   const Eigen::VectorXd& controls) const;

@@ -1,0 +1,98 @@
+#include "layer_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_align/layer_motion.hpp"
+
+namespace calipso::align {
+namespace {
+
+constexpr int kMeanSize = 4;         // px; of a block
+constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
+// px; from here on half the resolution tells how a layer moves nearly as well
+constexpr int kLargeView = 200;
+
+}  // namespace
+
+cv::Rect grown(const cv::Rect& rect, int px) {
+  return {rect.x - px, rect.y - px, rect.width + 2 * px, rect.height + 2 * px};
+}
+
+cv::Rect around(const cv::Mat& mask, int margin) {
+  const cv::Rect box = cv::boundingRect(mask);
+  return box.empty() ? box : grown(box, margin) & cv::Rect(cv::Point(), mask.size());
+}
+
+cv::Mat blockMeans(const cv::Mat& image) {
+  cv::Mat means;
+  cv::resize(image, means, cv::Size(), 1.0 / kMeanSize, 1.0 / kMeanSize, cv::INTER_AREA);
+  return means;
+}
+
+bool isStill(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& reference_means,
+             const TrackerParams& params) {
+  const cv::Rect roi = around(mask, params.band_px + kMeanSize);
+  if (roi.empty()) return true;
+  const cv::Rect cells((roi.x + kMeanSize - 1) / kMeanSize, (roi.y + kMeanSize - 1) / kMeanSize,
+                       roi.width / kMeanSize - 1, roi.height / kMeanSize - 1);
+  const cv::Rect part = cells & cv::Rect(cv::Point(), means.size());
+  if (part.empty()) return false;
+  cv::Mat difference, changed, cell_mask;
+  cv::absdiff(means(part), reference_means(part), difference);
+  cv::resize(grown(mask, params.band_px), cell_mask, means.size(), 0, 0, cv::INTER_NEAREST);
+  cv::inRange(difference, cv::Scalar::all(0), cv::Scalar::all(params.still_levels), changed);
+  changed = (changed == 0) & cell_mask(part);
+  const int counted = cv::countNonZero(cell_mask(part));
+  return cv::countNonZero(changed) <= params.still_share * counted;
+}
+
+cv::Point coarseShift(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& previous_means,
+                      int search_px) {
+  const cv::Rect box = cv::boundingRect(mask);
+  if (box.empty()) return {};
+  const cv::Rect cells =
+      cv::Rect(box.tl() / kMeanSize, box.size() / kMeanSize) & cv::Rect(cv::Point(), means.size());
+  if (cells.width < 2 || cells.height < 2) return {};
+  const cv::Rect search = grown(cells, search_px / kMeanSize) & cv::Rect(cv::Point(), means.size());
+  cv::Mat weight, score;
+  cv::resize(mask, weight, means.size(), 0, 0, cv::INTER_AREA);
+  cv::matchTemplate(means(search), previous_means(cells), score, cv::TM_SQDIFF, weight(cells));
+  cv::Point best;
+  cv::minMaxLoc(score, nullptr, nullptr, &best);
+  const cv::Point moved = search.tl() + best - cells.tl();
+  // Motion of a cell or two is the flow's to find.
+  return std::abs(moved.x) > 2 || std::abs(moved.y) > 2 ? moved * kMeanSize : cv::Point();
+}
+
+cv::Mat backwardFlow(const cv::Mat& grey, const cv::Mat& previous_grey, const cv::Mat& mask,
+                     const cv::Point& shift, int margin_px, cv::DISOpticalFlow& search) {
+  const cv::Rect whole(cv::Point(), grey.size());
+  const cv::Rect view = grown(cv::boundingRect(mask) + shift, margin_px) & whole;
+  cv::Mat flow(grey.size(), CV_32FC2, cv::Scalar(-shift.x, -shift.y));
+  if (view.width < kLeastFlowWidth || view.height < kLeastFlowWidth) return flow;
+  cv::Mat before;
+  const cv::Matx23d back(1, 0, -shift.x + view.x, 0, 1, -shift.y + view.y);
+  cv::warpAffine(previous_grey, before, back, view.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                 cv::BORDER_REPLICATE);
+  cv::Mat rest, now = grey(view).clone();  // flow wants whole rows
+  const bool large = std::min(view.width, view.height) >= kLargeView;
+  if (large) {
+    cv::resize(now, now, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
+    cv::resize(before, before, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
+  }
+  search.calc(now, before, rest);
+  if (large) cv::resize(2.0 * rest, rest, view.size());
+  flow(view) += rest;
+  return flow;
+}
+
+cv::Mat roughlyMoved(const cv::Mat& mask, const cv::Mat& flow, const cv::Point& shift) {
+  if (shift == cv::Point()) return movedBack(mask, flow, cv::Rect(cv::Point(), mask.size())) > 127;
+  cv::Mat moved;
+  cv::warpAffine(mask, moved, cv::Matx23d(1, 0, shift.x, 0, 1, shift.y), mask.size());
+  return moved > 127;
+}
+
+}  // namespace calipso::align

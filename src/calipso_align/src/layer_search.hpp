@@ -1,0 +1,39 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "calipso_align/mask_tracker.hpp"
+#include "calipso_align/segmentation_level.hpp"
+
+// Where an object went from one frame to the next.
+namespace calipso::align {
+
+// A rectangle with a margin.
+cv::Rect grown(const cv::Rect& rect, int px);
+// The part of the picture around a mask; empty where the mask is.
+cv::Rect around(const cv::Mat& mask, int margin);
+
+// Means over small blocks, which average the sensor's noise away: what stillness and large motions
+// are told by.
+cv::Mat blockMeans(const cv::Mat& image);
+
+// Whether nothing changed in an object and its rim since the frame of `reference_means`.
+bool isStill(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& reference_means,
+             const TrackerParams& params);
+
+// Translation of an object since the previous frame: best match of its pixels on a coarse picture;
+// none where that is little enough to be the flow's to find.
+cv::Point coarseShift(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& previous_means,
+                      int search_px);
+
+// Backward flow, current to previous frame, near where an object went; `shift` elsewhere. What the
+// object moved as a whole is taken out first: the flow then has only the rest to find.
+cv::Mat backwardFlow(const cv::Mat& grey, const cv::Mat& previous_grey, const cv::Mat& mask,
+                     const cv::Point& shift, int margin_px, cv::DISOpticalFlow& search);
+
+// Roughly where an object is now: where its pixels flowed, or where it went as a whole if that is
+// far, for then the background's own flow leads back to where the object was.
+cv::Mat roughlyMoved(const cv::Mat& mask, const cv::Mat& flow, const cv::Point& shift);
+
+}  // namespace calipso::align
