@@ -30,23 +30,6 @@ float bend(const Relief& relief, const cv::Point& p, const cv::Point& step) {
 
 const cv::Point kRight(1, 0), kDown(0, 1);
 
-// What bends in nine of ten places may be noise.
-float creaseThreshold(const Relief& relief) {
-  constexpr double kFlat = 0.9;
-  constexpr float kBeyond = 2.0f;
-  std::vector<float> bends;
-  for (int y = 0; y < relief.state.rows; ++y)
-    for (int x = 0; x < relief.state.cols; ++x)
-      for (const cv::Point& step : {kRight, kDown}) {
-        const float b = bend(relief, {x, y}, step);
-        if (b >= 0.0f) bends.push_back(b);
-      }
-  if (bends.empty()) return 0.0f;
-  const auto place = bends.begin() + static_cast<long>(kFlat * (bends.size() - 1));
-  std::nth_element(bends.begin(), place, bends.end());
-  return kBeyond * *place;
-}
-
 // Least squares plane q = a + b u + c v.
 struct PlaneFit {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
@@ -84,6 +67,23 @@ cv::Mat withRims(const Relief& relief, const cv::Mat& pieces, float crease) {
 }
 
 }  // namespace
+
+// What bends in nine of ten places may be noise.
+float creaseThreshold(const Relief& relief) {
+  constexpr double kFlat = 0.9;
+  constexpr float kBeyond = 2.0f;
+  std::vector<float> bends;
+  for (int y = 0; y < relief.state.rows; ++y)
+    for (int x = 0; x < relief.state.cols; ++x)
+      for (const cv::Point& step : {kRight, kDown}) {
+        const float b = bend(relief, {x, y}, step);
+        if (b >= 0.0f) bends.push_back(b);
+      }
+  if (bends.empty()) return 0.0f;
+  const auto place = bends.begin() + static_cast<long>(kFlat * (bends.size() - 1));
+  std::nth_element(bends.begin(), place, bends.end());
+  return kBeyond * *place;
+}
 
 cv::Mat planarPieces(const Relief& relief) {
   constexpr double kLeastPixels = 30.0;

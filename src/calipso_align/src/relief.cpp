@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_align/planar_pieces.hpp"
+#include "calipso_align/surface_islands.hpp"
 
 namespace calipso::align {
 namespace {
@@ -166,7 +167,10 @@ Relief makeRelief(const cv::Mat& image, const cv::Mat& depth,
   if (!relief.registered)
     relief.state.setTo(Relief::kUnusable,
                        grown(across | down, static_cast<int>(std::ceil(error)) + 1));
-  if (relief.registered) relief.pieces = planarPieces(relief);
+  if (relief.registered) {
+    relief.pieces = planarPieces(relief);
+    relief.islands = surfaceIslands(relief, creaseThreshold(relief));
+  }
   if (!supports.empty())
     relief.on_support = surfacesOf(supports, depth, noise) & (relief.state == Relief::kSurface);
   return relief;
@@ -179,6 +183,8 @@ Relief resized(const Relief& relief, const cv::Rect& view, const cv::Size& size)
   cv::resize(relief.state(view), result.state, size, 0, 0, cv::INTER_NEAREST);
   if (!relief.pieces.empty())
     cv::resize(relief.pieces(view), result.pieces, size, 0, 0, cv::INTER_NEAREST);
+  if (!relief.islands.empty())
+    cv::resize(relief.islands(view), result.islands, size, 0, 0, cv::INTER_NEAREST);
   if (!relief.on_support.empty())
     cv::resize(relief.on_support(view), result.on_support, size, 0, 0, cv::INTER_NEAREST);
   result.units = relief.units;

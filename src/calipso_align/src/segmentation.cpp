@@ -101,7 +101,7 @@ void Segmenter::initialiseModels() {
 void Segmenter::refitColours() {
   const cv::Mat near = surroundings(coarse_);
   for (size_t k = 0; k < models_.size(); ++k) {
-    const cv::Mat own = (coarse_.labels == static_cast<int>(k)) & near;
+    const cv::Mat own = believedPixels(coarse_, k) & near;
     if (cv::countNonZero(own) >= kMinModelPixels)
       fitColours(coarse_, own, params_.components, models_[k]);
   }
@@ -130,9 +130,10 @@ void Segmenter::refitSurfaces(const std::vector<cv::Mat>& certain) {
   const cv::Mat near = surroundings(coarse_);
   const double area = cv::countNonZero(coarse_.region);
   for (size_t k = 0; k < models_.size(); ++k) {
-    cv::Mat own = (coarse_.labels == static_cast<int>(k)) & near;
+    cv::Mat own = believedPixels(coarse_, k) & near;
     const double share = cv::countNonZero(own & coarse_.region) / area;
     if (!certain.empty()) own &= certain[k];
+    own = nearIslands(coarse_, own, k);
     if (cv::countNonZero(own) >= kMinModelPixels)
       models_[k].surfaces = SurfaceModel::fit(coarse_.relief, own, share, params_.surfaces);
   }

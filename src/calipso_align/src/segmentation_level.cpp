@@ -6,6 +6,7 @@
 
 #include "calipso_align/label_cut.hpp"
 #include "calipso_align/planar_pieces.hpp"
+#include "calipso_align/surface_islands.hpp"
 
 namespace calipso::align {
 namespace {
@@ -135,6 +136,7 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
   constexpr double kFlat = 0.1;  // of the strokes
   level.seeds = cv::Mat::zeros(level.image.size(), CV_8U);
   level.stroked.release();
+  level.floating.release();
   level.lies_flat.assign(targets.size() + 1, 0);
   if (strokes.empty()) return;
   const cv::Mat marks = thinnedOut(strokes, level.image.size());
@@ -150,8 +152,10 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
     level.lies_flat[k] =
         cv::countNonZero(own & level.relief.on_support) > kFlat * cv::countNonZero(own);
   }
-  if (!level.relief.pieces.empty())
-    level.stroked = strokesOfPieces(level.relief.pieces, level.seeds);
+  if (!level.relief.registered) return;
+  level.stroked = strokesOfPieces(level.relief.pieces, level.seeds);
+  level.floating = seedsOfIslands(level.relief.islands, level.seeds, level.allowed);
+  level.floating.copyTo(level.stroked, (level.stroked == 0) & (level.floating != 0));
 }
 
 void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int components,
@@ -198,6 +202,25 @@ void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
           if (models[k].surfaces) cost.at<float>(y, x) += surfaceCost(models[k], level, k, x, y);
         }
   }
+}
+
+cv::Mat believedPixels(const SegmentationLevel& level, size_t k) {
+  const cv::Mat own = level.labels == static_cast<int>(k);
+  if (level.floating.empty()) return own;
+  return (own & (level.floating == 0)) | (level.floating == static_cast<int>(k + 1));
+}
+
+cv::Mat nearIslands(const SegmentationLevel& level, const cv::Mat& own, size_t k) {
+  if (level.floating.empty()) return own;
+  const cv::Mat island = own & (level.floating == static_cast<int>(k + 1));
+  if (2 * cv::countNonZero(island) <= cv::countNonZero(own)) return own;
+  cv::Mat inverse_depth;
+  cv::extractChannel(level.relief.surface, inverse_depth, 2);
+  double least = 0.0, most = 0.0;
+  cv::minMaxLoc(inverse_depth, &least, &most, nullptr, nullptr, island);
+  const double margin = 0.1 * (most - least);
+  const cv::Mat near = (inverse_depth >= least - margin) & (inverse_depth <= most + margin);
+  return own & (near | (level.relief.state != Relief::kSurface));
 }
 
 cv::Mat freePixels(const SegmentationLevel& level) { return level.region & (level.seeds == 0); }

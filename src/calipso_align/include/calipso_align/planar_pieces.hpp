@@ -11,6 +11,9 @@ struct Relief;
 // CV_32S: the piece's number from 1, 0 where a pixel is in none.
 cv::Mat planarPieces(const Relief& relief);
 
+// How far the inverse depth of a relief may bend at a pixel without a crease, in its units.
+float creaseThreshold(const Relief& relief);
+
 // Per pixel the value of the strokes that its piece bears, 0 where it bears none or different ones.
 // strokes  CV_8U, 0: none
 cv::Mat strokesOfPieces(const cv::Mat& pieces, const cv::Mat& strokes);

@@ -41,8 +41,10 @@ struct SegmentationLevel {
   std::vector<cv::Mat> expected;  // CV_32F per label number, as the relief's inverse depth: where a
                                   // fitted model has its surface, 0 outside of it; or empty
   float jump_scale = 0.0f;        // of label_cut.hpp over the region
-  cv::Mat mixed;    // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
-  cv::Mat stroked;  // CV_8U: as seeds, of the flat piece of the relief that a pixel is in; or empty
+  cv::Mat mixed;     // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
+  cv::Mat stroked;   // CV_8U: as seeds, of the flat piece or island of the relief that a pixel is
+                     // in; or empty
+  cv::Mat floating;  // CV_8U: as seeds, of the island of the relief that a pixel is in; or empty
   std::vector<char>
       lies_flat;  // per label number: its strokes lie on support planes themselves, as a cloth's do
 };
@@ -81,6 +83,13 @@ void fitColours(const SegmentationLevel& level, const cv::Mat& mask, int compone
 // be.
 void evaluateCosts(const std::vector<LabelModel>& models, float outlier_cost,
                    SegmentationLevel& level);
+
+// Label k's pixels for learning: an island of the relief is its object's whatever a cut left of it.
+cv::Mat believedPixels(const SegmentationLevel& level, size_t k);
+
+// Those of label k's pixels that are about as far away as its islands of the relief, if most lie on
+// them: what else looks like the label may be something else. Else all of them.
+cv::Mat nearIslands(const SegmentationLevel& level, const cv::Mat& own, size_t k);
 
 // Pixels without a seed in the region.
 cv::Mat freePixels(const SegmentationLevel& level);
