@@ -100,6 +100,9 @@ Placement comeCloser(const TriangleMesh& cad, const FitProblem& problem, const f
   constexpr int kMostRounds = 5;
   constexpr double kFarOff = 0.015, kClose = 0.003;  // misfit
   constexpr double kCloser = 0.9;                    // of what it was
+  // What little of a contour is known says too little of the rest.
+  constexpr double kLeastKnown = 0.5;  // part of its length
+  if (problem.target.known_length_px < kLeastKnown * problem.target.length_px) return placed;
   double before = misfit(assess(problem, placed(cad.vertices)));
   if (before < kFarOff) return placed;
   for (int round = 0; round < kMostRounds && before > kClose; ++round) {
@@ -248,6 +251,7 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
   result.expected_error = error.expected().mean;
   result.expected_rms = error.expected().rms;
   result.off_probability = error.beyond(kTrustedWithin);
+  result.shape_off_probability = error.shapeBeyond(kTrustedWithin);
   const FitQuality quality = assess(problem, x);
   result.placed = true;
   result.met_mean_px = quality.met_mean_px;

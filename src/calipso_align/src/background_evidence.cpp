@@ -15,6 +15,7 @@ cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, doubl
   const float same = static_cast<float>(3.0 * kSame * kSame * noise * noise);
   const float different = static_cast<float>(3.0 * kDifferent * kDifferent * noise * noise);
   cv::Mat accounts = cv::Mat::zeros(view.size(), CV_8U);
+#pragma omp parallel for schedule(dynamic, 16)
   for (int y = 0; y < view.rows; ++y)
     for (int x = 0; x < view.cols; ++x) {
       if (!background.known.at<uchar>(y, x)) continue;

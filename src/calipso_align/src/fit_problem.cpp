@@ -120,8 +120,7 @@ int narrowestRadius(const cv::Mat1b& silhouette) {
 void markSpurs(FitProblem& problem) {
   constexpr double kInsidePx = 0.75;
   const Camera& camera = problem.camera;
-  const cv::Mat1b silhouette =
-      maskOf(renderDepth(problem.X, problem.topology.triangles(), camera), camera);
+  const cv::Mat1b silhouette = maskOf(renderDepth(problem.X, problem.topology, camera), camera);
   const int radius = narrowestRadius(silhouette);
   if (radius == 0 || cv::countNonZero(silhouette) == 0) return;
   // A margin that continues the mask: the border of the picture makes nothing narrow.
@@ -215,7 +214,7 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
 
 Rows measure(const FitProblem& problem, const Points& x, const MeasureSettings& settings) {
   constexpr double kOutlineStepPx = 2.0;
-  const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
+  const DepthRendering rendering = renderDepth(x, problem.topology, problem.camera);
   Rows rows =
       contourRows(problem.target,
                   occludingContour(x, problem.topology, rendering, problem.camera, kOutlineStepPx),

@@ -27,24 +27,49 @@ double noiseOf(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
   return std::max(kLeast, 1.4826 * median);
 }
 
-cv::Mat relit(const cv::Mat& image, const cv::Mat& other, const cv::Mat& same) {
-  const cv::Size kWindow(13, 13);                           // px; light changes slowly
-  const float kFaint = static_cast<float>(kWindow.area());  // one grey level all over the window
-  cv::Mat here = cv::Mat::zeros(image.size(), CV_8UC3), there = here.clone(), from, to;
+namespace {
+
+// Sums over a window around every pixel of what a mask lets through, of which the light is read: it
+// changes slowly, so that half the resolution tells it in a large view.
+struct LightSums {
+  cv::Mat from, to;  // CV_32FC3
+  float faint;       // one grey level all over the window
+};
+
+LightSums lightSums(const cv::Mat& image, const cv::Mat& other, const cv::Mat& same) {
+  constexpr int kWindow = 13;        // px
+  constexpr int kLargeView = 40000;  // px^2
+  cv::Mat here = cv::Mat::zeros(image.size(), CV_8UC3), there = here.clone();
   image.copyTo(here, same);
   other.copyTo(there, same);
-  cv::boxFilter(here, from, CV_32F, kWindow, cv::Point(-1, -1), false);
-  cv::boxFilter(there, to, CV_32F, kWindow, cv::Point(-1, -1), false);
-  cv::Mat result(image.size(), CV_8UC3);
-  for (int y = 0; y < result.rows; ++y) {
-    const cv::Vec3b* in = image.ptr<cv::Vec3b>(y);
-    const cv::Vec3f *a = from.ptr<cv::Vec3f>(y), *b = to.ptr<cv::Vec3f>(y);
-    cv::Vec3b* out = result.ptr<cv::Vec3b>(y);
-    for (int x = 0; x < result.cols; ++x)
-      for (int c = 0; c < 3; ++c)
-        out[x][c] = cv::saturate_cast<uchar>(
-            in[x][c] * std::clamp((b[x][c] + kFaint) / (a[x][c] + kFaint), 0.3f, 3.0f));
+  const bool large = image.size().area() > kLargeView;
+  if (large) {
+    cv::resize(here, here, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
+    cv::resize(there, there, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
   }
+  const int window = large ? kWindow / 2 + 1 : kWindow;
+  LightSums sums{{}, {}, static_cast<float>(window * window)};
+  cv::boxFilter(here, sums.from, CV_32F, {window, window}, cv::Point(-1, -1), false);
+  cv::boxFilter(there, sums.to, CV_32F, {window, window}, cv::Point(-1, -1), false);
+  return sums;
+}
+
+}  // namespace
+
+cv::Mat relit(const cv::Mat& image, const cv::Mat& other, const cv::Mat& same) {
+  const LightSums sums = lightSums(image, other, same);
+  cv::Mat factor(sums.from.size(), CV_32FC3);
+#pragma omp parallel for schedule(static)
+  for (int y = 0; y < factor.rows; ++y) {
+    const cv::Vec3f *a = sums.from.ptr<cv::Vec3f>(y), *b = sums.to.ptr<cv::Vec3f>(y);
+    cv::Vec3f* out = factor.ptr<cv::Vec3f>(y);
+    for (int x = 0; x < factor.cols; ++x)
+      for (int c = 0; c < 3; ++c)
+        out[x][c] = std::clamp((b[x][c] + sums.faint) / (a[x][c] + sums.faint), 0.3f, 3.0f);
+  }
+  if (factor.size() != image.size()) cv::resize(factor, factor, image.size());
+  cv::Mat result;
+  cv::multiply(image, factor, result, 1.0, CV_8U);
   return result;
 }
 
@@ -78,15 +103,19 @@ Darkened darkened(const cv::Vec3f& lit, const cv::Vec3f& seen) {
   return {s, rest.dot(rest), kTint * std::max(0.0f, 1.0f - s) * std::sqrt(squared)};
 }
 
-bool isDeep(const Darkened& d, double noise) {
-  const float allowed = static_cast<float>(9.0 * noise * noise) + 4.0f * d.tint * d.tint;
-  return d.factor >= kDarkest && d.factor <= kDeep && d.squared_rest <= allowed;
+// Whether a shadow that is one for certain would darken the one colour to about the other's
+// brightness.
+bool isDarkerBy(const cv::Vec3f& lit, const cv::Vec3f& seen) {
+  const float squared = std::max(1.0f, lit.dot(lit)), along = seen.dot(lit);
+  return along >= kDarkest * squared && along <= kDeep * squared;
 }
 
 }  // namespace
 
 bool isShadowed(const cv::Vec3f& lit, const cv::Vec3f& seen, double noise) {
-  return isDeep(darkened(lit, seen), noise);
+  if (!isDarkerBy(lit, seen)) return false;
+  const Darkened d = darkened(lit, seen);
+  return d.squared_rest <= static_cast<float>(9.0 * noise * noise) + 4.0f * d.tint * d.tint;
 }
 
 // Uniform over the factors that a shadow darkens by, Student's t across the line from black to the
@@ -122,6 +151,7 @@ Shadow shadowOn(const cv::Mat& background, const cv::Mat& view, const cv::Mat& c
   };
   cv::Mat seen, shaded(view.size(), CV_32F, cv::Scalar(0));
   cv::Mat(clear > 0).convertTo(seen, CV_32F, 1.0 / 255.0);
+#pragma omp parallel for schedule(dynamic, 16)
   for (int y = 0; y < view.rows; ++y)
     for (int x = 0; x < view.cols; ++x)
       if (clear.at<uchar>(y, x) && isShaded(x, y)) shaded.at<float>(y, x) = 1.0f;

@@ -85,6 +85,7 @@ cv::Mat layerMotion(const cv::Mat& flow, const cv::Mat& support, const cv::Rect&
 
   cv::Mat remainder = cv::Mat::zeros(roi.size(), CV_32FC2), weight;
   own.convertTo(weight, CV_32F, 1.0 / 255.0);
+#pragma omp parallel for schedule(static)
   for (int y = 0; y < roi.height; ++y)
     for (int x = 0; x < roi.width; ++x) {
       const Eigen::Vector2d m = map * Eigen::Vector3d(x - centre.x, y - centre.y, 1.0);
@@ -96,6 +97,7 @@ cv::Mat layerMotion(const cv::Mat& flow, const cv::Mat& support, const cv::Rect&
   cv::blur(remainder, remainder, kWindow);
   cv::blur(weight, weight, kWindow);
   constexpr float kFaint = 0.02f;  // share of the window that must be support to be believed
+#pragma omp parallel for schedule(static)
   for (int y = 0; y < roi.height; ++y)
     for (int x = 0; x < roi.width; ++x)
       motion.at<cv::Vec2f>(y, x) +=
@@ -105,6 +107,7 @@ cv::Mat layerMotion(const cv::Mat& flow, const cv::Mat& support, const cv::Rect&
 
 cv::Mat movedBack(const cv::Mat& image, const cv::Mat& motion, const cv::Rect& roi) {
   cv::Mat map(roi.size(), CV_32FC2), result;
+#pragma omp parallel for schedule(static)
   for (int y = 0; y < roi.height; ++y)
     for (int x = 0; x < roi.width; ++x)
       map.at<cv::Vec2f>(y, x) = motion.at<cv::Vec2f>(y, x) + cv::Vec2f(roi.x + x, roi.y + y);

@@ -14,6 +14,17 @@ constexpr int kLeastFlowWidth = 32;  // px; DIS wants a few of its patches
 // px; from here on half the resolution tells how a layer moves nearly as well
 constexpr int kLargeView = 200;
 
+// A part of a picture, continued beyond its border.
+cv::Mat shifted(const cv::Mat& image, const cv::Rect& part) {
+  const cv::Rect there = part & cv::Rect(cv::Point(), image.size());
+  if (there == part) return image(part);
+  cv::Mat result;
+  const cv::Matx23d back(1, 0, part.x, 0, 1, part.y);
+  cv::warpAffine(image, result, back, part.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                 cv::BORDER_REPLICATE);
+  return result;
+}
+
 }  // namespace
 
 cv::Rect grown(const cv::Rect& rect, int px) {
@@ -72,15 +83,14 @@ cv::Mat backwardFlow(const cv::Mat& grey, const cv::Mat& previous_grey, const cv
   const cv::Rect view = grown(cv::boundingRect(mask) + shift, margin_px) & whole;
   cv::Mat flow(grey.size(), CV_32FC2, cv::Scalar(-shift.x, -shift.y));
   if (view.width < kLeastFlowWidth || view.height < kLeastFlowWidth) return flow;
-  cv::Mat before;
-  const cv::Matx23d back(1, 0, -shift.x + view.x, 0, 1, -shift.y + view.y);
-  cv::warpAffine(previous_grey, before, back, view.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
-                 cv::BORDER_REPLICATE);
-  cv::Mat rest, now = grey(view).clone();  // flow wants whole rows
+  cv::Mat rest, now = grey(view), before = shifted(previous_grey, view - shift);
   const bool large = std::min(view.width, view.height) >= kLargeView;
   if (large) {
     cv::resize(now, now, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
     cv::resize(before, before, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
+  } else {
+    now = now.clone();  // flow wants whole rows
+    before = before.clone();
   }
   search.calc(now, before, rest);
   if (large) cv::resize(2.0 * rest, rest, view.size());
@@ -88,9 +98,15 @@ cv::Mat backwardFlow(const cv::Mat& grey, const cv::Mat& previous_grey, const cv
   return flow;
 }
 
-cv::Mat roughlyMoved(const cv::Mat& mask, const cv::Mat& flow, const cv::Point& shift) {
-  if (shift == cv::Point()) return movedBack(mask, flow, cv::Rect(cv::Point(), mask.size())) > 127;
+cv::Mat roughlyMoved(const cv::Mat& mask, const cv::Mat& flow, const cv::Point& shift,
+                     int margin_px) {
   cv::Mat moved;
+  if (shift == cv::Point()) {
+    moved = cv::Mat::zeros(mask.size(), CV_8U);
+    const cv::Rect near = around(mask, margin_px);
+    if (!near.empty()) moved(near) = movedBack(mask, flow(near), near) > 127;
+    return moved;
+  }
   cv::warpAffine(mask, moved, cv::Matx23d(1, 0, shift.x, 0, 1, shift.y), mask.size());
   return moved > 127;
 }

@@ -33,7 +33,9 @@ cv::Mat backwardFlow(const cv::Mat& grey, const cv::Mat& previous_grey, const cv
                      const cv::Point& shift, int margin_px, cv::DISOpticalFlow& search);
 
 // Roughly where an object is now: where its pixels flowed, or where it went as a whole if that is
-// far, for then the background's own flow leads back to where the object was.
-cv::Mat roughlyMoved(const cv::Mat& mask, const cv::Mat& flow, const cv::Point& shift);
+// far, for then the background's own flow leads back to where the object was. No flow reaches
+// further than the margin.
+cv::Mat roughlyMoved(const cv::Mat& mask, const cv::Mat& flow, const cv::Point& shift,
+                     int margin_px);
 
 }  // namespace calipso::align

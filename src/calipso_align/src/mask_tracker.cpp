@@ -116,20 +116,21 @@ TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
 
   occupied_ = cv::Mat::zeros(size_, CV_8U);
   for (const Object& object : objects_) occupied_ |= object.mask;
-#pragma omp parallel for schedule(dynamic)
+// A single object leaves the processors to the loops over its pixels.
+#pragma omp parallel for schedule(dynamic) if (moving.size() > 1)
   for (size_t k = 0; k < moving.size(); ++k) {
     Object* object = moving[k];
     const cv::Point shift = coarseShift(object->mask, means, previous_means_, params_.search_px);
     const cv::Mat flow =
         backwardFlow(grey, previous_grey_, object->mask, shift, params_.margin_px, *object->flow);
     const bool told = !prior.empty() && cv::countNonZero(prior == object->label) > 0;
-    const cv::Mat rough =
-        told ? cv::Mat(prior == object->label) : roughlyMoved(object->mask, flow, shift);
+    const cv::Mat rough = told ? cv::Mat(prior == object->label)
+                               : roughlyMoved(object->mask, flow, shift, params_.margin_px);
     follow(*object, image, flow, rough, told);
     object->reference_mean = means;
   }
   rememberBackground(image);
-  previous_image_ = image.clone();
+  image.copyTo(previous_image_);
   previous_grey_ = grey;
   previous_means_ = means;
   return combine(static_cast<int>(moving.size()));
@@ -203,6 +204,7 @@ std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& ba
   };
   std::vector<cv::Mat> costs = {cv::Mat::zeros(view.size(), CV_32F),
                                 cv::Mat::zeros(view.size(), CV_32F)};
+#pragma omp parallel for schedule(dynamic, 16)
   for (int y = 0; y < view.rows; ++y)
     for (int x = 0; x < view.cols; ++x) {
       if (!band.at<uchar>(y, x)) continue;

@@ -81,13 +81,13 @@ cv::Mat1b openBackground(const cv::Mat1b& mask) {
 
 ContourError contourError(const std::vector<ContourLoop>& contour, const Points& x,
                           const MeshTopology& topology, const Camera& camera) {
-  const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
+  const DepthRendering rendering = renderDepth(x, topology, camera);
   return errorBetween(contour, occludingContour(x, topology, rendering, camera, kOutlineStepPx));
 }
 
 ContourError hullError(const std::vector<ContourLoop>& contour, const Points& x,
                        const MeshTopology& topology, const Camera& camera) {
-  const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
+  const DepthRendering rendering = renderDepth(x, topology, camera);
   const cv::Mat1b open = openBackground(maskOf(rendering, camera));
   std::vector<OutlinePoint> hull;
   for (const OutlinePoint& p : occludingContour(x, topology, rendering, camera, kOutlineStepPx)) {

@@ -45,8 +45,7 @@ void matchMoments(const FitProblem& problem, const Moments& goal, LowOrderMap& m
   constexpr double kLargestLogScale = 0.25;  // per round
   const Camera& camera = problem.camera;
   const Points x = map.apply(problem.X);
-  const Moments now =
-      momentsOf(maskOf(renderDepth(x, problem.topology.triangles(), camera), camera));
+  const Moments now = momentsOf(maskOf(renderDepth(x, problem.topology, camera), camera));
   if (now.area <= 0.0) return;
   const double z = x.col(2).mean();
   const Eigen::Vector2d shift = goal.centroid - now.centroid;
@@ -63,8 +62,8 @@ void matchDepth(const FitProblem& problem, LowOrderMap& map) {
   if (problem.depth.empty()) return;
   const Points x = map.apply(problem.X);
   const Eigen::Vector3d centroid = x.colwise().mean().transpose();
-  const double offset = medianDepthOffset(
-      problem.depth, renderDepth(x, problem.topology.triangles(), problem.camera));
+  const double offset =
+      medianDepthOffset(problem.depth, renderDepth(x, problem.topology, problem.camera));
   LowOrderMap::Parameters step = LowOrderMap::Parameters::Zero();
   step.segment<3>(LowOrderMap::kTranslation) = centroid / centroid.z() * offset;
   map.setParameters(map.plus(step));
@@ -89,7 +88,7 @@ RoughCheck checkPlacement(const FitProblem& problem) {
          << " to fill the contour; is it in millimetres? Scale it by about that much";
     return {false, text.str()};
   }
-  if (renderDepth(problem.X, problem.topology.triangles(), problem.camera).roi.empty()) {
+  if (renderDepth(problem.X, problem.topology, problem.camera).roi.empty()) {
     return {false, "the rough placement is off the image: move the model onto the object"};
   }
   return {};

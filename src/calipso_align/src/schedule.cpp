@@ -8,6 +8,12 @@ namespace {
 
 constexpr double kElasticWeight = 3e3;  // of the finished fit: see FemStageOptions
 
+// of the model's size: closer than this a stage need not come that another one follows
+constexpr double kPassingStep = 2e-3;
+
+constexpr double kFineStep =
+    3e-3;  // the same of what a finer grid adds: about a pixel of the largest step
+
 constexpr double kTypicalDeformation = 0.15;  // a (LowOrderPrior) before anything is known
 
 // A rough placement is up to a twentieth of the distance off, in any direction: of a length between
@@ -50,6 +56,7 @@ LowOrderStep deformationStep(const FitProblem& problem, const AlignOptions& opti
   LowOrderStep step;
   step.name = order == 1 ? "affine" : "quadratic";
   step.fit = stage(prior, order == 1 ? 10 : 20);
+  if (order == 1) step.fit.smallest_step = kPassingStep;
   step.fit.estimate_deformation = true;
   step.robust = order == 1 ? Ramp{0.06, 0.03} : Ramp{0.04, 0.015};
   step.depth_robust = order == 1 ? Ramp{0.10, 0.05} : Ramp{0.06, 0.03};
@@ -128,6 +135,7 @@ std::vector<LowOrderStep> lowOrderSteps(const FitProblem& problem, const AlignOp
   LowOrderStep similarity;
   similarity.name = "similarity";
   similarity.fit = stage(similarityPrior(problem, options), 12);
+  similarity.fit.smallest_step = kPassingStep;
   return {similarity, deformationStep(problem, options, 1), deformationStep(problem, options, 2)};
 }
 

@@ -70,6 +70,41 @@ Eigen::Vector3d centreOf(const Points& x, const Triangles& triangles, int f) {
          3.0;
 }
 
+double weightBeyond(const std::vector<SurfaceDistance>& draws, const std::vector<double>& weights,
+                    const SurfaceDistance& limit) {
+  double weight = 0.0;
+  for (size_t k = 0; k < draws.size(); ++k) {
+    if (draws[k].mean > limit.mean || draws[k].rms > limit.rms) weight += weights[k];
+  }
+  return weight;
+}
+
+// Point k is of draw k modulo their number.
+std::vector<SurfaceDistance> perDraw(const std::vector<double>& distances, int count,
+                                     double model_size) {
+  std::vector<SurfaceDistance> draws(count);
+  for (size_t k = 0; k < distances.size(); ++k) {
+    const double part = distances[k] / model_size;
+    draws[k % count].mean += part / kPointsPerDraw;
+    draws[k % count].rms += part * part / kPointsPerDraw;
+  }
+  for (SurfaceDistance& draw : draws) draw.rms = std::sqrt(draw.rms);
+  return draws;
+}
+
+// Every draw's points moved along their sight lines, all in proportion, back to where they came
+// from as well as can be.
+Points withoutDistance(const Points& moved, const Points& from, int count) {
+  Eigen::ArrayXd along = Eigen::ArrayXd::Zero(count), squared = along;
+  for (int k = 0; k < moved.rows(); ++k) {
+    along[k % count] += moved.row(k).dot(from.row(k));
+    squared[k % count] += moved.row(k).squaredNorm();
+  }
+  Points result = moved;
+  for (int k = 0; k < moved.rows(); ++k) result.row(k) *= along[k % count] / squared[k % count];
+  return result;
+}
+
 }  // namespace
 
 SurfaceDistance ShapeUncertainty::expected() const {
@@ -83,11 +118,11 @@ SurfaceDistance ShapeUncertainty::expected() const {
 }
 
 double ShapeUncertainty::beyond(const SurfaceDistance& limit) const {
-  double probability = 0.0;
-  for (size_t k = 0; k < draws.size(); ++k) {
-    if (draws[k].mean > limit.mean || draws[k].rms > limit.rms) probability += weights[k];
-  }
-  return probability;
+  return weightBeyond(draws, weights, limit);
+}
+
+double ShapeUncertainty::shapeBeyond(const SurfaceDistance& limit) const {
+  return weightBeyond(without_distance, weights, limit);
 }
 
 ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
@@ -100,26 +135,22 @@ ShapeUncertainty shapeUncertainty(const Points& x, const Triangles& triangles,
   const Draws draws = drawMaps(here, covariance, likelihood, generator, normal);
   if (draws.maps.empty()) {  // nothing agrees with what is known besides: it may be anywhere
     const double anywhere = std::numeric_limits<double>::infinity();
-    return {{{anywhere, anywhere}}, {1.0}};
+    return {{{anywhere, anywhere}}, {{anywhere, anywhere}}, {1.0}};
   }
   // Consecutive points are of different draws: each draw is seen all over the surface.
   const int count = static_cast<int>(draws.maps.size());
-  Points moved(count * kPointsPerDraw, 3);
+  Points from(count * kPointsPerDraw, 3), moved(from.rows(), 3);
   for (int k = 0; k < moved.rows(); ++k) {
     const int f = faces[k * static_cast<long>(faces.size()) / moved.rows()];
     const Eigen::Vector3d centre = centreOf(x, triangles, f);
     const double along = unseen * model_size * normal(generator);
+    from.row(k) = centre.transpose();
     moved.row(k) = (draws.maps[k % count](centre) + along * centre.normalized()).transpose();
   }
-  ShapeUncertainty error{std::vector<SurfaceDistance>(count), draws.weights};
-  const std::vector<double> distances = distancesToSurface(moved, x, triangles);
-  for (size_t k = 0; k < distances.size(); ++k) {
-    const double part = distances[k] / model_size;
-    error.draws[k % count].mean += part / kPointsPerDraw;
-    error.draws[k % count].rms += part * part / kPointsPerDraw;
-  }
-  for (SurfaceDistance& draw : error.draws) draw.rms = std::sqrt(draw.rms);
-  return error;
+  const auto errorsOf = [&](const Points& points) {
+    return perDraw(distancesToSurface(points, x, triangles), count, model_size);
+  };
+  return {errorsOf(moved), errorsOf(withoutDistance(moved, from, count)), draws.weights};
 }
 
 }  // namespace calipso::align

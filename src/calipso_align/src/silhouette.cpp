@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -115,8 +116,46 @@ void fillTriangle(const Eigen::Vector3d (&c)[3], const cv::Rect& roi, cv::Mat1f&
   }
 }
 
-// The largest 1/z of all triangles at every pixel of the roi; 0 where there is none.
-cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles,
+// Six times the volume between a face and the camera's centre, positive where its back is seen;
+// for all faces.
+std::vector<double> volumesBefore(const Points& x, const Triangles& triangles) {
+  std::vector<double> volumes(triangles.rows());
+#pragma omp parallel for schedule(static)
+  for (int f = 0; f < triangles.rows(); ++f) {
+    const Eigen::Vector3d a = x.row(triangles(f, 0)), b = x.row(triangles(f, 1)),
+                          c = x.row(triangles(f, 2));
+    volumes[f] = (b - a).cross(c - a).dot(a);
+  }
+  return volumes;
+}
+
+using Faces = std::vector<int>;
+
+// Front faces of closed shells, whichever way they are wound: a shell's volume says which. All
+// faces of what is open.
+Faces facesInSight(const Points& x, const MeshTopology& topology) {
+  const std::vector<int>& shells = topology.shells();
+  const std::vector<double> volumes = volumesBefore(x, topology.triangles());
+  std::vector<double> enclosed(volumes.size(), 0.0);  // per shell
+  for (size_t f = 0; f < shells.size(); ++f) {
+    if (shells[f] != MeshTopology::kOpen) enclosed[shells[f]] += volumes[f];
+  }
+  Faces faces;
+  for (size_t f = 0; f < shells.size(); ++f) {
+    const bool is_open = shells[f] == MeshTopology::kOpen;
+    if (is_open || volumes[f] * enclosed[shells[f]] <= 0.0) faces.push_back(static_cast<int>(f));
+  }
+  return faces;
+}
+
+Faces allFaces(const Triangles& triangles) {
+  Faces all(triangles.rows());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+// The largest 1/z of some triangles at every pixel of the roi; 0 where there is none.
+cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles, const Faces& faces,
                               const cv::Rect& roi) {
   cv::Mat1f all = cv::Mat1f::zeros(roi.size());
   // Every thread draws its share of the triangles; the largest is the same in whatever order.
@@ -124,7 +163,8 @@ cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles,
   {
     cv::Mat1f own = cv::Mat1f::zeros(roi.size());
 #pragma omp for schedule(static) nowait
-    for (int f = 0; f < triangles.rows(); ++f) {
+    for (size_t k = 0; k < faces.size(); ++k) {
+      const int f = faces[k];
       fillTriangle(
           {pixels.row(triangles(f, 0)), pixels.row(triangles(f, 1)), pixels.row(triangles(f, 2))},
           roi, own);
@@ -134,6 +174,19 @@ cv::Mat1f largestInverseDepth(const Points& pixels, const Triangles& triangles,
                    [](float a, float b) { return std::max(a, b); });
   }
   return all;
+}
+
+DepthRendering renderFaces(const Points& pixels, const Triangles& triangles, const Faces& faces,
+                           const Camera& camera) {
+  DepthRendering rendering;
+  rendering.roi = boundingRoi(pixels, camera);
+  if (rendering.roi.empty()) return rendering;
+  rendering.depth = largestInverseDepth(pixels, triangles, faces, rendering.roi);
+  for (int v = 0; v < rendering.depth.rows; ++v) {
+    float* row = rendering.depth[v];
+    for (int u = 0; u < rendering.depth.cols; ++u) row[u] = row[u] > 0.0f ? 1.0f / row[u] : 0.0f;
+  }
+  return rendering;
 }
 
 // Whether the mask ends at the edge: the pixel beyond it is uncovered.
@@ -146,13 +199,9 @@ bool bordersBackground(const DepthRendering& rendering, const Eigen::Vector2d& p
 
 // Whether a face is seen from its front, for all faces.
 std::vector<char> frontFacing(const Points& x, const Triangles& triangles) {
-  std::vector<char> front(triangles.rows());
-#pragma omp parallel for schedule(static)
-  for (int f = 0; f < triangles.rows(); ++f) {
-    const Eigen::Vector3d a = x.row(triangles(f, 0)), b = x.row(triangles(f, 1)),
-                          c = x.row(triangles(f, 2));
-    front[f] = (b - a).cross(c - a).dot(a) < 0.0;
-  }
+  const std::vector<double> volumes = volumesBefore(x, triangles);
+  std::vector<char> front(volumes.size());
+  std::transform(volumes.begin(), volumes.end(), front.begin(), [](double v) { return v < 0.0; });
   return front;
 }
 
@@ -206,40 +255,16 @@ void appendVisible(const Points& x, const MeshTopology::Edge& edge, int inner,
 
 }  // namespace
 
-MeshTopology::MeshTopology(const Triangles& triangles) : triangles_(triangles) {
-  struct HalfEdge {
-    int v0, v1, face;
-  };
-  std::vector<HalfEdge> half_edges;
-  half_edges.reserve(3 * triangles.rows());
-  for (int f = 0; f < triangles.rows(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = triangles(f, k), b = triangles(f, (k + 1) % 3);
-      half_edges.push_back({std::min(a, b), std::max(a, b), f});
-    }
-  }
-  std::sort(half_edges.begin(), half_edges.end(), [](const HalfEdge& a, const HalfEdge& b) {
-    return std::tie(a.v0, a.v1, a.face) < std::tie(b.v0, b.v1, b.face);
-  });
-  for (const HalfEdge& h : half_edges) {
-    if (edges_.empty() || edges_.back().v0 != h.v0 || edges_.back().v1 != h.v1) {
-      edges_.push_back({h.v0, h.v1, {}});
-    }
-    edges_.back().faces.push_back(h.face);
-  }
+DepthRendering renderDepth(const Points& x, const Triangles& triangles, const Camera& camera) {
+  return renderFaces(projectAll(x, camera), triangles, allFaces(triangles), camera);
 }
 
-DepthRendering renderDepth(const Points& x, const Triangles& triangles, const Camera& camera) {
+DepthRendering renderDepth(const Points& x, const MeshTopology& topology, const Camera& camera) {
   const Points pixels = projectAll(x, camera);
-  DepthRendering rendering;
-  rendering.roi = boundingRoi(pixels, camera);
-  if (rendering.roi.empty()) return rendering;
-  rendering.depth = largestInverseDepth(pixels, triangles, rendering.roi);
-  for (int v = 0; v < rendering.depth.rows; ++v) {
-    float* row = rendering.depth[v];
-    for (int u = 0; u < rendering.depth.cols; ++u) row[u] = row[u] > 0.0f ? 1.0f / row[u] : 0.0f;
-  }
-  return rendering;
+  // What reaches behind the camera is open there.
+  const Triangles& triangles = topology.triangles();
+  return renderFaces(pixels, triangles,
+                     pixels.allFinite() ? facesInSight(x, topology) : allFaces(triangles), camera);
 }
 
 cv::Mat1b maskOf(const DepthRendering& rendering, const Camera& camera) {

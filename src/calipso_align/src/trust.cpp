@@ -119,6 +119,23 @@ std::string remarks(const FitProblem& problem, double known, double distance_sig
   return text;
 }
 
+// Why a surface that meets its contour is not trusted along the sight line: its distance alone, or
+// its shape, too.
+std::string depthUndetermined(const ShapeUncertainty& error, double distance_sigma) {
+  const double shape = error.shapeBeyond(kTrustedWithin);
+  std::ostringstream text;
+  text.precision(3);
+  text << "depth undetermined: the contour is met, but the surface is off by more than "
+       << 100.0 * kTrustedWithin.mean << " % of the size with a probability of "
+       << percent(error.beyond(kTrustedWithin)) << ", "
+       << (shape > kLargestOff ? "by turn and thickness along the sight line ("
+                               : "by its distance and the size that goes with it, not its shape (")
+       << percent(shape) << " with the distance left out); its distance is uncertain by "
+       << 100.0 * distance_sigma
+       << " % (standard deviation); give a depth image or the plane that the object stands on";
+  return text.str();
+}
+
 // The model's silhouette without what is covered by something else: holes of the picture that are
 // known to be an occluder's are none that the model lacks.
 cv::Mat1b surelySeen(const FitProblem& problem, const cv::Mat1b& silhouette) {
@@ -137,7 +154,7 @@ cv::Mat1b surelySeen(const FitProblem& problem, const cv::Mat1b& silhouette) {
 
 FitQuality assess(const FitProblem& problem, const Points& x) {
   constexpr double kFineStepPx = 0.5, kMetPx = 2.0;
-  const DepthRendering rendering = renderDepth(x, problem.topology.triangles(), problem.camera);
+  const DepthRendering rendering = renderDepth(x, problem.topology, problem.camera);
   FitQuality quality;
   const std::vector<OutlinePoint> outline =
       occludingContour(x, problem.topology, rendering, problem.camera, kFineStepPx);
@@ -209,13 +226,7 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
               "there, "
               "or place the model closer";
   } else if (error.beyond(kTrustedWithin) > kLargestOff) {
-    reason << "depth undetermined: the contour is met, but as to distance, turn and thickness "
-              "along the "
-              "sight line the surface is off by more than "
-           << 100.0 * kTrustedWithin.mean << " % of the size with a probability of "
-           << percent(error.beyond(kTrustedWithin)) << "; its distance is uncertain by "
-           << 100.0 * distance_sigma
-           << " % (standard deviation); give a depth image or the plane that the object stands on";
+    reason << depthUndetermined(error, distance_sigma);
   } else {
     return {true, remarks(problem, known, distance_sigma)};
   }

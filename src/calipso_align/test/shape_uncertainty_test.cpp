@@ -45,6 +45,14 @@ TEST(ShapeUncertainty, OfAShiftedSphereIsHalfItsShift) {
   EXPECT_NEAR(expected.rms * kDiagonal, kDeviation / std::sqrt(3.0), 0.0102);
 }
 
+// 20 m away, a sphere shifted by d is off by d / 2, but in the picture only shrinks by d / 20.
+TEST(ShapeUncertainty, AShiftAlongTheSightLineIsNearlyAllDistance) {
+  const ShapeUncertainty error = ofSphere(0.1, anything);
+  const SurfaceDistance limit{0.015 / kDiagonal, 1.0};  // half of 0.03, a twentieth of 0.3
+  EXPECT_GT(error.beyond(limit), 0.6);
+  EXPECT_LT(error.shapeBeyond(limit), 0.05);
+}
+
 TEST(ShapeUncertainty, LeavesOutWhatIsImpossible) {
   constexpr double kMost = 0.05;
   const auto bounded = [](const LowOrderMap::Parameters& step) {

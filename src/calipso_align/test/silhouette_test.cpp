@@ -65,6 +65,51 @@ TEST(Silhouette, PartsBehindTheCameraAreLeftOut) {
   EXPECT_TRUE(renderDepth(frame.x, frame.triangles, test::frontCamera()).roi.empty());
 }
 
+// Two pears, one behind the other, as one mesh.
+TriangleMesh twoPears(bool second_inside_out) {
+  const TriangleMesh pear = test::pear();
+  const int vertices = pear.vertexCount(), faces = static_cast<int>(pear.triangles.rows());
+  TriangleMesh two;
+  two.vertices.resize(2 * vertices, 3);
+  two.vertices << pear.vertices, pear.vertices.rowwise() + Eigen::RowVector3d(0.2, 0.5, 0.1);
+  two.triangles.resize(2 * faces, 3);
+  two.triangles << pear.triangles, pear.triangles.array() + vertices;
+  if (second_inside_out)
+    two.triangles.bottomRows(faces).col(1).swap(two.triangles.bottomRows(faces).col(2));
+  return two;
+}
+
+// Back faces of closed shells are never the nearest: the picture is the same without them.
+TEST(Silhouette, ClosedShellsLookTheSameWithoutTheirBackFaces) {
+  const Camera camera = test::frontCamera();
+  for (const bool inside_out : {false, true}) {
+    const TriangleMesh mesh = twoPears(inside_out);
+    const MeshTopology topology(mesh.triangles);
+    ASSERT_EQ(topology.shells().size(), static_cast<size_t>(mesh.triangles.rows()));
+    EXPECT_EQ(topology.shells().front(), 0);
+    EXPECT_EQ(topology.shells().back(), 1);
+    const Points x = test::inCamera(camera, Eigen::Isometry3d::Identity(), mesh.vertices);
+    const DepthRendering all = renderDepth(x, mesh.triangles, camera),
+                         front = renderDepth(x, topology, camera);
+    ASSERT_EQ(all.roi, front.roi);
+    // A pixel whose centre lies on the outline may go either way.
+    EXPECT_LE(cv::countNonZero(cv::abs(all.depth - front.depth) > 1e-5), 2);
+  }
+}
+
+TEST(Silhouette, AnOpenMeshShowsItsInside) {
+  const Camera camera = test::frontCamera();
+  TriangleMesh mesh = test::pear();
+  const int faces = static_cast<int>(mesh.triangles.rows());
+  mesh.triangles.conservativeResize(faces / 2, 3);
+  const MeshTopology topology(mesh.triangles);
+  for (const int shell : topology.shells()) EXPECT_EQ(shell, MeshTopology::kOpen);
+  const Points x = test::inCamera(camera, Eigen::Isometry3d::Identity(), mesh.vertices);
+  EXPECT_EQ(cv::norm(renderDepth(x, mesh.triangles, camera).depth,
+                     renderDepth(x, topology, camera).depth, cv::NORM_INF),
+            0.0);
+}
+
 TEST(ContourTerm, ResidualDerivativesMatchDifferences) {
   const TriangleMesh mesh = test::pear();
   const Camera camera = test::frontCamera();

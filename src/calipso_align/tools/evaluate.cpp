@@ -151,7 +151,7 @@ std::vector<int> allVertices(const Points& x) {
 std::vector<int> contourVertices(const Points& x, const MeshTopology& topology,
                                  const Camera& camera) {
   std::vector<int> vertices;
-  const DepthRendering rendering = renderDepth(x, topology.triangles(), camera);
+  const DepthRendering rendering = renderDepth(x, topology, camera);
   for (const OutlinePoint& p : occludingContour(x, topology, rendering, camera, 1e9)) {
     vertices.push_back(p.v0);
     vertices.push_back(p.v1);
@@ -297,6 +297,7 @@ std::string evaluate(const EvaluationCase& one, const Arguments& arguments, doub
   line.addNumber("expected3d_rms_percent", 100.0 * result.expected_rms);
   line.addNumber("distance_sigma_percent", 100.0 * result.distance_sigma);
   line.addNumber("off_probability", result.off_probability);
+  line.addNumber("shape_off_probability", result.shape_off_probability);
   line.addNumber("deformation_found", result.deformation);
   line.addNumber("clearance_mm",
                  clearanceMm(one, inCamera(one.camera, result.world_from_object, result.mesh)));

@@ -65,9 +65,10 @@ struct AlignmentResult {
       0.0;  // if asked: mean distance of the surface from the true one, predicted,
   double expected_rms = 0.0;     // in parts of the model's diagonal
   double off_probability = 0.0;  // that it is further away than a result that is trusted may be
-  double noise_px = 0.0;         // estimated noise of the contour
-  double scale = 1.0;            // size of S* relative to S
-  double deformation = 0.0;      // how far S had to be deformed: r.m.s. strain, estimated
+  double shape_off_probability = 0.0;  // the same, had it the right distance
+  double noise_px = 0.0;               // estimated noise of the contour
+  double scale = 1.0;                  // size of S* relative to S
+  double deformation = 0.0;            // how far S had to be deformed: r.m.s. strain, estimated
   bool trusted = false;
   std::string reason;  // why not, and what to do
   std::vector<StageTime> times;

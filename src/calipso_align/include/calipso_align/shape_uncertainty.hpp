@@ -18,11 +18,15 @@ struct SurfaceDistance {
 // one.
 struct ShapeUncertainty {
   std::vector<SurfaceDistance> draws;
+  // The same surfaces with the scale about the camera's centre taken out, which no picture shows:
+  // what is left is the shape's.
+  std::vector<SurfaceDistance> without_distance;
   std::vector<double> weights;  // of the draws; they sum to 1
 
   SurfaceDistance expected() const;
   // Probability that the true surface is further away, by its mean or its r.m.s. distance.
   double beyond(const SurfaceDistance& limit) const;
+  double shapeBeyond(const SurfaceDistance& limit) const;  // without its distance
 };
 
 // Of a change of the parameters, by what is known of it besides; 0: impossible.

@@ -30,10 +30,15 @@ class MeshTopology {
 
   const Triangles& triangles() const { return triangles_; }
   const std::vector<Edge>& edges() const { return edges_; }
+  // Which closed shell a face belongs to, numbered from 0; kOpen in pieces where an edge borders
+  // anything but two faces that are wound alike.
+  static constexpr int kOpen = -1;
+  const std::vector<int>& shells() const { return shells_; }
 
  private:
   Triangles triangles_;
   std::vector<Edge> edges_;
+  std::vector<int> shells_;
 };
 
 // A depth image of the part of the picture that a mesh covers.
@@ -48,6 +53,8 @@ struct DepthRendering {
 // Renders with a depth buffer. `x` holds the vertices in the camera frame. Triangles that reach
 // behind the camera are left out.
 DepthRendering renderDepth(const Points& x, const Triangles& triangles, const Camera& camera);
+// The same without drawing what closed shells hide themselves: their back faces.
+DepthRendering renderDepth(const Points& x, const MeshTopology& topology, const Camera& camera);
 
 // 255 where the rendering covers the pixel; the whole picture.
 cv::Mat1b maskOf(const DepthRendering& rendering, const Camera& camera);
