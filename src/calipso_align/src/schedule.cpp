@@ -11,9 +11,6 @@ constexpr double kElasticWeight = 3e3;  // of the finished fit: see FemStageOpti
 // of the model's size: closer than this a stage need not come that another one follows
 constexpr double kPassingStep = 2e-3;
 
-constexpr double kFineStep =
-    3e-3;  // the same of what a finer grid adds: about a pixel of the largest step
-
 constexpr double kTypicalDeformation = 0.15;  // a (LowOrderPrior) before anything is known
 
 // A rough placement is up to a twentieth of the distance off, in any direction: of a length between
