@@ -120,19 +120,21 @@ bool isShadowed(const cv::Vec3f& lit, const cv::Vec3f& seen, double noise) {
 
 // Uniform over the factors that a shadow darkens by, Student's t across the line from black to the
 // colour: the sky that still lights a shadow has another tint than the sun.
-float Shadow::cost(const cv::Vec3f& seen, int x, int y) const {
-  if (colour.empty()) return kForbidden;
+float shadowCost(const cv::Vec3f& lit, const cv::Vec3f& seen, double noise) {
   constexpr float kFreedom = 3.0f,
                   kNormaliser = 1.84f;  // -log of the density's constant in the plane
-  const float likely = share.at<uchar>(y, x) / 255.0f;
-  if (!(likely > 0.0f)) return kForbidden;
-  const cv::Vec3f lit(colour.at<cv::Vec3b>(y, x));
   const Darkened d = darkened(lit, seen);
   const float variance = static_cast<float>(noise * noise) + d.tint * d.tint;
   return kNormaliser + std::log(variance) +
          0.5f * (kFreedom + 2.0f) * std::log1p(d.squared_rest / (kFreedom * variance)) +
-         std::log((kLightest - kDarkest) * std::max(1.0f, static_cast<float>(cv::norm(lit)))) -
-         std::log(likely);
+         std::log((kLightest - kDarkest) * std::max(1.0f, static_cast<float>(cv::norm(lit))));
+}
+
+float Shadow::cost(const cv::Vec3f& seen, int x, int y) const {
+  if (colour.empty()) return kForbidden;
+  const float likely = share.at<uchar>(y, x) / 255.0f;
+  if (!(likely > 0.0f)) return kForbidden;
+  return shadowCost(cv::Vec3f(colour.at<cv::Vec3b>(y, x)), seen, noise) - std::log(likely);
 }
 
 Shadow shadowOn(const cv::Mat& background, const cv::Mat& view, const cv::Mat& clear, double noise,

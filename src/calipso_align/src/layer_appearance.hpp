@@ -37,6 +37,9 @@ struct Shadow {
 // A colour that is another one in a shadow, within the noise (grey levels).
 bool isShadowed(const cv::Vec3f& lit, const cv::Vec3f& seen, double noise);
 
+// Negative log density of a colour that is another one in some shadow, nats.
+float shadowCost(const cv::Vec3f& lit, const cv::Vec3f& seen, double noise);
+
 // The shadow on a background, expected as far as the pixels of `clear` (CV_8U: no object there)
 // show it close by, and do not rather look like the object that may have moved there.
 Shadow shadowOn(const cv::Mat& background, const cv::Mat& view, const cv::Mat& clear, double noise,

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_align/layer_motion.hpp"
+#include "layer_appearance.hpp"
 
 namespace calipso::align {
 namespace {
@@ -59,8 +60,28 @@ bool isStill(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& reference
   return cv::countNonZero(changed) <= params.still_share * counted;
 }
 
+cv::Mat foreignBlocks(const cv::Mat& means, const KnownBackground& background) {
+  constexpr float kNoise = 3.0f;        // grey levels, of a block's mean and of what moves a bit
+  constexpr double kMostForeign = 0.1;  // of the picture
+  cv::Mat known, behind = blockMeans(background.image);
+  cv::resize(background.known, known, means.size(), 0, 0, cv::INTER_AREA);
+  cv::Mat foreign(means.size(), CV_8U, cv::Scalar(255));
+  for (int y = 0; y < means.rows; ++y)
+    for (int x = 0; x < means.cols; ++x) {
+      if (known.at<uchar>(y, x) < 255) continue;
+      const cv::Vec3f lit(behind.at<cv::Vec3b>(y, x)), seen(means.at<cv::Vec3b>(y, x));
+      const cv::Vec3f d = seen - lit;
+      if (d.dot(d) < 27.0f * kNoise * kNoise || isShadowed(lit, seen, kNoise))
+        foreign.at<uchar>(y, x) = 0;
+    }
+  const cv::Mat apart = foreign & (known == 255);
+  if (cv::countNonZero(apart) > kMostForeign * static_cast<double>(apart.total())) foreign = 255;
+  return foreign;
+}
+
 cv::Point coarseShift(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& previous_means,
-                      int search_px) {
+                      const cv::Mat& foreign, int search_px) {
+  constexpr double kLeastForeign = 0.5;  // of what there is of it in the best place
   const cv::Rect box = cv::boundingRect(mask);
   if (box.empty()) return {};
   const cv::Rect cells =
@@ -70,8 +91,14 @@ cv::Point coarseShift(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& 
   cv::Mat weight, score;
   cv::resize(mask, weight, means.size(), 0, 0, cv::INTER_AREA);
   cv::matchTemplate(means(search), previous_means(cells), score, cv::TM_SQDIFF, weight(cells));
+  cv::Mat there, own, met;
+  foreign(search).convertTo(there, CV_32F);
+  weight(cells).convertTo(own, CV_32F);
+  cv::matchTemplate(there, own, met, cv::TM_CCORR);
+  double most = 0.0;
+  cv::minMaxLoc(met, nullptr, &most);
   cv::Point best;
-  cv::minMaxLoc(score, nullptr, nullptr, &best);
+  cv::minMaxLoc(score, nullptr, nullptr, &best, nullptr, cv::Mat(met >= kLeastForeign * most));
   const cv::Point moved = search.tl() + best - cells.tl();
   // Motion of a cell or two is the flow's to find.
   return std::abs(moved.x) > 2 || std::abs(moved.y) > 2 ? moved * kMeanSize : cv::Point();

@@ -22,10 +22,14 @@ cv::Mat blockMeans(const cv::Mat& image);
 bool isStill(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& reference_means,
              const TrackerParams& params);
 
-// Translation of an object since the previous frame: best match of its pixels on a coarse picture;
-// none where that is little enough to be the flow's to find.
+// Blocks (CV_8U, as blockMeans()) that a known background does not account for, lit or shaded; all
+// of them where so much differs that the background cannot be relied on.
+cv::Mat foreignBlocks(const cv::Mat& means, const KnownBackground& background);
+
+// Translation of an object since the previous frame: best match of its pixels on a coarse picture,
+// where there is something foreign; none where that is little enough to be the flow's to find.
 cv::Point coarseShift(const cv::Mat& mask, const cv::Mat& means, const cv::Mat& previous_means,
-                      int search_px);
+                      const cv::Mat& foreign, int search_px);
 
 // Backward flow, current to previous frame, near where an object went; `shift` elsewhere. What the
 // object moved as a whole is taken out first: the flow then has only the rest to find.

@@ -116,11 +116,13 @@ TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
 
   occupied_ = cv::Mat::zeros(size_, CV_8U);
   for (const Object& object : objects_) occupied_ |= object.mask;
+  const cv::Mat foreign = moving.empty() ? cv::Mat() : foreignBlocks(means, background_);
 // A single object leaves the processors to the loops over its pixels.
 #pragma omp parallel for schedule(dynamic) if (moving.size() > 1)
   for (size_t k = 0; k < moving.size(); ++k) {
     Object* object = moving[k];
-    const cv::Point shift = coarseShift(object->mask, means, previous_means_, params_.search_px);
+    const cv::Point shift =
+        coarseShift(object->mask, means, previous_means_, foreign, params_.search_px);
     const cv::Mat flow =
         backwardFlow(grey, previous_grey_, object->mask, shift, params_.margin_px, *object->flow);
     const bool told = !prior.empty() && cv::countNonZero(prior == object->label) > 0;
@@ -274,11 +276,20 @@ void MaskTracker::cutContradicted(const Object& object, const cv::Mat& view, con
                                   const KnownBackground& background, const Layers& layers,
                                   const cv::Rect& roi, cv::Mat& labels) const {
   const cv::Mat apart = othersIn(object, view, roi);
-  const cv::Mat wrong = contradicted(view, labels, background, apart, layers.back_noise);
+  const std::vector<cv::Vec3f> known =
+      coloursUnder(background.image, background.known & (p.distance > params_.band_px));
+  if (known.empty()) return;
+  const GaussianMixture known_colours = GaussianMixture::fit(known, params_.components);
+  const cv::Mat wrong =
+      contradicted(view, labels, background, apart, layers.back_noise, layers.fore.colours) |
+      unseenParts(view, labels, background.known, apart, layers.fore.colours, known_colours);
   if (cv::countNonZero(wrong) <= params_.wrong_share * cv::countNonZero(labels)) return;
-  const cv::Mat free = ((grown(wrong, 2) | ~background.known) & ~apart) | p.band;
+  cv::Mat between;  // what was gained and the rest, where the two look alike
+  cv::morphologyEx((labels > 0) | wrong, between, cv::MORPH_CLOSE, cv::Mat::ones(9, 9, CV_8U));
+  const cv::Mat free = ((grown(wrong, 2) | between | ~background.known) & ~apart) | p.band;
   LayerAppearance back = layers.back;
-  back.accounts.resize(2);  // those of the known background
+  back.accounts.resize(2);          // those of the known background
+  back.colours = {&known_colours};  // around it there may be some of the object
   back.shadow.share = cv::max(back.shadow.share, background.known & kAnyShadow);
   const LayerAppearance looks{{}, layers.fore.colours};
   cutLabels(view, free, costsOf(view, free, p.distance, back, looks, kLoosePrior),

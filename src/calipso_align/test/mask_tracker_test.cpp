@@ -127,6 +127,26 @@ TEST(MaskTracker, FollowsABallThatRolls) {
   }
 }
 
+// A bar that lands on its end: from one frame to the next it shows a third of its area, and what
+// looks most like it before is a bar that lies about.
+TEST(MaskTracker, FollowsABarThatTurnsItsEnd) {
+  const auto bar = [](double u0, double v0, double half) {
+    return [=](double u, double v) {
+      return testing::box(u0 - half, v0 - 9, u0 + half, v0 + 9)(u, v);
+    };
+  };
+  const auto frame = [&](double u0, double v0, double half, int seed) {
+    cv::Mat image = picture(-100, -100, seed);
+    for (const cv::Mat& mask : {maskOf(kSize, bar(150, 40, 27)), maskOf(kSize, bar(u0, v0, half))})
+      image.setTo(cv::Scalar(50, 90, 190), mask);
+    return image;
+  };
+  MaskTracker tracker(frame(50, 60, 27, 1), maskOf(kSize, bar(50, 60, 27)) / 255);
+  for (int k = 1; k <= 4; ++k) tracker.track(frame(50 + 6 * k, 60 + 6 * k, 27, k + 1));
+  const TrackedMask tracked = tracker.track(frame(70, 108, 9, 6));
+  EXPECT_GE(intersectionOverUnion(tracked.labels == 1, maskOf(kSize, bar(70, 108, 9))), 0.9);
+}
+
 // A side that comes into view in a jump is the object's, although nothing moved there.
 TEST(MaskTracker, TakesInASideThatComesIntoView) {
   const auto box = [](int width, int seed) {
