@@ -263,8 +263,10 @@ MaskTracker::Layers MaskTracker::layersOf(const Object& object, const cv::Mat& v
   return {{{{moved, p.coverage, 0.5f, noise}, {moved_relit, p.coverage, 0.3f, noise}}, colours},
           {{{background.image, background.known, 0.6f, back_noise},
             {relit(background.image, view, clear), background.known, 0.37f, back_noise},
-            // What hides the object may move along with it.
-            {moved, ~p.coverage, 0.02f, noise}},
+            // What hides the object may move along with it; what was taken for it but stays where
+            // it was is none of it.
+            {moved, ~p.coverage, 0.02f, noise},
+            {previous_image_(roi), object.coverage(roi), 0.02f, back_noise}},
            {&surroundings},
            shadowOn(background.image, view, clear, back_noise, colours)},
           back_noise};
