@@ -12,9 +12,6 @@ namespace calipso::flow {
 
 namespace {
 
-constexpr size_t kRecentFrames = 8;  // kept, to be looked at again when an object starts to deform
-constexpr int kLeftFrames = 2;       // in which an object must have left its shape
-
 // Image motion between the first state and the farthest other one, px, were the camera at rest: the
 // mean over the object's followed points, since errors of the pose are largest at single points far
 // out.
@@ -109,20 +106,14 @@ std::string summary(const std::vector<ObjectDynamics>& objects) {
 ClipAnalyser::ClipAnalyser(const Frame& key_frame, const std::vector<ObjectModel>& models,
                            const std::vector<cv::Mat>& masks, const Eigen::Vector3d& gravity,
                            const DynamicsParams& params)
-    : params_(params),
-      gravity_(gravity),
-      key_(key_frame),
-      last_(key_frame),
-      times_{key_frame.time} {
+    : params_(params), gravity_(gravity), last_(key_frame), times_{key_frame.time} {
   if (models.size() != masks.size()) {
     throw std::invalid_argument("clip analyser: " + std::to_string(models.size()) + " models but " +
                                 std::to_string(masks.size()) +
                                 " masks; give one mask (or an empty one) per model");
   }
   for (size_t i = 0; i < models.size(); ++i) {
-    ObjectTracker tracker(models[i], key_frame, masks[i], params.tracker);
-    const Observation key = tracker.keyObservation();
-    objects_.push_back(Followed{std::move(tracker), masks[i], {key}, 0, nullptr, {}});
+    objects_.emplace_back(models[i], key_frame, masks[i], params.tracker, params.rest_px);
   }
 }
 
@@ -136,8 +127,8 @@ void ClipAnalyser::add(const Frame& frame) {
   const bool cut = isCut(last_, frame, params_.cut_correlation);
   if (cut) cut_times_.push_back(0.5 * (times_.back() + frame.time));
   recent_.push_back(frame);
-  if (recent_.size() > kRecentFrames) recent_.pop_front();
-  forEachObject([&](size_t i) { follow(frame, cut, objects_[i]); });
+  if (recent_.size() > FollowedObject::kLookBack) recent_.pop_front();
+  forEachObject([&](size_t i) { objects_[i].follow(recent_, cut, cut_times_); });
   times_.push_back(frame.time);
   last_ = frame;
 }
@@ -149,58 +140,21 @@ void ClipAnalyser::forEachObject(const std::function<void(size_t)>& work) const 
   });
 }
 
-void ClipAnalyser::follow(const Frame& frame, bool cut, Followed& object) const {
-  if (object.deformable) {
-    object.deformations.push_back(object.deformable->track(frame, cut));
-    object.observations.push_back(
-        rigidPart(*object.deformable, object.deformations.back(), object.tracker.centroid()));
-    return;
-  }
-  object.observations.push_back(object.tracker.track(frame, cut));
-  const ObjectModel& model = object.tracker.model();
-  const bool bent =
-      !model.attached.empty() &&
-      hasLeft(object.observations.back(), model.world_from_object, frame.camera, params_.rest_px) &&
-      !movesRigidly(object.observations, model.world_from_object, frame.camera);
-  object.frames_left = bent ? object.frames_left + 1 : 0;
-  if (object.frames_left >= kLeftFrames) beginDeformable(object);
-}
-
-// Looks at the frames just seen again; before them the object was in its place.
-void ClipAnalyser::beginDeformable(Followed& object) const {
-  object.deformable = std::make_unique<DeformableTracker>(object.tracker.model(), key_, object.mask,
-                                                          params_.tracker);
-  const size_t before = object.observations.size() - recent_.size();
-  for (size_t k = 0; k < before; ++k) {
-    object.deformations.push_back(object.deformable->keyObservation());
-    object.deformations.back().time = object.observations[k].time;
-  }
-  for (const Frame& frame : recent_) {
-    const size_t k = object.deformations.size();
-    const bool cut = std::any_of(cut_times_.begin(), cut_times_.end(), [&](double time) {
-      return time > object.observations[k - 1].time && time < frame.time;
-    });
-    object.deformations.push_back(object.deformable->track(frame, cut));
-    object.observations[k] =
-        rigidPart(*object.deformable, object.deformations.back(), object.tracker.centroid());
-  }
-}
-
 std::vector<ObjectDynamics> ClipAnalyser::finish(bool with_wind) const {
   std::vector<ObjectDynamics> result(objects_.size());
   forEachObject([&](size_t i) { result[i] = finishObject(objects_[i], with_wind); });
   return result;
 }
 
-ObjectDynamics ClipAnalyser::finishObject(const Followed& object, bool with_wind) const {
-  const ObjectTracker& tracker = object.tracker;
+ObjectDynamics ClipAnalyser::finishObject(const FollowedObject& object, bool with_wind) const {
+  const ObjectTracker& tracker = object.tracker();
   ObjectDynamics dynamics;
   dynamics.name = tracker.model().name;
   dynamics.diagonal = boundingDiagonal(tracker.model().mesh);
-  dynamics.observations = object.observations;
-  if (object.deformable) {
+  dynamics.observations = object.observations();
+  if (object.deformable()) {
     dynamics.deformation =
-        describeDeformation(*object.deformable, object.deformations, gravity_, with_wind);
+        describeDeformation(*object.deformable(), object.deformations(), gravity_, with_wind);
     if (dynamics.deformation->modes.count() == 0) dynamics.deformation.reset();
   }
   auto measurements = measurementsOf(dynamics.observations, tracker.centroid());
@@ -212,7 +166,7 @@ ObjectDynamics ClipAnalyser::finishObject(const Followed& object, bool with_wind
   const Camera& camera = last_.camera;
   const double depth = (camera.world_from_camera.inverse() * measurements.front().position).norm();
   TrajectoryParams trajectory = params_.trajectory;
-  if (object.deformable) trajectory.max_collisions = 0;  // a swing is no collision
+  if (object.deformable()) trajectory.max_collisions = 0;  // a swing is no collision
   trajectory.still = [&](const std::vector<MotionState>& states) {
     return largestImageMotion(states, camera, tracker) < params_.rest_px;
   };

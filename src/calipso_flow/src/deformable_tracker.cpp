@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calipso_flow/look_match.hpp"
 #include "calipso_flow/outline_match.hpp"
@@ -35,6 +36,10 @@ DeformableTracker::DeformableTracker(const ObjectModel& model, const Frame& key_
   point_weights_ = fitter_.field().weightsAt(points_);
   params_.patch = stripePatches(params.patch);
   params_.patch.radius_px = std::max(params.patch.radius_px, kRadius);
+  outline_bias_ =
+      OutlineBias(findOutline(edges_, model.mesh, model.mesh.vertices,
+                              reference_.warp(key_frame.camera, model.world_from_object), key_frame,
+                              model.world_from_object));
   last_ = keyObservation();
   last_.time = key_frame.time;
 }
@@ -60,8 +65,8 @@ Eigen::VectorXd DeformableTracker::predict(double time) const {
 }
 
 std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
-                                                   const Eigen::VectorXd& controls,
-                                                   Care care) const {
+                                                   const Eigen::VectorXd& controls, Care care,
+                                                   Eigen::VectorXd* brightness) const {
   std::vector<SurfaceMatch> matches;
   const auto surface = surfaceAt(controls);
   const auto look = reference_.warp(frame.camera, model_.world_from_object, surface);
@@ -86,11 +91,14 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
     if (!found[i]) continue;
     matches.push_back(
         {points_.row(visible[i]).transpose(), found[i]->position, found[i]->covariance});
+    if (!brightness) continue;
+    const auto brighter = pictures.brightening(pixels[i], *found[i], params_.patch.radius_px);
+    if (brighter) (*brightness)[visible[i]] = *brighter;
   }
   if (care == Care::kRough) return matches;
   for (const OutlineStep& step :
        findOutline(edges_, model_.mesh, surface, look, frame, model_.world_from_object)) {
-    matches.push_back(step.match());
+    matches.push_back(step.match(outline_bias_.towards(step.outward)));
   }
   return matches;
 }
@@ -101,10 +109,12 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
   DeformationObservation observation;
   observation.time = frame.time;
   observation.controls = predicted;
+  observation.brightness.setConstant(points_.rows(), std::numeric_limits<double>::quiet_NaN());
   // Without a motion to go by, the shape may be some pixels away.
   for (const Care care : {Care::kRough, Care::kForward, Care::kChecked}) {
     if (care == Care::kRough && before_last_) continue;
-    const auto matches = match(frame, observation.controls, care);
+    const auto matches = match(frame, observation.controls, care,
+                               care == Care::kChecked ? &observation.brightness : nullptr);
     const DeformationFit fit = fitter_.fit(matches, frame.camera, observation.controls, predicted,
                                            care == Care::kRough ? kRoughScale : kFineScale);
     observation.found = fit.converged && fit.inliers >= kLeastInlierShare * matches.size();

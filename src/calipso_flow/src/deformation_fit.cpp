@@ -222,6 +222,11 @@ void DeformationFitter::addPriors(const Eigen::VectorXd& controls, const Eigen::
   normal.right += predicted / (innovation * innovation) - quadratic_ * controls;
 }
 
+Eigen::MatrixXd DeformationFitter::priorInformation() const {
+  const Eigen::MatrixXd springs = springNormal(zero()).matrix();
+  return quadratic_ + Eigen::MatrixXd(springs.selfadjointView<Eigen::Lower>());
+}
+
 void DeformationFitter::addMatches(const DeformationField::Weights& weights,
                                    const std::vector<Residual>& residuals,
                                    const std::vector<double>& trust, Normal& normal) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "field_metric.hpp"
+
 namespace calipso::flow {
 namespace {
 
@@ -12,28 +14,6 @@ constexpr int kMostModes = 8;
 constexpr double kLeastSignal = 3.0;  // root mean square amplitude over its deviation
 constexpr double kLeastShare = 0.02;  // of the strongest mode's amplitude
 constexpr int kHalfWindow = 2;        // frames on either side that a velocity is taken from
-constexpr double kRidge = 1e-9;       // controls that no vertex sees have no length of their own
-
-// G of the mean square displacement over the vertices, c^T G c.
-Eigen::MatrixXd meanSquare(const DeformationField::Weights& weights) {
-  const Eigen::MatrixXd scalar =
-      Eigen::MatrixXd(weights.transpose() * weights) / static_cast<double>(weights.rows());
-  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(3 * scalar.rows(), 3 * scalar.cols());
-  for (int i = 0; i < scalar.rows(); ++i) {
-    for (int j = 0; j < scalar.cols(); ++j) {
-      for (int a = 0; a < 3; ++a) G(3 * i + a, 3 * j + a) = scalar(i, j);
-    }
-  }
-  G.diagonal().array() += kRidge;
-  return G;
-}
-
-Eigen::VectorXd vertexShape(const DeformationField::Weights& weights,
-                            const Eigen::VectorXd& controls) {
-  const Eigen::Map<const DeformationField::Points> c(controls.data(), controls.size() / 3, 3);
-  const DeformationField::Points shape = weights * c;
-  return Eigen::Map<const Eigen::VectorXd>(shape.data(), shape.size());
-}
 
 void interpolateGaps(const std::vector<DeformationObservation>& observations,
                      Eigen::MatrixXd& values) {
@@ -48,6 +28,52 @@ void interpolateGaps(const std::vector<DeformationObservation>& observations,
     before = k;
   }
   for (int k = before + 1; k < values.rows(); ++k) values.row(k) = values.row(before);
+}
+
+// One row per frame.
+Eigen::MatrixXd controlSeries(const std::vector<DeformationObservation>& observations) {
+  Eigen::MatrixXd controls =
+      Eigen::MatrixXd::Zero(observations.size(), observations.front().controls.size());
+  for (size_t k = 0; k < observations.size(); ++k) {
+    if (observations[k].found) controls.row(k) = observations[k].controls.transpose();
+  }
+  interpolateGaps(observations, controls);
+  return controls;
+}
+
+// The projection of controls (rows) on what rises above the uncertainty of their observation: the
+// principal components of the series whitened by its mean covariance C = L L^T. What is seen badly,
+// such as depth, counts only as far as it goes with what is seen well. Of T frames of pure noise in
+// n unknowns the largest eigenvalue is (1 + sqrt(n / T))^2 (Marchenko and Pastur).
+Eigen::MatrixXd aboveNoise(const std::vector<DeformationObservation>& observations,
+                           const Eigen::MatrixXd& controls) {
+  const Eigen::Index size = controls.cols();
+  Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(size, size);
+  int seen = 0;
+  for (const DeformationObservation& o : observations) {
+    if (o.found && o.covariance.size() > 0 && !o.covariance.isZero()) noise += o.covariance, ++seen;
+  }
+  if (seen == 0) return Eigen::MatrixXd::Identity(size, size);
+  const Eigen::LLT<Eigen::MatrixXd> factor(noise / seen);
+  const auto L = factor.matrixL();
+  const Eigen::MatrixXd white = L.solve(controls.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(white * white.transpose() / seen);
+  const double chance = 1.0 + std::sqrt(static_cast<double>(size) / seen);
+  const double least = kLeastSignal * chance * chance;
+  const Eigen::Index first = (solver.eigenvalues().array() <= least).count();
+  const Eigen::MatrixXd W = solver.eigenvectors().rightCols(size - first);
+  return factor.matrixU().solve(W) * (W.transpose() * Eigen::MatrixXd(factor.matrixU()));
+}
+
+// Of controls . dual, per frame.
+Eigen::VectorXd deviationsOf(const std::vector<DeformationObservation>& observations,
+                             const Eigen::VectorXd& dual) {
+  Eigen::VectorXd deviations = Eigen::VectorXd::Zero(observations.size());
+  for (size_t k = 0; k < observations.size(); ++k) {
+    if (!observations[k].found || observations[k].covariance.size() == 0) continue;
+    deviations[k] = std::sqrt(std::max(0.0, dual.dot(observations[k].covariance * dual)));
+  }
+  return deviations;
 }
 
 // Slope of the parabola through a frame and its neighbours in time.
@@ -83,35 +109,26 @@ DeformationModes modesOf(const std::vector<DeformationObservation>& observations
                          const DeformationField::Weights& weights) {
   const int frames = static_cast<int>(observations.size());
   const int size = static_cast<int>(observations.front().controls.size());
-  Eigen::MatrixXd controls = Eigen::MatrixXd::Zero(frames, size);
-  for (int k = 0; k < frames; ++k) {
-    if (observations[k].found) controls.row(k) = observations[k].controls.transpose();
-  }
-  interpolateGaps(observations, controls);
+  const Eigen::MatrixXd controls = controlSeries(observations);
+  const Eigen::MatrixXd clear = aboveNoise(observations, controls);
 
   // Principal components in the metric of G = L L^T.
-  const Eigen::MatrixXd G = meanSquare(weights);
-  const Eigen::LLT<Eigen::MatrixXd> factor(G);
-  const Eigen::MatrixXd scaled = controls * Eigen::MatrixXd(factor.matrixL());
+  const Eigen::LLT<Eigen::MatrixXd> factor(meanSquare(weights));
+  const Eigen::MatrixXd scaled = controls * clear * Eigen::MatrixXd(factor.matrixL());
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled.transpose() * scaled / frames);
+  const auto strengthOf = [&](int m) {
+    return std::sqrt(std::max(0.0, solver.eigenvalues()[size - 1 - m]));
+  };
 
   DeformationModes modes;
   modes.shapes.resize(3 * weights.rows(), 0);
   modes.amplitudes = modes.deviations = Eigen::MatrixXd(frames, 0);
   for (int m = 0; m < std::min(kMostModes, size); ++m) {
     const Eigen::VectorXd y = solver.eigenvectors().col(size - 1 - m);
-    const double strength = std::sqrt(std::max(0.0, solver.eigenvalues()[size - 1 - m]));
-    const Eigen::VectorXd dual = factor.matrixL() * y;  // q = controls . dual
-    Eigen::VectorXd deviations = Eigen::VectorXd::Zero(frames);
-    double variance = 0.0;
-    for (int k = 0; k < frames; ++k) {
-      if (!observations[k].found || observations[k].covariance.size() == 0) continue;
-      const double v = dual.dot(observations[k].covariance * dual);
-      deviations[k] = std::sqrt(std::max(0.0, v));
-      variance += v / frames;
-    }
-    const double strongest = std::sqrt(std::max(0.0, solver.eigenvalues()[size - 1]));
-    if (strength < kLeastSignal * std::sqrt(variance) || strength < kLeastShare * strongest) break;
+    const Eigen::VectorXd dual = clear * (factor.matrixL() * y);  // q = controls . dual
+    const Eigen::VectorXd deviations = deviationsOf(observations, dual);
+    const double noise = std::sqrt(deviations.squaredNorm() / frames);
+    if (strengthOf(m) < kLeastSignal * noise || strengthOf(m) <= kLeastShare * strengthOf(0)) break;
     const int n = modes.count();
     modes.shapes.conservativeResize(Eigen::NoChange, n + 1);
     modes.amplitudes.conservativeResize(Eigen::NoChange, n + 1);

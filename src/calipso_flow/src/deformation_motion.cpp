@@ -5,6 +5,8 @@
 #include <cmath>
 #include <complex>
 
+#include "calipso_flow/shading.hpp"
+
 namespace calipso::flow {
 namespace {
 
@@ -12,6 +14,9 @@ using Vertices = decltype(TriangleMesh::vertices);
 
 constexpr double kLeastTravelling = 0.1;  // a smaller share of travelling power is a standing wave
 constexpr double kLeastPhase = 0.5;       // rad over the object's size
+constexpr double kMostWaves = 3.0;        // over the object's size
+constexpr double kClearTravel = 2.0;      // power of what goes forth over that of what goes back
+constexpr double kLeastNoise = 1e-6;      // m
 constexpr double kEnd = 0.05;             // of the extent along gravity: what counts as the end
 constexpr double kLeftShare = 0.15;       // of the tracks that must have moved
 constexpr int kLeastLeft = 6;
@@ -21,19 +26,91 @@ constexpr double kRigidShare = 0.1;  // of the way: a clamped beam's bend leaves
 // by so much of their own account do rigid tracks scatter
 constexpr double kRigidDeviations = 2.0;
 
-SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& modes,
-                      const SpectralLine& line, Eigen::VectorXcd& shape) {
-  SurfaceLine result;
-  result.line = line;
-  shape = modes.shapes.cast<std::complex<double>>() * line.amplitude;
-  result.amplitude = std::sqrt(0.5 * shape.squaredNorm() * 3.0 / shape.size());
+// The series in which lines are sought: amplitudes of the modes and of the shading, each over its
+// noise, so that a line is as strong as it stands out.
+struct LineSeries {
+  Eigen::MatrixXd values;      // T x (modes + shading)
+  Eigen::VectorXd mode_noise;  // m
+
+  LineSeries(const DeformationModes& modes, const Shading& shading)
+      : values(modes.amplitudes.rows(), modes.count() + shading.count()),
+        mode_noise(modes.count()) {
+    for (int m = 0; m < modes.count(); ++m) {
+      const double stated =
+          std::sqrt(modes.deviations.col(m).squaredNorm() / modes.deviations.rows());
+      mode_noise[m] = std::max({stated, noiseOf(modes.amplitudes.col(m)), kLeastNoise});
+      values.col(m) = modes.amplitudes.col(m) / mode_noise[m];
+    }
+    values.rightCols(shading.count()) = shading.amplitudes / shading.noise;
+  }
+};
+
+// Rows: two unit vectors within a sheet, object frame.
+Eigen::Matrix<double, 2, 3> withinSheet(const Eigen::Vector3d& normal) {
+  Eigen::Matrix<double, 2, 3> axes;
+  axes.row(0) = normal.unitOrthogonal().transpose();
+  axes.row(1) = normal.cross(normal.unitOrthogonal()).transpose();
+  return axes;
+}
+
+// Where the crests of a sheet's line go as its shading shows it, rad/m, object frame; nothing where
+// as much goes back as forth.
+std::optional<Eigen::Vector3d> shadedTravel(const DeformableTracker& tracker,
+                                            const Eigen::VectorXcd& shading_field) {
+  const auto normal = tracker.fitter().field().sheetNormal();
+  if (!normal || !(shading_field.norm() > 0.0)) return std::nullopt;
+  const Eigen::Matrix<double, 2, 3> axes = withinSheet(*normal);
+  const double diagonal = boundingDiagonal(tracker.model().mesh);
+  const PlaneWave wave = planeWaveIn(tracker.points() * axes.transpose(), shading_field,
+                                     kMostWaves * 2.0 * M_PI / diagonal);
+  const bool travels =
+      wave.power > kClearTravel * wave.opposite && wave.wave_vector.norm() * diagonal > kLeastPhase;
+  if (!travels) return std::nullopt;
+  return Eigen::Vector3d(axes.transpose() * wave.wave_vector);
+}
+
+// The same from the displacement of the surface.
+std::optional<Eigen::Vector3d> displacementTravel(const DeformableTracker& tracker,
+                                                  const Eigen::VectorXcd& shape) {
   const TriangleMesh& mesh = tracker.model().mesh;
   const CrestTravel travel = crestTravel(mesh, shape);
   const bool travels = travel.travelling > kLeastTravelling &&
                        travel.wave_vector.norm() * boundingDiagonal(mesh) > kLeastPhase;
-  if (travels) {
-    result.wave_vector = tracker.model().world_from_object.linear() * travel.wave_vector;
+  if (!travels) return std::nullopt;
+  return travel.wave_vector;
+}
+
+// A solid's vibration is compared as the picture shows it, across the lines of sight: along them it
+// is seen far worse, and what wanders there would be taken for a part of its shape.
+Eigen::VectorXcd acrossSight(const DeformableTracker& tracker, const Eigen::VectorXcd& shape) {
+  const ObjectModel& model = tracker.model();
+  const Eigen::Vector3d eye = model.world_from_object.inverse() * tracker.keyCamera().translation();
+  Eigen::VectorXcd across = shape;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    const Eigen::Vector3d sight = (model.mesh.vertex(i) - eye).normalized();
+    const std::complex<double> along =
+        sight.cast<std::complex<double>>().dot(shape.segment<3>(3 * i));
+    across.segment<3>(3 * i) -= along * sight;
   }
+  return across;
+}
+
+// @param line  of a LineSeries; its amplitudes become those of the modes
+SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& modes,
+                      const Shading& shading, const LineSeries& series, SpectralLine line,
+                      Eigen::VectorXcd& shape) {
+  const Eigen::VectorXcd field =
+      shading.shapes.cast<std::complex<double>>() * line.amplitude.tail(shading.count());
+  line.amplitude = series.mode_noise.cast<std::complex<double>>().cwiseProduct(
+      line.amplitude.head(modes.count()).eval());
+  SurfaceLine result;
+  result.line = line;
+  shape = modes.shapes.cast<std::complex<double>>() * line.amplitude;
+  result.amplitude = std::sqrt(0.5 * shape.squaredNorm() * 3.0 / shape.size());
+  auto travel = shadedTravel(tracker, field);
+  if (!tracker.fitter().field().sheetNormal()) shape = acrossSight(tracker, shape);
+  if (!travel) travel = displacementTravel(tracker, shape);
+  if (travel) result.wave_vector = tracker.model().world_from_object.linear() * *travel;
   return result;
 }
 
@@ -96,17 +173,20 @@ DeformationMotion describeDeformation(const DeformableTracker& tracker,
   const DeformationModes& modes = motion.modes;
   if (modes.count() == 0) return motion;
 
+  const Shading shading = shadingOf(observations);
+  const LineSeries series(modes, shading);
   SpectrumParams params;
-  params.noise = std::sqrt(modes.deviations.squaredNorm() / modes.deviations.size());
+  params.noise = 1.0;
   const Spectrum spectrum =
       findLines(Eigen::Map<const Eigen::VectorXd>(motion.times.data(), motion.times.size()),
-                modes.amplitudes, params);
+                series.values, params);
   for (const SpectralLine& line : spectrum.lines) {
     Eigen::VectorXcd shape;
-    motion.lines.push_back(onSurface(tracker, modes, line, shape));
+    motion.lines.push_back(onSurface(tracker, modes, shading, series, line, shape));
     // Only a standing vibration is the object's own.
     const bool own = motion.lines.size() == 1 && motion.lines[0].wave_vector.isZero();
-    if (own) motion.stiffness = stiffnessRatio(tracker.model(), line, shape, motion.note);
+    if (own)
+      motion.stiffness = stiffnessRatio(tracker.model(), motion.lines[0].line, shape, motion.note);
   }
   const ObjectModel& model = tracker.model();
   if (with_wind && tracker.fitter().field().sheetNormal()) {
@@ -114,7 +194,10 @@ DeformationMotion describeDeformation(const DeformableTracker& tracker,
     motion.wind = estimateWind(model, motion.times, modes, gravity, note);
     if (!note.empty()) motion.note += (motion.note.empty() ? "" : "; ") + note;
   }
-  motion.lean = leanOf(model, modes.surface(model.mesh, spectrum.mean), gravity);
+  motion.lean = leanOf(
+      model,
+      modes.surface(model.mesh, series.mode_noise.cwiseProduct(spectrum.mean.head(modes.count()))),
+      gravity);
   return motion;
 }
 

@@ -11,7 +11,26 @@ namespace {
 constexpr int kSurrounding = 16;  // px of the frame around the object's window; even
 constexpr double kStripes = 8;    // in which points are shared out
 constexpr double kReturnDeviations = 3.0;
+constexpr double kBlack = 4.0;           // grey levels: brightness below means nothing
 constexpr double kStripeGradient = 2.0;  // grey levels per px; below, a direction is a stripe's
+
+// Over a square, bilinear; nothing where it leaves the picture.
+std::optional<double> meanAround(const ImageWindow& window, const Eigen::Vector2d& at, int radius) {
+  const double x = at.x() - window.origin.x - radius, y = at.y() - window.origin.y - radius;
+  const int side = 2 * radius + 1;
+  if (!(x >= 0.0 && y >= 0.0 && x < window.image.cols - side && y < window.image.rows - side))
+    return std::nullopt;
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const double right = x - x0, down = y - y0;
+  double sum = 0.0;
+  for (int v = 0; v <= side; ++v) {
+    const float* row = window.image.ptr<float>(y0 + v) + x0;
+    double line = (1.0 - right) * row[0] + right * row[side];
+    for (int u = 1; u < side; ++u) line += row[u];
+    sum += (v == 0 ? 1.0 - down : v == side ? down : 1.0) * line;
+  }
+  return sum / (side * side);
+}
 
 ImageWindow halved(const ImageWindow& window) {
   ImageWindow half{{}, 0.5 * window.origin};
@@ -86,6 +105,15 @@ LookMatch::Matches LookMatch::forEach(const std::vector<Seed>& seeds, const Sear
       },
       kStripes);
   return matches;
+}
+
+std::optional<double> LookMatch::brightening(const Seed& seed, const PatchMatch& match,
+                                             int radius_px) const {
+  const auto known = meanAround(weight_, scale_ * seed.at, radius_px);
+  const auto before = meanAround(look_, scale_ * seed.at, radius_px);
+  const auto now = meanAround(frame_, scale_ * match.position, radius_px);
+  if (!known || !before || !now || *known < 1.0 - 1e-6) return std::nullopt;
+  return std::log((*now + kBlack) / (*before + kBlack));
 }
 
 std::optional<Eigen::Vector2d> LookMatch::missOnReturn(const Eigen::Vector2d& at,

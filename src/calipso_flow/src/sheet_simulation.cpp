@@ -29,8 +29,8 @@ fem::FemOptions optionsFor(const SheetSettings& settings) {
   options.target_nodes = settings.nodes;
   options.cell_size = settings.cell_size;
   options.threads = 1;
-  options.newton_tolerance = 1e-3;
-  options.newton_iterations = 8;
+  options.newton_tolerance = 1e-2;
+  options.newton_iterations = 4;
   return options;
 }
 
@@ -77,11 +77,11 @@ void SheetSimulation::blow(const Eigen::Vector3d& wind, double h) {
       Eigen::Map<const Eigen::VectorXd>(forces.data(), forces.size())));
 }
 
-void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector& velocities,
-                           const Wind& wind, const AfterStep& after_step,
-                           const std::function<void()>& after_frame) {
+void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector& displacements,
+                           const SurfaceVector& velocities, const Wind& wind,
+                           const AfterStep& after_step, const std::function<void()>& after_frame) {
   fem::DeformableBody& body = sheet_.body();
-  body.setState(start_, sheet_.nodalField(velocities));
+  body.setState(start_ + sheet_.nodalField(displacements), sheet_.nodalField(velocities));
   after_frame();
   for (size_t k = 1; k < times.size(); ++k) {
     const double span = times[k] - times[k - 1];
@@ -101,7 +101,7 @@ void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector
 std::vector<SurfaceVector> SheetSimulation::run(const std::vector<double>& times,
                                                 const SurfaceVector& velocities, const Wind& wind) {
   std::vector<SurfaceVector> shapes;
-  move(times, velocities, wind, nullptr,
+  move(times, SurfaceVector::Zero(velocities.size()), velocities, wind, nullptr,
        [&] { shapes.push_back(sheet_.body().surfaceVertices()); });
   const SurfaceVector first = shapes.front();
   for (SurfaceVector& shape : shapes) shape -= first;
@@ -109,6 +109,7 @@ std::vector<SurfaceVector> SheetSimulation::run(const std::vector<double>& times
 }
 
 SheetMotion SheetSimulation::measure(const std::vector<double>& times,
+                                     const SurfaceVector& displacements,
                                      const SurfaceVector& velocities, const WindCourse& wind,
                                      const Eigen::MatrixXd& measured,
                                      const SheetSimulation* stiffer, double by) {
@@ -145,8 +146,8 @@ SheetMotion SheetSimulation::measure(const std::vector<double>& times,
     ++frame;
   };
   move(
-      times, velocities, [&](double time) { return wind.at(time); }, stiffer ? carry : AfterStep(),
-      see);
+      times, displacements, velocities, [&](double time) { return wind.at(time); },
+      stiffer ? carry : AfterStep(), see);
   return motion;
 }
 

@@ -51,11 +51,12 @@ class SheetSimulation {
   std::vector<SurfaceVector> run(const std::vector<double>& times, const SurfaceVector& velocities,
                                  const Wind& wind);
   // The same, measured: amplitudes = measured * displacements of the surface.
+  // @param displacements  of the surface at the first time, world axes, m
   // @param measured   K x 3 #V
   // @param stiffer    null: no slopes; else the same sheet, by a factor exp(`by`) as stiff
-  SheetMotion measure(const std::vector<double>& times, const SurfaceVector& velocities,
-                      const WindCourse& wind, const Eigen::MatrixXd& measured,
-                      const SheetSimulation* stiffer, double by);
+  SheetMotion measure(const std::vector<double>& times, const SurfaceVector& displacements,
+                      const SurfaceVector& velocities, const WindCourse& wind,
+                      const Eigen::MatrixXd& measured, const SheetSimulation* stiffer, double by);
   double stiffnessRatio() const { return stiffness_over_density_; }  // E/rho, m^2/s^2
 
  private:
@@ -63,8 +64,9 @@ class SheetSimulation {
       std::function<void(const fem::Vec& x0, const fem::Vec& v0, double time, double h)>;
   // Steps through all times, with the wind of the middle of each step, whose time is told to
   // `after_step`.
-  void move(const std::vector<double>& times, const SurfaceVector& velocities, const Wind& wind,
-            const AfterStep& after_step, const std::function<void()>& after_frame);
+  void move(const std::vector<double>& times, const SurfaceVector& displacements,
+            const SurfaceVector& velocities, const Wind& wind, const AfterStep& after_step,
+            const std::function<void()>& after_frame);
   void settle(const Eigen::Vector3d& gravity, double sag);
   // Of the nodal forces, 3 #N x P. @param dw  of the wind, 3 x P
   Slopes windSlopes(const fem::Vec& x0, const fem::Vec& v0, const Eigen::Vector3d& wind, double h,

@@ -42,6 +42,7 @@ WindFit::WindFit(SheetFamily& sheets, const ObjectModel& model, const std::vecto
   }
   measured_ = (shapes.transpose() * shapes).ldlt().solve(shapes.transpose());
   velocities_ = shapes * modes.velocities.row(0).transpose();
+  displacements_ = shapes * modes.amplitudes.row(0).transpose();
   const double motion = std::sqrt(modes.amplitudes.squaredNorm() / modes.amplitudes.rows());
   deviations_ =
       (modes.deviations.array().square() + std::pow(params.model_error * motion, 2)).sqrt();
@@ -55,7 +56,7 @@ std::optional<SheetMotion> WindFit::simulated(const std::vector<double>& knots,
   try {
     const SheetSimulation* stiffer = slopes ? &sheets_.stifferThan(log_stiffness) : nullptr;
     return sheets_.at(log_stiffness)
-        .measure(times_, velocities_, course, measured_, stiffer, kStiffer);
+        .measure(times_, displacements_, velocities_, course, measured_, stiffer, kStiffer);
   } catch (const NoEquilibrium&) {
     return std::nullopt;
   }

@@ -63,11 +63,11 @@ class WindFit {
   const std::vector<double>& times_;
   const DeformationModes& modes_;
   const WindParams& params_;
-  Eigen::Vector3d down_;        // unit; zero without gravity
-  Eigen::MatrixXd measured_;    // Phi^+, K x 3 #V, world axes
-  Eigen::VectorXd velocities_;  // of the surface in the key frame
-  Eigen::MatrixXd deviations_;  // T x K
-  double spread_ = 1.0;         // factor on them
+  Eigen::Vector3d down_;                        // unit; zero without gravity
+  Eigen::MatrixXd measured_;                    // Phi^+, K x 3 #V, world axes
+  Eigen::VectorXd displacements_, velocities_;  // of the surface at the first time
+  Eigen::MatrixXd deviations_;                  // T x K
+  double spread_ = 1.0;                         // factor on them
 };
 
 }  // namespace calipso::flow

@@ -6,7 +6,9 @@
 #include "calipso_flow/deformation_fit.hpp"
 #include "calipso_flow/deformation_modes.hpp"
 #include "calipso_flow/deformation_motion.hpp"
+#include "calipso_flow/live_deformation.hpp"
 #include "calipso_flow/rotation.hpp"
+#include "calipso_flow/shading.hpp"
 #include "calipso_flow/stiffness_ratio.hpp"
 #include "rendered_scene.hpp"
 
@@ -167,6 +169,46 @@ TEST(MovesRigidly, aSwingDoesAndABendDoesNot) {
   EXPECT_TRUE(hasLeft(bent, model.world_from_object, camera, 0.6));
   EXPECT_TRUE(movesRigidly({swung}, model.world_from_object, camera));
   EXPECT_FALSE(movesRigidly({bent}, model.world_from_object, camera));
+}
+
+// Of sin(w t) at 30 frames per second the filter tells the velocity of the present frame, looking
+// back only; and nothing new comes of a frame in which nothing was found.
+TEST(ModeFilter, tellsVelocitiesOfASway) {
+  constexpr double kRate = 30.0, kOmega = 7.0, kAmplitude = 0.05;
+  ModeFilter filter(1, 1.0);
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 5e-4);
+  double squared = 0.0;
+  for (int k = 0; k < 60; ++k) {
+    const double t = k / kRate;
+    const auto amplitude =
+        Eigen::VectorXd::Constant(1, kAmplitude * std::sin(kOmega * t) + noise(random));
+    filter.add(t, amplitude, Eigen::VectorXd::Constant(1, 5e-4), false);
+    const double error = filter.velocities()[0] - kAmplitude * kOmega * std::cos(kOmega * t);
+    if (k >= 10) squared += error * error / 50.0;
+  }
+  EXPECT_LT(std::sqrt(squared), 0.15 * kAmplitude * kOmega / std::sqrt(2.0));
+  const double before = filter.velocityDeviations()[0];
+  filter.skip(61 / kRate);
+  EXPECT_GT(filter.velocityDeviations()[0], before);
+}
+
+// A field exp(-i k.x) under an uneven envelope travels along k; a standing one goes both ways.
+TEST(PlaneWave, isFoundUnderAnEnvelope) {
+  const Eigen::Vector2d k(5.0, -3.0);
+  Eigen::Matrix<double, Eigen::Dynamic, 2> points(200, 2);
+  Eigen::VectorXcd travelling(200), standing(200);
+  for (int i = 0; i < 200; ++i) {
+    points.row(i) << 0.05 * (i % 14), 0.07 * (i / 14);
+    const double phase = points.row(i).dot(k.transpose()), envelope = 0.3 + points(i, 1);
+    travelling[i] = envelope * std::polar(1.0, -phase);
+    standing[i] = envelope * std::cos(phase);
+  }
+  const PlaneWave wave = planeWaveIn(points, travelling, 20.0);
+  EXPECT_LT((wave.wave_vector - k).norm(), 0.3);
+  EXPECT_GT(wave.power, 4.0 * wave.opposite);
+  const PlaneWave both = planeWaveIn(points, standing, 20.0);
+  EXPECT_LT(both.power, 1.5 * both.opposite);
 }
 
 // A cantilever's first frequency after Euler and Bernoulli:  omega = 1.8751^2 sqrt(E I / (rho A

@@ -4,6 +4,7 @@
 
 #include "../tools/film.hpp"
 #include "calipso_flow/clip_dynamics.hpp"
+#include "calipso_flow/live_dynamics.hpp"
 
 // Bodies whose motion is known because it was simulated, estimated from pictures of them.
 namespace calipso::flow {
@@ -23,6 +24,38 @@ TEST(Filmed, windAcrossASheetIsFound) {
   EXPECT_GT(w.explained, 0.9);
   // Along the sheet nothing is seen: the deviation is that of what is known beforehand.
   EXPECT_GT(std::sqrt(w.mean_covariance(0, 0)), 2.0 * std::sqrt(w.mean_covariance(1, 1)));
+}
+
+// Live, the sheet's modes, their velocities and the wind come from what has been seen so far.
+TEST(Filmed, aSheetIsFollowedLive) {
+  const FilmedSheet sheet = filmedSheet({0.0, 4.0, 0.0}, 24);
+  const auto frame = [&](size_t k) {
+    return makeFrame(sheet.times[k], film(sheet.model, sheet.shapes[k], sheet.camera, 2.0, k + 1),
+                     sheet.camera);
+  };
+  LiveAnalyser live(frame(0), {sheet.model}, {cv::Mat()}, sheet.gravity);
+  std::vector<NamedMotion> motions;
+  double error = 0.0, motion = 0.0;
+  for (size_t k = 1; k < sheet.times.size(); ++k) {
+    motions = live.add(frame(k));
+    if (k < 10 || k + 1 == sheet.times.size()) continue;
+    const CoarseModes* modes = live.modesOf("sheet");
+    ASSERT_NE(modes, nullptr);
+    const Eigen::VectorXd velocities = modes->shapes * motions[0].mode_velocities;
+    const Eigen::MatrixXd ahead = sheet.shapes[k + 1], behind = sheet.shapes[k - 1];
+    for (int i = 0; i < sheet.model.mesh.vertexCount(); ++i) {
+      const Eigen::RowVector3d v =
+          (ahead.row(i) - behind.row(i)) / (sheet.times[k + 1] - sheet.times[k - 1]);
+      error += (velocities.segment<3>(3 * i).transpose() - v).squaredNorm();
+      motion += v.squaredNorm();
+    }
+  }
+  EXPECT_TRUE(motions[0].motion.moving);
+  EXPECT_LT(std::sqrt(error / motion), 0.3);
+  const std::vector<ObjectDynamics> of_late = describe(live.windows(), sheet.gravity, true);
+  ASSERT_EQ(of_late.size(), 1u);
+  ASSERT_TRUE(of_late[0].deformation->wind) << of_late[0].deformation->note;
+  EXPECT_NEAR(of_late[0].deformation->wind->mean.y(), 4.0, 0.6);
 }
 
 TEST(Filmed, beamVibratesAtItsFrequency) {

@@ -65,22 +65,22 @@ TEST(SheetSimulation, slopesAreThoseOfItsMotion) {
   more_stiff.stiffness = std::exp(kBy), less_stiff.stiffness = std::exp(-kBy);
   SheetSimulation sheet(model, kGravity, as_is), stiffer(model, kGravity, more_stiff),
       softer(model, kGravity, less_stiff);
-  const SheetMotion motion = sheet.measure(times, still, wind, measured, &stiffer, kBy);
+  const SheetMotion motion = sheet.measure(times, still, still, wind, measured, &stiffer, kBy);
   ASSERT_EQ(motion.slopes.size(), 10u);
   for (int p = 0; p < 9; ++p) {
     constexpr double kEpsilon = 0.05;  // m/s
     WindCourse more = wind, less = wind;
     more.wind[p / 3][p % 3] += kEpsilon, less.wind[p / 3][p % 3] -= kEpsilon;
     const Eigen::MatrixXd difference =
-        (sheet.measure(times, still, more, measured, nullptr, 0.0).amplitudes -
-         sheet.measure(times, still, less, measured, nullptr, 0.0).amplitudes) /
+        (sheet.measure(times, still, still, more, measured, nullptr, 0.0).amplitudes -
+         sheet.measure(times, still, still, less, measured, nullptr, 0.0).amplitudes) /
         (2.0 * kEpsilon);
     const double scale = std::max(difference.norm(), 0.01 * motion.slopes[4].norm());
     EXPECT_LT((motion.slopes[p] - difference).norm(), 0.05 * scale) << p;
   }
   const Eigen::MatrixXd difference =
-      (stiffer.measure(times, still, wind, measured, nullptr, 0.0).amplitudes -
-       softer.measure(times, still, wind, measured, nullptr, 0.0).amplitudes) /
+      (stiffer.measure(times, still, still, wind, measured, nullptr, 0.0).amplitudes -
+       softer.measure(times, still, still, wind, measured, nullptr, 0.0).amplitudes) /
       (2.0 * kBy);
   EXPECT_LT((motion.slopes[9] - difference).norm(), 0.1 * difference.norm());
 }

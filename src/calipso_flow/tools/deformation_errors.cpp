@@ -79,6 +79,12 @@ void addDeformationErrors(const ObjectModel& model, const TrueObject& truth,
   entry.flag("deforms", dynamics.deformation.has_value());
   entry.number("frequency_error_percent", frequency);
   entry.number("frequency_hz", estimate).number("frequency_deviation_hz", deviation);
+  std::vector<double> lines;
+  if (dynamics.deformation) {
+    for (const SurfaceLine& line : dynamics.deformation->lines)
+      lines.push_back(line.line.frequency);
+  }
+  entry.numbers("lines_hz", lines);
   entry.number("travel_direction_error_deg", travel).number("lean_error_percent", lean);
   entry.number("shape_error_percent", shape);
   // A scene's wind is only nominal.

@@ -37,6 +37,8 @@ SimulatorRos::SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
   };
   if (params_.live) {
     subscribers_.push_back(nh.subscribe(topics::kDynamics, queue, &SimulatorRos::onDynamics, this));
+    subscribers_.push_back(
+        nh.subscribe(topics::kClipDynamics, 1, &SimulatorRos::onLiveModes, this));
   } else {
     subscribers_.push_back(nh.subscribe(topics::kClipInfo, 1, &SimulatorRos::onClipInfo, this));
     subscribers_.push_back(
@@ -77,7 +79,24 @@ void SimulatorRos::onStatus(const calipso_msgs::NodeStatusConstPtr& status) {
 }
 
 void SimulatorRos::onDynamics(const calipso_msgs::DynamicsConstPtr& dynamics) {
-  if (world_ && first_stamp_) take(*dynamics);
+  if (!(world_ && first_stamp_)) return;
+  take(*dynamics);
+  for (const auto& object : dynamics->objects) {
+    for (const auto& wind : object.wind)
+      world_->addObservedWind(object.object, fromMsg(wind, *first_stamp_));
+  }
+}
+
+// Live, a deforming object's modes come with what the last seconds tell; they stay the same.
+void SimulatorRos::onLiveModes(const calipso_msgs::ClipDynamicsConstPtr& dynamics) {
+  if (!world_) return;
+  try {
+    for (const auto& object : dynamics->objects) {
+      if (!object.modes.empty()) world_->addObservedModes(object.object, shapesOf(object.modes));
+    }
+  } catch (const std::invalid_argument& error) {
+    reporter_.warn(dynamics->header.stamp, error.what());
+  }
 }
 
 void SimulatorRos::prepare() {

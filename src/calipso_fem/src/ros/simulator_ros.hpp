@@ -31,6 +31,7 @@ class SimulatorRos {
   void onModels(const calipso_msgs::AlignedModelsConstPtr& models);
   void onClipInfo(const calipso_msgs::ClipInfoConstPtr& info);
   void onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip);
+  void onLiveModes(const calipso_msgs::ClipDynamicsConstPtr& dynamics);
   void onStatus(const calipso_msgs::NodeStatusConstPtr& status);
   void onDynamics(const calipso_msgs::DynamicsConstPtr& dynamics);
   void onEdit(const calipso_msgs::EditConstPtr& edit);

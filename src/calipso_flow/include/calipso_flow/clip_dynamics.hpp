@@ -2,12 +2,12 @@
 
 #include <deque>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "calipso_flow/deformation_motion.hpp"
+#include "calipso_flow/followed_object.hpp"
 #include "calipso_flow/object_motion.hpp"
 #include "calipso_flow/trajectory.hpp"
 
@@ -17,6 +17,7 @@ struct DynamicsParams {
   TrackerParams tracker;
   TrajectoryParams trajectory;
   double rest_px = 0.3;          // image motion over a piece that tracking errors may explain
+  double live_window = 3.0;      // s, looked back over live, for what needs more than one frame
   double cut_correlation = 0.5;  // successive pictures that agree less than this are cut apart
 };
 
@@ -53,27 +54,16 @@ class ClipAnalyser {
   std::vector<ObjectDynamics> finish(bool with_wind = true) const;
 
  private:
-  // One object as it is followed.
-  struct Followed {
-    ObjectTracker tracker;
-    cv::Mat mask;
-    std::vector<Observation> observations;  // one per frame
-    int frames_left = 0;                    // successive frames in which it had left its place
-    std::unique_ptr<DeformableTracker> deformable;     // once it is seen to deform
-    std::vector<DeformationObservation> deformations;  // one per frame, then
-  };
   void forEachObject(const std::function<void(size_t)>& work) const;
-  void follow(const Frame& frame, bool cut, Followed& object) const;
-  void beginDeformable(Followed& object) const;
-  ObjectDynamics finishObject(const Followed& object, bool with_wind) const;
+  ObjectDynamics finishObject(const FollowedObject& object, bool with_wind) const;
 
   DynamicsParams params_;
   Eigen::Vector3d gravity_;  // m/s^2, world
-  Frame key_, last_;
+  Frame last_;
   std::deque<Frame> recent_;  // the frames just seen, oldest first
   std::vector<double> times_;
   std::vector<double> cut_times_;
-  std::vector<Followed> objects_;
+  std::vector<FollowedObject> objects_;
 };
 
 }  // namespace calipso::flow

@@ -17,6 +17,9 @@ struct DeformationObservation {
   Eigen::MatrixXd covariance;  // of controls, m^2
   double deviation = 0.0;      // see DeformationFit
   std::vector<Track> tracks;
+  // Logarithm of the brightness over that in the key frame at DeformableTracker::points; NaN where
+  // a point is not found.
+  Eigen::VectorXd brightness;
 };
 
 // Follows an object that deforms from its shape in the key frame: its look is warped along the
@@ -35,18 +38,22 @@ class DeformableTracker {
 
   const ObjectModel& model() const { return model_; }
   const DeformationFitter& fitter() const { return fitter_; }
+  const Eigen::Isometry3d& keyCamera() const { return reference_.frame().camera.world_from_camera; }
   // The deformed surface, object frame.
   decltype(TriangleMesh::vertices) surfaceAt(const Eigen::VectorXd& controls) const;
+  const DeformationField::Points& points() const { return points_; }  // followed, object frame
   const DeformationField::Weights& vertexWeights() const { return vertex_weights_; }
 
  private:
   Eigen::VectorXd predict(double time) const;
-  std::vector<SurfaceMatch> match(const Frame& frame, const Eigen::VectorXd& controls,
-                                  Care care) const;
+  // @param brightness  null, or see DeformationObservation
+  std::vector<SurfaceMatch> match(const Frame& frame, const Eigen::VectorXd& controls, Care care,
+                                  Eigen::VectorXd* brightness) const;
 
   ObjectModel model_;
   TrackerParams params_;
   std::vector<SurfaceEdge> edges_;
+  OutlineBias outline_bias_;  // of the key frame, where the shape is known
   ReferenceView reference_;
   DeformationFitter fitter_;
   DeformationField::Weights vertex_weights_, point_weights_;

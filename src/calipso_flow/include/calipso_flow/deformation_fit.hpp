@@ -52,6 +52,8 @@ class DeformationFitter {
                      double scale) const;
 
   const DeformationField& field() const { return field_; }
+  // What is known of the controls before any picture, about the shape in the key frame, 1/m^2.
+  Eigen::MatrixXd priorInformation() const;
   Eigen::VectorXd zero() const { return Eigen::VectorXd::Zero(3 * field_.size()); }
   // Displaced points for given controls, object frame.
   static DeformationField::Points displaced(const DeformationField::Points& points,

@@ -44,6 +44,9 @@ class LookMatch {
   using Matches = std::vector<std::optional<PatchMatch>>;
   using Search = std::function<std::optional<PatchMatch>(const Seed& seed)>;
   static Matches forEach(const std::vector<Seed>& seeds, const Search& search);
+  // Logarithm of the mean brightness around a match over that of the look around its seed; nothing
+  // where the look is not known all around.
+  std::optional<double> brightening(const Seed& seed, const PatchMatch& match, int radius_px) const;
   // By how much the match, followed back into the look, misses the point where it began.
   std::optional<Eigen::Vector2d> missOnReturn(const Eigen::Vector2d& at, const PatchMatch& there,
                                               const PatchParams& params) const;

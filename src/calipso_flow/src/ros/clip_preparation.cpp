@@ -40,10 +40,37 @@ calipso_msgs::Dynamics dynamicsMsg(const Scene& scene, const std::vector<NamedMo
   for (const SceneObject& object : scene.objects) {
     const auto motion = std::find_if(motions.begin(), motions.end(),
                                      [&](const auto& m) { return m.object == object.name; });
-    msg.objects.push_back(motion == motions.end() ? withoutEstimate(object)
-                                                  : toMsg(object.name, motion->motion));
+    if (motion == motions.end()) {
+      msg.objects.push_back(withoutEstimate(object));
+      continue;
+    }
+    msg.objects.push_back(toMsg(object.name, motion->motion));
+    addModes(motion->mode_amplitudes, motion->mode_velocities, msg.objects.back());
   }
   return msg;
+}
+
+calipso_msgs::ClipDynamics liveDynamicsMsg(const std::vector<ObjectDynamics>& objects,
+                                           const LiveAnalyser& analyser,
+                                           const std_msgs::Header& header) {
+  calipso_msgs::ClipDynamics msg;
+  msg.header = header;
+  msg.header.frame_id = topics::kWorldFrame;
+  for (ObjectDynamics object : objects) {
+    if (const CoarseModes* modes = analyser.modesOf(object.name))
+      object.deformation->modes.shapes = modes->shapes;
+    msg.objects.push_back(toMsg(object));
+  }
+  return msg;
+}
+
+void addWinds(const std::vector<ObjectDynamics>& objects, double time,
+              calipso_msgs::Dynamics& msg) {
+  for (calipso_msgs::ObjectDynamics& entry : msg.objects) {
+    for (const ObjectDynamics& object : objects) {
+      if (object.name == entry.object) addWind(*object.deformation, time, entry);
+    }
+  }
 }
 
 calipso_msgs::ClipDynamics clipDynamicsMsg(const Scene& scene,

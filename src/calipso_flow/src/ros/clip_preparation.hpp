@@ -45,6 +45,14 @@ calipso_msgs::ClipDynamics clipDynamicsMsg(const Scene& scene,
                                            const std::vector<double>& cut_times,
                                            const std::vector<std_msgs::Header>& headers);
 
+// What the last seconds say about deforming objects, in the modes of the frames' amplitudes.
+calipso_msgs::ClipDynamics liveDynamicsMsg(const std::vector<ObjectDynamics>& objects,
+                                           const LiveAnalyser& analyser,
+                                           const std_msgs::Header& header);
+
+// Adds the wind that the last seconds show, as it is at a time, s.
+void addWinds(const std::vector<ObjectDynamics>& objects, double time, calipso_msgs::Dynamics& msg);
+
 // One frame's dynamics; `motions` by object name, objects without one get no estimate.
 calipso_msgs::Dynamics dynamicsMsg(const Scene& scene, const std::vector<NamedMotion>& motions,
                                    const std_msgs::Header& header);

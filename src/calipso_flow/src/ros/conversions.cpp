@@ -156,12 +156,21 @@ calipso_msgs::ObjectDynamics toMsg(const std::string& object, const ObjectMotion
 
 void addDeformation(const DeformationMotion& deformation, int index,
                     calipso_msgs::ObjectDynamics& msg) {
-  for (int m = 0; m < deformation.modes.count(); ++m) {
-    msg.mode_amplitudes.push_back(static_cast<float>(deformation.modes.amplitudes(index, m)));
-    msg.mode_velocities.push_back(static_cast<float>(deformation.modes.velocities(index, m)));
+  addModes(deformation.modes.amplitudes.row(index).transpose(),
+           deformation.modes.velocities.row(index).transpose(), msg);
+  addWind(deformation, deformation.times.at(index), msg);
+}
+
+void addModes(const Eigen::VectorXd& amplitudes, const Eigen::VectorXd& velocities,
+              calipso_msgs::ObjectDynamics& msg) {
+  for (Eigen::Index m = 0; m < amplitudes.size(); ++m) {
+    msg.mode_amplitudes.push_back(static_cast<float>(amplitudes[m]));
+    msg.mode_velocities.push_back(static_cast<float>(velocities[m]));
   }
+}
+
+void addWind(const DeformationMotion& deformation, double time, calipso_msgs::ObjectDynamics& msg) {
   if (!deformation.wind) return;
-  const double time = deformation.times.at(index);
   msg.wind = {windMsg(time, deformation.wind->at(time), deformation.wind->covarianceAt(time))};
 }
 

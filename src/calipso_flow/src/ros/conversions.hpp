@@ -36,6 +36,12 @@ calipso_msgs::ObjectDynamics toMsg(const std::string& object, const ObjectMotion
 void addDeformation(const DeformationMotion& deformation, int index,
                     calipso_msgs::ObjectDynamics& msg);
 
+// @param amplitudes, velocities  of the object's modes, m, m/s
+void addModes(const Eigen::VectorXd& amplitudes, const Eigen::VectorXd& velocities,
+              calipso_msgs::ObjectDynamics& msg);
+// Adds the wind at a time, s, where the deformation shows one.
+void addWind(const DeformationMotion& deformation, double time, calipso_msgs::ObjectDynamics& msg);
+
 // What the whole clip says about one object; times are seconds of ROS time.
 calipso_msgs::ObjectClipDynamics toMsg(const ObjectDynamics& object);
 

@@ -11,7 +11,8 @@ namespace calipso::flow {
 namespace {
 
 constexpr unsigned kKeepAll = 0;
-constexpr size_t kLiveWaiting = 300;  // frames kept while a live key frame is being aligned
+constexpr double kDescribeEvery = 1.0;  // s: how deforming objects have moved of late
+constexpr size_t kLiveWaiting = 300;    // frames kept while a live key frame is being aligned
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -173,7 +174,10 @@ void FlowNode::publishDynamics(const calipso::Frame& frame) {
       return;
     }
     const auto motions = live_analyser_->add(frameFromMsg(frame));
-    dynamics_publisher_.publish(dynamicsMsg(scene_, motions, frame.image->header));
+    describeOfLate(frame.image->header);
+    auto msg = dynamicsMsg(scene_, motions, frame.image->header);
+    addWinds(of_late_, frame.stamp().toSec(), msg);
+    dynamics_publisher_.publish(msg);
     return;
   }
   const auto known = dynamics_.find(frame.stamp());
@@ -183,6 +187,23 @@ void FlowNode::publishDynamics(const calipso::Frame& frame) {
   }
   dynamics_publisher_.publish(known->second);
   markers_.publish(std::distance(dynamics_.begin(), known), frame.stamp());
+}
+
+// Beside the frames, which must not wait for it.
+void FlowNode::describeOfLate(const std_msgs::Header& header) {
+  if (describing_.valid()) {
+    if (describing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    of_late_ = describing_.get();
+    clip_dynamics_publisher_.publish(liveDynamicsMsg(of_late_, *live_analyser_, header));
+    reporter_.ready(summary(of_late_));
+  }
+  if ((header.stamp - described_).toSec() < kDescribeEvery) return;
+  std::vector<DeformationWindow> windows = live_analyser_->windows();
+  if (windows.empty()) return;
+  described_ = header.stamp;
+  describing_ = std::async(std::launch::async, [this, windows = std::move(windows)] {
+    return describe(windows, scene_.gravity, true);
+  });
 }
 
 // The flow lives on this frame's pixels: how far each has come since the frame before.

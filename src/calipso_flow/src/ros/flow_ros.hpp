@@ -3,6 +3,7 @@
 #include <calipso_msgs/NodeStatus.h>
 #include <ros/ros.h>
 
+#include <future>
 #include <map>
 #include <memory>
 #include <vector>
@@ -18,7 +19,7 @@ namespace calipso::flow {
 
 // Wires the analysers to topics. Everything runs in the node's one callback thread.
 //   bag:  clip frames + models + masks -> clip/dynamics; then, per image, dynamics and flow
-//   live: image + models + masks -> per image, dynamics and flow
+//   live: image + models + masks -> per image, dynamics and flow; clip/dynamics of late
 class FlowNode {
  public:
   FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh);
@@ -37,6 +38,7 @@ class FlowNode {
   void analyse(const calipso::Frame& frame);
   void finishWhenComplete();
   void publishDynamics(const calipso::Frame& frame);
+  void describeOfLate(const std_msgs::Header& header);
   void publishFlow(const calipso::Frame& frame);
 
   Params params_;
@@ -55,6 +57,11 @@ class FlowNode {
   std::unique_ptr<LiveAnalyser> live_analyser_;
   std::map<ros::Time, calipso_msgs::Dynamics> dynamics_;
   bool finished_ = false;
+  // Live: what the last seconds tell of deforming objects, and the work on the next such
+  // description, which must end before the analyser does.
+  std::vector<ObjectDynamics> of_late_;
+  ros::Time described_;
+  std::future<std::vector<ObjectDynamics>> describing_;
 
   DenseFlow dense_flow_;
   sensor_msgs::ImageConstPtr previous_image_;
