@@ -29,8 +29,8 @@ fem::FemOptions optionsFor(const SheetSettings& settings) {
   options.target_nodes = settings.nodes;
   options.cell_size = settings.cell_size;
   options.threads = 1;
-  options.newton_tolerance = 1e-2;
-  options.newton_iterations = 4;
+  options.newton_tolerance = 1e-3;
+  options.newton_iterations = 8;
   return options;
 }
 
