@@ -1,31 +1,11 @@
 #include "frame_compositor.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "calipso_render/colour.hpp"
 
 namespace calipso::render {
-namespace {
-
-// Squared distance of a pixel's samples from its centre, in eighths of a pixel.
-constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
-  std::array<int, EdgeCoverage::kSamples> squared{};
-  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
-    const int x = 2 * (i % EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid,
-              y = 2 * (i / EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid;
-    squared[i] = x * x + y * y;
-  }
-  return squared;
-}();
-
-}  // namespace
-
-float FrameCompositor::newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const {
-  return shadows_.others->visibility(p, n) * moved_shadow_->visibility(p, n);
-}
-
 cv::Vec3f FrameCompositor::shadowRatio(float sun, float sky) const {
   return prepared_.umbra * sky + (cv::Vec3f(1, 1, 1) - prepared_.umbra) * sun;
 }
@@ -50,17 +30,6 @@ Eigen::Vector2f FrameCompositor::movement(std::uint32_t id, float u, float v) co
   return moved;
 }
 
-cv::Vec3f FrameCompositor::shadeSurface(std::uint32_t id, float u, float v) const {
-  const int slot = VisibilityBuffer::objectOf(id);
-  const SurfacePoint p = surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), u, v, eye_);
-  const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
-  const Look& look = lookOf(slot);
-  const Lit lit = exactLight({p.position, p.normal, p.sky}, slot);
-  const cv::Vec3f albedo = (look.albedo ? *look.albedo : appearance.albedoAt(p)).mul(tintOf(slot));
-  const auto colour = [](const cv::Vec4f& c) { return cv::Vec3f(c[0], c[1], c[2]); };
-  return appearance.radiance(albedo, colour(lit.diffuse), colour(lit.highlight));
-}
-
 // Something without a model stands in front: it hid the object at the key frame, and goes on doing
 // so.
 bool FrameCompositor::hiddenByFront(int surface, int u, int v) const {
@@ -75,41 +44,6 @@ bool FrameCompositor::isDrawn(std::uint32_t id, int u, int v) const {
   const int surface = surface_of_slot_[VisibilityBuffer::objectOf(id)];
   if (hiddenByFront(surface, u, v)) return false;
   return edited_[surface] || removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
-}
-
-FrameCompositor::Drawn FrameCompositor::drawnAt(int u, int v) const {
-  Drawn drawn;
-  if (screenAt(u, v) == 1.0f) return drawn;
-  const EdgeCoverage::Pixel* edge = edges_->at(u, v);
-  if (edge == nullptr) {
-    const std::uint32_t id = centre_->idAt(u, v);
-    if (isDrawn(id, u, v)) drawn = {shadeSurface(id, u, v), 1.0f - screenAt(u, v)};
-    return drawn;
-  }
-  // One shaded point for each sheet of each object in the pixel: the sample nearest to the pixel's
-  // centre.
-  std::array<bool, EdgeCoverage::kSamples> done{};
-  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
-    if (done[i] || !isDrawn(edge->ids[i], u, v)) continue;
-    int count = 0, middle = i;
-    const int object = VisibilityBuffer::objectOf(edge->ids[i]);
-    for (int j = i; j < EdgeCoverage::kSamples; ++j) {
-      if (done[j] || edge->ids[j] == VisibilityBuffer::kNothing ||
-          VisibilityBuffer::objectOf(edge->ids[j]) != object)
-        continue;
-      const auto [farthest, nearest] = std::minmax(edge->nearness[i], edge->nearness[j]);
-      if (!EdgeCoverage::isOneSheet(nearest, farthest)) continue;
-      done[j] = true, ++count;
-      if (kFromCentre[j] < kFromCentre[middle]) middle = j;
-    }
-    const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(middle);
-    const float part = static_cast<float>(count) / EdgeCoverage::kSamples;
-    drawn.colour += part * shadeSurface(edge->ids[middle], x.x(), x.y());
-    drawn.cover += part;
-  }
-  if (drawn.cover > 0.0f) drawn.colour /= drawn.cover;
-  drawn.cover *= 1.0f - screenAt(u, v);
-  return drawn;
 }
 
 // The part of a pixel that objects which stay cover: of one on their outline less than all.
@@ -184,8 +118,7 @@ FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
   return {plate_.at<cv::Vec3f>(v, u), 1.0f, invented ? kInvented : kSeenElsewhere};
 }
 
-FrameCompositor::Composed FrameCompositor::composedAt(int u, int v) const {
-  const Drawn drawn = drawnAt(u, v);
+FrameCompositor::Composed FrameCompositor::composedOf(const Drawn& drawn, int u, int v) const {
   const Behind behind = drawn.cover < 1.0f ? behindAt(u, v) : Behind{};
   return {drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour,
           drawn.cover + (1.0f - drawn.cover) * behind.fresh,

@@ -9,9 +9,9 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/visibility.hpp"
+#include "light_batch.hpp"
 #include "line_codec.hpp"
 #include "place_view.hpp"
-#include "point_light.hpp"
 #include "smooth_step.hpp"
 #include "square_mask.hpp"
 #include "triangle_map.hpp"
@@ -45,8 +45,8 @@ struct RestPicture {
   cv::Rect box;     // of what `drawn` has
 };
 
-constexpr int kLightStep =
-    4;  // px between the places where the light on a smooth surface is computed
+// px between the places where the sun on a smooth surface is looked up
+constexpr int kLightStep = 4;
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
 constexpr int kSameLevels = 4;            // the same of a lightLevel()
 constexpr float kPerLevel = 1.0f / 255.0f;
@@ -57,6 +57,7 @@ constexpr int kRepaintReach = 2;
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
 constexpr std::uint8_t kChanged = 255;  // of FrameCompositor::remirrored_
 constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
+constexpr float kNonePx = 5.0f;         // from which none of what drawing misses goes along
 constexpr float kMovedPx = 0.3f;        // an edited surface that moved more is drawn
 
 inline cv::Mat disc(int radius) {
@@ -102,31 +103,49 @@ class FrameCompositor {
     float cover = 0.0f;
   };
 
-  // Light on a drawn surface.
-  struct Lit {
-    cv::Vec4f diffuse;    // of a white surface; fourth: its nearness, 1/m
-    cv::Vec4f highlight;  // radiance
-    int slot = -1;        // -1: nothing is drawn here
+  // The sun where a grid's line meet on a drawn surface.
+  struct SunCorner {
+    float sun = 0.0f, nearness = 0.0f;  // visible part; 1/m
+    int slot = -1;                      // -1: nothing is drawn here
+  };
+
+  // Corners of one row that see one object.
+  struct CornerRun {
+    int slot, count;
+    std::uint32_t ids[SurfaceRun::kMost];
+    int corners[SurfaceRun::kMost];  // columns of the grid
+    SurfaceRun run;
   };
 
   // What has to be done for a pixel: nothing; one drawn surface, the same where it ends or folds;
   // what lies behind, in other light; more than one surface.
-  enum Kind : std::uint8_t { kNone = 0, kPlain, kPlainEdge, kBehind, kSpecial };
+  enum Kind : std::uint8_t { kNone = 0, kPlain = 1, kBehind = 2, kPlainEdge = 4, kSpecial = 8 };
   static bool isPlain(Kind kind) { return kind == kPlain || kind == kPlainEdge; }
+
+  // A sheet of a surface in a pixel that sees several, or sees one end.
+  struct Sheet {
+    SurfacePlace place;
+    int column;  // of region_
+    float part;  // of the pixel
+  };
 
   // A row of the result over region_, on its way.
   struct Row {
-    std::vector<cv::Vec4f> colour;     // linear; fourth: the part that carries no camera noise yet
+    // Linear B, G, R; the part that carries no camera noise yet. Up to seven more than the row has.
+    std::vector<float> colour[4];
     std::vector<std::uint8_t> source;  // Provenance
     std::vector<Kind> kinds;
-    std::vector<Lit> light;  // at the columns of lit_
-    std::vector<float> key_u,
-        key_v;                // of what is drawn: place in Appearance::albedo; up to seven more
-    std::vector<int> uneven;  // pixels on which light has to be computed
+    std::vector<Drawn> drawn;   // of pixels that need more than their centre
+    std::vector<Sheet> sheets;  // of those, in the order of their columns
+    SurfaceRun run;
 
     void resize(std::size_t width) {
-      colour.resize(width), source.resize(width), kinds.resize(width), key_u.resize(width + 7),
-          key_v.resize(width + 7);
+      for (auto& channel : colour) channel.resize(width + 7);
+      source.resize(width), kinds.resize(width), drawn.resize(width);
+    }
+    cv::Vec4f at(int i) const { return {colour[0][i], colour[1][i], colour[2][i], colour[3][i]}; }
+    void set(int i, const cv::Vec4f& c) {
+      for (int k = 0; k < 4; ++k) colour[k][i] = c[k];
     }
   };
 
@@ -161,7 +180,7 @@ class FrameCompositor {
                                  const std::vector<bool>& edited);
   void recordRow(int v, Row& row, RestPicture& picture) const;
   void recordOwners(RestPicture& picture) const;
-  Composed composedAt(int u, int v) const;
+  Composed composedOf(const Drawn& drawn, int u, int v) const;
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
   bool findRest(int surface);
   bool isSeenAt(int surface, const Points& vertices) const;
@@ -185,7 +204,15 @@ class FrameCompositor {
   bool findResting(int slot, std::vector<bool>& can_rest) const;
   void keepRims(const cv::Mat& owner);
   void findCovered();
-  void findSurfaceLight();
+  void findSurfaceSun();
+  void lightCorners(int j, int first, const std::vector<std::uint8_t>& large);
+  void lookUp(int v, CornerRun& wanted, SunCorner* corners) const;
+  bool isSmoothAround(int i, int j, const std::vector<std::uint8_t>& large) const;
+  std::optional<float> sunBetween(float u, float v, float nearness, int slot) const;
+  std::size_t cornerAt(int i, int j) const {
+    return static_cast<std::size_t>(j) * sun_columns_ + i;
+  }
+  void shadeSetup();
   void measureSky();
   void measureSun();
   void joinSun(int v);
@@ -205,10 +232,15 @@ class FrameCompositor {
   void composeRow(int v, Row& row, FrameOutput& out) const;
   void drawRow(int v, Row& row) const;
   void findKinds(int v, Row& row) const;
-  void lightRow(int v, Row& row) const;
-  void reflectStretch(int v, int first, int last, int slot, Row& row) const;
-  void shadeStretch(int v, int first, int last, int slot, Row& row) const;
+  bool reflectStretch(const std::uint32_t* ids, int v, int first, int last, int slot,
+                      Row& row) const;
+  void sunOnStretch(int v, int first, int last, int slot, Row& row) const;
   void drawStretch(int v, int first, int last, int slot, Row& row) const;
+  void carryResidual(int v, int first, int last, int slot, Row& row) const;
+  void findSheets(int v, Row& row) const;
+  void addSheets(int u, int v, std::vector<Sheet>& sheets) const;
+  void shadeSheets(int v, Row& row) const;
+  void shadePlaces(const SurfacePlace* places, int count, int slot, SurfaceRun& run) const;
   void composeBehind(int v, int first, int last, Row& row) const;
   void composeSpecial(int u, int v, Row& row) const;
   void keepStill(int v, Row& row) const;
@@ -221,22 +253,17 @@ class FrameCompositor {
   void addMirrored(int u, int v, Behind& behind) const;
   float coverOfOthers(int u, int v) const;
   Behind revealedAt(int u, int v) const;
-  Drawn drawnAt(int u, int v) const;
   bool hiddenByFront(int surface, int u, int v) const;
   bool isDrawn(std::uint32_t id, int u, int v) const;
-  cv::Vec3f shadeSurface(std::uint32_t id, float u, float v) const;
   float stillness(std::uint32_t id, float u, float v) const;
   bool isElsewhere(float u, float v) const {
     return !elsewhere_.empty() &&
            elsewhere_.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u)) != 0;
   }
-  float newSun(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
-  Lit exactLight(const LitPoint& p, int slot) const;
+  void sunOn(const LightBatch& points, float* sun) const;
+  void sunOnPlaces(const int* places, int count, const float* nearness, SurfaceRun& run) const;
   const Look& lookOf(int slot) const;
   cv::Vec3f tintOf(int slot) const { return lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)); }
-  void lightCorner(int i, int j);
-  void interpolateCorner(int i, int j);
-  Lit lightAt(int u, int v) const;
   bool isSmooth(int i, int j, int size) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
@@ -247,8 +274,7 @@ class FrameCompositor {
   const RenderParams& params_;
   const FrameInput& frame_;
   ShadowCache& shadows_;
-  const Light light_;             // of this frame; what the video shows was lit by Prepared::light
-  const PointLight point_light_;  // light_
+  const Light light_;  // of this frame; what the video shows was lit by Prepared::light
   RestPicture& rest_;
 
   std::vector<cv::Mat> footprints_;  // Prepared::footprints, likewise
@@ -290,10 +316,14 @@ class FrameCompositor {
   cv::Mat takes_light_;  // CV_8UC1 over region_: 255 = support plane or relief is seen, on which
                          // light changes
   cv::Mat relit_;  // CV_8UC1 over region_: 255 = the original's shadow, to be taken from the plate
-  std::vector<Lit> lit_;  // at the corners of squares of kLightStep px over region_
-  std::vector<std::uint8_t>
-      smooth_;  // per square, by its first corner: light between the corners follows from theirs
-  int lit_columns_ = 0, lit_rows_ = 0;
+  // The sun on the drawn surfaces at the corners of squares of kLightStep px that hang on the
+  // picture; the first one's place there.
+  std::vector<SunCorner> sun_corners_;
+  cv::Point sun_origin_;
+  int sun_columns_ = 0, sun_rows_ = 0;
+  // per square, by its first corner: the sun between the corners follows from theirs
+  std::vector<std::uint8_t> smooth_;
+  std::vector<SurfaceShade> shades_;  // per slot
   cv::Mat still_;  // CV_32FC1 over region_: 1 = nothing moved here; empty: everything did
   cv::Rect miss_box_;
   cv::Mat miss_;  // CV_32FC4 over miss_box_: what drawing misses of the video, linear, and 1 where
@@ -306,8 +336,7 @@ class FrameCompositor {
   cv::Mat screened_;   // CV_8UC1 over region_: 255 = scenery hides what is drawn; may be empty
   std::vector<bool> always_drawn_;  // per slot: isDrawn() wherever it is seen
   bool all_drawn_ = false;          // every slot is
-  std::vector<std::vector<TriangleMap>>
-      maps_;  // per slot, per triangle; empty where the slot is not drawn
+  std::vector<SurfaceMaps> maps_;   // per slot; empty where it is not drawn
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;
   Eigen::Vector3f eye_;

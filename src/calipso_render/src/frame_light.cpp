@@ -60,11 +60,20 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
                CV_32F, cv::Scalar(1.0f));
 #pragma omp parallel for schedule(dynamic, 4)
   for (int j = 0; j < grid.rows; ++j) {
-    Receiver r;
-    for (int i = 0; i < grid.cols; ++i) {
-      const int u = (first.x + i) * step, v = (first.y + j) * step;
-      if (!skip.at(u, v) && place_view_.planes().at(u, v, r))
-        grid.at<float>(j, i) = skyLight(shadow.visibility(r.position, r.normal));
+    float* row = grid.ptr<float>(j);
+    const int v = (first.y + j) * step;
+    for (int begin = 0; begin < grid.cols; begin += LightBatch::kMost) {
+      LightBatch batch;
+      int columns[LightBatch::kMost];
+      Receiver r;
+      for (int i = begin; i < std::min(grid.cols, begin + LightBatch::kMost); ++i) {
+        const int u = (first.x + i) * step;
+        if (!skip.at(u, v) && place_view_.planes().at(u, v, r))
+          columns[batch.add(r.position, r.normal)] = i;
+      }
+      float seen[LightBatch::kMost];
+      batch.look(shadow, seen);
+      for (int k = 0; k < batch.count(); ++k) row[columns[k]] = skyLight(seen[k]);
     }
   }
   cv::Mat sky(region.size(), CV_8U);

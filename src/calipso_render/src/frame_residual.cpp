@@ -13,8 +13,7 @@
 namespace calipso::render {
 namespace {
 
-// movement up to which the residual goes along, and from which none does
-constexpr float kWholePx = 0.5f, kNonePx = 5.0f;
+constexpr float kWholePx = 0.5f;  // movement up to which the residual goes along
 
 // ... of what sways in the video: what is missed is how it did
 constexpr float kWholeSwaying = 0.05f, kNoneSwaying = 0.3f;
@@ -86,7 +85,6 @@ RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderP
                       {}};
   const cv::Rect& r = rest.region_;
   if (r.empty()) return picture;
-  rest.findMaps();
 #pragma omp parallel
   {
     Row row;
@@ -126,9 +124,12 @@ void FrameCompositor::recordRow(int v, Row& row, RestPicture& picture) const {
   for (int i = 0; i < region_.width; ++i) {
     const int u = i + region_.x;
     if (removed_.at<std::uint8_t>(v - region_.y, i) == 0) continue;
-    const cv::Vec4f& plain = row.colour[i];
-    const Drawn drawn =
-        isPlain(row.kinds[i]) ? Drawn{{plain[0], plain[1], plain[2]}, 1.0f} : drawnAt(u, v);
+    const cv::Vec4f plain = row.at(i);
+    Drawn drawn;
+    if (isPlain(row.kinds[i]))
+      drawn = {{plain[0], plain[1], plain[2]}, 1.0f};
+    else if (row.kinds[i] == kSpecial)
+      drawn = row.drawn[i];
     picture.drawn.at<cv::Vec3f>(v, u) = drawn.cover * drawn.colour;
     if (drawn.cover == 1.0f) continue;
     const cv::Vec3f behind = behindAt(u, v).colour, revealed = revealedAt(u, v).colour;
@@ -255,17 +256,17 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
     const cv::Point away = rim.nearest - cv::Point(rim.u, rim.v);
     const float reach = params_.background.mask_margin_px + kNonePx;
     if (away.dot(away) > reach * reach && moved.norm() > kStillPx) continue;
-    cv::Vec4f& colour = row.colour[rim.u];
+    cv::Vec4f colour = row.at(rim.u);
     const cv::Vec3f plain(colour[0], colour[1], colour[2]);
     addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved,
                 surface_of_slot_[VisibilityBuffer::objectOf(id)], cv::Vec3f::all(1), colour);
-    if (away.dot(away) > kRepaintReach * kRepaintReach ||
-        !lookOf(VisibilityBuffer::objectOf(id)).changes())
-      continue;
     // Beside a surface of a new look the video has the old one's hue.
+    const bool repainted = away.dot(away) <= kRepaintReach * kRepaintReach &&
+                           lookOf(VisibilityBuffer::objectOf(id)).changes();
     const float brighter =
         luminance({colour[0], colour[1], colour[2]}) / std::max(luminance(plain), kDark);
-    for (int c = 0; c < 3; ++c) colour[c] = plain[c] * brighter;
+    for (int c = 0; repainted && c < 3; ++c) colour[c] = plain[c] * brighter;
+    row.set(rim.u, colour);
   }
 }
 

@@ -44,7 +44,6 @@ FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& p
       frame_(frame),
       shadows_(shadows),
       light_(lightOf(frame)),
-      point_light_(light_),
       rest_(rest),
       labels_(frame.labels.empty() ? prepared.key_labels : frame.labels),
       eye_(frame.camera.world_from_camera.translation().cast<float>()),
@@ -58,7 +57,6 @@ FrameOutput FrameCompositor::run() {
   prepareFrame();
   if (region_.empty()) return {frame_.bgr.clone(), cv::Mat::zeros(frame_.bgr.size(), CV_8U)};
   findResidual();
-  findMaps();
   FrameOutput out{cv::Mat(frame_.bgr.size(), CV_8UC3), cv::Mat(frame_.bgr.size(), CV_8U)};
 #pragma omp parallel
   {
@@ -89,7 +87,8 @@ void FrameCompositor::prepareFrame() {
   measureSun();
   findScreened();
   findRelit();
-  findSurfaceLight();
+  findMaps();
+  findSurfaceSun();
 }
 
 Light FrameCompositor::lightOf(const FrameInput& frame) const {
@@ -340,8 +339,8 @@ void FrameCompositor::findMaps() {
     const int surface = surface_of_slot_[slot];
     const bool seen = edited_[surface] ||
                       !(boundsOf(actors_[slot].screen, 0, frame_.bgr.size()) & region_).empty();
-    maps_.push_back(seen ? triangleMaps(actors_[slot], prepared_.appearances[surface])
-                         : std::vector<TriangleMap>{});
+    maps_.push_back(seen ? SurfaceMaps(actors_[slot], prepared_.appearances[surface], eye_)
+                         : SurfaceMaps());
   }
 }
 

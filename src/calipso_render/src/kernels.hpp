@@ -4,24 +4,12 @@
 #include <opencv2/core.hpp>
 
 #include "calipso_render/edge_coverage.hpp"
+#include "shadow_texels.hpp"
+#include "surface_run.hpp"
 #include "triangle_map.hpp"
 #include "triangle_span.hpp"
 
 namespace calipso::render {
-
-// Samples of a disc for a shadow map's filter. The number of taps is a multiple of 8.
-struct ShadowTaps {
-  static constexpr int kMost = 32;
-  int count = 0;
-  alignas(32) float x[kMost], y[kMost];  // unit disc
-};
-
-// A shadow map as its filter reads it. What lies in the corner blocks nothing.
-struct ShadowTexels {
-  const float* heights;  // towards the light, m
-  int width, height, stride;
-  float spread;  // texels of penumbra per m above the receiver
-};
 
 // The camera's noise: per channel its deviation, start + rise * code, in eight pieces of 32 code
 // values.
@@ -37,23 +25,30 @@ struct NoiseRows {
 // Loops over which a frame spends its time, compiled for the processors that the build is for and
 // for those with AVX2. Both give the same bits: nothing is contracted or summed in another order.
 struct Kernels {
-  // Part of the light that a receiver at (s, t), texels, and height h sees: the mean height of the
-  // blockers within `search`, then the covered part of the penumbra that it sets (Fernando 2005).
-  float (*visibleThrough)(const ShadowTexels& map, const ShadowTaps& taps, float s, float t,
-                          float h, float search);
+  // Part of the light that `count` points see: the mean height of the blockers within the cone that
+  // the light's disc spans up to the highest, then the covered part of the penumbra that it sets
+  // (Fernando 2005).
+  void (*visible)(const ShadowTexels& map, const ShadowTaps& taps, const LightPoints& points,
+                  int count, float* visible);
 
-  // The key picture's places that pixels (u + k, v), k < count, show, by their triangles' maps. Up
-  // to seven places more are written.
-  // @param ids of the pixels' triangles; corner of the key picture
-  void (*locate)(const TriangleMap* maps, const std::uint32_t* ids, int u, int v, int count,
-                 const cv::Point& corner, float* key_u, float* key_v);
+  // What a stretch of pixels shows, by their triangles' maps: all of a run but `sun` and `colour`,
+  // from its `column`.
+  // @param ids of the pixels' triangles, none of them thin
+  void (*locate)(const TriangleMap* maps, const std::uint32_t* ids, const PixelStretch& stretch,
+                 const SightLines& sight, SurfaceRun& run);
 
-  // sampleBicubic() at `count` places. @param image CV_32FC4, not empty
-  void (*sample)(const cv::Mat& image, const float* u, const float* v, int count, cv::Vec4f* out);
+  // Reflectance of places [first, last) of a run by sampleBicubic(). @param image CV_32FC4, not
+  // empty
+  void (*sample)(const cv::Mat& image, int first, int last, SurfaceRun& run);
 
-  // Code values of `count` linear colours (B, G, R, part without noise), with noise.
+  // Radiance of places [first, last) of a run from their reflectance. Up to seven on each side are
+  // changed, too.
+  void (*shade)(const SurfaceShade& shade, int first, int last, SurfaceRun& run);
+
+  // Code values of `count` linear colours, with noise. Up to seven more are read.
+  // @param colour linear B, G, R, and the part of the pixel that carries no noise yet
   // @param column of the first in the rows of noise, which are read around their end
-  void (*encode)(const NoiseCurves& curves, const cv::Vec4f* colours, const NoiseRows& noise,
+  void (*encode)(const NoiseCurves& curves, const float* const (&colour)[4], const NoiseRows& noise,
                  int column, int count, cv::Vec3b* codes);
 
   // Draws `count` triangles in their order.

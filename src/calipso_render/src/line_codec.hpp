@@ -8,15 +8,15 @@
 
 namespace calipso::render {
 
-// Linear colours to code values with the camera's noise, a stretch of a row at a time. Colours are
-// four floats: linear B, G, R, and the part of the pixel that carries no noise yet.
+// Linear colours to code values with the camera's noise, a stretch of a row at a time.
 class LineCodec {
  public:
   // @param noise of the camera; a model without deviations adds none
   LineCodec(const NoiseModel& noise, std::int64_t stamp_ns);
 
-  // @param u, v the first pixel's place in the picture
-  void encode(const cv::Vec4f* colours, int u, int v, int count, cv::Vec3b* codes) const;
+  // @param colour linear B, G, R, and the part of the pixel that carries no noise yet; up to seven
+  // more are read. @param u, v the first pixel's place in the picture
+  void encode(const float* const (&colour)[4], int u, int v, int count, cv::Vec3b* codes) const;
 
  private:
   NoiseCurves curves_;

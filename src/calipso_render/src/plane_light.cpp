@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "light_batch.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -57,30 +59,50 @@ class Squares {
     } else if (even) {
       refine(square, here);
     } else {
-      fillExactly(here);
+      fillExactly(square, here);
     }
   }
 
-  float exactly(int u, int v) const {
-    Receiver r;
-    return view_.at(u, v, r) ? light_.visibility(r.position, r.normal) : 1.0f;
-  }
+  // Places looked up at once; those that see neither plane nor relief keep 1.
+  class Lookup {
+   public:
+    explicit Lookup(const Squares& squares) : squares_(squares) {}
+    void add(int u, int v, float* visible) {
+      Receiver r;
+      *visible = 1.0f;
+      if (!squares_.view_.at(u, v, r)) return;
+      out_[batch_.add(r.position, r.normal)] = visible;
+      if (batch_.count() == LightBatch::kMost) look();
+    }
+    void look() {
+      float visible[LightBatch::kMost];
+      batch_.look(squares_.light_, visible);
+      for (int k = 0; k < batch_.count(); ++k) *out_[k] = visible[k];
+      batch_.clear();
+    }
+
+   private:
+    const Squares& squares_;
+    LightBatch batch_;
+    float* out_[LightBatch::kMost];
+  };
+
+  static constexpr int kPlaces = kSquare / kStep + 1;
 
   // Places two steps apart are looked at first; those between where they, or the one in their
   // middle, differ.
-  void refine(const cv::Rect& square, const cv::Rect& here) const {
-    constexpr int kPlaces = kSquare / kStep + 1;
-    float grid[kPlaces][kPlaces];
+  void fillGrid(const cv::Rect& square, float (&grid)[kPlaces][kPlaces]) const {
+    Lookup lookup(*this);
     const auto set = [&](int i, int j) {
-      grid[j][i] = exactly(square.x + i * kStep, square.y + j * kStep);
+      lookup.add(square.x + i * kStep, square.y + j * kStep, &grid[j][i]);
     };
-    bool uneven[kPlaces / 2][kPlaces / 2] = {};
-    for (int j = 0; j < kPlaces; j += 2) {
-      for (int i = 0; i < kPlaces; i += 2) set(i, j);
+    for (int j = 0; j < kPlaces; ++j) {
+      for (int i = j % 2; i < kPlaces; i += 2) set(i, j);
     }
+    lookup.look();
+    bool uneven[kPlaces / 2][kPlaces / 2] = {};
     for (int j = 1; j < kPlaces; j += 2) {
       for (int i = 1; i < kPlaces; i += 2) {
-        set(i, j);
         const auto [low, high] = std::minmax({grid[j][i], grid[j - 1][i - 1], grid[j - 1][i + 1],
                                               grid[j + 1][i - 1], grid[j + 1][i + 1]});
         uneven[j / 2][i / 2] = high - low > kEven;
@@ -100,8 +122,15 @@ class Squares {
                              : 0.5f * (grid[j - 1][i] + grid[j + 1][i]);
       }
     }
+    lookup.look();
+  }
+
+  // The pixels of a square by its grid; exactly where its places differ by much.
+  void refine(const cv::Rect& square, const cv::Rect& here) const {
+    float grid[kPlaces][kPlaces], visible[kSquare][kSquare];
+    fillGrid(square, grid);
+    Lookup lookup(*this);
     for (int y = here.y; y < here.br().y; ++y) {
-      std::uint8_t* row = out_.ptr<std::uint8_t>(y);
       for (int x = here.x; x < here.br().x; ++x) {
         const int u = x + rect_.x - square.x, v = y + rect_.y - square.y, i = u / kStep,
                   j = v / kStep;
@@ -109,21 +138,39 @@ class Squares {
         const auto [low, high] = std::minmax({a, b, c, d});
         const float s = static_cast<float>(u % kStep) / kStep,
                     t = static_cast<float>(v % kStep) / kStep;
-        row[x] =
-            lightLevel(high - low <= kSlow ? (a + (b - a) * s) * (1.0f - t) + (c + (d - c) * s) * t
-                                           : exactly(x + rect_.x, y + rect_.y));
+        if (high - low <= kSlow)
+          visible[v][u] = (a + (b - a) * s) * (1.0f - t) + (c + (d - c) * s) * t;
+        else
+          lookup.add(x + rect_.x, y + rect_.y, &visible[v][u]);
       }
+    }
+    lookup.look();
+    write(square, here, visible);
+  }
+
+  void write(const cv::Rect& square, const cv::Rect& here,
+             const float (&visible)[kSquare][kSquare]) const {
+    for (int y = here.y; y < here.br().y; ++y) {
+      std::uint8_t* row = out_.ptr<std::uint8_t>(y);
+      for (int x = here.x; x < here.br().x; ++x)
+        row[x] = lightLevel(visible[y + rect_.y - square.y][x + rect_.x - square.x]);
     }
   }
 
-  void fillExactly(const cv::Rect& here) const {
+  // Every pixel on its own: the relief, or several planes. What sees neither keeps its value.
+  void fillExactly(const cv::Rect& square, const cv::Rect& here) const {
+    float visible[kSquare][kSquare];
+    Lookup lookup(*this);
     Receiver r;
     for (int y = here.y; y < here.br().y; ++y) {
       for (int x = here.x; x < here.br().x; ++x) {
-        if (view_.at(x + rect_.x, y + rect_.y, r))
-          out_.at<std::uint8_t>(y, x) = lightLevel(light_.visibility(r.position, r.normal));
+        float& at = visible[y + rect_.y - square.y][x + rect_.x - square.x];
+        lookup.add(x + rect_.x, y + rect_.y, &at);
+        if (!view_.at(x + rect_.x, y + rect_.y, r)) at = out_.at<std::uint8_t>(y, x) / 255.0f;
       }
     }
+    lookup.look();
+    write(square, here, visible);
   }
 
   const PlaceView& view_;

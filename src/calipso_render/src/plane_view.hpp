@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calipso_render/stage.hpp"
+#include "surface_run.hpp"
 
 namespace calipso::render {
 
@@ -21,6 +22,14 @@ class PlaneView {
 
   // The same for `count` pixels of a row from (u, v) on: 255 where a plane is seen.
   void seesRow(int u, int v, int count, std::uint8_t* out) const;
+
+  const Eigen::Vector3f& eye() const { return eye_; }
+
+  // Of a row's pixels, world.
+  SightLines sightLines(int v) const {
+    const Eigen::Vector3f start = ray_0_ + static_cast<float>(v) * ray_v_;
+    return {{start.x(), start.y(), start.z()}, {ray_u_.x(), ray_u_.y(), ray_u_.z()}};
+  }
 
   // @return false where no plane is seen
   bool at(float u, float v, Receiver& receiver) const {

@@ -5,15 +5,10 @@
 #include <cmath>
 
 #include "calipso_render/edge_coverage.hpp"
+#include "eight_lanes.hpp"
 #include "triangle_span.hpp"
 
 namespace calipso::render {
-
-typedef float Eight __attribute__((vector_size(32), aligned(4), may_alias));
-typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
-typedef std::int32_t EightInts __attribute__((vector_size(32), aligned(4), may_alias));
-
-#define CALIPSO_INLINE inline __attribute__((always_inline))
 
 // Columns of row v inside the triangle. @return false if there are none
 CALIPSO_INLINE bool rowLimits(const TriangleSpan& s, float v, int& from, int& to) {

@@ -43,6 +43,8 @@ RayShadow::RayShadow(const std::vector<Occluder>& occluders, const Eigen::Vector
 
 RayShadow::~RayShadow() = default;
 
+bool RayShadow::empty() const { return scene_->empty(); }
+
 std::optional<float> RayShadow::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f&,
                                         float radius) const {
   if (scene_->empty()) return 1.0f;

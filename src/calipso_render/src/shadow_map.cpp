@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "kernels.hpp"
+#include "shadow_texels.hpp"
 
 namespace calipso::render {
 namespace {
@@ -168,11 +169,36 @@ float ShadowMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) 
   const Extremes near = coneAround(s, t, h, kTapMargin);
   if (near.highest <= h) return 1.0f;
   if (near.lowest > h) return 0.0f;
-  // Blockers inside the cone that the disc spans up to the highest occluder.
-  const float search = std::max(1.5f, angular_radius_ * (highest_ - h) * per_texel_);
-  return kernels().visibleThrough(
-      {map_->nearness(0), width_, height_, map_->stride(), angular_radius_ * per_texel_}, *taps_, s,
-      t, h, search);
+  alignas(32) float places[6][8] = {};
+  for (int c = 0; c < 3; ++c) places[c][0] = p[c], places[3 + c][0] = n[c];
+  float visible[8];
+  visibilities({{places[0], places[1], places[2]}, {places[3], places[4], places[5]}}, 1, visible);
+  return visible[0];
+}
+
+void ShadowMap::visibilities(const LightPoints& points, int count, float* visible) const {
+  if (map_)
+    kernels().visible(texels(), *taps_, points, count, visible);
+  else
+    std::fill_n(visible, count, 1.0f);
+}
+
+ShadowTexels ShadowMap::texels() const {
+  ShadowTexels texels{map_->nearness(0),
+                      width_,
+                      height_,
+                      map_->stride(),
+                      angular_radius_ * per_texel_,
+                      {},
+                      {},
+                      texel_,
+                      highest_};
+  const Eigen::Vector3f* axes[] = {&axis_s_, &axis_t_, &axis_h_};
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Map<Eigen::Vector3f>(texels.axes[i]) = *axes[i];
+    texels.origin[i] = origin_[i];
+  }
+  return texels;
 }
 
 std::optional<float> ShadowMap::uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n,

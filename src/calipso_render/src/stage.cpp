@@ -86,28 +86,15 @@ Eigen::Vector3f unit(const Eigen::Vector3f& x) {
 }
 
 // Sheets are seen from both sides: has the one towards the viewer the other normal?
-bool seenFromBehind(const Actor& actor, const Eigen::Vector3i& t, const LitPoint& p,
-                    const Eigen::Vector3f& eye) {
-  if (p.normal.dot(eye - p.position) >= 0.0f) return false;
+bool seenFromBehind(const Actor& actor, const Eigen::Vector3i& t, const Eigen::Vector3f& position,
+                    const Eigen::Vector3f& normal, const Eigen::Vector3f& eye) {
+  if (normal.dot(eye - position) >= 0.0f) return false;
   const Eigen::Vector3f &a = actor.vertices[t[0]], &b = actor.vertices[t[1]],
                         &c = actor.vertices[t[2]];
-  return (b - a).cross(c - a).dot(eye - p.position) < 0.0f;
-}
-
-LitPoint litPoint(const Actor& actor, const Eigen::Vector3i& t, const Eigen::Vector3f& w) {
-  const std::vector<float>& sky = actor.surface->sky;
-  return {mix(actor.vertices, t, w), unit(mix(actor.normals, t, w)),
-          w[0] * sky[t[0]] + w[1] * sky[t[1]] + w[2] * sky[t[2]]};
+  return (b - a).cross(c - a).dot(eye - position) < 0.0f;
 }
 
 }  // namespace
-
-LitPoint litPoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye) {
-  const Eigen::Vector3i& t = actor.surface->triangles[triangle];
-  LitPoint p = litPoint(actor, t, barycentric(actor.screen, triangle, u, v));
-  if (seenFromBehind(actor, t, p, eye)) p.normal = -p.normal;
-  return p;
-}
 
 SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v,
                           const Eigen::Vector3f& eye) {
@@ -117,13 +104,15 @@ SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v,
 SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3f& w,
                           const Eigen::Vector3f& eye) {
   const Eigen::Vector3i& t = actor.surface->triangles[triangle];
-  const LitPoint p = litPoint(actor, t, w);
-  const float side = seenFromBehind(actor, t, p, eye) ? -1.0f : 1.0f;
-  return {p.position,
-          side * p.normal,
+  const Eigen::Vector3f position = mix(actor.vertices, t, w),
+                        normal = unit(mix(actor.normals, t, w));
+  const std::vector<float>& sky = actor.surface->sky;
+  const float side = seenFromBehind(actor, t, position, normal, eye) ? -1.0f : 1.0f;
+  return {position,
+          side * normal,
           mix(actor.surface->key_vertices, t, w),
           side * unit(mix(actor.surface->key_normals, t, w)),
-          p.sky,
+          w[0] * sky[t[0]] + w[1] * sky[t[1]] + w[2] * sky[t[2]],
           triangle,
           w};
 }

@@ -5,23 +5,57 @@
 
 #include "calipso_render/appearance.hpp"
 #include "calipso_render/stage.hpp"
+#include "surface_run.hpp"
 
 namespace calipso::render {
 
-// What the pixels of a drawn triangle show, linear in the picture: the place in the key frame's
-// picture, homogeneous, and the barycentric weights up to a common factor. Counted from the
-// triangle's first corner, where single precision is exact.
+// What the pixels of a drawn triangle show, linear in the picture, each up to the same factor: the
+// place in the key frame's picture, homogeneous; the barycentric weights; the normal with the sky
+// that is seen. Counted from the triangle's first corner, where single precision is exact.
 struct alignas(16) TriangleMap {
-  float key[3][4];           // at the corner, per column, per row; x, y, w, 0
+  float key[3][4];           // at the corner, per column, per row; x, y, w, sum of the weights
   float weights[3][4];       // likewise; of the three corners, 0
+  float normal[3][4];        // likewise; world, sky
   float u = 0.0f, v = 0.0f;  // the corner, px
   bool thin = true;          // too thin for single precision, or never seen
+  bool turned = false;       // its far side is seen
 
   Eigen::Vector2f keyAt(float pixel_u, float pixel_v) const;
   Eigen::Vector3f weightsAt(float pixel_u, float pixel_v) const;  // clamped into the triangle
 };
 
-// One for each triangle of the actor.
-std::vector<TriangleMap> triangleMaps(const Actor& actor, const Appearance& appearance);
+// A point of a surface that is to be shaded: what is seen of a triangle at a place of the picture.
+struct SurfacePlace {
+  std::uint32_t id;
+  float u, v;
+};
+
+// What can be seen of an actor at any place of the picture.
+class SurfaceMaps {
+ public:
+  SurfaceMaps() = default;
+  SurfaceMaps(const Actor& actor, const Appearance& appearance, const Eigen::Vector3f& eye);
+
+  bool empty() const { return triangles_.empty(); }
+  const TriangleMap* triangles() const { return triangles_.data(); }
+  const TriangleMap& of(int triangle) const { return triangles_[triangle]; }
+
+  // All of a run but `sun` and `colour`, from surface points within their triangles.
+  // @param weights barycentric weights of each, written
+  void locate(const SurfacePlace* places, int count, SurfaceRun& run,
+              Eigen::Vector3f* weights) const;
+
+ private:
+  struct alignas(16) Vertex {
+    float sight[4];   // from the eye, m, 0
+    float normal[4];  // world, sky
+    float key[4];     // place in the key picture, homogeneous, 1
+  };
+
+  const Actor* actor_ = nullptr;
+  cv::Point corner_;  // Appearance::region's
+  std::vector<Vertex> vertices_;
+  std::vector<TriangleMap> triangles_;
+};
 
 }  // namespace calipso::render

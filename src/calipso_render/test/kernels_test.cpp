@@ -8,6 +8,7 @@
 
 #include "calipso_render/appearance.hpp"
 #include "calipso_render/colour.hpp"
+#include "calipso_render/light.hpp"
 #include "calipso_render/noise.hpp"
 
 namespace calipso::render {
@@ -24,10 +25,14 @@ class Avx2 : public ::testing::Test {
 };
 
 TEST_F(Avx2, EncodesTheSameBytes) {
-  std::vector<cv::Vec4f> colours(1000);
-  for (cv::Vec4f& c : colours)
-    c = {random_.uniform(-0.1f, 1.2f), random_.uniform(0.0f, 0.02f), random_.uniform(0.0f, 1.0f),
-         random_.uniform(0.0f, 1.0f)};
+  std::vector<float> colours[4];
+  for (int i = 0; i < 1007; ++i)
+    colours[0].push_back(random_.uniform(-0.1f, 1.2f)),
+        colours[1].push_back(random_.uniform(0.0f, 0.02f)),
+        colours[2].push_back(random_.uniform(0.0f, 1.0f)),
+        colours[3].push_back(random_.uniform(0.0f, 1.0f));
+  const float* const planes[] = {colours[0].data(), colours[1].data(), colours[2].data(),
+                                 colours[3].data()};
   const NoiseField field(3);
   const NoiseRows noise{{field.row(5, 0), field.row(5, 1), field.row(5, 2)}};
   NoiseCurves curves;
@@ -35,52 +40,106 @@ TEST_F(Avx2, EncodesTheSameBytes) {
     curves.start[i / 8][i % 8] = random_.uniform(0.0f, 4.0f),
                             curves.rise[i / 8][i % 8] = random_.uniform(-0.01f, 0.01f);
   for (const int count : {1, 7, 64, 65, 1000}) {
-    std::vector<cv::Vec3b> plain(colours.size()), fast(colours.size());
-    plainKernels().encode(curves, colours.data(), noise, 200, count, plain.data());
-    avx2Kernels()->encode(curves, colours.data(), noise, 200, count, fast.data());
+    std::vector<cv::Vec3b> plain(1000), fast(1000);
+    plainKernels().encode(curves, planes, noise, 200, count, plain.data());
+    avx2Kernels()->encode(curves, planes, noise, 200, count, fast.data());
     EXPECT_EQ(plain, fast) << count;
   }
+}
+
+// A run whose every value is random.
+SurfaceRun randomRun(cv::RNG& random) {
+  SurfaceRun run;
+  for (int k = 0; k < SurfaceRun::kRoom; ++k) {
+    for (int c = 0; c < 3; ++c)
+      run.sight[c][k] = random.uniform(-2.0f, 2.0f), run.colour[c][k] = random.uniform(0.0f, 1.0f),
+      run.normal[c][k] = random.uniform(-1.0f, 1.0f);
+    const Eigen::Vector3f n =
+        Eigen::Vector3f(run.normal[0][k], run.normal[1][k], run.normal[2][k]).normalized();
+    for (int c = 0; c < 3; ++c) run.normal[c][k] = n[c];
+    run.sky[k] = random.uniform(0.0f, 1.0f), run.sun[k] = random.uniform(0.0f, 1.0f);
+    run.key_u[k] = random.uniform(-3.0f, 33.0f), run.key_v[k] = random.uniform(-3.0f, 23.0f);
+  }
+  return run;
+}
+
+Light someLight(int terms) {
+  Light light;
+  light.direction = Eigen::Vector3f(0.3f, -0.5f, 0.8f).normalized();
+  light.ambient[0] = {0.3f, 0.4f, 0.5f};
+  for (int i = 1; i < terms; ++i)
+    light.ambient[i] = {0.1f, -0.05f * static_cast<float>(i), 0.02f * static_cast<float>(i)};
+  return light;
+}
+
+SurfaceShade shadeOf(const Light& light, int terms, float specular) {
+  SurfaceShade shade{{light.direction.x(), light.direction.y(), light.direction.z()},
+                     {light.sun[0], light.sun[1], light.sun[2]},
+                     {},
+                     {},
+                     terms,
+                     {0.1f, 0.0f, -0.1f},
+                     specular,
+                     0.3f,
+                     {0.02f, 0.02f, 0.03f},
+                     {1.0f, 0.5f, 0.25f}};
+  for (int c = 0; c < 3; ++c) {
+    shade.least[c] = 0.02f * light.ambient[0][c];
+    for (int i = 0; i < 9; ++i) shade.ambient[i][c] = light.ambient[i][c];
+  }
+  return shade;
 }
 
 TEST_F(Avx2, SamplesTheSameValues) {
   cv::Mat image(20, 30, CV_32FC4);
   random_.fill(image, cv::RNG::UNIFORM, -0.2, 1.0);
-  std::vector<float> u, v;
-  for (int i = 0; i < 500; ++i)
-    u.push_back(random_.uniform(-3.0f, 33.0f)), v.push_back(random_.uniform(-3.0f, 23.0f));
-  std::vector<cv::Vec4f> plain(u.size()), fast(u.size());
-  plainKernels().sample(image, u.data(), v.data(), 500, plain.data());
-  avx2Kernels()->sample(image, u.data(), v.data(), 500, fast.data());
-  EXPECT_EQ(std::memcmp(plain.data(), fast.data(), plain.size() * sizeof(cv::Vec4f)), 0);
+  for (int i = 0; i < 20; ++i) {
+    SurfaceRun plain = randomRun(random_), fast = plain;
+    plainKernels().sample(image, 3, 60, plain), avx2Kernels()->sample(image, 3, 60, fast);
+    EXPECT_EQ(std::memcmp(&plain, &fast, sizeof(plain)), 0);
+  }
+}
+
+TEST_F(Avx2, ShadesTheSame) {
+  for (const int terms : {1, 4, 9}) {
+    const SurfaceShade shade = shadeOf(someLight(terms), terms, 0.05f);
+    SurfaceRun plain = randomRun(random_), fast = plain;
+    plainKernels().shade(shade, 2, 58, plain), avx2Kernels()->shade(shade, 2, 58, fast);
+    EXPECT_EQ(std::memcmp(&plain, &fast, sizeof(plain)), 0) << terms;
+  }
 }
 
 TEST_F(Avx2, LocatesTheSamePlaces) {
   std::vector<TriangleMap> maps(40);
   for (TriangleMap& map : maps) {
-    for (auto& line : map.key) {
-      for (float& x : line) x = random_.uniform(0.1f, 1.0f);
+    for (auto* part : {&map.key, &map.normal}) {
+      for (auto& line : *part) {
+        for (float& x : line) x = random_.uniform(0.1f, 1.0f);
+      }
     }
     map.u = random_.uniform(0.0f, 50.0f), map.v = random_.uniform(0.0f, 50.0f);
+    map.turned = random_.uniform(0, 2) != 0;
   }
   std::vector<std::uint32_t> ids;
   for (std::uint32_t id = 0; id < maps.size(); ++id)
     ids.insert(ids.end(), random_.uniform(1, 20), id);
-  const int count = static_cast<int>(ids.size());
-  std::vector<float> plain_u(count + 7), plain_v(count + 7), u(count + 7), v(count + 7);
-  plainKernels().locate(maps.data(), ids.data(), 3, 20, count, {5, 6}, plain_u.data(),
-                        plain_v.data());
-  avx2Kernels()->locate(maps.data(), ids.data(), 3, 20, count, {5, 6}, u.data(), v.data());
-  for (int k = 0; k < count; ++k) {
-    ASSERT_EQ(plain_u[k], u[k]) << k;
-    ASSERT_EQ(plain_v[k], v[k]) << k;
-    ASSERT_NEAR(u[k], maps[ids[k]].keyAt(3.0f + k, 20.0f).x() - 5.0f,
-                1e-3f * (1.0f + std::abs(u[k])))
+  const PixelStretch stretch{20, 61, 2, {5, 6}};
+  const SightLines sight{{0.1f, -0.2f, 1.0f}, {0.01f, 0.0f, -0.002f}};
+  SurfaceRun plain{};
+  for (int k = 0; k < SurfaceRun::kRoom; ++k) plain.column[k] = static_cast<float>(k) + 1.0f;
+  SurfaceRun fast = plain;
+  plainKernels().locate(maps.data(), ids.data(), stretch, sight, plain);
+  avx2Kernels()->locate(maps.data(), ids.data(), stretch, sight, fast);
+  EXPECT_EQ(std::memcmp(&plain, &fast, sizeof(plain)), 0);
+  for (int k = 0; k < stretch.count; ++k) {
+    const float u = plain.key_u[stretch.offset + k];
+    ASSERT_NEAR(u, maps[ids[k]].keyAt(3.0f + k, 20.0f).x() - 5.0f, 1e-3f * (1.0f + std::abs(u)))
         << k;
   }
 }
 
 TEST_F(Avx2, SeesTheSameLight) {
-  constexpr int kSide = 40;
+  constexpr int kSide = 40, kCount = 500;
   std::vector<float> heights(kSide * kSide, -3e38f);
   for (int j = 8; j < 32; ++j) {
     for (int i = 8; i < 32; ++i) heights[j * kSide + i] = random_.uniform(0.0f, 1.0f);
@@ -89,19 +148,29 @@ TEST_F(Avx2, SeesTheSameLight) {
   taps.count = 24;
   for (int k = 0; k < taps.count; ++k)
     taps.x[k] = random_.uniform(-0.7f, 0.7f), taps.y[k] = random_.uniform(-0.7f, 0.7f);
-  int between = 0;
-  for (int i = 0; i < 500; ++i) {
-    const float s = random_.uniform(-5.0f, 45.0f), t = random_.uniform(-5.0f, 45.0f),
-                h = random_.uniform(-0.2f, 1.0f);
-    const float plain = plainKernels().visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f},
-                                                      taps, s, t, h, 6.0f);
-    EXPECT_EQ(avx2Kernels()->visibleThrough({heights.data(), kSide, kSide, kSide, 9.0f}, taps, s, t,
-                                            h, 6.0f),
-              plain)
-        << s << ", " << t;
-    between += plain > 0.0f && plain < 1.0f;
+  const ShadowTexels map{heights.data(),
+                         kSide,
+                         kSide,
+                         kSide,
+                         9.0f,
+                         {{1.0f, 0.0f, 0.0f}, {0.0f, 1.0f, 0.0f}, {0.0f, 0.0f, 1.0f}},
+                         {},
+                         0.1f,
+                         1.0f};
+  std::vector<float> axes[6];
+  for (int i = 0; i < kCount + 7; ++i) {
+    for (const int c : {0, 1}) axes[c].push_back(random_.uniform(-0.5f, 4.5f));
+    axes[2].push_back(random_.uniform(-0.2f, 1.0f));
+    for (const int c : {3, 4, 5}) axes[c].push_back(c == 5 ? 1.0f : 0.0f);
   }
-  EXPECT_GT(between, 100);
+  const LightPoints points{{axes[0].data(), axes[1].data(), axes[2].data()},
+                           {axes[3].data(), axes[4].data(), axes[5].data()}};
+  std::vector<float> plain(kCount + 7), fast(kCount + 7);
+  plainKernels().visible(map, taps, points, kCount, plain.data());
+  avx2Kernels()->visible(map, taps, points, kCount, fast.data());
+  EXPECT_EQ(plain, fast);
+  EXPECT_GT(std::count_if(plain.begin(), plain.end(), [](float x) { return x > 0.0f && x < 1.0f; }),
+            100);
 }
 
 TEST_F(Avx2, FillsTheSameTriangles) {
@@ -159,18 +228,45 @@ TEST_F(Avx2, DrawsTheSameSamples) {
 
 // What is sampled in a row and what is sampled alone must not differ where the two meet.
 TEST(Kernels, SampleAsSampleBicubic) {
-  constexpr int kCount = 200;
   cv::RNG random(3);
   cv::Mat image(20, 30, CV_32FC4);
   random.fill(image, cv::RNG::UNIFORM, 0.0, 1.0);
-  std::vector<float> u(kCount), v(kCount);
-  for (int i = 0; i < kCount; ++i)
-    u[i] = random.uniform(-3.0f, 33.0f), v[i] = random.uniform(-3.0f, 23.0f);
-  std::vector<cv::Vec4f> out(kCount);
-  kernels().sample(image, u.data(), v.data(), kCount, out.data());
-  for (int i = 0; i < kCount; ++i) {
-    EXPECT_LT(cv::norm(out[i] - sampleBicubic(image, u[i], v[i]), cv::NORM_INF), 1e-6)
-        << u[i] << ", " << v[i];
+  for (int repeat = 0; repeat < 4; ++repeat) {
+    SurfaceRun run = randomRun(random);
+    kernels().sample(image, 0, SurfaceRun::kMost, run);
+    for (int i = 0; i < SurfaceRun::kMost; ++i) {
+      const cv::Vec4f alone = sampleBicubic(image, run.key_u[i], run.key_v[i]);
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(run.colour[c][i], alone[c], 1e-6f) << run.key_u[i] << ", " << run.key_v[i];
+    }
+  }
+}
+
+// Against the formulas point by point; the exponential's error is the largest.
+TEST(Kernels, ShadeAsDiffuseAndSpecularShading) {
+  cv::RNG random(5);
+  for (const int terms : {1, 4, 9}) {
+    const Light light = someLight(terms);
+    const SurfaceShade shade = shadeOf(light, terms, 0.05f);
+    const SurfaceRun before = randomRun(random);
+    SurfaceRun run = before;
+    kernels().shade(shade, 0, SurfaceRun::kMost, run);
+    for (int i = 0; i < SurfaceRun::kMost; ++i) {
+      const auto at = [i](const float(&x)[3][SurfaceRun::kRoom]) {
+        return Eigen::Vector3f(x[0][i], x[1][i], x[2][i]);
+      };
+      const Eigen::Vector3f n = at(run.normal), view = -at(run.sight).normalized();
+      const cv::Vec3f diffuse =
+          diffuseShading(light, n, run.sun[i], run.sky[i],
+                         {shade.thrown_back[0], shade.thrown_back[1], shade.thrown_back[2]});
+      const cv::Vec3f highlight = specularShading(light, {shade.specular, shade.roughness}, n, view,
+                                                  run.sun[i], run.sky[i]);
+      for (int c = 0; c < 3; ++c) {
+        const float expected =
+            before.colour[c][i] * shade.tint[c] * (diffuse[c] + shade.floor[c]) + highlight[c];
+        EXPECT_NEAR(run.colour[c][i], expected, 2e-5f * (1.0f + std::abs(expected))) << terms;
+      }
+    }
   }
 }
 

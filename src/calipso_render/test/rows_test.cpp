@@ -5,9 +5,11 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "disc_dilation.hpp"
+#include "kernels.hpp"
 #include "line_codec.hpp"
 #include "mesh_topology.hpp"
 #include "plane_light.hpp"
+#include "plane_view.hpp"
 #include "render_test_scene.hpp"
 #include "square_mask.hpp"
 #include "triangle_map.hpp"
@@ -21,7 +23,7 @@ const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
 
 // Against the surface point of every pixel, of a ball that has turned and moved since the key
 // frame.
-TEST(TriangleMap, TellsWhatThePixelsShow) {
+TEST(SurfaceMaps, TellWhatThePixelsShow) {
   const Surface surface = makeSurface(ballAt(kCentre));
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
   turn.translate(kCentre + Eigen::Vector3d(0.05, 0.1, 0.02))
@@ -29,23 +31,36 @@ TEST(TriangleMap, TellsWhatThePixelsShow) {
   const Actor actor = makeActor(surface, transformed(surface.object_vertices, turn), camera());
   Appearance appearance;
   appearance.key_camera = camera();
-  const std::vector<TriangleMap> maps = triangleMaps(actor, appearance);
+  const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
+  const SurfaceMaps maps(actor, appearance, eye);
+  const PlaneView view({}, camera());
   VisibilityBuffer buffer({0, 0, kWidth, kHeight});
   buffer.draw(actor.screen, 0);
-  const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
   int seen = 0;
+  SurfaceRun run, place;
+  Eigen::Vector3f weights;
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       const std::uint32_t id = buffer.ids(v)[u];
-      if (id == VisibilityBuffer::kNothing || maps[VisibilityBuffer::triangleOf(id)].thin) continue;
-      const TriangleMap& map = maps[VisibilityBuffer::triangleOf(id)];
+      if (id == VisibilityBuffer::kNothing || maps.of(VisibilityBuffer::triangleOf(id)).thin)
+        continue;
       const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u, v, eye);
-      ASSERT_LT(
-          (map.keyAt(u, v).cast<double>() - camera().projectWorld(p.key_position.cast<double>()))
-              .norm(),
-          0.01)
+      const Eigen::Vector2d key = camera().projectWorld(p.key_position.cast<double>());
+      ASSERT_LT((maps.of(VisibilityBuffer::triangleOf(id)).weightsAt(u, v) - p.weights).norm(),
+                2e-3f)
           << u << ", " << v;
-      ASSERT_LT((map.weightsAt(u, v) - p.weights).norm(), 2e-3f) << u << ", " << v;
+      run.column[0] = static_cast<float>(u);
+      kernels().locate(maps.triangles(), &id, {v, 1, 0, {}}, view.sightLines(v), run);
+      const SurfacePlace here{id, static_cast<float>(u), static_cast<float>(v)};
+      maps.locate(&here, 1, place, &weights);
+      for (const SurfaceRun* r : {&run, &place}) {
+        const Eigen::Vector3f n(r->normal[0][0], r->normal[1][0], r->normal[2][0]),
+            sight(r->sight[0][0], r->sight[1][0], r->sight[2][0]);
+        ASSERT_LT((Eigen::Vector2d(r->key_u[0], r->key_v[0]) - key).norm(), 0.01) << u << ", " << v;
+        ASSERT_LT((n - p.normal).norm(), 2e-3f) << u << ", " << v;
+        ASSERT_LT((sight.normalized() - (p.position - eye).normalized()).norm(), 1e-3f);
+        ASSERT_NEAR(r->sky[0], p.sky, 2e-3f);
+      }
       ++seen;
     }
   }
@@ -53,15 +68,19 @@ TEST(TriangleMap, TellsWhatThePixelsShow) {
 }
 
 TEST(LineCodec, EncodesAsCodeFromLinear) {
-  std::vector<cv::Vec4f> colours;
-  for (int i = 0; i <= 2000; ++i)
-    colours.emplace_back(i / 1990.0f - 0.001f, 0.3f * i / 2000.0f, std::nanf(""), 1.0f);
-  std::vector<cv::Vec3b> codes(colours.size());
+  constexpr int kCount = 2001;
+  std::vector<float> colours[4];
+  for (auto& channel : colours) channel.resize(kCount + 7, 1.0f);
+  for (int i = 0; i < kCount; ++i)
+    colours[0][i] = i / 1990.0f - 0.001f, colours[1][i] = 0.3f * i / 2000.0f,
+    colours[2][i] = std::nanf("");
+  std::vector<cv::Vec3b> codes(kCount);
   LineCodec(NoiseModel(), 3)
-      .encode(colours.data(), 5, 7, static_cast<int>(colours.size()), codes.data());
-  for (std::size_t i = 0; i < codes.size(); ++i) {
+      .encode({colours[0].data(), colours[1].data(), colours[2].data(), colours[3].data()}, 5, 7,
+              kCount, codes.data());
+  for (int i = 0; i < kCount; ++i) {
     for (int c = 0; c < 3; ++c)
-      ASSERT_EQ(codes[i][c], quantise(codeFromLinear(colours[i][c]))) << i << ", " << c;
+      ASSERT_EQ(codes[i][c], quantise(codeFromLinear(colours[c][i]))) << i << ", " << c;
   }
 }
 

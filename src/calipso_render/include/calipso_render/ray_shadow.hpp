@@ -24,6 +24,7 @@ class RayShadow : public Visibility {
   ~RayShadow() override;
 
   float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const override;
+  bool empty() const override;
   std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
                                float radius) const override;
 

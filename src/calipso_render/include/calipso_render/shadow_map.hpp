@@ -11,6 +11,7 @@
 namespace calipso::render {
 
 struct ShadowTaps;
+struct ShadowTexels;
 
 // Half the angle of the disc of sky that shades softly near contact, rad.
 constexpr double kSkyRadius = 0.8;
@@ -33,6 +34,8 @@ class ShadowMap : public Visibility {
             const Params& params);
 
   float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const override;
+  void visibilities(const LightPoints& points, int count, float* visible) const override;
+  bool empty() const override { return !map_; }
   std::optional<float> uniform(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
                                float radius) const override;
 
@@ -54,6 +57,7 @@ class ShadowMap : public Visibility {
   };
   Place placeOf(const Eigen::Vector3f& p, const Eigen::Vector3f& n) const;
 
+  ShadowTexels texels() const;
   void buildLevels();
   Level coarsened() const;
   Extremes around(float s, float t, float reach) const;

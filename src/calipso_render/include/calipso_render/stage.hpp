@@ -79,13 +79,6 @@ struct View {
   std::vector<Actor> actors;
 };
 
-// The same without the key frame: what light falls on.
-struct LitPoint {
-  Eigen::Vector3f position, normal;
-  float sky;
-};
-LitPoint litPoint(const Actor& actor, int triangle, float u, float v, const Eigen::Vector3f& eye);
-
 // The support plane that pixel (u, v) of the camera looks at.
 struct Receiver {
   Eigen::Vector3f position, normal;  // world

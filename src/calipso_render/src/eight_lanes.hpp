@@ -1,0 +1,54 @@
+#pragma once
+
+// Eight lanes of one kind, for the bodies of the kernels: see kernels.hpp.
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+namespace calipso::render {
+
+typedef float Eight __attribute__((vector_size(32), aligned(4), may_alias));
+typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
+typedef std::int32_t EightInts __attribute__((vector_size(32), aligned(4), may_alias));
+typedef std::int32_t LaneChoice __attribute__((vector_size(32)));
+
+#define CALIPSO_INLINE inline __attribute__((always_inline))
+
+CALIPSO_INLINE Eight& eightAt(float* at) { return *reinterpret_cast<Eight*>(at); }
+CALIPSO_INLINE const Eight& eightAt(const float* at) { return *reinterpret_cast<const Eight*>(at); }
+CALIPSO_INLINE const Four& fourAt(const float* at) { return *reinterpret_cast<const Four*>(at); }
+
+CALIPSO_INLINE Eight all(float x) { return Eight{} + x; }
+CALIPSO_INLINE Eight larger(const Eight& a, const Eight& b) { return a > b ? a : b; }
+CALIPSO_INLINE Eight smaller(const Eight& a, const Eight& b) { return a < b ? a : b; }
+CALIPSO_INLINE Eight lanes() { return Eight{0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f}; }
+
+// Sum in a fixed order, whatever the width of a register.
+CALIPSO_INLINE float sumOf(const Eight& x) {
+  return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
+}
+
+CALIPSO_INLINE bool any(const EightInts& mask) { return sumOf(mask ? all(1.0f) : Eight{}) > 0.0f; }
+
+CALIPSO_INLINE Eight squareRoot(const Eight& x) {
+  Eight root;
+  for (int k = 0; k < 8; ++k) root[k] = std::sqrt(x[k]);
+  return root;
+}
+
+// e to the x; relative error below 3e-7. @pre x <= 80; below -87 it is taken for that
+CALIPSO_INLINE Eight exponential(const Eight& x) {
+  const Eight y = larger(x, all(-87.0f)) * 1.44269504f;  // of 2
+  const EightInts whole = __builtin_convertvector(y + 16384.5f, EightInts) - 16384;
+  const Eight f = y - __builtin_convertvector(whole, Eight);  // -0.5 .. 0.5
+  const Eight power =
+      1.0f +
+      f * (0.69314718f +
+           f * (0.24022651f +
+                f * (0.05550411f + f * (0.00961813f + f * (0.00133336f + f * 0.00015469f)))));
+  const EightInts scale = (whole + 127) << 23;
+  return power * (Eight)scale;
+}
+
+}  // namespace calipso::render
