@@ -104,11 +104,14 @@ void EdgeCoverage::choose(int column, int row) {
   if (tile < 0) {
     tile = static_cast<int>(slots_.size() / (kTile * kTile));
     slots_.resize(slots_.size() + kTile * kTile, kNone);
+    chosen_.resize(chosen_.size() + kTile, 0);
   }
   int& slot = slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile +
                      column % kTile];
   if (slot >= 0) return;
   slot = static_cast<int>(pixels_.size());
+  chosen_[static_cast<std::size_t>(tile) * kTile + row % kTile] |=
+      static_cast<std::uint8_t>(1u << column % kTile);
   pixels_.emplace_back();
   pixels_.back().ids.fill(VisibilityBuffer::kNothing);
   pixels_.back().nearness.fill(VisibilityBuffer::kFar);
@@ -197,12 +200,15 @@ void EdgeCoverage::addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t
 }
 
 void EdgeCoverage::drawPiece(const Piece& piece) {
+  const std::uint8_t* chosen = &chosen_[static_cast<std::size_t>(piece.tile) * kTile];
+  const int* slots = &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile];
+  const int left = piece.u0 % kTile, right = piece.u1 % kTile;
+  const unsigned within = (0xffu << left) & (0xffu >> (kTile - 1 - right));
   for (int v = piece.v0; v <= piece.v1; ++v) {
-    const int* slots =
-        &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile + (v % kTile) * kTile];
-    for (int u = piece.u0; u <= piece.u1; ++u) {
-      if (slots[u % kTile] >= 0)
-        kernels().drawSamples(piece.samples, u, v, piece.id, pixels_[slots[u % kTile]]);
+    for (unsigned rest = chosen[v % kTile] & within; rest != 0; rest &= rest - 1) {
+      const int column = __builtin_ctz(rest);
+      kernels().drawSamples(piece.samples, piece.u0 - left + column, v, piece.id,
+                            pixels_[slots[(v % kTile) * kTile + column]]);
     }
   }
 }

@@ -9,6 +9,7 @@
 #include "frame_compositor.hpp"
 #include "marked.hpp"
 #include "plane_light.hpp"
+#include "wide_loops.hpp"
 
 namespace calipso::render {
 namespace {
@@ -165,7 +166,7 @@ void FrameCompositor::takeReliefInPlaneTerms() {
 }
 
 // Row v of what edited objects and others shade together, and of what was shaded before.
-void FrameCompositor::joinSun(int v) {
+CALIPSO_WIDE_LOOPS void FrameCompositor::joinSun(int v) {
   std::uint8_t *now = sun_now_.ptr<std::uint8_t>(v), *before = sun_before_.ptr<std::uint8_t>(v),
                *takes = takes_light_.ptr<std::uint8_t>(v);
   const auto rowOf = [&](const cv::Mat& picture) {

@@ -10,6 +10,7 @@
 #include "frame_compositor.hpp"
 #include "kernels.hpp"
 #include "marked.hpp"
+#include "wide_loops.hpp"
 
 namespace calipso::render {
 namespace {
@@ -25,7 +26,7 @@ cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) {
 }  // namespace
 
 // What has to be done for every pixel of row v.
-void FrameCompositor::findKinds(int v, Row& row) const {
+CALIPSO_WIDE_LOOPS void FrameCompositor::findKinds(int v, Row& row) const {
   const int j = v - region_.y, width = region_.width;
   const auto rowOf = [j](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j); };
   const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),

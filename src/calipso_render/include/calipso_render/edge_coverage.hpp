@@ -92,6 +92,7 @@ class EdgeCoverage {
   int tiles_across_;
   std::vector<int> tiles_;  // index of the tile in slots_, -1: none of its pixels is chosen
   std::vector<int> slots_;  // per pixel of those tiles: index into pixels_, kNone or kSettled
+  std::vector<std::uint8_t> chosen_;  // per row of those tiles: a bit for each pixel with a slot
   std::vector<Pixel> pixels_;
 };
 
