@@ -66,7 +66,7 @@ cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& regio
     for (int begin = 0; begin < grid.cols; begin += LightBatch::kMost) {
       LightBatch batch;
       int columns[LightBatch::kMost];
-      Receiver r;
+      Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
       for (int i = begin; i < std::min(grid.cols, begin + LightBatch::kMost); ++i) {
         const int u = (first.x + i) * step;
         if (!skip.at(u, v) && place_view_.planes().at(u, v, r))

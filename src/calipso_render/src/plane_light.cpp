@@ -68,7 +68,7 @@ class Squares {
    public:
     explicit Lookup(const Squares& squares) : squares_(squares) {}
     void add(int u, int v, float* visible) {
-      Receiver r;
+      Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
       *visible = 1.0f;
       if (!squares_.view_.at(u, v, r)) return;
       out_[batch_.add(r.position, r.normal)] = visible;
@@ -161,7 +161,7 @@ class Squares {
   void fillExactly(const cv::Rect& square, const cv::Rect& here) const {
     float visible[kSquare][kSquare];
     Lookup lookup(*this);
-    Receiver r;
+    Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
     for (int y = here.y; y < here.br().y; ++y) {
       for (int x = here.x; x < here.br().x; ++x) {
         float& at = visible[y + rect_.y - square.y][x + rect_.x - square.x];
