@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "../src/world/obstacle_query.hpp"
@@ -217,6 +218,47 @@ TEST(SelfContact, OnlyPartsThatComeNearEachOtherAreSearched) {
   for (int v = 0; v < flat.vertexCount(); ++v)
     if (std::abs(flat.vertices(v, 0)) > 0.03)
       EXPECT_TRUE(std::binary_search(near.begin(), near.end(), v)) << v;
+}
+
+// A plate of 2 n + 1 by 2 n + 1 square cells, 1 cm wide and .2 mm thick, without every second one of
+// every second row: n x n holes.
+TriangleMesh grating(int n) {
+  const int side = 2 * n + 1, corners = side + 1;
+  const auto solid = [&](int i, int j) {
+    return i >= 0 && j >= 0 && i < side && j < side && (i % 2 == 0 || j % 2 == 0);
+  };
+  TriangleMesh mesh;
+  mesh.vertices.resize(2 * corners * corners, 3);
+  const auto vertex = [&](int i, int j, int k) { return (k * corners + j) * corners + i; };
+  for (int k = 0; k < 2; ++k)
+    for (int j = 0; j < corners; ++j)
+      for (int i = 0; i < corners; ++i)
+        mesh.vertices.row(vertex(i, j, k)) << 0.01 * i, 0.01 * j, 0.0002 * k;
+  std::vector<std::array<int, 3>> triangles;
+  const auto quad = [&](int a, int b, int c, int d) {
+    triangles.push_back({a, b, c});
+    triangles.push_back({a, c, d});
+  };
+  for (int j = 0; j < side; ++j)
+    for (int i = 0; i < side; ++i) {
+      if (!solid(i, j)) continue;
+      const auto at = [&](int di, int dj, int k) { return vertex(i + di, j + dj, k); };
+      quad(at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1));
+      quad(at(0, 0, 0), at(0, 1, 0), at(1, 1, 0), at(1, 0, 0));
+      if (!solid(i, j - 1)) quad(at(0, 0, 0), at(1, 0, 0), at(1, 0, 1), at(0, 0, 1));
+      if (!solid(i, j + 1)) quad(at(1, 1, 0), at(0, 1, 0), at(0, 1, 1), at(1, 1, 1));
+      if (!solid(i - 1, j)) quad(at(0, 1, 0), at(0, 0, 0), at(0, 0, 1), at(0, 1, 1));
+      if (!solid(i + 1, j)) quad(at(1, 0, 0), at(1, 1, 0), at(1, 1, 1), at(1, 0, 1));
+    }
+  mesh.triangles.resize(static_cast<long>(triangles.size()), 3);
+  for (size_t f = 0; f < triangles.size(); ++f)
+    mesh.triangles.row(static_cast<long>(f)) << triangles[f][0], triangles[f][1], triangles[f][2];
+  return mesh;
+}
+
+TEST(SelfContact, LatticesAreNotTakenForCloth) {
+  EXPECT_TRUE(isThin(grating(1)));
+  EXPECT_FALSE(isThin(grating(6)));
 }
 
 TEST(SelfContact, ThinOnesMeetThemselvesUnlessToldNotTo) {

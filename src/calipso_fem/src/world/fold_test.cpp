@@ -93,6 +93,7 @@ std::vector<int> FoldTest::mayMeet(const SurfaceTree& surface, const Eigen::Vect
 
 bool isThin(const TriangleMesh& mesh) {
   constexpr double kThin = 1.0 / 40.0;
+  constexpr int kMostHoles = 2;  // through it; a lattice has dozens
   DisjointSets pieces(mesh.vertexCount());
   double area = 0.0;
   for (int f = 0; f < mesh.triangleCount(); ++f) {
@@ -101,6 +102,13 @@ bool isThin(const TriangleMesh& mesh) {
   }
   for (int f = 1; f < mesh.triangleCount(); ++f)
     if (pieces.find(mesh.triangles(f, 0)) != pieces.find(mesh.triangles(0, 0))) return false;
+  std::vector<char> used(mesh.vertexCount(), 0);
+  for (int f = 0; f < mesh.triangleCount(); ++f)
+    for (int k = 0; k < 3; ++k) used[mesh.triangles(f, k)] = 1;
+  // Euler's formula of a closed surface, which has three edges to two triangles.
+  const long vertices = std::count(used.begin(), used.end(), 1);
+  const long holes = 1 - (2 * vertices - mesh.triangleCount()) / 4;
+  if (holes > kMostHoles) return false;
   return 2.0 * std::abs(signedVolume(mesh)) / area < kThin * std::sqrt(0.5 * area);
 }
 

@@ -26,7 +26,8 @@ class FoldTest {
 };
 
 // Whether a closed surface is thin enough to fold onto itself: one piece whose thickness is under a
-// fortieth of its extent, as cloth, a flag or a rope.
+// fortieth of its extent, as cloth, a flag or a rope. Lattices, with many holes through them, are
+// not.
 bool isThin(const TriangleMesh& mesh);
 
 }  // namespace calipso::fem
