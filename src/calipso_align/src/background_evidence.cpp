@@ -92,6 +92,7 @@ cv::Mat unseenParts(const cv::Mat& view, const cv::Mat& mask, const cv::Mat& kno
   constexpr float kSure = 5.0f;  // nats
   const cv::Mat unknown = (known == 0) & (mask == 0) & (apart == 0);
   cv::Mat parts = cv::Mat::zeros(view.size(), CV_8U);
+#pragma omp parallel for schedule(dynamic, 16)
   for (int y = 0; y < view.rows; ++y)
     for (int x = 0; x < view.cols; ++x) {
       if (!unknown.at<uchar>(y, x)) continue;
