@@ -28,7 +28,8 @@ float strengthAt(const cv::Mat& picture, const cv::Point& p, const cv::Point& q)
 // Mean gradient around what may be copied.
 cv::Mat liveliness(const cv::Mat& image, const cv::Mat& source) {
   cv::Mat strength(image.size(), CV_32F, cv::Scalar(0.0f)), weight = strength.clone();
-  for (int v = 0; v + 1 < image.rows; ++v) {
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < image.rows - 1; ++v) {
     for (int u = 0; u + 1 < image.cols; ++u) {
       const cv::Point p(u, v), right(u + 1, v), below(u, v + 1);
       if (!source.at<std::uint8_t>(p) || !source.at<std::uint8_t>(right) ||
@@ -46,7 +47,8 @@ cv::Mat liveliness(const cv::Mat& image, const cv::Mat& source) {
 // How much a step from a pixel to the next shows: the less, the more of them are around.
 cv::Mat stepWeight(const cv::Mat& picture, const cv::Point& next) {
   cv::Mat grain(picture.size(), CV_32F, cv::Scalar(0.0f));
-  for (int v = 0; v + next.y < picture.rows; ++v) {
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < picture.rows - next.y; ++v) {
     for (int u = 0; u + next.x < picture.cols; ++u) {
       grain.at<float>(v, u) = strengthAt(picture, {u, v}, cv::Point(u, v) + next);
     }
