@@ -29,7 +29,8 @@ constexpr double kRidge = 1e-6;
 // The test's pictures, brought down.
 class Trial {
  public:
-  Trial(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known)
+  Trial(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known,
+        const cv::Mat& hidden)
       : scale_(std::max(1.0f, static_cast<float>(picture.cols) / kTestedWidth)) {
     const cv::Size size(cvRound(picture.cols / scale_), cvRound(picture.rows / scale_));
     const auto brought = [&](const cv::Mat& values) {
@@ -45,6 +46,7 @@ class Trial {
     around_ = cv::max(around_, 1e-6);
     std::array<cv::Mat, 3> y;
     cv::split(brought(picture), y);
+    if (!hidden.empty()) shade_ = lessAround(brought(hidden).mul(y[0] + y[1] + y[2]));
     for (int c = 0; c < 3; ++c) y_less_[c] = less(y[c]);
     image_ = brought(withCover(image));
     spread_ = brought(image.spread) / scale_, across_ = image.across;
@@ -133,23 +135,31 @@ class Trial {
     return out;
   }
 
-  cv::Mat less(const cv::Mat& values) const {
+  cv::Mat lessAround(const cv::Mat& values) const {
     cv::Mat sum;
     cv::GaussianBlur(values.mul(weight_), sum, {}, kAround);
     return (values - sum / around_).mul(weight_);
   }
 
+  // Less what shade explains of it, too.
+  cv::Mat less(const cv::Mat& values) const {
+    cv::Mat out = lessAround(values);
+    if (!shade_.empty()) out -= shade_ * (out.dot(shade_) / std::max(1e-12, shade_.dot(shade_)));
+    return out;
+  }
+
   float scale_;
   float across_ = 1.0f;
   cv::Mat weight_, around_, image_, spread_;  // image_ CV_32FC4: colour and cover
+  cv::Mat shade_;                             // as dark as the hidden sky makes it; may be empty
   std::array<cv::Mat, 3> y_less_;
 };
 
 }  // namespace
 
-PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture,
-                            const cv::Mat& known) {
-  const Trial trial(image, picture, known);
+PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known,
+                            const cv::Mat& hidden) {
+  const Trial trial(image, picture, known, hidden);
   Trial::Fit best;
   cv::Mat best_drawn;
   PlaneMirror mirror;

@@ -120,14 +120,28 @@ cv::Mat reachOf(const cv::Mat& on) {
 // A plane all over the picture.
 struct Extent {
   cv::Mat nearness;  // CV_32FC1, 0: not there
+  cv::Mat farthest;  // CV_32FC1: of it and the pixels around, which the depth image may show
   cv::Mat goes_on;   // CV_8UC1: 255 where it may be behind objects
+
+  // Part by which what is seen misses it: none within a pixel. Towards the horizon that is much.
+  float miss(float seen, int u, int v) const {
+    return std::max({0.0f, seen - nearness.at<float>(v, u), farthest.at<float>(v, u) - seen}) /
+           seen;
+  }
 };
+
+Extent supportExtent(const cv::Mat& nearness) {
+  Extent e{nearness, {}, {}};
+  cv::erode(nearness, e.farthest, cv::Mat::ones(3, 3, CV_8U));
+  return e;
+}
 
 // Where a plane goes on that is hidden: in its reach, and nearer to where it is seen than to where
 // something farther is seen in its place.
-cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& scenery) {
+// @param taken CV_8UC1, != 0: another plane is seen, which it may well pass through
+cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& scenery, const cv::Mat& taken) {
   const cv::Mat known = (scenery > 0.0f) & (plane > 0.0f),
-                on = known & (cv::abs(plane - scenery) < kOnPlane * plane);
+                on = known & (cv::abs(plane - scenery) < kOnPlane * plane) & (taken == 0);
   cv::Mat absent = known & (scenery < kFarther * plane), to_on, to_absent;
   cv::morphologyEx(absent, absent, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   if (cv::countNonZero(on) == 0) return cv::Mat::zeros(plane.size(), CV_8U);
@@ -184,17 +198,24 @@ void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const C
   surfaces.normal.at<cv::Vec3f>(v, u) = {normal.x(), normal.y(), normal.z()};
 }
 
-// The plane that the depth image shows at a pixel, or kNoPlane: support planes are met less
-// exactly.
-int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u, int v) {
-  int best = kNoPlane, support = kNoPlane;
-  float least = kOnPlane, least_support = kOffSupport;
-  for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
-    const float error = std::abs(planes[k].nearness.at<float>(v, u) - seen) / seen;
-    if (error < least) least = error, best = k;
-    if (k < supports && error < least_support) least_support = error, support = k;
+// Of planes first ... last - 1 the one that misses what is seen least, by less than `most`.
+int closest(const std::vector<Extent>& planes, int first, int last, float most, float seen, int u,
+            int v) {
+  int best = kNoPlane;
+  for (int k = first; k < last; ++k) {
+    const float miss = planes[k].miss(seen, u, v);
+    if (miss < most) most = miss, best = k;
   }
-  return best == kNoPlane ? support : best;
+  return best;
+}
+
+// The plane that the depth image shows at a pixel, or kNoPlane: support planes above all, which
+// others pass through, and which are met less exactly.
+int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u, int v) {
+  int best = closest(planes, 0, supports, kOnPlane, seen, u, v);
+  if (best == kNoPlane)
+    best = closest(planes, supports, static_cast<int>(planes.size()), kOnPlane, seen, u, v);
+  return best != kNoPlane ? best : closest(planes, 0, supports, kOffSupport, seen, u, v);
 }
 
 // The plane seen if the object were not there: the nearest behind it. @param object nearness of the
@@ -209,6 +230,20 @@ int planeBehind(const std::vector<Extent>& planes, float object, int u, int v) {
       nearest = near, best = k;
   }
   return best;
+}
+
+void findReaches(const cv::Mat& scenery, int supports, std::vector<Extent>& planes) {
+  cv::Mat on_support = cv::Mat::zeros(scenery.size(), CV_8U);
+  for (int v = 0; v < scenery.rows && supports > 0; ++v) {
+    for (int u = 0; u < scenery.cols; ++u) {
+      const float seen = scenery.at<float>(v, u);
+      if (seen > 0.0f && closest(planes, 0, supports, kOnPlane, seen, u, v) != kNoPlane)
+        on_support.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  const cv::Mat none = cv::Mat::zeros(scenery.size(), CV_8U);
+  for (int k = 0; k < static_cast<int>(planes.size()); ++k)
+    planes[k].goes_on = goesOn(planes[k].nearness, scenery, k < supports ? none : on_support);
 }
 
 float brightness(const cv::Vec3f& code) {
@@ -260,14 +295,16 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
   std::vector<Extent> extents;
   cv::Mat off = scenery > 0.0f;
   for (const SupportPlane& plane : planes) {
-    extents.push_back({supportNearness(plane, camera), {}});
-    off &= cv::abs(scenery - extents.back().nearness) > kOffSupport * scenery;
+    extents.push_back(supportExtent(supportNearness(plane, camera)));
+    off &= (scenery - extents.back().nearness > kOffSupport * scenery) |
+           (extents.back().farthest - scenery > kOffSupport * scenery);
   }
   std::vector<Eigen::Vector3f> normals(planes.size());
-  for (const PicturePlane& plane : picturePlanes(scenery, off))
-    extents.push_back({nearnessOf(plane, scenery.size()), {}}),
-        normals.push_back(plane.normal(camera));
-  for (Extent& e : extents) e.goes_on = goesOn(e.nearness, scenery);
+  for (const PicturePlane& plane : picturePlanes(scenery, off)) {
+    const cv::Mat nearness = nearnessOf(plane, scenery.size());
+    extents.push_back({nearness, nearness, {}}), normals.push_back(plane.normal(camera));
+  }
+  findReaches(scenery, supports, extents);
   PlaceSurfaces surfaces{cv::Mat::zeros(scenery.size(), CV_8U), cv::Mat(scenery.size(), CV_32FC3),
                          cv::Mat(scenery.size(), CV_32FC3), supports};
 #pragma omp parallel for schedule(dynamic, 8)

@@ -50,8 +50,11 @@ cv::Mat unmirroredCodes(const PlaneMirror& mirror, const cv::Mat& bgr);
 // strength and surroundings found in one half of the picture's squares and judged in the other, and
 // both the same way for mirror images displaced sideways. Established if the one in place explains
 // far more than any of those.
+// The dark along contacts may be there as well.
 // @param picture CV_32FC3, linear; known CV_8UC1: pixels that may be looked at
+// @param hidden CV_32FC1, part of the sky that objects hide, 0..1; may be empty
 // @return strength 0 if it is not established
-PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known);
+PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known,
+                            const cv::Mat& hidden);
 
 }  // namespace calipso::render

@@ -13,8 +13,8 @@
 namespace calipso::render {
 namespace {
 
-// visible parts from which a place says how the planes mirror
-constexpr float kUnshadedSun = 0.985f, kUnshadedSky = 0.85f;
+// visible part of the sun from which a place says how the planes mirror
+constexpr float kUnshadedSun = 0.985f;
 // part by which scenery is nearer or farther than the plane behind or before it
 constexpr float kOffPlane = 0.1f;
 
@@ -23,10 +23,11 @@ cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& plane
                   const Camera& camera) {
   cv::Mat off = cv::Mat::zeros(camera.height, camera.width, CV_8U);
   const cv::Mat ground = scenery.empty() ? cv::Mat() : groundNearness(planes, camera, cv::Mat());
-  if (!ground.empty())
-    off = (scenery > 0.0f) &
-          ((scenery > (1.0f + kOffPlane) * ground) | ((1.0f + kOffPlane) * scenery < ground));
-  return off;
+  if (ground.empty()) return off;
+  cv::Mat farthest;  // of a pixel and those around: towards the horizon one row makes much
+  cv::erode(ground, farthest, cv::Mat::ones(3, 3, CV_8U));
+  return (scenery > 0.0f) &
+         ((scenery > (1.0f + kOffPlane) * ground) | ((1.0f + kOffPlane) * scenery < farthest));
 }
 
 // Visibility of a light on the support planes and on the relief, 0..1, where one is seen; 1
@@ -74,9 +75,9 @@ cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const cv::M
 
 // What the support planes mirror, if the key frame shows it. Objects that move in the video have
 // left their place in later frames.
-// @param unclear CV_8UC1, != 0: objects, shadows
+// @param unclear CV_8UC1, != 0: objects, shadows; sky CV_32FC1, visible part of it
 PlaneMirror findMirror(const std::vector<Actor>& actors, const cv::Mat& picture,
-                       const cv::Mat& unclear, const cv::Mat& off_planes,
+                       const cv::Mat& unclear, const cv::Mat& sky, const cv::Mat& off_planes,
                        const RenderParams& params, const Prepared& p) {
   std::vector<const Actor*> resting;
   std::vector<std::size_t> surfaces;
@@ -88,8 +89,8 @@ PlaneMirror findMirror(const std::vector<Actor>& actors, const cv::Mat& picture,
   };
   const MirrorImage image = mirrorImage(resting, radiance, params.planes, p.camera, off_planes);
   if (image.empty()) return {};
-  PlaneMirror mirror = establishMirror(image, linearOf(picture),
-                                       grown(unclear, params.background.mask_margin_px) == 0);
+  PlaneMirror mirror = establishMirror(
+      image, linearOf(picture), grown(unclear, params.background.mask_margin_px) == 0, 1.0 - sky);
   if (!mirror.established()) return mirror;
   mirror.off = off_planes;
   mirror.at_key = addedBy(mirror, image);
@@ -121,7 +122,11 @@ SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, P
 cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
                    const cv::Mat& sky, const RenderParams& params, Prepared& p) {
   const cv::Mat objects = p.key_labels != 0;
-  const SeenShadows shadows = seenShadows(sun, sky, e.picture, objects | place.blind);
+  SeenShadows shadows = seenShadows(sun, sky, e.picture, objects | place.blind);
+  const cv::Mat dark = (sun < kUnshadedSun) & (shadows.refuted == 0);
+  p.mirror = findMirror(e.actors, e.picture, objects | dark, sky, place.off_planes, params, p);
+  if (p.mirror.established())  // what is mirrored can be dark, too
+    shadows = seenShadows(sun, sky, unmirrored(p.mirror, e.picture), objects | place.blind);
   if (cv::countNonZero(shadows.refuted) > 0) {
     p.remarks.push_back(
         "a shadow that the light predicts is not seen in the picture: none is taken out or drawn "
@@ -129,8 +134,6 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   }
   p.shadowless |= grown(shadows.refuted, params.background.shadow_margin_px);
   if (shadows.none) p.shadowless.setTo(255);
-  const cv::Mat dark = ((sun < kUnshadedSun) | (sky < kUnshadedSky)) & (shadows.refuted == 0);
-  p.mirror = findMirror(e.actors, e.picture, objects | dark, place.off_planes, params, p);
   return restingTraces(p, shadows, place.curved, params);
 }
 

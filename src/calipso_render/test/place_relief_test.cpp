@@ -70,6 +70,21 @@ TEST(PlaceRelief, AWallGoesOnBehindAnObjectAndMeetsTheFloorThere) {
   EXPECT_NEAR((behind.normal - Eigen::Vector3f(0, -1, 0)).norm(), 0.0, 1e-3);
 }
 
+// Depth images are taken as near as all of a pixel's surroundings; towards the horizon that is a
+// row farther off, and much.
+TEST(PlaceRelief, AFloorUpToTheHorizonIsNoPlaneOfItsOwn) {
+  Room room;
+  for (int v = 0; v < kHigh; ++v) {
+    const float down = std::max(0.0f, static_cast<float>(camera().ray(0, v).y()));
+    room.scenery.row(v) = down, room.depth.row(v) = down > 0.0f ? 1.0f / down : 0.0f;
+  }
+  cv::erode(room.scenery, room.scenery, cv::Mat::ones(3, 3, CV_8U));
+  room.scenery(kObject) = 0.0f, room.labels(kObject) = 1;
+  const PlaceSurfaces surfaces = room.surfaces();
+  EXPECT_EQ(cv::countNonZero(surfaces.label > 1), 0);
+  EXPECT_TRUE(findRelief(surfaces, kSun).empty());
+}
+
 TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereTheSunComesFromBehind) {
   EXPECT_TRUE(
       findRelief(findSurfaces(cv::Mat(), cv::Mat(), Room().labels, floorPlane(), camera()), kSun)

@@ -79,7 +79,7 @@ TEST(PlaneMirror, FindsStrengthAndSurroundingsOfAPolishedTable) {
   PlaneMirror truth;
   truth.strength = kTrueStrength, truth.surroundings = kSky, truth.slope = 0.02f;
   const PlaneMirror found =
-      establishMirror(m.image, tablePicture(addedBy(truth, m.image)), m.known);
+      establishMirror(m.image, tablePicture(addedBy(truth, m.image)), m.known, cv::Mat());
   ASSERT_TRUE(found.established());
   EXPECT_FLOAT_EQ(found.slope, 0.02f);
   // What it adds is one colour: strength and surroundings are known together only.
@@ -91,7 +91,7 @@ TEST(PlaneMirror, FindsStrengthAndSurroundingsOfAPolishedTable) {
 
 TEST(PlaneMirror, IsNotFoundOnAMattTable) {
   const Mirrored m;
-  EXPECT_FALSE(establishMirror(m.image, tablePicture(cv::Mat()), m.known).established());
+  EXPECT_FALSE(establishMirror(m.image, tablePicture(cv::Mat()), m.known, cv::Mat()).established());
 }
 
 TEST(PlaneMirror, SomethingDarkBesideItsPlaceIsNone) {
@@ -101,7 +101,7 @@ TEST(PlaneMirror, SomethingDarkBesideItsPlaceIsNone) {
   cv::Mat beside;
   const cv::Mat by = (cv::Mat_<double>(2, 3) << 1, 0, 18, 0, 1, 0);
   cv::warpAffine(addedBy(truth, m.image), beside, by, beside.size());
-  EXPECT_FALSE(establishMirror(m.image, tablePicture(beside), m.known).established());
+  EXPECT_FALSE(establishMirror(m.image, tablePicture(beside), m.known, cv::Mat()).established());
 }
 
 TEST(PlaneMirror, UnmirroredTakesAwayWhatWasAdded) {
