@@ -14,6 +14,8 @@ constexpr int kPoints = 150;          // surface points followed
 constexpr double kRoughScale = 30.0;  // deviations; residuals of a rough match
 constexpr double kFineScale = 40.0;
 constexpr double kLeastInlierShare = 0.35;
+// px: where the last frame was foreseen so well, this one is matched at once.
+constexpr double kForeseenPx = 0.7;
 constexpr int kRadius = 5;  // px, of a patch: a sheet is often plain
 
 DeformationField::Points matrixOf(const std::vector<Eigen::Vector3d>& points) {
@@ -103,6 +105,29 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
   return matches;
 }
 
+// Median way in the picture from where the tracks' points were predicted to where they are, px.
+double DeformableTracker::missOf(const Eigen::VectorXd& predicted,
+                                 const DeformationObservation& observation,
+                                 const Frame& frame) const {
+  std::vector<Eigen::Vector3d> rest;
+  for (const Track& track : observation.tracks) rest.push_back(track.point);
+  const DeformationField::Points points = matrixOf(rest);
+  const auto weights = fitter_.field().weightsAt(points);
+  const auto foreseen = DeformationFitter::displaced(points, weights, predicted);
+  const auto found = DeformationFitter::displaced(points, weights, observation.controls);
+  std::vector<double> misses;
+  for (int i = 0; i < points.rows(); ++i) {
+    const Eigen::Vector2d there =
+        frame.camera.projectWorld(model_.world_from_object * found.row(i).transpose());
+    const Eigen::Vector2d expected =
+        frame.camera.projectWorld(model_.world_from_object * foreseen.row(i).transpose());
+    misses.push_back((there - expected).norm());
+  }
+  const auto middle = misses.begin() + misses.size() / 2;
+  std::nth_element(misses.begin(), middle, misses.end());
+  return *middle;
+}
+
 DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
   if (cut) before_last_.reset();
   const Eigen::VectorXd predicted = predict(frame.time);
@@ -113,6 +138,7 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
   // Without a motion to go by, the shape may be some pixels away.
   for (const Care care : {Care::kRough, Care::kForward, Care::kChecked}) {
     if (care == Care::kRough && before_last_) continue;
+    if (care == Care::kForward && before_last_ && last_miss_px_ < kForeseenPx) continue;
     const auto matches = match(frame, observation.controls, care,
                                care == Care::kChecked ? &observation.brightness : nullptr);
     const DeformationFit fit = fitter_.fit(matches, frame.camera, observation.controls, predicted,
@@ -133,6 +159,7 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
     before_last_.reset();
     return observation;
   }
+  last_miss_px_ = missOf(predicted, observation, frame);
   before_last_ = last_;
   last_ = observation;
   return observation;

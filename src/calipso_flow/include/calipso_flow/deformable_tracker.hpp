@@ -46,6 +46,8 @@ class DeformableTracker {
 
  private:
   Eigen::VectorXd predict(double time) const;
+  double missOf(const Eigen::VectorXd& predicted, const DeformationObservation& observation,
+                const Frame& frame) const;
   // @param brightness  null, or see DeformationObservation
   std::vector<SurfaceMatch> match(const Frame& frame, const Eigen::VectorXd& controls, Care care,
                                   Eigen::VectorXd* brightness) const;
@@ -60,6 +62,7 @@ class DeformableTracker {
   DeformationField::Points points_;  // surface points followed, object frame
   DeformationObservation last_;
   std::optional<DeformationObservation> before_last_;
+  double last_miss_px_ = 0.0;  // of the last prediction
 };
 
 }  // namespace calipso::flow
