@@ -19,6 +19,7 @@ using Vertices = decltype(TriangleMesh::vertices);
 constexpr double kFps = 30.0;
 constexpr int kOver = 2;                // samples per pixel and direction
 constexpr double kTextureStep = 0.045;  // m, wavelength scale of the texture
+constexpr double kGustPeriod = 1.5;     // s
 constexpr int kTruthBeamNodes = 3000;
 constexpr int kSubsteps = 16;  // per frame: backward Euler shall not damp the beam
 
@@ -133,10 +134,10 @@ cv::Mat film(const ObjectModel& model, const Vertices& moved, const Camera& came
 }
 
 ObjectDynamics analyseFilm(const ObjectModel& model, const Camera& camera, const Shapes& shapes,
-                           const std::vector<double>& times, const Eigen::Vector3d& gravity) {
-  constexpr double kNoise = 2.0;  // grey levels
+                           const std::vector<double>& times, const Eigen::Vector3d& gravity,
+                           double noise_grey) {
   const auto frame = [&](size_t k) {
-    return makeFrame(times[k], film(model, shapes[k], camera, kNoise, k + 1), camera);
+    return makeFrame(times[k], film(model, shapes[k], camera, noise_grey, k + 1), camera);
   };
   ClipAnalyser analyser(frame(0), {model}, {cv::Mat()}, gravity);
   for (size_t k = 1; k < times.size(); ++k) analyser.add(frame(k));
@@ -147,17 +148,25 @@ FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetTrut
   FilmedSheet sheet;
   sheet.model.name = "sheet";
   sheet.model.index = 1;
-  sheet.model.mesh = dividedBox({-0.35, -0.002, -0.8}, {0.35, 0.002, 0.0}, {14, 1, 16});
+  const double half = 0.5 * settings.width;
+  const int columns = static_cast<int>(std::lround(20.0 * settings.width)),
+            rows = static_cast<int>(std::lround(20.0 * settings.height));
+  sheet.model.mesh =
+      dividedBox({-half, -0.002, -settings.height}, {half, 0.002, 0.0}, {columns, 1, rows});
   sheet.model.world_from_object.translation().z() = 1.8;
   for (int i = 0; i < sheet.model.mesh.vertexCount(); ++i) {
-    const bool corner = std::abs(sheet.model.mesh.vertices(i, 0)) > 0.29;
+    const bool corner = std::abs(sheet.model.mesh.vertices(i, 0)) > half - 0.06;
     if (sheet.model.mesh.vertices(i, 2) > -0.02 && (corner || !settings.pegged))
       sheet.model.attached.push_back(i);
   }
   sheet.gravity = {0.0, 0.0, -9.81};
   sheet.camera = lookingAt({1.5, -1.6, 1.5}, {0.0, 0.05, 1.4}, 480, 360, 620.0);
   sheet.times = frameTimes(frames);
-  sheet.wind = wind;
+  const auto windAt = [&](double t) -> Eigen::Vector3d {
+    return (1.0 + settings.gust * std::sin(2.0 * M_PI * t / kGustPeriod)) * wind;
+  };
+  sheet.wind.setZero();
+  for (const double t : sheet.times) sheet.wind += windAt(t) / frames;
   SheetSettings simulated;
   simulated.nodes = settings.nodes, simulated.longest_step = settings.step,
   simulated.stiffness = settings.stiffness;
@@ -166,15 +175,15 @@ FilmedSheet filmedSheet(const Eigen::Vector3d& wind, int frames, const SheetTrut
   const Vertices rest =
       sheet.model.mesh.vertices.rowwise() + sheet.model.world_from_object.translation().transpose();
   for (const SurfaceVector& u :
-       simulation.run(sheet.times, SurfaceVector::Zero(3 * count), [&](double) { return wind; })) {
+       simulation.run(sheet.times, SurfaceVector::Zero(3 * count), windAt)) {
     sheet.shapes.push_back(rest + reshaped(u));
   }
   return sheet;
 }
 
-FilmedBeam filmedBeam(double stiffness_ratio, int frames) {
+FilmedBeam filmedBeam(const BeamTruth& truth, int frames) {
   FilmedBeam beam;
-  beam.stiffness_ratio = stiffness_ratio;
+  beam.stiffness_ratio = truth.stiffness_ratio;
   beam.model.name = "beam";
   beam.model.index = 1;
   beam.model.mesh = dividedBox({0.0, -0.04, -0.04}, {0.8, 0.04, 0.04}, {30, 3, 3});
@@ -184,8 +193,8 @@ FilmedBeam filmedBeam(double stiffness_ratio, int frames) {
   beam.camera = lookingAt({0.5, -1.6, 0.3}, {0.4, 0.0, 0.0}, 480, 360, 700.0);
   beam.times = frameTimes(frames);
   Material material;
-  material.youngs_modulus = stiffness_ratio * material.density;
-  material.damping = 0.0;
+  material.youngs_modulus = truth.stiffness_ratio * material.density;
+  material.damping = truth.damping;
   fem::FemOptions options;
   options.target_nodes = kTruthBeamNodes;
   options.has_anchor = true;
@@ -197,13 +206,16 @@ FilmedBeam filmedBeam(double stiffness_ratio, int frames) {
     for (int axis = 0; axis < 3; ++axis) fixed.push_back(3 * node + axis);
   }
   const fem::ModalResult modal =
-      fem::naturalFrequencies(body.model(), fixed, 2, options.lumped_mass);
-  beam.frequency = modal.frequencies[0];
-  // Struck upwards: the first mode's shape, with the tip at 1.5 cm of amplitude.
+      fem::naturalFrequencies(body.model(), fixed, 4, options.lumped_mass);
+  beam.frequency = modal.frequencies[0];  // those of a square beam come in pairs
+  beam.second_frequency = modal.frequencies[2];
+  // Struck upwards: about the first mode's shape, with the tip at 1.5 cm of amplitude, and as much
+  // of the second's as is asked for.
   Eigen::VectorXd velocity = Eigen::VectorXd::Zero(3 * body.nodeCount());
   for (int n = 0; n < body.nodeCount(); ++n) {
     const double x = body.positions()[3 * n] / 0.8;
-    if (!body.isFixed(n)) velocity[3 * n + 2] = 0.5 * x * x * (3.0 - x);
+    const double second = truth.second * x * x * (x - 0.783) / (1.0 - 0.783);
+    if (!body.isFixed(n)) velocity[3 * n + 2] = 0.5 * x * x * (3.0 - x) + second;
   }
   velocity *= 0.015 * 2.0 * M_PI * beam.frequency;
   body.setState(body.positions(), velocity);
