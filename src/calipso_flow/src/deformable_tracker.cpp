@@ -105,6 +105,10 @@ std::vector<SurfaceMatch> DeformableTracker::match(const Frame& frame,
   return matches;
 }
 
+bool DeformableTracker::isForeseen() const {
+  return before_last_ && last_miss_px_ < kForeseenPx && fitter_.field().sheetNormal();
+}
+
 // Median way in the picture from where the tracks' points were predicted to where they are, px.
 double DeformableTracker::missOf(const Eigen::VectorXd& predicted,
                                  const DeformationObservation& observation,
@@ -138,7 +142,7 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
   // Without a motion to go by, the shape may be some pixels away.
   for (const Care care : {Care::kRough, Care::kForward, Care::kChecked}) {
     if (care == Care::kRough && before_last_) continue;
-    if (care == Care::kForward && before_last_ && last_miss_px_ < kForeseenPx) continue;
+    if (care == Care::kForward && isForeseen()) continue;
     const auto matches = match(frame, observation.controls, care,
                                care == Care::kChecked ? &observation.brightness : nullptr);
     const DeformationFit fit = fitter_.fit(matches, frame.camera, observation.controls, predicted,

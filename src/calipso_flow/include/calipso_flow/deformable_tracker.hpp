@@ -46,6 +46,8 @@ class DeformableTracker {
 
  private:
   Eigen::VectorXd predict(double time) const;
+  // A sheet that was foreseen well is matched at once; a solid's vibration is too fine for that.
+  bool isForeseen() const;
   double missOf(const Eigen::VectorXd& predicted, const DeformationObservation& observation,
                 const Frame& frame) const;
   // @param brightness  null, or see DeformationObservation
