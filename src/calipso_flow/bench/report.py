@@ -90,10 +90,12 @@ COLUMNS = [("case", "case"), ("object", "object"), ("moving", "moves"),
            ("velocity_error_percent", "v, %"), ("velocity_error_px", "v, px/frame"),
            ("angular_velocity_error_percent", "spin, %"), ("g_error_percent", "g, %"),
            ("collision_errors_frames", "collisions, frames"),
+           ("impacts_present", "impacts"), ("impacts_found", "found"), ("impacts_false", "false"),
            ("sign_change_error_frames", "sign change, frames"),
            ("restitution_error_percent", "restitution, %"), ("thrown_before_px", "thrown on, px"),
            ("thrown_after_px", "after impact, px"), ("below_uncertainty", "below its uncertainty"),
-           ("ms_frame", "ms/frame"), ("cpu_ms_frame", "CPU ms/frame")]
+           ("covered_95", "v in its 95 %"), ("ms_frame", "ms/frame"),
+           ("cpu_ms_frame", "CPU ms/frame")]
 
 
 FILMED = [("case", "case"), ("wind_true_m_s", "wind, m/s"), ("wind_m_s", "found"),
@@ -107,7 +109,8 @@ CLOTH = [("case", "case"), ("object", "object"), ("frequency_error_percent", "fr
          ("track_cpu_ms_frame", "CPU ms/frame"), ("wind_cpu_ms_frame", "search for the wind, CPU ms/frame")]
 REPEATED = [("repeats", "repeats"), ("velocity_covered_95", "velocity in its 95 %"),
             ("spin_covered_95", "spin in its 95 %"), ("gravity_found", "g told"), ("gravity_covered_95", "g in its 95 %"),
-            ("velocity_rms_m_s", "velocity error, m/s")]
+            ("velocity_normalised", "squared v error over its variance"),
+            ("spin_normalised", "of spin"), ("velocity_rms_m_s", "velocity error, m/s")]
 FLOW = [("method", "method"), ("endpoint_error_px", "end-point error, px"), ("ms_frame", "CPU ms")]
 
 
@@ -232,7 +235,8 @@ def main():
     cloth = [e for e in aligned + exact if e.get("deforms")]
     with open(arguments.out, "w") as out:
         out.write("# Dynamics\nWritten by `calipso_flow/bench/run.sh`. Errors are root mean squares up to the "
-                  "first true collision. ms/frame is wall time over all objects of a scene, tracking and fit.\n\n"
+                  "first true collision. Impacts less than a frame apart are one, found when told within a frame. "
+                  "ms/frame is wall time over all objects of a scene, tracking and fit.\n\n"
                   "## Models and masks as calipso_align finds them\n" + table(aligned) +
                   "\n\n## True model and pose\n" + table(exact) +
                   "\n\n## Enlarged to twice the width and height\n" + table(large) +

@@ -106,7 +106,7 @@ NamedMotion LiveAnalyser::follow(bool cut, Live& object) const {
 void LiveAnalyser::filterPose(const Observation& observation, bool cut, Live& object) const {
   const Eigen::Vector3d& centroid = object.followed.tracker().centroid();
   const PoseMeasurement measurement = measurementsOf({observation}, centroid).front();
-  MotionState next = predicted(object.state, observation.time, object.piece);
+  MotionState next = predicted(object.state, measurement, object.piece, kNoiseScale);
   if (measurement.valid) {
     if (cut || squaredSurprise(next, measurement, kNoiseScale) > kCollisionSurprise) {
       MotionPiece fresh = object.piece;
@@ -114,7 +114,7 @@ void LiveAnalyser::filterPose(const Observation& observation, bool cut, Live& ob
       const double between = 0.5 * (object.state.time + observation.time);
       next =
           predicted(enterPiece(predicted(object.state, between, object.piece), fresh, object.prior),
-                    observation.time, object.piece);
+                    measurement, object.piece, kNoiseScale);
     }
     correct(next, measurement, kNoiseScale);
   }

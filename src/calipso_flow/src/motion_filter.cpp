@@ -186,7 +186,7 @@ double passForward(const std::vector<PoseMeasurement>& measurements,
     Stop stop;
     stop.measurement = static_cast<int>(k);
     stop.F = transition(state, measurement.time - state.time);
-    stop.arrived = state = predicted(state, measurement.time, pieces[piece]);
+    stop.arrived = state = predicted(state, measurement, pieces[piece], noise_scale);
     if (measurement.valid) sum += correct(state, measurement, noise_scale);
     stop.left = state;
     visit(stop);
@@ -285,6 +285,18 @@ MotionState predicted(const MotionState& state, double time, const MotionPiece& 
   next.covariance.transposeInPlace();
   applyTransition(state, dt, next.covariance);  // F P^T F^T, P being symmetric
   next.covariance += processNoise(piece, dt);
+  return next;
+}
+
+MotionState predicted(const MotionState& state, const PoseMeasurement& measurement,
+                      const MotionPiece& piece, double noise_scale) {
+  MotionState next = predicted(state, measurement.time, piece);
+  if (!measurement.valid) return next;
+  const Matrix6d drift = std::max(1.0, noise_scale * noise_scale) * measurement.drift;
+  next.covariance.block<3, 3>(kP, kP) += drift.topLeftCorner<3, 3>();
+  next.covariance.block<3, 3>(kP, kR) += drift.topRightCorner<3, 3>();
+  next.covariance.block<3, 3>(kR, kP) += drift.bottomLeftCorner<3, 3>();
+  next.covariance.block<3, 3>(kR, kR) += drift.bottomRightCorner<3, 3>();
   return next;
 }
 

@@ -49,8 +49,9 @@ std::vector<PoseMeasurement> measurementsOf(const std::vector<Observation>& obse
   std::vector<PoseMeasurement> measurements;
   for (const Observation& observation : observations) {
     measurements.push_back({observation.time, observation.world_from_object * centroid,
-                            observation.world_from_object.linear(), observation.covariance,
-                            observation.found, observation.common});
+                            observation.world_from_object.linear(),
+                            observation.covariance - observation.persistent, observation.found,
+                            observation.common, observation.drift});
   }
   return measurements;
 }

@@ -38,7 +38,10 @@ constexpr double kFarView = 0.5;
 // of the object's extent, of its outline seen from another side
 constexpr double kShapeError = 0.01;
 constexpr double kIndependent = 1.5;  // errors along an outline: they are off nearly as one
-constexpr double kKeySigma = 1e-4;    // of the diagonal: the key pose is given, not measured
+// rad, or relative distance: what a wrong shape does to the pose is forgotten over such a change of
+// view, as it is over as large a part of the picture (pose_fit.cpp)
+constexpr double kViewLength = 0.4;
+constexpr double kKeySigma = 1e-4;  // of the diagonal: the key pose is given, not measured
 
 // Follows the reference's seeds into the frame, the object's look being warped to `look` and the
 // object expected at `start`.
@@ -95,15 +98,19 @@ ImageMotion imageMotion(const Camera& camera, const Eigen::Isometry3d& a,
   return motion;
 }
 
-// How differently a reference and a frame show an object: by the turn against the camera, rad, and
-// by the distance, relative.
-double viewChange(const ReferenceView& reference, const Frame& frame, const Eigen::Isometry3d& pose,
+// How differently an object shows in two poses in the camera: by the turn, rad, and by the
+// distance, relative.
+double viewChange(const Eigen::Isometry3d& then, const Eigen::Isometry3d& now,
                   const Eigen::Vector3d& centroid) {
-  const Eigen::Isometry3d now = frame.camera.world_from_camera.inverse() * pose;
-  const Eigen::Isometry3d then =
-      reference.frame().camera.world_from_camera.inverse() * reference.worldFromObject();
   const double turn = vectorFromRotation(now.linear() * then.linear().transpose()).norm();
   return std::hypot(turn, std::log((now * centroid).norm() / (then * centroid).norm()));
+}
+
+double viewChange(const ReferenceView& reference, const Frame& frame, const Eigen::Isometry3d& pose,
+                  const Eigen::Vector3d& centroid) {
+  return viewChange(
+      reference.frame().camera.world_from_camera.inverse() * reference.worldFromObject(),
+      frame.camera.world_from_camera.inverse() * pose, centroid);
 }
 
 // Seeds that the camera would see inside the picture, hidden or not.
@@ -155,6 +162,7 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
                   references_.front().view.warp(key_frame.camera, model.world_from_object),
                   key_frame, model.world_from_object));
   last_ = key_;
+  last_world_from_camera_ = key_frame.camera.world_from_camera;
   last_seen_time_ = key_.time;
   due_inliers_ = static_cast<int>(key_.tracks.size());
 }
@@ -238,6 +246,9 @@ Observation ObjectTracker::refine(const Frame& frame, const Reference& reference
   // The reference's own error is all of its frames': too far away there, the object is taken for
   // too far away here.
   observation.covariance += reference.covariance;
+  observation.persistent += reference.covariance;
+  observation.reference_time = reference.view.frame().time;
+  observation.reference_error = reference.alone;
   return observation;
 }
 
@@ -264,6 +275,7 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   if (!observation.found) return pose;
   for (size_t i = 0; i < tracks; ++i) observation.tracks[i].inlier = fit.inlier[i];
   observation.covariance = fit.covariance;
+  observation.persistent = fit.persistent;
   observation.common = fit.common;
   observation.deviation = fit.deviation;
   return fit.world_from_object;
@@ -284,7 +296,7 @@ void ObjectTracker::addOutline(const Frame& frame, const Look& seen,
   for (const OutlineStep& step : steps) {
     const SurfaceMatch match = step.match(outline_bias_.towards(step.outward));
     const Eigen::Matrix2d shape = shape_px * shape_px * Eigen::Matrix2d::Identity();
-    found.push_back({match.point, match.pixel, shared * (match.covariance + shape), true});
+    found.push_back({match.point, match.pixel, shared * (match.covariance + shape), true, shared});
   }
 }
 
@@ -312,7 +324,13 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
   Observation best = attempt(frame, nearest, predicted, drowned_ ? wide_ : params_);
   if (!isClear(best)) best = tryOtherwise(frame, nearest, predicted, std::move(best));
   frames_lost_ = best.found ? 0 : frames_lost_ + 1;
-  if (best.found) remember(frame, best, cut);
+  if (best.found) {
+    const double change =
+        viewChange(last_world_from_camera_.inverse() * last_->world_from_object,
+                   frame.camera.world_from_camera.inverse() * best.world_from_object, centroid_);
+    best.drift = driftSinceLast(best, change);
+    remember(frame, best, cut);
+  }
   return best;
 }
 
@@ -369,9 +387,19 @@ bool ObjectTracker::stays(const Observation& observation) const {
              kStaysShare * boundingDiagonal(model_.mesh);
 }
 
+// Errors of covariance C that are correlated by q differ by 2 (1 - q) C.
+// @param change  of the view since
+Matrix6d ObjectTracker::driftSinceLast(const Observation& observation, double change) const {
+  const Matrix6d forgotten =
+      (1.0 - std::exp(-change / kViewLength)) * (last_->persistent + observation.persistent);
+  if (observation.reference_time == last_->reference_time) return forgotten;
+  return forgotten + last_->reference_error + observation.reference_error;
+}
+
 void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
   before_last_ = cut ? std::nullopt : last_;
   last_ = observation;
+  last_world_from_camera_ = frame.camera.world_from_camera;
   due_inliers_ = std::max(due_inliers_, observation.inliers());
   Reference& nearest = nearestReference(frame, observation.world_from_object);
   nearest.most_inliers = std::max(nearest.most_inliers, observation.inliers());
@@ -386,7 +414,7 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   }
   references_.push_back(
       {ReferenceView(frame, model_, observation.world_from_object, cv::Mat(), params_.seed_count),
-       observation.covariance});
+       observation.covariance, observation.covariance - observation.persistent});
   due_inliers_ = static_cast<int>(references_.back().view.seeds().size());
   look_ = {};  // the references may have moved
 }

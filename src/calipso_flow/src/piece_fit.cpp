@@ -113,13 +113,16 @@ double noiseScaleBetweenJumps(const std::vector<PoseMeasurement>& measurements) 
     // Newton's weights of the third divided difference, for frames that need not be evenly spaced.
     Eigen::Vector3d difference = Eigen::Vector3d::Zero();
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    for (int i = 0; i < 4; ++i) {
+    double later = 0.0;  // weight of a measurement and all after it, which share what drifts
+    for (int i = 3; i >= 0; --i) {
       double weight = 1.0;
       for (int j = 0; j < 4; ++j) {
         if (j != i) weight /= m[i].time - m[j].time;
       }
       difference += weight * m[i].position;
       covariance += weight * weight * m[i].covariance.topLeftCorner<3, 3>();
+      later += weight;
+      if (i > 0) covariance += later * later * m[i].drift.topLeftCorner<3, 3>();
     }
     squares.push_back(difference.dot(covariance.ldlt().solve(difference)));
   }

@@ -108,7 +108,7 @@ class PathSearch {
     int frames = 0;
     const int count = static_cast<int>(stages_.size());
     for (int k = s + 1; k < count; ++k) {
-      state = predicted(state, measurements_[k].time, piece);
+      state = predicted(state, measurements_[k], piece, noise_scale_);
       if (measurements_[k].valid) log_likelihood += correct(state, measurements_[k], noise_scale_);
       ++frames;
       Stage& stage = stages_[k];

@@ -13,9 +13,12 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kShapeLength = 2.5;  // see ShapeError
-constexpr double kShapeReach = 4.0;   // of 2 l^2: farther apart tracks do not err together
+// deviations by which it must stand out of what chance makes
+constexpr double kShapeSurprise = 1.0;
+constexpr double kShapeReach = 4.0;  // of 2 l^2: farther apart tracks do not err together
 // 12 / (12 - 6): a pose takes up six of the errors of six such patches
 constexpr double kShapeAbsorbed = 2.0;
+constexpr int kLeastPoints = 2;
 constexpr double kRobust = 3.0;  // deviations: residuals beyond count less and less
 
 // Residuals and their derivatives by the motion of movePose(), for one pose.
@@ -24,6 +27,7 @@ struct Linearisation {
   std::vector<Eigen::Matrix<double, 2, 6>> jacobian;
   std::vector<Eigen::Matrix2d> information;  // 1/px^2
   std::vector<bool> outline;
+  std::vector<double> alike;
 };
 
 Linearisation linearise(const std::vector<Correspondence>& correspondences, const Camera& camera,
@@ -45,6 +49,7 @@ Linearisation linearise(const std::vector<Correspondence>& correspondences, cons
     const Eigen::Matrix2d covariance = c.covariance + floor * floor * Eigen::Matrix2d::Identity();
     lin.information.push_back(covariance.inverse());
     lin.outline.push_back(c.outline);
+    lin.alike.push_back(c.alike);
   }
   return lin;
 }
@@ -138,14 +143,15 @@ struct ShapeError {
   Matrix6d gradient = Matrix6d::Zero();  // sum_ij c k_ij A_i^T A_j: covariance of sum_i A_i^T r_i
 };
 
-ShapeError shapeError(const Whitened& tracks) {
+// @param deviation  of the residuals, whitened
+ShapeError shapeError(const Whitened& tracks, double deviation) {
   const size_t count = tracks.pixel.size();
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& pixel : tracks.pixel) mean += pixel / count;
   double spread = 0.0;
   for (const Eigen::Vector2d& pixel : tracks.pixel) spread += (pixel - mean).squaredNorm() / count;
   const double twice_length = 2.0 * spread / (kShapeLength * kShapeLength);
-  double product = 0.0;
+  double product = 0.0, chance = 0.0;  // of independent residuals: its variance
   Matrix6d sum = Matrix6d::Zero();
   for (size_t i = 0; i < count; ++i) {
     double nearest = std::numeric_limits<double>::infinity();
@@ -159,11 +165,14 @@ ShapeError shapeError(const Whitened& tracks) {
     }
     sum += tracks.jacobian[i].transpose() * around;
     const double correlation = std::exp(-nearest / twice_length);
-    if (neighbour != i)
-      product += 0.5 * correlation * tracks.residual[i].dot(tracks.residual[neighbour]) / count;
+    if (neighbour == i) continue;
+    product += 0.5 * correlation * tracks.residual[i].dot(tracks.residual[neighbour]) / count;
+    // 0.5 in two dimensions; two that are nearest to each other come twice.
+    chance += std::pow(correlation * deviation * deviation / count, 2);
   }
   ShapeError error;
-  error.variance = std::max(0.0, kShapeAbsorbed * product);
+  if (product < kShapeSurprise * std::sqrt(chance)) return error;
+  error.variance = kShapeAbsorbed * product;
   error.gradient = error.variance * sum;
   return error;
 }
@@ -171,7 +180,9 @@ ShapeError shapeError(const Whitened& tracks) {
 // Sums of A^T A over the inliers, A = Jacobian in units of its own deviation.
 struct Information {
   Matrix6d points = Matrix6d::Zero(), outline = Matrix6d::Zero();
-  Matrix6d geometry = Matrix6d::Zero();  // of points, each counted alike, 1/px^2
+  Matrix6d outline_apart = Matrix6d::Zero();  // of its points' own errors, which are not alike
+  Matrix6d geometry = Matrix6d::Zero();       // of all, each counted alike, 1/px^2
+  int outline_inliers = 0;
 };
 
 Information chooseInliers(const Linearisation& lin, const std::vector<double>& lengths,
@@ -180,11 +191,13 @@ Information chooseInliers(const Linearisation& lin, const std::vector<double>& l
   for (size_t i = 0; i < lengths.size(); ++i) {
     fit.inlier.push_back(lengths[i] < limit * found.of(lin.outline[i]));
     if (!fit.inlier.back()) continue;
-    (lin.outline[i] ? sum.outline : sum.points) +=
-        lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
-    if (lin.outline[i]) continue;
-    ++fit.inliers;
-    sum.geometry += lin.jacobian[i].transpose() * lin.jacobian[i];
+    const Matrix6d told = lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
+    (lin.outline[i] ? sum.outline : sum.points) += told;
+    if (lin.outline[i]) sum.outline_apart += told / lin.alike[i];
+    ++(lin.outline[i] ? sum.outline_inliers : fit.inliers);
+    // Across an outline, or in both directions.
+    const double most = lin.information[i].trace() / (lin.outline[i] ? 1.0 : 2.0);
+    sum.geometry += told / most;
   }
   return sum;
 }
@@ -195,19 +208,26 @@ void judge(const std::vector<Correspondence>& correspondences, const Linearisati
   const Deviations found = robustDeviations(lin, all);
   fit.deviation = found.points;
   const Information sum = chooseInliers(lin, all, found, params.inlier_sigma, fit);
-  if (fit.inliers < params.least_inliers) return;
+  // A point of the outline tells one coordinate of two. Of a small object there is little else; but
+  // without any point what moves may be what is behind it.
+  if (fit.inliers < kLeastPoints || fit.inliers + sum.outline_inliers / 2 < params.least_inliers)
+    return;
   const double of_points = found.of(false) * found.of(false),
                of_outline = found.of(true) * found.of(true);
   const Eigen::LDLT<Matrix6d> factor(sum.points / of_points + sum.outline / of_outline);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0.0)) return;
-  fit.common = fit.inliers * params.common_px * params.common_px * sum.geometry.inverse();
+  fit.common = (fit.inliers + 0.5 * sum.outline_inliers) * params.common_px * params.common_px *
+               sum.geometry.inverse();
   // Points err apart by what their shared error leaves of their deviation, and together by that.
-  const ShapeError shape = shapeError(whitened(correspondences, lin, fit.inlier));
+  const ShapeError shape = shapeError(whitened(correspondences, lin, fit.inlier), found.points);
   const double apart = std::max(1.0, of_points - shape.variance);
-  const Matrix6d gradient =
-      (apart * sum.points + shape.gradient) / (of_points * of_points) + sum.outline / of_outline;
+  const Matrix6d alone =
+      apart * sum.points / (of_points * of_points) + sum.outline_apart / of_outline;
+  const Matrix6d together =
+      shape.gradient / (of_points * of_points) + (sum.outline - sum.outline_apart) / of_outline;
   const Matrix6d inverse = factor.solve(Matrix6d::Identity());
-  fit.covariance = inverse * gradient * inverse;
+  fit.persistent = inverse * together * inverse;
+  fit.covariance = inverse * alone * inverse + fit.persistent;
   fit.converged = fit.covariance.allFinite();
 }
 

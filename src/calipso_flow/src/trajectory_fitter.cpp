@@ -303,6 +303,16 @@ std::optional<Trajectory::Gravity> TrajectoryFitter::fittedGravity() const {
                              longest};
 }
 
+// What slides or sways to a rest is brought to it by forces that are no larger than its weight.
+bool TrajectoryFitter::isImpact(const Jump& jump) const {
+  if (jump.cut) return false;
+  const auto rests = [&](size_t piece) { return pieces_[piece].travel == Travel::kRest; };
+  const size_t after = indexOfPieceAt(jump.after.time);
+  if (!rests(after) && !rests(after - 1)) return true;
+  return (jump.after.velocity - jump.before.velocity).norm() >
+         prior_.gravity.norm() * frameSpacing();
+}
+
 Trajectory TrajectoryFitter::result() {
   Trajectory trajectory;
   const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
@@ -334,7 +344,7 @@ Trajectory TrajectoryFitter::result() {
                   32.0 * drift / (span * span));
   }
   for (const Jump& jump : motion.jumps) {
-    if (jump.cut) continue;
+    if (!isImpact(jump)) continue;
     const double time = jump.after.time;
     trajectory.collisions.push_back(
         {time, timeDeviation(indexOfPieceAt(time)), jump.before, jump.after});

@@ -43,6 +43,7 @@ class TrajectoryFitter {
   double timeDeviation(size_t piece) const;
 
   void settleStillPieces();
+  bool isImpact(const Jump& jump) const;
   std::vector<MotionState> statesWithHonestRest(const SmoothedMotion& motion) const;
   // Of velocity and spin, by errors of the poses that change slowly over the piece at `time`.
   Matrix6d driftCovariance(double time) const;

@@ -189,6 +189,46 @@ TEST(Trajectory, velocityIntervalsAreCalibrated) {
   EXPECT_LE(inside, 0.99 * kRepeats);
 }
 
+// A wrong shape puts the pose off by what changes with the view: a walk of 2 mm per frame in depth,
+// over ten times what single poses scatter by. Where that is stated, the velocity's interval holds.
+TEST(Trajectory, anErrorThatDriftsIsNotTakenForMotion) {
+  constexpr int kRepeats = 100, kFrames = 15;
+  constexpr double kStep = 2e-3;
+  const Eigen::Vector3d velocity(0.8, 0.3, 0.0);
+  int inside = 0;
+  for (int i = 0; i < kRepeats; ++i) {
+    auto measurements = measure(
+        kFrames, 1.5e-4, 1e-3, 900 + i, [&](double t) { return Eigen::Vector3d(t * velocity); },
+        still);
+    std::mt19937 random(i);
+    std::normal_distribution<double> step(0.0, kStep);
+    double off = 0.0;
+    for (int k = 1; k < kFrames; ++k) {
+      off += step(random);
+      measurements[k].position.y() += off;
+      measurements[k].drift(1, 1) = kStep * kStep;
+    }
+    const MotionState& state = fitTrajectory(measurements, {}, testPrior()).states[kFrames / 2];
+    const Eigen::Vector3d error = state.velocity - velocity;
+    const Eigen::Matrix3d covariance = state.twistCovariance().topLeftCorner<3, 3>();
+    inside += error.dot(covariance.ldlt().solve(error)) < 7.815;  // 95 %, three degrees of freedom
+  }
+  EXPECT_GE(inside, 0.88 * kRepeats);  // three deviations of a count of 100 below 95
+}
+
+// Slides, is braked by friction and stays.
+TEST(Trajectory, comingToRestIsNoImpact) {
+  constexpr double kBraking = 1.2, kStart = 0.8;  // m/s^2, m/s
+  const auto slide = [&](double t) {
+    const double braked = std::min(t, kStart / kBraking);
+    return Eigen::Vector3d(kStart * braked - 0.5 * kBraking * braked * braked, 0.0, 0.0);
+  };
+  const Trajectory trajectory =
+      fitTrajectory(measure(36, 2e-4, 1e-3, 5, slide, still), {}, testPrior());
+  EXPECT_TRUE(trajectory.collisions.empty());
+  EXPECT_NEAR(trajectory.states[5].velocity.x(), kStart - kBraking * 5 / kFps, 0.02);
+}
+
 TEST(Trajectory, worksOnOneAndTwoFrames) {
   const auto one = measure(1, 0.001, 0.01, 8, still, still);
   EXPECT_FALSE(fitTrajectory(one, {}, testPrior()).movingAt(0.0));

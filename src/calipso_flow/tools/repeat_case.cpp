@@ -34,8 +34,28 @@ struct Throw {
   }
 };
 
-bool inside(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
-  return error.dot(covariance.ldlt().solve(error)) < kChiSquared95;
+// How errors of three components compare with their covariances.
+struct Calibration {
+  int inside = 0;           // of 95 %
+  double normalised = 0.0;  // squares in units of their variance, per component: 1 as stated
+  void add(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
+    const double square = error.dot(covariance.ldlt().solve(error));
+    inside += square < kChiSquared95;
+    normalised += square / 3.0;
+  }
+};
+
+ObjectDynamics analyseWithNoise(const Throw& box, const std::vector<cv::Mat>& clean, int seed) {
+  cv::RNG rng(seed);
+  const auto frame = [&](int k) {
+    cv::Mat grain(clean[k].size(), CV_32F), picture;
+    rng.fill(grain, cv::RNG::NORMAL, 0.0, kNoise);
+    cv::add(clean[k], grain, picture, cv::noArray(), CV_8U);
+    return makeFrame(k / kFps, picture, box.camera);
+  };
+  ClipAnalyser analyser(frame(0), {box.model}, {cv::Mat()}, box.gravity);
+  for (int k = 1; k < kFrames; ++k) analyser.add(frame(k));
+  return analyser.finish().front();
 }
 
 }  // namespace
@@ -46,25 +66,17 @@ std::vector<std::string> evaluateRepeats(int repeats) {
   for (int k = 0; k < kFrames; ++k) {
     clean.push_back(film(box.model, box.at(k / kFps), box.camera, 0.0, 0));
   }
-  int velocity = 0, spin = 0, gravity = 0, found = 0;
+  Calibration velocity, spin;
+  int gravity = 0, found = 0;
   double square = 0.0;
   for (int n = 0; n < repeats; ++n) {
-    cv::RNG rng(n + 1);
-    const auto frame = [&](int k) {
-      cv::Mat grain(clean[k].size(), CV_32F), picture;
-      rng.fill(grain, cv::RNG::NORMAL, 0.0, kNoise);
-      cv::add(clean[k], grain, picture, cv::noArray(), CV_8U);
-      return makeFrame(k / kFps, picture, box.camera);
-    };
-    ClipAnalyser analyser(frame(0), {box.model}, {cv::Mat()}, box.gravity);
-    for (int k = 1; k < kFrames; ++k) analyser.add(frame(k));
-    const ObjectDynamics dynamics = analyser.finish().front();
+    const ObjectDynamics dynamics = analyseWithNoise(box, clean, n + 1);
     const int middle = kFrames / 2;
     const MotionState& state = dynamics.motions[middle].state;
     const Eigen::Vector3d error = state.velocity - (box.velocity + middle / kFps * box.gravity);
     const Matrix6d covariance = state.twistCovariance();
-    velocity += inside(error, covariance.topLeftCorner<3, 3>());
-    spin += inside(state.spin - box.spin, covariance.bottomRightCorner<3, 3>());
+    velocity.add(error, covariance.topLeftCorner<3, 3>());
+    spin.add(state.spin - box.spin, covariance.bottomRightCorner<3, 3>());
     square += error.squaredNorm();
     if (!dynamics.trajectory.gravity) continue;
     ++found;
@@ -73,10 +85,12 @@ std::vector<std::string> evaluateRepeats(int repeats) {
   }
   JsonEntry entry;
   entry.text("case", "filmed_repeats").text("object", "box").number("repeats", repeats);
-  entry.number("velocity_covered_95", velocity / double(repeats));
-  entry.number("spin_covered_95", spin / double(repeats));
+  entry.number("velocity_covered_95", velocity.inside / double(repeats));
+  entry.number("spin_covered_95", spin.inside / double(repeats));
   entry.number("gravity_covered_95", gravity / std::max(1.0, double(found)));
   entry.number("gravity_found", found / double(repeats));
+  entry.number("velocity_normalised", velocity.normalised / repeats);
+  entry.number("spin_normalised", spin.normalised / repeats);
   entry.number("velocity_rms_m_s", std::sqrt(square / repeats));
   return {entry.str()};
 }

@@ -47,6 +47,9 @@ struct PoseMeasurement {
   Matrix6d covariance;                 // of (m, rad), independent from time to time
   bool valid = false;                  // false: nothing was seen at this time
   Matrix6d common = Matrix6d::Zero();  // of errors that change slowly
+  // Of how an error has changed since the valid measurement before, which otherwise persists: the
+  // state's pose holds it.
+  Matrix6d drift = Matrix6d::Zero();
 };
 
 enum class Travel { kRest, kUniform, kFreeFall, kAccelerated, kForced };
@@ -97,6 +100,10 @@ SmoothedMotion smooth(const std::vector<PoseMeasurement>& measurements,
 
 // One step of the same filter, for frames as they come (live mode).
 MotionState predicted(const MotionState& state, double time, const MotionPiece& piece);
+// The same at the time of a measurement, whose error may have drifted: by more than is stated where
+// measurements err by more than they state.
+MotionState predicted(const MotionState& state, const PoseMeasurement& measurement,
+                      const MotionPiece& piece, double noise_scale);
 // Takes a measurement in. @return the log of its likelihood
 double correct(MotionState& state, const PoseMeasurement& measurement, double noise_scale);
 // Squared Mahalanobis length of the innovation, 6 degrees of freedom.

@@ -39,9 +39,15 @@ struct Observation {
   bool found = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
   Matrix6d covariance = Matrix6d::Zero();  // (m of the centroid, rad), world axes
-  Matrix6d common = Matrix6d::Zero();      // see PoseFit
-  double deviation = 0.0;                  // see PoseFit
-  double coverage = 0.0;                   // see ReferenceView::Warped
+  Matrix6d persistent = Matrix6d::Zero();  // see PoseFit
+  // By how much the persistent error may have changed since the object was found last.
+  Matrix6d drift = Matrix6d::Zero();
+  double reference_time = 0.0;  // s, of the frame that it was compared with
+  Matrix6d reference_error =
+      Matrix6d::Zero();                // covariance of what that frame's pose errs by alone
+  Matrix6d common = Matrix6d::Zero();  // see PoseFit
+  double deviation = 0.0;              // see PoseFit
+  double coverage = 0.0;               // see ReferenceView::Warped
   std::vector<Track> tracks;
   int inliers() const;
 };
@@ -84,6 +90,7 @@ class ObjectTracker {
   struct Reference {
     ReferenceView view;
     Matrix6d covariance = Matrix6d::Zero();  // of its pose, world axes; the key frame's is given
+    Matrix6d alone = Matrix6d::Zero();       // the part of it that no other frame shares
     int most_inliers = 0;                    // that a frame had with it
   };
   Observation refine(const Frame& frame, const Reference& reference, const Eigen::Isometry3d& start,
@@ -97,6 +104,7 @@ class ObjectTracker {
                            const Eigen::Isometry3d& predicted, Observation best);
   bool isClear(const Observation& observation) const;
   bool stays(const Observation& observation) const;  // found where it was
+  Matrix6d driftSinceLast(const Observation& observation, double change) const;
   void remember(const Frame& frame, const Observation& observation, bool cut);
 
   // Where the object's outline is found in the frame, as far as the model is known from this side.
@@ -114,6 +122,7 @@ class ObjectTracker {
   Look look_;  // the last one, which often serves again
   Observation key_;
   std::optional<Observation> last_, before_last_;  // found, most recent first
+  Eigen::Isometry3d last_world_from_camera_;       // of `last_`
   double last_seen_time_ = 0.0;                    // s; of the last frame, found in or not
   int frames_lost_ = 0;
   int due_inliers_ = 0;  // tracks that a clear observation has

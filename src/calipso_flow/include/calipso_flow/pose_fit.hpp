@@ -16,21 +16,24 @@ struct Correspondence {
   Eigen::Vector2d pixel;       // px
   Eigen::Matrix2d covariance;  // of pixel, px^2
   bool outline = false;  // found across the outline only; how well such are found is judged apart
+  double alike = 1.0;    // so many near it err with it, and `covariance` is as many times its own
 };
 
 struct PoseFitParams {
   double start_scale_px = 8.0;  // residuals up to this count fully at first, then less and less
   double floor_px = 0.03;       // no track is better than this: model error, compression
   double inlier_sigma = 4.0;    // a track further off than this many deviations does not count
-  double common_px = 0.006;  // error that all tracks of a frame may share, and that changes slowly:
-                             // of how looks are resampled and lit
+  double common_px = 0.004;    // error that all tracks of a frame may share, and that changes
+                              // slowly: of how looks are resampled and lit
   int max_iterations = 30;
-  int least_inliers = 6;
+  int least_inliers = 6;  // a point of the outline counts half
 };
 
 struct PoseFit {
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
   Matrix6d covariance = Matrix6d::Zero();  // of (m of the pivot, rad), world axes
+  // The part of it that stays from frame to frame as long as the object shows the same side.
+  Matrix6d persistent = Matrix6d::Zero();
   Matrix6d common =
       Matrix6d::Zero();      // the same of the error that all tracks share; not part of covariance
   std::vector<bool> inlier;  // per correspondence
