@@ -164,6 +164,23 @@ Eigen::Vector3d leanOf(const ObjectModel& model, const Vertices& mean_shape,
   return way - way.dot(down) * down;
 }
 
+namespace {
+
+// Only a standing vibration is the object's own. Whether a solid's is one its shape shows, which a
+// mode of the model explains or not; a sheet's shape is seen badly, but its shading shows travel.
+std::optional<StiffnessRatio> ownStiffness(const DeformableTracker& tracker,
+                                           const SurfaceLine& line, const Eigen::VectorXcd& shape,
+                                           std::string& note) {
+  const bool sheet = tracker.fitter().field().sheetNormal().has_value();
+  if (sheet && !line.wave_vector.isZero()) {
+    note = "no stiffness from the vibration: its crests travel, so that it is driven";
+    return std::nullopt;
+  }
+  return stiffnessRatio(tracker.model(), line.line, shape, note);
+}
+
+}  // namespace
+
 DeformationMotion describeDeformation(const DeformableTracker& tracker,
                                       const std::vector<DeformationObservation>& observations,
                                       const Eigen::Vector3d& gravity, bool with_wind) {
@@ -183,10 +200,9 @@ DeformationMotion describeDeformation(const DeformableTracker& tracker,
   for (const SpectralLine& line : spectrum.lines) {
     Eigen::VectorXcd shape;
     motion.lines.push_back(onSurface(tracker, modes, shading, series, line, shape));
-    // Only a standing vibration is the object's own.
-    const bool own = motion.lines.size() == 1 && motion.lines[0].wave_vector.isZero();
-    if (own)
-      motion.stiffness = stiffnessRatio(tracker.model(), motion.lines[0].line, shape, motion.note);
+    if (motion.lines.size() == 1) {
+      motion.stiffness = ownStiffness(tracker, motion.lines[0], shape, motion.note);
+    }
   }
   const ObjectModel& model = tracker.model();
   if (with_wind && tracker.fitter().field().sheetNormal()) {

@@ -240,6 +240,13 @@ TEST(StiffnessRatio, ofACantileverIsTheBeams) {
   // the beam's stiffness: measured as 1.10 with 1000 nodes, not derived.
   EXPECT_NEAR(ratio->value / kRatio, 1.0, 0.13);
   EXPECT_NEAR(ratio->deviation, 0.02 * ratio->value, 1e-6 * ratio->value);
+  // What travels moves as much a quarter of a period later, elsewhere.
+  Eigen::VectorXcd travelling = shape;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    travelling[3 * i + 2] = std::polar(0.01, 2.0 * M_PI * model.mesh.vertices(i, 0) / kLength);
+  }
+  EXPECT_FALSE(stiffnessRatio(model, line, travelling, note).has_value());
+  EXPECT_NE(note.find("driven"), std::string::npos);
   model.attached.clear();
   EXPECT_FALSE(stiffnessRatio(model, line, shape, note).has_value());
   EXPECT_NE(note.find("attachment"), std::string::npos);
