@@ -11,8 +11,8 @@ constexpr int kHexLanes = 32 / static_cast<int>(sizeof(Real));  // 8 floats or 4
 // Numbers per lane of a batch's constants, in this order: lambda, 2 mu, weights (8), inverse of the
 // modes' stiffness (45, upper triangle by rows), then
 //  boxes:   derivative scale per axis (3), mode of axis k at point q along axis k (8 x 3)
-//  others:  half the inverse Jacobian at each point (8 x 9, rows: parent axes), mode vectors (8 x 3
-//  x 3)
+//  others:  half the inverse Jacobian at each point (8 x 9, rows: parent axes),
+//           mode vectors (8 x 3 x 3)
 constexpr int kHexCommon = 2 + 8 + 45;
 constexpr int kBoxConstants = kHexCommon + 3 + 24;
 constexpr int kHexConstants = kHexCommon + 72 + 72;
@@ -45,8 +45,9 @@ struct HexState {
 
 // Stiffness of one batch's cells, as the coarse grid sees them.
 struct HexStiffness {
-  alignas(32) float even[3][8];  // in: per axis and lane, 1 where the cell is the first half of the
-                                 // coarse cell around it, 0 where the second
+  // in: per axis and lane, 1 where the cell is the first half of the coarse cell around it, 0 where
+  // the second
+  alignas(32) float even[3][8];
   alignas(32) float K[24][24][8];       // P^T K_e P of the coarse cell's corners
   alignas(32) float diagonal[8][9][8];  // diagonal blocks of K_e
 };

@@ -15,8 +15,8 @@ namespace calipso::fem {
 // What one evaluation of the elastic energy at x has found.
 struct HexEvaluation {
   AlignedBuffer<double> x;  // four per node
-  AlignedBuffer<double>
-      stress;  // geometric stresses, as the kernel stores them; empty unless asked for
+  // geometric stresses, as the kernel stores them; empty unless asked for
+  AlignedBuffer<double> stress;
   AlignedBuffer<double> slots, energies, dilatations;  // work space
   Vec forces;                                          // 3n, N
   double energy = 0.0;                                 // J

@@ -15,8 +15,8 @@ namespace {
 constexpr int kRefinements = 2;  // warp, match both ways, fit
 // of a patch's radius: poses this close need no look of their own
 constexpr double kSameLookShare = 0.025;
-constexpr double kClearShare =
-    0.7;                         // of the frame before's tracks: with so many no search is needed
+// of the frame before's tracks: with so many no search is needed
+constexpr double kClearShare = 0.7;
 constexpr double kNearPx = 1.5;  // a prediction this close needs no half-size match
 // looks that differ by this, but for where they are, serve for one another
 constexpr double kSameShapePx = 1.0;

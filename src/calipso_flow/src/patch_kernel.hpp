@@ -21,12 +21,13 @@ struct PatchTerms {
 };
 
 // Bilinear values of the square of `side` pixels whose first pixel lies (fx, fy) in [0, 1) beyond
-// `picture`. @param row  floats from one row of the picture to the next
+// `picture`.
+// @param row  floats from one row of the picture to the next
 void sampleRows(const float* picture, long row, float fx, float fy, int side, float* out);
 
 // Fills the terms from grey values and weights of a square with one more ring than the patch, for
-// central differences; a pixel counts when it and its four neighbours do. @param count  padded
-// pixels
+// central differences; a pixel counts when it and its four neighbours do.
+// @param count  padded pixels
 // @return the pixels that count, and the sum of their grey values
 struct PatchFill {
   float support, sum;

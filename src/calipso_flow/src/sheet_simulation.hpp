@@ -22,9 +22,10 @@ struct NoEquilibrium : std::runtime_error {
 // A sheet's motion as seen by K linear measurements of its surface, and how it depends on the wind.
 struct SheetMotion {
   Eigen::MatrixXd amplitudes;  // T x K
-  std::vector<Eigen::MatrixXd>
-      slopes;  // T x K each: by the wind at the knots, one component after the other, and
-};             // by the logarithm of the stiffness; empty when not asked for
+  // T x K each: by the wind at the knots, one component after the other, and by the logarithm of
+  // the stiffness; empty when not asked for
+  std::vector<Eigen::MatrixXd> slopes;
+};
 
 struct SheetSettings {
   int nodes = 120;                   // of the grid, about
@@ -32,8 +33,8 @@ struct SheetSettings {
   double longest_step = 1.0 / 30.0;  // s
   double stiffness = 1.0;            // times the modulus that an object of its size starts with
   double sag = 1e-3;                 // of the diagonal, that the key frame's shape may give way by
-  bool coarse_skin =
-      false;  // the wind blows on triangles of half a cell instead of the surface's own
+  // the wind blows on triangles of half a cell instead of the surface's own
+  bool coarse_skin = false;
 };
 
 // A thin object of the video as the simulator moves it in the wind: with the material an object of

@@ -37,7 +37,8 @@ struct CellSizes {
 
 // On as coarse a grid as finds an equilibrium. A sheet of unknown stiffness must also hang in its
 // shape when it is soft; where it does not, finer grids hardly help, and would cost most of the
-// time. @param note  why there is none
+// time.
+// @param note  why there is none
 std::optional<SheetFamily> sheetsOf(const ObjectModel& model, const Eigen::Vector3d& gravity,
                                     const CellSizes& cells, bool given, std::string& note,
                                     const WindParams& params) {

@@ -22,7 +22,8 @@ struct ClipCase {
   cv::Mat frame(int k) const;  // enlarged
 };
 
-// @param models  see DynamicsOptions  @param scale  the frames are enlarged by this factor
+// @param models  see DynamicsOptions
+// @param scale   the frames are enlarged by this factor
 // @throw std::runtime_error when the folder holds no truth
 ClipCase loadClipCase(const std::string& directory, const std::string& models, int scale);
 

@@ -140,8 +140,8 @@ void EdgeCoverage::draw(const ScreenMesh& mesh, int object) {
   if (pixels_.empty()) return;
   constexpr int kParts = 8;
   const int count = static_cast<int>(mesh.triangles->size());
-  std::vector<Piece>
-      pieces[kParts];  // of the triangles that touch a chosen pixel's tile, in their order
+  // of the triangles that touch a chosen pixel's tile, in their order
+  std::vector<Piece> pieces[kParts];
 #pragma omp parallel
   {
 #pragma omp for schedule(static)

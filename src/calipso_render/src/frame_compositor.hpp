@@ -25,9 +25,9 @@ struct ShadowCache {
   Camera camera;
   Eigen::Vector3f sun = Eigen::Vector3f::Zero();  // direction
   std::unique_ptr<Visibility> others;             // of what is not edited
-  std::unique_ptr<Visibility>
-      originals;                   // of the edited objects where the video has them; null: of none
-  cv::Mat others_sun, others_sky;  // of the others; empty: nothing else casts a shadow
+  // of the edited objects where the video has them; null: of none
+  std::unique_ptr<Visibility> originals;
+  cv::Mat others_sun, others_sky;        // of the others; empty: nothing else casts a shadow
   cv::Mat originals_sun, originals_sky;  // of the edited objects where the video has them
   cv::Mat shaded;               // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
   cv::Rect shaded_box, bounds;  // of `shaded`; of all that the originals' shadows can reach
@@ -37,8 +37,8 @@ struct ShadowCache {
 // edited.
 struct RestPicture {
   std::vector<bool> edited;
-  cv::Mat drawn;    // CV_32FC3: what they add to a pixel, linear; negative where the video does not
-                    // show them
+  // CV_32FC3: what they add to a pixel, linear; negative where the video does not show them
+  cv::Mat drawn;
   cv::Mat passing;  // CV_32FC3: part of the background's light that passes beside them
   cv::Mat owners;   // CV_16SC1: surface that is seen there, or nearest; -1 = none
   cv::Mat reach;    // CV_8UC1: 255 where what drawing misses can be carried to
@@ -50,8 +50,9 @@ constexpr int kLightStep = 4;
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
 constexpr int kSameLevels = 4;            // the same of a lightLevel()
 constexpr float kPerLevel = 1.0f / 255.0f;
-constexpr float kDarkest = 0.05f;  // of a support plane's light before an edit: darker, its own
-                                   // pixels do not tell what it would be in more light
+// of a support plane's light before an edit: darker, its own pixels do not tell what it would be in
+// more light
+constexpr float kDarkest = 0.05f;
 // px around a surface of a new look in which the frame has its old colour, too
 constexpr int kRepaintReach = 2;
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
@@ -287,34 +288,35 @@ class FrameCompositor {
   std::vector<cv::Vec3f> live_corrections_;
   std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
   std::vector<bool> edited_;                  // per surface
-  std::vector<bool>
-      at_rest_;        // per surface: the video has it, or a part of it, where the key frame has it
-  cv::Mat elsewhere_;  // CV_8UC1, whole picture: where it does not; may be empty
+  // per surface: the video has it, or a part of it, where the key frame has it
+  std::vector<bool> at_rest_;
+  cv::Mat elsewhere_;          // CV_8UC1, whole picture: where it does not; may be empty
   std::vector<Actor> actors_;  // visible ones, per slot
   std::vector<int> surface_of_slot_;
   std::vector<Gloss> glosses_;  // per slot, as its look has it
-  std::vector<ScreenMesh>
-      observed_;  // per slot: where the video has it (edited objects at rest only)
+  // per slot: where the video has it (edited objects at rest only)
+  std::vector<ScreenMesh> observed_;
   std::unique_ptr<Visibility> moved_shadow_;  // of the edited objects where they are now
   std::unique_ptr<Visibility> moved_sky_;
   cv::Rect region_,
       moved_bounds_;  // what an edit can change; what the edited objects can shade now
-  cv::Mat
-      mirrored_;  // CV_32FC3, whole picture: what support planes mirror now; empty: as in the video
+  // CV_32FC3, whole picture: what support planes mirror now; empty: as in the video
+  cv::Mat mirrored_;
   cv::Mat unmirrored_;  // CV_8UC3: the frame without what they mirrored of objects at rest
-  cv::Mat remirrored_;  // CV_8UC1, whole picture: 255 = it differs from what the video has, 1 = it
-                        // does not; 0 = there is nothing
-  cv::Mat
-      passing_;  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
+  // CV_8UC1, whole picture: 255 = it differs from what the video has, 1 = it does not; 0 = there is
+  // nothing
+  cv::Mat remirrored_;
+  // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
+  cv::Mat passing_;
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
-  SquareMask
-      covered_;  // over region_: so deep behind drawn surfaces that light there does not matter
-  cv::Mat sky_now_, sky_before_;  // CV_8UC1 over region_: lightLevel() of the sky on support plane
-                                  // or relief, this in plane terms
+  // over region_: so deep behind drawn surfaces that light there does not matter
+  SquareMask covered_;
+  // CV_8UC1 over region_: lightLevel() of the sky on support plane or relief, this in plane terms
+  cv::Mat sky_now_, sky_before_;
   cv::Mat sun_now_, sun_before_;  // CV_8UC1 over region_: the same of the sun
-  cv::Mat takes_light_;  // CV_8UC1 over region_: 255 = support plane or relief is seen, on which
-                         // light changes
+  // CV_8UC1 over region_: 255 = support plane or relief is seen, on which light changes
+  cv::Mat takes_light_;
   cv::Mat relit_;  // CV_8UC1 over region_: 255 = the original's shadow, to be taken from the plate
   // The sun on the drawn surfaces at the corners of squares of kLightStep px that hang on the
   // picture; the first one's place there.
@@ -326,14 +328,15 @@ class FrameCompositor {
   std::vector<SurfaceShade> shades_;  // per slot
   cv::Mat still_;  // CV_32FC1 over region_: 1 = nothing moved here; empty: everything did
   cv::Rect miss_box_;
-  cv::Mat miss_;  // CV_32FC4 over miss_box_: what drawing misses of the video, linear, and 1 where
-                  // that is known; may be empty
+  // CV_32FC4 over miss_box_: what drawing misses of the video, linear, and 1 where that is known;
+  // may be empty
+  cv::Mat miss_;
   std::vector<Rim> rims_;              // by rows
   std::vector<std::size_t> rim_rows_;  // per row of region_: its first in rims_, and one more
   bool any_shaded_ = false;            // one of them is
-  std::vector<bool>
-      may_be_shaded_;  // per slot: not edited, and in the way of the sun that falls on edited ones
-  cv::Mat screened_;   // CV_8UC1 over region_: 255 = scenery hides what is drawn; may be empty
+  // per slot: not edited, and in the way of the sun that falls on edited ones
+  std::vector<bool> may_be_shaded_;
+  cv::Mat screened_;  // CV_8UC1 over region_: 255 = scenery hides what is drawn; may be empty
   std::vector<bool> always_drawn_;  // per slot: isDrawn() wherever it is seen
   bool all_drawn_ = false;          // every slot is
   std::vector<SurfaceMaps> maps_;   // per slot; empty where it is not drawn

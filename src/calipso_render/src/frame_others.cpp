@@ -10,8 +10,8 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kNearer =
-    1.02f;  // of the nearness: what the depth image shows that much nearer stands in front
+// of the nearness: what the depth image shows that much nearer stands in front
+constexpr float kNearer = 1.02f;
 constexpr int kRimReach = 3;  // px beyond a fitted surface that its mask may have more
 
 // Extent of points along two axes across the light, and along it.

@@ -18,11 +18,11 @@ constexpr float kWholePx = 0.5f;  // movement up to which the residual goes alon
 // ... of what sways in the video: what is missed is how it did
 constexpr float kWholeSwaying = 0.05f, kNoneSwaying = 0.3f;
 
-constexpr float kMostChange =
-    3.0f;  // factor: what is missed by more, where a surface has moved, is misfit and not its look
+// factor: what is missed by more, where a surface has moved, is misfit and not its look
+constexpr float kMostChange = 3.0f;
 
-constexpr int kCarried =
-    16;  // px around surfaces at rest in which their rims and what they take over lie
+// px around surfaces at rest in which their rims and what they take over lie
+constexpr int kCarried = 16;
 
 constexpr float kDark = 1e-5f;  // linear; a plate darker than that says nothing of its shadow
 

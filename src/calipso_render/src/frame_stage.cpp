@@ -302,7 +302,8 @@ cv::Mat FrameCompositor::originalOf(int surface) const {
 }
 
 // Row v of the pixels that show an edited object in the video, and of those that show another one.
-CALIPSO_WIDE_LOOPS void FrameCompositor::findShown(int v, std::uint8_t* own, std::uint8_t* others) const {
+CALIPSO_WIDE_LOOPS void FrameCompositor::findShown(int v, std::uint8_t* own,
+                                                   std::uint8_t* others) const {
   const int width = region_.width;
   const std::uint8_t* labels = labels_.ptr<std::uint8_t>(v + region_.y) + region_.x;
   for (int u = 0; u < width; ++u) own[u] = 0, others[u] = labels[u] != 0 ? 255 : 0;

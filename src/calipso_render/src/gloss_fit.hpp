@@ -23,7 +23,8 @@ std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
 // Specular strength and roughness from the highlights' shape: for every roughness the best strength
 // and brightness of the clusters (linear least squares, outliers weighed down), and of these the
 // best. nullopt: no highlight is seen, or any roughness explains it.
-// @param fit light and albedos so far; @param visible as in LightEvidence
+// @param fit light and albedos so far
+// @param visible as in LightEvidence
 std::optional<SeenGloss> fitGloss(
     const std::vector<HighlightSample>& highlights, const LightFit& fit,
     const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible);

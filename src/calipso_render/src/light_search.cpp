@@ -7,13 +7,13 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kDirections =
-    400;  // tried over the upper hemisphere, without the objects' own shadows
+// tried over the upper hemisphere, without the objects' own shadows
+constexpr int kDirections = 400;
 constexpr std::size_t kKept = 10;  // of those, tried with them
 constexpr float kApart = 0.94f;    // cosine of the angle between two of them
-constexpr float kShadowApart =
-    0.9976f;                         // the same between two that cast shadows speak for: 4 degrees
-constexpr float kLowestSun = 0.08f;  // sine of its elevation
+// the same between two that cast shadows speak for: 4 degrees
+constexpr float kShadowApart = 0.9976f;
+constexpr float kLowestSun = 0.08f;                     // sine of its elevation
 constexpr double kLeastRatio = 0.1, kMostRatio = 10.0;  // of sun to ambient light
 constexpr int kRatios = 20;
 constexpr double kShadingWeight = 50.0;  // pixels that err independently of each other

@@ -10,9 +10,9 @@ namespace calipso::render {
 // that fits best under it.
 struct LightCandidate {
   Eigen::Vector3f direction;
-  double misfit = 0.0;     // minus a log-likelihood of shading and cast shadows
-  double contrast = 0.0;   // of shading alone: how much better the best direction is than half of
-                           // all; 0: nothing tells
+  double misfit = 0.0;  // minus a log-likelihood of shading and cast shadows
+  // of shading alone: how much better the best direction is than half of all; 0: nothing tells
+  double contrast = 0.0;
   cv::Vec3f ambient, sun;  // their sum is 1
 };
 

@@ -12,9 +12,9 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kAloneContrast =
-    30.0f;                            // code values across a line that ends at another; it is thin:
-constexpr float kAsStrong = 0.5f;     // that has at least this part of its contrast
+// code values across a thin line that ends at another one
+constexpr float kAloneContrast = 30.0f;
+constexpr float kAsStrong = 0.5f;     // part of its contrast that the other one has at least
 constexpr float kStray = 1.5f;        // px by which ends may miss each other,
 constexpr float kTurn = 0.04f;        // and part of the way between them
 constexpr float kAlike = 0.4f;        // difference of colours across, to their contrast

@@ -17,13 +17,13 @@ constexpr int kBandRows = 16;       // rows that one thread searches in order
 constexpr int kFirstGuesses = 200;  // places tried for a patch of the rim
 // px around the best place in which levels, and the finest, look further
 constexpr int kFarthest = 16, kFinest = 2;
-constexpr int kSweeps = 2;     // of a search
-constexpr float kJump = 1.6f;  // times better than what continues a neighbour's copy a place beside
-                               // it must be: pieces stay large
-constexpr float kNearer = 2.5f;        // times that a source may be nearer or farther,
-constexpr float kHorizon = 6.0f;       // or px of height by which it may miss that
-constexpr float kMisplaced = 2000.0f;  // cost of one that does not, squared code values: such are
-                                       // taken for want of others only
+constexpr int kSweeps = 2;  // of a search
+// times better than what continues a neighbour's copy a place beside it must be: pieces stay large
+constexpr float kJump = 1.6f;
+constexpr float kNearer = 2.5f;   // times that a source may be nearer or farther,
+constexpr float kHorizon = 6.0f;  // or px of height by which it may miss that
+// cost of one that does not, squared code values: such are taken for want of others only
+constexpr float kMisplaced = 2000.0f;
 
 cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
 cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_cast<short>(p.y)}; }

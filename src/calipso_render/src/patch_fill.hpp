@@ -11,9 +11,10 @@ namespace calipso::render {
 // patches (PatchMatch, Barnes et al. 2009) and weighted votes in turn, begun at the coarsest level
 // from the rim inwards. Patches compare colour and how lively the picture is. At the finest level
 // there is no vote: what is copied keeps its grain. Does not depend on the number of threads.
-// @param image CV_32FC3, code values; hole, source CV_8UC1: to be filled; may be copied from
+// @param image CV_32FC3, code values
+// @param hole, source CV_8UC1: to be filled; may be copied from
 // @return CV_16SC2: (u, v); (-1, -1) outside the hole, and everywhere if no patch lies in the
-// source
+//   source
 cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
                      const InpaintParams& params);
 

@@ -21,8 +21,8 @@ constexpr double kSeedSpread = 0.005;  // likewise
 constexpr float kOffSupport = 0.02f;
 constexpr float kBehind = 1.02f;      // of an object's nearness: what it hides is no nearer
 constexpr double kLeastPiece = 0.05;  // of a plane's pixels, for a connected piece of it to count
-constexpr double kBeyond = 0.25;  // of the side of a square as large as what is seen of a plane: so
-                                  // far it may go on beyond that
+// of the side of a square as large as what is seen of a plane: so far it may go on beyond that
+constexpr double kBeyond = 0.25;
 constexpr float kFarther = 0.97f;  // of a plane's nearness: where that is seen the plane is not
 constexpr int kCurvedReach = 4;    // px of the square that tells the normal of what is not plane
 constexpr float kSameSurface = 0.05f;  // of the nearness within it

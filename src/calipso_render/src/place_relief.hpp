@@ -25,8 +25,9 @@ std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& 
 struct PlaceSurfaces {
   static constexpr int kUnknown = 0, kCurved = 255;
 
-  cv::Mat label;  // CV_8UC1: kUnknown; the support planes from 1 on, then other planes; kCurved:
-                  // what is none of them
+  // CV_8UC1: kUnknown; the support planes from 1 on, then other planes; kCurved: what is none of
+  // them
+  cv::Mat label;
   cv::Mat position, normal;  // CV_32FC3, world, off the support planes
   int supports = 0;          // support planes
 
@@ -36,8 +37,8 @@ struct PlaceSurfaces {
 // By the depth image. Behind objects a plane goes on as long as it is seen nearer by than what
 // shows that it has ended; of the planes that do and lie behind the object the nearest is seen.
 // Empty without a depth image.
-// @param scenery CV_32FC1, 1/m, of what is no object; 0 unknown. @param depth CV_32FC1, m, with the
-// objects; 0 unknown
+// @param scenery CV_32FC1, 1/m, of what is no object; 0 unknown
+// @param depth CV_32FC1, m, with the objects; 0 unknown
 // @param labels CV_8UC1, != 0 on objects
 PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels,
                            const std::vector<SupportPlane>& planes, const Camera& camera);
@@ -49,8 +50,8 @@ Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun);
 // What the sun's absence leaves of the relief: from how bright it is in the objects' full shade
 // where that is seen, else as the light has it for a surface that faces so, on the scale of the
 // support planes.
-// @param picture, plate CV_32FC3, code values, with the shade and without; @param sun CV_32FC1, its
-// visible part
+// @param picture, plate CV_32FC3, code values, with the shade and without
+// @param sun CV_32FC1, its visible part
 // @param umbra what the sun's absence leaves of the support planes
 void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,
                const cv::Mat& labels, const std::vector<SupportPlane>& planes,

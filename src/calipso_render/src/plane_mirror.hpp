@@ -20,10 +20,11 @@ cv::Vec3f mirroredRadiance(const Appearance& appearance, const Light& light, con
 // What even mirrors in place of the support planes would show of some objects.
 struct MirrorImage {
   cv::Mat colour;  // CV_32FC3: linear, times the reflectance; 0 where no object is seen
-  cv::Mat cover;   // CV_32FC1: the reflectance (Schlick 1994, relative to a whole mirror) where an
-                   // object is seen, 0 elsewhere
-  cv::Mat spread;  // CV_32FC1: px along a column by which it is drawn out for each unit of the
-                   // planes' slopes
+  // CV_32FC1: the reflectance (Schlick 1994, relative to a whole mirror) where an object is seen, 0
+  // elsewhere
+  cv::Mat cover;
+  // CV_32FC1: px along a column by which it is drawn out for each unit of the planes' slopes
+  cv::Mat spread;
   float across = 1.0f;  // how much less it is along a row
   bool empty() const { return colour.empty(); }
 };

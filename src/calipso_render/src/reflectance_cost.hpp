@@ -7,9 +7,10 @@
 namespace calipso::render {
 
 // What one pixel's three channels say about light and material (paper: section 6, eqs. 10, 11).
-//   r = (a E + ks (T L V + F A (1 + g r.up) S) - I) / scale,  E = A (1 + g n.up) S + L V max(0,
-//   n.l), T: torranceSparrow(n, l, v, m),  F: grazing(n.v),  r: v mirrored at n,  V, S: visible
-//   part of sun and sky
+//   (a E + ks (T L V + F A (1 + g r.up) S) - I) / scale
+//   E = A (1 + g n.up) S + L V max(0, n.l)
+//   T = torranceSparrow(n, l, v, m),  F = grazing(n.v)
+//   r: v mirrored at n,  V, S: visible part of sun and sky
 // Parameter blocks, colours as logarithms so that they stay positive:
 //   0  l   direction to the sun, unit, world   3
 //   1  A   ambient light                       3

@@ -7,8 +7,8 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kScreen =
-    0.003f;  // inverse square of the distance, px, over which a seam is spread
+// inverse square of the distance, px, over which a seam is spread
+constexpr float kScreen = 0.003f;
 // code values; what misses by much more is an edge of things, not a seam to be spread
 constexpr float kEdge = 25.0f;
 constexpr float kScreenEdge = 0.3f;  // kScreen of what an edge misses

@@ -7,7 +7,9 @@ namespace calipso::render {
 // Evens out the seams of a hole filled with shifted copies: keeps every copy's differences between
 // neighbours, and spreads what does not meet at a seam over some twenty pixels, what is too much for
 // a seam over two (screened Poisson equation).
-// @param image CV_32FC3, filled; @param hole CV_8UC1; @param source CV_8UC1, known pixels
+// @param image CV_32FC3, filled
+// @param hole CV_8UC1
+// @param source CV_8UC1, known pixels
 // @param origin CV_16SC2, per hole pixel what it is a copy of; (-1, -1): of nothing
 void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, cv::Mat& image);
 

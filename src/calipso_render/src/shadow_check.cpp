@@ -11,8 +11,8 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kSunShaded =
-    0.985f;                          // visible part of the sun below which a pixel counts as shaded
+// visible part of the sun below which a pixel counts as shaded
+constexpr float kSunShaded = 0.985f;
 constexpr float kSkyShaded = 0.85f;  // the same for the sky: the dark line along a contact
 constexpr int kMargin = 3;           // px around what says nothing: mixed pixels
 // Regions are looked at in pixels of twice the size; px are those from here on.
@@ -25,8 +25,8 @@ constexpr int kFewest = 130;             // px of a region that is asked by itse
 constexpr int kLeastOpen = 30;  // px of a region away from what says nothing, for it to be asked
 constexpr double kLeastEvidence = 1.0;  // and sum of h'^2
 constexpr double kByChance = 0.12;  // deviation of b where there is no shadow: what else is dark
-constexpr double kDark = 0.8, kDarkVaries = 0.45;  // mean and deviation of b where there is one: it
-                                                   // takes 5 to 6 tenths of the light
+// mean and deviation of b where there is one: it takes 5 to 6 tenths of the light
+constexpr double kDark = 0.8, kDarkVaries = 0.45;
 constexpr double kDecided = 1.5;   // log of the odds from which a region is decided on by itself
 constexpr float kDarkest = 0.01f;  // linear; added before the logarithm
 

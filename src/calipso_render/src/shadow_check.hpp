@@ -6,8 +6,9 @@ namespace calipso::render {
 
 // Which of the predicted shadows a picture shows, decided region by region: a connected part of the
 // prediction as a whole.
-//   y' = b h' + e,   y: -log of brightness, h: hidden part of the light, ': less its mean around
-//   the pixel, b: how dark the shadow is
+//   y' = b h' + e
+//   y  -log of brightness        h  hidden part of the light
+//   b  how dark the shadow is    '  less its mean around the pixel
 // A shadow is dark from its border on; something that happens to be dark there, or gets darker, has
 // a small b. The odds are those of b under a shadow and under none. A prediction may lie some
 // pixels beside its shadow.
@@ -18,8 +19,8 @@ struct SeenShadows {
 };
 
 // @param sun, sky CV_32FC1, visible part of them, 0..1, as predicted
-// @param picture CV_32FC3, code values; unknown CV_8UC1, != 0: says nothing (objects, things off
-// the planes)
+// @param picture CV_32FC3, code values
+// @param unknown CV_8UC1, != 0: says nothing (objects, things off the planes)
 SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& picture,
                         const cv::Mat& unknown);
 

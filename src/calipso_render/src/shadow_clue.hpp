@@ -12,9 +12,11 @@ namespace calipso::render {
 
 // What shadows on the support planes say about the sun: log-darkness of the planes' pixels against
 // the part of the sun that the objects hide from them.
-//   y = b (1 - V(l)) + e_g,   y: -log of brightness, b >= 0: depth of the shadow,
-//   V: visible part of a sun in direction l, e_g: brightness of the pixel's group (0 where the
-//   plate is known)
+//   y = b (1 - V(l)) + e_g
+//   y    -log of brightness
+//   b    depth of the shadow, >= 0
+//   V    visible part of a sun in direction l
+//   e_g  brightness of the pixel's group (0 where the plate is known)
 class ShadowClue {
  public:
   struct Sample {

@@ -11,8 +11,8 @@ SquareMask::SquareMask(const cv::Mat& pixels, const cv::Rect& part, int margin)
   const int across = (part.br().x - 1) / kSide - first_.x + 1,
             down = (part.br().y - 1) / kSide - first_.y + 1;
   cv::Mat full(down, across, CV_8U);
-  const int before =
-      part.x - first_.x * kSide;  // columns of the first square that lie before the part
+  // columns of the first square that lie before the part
+  const int before = part.x - first_.x * kSide;
 #pragma omp parallel for schedule(static)
   for (int j = 0; j < down; ++j) {
     const int first = std::max(0, (first_.y + j) * kSide - part.y),

@@ -187,8 +187,8 @@ SurfaceUnfolder::SurfaceUnfolder(const Points& vertices, const Triangles& triang
       triangles_(triangles),
       place_(weld(vertices)),
       neighbours_(triangles.size(), {-1, -1, -1}) {
-  std::map<std::pair<int, int>, std::vector<std::pair<int, int>>>
-      sides;  // by edge: triangle and side
+  // by edge: triangle and side
+  std::map<std::pair<int, int>, std::vector<std::pair<int, int>>> sides;
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     for (int k = 0; k < 3; ++k) {
       const int a = place_[triangles[t][k]], b = place_[triangles[t][(k + 1) % 3]];

@@ -23,10 +23,10 @@ constexpr float kEnough = 0.3f;  // weight of a look that needs no other
 constexpr float kSeen = 1e-5f;   // sum of weights, cubed, below which a texel counts as not seen
 // certainty, of the greatest there is, of what others are continued from
 constexpr float kKnown = 0.5f;
-constexpr float kSure = 0.2f;                     // ... of which nothing else is needed
-constexpr float kFurther = 0.3f;                  // of further frames, whose poses are less exact
-constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;  // the key frame's share in a colour with which it
-                                                  // counts for nothing, and alone
+constexpr float kSure = 0.2f;     // ... of which nothing else is needed
+constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exact
+// the key frame's share in a colour with which it counts for nothing, and alone
+constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;
 // weight of a look at a like place that counts for nothing, and in full
 constexpr float kPoor = 0.15f, kGood = 0.45f;
 constexpr float kAskew = 0.6f,
@@ -101,8 +101,8 @@ struct Layers {
 // How well a picture shows a place: 0 not at all, 1 straight on and well inside the mask.
 struct Look {
   float weight = 0.0f;
-  float detail =
-      0.0f;  // pixels per area of surface, 1 = straight on from where the key frame's camera is
+  // pixels per area of surface, 1 = straight on from where the key frame's camera is
+  float detail = 0.0f;
   float u = 0.0f, v = 0.0f;  // in Reflectance::region
 };
 

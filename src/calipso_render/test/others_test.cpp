@@ -57,8 +57,8 @@ struct TwoBalls {
 TEST(Others, AnEditedObjectCastsItsShadowOnOneThatStays) {
   const TwoBalls s(params());
   const Eigen::Vector3d sun = s.prepared->light.light.direction.cast<double>();
-  const FrameOutput out =
-      s.drawn(kOther + 2.6 * kBallRadius * sun - kCentre);  // between the sun and the other ball
+  // between the sun and the other ball
+  const FrameOutput out = s.drawn(kOther + 2.6 * kBallRadius * sun - kCentre);
   // The point of the other ball's front that looks at the sun as far as the camera sees it.
   const Eigen::Vector3d eye = s.key.camera.world_from_camera.translation();
   const Eigen::Vector3d facing = (sun + (eye - kOther).normalized()).normalized();
@@ -166,8 +166,8 @@ TEST(Others, WhereNoShadowFallsTheirPixelsStay) {
 TEST(Others, WhatTheDepthImageHasNearerStaysInFront) {
   RenderParams p = params();
   p.depth = cv::Mat(kHeight, kWidth, CV_32F, cv::Scalar(5.0));
-  const Eigen::Vector3d place =
-      kCentre + Eigen::Vector3d(0.0, 0.0, 0.22);  // above the table's far end
+  // above the table's far end
+  const Eigen::Vector3d place = kCentre + Eigen::Vector3d(0.0, 0.0, 0.22);
   const cv::Point middle = TwoBalls(params()).at(place);
   p.depth(cv::Rect(0, 0, middle.x, kHeight)).setTo(0.3);
   const TwoBalls s(p);

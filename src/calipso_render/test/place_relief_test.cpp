@@ -101,8 +101,9 @@ TEST(PlaceRelief, WhatIsBehindAnObjectIsNotBeforeIt) {
 }
 
 TEST(PlaceRelief, APlaneDoesNotGoOnBetweenItsPiecesWhereSomethingFartherIsSeen) {
-  Room room;  // of the wall two pieces are left, 5 m behind it is another one; an object stands
-              // before all of them
+  // of the wall two pieces are left, 5 m behind it is another one; an object stands before all of
+  // them
+  Room room;
   const cv::Rect gap(40, 0, 80, kHigh), object(0, 20, kWide, 10);
   for (int v = 0; v < kHigh; ++v) {
     for (int u = gap.x; u < gap.br().x; ++u)

@@ -18,9 +18,9 @@ namespace {
 constexpr int kSeam = 3;     // px on either side of the silhouette
 constexpr int kRim = 3;      // px of a mask's rim that "inside" leaves out
 constexpr int kAround = 40;  // px around a moved object in which its shadow is judged
-constexpr int kMovedFirst = 3,
-              kMovedStep = 4;  // frames of a moving object that are drawn again: odd ones, which a
-                               // clip sample of more than 24 frames leaves out
+// frames of a moving object that are drawn again: odd ones, which a clip sample of more than 24
+// frames leaves out
+constexpr int kMovedFirst = 3, kMovedStep = 4;
 // rad against the key frame, from which copying texture is wrong
 constexpr double kTurned = 10.0 * M_PI / 180.0;
 constexpr int kFlickerFrames = 8;

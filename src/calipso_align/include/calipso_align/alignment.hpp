@@ -50,20 +50,22 @@ struct StageTime {
 
 struct AlignmentResult {
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   // of translation (m) and rotation vector (rad), world axes
-  TriangleMesh mesh;                            // S*, object frame, the order of the stock model
-  TriangleMesh rest;                            // S, as given
-  std::vector<std::vector<float>> residual_px;  // per loop and point; positive: the model reaches
-                                                // too far out; NaN: unknown or without counterpart
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  TriangleMesh mesh;  // S*, object frame, the order of the stock model
+  TriangleMesh rest;  // S, as given
+  // per loop and point; positive: the model reaches too far out; NaN: unknown or without
+  // counterpart
+  std::vector<std::vector<float>> residual_px;
   double distance_sigma = 0.0;   // deviation of the centroid's distance, as part of it
   bool placed = false;           // false: the rough placement was of no use, nothing was fitted
   double met_mean_px = 0.0;      // of known points that the model meets
   double contour_mean_px = 0.0;  // of known points
   double contour_p95_px = 0.0;
-  double expected_error =
-      0.0;  // if asked: mean distance of the surface from the true one, predicted,
-  double expected_rms = 0.0;     // in parts of the model's diagonal
+  // if asked: mean distance of the surface from the true one, and root of its mean square,
+  // predicted, in parts of the model's diagonal
+  double expected_error = 0.0;
+  double expected_rms = 0.0;
   double off_probability = 0.0;  // that it is further away than a result that is trusted may be
   double shape_off_probability = 0.0;  // the same, had it the right distance
   double noise_px = 0.0;               // estimated noise of the contour

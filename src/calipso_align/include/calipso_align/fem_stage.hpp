@@ -17,8 +17,7 @@
 //  E V     Young's modulus times volume, so that Psi / (E V) is a mean squared strain
 //  lambda  what a mean squared strain of one costs, in units of r^2 w
 //  eps     keeps nodes that nothing holds where they are, above all along the sight line; where
-//  nothing
-//          shows the depth, they are held there
+//          nothing shows the depth, they are held there
 namespace calipso::align {
 
 struct FemStageOptions {

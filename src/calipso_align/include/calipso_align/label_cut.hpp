@@ -11,8 +11,8 @@ namespace calipso::align {
 struct SmoothnessParams {
   float gamma = 20.0f;  // cost of an edge between equal colours, nats
   float floor = 0.02f;  // share of gamma that even the strongest image edge still costs
-  float contrast_scale =
-      0.0f;                 // beta; 0: from the free pixels, which a narrow band makes too small
+  // beta; 0: from the free pixels, which a narrow band makes too small
+  float contrast_scale = 0.0f;
   float jump_scale = 0.0f;  // as beta, of the relief's jumps
 };
 
@@ -22,8 +22,8 @@ float contrastScale(const cv::Mat& image, const cv::Mat& mask);
 // Gives every pixel that is free its cheapest label (Boykov, Veksler and Zabih 2001):
 //
 //   E(L) = sum_p costs[L_p](p) + sum_{pq} w_pq [L_p != L_q]
-//   w_pq = gamma / |p - q| * (floor + (1 - floor) exp(-beta |I_p - I_q|^2)) exp(-beta_jump
-//   jump_pq^2)
+//   w_pq = gamma / |p - q| * (floor + (1 - floor) exp(-beta |I_p - I_q|^2))
+//          exp(-beta_jump jump_pq^2)
 //
 // over the 8-neighbourhood, by expansion moves; with one object the result is the global optimum.
 // labels  CV_8U, in: start and fixed surroundings; out: result

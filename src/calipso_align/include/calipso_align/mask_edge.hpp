@@ -14,9 +14,12 @@ struct KnownBackground {
 //   alpha = (I - B).(F - B) / |F - B|^2,
 // with F and B the mean colours close by on either side (B: the background itself where it is
 // known). A pixel whose centre the object covers has alpha > 1/2. Where F and B differ too little
-// for the noise, or a pixel is no mixture of them, it stays as it is. image  CV_8UC3; noise: its
-// standard deviation, grey levels other  CV_8U, pixels of other objects, which are left alone; or
-// empty mask   CV_8U 0 or 255, in and out Returns CV_8U 255 alpha, 0 or 255 away from the outline.
+// for the noise, or a pixel is no mixture of them, it stays as it is.
+// image  CV_8UC3
+// noise  its standard deviation, grey levels
+// other  CV_8U, pixels of other objects, which are left alone; or empty
+// mask   CV_8U 0 or 255, in and out
+// Returns CV_8U 255 alpha, 0 or 255 away from the outline.
 cv::Mat settleEdge(const cv::Mat& image, const cv::Mat& other, const KnownBackground& background,
                    double noise, cv::Mat& mask);
 

@@ -21,8 +21,8 @@ struct TrackerParams {
   float still_levels = 5.0f;   // grey levels; what changes less than this (4 x 4 px mean) is still
   float still_share = 0.002f;  // ... in all but this share of the object and its rim
   float prior_cost = 2.0f;     // nats per pixel of distance from the predicted outline
-  float prior_limit =
-      9.0f;  // nats; the most that the prediction says, unless the background contradicts it
+  // nats; the most that the prediction says, unless the background contradicts it
+  float prior_limit = 9.0f;
   float wrong_share = 0.02f;   // of the object: what a known background contradicts is cut anew
   float outlier_cost = 18.0f;  // nats; cost of a colour that a model does not know
   SmoothnessParams smoothness{4.0f, 0.02f, 0.0f, 0.0f};

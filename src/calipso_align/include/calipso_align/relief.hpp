@@ -12,11 +12,11 @@ namespace calipso::align {
 // setting.
 struct Relief {
   enum State : uchar { kUnusable = 0, kNone = 1, kSurface = 2 };
-  cv::Mat
-      surface;     // CV_32FC3: u, v (px) and inverse depth in half standard deviations of its noise
-  cv::Mat state;   // CV_8U: kUnusable near edges when `registered` is false, kNone without depth
-  cv::Mat pieces;  // CV_32S: planar_pieces.hpp; empty unless `registered`
-  cv::Mat islands;      // CV_32S: surface_islands.hpp; empty unless `registered`
+  // CV_32FC3: u, v (px) and inverse depth in half standard deviations of its noise
+  cv::Mat surface;
+  cv::Mat state;    // CV_8U: kUnusable near edges when `registered` is false, kNone without depth
+  cv::Mat pieces;   // CV_32S: planar_pieces.hpp; empty unless `registered`
+  cv::Mat islands;  // CV_32S: surface_islands.hpp; empty unless `registered`
   cv::Mat on_support;   // CV_8U: the surface is that of a support plane, within its noise; or empty
   double units = 0.0;   // of `surface` per inverse metre
   double volume = 0.0;  // px x px x units of inverse depth: where a surface may be

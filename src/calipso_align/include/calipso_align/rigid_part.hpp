@@ -14,8 +14,8 @@ Eigen::Isometry3d bestRigid(const Points& from, const Points& to);
 // parameters.
 //  d_i  model point from its centroid      x_i  where the map takes it, from their centroid
 //  R    rotation for which sum |x_i - R d_i|^2 is least:   sum (R d_i) x x_i = 0
-//  so that a change of x_i turns it by     (tr(S) 1 - S)^-1 sum (R d_i) x dx_i,   S = sum (R d_i)
-//  x_i'
+//  so that a change of x_i turns it by     (tr(S) 1 - S)^-1 sum (R d_i) x dx_i
+//  with                                    S = sum (R d_i) x_i'
 // NOTE: the rotation vector's change is taken for that turn, which holds up to half the rotation
 // vector's length.
 struct RigidPart {

@@ -27,8 +27,7 @@ constexpr double kPlacementError = 0.05;
 class PlacementPrior {
  public:
   // @param found  where the fit has the object: a placement that was further off across the sight
-  // line than
-  //               it may be, may be as far off along it
+  //               line than it may be, may be as far off along it
   PlacementPrior(const Eigen::Vector3d& placed, const Eigen::Vector3d& found);
   double density(const Eigen::Vector3d& centroid) const;  // not normalised; 0 beyond the bound
 

@@ -21,32 +21,34 @@ struct SegmentationTarget {
   int label = 0;                 // 1..254, distinct
   cv::Rect rect;                 // px; empty: anywhere
   std::vector<cv::Point> lasso;  // px, polygon; empty: none. The object lies inside both.
-  cv::Mat silhouette = {};       // CV_8U: roughly its shape and place, or empty. May be larger than
-                                 // the picture, with an equal margin on opposite sides.
-  ModelFitter fit_model = {};    // or none
+  // CV_8U: roughly its shape and place, or empty. May be larger than the picture, with an equal
+  // margin on opposite sides.
+  cv::Mat silhouette = {};
+  ModelFitter fit_model = {};  // or none
 };
 
 // The picture at one resolution and all that a cut needs there. Label number 0 is the background,
 // number k is targets[k - 1].
 struct SegmentationLevel {
-  cv::Mat image;                  // CV_8UC3
-  std::vector<cv::Mat> allowed;   // CV_8U per target: where it may lie
-  cv::Mat region;                 // CV_8U: where any target may lie
-  int near_px = 3;                // what is this close to the region counts as its surroundings
-  cv::Mat seeds;                  // CV_8U: label number + 1 where a stroke says so, else 0
-  cv::Mat labels;                 // CV_8U: label numbers
-  std::vector<cv::Mat> costs;     // CV_32F per label number, nats
-  float contrast_scale = 0.0f;    // beta of label_cut.hpp over the region
-  Relief relief;                  // empty without a depth image
-  std::vector<cv::Mat> expected;  // CV_32F per label number, as the relief's inverse depth: where a
-                                  // fitted model has its surface, 0 outside of it; or empty
-  float jump_scale = 0.0f;        // of label_cut.hpp over the region
-  cv::Mat mixed;     // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
-  cv::Mat stroked;   // CV_8U: as seeds, of the flat piece or island of the relief that a pixel is
-                     // in; or empty
+  cv::Mat image;                 // CV_8UC3
+  std::vector<cv::Mat> allowed;  // CV_8U per target: where it may lie
+  cv::Mat region;                // CV_8U: where any target may lie
+  int near_px = 3;               // what is this close to the region counts as its surroundings
+  cv::Mat seeds;                 // CV_8U: label number + 1 where a stroke says so, else 0
+  cv::Mat labels;                // CV_8U: label numbers
+  std::vector<cv::Mat> costs;    // CV_32F per label number, nats
+  float contrast_scale = 0.0f;   // beta of label_cut.hpp over the region
+  Relief relief;                 // empty without a depth image
+  // CV_32F per label number, as the relief's inverse depth: where a fitted model has its surface, 0
+  // outside of it; or empty
+  std::vector<cv::Mat> expected;
+  float jump_scale = 0.0f;  // of label_cut.hpp over the region
+  cv::Mat mixed;  // CV_8U: where a jump of the relief makes a colour a mixture; empty: unknown
+  // CV_8U: as seeds, of the flat piece or island of the relief that a pixel is in; or empty
+  cv::Mat stroked;
   cv::Mat floating;  // CV_8U: as seeds, of the island of the relief that a pixel is in; or empty
-  std::vector<char>
-      lies_flat;  // per label number: its strokes lie on support planes themselves, as a cloth's do
+  // per label number: its strokes lie on support planes themselves, as a cloth's do
+  std::vector<char> lies_flat;
 };
 
 // Where the targets may lie in a picture and what is near.

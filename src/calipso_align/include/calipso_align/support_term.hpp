@@ -25,7 +25,8 @@ std::vector<SupportTarget> makeSupportTargets(const std::vector<SupportPlane>& p
 std::optional<double> clearance(const SupportTarget& target, const Points& x, const Camera& camera);
 
 // Vertices under a plane are pushed out of it; the lowest one of an object that stands is held on
-// it. Residuals in m. @param sigma  what a vertex may be off, m
+// it. Residuals in m.
+// @param sigma  what a vertex may be off, m
 Rows supportRows(const std::vector<SupportTarget>& targets, const Points& x, const Camera& camera,
                  double sigma);
 

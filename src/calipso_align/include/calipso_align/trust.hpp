@@ -33,9 +33,9 @@ struct Verdict {
   std::string reason;  // why not; or what the user should know all the same
 };
 
-// @param scale     size of the fitted model relative to the stock model
+// @param scale           size of the fitted model relative to the stock model
 // @param distance_sigma  deviation of its distance, as part of it
-// @param error     what the fitted surface may be off
+// @param error           what the fitted surface may be off
 Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour,
               const FitQuality& quality, double scale, double distance_sigma,
               const ShapeUncertainty& error);

@@ -11,8 +11,8 @@ namespace calipso::bag {
 // What a camera's calibration file says.
 struct Calibration {
   Camera camera;  // pose: identity
-  std::vector<double>
-      distortion;  // k1 k2 p1 p2 [k3 ...] (plumb_bob, rational_polynomial); may be empty
+  // k1 k2 p1 p2 [k3 ...] (plumb_bob, rational_polynomial); may be empty
+  std::vector<double> distortion;
 
   bool distorted() const;
 };

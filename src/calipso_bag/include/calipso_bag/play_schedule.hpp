@@ -21,8 +21,8 @@ struct PlayedFrame {
 // interval between two frames. Their instants divide the interval evenly, so that everything
 // simulated moves on in between; what is only seen in the video stands still until the next frame.
 // Without scales: the clip as it is.
-// @param frames_ns the clip's stamps, ascending; @param scales in any order, the latest one before
-// a frame counts
+// @param frames_ns the clip's stamps, ascending
+// @param scales in any order, the latest one before a frame counts
 std::vector<PlayedFrame> playSchedule(const std::vector<std::int64_t>& frames_ns,
                                       std::vector<TimeScale> scales);
 

@@ -56,8 +56,8 @@ struct Actor {
 
   WorldObject object;  // its mesh is rescaled by edits
   ObservedTrack track;
-  Eigen::MatrixXd
-      modes;  // 3 #V x K, object frame: in which it deforms in the video; empty: as a rigid body
+  // 3 #V x K, object frame: in which it deforms in the video; empty: as a rigid body
+  Eigen::MatrixXd modes;
   WindTrack wind;  // that its cloth shows in the video
   int id = 0;      // index among the actors; also its obstacle's id
   ObjectSettings settings;
@@ -68,8 +68,8 @@ struct Actor {
   std::string reason = "no edit touches it";
   bool edited = false, removed = false;
   bool altered = false;  // by an edit that does more than to let it go on, or of its look
-  bool continues =
-      false;  // as in the video, with the velocity it has there, and nothing else is edited
+  // as in the video, with the velocity it has there, and nothing else is edited
+  bool continues = false;
   bool inserted = false;          // not in the video
   bool immovable = false;         // of infinite mass
   std::vector<int> own_supports;  // ids of the support meshes that are its own surface

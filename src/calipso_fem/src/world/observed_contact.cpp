@@ -13,8 +13,8 @@
 namespace calipso::fem {
 namespace {
 
-constexpr double kAgree =
-    0.05;  // of the size, between simulated and observed: now, and by the velocities a frame on
+// of the size, between simulated and observed: now, and by the velocities a frame on
+constexpr double kAgree = 0.05;
 constexpr double kForced = 0.2;  // of its weight, that something else acts on it with in the video
 
 double turn(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {

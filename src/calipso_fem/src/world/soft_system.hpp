@@ -41,8 +41,8 @@ class SoftSystem {
   BlockMatrix A_;
   Vec pull_;
   Eigen::MatrixX3d shifted_;  // A times a shift along each axis
-  Eigen::Vector3d push_ =
-      Eigen::Vector3d::Zero();  // sum of the forces of reduce(), in the factor's axes
+  // sum of the forces of reduce(), in the factor's axes
+  Eigen::Vector3d push_ = Eigen::Vector3d::Zero();
   std::vector<int> held_;       // prescribed components among those of the contact nodes
   Eigen::MatrixXd compliance_;  // of a body that has some
   Eigen::Matrix3d frozen_ = Eigen::Matrix3d::Identity(), turn_ = Eigen::Matrix3d::Identity();

@@ -8,8 +8,8 @@
 namespace calipso::fem {
 namespace {
 
-constexpr double kPullFrequency =
-    2.0 * M_PI * 4.0;  // rad/s, a quarter of a second to follow a target
+// rad/s, a quarter of a second to follow a target
+constexpr double kPullFrequency = 2.0 * M_PI * 4.0;
 
 }  // namespace
 

@@ -174,9 +174,9 @@ struct World::Impl {
   bool started = false;
   double step_ms = 0.0;
   int substeps = 0;
-  double soft_part = std::numeric_limits<double>::infinity();  // s, of a step, at which deformable
-                                                               // objects converge
-  int good_parts = 0;                                          // in a row, of that length
+  // s, of a step, at which deformable objects converge
+  double soft_part = std::numeric_limits<double>::infinity();
+  int good_parts = 0;  // in a row, of that length
   std::vector<ContactPoint> shown_contacts;
   std::set<std::pair<std::string, std::string>> touching;
   std::vector<TouchEvent> first_touches;

@@ -11,8 +11,8 @@ namespace calipso::fem {
 namespace {
 
 // A support mesh is an object's own surface when most of it lies on that, facing as it does.
-constexpr double kOwnSurface =
-    0.02;                          // of the object's diagonal: the alignment's error, and details
+// of the object's diagonal: the alignment's error, and details
+constexpr double kOwnSurface = 0.02;
 constexpr double kOwnShare = 0.5;  // of the support's area
 
 // Part of the mesh's area whose triangles lie within `reach` of the surface and face the same way.

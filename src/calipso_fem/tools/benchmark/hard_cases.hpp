@@ -14,10 +14,12 @@ struct HardCaseResult {
   std::string material;
   double h = 0.0;  // s
   int steps = 0;
-  double energy_growth = 0.0;   // largest growth of the total energy (with that of dead loads)
-                                // within a step, relative to the largest energy so far
-  double displacement = 0.0;    // at the end: largest distance from rest / size; of a free body:
-                                // distance of its centre from where it should be / its way
+  // largest growth of the total energy (with that of dead loads) within a step, relative to the
+  // largest energy so far
+  double energy_growth = 0.0;
+  // at the end: largest distance from rest / size; of a free body: distance of its centre from
+  // where it should be / its way
+  double displacement = 0.0;
   double momentum_error = 0.0;  // free bodies: change of linear or angular momentum, relative
   int recovering_steps = 0;     // steps in which the material was stiffened against inversion
   int unconverged_steps = 0;

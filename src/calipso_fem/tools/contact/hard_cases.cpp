@@ -196,8 +196,8 @@ std::vector<Result> squeezed() {
   watch.scale = most;
   const double squeezed_height = height;
   watch.play(scene, 3.0, 1.0 / 60.0);
-  const Eigen::VectorXd along =
-      soft.vertices() * soft.motion().linear().col(2);  // it has got some spin
+  // it has got some spin
+  const Eigen::VectorXd along = soft.vertices() * soft.motion().linear().col(2);
   height = along.maxCoeff() - along.minCoeff();
   return {resultOf("height of a block squeezed between plates 0.1 m apart, m", squeezed_height,
                    0.1002, scene, watch, 4.5),

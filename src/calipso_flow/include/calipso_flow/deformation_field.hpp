@@ -7,9 +7,10 @@
 
 namespace calipso::flow {
 
-// Smooth displacements of an object, by a coarse lattice of control points over its box of
-// principal axes:  u(X) = sum_m w_m(X) c_m.  Cubic B-splines along axes that are long, linear along
-// short ones, constant through a sheet.
+// Smooth displacements of an object, by a coarse lattice of control points c_m over its box of
+// principal axes:
+//   u(X) = sum_m w_m(X) c_m
+// Cubic B-splines along axes that are long, linear along short ones, constant through a sheet.
 class DeformationField {
  public:
   using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;  // #points x size()

@@ -15,8 +15,8 @@ enum class Care { kRough, kForward, kChecked };
 
 // What makes a match count.
 struct MatchTrust {
-  double forward_backward_px =
-      0.3;  // a match followed back misses its origin by less, beside its own uncertainty
+  // a match followed back misses its origin by less, beside its own uncertainty
+  double forward_backward_px = 0.3;
   double largest_deviation_px = 0.5;  // a match less certain than this is dropped
   double least_correlation = 0.4;     // of the patch with its reference
 };

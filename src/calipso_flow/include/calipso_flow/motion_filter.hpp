@@ -57,10 +57,10 @@ enum class Turning { kNone, kSteady, kForced };
 
 // One piece of the motion and what is assumed about it.
 struct MotionPiece {
-  double start = 0.0;    // s; the first piece's start is not read
-  bool cut = false;      // the video was cut here: nothing carries over
-  double contact = 0.0;  // s; > 0: several impacts within about so long, between which it moves at
-                         // an unknown rate
+  double start = 0.0;  // s; the first piece's start is not read
+  bool cut = false;    // the video was cut here: nothing carries over
+  // s; > 0: several impacts within about so long, between which it moves at an unknown rate
+  double contact = 0.0;
   Travel travel = Travel::kForced;
   Turning turning = Turning::kForced;
   double jerk = 0.0;        // m/s^3 per square root of Hz; kForced only

@@ -13,8 +13,8 @@ namespace calipso::flow {
 
 struct TrackerParams {
   int seed_count = 120;  // surface points followed at a time
-  double least_inliers =
-      0.65;  // below this share of the most tracks it had a reference is worn out
+  // below this share of the most tracks it had a reference is worn out
+  double least_inliers = 0.65;
   double least_coverage = 0.55;  // below this share of known surface a new reference is taken
   int max_references = 12;
   double search_px = 24.0;  // the coarse search looks this far beyond the prediction
@@ -43,8 +43,8 @@ struct Observation {
   // By how much the persistent error may have changed since the object was found last.
   Matrix6d drift = Matrix6d::Zero();
   double reference_time = 0.0;  // s, of the frame that it was compared with
-  Matrix6d reference_error =
-      Matrix6d::Zero();                // covariance of what that frame's pose errs by alone
+  // covariance of what that frame's pose errs by alone
+  Matrix6d reference_error = Matrix6d::Zero();
   Matrix6d common = Matrix6d::Zero();  // see PoseFit
   double deviation = 0.0;              // see PoseFit
   double coverage = 0.0;               // see ReferenceView::Warped
@@ -114,8 +114,8 @@ class ObjectTracker {
   std::vector<SurfaceEdge> edges_;
   OutlineBias outline_bias_;  // of the key frame, where the pose is known
   TrackerParams params_;
-  TrackerParams
-      wide_;  // the same with large patches, for frames whose noise or blur drowns small ones
+  // the same with large patches, for frames whose noise or blur drowns small ones
+  TrackerParams wide_;
   Eigen::Vector3d centroid_;
   bool drowned_ = false;  // `wide_` found more of late
   std::vector<Reference> references_;

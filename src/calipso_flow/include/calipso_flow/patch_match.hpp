@@ -15,8 +15,8 @@ struct ImageWindow {
 constexpr int kMostRadius = 10;  // px, of a patch
 
 struct PatchParams {
-  int radius_px = 4;  // 1..kMostRadius; the patch is a square of 2 r + 1 pixels: small, since
-                      // shading bends large ones
+  // 1..kMostRadius; the patch is a square of 2 r + 1 pixels: small, since shading bends large ones
+  int radius_px = 4;
   int max_iterations = 12;
   double least_support = 0.4;   // share of the patch's pixels that must carry weight
   double converged_px = 0.005;  // an update smaller than this ends the iteration

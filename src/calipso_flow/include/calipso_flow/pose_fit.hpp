@@ -23,8 +23,9 @@ struct PoseFitParams {
   double start_scale_px = 8.0;  // residuals up to this count fully at first, then less and less
   double floor_px = 0.03;       // no track is better than this: model error, compression
   double inlier_sigma = 4.0;    // a track further off than this many deviations does not count
-  double common_px = 0.004;    // error that all tracks of a frame may share, and that changes
-                              // slowly: of how looks are resampled and lit
+  // error that all tracks of a frame may share, and that changes slowly: of how looks are resampled
+  // and lit
+  double common_px = 0.004;
   int max_iterations = 30;
   int least_inliers = 6;  // a point of the outline counts half
 };
@@ -34,8 +35,8 @@ struct PoseFit {
   Matrix6d covariance = Matrix6d::Zero();  // of (m of the pivot, rad), world axes
   // The part of it that stays from frame to frame as long as the object shows the same side.
   Matrix6d persistent = Matrix6d::Zero();
-  Matrix6d common =
-      Matrix6d::Zero();      // the same of the error that all tracks share; not part of covariance
+  // the same of the error that all tracks share; not part of covariance
+  Matrix6d common = Matrix6d::Zero();
   std::vector<bool> inlier;  // per correspondence
   int inliers = 0;           // of those that are not of the outline
   double deviation = 0.0;    // robust deviation of their residuals over their own, 1 = as expected

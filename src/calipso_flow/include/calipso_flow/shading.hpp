@@ -23,7 +23,8 @@ Shading shadingOf(const std::vector<DeformationObservation>& observations);
 
 // The wave vector k, rad per unit of length, of a field that goes as exp(-i k.x) times a positive
 // envelope: where its spatial spectrum is largest.
-// @param points  #P x 2  @param farthest  of |k| that is looked for
+// @param points    #P x 2
+// @param farthest  of |k| that is looked for
 struct PlaneWave {
   Eigen::Vector2d wave_vector = Eigen::Vector2d::Zero();
   double power = 0.0;     // share of the field's that the wave shows, were its envelope even

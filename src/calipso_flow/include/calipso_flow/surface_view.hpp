@@ -24,8 +24,7 @@ struct CarriedView {
 };
 
 // Draws the triangles of `mesh`, moved to `moved` (camera frame, #V x 3), and interpolates
-// `carried`
-// (#V x 3, not zero where it counts) over them.
+// `carried` (#V x 3, not zero where it counts) over them.
 CarriedView carrySurface(const TriangleMesh& mesh, const Camera& camera,
                          const decltype(TriangleMesh::vertices)& moved,
                          const decltype(TriangleMesh::vertices)& carried);

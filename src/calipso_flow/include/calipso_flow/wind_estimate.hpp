@@ -10,14 +10,15 @@
 namespace calipso::flow {
 
 // The wind under which the simulated sheet moves as the tracked one does:
-//   min over w, s   sum_k |S^-1 (Phi^+ (x_k(w, s) - x_0) - q_k)|^2 + |w' / sigma'|^2 + |w /
-//   sigma|^2 + |log s / tau|^2
+//   min over w, s   sum_k |S^-1 (Phi^+ (x_k(w, s) - x_0) - q_k)|^2
+//                   + |w' / sigma'|^2 + |w / sigma|^2 + |log s / tau|^2
 //  x_k     shape at frame k, by the simulator, from the key frame's shape in equilibrium under
-//  gravity q_k     observed amplitudes of the modes Phi, S their deviations w       velocity of the
-//  air, linear between knots; m/s, world axes s       the sheet's modulus over that which the
-//  simulator starts with. It is no less unknown than the wind, and on
-//          cubes of edge h that are thicker than the sheet its stiffness in bending goes with h^2:
-//          s takes up both.
+//          gravity
+//  q_k     observed amplitudes of the modes Phi, S their deviations
+//  w       velocity of the air, linear between knots; m/s, world axes
+//  s       the sheet's modulus over that which the simulator starts with. It is no less unknown
+//          than the wind, and on cubes of edge h that are thicker than the sheet its stiffness in
+//          bending goes with h^2: s takes up both.
 struct WindEstimate : WindCourse {
   std::vector<Eigen::Matrix3d> covariance;         // m^2/s^2, at the knots
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();  // m/s, over the clip
@@ -36,10 +37,10 @@ struct WindParams {
   int simulator_nodes = 1200;  // of the grid for which the stiffness is told
   double longest_step = 1.0 / 30.0;  // s, of the simulation
   double knot_spacing = 0.5;         // s
-  double strongest =
-      6.0;              // m/s, deviation of the wind before anything is seen, level with the ground
-  double rising = 0.5;  // m/s, the same up and down
-  double change = 3.0;  // m/s per square root of a second, deviation of its changes
+  // m/s, deviation of the wind before anything is seen, level with the ground
+  double strongest = 6.0;
+  double rising = 0.5;       // m/s, the same up and down
+  double change = 3.0;       // m/s per square root of a second, deviation of its changes
   double stiffness = 1.5;    // deviation of the logarithm of s
   double model_error = 0.1;  // of the motion: what the simulation cannot show
   double least_explained = 0.4;

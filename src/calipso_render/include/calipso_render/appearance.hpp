@@ -22,8 +22,8 @@ class Appearance {
   cv::Mat albedo;
   cv::Rect region;         // of the key frame's picture that albedo covers
   SurfaceTexture texture;  // reflectance, and how far the picture is to be taken instead (0..1)
-  std::vector<Source>
-      sources;  // per triangle: what `texture` says there; findSources() once that is complete
+  // per triangle: what `texture` says there; findSources() once that is complete
+  std::vector<Source> sources;
   Camera key_camera;
   cv::Vec3f mean_light;  // average shading over the seen surface: regularises the relighting
   cv::Vec3f tint;        // thrownBackTint() of its mean reflectance

@@ -20,12 +20,12 @@ struct Background {
 };
 
 struct BackgroundParams {
-  int mask_margin_px =
-      3;  // masks are grown by this: mixed pixels and compression belong to the object
-  int shadow_margin_px =
-      7;  // predicted shadows are grown by this: penumbra, errors of light and model
-  double shadow_step =
-      0.06;  // a pixel darker by more than this fraction may be shaded by an object
+  // masks are grown by this: mixed pixels and compression belong to the object
+  int mask_margin_px = 3;
+  // predicted shadows are grown by this: penumbra, errors of light and model
+  int shadow_margin_px = 7;
+  // a pixel darker by more than this fraction may be shaded by an object
+  double shadow_step = 0.06;
 };
 
 // Temporal median of every pixel over the frames in which no object covers it (masks grown),
@@ -39,8 +39,8 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
 // Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects cover or
 // darken in every frame), from the surroundings. Where the place moves by itself, the median is no
 // picture of it: there the key frame is what the surroundings look like.
-// @param nearness of the ground, as groundNearness(); @param surface as InpaintParams::surface;
-// both may be empty
+// @param nearness of the ground, as groundNearness(); may be empty
+// @param surface as InpaintParams::surface; may be empty
 void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness,
                       const cv::Mat& surface, Background& background);
 

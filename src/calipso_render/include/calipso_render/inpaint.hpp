@@ -13,17 +13,18 @@ struct InpaintParams {
         away_column =
             0.2f;  // what a px of way to the source counts, squared code values: places are layered
   std::uint32_t seed = 1;
-  cv::Mat nearness;  // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the
-                     // horizon. What is copied comes from where the ground is about as near: there
-                     // things have the same size.
-  cv::Mat surface;   // CV_8UC1, may be empty: number of the surface that a pixel sees, 0 unknown.
-                     // What is copied comes from the same one.
+  // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the horizon. What is
+  // copied comes from where the ground is about as near: there things have the same size.
+  cv::Mat nearness;
+  // CV_8UC1, may be empty: number of the surface that a pixel sees, 0 unknown. What is copied comes
+  // from the same one.
+  cv::Mat surface;
 };
 
 struct InpaintResult {
-  cv::Mat image;   // CV_32FC3, as the input outside the hole
-  cv::Mat origin;  // CV_16SC2: (u, v) in the input that each hole pixel is a copy of; (-1, -1)
-                   // elsewhere
+  cv::Mat image;  // CV_32FC3, as the input outside the hole
+  // CV_16SC2: (u, v) in the input that each hole pixel is a copy of; (-1, -1) elsewhere
+  cv::Mat origin;
   bool patches_found = true;  // false: nothing to copy from, the hole was filled smoothly
 };
 

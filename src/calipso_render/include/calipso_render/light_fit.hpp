@@ -58,8 +58,8 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
 struct LightFit {
   Light light;
   Gloss gloss;  // of all objects together
-  std::optional<SeenGloss>
-      seen_gloss;  // nullopt: no highlight tells it, `gloss` is what the shading leaves possible
+  // nullopt: no highlight tells it, `gloss` is what the shading leaves possible
+  std::optional<SeenGloss> seen_gloss;
   std::vector<cv::Vec3f> albedos;  // per cluster, up to a common factor
   bool determined = false;  // false: too little was seen; the light is a default, high and frontal
   bool second_order = false;  // ambient light in bands 1 and 2, too: held-out pixels spoke for it

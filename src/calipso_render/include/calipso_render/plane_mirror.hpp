@@ -9,10 +9,10 @@ namespace calipso::render {
 struct PlaneMirror {
   float strength = 0.0f;   // part of a whole mirror's reflection
   cv::Vec3f surroundings;  // linear; what is mirrored where no object is
-  float slope = 0.0f;  // standard deviation of the planes' slope, by waves or roughness: it draws
-                       // reflections out
-  cv::Mat off;         // CV_8UC1: 255 where something else than a plane is seen
-  cv::Mat at_key;      // CV_32FC3, linear: what the objects at rest add to the key frame
+  // standard deviation of the planes' slope, by waves or roughness: it draws reflections out
+  float slope = 0.0f;
+  cv::Mat off;     // CV_8UC1: 255 where something else than a plane is seen
+  cv::Mat at_key;  // CV_32FC3, linear: what the objects at rest add to the key frame
 
   bool established() const { return strength > 0.0f; }
 };

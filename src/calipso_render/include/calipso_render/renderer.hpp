@@ -85,20 +85,21 @@ struct Prepared {
   cv::Mat key_labels;
   std::vector<Surface> surfaces;
   std::vector<bool> moves;  // per surface: it moves in the video
-  std::vector<bool> sways;  // per surface: it does not, but what is seen within its outline
-                            // changes: it hangs or bends
+  // per surface: it does not, but what is seen within its outline changes: it hangs or bends
+  std::vector<bool> sways;
   std::vector<Appearance> appearances;
   LightFit light;
-  std::vector<cv::Mat>
-      fronts;  // per surface, CV_8UC1: places where something unmodelled stands before it
-  std::vector<cv::Mat>
-      footprints;   // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
-  cv::Mat scenery;  // CV_32FC1, 1/m: nearness of what is no object and may hide one; 0 unknown; may
-                    // be empty
-  cv::Mat shadowless;  // CV_8UC1: where objects cast no shadow: neither plane nor relief is seen
-                       // there, or shows none in the video
-  Relief relief;       // of the place, takes shadows; may be empty
-  cv::Mat nearness;    // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
+  // per surface, CV_8UC1: places where something unmodelled stands before it
+  std::vector<cv::Mat> fronts;
+  // per surface, CV_8UC1: what it covers at the key frame; empty if it moves
+  std::vector<cv::Mat> footprints;
+  // CV_32FC1, 1/m: nearness of what is no object and may hide one; 0 unknown; may be empty
+  cv::Mat scenery;
+  // CV_8UC1: where objects cast no shadow: neither plane nor relief is seen there, or shows none in
+  // the video
+  cv::Mat shadowless;
+  Relief relief;     // of the place, takes shadows; may be empty
+  cv::Mat nearness;  // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
   PlaneMirror mirror;
   Background background;
   cv::Mat plate_linear;  // CV_32FC3

@@ -67,8 +67,8 @@ class ShadowMap : public Visibility {
   float texel_ = 0.0f, per_texel_ = 0.0f, angular_radius_ = 0.0f, highest_ = 0.0f;
   int width_ = 0, height_ = 0;
   std::shared_ptr<const ShadowTaps> taps_;
-  std::optional<VisibilityBuffer>
-      map_;                     // of the heights towards the light, m; none: nothing casts a shadow
+  // of the heights towards the light, m; none: nothing casts a shadow
+  std::optional<VisibilityBuffer> map_;
   int columns_ = 0, rows_ = 0;  // of cells
   std::vector<Level> levels_;   // tell at once where all is lit or all is shaded
 };

@@ -31,8 +31,8 @@ struct Surface {
   Points object_vertices;  // object frame, m
   Points key_vertices;     // world, key frame, m
   Points key_normals;      // world, unit
-  int winding =
-      0;  // of its triangles seen from outside: 1 counterclockwise, -1 clockwise, 0 it is open
+  // of its triangles seen from outside: 1 counterclockwise, -1 clockwise, 0 it is open
+  int winding = 0;
   std::vector<float> sky;  // part of the ambient light that a vertex gets past its own object
 };
 

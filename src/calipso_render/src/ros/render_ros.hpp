@@ -75,9 +75,9 @@ class RenderNode {
   std::uint32_t clip_frames_ = 0;  // seen, good or bad
   calipso_msgs::AlignedModelsConstPtr models_msg_;
   std::vector<ObjectModel> models_;
-  calipso_msgs::ClipDynamicsConstPtr
-      dynamics_;             // of the clip; empty: not there yet, or nobody estimates it
-  bool flow_works_ = false;  // somebody estimates it, and has not failed
+  // of the clip; empty: not there yet, or nobody estimates it
+  calipso_msgs::ClipDynamicsConstPtr dynamics_;
+  bool flow_works_ = false;                    // somebody estimates it, and has not failed
   std::map<std::string, std::string> failed_;  // node -> why
   std::unique_ptr<Renderer> renderer_;
 

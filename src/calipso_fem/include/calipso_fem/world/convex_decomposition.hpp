@@ -9,8 +9,8 @@ namespace calipso::fem {
 struct DecompositionParams {
   double concavity = 0.02;  // stop when the hulls exceed the solid by this share of its volume
   int max_hulls = 24;
-  int cuts_per_axis =
-      7;  // candidate planes per axis and split; if that does not do, half as many more, twice
+  // candidate planes per axis and split; if that does not do, half as many more, twice
+  int cuts_per_axis = 7;
   int grid = 48;  // cells along the longest side, for volumes and inside tests
 };
 

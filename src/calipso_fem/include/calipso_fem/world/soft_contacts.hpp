@@ -41,8 +41,8 @@ struct SoftEntry {
 struct ContactParams {
   double proximity = 5e-3;  // m, surfaces closer than this are watched
   int iterations = 120;     // Gauss-Seidel sweeps per solve
-  double tolerance =
-      0.5;  // of allowed_depth: sweeps that change the ways of the surfaces by less are the last
+  // of allowed_depth: sweeps that change the ways of the surfaces by less are the last
+  double tolerance = 0.5;
   int newton_iterations = 30;
   double allowed_depth = 3e-6;  // m, remaining violation that ends a step's iteration,
   double residual = 1e-3;       // with this of bodies in contact, over their forces

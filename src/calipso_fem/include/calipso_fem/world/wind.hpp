@@ -23,10 +23,9 @@ struct Air {
 
 // Forces on the vertices, #V x 3, N.
 // @param x, u positions (m) and velocities (m/s) of the vertices, #V x 3
-// @param areal_density kg/m^2 of the sheet, and h (s): the force is damped by the change of u that
-// it brings about
-//   within a step, so that a light sheet takes on the wind's speed instead of overshooting it; h =
-//   0: undamped
+// @param areal_density of the sheet, kg/m^2
+// @param h s: the force is damped by the change of u that it brings about within a step, so that a
+//   light sheet takes on the wind's speed instead of overshooting it; 0: undamped
 Vertices windForces(const Vertices& x, const Vertices& u, const Triangles& triangles,
                     const Air& air, double areal_density, double h);
 

@@ -106,8 +106,8 @@ struct WorldParams {
   FemOptions fem;                    // cell_size and target_nodes are chosen per object
   double proximity = 0.0;  // m, minimal distance of surfaces; 0: a fiftieth of the smallest object
   int contact_iterations = 60;  // block Gauss-Seidel sweeps per solve
-  double contact_tolerance =
-      0.5;  // of the depth a step may end with: sweeps that change less are the last
+  // of the depth a step may end with: sweeps that change less are the last
+  double contact_tolerance = 0.5;
   SurfaceSettings support;  // of planes and support meshes
   ObjectSettings defaults;
   std::map<std::string, ObjectSettings> objects;  // by object name; replaces the defaults
@@ -129,10 +129,10 @@ struct ObjectSnapshot {
   bool removed = false;
   bool sleeping = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // best rigid motion
-  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>
-      vertices;  // #V x 3; empty unless edited
-  Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>
-      triangles;                // #F x 3, of a model that the video does not have; else empty
+  // #V x 3; empty unless edited
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> vertices;
+  // #F x 3, of a model that the video does not have; else empty
+  Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor> triangles;
   Eigen::VectorXd von_mises;    // #V, Pa; empty unless deformable
   double kinetic_energy = 0.0;  // J
   double elastic_energy = 0.0;  // J
