@@ -49,9 +49,8 @@ cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, doubl
 
 // The pieces of `pixels` that touch `mask`, gaps passed over where the two look alike.
 cv::Mat connectedTo(const cv::Mat& mask, const cv::Mat& pixels) {
-  constexpr int kGap = 8;  // px
   cv::Mat wide, pieces, reached = cv::Mat::zeros(mask.size(), CV_8U);
-  cv::dilate(pixels | mask, wide, cv::Mat::ones(kGap + 1, kGap + 1, CV_8U));
+  cv::dilate(pixels | mask, wide, cv::Mat::ones(kLookAlikeGap + 1, kLookAlikeGap + 1, CV_8U));
   const int count = cv::connectedComponents(wide, pieces, 8);
   std::vector<uchar> touches(count, 0);
   for (int y = 0; y < mask.rows; ++y)

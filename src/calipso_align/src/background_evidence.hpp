@@ -8,6 +8,9 @@
 
 namespace calipso::align {
 
+// Pieces of an object may lie so far apart where it looks as its background does, px.
+constexpr int kLookAlikeGap = 8;
+
 // Where a background that is known contradicts a mask: pixels beside it, in one piece with it, that
 // the background cannot be, and pixels of it that are the background, lit or in a shadow.
 // view         CV_8UC3

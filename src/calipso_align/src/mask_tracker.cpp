@@ -287,7 +287,8 @@ void MaskTracker::cutContradicted(const Object& object, const cv::Mat& view, con
       unseenParts(view, labels, background.known, apart, layers.fore.colours, known_colours);
   if (cv::countNonZero(wrong) <= params_.wrong_share * cv::countNonZero(labels)) return;
   cv::Mat between;  // what was gained and the rest, where the two look alike
-  cv::morphologyEx((labels > 0) | wrong, between, cv::MORPH_CLOSE, cv::Mat::ones(9, 9, CV_8U));
+  cv::morphologyEx((labels > 0) | wrong, between, cv::MORPH_CLOSE,
+                   cv::Mat::ones(kLookAlikeGap + 1, kLookAlikeGap + 1, CV_8U));
   const cv::Mat free = ((grown(wrong, 2) | between | ~background.known) & ~apart) | p.band;
   LayerAppearance back = layers.back;
   back.accounts.resize(2);          // those of the known background

@@ -1,8 +1,9 @@
+#include "calipso_align/mesh_topology.hpp"
+
 #include <algorithm>
-#include <numeric>
 #include <tuple>
 
-#include "calipso_align/silhouette.hpp"
+#include "calipso_scene/disjoint_sets.hpp"
 
 namespace calipso::align {
 namespace {
@@ -33,42 +34,13 @@ bool isClosed(const HalfEdge* first, const HalfEdge* last) {
   return last - first == 2 && first[0].forward != first[1].forward;
 }
 
-// Pieces of faces that share edges; a piece is open where one of its edges is.
-class Pieces {
- public:
-  explicit Pieces(int faces) : parent_(faces), open_(faces, false) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  void join(int f, int g) {
-    const auto [a, b] = std::minmax({rootOf(f), rootOf(g)});
-    parent_[b] = a;
-    open_[a] = open_[a] || open_[b];
-  }
-  void open(int f) { open_[rootOf(f)] = true; }
-  std::vector<int> closedShells() {
-    std::vector<int> shells(parent_.size());
-    int count = 0;
-    for (int f = 0; f < static_cast<int>(shells.size()); ++f) {
-      const int root = rootOf(f);
-      shells[f] = open_[root] ? MeshTopology::kOpen : root == f ? count++ : shells[root];
-    }
-    return shells;
-  }
-
- private:
-  int rootOf(int f) {
-    while (parent_[f] != f) f = parent_[f] = parent_[parent_[f]];
-    return f;
-  }
-  std::vector<int> parent_;
-  std::vector<bool> open_;
-};
-
 }  // namespace
 
-MeshTopology::MeshTopology(const Triangles& triangles) : triangles_(triangles) {
+MeshTopology::MeshTopology(const Triangles& triangles)
+    : triangles_(triangles), shells_(triangles.rows()) {
   const std::vector<HalfEdge> half_edges = sortedHalfEdges(triangles);
-  Pieces pieces(static_cast<int>(triangles.rows()));
+  DisjointSets pieces(static_cast<int>(triangles.rows()));
+  std::vector<int> at_open_edges;  // faces
   const HalfEdge* const end = half_edges.data() + half_edges.size();
   for (const HalfEdge *first = half_edges.data(), *last = first; first != end; first = last) {
     Edge edge{first->v0, first->v1, {}};
@@ -76,10 +48,16 @@ MeshTopology::MeshTopology(const Triangles& triangles) : triangles_(triangles) {
       edge.faces.push_back(last->face);
       pieces.join(first->face, last->face);
     }
-    if (!isClosed(first, last)) pieces.open(first->face);
+    if (!isClosed(first, last)) at_open_edges.push_back(first->face);
     edges_.push_back(std::move(edge));
   }
-  shells_ = pieces.closedShells();
+  std::vector<bool> open(shells_.size(), false);
+  for (const int f : at_open_edges) open[pieces.find(f)] = true;
+  int count = 0;
+  for (int f = 0; f < static_cast<int>(shells_.size()); ++f) {
+    const int first = pieces.find(f);  // the smallest face of its piece
+    shells_[f] = open[first] ? kOpen : first == f ? count++ : shells_[first];
+  }
 }
 
 }  // namespace calipso::align

@@ -85,10 +85,9 @@ float creaseThreshold(const Relief& relief) {
   return kBeyond * *place;
 }
 
-cv::Mat planarPieces(const Relief& relief) {
+cv::Mat planarPieces(const Relief& relief, float crease) {
   constexpr double kLeastPixels = 30.0;
   const int rows = relief.state.rows, cols = relief.state.cols;
-  const float crease = creaseThreshold(relief);
   // A crease is of neither side, and seen across it only: what is flat is so in both directions.
   cv::Mat flat = cv::Mat::zeros(relief.state.size(), CV_8U);
   for (int y = 0; y < rows; ++y)

@@ -168,8 +168,9 @@ Relief makeRelief(const cv::Mat& image, const cv::Mat& depth,
     relief.state.setTo(Relief::kUnusable,
                        grown(across | down, static_cast<int>(std::ceil(error)) + 1));
   if (relief.registered) {
-    relief.pieces = planarPieces(relief);
-    relief.islands = surfaceIslands(relief, creaseThreshold(relief));
+    const float crease = creaseThreshold(relief);
+    relief.pieces = planarPieces(relief, crease);
+    relief.islands = surfaceIslands(relief, crease);
   }
   if (!supports.empty())
     relief.on_support = surfacesOf(supports, depth, noise) & (relief.state == Relief::kSurface);

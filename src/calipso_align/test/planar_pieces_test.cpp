@@ -34,8 +34,10 @@ Relief corner() {
   });
 }
 
+cv::Mat piecesOf(const Relief& relief) { return planarPieces(relief, creaseThreshold(relief)); }
+
 TEST(PlanarPieces, CreasesAndJumpsPartThem) {
-  const cv::Mat pieces = planarPieces(corner());
+  const cv::Mat pieces = piecesOf(corner());
   const int left = pieces.at<int>(30, 10), right = pieces.at<int>(30, 42),
             behind = pieces.at<int>(30, 56);
   EXPECT_GT(left, 0);
@@ -53,17 +55,17 @@ TEST(PlanarPieces, WhatIsCurvedIsNone) {
   const Relief relief = reliefOf([](int x, int y) {
     return 1000.0f - 0.3f * static_cast<float>((x - 30) * (x - 30) + (y - 30) * (y - 30));
   });
-  EXPECT_EQ(cv::countNonZero(planarPieces(relief)), 0);
+  EXPECT_EQ(cv::countNonZero(piecesOf(relief)), 0);
 }
 
 TEST(PlanarPieces, WithoutDepthThereAreNone) {
   Relief relief = corner();
   relief.state.setTo(Relief::kNone);
-  EXPECT_EQ(cv::countNonZero(planarPieces(relief)), 0);
+  EXPECT_EQ(cv::countNonZero(piecesOf(relief)), 0);
 }
 
 TEST(StrokesOfPieces, OnlyStrokesThatAgreeCount) {
-  const cv::Mat pieces = planarPieces(corner());
+  const cv::Mat pieces = piecesOf(corner());
   cv::Mat strokes = cv::Mat::zeros(kSize, kSize, CV_8U);
   strokes(cv::Rect(8, 20, 5, 5)).setTo(2);   // left wall
   strokes(cv::Rect(40, 20, 3, 3)).setTo(2);  // right wall, of two kinds

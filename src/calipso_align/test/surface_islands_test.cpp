@@ -12,14 +12,11 @@
 namespace calipso::align {
 namespace {
 
-using testing::disc;
-using testing::intersectionOverUnion;
-using testing::maskOf;
-using testing::paint;
+using namespace testing;
 
 const cv::Size kSize(160, 120);
 const cv::Vec3b kGreen(40, 160, 60), kGrey(150, 150, 150);
-const testing::SignedDistance kBowl = disc(80.3, 60.7, 30.2);
+const SignedDistance kBowl = disc(80.3, 60.7, 30.2);
 
 // A bowl, 0.8 m away, before a wall at 2 m on whose left a step of 0.5 m stands.
 cv::Mat depthOfBowl() {

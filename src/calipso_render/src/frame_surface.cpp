@@ -1,5 +1,5 @@
 // The part of FrameCompositor that lights and shades the drawn surfaces: stretches of pixels that
-// see one object by their triangles' maps, places of silhouettes one by one. Where the sun changes
+// see one object by their triangles' maps, other places one by one. Where the sun changes
 // little between the corners of small squares it is interpolated, elsewhere looked up at the pixel.
 
 #include <algorithm>
@@ -17,17 +17,6 @@ namespace {
 
 // of visibility: between corners that differ by no more it is interpolated
 constexpr float kEvenSun = 0.12f, kEvenSunOfTwo = 0.06f;  // likewise over two steps
-
-// Squared distance of a pixel's samples from its centre, in eighths of a pixel.
-constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
-  std::array<int, EdgeCoverage::kSamples> squared{};
-  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
-    const int x = 2 * (i % EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid,
-              y = 2 * (i / EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid;
-    squared[i] = x * x + y * y;
-  }
-  return squared;
-}();
 
 void copyTo(float (&to)[3], const cv::Vec3f& from) { std::copy_n(from.val, 3, to); }
 
@@ -333,82 +322,6 @@ void FrameCompositor::carryResidual(int v, int first, int last, int slot, Row& r
     cv::Vec4f colour = row.at(i);
     addResidual(from_u, from_v, moved, surface, tintOf(slot), colour);
     row.set(i, colour);
-  }
-}
-
-// One place for each sheet of each object in a pixel: the sample nearest to the pixel's centre.
-void FrameCompositor::addSheets(int u, int v, std::vector<Sheet>& sheets) const {
-  if (screenAt(u, v) == 1.0f) return;
-  const int column = u - region_.x;
-  const EdgeCoverage::Pixel* edge = edges_->at(u, v);
-  if (edge == nullptr) {
-    const std::uint32_t id = centre_->idAt(u, v);
-    if (isDrawn(id, u, v))
-      sheets.push_back({{id, static_cast<float>(u), static_cast<float>(v)}, column, 1.0f});
-    return;
-  }
-  std::array<bool, EdgeCoverage::kSamples> done{};
-  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
-    if (done[i] || !isDrawn(edge->ids[i], u, v)) continue;
-    int count = 0, middle = i;
-    const int object = VisibilityBuffer::objectOf(edge->ids[i]);
-    for (int j = i; j < EdgeCoverage::kSamples; ++j) {
-      if (done[j] || edge->ids[j] == VisibilityBuffer::kNothing ||
-          VisibilityBuffer::objectOf(edge->ids[j]) != object)
-        continue;
-      const auto [farthest, nearest] = std::minmax(edge->nearness[i], edge->nearness[j]);
-      if (!EdgeCoverage::isOneSheet(nearest, farthest)) continue;
-      done[j] = true, ++count;
-      if (kFromCentre[j] < kFromCentre[middle]) middle = j;
-    }
-    const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(middle);
-    sheets.push_back({{edge->ids[middle], x.x(), x.y()},
-                      column,
-                      static_cast<float>(count) / EdgeCoverage::kSamples});
-  }
-}
-
-// Sheets of the row's pixels that need more than their centre, or more than its triangle's map.
-void FrameCompositor::findSheets(int v, Row& row) const {
-  constexpr std::uint8_t kPlaces = kSpecial | kPlainEdge;
-  row.sheets.clear();
-  const Kind* kinds = row.kinds.data();
-  for (int i = nextMarked(kinds, 0, region_.width, kPlaces); i < region_.width;
-       i = nextMarked(kinds, i + 1, region_.width, kPlaces)) {
-    row.drawn[i] = {};
-    const float u = static_cast<float>(i + region_.x);
-    if (kinds[i] == kSpecial)
-      addSheets(i + region_.x, v, row.sheets);
-    else
-      row.sheets.push_back({{centre_->ids(v - region_.y)[i], u, static_cast<float>(v)}, i, 1.0f});
-  }
-}
-
-// Row v's sheets, into row.drawn.
-void FrameCompositor::shadeSheets(int v, Row& row) const {
-  SurfacePlace places[SurfaceRun::kMost];
-  const std::size_t all = row.sheets.size();
-  for (std::size_t i = 0; i < all;) {
-    const std::size_t first = i;
-    const int slot = VisibilityBuffer::objectOf(row.sheets[i].place.id);
-    for (; i < all && i - first < SurfaceRun::kMost &&
-           VisibilityBuffer::objectOf(row.sheets[i].place.id) == slot;
-         ++i)
-      places[i - first] = row.sheets[i].place;
-    shadePlaces(places, static_cast<int>(i - first), slot, row.run);
-    for (std::size_t k = 0; k < i - first; ++k) {
-      const Sheet& sheet = row.sheets[first + k];
-      Drawn& drawn = row.drawn[sheet.column];
-      drawn.cover += sheet.part;
-      for (int c = 0; c < 3; ++c) drawn.colour[c] += sheet.part * row.run.colour[c][k];
-    }
-  }
-  for (std::size_t i = 0; i < all; ++i) {
-    const int column = row.sheets[i].column;
-    if (i + 1 < all && row.sheets[i + 1].column == column) continue;
-    Drawn& drawn = row.drawn[column];
-    drawn.colour /= drawn.cover;
-    drawn.cover *= 1.0f - screenAt(column + region_.x, v);
   }
 }
 

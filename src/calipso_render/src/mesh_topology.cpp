@@ -5,8 +5,9 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <utility>
+
+#include "calipso_scene/disjoint_sets.hpp"
 
 namespace calipso::render {
 namespace {
@@ -22,11 +23,6 @@ bool isClosed(std::vector<DirectedEdge> edges) {
   return std::all_of(edges.begin(), edges.end(), [&](const DirectedEdge& e) {
     return std::binary_search(edges.begin(), edges.end(), DirectedEdge(e.second, e.first));
   });
-}
-
-int rootOf(std::vector<int>& parents, int i) {
-  while (parents[i] != i) i = parents[i] = parents[parents[i]];
-  return i;
 }
 
 }  // namespace
@@ -47,22 +43,21 @@ std::vector<int> weld(const Points& vertices) {
 
 int outsideWinding(const Points& vertices, const Triangles& triangles) {
   const std::vector<int> place = weld(vertices);
-  std::vector<int> parents(vertices.size());
-  std::iota(parents.begin(), parents.end(), 0);
+  DisjointSets parts(static_cast<int>(vertices.size()));
   std::vector<DirectedEdge> edges;
   for (const Eigen::Vector3i& t : triangles) {
     const int a = place[t[0]], b = place[t[1]], c = place[t[2]];
     if (a == b || b == c || c == a) continue;  // without area
     edges.insert(edges.end(), {{a, b}, {b, c}, {c, a}});
-    parents[rootOf(parents, a)] = rootOf(parents, b);
-    parents[rootOf(parents, b)] = rootOf(parents, c);
+    parts.join(a, b);
+    parts.join(b, c);
   }
   if (edges.empty() || !isClosed(edges)) return 0;
   std::map<int, double> volumes;  // of the connected parts, six times
   for (const Eigen::Vector3i& t : triangles) {
     const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(),
                           c = vertices[t[2]].cast<double>();
-    volumes[rootOf(parents, place[t[0]])] += a.dot(b.cross(c));
+    volumes[parts.find(place[t[0]])] += a.dot(b.cross(c));
   }
   const bool outward =
       std::all_of(volumes.begin(), volumes.end(), [](const auto& v) { return v.second >= 0.0; });

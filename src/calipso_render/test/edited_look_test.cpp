@@ -4,41 +4,16 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "calipso_render/renderer.hpp"
-#include "render_test_scene.hpp"
+#include "ball_setting.hpp"
 
 namespace calipso::render {
 namespace {
 
 using namespace testing;
 
-const Eigen::Vector3d kCentre(0.0, 0.1, 0.12);
-
-RenderParams params() {
-  RenderParams p;
-  p.planes = table();
-  p.add_noise = false;
-  return p;
-}
-
-struct Setting {
-  ClipFrame key = frameWithBall(ballAt(kCentre));
-  std::shared_ptr<const Prepared> prepared;
-
-  Setting() {
-    ClipSample clip;
-    clip.add(key);
-    prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
-  }
-  FrameInput input(bool edited) const {
-    FrameInput in;
-    in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera, in.stamp_ns = 7;
-    ObjectInFrame ball;
-    ball.name = "ball", ball.edited = edited;
-    ball.vertices = prepared->surfaces[0].key_vertices;
-    in.objects = {ball};
-    return in;
-  }
+struct BallToEdit : Setting {
+  BallToEdit() : Setting(params()) {}
+  FrameInput input(bool edited) const { return Setting::input(edited, Eigen::Vector3f::Zero()); }
   FrameOutput draw(const FrameInput& in) const {
     return Renderer(prepared, params()).composite(in);
   }
@@ -56,7 +31,7 @@ ObjectInFrame copyOf(const ObjectInFrame& ball, const Eigen::Vector3f& move) {
 }
 
 TEST(EditedLook, ACopyIsDrawnBesideAnUntouchedOriginal) {
-  const Setting s;
+  const BallToEdit s;
   FrameInput in = s.input(false);
   const Eigen::Vector3f move(0.22f, 0.0f, 0.0f);
   in.objects.push_back(copyOf(in.objects[0], move));
@@ -73,7 +48,7 @@ TEST(EditedLook, ACopyIsDrawnBesideAnUntouchedOriginal) {
 }
 
 TEST(EditedLook, ACopyThatAStateDoesNotHaveIsNotDrawn) {
-  const Setting s;
+  const BallToEdit s;
   Renderer renderer(s.prepared, params());
   FrameInput with = s.input(false);
   with.objects.push_back(copyOf(with.objects[0], {0.22f, 0.0f, 0.0f}));
@@ -88,7 +63,7 @@ TEST(EditedLook, ACopyThatAStateDoesNotHaveIsNotDrawn) {
 }
 
 TEST(EditedLook, ACopyOfNothingIsRefused) {
-  const Setting s;
+  const BallToEdit s;
   FrameInput in = s.input(false);
   in.objects.push_back(copyOf(in.objects[0], {0.2f, 0.0f, 0.0f}));
   in.objects.back().source = "teapot";
@@ -109,7 +84,7 @@ ObjectInFrame card(const Eigen::Vector3d& centre) {
 }
 
 TEST(EditedLook, AnInsertedObjectIsDrawnInItsColour) {
-  const Setting s;
+  const BallToEdit s;
   FrameInput in = s.input(false);
   const Eigen::Vector3d centre = kCentre + Eigen::Vector3d(0.2, 0.0, 0.0);
   in.objects.push_back(card(centre));
@@ -122,7 +97,7 @@ TEST(EditedLook, AnInsertedObjectIsDrawnInItsColour) {
 }
 
 TEST(EditedLook, AnInsertedObjectIsHiddenByWhatStandsBeforeIt) {
-  const Setting s;
+  const BallToEdit s;
   FrameInput in = s.input(true);  // the ball is drawn
   in.objects.push_back(card(kCentre + Eigen::Vector3d(0.0, 0.3, 0.0)));
   const FrameOutput with = s.draw(in);
@@ -131,7 +106,7 @@ TEST(EditedLook, AnInsertedObjectIsHiddenByWhatStandsBeforeIt) {
 }
 
 TEST(EditedLook, ATintMultipliesTheReflectance) {
-  const Setting s;
+  const BallToEdit s;
   FrameInput in = s.input(true);
   in.objects[0].look.tint = cv::Vec3f(1.0f, 0.5f, 0.25f);
   const FrameOutput out = s.draw(in);
@@ -144,7 +119,7 @@ TEST(EditedLook, ATintMultipliesTheReflectance) {
 }
 
 TEST(EditedLook, AnotherLookLeavesThePlaceAround) {
-  const Setting s;
+  const BallToEdit s;
   FrameInput in = s.input(true);
   in.objects[0].look.tint = cv::Vec3f(0.2f, 0.5f, 1.0f);
   const FrameOutput out = s.draw(in);
@@ -157,7 +132,7 @@ TEST(EditedLook, AnotherLookLeavesThePlaceAround) {
 }
 
 TEST(EditedLook, AnAlbedoReplacesTheReflectance) {
-  const Setting s;
+  const BallToEdit s;
   const auto pixelAt = [&](float albedo) {
     FrameInput in = s.input(true);
     in.objects[0].look.albedo = cv::Vec3f(0.5f * albedo, albedo, albedo);
@@ -171,7 +146,7 @@ TEST(EditedLook, AnAlbedoReplacesTheReflectance) {
 }
 
 TEST(EditedLook, AnotherSunLightsTheOtherSide) {
-  const Setting s;
+  const BallToEdit s;
   FrameInput in = s.input(true);
   for (Eigen::Vector3f& x : in.objects[0].vertices) x.z() += 0.02f;
   const Eigen::Vector3d centre = kCentre + Eigen::Vector3d(0, 0, 0.02);

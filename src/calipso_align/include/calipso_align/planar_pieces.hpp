@@ -9,7 +9,8 @@ struct Relief;
 // Connected parts of a relief that are one plane: no jump, no crease, and flat as a whole. An
 // object does not end in the middle of one as a rule, whatever its colours do there. Returns
 // CV_32S: the piece's number from 1, 0 where a pixel is in none.
-cv::Mat planarPieces(const Relief& relief);
+// crease: creaseThreshold()
+cv::Mat planarPieces(const Relief& relief, float crease);
 
 // How far the inverse depth of a relief may bend at a pixel without a crease, in its units.
 float creaseThreshold(const Relief& relief);
