@@ -4,16 +4,12 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calipso_scene/median.hpp"
+
 namespace calipso::align {
 namespace {
 
 constexpr double kLeastFacing = 0.25;  // cosine to the sight line; grazing surfaces tell little
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Vertices to measure at, no more than the depth image can tell apart by far: spread over the mesh
 // whatever pattern its order follows, as multiples of the golden ratio are over the unit interval.

@@ -6,6 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "calipso_scene/median.hpp"
+
 namespace calipso::align {
 namespace {
 
@@ -34,12 +36,6 @@ std::vector<Sample> samplesUnder(const cv::Mat& support, const cv::Mat& flow,
   return samples;
 }
 
-double medianOf(std::vector<double> values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // The translation that most samples are close to: where to start from.
 Affine medianTranslation(const std::vector<Sample>& samples) {
   std::vector<double> u, v;
@@ -48,7 +44,7 @@ Affine medianTranslation(const std::vector<Sample>& samples) {
     v.push_back(sample.motion.y());
   }
   Affine map = Affine::Zero();
-  map.col(2) << medianOf(u), medianOf(v);
+  map.col(2) << median(u), median(v);
   return map;
 }
 
@@ -60,7 +56,7 @@ Affine robustAffine(const std::vector<Sample>& samples) {
   for (int round = 0; round < kRounds; ++round) {
     for (size_t i = 0; i < samples.size(); ++i)
       residuals[i] = (samples[i].motion - map * samples[i].x).norm();
-    const double scale = std::max(0.05, 1.5 * medianOf(residuals));
+    const double scale = std::max(0.05, 1.5 * median(residuals));
     Eigen::Matrix3d A = 1e-6 * Eigen::Matrix3d::Identity();
     Eigen::Matrix<double, 3, 2> b = Eigen::Matrix<double, 3, 2>::Zero();
     for (size_t i = 0; i < samples.size(); ++i) {

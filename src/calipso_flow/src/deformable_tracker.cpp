@@ -6,6 +6,7 @@
 
 #include "calipso_flow/look_match.hpp"
 #include "calipso_flow/outline_match.hpp"
+#include "calipso_scene/median.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -127,9 +128,7 @@ double DeformableTracker::missOf(const Eigen::VectorXd& predicted,
         frame.camera.projectWorld(model_.world_from_object * foreseen.row(i).transpose());
     misses.push_back((there - expected).norm());
   }
-  const auto middle = misses.begin() + misses.size() / 2;
-  std::nth_element(misses.begin(), middle, misses.end());
-  return *middle;
+  return misses.empty() ? std::numeric_limits<double>::infinity() : median(std::move(misses));
 }
 
 DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {

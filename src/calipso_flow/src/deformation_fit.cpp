@@ -7,6 +7,8 @@
 #include <numeric>
 #include <set>
 
+#include "calipso_scene/median.hpp"
+
 namespace calipso::flow {
 namespace {
 
@@ -46,13 +48,6 @@ std::set<std::pair<int, int>> neighbourPairs(const DeformationField::Points& poi
     for (int k = 1; k < last; ++k) pairs.insert(std::minmax(i, order[k]));
   }
   return pairs;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Weight of a sheet's displacements within its plane. Bending shortens it towards what holds it;

@@ -6,6 +6,7 @@
 #include <complex>
 
 #include "calipso_flow/shading.hpp"
+#include "calipso_scene/median.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -112,12 +113,6 @@ SurfaceLine onSurface(const DeformableTracker& tracker, const DeformationModes& 
   if (!travel) travel = displacementTravel(tracker, shape);
   if (travel) result.wave_vector = tracker.model().world_from_object.linear() * *travel;
   return result;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // How far the tracks' points are apart in the picture in two poses, px.

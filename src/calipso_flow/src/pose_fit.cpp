@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "calipso_flow/rotation.hpp"
+#include "calipso_scene/median.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -52,13 +53,6 @@ Linearisation linearise(const std::vector<Correspondence>& correspondences, cons
     lin.alike.push_back(c.alike);
   }
   return lin;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Mahalanobis lengths of the residuals.
