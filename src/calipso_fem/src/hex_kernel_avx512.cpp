@@ -9,5 +9,5 @@
 #endif
 
 namespace calipso::fem::avx512 {
-#include "hex_kernel.inl"
+#include "hex_kernel/kernel.inl"
 }  // namespace calipso::fem::avx512

@@ -3,7 +3,7 @@
 #include "hex_kernel.hpp"
 
 namespace calipso::fem::portable {
-#include "hex_kernel.inl"
+#include "hex_kernel/kernel.inl"
 }  // namespace calipso::fem::portable
 
 namespace calipso::fem {

@@ -58,51 +58,54 @@ RigidWorld::Id SoftScene::addRigid(const TriangleMesh& mesh, double density,
   return id;
 }
 
-void SoftScene::step(double h) {
-  std::vector<SoftEntry> entries;
-  std::vector<Obstacle> obstacles;
-  for (size_t i = 0; i < softs_.size(); ++i) {
-    const std::string name = "soft" + std::to_string(i);
-    entries.push_back({static_cast<int>(i), name, soft_surfaces_[i], softs_[i].get()});
+std::vector<SoftEntry> SoftScene::entries() const {
+  std::vector<SoftEntry> list;
+  for (size_t i = 0; i < softs_.size(); ++i)
+    list.push_back(
+        {static_cast<int>(i), "soft" + std::to_string(i), soft_surfaces_[i], softs_[i].get()});
+  return list;
+}
+
+std::vector<Obstacle> SoftScene::obstacles(double h) const {
+  std::vector<Obstacle> list;
+  const auto add = [&](int id, const std::string& name,
+                       const SurfaceSettings& surface) -> Obstacle& {
     Obstacle o;
-    o.id = static_cast<int>(i);
+    o.id = id;
     o.name = name;
-    o.surface = soft_surfaces_[i];
+    o.surface = surface;
+    return list.emplace_back(o);
+  };
+  const auto numbered = [](const char* kind, size_t i) { return kind + std::to_string(i); };
+  for (size_t i = 0; i < softs_.size(); ++i) {
+    Obstacle& o = add(static_cast<int>(i), numbered("soft", i), soft_surfaces_[i]);
     o.soft = softs_[i].get();
     o.tree = &softs_[i]->tree();
-    obstacles.push_back(o);
   }
   for (size_t i = 0; i < rigids_.size(); ++i) {
-    Obstacle o;
-    o.id = kFirstRigid + static_cast<int>(i);
-    o.name = "rigid" + std::to_string(i);
-    o.surface = rigids_[i].surface;
+    Obstacle& o = add(kFirstRigid + static_cast<int>(i), numbered("rigid", i), rigids_[i].surface);
     o.tree = rigids_[i].tree.get();
     o.pose = o.previous_pose = rigid_.pose(rigids_[i].id);
     o.rigid = rigids_[i].id;
     o.acceleration = gravity;
-    obstacles.push_back(o);
   }
   for (size_t i = 0; i < moving_.size(); ++i) {
-    Obstacle o;
-    o.id = kFirstMoving + static_cast<int>(i);
-    o.name = "moving" + std::to_string(i);
-    o.surface = moving_[i].surface;
+    Obstacle& o =
+        add(kFirstMoving + static_cast<int>(i), numbered("moving", i), moving_[i].surface);
     o.tree = moving_[i].tree.get();
     o.previous_pose = moving_[i].pose(time_);
     o.pose = moving_[i].pose(time_ + h);
-    obstacles.push_back(o);
   }
-  for (size_t i = 0; i < planes_.size(); ++i) {
-    Obstacle o;
-    o.id = kFirstPlane + static_cast<int>(i);
-    o.name = planes_[i].first.name;
-    o.surface = planes_[i].second;
-    o.plane = &planes_[i].first;
-    obstacles.push_back(o);
-  }
+  for (size_t i = 0; i < planes_.size(); ++i)
+    add(kFirstPlane + static_cast<int>(i), planes_[i].first.name, planes_[i].second).plane =
+        &planes_[i].first;
+  return list;
+}
+
+void SoftScene::step(double h) {
+  const std::vector<Obstacle> around = obstacles(h);
   const double start = processMs();
-  report_ = contacts_.step(entries, obstacles, rigid_, h);
+  report_ = contacts_.step(entries(), around, rigid_, h);
   if (report_.bodies.empty()) {  // given up
     cpu_ms_ += processMs() - start;
     step(0.5 * h);

@@ -45,6 +45,9 @@ class SoftScene {
   Eigen::Matrix<double, 6, 1> momentum() const;
 
  private:
+  std::vector<SoftEntry> entries() const;
+  std::vector<Obstacle> obstacles(double h) const;  // of a step of h seconds from now on
+
   struct Rigid {
     RigidWorld::Id id;
     MassProperties mass;

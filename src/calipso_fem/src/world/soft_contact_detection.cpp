@@ -161,56 +161,89 @@ double SoftContacts::watchOf(const SoftEntry& entry, const Obstacle& obstacle,
   return watch;
 }
 
+// A deformable object and what it may meet, as they are at the start of a step.
+struct SoftContacts::WatchedPair {
+  const SoftEntry& entry;
+  const Obstacle& obstacle;
+  int soft, soft_b, index;  // places in the lists; soft_b -1 where the obstacle is not deformable
+  double reach, watch, friction, size;
+  Eigen::AlignedBox3d own, others;  // both grown by `watch`; others empty for a plane
+};
+
 void SoftContacts::watchPair(const std::vector<SoftEntry>& softs, int soft,
                              const std::vector<Obstacle>& obstacles, int index,
                              const RigidWorld& rigid, double h,
                              std::vector<Candidate>& list) const {
   const SoftEntry& entry = softs[soft];
   const Obstacle& obstacle = obstacles[index];
-  const double reach = reachOf(entry, obstacle), watch = watchOf(entry, obstacle, rigid, h);
+  const double watch = watchOf(entry, obstacle, rigid, h);
   const Eigen::AlignedBox3d own = boxOf(*entry.soft, watch);
   Eigen::AlignedBox3d others = obstacleBounds(obstacle);
   if (!others.isEmpty() && !others.intersects(own)) return;
-  const double friction = frictionOf(entry, obstacle), size = sizeOf(*entry.soft);
+  if (!others.isEmpty()) others = {others.min().array() - watch, others.max().array() + watch};
   const int soft_b = obstacle.soft ? indexOf(softs, obstacle.soft) : -1;
-  const auto watchVertex = [&](Contact contact, bool reversed, int vertex) {
-    // Between what is held and what does not move no force would change anything.
-    const bool other_held = soft_b < 0 || softs[soft_b].soft->isHeld(contact.other);
-    if (!contact.rigid_b && other_held && entry.soft->isHeld(contact.point)) return;
-    contact.reach = reach;
-    contact.friction = friction;
-    contact = completed(contact);
-    const bool near = obstacle.plane || contact.start_gap - contact.offset <= reach;
-    contact.force.setZero();
-    list.push_back({contact, reversed, vertex, near});
-  };
+  const WatchedPair pair{entry,
+                         obstacle,
+                         soft,
+                         soft_b,
+                         index,
+                         reachOf(entry, obstacle),
+                         watch,
+                         frictionOf(entry, obstacle),
+                         sizeOf(*entry.soft),
+                         own,
+                         others};
+  watchOwnVertices(pair, softs, list);
+  if (!obstacle.plane) watchTheirVertices(pair, softs, list);
+}
 
-  const auto& vertices = entry.soft->vertices();
-  const bool everywhere = others.isEmpty();
-  if (!everywhere) others = {others.min().array() - watch, others.max().array() + watch};
+void SoftContacts::watchVertex(const WatchedPair& pair, const std::vector<SoftEntry>& softs,
+                               Contact contact, bool reversed, int vertex,
+                               std::vector<Candidate>& list) const {
+  // Between what is held and what does not move no force would change anything.
+  const bool other_held = pair.soft_b < 0 || softs[pair.soft_b].soft->isHeld(contact.other);
+  if (!contact.rigid_b && other_held && pair.entry.soft->isHeld(contact.point)) return;
+  contact.reach = pair.reach;
+  contact.friction = pair.friction;
+  contact = completed(contact);
+  const bool near = pair.obstacle.plane || contact.start_gap - contact.offset <= pair.reach;
+  contact.force.setZero();
+  list.push_back({contact, reversed, vertex, near});
+}
+
+void SoftContacts::watchOwnVertices(const WatchedPair& pair, const std::vector<SoftEntry>& softs,
+                                    std::vector<Candidate>& list) const {
+  const Obstacle& obstacle = pair.obstacle;
+  const auto& vertices = pair.entry.soft->vertices();
   for (int v = 0; v < vertices.rows(); ++v) {
     const Eigen::Vector3d x = vertices.row(v).transpose();
-    if (!everywhere && !others.contains(x)) continue;
-    const auto hit = queryObstacle(obstacle, x, watch, size);
-    if (!hit || (obstacle.soft && misjudged(*hit, *obstacle.tree, x, reach))) continue;
-    watchVertex(contactAt({entry.id, obstacle.id, v, Contact::kNearest}, soft, index, obstacle,
-                          soft_b, SurfacePoint::vertex(v), *hit),
-                false, v);
+    if (!pair.others.isEmpty() && !pair.others.contains(x)) continue;
+    const auto hit = queryObstacle(obstacle, x, pair.watch, pair.size);
+    if (!hit || (obstacle.soft && misjudged(*hit, *obstacle.tree, x, pair.reach))) continue;
+    const Contact::Key key{pair.entry.id, obstacle.id, v, Contact::kNearest};
+    watchVertex(
+        pair, softs,
+        contactAt(key, pair.soft, pair.index, obstacle, pair.soft_b, SurfacePoint::vertex(v), *hit),
+        false, v, list);
   }
-  if (obstacle.plane) return;
+}
 
+void SoftContacts::watchTheirVertices(const WatchedPair& pair, const std::vector<SoftEntry>& softs,
+                                      std::vector<Candidate>& list) const {
+  const Obstacle& obstacle = pair.obstacle;
   Obstacle self;  // the deformable object as an obstacle for the other's vertices
-  self.tree = &entry.soft->tree();
-  const auto& theirs = obstacle.tree->mesh().vertices;
-  for (int v = 0; v < theirs.rows(); ++v) {
-    const Eigen::Vector3d x = obstacle.previous_pose * Eigen::Vector3d(theirs.row(v).transpose());
-    if (!own.contains(x)) continue;
-    const auto hit = queryObstacle(self, x, watch, size);
-    if (!hit || misjudged(*hit, *self.tree, x, reach)) continue;
+  self.tree = &pair.entry.soft->tree();
+  const auto& vertices = obstacle.tree->mesh().vertices;
+  for (int v = 0; v < vertices.rows(); ++v) {
+    const Eigen::Vector3d x = obstacle.previous_pose * Eigen::Vector3d(vertices.row(v).transpose());
+    if (!pair.own.contains(x)) continue;
+    const auto hit = queryObstacle(self, x, pair.watch, pair.size);
+    if (!hit || misjudged(*hit, *self.tree, x, pair.reach)) continue;
     const ObstacleHit turned{hit->gap, -hit->normal, x, SurfacePoint::vertex(v)};
-    watchVertex(contactAt({entry.id, obstacle.id, v, Contact::kNearestReversed}, soft, index,
-                          obstacle, soft_b, hit->other, turned),
-                true, v);
+    const Contact::Key key{pair.entry.id, obstacle.id, v, Contact::kNearestReversed};
+    watchVertex(pair, softs,
+                contactAt(key, pair.soft, pair.index, obstacle, pair.soft_b, hit->other, turned),
+                true, v, list);
   }
 }
 

@@ -103,6 +103,8 @@ struct World::Impl {
   // Contacts and forces of a step (world_step.cpp)
   // @param except  is left out, with the supports that are its own surface
   std::vector<Obstacle> obstacles(double from, double to, const Actor* except = nullptr);
+  void addSupports(std::vector<Obstacle>& list) const;
+  Obstacle obstacleOf(Actor& actor, double from, double to);
   std::vector<SoftEntry> softEntries();
   void applyLoads(double at, double h);  // world_forces.cpp
   Eigen::Vector3d twistOf(const Actor& actor, const Pull& pull, double at) const;

@@ -27,54 +27,51 @@ Eigen::AlignedBox3d boxOf(const SoftObject& soft) {
 
 }  // namespace
 
+void World::Impl::addSupports(std::vector<Obstacle>& list) const {
+  size_t support = 0;
+  const auto add = [&](const std::string& name) -> Obstacle& {
+    Obstacle o;
+    o.id = supportId(support++);
+    o.name = name;
+    o.surface = params.support;
+    return list.emplace_back(o);
+  };
+  for (const SupportPlane& plane : scene.planes) add(plane.name).plane = &plane;
+  for (size_t k = 0; k < scene.support_meshes.size(); ++k)
+    add(scene.support_meshes[k].name).tree = support_trees[k].get();
+}
+
+Obstacle World::Impl::obstacleOf(Actor& actor, double from, double to) {
+  Obstacle o;
+  o.id = actor.id;
+  o.name = actor.object.name;
+  o.surface = actor.settings.surface;
+  if (actor.soft) {
+    o.soft = actor.soft.get();
+    o.tree = &actor.soft->tree();
+    return o;
+  }
+  if (!actor.tree) actor.tree = std::make_unique<SurfaceTree>(actor.object.mesh);
+  o.tree = actor.tree.get();
+  o.previous_pose = poseOf(actor, from);
+  o.pose = poseOf(actor, to);
+  if (actor.kind != ObjectKind::kRigid) return o;
+  o.rigid = actor.body;
+  o.acceleration = rigid.sleeping(*actor.body) ? Eigen::Vector3d::Zero() : actor.acceleration();
+  return o;
+}
+
 std::vector<Obstacle> World::Impl::obstacles(double from, double to, const Actor* except) {
   std::vector<Obstacle> list;
-  size_t support = 0;
-  for (const SupportPlane& plane : scene.planes) {
-    Obstacle o;
-    o.id = supportId(support++);
-    o.name = plane.name;
-    o.surface = params.support;
-    o.plane = &plane;
-    list.push_back(o);
-  }
-  for (size_t k = 0; k < scene.support_meshes.size(); ++k) {
-    Obstacle o;
-    o.id = supportId(support++);
-    o.name = scene.support_meshes[k].name;
-    o.surface = params.support;
-    o.tree = support_trees[k].get();
-    list.push_back(o);
-  }
-  for (Actor& actor : actors) {
-    if (actor.removed || &actor == except) continue;
-    Obstacle o;
-    o.id = actor.id;
-    o.name = actor.object.name;
-    o.surface = actor.settings.surface;
-    if (actor.soft) {
-      o.soft = actor.soft.get();
-      o.tree = &actor.soft->tree();
-    } else {
-      if (!actor.tree) actor.tree = std::make_unique<SurfaceTree>(actor.object.mesh);
-      o.tree = actor.tree.get();
-      o.previous_pose = poseOf(actor, from);
-      o.pose = poseOf(actor, to);
-      if (actor.kind == ObjectKind::kRigid) {
-        o.rigid = actor.body;
-        o.acceleration =
-            rigid.sleeping(*actor.body) ? Eigen::Vector3d::Zero() : actor.acceleration();
-      }
-    }
-    list.push_back(o);
-  }
-  if (except) {
-    const auto isOwn = [&](const Obstacle& o) {
-      return std::find(except->own_supports.begin(), except->own_supports.end(), o.id) !=
-             except->own_supports.end();
-    };
-    list.erase(std::remove_if(list.begin(), list.end(), isOwn), list.end());
-  }
+  addSupports(list);
+  for (Actor& actor : actors)
+    if (!actor.removed && &actor != except) list.push_back(obstacleOf(actor, from, to));
+  if (!except) return list;
+  const auto isOwn = [&](const Obstacle& o) {
+    return std::find(except->own_supports.begin(), except->own_supports.end(), o.id) !=
+           except->own_supports.end();
+  };
+  list.erase(std::remove_if(list.begin(), list.end(), isOwn), list.end());
   return list;
 }
 

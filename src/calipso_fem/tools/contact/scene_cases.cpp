@@ -92,12 +92,8 @@ std::vector<Result> follow(const Scene& scene, const YAML::Node& truth, size_t k
           {name + ": largest mean error after it, px", late, 0.0, ratio, 0, ms}};
 }
 
-// The first object is lifted over the second and let go, both deformable.
-std::vector<Result> drop(const Scene& scene, const YAML::Node& truth) {
-  const WorldScene start = trueScene(scene, truth);
-  WorldParams params;
-  params.frame_period = 1.0 / scene.fps;
-  World world(start, params);
+// Makes both objects deformable and lifts the first over the second.
+void liftFirstOverSecond(const WorldScene& start, const Eigen::Vector3d& up, World& world) {
   const auto middle = [&](int k) {
     return start.objects[k].world_from_object *
            Eigen::Vector3d(start.objects[k].mesh.vertices.colwise().mean().transpose());
@@ -110,40 +106,62 @@ std::vector<Result> drop(const Scene& scene, const YAML::Node& truth) {
   }
   Edit lift = editOf(EditKind::kTransform);
   lift.object = start.objects[0].name;
-  lift.translation = middle(1) - middle(0) -
-                     scene.gravity.normalized() * 0.5 * boundingDiagonal(start.objects[0].mesh);
+  lift.translation = middle(1) - middle(0) + up * 0.5 * boundingDiagonal(start.objects[0].mesh);
   world.submit(lift);
+}
+
+double depthOfFirstInSecond(const WorldScene& start, const WorldState& state) {
+  TriangleMesh under = start.objects[1].mesh;
+  under.vertices = state.objects[1].vertices;
+  const SurfaceTree tree(under);
+  double depth = 0.0;
+  for (const auto& vertex : state.objects[0].vertices.rowwise())
+    if (const auto hit = tree.nearest(vertex.transpose(), 0.02))
+      depth = std::max(depth, -hit->distance);
+  return depth;
+}
+
+double lowestOver(const std::vector<SupportPlane>& planes, const WorldState& state) {
+  double lowest = 1.0;
+  for (const int k : {0, 1})
+    for (const SupportPlane& plane : planes)
+      lowest = std::min(
+          lowest, ((state.objects[k].vertices * plane.normal).array() - plane.offset).minCoeff());
+  return lowest;
+}
+
+double fastestBetween(const WorldState& before, const WorldState& after, double seconds) {
+  double fastest = 0.0;
+  for (const int k : {0, 1})
+    fastest = std::max(
+        fastest,
+        (after.objects[k].vertices - before.objects[k].vertices).rowwise().norm().maxCoeff() /
+            seconds);
+  return fastest;
+}
+
+// The first object is let go over the second, both deformable.
+std::vector<Result> drop(const Scene& scene, const YAML::Node& truth) {
+  const WorldScene start = trueScene(scene, truth);
+  WorldParams params;
+  params.frame_period = 1.0 / scene.fps;
+  World world(start, params);
+  liftFirstOverSecond(start, -scene.gravity.normalized(), world);
   world.advanceTo(0.0);
   Run run;
   run.period = params.frame_period;
   run.play(world, 6.0);
-  double fastest = 0.0, lowest = 1.0;
   const WorldState end = world.state();
-  run.play(world, 1.0 / scene.fps);
-  const WorldState next = world.state();
-  for (const int k : {0, 1}) {
-    fastest = std::max(
-        fastest,
-        scene.fps *
-            (next.objects[k].vertices - end.objects[k].vertices).rowwise().norm().maxCoeff());
-    for (const SupportPlane& plane : scene.planes)
-      lowest = std::min(
-          lowest, ((end.objects[k].vertices * plane.normal).array() - plane.offset).minCoeff());
-  }
-  double overlap = 0.0;
-  TriangleMesh under = start.objects[1].mesh;
-  under.vertices = end.objects[1].vertices;
-  const SurfaceTree tree(under);
-  for (int v = 0; v < end.objects[0].vertices.rows(); ++v)
-    if (const auto hit = tree.nearest(end.objects[0].vertices.row(v).transpose(), 0.02))
-      overlap = std::max(overlap, -hit->distance);
+  run.play(world, params.frame_period);
+  const double fastest = fastestBetween(end, world.state(), params.frame_period);
+  const double depth = depthOfFirstInSecond(start, end);
   const double proximity = 0.02 * boundingDiagonal(start.objects[0].mesh);
-  const double ms = run.msPerFrame();
+  const double ratio = run.deepest / proximity, ms = run.msPerFrame();
   return {{"fastest vertex 6 s after " + start.objects[0].name + " was dropped on " +
                start.objects[1].name + ", m/s",
-           fastest, 0.0, run.deepest / proximity, 0, ms},
-          {"lowest vertex over the support, m", lowest, 0.0, run.deepest / proximity, 0, ms},
-          {"depth of one in the other, m", overlap, 0.0, overlap / proximity, 0, ms}};
+           fastest, 0.0, ratio, 0, ms},
+          {"lowest vertex over the support, m", lowestOver(scene.planes, end), 0.0, ratio, 0, ms},
+          {"depth of one in the other, m", depth, 0.0, depth / proximity, 0, ms}};
 }
 
 }  // namespace

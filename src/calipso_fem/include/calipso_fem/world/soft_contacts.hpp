@@ -173,6 +173,13 @@ class SoftContacts {
   void watchPair(const std::vector<SoftEntry>& softs, int soft,
                  const std::vector<Obstacle>& obstacles, int obstacle, const RigidWorld& rigid,
                  double h, std::vector<Candidate>& list) const;
+  struct WatchedPair;
+  void watchOwnVertices(const WatchedPair& pair, const std::vector<SoftEntry>& softs,
+                        std::vector<Candidate>& list) const;
+  void watchTheirVertices(const WatchedPair& pair, const std::vector<SoftEntry>& softs,
+                          std::vector<Candidate>& list) const;
+  void watchVertex(const WatchedPair& pair, const std::vector<SoftEntry>& softs, Contact contact,
+                   bool reversed, int vertex, std::vector<Candidate>& list) const;
   // The surface of a deformable object against itself (self_contact_detection.cpp).
   void watchSelf(const std::vector<SoftEntry>& softs, int soft,
                  const std::vector<Obstacle>& obstacles, double h,
