@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "key_cover.hpp"
+#include "place_depth.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -33,9 +34,10 @@ bool cameraMoves(const ClipSample& clip) {
                      [&](const ClipFrame& f) { return !sameView(f.camera, key); });
 }
 
-std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness) {
+std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness, int margin) {
   std::vector<ClipFrame> frames = clip.frames();
-  const Camera& key = frames.front().camera;
+  const Camera key = frames.front().camera;
+  const cv::Mat objects = grown(frames.front().labels != 0, margin);
   for (ClipFrame& f : frames) {
     if (sameView(f.camera, key)) continue;
     const cv::Mat map = viewWarp(nearness, f.camera, key);
@@ -43,6 +45,7 @@ std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness
     cv::remap(f.bgr, bgr, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
     cv::remap(f.labels, labels, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
               cv::Scalar(255));
+    labels.setTo(255, hiddenFrom(nearness, objects, key, f.camera));
     f = {bgr, labels, key};
   }
   return frames;

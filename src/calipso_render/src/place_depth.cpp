@@ -14,6 +14,8 @@ constexpr int kDepths = 24;      // tried behind an object
 constexpr int kFewestViews = 3;  // that must look behind it
 constexpr int kAround = 15;      // px of the square whose spread is compared
 constexpr float kNoSpread = 1e9f;
+constexpr float kBefore = 1.1f;        // times that what hides a place is nearer than it,
+constexpr float kLeastBefore = 1e-4f;  // 1/m
 
 cv::Mat grown(const cv::Mat& mask, int radius) {
   cv::Mat out;
@@ -130,6 +132,29 @@ void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int marg
   three.copyTo(nearness, known == 0);
 }
 
+// What is nearest at every pixel of another camera, of the key frame's pixels drawn as squares of
+// two, so that a place that grows has no gaps; -1 where none falls.
+cv::Mat nearestFrom(const cv::Mat& nearness, const Camera& key, const Camera& to) {
+  const Eigen::Isometry3f way =
+      (to.world_from_camera.inverse() * key.world_from_camera).cast<float>();
+  cv::Mat out(to.height, to.width, CV_32F, cv::Scalar(-1.0f));
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) {
+      const float near = nearness.at<float>(v, u);
+      const Eigen::Vector3f p =
+          way.linear() * key.ray(u, v).cast<float>() + near * way.translation();
+      if (p.z() < 1e-6f) continue;
+      const int x = cvFloor(to.fx * p.x() / p.z() + to.cx),
+                y = cvFloor(to.fy * p.y() / p.z() + to.cy);
+      for (int j = std::max(0, y); j <= std::min(to.height - 1, y + 1); ++j) {
+        for (int i = std::max(0, x); i <= std::min(to.width - 1, x + 1); ++i)
+          out.at<float>(j, i) = std::max(out.at<float>(j, i), near / p.z());
+      }
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<SupportPlane>& planes,
@@ -151,24 +176,7 @@ cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<Su
 }
 
 cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& to) {
-  const Eigen::Isometry3f way =
-      (to.world_from_camera.inverse() * key.world_from_camera).cast<float>();
-  cv::Mat out(to.height, to.width, CV_32F, cv::Scalar(-1.0f)), farthest;
-  for (int v = 0; v < nearness.rows; ++v) {
-    for (int u = 0; u < nearness.cols; ++u) {
-      const float near = nearness.at<float>(v, u);
-      const Eigen::Vector3f p =
-          way.linear() * key.ray(u, v).cast<float>() + near * way.translation();
-      if (p.z() < 1e-6f) continue;
-      // Every pixel is drawn as a square of two, so that a place that grows has no gaps.
-      const int x = cvFloor(to.fx * p.x() / p.z() + to.cx),
-                y = cvFloor(to.fy * p.y() / p.z() + to.cy);
-      for (int j = std::max(0, y); j <= std::min(to.height - 1, y + 1); ++j) {
-        for (int i = std::max(0, x); i <= std::min(to.width - 1, x + 1); ++i)
-          out.at<float>(j, i) = std::max(out.at<float>(j, i), near / p.z());
-      }
-    }
-  }
+  cv::Mat out = nearestFrom(nearness, key, to), farthest;
   for (cv::Mat unseen = out<0.0f; cv::countNonZero(unseen)> 0; unseen = out < 0.0f) {
     cv::Mat near = out.clone();
     near.setTo(1e9f, unseen);
@@ -177,6 +185,30 @@ cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& t
     if (cv::countNonZero(out >= 0.0f) == 0) out.setTo(0.0f);
   }
   return out;
+}
+
+cv::Mat hiddenFrom(const cv::Mat& nearness, const cv::Mat& guessed, const Camera& key,
+                   const Camera& to) {
+  const Eigen::Isometry3f way =
+      (to.world_from_camera.inverse() * key.world_from_camera).cast<float>();
+  cv::Mat surely = nearness.clone();
+  surely.setTo(0.0f, guessed);
+  const cv::Mat nearest = nearestFrom(surely, key, to);
+  cv::Mat hidden = cv::Mat::zeros(nearness.size(), CV_8U);
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) {
+      const float near = nearness.at<float>(v, u);
+      const Eigen::Vector3f p =
+          way.linear() * key.ray(u, v).cast<float>() + near * way.translation();
+      if (p.z() < 1e-6f) continue;
+      const int x = cvRound(to.fx * p.x() / p.z() + to.cx),
+                y = cvRound(to.fy * p.y() / p.z() + to.cy);
+      if (x < 0 || y < 0 || x >= to.width || y >= to.height) continue;
+      if (nearest.at<float>(y, x) > kBefore * near / p.z() + kLeastBefore)
+        hidden.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return hidden;
 }
 
 }  // namespace calipso::render

@@ -23,4 +23,10 @@ cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<Su
 // beside it.
 cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& to);
 
+// Which pixels of the key frame show something that another camera does not, since the place is
+// before it. CV_8UC1.
+// @param guessed CV_8UC1, != 0: may lie elsewhere, and is taken to hide nothing
+cv::Mat hiddenFrom(const cv::Mat& nearness, const cv::Mat& guessed, const Camera& key,
+                   const Camera& to);
+
 }  // namespace calipso::render

@@ -133,7 +133,8 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.nearness = placeNearness(
       cameraMoves(clip) ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()},
       params.planes, params.depth, params.background.mask_margin_px);
-  const std::vector<ClipFrame> frames = inKeyView(clip, p.nearness);
+  const std::vector<ClipFrame> frames =
+      inKeyView(clip, p.nearness, params.background.mask_margin_px);
   findSurfacesInClip(clip, frames, models, p);
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);
@@ -151,7 +152,8 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.fronts = frontsOf(actors, p, params);
   p.footprints = footprintsOf(actors, p);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
-  prepareBackground({frames, views, actors, seen, picture, sun, sky}, params, p);
+  prepareBackground({frames, views, actors, seen, picture, sun, sky, cameraMoves(clip)}, params,
+                    p);
   p.background_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness);
   addRemarks(clip.frames(), actors, p);

@@ -17,6 +17,8 @@ namespace {
 constexpr float kUnshadedSun = 0.985f;
 // part by which scenery is nearer or farther than the plane behind or before it
 constexpr float kOffPlane = 0.1f;
+// frames that must show a place past an object, from which on their median is believed
+constexpr int kFewestPast = 3;
 
 // Where the depth image shows something else than a support plane.
 cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes,
@@ -58,16 +60,23 @@ cv::Mat linearOf(const cv::Mat& codes) {
   return linear;
 }
 
+// What other frames show past the objects that hide it at the key frame.
+cv::Mat seenPast(const PlaceEvidence& e) {
+  if (!e.camera_moves) return cv::Mat::zeros(e.seen.count.size(), CV_8U);
+  return e.seen.count >= kFewestPast;
+}
+
 // What objects at rest cover or shade at the key frame, with soft edges and the predictions'
 // errors.
 // @param curved CV_8UC1, != 0: keeps its shadows; may be empty
+// @param seen_past CV_8UC1, != 0: not hidden in other frames
 cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const cv::Mat& curved,
-                      const RenderParams& params) {
+                      const cv::Mat& seen_past, const RenderParams& params) {
   cv::Mat traces = grown(shadows.sun | shadows.sky, params.background.shadow_margin_px);
   if (!curved.empty()) traces.setTo(0, curved);
   for (std::size_t i = 0; i < p.footprints.size(); ++i) {
     if (p.footprints[i].empty()) continue;
-    traces |= grown(p.footprints[i], params.background.mask_margin_px);
+    traces |= grown(p.footprints[i], params.background.mask_margin_px) & (seen_past == 0);
     if (!p.fronts[i].empty()) traces.setTo(0, p.fronts[i]);
   }
   return traces;
@@ -134,7 +143,7 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   }
   p.shadowless |= grown(shadows.refuted, params.background.shadow_margin_px);
   if (shadows.none) p.shadowless.setTo(255);
-  return restingTraces(p, shadows, place.curved, params);
+  return restingTraces(p, shadows, place.curved, seenPast(e), params);
 }
 
 void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,

@@ -15,6 +15,7 @@ struct PlaceEvidence {
   const Background& seen;
   const cv::Mat& picture;  // CV_32FC3, code values: the key frame, steadied
   const ShadowMap &sun, &sky;
+  bool camera_moves;
 };
 
 // Takes objects, shadows and reflections out and invents what is hidden: relief, shadowless,

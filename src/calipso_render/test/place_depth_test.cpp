@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../src/view_warp.hpp"
+#include "calipso_render/renderer.hpp"
 
 namespace calipso::render {
 namespace {
@@ -101,6 +102,50 @@ TEST(PlaceDepth, FromAnotherCameraANearPlaceHidesAFarOne) {
   EXPECT_FLOAT_EQ(from.at<float>(40, 28), 1.0f / kWall);
   EXPECT_FLOAT_EQ(from.at<float>(40, 60), 1.0f / kWall);         // the post hid it
   EXPECT_FLOAT_EQ(from.at<float>(40, kWide - 1), 1.0f / kWall);  // outside the key frame
+}
+
+TEST(PlaceDepth, SaysWhatAnotherCameraDoesNotSeeForWhatStandsBefore) {
+  cv::Mat nearness(kHigh, kWide, CV_32F, cv::Scalar(1.0f / kWall)),
+      guessed = cv::Mat::zeros(kHigh, kWide, CV_8U);
+  nearness.colRange(60, 80).setTo(1.0f / kPost);
+  // 22.5 px farther left than the wall, the post hides what the key frame shows there.
+  const cv::Mat hidden = hiddenFrom(nearness, guessed, cameraAt(0.0), cameraAt(0.2));
+  EXPECT_EQ(cv::countNonZero(hidden.colRange(39, 58) == 0), 0);
+  EXPECT_EQ(cv::countNonZero(hidden.colRange(8, 36) | hidden.colRange(82, 110)), 0);
+  EXPECT_EQ(cv::countNonZero(hidden.colRange(60, 80)), 0);
+  guessed.colRange(60, 80).setTo(255);
+  EXPECT_EQ(cv::countNonZero(hiddenFrom(nearness, guessed, cameraAt(0.0), cameraAt(0.2))), 0);
+}
+
+// The object of frameFrom(), a square without depth.
+ObjectModel square() {
+  const Camera c = cameraAt(0.0);
+  TriangleMesh m;
+  m.vertices.resize(4, 3);
+  m.triangles.resize(2, 3);
+  const int right = kObject.x + kObject.width - 1, bottom = kObject.y + kObject.height - 1;
+  m.vertices << c.ray(kObject.x, kObject.y).transpose(), c.ray(right, kObject.y).transpose(),
+      c.ray(right, bottom).transpose(), c.ray(kObject.x, bottom).transpose();
+  m.vertices *= kPost;
+  m.triangles << 0, 1, 2, 0, 2, 3;
+  return {"square", 1, m, Eigen::Isometry3d::Identity()};
+}
+
+TEST(Prepare, ACameraThatMovesSeesPastAnObjectAtRest) {
+  ClipSample clip;
+  for (const ClipFrame& f : passingBy()) clip.add(f);
+  RenderParams params;
+  params.depth = depthImage();
+  const Prepared p = prepare(clip, {square()}, params);
+  ASSERT_FALSE(p.moves.front());
+  const Camera key = cameraAt(0.0);
+  for (int v = kObject.y; v < kObject.br().y; ++v) {
+    for (int u = kObject.x; u < kObject.br().x; ++u) {
+      const Eigen::Vector3d wall = kWall * key.ray(u, v);
+      ASSERT_EQ(p.background.invented.at<std::uint8_t>(v, u), 0) << u << ", " << v;
+      ASSERT_NEAR(p.background.plate.at<cv::Vec3f>(v, u)[0], wallColour(wall.x(), wall.y()), 6);
+    }
+  }
 }
 
 }  // namespace
