@@ -6,17 +6,15 @@
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
 #include "frame_compositor.hpp"
 #include "marked.hpp"
 #include "plane_light.hpp"
+#include "plane_sky.hpp"
 #include "wide_loops.hpp"
 
 namespace calipso::render {
 namespace {
-
-constexpr int kSkySteps = 160;  // places along the picture's width where the sky is measured
-
-int skyStep(const cv::Size& picture) { return std::max(4, picture.width / kSkySteps); }
 
 // Product of two levels, 255 = 1.
 std::uint8_t both(std::uint8_t a, std::uint8_t b) {
@@ -50,56 +48,10 @@ cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bound
   return sun;
 }
 
-// The sky changes slowly over a support plane: measured on a grid that hangs on the picture,
-// interpolated between.
 // @param skip where it is not wanted
 cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region,
                                  const SquareMask& skip) const {
-  const int step = skyStep(frame_.bgr.size());
-  const cv::Point first(region.x / step, region.y / step);
-  cv::Mat grid((region.br().y - 1) / step - first.y + 2, (region.br().x - 1) / step - first.x + 2,
-               CV_32F, cv::Scalar(1.0f));
-#pragma omp parallel for schedule(dynamic, 4)
-  for (int j = 0; j < grid.rows; ++j) {
-    float* row = grid.ptr<float>(j);
-    const int v = (first.y + j) * step;
-    for (int begin = 0; begin < grid.cols; begin += LightBatch::kMost) {
-      LightBatch batch;
-      int columns[LightBatch::kMost];
-      Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
-      for (int i = begin; i < std::min(grid.cols, begin + LightBatch::kMost); ++i) {
-        const int u = (first.x + i) * step;
-        if (!skip.at(u, v) && place_view_.planes().at(u, v, r))
-          columns[batch.add(r.position, r.normal)] = i;
-      }
-      float seen[LightBatch::kMost];
-      batch.look(shadow, seen);
-      for (int k = 0; k < batch.count(); ++k) row[columns[k]] = skyLight(seen[k]);
-    }
-  }
-  cv::Mat sky(region.size(), CV_8U);
-#pragma omp parallel
-  {
-    std::vector<float> line(grid.cols);
-    std::vector<std::uint8_t> whole(static_cast<std::size_t>(grid.cols) * step);
-#pragma omp for schedule(static)
-    for (int v = 0; v < region.height; ++v) {
-      const int j = (region.y + v) / step - first.y;
-      const float y = static_cast<float>((region.y + v) % step) / step;
-      const float *above = grid.ptr<float>(j), *below = grid.ptr<float>(j + 1);
-      for (int i = 0; i < grid.cols; ++i) line[i] = (1.0f - y) * above[i] + y * below[i];
-      for (int i = 0; i + 1 < grid.cols; ++i) {
-        const float left = line[i], rise = (line[i + 1] - left) / step;
-        if (rise == 0.0f)
-          std::fill_n(&whole[i * step], step, lightLevel(left));
-        else
-          for (int k = 0; k < step; ++k)
-            whole[i * step + k] = lightLevel(left + rise * static_cast<float>(k));
-      }
-      std::copy_n(whole.begin() + region.x % step, region.width, sky.ptr<std::uint8_t>(v));
-    }
-  }
-  return sky;
+  return planesUnderSky(place_view_.planes(), shadow, frame_.bgr.size(), region, skip);
 }
 
 void FrameCompositor::findCovered() {

@@ -7,6 +7,7 @@
 
 #include "calipso_render/ray_shadow.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
 #include "frame_compositor.hpp"
 #include "view_warp.hpp"
 
@@ -14,7 +15,6 @@ namespace calipso::render {
 namespace {
 
 constexpr int kShadowMapSide = 512;     // texels, live
-constexpr int kSkyMapSide = 128;        // the same for the sky, which is soft
 constexpr int kShadowBoundsMargin = 8;  // px
 constexpr float kReliefMargin = 0.01f;  // m: planes have boxes without thickness
 // of the height: a vertex that far below its plane still shades it
@@ -27,7 +27,7 @@ std::unique_ptr<Visibility> skyShadowOf(const std::vector<Occluder>& all,
   const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
   if (params.quality == Quality::kFinal)
     return std::make_unique<RayShadow>(occluders, up, RayShadow::Params{kSkyRadius, 48});
-  return std::make_unique<ShadowMap>(occluders, up, ShadowMap::Params{kSkyMapSide, kSkyRadius, 24});
+  return std::make_unique<SkyMap>(occluders, up, SkyMap::Params());
 }
 
 std::unique_ptr<Visibility> shadowOf(const std::vector<Occluder>& occluders, const Light& light,

@@ -5,6 +5,7 @@
 #include "calipso_render/clip_poses.hpp"
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
 #include "clip_motion.hpp"
 #include "key_cover.hpp"
 #include "place_depth.hpp"
@@ -113,9 +114,10 @@ ShadowMap sunOver(const std::vector<Actor>& actors, const Light& light) {
   return {occluders(actors), light.direction.cast<double>(), {768, light.angular_radius, 16}};
 }
 
-ShadowMap skyOver(const std::vector<Actor>& actors, const RenderParams& params) {
-  if (params.planes.empty()) return {{}, params.up, {256, kSkyRadius, 24}};
-  return {occluders(actors), params.planes.front().normal, {256, kSkyRadius, 24}};
+SkyMap skyOver(const std::vector<Actor>& actors, const RenderParams& params) {
+  constexpr SkyMap::Params kFine{256};
+  if (params.planes.empty()) return {{}, params.up, kFine};
+  return {occluders(actors), params.planes.front().normal, kFine};
 }
 
 NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadiness) {
@@ -146,14 +148,14 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const Background seen = seenBackground(frames, any_moves, params.background);
   p.background_ms = watch.lap();
   p.light = lightOf(views, seen, any_moves, params, p);
-  const ShadowMap sun = sunOver(actors, p.light.light), sky = skyOver(actors, params);
+  const ShadowMap sun = sunOver(actors, p.light.light);
+  const SkyMap sky = skyOver(actors, params);
   p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   p.appearance_ms = watch.lap();
   p.fronts = frontsOf(actors, p, params);
   p.footprints = footprintsOf(actors, p);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
-  prepareBackground({frames, views, actors, seen, picture, sun, sky, cameraMoves(clip)}, params,
-                    p);
+  prepareBackground({frames, views, actors, seen, picture, sun, sky, cameraMoves(clip)}, params, p);
   p.background_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness);
   addRemarks(clip.frames(), actors, p);

@@ -34,7 +34,7 @@ cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& plane
 
 // Visibility of a light on the support planes and on the relief, 0..1, where one is seen; 1
 // elsewhere.
-cv::Mat placeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& planes,
+cv::Mat placeVisibility(const Visibility& light, const std::vector<SupportPlane>& planes,
                         const Relief& relief, const cv::Mat& off_planes, const ClipFrame& key) {
   cv::Mat visibility(key.bgr.size(), CV_32F, cv::Scalar(1.0f));
 #pragma omp parallel for schedule(static)
@@ -44,7 +44,7 @@ cv::Mat placeVisibility(const ShadowMap& sun, const std::vector<SupportPlane>& p
       const std::optional<Receiver> receiver =
           relief.at(u, v) ? relief.receiver(u, v) : receiverAt(planes, key.camera, u, v);
       if (receiver)
-        visibility.at<float>(v, u) = sun.visibility(receiver->position, receiver->normal);
+        visibility.at<float>(v, u) = light.visibility(receiver->position, receiver->normal);
     }
   }
   return visibility;

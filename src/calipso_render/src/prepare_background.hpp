@@ -14,7 +14,7 @@ struct PlaceEvidence {
   const std::vector<Actor>& actors;  // at the key frame
   const Background& seen;
   const cv::Mat& picture;  // CV_32FC3, code values: the key frame, steadied
-  const ShadowMap &sun, &sky;
+  const Visibility &sun, &sky;
   bool camera_moves;
 };
 

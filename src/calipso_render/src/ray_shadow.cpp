@@ -12,6 +12,8 @@ namespace {
 
 constexpr float kGoldenAngle = 2.39996323f;
 constexpr int kFirstRays = 6;       // if these agree, so do the others
+// coprime to the numbers of rays in use; so many golden angles are a fifth of a turn
+constexpr int kStride = 11;
 constexpr float kLiftPart = 2e-4f;  // of the occluders' extent
 
 }  // namespace
@@ -35,7 +37,7 @@ RayShadow::RayShadow(const std::vector<Occluder>& occluders, const Eigen::Vector
   lift_ = kLiftPart * (high_ - low_).norm();
   // Vogel's spiral, strided so that the first few rays already spread over the disc.
   for (int i = 0; i < params.rays; ++i) {
-    const int k = (i * 7) % params.rays;
+    const int k = (i * kStride) % params.rays;
     const float r = spread_ * std::sqrt((k + 0.5f) / params.rays), a = k * kGoldenAngle;
     rays_.push_back((axis_h_ + r * std::cos(a) * axis_s_ + r * std::sin(a) * axis_t_).normalized());
   }

@@ -5,6 +5,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
 #include "plane_view.hpp"
 #include "view_warp.hpp"
 
@@ -26,8 +27,8 @@ void collect(const View& view, const std::vector<SupportPlane>& planes, const Ba
   std::vector<Occluder> occluders;
   for (const Actor& a : view.actors)
     occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-  const ShadowMap sun(occluders, light.direction.cast<double>(), {512, light.angular_radius, 16}),
-      sky(occluders, planes.front().normal, {128, kSkyRadius, 24});
+  const ShadowMap sun(occluders, light.direction.cast<double>(), {512, light.angular_radius, 16});
+  const SkyMap sky(occluders, planes.front().normal, {});
   const PlaneView seen(planes, view.camera);
   cv::Mat covered;
   cv::dilate(view.labels != 0, covered, cv::Mat::ones(2 * kBeside + 1, 2 * kBeside + 1, CV_8U));

@@ -7,6 +7,7 @@
 #include "ball_setting.hpp"
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
 #include "umbra.hpp"
 
 namespace calipso::render {
@@ -32,8 +33,8 @@ TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
                      camera(),
                      {makeActor(surface, vertices, camera())}});
     const std::vector<Occluder> occluder = {{&views.back().actors[0].vertices, &surface.triangles}};
-    const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}),
-        sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
+    const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16});
+    const SkyMap sky(occluder, Eigen::Vector3d::UnitZ(), {256});
     for (int v = 0; v < kHeight; ++v) {
       for (int u = 0; u < kWidth; ++u) {
         const auto r = receiverAt(table(), camera(), u, v);
@@ -63,8 +64,8 @@ TEST(Renderer, TheDarkOfAShadowIsToldFromTheHiddenSky) {
   ClipFrame frame = frameWithBall(ball);
   const Surface surface = makeSurface(ball);
   const std::vector<Occluder> occluder = {{&surface.key_vertices, &surface.triangles}};
-  const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16}),
-      sky(occluder, Eigen::Vector3d::UnitZ(), {256, kSkyRadius, 24});
+  const ShadowMap sun(occluder, sunlight().direction.cast<double>(), {512, 0.025, 16});
+  const SkyMap sky(occluder, Eigen::Vector3d::UnitZ(), {256});
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       const auto r = receiverAt(table(), frame.camera, u, v);

@@ -13,12 +13,6 @@ namespace calipso::render {
 struct ShadowTaps;
 struct ShadowTexels;
 
-// Half the angle of the disc of sky that shades softly near contact, rad.
-constexpr double kSkyRadius = 0.8;
-// Part of the sky's light that a plane gets where `seen` of the sky is visible: some comes from
-// what is around, also where none is.
-inline float skyLight(float seen) { return 0.15f + 0.85f * seen; }
-
 // How much of a distant disc of light each point sees, from one depth map towards the disc's centre
 // (percentage-closer soft shadows, Fernando 2005: the blockers' mean height sets the penumbra).
 class ShadowMap : public Visibility {
