@@ -8,8 +8,6 @@
 namespace calipso::align {
 namespace {
 
-enum Account : uchar { kUnknown, kBackground, kOther };
-
 // Whether a shadow that lay on the background has gone, which explains its colour better than that
 // the object has come.
 bool isLitAgain(const cv::Vec3f& behind, const cv::Vec3f& seen, double noise,
@@ -22,7 +20,24 @@ bool isLitAgain(const cv::Vec3f& behind, const cv::Vec3f& seen, double noise,
   });
 }
 
-// What a pixel is as far as the background tells.
+// The pieces of `pixels` that touch `mask`, gaps passed over where the two look alike.
+cv::Mat connectedTo(const cv::Mat& mask, const cv::Mat& pixels) {
+  cv::Mat wide, pieces, reached = cv::Mat::zeros(mask.size(), CV_8U);
+  cv::dilate(pixels | mask, wide, cv::Mat::ones(kLookAlikeGap + 1, kLookAlikeGap + 1, CV_8U));
+  const int count = cv::connectedComponents(wide, pieces, 8);
+  std::vector<uchar> touches(count, 0);
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (mask.at<uchar>(y, x)) touches[pieces.at<int>(y, x)] = 255;
+  touches[0] = 0;
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (pixels.at<uchar>(y, x)) reached.at<uchar>(y, x) = touches[pieces.at<int>(y, x)];
+  return reached;
+}
+
+}  // namespace
+
 cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, double noise,
                    const std::vector<const GaussianMixture*>& object) {
   constexpr double kSame = 2.5, kDifferent = 6.0;  // deviations of a pixel's colour
@@ -46,24 +61,6 @@ cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, doubl
     }
   return accounts;
 }
-
-// The pieces of `pixels` that touch `mask`, gaps passed over where the two look alike.
-cv::Mat connectedTo(const cv::Mat& mask, const cv::Mat& pixels) {
-  cv::Mat wide, pieces, reached = cv::Mat::zeros(mask.size(), CV_8U);
-  cv::dilate(pixels | mask, wide, cv::Mat::ones(kLookAlikeGap + 1, kLookAlikeGap + 1, CV_8U));
-  const int count = cv::connectedComponents(wide, pieces, 8);
-  std::vector<uchar> touches(count, 0);
-  for (int y = 0; y < mask.rows; ++y)
-    for (int x = 0; x < mask.cols; ++x)
-      if (mask.at<uchar>(y, x)) touches[pieces.at<int>(y, x)] = 255;
-  touches[0] = 0;
-  for (int y = 0; y < mask.rows; ++y)
-    for (int x = 0; x < mask.cols; ++x)
-      if (pixels.at<uchar>(y, x)) reached.at<uchar>(y, x) = touches[pieces.at<int>(y, x)];
-  return reached;
-}
-
-}  // namespace
 
 cv::Mat contradicted(const cv::Mat& view, const cv::Mat& mask, const KnownBackground& background,
                      const cv::Mat& apart, double noise,

@@ -11,6 +11,14 @@ namespace calipso::align {
 // Pieces of an object may lie so far apart where it looks as its background does, px.
 constexpr int kLookAlikeGap = 8;
 
+// What a pixel is as far as the background tells.
+enum Account : uchar { kUnknown, kBackground, kOther };
+
+// The account of every pixel of a picture (CV_8UC3), as CV_8U. A shadow that has come is background;
+// so is one that has gone, unless the pixel looks like the object (its colours).
+cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, double noise,
+                   const std::vector<const GaussianMixture*>& object);
+
 // Where a background that is known contradicts a mask: pixels beside it, in one piece with it, that
 // the background cannot be, and pixels of it that are the background, lit or in a shadow.
 // view         CV_8UC3

@@ -11,6 +11,7 @@
 #include "calipso_align/layer_motion.hpp"
 #include "layer_appearance.hpp"
 #include "layer_search.hpp"
+#include "reappearance.hpp"
 
 namespace calipso::align {
 namespace {
@@ -19,6 +20,7 @@ constexpr size_t kMaxSamples = 2000;
 constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has proved wrong
 // of 255: how likely a pixel may lie in a shadow where nothing is known of any
 constexpr int kAnyShadow = 76;
+constexpr double kLeastNoise = 2.0;    // grey levels, of a still picture
 constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
 
 std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {
@@ -81,6 +83,7 @@ MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerPar
     Object object;
     object.label = label;
     object.mask = labels == label;
+    object.key_area = cv::countNonZero(object.mask);
     object.coverage = object.mask.clone();
     object.reference_mean = previous_means_;
     object.flow = cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM);
@@ -131,6 +134,7 @@ TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
     follow(*object, image, flow, rough, told);
     object->reference_mean = means;
   }
+  takeUpAgain(image, means);
   rememberBackground(image);
   image.copyTo(previous_image_);
   previous_grey_ = grey;
@@ -160,6 +164,23 @@ void MaskTracker::lose(Object& object) const {
   object.mask = cv::Mat::zeros(size_, CV_8U);
   object.coverage = object.mask.clone();
   object.confidence = 0.0f;
+}
+
+void MaskTracker::takeUpAgain(const cv::Mat& image, const cv::Mat& means) {
+  constexpr double kLeastShare = 0.05;  // of its area in the key frame
+  constexpr float kConfidence = 0.5f;   // of a mask that no motion led to
+  cv::Mat taken = cv::Mat::zeros(size_, CV_8U);
+  for (const Object& object : objects_) taken |= object.mask;
+  for (Object& object : objects_) {
+    const int least = std::max(1, static_cast<int>(kLeastShare * object.key_area));
+    if (cv::countNonZero(object.mask) >= least) continue;
+    const cv::Mat found = findAgain(image, background_, taken & ~object.mask, object.colours, least);
+    if (found.empty()) continue;
+    object.confidence = kConfidence;
+    accept(object, image, background_, kLeastNoise, found, cv::Rect(cv::Point(), size_));
+    object.reference_mean = means;
+    taken |= object.mask;
+  }
 }
 
 void MaskTracker::rememberBackground(const cv::Mat& image) {

@@ -66,6 +66,19 @@ TEST(MaskTracker, OwnsUpWhenTheObjectIsGone) {
   EXPECT_LT(tracker.track(picture(-100, -100, 2)).confidence, 0.5f);
 }
 
+TEST(MaskTracker, TakesUpAnObjectThatComesBack) {
+  const auto height = [](int k) { return 60.0 - 20.0 * k + 1.0 * k * k; };  // above the picture
+  MaskTracker tracker(picture(60, height(0), 1), truth(60, height(0)) / 255);
+  TrackedMask tracked;
+  bool was_gone = false;
+  for (int k = 1; k <= 20; ++k) {
+    tracked = tracker.track(picture(60 + 4 * k, height(k), k + 1));
+    was_gone = was_gone || cv::countNonZero(tracked.labels) == 0;
+  }
+  EXPECT_TRUE(was_gone);
+  EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(140, height(20))), 0.95);
+}
+
 // A moving object of the wall's own colour: only where it was seen before tells it from the wall.
 TEST(MaskTracker, ARememberedBackgroundIsNotTakenIn) {
   const auto withTwin = [](double u0, int seed) {

@@ -38,7 +38,8 @@ struct TrackedMask {
 // background that is remembered: a pixel near the predicted outline is the object's when the object
 // of the previous frame, moved along, explains it better than the background does. What neither
 // explains is left to colour models. A cut settles the labels, the coverage of the edge pixels the
-// outline. An object whose surroundings do not change keeps its mask at hardly any cost. Objects of
+// outline. An object whose surroundings do not change keeps its mask at hardly any cost. One that
+// has gone is looked for wherever the background is not what it was. Objects of
 // one frame are followed in parallel, each from where the others were. One caller at a time; frames
 // in order.
 class MaskTracker {
@@ -60,6 +61,7 @@ class MaskTracker {
     cv::Mat mask;                    // CV_8U, the whole picture
     cv::Mat coverage;        // CV_8U, as `mask` but with the share of the pixels along its edge
     cv::Mat reference_mean;  // 4 x 4 px means of the frame in which `mask` was found
+    int key_area = 0;  // px
     float confidence = 1.0f;
     cv::Ptr<cv::DISOpticalFlow> flow;  // has buffers of its own
   };
@@ -81,6 +83,8 @@ class MaskTracker {
   void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
               bool exact);
   void lose(Object& object) const;
+  // Takes up the lost objects that have come back.
+  void takeUpAgain(const cv::Mat& image, const cv::Mat& means);
   TrackedMask combine(int moved) const;
   void settle(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
               bool exact, const cv::Rect& roi);
