@@ -19,7 +19,9 @@ struct BulletBody {
   std::unique_ptr<btTriangleMesh> triangles;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;  // the last one is the body's own
   std::unique_ptr<btRigidBody> body;
-  Eigen::Isometry3d kinematic_start, kinematic_target;  // world_from_object over the next step
+  // world_from_object over the next step
+  Eigen::Isometry3d kinematic_start = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d kinematic_target = Eigen::Isometry3d::Identity();
   bool moves = false;
   bool pushed = false;  // by an impulse that acts over the next step
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();

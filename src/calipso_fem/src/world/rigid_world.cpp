@@ -46,6 +46,7 @@ RigidWorld::Id RigidWorld::add(const RigidBodySpec& spec) {
   BulletBody body;
   body.name = spec.name;
   body.motion = spec.motion;
+  body.kinematic_start = body.kinematic_target = spec.world_from_object;
   btVector3 inertia(0, 0, 0);
   const bool dynamic = spec.motion == RigidMotion::kDynamic;
   if (dynamic) inertia = toBullet(principal(spec.mass, body.object_from_body));
@@ -59,7 +60,6 @@ RigidWorld::Id RigidWorld::add(const RigidBodySpec& spec) {
     body.body->setCollisionFlags(body.body->getCollisionFlags() |
                                  btCollisionObject::CF_KINEMATIC_OBJECT);
     body.body->setActivationState(DISABLE_DEACTIVATION);
-    body.kinematic_start = body.kinematic_target = spec.world_from_object;
   }
   if (dynamic) {
     const double size = span(spec.shapes);

@@ -108,6 +108,7 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
       actor.immovable && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
   if (attached || immovable) kind = ObjectKind::kKinematic;
   actor.edited = actor.edited || kind != ObjectKind::kStatic;
+  if (kind == ObjectKind::kStatic && !actor.edited) actor.reason = reason, plan_changed = true;
   if (actor.kind == kind) return;
   BodyMotion motion = motionOf(actor);
   const bool as_observed = actor.kind == ObjectKind::kStatic;

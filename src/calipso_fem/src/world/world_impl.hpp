@@ -100,6 +100,11 @@ struct World::Impl {
       const Actor& carrier);  // as the video has it, before an edit touches the carrier
   void letGoWhatLostItsRest();
 
+  // Objects of the video in the way of edited ones (world_strikes.cpp)
+  bool canBeStruck(const Actor& actor) const;
+  double closingSpeedOf(const Actor& striker, const Actor& struck, double h);
+  void releaseWhatIsStruck(double h);  // within the next h
+
   // Contacts and forces of a step (world_step.cpp)
   // @param except  is left out, with the supports that are its own surface
   std::vector<Obstacle> obstacles(double from, double to, const Actor* except = nullptr);

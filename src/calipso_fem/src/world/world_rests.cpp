@@ -10,6 +10,12 @@ namespace {
 
 constexpr double kFollows = 0.01;  // of the size: by so much the place has to move
 
+// Whether it moves by more than that to the next frame of the video.
+bool isOnTheMove(const ObservedMotion& seen, double size, double frame_period) {
+  return seen.moving && (seen.linear.norm() + 0.5 * size * seen.angular.norm()) * frame_period >
+                            kFollows * size;
+}
+
 }  // namespace
 
 void World::Impl::noteWhatRestsOn(const Actor& carrier) {
@@ -27,9 +33,10 @@ void World::Impl::noteWhatRestsOn(const Actor& carrier) {
     if (&actor == &carrier || actor.edited || actor.removed || actor.kind != ObjectKind::kStatic ||
         isKnown(actor.id))
       continue;
-    if (!actor.object.attachments.empty() || actor.track.at(now).moving) continue;
+    if (!actor.object.attachments.empty()) continue;
+    const double size = boundingDiagonal(actor.object.mesh);
+    if (isOnTheMove(actor.track.at(now), size, params.frame_period)) continue;
     const TriangleMesh surface = placed(actor.object.mesh, poseOf(actor, now));
-    const double size = boundingDiagonal(surface);
     bool carried_otherwise = false;
     std::optional<ObstacleHit> on;
     for (const Obstacle& obstacle : obstacles(now, now, &actor)) {

@@ -97,10 +97,11 @@ int World::Impl::substepsPerFrame() const {
 }
 
 void World::Impl::stepFrame(double h) {
+  for (Actor& actor : actors) actor.soft_ms = 0.0;
+  releaseWhatIsStruck(h);
   const bool soft = std::any_of(actors.begin(), actors.end(),
                                 [](const Actor& a) { return a.soft && !a.removed && !a.asleep; });
   const int parts = soft ? substepsPerFrame() : 1;
-  for (Actor& actor : actors) actor.soft_ms = 0.0;
   const std::vector<Continued> continuing = continued();
   const double from = now;
   for (int k = 0; k < parts; ++k) {

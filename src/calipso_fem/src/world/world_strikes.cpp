@@ -1,0 +1,125 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "calipso_fem/world/mass_properties.hpp"
+#include "obstacle_query.hpp"
+#include "world_impl.hpp"
+
+// What something edited is about to strike: it leaves its place in the video, with the velocity it
+// has there. A blow counts that sends it further than can be overlooked,
+//   v m_a / (m_a + m_b) > sqrt(2 mu g s)
+//  v         m/s, at which the surfaces close
+//  m_a, m_b  kg, of what strikes and what is struck
+//  mu, g, s  friction, m/s^2, and the way (m) it would slide
+namespace calipso::fem {
+namespace {
+
+constexpr double kOverlooked = 0.01;  // of its size, of the way it would slide
+
+// Velocity of a body's points.
+struct VelocityField {
+  Eigen::Vector3d center, linear, angular;
+  Eigen::Vector3d at(const Eigen::Vector3d& x) const { return linear + angular.cross(x - center); }
+};
+
+Eigen::AlignedBox3d boxAround(const Vertices& points, double reach) {
+  return {points.colwise().minCoeff().transpose().array() - reach,
+          points.colwise().maxCoeff().transpose().array() + reach};
+}
+
+// The vertices of a surface and the middles of its triangles' sides: edges may meet, too.
+Vertices samplesOf(const Vertices& vertices, const TriangleMesh& mesh) {
+  const int n = static_cast<int>(vertices.rows());
+  Vertices samples(n + 3 * mesh.triangleCount(), 3);
+  samples.topRows(n) = vertices;
+  for (int t = 0; t < mesh.triangleCount(); ++t)
+    for (int i = 0; i < 3; ++i)
+      samples.row(n + 3 * t + i) = 0.5 * (vertices.row(mesh.triangles(t, i)) +
+                                          vertices.row(mesh.triangles(t, (i + 1) % 3)));
+  return samples;
+}
+
+// How fast the points close with an obstacle that they reach within h, m/s; 0: none does.
+double closingSpeed(const Vertices& points, const VelocityField& own, const Obstacle& obstacle,
+                    const VelocityField& other, double h, double size) {
+  double fastest = 0.0;
+  const double furthest =
+      h * ((own.linear - other.linear).norm() + size * (own.angular - other.angular).norm());
+  Eigen::AlignedBox3d near = obstacleBounds(obstacle);
+  near = {near.min().array() - furthest, near.max().array() + furthest};
+  for (int k = 0; k < points.rows(); ++k) {
+    const Eigen::Vector3d x = points.row(k).transpose();
+    if (!near.contains(x)) continue;
+    const auto hit = queryObstacle(obstacle, x, furthest, size);
+    if (!hit) continue;
+    const double closing = -(own.at(x) - other.at(x)).dot(hit->normal);
+    if (hit->gap <= closing * h) fastest = std::max(fastest, closing);
+  }
+  return fastest;
+}
+
+}  // namespace
+
+bool World::Impl::canBeStruck(const Actor& actor) const {
+  const ObjectKind kind = actor.settings.kind.value_or(ObjectKind::kRigid);
+  return !actor.edited && !actor.removed && !actor.immovable &&
+         actor.kind == ObjectKind::kStatic && actor.object.attachments.empty() &&
+         actor.modes.cols() == 0 &&
+         (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
+}
+
+// m/s, within the next h; 0: they do not meet.
+double World::Impl::closingSpeedOf(const Actor& striker, const Actor& struck, double h) {
+  if (!meet(striker.id, struck.id)) return 0.0;
+  const auto fieldOf = [&](const Actor& actor) {
+    const BodyMotion m = motionOf(actor);
+    return VelocityField{m.world_from_object * massProperties(actor.object.mesh, 1.0).center,
+                         m.linear, m.angular};
+  };
+  const VelocityField a = fieldOf(striker), b = fieldOf(struck);
+  const double size =
+      std::max(boundingDiagonal(striker.object.mesh), boundingDiagonal(struck.object.mesh));
+  const double reach =
+      h * ((a.linear - b.linear).norm() + size * (a.angular - b.angular).norm());
+  const Vertices on_a = verticesOf(striker), on_b = verticesOf(struck);
+  if (!boxAround(on_a, reach).intersects(boxAround(on_b, 0.0))) return 0.0;
+  double fastest = 0.0;
+  for (const Obstacle& obstacle : obstacles(now, now)) {
+    if (obstacle.id == struck.id)
+      fastest = std::max(fastest, closingSpeed(samplesOf(on_a, striker.object.mesh), a, obstacle,
+                                               b, h, size));
+    if (obstacle.id == striker.id)
+      fastest = std::max(fastest, closingSpeed(samplesOf(on_b, struck.object.mesh), b, obstacle, a,
+                                               h, size));
+  }
+  return fastest;
+}
+
+void World::Impl::releaseWhatIsStruck(double h) {
+  const auto massOf = [](const Actor& actor) {
+    return massProperties(actor.object.mesh, actor.material.density).mass;
+  };
+  for (Actor& actor : actors) {
+    if (!canBeStruck(actor)) continue;
+    const double way = kOverlooked * boundingDiagonal(actor.object.mesh);
+    const double least =
+        std::sqrt(2.0 * actor.settings.surface.friction * scene.gravity.norm() * way);
+    for (const Actor& striker : actors) {
+      const bool follows_video = striker.continues || !striker.edited;
+      if (&striker == &actor || striker.removed || follows_video || striker.asleep) continue;
+      const double share =
+          striker.simulated() ? massOf(striker) / (massOf(striker) + massOf(actor)) : 1.0;
+      if (!(share * closingSpeedOf(striker, actor, h) > least)) continue;
+      noteWhatRestsOn(actor);
+      become(actor, actor.settings.kind.value_or(ObjectKind::kRigid),
+             striker.object.name + " strikes it");
+      actor.continues =
+          actor.kind == ObjectKind::kRigid && striker.kind != ObjectKind::kDeformable;
+      wake(actor);
+      break;
+    }
+  }
+}
+
+}  // namespace calipso::fem

@@ -1,0 +1,130 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+
+#include "world_fixtures.hpp"
+
+// Objects of the video that an edited one runs into.
+namespace calipso::fem {
+namespace {
+
+using namespace test;
+
+constexpr double kRadius = 0.05, kFrame = 1.0 / 30.0;
+
+// Two balls in free space, 0.3 m apart along x.
+WorldScene twoBalls() {
+  WorldScene scene = sceneWith(sphereSurface(kRadius, 16, 24), {0, 0, 0.5}, false);
+  scene.gravity.setZero();
+  scene.objects.push_back(scene.objects.front());
+  scene.objects[1].name = "other", scene.objects[1].index = 2;
+  scene.objects[1].world_from_object.translation().x() = 0.3;
+  return scene;
+}
+
+Eigen::Vector3d placeOf(const World& world, int object) {
+  return world.state().objects[object].world_from_object.translation();
+}
+
+// m/s, along x, over the next frame.
+Eigen::Vector2d speedsAlongX(World& world) {
+  const Eigen::Vector2d before(placeOf(world, 0).x(), placeOf(world, 1).x());
+  play(world, kFrame);
+  return (Eigen::Vector2d(placeOf(world, 0).x(), placeOf(world, 1).x()) - before) / kFrame;
+}
+
+Edit throwOf(const std::string& object, double speed) {
+  Edit edit = editOf(EditKind::kVelocity);
+  edit.object = object;
+  edit.vector = {speed, 0, 0};
+  return edit;
+}
+
+// Equal masses along the line of their centres: the momentum is shared out and none is lost.
+TEST(WorldStrikes, WhatAThrownBallHitsTakesUpItsMomentum) {
+  World world(twoBalls(), {});
+  world.submit(throwOf("thing", 1.0));
+  world.advanceTo(0.0);
+  play(world, 0.1);
+  EXPECT_EQ(world.state().objects[1].kind, ObjectKind::kStatic) << "struck before anything came";
+  play(world, 0.4);
+  EXPECT_EQ(world.state().objects[1].kind, ObjectKind::kRigid);
+  EXPECT_NE(world.plan()[1].reason.find("thing strikes it"), std::string::npos);
+  const Eigen::Vector2d speeds = speedsAlongX(world);
+  EXPECT_GT(speeds[1], 0.4);
+  // 1e-2: the spheres are polyhedra, which meet a little beside their centres
+  EXPECT_NEAR(speeds.sum(), 1.0, 1e-2);
+}
+
+TEST(WorldStrikes, WhatPassesByLeavesItInPeace) {
+  WorldScene scene = twoBalls();
+  scene.objects[1].world_from_object.translation().y() = 0.12;
+  World world(scene, {});
+  world.submit(throwOf("thing", 1.0));
+  world.advanceTo(0.0);
+  play(world, 0.6);
+  EXPECT_EQ(world.state().objects[1].kind, ObjectKind::kStatic);
+  EXPECT_NEAR(placeOf(world, 0).x(), 0.6, 1e-6);
+}
+
+// What a user holds in place, by its parameter, by infinite mass or by attachments, is a wall.
+TEST(WorldStrikes, WhatIsHeldStaysAndTheBallComesBack) {
+  for (const char* const by : {"kind", "density", "attachment"}) {
+    WorldScene scene = twoBalls();
+    WorldParams params;
+    if (by == std::string("kind")) params.objects["other"].kind = ObjectKind::kStatic;
+    if (by == std::string("density")) params.objects["other"].density = std::numeric_limits<double>::infinity();
+    if (by == std::string("attachment"))
+      scene.objects[1].attachments.push_back({"hook", {0.29, -0.1, 0.4}, {0.4, 0.1, 0.6}});
+    World world(scene, params);
+    world.submit(throwOf("thing", 1.0));
+    world.advanceTo(0.0);
+    play(world, 0.6);
+    EXPECT_NEAR((placeOf(world, 1) - Eigen::Vector3d(0.3, 0, 0.5)).norm(), 0.0, 1e-9)
+        << by;
+    EXPECT_LT(placeOf(world, 0).x(), 0.3 - 2.0 * kRadius + 1e-3) << by;
+  }
+}
+
+// On a table, a nudge that friction stops within a hundredth of its size is none.
+TEST(WorldStrikes, ANudgeMovesNothing) {
+  for (const double speed : {0.05, 1.5}) {
+    WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 1), {0, 0, 0.05});
+    scene.objects.push_back(scene.objects.front());
+    scene.objects[1].name = "other", scene.objects[1].index = 2;
+    scene.objects[1].world_from_object.translation().x() = 0.1005;
+    World world(scene, {});
+    world.submit(throwOf("thing", speed));
+    world.advanceTo(0.0);
+    play(world, 0.5);
+    EXPECT_EQ(world.state().objects[1].kind == ObjectKind::kRigid, speed > 1.0) << speed;
+    EXPECT_EQ(placeOf(world, 1).x() > 0.102, speed > 1.0) << speed;
+  }
+}
+
+// In the video the other ball comes along and would go through what stands in its way now.
+TEST(WorldStrikes, WhatTheVideoMovesBouncesOffWhatIsPutInItsWay) {
+  World world(twoBalls(), {});
+  for (int k = 0; k <= 30; ++k) {
+    ObservedMotion m;
+    m.time = k * kFrame;
+    m.moving = true;
+    m.linear = {-1.0, 0, 0};
+    m.world_from_object.translation() = m.centroid = Eigen::Vector3d(0.3 - m.time, 0, 0.5);
+    world.addObservedMotion("other", m);
+  }
+  Edit heavy = editOf(EditKind::kMaterial, EditMode::kFactor);
+  heavy.object = "thing";
+  heavy.density = 100.0;
+  world.submit(heavy);
+  world.advanceTo(0.0);
+  play(world, 0.1);
+  EXPECT_NEAR(placeOf(world, 1).x(), 0.2, 1e-6) << "as in the video before they meet";
+  play(world, 0.7);
+  EXPECT_GE(placeOf(world, 1).x(), 0.09);
+  EXPECT_GT(speedsAlongX(world)[1], -0.1);
+}
+
+}  // namespace
+}  // namespace calipso::fem
