@@ -16,12 +16,13 @@ namespace {
 using calipso_msgs::NodeStatus;
 
 // Stands in for the whole graph between player and recorder: is ready at once and gives every frame
-// back as it came. ~swallow: index of a frame to lose; ~die_at: index of a frame to end the process
-// at.
+// back as it came. ~swallow: index of a frame to lose; ~lose_image: of one whose image alone is lost;
+// ~die_at: of one to end the process at.
 class EchoNode {
  public:
   EchoNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       : swallow_(pnh.param("swallow", -1)),
+        lose_image_(pnh.param("lose_image", -1)),
         die_at_(pnh.param("die_at", -1)),
         edited_(nh.advertise<sensor_msgs::Image>(calipso::topics::kImageEdited, 100)),
         info_(nh.advertise<sensor_msgs::CameraInfo>(calipso::topics::kImageEditedCameraInfo, 100)),
@@ -73,7 +74,7 @@ class EchoNode {
     const int index = frames_seen_++;
     if (index == die_at_) std::_Exit(3);
     if (index == swallow_) return;
-    edited_.publish(frame.image);
+    if (index != lose_image_) edited_.publish(frame.image);
     info_.publish(frame.info);
     sensor_msgs::Image provenance = *frame.image;
     provenance.encoding = "mono8";
@@ -88,7 +89,7 @@ class EchoNode {
     dynamics_.publish(dynamics);
   }
 
-  int swallow_, die_at_;
+  int swallow_, lose_image_, die_at_;
   int frames_seen_ = 0;
   unsigned clip_frames_ = 0, edit_count_ = 0;
   ros::Publisher edited_, info_, provenance_, state_, dynamics_, report_, status_;

@@ -88,6 +88,15 @@ class BadInput(unittest.TestCase):
         edits = self.edits({"t": 0, "object": "banana1", "kind": "material", "poissons_ratio": 0.7})
         self.expect_complaint("edits.yaml", "poissons_ratio", "0.7", edits=edits)
 
+    def test_model_to_insert_that_is_not_there(self):
+        edits = self.edits({"t": 0, "kind": "insert", "value": "ball", "model": "cad/ball.obj",
+                            "translation": [0, 0, 0.3]})
+        self.expect_complaint("cad/ball.obj", "cannot be opened", edits=edits)
+
+    def test_edit_before_the_first_frame(self):
+        edits = self.edits({"t": -0.5, "object": "banana1", "kind": "remove"})
+        self.expect_complaint("edits.yaml", "-0.5", ">= 0 s", edits=edits)
+
     def test_missing_and_broken_mesh(self):
         with tempfile.TemporaryDirectory() as folder:
             scene = clips.make_scene(folder, 4)

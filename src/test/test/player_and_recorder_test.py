@@ -70,6 +70,12 @@ class PlayerAndRecorder(unittest.TestCase):
         self.assertIn("a frame was lost", output)
         self.assertFalse(os.path.exists(self.path("out.bag")))
 
+    def test_an_image_that_gets_lost_on_the_way_to_the_recorder_is_not_waited_for_for_ever(self):
+        status, output = self.echo(lose_image=1)
+        self.assertNotEqual(status, 0)
+        self.assertIn("1 of %d edited images" % FRAMES, output)
+        self.assertFalse(os.path.exists(self.path("out.bag")))
+
     def test_a_last_frame_that_never_comes_is_not_waited_for_for_ever(self):
         status, output = self.echo(swallow=FRAMES - 1, frame_timeout_sec=3)
         self.assertNotEqual(status, 0)

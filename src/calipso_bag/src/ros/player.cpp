@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <boost/make_shared.hpp>
+#include <filesystem>
 #include <iomanip>
 #include <stdexcept>
 
@@ -75,6 +76,7 @@ Player::Player(ros::NodeHandle& nh, const Params& params)
       watch_(nh, rolesOf(params.nodes)),
       window_(params.in_flight) {
   checkScene();
+  checkEdits();
   advertiseAll();
   ROS_INFO_STREAM(params.clip.path << ": " << clip_.frameCount() << " frames of "
                                    << clip_.imageTopic() << ", " << clip_.firstInfo().width << "x"
@@ -93,8 +95,13 @@ void Player::checkScene() const {
                              "; use the scene of this video");
   }
   for (const SceneObject& object : scene_.objects) loadMesh(object.cad_path);
+}
+
+void Player::checkEdits() const {
   const ros::Time last = clip_.stamps().back();
   for (const calipso_msgs::Edit& edit : edits_) {
+    if (edit.kind == calipso_msgs::Edit::INSERT)
+      loadMesh((std::filesystem::path(scene_.directory) / edit.model).string());
     if (edit.header.stamp <= last) continue;
     ROS_WARN_STREAM("edit '" << edit.kind << "' of '" << edit.object << "' lies "
                              << (edit.header.stamp - last).toSec()

@@ -180,12 +180,28 @@ void Recorder::recordClip() {
   while (!waitFor([this] { return connected(); }, kOneHourSec)) {
   }
   reporter_.ready("recording to " + output_.path());
-  while (!waitFor([this] { return allEdited(); }, kOneHourSec)) {
-  }
+  waitForEdited();
   if (!waitFor([this] { return allExplained(); }, params_.late_timeout_sec)) {
     ROS_WARN("not every frame has its camera_info, provenance, state and dynamics");
   }
   checkFrames();
+}
+
+// Each image has a camera_info, which comes on a connection of its own: once all of these are there
+// and no image has come for long, none will.
+void Recorder::waitForEdited() {
+  std::size_t had = 0;
+  while (!waitFor([this] { return allEdited(); }, params_.late_timeout_sec)) {
+    const bool all_sent = clip_.played_frames > 0 && count_[topics::kImageEditedCameraInfo] >=
+                                                         static_cast<int>(clip_.played_frames);
+    if (all_sent && edited_.size() == had) {
+      throw std::runtime_error(std::to_string(clip_.played_frames - had) + " of " +
+                               std::to_string(clip_.played_frames) +
+                               " edited images were sent and got lost; give the recorder more of "
+                               "the machine, or set in_flight to 1");
+    }
+    had = edited_.size();
+  }
 }
 
 void Recorder::recordLive() {

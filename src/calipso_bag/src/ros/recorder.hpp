@@ -57,6 +57,8 @@ class Recorder {
              const std::string& rank);
 
   void subscribeFrames();
+  // @throw std::runtime_error when images are lost that were sent
+  void waitForEdited();
   void subscribeExplanations();
   void onInput(const sensor_msgs::CameraInfoConstPtr& info);
   void onEdited(const ros::MessageEvent<sensor_msgs::Image const>& event);

@@ -11,6 +11,7 @@ namespace calipso::flow {
 namespace {
 
 constexpr unsigned kKeepAll = 0;
+constexpr unsigned kLiveQueue = 10;
 constexpr double kDescribeEvery = 1.0;  // s: how deforming objects have moved of late
 constexpr size_t kLiveWaiting = 300;    // frames kept while a live key frame is being aligned
 
@@ -27,8 +28,9 @@ FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       reporter_(nh, "flow"),
       clip_dynamics_publisher_(
           nh.advertise<calipso_msgs::ClipDynamics>(topics::kClipDynamics, 1, true)),
-      dynamics_publisher_(nh.advertise<calipso_msgs::Dynamics>(topics::kDynamics, 100)),
-      flow_publisher_(nh.advertise<sensor_msgs::Image>(topics::kFlow, 10)),
+      dynamics_publisher_(nh.advertise<calipso_msgs::Dynamics>(topics::kDynamics, kKeepAll)),
+      flow_publisher_(nh.advertise<sensor_msgs::Image>(
+          topics::kFlow, params_.live ? kLiveQueue : kKeepAll)),
       markers_(nh),
       dense_flow_(params_.flow_preset) {
   subscribers_ = {nh.subscribe(topics::kModels, 1, &FlowNode::onModels, this),

@@ -11,6 +11,8 @@ namespace {
 
 constexpr std::size_t kLiveLabels = 300;  // label images kept in live mode
 constexpr std::uint32_t kLatchedQueue = 10000;
+// messages kept for a slow subscriber: in a clip nothing may be lost
+constexpr std::uint32_t kKeepAll = 0, kLiveQueue = 10;
 
 double milliseconds(std::chrono::steady_clock::time_point since) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since)
@@ -24,9 +26,10 @@ RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       reporter_(nh, "render"),
       clip_(params_.clip_samples),
       labels_(params_.mode == Mode::kLive ? kLiveLabels : 0) {
-  edited_ = nh.advertise<sensor_msgs::Image>(topics::kImageEdited, 10);
-  edited_info_ = nh.advertise<sensor_msgs::CameraInfo>(topics::kImageEditedCameraInfo, 10);
-  provenance_ = nh.advertise<sensor_msgs::Image>(topics::kProvenance, 10);
+  const std::uint32_t queue = params_.mode == Mode::kLive ? kLiveQueue : kKeepAll;
+  edited_ = nh.advertise<sensor_msgs::Image>(topics::kImageEdited, queue);
+  edited_info_ = nh.advertise<sensor_msgs::CameraInfo>(topics::kImageEditedCameraInfo, queue);
+  provenance_ = nh.advertise<sensor_msgs::Image>(topics::kProvenance, queue);
   plate_ = nh.advertise<sensor_msgs::Image>(topics::kPlate, 1, true);
   subscribers_ = {
       nh.subscribe(topics::kClipInfo, 1, &RenderNode::onClipInfo, this),
