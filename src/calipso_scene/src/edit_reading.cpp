@@ -56,7 +56,9 @@ Edit readEdit(const YAML::Node& node, const YamlReader& reader) {
   reader.rejectUnknownKeys(node, editKeys());
   Edit edit;
   edit.time = reader.number(node, "t");
-  if (edit.time < 0.0) reader.fail("t", "must be >= 0 s after the first frame");
+  if (edit.time < 0.0) {
+    reader.fail("t", "is " + node["t"].Scalar() + "; it must be >= 0 s after the first frame");
+  }
   edit.object = reader.text(node, "object", "");
   edit.kind = editKindFromString(reader.text(node, "kind"));
   edit.mode = editModeFromString(reader.text(node, "mode", ""), edit.kind);

@@ -17,16 +17,14 @@ std::string existing(const std::string& path) {
 
 Camera readCamera(const YAML::Node& root, const YamlReader& reader) {
   Camera camera;
+  reader.positive(root, "width", "px");
+  reader.positive(root, "height", "px");
   camera.width = reader.integer(root, "width");
   camera.height = reader.integer(root, "height");
-  camera.fx = reader.number(root, "fx");
-  camera.fy = reader.number(root, "fy");
+  camera.fx = reader.positive(root, "fx", "px");
+  camera.fy = reader.positive(root, "fy", "px");
   camera.cx = reader.number(root, "cx");
   camera.cy = reader.number(root, "cy");
-  if (camera.width <= 0) reader.fail("width", "must be > 0 px");
-  if (camera.height <= 0) reader.fail("height", "must be > 0 px");
-  if (camera.fx <= 0.0) reader.fail("fx", "must be > 0 px");
-  if (camera.fy <= 0.0) reader.fail("fy", "must be > 0 px");
   if (root["distortion"] && !reader.vector(root, "distortion", 5).isZero()) {
     reader.fail("distortion", "is not zero; undistort the images first (image_proc)");
   }
@@ -137,8 +135,7 @@ Scene loadScene(const std::string& directory) {
   Scene scene;
   scene.directory = directory;
   scene.name = reader.text(root, "name");
-  scene.fps = reader.number(root, "fps");
-  if (scene.fps <= 0.0) reader.fail("fps", "must be > 0 Hz");
+  scene.fps = reader.positive(root, "fps", "Hz");
   scene.frame_count = reader.integer(root, "n_frames");
   scene.frame_pattern = reader.text(root, "frames", "frames/%06d.jpg");
   scene.camera = readCamera(root, reader);

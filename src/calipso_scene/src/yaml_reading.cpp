@@ -53,6 +53,13 @@ double YamlReader::number(const YAML::Node& node, const std::string& key) const 
   return result;
 }
 
+double YamlReader::positive(const YAML::Node& node, const std::string& key,
+                            const std::string& unit) const {
+  const double value = number(node, key);
+  if (value <= 0.0) fail(key, "is " + describe(node[key]) + "; it must be > 0 " + unit);
+  return value;
+}
+
 int YamlReader::integer(const YAML::Node& node, const std::string& key) const {
   const double value = number(node, key);
   if (value != std::floor(value) || std::abs(value) > 1e9) {

@@ -21,6 +21,8 @@ class YamlReader {
   // All of these: @throw std::invalid_argument if absent, of another type or not finite.
   double number(const YAML::Node& node, const std::string& key) const;
   int integer(const YAML::Node& node, const std::string& key) const;
+  // ... or not above zero; `unit` for the message.
+  double positive(const YAML::Node& node, const std::string& key, const std::string& unit) const;
   std::string text(const YAML::Node& node, const std::string& key) const;
   Eigen::VectorXd vector(const YAML::Node& node, const std::string& key, int size) const;
   Eigen::Isometry3d pose(const YAML::Node& node, const std::string& key) const;

@@ -104,7 +104,7 @@ TEST(Edit, badInputNamesEntryFieldAndRemedy) {
   expect("- {t: 0, object: apple, kind: remove}", "edit 1: object is 'apple'");
   expect("- {t: 0, object: banana1, kind: melt}", "kind is 'melt'; it must be one of");
   expect("- {t: .nan, object: banana1, kind: remove}", "t is");
-  expect("- {t: -1, object: banana1, kind: remove}", "t must be >= 0");
+  expect("- {t: -1, object: banana1, kind: remove}", "t is -1; it must be >= 0");
   expect("- {object: banana1, kind: remove}", "t is missing");
   expect("- {t: 0, object: banana1, kind: material, youngs_modulus: -5}", "youngs_modulus = -5");
   expect("- {t: 0, object: banana1, kind: material, poissons_ratio: 0.5}", "poissons_ratio = 0.5");

@@ -83,6 +83,7 @@ TEST(Scene, badInputNamesKeyAndRemedy) {
     EXPECT_NE(errorOf(yaml).find(part), std::string::npos) << errorOf(yaml);
   };
   expect("name: desk\n" + kPose + kObject, "fps is missing");
+  expect("name: desk\nfps: -30\n" + kPose + kObject, "fps is -30; it must be > 0 Hz");
   expect(kHead + kObject, "world_T_camera is missing");
   expect(kHead + kPose, "objects is empty");
   expect(kHead + kPose + kObject + "distortion: [0.1, 0, 0, 0, 0]\n", "undistort");
