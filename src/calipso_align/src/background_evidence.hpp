@@ -14,8 +14,8 @@ constexpr int kLookAlikeGap = 8;
 // What a pixel is as far as the background tells.
 enum Account : uchar { kUnknown, kBackground, kOther };
 
-// The account of every pixel of a picture (CV_8UC3), as CV_8U. A shadow that has come is background;
-// so is one that has gone, unless the pixel looks like the object (its colours).
+// The account of every pixel of a picture (CV_8UC3), as CV_8U. A shadow that has come is
+// background; so is one that has gone, unless the pixel looks like the object (its colours).
 cv::Mat accountsOf(const cv::Mat& view, const KnownBackground& background, double noise,
                    const std::vector<const GaussianMixture*>& object);
 

@@ -174,7 +174,8 @@ void MaskTracker::takeUpAgain(const cv::Mat& image, const cv::Mat& means) {
   for (Object& object : objects_) {
     const int least = std::max(1, static_cast<int>(kLeastShare * object.key_area));
     if (cv::countNonZero(object.mask) >= least) continue;
-    const cv::Mat found = findAgain(image, background_, taken & ~object.mask, object.colours, least);
+    const cv::Mat found =
+        findAgain(image, background_, taken & ~object.mask, object.colours, least);
     if (found.empty()) continue;
     object.confidence = kConfidence;
     accept(object, image, background_, kLeastNoise, found, cv::Rect(cv::Point(), size_));

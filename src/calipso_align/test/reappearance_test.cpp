@@ -70,8 +70,8 @@ TEST(Reappearance, ABackgroundThatMovesTellsNothing) {
     cv::Mat image(kSize, CV_8UC3);
     for (int v = 0; v < kSize.height; ++v)
       for (int u = 0; u < kSize.width; ++u)
-        image.at<cv::Vec3b>(v, u) = cv::Vec3b::all(cv::saturate_cast<uchar>(
-            128 + 60 * std::sin(0.4 * (u + shift))));
+        image.at<cv::Vec3b>(v, u) =
+            cv::Vec3b::all(cv::saturate_cast<uchar>(128 + 60 * std::sin(0.4 * (u + shift))));
     return image;
   };
   const KnownBackground before{stripes(0), cv::Mat(kSize, CV_8U, cv::Scalar(255))};

@@ -73,16 +73,16 @@ TEST(WorldStrikes, WhatIsHeldStaysAndTheBallComesBack) {
   for (const char* const by : {"kind", "density", "attachment"}) {
     WorldScene scene = twoBalls();
     WorldParams params;
-    if (by == std::string("kind")) params.objects["other"].kind = ObjectKind::kStatic;
-    if (by == std::string("density")) params.objects["other"].density = std::numeric_limits<double>::infinity();
+    ObjectSettings& other = params.objects["other"];
+    if (by == std::string("kind")) other.kind = ObjectKind::kStatic;
+    if (by == std::string("density")) other.density = std::numeric_limits<double>::infinity();
     if (by == std::string("attachment"))
       scene.objects[1].attachments.push_back({"hook", {0.29, -0.1, 0.4}, {0.4, 0.1, 0.6}});
     World world(scene, params);
     world.submit(throwOf("thing", 1.0));
     world.advanceTo(0.0);
     play(world, 0.6);
-    EXPECT_NEAR((placeOf(world, 1) - Eigen::Vector3d(0.3, 0, 0.5)).norm(), 0.0, 1e-9)
-        << by;
+    EXPECT_NEAR((placeOf(world, 1) - Eigen::Vector3d(0.3, 0, 0.5)).norm(), 0.0, 1e-9) << by;
     EXPECT_LT(placeOf(world, 0).x(), 0.3 - 2.0 * kRadius + 1e-3) << by;
   }
 }

@@ -16,8 +16,8 @@ namespace {
 using calipso_msgs::NodeStatus;
 
 // Stands in for the whole graph between player and recorder: is ready at once and gives every frame
-// back as it came. ~swallow: index of a frame to lose; ~lose_image: of one whose image alone is lost;
-// ~die_at: of one to end the process at.
+// back as it came. Indices of frames: ~swallow one to lose, ~lose_image one whose image alone is
+// lost, ~die_at one to end the process at.
 class EchoNode {
  public:
   EchoNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)

@@ -35,8 +35,8 @@ Vertices samplesOf(const Vertices& vertices, const TriangleMesh& mesh) {
   samples.topRows(n) = vertices;
   for (int t = 0; t < mesh.triangleCount(); ++t)
     for (int i = 0; i < 3; ++i)
-      samples.row(n + 3 * t + i) = 0.5 * (vertices.row(mesh.triangles(t, i)) +
-                                          vertices.row(mesh.triangles(t, (i + 1) % 3)));
+      samples.row(n + 3 * t + i) =
+          0.5 * (vertices.row(mesh.triangles(t, i)) + vertices.row(mesh.triangles(t, (i + 1) % 3)));
   return samples;
 }
 
@@ -63,9 +63,8 @@ double closingSpeed(const Vertices& points, const VelocityField& own, const Obst
 
 bool World::Impl::canBeStruck(const Actor& actor) const {
   const ObjectKind kind = actor.settings.kind.value_or(ObjectKind::kRigid);
-  return !actor.edited && !actor.removed && !actor.immovable &&
-         actor.kind == ObjectKind::kStatic && actor.object.attachments.empty() &&
-         actor.modes.cols() == 0 &&
+  return !actor.edited && !actor.removed && !actor.immovable && actor.kind == ObjectKind::kStatic &&
+         actor.object.attachments.empty() && actor.modes.cols() == 0 &&
          (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
 }
 
@@ -80,18 +79,17 @@ double World::Impl::closingSpeedOf(const Actor& striker, const Actor& struck, do
   const VelocityField a = fieldOf(striker), b = fieldOf(struck);
   const double size =
       std::max(boundingDiagonal(striker.object.mesh), boundingDiagonal(struck.object.mesh));
-  const double reach =
-      h * ((a.linear - b.linear).norm() + size * (a.angular - b.angular).norm());
+  const double reach = h * ((a.linear - b.linear).norm() + size * (a.angular - b.angular).norm());
   const Vertices on_a = verticesOf(striker), on_b = verticesOf(struck);
   if (!boxAround(on_a, reach).intersects(boxAround(on_b, 0.0))) return 0.0;
   double fastest = 0.0;
   for (const Obstacle& obstacle : obstacles(now, now)) {
     if (obstacle.id == struck.id)
-      fastest = std::max(fastest, closingSpeed(samplesOf(on_a, striker.object.mesh), a, obstacle,
-                                               b, h, size));
+      fastest = std::max(
+          fastest, closingSpeed(samplesOf(on_a, striker.object.mesh), a, obstacle, b, h, size));
     if (obstacle.id == striker.id)
-      fastest = std::max(fastest, closingSpeed(samplesOf(on_b, struck.object.mesh), b, obstacle, a,
-                                               h, size));
+      fastest = std::max(
+          fastest, closingSpeed(samplesOf(on_b, struck.object.mesh), b, obstacle, a, h, size));
   }
   return fastest;
 }
@@ -114,8 +112,7 @@ void World::Impl::releaseWhatIsStruck(double h) {
       noteWhatRestsOn(actor);
       become(actor, actor.settings.kind.value_or(ObjectKind::kRigid),
              striker.object.name + " strikes it");
-      actor.continues =
-          actor.kind == ObjectKind::kRigid && striker.kind != ObjectKind::kDeformable;
+      actor.continues = actor.kind == ObjectKind::kRigid && striker.kind != ObjectKind::kDeformable;
       wake(actor);
       break;
     }
