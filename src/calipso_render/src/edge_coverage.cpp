@@ -33,6 +33,13 @@ TriangleSamples samplesOf(const Eigen::Vector3f (&p)[3], float area) {
   return t;
 }
 
+// Meshes and tiles are split in fixed parts: the result knows no thread count.
+constexpr int kParts = 32, kBands = 8;
+
+int partOf(int count, int part) {
+  return static_cast<int>(static_cast<long>(count) * part / kParts);
+}
+
 constexpr std::uint8_t kRight = 1, kDown = 2;
 
 // Where the object seen changes to the right of a row's pixels, or below them.
@@ -118,46 +125,63 @@ void EdgeCoverage::choose(int column, int row) {
 }
 
 void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges) {
-  std::vector<char> turned(mesh.triangles->size());
-  for (std::size_t t = 0; t < turned.size(); ++t)
-    turned[t] = signedArea(mesh, (*mesh.triangles)[t]) > 0.0f;
-  for (const MeshEdge& edge : edges) {
-    if (edge.b >= 0 && turned[edge.a] == turned[edge.b]) continue;
-    const Eigen::Vector3f &p = mesh.points[edge.from], &q = mesh.points[edge.to];
-    if (std::isnan(p.z() + q.z())) continue;
-    const float length =
-        std::min((q - p).head<2>().norm(), 2.0f * (region_.width + region_.height));
-    const int steps = 1 + static_cast<int>(2.0f * length);
-    for (int i = 0; i <= steps; ++i) {
-      const Eigen::Vector3f s = p + (q - p) * (static_cast<float>(i) / steps);
-      choose(static_cast<int>(std::floor(s.x() + 0.5f)) - region_.x,
-             static_cast<int>(std::floor(s.y() + 0.5f)) - region_.y);
+  const int triangles = static_cast<int>(mesh.triangles->size()),
+            count = static_cast<int>(edges.size());
+  std::vector<char> turned(triangles);
+  std::vector<cv::Point> crossed[kParts];  // by parts of the edges, in their order
+#pragma omp parallel
+  {
+#pragma omp for schedule(static)
+    for (int t = 0; t < triangles; ++t) turned[t] = signedArea(mesh, (*mesh.triangles)[t]) > 0.0f;
+#pragma omp for schedule(static)
+    for (int part = 0; part < kParts; ++part) {
+      const int begin = partOf(count, part), end = partOf(count, part + 1);
+      for (int k = begin; k < end; ++k) {
+        const MeshEdge& edge = edges[k];
+        if (edge.b < 0 || turned[edge.a] != turned[edge.b])
+          addCrossed(mesh.points[edge.from], mesh.points[edge.to], crossed[part]);
+      }
     }
+  }
+  for (const auto& part : crossed) {
+    for (const cv::Point& p : part) choose(p.x, p.y);
+  }
+}
+
+// Pixels that an edge of a silhouette crosses, region coordinates.
+void EdgeCoverage::addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q,
+                              std::vector<cv::Point>& crossed) const {
+  if (std::isnan(p.z() + q.z())) return;
+  const float length = std::min((q - p).head<2>().norm(), 2.0f * (region_.width + region_.height));
+  const int steps = 1 + static_cast<int>(2.0f * length);
+  for (int i = 0; i <= steps; ++i) {
+    const Eigen::Vector3f s = p + (q - p) * (static_cast<float>(i) / steps);
+    const cv::Point at(static_cast<int>(std::floor(s.x() + 0.5f)) - region_.x,
+                       static_cast<int>(std::floor(s.y() + 0.5f)) - region_.y);
+    if (crossed.empty() || crossed.back() != at) crossed.push_back(at);
   }
 }
 
 void EdgeCoverage::draw(const ScreenMesh& mesh, int object) {
   if (pixels_.empty()) return;
-  constexpr int kParts = 8;
   const int count = static_cast<int>(mesh.triangles->size());
   // of the triangles that touch a chosen pixel's tile, in their order
   std::vector<Piece> pieces[kParts];
 #pragma omp parallel
   {
-#pragma omp for schedule(static)
+#pragma omp for schedule(dynamic, 1)
     for (int part = 0; part < kParts; ++part) {
-      const int begin = static_cast<int>(static_cast<long>(count) * part / kParts),
-                end = static_cast<int>(static_cast<long>(count) * (part + 1) / kParts);
+      const int begin = partOf(count, part), end = partOf(count, part + 1);
       for (int t = begin; t < end; ++t)
         addPieces(mesh, t,
                   (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t),
                   pieces[part]);
     }
-#pragma omp for schedule(static)
-    for (int band = 0; band < kParts; ++band) {
+#pragma omp for schedule(dynamic, 1)
+    for (int band = 0; band < kBands; ++band) {
       for (const auto& part : pieces) {
         for (const Piece& piece : part) {
-          if (piece.tile % kParts == band) drawPiece(piece);
+          if (piece.tile % kBands == band) drawPiece(piece);
         }
       }
     }

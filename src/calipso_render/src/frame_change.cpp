@@ -107,22 +107,23 @@ void FrameCompositor::keepRims(const cv::Mat& owner) {
 }
 
 // The triangles with a point that may be at rest.
-bool FrameCompositor::findResting(int slot, std::vector<bool>& can_rest) const {
+bool FrameCompositor::findResting(int slot, std::vector<char>& can_rest) const {
   const Actor& actor = actors_[slot];
-  can_rest.assign(actor.surface->triangles.size(), false);
+  can_rest.assign(actor.surface->triangles.size(), 0);
   if (observed_[slot].points.empty()) return false;
   bool any = false;
+#pragma omp parallel for schedule(static) reduction(|| : any)
   for (std::size_t t = 0; t < can_rest.size(); ++t) {
     can_rest[t] = mayMoveLess(actor.screen.points, observed_[slot].points,
                               actor.surface->triangles[t], kMovedPx);
-    any = any || can_rest[t];
+    any = any || can_rest[t] != 0;
   }
   return any;
 }
 
 void FrameCompositor::findStill() {
   if (!params_.keep_still) return;
-  std::vector<std::vector<bool>> can_rest(actors_.size());
+  std::vector<std::vector<char>> can_rest(actors_.size());
   bool any = false;
   for (std::size_t slot = 0; slot < actors_.size(); ++slot)
     any = findResting(static_cast<int>(slot), can_rest[slot]) || any;
@@ -138,7 +139,7 @@ void FrameCompositor::findStill() {
           !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]])
         continue;
       owner.at<short>(v, u) = static_cast<short>(surface_of_slot_[VisibilityBuffer::objectOf(id)]);
-      if (!can_rest[VisibilityBuffer::objectOf(id)][VisibilityBuffer::triangleOf(id)]) continue;
+      if (can_rest[VisibilityBuffer::objectOf(id)][VisibilityBuffer::triangleOf(id)] == 0) continue;
       if (lookOf(VisibilityBuffer::objectOf(id)).changes()) repainted.at<std::uint8_t>(v, u) = 255;
       still_.at<float>(v, u) = stillness(id, u + region_.x, v + region_.y);
     }

@@ -202,7 +202,7 @@ class FrameCompositor {
   void findPassingShadows();
   void drawVisibility();
   void findStill();
-  bool findResting(int slot, std::vector<bool>& can_rest) const;
+  bool findResting(int slot, std::vector<char>& can_rest) const;
   void keepRims(const cv::Mat& owner);
   void findCovered();
   void findSurfaceSun();

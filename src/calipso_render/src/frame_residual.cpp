@@ -159,16 +159,21 @@ cv::Rect FrameCompositor::carriedBox() const {
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     if (observed_[slot].points.empty()) continue;
     const Points &now = actors_[slot].screen.points, &then = observed_[slot].points;
-    Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
-    for (const Eigen::Vector3i& t : actors_[slot].surface->triangles) {
-      if (!mayMoveLess(now, then, t, kNonePx)) continue;
-      for (int i = 0; i < 3; ++i)
-        low = low.min(now[t[i]].head<2>().array()), high = high.max(now[t[i]].head<2>().array());
+    const Triangles& triangles = actors_[slot].surface->triangles;
+    float left = 1e9f, top = 1e9f, right = -1e9f, bottom = -1e9f;
+#pragma omp parallel for schedule(static) reduction(min : left, top) reduction(max : right, bottom)
+    for (std::size_t k = 0; k < triangles.size(); ++k) {
+      if (!mayMoveLess(now, then, triangles[k], kNonePx)) continue;
+      for (int i = 0; i < 3; ++i) {
+        const Eigen::Vector3f& p = now[triangles[k][i]];
+        left = std::min(left, p.x()), right = std::max(right, p.x());
+        top = std::min(top, p.y()), bottom = std::max(bottom, p.y());
+      }
     }
-    if (!(low <= high).all()) continue;
-    const Eigen::Array2i first = low.max(-1.0f).min(1e6f).cast<int>() - kCarried,
-                         last = high.max(-1.0f).min(1e6f).cast<int>() + kCarried + 1;
-    carried |= cv::Rect(first.x(), first.y(), last.x() - first.x(), last.y() - first.y());
+    if (!(left <= right && top <= bottom)) continue;
+    const auto pixel = [](float x) { return static_cast<int>(std::clamp(x, -1.0f, 1e6f)); };
+    carried |= cv::Rect(cv::Point(pixel(left) - kCarried, pixel(top) - kCarried),
+                        cv::Point(pixel(right) + kCarried + 1, pixel(bottom) + kCarried + 1));
   }
   return carried & region_;
 }

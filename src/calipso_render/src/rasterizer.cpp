@@ -119,18 +119,26 @@ cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size) {
 VisibilityBuffer::VisibilityBuffer(const cv::Rect& region, bool with_ids)
     : region_(region),
       stride_(region.width + kPadding),
-      ids_(with_ids ? static_cast<std::size_t>(stride_) * region.height : 0, kNothing),
-      near_(static_cast<std::size_t>(stride_) * region.height, kFar) {}
+      ids_(with_ids ? new std::uint32_t[static_cast<std::size_t>(stride_) * region.height]
+                    : nullptr),
+      near_(new float[static_cast<std::size_t>(stride_) * region.height]) {
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region.height; ++v) {
+    const std::size_t first = static_cast<std::size_t>(v) * stride_;
+    if (with_ids) std::fill_n(&ids_[first], stride_, kNothing);
+    std::fill_n(&near_[first], stride_, kFar);
+  }
+}
 
 void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
   const int count = static_cast<int>(mesh.triangles->size());
-  std::vector<TriangleSpan> parts[kBands];  // of the triangles, in their order
+  std::vector<TriangleSpan> parts[kParts];  // of the triangles, in their order
 #pragma omp parallel
   {
-#pragma omp for schedule(static)
-    for (int part = 0; part < kBands; ++part) {
-      const int begin = static_cast<int>(static_cast<long>(count) * part / kBands),
-                end = static_cast<int>(static_cast<long>(count) * (part + 1) / kBands);
+#pragma omp for schedule(dynamic, 1)
+    for (int part = 0; part < kParts; ++part) {
+      const int begin = static_cast<int>(static_cast<long>(count) * part / kParts),
+                end = static_cast<int>(static_cast<long>(count) * (part + 1) / kParts);
       parts[part].reserve(end - begin);
       TriangleSpan span;
       for (int t = begin; t < end; ++t) {
@@ -138,12 +146,11 @@ void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
         if (makeSpan(mesh, t, region_, span)) parts[part].push_back(span);
       }
     }
-#pragma omp for schedule(static)
+#pragma omp for schedule(dynamic, 1)
     for (int band = 0; band < kBands; ++band) {
       const int first = region_.height * band / kBands,
                 last = region_.height * (band + 1) / kBands - 1;
-      const SpanTarget target{ids_.empty() ? nullptr : ids_.data(), near_.data(), stride_, first,
-                              last};
+      const SpanTarget target{ids_.get(), near_.get(), stride_, first, last};
       for (const auto& part : parts)
         kernels().fill(part.data(), static_cast<int>(part.size()), target);
     }

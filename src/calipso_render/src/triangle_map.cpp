@@ -89,7 +89,7 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance,
           {static_cast<float>(c.fx) * q.x() + static_cast<float>(c.cx) * q.z(),
            static_cast<float>(c.fy) * q.y() + static_cast<float>(c.cy) * q.z(), q.z(), 1.0f}};
     }
-#pragma omp for schedule(static)
+#pragma omp for schedule(static, 64)
     for (std::size_t t = 0; t < triangles.size(); ++t) {
       const Eigen::Vector3i& corners = triangles[t];
       Eigen::Vector3f p[3];

@@ -75,6 +75,8 @@ class EdgeCoverage {
   struct Piece;
 
   void choose(int column, int row);  // region coordinates
+  void addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q,
+                  std::vector<cv::Point>& crossed) const;
   void addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id,
                  std::vector<Piece>& pieces) const;
   void drawPiece(const Piece& piece);

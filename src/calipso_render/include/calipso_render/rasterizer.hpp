@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -66,15 +67,15 @@ class VisibilityBuffer {
   static constexpr float kFar = -3.0e38f;
 
  private:
-  // rows are split in fixed bands: the result knows no thread count
-  static constexpr int kBands = 8;
+  // rows and triangles are split in fixed parts: the result knows no thread count
+  static constexpr int kBands = 16, kParts = 32;
   // places after each row, which kernels may read and write back
   static constexpr int kPadding = 8;
 
   cv::Rect region_;
   int stride_;
-  std::vector<std::uint32_t> ids_;
-  std::vector<float> near_;
+  std::unique_ptr<std::uint32_t[]> ids_;  // null: only nearness is kept
+  std::unique_ptr<float[]> near_;
 };
 
 // Perspective-correct barycentric weights of pixel (u, v) in a triangle of `mesh` whose nearness is
