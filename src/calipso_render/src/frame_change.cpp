@@ -3,20 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
 #include "disc_dilation.hpp"
 #include "frame_compositor.hpp"
-#include "marked.hpp"
 #include "tiled_filter.hpp"
 
 namespace calipso::render {
 namespace {
 
 constexpr int kLeastChange = 3;  // px across
-// levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
-constexpr std::uint8_t kSoftSky = 51;
 // mask margins around a surface at rest in which the frame's pixels stay
 constexpr int kRimReach = 4;
 
@@ -35,37 +33,19 @@ bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& t
 // some pixels, so what lies that near to both the shadow and the change is taken from the plate. A
 // change of single pixels is noise of the shadow's border and moves nothing.
 void FrameCompositor::findRelit() {
-  relit_ = cv::Mat::zeros(region_.size(), CV_8U);
+  relit_.create(region_.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region_.height; ++v) std::memset(relit_.ptr(v), 0, region_.width);
   const int reach = params_.background.shadow_margin_px, side = reach + 2;
-  cv::Rect box = shadows_.shaded_box;
-  if (box.empty()) return;
-  box = cv::Rect(box.x - side, box.y - side, box.width + 2 * side, box.height + 2 * side) & region_;
+  const auto around = [side](const cv::Rect& r) {
+    return r.empty() ? r : cv::Rect(r.x - side, r.y - side, r.width + 2 * side, r.height + 2 * side);
+  };
+  const cv::Rect box = around(shadows_.shaded_box) & around(sun_changes_.box()) & region_;
   if (box.empty()) return;
   cv::Mat change(box.size(), CV_8U);
-  const cv::Rect here = box - region_.tl();
-  const float umbra = kPerLevel * luminance(prepared_.umbra), lit = kPerLevel - umbra;
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < box.height; ++v) {
-    const auto rowOf = [&](const cv::Mat& picture) {
-      return picture.ptr<std::uint8_t>(here.y + v) + here.x;
-    };
-    const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
-                       *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_),
-                       *takes = rowOf(takes_light_);
-    std::uint8_t* out = change.ptr<std::uint8_t>(v);
-    for (int u = 0; u < box.width; ++u) {
-      const std::uint8_t more_sky =
-          std::max(sky[u], sky_before[u]) - std::min(sky[u], sky_before[u]);
-      out[u] = ((sun[u] != sun_before[u]) | (more_sky > kSoftSky)) & (takes[u] != 0);
-    }
-    for (int u = nextMarked(out, 0, box.width); u < box.width;
-         u = nextMarked(out, u + 1, box.width)) {
-      const int more_sky = sky[u] - sky_before[u], more_sun = sun[u] - sun_before[u];
-      const int beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
-      out[u] = changeOfLight(
-          std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
-    }
-  }
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = box.y; v < box.br().y; ++v)
+    findChange(v, box.x, box.br().x, change.ptr<std::uint8_t>(v - box.y));
   cv::Mat eroded(box.size(), CV_8U), opened(box.size(), CV_8U), grown(box.size(), CV_8U);
   const cv::Mat least = cv::Mat::ones(kLeastChange, kLeastChange, CV_8U);
   filterTiles(change, kLeastChange, eroded,
@@ -75,8 +55,29 @@ void FrameCompositor::findRelit() {
   filterTiles(opened, reach, grown,
               [&](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, reach, to); });
   cv::min(grown, shadows_.shaded(box), grown);
-  filterTiles(grown, 1, relit_(here), [](const cv::Mat& from, cv::Mat& to) {
+  filterTiles(grown, 1, relit_(box - region_.tl()), [](const cv::Mat& from, cv::Mat& to) {
     cv::blur(from, to, {3, 3});
+  });
+}
+
+// changeOfLight() at columns [from, to) of row v, where it is more than a pixel can follow.
+void FrameCompositor::findChange(int v, int from, int to, std::uint8_t* out) const {
+  std::memset(out, 0, to - from);
+  const auto rowOf = [&](const cv::Mat& picture) {
+    return picture.ptr<std::uint8_t>(v - region_.y) - region_.x;
+  };
+  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
+                     *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_),
+                     *takes = rowOf(takes_light_);
+  const float umbra = kPerLevel * luminance(prepared_.umbra), lit = kPerLevel - umbra;
+  sun_changes_.visitRow(v, from, to, [&](int begin, int end) {
+    for (int u = begin; u < end; ++u) {
+      const int more_sky = sky[u] - sky_before[u], more_sun = sun[u] - sun_before[u];
+      const int beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
+      if (takes[u] == 0 || (more_sun == 0 && beyond == 0)) continue;
+      out[u - from] = changeOfLight(
+          std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
+    }
   });
 }
 

@@ -81,7 +81,7 @@ FrameCompositor::Behind FrameCompositor::shadowedAt(int u, int v, bool removed) 
   Behind behind{unmirroredAt(u, v), 0.0f, kOriginal};
   if (removed) behind = revealedAt(u, v);
   const cv::Point at = cv::Point(u, v) - region_.tl();
-  if (takes_light_.at<std::uint8_t>(at) == 0) return behind;
+  if (!relightable_.at(u, v) || takes_light_.at<std::uint8_t>(at) == 0) return behind;
   const int sun = sun_now_.at<std::uint8_t>(at), sun_before = sun_before_.at<std::uint8_t>(at);
   const int sky = sky_now_.at<std::uint8_t>(at), sky_before = sky_before_.at<std::uint8_t>(at);
   const cv::Vec3f now = shadowRatio(kPerLevel * sun, kPerLevel * sky),

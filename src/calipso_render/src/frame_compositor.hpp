@@ -12,6 +12,7 @@
 #include "light_batch.hpp"
 #include "line_codec.hpp"
 #include "place_view.hpp"
+#include "plane_sky.hpp"
 #include "smooth_step.hpp"
 #include "square_mask.hpp"
 #include "triangle_map.hpp"
@@ -27,8 +28,14 @@ struct ShadowCache {
   std::unique_ptr<Visibility> others;             // of what is not edited
   // of the edited objects where the video has them; null: of none
   std::unique_ptr<Visibility> originals;
-  cv::Mat others_sun, others_sky;        // of the others; empty: nothing else casts a shadow
-  cv::Mat originals_sun, originals_sky;  // of the edited objects where the video has them
+  cv::Mat others_sun, others_sky;  // of the others; empty: nothing else casts a shadow
+  cv::Mat originals_sun;           // of the edited objects where the video has them
+  SkyGrid originals_sky;
+  cv::Mat originals_sky_levels;
+  SquareMask sunless;               // squares that originals_sun is not known to be all lit in
+  cv::Mat sun_before, sky_before;   // of both together; of the relief in plane terms
+  cv::Mat takes;                    // 255 = support plane or relief is seen, on which light changes
+  cv::Rect footprints;              // of what the edited objects cover at the key frame
   cv::Mat shaded;               // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
   cv::Rect shaded_box, bounds;  // of `shaded`; of all that the originals' shadows can reach
 };
@@ -49,6 +56,8 @@ struct RestPicture {
 constexpr int kLightStep = 4;
 constexpr float kSameShadow = 1.0f / 64;  // of visibility: no visible change
 constexpr int kSameLevels = 4;            // the same of a lightLevel()
+// levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
+constexpr std::uint8_t kSoftSky = 51;
 constexpr float kPerLevel = 1.0f / 255.0f;
 // of a support plane's light before an edit: darker, its own pixels do not tell what it would be in
 // more light
@@ -192,11 +201,15 @@ class FrameCompositor {
   void prepareShadows();
   void cacheOriginals(const std::vector<Occluder>& originals);
   void cacheOthers(const std::vector<Occluder>& others);
-  cv::Mat sunOver(const Visibility& shadow, const cv::Rect& bounds) const;
-  cv::Mat skyOver(const Visibility& shadow, const cv::Rect& region, const SquareMask& skip) const;
-  void leaveHidden(cv::Mat& sky, const cv::Rect& region) const;
+  cv::Mat sunOver(const Visibility& shadow, const cv::Rect& bounds, SquareMask* shaded) const;
+  SkyGrid skyOver(const Visibility& shadow, const cv::Rect& region, const SquareMask& skip) const;
+  cv::Mat skyLevels(const SkyGrid& grid, const Visibility& shadow) const;
+  void leaveHidden(int v, int begin, int end, std::uint8_t* sky) const;
+  void cacheBefore();
+  void joinBefore(int v);
   void chooseRegion();
-  void findShown(int v, std::uint8_t* own, std::uint8_t* others) const;
+  void findShown(int v, const cv::Rect& box, std::uint8_t* own, std::uint8_t* others) const;
+  void findOwn(const cv::Rect& box);
   void findRemoved();
   cv::Mat quietPlaces() const;
   void findPassingShadows();
@@ -214,12 +227,14 @@ class FrameCompositor {
     return static_cast<std::size_t>(j) * sun_columns_ + i;
   }
   void shadeSetup();
-  void measureSky();
-  void measureSun();
-  void joinSun(int v);
-  void takeReliefInPlaneTerms();
+  void measureLight();
+  void findSkyChanges(const SkyGrid& now, SquareMask& changes);
+  void measureRun(const SkyGrid& sky_grid, int v, int begin, int end);
+  void takeReliefInPlaneTerms(int v, int begin, int end, std::uint8_t* sun,
+                              std::uint8_t* sky) const;
   float darkeningAt(int u, int v, std::uint8_t sun, std::uint8_t sky) const;
   void findRelit();
+  void findChange(int v, int from, int to, std::uint8_t* out) const;
   void findMaps();
   void findShaded();
   void findScreened();
@@ -233,6 +248,7 @@ class FrameCompositor {
   void composeRow(int v, Row& row, FrameOutput& out) const;
   void drawRow(int v, Row& row) const;
   void findKinds(int v, Row& row) const;
+  void findBehind(int j, int begin, int end, Kind* kinds) const;
   bool reflectStretch(const std::uint32_t* ids, int v, int first, int last, int slot,
                       Row& row) const;
   void sunOnStretch(int v, int first, int last, int slot, Row& row) const;
@@ -308,11 +324,17 @@ class FrameCompositor {
   cv::Mat remirrored_;
   // CV_8UC1, whole picture: shaded now by an edited object that moves in the video
   cv::Mat passing_;
+  cv::Rect shown_box_;  // of region_: what shows edited objects in the video, with a margin
+  cv::Rect drawn_box_;  // of region_: all that is drawn, with a margin
   cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
   cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
   // over region_: so deep behind drawn surfaces that light there does not matter
   SquareMask covered_;
-  // CV_8UC1 over region_: lightLevel() of the sky on support plane or relief, this in plane terms
+  SquareMask sun_changes_;  // squares in which the light may change by more than a pixel can follow
+  // ... and those beyond which neither light changes nor anything comes to light
+  SquareMask relightable_;
+  // CV_8UC1 over region_: lightLevel() of the sky on support plane or relief, this in plane terms;
+  // now: in relightable_ squares
   cv::Mat sky_now_, sky_before_;
   cv::Mat sun_now_, sun_before_;  // CV_8UC1 over region_: the same of the sun
   // CV_8UC1 over region_: 255 = support plane or relief is seen, on which light changes

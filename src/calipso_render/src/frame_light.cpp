@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
@@ -16,6 +17,11 @@
 namespace calipso::render {
 namespace {
 
+// of the sky's light: differences of levels that come of no more are less than kSameLevels, or no
+// more than kSoftSky, also once they are rounded
+constexpr float kSameSky = (kSameLevels - 2.1f) * kPerLevel,
+                kLittleSky = (kSoftSky - 2.1f) * kPerLevel;
+
 // Product of two levels, 255 = 1.
 std::uint8_t both(std::uint8_t a, std::uint8_t b) {
   const unsigned product = a * static_cast<unsigned>(b) + 128;
@@ -26,119 +32,168 @@ std::uint8_t both(std::uint8_t a, std::uint8_t b) {
 
 // Edited objects hide only that part of the sky which others leave: the picture's pixels lack
 // theirs already.
-// @param sky of edited objects alone, over `region`
-void FrameCompositor::leaveHidden(cv::Mat& sky, const cv::Rect& region) const {
+// @param sky of edited objects alone, columns [begin, end) of row v
+void FrameCompositor::leaveHidden(int v, int begin, int end, std::uint8_t* sky) const {
   if (shadows_.others_sky.empty()) return;
   const float all_hidden = skyLight(0.0f), scale = kPerLevel / (1.0f - all_hidden),
               offset = all_hidden / (1.0f - all_hidden);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region.height; ++v) {
-    const std::uint8_t* others = shadows_.others_sky.ptr<std::uint8_t>(v + region.y) + region.x;
-    std::uint8_t* row = sky.ptr<std::uint8_t>(v);
-    for (int u = 0; u < region.width; ++u) {
-      const float left = std::clamp(scale * others[u] - offset, 0.0f, 1.0f);
-      row[u] = static_cast<std::uint8_t>(255.5f - left * static_cast<float>(255 - row[u]));
-    }
+  const std::uint8_t* others = shadows_.others_sky.ptr<std::uint8_t>(v) + begin;
+  for (int k = 0; k < end - begin; ++k) {
+    const float left = std::clamp(scale * others[k] - offset, 0.0f, 1.0f);
+    sky[k] = static_cast<std::uint8_t>(255.5f - left * static_cast<float>(255 - sky[k]));
   }
 }
 
-cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds) const {
+// @param shaded gets the squares that are not known to be all lit; may be null
+cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds,
+                                 SquareMask* shaded) const {
   cv::Mat sun(frame_.bgr.size(), CV_8U, cv::Scalar(255)), part = sun(bounds);
-  planesInLight(place_view_, shadow, bounds, SquareMask(), part);
+  planesInLight(place_view_, shadow, bounds, SquareMask(), part, shaded);
   return sun;
 }
 
 // @param skip where it is not wanted
-cv::Mat FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region,
+SkyGrid FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region,
                                  const SquareMask& skip) const {
-  return planesUnderSky(place_view_.planes(), shadow, frame_.bgr.size(), region, skip);
+  return SkyGrid(place_view_.planes(), shadow, frame_.bgr.size(), region, skip);
+}
+
+// The whole picture's levels.
+cv::Mat FrameCompositor::skyLevels(const SkyGrid& grid, const Visibility& shadow) const {
+  cv::Mat sky(frame_.bgr.size(), CV_8U);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = 0; v < sky.rows; ++v)
+    grid.levels(place_view_.planes(), shadow, v, 0, sky.cols, sky.ptr<std::uint8_t>(v));
+  return sky;
 }
 
 void FrameCompositor::findCovered() {
   drawn_.create(region_.size(), CV_8U);
   all_drawn_ =
       std::all_of(always_drawn_.begin(), always_drawn_.end(), [](bool always) { return always; });
+  const cv::Rect box = drawn_box_ - region_.tl();
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region_.height; ++v) {
     const std::uint32_t* ids = centre_->ids(v);
     std::uint8_t* drawn = drawn_.ptr<std::uint8_t>(v);
+    std::memset(drawn, 0, region_.width);
+    if (v < box.y || v >= box.br().y) continue;
     if (all_drawn_) {
-      for (int u = 0; u < region_.width; ++u)
+      for (int u = box.x; u < box.br().x; ++u)
         drawn[u] = ids[u] != VisibilityBuffer::kNothing ? 255 : 0;
     } else {
-      for (int u = 0; u < region_.width; ++u)
+      for (int u = box.x; u < box.br().x; ++u)
         drawn[u] = isDrawn(ids[u], u + region_.x, v + region_.y) ? 255 : 0;
     }
   }
-  covered_ = SquareMask(drawn_, region_, params_.background.shadow_margin_px + 2);
+  if (!box.empty())
+    covered_ = SquareMask(drawn_(box), drawn_box_, params_.background.shadow_margin_px + 2);
 }
 
-void FrameCompositor::measureSky() {
-  sky_now_ = skyOver(*moved_sky_, region_, covered_);
-  leaveHidden(sky_now_, region_);
-  sky_before_ = shadows_.originals_sky(region_);
-}
-
-void FrameCompositor::measureSun() {
-  sun_now_ = cv::Mat(region_.size(), CV_8U, cv::Scalar(255));
-  sun_before_.create(region_.size(), CV_8U);
-  takes_light_.create(region_.size(), CV_8U);
-  const cv::Rect bounds = moved_bounds_ & region_;
-  if (!bounds.empty()) {
-    cv::Mat part = sun_now_(bounds - region_.tl());
-    planesInLight(place_view_, *moved_shadow_, bounds, covered_, part);
-  }
+// Sun and sky before the edit, and where light is taken at all; all of it stays while the same
+// objects are edited.
+void FrameCompositor::cacheBefore() {
+  const cv::Size size = frame_.bgr.size();
+  shadows_.sun_before.create(size, CV_8U), shadows_.takes.create(size, CV_8U);
+  shadows_.sky_before = shadows_.originals_sky_levels.clone();
 #pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) joinSun(v);
-  takeReliefInPlaneTerms();
-}
-
-// The sun alone shades the relief; what its levels do to the support planes they do not do to it.
-void FrameCompositor::takeReliefInPlaneTerms() {
-  const Relief& relief = place_view_.relief();
-  if (relief.empty()) return;
-  sky_before_ = sky_before_.clone();  // it is the cache's
-  const float planes_umbra = luminance(prepared_.umbra);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) {
-    std::uint8_t *sun_now = sun_now_.ptr<std::uint8_t>(v), *sky_now = sky_now_.ptr<std::uint8_t>(v);
-    std::uint8_t *sun_before = sun_before_.ptr<std::uint8_t>(v),
-                 *sky_before = sky_before_.ptr<std::uint8_t>(v);
-    const float* umbra = relief.umbra.ptr<float>(v + region_.y) + region_.x;
-    const std::uint8_t* seen = relief.seen.ptr<std::uint8_t>(v + region_.y) + region_.x;
-    const auto take = [&](int u, std::uint8_t& sun, std::uint8_t& sky) {
-      const PlaneTerms terms = inPlaneTerms(kPerLevel * sun, umbra[u], planes_umbra);
-      sun = lightLevel(terms.sun), sky = lightLevel(terms.sky);
-    };
-    for (int u = nextMarked(seen, 0, region_.width); u < region_.width;
-         u = nextMarked(seen, u + 1, region_.width)) {
-      take(u, sun_now[u], sky_now[u]), take(u, sun_before[u], sky_before[u]);
-    }
+  for (int v = 0; v < size.height; ++v) {
+    joinBefore(v);
+    leaveHidden(v, 0, size.width, shadows_.sky_before.ptr<std::uint8_t>(v));
+    takeReliefInPlaneTerms(v, 0, size.width, shadows_.sun_before.ptr<std::uint8_t>(v),
+                           shadows_.sky_before.ptr<std::uint8_t>(v));
   }
 }
 
-// Row v of what edited objects and others shade together, and of what was shaded before.
-CALIPSO_WIDE_LOOPS void FrameCompositor::joinSun(int v) {
-  std::uint8_t *now = sun_now_.ptr<std::uint8_t>(v), *before = sun_before_.ptr<std::uint8_t>(v),
-               *takes = takes_light_.ptr<std::uint8_t>(v);
-  const auto rowOf = [&](const cv::Mat& picture) {
-    return picture.empty() ? nullptr : picture.ptr<std::uint8_t>(v + region_.y) + region_.x;
+// Row v of what originals and others shade together, and of what takes shadows.
+CALIPSO_WIDE_LOOPS void FrameCompositor::joinBefore(int v) {
+  std::uint8_t *before = shadows_.sun_before.ptr<std::uint8_t>(v),
+               *takes = shadows_.takes.ptr<std::uint8_t>(v);
+  const auto rowOf = [v](const cv::Mat& picture) {
+    return picture.empty() ? nullptr : picture.ptr<std::uint8_t>(v);
   };
   const std::uint8_t *others = rowOf(shadows_.others_sun),
                      *originals = rowOf(shadows_.originals_sun), *none = rowOf(shadowless_);
-  const int width = region_.width;
+  const int width = shadows_.takes.cols;
   if (originals != nullptr)
     std::copy_n(originals, width, before);
   else
     std::fill_n(before, width, 255);
-  for (int u = 0; others != nullptr && u < width; ++u)
-    now[u] = both(now[u], others[u]), before[u] = both(before[u], others[u]);
-  place_view_.seesRow(region_.x, v + region_.y, width, takes);
+  for (int u = 0; others != nullptr && u < width; ++u) before[u] = both(before[u], others[u]);
+  place_view_.seesRow(0, v, width, takes);
   for (int u = 0; none != nullptr && u < width; ++u) takes[u] = none[u] == 0 ? takes[u] : 0;
-  for (int u = 0; u < width;) {
-    const int end = std::min(width, u + SquareMask::kSide - (region_.x + u) % SquareMask::kSide);
-    if (covered_.at(region_.x + u, region_.y + v)) std::fill(takes + u, takes + end, 0);
-    u = end;
+}
+
+// Sun and sky now, in the squares in which they can matter: where they may differ from before,
+// around where the sun may, and where the place behind an object comes to light.
+void FrameCompositor::measureLight() {
+  sun_before_ = shadows_.sun_before(region_), sky_before_ = shadows_.sky_before(region_);
+  takes_light_ = shadows_.takes(region_);
+  sun_now_ = cv::Mat(region_.size(), CV_8U, cv::Scalar(255));
+  sky_now_.create(region_.size(), CV_8U);
+  sun_changes_ = SquareMask(region_);
+  const cv::Rect bounds = moved_bounds_ & region_;
+  if (!bounds.empty()) {
+    cv::Mat part = sun_now_(bounds - region_.tl());
+    planesInLight(place_view_, *moved_shadow_, bounds, covered_, part, &sun_changes_);
+  }
+  sun_changes_.add(shadows_.sunless);
+  const SkyGrid sky = skyOver(*moved_sky_, region_, covered_);
+  SquareMask sky_changes(region_);
+  findSkyChanges(sky, sky_changes);
+  sun_changes_.remove(covered_);
+  relightable_ = sun_changes_.grown(params_.background.shadow_margin_px + 2);
+  relightable_.add(sky_changes);
+  relightable_.set(passing_.empty() ? shown_box_ : region_);
+  relightable_.remove(covered_);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = region_.y; v < region_.br().y; ++v) {
+    relightable_.visitRow(v, region_.x, region_.br().x,
+                          [&](int begin, int end) { measureRun(sky, v, begin, end); });
+  }
+}
+
+// Squares of the region in which the sky's light may differ from before.
+void FrameCompositor::findSkyChanges(const SkyGrid& now, SquareMask& changes) {
+  constexpr int kSide = SquareMask::kSide;
+  const int first = region_.y / kSide, last = (region_.br().y - 1) / kSide;
+#pragma omp parallel for schedule(static)
+  for (int j = first; j <= last; ++j) {
+    for (int u = region_.x / kSide * kSide; u < region_.br().x; u += kSide) {
+      const cv::Rect square = cv::Rect(u, j * kSide, kSide, kSide) & region_;
+      const float difference = now.greatestDifference(shadows_.originals_sky, square);
+      if (difference > kSameSky) changes.set(square);
+      if (difference > kLittleSky) sun_changes_.set(square);
+    }
+  }
+}
+
+// Columns [begin, end) of row v.
+void FrameCompositor::measureRun(const SkyGrid& sky_grid, int v, int begin, int end) {
+  std::uint8_t *sun = sun_now_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x),
+               *sky = sky_now_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x);
+  sky_grid.levels(place_view_.planes(), *moved_sky_, v, begin, end, sky);
+  leaveHidden(v, begin, end, sky);
+  if (!shadows_.others_sun.empty()) {
+    const std::uint8_t* others = shadows_.others_sun.ptr<std::uint8_t>(v) + begin;
+    for (int k = 0; k < end - begin; ++k) sun[k] = both(sun[k], others[k]);
+  }
+  takeReliefInPlaneTerms(v, begin, end, sun, sky);
+}
+
+// The sun alone shades the relief; what its levels do to the support planes they do not do to it.
+// @param sun, sky columns [begin, end) of row v
+void FrameCompositor::takeReliefInPlaneTerms(int v, int begin, int end, std::uint8_t* sun,
+                                             std::uint8_t* sky) const {
+  const Relief& relief = place_view_.relief();
+  if (relief.empty()) return;
+  const float planes_umbra = luminance(prepared_.umbra);
+  const float* umbra = relief.umbra.ptr<float>(v) + begin;
+  const std::uint8_t* seen = relief.seen.ptr<std::uint8_t>(v) + begin;
+  const int count = end - begin;
+  for (int k = nextMarked(seen, 0, count); k < count; k = nextMarked(seen, k + 1, count)) {
+    const PlaneTerms terms = inPlaneTerms(kPerLevel * sun[k], umbra[k], planes_umbra);
+    sun[k] = lightLevel(terms.sun), sky[k] = lightLevel(terms.sky);
   }
 }
 

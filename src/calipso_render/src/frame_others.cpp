@@ -95,6 +95,7 @@ void FrameCompositor::findScreened() {
   screened_ = params_.matte.empty() ? cv::Mat::zeros(region_.size(), CV_8U)
                                     : params_.matte(region_).clone();
   if (prepared_.scenery.empty()) return;
+  takes_light_ = takes_light_.clone();  // it is the cache's
   const cv::Mat scenery = prepared_.scenery(region_);
   cv::Mat drawn = cv::Mat::zeros(region_.size(), CV_32F), hidden;
   const Eigen::Vector3f axis = frame_.camera.world_from_camera.linear().col(2).cast<float>();

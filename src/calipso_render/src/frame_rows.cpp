@@ -25,19 +25,17 @@ cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) {
 
 }  // namespace
 
-// What has to be done for every pixel of row v.
-CALIPSO_WIDE_LOOPS void FrameCompositor::findKinds(int v, Row& row) const {
-  const int j = v - region_.y, width = region_.width;
+// Of columns [begin, end) of region_'s row j: what lies behind, where its light changes or where
+// it comes to light.
+CALIPSO_WIDE_LOOPS void FrameCompositor::findBehind(int j, int begin, int end, Kind* kinds) const {
   const auto rowOf = [j](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j); };
   const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
                      *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
-  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x, *drawn = rowOf(drawn_),
-                     *takes = rowOf(takes_light_);
-  const std::uint8_t *removed = rowOf(removed_), *relit = rowOf(relit_);
-  const std::uint32_t* ids = centre_->ids(j);
-  Kind* kinds = row.kinds.data();
+  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(j + region_.y) + region_.x,
+                     *takes = rowOf(takes_light_), *removed = rowOf(removed_),
+                     *relit = rowOf(relit_);
   std::uint8_t* out = reinterpret_cast<std::uint8_t*>(kinds);
-  for (int i = 0; i < width; ++i) {
+  for (int i = begin; i < end; ++i) {
     const std::uint8_t sun_change =
         std::max(sun[i], sun_before[i]) - std::min(sun[i], sun_before[i]);
     const std::uint8_t sky_change =
@@ -47,8 +45,22 @@ CALIPSO_WIDE_LOOPS void FrameCompositor::findKinds(int v, Row& row) const {
     const std::uint8_t differs =
         ((relit[i] != 0) | (change >= kSameLevels)) & (takes[i] != 0) & (labels[i] == 0);
     const std::uint8_t behind = (differs | (removed[i] != 0)) != 0 ? kBehind : kNone;
-    out[i] = drawn[i] != 0 ? static_cast<std::uint8_t>(kPlain) : behind;
+    out[i] = out[i] == kNone ? behind : out[i];
   }
+}
+
+// What has to be done for every pixel of row v.
+CALIPSO_WIDE_LOOPS void FrameCompositor::findKinds(int v, Row& row) const {
+  const int j = v - region_.y, width = region_.width;
+  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x,
+                     *drawn = drawn_.ptr<std::uint8_t>(j), *removed = removed_.ptr<std::uint8_t>(j);
+  const std::uint32_t* ids = centre_->ids(j);
+  Kind* kinds = row.kinds.data();
+  for (int i = 0; i < width; ++i)
+    reinterpret_cast<std::uint8_t*>(kinds)[i] = drawn[i] & static_cast<std::uint8_t>(kPlain);
+  relightable_.visitRow(v, region_.x, region_.br().x, [&](int begin, int end) {
+    findBehind(j, begin - region_.x, end - region_.x, kinds);
+  });
   // What hides a surface at rest takes its residual.
   for (int i = 0; !all_drawn_ && i < width; ++i)
     kinds[i] = kinds[i] == kBehind && ids[i] != VisibilityBuffer::kNothing ? kSpecial : kinds[i];

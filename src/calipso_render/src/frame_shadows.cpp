@@ -67,6 +67,7 @@ void FrameCompositor::prepareShadows() {
       std::find(prepared_.moves.begin(), prepared_.moves.end(), true) == prepared_.moves.end();
   if (!same || !others_rest) cacheOthers(others);
   if (!same) cacheOriginals(originals);
+  if (!same || !others_rest) cacheBefore();
   shadows_.edited = edited_, shadows_.camera = frame_.camera, shadows_.sun = light_.direction;
 }
 
@@ -74,10 +75,12 @@ void FrameCompositor::cacheOthers(const std::vector<Occluder>& others) {
   shadows_.others = shadowOf(others, light_, params_);
   cv::Rect bounds;
   for (const Occluder& o : others) bounds |= shadowBounds(*o.vertices, light_);
-  shadows_.others_sun = bounds.empty() ? cv::Mat() : sunOver(*shadows_.others, bounds);
-  shadows_.others_sky = others.empty() ? cv::Mat()
-                                       : skyOver(*skyShadowOf(others, params_),
-                                                 {{0, 0}, frame_.bgr.size()}, SquareMask());
+  shadows_.others_sun = bounds.empty() ? cv::Mat() : sunOver(*shadows_.others, bounds, nullptr);
+  shadows_.others_sky.release();
+  if (others.empty()) return;
+  const auto sky = skyShadowOf(others, params_);
+  shadows_.others_sky =
+      skyLevels(skyOver(*sky, {{0, 0}, frame_.bgr.size()}, SquareMask()), *sky);
 }
 
 void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
@@ -87,24 +90,32 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
     shadows_.bounds |= shadowBounds(*o.vertices, prepared_.light.light);
   shadows_.originals =
       originals.empty() ? nullptr : shadowOf(originals, prepared_.light.light, params_);
-  shadows_.originals_sun =
-      shadows_.bounds.empty() ? cv::Mat() : sunOver(*shadows_.originals, shadows_.bounds);
-  shadows_.originals_sky = originals.empty()
-                               ? cv::Mat(whole.size(), CV_8U, cv::Scalar(255))
-                               : skyOver(*skyShadowOf(originals, params_), whole, SquareMask());
-  leaveHidden(shadows_.originals_sky, whole);
+  shadows_.sunless = SquareMask(whole);
+  shadows_.originals_sun = shadows_.bounds.empty()
+                               ? cv::Mat()
+                               : sunOver(*shadows_.originals, shadows_.bounds, &shadows_.sunless);
+  const auto sky_shadow = skyShadowOf(originals, params_);
+  shadows_.originals_sky = skyOver(*sky_shadow, whole, SquareMask());
+  shadows_.originals_sky_levels = skyLevels(shadows_.originals_sky, *sky_shadow);
+  cv::Mat originals_sky = shadows_.originals_sky_levels.clone();
   shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < whole.height; ++v) {
+    leaveHidden(v, 0, whole.width, originals_sky.ptr<std::uint8_t>(v));
     for (int u = 0; u < whole.width; ++u) {
       const std::uint8_t sun = levelAt(shadows_.originals_sun, u, v),
-                         sky = shadows_.originals_sky.at<std::uint8_t>(v, u);
+                         sky = originals_sky.at<std::uint8_t>(v, u);
       if ((sun == 255 && sky == 255) || !takesShadow(u, v)) continue;
       shadows_.shaded.at<std::uint8_t>(v, u) = changeOfLight(darkeningAt(u, v, sun, sky));
     }
   }
   cv::dilate(shadows_.shaded, shadows_.shaded, disc(params_.background.shadow_margin_px));
   shadows_.shaded_box = cv::boundingRect(shadows_.shaded);
+  shadows_.footprints = {};
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (edited_[i] && !footprints_[i].empty())
+      shadows_.footprints |= cv::boundingRect(footprints_[i]);
+  }
 }
 
 // Part of its brightness that a pixel loses which gets these levels of sun and sky.

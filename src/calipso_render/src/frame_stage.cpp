@@ -32,6 +32,27 @@ constexpr int kRimShare = 50;   // of the picture's width: how far a mask may mi
 constexpr int kInFront = 127;   // of a matte
 constexpr float kQuiet = 5.0f;  // code values of spread over time: the background rests
 
+cv::Rect grown(const cv::Rect& r, int margin) {
+  return {r.x - margin, r.y - margin, r.width + 2 * margin, r.height + 2 * margin};
+}
+
+// Bounding box of an object's pixels.
+cv::Rect boxOf(const cv::Mat& labels, int index) {
+  if (index < 0) return {};  // the video does not have it
+  int left = labels.cols, right = -1, top = labels.rows, bottom = -1;
+  for (int v = 0; v < labels.rows; ++v) {
+    const std::uint8_t* row = labels.ptr<std::uint8_t>(v);
+    const void* first = std::memchr(row, index, labels.cols);
+    if (first == nullptr) continue;
+    top = std::min(top, v), bottom = v;
+    left = std::min(left, static_cast<int>(static_cast<const std::uint8_t*>(first) - row));
+    int last = labels.cols - 1;
+    while (last > right && row[last] != index) --last;
+    right = last;
+  }
+  return bottom < 0 ? cv::Rect() : cv::Rect({left, top}, cv::Point(right + 1, bottom + 1));
+}
+
 Gloss glossOf(const Gloss& own, const Look& look) {
   return {look.specular.value_or(own.specular), look.roughness.value_or(own.roughness)};
 }
@@ -84,8 +105,7 @@ void FrameCompositor::prepareFrame() {
   drawVisibility();
   findStill();
   findCovered();
-  measureSky();
-  measureSun();
+  measureLight();
   findScreened();
   findRelit();
   findMaps();
@@ -230,19 +250,21 @@ void FrameCompositor::chooseRegion() {
   const cv::Rect all(0, 0, size.width, size.height);
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     if (!edited_[i]) continue;
-    const cv::Rect box = cv::boundingRect(labels_ == prepared_.surfaces[i].index);
-    if (!box.empty())
-      region_ |= cv::Rect(box.x - kRegionMargin, box.y - kRegionMargin,
-                          box.width + 2 * kRegionMargin, box.height + 2 * kRegionMargin);
+    shown_box_ |= boxOf(labels_, prepared_.surfaces[i].index);
   }
+  if (!shown_box_.empty()) region_ |= grown(shown_box_, kRegionMargin);
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
-    if (!edited_[surface_of_slot_[slot]] && !may_be_shaded_[slot]) continue;
-    region_ |= boundsOf(actors_[slot].screen, kRegionMargin, size);
+    const cv::Rect box = boundsOf(actors_[slot].screen, kRegionMargin, size);
+    if (edited_[surface_of_slot_[slot]] || may_be_shaded_[slot]) region_ |= box;
+    drawn_box_ |= box;
   }
   region_ |= shadows_.bounds | shadows_.shaded_box | moved_bounds_;
   if (!passing_.empty()) region_ |= cv::boundingRect(passing_);
   if (!remirrored_.empty()) region_ |= cv::boundingRect(remirrored_ == kChanged);
-  region_ &= all;
+  region_ &= all, drawn_box_ &= region_;
+  shown_box_ |= shadows_.footprints;
+  if (!shown_box_.empty())
+    shown_box_ = grown(shown_box_, params_.background.mask_margin_px) & region_;
 }
 
 // CV_8UC1: seen in other frames, always alike.
@@ -301,11 +323,12 @@ cv::Mat FrameCompositor::originalOf(int surface) const {
   return original;
 }
 
-// Row v of the pixels that show an edited object in the video, and of those that show another one.
-CALIPSO_WIDE_LOOPS void FrameCompositor::findShown(int v, std::uint8_t* own,
+// Row v of the pixels of a box that show an edited object in the video, and of those that show
+// another one.
+CALIPSO_WIDE_LOOPS void FrameCompositor::findShown(int v, const cv::Rect& box, std::uint8_t* own,
                                                    std::uint8_t* others) const {
-  const int width = region_.width;
-  const std::uint8_t* labels = labels_.ptr<std::uint8_t>(v + region_.y) + region_.x;
+  const int width = box.width;
+  const std::uint8_t* labels = labels_.ptr<std::uint8_t>(v) + box.x;
   for (int u = 0; u < width; ++u) own[u] = 0, others[u] = labels[u] != 0 ? 255 : 0;
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     if (!edited_[i] || !prepared_.surfaces[i].in_video) continue;
@@ -313,22 +336,35 @@ CALIPSO_WIDE_LOOPS void FrameCompositor::findShown(int v, std::uint8_t* own,
     for (int u = 0; u < width; ++u)
       own[u] |= labels[u] == index ? 255 : 0, others[u] &= labels[u] == index ? 0 : 255;
     if (footprints_[i].empty()) continue;
-    const std::uint8_t* footprint = footprints_[i].ptr<std::uint8_t>(v + region_.y) + region_.x;
+    const std::uint8_t* footprint = footprints_[i].ptr<std::uint8_t>(v) + box.x;
     for (int u = 0; u < width; ++u) own[u] |= footprint[u];
   }
 }
 
-void FrameCompositor::findRemoved() {
-  cv::Mat own(region_.size(), CV_8U), others(region_.size(), CV_8U);
+// What the edited objects show in the video, with a margin, but not what stands beside them.
+void FrameCompositor::findOwn(const cv::Rect& box) {
+  cv::Mat own(box.size(), CV_8U), others(box.size(), CV_8U), here = removed_(box - region_.tl());
 #pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v)
-    findShown(v, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
-  removed_.create(region_.size(), CV_8U);
+  for (int v = 0; v < box.height; ++v)
+    findShown(v + box.y, box, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
   const int margin = params_.background.mask_margin_px;
-  filterTiles(own, margin, removed_,
+  filterTiles(own, margin, here,
               [margin](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, margin, to); });
-  if (!passing_.empty()) removed_ |= passing_(region_);
-  removed_ &= ~others;  // what stands beside it keeps its own pixels, and what stands before it
+  if (!passing_.empty()) here |= passing_(box);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < box.height; ++v) {
+    std::uint8_t* row = here.ptr<std::uint8_t>(v);
+    const std::uint8_t* stays = others.ptr<std::uint8_t>(v);
+    for (int u = 0; u < box.width; ++u) row[u] &= static_cast<std::uint8_t>(~stays[u]);
+  }
+}
+
+void FrameCompositor::findRemoved() {
+  removed_.create(region_.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region_.height; ++v) std::memset(removed_.ptr(v), 0, region_.width);
+  const cv::Rect box = passing_.empty() ? shown_box_ : region_;
+  if (!box.empty()) findOwn(box);
   for (const cv::Mat& front : fronts_) {
     if (!front.empty()) removed_.setTo(0, front(region_));
   }

@@ -19,8 +19,8 @@ constexpr float kSlow = 0.3f;
 class Squares {
  public:
   Squares(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
-          const SquareMask& skip, cv::Mat& out)
-      : view_(view), light_(light), rect_(rect), skip_(skip), out_(out) {}
+          const SquareMask& skip, cv::Mat& out, SquareMask* shaded)
+      : view_(view), light_(light), rect_(rect), skip_(skip), out_(out), shaded_(shaded) {}
 
   // Squares hang on the picture, not on the rectangle: pixels are the same whatever else is asked
   // for.
@@ -49,10 +49,12 @@ class Squares {
     }
     const std::optional<float> uniform =
         even ? light_.uniform(middle.position, middle.normal, radius) : std::nullopt;
+    const bool split = !uniform && square.width > kSquare;
+    if (shaded_ != nullptr && !split && uniform != 1.0f) shaded_->set(here + rect_.tl());
     if (uniform) {
       for (int y = here.y; y < here.br().y; ++y)
         std::memset(out_.ptr<std::uint8_t>(y) + here.x, lightLevel(*uniform), here.width);
-    } else if (square.width > kSquare) {
+    } else if (split) {
       const int half = square.width / 2;
       for (int k = 0; k < 4; ++k)
         fill({square.x + (k & 1) * half, square.y + (k >> 1) * half, half, half});
@@ -178,13 +180,14 @@ class Squares {
   const cv::Rect rect_;
   const SquareMask& skip_;
   cv::Mat& out_;
+  SquareMask* shaded_;
 };
 
 }  // namespace
 
 void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
-                   const SquareMask& skip, cv::Mat& out) {
-  if (!rect.empty()) Squares(view, light, rect, skip, out).run();
+                   const SquareMask& skip, cv::Mat& out, SquareMask* shaded) {
+  if (!rect.empty()) Squares(view, light, rect, skip, out, shaded).run();
 }
 
 }  // namespace calipso::render

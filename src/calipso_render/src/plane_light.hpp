@@ -20,7 +20,8 @@ inline std::uint8_t lightLevel(float visible) {
 // @param skip squares that are not wanted
 // @param out CV_8UC1 over `rect`, lightLevel(); keeps its values where neither is seen, and where
 // not wanted
+// @param shaded gets the squares that are not known to be all lit; null: not wanted
 void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
-                   const SquareMask& skip, cv::Mat& out);
+                   const SquareMask& skip, cv::Mat& out, SquareMask* shaded = nullptr);
 
 }  // namespace calipso::render

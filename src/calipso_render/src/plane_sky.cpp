@@ -1,10 +1,11 @@
 #include "plane_sky.hpp"
 
 #include <algorithm>
-#include <vector>
+#include <cmath>
 
 #include "calipso_render/sky_map.hpp"
 #include "light_batch.hpp"
+#include "marked.hpp"
 #include "plane_light.hpp"
 
 namespace calipso::render {
@@ -14,113 +15,129 @@ constexpr int kSteps = 160;  // places along the picture's width
 constexpr float kSlow =
     0.12f;  // of the sky's light: between places that differ by no more it is interpolated
 
-class SkyGrid {
+// Places looked up together; those where no plane is seen get nothing.
+template <class Store>
+class SkyLookup {
  public:
-  SkyGrid(const PlaneView& planes, const Visibility& sky, const cv::Size& picture,
-          const cv::Rect& region, const SquareMask& skip)
-      : planes_(planes),
-        sky_(sky),
-        region_(region),
-        skip_(skip),
-        step_(std::max(4, picture.width / kSteps)),
-        first_(region.x / step_, region.y / step_),
-        grid_((region.br().y - 1) / step_ - first_.y + 2,
-              (region.br().x - 1) / step_ - first_.x + 2, CV_32F, cv::Scalar(1.0f)),
-        levels_(region.size(), CV_8U) {}
-
-  cv::Mat run() {
-#pragma omp parallel for schedule(dynamic, 4)
-    for (int j = 0; j < grid_.rows; ++j) measure(j);
-#pragma omp parallel for schedule(static)
-    for (int v = 0; v < region_.height; ++v) interpolate(v);
-#pragma omp parallel for schedule(dynamic, 4)
-    for (int j = 0; j < grid_.rows - 1; ++j)
-      for (int i = 0; i + 1 < grid_.cols; ++i)
-        if (isUneven(i, j)) refine(i, j);
-    return levels_;
+  SkyLookup(const PlaneView& planes, const Visibility& sky, const Store& store)
+      : planes_(planes), sky_(sky), store_(store) {}
+  void add(int u, int v, int number) {
+    Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+    if (!planes_.at(u, v, r)) return;
+    numbers_[batch_.add(r.position, r.normal)] = number;
+    if (batch_.count() == LightBatch::kMost) look();
+  }
+  void look() {
+    float seen[LightBatch::kMost];
+    batch_.look(sky_, seen);
+    for (int k = 0; k < batch_.count(); ++k) store_(numbers_[k], skyLight(seen[k]));
+    batch_.clear();
   }
 
  private:
-  // Places looked up together; those where no plane is seen keep what they have.
-  template <class Store>
-  void measure(const cv::Point* places, int count, const Store& store) const {
-    LightBatch batch;
-    int number[LightBatch::kMost];
-    Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
-    for (int k = 0; k < count; ++k)
-      if (planes_.at(places[k].x, places[k].y, r)) number[batch.add(r.position, r.normal)] = k;
-    float seen[LightBatch::kMost];
-    batch.look(sky_, seen);
-    for (int k = 0; k < batch.count(); ++k) store(number[k], skyLight(seen[k]));
-  }
-
-  void measure(int j) {
-    float* row = grid_.ptr<float>(j);
-    const int v = (first_.y + j) * step_;
-    for (int begin = 0; begin < grid_.cols; begin += LightBatch::kMost) {
-      cv::Point places[LightBatch::kMost];
-      int columns[LightBatch::kMost], count = 0;
-      for (int i = begin; i < std::min(grid_.cols, begin + LightBatch::kMost); ++i) {
-        const int u = (first_.x + i) * step_;
-        if (!skip_.at(u, v)) columns[count] = i, places[count++] = {u, v};
-      }
-      measure(places, count, [&](int k, float light) { row[columns[k]] = light; });
-    }
-  }
-
-  void interpolate(int v) {
-    const int j = (region_.y + v) / step_ - first_.y;
-    const float y = static_cast<float>((region_.y + v) % step_) / static_cast<float>(step_);
-    const float *above = grid_.ptr<float>(j), *below = grid_.ptr<float>(j + 1);
-    const auto at = [&](int i) { return (1.0f - y) * above[i] + y * below[i]; };
-    std::uint8_t* out = levels_.ptr<std::uint8_t>(v);
-    int u = -(region_.x % step_);  // of the place
-    for (int i = 0; i + 1 < grid_.cols; ++i, u += step_) {
-      const float left = at(i), rise = (at(i + 1) - left) / static_cast<float>(step_);
-      const int begin = std::max(u, 0), end = std::min(u + step_, region_.width);
-      if (rise == 0.0f && begin < end)
-        std::fill(out + begin, out + end, lightLevel(left));
-      else
-        for (int x = begin; x < end; ++x)
-          out[x] = lightLevel(left + rise * static_cast<float>(x - u));
-    }
-  }
-
-  bool isUneven(int i, int j) const {
-    const float *above = grid_.ptr<float>(j) + i, *below = grid_.ptr<float>(j + 1) + i;
-    const auto [low, high] = std::minmax({above[0], above[1], below[0], below[1]});
-    return high - low > kSlow;
-  }
-
-  void refine(int i, int j) {
-    const cv::Rect cell =
-        cv::Rect((first_.x + i) * step_, (first_.y + j) * step_, step_, step_) & region_;
-    for (int v = cell.y; v < cell.br().y; ++v) {
-      std::uint8_t* row = levels_.ptr<std::uint8_t>(v - region_.y) - region_.x;
-      for (int begin = cell.x; begin < cell.br().x; begin += LightBatch::kMost) {
-        cv::Point places[LightBatch::kMost];
-        const int count = std::min(cell.br().x - begin, LightBatch::kMost);
-        for (int k = 0; k < count; ++k) places[k] = {begin + k, v};
-        measure(places, count, [&](int k, float light) { row[begin + k] = lightLevel(light); });
-      }
-    }
-  }
-
   const PlaneView& planes_;
   const Visibility& sky_;
-  const cv::Rect region_;
-  const SquareMask& skip_;
-  const int step_;
-  const cv::Point first_;  // steps
-  cv::Mat grid_;           // CV_32FC1
-  cv::Mat levels_;
+  const Store& store_;
+  LightBatch batch_;
+  int numbers_[LightBatch::kMost];
 };
 
 }  // namespace
 
-cv::Mat planesUnderSky(const PlaneView& planes, const Visibility& sky, const cv::Size& picture,
-                       const cv::Rect& region, const SquareMask& skip) {
-  return SkyGrid(planes, sky, picture, region, skip).run();
+SkyGrid::SkyGrid(const PlaneView& planes, const Visibility& sky, const cv::Size& picture,
+                 const cv::Rect& region, const SquareMask& skip)
+    : step_(std::max(4, picture.width / kSteps)),
+      first_(region.x / step_, region.y / step_),
+      light_((region.br().y - 1) / step_ - first_.y + 2, (region.br().x - 1) / step_ - first_.x + 2,
+             CV_32F, cv::Scalar(1.0f)),
+      uneven_(cv::Mat::zeros(light_.rows - 1, light_.cols - 1, CV_8U)) {
+  if (sky.empty()) return;
+#pragma omp parallel
+  {
+#pragma omp for schedule(dynamic, 2)
+    for (int j = 0; j < light_.rows; ++j) measureRow(planes, sky, skip, j);
+#pragma omp for schedule(static)
+    for (int j = 0; j < uneven_.rows; ++j) {
+      for (int i = 0; i < uneven_.cols; ++i)
+        uneven_.at<std::uint8_t>(j, i) = isUneven(skip, i, j) ? 255 : 0;
+    }
+  }
+}
+
+void SkyGrid::measureRow(const PlaneView& planes, const Visibility& sky, const SquareMask& skip,
+                         int j) {
+  float* row = light_.ptr<float>(j);
+  const auto store = [row](int i, float light) { row[i] = light; };
+  SkyLookup lookup(planes, sky, store);
+  const int v = (first_.y + j) * step_;
+  for (int i = 0; i < light_.cols; ++i) {
+    if (!skip.at((first_.x + i) * step_, v)) lookup.add((first_.x + i) * step_, v, i);
+  }
+  lookup.look();
+}
+
+// What lies beside places that are not wanted is not wanted either.
+bool SkyGrid::isUneven(const SquareMask& skip, int i, int j) const {
+  const float *above = light_.ptr<float>(j) + i, *below = light_.ptr<float>(j + 1) + i;
+  const auto [low, high] = std::minmax({above[0], above[1], below[0], below[1]});
+  if (high - low <= kSlow) return false;
+  const int u = (first_.x + i) * step_, v = (first_.y + j) * step_;
+  return !skip.at(u, v) && !skip.at(u + step_, v) && !skip.at(u, v + step_) &&
+         !skip.at(u + step_, v + step_);
+}
+
+void SkyGrid::levels(const PlaneView& planes, const Visibility& sky, int v, int begin, int end,
+                     std::uint8_t* out) const {
+  interpolate(v, begin, end, out);
+  const std::uint8_t* uneven = uneven_.ptr<std::uint8_t>(v / step_ - first_.y);
+  const auto store = [&](int k, float light) { out[k] = lightLevel(light); };
+  SkyLookup lookup(planes, sky, store);
+  const int last = (end - 1) / step_ - first_.x + 1;
+  for (int i = nextMarked(uneven, begin / step_ - first_.x, last); i < last;
+       i = nextMarked(uneven, i + 1, last)) {
+    const int left = (first_.x + i) * step_;
+    for (int u = std::max(begin, left); u < std::min(end, left + step_); ++u)
+      lookup.add(u, v, u - begin);
+  }
+  lookup.look();
+}
+
+void SkyGrid::interpolate(int v, int begin, int end, std::uint8_t* out) const {
+  const int j = v / step_ - first_.y;
+  const float y = static_cast<float>(v % step_) / static_cast<float>(step_);
+  const float *above = light_.ptr<float>(j), *below = light_.ptr<float>(j + 1);
+  const auto at = [&](int i) { return (1.0f - y) * above[i] + y * below[i]; };
+  for (int u = begin; u < end;) {
+    const int i = u / step_ - first_.x, corner = (i + first_.x) * step_,
+              stop = std::min(end, corner + step_);
+    const float left = at(i), rise = (at(i + 1) - left) / static_cast<float>(step_);
+    for (; u < stop; ++u) *out++ = lightLevel(left + rise * static_cast<float>(u - corner));
+  }
+}
+
+cv::Rect SkyGrid::cellsOf(const cv::Rect& rect) const {
+  const cv::Point low(rect.x / step_, rect.y / step_),
+      high((rect.br().x - 1) / step_, (rect.br().y - 1) / step_);
+  return cv::Rect(low, high + cv::Point(1, 1)) - first_;
+}
+
+float SkyGrid::greatestDifference(const SkyGrid& other, const cv::Rect& rect) const {
+  const cv::Rect cells = cellsOf(rect), others = other.cellsOf(rect);
+  float greatest = 0.0f;
+  for (int j = 0; j <= cells.height; ++j) {
+    const float *here = light_.ptr<float>(cells.y + j) + cells.x,
+                *there = other.light_.ptr<float>(others.y + j) + others.x;
+    for (int i = 0; i <= cells.width; ++i)
+      greatest = std::max(greatest, std::abs(here[i] - there[i]));
+  }
+  for (int j = 0; j < cells.height; ++j) {
+    const std::uint8_t *here = uneven_.ptr<std::uint8_t>(cells.y + j) + cells.x,
+                       *there = other.uneven_.ptr<std::uint8_t>(others.y + j) + others.x;
+    for (int i = 0; i < cells.width; ++i) {
+      if ((here[i] | there[i]) != 0) return 1.0f;
+    }
+  }
+  return greatest;
 }
 
 }  // namespace calipso::render

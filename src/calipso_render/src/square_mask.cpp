@@ -6,6 +6,35 @@
 
 namespace calipso::render {
 
+SquareMask::SquareMask(const cv::Rect& part) : first_(part.x / kSide, part.y / kSide) {
+  set_ = cv::Mat::zeros((part.br().y - 1) / kSide - first_.y + 1,
+                        (part.br().x - 1) / kSide - first_.x + 1, CV_8U);
+}
+
+void SquareMask::add(const SquareMask& other) {
+  const auto [here, there] = shared(other);
+  if (!here.empty()) set_(here) |= other.set_(there);
+}
+
+void SquareMask::remove(const SquareMask& other) {
+  const auto [here, there] = shared(other);
+  if (!here.empty()) set_(here) &= ~other.set_(there);
+}
+
+SquareMask SquareMask::grown(int margin) const {
+  SquareMask out;
+  out.first_ = first_;
+  const int reach = (margin + kSide - 1) / kSide;
+  cv::dilate(set_, out.set_, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
+  return out;
+}
+
+cv::Rect SquareMask::box() const {
+  const cv::Rect squares = set_.empty() ? cv::Rect() : cv::boundingRect(set_);
+  return squares.empty() ? cv::Rect()
+                         : cv::Rect((squares.tl() + first_) * kSide, squares.size() * kSide);
+}
+
 SquareMask::SquareMask(const cv::Mat& pixels, const cv::Rect& part, int margin)
     : first_(part.x / kSide, part.y / kSide) {
   const int across = (part.br().x - 1) / kSide - first_.x + 1,
