@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "kernels.hpp"
-#include "marked.hpp"
 #include "triangle_span.hpp"
+#include "wide_loops.hpp"
 
 namespace calipso::render {
 namespace {
@@ -42,11 +42,28 @@ int partOf(int count, int part) {
 
 constexpr std::uint8_t kRight = 1, kDown = 2;
 
-// Where the object seen changes to the right of a row's pixels, or below them.
-void markChanges(const std::uint32_t* row, const std::uint32_t* below, int width,
-                 std::uint8_t* changes) {
-  for (int u = 0; u < width; ++u) changes[u] = ((row[u] ^ below[u]) >> 24) != 0 ? kDown : 0;
-  for (int u = 0; u + 1 < width; ++u) changes[u] |= ((row[u] ^ row[u + 1]) >> 24) != 0 ? kRight : 0;
+// Does the object seen change anywhere to the right of `count` pixels, or below them?
+CALIPSO_WIDE_LOOPS bool changesWithin(const std::uint32_t* row, const std::uint32_t* below,
+                                      int count) {
+  std::uint32_t changes = 0;
+  for (int u = 0; u < count; ++u) changes |= (row[u] ^ below[u]) | (row[u] ^ row[u + 1]);
+  return (changes >> 24) != 0;
+}
+
+// Where it does: the columns, and how. @pre the row has a place more than `width`
+void findChanges(const std::uint32_t* row, const std::uint32_t* below, int width,
+                 std::vector<std::pair<int, std::uint8_t>>& found) {
+  constexpr int kAtOnce = 64;
+  for (int begin = 0; begin < width; begin += kAtOnce) {
+    const int count = std::min(kAtOnce, width - begin);
+    if (!changesWithin(row + begin, below + begin, count)) continue;
+    for (int u = begin; u < begin + count; ++u) {
+      const bool right = u + 1 < width && ((row[u] ^ row[u + 1]) >> 24) != 0,
+                 down = ((row[u] ^ below[u]) >> 24) != 0;
+      if (right || down)
+        found.emplace_back(u, static_cast<std::uint8_t>((right ? kRight : 0) | (down ? kDown : 0)));
+    }
+  }
 }
 
 }  // namespace
@@ -85,17 +102,9 @@ EdgeCoverage::EdgeCoverage(const VisibilityBuffer& centre)
   const int width = region_.width, height = region_.height;
   std::vector<std::vector<std::pair<int, std::uint8_t>>> found(
       height);  // per row: columns, and where the object changes
-#pragma omp parallel
-  {
-    std::vector<std::uint8_t> changes(width);
-#pragma omp for schedule(static)
-    for (int v = 0; v < height; ++v) {
-      markChanges(centre.ids(v), centre.ids(std::min(v + 1, height - 1)), width, changes.data());
-      for (int u = nextMarked(changes.data(), 0, width); u < width;
-           u = nextMarked(changes.data(), u + 1, width))
-        found[v].emplace_back(u, changes[u]);
-    }
-  }
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < height; ++v)
+    findChanges(centre.ids(v), centre.ids(std::min(v + 1, height - 1)), width, found[v]);
   for (int v = 0; v < height; ++v) {
     for (const auto& [u, change] : found[v]) {
       choose(u, v);
@@ -224,17 +233,17 @@ void EdgeCoverage::addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t
 }
 
 void EdgeCoverage::drawPiece(const Piece& piece) {
-  const std::uint8_t* chosen = &chosen_[static_cast<std::size_t>(piece.tile) * kTile];
-  const int* slots = &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile];
+  static_assert(kTile == SampledTile::kSide);
   const int left = piece.u0 % kTile, right = piece.u1 % kTile;
-  const unsigned within = (0xffu << left) & (0xffu >> (kTile - 1 - right));
-  for (int v = piece.v0; v <= piece.v1; ++v) {
-    for (unsigned rest = chosen[v % kTile] & within; rest != 0; rest &= rest - 1) {
-      const int column = __builtin_ctz(rest);
-      kernels().drawSamples(piece.samples, piece.u0 - left + column, v, piece.id,
-                            pixels_[slots[(v % kTile) * kTile + column]]);
-    }
-  }
+  const unsigned columns = (0xffu << left) & (0xffu >> (kTile - 1 - right));
+  const SampledTile tile{piece.u0 - left,
+                         piece.v0 - piece.v0 % kTile,
+                         piece.v0 % kTile,
+                         piece.v1 % kTile,
+                         columns,
+                         &chosen_[static_cast<std::size_t>(piece.tile) * kTile],
+                         &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile]};
+  kernels().drawSamples(piece.samples, tile, piece.id, pixels_.data());
 }
 
 const EdgeCoverage::Pixel* EdgeCoverage::at(int u, int v) const {

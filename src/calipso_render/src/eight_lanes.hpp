@@ -19,7 +19,7 @@ CALIPSO_INLINE Eight& eightAt(float* at) { return *reinterpret_cast<Eight*>(at);
 CALIPSO_INLINE const Eight& eightAt(const float* at) { return *reinterpret_cast<const Eight*>(at); }
 CALIPSO_INLINE const Four& fourAt(const float* at) { return *reinterpret_cast<const Four*>(at); }
 
-CALIPSO_INLINE Eight all(float x) { return Eight{} + x; }
+CALIPSO_INLINE Eight all(float x) { return x - Eight{}; }  // adding to 0 would have to be done
 CALIPSO_INLINE Eight larger(const Eight& a, const Eight& b) { return a > b ? a : b; }
 CALIPSO_INLINE Eight smaller(const Eight& a, const Eight& b) { return a < b ? a : b; }
 CALIPSO_INLINE Eight lanes() { return Eight{0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f}; }
@@ -29,7 +29,12 @@ CALIPSO_INLINE float sumOf(const Eight& x) {
   return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
 }
 
-CALIPSO_INLINE bool any(const EightInts& mask) { return sumOf(mask ? all(1.0f) : Eight{}) > 0.0f; }
+// @param mask 0 or -1 in each lane
+CALIPSO_INLINE bool any(const EightInts& mask) {
+  typedef std::int64_t Halves __attribute__((vector_size(32)));
+  const Halves h = (Halves)mask;
+  return ((h[0] | h[1]) | (h[2] | h[3])) != 0;
+}
 
 CALIPSO_INLINE Eight squareRoot(const Eight& x) {
   Eight root;

@@ -14,24 +14,26 @@
 namespace calipso::render {
 namespace {
 
+// Weights of the four taps along one axis, for eight places at parts t between the middle two:
+// places 0 and 4, 1 and 5, 2 and 6, 3 and 7.
+CALIPSO_INLINE void bicubicWeights(const Eight& t, Eight (&out)[4]) {
+  const Eight w0 = t * (-0.5f + t * (1.0f + t * -0.5f)), w1 = 1.0f + t * (t * (-2.5f + t * 1.5f)),
+              w2 = t * (0.5f + t * (2.0f + t * -1.5f)), w3 = t * (t * (-0.5f + t * 0.5f));
+  const LaneChoice low = {0, 8, 1, 9, 4, 12, 5, 13}, high = {2, 10, 3, 11, 6, 14, 7, 15},
+                   halves = {0, 1, 8, 9, 4, 5, 12, 13}, others = {2, 3, 10, 11, 6, 7, 14, 15};
+  const Eight a = __builtin_shuffle(w0, w1, low), b = __builtin_shuffle(w0, w1, high),
+              c = __builtin_shuffle(w2, w3, low), d = __builtin_shuffle(w2, w3, high);
+  out[0] = __builtin_shuffle(a, c, halves), out[1] = __builtin_shuffle(a, c, others);
+  out[2] = __builtin_shuffle(b, d, halves), out[3] = __builtin_shuffle(b, d, others);
+}
+
 // Sums of a place's taps in even (B, G, R, _) and odd columns (B, G, R, _).
-// @pre 1 <= u < columns - 2, likewise v
-CALIPSO_INLINE Eight bicubicSums(const cv::Mat& image, std::size_t step, float u, float v) {
-  const int i = static_cast<int>(u), j = static_cast<int>(v);
-  const float t = u - static_cast<float>(i), s = v - static_cast<float>(j);
-  const Eight a01 = {0.0f, 0.0f, 0.0f, 0.0f, 1.0f, 1.0f, 1.0f, 1.0f},
-              b01 = {-0.5f, -0.5f, -0.5f, -0.5f},
-              c01 = {1.0f, 1.0f, 1.0f, 1.0f, -2.5f, -2.5f, -2.5f, -2.5f};
-  const Eight d01 = {-0.5f, -0.5f, -0.5f, -0.5f, 1.5f, 1.5f, 1.5f, 1.5f},
-              b23 = {0.5f, 0.5f, 0.5f, 0.5f},
-              c23 = {2.0f, 2.0f, 2.0f, 2.0f, -0.5f, -0.5f, -0.5f, -0.5f},
-              d23 = {-1.5f, -1.5f, -1.5f, -1.5f, 0.5f, 0.5f, 0.5f, 0.5f};
-  const Eight first = a01 + t * (b01 + t * (c01 + t * d01)),
-              second = t * (b23 + t * (c23 + t * d23));
-  const Four a = {0.0f, 1.0f, 0.0f, 0.0f}, b = {-0.5f, 0.0f, 0.5f, 0.0f},
-             c = {1.0f, -2.5f, 2.0f, -0.5f}, d = {-0.5f, 1.5f, -1.5f, 0.5f};
-  const Four wy = a + s * (b + s * (c + s * d));
-  const float* p = image.ptr<float>(j - 1) + 4 * (i - 1);
+// @param p its first tap; wx weights of two places, of which `upper` says which; wy its own
+CALIPSO_INLINE Eight bicubicSums(const float* p, std::size_t step, const Eight& wx, const float* wy,
+                                 bool upper) {
+  const LaneChoice f = {0, 0, 0, 0, 1, 1, 1, 1}, s = {2, 2, 2, 2, 3, 3, 3, 3};
+  const Eight first = __builtin_shuffle(wx, upper ? f + 4 : f),
+              second = __builtin_shuffle(wx, upper ? s + 4 : s);
   const auto line = [&](int r) {
     return wy[r] * (first * eightAt(p + r * step) + second * eightAt(p + r * step + 8));
   };
@@ -52,35 +54,44 @@ CALIPSO_INLINE void toPlanes(const Eight& a, const Eight& b, const Eight& c, con
   planes[2] = __builtin_shuffle(__builtin_shuffle(r, r4, halves), in_order);
 }
 
-// Two places' colours, B, G, R, _.
-CALIPSO_INLINE Eight samplePair(const cv::Mat& image, std::size_t step, const float* us,
-                                const float* vs) {
-  const float right = static_cast<float>(image.cols) - 2.0f,
-              bottom = static_cast<float>(image.rows) - 2.0f;
-  const auto isInside = [&](int k) {
-    return (us[k] >= 1.0f) & (vs[k] >= 1.0f) & (us[k] < right) & (vs[k] < bottom);
-  };
-  if (isInside(0) & isInside(1)) {
-    const Eight a = bicubicSums(image, step, us[0], vs[0]),
-                b = bicubicSums(image, step, us[1], vs[1]);
+// Colours of eight places that lie within the image, by pairs. @pre 1 <= u < columns - 2, likewise v
+CALIPSO_INLINE void sampleInside(const cv::Mat& image, const Eight& u, const Eight& v,
+                                 Eight (&pairs)[4]) {
+  const int step = static_cast<int>(image.step1());
+  const EightInts i = __builtin_convertvector(u, EightInts),
+                  j = __builtin_convertvector(v, EightInts);
+  Eight wx[4], wy[4];
+  bicubicWeights(u - __builtin_convertvector(i, Eight), wx);
+  bicubicWeights(v - __builtin_convertvector(j, Eight), wy);
+  const EightInts at = (j - 1) * step + 4 * (i - 1);
+  const float *from = image.ptr<float>(), *rows = reinterpret_cast<const float*>(wy);
+  for (int k = 0; k < 4; ++k) {
+    const int m = 2 * k % 4;  // of the weights
+    const bool upper = k >= 2;
+    const float* weights = rows + 8 * m + (upper ? 4 : 0);
+    const Eight a = bicubicSums(from + at[2 * k], step, wx[m], weights, upper),
+                b = bicubicSums(from + at[2 * k + 1], step, wx[m + 1], weights + 8, upper);
     const Eight sum = __builtin_shuffle(a, b, LaneChoice{0, 1, 2, 3, 8, 9, 10, 11}) +
                       __builtin_shuffle(a, b, LaneChoice{4, 5, 6, 7, 12, 13, 14, 15});
-    return sum > 0.0f ? sum : Eight{};
+    pairs[k] = sum > 0.0f ? sum : Eight{};
   }
-  float both[8];
-  cv::v_store(both, bicubic(image, us[0], vs[0]));
-  cv::v_store(both + 4, bicubic(image, us[1], vs[1]));
-  return eightAt(both);
 }
 
 CALIPSO_INLINE void sampleBody(const cv::Mat& image, int first, int last, SurfaceRun& run) {
-  const std::size_t step = image.step1();
+  const float right = static_cast<float>(image.cols) - 2.0f,
+              bottom = static_cast<float>(image.rows) - 2.0f;
   for (int k = first; k < last; k += 8) {
+    // What lies beyond the run is taken for its first place.
+    const EightInts wanted = lanes() < static_cast<float>(last - k);
+    const Eight u = wanted ? eightAt(run.key_u + k) : all(run.key_u[k]),
+                v = wanted ? eightAt(run.key_v + k) : all(run.key_v[k]);
     Eight pairs[4], planes[3];
-    for (int i = 0; i < 4; ++i)
-      pairs[i] = k + 2 * i < last
-                     ? samplePair(image, step, run.key_u + k + 2 * i, run.key_v + k + 2 * i)
-                     : Eight{};
+    if (!any(~((u >= 1.0f) & (v >= 1.0f) & (u < right) & (v < bottom)))) {
+      sampleInside(image, u, v, pairs);
+    } else {
+      for (int i = 0; i < 8; ++i)
+        cv::v_store(reinterpret_cast<float*>(pairs) + 4 * i, bicubic(image, u[i], v[i]));
+    }
     toPlanes(pairs[0], pairs[1], pairs[2], pairs[3], planes);
     for (int c = 0; c < 3; ++c) eightAt(run.colour[c] + k) = planes[c];
   }
@@ -88,10 +99,10 @@ CALIPSO_INLINE void sampleBody(const cv::Mat& image, int first, int last, Surfac
 
 // codeFromLinear(); what is no number becomes 0.
 CALIPSO_INLINE Eight codesOf(const Eight& linear) {
-  const Eight one = Eight{} + 1.0f, positive = linear > 0.0f ? linear : Eight{},
+  const Eight one = all(1.0f), positive = linear > 0.0f ? linear : Eight{},
               x = positive < one ? positive : one;
   const Eight root = squareRoot(squareRoot(x));
-  Eight curve = Eight{} + kCurve[6];
+  Eight curve = all(kCurve[6]);
   for (int k = 5; k >= 0; --k) curve = curve * root + kCurve[k];
   return x > kStraight ? curve : kStraightRise * x;
 }
@@ -103,7 +114,7 @@ CALIPSO_INLINE EightInts noisyCodes(const Eight& linear, const Eight& fresh, con
   const LaneChoice piece = __builtin_convertvector(code * (1.0f / 32.0f), LaneChoice);
   const Eight deviation =
       __builtin_shuffle(eightAt(start), piece) + __builtin_shuffle(eightAt(rise), piece) * code;
-  const Eight x = code + fresh * deviation * eightAt(noise), most = Eight{} + 255.0f;
+  const Eight x = code + fresh * deviation * eightAt(noise), most = all(255.0f);
   const Eight positive = x > 0.0f ? x : Eight{};
   return __builtin_convertvector((positive < most ? positive : most) + 0.5f, EightInts);
 }
@@ -167,9 +178,9 @@ CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTar
   attribute void name##Fill(const TriangleSpan* spans, int count, const SpanTarget& target) {    \
     fillBody(spans, count, target);                                                              \
   }                                                                                              \
-  attribute void name##DrawSamples(const TriangleSamples& t, int u, int v, std::uint32_t id,     \
-                                   EdgeCoverage::Pixel& pixel) {                                 \
-    drawSamplesBody(t, u, v, id, pixel);                                                         \
+  attribute void name##DrawSamples(const TriangleSamples& t, const SampledTile& tile,            \
+                                   std::uint32_t id, EdgeCoverage::Pixel* pixels) {              \
+    drawSamplesBody(t, tile, id, pixels);                                                        \
   }                                                                                              \
   const Kernels name##Table{name##Visible, name##Locate, name##Sample,     name##Shade,          \
                             name##Encode,  name##Fill,   name##DrawSamples};

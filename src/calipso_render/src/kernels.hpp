@@ -54,9 +54,9 @@ struct Kernels {
   // Draws `count` triangles in their order.
   void (*fill)(const TriangleSpan* spans, int count, const SpanTarget& target);
 
-  // Draws a triangle into the samples of pixel (u, v).
-  void (*drawSamples)(const TriangleSamples& t, int u, int v, std::uint32_t id,
-                      EdgeCoverage::Pixel& pixel);
+  // Draws a triangle into the samples of a square's pixels. @param pixels that the square names
+  void (*drawSamples)(const TriangleSamples& t, const SampledTile& tile, std::uint32_t id,
+                      EdgeCoverage::Pixel* pixels);
 };
 
 const Kernels& plainKernels();

@@ -132,18 +132,21 @@ class Squares {
     float grid[kPlaces][kPlaces], visible[kSquare][kSquare];
     fillGrid(square, grid);
     Lookup lookup(*this);
-    for (int y = here.y; y < here.br().y; ++y) {
-      for (int x = here.x; x < here.br().x; ++x) {
-        const int u = x + rect_.x - square.x, v = y + rect_.y - square.y, i = u / kStep,
-                  j = v / kStep;
-        const float a = grid[j][i], b = grid[j][i + 1], c = grid[j + 1][i], d = grid[j + 1][i + 1];
-        const auto [low, high] = std::minmax({a, b, c, d});
-        const float s = static_cast<float>(u % kStep) / kStep,
-                    t = static_cast<float>(v % kStep) / kStep;
-        if (high - low <= kSlow)
-          visible[v][u] = (a + (b - a) * s) * (1.0f - t) + (c + (d - c) * s) * t;
-        else
-          lookup.add(x + rect_.x, y + rect_.y, &visible[v][u]);
+    for (int v = 0; v < kSquare; v += kStep) {
+      for (int u = 0; u < kSquare; u += kStep) {
+        const float *above = &grid[v / kStep][u / kStep], *below = &grid[v / kStep + 1][u / kStep];
+        const auto [low, high] = std::minmax({above[0], above[1], below[0], below[1]});
+        for (int y = v; y < v + kStep; ++y) {
+          for (int x = u; x < u + kStep; ++x) {
+            const float s = static_cast<float>(x - u) / kStep,
+                        t = static_cast<float>(y - v) / kStep;
+            if (high - low <= kSlow)
+              visible[y][x] = (above[0] + (above[1] - above[0]) * s) * (1.0f - t) +
+                              (below[0] + (below[1] - below[0]) * s) * t;
+            else if (here.contains(cv::Point(square.x + x, square.y + y) - rect_.tl()))
+              lookup.add(square.x + x, square.y + y, &visible[y][x]);
+          }
+        }
       }
     }
     lookup.look();

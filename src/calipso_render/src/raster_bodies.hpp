@@ -83,28 +83,60 @@ CALIPSO_INLINE void fillSpansBody(const TriangleSpan* spans, int count, const Sp
   }
 }
 
-CALIPSO_INLINE void drawSamplesBody(const TriangleSamples& t, int u, int v, std::uint32_t id,
-                                    EdgeCoverage::Pixel& pixel) {
+// What a triangle's linear functions add at a pixel's 4 x 4 samples to what they are at its centre,
+// along the row and across it; the upper eight samples, then the lower.
+struct SampleSteps {
+  Eight edge_u[3], edge_v[2][3], near_u, near_v[2];
+  float reach[3];  // the most that an edge function can grow by
+};
+
+CALIPSO_INLINE SampleSteps sampleSteps(const TriangleSamples& t) {
   constexpr float kReach = 0.375f;  // px from the centre to the outermost samples
+  const Eight x = {-0.375f, -0.125f, 0.125f, 0.375f, -0.375f, -0.125f, 0.125f, 0.375f},
+              upper = {-0.375f, -0.375f, -0.375f, -0.375f, -0.125f, -0.125f, -0.125f, -0.125f};
+  SampleSteps steps;
+  steps.near_u = t.near_u * x;
+  for (int i = 0; i < 3; ++i) {
+    steps.edge_u[i] = t.edge_u[i] * x;
+    steps.reach[i] = kReach * (std::fabs(t.edge_u[i]) + std::fabs(t.edge_v[i]));
+  }
+  for (int half = 0; half < 2; ++half) {
+    const Eight y = upper + 0.5f * static_cast<float>(half);
+    steps.near_v[half] = t.near_v * y;
+    for (int i = 0; i < 3; ++i) steps.edge_v[half][i] = t.edge_v[i] * y;
+  }
+  return steps;
+}
+
+CALIPSO_INLINE void drawSamplesAt(const TriangleSamples& t, const SampleSteps& steps, float u,
+                                  float v, std::uint32_t id, EdgeCoverage::Pixel& pixel) {
   float centre[3];
   for (int i = 0; i < 3; ++i) {
-    centre[i] =
-        t.edge_u[i] * static_cast<float>(u) + t.edge_v[i] * static_cast<float>(v) + t.edge_0[i];
-    if (centre[i] < -kReach * (std::fabs(t.edge_u[i]) + std::fabs(t.edge_v[i]))) return;
+    centre[i] = t.edge_u[i] * u + t.edge_v[i] * v + t.edge_0[i];
+    if (centre[i] < -steps.reach[i]) return;
   }
-  const float near_centre =
-      t.near_u * static_cast<float>(u) + t.near_v * static_cast<float>(v) + t.near_0;
-  const Eight x = {-0.375f, -0.125f, 0.125f, 0.375f, -0.375f, -0.125f, 0.125f, 0.375f};
+  const float near_centre = t.near_u * u + t.near_v * v + t.near_0;
   for (int half = 0; half < 2; ++half) {
-    const Eight upper = {-0.375f, -0.375f, -0.375f, -0.375f, -0.125f, -0.125f, -0.125f, -0.125f};
-    const Eight y = upper + 0.5f * static_cast<float>(half);
     Eight& nearest = *reinterpret_cast<Eight*>(&pixel.nearness[8 * half]);
     EightInts& ids = *reinterpret_cast<EightInts*>(&pixel.ids[8 * half]);
-    const Eight near = near_centre + t.near_u * x + t.near_v * y;
+    const Eight near = near_centre + steps.near_u + steps.near_v[half];
     EightInts wins = near > nearest;
-    for (int i = 0; i < 3; ++i) wins &= centre[i] + t.edge_u[i] * x + t.edge_v[i] * y >= 0.0f;
+    for (int i = 0; i < 3; ++i)
+      wins &= centre[i] + steps.edge_u[i] + steps.edge_v[half][i] >= 0.0f;
     nearest = wins ? near : nearest;
     ids = wins ? EightInts{} + static_cast<std::int32_t>(id) : ids;
+  }
+}
+
+CALIPSO_INLINE void drawSamplesBody(const TriangleSamples& t, const SampledTile& tile,
+                                    std::uint32_t id, EdgeCoverage::Pixel* pixels) {
+  const SampleSteps steps = sampleSteps(t);
+  for (int row = tile.first; row <= tile.last; ++row) {
+    for (unsigned rest = tile.chosen[row] & tile.columns; rest != 0; rest &= rest - 1) {
+      const int column = __builtin_ctz(rest);
+      drawSamplesAt(t, steps, static_cast<float>(tile.u + column), static_cast<float>(tile.v + row),
+                    id, pixels[tile.pixels[row * SampledTile::kSide + column]]);
+    }
   }
 }
 

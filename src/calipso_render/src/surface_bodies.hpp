@@ -25,9 +25,15 @@ CALIPSO_INLINE void turnToViewer(const SightLines& sight, const Eight& column, E
   for (Eight& x : n) x = away > 0.0f ? -x : x;
 }
 
-CALIPSO_INLINE void locateBody(const TriangleMap* maps, const std::uint32_t* ids,
-                               const PixelStretch& at, const SightLines& sight, SurfaceRun& run) {
-  const float left = static_cast<float>(at.corner.x), top = static_cast<float>(at.corner.y);
+// Weights of a stretch's places, and the sums of their corners' weights.
+struct StretchWeights {
+  alignas(32) float w[SurfaceRun::kRoom], sum[SurfaceRun::kRoom];
+};
+
+// The triangles' linear functions at a stretch's pixels: key places, normals and sky up to a factor.
+CALIPSO_INLINE void evaluateMaps(const TriangleMap* maps, const std::uint32_t* ids,
+                                 const PixelStretch& at, const SightLines& sight, SurfaceRun& run,
+                                 StretchWeights& weights) {
   for (int k = 0; k < at.count;) {
     const std::uint32_t id = ids[k];
     const TriangleMap& map = maps[VisibilityBuffer::triangleOf(id)];
@@ -38,21 +44,33 @@ CALIPSO_INLINE void locateBody(const TriangleMap* maps, const std::uint32_t* ids
     do {
       const int to = at.offset + k;
       const Eight column = eightAt(run.column + to), du = column - map.u;
-      // The corners' weights add up to key[3].
-      const Eight w = key[2] + key_rise[2] * du, sum = key[3] + key_rise[3] * du,
-                  inverse = 1.0f / (w * sum), scale = sum * inverse;
-      eightAt(run.key_u + to) = (key[0] + key_rise[0] * du) * scale - left;
-      eightAt(run.key_v + to) = (key[1] + key_rise[1] * du) * scale - top;
+      eightAt(run.key_u + to) = key[0] + key_rise[0] * du;
+      eightAt(run.key_v + to) = key[1] + key_rise[1] * du;
+      eightAt(weights.w + to) = key[2] + key_rise[2] * du;
+      eightAt(weights.sum + to) = key[3] + key_rise[3] * du;
       Eight n[3];
       for (int c = 0; c < 3; ++c) n[c] = normal[c] + normal_rise[c] * du;
       if (map.turned) turnToViewer(sight, column, n);
       for (int c = 0; c < 3; ++c) eightAt(run.normal[c] + to) = n[c];
-      eightAt(run.sky + to) = (normal[3] + normal_rise[3] * du) * (w * inverse);
+      eightAt(run.sky + to) = normal[3] + normal_rise[3] * du;
       const int end = std::min(k + 8, at.count);
       while (k < end && ids[k] == id) ++k;
     } while (k < at.count && ids[k] == id);
   }
+}
+
+CALIPSO_INLINE void locateBody(const TriangleMap* maps, const std::uint32_t* ids,
+                               const PixelStretch& at, const SightLines& sight, SurfaceRun& run) {
+  const float left = static_cast<float>(at.corner.x), top = static_cast<float>(at.corner.y);
+  StretchWeights weights;
+  evaluateMaps(maps, ids, at, sight, run, weights);
   for (int k = at.offset; k < at.offset + at.count; k += 8) {
+    // The corners' weights add up to `sum`.
+    const Eight w = eightAt(weights.w + k), sum = eightAt(weights.sum + k),
+                inverse = 1.0f / (w * sum), scale = sum * inverse;
+    eightAt(run.key_u + k) = eightAt(run.key_u + k) * scale - left;
+    eightAt(run.key_v + k) = eightAt(run.key_v + k) * scale - top;
+    eightAt(run.sky + k) = eightAt(run.sky + k) * (w * inverse);
     for (int c = 0; c < 3; ++c)
       eightAt(run.sight[c] + k) = sight.start[c] + sight.rise[c] * eightAt(run.column + k);
     Eight n[3] = {eightAt(run.normal[0] + k), eightAt(run.normal[1] + k),

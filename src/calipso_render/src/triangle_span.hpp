@@ -30,4 +30,15 @@ struct TriangleSamples {
   float near_u, near_v, near_0;
 };
 
+// The part of a square of pixels that a triangle may touch, and which of its pixels have samples.
+struct SampledTile {
+  static constexpr int kSide = 8;  // px
+
+  int u, v;                    // the first pixel's place
+  int first, last;             // rows of the square
+  unsigned columns;            // a bit for each
+  const std::uint8_t* chosen;  // per row: a bit for each pixel that has samples
+  const int* pixels;           // per pixel of the square: which samples
+};
+
 }  // namespace calipso::render

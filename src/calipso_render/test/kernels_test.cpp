@@ -211,6 +211,10 @@ TEST_F(Avx2, DrawsTheSameSamples) {
   EdgeCoverage::Pixel plain;
   plain.ids.fill(VisibilityBuffer::kNothing), plain.nearness.fill(VisibilityBuffer::kFar);
   EdgeCoverage::Pixel fast = plain;
+  constexpr int kRow = 2, kColumn = 1;
+  const std::uint8_t chosen[8] = {0, 0, 1 << kColumn, 0, 0, 0, 0, 0};
+  const int pixels[64] = {};
+  const SampledTile tile{0, 0, kRow, kRow, 1 << kColumn, chosen, pixels};
   for (std::uint32_t id = 0; id < 300; ++id) {
     TriangleSamples t;
     for (int k = 0; k < 3; ++k)
@@ -218,8 +222,8 @@ TEST_F(Avx2, DrawsTheSameSamples) {
       t.edge_0[k] = random_.uniform(-1.0f, 3.0f);
     t.near_u = random_.uniform(-0.1f, 0.1f), t.near_v = random_.uniform(-0.1f, 0.1f),
     t.near_0 = random_.uniform(0.0f, 5.0f) + 0.01f * static_cast<float>(id);
-    plainKernels().drawSamples(t, 1, 2, id, plain);
-    avx2Kernels()->drawSamples(t, 1, 2, id, fast);
+    plainKernels().drawSamples(t, tile, id, &plain);
+    avx2Kernels()->drawSamples(t, tile, id, &fast);
     ASSERT_EQ(plain.ids, fast.ids);
     ASSERT_EQ(plain.nearness, fast.nearness);
   }
