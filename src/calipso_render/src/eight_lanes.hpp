@@ -11,6 +11,7 @@ namespace calipso::render {
 typedef float Eight __attribute__((vector_size(32), aligned(4), may_alias));
 typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
 typedef std::int32_t EightInts __attribute__((vector_size(32), aligned(4), may_alias));
+typedef std::int32_t FourInts __attribute__((vector_size(16), aligned(4), may_alias));
 typedef std::int32_t LaneChoice __attribute__((vector_size(32)));
 
 #define CALIPSO_INLINE inline __attribute__((always_inline))

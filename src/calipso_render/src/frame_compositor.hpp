@@ -259,6 +259,7 @@ class FrameCompositor {
   void shadeSheets(int v, Row& row) const;
   void shadePlaces(const SurfacePlace* places, int count, int slot, SurfaceRun& run) const;
   void composeBehind(int v, int first, int last, Row& row) const;
+  void composeRelit(int v, int first, int last, Row& row) const;
   void composeSpecial(int u, int v, Row& row) const;
   void keepStill(int v, Row& row) const;
   Behind behindAt(int u, int v) const;
@@ -285,6 +286,8 @@ class FrameCompositor {
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
   void addReliefBounds(const Points& vertices, const Eigen::Vector3f& sun, Points& shadow) const;
+  void addPlaneBounds(const SupportPlane& plane, const Points& vertices,
+                      const Eigen::Vector3f& sun, Points& shadow) const;
   cv::Rect shadowBounds(const Points& vertices, const Light& light) const;
 
   const Prepared& prepared_;

@@ -17,10 +17,41 @@ namespace {
 
 constexpr float kKept = 0.999f;  // of a pixel at rest: it keeps its bytes
 
-cv::v_float32x4 wide(const cv::Vec3f& c, float fourth = 0.0f) { return {c[0], c[1], c[2], fourth}; }
-
 cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) {
   return {decoded[c[0]], decoded[c[1]], decoded[c[2]], 0.0f};
+}
+
+// The light on pixels of a row: levels now and before, 255 where a change is taken at all, where
+// the place comes to light, and how far the original's shadow is to be taken from the plate.
+struct LightLevels {
+  const std::uint8_t *sun, *sun_before, *sky, *sky_before, *takes, *removed, *relit;
+};
+
+// What it makes of them.
+struct LightFactors {
+  static constexpr int kMost = 64;
+  float from_plate[kMost];  // part that is taken from the plate
+  // times the plate; times the frame's own pixel, which keeps its grain where it is darkened further
+  // or sees a little more sky: what the sun newly reaches must come from the plate
+  float now[3][kMost], change[3][kMost];
+};
+
+CALIPSO_WIDE_LOOPS void findLightFactors(const LightLevels& at, const cv::Vec3f& full_umbra,
+                                         int count, LightFactors& out) {
+  for (int i = 0; i < count; ++i)
+    out.from_plate[i] = at.removed[i] != 0 ? 1.0f : static_cast<float>(at.relit[i]) * kPerLevel;
+  for (int c = 0; c < 3; ++c) {
+    const float umbra = full_umbra[c] * kPerLevel, lit = kPerLevel - umbra;
+    for (int i = 0; i < count; ++i) {
+      const float all = umbra * static_cast<float>(at.sky[i]) + lit * static_cast<float>(at.sun[i]),
+                  now = at.takes[i] == 0 ? 1.0f : all,
+                  before = umbra * static_cast<float>(at.sky_before[i]) +
+                           lit * static_cast<float>(at.sun_before[i]),
+                  ratio = now / (before > kDarkest ? before : kDarkest);
+      out.now[c][i] = now;
+      out.change[c][i] = ratio < kBrightest ? ratio : kBrightest;
+    }
+  }
 }
 
 }  // namespace
@@ -95,57 +126,47 @@ CALIPSO_WIDE_LOOPS void FrameCompositor::findKinds(int v, Row& row) const {
   }
 }
 
-// Pixels [first, last) of row v that nothing is drawn in: behindAt(), four values at a time.
+// Pixels [first, last) of row v that nothing is drawn in: behindAt().
 void FrameCompositor::composeBehind(int v, int first, int last, Row& row) const {
   const int j = v - region_.y;
-  const auto rowOf = [j](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j); };
-  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
-                     *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
-  const std::uint8_t *removed = rowOf(removed_), *relit = rowOf(relit_),
-                     *takes = rowOf(takes_light_),
-                     *invented = invented_.ptr<std::uint8_t>(v) + region_.x;
-  const cv::Vec3f* plate = plate_.ptr<cv::Vec3f>(v) + region_.x;
-  const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + region_.x;
-  const float* decoded = decodeTable();
-  const cv::v_float32x4 one = cv::v_setall_f32(1.0f), brightest = cv::v_setall_f32(kBrightest),
-                        umbra = wide(prepared_.umbra) * cv::v_setall_f32(kPerLevel),
-                        lit = cv::v_setall_f32(kPerLevel) - umbra;
-  const auto ratioOf = [&](std::uint8_t sun_level, std::uint8_t sky_level) {
-    return umbra * cv::v_setall_f32(sky_level) + lit * cv::v_setall_f32(sun_level);
-  };
-  const std::uint8_t* mirrored =
-      remirrored_.empty() ? nullptr : remirrored_.ptr<std::uint8_t>(v) + region_.x;
+  for (int i = first; i < last; i += LightFactors::kMost)
+    composeRelit(v, i, std::min(last, i + LightFactors::kMost), row);
+  if (remirrored_.empty() && live_ == nullptr) return;
+  const std::uint8_t *mirrored =
+                         remirrored_.empty() ? nullptr : remirrored_.ptr<std::uint8_t>(v) + region_.x,
+                     *invented = invented_.ptr<std::uint8_t>(v) + region_.x,
+                     *removed = removed_.ptr<std::uint8_t>(j), *relit = relit_.ptr<std::uint8_t>(j);
   for (int i = first; i < last; ++i) {
-    if (mirrored != nullptr && mirrored[i] != 0) {
-      const Behind behind = groundAt(i + region_.x, v, removed[i] != 0);
-      row.set(i, {behind.colour[0], behind.colour[1], behind.colour[2], behind.fresh});
-      row.source[i] = behind.source;
-      continue;
-    }
-    const float from_plate = removed[i] != 0 ? 1.0f : relit[i] * kPerLevel;
-    const cv::v_float32x4 now = takes[i] == 0 ? one : ratioOf(sun[i], sky[i]);
-    cv::v_float32x4 colour = cv::v_setzero_f32();
-    float fresh = 0.0f;
-    row.source[i] = kRendered;
-    if (from_plate > 0.0f) {
-      Behind revealed{plate[i], 1.0f, invented[i] != 0 ? kInvented : kSeenElsewhere};
-      if (invented[i] != 0 && live_ != nullptr) revealed = revealedAt(i + region_.x, v);
-      colour = cv::v_setall_f32(from_plate) * wide(revealed.colour) * now;
-      fresh = from_plate * revealed.fresh;
-      if (from_plate > 0.5f) row.source[i] = revealed.source;
-    }
-    if (from_plate < 1.0f) {
-      // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun
-      // newly reaches must come from the plate.
-      const cv::v_float32x4 before = ratioOf(sun_before[i], sky_before[i]);
-      const cv::v_float32x4 ratio =
-          cv::v_min(brightest, now / cv::v_max(before, cv::v_setall_f32(kDarkest)));
-      colour += cv::v_setall_f32(1.0f - from_plate) * linearOf(decoded, frame[i]) * ratio;
-    }
-    cv::Vec4f out;
-    cv::v_store(out.val, colour);
-    out[3] = fresh;
-    row.set(i, out);
+    const bool filled_live = live_ != nullptr && invented[i] != 0 && (removed[i] | relit[i]) != 0;
+    if (!filled_live && (mirrored == nullptr || mirrored[i] == 0)) continue;
+    const Behind behind = groundAt(i + region_.x, v, removed[i] != 0);
+    row.set(i, {behind.colour[0], behind.colour[1], behind.colour[2], behind.fresh});
+    row.source[i] = behind.source;
+  }
+}
+
+// The same of at most LightFactors::kMost pixels, from the plate as it was prepared and without
+// what planes mirror.
+void FrameCompositor::composeRelit(int v, int first, int last, Row& row) const {
+  const int j = v - region_.y, count = last - first;
+  const auto rowOf = [&](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j) + first; };
+  LightFactors factors;
+  findLightFactors({rowOf(sun_now_), rowOf(sun_before_), rowOf(sky_now_), rowOf(sky_before_),
+                    rowOf(takes_light_), rowOf(removed_), rowOf(relit_)},
+                   prepared_.umbra, count, factors);
+  const int u = first + region_.x;
+  const std::uint8_t* invented = invented_.ptr<std::uint8_t>(v) + u;
+  const cv::Vec3f* plate = plate_.ptr<cv::Vec3f>(v) + u;
+  const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + u;
+  const float* decoded = decodeTable();
+  for (int k = 0; k < count; ++k) {
+    const float from_plate = factors.from_plate[k], kept = 1.0f - from_plate;
+    for (int c = 0; c < 3; ++c)
+      row.colour[c][first + k] = from_plate * plate[k][c] * factors.now[c][k] +
+                                 kept * decoded[frame[k][c]] * factors.change[c][k];
+    row.colour[3][first + k] = from_plate;
+    const Provenance revealed = invented[k] != 0 ? kInvented : kSeenElsewhere;
+    row.source[first + k] = from_plate > 0.5f ? revealed : kRendered;
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/ray_shadow.hpp"
@@ -149,25 +150,35 @@ void FrameCompositor::addReliefBounds(const Points& vertices, const Eigen::Vecto
   }
 }
 
+// Adds the feet of the sun's rays through the vertices on a plane, with the disc's spread.
+void FrameCompositor::addPlaneBounds(const SupportPlane& plane, const Points& vertices,
+                                     const Eigen::Vector3f& sun, Points& shadow) const {
+  const Eigen::Vector3f n = plane.normal.cast<float>();
+  const float slope = n.dot(sun);
+  if (slope < 0.02f) return;
+  const Eigen::Vector3f side = n.unitOrthogonal(), other = n.cross(side);
+  const Eigen::Vector3f nowhere =
+      Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  const std::size_t first = shadow.size();
+  shadow.resize(first + 4 * vertices.size(), nowhere);
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const float height = n.dot(vertices[i]) - static_cast<float>(plane.offset);
+    if (height < -kHeightTolerance) continue;
+    const float spread = params_.sun_radius * height / (slope * slope);
+    const Eigen::Vector3f foot = vertices[i] - sun * (height / slope);
+    Eigen::Vector3f* to = &shadow[first + 4 * i];
+    to[0] = foot + spread * side, to[1] = foot - spread * side, to[2] = foot + spread * other,
+    to[3] = foot - spread * other;
+  }
+}
+
 // Pixels onto which the sun can cast the vertices' shadow.
 cv::Rect FrameCompositor::shadowBounds(const Points& vertices, const Light& light) const {
-  const Eigen::Vector3f l = light.direction;
   Points shadow;
-  for (const SupportPlane& plane : params_.planes) {
-    const Eigen::Vector3f n = plane.normal.cast<float>();
-    const float slope = n.dot(l);
-    if (slope < 0.02f) continue;
-    const Eigen::Vector3f side = n.unitOrthogonal(), other = n.cross(side);
-    for (const Eigen::Vector3f& p : vertices) {
-      const float height = n.dot(p) - static_cast<float>(plane.offset);
-      if (height < -kHeightTolerance) continue;
-      const float spread = params_.sun_radius * height / (slope * slope);
-      const Eigen::Vector3f foot = p - l * (height / slope);
-      shadow.insert(shadow.end(), {foot + spread * side, foot - spread * side,
-                                   foot + spread * other, foot - spread * other});
-    }
-  }
-  addReliefBounds(vertices, l, shadow);
+  for (const SupportPlane& plane : params_.planes)
+    addPlaneBounds(plane, vertices, light.direction, shadow);
+  addReliefBounds(vertices, light.direction, shadow);
   return boundsOf(projectMesh(shadow, {}, frame_.camera), kShadowBoundsMargin, frame_.bgr.size());
 }
 

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <numeric>
 
+#include "eight_lanes.hpp"
 #include "frame_compositor.hpp"
 #include "kernels.hpp"
 #include "marked.hpp"
@@ -250,13 +251,15 @@ void FrameCompositor::sunOnStretch(int v, int first, int last, int slot, Row& ro
               tolerance = kLightStep / static_cast<float>(frame_.camera.fx);
   const float* nearness = centre_->nearness(v - region_.y);
   SurfaceRun& run = row.run;
-  float near[SurfaceRun::kRoom];
+  float near[SurfaceRun::kRoom] = {};
+  std::copy_n(&nearness[first], last - first, &near[offset]);
+  const Four parts = {0.0f, 0.25f, 0.5f, 0.75f};
+  static_assert(kLightStep == 4);
   int uneven[SurfaceRun::kRoom], count = 0;
   std::size_t square =
       static_cast<std::size_t>(j) * sun_columns_ + (base + region_.x - sun_origin_.x) / kLightStep;
   for (int k = 0; k < offset + last - first; k += kLightStep, ++square) {
     const int begin = std::max(k, offset), end = std::min(k + kLightStep, offset + last - first);
-    std::copy_n(&nearness[base + begin], end - begin, &near[begin]);
     const SunCorner *a = &sun_corners_[square], *b = a + sun_columns_;
     if (smooth_[square] == 0 || a->slot != slot) {
       for (int i = begin; i < end; ++i) {
@@ -268,11 +271,13 @@ void FrameCompositor::sunOnStretch(int v, int first, int last, int slot, Row& ro
     const float sun = between(a->sun, b->sun), sun_rise = between(a[1].sun, b[1].sun) - sun,
                 from = between(a->nearness, b->nearness),
                 rise = between(a[1].nearness, b[1].nearness) - from;
+    *reinterpret_cast<Four*>(run.sun + k) = sun + parts * sun_rise;
+    // Another piece of the surface can look out between the corners.
+    const Four here = fourAt(near + k), off = here - (from + parts * rise),
+               most = tolerance * here;
+    const FourInts other = (off > most) | (-off > most);
     for (int i = begin; i < end; ++i) {
-      const float part = static_cast<float>(i - k) / kLightStep;
-      run.sun[i] = sun + part * sun_rise;
-      // Another piece of the surface can look out between the corners.
-      if (std::abs(near[i] - (from + part * rise)) > tolerance * near[i]) uneven[count++] = i;
+      if (other[i - k] != 0) uneven[count++] = i;
     }
   }
   sunOnPlaces(uneven, count, near, run);
@@ -294,9 +299,10 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
   kernels().shade(shades_[slot], offset, offset + count, run);
   for (int c = 0; c < 3; ++c) std::copy_n(&run.colour[c][offset], count, &row.colour[c][first]);
   std::fill_n(&row.colour[3][first], count, 1.0f);
-  for (int i = first; i < last; ++i) {
+  for (int i = nextMarked(row.kinds.data(), first, last, kPlainEdge); i < last;
+       i = nextMarked(row.kinds.data(), i + 1, last, kPlainEdge)) {
     const cv::Vec3f& c = row.drawn[i].colour;
-    if (row.kinds[i] == kPlainEdge) row.set(i, {c[0], c[1], c[2], 1.0f});
+    row.set(i, {c[0], c[1], c[2], 1.0f});
   }
   std::memset(&row.source[first], kRendered, count);
   carryResidual(v, first, last, slot, row);

@@ -13,6 +13,7 @@ namespace {
 constexpr double kNearPlane = 1e-6;      // m in front of the camera
 constexpr float kEdgeTolerance = 1e-3f;  // px; shared edges belong to both sides, so no cracks
 constexpr float kSmallestArea = 1e-9f;   // px^2
+constexpr std::size_t kFewPoints = 4096;  // not worth sharing out
 
 // Without SSE 4.1 std::floor and std::ceil are calls; |x| must fit an int.
 int floorInt(float x) {
@@ -101,7 +102,10 @@ ScreenMesh projectMesh(const Points& world, const Triangles& triangles, const Ca
 
 cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size) {
   float left = 1e9f, top = 1e9f, right = -1e9f, bottom = -1e9f;
-  for (const Eigen::Vector3f& p : mesh.points) {
+#pragma omp parallel for schedule(static) if (mesh.points.size() > kFewPoints) \
+    reduction(min : left, top) reduction(max : right, bottom)
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    const Eigen::Vector3f& p = mesh.points[i];
     if (std::isnan(p.z())) continue;
     left = std::min(left, p.x()), right = std::max(right, p.x());
     top = std::min(top, p.y()), bottom = std::max(bottom, p.y());
