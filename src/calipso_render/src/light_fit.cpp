@@ -197,6 +197,22 @@ void tryStart(const LightEvidence& evidence, const Eigen::Vector3f& up, const Li
   best.from_shadows = from_shadows;
 }
 
+double shadowMisfit(const LightEvidence& evidence, const LightCandidate& c) {
+  return evidence.shadow_misfit ? evidence.shadow_misfit(c.direction) : 0.0;
+}
+
+bool anyShadow(const LightEvidence& evidence, const std::vector<LightCandidate>& starts) {
+  return std::any_of(starts.begin(), starts.end(), [&](const LightCandidate& c) {
+    return shadowMisfit(evidence, c) != 0.0;
+  });
+}
+
+// Dark places that hardly look like shadows count for nothing.
+LightEvidence withoutShadows(LightEvidence evidence) {
+  evidence.shadow_misfit = {}, evidence.shadow_candidates.clear();
+  return evidence;
+}
+
 }  // namespace
 
 LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
@@ -204,11 +220,10 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
   LightFit best;
   best.light.direction = (up + 0.4f * view).normalized();
   if (static_cast<int>(evidence.samples.size()) < kFewestSamples) return best;
-  const std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
-  const auto shadows = [&](const LightCandidate& c) {
-    return evidence.shadow_misfit ? evidence.shadow_misfit(c.direction) : 0.0;
-  };
-  best.from_shadows = shadows(starts.front()) < -kShadowsSpeak;
+  std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
+  best.from_shadows = shadowMisfit(evidence, starts.front()) < -kShadowsSpeak;
+  if (!best.from_shadows && anyShadow(evidence, starts))
+    starts = searchLight(withoutShadows(evidence), up, kStarts);
   if (!best.from_shadows) {
     for (const LightCandidate& start : starts) tryStart(evidence, up, start, true, best);
   }

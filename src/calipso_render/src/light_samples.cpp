@@ -7,6 +7,7 @@
 #include "gloss_fit.hpp"
 #include "ray_scene.hpp"
 #include "shadow_clue.hpp"
+#include "shadow_contrast.hpp"
 
 namespace calipso::render {
 namespace {
@@ -84,6 +85,38 @@ void sampleView(const View& view, int picture, std::size_t object, std::size_t l
   }
 }
 
+RayScene sceneOf(const View& view) {
+  std::vector<Occluder> occluders;
+  for (const Actor& a : view.actors)
+    occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+  return RayScene(occluders);
+}
+
+using Scenes = std::shared_ptr<std::vector<RayScene>>;
+
+// Shadows of what moves, against the place without them.
+void addPassingShadows(const std::shared_ptr<std::vector<ShadowClue>>& clues, const Scenes& scenes,
+                       LightEvidence& evidence) {
+  evidence.shadow_misfit = [scenes, clues](const Eigen::Vector3f& l) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < clues->size(); ++i) sum += (*clues)[i].misfit((*scenes)[i], l);
+    return sum;
+  };
+  for (const ShadowClue& clue : *clues) {
+    const std::vector<Eigen::Vector3f> more = clue.candidates();
+    evidence.shadow_candidates.insert(evidence.shadow_candidates.end(), more.begin(), more.end());
+  }
+}
+
+// Shadows that stay, by their outlines in the key frame.
+void addRestingShadows(const std::shared_ptr<ShadowContrast>& contrast, const Scenes& scenes,
+                       LightEvidence& evidence) {
+  evidence.shadow_misfit = [scenes, contrast](const Eigen::Vector3f& l) {
+    return contrast->misfit(scenes->front(), l);
+  };
+  evidence.shadow_candidates = contrast->candidates(scenes->front());
+}
+
 }  // namespace
 
 std::vector<LightSample> lightSamples(const std::vector<View>& views,
@@ -102,34 +135,28 @@ std::vector<LightSample> lightSamples(const std::vector<View>& views,
 }
 
 LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bool>& moves,
-                            const std::vector<SupportPlane>& planes, const Background& plate) {
+                            const std::vector<SupportPlane>& planes, const Background& plate,
+                            const cv::Mat& depth) {
   LightEvidence evidence;
   evidence.samples = lightSamples(views, moves, evidence.clusters);
   const auto scenes = std::make_shared<std::vector<RayScene>>();
-  const auto clues = std::make_shared<std::vector<ShadowClue>>();
-  for (const View& view : views) {
-    std::vector<Occluder> occluders;
-    for (const Actor& a : view.actors)
-      occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-    scenes->emplace_back(occluders);
-    if (!planes.empty()) clues->emplace_back(view, planes, plate);
-  }
+  for (const View& view : views) scenes->push_back(sceneOf(view));
   evidence.visible = [scenes](const LightSample& s, const Eigen::Vector3f& l) {
     return (*scenes)[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
   };
-  evidence.shadow_misfit = [scenes, clues](const Eigen::Vector3f& l) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < clues->size(); ++i) sum += (*clues)[i].misfit((*scenes)[i], l);
-    return sum;
-  };
+  const auto clues = std::make_shared<std::vector<ShadowClue>>();
+  if (!planes.empty()) {
+    for (const View& view : views) clues->emplace_back(view, planes, plate);
+  }
+  if (std::any_of(clues->begin(), clues->end(), [](const ShadowClue& c) { return c.plateKnown(); }))
+    addPassingShadows(clues, scenes, evidence);
+  else
+    addRestingShadows(std::make_shared<ShadowContrast>(views.front(), planes, depth), scenes,
+                      evidence);
   evidence.gloss = [&views, moves, samples = evidence.samples,
                     visible = evidence.visible](const LightFit& fit) {
     return fitGloss(highlightSamples(views, moves, samples, fit.light.direction), fit, visible);
   };
-  for (const ShadowClue& clue : *clues) {
-    const std::vector<Eigen::Vector3f> more = clue.candidates();
-    evidence.shadow_candidates.insert(evidence.shadow_candidates.end(), more.begin(), more.end());
-  }
   return evidence;
 }
 

@@ -103,7 +103,7 @@ void findSurfacesInClip(const ClipSample& clip, const std::vector<ClipFrame>& fr
 LightFit lightOf(const std::vector<View>& views, const Background& seen, bool any_moves,
                  const RenderParams& params, const Prepared& p) {
   const LightEvidence evidence =
-      lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background());
+      lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background(), params.depth);
   const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
   LightFit fit = fitLight(evidence, params.up.cast<float>(), view);
   fit.light.angular_radius = static_cast<float>(params.sun_radius);

@@ -17,13 +17,11 @@ constexpr float kQuiet = 5.0f;     // code values of spread over time: the backg
 constexpr int kFewestFrames = 3;   // in which the plate must have been seen
 constexpr float kDarkest = 0.02f;  // linear; added before the logarithm
 constexpr float kBrighter = -0.2f, kDarker = 1.5f;  // range of darkness: more is something else
-constexpr double kOutlier = 0.2,
-                 kOutlierByColour = 0.8;   // error of a sample beyond which it does not count more
+constexpr double kOutlier = 0.2;           // error of a sample beyond which it does not count more
 constexpr double kDeepest = 1.5;           // b at most
 constexpr double kLeastDeviation = 0.015;  // of log-brightness
 constexpr double kCorrelated = 20.0;       // so many neighbouring samples err alike
 constexpr int kStep = 2;                   // px
-constexpr int kGroups = 6;
 constexpr float kShadow = 0.15f;  // darkness that may be a shadow
 constexpr std::size_t kCandidates = 24;
 
@@ -31,20 +29,6 @@ float logBrightness(const cv::Vec3f& code) {
   const cv::Vec3f linear(linearFromRealCode(code[0]), linearFromRealCode(code[1]),
                          linearFromRealCode(code[2]));
   return std::log(luminance(linear) + kDarkest);
-}
-
-// Groups pixels by colour alone, which a shadow changes little.
-int groupByColour(const std::vector<cv::Vec2f>& colours, std::vector<ShadowClue::Sample>& samples) {
-  const int count = static_cast<int>(samples.size());
-  if (count < 20 * kGroups) return 1;
-  cv::Mat points(count, 1, CV_32FC2), labels;
-  for (int i = 0; i < count; ++i) points.at<cv::Vec2f>(i) = colours[i];
-  cv::theRNG().state = 1;  // k-means draws its starts from the shared generator
-  cv::kmeans(points, kGroups, labels,
-             {cv::TermCriteria::MAX_ITER | cv::TermCriteria::EPS, 20, 1e-4}, 2,
-             cv::KMEANS_PP_CENTERS);
-  for (int i = 0; i < count; ++i) samples[i].group = labels.at<int>(i);
-  return kGroups;
 }
 
 struct PlanePixel {
@@ -94,21 +78,16 @@ ShadowClue::ShadowClue(const View& view, const std::vector<SupportPlane>& planes
   const auto unknown = [](const PlanePixel& p) { return !p.known; };
   plate_known_ =
       2 * std::count_if(pixels.begin(), pixels.end(), unknown) < static_cast<long>(pixels.size());
-  if (plate_known_)
-    pixels.erase(std::remove_if(pixels.begin(), pixels.end(), unknown), pixels.end());
+  if (!plate_known_) return;
+  pixels.erase(std::remove_if(pixels.begin(), pixels.end(), unknown), pixels.end());
   const std::size_t step = std::max<std::size_t>(1, pixels.size() / kSamples);
-  std::vector<cv::Vec2f> colours;
   for (std::size_t i = 0; i < pixels.size(); i += step) {
-    const cv::Vec3f& code = view.picture.at<cv::Vec3f>(pixels[i].at);
-    Sample s{pixels[i].receiver.position, pixels[i].receiver.normal, -logBrightness(code), 0};
-    if (plate_known_)
-      s.darkness = std::clamp(s.darkness + logBrightness(plate.plate.at<cv::Vec3f>(pixels[i].at)),
-                              kBrighter, kDarker);
-    samples_.push_back(s);
-    const float sum = code[0] + code[1] + code[2] + 1.0f;
-    colours.push_back({code[0] / sum, code[2] / sum});
+    const cv::Point& at = pixels[i].at;
+    const float darkness = logBrightness(plate.plate.at<cv::Vec3f>(at)) -
+                           logBrightness(view.picture.at<cv::Vec3f>(at));
+    samples_.push_back({pixels[i].receiver.position, pixels[i].receiver.normal,
+                        std::clamp(darkness, kBrighter, kDarker)});
   }
-  if (!plate_known_) groups_ = groupByColour(colours, samples_);
   for (const Actor& a : view.actors)
     centre_ += boxOf(a).center() / static_cast<float>(view.actors.size());
   // Most pixels lie in no shadow: the errors' median without one is what noise and texture do.
@@ -122,29 +101,14 @@ ShadowClue::ShadowClue(const View& view, const std::vector<SupportPlane>& planes
 
 // Squared error of every sample at the best b; an outlier counts up to a bound.
 std::vector<double> ShadowClue::squaredErrors(const std::vector<float>& hidden) const {
-  std::vector<double> n(groups_, 0.0), mean_x(groups_, 0.0), mean_y(groups_, 0.0);
-  if (!plate_known_) {
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const int g = samples_[i].group;
-      n[g] += 1.0, mean_x[g] += hidden[i], mean_y[g] += samples_[i].darkness;
-    }
-    for (int g = 0; g < groups_; ++g) {
-      if (n[g] > 0.0) mean_x[g] /= n[g], mean_y[g] /= n[g];
-    }
-  }
   double xx = 0.0, xy = 0.0;
-  for (std::size_t i = 0; i < samples_.size(); ++i) {
-    const double x = hidden[i] - mean_x[samples_[i].group],
-                 y = samples_[i].darkness - mean_y[samples_[i].group];
-    xx += x * x, xy += x * y;
-  }
-  const double b = xx > 1e-9 ? std::clamp(xy / xx, 0.0, kDeepest) : 0.0,
-               bound = plate_known_ ? kOutlier : kOutlierByColour;
+  for (std::size_t i = 0; i < samples_.size(); ++i)
+    xx += hidden[i] * hidden[i], xy += hidden[i] * samples_[i].darkness;
+  const double b = xx > 1e-9 ? std::clamp(xy / xx, 0.0, kDeepest) : 0.0;
   std::vector<double> squares(samples_.size());
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    const double x = hidden[i] - mean_x[samples_[i].group],
-                 y = samples_[i].darkness - mean_y[samples_[i].group];
-    squares[i] = std::min((y - b * x) * (y - b * x), bound * bound);
+    const double error = samples_[i].darkness - b * hidden[i];
+    squares[i] = std::min(error * error, kOutlier * kOutlier);
   }
   return squares;
 }
@@ -161,7 +125,6 @@ double ShadowClue::misfit(const RayScene& objects, const Eigen::Vector3f& l) con
 
 std::vector<Eigen::Vector3f> ShadowClue::candidates() const {
   std::vector<Eigen::Vector3f> directions;
-  if (!plate_known_) return directions;
   for (const Sample& s : samples_) {
     if (s.darkness > kShadow) directions.push_back((centre_ - s.position).normalized());
   }

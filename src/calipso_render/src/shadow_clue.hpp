@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -10,24 +9,24 @@
 
 namespace calipso::render {
 
-// What shadows on the support planes say about the sun: log-darkness of the planes' pixels against
-// the part of the sun that the objects hide from them.
-//   y = b (1 - V(l)) + e_g
-//   y    -log of brightness
-//   b    depth of the shadow, >= 0
-//   V    visible part of a sun in direction l
-//   e_g  brightness of the pixel's group (0 where the plate is known)
+// What shadows on the support planes say about the sun where other frames show the place without
+// them: log-darkness of the planes' pixels against the part of the sun that the objects hide.
+//   y = b (1 - V(l))
+//   y  -log of brightness over that without shadow
+//   b  depth of the shadow, >= 0
+//   V  visible part of a sun in direction l
 class ShadowClue {
  public:
   struct Sample {
     Eigen::Vector3f position, normal;  // world
     float darkness;                    // y
-    int group;  // pixels of one material; all of them 0 where the plate is known
   };
 
-  // @param plate what was seen of the place, from the same camera; empty: nothing is known, and the
-  // plane's own pixels are compared with each other, grouped by colour
+  // @param plate what was seen of the place, from the same camera; may be empty
   ShadowClue(const View& view, const std::vector<SupportPlane>& planes, const Background& plate);
+
+  // false: too little of the planes was seen without shadows, misfit() is 0
+  bool plateKnown() const { return plate_known_; }
 
   // How badly a sun in direction l explains the pixels, at its best b: minus a log-likelihood, 0
   // without any shadow.
@@ -42,7 +41,6 @@ class ShadowClue {
   Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();  // of the objects
   std::vector<Sample> samples_;
   bool plate_known_ = false;
-  int groups_ = 1;
   double unshaded_ = 0.0, variance_ = 1.0;
 };
 

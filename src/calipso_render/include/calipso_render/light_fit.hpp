@@ -51,9 +51,11 @@ struct LightEvidence {
 
 // What views, one or several, show. @param plate what was seen of the place without the objects,
 // from the key frame's camera; empty where nothing moves
+// @param depth CV_32FC1, m, of the key frame, 0: unknown; may be empty
 // @pre the views outlive the evidence
 LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bool>& moves,
-                            const std::vector<SupportPlane>& planes, const Background& plate);
+                            const std::vector<SupportPlane>& planes, const Background& plate,
+                            const cv::Mat& depth);
 
 struct LightFit {
   Light light;
