@@ -188,6 +188,11 @@ class FrameCompositor {
   cv::Vec4f missAt(float u, float v, int owner) const;
   static RestPicture restPicture(const Prepared& prepared, const RenderParams& params,
                                  const std::vector<bool>& edited);
+
+  // Outlines as soft as the video's (frame_outline.cpp)
+  float lacksSoftness(std::uint32_t id, int u, int v) const;
+  cv::Mat findOutlines(int reach) const;
+  void softenOutlines(FrameOutput& out) const;
   void recordRow(int v, Row& row, RestPicture& picture) const;
   void recordOwners(RestPicture& picture) const;
   Composed composedOf(const Drawn& drawn, int u, int v) const;

@@ -90,6 +90,7 @@ FrameOutput FrameCompositor::run() {
       if (v >= region_.y && v < region_.br().y) composeRow(v, row, out);
     }
   }
+  softenOutlines(out);
   return out;
 }
 

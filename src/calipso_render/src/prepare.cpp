@@ -9,6 +9,7 @@
 #include "clip_motion.hpp"
 #include "key_cover.hpp"
 #include "place_depth.hpp"
+#include "edge_blur.hpp"
 #include "prepare_background.hpp"
 #include "prepare_remarks.hpp"
 
@@ -158,6 +159,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   prepareBackground({frames, views, actors, seen, picture, sun, sky, cameraMoves(clip)}, params, p);
   p.background_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness);
+  p.outline_blur = outlineBlur(picture, p.key_labels);
   addRemarks(clip.frames(), actors, p);
   return p;
 }

@@ -106,6 +106,7 @@ struct Prepared {
   cv::Vec3f umbra = {0.4f, 0.4f,
                      0.4f};  // what the sun's absence leaves of a support plane's brightness
   NoiseModel noise;
+  float outline_blur = 0.0f;  // px: how much softer than a pixel the video's outlines are
   int views = 1;  // frames that light and texture come from
   double background_ms = 0.0,
          appearance_ms = 0.0;        // wall time that plate, and light with appearances, took

@@ -1,0 +1,106 @@
+// Outlines of what is drawn are as soft as the video's.
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "ball_setting.hpp"
+#include "calipso_render/colour.hpp"
+#include "edge_blur.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+// A bright disc on a dark, uneven ground, each pixel the mean of 64 points, then blurred, as lenses
+// blur: in linear light.
+cv::Mat disc(float blur, cv::Mat& labels) {
+  constexpr int kSide = 160, kParts = 8;
+  cv::RNG random(3);
+  cv::Mat linear(kSide, kSide, CV_32FC3);
+  labels = cv::Mat::zeros(kSide, kSide, CV_8U);
+  for (int v = 0; v < kSide; ++v) {
+    for (int u = 0; u < kSide; ++u) {
+      int inside = 0;
+      for (int k = 0; k < kParts * kParts; ++k) {
+        const float x = u + (k % kParts + 0.5f) / kParts - 80.3f,
+                    y = v + (k / kParts + 0.5f) / kParts - 79.6f;
+        inside += x * x + y * y < 50.0f * 50.0f;
+      }
+      const float part = static_cast<float>(inside) / (kParts * kParts);
+      linear.at<cv::Vec3f>(v, u) =
+          cv::Vec3f::all(0.5f * part + (1.0f - part) * random.uniform(0.08f, 0.12f));
+      labels.at<std::uint8_t>(v, u) = part > 0.5f ? 1 : 0;
+    }
+  }
+  if (blur > 0.0f) cv::GaussianBlur(linear, linear, {0, 0}, blur);
+  cv::Mat codes(linear.size(), CV_32FC3);
+  std::transform(linear.begin<cv::Vec3f>(), linear.end<cv::Vec3f>(), codes.begin<cv::Vec3f>(),
+                 [](const cv::Vec3f& x) {
+                   return cv::Vec3f(codeFromLinear(x[0]), codeFromLinear(x[1]),
+                                    codeFromLinear(x[2]));
+                 });
+  return codes;
+}
+
+TEST(OutlineBlur, IsThatOfThePicture) {
+  for (const float blur : {0.0f, 0.5f, 0.8f, 1.5f}) {
+    cv::Mat labels;
+    const cv::Mat picture = disc(blur, labels);
+    // The widths that are tried are 15 % apart; a pixel's own 0.29 hides what is below 0.2.
+    EXPECT_NEAR(outlineBlur(picture, labels), blur, blur > 0.0f ? 0.15f : 0.2f) << blur;
+  }
+}
+
+TEST(OutlineBlur, IsNotToldWithoutContrast) {
+  cv::Mat labels;
+  disc(0.0f, labels);
+  cv::Mat noise(labels.size(), CV_32FC3);
+  cv::randu(noise, cv::Scalar::all(90), cv::Scalar::all(110));
+  EXPECT_EQ(outlineBlur(noise, labels), 0.0f);
+  EXPECT_EQ(outlineBlur(noise, cv::Mat::zeros(labels.size(), CV_8U)), 0.0f);
+}
+
+// A ball that is moved in a blurred picture has an outline as soft as before; one that stays is the
+// picture's, to the byte.
+TEST(Renderer, DrawnOutlinesAreAsSoftAsTheVideos) {
+  const ObjectModel ball = ballAt(kCentre);
+  ClipFrame key = frameWithBall(ball);
+  cv::Mat linear = linearFromCode(key.bgr);
+  cv::GaussianBlur(linear, linear, {0, 0}, 1.0);
+  key.bgr = codeFromLinear(linear);
+  ClipSample clip;
+  clip.add(key);
+  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ball}, params()));
+  ASSERT_NEAR(prepared->outline_blur, 1.0f, 0.2f);
+  auto sharp = std::make_shared<Prepared>(*prepared);
+  sharp->outline_blur = 0.0f;
+
+  const FrameInput moved = ballMovedLeft(key, *prepared);
+  const Actor now = makeActor(prepared->surfaces[0], moved.objects[0].vertices, key.camera);
+  VisibilityBuffer seen({0, 0, kWidth, kHeight});
+  seen.draw(now.screen, 0);
+  cv::Mat labels = cv::Mat::zeros(kHeight, kWidth, CV_8U);
+  for (int v = 0; v < kHeight; ++v)
+    for (int u = 0; u < kWidth; ++u)
+      if (seen.idAt(u, v) != VisibilityBuffer::kNothing) labels.at<std::uint8_t>(v, u) = 1;
+  const auto blurDrawnBy = [&](Renderer& renderer) {
+    cv::Mat codes;
+    renderer.composite(moved).bgr.convertTo(codes, CV_32F);
+    return outlineBlur(codes, labels);
+  };
+  Renderer renderer(prepared, params()), sharp_renderer(sharp, params());
+  const float soft = blurDrawnBy(renderer), hard = blurDrawnBy(sharp_renderer);
+  // The texture is of the blurred picture, which adds to both.
+  EXPECT_GT(soft, 0.9f * prepared->outline_blur);
+  EXPECT_LT(soft, 1.5f * prepared->outline_blur);
+  EXPECT_LT(hard, 0.75f * soft);
+
+  FrameInput still = moved;
+  still.objects[0].vertices = prepared->surfaces[0].key_vertices;
+  EXPECT_EQ(cv::norm(renderer.composite(still).bgr, key.bgr, cv::NORM_INF), 0.0);
+}
+
+}  // namespace
+}  // namespace calipso::render
