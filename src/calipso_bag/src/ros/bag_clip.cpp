@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "calipso_bag/shot_changes.hpp"
 #include "clip_checks.hpp"
 
 namespace calipso::bag {
@@ -112,6 +113,7 @@ void BagClip::readCameraInfos() {
 void BagClip::checkFrames() {
   rosbag::View view(bag_, rosbag::TopicQuery(image_topic_));
   sensor_msgs::ImageConstPtr first;
+  ShotChanges shots;
   for (const rosbag::MessageInstance& message : view) {
     const int index = frameCount();
     const std::string where = path_ + ": " + image_topic_ + " image " + std::to_string(index);
@@ -124,11 +126,13 @@ void BagClip::checkFrames() {
       first = image;
       first_info_ = info;
     }
+    shots.add(cv_bridge::toCvShare(image)->image);
     stamps_.push_back(image->header.stamp);
   }
   if (stamps_.empty()) {
     throw std::runtime_error(path_ + ": topic " + image_topic_ + " holds no image");
   }
+  shot_changes_ = shots.found();
 }
 
 sensor_msgs::ImageConstPtr BagClip::readImage(const rosbag::MessageInstance& message,

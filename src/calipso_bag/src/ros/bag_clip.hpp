@@ -37,6 +37,8 @@ class BagClip {
   const std::string& imageTopic() const { return image_topic_; }
   const sensor_msgs::CameraInfo& firstInfo() const { return *first_info_; }
   const std::string& frameId() const { return first_info_->header.frame_id; }
+  // Frames with which another shot begins.
+  const std::vector<int>& shotChanges() const { return shot_changes_; }
   double fps() const;  // mean over the clip; 30 for a single frame
 
   // Reads the frames in their order, from the first.
@@ -67,6 +69,7 @@ class BagClip {
   std::string image_topic_, camera_info_topic_;
   std::map<ros::Time, sensor_msgs::CameraInfo> infos_;  // by stamp
   std::vector<ros::Time> stamps_;
+  std::vector<int> shot_changes_;
   sensor_msgs::CameraInfoConstPtr first_info_;
 };
 

@@ -77,6 +77,7 @@ Player::Player(ros::NodeHandle& nh, const Params& params)
       window_(params.in_flight) {
   checkScene();
   checkEdits();
+  warnOfCuts();
   advertiseAll();
   ROS_INFO_STREAM(params.clip.path << ": " << clip_.frameCount() << " frames of "
                                    << clip_.imageTopic() << ", " << clip_.firstInfo().width << "x"
@@ -95,6 +96,16 @@ void Player::checkScene() const {
                              "; use the scene of this video");
   }
   for (const SceneObject& object : scene_.objects) loadMesh(object.cad_path);
+}
+
+void Player::warnOfCuts() const {
+  for (const int frame : clip_.shotChanges()) {
+    const double time = (clip_.stamps()[frame] - clip_.stamps().front()).toSec();
+    ROS_WARN_STREAM(params_.clip.path
+                    << ": frame " << frame << " (" << time
+                    << " s) shows something else than the one before: the scene is "
+                       "that of the first shot alone; cut the bag there");
+  }
 }
 
 void Player::checkEdits() const {

@@ -47,6 +47,7 @@ class Player {
  private:
   static Preparation::Roles rolesOf(const std::vector<std::string>& nodes);
   void checkScene() const;
+  void warnOfCuts() const;
   void checkEdits() const;  // models to insert can be read; what comes too late is said
   template <typename M>
   ros::Publisher advertise(const std::string& topic, bool latched);
