@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 
@@ -124,6 +125,41 @@ TEST(WorldStrikes, WhatTheVideoMovesBouncesOffWhatIsPutInItsWay) {
   play(world, 0.7);
   EXPECT_GE(placeOf(world, 1).x(), 0.09);
   EXPECT_GT(speedsAlongX(world)[1], -0.1);
+}
+
+// In the video one ball hits the other, which goes on in its place. Without the first one, or when
+// that goes elsewhere, the other stays; a third one that collides at the same time far away has no
+// part in it.
+TEST(WorldStrikes, WhatNothingStrikesAnyMoreStays) {
+  constexpr double kHit = 6.0 * kFrame;
+  for (const std::string edited : {"thing", "far", ""}) {
+    WorldScene scene = twoBalls();
+    scene.objects.push_back(scene.objects.front());
+    scene.objects[2].name = "far", scene.objects[2].index = 3;
+    scene.objects[2].world_from_object.translation().y() = 2.0;
+    World world(scene, {});
+    for (int k = 0; k <= 30; ++k) {
+      ObservedMotion m;
+      m.time = k * kFrame;
+      m.moving = true;
+      m.linear.x() = m.time < kHit ? 1.0 : 0.0;
+      m.world_from_object.translation() = m.centroid =
+          Eigen::Vector3d(std::min(m.time, kHit), 0, 0.5);
+      world.addObservedMotion("thing", m);
+      m.linear.x() = m.time < kHit ? 0.0 : 1.0;
+      m.world_from_object.translation() = m.centroid =
+          Eigen::Vector3d(0.3 + std::max(0.0, m.time - kHit), 0, 0.5);
+      world.addObservedMotion("other", m);
+    }
+    for (const char* const ball : {"thing", "other", "far"}) world.addCollision(ball, kHit);
+    Edit edit = editOf(EditKind::kRemove);
+    edit.object = edited;
+    if (!edited.empty()) world.submit(edit);
+    world.advanceTo(0.0);
+    play(world, 0.8);
+    const bool stays = edited == "thing";
+    EXPECT_NEAR(placeOf(world, 1).x(), stays ? 0.3 : 0.9, 1e-6) << edited;
+  }
 }
 
 }  // namespace

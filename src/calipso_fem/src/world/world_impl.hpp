@@ -103,6 +103,9 @@ struct World::Impl {
   // Objects of the video in the way of edited ones (world_strikes.cpp)
   bool canBeStruck(const Actor& actor) const;
   double closingSpeedOf(const Actor& striker, const Actor& struck, double h);
+  bool isStruckHard(const Actor& actor, const Actor& striker, double h);
+  bool strikesInVideo(const Actor& striker, const Actor& struck, double h) const;
+  void letGo(Actor& actor, const std::string& why);
   void releaseWhatIsStruck(double h);  // within the next h
 
   // Contacts and forces of a step (world_step.cpp)

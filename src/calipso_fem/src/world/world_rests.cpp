@@ -78,11 +78,8 @@ void World::Impl::letGoWhatLostItsRest() {
     const std::string& carrier = actors[rests[k].carrier].object.name;
     rests.erase(rests.begin() + k);
     if (!falls) continue;
-    noteWhatRestsOn(actor);
+    letGo(actor, carrier + ", on which it rests, moves");
     k = 0;  // the list has grown
-    become(actor, actor.settings.kind.value_or(ObjectKind::kRigid),
-           carrier + ", on which it rests, moves");
-    wake(actor);
   }
 }
 

@@ -6,8 +6,9 @@
 #include "obstacle_query.hpp"
 #include "world_impl.hpp"
 
-// What something edited is about to strike: it leaves its place in the video, with the velocity it
-// has there. A blow counts that sends it further than can be overlooked,
+// What something edited is about to strike, or strikes in the video, where it may be elsewhere now:
+// it leaves its place in the video, with the velocity it has there. A blow counts that sends it
+// further than can be overlooked,
 //   v m_a / (m_a + m_b) > sqrt(2 mu g s)
 //  v         m/s, at which the surfaces close
 //  m_a, m_b  kg, of what strikes and what is struck
@@ -94,26 +95,58 @@ double World::Impl::closingSpeedOf(const Actor& striker, const Actor& struck, do
   return fastest;
 }
 
-void World::Impl::releaseWhatIsStruck(double h) {
-  const auto massOf = [](const Actor& actor) {
-    return massProperties(actor.object.mesh, actor.material.density).mass;
+// Whether the one sets the other in motion in the video, shortly after now: both collide at once,
+// and close to each other.
+bool World::Impl::strikesInVideo(const Actor& striker, const Actor& struck, double h) const {
+  constexpr double kAtOnce = 1.5;  // frames; each instant is found to half a frame or so
+  constexpr double kNear = 0.05;   // of the size
+  const double period = params.frame_period;
+  const double near = kNear * boundingDiagonal(struck.object.mesh);
+  const auto boxAt = [](const Actor& actor, double time, double reach) {
+    const Eigen::Isometry3d pose = actor.track.at(time).world_from_object;
+    return boxAround(placed(actor.object.mesh, pose).vertices, reach);
   };
+  for (const double t : struck.collisions) {
+    if (t <= now || t - period > now + h) continue;
+    const bool at_once =
+        std::any_of(striker.collisions.begin(), striker.collisions.end(),
+                    [&](double other) { return std::abs(other - t) <= kAtOnce * period; });
+    if (at_once && boxAt(striker, t, near).intersects(boxAt(struck, t, 0.0))) return true;
+  }
+  return false;
+}
+
+void World::Impl::letGo(Actor& actor, const std::string& why) {
+  noteWhatRestsOn(actor);
+  become(actor, actor.settings.kind.value_or(ObjectKind::kRigid), why);
+  wake(actor);
+}
+
+bool World::Impl::isStruckHard(const Actor& actor, const Actor& striker, double h) {
+  const auto massOf = [](const Actor& a) {
+    return massProperties(a.object.mesh, a.material.density).mass;
+  };
+  const double way = kOverlooked * boundingDiagonal(actor.object.mesh);
+  const double least =
+      std::sqrt(2.0 * actor.settings.surface.friction * scene.gravity.norm() * way);
+  const double share =
+      striker.simulated() ? massOf(striker) / (massOf(striker) + massOf(actor)) : 1.0;
+  return share * closingSpeedOf(striker, actor, h) > least;
+}
+
+void World::Impl::releaseWhatIsStruck(double h) {
   for (Actor& actor : actors) {
     if (!canBeStruck(actor)) continue;
-    const double way = kOverlooked * boundingDiagonal(actor.object.mesh);
-    const double least =
-        std::sqrt(2.0 * actor.settings.surface.friction * scene.gravity.norm() * way);
     for (const Actor& striker : actors) {
-      const bool follows_video = striker.continues || !striker.edited;
-      if (&striker == &actor || striker.removed || follows_video || striker.asleep) continue;
-      const double share =
-          striker.simulated() ? massOf(striker) / (massOf(striker) + massOf(actor)) : 1.0;
-      if (!(share * closingSpeedOf(striker, actor, h) > least)) continue;
-      noteWhatRestsOn(actor);
-      become(actor, actor.settings.kind.value_or(ObjectKind::kRigid),
-             striker.object.name + " strikes it");
+      const bool follows_video = striker.continues || !(striker.edited || striker.removed);
+      if (&striker == &actor || follows_video) continue;
+      if (strikesInVideo(striker, actor, h)) {
+        letGo(actor, "what strikes it in the video, " + striker.object.name + ", is edited");
+        break;
+      }
+      if (striker.removed || striker.asleep || !isStruckHard(actor, striker, h)) continue;
+      letGo(actor, striker.object.name + " strikes it");
       actor.continues = actor.kind == ObjectKind::kRigid && striker.kind != ObjectKind::kDeformable;
-      wake(actor);
       break;
     }
   }
