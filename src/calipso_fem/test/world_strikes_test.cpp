@@ -69,9 +69,9 @@ TEST(WorldStrikes, WhatPassesByLeavesItInPeace) {
   EXPECT_NEAR(placeOf(world, 0).x(), 0.6, 1e-6);
 }
 
-// What a user holds in place, by its parameter, by infinite mass or by attachments, is a wall.
+// What a user holds in place, by a parameter, an edit, infinite mass or attachments, is a wall.
 TEST(WorldStrikes, WhatIsHeldStaysAndTheBallComesBack) {
-  for (const char* const by : {"kind", "density", "attachment"}) {
+  for (const char* const by : {"kind", "edit", "density", "attachment"}) {
     WorldScene scene = twoBalls();
     WorldParams params;
     ObjectSettings& other = params.objects["other"];
@@ -80,6 +80,9 @@ TEST(WorldStrikes, WhatIsHeldStaysAndTheBallComesBack) {
     if (by == std::string("attachment"))
       scene.objects[1].attachments.push_back({"hook", {0.29, -0.1, 0.4}, {0.4, 0.1, 0.6}});
     World world(scene, params);
+    Edit hold = editOf(EditKind::kObjectKind);
+    hold.object = "other", hold.object_kind = ObjectKind::kStatic;
+    if (by == std::string("edit")) world.submit(hold);
     world.submit(throwOf("thing", 1.0));
     world.advanceTo(0.0);
     play(world, 0.6);

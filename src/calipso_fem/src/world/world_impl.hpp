@@ -101,6 +101,7 @@ struct World::Impl {
   void letGoWhatLostItsRest();
 
   // Objects of the video in the way of edited ones (world_strikes.cpp)
+  ObjectKind kindWhenFree(const Actor& actor) const;
   bool canBeStruck(const Actor& actor) const;
   double closingSpeedOf(const Actor& striker, const Actor& struck, double h);
   bool isStruckHard(const Actor& actor, const Actor& striker, double h);

@@ -62,8 +62,13 @@ double closingSpeed(const Vertices& points, const VelocityField& own, const Obst
 
 }  // namespace
 
+// As the user wants it, or else the simplest kind that moves.
+ObjectKind World::Impl::kindWhenFree(const Actor& actor) const {
+  return actor.forced_kind.value_or(actor.settings.kind.value_or(ObjectKind::kRigid));
+}
+
 bool World::Impl::canBeStruck(const Actor& actor) const {
-  const ObjectKind kind = actor.settings.kind.value_or(ObjectKind::kRigid);
+  const ObjectKind kind = kindWhenFree(actor);
   return !actor.edited && !actor.removed && !actor.immovable && actor.kind == ObjectKind::kStatic &&
          actor.object.attachments.empty() && actor.modes.cols() == 0 &&
          (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
@@ -118,7 +123,7 @@ bool World::Impl::strikesInVideo(const Actor& striker, const Actor& struck, doub
 
 void World::Impl::letGo(Actor& actor, const std::string& why) {
   noteWhatRestsOn(actor);
-  become(actor, actor.settings.kind.value_or(ObjectKind::kRigid), why);
+  become(actor, kindWhenFree(actor), why);
   wake(actor);
 }
 
