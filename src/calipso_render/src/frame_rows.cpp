@@ -54,6 +54,21 @@ CALIPSO_WIDE_LOOPS void findLightFactors(const LightLevels& at, const cv::Vec3f&
   }
 }
 
+// Linear colours of `count` pixels, by channels, from the plate and from the frame's codes.
+CALIPSO_WIDE_LOOPS void relight(const LightFactors& factors, const cv::Vec3f* plate,
+                                const cv::Vec3b* frame, int count, float* const (&out)[3]) {
+  const float* decoded = decodeTable();
+  float own[LightFactors::kMost], place[LightFactors::kMost];
+  for (int c = 0; c < 3; ++c) {
+    for (int k = 0; k < count; ++k) own[k] = decoded[frame[k][c]], place[k] = plate[k][c];
+    for (int k = 0; k < count; ++k) {
+      const float from_plate = factors.from_plate[k];
+      out[c][k] = from_plate * place[k] * factors.now[c][k] +
+                  (1.0f - from_plate) * own[k] * factors.change[c][k];
+    }
+  }
+}
+
 }  // namespace
 
 // Of columns [begin, end) of region_'s row j: what lies behind, where its light changes or where
@@ -158,15 +173,12 @@ void FrameCompositor::composeRelit(int v, int first, int last, Row& row) const {
   const std::uint8_t* invented = invented_.ptr<std::uint8_t>(v) + u;
   const cv::Vec3f* plate = plate_.ptr<cv::Vec3f>(v) + u;
   const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + u;
-  const float* decoded = decodeTable();
+  relight(factors, plate, frame, count,
+          {&row.colour[0][first], &row.colour[1][first], &row.colour[2][first]});
+  std::copy_n(factors.from_plate, count, &row.colour[3][first]);
   for (int k = 0; k < count; ++k) {
-    const float from_plate = factors.from_plate[k], kept = 1.0f - from_plate;
-    for (int c = 0; c < 3; ++c)
-      row.colour[c][first + k] = from_plate * plate[k][c] * factors.now[c][k] +
-                                 kept * decoded[frame[k][c]] * factors.change[c][k];
-    row.colour[3][first + k] = from_plate;
     const Provenance revealed = invented[k] != 0 ? kInvented : kSeenElsewhere;
-    row.source[first + k] = from_plate > 0.5f ? revealed : kRendered;
+    row.source[first + k] = factors.from_plate[k] > 0.5f ? revealed : kRendered;
   }
 }
 

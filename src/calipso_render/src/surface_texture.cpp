@@ -3,6 +3,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/hal/intrin.hpp>
 
 #include "mesh_topology.hpp"
 
@@ -111,14 +112,21 @@ cv::Vec4f SurfaceTexture::at(int triangle, const Eigen::Vector3f& weights) const
               y = std::clamp(weights[1], 0.0f, 1.0f) * n;
   const int i = std::min(static_cast<int>(x), n - 1), j = std::min(static_cast<int>(y), n - 1 - i);
   float fx = x - i, fy = y - j;
+  const auto times = [grid](std::size_t texel, float weight) {
+    return cv::v_load(grid[texel].val) * cv::v_setall_f32(weight);
+  };
+  const std::size_t right = index(i + 1, j, n), below = index(i, j + 1, n);
+  cv::Vec4f out;
   if (fx + fy <= 1.0f || i + j + 2 > n) {
     const float sum = std::max(1.0f, fx + fy);
     fx /= sum, fy /= sum;
-    return grid[index(i, j, n)] * (1.0f - fx - fy) + grid[index(i + 1, j, n)] * fx +
-           grid[index(i, j + 1, n)] * fy;
+    cv::v_store(out.val,
+                times(index(i, j, n), 1.0f - fx - fy) + times(right, fx) + times(below, fy));
+  } else {
+    cv::v_store(out.val, times(index(i + 1, j + 1, n), fx + fy - 1.0f) +
+                             times(right, 1.0f - fy) + times(below, 1.0f - fx));
   }
-  return grid[index(i + 1, j + 1, n)] * (fx + fy - 1.0f) + grid[index(i + 1, j, n)] * (1.0f - fy) +
-         grid[index(i, j + 1, n)] * (1.0f - fx);
+  return out;
 }
 
 void diffuseOverMesh(const Points& vertices, const Triangles& triangles,
