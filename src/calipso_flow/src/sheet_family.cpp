@@ -22,14 +22,17 @@ SheetFamily::SheetFamily(const ObjectModel& model, const Eigen::Vector3d& gravit
 }
 
 SheetSimulation& SheetFamily::at(double log_stiffness) {
-  return keep(sheet_, log_stiffness, settings_, sheet_.sheet.get());
+  return keep(sheet_, member(log_stiffness), settings_, sheet_.sheet.get());
 }
 
 const SheetSimulation& SheetFamily::stifferThan(double log_stiffness) {
-  if (given_) return at(log_stiffness);
   SheetSettings settings = settings_;
   settings.sag *= kStiffer;
-  return keep(stiffer_, log_stiffness + kStiffer, settings, &at(log_stiffness));
+  return keep(stiffer_, member(log_stiffness) + kStiffer, settings, &at(log_stiffness));
+}
+
+double SheetFamily::member(double log_stiffness) const {
+  return given_ ? -std::log(scale_) : log_stiffness;
 }
 
 double SheetFamily::stiffnessOverDensity(double log_stiffness) {
@@ -38,7 +41,6 @@ double SheetFamily::stiffnessOverDensity(double log_stiffness) {
 
 SheetSimulation& SheetFamily::keep(Kept& kept, double log_stiffness, SheetSettings settings,
                                    const SheetSimulation* like) {
-  if (given_) log_stiffness = -std::log(scale_);
   if (!kept.sheet || kept.log_stiffness != log_stiffness) {
     settings.stiffness = scale_ * std::exp(log_stiffness);
     kept = {log_stiffness, std::make_unique<SheetSimulation>(model_, gravity_, settings, like)};

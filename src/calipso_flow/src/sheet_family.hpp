@@ -35,6 +35,7 @@ class SheetFamily {
     double log_stiffness = 0.0;
     std::unique_ptr<SheetSimulation> sheet;
   };
+  double member(double log_stiffness) const;
   SheetSimulation& keep(Kept& kept, double log_stiffness, SheetSettings settings,
                         const SheetSimulation* like);
 

@@ -9,6 +9,7 @@
 namespace calipso::flow {
 namespace {
 
+constexpr double kTolerance = 1e-3;  // of a step: residual over loads and inner forces
 constexpr double kSkin = 0.5;  // edge of a coarse skin's cubes over that of a cell
 
 TriangleMesh inWorld(const ObjectModel& model) {
@@ -29,7 +30,7 @@ fem::FemOptions optionsFor(const SheetSettings& settings) {
   options.target_nodes = settings.nodes;
   options.cell_size = settings.cell_size;
   options.threads = 1;
-  options.newton_tolerance = 1e-3;
+  options.newton_tolerance = kTolerance;
   options.newton_iterations = 8;
   return options;
 }
@@ -52,6 +53,7 @@ SheetSimulation::SheetSimulation(const ObjectModel& model, const Eigen::Vector3d
   if (like) sheet_.body().setRestNodes(like->sheet_.body().model().mesh().nodes);
   settle(gravity, settings.sag * boundingDiagonal(surface_));
   start_ = sheet_.body().positions();
+  step_.emplace(sheet_.body());
 }
 
 void SheetSimulation::settle(const Eigen::Vector3d& gravity, double sag) {
@@ -79,9 +81,10 @@ void SheetSimulation::blow(const Eigen::Vector3d& wind, double h) {
 
 void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector& displacements,
                            const SurfaceVector& velocities, const Wind& wind,
-                           const AfterStep& after_step, const std::function<void()>& after_frame) {
+                           const InStep& in_step, const std::function<void()>& after_frame) {
   fem::DeformableBody& body = sheet_.body();
   body.setState(start_ + sheet_.nodalField(displacements), sheet_.nodalField(velocities));
+  step_->restart();
   after_frame();
   for (size_t k = 1; k < times.size(); ++k) {
     const double span = times[k] - times[k - 1];
@@ -89,10 +92,10 @@ void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector
     const double h = span / steps;
     for (int s = 0; s < steps; ++s) {
       const double middle = times[k - 1] + (s + 0.5) * h;
-      const fem::Vec x0 = body.positions(), v0 = body.velocities();
       blow(wind(middle), h);
-      body.step(h);
-      if (after_step) after_step(x0, v0, middle, h);
+      step_->advance(h, kTolerance);
+      if (in_step) in_step(middle, h);
+      body.endStep(fem::Vec::Zero(start_.size()));
     }
     after_frame();
   }
@@ -120,23 +123,23 @@ SheetMotion SheetSimulation::measure(const std::vector<double>& times,
   for (Eigen::Index m = 0; m < measured.rows(); ++m) {
     nodal.row(m) = body.embedding().applyTransposed(measured.row(m).transpose()).transpose();
   }
-  MotionTangent tangent(body, parameters);
+  MotionTangent tangent(static_cast<int>(nodal.cols()), parameters);
   SheetMotion motion;
   motion.amplitudes.resize(times.size(), measured.rows());
   motion.slopes.assign(parameters, Eigen::MatrixXd(times.size(), measured.rows()));
   const Eigen::VectorXd viscosity =
       Eigen::VectorXd::Unit(std::max(1, parameters), std::max(0, parameters - 1));
-  const AfterStep carry = [&](const fem::Vec& x0, const fem::Vec& v0, double time, double h) {
+  const InStep carry = [&](double time, double h) {
     Slopes dw = Slopes::Zero(3, parameters);
     for (size_t i = 0; i < wind.knots.size(); ++i) {
       dw.middleCols<3>(3 * i) = wind.weight(i, time) * Eigen::Matrix3d::Identity();
     }
-    Slopes dF = windSlopes(x0, v0, wind.at(time), h, tangent, dw);
+    Slopes dF = windSlopes(wind.at(time), h, tangent, dw);
     fem::Vec own, other;
-    body.model().gradient(body.positions(), own);
-    stiffer->sheet_.body().model().gradient(body.positions(), other);
+    body.model().gradient(body.trialPositions(), own);
+    stiffer->sheet_.body().model().gradient(body.trialPositions(), other);
     dF.col(winds) -= (other - own) / by;
-    tangent.advance(x0, h, dF, viscosity);
+    tangent.advance(*step_, body.trialPositions() - body.positions(), h, dF, viscosity);
   };
   Eigen::Index frame = 0;
   const auto see = [&] {
@@ -147,13 +150,13 @@ SheetMotion SheetSimulation::measure(const std::vector<double>& times,
   };
   move(
       times, displacements, velocities, [&](double time) { return wind.at(time); },
-      stiffer ? carry : AfterStep(), see);
+      stiffer ? carry : InStep(), see);
   return motion;
 }
 
-Slopes SheetSimulation::windSlopes(const fem::Vec& x0, const fem::Vec& v0,
-                                   const Eigen::Vector3d& wind, double h,
+Slopes SheetSimulation::windSlopes(const Eigen::Vector3d& wind, double h,
                                    const MotionTangent& tangent, const Slopes& dw) const {
+  const fem::DeformableBody& body = sheet_.body();
   const auto& weights = skin_.embedding.weights;
   Slopes dx = Slopes::Zero(3 * weights.rows(), dw.cols()), du = dx;
   using Entry = Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
@@ -164,9 +167,10 @@ Slopes SheetSimulation::windSlopes(const fem::Vec& x0, const fem::Vec& v0,
     }
   }
   const Slopes forces =
-      windForceSlopes(skin_.embedding.apply(x0), skin_.embedding.apply(v0), skin_.triangles,
+      windForceSlopes(skin_.embedding.apply(body.positions()),
+                      skin_.embedding.apply(body.velocities()), skin_.triangles,
                       {wind, skin_.drag}, areal_density_, h, dx, du, dw);
-  Slopes nodal = Slopes::Zero(x0.size(), dw.cols());
+  Slopes nodal = Slopes::Zero(3 * body.nodeCount(), dw.cols());
   for (int v = 0; v < weights.rows(); ++v) {
     for (Entry it(weights, v); it; ++it)
       nodal.middleRows<3>(3 * it.col()) += it.value() * forces.middleRows<3>(3 * v);

@@ -2,12 +2,14 @@
 
 #include <calipso_fem/world/soft_object.hpp>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
 #include "calipso_flow/object_model.hpp"
 #include "calipso_flow/wind_course.hpp"
 #include "sheet_skin.hpp"
+#include "sheet_step.hpp"
 #include "sheet_tangent.hpp"
 
 namespace calipso::flow {
@@ -61,17 +63,16 @@ class SheetSimulation {
   double stiffnessRatio() const { return stiffness_over_density_; }  // E/rho, m^2/s^2
 
  private:
-  using AfterStep =
-      std::function<void(const fem::Vec& x0, const fem::Vec& v0, double time, double h)>;
+  using InStep = std::function<void(double time, double h)>;
   // Steps through all times, with the wind of the middle of each step, whose time is told to
-  // `after_step`.
+  // `in_step` while the body is in it.
   void move(const std::vector<double>& times, const SurfaceVector& displacements,
-            const SurfaceVector& velocities, const Wind& wind, const AfterStep& after_step,
+            const SurfaceVector& velocities, const Wind& wind, const InStep& in_step,
             const std::function<void()>& after_frame);
   void settle(const Eigen::Vector3d& gravity, double sag);
   // Of the nodal forces, 3 #N x P. @param dw  of the wind, 3 x P
-  Slopes windSlopes(const fem::Vec& x0, const fem::Vec& v0, const Eigen::Vector3d& wind, double h,
-                    const MotionTangent& tangent, const Slopes& dw) const;
+  Slopes windSlopes(const Eigen::Vector3d& wind, double h, const MotionTangent& tangent,
+                    const Slopes& dw) const;
   void blow(const Eigen::Vector3d& wind, double h);
 
   double longest_step_;   // s
@@ -80,6 +81,7 @@ class SheetSimulation {
   double stiffness_over_density_;
   fem::SoftObject sheet_;
   SheetSkin skin_;
+  std::optional<SheetStep> step_;
   Eigen::VectorXd start_;  // 3 #N, nodes in the key frame
 };
 

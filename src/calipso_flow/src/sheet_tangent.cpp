@@ -40,74 +40,27 @@ Slopes windForceSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& u,
   return dF;
 }
 
-MotionTangent::MotionTangent(const fem::DeformableBody& body, int parameters)
-    : body_(body), mass_(3 * body.nodeCount()) {
-  const int count = 3 * body.nodeCount();
-  std::vector<int> index(count, -1);
-  for (int d = 0; d < count; ++d) {
-    mass_[d] = body.model().lumpedMass()[d / 3];
-    if (body.isFixed(d / 3)) continue;
-    index[d] = static_cast<int>(free_.size());
-    free_.push_back(d);
-  }
-  // Every entry is given its number as value, to find the place that it gets.
-  const fem::BlockPattern& pattern = *body.model().pattern();
-  std::vector<Eigen::Triplet<double>> entries;
-  std::vector<int> entry_of(9 * pattern.blockCount(), -1);
-  for (int i = 0; i < pattern.rows(); ++i) {
-    for (int b = pattern.row_start[i]; b < pattern.row_start[i + 1]; ++b) {
-      for (int e = 0; e < 9; ++e) {
-        const int row = index[3 * i + e / 3], column = index[3 * pattern.column[b] + e % 3];
-        if (column < 0 || row < column) continue;
-        entry_of[9 * b + e] = static_cast<int>(entries.size());
-        entries.emplace_back(row, column, static_cast<double>(entries.size()));
-      }
-    }
-  }
-  A_.resize(free_.size(), free_.size());
-  A_.setFromTriplets(entries.begin(), entries.end());
-  std::vector<int> place(entries.size());
-  for (Eigen::Index p = 0; p < A_.nonZeros(); ++p)
-    place[static_cast<size_t>(A_.valuePtr()[p])] = static_cast<int>(p);
-  for (const int entry : entry_of) slots_.push_back(entry < 0 ? -1 : place[entry]);
-  factor_.analyzePattern(A_);
-  dx_ = dv_ = Slopes::Zero(count, parameters);
-}
+MotionTangent::MotionTangent(int components, int parameters)
+    : dx_(Slopes::Zero(components, parameters)), dv_(dx_) {}
 
-void MotionTangent::factorise(const fem::Vec& x0, double h) {
-  body_.model().hessian(body_.positions(), fem::Definiteness::kExact, K_);
-  body_.model().viscosity(x0, D_);
-  for (double& value : D_.values) value *= body_.model().cellMaterials().front().damping;
-  for (size_t e = 0; e < slots_.size(); ++e) {
-    if (slots_[e] >= 0) A_.valuePtr()[slots_[e]] = K_.values[e] + D_.values[e] / h;
-  }
-  for (size_t f = 0; f < free_.size(); ++f) A_.coeffRef(f, f) += mass_[free_[f]] / (h * h);
-  factor_.factorize(A_);
-}
-
-void MotionTangent::advance(const fem::Vec& x0, double h, const Slopes& dF,
-                            const Eigen::VectorXd& viscosity) {
-  factorise(x0, h);
-  const Slopes moving = dx_ - (body_.positions() - x0) * viscosity.transpose();
+void MotionTangent::advance(const SheetStep& step, const fem::Vec& moved, double h,
+                            const Slopes& dF, const Eigen::VectorXd& viscosity) {
+  const Slopes moving = dx_ - moved * viscosity.transpose();
   Slopes all = dF;
   for (Eigen::Index d = 0; d < all.rows(); ++d) {
-    all.row(d) += mass_[d] * (dx_.row(d) / (h * h) + dv_.row(d) / h);
+    all.row(d) += step.mass()[d] * (dx_.row(d) / (h * h) + dv_.row(d) / h);
   }
-  const fem::BlockPattern& pattern = *D_.pattern;
+  const fem::BlockMatrix& D = step.viscosity();
+  const fem::BlockPattern& pattern = *D.pattern;
   for (int i = 0; i < pattern.rows(); ++i) {
     for (int b = pattern.row_start[i]; b < pattern.row_start[i + 1]; ++b) {
       all.middleRows<3>(3 * i).noalias() +=
-          D_.block(b) / h * moving.middleRows<3>(3 * pattern.column[b]);
+          D.block(b) / h * moving.middleRows<3>(3 * pattern.column[b]);
     }
   }
-  Eigen::MatrixXd b(free_.size(), dF.cols());
-  for (size_t f = 0; f < free_.size(); ++f) b.row(f) = all.row(free_[f]);
-  const Eigen::MatrixXd moved = factor_.solve(b);
-  for (size_t f = 0; f < free_.size(); ++f) {
-    const int d = free_[f];
-    dv_.row(d) = (moved.row(f) - dx_.row(d)) / h;
-    dx_.row(d) = moved.row(f);
-  }
+  const Slopes next = step.solve(all);
+  dv_ = (next - dx_) / h;
+  dx_ = next;
 }
 
 }  // namespace calipso::flow

@@ -17,6 +17,8 @@ constexpr double kTwoPi = 6.28318530717958647692;
 constexpr int kGridPerBin = 8;  // candidates per resolvable frequency
 constexpr int kRefinements = 40;
 constexpr double kNyquistShare = 0.95;
+// of the lowest candidate, and of the distance of two: what refinement may come to
+constexpr double kLeastShare = 0.9;
 constexpr double kMostDecay = 3.0;  // e-foldings within the clip
 
 // Frequency and decay of one line.
@@ -59,11 +61,10 @@ Pole bestCandidate(const Eigen::VectorXd& t, const Eigen::MatrixXd& Y, const Pol
   for (double omega = lowest; omega <= highest; omega += step) {
     Poles tried = poles;
     tried.push_back({omega, 0.0});
-    // Two lines closer than half a bin are one.
     const bool taken = std::any_of(poles.begin(), poles.end(), [&](const Pole& p) {
-      return std::abs(p.omega - omega) < 0.5 * kTwoPi / span(t);
+      return std::abs(p.omega - omega) < kTwoPi / span(t);
     });
-    if (taken) continue;
+    if (taken) continue;  // what the clip cannot tell apart is one line
     const double left = residual(t, Y, tried).squaredNorm();
     if (left < least) least = left, best = tried.back();
   }
@@ -92,9 +93,19 @@ Eigen::MatrixXd jacobian(const Eigen::VectorXd& t, const Eigen::MatrixXd& Y, con
   return J;
 }
 
+bool apart(const Poles& poles, double least) {
+  for (size_t a = 0; a < poles.size(); ++a) {
+    for (size_t b = 0; b < a; ++b) {
+      if (std::abs(poles[a].omega - poles[b].omega) < least) return false;
+    }
+  }
+  return true;
+}
+
 bool allowed(const Poles& poles, double lowest, double highest, double duration) {
+  if (!apart(poles, kLeastShare * kTwoPi / duration)) return false;
   return std::all_of(poles.begin(), poles.end(), [&](const Pole& p) {
-    return p.omega >= 0.8 * lowest && p.omega <= highest &&
+    return p.omega >= kLeastShare * lowest && p.omega <= highest &&
            std::abs(p.decay) * duration <= kMostDecay;
   });
 }

@@ -66,7 +66,6 @@ WindFit::Linearised WindFit::linearise(const SheetMotion& motion) const {
   Linearised at{flat(motion.amplitudes - modes_.amplitudes), {}};
   at.J.resize(at.r.size(), motion.slopes.size());
   for (size_t p = 0; p < motion.slopes.size(); ++p) at.J.col(p) = flat(motion.slopes[p]);
-  if (sheets_.given()) at.J.col(at.J.cols() - 1).setZero();
   return at;
 }
 
@@ -120,10 +119,12 @@ std::optional<WindFit::Fitted> WindFit::solve(const std::vector<double>& knots,
 
 Eigen::VectorXd WindFit::stepFrom(const Linearised& at, const Eigen::MatrixXd& P,
                                   const Eigen::VectorXd& w, double damping) const {
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> seen(at.J.transpose() * at.J, P);
+  Eigen::MatrixXd J = at.J;
+  if (sheets_.given()) J.rightCols<1>().setZero();  // it stays as it is, though it is not known
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> seen(J.transpose() * J, P);
   const Eigen::MatrixXd& V = seen.eigenvectors();  // V' P V = 1
   const Eigen::VectorXd beforehand = V.transpose() * (P * w),
-                        pictures = V.transpose() * (at.J.transpose() * at.r);
+                        pictures = V.transpose() * (J.transpose() * at.r);
   Eigen::VectorXd along(w.size());
   for (int i = 0; i < w.size(); ++i) {
     const double information = seen.eigenvalues()[i];

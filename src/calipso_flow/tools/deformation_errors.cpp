@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
+
+#include "calipso_flow/shading.hpp"
 
 namespace calipso::flow {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kTwoPi = 6.28318530717958647692;
+constexpr double kMostTrueWaves = 4.0;  // over the object's size
 
 double percent(double estimate, double truth) { return 100.0 * std::abs(estimate / truth - 1.0); }
 
@@ -46,6 +50,36 @@ double edgeCorrelation(const ObjectModel& model, const TrueObject& truth,
   return (simulated.array() * real.array()).sum() / (simulated.norm() * real.norm());
 }
 
+// Which way the true crests go, object frame: the peak of the spatial spectrum that the true
+// displacement has at the wave's frequency. What a scene writes of its wave depends on how it
+// counts depth.
+Eigen::Vector3d trueTravel(const ObjectModel& model, const TrueObject& truth,
+                           const std::vector<double>& times) {
+  const Eigen::MatrixXd& rest = truth.vertices.front();
+  Eigen::MatrixXd basis(times.size(), 3), displacement(times.size(), rest.size());
+  for (size_t k = 0; k < times.size(); ++k) {
+    const double phase = truth.wave->omega * times[k];
+    basis.row(k) << 1.0, std::cos(phase), std::sin(phase);
+    const Eigen::MatrixXd moved = truth.vertices[k] - rest;
+    displacement.row(k) = Eigen::Map<const Eigen::RowVectorXd>(moved.data(), moved.size());
+  }
+  const Eigen::MatrixXd c = basis.householderQr().solve(displacement);
+  const Eigen::VectorXcd amplitude = c.row(1).transpose().cast<std::complex<double>>() -
+                                     std::complex<double>(0.0, 1.0) *
+                                         c.row(2).transpose().cast<std::complex<double>>();
+  const Eigen::Map<const Eigen::MatrixXcd> columns(amplitude.data(), rest.rows(), 3);
+  Eigen::Index across = 0;  // the axis along which most of it goes
+  columns.colwise().squaredNorm().maxCoeff(&across);
+  const Eigen::Index a = (across + 1) % 3, b = (across + 2) % 3;
+  Eigen::Matrix<double, Eigen::Dynamic, 2> points(rest.rows(), 2);
+  points << rest.col(a), rest.col(b);
+  const double farthest = kMostTrueWaves * kTwoPi / boundingDiagonal(model.mesh);
+  const Eigen::Vector2d k = planeWaveIn(points, columns.col(across), farthest).wave_vector;
+  Eigen::Vector3d travel = Eigen::Vector3d::Zero();
+  travel[a] = k.x(), travel[b] = k.y();
+  return travel;
+}
+
 }  // namespace
 
 void addDeformationErrors(const ObjectModel& model, const TrueObject& truth,
@@ -66,9 +100,11 @@ void addDeformationErrors(const ObjectModel& model, const TrueObject& truth,
       if (!motion.lines.empty() && !motion.lines[0].wave_vector.isZero()) {
         const Eigen::Vector3d k =
             model.world_from_object.linear().transpose() * motion.lines[0].wave_vector;
-        travel =
-            360.0 / kTwoPi *
-            std::acos(std::clamp(k.normalized().dot(truth.wave->vector.normalized()), -1.0, 1.0));
+        const Eigen::Vector3d truly = truth.vertices.size() == motion.times.size()
+                                          ? trueTravel(model, truth, motion.times)
+                                          : truth.wave->vector;
+        travel = 360.0 / kTwoPi *
+                 std::acos(std::clamp(k.normalized().dot(truly.normalized()), -1.0, 1.0));
       }
     }
     if (truth.vertices.size() == motion.times.size()) {

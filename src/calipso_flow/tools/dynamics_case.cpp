@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "calipso_flow/clip_dynamics.hpp"
+#include "carry_case.hpp"
 #include "clip_case.hpp"
 #include "deformation_errors.hpp"
 #include "json_entry.hpp"
@@ -53,6 +54,8 @@ std::string describe(const ClipCase& clip, size_t index, const ObjectDynamics& d
   entry.null("endpoint_error_px");
   const bool rigid = !dynamics.deformation && truth.world_from_object.size() > 1;
   if (rigid) addThrow(scene, model, truth, dynamics, entry);
+  const bool both_deform = dynamics.deformation && truth.vertices.size() == dynamics.motions.size();
+  if (both_deform) addCarriedOn(scene, model, truth, dynamics, entry);
   entry.number("width", scene.camera.width);
   entry.number("track_ms_frame", costs.track.wall).number("fit_ms_frame", costs.fit.wall);
   entry.number("track_cpu_ms_frame", costs.track.cpu).number("fit_cpu_ms_frame", costs.fit.cpu);

@@ -24,7 +24,7 @@ struct Spectrum {
 };
 
 struct SpectrumParams {
-  double least_periods = 0.75;  // of a line within the clip
+  double least_periods = 1.0;  // of a line within the clip
   double least_quality = 8.0;
   int most_lines = 4;
   double noise = 0.0;  // standard deviation that errors explain; no line is sought below

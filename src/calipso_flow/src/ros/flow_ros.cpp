@@ -12,7 +12,9 @@ namespace {
 
 constexpr unsigned kKeepAll = 0;
 constexpr unsigned kLiveQueue = 10;
-constexpr double kDescribeEvery = 1.0;  // s: how deforming objects have moved of late
+constexpr double kDescribeEvery = 1.0;  // s, at least: how deforming objects have moved of late
+// of one core: what may be spent on that, whose search for the wind costs most
+constexpr double kDescribeShare = 0.2;
 constexpr size_t kLiveWaiting = 300;    // frames kept while a live key frame is being aligned
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
@@ -195,16 +197,20 @@ void FlowNode::publishDynamics(const calipso::Frame& frame) {
 void FlowNode::describeOfLate(const std_msgs::Header& header) {
   if (describing_.valid()) {
     if (describing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
-    of_late_ = describing_.get();
+    Description description = describing_.get();
+    of_late_ = std::move(description.objects);
+    describe_every_ = std::max(kDescribeEvery, description.seconds / kDescribeShare);
     clip_dynamics_publisher_.publish(liveDynamicsMsg(of_late_, *live_analyser_, header));
     reporter_.ready(summary(of_late_));
   }
-  if ((header.stamp - described_).toSec() < kDescribeEvery) return;
+  if ((header.stamp - described_).toSec() < describe_every_) return;
   std::vector<DeformationWindow> windows = live_analyser_->windows();
   if (windows.empty()) return;
   described_ = header.stamp;
   describing_ = std::async(std::launch::async, [this, windows = std::move(windows)] {
-    return describe(windows, scene_.gravity, true);
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<ObjectDynamics> objects = describe(windows, scene_.gravity, true);
+    return Description{std::move(objects), 1e-3 * millisecondsSince(start)};
   });
 }
 

@@ -59,9 +59,14 @@ class FlowNode {
   bool finished_ = false;
   // Live: what the last seconds tell of deforming objects, and the work on the next such
   // description, which must end before the analyser does.
+  struct Description {
+    std::vector<ObjectDynamics> objects;
+    double seconds;  // that it took
+  };
   std::vector<ObjectDynamics> of_late_;
   ros::Time described_;
-  std::future<std::vector<ObjectDynamics>> describing_;
+  double describe_every_ = 0.0;  // s
+  std::future<Description> describing_;
 
   DenseFlow dense_flow_;
   sensor_msgs::ImageConstPtr previous_image_;
