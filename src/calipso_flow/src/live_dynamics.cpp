@@ -146,6 +146,14 @@ void LiveAnalyser::filterModes(bool cut, Live& object) {
   }
 }
 
+std::vector<std::string> LiveAnalyser::deforming() const {
+  std::vector<std::string> names;
+  for (const Live& object : objects_) {
+    if (object.deforming) names.push_back(object.followed.tracker().model().name);
+  }
+  return names;
+}
+
 const CoarseModes* LiveAnalyser::modesOf(const std::string& name) const {
   for (const Live& object : objects_) {
     if (object.deforming && object.followed.tracker().model().name == name)

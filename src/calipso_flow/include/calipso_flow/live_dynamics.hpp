@@ -42,6 +42,7 @@ class LiveAnalyser {
   // Takes the next frame in. @throw std::invalid_argument when it is not later than the last
   std::vector<NamedMotion> add(const Frame& frame);
 
+  std::vector<std::string> deforming() const;  // names
   // The modes of a deforming object, which stay the same; nothing while it is rigid or unknown.
   const CoarseModes* modesOf(const std::string& object) const;
   // Of the deforming objects, over the last DynamicsParams::live_window. Their trackers live as

@@ -56,9 +56,14 @@ calipso_msgs::ClipDynamics liveDynamicsMsg(const std::vector<ObjectDynamics>& ob
   calipso_msgs::ClipDynamics msg;
   msg.header = header;
   msg.header.frame_id = topics::kWorldFrame;
-  for (ObjectDynamics object : objects) {
-    if (const CoarseModes* modes = analyser.modesOf(object.name))
-      object.deformation->modes.shapes = modes->shapes;
+  for (const std::string& name : analyser.deforming()) {
+    const auto described = std::find_if(objects.begin(), objects.end(),
+                                        [&](const ObjectDynamics& o) { return o.name == name; });
+    ObjectDynamics object;
+    if (described != objects.end()) object = *described;
+    object.name = name;
+    if (!object.deformation) object.deformation.emplace();
+    object.deformation->modes.shapes = analyser.modesOf(name)->shapes;
     msg.objects.push_back(toMsg(object));
   }
   return msg;

@@ -178,6 +178,7 @@ void FlowNode::publishDynamics(const calipso::Frame& frame) {
       return;
     }
     const auto motions = live_analyser_->add(frameFromMsg(frame));
+    tellNewModes(frame.image->header);
     describeOfLate(frame.image->header);
     auto msg = dynamicsMsg(scene_, motions, frame.image->header);
     addWinds(of_late_, frame.stamp().toSec(), msg);
@@ -191,6 +192,14 @@ void FlowNode::publishDynamics(const calipso::Frame& frame) {
   }
   dynamics_publisher_.publish(known->second);
   markers_.publish(std::distance(dynamics_.begin(), known), frame.stamp());
+}
+
+// Without the modes nobody can make anything of their amplitudes.
+void FlowNode::tellNewModes(const std_msgs::Header& header) {
+  const size_t count = live_analyser_->deforming().size();
+  if (count == modes_told_) return;
+  modes_told_ = count;
+  clip_dynamics_publisher_.publish(liveDynamicsMsg(of_late_, *live_analyser_, header));
 }
 
 // Beside the frames, which must not wait for it.

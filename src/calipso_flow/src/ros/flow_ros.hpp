@@ -38,6 +38,7 @@ class FlowNode {
   void analyse(const calipso::Frame& frame);
   void finishWhenComplete();
   void publishDynamics(const calipso::Frame& frame);
+  void tellNewModes(const std_msgs::Header& header);
   void describeOfLate(const std_msgs::Header& header);
   void publishFlow(const calipso::Frame& frame);
 
@@ -63,6 +64,7 @@ class FlowNode {
     std::vector<ObjectDynamics> objects;
     double seconds;  // that it took
   };
+  size_t modes_told_ = 0;  // of so many objects
   std::vector<ObjectDynamics> of_late_;
   ros::Time described_;
   double describe_every_ = 0.0;  // s
