@@ -9,11 +9,12 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kTrials = 8;    // steps of one fit, also those that make things worse
-constexpr int kFailures = 2;  // of these in a row
-constexpr double kLeastDamping = 0.3, kDamping = 5.0;
+constexpr int kTrials = 12;   // steps of one fit, also those that make things worse
+constexpr int kFailures = 3;  // of these in a row
+constexpr double kLeastDamping = 1.0, kDamping = 5.0;
+constexpr double kPoor = 0.25, kGood = 0.75;  // of the gain that was expected
 constexpr double kSettled = 0.02;  // m/s, a smaller step is the last
-constexpr double kGained = 1e-2;   // of the cost: less gained, and it was the last step
+constexpr double kGained = 1e-2;   // of the cost: less to be gained, and it is the end
 // the pictures' information over that beforehand: half of the deviation
 constexpr double kSeen = 3.0;
 constexpr double kSeenShare = 0.03;  // of the best direction's
@@ -21,6 +22,23 @@ constexpr double kHardlyShown = 0.5;
 constexpr double kMostPersistent = 0.95;
 constexpr double kGuesses[] = {1.0, 2.0, 4.0,
                                8.0};  // m/s: still air has no derivative, drag being quadratic
+
+// After Levenberg and Marquardt: from how far a step gained what the slopes promised.
+class Damping {
+ public:
+  double value() const { return value_; }
+  bool exhausted() const { return failed_ >= kFailures; }
+  // @param gain  over the expected one; negative where things got worse
+  void learn(double gain) {
+    failed_ = gain > 0.0 ? 0 : failed_ + 1;
+    if (gain < kPoor) value_ = std::max(kLeastDamping, (gain > 0.0 ? 1.0 : kDamping) * value_);
+    if (gain > kGood) value_ = value_ <= kLeastDamping ? 0.0 : value_ / kDamping;
+  }
+
+ private:
+  double value_ = 0.0;
+  int failed_ = 0;
+};
 
 }  // namespace
 
@@ -95,23 +113,20 @@ std::optional<WindFit::Fitted> WindFit::solve(const std::vector<double>& knots,
   if (!reached) return std::nullopt;
   Linearised at = linearise(*reached);
   double cost = at.r.squaredNorm() + w.dot(P * w);
-  double damping = 0.0;  // after Levenberg and Marquardt
-  for (int trial = 0, failed = 0; trial < kTrials && failed < kFailures; ++trial) {
-    const Eigen::VectorXd step = stepFrom(at, P, w, damping);
-    std::optional<SheetMotion> motion = simulated(knots, w + step, true);
-    const double before = cost;
+  Damping damping;
+  for (int trial = 0; trial < kTrials && !damping.exhausted(); ++trial) {
+    const Eigen::VectorXd step = stepFrom(at, P, w, damping.value()), tried = w + step;
+    const double expected = (at.r + at.J * step).squaredNorm() + tried.dot(P * tried);
+    if (cost - expected < kGained * cost || step.cwiseAbs().maxCoeff() < kSettled) break;
+    std::optional<SheetMotion> motion = simulated(knots, tried, true);
+    double gain = -1.0;  // over what was expected
     if (motion) {
-      const Eigen::VectorXd tried = w + step;
       const Linearised there = linearise(*motion);
       const double value = there.r.squaredNorm() + tried.dot(P * tried);
+      gain = (cost - value) / (cost - expected);
       if (value < cost) w = tried, at = there, cost = value, reached.swap(motion);
     }
-    if (step.cwiseAbs().maxCoeff() < kSettled ||
-        (cost < before && before - cost < kGained * before))
-      break;
-    failed = cost < before ? 0 : failed + 1;
-    damping = cost < before ? (damping < kLeastDamping ? 0.0 : damping / kDamping)
-                            : std::max(kLeastDamping, damping * kDamping);
+    damping.learn(gain);
   }
   return Fitted{seenPart(at.J, P, w), reached->amplitudes, at.J.transpose() * at.J + P, cost,
                 at.r.squaredNorm()};
