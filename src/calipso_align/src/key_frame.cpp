@@ -31,7 +31,8 @@ std::string framePath(const Scene& scene, int frame) {
   return scene.directory + "/" + name;
 }
 
-// Fits the low-order deformations only: what is to be told is where the contour is implausible.
+// Fits the low-order deformations only: what is to be told is where the contour is implausible. What
+// is attached somewhere cannot move as a whole.
 ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
                         const std::optional<DepthObservation>& depth) {
   AlignOptions options;
@@ -40,7 +41,7 @@ ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
   options.planes = scene.planes;
   options.depth = depth;
   return [mesh = loadMesh(object.cad_path), camera = scene.camera, options,
-          rough = object.initial_world_from_object](
+          moves_whole = object.attachments.empty(), rough = object.initial_world_from_object](
              const std::vector<ContourLoop>& contour) -> std::optional<ModelView> {
     constexpr double kLeastTolerancePx = 1.5;
     const AlignmentResult fit = align(mesh, camera, rough, contour, options);
@@ -48,8 +49,11 @@ ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
     const Points x =
         transformed(camera.world_from_camera.inverse() * fit.world_from_object, fit.mesh.vertices);
     const DepthRendering rendering = renderDepth(x, mesh.triangles, camera);
-    ModelView view{maskOf(rendering, camera), cv::Mat1f::zeros(camera.height, camera.width),
-                   std::max(kLeastTolerancePx, 2.0 * fit.met_mean_px)};
+    ModelView view{maskOf(rendering, camera),
+                   cv::Mat1f::zeros(camera.height, camera.width),
+                   std::max(kLeastTolerancePx, 2.0 * fit.met_mean_px),
+                   {}};
+    if (moves_whole) view.surface = {x, mesh.triangles, camera};
     if (!rendering.roi.empty()) rendering.depth.copyTo(view.depth(rendering.roi));
     return view;
   };
@@ -116,6 +120,7 @@ KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::M
   KeyFrame result;
   const auto start = std::chrono::steady_clock::now();
   result.labels = segmenter.segment(strokes).clone();
+  result.models = segmenter.models();
   result.segmentation_ms = millisecondsSince(start);
   const auto traced = std::chrono::steady_clock::now();
   result.contours = extractContours(image, result.labels, segmenter.targets());

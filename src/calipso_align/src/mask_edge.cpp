@@ -43,6 +43,23 @@ std::optional<float> coverage(const cv::Vec3f& colour, const cv::Vec3f& fore, co
 
 }  // namespace
 
+cv::Mat insideOf(const cv::Mat& mask, int rim_px) {
+  for (int rim = rim_px; rim > 0; rim /= 2) {
+    cv::Mat core;
+    cv::erode(mask, core,
+              cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * rim + 1, 2 * rim + 1)));
+    if (4 * cv::countNonZero(core) > cv::countNonZero(mask)) return core;
+  }
+  return mask;
+}
+
+cv::Mat signedDistance(const cv::Mat& mask) {
+  cv::Mat outside, inside;
+  cv::distanceTransform(mask == 0, outside, cv::DIST_L2, 3);
+  cv::distanceTransform(mask, inside, cv::DIST_L2, 3);
+  return outside - inside;
+}
+
 cv::Mat settleEdge(const cv::Mat& image, const cv::Mat& other, const KnownBackground& background,
                    double noise, cv::Mat& mask) {
   const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3));

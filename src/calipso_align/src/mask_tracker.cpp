@@ -34,25 +34,6 @@ std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {
   return colours;
 }
 
-// Signed distance from the outline of a mask, px; negative inside.
-cv::Mat signedDistance(const cv::Mat& mask) {
-  cv::Mat outside, inside;
-  cv::distanceTransform(mask == 0, outside, cv::DIST_L2, 3);
-  cv::distanceTransform(mask, inside, cv::DIST_L2, 3);
-  return outside - inside;
-}
-
-// A mask without its rim, where flow mixes both sides; the mask itself where nothing else is left.
-cv::Mat insideOf(const cv::Mat& mask) {
-  for (const int rim : {4, 2, 1}) {
-    cv::Mat core;
-    cv::erode(mask, core,
-              cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * rim + 1, 2 * rim + 1)));
-    if (4 * cv::countNonZero(core) > cv::countNonZero(mask)) return core;
-  }
-  return mask;
-}
-
 // Mean over a mask, large differences cut off: an object that passes is no camera motion.
 double meanDifference(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
   constexpr double kMost = 20.0;  // grey levels
@@ -71,7 +52,8 @@ struct MaskTracker::Layers {
   double back_noise;  // grey levels
 };
 
-MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerParams params)
+MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels,
+                         const std::map<int, ModelSurface>& models, TrackerParams params)
     : params_(params), size_(image.size()) {
   checkInput(image, labels);
   previous_image_ = image.clone();
@@ -89,6 +71,9 @@ MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerPar
     object.flow = cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM);
     object.colours = GaussianMixture::fit(coloursUnder(image, object.mask), params_.components);
     object.recent_colours = object.colours;
+    const auto model = models.find(label);
+    if (model != models.end()) object.shape.emplace(model->second, object.mask);
+    if (object.shape && !object.shape->holds()) object.shape.reset();
     objects_.push_back(std::move(object));
   }
   rememberBackground(image);
@@ -108,8 +93,8 @@ void MaskTracker::checkInput(const cv::Mat& image, const cv::Mat& labels) const 
                                 "; give 8 bit grey of the frame's size");
 }
 
-TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
-  checkInput(image, prior);
+TrackedMask MaskTracker::track(const cv::Mat& image) {
+  checkInput(image, {});
   const cv::Mat means = blockMeans(image);
   cv::Mat grey;
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
@@ -128,10 +113,12 @@ TrackedMask MaskTracker::track(const cv::Mat& image, const cv::Mat& prior) {
         coarseShift(object->mask, means, previous_means_, foreign, params_.search_px);
     const cv::Mat flow =
         backwardFlow(grey, previous_grey_, object->mask, shift, params_.margin_px, *object->flow);
-    const bool told = !prior.empty() && cv::countNonZero(prior == object->label) > 0;
-    const cv::Mat rough = told ? cv::Mat(prior == object->label)
-                               : roughlyMoved(object->mask, flow, shift, params_.margin_px);
-    follow(*object, image, flow, rough, told);
+    cv::Mat rough = roughlyMoved(object->mask, flow, shift, params_.margin_px);
+    if (object->shape) {
+      object->shape->moveAlong(previous_grey_, grey, flow, insideOf(rough));
+      rough = object->shape->silhouette();
+    }
+    follow(*object, image, flow, rough);
     object->reference_mean = means;
   }
   takeUpAgain(image, means);
@@ -152,18 +139,19 @@ TrackedMask MaskTracker::combine(int moved) const {
 }
 
 void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& flow,
-                         const cv::Mat& rough, bool exact) {
+                         const cv::Mat& rough) {
   const cv::Rect roi = around(rough, params_.margin_px);
   if (roi.empty())
     lose(object);
   else
-    settle(object, image, flow, rough(roi), exact, roi);
+    settle(object, image, flow, rough(roi), roi);
 }
 
 void MaskTracker::lose(Object& object) const {
   object.mask = cv::Mat::zeros(size_, CV_8U);
   object.coverage = object.mask.clone();
   object.confidence = 0.0f;
+  object.shape.reset();
 }
 
 void MaskTracker::takeUpAgain(const cv::Mat& image, const cv::Mat& means) {
@@ -257,15 +245,14 @@ cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view,
 }
 
 MaskTracker::Prediction MaskTracker::predict(const Object& object, const cv::Mat& flow,
-                                             const cv::Mat& rough, bool exact,
-                                             const cv::Rect& roi) const {
+                                             const cv::Mat& rough, const cv::Rect& roi) const {
   Prediction p;
   p.core = insideOf(rough);
   cv::Mat support = cv::Mat::zeros(size_, CV_8U);
   p.core.copyTo(support(roi));
   p.motion = layerMotion(flow, support, roi);
   p.coverage = movedBack(object.coverage, p.motion, roi);
-  p.mask = exact ? rough.clone() : cv::Mat(p.coverage > 127);
+  p.mask = p.coverage > 127;
   if (cv::countNonZero(p.mask) == 0) return p;
   p.distance = signedDistance(p.mask);
   p.band = cv::abs(p.distance) <= params_.band_px;
@@ -321,10 +308,31 @@ void MaskTracker::cutContradicted(const Object& object, const cv::Mat& view, con
             params_.smoothness, labels);
 }
 
+// Takes the outline from the object's model, moved to where the colours have it, as long as it
+// meets what they say.
+bool MaskTracker::fitShape(Object& object, const cv::Mat& view, const Layers& layers,
+                           const cv::Rect& roi, Prediction& p) const {
+  if (!object.shape) return false;
+  object.shape->carryDetails(p.motion, roi);
+  const cv::Mat expected = object.shape->distance(roi);
+  const std::vector<cv::Mat> costs = costsOf(view, cv::abs(expected) <= params_.shape_search_px,
+                                             expected, layers.back, layers.fore, 0.0f);
+  const cv::Mat others = grown(occupied_ & ~object.mask, params_.band_px)(roi);
+  object.shape->meetOutline(costs[0] - costs[1], others, roi);
+  if (!object.shape->holds()) {
+    object.shape.reset();
+    return false;
+  }
+  p.distance = object.shape->distance(roi);
+  p.mask = p.distance < 0.0;
+  p.band = cv::abs(p.distance) <= params_.shape_band_px;
+  return true;
+}
+
 void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& flow,
-                         const cv::Mat& rough, bool exact, const cv::Rect& roi) {
+                         const cv::Mat& rough, const cv::Rect& roi) {
   const cv::Mat view = image(roi);
-  const Prediction p = predict(object, flow, rough, exact, roi);
+  Prediction p = predict(object, flow, rough, roi);
   if (p.distance.empty()) return lose(object);
   const std::vector<cv::Vec3f> surroundings =
       coloursUnder(view, (p.distance > params_.band_px) & (p.distance < params_.margin_px));
@@ -335,12 +343,13 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   const KnownBackground background = backgroundIn(roi, image, flow);
   const GaussianMixture ring_colours = GaussianMixture::fit(surroundings, params_.components);
   const Layers layers = layersOf(object, view, p, background, ring_colours, roi);
+  const bool shaped = fitShape(object, view, layers, roi, p);
   cv::Mat labels = p.mask / 255;
   cutLabels(view, p.band,
             costsOf(view, p.band, p.distance, layers.back, layers.fore, params_.prior_limit),
             params_.smoothness, labels);
   const double area = std::max(1, cv::countNonZero(labels));
-  if (!exact) cutContradicted(object, view, p, background, layers, roi, labels);
+  if (!shaped) cutContradicted(object, view, p, background, layers, roi, labels);
   const double flipped = cv::countNonZero((labels > 0) != (p.mask > 0));
   object.confidence = static_cast<float>(std::clamp(1.0 - 4.0 * flipped / area, 0.0, 1.0));
   accept(object, view, background, layers.back_noise, labels > 0, roi);

@@ -232,7 +232,16 @@ std::optional<FittedShape> Segmenter::fitModel(size_t k) const {
   const cv::Mat silhouette = view->silhouette(view_), own = labels_(view_) == targets_[k].label;
   const double agreement = cv::countNonZero(silhouette & own) /
                            static_cast<double>(std::max(1, cv::countNonZero(silhouette | own)));
-  return FittedShape{{silhouette, view->depth(view_), view->tolerance_px}, agreement};
+  return FittedShape{{silhouette, view->depth(view_), view->tolerance_px, view->surface},
+                     agreement};
+}
+
+std::map<int, ModelSurface> Segmenter::models() const {
+  std::map<int, ModelSurface> models;
+  for (size_t k = 0; k < fitted_.size(); ++k)
+    if (fitted_[k] && fitted_[k]->view.surface.points.size() > 0)
+      models[targets_[k].label] = fitted_[k]->view.surface;
+  return models;
 }
 
 // Objects do not know of each other: side by side, the first in this thread.

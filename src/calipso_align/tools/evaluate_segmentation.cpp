@@ -157,9 +157,10 @@ struct Tracking {
   double ms_per_frame = 0.0;
 };
 
-Tracking track(const Scene& scene, const cv::Mat& start, const std::string& pictures) {
+Tracking track(const Scene& scene, const cv::Mat& start, const std::map<int, ModelSurface>& models,
+               const std::string& pictures) {
   Tracking result;
-  MaskTracker tracker(readFrame(scene, 0), start);
+  MaskTracker tracker(readFrame(scene, 0), start, models);
   int frames = 0;
   for (int frame = 1; frame < scene.frame_count; ++frame) {
     const cv::Mat truth = trueLabels(scene, frame);
@@ -205,8 +206,9 @@ void evaluate(const std::string& path, const Arguments& arguments) {
   const std::vector<SegmentationTarget>& targets = segmenter->targets();
   const cv::Mat truth = trueLabels(scene, 0);
   const bool track_it = arguments.track && !truth.empty();
-  const Tracking tracked = track_it ? track(scene, key.labels, arguments.pictures) : Tracking();
-  const Tracking ideal = track_it ? track(scene, truth, "") : Tracking();
+  const Tracking tracked =
+      track_it ? track(scene, key.labels, key.models, arguments.pictures) : Tracking();
+  const Tracking ideal = track_it ? track(scene, truth, key.models, "") : Tracking();
 
   for (size_t k = 0; k < targets.size(); ++k) {
     std::printf(

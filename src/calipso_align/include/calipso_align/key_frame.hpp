@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -15,6 +16,7 @@ namespace calipso::align {
 struct KeyFrame {
   cv::Mat labels;                       // CV_8U: 0 none, else the object's index
   std::vector<ObjectContour> contours;  // in the scene's order of objects
+  std::map<int, ModelSurface> models;   // per label, where one could be fitted
   double segmentation_ms = 0.0;         // wall time
   double contour_ms = 0.0;
 };

@@ -4,6 +4,12 @@
 
 namespace calipso::align {
 
+// Signed distance from the outline of a mask (CV_8U), px: CV_32F, negative inside.
+cv::Mat signedDistance(const cv::Mat& mask);
+
+// A mask without its rim, where flow mixes both sides; the mask itself where nothing else is left.
+cv::Mat insideOf(const cv::Mat& mask, int rim_px = 4);
+
 // What is clear about the background behind an outline: a picture of it, where `known` (CV_8U).
 struct KnownBackground {
   cv::Mat image;  // CV_8UC3; empty: nothing is known

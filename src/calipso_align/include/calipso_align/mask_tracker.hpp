@@ -3,11 +3,13 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <optional>
 #include <vector>
 
 #include "calipso_align/gaussian_mixture.hpp"
 #include "calipso_align/label_cut.hpp"
 #include "calipso_align/mask_edge.hpp"
+#include "calipso_align/rigid_shape.hpp"
 
 namespace calipso::align {
 
@@ -24,6 +26,8 @@ struct TrackerParams {
   // nats; the most that the prediction says, unless the background contradicts it
   float prior_limit = 9.0f;
   float wrong_share = 0.02f;   // of the object: what a known background contradicts is cut anew
+  int shape_search_px = 8;     // the outline of a model that moves along is looked for this close
+  int shape_band_px = 3;       // ... and then pixels this close to it are told by their colours
   float outlier_cost = 18.0f;  // nats; cost of a colour that a model does not know
   SmoothnessParams smoothness{4.0f, 0.02f, 0.0f, 0.0f};
 };
@@ -46,12 +50,12 @@ class MaskTracker {
  public:
   // image: CV_8UC3, labels: CV_8U, of equal size.
   // @throw std::invalid_argument naming size or type
-  MaskTracker(const cv::Mat& image, const cv::Mat& labels, TrackerParams params = {});
+  MaskTracker(const cv::Mat& image, const cv::Mat& labels,
+              const std::map<int, ModelSurface>& models = {}, TrackerParams params = {});
 
-  // The next frame. `prior`: CV_8U labels where something better than the flow predicts them (the
-  // aligned models' silhouettes), or empty.
+  // The next frame.
   // @throw std::invalid_argument naming size or type of what does not fit the key frame
-  TrackedMask track(const cv::Mat& image, const cv::Mat& prior = {});
+  TrackedMask track(const cv::Mat& image);
 
  private:
   struct Object {
@@ -64,6 +68,7 @@ class MaskTracker {
     int key_area = 0;  // px
     float confidence = 1.0f;
     cv::Ptr<cv::DISOpticalFlow> flow;  // has buffers of its own
+    std::optional<RigidShape> shape;   // while the object moves as its model does
   };
 
   // Where the motion of an object's layer puts it, on a part of the picture.
@@ -80,21 +85,20 @@ class MaskTracker {
   void rememberBackground(const cv::Mat& image);
   KnownBackground backgroundIn(const cv::Rect& roi, const cv::Mat& image,
                                const cv::Mat& flow) const;
-  void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
-              bool exact);
+  void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough);
   void lose(Object& object) const;
   // Takes up the lost objects that have come back.
   void takeUpAgain(const cv::Mat& image, const cv::Mat& means);
   TrackedMask combine(int moved) const;
   void settle(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
-              bool exact, const cv::Rect& roi);
+              const cv::Rect& roi);
   // Takes a mask as where the object is, with its edge settled.
   void accept(Object& object, const cv::Mat& view, const KnownBackground& background, double noise,
               cv::Mat mask, const cv::Rect& roi) const;
   std::vector<cv::Mat> costsOf(const cv::Mat& view, const cv::Mat& band, const cv::Mat& distance,
                                const LayerAppearance& back, const LayerAppearance& fore,
                                float prior_limit) const;
-  Prediction predict(const Object& object, const cv::Mat& flow, const cv::Mat& rough, bool exact,
+  Prediction predict(const Object& object, const cv::Mat& flow, const cv::Mat& rough,
                      const cv::Rect& roi) const;
   Layers layersOf(const Object& object, const cv::Mat& view, const Prediction& prediction,
                   const KnownBackground& background, const GaussianMixture& surroundings,
@@ -102,6 +106,8 @@ class MaskTracker {
   void cutContradicted(const Object& object, const cv::Mat& view, const Prediction& prediction,
                        const KnownBackground& background, const Layers& layers, const cv::Rect& roi,
                        cv::Mat& labels) const;
+  bool fitShape(Object& object, const cv::Mat& view, const Layers& layers, const cv::Rect& roi,
+                Prediction& prediction) const;
   cv::Mat othersIn(const Object& object, const cv::Mat& view, const cv::Rect& roi) const;
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -51,6 +52,8 @@ class Segmenter {
 
   const cv::Mat& labels() const { return labels_; }
   const std::vector<SegmentationTarget>& targets() const { return targets_; }
+  // Per label, the models that were fitted to the first contours; none before the first call.
+  std::map<int, ModelSurface> models() const;
 
  private:
   void learn();

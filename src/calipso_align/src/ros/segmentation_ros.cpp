@@ -95,7 +95,7 @@ void SegmentationRos::segment() {
       segmenter_ =
           std::make_unique<Segmenter>(makeSegmenter(key_image_, scene_, params_.mode == "bag"));
     const KeyFrame key = segmentKeyFrame(key_image_, *segmenter_, strokes_);
-    tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels);
+    tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels, key.models);
     labels_ = key.labels;
     key_message_ = boost::make_shared<calipso_msgs::Segmentation>(
         toMsg(key_header_, key.labels, key.contours, 1.0f));

@@ -1,0 +1,150 @@
+#include "calipso_align/rigid_shape.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "../src/body_pose.hpp"
+#include "calipso_align/mask_tracker.hpp"
+#include "synthetic_picture.hpp"
+#include "synthetic_shape.hpp"
+
+namespace calipso::align {
+namespace {
+
+using testing::intersectionOverUnion;
+
+// A painted pear, as it is seen after a motion in the camera frame.
+class PaintedPear {
+ public:
+  PaintedPear() : camera_(test::frontCamera()), mesh_(test::pear(36, 48)) {
+    surface_ = {test::inCamera(camera_, Eigen::Isometry3d::Identity(), mesh_.vertices),
+                mesh_.triangles, camera_};
+  }
+
+  const ModelSurface& surface() const { return surface_; }
+
+  cv::Mat mask(const Eigen::Isometry3d& motion, double stretch = 1.0) const {
+    return maskOf(renderDepth(moved(motion, stretch), mesh_.triangles, camera_), camera_);
+  }
+
+  // Blotches on the pear, and behind it blotches of the same colours that stand still.
+  cv::Mat picture(const Eigen::Isometry3d& motion, int seed, double stretch = 1.0) const {
+    const DepthRendering view = renderDepth(moved(motion, stretch), mesh_.triangles, camera_);
+    cv::Mat image(camera_.height, camera_.width, CV_8UC3);
+    cv::RNG rng(seed);
+    for (int v = 0; v < image.rows; ++v)
+      for (int u = 0; u < image.cols; ++u) {
+        const double depth = view.at(u, v);
+        Eigen::Vector3d p = 0.008 * Eigen::Vector3d(u, v, 200.0);
+        if (depth > 0.0) p = motion.inverse() * Eigen::Vector3d(depth * camera_.ray(u, v));
+        const double bright = std::sin(17.0 * p.x() + 3.0) * std::sin(13.0 * p.y() + 5.0 * p.z());
+        for (int c = 0; c < 3; ++c)
+          image.at<cv::Vec3b>(v, u)[c] = cv::saturate_cast<uchar>(
+              110.0 + 60.0 * bright + (depth > 0.0 ? 12.0 : -12.0) * (c - 1) + rng.gaussian(2.0));
+      }
+    cv::GaussianBlur(image, image, {3, 3}, 0.6);
+    return image;
+  }
+
+ private:
+  Points moved(const Eigen::Isometry3d& motion, double stretch) const {
+    Points x = surface_.points;
+    x.col(0) *= stretch;
+    return transformed(motion, x);
+  }
+
+  Camera camera_;
+  TriangleMesh mesh_;
+  ModelSurface surface_;
+};
+
+// Turns about an axis through the pear and drifts sideways.
+Eigen::Isometry3d motionAt(int frame) {
+  const Eigen::Vector3d centre(0.0, 0.0, 3.0), axis(0.3, 0.9, 0.2);
+  const Eigen::AngleAxisd turn(0.05 * frame, axis.normalized());
+  const Eigen::Vector3d to = centre + frame * Eigen::Vector3d(0.018, 0.004, 0.0);
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = turn.toRotationMatrix();
+  motion.translation() = to - motion.linear() * centre;
+  return motion;
+}
+
+TEST(BodyPose, JacobianMatchesDifferences) {
+  const Camera camera = test::frontCamera();
+  const BodyPose pose{{0.1, -0.2, 2.5}, motionAt(4)};
+  const Eigen::Vector3d point(0.25, 0.1, 2.8), p = pose.camera_from_key * point;
+  const Eigen::Matrix<double, 2, 6> J = pose.jacobian(camera, p);
+  constexpr double h = 1e-5;
+  for (int k = 0; k < 6; ++k) {
+    BodyPose ahead = pose, behind = pose;
+    ahead.move(h * Vector6::Unit(k));
+    behind.move(-h * Vector6::Unit(k));
+    const Eigen::Vector2d difference = (camera.project(ahead.camera_from_key * point) -
+                                        camera.project(behind.camera_from_key * point)) /
+                                       (2.0 * h);
+    // Central differences: the error is of order h^2 times the third derivative, some 1e-6 px.
+    EXPECT_LT((difference - J.col(k)).norm(), 1e-4) << "parameter " << k;
+  }
+}
+
+TEST(RigidShape, FollowsATurningBodyBeforeItsOwnColours) {
+  const PaintedPear pear;
+  const cv::Mat key = pear.mask(motionAt(0));
+  MaskTracker tracker(pear.picture(motionAt(0), 1), key / 255, {{1, pear.surface()}});
+  for (int k = 1; k <= 10; ++k) {
+    const TrackedMask tracked = tracker.track(pear.picture(motionAt(k), k + 1));
+    // A pixel of some 400 along the outline of 25,000: 0.016.
+    EXPECT_GE(intersectionOverUnion(tracked.labels == 1, pear.mask(motionAt(k))), 0.98)
+        << "frame " << k;
+  }
+}
+
+// The model may lack details that the mask has.
+TEST(RigidShape, KeepsWhatTheMaskHadBesides) {
+  const PaintedPear pear;
+  cv::Mat mask = pear.mask(motionAt(0));
+  const cv::Rect knob(cv::boundingRect(mask).br().x - 3, 110, 16, 16);
+  mask(knob).setTo(255);
+  RigidShape shape(pear.surface(), mask);
+  ASSERT_TRUE(shape.holds());
+  const cv::Rect whole(cv::Point(), mask.size());
+  EXPECT_EQ(cv::countNonZero((shape.distance(whole) < 0.0f) != (mask > 0)), 0);
+  const cv::Rect part(40, 20, 220, 200);
+  shape.carryDetails(cv::Mat::zeros(part.size(), CV_32FC2), part);
+  EXPECT_EQ(cv::countNonZero((shape.distance(part) < 0.0f) != (mask(part) > 0)), 0);
+}
+
+TEST(RigidShape, IsGivenUpWhenTheBodyDeforms) {
+  const PaintedPear pear;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  const cv::Rect whole(0, 0, 320, 240);
+  RigidShape shape(pear.surface(), pear.mask(still));
+  const cv::Mat nowhere = cv::Mat::zeros(whole.size(), CV_8U);
+  const auto frame = [&](double stretch) {
+    cv::Mat grey;
+    cv::cvtColor(pear.picture(still, 1, stretch), grey, cv::COLOR_BGR2GRAY);
+    return grey;
+  };
+  const auto track = [&](double from, double to) {
+    const cv::Mat flow = cv::Mat::zeros(whole.size(), CV_32FC2), mask = pear.mask(still, to);
+    shape.moveAlong(frame(from), frame(to), flow, mask);
+    cv::Mat evidence;
+    mask.convertTo(evidence, CV_32F, 6.0 / 255.0, -3.0);
+    shape.meetOutline(evidence, nowhere, whole);
+  };
+  track(1.0, 1.0);
+  EXPECT_TRUE(shape.holds());
+  track(1.0, 1.15);
+  EXPECT_FALSE(shape.holds());
+}
+
+TEST(RigidShape, AModelThatDoesNotMeetItsMaskIsOfNoUse) {
+  const PaintedPear pear;
+  cv::Mat half = pear.mask(motionAt(0));
+  half.colRange(0, 160).setTo(0);
+  EXPECT_FALSE(RigidShape(pear.surface(), half).holds());
+}
+
+}  // namespace
+}  // namespace calipso::align
