@@ -177,13 +177,13 @@ cv::Mat nearnessOf(const PicturePlane& plane, const cv::Size& size) {
 }
 
 // The normal of a surface that is not plane, from its pixels around.
-std::optional<PicturePlane> curvedAt(const cv::Mat& nearness, int u, int v) {
+// @param known CV_8UC1, != 0: the depth image says how near it is
+std::optional<PicturePlane> curvedAt(const cv::Mat& nearness, const cv::Mat& known, int u, int v) {
   const float own = nearness.at<float>(v, u);
   const cv::Rect around(u - kCurvedReach, v - kCurvedReach, 2 * kCurvedReach + 1,
                         2 * kCurvedReach + 1);
   std::vector<Pixel> same;
-  for (const Pixel& p :
-       pixelsIn(nearness, nearness > 0.0f, around & cv::Rect({0, 0}, nearness.size()), 1)) {
+  for (const Pixel& p : pixelsIn(nearness, known, around, 1)) {
     if (std::abs(p.nearness - own) < kSameSurface * own) same.push_back(p);
   }
   const auto abc = affineThrough(same);
@@ -305,6 +305,7 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
     extents.push_back({nearness, nearness, {}}), normals.push_back(plane.normal(camera));
   }
   findReaches(scenery, supports, extents);
+  const cv::Mat known = scenery > 0.0f;
   PlaceSurfaces surfaces{cv::Mat::zeros(scenery.size(), CV_8U), cv::Mat(scenery.size(), CV_32FC3),
                          cv::Mat(scenery.size(), CV_32FC3), supports};
 #pragma omp parallel for schedule(dynamic, 8)
@@ -320,7 +321,7 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
       if (plane >= supports)
         setAt(u, v, extents[plane].nearness.at<float>(v, u), normals[plane], camera, surfaces);
       if (plane != kNoPlane || seen == 0.0f) continue;
-      if (const auto curved = curvedAt(scenery, u, v))
+      if (const auto curved = curvedAt(scenery, known, u, v))
         label = PlaceSurfaces::kCurved, setAt(u, v, seen, curved->normal(camera), camera, surfaces);
     }
   }
