@@ -105,7 +105,8 @@ FILMED = [("case", "case"), ("wind_true_m_s", "wind, m/s"), ("wind_m_s", "found"
 CLOTH = [("case", "case"), ("object", "object"), ("frequency_error_percent", "frequency, %"),
          ("travel_direction_error_deg", "travel, deg"), ("lean_error_percent", "lean, %"),
          ("wind_m_s", "wind, m/s"), ("wind_explained", "explained"),
-         ("lower_edge_correlation", "lower edge, correlation"), ("track_ms_frame", "tracking, ms/frame"),
+         ("lower_edge_correlation", "lower edge, correlation"), ("carried_speed", "carried on: speed kept"),
+         ("carried_edge_percent", "its lower edge off, %"), ("track_ms_frame", "tracking, ms/frame"),
          ("track_cpu_ms_frame", "CPU ms/frame"), ("wind_cpu_ms_frame", "search for the wind, CPU ms/frame")]
 REPEATED = [("repeats", "repeats"), ("velocity_covered_95", "velocity in its 95 %"),
             ("spin_covered_95", "spin in its 95 %"), ("gravity_found", "g told"), ("gravity_covered_95", "g in its 95 %"),

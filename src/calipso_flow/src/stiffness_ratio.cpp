@@ -10,7 +10,7 @@
 namespace calipso::flow {
 namespace {
 
-constexpr int kNodes = 1000;
+constexpr int kNodes = 3000;
 constexpr int kModes = 6;
 constexpr double kLeastAgreement = 0.6;
 constexpr double kSameFrequency = 0.02;  // relative
