@@ -5,8 +5,9 @@
 
 namespace calipso::flow {
 
-std::vector<AlignedModel> alignedModels(const Scene& scene) {
-  const cv::Mat image = align::loadKeyImage(scene);
+std::vector<AlignedModel> alignedModels(const Scene& scene, const Perturbation& perturbation) {
+  cv::Mat image = align::loadKeyImage(scene);
+  perturbation.addGrain(0, image);
   align::Segmenter segmenter = align::makeSegmenter(image, scene, true);
   const align::KeyFrame key = align::segmentKeyFrame(image, segmenter, align::loadStrokes(scene));
   std::vector<AlignedModel> models;
@@ -17,7 +18,8 @@ std::vector<AlignedModel> alignedModels(const Scene& scene) {
     options.attachments = object.attachments;
     options.depth = align::loadDepth(scene);
     const align::AlignmentResult fit =
-        align::align(loadMesh(object.cad_path), scene.camera, object.initial_world_from_object,
+        align::align(loadMesh(object.cad_path), scene.camera,
+                     perturbation.nudged(object.initial_world_from_object, scene.camera, object.index),
                      key.contours[k].loops, options);
     AlignedModel aligned;
     aligned.model.name = object.name;

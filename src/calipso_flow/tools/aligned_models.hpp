@@ -5,6 +5,7 @@
 
 #include "calipso_flow/object_model.hpp"
 #include "calipso_scene/scene.hpp"
+#include "perturbation.hpp"
 
 namespace calipso::flow {
 
@@ -16,6 +17,6 @@ struct AlignedModel {
 };
 
 // In the scene's order of objects. @throw what calipso_align throws
-std::vector<AlignedModel> alignedModels(const Scene& scene);
+std::vector<AlignedModel> alignedModels(const Scene& scene, const Perturbation& perturbation);
 
 }  // namespace calipso::flow

@@ -90,16 +90,18 @@ cv::Mat ClipCase::frame(int k) const {
   const std::string path = scene.directory + "/" + name;
   cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
   if (picture.empty()) throw std::runtime_error(path + " is no picture that can be read");
+  perturbation.addGrain(k, picture);
   if (scale > 1) cv::resize(picture, picture, {}, scale, scale, cv::INTER_CUBIC);
   return picture;
 }
 
-ClipCase loadClipCase(const std::string& directory, const std::string& models, int scale) {
-  ClipCase clip{loadScene(directory), scale, {}, {}, {}};
+ClipCase loadClipCase(const std::string& directory, const std::string& models, int scale,
+                      const Perturbation& perturbation) {
+  ClipCase clip{loadScene(directory), scale, perturbation, {}, {}, {}};
   const Scene& scene = clip.scene;
   std::vector<std::optional<AlignedModel>> aligned(scene.objects.size());
   if (models == "aligned") {
-    std::vector<AlignedModel> fits = alignedModels(scene);
+    std::vector<AlignedModel> fits = alignedModels(scene, perturbation);
     std::move(fits.begin(), fits.end(), aligned.begin());
   }
   for (size_t i = 0; i < scene.objects.size(); ++i) {

@@ -6,6 +6,7 @@
 
 #include "calipso_flow/object_model.hpp"
 #include "calipso_scene/scene.hpp"
+#include "perturbation.hpp"
 #include "truth.hpp"
 
 namespace calipso::flow {
@@ -15,6 +16,7 @@ namespace calipso::flow {
 struct ClipCase {
   Scene scene;  // its camera is that of the enlarged frames
   int scale = 1;
+  Perturbation perturbation;
   std::vector<ObjectModel> models;
   std::vector<cv::Mat> masks;
   std::vector<TrueObject> truths;
@@ -25,6 +27,7 @@ struct ClipCase {
 // @param models  see DynamicsOptions
 // @param scale   the frames are enlarged by this factor
 // @throw std::runtime_error when the folder holds no truth
-ClipCase loadClipCase(const std::string& directory, const std::string& models, int scale);
+ClipCase loadClipCase(const std::string& directory, const std::string& models, int scale,
+                      const Perturbation& perturbation = Perturbation());
 
 }  // namespace calipso::flow

@@ -48,7 +48,8 @@ std::string describe(const ClipCase& clip, size_t index, const ObjectDynamics& d
                                   [](const ObjectMotion& m) { return m.moving; });
   JsonEntry entry;
   entry.text("case", std::filesystem::path(scene.directory).filename().string());
-  entry.text("object", dynamics.name).flag("moving", moving);
+  entry.text("object", dynamics.name).number("perturbation", clip.perturbation.number());
+  entry.flag("moving", moving);
   addMotionErrors(scene, truth, dynamics, entry);
   addDeformationErrors(model, truth, dynamics, scene.gravity, entry);
   entry.null("endpoint_error_px");
@@ -94,14 +95,16 @@ std::vector<ObjectDynamics> analyse(const ClipCase& clip, Costs& costs) {
 
 std::vector<std::string> evaluateScene(const std::string& directory,
                                        const DynamicsOptions& options) {
-  const ClipCase clip = loadClipCase(directory, options.models, options.scale);
-  Costs costs;
-  const std::vector<ObjectDynamics> dynamics = analyse(clip, costs);
   std::vector<std::string> entries;
-  for (size_t i = 0; i < dynamics.size(); ++i) {
-    entries.push_back(describe(clip, i, dynamics[i], costs));
-    if (!options.trace.empty())
-      writeTrace(options.trace, clip.scene, clip.models[i], clip.truths[i], dynamics[i]);
+  for (int n = 0; n <= options.perturbations; ++n) {
+    const ClipCase clip = loadClipCase(directory, options.models, options.scale, Perturbation(n));
+    Costs costs;
+    const std::vector<ObjectDynamics> dynamics = analyse(clip, costs);
+    for (size_t i = 0; i < dynamics.size(); ++i) {
+      entries.push_back(describe(clip, i, dynamics[i], costs));
+      if (!options.trace.empty() && n == 0)
+        writeTrace(options.trace, clip.scene, clip.models[i], clip.truths[i], dynamics[i]);
+    }
   }
   return entries;
 }

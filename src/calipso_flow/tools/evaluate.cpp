@@ -14,7 +14,7 @@ namespace {
 
 constexpr char kUsage[] =
     "usage: evaluate [--models aligned|true|held|DIR] [--trace DIR] [--scale N] [--filmed] "
-    "[--repeats N] PATH...\n"
+    "[--repeats N] [--perturb N] PATH...\n"
     "  PATH      a scene folder (scene.yaml), or a folder with frame10.png, frame11.png, "
     "flow10.flo\n"
     "  --models  aligned (default): as calipso_align fits them to the key frame; true: true shape "
@@ -26,6 +26,7 @@ constexpr char kUsage[] =
     "  --filmed  adds bodies simulated in a known wind or with a known stiffness, filmed by this "
     "tool\n"
     "  --repeats N noisy films of a thrown box: how often the stated intervals hold the truth\n"
+    "  --perturb evaluates N further recordings of each scene: other grain, another rough placement\n"
     "  --scale   enlarges the frames first: 2 makes 1280x720 of 640x360\n";
 
 struct Arguments {
@@ -45,6 +46,8 @@ Arguments parse(int argc, char** argv) {
       arguments.options.trace = argv[++i];
     } else if (argument == "--repeats" && i + 1 < argc) {
       arguments.repeats = std::max(0, std::atoi(argv[++i]));
+    } else if (argument == "--perturb" && i + 1 < argc) {
+      arguments.options.perturbations = std::max(0, std::atoi(argv[++i]));
     } else if (argument == "--filmed") {
       arguments.filmed = true;
     } else if (argument == "--scale" && i + 1 < argc) {
