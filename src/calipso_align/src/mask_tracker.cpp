@@ -34,6 +34,12 @@ std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {
   return colours;
 }
 
+// A part of a mask that was grown.
+cv::Mat grownIn(const cv::Rect& roi, const cv::Mat& mask, int px) {
+  const cv::Rect near = grown(roi, px) & cv::Rect(cv::Point(), mask.size());
+  return grown(mask(near), px)(roi - near.tl());
+}
+
 // Mean over a mask, large differences cut off: an object that passes is no camera motion.
 double meanDifference(const cv::Mat& a, const cv::Mat& b, const cv::Mat& mask) {
   constexpr double kMost = 20.0;  // grey levels
@@ -191,12 +197,12 @@ KnownBackground MaskTracker::backgroundIn(const cv::Rect& roi, const cv::Mat& im
                                           const cv::Mat& flow) const {
   constexpr int kClearance = 3;
   const KnownBackground remembered{background_.image(roi), background_.known(roi)};
-  const cv::Mat free = ~grown(occupied_, kClearance), visible = free(roi);
+  const cv::Mat visible = ~grownIn(roi, occupied_, kClearance);
   constexpr double kSensorNoise = 4.0;  // grey levels; not more differs where nothing moves
   if (cv::countNonZero(visible) == 0 ||
       noiseOf(image(roi), remembered.image, visible) <= kSensorNoise)
     return remembered;
-  const cv::Mat motion = layerMotion(flow, free, roi);
+  const cv::Mat free = ~grown(occupied_, kClearance), motion = layerMotion(flow, free, roi);
   const KnownBackground moved{movedBack(previous_image_, motion, roi),
                               movedBack(free, motion, roi) > 250};
   return meanDifference(image(roi), remembered.image, visible) <=
@@ -231,8 +237,9 @@ std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& ba
 // Pixels (CV_8U, of roi's size) that are rather another object's, near where one was.
 cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view,
                               const cv::Rect& roi) const {
-  const cv::Mat near = grown(occupied_ & ~object.mask, params_.margin_px / 2)(roi);
   cv::Mat others = cv::Mat::zeros(view.size(), CV_8U);
+  if (objects_.size() == 1) return others;
+  const cv::Mat near = grownIn(roi, occupied_ & ~object.mask, params_.margin_px / 2);
   for (int y = 0; y < view.rows; ++y)
     for (int x = 0; x < view.cols; ++x) {
       if (!near.at<uchar>(y, x)) continue;
@@ -317,7 +324,7 @@ bool MaskTracker::fitShape(Object& object, const cv::Mat& view, const Layers& la
   const cv::Mat expected = object.shape->distance(roi);
   const std::vector<cv::Mat> costs = costsOf(view, cv::abs(expected) <= params_.shape_search_px,
                                              expected, layers.back, layers.fore, 0.0f);
-  const cv::Mat others = grown(occupied_ & ~object.mask, params_.band_px)(roi);
+  const cv::Mat others = grownIn(roi, occupied_ & ~object.mask, params_.band_px);
   object.shape->meetOutline(costs[0] - costs[1], others, roi);
   if (!object.shape->holds()) {
     object.shape.reset();
