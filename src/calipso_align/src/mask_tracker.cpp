@@ -20,7 +20,7 @@ constexpr size_t kMaxSamples = 2000;
 constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has proved wrong
 // of 255: how likely a pixel may lie in a shadow where nothing is known of any
 constexpr int kAnyShadow = 76;
-constexpr double kLeastNoise = 2.0;    // grey levels, of a still picture
+constexpr double kLeastNoise = 2.0;  // grey levels, of a still picture
 constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
 
 std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {

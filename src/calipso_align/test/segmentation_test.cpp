@@ -72,6 +72,26 @@ TEST(Segmenter, AModelThatCannotBeFittedChangesNothing) {
   EXPECT_EQ(cv::countNonZero(guided.segment({}) != before), 0);
 }
 
+// Only what may move as a whole hands on its surface.
+TEST(Segmenter, HandsOnTheModelsThatMoveAsAWhole) {
+  const auto shape = disc(80.3, 60.7, 30.2);
+  const cv::Mat image = paint(kSize, shape, kGreen, kGrey, 3.0);
+  const auto modelsWith = [&](const ModelSurface& surface) {
+    SegmentationTarget target{"disc", 7, cv::Rect(45, 25, 72, 72), {}};
+    target.fit_model = [&](const std::vector<ContourLoop>&) {
+      return ModelView{maskOf(kSize, shape), cv::Mat1f::zeros(kSize), 1.5, surface};
+    };
+    Segmenter segmenter(image, {target});
+    EXPECT_TRUE(segmenter.models().empty());
+    segmenter.segment({});
+    return segmenter.models();
+  };
+  EXPECT_TRUE(modelsWith({}).empty());
+  const auto models = modelsWith({Points::Ones(3, 3), Triangles::Zero(1, 3), {}});
+  ASSERT_EQ(models.size(), 1u);
+  EXPECT_EQ(models.at(7).points.rows(), 3);
+}
+
 TEST(Segmenter, GivesTouchingObjectsTheirOwnPixels) {
   // Edges between pixels: a mixed pixel would belong to either side.
   const auto left = box(29.5, 29.5, 79.5, 89.5), right = box(79.5, 29.5, 129.5, 89.5);

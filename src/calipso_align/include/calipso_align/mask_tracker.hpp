@@ -65,7 +65,7 @@ class MaskTracker {
     cv::Mat mask;                    // CV_8U, the whole picture
     cv::Mat coverage;        // CV_8U, as `mask` but with the share of the pixels along its edge
     cv::Mat reference_mean;  // 4 x 4 px means of the frame in which `mask` was found
-    int key_area = 0;  // px
+    int key_area = 0;        // px
     float confidence = 1.0f;
     cv::Ptr<cv::DISOpticalFlow> flow;  // has buffers of its own
     std::optional<RigidShape> shape;   // while the object moves as its model does
