@@ -109,13 +109,16 @@ void SkyMap::keepHeights(const std::vector<Occluder>& occluders) {
     ScreenMesh mesh;
     mesh.triangles = o.triangles;
     mesh.hidden_side = -o.winding;  // from above, along rows upwards
-    for (const Eigen::Vector3f& p : *o.vertices) mesh.points.push_back(placeOf(p));
+    mesh.points.resize(o.vertices->size());
+#pragma omp parallel for schedule(static)
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) mesh.points[i] = placeOf((*o.vertices)[i]);
     tops.draw(mesh, 0);
     mesh.hidden_side = o.winding;
     for (Eigen::Vector3f& p : mesh.points) p.z() = -p.z();
     bottoms.draw(mesh, 0);
   }
   columns_.assign(static_cast<std::size_t>(width_) * depth_, kOpen);
+#pragma omp parallel for schedule(static)
   for (int j = 0; j < depth_; ++j) {
     const float *top = tops.nearness(j), *bottom = bottoms.nearness(j);
     for (int i = 0; i < width_; ++i)
