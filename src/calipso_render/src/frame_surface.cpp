@@ -232,13 +232,18 @@ bool FrameCompositor::reflectStretch(const std::uint32_t* ids, int v, int first,
     return any_thin;
   }
   if (any_picture) kernels().sample(appearance.albedo, offset, offset + last - first, run);
-  for (int i = first; any_texture && i < last; ++i) {
-    const int triangle = VisibilityBuffer::triangleOf(ids[i]);
+  for (int i = first; any_texture && i < last;) {
+    const std::uint32_t id = ids[i];
+    const int triangle = VisibilityBuffer::triangleOf(id), begin = i;
+    while (i < last && ids[i] == id) ++i;
     const TriangleMap& map = maps_[slot].of(triangle);
-    if (appearance.sources[triangle] == Appearance::Source::kPicture || map.thin) continue;
-    const cv::Vec4f texel = appearance.texture.at(
-        triangle, map.weightsAt(static_cast<float>(i + region_.x), static_cast<float>(v)));
-    run.mix(offset + i - first, texel, appearance.sources[triangle] == Appearance::Source::kBoth);
+    const Appearance::Source source = appearance.sources[triangle];
+    if (source == Appearance::Source::kPicture || map.thin) continue;
+    for (int k = begin; k < i; ++k) {
+      const cv::Vec4f texel = appearance.texture.at(
+          triangle, map.weightsAt(static_cast<float>(k + region_.x), static_cast<float>(v)));
+      run.mix(offset + k - first, texel, source == Appearance::Source::kBoth);
+    }
   }
   return any_thin;
 }
