@@ -4,11 +4,13 @@
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
 #include "disc_dilation.hpp"
 #include "kernels.hpp"
 #include "line_codec.hpp"
 #include "mesh_topology.hpp"
 #include "plane_light.hpp"
+#include "plane_sky.hpp"
 #include "plane_view.hpp"
 #include "render_test_scene.hpp"
 #include "square_mask.hpp"
@@ -164,6 +166,67 @@ TEST(SquareMask, IsTheMaskLessItsRim) {
   EXPECT_TRUE(mask.all({part.x + 48, part.y + 47, 16, 16}));
   EXPECT_FALSE(mask.all({part.x, part.y, 64, 64}));
   EXPECT_FALSE(SquareMask().all({0, 0, 8, 8}));
+}
+
+TEST(SquareMask, IsGrownAddedToAndTakenFromBySquares) {
+  const cv::Rect part(13, 9, 120, 101);
+  SquareMask mask(part), other(cv::Rect(0, 0, 300, 200));
+  EXPECT_TRUE(mask.box().empty());
+  mask.set({50, 40, 1, 1}), other.set({50, 40, 20, 1}), other.set({250, 150, 8, 8});
+  EXPECT_EQ(mask.box(), cv::Rect(48, 40, 8, 8));
+  EXPECT_EQ(mask.grown(9).box(), cv::Rect(32, 24, 40, 40));  // two squares
+  mask.add(other);  // which has squares beyond the part
+  EXPECT_EQ(mask.box(), cv::Rect(48, 40, 24, 8));
+  std::vector<int> ends;
+  const auto record = [&](int begin, int end) { ends.insert(ends.end(), {begin, end}); };
+  mask.visitRow(43, 51, 60, record), mask.visitRow(48, 13, 133, record);
+  EXPECT_EQ(ends, (std::vector<int>{51, 60}));
+  SquareMask last(part);
+  last.set({64, 40, 8, 8});
+  mask.remove(last);
+  EXPECT_EQ(mask.box(), cv::Rect(48, 40, 16, 8));
+  EXPECT_FALSE(mask.all({120, 100, 40, 8}));  // none of its squares beyond the part is set
+}
+
+// A sky that a half space hides: what is seen of it rises along the table.
+class HalfSky : public Visibility {
+ public:
+  explicit HalfSky(float rise) : rise_(rise) {}
+  float visibility(const Eigen::Vector3f& p, const Eigen::Vector3f&) const override {
+    return std::clamp(0.5f + rise_ * p.x(), 0.0f, 1.0f);
+  }
+  bool empty() const override { return false; }
+  std::optional<float> uniform(const Eigen::Vector3f&, const Eigen::Vector3f&,
+                               float) const override {
+    return std::nullopt;
+  }
+
+ private:
+  float rise_;
+};
+
+TEST(SkyGrid, IsWhatThePlanesSeeAndDiffersByNoMoreThanItSays) {
+  const PlaneView planes(table(), camera());
+  const HalfSky slow(1.0f), fast(30.0f);
+  const cv::Rect rect(13, 9, 120, 101);
+  const SkyGrid grid(planes, slow, {kWidth, kHeight}, rect, SquareMask()),
+      steep(planes, fast, {kWidth, kHeight}, rect, SquareMask());
+  std::vector<std::uint8_t> level(rect.width), other(rect.width);
+  bool any_known = false;
+  for (int v = rect.y; v < rect.br().y; ++v) {
+    grid.levels(planes, slow, v, rect.x, rect.br().x, level.data());
+    steep.levels(planes, fast, v, rect.x, rect.br().x, other.data());
+    for (int i = 0; i < rect.width; ++i) {
+      const int u = i + rect.x;
+      Receiver r;
+      const float exact = planes.at(u, v, r) ? slow.visibility(r.position, r.normal) : 1.0f;
+      ASSERT_NEAR(level[i], 255.0f * skyLight(exact), 31.0f);  // an eighth may be between places
+      const float most = grid.greatestDifference(steep, {u, v, 1, 1});
+      any_known = any_known || most < 0.5f;
+      ASSERT_LE(std::abs(level[i] - other[i]), 255.0f * most + 1.0f) << u << ", " << v;
+    }
+  }
+  EXPECT_TRUE(any_known);
 }
 
 TEST(DilateByDisc, DoesWhatOpenCVDoes) {
