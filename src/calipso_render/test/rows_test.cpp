@@ -219,7 +219,8 @@ TEST(SkyGrid, IsWhatThePlanesSeeAndDiffersByNoMoreThanItSays) {
     for (int i = 0; i < rect.width; ++i) {
       const int u = i + rect.x;
       Receiver r;
-      const float exact = planes.at(u, v, r) ? slow.visibility(r.position, r.normal) : 1.0f;
+      if (!planes.at(u, v, r)) continue;
+      const float exact = slow.visibility(r.position, r.normal);
       ASSERT_NEAR(level[i], 255.0f * skyLight(exact), 31.0f);  // an eighth may be between places
       const float most = grid.greatestDifference(steep, {u, v, 1, 1});
       any_known = any_known || most < 0.5f;
