@@ -34,9 +34,8 @@ cv::Rect boxOf(const cv::Mat& labels, int index) {
     if (first == nullptr) continue;
     top = std::min(top, v), bottom = v;
     left = std::min(left, static_cast<int>(static_cast<const std::uint8_t*>(first) - row));
-    int last = labels.cols - 1;
-    while (last > right && row[last] != index) --last;
-    right = last;
+    const void* last = memrchr(row, index, labels.cols);
+    right = std::max(right, static_cast<int>(static_cast<const std::uint8_t*>(last) - row));
   }
   return bottom < 0 ? cv::Rect() : cv::Rect({left, top}, cv::Point(right + 1, bottom + 1));
 }
