@@ -1,24 +1,43 @@
 // The part of FrameCompositor that draws pixels which see more than the middle of one triangle:
 // silhouettes by a place for each sheet in them.
 
+#include <algorithm>
 #include <array>
 
 #include "frame_compositor.hpp"
 #include "marked.hpp"
+#include "wide_loops.hpp"
 
 namespace calipso::render {
 namespace {
 
-// Squared distance of a pixel's samples from its centre, in eighths of a pixel.
+// A pixel's samples, those nearest to its centre first.
 constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
-  std::array<int, EdgeCoverage::kSamples> squared{};
-  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
+  std::array<int, EdgeCoverage::kSamples> order{};
+  const auto squared = [](int i) {  // eighths of a pixel
     const int x = 2 * (i % EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid,
               y = 2 * (i / EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid;
-    squared[i] = x * x + y * y;
+    return x * x + y * y;
+  };
+  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
+    int place = i;
+    for (; place > 0 && squared(order[place - 1]) > squared(i); --place)
+      order[place] = order[place - 1];
+    order[place] = i;
   }
-  return squared;
+  return order;
 }();
+
+// Which samples see the sheet that sample `of` sees.
+CALIPSO_WIDE_LOOPS void findSheet(const EdgeCoverage::Pixel& edge, int of,
+                                  std::array<std::uint8_t, EdgeCoverage::kSamples>& sees) {
+  for (int j = 0; j < EdgeCoverage::kSamples; ++j) {
+    const float a = edge.nearness[of], b = edge.nearness[j];
+    const bool one = EdgeCoverage::isOneSheet(a > b ? a : b, a > b ? b : a),
+               same = ((edge.ids[of] ^ edge.ids[j]) >> 24) == 0;
+    sees[j] = static_cast<std::uint8_t>(one & same);
+  }
+}
 
 }  // namespace
 
@@ -33,20 +52,15 @@ void FrameCompositor::addSheets(int u, int v, std::vector<Sheet>& sheets) const 
       sheets.push_back({{id, static_cast<float>(u), static_cast<float>(v)}, column, 1.0f});
     return;
   }
-  std::array<bool, EdgeCoverage::kSamples> done{};
+  std::array<std::uint8_t, EdgeCoverage::kSamples> done{}, sees;
   for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
-    if (done[i] || !isDrawn(edge->ids[i], u, v)) continue;
-    int count = 0, middle = i;
-    const int object = VisibilityBuffer::objectOf(edge->ids[i]);
-    for (int j = i; j < EdgeCoverage::kSamples; ++j) {
-      if (done[j] || edge->ids[j] == VisibilityBuffer::kNothing ||
-          VisibilityBuffer::objectOf(edge->ids[j]) != object)
-        continue;
-      const auto [farthest, nearest] = std::minmax(edge->nearness[i], edge->nearness[j]);
-      if (!EdgeCoverage::isOneSheet(nearest, farthest)) continue;
-      done[j] = true, ++count;
-      if (kFromCentre[j] < kFromCentre[middle]) middle = j;
-    }
+    if (done[i] != 0 || !isDrawn(edge->ids[i], u, v)) continue;
+    findSheet(*edge, i, sees);
+    int count = 0;
+    for (int j = 0; j < EdgeCoverage::kSamples; ++j)
+      sees[j] &= static_cast<std::uint8_t>(done[j] == 0), done[j] |= sees[j], count += sees[j];
+    const int middle = *std::find_if(kFromCentre.begin(), kFromCentre.end(),
+                                     [&](int sample) { return sees[sample] != 0; });
     const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(middle);
     sheets.push_back({{edge->ids[middle], x.x(), x.y()},
                       column,
