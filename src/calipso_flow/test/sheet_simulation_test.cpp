@@ -110,6 +110,31 @@ TEST(SheetSkin, feelsTheSameForce) {
   EXPECT_THROW(SheetSkin(model.mesh, grid, 5.0), std::invalid_argument);
 }
 
+// One factor per step, with the viscosity of a step before, leads where Newton's method with a new
+// one every time does.
+TEST(SheetStep, goesWhereTheBodysOwnStepGoes) {
+  const ObjectModel model = hangingSheet();
+  fem::FemOptions options;
+  options.target_nodes = 60;
+  options.newton_tolerance = 1e-6;
+  const Material material = defaultMaterial(boundingDiagonal(model.mesh), 9.81);
+  fem::DeformableBody own(model.mesh, material, options), other(model.mesh, material, options);
+  for (fem::DeformableBody* body : {&own, &other}) {
+    body->fixSurfaceVertices(model.attached);
+    body->setGravity({0.0, -5.0, -8.0});
+  }
+  SheetStep step(other);
+  const fem::Vec start = own.positions(), none = fem::Vec::Zero(start.size());
+  for (int k = 0; k < 8; ++k) {
+    own.step(1.0 / 30.0);
+    step.advance(1.0 / 30.0, 1e-6);
+    other.endStep(none);
+  }
+  const double way = (own.positions() - start).norm();
+  EXPECT_GT(way, 0.01);
+  EXPECT_LT((other.positions() - own.positions()).norm(), 1e-4 * way);
+}
+
 TEST(SheetSimulation, saysThatASheetIsTooSoftToHang) {
   SheetSettings soft;
   soft.stiffness = 1e-9;

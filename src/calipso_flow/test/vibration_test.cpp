@@ -79,6 +79,18 @@ TEST(Vibration, findsNothingInNoise) {
   EXPECT_TRUE(findLines(t, y).lines.empty());
 }
 
+// In a second nothing tells 1.2 Hz and 1.8 Hz apart, nor what takes longer than a second.
+TEST(Vibration, tellsNothingApartThatTheClipDoesNot) {
+  const Eigen::VectorXd t = evenTimes(31, 30.0);
+  const Spectrum spectrum = findLines(t, twoLines(t, 1.2, 1.8));
+  for (size_t a = 0; a < spectrum.lines.size(); ++a) {
+    EXPECT_GT(spectrum.lines[a].frequency, 0.89);
+    for (size_t b = 0; b < a; ++b) {
+      EXPECT_GT(std::abs(spectrum.lines[a].frequency - spectrum.lines[b].frequency), 0.89);
+    }
+  }
+}
+
 TEST(Vibration, refusesTimesThatDoNotIncrease) {
   Eigen::VectorXd t = evenTimes(10, 30.0);
   t[5] = t[4];
