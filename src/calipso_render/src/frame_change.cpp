@@ -38,7 +38,8 @@ void FrameCompositor::findRelit() {
   for (int v = 0; v < region_.height; ++v) std::memset(relit_.ptr(v), 0, region_.width);
   const int reach = params_.background.shadow_margin_px, side = reach + 2;
   const auto around = [side](const cv::Rect& r) {
-    return r.empty() ? r : cv::Rect(r.x - side, r.y - side, r.width + 2 * side, r.height + 2 * side);
+    return r.empty() ? r
+                     : cv::Rect(r.x - side, r.y - side, r.width + 2 * side, r.height + 2 * side);
   };
   const cv::Rect box = around(shadows_.shaded_box) & around(sun_changes_.box()) & region_;
   if (box.empty()) return;

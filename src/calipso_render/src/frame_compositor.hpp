@@ -32,12 +32,12 @@ struct ShadowCache {
   cv::Mat originals_sun;           // of the edited objects where the video has them
   SkyGrid originals_sky;
   cv::Mat originals_sky_levels;
-  SquareMask sunless;               // squares that originals_sun is not known to be all lit in
-  cv::Mat sun_before, sky_before;   // of both together; of the relief in plane terms
-  cv::Mat takes;                    // 255 = support plane or relief is seen, on which light changes
-  cv::Rect footprints;              // of what the edited objects cover at the key frame
-  cv::Mat shaded;               // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
-  cv::Rect shaded_box, bounds;  // of `shaded`; of all that the originals' shadows can reach
+  SquareMask sunless;              // squares that originals_sun is not known to be all lit in
+  cv::Mat sun_before, sky_before;  // of both together; of the relief in plane terms
+  cv::Mat takes;                   // 255 = support plane or relief is seen, on which light changes
+  cv::Rect footprints;             // of what the edited objects cover at the key frame
+  cv::Mat shaded;                  // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
+  cv::Rect shaded_box, bounds;     // of `shaded`; of all that the originals' shadows can reach
 };
 
 // Edited objects drawn where the video has them, which stays the same while the same ones are
@@ -291,8 +291,8 @@ class FrameCompositor {
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
   void addReliefBounds(const Points& vertices, const Eigen::Vector3f& sun, Points& shadow) const;
-  void addPlaneBounds(const SupportPlane& plane, const Points& vertices,
-                      const Eigen::Vector3f& sun, Points& shadow) const;
+  void addPlaneBounds(const SupportPlane& plane, const Points& vertices, const Eigen::Vector3f& sun,
+                      Points& shadow) const;
   cv::Rect shadowBounds(const Points& vertices, const Light& light) const;
 
   const Prepared& prepared_;
@@ -334,8 +334,8 @@ class FrameCompositor {
   cv::Mat passing_;
   cv::Rect shown_box_;  // of region_: what shows edited objects in the video, with a margin
   cv::Rect drawn_box_;  // of region_: all that is drawn, with a margin
-  cv::Mat removed_;  // CV_8UC1 over region_: pixels of edited objects in the video
-  cv::Mat drawn_;    // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
+  cv::Mat removed_;     // CV_8UC1 over region_: pixels of edited objects in the video
+  cv::Mat drawn_;       // CV_8UC1 over region_: 255 = isDrawn() at the pixel's centre
   // over region_: so deep behind drawn surfaces that light there does not matter
   SquareMask covered_;
   SquareMask sun_changes_;  // squares in which the light may change by more than a pixel can follow

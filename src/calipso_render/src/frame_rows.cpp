@@ -147,8 +147,8 @@ void FrameCompositor::composeBehind(int v, int first, int last, Row& row) const 
   for (int i = first; i < last; i += LightFactors::kMost)
     composeRelit(v, i, std::min(last, i + LightFactors::kMost), row);
   if (remirrored_.empty() && live_ == nullptr) return;
-  const std::uint8_t *mirrored =
-                         remirrored_.empty() ? nullptr : remirrored_.ptr<std::uint8_t>(v) + region_.x,
+  const std::uint8_t *mirrored = remirrored_.empty() ? nullptr
+                                                     : remirrored_.ptr<std::uint8_t>(v) + region_.x,
                      *invented = invented_.ptr<std::uint8_t>(v) + region_.x,
                      *removed = removed_.ptr<std::uint8_t>(j), *relit = relit_.ptr<std::uint8_t>(j);
   for (int i = first; i < last; ++i) {

@@ -80,8 +80,7 @@ void FrameCompositor::cacheOthers(const std::vector<Occluder>& others) {
   shadows_.others_sky.release();
   if (others.empty()) return;
   const auto sky = skyShadowOf(others, params_);
-  shadows_.others_sky =
-      skyLevels(skyOver(*sky, {{0, 0}, frame_.bgr.size()}, SquareMask()), *sky);
+  shadows_.others_sky = skyLevels(skyOver(*sky, {{0, 0}, frame_.bgr.size()}, SquareMask()), *sky);
 }
 
 void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {

@@ -278,8 +278,7 @@ void FrameCompositor::sunOnStretch(int v, int first, int last, int slot, Row& ro
                 rise = between(a[1].nearness, b[1].nearness) - from;
     *reinterpret_cast<Four*>(run.sun + k) = sun + parts * sun_rise;
     // Another piece of the surface can look out between the corners.
-    const Four here = fourAt(near + k), off = here - (from + parts * rise),
-               most = tolerance * here;
+    const Four here = fourAt(near + k), off = here - (from + parts * rise), most = tolerance * here;
     const FourInts other = (off > most) | (-off > most);
     for (int i = begin; i < end; ++i) {
       if (other[i - k] != 0) uneven[count++] = i;

@@ -121,8 +121,7 @@ CALIPSO_INLINE void drawSamplesAt(const TriangleSamples& t, const SampleSteps& s
     EightInts& ids = *reinterpret_cast<EightInts*>(&pixel.ids[8 * half]);
     const Eight near = near_centre + steps.near_u + steps.near_v[half];
     EightInts wins = near > nearest;
-    for (int i = 0; i < 3; ++i)
-      wins &= centre[i] + steps.edge_u[i] + steps.edge_v[half][i] >= 0.0f;
+    for (int i = 0; i < 3; ++i) wins &= centre[i] + steps.edge_u[i] + steps.edge_v[half][i] >= 0.0f;
     nearest = wins ? near : nearest;
     ids = wins ? EightInts{} + static_cast<std::int32_t>(id) : ids;
   }

@@ -10,9 +10,9 @@
 namespace calipso::render {
 namespace {
 
-constexpr double kNearPlane = 1e-6;      // m in front of the camera
-constexpr float kEdgeTolerance = 1e-3f;  // px; shared edges belong to both sides, so no cracks
-constexpr float kSmallestArea = 1e-9f;   // px^2
+constexpr double kNearPlane = 1e-6;       // m in front of the camera
+constexpr float kEdgeTolerance = 1e-3f;   // px; shared edges belong to both sides, so no cracks
+constexpr float kSmallestArea = 1e-9f;    // px^2
 constexpr std::size_t kFewPoints = 4096;  // not worth sharing out
 
 // Without SSE 4.1 std::floor and std::ceil are calls; |x| must fit an int.
@@ -103,7 +103,9 @@ ScreenMesh projectMesh(const Points& world, const Triangles& triangles, const Ca
 cv::Rect boundsOf(const ScreenMesh& mesh, int margin, cv::Size size) {
   float left = 1e9f, top = 1e9f, right = -1e9f, bottom = -1e9f;
 #pragma omp parallel for schedule(static) if (mesh.points.size() > kFewPoints) \
-    reduction(min : left, top) reduction(max : right, bottom)
+    reduction(min                                                              \
+              : left, top) reduction(max                                       \
+                                     : right, bottom)
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     const Eigen::Vector3f& p = mesh.points[i];
     if (std::isnan(p.z())) continue;

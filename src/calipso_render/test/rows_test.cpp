@@ -175,7 +175,7 @@ TEST(SquareMask, IsGrownAddedToAndTakenFromBySquares) {
   mask.set({50, 40, 1, 1}), other.set({50, 40, 20, 1}), other.set({250, 150, 8, 8});
   EXPECT_EQ(mask.box(), cv::Rect(48, 40, 8, 8));
   EXPECT_EQ(mask.grown(9).box(), cv::Rect(32, 24, 40, 40));  // two squares
-  mask.add(other);  // which has squares beyond the part
+  mask.add(other);                                           // which has squares beyond the part
   EXPECT_EQ(mask.box(), cv::Rect(48, 40, 24, 8));
   std::vector<int> ends;
   const auto record = [&](int begin, int end) { ends.insert(ends.end(), {begin, end}); };
