@@ -171,6 +171,7 @@ void MaskTracker::takeUpAgain(const cv::Mat& image, const cv::Mat& means) {
     const cv::Mat found =
         findAgain(image, background_, taken & ~object.mask, object.colours, least);
     if (found.empty()) continue;
+    object.shape.reset();  // it was left behind
     object.confidence = kConfidence;
     accept(object, image, background_, kLeastNoise, found, cv::Rect(cv::Point(), size_));
     object.reference_mean = means;
