@@ -10,7 +10,7 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kTolerance = 1e-3;  // of a step: residual over loads and inner forces
-constexpr double kSkin = 0.5;  // edge of a coarse skin's cubes over that of a cell
+constexpr double kSkin = 0.5;        // edge of a coarse skin's cubes over that of a cell
 
 TriangleMesh inWorld(const ObjectModel& model) {
   TriangleMesh mesh = model.mesh;
@@ -80,8 +80,8 @@ void SheetSimulation::blow(const Eigen::Vector3d& wind, double h) {
 }
 
 void SheetSimulation::move(const std::vector<double>& times, const SurfaceVector& displacements,
-                           const SurfaceVector& velocities, const Wind& wind,
-                           const InStep& in_step, const std::function<void()>& after_frame) {
+                           const SurfaceVector& velocities, const Wind& wind, const InStep& in_step,
+                           const std::function<void()>& after_frame) {
   fem::DeformableBody& body = sheet_.body();
   body.setState(start_ + sheet_.nodalField(displacements), sheet_.nodalField(velocities));
   step_->restart();
@@ -166,10 +166,9 @@ Slopes SheetSimulation::windSlopes(const Eigen::Vector3d& wind, double h,
       du.middleRows<3>(3 * v) += it.value() * tangent.velocities().middleRows<3>(3 * it.col());
     }
   }
-  const Slopes forces =
-      windForceSlopes(skin_.embedding.apply(body.positions()),
-                      skin_.embedding.apply(body.velocities()), skin_.triangles,
-                      {wind, skin_.drag}, areal_density_, h, dx, du, dw);
+  const Slopes forces = windForceSlopes(skin_.embedding.apply(body.positions()),
+                                        skin_.embedding.apply(body.velocities()), skin_.triangles,
+                                        {wind, skin_.drag}, areal_density_, h, dx, du, dw);
   Slopes nodal = Slopes::Zero(3 * body.nodeCount(), dw.cols());
   for (int v = 0; v < weights.rows(); ++v) {
     for (Entry it(weights, v); it; ++it)

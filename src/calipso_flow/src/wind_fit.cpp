@@ -13,8 +13,8 @@ constexpr int kTrials = 12;   // steps of one fit, also those that make things w
 constexpr int kFailures = 3;  // of these in a row
 constexpr double kLeastDamping = 1.0, kDamping = 5.0;
 constexpr double kPoor = 0.25, kGood = 0.75;  // of the gain that was expected
-constexpr double kSettled = 0.02;  // m/s, a smaller step is the last
-constexpr double kGained = 1e-2;   // of the cost: less to be gained, and it is the end
+constexpr double kSettled = 0.02;             // m/s, a smaller step is the last
+constexpr double kGained = 1e-2;              // of the cost: less to be gained, and it is the end
 // the pictures' information over that beforehand: half of the deviation
 constexpr double kSeen = 3.0;
 constexpr double kSeenShare = 0.03;  // of the best direction's

@@ -92,9 +92,9 @@ class LiveSheetTest : public testing::Test {
     calipso_msgs::Segmentation segmentation;
     segmentation.header = headerOf(0);
     cv::Mat labels(sheet_.camera.height, sheet_.camera.width, CV_8U, cv::Scalar(0));
-    const SurfaceView view = viewSurface(
-        sheet_.model.mesh, sheet_.camera,
-        sheet_.camera.world_from_camera.inverse() * sheet_.model.world_from_object);
+    const SurfaceView view =
+        viewSurface(sheet_.model.mesh, sheet_.camera,
+                    sheet_.camera.world_from_camera.inverse() * sheet_.model.world_from_object);
     labels(view.window).setTo(1, view.depth > 0.0f);
     cv_bridge::CvImage(headerOf(0), "mono8", labels).toImageMsg(segmentation.labels);
     labels_.publish(segmentation);
@@ -127,8 +127,8 @@ class LiveSheetTest : public testing::Test {
     Eigen::VectorXd field = Eigen::VectorXd::Zero(3 * sheet_.model.mesh.vertexCount());
     for (size_t m = 0; m < velocities.size(); ++m) {
       const std::vector<float>& shape = modes.at(m).displacements;
-      field += velocities[m] * Eigen::Map<const Eigen::VectorXf>(shape.data(), shape.size())
-                                   .cast<double>();
+      field += velocities[m] *
+               Eigen::Map<const Eigen::VectorXf>(shape.data(), shape.size()).cast<double>();
     }
     return field;
   }
@@ -178,7 +178,8 @@ TEST_F(LiveSheetTest, goesOnAsItWasSeenTo) {
     send(k);
     ASSERT_TRUE(waitFor([&] {
       return dynamics_.size() == size_t(k) && states_.size() == before + k;
-    })) << "frame " << k;
+    })) << "frame "
+        << k;
     EXPECT_EQ(dynamics_.back().header.stamp, headerOf(k).stamp);
     EXPECT_EQ(states_.back().header.stamp, headerOf(k).stamp);
   }

@@ -78,8 +78,9 @@ Eigen::MatrixXd edgeWay(const std::vector<Surface>& shapes, const Surface& rest,
 std::vector<Surface> trueShapes(const ObjectModel& model, const TrueObject& truth, int start) {
   std::vector<Surface> shapes;
   for (int k = start; k <= start + kCarriedFrames; ++k) {
-    shapes.emplace_back((truth.vertices[k] * model.world_from_object.linear().transpose()).rowwise() +
-                        model.world_from_object.translation().transpose());
+    shapes.emplace_back(
+        (truth.vertices[k] * model.world_from_object.linear().transpose()).rowwise() +
+        model.world_from_object.translation().transpose());
   }
   return shapes;
 }
@@ -91,15 +92,17 @@ void addCarriedOn(const Scene& scene, const ObjectModel& model, const TrueObject
   const int last = static_cast<int>(dynamics.motions.size()) - 1 - kCarriedFrames;
   if (last < 1) return;
   const DeformationModes& modes = dynamics.deformation->modes;
-  const Surface rest = (model.mesh.vertices * model.world_from_object.linear().transpose()).rowwise() +
-                       model.world_from_object.translation().transpose();
+  const Surface rest =
+      (model.mesh.vertices * model.world_from_object.linear().transpose()).rowwise() +
+      model.world_from_object.translation().transpose();
   double speed = 0.0, error = 0.0, simulated = 0.0, real = 0.0, product = 0.0;
   for (const int start : {last / 2, last}) {
     const std::vector<Surface> shapes = carriedOn(scene, model, dynamics, start);
     speed += 0.5 * speedKept(model, modes, start, scene.fps, shapes);
     const Eigen::MatrixXd way = edgeWay(shapes, rest, scene.gravity),
                           truly = edgeWay(trueShapes(model, truth, start), rest, scene.gravity);
-    error += (way - truly).squaredNorm(), simulated += way.squaredNorm(), real += truly.squaredNorm();
+    error += (way - truly).squaredNorm(), simulated += way.squaredNorm(),
+        real += truly.squaredNorm();
     product += (way.array() * truly.array()).sum();
   }
   entry.number("carried_speed", speed)

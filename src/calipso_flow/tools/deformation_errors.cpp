@@ -64,9 +64,9 @@ Eigen::Vector3d trueTravel(const ObjectModel& model, const TrueObject& truth,
     displacement.row(k) = Eigen::Map<const Eigen::RowVectorXd>(moved.data(), moved.size());
   }
   const Eigen::MatrixXd c = basis.householderQr().solve(displacement);
-  const Eigen::VectorXcd amplitude = c.row(1).transpose().cast<std::complex<double>>() -
-                                     std::complex<double>(0.0, 1.0) *
-                                         c.row(2).transpose().cast<std::complex<double>>();
+  const Eigen::VectorXcd amplitude =
+      c.row(1).transpose().cast<std::complex<double>>() -
+      std::complex<double>(0.0, 1.0) * c.row(2).transpose().cast<std::complex<double>>();
   const Eigen::Map<const Eigen::MatrixXcd> columns(amplitude.data(), rest.rows(), 3);
   Eigen::Index across = 0;  // the axis along which most of it goes
   columns.colwise().squaredNorm().maxCoeff(&across);

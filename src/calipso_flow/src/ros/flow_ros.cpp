@@ -15,7 +15,7 @@ constexpr unsigned kLiveQueue = 10;
 constexpr double kDescribeEvery = 1.0;  // s, at least: how deforming objects have moved of late
 // of one core: what may be spent on that, whose search for the wind costs most
 constexpr double kDescribeShare = 0.2;
-constexpr size_t kLiveWaiting = 300;    // frames kept while a live key frame is being aligned
+constexpr size_t kLiveWaiting = 300;  // frames kept while a live key frame is being aligned
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -31,8 +31,8 @@ FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       clip_dynamics_publisher_(
           nh.advertise<calipso_msgs::ClipDynamics>(topics::kClipDynamics, 1, true)),
       dynamics_publisher_(nh.advertise<calipso_msgs::Dynamics>(topics::kDynamics, kKeepAll)),
-      flow_publisher_(nh.advertise<sensor_msgs::Image>(
-          topics::kFlow, params_.live ? kLiveQueue : kKeepAll)),
+      flow_publisher_(
+          nh.advertise<sensor_msgs::Image>(topics::kFlow, params_.live ? kLiveQueue : kKeepAll)),
       markers_(nh),
       dense_flow_(params_.flow_preset) {
   subscribers_ = {nh.subscribe(topics::kModels, 1, &FlowNode::onModels, this),
