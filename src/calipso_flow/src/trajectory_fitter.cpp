@@ -36,6 +36,7 @@ Trajectory TrajectoryFitter::run(const std::vector<double>& cut_times) {
   dropUnearnedPieces();
   dropJumpsOfSpinAlone();
   settleStillPieces();
+  dropExcursions();
   return result();
 }
 
@@ -149,6 +150,45 @@ void TrajectoryFitter::dropJumpsOfSpinAlone() {
     pieces_.erase(pieces_.begin() + piece);
     fitKind(piece - 1);
   }
+}
+
+// What rests, is elsewhere for a few poses and rests again where it was has not moved: these poses
+// are wrong. Nor has what rests again a pose or two later, wherever: no force starts and stops
+// things so fast, but what is mostly hidden is easily found again in another place.
+void TrajectoryFitter::dropExcursions() {
+  const auto rests = [&](size_t i) { return pieces_[i].travel == Travel::kRest; };
+  for (size_t first = 1; first < pieces_.size(); ++first) {
+    if (!rests(first - 1)) continue;
+    size_t back = first;
+    while (back < pieces_.size() && !rests(back)) ++back;
+    if (back == first || back == pieces_.size() || !isExcursion(first, back)) continue;
+    pieces_.erase(pieces_.begin() + first, pieces_.begin() + back + 1);
+    --first;
+  }
+}
+
+// @param first, back  pieces: the first that moves, and the one that rests again
+bool TrajectoryFitter::isExcursion(size_t first, size_t back) const {
+  constexpr size_t kMostPoses = 4, kNoMotion = 2;
+  constexpr double kBack = 0.5;  // of the way out: so near it is where it was
+  const auto is_cut = [](const MotionPiece& piece) { return piece.cut; };
+  const Measurements before = measurementsOf(first - 1, first - 1),
+                     away = measurementsOf(first, back - 1), after = measurementsOf(back, back);
+  if (before.empty() || after.empty() || away.size() > kMostPoses ||
+      std::any_of(pieces_.begin() + first, pieces_.begin() + back + 1, is_cut))
+    return false;
+  if (away.size() <= kNoMotion) return true;
+  const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
+  const auto positionAt = [&](double time) {
+    const auto state = std::find_if(motion.states.begin(), motion.states.end(),
+                                    [&](const MotionState& s) { return s.time >= time; });
+    return state->position;
+  };
+  const Eigen::Vector3d place = positionAt(before.back().time);
+  double out = 0.0;
+  for (const PoseMeasurement& m : away)
+    if (m.valid) out = std::max(out, (m.position - place).norm());
+  return (positionAt(after.front().time) - place).norm() < kBack * out;
 }
 
 void TrajectoryFitter::refineTimes() {

@@ -37,6 +37,8 @@ class TrajectoryFitter {
   void fitKindsAndNoise();
   void dropUnearnedPieces();
   void dropJumpsOfSpinAlone();
+  void dropExcursions();
+  bool isExcursion(size_t first, size_t back) const;
   void refineTimes();
   void chooseContacts();
   double bestTime(size_t piece, double reach) const;

@@ -97,6 +97,34 @@ TEST(Trajectory, recognisesRest) {
   EXPECT_GT(fit.states[15].twistCovariance()(0, 0), 0.0);
 }
 
+// Of what is mostly hidden single poses may be far off, and surer than they should be.
+TEST(Trajectory, isAtRestThoughOneOrTwoPosesAreElsewhere) {
+  TrajectoryParams params;
+  params.still = [](const std::vector<MotionState>& states) {
+    return std::all_of(states.begin(), states.end(), [&](const MotionState& s) {
+      return (s.position - states.front().position).norm() < 0.02;
+    });
+  };
+  for (const int wrong : {1, 2}) {
+    auto data = measure(30, 0.002, 0.01, 3, still, still);
+    for (int k = 0; k < wrong; ++k) data[6 + k].position += Eigen::Vector3d(0.1, 0.4, 0.3);
+    const Trajectory fit = fitTrajectory(data, {}, testPrior(), params);
+    EXPECT_TRUE(fit.collisions.empty()) << wrong;
+    for (const double t : {0.1, 6.5 / kFps, 0.5})
+      EXPECT_FALSE(fit.movingAt(t)) << wrong << ", " << t;
+  }
+}
+
+// It does move where it rests elsewhere afterwards.
+TEST(Trajectory, isNotAtRestWhereItDoesNotComeBack) {
+  const auto pushed = [](double t) -> Eigen::Vector3d {
+    return {0.4 * std::clamp((t - 6.0 / kFps) * kFps / 3.0, 0.0, 1.0), 0.0, 0.0};
+  };
+  const Trajectory fit = fitTrajectory(measure(30, 0.002, 0.01, 3, pushed, still), {}, testPrior());
+  EXPECT_TRUE(fit.movingAt(7.5 / kFps));
+  EXPECT_NEAR(fit.states.back().position.x(), 0.4, 0.01);
+}
+
 TEST(Trajectory, findsUniformMotionAndSpin) {
   const Eigen::Vector3d v(0.4, -0.2, 0.1), w(0.0, 0.3, 1.2);
   const auto data = measure(

@@ -99,6 +99,8 @@ struct World::Impl {
   void noteWhatRestsOn(
       const Actor& carrier);  // as the video has it, before an edit touches the carrier
   void letGoWhatLostItsRest();
+  struct Rest;
+  void setPressing(const Rest& rest, bool presses);
 
   // Objects of the video in the way of edited ones (world_strikes.cpp)
   ObjectKind kindWhenFree(const Actor& actor) const;

@@ -12,8 +12,8 @@ constexpr double kFollows = 0.01;  // of the size: by so much the place has to m
 
 // Whether it moves by more than that to the next frame of the video.
 bool isOnTheMove(const ObservedMotion& seen, double size, double frame_period) {
-  return seen.moving && (seen.linear.norm() + 0.5 * size * seen.angular.norm()) * frame_period >
-                            kFollows * size;
+  return seen.moving &&
+         (seen.linear.norm() + 0.5 * size * seen.angular.norm()) * frame_period > kFollows * size;
 }
 
 }  // namespace
@@ -53,7 +53,16 @@ void World::Impl::noteWhatRestsOn(const Actor& carrier) {
     if (!place) continue;
     rests.push_back({actor.id, carrier.id, place->triangle, place->barycentric, place->point});
     actor.holder = Holder::kSupport;
+    setPressing(rests.back(), false);
   }
+}
+
+// Until an object is let go it does not press on what carries it: a fit is never so good that the two
+// only just touch, and what cannot give way would push a deformable carrier out of itself.
+void World::Impl::setPressing(const Rest& rest, bool presses) {
+  PairRule rule = pairRule(actors[rest.actor].object.name, actors[rest.carrier].object.name);
+  rule.contact = rule.contact && presses;
+  contacts.setRule(rest.actor, rest.carrier, rule);
 }
 
 void World::Impl::letGoWhatLostItsRest() {
@@ -76,6 +85,7 @@ void World::Impl::letGoWhatLostItsRest() {
       continue;
     }
     const std::string& carrier = actors[rests[k].carrier].object.name;
+    setPressing(rests[k], true);
     rests.erase(rests.begin() + k);
     if (!falls) continue;
     letGo(actor, carrier + ", on which it rests, moves");
