@@ -9,7 +9,6 @@ namespace {
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kInstants[] = {0.125, 0.375, 0.625, 0.875};  // of a frame
-constexpr int kLeastFrames = 2;     // in a piece: fewer tell nothing about its velocity
 constexpr double kHopeless = 60.0;  // log odds by which a path lies behind that never catches up
 
 // The kinds that are told apart here; a finer choice comes after. Shares are of the prior's
@@ -107,6 +106,7 @@ class PathSearch {
   void follow(int s, MotionState state, const MotionPiece& piece, double log_likelihood) {
     int frames = 0;
     const int count = static_cast<int>(stages_.size());
+    const int least = s < 0 ? kLeastFirstFrames : kLeastFrames;
     for (int k = s + 1; k < count; ++k) {
       state = predicted(state, measurements_[k], piece, noise_scale_);
       if (measurements_[k].valid) log_likelihood += correct(state, measurements_[k], noise_scale_);
@@ -114,7 +114,7 @@ class PathSearch {
       Stage& stage = stages_[k];
       const bool ends = k + 1 == count || cutAfter(k).has_value();
       const bool all = ends && (s < 0 || piece.cut);  // that there is between two cuts
-      if ((frames >= kLeastFrames || all) && log_likelihood > stage.log_likelihood) {
+      if ((frames >= least || all) && log_likelihood > stage.log_likelihood) {
         stage = {log_likelihood, state, piece, s};
       }
       if (ends || log_likelihood < stage.log_likelihood - kHopeless) return;

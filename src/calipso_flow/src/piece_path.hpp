@@ -11,6 +11,10 @@ namespace calipso::flow {
 // and the log odds that they have to earn.
 constexpr double kContactShare = 0.3, kContactEvidence = 4.0;
 
+// Fewer frames in a piece tell nothing about its velocity. In the first one nothing is known
+// before: two poses are always explained by some velocity, also when one of them is wrong.
+constexpr int kLeastFrames = 2, kLeastFirstFrames = 3;
+
 // The likeliest division of a motion into pieces of a few plain kinds, over all divisions at once,
 // by dynamic programming over the frame that a piece ends with: the state that the best pieces up
 // to there lead to is all that goes on. Instants are good to a part of a frame, and kinds to their

@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kEver = std::numeric_limits<double>::infinity();
 constexpr int kRefineRounds = 3;
-constexpr size_t kLeastFrames = 2;    // in a piece: fewer tell nothing about its velocity
 constexpr double kRefineReach = 0.6;  // frames by which a fit may move an instant
 constexpr double kDropReach = 1.2;    // the same when its neighbour is gone
 
@@ -220,8 +219,9 @@ double TrajectoryFitter::bestTime(size_t piece, double reach) const {
   const double original = pieces_[piece].start, step = frameSpacing();
   const Measurements before = measurementsOf(piece - 1, piece - 1);
   const Measurements after = measurementsOf(piece, piece);
-  if (before.size() < kLeastFrames || after.size() < kLeastFrames) return original;
-  const double low = std::max(original - reach, before[kLeastFrames - 1].time);
+  const size_t least_before = piece == 1 ? kLeastFirstFrames : kLeastFrames;
+  if (before.size() < least_before || after.size() < kLeastFrames) return original;
+  const double low = std::max(original - reach, before[least_before - 1].time);
   const double high = std::min(original + reach, after[after.size() - kLeastFrames].time);
   Neighbourhood local = neighbourhood(piece);
   return maximise(

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -123,6 +124,31 @@ TEST(Trajectory, isNotAtRestWhereItDoesNotComeBack) {
   const Trajectory fit = fitTrajectory(measure(30, 0.002, 0.01, 3, pushed, still), {}, testPrior());
   EXPECT_TRUE(fit.movingAt(7.5 / kFps));
   EXPECT_NEAR(fit.states.back().position.x(), 0.4, 0.01);
+}
+
+// An object may be found wrongly as long as no motion is known. Key pose and one other are always
+// explained by some velocity, and the rest then by an impact.
+TEST(Trajectory, wrongPoseAfterTheKeyPoseIsNoImpactAtOnce) {
+  constexpr double kSurprise = 16.27;  // chi-squared with 3 degrees of freedom, 99.9 %
+  const Eigen::Vector3d v(1.3, 0.2, 0.2), wrong(0.05, 0.01, 0.005);
+  int impacts = 0;
+  for (int seed = 0; seed < 12; ++seed) {
+    auto data = measure(
+        40, 0.002, 0.01, seed, [&](double t) -> Eigen::Vector3d { return v * t; }, still);
+    data[0].position.setZero();
+    data[0].rotation = rotationFromVector(Eigen::Vector3d::Zero());
+    data[0].covariance *= 1e-4;
+    data[1].position -= wrong;
+    const Trajectory fit = fitTrajectory(data, {}, testPrior());
+    for (const Collision& impact : fit.collisions) EXPECT_GE(impact.time, data[2].time) << seed;
+    impacts += fit.collisions.size();
+    for (size_t k = 2; k < data.size(); ++k) {
+      const Eigen::Vector3d error = fit.states[k].velocity - v;
+      const Eigen::Matrix3d covariance = fit.states[k].twistCovariance().topLeftCorner<3, 3>();
+      EXPECT_LT(error.dot(covariance.ldlt().solve(error)), kSurprise) << seed << ", frame " << k;
+    }
+  }
+  EXPECT_LE(impacts, 3);  // a forced motion over three poses remains possible
 }
 
 TEST(Trajectory, findsUniformMotionAndSpin) {
