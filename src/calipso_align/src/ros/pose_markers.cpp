@@ -55,8 +55,8 @@ void PoseMarkers::add(int object, const SceneObject& description, const Triangle
   body.interaction_mode = InteractiveMarkerControl::MOVE_3D;
   body.markers.push_back(solidOf(model));
   marker.controls.push_back(body);
-  for (const Eigen::Vector3d& axis :
-       {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()}) {
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(k);
     addAxis(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), axis), marker);
   }
   server_.insert(marker, [this, object](const InteractiveMarkerFeedbackConstPtr& feedback) {
