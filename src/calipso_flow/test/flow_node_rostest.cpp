@@ -11,6 +11,7 @@
 
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
+#include "node_test_frames.hpp"
 #include "rendered_scene.hpp"
 
 // Shows the node a clip of six frames whose frames come before the models, in the order that suits
@@ -19,27 +20,7 @@ namespace calipso::flow {
 namespace {
 
 constexpr int kFrames = 6;
-constexpr double kFps = 30.0;
-constexpr double kTimeoutSec = 60.0;
-constexpr char kCameraFrame[] = "camera_optical_frame";
 const Eigen::Vector3d kVelocity(0.5, 0.0, 0.3);
-
-std_msgs::Header headerOf(int k) {
-  std_msgs::Header header;
-  header.stamp = ros::Time(100.0 + k / kFps);
-  header.frame_id = kCameraFrame;
-  return header;
-}
-
-template <class Condition>
-bool waitFor(Condition condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kTimeoutSec);
-  while (ros::ok() && ros::WallTime::now() < end) {
-    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.02));
-    if (condition()) return true;
-  }
-  return false;
-}
 
 class FlowNodeTest : public testing::Test {
  protected:

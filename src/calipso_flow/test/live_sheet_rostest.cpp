@@ -19,6 +19,7 @@
 #include "calipso_flow/surface_view.hpp"
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
+#include "node_test_frames.hpp"
 
 // Shows flow and simulator, live, the film of a sheet that a wind blows away from where it hung; in
 // the midst of it the sheet is made deformable, and has to go on as it was seen to.
@@ -26,26 +27,6 @@ namespace calipso::flow {
 namespace {
 
 constexpr int kFrames = 24, kEdited = 16;
-constexpr double kFps = 30.0;
-constexpr double kTimeoutSec = 60.0;
-constexpr char kCameraFrame[] = "camera_optical_frame";
-
-std_msgs::Header headerOf(int k) {
-  std_msgs::Header header;
-  header.stamp = ros::Time(100.0 + k / kFps);
-  header.frame_id = kCameraFrame;
-  return header;
-}
-
-template <class Condition>
-bool waitFor(Condition condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kTimeoutSec);
-  while (ros::ok() && ros::WallTime::now() < end) {
-    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.01));
-    if (condition()) return true;
-  }
-  return false;
-}
 
 class LiveSheetTest : public testing::Test {
  protected:
@@ -174,7 +155,9 @@ TEST_F(LiveSheetTest, goesOnAsItWasSeenTo) {
   const size_t before = states_.size();
   for (int k = 1; k < kFrames; ++k) {
     if (k == kEdited) sendEdit(k);
-    if (k == kEdited) ASSERT_TRUE(waitFor([&] { return status_["simulator"].edits > 0; }));
+    if (k == kEdited) {
+      ASSERT_TRUE(waitFor([&] { return status_["simulator"].edits > 0; }));
+    }
     send(k);
     ASSERT_TRUE(waitFor([&] {
       return dynamics_.size() == size_t(k) && states_.size() == before + k;
