@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/stage.hpp"
@@ -132,23 +133,43 @@ void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int marg
   three.copyTo(nearness, known == 0);
 }
 
+// The key frame's pixels as another camera sees them.
+class OtherView {
+ public:
+  OtherView(const Camera& key, const Camera& to)
+      : key_(key),
+        to_(to),
+        way_((to.world_from_camera.inverse() * key.world_from_camera).cast<float>()) {}
+
+  // Where pixel (u, v) of the key frame is seen, px, and its depth over that in the key frame;
+  // nothing behind the camera.
+  // @param near 1/m
+  std::optional<Eigen::Vector3f> placeOf(int u, int v, float near) const {
+    const Eigen::Vector3f p =
+        way_.linear() * key_.ray(u, v).cast<float>() + near * way_.translation();
+    if (p.z() < 1e-6f) return std::nullopt;
+    return Eigen::Vector3f(to_.fx * p.x() / p.z() + to_.cx, to_.fy * p.y() / p.z() + to_.cy, p.z());
+  }
+
+ private:
+  const Camera &key_, &to_;
+  Eigen::Isometry3f way_;
+};
+
 // What is nearest at every pixel of another camera, of the key frame's pixels drawn as squares of
 // two, so that a place that grows has no gaps; -1 where none falls.
 cv::Mat nearestFrom(const cv::Mat& nearness, const Camera& key, const Camera& to) {
-  const Eigen::Isometry3f way =
-      (to.world_from_camera.inverse() * key.world_from_camera).cast<float>();
+  const OtherView view(key, to);
   cv::Mat out(to.height, to.width, CV_32F, cv::Scalar(-1.0f));
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u) {
       const float near = nearness.at<float>(v, u);
-      const Eigen::Vector3f p =
-          way.linear() * key.ray(u, v).cast<float>() + near * way.translation();
-      if (p.z() < 1e-6f) continue;
-      const int x = cvFloor(to.fx * p.x() / p.z() + to.cx),
-                y = cvFloor(to.fy * p.y() / p.z() + to.cy);
+      const auto place = view.placeOf(u, v, near);
+      if (!place) continue;
+      const int x = cvFloor(place->x()), y = cvFloor(place->y());
       for (int j = std::max(0, y); j <= std::min(to.height - 1, y + 1); ++j) {
         for (int i = std::max(0, x); i <= std::min(to.width - 1, x + 1); ++i)
-          out.at<float>(j, i) = std::max(out.at<float>(j, i), near / p.z());
+          out.at<float>(j, i) = std::max(out.at<float>(j, i), near / place->z());
       }
     }
   }
@@ -189,8 +210,7 @@ cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& t
 
 cv::Mat hiddenFrom(const cv::Mat& nearness, const cv::Mat& guessed, const Camera& key,
                    const Camera& to) {
-  const Eigen::Isometry3f way =
-      (to.world_from_camera.inverse() * key.world_from_camera).cast<float>();
+  const OtherView view(key, to);
   cv::Mat surely = nearness.clone();
   surely.setTo(0.0f, guessed);
   const cv::Mat nearest = nearestFrom(surely, key, to);
@@ -198,13 +218,11 @@ cv::Mat hiddenFrom(const cv::Mat& nearness, const cv::Mat& guessed, const Camera
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u) {
       const float near = nearness.at<float>(v, u);
-      const Eigen::Vector3f p =
-          way.linear() * key.ray(u, v).cast<float>() + near * way.translation();
-      if (p.z() < 1e-6f) continue;
-      const int x = cvRound(to.fx * p.x() / p.z() + to.cx),
-                y = cvRound(to.fy * p.y() / p.z() + to.cy);
+      const auto place = view.placeOf(u, v, near);
+      if (!place) continue;
+      const int x = cvRound(place->x()), y = cvRound(place->y());
       if (x < 0 || y < 0 || x >= to.width || y >= to.height) continue;
-      if (nearest.at<float>(y, x) > kBefore * near / p.z() + kLeastBefore)
+      if (nearest.at<float>(y, x) > kBefore * near / place->z() + kLeastBefore)
         hidden.at<std::uint8_t>(v, u) = 255;
     }
   }

@@ -12,8 +12,8 @@ namespace calipso::render {
 namespace {
 
 constexpr int kSteps = 160;  // places along the picture's width
-constexpr float kSlow =
-    0.12f;  // of the sky's light: between places that differ by no more it is interpolated
+// of the sky's light: between places that differ by no more it is interpolated
+constexpr float kSlow = 0.12f;
 
 // Places looked up together; those where no plane is seen get nothing.
 template <class Store>

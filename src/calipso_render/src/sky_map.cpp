@@ -16,8 +16,8 @@ constexpr int kMostDirections = 64;
 constexpr int kMargin = 2;           // texels around the occluders, where nothing is
 constexpr float kPerTexel = 64.0f;   // units of a kept height
 constexpr float kOwnSurface = 2.0f;  // texels: what reaches no higher over a point is its own plane
-constexpr std::uint32_t kOpen =
-    0xffffu;  // a column with nothing in it: its lowest is over its highest
+// A column with nothing in it: its lowest is over its highest.
+constexpr std::uint32_t kOpen = 0xffffu;
 
 std::uint32_t unitsOf(float texels) {
   return static_cast<std::uint32_t>(std::clamp(texels * kPerTexel, 0.0f, 65534.0f));
@@ -29,8 +29,8 @@ struct Look {
   int width, depth;
   float height;        // of the highest, texels
   const float *x, *y;  // of the directions, per height
-  float s, t, h,
-      first;  // the point; the height over it below which no direction meets anything, texels
+  float s, t, h;       // the point, texels
+  float first;         // height over it below which no direction meets anything, texels
 };
 
 CALIPSO_INLINE EightInts columnsAt(const Look& look, const Eight& s, const Eight& t) {
