@@ -174,6 +174,9 @@ Relief makeRelief(const cv::Mat& image, const cv::Mat& depth,
   }
   if (!supports.empty())
     relief.on_support = surfacesOf(supports, depth, noise) & (relief.state == Relief::kSurface);
+  if (relief.registered && !supports.empty())
+    cv::connectedComponents((relief.state == Relief::kSurface) & ~relief.on_support, relief.raised,
+                            4, CV_32S);
   return relief;
 }
 
@@ -186,6 +189,8 @@ Relief resized(const Relief& relief, const cv::Rect& view, const cv::Size& size)
     cv::resize(relief.pieces(view), result.pieces, size, 0, 0, cv::INTER_NEAREST);
   if (!relief.islands.empty())
     cv::resize(relief.islands(view), result.islands, size, 0, 0, cv::INTER_NEAREST);
+  if (!relief.raised.empty())
+    cv::resize(relief.raised(view), result.raised, size, 0, 0, cv::INTER_NEAREST);
   if (!relief.on_support.empty())
     cv::resize(relief.on_support(view), result.on_support, size, 0, 0, cv::INTER_NEAREST);
   result.units = relief.units;

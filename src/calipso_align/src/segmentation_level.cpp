@@ -155,6 +155,11 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
   if (!level.relief.registered) return;
   level.stroked = strokesOfPieces(level.relief.pieces, level.seeds);
   level.floating = seedsOfIslands(level.relief.islands, level.seeds, level.allowed);
+  if (!level.relief.raised.empty()) {
+    // A vessel's inside and outside are parted by a jump, but stand on the table as one.
+    const cv::Mat carried = seedsOfIslands(level.relief.raised, level.seeds, level.allowed);
+    carried.copyTo(level.floating, (level.floating == 0) & (carried != 0));
+  }
   level.floating.copyTo(level.stroked, (level.stroked == 0) & (level.floating != 0));
 }
 

@@ -82,5 +82,20 @@ TEST(Segmenter, AnIslandIsOneObjectWhateverItsColours) {
   EXPECT_GE(intersectionOverUnion(segmenter.segment(strokes) == 1, maskOf(kSize, kBowl)), 0.98);
 }
 
+// Its inside bears the stroke, its outside is nearer by a jump and looks like the table.
+TEST(Segmenter, WhatStandsOnASupportIsOneObjectInsideAndOutside) {
+  const auto inside = [](double u, double v) { return std::max(kBowl(u, v), v - 60.0); };
+  cv::Mat image = paint(kSize, inside, kGreen, kGrey, 3.0);
+  const cv::Mat table(kSize, CV_32F, cv::Scalar(2.0));
+  cv::Mat depth = table.clone();
+  depth.setTo(1.5, maskOf(kSize, kBowl));
+  depth.setTo(1.7, maskOf(kSize, inside));
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  strokes(cv::Rect(70, 42, 20, 6)).setTo(1);
+  const std::vector<SegmentationTarget> targets = {{"bowl", 1, cv::Rect(46, 26, 70, 70), {}, {}}};
+  Segmenter segmenter(image, targets, {}, depth, {table});
+  EXPECT_GE(intersectionOverUnion(segmenter.segment(strokes) == 1, maskOf(kSize, kBowl)), 0.98);
+}
+
 }  // namespace
 }  // namespace calipso::align

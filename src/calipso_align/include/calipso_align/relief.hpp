@@ -17,9 +17,12 @@ struct Relief {
   cv::Mat state;    // CV_8U: kUnusable near edges when `registered` is false, kNone without depth
   cv::Mat pieces;   // CV_32S: planar_pieces.hpp; empty unless `registered`
   cv::Mat islands;  // CV_32S: surface_islands.hpp; empty unless `registered`
-  cv::Mat on_support;   // CV_8U: the surface is that of a support plane, within its noise; or empty
-  double units = 0.0;   // of `surface` per inverse metre
-  double volume = 0.0;  // px x px x units of inverse depth: where a surface may be
+  cv::Mat on_support;  // CV_8U: the surface is that of a support plane, within its noise; or empty
+  // CV_32S: number from 1 of what hangs together in the picture and is no support; empty unless
+  // `registered` and there are supports
+  cv::Mat raised;
+  double units = 0.0;       // of `surface` per inverse metre
+  double volume = 0.0;      // px x px x units of inverse depth: where a surface may be
   bool registered = false;  // its edges lie on the picture's edges to a pixel: measured
 
   bool empty() const { return state.empty(); }
