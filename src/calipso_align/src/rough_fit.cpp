@@ -76,8 +76,11 @@ RoughCheck checkPlacement(const FitProblem& problem) {
   constexpr double kImplausible = 5.0;
   const double z = problem.X.col(2).mean();
   if (z <= 0.0) {
-    return {false, "the rough placement is behind the camera (" + std::to_string(-z) +
-                       " m): move the model in front of it"};
+    std::ostringstream text;
+    text.precision(3);
+    text << "the rough placement is behind the camera (" << -z << " m): move the model ("
+         << problem.model_size << " m) in front of it, or scale it if it is in millimetres";
+    return {false, text.str()};
   }
   const double scale = apparentScale(problem);
   if (scale > kImplausible || scale < 1.0 / kImplausible) {

@@ -26,6 +26,7 @@ void NodeReporter::preparing(const std::string& message) {
 void NodeReporter::ready(const std::string& message) { publish(NodeStatus::READY, message); }
 
 void NodeReporter::failed(const std::string& message) {
+  if (status_.state == NodeStatus::FAILED && status_.message == message) return;
   ROS_ERROR_STREAM(status_.node << ": " << message);
   publish(NodeStatus::FAILED, message);
   publishDiagnostic(ros::Time::now(), DiagnosticStatus::ERROR, message);

@@ -2,10 +2,13 @@
 """What the player cannot play: one message that names what, the value and the remedy; exit status 1."""
 
 import os
+import shutil
 import subprocess
 import tempfile
 import unittest
 
+import cv2
+import numpy
 import rostest
 import yaml
 
@@ -74,6 +77,22 @@ class BadInput(unittest.TestCase):
 
     def test_missing_bag(self):
         self.expect_complaint("absent.bag", bag=self.path("absent.bag"))
+
+    def spoilt_scene(self, picture, size, deep):
+        """The scene with one of its pictures made anew."""
+        scene = os.path.join(tempfile.mkdtemp(dir=self.folder.name), "scene")
+        shutil.copytree(self.scene, scene)
+        cv2.imwrite(os.path.join(scene, picture), numpy.ones(size[::-1], numpy.uint16 if deep else numpy.uint8))
+        return scene
+
+    def test_strokes_of_another_size(self):
+        self.expect_complaint("strokes.png", "1280x720", "640x360", scene=self.spoilt_scene("strokes.png", (1280, 720), False))
+
+    def test_depth_of_another_size_or_kind(self):
+        self.expect_complaint("depth/000000.png", "320x180", "640x360",
+                              scene=self.spoilt_scene("depth/000000.png", (320, 180), True))
+        self.expect_complaint("depth/000000.png", "of 8 bits", "of 16",
+                              scene=self.spoilt_scene("depth/000000.png", (640, 360), False))
 
     def test_edit_of_an_unknown_object(self):
         edits = self.edits({"t": 0, "object": "pear", "kind": "remove"})

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 namespace calipso::bag {
@@ -20,6 +21,18 @@ std::string size(std::uint32_t width, std::uint32_t height) {
 }
 
 }  // namespace
+
+void checkPicture(const std::string& path, int bits, int width, int height) {
+  if (path.empty()) return;
+  const cv::Mat picture = cv::imread(path, cv::IMREAD_UNCHANGED);
+  if (picture.empty()) fail(path, "no readable picture; replace or remove it");
+  const bool deep_enough = bits == 8 || picture.elemSize1() == 2;
+  if (deep_enough && picture.cols == width && picture.rows == height) return;
+  fail(path, "has " + size(picture.cols, picture.rows) + " pixels of " +
+                 std::to_string(8 * picture.elemSize1()) + " bits; it takes " +
+                 size(width, height) + " of " + std::to_string(bits) +
+                 ", as the video has: replace or remove it");
+}
 
 void checkImage(const sensor_msgs::Image& image, const std::string& where) {
   static const std::array<std::string, 5> kKnown = {enc::RGB8, enc::BGR8, enc::RGBA8, enc::BGRA8,

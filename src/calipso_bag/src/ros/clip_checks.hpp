@@ -10,6 +10,10 @@ namespace calipso::bag {
 // Each throws std::runtime_error naming what is wrong, the value and the remedy.
 // `where`: what is being checked, e.g. "in.bag: image 12".
 
+// A picture that belongs to the video: of its size, and deep enough. bits: 8 or 16 per channel.
+// path: "" for none
+void checkPicture(const std::string& path, int bits, int width, int height);
+
 // Encoding known, 8 bit, data complete.
 void checkImage(const sensor_msgs::Image& image, const std::string& where);
 
