@@ -33,6 +33,12 @@ int Preparation::clipFramesTaken(int sent) const {
   return taken;
 }
 
+int Preparation::framesRecorded(int edited) const {
+  const auto recorder = standing_.find("recorder");
+  if (recorder == standing_.end() || recorder->second.state == NodeState::kFailed) return edited;
+  return recorder->second.clip_frames;
+}
+
 NodeStanding Preparation::standing(const std::string& node) const {
   const auto found = standing_.find(node);
   return found == standing_.end() ? NodeStanding() : found->second;

@@ -5,7 +5,6 @@
 #include "calipso_scene/scene.hpp"
 #include "ros/edit_files.hpp"
 #include "ros/node_watch.hpp"
-#include "ros/wait.hpp"
 
 namespace {
 
@@ -13,8 +12,8 @@ using calipso::bag::NodeState;
 
 // Sends a file of edits into a running graph. Live video has no first frame to count from: the
 // times of the edits count from the first frame after the simulator and the renderer are ready.
+// They are sent again when the simulator has started over, because the video has.
 void sendEdits(ros::NodeHandle& nh, const ros::NodeHandle& pnh) {
-  constexpr double kOneHourSec = 3600.0;
   const calipso::Scene scene =
       calipso::loadScene(calipso::requiredParam<std::string>(pnh, "scene"));
   const std::string path = calipso::requiredParam<std::string>(pnh, "edits");
@@ -22,24 +21,27 @@ void sendEdits(ros::NodeHandle& nh, const ros::NodeHandle& pnh) {
 
   calipso::bag::NodeWatch watch(nh, calipso::bag::Preparation::Roles());
   ros::Publisher edits = nh.advertise<calipso_msgs::Edit>(calipso::topics::kEdits, 1000);
-  const auto ready = [&] {
-    return watch.preparation().standing("simulator").state == NodeState::kReady &&
-           watch.preparation().standing("render").state == NodeState::kReady &&
-           edits.getNumSubscribers() > 0;
+  const auto ready = [&](const std::string& node) {
+    return watch.preparation().standing(node).state == NodeState::kReady;
   };
-  while (!calipso::bag::waitFor(ready, kOneHourSec)) {
-  }
-  ros::Time first;
+  bool due = true;
+  const boost::function<void(const calipso_msgs::NodeStatusConstPtr&)> on_status =
+      [&](const calipso_msgs::NodeStatusConstPtr& status) {
+        due = due || (status->node == "simulator" && status->state == status->STARTING);
+      };
   const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> on_frame =
-      [&](const sensor_msgs::CameraInfoConstPtr& info) { first = info->header.stamp; };
-  const ros::Subscriber frames =
+      [&](const sensor_msgs::CameraInfoConstPtr& info) {
+        if (!due || !ready("simulator") || !ready("render") || edits.getNumSubscribers() == 0)
+          return;
+        due = false;
+        const ros::Time first = info->header.stamp;
+        for (const auto& edit : calipso::bag::readEdits(path, scene, first)) edits.publish(edit);
+        ROS_INFO_STREAM("edits sent; they count from the frame at " << first.toSec() << " s");
+      };
+  const auto statuses =
+      nh.subscribe<calipso_msgs::NodeStatus>(calipso::topics::kStatus, 1000, on_status);
+  const auto frames =
       nh.subscribe<sensor_msgs::CameraInfo>(calipso::topics::kCameraInfo, 1, on_frame);
-  while (!calipso::bag::waitFor([&] { return !first.isZero(); }, kOneHourSec)) {
-  }
-  for (const calipso_msgs::Edit& edit : calipso::bag::readEdits(path, scene, first)) {
-    edits.publish(edit);
-  }
-  ROS_INFO_STREAM("edits sent; they count from the frame at " << first.toSec() << " s");
   ros::spin();
 }
 

@@ -45,6 +45,15 @@ TEST(Preparation, TheSlowestLivingConsumerCounts) {
   EXPECT_EQ(preparation.clipFramesTaken(6), 4);
 }
 
+TEST(Preparation, ARecorderThatTakesPartCounts) {
+  Preparation preparation;
+  EXPECT_EQ(preparation.framesRecorded(5), 5);
+  preparation.update("recorder", at(NodeState::kReady, 3));
+  EXPECT_EQ(preparation.framesRecorded(5), 3);
+  preparation.fail("recorder", "its process ended");
+  EXPECT_EQ(preparation.framesRecorded(5), 5);
+}
+
 TEST(Preparation, NobodyWaitsForAFailedNode) {
   Preparation preparation;
   preparation.update("segmentation", at(NodeState::kReady));

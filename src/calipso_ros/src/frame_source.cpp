@@ -13,8 +13,11 @@ namespace {
 constexpr double kKeepSec = 1e6;         // longer than any clip
 constexpr double kPoseTimeoutSec = 1.0;  // tf and image travel on different connections
 constexpr unsigned kUnboundedPairs = 100000;
+// Halves of pairs wait at the cost of a pointer. Those left over when live stamps go back are the
+// newest, and must not fill the queue.
+constexpr unsigned kStrayHalves = 30;
 
-unsigned pairQueue(unsigned queue) { return queue == 0 ? kUnboundedPairs : queue; }
+unsigned pairQueue(unsigned queue) { return queue == 0 ? kUnboundedPairs : queue + kStrayHalves; }
 
 }  // namespace
 

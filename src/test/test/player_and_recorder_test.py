@@ -76,6 +76,12 @@ class PlayerAndRecorder(unittest.TestCase):
         self.assertIn("1 of %d edited images" % FRAMES, output)
         self.assertFalse(os.path.exists(self.path("out.bag")))
 
+    def test_frames_wait_for_a_recorder_that_does_not_take_them_in(self):
+        status, output = self.echo(lose_image=0, in_flight=1, frame_timeout_sec=3)
+        self.assertNotEqual(status, 0)
+        self.assertIn("the recorder has taken in 0 of 1 edited frames", output)
+        self.assertFalse(os.path.exists(self.path("out.bag")))
+
     def test_a_last_frame_that_never_comes_is_not_waited_for_for_ever(self):
         status, output = self.echo(swallow=FRAMES - 1, frame_timeout_sec=3)
         self.assertNotEqual(status, 0)

@@ -60,6 +60,7 @@ void SegmentationRos::onSubscriber(const ros::SingleSubscriberPublisher& subscri
 void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
   if (msg->header.stamp == last_stamp_) return;
   last_stamp_ = msg->header.stamp;
+  if (params_.mode == "live" && clock_.startsOver(last_stamp_)) startOver();
   try {
     if (key_image_.empty())
       adoptKeyFrame(msg);
@@ -69,6 +70,15 @@ void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
     reporter_.warn(msg->header.stamp, error.what());
   }
   if (params_.mode == "bag") reporter_.clipFrameDone();
+}
+
+// The frame at hand is to become the key frame.
+void SegmentationRos::startOver() {
+  reporter_.warn(last_stamp_, kStartsOver);
+  key_image_.release();
+  key_message_.reset();
+  segmenter_.reset();
+  tracker_.reset();
 }
 
 void SegmentationRos::onStrokes(const sensor_msgs::ImageConstPtr& msg) {

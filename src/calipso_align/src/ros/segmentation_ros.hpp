@@ -10,6 +10,7 @@
 #include "calipso_align/key_frame.hpp"
 #include "calipso_align/mask_tracker.hpp"
 #include "calipso_ros/node_reporter.hpp"
+#include "calipso_ros/video_clock.hpp"
 #include "calipso_scene/scene.hpp"
 
 namespace calipso::align {
@@ -33,6 +34,7 @@ class SegmentationRos {
   void onStrokes(const sensor_msgs::ImageConstPtr& msg);
   void onSubscriber(const ros::SingleSubscriberPublisher& subscriber);
 
+  void startOver();
   void adoptKeyFrame(const sensor_msgs::ImageConstPtr& msg);
   void segment();
   void trackFrame(const sensor_msgs::ImageConstPtr& msg);
@@ -44,6 +46,7 @@ class SegmentationRos {
   ros::Publisher segmentation_publisher_, overlay_publisher_;
   ros::Subscriber image_subscriber_, strokes_subscriber_;
 
+  VideoClock clock_;  // live
   cv::Mat strokes_;
   ros::Time last_stamp_;
   std_msgs::Header key_header_;

@@ -48,6 +48,9 @@ class Preparation {
   // Clip frames that every living node has taken in; `sent` when none is alive.
   int clipFramesTaken(int sent) const;
 
+  // Edited frames that the recorder has taken in; `edited` when none takes part or it has failed.
+  int framesRecorded(int edited) const;
+
   NodeStanding standing(const std::string& node) const;
   std::vector<std::string> failed() const;
 

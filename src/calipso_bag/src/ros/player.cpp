@@ -11,6 +11,7 @@
 
 #include "calipso_ros/topics.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
+#include "clip_checks.hpp"
 #include "edit_files.hpp"
 #include "wait.hpp"
 
@@ -95,6 +96,10 @@ void Player::checkScene() const {
                              std::to_string(scene_.camera.height) +
                              "; use the scene of this video");
   }
+  constexpr int kDepthBits = 16, kMaskBits = 8;
+  checkPicture(scene_.depth_path, kDepthBits, scene_.camera.width, scene_.camera.height);
+  for (const std::string& mask : {scene_.strokes_path, scene_.matte_path})
+    checkPicture(mask, kMaskBits, scene_.camera.width, scene_.camera.height);
   for (const SceneObject& object : scene_.objects) loadMesh(object.cad_path);
 }
 
@@ -265,7 +270,7 @@ void Player::playFrames() {
   first_sent_ = last_shown_ = ros::WallTime::now();
   for (std::size_t i = 0; i < schedule_.size(); ++i) {
     if (i == 0 || schedule_[i].source != schedule_[i - 1].source) frame = reader.next();
-    waitForEdited([this] { return window_.hasRoom(); });
+    waitForEdited([this] { return window_.hasRoom() && recorded(window_.returned()); });
     playFrame(frame, ros::Time().fromNSec(static_cast<std::uint64_t>(schedule_[i].time_ns)));
   }
   waitForEdited([this] { return window_.empty(); });
@@ -285,10 +290,23 @@ void Player::playFrame(const BagFrame& frame, const ros::Time& stamp) {
   image_.publish(image);
 }
 
+// What the recorder has not taken in waits in memory.
+bool Player::recorded(int edited) const {
+  return edited - watch_.preparation().framesRecorded(edited) < params_.in_flight;
+}
+
 void Player::waitForEdited(const std::function<bool()>& done) {
   const bool in_time =
       waitFor([&] { return done() || watch_.ended("render"); }, params_.frame_timeout_sec);
   if (done()) return;
+  if (!recorded(window_.returned())) {
+    throw std::runtime_error(
+        "the recorder has taken in " +
+        std::to_string(watch_.preparation().framesRecorded(window_.returned())) + " of " +
+        std::to_string(window_.returned()) + " edited frames, and none for " +
+        std::to_string(params_.frame_timeout_sec) +
+        " s; look for its messages above, and at its disk");
+  }
   throw std::runtime_error(
       (in_time ? "the renderer's process ended"
                : "no edited frame for " + std::to_string(params_.frame_timeout_sec) + " s") +

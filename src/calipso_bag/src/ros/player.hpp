@@ -62,6 +62,7 @@ class Player {
   void sendEdits();
   void playFrames();
   void playFrame(const BagFrame& frame, const ros::Time& stamp);
+  bool recorded(int edited) const;
   void waitForEdited(const std::function<bool()>& done);
   void onEdited(const sensor_msgs::CameraInfoConstPtr& info);
   void showProgress();

@@ -16,7 +16,8 @@
 namespace calipso::bag {
 namespace {
 
-constexpr unsigned kQueue = 10000;  // nothing may be lost before it is written
+// Nothing may be lost before it is written; in a clip the player sends no more than is taken in.
+constexpr unsigned kQueue = 10000;
 // messages of a frame may come this much later than its image
 constexpr std::size_t kLagFrames = 8;
 
@@ -97,6 +98,8 @@ void Recorder::onInput(const sensor_msgs::CameraInfoConstPtr& info) {
 
 void Recorder::onEdited(const ros::MessageEvent<sensor_msgs::Image const>& event) {
   const ros::Time stamp = event.getMessage()->header.stamp;
+  started_over_ = started_over_ || (params_.live && clock_.startsOver(stamp));
+  if (started_over_) return;
   if (!edited_.empty() && stamp <= edited_.back()) {
     throw std::runtime_error("edited frame " + seconds(stamp) + " came after " +
                              seconds(edited_.back()) + "; is a second renderer running?");
@@ -104,6 +107,7 @@ void Recorder::onEdited(const ros::MessageEvent<sensor_msgs::Image const>& event
   if (edited_.empty()) first_edited_ = ros::WallTime::now();
   edited_.push_back(stamp);
   write(topics::kImageEdited, event, "");
+  reporter_.clipFrameDone();
   summary_.edit_seconds = (ros::WallTime::now() - first_edited_).toSec();
   if (edited_.size() > kLagFrames) writer_.flush(edited_[edited_.size() - 1 - kLagFrames]);
 }
@@ -206,7 +210,11 @@ void Recorder::waitForEdited() {
 
 void Recorder::recordLive() {
   reporter_.ready("recording to " + output_.path() + " until stopped");
-  while (ros::ok()) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+  while (ros::ok() && !started_over_)
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.05));
+  if (started_over_)
+    ROS_WARN_STREAM("the stamps went back after " << seconds(edited_.back())
+                                                  << ": the recording ends there");
 }
 
 void Recorder::checkFrames() const {

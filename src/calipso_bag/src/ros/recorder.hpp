@@ -17,6 +17,7 @@
 
 #include "calipso_bag/run_summary.hpp"
 #include "calipso_ros/node_reporter.hpp"
+#include "calipso_ros/video_clock.hpp"
 #include "output_bag.hpp"
 #include "stamped_writer.hpp"
 
@@ -85,6 +86,9 @@ class Recorder {
   std::map<std::string, int> count_;       // messages recorded, by topic
   int rank_ = 0;
   ros::WallTime first_edited_;
+  // Live: a bag holds the video up to where its stamps go back.
+  VideoClock clock_;
+  bool started_over_ = false;
 };
 
 }  // namespace calipso::bag

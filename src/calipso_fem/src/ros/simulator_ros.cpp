@@ -72,14 +72,14 @@ void SimulatorRos::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip
 void SimulatorRos::onStatus(const calipso_msgs::NodeStatusConstPtr& status) {
   if (status->node != "flow" || status->state != calipso_msgs::NodeStatus::FAILED || clip_dynamics_)
     return;
-  reporter_.warn(status->header.stamp,
+  reporter_.warn(ros::Time(0),
                  "how things move in the video is not known, flow failed: " + status->message);
   clip_dynamics_ = boost::make_shared<const calipso_msgs::ClipDynamics>();
   prepare();
 }
 
 void SimulatorRos::onDynamics(const calipso_msgs::DynamicsConstPtr& dynamics) {
-  if (!(world_ && first_stamp_)) return;
+  if (!(world_ && first_stamp_) || !clock_.covers(dynamics->header.stamp)) return;
   take(*dynamics);
   for (const auto& object : dynamics->objects) {
     for (const auto& wind : object.wind)
@@ -89,7 +89,7 @@ void SimulatorRos::onDynamics(const calipso_msgs::DynamicsConstPtr& dynamics) {
 
 // Live, a deforming object's modes come with what the last seconds tell; they stay the same.
 void SimulatorRos::onLiveModes(const calipso_msgs::ClipDynamicsConstPtr& dynamics) {
-  if (!world_) return;
+  if (!world_ || !clock_.covers(dynamics->header.stamp)) return;
   try {
     for (const auto& object : dynamics->objects) {
       if (!object.modes.empty()) world_->addObservedModes(object.object, shapesOf(object.modes));
@@ -176,8 +176,20 @@ void SimulatorRos::refuse(const calipso_msgs::Edit& edit, const std::string& mes
   reporter_.warn(edit.header.stamp, "edit refused: " + message);
 }
 
+// Models of a key frame that is not later stay: they are sent once only, perhaps before this.
+void SimulatorRos::startOver(const ros::Time& stamp) {
+  reporter_.warn(stamp, kStartsOver);
+  world_.reset();
+  first_stamp_.reset();
+  early_edits_.clear();
+  if (models_ && models_->header.stamp > stamp) models_.reset();
+  reporter_.starting("waiting for models");
+  prepare();
+}
+
 void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
   const ros::Time stamp = info->header.stamp;
+  if (params_.live && clock_.startsOver(stamp)) startOver(stamp);
   if (!world_) {
     // A state without objects lets the frame pass unedited.
     if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) {

@@ -16,6 +16,7 @@
 
 #include "calipso_fem/world/world.hpp"
 #include "calipso_ros/node_reporter.hpp"
+#include "calipso_ros/video_clock.hpp"
 #include "calipso_scene/scene.hpp"
 #include "simulator_params.hpp"
 
@@ -37,6 +38,7 @@ class SimulatorRos {
   void onEdit(const calipso_msgs::EditConstPtr& edit);
   void onFrame(const sensor_msgs::CameraInfoConstPtr& info);
 
+  void startOver(const ros::Time& stamp);
   void prepare();  // once everything it takes has arrived
   void take(const calipso_msgs::Dynamics& dynamics);
   void take(const calipso_msgs::ObjectClipDynamics& object);
@@ -52,6 +54,7 @@ class SimulatorRos {
   tf2_ros::TransformBroadcaster tf_;
   ros::Publisher state_, plan_, applied_, markers_;
   std::vector<ros::Subscriber> subscribers_;
+  VideoClock clock_;  // live
   calipso_msgs::AlignedModelsConstPtr models_;
   calipso_msgs::ClipDynamicsConstPtr clip_dynamics_;
   std::optional<ros::Time> first_stamp_;

@@ -8,9 +8,12 @@
 namespace calipso::flow {
 
 void KeyCollector::take(const calipso_msgs::SegmentationConstPtr& segmentation) {
-  const std::optional<ros::Time> key = keyStamp();
-  if (key && segmentation->header.stamp != *key) return;
-  segmentations_.push_back(segmentation);
+  if (!segmentation->contours.empty()) segmentation_ = segmentation;
+}
+
+void KeyCollector::forgetAfter(const ros::Time& stamp) {
+  if (models_ && models_->header.stamp > stamp) models_.reset();
+  if (segmentation_ && segmentation_->header.stamp > stamp) segmentation_.reset();
 }
 
 std::optional<ros::Time> KeyCollector::keyStamp() const {
@@ -19,15 +22,12 @@ std::optional<ros::Time> KeyCollector::keyStamp() const {
 }
 
 std::optional<KeyKnowledge> KeyCollector::knowledge(const Scene& scene) const {
-  if (!models_) return std::nullopt;
-  const auto of_key =
-      std::find_if(segmentations_.begin(), segmentations_.end(),
-                   [&](const auto& s) { return s->header.stamp == models_->header.stamp; });
-  if (of_key == segmentations_.end()) return std::nullopt;
+  if (!models_ || !segmentation_ || segmentation_->header.stamp != models_->header.stamp)
+    return std::nullopt;
   KeyKnowledge knowledge;
   for (const calipso_msgs::AlignedModel& model : models_->models) {
     knowledge.models.push_back(modelFromMsg(model, scene));
-    knowledge.masks.push_back(maskFromMsg((*of_key)->labels, model.index));
+    knowledge.masks.push_back(maskFromMsg(segmentation_->labels, model.index));
   }
   return knowledge;
 }

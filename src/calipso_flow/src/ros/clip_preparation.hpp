@@ -27,7 +27,9 @@ struct KeyKnowledge {
 class KeyCollector {
  public:
   void take(const calipso_msgs::AlignedModelsConstPtr& models) { models_ = models; }
-  void take(const calipso_msgs::SegmentationConstPtr& segmentation);
+  void take(const calipso_msgs::SegmentationConstPtr& segmentation);  // the key frame's counts
+  // Forgets what belongs to a key frame later than this.
+  void forgetAfter(const ros::Time& stamp);
   // Stamp of the key frame, once models have come.
   std::optional<ros::Time> keyStamp() const;
   // Both messages' content, once both have come. @throw std::invalid_argument for a bad message
@@ -36,7 +38,7 @@ class KeyCollector {
 
  private:
   calipso_msgs::AlignedModelsConstPtr models_;
-  std::vector<calipso_msgs::SegmentationConstPtr> segmentations_;  // until the models have come
+  calipso_msgs::SegmentationConstPtr segmentation_;
 };
 
 // The whole clip's dynamics as a message, one entry per stamp and object of the scene.

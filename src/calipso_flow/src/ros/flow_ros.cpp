@@ -63,7 +63,6 @@ void FlowNode::onModels(const calipso_msgs::AlignedModelsConstPtr& models) {
 }
 
 void FlowNode::onSegmentation(const calipso_msgs::SegmentationConstPtr& segmentation) {
-  if (clip_analyser_ || live_analyser_) return;
   key_.take(segmentation);
   beginWhenPossible();
 }
@@ -158,7 +157,23 @@ void FlowNode::finishWhenComplete() {
   }
 }
 
+// What is known of a key frame that is not later stays: it is sent once only, perhaps before this.
+void FlowNode::startOver(const ros::Time& stamp) {
+  reporter_.warn(stamp, kStartsOver);
+  describing_ = {};  // waits for its end
+  live_analyser_.reset();
+  waiting_.clear();
+  key_.forgetAfter(stamp);
+  of_late_.clear();
+  modes_told_ = 0;
+  described_ = ros::Time();
+  describe_every_ = 0.0;
+  previous_image_.reset();
+  reporter_.starting("waiting for the key frame's models");
+}
+
 void FlowNode::onFrame(const calipso::Frame& frame) {
+  if (params_.live && clock_.startsOver(frame.stamp())) startOver(frame.stamp());
   const auto start = std::chrono::steady_clock::now();
   try {
     publishDynamics(frame);

@@ -11,6 +11,7 @@
 #include "calipso_flow/dense_flow.hpp"
 #include "calipso_ros/frame_source.hpp"
 #include "calipso_ros/node_reporter.hpp"
+#include "calipso_ros/video_clock.hpp"
 #include "clip_preparation.hpp"
 #include "marker_publisher.hpp"
 #include "params.hpp"
@@ -33,6 +34,7 @@ class FlowNode {
   void onFrame(const calipso::Frame& frame);
   void onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason, bool of_clip);
 
+  void startOver(const ros::Time& stamp);
   void beginWhenPossible();
   void begin(const KeyKnowledge& knowledge);
   void analyse(const calipso::Frame& frame);
@@ -49,6 +51,7 @@ class FlowNode {
   ros::Publisher clip_dynamics_publisher_, dynamics_publisher_, flow_publisher_;
   MarkerPublisher markers_;
 
+  VideoClock clock_;  // live
   calipso_msgs::ClipInfoConstPtr clip_;
   KeyCollector key_;
   std::vector<calipso::Frame> waiting_;    // frames that came before the models

@@ -17,6 +17,10 @@ class LabelStore {
 
   void put(const ros::Time& stamp, const cv::Mat& labels);
 
+  void forgetAfter(const ros::Time& stamp) {
+    packed_.erase(packed_.upper_bound(stamp), packed_.end());
+  }
+
   bool has(const ros::Time& stamp) const { return packed_.count(stamp) > 0; }
 
   // Labels at `stamp`, else the nearest before it, else an empty matrix.

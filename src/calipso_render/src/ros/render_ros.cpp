@@ -74,6 +74,7 @@ void RenderNode::onBadClipFrame(const sensor_msgs::ImageConstPtr& image,
 }
 
 void RenderNode::onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) {
+  if (params_.mode == Mode::kLive && !clock_.covers(msg->header.stamp)) return;
   try {
     labels_.put(msg->header.stamp, labelsFromMsg(msg->labels));
   } catch (const std::exception& error) {
@@ -195,7 +196,25 @@ void RenderNode::prepareNow() {
   workOff();
 }
 
+// What is known of frames that are not later stays: it is sent once only, perhaps before this.
+void RenderNode::startOver(const ros::Time& stamp) {
+  reporter_.warn(stamp, kStartsOver);
+  renderer_.reset();
+  clip_ = ClipSample(params_.clip_samples);
+  labels_.forgetAfter(stamp);
+  unlabelled_.clear();
+  if (models_msg_ && models_msg_->header.stamp > stamp) {
+    models_msg_.reset();
+    models_.clear();
+  }
+  dynamics_.reset();
+  frames_.clear();
+  states_.clear();
+  reporter_.starting("waiting for segmentation and models");
+}
+
 void RenderNode::onFrame(const Frame& frame) {
+  if (params_.mode == Mode::kLive && clock_.startsOver(frame.stamp())) startOver(frame.stamp());
   if (params_.mode == Mode::kLive && !renderer_) {
     unlabelled_.push_back(frame);
     if (unlabelled_.size() > static_cast<std::size_t>(params_.live_queue)) unlabelled_.pop_front();
@@ -212,6 +231,7 @@ void RenderNode::onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::
 }
 
 void RenderNode::onState(const calipso_msgs::SimulationStateConstPtr& msg) {
+  if (params_.mode == Mode::kLive && !clock_.covers(msg->header.stamp)) return;
   states_[msg->header.stamp] = msg;
   if (params_.mode == Mode::kLive && renderer_) skipOlderThan(msg->header.stamp);
   workOff();

@@ -17,6 +17,7 @@
 #include "calipso_render/renderer.hpp"
 #include "calipso_ros/frame_source.hpp"
 #include "calipso_ros/node_reporter.hpp"
+#include "calipso_ros/video_clock.hpp"
 #include "label_store.hpp"
 #include "params.hpp"
 
@@ -49,6 +50,7 @@ class RenderNode {
   void onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason);
   void onState(const calipso_msgs::SimulationStateConstPtr& msg);
 
+  void startOver(const ros::Time& stamp);
   void addClipFrame(const Frame& frame, const cv::Mat& labels);
   void pairClipFrames(const ros::Time& segmented);
   bool clipComplete() const;
@@ -68,6 +70,7 @@ class RenderNode {
   CameraPoses poses_;
   ros::Publisher edited_, edited_info_, provenance_, plate_;
 
+  VideoClock clock_;  // live
   ClipSample clip_;
   LabelStore labels_;
   std::deque<Frame> unlabelled_;  // clip frames that wait for their segmentation
