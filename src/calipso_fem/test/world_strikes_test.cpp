@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 
+#include "calipso_fem/world/surface_tree.hpp"
 #include "world_fixtures.hpp"
 
 // Objects of the video that an edited one runs into.
@@ -105,6 +107,48 @@ TEST(WorldStrikes, ANudgeMovesNothing) {
     EXPECT_EQ(world.state().objects[1].kind == ObjectKind::kRigid, speed > 1.0) << speed;
     EXPECT_EQ(placeOf(world, 1).x() > 0.102, speed > 1.0) << speed;
   }
+}
+
+// Largest depth of one surface's vertices in the other, m.
+double depthIn(const TriangleMesh& mesh, const ObjectSnapshot& at, const ObjectSnapshot& other) {
+  TriangleMesh surface = mesh;
+  surface.vertices = other.vertices;
+  const SurfaceTree tree(surface);
+  double depth = 0.0;
+  for (const auto& vertex : at.vertices.rowwise())
+    if (const auto hit = tree.nearest(vertex.transpose(), 0.02))
+      depth = std::max(depth, -hit->distance);
+  return depth;
+}
+
+// What lies on a table cannot give way to a soft body that falls on it; it rolls aside. The table's
+// push belongs to the blow: without it the one below would be thrown back up into the soft one.
+TEST(WorldStrikes, ARigidBodyOnATableHoldsASoftOneOut) {
+  const TriangleMesh rod = bentRod(0.2, 0.04);
+  WorldScene scene = sceneWith(rod, {0, 0, 0.02});
+  scene.objects.push_back(scene.objects.front());
+  scene.objects[1].name = "other", scene.objects[1].index = 2;
+  scene.objects[0].world_from_object.translation() = Eigen::Vector3d(0.01, 0.0, 0.14);
+  scene.objects[0].world_from_object.rotate(
+      Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitZ()));
+  World world(scene, {});
+  Edit soft = editOf(EditKind::kMaterial, EditMode::kFactor);
+  soft.object = "thing";
+  soft.youngs_modulus = 0.03;
+  world.submit(soft);
+  world.submit(letGo("thing"));
+  world.advanceTo(0.0);
+  double depth = 0.0, highest = 0.0;
+  for (int frame = 0; frame < 20; ++frame) {
+    play(world, kFrame);
+    const WorldState state = world.state();
+    if (state.objects[1].vertices.rows() == 0) continue;
+    depth = std::max(depth, depthIn(rod, state.objects[0], state.objects[1]));
+    highest = std::max(highest, state.objects[1].world_from_object.translation().z());
+  }
+  EXPECT_EQ(world.state().objects[1].kind, ObjectKind::kRigid);
+  EXPECT_LT(depth, 1e-3);
+  EXPECT_LT(highest, 0.025);
 }
 
 // In the video the other ball comes along and would go through what stands in its way now.

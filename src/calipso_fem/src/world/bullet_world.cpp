@@ -141,6 +141,12 @@ void BulletWorld::setPairSurface(const Pair& pair, std::optional<double> frictio
     pair_surface_.erase(pair);
 }
 
+double BulletWorld::frictionOf(const btCollisionObject& a, const btCollisionObject& b) const {
+  const auto own = pair_surface_.find(std::minmax({a.getUserIndex(), b.getUserIndex()}));
+  if (own != pair_surface_.end() && own->second.friction) return *own->second.friction;
+  return a.getFriction() * b.getFriction();
+}
+
 void BulletWorld::findTouches() {
   std::set<Pair> touching;
   new_touches_.clear();

@@ -40,6 +40,7 @@ class BulletWorld : public btDiscreteDynamicsWorld {
   void forget(int id);
   void setPairSurface(const Pair& pair, std::optional<double> friction,
                       std::optional<double> restitution);
+  double frictionOf(const btCollisionObject& a, const btCollisionObject& b) const;
   void substep(double h);
 
   // Pairs that push on each other since the last sub-step, and did not before.

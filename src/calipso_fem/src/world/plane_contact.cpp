@@ -2,41 +2,37 @@
 
 #include <cmath>
 #include <functional>
-#include <vector>
 
 namespace calipso::fem {
 namespace {
 
-struct Corner {
-  btVector3 point;  // on the hull, in the plane's frame
-  double height;
-};
-
 // Where `gain` is most, if it is anything there.
-const Corner* best(const std::vector<Corner>& corners,
-                   const std::function<double(const Corner&)>& gain) {
-  const Corner* found = nullptr;
+const PlaneCorner* best(const std::vector<PlaneCorner>& corners,
+                        const std::function<double(const PlaneCorner&)>& gain) {
+  const PlaneCorner* found = nullptr;
   double most = 0.0;
-  for (const Corner& c : corners)
+  for (const PlaneCorner& c : corners)
     if (const double g = gain(c); g > most) most = g, found = &c;
   return found;
 }
 
 // The deepest corner, the one furthest from it, and those furthest from the line through both.
-std::vector<const Corner*> spanning(const std::vector<Corner>& corners, const btVector3& normal) {
-  std::vector<const Corner*> chosen;
-  for (const Corner& c : corners)
-    if (chosen.empty() || c.height < chosen[0]->height) chosen.assign(1, &c);
+std::vector<PlaneCorner> spanning(const std::vector<PlaneCorner>& corners,
+                                  const btVector3& normal) {
+  std::vector<PlaneCorner> chosen;
+  for (const PlaneCorner& c : corners)
+    if (chosen.empty() || c.height < chosen[0].height) chosen.assign(1, c);
   if (chosen.empty()) return chosen;
-  const btVector3 first = chosen[0]->point;
-  const Corner* far = best(corners, [&](const Corner& c) { return (c.point - first).length2(); });
+  const btVector3 first = chosen[0].point;
+  const PlaneCorner* far =
+      best(corners, [&](const PlaneCorner& c) { return (c.point - first).length2(); });
   if (!far) return chosen;
-  chosen.push_back(far);
+  chosen.push_back(*far);
   const btVector3 across = normal.cross(far->point - first);
   for (const double side : {1.0, -1.0})
-    if (const Corner* c =
-            best(corners, [&](const Corner& k) { return side * across.dot(k.point - first); }))
-      chosen.push_back(c);
+    if (const PlaneCorner* c =
+            best(corners, [&](const PlaneCorner& k) { return side * across.dot(k.point - first); }))
+      chosen.push_back(*c);
   return chosen;
 }
 
@@ -46,6 +42,22 @@ double reachOf(const btCollisionObject* body) {
 }
 
 }  // namespace
+
+std::vector<PlaneCorner> spanningCorners(const btConvexHullShape& hull,
+                                         const btTransform& plane_from_hull,
+                                         const btStaticPlaneShape& plane, double reach) {
+  const btVector3& normal = plane.getPlaneNormal();
+  const btVector3 rise = normal * plane_from_hull.getBasis();  // of the height, in the hull's frame
+  const double level =
+      normal.dot(plane_from_hull.getOrigin()) - plane.getPlaneConstant() - hull.getMargin();
+  std::vector<PlaneCorner> near;
+  for (int i = 0; i < hull.getNumPoints(); ++i) {
+    const btVector3& x = hull.getUnscaledPoints()[i];
+    const double height = level + rise.dot(x);
+    if (height < reach) near.push_back({plane_from_hull * x, height});
+  }
+  return spanning(near, normal);
+}
 
 HullPlaneAlgorithm::HullPlaneAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
                                        const btCollisionObjectWrapper*,
@@ -76,23 +88,15 @@ void HullPlaneAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   const btVector3& normal = ground.getPlaneNormal();
   const btTransform plane_from_hull =
       plane->getWorldTransform().inverseTimes(hull->getWorldTransform());
-  const double reach = reachOf(hull->getCollisionObject());
-  const btVector3 rise = normal * plane_from_hull.getBasis();  // of the height, in the hull's frame
-  const double level =
-      normal.dot(plane_from_hull.getOrigin()) - ground.getPlaneConstant() - shape.getMargin();
-  std::vector<Corner> near;
-  for (int i = 0; i < shape.getNumPoints(); ++i) {
-    const btVector3& x = shape.getUnscaledPoints()[i];
-    const double height = level + rise.dot(x);
-    if (height < reach) near.push_back({plane_from_hull * x, height});
-  }
+  const std::vector<PlaneCorner> near =
+      spanningCorners(shape, plane_from_hull, ground, reachOf(hull->getCollisionObject()));
   if ((near.empty() && !manifold_) || !manifoldOf(hull, plane)) return;
   result->setPersistentManifold(manifold_);
   const btTransform& world_from_plane = plane->getWorldTransform();
   const btVector3 up = world_from_plane.getBasis() * normal;
-  for (const Corner* c : spanning(near, normal))
+  for (const PlaneCorner& c : near)
     result->addContactPoint(
-        up, world_from_plane * (c->point - (c->height + shape.getMargin()) * normal), c->height);
+        up, world_from_plane * (c.point - (c.height + shape.getMargin()) * normal), c.height);
   if (owner_ && manifold_->getNumContacts()) result->refreshContactPoints();
 }
 

@@ -3,8 +3,22 @@
 #include <BulletCollision/CollisionDispatch/btCompoundCollisionAlgorithm.h>
 #include <btBulletCollisionCommon.h>
 
+#include <vector>
+
 // Private to the rigid world.
 namespace calipso::fem {
+
+// A corner of a hull over a plane.
+struct PlaneCorner {
+  btVector3 point;  // in the plane's frame
+  double height;    // over the plane, less the hull's margin, m
+};
+
+// Up to four corners nearer to the plane than `reach` (m): the deepest and those that span the most
+// with it.
+std::vector<PlaneCorner> spanningCorners(const btConvexHullShape& hull,
+                                         const btTransform& plane_from_hull,
+                                         const btStaticPlaneShape& plane, double reach);
 
 // Convex hull against a plane: up to four vertices, the deepest and those that span the most with
 // it. Bullet finds one per step, so that a body put down flat rocks until it has found all its

@@ -96,6 +96,9 @@ struct RigidWorld::Impl {
     return taken;
   }
 
+  // Corners of a dynamic body that are nearer to a plane than `reach` (m).
+  void addPlaneTouches(Id id, double reach, std::vector<RigidTouch>& touches) const;
+
   Id enter(Body body) {
     const Id id = next++;
     body.body->setUserIndex(id);

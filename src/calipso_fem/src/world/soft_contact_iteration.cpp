@@ -145,7 +145,7 @@ SoftContacts::Contacts SoftContacts::startingContacts(const std::vector<Candidat
     if (c.near && known != memory_.end() && !known->second.force.isZero(0.0))
       contacts.emplace(c.contact.key, completed(c.contact));
   }
-  addRigidTouches(watched, rigid, contacts);
+  addRigidTouches(watched, softs, rigid, motion.h(), contacts);
   grow(watched, obstacles, softs, motion, contacts);
   return contacts;
 }
@@ -239,18 +239,21 @@ int SoftContacts::direct(const std::vector<SoftEntry>& softs, RigidWorld& rigid,
   return sweeps;
 }
 
-// What rigid bodies near a deformable one rest on holds against its push. Bullet solves these
-// contacts itself afterwards; here they only keep the deformable side from pushing the rigid one
-// through.
-void SoftContacts::addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
-                                   Contacts& contacts) const {
+// What rigid bodies near a deformable one rest on, or come to rest on, holds against its push.
+void SoftContacts::addRigidTouches(const std::vector<Candidate>& watched,
+                                   const std::vector<SoftEntry>& softs, const RigidWorld& rigid,
+                                   double h, Contacts& contacts) const {
   constexpr int kNoSoft = std::numeric_limits<int>::max();
   std::set<RigidWorld::Id> ids;
-  for (const Candidate& c : watched)
-    if (c.near && c.contact.rigid_b) ids.insert(*c.contact.rigid_b);
+  double pushed = 0.0;  // how far a deformable one may push them, m
+  for (const Candidate& c : watched) {
+    if (!c.contact.rigid_b) continue;
+    ids.insert(*c.contact.rigid_b);
+    pushed = std::max(pushed, h * softs[c.contact.soft_a].soft->fastest());
+  }
   if (ids.empty()) return;
   int index = 0;
-  for (const RigidTouch& t : rigid.touchesAround(ids)) {
+  for (const RigidTouch& t : rigid.touchesAround(ids, pushed, h)) {
     Contact c;
     c.key = {kNoSoft, 0, index++, 0};
     c.rigid_a = t.a;

@@ -318,8 +318,10 @@ std::vector<StepReport> StepMotion::finish(const std::map<Contact::Key, Contact>
     const Eigen::Vector3d impulse = h_ * c.force;
     give(c.soft_a, impulse, c.place);
     give(c.soft_b, -impulse, c.place);
-    // What rigid bodies give each other is Bullet's own affair.
-    if (c.soft_a >= 0 && c.rigid_b) rigid_.push(*c.rigid_b, -impulse, c.place);
+    // What rigid ones give each other under the push, too: without it Bullet would see them run into
+    // what they rest on, and throw them back.
+    if (c.rigid_a) rigid_.push(*c.rigid_a, impulse, c.place);
+    if (c.rigid_b) rigid_.push(*c.rigid_b, -impulse, c.place);
   }
   std::vector<StepReport> reports;
   for (size_t i = 0; i < bodies_.size(); ++i) {

@@ -84,8 +84,9 @@ class RigidWorld {
   // Advances by h in sub-steps that get finer the fewer bodies are awake. @return their number
   int step(double h);
   std::vector<ContactPoint> contacts() const;  // of the last sub-step
-  // Where the given bodies, and those they reach through others, touch something rigid.
-  std::vector<RigidTouch> touchesAround(std::set<Id> ids) const;
+  // Where the given bodies, and those they reach through others, touch something rigid, or come
+  // nearer to a plane than `reach` (m) and what their own velocities make of it in h (s).
+  std::vector<RigidTouch> touchesAround(std::set<Id> ids, double reach, double h) const;
   // Pairs that met during the last step; times since its beginning.
   const std::vector<TouchEvent>& touches() const;
 

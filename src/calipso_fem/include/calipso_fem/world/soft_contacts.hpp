@@ -217,8 +217,8 @@ class SoftContacts {
                double h) const;
   bool unbalanced(const StepMotion& motion, size_t soft, double wanted) const;
   bool acceptable(const Contacts& contacts, const StepMotion& motion) const;
-  void addRigidTouches(const std::vector<Candidate>& watched, const RigidWorld& rigid,
-                       Contacts& contacts) const;
+  void addRigidTouches(const std::vector<Candidate>& watched, const std::vector<SoftEntry>& softs,
+                       const RigidWorld& rigid, double h, Contacts& contacts) const;
   void forgetForces();
   void remember(const Contacts& contacts, const StepMotion& motion);
   void publish(const Contacts& contacts, const StepMotion& motion,
