@@ -62,12 +62,23 @@ void squash(DeformableBody* body) {
   deform(body, [](Eigen::Vector3d p) { return Eigen::Vector3d(p.x(), 0.125, p.z()); });
 }
 
+// Every node anywhere in the body's box.
 void scramble(DeformableBody* body) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   deform(body, [&](const Eigen::Vector3d&) {
     const double a = unit(random), b = unit(random), c = unit(random);
     return Eigen::Vector3d(a, 0.25 * b, 0.25 * c);
+  });
+}
+
+// Every node off by up to one and a half cells along each axis: most cells are inside out.
+void shake(DeformableBody* body, double cell) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> off(-1.5 * cell, 1.5 * cell);
+  deform(body, [&](const Eigen::Vector3d& p) {
+    const double x = off(random), y = off(random), z = off(random);
+    return Eigen::Vector3d(p + Eigen::Vector3d(x, y, z));
   });
 }
 
@@ -156,6 +167,9 @@ const std::map<std::string, std::function<Setup(int)>>& setups() {
       {"stretched 3x", with([](Setup* s) { s->start = stretch; })},
       {"twisted by 720 degrees", with([](Setup* s) { s->start = twist; })},
       {"squashed flat", with([](Setup* s) { s->start = squash; })},
+      {"every node off by 1.5 cells", with([](Setup* s) {
+         s->start = [cell = 1.0 / s->cells.x()](DeformableBody* body) { shake(body, cell); };
+       })},
       {"every node at random", with([](Setup* s) { s->start = scramble; })},
       {"inverted elements", with([](Setup* s) { s->start = invert; })},
       {"nu = 0.499", with([](Setup* s) {
