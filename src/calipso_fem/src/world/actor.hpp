@@ -12,6 +12,7 @@
 #include "calipso_fem/world/soft_object.hpp"
 #include "calipso_fem/world/surface_tree.hpp"
 #include "calipso_fem/world/world_types.hpp"
+#include "observed_drive.hpp"
 
 namespace calipso::fem {
 
@@ -83,6 +84,9 @@ struct Actor {
   std::optional<RigidWorld::Id> body;                           // also as a collider while static
   std::vector<TriangleMesh> hulls;                              // cached convex parts, object frame
   std::unique_ptr<SoftObject> soft;
+  Vec key_nodes;  // 3n, m: of one that deforms in the video, in the key frame
+  std::unique_ptr<ObservedDrive>
+      drive;  // of soft: what moves it in the video, until an edit's wind does
   Eigen::Isometry3d soft_from_object = Eigen::Isometry3d::Identity();  // pose when soft was made
   std::unique_ptr<SurfaceTree> tree;                                   // object frame
   std::vector<Pull> pulls;

@@ -196,15 +196,17 @@ void SoftObject::copyPrestress(const SoftObject& other) {
   prestress_modulus_ = other.prestress_modulus_;
 }
 
-// The inner forces are stresses of the body's material: they turn with it, and fall as it is made
-// softer. A stiffer one needs no more than what carries the weight.
-void SoftObject::applyPrestress() {
-  if (prestress_.size() == 0) return;
-  const double share =
-      std::min(1.0, body_.model().cellMaterials().front().youngs_modulus / prestress_modulus_);
-  Vec forces = share * prestress_;
-  Eigen::Map<Eigen::Matrix3Xd> columns(forces.data(), 3, forces.size() / 3);
-  columns = (rotation_ * columns).eval();
+// The inner forces of a prestress are stresses of the body's material: they turn with it, and fall
+// as it is made softer. A stiffer one needs no more than what carries the weight.
+void SoftObject::applyNodalForces() {
+  if (drive_.size() == 0 && prestress_.size() == 0) return;
+  Vec forces = drive_.size() > 0 ? drive_ : Vec(Vec::Zero(observed_.size()));
+  if (prestress_.size() > 0) {
+    const double share =
+        std::min(1.0, body_.model().cellMaterials().front().youngs_modulus / prestress_modulus_);
+    const Eigen::Map<const Eigen::Matrix3Xd> inner(prestress_.data(), 3, prestress_.size() / 3);
+    Eigen::Map<Eigen::Matrix3Xd>(forces.data(), 3, inner.cols()) += rotation_ * (share * inner);
+  }
   body_.setNodalForces(forces);
 }
 
@@ -218,10 +220,17 @@ void SoftObject::addForce(const SurfacePoint& point, const Eigen::Vector3d& forc
   forced_ = true;
 }
 
+StepReport SoftObject::step(double h) {
+  applyNodalForces();
+  const StepReport report = body_.step(h);
+  changed();
+  return report;
+}
+
 void SoftObject::beginStep(double h) {
   before_ = body_.momentum();
   body_.setSurfaceForces(forces_);
-  applyPrestress();
+  applyNodalForces();
   body_.beginStep(h);
 }
 
@@ -230,7 +239,7 @@ void SoftObject::beginStep(double h) {
 StepReport SoftObject::endStep(const Vec& contact_forces, double h,
                                const std::optional<Momentum>& gained) {
   const StepReport report = body_.endStep(contact_forces);
-  if (gained && !forced_ && !hasFixedNodes()) {
+  if (gained && !forced_ && drive_.size() == 0 && !hasFixedNodes()) {
     const double mass = body_.totalMass();
     Momentum target;
     target.linear = before_.linear + h * mass * gravity_ + gained->linear;

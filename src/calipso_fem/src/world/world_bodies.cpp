@@ -13,6 +13,7 @@ namespace {
 
 // An object that starts to be simulated must not keep the video waiting.
 constexpr int kSettlingLoadSteps = 4;
+constexpr double kRunUp = 0.2;  // s, over which one that deforms in the video is led there
 
 }  // namespace
 
@@ -114,7 +115,8 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
   const bool as_observed = actor.kind == ObjectKind::kStatic;
   removeBodies(actor);
   Eigen::Isometry3d seen = actor.track.at(now).world_from_object;
-  const bool deforms = as_observed && kind == ObjectKind::kDeformable && actor.modes.cols() > 0;
+  const bool deforms = as_observed && kind == ObjectKind::kDeformable && actor.modes.cols() > 0 &&
+                       !actor.track.empty();
   if (deforms) {  // its modes start from the key frame's shape and place
     motion = BodyMotion();
     motion.world_from_object = seen = actor.object.world_from_object;
@@ -236,12 +238,24 @@ Vec World::Impl::nodalModes(const Actor& actor, const Vec& amplitudes) const {
   return actor.soft->nodalField(field);
 }
 
+// Its modes tell a shape that the material may resist, as by being stretched: led along the motion for
+// a while, it is in one of its own when it is let go.
 void World::Impl::deformAsObserved(Actor& actor) {
-  const ObservedMotion seen = actor.track.at(now);
+  const double step = params.frame_period / params.max_substeps;
+  const int steps = static_cast<int>(std::min(kRunUp, now - actor.track.begin()) / step);
+  const ObservedMotion seen = actor.track.at(now - steps * step);
   if (seen.mode_amplitudes.size() != actor.modes.cols()) return;
   DeformableBody& body = actor.soft->body();
-  body.setState(body.positions() + nodalModes(actor, seen.mode_amplitudes),
+  const Vec key = body.positions();
+  body.setState(key + nodalModes(actor, seen.mode_amplitudes),
                 nodalModes(actor, seen.mode_velocities));
+  auto twin = twinOf(actor, actor.object.mesh, ObservedDrive::twinOptions(body.options()));
+  for (const auto& region : actor.fixed) twin->body().fixSurfaceVertices(region);
+  actor.drive = std::make_unique<ObservedDrive>(std::move(twin));
+  actor.key_nodes = key;
+  for (int k = steps - 1; k >= 0; --k) driveTo(actor, now - k * step, speed_scale * step);
+  const DeformableBody& led = actor.drive->twin().body();
+  body.setState(led.positions(), led.velocities());
   actor.soft->changed();
 }
 
@@ -249,6 +263,7 @@ void World::Impl::removeBodies(Actor& actor) {
   if (actor.body) rigid.remove(*actor.body);
   actor.body.reset();
   actor.soft.reset();
+  actor.drive.reset();
   contacts.forget(actor.id);
 }
 

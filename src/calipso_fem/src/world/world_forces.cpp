@@ -10,8 +10,27 @@ namespace {
 
 // rad/s, a quarter of a second to follow a target
 constexpr double kPullFrequency = 2.0 * M_PI * 4.0;
+constexpr double kFramesAhead = 2.5;  // for which a deforming object's motion is foreseen
 
 }  // namespace
+
+// Leads the twin on for h (s) of its own time. After the last frame known the amplitudes go on as they
+// last did; longer nothing is known of them.
+Vec World::Impl::driveTo(Actor& actor, double to, double h) {
+  ObservedMotion seen = actor.track.at(to);
+  const double beyond = std::max(0.0, to - seen.time);
+  if (beyond > kFramesAhead * params.frame_period)
+    seen.mode_velocities.setZero();
+  else
+    seen.mode_amplitudes += beyond * seen.mode_velocities;
+  return actor.drive->advance(actor.key_nodes + nodalModes(actor, seen.mode_amplitudes),
+                              nodalModes(actor, seen.mode_velocities) / speed_scale, h);
+}
+
+void World::Impl::driveAsObserved(double to, double h) {
+  for (Actor& actor : actors)
+    if (actor.drive) actor.soft->setDrive(driveTo(actor, to, h));
+}
 
 void World::Impl::applyLoads(double at, double h) {
   for (Actor& actor : actors) {

@@ -58,6 +58,9 @@ struct World::Impl {
   void makeSoft(Actor& actor, const BodyMotion& motion, bool settle);
   void deformAsObserved(Actor& actor);  // shape and velocity as in the video at this instant
   Vec nodalModes(const Actor& actor, const Vec& amplitudes) const;
+  // The same body in the same state, with the material it was observed with and not held.
+  std::unique_ptr<SoftObject> twinOf(const Actor& actor, const TriangleMesh& mesh,
+                                     const FemOptions& options) const;
   void removeBodies(Actor& actor);
   void reset(Actor& actor);
   // Friction, restitution and proximity of one object's surface, in all its contacts.
@@ -117,6 +120,8 @@ struct World::Impl {
   void addSupports(std::vector<Obstacle>& list) const;
   Obstacle obstacleOf(Actor& actor, double from, double to);
   std::vector<SoftEntry> softEntries();
+  Vec driveTo(Actor& actor, double to, double h);  // world_forces.cpp
+  void driveAsObserved(double to, double h);
   void applyLoads(double at, double h);  // world_forces.cpp
   Eigen::Vector3d twistOf(const Actor& actor, const Pull& pull, double at) const;
   void twistSoft(Actor& actor, const Pull& pull, double at);

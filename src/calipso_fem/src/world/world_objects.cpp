@@ -241,18 +241,25 @@ Actor& World::Impl::duplicate(const std::string& source_name, const std::string&
   return copy;
 }
 
+std::unique_ptr<SoftObject> World::Impl::twinOf(const Actor& actor, const TriangleMesh& mesh,
+                                                const FemOptions& options) const {
+  const DeformableBody& from = actor.soft->body();
+  auto twin = std::make_unique<SoftObject>(placed(mesh, actor.soft_from_object),
+                                           actor.observed_material, options);
+  twin->body().setRestNodes(from.model().mesh().nodes);
+  twin->copyPrestress(*actor.soft);
+  twin->setGravity(actor.acceleration());
+  twin->body().setState(from.positions(), from.velocities());
+  twin->changed();
+  return twin;
+}
+
 // The same grid in the same place, with the original's rest shape; then the state, moved.
 void World::Impl::copySoft(Actor& copy, const Actor& source, const Eigen::Isometry3d& motion) {
-  const DeformableBody& from = source.soft->body();
-  copy.soft = std::make_unique<SoftObject>(placed(copy.object.mesh, source.soft_from_object),
-                                           copy.observed_material, from.options());
+  copy.soft = twinOf(source, copy.object.mesh, source.soft->body().options());
   copy.soft_from_object = source.soft_from_object;
-  DeformableBody& body = copy.soft->body();
-  body.setRestNodes(from.model().mesh().nodes);
-  copy.soft->copyPrestress(*source.soft);
   copy.soft->setMaterial(copy.material);
-  body.setState(from.positions(), from.velocities());
-  body.applyRigidTransform(motion);
+  copy.soft->body().applyRigidTransform(motion);
   copy.soft->setGravity(copy.acceleration());
   copy.soft->changed();
   watchItself(copy);

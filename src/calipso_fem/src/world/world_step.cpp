@@ -117,6 +117,7 @@ void World::Impl::stepFrame(double h) {
 void World::Impl::substep(double from, double span) {
   const double to = from + span, h = speed_scale * span;
   endPulls(from);
+  driveAsObserved(to, h);
   applyLoads(to, h);
   const std::vector<SoftEntry> softs = softEntries();
   if (!softs.empty()) {
@@ -187,8 +188,8 @@ void World::Impl::updateSleep() {
       }
       continue;
     }
-    const bool calm =
-        actor.pulls.empty() && actor.air.empty() && actor.soft->body().isAtRest(kRestSpeed * size);
+    const bool calm = actor.pulls.empty() && actor.air.empty() && !actor.drive &&
+                      actor.soft->body().isAtRest(kRestSpeed * size);
     actor.calm_frames = calm ? actor.calm_frames + 1 : 0;
     actor.asleep = actor.calm_frames >= kCalmFrames;
   }

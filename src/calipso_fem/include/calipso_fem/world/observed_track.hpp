@@ -16,6 +16,7 @@ class ObservedTrack {
   // Keeps samples sorted by time; one of the same time is replaced.
   void add(const ObservedMotion& sample);
   bool empty() const { return samples_.empty(); }
+  double begin() const { return samples_.front().time; }  // s. @pre not empty
   bool reaches(double time) const {
     return !samples_.empty() && samples_.back().time >= time - 1e-9;
   }  // s

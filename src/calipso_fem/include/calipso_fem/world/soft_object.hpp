@@ -56,6 +56,7 @@ class SoftObject {
   // The prestress of another body with the same nodes.
   void copyPrestress(const SoftObject& other);
 
+  StepReport step(double h);  // under gravity and what drives it alone, without contacts
   // One step under gravity, all forces given since the last one, and contacts: whoever solves for
   // these drives the body's trial in between. `gained`: impulse and, about the centre of mass
   // before the step, its moment, of a body that nothing else holds; then momentum is exact, and
@@ -66,6 +67,7 @@ class SoftObject {
 
   void setGravity(const Eigen::Vector3d& gravity);
   void addForce(const SurfacePoint& point, const Eigen::Vector3d& force);  // N, for the next step
+  void setDrive(const Vec& forces) { drive_ = forces; }  // 3n, N, until others are given
 
   // The system that contact iterates with; forgotten when the body's own has changed for good.
   SoftSystem& system() { return *system_; }
@@ -100,7 +102,7 @@ class SoftObject {
   double holdStiffness(size_t points) const;  // N/m, of each
   SettleReport findRestShape(const Vec& goal, double stiffness, std::vector<HoldPoint>& hold,
                              double tolerance);
-  void applyPrestress();
+  void applyNodalForces();
   void setMomentum(const Momentum& target);
   Eigen::Vector3d gather(const Vec& nodal, const SurfacePoint& point) const;
 
@@ -110,6 +112,7 @@ class SoftObject {
   bool forced_ = false;
   Vec observed_;                    // 3 #N, nodes at construction
   Vec prestress_;                   // 3 #N, N, at the observed shape; empty: none
+  Vec drive_;                       // 3 #N, N; empty: never one
   double prestress_modulus_ = 0.0;  // Pa, of the material with which it carries the weight
   std::vector<int> carrier_;
   decltype(TriangleMesh::vertices) vertices_;
