@@ -1,5 +1,6 @@
 #include "calipso_flow/clip_dynamics.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -65,9 +66,13 @@ std::string summaryOf(const DeformationMotion& deformation) {
   }
   if (deformation.wind) {
     const Eigen::Vector3d& w = deformation.wind->mean;
-    const Eigen::Vector3d deviation = deformation.wind->mean_covariance.diagonal().cwiseSqrt();
-    std::snprintf(text, sizeof text, ", wind (%.1f +- %.1f, %.1f +- %.1f, %.1f +- %.1f) m/s", w.x(),
-                  deviation.x(), w.y(), deviation.y(), w.z(), deviation.z());
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(deformation.wind->mean_covariance);
+    const Eigen::Vector3d deviations = axes.eigenvalues().cwiseSqrt(),
+                          blind = axes.eigenvectors().col(2);
+    std::snprintf(text, sizeof text,
+                  ", wind (%.1f, %.1f, %.1f) +- %.1f m/s, but +- %.1f along (%.2f, %.2f, %.2f)",
+                  w.x(), w.y(), w.z(), deviations[1], deviations[2], blind.x(), blind.y(),
+                  blind.z());
     result += text;
   }
   if (deformation.stiffness) {

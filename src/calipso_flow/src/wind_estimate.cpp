@@ -107,7 +107,8 @@ std::optional<WindEstimate> fitWind(const ObjectModel& model, const std::vector<
     return std::nullopt;
   }
   WindEstimate estimate = estimateFrom(*fitted, knots, *sheets);
-  estimate.amplitudes = fit.simulated(knots, fitted->w, false)->amplitudes;
+  estimate.amplitudes =
+      fitted->all_seen ? fitted->amplitudes : fit.simulated(knots, fitted->w, false)->amplitudes;
   estimate.explained =
       1.0 - (estimate.amplitudes - modes.amplitudes).squaredNorm() / modes.amplitudes.squaredNorm();
   if (estimate.explained >= params.least_explained) return estimate;

@@ -128,8 +128,9 @@ std::optional<WindFit::Fitted> WindFit::solve(const std::vector<double>& knots,
     }
     damping.learn(gain);
   }
-  return Fitted{seenPart(at.J, P, w), reached->amplitudes, at.J.transpose() * at.J + P, cost,
-                at.r.squaredNorm()};
+  const Eigen::VectorXd seen = seenPart(at.J, P, w);
+  return Fitted{seen, reached->amplitudes, seen == w, at.J.transpose() * at.J + P,
+                cost, at.r.squaredNorm()};
 }
 
 Eigen::VectorXd WindFit::stepFrom(const Linearised& at, const Eigen::MatrixXd& P,
@@ -183,9 +184,9 @@ Eigen::VectorXd WindFit::seenPart(const Eigen::MatrixXd& J, const Eigen::MatrixX
                                   const Eigen::VectorXd& w) const {
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> seen(J.transpose() * J, P);
   const Eigen::MatrixXd& V = seen.eigenvectors();
-  const Eigen::VectorXd along = (seen.eigenvalues().array() > leastInformation(seen.eigenvalues()))
-                                    .select(V.transpose() * (P * w), 0.0);
-  return V * along;
+  const auto is_seen = seen.eigenvalues().array() > leastInformation(seen.eigenvalues());
+  if (is_seen.all()) return w;
+  return V * is_seen.select(V.transpose() * (P * w), 0.0).matrix();
 }
 
 void WindFit::allowForPersistence(const Eigen::MatrixXd& amplitudes) {

@@ -20,6 +20,7 @@ class WindFit {
   struct Fitted {
     Eigen::VectorXd w;
     Eigen::MatrixXd amplitudes;  // T x K, with the w that the steps ended at
+    bool all_seen = false;       // that is w
     Eigen::MatrixXd information;
     double cost = 0.0, left = 0.0;  // left: the residuals' part
   };
