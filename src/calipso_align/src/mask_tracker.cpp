@@ -21,6 +21,7 @@ constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has pr
 // of 255: how likely a pixel may lie in a shadow where nothing is known of any
 constexpr int kAnyShadow = 76;
 constexpr double kLeastNoise = 2.0;  // grey levels, of a still picture
+constexpr float kClearly = 3.0f;     // nats by which a colour is one object's rather than another's
 constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
 
 std::vector<cv::Vec3f> coloursUnder(const cv::Mat& image, const cv::Mat& mask) {
@@ -127,6 +128,7 @@ TrackedMask MaskTracker::track(const cv::Mat& image) {
     follow(*object, image, flow, rough);
     object->reference_mean = means;
   }
+  partOverlaps(image);
   takeUpAgain(image, means);
   rememberBackground(image);
   image.copyTo(previous_image_);
@@ -142,6 +144,23 @@ TrackedMask MaskTracker::combine(int moved) const {
     result.confidence = std::min(result.confidence, object.confidence);
   }
   return result;
+}
+
+// Where a mask reaches into that of an object whose model says where it is, the pixel is the
+// model's, unless it clearly has the colour of what then hides it.
+void MaskTracker::partOverlaps(const cv::Mat& image) {
+  for (Object& modelled : objects_)
+    for (Object& other : objects_) {
+      if (!modelled.shape || other.shape) continue;
+      std::vector<cv::Point> overlap;
+      cv::findNonZero(modelled.mask & other.mask, overlap);
+      for (const cv::Point& p : overlap) {
+        const cv::Vec3f colour = image.at<cv::Vec3b>(p);
+        const bool hides = other.colours.cost(colour) + kClearly < modelled.colours.cost(colour);
+        Object& wrong = hides ? modelled : other;
+        wrong.mask.at<uchar>(p) = wrong.coverage.at<uchar>(p) = 0;
+      }
+    }
 }
 
 void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& flow,
@@ -235,17 +254,21 @@ std::vector<cv::Mat> MaskTracker::costsOf(const cv::Mat& view, const cv::Mat& ba
   return costs;
 }
 
-// Pixels (CV_8U, of roi's size) that are rather another object's, near where one was.
-cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view,
+// Pixels (CV_8U, of roi's size) that are rather another object's, near where one was. Two cars'
+// windows look alike: where colours do not tell clearly, a pixel is whose it was or is predicted.
+cv::Mat MaskTracker::othersIn(const Object& object, const cv::Mat& view, const cv::Mat& predicted,
                               const cv::Rect& roi) const {
   cv::Mat others = cv::Mat::zeros(view.size(), CV_8U);
   if (objects_.size() == 1) return others;
-  const cv::Mat near = grownIn(roi, occupied_ & ~object.mask, params_.margin_px / 2);
+  const cv::Mat theirs = occupied_ & ~object.mask;
+  const cv::Mat near = grownIn(roi, theirs, params_.margin_px / 2);
   for (int y = 0; y < view.rows; ++y)
     for (int x = 0; x < view.cols; ++x) {
       if (!near.at<uchar>(y, x)) continue;
-      const cv::Vec3f colour = view.at<cv::Vec3b>(y, x);
-      const float own = object.colours.cost(colour);
+      const cv::Vec3b colour = view.at<cv::Vec3b>(y, x);
+      float own = object.colours.cost(colour);
+      if (predicted.at<uchar>(y, x)) own -= kClearly;
+      if (theirs.at<uchar>(roi.y + y, roi.x + x)) own += kClearly;
       for (const Object& other : objects_)
         if (&other != &object && other.colours.cost(colour) < own) others.at<uchar>(y, x) = 255;
     }
@@ -294,7 +317,7 @@ MaskTracker::Layers MaskTracker::layersOf(const Object& object, const cv::Mat& v
 void MaskTracker::cutContradicted(const Object& object, const cv::Mat& view, const Prediction& p,
                                   const KnownBackground& background, const Layers& layers,
                                   const cv::Rect& roi, cv::Mat& labels) const {
-  const cv::Mat apart = othersIn(object, view, roi);
+  const cv::Mat apart = othersIn(object, view, p.mask, roi);
   const std::vector<cv::Vec3f> known =
       coloursUnder(background.image, background.known & (p.distance > params_.band_px));
   if (known.empty()) return;

@@ -100,6 +100,36 @@ TEST(RigidShape, FollowsATurningBodyBeforeItsOwnColours) {
   }
 }
 
+// A ball without a model passes behind it, of the same paint.
+TEST(MaskTracker, WhatLooksLikeAModelledBodyDoesNotTakeItOver) {
+  const PaintedPear pear;
+  constexpr double kRadius = 32.0;
+  const auto ball = [](int frame) { return testing::disc(50.0 + 7.0 * frame, 130.0, kRadius); };
+  const auto labels = [&](int frame) {
+    cv::Mat both = testing::maskOf(pear.mask(motionAt(0)).size(), ball(frame)) / 255 * 2;
+    both.setTo(1, pear.mask(motionAt(frame)));
+    return both;
+  };
+  const auto picture = [&](int frame) {
+    cv::Mat image = pear.picture(motionAt(frame), frame + 1);
+    const cv::Mat visible = labels(frame) == 2;
+    for (int v = 0; v < image.rows; ++v)
+      for (int u = 0; u < image.cols; ++u) {
+        if (!visible.at<uchar>(v, u)) continue;
+        const double bright = std::sin(0.25 * (u - 7.0 * frame)) * std::sin(0.2 * v);
+        for (int c = 0; c < 3; ++c)
+          image.at<cv::Vec3b>(v, u)[c] =
+              cv::saturate_cast<uchar>(110.0 + 60.0 * bright + 12.0 * (c - 1));
+      }
+    return image;
+  };
+  MaskTracker tracker(picture(0), labels(0), {{1, pear.surface()}});
+  for (int k = 1; k <= 12; ++k) {
+    const cv::Mat found = tracker.track(picture(k)).labels, truth = labels(k);
+    EXPECT_GE(intersectionOverUnion(found == 1, truth == 1), 0.97) << "frame " << k;
+  }
+}
+
 // The model may lack details that the mask has.
 TEST(RigidShape, KeepsWhatTheMaskHadBesides) {
   const PaintedPear pear;

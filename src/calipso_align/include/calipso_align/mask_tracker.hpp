@@ -87,6 +87,7 @@ class MaskTracker {
                                const cv::Mat& flow) const;
   void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough);
   void lose(Object& object) const;
+  void partOverlaps(const cv::Mat& image);
   // Takes up the lost objects that have come back.
   void takeUpAgain(const cv::Mat& image, const cv::Mat& means);
   TrackedMask combine(int moved) const;
@@ -108,7 +109,8 @@ class MaskTracker {
                        cv::Mat& labels) const;
   bool fitShape(Object& object, const cv::Mat& view, const Layers& layers, const cv::Rect& roi,
                 Prediction& prediction) const;
-  cv::Mat othersIn(const Object& object, const cv::Mat& view, const cv::Rect& roi) const;
+  cv::Mat othersIn(const Object& object, const cv::Mat& view, const cv::Mat& predicted,
+                   const cv::Rect& roi) const;
   void checkInput(const cv::Mat& image, const cv::Mat& labels) const;
 
   TrackerParams params_;
