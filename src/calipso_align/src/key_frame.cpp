@@ -121,6 +121,7 @@ KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::M
   const auto start = std::chrono::steady_clock::now();
   result.labels = segmenter.segment(strokes).clone();
   result.models = segmenter.models();
+  result.remarks = segmenter.remarks();
   result.segmentation_ms = millisecondsSince(start);
   const auto traced = std::chrono::steady_clock::now();
   result.contours = extractContours(image, result.labels, segmenter.targets());

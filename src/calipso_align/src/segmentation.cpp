@@ -236,6 +236,13 @@ std::optional<FittedShape> Segmenter::fitModel(size_t k) const {
                      agreement};
 }
 
+std::vector<std::string> Segmenter::remarks() const {
+  if (models_.empty()) return {};
+  SegmentationLevel level = coarse_;
+  evaluateCosts(models_, params_.outlier_cost, level);
+  return indistinctTargets(targets_, level.costs, level.labels);
+}
+
 std::map<int, ModelSurface> Segmenter::models() const {
   std::map<int, ModelSurface> models;
   for (size_t k = 0; k < fitted_.size(); ++k)

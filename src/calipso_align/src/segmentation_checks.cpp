@@ -80,6 +80,24 @@ void checkStrokes(const cv::Mat& strokes, const std::vector<SegmentationTarget>&
   }
 }
 
+std::vector<std::string> indistinctTargets(const std::vector<SegmentationTarget>& targets,
+                                           const std::vector<cv::Mat>& costs,
+                                           const cv::Mat& labels) {
+  // nats per pixel, no pixel counting more than the most: objects that are there have 3 to 6
+  constexpr double kLeast = 2.0, kMost = 6.0;
+  std::vector<std::string> remarks;
+  for (size_t k = 0; k < targets.size(); ++k) {
+    const cv::Mat odds = cv::min(cv::max(costs[0] - costs[k + 1], -kMost), kMost);
+    const double mean = cv::mean(odds, labels == static_cast<int>(k + 1))[0];
+    if (mean >= kLeast) continue;
+    remarks.push_back("object '" + targets[k].name + "' is hardly told from its surroundings (" +
+                      std::to_string(mean) +
+                      " nats per pixel): is it in the first frame? If so, "
+                      "draw strokes on it and around it");
+  }
+  return remarks;
+}
+
 void failWithoutForeground(const SegmentationTarget& target) {
   throw std::invalid_argument("object '" + target.name +
                               "': the rectangle and strokes leave no foreground; draw a stroke on "

@@ -61,6 +61,28 @@ TEST(Segmenter, AFittedModelBringsInColoursWithoutStroke) {
   EXPECT_GE(intersectionOverUnion(guided.segment(strokes) == 1, maskOf(kSize, whole)), 0.97);
 }
 
+// Where the object is said to be there is nothing but more of the background; its model alone says
+// where it ends.
+TEST(Segmenter, SaysThatAnObjectMayNotBeInThePicture) {
+  const auto shape = disc(80.3, 60.7, 30.2);
+  SegmentationTarget target{"disc", 7, cv::Rect(45, 25, 72, 72), {}};
+  target.fit_model = [&](const std::vector<ContourLoop>&) {
+    return ModelView{maskOf(kSize, shape), cv::Mat1f::zeros(kSize), 1.5, {}};
+  };
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  cv::circle(strokes, {80, 60}, 20, 7, cv::FILLED);
+  Segmenter present(paint(kSize, shape, kGreen, kGrey, 3.0), {target});
+  EXPECT_TRUE(present.remarks().empty());
+  present.segment(strokes);
+  EXPECT_TRUE(present.remarks().empty());
+
+  Segmenter absent(paint(kSize, shape, kGrey, kGrey, 3.0), {target});
+  absent.segment(strokes);
+  ASSERT_EQ(absent.remarks().size(), 1u);
+  EXPECT_NE(absent.remarks()[0].find("'disc'"), std::string::npos);
+  EXPECT_NE(absent.remarks()[0].find("first frame"), std::string::npos);
+}
+
 TEST(Segmenter, AModelThatCannotBeFittedChangesNothing) {
   const auto shape = disc(80.3, 60.7, 30.2);
   const cv::Mat image = paint(kSize, shape, kGreen, kGrey, 3.0);

@@ -17,6 +17,7 @@ struct KeyFrame {
   cv::Mat labels;                       // CV_8U: 0 none, else the object's index
   std::vector<ObjectContour> contours;  // in the scene's order of objects
   std::map<int, ModelSurface> models;   // per label, where one could be fitted
+  std::vector<std::string> remarks;     // of the segmentation, for the user
   double segmentation_ms = 0.0;         // wall time
   double contour_ms = 0.0;
 };

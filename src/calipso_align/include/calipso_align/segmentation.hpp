@@ -3,6 +3,7 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "calipso_align/gaussian_mixture.hpp"
@@ -52,6 +53,9 @@ class Segmenter {
 
   const cv::Mat& labels() const { return labels_; }
   const std::vector<SegmentationTarget>& targets() const { return targets_; }
+  // What the user should know: objects that colours and depth hardly tell from their surroundings,
+  // so that it is the rough placement that says where they are. Empty before the first call.
+  std::vector<std::string> remarks() const;
   // Per label, the models that were fitted to the first contours; none before the first call.
   std::map<int, ModelSurface> models() const;
 

@@ -111,6 +111,7 @@ void SegmentationRos::segment() {
         toMsg(key_header_, key.labels, key.contours, 1.0f));
     segmentation_publisher_.publish(key_message_);
     publishOverlay(key);
+    for (const std::string& remark : key.remarks) reporter_.warn(key_header_.stamp, remark);
     reporter_.ready("key frame segmented");
   } catch (const std::exception& error) {
     reporter_.failed(error.what());
