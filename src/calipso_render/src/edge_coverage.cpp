@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/hal/intrin.hpp>
 #include <optional>
 #include <unordered_map>
 #include <utility>
@@ -66,11 +67,35 @@ void findChanges(const std::uint32_t* row, const std::uint32_t* below, int width
   }
 }
 
+// SampledTile::wanted of columns [left, right] of rows [top, bottom].
+std::uint64_t pixelsWithin(int left, int top, int right, int bottom) {
+  static_assert(SampledTile::kSide == 8);
+  const std::uint64_t columns = (0xffu << left) & (0xffu >> (7 - right)),
+                      rows =
+                          (~std::uint64_t{0} << 8 * top) & (~std::uint64_t{0} >> 8 * (7 - bottom));
+  return columns * 0x0101010101010101ull & rows;
+}
+
+// Do all samples see the object that `id` names, and one sheet of it?
+bool agree(const EdgeCoverage::Pixel& pixel, std::uint32_t id) {
+  std::uint32_t differ = 0;
+  for (const std::uint32_t sample : pixel.ids) differ |= sample ^ id;
+  if ((differ >> 24) != 0) return false;
+  cv::v_float32x4 low = cv::v_load(pixel.nearness.data()), high = low;
+  for (int k = 4; k < EdgeCoverage::kSamples; k += 4) {
+    const cv::v_float32x4 four = cv::v_load(&pixel.nearness[k]);
+    low = cv::v_min(low, four), high = cv::v_max(high, four);
+  }
+  return id == VisibilityBuffer::kNothing ||
+         EdgeCoverage::isOneSheet(cv::v_reduce_max(high), cv::v_reduce_min(low));
+}
+
 }  // namespace
 
 struct EdgeCoverage::Piece {
   TriangleSamples samples;
-  int u0, v0, u1, v1;  // region coordinates
+  std::uint64_t wanted;  // SampledTile::wanted
+  int u, v;              // the tile's first pixel, region coordinates
   int tile;
   std::uint32_t id;
 };
@@ -120,14 +145,13 @@ void EdgeCoverage::choose(int column, int row) {
   if (tile < 0) {
     tile = static_cast<int>(slots_.size() / (kTile * kTile));
     slots_.resize(slots_.size() + kTile * kTile, kNone);
-    chosen_.resize(chosen_.size() + kTile, 0);
+    chosen_.push_back(0);
   }
-  int& slot = slots_[static_cast<std::size_t>(tile) * kTile * kTile + (row % kTile) * kTile +
-                     column % kTile];
+  const int place = (row % kTile) * kTile + column % kTile;
+  int& slot = slots_[static_cast<std::size_t>(tile) * kTile * kTile + place];
   if (slot >= 0) return;
   slot = static_cast<int>(pixels_.size());
-  chosen_[static_cast<std::size_t>(tile) * kTile + row % kTile] |=
-      static_cast<std::uint8_t>(1u << column % kTile);
+  chosen_[tile] |= std::uint64_t{1} << place;
   pixels_.emplace_back();
   pixels_.back().ids.fill(VisibilityBuffer::kNothing);
   pixels_.back().nearness.fill(VisibilityBuffer::kFar);
@@ -190,7 +214,10 @@ void EdgeCoverage::draw(const ScreenMesh& mesh, int object) {
     for (int band = 0; band < kBands; ++band) {
       for (const auto& part : pieces) {
         for (const Piece& piece : part) {
-          if (piece.tile % kBands == band) drawPiece(piece);
+          if (piece.tile % kBands != band) continue;
+          const int* slots = &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile];
+          kernels().drawSamples(piece.samples, {piece.u, piece.v, piece.wanted, slots}, piece.id,
+                                pixels_.data());
         }
       }
     }
@@ -224,26 +251,15 @@ void EdgeCoverage::addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t
     for (int i = u0 / kTile; i <= u1 / kTile && u0 <= u1; ++i) {
       const int tile = tiles_[static_cast<std::size_t>(j) * tiles_across_ + i];
       if (tile < 0) continue;
+      const int u = i * kTile, v = j * kTile;
+      const std::uint64_t wanted =
+          chosen_[tile] & pixelsWithin(std::max(u0 - u, 0), std::max(v0 - v, 0),
+                                       std::min(u1 - u, kTile - 1), std::min(v1 - v, kTile - 1));
+      if (wanted == 0) continue;
       if (!samples) samples = samplesOf(p, area);
-      pieces.push_back({*samples, std::max(u0, i * kTile), std::max(v0, j * kTile),
-                        std::min(u1, (i + 1) * kTile - 1), std::min(v1, (j + 1) * kTile - 1), tile,
-                        id});
+      pieces.push_back({*samples, wanted, u, v, tile, id});
     }
   }
-}
-
-void EdgeCoverage::drawPiece(const Piece& piece) {
-  static_assert(kTile == SampledTile::kSide);
-  const int left = piece.u0 % kTile, right = piece.u1 % kTile;
-  const unsigned columns = (0xffu << left) & (0xffu >> (kTile - 1 - right));
-  const SampledTile tile{piece.u0 - left,
-                         piece.v0 - piece.v0 % kTile,
-                         piece.v0 % kTile,
-                         piece.v1 % kTile,
-                         columns,
-                         &chosen_[static_cast<std::size_t>(piece.tile) * kTile],
-                         &slots_[static_cast<std::size_t>(piece.tile) * kTile * kTile]};
-  kernels().drawSamples(piece.samples, tile, piece.id, pixels_.data());
 }
 
 const EdgeCoverage::Pixel* EdgeCoverage::at(int u, int v) const {
@@ -254,23 +270,16 @@ const EdgeCoverage::Pixel* EdgeCoverage::at(int u, int v) const {
 }
 
 void EdgeCoverage::settle(const VisibilityBuffer& centre) {
-  const auto agrees = [](const Pixel& pixel, std::uint32_t id) {
-    for (const std::uint32_t sample : pixel.ids) {
-      if (((sample ^ id) >> 24) != 0) return false;
-    }
-    const auto [farthest, nearest] =
-        std::minmax_element(pixel.nearness.begin(), pixel.nearness.end());
-    return id == VisibilityBuffer::kNothing || isOneSheet(*nearest, *farthest);
-  };
   const int down = static_cast<int>(tiles_.size()) / tiles_across_;
 #pragma omp parallel for schedule(dynamic, 2)
   for (int j = 0; j < down; ++j) {
     for (int i = 0; i < tiles_across_; ++i) {
       const int tile = tiles_[static_cast<std::size_t>(j) * tiles_across_ + i];
-      int* slots = &slots_[static_cast<std::size_t>(std::max(tile, 0)) * kTile * kTile];
-      for (int k = 0; tile >= 0 && k < kTile * kTile; ++k) {
-        if (slots[k] >= 0 &&
-            agrees(pixels_[slots[k]], centre.ids(j * kTile + k / kTile)[i * kTile + k % kTile]))
+      if (tile < 0) continue;
+      int* slots = &slots_[static_cast<std::size_t>(tile) * kTile * kTile];
+      for (std::uint64_t rest = chosen_[tile]; rest != 0; rest &= rest - 1) {
+        const int k = __builtin_ctzll(rest);
+        if (agree(pixels_[slots[k]], centre.ids(j * kTile + k / kTile)[i * kTile + k % kTile]))
           slots[k] = kSettled;
       }
     }

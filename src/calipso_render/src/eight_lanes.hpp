@@ -37,6 +37,15 @@ CALIPSO_INLINE bool any(const EightInts& mask) {
   return ((h[0] | h[1]) | (h[2] | h[3])) != 0;
 }
 
+// How many of the first lanes are set. @param mask 0 or -1 in each lane
+CALIPSO_INLINE int leadingLanes(const EightInts& mask) {
+  typedef std::int8_t EightBytes __attribute__((vector_size(8)));
+  const EightBytes bytes = __builtin_convertvector(~mask, EightBytes);
+  std::uint64_t others;
+  std::memcpy(&others, &bytes, sizeof(others));
+  return others == 0 ? 8 : __builtin_ctzll(others) / 8;
+}
+
 CALIPSO_INLINE Eight squareRoot(const Eight& x) {
   Eight root;
   for (int k = 0; k < 8; ++k) root[k] = std::sqrt(x[k]);

@@ -33,9 +33,7 @@ bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& t
 // some pixels, so what lies that near to both the shadow and the change is taken from the plate. A
 // change of single pixels is noise of the shadow's border and moves nothing.
 void FrameCompositor::findRelit() {
-  relit_.create(region_.size(), CV_8U);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) std::memset(relit_.ptr(v), 0, region_.width);
+  relit_ = cv::Mat::zeros(region_.size(), CV_8U);
   const int reach = params_.background.shadow_margin_px, side = reach + 2;
   const auto around = [side](const cv::Rect& r) {
     return r.empty() ? r

@@ -122,7 +122,7 @@ class FrameCompositor {
   // Corners of one row that see one object.
   struct CornerRun {
     int slot, count;
-    std::uint32_t ids[SurfaceRun::kMost];
+    std::uint32_t ids[SurfaceRun::kRoom];
     int corners[SurfaceRun::kMost];  // columns of the grid
     SurfaceRun run;
   };
@@ -219,6 +219,7 @@ class FrameCompositor {
   cv::Mat quietPlaces() const;
   void findPassingShadows();
   void drawVisibility();
+  void sampleEdges();
   void findStill();
   bool findResting(int slot, std::vector<char>& can_rest) const;
   void keepRims(const cv::Mat& owner);
@@ -254,8 +255,8 @@ class FrameCompositor {
   void drawRow(int v, Row& row) const;
   void findKinds(int v, Row& row) const;
   void findBehind(int j, int begin, int end, Kind* kinds) const;
-  bool reflectStretch(const std::uint32_t* ids, int v, int first, int last, int slot,
-                      Row& row) const;
+  void reflectStretch(unsigned traits, int v, int first, int last, int slot, Row& row) const;
+  void addTexture(int v, int first, int last, int slot, Row& row) const;
   void sunOnStretch(int v, int first, int last, int slot, Row& row) const;
   void drawStretch(int v, int first, int last, int slot, Row& row) const;
   void carryResidual(int v, int first, int last, int slot, Row& row) const;

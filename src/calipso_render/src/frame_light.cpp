@@ -22,6 +22,10 @@ namespace {
 constexpr float kSameSky = (kSameLevels - 2.1f) * kPerLevel,
                 kLittleSky = (kSoftSky - 2.1f) * kPerLevel;
 
+CALIPSO_WIDE_LOOPS void markSeen(const std::uint32_t* ids, int count, std::uint8_t* seen) {
+  for (int i = 0; i < count; ++i) seen[i] = ids[i] != VisibilityBuffer::kNothing ? 255 : 0;
+}
+
 // Product of two levels, 255 = 1.
 std::uint8_t both(std::uint8_t a, std::uint8_t b) {
   const unsigned product = a * static_cast<unsigned>(b) + 128;
@@ -79,8 +83,7 @@ void FrameCompositor::findCovered() {
     std::memset(drawn, 0, region_.width);
     if (v < box.y || v >= box.br().y) continue;
     if (all_drawn_) {
-      for (int u = box.x; u < box.br().x; ++u)
-        drawn[u] = ids[u] != VisibilityBuffer::kNothing ? 255 : 0;
+      markSeen(ids + box.x, box.width, drawn + box.x);
     } else {
       for (int u = box.x; u < box.br().x; ++u)
         drawn[u] = isDrawn(ids[u], u + region_.x, v + region_.y) ? 255 : 0;

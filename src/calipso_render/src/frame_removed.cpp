@@ -2,7 +2,6 @@
 // of those that move: pixels behind which the place comes to light.
 
 #include <algorithm>
-#include <cstring>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
@@ -120,9 +119,7 @@ void FrameCompositor::findOwn(const cv::Rect& box) {
 }
 
 void FrameCompositor::findRemoved() {
-  removed_.create(region_.size(), CV_8U);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < region_.height; ++v) std::memset(removed_.ptr(v), 0, region_.width);
+  removed_ = cv::Mat::zeros(region_.size(), CV_8U);
   const cv::Rect box = passing_.empty() ? shown_box_ : region_;
   if (!box.empty()) findOwn(box);
   for (const cv::Mat& front : fronts_) {

@@ -69,6 +69,16 @@ CALIPSO_WIDE_LOOPS void relight(const LightFactors& factors, const cv::Vec3f* pl
   }
 }
 
+// How many of the pixels see the object that the first sees, from that on.
+CALIPSO_WIDE_LOOPS int countOfFirst(const std::uint32_t* ids, int count) {
+  std::uint32_t differ = 0;
+  for (int k = 0; k < count; ++k) differ |= ids[k] ^ ids[0];
+  if ((differ >> 24) == 0) return count;
+  int same = 1;
+  while (((ids[same] ^ ids[0]) >> 24) == 0) ++same;
+  return same;
+}
+
 }  // namespace
 
 // Of columns [begin, end) of region_'s row j: what lies behind, where its light changes or where
@@ -208,14 +218,15 @@ void FrameCompositor::drawRow(int v, Row& row) const {
        i = nextMarked(row.kinds.data(), i, region_.width)) {
     const int u = i + region_.x;
     if (isPlain(row.kinds[i])) {
-      const int first = i, slot = VisibilityBuffer::objectOf(ids[i]),
-                end = std::min(region_.width,
-                               (u / SurfaceRun::kMost + 1) * SurfaceRun::kMost - region_.x);
-      while (i < end && isPlain(row.kinds[i]) && VisibilityBuffer::objectOf(ids[i]) == slot) ++i;
-      drawStretch(v, first, i, slot, row);
+      const int first = i,
+                limit = std::min(region_.width,
+                                 (u / SurfaceRun::kMost + 1) * SurfaceRun::kMost - region_.x);
+      i = first + countOfFirst(ids + first,
+                               nextUnmarked(row.kinds.data(), i, limit, kPlain | kPlainEdge) - i);
+      drawStretch(v, first, i, VisibilityBuffer::objectOf(ids[first]), row);
     } else if (row.kinds[i] == kBehind) {
       const int first = i;
-      while (i < region_.width && row.kinds[i] == kBehind) ++i;
+      i = nextUnmarked(row.kinds.data(), i, region_.width, kBehind);
       composeBehind(v, first, i, row);
     } else {
       composeSpecial(u, v, row);

@@ -10,6 +10,7 @@
 #include "calipso_render/shadow_map.hpp"
 #include "calipso_render/sky_map.hpp"
 #include "frame_compositor.hpp"
+#include "side_by_side.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -59,9 +60,12 @@ void FrameCompositor::prepareShadows() {
     if (edited_[i] && !prepared_.moves[i] && s.in_video)
       originals.push_back({&s.key_vertices, &s.triangles, s.winding});
   }
-  moved_shadow_ = shadowOf(moved, light_, params_);
-  moved_sky_ = skyShadowOf(moved, params_);
-  for (const Occluder& o : moved) moved_bounds_ |= shadowBounds(*o.vertices, light_);
+  sideBySide(
+      params_.quality == Quality::kLive, [&] { moved_shadow_ = shadowOf(moved, light_, params_); },
+      [&] {
+        moved_sky_ = skyShadowOf(moved, params_);
+        for (const Occluder& o : moved) moved_bounds_ |= shadowBounds(*o.vertices, light_);
+      });
   const bool same = shadows_.others && shadows_.edited == edited_ &&
                     shadows_.sun == light_.direction && sameView(shadows_.camera, frame_.camera);
   const bool others_rest =

@@ -52,9 +52,12 @@ void FrameCompositor::addSheets(int u, int v, std::vector<Sheet>& sheets) const 
       sheets.push_back({{id, static_cast<float>(u), static_cast<float>(v)}, column, 1.0f});
     return;
   }
+  const auto draws = [&](std::uint32_t id) {
+    return all_drawn_ ? id != VisibilityBuffer::kNothing : isDrawn(id, u, v);
+  };
   std::array<std::uint8_t, EdgeCoverage::kSamples> done{}, sees;
   for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
-    if (done[i] != 0 || !isDrawn(edge->ids[i], u, v)) continue;
+    if (done[i] != 0 || !draws(edge->ids[i])) continue;
     findSheet(*edge, i, sees);
     int count = 0;
     for (int j = 0; j < EdgeCoverage::kSamples; ++j)

@@ -9,6 +9,7 @@
 #include "calipso_render/colour.hpp"
 #include "frame_compositor.hpp"
 #include "place_depth.hpp"
+#include "side_by_side.hpp"
 #include "view_warp.hpp"
 
 namespace calipso::render {
@@ -91,13 +92,20 @@ void FrameCompositor::prepareFrame() {
   if (region_.empty()) return;
   findRemoved();
   drawVisibility();
-  findStill();
-  findCovered();
-  measureLight();
-  findScreened();
-  findRelit();
-  findMaps();
-  findSurfaceSun();
+  sideBySide(
+      params_.quality == Quality::kLive,
+      [this] {
+        sampleEdges();
+        findMaps();
+        findSurfaceSun();
+      },
+      [this] {
+        findStill();
+        findCovered();
+        measureLight();
+        findScreened();
+        findRelit();
+      });
 }
 
 Light FrameCompositor::lightOf(const FrameInput& frame) const {
@@ -271,6 +279,9 @@ void FrameCompositor::drawVisibility() {
   centre_.emplace(region_);
   for (std::size_t slot = 0; slot < actors_.size(); ++slot)
     centre_->draw(actors_[slot].screen, static_cast<int>(slot));
+}
+
+void FrameCompositor::sampleEdges() {
   edges_.emplace(*centre_);
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     if (edited_[surface_of_slot_[slot]])

@@ -124,7 +124,7 @@ void FrameCompositor::lightCorners(int j, int first, const std::vector<std::uint
     const std::uint32_t id = ids[u - region_.x];
     if (!isDrawn(id, u, v)) return -1;
     const int slot = VisibilityBuffer::objectOf(id);
-    return maps_[slot].of(VisibilityBuffer::triangleOf(id)).thin ? -1 : slot;
+    return maps_[slot].of(VisibilityBuffer::triangleOf(id)).is(TriangleMap::kThin) ? -1 : slot;
   };
   CornerRun wanted;
   wanted.count = 0;
@@ -210,42 +210,35 @@ bool FrameCompositor::isSmooth(int i, int j, int size) const {
 }
 
 // Reflectance of the pixels [first, last) of row v at their places in row.run.
-// @param ids of the row
-// @return whether a pixel's triangle is too thin to tell what it shows
-bool FrameCompositor::reflectStretch(const std::uint32_t* ids, int v, int first, int last, int slot,
+// @param traits of their triangles
+void FrameCompositor::reflectStretch(unsigned traits, int v, int first, int last, int slot,
                                      Row& row) const {
-  const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
   const int offset = (first + region_.x) % kLightStep;
   const std::optional<cv::Vec3f>& albedo = lookOf(slot).albedo;
-  bool any_picture = false, any_texture = false, any_thin = false;
-  for (int i = first; i < last;) {
-    const std::uint32_t id = ids[i];
-    const int triangle = VisibilityBuffer::triangleOf(id);
-    any_picture |= appearance.sources[triangle] != Appearance::Source::kTexture,
-        any_texture |= appearance.sources[triangle] != Appearance::Source::kPicture;
-    any_thin |= maps_[slot].of(triangle).thin;
-    while (i < last && ids[i] == id) ++i;
-  }
   SurfaceRun& run = row.run;
   if (albedo) {
     for (int c = 0; c < 3; ++c) std::fill_n(&run.colour[c][offset], last - first, (*albedo)[c]);
-    return any_thin;
+    return;
   }
-  if (any_picture) kernels().sample(appearance.albedo, offset, offset + last - first, run);
-  for (int i = first; any_texture && i < last;) {
-    const std::uint32_t id = ids[i];
-    const int triangle = VisibilityBuffer::triangleOf(id), begin = i;
-    while (i < last && ids[i] == id) ++i;
+  const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
+  if ((traits & TriangleMap::kPictured) != 0)
+    kernels().sample(appearance.albedo, offset, offset + last - first, run);
+  if ((traits & TriangleMap::kTextured) != 0) addTexture(v, first, last, slot, row);
+}
+
+// What the texture says of their reflectance.
+void FrameCompositor::addTexture(int v, int first, int last, int slot, Row& row) const {
+  const SurfaceTexture& texture = prepared_.appearances[surface_of_slot_[slot]].texture;
+  const int offset = (first + region_.x) % kLightStep;
+  const std::uint32_t* ids = centre_->ids(v - region_.y);
+  for (int i = first; i < last; ++i) {
+    const int triangle = VisibilityBuffer::triangleOf(ids[i]);
     const TriangleMap& map = maps_[slot].of(triangle);
-    const Appearance::Source source = appearance.sources[triangle];
-    if (source == Appearance::Source::kPicture || map.thin) continue;
-    for (int k = begin; k < i; ++k) {
-      const cv::Vec4f texel = appearance.texture.at(
-          triangle, map.weightsAt(static_cast<float>(k + region_.x), static_cast<float>(v)));
-      run.mix(offset + k - first, texel, source == Appearance::Source::kBoth);
-    }
+    if (!map.is(TriangleMap::kTextured) || map.is(TriangleMap::kThin)) continue;
+    const Eigen::Vector3f weights = barycentric(
+        actors_[slot].screen, triangle, static_cast<float>(i + region_.x), static_cast<float>(v));
+    row.run.mix(offset + i - first, texture.at(triangle, weights), map.is(TriangleMap::kPictured));
   }
-  return any_thin;
 }
 
 // The sun on the same pixels.
@@ -295,10 +288,11 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
   SurfaceRun& run = row.run;
   std::iota(run.column + offset, run.column + offset + count,
             static_cast<float>(first + region_.x));
-  kernels().locate(maps_[slot].triangles(), ids + first,
-                   {v, count, offset, prepared_.appearances[surface_of_slot_[slot]].region.tl()},
-                   place_view_.planes().sightLines(v), run);
-  const bool any_thin = reflectStretch(ids, v, first, last, slot, row);
+  const unsigned traits = kernels().locate(
+      maps_[slot].triangles(), ids + first,
+      {v, count, offset, prepared_.appearances[surface_of_slot_[slot]].region.tl()},
+      place_view_.planes().sightLines(v), run);
+  reflectStretch(traits, v, first, last, slot, row);
   sunOnStretch(v, first, last, slot, row);
   kernels().shade(shades_[slot], offset, offset + count, run);
   for (int c = 0; c < 3; ++c) std::copy_n(&run.colour[c][offset], count, &row.colour[c][first]);
@@ -310,8 +304,8 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
   }
   std::memset(&row.source[first], kRendered, count);
   carryResidual(v, first, last, slot, row);
-  for (int i = first; any_thin && i < last; ++i) {
-    if (!maps_[slot].of(VisibilityBuffer::triangleOf(ids[i])).thin) continue;
+  for (int i = first; (traits & TriangleMap::kThin) != 0 && i < last; ++i) {
+    if (!maps_[slot].of(VisibilityBuffer::triangleOf(ids[i])).is(TriangleMap::kThin)) continue;
     const SurfacePlace place{ids[i], static_cast<float>(i + region_.x), static_cast<float>(v)};
     shadePlaces(&place, 1, slot, run);
     row.set(i, {run.colour[0][0], run.colour[1][0], run.colour[2][0], 1.0f});

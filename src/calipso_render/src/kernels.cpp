@@ -148,11 +148,12 @@ CALIPSO_INLINE void encodeBody(const NoiseCurves& curves, const float* const (&c
   std::copy_n(rest, count - k, codes + k);
 }
 
-CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTarget& target) {
+CALIPSO_INLINE void fillBody(const TriangleSpan* spans, const int* which, int count,
+                             const SpanTarget& target) {
   if (target.ids != nullptr)
-    fillSpansBody<true>(spans, count, target);
+    fillSpansBody<true>(spans, which, count, target);
   else
-    fillSpansBody<false>(spans, count, target);
+    fillSpansBody<false>(spans, which, count, target);
 }
 
 #define CALIPSO_KERNELS(name, attribute)                                                         \
@@ -160,10 +161,10 @@ CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTar
                                const LightPoints& points, int count, float* visible) {           \
     visibleBody(map, taps, points, count, visible);                                              \
   }                                                                                              \
-  attribute void name##Locate(const TriangleMap* maps, const std::uint32_t* ids,                 \
-                              const PixelStretch& stretch, const SightLines& sight,              \
-                              SurfaceRun& run) {                                                 \
-    locateBody(maps, ids, stretch, sight, run);                                                  \
+  attribute unsigned name##Locate(const TriangleMap* maps, const std::uint32_t* ids,             \
+                                  const PixelStretch& stretch, const SightLines& sight,          \
+                                  SurfaceRun& run) {                                             \
+    return locateBody(maps, ids, stretch, sight, run);                                           \
   }                                                                                              \
   attribute void name##Sample(const cv::Mat& image, int first, int last, SurfaceRun& run) {      \
     sampleBody(image, first, last, run);                                                         \
@@ -175,8 +176,9 @@ CALIPSO_INLINE void fillBody(const TriangleSpan* spans, int count, const SpanTar
                               const NoiseRows& noise, int column, int count, cv::Vec3b* codes) { \
     encodeBody(curves, colour, noise, column, count, codes);                                     \
   }                                                                                              \
-  attribute void name##Fill(const TriangleSpan* spans, int count, const SpanTarget& target) {    \
-    fillBody(spans, count, target);                                                              \
+  attribute void name##Fill(const TriangleSpan* spans, const int* which, int count,              \
+                            const SpanTarget& target) {                                          \
+    fillBody(spans, which, count, target);                                                       \
   }                                                                                              \
   attribute void name##DrawSamples(const TriangleSamples& t, const SampledTile& tile,            \
                                    std::uint32_t id, EdgeCoverage::Pixel* pixels) {              \

@@ -32,10 +32,11 @@ struct Kernels {
                   int count, float* visible);
 
   // What a stretch of pixels shows, by their triangles' maps: all of a run but `sun` and `colour`,
-  // from its `column`.
-  // @param ids of the pixels' triangles, none of them thin
-  void (*locate)(const TriangleMap* maps, const std::uint32_t* ids, const PixelStretch& stretch,
-                 const SightLines& sight, SurfaceRun& run);
+  // from its `column`. What is told of thin triangles is of no use.
+  // @param ids of the pixels' triangles; seven more are read
+  // @return TriangleMap::traits that any of the triangles has
+  unsigned (*locate)(const TriangleMap* maps, const std::uint32_t* ids, const PixelStretch& stretch,
+                     const SightLines& sight, SurfaceRun& run);
 
   // Reflectance of places [first, last) of a run by sampleBicubic(). @param image CV_32FC4, not
   // empty
@@ -51,8 +52,8 @@ struct Kernels {
   void (*encode)(const NoiseCurves& curves, const float* const (&colour)[4], const NoiseRows& noise,
                  int column, int count, cv::Vec3b* codes);
 
-  // Draws `count` triangles in their order.
-  void (*fill)(const TriangleSpan* spans, int count, const SpanTarget& target);
+  // Draws the `count` triangles of `spans` that `which` numbers, in that order.
+  void (*fill)(const TriangleSpan* spans, const int* which, int count, const SpanTarget& target);
 
   // Draws a triangle into the samples of a square's pixels. @param pixels that the square names
   void (*drawSamples)(const TriangleSamples& t, const SampledTile& tile, std::uint32_t id,

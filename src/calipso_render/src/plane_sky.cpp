@@ -122,7 +122,7 @@ cv::Rect SkyGrid::cellsOf(const cv::Rect& rect) const {
 }
 
 float SkyGrid::greatestDifference(const SkyGrid& other, const cv::Rect& rect) const {
-  const cv::Rect cells = cellsOf(rect), others = other.cellsOf(rect);
+  const cv::Rect cells = cellsOf(rect), others = cells + first_ - other.first_;
   float greatest = 0.0f;
   for (int j = 0; j <= cells.height; ++j) {
     const float *here = light_.ptr<float>(cells.y + j) + cells.x,

@@ -26,8 +26,8 @@ class SkyGrid {
   void levels(const PlaneView& planes, const Visibility& sky, int v, int begin, int end,
               std::uint8_t* out) const;
 
-  // How much the light at pixels of `rect` can differ from that of another grid of the picture; 1
-  // where it is not known.
+  // How much the light at pixels of `rect` can differ from that of another grid of the same
+  // picture; 1 where it is not known.
   float greatestDifference(const SkyGrid& other, const cv::Rect& rect) const;
 
  private:

@@ -10,17 +10,20 @@
 
 namespace calipso::render {
 
-// Columns of row v inside the triangle. @return false if there are none
-CALIPSO_INLINE bool rowLimits(const TriangleSpan& s, float v, int& from, int& to) {
-  const Four bound =
-      *reinterpret_cast<const Four*>(s.column) +
-      *reinterpret_cast<const Four*>(s.slope) * (v - *reinterpret_cast<const Four*>(s.row));
-  float low = static_cast<float>(s.column_min), high = static_cast<float>(s.column_max);
-  low = bound[0] > low ? bound[0] : low, high = bound[2] < high ? bound[2] : high;
-  low = bound[1] > low ? bound[1] : low, high = bound[3] < high ? bound[3] : high;
+// Columns inside the triangle, `dv` rows below its first. @return false if there are none
+CALIPSO_INLINE bool rowLimits(const TriangleSpan& s, const Four& per_edge_u, float dv, int& from,
+                              int& to) {
+  const Four bound = -(fourAt(s.edge_0) + fourAt(s.edge_v) * dv) * per_edge_u;
+  float low = 0.0f, high = static_cast<float>(s.column_max - s.column_min);
+  for (int i = 0; i < 3; ++i) {
+    if (per_edge_u[i] < 0.0f)
+      high = bound[i] < high ? bound[i] : high;
+    else  // a level edge bounds nothing or all
+      low = bound[i] > low ? bound[i] : low;
+  }
   if (!(low <= high)) return false;  // far off, they might not fit an int
-  from = static_cast<int>(low), to = static_cast<int>(high);
-  from += static_cast<float>(from) < low;
+  from = static_cast<int>(low), to = s.column_min + static_cast<int>(high);
+  from += s.column_min + (static_cast<float>(from) < low);
   return from <= to;
 }
 
@@ -39,30 +42,29 @@ CALIPSO_INLINE void setWhereCloser(const Eight& z, const EightInts& inside, std:
 template <bool kIds>
 CALIPSO_INLINE void fillNarrow(const TriangleSpan& s, int first, int last,
                                const SpanTarget& target) {
-  const EightInts lanes = {0, 1, 2, 3, 4, 5, 6, 7}, columns = s.column_min + lanes;
-  const Eight u = __builtin_convertvector(columns, Eight), slope = s.near_u * u;
-  const EightInts within = columns <= s.column_max;
+  const Eight du = lanes(), slope = s.near_u * (static_cast<float>(s.column_min) + du);
+  const EightInts within = du <= static_cast<float>(s.column_max - s.column_min);
+  Eight edge[3];
+  for (int i = 0; i < 3; ++i) edge[i] = s.edge_0[i] + s.edge_u[i] * du;
+  edge[0] = within ? edge[0] : all(-3.0e38f);
   for (int row = first; row <= last; ++row) {
-    const float v = static_cast<float>(row);
-    const Four bound =
-        *reinterpret_cast<const Four*>(s.column) +
-        *reinterpret_cast<const Four*>(s.slope) * (v - *reinterpret_cast<const Four*>(s.row));
-    const EightInts inside =
-        within & (u >= bound[0]) & (u >= bound[1]) & (u <= bound[2]) & (u <= bound[3]);
-    setWhereCloser<kIds>(s.near_0 + s.near_v * v + slope, inside, s.id, target,
-                         static_cast<std::size_t>(row) * target.stride + s.column_min);
+    const Four least = fourAt(s.edge_v) * static_cast<float>(s.row_min - row);
+    const EightInts inside = (edge[0] >= least[0]) & (edge[1] >= least[1]) & (edge[2] >= least[2]);
+    setWhereCloser<kIds>(s.near_0 + s.near_v * static_cast<float>(row) + slope, inside, s.id,
+                         target, static_cast<std::size_t>(row) * target.stride + s.column_min);
   }
 }
 
 template <bool kIds>
 CALIPSO_INLINE void fillWide(const TriangleSpan& s, int first, int last, const SpanTarget& target) {
-  const EightInts lanes = {0, 1, 2, 3, 4, 5, 6, 7};
+  const EightInts numbers = {0, 1, 2, 3, 4, 5, 6, 7};
+  const Four per_edge_u = 1.0f / fourAt(s.edge_u);
   for (int row = first; row <= last; ++row) {
     int from, to;
-    if (!rowLimits(s, static_cast<float>(row), from, to)) continue;
+    if (!rowLimits(s, per_edge_u, static_cast<float>(row - s.row_min), from, to)) continue;
     const float base = s.near_0 + s.near_v * static_cast<float>(row);
     for (int u = from; u <= to; u += 8) {
-      const EightInts columns = u + lanes;
+      const EightInts columns = u + numbers;
       const Eight z = base + s.near_u * __builtin_convertvector(columns, Eight);
       setWhereCloser<kIds>(z, columns <= to, s.id, target,
                            static_cast<std::size_t>(row) * target.stride + u);
@@ -71,15 +73,16 @@ CALIPSO_INLINE void fillWide(const TriangleSpan& s, int first, int last, const S
 }
 
 template <bool kIds>
-CALIPSO_INLINE void fillSpansBody(const TriangleSpan* spans, int count, const SpanTarget& target) {
-  for (const TriangleSpan* s = spans; s != spans + count; ++s) {
-    const int first = s->row_min > target.first ? s->row_min : target.first,
-              last = s->row_max < target.last ? s->row_max : target.last;
-    if (first > last) continue;
-    if (s->column_max - s->column_min < 8)
-      fillNarrow<kIds>(*s, first, last, target);
+CALIPSO_INLINE void fillSpansBody(const TriangleSpan* spans, const int* which, int count,
+                                  const SpanTarget& target) {
+  for (int k = 0; k < count; ++k) {
+    const TriangleSpan& s = spans[which[k]];
+    const int first = s.row_min > target.first ? s.row_min : target.first,
+              last = s.row_max < target.last ? s.row_max : target.last;
+    if (s.column_max - s.column_min < 8)
+      fillNarrow<kIds>(s, first, last, target);
     else
-      fillWide<kIds>(*s, first, last, target);
+      fillWide<kIds>(s, first, last, target);
   }
 }
 
@@ -87,19 +90,14 @@ CALIPSO_INLINE void fillSpansBody(const TriangleSpan* spans, int count, const Sp
 // along the row and across it; the upper eight samples, then the lower.
 struct SampleSteps {
   Eight edge_u[3], edge_v[2][3], near_u, near_v[2];
-  float reach[3];  // the most that an edge function can grow by
 };
 
 CALIPSO_INLINE SampleSteps sampleSteps(const TriangleSamples& t) {
-  constexpr float kReach = 0.375f;  // px from the centre to the outermost samples
   const Eight x = {-0.375f, -0.125f, 0.125f, 0.375f, -0.375f, -0.125f, 0.125f, 0.375f},
               upper = {-0.375f, -0.375f, -0.375f, -0.375f, -0.125f, -0.125f, -0.125f, -0.125f};
   SampleSteps steps;
   steps.near_u = t.near_u * x;
-  for (int i = 0; i < 3; ++i) {
-    steps.edge_u[i] = t.edge_u[i] * x;
-    steps.reach[i] = kReach * (std::fabs(t.edge_u[i]) + std::fabs(t.edge_v[i]));
-  }
+  for (int i = 0; i < 3; ++i) steps.edge_u[i] = t.edge_u[i] * x;
   for (int half = 0; half < 2; ++half) {
     const Eight y = upper + 0.5f * static_cast<float>(half);
     steps.near_v[half] = t.near_v * y;
@@ -108,13 +106,32 @@ CALIPSO_INLINE SampleSteps sampleSteps(const TriangleSamples& t) {
   return steps;
 }
 
+// An edge function, at a pixel's centre.
+CALIPSO_INLINE float edgeAt(const TriangleSamples& t, int edge, float u, float v) {
+  return t.edge_u[edge] * u + t.edge_v[edge] * v + t.edge_0[edge];
+}
+
+// The wanted pixels of which a sample may lie in the triangle.
+CALIPSO_INLINE std::uint64_t reachedPixels(const TriangleSamples& t, const SampledTile& tile) {
+  constexpr float kReach = 0.375f;  // px from the centre to the outermost samples
+  float least[3];
+  for (int i = 0; i < 3; ++i)
+    least[i] = -kReach * (std::fabs(t.edge_u[i]) + std::fabs(t.edge_v[i]));
+  std::uint64_t reached = 0;
+  for (std::uint64_t rest = tile.wanted; rest != 0; rest &= rest - 1) {
+    const int k = __builtin_ctzll(rest);
+    const float u = static_cast<float>(tile.u + k % SampledTile::kSide),
+                v = static_cast<float>(tile.v + k / SampledTile::kSide);
+    const bool reaches = (edgeAt(t, 0, u, v) >= least[0]) & (edgeAt(t, 1, u, v) >= least[1]) &
+                         (edgeAt(t, 2, u, v) >= least[2]);
+    reached |= static_cast<std::uint64_t>(reaches) << k;
+  }
+  return reached;
+}
+
 CALIPSO_INLINE void drawSamplesAt(const TriangleSamples& t, const SampleSteps& steps, float u,
                                   float v, std::uint32_t id, EdgeCoverage::Pixel& pixel) {
-  float centre[3];
-  for (int i = 0; i < 3; ++i) {
-    centre[i] = t.edge_u[i] * u + t.edge_v[i] * v + t.edge_0[i];
-    if (centre[i] < -steps.reach[i]) return;
-  }
+  const float centre[3] = {edgeAt(t, 0, u, v), edgeAt(t, 1, u, v), edgeAt(t, 2, u, v)};
   const float near_centre = t.near_u * u + t.near_v * v + t.near_0;
   for (int half = 0; half < 2; ++half) {
     Eight& nearest = *reinterpret_cast<Eight*>(&pixel.nearness[8 * half]);
@@ -129,13 +146,13 @@ CALIPSO_INLINE void drawSamplesAt(const TriangleSamples& t, const SampleSteps& s
 
 CALIPSO_INLINE void drawSamplesBody(const TriangleSamples& t, const SampledTile& tile,
                                     std::uint32_t id, EdgeCoverage::Pixel* pixels) {
+  const std::uint64_t reached = reachedPixels(t, tile);
+  if (reached == 0) return;
   const SampleSteps steps = sampleSteps(t);
-  for (int row = tile.first; row <= tile.last; ++row) {
-    for (unsigned rest = tile.chosen[row] & tile.columns; rest != 0; rest &= rest - 1) {
-      const int column = __builtin_ctz(rest);
-      drawSamplesAt(t, steps, static_cast<float>(tile.u + column), static_cast<float>(tile.v + row),
-                    id, pixels[tile.pixels[row * SampledTile::kSide + column]]);
-    }
+  for (std::uint64_t rest = reached; rest != 0; rest &= rest - 1) {
+    const int k = __builtin_ctzll(rest);
+    drawSamplesAt(t, steps, static_cast<float>(tile.u + k % SampledTile::kSide),
+                  static_cast<float>(tile.v + k / SampledTile::kSide), id, pixels[tile.pixels[k]]);
   }
 }
 

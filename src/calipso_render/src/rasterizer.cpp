@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "eight_lanes.hpp"
 #include "kernels.hpp"
 #include "triangle_span.hpp"
 
@@ -41,6 +42,21 @@ bool setLimits(const Eigen::Vector3f (&p)[3], const cv::Rect& region, TriangleSp
   return span.row_min <= span.row_max && span.column_min <= span.column_max;
 }
 
+// Edge functions, moved out by kEdgeTolerance. @pre the limits are set
+void setEdges(const Eigen::Vector3f (&p)[3], float area, TriangleSpan& span) {
+  const FourInts next = {1, 2, 0, 3};
+  const Four x = {p[0].x(), p[1].x(), p[2].x(), 0.0f}, y = {p[0].y(), p[1].y(), p[2].y(), 0.0f},
+             dx = __builtin_shuffle(x, next) - x, dy = __builtin_shuffle(y, next) - y,
+             squared = dx * dx + dy * dy;
+  const float inwards = area > 0.0f ? 1.0f : -1.0f;
+  const Four across = dx * (static_cast<float>(span.row_min) - y),
+             along = dy * (static_cast<float>(span.column_min) - x);
+  for (int i = 0; i < 4; ++i) {
+    span.edge_u[i] = -inwards * dy[i], span.edge_v[i] = inwards * dx[i];
+    span.edge_0[i] = inwards * (across[i] - along[i]) + kEdgeTolerance * std::sqrt(squared[i]);
+  }
+}
+
 bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, TriangleSpan& span) {
   const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
   const Eigen::Vector3f offset(region.x, region.y, 0.0f);
@@ -52,30 +68,36 @@ bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, Tria
       std::isnan(p[0].z() + p[1].z() + p[2].z()))
     return false;
   if (!setLimits(p, region, span)) return false;
-  for (int i = 0; i < 4; ++i) {
-    constexpr float kNoBound = 1e9f;
-    span.column[i] = i < 2 ? -kNoBound : kNoBound, span.row[i] = span.slope[i] = 0.0f;
-  }
-  // The edges that rise bound one side, those that fall the other: at most two, since they close.
-  int lefts = 0, rights = 2;
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3f& start = p[(i + 1) % 3];
-    const Eigen::Vector3f& end = p[(i + 2) % 3];
-    const float dx = end.x() - start.x(), dy = end.y() - start.y();
-    if (std::abs(dy) < kEdgeTolerance) continue;  // level: the rows' limits bound it
-    // The edge is moved out by kEdgeTolerance: along the row by that times length / |dy|.
-    const float slope = dx / dy, reach = kEdgeTolerance * std::sqrt(1.0f + slope * slope);
-    const bool is_left = (area > 0.0f) == (dy < 0.0f);
-    const int k = is_left ? lefts++ : rights++;
-    span.column[k] = is_left ? start.x() - reach : start.x() + reach, span.row[k] = start.y(),
-    span.slope[k] = slope;
-  }
+  setEdges(p, area, span);
   const float dz1 = p[1].z() - p[0].z(), dz2 = p[2].z() - p[0].z(), per_area = 1.0f / area;
   span.near_u = (dz1 * (p[2].y() - p[0].y()) - dz2 * (p[1].y() - p[0].y())) * per_area;
   span.near_v = (dz2 * (p[1].x() - p[0].x()) - dz1 * (p[2].x() - p[0].x())) * per_area;
   span.near_0 = p[0].z() - span.near_u * p[0].x() - span.near_v * p[0].y();
   return true;
 }
+
+constexpr int kBandRows = 32;
+
+// Spans by the bands of rows that they reach.
+struct Part {
+  std::vector<TriangleSpan> spans;
+  std::vector<int> sorted;  // numbers of spans, ascending in each band
+  std::vector<int> first;   // per band: its first in `sorted`, and one more
+
+  void sort(int bands) {
+    first.assign(bands + 2, 0);
+    for (const TriangleSpan& s : spans) {
+      for (int band = s.row_min / kBandRows; band <= s.row_max / kBandRows; ++band)
+        ++first[band + 2];
+    }
+    for (int band = 2; band <= bands; ++band) first[band + 1] += first[band];
+    sorted.resize(first.back());
+    for (std::size_t i = 0; i < spans.size(); ++i) {
+      for (int band = spans[i].row_min / kBandRows; band <= spans[i].row_max / kBandRows; ++band)
+        sorted[first[band + 1]++] = static_cast<int>(i);
+    }
+  }
+};
 
 }  // namespace
 
@@ -137,28 +159,32 @@ VisibilityBuffer::VisibilityBuffer(const cv::Rect& region, bool with_ids)
 }
 
 void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
-  const int count = static_cast<int>(mesh.triangles->size());
-  std::vector<TriangleSpan> parts[kParts];  // of the triangles, in their order
+  const int count = static_cast<int>(mesh.triangles->size()),
+            bands = (region_.height + kBandRows - 1) / kBandRows;
+  Part parts[kParts];  // of the triangles, in their order
 #pragma omp parallel
   {
 #pragma omp for schedule(dynamic, 1)
-    for (int part = 0; part < kParts; ++part) {
-      const int begin = static_cast<int>(static_cast<long>(count) * part / kParts),
-                end = static_cast<int>(static_cast<long>(count) * (part + 1) / kParts);
-      parts[part].reserve(end - begin);
+    for (int k = 0; k < kParts; ++k) {
+      const int begin = static_cast<int>(static_cast<long>(count) * k / kParts),
+                end = static_cast<int>(static_cast<long>(count) * (k + 1) / kParts);
+      std::vector<TriangleSpan>& spans = parts[k].spans;
+      spans.reserve(end - begin);
       TriangleSpan span;
       for (int t = begin; t < end; ++t) {
         span.id = (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t);
-        if (makeSpan(mesh, t, region_, span)) parts[part].push_back(span);
+        if (makeSpan(mesh, t, region_, span)) spans.push_back(span);
       }
+      parts[k].sort(bands);
     }
 #pragma omp for schedule(dynamic, 1)
-    for (int band = 0; band < kBands; ++band) {
-      const int first = region_.height * band / kBands,
-                last = region_.height * (band + 1) / kBands - 1;
-      const SpanTarget target{ids_.get(), near_.get(), stride_, first, last};
-      for (const auto& part : parts)
-        kernels().fill(part.data(), static_cast<int>(part.size()), target);
+    for (int band = 0; band < bands; ++band) {
+      const SpanTarget target{ids_.get(), near_.get(), stride_, band * kBandRows,
+                              std::min((band + 1) * kBandRows, region_.height) - 1};
+      for (const Part& part : parts) {
+        kernels().fill(part.spans.data(), &part.sorted[part.first[band]],
+                       part.first[band + 1] - part.first[band], target);
+      }
     }
   }
 }

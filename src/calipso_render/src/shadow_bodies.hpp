@@ -108,8 +108,8 @@ CALIPSO_INLINE Eight visibleEight(const ShadowTexels& map, const ShadowTaps& tap
   if (!any(hits > 0.0f)) return one;
   const Eight radius = map.spread * above / larger(hits, one);
   const EightInts wide = radius > 1.0f;
-  const Eight sharp = 1.0f - 0.25f * sharplyCovered(map, s, t, h);
-  Eight covered{};
+  Eight sharp{}, covered{};
+  if (any((hits > 0.0f) & ~wide)) sharp = 1.0f - 0.25f * sharplyCovered(map, s, t, h);
   if (any(wide)) {
     for (int k = 0; k < taps.count; ++k)
       covered += coveredAt(map, s + radius * taps.x[k], t + radius * taps.y[k], h);

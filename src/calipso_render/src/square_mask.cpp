@@ -4,7 +4,16 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "wide_loops.hpp"
+
 namespace calipso::render {
+namespace {
+
+CALIPSO_WIDE_LOOPS void takeLesser(const std::uint8_t* from, int count, std::uint8_t* to) {
+  for (int i = 0; i < count; ++i) to[i] = std::min(to[i], from[i]);
+}
+
+}  // namespace
 
 SquareMask::SquareMask(const cv::Rect& part) : first_(part.x / kSide, part.y / kSide) {
   set_ = cv::Mat::zeros((part.br().y - 1) / kSide - first_.y + 1,
@@ -49,8 +58,7 @@ SquareMask::SquareMask(const cv::Mat& pixels, const cv::Rect& part, int margin)
     std::vector<std::uint8_t> columns(static_cast<std::size_t>(across) * kSide, 255);
     for (int v = first; v < last; ++v) {
       const std::uint8_t* row = pixels.ptr<std::uint8_t>(v);
-      for (int u = 0; u < part.width; ++u)
-        columns[before + u] = std::min(columns[before + u], row[u]);
+      takeLesser(row, part.width, &columns[before]);
     }
     for (int i = 0; i < across; ++i)
       full.at<std::uint8_t>(j, i) =

@@ -31,16 +31,20 @@ struct StretchWeights {
 };
 
 // The triangles' linear functions at a stretch's pixels: key places, normals and sky up to a factor.
-CALIPSO_INLINE void evaluateMaps(const TriangleMap* maps, const std::uint32_t* ids,
-                                 const PixelStretch& at, const SightLines& sight, SurfaceRun& run,
-                                 StretchWeights& weights) {
+// @return the triangles' traits, of any of them
+CALIPSO_INLINE unsigned evaluateMaps(const TriangleMap* maps, const std::uint32_t* ids,
+                                     const PixelStretch& at, const SightLines& sight,
+                                     SurfaceRun& run, StretchWeights& weights) {
+  unsigned traits = 0;
   for (int k = 0; k < at.count;) {
     const std::uint32_t id = ids[k];
     const TriangleMap& map = maps[VisibilityBuffer::triangleOf(id)];
+    traits |= map.traits;
     const float dv = static_cast<float>(at.v) - map.v;
     const Four key = fourAt(map.key[0]) + fourAt(map.key[2]) * dv,
                normal = fourAt(map.normal[0]) + fourAt(map.normal[2]) * dv;
     const float *key_rise = map.key[1], *normal_rise = map.normal[1];
+    int seen;  // of eight pixels
     do {
       const int to = at.offset + k;
       const Eight column = eightAt(run.column + to), du = column - map.u;
@@ -50,20 +54,23 @@ CALIPSO_INLINE void evaluateMaps(const TriangleMap* maps, const std::uint32_t* i
       eightAt(weights.sum + to) = key[3] + key_rise[3] * du;
       Eight n[3];
       for (int c = 0; c < 3; ++c) n[c] = normal[c] + normal_rise[c] * du;
-      if (map.turned) turnToViewer(sight, column, n);
+      if (map.is(TriangleMap::kTurned)) turnToViewer(sight, column, n);
       for (int c = 0; c < 3; ++c) eightAt(run.normal[c] + to) = n[c];
       eightAt(run.sky + to) = normal[3] + normal_rise[3] * du;
-      const int end = std::min(k + 8, at.count);
-      while (k < end && ids[k] == id) ++k;
-    } while (k < at.count && ids[k] == id);
+      seen = leadingLanes(*reinterpret_cast<const EightInts*>(ids + k) ==
+                          static_cast<std::int32_t>(id));
+      k += seen;
+    } while (seen == 8 && k < at.count && ids[k] == id);
   }
+  return traits;
 }
 
-CALIPSO_INLINE void locateBody(const TriangleMap* maps, const std::uint32_t* ids,
-                               const PixelStretch& at, const SightLines& sight, SurfaceRun& run) {
+CALIPSO_INLINE unsigned locateBody(const TriangleMap* maps, const std::uint32_t* ids,
+                                   const PixelStretch& at, const SightLines& sight,
+                                   SurfaceRun& run) {
   const float left = static_cast<float>(at.corner.x), top = static_cast<float>(at.corner.y);
   StretchWeights weights;
-  evaluateMaps(maps, ids, at, sight, run, weights);
+  const unsigned traits = evaluateMaps(maps, ids, at, sight, run, weights);
   for (int k = at.offset; k < at.offset + at.count; k += 8) {
     // The corners' weights add up to `sum`.
     const Eight w = eightAt(weights.w + k), sum = eightAt(weights.sum + k),
@@ -78,6 +85,7 @@ CALIPSO_INLINE void locateBody(const TriangleMap* maps, const std::uint32_t* ids
     normalise(n);
     for (int c = 0; c < 3; ++c) eightAt(run.normal[c] + k) = n[c];
   }
+  return traits;
 }
 
 CALIPSO_INLINE Eight ambientBody(const SurfaceShade& s, int c, const Eight (&n)[3],

@@ -22,17 +22,16 @@ float areaOf(const Eigen::Vector3f (&p)[3]) {
 }
 
 // @param keys, normals of the corners, four values each
-void fill(const Eigen::Vector3f (&p)[3], const float* const (&keys)[3],
+// @return false if it is too thin
+bool fill(const Eigen::Vector3f (&p)[3], const float* const (&keys)[3],
           const float* const (&normals)[3], TriangleMap& map) {
   const float area = areaOf(p);
   const float longest =
       std::max({(p[1] - p[0]).head<2>().squaredNorm(), (p[2] - p[1]).head<2>().squaredNorm(),
                 (p[0] - p[2]).head<2>().squaredNorm()});
-  map.thin = !(area * area > kThinnest * kThinnest * longest);
-  if (map.thin) return;
   map.u = p[0].x(), map.v = p[0].y();
-  std::fill_n(&map.key[0][0], 12, 0.0f), std::fill_n(&map.weights[0][0], 12, 0.0f),
-      std::fill_n(&map.normal[0][0], 12, 0.0f);
+  std::fill_n(&map.key[0][0], 12, 0.0f), std::fill_n(&map.normal[0][0], 12, 0.0f);
+  if (!(area * area > kThinnest * kThinnest * longest)) return false;
   const float scale = 1.0f / (area * p[0].z());
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
@@ -41,7 +40,18 @@ void fill(const Eigen::Vector3f (&p)[3], const float* const (&keys)[3],
                            (b.x() - a.x()) * factor};
     addCorner(map.key, edge, cv::v_load(keys[i]));
     addCorner(map.normal, edge, cv::v_load(normals[i]));
-    for (int k = 0; k < 3; ++k) map.weights[k][i] = edge[k];
+  }
+  return true;
+}
+
+std::uint8_t traitsOf(Appearance::Source source) {
+  switch (source) {
+    case Appearance::Source::kPicture:
+      return TriangleMap::kPictured;
+    case Appearance::Source::kTexture:
+      return TriangleMap::kTextured;
+    default:
+      return TriangleMap::kPictured | TriangleMap::kTextured;
   }
 }
 
@@ -54,26 +64,12 @@ bool isTurned(const Actor& actor, const Eigen::Vector3i& t, const Eigen::Vector3
 
 }  // namespace
 
-Eigen::Vector2f TriangleMap::keyAt(float pixel_u, float pixel_v) const {
-  const float du = pixel_u - u, dv = pixel_v - v;
-  const auto at = [&](int c) { return key[0][c] + key[1][c] * du + key[2][c] * dv; };
-  return Eigen::Vector2f(at(0), at(1)) / at(2);
-}
-
-Eigen::Vector3f TriangleMap::weightsAt(float pixel_u, float pixel_v) const {
-  const float du = pixel_u - u, dv = pixel_v - v;
-  Eigen::Vector3f w;
-  for (int c = 0; c < 3; ++c)
-    w[c] = std::max(0.0f, weights[0][c] + weights[1][c] * du + weights[2][c] * dv);
-  return w / w.sum();
-}
-
 SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance,
                          const Eigen::Vector3f& eye)
     : actor_(&actor),
       corner_(appearance.region.tl()),
       vertices_(actor.vertices.size()),
-      triangles_(actor.surface->triangles.size()) {
+      triangles_(new TriangleMap[actor.surface->triangles.size()]) {
   const Triangles& triangles = actor.surface->triangles;
   const Camera& c = appearance.key_camera;
   const Eigen::Isometry3f camera_from_world = c.world_from_camera.inverse().cast<float>();
@@ -94,11 +90,14 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance,
       const Eigen::Vector3i& corners = triangles[t];
       Eigen::Vector3f p[3];
       for (int i = 0; i < 3; ++i) p[i] = actor.screen.points[corners[i]];
+      triangles_[t].traits = TriangleMap::kThin;
       if (actor.screen.hides(areaOf(p))) continue;
       const Vertex &a = vertices_[corners[0]], &b = vertices_[corners[1]],
                    &d = vertices_[corners[2]];
-      fill(p, {a.key, b.key, d.key}, {a.normal, b.normal, d.normal}, triangles_[t]);
-      triangles_[t].turned = isTurned(actor, corners, eye);
+      triangles_[t].traits = traitsOf(appearance.sources[t]);
+      if (!fill(p, {a.key, b.key, d.key}, {a.normal, b.normal, d.normal}, triangles_[t]))
+        triangles_[t].traits |= TriangleMap::kThin;
+      if (isTurned(actor, corners, eye)) triangles_[t].traits |= TriangleMap::kTurned;
     }
   }
 }
@@ -120,7 +119,8 @@ void SurfaceMaps::locate(const SurfacePlace* places, int count, SurfaceRun& run,
         cv::v_store(normal, mix(a.normal, b.normal, c.normal)),
         cv::v_store(key, mix(a.key, b.key, c.key));
     const Eigen::Map<const Eigen::Vector3f> n(normal), s(sight);
-    const float length = n.norm(), away = n.dot(s) > 0.0f && triangles_[triangle].turned ? -1 : 1,
+    const float length = n.norm(),
+                away = n.dot(s) > 0.0f && triangles_[triangle].is(TriangleMap::kTurned) ? -1 : 1,
                 scale = length > 0.0f ? away / length : 0.0f;
     for (int i = 0; i < 3; ++i) run.sight[i][k] = s[i], run.normal[i][k] = n[i] * scale;
     run.sky[k] = normal[3];

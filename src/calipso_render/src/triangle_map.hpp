@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "calipso_render/appearance.hpp"
@@ -10,18 +11,22 @@
 namespace calipso::render {
 
 // What the pixels of a drawn triangle show, linear in the picture, each up to the same factor: the
-// place in the key frame's picture, homogeneous; the barycentric weights; the normal with the sky
-// that is seen. Counted from the triangle's first corner, where single precision is exact.
+// place in the key frame's picture, homogeneous; the normal with the sky that is seen. Counted from
+// the triangle's first corner, where single precision is exact.
 struct alignas(16) TriangleMap {
-  float key[3][4];           // at the corner, per column, per row; x, y, w, sum of the weights
-  float weights[3][4];       // likewise; of the three corners, 0
-  float normal[3][4];        // likewise; world, sky
-  float u = 0.0f, v = 0.0f;  // the corner, px
-  bool thin = true;          // too thin for single precision, or never seen
-  bool turned = false;       // its far side is seen
+  enum Trait : std::uint8_t {
+    kThin = 1,      // too thin for single precision, or never seen
+    kTurned = 2,    // its far side is seen
+    kPictured = 4,  // its reflectance comes from the picture,
+    kTextured = 8   // ... the texture, or both
+  };
 
-  Eigen::Vector2f keyAt(float pixel_u, float pixel_v) const;
-  Eigen::Vector3f weightsAt(float pixel_u, float pixel_v) const;  // clamped into the triangle
+  float key[3][4];     // at the corner, per column, per row; x, y, w, sum of the weights
+  float normal[3][4];  // likewise; world, sky
+  float u, v;          // the corner, px
+  std::uint8_t traits;
+
+  bool is(Trait trait) const { return (traits & trait) != 0; }
 };
 
 // A point of a surface that is to be shaded: what is seen of a triangle at a place of the picture.
@@ -36,8 +41,7 @@ class SurfaceMaps {
   SurfaceMaps() = default;
   SurfaceMaps(const Actor& actor, const Appearance& appearance, const Eigen::Vector3f& eye);
 
-  bool empty() const { return triangles_.empty(); }
-  const TriangleMap* triangles() const { return triangles_.data(); }
+  const TriangleMap* triangles() const { return triangles_.get(); }
   const TriangleMap& of(int triangle) const { return triangles_[triangle]; }
 
   // All of a run but `sun` and `colour`, from surface points within their triangles.
@@ -55,7 +59,7 @@ class SurfaceMaps {
   const Actor* actor_ = nullptr;
   cv::Point corner_;  // Appearance::region's
   std::vector<Vertex> vertices_;
-  std::vector<TriangleMap> triangles_;
+  std::unique_ptr<TriangleMap[]> triangles_;
 };
 
 }  // namespace calipso::render

@@ -4,11 +4,11 @@
 
 namespace calipso::render {
 
-// A triangle made ready for row spans, in the buffer's coordinates. Row v lies inside from the
-// greater of the first two bounds to the lesser of the last two, each linear in v, within the
-// columns' limits; nearness is a plane.
+// A triangle made ready to be filled, in the buffer's coordinates: its limits; edge functions, per
+// column, per row and at the corner of the limits (inside: none of the three is negative); nearness
+// is a plane.
 struct TriangleSpan {
-  float column[4], row[4], slope[4];  // a point of each bound, and columns per row
+  float edge_u[4], edge_v[4], edge_0[4];
   float near_u, near_v, near_0;
   int row_min, row_max, column_min, column_max;
   std::uint32_t id;
@@ -30,15 +30,13 @@ struct TriangleSamples {
   float near_u, near_v, near_0;
 };
 
-// The part of a square of pixels that a triangle may touch, and which of its pixels have samples.
+// The pixels of a square that have samples and that a triangle may touch.
 struct SampledTile {
   static constexpr int kSide = 8;  // px
 
-  int u, v;                    // the first pixel's place
-  int first, last;             // rows of the square
-  unsigned columns;            // a bit for each
-  const std::uint8_t* chosen;  // per row: a bit for each pixel that has samples
-  const int* pixels;           // per pixel of the square: which samples
+  int u, v;              // the first pixel's place
+  std::uint64_t wanted;  // a bit for each pixel, row by row
+  const int* pixels;     // per pixel of the square: which samples
 };
 
 }  // namespace calipso::render

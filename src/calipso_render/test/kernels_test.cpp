@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <numeric>
 #include <opencv2/core.hpp>
 
 #include "calipso_render/appearance.hpp"
@@ -118,8 +119,14 @@ TEST_F(Avx2, LocatesTheSamePlaces) {
       }
     }
     map.u = random_.uniform(0.0f, 50.0f), map.v = random_.uniform(0.0f, 50.0f);
-    map.turned = random_.uniform(0, 2) != 0;
+    map.traits = static_cast<std::uint8_t>(random_.uniform(0, 2) * TriangleMap::kTurned);
   }
+  const auto keyOf = [](const TriangleMap& map, float u, float v, int axis) {
+    const auto at = [&](int c) {
+      return map.key[0][c] + map.key[1][c] * (u - map.u) + map.key[2][c] * (v - map.v);
+    };
+    return at(axis) / at(2);
+  };
   std::vector<std::uint32_t> ids;
   for (std::uint32_t id = 0; id < maps.size(); ++id)
     ids.insert(ids.end(), random_.uniform(1, 20), id);
@@ -128,12 +135,12 @@ TEST_F(Avx2, LocatesTheSamePlaces) {
   SurfaceRun plain{};
   for (int k = 0; k < SurfaceRun::kRoom; ++k) plain.column[k] = static_cast<float>(k) + 1.0f;
   SurfaceRun fast = plain;
-  plainKernels().locate(maps.data(), ids.data(), stretch, sight, plain);
-  avx2Kernels()->locate(maps.data(), ids.data(), stretch, sight, fast);
+  const unsigned traits = plainKernels().locate(maps.data(), ids.data(), stretch, sight, plain);
+  EXPECT_EQ(avx2Kernels()->locate(maps.data(), ids.data(), stretch, sight, fast), traits);
   EXPECT_EQ(std::memcmp(&plain, &fast, sizeof(plain)), 0);
   for (int k = 0; k < stretch.count; ++k) {
     const float u = plain.key_u[stretch.offset + k];
-    ASSERT_NEAR(u, maps[ids[k]].keyAt(3.0f + k, 20.0f).x() - 5.0f, 1e-3f * (1.0f + std::abs(u)))
+    ASSERT_NEAR(u, keyOf(maps[ids[k]], 3.0f + k, 20.0f, 0) - 5.0f, 1e-3f * (1.0f + std::abs(u)))
         << k;
   }
 }
@@ -182,17 +189,19 @@ TEST_F(Avx2, FillsTheSameTriangles) {
       s.column_max = s.column_min + (narrow ? random_.uniform(0, 8) : random_.uniform(8, 20));
       s.row_min = random_.uniform(0, 30), s.row_max = s.row_min + random_.uniform(0, 10);
       for (int k = 0; k < 4; ++k)
-        s.column[k] = random_.uniform(0.0f, 20.0f) + (k < 2 ? 0.0f : 20.0f),
-        s.row[k] = random_.uniform(0.0f, 40.0f), s.slope[k] = random_.uniform(-2.0f, 2.0f);
+        s.edge_u[k] = random_.uniform(-1.0f, 1.0f), s.edge_v[k] = random_.uniform(-1.0f, 1.0f),
+        s.edge_0[k] = random_.uniform(0.0f, 10.0f);
       s.near_u = random_.uniform(-0.1f, 0.1f), s.near_v = random_.uniform(-0.1f, 0.1f),
       s.near_0 = random_.uniform(0.0f, 5.0f);
       s.id = static_cast<std::uint32_t>(&s - spans.data());
     }
+    std::vector<int> which(spans.size());
+    std::iota(which.begin(), which.end(), 0);
     const auto draw = [&](const Kernels& kernels, std::vector<std::uint32_t>& ids,
                           std::vector<float>& nearness, std::vector<float>& alone) {
       ids.assign(kRows * kStride, 999), nearness.assign(kRows * kStride, -1.0f), alone = nearness;
-      kernels.fill(spans.data(), 200, {ids.data(), nearness.data(), kStride, 3, 35});
-      kernels.fill(spans.data(), 200, {nullptr, alone.data(), kStride, 3, 35});
+      kernels.fill(spans.data(), which.data(), 200, {ids.data(), nearness.data(), kStride, 3, 35});
+      kernels.fill(spans.data(), which.data(), 200, {nullptr, alone.data(), kStride, 3, 35});
     };
     std::vector<std::uint32_t> plain_ids, ids;
     std::vector<float> plain_near, near, plain_alone, alone;
@@ -212,9 +221,8 @@ TEST_F(Avx2, DrawsTheSameSamples) {
   plain.ids.fill(VisibilityBuffer::kNothing), plain.nearness.fill(VisibilityBuffer::kFar);
   EdgeCoverage::Pixel fast = plain;
   constexpr int kRow = 2, kColumn = 1;
-  const std::uint8_t chosen[8] = {0, 0, 1 << kColumn, 0, 0, 0, 0, 0};
   const int pixels[64] = {};
-  const SampledTile tile{0, 0, kRow, kRow, 1 << kColumn, chosen, pixels};
+  const SampledTile tile{0, 0, std::uint64_t{1} << (kRow * SampledTile::kSide + kColumn), pixels};
   for (std::uint32_t id = 0; id < 300; ++id) {
     TriangleSamples t;
     for (int k = 0; k < 3; ++k)

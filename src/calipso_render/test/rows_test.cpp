@@ -33,6 +33,7 @@ TEST(SurfaceMaps, TellWhatThePixelsShow) {
   const Actor actor = makeActor(surface, transformed(surface.object_vertices, turn), camera());
   Appearance appearance;
   appearance.key_camera = camera();
+  appearance.sources.assign(surface.triangles.size(), Appearance::Source::kBoth);
   const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
   const SurfaceMaps maps(actor, appearance, eye);
   const PlaneView view({}, camera());
@@ -44,17 +45,18 @@ TEST(SurfaceMaps, TellWhatThePixelsShow) {
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       const std::uint32_t id = buffer.ids(v)[u];
-      if (id == VisibilityBuffer::kNothing || maps.of(VisibilityBuffer::triangleOf(id)).thin)
+      if (id == VisibilityBuffer::kNothing ||
+          maps.of(VisibilityBuffer::triangleOf(id)).is(TriangleMap::kThin))
         continue;
       const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u, v, eye);
       const Eigen::Vector2d key = camera().projectWorld(p.key_position.cast<double>());
-      ASSERT_LT((maps.of(VisibilityBuffer::triangleOf(id)).weightsAt(u, v) - p.weights).norm(),
-                2e-3f)
-          << u << ", " << v;
       run.column[0] = static_cast<float>(u);
-      kernels().locate(maps.triangles(), &id, {v, 1, 0, {}}, view.sightLines(v), run);
+      const unsigned traits = kernels().locate(maps.triangles(), buffer.ids(v) + u, {v, 1, 0, {}},
+                                               view.sightLines(v), run);
+      ASSERT_EQ(traits, TriangleMap::kPictured | TriangleMap::kTextured);
       const SurfacePlace here{id, static_cast<float>(u), static_cast<float>(v)};
       maps.locate(&here, 1, place, &weights);
+      ASSERT_LT((weights - p.weights).norm(), 2e-3f) << u << ", " << v;
       for (const SurfaceRun* r : {&run, &place}) {
         const Eigen::Vector3f n(r->normal[0][0], r->normal[1][0], r->normal[2][0]),
             sight(r->sight[0][0], r->sight[1][0], r->sight[2][0]);

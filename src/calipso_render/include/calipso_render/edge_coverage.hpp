@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -79,7 +80,6 @@ class EdgeCoverage {
                   std::vector<cv::Point>& crossed) const;
   void addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id,
                  std::vector<Piece>& pieces) const;
-  void drawPiece(const Piece& piece);
   int slotAt(int column, int row) const {
     const int tile = tiles_[static_cast<std::size_t>(row / kTile) * tiles_across_ + column / kTile];
     return tile < 0 ? kNone
@@ -94,7 +94,7 @@ class EdgeCoverage {
   int tiles_across_;
   std::vector<int> tiles_;  // index of the tile in slots_, -1: none of its pixels is chosen
   std::vector<int> slots_;  // per pixel of those tiles: index into pixels_, kNone or kSettled
-  std::vector<std::uint8_t> chosen_;  // per row of those tiles: a bit for each pixel with a slot
+  std::vector<std::uint64_t> chosen_;  // per tile: a bit for each pixel that has a slot, by rows
   std::vector<Pixel> pixels_;
 };
 

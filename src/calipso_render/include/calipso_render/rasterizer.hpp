@@ -67,8 +67,8 @@ class VisibilityBuffer {
   static constexpr float kFar = -3.0e38f;
 
  private:
-  // rows and triangles are split in fixed parts: the result knows no thread count
-  static constexpr int kBands = 16, kParts = 32;
+  // triangles are split in fixed parts, rows in bands: the result knows no thread count
+  static constexpr int kParts = 32;
   // places after each row, which kernels may read and write back
   static constexpr int kPadding = 8;
 
