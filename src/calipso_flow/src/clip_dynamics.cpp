@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
@@ -53,6 +54,18 @@ Matrix6d offCentre(const ObjectModel& model, const MotionState& state) {
   Matrix6d twist = Matrix6d::Zero();
   twist.topLeftCorner<3, 3>() =
       round * turned * model.position_covariance * turned.transpose() * round.transpose();
+  return twist;
+}
+
+// Of the velocity: what is not seen may have met something. A force of its weight, for as long as
+// since it was seen, or until it is seen again.
+Matrix6d unseen(const std::vector<PoseMeasurement>& measurements, double time,
+                const Eigen::Vector3d& gravity) {
+  double apart = std::numeric_limits<double>::infinity();  // s
+  for (const PoseMeasurement& m : measurements)
+    if (m.valid) apart = std::min(apart, std::abs(m.time - time));
+  Matrix6d twist = Matrix6d::Zero();
+  twist.diagonal().head<3>().setConstant(apart * apart * gravity.squaredNorm());
   return twist;
 }
 
@@ -117,8 +130,9 @@ ClipAnalyser::ClipAnalyser(const Frame& key_frame, const std::vector<ObjectModel
                                 std::to_string(masks.size()) +
                                 " masks; give one mask (or an empty one) per model");
   }
+  params_.tracker.gravity = gravity;
   for (size_t i = 0; i < models.size(); ++i) {
-    objects_.emplace_back(models[i], key_frame, masks[i], params.tracker, params.rest_px);
+    objects_.emplace_back(models[i], key_frame, masks[i], params_.tracker, params.rest_px);
   }
 }
 
@@ -181,7 +195,8 @@ ObjectDynamics ClipAnalyser::finishObject(const FollowedObject& object, bool wit
   for (size_t k = 0; k < measurements.size(); ++k) {
     dynamics.trajectory.states[k].addScaleUncertainty(scale);
     dynamics.trajectory.states[k].addTwistCovariance(
-        offCentre(tracker.model(), dynamics.trajectory.states[k]));
+        offCentre(tracker.model(), dynamics.trajectory.states[k]) +
+        unseen(measurements, measurements[k].time, gravity_));
     const bool moving = dynamics.deformation || dynamics.trajectory.movingAt(measurements[k].time);
     dynamics.motions.push_back(motionFrom(dynamics.trajectory.states[k], tracker.centroid(), moving,
                                           dynamics.observations[k].inliers()));

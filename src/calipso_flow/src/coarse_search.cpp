@@ -104,4 +104,11 @@ Eigen::Vector2d coarseDisplacement(const ReferenceView::Warped& look, const cv::
                                                             : match.displacement;
 }
 
+double correlationInPlace(const ReferenceView::Warped& look, const cv::Mat& picture) {
+  if (look.coverage == 0.0) return -1.0;
+  return matchCoarsely(look, picture, {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()},
+                       reduction(boundingRect(look.weight.image).size()))
+      .at_home;
+}
+
 }  // namespace calipso::flow

@@ -53,8 +53,9 @@ LiveAnalyser::LiveAnalyser(const Frame& key_frame, const std::vector<ObjectModel
                                 std::to_string(masks.size()) +
                                 " masks; give one mask (or an empty one) per model");
   }
+  params_.tracker.gravity = gravity;
   for (size_t i = 0; i < models.size(); ++i) {
-    FollowedObject followed(models[i], key_frame, masks[i], params.tracker, params.rest_px);
+    FollowedObject followed(models[i], key_frame, masks[i], params_.tracker, params.rest_px);
     const ObjectTracker& tracker = followed.tracker();
     const auto measurement = measurementsOf({tracker.keyObservation()}, tracker.centroid()).front();
     const Eigen::Vector3d p_camera =

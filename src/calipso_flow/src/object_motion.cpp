@@ -4,10 +4,19 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "calipso_scene/median.hpp"
+
 namespace calipso::flow {
 namespace {
 
 constexpr double kCrossingTime = 0.1;  // s; see priorFor
+// grey levels by which half the picture differs: less is what moves before a place that stays
+constexpr double kOtherPlace = 3.0;
+
+double medianDifference(const cv::Mat& a, const cv::Mat& b) {
+  const cv::Mat difference = cv::abs(a - b);
+  return median({difference.begin<float>(), difference.end<float>()});
+}
 
 }  // namespace
 
@@ -31,7 +40,7 @@ bool isCut(const Frame& previous, const Frame& next, double least_correlation) {
   // Two flat pictures agree when their brightness does.
   if (spread < 1.0) return std::abs(mean_a[0] - mean_b[0]) > 16.0;
   const cv::Mat product = (a - mean_a[0]).mul(b - mean_b[0]);
-  return cv::mean(product)[0] / spread < least_correlation;
+  return cv::mean(product)[0] / spread < least_correlation && medianDifference(a, b) > kOtherPlace;
 }
 
 MotionPrior priorFor(const Camera& camera, double depth, const Eigen::Vector3d& gravity) {

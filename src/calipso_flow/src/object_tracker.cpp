@@ -6,8 +6,10 @@
 
 #include "calipso_flow/coarse_search.hpp"
 #include "calipso_flow/look_match.hpp"
+#include "calipso_flow/object_motion.hpp"
 #include "calipso_flow/rotation.hpp"
 #include "calipso_flow/turn_search.hpp"
+#include "seed_tracks.hpp"
 #include "view_change.hpp"
 
 namespace calipso::flow {
@@ -18,16 +20,13 @@ constexpr int kRefinements = 2;  // warp, match both ways, fit
 constexpr double kSameLookShare = 0.025;
 // of the frame before's tracks: with so many no search is needed
 constexpr double kClearShare = 0.7;
-constexpr double kNearPx = 1.5;  // a prediction this close needs no half-size match
 // looks that differ by this, but for where they are, serve for one another
 constexpr double kSameShapePx = 1.0;
 constexpr double kOtherView = 0.1;  // rad, or relative distance: looks from nearer show the same
 constexpr double kLeastInlierShare = 0.35;   // of the matches
 constexpr double kLeastVisibleShare = 0.25;  // of the seeds inside the picture
-constexpr double kFirstSearch = 0.2;         // of the picture's width, while no motion is known
-constexpr int kForgetAfter = 3;       // frames without the object before its motion is forgotten
-constexpr int kWeakInliers = 12;      // fewer tracks than this are worth another attempt
-constexpr double kStaysShare = 0.01;  // of the diagonal: what moves less has not moved
+constexpr int kWeakInliers = 12;             // fewer tracks than this are worth another attempt
+constexpr double kStaysShare = 0.01;         // of the diagonal: what moves less has not moved
 constexpr double kPatchShare = 1.0 / 160.0;  // of the picture's width: a patch's radius
 constexpr int kLargestRadius = 9;            // px
 // of the seeds in the picture: with fewer tracks noise or blur drowns small patches
@@ -43,35 +42,6 @@ constexpr double kIndependent = 1.5;  // errors along an outline: they are off n
 // view, as it is over as large a part of the picture (pose_fit.cpp)
 constexpr double kViewLength = 0.4;
 constexpr double kKeySigma = 1e-4;  // of the diagonal: the key pose is given, not measured
-
-// Follows the reference's seeds into the frame, the object's look being warped to `look` and the
-// object expected at `start`.
-std::vector<Track> followSeeds(const LookMatch& match, const ReferenceView& reference,
-                               const Camera& camera, const Eigen::Isometry3d& look,
-                               const Eigen::Isometry3d& start, const TrackerParams& params,
-                               std::vector<Correspondence>& found) {
-  const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
-  std::vector<Eigen::Vector3d> points;
-  std::vector<LookMatch::Seed> pixels;
-  for (const Eigen::Vector3d& seed : reference.seeds()) {
-    const Eigen::Vector3d in_look = camera_from_world * (look * seed),
-                          expected = camera_from_world * (start * seed);
-    if (in_look.z() <= 0.0 || expected.z() <= 0.0) continue;
-    points.push_back(seed);
-    pixels.push_back({camera.project(in_look), camera.project(expected)});
-  }
-  const LookMatch::Matches matches = LookMatch::forEach(pixels, [&](const LookMatch::Seed& seed) {
-    return match.findSurely(seed, params.patch, params.trust);
-  });
-  std::vector<Track> tracks;
-  for (size_t i = 0; i < points.size(); ++i) {
-    const auto& there = matches[i];
-    if (!there) continue;
-    found.push_back({points[i], there->position, there->covariance});
-    tracks.push_back({points[i], there->position, there->correlation, there->deviation, false});
-  }
-  return tracks;
-}
 
 }  // namespace
 
@@ -109,20 +79,10 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
                   references_.front().view.warp(key_frame.camera, model.world_from_object),
                   key_frame, model.world_from_object));
   last_ = key_;
-  last_world_from_camera_ = key_frame.camera.world_from_camera;
+  last_frame_ = key_frame;
   last_seen_time_ = key_.time;
+  fall_.take(measured(key_), MotionPrior());
   due_inliers_ = static_cast<int>(key_.tracks.size());
-}
-
-Eigen::Isometry3d ObjectTracker::predict(double time) const {
-  if (!before_last_) return last_->world_from_object;
-  const double share = (time - last_->time) / (last_->time - before_last_->time);
-  const Eigen::Isometry3d& from = before_last_->world_from_object;
-  const Eigen::Isometry3d& to = last_->world_from_object;
-  Vector6d motion;
-  motion << to * centroid_ - from * centroid_,
-      vectorFromRotation(to.linear() * from.linear().transpose());
-  return movePose(to, centroid_, share * motion);
 }
 
 // The look of an object at rest serves for many frames; where it need not be exact, so does one
@@ -146,22 +106,6 @@ bool ObjectTracker::isLookOf(const Frame& frame, const ReferenceView& reference,
              kSameLookShare * params_.patch.radius_px;
 }
 
-// The object may have stopped, or turned round: look as far as twice back to where it was.
-Eigen::AlignedBox2d ObjectTracker::reachFrom(const Frame& frame,
-                                             const Eigen::Isometry3d& predicted) const {
-  const Eigen::Vector2d home = frame.camera.projectWorld(predicted * centroid_);
-  const Eigen::Vector2d before = frame.camera.projectWorld(last_->world_from_object * centroid_);
-  // Without a motion to go by, it may be anywhere near.
-  const bool known = before_last_ && frames_lost_ < kForgetAfter;
-  const double search =
-      known ? params_.search_px : std::max(params_.search_px, kFirstSearch * frame.camera.width);
-  const Eigen::Vector2d margin(search, search);
-  Eigen::AlignedBox2d reach(-margin, margin);
-  const Eigen::Vector2d back = 1.5 * (before - home);
-  reach.extend(Eigen::AlignedBox2d(back - margin, back + margin));
-  return reach;
-}
-
 Eigen::Isometry3d ObjectTracker::searchCoarsely(const Frame& frame, const ReferenceView& reference,
                                                 const Eigen::Isometry3d& predicted) {
   const ReferenceView::Warped& look = lookAt(frame, reference, predicted, Care::kRough).warped;
@@ -179,10 +123,7 @@ Observation ObjectTracker::refine(const Frame& frame, const Reference& reference
   observation.time = frame.time;
   observation.world_from_object = start;
   if (!near) {
-    observation.world_from_object =
-        refineOnce(frame, reference.view, Care::kRough, params, observation);
-    observation.world_from_object =
-        refineOnce(frame, reference.view, Care::kForward, params, observation);
+    approach(frame, reference.view, params, observation);
   }
   for (int round = 0; round < kRefinements; ++round) {
     observation.world_from_object =
@@ -199,6 +140,21 @@ Observation ObjectTracker::refine(const Frame& frame, const Reference& reference
   return observation;
 }
 
+// From a start that may be some pixels off. Large patches reach farther.
+void ObjectTracker::approach(const Frame& frame, const ReferenceView& reference,
+                             const TrackerParams& params, Observation& observation) {
+  const Eigen::Isometry3d start = observation.world_from_object;
+  observation.world_from_object = refineOnce(frame, reference, Care::kRough, params, observation);
+  if (observation.inliers() < kClearShare * reference.seeds().size()) {
+    Observation wide;
+    wide.world_from_object = start;
+    wide.world_from_object = refineOnce(frame, reference, Care::kRough, wide_, wide);
+    if (wide.inliers() > observation.inliers())
+      observation.world_from_object = wide.world_from_object;
+  }
+  observation.world_from_object = refineOnce(frame, reference, Care::kForward, params, observation);
+}
+
 Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceView& reference,
                                             Care care, const TrackerParams& params,
                                             Observation& observation) {
@@ -210,8 +166,9 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
   observation.coverage = seen.warped.coverage;
   if (seen.warped.coverage == 0.0) return pose;
   std::vector<Correspondence> found;
-  observation.tracks = followSeeds(LookMatch(seen.warped, frame.gray, care), reference,
-                                   frame.camera, seen.pose, pose, params, found);
+  observation.tracks =
+      followSeeds(LookMatch(seen.warped, frame.gray, care), reference, frame.camera, seen.pose,
+                  pose, params, boundingDiagonal(model_.mesh), found);
   const size_t tracks = found.size();
   if (care != Care::kRough) addOutline(frame, seen, found);
   const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params.pose);
@@ -265,15 +222,24 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
   }
   last_seen_time_ = frame.time;
   frames_lost_ = cut ? kForgetAfter : frames_lost_;
-  const Eigen::Isometry3d predicted =
-      frames_lost_ < kForgetAfter ? predict(frame.time) : last_->world_from_object;
+  const Eigen::Isometry3d predicted = likeliestPrediction(frame);
+  if (isOutOfPicture(frame, predicted)) {
+    ++frames_lost_;
+    Observation lost;
+    lost.time = frame.time;
+    lost.world_from_object = predicted;
+    return lost;
+  }
   const Reference& nearest = nearestReference(frame, predicted);
   Observation best = attempt(frame, nearest, predicted, drowned_ ? wide_ : params_);
   if (!isClear(best)) best = tryOtherwise(frame, nearest, predicted, std::move(best));
+  if (best.found && frames_lost_ > 0 && best.inliers() < kWeakInliers && fall_.holds() &&
+      !fall_.expects(measured(best)))
+    best.found = false;  // few tracks that are not where it falls to are something else's
   frames_lost_ = best.found ? 0 : frames_lost_ + 1;
   if (best.found) {
     const double change =
-        viewChange(last_world_from_camera_.inverse() * last_->world_from_object,
+        viewChange(last_frame_.camera.world_from_camera.inverse() * last_->world_from_object,
                    frame.camera.world_from_camera.inverse() * best.world_from_object, centroid_);
     best.drift = driftSinceLast(best, change);
     remember(frame, best, cut);
@@ -285,6 +251,10 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
 // object.
 Observation ObjectTracker::tryOtherwise(const Frame& frame, const Reference& nearest,
                                         const Eigen::Isometry3d& predicted, Observation best) {
+  if (best.inliers() < kClearShare * due_inliers_ && frames_lost_ == 0) {
+    auto other = fromFrameBefore(frame, nearest, predicted);
+    if (other && other->inliers() > best.inliers()) best = std::move(*other);
+  }
   if (best.inliers() < kWeakInliers) {
     for (const Reference& reference : references_) {
       Observation other =
@@ -309,6 +279,23 @@ Observation ObjectTracker::tryOtherwise(const Frame& frame, const Reference& nea
   }
   due_inliers_ = best.inliers();
   return best;
+}
+
+// What has turned since its reference still looks as it did a frame ago. Found so, it is looked at
+// again with the reference, whose errors are smaller.
+std::optional<Observation> ObjectTracker::fromFrameBefore(const Frame& frame,
+                                                          const Reference& nearest,
+                                                          const Eigen::Isometry3d& predicted) {
+  if (nearest.view.frame().time == last_->time) return std::nullopt;
+  const TrackerParams& params = drowned_ ? wide_ : params_;
+  const Reference before{
+      ReferenceView(last_frame_, model_, last_->world_from_object, cv::Mat(), params_.seed_count),
+      last_->covariance, last_->covariance - last_->persistent};
+  Observation found = attempt(frame, before, predicted, params);
+  if (!found.found) return std::nullopt;
+  Observation again = refine(frame, nearest, found.world_from_object, params);
+  look_ = {};  // `before` goes
+  return again.inliers() >= kLeastInlierShare * found.inliers() ? again : found;
 }
 
 // What is found where it was expected needs no search.
@@ -346,7 +333,12 @@ Matrix6d ObjectTracker::driftSinceLast(const Observation& observation, double ch
 void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
   before_last_ = cut ? std::nullopt : last_;
   last_ = observation;
-  last_world_from_camera_ = frame.camera.world_from_camera;
+  last_frame_ = frame;
+  const double depth =
+      (frame.camera.world_from_camera.inverse() * (observation.world_from_object * centroid_))
+          .norm();
+  if (cut) fall_ = {};
+  fall_.take(measured(observation), priorFor(frame.camera, depth, params_.gravity));
   due_inliers_ = std::max(due_inliers_, observation.inliers());
   Reference& nearest = nearestReference(frame, observation.world_from_object);
   nearest.most_inliers = std::max(nearest.most_inliers, observation.inliers());

@@ -176,10 +176,13 @@ struct Information {
   Matrix6d points = Matrix6d::Zero(), outline = Matrix6d::Zero();
   Matrix6d outline_apart = Matrix6d::Zero();  // of its points' own errors, which are not alike
   Matrix6d geometry = Matrix6d::Zero();       // of all, each counted alike, 1/px^2
+  // sum of A^T S over the points, S = what the terms of the shape's error do to a pixel
+  Eigen::Matrix<double, 6, kShapeTerms> shape = Eigen::Matrix<double, 6, kShapeTerms>::Zero();
   int outline_inliers = 0;
 };
 
-Information chooseInliers(const Linearisation& lin, const std::vector<double>& lengths,
+Information chooseInliers(const std::vector<Correspondence>& correspondences,
+                          const Linearisation& lin, const std::vector<double>& lengths,
                           const Deviations& found, double limit, PoseFit& fit) {
   Information sum;
   for (size_t i = 0; i < lengths.size(); ++i) {
@@ -188,6 +191,7 @@ Information chooseInliers(const Linearisation& lin, const std::vector<double>& l
     const Matrix6d told = lin.jacobian[i].transpose() * lin.information[i] * lin.jacobian[i];
     (lin.outline[i] ? sum.outline : sum.points) += told;
     if (lin.outline[i]) sum.outline_apart += told / lin.alike[i];
+    sum.shape += lin.jacobian[i].transpose() * lin.information[i] * correspondences[i].shape;
     ++(lin.outline[i] ? sum.outline_inliers : fit.inliers);
     // Across an outline, or in both directions.
     const double most = lin.information[i].trace() / (lin.outline[i] ? 1.0 : 2.0);
@@ -201,7 +205,7 @@ void judge(const std::vector<Correspondence>& correspondences, const Linearisati
   const std::vector<double> all = lengths(lin);
   const Deviations found = robustDeviations(lin, all);
   fit.deviation = found.points;
-  const Information sum = chooseInliers(lin, all, found, params.inlier_sigma, fit);
+  const Information sum = chooseInliers(correspondences, lin, all, found, params.inlier_sigma, fit);
   // A point of the outline tells one coordinate of two. Of a small object there is little else; but
   // without any point what moves may be what is behind it.
   if (fit.inliers < kLeastPoints || fit.inliers + sum.outline_inliers / 2 < params.least_inliers)
@@ -220,7 +224,8 @@ void judge(const std::vector<Correspondence>& correspondences, const Linearisati
   const Matrix6d together =
       shape.gradient / (of_points * of_points) + (sum.outline - sum.outline_apart) / of_outline;
   const Matrix6d inverse = factor.solve(Matrix6d::Identity());
-  fit.persistent = inverse * together * inverse;
+  const Eigen::Matrix<double, 6, kShapeTerms> bias = inverse * sum.shape / of_points;
+  fit.persistent = inverse * together * inverse + bias * bias.transpose();
   fit.covariance = inverse * alone * inverse + fit.persistent;
   fit.converged = fit.covariance.allFinite();
 }

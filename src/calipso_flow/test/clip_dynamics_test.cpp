@@ -154,6 +154,17 @@ TEST(ClipDynamics, cameraMotionIsNotObjectMotion) {
   EXPECT_FALSE(analyser.finish().front().motions[5].moving);
 }
 
+// All that varies in the picture has moved, and yet the place has stayed.
+TEST(ClipDynamics, takesAThingBeforeAPlainWallForNoCut) {
+  const Camera camera = test::testCamera();
+  const auto frame = [&](double time, int x) {
+    cv::Mat wall(camera.height, camera.width, CV_8U, cv::Scalar(120));
+    wall({x, 80, 60, 60}).setTo(220);
+    return makeFrame(time, wall, camera);
+  };
+  EXPECT_FALSE(isCut(frame(0.0, 40), frame(1 / kFps, 110), DynamicsParams().cut_correlation));
+}
+
 TEST(ClipDynamics, seesACutAndTakesItForNoMotion) {
   const Eigen::Isometry3d pose = test::boxModel().world_from_object;
   ClipAnalyser analyser = analyserOf(frameOf(0.0, pose, 61));

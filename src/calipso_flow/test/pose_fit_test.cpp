@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <random>
 
 #include "calipso_flow/rotation.hpp"
@@ -48,6 +49,34 @@ TEST(PoseFit, survivesOutliers) {
   EXPECT_EQ(fit.inliers, 40);
   // 40 points of 0.1 px at 200 px/m: depth, the weakest direction, scatters by about 1 mm.
   EXPECT_LT((fit.world_from_object.translation() - somePose().translation()).norm(), 0.005);
+}
+
+// What an error of the shape does to the pose is stated: the same as displaced pixels make of it.
+TEST(PoseFit, statesWhatAnErrorOfTheShapeDoes) {
+  const Camera camera = test::testCamera();
+  auto points = correspondences(somePose(), 0.0, 3);
+  const Eigen::Vector2d middle = camera.projectWorld(somePose().translation());
+  for (Correspondence& c : points) {
+    const Eigen::Vector2d at = (c.pixel - middle) / 30.0;
+    c.shape = Eigen::Vector2d(1.0, 0.5) * Eigen::RowVector3d(at.x(), at.y(), at.squaredNorm() - 1);
+  }
+  const auto fit = [&](const std::vector<Correspondence>& found) {
+    return fitPose(found, camera, somePose(), Eigen::Vector3d::Zero());
+  };
+  constexpr double kShare = 0.01;  // so little that all points count fully
+  Matrix6d expected = Matrix6d::Zero();
+  for (int term = 0; term < kShapeTerms; ++term) {
+    auto displaced = points;
+    for (Correspondence& c : displaced) c.pixel += kShare * c.shape.col(term);
+    const Eigen::Isometry3d pose = fit(displaced).world_from_object;
+    Vector6d off;
+    off << pose.translation() - somePose().translation(),
+        vectorFromRotation(pose.linear() * somePose().linear().transpose());
+    expected += off * off.transpose() / (kShare * kShare);
+  }
+  const PoseFit told = fit(points);
+  ASSERT_TRUE(told.converged);
+  EXPECT_LT((told.persistent - expected).norm(), 0.1 * expected.norm());
 }
 
 // 95 % of the errors lie in the 95 % ellipsoid (12.59 for six degrees of freedom).

@@ -13,6 +13,9 @@ namespace calipso::flow {
 Eigen::Vector2d coarseDisplacement(const ReferenceView::Warped& look, const cv::Mat& picture,
                                    const Eigen::AlignedBox2d& reach);
 
+// Normalised correlation of the look with the picture where the look lies; -1: nothing to tell by.
+double correlationInPlace(const ReferenceView::Warped& look, const cv::Mat& picture);
+
 // The best place within reach, however it compares with the prediction.
 struct CoarseMatch {
   Eigen::Vector2d displacement = Eigen::Vector2d::Zero();  // px

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calipso_flow/deformation_fit.hpp"
+#include "calipso_flow/fall_filter.hpp"
 #include "calipso_flow/look_match.hpp"
 #include "calipso_flow/outline_match.hpp"
 #include "calipso_flow/pose_fit.hpp"
@@ -18,6 +19,7 @@ struct TrackerParams {
   double least_coverage = 0.55;  // below this share of known surface a new reference is taken
   int max_references = 12;
   double search_px = 24.0;  // the coarse search looks this far beyond the prediction
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // m/s^2, world: what is let go falls
   PatchParams patch;
   MatchTrust trust;
   PoseFitParams pose;
@@ -72,7 +74,15 @@ class ObjectTracker {
   const Eigen::Vector3d& centroid() const { return centroid_; }  // object frame, m
 
  private:
-  Eigen::Isometry3d predict(double time) const;
+  static constexpr double kNearPx = 1.5;  // a prediction this close needs no half-size match
+  static constexpr int kForgetAfter =
+      3;  // frames without the object before its motion is forgotten
+
+  // Where the object is at `time` if it goes on as it did, with an acceleration besides, m/s^2.
+  Eigen::Isometry3d predict(double time, const Eigen::Vector3d& acceleration) const;
+  PoseMeasurement measured(const Observation& observation) const;
+  Eigen::Isometry3d likeliestPrediction(const Frame& frame);
+  bool isOutOfPicture(const Frame& frame, const Eigen::Isometry3d& predicted) const;
   // A reference warped to a pose, as a camera sees it.
   struct Look {
     const ReferenceView* reference = nullptr;
@@ -95,11 +105,15 @@ class ObjectTracker {
   };
   Observation refine(const Frame& frame, const Reference& reference, const Eigen::Isometry3d& start,
                      const TrackerParams& params);
+  void approach(const Frame& frame, const ReferenceView& reference, const TrackerParams& params,
+                Observation& observation);
   Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
                                const TrackerParams& params, Observation& observation);
   Reference& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose);
   Observation attempt(const Frame& frame, const Reference& reference,
                       const Eigen::Isometry3d& predicted, const TrackerParams& params);
+  std::optional<Observation> fromFrameBefore(const Frame& frame, const Reference& nearest,
+                                             const Eigen::Isometry3d& predicted);
   Observation tryOtherwise(const Frame& frame, const Reference& nearest,
                            const Eigen::Isometry3d& predicted, Observation best);
   bool isClear(const Observation& observation) const;
@@ -122,8 +136,9 @@ class ObjectTracker {
   Look look_;  // the last one, which often serves again
   Observation key_;
   std::optional<Observation> last_, before_last_;  // found, most recent first
-  Eigen::Isometry3d last_world_from_camera_;       // of `last_`
-  double last_seen_time_ = 0.0;                    // s; of the last frame, found in or not
+  FallFilter fall_;
+  Frame last_frame_;             // of `last_`
+  double last_seen_time_ = 0.0;  // s; of the last frame, found in or not
   int frames_lost_ = 0;
   int due_inliers_ = 0;  // tracks that a clear observation has
 };

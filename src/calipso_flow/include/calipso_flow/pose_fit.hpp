@@ -10,6 +10,10 @@ namespace calipso::flow {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
+// What a model's shape errs by all over, as seen from one side: its depth leans in two directions
+// and bulges. From another side that looks like a motion unless it is told from one.
+constexpr int kShapeTerms = 3;
+
 // A point of an object's surface and where it was found in the picture.
 struct Correspondence {
   Eigen::Vector3d point;       // object frame, m
@@ -17,6 +21,9 @@ struct Correspondence {
   Eigen::Matrix2d covariance;  // of pixel, px^2
   bool outline = false;  // found across the outline only; how well such are found is judged apart
   double alike = 1.0;    // so many near it err with it, and `covariance` is as many times its own
+  // px by which the pixel moves with each of the first terms of the shape's error, in units of what
+  // is expected of them
+  Eigen::Matrix<double, 2, kShapeTerms> shape = Eigen::Matrix<double, 2, kShapeTerms>::Zero();
 };
 
 struct PoseFitParams {
