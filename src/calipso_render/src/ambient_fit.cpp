@@ -19,9 +19,9 @@ constexpr std::size_t kFewest = 200;
 
 using Terms = Eigen::Matrix<double, kTerms, 1>;
 
-// What a sample says: I = a (E + sky sum_j A_j B_j) + G, with E of sun and band 0, G the highlight.
+// What a sample says: I = a (E + sum_j A_j B_j) + G, with E of sun and band 0, G the highlight.
 struct Row {
-  Terms basis;                 // times the visible sky
+  Terms basis;                 // B: of what it sees of the sky
   Eigen::Array3d fixed, rest;  // E; I - G
   double scale;                // of the residual
   int cluster, fold;
@@ -118,11 +118,15 @@ std::vector<Row> rowsOf(const LightEvidence& evidence, const LightFit& fit) {
   for (std::size_t i = 0; i < evidence.samples.size(); ++i) {
     const LightSample& s = evidence.samples[i];
     const float visible = evidence.visible ? evidence.visible(s, plain.direction) : 1.0f;
-    const cv::Vec3f lit = diffuseShading(plain, s.normal, visible, s.sky),
-                    gloss = specularShading(fit.light, fit.gloss, s.normal, s.view, visible, s.sky);
-    const std::array<float, 9> basis = shBasis(s.normal);
+    const cv::Vec3f lit = diffuseShading(plain, s.normal, visible, s.seen,
+                                         cv::Vec3f::all(kThrownBack)),
+                    gloss = specularShading(fit.light, fit.gloss, s.normal, s.view, visible,
+                                            skyMirrored(s.seen));
+    const Eigen::Vector3f first = s.seen.towards + kThrownBack * s.seen.thrown_towards;
+    const std::array<float, 9> basis = shBasis(s.seen.towards.normalized());
     Row row;
-    for (int j = 0; j < kTerms; ++j) row.basis[j] = s.sky * basis[j + 1];
+    row.basis << first.y(), first.z(), first.x(), Eigen::Matrix<double, kTerms - 3, 1>::Zero();
+    for (int j = 3; j < kTerms; ++j) row.basis[j] = s.seen.open * basis[j + 1];
     for (int c = 0; c < 3; ++c) row.fixed[c] = lit[c], row.rest[c] = s.radiance[c] - gloss[c];
     const cv::Vec3f& a = fit.albedos[s.cluster];
     row.scale = (a[0] * lit[0] + a[1] * lit[1] + a[2] * lit[2]) / 3.0 + 1e-3;

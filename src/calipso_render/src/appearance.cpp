@@ -53,7 +53,7 @@ struct Shaded {
 };
 
 Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
-             const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& tint) {
+             const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& thrown_back) {
   Shaded s{cv::Mat::zeros(region.size(), CV_32FC3),
            cv::Mat::zeros(region.size(), CV_32FC3),
            cv::Mat::zeros(region.size(), CV_32F),
@@ -72,10 +72,11 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       const SurfacePoint p =
           surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
       const float visible = sun.visibility(p.position, p.normal);
-      const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.sky, tint);
+      const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.seen, thrown_back);
       s.light.at<cv::Vec3f>(v, u) = l;
+      const Eigen::Vector3f towards = (eye - p.position).normalized();
       s.highlight.at<cv::Vec3f>(v, u) =
-          specularShading(light, gloss, p.normal, (eye - p.position).normalized(), visible, p.sky);
+          specularShading(light, gloss, p.normal, towards, visible, skyMirrored(p.seen));
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];
@@ -91,7 +92,8 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
 // @param mean_light that of the key frame, where there is one
 Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light,
                           const Gloss& gloss, const ShadowMap& sun,
-                          const std::optional<cv::Vec3f>& mean_light, const cv::Vec3f& tint) {
+                          const std::optional<cv::Vec3f>& mean_light,
+                          const cv::Vec3f& thrown_back) {
   Reflectance r;
   const cv::Rect all(0, 0, view.picture.cols, view.picture.rows);
   cv::Rect mask_box = cv::boundingRect(view.labels == actor.surface->index);
@@ -101,7 +103,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
           : (mask_box + cv::Size(2 * kMargin, 2 * kMargin) - cv::Point(kMargin, kMargin)) & all;
   r.region = boundsOf(actor.screen, kMargin, view.picture.size()) | mask_box;
   if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
-  const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun, tint);
+  const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun, thrown_back);
   r.nearness = shaded.nearness, r.normal = shaded.normal;
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);
@@ -162,10 +164,10 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
     actors.push_back(&views[i].actors[object]);
     const std::optional<cv::Vec3f> mean = i == 0 ? std::nullopt : std::make_optional(a.mean_light);
     if (i == 0)
-      a.tint = thrownBackTint(meanReflectance(
-          reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, {})));
+      a.thrown_back = thrownBack(meanReflectance(
+          reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, thrownBack({}))));
     pictures.push_back(
-        reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, a.tint));
+        reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, a.thrown_back));
     if (i == 0) a.mean_light = pictures[0].mean_light;
   }
   a.region = pictures[0].region;

@@ -79,8 +79,9 @@ void FrameCompositor::shadeOther(int u, int v, Behind& behind) const {
       shadows_.originals ? shadows_.originals->visibility(p->position, p->normal) : 1.0f;
   if (before - now < kSameShadow) return;
   const float others = shadows_.others->visibility(p->position, p->normal);
-  const cv::Vec3f lit = diffuseShading(light_, p->normal, others * before, p->sky);
-  const cv::Vec3f shaded = diffuseShading(light_, p->normal, others * now, p->sky);
+  const cv::Vec3f back = cv::Vec3f::all(kThrownBack);
+  const cv::Vec3f lit = diffuseShading(light_, p->normal, others * before, p->seen, back);
+  const cv::Vec3f shaded = diffuseShading(light_, p->normal, others * now, p->seen, back);
   for (int c = 0; c < 3; ++c)
     behind.colour[c] *= std::min(1.0f, shaded[c] / std::max(lit[c], 1e-4f));
   behind.source = kRendered;

@@ -268,7 +268,7 @@ void FrameCompositor::findMaps() {
     const int surface = surface_of_slot_[slot];
     const bool seen = edited_[surface] ||
                       !(boundsOf(actors_[slot].screen, 0, frame_.bgr.size()) & region_).empty();
-    maps_.push_back(seen ? SurfaceMaps(actors_[slot], prepared_.appearances[surface], eye_)
+    maps_.push_back(seen ? SurfaceMaps(actors_[slot], prepared_.appearances[surface], light_, eye_)
                          : SurfaceMaps());
   }
 }

@@ -43,7 +43,7 @@ void FrameCompositor::shadeSetup() {
       copyTo(s.ambient[i], light_.ambient[i]);
       if (light_.ambient[i] != cv::Vec3f()) s.terms = i == 0 ? 1 : i < 4 ? 4 : 9;
     }
-    copyTo(s.thrown_back, appearance.tint), copyTo(s.floor, lightFloor(appearance.mean_light));
+    copyTo(s.floor, lightFloor(appearance.mean_light));
     copyTo(s.tint, tintOf(static_cast<int>(slot)));
     s.specular = glosses_[slot].specular, s.roughness = glosses_[slot].roughness;
     shades_.push_back(s);

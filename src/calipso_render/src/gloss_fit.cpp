@@ -100,7 +100,7 @@ void collect(const View& view, int picture, const Actor& actor, const Eigen::Vec
       if (s.normal.dot((light + towards).normalized()) < kNearMirror || s.normal.dot(light) <= 0.0f)
         continue;
       const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v + map.region.y, u + map.region.x);
-      HighlightSample h{{s.position, s.normal, towards, {}, -1, s.sky, picture},
+      HighlightSample h{{s.position, s.normal, towards, {}, -1, s.seen, picture},
                         spreadAt(map.normals, u, v)};
       for (int c = 0; c < 3; ++c) h.at.radiance[c] = linearFromRealCode(code[c]);
       highlights.push_back(h);
@@ -278,13 +278,13 @@ std::optional<SeenGloss> fitGloss(
                 n_v = h.at.normal.dot(h.at.view);
     const cv::Vec3f& a = fit.albedos[h.at.cluster];
     Row row{h.at.cluster,
-            a.mul(diffuseShading(light, h.at.normal, sun, h.at.sky)),
+            a.mul(diffuseShading(light, h.at.normal, sun, h.at.seen, cv::Vec3f::all(kThrownBack))),
             h.at.radiance,
             light.sun * sun,
             {},
             1.0};
-    row.mirrored =
-        ambientAt(light, 2.0f * n_v * h.at.normal - h.at.view) * (h.at.sky * grazing(n_v));
+    row.mirrored = ambientAt(light, 2.0f * n_v * h.at.normal - h.at.view) *
+                   (skyMirrored(h.at.seen) * grazing(n_v));
     row.scale = (row.diffuse[0] + row.diffuse[1] + row.diffuse[2]) / 3.0 + 1e-3;
     rows.push_back(row);
   }

@@ -26,23 +26,38 @@ cv::Vec3f ambientAt(const Light& light, const Eigen::Vector3f& n) {
   return sum;
 }
 
-cv::Vec3f thrownBackTint(const cv::Vec3f& reflectance) {
-  constexpr float kMostTint = 0.9f;  // of a channel's light: saturated colours are told with errors
-  cv::Vec3f tint;
+cv::Vec3f thrownBack(const cv::Vec3f& reflectance) {
+  constexpr float kMost = 0.9f;  // of a channel's light: saturated colours are told with errors
   const float grey = luminance(reflectance);
-  if (!(grey > 0.0f)) return tint;
-  // Of the hidden part h the surface's `sky` is 1 - (1 - kThrownBack) h.
-  for (int c = 0; c < 3; ++c)
-    tint[c] = kThrownBack / (1.0f - kThrownBack) *
-              (std::min(kMostTint / kThrownBack, reflectance[c] / grey) - 1.0f);
-  return tint;
+  if (!(grey > 0.0f)) return cv::Vec3f::all(kThrownBack);
+  cv::Vec3f back;
+  for (int c = 0; c < 3; ++c) back[c] = std::min(kMost, kThrownBack * reflectance[c] / grey);
+  return back;
 }
 
-cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky,
-                         const cv::Vec3f& tint) {
-  const cv::Vec3f reaching = cv::Vec3f::all(sky) + tint * (1.0f - sky);
-  return ambientAt(light, n).mul(reaching) +
+cv::Vec3f ambientOn(const Light& light, const SkySeen& seen, const cv::Vec3f& thrown_back) {
+  const std::array<cv::Vec3f, 9>& A = light.ambient;
+  const auto first = [&](float zeroth, const Eigen::Vector3f& d) {
+    return A[0] * zeroth + A[1] * d.y() + A[2] * d.z() + A[3] * d.x();
+  };
+  cv::Vec3f sum = first(seen.open, seen.towards);
+  const std::array<float, 9> basis = shBasis(seen.towards.normalized());
+  for (int i = 4; i < 9; ++i) sum += A[i] * (basis[i] * seen.open);
+  sum += thrown_back.mul(first(seen.thrown, seen.thrown_towards) +
+                         light.sun * sunThrown(seen, light.direction));
+  // Harmonics may dip below zero where nothing was seen; light cannot.
+  for (int c = 0; c < 3; ++c) sum[c] = std::max(sum[c], 0.02f * A[0][c]);
+  return sum;
+}
+
+cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun,
+                         const SkySeen& seen, const cv::Vec3f& thrown_back) {
+  return ambientOn(light, seen, thrown_back) +
          light.sun * (std::max(0.0f, n.dot(light.direction)) * sun);
+}
+
+cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun) {
+  return ambientAt(light, n) + light.sun * (std::max(0.0f, n.dot(light.direction)) * sun);
 }
 
 float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v,

@@ -118,7 +118,9 @@ class Fit {
       r.normal = s.normal.cast<double>(), r.view = s.view.cast<double>(), r.up = up_;
       r.radiance = Eigen::Vector3d(s.radiance[0], s.radiance[1], s.radiance[2]);
       r.visible = evidence_.visible ? evidence_.visible(s, l) : 1.0f;
-      r.sky = s.sky;
+      const GreyLight around = greyLight(s.seen, up_.cast<float>(), l);
+      r.below = Eigen::Array3d(evidence_.below[0], evidence_.below[1], evidence_.below[2]);
+      r.even = around.even, r.lean = around.lean, r.thrown_sun = around.sun;
       r.scale = (means_[s.cluster][0] + means_[s.cluster][1] + means_[s.cluster][2]) / 3.0;
       problem.AddResidualBlock(new ReflectanceCost(r), new ceres::SoftLOneLoss(kRobust),
                                x.direction.data(), x.ambient.data(), x.sun.data(), &x.gradient,
@@ -171,16 +173,17 @@ class Fit {
   std::vector<cv::Vec3f> means_;
 };
 
-LightFit toFit(const Unknowns& x, const Eigen::Vector3f& up, double cost) {
+LightFit toFit(const Unknowns& x, const cv::Vec3f& below, const Eigen::Vector3f& up, double cost) {
   LightFit fit;
   fit.determined = true;
   fit.cost = cost;
   fit.light.direction = x.direction.cast<float>();
-  fit.light.sun = expOf(x.sun), fit.light.ambient[0] = expOf(x.ambient);
+  const cv::Vec3f A = expOf(x.ambient);
+  fit.light.sun = expOf(x.sun), fit.light.ambient[0] = A;
+  const cv::Vec3f more =
+      A - below * static_cast<float>((1.0 - x.gradient) * (A[0] + A[1] + A[2]) / 3.0);
   // Band 1 of the harmonics is ordered y, z, x.
-  for (int i = 0; i < 3; ++i)
-    fit.light.ambient[1 + i] =
-        fit.light.ambient[0] * (static_cast<float>(x.gradient) * up[(i + 1) % 3]);
+  for (int i = 0; i < 3; ++i) fit.light.ambient[1 + i] = more * up[(i + 1) % 3];
   fit.gloss = {static_cast<float>(std::exp(x.gloss[0])), static_cast<float>(std::exp(x.gloss[1]))};
   for (const Eigen::Vector3d& a : x.albedos) fit.albedos.push_back(expOf(a));
   return fit;
@@ -193,7 +196,7 @@ void tryStart(const LightEvidence& evidence, const Eigen::Vector3f& up, const Li
   const double cost = Fit(evidence, up, direction_free).run(start, x);
   if (x.direction.dot(up.cast<double>()) <= 0.0 || (best.determined && cost >= best.cost)) return;
   const bool from_shadows = best.from_shadows;
-  best = toFit(x, up, cost);
+  best = toFit(x, evidence.below, up, cost);
   best.from_shadows = from_shadows;
 }
 
@@ -202,9 +205,8 @@ double shadowMisfit(const LightEvidence& evidence, const LightCandidate& c) {
 }
 
 bool anyShadow(const LightEvidence& evidence, const std::vector<LightCandidate>& starts) {
-  return std::any_of(starts.begin(), starts.end(), [&](const LightCandidate& c) {
-    return shadowMisfit(evidence, c) != 0.0;
-  });
+  return std::any_of(starts.begin(), starts.end(),
+                     [&](const LightCandidate& c) { return shadowMisfit(evidence, c) != 0.0; });
 }
 
 // Dark places that hardly look like shadows count for nothing.

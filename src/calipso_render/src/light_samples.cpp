@@ -18,6 +18,9 @@ constexpr float kSaturated = 250.0f;      // code value
 constexpr int kClustersPerObject = 4;
 // cosine to the viewer; flatter ones mirror more than the model knows
 constexpr float kGrazingView = 0.25f;
+constexpr int kBelowStep = 4, kFewestBelow = 100;  // px, places: of what lies below the objects
+constexpr float kAround = 3.0f;     // of the objects' extent, in which it is looked at
+constexpr double kDarkest = 0.005;  // linear; darker has no colour
 
 struct Pixel {
   int u, v;
@@ -78,11 +81,35 @@ void sampleView(const View& view, int picture, std::size_t object, std::size_t l
     const SurfacePoint s = surfacePoint(actor, triangle, p.u, p.v, eye);
     const Eigen::Vector3f towards = (eye - s.position).normalized();
     if (s.normal.dot(towards) < kGrazingView) continue;
-    LightSample sample{s.position, s.normal, towards, {}, 0, s.sky, picture};
+    LightSample sample{s.position, s.normal, towards, {}, 0, s.seen, picture};
     const cv::Vec3f& code = view.picture.at<cv::Vec3f>(p.v, p.u);
     for (int c = 0; c < 3; ++c) sample.radiance[c] = linearFromRealCode(code[c]);
     samples.push_back(sample);
   }
+}
+
+// Linear colour of the support planes around the objects, mean 1.
+cv::Vec3f colourBelow(const View& view, const std::vector<SupportPlane>& planes) {
+  Eigen::AlignedBox3f box;
+  for (const Actor& a : view.actors) {
+    for (const Eigen::Vector3f& p : a.vertices) box.extend(p);
+  }
+  cv::Vec3d sum;
+  int count = 0;
+  for (int v = 0; v < view.picture.rows && !box.isEmpty(); v += kBelowStep) {
+    for (int u = 0; u < view.picture.cols; u += kBelowStep) {
+      if (view.labels.at<std::uint8_t>(v, u) != 0) continue;
+      const auto receiver = receiverAt(planes, view.camera, u, v);
+      if (!receiver || (receiver->position - box.center()).norm() > kAround * box.diagonal().norm())
+        continue;
+      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v, u);
+      for (int c = 0; c < 3; ++c) sum[c] += linearFromRealCode(code[c]);
+      ++count;
+    }
+  }
+  const double mean = (sum[0] + sum[1] + sum[2]) / 3.0;
+  if (count < kFewestBelow || !(mean > kDarkest * count)) return {1.0f, 1.0f, 1.0f};
+  return cv::Vec3f(sum / mean);
 }
 
 RayScene sceneOf(const View& view) {
@@ -139,6 +166,7 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
                             const cv::Mat& depth) {
   LightEvidence evidence;
   evidence.samples = lightSamples(views, moves, evidence.clusters);
+  evidence.below = colourBelow(views.front(), planes);
   const auto scenes = std::make_shared<std::vector<RayScene>>();
   for (const View& view : views) scenes->push_back(sceneOf(view));
   evidence.visible = [scenes](const LightSample& s, const Eigen::Vector3f& l) {

@@ -85,9 +85,12 @@ class Search {
     ClusterSums sums(evidence_.clusters);
     for (const LightSample& x : samples_) {
       const float cosine = x.normal.dot(l);
-      const double s = cosine > 0.0f ? cosine * (visible ? visible(x, l) : 1.0f) : 0.0f;
-      const double p = x.sky * (1.0 + kSkyGradient * x.normal.dot(up_));
+      const GreyLight around = greyLight(x.seen, up_, l);
+      const double s =
+          (cosine > 0.0f ? cosine * (visible ? visible(x, l) : 1.0f) : 0.0f) + around.sun;
       for (int c = 0; c < 3; ++c) {
+        const double p =
+            around.even + (1.0 - (1.0 - kSkyGradient) * evidence_.below[c]) * around.lean;
         LineSums& m = sums[x.cluster][c];
         const double i = x.radiance[c];
         m.n += 1, m.i += i, m.pp += p * p, m.ps += p * s, m.ss += s * s, m.ip += i * p,

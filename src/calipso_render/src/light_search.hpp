@@ -6,8 +6,8 @@
 
 namespace calipso::render {
 
-// A direction of the sun with the light I = a (ambient (1 + kSkyGradient n.up) + sun max(0, n.l))
-// that fits best under it.
+// A direction of the sun with the light I = a (ambient (1 + g n.up) + sun max(0, n.l)) that fits
+// best under it; 1 - g = (1 - kSkyGradient) LightEvidence::below.
 struct LightCandidate {
   Eigen::Vector3f direction;
   double misfit = 0.0;  // minus a log-likelihood of shading and cast shadows
@@ -21,7 +21,19 @@ struct LightCandidate {
 std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
                                         std::size_t count);
 
-// Ambient light's assumed profile: 1 + kSkyGradient n.up.
+// Ambient light's assumed profile, where what lies below is grey: 1 + kSkyGradient n.up.
 inline constexpr float kSkyGradient = 0.45f;
+
+// What reaches a point of a grey object under a unit of ambient light of profile 1 + g n.up,
+// even + g lean, and of a unit of sunlight by way of the object.
+struct GreyLight {
+  double even, lean, sun;
+};
+inline GreyLight greyLight(const SkySeen& seen, const Eigen::Vector3f& up,
+                           const Eigen::Vector3f& to_sun) {
+  return {seen.open + kThrownBack * seen.thrown,
+          (seen.towards + kThrownBack * seen.thrown_towards).dot(up),
+          kThrownBack * sunThrown(seen, to_sun)};
+}
 
 }  // namespace calipso::render

@@ -141,7 +141,7 @@ cv::Vec3f mirroredRadiance(const Appearance& appearance, const Light& light, con
   const cv::Vec3f albedo = (look.albedo ? *look.albedo : appearance.albedoAt(point))
                                .mul(look.tint.value_or(cv::Vec3f(1, 1, 1)));
   return appearance.radiance(
-      albedo, diffuseShading(light, point.normal, 1.0f, point.sky, appearance.tint), {});
+      albedo, diffuseShading(light, point.normal, 1.0f, point.seen, appearance.thrown_back), {});
 }
 
 MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance& radiance,

@@ -51,6 +51,10 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
   if (!p.light.determined)
     p.remarks.push_back(
         "too little of the objects is seen to tell the light; it is assumed high and frontal");
+  if (p.light.determined && !p.light.confirmed())
+    p.remarks.push_back(
+        "neither a cast shadow nor a highlight confirms the light's direction, which shading alone "
+        "tells: it may be tens of degrees off; an edit 'light' sets it");
   if (p.light.determined && !p.light.seen_gloss)
     p.remarks.push_back(
         "no highlight is seen that tells the objects' gloss; it is what their shading leaves "

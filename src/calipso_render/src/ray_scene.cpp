@@ -3,22 +3,15 @@
 #include <embree3/rtcore.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string>
 
-#include "calipso_render/light.hpp"
-
 namespace calipso::render {
 namespace {
 
-constexpr float kGoldenAngle = 2.39996323f;
-constexpr float kLift = 1e-3f;      // of the scene's radius: rays start that far off the surface
-constexpr int kRayBudget = 120000;  // for the exposure of a whole mesh
-constexpr int kFewestRays = 12, kMostRays = 48;
+constexpr float kLift = 1e-3f;  // of the scene's radius: rays start that far off the surface
 
 // One single-threaded device for the process: the renderer's own loops use the cores.
 RTCDevice device() {
@@ -91,27 +84,22 @@ bool RayScene::blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& d) co
   return r.tfar < 0.0f;
 }
 
-std::vector<float> skyExposure(const Points& vertices, const Points& normals,
-                               const Triangles& triangles) {
-  const RayScene scene({{&vertices, &triangles}});
-  const int count = static_cast<int>(vertices.size());
-  const int rays = std::clamp(kRayBudget / std::max(1, count), kFewestRays, kMostRays);
-  std::vector<float> exposure(count, 1.0f);
-#pragma omp parallel for schedule(dynamic, 64)
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3f& n = normals[i];
-    if (n.squaredNorm() < 0.5f) continue;
-    const Eigen::Vector3f s = n.unitOrthogonal(), t = n.cross(s);
-    int hits = 0;
-    // Evenly spread over the disc below the hemisphere: the cosine weighs by itself (Malley).
-    for (int k = 0; k < rays; ++k) {
-      const float r2 = (k + 0.5f) / rays, r = std::sqrt(r2), a = k * kGoldenAngle;
-      hits += scene.blocked(vertices[i], n,
-                            r * std::cos(a) * s + r * std::sin(a) * t + std::sqrt(1.0f - r2) * n);
-    }
-    exposure[i] = 1.0f - (1.0f - kThrownBack) * hits / rays;
-  }
-  return exposure;
+std::optional<RayScene::Hit> RayScene::hit(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
+                                           const Eigen::Vector3f& d) const {
+  if (!handle_) return std::nullopt;
+  const Eigen::Vector3f from = p + n * (kLift * radius_);
+  RTCRayHit r{};
+  r.ray.org_x = from.x(), r.ray.org_y = from.y(), r.ray.org_z = from.z();
+  r.ray.dir_x = d.x(), r.ray.dir_y = d.y(), r.ray.dir_z = d.z();
+  r.ray.tnear = 0.0f, r.ray.tfar = std::numeric_limits<float>::infinity(), r.ray.mask = ~0u;
+  r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(handle_->scene, &context, &r);
+  if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  const Eigen::Vector3f normal(r.hit.Ng_x, r.hit.Ng_y, r.hit.Ng_z);
+  return Hit{static_cast<int>(r.hit.geomID), static_cast<int>(r.hit.primID), r.hit.u, r.hit.v,
+             normal.dot(d) > 0.0f};
 }
 
 }  // namespace calipso::render

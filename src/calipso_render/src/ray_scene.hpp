@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "calipso_render/visibility.hpp"
@@ -23,6 +24,15 @@ class RayScene {
   // The same from exactly here.
   bool blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& d) const;
 
+  // Where a ray meets a surface first.
+  struct Hit {
+    int mesh, triangle;
+    float v, w;   // weights of the triangle's second and third corner
+    bool behind;  // on the side from which its corners run clockwise
+  };
+  std::optional<Hit> hit(const Eigen::Vector3f& p, const Eigen::Vector3f& n,
+                         const Eigen::Vector3f& d) const;
+
   bool empty() const { return !handle_; }
 
  private:
@@ -31,10 +41,5 @@ class RayScene {
   Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();
   float radius_ = 0.0f;  // m, of a ball around everything
 };
-
-// Part of the sky that each vertex of a mesh sees past the mesh itself, weighted by the cosine,
-// plus what the mesh throws back of the rest. 0..1.
-std::vector<float> skyExposure(const Points& vertices, const Points& normals,
-                               const Triangles& triangles);
 
 }  // namespace calipso::render

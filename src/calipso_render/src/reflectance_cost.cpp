@@ -17,16 +17,18 @@ bool ReflectanceCost::Evaluate(double const* const* parameters, double* residual
   const double g = parameters[3][0], ks = std::exp(parameters[5][0]),
                m = std::exp(parameters[5][1]);
   const Eigen::Array3d a = Map(parameters[4]).array().exp();
-  const double nl = std::max(0.0, s_.normal.dot(l)), height = s_.normal.dot(s_.up);
+  const double nl = std::max(0.0, s_.normal.dot(l));
   const Lobe T = torranceSparrowLobe(s_.normal, l, s_.view, m);
 
   const double nv = s_.normal.dot(s_.view),
                mirrored_height = (2.0 * nv * s_.normal - s_.view).dot(s_.up);
-  const double mirrored = ks * s_.sky * grazing(static_cast<float>(nv));
+  const double mirrored = ks * s_.even * grazing(static_cast<float>(nv));
 
-  const Eigen::Array3d ambient = A * (s_.sky * (1.0 + g * height)), sun = L * (s_.visible * nl);
+  const Eigen::Array3d more = A - (1.0 - g) * A.mean() * s_.below;  // D
+  const Eigen::Array3d ambient = A * s_.even + more * s_.lean,
+                       sun = L * (s_.visible * nl + s_.thrown_sun);
   const Eigen::Array3d highlight = ks * T.value * s_.visible * L,
-                       surroundings = A * (mirrored * (1.0 + g * mirrored_height));
+                       surroundings = mirrored * (A + more * mirrored_height);
   Column r(residuals);
   r = (a * (ambient + sun) + highlight + surroundings - s_.radiance.array()) / s_.scale;
   if (jacobians == nullptr) return true;
@@ -37,9 +39,12 @@ bool ReflectanceCost::Evaluate(double const* const* parameters, double* residual
     Square J(jacobians[0]);
     J = (per_sun.array() * a).matrix() * dnl.transpose() + ks * per_sun * T.by_light.transpose();
   }
+  const Eigen::Array3d by_more = a * s_.lean + mirrored * mirrored_height;
   if (jacobians[1] != nullptr) {
     Square J(jacobians[1]);
-    J = Eigen::Matrix3d(((a * ambient + surroundings) / s_.scale).matrix().asDiagonal());
+    const Eigen::Array3d own = A * (a * s_.even + mirrored + by_more);
+    J = Eigen::Matrix3d((own / s_.scale).matrix().asDiagonal());
+    J -= ((1.0 - g) / 3.0 / s_.scale * by_more * s_.below).matrix() * A.matrix().transpose();
   }
   if (jacobians[2] != nullptr) {
     Square J(jacobians[2]);
@@ -47,7 +52,7 @@ bool ReflectanceCost::Evaluate(double const* const* parameters, double* residual
   }
   if (jacobians[3] != nullptr) {
     Column J(jacobians[3]);
-    J = A * (a * (s_.sky * height) + mirrored * mirrored_height) / s_.scale;
+    J = by_more * A.mean() * s_.below / s_.scale;
   }
   if (jacobians[4] != nullptr) {
     Square J(jacobians[4]);

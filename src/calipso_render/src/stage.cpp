@@ -1,11 +1,12 @@
 #include "calipso_render/stage.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "mesh_topology.hpp"
-#include "ray_scene.hpp"
+#include "sky_seen.hpp"
 
 namespace calipso::render {
 
@@ -57,15 +58,53 @@ Surface makeSurface(const ObjectModel& model) {
   surface.winding = outsideWinding(surface.object_vertices, surface.triangles);
   surface.key_vertices = transformed(surface.object_vertices, model.world_from_object);
   surface.key_normals = vertexNormals(surface.key_vertices, surface.triangles);
-  surface.sky = skyExposure(surface.key_vertices, surface.key_normals, surface.triangles);
+  findSkySeen(surface.key_vertices, surface.key_normals, surface.triangles, surface.winding != 1,
+              surface.seen, surface.seen_behind);
   return surface;
 }
+
+namespace {
+
+// The turn that takes one set of points best to another (Kabsch 1976).
+Eigen::Matrix3f turnBetween(const Points& from, const Points& to) {
+  if (from == to) return Eigen::Matrix3f::Identity();
+  Eigen::Vector3d from_mean = Eigen::Vector3d::Zero(), to_mean = from_mean;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    from_mean += from[i].cast<double>(), to_mean += to[i].cast<double>();
+  from_mean /= static_cast<double>(from.size()), to_mean /= static_cast<double>(from.size());
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < from.size(); ++i)
+    products += (to[i].cast<double>() - to_mean) * (from[i].cast<double>() - from_mean).transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d U = svd.matrixU(), V = svd.matrixV();
+  const double side = (U * V.transpose()).determinant() < 0.0 ? -1.0 : 1.0;
+  return (U * Eigen::Vector3d(1.0, 1.0, side).asDiagonal() * V.transpose()).cast<float>();
+}
+
+// What the vertices see, turned with their object and then as their normals are beside it.
+void turnSeen(const Surface& surface, Actor& actor) {
+  const Eigen::Matrix3f turn = turnBetween(surface.key_vertices, actor.vertices);
+  actor.seen = surface.seen, actor.seen_behind = surface.seen_behind;
+  constexpr float kSame = 0.9998f;  // cosine: about a degree
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < actor.seen.size(); ++i) {
+    const Eigen::Vector3f n = turn * surface.key_normals[i];
+    Eigen::Matrix3f by = turn;
+    if (n.dot(actor.normals[i]) < kSame)
+      by = Eigen::Quaternionf::FromTwoVectors(n, actor.normals[i]).toRotationMatrix() * turn;
+    actor.seen[i] = actor.seen[i].turned(by);
+    if (!actor.seen_behind.empty()) actor.seen_behind[i] = actor.seen_behind[i].turned(by);
+  }
+}
+
+}  // namespace
 
 Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
   Actor actor;
   actor.surface = &surface;
   actor.vertices = std::move(vertices);
   actor.normals = vertexNormals(actor.vertices, surface.triangles);
+  if (actor.vertices.size() == surface.seen.size()) turnSeen(surface, actor);
   actor.screen = projectMesh(actor.vertices, surface.triangles, camera);
   const auto behind = [](const Eigen::Vector3f& p) { return std::isnan(p.z()); };
   const bool around_us =
@@ -106,13 +145,14 @@ SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3
   const Eigen::Vector3i& t = actor.surface->triangles[triangle];
   const Eigen::Vector3f position = mix(actor.vertices, t, w),
                         normal = unit(mix(actor.normals, t, w));
-  const std::vector<float>& sky = actor.surface->sky;
   const float side = seenFromBehind(actor, t, position, normal, eye) ? -1.0f : 1.0f;
+  const std::vector<SkySeen>& seen =
+      side < 0.0f && !actor.seen_behind.empty() ? actor.seen_behind : actor.seen;
   return {position,
           side * normal,
           mix(actor.surface->key_vertices, t, w),
           side * unit(mix(actor.surface->key_normals, t, w)),
-          w[0] * sky[t[0]] + w[1] * sky[t[1]] + w[2] * sky[t[2]],
+          seen[t[0]] * w[0] + seen[t[1]] * w[1] + seen[t[2]] * w[2],
           triangle,
           w};
 }

@@ -30,7 +30,8 @@ struct StretchWeights {
   alignas(32) float w[SurfaceRun::kRoom], sum[SurfaceRun::kRoom];
 };
 
-// The triangles' linear functions at a stretch's pixels: key places, normals and sky up to a factor.
+// The triangles' linear functions at a stretch's pixels: key places, normals, sky and ambient
+// light up to a factor.
 // @return the triangles' traits, of any of them
 CALIPSO_INLINE unsigned evaluateMaps(const TriangleMap* maps, const std::uint32_t* ids,
                                      const PixelStretch& at, const SightLines& sight,
@@ -42,8 +43,10 @@ CALIPSO_INLINE unsigned evaluateMaps(const TriangleMap* maps, const std::uint32_
     traits |= map.traits;
     const float dv = static_cast<float>(at.v) - map.v;
     const Four key = fourAt(map.key[0]) + fourAt(map.key[2]) * dv,
-               normal = fourAt(map.normal[0]) + fourAt(map.normal[2]) * dv;
-    const float *key_rise = map.key[1], *normal_rise = map.normal[1];
+               normal = fourAt(map.normal[0]) + fourAt(map.normal[2]) * dv,
+               ambient = fourAt(map.ambient[0]) + fourAt(map.ambient[2]) * dv;
+    const float *key_rise = map.key[1], *normal_rise = map.normal[1],
+                *ambient_rise = map.ambient[1];
     int seen;  // of eight pixels
     do {
       const int to = at.offset + k;
@@ -57,6 +60,7 @@ CALIPSO_INLINE unsigned evaluateMaps(const TriangleMap* maps, const std::uint32_
       if (map.is(TriangleMap::kTurned)) turnToViewer(sight, column, n);
       for (int c = 0; c < 3; ++c) eightAt(run.normal[c] + to) = n[c];
       eightAt(run.sky + to) = normal[3] + normal_rise[3] * du;
+      for (int c = 0; c < 3; ++c) eightAt(run.ambient[c] + to) = ambient[c] + ambient_rise[c] * du;
       seen = leadingLanes(*reinterpret_cast<const EightInts*>(ids + k) ==
                           static_cast<std::int32_t>(id));
       k += seen;
@@ -77,7 +81,9 @@ CALIPSO_INLINE unsigned locateBody(const TriangleMap* maps, const std::uint32_t*
                 inverse = 1.0f / (w * sum), scale = sum * inverse;
     eightAt(run.key_u + k) = eightAt(run.key_u + k) * scale - left;
     eightAt(run.key_v + k) = eightAt(run.key_v + k) * scale - top;
-    eightAt(run.sky + k) = eightAt(run.sky + k) * (w * inverse);
+    const Eight linear = w * inverse;
+    eightAt(run.sky + k) = eightAt(run.sky + k) * linear;
+    for (int c = 0; c < 3; ++c) eightAt(run.ambient[c] + k) = eightAt(run.ambient[c] + k) * linear;
     for (int c = 0; c < 3; ++c)
       eightAt(run.sight[c] + k) = sight.start[c] + sight.rise[c] * eightAt(run.column + k);
     Eight n[3] = {eightAt(run.normal[0] + k), eightAt(run.normal[1] + k),
@@ -133,17 +139,14 @@ CALIPSO_INLINE void shadeEight(const SurfaceShade& s, int k, SurfaceRun& run) {
   const Eight sky = eightAt(run.sky + k), sun = eightAt(run.sun + k);
   const Eight n_l =
       larger(n[0] * s.direction[0] + n[1] * s.direction[1] + n[2] * s.direction[2], Eight{});
-  Eight second[5];
-  if (s.terms > 4) secondBand(n, second);
   Eight out[3];
   const Eight sunlit = n_l * sun;
   for (int c = 0; c < 3; ++c) {
-    const Eight diffuse =
-        ambientBody(s, c, n, second) * (sky + s.thrown_back[c] * (1.0f - sky)) + s.sun[c] * sunlit;
+    const Eight diffuse = eightAt(run.ambient[c] + k) + s.sun[c] * sunlit;
     out[c] = eightAt(run.colour[c] + k) * s.tint[c] * (diffuse + s.floor[c]);
   }
   if (s.specular > 0.0f) {
-    Eight view[3], mirrored[3], n_v{};
+    Eight view[3], mirrored[3], second[5], n_v{};
     for (int c = 0; c < 3; ++c) view[c] = -eightAt(run.sight[c] + k);
     normalise(view);
     for (int c = 0; c < 3; ++c) n_v += n[c] * view[c];

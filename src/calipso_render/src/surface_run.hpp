@@ -12,7 +12,8 @@ struct SurfaceRun {
   alignas(32) float column[kRoom];               // of the picture
   alignas(32) float sight[3][kRoom];             // along the way from the eye to it, world
   alignas(32) float normal[3][kRoom];            // unit, faces the viewer
-  alignas(32) float sky[kRoom];                  // Surface::sky
+  alignas(32) float sky[kRoom];                  // skyMirrored()
+  alignas(32) float ambient[3][kRoom];           // ambientOn(); B, G, R
   alignas(32) float sun[kRoom];                  // visible part of it
   alignas(32) float key_u[kRoom], key_v[kRoom];  // place in Appearance::albedo
   alignas(32) float colour[3][kRoom];            // reflectance, then linear radiance; B, G, R
@@ -38,13 +39,12 @@ struct PixelStretch {
   cv::Point corner;  // of Appearance::albedo in the key picture
 };
 
-// The light on an object, and what its look makes of it: diffuseShading(), specularShading() and
+// The light on an object, and what its look makes of it: specularShading() and
 // Appearance::radiance() for loops over many points.
 struct SurfaceShade {
   float direction[3], sun[3];
   float ambient[9][3], least[3];
   int terms;  // of the harmonics: 1, 4 or 9
-  float thrown_back[3];
   float specular, roughness;
   float floor[3], tint[3];
 };

@@ -47,8 +47,10 @@ struct WeldedValues {
   }
 };
 
-// Graph Laplacian with a weak pull to the mean. @return one row per unknown
-Eigen::MatrixXd harmonicValues(const WeldedValues& welded, const Triangles& triangles) {
+// Graph Laplacian with a weak pull to the mean and one to the value far away. @return one row per
+// unknown
+Eigen::MatrixXd smoothValues(const WeldedValues& welded, const Points& vertices,
+                             const Triangles& triangles, const std::optional<FarValue>& far) {
   std::vector<Eigen::Triplet<double>> entries;
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(welded.rows, 3);
   if (welded.rows == 0) return right;
@@ -59,7 +61,11 @@ Eigen::MatrixXd harmonicValues(const WeldedValues& welded, const Triangles& tria
   const auto link = [&](int a, int b) {
     const int row = welded.row[a], other = welded.row[b];
     if (row < 0) return;
-    entries.emplace_back(row, row, 1.0);
+    // Two links along each of a vertex' six edges of length e stand for 3 e^2 times the Laplacian.
+    const double e = (vertices[a] - vertices[b]).norm(),
+                 pull = far ? 0.25 * e * e / (far->reach * far->reach) : 0.0;
+    entries.emplace_back(row, row, 1.0 + pull);
+    for (int c = 0; c < 3 && far; ++c) right(row, c) += pull * far->value[c];
     if (other >= 0)
       entries.emplace_back(row, other, -1.0);
     else
@@ -123,16 +129,17 @@ cv::Vec4f SurfaceTexture::at(int triangle, const Eigen::Vector3f& weights) const
     cv::v_store(out.val,
                 times(index(i, j, n), 1.0f - fx - fy) + times(right, fx) + times(below, fy));
   } else {
-    cv::v_store(out.val, times(index(i + 1, j + 1, n), fx + fy - 1.0f) +
-                             times(right, 1.0f - fy) + times(below, 1.0f - fx));
+    cv::v_store(out.val, times(index(i + 1, j + 1, n), fx + fy - 1.0f) + times(right, 1.0f - fy) +
+                             times(below, 1.0f - fx));
   }
   return out;
 }
 
 void diffuseOverMesh(const Points& vertices, const Triangles& triangles,
-                     const std::vector<bool>& known, std::vector<cv::Vec3f>& values) {
+                     const std::vector<bool>& known, std::vector<cv::Vec3f>& values,
+                     const std::optional<FarValue>& far) {
   const WeldedValues welded(vertices, known, values);
-  const Eigen::MatrixXd x = harmonicValues(welded, triangles);
+  const Eigen::MatrixXd x = smoothValues(welded, vertices, triangles, far);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (known[i]) continue;
     const int place = welded.place[i], r = welded.row[place];

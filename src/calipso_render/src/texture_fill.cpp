@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "calipso_render/surface_symmetry.hpp"
@@ -34,6 +35,9 @@ constexpr float kAskew = 0.6f,
 constexpr float kQuarter = 0.25f * static_cast<float>(M_PI);
 constexpr float kTurns[] = {
     0.0f, 0.5f, -0.5f};  // rad: middles of the part of a body of revolution that others repeat
+// of the extent: within it what is not seen goes over from the seen around it to the common colour
+constexpr float kFromSeen = 0.1f;
+constexpr std::size_t kLookedAt = 300;       // texels, for that
 const cv::Vec3f kUnknown(0.3f, 0.3f, 0.3f);  // reflectance of an object that no picture shows
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
@@ -279,7 +283,35 @@ class TextureFill {
     add(front, smoothStep(0.0f, kGood, front.weight));
   }
 
-  // What no picture shows, or none for certain, continues the surface around it.
+  // The reflectance that most of what is known has: that of the texel nearest to all others, with
+  // the quarter of them that is most like it.
+  static cv::Vec3f commonColour(const std::vector<float>& certain, const SurfaceTexture& texture) {
+    std::vector<cv::Vec3f> known, some;
+    for (std::size_t i = 0; i < certain.size(); ++i) {
+      if (certain[i] >= 1.0f) known.push_back(colourOf(texture.texels[i]));
+    }
+    if (known.empty()) return kUnknown;
+    const std::size_t step = (known.size() + kLookedAt - 1) / kLookedAt;
+    for (std::size_t i = 0; i < known.size(); i += step) some.push_back(known[i]);
+    const auto away = [](const cv::Vec3f& a, const cv::Vec3f& b) { return cv::norm(a - b); };
+    cv::Vec3f middle;
+    double least = 1e30;
+    for (const cv::Vec3f& a : some) {
+      double sum = 0.0;
+      for (const cv::Vec3f& b : some) sum += away(a, b);
+      if (sum < least) least = sum, middle = a;
+    }
+    const std::size_t quarter = (some.size() + 3) / 4;
+    std::sort(some.begin(), some.end(), [&](const cv::Vec3f& a, const cv::Vec3f& b) {
+      return away(a, middle) < away(b, middle);
+    });
+    return std::accumulate(some.begin(), some.begin() + quarter, cv::Vec3f()) *
+           (1.0f / static_cast<float>(quarter));
+  }
+
+  // What no picture shows, or none for certain, continues the surface around it, and goes over to
+  // what the object is like on the whole: the rim of what is seen is seen flatly, with the sky and
+  // the background in it.
   void fillUnseen(const std::vector<float>& certain, SurfaceTexture& texture) const {
     const Triangles& triangles = surface_.triangles;
     std::vector<cv::Vec3f> values(surface_.key_vertices.size());
@@ -302,7 +334,8 @@ class TextureFill {
     if (most == 0.0f)
       std::fill(values.begin(), values.end(), kUnknown);
     else
-      diffuseOverMesh(surface_.key_vertices, triangles, known, values);
+      diffuseOverMesh(surface_.key_vertices, triangles, known, values,
+                      FarValue{commonColour(certain, texture), kFromSeen * extent_});
     for (int t = 0; t < texture.triangleCount(); ++t) {
       for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
         if (certain[i] >= 1.0f) continue;

@@ -21,16 +21,20 @@ float areaOf(const Eigen::Vector3f (&p)[3]) {
          (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
 }
 
-// @param keys, normals of the corners, four values each
+// What a corner of a triangle has, four values each.
+struct Corner {
+  const float *key, *normal, *sky, *ambient;
+};
+
 // @return false if it is too thin
-bool fill(const Eigen::Vector3f (&p)[3], const float* const (&keys)[3],
-          const float* const (&normals)[3], TriangleMap& map) {
+bool fill(const Eigen::Vector3f (&p)[3], const Corner (&corners)[3], TriangleMap& map) {
   const float area = areaOf(p);
   const float longest =
       std::max({(p[1] - p[0]).head<2>().squaredNorm(), (p[2] - p[1]).head<2>().squaredNorm(),
                 (p[0] - p[2]).head<2>().squaredNorm()});
   map.u = p[0].x(), map.v = p[0].y();
-  std::fill_n(&map.key[0][0], 12, 0.0f), std::fill_n(&map.normal[0][0], 12, 0.0f);
+  std::fill_n(&map.key[0][0], 12, 0.0f), std::fill_n(&map.normal[0][0], 12, 0.0f),
+      std::fill_n(&map.ambient[0][0], 12, 0.0f);
   if (!(area * area > kThinnest * kThinnest * longest)) return false;
   const float scale = 1.0f / (area * p[0].z());
   for (int i = 0; i < 3; ++i) {
@@ -38,8 +42,10 @@ bool fill(const Eigen::Vector3f (&p)[3], const float* const (&keys)[3],
     const float factor = p[i].z() * scale;
     const float edge[3] = {i == 0 ? area * factor : 0.0f, (a.y() - b.y()) * factor,
                            (b.x() - a.x()) * factor};
-    addCorner(map.key, edge, cv::v_load(keys[i]));
-    addCorner(map.normal, edge, cv::v_load(normals[i]));
+    const Corner& corner = corners[i];
+    addCorner(map.key, edge, cv::v_load(corner.key));
+    addCorner(map.normal, edge, cv::v_load(corner.normal) + cv::v_load(corner.sky));
+    addCorner(map.ambient, edge, cv::v_load(corner.ambient));
   }
   return true;
 }
@@ -64,12 +70,13 @@ bool isTurned(const Actor& actor, const Eigen::Vector3i& t, const Eigen::Vector3
 
 }  // namespace
 
-SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance,
+SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const Light& light,
                          const Eigen::Vector3f& eye)
     : actor_(&actor),
       corner_(appearance.region.tl()),
       vertices_(actor.vertices.size()),
       triangles_(new TriangleMap[actor.surface->triangles.size()]) {
+  findAround(appearance, light);
   const Triangles& triangles = actor.surface->triangles;
   const Camera& c = appearance.key_camera;
   const Eigen::Isometry3f camera_from_world = c.world_from_camera.inverse().cast<float>();
@@ -81,7 +88,7 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance,
                             sight = actor.vertices[i] - eye, &n = actor.normals[i];
       vertices_[i] = {
           {sight.x(), sight.y(), sight.z(), 0.0f},
-          {n.x(), n.y(), n.z(), actor.surface->sky[i]},
+          {n.x(), n.y(), n.z(), 0.0f},
           {static_cast<float>(c.fx) * q.x() + static_cast<float>(c.cx) * q.z(),
            static_cast<float>(c.fy) * q.y() + static_cast<float>(c.cy) * q.z(), q.z(), 1.0f}};
     }
@@ -92,14 +99,30 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance,
       for (int i = 0; i < 3; ++i) p[i] = actor.screen.points[corners[i]];
       triangles_[t].traits = TriangleMap::kThin;
       if (actor.screen.hides(areaOf(p))) continue;
-      const Vertex &a = vertices_[corners[0]], &b = vertices_[corners[1]],
-                   &d = vertices_[corners[2]];
       triangles_[t].traits = traitsOf(appearance.sources[t]);
-      if (!fill(p, {a.key, b.key, d.key}, {a.normal, b.normal, d.normal}, triangles_[t]))
-        triangles_[t].traits |= TriangleMap::kThin;
       if (isTurned(actor, corners, eye)) triangles_[t].traits |= TriangleMap::kTurned;
+      const std::vector<Around>& around = aroundOf(static_cast<int>(t));
+      const auto corner = [&](int i) -> Corner {
+        const Vertex& x = vertices_[corners[i]];
+        return {x.key, x.normal, around[corners[i]].sky, around[corners[i]].light};
+      };
+      if (!fill(p, {corner(0), corner(1), corner(2)}, triangles_[t]))
+        triangles_[t].traits |= TriangleMap::kThin;
     }
   }
+}
+
+void SurfaceMaps::findAround(const Appearance& appearance, const Light& light) {
+  const auto find = [&](const std::vector<SkySeen>& seen, std::vector<Around>& around) {
+    around.resize(seen.size());
+#pragma omp parallel for schedule(static)
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const cv::Vec3f ambient = ambientOn(light, seen[i], appearance.thrown_back);
+      around[i] = {{ambient[0], ambient[1], ambient[2], 0.0f},
+                   {0.0f, 0.0f, 0.0f, skyMirrored(seen[i])}};
+    }
+  };
+  find(actor_->seen, around_), find(actor_->seen_behind, around_behind_);
 }
 
 void SurfaceMaps::locate(const SurfacePlace* places, int count, SurfaceRun& run,
@@ -114,16 +137,20 @@ void SurfaceMaps::locate(const SurfacePlace* places, int count, SurfaceRun& run,
       return cv::v_setall_f32(w[0]) * cv::v_load(x) + cv::v_setall_f32(w[1]) * cv::v_load(y) +
              cv::v_setall_f32(w[2]) * cv::v_load(z);
     };
-    float sight[4], normal[4], key[4];
+    const std::vector<Around>& around = aroundOf(triangle);
+    const Around &d = around[t[0]], &e = around[t[1]], &f = around[t[2]];
+    float sight[4], normal[4], key[4], ambient[4];
     cv::v_store(sight, mix(a.sight, b.sight, c.sight)),
         cv::v_store(normal, mix(a.normal, b.normal, c.normal)),
-        cv::v_store(key, mix(a.key, b.key, c.key));
+        cv::v_store(key, mix(a.key, b.key, c.key)),
+        cv::v_store(ambient, mix(d.light, e.light, f.light));
     const Eigen::Map<const Eigen::Vector3f> n(normal), s(sight);
     const float length = n.norm(),
                 away = n.dot(s) > 0.0f && triangles_[triangle].is(TriangleMap::kTurned) ? -1 : 1,
                 scale = length > 0.0f ? away / length : 0.0f;
     for (int i = 0; i < 3; ++i) run.sight[i][k] = s[i], run.normal[i][k] = n[i] * scale;
-    run.sky[k] = normal[3];
+    for (int i = 0; i < 3; ++i) run.ambient[i][k] = ambient[i];
+    run.sky[k] = w[0] * d.sky[3] + w[1] * e.sky[3] + w[2] * f.sky[3];
     run.key_u[k] = key[0] / key[2] - static_cast<float>(corner_.x);
     run.key_v[k] = key[1] / key[2] - static_cast<float>(corner_.y);
   }

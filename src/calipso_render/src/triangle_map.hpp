@@ -11,8 +11,8 @@
 namespace calipso::render {
 
 // What the pixels of a drawn triangle show, linear in the picture, each up to the same factor: the
-// place in the key frame's picture, homogeneous; the normal with the sky that is seen. Counted from
-// the triangle's first corner, where single precision is exact.
+// place in the key frame's picture, homogeneous; the normal with the sky that it mirrors; the
+// ambient light. Counted from the triangle's first corner, where single precision is exact.
 struct alignas(16) TriangleMap {
   enum Trait : std::uint8_t {
     kThin = 1,      // too thin for single precision, or never seen
@@ -21,9 +21,10 @@ struct alignas(16) TriangleMap {
     kTextured = 8   // ... the texture, or both
   };
 
-  float key[3][4];     // at the corner, per column, per row; x, y, w, sum of the weights
-  float normal[3][4];  // likewise; world, sky
-  float u, v;          // the corner, px
+  float key[3][4];      // at the corner, per column, per row; x, y, w, sum of the weights
+  float normal[3][4];   // likewise; world, sky
+  float ambient[3][4];  // likewise; B, G, R, 0
+  float u, v;           // the corner, px
   std::uint8_t traits;
 
   bool is(Trait trait) const { return (traits & trait) != 0; }
@@ -39,7 +40,8 @@ struct SurfacePlace {
 class SurfaceMaps {
  public:
   SurfaceMaps() = default;
-  SurfaceMaps(const Actor& actor, const Appearance& appearance, const Eigen::Vector3f& eye);
+  SurfaceMaps(const Actor& actor, const Appearance& appearance, const Light& light,
+              const Eigen::Vector3f& eye);
 
   const TriangleMap* triangles() const { return triangles_.get(); }
   const TriangleMap& of(int triangle) const { return triangles_[triangle]; }
@@ -52,13 +54,25 @@ class SurfaceMaps {
  private:
   struct alignas(16) Vertex {
     float sight[4];   // from the eye, m, 0
-    float normal[4];  // world, sky
+    float normal[4];  // world, 0
     float key[4];     // place in the key picture, homogeneous, 1
   };
+  // What a side of a vertex gets of ambient light.
+  struct alignas(16) Around {
+    float light[4];  // B, G, R, 0
+    float sky[4];    // 0, 0, 0, sky
+  };
+
+  void findAround(const Appearance& appearance, const Light& light);
+  const std::vector<Around>& aroundOf(int triangle) const {
+    const bool behind = of(triangle).is(TriangleMap::kTurned) && !around_behind_.empty();
+    return behind ? around_behind_ : around_;
+  }
 
   const Actor* actor_ = nullptr;
   cv::Point corner_;  // Appearance::region's
   std::vector<Vertex> vertices_;
+  std::vector<Around> around_, around_behind_;  // the latter as Actor::seen_behind
   std::unique_ptr<TriangleMap[]> triangles_;
 };
 

@@ -54,7 +54,8 @@ SurfaceRun randomRun(cv::RNG& random) {
   for (int k = 0; k < SurfaceRun::kRoom; ++k) {
     for (int c = 0; c < 3; ++c)
       run.sight[c][k] = random.uniform(-2.0f, 2.0f), run.colour[c][k] = random.uniform(0.0f, 1.0f),
-      run.normal[c][k] = random.uniform(-1.0f, 1.0f);
+      run.normal[c][k] = random.uniform(-1.0f, 1.0f),
+      run.ambient[c][k] = random.uniform(0.0f, 1.0f);
     const Eigen::Vector3f n =
         Eigen::Vector3f(run.normal[0][k], run.normal[1][k], run.normal[2][k]).normalized();
     for (int c = 0; c < 3; ++c) run.normal[c][k] = n[c];
@@ -79,7 +80,6 @@ SurfaceShade shadeOf(const Light& light, int terms, float specular) {
                      {},
                      {},
                      terms,
-                     {0.1f, 0.0f, -0.1f},
                      specular,
                      0.3f,
                      {0.02f, 0.02f, 0.03f},
@@ -255,7 +255,7 @@ TEST(Kernels, SampleAsSampleBicubic) {
 }
 
 // Against the formulas point by point; the exponential's error is the largest.
-TEST(Kernels, ShadeAsDiffuseAndSpecularShading) {
+TEST(Kernels, ShadeAsSpecularShadingAndWhatIsDiffuse) {
   cv::RNG random(5);
   for (const int terms : {1, 4, 9}) {
     const Light light = someLight(terms);
@@ -268,9 +268,9 @@ TEST(Kernels, ShadeAsDiffuseAndSpecularShading) {
         return Eigen::Vector3f(x[0][i], x[1][i], x[2][i]);
       };
       const Eigen::Vector3f n = at(run.normal), view = -at(run.sight).normalized();
-      const cv::Vec3f diffuse =
-          diffuseShading(light, n, run.sun[i], run.sky[i],
-                         {shade.thrown_back[0], shade.thrown_back[1], shade.thrown_back[2]});
+      const Eigen::Vector3f around = at(run.ambient);
+      const float lit = std::max(0.0f, n.dot(light.direction)) * run.sun[i];
+      const cv::Vec3f diffuse = cv::Vec3f(around.x(), around.y(), around.z()) + light.sun * lit;
       const cv::Vec3f highlight = specularShading(light, {shade.specular, shade.roughness}, n, view,
                                                   run.sun[i], run.sky[i]);
       for (int c = 0; c < 3; ++c) {

@@ -11,6 +11,7 @@
 #include "calipso_render/ray_shadow.hpp"
 #include "ray_scene.hpp"
 #include "reflectance_cost.hpp"
+#include "sky_seen.hpp"
 
 namespace calipso::render {
 namespace {
@@ -49,7 +50,8 @@ TEST(TorranceSparrow, LobeAgreesWithItsFloatTwin) {
 TEST(ReflectanceCost, DerivativesMatchDifferences) {
   ReflectanceCost::Sample s;
   s.normal = direction(0.2, -0.3, 0.9), s.view = direction(-0.3, -0.6, 0.7), s.up = kUp;
-  s.radiance = {0.2, 0.3, 0.4}, s.visible = 0.8, s.sky = 0.7, s.scale = 0.3;
+  s.radiance = {0.2, 0.3, 0.4}, s.visible = 0.8, s.scale = 0.3;
+  s.even = 0.7, s.lean = 0.4, s.thrown_sun = 0.05, s.below = {0.5, 1.0, 1.5};
   const ReflectanceCost cost(s);
   const int sizes[] = {3, 3, 3, 1, 3, 2};
   for (const double m : {0.15, 0.5}) {
@@ -103,7 +105,7 @@ std::vector<LightSample> ballSamples(const Eigen::Vector3f& sun) {
     const Eigen::Vector3f n(r * std::cos(a), r * std::sin(a), z);
     if (n.dot(view) < 0.2f) continue;
     const float shade = 0.3f * (1.0f + 0.45f * n.z()) + 0.6f * std::max(0.0f, n.dot(sun));
-    samples.push_back({n, n, view, cv::Vec3f(0.2f, 0.4f, 0.6f) * shade, 0});
+    samples.push_back({n, n, view, cv::Vec3f(0.2f, 0.4f, 0.6f) * shade, 0, SkySeen::all(n)});
   }
   return samples;
 }
@@ -117,6 +119,7 @@ TEST(FitLight, FindsTheSunOfABall) {
   EXPECT_GT(fit.light.direction.dot(sun),
             std::cos(2.0 * M_PI / 180.0));  // 2 degrees: the gloss prior's pull
   EXPECT_NEAR(fit.light.sun[1] / fit.light.ambient[0][1], 2.0f, 0.2f);
+  EXPECT_FALSE(fit.confirmed());  // by nothing but shading
 }
 
 // A shadow of known direction outweighs shading that says otherwise.
@@ -131,6 +134,7 @@ TEST(FitLight, BelievesCastShadows) {
   evidence.shadow_candidates = {Eigen::Vector3f(0.25f, -0.5f, 0.8f).normalized()};
   const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
   EXPECT_TRUE(fit.from_shadows);
+  EXPECT_TRUE(fit.confirmed());
   EXPECT_GT(fit.light.direction.dot(shadow),
             std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
 }
@@ -178,27 +182,82 @@ TEST(RefineAmbient, LeavesAnEvenSkyAsItIs) {
   EXPECT_EQ(fit.light.ambient[4], cv::Vec3f());
 }
 
-TEST(ThrownBackTint, IsOfTheSurfacesColourAndNoBrighter) {
-  EXPECT_LT(cv::norm(thrownBackTint({0.4f, 0.4f, 0.4f})), 1e-6);
-  const cv::Vec3f blue = thrownBackTint({0.5f, 0.3f, 0.1f});
-  EXPECT_GT(blue[0], 0.0f);
-  EXPECT_LT(blue[2], 0.0f);
-  EXPECT_NEAR(luminance(blue), 0.0f, 1e-6f);
-  EXPECT_LT(cv::norm(thrownBackTint({0, 0, 0})), 1e-6);
+TEST(ThrownBack, IsOfTheSurfacesColourAndNoBrighter) {
+  EXPECT_LT(cv::norm(thrownBack({0.4f, 0.4f, 0.4f}), cv::Vec3f::all(kThrownBack)), 1e-6);
+  const cv::Vec3f blue = thrownBack({0.5f, 0.3f, 0.1f});
+  EXPECT_GT(blue[0], kThrownBack);
+  EXPECT_LT(blue[2], kThrownBack);
+  EXPECT_NEAR(luminance(blue), kThrownBack, 1e-6f);
+  EXPECT_LT(cv::norm(thrownBack({0, 0, 0}), cv::Vec3f::all(kThrownBack)), 1e-6);
 }
 
-TEST(SkyExposure, IsFullOutsideAndLessInABox) {
-  // An open box: its floor sees part of the sky, its walls' outsides all of it.
-  const Points box = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0},  {-1, 1, 0}, {-1, -1, 2},
-                      {1, -1, 2},  {1, 1, 2},  {-1, 1, 2}, {0, 0, 0}};
-  const Triangles faces = {{8, 0, 1}, {8, 1, 2}, {8, 2, 3}, {8, 3, 0}, {0, 1, 5}, {0, 5, 4},
-                           {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
-  Points normals(box.size(), Eigen::Vector3f::UnitZ());
-  normals[4] = Eigen::Vector3f(-1, -1, 0).normalized();
-  const std::vector<float> sky = skyExposure(box, normals, faces);
-  EXPECT_FLOAT_EQ(sky[4], 1.0f);
-  EXPECT_LT(sky[8], 0.6f);  // form factor of the opening: 0.24, the rest partly thrown back
-  EXPECT_GT(sky[8], 0.3f);
+// An open box of 2 x 2 x 2: its floor's middle, and its walls' insides, see part of the sky.
+struct OpenBox {
+  Points points = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0},  {-1, 1, 0}, {-1, -1, 2},
+                   {1, -1, 2},  {1, 1, 2},  {-1, 1, 2}, {0, 0, 0}};
+  Triangles faces = {{8, 0, 1}, {8, 1, 2}, {8, 2, 3}, {8, 3, 0}, {0, 1, 5}, {0, 5, 4},
+                     {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+  Points normals;
+  std::vector<SkySeen> seen, behind;
+  OpenBox() : normals(points.size(), Eigen::Vector3f::UnitZ()) {
+    normals[4] = Eigen::Vector3f(-1, -1, 0).normalized();
+    findSkySeen(points, normals, faces, true, seen, behind);
+  }
+};
+
+TEST(SkySeen, IsFullOutsideAndPartInABox) {
+  const OpenBox box;
+  EXPECT_FLOAT_EQ(box.seen[4].open, 1.0f);
+  EXPECT_LT((box.seen[4].towards - box.normals[4]).norm(), 1e-6f);
+  EXPECT_EQ(box.seen[4].thrown, 0.0f);
+  EXPECT_FLOAT_EQ(box.behind[8].open, 1.0f);  // the floor from below
+  const SkySeen& floor = box.seen[8];
+  EXPECT_NEAR(floor.open, 0.24f, 0.06f);  // form factor of the opening; 48 rays
+  // Nearly overhead: 1.5 times the mean cosine of the opening's directions, 0.85 to 1.
+  EXPECT_NEAR(floor.towards.z() / floor.open, 1.4f, 0.1f);
+  EXPECT_LT(floor.towards.head<2>().norm(), 0.1f);
+  EXPECT_GT(floor.thrown, 0.1f);                       // walls that see part of the sky
+  EXPECT_LT(floor.thrown, 1.0f - floor.open + 1e-6f);  // no more than what hides it could
+}
+
+// Under a sky that is red above and blue below, the floor of a box gets the red of its opening, and
+// more of it than what comes from all sides would give.
+TEST(AmbientOn, ComesFromWhereASurfaceSees) {
+  Light light;
+  light.sun = {};
+  light.ambient[0] = {0.5f, 0.3f, 0.5f}, light.ambient[2] = {-0.4f, 0.0f, 0.4f};
+  const OpenBox box;
+  const cv::Vec3f floor = ambientOn(light, box.seen[8], {}),
+                  open = ambientOn(light, SkySeen::all({0, 0, 1}), {}),
+                  wall = ambientOn(light, SkySeen::all({1, 0, 0}), {});
+  EXPECT_LT(cv::norm(open, ambientAt(light, {0, 0, 1})), 1e-6);
+  EXPECT_GT(floor[2] / floor[1], open[2] / open[1]);
+  EXPECT_FLOAT_EQ(wall[2] / wall[0], 1.0f);
+  const cv::Vec3f red_box = ambientOn(light, box.seen[8], {0.1f, 0.1f, 0.9f});
+  EXPECT_GT(red_box[2], floor[2]);
+}
+
+TEST(Actor, SeesTheSkyAsItIsTurned) {
+  ObjectModel model{"box", 1, {}, Eigen::Isometry3d::Identity()};
+  const OpenBox box;
+  model.mesh.vertices.resize(box.points.size(), 3);
+  model.mesh.triangles.resize(box.faces.size(), 3);
+  for (std::size_t i = 0; i < box.points.size(); ++i)
+    model.mesh.vertices.row(i) = box.points[i].cast<double>().transpose();
+  for (std::size_t t = 0; t < box.faces.size(); ++t)
+    model.mesh.triangles.row(t) = box.faces[t].transpose();
+  const Surface surface = makeSurface(model);
+  Eigen::Isometry3d pose(Eigen::AngleAxisd(1.1, direction(0.3, -0.2, 0.8)));
+  pose.pretranslate(Eigen::Vector3d(3, 2, 1));
+  const Actor actor =
+      makeActor(surface, transformed(surface.key_vertices, pose), {8, 8, 8, 8, 4, 4, {}});
+  ASSERT_EQ(actor.seen.size(), surface.seen.size());
+  for (std::size_t i = 0; i < actor.seen.size(); ++i) {
+    EXPECT_EQ(actor.seen[i].open, surface.seen[i].open);
+    EXPECT_LT(
+        (actor.seen[i].towards - pose.linear().cast<float>() * surface.seen[i].towards).norm(),
+        1e-4f);
+  }
 }
 
 TEST(FitLight, SaysWhenThereIsTooLittleToSee) {

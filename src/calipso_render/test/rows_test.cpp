@@ -35,7 +35,9 @@ TEST(SurfaceMaps, TellWhatThePixelsShow) {
   appearance.key_camera = camera();
   appearance.sources.assign(surface.triangles.size(), Appearance::Source::kBoth);
   const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
-  const SurfaceMaps maps(actor, appearance, eye);
+  Light light;
+  light.ambient[1] = {0.1f, -0.1f, 0.2f};
+  const SurfaceMaps maps(actor, appearance, light, eye);
   const PlaneView view({}, camera());
   VisibilityBuffer buffer({0, 0, kWidth, kHeight});
   buffer.draw(actor.screen, 0);
@@ -63,7 +65,9 @@ TEST(SurfaceMaps, TellWhatThePixelsShow) {
         ASSERT_LT((Eigen::Vector2d(r->key_u[0], r->key_v[0]) - key).norm(), 0.01) << u << ", " << v;
         ASSERT_LT((n - p.normal).norm(), 2e-3f) << u << ", " << v;
         ASSERT_LT((sight.normalized() - (p.position - eye).normalized()).norm(), 1e-3f);
-        ASSERT_NEAR(r->sky[0], p.sky, 2e-3f);
+        ASSERT_NEAR(r->sky[0], skyMirrored(p.seen), 2e-3f);
+        for (int c = 0; c < 3; ++c)
+          ASSERT_NEAR(r->ambient[c][0], ambientOn(light, p.seen, appearance.thrown_back)[c], 2e-3f);
       }
       ++seen;
     }

@@ -131,6 +131,32 @@ TEST(DiffuseOverMesh, IsHarmonic) {
   EXPECT_FLOAT_EQ(values[10][0], 1.0f);
 }
 
+// A strip of which one end is known: near it its value goes on, far away the other one holds. On a
+// line the screened Poisson equation has the solution exp(-x / reach).
+TEST(DiffuseOverMesh, GoesOverToAValueFarAway) {
+  constexpr float kStep = 0.1f, kReach = 0.5f;
+  constexpr int kSteps = 30;
+  Points vertices;
+  Triangles triangles;
+  for (int i = 0; i <= kSteps; ++i)
+    vertices.emplace_back(kStep * i, 0, 0), vertices.emplace_back(kStep * i, kStep, 0);
+  for (int i = 0; i < kSteps; ++i)
+    triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1}),
+        triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+  std::vector<bool> known(vertices.size(), false);
+  std::vector<cv::Vec3f> values(vertices.size());
+  known[0] = known[1] = true;
+  values[0] = values[1] = {1, 1, 1};
+  diffuseOverMesh(vertices, triangles, known, values, FarValue{{0.0f, 1.0f, 0.0f}, kReach});
+  EXPECT_GT(values[2][0], 0.7f);
+  // The strip's rims have fewer links than the formula takes for granted: within a factor of two.
+  const float at_reach = values[2 * static_cast<int>(kReach / kStep)][0];
+  EXPECT_GT(at_reach, std::exp(-2.0f));
+  EXPECT_LT(at_reach, std::exp(-0.5f));
+  EXPECT_LT(values[2 * kSteps][0], 0.05f);
+  EXPECT_NEAR(values[2 * kSteps][1], 1.0f, 1e-3f);
+}
+
 // A strip whose left third is seen, and the others copied: one is darker than what it continues,
 // the other has another pattern.
 TEST(LevelSeams, ShiftsACopyToWhatItContinuesAndLeavesPatterns) {

@@ -160,6 +160,7 @@ class Evaluation {
       angle =
           std::acos(std::clamp(found.dot(truth_.to_sun->normalized()), -1.0, 1.0)) * 180.0 / M_PI;
     put("light_error_deg", angle);
+    put("light_confirmed", prepared_->light.confirmed() ? 1.0 : 0.0);
     put("albedo_error_percent", albedoFigure());
     // Beckmann's slope m is the square of the roughness that Principled shaders ask for.
     for (std::size_t i = 0; i < truth_.objects.size() && !roughness; ++i) {
@@ -252,7 +253,10 @@ class Evaluation {
     flat->light.gloss = {};
     flat->light.light.ambient = {};
     flat->light.light.ambient[0] = {1, 1, 1};
-    for (Surface& s : flat->surfaces) std::fill(s.sky.begin(), s.sky.end(), 1.0f);
+    for (Surface& s : flat->surfaces) {
+      std::fill(s.seen.begin(), s.seen.end(), SkySeen());
+      std::fill(s.seen_behind.begin(), s.seen_behind.end(), SkySeen());
+    }
     flat->appearances = keyAppearances(*flat);
     return flat;
   }

@@ -26,7 +26,8 @@ class Appearance {
   std::vector<Source> sources;
   Camera key_camera;
   cv::Vec3f mean_light;  // average shading over the seen surface: regularises the relighting
-  cv::Vec3f tint;        // thrownBackTint() of its mean reflectance
+  // thrownBack() of its mean reflectance
+  cv::Vec3f thrown_back = {kThrownBack, kThrownBack, kThrownBack};
   Gloss gloss;
   float seen_in_key = 0.0f, seen_elsewhere = 0.0f,
         copied = 0.0f;  // parts of the texture's texels; the rest is filled

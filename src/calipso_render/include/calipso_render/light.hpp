@@ -30,18 +30,56 @@ std::array<float, 9> shBasis(const Eigen::Vector3f& n);
 
 cv::Vec3f ambientAt(const Light& light, const Eigen::Vector3f& n);
 
-// Part of the hidden sky's light that comes back from what hides it; `sky` below, where it is a
-// surface's own, has that in it.
+// How ambient light reaches a surface point past its own object: transfer of harmonics of bands 0
+// and 1 (Sloan, Kautz and Snyder 2002), of what comes straight and of what the object throws back
+// once, per unit of its reflectance.
+//   open     T_0 = 1/pi int V n.w dw            towards         T_1 = 3/(2 pi) int V w n.w dw
+//   thrown   R_0 = 1/pi int (1 - V) T_0' n.w dw  thrown_towards  R_1, likewise of T_1'
+//   V  1 where nothing hides direction w    '  of the place that is met there
+struct SkySeen {
+  float open = 1.0f;
+  Eigen::Vector3f towards = Eigen::Vector3f::Zero();
+  float thrown = 0.0f;
+  Eigen::Vector3f thrown_towards = Eigen::Vector3f::Zero();
+
+  static SkySeen all(const Eigen::Vector3f& n) { return {1.0f, n, 0.0f, Eigen::Vector3f::Zero()}; }
+  SkySeen turned(const Eigen::Matrix3f& by) const {
+    return {open, by * towards, thrown, by * thrown_towards};
+  }
+  // Linear in everything.
+  SkySeen operator*(float s) const {
+    return {s * open, s * towards, s * thrown, s * thrown_towards};
+  }
+  SkySeen operator+(const SkySeen& b) const {
+    return {open + b.open, towards + b.towards, thrown + b.thrown,
+            thrown_towards + b.thrown_towards};
+  }
+};
+
+// Reflectance that an object throws light back with whose colour is not known.
 inline constexpr float kThrownBack = 0.3f;
 
-// The colour of what comes back: per channel, what is added to each unit of 1 - sky where the
-// surface that hides the sky has this reflectance. 0 where it is grey.
-cv::Vec3f thrownBackTint(const cv::Vec3f& reflectance);
+// The same of that brightness, in the colour of a known reflectance.
+cv::Vec3f thrownBack(const cv::Vec3f& reflectance);
 
-// Radiance of a white diffuse surface with unit normal n; `sun`, `sky`: visible fraction of each;
-// `tint`: see thrownBackTint().
-cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun, float sky = 1.0f,
-                         const cv::Vec3f& tint = {});
+// Part of the sky, with what is thrown back for it, that a surface mirrors.
+inline float skyMirrored(const SkySeen& seen) { return seen.open + kThrownBack * seen.thrown; }
+
+// Part of the sun's light that reaches a point by way of its object, per unit of reflectance: by the
+// sun's own harmonics of bands 0 and 1 over the hemisphere.
+inline float sunThrown(const SkySeen& seen, const Eigen::Vector3f& to_sun) {
+  return std::max(0.0f, 0.25f * seen.thrown + 0.5f * seen.thrown_towards.dot(to_sun));
+}
+
+// What reaches a surface point without the sun. @param thrown_back reflectance of its object
+cv::Vec3f ambientOn(const Light& light, const SkySeen& seen, const cv::Vec3f& thrown_back);
+
+// Radiance of a white diffuse surface with unit normal n; `sun`: visible fraction of it.
+cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun,
+                         const SkySeen& seen, const cv::Vec3f& thrown_back);
+
+// The same where nothing hides the sky.
+cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun);
 
 // D G / (4 n.v) of Torrance and Sparrow 1967 with unit ks, Beckmann's D times pi (the light's
 // colour is irradiance / pi). Zero where light or viewer are below the horizon. l, v: unit, towards

@@ -16,7 +16,7 @@ struct LightSample {
   Eigen::Vector3f position, normal, view;  // world; view: unit, towards the camera
   cv::Vec3f radiance;                      // linear
   int cluster = 0;                         // pixels of one cluster share an albedo
-  float sky = 1.0f;                        // visible part of the sky
+  SkySeen seen;                            // of the sky
   int picture = 0;                         // view that it is from
 };
 
@@ -38,6 +38,8 @@ struct SeenGloss {
 struct LightEvidence {
   std::vector<LightSample> samples;
   int clusters = 0;
+  // Linear colour of what lies below the objects, mean 1: grey where no support plane is seen.
+  cv::Vec3f below = {1.0f, 1.0f, 1.0f};
   // Visible part (0 or 1) of a sun in direction l from a sample; empty: nothing is in the way.
   std::function<float(const LightSample&, const Eigen::Vector3f& l)> visible;
   // How badly cast shadows agree with a sun in direction l: minus a log-likelihood, 0 = no shadow
@@ -67,6 +69,10 @@ struct LightFit {
   bool second_order = false;  // ambient light in bands 1 and 2, too: held-out pixels spoke for it
   bool from_shadows = false;  // cast shadows decided on the direction
   double cost = 0.0;          // of the last pass, half the robust sum of squares
+
+  // Something besides shading speaks for the direction: shading alone is off by tens of degrees
+  // where surfaces of one albedo are few.
+  bool confirmed() const { return determined && (from_shadows || seen_gloss); }
 };
 
 // Sun direction, sun and ambient colour, albedos and gloss from shading and cast shadows: a search

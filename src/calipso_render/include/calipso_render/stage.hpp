@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calipso_render/edge_coverage.hpp"
+#include "calipso_render/light.hpp"
 #include "calipso_render/rasterizer.hpp"
 #include "calipso_scene/scene.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
@@ -33,7 +34,9 @@ struct Surface {
   Points key_normals;      // world, unit
   // of its triangles seen from outside: 1 counterclockwise, -1 clockwise, 0 it is open
   int winding = 0;
-  std::vector<float> sky;  // part of the ambient light that a vertex gets past its own object
+  // per vertex, world, key frame: of the side that its normal is on, and of the other one unless the
+  // mesh hides that
+  std::vector<SkySeen> seen, seen_behind;
 };
 
 // @throw std::invalid_argument naming the object and what is wrong with its mesh
@@ -47,8 +50,9 @@ Points transformed(const Points& points, const Eigen::Isometry3d& transform);
 // A surface at one instant, seen by one camera.
 struct Actor {
   const Surface* surface = nullptr;
-  Points vertices;  // world, m
-  Points normals;   // world, unit
+  Points vertices;                         // world, m
+  Points normals;                          // world, unit
+  std::vector<SkySeen> seen, seen_behind;  // the surface's, turned as it is now
   ScreenMesh screen;
 };
 
@@ -58,7 +62,7 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera);
 struct SurfacePoint {
   Eigen::Vector3f position, normal;          // world; the normal faces the viewer
   Eigen::Vector3f key_position, key_normal;  // world, key frame; the normal on the same side
-  float sky = 1.0f;                          // Surface::sky there
+  SkySeen seen;                              // Actor::seen there, of the viewer's side
   int triangle = -1;
   Eigen::Vector3f weights = Eigen::Vector3f::Zero();  // barycentric
 };

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "calipso_render/stage.hpp"
@@ -42,10 +43,17 @@ class SurfaceTexture {
   float spacing_ = 0.0f;
 };
 
-// Fills vertices that have no value smoothly from those that have (harmonic on the mesh; vertices
-// at one place are one).
+// What vertices far from all that is known go over to: by 1 - 1/e within `reach`, m.
+struct FarValue {
+  cv::Vec3f value;
+  float reach;
+};
+
+// Fills vertices that have no value smoothly from those that have (harmonic on the mesh, or screened
+// Poisson with a value far away; vertices at one place are one).
 // @param known per vertex; at least one must be
 void diffuseOverMesh(const Points& vertices, const Triangles& triangles,
-                     const std::vector<bool>& known, std::vector<cv::Vec3f>& values);
+                     const std::vector<bool>& known, std::vector<cv::Vec3f>& values,
+                     const std::optional<FarValue>& far = {});
 
 }  // namespace calipso::render
