@@ -73,6 +73,7 @@ class FlowNodeTest : public testing::Test {
 
   calipso_msgs::Segmentation segmentation() const {
     calipso_msgs::Segmentation msg;
+    msg.contours.resize(1);  // as the key frame has them
     msg.header = headerOf(0);
     cv::Mat labels(camera_.height, camera_.width, CV_8U, cv::Scalar(0));
     const SurfaceView view = viewSurface(

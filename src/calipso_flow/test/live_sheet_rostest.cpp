@@ -71,6 +71,7 @@ class LiveSheetTest : public testing::Test {
   void sendKey() {
     send(0);
     calipso_msgs::Segmentation segmentation;
+    segmentation.contours.resize(1);  // as the key frame has them
     segmentation.header = headerOf(0);
     cv::Mat labels(sheet_.camera.height, sheet_.camera.width, CV_8U, cv::Scalar(0));
     const SurfaceView view =
