@@ -241,8 +241,8 @@ cv::Mat motionOfRows(const cv::Mat& moving, const cv::Mat& known) {
   return (motion + 0.5f) / (weight + 1.0f);
 }
 
-void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness,
-                      const cv::Mat& surface, Background& background) {
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const InpaintParams& place,
+                      Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
   const cv::Mat moving = movingPlaces(key, background);
   const bool any_moving = cv::countNonZero(moving) > 0;
@@ -252,9 +252,9 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat
     key.bgr.convertTo(now, CV_32F);
     now.copyTo(look, closedGaps(moving) & (background.invented == 0) & (key.labels == 0));
   }
-  InpaintParams params;
-  params.nearness = nearness, params.surface = surface;
-  const InpaintResult filled = inpaint(look, background.invented, cv::Mat(), params);
+  InpaintParams guide = place;
+  if (any_moving) guide.planes.clear();  // copies that go on moving are shifted by whole pixels
+  const InpaintResult filled = inpaint(look, background.invented, cv::Mat(), guide);
   filled.image.copyTo(background.plate, background.invented);
   background.origin = filled.origin;
   if (!any_moving) return;

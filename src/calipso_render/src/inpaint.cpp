@@ -2,20 +2,29 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
+#include "lattice.hpp"
 #include "line_bridge.hpp"
 #include "patch_fill.hpp"
+#include "plane_chart.hpp"
 #include "seam_blend.hpp"
 #include "seam_cut.hpp"
+#include "spline.hpp"
 
 namespace calipso::render {
 namespace {
 
-constexpr int kLeastMargin = 48;  // px around the hole that are looked at, at least
+constexpr int kLatticeMargin = 72;  // px around it in which a pattern is sought
+constexpr int kLeastMargin = 48;    // px around the hole that are looked at, at least
+constexpr float kRounded =
+    1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
+constexpr float kFarther = 2000.0f;  // InpaintParams::away_farther along a plane
+constexpr int kFewestOnPlane = 200;  // px of a plane's part of the hole, to be filled along it
 
-cv::Rect windowAround(const cv::Mat& hole) {
+cv::Rect windowAround(const cv::Mat& hole, int least = kLeastMargin, int most = 1 << 20) {
   const cv::Rect box = cv::boundingRect(hole);
-  const int margin = std::max({kLeastMargin, box.width / 2, box.height / 2});
+  const int margin = std::clamp(std::max(box.width, box.height) / 2, least, most);
   const cv::Rect grown(box.x - margin, box.y - margin, box.width + 2 * margin,
                        box.height + 2 * margin);
   return grown & cv::Rect(0, 0, hole.cols, hole.rows);
@@ -23,8 +32,11 @@ cv::Rect windowAround(const cv::Mat& hole) {
 
 InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
   InpaintParams inner = params;
+  const cv::Matx33d shift(1, 0, window.x, 0, 1, window.y, 0, 0, 1);
+  for (cv::Matx33d& plane : inner.planes) plane = plane * shift;
   if (!params.nearness.empty()) inner.nearness = params.nearness(window).clone();
   if (!params.surface.empty()) inner.surface = params.surface(window).clone();
+  if (!params.sure.empty()) inner.sure = params.sure(window).clone();
   return inner;
 }
 
@@ -49,6 +61,148 @@ cv::Mat copyFrom(const cv::Mat& origin, const cv::Mat& image, cv::Mat& filled) {
   return copied;
 }
 
+// CV_8UC1: 255 where a pixel has an origin.
+cv::Mat copied(const cv::Mat& origin) {
+  cv::Mat columns;
+  cv::extractChannel(origin, columns, 0);
+  return columns >= 0;
+}
+
+// What fills a hole and where it comes from.
+struct Filling {
+  cv::Mat image;   // CV_32FC3
+  cv::Mat origin;  // CV_16SC2; (-1, -1) where nothing was copied
+};
+
+// @param known CV_8UC1: what the filling has to go with; source, of it: what may be copied
+Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const Lattice* lattice,
+             const InpaintParams& params) {
+  const cv::Mat whole_hole = to_fill.clone();
+  const LineBridges bridges = bridgeLines(to_fill, source, look, lattice);
+  to_fill.setTo(0, bridges.core);
+  known |= bridges.core;
+  source.setTo(0, bridges.lines);
+  Filling f{smoothFill(look, to_fill, known), patchOrigins(look, to_fill, source, lattice, params)};
+  cutSeams(look, to_fill, source, known, params.surface, f.origin);
+  if (cv::countNonZero(copyFrom(f.origin, look, f.image)) > 0)
+    blendSeams(to_fill, known, f.origin, f.image);
+  bridges.origin.copyTo(f.origin, bridges.core);
+  f.origin.setTo(cv::Scalar(-1, -1), whole_hole == 0);
+  return f;
+}
+
+// A picture on its way to being filled.
+struct Canvas {
+  cv::Mat look, hole, source, known;
+  cv::Mat origin;  // CV_16SC2
+
+  void set(const cv::Point& p, const cv::Vec3f& colour, const cv::Point& from) {
+    for (int c = 0; c < 3; ++c) look.at<cv::Vec3f>(p)[c] = std::clamp(colour[c], 0.0f, 255.0f);
+    hole.at<std::uint8_t>(p) = 0, known.at<std::uint8_t>(p) = 255;
+    origin.at<cv::Vec2s>(p) = {static_cast<short>(from.x), static_cast<short>(from.y)};
+  }
+};
+
+cv::Mat nearnessOf(const cv::Matx33d& to_plane, const cv::Size& size) {
+  cv::Mat nearness(size, CV_32F);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u)
+      nearness.at<float>(v, u) =
+          static_cast<float>(to_plane(2, 0) * u + to_plane(2, 1) * v + to_plane(2, 2));
+  }
+  return nearness;
+}
+
+// A plane's part of the picture, in its chart.
+struct PlanePart {
+  PlaneChart chart;
+  cv::Mat look;  // CV_32FC3; where the plane is not known it goes on smoothly
+  cv::Mat hole, known, source;
+};
+
+PlanePart partOf(const PlaneChart& chart, const cv::Mat& look, const cv::Mat& hole,
+                 const cv::Mat& seen) {
+  cv::Mat copied_from;  // around which a sample sees nothing else
+  cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
+  PlanePart part{chart, chart.carried(look), chart.any(hole), chart.whole(seen),
+                 chart.whole(copied_from)};
+  part.known &= part.hole == 0, part.source &= part.hole == 0;
+  smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
+  return part;
+}
+
+// Every pixel of a plane's hole as the chart's nearest one was filled: a sample of the picture, as far off along the
+// plane as that was copied from, and what was evened out there.
+// @param wanted CV_8UC1, of the chart
+void copyBack(const PlanePart& part, const Filling& filled, const std::optional<Lattice>& lattice,
+              const cv::Mat& wanted, const cv::Mat& hole, Canvas& canvas) {
+  const cv::Mat spline = splineOf(canvas.look);
+  const cv::Rect all({0, 0}, part.look.size());
+  for (int v = 0; v < hole.rows; ++v) {
+    for (int u = 0; u < hole.cols; ++u) {
+      if (hole.at<std::uint8_t>(v, u) == 0) continue;
+      const cv::Point2d at = taken(part.chart.to_chart, u, v);
+      const cv::Point nearest(cvRound(at.x), cvRound(at.y));
+      if (!all.contains(nearest) || wanted.at<std::uint8_t>(nearest) == 0) continue;
+      if (filled.origin.at<cv::Vec2s>(nearest)[0] < 0) continue;
+      const cv::Vec2s& o = filled.origin.at<cv::Vec2s>(nearest);
+      cv::Point2f shift(cv::Point(o[0], o[1]) - nearest);
+      if (lattice && cv::norm(lattice->nearest(shift) - shift) < kRounded)
+        shift = lattice->nearest(shift);
+      const cv::Point2d from = taken(part.chart.to_picture, at.x + shift.x, at.y + shift.y);
+      const cv::Vec3f evened =
+          filled.image.at<cv::Vec3f>(nearest) - part.look.at<cv::Vec3f>(o[1], o[0]);
+      canvas.set({u, v}, sampleSpline(spline, from.x, from.y) + evened,
+                 {cvRound(from.x), cvRound(from.y)});
+    }
+  }
+}
+
+// Fills a plane's part of the hole with copies shifted along the plane.
+// @param supports something stands on it
+// @param hole, seen CV_8UC1: where the plane is hidden; where it may be copied from
+void fillPlane(const cv::Matx33d& to_plane, bool supports, const cv::Mat& hole, const cv::Mat& seen,
+               const InpaintParams& params, Canvas& canvas) {
+  const std::optional<PlaneChart> chart = planeChart(to_plane, hole, seen);
+  if (!chart) return;
+  const PlanePart part = partOf(*chart, canvas.look, hole, seen);
+  if (cv::countNonZero(part.hole) == 0 || cv::countNonZero(part.source) == 0) return;
+  const cv::Rect near = windowAround(part.hole, kLatticeMargin, kLatticeMargin);
+  const std::optional<Lattice> lattice = findLattice(part.look(near), part.source(near));
+  if (!(supports && chart->tilted) && !lattice) return;
+  InpaintParams inner = params;
+  inner.surface = cv::Mat();
+  inner.nearness = chart->carried(nearnessOf(to_plane, hole.size())), inner.away_farther = kFarther;
+  const cv::Mat wanted =
+      lattice ? goesOnByLattice(*lattice, part.look, part.known, part.hole) : part.hole;
+  copyBack(part,
+           fill(part.look.clone(), part.hole.clone(), part.source.clone(), part.known.clone(),
+                lattice ? &*lattice : nullptr, inner),
+           lattice, wanted, hole, canvas);
+}
+
+void fillPlanes(const InpaintParams& params, Canvas& canvas) {
+  const cv::Mat hole = canvas.hole.clone();
+  for (std::size_t k = 0; k < params.planes.size(); ++k) {
+    const cv::Mat here = params.surface == static_cast<double>(k + 1),
+                  hidden = hole & here & params.sure;
+    if (cv::countNonZero(hidden) >= kFewestOnPlane)
+      fillPlane(params.planes[k], static_cast<int>(k) < params.supports, hidden,
+                canvas.source & here, params, canvas);
+  }
+}
+
+void fillRest(const InpaintParams& params, Canvas& canvas) {
+  const cv::Rect window = windowAround(canvas.hole);
+  const cv::Mat hole = canvas.hole(window);
+  const Filling rest =
+      fill(canvas.look(window).clone(), hole.clone(), canvas.source(window).clone(),
+           canvas.known(window).clone(), nullptr, within(window, params));
+  rest.image.copyTo(canvas.look(window), hole);
+  cv::Mat(rest.origin + cv::Scalar(window.x, window.y))
+      .copyTo(canvas.origin(window), copied(rest.origin));
+}
+
 }  // namespace
 
 InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& banned,
@@ -59,24 +213,20 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)), true};
   if (cv::countNonZero(hole) == 0) return result;
   const cv::Rect window = windowAround(hole);
-  cv::Mat look = image(window).clone(), to_fill = hole(window) != 0, source = to_fill == 0;
-  if (!banned.empty()) source.setTo(0, banned(window));
-  const cv::Mat whole_hole = to_fill.clone();
-  const LineBridges bridges = bridgeLines(to_fill, source, look);
-  to_fill.setTo(0, bridges.core);
-  const cv::Mat known = source | bridges.core;
-  source.setTo(0, bridges.lines);
+  Canvas canvas{image(window).clone(),
+                hole(window) != 0,
+                hole(window) == 0,
+                {},
+                result.origin(window).clone()};
+  if (!banned.empty()) canvas.source.setTo(0, banned(window));
+  canvas.known = canvas.source.clone();
   const InpaintParams inner = within(window, params);
-  cv::Mat filled = smoothFill(look, to_fill, known),
-          origin = patchOrigins(look, to_fill, source, inner);
-  cutSeams(look, to_fill, source, known, inner.surface, origin);
-  const cv::Mat copied = copyFrom(origin, look, filled);
-  result.patches_found = cv::countNonZero(copied) > 0;
-  if (result.patches_found) blendSeams(to_fill, known, origin, filled);
-  bridges.origin.copyTo(origin, bridges.core);
-  cv::Mat(origin + cv::Scalar(window.x, window.y))
-      .copyTo(result.origin(window), copied | bridges.core);
-  filled.copyTo(result.image(window), whole_hole);
+  if (!inner.surface.empty() && !inner.sure.empty()) fillPlanes(inner, canvas);
+  if (cv::countNonZero(canvas.hole) > 0) fillRest(inner, canvas);
+  const cv::Mat has_origin = copied(canvas.origin);
+  result.patches_found = cv::countNonZero(has_origin) > 0;
+  cv::Mat(canvas.origin + cv::Scalar(window.x, window.y)).copyTo(result.origin(window), has_origin);
+  canvas.look.copyTo(result.image(window), hole(window));
   return result;
 }
 

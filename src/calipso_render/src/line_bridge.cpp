@@ -40,8 +40,14 @@ class Bridger {
     result_.origin = cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   }
 
-  LineBridges run() {
+  LineBridges run(const Lattice* lattice) {
     ends_ = findLineEnds(hole_, source_, image_);
+    if (lattice != nullptr) {
+      ends_.erase(std::remove_if(
+                      ends_.begin(), ends_.end(),
+                      [&](const LineEnd& end) { return repeats(end, *lattice, source_, image_); }),
+                  ends_.end());
+    }
     std::vector<Bridge> bridges = connections();
     const std::size_t through = bridges.size();
     for (const LineEnd& end : ends_) {
@@ -222,8 +228,9 @@ class Bridger {
 
 }  // namespace
 
-LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image) {
-  return Bridger(hole, source, image).run();
+LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image,
+                        const Lattice* lattice) {
+  return Bridger(hole, source, image).run(lattice);
 }
 
 }  // namespace calipso::render

@@ -2,6 +2,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "lattice.hpp"
+
 namespace calipso::render {
 
 struct LineBridges {
@@ -21,6 +23,8 @@ struct LineBridges {
 // hole, so that it keeps its grain.
 // @param image CV_32FC3, code values; drawn upon
 // @param hole, source CV_8UC1: to be filled; known
-LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image);
+// @param lattice by which the picture repeats itself, may be nullptr: its lines are left to it
+LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image,
+                        const Lattice* lattice = nullptr);
 
 }  // namespace calipso::render

@@ -26,7 +26,8 @@ constexpr float kStandsOut = 3.0f;  // contrast of a line, in deviations of what
 constexpr float kStray = 1.5f;      // px by which ends may miss each other,
 // change of colours along a line, to their contrast, from which it is another
 constexpr float kSame = 0.2f;
-constexpr float kThin = 0.35f;  // both sides differ by no more than this part of the contrast
+constexpr float kAgain = 0.25f;  // mean difference, to the contrast, of a line that is seen again
+constexpr float kThin = 0.35f;   // both sides differ by no more than this part of the contrast
 
 class LineEndFinder {
  public:
@@ -194,6 +195,31 @@ bool LineEnd::isThin() const { return rms(beside[0] - beside[1]) < kThin * contr
 std::vector<LineEnd> findLineEnds(const cv::Mat& hole, const cv::Mat& source,
                                   const cv::Mat& image) {
   return LineEndFinder(hole, source, image).run();
+}
+
+bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,
+             const cv::Mat& image) {
+  int seen = 0, alike = 0;
+  for (int i = -1; i <= 1; ++i) {
+    for (int j = -1; j <= 1; ++j) {
+      const cv::Vec2f n = lattice.basis * cv::Vec2f(i, j);
+      const cv::Point2f shift(n[0], n[1]);
+      if (std::abs(render::cross(end.into, shift)) < kLineHalf) continue;
+      float sum = 0.0f;
+      int count = 0;
+      for (int t = kFirst; t <= kLast; ++t) {
+        for (int s = -kLineHalf; s <= kLineHalf; ++s) {
+          const cv::Point2f p = end.at + shift - static_cast<float>(t) * end.into +
+                                static_cast<float>(s) * leftOf(end.into);
+          if (isSet(source, p))
+            sum += rms(sampleLinear(image, p) - end.profile[s + kLineHalf]), ++count;
+        }
+      }
+      if (2 * count < (kLast - kFirst) * (2 * kLineHalf + 1)) continue;
+      ++seen, alike += sum < kAgain * end.contrast * static_cast<float>(count);
+    }
+  }
+  return 2 * alike > seen;
 }
 
 float rms(const cv::Vec3f& c) { return std::sqrt(c.dot(c) / 3.0f); }

@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "lattice.hpp"
+
 namespace calipso::render {
 
 constexpr int kLineHalf = 4;  // px on either side of a line that are drawn with it
@@ -24,6 +26,10 @@ struct LineEnd {
 // Lines and edges that stand out from what is beside them and end at the hole, the longest first.
 // @param image CV_32FC3, code values; hole, source CV_8UC1: to be filled; known
 std::vector<LineEnd> findLineEnds(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image);
+
+// Is a line seen again at the shifts of a lattice that lead off it?
+bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,
+             const cv::Mat& image);
 
 inline cv::Point2f leftOf(const cv::Point2f& d) { return {d.y, -d.x}; }
 inline float cross(const cv::Point2f& a, const cv::Point2f& b) { return a.x * b.y - a.y * b.x; }

@@ -24,6 +24,8 @@ constexpr float kNearer = 2.5f;   // times that a source may be nearer or farthe
 constexpr float kHorizon = 6.0f;  // or px of height by which it may miss that
 // cost of one that does not, squared code values: such are taken for want of others only
 constexpr float kMisplaced = 2000.0f;
+constexpr float kAsNear = 1.02f;  // times that a place may be nearer than a source as near as it
+constexpr float kOffLattice = 0.75f;  // px by which a copy's way may miss the lattice
 
 cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
 cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_cast<short>(p.y)}; }
@@ -33,13 +35,15 @@ cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_c
 class Filling {
  public:
   // @param horizon difference of nearness that does not count
-  Filling(const FillLevel& level, float scale, float horizon, const InpaintParams& params)
+  Filling(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
+          const InpaintParams& params)
       : image_(level.image.clone()),
         hole_(level.hole),
         nearness_(level.nearness),
         surface_(level.surface),
         scale_(scale),
         horizon_(horizon),
+        lattice_(lattice),
         params_(params),
         to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
         cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)),
@@ -195,7 +199,10 @@ class Filling {
       for (const cv::Point& d : {cv::Point(step, 0), cv::Point(0, step)}) {
         if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d, 1.0f);
       }
-      for (int r = reach; r >= 1; r /= 2) attempt(p, match(p) + jitter(p, r, r), kJump);
+      for (int r = reach; r >= 1; r /= 2) {
+        const cv::Point q = match(p) + jitter(p, r, r);
+        attempt(p, lattice_ == nullptr ? q : onLattice(p, q), kJump);
+      }
     }
   }
 
@@ -211,7 +218,8 @@ class Filling {
   void firstMatch(const cv::Point& p, const cv::Mat& known) {
     cv::Point best = anySource(p, 0);
     float least = partialDistance(p, best, known);
-    const auto attemptFirst = [&](const cv::Point& q) {
+    const auto attemptFirst = [&](cv::Point q) {
+      if (lattice_ != nullptr) q = onLattice(p, q);
       const float cost = isWhole(q) ? partialDistance(p, q, known) : least;
       if (cost < least) least = cost, best = q;
     };
@@ -251,12 +259,26 @@ class Filling {
     if (!nearness_.empty()) {
       const float own = nearness_.at<float>(p), other = nearness_.at<float>(q);
       if (other > kNearer * own + horizon_ || own > kNearer * other + horizon_) cost += kMisplaced;
+      if (params_.away_farther > 0.0f && own > kAsNear * other && other > 0.0f)
+        cost += params_.away_farther * (own / other - kAsNear);
     }
     if (!surface_.empty()) {
       const std::uint8_t own = surface_.at<std::uint8_t>(p), other = surface_.at<std::uint8_t>(q);
       if (own != 0 && other != 0 && own != other) cost += kMisplaced;
     }
+    if (lattice_ != nullptr && offLattice(q - p) > kOffLattice) cost += kMisplaced;
     return kSide * kSide * cost;
+  }
+
+  // px of this level by which a shift misses the lattice
+  float offLattice(const cv::Point& shift) const {
+    const cv::Point2f fine = scale_ * cv::Point2f(shift);
+    return static_cast<float>(cv::norm(fine - lattice_->nearest(fine))) / scale_;
+  }
+  // The shift of the lattice that is nearest to the way to a place.
+  cv::Point onLattice(const cv::Point& p, const cv::Point& q) const {
+    const cv::Point2f whole = lattice_->nearest(scale_ * cv::Point2f(q - p));
+    return p + cv::Point(cvRound(whole.x / scale_), cvRound(whole.y / scale_));
   }
 
   float distance(const cv::Point& p, const cv::Point& q, float bound) const {
@@ -299,8 +321,9 @@ class Filling {
   }
 
   cv::Mat image_, hole_, nearness_, surface_,
-      whole_;              // whole_ CV_8UC1: all of the patch around it may be copied
-  float scale_, horizon_;  // size of these pixels in the finest level's
+      whole_;               // whole_ CV_8UC1: all of the patch around it may be copied
+  float scale_, horizon_;   // size of these pixels in the finest level's
+  const Lattice* lattice_;  // may be nullptr
   InpaintParams params_;
   cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
@@ -311,17 +334,17 @@ class Filling {
 }  // namespace
 
 cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
-                     const InpaintParams& params) {
+                     const Lattice* lattice, const InpaintParams& params) {
   const std::vector<FillLevel> levels = fillLevels(image, hole, source, params);
   const float horizon = params.nearness.empty() ? 0.0f : kHorizon * nearnessPerRow(params.nearness);
   const int coarsest = static_cast<int>(levels.size()) - 1;
-  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, params);
+  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, lattice, params);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   filling.peel();
   for (int i = 0; i < params.coarsest_rounds; ++i)
     filling.search(std::max(hole.cols, hole.rows) >> coarsest), filling.vote();
   for (int k = coarsest - 1; k >= 0; --k) {
-    Filling finer(levels[k], static_cast<float>(1 << k), horizon, params);
+    Filling finer(levels[k], static_cast<float>(1 << k), horizon, lattice, params);
     finer.startFrom(filling);
     for (int i = 0; i < params.rounds && k > 0; ++i) finer.search(kFarthest), finer.vote();
     if (k == 0) finer.search(kFinest);

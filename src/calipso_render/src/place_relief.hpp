@@ -16,7 +16,11 @@ struct PicturePlane {
   double nearnessAt(int u, int v) const { return abc[0] * u + abc[1] * v + abc[2]; }
   // World; towards the camera.
   Eigen::Vector3f normal(const Camera& camera) const;
+  // The homography from pixels to coordinates (m) along it, the third one its nearness.
+  cv::Matx33d fromPixels(const Camera& camera) const;
 };
+
+PicturePlane inPicture(const SupportPlane& plane, const Camera& camera);
 
 // The largest planes among the pixels of `wanted`.
 std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& wanted);
@@ -28,8 +32,11 @@ struct PlaceSurfaces {
   // CV_8UC1: kUnknown; the support planes from 1 on, then other planes; kCurved: what is none of
   // them
   cv::Mat label;
-  cv::Mat position, normal;  // CV_32FC3, world, off the support planes
-  int supports = 0;          // support planes
+  cv::Mat
+      sure;  // CV_8UC1: 255 where a plane is seen, or hidden and nothing else is seen nearer by that does not meet it
+  cv::Mat position, normal;          // CV_32FC3, world, off the support planes
+  int supports = 0;                  // support planes
+  std::vector<PicturePlane> planes;  // of label k + 1
 
   bool empty() const { return label.empty(); }
 };

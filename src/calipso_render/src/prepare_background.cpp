@@ -178,8 +178,13 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
     p.background.plate = unmirrored(p.mirror, p.background.plate);
     key.bgr = unmirroredCodes(p.mirror, key.bgr);
   }
-  inventBackground(traces, key, groundNearness(params.planes, key.camera, p.scenery),
-                   surfaces.label, p.background);
+  InpaintParams known_of_place;
+  known_of_place.nearness = groundNearness(params.planes, key.camera, p.scenery);
+  known_of_place.surface = surfaces.label, known_of_place.supports = surfaces.supports;
+  known_of_place.sure = surfaces.sure;
+  for (const PicturePlane& plane : surfaces.planes)
+    known_of_place.planes.push_back(plane.fromPixels(key.camera));
+  inventBackground(traces, key, known_of_place, p.background);
   p.plate_linear = linearOf(p.background.plate);
   findPlaceUmbra(e, sun, sky, place.off_planes, params, p);
 }

@@ -100,7 +100,7 @@ TEST(InventBackground, FillsOnlyTheHole) {
   Background b = seenBackground(wanderingSquare(1), false);
   const cv::Mat before = b.plate.clone(), hole = b.invented.clone();
   ASSERT_GT(cv::countNonZero(hole), 0);
-  inventBackground(cv::Mat(), wanderingSquare(1).front(), cv::Mat(), cv::Mat(), b);
+  inventBackground(cv::Mat(), wanderingSquare(1).front(), {}, b);
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       if (hole.at<std::uint8_t>(v, u) == 0) {
@@ -134,7 +134,7 @@ TEST(InventBackground, WhatIsHiddenRestsWhereTheRowsAroundRest) {
   }
   addGrain(clip);
   Background b = seenBackground(clip, false);
-  inventBackground(cv::Mat(), clip.front(), cv::Mat(), cv::Mat(), b);
+  inventBackground(cv::Mat(), clip.front(), {}, b);
   ASSERT_FALSE(b.live.empty());
   const auto live = [&](int u, int v) {
     cv::Vec3f colour;

@@ -70,6 +70,33 @@ TEST(PlaceRelief, AWallGoesOnBehindAnObjectAndMeetsTheFloorThere) {
   EXPECT_NEAR((behind.normal - Eigen::Vector3f(0, -1, 0)).norm(), 0.0, 1e-3);
 }
 
+// A block on the floor, its front at y = 1.702 and its top at z = 0.5, an object before the edge between both.
+TEST(PlaceRelief, TheSidesOfABlockEndAtItsEdge) {
+  Room room;
+  const auto isTop = [](double down) { return down * 1.702 < 0.5; };
+  for (int v = 0; v < kHigh; ++v) {
+    const double down = camera().ray(0, v).y();
+    const double front = 1.702, top = 0.5 / std::max(down, 1e-6);
+    if (top > 3.0) continue;  // the wall behind
+    const double near = isTop(down) ? top : std::min(front, 1.0 / down);
+    room.depth.row(v) = near, room.scenery.row(v) = 1.0 / near;
+  }
+  const int edge = static_cast<int>(59.5 + 120.0 * 0.5 / 1.702);  // row
+  const cv::Rect object(60, edge - 8, 40, 20);
+  room.labels.setTo(0), room.labels(object).setTo(1);
+  room.depth(object).setTo(1.2), room.scenery(object).setTo(0.0);
+  const PlaceSurfaces surfaces = room.surfaces();
+  const int top = surfaces.label.at<std::uint8_t>(edge - 4, 20),
+            front = surfaces.label.at<std::uint8_t>(edge + 4, 20);
+  ASSERT_NE(top, front);
+  for (int v = object.y; v < object.br().y; ++v) {
+    for (int u = object.x; u < object.br().x; ++u) {
+      ASSERT_EQ(surfaces.label.at<std::uint8_t>(v, u), v <= edge ? top : front) << u << ", " << v;
+      ASSERT_NE(surfaces.sure.at<std::uint8_t>(v, u), 0);
+    }
+  }
+}
+
 // Depth images are taken as near as all of a pixel's surroundings; towards the horizon that is a
 // row farther off, and much.
 TEST(PlaceRelief, AFloorUpToTheHorizonIsNoPlaneOfItsOwn) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calipso_render/clip_sample.hpp"
+#include "calipso_render/inpaint.hpp"
 #include "calipso_render/live_fill.hpp"
 #include "calipso_scene/scene.hpp"
 
@@ -39,10 +40,9 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
 // Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects cover or
 // darken in every frame), from the surroundings. Where the place moves by itself, the median is no
 // picture of it: there the key frame is what the surroundings look like.
-// @param nearness of the ground, as groundNearness(); may be empty
-// @param surface as InpaintParams::surface; may be empty
-void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const cv::Mat& nearness,
-                      const cv::Mat& surface, Background& background);
+// @param place its nearness (groundNearness()), surfaces and planes
+void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const InpaintParams& place,
+                      Background& background);
 
 // CV_32FC1, 1/m along the optical axis, of the support plane that a pixel sees, or of what is seen
 // of the scenery beyond it; 0 where no plane is. Empty if none is seen at all.
