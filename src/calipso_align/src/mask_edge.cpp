@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <vector>
 
 namespace calipso::align {
 namespace {
@@ -87,6 +88,20 @@ cv::Mat settleEdge(const cv::Mat& image, const cv::Mat& other, const KnownBackgr
     }
   mask = settled;
   return alpha;
+}
+
+cv::Mat withoutStrays(const cv::Mat& mask, const cv::Mat& expected) {
+  cv::Mat pieces;
+  const int count = cv::connectedComponents(mask, pieces, 8, CV_32S);
+  std::vector<char> met(count, 0);
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (expected.at<uchar>(y, x)) met[pieces.at<int>(y, x)] = 1;
+  cv::Mat kept = mask.clone();
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (!met[pieces.at<int>(y, x)]) kept.at<uchar>(y, x) = 0;
+  return 2 * cv::countNonZero(kept) > cv::countNonZero(mask) ? kept : mask;
 }
 
 }  // namespace calipso::align

@@ -9,6 +9,7 @@
 
 #include "background_evidence.hpp"
 #include "calipso_align/layer_motion.hpp"
+#include "calipso_align/mask_edge.hpp"
 #include "layer_appearance.hpp"
 #include "layer_search.hpp"
 #include "reappearance.hpp"
@@ -74,6 +75,7 @@ MaskTracker::MaskTracker(const cv::Mat& image, const cv::Mat& labels,
     object.mask = labels == label;
     object.key_area = cv::countNonZero(object.mask);
     object.coverage = object.mask.clone();
+    object.expected = object.mask.clone();
     object.reference_mean = previous_means_;
     object.flow = cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM);
     object.colours = GaussianMixture::fit(coloursUnder(image, object.mask), params_.components);
@@ -128,13 +130,35 @@ TrackedMask MaskTracker::track(const cv::Mat& image) {
     follow(*object, image, flow, rough);
     object->reference_mean = means;
   }
-  partOverlaps(image);
+  settleClaims();
   takeUpAgain(image, means);
   rememberBackground(image);
   image.copyTo(previous_image_);
   previous_grey_ = grey;
   previous_means_ = means;
   return combine(static_cast<int>(moving.size()));
+}
+
+// A pixel goes to the one that was to be expected there; where both or neither were, to the one
+// whose model says so, or else to the later.
+void MaskTracker::settleClaims() {
+  for (size_t a = 0; a < objects_.size(); ++a)
+    for (size_t b = a + 1; b < objects_.size(); ++b) {
+      Object &one = objects_[a], &other = objects_[b];
+      const cv::Mat both = one.mask & other.mask;
+      if (cv::countNonZero(both) == 0) continue;
+      const cv::Mat expects_one = one.expected & ~other.expected,
+                    expects_other = other.expected & ~one.expected;
+      const bool first = one.shape && !other.shape;
+      const cv::Mat others = both & (first ? expects_other : ~expects_one);
+      leave(one, others);
+      leave(other, both & ~others);
+    }
+}
+
+void MaskTracker::leave(Object& object, const cv::Mat& pixels) {
+  object.mask.setTo(0, pixels);
+  object.coverage.setTo(0, pixels);
 }
 
 TrackedMask MaskTracker::combine(int moved) const {
@@ -144,23 +168,6 @@ TrackedMask MaskTracker::combine(int moved) const {
     result.confidence = std::min(result.confidence, object.confidence);
   }
   return result;
-}
-
-// Where a mask reaches into that of an object whose model says where it is, the pixel is the
-// model's, unless it clearly has the colour of what then hides it.
-void MaskTracker::partOverlaps(const cv::Mat& image) {
-  for (Object& modelled : objects_)
-    for (Object& other : objects_) {
-      if (!modelled.shape || other.shape) continue;
-      std::vector<cv::Point> overlap;
-      cv::findNonZero(modelled.mask & other.mask, overlap);
-      for (const cv::Point& p : overlap) {
-        const cv::Vec3f colour = image.at<cv::Vec3b>(p);
-        const bool hides = other.colours.cost(colour) + kClearly < modelled.colours.cost(colour);
-        Object& wrong = hides ? modelled : other;
-        wrong.mask.at<uchar>(p) = wrong.coverage.at<uchar>(p) = 0;
-      }
-    }
 }
 
 void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& flow,
@@ -175,6 +182,7 @@ void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& fl
 void MaskTracker::lose(Object& object) const {
   object.mask = cv::Mat::zeros(size_, CV_8U);
   object.coverage = object.mask.clone();
+  object.expected = object.mask.clone();
   object.confidence = 0.0f;
   object.shape.reset();
 }
@@ -365,6 +373,8 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   const cv::Mat view = image(roi);
   Prediction p = predict(object, flow, rough, roi);
   if (p.distance.empty()) return lose(object);
+  object.expected = cv::Mat::zeros(size_, CV_8U);
+  p.mask.copyTo(object.expected(roi));
   const std::vector<cv::Vec3f> surroundings =
       coloursUnder(view, (p.distance > params_.band_px) & (p.distance < params_.margin_px));
   if (surroundings.empty()) {
@@ -383,7 +393,8 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
   if (!shaped) cutContradicted(object, view, p, background, layers, roi, labels);
   const double flipped = cv::countNonZero((labels > 0) != (p.mask > 0));
   object.confidence = static_cast<float>(std::clamp(1.0 - 4.0 * flipped / area, 0.0, 1.0));
-  accept(object, view, background, layers.back_noise, labels > 0, roi);
+  accept(object, view, background, layers.back_noise,
+         withoutStrays(labels > 0, p.distance < params_.band_px), roi);
 }
 
 void MaskTracker::accept(Object& object, const cv::Mat& view, const KnownBackground& background,

@@ -149,7 +149,10 @@ cv::Mat RigidShape::distance(const cv::Rect& roi) const {
 // The surface's say is kept as it was where it put the model.
 void RigidShape::meetOutline(const cv::Mat& evidence, const cv::Mat& other, const cv::Rect& roi) {
   constexpr int kIterations = 4, kFewest = 10;
-  constexpr double kStillMet = 0.8, kStillAlike = 2.0;  // of what it was
+  constexpr double kStillMet = 0.65, kStillAlike = 2.0;  // of what it was
+  constexpr double kLeastMet = 0.4;                      // by chance a few points are met
+  // What turns fast, or shows new sides, looks different; the outline of what deforms would show.
+  constexpr double kPlainlyMet = 0.9;
   Vector6 moved = Vector6::Zero();
   OutlineFit fit;
   for (int k = 0; k < kIterations; ++k) {
@@ -165,8 +168,9 @@ void RigidShape::meetOutline(const cv::Mat& evidence, const cv::Mat& other, cons
   state_->velocity = state_->pose.camera_from_key * state_->before.inverse();
   const double met = fit.known < kFewest ? 0.0 : static_cast<double>(fit.met) / fit.known;
   state_->most_met = std::max(state_->most_met, met);
-  state_->holds = met >= kStillMet * state_->most_met && met > 0.0 &&
-                  state_->look.difference <= kStillAlike * state_->least_difference;
+  const bool alike =
+      met >= kPlainlyMet || state_->look.difference <= kStillAlike * state_->least_difference;
+  state_->holds = met >= std::max(kLeastMet, kStillMet * state_->most_met) && alike;
 }
 
 }  // namespace calipso::align

@@ -52,5 +52,19 @@ TEST(MaskEdge, OtherObjectsKeepTheirPixels) {
   EXPECT_EQ(cv::countNonZero(mask & other), 0);
 }
 
+TEST(WithoutStrays, DropsWhatIsElsewhereUnlessItIsMostOfTheMask) {
+  cv::Mat mask = cv::Mat::zeros(60, 100, CV_8U), expected = mask.clone();
+  const cv::Rect object(10, 10, 20, 20), stray(70, 30, 10, 10);
+  mask(object).setTo(255);
+  mask(stray).setTo(255);
+  expected(cv::Rect(25, 10, 20, 20)).setTo(255);  // meets the object at its side only
+  const cv::Mat kept = withoutStrays(mask, expected);
+  EXPECT_EQ(cv::countNonZero(kept(object)), object.area());
+  EXPECT_EQ(cv::countNonZero(kept(stray)), 0);
+  expected.setTo(0);
+  expected(stray).setTo(255);  // it has gone elsewhere in a jump
+  EXPECT_EQ(cv::countNonZero(withoutStrays(mask, expected) != mask), 0);
+}
+
 }  // namespace
 }  // namespace calipso::align

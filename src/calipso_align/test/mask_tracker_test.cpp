@@ -160,6 +160,29 @@ TEST(MaskTracker, FollowsABarThatTurnsItsEnd) {
   EXPECT_GE(intersectionOverUnion(tracked.labels == 1, maskOf(kSize, bar(70, 108, 9))), 0.9);
 }
 
+// A dark thing passes behind a box with a dark window: what one of them was expected to be is not
+// the other's.
+TEST(MaskTracker, ObjectsOfOneColourKeepToTheirOwn) {
+  const cv::Rect body(80, 60, 50, 50), window(90, 66, 30, 20);
+  cv::Mat box = cv::Mat::zeros(kSize, CV_8U);
+  box(body).setTo(255);
+  const auto behind = [&](double u0) { return cv::Mat(maskOf(kSize, disc(u0, 60, 18)) & ~box); };
+  const auto frame = [&](double u0, int seed) {
+    cv::Mat image = picture(-100, -100, seed);
+    image.setTo(cv::Scalar(40, 38, 36), behind(u0));
+    image(body).setTo(cv::Scalar(50, 90, 190));
+    image(window).setTo(cv::Scalar(42, 38, 36));
+    return image;
+  };
+  MaskTracker tracker(frame(55, 1), (box & 1) | (behind(55) & 2));
+  for (int k = 1; k <= 15; ++k) {
+    const double u = 55 + 5.0 * k;
+    const TrackedMask tracked = tracker.track(frame(u, k + 1));
+    EXPECT_GE(intersectionOverUnion(tracked.labels == 1, box), 0.97) << "frame " << k;
+    EXPECT_GE(intersectionOverUnion(tracked.labels == 2, behind(u)), 0.9) << "frame " << k;
+  }
+}
+
 // A side that comes into view in a jump is the object's, although nothing moved there.
 TEST(MaskTracker, TakesInASideThatComesIntoView) {
   const auto box = [](int width, int seed) {

@@ -130,6 +130,19 @@ TEST(MaskTracker, WhatLooksLikeAModelledBodyDoesNotTakeItOver) {
   }
 }
 
+// At rest a surface looks the same in every frame; turning, it does not, and shows new sides.
+TEST(RigidShape, HoldsWhenABodyThatRestedStartsToTurn) {
+  const PaintedPear pear;
+  MaskTracker tracker(pear.picture(motionAt(0), 1), pear.mask(motionAt(0)) / 255,
+                      {{1, pear.surface()}});
+  for (int k = 1; k <= 2; ++k) tracker.track(pear.picture(motionAt(0), k + 1));
+  for (int k = 1; k <= 8; ++k) {
+    const Eigen::Isometry3d motion = motionAt(3 * k);
+    const TrackedMask tracked = tracker.track(pear.picture(motion, k + 3));
+    EXPECT_GE(intersectionOverUnion(tracked.labels == 1, pear.mask(motion)), 0.97) << "frame " << k;
+  }
+}
+
 // The model may lack details that the mask has.
 TEST(RigidShape, KeepsWhatTheMaskHadBesides) {
   const PaintedPear pear;

@@ -29,4 +29,9 @@ struct KnownBackground {
 cv::Mat settleEdge(const cv::Mat& image, const cv::Mat& other, const KnownBackground& background,
                    double noise, cv::Mat& mask);
 
+// The mask without the pieces that lie wholly outside of where it was expected, as long as these
+// are the smaller part of it: shadows, and other things of its colours.
+// @param mask, expected  CV_8U, 0 or 255, of equal size
+cv::Mat withoutStrays(const cv::Mat& mask, const cv::Mat& expected);
+
 }  // namespace calipso::align

@@ -63,6 +63,7 @@ class MaskTracker {
     GaussianMixture colours;         // of the key frame
     GaussianMixture recent_colours;  // of the last frame in which its mask was certain
     cv::Mat mask;                    // CV_8U, the whole picture
+    cv::Mat expected;                // CV_8U, where its motion alone has put it
     cv::Mat coverage;        // CV_8U, as `mask` but with the share of the pixels along its edge
     cv::Mat reference_mean;  // 4 x 4 px means of the frame in which `mask` was found
     int key_area = 0;        // px
@@ -87,9 +88,11 @@ class MaskTracker {
                                const cv::Mat& flow) const;
   void follow(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough);
   void lose(Object& object) const;
-  void partOverlaps(const cv::Mat& image);
   // Takes up the lost objects that have come back.
   void takeUpAgain(const cv::Mat& image, const cv::Mat& means);
+  // What two objects claim is left to one of them.
+  void settleClaims();
+  static void leave(Object& object, const cv::Mat& pixels);  // takes these from its mask
   TrackedMask combine(int moved) const;
   void settle(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
               const cv::Rect& roi);
