@@ -80,6 +80,7 @@ class FlowNodeTest : public testing::Test {
         model_.mesh, camera_, camera_.world_from_camera.inverse() * model_.world_from_object);
     labels(view.window).setTo(1, view.depth > 0.0f);
     cv_bridge::CvImage(headerOf(0), "mono8", labels).toImageMsg(msg.labels);
+    msg.contours.emplace_back();  // by which the key frame's is told from those that follow
     return msg;
   }
 

@@ -79,6 +79,7 @@ class LiveSheetTest : public testing::Test {
                     sheet_.camera.world_from_camera.inverse() * sheet_.model.world_from_object);
     labels(view.window).setTo(1, view.depth > 0.0f);
     cv_bridge::CvImage(headerOf(0), "mono8", labels).toImageMsg(segmentation.labels);
+    segmentation.contours.emplace_back();  // by which the key frame's is told from later ones
     labels_.publish(segmentation);
     calipso_msgs::AlignedModels models;
     models.header = headerOf(0);
