@@ -12,7 +12,6 @@
 #include "calipso_align/mask_edge.hpp"
 #include "layer_appearance.hpp"
 #include "layer_search.hpp"
-#include "reappearance.hpp"
 
 namespace calipso::align {
 namespace {
@@ -21,7 +20,6 @@ constexpr size_t kMaxSamples = 2000;
 constexpr float kLoosePrior = 1.5f;  // nats; what a prediction says that has proved wrong
 // of 255: how likely a pixel may lie in a shadow where nothing is known of any
 constexpr int kAnyShadow = 76;
-constexpr double kLeastNoise = 2.0;  // grey levels, of a still picture
 constexpr float kClearly = 3.0f;     // nats by which a colour is one object's rather than another's
 constexpr float kSureEnough = 0.8f;  // confidence that lets colours be learnt anew
 
@@ -139,28 +137,6 @@ TrackedMask MaskTracker::track(const cv::Mat& image) {
   return combine(static_cast<int>(moving.size()));
 }
 
-// A pixel goes to the one that was to be expected there; where both or neither were, to the one
-// whose model says so, or else to the later.
-void MaskTracker::settleClaims() {
-  for (size_t a = 0; a < objects_.size(); ++a)
-    for (size_t b = a + 1; b < objects_.size(); ++b) {
-      Object &one = objects_[a], &other = objects_[b];
-      const cv::Mat both = one.mask & other.mask;
-      if (cv::countNonZero(both) == 0) continue;
-      const cv::Mat expects_one = one.expected & ~other.expected,
-                    expects_other = other.expected & ~one.expected;
-      const bool first = one.shape && !other.shape;
-      const cv::Mat others = both & (first ? expects_other : ~expects_one);
-      leave(one, others);
-      leave(other, both & ~others);
-    }
-}
-
-void MaskTracker::leave(Object& object, const cv::Mat& pixels) {
-  object.mask.setTo(0, pixels);
-  object.coverage.setTo(0, pixels);
-}
-
 TrackedMask MaskTracker::combine(int moved) const {
   TrackedMask result{cv::Mat::zeros(size_, CV_8U), 1.0f, moved};
   for (const Object& object : objects_) {
@@ -177,33 +153,6 @@ void MaskTracker::follow(Object& object, const cv::Mat& image, const cv::Mat& fl
     lose(object);
   else
     settle(object, image, flow, rough(roi), roi);
-}
-
-void MaskTracker::lose(Object& object) const {
-  object.mask = cv::Mat::zeros(size_, CV_8U);
-  object.coverage = object.mask.clone();
-  object.expected = object.mask.clone();
-  object.confidence = 0.0f;
-  object.shape.reset();
-}
-
-void MaskTracker::takeUpAgain(const cv::Mat& image, const cv::Mat& means) {
-  constexpr double kLeastShare = 0.05;  // of its area in the key frame
-  constexpr float kConfidence = 0.5f;   // of a mask that no motion led to
-  cv::Mat taken = cv::Mat::zeros(size_, CV_8U);
-  for (const Object& object : objects_) taken |= object.mask;
-  for (Object& object : objects_) {
-    const int least = std::max(1, static_cast<int>(kLeastShare * object.key_area));
-    if (cv::countNonZero(object.mask) >= least) continue;
-    const cv::Mat found =
-        findAgain(image, background_, taken & ~object.mask, object.colours, least);
-    if (found.empty()) continue;
-    object.shape.reset();  // it was left behind
-    object.confidence = kConfidence;
-    accept(object, image, background_, kLeastNoise, found, cv::Rect(cv::Point(), size_));
-    object.reference_mean = means;
-    taken |= object.mask;
-  }
 }
 
 void MaskTracker::rememberBackground(const cv::Mat& image) {

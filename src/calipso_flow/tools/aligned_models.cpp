@@ -17,10 +17,10 @@ std::vector<AlignedModel> alignedModels(const Scene& scene, const Perturbation& 
     options.planes = scene.planes;
     options.attachments = object.attachments;
     options.depth = align::loadDepth(scene);
-    const align::AlignmentResult fit =
-        align::align(loadMesh(object.cad_path), scene.camera,
-                     perturbation.nudged(object.initial_world_from_object, scene.camera, object.index),
-                     key.contours[k].loops, options);
+    const align::AlignmentResult fit = align::align(
+        loadMesh(object.cad_path), scene.camera,
+        perturbation.nudged(object.initial_world_from_object, scene.camera, object.index),
+        key.contours[k].loops, options);
     AlignedModel aligned;
     aligned.model.name = object.name;
     aligned.model.index = object.index;

@@ -26,7 +26,8 @@ constexpr char kUsage[] =
     "  --filmed  adds bodies simulated in a known wind or with a known stiffness, filmed by this "
     "tool\n"
     "  --repeats N noisy films of a thrown box: how often the stated intervals hold the truth\n"
-    "  --perturb evaluates N further recordings of each scene: other grain, another rough placement\n"
+    "  --perturb evaluates N further recordings of each scene: other grain, another rough "
+    "placement\n"
     "  --scale   enlarges the frames first: 2 makes 1280x720 of 640x360\n";
 
 struct Arguments {

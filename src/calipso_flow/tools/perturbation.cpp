@@ -22,11 +22,12 @@ void Perturbation::addGrain(int k, cv::Mat& picture) const {
   cv::add(picture, grain, picture, cv::noArray(), CV_8UC3);
 }
 
-Eigen::Isometry3d Perturbation::nudged(const Eigen::Isometry3d& world_from_object, const Camera& camera,
-                                       int seed) const {
+Eigen::Isometry3d Perturbation::nudged(const Eigen::Isometry3d& world_from_object,
+                                       const Camera& camera, int seed) const {
   if (number_ == 0) return world_from_object;
   cv::RNG random = generator(number_, -1 - seed);
-  const double right = random.uniform(-kNudgePx, kNudgePx), down = random.uniform(-kNudgePx, kNudgePx);
+  const double right = random.uniform(-kNudgePx, kNudgePx),
+               down = random.uniform(-kNudgePx, kNudgePx);
   return shiftInPicture(camera, world_from_object, Eigen::Vector3d::Zero(), {right, down});
 }
 

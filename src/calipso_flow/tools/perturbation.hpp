@@ -19,7 +19,8 @@ class Perturbation {
   void addGrain(int k, cv::Mat& picture) const;
   // The placement moved by a fraction of a pixel, parallel to the picture.
   // @param seed  objects with different ones are moved differently
-  Eigen::Isometry3d nudged(const Eigen::Isometry3d& world_from_object, const Camera& camera, int seed) const;
+  Eigen::Isometry3d nudged(const Eigen::Isometry3d& world_from_object, const Camera& camera,
+                           int seed) const;
 
  private:
   int number_;

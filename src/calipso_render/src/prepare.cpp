@@ -7,9 +7,9 @@
 #include "calipso_render/shadow_map.hpp"
 #include "calipso_render/sky_map.hpp"
 #include "clip_motion.hpp"
+#include "edge_blur.hpp"
 #include "key_cover.hpp"
 #include "place_depth.hpp"
-#include "edge_blur.hpp"
 #include "prepare_background.hpp"
 #include "prepare_remarks.hpp"
 

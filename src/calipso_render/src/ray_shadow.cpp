@@ -11,7 +11,7 @@ namespace calipso::render {
 namespace {
 
 constexpr float kGoldenAngle = 2.39996323f;
-constexpr int kFirstRays = 6;       // if these agree, so do the others
+constexpr int kFirstRays = 6;  // if these agree, so do the others
 // coprime to the numbers of rays in use; so many golden angles are a fifth of a turn
 constexpr int kStride = 11;
 constexpr float kLiftPart = 2e-4f;  // of the occluders' extent

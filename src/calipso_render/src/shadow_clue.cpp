@@ -22,7 +22,7 @@ constexpr double kDeepest = 1.5;           // b at most
 constexpr double kLeastDeviation = 0.015;  // of log-brightness
 constexpr double kCorrelated = 20.0;       // so many neighbouring samples err alike
 constexpr int kStep = 2;                   // px
-constexpr float kShadow = 0.15f;  // darkness that may be a shadow
+constexpr float kShadow = 0.15f;           // darkness that may be a shadow
 constexpr std::size_t kCandidates = 24;
 
 float logBrightness(const cv::Vec3f& code) {

@@ -18,10 +18,10 @@ constexpr float kReach = 6.0f;    // radii of the objects in which their shadow 
 constexpr int kFlatReach = 4;     // px on either side of a pixel between which its surface is flat,
 constexpr float kFlat = 0.02f;    // but for this part of its distance
 constexpr int kGroups = 4, kFewest = 50;
-constexpr float kDarkest = 0.02f;                        // linear; added before the logarithm
+constexpr float kDarkest = 0.02f;                         // linear; added before the logarithm
 constexpr double kLeastDeviation = 0.015, kCapped = 3.0;  // of y', and of those the most that count
-constexpr double kAlike = 6.5;                           // so many cells err alike
-constexpr float kLift = 0.004f;                          // radii by which rays start off a surface
+constexpr double kAlike = 6.5;                            // so many cells err alike
+constexpr float kLift = 0.004f;                           // radii by which rays start off a surface
 constexpr int kDirections = 800;
 constexpr std::size_t kCandidates = 6;
 
