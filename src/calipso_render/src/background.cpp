@@ -1,6 +1,7 @@
 #include "calipso_render/background.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -254,7 +255,10 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const Inpaint
   }
   InpaintParams guide = place;
   if (any_moving) guide.planes.clear();  // copies that go on moving are shifted by whole pixels
+  const auto start = std::chrono::steady_clock::now();
   const InpaintResult filled = inpaint(look, background.invented, cv::Mat(), guide);
+  background.filling_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   filled.image.copyTo(background.plate, background.invented);
   background.origin = filled.origin;
   if (!any_moving) return;

@@ -18,6 +18,7 @@ struct Background {
   cv::Mat invented;  // CV_8UC1: 255 where no frame shows it
   cv::Mat origin;    // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
   LiveFill live;     // where an invented pixel's origin moves by itself; empty if nothing moves
+  double filling_ms = 0.0;  // wall time in which what is invented was filled
 };
 
 struct BackgroundParams {

@@ -107,7 +107,7 @@ struct Prepared {
                      0.4f};  // what the sun's absence leaves of a support plane's brightness
   NoiseModel noise;
   float outline_blur = 0.0f;  // px: how much softer than a pixel the video's outlines are
-  int views = 1;  // frames that light and texture come from
+  int views = 1;              // frames that light and texture come from
   double background_ms = 0.0,
          appearance_ms = 0.0;        // wall time that plate, and light with appearances, took
   std::vector<std::string> remarks;  // what had to be assumed or invented, for a diagnostic
