@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "world_fixtures.hpp"
@@ -28,8 +30,10 @@ WorldScene heldPlate() {
 double liftAt(double time) { return 0.5 * kLift * (1.0 - std::cos(2.0 * M_PI * time / kPeriod)); }
 
 // How far the free end is up at the end of every frame after it was touched.
-std::vector<double> liftsAfter(const std::function<void(World&)>& touch) {
+std::vector<double> liftsAfter(const std::function<void(World&)>& touch,
+                               std::string* reason = nullptr, int newton_iterations = 20) {
   WorldParams params;
+  params.fem.newton_iterations = newton_iterations;
   params.max_nodes = 300;
   params.defaults.youngs_modulus = 2e5;
   const WorldScene scene = heldPlate();
@@ -68,6 +72,7 @@ std::vector<double> liftsAfter(const std::function<void(World&)>& touch) {
       if (mesh.vertex(i).x() > 0.249) sum += vertices(i, 2) - 2.0 - mesh.vertex(i).z(), ++count;
     lifts.push_back(sum / count);
   }
+  if (reason) *reason = world.plan().at(0).reason;
   return lifts;
 }
 
@@ -111,6 +116,26 @@ TEST(ObservedDrive, AWindOfTheUsersEndsIt) {
   double sum = 0.0;  // it swings about its place in the key frame
   for (const double lift : still) sum += lift;
   EXPECT_NEAR(sum / static_cast<double>(still.size()), 0.0, 0.1 * kLift);
+}
+
+// A motion that no step can be solved for is not followed: the plate swings on without it, and the plan
+// says so.
+TEST(ObservedDrive, AMotionThatCannotBeFollowedEndsIt) {
+  std::string reason;
+  const std::vector<double> lifts = liftsAfter(
+      [](World& world) {
+        ObservedMotion lost;
+        lost.time = 12 * kFramePeriod;
+        lost.world_from_object = heldPlate().objects[0].world_from_object;
+        lost.mode_amplitudes = lost.mode_velocities = Eigen::VectorXd::Constant(1, 1e6);
+        world.addObservedMotion("thing", lost);
+      },
+      &reason, 1);
+  EXPECT_NE(reason.find("what drives it in the video is not told"), std::string::npos) << reason;
+  double most = 0.0;
+  for (const double lift : lifts) most = std::max(most, std::abs(lift));
+  EXPECT_LT(most, 2.0 * kLift);
+  EXPECT_GT(std::abs(lifts.back() - lifts[lifts.size() / 2]), 1e-4) << "frozen";
 }
 
 }  // namespace

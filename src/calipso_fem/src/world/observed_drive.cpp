@@ -10,6 +10,7 @@ namespace {
 constexpr double kLead = 143.0;
 // Residual over loads and inner forces: the next step makes up for it.
 constexpr double kTolerance = 1e-2;
+constexpr double kLost = 0.5;  // ... beyond that the step has found no balance at all
 
 }  // namespace
 
@@ -29,7 +30,8 @@ Vec ObservedDrive::advance(const Vec& positions, const Vec& velocities, double h
   const Eigen::VectorXd& mass = body.model().lumpedMass();
   for (Eigen::Index d = 0; d < F.size(); ++d) F[d] *= mass[d / 3];
   twin_->setDrive(F);
-  twin_->step(h);
+  const StepReport report = twin_->step(h);
+  holds_ = holds_ && (report.converged || report.residual < kLost);
   for (Eigen::Index d = 0; d < F.size(); ++d)
     F[d] -= mass[d / 3] * kLead / h * (body.positions()[d] - from[d]);
   return F;

@@ -24,10 +24,13 @@ class ObservedDrive {
 
   // Takes the twin a step of h (s) on. @return F, 3n, N, that took it there
   Vec advance(const Vec& positions, const Vec& velocities, double h);
+  // False: a step could not be solved; the motion told is none that the material could follow.
+  bool holds() const { return holds_; }
   const SoftObject& twin() const { return *twin_; }
 
  private:
   std::unique_ptr<SoftObject> twin_;
+  bool holds_ = true;
 };
 
 }  // namespace calipso::fem

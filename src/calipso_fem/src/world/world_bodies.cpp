@@ -254,8 +254,16 @@ void World::Impl::deformAsObserved(Actor& actor) {
   actor.drive = std::make_unique<ObservedDrive>(std::move(twin));
   actor.key_nodes = key;
   for (int k = steps - 1; k >= 0; --k) driveTo(actor, now - k * step, speed_scale * step);
-  const DeformableBody& led = actor.drive->twin().body();
-  body.setState(led.positions(), led.velocities());
+  if (actor.drive->holds()) {
+    const DeformableBody& led = actor.drive->twin().body();
+    body.setState(led.positions(), led.velocities());
+  } else {
+    const ObservedMotion start = actor.track.at(now);
+    body.setState(key + nodalModes(actor, start.mode_amplitudes),
+                  nodalModes(actor, start.mode_velocities));
+    endDrive(actor);
+    noteNoDrive(actor);
+  }
   actor.soft->changed();
 }
 

@@ -28,8 +28,29 @@ Vec World::Impl::driveTo(Actor& actor, double to, double h) {
 }
 
 void World::Impl::driveAsObserved(double to, double h) {
-  for (Actor& actor : actors)
-    if (actor.drive) actor.soft->setDrive(driveTo(actor, to, h));
+  for (Actor& actor : actors) {
+    if (!actor.drive) continue;
+    const Vec load = driveTo(actor, to, h);
+    if (actor.drive->holds()) {
+      actor.soft->setDrive(load);
+    } else {
+      endDrive(actor);
+      noteNoDrive(actor);
+    }
+  }
+}
+
+void World::Impl::endDrive(Actor& actor) {
+  if (!actor.drive) return;
+  actor.soft->setDrive(Vec::Zero(3 * actor.soft->body().nodeCount()));
+  actor.drive.reset();
+}
+
+void World::Impl::noteNoDrive(Actor& actor) {
+  actor.note +=
+      "what drives it in the video is not told: its material cannot follow the motion that was "
+      "seen; ";
+  plan_changed = true;
 }
 
 void World::Impl::applyLoads(double at, double h) {

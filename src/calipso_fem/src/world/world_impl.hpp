@@ -122,6 +122,8 @@ struct World::Impl {
   std::vector<SoftEntry> softEntries();
   Vec driveTo(Actor& actor, double to, double h);  // world_forces.cpp
   void driveAsObserved(double to, double h);
+  void endDrive(Actor& actor);
+  void noteNoDrive(Actor& actor);
   void applyLoads(double at, double h);  // world_forces.cpp
   Eigen::Vector3d twistOf(const Actor& actor, const Pull& pull, double at) const;
   void twistSoft(Actor& actor, const Pull& pull, double at);

@@ -153,8 +153,7 @@ std::string World::Impl::blow(Actor& actor, const Edit& edit) {
     throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
                                 " and no wind moves it; make it rigid or deformable (edit 'kind')");
   actor.air = air;
-  if (actor.drive) actor.soft->setDrive(Vec::Zero(3 * actor.soft->body().nodeCount()));
-  actor.drive.reset();  // another wind drives it now
+  endDrive(actor);  // another wind drives it now
   return "wind of " + describe(air.at(now)) + " m/s moves " + actor.object.name +
          (estimated ? ", changing as in the video" : "");
 }
