@@ -116,7 +116,8 @@ cv::Mat nearnessOf(const cv::Matx33d& to_plane, const cv::Size& size) {
 // A plane's part of the picture, in its chart.
 struct PlanePart {
   PlaneChart chart;
-  cv::Mat look;  // CV_32FC3; where the plane is not known it goes on smoothly
+  cv::Mat plain;  // CV_32FC3, the picture; where the plane is not seen it goes on smoothly
+  cv::Mat look;   // CV_32FC3, so, too
   cv::Mat hole, known, source;
 };
 
@@ -124,7 +125,13 @@ PlanePart partOf(const PlaneChart& chart, const cv::Mat& look, const cv::Mat& ho
                  const cv::Mat& seen) {
   cv::Mat copied_from;  // around which a sample sees nothing else
   cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
-  PlanePart part{chart, chart.carried(look), chart.any(hole), chart.whole(seen),
+  // What is not seen of the plane would shine through to what is.
+  const cv::Mat plain = smoothFill(look, seen == 0, seen);
+  PlanePart part{chart,
+                 plain,
+                 chart.carried(plain),
+                 chart.any(hole),
+                 chart.whole(seen),
                  chart.whole(copied_from)};
   part.known &= part.hole == 0, part.source &= part.hole == 0;
   smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
@@ -136,7 +143,7 @@ PlanePart partOf(const PlaneChart& chart, const cv::Mat& look, const cv::Mat& ho
 // @param wanted CV_8UC1, of the chart
 void copyBack(const PlanePart& part, const Filling& filled, const std::optional<Lattice>& lattice,
               const cv::Mat& wanted, const cv::Mat& hole, Canvas& canvas) {
-  const cv::Mat spline = splineOf(canvas.look);
+  const cv::Mat spline = splineOf(part.plain);
   const cv::Rect all({0, 0}, part.look.size());
   for (int v = 0; v < hole.rows; ++v) {
     for (int u = 0; u < hole.cols; ++u) {
