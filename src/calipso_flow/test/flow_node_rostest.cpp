@@ -9,6 +9,8 @@
 #include <ros/ros.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 
+#include <algorithm>
+
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
 #include "node_test_frames.hpp"
@@ -41,6 +43,12 @@ class FlowNodeTest : public testing::Test {
             topics::kDynamics, 100, [this](const auto& msg) { dynamics_.push_back(*msg); }),
         nh_.subscribe<sensor_msgs::Image>(topics::kFlow, 100,
                                           [this](const auto& msg) { flows_.push_back(*msg); })};
+  }
+
+  // What the node publishes for nobody, it does not compute.
+  bool hearsTheNode() const {
+    return std::all_of(subscribers_.begin(), subscribers_.end(),
+                       [](const ros::Subscriber& s) { return s.getNumPublishers() > 0; });
   }
 
   sensor_msgs::ImagePtr imageOf(int k) const {
@@ -127,7 +135,7 @@ TEST_F(FlowNodeTest, analysesTheClipAndRepeatsItPerFrame) {
   ros::Publisher aligned = nh_.advertise<calipso_msgs::AlignedModels>(topics::kModels, 1, true);
   ASSERT_TRUE(waitFor([&] {
     return clip_image.getNumSubscribers() > 0 && clip_info.getNumSubscribers() > 0 &&
-           image.getNumSubscribers() > 0 && info.getNumSubscribers() > 0;
+           image.getNumSubscribers() > 0 && info.getNumSubscribers() > 0 && hearsTheNode();
   })) << "the node did not come up";
 
   calipso_msgs::ClipInfo clip_msg;
