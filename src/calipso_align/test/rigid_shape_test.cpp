@@ -158,6 +158,26 @@ TEST(RigidShape, KeepsWhatTheMaskHadBesides) {
   EXPECT_EQ(cv::countNonZero((shape.distance(part) < 0.0f) != (mask(part) > 0)), 0);
 }
 
+// Its surface may come to look otherwise, as by turning in the light: the outline says that it is there.
+TEST(RigidShape, IsKeptWhileItsOutlineIsPlainlyMet) {
+  const PaintedPear pear;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  const cv::Mat mask = pear.mask(still), nowhere = cv::Mat::zeros(mask.size(), CV_8U),
+                flow = cv::Mat::zeros(mask.size(), CV_32FC2);
+  const cv::Rect whole(cv::Point(), mask.size());
+  cv::Mat grey, noise(mask.size(), CV_8U), speckled, evidence;
+  cv::cvtColor(pear.picture(still, 1), grey, cv::COLOR_BGR2GRAY);
+  cv::RNG(2).fill(noise, cv::RNG::UNIFORM, 0, 12);
+  cv::add(grey, noise, speckled);
+  mask.convertTo(evidence, CV_32F, 6.0 / 255.0, -3.0);
+  RigidShape shape(pear.surface(), mask);
+  for (const cv::Mat& now : {grey, speckled}) {
+    shape.moveAlong(grey, now, flow, mask);
+    shape.meetOutline(evidence, nowhere, whole);
+    EXPECT_TRUE(shape.holds());
+  }
+}
+
 TEST(RigidShape, IsGivenUpWhenTheBodyDeforms) {
   const PaintedPear pear;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();

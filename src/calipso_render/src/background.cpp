@@ -8,6 +8,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/stage.hpp"
+#include "masked_quantile.hpp"
 
 namespace calipso::render {
 namespace {
@@ -130,19 +131,6 @@ cv::Vec3f robustMean(const std::vector<cv::Vec3b>& values, float& spread) {
   return result;
 }
 
-float lowerQuartile(const cv::Mat& values, const cv::Mat& mask) {
-  std::vector<float> all;
-  for (int v = 0; v < values.rows; ++v) {
-    for (int u = 0; u < values.cols; ++u) {
-      if (mask.at<std::uint8_t>(v, u) != 0) all.push_back(values.at<float>(v, u));
-    }
-  }
-  if (all.empty()) return 0.0f;
-  const std::size_t quarter = all.size() / 4;
-  std::nth_element(all.begin(), all.begin() + quarter, all.end());
-  return all[quarter];
-}
-
 }  // namespace
 
 Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_move,
@@ -199,8 +187,9 @@ cv::Mat movingPlaces(const ClipFrame& key, const Background& background) {
   const auto beyondNoise = [&](const cv::Mat& change) {
     cv::Mat smooth;
     cv::blur(change, smooth, {5, 5});
-    return cv::Mat(smooth > std::max(kLeastMoving,
-                                     kMovingSpread * lowerQuartile(smooth, background.count > 0)));
+    return cv::Mat(
+        smooth >
+        std::max(kLeastMoving, kMovingSpread * quantileOf(smooth, background.count > 0, 0.25)));
   };
   const cv::Mat spreads = beyondNoise(background.spread);
   if (kFewestMoving * static_cast<std::size_t>(cv::countNonZero(spreads)) <= spreads.total())

@@ -5,6 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "masked_quantile.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -223,18 +225,6 @@ cv::Mat differenceFromShifted(const Lattice& lattice, const cv::Mat& image, cons
   return sum / cv::max(weights, 1e-3);
 }
 
-float medianOf(const cv::Mat& values, const cv::Mat& mask) {
-  std::vector<float> all;
-  for (int v = 0; v < values.rows; ++v) {
-    for (int u = 0; u < values.cols; ++u) {
-      if (mask.at<std::uint8_t>(v, u) != 0) all.push_back(values.at<float>(v, u));
-    }
-  }
-  if (all.empty()) return 0.0f;
-  std::nth_element(all.begin(), all.begin() + all.size() / 2, all.end());
-  return all[all.size() / 2];
-}
-
 }  // namespace
 
 std::optional<Lattice> findLattice(const cv::Mat& image, const cv::Mat& known) {
@@ -263,7 +253,7 @@ cv::Mat goesOnByLattice(const Lattice& lattice, const cv::Mat& image, const cv::
   cv::Mat weight, on, other, to_on, to_other;
   known.convertTo(weight, CV_32F, 1.0 / 255.0);
   const cv::Mat difference = differenceFromShifted(lattice, image, weight);
-  on = known & (difference < kUnlike * medianOf(difference, known) + kLeastUnlike);
+  on = known & (difference < kUnlike * quantileOf(difference, known, 0.5) + kLeastUnlike);
   cv::morphologyEx(on, on, cv::MORPH_OPEN, cv::Mat::ones(kCompared, kCompared, CV_8U), {-1, -1}, 1,
                    cv::BORDER_REPLICATE);
   // Gaps in what is known belong to it.

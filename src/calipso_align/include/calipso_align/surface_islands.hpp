@@ -13,7 +13,8 @@ struct Relief;
 cv::Mat surfaceIslands(const Relief& relief, float largest_jump);
 
 // What nothing holds to its surroundings is one object, whatever its colours: per pixel the seed
-// of an island (of `surfaceIslands`, or of what supports carry) that bears seeds of one object only and lies where that may lie; else 0.
+// of an island (of `surfaceIslands`, or of what supports carry) that bears seeds of one object only
+// and lies where that may lie; else 0.
 // seeds    CV_8U: label number + 1, 0: none; label 0 is the background
 // allowed  CV_8U per object, from label 1
 cv::Mat seedsOfIslands(const cv::Mat& islands, const cv::Mat& seeds,
