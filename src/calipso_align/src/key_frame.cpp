@@ -1,7 +1,6 @@
 #include "calipso_align/key_frame.hpp"
 
 #include <chrono>
-#include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
@@ -23,12 +22,6 @@ cv::Mat readImage(const std::string& path, int flags) {
   if (image.empty())
     throw std::runtime_error(path + ": no readable image; give a PNG or JPEG file");
   return image;
-}
-
-std::string framePath(const Scene& scene, int frame) {
-  char name[4096];
-  std::snprintf(name, sizeof(name), scene.frame_pattern.c_str(), frame);
-  return scene.directory + "/" + name;
 }
 
 // Fits the low-order deformations only: what is to be told is where the contour is implausible. What
@@ -92,7 +85,7 @@ std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
 }
 
 cv::Mat loadKeyImage(const Scene& scene) {
-  return readImage(framePath(scene, 0), cv::IMREAD_COLOR);
+  return readImage(scene.framePath(0), cv::IMREAD_COLOR);
 }
 
 cv::Mat loadStrokes(const Scene& scene) {

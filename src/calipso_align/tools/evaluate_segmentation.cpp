@@ -73,10 +73,9 @@ double cpuMsOf(const Action& action) {
 }
 
 cv::Mat readFrame(const Scene& scene, int frame) {
-  char name[4096];
-  std::snprintf(name, sizeof(name), scene.frame_pattern.c_str(), frame);
-  const cv::Mat image = cv::imread(scene.directory + "/" + name, cv::IMREAD_COLOR);
-  if (image.empty()) throw std::runtime_error(scene.directory + "/" + name + ": no readable image");
+  const std::string path = scene.framePath(frame);
+  const cv::Mat image = cv::imread(path, cv::IMREAD_COLOR);
+  if (image.empty()) throw std::runtime_error(path + ": no readable image");
   return image;
 }
 
@@ -84,10 +83,9 @@ cv::Mat readFrame(const Scene& scene, int frame) {
 cv::Mat trueLabels(const Scene& scene, int frame) {
   cv::Mat labels = cv::Mat::zeros(scene.camera.height, scene.camera.width, CV_8U);
   for (const SceneObject& object : scene.objects) {
-    char name[64];
-    std::snprintf(name, sizeof(name), "_%06d.png", frame);
-    const cv::Mat mask =
-        cv::imread(scene.directory + "/masks/" + object.name + name, cv::IMREAD_GRAYSCALE);
+    const std::string path =
+        scene.directory + "/masks/" + object.name + numbered("_%06d.png", frame);
+    const cv::Mat mask = cv::imread(path, cv::IMREAD_GRAYSCALE);
     if (mask.empty()) return {};
     labels.setTo(object.index, mask > 127);
   }
@@ -173,9 +171,8 @@ Tracking track(const Scene& scene, const cv::Mat& start, const std::map<int, Mod
       const cv::Mat found = tracked.labels == object.index, right = truth == object.index;
       result.iou[object.index].push_back(intersectionOverUnion(found, right));
       if (pictures.empty() || frame % 4 != 0) continue;
-      char name[64];
-      std::snprintf(name, sizeof(name), "_%06d.png", frame);
-      writeErrors(pictures + "/" + scene.name + "_" + object.name + name, image, found, right);
+      writeErrors(pictures + "/" + scene.name + "_" + object.name + numbered("_%06d.png", frame),
+                  image, found, right);
     }
   }
   result.ms_per_frame /= std::max(1, frames);

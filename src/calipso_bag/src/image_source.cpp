@@ -1,13 +1,13 @@
 #include "calipso_bag/image_source.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
-#include <regex>
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "calipso_scene/scene.hpp"
 
 namespace calipso::bag {
 namespace {
@@ -20,21 +20,6 @@ cv::Mat readImage(const std::string& path) {
     throw std::runtime_error(path + ": missing, or not an image; every frame must be there");
   }
   return image;
-}
-
-// @pre requirePattern(pattern)
-std::string numbered(const std::string& pattern, int index) {
-  std::vector<char> text(pattern.size() + 32);
-  std::snprintf(text.data(), text.size(), pattern.c_str(), index);
-  return text.data();
-}
-
-// A file name pattern comes from the user: nothing but one integer may be formatted by it.
-void requirePattern(const std::string& pattern) {
-  static const std::regex kOneInteger("[^%]*%(0?[1-9])?d[^%]*");
-  if (std::regex_match(pattern, kOneInteger)) return;
-  throw std::invalid_argument("frame pattern '" + pattern +
-                              "' needs exactly one integer field, like frames/%06d.jpg");
 }
 
 void requireSize(const cv::Mat& image, const cv::Size& size, const std::string& what) {
@@ -133,7 +118,7 @@ class Held : public ImageSource {
 
 std::unique_ptr<ImageSource> openSequence(const std::string& directory, const std::string& pattern,
                                           int count, double fps) {
-  requirePattern(pattern);
+  numbered(pattern, 0);  // refuses a pattern at once
   return std::make_unique<Sequence>(directory, pattern, count, fps);
 }
 

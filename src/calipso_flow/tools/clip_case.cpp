@@ -1,6 +1,5 @@
 #include "clip_case.hpp"
 
-#include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -85,9 +84,7 @@ cv::Mat maskOf(const TrueObject& truth, const std::optional<AlignedModel>& align
 }  // namespace
 
 cv::Mat ClipCase::frame(int k) const {
-  char name[512];
-  std::snprintf(name, sizeof name, scene.frame_pattern.c_str(), k);
-  const std::string path = scene.directory + "/" + name;
+  const std::string path = scene.framePath(k);
   cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
   if (picture.empty()) throw std::runtime_error(path + " is no picture that can be read");
   perturbation.addGrain(k, picture);

@@ -2,7 +2,6 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <cstdio>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
@@ -18,12 +17,6 @@ Eigen::Isometry3d toIsometry(const YAML::Node& rows) {
   Eigen::Isometry3d pose;
   pose.matrix() = m;
   return pose;
-}
-
-std::string numbered(const std::string& pattern, int k) {
-  char name[512];
-  std::snprintf(name, sizeof(name), pattern.c_str(), k);
-  return name;
 }
 
 // The shapes of a deforming object, from an array of NumPy's format 1.0: little-endian floats,
@@ -92,7 +85,7 @@ Truth loadTruth(const Scene& scene) {
 }
 
 cv::Mat loadFrame(const Scene& scene, int k) {
-  const std::string file = scene.directory + "/" + numbered(scene.frame_pattern, k);
+  const std::string file = scene.framePath(k);
   const cv::Mat frame = cv::imread(file, cv::IMREAD_COLOR);
   if (frame.empty()) throw std::runtime_error(file + ": cannot be read as a picture");
   return frame;

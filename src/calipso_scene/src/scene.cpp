@@ -1,9 +1,12 @@
 #include "calipso_scene/scene.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
+#include <regex>
 #include <set>
 #include <stdexcept>
+#include <vector>
 
 #include "yaml_reading.hpp"
 
@@ -13,6 +16,17 @@ namespace {
 
 std::string existing(const std::string& path) {
   return std::filesystem::exists(path) ? path : std::string();
+}
+
+bool hasOneInteger(const std::string& pattern) {
+  static const std::regex kOneInteger("[^%]*%(0?[1-9])?d[^%]*");
+  return std::regex_match(pattern, kOneInteger);
+}
+
+int frameFiles(const Scene& scene) {
+  int count = 0;
+  while (std::filesystem::exists(scene.framePath(count))) ++count;
+  return count;
 }
 
 Camera readCamera(const YAML::Node& root, const YamlReader& reader) {
@@ -111,6 +125,17 @@ void readObjects(const YAML::Node& root, const std::string& file, Scene& scene) 
 
 }  // namespace
 
+std::string numbered(const std::string& pattern, int k) {
+  if (!hasOneInteger(pattern))
+    throw std::invalid_argument("frame pattern '" + pattern +
+                                "' needs exactly one integer field, like frames/%06d.jpg");
+  std::vector<char> text(pattern.size() + 32);
+  std::snprintf(text.data(), text.size(), pattern.c_str(), k);
+  return text.data();
+}
+
+std::string Scene::framePath(int k) const { return directory + "/" + numbered(frame_pattern, k); }
+
 Camera Scene::cameraAt(int k) const {
   Camera at = camera;
   const auto& moving = world_from_camera_per_frame;
@@ -134,10 +159,14 @@ Scene loadScene(const std::string& directory) {
   const YamlReader reader(file, "");
   Scene scene;
   scene.directory = directory;
-  scene.name = reader.text(root, "name");
+  scene.name = root["name"] ? reader.text(root, "name")
+                            : std::filesystem::canonical(directory).filename().string();
   scene.fps = reader.positive(root, "fps", "Hz");
-  scene.frame_count = reader.integer(root, "n_frames");
   scene.frame_pattern = reader.text(root, "frames", "frames/%06d.jpg");
+  if (!hasOneInteger(scene.frame_pattern))
+    reader.fail("frames", "is '" + scene.frame_pattern +
+                              "'; it needs exactly one integer field, like frames/%06d.jpg");
+  scene.frame_count = root["n_frames"] ? reader.integer(root, "n_frames") : frameFiles(scene);
   scene.camera = readCamera(root, reader);
   scene.world_from_camera_per_frame = readCameraPath(root, reader);
   if (root["gravity"]) scene.gravity = reader.vector(root, "gravity", 3);

@@ -46,6 +46,22 @@ TEST(Scene, readsWhatAUserGives) {
   EXPECT_TRUE(scene.depth_path.empty());
 }
 
+TEST(Scene, nameAndNumberOfFramesAreTheFoldersWhereTheFileHasNone) {
+  const std::string fps_on = kHead.substr(kHead.find("fps"));
+  const auto without = [&](const std::string& line) {
+    std::string yaml = fps_on;
+    return yaml.erase(yaml.find(line), line.size()) + kPose + kObject;
+  };
+  const std::string directory = writeScene(without("n_frames: 2\n"));
+  std::filesystem::create_directories(directory + "/frames");
+  for (int k = 0; k < 3; ++k) std::ofstream(directory + "/" + numbered("frames/%06d.jpg", k));
+  const Scene scene = loadScene(directory + "/");
+  std::filesystem::remove_all(directory + "/frames");
+  EXPECT_EQ(scene.name, "scene");
+  EXPECT_EQ(scene.frame_count, 3);
+  EXPECT_EQ(scene.framePath(12), scene.directory + "/frames/000012.jpg");
+}
+
 TEST(Scene, aPointAheadProjectsToThePrincipalPoint) {
   const Camera camera = loadScene(writeScene(kHead + kPose + kObject)).camera;
   EXPECT_TRUE(camera.projectWorld({0, 3, 1}).isApprox(Eigen::Vector2d(31.5, 17.5), 1e-12));
@@ -86,6 +102,7 @@ TEST(Scene, badInputNamesKeyAndRemedy) {
   expect("name: desk\nfps: -30\n" + kPose + kObject, "fps is -30; it must be > 0 Hz");
   expect(kHead + kObject, "world_T_camera is missing");
   expect(kHead + kPose, "objects is empty");
+  expect(kHead + kPose + kObject + "frames: frames/%s.jpg\n", "exactly one integer field");
   expect(kHead + kPose + kObject + "distortion: [0.1, 0, 0, 0, 0]\n", "undistort");
   expect(kHead + "world_T_camera: [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n",
          "not a rigid transform");

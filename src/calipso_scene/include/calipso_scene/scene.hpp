@@ -36,10 +36,10 @@ struct SceneObject {
 // What a user gives about a clip (scene.yaml): camera, gravity, supports, objects. Reads nothing
 // else of a scene folder: a folder without its ground truth gives the same Scene.
 struct Scene {
-  std::string name;
+  std::string name;  // the folder's where scene.yaml names none
   std::string directory;
   double fps = 0.0;
-  int frame_count = 0;
+  int frame_count = 0;        // the files there are where scene.yaml has no n_frames
   std::string frame_pattern;  // printf style, relative to directory
   Camera camera;              // pose: frame 0
   std::vector<Eigen::Isometry3d> world_from_camera_per_frame;  // empty when the camera stands still
@@ -52,12 +52,18 @@ struct Scene {
   double depth_scale = 0.001;  // m per unit of the depth image
   std::vector<SceneObject> objects;
 
+  std::string framePath(int k) const;
+
   // The camera as it stands at frame k; past the last pose it stays there.
   Camera cameraAt(int k) const;
 
   // @throw std::invalid_argument naming the object asked for and the ones there are
   const SceneObject& object(const std::string& name) const;
 };
+
+// "frames/%06d.jpg", 7 -> "frames/000007.jpg".
+// @throw std::invalid_argument unless the pattern has exactly one integer field
+std::string numbered(const std::string& pattern, int k);
 
 // @throw std::runtime_error / std::invalid_argument naming file, key, value and remedy
 Scene loadScene(const std::string& directory);
