@@ -142,5 +142,29 @@ TEST(RigidWorld, BodiesOfSeveralPartsMeetAgainAfterTheyWereApart) {
   }
 }
 
+// Round and square bodies come to rest on a plane that ends, wherever they come down, as on an
+// endless one; past its end they fall.
+TEST(RigidWorld, BodiesRestOnAPlaneThatEnds) {
+  for (const bool round : {true, false}) {
+    for (const double x : {-1.0, -0.31, 0.02, 0.4, 1.7, 2.6, 3.3}) {
+      RigidWorld world;
+      world.addPlane({"step", Eigen::Vector3d::UnitZ(), 0.2, Eigen::Vector2d(-1.25, 3.0)}, {});
+      RigidBodySpec spec;
+      spec.name = "body";
+      spec.shapes = {round ? test::sphereSurface(0.07, 16, 32)
+                           : test::boxSurface({0.14, 0.14, 0.14}, 1)};
+      spec.mass = massProperties(spec.shapes.front(), 300.0);
+      spec.world_from_object.translation() = Eigen::Vector3d(x, 0.15, 0.5);
+      const RigidWorld::Id id = world.add(spec);
+      world.setAcceleration(id, {0, 0, -kG});
+      for (int k = 0; k < 60; ++k) world.step(kStep);
+      if (x < 3.0)
+        EXPECT_NEAR(world.center(id).z(), 0.27, 2e-3) << round << " at " << x;
+      else
+        EXPECT_LT(world.center(id).z(), -2.0) << round << " at " << x;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace calipso::fem

@@ -10,7 +10,9 @@ btVector3 unpacked(const Four& v) { return {v[0], v[1], v[2]}; }
 
 RigidRow CoulombSolver::packed(const btSolverConstraint& row) {
   RigidRow r;
-  r.normal = fem::packed(row.m_contactNormal1);
+  // Bullet leaves a static body's normal zero, whichever of the two it is.
+  r.normal = fem::packed(row.m_contactNormal1.isZero() ? -row.m_contactNormal2
+                                                       : row.m_contactNormal1);
   r.turn_a = fem::packed(row.m_relpos1CrossNormal);
   r.turn_b = fem::packed(row.m_relpos2CrossNormal);
   r.angular_a = fem::packed(row.m_angularComponentA);
