@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 
 #include "calipso_flow/look_match.hpp"
 #include "calipso_flow/outline_match.hpp"
+#include "calipso_flow/surface_view.hpp"
 #include "calipso_scene/median.hpp"
 
 namespace calipso::flow {
@@ -18,11 +20,32 @@ constexpr double kLeastInlierShare = 0.35;
 // px: where the last frame was foreseen so well, this one is matched at once.
 constexpr double kForeseenPx = 0.7;
 constexpr int kRadius = 5;  // px, of a patch: a sheet is often plain
+// px, of a square as large as the sheet is seen: from twice that on, a smaller picture does.
+constexpr double kSheetSide = 140.0;
 
 DeformationField::Points matrixOf(const std::vector<Eigen::Vector3d>& points) {
   DeformationField::Points matrix(points.size(), 3);
   for (size_t i = 0; i < points.size(); ++i) matrix.row(i) = points[i].transpose();
   return matrix;
+}
+
+// How many times smaller the frames are in which a sheet is followed: where it is seen larger, a
+// patch has too little of a plain sheet's pattern. What bends little is measured as finely as it is
+// seen.
+int reductionFor(const DeformationField& field, const ObjectModel& model, const Camera& camera) {
+  if (!field.sheetNormal()) return 1;
+  const SurfaceView view =
+      viewSurface(model.mesh, camera, camera.world_from_camera.inverse() * model.world_from_object);
+  const double side = view.empty() ? 0.0 : std::sqrt(cv::countNonZero(view.depth > 0.0f));
+  return std::max(1, static_cast<int>(side / kSheetSide));
+}
+
+cv::Mat reducedMask(const cv::Mat& mask, const Camera& camera, int factor) {
+  if (mask.empty() || factor == 1) return mask;
+  cv::Mat small;
+  const cv::Rect whole(0, 0, camera.width * factor, camera.height * factor);
+  cv::resize(mask(whole) != 0, small, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return small > 127;
 }
 
 }  // namespace
@@ -32,19 +55,26 @@ DeformableTracker::DeformableTracker(const ObjectModel& model, const Frame& key_
     : model_(model),
       params_(params),
       edges_(edgesOf(model.mesh)),
-      reference_(key_frame, model, model.world_from_object, mask, params.seed_count),
       fitter_(model, params.deformation),
+      reduction_(reductionFor(fitter_.field(), model, key_frame.camera)),
+      reference_(inReduced(key_frame, mask)),
       vertex_weights_(fitter_.field().weightsAt(model.mesh.vertices)),
       points_(matrixOf(reference_.gridPoints(kPoints))) {
   point_weights_ = fitter_.field().weightsAt(points_);
   params_.patch = stripePatches(params.patch);
   params_.patch.radius_px = std::max(params.patch.radius_px, kRadius);
-  outline_bias_ =
-      OutlineBias(findOutline(edges_, model.mesh, model.mesh.vertices,
-                              reference_.warp(key_frame.camera, model.world_from_object), key_frame,
-                              model.world_from_object));
+  const Frame& key = reference_.frame();
+  outline_bias_ = OutlineBias(findOutline(edges_, model.mesh, model.mesh.vertices,
+                                          reference_.warp(key.camera, model.world_from_object), key,
+                                          model.world_from_object));
   last_ = keyObservation();
   last_.time = key_frame.time;
+}
+
+ReferenceView DeformableTracker::inReduced(const Frame& key_frame, const cv::Mat& mask) const {
+  const Frame small = reduced(key_frame, reduction_);
+  return ReferenceView(small, model_, model_.world_from_object,
+                       reducedMask(mask, small.camera, reduction_), params_.seed_count);
 }
 
 DeformationObservation DeformableTracker::keyObservation() const {
@@ -131,8 +161,15 @@ double DeformableTracker::missOf(const Eigen::VectorXd& predicted,
   return misses.empty() ? std::numeric_limits<double>::infinity() : median(std::move(misses));
 }
 
-DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
+Track DeformableTracker::trackOf(const SurfaceMatch& match, bool inlier) const {
+  const Eigen::Vector2d half = Eigen::Vector2d::Constant(0.5);
+  return {match.point, reduction_ * (match.pixel + half) - half, 1.0,
+          reduction_ * std::sqrt(0.5 * match.covariance.trace()), inlier};
+}
+
+DeformationObservation DeformableTracker::track(const Frame& whole, bool cut) {
   if (cut) before_last_.reset();
+  const Frame frame = reduced(whole, reduction_);
   const Eigen::VectorXd predicted = predict(frame.time);
   DeformationObservation observation;
   observation.time = frame.time;
@@ -152,11 +189,8 @@ DeformationObservation DeformableTracker::track(const Frame& frame, bool cut) {
     observation.covariance = fit.covariance;
     observation.deviation = fit.deviation;
     observation.tracks.clear();
-    for (size_t i = 0; i < matches.size(); ++i) {
-      const double deviation = std::sqrt(0.5 * matches[i].covariance.trace());
-      observation.tracks.push_back(
-          {matches[i].point, matches[i].pixel, 1.0, deviation, fit.inlier[i]});
-    }
+    for (size_t i = 0; i < matches.size(); ++i)
+      observation.tracks.push_back(trackOf(matches[i], fit.inlier[i]));
   }
   if (!observation.found) {
     before_last_.reset();

@@ -47,6 +47,7 @@ Frame makeFrame(double time, const cv::Mat& picture, const Camera& camera) {
 }
 
 Frame reduced(const Frame& frame, int factor) {
+  if (factor == 1) return frame;
   Frame small = frame;
   Camera& camera = small.camera;
   camera.width /= factor, camera.height /= factor;

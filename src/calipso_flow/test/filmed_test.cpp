@@ -4,11 +4,19 @@
 
 #include "../tools/film.hpp"
 #include "calipso_flow/clip_dynamics.hpp"
+#include "calipso_flow/deformable_tracker.hpp"
 #include "calipso_flow/live_dynamics.hpp"
+#include "calipso_scene/median.hpp"
 
 // Bodies whose motion is known because it was simulated, estimated from pictures of them.
 namespace calipso::flow {
 namespace {
+
+int nearestVertex(const ObjectModel& model, const Eigen::Vector3d& point) {
+  int nearest = 0;
+  (model.mesh.vertices.rowwise() - point.transpose()).rowwise().squaredNorm().minCoeff(&nearest);
+  return nearest;
+}
 
 TEST(Filmed, windAcrossASheetIsFound) {
   const Eigen::Vector3d wind(0.0, 4.0, 0.0);
@@ -72,6 +80,36 @@ TEST(Filmed, aSheetIsFollowedLive) {
   ASSERT_EQ(of_late.size(), 1u);
   ASSERT_TRUE(of_late[0].deformation->wind) << of_late[0].deformation->note;
   EXPECT_NEAR(of_late[0].deformation->wind->mean.y(), 4.0, 0.6);
+}
+
+// It is followed in smaller frames; its tracks are told in those that were given.
+TEST(Filmed, aSheetSeenTwiceAsLargeIsFollowedAsWell) {
+  const FilmedSheet sheet = filmedSheet({0.0, 4.0, 0.0}, 8);
+  Camera camera = sheet.camera;
+  camera.width *= 2, camera.height *= 2, camera.fx *= 2.0, camera.fy *= 2.0;
+  camera.cx = 2.0 * camera.cx + 0.5, camera.cy = 2.0 * camera.cy + 0.5;
+  const auto frame = [&](size_t k) {
+    return makeFrame(sheet.times[k], film(sheet.model, sheet.shapes[k], camera, 2.0, k + 1),
+                     camera);
+  };
+  DeformableTracker tracker(sheet.model, frame(0), cv::Mat(), {});
+  for (size_t k = 1; k < sheet.times.size(); ++k) {
+    const DeformationObservation seen = tracker.track(frame(k), false);
+    ASSERT_TRUE(seen.found);
+    const Eigen::MatrixXd surface = tracker.surfaceAt(seen.controls).rowwise() +
+                                    sheet.model.world_from_object.translation().transpose();
+    const Eigen::MatrixXd motion = sheet.shapes[k] - sheet.shapes[0];
+    // Two to four percent are left over a clip; here the first frames, in which it hardly moves.
+    EXPECT_LT((surface - sheet.shapes[k]).norm(), 0.1 * motion.norm() + 0.01);
+    std::vector<double> off;  // px
+    for (const Track& track : seen.tracks) {
+      const int v = nearestVertex(sheet.model, track.point);
+      const Eigen::Vector3d there =
+          sheet.model.world_from_object * track.point + motion.row(v).transpose();
+      off.push_back((camera.projectWorld(there) - track.pixel).norm());
+    }
+    EXPECT_LT(median(off), 0.7);
+  }
 }
 
 TEST(Filmed, beamVibratesAtItsFrequency) {

@@ -45,6 +45,8 @@ class DeformableTracker {
   const DeformationField::Weights& vertexWeights() const { return vertex_weights_; }
 
  private:
+  ReferenceView inReduced(const Frame& key_frame, const cv::Mat& mask) const;
+  Track trackOf(const SurfaceMatch& match, bool inlier) const;
   Eigen::VectorXd predict(double time) const;
   // A sheet that was foreseen well is matched at once; a solid's vibration is too fine for that.
   bool isForeseen() const;
@@ -58,8 +60,9 @@ class DeformableTracker {
   TrackerParams params_;
   std::vector<SurfaceEdge> edges_;
   OutlineBias outline_bias_;  // of the key frame, where the shape is known
-  ReferenceView reference_;
   DeformationFitter fitter_;
+  int reduction_;  // frames are followed so many times smaller
+  ReferenceView reference_;
   DeformationField::Weights vertex_weights_, point_weights_;
   DeformationField::Points points_;  // surface points followed, object frame
   DeformationObservation last_;
