@@ -152,30 +152,33 @@ Eigen::VectorXd WindFit::stepFrom(const Linearised& at, const Eigen::MatrixXd& P
 }
 
 std::optional<WindFit::Fitted> WindFit::steady(const Eigen::Vector3d& direction) const {
+  if (sheets_.given()) return firstGuess(direction, 0.0);
   const double motion = flat(modes_.amplitudes).squaredNorm();
   std::optional<Fitted> best;
   for (const double log_stiffness : {0.0, kStiffStart}) {
-    const std::optional<Fitted> fitted =
-        solve({times_.front()}, firstGuess(direction, log_stiffness));
+    const std::optional<Fitted> guess = firstGuess(direction, log_stiffness);
+    const std::optional<Fitted> fitted = guess ? solve({times_.front()}, guess->w) : std::nullopt;
     if (!fitted) continue;
     const bool none_shown = best && fitted->left > (1.0 - kHardlyShown) * motion &&
                             best->left > (1.0 - kHardlyShown) * motion;
     if (!best || fitted->cost < best->cost || none_shown) best = fitted;
-    if (fitted->left < (1.0 - kWellShown) * motion || sheets_.given()) break;
+    if (fitted->left < (1.0 - kWellShown) * motion) break;
   }
   return best;
 }
 
-Eigen::VectorXd WindFit::firstGuess(const Eigen::Vector3d& direction, double log_stiffness) const {
-  Eigen::VectorXd best(4);
-  double least = std::numeric_limits<double>::infinity();
+std::optional<WindFit::Fitted> WindFit::firstGuess(const Eigen::Vector3d& direction,
+                                                   double log_stiffness) const {
+  std::optional<Fitted> best;
   for (const double strength : kGuesses) {
-    Eigen::VectorXd w(4);
-    w << strength * direction, log_stiffness;
-    const std::optional<SheetMotion> motion = simulated({times_.front()}, w, false);
-    const double left = motion ? flat(motion->amplitudes - modes_.amplitudes).squaredNorm() : least;
-    if (strength > kGuesses[0] && left >= least) break;
-    best = w, least = left;
+    Fitted guess;
+    guess.w = (Eigen::Vector4d() << strength * direction, log_stiffness).finished();
+    const std::optional<SheetMotion> motion = simulated({times_.front()}, guess.w, false);
+    if (!motion) return std::nullopt;
+    guess.amplitudes = motion->amplitudes;
+    guess.left = flat(motion->amplitudes - modes_.amplitudes).squaredNorm();
+    if (best && guess.left >= best->left) break;
+    best = guess;
   }
   return best;
 }

@@ -28,7 +28,8 @@ class WindFit {
   std::optional<Fitted> solve(const std::vector<double>& knots, Eigen::VectorXd w) const;
   // A steady wind and log s. A stiff sheet in much wind and a soft one in little are two valleys:
   // the better of both ends. Where neither shows the motion, it is for a changing wind to do, on
-  // the stiff one, which answers it more evenly.
+  // the stiff one, which answers it more evenly. Of a sheet whose stiffness is given, and which may
+  // not move as a hanging sheet does at all, the first guess: more would follow its errors.
   // @param direction  unit vector, of the wind that is tried first
   std::optional<Fitted> steady(const Eigen::Vector3d& direction) const;
   // Amplitudes of the modes and, if asked for, how they depend on w. Nothing where the sheet is too
@@ -52,8 +53,8 @@ class WindFit {
   // known beforehand.
   Eigen::VectorXd stepFrom(const Linearised& at, const Eigen::MatrixXd& P, const Eigen::VectorXd& w,
                            double damping) const;
-  // The strength in `direction` that shows most.
-  Eigen::VectorXd firstGuess(const Eigen::Vector3d& direction, double log_stiffness) const;
+  // The strength in `direction` that shows most; w and amplitudes alone.
+  std::optional<Fitted> firstGuess(const Eigen::Vector3d& direction, double log_stiffness) const;
   // w, as it was known beforehand where the pictures say no more.
   Eigen::VectorXd seenPart(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P,
                            const Eigen::VectorXd& w) const;
