@@ -5,131 +5,23 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/stage.hpp"
+#include "key_cover.hpp"
 #include "masked_quantile.hpp"
+#include "place_samples.hpp"
 
 namespace calipso::render {
 namespace {
 
-constexpr float kNearMedian = 6.0f;    // code values; farther ones do not enter the mean
-constexpr float kLit = 0.75f;          // quantile of brightness that stands for the unshaded value
-constexpr std::size_t kFewestLit = 3;  // samples that a lit or shaded group must have
-constexpr double kGroupGap = 4.0;      // gap between two groups, in spreads of either
-// a shadow's largest ratio of shaded to lit in a channel over its smallest
-constexpr float kShadowTint = 1.8f;
 constexpr int kAgree = 7;  // px; a shadow that stays covers most of such a square or nothing of it
 constexpr float kMovingSpread = 2.2f;  // times what still places have, and
 constexpr float kLeastMoving = 2.0f;   // code values: from there on a place moves by itself
 constexpr int kMovingGap = 12;         // px between moving places that move with them
 constexpr int kFewestMoving = 50;  // one part in so many of the picture; fewer are passing things
 constexpr int kRowsAround = 2;     // on either side of a row, for what moves in it,
-constexpr float kResting = 0.15f;  // and the part of them up to which it rests
+constexpr float kResting = 0.15f;  // and the part of it, or of a plane, up to which it rests
 constexpr int kSteadyDifference = 14;  // code values; about five deviations of the difference
-
-cv::Mat grown(const cv::Mat& mask, int radius) {
-  cv::Mat out;
-  const cv::Size side(2 * radius + 1, 2 * radius + 1);
-  cv::dilate(mask, out, cv::getStructuringElement(cv::MORPH_ELLIPSE, side));
-  return out;
-}
-
-int brightness(const cv::Vec3b& c) { return c[0] + 2 * c[1] + c[2]; }
-
-using Samples = std::vector<cv::Vec3b>;
-
-// Where values in order of brightness fall apart best: the least sum of squares within two groups
-// (Otsu).
-std::size_t bestSplit(const Samples& sorted) {
-  double total = 0.0, below = 0.0, best = -1.0;
-  for (const cv::Vec3b& c : sorted) total += brightness(c);
-  std::size_t split = 0;
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    below += brightness(sorted[i - 1]);
-    const double gap = (total - below) / (sorted.size() - i) - below / i;
-    const double between = gap * gap * i * (sorted.size() - i);
-    if (between > best) best = between, split = i;
-  }
-  return split;
-}
-
-// Half the range that the middle half of a group covers, at least the camera's noise.
-double groupSpread(const Samples& sorted, std::size_t from, std::size_t to) {
-  const std::size_t quarter = (to - from) / 4;
-  return std::max(0.5 * (brightness(sorted[to - 1 - quarter]) - brightness(sorted[from + quarter])),
-                  1.0 * kNearMedian);
-}
-
-// A shadow darkens all channels, and to about the same part of their linear values.
-bool darkenedAlike(const cv::Vec3b& shaded, const cv::Vec3b& lit) {
-  float least = 1.0f, most = 0.0f;
-  for (int c = 0; c < 3; ++c) {
-    const float ratio = linearFromCode(shaded[c]) / std::max(linearFromCode(lit[c]), 1e-3f);
-    least = std::min(least, ratio), most = std::max(most, ratio);
-  }
-  return most < 1.0f && most < kShadowTint * least;
-}
-
-// Brightness without shade. A shadow that stays can hold most of the samples; two clear groups
-// that differ as shade does tell it, however few the bright ones are.
-double litBrightness(double step, Samples values) {
-  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) {
-    return brightness(a) < brightness(b);
-  };
-  std::stable_sort(values.begin(), values.end(), darker);
-  const std::size_t n = values.size(), split = bestSplit(values);
-  const double usual = brightness(values[static_cast<std::size_t>(kLit * (n - 1))]);
-  if (split < kFewestLit || n - split < kFewestLit) return usual;
-  const cv::Vec3b &shaded = values[split / 2], &lit = values[(split + n) / 2];
-  const double gap = brightness(lit) - brightness(shaded);
-  const double spread = std::max(groupSpread(values, 0, split), groupSpread(values, split, n));
-  const bool apart = gap > std::max(step * brightness(lit), kGroupGap * spread);
-  return apart && darkenedAlike(shaded, lit) ? brightness(lit) : usual;
-}
-
-// Leaves out the darker group if the values fall into two, and tells whether they do.
-bool dropShaded(double step, Samples& values) {
-  const std::size_t before = values.size();
-  const double lit = litBrightness(step, values);
-  const double limit = lit - std::max(step * lit, 4.0 * kNearMedian);
-  values.erase(std::remove_if(values.begin(), values.end(),
-                              [&](const cv::Vec3b& c) { return brightness(c) < limit; }),
-               values.end());
-  return 2 * values.size() < before;
-}
-
-// Leaves out the darker of the two groups that the values fall into best.
-void keepBrighter(Samples& values) {
-  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) {
-    return brightness(a) < brightness(b);
-  };
-  std::stable_sort(values.begin(), values.end(), darker);
-  values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(bestSplit(values)));
-}
-
-// Median per channel, then the mean of what lies around it; `spread`: the largest channel's MAD.
-cv::Vec3f robustMean(const std::vector<cv::Vec3b>& values, float& spread) {
-  cv::Vec3f result;
-  spread = 0.0f;
-  std::vector<int> sorted(values.size()), deviation(values.size());
-  const std::size_t middle = values.size() / 2;
-  for (int c = 0; c < 3; ++c) {
-    for (std::size_t i = 0; i < values.size(); ++i) sorted[i] = values[i][c];
-    std::nth_element(sorted.begin(), sorted.begin() + middle, sorted.end());
-    const int median = sorted[middle];
-    float sum = 0.0f;
-    int used = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      deviation[i] = std::abs(values[i][c] - median);
-      if (deviation[i] <= kNearMedian) sum += values[i][c], ++used;
-    }
-    std::nth_element(deviation.begin(), deviation.begin() + middle, deviation.end());
-    spread = std::max(spread, static_cast<float>(deviation[middle]));
-    result[c] = sum / used;
-  }
-  return result;
-}
 
 }  // namespace
 
@@ -137,26 +29,17 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
                           const BackgroundParams& params) {
   CV_Assert(!frames.empty());
   const cv::Size size = frames.front().bgr.size();
-  std::vector<cv::Mat> covered;
-  for (const ClipFrame& f : frames) covered.push_back(grown(f.labels != 0, params.mask_margin_px));
+  const PlaceSamples samples(frames, params.mask_margin_px);
   Background b;
   b.plate = cv::Mat::zeros(size, CV_32FC3);
   b.count = cv::Mat::zeros(size, CV_8U);
   b.spread = cv::Mat::zeros(size, CV_32F);
   b.origin = cv::Mat(size, CV_16SC2, cv::Scalar(-1, -1));
-  const auto samplesAt = [&](int u, int v) {
-    Samples values;
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      if (covered[i].at<std::uint8_t>(v, u) == 0)
-        values.push_back(frames[i].bgr.at<cv::Vec3b>(v, u));
-    }
-    return values;
-  };
   cv::Mat long_shaded = cv::Mat::zeros(size, CV_8U), agreed;
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
-      Samples values = samplesAt(u, v);
+      Samples values = samples.at(u, v);
       if (values.empty()) continue;
       b.count.at<std::uint8_t>(v, u) =
           static_cast<std::uint8_t>(std::min<std::size_t>(255, values.size()));
@@ -171,7 +54,7 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       if (agreed.at<std::uint8_t>(v, u) == 0) continue;
-      Samples values = samplesAt(u, v);
+      Samples values = samples.at(u, v);
       if (values.size() < 2) continue;
       keepBrighter(values);
       b.plate.at<cv::Vec3f>(v, u) = robustMean(values, b.spread.at<float>(v, u));
@@ -191,7 +74,11 @@ cv::Mat movingPlaces(const ClipFrame& key, const Background& background) {
         smooth >
         std::max(kLeastMoving, kMovingSpread * quantileOf(smooth, background.count > 0, 0.25)));
   };
-  const cv::Mat spreads = beyondNoise(background.spread);
+  const auto leaveOutShaded = [&](cv::Mat& change) {
+    if (!background.shaded_at_times.empty()) change.setTo(0, background.shaded_at_times);
+  };
+  cv::Mat spreads = beyondNoise(background.spread);
+  leaveOutShaded(spreads);
   if (kFewestMoving * static_cast<std::size_t>(cv::countNonZero(spreads)) <= spreads.total())
     return cv::Mat::zeros(spreads.size(), CV_8U);
   cv::Mat now, difference(spreads.size(), CV_32F, cv::Scalar(0.0f));
@@ -204,6 +91,7 @@ cv::Mat movingPlaces(const ClipFrame& key, const Background& background) {
       difference.at<float>(v, u) = std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
     }
   }
+  leaveOutShaded(difference);
   return spreads | beyondNoise(difference);
 }
 
@@ -231,6 +119,21 @@ cv::Mat motionOfRows(const cv::Mat& moving, const cv::Mat& known) {
   return (motion + 0.5f) / (weight + 1.0f);
 }
 
+// Along planes that move copies go on moving if they are shifted by whole pixels: nothing of such
+// is sure.
+InpaintParams alongRestingPlanes(const InpaintParams& place, const cv::Mat& moving,
+                                 const cv::Mat& known) {
+  InpaintParams guide = place;
+  if (place.sure.empty()) return guide;
+  guide.sure = place.sure.clone();
+  for (std::size_t k = 0; k < place.planes.size(); ++k) {
+    const cv::Mat here = place.surface == static_cast<double>(k + 1);
+    if (cv::countNonZero(moving & here & known) > kResting * cv::countNonZero(here & known))
+      guide.sure.setTo(0, here);
+  }
+  return guide;
+}
+
 void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const InpaintParams& place,
                       Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
@@ -242,8 +145,8 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const Inpaint
     key.bgr.convertTo(now, CV_32F);
     now.copyTo(look, closedGaps(moving) & (background.invented == 0) & (key.labels == 0));
   }
-  InpaintParams guide = place;
-  if (any_moving) guide.planes.clear();  // copies that go on moving are shifted by whole pixels
+  const InpaintParams guide =
+      any_moving ? alongRestingPlanes(place, moving, background.invented == 0) : place;
   const auto start = std::chrono::steady_clock::now();
   const InpaintResult filled = inpaint(look, background.invented, cv::Mat(), guide);
   background.filling_ms =

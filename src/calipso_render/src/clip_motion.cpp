@@ -46,7 +46,7 @@ std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness
     cv::remap(f.labels, labels, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
               cv::Scalar(255));
     labels.setTo(255, hiddenFrom(nearness, objects, key, f.camera));
-    f = {bgr, labels, key};
+    f.bgr = bgr, f.labels = labels, f.camera = key;
   }
   return frames;
 }

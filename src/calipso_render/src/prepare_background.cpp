@@ -5,6 +5,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "key_cover.hpp"
+#include "passing_shade.hpp"
 #include "place_relief.hpp"
 #include "plane_mirror.hpp"
 #include "shadow_check.hpp"
@@ -32,17 +33,23 @@ cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& plane
          ((scenery > (1.0f + kOffPlane) * ground) | ((1.0f + kOffPlane) * scenery < farthest));
 }
 
-// Visibility of a light on the support planes and on the relief, 0..1, where one is seen; 1
-// elsewhere.
-cv::Mat placeVisibility(const Visibility& light, const std::vector<SupportPlane>& planes,
-                        const Relief& relief, const cv::Mat& off_planes, const ClipFrame& key) {
-  cv::Mat visibility(key.bgr.size(), CV_32F, cv::Scalar(1.0f));
+// What of the place takes shade. @param blind CV_8UC1, != 0: nothing there does
+ReceiverOf receiversOf(const std::vector<SupportPlane>& planes, const Relief& relief,
+                       const cv::Mat& blind, const Camera& camera) {
+  return [&](int u, int v) {
+    if (blind.at<std::uint8_t>(v, u) != 0) return std::optional<Receiver>();
+    return relief.at(u, v) ? relief.receiver(u, v) : receiverAt(planes, camera, u, v);
+  };
+}
+
+// Visibility of a light, 0..1, where something takes shade; 1 elsewhere.
+cv::Mat placeVisibility(const Visibility& light, const ReceiverOf& receiver_of,
+                        const cv::Size& size) {
+  cv::Mat visibility(size, CV_32F, cv::Scalar(1.0f));
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < visibility.rows; ++v) {
     for (int u = 0; u < visibility.cols; ++u) {
-      if (off_planes.at<std::uint8_t>(v, u) != 0) continue;
-      const std::optional<Receiver> receiver =
-          relief.at(u, v) ? relief.receiver(u, v) : receiverAt(planes, key.camera, u, v);
+      const std::optional<Receiver> receiver = receiver_of(u, v);
       if (receiver)
         visibility.at<float>(v, u) = light.visibility(receiver->position, receiver->normal);
     }
@@ -146,6 +153,24 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   return restingTraces(p, shadows, place.curved, seenPast(e), params);
 }
 
+// What objects that move shade in all frames that show it. Where others show it, their shade is
+// taken off the plate.
+cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const ReceiverOf& receiver,
+                      const RenderParams& params, Prepared& p) {
+  const PassingCast cast{p.surfaces, p.moves, p.light.light.direction.cast<double>(),
+                         p.light.light.angular_radius,
+                         params.planes.empty() ? params.up : params.planes.front().normal};
+  const ShadeThatStays stays =
+      leaveOutPassingShade(e.frames, cast, receiver, params.background, p.background);
+  if (stays.never_lit.empty()) return cv::Mat::zeros(p.key_labels.size(), CV_8U);
+  const SeenShadows shadows = seenShadows(stays.sun, stays.sky, p.background.plate,
+                                          (p.background.count == 0) | place.blind);
+  cv::Mat traces =
+      grown(shadows.sun | shadows.sky, params.background.shadow_margin_px) & stays.never_lit;
+  if (!place.curved.empty()) traces.setTo(0, place.curved);
+  return traces;
+}
+
 void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,
                     const cv::Mat& off_planes, const RenderParams& params, Prepared& p) {
   const Light& light = p.light.light;
@@ -170,10 +195,14 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   const PlaceSurfaces surfaces =
       findSurfaces(p.scenery, params.depth, p.key_labels, params.planes, p.camera);
   const SeenPlace place = findPlace(surfaces, params, p);
-  const cv::Mat sun = placeVisibility(e.sun, params.planes, p.relief, place.blind, key),
-                sky = placeVisibility(e.sky, params.planes, p.relief, place.off_planes, key);
+  const ReceiverOf in_sun = receiversOf(params.planes, p.relief, place.blind, p.camera),
+                   under_sky = receiversOf(params.planes, p.relief, place.off_planes, p.camera);
+  const cv::Mat sun = placeVisibility(e.sun, in_sun, key.bgr.size()),
+                sky = placeVisibility(e.sky, under_sky, key.bgr.size());
   const bool any_rests = std::find(p.moves.begin(), p.moves.end(), false) != p.moves.end();
-  const cv::Mat traces = any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat();
+  cv::Mat traces = any_rests ? findTraces(e, place, sun, sky, params, p)
+                             : cv::Mat::zeros(key.bgr.size(), CV_8U);
+  traces |= passingTraces(e, place, in_sun, params, p);
   if (p.mirror.established()) {
     p.background.plate = unmirrored(p.mirror, p.background.plate);
     key.bgr = unmirroredCodes(p.mirror, key.bgr);

@@ -165,6 +165,10 @@ void addRegions(const Test& test, const cv::Mat& visible, float limit, bool of_s
 
 }  // namespace
 
+cv::Mat isShaded(const cv::Mat& sun, const cv::Mat& sky) {
+  return (sun < kSunShaded) | (sky < kSkyShaded);
+}
+
 SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& picture,
                         const cv::Mat& unknown) {
   const Test test(picture, unknown);

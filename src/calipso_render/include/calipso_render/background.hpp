@@ -15,6 +15,9 @@ struct Background {
   cv::Mat plate;     // CV_32FC3, code values
   cv::Mat count;     // CV_8UC1: frames of the sample in which the pixel was seen (at most 255)
   cv::Mat spread;    // CV_32FC1: median absolute deviation over time, code values
+  // CV_8UC1, may be empty: != 0 where moving objects are predicted to cast shade at times, so that
+  // `spread` does not tell whether the place itself moves
+  cv::Mat shaded_at_times;
   cv::Mat invented;  // CV_8UC1: 255 where no frame shows it
   cv::Mat origin;    // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
   LiveFill live;     // where an invented pixel's origin moves by itself; empty if nothing moves

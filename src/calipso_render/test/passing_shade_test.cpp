@@ -1,0 +1,131 @@
+#include "passing_shade.hpp"
+
+#include <gtest/gtest.h>
+
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+constexpr float kUmbra = 0.5f;  // what is left of the table's codes in the ball's shadow
+
+// Is a point of the table in the shadow of the ball?
+bool isInShadow(const Eigen::Vector3f& p, const Eigen::Vector3d& centre) {
+  const Eigen::Vector3f l = sunlight().direction, way = centre.cast<float>() - p;
+  const float along = way.dot(l);
+  return along > 0.0f && (way - along * l).norm() < static_cast<float>(kBallRadius);
+}
+
+struct Clip {
+  std::vector<ClipFrame> frames;
+  std::vector<Surface> surfaces;
+  ReceiverOf receiver = [](int u, int v) { return receiverAt(table(), camera(), u, v); };
+};
+
+// The ball, shadow and all, at one place per frame.
+Clip ballAlong(const std::vector<Eigen::Vector3d>& places) {
+  Clip clip;
+  clip.surfaces.push_back(makeSurface(ballAt(places.front())));
+  for (const Eigen::Vector3d& centre : places) {
+    ClipFrame f = frameWithBall(ballAt(centre));
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const auto r = clip.receiver(u, v);
+        if (f.labels.at<std::uint8_t>(v, u) != 0 || !r || !isInShadow(r->position, centre))
+          continue;
+        for (int c = 0; c < 3; ++c)
+          f.bgr.at<cv::Vec3b>(v, u)[c] =
+              static_cast<std::uint8_t>(kUmbra * f.bgr.at<cv::Vec3b>(v, u)[c]);
+      }
+    }
+    ObjectPose pose{kBallLabel};
+    pose.world_from_object.translation() = centre;
+    f.poses = {pose};
+    clip.frames.push_back(f);
+  }
+  return clip;
+}
+
+PassingCast castOf(const Clip& clip, const std::vector<bool>& moves) {
+  return {clip.surfaces, moves, sunlight().direction.cast<double>(), 0.004,
+          Eigen::Vector3d::UnitZ()};
+}
+
+const Eigen::Vector3d kFrom(-0.25, 0.1, 0.2), kTo(0.05, 0.1, 0.2);
+
+TEST(PassingShade, IsTakenOffWhereItLiesInAllFramesButOne) {
+  std::vector<Eigen::Vector3d> places(10, kTo);
+  places[0] = kFrom;
+  const Clip clip = ballAlong(places);
+  const std::vector<bool> moves = {true};
+  Background b = seenBackground(clip.frames, true);
+  const cv::Mat before = b.plate.clone();
+  const ShadeThatStays stays =
+      leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, {}, b);
+  int shaded = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = clip.receiver(u, v);
+      const bool seen_lit = clip.frames[0].labels.at<std::uint8_t>(v, u) == 0 && r &&
+                            !isInShadow(r->position, kFrom);
+      // The place is seen past the ball and its mask's margin in all frames.
+      if (!seen_lit || !isInShadow(r->position, kTo) || b.count.at<std::uint8_t>(v, u) < 10 ||
+          stays.never_lit.at<std::uint8_t>(v, u) != 0)
+        continue;
+      ++shaded;
+      EXPECT_NEAR(b.plate.at<cv::Vec3f>(v, u)[2], tableColour(u, v)[2], 0.5f) << u << " " << v;
+      EXPECT_LT(before.at<cv::Vec3f>(v, u)[2], 0.7f * tableColour(u, v)[2]);  // by majority
+    }
+  }
+  EXPECT_GT(shaded, 100);
+}
+
+TEST(PassingShade, StaysWhereNoFrameShowsThePlaceWithoutIt) {
+  const Clip clip = ballAlong({kTo, kTo + Eigen::Vector3d(0.01, 0.0, 0.0), kTo});
+  const std::vector<bool> moves = {true};
+  Background b = seenBackground(clip.frames, true);
+  const ShadeThatStays stays =
+      leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, {}, b);
+  int dark = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      if (b.plate.at<cv::Vec3f>(v, u)[2] > 0.6f * tableColour(u, v)[2] ||
+          b.count.at<std::uint8_t>(v, u) == 0)
+        continue;
+      ++dark;
+      EXPECT_EQ(stays.never_lit.at<std::uint8_t>(v, u), 255) << u << " " << v;
+    }
+  }
+  EXPECT_GT(dark, 100);
+  EXPECT_EQ(stays.sun.at<float>(5, 5), 1.0f);
+}
+
+TEST(PassingShade, ChangesNothingWhereThePredictedShadowIsNotSeen) {
+  std::vector<Eigen::Vector3d> places(6, kTo);
+  places[0] = kFrom;
+  Clip clip = ballAlong(places);
+  for (std::size_t i = 0; i < places.size(); ++i) {  // an overcast day
+    const ClipFrame sunless = frameWithBall(ballAt(places[i]));
+    clip.frames[i].bgr = sunless.bgr;
+  }
+  const std::vector<bool> moves = {true};
+  Background b = seenBackground(clip.frames, true);
+  const cv::Mat before = b.plate.clone();
+  leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, {}, b);
+  EXPECT_EQ(cv::norm(b.plate, before, cv::NORM_INF), 0.0);
+}
+
+TEST(PassingShade, NothingIsToldWithoutPoses) {
+  Clip clip = ballAlong({kFrom, kTo, kTo});
+  for (ClipFrame& f : clip.frames) f.poses.clear();
+  const std::vector<bool> moves = {true};
+  Background b = seenBackground(clip.frames, true);
+  EXPECT_TRUE(leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, {}, b)
+                  .never_lit.empty());
+  EXPECT_TRUE(b.shaded_at_times.empty());
+}
+
+}  // namespace
+}  // namespace calipso::render
