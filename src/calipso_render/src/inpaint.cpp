@@ -10,6 +10,7 @@
 #include "plane_chart.hpp"
 #include "seam_blend.hpp"
 #include "seam_cut.hpp"
+#include "side_by_side.hpp"
 #include "spline.hpp"
 
 namespace calipso::render {
@@ -82,9 +83,11 @@ Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const
   to_fill.setTo(0, bridges.core);
   known |= bridges.core;
   source.setTo(0, bridges.lines);
-  Filling f{smoothFill(look, to_fill, known), patchOrigins(look, to_fill, source, lattice, params)};
+  Filling f{look.clone(), patchOrigins(look, to_fill, source, lattice, params)};
   cutSeams(look, to_fill, source, known, params.surface, f.origin);
-  if (cv::countNonZero(copyFrom(f.origin, look, f.image)) > 0)
+  const cv::Mat without = to_fill & (copyFrom(f.origin, look, f.image) == 0);
+  if (cv::countNonZero(without) > 0) smoothFill(look, to_fill, known).copyTo(f.image, without);
+  if (cv::countNonZero(without) < cv::countNonZero(to_fill))
     blendSeams(to_fill, known, f.origin, f.image);
   bridges.origin.copyTo(f.origin, bridges.core);
   f.origin.setTo(cv::Scalar(-1, -1), whole_hole == 0);
@@ -121,21 +124,19 @@ struct PlanePart {
   cv::Mat hole, known, source;
 };
 
-PlanePart partOf(const PlaneChart& chart, const cv::Mat& look, const cv::Mat& hole,
-                 const cv::Mat& seen) {
+PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen) {
   cv::Mat copied_from;  // around which a sample sees nothing else
   cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
-  // What is not seen of the plane would shine through to what is.
-  const cv::Mat plain = smoothFill(look, seen == 0, seen);
-  PlanePart part{chart,
-                 plain,
-                 chart.carried(plain),
-                 chart.any(hole),
-                 chart.whole(seen),
-                 chart.whole(copied_from)};
+  PlanePart part{chart, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from)};
   part.known &= part.hole == 0, part.source &= part.hole == 0;
-  smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
   return part;
+}
+
+void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
+  // What is not seen of the plane would shine through to what is.
+  part.plain = smoothFill(look, seen == 0, seen);
+  part.look = part.chart.carried(part.plain);
+  smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
 }
 
 // Every pixel of a plane's hole as the chart's nearest one was filled: a sample of the picture, as far off along the
@@ -172,11 +173,21 @@ void fillPlane(const cv::Matx33d& to_plane, bool supports, const cv::Mat& hole, 
                const InpaintParams& params, Canvas& canvas) {
   const std::optional<PlaneChart> chart = planeChart(to_plane, hole, seen);
   if (!chart) return;
-  const PlanePart part = partOf(*chart, canvas.look, hole, seen);
+  PlanePart part = partOf(*chart, hole, seen);
   if (cv::countNonZero(part.hole) == 0 || cv::countNonZero(part.source) == 0) return;
   const cv::Rect near = windowAround(part.hole, kLatticeMargin, kLatticeMargin);
-  const std::optional<Lattice> lattice = findLattice(part.look(near), part.source(near));
-  if (!(supports && chart->tilted) && !lattice) return;
+  std::optional<Lattice> lattice;
+  const auto seek = [&] {
+    lattice = findLattice(chart->carried(canvas.look, near), part.source(near));
+  };
+  const auto see = [&] { addLook(canvas.look, seen, part); };
+  if (supports && chart->tilted) {
+    sideBySide(true, seek, see);
+  } else {
+    seek();
+    if (!lattice) return;
+    see();
+  }
   InpaintParams inner = params;
   inner.surface = cv::Mat();
   inner.nearness = chart->carried(nearnessOf(to_plane, hole.size())), inner.away_farther = kFarther;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -18,6 +19,8 @@ constexpr int kFirstGuesses = 200;  // places tried for a patch of the rim
 // px around the best place in which levels, and the finest, look further
 constexpr int kFarthest = 16, kFinest = 2;
 constexpr int kSweeps = 2;  // of a search
+// part of the patches that a sweep leads elsewhere, below which no further round follows
+constexpr float kSettled = 0.05f;
 // times better than what continues a neighbour's copy a place beside it must be: pieces stay large
 constexpr float kJump = 1.6f;
 constexpr float kNearer = 2.5f;   // times that a source may be nearer or farther,
@@ -41,6 +44,8 @@ class Filling {
         hole_(level.hole),
         nearness_(level.nearness),
         surface_(level.surface),
+        has_nearness_(!nearness_.empty()),
+        has_surface_(!surface_.empty()),
         scale_(scale),
         horizon_(horizon),
         lattice_(lattice),
@@ -75,7 +80,11 @@ class Filling {
       std::vector<cv::Point> pixels;
       cv::findNonZero(ring, pixels);
       if (pixels.empty()) return;
-      for (const cv::Point& pixel : pixels) firstMatch(centreFor(pixel), known);
+      std::vector<Guess> guesses(pixels.size());
+#pragma omp parallel for schedule(dynamic, 8)
+      for (std::size_t i = 0; i < pixels.size(); ++i)
+        guesses[i] = firstGuess(centreFor(pixels[i]), known);
+      for (std::size_t i = 0; i < pixels.size(); ++i) spreadMatch(centreFor(pixels[i]), guesses[i]);
       for (const cv::Point& pixel : pixels) {
         const cv::Point p = centreFor(pixel);
         image_.at<cv::Vec4f>(pixel) = image_.at<cv::Vec4f>(match(p) + pixel - p);
@@ -104,7 +113,9 @@ class Filling {
   }
 
   // @param reach px around the best place found so far in which others are tried
-  void search(int reach) {
+  // @return part of the patches that were led elsewhere
+  float search(int reach) {
+    std::vector<int> changes(bands_.size(), 0);
     forEachPatch([&](const cv::Point& p) {
       if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(anySource(p, 0));
       cost_.at<float>(p) = distance(p, match(p), 1e30f);
@@ -115,9 +126,13 @@ class Filling {
       for (int first = 0; first < 2; ++first) {
 #pragma omp parallel for schedule(dynamic, 1)
         for (int b = first; b < static_cast<int>(bands_.size()); b += 2)
-          searchBand(bands_[b], sweep_ % 2 == 0, reach);
+          changes[b] += searchBand(bands_[b], sweep_ % 2 == 0, reach);
       }
     }
+    std::size_t all = 0;
+    for (const auto& band : bands_) all += band.size();
+    return static_cast<float>(std::accumulate(changes.begin(), changes.end(), 0)) /
+           static_cast<float>(kSweeps * all);
   }
 
   // Every hole pixel becomes the mean of what the patches over it have there, good ones above all.
@@ -192,10 +207,11 @@ class Filling {
     }
   }
 
-  void searchBand(const std::vector<cv::Point>& band, bool backwards, int reach) {
+  int searchBand(const std::vector<cv::Point>& band, bool backwards, int reach) {
     const int step = backwards ? 1 : -1;
+    int changed = 0;
     for (std::size_t i = 0; i < band.size(); ++i) {
-      const cv::Point p = band[backwards ? band.size() - 1 - i : i];
+      const cv::Point p = band[backwards ? band.size() - 1 - i : i], before = match(p);
       for (const cv::Point& d : {cv::Point(step, 0), cv::Point(0, step)}) {
         if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d, 1.0f);
       }
@@ -203,7 +219,9 @@ class Filling {
         const cv::Point q = match(p) + jitter(p, r, r);
         attempt(p, lattice_ == nullptr ? q : onLattice(p, q), kJump);
       }
+      changed += match(p) != before;
     }
+    return changed;
   }
 
   // @param better how many times the cost must be lower
@@ -214,27 +232,51 @@ class Filling {
     if (cost < least) least = cost, to_.at<cv::Vec2s>(p) = shorts(q);
   }
 
-  // Among places all over the picture, its neighbours' and around the best.
-  void firstMatch(const cv::Point& p, const cv::Mat& known) {
-    cv::Point best = anySource(p, 0);
-    float least = partialDistance(p, best, known);
-    const auto attemptFirst = [&](cv::Point q) {
-      if (lattice_ != nullptr) q = onLattice(p, q);
-      const float cost = isWhole(q) ? partialDistance(p, q, known) : least;
-      if (cost < least) least = cost, best = q;
-    };
-    for (int i = 1; i < kFirstGuesses; ++i) attemptFirst(anySource(p, i));
+  // A patch of the rim, the best place found for it and what that costs.
+  struct Guess {
+    std::vector<cv::Point> seen;  // what is known of it, from its middle
+    cv::Point best;
+    float least;
+  };
+
+  void attempt(const cv::Point& p, cv::Point q, Guess& guess) const {
+    if (lattice_ != nullptr) q = onLattice(p, q);
+    const float cost = isWhole(q) ? partialDistance(p, q, guess.seen, guess.least) : guess.least;
+    if (cost < guess.least) guess.least = cost, guess.best = q;
+  }
+
+  // Among places all over the picture.
+  Guess firstGuess(const cv::Point& p, const cv::Mat& known) const {
+    Guess guess{knownAround(p, known), anySource(p, 0), 0.0f};
+    guess.least = partialDistance(p, guess.best, guess.seen, 1e30f);
+    for (int i = 1; i < kFirstGuesses; ++i) attempt(p, anySource(p, i), guess);
+    return guess;
+  }
+
+  // Then its neighbours' and around the best.
+  void spreadMatch(const cv::Point& p, Guess& guess) {
     for (int dv = -2; dv <= 2; ++dv) {
       for (int du = -2; du <= 2; ++du) {
         const cv::Point d(du, dv);
-        if (inside(p + d) && hasMatch(p + d)) attemptFirst(match(p + d) - d);
+        if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d, guess);
       }
     }
     for (int reach = 8; reach >= 1; reach /= 2) {
       for (int i = 0; i < 6; ++i)
-        attemptFirst(best + jitter(p, kFirstGuesses + 8 * i + reach, reach));
+        attempt(p, guess.best + jitter(p, kFirstGuesses + 8 * i + reach, reach), guess);
     }
-    to_.at<cv::Vec2s>(p) = shorts(best);
+    to_.at<cv::Vec2s>(p) = shorts(guess.best);
+  }
+
+  // What is known of the patch around a place, from it.
+  static std::vector<cv::Point> knownAround(const cv::Point& p, const cv::Mat& known) {
+    std::vector<cv::Point> seen;
+    for (int dv = -kRadius; dv <= kRadius; ++dv) {
+      for (int du = -kRadius; du <= kRadius; ++du) {
+        if (known.at<std::uint8_t>(p + cv::Point(du, dv)) != 0) seen.push_back({du, dv});
+      }
+    }
+    return seen;
   }
 
   cv::Vec4f meanVote(const cv::Point& pixel, const cv::Mat& weights) const {
@@ -256,13 +298,13 @@ class Filling {
   float awayCost(const cv::Point& p, const cv::Point& q) const {
     float cost = scale_ * (params_.away_row * std::abs(p.y - q.y) +
                            params_.away_column * std::abs(p.x - q.x));
-    if (!nearness_.empty()) {
+    if (has_nearness_) {
       const float own = nearness_.at<float>(p), other = nearness_.at<float>(q);
       if (other > kNearer * own + horizon_ || own > kNearer * other + horizon_) cost += kMisplaced;
       if (params_.away_farther > 0.0f && own > kAsNear * other && other > 0.0f)
         cost += params_.away_farther * (own / other - kAsNear);
     }
-    if (!surface_.empty()) {
+    if (has_surface_) {
       const std::uint8_t own = surface_.at<std::uint8_t>(p), other = surface_.at<std::uint8_t>(q);
       if (own != 0 && other != 0 && own != other) cost += kMisplaced;
     }
@@ -292,18 +334,20 @@ class Filling {
     return sum;
   }
 
-  float partialDistance(const cv::Point& p, const cv::Point& q, const cv::Mat& known) const {
-    float sum = 0.0f;
-    int count = 0;
-    for (int dv = -kRadius; dv <= kRadius; ++dv) {
-      for (int du = -kRadius; du <= kRadius; ++du) {
-        const cv::Point d(du, dv);
-        if (known.at<std::uint8_t>(p + d) == 0) continue;
-        const cv::Vec4f difference = image_.at<cv::Vec4f>(p + d) - image_.at<cv::Vec4f>(q + d);
-        sum += difference.dot(difference), ++count;
-      }
+  // Of what is known. No less than `bound` if it is not below.
+  float partialDistance(const cv::Point& p, const cv::Point& q, const std::vector<cv::Point>& seen,
+                        float bound) const {
+    using Pixel = Eigen::Map<const Eigen::Array4f>;
+    const float away = awayCost(p, q),
+                part = static_cast<float>(kSide * kSide) / std::max<std::size_t>(1, seen.size());
+    Eigen::Array4f sums = Eigen::Array4f::Zero();
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (i % kSide == 0 && part * sums.sum() + away >= bound) return bound;
+      const Eigen::Array4f difference = Pixel(image_.at<cv::Vec4f>(p + seen[i]).val) -
+                                        Pixel(image_.at<cv::Vec4f>(q + seen[i]).val);
+      sums += difference.square();
     }
-    return sum * (kSide * kSide) / std::max(1, count) + awayCost(p, q);
+    return part * sums.sum() + away;
   }
 
   cv::Point jitter(const cv::Point& p, int salt, int reach) const {
@@ -321,7 +365,8 @@ class Filling {
   }
 
   cv::Mat image_, hole_, nearness_, surface_,
-      whole_;               // whole_ CV_8UC1: all of the patch around it may be copied
+      whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
+  bool has_nearness_, has_surface_;
   float scale_, horizon_;   // size of these pixels in the finest level's
   const Lattice* lattice_;  // may be nullptr
   InpaintParams params_;
@@ -330,6 +375,15 @@ class Filling {
   std::vector<cv::Point> sources_;
   int sweep_ = 0;
 };
+
+// Search and vote in turn until hardly any patch is led elsewhere.
+void settle(Filling& filling, int rounds, int reach) {
+  for (int i = 0; i < rounds; ++i) {
+    const float changed = filling.search(reach);
+    filling.vote();
+    if (changed < kSettled) return;
+  }
+}
 
 }  // namespace
 
@@ -341,13 +395,14 @@ cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& s
   Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, lattice, params);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   filling.peel();
-  for (int i = 0; i < params.coarsest_rounds; ++i)
-    filling.search(std::max(hole.cols, hole.rows) >> coarsest), filling.vote();
+  settle(filling, params.coarsest_rounds, std::max(hole.cols, hole.rows) >> coarsest);
   for (int k = coarsest - 1; k >= 0; --k) {
     Filling finer(levels[k], static_cast<float>(1 << k), horizon, lattice, params);
     finer.startFrom(filling);
-    for (int i = 0; i < params.rounds && k > 0; ++i) finer.search(kFarthest), finer.vote();
-    if (k == 0) finer.search(kFinest);
+    if (k > 0)
+      settle(finer, params.rounds, kFarthest);
+    else
+      finer.search(kFinest);
     filling = finer;
   }
   return filling.origins();

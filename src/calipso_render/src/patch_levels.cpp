@@ -17,7 +17,8 @@ cv::Mat liveliness(const cv::Mat& image, const cv::Mat& known) {
   cv::Mat grey, strength = cv::Mat::zeros(image.size(), CV_32F),
                 weight = cv::Mat::zeros(image.size(), CV_32F);
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  for (int v = 0; v + 1 < image.rows; ++v) {
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < image.rows - 1; ++v) {
     for (int u = 0; u + 1 < image.cols; ++u) {
       const bool whole = known.at<std::uint8_t>(v, u) != 0 &&
                          known.at<std::uint8_t>(v + 1, u) != 0 &&
@@ -46,23 +47,25 @@ FillLevel halved(const FillLevel& fine) {
                  {},
                  {}};
   cv::Mat weight = cv::Mat::zeros(size, CV_32F), count = weight.clone();
-  for (int v = 0; v < fine.hole.rows; ++v) {
-    for (int u = 0; u < fine.hole.cols; ++u) {
-      const float known = fine.known.at<float>(v, u), w = std::max(known, kUnknown);
-      half.source.at<std::uint8_t>(v / 2, u / 2) &= fine.source.at<std::uint8_t>(v, u);
-      half.image.at<cv::Vec4f>(v / 2, u / 2) += w * fine.image.at<cv::Vec4f>(v, u);
-      half.known.at<float>(v / 2, u / 2) += known;
-      weight.at<float>(v / 2, u / 2) += w, count.at<float>(v / 2, u / 2) += 1.0f;
+#pragma omp parallel for schedule(static)
+  for (int row = 0; row < size.height; ++row) {
+    for (int v = 2 * row; v < std::min(2 * row + 2, fine.hole.rows); ++v) {
+      for (int u = 0; u < fine.hole.cols; ++u) {
+        const float known = fine.known.at<float>(v, u), w = std::max(known, kUnknown);
+        half.source.at<std::uint8_t>(row, u / 2) &= fine.source.at<std::uint8_t>(v, u);
+        half.image.at<cv::Vec4f>(row, u / 2) += w * fine.image.at<cv::Vec4f>(v, u);
+        half.known.at<float>(row, u / 2) += known;
+        weight.at<float>(row, u / 2) += w, count.at<float>(row, u / 2) += 1.0f;
+      }
     }
+    for (int u = 0; u < size.width; ++u)
+      half.image.at<cv::Vec4f>(row, u) /= weight.at<float>(row, u);
   }
   half.known /= count;
   half.hole = half.known < kMostlyKnown;
   if (!fine.nearness.empty())
     cv::resize(fine.nearness, half.nearness, size, 0, 0, cv::INTER_NEAREST);
   if (!fine.surface.empty()) cv::resize(fine.surface, half.surface, size, 0, 0, cv::INTER_NEAREST);
-  for (int v = 0; v < size.height; ++v) {
-    for (int u = 0; u < size.width; ++u) half.image.at<cv::Vec4f>(v, u) /= weight.at<float>(v, u);
-  }
   return half;
 }
 

@@ -95,9 +95,11 @@ cv::Mat PlaneChart::any(const cv::Mat& mask) const {
   return carried != 0;
 }
 
-cv::Mat PlaneChart::carried(const cv::Mat& image) const {
+cv::Mat PlaneChart::carried(const cv::Mat& image) const { return carried(image, {{0, 0}, size}); }
+
+cv::Mat PlaneChart::carried(const cv::Mat& image, const cv::Rect& part) const {
   cv::Mat carried;
-  cv::remap(image, carried, places, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::remap(image, carried, places(part), cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
   return carried;
 }
 

@@ -18,8 +18,9 @@ struct PlaneChart {
   cv::Mat whole(const cv::Mat& mask) const;
   // ... where any of it is.
   cv::Mat any(const cv::Mat& mask) const;
-  // Bicubic.
+  // Bicubic; of all of the chart, or of a part of it.
   cv::Mat carried(const cv::Mat& image) const;
+  cv::Mat carried(const cv::Mat& image, const cv::Rect& part) const;
 };
 
 // The chart of the plane around a hole in it. Nothing if the plane is seen from behind.

@@ -15,6 +15,7 @@ void pull(const cv::Mat& weighted, const cv::Mat& weight, cv::Mat& weighted_half
 
 cv::Mat normalised(const cv::Mat& weighted, const cv::Mat& weight) {
   cv::Mat out(weighted.size(), CV_32FC3);
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < out.rows; ++v) {
     for (int u = 0; u < out.cols; ++u) {
       const float w = weight.at<float>(v, u);
@@ -26,9 +27,13 @@ cv::Mat normalised(const cv::Mat& weighted, const cv::Mat& weight) {
 }
 
 cv::Mat multiplied(const cv::Mat& image, const cv::Mat& weight) {
-  cv::Mat weight3;
-  cv::merge(std::vector<cv::Mat>(3, weight), weight3);
-  return image.mul(weight3);
+  cv::Mat out(image.size(), CV_32FC3);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < out.rows; ++v) {
+    for (int u = 0; u < out.cols; ++u)
+      out.at<cv::Vec3f>(v, u) = weight.at<float>(v, u) * image.at<cv::Vec3f>(v, u);
+  }
+  return out;
 }
 
 }  // namespace
@@ -46,6 +51,7 @@ cv::Mat pushPull(const cv::Mat& image, const cv::Mat& weight) {
   cv::pyrUp(half, coarse, {half.cols * 2, half.rows * 2});
   coarse = coarse(cv::Rect(0, 0, image.cols, image.rows));
   cv::Mat out(image.size(), CV_32FC3);
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < out.rows; ++v) {
     for (int u = 0; u < out.cols; ++u) {
       const float w = std::min(1.0f, weight.at<float>(v, u));

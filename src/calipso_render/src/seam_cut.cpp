@@ -73,12 +73,16 @@ class Seams {
     cv::Mat picture = image.clone();
     std::map<std::pair<int, int>, int> labels;
     for (int v = 0; v < hole.rows; ++v) {
+      int last = kNoCopy;  // most copies go on along a row
       for (int u = 0; u < hole.cols; ++u) {
         const cv::Vec2s from = origin.at<cv::Vec2s>(v, u);
         if (hole.at<std::uint8_t>(v, u) == 0 || from[0] < 0) continue;
         const cv::Point way(from[0] - u, from[1] - v);
         const int next = static_cast<int>(ways_.size());
-        const int label = labels.try_emplace({way.y, way.x}, next).first->second;
+        const int label = last != kNoCopy && ways_[last] == way
+                              ? last
+                              : labels.try_emplace({way.y, way.x}, next).first->second;
+        last = label;
         if (label == next)
           ways_.push_back(way), boxes_.emplace_back(u, v, 1, 1), sizes_.push_back(0);
         boxes_[label] |= cv::Rect(u, v, 1, 1);

@@ -8,7 +8,7 @@ namespace calipso::render {
 
 struct InpaintParams {
   int coarsest_side = 30;    // px; the pyramid ends where the picture's shorter side has no more
-  int coarsest_rounds = 12;  // of search and vote at the coarsest level,
+  int coarsest_rounds = 12;  // of search and vote at the coarsest level, at most,
   int rounds = 4;            // at the finer ones
   float away_row = 6.0f,
         away_column =
