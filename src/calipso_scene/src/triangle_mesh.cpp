@@ -15,6 +15,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "mesh_repair.hpp"
+
 namespace calipso {
 
 namespace {
@@ -38,6 +40,9 @@ TriangleMesh toMesh(const std::string& path, const Points& points, const Faces& 
   for (std::size_t i = 0; i < faces.size(); ++i) {
     mesh.triangles.row(static_cast<Eigen::Index>(i)) = faces[i].transpose();
   }
+  repairFaces(&mesh);
+  if (mesh.triangleCount() == 0)
+    fail(path, "has no face with three different corners; export the surface as triangles");
   return mesh;
 }
 

@@ -45,6 +45,40 @@ TEST(TriangleMesh, normalsPointOutwards) {
   }
 }
 
+// The cube's faces with some changed, as an OBJ file has them.
+TriangleMesh cubeWith(const std::string& faces) {
+  const std::string cube = kUnitCube;
+  return loadMesh(writeFile("changed.obj", cube.substr(0, cube.find('f')) + faces));
+}
+
+TEST(TriangleMesh, facesThatAreDegenerateOrRepeatedAreLeftOut) {
+  const std::string cube = kUnitCube;
+  const TriangleMesh mesh = cubeWith(cube.substr(cube.find('f')) + "f 3 2 4\nf 1 4 2\nf 1 1 2\n");
+  EXPECT_EQ(mesh.triangleCount(), 12);
+}
+
+TEST(TriangleMesh, facesWoundTheWrongWayRoundAreTurned) {
+  for (const char* faces :
+       {"f 1 2 3 4\nf 8 7 6 5\nf 5 6 2 1\nf 6 7 3 2\nf 7 8 4 3\nf 8 5 1 4\n",     // all
+        "f 1 2 3 4\nf 8 7 6 5\nf 1 2 6 5\nf 2 3 7 6\nf 7 8 4 3\nf 8 5 1 4\n"}) {  // most
+    EXPECT_NEAR(signedVolume(cubeWith(faces)), 1.0, 1e-14) << faces;
+  }
+}
+
+TEST(TriangleMesh, openSurfaceIsWoundAsMostOfItIs) {
+  const auto normals = vertexNormals(cubeWith("f 1 4 2\nf 2 3 4\nf 2 6 3\n"));
+  EXPECT_GT(normals(0, 2), 0.5);
+  EXPECT_GT(normals(3, 2), 0.5);
+}
+
+TEST(TriangleMesh, insideOfAHollowStaysFacingInwards) {
+  const std::string hollow =
+      "v .2 .2 .2\nv .8 .2 .2\nv .2 .8 .2\nv .2 .2 .8\n"
+      "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+      "f 9 10 11\nf 9 12 10\nf 10 12 11\nf 9 11 12\n";
+  EXPECT_NEAR(signedVolume(cubeWith(hollow)), 1.0 - 0.6 * 0.6 * 0.6 / 6.0, 1e-14);
+}
+
 TEST(TriangleMesh, objRoundTripIsExact) {
   TriangleMesh mesh = loadMesh(writeFile("cube.obj", kUnitCube));
   mesh.vertices *= 1.0 / 3.0;

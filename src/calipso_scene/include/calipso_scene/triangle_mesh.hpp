@@ -15,8 +15,8 @@ struct TriangleMesh {
   Eigen::Vector3d vertex(int i) const { return vertices.row(i).transpose(); }
 };
 
-// Reads a mesh. OBJ files keep their vertex order; every other format goes through assimp, with
-// vertices at equal positions merged. Polygons are split into triangles.
+// Reads a mesh. OBJ files keep their vertex order; other formats go through assimp, with equal
+// vertices merged. Polygons are split; useless faces are left out, those wound wrongly are turned.
 // @throw std::runtime_error naming the file, what is wrong in it and the remedy
 TriangleMesh loadMesh(const std::string& path);
 
