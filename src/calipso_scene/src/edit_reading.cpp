@@ -20,7 +20,7 @@ const std::vector<std::string>& editKeys() {
 
 // A point of the surface is given in pixels of the key frame or in metres of the world.
 Region readRegion(const YAML::Node& node, const YamlReader& reader) {
-  reader.rejectUnknownKeys(node, {"kind", "u", "v", "point", "radius", "box_min", "box_max"});
+  reader.checkKeys(node, {"kind", "u", "v", "point", "radius", "box_min", "box_max"});
   Region region;
   region.kind = regionKindFromString(reader.text(node, "kind", ""));
   region.radius = reader.number(node, "radius", 0.0);
@@ -53,7 +53,7 @@ void readVectors(const YAML::Node& node, const YamlReader& reader, Edit& edit) {
 
 Edit readEdit(const YAML::Node& node, const YamlReader& reader) {
   if (!node.IsMap()) reader.fail("", "is not a map of key: value; see the tutorial for examples");
-  reader.rejectUnknownKeys(node, editKeys());
+  reader.checkKeys(node, editKeys());
   Edit edit;
   edit.time = reader.number(node, "t");
   if (edit.time < 0.0) {

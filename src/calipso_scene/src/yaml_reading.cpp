@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -110,13 +111,13 @@ Eigen::Isometry3d YamlReader::pose(const YAML::Node& node, const std::string& ke
   return result;
 }
 
-void YamlReader::rejectUnknownKeys(const YAML::Node& node,
-                                   const std::vector<std::string>& known) const {
+void YamlReader::checkKeys(const YAML::Node& node, const std::vector<std::string>& known) const {
+  std::set<std::string> seen;
   for (const auto& entry : node) {
     const std::string key = entry.first.as<std::string>();
-    if (std::find(known.begin(), known.end(), key) == known.end()) {
+    if (std::find(known.begin(), known.end(), key) == known.end())
       fail(key, "is not a known key; known ones are " + joined(known));
-    }
+    if (!seen.insert(key).second) fail(key, "is given twice; only one of them would count");
   }
 }
 

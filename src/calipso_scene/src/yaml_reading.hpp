@@ -35,8 +35,8 @@ class YamlReader {
     return node[key] ? text(node, key) : otherwise;
   }
 
-  // @throw std::invalid_argument for a key of `node` that is not among `known`
-  void rejectUnknownKeys(const YAML::Node& node, const std::vector<std::string>& known) const;
+  // @throw std::invalid_argument for a key of `node` that is not among `known`, or twice there
+  void checkKeys(const YAML::Node& node, const std::vector<std::string>& known) const;
 
  private:
   YAML::Node require(const YAML::Node& node, const std::string& key) const;
