@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 #include <rosbag/view.h>
 #include <std_msgs/String.h>
+#include <sys/resource.h>
 
+#include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -47,12 +50,12 @@ TEST(OutputBag, HasItsNameOnlyWhenItIsFinished) {
   const std::string path = folder / "new/folder/out.bag";
   {
     OutputBag output(path);
-    output.bag().write("/words", ros::Time(1.0), *text("a"));
+    output.write("/words", ros::Time(1.0), *text("a"));
     EXPECT_FALSE(std::filesystem::exists(path));
   }
   EXPECT_FALSE(std::filesystem::exists(path)) << "an unfinished bag must not look complete";
   OutputBag output(path);
-  output.bag().write("/words", ros::Time(1.0), *text("a"));
+  output.write("/words", ros::Time(1.0), *text("a"));
   output.finish();
   EXPECT_EQ(wordsIn(path, "/words"), "a ");
   EXPECT_FALSE(std::filesystem::exists(path + ".active"));
@@ -65,10 +68,33 @@ TEST(OutputBag, SaysWhereItCannotBeWritten) {
   EXPECT_NE(text.find("file/out.bag: cannot be written"), std::string::npos) << text;
 }
 
+// A limit on the size of files stands for a disk that is full.
+TEST(OutputBag, SaysWhenTheDiskIsFullAndCanBeLeft) {
+  const TemporaryFolder folder;
+  const auto limitFiles = [](rlim_t bytes) {
+    rlimit limit{};
+    getrlimit(RLIMIT_FSIZE, &limit);
+    limit.rlim_cur = std::min(bytes, limit.rlim_max);
+    setrlimit(RLIMIT_FSIZE, &limit);
+  };
+  const auto on_excess = std::signal(SIGXFSZ, SIG_IGN);
+  limitFiles(1 << 16);
+  const std::string said = messageOf([&] {
+    OutputBag output(folder / "out.bag");
+    for (int i = 1; i < 1000; ++i)
+      output.write("/words", ros::Time(i), *text(std::string(10000, 'a')));
+    output.finish();
+  });
+  limitFiles(RLIM_INFINITY);
+  std::signal(SIGXFSZ, on_excess);
+  EXPECT_NE(said.find("out.bag: cannot be written"), std::string::npos) << said;
+  EXPECT_NE(said.find("make room"), std::string::npos) << said;
+}
+
 TEST(StampedWriter, OrdersByStampThenRankAndKeepsTheFirst) {
   const TemporaryFolder folder;
   OutputBag output(folder / "out.bag");
-  StampedWriter writer(output.bag());
+  StampedWriter writer(output);
   writer.add<std_msgs::String>("/b", ros::Time(2.0), "", text("late"));
   writer.add<std_msgs::String>("/b", ros::Time(1.0), "", text("early"));
   writer.add<std_msgs::String>("/a", ros::Time(1.0), "y", text("second"));
@@ -87,7 +113,7 @@ TEST(StampedWriter, ArrivalDoesNotShow) {
   const TemporaryFolder folder;
   const auto record = [&](const std::string& name, bool swapped) {
     OutputBag output(folder / name);
-    StampedWriter writer(output.bag());
+    StampedWriter writer(output);
     for (int i = 0; i < 2; ++i) {
       const std::string topic = (i == 1) != swapped ? "/a" : "/b";
       writer.add<std_msgs::String>(topic, ros::Time(1.0), "", text(topic));

@@ -35,7 +35,7 @@ void ClipWriter::add(const cv::Mat& bgr,
   writeImage(bgr, stamp);
   sensor_msgs::CameraInfo info = toMsg(camera_);
   info.header = headerAt(stamp, kCameraFrame);
-  output_.bag().write(kClipCameraInfoTopic, stamp, info);
+  output_.write(kClipCameraInfoTopic, stamp, info);
   if (world_from_camera) writePose(*world_from_camera, stamp);
   ++frames_;
 }
@@ -43,10 +43,10 @@ void ClipWriter::add(const cv::Mat& bgr,
 void ClipWriter::writeImage(const cv::Mat& bgr, const ros::Time& stamp) {
   const cv_bridge::CvImage image(headerAt(stamp, kCameraFrame), "bgr8", bgr);
   if (compressed_) {
-    output_.bag().write(std::string(kClipImageTopic) + "/compressed", stamp,
-                        image.toCompressedImageMsg(cv_bridge::JPG));
+    output_.write(std::string(kClipImageTopic) + "/compressed", stamp,
+                  image.toCompressedImageMsg(cv_bridge::JPG));
   } else {
-    output_.bag().write(kClipImageTopic, stamp, image.toImageMsg());
+    output_.write(kClipImageTopic, stamp, image.toImageMsg());
   }
 }
 
@@ -56,7 +56,7 @@ void ClipWriter::writePose(const Eigen::Isometry3d& world_from_camera, const ros
   tf.transforms[0].header = headerAt(stamp, topics::kWorldFrame);
   tf.transforms[0].child_frame_id = kCameraFrame;
   tf.transforms[0].transform = toTransformMsg(world_from_camera);
-  output_.bag().write("/tf", stamp, tf);
+  output_.write("/tf", stamp, tf);
 }
 
 }  // namespace calipso::bag

@@ -7,24 +7,40 @@ namespace calipso::bag {
 
 namespace fs = std::filesystem;
 
-OutputBag::OutputBag(const std::string& path) : path_(path), active_path_(path + ".active") {
+OutputBag::OutputBag(const std::string& path)
+    : path_(path), active_path_(path + ".active"), bag_(std::make_unique<rosbag::Bag>()) {
   if (path.empty()) throw std::invalid_argument("the output bag's path is empty; give one");
   try {
     const fs::path folder = fs::path(path).parent_path();
     if (!folder.empty()) fs::create_directories(folder);
-    bag_.open(active_path_, rosbag::bagmode::Write);
+    bag_->open(active_path_, rosbag::bagmode::Write);
   } catch (const std::exception& e) {
-    throw std::runtime_error(path + ": cannot be written (" + e.what() +
-                             "); choose a folder that is yours");
+    abandon();
+    failWriting(e, "choose a folder that is yours");
   }
+}
+
+OutputBag::~OutputBag() { abandon(); }
+
+// NOTE: where a bag cannot be closed, its destructor would try again, and throw.
+void OutputBag::abandon() {
+  try {
+    bag_->close();
+  } catch (const std::exception&) {
+    static_cast<void>(bag_.release());
+  }
+}
+
+void OutputBag::failWriting(const std::exception& error, const std::string& remedy) const {
+  throw std::runtime_error(path_ + ": cannot be written (" + error.what() + "); " + remedy);
 }
 
 void OutputBag::finish() {
   try {
-    bag_.close();
+    bag_->close();
     fs::rename(active_path_, path_);
   } catch (const std::exception& e) {
-    throw std::runtime_error(path_ + ": cannot be completed (" + e.what() + ")");
+    failWriting(e, kMakeRoom);
   }
 }
 

@@ -2,7 +2,10 @@
 
 #include <rosbag/bag.h>
 
+#include <exception>
+#include <memory>
 #include <string>
+#include <utility>
 
 namespace calipso::bag {
 
@@ -13,15 +16,32 @@ class OutputBag {
   // Makes missing folders. @throw std::runtime_error when the file cannot be written
   explicit OutputBag(const std::string& path);
 
-  rosbag::Bag& bag() { return bag_; }
+  ~OutputBag();
+  OutputBag(const OutputBag&) = delete;
+  OutputBag& operator=(const OutputBag&) = delete;
+
+  // As rosbag::Bag's. @throw std::runtime_error, for one when the disk is full
+  template <typename... Arguments>
+  void write(Arguments&&... arguments) {
+    try {
+      bag_->write(std::forward<Arguments>(arguments)...);
+    } catch (const rosbag::BagException& e) {
+      failWriting(e, kMakeRoom);
+    }
+  }
   const std::string& path() const { return path_; }
 
   // Closes and renames. @throw std::runtime_error
   void finish();
 
  private:
+  static constexpr char kMakeRoom[] = "make room on the disk, or choose another folder";
+
+  void abandon();
+  [[noreturn]] void failWriting(const std::exception& error, const std::string& remedy) const;
+
   std::string path_, active_path_;
-  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::Bag> bag_;
 };
 
 }  // namespace calipso::bag

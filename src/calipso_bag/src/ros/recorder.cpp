@@ -29,7 +29,7 @@ Recorder::Recorder(ros::NodeHandle& nh, const Params& params)
     : params_(params),
       nh_(nh),
       output_(params.output),
-      writer_(output_.bag()),
+      writer_(output_),
       reporter_(nh, "recorder") {
   summary_.output = params.output;
   subscribeFrames();

@@ -2,12 +2,13 @@
 
 #include <ros/message_event.h>
 #include <ros/time.h>
-#include <rosbag/bag.h>
 
 #include <functional>
 #include <map>
 #include <string>
 #include <tuple>
+
+#include "output_bag.hpp"
 
 namespace calipso::bag {
 
@@ -15,7 +16,7 @@ namespace calipso::bag {
 // the rank the caller gives. Holds what may still be overtaken. Not thread-safe.
 class StampedWriter {
  public:
-  explicit StampedWriter(rosbag::Bag& bag) : bag_(bag) {}
+  explicit StampedWriter(OutputBag& output) : output_(output) {}
 
   // `rank` orders messages of one stamp and topic; equal ranks: the first one is kept.
   template <typename M>
@@ -23,7 +24,7 @@ class StampedWriter {
            const boost::shared_ptr<M const>& message,
            const boost::shared_ptr<ros::M_string>& connection = nullptr) {
     waiting_.emplace(Key(stamp, topic, rank),
-                     [=](rosbag::Bag& bag) { bag.write(topic, stamp, message, connection); });
+                     [=](OutputBag& out) { out.write(topic, stamp, message, connection); });
   }
 
   // Writes everything up to and including this stamp.
@@ -32,8 +33,8 @@ class StampedWriter {
 
  private:
   using Key = std::tuple<ros::Time, std::string, std::string>;  // stamp, topic, rank
-  rosbag::Bag& bag_;
-  std::map<Key, std::function<void(rosbag::Bag&)>> waiting_;
+  OutputBag& output_;
+  std::map<Key, std::function<void(OutputBag&)>> waiting_;
 };
 
 }  // namespace calipso::bag
