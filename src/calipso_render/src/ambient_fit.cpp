@@ -121,7 +121,7 @@ std::vector<Row> rowsOf(const LightEvidence& evidence, const LightFit& fit) {
     const cv::Vec3f lit = diffuseShading(plain, s.normal, visible, s.seen,
                                          cv::Vec3f::all(kThrownBack)),
                     gloss = specularShading(fit.light, fit.gloss, s.normal, s.view, visible,
-                                            skyMirrored(s.seen));
+                                            skyMirrored(s.seen, mirroredIn(s.normal, s.view)));
     const Eigen::Vector3f first = s.seen.towards + kThrownBack * s.seen.thrown_towards;
     const std::array<float, 9> basis = shBasis(s.seen.towards.normalized());
     Row row;

@@ -76,7 +76,8 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       s.light.at<cv::Vec3f>(v, u) = l;
       const Eigen::Vector3f towards = (eye - p.position).normalized();
       s.highlight.at<cv::Vec3f>(v, u) =
-          specularShading(light, gloss, p.normal, towards, visible, skyMirrored(p.seen));
+          specularShading(light, gloss, p.normal, towards, visible,
+                          skyMirrored(p.seen, mirroredIn(p.normal, towards)));
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];

@@ -42,7 +42,8 @@ cv::Rect boxOf(const cv::Mat& labels, int index) {
 }
 
 Gloss glossOf(const Gloss& own, const Look& look) {
-  return {look.specular.value_or(own.specular), look.roughness.value_or(own.roughness)};
+  return {look.specular.value_or(own.specular), look.roughness.value_or(own.roughness),
+          look.specular.value_or(own.around)};
 }
 
 }  // namespace

@@ -46,6 +46,7 @@ void FrameCompositor::shadeSetup() {
     copyTo(s.floor, lightFloor(appearance.mean_light));
     copyTo(s.tint, tintOf(static_cast<int>(slot)));
     s.specular = glosses_[slot].specular, s.roughness = glosses_[slot].roughness;
+    s.around = glosses_[slot].around;
     shades_.push_back(s);
   }
 }

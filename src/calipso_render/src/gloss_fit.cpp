@@ -27,8 +27,13 @@ constexpr double kNarrowPart = 0.5;  // of its roughness, that a narrow one besi
 constexpr double kSeenBeside = 15.0;
 // rows' mean errors within which another roughness explains the highlights as well
 constexpr double kAlike = 6.0;
+// Strength of mirrored surroundings at most: a dielectric's, of refraction 1.6, where lit white has
+// half of the light's unit.
+constexpr double kMostAround = 0.025;
 // of the error without gloss: less must remain, or no highlight was seen
 constexpr double kExplained = 0.97;
+
+using SunVisible = std::function<float(const LightSample&, const Eigen::Vector3f&)>;
 
 struct NormalMap {
   cv::Rect region;
@@ -116,7 +121,8 @@ struct Row {
 };
 
 struct Solution {
-  double strength = 0.0, cost = 1e30;
+  double strength = 0.0, beside = 0.0;  // of Lobes' own, and of what goes with the broad one
+  double cost = 1e30;
 };
 
 // Lobes of the rows whose strengths are unknown: the one in question, and a broad one beside it.
@@ -177,7 +183,7 @@ Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
         sums.add(rows[i].cluster, w, rows[i].diffuse[c], glossOf(i, c), rows[i].radiance[c]);
     }
     const Eigen::Vector2d strengths = sums.strengths();
-    solution.strength = strengths[0], solution.cost = 0.0;
+    solution.strength = strengths[0], solution.beside = strengths[1], solution.cost = 0.0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const int k = rows[i].cluster;
       const double brightness = (sums.di[k] - strengths.dot(sums.dg[k])) / sums.dd[k];
@@ -195,6 +201,21 @@ Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
     }
   }
   return solution;
+}
+
+Row rowOf(const LightSample& s, const LightFit& fit, const SunVisible& visible) {
+  const Light& light = fit.light;
+  const float sun = visible ? visible(s, light.direction) : 1.0f;
+  const Eigen::Vector3f mirrored = mirroredIn(s.normal, s.view);
+  Row row;
+  row.cluster = s.cluster;
+  row.diffuse = fit.albedos[s.cluster].mul(
+      diffuseShading(light, s.normal, sun, s.seen, cv::Vec3f::all(kThrownBack)));
+  row.radiance = s.radiance, row.sun = light.sun * sun;
+  row.mirrored =
+      ambientAt(light, mirrored) * (skyMirrored(s.seen, mirrored) * grazing(s.normal.dot(s.view)));
+  row.scale = (row.diffuse[0] + row.diffuse[1] + row.diffuse[2]) / 3.0 + 1e-3;
+  return row;
 }
 
 double roughnessAt(int i) {
@@ -242,7 +263,8 @@ std::optional<Found> bestRoughness(const std::vector<Row>& rows,
     return static_cast<float>(roughnessAt(static_cast<int>(i)));
   };
   Found found;
-  found.gloss = {static_cast<float>(strengths[best]), roughness(best)};
+  const float ks = static_cast<float>(strengths[best]);
+  found.gloss = {ks, roughness(best), ks};
   found.smoothest = roughness(first), found.roughest = roughness(last), found.cost = costs[best];
   return found;
 }
@@ -273,21 +295,7 @@ std::optional<SeenGloss> fitGloss(
   if (highlights.size() < kFewest) return std::nullopt;
   const Light& light = fit.light;
   std::vector<Row> rows;
-  for (const HighlightSample& h : highlights) {
-    const float sun = visible ? visible(h.at, light.direction) : 1.0f,
-                n_v = h.at.normal.dot(h.at.view);
-    const cv::Vec3f& a = fit.albedos[h.at.cluster];
-    Row row{h.at.cluster,
-            a.mul(diffuseShading(light, h.at.normal, sun, h.at.seen, cv::Vec3f::all(kThrownBack))),
-            h.at.radiance,
-            light.sun * sun,
-            {},
-            1.0};
-    row.mirrored = ambientAt(light, 2.0f * n_v * h.at.normal - h.at.view) *
-                   (skyMirrored(h.at.seen) * grazing(n_v));
-    row.scale = (row.diffuse[0] + row.diffuse[1] + row.diffuse[2]) / 3.0 + 1e-3;
-    rows.push_back(row);
-  }
+  for (const HighlightSample& h : highlights) rows.push_back(rowOf(h.at, fit, visible));
   const int clusters = static_cast<int>(fit.albedos.size());
   const double without = solve(rows, {}, clusters).cost;
   double worst = 0.0;
@@ -305,6 +313,22 @@ std::optional<SeenGloss> fitGloss(
       bestRoughness(rows, highlights, light.direction, clusters, &beside,
                     kNarrowPart * best->gloss.roughness, with_broad, worst);
   return *(narrow ? narrow : best);
+}
+
+float surroundingsStrength(const LightEvidence& evidence, const LightFit& fit) {
+  std::vector<Row> rows;
+  std::vector<double> lobes;
+  for (const LightSample& s : evidence.samples) {
+    rows.push_back(rowOf(s, fit, evidence.visible));
+    lobes.push_back(torranceSparrow(s.normal, fit.light.direction, s.view, fit.gloss.roughness));
+  }
+  // The slot of the broad lobe without a lobe: the surroundings alone.
+  const std::vector<double> no_lobe(rows.size(), 0.0);
+  const int clusters = static_cast<int>(fit.albedos.size());
+  const Solution together = solve(rows, {&lobes, nullptr}, clusters),
+                 apart = solve(rows, {&lobes, &no_lobe}, clusters);
+  const double found = apart.cost < together.cost ? apart.beside : together.strength;
+  return static_cast<float>(std::min(found, kMostAround));
 }
 
 }  // namespace calipso::render

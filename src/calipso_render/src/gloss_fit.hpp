@@ -29,4 +29,8 @@ std::optional<SeenGloss> fitGloss(
     const std::vector<HighlightSample>& highlights, const LightFit& fit,
     const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible);
 
+// Strength with which the surroundings are mirrored, by all samples beside the highlights' gloss.
+// @param fit light, albedos and gloss so far
+float surroundingsStrength(const LightEvidence& evidence, const LightFit& fit);
+
 }  // namespace calipso::render

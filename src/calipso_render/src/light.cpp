@@ -94,10 +94,9 @@ Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
 
 cv::Vec3f specularShading(const Light& light, const Gloss& gloss, const Eigen::Vector3f& n,
                           const Eigen::Vector3f& view, float sun, float sky) {
-  if (gloss.specular <= 0.0f) return {};
+  if (gloss.specular <= 0.0f && gloss.around <= 0.0f) return {};
   const float n_v = n.dot(view);
-  const Eigen::Vector3f mirrored = 2.0f * n_v * n - view;
-  cv::Vec3f radiance = ambientAt(light, mirrored) * (gloss.specular * sky * grazing(n_v));
+  cv::Vec3f radiance = ambientAt(light, mirroredIn(n, view)) * (gloss.around * sky * grazing(n_v));
   if (sun > 0.0f)
     radiance += light.sun *
                 (gloss.specular * sun * torranceSparrow(n, light.direction, view, gloss.roughness));

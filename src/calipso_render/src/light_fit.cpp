@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "ambient_fit.hpp"
+#include "gloss_fit.hpp"
 #include "light_search.hpp"
 #include "reflectance_cost.hpp"
 
@@ -184,7 +185,8 @@ LightFit toFit(const Unknowns& x, const cv::Vec3f& below, const Eigen::Vector3f&
       A - below * static_cast<float>((1.0 - x.gradient) * (A[0] + A[1] + A[2]) / 3.0);
   // Band 1 of the harmonics is ordered y, z, x.
   for (int i = 0; i < 3; ++i) fit.light.ambient[1 + i] = more * up[(i + 1) % 3];
-  fit.gloss = {static_cast<float>(std::exp(x.gloss[0])), static_cast<float>(std::exp(x.gloss[1]))};
+  const float ks = static_cast<float>(std::exp(x.gloss[0]));
+  fit.gloss = {ks, static_cast<float>(std::exp(x.gloss[1])), ks};
   for (const Eigen::Vector3d& a : x.albedos) fit.albedos.push_back(expOf(a));
   return fit;
 }
@@ -236,6 +238,7 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
   if (!best.determined) return best;
   best.seen_gloss = evidence.gloss ? evidence.gloss(best) : std::nullopt;
   if (best.seen_gloss) best.gloss = best.seen_gloss->gloss;
+  best.gloss.around = surroundingsStrength(evidence, best);
   best.second_order = refineAmbient(evidence, best);
   return best;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 namespace calipso::render {
@@ -10,6 +11,9 @@ namespace {
 constexpr double kMedianToSigma = 1.4826;  // of a normal distribution's median absolute value
 constexpr int kFewestSamples = 64;         // per knot; below that the neighbours decide
 constexpr int kHistogram = 512;            // of absolute differences, in 1/8 code value
+// from a knot to the next, at most: shot noise hardly changes in code values, read noise grows in
+// the dark
+constexpr float kGrowsBrighter = 1.25f, kGrowsDarker = 2.5f;
 
 std::uint64_t splitMix(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ull;
@@ -27,10 +31,12 @@ struct Differences {
   void add(int code, double difference) {
     ++counts[(code + 16) / 32][std::min(kHistogram - 1, static_cast<int>(8.0 * difference))];
   }
+  long samples(int knot) const {
+    return std::accumulate(counts[knot].begin(), counts[knot].end(), 0L);
+  }
   // < 0: too few samples.
   double median(int knot) const {
-    long total = 0;
-    for (int c : counts[knot]) total += c;
+    const long total = samples(knot);
     if (total < kFewestSamples) return -1.0;
     long below = 0;
     for (int i = 0; i < kHistogram; ++i) {
@@ -56,6 +62,15 @@ void fillGaps(std::array<float, N>& values) {
     filled[i] = std::max(filled[i], 0.0f);
   }
   values = filled;
+}
+
+// Growth from the knot with most samples on. What else differs (something that passes and has the
+// only bright parts) has few.
+template <std::size_t N>
+void limitGrowth(int from, std::array<float, N>& values) {
+  for (std::size_t i = from + 1; i < N; ++i)
+    values[i] = std::min(values[i], kGrowsBrighter * values[i - 1]);
+  for (int i = from - 1; i >= 0; --i) values[i] = std::min(values[i], kGrowsDarker * values[i + 1]);
 }
 
 // Consecutive pairs: their difference has twice the variance.
@@ -93,20 +108,24 @@ NoiseModel::NoiseModel() {
   for (auto& channel : deviation_) channel.fill(0.0f);
 }
 
-NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames, const cv::Mat& steady) {
-  CV_Assert(!frames.empty());
+NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames,
+                                const std::vector<cv::Mat>& steady) {
+  CV_Assert(!frames.empty() && frames.size() == steady.size());
   NoiseModel model;
   for (int channel = 0; channel < 3; ++channel) {
     Differences differences(kKnots);
     for (std::size_t i = 0; i + 1 < frames.size() && i < 6; ++i) {
-      addPairs(frames[i], frames[i + 1], steady, channel, differences);
+      addPairs(frames[i], frames[i + 1], steady[i] & steady[i + 1], channel, differences);
     }
     if (frames.size() == 1) addDetail(frames[0], channel, differences);
+    int best = 0;
     for (int knot = 0; knot < kKnots; ++knot) {
+      if (differences.samples(knot) > differences.samples(best)) best = knot;
       model.deviation_[channel][knot] =
           static_cast<float>(kMedianToSigma * differences.median(knot));
     }
     fillGaps(model.deviation_[channel]);
+    limitGrowth(best, model.deviation_[channel]);
   }
   return model;
 }

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "calipso_render/clip_poses.hpp"
@@ -17,6 +18,7 @@ namespace calipso::render {
 namespace {
 
 constexpr std::size_t kFurtherViews = 5;  // beside the key frame
+constexpr int kMixed = 2;                 // px around a moving object whose colour is mixed
 
 std::vector<Actor> keyActors(const Prepared& p) {
   std::vector<Actor> actors;
@@ -121,10 +123,18 @@ SkyMap skyOver(const std::vector<Actor>& actors, const RenderParams& params) {
   return {occluders(actors), params.planes.front().normal, kFine};
 }
 
-NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadiness) {
-  std::vector<cv::Mat> pictures;
-  for (const ClipFrame& f : frames) pictures.push_back(f.bgr);
-  return NoiseModel::estimate(pictures, steadiness > 1);
+NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadiness,
+                   const Prepared& p) {
+  std::vector<cv::Mat> pictures, steady;
+  for (const ClipFrame& f : frames) {
+    cv::Mat moving = cv::Mat::zeros(f.labels.size(), CV_8U);
+    for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
+      if (p.moves[i] || p.sways[i]) moving |= f.labels == p.surfaces[i].index;
+    }
+    cv::dilate(moving, moving, cv::Mat::ones(2 * kMixed + 1, 2 * kMixed + 1, CV_8U));
+    pictures.push_back(f.bgr), steady.push_back((steadiness > 1) & (moving == 0));
+  }
+  return NoiseModel::estimate(pictures, steady);
 }
 
 }  // namespace
@@ -158,7 +168,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
   prepareBackground({frames, views, actors, seen, picture, sun, sky, cameraMoves(clip)}, params, p);
   p.background_ms += watch.lap();
-  p.noise = noiseOf(frames, steadiness);
+  p.noise = noiseOf(frames, steadiness, p);
   p.outline_blur = outlineBlur(picture, p.key_labels);
   addRemarks(clip.frames(), actors, p);
   return p;

@@ -1,5 +1,6 @@
 #include "sky_seen.hpp"
 
+#include <Eigen/Dense>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,28 @@ namespace {
 constexpr float kGoldenAngle = 2.39996323f;
 constexpr int kRayBudget = 120000;  // for a whole mesh
 constexpr int kFewestRays = 12, kMostRays = 48;
+constexpr float kEven = 0.02f;  // of the fit of V: weight of no slope, as a part of all rays
+
+// Place of ray k in the unit disc below the hemisphere.
+Eigen::Vector2f discPlace(int k, int rays) {
+  const float r = std::sqrt((k + 0.5f) / rays), a = k * kGoldenAngle;
+  return {r * std::cos(a), r * std::sin(a)};
+}
+
+using Fit = Eigen::Matrix<float, 6, Eigen::Dynamic>;
+
+// Least squares of values by rays as 1, x, y, x^2 - y^2, 2 x y, x^2 + y^2: one row per coefficient.
+Fit polynomialFit(int rays) {
+  Fit basis(6, rays);
+  for (int k = 0; k < rays; ++k) {
+    const Eigen::Vector2f p = discPlace(k, rays);
+    const float x = p.x(), y = p.y();
+    basis.col(k) << 1.0f, x, y, x * x - y * y, 2.0f * x * y, x * x + y * y;
+  }
+  Eigen::Matrix<float, 6, 6> normal = basis * basis.transpose();
+  normal.diagonal().tail<5>().array() += kEven * static_cast<float>(rays);
+  return normal.ldlt().solve(basis);
+}
 
 // Rays from one side of every vertex, evenly spread over the disc below its hemisphere: the cosine
 // weighs by itself (Malley).
@@ -21,7 +44,8 @@ class Side {
   Side(const RayScene& scene, const Points& vertices, const Points& normals, float side)
       : rays_(std::clamp(kRayBudget / std::max(1, static_cast<int>(vertices.size())), kFewestRays,
                          kMostRays)),
-        hits_(vertices.size() * rays_) {
+        hits_(vertices.size() * rays_),
+        fit_(polynomialFit(rays_)) {
     seen.resize(vertices.size());
 #pragma omp parallel for schedule(dynamic, 64)
     for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -58,21 +82,29 @@ class Side {
  private:
   void follow(const RayScene& scene, const Eigen::Vector3f& p, const Eigen::Vector3f& n, int i) {
     const Eigen::Vector3f s = n.unitOrthogonal(), t = n.cross(s);
+    Eigen::Matrix<float, 6, 1> hidden = Eigen::Matrix<float, 6, 1>::Zero();
     for (int k = 0; k < rays_; ++k) {
-      const float r2 = (k + 0.5f) / rays_, r = std::sqrt(r2), a = k * kGoldenAngle;
+      const Eigen::Vector2f q = discPlace(k, rays_);
       const Eigen::Vector3f d =
-          r * std::cos(a) * s + r * std::sin(a) * t + std::sqrt(1.0f - r2) * n;
+          q.x() * s + q.y() * t + std::sqrt(std::max(0.0f, 1.0f - q.squaredNorm())) * n;
       std::optional<RayScene::Hit>& hit = hits_[static_cast<std::size_t>(i) * rays_ + k];
       hit = scene.hit(p, n, d);
       if (!hit) continue;
       // Taken off what the whole hemisphere gives, which is exact where nothing is in the way.
       seen[i].open -= 1.0f / static_cast<float>(rays_);
       seen[i].towards -= 1.5f / static_cast<float>(rays_) * d;
+      hidden += fit_.col(k);
     }
+    seen[i].level -= hidden[0];
+    seen[i].slope -= hidden[1] * s + hidden[2] * t;
+    const Eigen::Matrix3f ss = s * s.transpose(), tt = t * t.transpose(), st = s * t.transpose();
+    seen[i].curve -=
+        hidden[3] * (ss - tt) + hidden[4] * (st + st.transpose()) + hidden[5] * (ss + tt);
   }
 
   int rays_;
   std::vector<std::optional<RayScene::Hit>> hits_;
+  Fit fit_;
 };
 
 }  // namespace

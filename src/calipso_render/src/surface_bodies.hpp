@@ -145,14 +145,14 @@ CALIPSO_INLINE void shadeEight(const SurfaceShade& s, int k, SurfaceRun& run) {
     const Eight diffuse = eightAt(run.ambient[c] + k) + s.sun[c] * sunlit;
     out[c] = eightAt(run.colour[c] + k) * s.tint[c] * (diffuse + s.floor[c]);
   }
-  if (s.specular > 0.0f) {
+  if (s.specular > 0.0f || s.around > 0.0f) {
     Eight view[3], mirrored[3], second[5], n_v{};
     for (int c = 0; c < 3; ++c) view[c] = -eightAt(run.sight[c] + k);
     normalise(view);
     for (int c = 0; c < 3; ++c) n_v += n[c] * view[c];
     for (int c = 0; c < 3; ++c) mirrored[c] = 2.0f * n_v * n[c] - view[c];
     if (s.terms > 4) secondBand(mirrored, second);
-    const Eight from_around = s.specular * sky * grazingBody(n_v);
+    const Eight from_around = s.around * sky * grazingBody(n_v);
     for (int c = 0; c < 3; ++c) out[c] += ambientBody(s, c, mirrored, second) * from_around;
     if (any(sunlit > 0.0f)) {  // places beyond the run may be no numbers
       const EightInts seen = (n_l > kHorizon) & (n_v > kHorizon);

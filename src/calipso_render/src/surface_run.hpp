@@ -47,6 +47,7 @@ struct SurfaceShade {
   int terms;  // of the harmonics: 1, 4 or 9
   float specular, roughness;
   float floor[3], tint[3];
+  float around;  // strength of the mirrored surroundings
 };
 
 }  // namespace calipso::render

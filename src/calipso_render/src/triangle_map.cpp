@@ -76,7 +76,7 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const
       corner_(appearance.region.tl()),
       vertices_(actor.vertices.size()),
       triangles_(new TriangleMap[actor.surface->triangles.size()]) {
-  findAround(appearance, light);
+  findAround(appearance, light, eye);
   const Triangles& triangles = actor.surface->triangles;
   const Camera& c = appearance.key_camera;
   const Eigen::Isometry3f camera_from_world = c.world_from_camera.inverse().cast<float>();
@@ -112,17 +112,19 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const
   }
 }
 
-void SurfaceMaps::findAround(const Appearance& appearance, const Light& light) {
-  const auto find = [&](const std::vector<SkySeen>& seen, std::vector<Around>& around) {
+void SurfaceMaps::findAround(const Appearance& appearance, const Light& light,
+                             const Eigen::Vector3f& eye) {
+  const auto find = [&](const std::vector<SkySeen>& seen, float side, std::vector<Around>& around) {
     around.resize(seen.size());
 #pragma omp parallel for schedule(static)
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const cv::Vec3f ambient = ambientOn(light, seen[i], appearance.thrown_back);
-      around[i] = {{ambient[0], ambient[1], ambient[2], 0.0f},
-                   {0.0f, 0.0f, 0.0f, skyMirrored(seen[i])}};
+      const float sky = skyMirrored(
+          seen[i], mirroredIn(side * actor_->normals[i], (eye - actor_->vertices[i]).normalized()));
+      around[i] = {{ambient[0], ambient[1], ambient[2], 0.0f}, {0.0f, 0.0f, 0.0f, sky}};
     }
   };
-  find(actor_->seen, around_), find(actor_->seen_behind, around_behind_);
+  find(actor_->seen, 1.0f, around_), find(actor_->seen_behind, -1.0f, around_behind_);
 }
 
 void SurfaceMaps::locate(const SurfacePlace* places, int count, SurfaceRun& run,

@@ -63,7 +63,7 @@ class SurfaceMaps {
     float sky[4];    // 0, 0, 0, sky
   };
 
-  void findAround(const Appearance& appearance, const Light& light);
+  void findAround(const Appearance& appearance, const Light& light, const Eigen::Vector3f& eye);
   const std::vector<Around>& aroundOf(int triangle) const {
     const bool behind = of(triangle).is(TriangleMap::kTurned) && !around_behind_.empty();
     return behind ? around_behind_ : around_;

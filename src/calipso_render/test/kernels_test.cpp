@@ -83,7 +83,8 @@ SurfaceShade shadeOf(const Light& light, int terms, float specular) {
                      specular,
                      0.3f,
                      {0.02f, 0.02f, 0.03f},
-                     {1.0f, 0.5f, 0.25f}};
+                     {1.0f, 0.5f, 0.25f},
+                     0.03f};
   for (int c = 0; c < 3; ++c) {
     shade.least[c] = 0.02f * light.ambient[0][c];
     for (int i = 0; i < 9; ++i) shade.ambient[i][c] = light.ambient[i][c];
@@ -271,8 +272,8 @@ TEST(Kernels, ShadeAsSpecularShadingAndWhatIsDiffuse) {
       const Eigen::Vector3f around = at(run.ambient);
       const float lit = std::max(0.0f, n.dot(light.direction)) * run.sun[i];
       const cv::Vec3f diffuse = cv::Vec3f(around.x(), around.y(), around.z()) + light.sun * lit;
-      const cv::Vec3f highlight = specularShading(light, {shade.specular, shade.roughness}, n, view,
-                                                  run.sun[i], run.sky[i]);
+      const cv::Vec3f highlight = specularShading(
+          light, {shade.specular, shade.roughness, shade.around}, n, view, run.sun[i], run.sky[i]);
       for (int c = 0; c < 3; ++c) {
         const float expected =
             before.colour[c][i] * shade.tint[c] * (diffuse[c] + shade.floor[c]) + highlight[c];

@@ -9,6 +9,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/light_fit.hpp"
 #include "calipso_render/ray_shadow.hpp"
+#include "gloss_fit.hpp"
 #include "ray_scene.hpp"
 #include "reflectance_cost.hpp"
 #include "sky_seen.hpp"
@@ -218,6 +219,36 @@ TEST(SkySeen, IsFullOutsideAndPartInABox) {
   EXPECT_LT(floor.towards.head<2>().norm(), 0.1f);
   EXPECT_GT(floor.thrown, 0.1f);                       // walls that see part of the sky
   EXPECT_LT(floor.thrown, 1.0f - floor.open + 1e-6f);  // no more than what hides it could
+}
+
+// What the floor's middle mirrors is the sky above it and the walls beside it, which the opening's
+// edge lies 35 degrees from overhead before.
+TEST(SkySeen, IsOpenInSomeDirections) {
+  const OpenBox box;
+  const SkySeen& floor = box.seen[8];
+  EXPECT_GT(floor.openTowards({0, 0, 1}), 0.8f);  // 48 rays, two degrees of the polynomial
+  for (const Eigen::Vector3f& side :
+       {Eigen::Vector3f(0.9f, 0, 0.436f), Eigen::Vector3f(0, -0.9f, 0.436f)}) {
+    EXPECT_LT(floor.openTowards(side), 0.15f);
+    EXPECT_LT(skyMirrored(floor, side), kThrownBack);
+  }
+  EXPECT_FLOAT_EQ(box.seen[4].openTowards(Eigen::Vector3f(-1, 0, 0)), 1.0f);
+  const Eigen::Matrix3f turn(Eigen::AngleAxisf(1.1f, Eigen::Vector3f(1, 2, 3).normalized()));
+  const Eigen::Vector3f w = Eigen::Vector3f(0.3f, -0.4f, 0.8f).normalized();
+  EXPECT_NEAR(floor.turned(turn).openTowards(turn * w), floor.openTowards(w), 1e-4f);
+}
+
+// A glossy ball's rim mirrors the sky with a strength that its highlight does not have.
+TEST(SurroundingsStrength, IsFoundBesideTheHighlights) {
+  LightFit fit = plainFit(Light());
+  fit.light.direction = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
+  fit.gloss = {0.005f, 0.1f, 0.02f};
+  LightEvidence evidence = ballUnder(fit.light);
+  for (LightSample& s : evidence.samples)
+    s.radiance += specularShading(fit.light, fit.gloss, s.normal, s.view, 1.0f);
+  fit.gloss.around = 0.0f;
+  EXPECT_NEAR(surroundingsStrength(evidence, fit), 0.02f, 0.003f);  // errors of 1 %
+  EXPECT_LT(surroundingsStrength(ballUnder(fit.light), fit), 0.003f);
 }
 
 // Under a sky that is red above and blue below, the floor of a box gets the red of its opening, and

@@ -17,10 +17,13 @@ struct Light {
   float angular_radius = 0.02f;                                      // of the sun, rad
 };
 
-// Torrance-Sparrow lobe with Beckmann's distribution: specular strength ks, roughness m.
+// Torrance-Sparrow lobe with Beckmann's distribution: specular strength ks, roughness m. The smooth
+// surroundings are mirrored with a strength of their own: highlights are clipped, and narrower than
+// pixels.
 struct Gloss {
   float specular = 0.0f;   // ks, reflectance at normal incidence
   float roughness = 0.4f;  // m, root mean square slope of the facets
+  float around = 0.0f;     // ks of the surroundings
 };
 
 inline constexpr float kGrazing = 14.0f;  // of grazing()
@@ -36,23 +39,43 @@ cv::Vec3f ambientAt(const Light& light, const Eigen::Vector3f& n);
 //   open     T_0 = 1/pi int V n.w dw            towards         T_1 = 3/(2 pi) int V w n.w dw
 //   thrown   R_0 = 1/pi int (1 - V) T_0' n.w dw  thrown_towards  R_1, likewise of T_1'
 //   V  1 where nothing hides direction w    '  of the place that is met there
+// and, for what is mirrored from single directions, V itself: V(w) = level + w.slope + w.curve w.
 struct SkySeen {
   float open = 1.0f;
   Eigen::Vector3f towards = Eigen::Vector3f::Zero();
   float thrown = 0.0f;
   Eigen::Vector3f thrown_towards = Eigen::Vector3f::Zero();
+  float level = 1.0f;
+  Eigen::Vector3f slope = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f curve = Eigen::Matrix3f::Zero();
 
-  static SkySeen all(const Eigen::Vector3f& n) { return {1.0f, n, 0.0f, Eigen::Vector3f::Zero()}; }
+  static SkySeen all(const Eigen::Vector3f& n) {
+    SkySeen seen;
+    seen.towards = n;
+    return seen;
+  }
   SkySeen turned(const Eigen::Matrix3f& by) const {
-    return {open, by * towards, thrown, by * thrown_towards};
+    if (open == 1.0f) return all(by * towards);
+    return {open,
+            by * towards,
+            thrown,
+            by * thrown_towards,
+            level,
+            by * slope,
+            by * curve * by.transpose()};
   }
   // Linear in everything.
   SkySeen operator*(float s) const {
-    return {s * open, s * towards, s * thrown, s * thrown_towards};
+    return {s * open, s * towards, s * thrown, s * thrown_towards, s * level, s * slope, s * curve};
   }
   SkySeen operator+(const SkySeen& b) const {
-    return {open + b.open, towards + b.towards, thrown + b.thrown,
-            thrown_towards + b.thrown_towards};
+    return {
+        open + b.open,   towards + b.towards, thrown + b.thrown, thrown_towards + b.thrown_towards,
+        level + b.level, slope + b.slope,     curve + b.curve};
+  }
+  // V in unit direction w.
+  float openTowards(const Eigen::Vector3f& w) const {
+    return std::clamp(level + w.dot(slope + curve * w), 0.0f, 1.0f);
   }
 };
 
@@ -62,8 +85,19 @@ inline constexpr float kThrownBack = 0.3f;
 // The same of that brightness, in the colour of a known reflectance.
 cv::Vec3f thrownBack(const cv::Vec3f& reflectance);
 
-// Part of the sky, with what is thrown back for it, that a surface mirrors.
-inline float skyMirrored(const SkySeen& seen) { return seen.open + kThrownBack * seen.thrown; }
+// Direction that a surface with unit normal n mirrors to unit direction `view`.
+inline Eigen::Vector3f mirroredIn(const Eigen::Vector3f& n, const Eigen::Vector3f& view) {
+  return 2.0f * n.dot(view) * n - view;
+}
+
+// Part of the sky that a surface mirrors from unit direction w; where its object hides it, what that
+// throws back for it.
+inline float skyMirrored(const SkySeen& seen, const Eigen::Vector3f& w) {
+  constexpr float kNone = 1e-3f;
+  const float open = seen.openTowards(w), hidden = 1.0f - seen.open;
+  const float back = hidden > kNone ? seen.thrown / hidden : 0.0f;
+  return open + (1.0f - open) * kThrownBack * std::min(1.0f, back);
+}
 
 // Part of the sun's light that reaches a point by way of its object, per unit of reflectance: by the
 // sun's own harmonics of bands 0 and 1 over the hemisphere.

@@ -12,10 +12,12 @@ class NoiseModel {
  public:
   NoiseModel();  // a camera without noise
 
-  // From pictures of the same place: spread over time per code value, where `steady` (CV_8UC1) is
-  // not 0. With a single picture: from its finest detail, by the median, which edges do not move.
+  // From pictures of the same place: spread over time per code value, where both pictures of a pair
+  // are `steady` (CV_8UC1, one per picture, != 0). With a single picture: from its finest detail,
+  // by the median, which edges do not move.
   // @pre frames: CV_8UC3, all of one size, at least one
-  static NoiseModel estimate(const std::vector<cv::Mat>& frames, const cv::Mat& steady);
+  static NoiseModel estimate(const std::vector<cv::Mat>& frames,
+                             const std::vector<cv::Mat>& steady);
 
   // Code values, >= 0.
   float deviation(int channel, float code) const;
