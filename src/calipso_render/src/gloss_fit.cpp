@@ -30,10 +30,13 @@ constexpr double kAlike = 6.0;
 // Strength of mirrored surroundings at most: a dielectric's, of refraction 1.6, where lit white has
 // half of the light's unit.
 constexpr double kMostAround = 0.025;
+// Directions beside the light's, and how far (rad), that highlights have to speak against; by so
+// many samples, and every so manieth roughness.
+constexpr int kBesides = 8, kTriedStep = 3;
+constexpr float kBeside = 0.1f;
+constexpr std::size_t kTriedWith = 900;
 // of the error without gloss: less must remain, or no highlight was seen
 constexpr double kExplained = 0.97;
-
-using SunVisible = std::function<float(const LightSample&, const Eigen::Vector3f&)>;
 
 struct NormalMap {
   cv::Rect region;
@@ -269,6 +272,21 @@ std::optional<Found> bestRoughness(const std::vector<Row>& rows,
   return found;
 }
 
+// The least error that any roughness leaves under the same light from direction l.
+double leastError(const std::vector<HighlightSample>& highlights, LightFit fit,
+                  const SunVisible& visible, const Eigen::Vector3f& l) {
+  fit.light.direction = l;
+  std::vector<Row> rows;
+  for (const HighlightSample& h : highlights) rows.push_back(rowOf(h.at, fit, visible));
+  double least = 1e30;
+  for (int i = 0; i <= kRoughnesses; i += kTriedStep) {
+    const std::vector<double> lobes = lobesOf(highlights, l, roughnessAt(i));
+    const int clusters = static_cast<int>(fit.albedos.size());
+    least = std::min(least, solve(rows, {&lobes, nullptr}, clusters).cost);
+  }
+  return least;
+}
+
 }  // namespace
 
 std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
@@ -289,9 +307,8 @@ std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
   return thinned;
 }
 
-std::optional<SeenGloss> fitGloss(
-    const std::vector<HighlightSample>& highlights, const LightFit& fit,
-    const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible) {
+std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights,
+                                  const LightFit& fit, const SunVisible& visible) {
   if (highlights.size() < kFewest) return std::nullopt;
   const Light& light = fit.light;
   std::vector<Row> rows;
@@ -313,6 +330,22 @@ std::optional<SeenGloss> fitGloss(
       bestRoughness(rows, highlights, light.direction, clusters, &beside,
                     kNarrowPart * best->gloss.roughness, with_broad, worst);
   return *(narrow ? narrow : best);
+}
+
+bool tellDirection(const std::vector<HighlightSample>& highlights, const LightFit& fit,
+                   const SunVisible& visible) {
+  std::vector<HighlightSample> some;
+  const std::size_t step = std::max<std::size_t>(1, highlights.size() / kTriedWith);
+  for (std::size_t i = 0; i < highlights.size(); i += step) some.push_back(highlights[i]);
+  const Eigen::Vector3f l = fit.light.direction, s = l.unitOrthogonal(), t = l.cross(s);
+  const double here = leastError(some, fit, visible, l);
+  for (int i = 0; i < kBesides; ++i) {
+    const float a = 2.0f * static_cast<float>(M_PI) * i / kBesides;
+    const Eigen::Vector3f off = std::cos(a) * s + std::sin(a) * t;
+    const Eigen::Vector3f beside = std::cos(kBeside) * l + std::sin(kBeside) * off;
+    if (leastError(some, fit, visible, beside) < here) return false;
+  }
+  return true;
 }
 
 float surroundingsStrength(const LightEvidence& evidence, const LightFit& fit) {

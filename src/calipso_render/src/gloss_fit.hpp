@@ -13,6 +13,9 @@ struct HighlightSample {
   float spread = 0.0f;  // root mean square turn of the normal across the pixel, rad per axis
 };
 
+using SunVisible =
+    std::function<float(const LightSample&, const Eigen::Vector3f&)>;  // LightEvidence's
+
 // Every pixel of the views inside the masks whose normal lies near the half vector of light and
 // viewer, each in the cluster of the nearest of `samples` in its picture.
 std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
@@ -24,10 +27,14 @@ std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
 // and brightness of the clusters (linear least squares, outliers weighed down), and of these the
 // best. nullopt: no highlight is seen, or any roughness explains it.
 // @param fit light and albedos so far
-// @param visible as in LightEvidence
-std::optional<SeenGloss> fitGloss(
-    const std::vector<HighlightSample>& highlights, const LightFit& fit,
-    const std::function<float(const LightSample&, const Eigen::Vector3f&)>& visible);
+std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights,
+                                  const LightFit& fit, const SunVisible& visible);
+
+// Do the highlights speak for the light's direction against those a few degrees beside it, whatever
+// the roughness? One that shading has put in the wrong place is no highlight's, but what else is
+// bright there.
+bool tellDirection(const std::vector<HighlightSample>& highlights, const LightFit& fit,
+                   const SunVisible& visible);
 
 // Strength with which the surroundings are mirrored, by all samples beside the highlights' gloss.
 // @param fit light, albedos and gloss so far

@@ -183,7 +183,11 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
                       evidence);
   evidence.gloss = [&views, moves, samples = evidence.samples,
                     visible = evidence.visible](const LightFit& fit) {
-    return fitGloss(highlightSamples(views, moves, samples, fit.light.direction), fit, visible);
+    const std::vector<HighlightSample> highlights =
+        highlightSamples(views, moves, samples, fit.light.direction);
+    std::optional<SeenGloss> seen = fitGloss(highlights, fit, visible);
+    if (seen) seen->tells_direction = tellDirection(highlights, fit, visible);
+    return seen;
   };
   return evidence;
 }

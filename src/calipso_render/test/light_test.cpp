@@ -251,6 +251,21 @@ TEST(SurroundingsStrength, IsFoundBesideTheHighlights) {
   EXPECT_LT(surroundingsStrength(ballUnder(fit.light), fit), 0.003f);
 }
 
+// The pixels around a glossy ball's highlight speak for its light, and against one beside it.
+TEST(TellDirection, BelievesALightOnlyWhereItsHighlightIs) {
+  LightFit fit = plainFit(Light());
+  fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
+  fit.gloss = {0.02f, 0.2f, 0.0f};
+  std::vector<HighlightSample> highlights;
+  for (LightSample s : ballUnder(fit.light).samples) {
+    s.radiance += specularShading(fit.light, fit.gloss, s.normal, s.view, 1.0f);
+    highlights.push_back({s, 0.0f});
+  }
+  EXPECT_TRUE(tellDirection(highlights, fit, {}));
+  fit.light.direction = Eigen::Vector3f(0.1f, -0.7f, 0.7f).normalized();  // 18 degrees off
+  EXPECT_FALSE(tellDirection(highlights, fit, {}));
+}
+
 // Under a sky that is red above and blue below, the floor of a box gets the red of its opening, and
 // more of it than what comes from all sides would give.
 TEST(AmbientOn, ComesFromWhereASurfaceSees) {

@@ -32,6 +32,7 @@ struct LightFit;
 struct SeenGloss {
   Gloss gloss;
   float smoothest = 0.0f, roughest = 0.0f;
+  bool tells_direction = false;  // they are where the light found puts them, and not beside it
 };
 
 // All that the pictures show of the light.
@@ -72,7 +73,9 @@ struct LightFit {
 
   // Something besides shading speaks for the direction: shading alone is off by tens of degrees
   // where surfaces of one albedo are few.
-  bool confirmed() const { return determined && (from_shadows || seen_gloss); }
+  bool confirmed() const {
+    return determined && (from_shadows || (seen_gloss && seen_gloss->tells_direction));
+  }
 };
 
 // Sun direction, sun and ambient colour, albedos and gloss from shading and cast shadows: a search
