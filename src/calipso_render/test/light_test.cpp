@@ -221,12 +221,12 @@ TEST(SkySeen, IsFullOutsideAndPartInABox) {
   EXPECT_LT(floor.thrown, 1.0f - floor.open + 1e-6f);  // no more than what hides it could
 }
 
-// What the floor's middle mirrors is the sky above it and the walls beside it, which the opening's
-// edge lies 35 degrees from overhead before.
+// The floor's middle sees sky to within 27 to 35 degrees of overhead, walls beyond.
 TEST(SkySeen, IsOpenInSomeDirections) {
   const OpenBox box;
   const SkySeen& floor = box.seen[8];
-  EXPECT_GT(floor.openTowards({0, 0, 1}), 0.8f);  // 48 rays, two degrees of the polynomial
+  // The polynomial of degree two smooths the opening's edge.
+  EXPECT_GT(floor.openTowards({0, 0, 1}), 0.6f);
   for (const Eigen::Vector3f& side :
        {Eigen::Vector3f(0.9f, 0, 0.436f), Eigen::Vector3f(0, -0.9f, 0.436f)}) {
     EXPECT_LT(floor.openTowards(side), 0.15f);
