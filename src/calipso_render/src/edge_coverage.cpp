@@ -157,7 +157,8 @@ void EdgeCoverage::choose(int column, int row) {
   pixels_.back().nearness.fill(VisibilityBuffer::kFar);
 }
 
-void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges) {
+void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges,
+                                    const VisibilityBuffer& centre) {
   const int triangles = static_cast<int>(mesh.triangles->size()),
             count = static_cast<int>(edges.size());
   std::vector<char> turned(triangles);
@@ -172,7 +173,7 @@ void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<Me
       for (int k = begin; k < end; ++k) {
         const MeshEdge& edge = edges[k];
         if (edge.b < 0 || turned[edge.a] != turned[edge.b])
-          addCrossed(mesh.points[edge.from], mesh.points[edge.to], crossed[part]);
+          addCrossed(mesh.points[edge.from], mesh.points[edge.to], centre, crossed[part]);
       }
     }
   }
@@ -181,17 +182,21 @@ void EdgeCoverage::chooseSilhouette(const ScreenMesh& mesh, const std::vector<Me
   }
 }
 
-// Pixels that an edge of a silhouette crosses, region coordinates.
+// Pixels that an edge of a silhouette crosses, region coordinates. Behind another sheet nobody sees
+// it: where that one ends, its own edge chooses the pixel.
 void EdgeCoverage::addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q,
+                              const VisibilityBuffer& centre,
                               std::vector<cv::Point>& crossed) const {
   if (std::isnan(p.z() + q.z())) return;
   const float length = std::min((q - p).head<2>().norm(), 2.0f * (region_.width + region_.height));
   const int steps = 1 + static_cast<int>(2.0f * length);
   for (int i = 0; i <= steps; ++i) {
     const Eigen::Vector3f s = p + (q - p) * (static_cast<float>(i) / steps);
-    const cv::Point at(static_cast<int>(std::floor(s.x() + 0.5f)) - region_.x,
-                       static_cast<int>(std::floor(s.y() + 0.5f)) - region_.y);
-    if (crossed.empty() || crossed.back() != at) crossed.push_back(at);
+    const cv::Point seen(static_cast<int>(std::floor(s.x() + 0.5f)),
+                         static_cast<int>(std::floor(s.y() + 0.5f))),
+        at = seen - region_.tl();
+    if (!crossed.empty() && crossed.back() == at) continue;
+    if (isOneSheet(centre.nearnessAt(seen.x, seen.y), s.z())) crossed.push_back(at);
   }
 }
 

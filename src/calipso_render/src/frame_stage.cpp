@@ -286,7 +286,7 @@ void FrameCompositor::sampleEdges() {
   edges_.emplace(*centre_);
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     if (edited_[surface_of_slot_[slot]])
-      edges_->chooseSilhouette(actors_[slot].screen, actors_[slot].surface->edges);
+      edges_->chooseSilhouette(actors_[slot].screen, actors_[slot].surface->edges, *centre_);
   }
   for (std::size_t slot = 0; slot < actors_.size(); ++slot)
     edges_->draw(actors_[slot].screen, static_cast<int>(slot));

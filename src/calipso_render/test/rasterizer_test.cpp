@@ -130,7 +130,7 @@ TEST(EdgeCoverage, FindsPartsThinnerThanAPixel) {
   buffer.draw(mesh, 0);
   ASSERT_EQ(buffer.idAt(10, 10), VisibilityBuffer::kNothing);
   EdgeCoverage edges(buffer);
-  edges.chooseSilhouette(mesh, meshEdges(strip));
+  edges.chooseSilhouette(mesh, meshEdges(strip), buffer);
   edges.draw(mesh, 0);
   const EdgeCoverage::Pixel* pixel = edges.at(10, 10);
   ASSERT_NE(pixel, nullptr);

@@ -31,8 +31,10 @@ class EdgeCoverage {
   // Chooses the pixels in which `centre` sees another object than in a neighbour.
   explicit EdgeCoverage(const VisibilityBuffer& centre);
 
-  // Adds the pixels that the mesh's own silhouette crosses (parts thinner than a pixel).
-  void chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges);
+  // Adds the pixels that the mesh's own silhouette crosses (parts thinner than a pixel), but for
+  // those whose centre sees something nearer. @param centre as in the constructor
+  void chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges,
+                        const VisibilityBuffer& centre);
 
   // Draws into the chosen pixels. @pre nothing is chosen after the first draw
   void draw(const ScreenMesh& mesh, int object);
@@ -76,7 +78,7 @@ class EdgeCoverage {
   struct Piece;
 
   void choose(int column, int row);  // region coordinates
-  void addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q,
+  void addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q, const VisibilityBuffer& centre,
                   std::vector<cv::Point>& crossed) const;
   void addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id,
                  std::vector<Piece>& pieces) const;
