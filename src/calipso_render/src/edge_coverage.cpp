@@ -120,21 +120,23 @@ std::vector<MeshEdge> meshEdges(const Triangles& triangles) {
   return edges;
 }
 
-EdgeCoverage::EdgeCoverage(const VisibilityBuffer& centre)
+EdgeCoverage::EdgeCoverage(const VisibilityBuffer& centre, const cv::Rect& box)
     : region_(centre.region()),
       tiles_across_(centre.region().width / kTile + 1),
       tiles_(static_cast<std::size_t>(tiles_across_) * (centre.region().height / kTile + 1), -1) {
-  const int width = region_.width, height = region_.height;
-  std::vector<std::vector<std::pair<int, std::uint8_t>>> found(
-      height);  // per row: columns, and where the object changes
+  // Per row of the box: columns of it, and where the object changes.
+  std::vector<std::vector<std::pair<int, std::uint8_t>>> found(box.height);
 #pragma omp parallel for schedule(static)
-  for (int v = 0; v < height; ++v)
-    findChanges(centre.ids(v), centre.ids(std::min(v + 1, height - 1)), width, found[v]);
-  for (int v = 0; v < height; ++v) {
-    for (const auto& [u, change] : found[v]) {
-      choose(u, v);
-      if ((change & kRight) != 0) choose(u + 1, v);
-      if ((change & kDown) != 0) choose(u, v + 1);
+  for (int j = 0; j < box.height; ++j) {
+    const int below = std::min(j + 1, box.height - 1);
+    findChanges(centre.ids(box.y + j) + box.x, centre.ids(box.y + below) + box.x, box.width,
+                found[j]);
+  }
+  for (int j = 0; j < box.height; ++j) {
+    for (const auto& [i, change] : found[j]) {
+      choose(box.x + i, box.y + j);
+      if ((change & kRight) != 0) choose(box.x + i + 1, box.y + j);
+      if ((change & kDown) != 0) choose(box.x + i, box.y + j + 1);
     }
   }
 }

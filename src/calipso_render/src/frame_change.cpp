@@ -7,14 +7,13 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
-#include "disc_dilation.hpp"
+#include "mask_morphology.hpp"
 #include "frame_compositor.hpp"
 #include "tiled_filter.hpp"
 
 namespace calipso::render {
 namespace {
 
-constexpr int kLeastChange = 3;  // px across
 // mask margins around a surface at rest in which the frame's pixels stay
 constexpr int kRimReach = 4;
 
@@ -45,14 +44,8 @@ void FrameCompositor::findRelit() {
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = box.y; v < box.br().y; ++v)
     findChange(v, box.x, box.br().x, change.ptr<std::uint8_t>(v - box.y));
-  cv::Mat eroded(box.size(), CV_8U), opened(box.size(), CV_8U), grown(box.size(), CV_8U);
-  const cv::Mat least = cv::Mat::ones(kLeastChange, kLeastChange, CV_8U);
-  filterTiles(change, kLeastChange, eroded,
-              [&](const cv::Mat& from, cv::Mat& to) { cv::erode(from, to, least); });
-  filterTiles(eroded, kLeastChange, opened,
-              [&](const cv::Mat& from, cv::Mat& to) { cv::dilate(from, to, least); });
-  filterTiles(opened, reach, grown,
-              [&](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, reach, to); });
+  cv::Mat grown(box.size(), CV_8U);
+  filterTiles(openedByThree(change), reach, grown, DiscDilation(reach));
   cv::min(grown, shadows_.shaded(box), grown);
   filterTiles(grown, 1, relit_(box - region_.tl()), [](const cv::Mat& from, cv::Mat& to) {
     cv::blur(from, to, {3, 3});

@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
-#include "disc_dilation.hpp"
+#include "mask_morphology.hpp"
 #include "frame_compositor.hpp"
 #include "tiled_filter.hpp"
 #include "view_warp.hpp"
@@ -107,8 +107,7 @@ void FrameCompositor::findOwn(const cv::Rect& box) {
   for (int v = 0; v < box.height; ++v)
     findShown(v + box.y, box, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
   const int margin = params_.background.mask_margin_px;
-  filterTiles(own, margin, here,
-              [margin](const cv::Mat& from, cv::Mat& to) { dilateByDisc(from, margin, to); });
+  filterTiles(own, margin, here, DiscDilation(margin));
   if (!passing_.empty()) here |= passing_(box);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < box.height; ++v) {

@@ -283,7 +283,7 @@ void FrameCompositor::drawVisibility() {
 }
 
 void FrameCompositor::sampleEdges() {
-  edges_.emplace(*centre_);
+  edges_.emplace(*centre_, drawn_box_ - region_.tl());
   for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
     if (edited_[surface_of_slot_[slot]])
       edges_->chooseSilhouette(actors_[slot].screen, actors_[slot].surface->edges, *centre_);

@@ -111,7 +111,7 @@ TEST(EdgeCoverage, MeasuresAreaWithinAPixel) {
   mesh.triangles = &square;
   VisibilityBuffer buffer({0, 0, 20, 20});
   buffer.draw(mesh, 0);
-  EdgeCoverage edges(buffer);
+  EdgeCoverage edges(buffer, buffer.region());
   edges.draw(mesh, 0);
   const EdgeCoverage::Pixel* pixel = edges.at(10, 10);
   ASSERT_NE(pixel, nullptr);
@@ -129,7 +129,7 @@ TEST(EdgeCoverage, FindsPartsThinnerThanAPixel) {
   VisibilityBuffer buffer({0, 0, 20, 20});
   buffer.draw(mesh, 0);
   ASSERT_EQ(buffer.idAt(10, 10), VisibilityBuffer::kNothing);
-  EdgeCoverage edges(buffer);
+  EdgeCoverage edges(buffer, buffer.region());
   edges.chooseSilhouette(mesh, meshEdges(strip), buffer);
   edges.draw(mesh, 0);
   const EdgeCoverage::Pixel* pixel = edges.at(10, 10);

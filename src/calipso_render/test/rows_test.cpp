@@ -5,7 +5,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "calipso_render/sky_map.hpp"
-#include "disc_dilation.hpp"
+#include "mask_morphology.hpp"
 #include "kernels.hpp"
 #include "line_codec.hpp"
 #include "mesh_topology.hpp"
@@ -237,7 +237,7 @@ TEST(SkyGrid, IsWhatThePlanesSeeAndDiffersByNoMoreThanItSays) {
   EXPECT_TRUE(any_known);
 }
 
-TEST(DilateByDisc, DoesWhatOpenCVDoes) {
+TEST(MaskMorphology, DoesWhatOpenCVDoes) {
   cv::Mat picture(60, 90, CV_8U), expected;
   cv::RNG(5).fill(picture, cv::RNG::UNIFORM, 0, 1000);
   picture.setTo(0, picture < 253);
@@ -247,10 +247,15 @@ TEST(DilateByDisc, DoesWhatOpenCVDoes) {
     for (const cv::Rect& part :
          {cv::Rect(0, 0, 90, 60), cv::Rect(20, 10, 40, 30), cv::Rect(60, 5, 30, 55)}) {
       cv::Mat out(part.size(), CV_8U);
-      dilateByDisc(picture(part), radius, out);
+      DiscDilation(radius)(picture(part), out);
       EXPECT_EQ(cv::norm(out, expected(part), cv::NORM_INF), 0.0) << radius << " " << part;
     }
   }
+  const cv::Mat dense = expected, square = cv::Mat::ones(3, 3, CV_8U);  // with whole areas and holes
+  cv::morphologyEx(dense, expected, cv::MORPH_OPEN, square);
+  ASSERT_GT(cv::countNonZero(expected), 0);
+  ASSERT_GT(cv::countNonZero(expected != dense), 0);
+  EXPECT_EQ(cv::norm(openedByThree(dense), expected, cv::NORM_INF), 0.0);
 }
 
 }  // namespace

@@ -29,7 +29,8 @@ class EdgeCoverage {
   };
 
   // Chooses the pixels in which `centre` sees another object than in a neighbour.
-  explicit EdgeCoverage(const VisibilityBuffer& centre);
+  // @param box of what it sees, region coordinates, with a pixel around it
+  EdgeCoverage(const VisibilityBuffer& centre, const cv::Rect& box);
 
   // Adds the pixels that the mesh's own silhouette crosses (parts thinner than a pixel), but for
   // those whose centre sees something nearer. @param centre as in the constructor
