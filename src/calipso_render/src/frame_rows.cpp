@@ -69,6 +69,13 @@ CALIPSO_WIDE_LOOPS void relight(const LightFactors& factors, const cv::Vec3f* pl
   }
 }
 
+// Asks for what the next row will read: its stretches lie below this one's.
+void prefetchRow(const cv::Mat& picture, int v, int u, int count) {
+  if (v >= picture.rows) return;
+  const std::uint8_t* from = picture.ptr(v, u);
+  for (std::size_t k = 0; k < count * picture.elemSize(); k += 64) __builtin_prefetch(from + k);
+}
+
 // How many of the pixels see the object that the first sees, from that on.
 CALIPSO_WIDE_LOOPS int countOfFirst(const std::uint32_t* ids, int count) {
   std::uint32_t differ = 0;
@@ -183,6 +190,7 @@ void FrameCompositor::composeRelit(int v, int first, int last, Row& row) const {
   const std::uint8_t* invented = invented_.ptr<std::uint8_t>(v) + u;
   const cv::Vec3f* plate = plate_.ptr<cv::Vec3f>(v) + u;
   const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + u;
+  prefetchRow(plate_, v + 1, u, count);
   relight(factors, plate, frame, count,
           {&row.colour[0][first], &row.colour[1][first], &row.colour[2][first]});
   std::copy_n(factors.from_plate, count, &row.colour[3][first]);

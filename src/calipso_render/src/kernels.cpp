@@ -77,9 +77,18 @@ CALIPSO_INLINE void sampleInside(const cv::Mat& image, const Eight& u, const Eig
   }
 }
 
+// Asks for what the next row's stretch will read, most often a row of the image further.
+inline void fetchBelow(const cv::Mat& image, float u, float v, int count) {
+  if (!(u >= 1.0f && v >= 0.0f && u < image.cols && v < image.rows - 3)) return;
+  const int left = static_cast<int>(u) - 1, row = static_cast<int>(v) + 3;
+  for (int k = left; k < std::min(left + count + 4, image.cols); k += 4)
+    __builtin_prefetch(image.ptr<cv::Vec4f>(row, k));
+}
+
 CALIPSO_INLINE void sampleBody(const cv::Mat& image, int first, int last, SurfaceRun& run) {
   const float right = static_cast<float>(image.cols) - 2.0f,
               bottom = static_cast<float>(image.rows) - 2.0f;
+  fetchBelow(image, run.key_u[first], run.key_v[first], last - first);
   for (int k = first; k < last; k += 8) {
     // What lies beyond the run is taken for its first place.
     const EightInts wanted = lanes() < static_cast<float>(last - k);

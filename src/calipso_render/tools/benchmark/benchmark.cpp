@@ -66,13 +66,20 @@ void timeDrawing(const Options& options) {
   const auto wanted = [&](const char* name) {
     return options.only.empty() || options.only == name;
   };
-  for (const Quality quality : {Quality::kLive, Quality::kFinal}) {
-    const char* name = quality == Quality::kLive ? "drawing_live" : "drawing_final";
-    if (!wanted(name)) continue;
+  struct Way {
+    const char* name;
+    Quality quality;
+    bool casts_shadow;  // on the table; llvmpipe's drawing does not
+  };
+  for (const Way& way : {Way{"drawing_live", Quality::kLive, true},
+                         Way{"drawing_live_no_cast_shadow", Quality::kLive, false},
+                         Way{"drawing_final", Quality::kFinal, true}}) {
+    if (!wanted(way.name)) continue;
     DrawingCase drawing = live;
-    drawing.params.quality = quality;
+    drawing.params.quality = way.quality;
+    if (!way.casts_shadow) drawing.params.planes.clear();
     Renderer renderer(drawing.prepared, drawing.params);
-    timeFrames(name, drawing, options,
+    timeFrames(way.name, drawing, options,
                [&](int k) { return renderer.composite(drawing.input(k)).bgr; });
   }
   if (!wanted("drawing_llvmpipe")) return;
@@ -107,8 +114,8 @@ void compareScene(const std::string& scene, const Options& options) {
 }  // namespace
 }  // namespace calipso::render
 
-// Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only
-// drawing_live|drawing_final|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per case.
+// Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only drawing_live|
+// drawing_live_no_cast_shadow|drawing_final|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per case.
 int main(int argc, char** argv) {
   using namespace calipso::render;
   cv::utils::logging::setLogLevel(
