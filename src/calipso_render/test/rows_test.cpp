@@ -242,20 +242,20 @@ TEST(MaskMorphology, DoesWhatOpenCVDoes) {
   cv::RNG(5).fill(picture, cv::RNG::UNIFORM, 0, 1000);
   picture.setTo(0, picture < 253);
   for (const int radius : {1, 3, 7}) {
+    const DiscDilation dilate(radius);
     cv::dilate(picture, expected,
                cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
     for (const cv::Rect& part :
          {cv::Rect(0, 0, 90, 60), cv::Rect(20, 10, 40, 30), cv::Rect(60, 5, 30, 55)}) {
       cv::Mat out(part.size(), CV_8U);
-      DiscDilation(radius)(picture(part), out);
+      dilate(picture(part), out);
       EXPECT_EQ(cv::norm(out, expected(part), cv::NORM_INF), 0.0) << radius << " " << part;
     }
   }
-  const cv::Mat dense = expected, square = cv::Mat::ones(3, 3, CV_8U);  // with whole areas and holes
-  cv::morphologyEx(dense, expected, cv::MORPH_OPEN, square);
+  cv::morphologyEx(picture, expected, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   ASSERT_GT(cv::countNonZero(expected), 0);
-  ASSERT_GT(cv::countNonZero(expected != dense), 0);
-  EXPECT_EQ(cv::norm(openedByThree(dense), expected, cv::NORM_INF), 0.0);
+  ASSERT_GT(cv::countNonZero(expected != picture), 0);
+  EXPECT_EQ(cv::norm(openedByThree(picture), expected, cv::NORM_INF), 0.0);
 }
 
 }  // namespace
