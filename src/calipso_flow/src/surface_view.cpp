@@ -8,6 +8,7 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kNear = 1e-6;  // m; nothing nearer is projected
+constexpr int kWide = 4;        // px; rows of wider triangles are worth clipping
 
 struct ProjectedVertex {
   double u, v;       // px
@@ -54,6 +55,19 @@ int floorOf(double value) {
 
 int ceilingOf(double value) { return -floorOf(-value); }
 
+// Pixels of a row outside of which value + slope (x - from) is negative, by more than rounding.
+struct Span {
+  int first, last;
+  void clip(double value, double slope, int from) {
+    if (slope == 0.0) return;
+    const double zero = std::clamp(from - value / slope, first - 2.0, last + 2.0);
+    if (slope > 0.0)
+      first = std::max(first, floorOf(zero) - 1);
+    else
+      last = std::min(last, ceilingOf(zero) + 1);
+  }
+};
+
 // Calls draw(x, y, wb, wc) for the pixels of a triangle with their weights of b and c.
 template <class Draw>
 void scanTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const ProjectedVertex& c,
@@ -73,7 +87,15 @@ void scanTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const Proj
   const double db_du = (c.v - a.v) / area, db_dv = -(c.u - a.u) / area;
   const double dc_du = -(b.v - a.v) / area, dc_dv = (b.u - a.u) / area;
   for (int y = y0; y <= y1; ++y) {
-    for (int x = x0; x <= x1; ++x) {
+    Span span{x0, x1};
+    if (x1 - x0 > kWide) {  // slender and aslant, it fills little of its rectangle
+      const double wb = db_du * (x0 - a.u) + db_dv * (y - a.v);
+      const double wc = dc_du * (x0 - a.u) + dc_dv * (y - a.v);
+      span.clip(wb, db_du, x0);
+      span.clip(wc, dc_du, x0);
+      span.clip(1.0 - wb - wc, -db_du - dc_du, x0);
+    }
+    for (int x = span.first; x <= span.last; ++x) {
       const double wb = db_du * (x - a.u) + db_dv * (y - a.v);
       const double wc = dc_du * (x - a.u) + dc_dv * (y - a.v);
       if (wb >= 0.0 && wc >= 0.0 && wb + wc <= 1.0) draw(x - window.x, y - window.y, wb, wc);
