@@ -33,6 +33,7 @@ constexpr int kLargestRadius = 9;            // px
 constexpr double kDrownedShare = 0.35;
 constexpr double kTurnedShare = 0.35;  // of the tracks due: with fewer the object may have turned
 constexpr size_t kTurnsTried = 6;
+constexpr double kTurnedView = 0.4;  // rad, or relative distance: half of what is searched
 // rad, or relative distance: seen from farther a look is drawn out
 constexpr double kFarView = 0.5;
 // of the object's extent, of its outline seen from another side
@@ -270,15 +271,45 @@ Observation ObjectTracker::tryOtherwise(const Frame& frame, const Reference& nea
     }
   }
   if (best.inliers() < kTurnedShare * due_inliers_ && frames_lost_ < kForgetAfter && !stays(best)) {
-    for (const Eigen::Isometry3d& turned :
-         searchTurned(nearest.view, frame, {predicted, centroid_, reachFrom(frame, predicted)},
-                      kTurnsTried)) {
-      Observation other = refine(frame, nearest, turned, drowned_ ? wide_ : params_);
-      if (other.inliers() > best.inliers()) best = std::move(other);
-    }
+    Observation other = findTurned(frame, nearest, predicted);
+    if (other.inliers() > best.inliers()) best = std::move(other);
   }
   due_inliers_ = best.inliers();
   return best;
+}
+
+// What was struck turns otherwise than expected. Where its reference shows it from afar, it is
+// searched with the frame before, which shows about the same side.
+Observation ObjectTracker::findTurned(const Frame& frame, const Reference& nearest,
+                                      const Eigen::Isometry3d& predicted) {
+  const bool near = viewChange(nearest.view, frame, predicted, centroid_) < kTurnedView;
+  const std::optional<Reference> before = near ? std::nullopt : std::optional(lastAsReference());
+  const Reference& reference = near ? nearest : *before;
+  Observation best;
+  best.time = frame.time;
+  for (const Eigen::Isometry3d& turned :
+       searchTurned(reference.view, frame, {predicted, centroid_, reachFrom(frame, predicted)},
+                    kTurnsTried)) {
+    Observation found = refine(frame, reference, turned, drowned_ ? wide_ : params_);
+    if (found.inliers() > best.inliers()) best = std::move(found);
+  }
+  if (near) return best;
+  if (best.found) best = withReference(frame, nearest, std::move(best));
+  look_ = {};  // `before` goes
+  return best;
+}
+
+ObjectTracker::Reference ObjectTracker::lastAsReference() const {
+  return {
+      ReferenceView(last_frame_, model_, last_->world_from_object, cv::Mat(), params_.seed_count),
+      last_->covariance, last_->covariance - last_->persistent};
+}
+
+// Looked at again with a reference whose errors are smaller, unless that shows too little of it.
+Observation ObjectTracker::withReference(const Frame& frame, const Reference& reference,
+                                         Observation found) {
+  Observation again = refine(frame, reference, found.world_from_object, drowned_ ? wide_ : params_);
+  return again.inliers() >= kLeastInlierShare * found.inliers() ? again : found;
 }
 
 // What has turned since its reference still looks as it did a frame ago. Found so, it is looked at
@@ -287,15 +318,12 @@ std::optional<Observation> ObjectTracker::fromFrameBefore(const Frame& frame,
                                                           const Reference& nearest,
                                                           const Eigen::Isometry3d& predicted) {
   if (nearest.view.frame().time == last_->time) return std::nullopt;
-  const TrackerParams& params = drowned_ ? wide_ : params_;
-  const Reference before{
-      ReferenceView(last_frame_, model_, last_->world_from_object, cv::Mat(), params_.seed_count),
-      last_->covariance, last_->covariance - last_->persistent};
-  Observation found = attempt(frame, before, predicted, params);
+  const Reference before = lastAsReference();
+  Observation found = attempt(frame, before, predicted, drowned_ ? wide_ : params_);
   if (!found.found) return std::nullopt;
-  Observation again = refine(frame, nearest, found.world_from_object, params);
+  found = withReference(frame, nearest, std::move(found));
   look_ = {};  // `before` goes
-  return again.inliers() >= kLeastInlierShare * found.inliers() ? again : found;
+  return found;
 }
 
 // What is found where it was expected needs no search.

@@ -114,6 +114,10 @@ class ObjectTracker {
                       const Eigen::Isometry3d& predicted, const TrackerParams& params);
   std::optional<Observation> fromFrameBefore(const Frame& frame, const Reference& nearest,
                                              const Eigen::Isometry3d& predicted);
+  Observation findTurned(const Frame& frame, const Reference& nearest,
+                         const Eigen::Isometry3d& predicted);
+  Reference lastAsReference() const;
+  Observation withReference(const Frame& frame, const Reference& reference, Observation found);
   Observation tryOtherwise(const Frame& frame, const Reference& nearest,
                            const Eigen::Isometry3d& predicted, Observation best);
   bool isClear(const Observation& observation) const;
