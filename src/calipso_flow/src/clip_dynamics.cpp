@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "calipso_flow/rotation.hpp"
+#include "support_contact.hpp"
 
 namespace calipso::flow {
 
@@ -177,6 +178,7 @@ ObjectDynamics ClipAnalyser::finishObject(const FollowedObject& object, bool wit
     if (dynamics.deformation->modes.count() == 0) dynamics.deformation.reset();
   }
   auto measurements = measurementsOf(dynamics.observations, tracker.centroid());
+  noteContacts(params_.supports, tracker.model(), dynamics.observations, gravity_, measurements);
   // All frames are compared with the key frame: its noise is an error that they share, so that it
   // is the key pose that errs against them.
   const auto first = std::find_if(measurements.begin() + 1, measurements.end(),

@@ -65,20 +65,29 @@ StateMatrix processNoise(const MotionPiece& piece, double dt) {
   return Q;
 }
 
-// Deviations with which a piece's velocity, acceleration and spin start, and the acceleration's
-// mean.
+// Deviations with which a piece's velocity and spin start; the acceleration's mean and covariance.
 struct PieceStart {
-  double velocity, acceleration, spin;
-  Eigen::Vector3d mean_acceleration;
+  double velocity, spin;
+  Eigen::Vector3d mean_acceleration = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d acceleration;
 };
+
+// Of free fall. How far away things are scales gravity; across it there is only drag.
+Eigen::Matrix3d fallCovariance(const MotionPrior& prior) {
+  const Eigen::Matrix3d along = prior.gravity * prior.gravity.transpose();
+  const double across = std::pow(prior.drag_share, 2), scale = std::pow(prior.gravity_share, 2);
+  return scaledIdentity(across * prior.gravity.squaredNorm()) + scale * along;
+}
 
 PieceStart pieceStart(const MotionPiece& piece, const MotionPrior& prior) {
   const bool rest = piece.travel == Travel::kRest, uniform = piece.travel == Travel::kUniform;
-  PieceStart start{prior.velocity, prior.acceleration, prior.spin, Eigen::Vector3d::Zero()};
-  if (rest) start.velocity *= kZeroShare;
-  if (rest || uniform) start.acceleration *= kZeroShare;
+  PieceStart start;
+  start.velocity = (rest ? kZeroShare : 1.0) * prior.velocity;
+  start.spin = prior.spin;
+  const double acceleration = (rest || uniform ? kZeroShare : 1.0) * prior.acceleration;
+  start.acceleration = scaledIdentity(acceleration * acceleration);
   if (piece.travel == Travel::kFreeFall) {
-    start.acceleration = prior.gravity_share * prior.gravity.norm();
+    start.acceleration = fallCovariance(prior);
     start.mean_acceleration = prior.gravity;
   }
   if (piece.turning == Turning::kNone) start.spin *= kZeroShare;
@@ -90,14 +99,14 @@ void applyStart(const PieceStart& start, MotionState& state) {
   state.velocity.setZero();
   state.acceleration = start.mean_acceleration;
   state.spin.setZero();
-  const auto reset = [&](int block, double deviation) {
+  const auto reset = [&](int block, const Eigen::Matrix3d& covariance) {
     state.covariance.middleRows<3>(block).setZero();
     state.covariance.middleCols<3>(block).setZero();
-    state.covariance.block<3, 3>(block, block) = scaledIdentity(deviation * deviation);
+    state.covariance.block<3, 3>(block, block) = covariance;
   };
-  reset(kV, start.velocity);
+  reset(kV, scaledIdentity(start.velocity * start.velocity));
   reset(kA, start.acceleration);
-  reset(kW, start.spin);
+  reset(kW, scaledIdentity(start.spin * start.spin));
 }
 
 Vector6d innovation(const MotionState& state, const PoseMeasurement& measurement) {
@@ -187,7 +196,8 @@ double passForward(const std::vector<PoseMeasurement>& measurements,
     stop.measurement = static_cast<int>(k);
     stop.F = transition(state, measurement.time - state.time);
     stop.arrived = state = predicted(state, measurement, pieces[piece], noise_scale);
-    if (measurement.valid) sum += correct(state, measurement, noise_scale);
+    if (measurement.valid)
+      sum += correct(state, measurement, noise_scale) + oddsOf(measurement, pieces[piece]);
     stop.left = state;
     visit(stop);
   }
@@ -321,6 +331,10 @@ double squaredSurprise(const MotionState& state, const PoseMeasurement& measurem
                        double noise_scale) {
   const Vector6d r = innovation(state, measurement);
   return r.dot(innovationCovariance(state, measurement, noise_scale).ldlt().solve(r));
+}
+
+double oddsOf(const PoseMeasurement& measurement, const MotionPiece& piece) {
+  return piece.travel == Travel::kFreeFall ? measurement.falls : 0.0;
 }
 
 double logLikelihood(const std::vector<PoseMeasurement>& measurements,

@@ -87,17 +87,18 @@ class PathSearch {
       instants = {*cut};
     else
       for (const double share : kInstants) instants.push_back(from + share * span);
+    const double evidence = least_evidence_ - measurements_[s + 1].strikes;
     for (const double time : instants) {
       const MotionState arrived = predicted(stages_[s].state, time, stages_[s].piece);
       for (MotionPiece piece : kinds_) {
         piece.start = time;
         piece.cut = cut.has_value();
         follow(s, enterPiece(arrived, piece, prior_), piece,
-               stages_[s].log_likelihood - (cut ? 0.0 : least_evidence_));
+               stages_[s].log_likelihood - (cut ? 0.0 : evidence));
         if (cut || piece.travel == Travel::kRest) continue;
         piece.contact = kContactShare * span;
         follow(s, enterPiece(arrived, piece, prior_), piece,
-               stages_[s].log_likelihood - least_evidence_ - kContactEvidence);
+               stages_[s].log_likelihood - evidence - kContactEvidence);
       }
     }
   }
@@ -109,7 +110,9 @@ class PathSearch {
     const int least = s < 0 ? kLeastFirstFrames : kLeastFrames;
     for (int k = s + 1; k < count; ++k) {
       state = predicted(state, measurements_[k], piece, noise_scale_);
-      if (measurements_[k].valid) log_likelihood += correct(state, measurements_[k], noise_scale_);
+      if (measurements_[k].valid)
+        log_likelihood +=
+            correct(state, measurements_[k], noise_scale_) + oddsOf(measurements_[k], piece);
       ++frames;
       Stage& stage = stages_[k];
       const bool ends = k + 1 == count || cutAfter(k).has_value();

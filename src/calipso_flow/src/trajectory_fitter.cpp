@@ -109,12 +109,19 @@ void TrajectoryFitter::fitKindsAndNoise() {
   noise_scale_ = chooseNoiseScale(measurements_, pieces_, prior_, noise_scale_);
 }
 
+// That a collision at this time has to have.
+double TrajectoryFitter::evidenceFor(double time) const {
+  const auto next = std::find_if(measurements_.begin(), measurements_.end(),
+                                 [&](const PoseMeasurement& m) { return m.time >= time; });
+  return params_.least_evidence - (next == measurements_.end() ? 0.0 : next->strikes);
+}
+
 // A later piece may have taken over what an earlier one was needed for.
 void TrajectoryFitter::dropUnearnedPieces() {
   for (size_t i = pieces_.size(); i-- > 1;) {
     if (pieces_[i].cut) continue;
     const std::vector<MotionPiece> saved = pieces_;
-    const double with = likelihood();
+    const double with = likelihood(), evidence = evidenceFor(pieces_[i].start);
     pieces_.erase(pieces_.begin() + i);
     fitKind(i - 1);
     // Two instants in a row may stand for one in between.
@@ -124,7 +131,7 @@ void TrajectoryFitter::dropUnearnedPieces() {
       fitKind(near - 1);
       fitKind(near);
     }
-    if (with - likelihood() > params_.least_evidence) pieces_ = saved;
+    if (with - likelihood() > evidence) pieces_ = saved;
   }
 }
 
@@ -328,7 +335,9 @@ std::optional<Trajectory::Gravity> TrajectoryFitter::fittedGravity() const {
   constexpr size_t kLeastFall = 4;  // frames
   size_t longest = 0, most = 0;
   for (size_t i = 0; i < pieces_.size(); ++i) {
-    const size_t count = measurementsOf(i, i).size();
+    const Measurements inside = measurementsOf(i, i);
+    const size_t count = std::count_if(inside.begin(), inside.end(),
+                                       [](const PoseMeasurement& m) { return m.valid; });
     if (pieces_[i].travel == Travel::kFreeFall && count > most) longest = i, most = count;
   }
   if (most < kLeastFall) return std::nullopt;

@@ -88,6 +88,45 @@ TEST(Trajectory, tellsTwoImpactsWithinAFrameAsOne) {
   EXPECT_LT((impact.after.spin - 1.5 * spin).norm(), 0.2);
 }
 
+// Depth drifts as shapes err: across gravity that is no acceleration of what falls.
+TEST(Trajectory, whatFallsIsPulledDownOnly) {
+  const auto drifting = [](double t) -> Eigen::Vector3d {
+    return Eigen::Vector3d(0.5 * t, 0.1 * t * t, -0.5 * 9.81 * t * t);
+  };
+  auto data = measure(12, 0.001, 0.003, 8, drifting, still);
+  for (PoseMeasurement& m : data) m.covariance(1, 1) = 0.01 * 0.01;  // in depth
+  const Trajectory fit = fitTrajectory(data, {}, testPrior());
+  ASSERT_EQ(fit.pieces.front().travel, Travel::kFreeFall);
+  // The drift's mean velocity, 0.2 T = 0.07 m/s at most, at both ends; half a percent of g in between.
+  for (const MotionState& s : fit.states) EXPECT_LT(std::abs(s.acceleration.y()), 0.1);
+  EXPECT_NEAR(fit.states.front().velocity.y(), fit.states.back().velocity.y(), 0.04);
+}
+
+// A bounce by 0.7 m/s in poses of 8 mm is found where the body is known to have struck something;
+// and what has struck nothing is not made to bounce by that.
+TEST(Trajectory, whatIsKnownOfTheSurroundingsTellsAWeakBounce) {
+  constexpr double kImpact = 10.4 / kFps;
+  const Eigen::Vector3d g(0.0, 0.0, -9.81), start(0.3, 0.0, 1.7), turned(-0.35, 0.14, 0.6);
+  const auto collisions = [&](int seed, double share, bool known) {
+    const auto position = [&](double t) -> Eigen::Vector3d {
+      return start * t + 0.5 * g * t * t + share * std::max(0.0, t - kImpact) * turned;
+    };
+    auto data = measure(22, 0.008, 0.02, seed, position, still);
+    for (PoseMeasurement& m : data) m.falls = known ? 1.5 : 0.0, m.strikes = known ? -2.0 : 0.0;
+    if (known) data[11].strikes = 4.0;
+    return fitTrajectory(data, {}, testPrior()).collisions;
+  };
+  size_t unaided = 0;
+  for (int seed = 1; seed <= 5; ++seed) {
+    unaided += collisions(seed, 1.0, false).size();
+    const auto found = collisions(seed, 1.0, true);
+    ASSERT_EQ(found.size(), 1u) << seed;
+    EXPECT_NEAR(found.front().time, kImpact, 0.5 / kFps) << seed;
+    EXPECT_TRUE(collisions(seed, 0.0, true).empty()) << seed;
+  }
+  EXPECT_LT(unaided, 5u);
+}
+
 TEST(Trajectory, recognisesRest) {
   const auto data = measure(30, 0.002, 0.01, 3, still, still);
   const Trajectory fit = fitTrajectory(data, {}, testPrior());

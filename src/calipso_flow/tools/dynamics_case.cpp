@@ -68,8 +68,10 @@ std::string describe(const ClipCase& clip, size_t index, const ObjectDynamics& d
 // Follows all objects through the clip.
 std::vector<ObjectDynamics> analyse(const ClipCase& clip, Costs& costs) {
   const Scene& scene = clip.scene;
+  DynamicsParams params;
+  params.supports = scene.planes;
   ClipAnalyser analyser(makeFrame(0.0, clip.frame(0), scene.cameraAt(0)), clip.models, clip.masks,
-                        scene.gravity);
+                        scene.gravity, params);
   for (int k = 1; k < scene.frame_count; ++k) {
     const cv::Mat picture = clip.frame(k);
     const Cost start = now();

@@ -10,13 +10,15 @@
 #include "calipso_flow/followed_object.hpp"
 #include "calipso_flow/object_motion.hpp"
 #include "calipso_flow/trajectory.hpp"
+#include "calipso_scene/scene.hpp"
 
 namespace calipso::flow {
 
 struct DynamicsParams {
   TrackerParams tracker;
   TrajectoryParams trajectory;
-  double rest_px = 0.3;          // image motion over a piece that tracking errors may explain
+  std::vector<SupportPlane> supports;  // what things fall on
+  double rest_px = 0.3;                // image motion over a piece that tracking errors may explain
   double live_window = 3.0;      // s, looked back over live, for what needs more than one frame
   double cut_correlation = 0.5;  // successive pictures that agree less than this are cut apart
 };

@@ -50,6 +50,9 @@ struct PoseMeasurement {
   // Of how an error has changed since the valid measurement before, which otherwise persists: the
   // state's pose holds it.
   Matrix6d drift = Matrix6d::Zero();
+  // What is known of the surroundings, as log odds: that it falls freely at this time rather than
+  // being held, and that since the measurement before it has struck something, besides the usual.
+  double falls = 0.0, strikes = 0.0;
 };
 
 enum class Travel { kRest, kUniform, kFreeFall, kAccelerated, kForced };
@@ -74,7 +77,8 @@ struct MotionPrior {
   double acceleration = 100.0;                  // m/s^2
   double spin = 30.0;                           // rad/s
   Eigen::Vector3d gravity = {0.0, 0.0, -9.81};  // m/s^2
-  double gravity_share = 0.05;                  // relative uncertainty of free fall: scale, drag
+  double gravity_share = 0.05;                  // relative uncertainty of free fall: scale
+  double drag_share = 0.005;                    // of gravity, in every direction: drag
 };
 
 // A jump between two pieces, with the state on either side of it.
@@ -88,6 +92,9 @@ struct SmoothedMotion {
   std::vector<Jump> jumps;          // one per piece after the first that starts within the clip
   double log_likelihood = 0.0;      // of the measurements, given the pieces
 };
+
+// What PoseMeasurement::falls adds to a piece's log likelihood.
+double oddsOf(const PoseMeasurement& measurement, const MotionPiece& piece);
 
 // @param noise_scale  factor on the measurements' standard deviations
 // @pre measurements and pieces are in order of time, and neither is empty

@@ -1,0 +1,69 @@
+#include "../src/support_contact.hpp"
+
+#include <gtest/gtest.h>
+
+#include "rendered_scene.hpp"
+
+namespace calipso::flow {
+namespace {
+
+constexpr double kFps = 30.0;
+const Eigen::Vector3d kGravity(0.0, 0.0, -9.81);
+
+// A box of 0.4 m height falls upright from `height`, m, of its lower side, and stays where it
+// comes down on z = 0.
+std::vector<Observation> fall(double height, int frames) {
+  std::vector<Observation> observations(frames);
+  for (int k = 0; k < frames; ++k) {
+    const double t = k / kFps;
+    observations[k].time = t;
+    observations[k].found = true;
+    observations[k].world_from_object.translation().z() =
+        0.2 + std::max(0.0, height - 0.5 * 9.81 * t * t);
+    observations[k].covariance.diagonal().setConstant(1e-6);
+  }
+  return observations;
+}
+
+std::vector<PoseMeasurement> noted(const std::vector<SupportPlane>& planes,
+                                   const std::vector<Observation>& observations) {
+  auto measurements = measurementsOf(observations, Eigen::Vector3d::Zero());
+  noteContacts(planes, test::boxModel(), observations, kGravity, measurements);
+  return measurements;
+}
+
+TEST(SupportContact, strikesBetweenTheFramesAroundTheImpact) {
+  // 0.3 m: 0.2473 s, 7.4 frames
+  const auto measurements = noted({SupportPlane()}, fall(0.3, 12));
+  for (int k = 1; k < 12; ++k) EXPECT_EQ(measurements[k].strikes > 0.0, k >= 8) << k;
+  for (int k = 1; k <= 7; ++k) EXPECT_LT(measurements[k].strikes, 0.0) << k;
+  for (int k = 0; k < 12; ++k) EXPECT_EQ(measurements[k].falls > 0.0, k <= 7) << k;
+}
+
+TEST(SupportContact, nothingIsNotedWithoutAPlane) {
+  for (const PoseMeasurement& m : noted({}, fall(0.3, 12))) {
+    EXPECT_EQ(m.strikes, 0.0);
+    EXPECT_EQ(m.falls, 0.0);
+  }
+}
+
+TEST(SupportContact, aPlaneEndsWhereItsRangeDoes) {
+  SupportPlane beside;
+  beside.x_range = Eigen::Vector2d(1.0, 2.0);
+  for (const PoseMeasurement& m : noted({beside}, fall(0.3, 12))) {
+    EXPECT_LE(m.strikes, 0.0);
+    EXPECT_GT(m.falls, 0.0);
+  }
+}
+
+TEST(SupportContact, whatIsNotSeenTellsNothing) {
+  auto observations = fall(0.3, 12);
+  observations[3].found = false;
+  const auto measurements = noted({SupportPlane()}, observations);
+  EXPECT_EQ(measurements[3].falls, 0.0);
+  EXPECT_EQ(measurements[3].strikes, 0.0);
+  EXPECT_EQ(measurements[4].strikes, 0.0);
+}
+
+}  // namespace
+}  // namespace calipso::flow
