@@ -78,7 +78,7 @@ std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& 
     if (!params.depth.empty() && !p.moves[i]) {
       const cv::Mat beside =
           nearerBeside(p.key_labels == p.surfaces[i].index, p.key_labels, params.depth, ground,
-                       params.background.mask_margin_px + 1);
+                       params.background.mask_margin_px + params.background.shadow_margin_px + 1);
       if (cv::countNonZero(beside) > 0) front = front.empty() ? beside : cv::Mat(front | beside);
     }
     fronts.push_back(front);

@@ -73,14 +73,35 @@ cv::Mat seenPast(const PlaceEvidence& e) {
   return e.seen.count >= kFewestPast;
 }
 
+// Where the key frame shows support planes, the relief, and neither.
+struct SeenPlace {
+  cv::Mat off_planes;  // CV_8UC1: 255 where something else than a support plane is seen
+  // ... what is neither plane nor relief, or curved, which has no like to be filled from: gives up no shadow
+  cv::Mat blind;
+  cv::Mat surface;  // CV_8UC1: PlaceSurfaces::label; may be empty
+  int planes = 0;   // of the surfaces, from 1 on
+};
+
+// Where shadows leave a trace, with the predictions' errors: on the surfaces that they fall on, not on
+// what stands before these.
+cv::Mat shadeTraces(const SeenShadows& shadows, const SeenPlace& place,
+                    const RenderParams& params) {
+  const cv::Mat shaded = shadows.sun | shadows.sky;
+  cv::Mat traces = grown(shaded, params.background.shadow_margin_px);
+  for (int k = 1; k <= place.planes; ++k) {
+    const cv::Mat here = place.surface == k;
+    traces.setTo(0, here & (grown(shaded & here, params.background.shadow_margin_px) == 0));
+  }
+  traces.setTo(0, grown(place.blind, 1));
+  return traces;
+}
+
 // What objects at rest cover or shade at the key frame, with soft edges and the predictions'
 // errors.
-// @param curved CV_8UC1, != 0: keeps its shadows; may be empty
 // @param seen_past CV_8UC1, != 0: not hidden in other frames
-cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const cv::Mat& curved,
+cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const SeenPlace& place,
                       const cv::Mat& seen_past, const RenderParams& params) {
-  cv::Mat traces = grown(shadows.sun | shadows.sky, params.background.shadow_margin_px);
-  if (!curved.empty()) traces.setTo(0, curved);
+  cv::Mat traces = shadeTraces(shadows, place, params);
   for (std::size_t i = 0; i < p.footprints.size(); ++i) {
     if (p.footprints[i].empty()) continue;
     traces |= grown(p.footprints[i], params.background.mask_margin_px) & (seen_past == 0);
@@ -113,23 +134,18 @@ PlaneMirror findMirror(const std::vector<Actor>& actors, const cv::Mat& picture,
   return mirror;
 }
 
-// Where the key frame shows support planes, the relief, and neither.
-struct SeenPlace {
-  cv::Mat off_planes;  // CV_8UC1: 255 where something else than a support plane is seen
-  cv::Mat blind;       // ... what is neither plane nor relief, or curved: takes no shadow
-  cv::Mat curved;      // ... has no like to be filled from: a shadow stays there; may be empty
-};
-
 SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, Prepared& p) {
-  SeenPlace place{offPlanes(p.scenery, params.planes, p.camera), {}, {}};
+  SeenPlace place{offPlanes(p.scenery, params.planes, p.camera),
+                  {},
+                  surfaces.label,
+                  static_cast<int>(surfaces.planes.size())};
   place.blind = place.off_planes.clone();
   p.relief = findRelief(surfaces, p.light.light.direction);
   if (!p.relief.empty())
     place.blind = place.off_planes & ~p.relief.seen, place.off_planes |= p.relief.seen;
   p.shadowless = place.blind.clone();
   if (!surfaces.empty()) {
-    place.curved = surfaces.label == PlaceSurfaces::kCurved;
-    place.blind |= place.curved;
+    place.blind |= surfaces.label == PlaceSurfaces::kCurved;
   }
   return place;
 }
@@ -150,7 +166,7 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   }
   p.shadowless |= grown(shadows.refuted, params.background.shadow_margin_px);
   if (shadows.none) p.shadowless.setTo(255);
-  return restingTraces(p, shadows, place.curved, seenPast(e), params);
+  return restingTraces(p, shadows, place, seenPast(e), params);
 }
 
 // What objects that move shade in all frames that show it. Where others show it, their shade is
@@ -165,10 +181,7 @@ cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const Rece
   if (stays.never_lit.empty()) return cv::Mat::zeros(p.key_labels.size(), CV_8U);
   const SeenShadows shadows = seenShadows(stays.sun, stays.sky, p.background.plate,
                                           (p.background.count == 0) | place.blind);
-  cv::Mat traces =
-      grown(shadows.sun | shadows.sky, params.background.shadow_margin_px) & stays.never_lit;
-  if (!place.curved.empty()) traces.setTo(0, place.curved);
-  return traces;
+  return shadeTraces(shadows, place, params) & stays.never_lit;
 }
 
 void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,
@@ -200,8 +213,8 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   const cv::Mat sun = placeVisibility(e.sun, in_sun, key.bgr.size()),
                 sky = placeVisibility(e.sky, under_sky, key.bgr.size());
   const bool any_rests = std::find(p.moves.begin(), p.moves.end(), false) != p.moves.end();
-  cv::Mat traces = any_rests ? findTraces(e, place, sun, sky, params, p)
-                             : cv::Mat::zeros(key.bgr.size(), CV_8U);
+  cv::Mat traces =
+      any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
   traces |= passingTraces(e, place, in_sun, params, p);
   if (p.mirror.established()) {
     p.background.plate = unmirrored(p.mirror, p.background.plate);

@@ -6,6 +6,7 @@
 
 #include "calipso_render/clip_sample.hpp"
 #include "calipso_render/inpaint.hpp"
+#include "calipso_render/renderer.hpp"
 #include "render_test_scene.hpp"
 
 namespace calipso::render {
@@ -247,6 +248,35 @@ TEST(GroundNearness, IsThePlanesBelowTheHorizonAndWhatLiesBeyond) {
   EXPECT_NEAR(nearness.at<float>(20, 5), 0.02f, 1e-6f);  // the plane has ended before
   EXPECT_NEAR(nearness.at<float>(20, 6), 0.1f, 1e-6f);   // something stands on it
   EXPECT_TRUE(groundNearness({}, camera, scenery).empty());
+}
+
+// A post before the ball and before the table on which the ball's shadow falls.
+TEST(PrepareBackground, WhatStandsBeforeAShadowKeepsItsPixels) {
+  const ObjectModel model = ballAt({0.0, 0.1, kBallRadius});
+  ClipFrame frame = frameWithBall(model);
+  RenderParams params;
+  params.planes = table();
+  params.depth = cv::Mat(kHeight, kWidth, CV_32F);
+  const Eigen::Isometry3d from_world = camera().world_from_camera.inverse();
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = receiverAt(table(), camera(), u, v);
+      const Eigen::Vector3d seen = frame.labels.at<std::uint8_t>(v, u) != 0 || !r
+                                       ? model.world_from_object.translation()
+                                       : Eigen::Vector3d(r->position.cast<double>());
+      params.depth.at<float>(v, u) = static_cast<float>((from_world * seen).z());
+    }
+  }
+  const cv::Rect post(70, 20, 23, kHeight - 20);
+  frame.bgr(post).setTo(cv::Scalar(20, 20, 200));
+  frame.labels(post).setTo(0);
+  params.depth(post).setTo(0.3f);
+  ClipSample clip;
+  clip.add(frame);
+  const cv::Mat invented = prepare(clip, {model}, params).background.invented;
+  const cv::Rect core(post.x + 4, post.y, post.width - 8, post.height);  // without its rim
+  EXPECT_EQ(cv::countNonZero(invented(core)), 0);
+  EXPECT_GT(cv::countNonZero(invented), kHeight);  // the ball, on both sides
 }
 
 }  // namespace
