@@ -143,7 +143,8 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const Inpaint
   if (any_moving) {
     cv::Mat now;
     key.bgr.convertTo(now, CV_32F);
-    cv::Mat shows = closedGaps(moving) & (background.invented == 0) & (key.labels == 0);
+    cv::Mat shows = closedGaps(moving) & (background.invented == 0) &
+                    (grown(key.labels != 0, BackgroundParams().mask_margin_px) == 0);
     if (!background.shaded_at_times.empty()) shows.setTo(0, background.shaded_at_times);
     now.copyTo(look, shows);
   }
