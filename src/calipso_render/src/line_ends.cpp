@@ -11,7 +11,8 @@ namespace calipso::render {
 namespace {
 
 constexpr float kShortest = 14.0f;  // px of a line that is seen
-constexpr float kReach = 8.0f;      // px from where a line was lost to the hole
+constexpr float kLost = 14.0f;      // px from where a line was lost to the hole, at most
+constexpr float kReach = 8.0f;      // px along a line by which both of its edges may end apart
 // px from the hole at which the line must have been seen: it does not run along the rim
 constexpr float kClear = 4.0f;
 constexpr int kFirst = 2, kLast = 14;  // px before the end over which its colours are averaged
@@ -82,8 +83,8 @@ class LineEndFinder {
                                                         cvRound(to.y - kLast * into.y))) < kClear)
       return;
     float reach = 1.0f;
-    while (reach <= kReach && !isSet(hole_, to + reach * into)) reach += 1.0f;
-    if (reach > kReach) return;
+    while (reach <= kLost && !isSet(hole_, to + reach * into)) reach += 1.0f;
+    if (reach > kLost) return;
     LineEnd end{to, into, length, {}, 0.0f, {}};
     if (measure(end) && standsOut(end) && centre(end)) ends_.push_back(end);
   }
