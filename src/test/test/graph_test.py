@@ -11,6 +11,7 @@ import numpy
 import rosgraph
 import rospy
 import rostest
+import yaml
 from calipso_msgs.msg import ClipInfo, Edit, EditReport, NodeStatus, SimulationState, Wind
 from geometry_msgs.msg import Vector3
 from sensor_msgs.msg import CameraInfo
@@ -99,6 +100,11 @@ class Graph(unittest.TestCase):
         changed = numpy.abs(before - after).max(axis=2) > 30.0  # far beyond the sensor noise
         self.assertGreater(changed[90:190, 190:445].sum(), 300, "the banana's pixels")
         self.assertEqual(changed[:, :150].sum(), 0, "pixels far from it")
+
+    def test_quality_reaches_the_renderer(self):
+        command = ["roslaunch", "--dump-params", "calipso_launch", "edit.launch", "quality:=final"]
+        command += ["%s:=%s" % pair for pair in self.arguments("final.bag", None).items()]
+        self.assertEqual(yaml.safe_load(subprocess.check_output(command))["/calipso/render/quality"], "final")
 
     def wait_for_publisher(self, topic, timeout_sec=60):
         """Until the master knows one; the run is over within seconds."""
