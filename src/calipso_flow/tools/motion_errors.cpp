@@ -21,7 +21,7 @@ size_t smoothFrames(const TrueObject& truth, const ObjectDynamics& dynamics) {
 }
 
 struct MotionErrors {
-  double velocity_m = 0.0, velocity_percent = kNone, velocity_px = 0.0;
+  double velocity_m = kNone, velocity_percent = kNone, velocity_px = kNone;
   double spin_percent = kNone, acceleration_percent = kNone;
   double covered = kNone;  // share of frames whose velocity lies inside its 95 % ellipsoid
   bool below_uncertainty = true;
@@ -33,6 +33,7 @@ constexpr double kChiSquared95 = 7.815;
 MotionErrors motionErrors(const Scene& scene, const TrueObject& truth,
                           const ObjectDynamics& dynamics) {
   MotionErrors errors;
+  if (!truth.hasVelocity()) return errors;
   const size_t frames = smoothFrames(truth, dynamics);
   double error = 0.0, speed = 0.0, spin_error = 0.0, spin = 0.0, pixels = 0.0;
   int inside = 0;
@@ -51,7 +52,7 @@ MotionErrors motionErrors(const Scene& scene, const TrueObject& truth,
     const Eigen::Matrix3d covariance = motion.state.twistCovariance().topLeftCorner<3, 3>();
     const bool covers = difference.dot(covariance.ldlt().solve(difference)) < kChiSquared95;
     inside += covers;
-    if (truth.velocity.empty() && !covers) errors.below_uncertainty = false;
+    if (truth.still() && !covers) errors.below_uncertainty = false;
   }
   errors.velocity_m = std::sqrt(error / frames);
   errors.velocity_px = pixels / frames;
@@ -169,13 +170,13 @@ void addMotionErrors(const Scene& scene, const TrueObject& truth, const ObjectDy
   entry.numbers("collision_errors_frames", collisionErrors(scene, truth, trajectory));
   entry.number("collisions_found", static_cast<double>(trajectory.collisions.size()));
   const ImpactCount impacts = countImpacts(scene, truth, trajectory);
-  entry.number("impacts_present", impacts.present).number("impacts_found", impacts.found);
-  entry.number("impacts_false", impacts.wrong);
+  const auto told = [&](int count) { return truth.collisions_known ? count : kNone; };
+  entry.number("impacts_present", told(impacts.present));
+  entry.number("impacts_found", told(impacts.found)).number("impacts_false", told(impacts.wrong));
   entry.number("sign_change_error_frames", signChangeError(scene, truth, dynamics));
   entry.number("restitution_error_percent", restitutionError(scene, truth, trajectory));
   entry.number("covered_95", errors.covered);
-  const bool still = truth.velocity.empty() && truth.vertices.empty();
-  if (still) entry.flag("below_uncertainty", errors.below_uncertainty);
+  if (truth.still()) entry.flag("below_uncertainty", errors.below_uncertainty);
 }
 
 }  // namespace calipso::flow

@@ -2,11 +2,15 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+
+#include "calipso_flow/object_model.hpp"
+#include "calipso_scene/triangle_mesh.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -61,7 +65,22 @@ std::vector<Eigen::MatrixXd> readVertices(const std::string& path) {
   return result;
 }
 
-TrueObject readObject(const std::string& directory, const YAML::Node& node) {
+// Central differences of the surface's centre, world axes.
+std::vector<Eigen::Vector3d> surfaceVelocity(const TrueObject& truth, double fps) {
+  TriangleMesh mesh = loadMesh(truth.mesh_path);
+  std::vector<Eigen::Vector3d> centre, velocity;
+  for (const Eigen::MatrixXd& vertices : truth.vertices) {
+    mesh.vertices = vertices;
+    centre.push_back(truth.world_from_object.front() * centroid(mesh));
+  }
+  for (size_t k = 0; k < centre.size(); ++k) {
+    const size_t before = k == 0 ? 0 : k - 1, after = std::min(k + 1, centre.size() - 1);
+    velocity.push_back((centre[after] - centre[before]) * fps / std::max<double>(after - before, 1));
+  }
+  return velocity;
+}
+
+TrueObject readObject(const std::string& directory, const YAML::Node& node, double fps) {
   TrueObject truth;
   truth.mesh_path = directory + "/" + node["true_mesh"].as<std::string>();
   for (const YAML::Node& pose : node["world_T_object"]) {
@@ -74,6 +93,7 @@ TrueObject readObject(const std::string& directory, const YAML::Node& node) {
     truth.collisions.push_back({c["time_s"].as<double>(), readVector(c["com_velocity_before"]),
                                 readVector(c["com_velocity_after"])});
   }
+  truth.collisions_known = node["collisions"] || truth.world_from_object.size() == 1;
   if (const YAML::Node wave = node["wave"]) {
     truth.wave = {
         wave["om"].as<double>(),
@@ -82,6 +102,7 @@ TrueObject readObject(const std::string& directory, const YAML::Node& node) {
   }
   if (const YAML::Node vertices = node["true_vertices_per_frame"]) {
     truth.vertices = readVertices(directory + "/" + vertices.as<std::string>());
+    if (truth.velocity.empty()) truth.velocity = surfaceVelocity(truth, fps);
   }
   const std::string mask = directory + "/masks/" + node["name"].as<std::string>() + "_000000.png";
   if (std::filesystem::exists(mask)) truth.mask_path = mask;
@@ -95,7 +116,7 @@ std::optional<TrueObject> readTruth(const std::string& directory, const std::str
   for (const YAML::Node& node : scene["objects"]) {
     if (node["name"].as<std::string>() != name) continue;
     if (!node["world_T_object"] || !node["true_mesh"]) return std::nullopt;
-    return readObject(directory, node);
+    return readObject(directory, node, scene["fps"].as<double>());
   }
   return std::nullopt;
 }

@@ -75,9 +75,11 @@ Truth loadTruth(const Scene& scene) {
     const YAML::Node root = YAML::LoadFile(file);
     Truth truth;
     for (const YAML::Node& node : root["objects"]) truth.objects.push_back(toObject(scene, node));
-    const YAML::Node sun = root["lights"]["sun"]["direction_to_sun_world"];
-    if (sun)
+    const YAML::Node lights = root["lights"];
+    if (lights && lights["sun"]) {
+      const YAML::Node sun = lights["sun"]["direction_to_sun_world"];
       truth.to_sun = Eigen::Vector3d(sun[0].as<double>(), sun[1].as<double>(), sun[2].as<double>());
+    }
     return truth;
   } catch (const YAML::Exception& error) {
     throw std::runtime_error(file + ": no ground truth to evaluate against (" + error.what() + ")");
