@@ -128,9 +128,7 @@ DeformationFitter::DeformationFitter(const ObjectModel& model, const Deformation
   }
   if (const auto normal = field_.sheetNormal()) {
     strain_ = params.sheet_strain;
-    const double in_plane = params.in_plane * diagonal_;
-    const Eigen::Matrix3d tangential = inPlane(model, *normal) / (in_plane * in_plane);
-    for (int i = 0; i < field_.size(); ++i) quadratic_.block<3, 3>(3 * i, 3 * i) += tangential;
+    in_plane_ = inPlane(model, *normal);
   }
   quadratic_blocks_.resize(9, blockIndex(field_.size(), 0));
   for (int i = 0; i < field_.size(); ++i) {
@@ -209,17 +207,35 @@ DeformationFitter::Normal DeformationFitter::springNormal(const Eigen::VectorXd&
   return normal;
 }
 
+std::vector<Eigen::Matrix3d> DeformationFitter::inPlaneWeights(
+    const Eigen::VectorXd& controls) const {
+  std::vector<Eigen::Matrix3d> weights;
+  if (!field_.sheetNormal()) return weights;
+  for (int i = 0; i < field_.size(); ++i) {
+    const double out = field_.sheetNormal()->dot(controls.segment<3>(3 * i));
+    const double still = params_.in_plane * diagonal_, bent = params_.bent * out * out / diagonal_;
+    weights.push_back(in_plane_ / (still * still + bent * bent));
+  }
+  return weights;
+}
+
 void DeformationFitter::addPriors(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted,
                                   Normal& normal) const {
   normal.blocks += quadratic_blocks_;
+  const std::vector<Eigen::Matrix3d> in_plane = inPlaneWeights(predicted);
+  for (size_t i = 0; i < in_plane.size(); ++i) {
+    Eigen::Map<Eigen::Matrix3d>(normal.blocks.col(blockIndex(i, i)).data()) += in_plane[i];
+    normal.right.segment<3>(3 * i) -= in_plane[i] * controls.segment<3>(3 * i);
+  }
   // The innovation's prior is about the prediction, not about zero.
   const double innovation = params_.innovation * diagonal_;
   normal.right += predicted / (innovation * innovation) - quadratic_ * controls;
 }
 
 Eigen::MatrixXd DeformationFitter::priorInformation() const {
-  const Eigen::MatrixXd springs = springNormal(zero()).matrix();
-  return quadratic_ + Eigen::MatrixXd(springs.selfadjointView<Eigen::Lower>());
+  Normal normal = springNormal(zero());
+  addPriors(zero(), zero(), normal);
+  return Eigen::MatrixXd(normal.matrix().selfadjointView<Eigen::Lower>());
 }
 
 void DeformationFitter::addMatches(const DeformationField::Weights& weights,

@@ -113,6 +113,40 @@ TEST(DeformationFit, followsASheetThatSwingsOut) {
   EXPECT_LT(std::sqrt(squared), 0.01);
 }
 
+// Hanging it is as long as ever, and so its lower edge rises by a fifth of its height: that is
+// neither a motion within its plane nor, though it looks alike but for the perspective, a swing to
+// the other side.
+TEST(DeformationFit, followsASheetThatSwingsFar) {
+  const ObjectModel model = sheet();
+  const Camera camera = test::testCamera();
+  const DeformationFitter fitter(model, {});
+  const auto weights = fitter.field().weightsAt(model.mesh.vertices);
+  std::mt19937 generator(4);
+  std::normal_distribution<double> noise(0.0, 0.1);
+  Eigen::VectorXd before = fitter.zero(), last = fitter.zero();
+  for (double degrees = -4.0; degrees >= -40.0; degrees -= 4.0) {
+    const Eigen::AngleAxisd swing(degrees * M_PI / 180.0, Eigen::Vector3d::UnitX());
+    const Eigen::Vector3d bar(0.0, 0.0, 0.8);
+    decltype(TriangleMesh::vertices) truth = model.mesh.vertices;
+    std::vector<SurfaceMatch> matches;
+    for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+      const Eigen::Vector3d X = model.mesh.vertex(i), moved = bar + swing * (X - bar);
+      truth.row(i) = moved.transpose();
+      if (X.y() > 1e-6) continue;
+      const Eigen::Vector2d error(noise(generator), noise(generator));
+      matches.push_back({X, camera.projectWorld(model.world_from_object * moved) + error,
+                         0.01 * Eigen::Matrix2d::Identity()});
+    }
+    const Eigen::VectorXd predicted = 2.0 * last - before;
+    const DeformationFit fit = fitter.fit(matches, camera, predicted, predicted, 40.0);
+    ASSERT_TRUE(fit.converged);
+    before = last, last = fit.controls;
+    const auto moved = DeformationFitter::displaced(model.mesh.vertices, weights, fit.controls);
+    const double error = (moved - truth).norm(), motion = (truth - model.mesh.vertices).norm();
+    EXPECT_LT(error, 0.25 * motion) << degrees << " degrees";
+  }
+}
+
 TEST(DeformationModes, nothingMovesNothingFound) {
   const ObjectModel model = sheet();
   const DeformationFitter fitter(model, {});

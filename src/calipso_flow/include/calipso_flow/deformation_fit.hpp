@@ -11,14 +11,16 @@ namespace calipso::flow {
 
 // Deviations of what is assumed about a deforming body, relative to its diagonal where lengths.
 struct DeformationParams {
-  int spans = 3;              // control intervals along the longest axis
-  double strain = 0.03;       // of a distance between neighbouring surface points
-  double sheet_strain = 0.3;  // the same of a thin sheet, which is held in its plane by:
-  double in_plane = 0.006;    // a sheet's controls within its plane: second order in its bending
-  double roughness = 0.2;     // second difference of neighbouring controls
-  double innovation = 0.05;   // of a control point, from the constant-velocity prediction
-  double anchor = 1e-3;       // of a point that is attached
-  double floor_px = 0.05;     // no track is better than this
+  int spans = 3;               // control intervals along the longest axis
+  double strain = 0.03;        // of a distance between neighbouring surface points
+  double sheet_strain = 0.05;  // the same of a thin sheet
+  // Of a sheet's controls within its plane, and besides, which is second order in how far it has
+  // left the plane, so many times the square of that over the diagonal.
+  double in_plane = 0.006, bent = 4.0;
+  double roughness = 0.2;    // second difference of neighbouring controls
+  double innovation = 0.05;  // of a control point, from the constant-velocity prediction
+  double anchor = 1e-3;      // of a point that is attached
+  double floor_px = 0.05;    // no track is better than this
   double inlier_sigma = 5.0;
   int least_inliers = 12;
 };
@@ -86,6 +88,9 @@ class DeformationFitter {
   // Adds what is quadratic in the controls.
   void addPriors(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted,
                  Normal& normal) const;
+  // Of a sheet's controls within its plane, one each, 1/m^2; nothing of a solid's.
+  // @param controls  that the sheet is about as bent as
+  std::vector<Eigen::Matrix3d> inPlaneWeights(const Eigen::VectorXd& controls) const;
   // @param trust  weight of each match
   static void addMatches(const DeformationField::Weights& weights,
                          const std::vector<Residual>& residuals, const std::vector<double>& trust,
@@ -98,6 +103,7 @@ class DeformationFitter {
   Eigen::Isometry3d world_from_object_;
   DeformationField field_;
   std::vector<Spring> springs_;
+  Eigen::Matrix3d in_plane_ = Eigen::Matrix3d::Zero();  // directions that a sheet is held in
   Eigen::MatrixXd quadratic_;  // roughness, anchors and innovation: constant
   Eigen::Matrix<double, 9, Eigen::Dynamic> quadratic_blocks_;  // the same, as Normal's
 };

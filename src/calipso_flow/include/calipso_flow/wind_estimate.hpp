@@ -43,7 +43,7 @@ struct WindParams {
   double change = 3.0;       // m/s per square root of a second, deviation of its changes
   double stiffness = 1.5;    // deviation of the logarithm of s
   double model_error = 0.1;  // of the motion: what the simulation cannot show
-  double least_explained = 0.4;
+  double least_explained = 0.35;
 };
 
 // @param times  s, one per row of the modes' amplitudes; the first is the key frame
