@@ -70,6 +70,19 @@ Matrix6d unseen(const std::vector<PoseMeasurement>& measurements, double time,
   return twist;
 }
 
+std::string motionText(const ObjectDynamics& object) {
+  const size_t frames = object.observations.size();
+  const size_t seen = std::count_if(object.observations.begin(), object.observations.end(),
+                                    [](const Observation& o) { return o.found; });
+  // What is seen in a few frames only is not known to rest in the others.
+  if (2 * seen < frames)
+    return " not followed: seen in " + std::to_string(seen) + " of " + std::to_string(frames) +
+           " frames";
+  const bool moves = std::any_of(object.motions.begin(), object.motions.end(),
+                                 [](const ObjectMotion& m) { return m.moving; });
+  return moves ? " moves" : " at rest";
+}
+
 std::string summaryOf(const DeformationMotion& deformation) {
   char text[160];
   std::string result = ", deforms";
@@ -103,9 +116,7 @@ std::string summary(const std::vector<ObjectDynamics>& objects) {
   std::string text;
   for (const ObjectDynamics& object : objects) {
     const Trajectory& trajectory = object.trajectory;
-    const bool moves = std::any_of(object.motions.begin(), object.motions.end(),
-                                   [](const ObjectMotion& m) { return m.moving; });
-    text += (text.empty() ? "" : "; ") + object.name + (moves ? " moves" : " at rest");
+    text += (text.empty() ? "" : "; ") + object.name + motionText(object);
     char number[64];
     if (!trajectory.collisions.empty()) {
       std::snprintf(number, sizeof number, ", %zu collisions from %.3f s",

@@ -107,7 +107,6 @@ class PathSearch {
   void follow(int s, MotionState state, const MotionPiece& piece, double log_likelihood) {
     int frames = 0;
     const int count = static_cast<int>(stages_.size());
-    const int least = s < 0 ? kLeastFirstFrames : kLeastFrames;
     for (int k = s + 1; k < count; ++k) {
       state = predicted(state, measurements_[k], piece, noise_scale_);
       if (measurements_[k].valid)
@@ -116,6 +115,7 @@ class PathSearch {
       ++frames;
       Stage& stage = stages_[k];
       const bool ends = k + 1 == count || cutAfter(k).has_value();
+      const int least = s < 0 || ends ? kLeastEndFrames : kLeastFrames;
       const bool all = ends && (s < 0 || piece.cut);  // that there is between two cuts
       if ((frames >= least || all) && log_likelihood > stage.log_likelihood) {
         stage = {log_likelihood, state, piece, s};

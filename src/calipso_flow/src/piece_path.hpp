@@ -11,9 +11,9 @@ namespace calipso::flow {
 // and the log odds that they have to earn.
 constexpr double kContactShare = 0.3, kContactEvidence = 4.0;
 
-// Fewer frames in a piece tell nothing about its velocity. In the first one nothing is known
-// before: two poses are always explained by some velocity, also when one of them is wrong.
-constexpr int kLeastFrames = 2, kLeastFirstFrames = 3;
+// Fewer frames in a piece tell nothing about its velocity. In the first and the last one nothing is
+// known before or after: two poses are always explained by some velocity, also when one is wrong.
+constexpr int kLeastFrames = 2, kLeastEndFrames = 3;
 
 // The likeliest division of a motion into pieces of a few plain kinds, over all divisions at once,
 // by dynamic programming over the frame that a piece ends with: the state that the best pieces up

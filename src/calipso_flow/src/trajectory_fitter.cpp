@@ -109,8 +109,19 @@ void TrajectoryFitter::fitKindsAndNoise() {
   noise_scale_ = chooseNoiseScale(measurements_, pieces_, prior_, noise_scale_);
 }
 
-// That a collision at this time has to have.
-double TrajectoryFitter::evidenceFor(double time) const {
+// That the collision at a piece's start has to have. What lies below pushes up or aside: a push down
+// is more likely an error of the poses.
+double TrajectoryFitter::evidenceFor(size_t piece) const {
+  constexpr double kPushedDown = 16.0, kDownwards = 0.3;  // log odds; cosine
+  const double time = pieces_[piece].start;
+  const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
+  const auto jump = std::find_if(motion.jumps.begin(), motion.jumps.end(),
+                                 [&](const Jump& j) { return j.after.time >= time; });
+  if (jump != motion.jumps.end()) {
+    const Eigen::Vector3d change = jump->after.velocity - jump->before.velocity;
+    if (change.dot(prior_.gravity) > kDownwards * change.norm() * prior_.gravity.norm())
+      return params_.least_evidence + kPushedDown;
+  }
   const auto next = std::find_if(measurements_.begin(), measurements_.end(),
                                  [&](const PoseMeasurement& m) { return m.time >= time; });
   return params_.least_evidence - (next == measurements_.end() ? 0.0 : next->strikes);
@@ -121,7 +132,7 @@ void TrajectoryFitter::dropUnearnedPieces() {
   for (size_t i = pieces_.size(); i-- > 1;) {
     if (pieces_[i].cut) continue;
     const std::vector<MotionPiece> saved = pieces_;
-    const double with = likelihood(), evidence = evidenceFor(pieces_[i].start);
+    const double with = likelihood(), evidence = evidenceFor(i);
     pieces_.erase(pieces_.begin() + i);
     fitKind(i - 1);
     // Two instants in a row may stand for one in between.
@@ -226,10 +237,11 @@ double TrajectoryFitter::bestTime(size_t piece, double reach) const {
   const double original = pieces_[piece].start, step = frameSpacing();
   const Measurements before = measurementsOf(piece - 1, piece - 1);
   const Measurements after = measurementsOf(piece, piece);
-  const size_t least_before = piece == 1 ? kLeastFirstFrames : kLeastFrames;
-  if (before.size() < least_before || after.size() < kLeastFrames) return original;
+  const size_t least_before = piece == 1 ? kLeastEndFrames : kLeastFrames;
+  const size_t least_after = piece + 1 == pieces_.size() ? kLeastEndFrames : kLeastFrames;
+  if (before.size() < least_before || after.size() < least_after) return original;
   const double low = std::max(original - reach, before[least_before - 1].time);
-  const double high = std::min(original + reach, after[after.size() - kLeastFrames].time);
+  const double high = std::min(original + reach, after[after.size() - least_after].time);
   Neighbourhood local = neighbourhood(piece);
   return maximise(
              [&](double time) {

@@ -35,7 +35,7 @@ class TrajectoryFitter {
   void insertPiece(double time, bool cut);
   void fitKind(size_t piece);
   void fitKindsAndNoise();
-  double evidenceFor(double time) const;
+  double evidenceFor(size_t piece) const;
   void dropUnearnedPieces();
   void dropJumpsOfSpinAlone();
   void dropExcursions();

@@ -200,10 +200,11 @@ TEST(ClipDynamics, objectWithoutTextureHasNoEstimate) {
   const Camera camera = test::testCamera();
   const cv::Mat flat(camera.height, camera.width, CV_8U, cv::Scalar(128));
   ClipAnalyser analyser = analyserOf(makeFrame(0.0, flat, camera));
-  analyser.add(makeFrame(1 / kFps, flat, camera));
+  for (int k = 1; k < 3; ++k) analyser.add(makeFrame(k / kFps, flat, camera));
   const ObjectDynamics box = analyser.finish().front();
   EXPECT_EQ(box.motions[1].tracks, 0);
   EXPECT_FALSE(box.motions[1].moving);
+  EXPECT_EQ(summary({box}), "box not followed: seen in 1 of 3 frames");
 }
 
 TEST(ClipDynamics, refusesStampsThatDoNotIncrease) {

@@ -127,6 +127,24 @@ TEST(Trajectory, whatIsKnownOfTheSurroundingsTellsAWeakBounce) {
   EXPECT_LT(unaided, 5u);
 }
 
+// The same change of velocity, up and down: nothing below pushes down.
+TEST(Trajectory, aWeakPushDownIsNoImpact) {
+  constexpr double kImpact = 10.4 / kFps;
+  const auto collisions = [&](int seed, double up) {
+    const auto position = [&](double t) -> Eigen::Vector3d {
+      const Eigen::Vector3d change(0.1, 0.0, up);
+      return Eigen::Vector3d(0.3 * t, 0.0, -0.5 * 9.81 * t * t) +
+             std::max(0.0, t - kImpact) * change;
+    };
+    return fitTrajectory(measure(22, 0.004, 0.02, seed, position, still), {}, testPrior())
+        .collisions.size();
+  };
+  size_t up = 0, down = 0;
+  for (int seed = 1; seed <= 5; ++seed) up += collisions(seed, 0.6), down += collisions(seed, -0.6);
+  EXPECT_EQ(up, 5u);
+  EXPECT_LT(down, 5u);
+}
+
 TEST(Trajectory, recognisesRest) {
   const auto data = measure(30, 0.002, 0.01, 3, still, still);
   const Trajectory fit = fitTrajectory(data, {}, testPrior());
