@@ -139,10 +139,15 @@ TEST(Trajectory, aWeakPushDownIsNoImpact) {
     return fitTrajectory(measure(22, 0.004, 0.02, seed, position, still), {}, testPrior())
         .collisions.size();
   };
-  size_t up = 0, down = 0;
-  for (int seed = 1; seed <= 5; ++seed) up += collisions(seed, 0.6), down += collisions(seed, -0.6);
+  size_t up = 0, down = 0, struck_down = 0;
+  for (int seed = 1; seed <= 5; ++seed) {
+    up += collisions(seed, 0.7);
+    down += collisions(seed, -0.7);
+    struck_down += collisions(seed, -1.5);
+  }
   EXPECT_EQ(up, 5u);
-  EXPECT_LT(down, 5u);
+  EXPECT_LE(down, 2u);
+  EXPECT_EQ(struck_down, 5u);
 }
 
 TEST(Trajectory, recognisesRest) {
