@@ -118,7 +118,12 @@ class Held : public ImageSource {
 
 std::unique_ptr<ImageSource> openSequence(const std::string& directory, const std::string& pattern,
                                           int count, double fps) {
-  numbered(pattern, 0);  // refuses a pattern at once
+  const std::string first = directory + "/" + numbered(pattern, 0);
+  if (count < 1) {
+    throw std::invalid_argument(
+        "a sequence of " + std::to_string(count) + " frames, the first of them " + first +
+        ": there must be one at least; number them from 0, or give n_frames");
+  }
   return std::make_unique<Sequence>(directory, pattern, count, fps);
 }
 

@@ -45,6 +45,14 @@ TEST(Sequence, RejectsPatternsThatAreNotOneInteger) {
   }
 }
 
+TEST(Sequence, RefusesToBeEmptyAndNamesItsFirstFrame) {
+  for (const int count : {0, -1}) {
+    const std::string said = messageOf([&] { openSequence("clip", "%03d.png", count, 25.0); });
+    EXPECT_NE(said.find("clip/000.png"), std::string::npos) << said;
+    EXPECT_NE(said.find("number them from 0"), std::string::npos) << said;
+  }
+}
+
 TEST(HoldLast, ContinuesAShortClip) {
   const TemporaryFolder folder;
   writeGrey(folder / "still.png", 77);

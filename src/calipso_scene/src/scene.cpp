@@ -1,8 +1,10 @@
 #include "calipso_scene/scene.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <regex>
 #include <set>
 #include <stdexcept>
@@ -23,9 +25,35 @@ bool hasOneInteger(const std::string& pattern) {
   return std::regex_match(pattern, kOneInteger);
 }
 
-int frameFiles(const Scene& scene) {
+// The lowest number after `gap` that a frame file has.
+std::optional<int> frameAfter(const Scene& scene, int gap) {
+  const std::string& pattern = scene.frame_pattern;
+  const std::filesystem::path prefix(pattern.substr(0, pattern.find('%')));
+  const std::string start = prefix.filename().string();
+  std::optional<int> next;
+  std::error_code none;  // no folder, no frames
+  for (const auto& entry :
+       std::filesystem::directory_iterator(scene.directory / prefix.parent_path(), none)) {
+    const std::string name = entry.path().filename().string();
+    if (name.compare(0, start.size(), start) != 0) continue;
+    int k = 0;
+    const char* const digits = name.data() + start.size();
+    const auto parsed = std::from_chars(digits, name.data() + name.size(), k);
+    if (parsed.ec == std::errc() && k > gap && k < next.value_or(k + 1) &&
+        std::filesystem::exists(scene.framePath(k)))
+      next = k;
+  }
+  return next;
+}
+
+int frameFiles(const Scene& scene, const YamlReader& reader) {
   int count = 0;
   while (std::filesystem::exists(scene.framePath(count))) ++count;
+  if (const std::optional<int> next = frameAfter(scene, count))
+    reader.fail("n_frames", "is missing, and so is " + scene.framePath(count) + ", though " +
+                                numbered(scene.frame_pattern, *next) +
+                                " is there; number the frames from 0 without a gap, or give "
+                                "n_frames");
   return count;
 }
 
@@ -166,7 +194,8 @@ Scene loadScene(const std::string& directory) {
   if (!hasOneInteger(scene.frame_pattern))
     reader.fail("frames", "is '" + scene.frame_pattern +
                               "'; it needs exactly one integer field, like frames/%06d.jpg");
-  scene.frame_count = root["n_frames"] ? reader.integer(root, "n_frames") : frameFiles(scene);
+  scene.frame_count =
+      root["n_frames"] ? reader.integer(root, "n_frames") : frameFiles(scene, reader);
   scene.camera = readCamera(root, reader);
   scene.world_from_camera_per_frame = readCameraPath(root, reader);
   if (root["gravity"]) scene.gravity = reader.vector(root, "gravity", 3);

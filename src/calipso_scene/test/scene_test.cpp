@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <vector>
 
 namespace calipso {
 namespace {
@@ -60,6 +61,31 @@ TEST(Scene, nameAndNumberOfFramesAreTheFoldersWhereTheFileHasNone) {
   EXPECT_EQ(scene.name, "scene");
   EXPECT_EQ(scene.frame_count, 3);
   EXPECT_EQ(scene.framePath(12), scene.directory + "/frames/000012.jpg");
+}
+
+TEST(Scene, aGapAmongTheFramesIsNamed) {
+  std::string yaml = kHead + kPose + kObject;
+  yaml.erase(yaml.find("n_frames: 2\n"), 12);
+  const std::string folder = testing::TempDir() + "scene/frames";
+  const auto errorWith = [&](const std::vector<int>& there, const std::string& pattern) {
+    for (const int k : there) {
+      const std::filesystem::path file = folder + "/../" + numbered(pattern, k);
+      std::filesystem::create_directories(file.parent_path());
+      std::ofstream(file.string());
+    }
+    const std::string error = errorOf(yaml + "frames: " + pattern + "\n");
+    std::filesystem::remove_all(folder);
+    return error;
+  };
+  const std::string first = errorWith({1, 2}, "frames/%06d.jpg");  // as ffmpeg numbers them
+  EXPECT_NE(first.find("000000.jpg, though frames/000001.jpg"), std::string::npos) << first;
+  EXPECT_NE(first.find("from 0"), std::string::npos) << first;
+  const std::string third = errorWith({0, 1, 12, 4}, "frames/f%d.jpg");
+  EXPECT_NE(third.find("f2.jpg, though frames/f4.jpg"), std::string::npos) << third;
+  const std::string folders = errorWith({0, 2}, "frames/%d/left.jpg");
+  EXPECT_NE(folders.find("1/left.jpg, though frames/2/left.jpg"), std::string::npos) << folders;
+  EXPECT_EQ(errorWith({0, 1}, "frames/%06d.jpg"), "");
+  EXPECT_EQ(errorWith({}, "frames/%06d.jpg"), "");  // the frames can come from a bag
 }
 
 TEST(Scene, aPointAheadProjectsToThePrincipalPoint) {

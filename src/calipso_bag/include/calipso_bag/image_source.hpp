@@ -20,7 +20,8 @@ class ImageSource {
 };
 
 // `count` images of a numbered sequence, 0-based. `pattern`: printf style, relative to `directory`.
-// @throw std::invalid_argument when the pattern does not hold exactly one integer field
+// @throw std::invalid_argument when the pattern does not hold exactly one integer field,
+// or where there is no frame
 std::unique_ptr<ImageSource> openSequence(const std::string& directory, const std::string& pattern,
                                           int count, double fps);
 
