@@ -68,6 +68,25 @@ TEST(OutputBag, SaysWhereItCannotBeWritten) {
   EXPECT_NE(text.find("file/out.bag: cannot be written"), std::string::npos) << text;
 }
 
+TEST(OutputBag, RefusesAFolderAtOnce) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "old");
+  for (const std::string& path : {folder / "old", folder / "old/", folder / "new/"}) {
+    const std::string text = messageOf([&] { OutputBag output(path); });
+    EXPECT_NE(text.find("is a folder"), std::string::npos) << text;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "new"));
+}
+
+TEST(OutputBag, SaysWhereTheWholeBagIsThatCannotHaveItsName) {
+  const TemporaryFolder folder;
+  OutputBag output(folder / "out.bag");
+  std::filesystem::create_directory(folder / "out.bag");
+  const std::string text = messageOf([&] { output.finish(); });
+  EXPECT_NE(text.find("out.bag.active: rename it"), std::string::npos) << text;
+  EXPECT_EQ(text.find("make room"), std::string::npos) << text;
+}
+
 // A limit on the size of files stands for a disk that is full.
 TEST(OutputBag, SaysWhenTheDiskIsFullAndCanBeLeft) {
   const TemporaryFolder folder;

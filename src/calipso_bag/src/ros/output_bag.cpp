@@ -10,6 +10,9 @@ namespace fs = std::filesystem;
 OutputBag::OutputBag(const std::string& path)
     : path_(path), active_path_(path + ".active"), bag_(std::make_unique<rosbag::Bag>()) {
   if (path.empty()) throw std::invalid_argument("the output bag's path is empty; give one");
+  std::error_code none;
+  if (!fs::path(path).has_filename() || fs::is_directory(path, none))
+    throw std::invalid_argument(path + ": is a folder; give the path of the bag to be written");
   try {
     const fs::path folder = fs::path(path).parent_path();
     if (!folder.empty()) fs::create_directories(folder);
@@ -38,9 +41,13 @@ void OutputBag::failWriting(const std::exception& error, const std::string& reme
 void OutputBag::finish() {
   try {
     bag_->close();
-    fs::rename(active_path_, path_);
   } catch (const std::exception& e) {
     failWriting(e, kMakeRoom);
+  }
+  try {
+    fs::rename(active_path_, path_);
+  } catch (const std::exception& e) {
+    failWriting(e, "the whole bag is there as " + active_path_ + ": rename it");
   }
 }
 
