@@ -117,7 +117,8 @@ void YamlReader::checkKeys(const YAML::Node& node, const std::vector<std::string
     const std::string key = entry.first.as<std::string>();
     if (std::find(known.begin(), known.end(), key) == known.end())
       fail(key, "is not a known key; known ones are " + joined(known));
-    if (!seen.insert(key).second) fail(key, "is given twice; only one of them would count");
+    if (!seen.insert(key).second)
+      fail(key, "is given twice; only one of them would count: leave one out");
   }
 }
 

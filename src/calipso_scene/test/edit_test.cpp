@@ -110,7 +110,8 @@ TEST(Edit, badInputNamesEntryFieldAndRemedy) {
   expect("- {t: 0, object: banana1, kind: material, poissons_ratio: 0.5}", "poissons_ratio = 0.5");
   expect("- {t: 0, object: banana1, kind: material}", "changes nothing");
   expect("- {t: 0, object: banana1, kind: pull, vektor: [0, 0, 1]}", "vektor is not a known key");
-  expect("- {t: 0, object: banana1, kind: remove, t: 1}", "t is given twice");
+  expect("- {t: 0, object: banana1, kind: remove, t: 1}",
+         "t is given twice; only one of them would count: leave one out");
   expect("- {t: 0, object: banana1, kind: pull, vector: [0, 0]}", "list of 3 numbers");
   expect("- {t: 0, object: banana1, kind: pull, mode: factor}", "for kind 'pull'");
   expect("- {t: 0, object: banana1, kind: transform, scale: 0}", "scale = 0");
