@@ -1,33 +1,10 @@
 #include "calipso_align/mesh_topology.hpp"
 
-#include <algorithm>
-#include <tuple>
-
 #include "calipso_scene/disjoint_sets.hpp"
+#include "calipso_scene/half_edges.hpp"
 
 namespace calipso::align {
 namespace {
-
-struct HalfEdge {
-  int v0, v1, face;
-  bool forward;  // the face is wound from v0 to v1
-};
-
-// Those of one edge side by side.
-std::vector<HalfEdge> sortedHalfEdges(const Triangles& triangles) {
-  std::vector<HalfEdge> half_edges;
-  half_edges.reserve(3 * triangles.rows());
-  for (int f = 0; f < triangles.rows(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = triangles(f, k), b = triangles(f, (k + 1) % 3);
-      half_edges.push_back({std::min(a, b), std::max(a, b), f, a < b});
-    }
-  }
-  std::sort(half_edges.begin(), half_edges.end(), [](const HalfEdge& a, const HalfEdge& b) {
-    return std::tie(a.v0, a.v1, a.face, a.forward) < std::tie(b.v0, b.v1, b.face, b.forward);
-  });
-  return half_edges;
-}
 
 // Whether an edge, whose half edges these are, is passed once each way.
 bool isClosed(const HalfEdge* first, const HalfEdge* last) {
@@ -43,8 +20,8 @@ MeshTopology::MeshTopology(const Triangles& triangles)
   std::vector<int> at_open_edges;  // faces
   const HalfEdge* const end = half_edges.data() + half_edges.size();
   for (const HalfEdge *first = half_edges.data(), *last = first; first != end; first = last) {
-    Edge edge{first->v0, first->v1, {}};
-    for (; last != end && last->v0 == edge.v0 && last->v1 == edge.v1; ++last) {
+    Edge edge{first->low, first->high, {}};
+    for (; last != end && last->low == edge.v0 && last->high == edge.v1; ++last) {
       edge.faces.push_back(last->face);
       pieces.join(first->face, last->face);
     }

@@ -4,30 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <set>
-#include <tuple>
 #include <vector>
+
+#include "calipso_scene/half_edges.hpp"
 
 namespace calipso {
 namespace {
-
-struct HalfEdge {
-  int low, high, face;
-  bool forward;  // the face is wound from low to high
-};
-
-std::vector<HalfEdge> sortedHalfEdges(const TriangleMesh& mesh) {
-  std::vector<HalfEdge> edges;
-  edges.reserve(3 * mesh.triangles.rows());
-  for (int f = 0; f < mesh.triangleCount(); ++f)
-    for (int k = 0; k < 3; ++k) {
-      const int a = mesh.triangles(f, k), b = mesh.triangles(f, (k + 1) % 3);
-      edges.push_back({std::min(a, b), std::max(a, b), f, a < b});
-    }
-  std::sort(edges.begin(), edges.end(), [](const HalfEdge& a, const HalfEdge& b) {
-    return std::tie(a.low, a.high, a.face) < std::tie(b.low, b.high, b.face);
-  });
-  return edges;
-}
 
 void dropUselessFaces(TriangleMesh* mesh) {
   std::set<std::array<int, 3>> seen;
@@ -56,7 +38,7 @@ struct Surface {
 Surface surfaceOf(const TriangleMesh& mesh) {
   Surface surface{std::vector<std::vector<Neighbour>>(mesh.triangleCount()),
                   std::vector<bool>(mesh.triangleCount(), true)};
-  const std::vector<HalfEdge> edges = sortedHalfEdges(mesh);
+  const std::vector<HalfEdge> edges = sortedHalfEdges(mesh.triangles);
   for (size_t i = 0, end = 0; i < edges.size(); i = end) {
     for (end = i;
          end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high;)
@@ -112,7 +94,7 @@ void windPiece(const Surface& surface, int first, std::vector<int>* done, Triang
 
 // Whether every edge is passed as often one way as the other.
 bool isClosed(const TriangleMesh& mesh) {
-  const std::vector<HalfEdge> edges = sortedHalfEdges(mesh);
+  const std::vector<HalfEdge> edges = sortedHalfEdges(mesh.triangles);
   for (size_t i = 0; i < edges.size();) {
     const HalfEdge& first = edges[i];
     int balance = 0;
