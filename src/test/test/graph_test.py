@@ -106,6 +106,10 @@ class Graph(unittest.TestCase):
         command += ["%s:=%s" % pair for pair in self.arguments("final.bag", None).items()]
         self.assertEqual(yaml.safe_load(subprocess.check_output(command))["/calipso/render/quality"], "final")
 
+    def test_quality_on_the_server_is_kept_by_live(self):
+        command = ["roslaunch", "--dump-params", "calipso_launch", "live.launch", "scene:=" + self.scene]
+        self.assertNotIn("/calipso/render/quality", yaml.safe_load(subprocess.check_output(command)))
+
     def wait_for_publisher(self, topic, timeout_sec=60):
         """Until the master knows one; the run is over within seconds."""
         master = rosgraph.Master("/graph_test")
