@@ -73,6 +73,9 @@ void limitGrowth(int from, std::array<float, N>& values) {
   for (int i = from - 1; i >= 0; --i) values[i] = std::min(values[i], kGrowsDarker * values[i + 1]);
 }
 
+// Black bars, burnt-out skies: what is clipped shows no noise, however much of the picture it is.
+bool isClipped(int code) { return code == 0 || code == 255; }
+
 // Consecutive pairs: their difference has twice the variance.
 void addPairs(const cv::Mat& first, const cv::Mat& second, const cv::Mat& steady, int channel,
               Differences& differences) {
@@ -82,6 +85,7 @@ void addPairs(const cv::Mat& first, const cv::Mat& second, const cv::Mat& steady
     for (int u = 0; u < first.cols; ++u) {
       if (use[u] == 0) continue;
       const int x = a[u][channel], y = b[u][channel];
+      if (isClipped(x) || isClipped(y)) continue;
       // Spread within the cell of rounding, so that small deviations are not lost in steps of one.
       const double dither = ((u * 7 + v * 13) % 16 + 0.5) / 16.0 - 0.5;
       differences.add((x + y) / 2, std::abs(x - y + dither) / std::sqrt(2.0));
@@ -97,7 +101,8 @@ void addDetail(const cv::Mat& frame, int channel, Differences& differences) {
   cv::filter2D(plane, detail, CV_32F, kernel);
   for (int v = 1; v + 1 < frame.rows; ++v) {
     for (int u = 1; u + 1 < frame.cols; ++u) {
-      differences.add(plane.at<std::uint8_t>(v, u), std::abs(detail.at<float>(v, u)) / 6.0);
+      const int code = plane.at<std::uint8_t>(v, u);
+      if (!isClipped(code)) differences.add(code, std::abs(detail.at<float>(v, u)) / 6.0);
     }
   }
 }

@@ -93,6 +93,28 @@ TEST(Noise, IsNotWhatMoves) {
   EXPECT_LT(NoiseModel::estimate(frames, everywhere).deviation(1, 250.0f), 10.0f);
 }
 
+// Black bars above and below a picture, or a burnt-out sky, hold most of the samples.
+TEST(Noise, IsNotBoundByWhatIsClipped) {
+  for (const double clipped : {0.0, 255.0}) {
+    cv::RNG random(3);
+    std::vector<cv::Mat> frames;
+    for (int k = 0; k < 4; ++k) {
+      cv::Mat noise(120, 120, CV_32FC3), frame;
+      random.fill(noise, cv::RNG::NORMAL, 128.0, 3.0);
+      noise.rowRange(0, 80).setTo(cv::Scalar::all(clipped));
+      noise.convertTo(frame, CV_8U);
+      frames.push_back(frame);
+    }
+    const std::vector<cv::Mat> everywhere(4, cv::Mat(120, 120, CV_8U, cv::Scalar(255)));
+    for (const std::size_t count : {4, 1}) {
+      const NoiseModel model =
+          NoiseModel::estimate({frames.begin(), frames.begin() + count},
+                               {everywhere.begin(), everywhere.begin() + count});
+      EXPECT_NEAR(model.deviation(1, 128.0f), 3.0f, 0.3f) << clipped << ", " << count;
+    }
+  }
+}
+
 TEST(Noise, StillPicturesHaveNone) {
   const std::vector<cv::Mat> frames(3, cv::Mat(64, 64, CV_8UC3, cv::Scalar::all(90)));
   EXPECT_LT(
