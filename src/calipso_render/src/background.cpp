@@ -135,7 +135,7 @@ InpaintParams alongRestingPlanes(const InpaintParams& place, const cv::Mat& movi
 }
 
 void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const InpaintParams& place,
-                      Background& background) {
+                      const BackgroundParams& params, Background& background) {
   if (!shaded.empty()) background.invented |= shaded != 0;
   const cv::Mat moving = movingPlaces(key, background);
   const bool any_moving = cv::countNonZero(moving) > 0;
@@ -144,7 +144,7 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const Inpaint
     cv::Mat now;
     key.bgr.convertTo(now, CV_32F);
     cv::Mat shows = closedGaps(moving) & (background.invented == 0) &
-                    (grown(key.labels != 0, BackgroundParams().mask_margin_px) == 0);
+                    (grown(key.labels != 0, params.mask_margin_px) == 0);
     if (!background.shaded_at_times.empty()) shows.setTo(0, background.shaded_at_times);
     now.copyTo(look, shows);
   }

@@ -226,7 +226,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   known_of_place.sure = surfaces.sure;
   for (const PicturePlane& plane : surfaces.planes)
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
-  inventBackground(traces, key, known_of_place, p.background);
+  inventBackground(traces, key, known_of_place, params.background, p.background);
   p.plate_linear = linearOf(p.background.plate);
   findPlaceUmbra(e, sun, sky, place.off_planes, params, p);
 }

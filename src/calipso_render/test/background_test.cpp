@@ -101,7 +101,7 @@ TEST(InventBackground, FillsOnlyTheHole) {
   Background b = seenBackground(wanderingSquare(1), false);
   const cv::Mat before = b.plate.clone(), hole = b.invented.clone();
   ASSERT_GT(cv::countNonZero(hole), 0);
-  inventBackground(cv::Mat(), wanderingSquare(1).front(), {}, b);
+  inventBackground(cv::Mat(), wanderingSquare(1).front(), {}, {}, b);
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       if (hole.at<std::uint8_t>(v, u) == 0) {
@@ -110,6 +110,38 @@ TEST(InventBackground, FillsOnlyTheHole) {
         // The square was pure red; the table has a third channel below the first never.
         ASSERT_GT(b.plate.at<cv::Vec3f>(v, u)[1], 20.0f);
       }
+    }
+  }
+}
+
+// All is water. What passes has a red rim that its mask misses, and at the key frame it touches
+// what is hidden all the time; the margin covers the rim.
+TEST(InventBackground, CopiesNoRimThatTheMarginCovers) {
+  const cv::Rect hidden(80, 40, 20, 40);
+  std::vector<ClipFrame> clip;
+  for (int k = 0; k < 8; ++k) {
+    ClipFrame f{cv::Mat(kHeight, kWidth, CV_8UC3), cv::Mat::zeros(kHeight, kWidth, CV_8U),
+                camera()};
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u)
+        f.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(
+            cv::saturate_cast<std::uint8_t>(120.0 + 30.0 * std::sin(0.3 * u + 1.9 * k + 0.5 * v)));
+    }
+    const cv::Rect passing(k == 0 ? 50 : 2, 40, 20, 40);
+    f.bgr(passing + cv::Size(8, 0)).setTo(cv::Scalar(0, 0, 255));
+    f.labels(passing).setTo(kBallLabel);
+    f.labels(hidden).setTo(kBallLabel + 1);
+    clip.push_back(f);
+  }
+  addGrain(clip);
+  BackgroundParams params;
+  params.mask_margin_px = 9;
+  Background b = seenBackground(clip, false, params);
+  inventBackground(cv::Mat(), clip.front(), {}, params, b);
+  for (int v = hidden.y; v < hidden.br().y; ++v) {
+    for (int u = hidden.x; u < hidden.br().x; ++u) {
+      const cv::Vec3f c = b.plate.at<cv::Vec3f>(v, u);
+      ASSERT_LT(c[2] - c[0], 60.0f) << u << ", " << v;
     }
   }
 }
@@ -135,7 +167,7 @@ TEST(InventBackground, WhatIsHiddenRestsWhereTheRowsAroundRest) {
   }
   addGrain(clip);
   Background b = seenBackground(clip, false);
-  inventBackground(cv::Mat(), clip.front(), {}, b);
+  inventBackground(cv::Mat(), clip.front(), {}, {}, b);
   ASSERT_FALSE(b.live.empty());
   const auto live = [&](int u, int v) {
     cv::Vec3f colour;

@@ -46,7 +46,7 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
 // picture of it: there the key frame is what the surroundings look like.
 // @param place its nearness (groundNearness()), surfaces and planes
 void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const InpaintParams& place,
-                      Background& background);
+                      const BackgroundParams& params, Background& background);
 
 // CV_32FC1, 1/m along the optical axis, of the support plane that a pixel sees, or of what is seen
 // of the scenery beyond it; 0 where no plane is. Empty if none is seen at all.
