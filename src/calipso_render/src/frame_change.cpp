@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
-#include "mask_morphology.hpp"
 #include "frame_compositor.hpp"
+#include "mask_morphology.hpp"
 #include "tiled_filter.hpp"
 
 namespace calipso::render {

@@ -5,8 +5,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
-#include "mask_morphology.hpp"
 #include "frame_compositor.hpp"
+#include "mask_morphology.hpp"
 #include "tiled_filter.hpp"
 #include "view_warp.hpp"
 #include "wide_loops.hpp"

@@ -28,7 +28,7 @@ class PlaceSamples {
   std::vector<cv::Mat> covered_;  // CV_8UC1
 };
 
-// Are these values darker than those, by more than `step` of their brightness, as a shadow makes
+// Are `values` darker than `lit`, by more than `step` of the brightness of `lit`, as a shadow makes
 // them? @pre neither is empty
 bool shadedAgainst(const Samples& lit, const Samples& values, double step);
 
