@@ -90,6 +90,16 @@ bool agree(const EdgeCoverage::Pixel& pixel, std::uint32_t id) {
          EdgeCoverage::isOneSheet(cv::v_reduce_max(high), cv::v_reduce_min(low));
 }
 
+// Is a place hidden by another sheet? Its own sheet may turn away so fast that the pixel's centre is
+// as much nearer; but beyond its edge, in the pixel beside, that one hides nothing.
+bool isHidden(const VisibilityBuffer& centre, const cv::Point& at, float nearness) {
+  for (const cv::Point& to : {cv::Point(0, 0), {-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+    const cv::Point seen = at + to;
+    if (EdgeCoverage::isOneSheet(centre.nearnessAt(seen.x, seen.y), nearness)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 struct EdgeCoverage::Piece {
@@ -198,7 +208,7 @@ void EdgeCoverage::addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q
                          static_cast<int>(std::floor(s.y() + 0.5f))),
         at = seen - region_.tl();
     if (!crossed.empty() && crossed.back() == at) continue;
-    if (isOneSheet(centre.nearnessAt(seen.x, seen.y), s.z())) crossed.push_back(at);
+    if (!isHidden(centre, seen, s.z())) crossed.push_back(at);
   }
 }
 

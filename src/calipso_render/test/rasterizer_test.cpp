@@ -139,6 +139,29 @@ TEST(EdgeCoverage, FindsPartsThinnerThanAPixel) {
   EXPECT_EQ(covered, 4);
 }
 
+// A handle before its cup: one mesh whose front turns away by a tenth of its nearness per pixel. A
+// third sheet behind both is seen by nobody.
+TEST(EdgeCoverage, SmoothsWhereAMeshHidesItself) {
+  ScreenMesh mesh;
+  mesh.points = {{5, -5, 1.5f},   {10.3f, -5, 1},     {10.3f, 30, 1},     {5, 30, 1.5f},
+                 {-5, -5, 0.5f},  {30, -5, 0.5f},     {30, 30, 0.5f},     {-5, 30, 0.5f},
+                 {-5, -5, 0.25f}, {15.3f, -5, 0.25f}, {15.3f, 30, 0.25f}, {-5, 30, 0.25f}};
+  const Triangles sheets = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}, {8, 9, 10}, {8, 10, 11}};
+  mesh.triangles = &sheets;
+  VisibilityBuffer buffer({0, 0, 20, 20});
+  buffer.draw(mesh, 0);
+  EdgeCoverage edges(buffer, buffer.region());
+  edges.chooseSilhouette(mesh, meshEdges(sheets), buffer);
+  edges.draw(mesh, 0);
+  edges.settle(buffer);
+  const EdgeCoverage::Pixel* pixel = edges.at(10, 10);
+  ASSERT_NE(pixel, nullptr);
+  int front = 0;
+  for (const float nearness : pixel->nearness) front += nearness > 0.75f;
+  EXPECT_EQ(front, 12);
+  EXPECT_EQ(edges.at(15, 10), nullptr);
+}
+
 // A horizontal 2 m square at height 1 over the origin.
 const Points kRoof = {{-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1}};
 const Triangles kRoofFaces = {{0, 1, 2}, {0, 2, 3}};

@@ -33,7 +33,7 @@ class EdgeCoverage {
   EdgeCoverage(const VisibilityBuffer& centre, const cv::Rect& box);
 
   // Adds the pixels that the mesh's own silhouette crosses (parts thinner than a pixel), but for
-  // those whose centre sees something nearer. @param centre as in the constructor
+  // those that another sheet hides. @param centre as in the constructor
   void chooseSilhouette(const ScreenMesh& mesh, const std::vector<MeshEdge>& edges,
                         const VisibilityBuffer& centre);
 
