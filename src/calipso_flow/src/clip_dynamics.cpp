@@ -74,13 +74,12 @@ std::string motionText(const ObjectDynamics& object) {
   const size_t frames = object.observations.size();
   const size_t seen = std::count_if(object.observations.begin(), object.observations.end(),
                                     [](const Observation& o) { return o.found; });
-  // What is seen in a few frames only is not known to rest in the others.
-  if (2 * seen < frames)
-    return " not followed: seen in " + std::to_string(seen) + " of " + std::to_string(frames) +
-           " frames";
   const bool moves = std::any_of(object.motions.begin(), object.motions.end(),
                                  [](const ObjectMotion& m) { return m.moving; });
-  return moves ? " moves" : " at rest";
+  const std::string share = std::to_string(seen) + " of " + std::to_string(frames) + " frames";
+  if (2 * seen >= frames) return moves ? " moves" : " at rest";
+  // What is seen in a few frames only is not known to rest in the others.
+  return (moves ? " moves, seen in " : " not followed: seen in ") + share;
 }
 
 std::string summaryOf(const DeformationMotion& deformation) {

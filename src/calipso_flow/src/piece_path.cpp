@@ -87,7 +87,7 @@ class PathSearch {
       instants = {*cut};
     else
       for (const double share : kInstants) instants.push_back(from + share * span);
-    const double evidence = least_evidence_ - measurements_[s + 1].strikes;
+    const double evidence = evidenceBefore(measurements_[s + 1], least_evidence_);
     for (const double time : instants) {
       const MotionState arrived = predicted(stages_[s].state, time, stages_[s].piece);
       for (MotionPiece piece : kinds_) {
@@ -115,9 +115,9 @@ class PathSearch {
       ++frames;
       Stage& stage = stages_[k];
       const bool ends = k + 1 == count || cutAfter(k).has_value();
-      const int least = s < 0 || ends ? kLeastEndFrames : kLeastFrames;
-      const bool all = ends && (s < 0 || piece.cut);  // that there is between two cuts
-      if ((frames >= least || all) && log_likelihood > stage.log_likelihood) {
+      const bool begins = s < 0 || piece.cut;
+      const bool all = begins && ends;  // that there is between two cuts
+      if ((frames >= leastFrames(begins, ends) || all) && log_likelihood > stage.log_likelihood) {
         stage = {log_likelihood, state, piece, s};
       }
       if (ends || log_likelihood < stage.log_likelihood - kHopeless) return;

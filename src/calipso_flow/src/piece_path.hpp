@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "calipso_flow/motion_filter.hpp"
@@ -11,9 +12,16 @@ namespace calipso::flow {
 // and the log odds that they have to earn.
 constexpr double kContactShare = 0.3, kContactEvidence = 4.0;
 
-// Fewer frames in a piece tell nothing about its velocity. In the first and the last one nothing is
-// known before or after: two poses are always explained by some velocity, also when one is wrong.
-constexpr int kLeastFrames = 2, kLeastEndFrames = 3;
+// Fewer frames in a piece tell nothing about its velocity. In the first and the last one of the clip
+// and at a cut nothing is known before or after: two poses are always explained by some velocity,
+// also when one is wrong.
+inline int leastFrames(bool first, bool last) { return first || last ? 3 : 2; }
+
+// Log of the odds by which a piece more must raise the likelihood that begins before a measurement.
+// @param least  where nothing is known of what it may have struck
+inline double evidenceBefore(const PoseMeasurement& measurement, double least) {
+  return std::max(0.0, least - measurement.strikes);
+}
 
 // The likeliest division of a motion into pieces of a few plain kinds, over all divisions at once,
 // by dynamic programming over the frame that a piece ends with: the state that the best pieces up

@@ -14,34 +14,47 @@ constexpr double kFalls = 1.5;
 // log odds, besides the usual, of an impact where it reaches a plane, and where it does not
 constexpr double kStrikes = 4.0, kStrikesAir = -2.0;
 
-// Of a body's lowest point above the planes.
+// How high above a plane the part of a body is that is within the plane's range, m.
 struct Clearance {
-  double height = std::numeric_limits<double>::infinity();  // m
-  double tolerance = 0.0;                                   // m; below it the body may touch
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -std::numeric_limits<double>::infinity();
+  double tolerance = 0.0;  // so far off it may still touch
+  bool whole = true;       // all of the body is within the range
+
+  bool touches() const { return lowest < tolerance && highest > -tolerance; }
+  bool above() const { return whole && lowest >= tolerance; }
 };
 
 Clearance clearanceOf(const SupportPlane& plane, const ObjectModel& model,
                       const Observation& observation, double shape_error) {
-  Clearance clearance;
+  Clearance body;
   const Eigen::Isometry3d& pose = observation.world_from_object;
   for (int i = 0; i < model.mesh.vertexCount(); ++i) {
     const Eigen::Vector3d p = pose * model.mesh.vertex(i);
-    if (plane.x_range && (p.x() < plane.x_range->x() || p.x() > plane.x_range->y())) continue;
-    clearance.height = std::min(clearance.height, plane.normal.dot(p) - plane.offset);
+    if (plane.x_range && (p.x() < plane.x_range->x() || p.x() > plane.x_range->y())) {
+      body.whole = false;
+      continue;
+    }
+    const double height = plane.normal.dot(p) - plane.offset;
+    body.lowest = std::min(body.lowest, height);
+    body.highest = std::max(body.highest, height);
   }
   const double variance =
       plane.normal.dot(observation.covariance.topLeftCorner<3, 3>() * plane.normal);
-  clearance.tolerance = shape_error + kDeviations * std::sqrt(variance);
-  return clearance;
+  body.tolerance = shape_error + kDeviations * std::sqrt(variance);
+  return body;
 }
 
-// Whether a fall through three heights ends below the tolerance at the next, in either direction of
-// time. @param fall  m/s^2, towards the plane
-bool reaches(const PoseMeasurement& before, double height_before, const PoseMeasurement& from,
-             const Clearance& height, const PoseMeasurement& to, double fall) {
+// Whether a fall through two heights ends below the tolerance at a third time, in either direction
+// of time. A body that enters or leaves the range shows another lowest point in every frame.
+// @param fall  m/s^2, towards the plane
+bool reaches(const PoseMeasurement& before, const Clearance& height_before,
+             const PoseMeasurement& from, const Clearance& height, const PoseMeasurement& to,
+             double fall) {
+  if (!before.valid || !from.valid || !height_before.whole || !height.above()) return false;
   const double past = std::abs(from.time - before.time), ahead = std::abs(to.time - from.time);
-  const double speed = (height.height - height_before) / past - 0.5 * fall * past;
-  return height.height + speed * ahead - 0.5 * fall * ahead * ahead < height.tolerance;
+  const double speed = (height.lowest - height_before.lowest) / past - 0.5 * fall * past;
+  return height.lowest + speed * ahead - 0.5 * fall * ahead * ahead < height.tolerance;
 }
 
 }  // namespace
@@ -58,23 +71,22 @@ void noteContacts(const std::vector<SupportPlane>& planes, const ObjectModel& mo
     for (const Observation& o : observations)
       heights.push_back(clearanceOf(plane, model, o, shape_error));
     const double fall = -plane.normal.dot(gravity);
-    const auto touches = [&](size_t k) { return heights[k].height < heights[k].tolerance; };
-    const auto seen = [&](size_t k) { return k < count && measurements[k].valid; };
+    const auto touches = [&](size_t k) { return measurements[k].valid && heights[k].touches(); };
     const auto falls = [&](size_t before, size_t from, size_t to) {
-      return seen(before) && seen(from) &&
-             reaches(measurements[before], heights[before].height, measurements[from],
-                     heights[from], measurements[to], fall);
+      return reaches(measurements[before], heights[before], measurements[from], heights[from],
+                     measurements[to], fall);
     };
     for (size_t k = 0; k < count; ++k) {
       if (touches(k)) clear[k] = false;
       if (k == 0) continue;
       if (touches(k - 1) || touches(k) || (k > 1 && falls(k - 2, k - 1, k)) ||
-          falls(k + 1, k, k - 1))
+          (k + 1 < count && falls(k + 1, k, k - 1)))
         strikes[k] = true;
     }
   }
+  const bool held = !model.attached.empty();
   for (size_t k = 0; k < count; ++k) {
-    measurements[k].falls = measurements[k].valid && clear[k] ? kFalls : 0.0;
+    measurements[k].falls = measurements[k].valid && clear[k] && !held ? kFalls : 0.0;
     const bool known = k > 0 && measurements[k].valid && measurements[k - 1].valid;
     measurements[k].strikes = strikes[k] ? kStrikes : known ? kStrikesAir : 0.0;
   }

@@ -109,8 +109,8 @@ void TrajectoryFitter::fitKindsAndNoise() {
   noise_scale_ = chooseNoiseScale(measurements_, pieces_, prior_, noise_scale_);
 }
 
-// That the collision at a piece's start has to have. What lies below pushes up or aside: a push down
-// is more likely an error of the poses.
+// Log odds that the collision at a piece's start must have. What lies below pushes up or aside: a
+// push down is more likely an error of the poses.
 double TrajectoryFitter::evidenceFor(size_t piece) const {
   constexpr double kPushedDown = 16.0, kDownwards = 0.3;  // log odds; cosine
   const double time = pieces_[piece].start;
@@ -124,7 +124,8 @@ double TrajectoryFitter::evidenceFor(size_t piece) const {
   }
   const auto next = std::find_if(measurements_.begin(), measurements_.end(),
                                  [&](const PoseMeasurement& m) { return m.time >= time; });
-  return params_.least_evidence - (next == measurements_.end() ? 0.0 : next->strikes);
+  return next == measurements_.end() ? params_.least_evidence
+                                     : evidenceBefore(*next, params_.least_evidence);
 }
 
 // A later piece may have taken over what an earlier one was needed for.
@@ -232,13 +233,18 @@ void TrajectoryFitter::chooseContacts() {
   }
 }
 
+size_t TrajectoryFitter::leastFramesOf(size_t piece) const {
+  const bool first = piece == 0 || pieces_[piece].cut;
+  const bool last = piece + 1 == pieces_.size() || pieces_[piece + 1].cut;
+  return leastFrames(first, last);
+}
+
 // The likeliest start of a piece, within `reach` of the present one.
 double TrajectoryFitter::bestTime(size_t piece, double reach) const {
   const double original = pieces_[piece].start, step = frameSpacing();
   const Measurements before = measurementsOf(piece - 1, piece - 1);
   const Measurements after = measurementsOf(piece, piece);
-  const size_t least_before = piece == 1 ? kLeastEndFrames : kLeastFrames;
-  const size_t least_after = piece + 1 == pieces_.size() ? kLeastEndFrames : kLeastFrames;
+  const size_t least_before = leastFramesOf(piece - 1), least_after = leastFramesOf(piece);
   if (before.size() < least_before || after.size() < least_after) return original;
   const double low = std::max(original - reach, before[least_before - 1].time);
   const double high = std::min(original + reach, after[after.size() - least_after].time);

@@ -42,6 +42,7 @@ class TrajectoryFitter {
   bool isExcursion(size_t first, size_t back) const;
   void refineTimes();
   void chooseContacts();
+  size_t leastFramesOf(size_t piece) const;
   double bestTime(size_t piece, double reach) const;
   double timeDeviation(size_t piece) const;
 

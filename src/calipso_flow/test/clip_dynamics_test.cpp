@@ -187,13 +187,14 @@ TEST(ClipDynamics, seesACutAndTakesItForNoMotion) {
 TEST(ClipDynamics, objectThatLeavesThePictureLosesItsTracks) {
   const Eigen::Vector3d velocity(3.0, 0.0, 0.0);
   ClipAnalyser analyser = analyserOf(frameOf(0.0, movedPose(0.0, velocity, 0.0), 80));
-  for (int k = 1; k < 16; ++k) {
+  for (int k = 1; k < 30; ++k) {
     analyser.add(frameOf(k / kFps, movedPose(k / kFps, velocity, 0.0), 80 + k));
   }
   const ObjectDynamics box = analyser.finish().front();
   EXPECT_GT(box.motions[2].tracks, 0);
   EXPECT_EQ(box.motions[15].tracks, 0);
   EXPECT_NEAR(box.motions[15].state.velocity.x(), 3.0, 0.15);
+  EXPECT_EQ(summary({box}).rfind("box moves, seen in ", 0), 0u) << summary({box});
 }
 
 TEST(ClipDynamics, objectWithoutTextureHasNoEstimate) {

@@ -65,5 +65,43 @@ TEST(SupportContact, whatIsNotSeenTellsNothing) {
   EXPECT_EQ(measurements[4].strikes, 0.0);
 }
 
+// The range ends within the body in frame 5 and begins again before frame 7: what comes over a
+// step's edge in the air strikes nothing there.
+TEST(SupportContact, whatCrossesTheEndOfAPlaneDoesNotStrikeIt) {
+  SupportPlane step;
+  step.x_range = Eigen::Vector2d(0.0, 20.0);
+  auto observations = fall(0.0, 12);
+  for (int k = 0; k < 12; ++k)
+    observations[k].world_from_object.translation() = Eigen::Vector3d(0.6 * (k - 5.3), 0.0, 2.0);
+  for (const PoseMeasurement& m : noted({step}, observations)) EXPECT_LE(m.strikes, 0.0) << m.time;
+}
+
+TEST(SupportContact, whatIsBelowAPlaneDoesNotTouchIt) {
+  auto observations = fall(0.0, 6);
+  for (Observation& o : observations) o.world_from_object.translation().z() = -0.5;
+  for (const PoseMeasurement& m : noted({SupportPlane()}, observations)) {
+    EXPECT_LE(m.strikes, 0.0);
+    EXPECT_GT(m.falls, 0.0);
+  }
+}
+
+TEST(SupportContact, aPoseThatIsOnlyPredictedTouchesNothing) {
+  auto observations = fall(0.3, 12);
+  observations[3].found = false;
+  observations[3].world_from_object.translation().z() = 0.1;  // in the plane
+  const auto measurements = noted({SupportPlane()}, observations);
+  EXPECT_EQ(measurements[3].strikes, 0.0);
+  EXPECT_EQ(measurements[4].strikes, 0.0);
+}
+
+TEST(SupportContact, whatIsHeldDoesNotFall) {
+  ObjectModel hung = test::boxModel();
+  hung.attached = {0};
+  const auto observations = fall(0.3, 6);
+  auto measurements = measurementsOf(observations, Eigen::Vector3d::Zero());
+  noteContacts({SupportPlane()}, hung, observations, kGravity, measurements);
+  for (const PoseMeasurement& m : measurements) EXPECT_EQ(m.falls, 0.0);
+}
+
 }  // namespace
 }  // namespace calipso::flow

@@ -102,6 +102,19 @@ TEST(Trajectory, whatFallsIsPulledDownOnly) {
   EXPECT_NEAR(fit.states.front().velocity.y(), fit.states.back().velocity.y(), 0.04);
 }
 
+// That a collision is likely where it strikes something does not make it likelier than not.
+TEST(Trajectory, contactAloneIsNoEvidenceOfACollision) {
+  const auto collisions = [](double strikes) {
+    const auto position = [](double t) { return Eigen::Vector3d(t, 0.0, 0.0); };
+    auto data = measure(16, 0.002, 0.005, 4, position, still);
+    for (PoseMeasurement& m : data) m.strikes = strikes;
+    TrajectoryParams params;
+    params.least_evidence = 0.0;
+    return fitTrajectory(data, {}, testPrior(), params).collisions.size();
+  };
+  EXPECT_EQ(collisions(40.0), collisions(0.0));
+}
+
 // A bounce by 0.7 m/s in poses of 8 mm is found where the body is known to have struck something;
 // and what has struck nothing is not made to bounce by that.
 TEST(Trajectory, whatIsKnownOfTheSurroundingsTellsAWeakBounce) {
