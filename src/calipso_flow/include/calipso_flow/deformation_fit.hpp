@@ -13,10 +13,11 @@ namespace calipso::flow {
 struct DeformationParams {
   int spans = 3;               // control intervals along the longest axis
   double strain = 0.03;        // of a distance between neighbouring surface points
-  double sheet_strain = 0.05;  // the same of a thin sheet
+  double sheet_strain = 0.04;  // the same of a thin sheet
   // Of a sheet's controls within its plane, and besides, which is second order in how far it has
-  // left the plane, so many times the square of that over the diagonal.
-  double in_plane = 0.006, bent = 4.0;
+  // left the plane, so many times the square of that over the diagonal: what swings on an arm as
+  // long as the diagonal rises by half that square.
+  double in_plane = 0.006, bent = 1.0;
   double roughness = 0.2;    // second difference of neighbouring controls
   double innovation = 0.05;  // of a control point, from the constant-velocity prediction
   double anchor = 1e-3;      // of a point that is attached
