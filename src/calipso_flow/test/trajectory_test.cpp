@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "../src/piece_path.hpp"
 #include "calipso_flow/rotation.hpp"
 
 namespace calipso::flow {
@@ -100,6 +101,19 @@ TEST(Trajectory, whatFallsIsPulledDownOnly) {
   // The drift's mean velocity, 0.2 T = 0.07 m/s at most, at both ends; half a percent of g in between.
   for (const MotionState& s : fit.states) EXPECT_LT(std::abs(s.acceleration.y()), 0.1);
   EXPECT_NEAR(fit.states.front().velocity.y(), fit.states.back().velocity.y(), 0.04);
+}
+
+// After a cut nothing is known of what was before: two poses make no piece, as at the clip's start.
+TEST(Trajectory, noPieceOfTwoPosesBeginsAfterACut) {
+  const double cut = 9.5 / kFps, bend = 11.375 / kFps;
+  const auto position = [&](double t) -> Eigen::Vector3d {
+    return Eigen::Vector3d(2.0 * t - (t < bend ? 0.0 : 4.0 * (t - bend)), 0.0, 0.0);
+  };
+  const auto poses = measure(20, 0.0001, 0.0003, 3, position, still);
+  const auto pieces = likeliestPieces(poses, {cut}, testPrior(), 1.0, 8.0);
+  ASSERT_EQ(pieces.size(), 3u);
+  EXPECT_TRUE(pieces[1].cut);
+  EXPECT_GT(pieces[2].start, 12.0 / kFps);
 }
 
 // That a collision is likely where it strikes something does not make it likelier than not.
