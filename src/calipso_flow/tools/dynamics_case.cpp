@@ -69,7 +69,7 @@ std::string describe(const ClipCase& clip, size_t index, const ObjectDynamics& d
 std::vector<ObjectDynamics> analyse(const ClipCase& clip, Costs& costs) {
   const Scene& scene = clip.scene;
   DynamicsParams params;
-  params.supports = scene.planes;
+  params.supports = scene.onlySupports();
   ClipAnalyser analyser(makeFrame(0.0, clip.frame(0), scene.cameraAt(0)), clip.models, clip.masks,
                         scene.gravity, params);
   for (int k = 1; k < scene.frame_count; ++k) {

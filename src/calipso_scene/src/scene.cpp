@@ -171,6 +171,10 @@ Camera Scene::cameraAt(int k) const {
   return at;
 }
 
+std::vector<SupportPlane> Scene::onlySupports() const {
+  return support_meshes.empty() ? planes : std::vector<SupportPlane>();
+}
+
 const SceneObject& Scene::object(const std::string& wanted) const {
   std::string known;
   for (const auto& candidate : objects) {

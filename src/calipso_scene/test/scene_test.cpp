@@ -88,6 +88,13 @@ TEST(Scene, aGapAmongTheFramesIsNamed) {
   EXPECT_EQ(errorWith({}, "frames/%06d.jpg"), "");  // the frames can come from a bag
 }
 
+// What is clear of all planes would else be taken to fall.
+TEST(Scene, planesAreNotTheOnlySupportsBesideAMesh) {
+  const std::string yaml = kHead + kPose + kObject + "support:\n- {plane: [0, 0, 1, 0]}\n";
+  EXPECT_EQ(loadScene(writeScene(yaml)).onlySupports().size(), 1u);
+  EXPECT_TRUE(loadScene(writeScene(yaml + "- {mesh: deck.obj}\n")).onlySupports().empty());
+}
+
 TEST(Scene, aPointAheadProjectsToThePrincipalPoint) {
   const Camera camera = loadScene(writeScene(kHead + kPose + kObject)).camera;
   EXPECT_TRUE(camera.projectWorld({0, 3, 1}).isApprox(Eigen::Vector2d(31.5, 17.5), 1e-12));

@@ -17,7 +17,7 @@ namespace calipso::flow {
 struct DynamicsParams {
   TrackerParams tracker;
   TrajectoryParams trajectory;
-  std::vector<SupportPlane> supports;  // what things fall on
+  std::vector<SupportPlane> supports;  // all that holds things up; may be empty
   double rest_px = 0.3;                // image motion over a piece that tracking errors may explain
   double live_window = 3.0;      // s, looked back over live, for what needs more than one frame
   double cut_correlation = 0.5;  // successive pictures that agree less than this are cut apart

@@ -35,7 +35,7 @@ FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
           nh.advertise<sensor_msgs::Image>(topics::kFlow, params_.live ? kLiveQueue : kKeepAll)),
       markers_(nh),
       dense_flow_(params_.flow_preset) {
-  params_.dynamics.supports = scene_.planes;
+  params_.dynamics.supports = scene_.onlySupports();
   subscribers_ = {nh.subscribe(topics::kModels, 1, &FlowNode::onModels, this),
                   nh.subscribe(topics::kSegmentation, kKeepAll, &FlowNode::onSegmentation, this),
                   nh.subscribe(topics::kStatus, 100, &FlowNode::onStatus, this)};

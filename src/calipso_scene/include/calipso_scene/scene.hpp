@@ -57,6 +57,9 @@ struct Scene {
   // The camera as it stands at frame k; past the last pose it stays there.
   Camera cameraAt(int k) const;
 
+  // The planes, where they are all that objects stand on; none where a mesh holds objects up, too.
+  std::vector<SupportPlane> onlySupports() const;
+
   // @throw std::invalid_argument naming the object asked for and the ones there are
   const SceneObject& object(const std::string& name) const;
 };
