@@ -24,8 +24,8 @@ cv::Mat readImage(const std::string& path, int flags) {
   return image;
 }
 
-// Fits the low-order deformations only: what is to be told is where the contour is implausible. What
-// is attached somewhere cannot move as a whole.
+// Fits the low-order deformations only: what is to be told is where the contour is implausible.
+// What is attached somewhere cannot move as a whole.
 ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
                         const std::optional<DepthObservation>& depth) {
   AlignOptions options;
@@ -84,9 +84,7 @@ std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
   return targets;
 }
 
-cv::Mat loadKeyImage(const Scene& scene) {
-  return readImage(scene.framePath(0), cv::IMREAD_COLOR);
-}
+cv::Mat loadKeyImage(const Scene& scene) { return readImage(scene.framePath(0), cv::IMREAD_COLOR); }
 
 cv::Mat loadStrokes(const Scene& scene) {
   return scene.strokes_path.empty() ? cv::Mat()

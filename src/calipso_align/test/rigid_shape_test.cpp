@@ -158,7 +158,8 @@ TEST(RigidShape, KeepsWhatTheMaskHadBesides) {
   EXPECT_EQ(cv::countNonZero((shape.distance(part) < 0.0f) != (mask(part) > 0)), 0);
 }
 
-// Its surface may come to look otherwise, as by turning in the light: the outline says that it is there.
+// Its surface may come to look otherwise, as by turning in the light: the outline says that it is
+// there.
 TEST(RigidShape, IsKeptWhileItsOutlineIsPlainlyMet) {
   const PaintedPear pear;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();

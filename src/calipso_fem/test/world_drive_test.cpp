@@ -86,7 +86,8 @@ TEST(ObservedDrive, WhatIsNotEditedGoesOnAsInTheVideo) {
   const std::vector<double> lifts = liftsAfter([](World&) {});
   ASSERT_GT(lifts.size(), 30u);
   for (size_t k = 1; k < lifts.size(); ++k) {
-    // 8 %: the load found is spread as the mode is, and bends the end further than an even one does.
+    // 8 %: the load found is spread as the mode is, and bends the end further than an even one
+    // does.
     const double time = kTouched + k * kFramePeriod;
     EXPECT_NEAR(lifts[k], liftAt(time), 0.08 * kLift) << time;
   }
@@ -118,8 +119,8 @@ TEST(ObservedDrive, AWindOfTheUsersEndsIt) {
   EXPECT_NEAR(sum / static_cast<double>(still.size()), 0.0, 0.1 * kLift);
 }
 
-// A motion that no step can be solved for is not followed: the plate swings on without it, and the plan
-// says so.
+// A motion that no step can be solved for is not followed: the plate swings on without it, and the
+// plan says so.
 TEST(ObservedDrive, AMotionThatCannotBeFollowedEndsIt) {
   std::string reason;
   const std::vector<double> lifts = liftsAfter(

@@ -12,9 +12,9 @@ namespace calipso::flow {
 // and the log odds that they have to earn.
 constexpr double kContactShare = 0.3, kContactEvidence = 4.0;
 
-// Fewer frames in a piece tell nothing about its velocity. In the first and the last one of the clip
-// and at a cut nothing is known before or after: two poses are always explained by some velocity,
-// also when one is wrong.
+// Fewer frames in a piece tell nothing about its velocity. In the first and the last one of the
+// clip and at a cut nothing is known before or after: two poses are always explained by some
+// velocity, also when one is wrong.
 inline int leastFrames(bool first, bool last) { return first || last ? 3 : 2; }
 
 // Log of the odds by which a piece more must raise the likelihood that begins before a measurement.

@@ -10,7 +10,8 @@
 namespace calipso::flow {
 namespace {
 
-constexpr double kDropReach = 1.2;  // frames by which an instant may move when its neighbour is gone
+constexpr double kDropReach =
+    1.2;  // frames by which an instant may move when its neighbour is gone
 
 }  // namespace
 

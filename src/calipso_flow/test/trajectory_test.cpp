@@ -98,7 +98,8 @@ TEST(Trajectory, whatFallsIsPulledDownOnly) {
   for (PoseMeasurement& m : data) m.covariance(1, 1) = 0.01 * 0.01;  // in depth
   const Trajectory fit = fitTrajectory(data, {}, testPrior());
   ASSERT_EQ(fit.pieces.front().travel, Travel::kFreeFall);
-  // The drift's mean velocity, 0.2 T = 0.07 m/s at most, at both ends; half a percent of g in between.
+  // The drift's mean velocity, 0.2 T = 0.07 m/s at most, at both ends; half a percent of g in
+  // between.
   for (const MotionState& s : fit.states) EXPECT_LT(std::abs(s.acceleration.y()), 0.1);
   EXPECT_NEAR(fit.states.front().velocity.y(), fit.states.back().velocity.y(), 0.04);
 }

@@ -7,8 +7,9 @@
 
 namespace calipso::flow {
 
-// A clip as a second recording of the same scene would have it: other grain, another rough placement by hand.
-// What an estimate differs by from one such recording to the next rests on chance.
+// A clip as a second recording of the same scene would have it: other grain, another rough
+// placement by hand. What an estimate differs by from one such recording to the next rests on
+// chance.
 class Perturbation {
  public:
   // @param number  of the recording, which decides its grain and placement; 0: the clip as it is

@@ -75,7 +75,8 @@ std::vector<Eigen::Vector3d> surfaceVelocity(const TrueObject& truth, double fps
   }
   for (size_t k = 0; k < centre.size(); ++k) {
     const size_t before = k == 0 ? 0 : k - 1, after = std::min(k + 1, centre.size() - 1);
-    velocity.push_back((centre[after] - centre[before]) * fps / std::max<double>(after - before, 1));
+    velocity.push_back((centre[after] - centre[before]) * fps /
+                       std::max<double>(after - before, 1));
   }
   return velocity;
 }

@@ -90,8 +90,8 @@ bool agree(const EdgeCoverage::Pixel& pixel, std::uint32_t id) {
          EdgeCoverage::isOneSheet(cv::v_reduce_max(high), cv::v_reduce_min(low));
 }
 
-// Is a place hidden by another sheet? Its own sheet may turn away so fast that the pixel's centre is
-// as much nearer; but beyond its edge, in the pixel beside, that one hides nothing.
+// Is a place hidden by another sheet? Its own sheet may turn away so fast that the pixel's centre
+// is as much nearer; but beyond its edge, in the pixel beside, that one hides nothing.
 bool isHidden(const VisibilityBuffer& centre, const cv::Point& at, float nearness) {
   for (const cv::Point& to : {cv::Point(0, 0), {-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
     const cv::Point seen = at + to;

@@ -31,8 +31,8 @@ struct LightLevels {
 struct LightFactors {
   static constexpr int kMost = 64;
   float from_plate[kMost];  // part that is taken from the plate
-  // times the plate; times the frame's own pixel, which keeps its grain where it is darkened further
-  // or sees a little more sky: what the sun newly reaches must come from the plate
+  // times the plate; times the frame's own pixel, which keeps its grain where it is darkened
+  // further or sees a little more sky: what the sun newly reaches must come from the plate
   float now[3][kMost], change[3][kMost];
 };
 

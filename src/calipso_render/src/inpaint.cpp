@@ -139,8 +139,8 @@ void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
   smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
 }
 
-// Every pixel of a plane's hole as the chart's nearest one was filled: a sample of the picture, as far off along the
-// plane as that was copied from, and what was evened out there.
+// Every pixel of a plane's hole as the chart's nearest one was filled: a sample of the picture, as
+// far off along the plane as that was copied from, and what was evened out there.
 // @param wanted CV_8UC1, of the chart
 void copyBack(const PlanePart& part, const Filling& filled, const std::optional<Lattice>& lattice,
               const cv::Mat& wanted, const cv::Mat& hole, Canvas& canvas) {

@@ -54,7 +54,8 @@ CALIPSO_INLINE void toPlanes(const Eight& a, const Eight& b, const Eight& c, con
   planes[2] = __builtin_shuffle(__builtin_shuffle(r, r4, halves), in_order);
 }
 
-// Colours of eight places that lie within the image, by pairs. @pre 1 <= u < columns - 2, likewise v
+// Colours of eight places that lie within the image, by pairs. @pre 1 <= u < columns - 2, likewise
+// v
 CALIPSO_INLINE void sampleInside(const cv::Mat& image, const Eight& u, const Eight& v,
                                  Eight (&pairs)[4]) {
   const int step = static_cast<int>(image.step1());

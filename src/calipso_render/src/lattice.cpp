@@ -42,7 +42,8 @@ cv::Mat levelled(const cv::Mat& image, const cv::Mat& weight) {
   return (grey - sum / cv::max(weights, 1e-3)).mul(weight);
 }
 
-// Normalised correlation of a picture and itself shifted by up to kFarthest px, right or left and down.
+// Normalised correlation of a picture and itself shifted by up to kFarthest px, right or left and
+// down.
 class Correlation {
  public:
   Correlation(const cv::Mat& image, const cv::Mat& known) {
@@ -134,8 +135,8 @@ class Correlation {
   cv::Mat ncc_;  // CV_32FC1; row: v, column: u + kFarthest; -1: not known
 };
 
-// How well a pair of shifts and what they add up to repeats the picture: the worst of them. Below 0: not at all, or
-// already with halves of them.
+// How well a pair of shifts and what they add up to repeats the picture: the worst of them. Below
+// 0: not at all, or already with halves of them.
 float quality(const Correlation& c, const cv::Point2f& a, const cv::Point2f& b) {
   float worst = 1.0f, half = -1.0f;
   for (const cv::Point2f& x : {a, b, a + b, a - b}) {
@@ -174,8 +175,9 @@ float meanOf(const Correlation& c, const Lattice& lattice) {
              : 0.0f;
 }
 
-// The highest of the peaks that are no shifts of a lattice, to the correlation of the shift next to it: both fall with
-// the way where a picture only nearly repeats itself, and along lines that many shifts keep.
+// The highest of the peaks that are no shifts of a lattice, to the correlation of the shift next to
+// it: both fall with the way where a picture only nearly repeats itself, and along lines that many
+// shifts keep.
 float highestOff(const Correlation& c, const Lattice& lattice, const std::vector<Peak>& peaks) {
   float highest = 0.0f;
   for (const Peak& p : peaks) {
@@ -206,7 +208,8 @@ Lattice refined(const Correlation& c, const cv::Point2f& a, const cv::Point2f& b
   return {basis, basis.inv()};
 }
 
-// Mean difference from the picture one shift off, to all sides, of what is known; the mean of a small square.
+// Mean difference from the picture one shift off, to all sides, of what is known; the mean of a
+// small square.
 cv::Mat differenceFromShifted(const Lattice& lattice, const cv::Mat& image, const cv::Mat& weight) {
   cv::Mat grey, sum = cv::Mat::zeros(image.size(), CV_32F), weights = sum.clone();
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);

@@ -17,10 +17,10 @@ inline float quantileOf(const cv::Mat& values, const cv::Mat& mask, double share
     }
   }
   if (all.empty()) return 0.0f;
-  const auto at =
-      all.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(all.size()));
-  std::nth_element(all.begin(), at, all.end());
-  return *at;
+  const std::size_t below = static_cast<std::size_t>(share * static_cast<double>(all.size())),
+                    at = std::min(below, all.size() - 1);
+  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(at), all.end());
+  return all[at];
 }
 
 }  // namespace calipso::render

@@ -1,19 +1,17 @@
 #include "patch_fill.hpp"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "patch_cost.hpp"
 #include "patch_levels.hpp"
 
 namespace calipso::render {
 namespace {
 
-constexpr int kRadius = 3;  // px; patches are squares of 7
-constexpr int kSide = 2 * kRadius + 1;
 constexpr int kBandRows = 16;       // rows that one thread searches in order
 constexpr int kFirstGuesses = 200;  // places tried for a patch of the rim
 // px around the best place in which levels, and the finest, look further
@@ -23,12 +21,7 @@ constexpr int kSweeps = 2;  // of a search
 constexpr float kSettled = 0.05f;
 // times better than what continues a neighbour's copy a place beside it must be: pieces stay large
 constexpr float kJump = 1.6f;
-constexpr float kNearer = 2.5f;   // times that a source may be nearer or farther,
-constexpr float kHorizon = 6.0f;  // or px of height by which it may miss that
-// cost of one that does not, squared code values: such are taken for want of others only
-constexpr float kMisplaced = 2000.0f;
-constexpr float kAsNear = 1.02f;  // times that a place may be nearer than a source as near as it
-constexpr float kOffLattice = 0.75f;  // px by which a copy's way may miss the lattice
+constexpr float kHorizon = 6.0f;  // px of height by which a source may miss PatchCost's limits
 
 cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
 cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_cast<short>(p.y)}; }
@@ -42,24 +35,19 @@ class Filling {
           const InpaintParams& params)
       : image_(level.image.clone()),
         hole_(level.hole),
-        nearness_(level.nearness),
-        surface_(level.surface),
-        has_nearness_(!nearness_.empty()),
-        has_surface_(!surface_.empty()),
         scale_(scale),
-        horizon_(horizon),
-        lattice_(lattice),
+        rules_(level, scale, horizon, lattice, params),
         params_(params),
         to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
         cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)),
         bands_((hole_.rows + kBandRows - 1) / kBandRows) {
-    const cv::Mat patch = cv::Mat::ones(kSide, kSide, CV_8U);
+    const cv::Mat patch = cv::Mat::ones(kPatchSide, kPatchSide, CV_8U);
     cv::Mat touched;
     cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
     cv::findNonZero(whole_, sources_);
     cv::dilate(hole_, touched, patch);
-    for (int v = kRadius; v + kRadius < hole_.rows; ++v) {
-      for (int u = kRadius; u + kRadius < hole_.cols; ++u) {
+    for (int v = kPatchRadius; v + kPatchRadius < hole_.rows; ++v) {
+      for (int u = kPatchRadius; u + kPatchRadius < hole_.cols; ++u) {
         if (touched.at<std::uint8_t>(v, u) != 0) bands_[v / kBandRows].emplace_back(u, v);
       }
     }
@@ -118,7 +106,7 @@ class Filling {
     std::vector<int> changes(bands_.size(), 0);
     forEachPatch([&](const cv::Point& p) {
       if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(anySource(p, 0));
-      cost_.at<float>(p) = distance(p, match(p), 1e30f);
+      cost_.at<float>(p) = rules_.distance(image_, p, match(p), 1e30f);
     });
     for (int s = 0; s < kSweeps; ++s) {
       ++sweep_;
@@ -195,8 +183,8 @@ class Filling {
 
   // The nearest centre of a patch that lies within the picture.
   cv::Point centreFor(const cv::Point& p) const {
-    return {std::clamp(p.x, kRadius, hole_.cols - 1 - kRadius),
-            std::clamp(p.y, kRadius, hole_.rows - 1 - kRadius)};
+    return {std::clamp(p.x, kPatchRadius, hole_.cols - 1 - kPatchRadius),
+            std::clamp(p.y, kPatchRadius, hole_.rows - 1 - kPatchRadius)};
   }
 
   template <typename Do>
@@ -217,7 +205,7 @@ class Filling {
       }
       for (int r = reach; r >= 1; r /= 2) {
         const cv::Point q = match(p) + jitter(p, r, r);
-        attempt(p, lattice_ == nullptr ? q : onLattice(p, q), kJump);
+        attempt(p, rules_.onLattice(p, q), kJump);
       }
       changed += match(p) != before;
     }
@@ -228,7 +216,7 @@ class Filling {
   void attempt(const cv::Point& p, const cv::Point& q, float better) {
     if (!isWhole(q)) return;
     float& least = cost_.at<float>(p);
-    const float cost = better * distance(p, q, least / better);
+    const float cost = better * rules_.distance(image_, p, q, least / better);
     if (cost < least) least = cost, to_.at<cv::Vec2s>(p) = shorts(q);
   }
 
@@ -240,15 +228,16 @@ class Filling {
   };
 
   void attempt(const cv::Point& p, cv::Point q, Guess& guess) const {
-    if (lattice_ != nullptr) q = onLattice(p, q);
-    const float cost = isWhole(q) ? partialDistance(p, q, guess.seen, guess.least) : guess.least;
+    q = rules_.onLattice(p, q);
+    const float cost =
+        isWhole(q) ? rules_.partialDistance(image_, p, q, guess.seen, guess.least) : guess.least;
     if (cost < guess.least) guess.least = cost, guess.best = q;
   }
 
   // Among places all over the picture.
   Guess firstGuess(const cv::Point& p, const cv::Mat& known) const {
     Guess guess{knownAround(p, known), anySource(p, 0), 0.0f};
-    guess.least = partialDistance(p, guess.best, guess.seen, 1e30f);
+    guess.least = rules_.partialDistance(image_, p, guess.best, guess.seen, 1e30f);
     for (int i = 1; i < kFirstGuesses; ++i) attempt(p, anySource(p, i), guess);
     return guess;
   }
@@ -271,8 +260,8 @@ class Filling {
   // What is known of the patch around a place, from it.
   static std::vector<cv::Point> knownAround(const cv::Point& p, const cv::Mat& known) {
     std::vector<cv::Point> seen;
-    for (int dv = -kRadius; dv <= kRadius; ++dv) {
-      for (int du = -kRadius; du <= kRadius; ++du) {
+    for (int dv = -kPatchRadius; dv <= kPatchRadius; ++dv) {
+      for (int du = -kPatchRadius; du <= kPatchRadius; ++du) {
         if (known.at<std::uint8_t>(p + cv::Point(du, dv)) != 0) seen.push_back({du, dv});
       }
     }
@@ -282,8 +271,8 @@ class Filling {
   cv::Vec4f meanVote(const cv::Point& pixel, const cv::Mat& weights) const {
     cv::Vec4f sum;
     float total = 0.0f;
-    for (int dv = -kRadius; dv <= kRadius; ++dv) {
-      for (int du = -kRadius; du <= kRadius; ++du) {
+    for (int dv = -kPatchRadius; dv <= kPatchRadius; ++dv) {
+      for (int du = -kPatchRadius; du <= kPatchRadius; ++du) {
         const cv::Point centre = pixel + cv::Point(du, dv);
         const float w = inside(centre) ? weights.at<float>(centre) : 0.0f;
         if (w > 0.0f)
@@ -291,63 +280,6 @@ class Filling {
       }
     }
     return total > 0.0f ? cv::Vec4f(sum / total) : image_.at<cv::Vec4f>(pixel);
-  }
-
-  // Places are layered: what is at another height is seldom the same, what is of another surface
-  // never.
-  float awayCost(const cv::Point& p, const cv::Point& q) const {
-    float cost = scale_ * (params_.away_row * std::abs(p.y - q.y) +
-                           params_.away_column * std::abs(p.x - q.x));
-    if (has_nearness_) {
-      const float own = nearness_.at<float>(p), other = nearness_.at<float>(q);
-      if (other > kNearer * own + horizon_ || own > kNearer * other + horizon_) cost += kMisplaced;
-      if (params_.away_farther > 0.0f && own > kAsNear * other && other > 0.0f)
-        cost += params_.away_farther * (own / other - kAsNear);
-    }
-    if (has_surface_) {
-      const std::uint8_t own = surface_.at<std::uint8_t>(p), other = surface_.at<std::uint8_t>(q);
-      if (own != 0 && other != 0 && own != other) cost += kMisplaced;
-    }
-    if (lattice_ != nullptr && offLattice(q - p) > kOffLattice) cost += kMisplaced;
-    return kSide * kSide * cost;
-  }
-
-  // px of this level by which a shift misses the lattice
-  float offLattice(const cv::Point& shift) const {
-    const cv::Point2f fine = scale_ * cv::Point2f(shift);
-    return static_cast<float>(cv::norm(fine - lattice_->nearest(fine))) / scale_;
-  }
-  // The shift of the lattice that is nearest to the way to a place.
-  cv::Point onLattice(const cv::Point& p, const cv::Point& q) const {
-    const cv::Point2f whole = lattice_->nearest(scale_ * cv::Point2f(q - p));
-    return p + cv::Point(cvRound(whole.x / scale_), cvRound(whole.y / scale_));
-  }
-
-  float distance(const cv::Point& p, const cv::Point& q, float bound) const {
-    using Row = Eigen::Map<const Eigen::Array<float, 4 * kSide, 1>>;
-    float sum = awayCost(p, q);
-    for (int dv = -kRadius; dv <= kRadius && sum < bound; ++dv) {
-      const Row a(image_.ptr<float>(p.y + dv) + 4 * (p.x - kRadius)),
-          b(image_.ptr<float>(q.y + dv) + 4 * (q.x - kRadius));
-      sum += (a - b).square().sum();
-    }
-    return sum;
-  }
-
-  // Of what is known. No less than `bound` if it is not below.
-  float partialDistance(const cv::Point& p, const cv::Point& q, const std::vector<cv::Point>& seen,
-                        float bound) const {
-    using Pixel = Eigen::Map<const Eigen::Array4f>;
-    const float away = awayCost(p, q),
-                part = static_cast<float>(kSide * kSide) / std::max<std::size_t>(1, seen.size());
-    Eigen::Array4f sums = Eigen::Array4f::Zero();
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      if (i % kSide == 0 && part * sums.sum() + away >= bound) return bound;
-      const Eigen::Array4f difference = Pixel(image_.at<cv::Vec4f>(p + seen[i]).val) -
-                                        Pixel(image_.at<cv::Vec4f>(q + seen[i]).val);
-      sums += difference.square();
-    }
-    return part * sums.sum() + away;
   }
 
   cv::Point jitter(const cv::Point& p, int salt, int reach) const {
@@ -364,11 +296,9 @@ class Filling {
     return h;
   }
 
-  cv::Mat image_, hole_, nearness_, surface_,
-      whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
-  bool has_nearness_, has_surface_;
-  float scale_, horizon_;   // size of these pixels in the finest level's
-  const Lattice* lattice_;  // may be nullptr
+  cv::Mat image_, hole_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
+  float scale_;                   // size of these pixels in the finest level's
+  PatchCost rules_;
   InpaintParams params_;
   cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows

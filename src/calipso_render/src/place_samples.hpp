@@ -17,9 +17,7 @@ class PlaceSamples {
   PlaceSamples(const std::vector<ClipFrame>& frames, int margin);
 
   // Does frame i show the place itself?
-  bool shows(std::size_t i, int u, int v) const {
-    return covered_[i].at<std::uint8_t>(v, u) == 0;
-  }
+  bool shows(std::size_t i, int u, int v) const { return covered_[i].at<std::uint8_t>(v, u) == 0; }
   // Of the frames that do.
   Samples at(int u, int v) const;
 
@@ -38,8 +36,8 @@ bool dropShaded(double step, Samples& values);
 // Leaves out the darker of the two groups that the values fall into best.
 void keepBrighter(Samples& values);
 
-// Median per channel, then the mean of what lies around it. @param spread out: the largest channel's
-// median absolute deviation. @pre values is not empty
+// Median per channel, then the mean of what lies around it. @param spread out: the largest
+// channel's median absolute deviation. @pre values is not empty
 cv::Vec3f robustMean(const Samples& values, float& spread);
 
 }  // namespace calipso::render

@@ -9,12 +9,14 @@ namespace {
 
 // times that what a chart shows may be nearer or farther than the middle of the hole
 constexpr double kNearer = 1.8;
-// times that the nearest of the hole must be as near as the farthest for the way it is seen to matter
+// times that the nearest of the hole must be as near as the farthest for the way it is seen to
+// matter
 constexpr double kTilted = 1.08;
 constexpr int kLargest = 900;  // px of a chart's side
 constexpr int kBorder = 4;     // px around what is charted
 
-// The affine map after which `to_plane` leaves pixel c where it is, and the picture around it as it is.
+// The affine map after which `to_plane` leaves pixel c where it is, and the picture around it as it
+// is.
 cv::Matx33d keeping(const cv::Matx33d& to_plane, const cv::Point2d& c) {
   const cv::Vec3d x = to_plane * cv::Vec3d(c.x, c.y, 1.0);
   cv::Matx22d J;

@@ -5,9 +5,9 @@
 
 namespace calipso::render {
 
-// A part of a plane of the place as a picture in which all of it is seen alike: the homography to the plane, and the
-// affine map after which the middle of a hole keeps its place and its scale. Every shift of the plane is a shift of
-// this picture.
+// A part of a plane of the place as a picture in which all of it is seen alike: the homography to
+// the plane, and the affine map after which the middle of a hole keeps its place and its scale.
+// Every shift of the plane is a shift of this picture.
 struct PlaneChart {
   cv::Matx33d to_chart, to_picture;  // pixels to pixels, homogeneous
   cv::Size size;

@@ -76,14 +76,15 @@ cv::Mat seenPast(const PlaceEvidence& e) {
 // Where the key frame shows support planes, the relief, and neither.
 struct SeenPlace {
   cv::Mat off_planes;  // CV_8UC1: 255 where something else than a support plane is seen
-  // ... what is neither plane nor relief, or curved, which has no like to be filled from: gives up no shadow
+  // ... what is neither plane nor relief, or curved, which has no like to be filled from: gives up
+  // no shadow
   cv::Mat blind;
   cv::Mat surface;  // CV_8UC1: PlaceSurfaces::label; may be empty
   int planes = 0;   // of the surfaces, from 1 on
 };
 
-// Where shadows leave a trace, with the predictions' errors: on the surfaces that they fall on, not on
-// what stands before these.
+// Where shadows leave a trace, with the predictions' errors: on the surfaces that they fall on, not
+// on what stands before these.
 cv::Mat shadeTraces(const SeenShadows& shadows, const SeenPlace& place,
                     const RenderParams& params) {
   const cv::Mat shaded = shadows.sun | shadows.sky;

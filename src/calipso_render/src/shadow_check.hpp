@@ -18,8 +18,8 @@ struct SeenShadows {
   bool none = false;  // there are predictions, and all of them were refuted
 };
 
-// CV_8UC1: 255 where so little of sun or sky is seen that a picture tells. @param sun, sky CV_32FC1,
-// visible part of them, 0..1
+// CV_8UC1: 255 where so little of sun or sky is seen that a picture tells. @param sun, sky
+// CV_32FC1, visible part of them, 0..1
 cv::Mat isShaded(const cv::Mat& sun, const cv::Mat& sky);
 
 // @param sun, sky CV_32FC1, visible part of them, 0..1, as predicted

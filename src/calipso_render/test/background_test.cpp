@@ -114,8 +114,8 @@ TEST(InventBackground, FillsOnlyTheHole) {
   }
 }
 
-// Water below row 38. What passes has a red rim that its mask misses, and at the key frame it touches
-// what is hidden all the time; the margin covers the rim.
+// Water below row 38. What passes has a red rim that its mask misses, and at the key frame it
+// touches what is hidden all the time; the margin covers the rim.
 TEST(InventBackground, CopiesNoRimThatTheMarginCovers) {
   const cv::Rect hidden(80, 40, 20, 40);
   constexpr int kRim = 14, kShore = 38;

@@ -61,15 +61,24 @@ TEST(PixelFormat, WritesOnlyChangedPixelsAndKeepsAlpha) {
   }
 }
 
-TEST(Noise, EstimatesWhatWasAdded) {
+// Four pictures of 120 x 120 px with noise of 3 code values about 100.
+// @param draw what frame k holds besides: (k, picture)
+template <typename Draw>
+std::vector<cv::Mat> noisyFrames(Draw draw) {
   cv::RNG random(3);
   std::vector<cv::Mat> frames;
   for (int k = 0; k < 4; ++k) {
     cv::Mat noise(120, 120, CV_32FC3), frame;
     random.fill(noise, cv::RNG::NORMAL, 100.0, 3.0);
+    draw(k, noise);
     noise.convertTo(frame, CV_8U);
     frames.push_back(frame);
   }
+  return frames;
+}
+
+TEST(Noise, EstimatesWhatWasAdded) {
+  const std::vector<cv::Mat> frames = noisyFrames([](int, cv::Mat&) {});
   const std::vector<cv::Mat> everywhere(4, cv::Mat(120, 120, CV_8U, cv::Scalar(255)));
   EXPECT_NEAR(NoiseModel::estimate(frames, everywhere).deviation(1, 100.0f), 3.0f,
               0.3f);  // 10 %: sampling
@@ -79,15 +88,9 @@ TEST(Noise, EstimatesWhatWasAdded) {
 
 // A white ball that flies by, unknown to the masks, shows the camera's brightest colours alone.
 TEST(Noise, IsNotWhatMoves) {
-  cv::RNG random(3);
-  std::vector<cv::Mat> frames;
-  for (int k = 0; k < 4; ++k) {
-    cv::Mat noise(120, 120, CV_32FC3), frame;
-    random.fill(noise, cv::RNG::NORMAL, 100.0, 3.0);
-    cv::circle(noise, {20 + 25 * k, 60}, 10, cv::Scalar::all(250.0), -1);
-    noise.convertTo(frame, CV_8U);
-    frames.push_back(frame);
-  }
+  const std::vector<cv::Mat> frames = noisyFrames([](int k, cv::Mat& picture) {
+    cv::circle(picture, {20 + 25 * k, 60}, 10, cv::Scalar::all(250.0), -1);
+  });
   const std::vector<cv::Mat> everywhere(4, cv::Mat(120, 120, CV_8U, cv::Scalar(255)));
   // Five knots from 96 on: 1.25^5 = 3.05 times 3; the passing itself has 90.
   EXPECT_LT(NoiseModel::estimate(frames, everywhere).deviation(1, 250.0f), 10.0f);

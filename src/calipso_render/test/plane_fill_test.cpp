@@ -38,7 +38,8 @@ cv::Mat tiles(const cv::Matx33d& to_plane) {
   return image + grain;
 }
 
-// Turned by 0.3 rad, 30 px to a tile, upright or twice as near at the lower border as at the upper one.
+// Turned by 0.3 rad, 30 px to a tile, upright or twice as near at the lower border as at the upper
+// one.
 cv::Matx33d seenFrom(bool tilted) {
   const double c = std::cos(0.3) / 30.0, s = std::sin(0.3) / 30.0;
   return cv::Matx33d(c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0) *
@@ -127,8 +128,8 @@ double missOfTiles(bool tilted, bool plane_known) {
   return cv::mean(difference, hole)[0];
 }
 
-// The grain alone differs by 2.3 (two of deviation 2); joints, 15 % of the place, by 120 code values, along whose rims a
-// tenth of a pixel is 12.
+// The grain alone differs by 2.3 (two of deviation 2); joints, 15 % of the place, by 120 code
+// values, along whose rims a tenth of a pixel is 12.
 TEST(Inpaint, GoesOnWithTilesAsTheyAreSeen) {
   EXPECT_LT(missOfTiles(true, true), 6.0);
   EXPECT_LT(missOfTiles(false, true), 5.0);

@@ -5,8 +5,8 @@
 namespace calipso::fem {
 namespace {
 
-// 1/s, omega^2 h + 2 omega: at 60 steps a second omega is 2 pi 8 Hz. What is slower is followed; what
-// wavers faster, as the tracking does, is hardly.
+// 1/s, omega^2 h + 2 omega: at 60 steps a second omega is 2 pi 8 Hz. What is slower is followed;
+// what wavers faster, as the tracking does, is hardly.
 constexpr double kLead = 143.0;
 // Residual over loads and inner forces: the next step makes up for it.
 constexpr double kTolerance = 1e-2;

@@ -238,8 +238,8 @@ Vec World::Impl::nodalModes(const Actor& actor, const Vec& amplitudes) const {
   return actor.soft->nodalField(field);
 }
 
-// Its modes tell a shape that the material may resist, as by being stretched: led along the motion for
-// a while, it is in one of its own when it is let go.
+// Its modes tell a shape that the material may resist, as by being stretched: led along the motion
+// for a while, it is in one of its own when it is let go.
 void World::Impl::deformAsObserved(Actor& actor) {
   const double step = params.frame_period / params.max_substeps;
   const int steps = static_cast<int>(std::min(kRunUp, now - actor.track.begin()) / step);

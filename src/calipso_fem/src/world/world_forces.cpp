@@ -14,8 +14,8 @@ constexpr double kFramesAhead = 2.5;  // for which a deforming object's motion i
 
 }  // namespace
 
-// Leads the twin on for h (s) of its own time. After the last frame known the amplitudes go on as they
-// last did; longer nothing is known of them.
+// Leads the twin on for h (s) of its own time. After the last frame known the amplitudes go on as
+// they last did; longer nothing is known of them.
 Vec World::Impl::driveTo(Actor& actor, double to, double h) {
   ObservedMotion seen = actor.track.at(to);
   const double beyond = std::max(0.0, to - seen.time);

@@ -79,8 +79,8 @@ class EdgeCoverage {
   struct Piece;
 
   void choose(int column, int row);  // region coordinates
-  void addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q, const VisibilityBuffer& centre,
-                  std::vector<cv::Point>& crossed) const;
+  void addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q,
+                  const VisibilityBuffer& centre, std::vector<cv::Point>& crossed) const;
   void addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id,
                  std::vector<Piece>& pieces) const;
   int slotAt(int column, int row) const {

@@ -13,7 +13,8 @@ struct InpaintParams {
   float away_row = 6.0f,
         away_column =
             0.2f;  // what a px of way to the source counts, squared code values: places are layered
-  // squared code values per unit by which a place is nearer than the source, over that: what is farther has less detail
+  // squared code values per unit by which a place is nearer than the source, over that: what is
+  // farther has less detail
   float away_farther = 0.0f;
   std::uint32_t seed = 1;
   // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the horizon. What is
@@ -24,11 +25,13 @@ struct InpaintParams {
   cv::Mat surface;
   // CV_8UC1, may be empty: != 0 where a surface that is hidden is known to go on.
   cv::Mat sure;
-  // Of surface k + 1, the homography from pixels to its own coordinates, the third of them its nearness (1/m): copies
-  // within it are shifted along it. May be empty; of surfaces without one none.
+  // Of surface k + 1, the homography from pixels to its own coordinates, the third of them its
+  // nearness (1/m): copies within it are shifted along it. May be empty; of surfaces without one
+  // none.
   std::vector<cv::Matx33d> planes;
-  int supports =
-      0;  // the first so many of them are what things stand on; along others only what repeats itself is shifted
+  // The first so many of them are what things stand on; along others only what repeats itself is
+  // shifted.
+  int supports = 0;
 };
 
 struct InpaintResult {

@@ -90,8 +90,8 @@ inline Eigen::Vector3f mirroredIn(const Eigen::Vector3f& n, const Eigen::Vector3
   return 2.0f * n.dot(view) * n - view;
 }
 
-// Part of the sky that a surface mirrors from unit direction w; where its object hides it, what that
-// throws back for it.
+// Part of the sky that a surface mirrors from unit direction w; where its object hides it, what
+// that throws back for it.
 inline float skyMirrored(const SkySeen& seen, const Eigen::Vector3f& w) {
   constexpr float kNone = 1e-3f;
   const float open = seen.openTowards(w), hidden = 1.0f - seen.open;
@@ -99,8 +99,8 @@ inline float skyMirrored(const SkySeen& seen, const Eigen::Vector3f& w) {
   return open + (1.0f - open) * kThrownBack * std::min(1.0f, back);
 }
 
-// Part of the sun's light that reaches a point by way of its object, per unit of reflectance: by the
-// sun's own harmonics of bands 0 and 1 over the hemisphere.
+// Part of the sun's light that reaches a point by way of its object, per unit of reflectance: by
+// the sun's own harmonics of bands 0 and 1 over the hemisphere.
 inline float sunThrown(const SkySeen& seen, const Eigen::Vector3f& to_sun) {
   return std::max(0.0f, 0.25f * seen.thrown + 0.5f * seen.thrown_towards.dot(to_sun));
 }

@@ -115,7 +115,8 @@ void compareScene(const std::string& scene, const Options& options) {
 }  // namespace calipso::render
 
 // Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only drawing_live|
-// drawing_live_no_cast_shadow|drawing_final|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per case.
+// drawing_live_no_cast_shadow|drawing_final|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per
+// case.
 int main(int argc, char** argv) {
   using namespace calipso::render;
   cv::utils::logging::setLogLevel(

@@ -20,7 +20,8 @@ struct TriangleMesh {
 // @throw std::runtime_error naming the file, what is wrong in it and the remedy
 TriangleMesh loadMesh(const std::string& path);
 
-// Writes an OBJ file with every digit; loadMesh() repairs faces when it reads it. @throw std::runtime_error
+// Writes an OBJ file with every digit; loadMesh() repairs faces when it reads it. @throw
+// std::runtime_error
 void saveObj(const TriangleMesh& mesh, const std::string& path);
 
 // Length of the bounding box's diagonal, m.
