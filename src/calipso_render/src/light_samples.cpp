@@ -112,36 +112,39 @@ cv::Vec3f colourBelow(const View& view, const std::vector<SupportPlane>& planes)
   return cv::Vec3f(sum / mean);
 }
 
-RayScene sceneOf(const View& view) {
+// @param which of its objects, one for each
+RayScene sceneOf(const View& view, const std::vector<bool>& which) {
   std::vector<Occluder> occluders;
-  for (const Actor& a : view.actors)
-    occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+  for (std::size_t i = 0; i < view.actors.size(); ++i) {
+    const Actor& a = view.actors[i];
+    if (which[i]) occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+  }
   return RayScene(occluders);
 }
 
 using Scenes = std::shared_ptr<std::vector<RayScene>>;
 
-// Shadows of what moves, against the place without them.
-void addPassingShadows(const std::shared_ptr<std::vector<ShadowClue>>& clues, const Scenes& scenes,
-                       LightEvidence& evidence) {
-  evidence.shadow_misfit = [scenes, clues](const Eigen::Vector3f& l) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < clues->size(); ++i) sum += (*clues)[i].misfit((*scenes)[i], l);
-    return sum;
-  };
-  for (const ShadowClue& clue : *clues) {
-    const std::vector<Eigen::Vector3f> more = clue.candidates();
-    evidence.shadow_candidates.insert(evidence.shadow_candidates.end(), more.begin(), more.end());
-  }
-}
-
-// Shadows that stay, by their outlines in the key frame.
-void addRestingShadows(const std::shared_ptr<ShadowContrast>& contrast, const Scenes& scenes,
-                       LightEvidence& evidence) {
+// Shadows of what leaves its place, against the place without them; those that stay, by their
+// outlines in the key frame.
+void addShadows(const std::vector<View>& views, const std::vector<bool>& leave,
+                const std::vector<SupportPlane>& planes, const EmptyPlace& place,
+                const Scenes& scenes, LightEvidence& evidence) {
+  const auto contrast = std::make_shared<ShadowContrast>(views.front(), planes, place.depth);
+  evidence.shadow_candidates = contrast->candidates(scenes->front());
   evidence.shadow_misfit = [scenes, contrast](const Eigen::Vector3f& l) {
     return contrast->misfit(scenes->front(), l);
   };
-  evidence.shadow_candidates = contrast->candidates(scenes->front());
+  if (std::find(leave.begin(), leave.end(), true) == leave.end()) return;
+  const auto passing = std::make_shared<ShadowClue>(views, leave, planes, place);
+  if (!passing->plateKnown()) return;
+  const auto leaving = std::make_shared<std::vector<RayScene>>();
+  for (const View& view : views) leaving->push_back(sceneOf(view, leave));
+  const std::vector<Eigen::Vector3f> more = passing->candidates();
+  evidence.shadow_candidates.insert(evidence.shadow_candidates.end(), more.begin(), more.end());
+  evidence.shadow_misfit = [outlines = evidence.shadow_misfit, leaving,
+                            passing](const Eigen::Vector3f& l) {
+    return outlines(l) + passing->misfit(*leaving, l);
+  };
 }
 
 }  // namespace
@@ -168,19 +171,13 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
   evidence.samples = lightSamples(views, moves, evidence.clusters);
   evidence.below = colourBelow(views.front(), planes);
   const auto scenes = std::make_shared<std::vector<RayScene>>();
-  for (const View& view : views) scenes->push_back(sceneOf(view));
+  for (const View& view : views)
+    scenes->push_back(sceneOf(view, std::vector<bool>(moves.size(), true)));
   evidence.visible = [scenes](const LightSample& s, const Eigen::Vector3f& l) {
     return (*scenes)[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
   };
-  const auto clues = std::make_shared<std::vector<ShadowClue>>();
-  if (!planes.empty()) {
-    for (const View& view : views) clues->emplace_back(view, planes, plate);
-  }
-  if (std::any_of(clues->begin(), clues->end(), [](const ShadowClue& c) { return c.plateKnown(); }))
-    addPassingShadows(clues, scenes, evidence);
-  else
-    addRestingShadows(std::make_shared<ShadowContrast>(views.front(), planes, depth), scenes,
-                      evidence);
+  addShadows(views, leavers(views.front(), moves, plate), planes,
+             {views.front().camera, plate, depth}, scenes, evidence);
   evidence.gloss = [&views, moves, samples = evidence.samples,
                     visible = evidence.visible](const LightFit& fit) {
     const std::vector<HighlightSample> highlights =
