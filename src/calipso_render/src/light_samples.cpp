@@ -129,8 +129,11 @@ using Scenes = std::shared_ptr<std::vector<RayScene>>;
 void addShadows(const std::vector<View>& views, const std::vector<bool>& leave,
                 const std::vector<SupportPlane>& planes, const EmptyPlace& place,
                 const Scenes& scenes, LightEvidence& evidence) {
-  const auto contrast = std::make_shared<ShadowContrast>(views.front(), planes, place.depth);
-  evidence.shadow_candidates = contrast->candidates(scenes->front());
+  evidence.shadow_candidates =
+      ShadowContrast(views.front(), planes, place.depth, ShadowContrast::kCoarse)
+          .candidates(scenes->front());
+  const auto contrast =
+      std::make_shared<ShadowContrast>(views.front(), planes, place.depth, ShadowContrast::kFine);
   evidence.shadow_misfit = [scenes, contrast](const Eigen::Vector3f& l) {
     return contrast->misfit(scenes->front(), l);
   };

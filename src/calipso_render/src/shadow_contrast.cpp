@@ -10,17 +10,16 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kCellsAcross = 80;  // of the picture
-constexpr double kScale = 2.5;    // cells, deviation of the weights around one
-constexpr int kSupport = 8;       // cells to which they reach
-constexpr int kMaskMargin = 5;    // px around the masks that are left out: mixed pixels
-constexpr float kReach = 6.0f;    // radii of the objects in which their shadow is looked for
-constexpr int kFlatReach = 4;     // px on either side of a pixel between which its surface is flat,
-constexpr float kFlat = 0.02f;    // but for this part of its distance
-constexpr int kGroups = 4, kFewest = 50;
+constexpr double kReachAround = 0.1;  // of the picture's width: up to there others are around
+constexpr double kScale = 0.3125;     // of that, deviation of their weights
+constexpr int kMaskMargin = 5;        // px around the masks that are left out: mixed pixels
+constexpr float kReach = 6.0f;        // radii of the objects in which their shadow is looked for
+constexpr int kFlatReach = 4;   // px on either side of a pixel between which its surface is flat,
+constexpr float kFlat = 0.02f;  // but for this part of its distance
+constexpr int kGroups = 4, kFewest = 50;                  // groups; cells
 constexpr float kDarkest = 0.02f;                         // linear; added before the logarithm
 constexpr double kLeastDeviation = 0.015, kCapped = 3.0;  // of y', and of those the most that count
-constexpr double kAlike = 6.5;                            // so many cells err alike
+constexpr double kAlike = 0.1;                            // of the reach's square err alike
 constexpr float kLift = 0.004f;                           // radii by which rays start off a surface
 constexpr int kDirections = 800;
 constexpr std::size_t kCandidates = 6;
@@ -43,13 +42,6 @@ float darknessOf(const cv::Vec3f& code) {
   return -std::log(luminance(linear) + kDarkest);
 }
 
-cv::Mat meansAround(const cv::Mat& values) {
-  cv::Mat out;
-  const int side = 2 * kSupport + 1;
-  cv::GaussianBlur(values, out, {side, side}, kScale, kScale, cv::BORDER_CONSTANT);
-  return out;
-}
-
 // Variance of what is normally distributed but for few.
 double robustVariance(const cv::Mat& values, const cv::Mat& where) {
   std::vector<float> sizes;
@@ -66,8 +58,9 @@ double robustVariance(const cv::Mat& values, const cv::Mat& where) {
 }  // namespace
 
 ShadowContrast::ShadowContrast(const View& view, const std::vector<SupportPlane>& planes,
-                               const cv::Mat& depth)
-    : step_(std::max(1, view.picture.cols / kCellsAcross)) {
+                               const cv::Mat& depth, int cells_across)
+    : step_(std::max(1, view.picture.cols / cells_across)),
+      reach_(std::max(1, cvRound(kReachAround * view.picture.cols / step_))) {
   Eigen::AlignedBox3f box;
   for (const Actor& a : view.actors) {
     for (const Eigen::Vector3f& p : a.vertices) box.extend(p);
@@ -141,6 +134,14 @@ void ShadowContrast::groupByColour(const cv::Mat& smooth) {
   }
 }
 
+cv::Mat ShadowContrast::meansAround(const cv::Mat& values) const {
+  cv::Mat out;
+  const int side = 2 * reach_ + 1;
+  const double deviation = kScale * reach_;
+  cv::GaussianBlur(values, out, {side, side}, deviation, deviation, cv::BORDER_CONSTANT);
+  return out;
+}
+
 cv::Mat ShadowContrast::lessGroupMeans(const cv::Mat& values) const {
   cv::Mat out = cv::Mat::zeros(values.size(), CV_32F);
   for (const Group& g : groups_) {
@@ -171,8 +172,7 @@ cv::Rect ShadowContrast::cast(const RayScene& objects, const Eigen::Vector3f& l,
     }
   }
   if (box.empty()) return box;
-  box = cv::Rect(box.x - kSupport, box.y - kSupport, box.width + 2 * kSupport,
-                 box.height + 2 * kSupport);
+  box = cv::Rect(box.x - reach_, box.y - reach_, box.width + 2 * reach_, box.height + 2 * reach_);
   return box & cv::Rect({0, 0}, hidden.size());
 }
 
@@ -187,7 +187,7 @@ double ShadowContrast::misfit(const RayScene& objects, const Eigen::Vector3f& l)
     const cv::Mat x = (own - meansAround(own).mul(g.per_weight(box))).mul(member);
     xx += x.dot(x), xy += x.dot(darkness_(box));
   }
-  return xx > 1e-6 && xy > 0.0 ? -0.5 * xy * xy / (xx * variance_ * kAlike) : 0.0;
+  return xx > 1e-6 && xy > 0.0 ? -0.5 * xy * xy / (xx * variance_ * kAlike * reach_ * reach_) : 0.0;
 }
 
 std::vector<Eigen::Vector3f> ShadowContrast::candidates(const RayScene& objects) const {

@@ -18,8 +18,12 @@ namespace calipso::render {
 //   b  how dark the shadow is     '  less the mean of like-coloured places around
 class ShadowContrast {
  public:
+  // Cells across the picture: enough to find a direction by; to tell directions near it apart.
+  static constexpr int kCoarse = 80, kFine = 160;
+
   // @param depth CV_32FC1, m, from the same camera, 0: unknown; may be empty
-  ShadowContrast(const View& view, const std::vector<SupportPlane>& planes, const cv::Mat& depth);
+  ShadowContrast(const View& view, const std::vector<SupportPlane>& planes, const cv::Mat& depth,
+                 int cells_across);
 
   // How badly a sun in direction l explains the picture, at its best b >= 0: minus a
   // log-likelihood, 0 without any shadow.
@@ -32,6 +36,7 @@ class ShadowContrast {
   void findReceivers(const View& view, const std::vector<SupportPlane>& planes,
                      const cv::Mat& depth);
   void groupByColour(const cv::Mat& smooth);
+  cv::Mat meansAround(const cv::Mat& values) const;
   cv::Mat lessGroupMeans(const cv::Mat& values) const;
   // 1: hidden from the sun. @return the cells that the hidden ones influence; empty if none is
   cv::Rect cast(const RayScene& objects, const Eigen::Vector3f& l, cv::Mat& hidden) const;
@@ -42,6 +47,7 @@ class ShadowContrast {
   };
 
   int step_ = 0;                           // px, side of a cell
+  int reach_ = 0;                          // cells, up to which those around one have weight
   cv::Mat receives_;                       // CV_8UC1, of the cells
   std::vector<Eigen::Vector3f> position_;  // world, of all cells in rows
   std::vector<Group> groups_;

@@ -11,6 +11,7 @@ namespace {
 
 using namespace testing;
 
+constexpr int kCoarse = ShadowContrast::kCoarse;
 constexpr float kShade = 0.6f;  // of the code values
 constexpr double kCalm = 0.3;   // part of the table's pattern, which alone is as dark as a shadow
 const Eigen::Vector3f kSun = Eigen::Vector3f(0.5f, -0.4f, 0.77f).normalized();
@@ -43,17 +44,32 @@ double degreesBetween(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
 
 TEST(ShadowContrast, IsBestWhereTheSunIs) {
   const Setting setting;
-  const ShadowContrast contrast(setting.seenUnder(kSun), table(), cv::Mat());
-  const double at_sun = contrast.misfit(setting.objects, kSun);
-  EXPECT_LT(at_sun, -20.0);
+  for (const int cells : {kCoarse, ShadowContrast::kFine}) {
+    const ShadowContrast contrast(setting.seenUnder(kSun), table(), cv::Mat(), cells);
+    const double at_sun = contrast.misfit(setting.objects, kSun);
+    EXPECT_LT(at_sun, -20.0) << cells;
+    const Eigen::Vector3f s = kSun.unitOrthogonal(), t = kSun.cross(s);
+    for (const Eigen::Vector3f& way : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)}) {
+      EXPECT_LT(at_sun, contrast.misfit(setting.objects, (kSun + 0.15f * way).normalized()))
+          << cells;
+    }
+  }
+}
+
+// A twentieth of a radian (3 degrees) is more than the fine cells' size here.
+TEST(ShadowContrast, TellsNearDirectionsApart) {
+  const Setting setting;
+  const ShadowContrast contrast(setting.seenUnder(kSun), table(), cv::Mat(), ShadowContrast::kFine);
   const Eigen::Vector3f s = kSun.unitOrthogonal(), t = kSun.cross(s);
-  for (const Eigen::Vector3f& way : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)})
-    EXPECT_LT(at_sun, contrast.misfit(setting.objects, (kSun + 0.15f * way).normalized()));
+  for (const Eigen::Vector3f& way : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)}) {
+    EXPECT_LT(contrast.misfit(setting.objects, kSun),
+              contrast.misfit(setting.objects, (kSun + 0.05f * way).normalized()));
+  }
 }
 
 TEST(ShadowContrast, CandidatesLieAroundTheSun) {
   const Setting setting;
-  const ShadowContrast contrast(setting.seenUnder(kSun), table(), cv::Mat());
+  const ShadowContrast contrast(setting.seenUnder(kSun), table(), cv::Mat(), kCoarse);
   const std::vector<Eigen::Vector3f> found = contrast.candidates(setting.objects);
   ASSERT_FALSE(found.empty());
   EXPECT_LT(degreesBetween(found.front(), kSun), 8.0);  // directions tried are 8 degrees apart
@@ -61,7 +77,8 @@ TEST(ShadowContrast, CandidatesLieAroundTheSun) {
 
 TEST(ShadowContrast, WithoutAShadowNoDirectionStandsOut) {
   const Setting setting;
-  const ShadowContrast contrast(setting.seenUnder({0.0f, 0.0f, -1.0f}), table(), cv::Mat());
+  const ShadowContrast contrast(setting.seenUnder({0.0f, 0.0f, -1.0f}), table(), cv::Mat(),
+                                kCoarse);
   for (const Eigen::Vector3f& l : contrast.candidates(setting.objects))
     EXPECT_GT(contrast.misfit(setting.objects, l), -12.0);  // from which on light_fit believes it
 }
@@ -77,18 +94,18 @@ TEST(ShadowContrast, FallsOnWhatTheDepthImageShowsToBeFlat) {
     }
   }
   const View view = setting.seenUnder(kSun);
-  const double on_plane = ShadowContrast(view, table(), {}).misfit(setting.objects, kSun);
-  EXPECT_NEAR(ShadowContrast(view, {}, depth).misfit(setting.objects, kSun), on_plane,
+  const double on_plane = ShadowContrast(view, table(), {}, kCoarse).misfit(setting.objects, kSun);
+  EXPECT_NEAR(ShadowContrast(view, {}, depth, kCoarse).misfit(setting.objects, kSun), on_plane,
               0.2 * std::abs(on_plane));  // the picture's rim lacks what tells it to be flat
   cv::RNG random(3);
   rough = depth.clone();
   for (float& d : cv::Mat_<float>(rough)) d *= static_cast<float>(1.0 + random.gaussian(0.1));
-  EXPECT_EQ(ShadowContrast(view, {}, rough).misfit(setting.objects, kSun), 0.0);
+  EXPECT_EQ(ShadowContrast(view, {}, rough, kCoarse).misfit(setting.objects, kSun), 0.0);
 }
 
 TEST(ShadowContrast, SaysNothingWithoutReceivers) {
   const Setting setting;
-  const ShadowContrast contrast(setting.seenUnder(kSun), {}, cv::Mat());
+  const ShadowContrast contrast(setting.seenUnder(kSun), {}, cv::Mat(), kCoarse);
   EXPECT_EQ(contrast.misfit(setting.objects, kSun), 0.0);
   EXPECT_TRUE(contrast.candidates(setting.objects).empty());
 }
