@@ -35,6 +35,7 @@ Trajectory TrajectoryFitter::run(const std::vector<double>& cut_times) {
   dropJumpsOfSpinAlone();
   settleStillPieces();
   dropExcursions();
+  letFallingPiecesTurn();
   return result();
 }
 
@@ -181,6 +182,16 @@ void TrajectoryFitter::settleStillPieces() {
     if (inside.empty() || !params_.still(inside)) continue;
     pieces_[i].travel = Travel::kRest;
     pieces_[i].turning = Turning::kNone;
+  }
+}
+
+// Nothing keeps from turning what falls. That no spin stands out is no reason to know it for none:
+// the velocity, which hangs together with it in the poses' errors, would be off and its interval too
+// narrow. The pieces are told apart before, while every travel is free not to turn.
+void TrajectoryFitter::letFallingPiecesTurn() {
+  for (MotionPiece& piece : pieces_) {
+    if (piece.travel == Travel::kFreeFall && piece.turning == Turning::kNone)
+      piece.turning = Turning::kSteady;
   }
 }
 

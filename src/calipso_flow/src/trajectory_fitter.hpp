@@ -47,6 +47,7 @@ class TrajectoryFitter {
   double timeDeviation(size_t piece) const;
 
   void settleStillPieces();
+  void letFallingPiecesTurn();
   bool isImpact(const Jump& jump) const;
   std::vector<MotionState> statesWithHonestRest(const SmoothedMotion& motion) const;
   // Of velocity and spin, by errors of the poses that change slowly over the piece at `time`.
