@@ -1,9 +1,11 @@
 // Where an object is expected in the next frame; see object_tracker.hpp.
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
 
 #include "calipso_flow/coarse_search.hpp"
 #include "calipso_flow/object_motion.hpp"
 #include "calipso_flow/object_tracker.hpp"
+#include "calipso_flow/picture_change.hpp"
 #include "calipso_flow/rotation.hpp"
 #include "view_change.hpp"
 
@@ -11,6 +13,7 @@ namespace calipso::flow {
 namespace {
 
 constexpr double kFirstSearch = 0.2;  // of the picture's width, while no motion is known
+constexpr double kStayedPx = 0.3;     // what may have shifted by less is matched from where it was
 
 }  // namespace
 
@@ -67,6 +70,34 @@ Eigen::AlignedBox2d ObjectTracker::reachFrom(const Frame& frame,
   const Eigen::Vector2d back = 1.5 * (before - home);
   reach.extend(Eigen::AlignedBox2d(back - margin, back + margin));
   return reach;
+}
+
+// Whether the frame shows the object, with its outline, as the one did in which it was found last:
+// few tracks are then no sign that it has gone. A camera that moves changes the picture.
+bool ObjectTracker::hasStayed(const Frame& frame, const Reference& nearest) {
+  if (!frame.camera.world_from_camera.isApprox(last_frame_.camera.world_from_camera, 0.0))
+    return false;
+  const ReferenceView::Warped& look =
+      lookAt(frame, nearest.view, last_->world_from_object, Care::kForward).warped;
+  if (look.coverage == 0.0) return false;
+  cv::Mat with_outline;
+  cv::dilate(look.covered, with_outline, cv::Mat());
+  const cv::Point origin(look.gray.origin);
+  return largestShift(last_frame_.gray, frame.gray, with_outline, origin) < kStayedPx;
+}
+
+// Where it was, with small patches or large ones.
+Observation ObjectTracker::inPlace(const Frame& frame, const Reference& nearest) {
+  const Eigen::Isometry3d place = last_->world_from_object;
+  Observation best = refine(frame, nearest, place, drowned_ ? wide_ : params_);
+  if (isClear(best)) return best;
+  Observation other = refine(frame, nearest, place, drowned_ ? params_ : wide_);
+  if (other.inliers() > best.inliers()) {
+    best = std::move(other);
+    drowned_ = !drowned_;
+  }
+  due_inliers_ = best.inliers();
+  return best;
 }
 
 }  // namespace calipso::flow

@@ -232,8 +232,13 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
     return lost;
   }
   const Reference& nearest = nearestReference(frame, predicted);
-  Observation best = attempt(frame, nearest, predicted, drowned_ ? wide_ : params_);
-  if (!isClear(best)) best = tryOtherwise(frame, nearest, predicted, std::move(best));
+  Observation best;
+  if (frames_lost_ == 0 && before_last_)
+    best = refine(frame, nearest, predicted, drowned_ ? wide_ : params_);
+  if (!isClear(best)) {
+    best = !cut && hasStayed(frame, nearest) ? inPlace(frame, nearest)
+                                             : search(frame, nearest, predicted);
+  }
   if (best.found && frames_lost_ > 0 && best.inliers() < kWeakInliers && fall_.holds() &&
       !fall_.expects(measured(best)))
     best.found = false;  // few tracks that are not where it falls to are something else's
@@ -250,8 +255,11 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
 
 // The motion may have changed, the look, or the picture: tries every other way to recognise the
 // object.
-Observation ObjectTracker::tryOtherwise(const Frame& frame, const Reference& nearest,
-                                        const Eigen::Isometry3d& predicted, Observation best) {
+Observation ObjectTracker::search(const Frame& frame, const Reference& nearest,
+                                  const Eigen::Isometry3d& predicted) {
+  Observation best = refine(frame, nearest, searchCoarsely(frame, nearest.view, predicted),
+                            drowned_ ? wide_ : params_);
+  if (isClear(best)) return best;
   if (best.inliers() < kClearShare * due_inliers_ && frames_lost_ == 0) {
     auto other = fromFrameBefore(frame, nearest, predicted);
     if (other && other->inliers() > best.inliers()) best = std::move(*other);

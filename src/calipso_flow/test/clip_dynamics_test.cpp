@@ -141,6 +141,28 @@ TEST(ClipDynamics, staticBoxBeforeAMovingBackgroundIsAtRest) {
   }
 }
 
+// Few tracks are no sign that it has gone while the picture stays the same, and what starts with
+// 10 px a frame is searched for at once.
+TEST(ClipDynamics, findsInItsPlaceWhatHasFewTracksUntilItStarts) {
+  constexpr int kStart = 8;
+  DynamicsParams params;
+  params.tracker.seed_count = 8;
+  const auto poseAt = [](int k) {
+    return movedPose(std::max(0, k - kStart) / kFps, {1.5, 0.0, 0.0}, 0.0);
+  };
+  ClipAnalyser analyser(frameOf(0.0, poseAt(0), 1), {test::boxModel()}, {cv::Mat()}, kGravity,
+                        params);
+  for (int k = 1; k < 14; ++k) analyser.add(frameOf(k / kFps, poseAt(k), 1 + k));
+  const ObjectDynamics box = analyser.finish().front();
+  for (int k = 1; k < 14; ++k) {
+    const Observation& seen = box.observations[k];
+    ASSERT_TRUE(seen.found) << k;
+    // A tenth of a frame's way is half a pixel.
+    const double x = (seen.world_from_object.translation() - poseAt(k).translation()).x();
+    EXPECT_NEAR(x, 0.0, 0.005) << k;
+  }
+}
+
 TEST(ClipDynamics, cameraMotionIsNotObjectMotion) {
   const ObjectModel model = test::boxModel();
   const auto frameFrom = [&](int k) {

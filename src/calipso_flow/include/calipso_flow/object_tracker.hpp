@@ -110,6 +110,8 @@ class ObjectTracker {
   Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
                                const TrackerParams& params, Observation& observation);
   Reference& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose);
+  bool hasStayed(const Frame& frame, const Reference& nearest);
+  Observation inPlace(const Frame& frame, const Reference& nearest);
   Observation attempt(const Frame& frame, const Reference& reference,
                       const Eigen::Isometry3d& predicted, const TrackerParams& params);
   std::optional<Observation> fromFrameBefore(const Frame& frame, const Reference& nearest,
@@ -118,8 +120,8 @@ class ObjectTracker {
                          const Eigen::Isometry3d& predicted);
   Reference lastAsReference() const;
   Observation withReference(const Frame& frame, const Reference& reference, Observation found);
-  Observation tryOtherwise(const Frame& frame, const Reference& nearest,
-                           const Eigen::Isometry3d& predicted, Observation best);
+  Observation search(const Frame& frame, const Reference& nearest,
+                     const Eigen::Isometry3d& predicted);
   bool isClear(const Observation& observation) const;
   bool stays(const Observation& observation) const;  // found where it was
   Matrix6d driftSinceLast(const Observation& observation, double change) const;
