@@ -19,6 +19,10 @@ constexpr std::size_t kStarts = 3;
 constexpr double kTelling = 3.0;  // of log-likelihood: a direction is better than most
 // of log-likelihood: cast shadows are seen where this light casts them
 constexpr double kShadowsSpeak = 12.0;
+// of log-likelihood, by which they are seen there better than kAside (rad) beside it: a dark place
+// that the shadow meets from many directions tells none of them
+constexpr double kShadowsTell = 4.0;
+constexpr float kAside = 0.35f;
 constexpr double kRobust = 0.15;  // relative residual beyond which a pixel counts less
 // of a light's colour: e^4 times brighter or darker than the unit
 constexpr double kLogRange = 4.0;
@@ -206,6 +210,22 @@ double shadowMisfit(const LightEvidence& evidence, const LightCandidate& c) {
   return evidence.shadow_misfit ? evidence.shadow_misfit(c.direction) : 0.0;
 }
 
+// Cast shadows speak for this direction, and not for those beside it.
+bool shadowsTell(const LightEvidence& evidence, const LightCandidate& c,
+                 const Eigen::Vector3f& up) {
+  const double here = shadowMisfit(evidence, c);
+  if (here >= -kShadowsSpeak) return false;
+  constexpr int kBeside = 12;
+  const Eigen::Vector3f s = c.direction.unitOrthogonal(), t = c.direction.cross(s);
+  for (int i = 0; i < kBeside; ++i) {
+    const float a = static_cast<float>(2.0 * M_PI * i / kBeside);
+    const Eigen::Vector3f l =
+        std::cos(kAside) * c.direction + std::sin(kAside) * (std::cos(a) * s + std::sin(a) * t);
+    if (l.dot(up) > 0.0f && evidence.shadow_misfit(l) < here + kShadowsTell) return false;
+  }
+  return true;
+}
+
 bool anyShadow(const LightEvidence& evidence, const std::vector<LightCandidate>& starts) {
   return std::any_of(starts.begin(), starts.end(),
                      [&](const LightCandidate& c) { return shadowMisfit(evidence, c) != 0.0; });
@@ -225,7 +245,7 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
   best.light.direction = (up + 0.4f * view).normalized();
   if (static_cast<int>(evidence.samples.size()) < kFewestSamples) return best;
   std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
-  best.from_shadows = shadowMisfit(evidence, starts.front()) < -kShadowsSpeak;
+  best.from_shadows = shadowsTell(evidence, starts.front(), up);
   if (!best.from_shadows && anyShadow(evidence, starts))
     starts = searchLight(withoutShadows(evidence), up, kStarts);
   if (!best.from_shadows) {

@@ -140,6 +140,18 @@ TEST(FitLight, BelievesCastShadows) {
             std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
 }
 
+// A place that is dark wherever the shadow falls, like the dark below an object.
+TEST(FitLight, IsNotToldByWhatAllDirectionsExplain) {
+  const Eigen::Vector3f shading = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
+  LightEvidence evidence;
+  evidence.samples = ballSamples(shading), evidence.clusters = 1;
+  evidence.shadow_misfit = [](const Eigen::Vector3f& l) { return -200.0 - l.x(); };
+  const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
+  EXPECT_FALSE(fit.from_shadows);
+  EXPECT_FALSE(fit.confirmed());
+  EXPECT_GT(fit.light.direction.dot(shading), std::cos(2.0 * M_PI / 180.0));  // as without shadows
+}
+
 // The ball's samples under an ambient light with these harmonics, with errors of 1 %.
 LightEvidence ballUnder(const Light& light) {
   LightEvidence evidence;
