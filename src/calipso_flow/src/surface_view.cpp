@@ -13,9 +13,27 @@ constexpr int kWide = 4;        // px; rows of wider triangles are worth clippin
 struct ProjectedVertex {
   double u, v;       // px
   double inverse_z;  // 1/m; 0 = behind the camera
+  // of u and v, not farther out than matters to any window
+  int u_floor, u_ceiling, v_floor, v_ceiling;
 };
 
 using Vertices = decltype(TriangleMesh::vertices);
+
+// The conversions of the C library cost as much as the rest of a small triangle.
+int floorOf(double value) {
+  const int whole = static_cast<int>(value);
+  return whole - (whole > value);
+}
+
+int ceilingOf(double value) { return -floorOf(-value); }
+
+// Each vertex is rounded once, and not with each of its triangles, most of which show nothing.
+ProjectedVertex roundedVertex(const Eigen::Vector2d& pixel, double inverse_z) {
+  constexpr double kFarPx = 1e8;
+  const double u = std::clamp(pixel.x(), -kFarPx, kFarPx);
+  const double v = std::clamp(pixel.y(), -kFarPx, kFarPx);
+  return {pixel.x(), pixel.y(), inverse_z, floorOf(u), ceilingOf(u), floorOf(v), ceilingOf(v)};
+}
 
 // @param vertices  camera frame
 std::vector<ProjectedVertex> projectVertices(const Vertices& vertices, const Camera& camera) {
@@ -23,11 +41,10 @@ std::vector<ProjectedVertex> projectVertices(const Vertices& vertices, const Cam
   for (int i = 0; i < vertices.rows(); ++i) {
     const Eigen::Vector3d p = vertices.row(i).transpose();
     if (p.z() < kNear) {
-      projected[i] = {0.0, 0.0, 0.0};
+      projected[i] = {};
       continue;
     }
-    const Eigen::Vector2d pixel = camera.project(p);
-    projected[i] = {pixel.x(), pixel.y(), 1.0 / p.z()};
+    projected[i] = roundedVertex(camera.project(p), 1.0 / p.z());
   }
   return projected;
 }
@@ -47,14 +64,6 @@ cv::Rect boundingWindow(const std::vector<ProjectedVertex>& vertices, const Came
   return {left, top, right - left + 1, bottom - top + 1};
 }
 
-// The conversions of the C library cost as much as the rest of a small triangle.
-int floorOf(double value) {
-  const int whole = static_cast<int>(value);
-  return whole - (whole > value);
-}
-
-int ceilingOf(double value) { return -floorOf(-value); }
-
 // Pixels of a row outside of which value + slope (x - from) is negative, by more than rounding.
 struct Span {
   int first, last;
@@ -72,16 +81,13 @@ struct Span {
 template <class Draw>
 void scanTriangle(const ProjectedVertex& a, const ProjectedVertex& b, const ProjectedVertex& c,
                   const cv::Rect& window, Draw draw) {
-  const double left = std::min(a.u, std::min(b.u, c.u)), right = std::max(a.u, std::max(b.u, c.u));
-  const double top = std::min(a.v, std::min(b.v, c.v)), bottom = std::max(a.v, std::max(b.v, c.v));
-  const int last_x = window.br().x - 1, last_y = window.br().y - 1;
-  if (!(left <= last_x && right >= window.x && top <= last_y && bottom >= window.y)) return;
   // Most triangles of a fine mesh lie between pixel centres.
-  const int x0 = ceilingOf(std::max<double>(window.x, left));
-  const int x1 = floorOf(std::min<double>(last_x, right));
-  const int y0 = ceilingOf(std::max<double>(window.y, top));
-  const int y1 = floorOf(std::min<double>(last_y, bottom));
-  if (x0 > x1 || y0 > y1) return;
+  const int x0 = std::max(window.x, std::min({a.u_ceiling, b.u_ceiling, c.u_ceiling}));
+  const int x1 = std::min(window.br().x - 1, std::max({a.u_floor, b.u_floor, c.u_floor}));
+  if (x0 > x1) return;
+  const int y0 = std::max(window.y, std::min({a.v_ceiling, b.v_ceiling, c.v_ceiling}));
+  const int y1 = std::min(window.br().y - 1, std::max({a.v_floor, b.v_floor, c.v_floor}));
+  if (y0 > y1) return;
   const double area = (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u);
   if (area == 0.0) return;
   const double db_du = (c.v - a.v) / area, db_dv = -(c.u - a.u) / area;
