@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 #include "patch_cost.hpp"
@@ -40,6 +41,7 @@ class Filling {
         params_(params),
         to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
         cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)),
+        plain_(hole_.size(), CV_8U, cv::Scalar(0)),
         bands_((hole_.rows + kBandRows - 1) / kBandRows) {
     const cv::Mat patch = cv::Mat::ones(kPatchSide, kPatchSide, CV_8U);
     cv::Mat touched;
@@ -107,6 +109,7 @@ class Filling {
     forEachPatch([&](const cv::Point& p) {
       if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(anySource(p, 0));
       cost_.at<float>(p) = rules_.distance(image_, p, match(p), 1e30f);
+      plain_.at<std::uint8_t>(p) = 255;
     });
     for (int s = 0; s < kSweeps; ++s) {
       ++sweep_;
@@ -215,9 +218,14 @@ class Filling {
   // @param better how many times the cost must be lower
   void attempt(const cv::Point& p, const cv::Point& q, float better) {
     if (!isWhole(q)) return;
+    std::uint8_t& plain = plain_.at<std::uint8_t>(p);
+    // Most neighbours lead to where a patch has been led already.
+    if (q == match(p) && (plain != 0 || better > 1.0f)) return;
     float& least = cost_.at<float>(p);
     const float cost = better * rules_.distance(image_, p, q, least / better);
-    if (cost < least) least = cost, to_.at<cv::Vec2s>(p) = shorts(q);
+    if (cost >= least) return;
+    least = cost, to_.at<cv::Vec2s>(p) = shorts(q);
+    plain = better > 1.0f ? 0 : 255;
   }
 
   // A patch of the rim, the best place found for it and what that costs.
@@ -301,6 +309,7 @@ class Filling {
   PatchCost rules_;
   InpaintParams params_;
   cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
+  cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   std::vector<cv::Point> sources_;
   int sweep_ = 0;
@@ -333,7 +342,7 @@ cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& s
       settle(finer, params.rounds, kFarthest);
     else
       finer.search(kFinest);
-    filling = finer;
+    filling = std::move(finer);
   }
   return filling.origins();
 }
