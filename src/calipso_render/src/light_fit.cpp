@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include "ambient_fit.hpp"
 #include "gloss_fit.hpp"
@@ -195,14 +197,19 @@ LightFit toFit(const Unknowns& x, const cv::Vec3f& below, const Eigen::Vector3f&
   return fit;
 }
 
-// Fits from one start and keeps the result if it is the best so far.
-void tryStart(const LightEvidence& evidence, const Eigen::Vector3f& up, const LightCandidate& start,
-              bool direction_free, LightFit& best) {
+// Nothing if the light found is below the horizon.
+std::optional<LightFit> fitFrom(const LightCandidate& start, const LightEvidence& evidence,
+                                const Eigen::Vector3f& up, bool direction_free) {
   Unknowns x;
   const double cost = Fit(evidence, up, direction_free).run(start, x);
-  if (x.direction.dot(up.cast<double>()) <= 0.0 || (best.determined && cost >= best.cost)) return;
+  if (x.direction.dot(up.cast<double>()) <= 0.0) return std::nullopt;
+  return toFit(x, evidence.below, up, cost);
+}
+
+void keepBetter(const std::optional<LightFit>& fit, LightFit& best) {
+  if (!fit || (best.determined && fit->cost >= best.cost)) return;
   const bool from_shadows = best.from_shadows;
-  best = toFit(x, evidence.below, up, cost);
+  best = *fit;
   best.from_shadows = from_shadows;
 }
 
@@ -249,12 +256,16 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
   if (!best.from_shadows && anyShadow(evidence, starts))
     starts = searchLight(withoutShadows(evidence), up, kStarts);
   if (!best.from_shadows) {
-    for (const LightCandidate& start : starts) tryStart(evidence, up, start, true, best);
+    std::vector<std::optional<LightFit>> fits(starts.size());
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = 0; i < starts.size(); ++i)
+      fits[i] = fitFrom(starts[i], evidence, up, true);
+    for (const std::optional<LightFit>& fit : fits) keepBetter(fit, best);
   }
   // Shading alone may lead below the horizon: then the search's direction stands, if it stands out,
   // as it does where shadows tell it.
   if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling))
-    tryStart(evidence, up, starts.front(), false, best);
+    keepBetter(fitFrom(starts.front(), evidence, up, false), best);
   if (!best.determined) return best;
   best.seen_gloss = evidence.gloss ? evidence.gloss(best) : std::nullopt;
   if (best.seen_gloss) best.gloss = best.seen_gloss->gloss;

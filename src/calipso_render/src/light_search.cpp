@@ -157,27 +157,43 @@ std::vector<LightCandidate> spread(const std::vector<LightCandidate>& sorted, fl
   return chosen;
 }
 
+template <typename Judge>
+std::vector<LightCandidate> judged(const std::vector<Eigen::Vector3f>& directions, Judge judge) {
+  std::vector<LightCandidate> candidates(directions.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 0; i < directions.size(); ++i) candidates[i] = judge(directions[i]);
+  return candidates;
+}
+
+std::vector<Eigen::Vector3f> directionsOf(const std::vector<LightCandidate>& candidates) {
+  std::vector<Eigen::Vector3f> directions;
+  for (const LightCandidate& c : candidates) directions.push_back(c.direction);
+  return directions;
+}
+
 }  // namespace
 
 std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
                                         std::size_t count) {
   const Search search(evidence, up);
-  std::vector<LightCandidate> all;
-  for (const Eigen::Vector3f& l : candidateDirections(up)) all.push_back(search.byShading(l, {}));
+  const auto by_all = [&](const Eigen::Vector3f& l) { return search.byAll(l); };
+  std::vector<LightCandidate> all = judged(
+      candidateDirections(up), [&](const Eigen::Vector3f& l) { return search.byShading(l, {}); });
   std::stable_sort(all.begin(), all.end(), better);
-  std::vector<LightCandidate> kept;
-  for (const LightCandidate& c : spread(all, kApart, kKept))
-    kept.push_back(search.byAll(c.direction));
-  std::vector<LightCandidate> from_shadows;
+  std::vector<LightCandidate> kept = judged(directionsOf(spread(all, kApart, kKept)), by_all);
+  std::vector<Eigen::Vector3f> cast;
   for (const Eigen::Vector3f& l : evidence.shadow_candidates) {
-    if (l.dot(up) > kLowestSun) from_shadows.push_back(search.byAll(l));
+    if (l.dot(up) > kLowestSun) cast.push_back(l);
   }
+  std::vector<LightCandidate> from_shadows = judged(cast, by_all);
   std::stable_sort(from_shadows.begin(), from_shadows.end(), better);
   for (const LightCandidate& c : spread(from_shadows, kShadowApart, count)) kept.push_back(c);
   std::stable_sort(kept.begin(), kept.end(), better);
   kept.resize(std::min(kept.size(), count));
   const double contrast = all[all.size() / 2].misfit - all.front().misfit;
-  for (LightCandidate& c : kept) c = search.refined(c), c.contrast = contrast;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    kept[i] = search.refined(kept[i]), kept[i].contrast = contrast;
   std::stable_sort(kept.begin(), kept.end(), better);
   return kept;
 }
