@@ -4,12 +4,12 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
-#include "key_cover.hpp"
-#include "passing_shade.hpp"
-#include "place_relief.hpp"
-#include "plane_mirror.hpp"
-#include "shadow_check.hpp"
-#include "umbra.hpp"
+#include "light/shadow_check.hpp"
+#include "place/key_cover.hpp"
+#include "place/passing_shade.hpp"
+#include "place/place_relief.hpp"
+#include "place/plane_mirror.hpp"
+#include "place/umbra.hpp"
 
 namespace calipso::render {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "frame_compositor.hpp"
+#include "frame/frame_compositor.hpp"
 
 namespace calipso::render {
 

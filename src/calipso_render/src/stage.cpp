@@ -5,8 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "mesh_topology.hpp"
-#include "sky_seen.hpp"
+#include "light/sky_seen.hpp"
+#include "texture/mesh_topology.hpp"
 
 namespace calipso::render {
 

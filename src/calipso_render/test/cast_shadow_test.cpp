@@ -8,7 +8,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "calipso_render/sky_map.hpp"
-#include "umbra.hpp"
+#include "place/umbra.hpp"
 
 namespace calipso::render {
 namespace {

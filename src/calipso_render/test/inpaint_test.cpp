@@ -7,10 +7,10 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "line_bridge.hpp"
-#include "patch_fill.hpp"
-#include "seam_blend.hpp"
-#include "seam_cut.hpp"
+#include "fill/line_bridge.hpp"
+#include "fill/patch_fill.hpp"
+#include "fill/seam_blend.hpp"
+#include "fill/seam_cut.hpp"
 
 namespace calipso::render {
 namespace {

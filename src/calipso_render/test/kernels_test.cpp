@@ -1,4 +1,4 @@
-#include "kernels.hpp"
+#include "draw/kernels.hpp"
 
 #include <gtest/gtest.h>
 

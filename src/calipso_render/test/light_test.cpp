@@ -5,14 +5,14 @@
 #include <cmath>
 #include <random>
 
-#include "ambient_fit.hpp"
 #include "calipso_render/colour.hpp"
 #include "calipso_render/light_fit.hpp"
 #include "calipso_render/ray_shadow.hpp"
-#include "gloss_fit.hpp"
-#include "ray_scene.hpp"
-#include "reflectance_cost.hpp"
-#include "sky_seen.hpp"
+#include "draw/ray_scene.hpp"
+#include "light/ambient_fit.hpp"
+#include "light/gloss_fit.hpp"
+#include "light/reflectance_cost.hpp"
+#include "light/sky_seen.hpp"
 
 namespace calipso::render {
 namespace {

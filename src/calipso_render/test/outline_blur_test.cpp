@@ -6,7 +6,7 @@
 
 #include "ball_setting.hpp"
 #include "calipso_render/colour.hpp"
-#include "edge_blur.hpp"
+#include "frame/edge_blur.hpp"
 
 namespace calipso::render {
 namespace {

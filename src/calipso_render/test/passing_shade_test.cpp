@@ -1,4 +1,4 @@
-#include "passing_shade.hpp"
+#include "place/passing_shade.hpp"
 
 #include <gtest/gtest.h>
 
@@ -68,8 +68,8 @@ TEST(PassingShade, IsTakenOffWhereItLiesInAllFramesButOne) {
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       const auto r = clip.receiver(u, v);
-      const bool seen_lit = clip.frames[0].labels.at<std::uint8_t>(v, u) == 0 && r &&
-                            !isInShadow(r->position, kFrom);
+      const bool seen_lit =
+          clip.frames[0].labels.at<std::uint8_t>(v, u) == 0 && r && !isInShadow(r->position, kFrom);
       // The place is seen past the ball and its mask's margin in all frames.
       if (!seen_lit || !isInShadow(r->position, kTo) || b.count.at<std::uint8_t>(v, u) < 10 ||
           stays.never_lit.at<std::uint8_t>(v, u) != 0)

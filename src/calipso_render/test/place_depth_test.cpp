@@ -1,12 +1,12 @@
-#include "../src/place_depth.hpp"
+#include "place/place_depth.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "../src/view_warp.hpp"
 #include "calipso_render/renderer.hpp"
+#include "place/view_warp.hpp"
 
 namespace calipso::render {
 namespace {

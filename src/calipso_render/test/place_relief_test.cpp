@@ -1,12 +1,12 @@
-#include "../src/place_relief.hpp"
+#include "place/place_relief.hpp"
 
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
 
-#include "../src/place_view.hpp"
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
+#include "place/place_view.hpp"
 
 namespace calipso::render {
 namespace {

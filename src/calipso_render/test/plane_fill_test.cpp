@@ -4,9 +4,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/inpaint.hpp"
-#include "lattice.hpp"
-#include "plane_chart.hpp"
-#include "spline.hpp"
+#include "fill/lattice.hpp"
+#include "fill/plane_chart.hpp"
+#include "fill/spline.hpp"
 
 namespace calipso::render {
 namespace {

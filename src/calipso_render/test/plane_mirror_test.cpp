@@ -1,4 +1,4 @@
-#include "../src/plane_mirror.hpp"
+#include "place/plane_mirror.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "ball_setting.hpp"
-#include "plane_view.hpp"
+#include "place/plane_view.hpp"
 
 namespace calipso::render {
 namespace {

@@ -1,4 +1,4 @@
-#include "shadow_check.hpp"
+#include "light/shadow_check.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "../src/shadow_clue.hpp"
+#include "light/shadow_clue.hpp"
 
 #include <gtest/gtest.h>
 

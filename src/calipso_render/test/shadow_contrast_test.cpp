@@ -1,4 +1,4 @@
-#include "../src/shadow_contrast.hpp"
+#include "light/shadow_contrast.hpp"
 
 #include <gtest/gtest.h>
 

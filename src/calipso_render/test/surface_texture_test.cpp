@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "../src/texture_seams.hpp"
 #include "calipso_render/surface_symmetry.hpp"
+#include "texture/texture_seams.hpp"
 
 namespace calipso::render {
 namespace {

@@ -1,11 +1,11 @@
-#include "texture_patches.hpp"
+#include "texture/texture_patches.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "calipso_render/colour.hpp"
-#include "surface_chart.hpp"
+#include "texture/surface_chart.hpp"
 
 namespace calipso::render {
 namespace {

@@ -1,0 +1,251 @@
+#include "calipso_render/inpaint.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "draw/side_by_side.hpp"
+#include "fill/lattice.hpp"
+#include "fill/line_bridge.hpp"
+#include "fill/patch_fill.hpp"
+#include "fill/plane_chart.hpp"
+#include "fill/seam_blend.hpp"
+#include "fill/seam_cut.hpp"
+#include "fill/spline.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kLatticeMargin = 72;  // px around it in which a pattern is sought
+constexpr int kLeastMargin = 48;    // px around the hole that are looked at, at least
+constexpr float kRounded =
+    1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
+constexpr float kFarther = 2000.0f;  // InpaintParams::away_farther along a plane
+constexpr int kFewestOnPlane = 200;  // px of a plane's part of the hole, to be filled along it
+
+cv::Rect windowAround(const cv::Mat& hole, int least = kLeastMargin, int most = 1 << 20) {
+  const cv::Rect box = cv::boundingRect(hole);
+  const int margin = std::clamp(std::max(box.width, box.height) / 2, least, most);
+  const cv::Rect grown(box.x - margin, box.y - margin, box.width + 2 * margin,
+                       box.height + 2 * margin);
+  return grown & cv::Rect(0, 0, hole.cols, hole.rows);
+}
+
+InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
+  InpaintParams inner = params;
+  const cv::Matx33d shift(1, 0, window.x, 0, 1, window.y, 0, 0, 1);
+  for (cv::Matx33d& plane : inner.planes) plane = plane * shift;
+  if (!params.nearness.empty()) inner.nearness = params.nearness(window).clone();
+  if (!params.surface.empty()) inner.surface = params.surface(window).clone();
+  if (!params.sure.empty()) inner.sure = params.sure(window).clone();
+  return inner;
+}
+
+cv::Mat smoothFill(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& known) {
+  cv::Mat weight(hole.size(), CV_32F, cv::Scalar(0.0f)), filled = image.clone();
+  weight.setTo(1.0f, known);
+  pushPull(image, weight).copyTo(filled, hole);
+  return filled;
+}
+
+// Copies every pixel from its origin. @return CV_8UC1: 255 where it has one
+cv::Mat copyFrom(const cv::Mat& origin, const cv::Mat& image, cv::Mat& filled) {
+  cv::Mat copied = cv::Mat::zeros(origin.size(), CV_8U);
+  for (int v = 0; v < origin.rows; ++v) {
+    for (int u = 0; u < origin.cols; ++u) {
+      const cv::Vec2s from = origin.at<cv::Vec2s>(v, u);
+      if (from[0] < 0) continue;
+      filled.at<cv::Vec3f>(v, u) = image.at<cv::Vec3f>(from[1], from[0]);
+      copied.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return copied;
+}
+
+// CV_8UC1: 255 where a pixel has an origin.
+cv::Mat copied(const cv::Mat& origin) {
+  cv::Mat columns;
+  cv::extractChannel(origin, columns, 0);
+  return columns >= 0;
+}
+
+// What fills a hole and where it comes from.
+struct Filling {
+  cv::Mat image;   // CV_32FC3
+  cv::Mat origin;  // CV_16SC2; (-1, -1) where nothing was copied
+};
+
+// @param known CV_8UC1: what the filling has to go with; source, of it: what may be copied
+Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const Lattice* lattice,
+             const InpaintParams& params) {
+  const cv::Mat whole_hole = to_fill.clone();
+  const LineBridges bridges = bridgeLines(to_fill, source, look, lattice);
+  to_fill.setTo(0, bridges.core);
+  known |= bridges.core;
+  source.setTo(0, bridges.lines);
+  Filling f{look.clone(), patchOrigins(look, to_fill, source, lattice, params)};
+  cutSeams(look, to_fill, source, known, params.surface, f.origin);
+  const cv::Mat without = to_fill & (copyFrom(f.origin, look, f.image) == 0);
+  if (cv::countNonZero(without) > 0) smoothFill(look, to_fill, known).copyTo(f.image, without);
+  if (cv::countNonZero(without) < cv::countNonZero(to_fill))
+    blendSeams(to_fill, known, f.origin, f.image);
+  bridges.origin.copyTo(f.origin, bridges.core);
+  f.origin.setTo(cv::Scalar(-1, -1), whole_hole == 0);
+  return f;
+}
+
+// A picture on its way to being filled.
+struct Canvas {
+  cv::Mat look, hole, source, known;
+  cv::Mat origin;  // CV_16SC2
+
+  void set(const cv::Point& p, const cv::Vec3f& colour, const cv::Point& from) {
+    for (int c = 0; c < 3; ++c) look.at<cv::Vec3f>(p)[c] = std::clamp(colour[c], 0.0f, 255.0f);
+    hole.at<std::uint8_t>(p) = 0, known.at<std::uint8_t>(p) = 255;
+    origin.at<cv::Vec2s>(p) = {static_cast<short>(from.x), static_cast<short>(from.y)};
+  }
+};
+
+cv::Mat nearnessOf(const cv::Matx33d& to_plane, const cv::Size& size) {
+  cv::Mat nearness(size, CV_32F);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u)
+      nearness.at<float>(v, u) =
+          static_cast<float>(to_plane(2, 0) * u + to_plane(2, 1) * v + to_plane(2, 2));
+  }
+  return nearness;
+}
+
+// A plane's part of the picture, in its chart.
+struct PlanePart {
+  PlaneChart chart;
+  cv::Mat plain;  // CV_32FC3, the picture; where the plane is not seen it goes on smoothly
+  cv::Mat look;   // CV_32FC3, so, too
+  cv::Mat hole, known, source;
+};
+
+PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen) {
+  cv::Mat copied_from;  // around which a sample sees nothing else
+  cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
+  PlanePart part{chart, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from)};
+  part.known &= part.hole == 0, part.source &= part.hole == 0;
+  return part;
+}
+
+void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
+  // What is not seen of the plane would shine through to what is.
+  part.plain = smoothFill(look, seen == 0, seen);
+  part.look = part.chart.carried(part.plain);
+  smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
+}
+
+// Every pixel of a plane's hole as the chart's nearest one was filled: a sample of the picture, as
+// far off along the plane as that was copied from, and what was evened out there.
+// @param wanted CV_8UC1, of the chart
+void copyBack(const PlanePart& part, const Filling& filled, const std::optional<Lattice>& lattice,
+              const cv::Mat& wanted, const cv::Mat& hole, Canvas& canvas) {
+  const cv::Mat spline = splineOf(part.plain);
+  const cv::Rect all({0, 0}, part.look.size());
+  for (int v = 0; v < hole.rows; ++v) {
+    for (int u = 0; u < hole.cols; ++u) {
+      if (hole.at<std::uint8_t>(v, u) == 0) continue;
+      const cv::Point2d at = taken(part.chart.to_chart, u, v);
+      const cv::Point nearest(cvRound(at.x), cvRound(at.y));
+      if (!all.contains(nearest) || wanted.at<std::uint8_t>(nearest) == 0) continue;
+      if (filled.origin.at<cv::Vec2s>(nearest)[0] < 0) continue;
+      const cv::Vec2s& o = filled.origin.at<cv::Vec2s>(nearest);
+      cv::Point2f shift(cv::Point(o[0], o[1]) - nearest);
+      if (lattice && cv::norm(lattice->nearest(shift) - shift) < kRounded)
+        shift = lattice->nearest(shift);
+      const cv::Point2d from = taken(part.chart.to_picture, at.x + shift.x, at.y + shift.y);
+      const cv::Vec3f evened =
+          filled.image.at<cv::Vec3f>(nearest) - part.look.at<cv::Vec3f>(o[1], o[0]);
+      canvas.set({u, v}, sampleSpline(spline, from.x, from.y) + evened,
+                 {cvRound(from.x), cvRound(from.y)});
+    }
+  }
+}
+
+// Fills a plane's part of the hole with copies shifted along the plane.
+// @param supports something stands on it
+// @param hole, seen CV_8UC1: where the plane is hidden; where it may be copied from
+void fillPlane(const cv::Matx33d& to_plane, bool supports, const cv::Mat& hole, const cv::Mat& seen,
+               const InpaintParams& params, Canvas& canvas) {
+  const std::optional<PlaneChart> chart = planeChart(to_plane, hole, seen);
+  if (!chart) return;
+  PlanePart part = partOf(*chart, hole, seen);
+  if (cv::countNonZero(part.hole) == 0 || cv::countNonZero(part.source) == 0) return;
+  const cv::Rect near = windowAround(part.hole, kLatticeMargin, kLatticeMargin);
+  std::optional<Lattice> lattice;
+  const auto seek = [&] {
+    lattice = findLattice(chart->carried(canvas.look, near), part.source(near));
+  };
+  const auto see = [&] { addLook(canvas.look, seen, part); };
+  if (supports && chart->tilted) {
+    sideBySide(true, seek, see);
+  } else {
+    seek();
+    if (!lattice) return;
+    see();
+  }
+  InpaintParams inner = params;
+  inner.surface = cv::Mat();
+  inner.nearness = chart->carried(nearnessOf(to_plane, hole.size())), inner.away_farther = kFarther;
+  const cv::Mat wanted =
+      lattice ? goesOnByLattice(*lattice, part.look, part.known, part.hole) : part.hole;
+  copyBack(part,
+           fill(part.look.clone(), part.hole.clone(), part.source.clone(), part.known.clone(),
+                lattice ? &*lattice : nullptr, inner),
+           lattice, wanted, hole, canvas);
+}
+
+void fillPlanes(const InpaintParams& params, Canvas& canvas) {
+  const cv::Mat hole = canvas.hole.clone();
+  for (std::size_t k = 0; k < params.planes.size(); ++k) {
+    const cv::Mat here = params.surface == static_cast<double>(k + 1),
+                  hidden = hole & here & params.sure;
+    if (cv::countNonZero(hidden) >= kFewestOnPlane)
+      fillPlane(params.planes[k], static_cast<int>(k) < params.supports, hidden,
+                canvas.source & here, params, canvas);
+  }
+}
+
+void fillRest(const InpaintParams& params, Canvas& canvas) {
+  const cv::Rect window = windowAround(canvas.hole);
+  const cv::Mat hole = canvas.hole(window);
+  const Filling rest =
+      fill(canvas.look(window).clone(), hole.clone(), canvas.source(window).clone(),
+           canvas.known(window).clone(), nullptr, within(window, params));
+  rest.image.copyTo(canvas.look(window), hole);
+  cv::Mat(rest.origin + cv::Scalar(window.x, window.y))
+      .copyTo(canvas.origin(window), copied(rest.origin));
+}
+
+}  // namespace
+
+InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& banned,
+                      const InpaintParams& params) {
+  CV_Assert(image.type() == CV_32FC3 && hole.type() == CV_8UC1 && image.size() == hole.size());
+  CV_Assert(params.nearness.empty() ||
+            (params.nearness.type() == CV_32FC1 && params.nearness.size() == hole.size()));
+  InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)), true};
+  if (cv::countNonZero(hole) == 0) return result;
+  const cv::Rect window = windowAround(hole);
+  Canvas canvas{image(window).clone(),
+                hole(window) != 0,
+                hole(window) == 0,
+                {},
+                result.origin(window).clone()};
+  if (!banned.empty()) canvas.source.setTo(0, banned(window));
+  canvas.known = canvas.source.clone();
+  const InpaintParams inner = within(window, params);
+  if (!inner.surface.empty() && !inner.sure.empty()) fillPlanes(inner, canvas);
+  if (cv::countNonZero(canvas.hole) > 0) fillRest(inner, canvas);
+  const cv::Mat has_origin = copied(canvas.origin);
+  result.patches_found = cv::countNonZero(has_origin) > 0;
+  cv::Mat(canvas.origin + cv::Scalar(window.x, window.y)).copyTo(result.origin(window), has_origin);
+  canvas.look.copyTo(result.image(window), hole(window));
+  return result;
+}
+
+}  // namespace calipso::render

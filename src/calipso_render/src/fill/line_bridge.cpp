@@ -1,0 +1,236 @@
+#include "fill/line_bridge.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <vector>
+
+#include "fill/line_ends.hpp"
+
+namespace calipso::render {
+namespace {
+
+// code values across a thin line that ends at another one
+constexpr float kAloneContrast = 30.0f;
+constexpr float kAsStrong = 0.5f;     // part of its contrast that the other one has at least
+constexpr float kStray = 1.5f;        // px by which ends may miss each other,
+constexpr float kTurn = 0.04f;        // and part of the way between them
+constexpr float kAlike = 0.4f;        // difference of colours across, to their contrast
+constexpr float kBesideAlike = 0.5f;  // the same of what is beside it
+constexpr float kInHole = 0.7f;       // part of a connection that the hole hides
+constexpr float kLongest = 40.0f;     // px of a line that are mirrored
+constexpr float kNear = 4.0f;         // px on either side that its colours reach
+constexpr float kCore = 1.5f;         // px on either side that are the line itself
+constexpr float kCrossFade = 4.0f;    // px on either side of the middle
+
+struct Bridge {
+  const LineEnd *from, *to;  // to: nothing if it ends at another bridge
+  float gap, cost;
+};
+
+class Bridger {
+ public:
+  Bridger(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image)
+      : hole_(hole), source_(source), image_(image) {
+    result_.drawn = cv::Mat::zeros(hole.size(), CV_8U);
+    result_.core = cv::Mat::zeros(hole.size(), CV_8U);
+    result_.lines = cv::Mat::zeros(hole.size(), CV_8U);
+    result_.origin = cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
+  }
+
+  LineBridges run(const Lattice* lattice) {
+    ends_ = findLineEnds(hole_, source_, image_);
+    if (lattice != nullptr) {
+      ends_.erase(std::remove_if(
+                      ends_.begin(), ends_.end(),
+                      [&](const LineEnd& end) { return repeats(end, *lattice, source_, image_); }),
+                  ends_.end());
+    }
+    std::vector<Bridge> bridges = connections();
+    const std::size_t through = bridges.size();
+    for (const LineEnd& end : ends_) {
+      if (std::any_of(bridges.begin(), bridges.begin() + through,
+                      [&](const Bridge& b) { return b.from == &end || b.to == &end; }))
+        continue;
+      if (const auto gap = wayTo(end, bridges, through))
+        bridges.push_back({&end, nullptr, *gap, 0.0f});
+    }
+    // What is led to another line comes before it, which goes through its end; what is weaker comes
+    // first.
+    const auto strength = [](const Bridge& b) {
+      return b.to == nullptr ? kAsStrong * b.from->contrast
+                             : std::min(b.from->contrast, b.to->contrast);
+    };
+    std::stable_sort(bridges.begin(), bridges.end(),
+                     [&](const Bridge& a, const Bridge& b) { return strength(a) < strength(b); });
+    const cv::Mat known = image_.clone();
+    for (const Bridge& b : bridges) {
+      draw(b, known);
+      markSeen(*b.from);
+      if (b.to != nullptr) markSeen(*b.to);
+    }
+    return result_;
+  }
+
+ private:
+  // A thin one; an edge between two things may well have others like it.
+  void markSeen(const LineEnd& end) {
+    if (!end.isThin()) return;
+    cv::line(result_.lines, end.at, end.at - end.length * end.into, cv::Scalar(255),
+             2 * cvRound(kCore) + 1);
+  }
+
+  // Ends that continue each other, the best first, each once, none across another.
+  std::vector<Bridge> connections() const {
+    std::vector<Bridge> all, chosen;
+    for (std::size_t i = 0; i < ends_.size(); ++i) {
+      for (std::size_t j = i + 1; j < ends_.size(); ++j) {
+        if (const auto cost = misfit(ends_[i], ends_[j]))
+          all.push_back({&ends_[i], &ends_[j],
+                         static_cast<float>(cv::norm(ends_[j].at - ends_[i].at)), *cost});
+      }
+    }
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Bridge& a, const Bridge& b) { return a.cost < b.cost; });
+    for (const Bridge& b : all) {
+      const bool taken = std::any_of(chosen.begin(), chosen.end(), [&](const Bridge& c) {
+        return c.from == b.from || c.to == b.from || c.from == b.to || c.to == b.to || cross(c, b);
+      });
+      if (!taken) chosen.push_back(b);
+    }
+    return chosen;
+  }
+
+  static bool cross(const Bridge& a, const Bridge& b) {
+    const auto side = [](const cv::Point2f& p, const cv::Point2f& q, const cv::Point2f& x) {
+      return render::cross(q - p, x - p) > 0.0f;
+    };
+    const cv::Point2f &p = a.from->at, &q = a.to->at, &r = b.from->at, &s = b.to->at;
+    return side(p, q, r) != side(p, q, s) && side(r, s, p) != side(r, s, q);
+  }
+
+  // How badly b continues a; nothing if it does not.
+  std::optional<float> misfit(const LineEnd& a, const LineEnd& b) const {
+    const cv::Point2f way = b.at - a.at;
+    const float gap = static_cast<float>(cv::norm(way)), allowed = kStray + kTurn * gap;
+    if (gap < 2.0f || a.into.dot(way) < 0.9f * gap || b.into.dot(way) > -0.9f * gap)
+      return std::nullopt;
+    const float stray =
+        std::max(std::abs(render::cross(a.into, way)), std::abs(render::cross(b.into, way)));
+    if (stray > allowed || hiddenPart(a.at, b.at) < kInHole) return std::nullopt;
+    float sum = 0.0f;
+    for (int s = 0; s <= 2 * kLineHalf; ++s)
+      sum += static_cast<float>(
+                 cv::norm(a.profile[s] - b.profile[2 * kLineHalf - s], cv::NORM_L2SQR)) /
+             3.0f;
+    const float difference =
+        std::sqrt(sum / (2 * kLineHalf + 1)) / std::min(a.contrast, b.contrast);
+    if (difference > kAlike) return std::nullopt;
+    for (const int side : {0, 1}) {
+      if (rms(a.beside[side] - b.beside[1 - side]) >
+          kBesideAlike * std::min(a.contrast, b.contrast))
+        return std::nullopt;
+    }
+    return stray / allowed + difference / kAlike + gap / std::max(hole_.cols, hole_.rows);
+  }
+
+  float hiddenPart(const cv::Point2f& a, const cv::Point2f& b) const {
+    const int steps = std::max(2, cvRound(cv::norm(b - a)));
+    int hidden = 0;
+    for (int i = 0; i <= steps; ++i)
+      hidden += isSet(hole_, a + (static_cast<float>(i) / steps) * (b - a));
+    return static_cast<float>(hidden) / (steps + 1);
+  }
+
+  // The way from a lone end to the nearest connection that it meets, all of it in the hole.
+  std::optional<float> wayTo(const LineEnd& end, const std::vector<Bridge>& bridges,
+                             std::size_t count) const {
+    if (end.contrast < kAloneContrast || !end.isThin()) return std::nullopt;
+    std::optional<float> nearest;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (std::min(bridges[i].from->contrast, bridges[i].to->contrast) < kAsStrong * end.contrast)
+        continue;
+      const cv::Point2f start = bridges[i].from->at, along = bridges[i].to->at - start;
+      const float sine = render::cross(end.into, along);
+      if (std::abs(sine) < 0.2f * cv::norm(along)) continue;
+      const float t = render::cross(start - end.at, along) / sine,
+                  where = render::cross(start - end.at, end.into) / sine;
+      if (t > 2.0f && where >= 0.0f && where <= 1.0f && (!nearest || t < *nearest)) nearest = t;
+    }
+    if (nearest && hiddenPart(end.at, end.at + *nearest * end.into) < kInHole) return std::nullopt;
+    return nearest;
+  }
+
+  // What is seen `t` px before an end, there and back, `s` px beside it.
+  static cv::Point2f mirrored(const LineEnd& end, float t, float s) {
+    const float length = std::clamp(end.length - kLineHalf, 1.0f * kLineHalf, kLongest),
+                turns = std::fmod(t, 2.0f * length);
+    return end.at - (turns < length ? turns : 2.0f * length - turns) * end.into +
+           s * leftOf(end.into);
+  }
+
+  void draw(const Bridge& b, const cv::Mat& known) {
+    const cv::Point2f start = b.from->at,
+                      along =
+                          b.to != nullptr ? cv::Point2f((b.to->at - start) / b.gap) : b.from->into,
+                      stop = start + b.gap * along;
+    const cv::Rect all(0, 0, hole_.cols, hole_.rows);
+    const cv::Rect box = cv::Rect(cv::Point(cvFloor(std::min(start.x, stop.x)) - kLineHalf,
+                                            cvFloor(std::min(start.y, stop.y)) - kLineHalf),
+                                  cv::Point(cvCeil(std::max(start.x, stop.x)) + kLineHalf + 1,
+                                            cvCeil(std::max(start.y, stop.y)) + kLineHalf + 1)) &
+                         all;
+    for (int v = box.y; v < box.br().y; ++v) {
+      for (int u = box.x; u < box.br().x; ++u) {
+        if (hole_.at<std::uint8_t>(v, u) == 0) continue;
+        const cv::Point2f d = cv::Point2f(static_cast<float>(u), static_cast<float>(v)) - start;
+        const float t = d.dot(along), s = d.dot(leftOf(along));
+        if (result_.drawn.at<std::uint8_t>(v, u) != 0 && std::abs(s) > kCore) continue;
+        const float beyond = b.to != nullptr ? kLineHalf : 0.0f;
+        if (std::abs(s) <= kLineHalf && t >= -kLineHalf && t <= b.gap + beyond)
+          drawPixel(b, known, {u, v}, std::clamp(t, 0.0f, b.gap), s);
+      }
+    }
+  }
+
+  // Either half is mirrored from its own end; the colours across the line go over from one end's to
+  // the other's.
+  void drawPixel(const Bridge& b, const cv::Mat& known, const cv::Point& at, float t, float s) {
+    const cv::Point2f from = mirrored(*b.from, t, s);
+    if (!isSet(source_, from)) return;
+    cv::Vec3f colour = sampleLinear(known, from);
+    cv::Point2f origin = from;
+    if (b.to != nullptr) {
+      const cv::Point2f other = mirrored(*b.to, b.gap - t, -s);
+      if (!isSet(source_, other)) return;
+      const int row = std::clamp(cvRound(s) + kLineHalf, 0, 2 * kLineHalf);
+      const cv::Vec3f difference = b.to->profile[2 * kLineHalf - row] - b.from->profile[row];
+      const float part = t / b.gap,
+                  share = std::clamp(0.5f + (t - 0.5f * b.gap) / (2.0f * kCrossFade), 0.0f, 1.0f);
+      colour = (1.0f - share) * (colour + part * difference) +
+               share * (sampleLinear(known, other) - (1.0f - part) * difference);
+      if (share > 0.5f) origin = other;
+    }
+    image_.at<cv::Vec3f>(at) = colour;
+    result_.drawn.at<std::uint8_t>(at) = 255;
+    if (std::abs(s) <= kNear) result_.core.at<std::uint8_t>(at) = 255;
+    result_.origin.at<cv::Vec2s>(at) =
+        cv::Vec2s(cv::saturate_cast<short>(origin.x), cv::saturate_cast<short>(origin.y));
+  }
+
+  const cv::Mat &hole_, &source_;
+  cv::Mat& image_;
+  std::vector<LineEnd> ends_;
+  LineBridges result_;
+};
+
+}  // namespace
+
+LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image,
+                        const Lattice* lattice) {
+  return Bridger(hole, source, image).run(lattice);
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "fill/lattice.hpp"
+
+namespace calipso::render {
+
+struct LineBridges {
+  cv::Mat drawn;  // CV_8UC1: 255 where a pixel of the hole was drawn
+  // CV_8UC1: the part of it that is the line; what is beside it is better filled like everything
+  // else
+  cv::Mat core;
+  cv::Mat origin;  // CV_16SC2: where it was copied from; (-1, -1) elsewhere
+  // CV_8UC1: 255 where those lines are seen; now that they are whole, nothing else should look like
+  // them
+  cv::Mat lines;
+};
+
+// Continues straight edges and lines through a hole: those that enter it at two places, on one line
+// and with the same colours across, are connected; one that meets such a connection within the hole
+// goes on to it. What lies a few pixels beside the line is drawn with it, mirrored from outside the
+// hole, so that it keeps its grain.
+// @param image CV_32FC3, code values; drawn upon
+// @param hole, source CV_8UC1: to be filled; known
+// @param lattice by which the picture repeats itself, may be nullptr: its lines are left to it
+LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image,
+                        const Lattice* lattice = nullptr);
+
+}  // namespace calipso::render

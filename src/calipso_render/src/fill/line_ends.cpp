@@ -1,0 +1,242 @@
+#include "fill/line_ends.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "calipso_render/inpaint.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kShortest = 14.0f;  // px of a line that is seen
+constexpr float kLost = 14.0f;      // px from where a line was lost to the hole, at most
+constexpr float kReach = 8.0f;      // px along a line by which both of its edges may end apart
+// px from the hole at which the line must have been seen: it does not run along the rim
+constexpr float kClear = 4.0f;
+constexpr int kFirst = 2, kLast = 14;  // px before the end over which its colours are averaged
+constexpr int kCentrings = 3;
+// of the contrast: what differs more from its surroundings is the line
+constexpr float kLineItself = 0.3f;
+constexpr float kSameLine = 0.995f;  // cosine between the two edges of a line
+constexpr float kContrast = 12.0f;   // code values across a line, at least
+constexpr int kBesideFirst = kLineHalf + 2,
+              kBesideLast = kLineHalf + 8;  // px beside a line that are not its own
+constexpr float kStandsOut = 3.0f;  // contrast of a line, in deviations of what is beside it
+constexpr float kStray = 1.5f;      // px by which ends may miss each other,
+// change of colours along a line, to their contrast, from which it is another
+constexpr float kSame = 0.2f;
+constexpr float kAgain = 0.25f;  // mean difference, to the contrast, of a line that is seen again
+constexpr float kThin = 0.35f;   // both sides differ by no more than this part of the contrast
+
+class LineEndFinder {
+ public:
+  LineEndFinder(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image)
+      : hole_(hole), source_(source), image_(image) {
+    cv::distanceTransform(hole == 0, away_, cv::DIST_L2, 3);
+  }
+
+  std::vector<LineEnd> run() {
+    cv::Mat weight(hole_.size(), CV_32F, cv::Scalar(0.0f)), grey;
+    weight.setTo(1.0f, source_);
+    cv::Mat smooth = image_.clone();
+    pushPull(image_, weight).copyTo(smooth, source_ == 0);
+    cv::cvtColor(smooth, grey, cv::COLOR_BGR2GRAY);
+    grey.convertTo(grey, CV_8U);
+    std::vector<cv::Vec4f> segments;
+    cv::createLineSegmentDetector(cv::LSD_REFINE_STD)->detect(grey, segments);
+    for (const cv::Vec4f& s : segments) {
+      addEnd({s[0], s[1]}, {s[2], s[3]});
+      addEnd({s[2], s[3]}, {s[0], s[1]});
+    }
+    dropDoubles();
+    return ends_;
+  }
+
+ private:
+  // Both edges of a line were found and are now the same: the longer one stays.
+  void dropDoubles() {
+    const auto isSame = [](const LineEnd& a, const LineEnd& b) {
+      const cv::Point2f apart = b.at - a.at;
+      return a.into.dot(b.into) > kSameLine && std::abs(a.into.dot(apart)) < kReach &&
+             std::abs(render::cross(a.into, apart)) < kStray;
+    };
+    std::stable_sort(ends_.begin(), ends_.end(),
+                     [](const LineEnd& a, const LineEnd& b) { return a.length > b.length; });
+    std::vector<LineEnd> kept;
+    for (const LineEnd& end : ends_) {
+      if (std::none_of(kept.begin(), kept.end(), [&](const LineEnd& k) { return isSame(k, end); }))
+        kept.push_back(end);
+    }
+    ends_ = std::move(kept);
+  }
+
+  void addEnd(cv::Point2f from, cv::Point2f to) {
+    const cv::Point2f way = to - from;
+    float length = static_cast<float>(cv::norm(way));
+    if (length < kShortest) return;
+    const cv::Point2f into = way / length;
+    // The last place that is known, and the hole soon after it.
+    while (length >= kShortest && !isSet(source_, to)) to -= into, length -= 1.0f;
+    if (length < kShortest || away_.at<float>(cv::Point(cvRound(to.x - kLast * into.x),
+                                                        cvRound(to.y - kLast * into.y))) < kClear)
+      return;
+    float reach = 1.0f;
+    while (reach <= kLost && !isSet(hole_, to + reach * into)) reach += 1.0f;
+    if (reach > kLost) return;
+    LineEnd end{to, into, length, {}, 0.0f, {}};
+    if (measure(end) && standsOut(end) && centre(end)) ends_.push_back(end);
+  }
+
+  // An edge of a thin line goes to the line's middle, and along it: through its middles near the
+  // end and far from it.
+  bool centre(LineEnd& end) const {
+    for (int i = 0; i < kCentrings && end.isThin(); ++i) {
+      const auto near = middleAt(end, kFirst, kLast),
+                 far = middleAt(end, static_cast<int>(end.length) - kLast,
+                                static_cast<int>(end.length) - kFirst);
+      if (!near) return true;
+      if (far && end.length > 2 * kLast) end.into = (*near - *far) / cv::norm(*near - *far);
+      end.at = *near + 0.5f * (kFirst + kLast) * end.into;
+      if (!measure(end) || !standsOut(end)) return false;
+    }
+    return true;
+  }
+
+  // Middle of a line `first` to `last` px before its end.
+  std::optional<cv::Point2f> middleAt(const LineEnd& end, int first, int last) const {
+    const cv::Vec3f around = 0.5f * (end.beside[0] + end.beside[1]);
+    float sum = 0.0f, weights = 0.0f;
+    for (int t = first; t <= last; ++t) {
+      for (int s = -kLineHalf; s <= kLineHalf; ++s) {
+        const cv::Point2f p =
+            end.at - static_cast<float>(t) * end.into + static_cast<float>(s) * leftOf(end.into);
+        if (!isSet(source_, p)) continue;
+        const float weight =
+            std::max(0.0f, rms(sampleLinear(image_, p) - around) - kLineItself * end.contrast);
+        sum += static_cast<float>(s) * weight, weights += weight;
+      }
+    }
+    if (weights == 0.0f) return std::nullopt;
+    return end.at - 0.5f * static_cast<float>(first + last) * end.into +
+           (sum / weights) * leftOf(end.into);
+  }
+
+  bool measure(LineEnd& end) const {
+    float least = 255.0f, most = 0.0f;
+    for (int s = -kLineHalf; s <= kLineHalf; ++s) {
+      cv::Vec3f sum;
+      int count = 0;
+      for (int t = kFirst; t <= kLast; ++t) {
+        const cv::Point2f p =
+            end.at - static_cast<float>(t) * end.into + static_cast<float>(s) * leftOf(end.into);
+        if (isSet(source_, p)) sum += sampleLinear(image_, p), ++count;
+      }
+      if (2 * count < kLast - kFirst) return false;
+      const cv::Vec3f mean = sum / count;
+      end.profile[s + kLineHalf] = mean;
+      const float grey = (mean[0] + 2.0f * mean[1] + mean[2]) / 4.0f;
+      least = std::min(least, grey), most = std::max(most, grey);
+    }
+    end.contrast = most - least;
+    end.length = std::min(end.length, sameLength(end));
+    return end.contrast > kContrast;
+  }
+
+  // How far back the line looks as it does at its end.
+  float sameLength(const LineEnd& end) const {
+    for (int t = kLast; t < end.length; ++t) {
+      float sums[2] = {0.0f, 0.0f};  // left and right
+      for (int s = -kLineHalf; s <= kLineHalf; ++s) {
+        const cv::Point2f p =
+            end.at - static_cast<float>(t) * end.into + static_cast<float>(s) * leftOf(end.into);
+        if (!isSet(source_, p)) return static_cast<float>(t);
+        sums[s < 0 ? 0 : 1] +=
+            rms(sampleLinear(image_, p) - end.profile[s + kLineHalf]) / kLineHalf;
+      }
+      if (std::max(sums[0], sums[1]) > kSame * end.contrast) return static_cast<float>(t);
+    }
+    return end.length;
+  }
+
+  // A line among many like it is texture.
+  bool standsOut(LineEnd& end) const {
+    for (const int side : {0, 1}) {
+      cv::Vec3f sum;
+      float squares = 0.0f;
+      int count = 0;
+      for (int s = kBesideFirst; s <= kBesideLast; ++s) {
+        for (int t = kFirst; t <= kLast; ++t) {
+          const cv::Point2f p = end.at - static_cast<float>(t) * end.into +
+                                static_cast<float>(side == 0 ? -s : s) * leftOf(end.into);
+          if (!isSet(source_, p)) continue;
+          const cv::Vec3f c = sampleLinear(image_, p);
+          sum += c, squares += c.dot(c), ++count;
+        }
+      }
+      if (4 * count < (kBesideLast - kBesideFirst) * (kLast - kFirst)) return false;
+      end.beside[side] = sum / count;
+      const float deviation = std::sqrt(
+          std::max(0.0f, squares / count - end.beside[side].dot(end.beside[side])) / 3.0f);
+      if (end.contrast < kStandsOut * deviation) return false;
+    }
+    return true;
+  }
+
+  const cv::Mat &hole_, &source_, &image_;
+  cv::Mat away_;  // CV_32FC1, px from the hole
+  std::vector<LineEnd> ends_;
+};
+
+}  // namespace
+
+bool LineEnd::isThin() const { return rms(beside[0] - beside[1]) < kThin * contrast; }
+
+std::vector<LineEnd> findLineEnds(const cv::Mat& hole, const cv::Mat& source,
+                                  const cv::Mat& image) {
+  return LineEndFinder(hole, source, image).run();
+}
+
+bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,
+             const cv::Mat& image) {
+  int seen = 0, alike = 0;
+  for (int i = -1; i <= 1; ++i) {
+    for (int j = -1; j <= 1; ++j) {
+      const cv::Vec2f n = lattice.basis * cv::Vec2f(i, j);
+      const cv::Point2f shift(n[0], n[1]);
+      if (std::abs(render::cross(end.into, shift)) < kLineHalf) continue;
+      float sum = 0.0f;
+      int count = 0;
+      for (int t = kFirst; t <= kLast; ++t) {
+        for (int s = -kLineHalf; s <= kLineHalf; ++s) {
+          const cv::Point2f p = end.at + shift - static_cast<float>(t) * end.into +
+                                static_cast<float>(s) * leftOf(end.into);
+          if (isSet(source, p))
+            sum += rms(sampleLinear(image, p) - end.profile[s + kLineHalf]), ++count;
+        }
+      }
+      if (2 * count < (kLast - kFirst) * (2 * kLineHalf + 1)) continue;
+      ++seen, alike += sum < kAgain * end.contrast * static_cast<float>(count);
+    }
+  }
+  return 2 * alike > seen;
+}
+
+float rms(const cv::Vec3f& c) { return std::sqrt(c.dot(c) / 3.0f); }
+
+bool isSet(const cv::Mat& mask, const cv::Point2f& p) {
+  return p.x >= 0.0f && p.y >= 0.0f && p.x <= mask.cols - 1.0f && p.y <= mask.rows - 1.0f &&
+         mask.at<std::uint8_t>(cvRound(p.y), cvRound(p.x)) != 0;
+}
+
+cv::Vec3f sampleLinear(const cv::Mat& image, const cv::Point2f& p) {
+  const int x = std::clamp(static_cast<int>(std::floor(p.x)), 0, image.cols - 2),
+            y = std::clamp(static_cast<int>(std::floor(p.y)), 0, image.rows - 2);
+  const float a = std::clamp(p.x - x, 0.0f, 1.0f), b = std::clamp(p.y - y, 0.0f, 1.0f);
+  const cv::Vec3f *upper = image.ptr<cv::Vec3f>(y) + x, *lower = image.ptr<cv::Vec3f>(y + 1) + x;
+  return (1.0f - b) * ((1.0f - a) * upper[0] + a * upper[1]) +
+         b * ((1.0f - a) * lower[0] + a * lower[1]);
+}
+
+}  // namespace calipso::render

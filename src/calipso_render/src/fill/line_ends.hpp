@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "fill/lattice.hpp"
+
+namespace calipso::render {
+
+constexpr int kLineHalf = 4;  // px on either side of a line that are drawn with it
+
+using LineProfile = std::array<cv::Vec3f, 2 * kLineHalf + 1>;  // colours across a line
+
+// A line that is lost in the hole.
+struct LineEnd {
+  cv::Point2f at, into;  // into: unit direction towards the hole
+  float length;          // px that are seen of it
+  LineProfile profile;   // from left to right of `into`
+  float contrast;
+  std::array<cv::Vec3f, 2> beside;  // mean colours left and right of it
+
+  bool isThin() const;  // a line, not an edge between two things
+};
+
+// Lines and edges that stand out from what is beside them and end at the hole, the longest first.
+// @param image CV_32FC3, code values; hole, source CV_8UC1: to be filled; known
+std::vector<LineEnd> findLineEnds(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image);
+
+// Is a line seen again at the shifts of a lattice that lead off it?
+bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,
+             const cv::Mat& image);
+
+inline cv::Point2f leftOf(const cv::Point2f& d) { return {d.y, -d.x}; }
+inline float cross(const cv::Point2f& a, const cv::Point2f& b) { return a.x * b.y - a.y * b.x; }
+float rms(const cv::Vec3f& c);
+
+// Is the pixel nearest to p set in a mask?
+bool isSet(const cv::Mat& mask, const cv::Point2f& p);
+
+// Bilinear. @param image CV_32FC3
+cv::Vec3f sampleLinear(const cv::Mat& image, const cv::Point2f& p);
+
+}  // namespace calipso::render

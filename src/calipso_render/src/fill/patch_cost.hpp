@@ -1,0 +1,45 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calipso_render/inpaint.hpp"
+#include "fill/lattice.hpp"
+#include "fill/patch_levels.hpp"
+
+namespace calipso::render {
+
+constexpr int kPatchRadius = 3;  // px; patches are squares of 7
+constexpr int kPatchSide = 2 * kPatchRadius + 1;
+
+// What it costs to copy the patch around q to p: how unlike they look, in squared code values
+// summed over the patch, and how little like the places are. Patches must lie within the picture.
+class PatchCost {
+ public:
+  // @param scale   size of the level's pixels in those of the finest
+  // @param horizon difference of nearness that does not count
+  // @param lattice by which the picture repeats itself, px of the finest level; may be nullptr
+  PatchCost(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
+            const InpaintParams& params);
+
+  // No less than `bound` if it is not below. @param image CV_32FC4
+  float distance(const cv::Mat& image, const cv::Point& p, const cv::Point& q, float bound) const;
+  // By a part of the patch, `seen` from its middle.
+  float partialDistance(const cv::Mat& image, const cv::Point& p, const cv::Point& q,
+                        const std::vector<cv::Point>& seen, float bound) const;
+
+  // The place nearest to q from which p can be copied by a shift of the lattice; q without one.
+  cv::Point onLattice(const cv::Point& p, const cv::Point& q) const;
+
+ private:
+  float awayCost(const cv::Point& p, const cv::Point& q) const;
+  float offLattice(const cv::Point& shift) const;
+
+  cv::Mat nearness_, surface_;
+  bool has_nearness_, has_surface_;
+  float scale_, horizon_;
+  const Lattice* lattice_;
+  float away_row_, away_column_, away_farther_;  // as InpaintParams'
+};
+
+}  // namespace calipso::render

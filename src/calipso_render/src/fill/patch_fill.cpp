@@ -1,0 +1,350 @@
+#include "fill/patch_fill.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+#include <vector>
+
+#include "fill/patch_cost.hpp"
+#include "fill/patch_levels.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kBandRows = 16;       // rows that one thread searches in order
+constexpr int kFirstGuesses = 200;  // places tried for a patch of the rim
+// px around the best place in which levels, and the finest, look further
+constexpr int kFarthest = 16, kFinest = 2;
+constexpr int kSweeps = 2;  // of a search
+// part of the patches that a sweep leads elsewhere, below which no further round follows
+constexpr float kSettled = 0.05f;
+// times better than what continues a neighbour's copy a place beside it must be: pieces stay large
+constexpr float kJump = 1.6f;
+constexpr float kHorizon = 6.0f;  // px of height by which a source may miss PatchCost's limits
+
+cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
+cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_cast<short>(p.y)}; }
+
+// One level's hole: the nearest source patch of every patch that touches it, and the picture that
+// they make.
+class Filling {
+ public:
+  // @param horizon difference of nearness that does not count
+  Filling(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
+          const InpaintParams& params)
+      : image_(level.image.clone()),
+        hole_(level.hole),
+        scale_(scale),
+        rules_(level, scale, horizon, lattice, params),
+        params_(params),
+        to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
+        cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)),
+        plain_(hole_.size(), CV_8U, cv::Scalar(0)),
+        bands_((hole_.rows + kBandRows - 1) / kBandRows) {
+    const cv::Mat patch = cv::Mat::ones(kPatchSide, kPatchSide, CV_8U);
+    cv::Mat touched;
+    cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+    cv::findNonZero(whole_, sources_);
+    cv::dilate(hole_, touched, patch);
+    for (int v = kPatchRadius; v + kPatchRadius < hole_.rows; ++v) {
+      for (int u = kPatchRadius; u + kPatchRadius < hole_.cols; ++u) {
+        if (touched.at<std::uint8_t>(v, u) != 0) bands_[v / kBandRows].emplace_back(u, v);
+      }
+    }
+  }
+
+  bool possible() const {
+    return !sources_.empty() && std::any_of(bands_.begin(), bands_.end(),
+                                            [](const auto& band) { return !band.empty(); });
+  }
+
+  // From the rim inwards: a ring's patches are compared by what is known of them, then the ring is
+  // filled.
+  void peel() {
+    cv::Mat known = hole_ == 0, ring;
+    for (;;) {
+      cv::dilate(known, ring, cv::Mat::ones(3, 3, CV_8U));
+      ring &= hole_ & (known == 0);
+      std::vector<cv::Point> pixels;
+      cv::findNonZero(ring, pixels);
+      if (pixels.empty()) return;
+      std::vector<Guess> guesses(pixels.size());
+#pragma omp parallel for schedule(dynamic, 8)
+      for (std::size_t i = 0; i < pixels.size(); ++i)
+        guesses[i] = firstGuess(centreFor(pixels[i]), known);
+      for (std::size_t i = 0; i < pixels.size(); ++i) spreadMatch(centreFor(pixels[i]), guesses[i]);
+      for (const cv::Point& pixel : pixels) {
+        const cv::Point p = centreFor(pixel);
+        image_.at<cv::Vec4f>(pixel) = image_.at<cv::Vec4f>(match(p) + pixel - p);
+      }
+      known |= ring;
+    }
+  }
+
+  // Takes over, twice as far, what half the size found. At the finest level it is copied at once:
+  // means of patches would be blurred, and resemble bland places most.
+  void startFrom(const Filling& coarse) {
+    forEachPatch([&](const cv::Point& p) {
+      const cv::Point c = coarse.centreFor({p.x / 2, p.y / 2});
+      const cv::Vec2s from = coarse.to_.at<cv::Vec2s>(c);
+      if (from[0] < 0) return;
+      const cv::Point q = p + 2 * (point(from) - c);
+      for (int i = 0; i < 9 && !hasMatch(p); ++i) {
+        const cv::Point near = i == 0 ? q : q + jitter(p, i, kFinest);
+        if (isWhole(near)) to_.at<cv::Vec2s>(p) = shorts(near);
+      }
+    });
+    if (scale_ > 1.0f)
+      vote();
+    else
+      copy();
+  }
+
+  // @param reach px around the best place found so far in which others are tried
+  // @return part of the patches that were led elsewhere
+  float search(int reach) {
+    std::vector<int> changes(bands_.size(), 0);
+    forEachPatch([&](const cv::Point& p) {
+      if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(anySource(p, 0));
+      cost_.at<float>(p) = rules_.distance(image_, p, match(p), 1e30f);
+      plain_.at<std::uint8_t>(p) = 255;
+    });
+    for (int s = 0; s < kSweeps; ++s) {
+      ++sweep_;
+      // Bands beside each other never at the same time: they read each other's rims.
+      for (int first = 0; first < 2; ++first) {
+#pragma omp parallel for schedule(dynamic, 1)
+        for (int b = first; b < static_cast<int>(bands_.size()); b += 2)
+          changes[b] += searchBand(bands_[b], sweep_ % 2 == 0, reach);
+      }
+    }
+    std::size_t all = 0;
+    for (const auto& band : bands_) all += band.size();
+    return static_cast<float>(std::accumulate(changes.begin(), changes.end(), 0)) /
+           static_cast<float>(kSweeps * all);
+  }
+
+  // Every hole pixel becomes the mean of what the patches over it have there, good ones above all.
+  void vote() {
+    std::vector<float> costs;
+    for (const auto& band : bands_) {
+      for (const cv::Point& p : band) costs.push_back(cost_.at<float>(p));
+    }
+    const std::size_t part = 3 * costs.size() / 4;
+    std::nth_element(costs.begin(), costs.begin() + part, costs.end());
+    const float scale = -0.5f / std::max(costs[part], 1.0f);
+    cv::Mat weights(hole_.size(), CV_32F, cv::Scalar(0.0f)), next = image_.clone();
+    forEachPatch([&](const cv::Point& p) {
+      weights.at<float>(p) = hasMatch(p) ? std::exp(scale * cost_.at<float>(p)) + 1e-6f : 0.0f;
+    });
+#pragma omp parallel for schedule(dynamic, 4)
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        if (hole_.at<std::uint8_t>(v, u) != 0) next.at<cv::Vec4f>(v, u) = meanVote({u, v}, weights);
+      }
+    }
+    image_ = next;
+  }
+
+  // Every hole pixel becomes what the patch around it has there.
+  void copy() {
+    const cv::Mat from = origins();
+    cv::Mat next = image_.clone();
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        const cv::Vec2s q = from.at<cv::Vec2s>(v, u);
+        if (q[0] >= 0) next.at<cv::Vec4f>(v, u) = image_.at<cv::Vec4f>(q[1], q[0]);
+      }
+    }
+    image_ = next;
+  }
+
+  cv::Mat origins() const {
+    cv::Mat origin(hole_.size(), CV_16SC2, cv::Scalar(-1, -1));
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        if (hole_.at<std::uint8_t>(v, u) == 0) continue;
+        const cv::Point p = centreFor({u, v});
+        if (hasMatch(p)) origin.at<cv::Vec2s>(v, u) = shorts(match(p) + cv::Point(u, v) - p);
+      }
+    }
+    return origin;
+  }
+
+ private:
+  cv::Point match(const cv::Point& p) const { return point(to_.at<cv::Vec2s>(p)); }
+  bool hasMatch(const cv::Point& p) const { return to_.at<cv::Vec2s>(p)[0] >= 0; }
+  bool inside(const cv::Point& p) const {
+    return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
+  }
+  bool isWhole(const cv::Point& p) const { return inside(p) && whole_.at<std::uint8_t>(p) != 0; }
+  cv::Point anySource(const cv::Point& p, int salt) const {
+    return sources_[random(p, salt) % sources_.size()];
+  }
+
+  // The nearest centre of a patch that lies within the picture.
+  cv::Point centreFor(const cv::Point& p) const {
+    return {std::clamp(p.x, kPatchRadius, hole_.cols - 1 - kPatchRadius),
+            std::clamp(p.y, kPatchRadius, hole_.rows - 1 - kPatchRadius)};
+  }
+
+  template <typename Do>
+  void forEachPatch(Do act) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t b = 0; b < bands_.size(); ++b) {
+      for (const cv::Point& p : bands_[b]) act(p);
+    }
+  }
+
+  int searchBand(const std::vector<cv::Point>& band, bool backwards, int reach) {
+    const int step = backwards ? 1 : -1;
+    int changed = 0;
+    for (std::size_t i = 0; i < band.size(); ++i) {
+      const cv::Point p = band[backwards ? band.size() - 1 - i : i], before = match(p);
+      for (const cv::Point& d : {cv::Point(step, 0), cv::Point(0, step)}) {
+        if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d, 1.0f);
+      }
+      for (int r = reach; r >= 1; r /= 2) {
+        const cv::Point q = match(p) + jitter(p, r, r);
+        attempt(p, rules_.onLattice(p, q), kJump);
+      }
+      changed += match(p) != before;
+    }
+    return changed;
+  }
+
+  // @param better how many times the cost must be lower
+  void attempt(const cv::Point& p, const cv::Point& q, float better) {
+    if (!isWhole(q)) return;
+    std::uint8_t& plain = plain_.at<std::uint8_t>(p);
+    // Most neighbours lead to where a patch has been led already.
+    if (q == match(p) && (plain != 0 || better > 1.0f)) return;
+    float& least = cost_.at<float>(p);
+    const float cost = better * rules_.distance(image_, p, q, least / better);
+    if (cost >= least) return;
+    least = cost, to_.at<cv::Vec2s>(p) = shorts(q);
+    plain = better > 1.0f ? 0 : 255;
+  }
+
+  // A patch of the rim, the best place found for it and what that costs.
+  struct Guess {
+    std::vector<cv::Point> seen;  // what is known of it, from its middle
+    cv::Point best;
+    float least;
+  };
+
+  void attempt(const cv::Point& p, cv::Point q, Guess& guess) const {
+    q = rules_.onLattice(p, q);
+    const float cost =
+        isWhole(q) ? rules_.partialDistance(image_, p, q, guess.seen, guess.least) : guess.least;
+    if (cost < guess.least) guess.least = cost, guess.best = q;
+  }
+
+  // Among places all over the picture.
+  Guess firstGuess(const cv::Point& p, const cv::Mat& known) const {
+    Guess guess{knownAround(p, known), anySource(p, 0), 0.0f};
+    guess.least = rules_.partialDistance(image_, p, guess.best, guess.seen, 1e30f);
+    for (int i = 1; i < kFirstGuesses; ++i) attempt(p, anySource(p, i), guess);
+    return guess;
+  }
+
+  // Then its neighbours' and around the best.
+  void spreadMatch(const cv::Point& p, Guess& guess) {
+    for (int dv = -2; dv <= 2; ++dv) {
+      for (int du = -2; du <= 2; ++du) {
+        const cv::Point d(du, dv);
+        if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d, guess);
+      }
+    }
+    for (int reach = 8; reach >= 1; reach /= 2) {
+      for (int i = 0; i < 6; ++i)
+        attempt(p, guess.best + jitter(p, kFirstGuesses + 8 * i + reach, reach), guess);
+    }
+    to_.at<cv::Vec2s>(p) = shorts(guess.best);
+  }
+
+  // What is known of the patch around a place, from it.
+  static std::vector<cv::Point> knownAround(const cv::Point& p, const cv::Mat& known) {
+    std::vector<cv::Point> seen;
+    for (int dv = -kPatchRadius; dv <= kPatchRadius; ++dv) {
+      for (int du = -kPatchRadius; du <= kPatchRadius; ++du) {
+        if (known.at<std::uint8_t>(p + cv::Point(du, dv)) != 0) seen.push_back({du, dv});
+      }
+    }
+    return seen;
+  }
+
+  cv::Vec4f meanVote(const cv::Point& pixel, const cv::Mat& weights) const {
+    cv::Vec4f sum;
+    float total = 0.0f;
+    for (int dv = -kPatchRadius; dv <= kPatchRadius; ++dv) {
+      for (int du = -kPatchRadius; du <= kPatchRadius; ++du) {
+        const cv::Point centre = pixel + cv::Point(du, dv);
+        const float w = inside(centre) ? weights.at<float>(centre) : 0.0f;
+        if (w > 0.0f)
+          sum += w * image_.at<cv::Vec4f>(match(centre) - cv::Point(du, dv)), total += w;
+      }
+    }
+    return total > 0.0f ? cv::Vec4f(sum / total) : image_.at<cv::Vec4f>(pixel);
+  }
+
+  cv::Point jitter(const cv::Point& p, int salt, int reach) const {
+    const std::uint32_t h = random(p, 1024 + salt);
+    return {static_cast<int>((h & 0xffff) % (2 * reach + 1)) - reach,
+            static_cast<int>((h >> 16) % (2 * reach + 1)) - reach};
+  }
+
+  std::uint32_t random(const cv::Point& p, int salt) const {
+    std::uint32_t h = params_.seed * 0x9e3779b9u ^ static_cast<std::uint32_t>(p.x) * 0x85ebca6bu ^
+                      static_cast<std::uint32_t>(p.y) * 0xc2b2ae35u ^
+                      static_cast<std::uint32_t>(salt + 2048 * sweep_) * 0x27d4eb2fu;
+    h ^= h >> 15, h *= 0x2c1b3c6du, h ^= h >> 12, h *= 0x297a2d39u, h ^= h >> 15;
+    return h;
+  }
+
+  cv::Mat image_, hole_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
+  float scale_;                   // size of these pixels in the finest level's
+  PatchCost rules_;
+  InpaintParams params_;
+  cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
+  cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
+  std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
+  std::vector<cv::Point> sources_;
+  int sweep_ = 0;
+};
+
+// Search and vote in turn until hardly any patch is led elsewhere.
+void settle(Filling& filling, int rounds, int reach) {
+  for (int i = 0; i < rounds; ++i) {
+    const float changed = filling.search(reach);
+    filling.vote();
+    if (changed < kSettled) return;
+  }
+}
+
+}  // namespace
+
+cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
+                     const Lattice* lattice, const InpaintParams& params) {
+  const std::vector<FillLevel> levels = fillLevels(image, hole, source, params);
+  const float horizon = params.nearness.empty() ? 0.0f : kHorizon * nearnessPerRow(params.nearness);
+  const int coarsest = static_cast<int>(levels.size()) - 1;
+  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, lattice, params);
+  if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
+  filling.peel();
+  settle(filling, params.coarsest_rounds, std::max(hole.cols, hole.rows) >> coarsest);
+  for (int k = coarsest - 1; k >= 0; --k) {
+    Filling finer(levels[k], static_cast<float>(1 << k), horizon, lattice, params);
+    finer.startFrom(filling);
+    if (k > 0)
+      settle(finer, params.rounds, kFarthest);
+    else
+      finer.search(kFinest);
+    filling = std::move(finer);
+  }
+  return filling.origins();
+}
+
+}  // namespace calipso::render

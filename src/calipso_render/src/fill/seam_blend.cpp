@@ -1,0 +1,128 @@
+#include "fill/seam_blend.hpp"
+
+#include <cmath>
+#include <opencv2/core/hal/intrin.hpp>
+#include <vector>
+
+namespace calipso::render {
+namespace {
+
+// inverse square of the distance, px, over which a seam is spread
+constexpr float kScreen = 0.003f;
+// code values; what misses by much more is an edge of things, not a seam to be spread
+constexpr float kEdge = 25.0f;
+constexpr float kScreenEdge = 0.3f;  // kScreen of what an edge misses
+// of Gauss-Seidel: seams go on changing slowly far away, what an edge misses is settled soon
+constexpr float kRelax = 1.8f, kRelaxEdge = 1.46f;
+constexpr int kIterations = 30, kIterationsEdge = 12;
+const cv::Point kAround[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+
+struct Node {
+  int neighbours[4];     // what is no unknown is the node after the last, which nothing is added to
+  float count = 0.0f;    // neighbours that pull, known ones included
+  cv::Vec4f seam, edge;  // what the copies' differences leave over, as a seam and as an edge
+  cv::Point at;
+};
+
+cv::Vec4f widened(const cv::Vec3f& c) { return {c[0], c[1], c[2], 0.0f}; }
+
+class Seams {
+ public:
+  Seams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, const cv::Mat& image)
+      : hole_(hole), source_(source), origin_(origin), image_(image) {}
+
+  std::vector<Node> nodes() const {
+    cv::Mat index(hole_.size(), CV_32S, cv::Scalar(-1));
+    std::vector<Node> nodes;
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        if (hole_.at<std::uint8_t>(v, u) == 0) continue;
+        index.at<int>(v, u) = static_cast<int>(nodes.size());
+        Node node;
+        node.at = {u, v};
+        nodes.push_back(node);
+      }
+    }
+#pragma omp parallel for schedule(static)
+    for (std::size_t k = 0; k < nodes.size(); ++k) link(index, nodes[k], nodes.size());
+    return nodes;
+  }
+
+ private:
+  void link(const cv::Mat& index, Node& node, std::size_t none) const {
+    for (int i = 0; i < 4; ++i) {
+      const cv::Point q = node.at + kAround[i];
+      node.neighbours[i] = static_cast<int>(none);
+      if (!inside(q) || (index.at<int>(q) < 0 && source_.at<std::uint8_t>(q) == 0)) continue;
+      if (index.at<int>(q) >= 0) node.neighbours[i] = index.at<int>(q);
+      node.count += 1.0f;
+      const cv::Vec3f miss = colour(q) - colour(node.at) - wanted(node.at, q);
+      const cv::Vec3f seam = miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
+      node.seam += widened(seam), node.edge += widened(miss - seam);
+    }
+  }
+
+  bool inside(const cv::Point& p) const {
+    return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
+  }
+  bool isSource(const cv::Point& p) const { return inside(p) && source_.at<std::uint8_t>(p) != 0; }
+  const cv::Vec3f& colour(const cv::Point& p) const { return image_.at<cv::Vec3f>(p); }
+
+  // The difference from p to its neighbour q in the places that they are copies of, as far as it
+  // can be seen there.
+  cv::Vec3f wanted(const cv::Point& p, const cv::Point& q) const {
+    cv::Vec3f sum;
+    int seen = 0;
+    for (const bool at_p : {true, false}) {
+      const cv::Vec2s from = origin_.at<cv::Vec2s>(at_p ? p : q);
+      if (from[0] < 0) continue;
+      const cv::Point own(from[0], from[1]), other = at_p ? own + (q - p) : own + (p - q);
+      if (!isSource(other)) continue;
+      sum += at_p ? colour(other) - colour(own) : colour(own) - colour(other), ++seen;
+    }
+    return seen > 0 ? cv::Vec3f(sum / seen) : cv::Vec3f(0, 0, 0);
+  }
+
+  const cv::Mat &hole_, &source_, &origin_, &image_;
+};
+
+// What is added: mismatches spread by a screened Poisson equation, all channels at once. Known
+// pixels, for which the last node stands, get nothing.
+std::vector<cv::Vec4f> spread(const std::vector<Node>& nodes, cv::Vec4f Node::*mismatch,
+                              float screen, float relax, int iterations) {
+  std::vector<cv::Vec4f> change(nodes.size() + 1, cv::Vec4f::all(0.0f));
+  const auto at = [&](int i) { return cv::v_load(change[i].val); };
+  for (int k = 0; k < iterations; ++k) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const Node& n = nodes[i];
+      const int* j = n.neighbours;
+      const cv::v_float32x4 own = at(static_cast<int>(i)), sum = cv::v_load((n.*mismatch).val) +
+                                                                 at(j[0]) + at(j[1]) + at(j[2]) +
+                                                                 at(j[3]);
+      cv::v_store(change[i].val, own * cv::v_setall_f32(1.0f - relax) +
+                                     sum * cv::v_setall_f32(relax / (n.count + screen)));
+    }
+  }
+  return change;
+}
+
+}  // namespace
+
+void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, cv::Mat& image) {
+  const std::vector<Node> nodes = Seams(hole, source, origin, image).nodes();
+  std::vector<cv::Vec4f> wide, narrow;
+#pragma omp parallel sections
+  {
+#pragma omp section
+    wide = spread(nodes, &Node::seam, kScreen, kRelax, kIterations);
+#pragma omp section
+    narrow = spread(nodes, &Node::edge, kScreenEdge, kRelaxEdge, kIterationsEdge);
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    cv::Vec3f& colour = image.at<cv::Vec3f>(nodes[i].at);
+    for (int c = 0; c < 3; ++c)
+      colour[c] = std::min(255.0f, std::max(0.0f, colour[c] + wide[i][c] + narrow[i][c]));
+  }
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,114 @@
+#include "frame/edge_blur.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <vector>
+
+#include "calipso_render/colour.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kAcross = 4, kAlong = 2;  // px of an outline that are looked at around a place
+constexpr int kStride = 3;              // places on an outline
+constexpr float kContrast = 0.05f;      // linear: the least that tells
+constexpr float kMisfit = 0.1f;         // of the contrast, r.m.s.: more is no plain step
+constexpr float kFurthest = 1.5f;       // px between the mask's outline and the picture's
+constexpr std::size_t kFewest = 12;     // places
+constexpr double kQuantile = 0.25;
+constexpr float kPixel = 0.288675f;  // standard deviation of a pixel's own width, px
+constexpr float kFinest = 1.15f;     // factor between the widths that are tried
+constexpr float kWidest = 3.0f;      // px
+
+struct Sample {
+  float across, value;  // px outwards; linear brightness
+};
+
+// R.m.s. of what a step at `edge`, `width` wide, leaves of the samples, over its height.
+float misfit(const std::vector<Sample>& samples, float edge, float width) {
+  // Least squares for value = a + b s(across), s from 0 to 1.
+  double n = 0, s1 = 0, s2 = 0, v1 = 0, v2 = 0, sv = 0;
+  for (const Sample& p : samples) {
+    const double s = 0.5 * std::erfc((edge - p.across) / (width * M_SQRT2));
+    ++n, s1 += s, s2 += s * s, v1 += p.value, v2 += p.value * p.value, sv += s * p.value;
+  }
+  const double spread = s2 - s1 * s1 / n, slope = spread > 0.0 ? (sv - s1 * v1 / n) / spread : 0.0;
+  if (std::abs(slope) < kContrast) return std::numeric_limits<float>::max();
+  const double left = v2 - v1 * v1 / n - slope * (sv - s1 * v1 / n);
+  return static_cast<float>(std::sqrt(std::max(left, 0.0) / n) / std::abs(slope));
+}
+
+std::optional<float> widthOf(const std::vector<Sample>& samples) {
+  float best = kMisfit, width = 0.0f;
+  for (float edge = -kFurthest; edge <= kFurthest; edge += 0.25f) {
+    for (float tried = kPixel; tried < kWidest; tried *= kFinest) {
+      const float left = misfit(samples, edge, tried);
+      if (left < best) best = left, width = tried;
+    }
+  }
+  return width > 0.0f ? std::make_optional(width) : std::nullopt;
+}
+
+class Outlines {
+ public:
+  Outlines(const cv::Mat& picture, const cv::Mat& labels) : picture_(picture), labels_(labels) {
+    cv::Mat mask = labels != 0;
+    mask.convertTo(mask, CV_32F, 1.0 / 255.0);
+    cv::GaussianBlur(mask, mask, {0, 0}, 2.0);
+    cv::Sobel(mask, along_u_, CV_32F, 1, 0), cv::Sobel(mask, along_v_, CV_32F, 0, 1);
+  }
+
+  std::vector<float> widths() const {
+    std::vector<std::vector<cv::Point>> outlines;
+    cv::findContours(labels_ != 0, outlines, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
+    std::vector<float> found;
+    for (const auto& outline : outlines)
+      for (std::size_t i = 0; i < outline.size(); i += kStride)
+        if (const auto width = widthOf(samplesAt(outline[i]))) found.push_back(*width);
+    return found;
+  }
+
+ private:
+  // Pixels around a place of the outline; none close to the picture's border.
+  std::vector<Sample> samplesAt(const cv::Point& place) const {
+    constexpr int kReach = kAcross + kAlong;
+    const cv::Rect around(place.x - kReach, place.y - kReach, 2 * kReach + 1, 2 * kReach + 1);
+    const Eigen::Vector2f normal(-along_u_.at<float>(place), -along_v_.at<float>(place));
+    std::vector<Sample> samples;
+    if ((around & cv::Rect({0, 0}, labels_.size())) != around || normal.norm() < 1e-3f)
+      return samples;
+    const Eigen::Vector2f n = normal.normalized();
+    for (int v = around.y; v < around.br().y; ++v) {
+      for (int u = around.x; u < around.br().x; ++u) {
+        const Eigen::Vector2f off(static_cast<float>(u - place.x), static_cast<float>(v - place.y));
+        const float across = n.dot(off), along = n.x() * off.y() - n.y() * off.x();
+        if (std::abs(across) > kAcross || std::abs(along) > kAlong) continue;
+        const cv::Vec3f& code = picture_.at<cv::Vec3f>(v, u);
+        samples.push_back(
+            {across, luminance({linearFromRealCode(code[0]), linearFromRealCode(code[1]),
+                                linearFromRealCode(code[2])})});
+      }
+    }
+    return samples;
+  }
+
+  const cv::Mat& picture_;
+  const cv::Mat& labels_;
+  cv::Mat along_u_, along_v_;  // CV_32FC1: gradient of the blurred mask
+};
+
+}  // namespace
+
+float outlineBlur(const cv::Mat& picture, const cv::Mat& labels) {
+  std::vector<float> widths = Outlines(picture, labels).widths();
+  if (widths.size() < kFewest) return 0.0f;
+  const auto quantile = widths.begin() + static_cast<std::ptrdiff_t>(kQuantile * widths.size());
+  std::nth_element(widths.begin(), quantile, widths.end());
+  return std::sqrt(std::max(*quantile * *quantile - kPixel * kPixel, 0.0f));
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,146 @@
+// The part of FrameCompositor that tells what an edit changes: light on the support planes, and
+// what stays.
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+#include "frame/frame_compositor.hpp"
+#include "frame/mask_morphology.hpp"
+#include "frame/tiled_filter.hpp"
+
+namespace calipso::render {
+namespace {
+
+// mask margins around a surface at rest in which the frame's pixels stay
+constexpr int kRimReach = 4;
+
+}  // namespace
+
+bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px) {
+  Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Array2f moved = (now[triangle[i]] - then[triangle[i]]).head<2>();
+    low = low.min(moved), high = high.max(moved);
+  }
+  return (low < px).all() && (high > -px).all();
+}
+
+// Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by
+// some pixels, so what lies that near to both the shadow and the change is taken from the plate. A
+// change of single pixels is noise of the shadow's border and moves nothing.
+void FrameCompositor::findRelit() {
+  relit_ = cv::Mat::zeros(region_.size(), CV_8U);
+  const int reach = params_.background.shadow_margin_px, side = reach + 2;
+  const auto around = [side](const cv::Rect& r) {
+    return r.empty() ? r
+                     : cv::Rect(r.x - side, r.y - side, r.width + 2 * side, r.height + 2 * side);
+  };
+  const cv::Rect box = around(shadows_.shaded_box) & around(sun_changes_.box()) & region_;
+  if (box.empty()) return;
+  cv::Mat change(box.size(), CV_8U);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = box.y; v < box.br().y; ++v)
+    findChange(v, box.x, box.br().x, change.ptr<std::uint8_t>(v - box.y));
+  cv::Mat grown(box.size(), CV_8U);
+  filterTiles(openedByThree(change), reach, grown, DiscDilation(reach));
+  cv::min(grown, shadows_.shaded(box), grown);
+  filterTiles(grown, 1, relit_(box - region_.tl()), [](const cv::Mat& from, cv::Mat& to) {
+    cv::blur(from, to, {3, 3});
+  });
+}
+
+// changeOfLight() at columns [from, to) of row v, where it is more than a pixel can follow.
+void FrameCompositor::findChange(int v, int from, int to, std::uint8_t* out) const {
+  std::memset(out, 0, to - from);
+  const auto rowOf = [&](const cv::Mat& picture) {
+    return picture.ptr<std::uint8_t>(v - region_.y) - region_.x;
+  };
+  const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
+                     *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_),
+                     *takes = rowOf(takes_light_);
+  const float umbra = kPerLevel * luminance(prepared_.umbra), lit = kPerLevel - umbra;
+  sun_changes_.visitRow(v, from, to, [&](int begin, int end) {
+    for (int u = begin; u < end; ++u) {
+      const int more_sky = sky[u] - sky_before[u], more_sun = sun[u] - sun_before[u];
+      const int beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
+      if (takes[u] == 0 || (more_sun == 0 && beyond == 0)) continue;
+      out[u - from] = changeOfLight(
+          std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
+    }
+  });
+}
+
+// The rim of an original's pixels belongs to the surface beside it, not to another edited object's.
+void FrameCompositor::keepRims(const cv::Mat& owner) {
+  cv::Mat rims = cv::Mat::zeros(region_.size(), CV_32F);
+  const int margin = params_.background.mask_margin_px, side = 2 * kRimReach * margin + 1;
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (!edited_[i]) continue;
+    cv::Mat rim = cv::Mat::zeros(region_.size(), CV_32F),
+            foreign = cv::Mat::zeros(region_.size(), CV_8U);
+    still_.copyTo(rim, owner == static_cast<int>(i));
+    cv::dilate(rim, rim, cv::Mat::ones(side, side, CV_8U));
+    for (std::size_t j = 0; j < edited_.size(); ++j) {
+      if (edited_[j] && j != i) foreign |= originalOf(static_cast<int>(j));
+    }
+    cv::dilate(foreign, foreign, disc(margin));
+    const cv::Mat original = originalOf(static_cast<int>(i));
+    cv::Mat own, inner;
+    cv::dilate(original, own, disc(margin));
+    cv::erode(original, inner, disc(margin));
+    foreign.setTo(0, own);
+    rim.setTo(0.0f,
+              foreign | inner);  // what the object has left shows it in the video, and is no rim
+    rims = cv::max(rims, rim);
+  }
+  rims.copyTo(still_, owner < 0);
+}
+
+// The triangles with a point that may be at rest.
+bool FrameCompositor::findResting(int slot, std::vector<char>& can_rest) const {
+  const Actor& actor = actors_[slot];
+  can_rest.assign(actor.surface->triangles.size(), 0);
+  if (observed_[slot].points.empty()) return false;
+  bool any = false;
+#pragma omp parallel for schedule(static) reduction(|| : any)
+  for (std::size_t t = 0; t < can_rest.size(); ++t) {
+    can_rest[t] = mayMoveLess(actor.screen.points, observed_[slot].points,
+                              actor.surface->triangles[t], kMovedPx);
+    any = any || can_rest[t] != 0;
+  }
+  return any;
+}
+
+void FrameCompositor::findStill() {
+  if (!params_.keep_still) return;
+  std::vector<std::vector<char>> can_rest(actors_.size());
+  bool any = false;
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot)
+    any = findResting(static_cast<int>(slot), can_rest[slot]) || any;
+  if (!any) return;
+  still_ = cv::Mat::zeros(region_.size(), CV_32F);
+  cv::Mat owner(region_.size(), CV_16S, cv::Scalar(-1));  // edited surface seen there
+  cv::Mat repainted = cv::Mat::zeros(region_.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region_.height; ++v) {
+    for (int u = 0; u < region_.width; ++u) {
+      const std::uint32_t id = centre_->ids(v)[u];
+      if (id == VisibilityBuffer::kNothing ||
+          !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]])
+        continue;
+      owner.at<short>(v, u) = static_cast<short>(surface_of_slot_[VisibilityBuffer::objectOf(id)]);
+      if (can_rest[VisibilityBuffer::objectOf(id)][VisibilityBuffer::triangleOf(id)] == 0) continue;
+      if (lookOf(VisibilityBuffer::objectOf(id)).changes()) repainted.at<std::uint8_t>(v, u) = 255;
+      still_.at<float>(v, u) = stillness(id, u + region_.x, v + region_.y);
+    }
+  }
+  keepRims(owner);
+  cv::dilate(repainted, repainted, disc(kRepaintReach));
+  still_.setTo(0.0f, repainted);
+  if (!elsewhere_.empty()) still_.setTo(0.0f, elsewhere_(region_));
+}
+
+}  // namespace calipso::render

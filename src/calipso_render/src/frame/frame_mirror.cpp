@@ -1,0 +1,83 @@
+// The part of FrameCompositor that draws anew what support planes mirror.
+
+#include <algorithm>
+#include <cmath>
+
+#include "calipso_render/colour.hpp"
+#include "frame/frame_compositor.hpp"
+#include "place/plane_mirror.hpp"
+#include "place/view_warp.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kNoChange = 0.01f;  // of the brightness
+constexpr float kDark = 0.01f;      // linear
+constexpr int kInFront = 127;       // of a matte
+
+float strongest(const cv::Vec3f& c) {
+  return std::max({std::abs(c[0]), std::abs(c[1]), std::abs(c[2])});
+}
+
+}  // namespace
+
+void FrameCompositor::findMirrored() {
+  unmirrored_ = frame_.bgr;
+  if (prepared_.mirror.established() && sameView(frame_.camera, prepared_.camera)) mirrorAnew();
+  if (live_ != nullptr) live_corrections_ = live_->corrections(unmirrored_, labels_);
+}
+
+void FrameCompositor::mirrorAnew() {
+  const PlaneMirror& mirror = prepared_.mirror;
+  std::vector<const Actor*> actors;
+  std::vector<int> slots;
+  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
+    const int surface = surface_of_slot_[slot];
+    if (edited_[surface] || !prepared_.moves[surface])
+      actors.push_back(&actors_[slot]), slots.push_back(static_cast<int>(slot));
+  }
+  const Radiance radiance = [&](int i, const SurfacePoint& point) {
+    return mirroredRadiance(prepared_.appearances[surface_of_slot_[slots[i]]], light_,
+                            lookOf(slots[i]), point);
+  };
+  const MirrorImage image =
+      mirrorImage(actors, radiance, params_.planes, frame_.camera, mirror.off);
+  mirrored_ =
+      image.empty() ? cv::Mat(frame_.bgr.size(), CV_32FC3, cv::Scalar()) : addedBy(mirror, image);
+  remirrored_ = cv::Mat::zeros(frame_.bgr.size(), CV_8U);
+  unmirrored_ = unmirroredCodes(mirror, frame_.bgr);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < remirrored_.rows; ++v) {
+    for (int u = 0; u < remirrored_.cols; ++u) {
+      const cv::Vec3f &now = mirrored_.at<cv::Vec3f>(v, u),
+                      &before = mirror.at_key.at<cv::Vec3f>(v, u);
+      if (now == cv::Vec3f() && before == cv::Vec3f()) continue;
+      const bool changed =
+          strongest(now - before) > kNoChange * (strongest(linearPixel(frame_.bgr, u, v)) + kDark);
+      remirrored_.at<std::uint8_t>(v, u) = changed ? kChanged : 1;
+    }
+  }
+  if (!params_.matte.empty()) remirrored_.setTo(0, params_.matte > kInFront);
+}
+
+cv::Vec3f FrameCompositor::unmirroredAt(int u, int v) const {
+  cv::Vec3f colour = linearPixel(frame_.bgr, u, v);
+  if (mirrored_.empty() || remirrored_.at<std::uint8_t>(v, u) == 0) return colour;
+  colour -= prepared_.mirror.at_key.at<cv::Vec3f>(v, u);
+  return {std::max(0.0f, colour[0]), std::max(0.0f, colour[1]), std::max(0.0f, colour[2])};
+}
+
+// Adds what the planes mirror now to what a pixel shows without it. Where nothing changed it is the
+// frame's own.
+void FrameCompositor::addMirrored(int u, int v, Behind& behind) const {
+  if (mirrored_.empty() || remirrored_.at<std::uint8_t>(v, u) == 0) return;
+  if (behind.source == kOriginal && remirrored_.at<std::uint8_t>(v, u) != kChanged) {
+    behind.colour = linearPixel(frame_.bgr, u, v);
+    return;
+  }
+  const cv::Vec3f& now = mirrored_.at<cv::Vec3f>(v, u);
+  if (behind.source == kOriginal || now != cv::Vec3f()) behind.source = kRendered;
+  for (int c = 0; c < 3; ++c) behind.colour[c] = std::max(0.0f, behind.colour[c] + now[c]);
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,123 @@
+// The part of FrameCompositor that deals with what no edit touches: objects that come into the
+// shadow of edited ones, and scenery that hides them.
+
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+#include "frame/frame_compositor.hpp"
+#include "place/view_warp.hpp"
+
+namespace calipso::render {
+namespace {
+
+// of the nearness: what the depth image shows that much nearer stands in front
+constexpr float kNearer = 1.02f;
+constexpr int kRimReach = 3;  // px beyond a fitted surface that its mask may have more
+
+// Extent of points along two axes across the light, and along it.
+struct LightBox {
+  Eigen::Array3f low = Eigen::Array3f::Constant(1e9f), high = Eigen::Array3f::Constant(-1e9f);
+
+  LightBox(const Points& points, const Eigen::Vector3f& light) {
+    Eigen::Matrix3f axes;
+    axes.row(0) = light.unitOrthogonal(), axes.row(1) = light.cross(light.unitOrthogonal()),
+    axes.row(2) = light;
+    for (const Eigen::Vector3f& p : points)
+      low = low.min((axes * p).array()), high = high.max((axes * p).array());
+  }
+  bool mayShade(const LightBox& other, float sun_radius) const {
+    const float spread = sun_radius * std::max(0.0f, high[2] - other.low[2]);
+    return (low.head<2>() - spread < other.high.head<2>()).all() &&
+           (high.head<2>() + spread > other.low.head<2>()).all() && high[2] > other.low[2];
+  }
+};
+
+}  // namespace
+
+void FrameCompositor::findShaded() {
+  may_be_shaded_.assign(actors_.size(), false);
+  std::vector<LightBox> boxes;
+  for (const Actor& actor : actors_) boxes.emplace_back(actor.vertices, light_.direction);
+  for (std::size_t other = 0; other < actors_.size(); ++other) {
+    const Surface& surface = *actors_[other].surface;
+    if (edited_[surface_of_slot_[other]] || !surface.in_video) continue;
+    for (std::size_t slot = 0; slot < actors_.size() && !may_be_shaded_[other]; ++slot) {
+      if (edited_[surface_of_slot_[slot]])
+        may_be_shaded_[other] =
+            boxes[slot].mayShade(boxes[other], static_cast<float>(params_.sun_radius));
+    }
+    any_shaded_ = any_shaded_ || may_be_shaded_[other];
+  }
+}
+
+// The surface of an object that stays, seen at a pixel of its mask; the mask may reach beyond the
+// fitted surface.
+std::optional<SurfacePoint> FrameCompositor::otherAt(int u, int v) const {
+  const int label = labels_.at<std::uint8_t>(v, u);
+  for (int reach = 0; reach <= kRimReach; ++reach) {
+    for (const cv::Point d : {cv::Point(0, 0), {1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+      const cv::Point at = cv::Point(u, v) + reach * d;
+      if (!region_.contains(at)) continue;
+      const std::uint32_t id = centre_->idAt(at.x, at.y);
+      if (id == VisibilityBuffer::kNothing) continue;
+      const int slot = VisibilityBuffer::objectOf(id);
+      if (!may_be_shaded_[slot] || actors_[slot].surface->index != label) continue;
+      return surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), static_cast<float>(u),
+                          static_cast<float>(v), eye_);
+    }
+  }
+  return std::nullopt;
+}
+
+// Another object's own pixel, darkened where an edited object takes sun away that it had in the
+// video.
+void FrameCompositor::shadeOther(int u, int v, Behind& behind) const {
+  const std::optional<SurfacePoint> p = otherAt(u, v);
+  if (!p || p->normal.dot(light_.direction) <= 0.0f) return;
+  const float now = moved_shadow_->visibility(p->position, p->normal);
+  const float before =
+      shadows_.originals ? shadows_.originals->visibility(p->position, p->normal) : 1.0f;
+  if (before - now < kSameShadow) return;
+  const float others = shadows_.others->visibility(p->position, p->normal);
+  const cv::Vec3f back = cv::Vec3f::all(kThrownBack);
+  const cv::Vec3f lit = diffuseShading(light_, p->normal, others * before, p->seen, back);
+  const cv::Vec3f shaded = diffuseShading(light_, p->normal, others * now, p->seen, back);
+  for (int c = 0; c < 3; ++c)
+    behind.colour[c] *= std::min(1.0f, shaded[c] / std::max(lit[c], 1e-4f));
+  behind.source = kRendered;
+}
+
+// Where the depth image or the user's matte puts something before what is drawn, with a soft edge;
+// and no shadow falls on the support plane that the scenery hides.
+void FrameCompositor::findScreened() {
+  if ((prepared_.scenery.empty() && params_.matte.empty()) ||
+      !sameView(frame_.camera, prepared_.camera))
+    return;
+  screened_ = params_.matte.empty() ? cv::Mat::zeros(region_.size(), CV_8U)
+                                    : params_.matte(region_).clone();
+  if (prepared_.scenery.empty()) return;
+  takes_light_ = takes_light_.clone();  // it is the cache's
+  const cv::Mat scenery = prepared_.scenery(region_);
+  cv::Mat drawn = cv::Mat::zeros(region_.size(), CV_32F), hidden;
+  const Eigen::Vector3f axis = frame_.camera.world_from_camera.linear().col(2).cast<float>();
+  for (int v = 0; v < region_.height; ++v) {
+    const std::uint32_t* ids = centre_->ids(v);
+    Receiver r;
+    for (int u = 0; u < region_.width; ++u) {
+      const bool edited = ids[u] != VisibilityBuffer::kNothing &&
+                          edited_[surface_of_slot_[VisibilityBuffer::objectOf(ids[u])]];
+      if (edited) drawn.at<float>(v, u) = centre_->nearness(v)[u];
+      const float near = scenery.at<float>(v, u);
+      const bool hides_plane = near > 0.0f && place_view_.at(u + region_.x, v + region_.y, r) &&
+                               near * axis.dot(r.position - eye_) > kNearer;
+      if (hides_plane) takes_light_.at<std::uint8_t>(v, u) = 0;
+    }
+  }
+  cv::dilate(drawn, drawn, cv::Mat::ones(3, 3, CV_8U));
+  hidden = (scenery > kNearer * drawn) & (drawn > 0.0f);
+  cv::blur(hidden, hidden, {3, 3});
+  hidden.setTo(0, drawn == 0.0f);
+  cv::max(screened_, hidden, screened_);
+}
+
+}  // namespace calipso::render

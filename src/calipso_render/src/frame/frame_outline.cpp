@@ -1,0 +1,106 @@
+// The part of FrameCompositor that softens the outlines of what is drawn as those of the video are.
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+#include "frame/frame_compositor.hpp"
+#include "smooth_step.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kLeast = 0.15f;  // px: less is not seen
+constexpr int kMostReach = 6;    // px
+
+// Parts of a Gaussian that fall upon the pixels 0, 1, ... from its middle.
+std::vector<float> partsOf(float deviation) {
+  const int reach = std::clamp(static_cast<int>(std::ceil(2.5f * deviation)), 1, kMostReach);
+  const auto below = [&](float x) {
+    return 0.5f * std::erfc(-x / (deviation * static_cast<float>(M_SQRT2)));
+  };
+  std::vector<float> parts;
+  float sum = 0.0f;
+  for (int k = 0; k <= reach; ++k) {
+    const auto x = static_cast<float>(k);
+    parts.push_back(below(x + 0.5f) - below(x - 0.5f));
+    sum += (k == 0 ? 1.0f : 2.0f) * parts.back();
+  }
+  for (float& part : parts) part /= sum;
+  return parts;
+}
+
+cv::Vec3f blurredAt(const cv::Mat& bgr, int u, int v, const std::vector<float>& parts) {
+  const int reach = static_cast<int>(parts.size()) - 1;
+  const float* linear = decodeTable();
+  cv::Vec3f sum;
+  for (int dv = -reach; dv <= reach; ++dv) {
+    const cv::Vec3b* row = bgr.ptr<cv::Vec3b>(std::clamp(v + dv, 0, bgr.rows - 1));
+    cv::Vec3f line;
+    for (int du = -reach; du <= reach; ++du) {
+      const cv::Vec3b& code = row[std::clamp(u + du, 0, bgr.cols - 1)];
+      line += parts[std::abs(du)] * cv::Vec3f(linear[code[0]], linear[code[1]], linear[code[2]]);
+    }
+    sum += parts[std::abs(dv)] * line;
+  }
+  return sum;
+}
+
+}  // namespace
+
+// How much of its softness an outline lacks: none where the surface is where the video has it, as
+// what drawing misses of the video is carried over there.
+float FrameCompositor::lacksSoftness(std::uint32_t id, int u, int v) const {
+  if (observed_[VisibilityBuffer::objectOf(id)].points.empty()) return 1.0f;
+  const float moved = movement(id, static_cast<float>(u), static_cast<float>(v)).norm();
+  return smoothStep(kStillPx, kNonePx, moved);
+}
+
+// @return CV_8UC1 over the region: how much of the softness lacks within `reach` px of an outline
+cv::Mat FrameCompositor::findOutlines(int reach) const {
+  cv::Mat lacking = cv::Mat::zeros(region_.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 1; v < region_.height - 1; ++v) {
+    const std::uint8_t *above = drawn_.ptr(v - 1), *here = drawn_.ptr(v),
+                       *below = drawn_.ptr(v + 1);
+    for (int u = 1; u < region_.width - 1; ++u) {
+      const bool inner = (here[u - 1] & here[u + 1] & above[u] & below[u]) != 0;
+      if (here[u] == 0 || inner) continue;
+      const float part = lacksSoftness(centre_->ids(v)[u], u + region_.x, v + region_.y);
+      lacking.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(255.0f * part + 0.5f);
+    }
+  }
+  cv::dilate(lacking, lacking, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
+  return lacking;
+}
+
+void FrameCompositor::softenOutlines(FrameOutput& out) const {
+  if (prepared_.outline_blur < kLeast) return;
+  const std::vector<float> parts = partsOf(prepared_.outline_blur);
+  const cv::Mat lacking = findOutlines(static_cast<int>(parts.size()) - 1);
+  std::vector<std::vector<std::pair<int, cv::Vec3b>>> softened(region_.height);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int j = 0; j < region_.height; ++j) {
+    const std::uint8_t* lacks = lacking.ptr(j);
+    for (int i = 0; i < region_.width; ++i) {
+      if (lacks[i] == 0) continue;
+      const int u = i + region_.x, v = j + region_.y;
+      const float part = lacks[i] / 255.0f;
+      const cv::Vec3f now = linearPixel(out.bgr, u, v),
+                      soft = now + part * (blurredAt(out.bgr, u, v, parts) - now);
+      cv::Vec3b code;
+      for (int c = 0; c < 3; ++c) code[c] = quantise(codeFromLinear(soft[c]));
+      if (code != out.bgr.at<cv::Vec3b>(v, u)) softened[j].push_back({u, code});
+    }
+  }
+  for (int j = 0; j < region_.height; ++j) {
+    for (const auto& [u, code] : softened[j]) {
+      out.bgr.at<cv::Vec3b>(j + region_.y, u) = code;
+      std::uint8_t& source = out.provenance.at<std::uint8_t>(j + region_.y, u);
+      if (source == kOriginal) source = kRendered;
+    }
+  }
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,131 @@
+// The part of FrameCompositor that finds what the video shows of edited objects and of the shadows
+// of those that move: pixels behind which the place comes to light.
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+#include "draw/wide_loops.hpp"
+#include "frame/frame_compositor.hpp"
+#include "frame/mask_morphology.hpp"
+#include "frame/tiled_filter.hpp"
+#include "place/view_warp.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kDarker = 0.97f;  // of the plate's brightness: a passing shadow,
+// likewise in another view, to which the plate is carried with small errors
+constexpr float kDarkerElsewhere = 0.9f;
+constexpr int kLeastPassing = 5;    // px across, and in another view
+constexpr int kLeastElsewhere = 9;  // that somewhere within
+constexpr int kPassingReach = 12;   // px: an edge that the plate misses looks like a narrow shadow
+constexpr int kRimShare = 50;   // of the picture's width: how far a mask may miss a moving object
+constexpr int kInFront = 127;   // of a matte
+constexpr float kQuiet = 5.0f;  // code values of spread over time: the background rests
+
+}  // namespace
+
+// CV_8UC1: seen in other frames, always alike.
+cv::Mat FrameCompositor::quietPlaces() const {
+  const cv::Mat at_key = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
+  if (view_from_key_.empty()) return at_key;
+  cv::Mat here;
+  cv::remap(at_key, here, view_from_key_, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
+            cv::Scalar(0));
+  return here;
+}
+
+// The shadow of an object that moves in the video shows as darkening against the plate.
+void FrameCompositor::findPassingShadows() {
+  bool any = false;
+  for (std::size_t i = 0; i < edited_.size(); ++i)
+    any = any || (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video);
+  if (!any) return;
+  const bool same_view = sameView(frame_.camera, prepared_.camera);
+  cv::Mat now, ratio_now, ratio_plate, plate;
+  cv::cvtColor(unmirrored_, now, cv::COLOR_BGR2GRAY);
+  if (same_view)
+    prepared_.background.plate.convertTo(plate, CV_8U);
+  else
+    plate = codeFromLinear(plate_);
+  cv::cvtColor(plate, plate, cv::COLOR_BGR2GRAY);
+  cv::blur(now, ratio_now, {5, 5});
+  cv::blur(plate, ratio_plate, {5, 5});
+  ratio_plate.convertTo(ratio_plate, CV_8U, same_view ? kDarker : kDarkerElsewhere);
+  passing_ = ratio_now < ratio_plate;
+  passing_ &= quietPlaces() & (labels_ == 0);
+  cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN,
+                   cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));
+  if (!same_view) {
+    cv::Mat broad;
+    cv::morphologyEx(passing_, broad, cv::MORPH_OPEN,
+                     cv::Mat::ones(kLeastElsewhere, kLeastElsewhere, CV_8U));
+    cv::dilate(broad, broad, cv::Mat::ones(2 * kPassingReach + 1, 2 * kPassingReach + 1, CV_8U));
+    passing_ &= broad;
+  }
+  cv::dilate(passing_, passing_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {13, 13}));
+  // The rim that the mask of another moving object has missed is no shadow.
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (edited_[i] || !prepared_.moves[i]) continue;
+    cv::Mat near;
+    cv::dilate(labels_ == prepared_.surfaces[i].index, near,
+               disc(std::max(2, labels_.cols / kRimShare)));
+    passing_.setTo(0, near);
+  }
+}
+
+// The pixels of region_ that show an object in the video.
+cv::Mat FrameCompositor::originalOf(int surface) const {
+  cv::Mat original = labels_(region_) == prepared_.surfaces[surface].index;
+  if (!footprints_[surface].empty()) original |= footprints_[surface](region_);
+  return original;
+}
+
+// Row v of the pixels of a box that show an edited object in the video, and of those that show
+// another one.
+CALIPSO_WIDE_LOOPS void FrameCompositor::findShown(int v, const cv::Rect& box, std::uint8_t* own,
+                                                   std::uint8_t* others) const {
+  const int width = box.width;
+  const std::uint8_t* labels = labels_.ptr<std::uint8_t>(v) + box.x;
+  for (int u = 0; u < width; ++u) own[u] = 0, others[u] = labels[u] != 0 ? 255 : 0;
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (!edited_[i] || !prepared_.surfaces[i].in_video) continue;
+    const std::uint8_t index = static_cast<std::uint8_t>(prepared_.surfaces[i].index);
+    for (int u = 0; u < width; ++u)
+      own[u] |= labels[u] == index ? 255 : 0, others[u] &= labels[u] == index ? 0 : 255;
+    if (footprints_[i].empty()) continue;
+    const std::uint8_t* footprint = footprints_[i].ptr<std::uint8_t>(v) + box.x;
+    for (int u = 0; u < width; ++u) own[u] |= footprint[u];
+  }
+}
+
+// What the edited objects show in the video, with a margin, but not what stands beside them.
+void FrameCompositor::findOwn(const cv::Rect& box) {
+  cv::Mat own(box.size(), CV_8U), others(box.size(), CV_8U), here = removed_(box - region_.tl());
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < box.height; ++v)
+    findShown(v + box.y, box, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
+  const int margin = params_.background.mask_margin_px;
+  filterTiles(own, margin, here, DiscDilation(margin));
+  if (!passing_.empty()) here |= passing_(box);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < box.height; ++v) {
+    std::uint8_t* row = here.ptr<std::uint8_t>(v);
+    const std::uint8_t* stays = others.ptr<std::uint8_t>(v);
+    for (int u = 0; u < box.width; ++u) row[u] &= static_cast<std::uint8_t>(~stays[u]);
+  }
+}
+
+void FrameCompositor::findRemoved() {
+  removed_ = cv::Mat::zeros(region_.size(), CV_8U);
+  const cv::Rect box = passing_.empty() ? shown_box_ : region_;
+  if (!box.empty()) findOwn(box);
+  for (const cv::Mat& front : fronts_) {
+    if (!front.empty()) removed_.setTo(0, front(region_));
+  }
+  if (!params_.matte.empty() && sameView(frame_.camera, prepared_.camera))
+    removed_.setTo(0, params_.matte(region_) > kInFront);
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,118 @@
+// The part of FrameCompositor that draws pixels which see more than the middle of one triangle:
+// silhouettes by a place for each sheet in them.
+
+#include <algorithm>
+#include <array>
+
+#include "draw/wide_loops.hpp"
+#include "frame/frame_compositor.hpp"
+#include "frame/marked.hpp"
+
+namespace calipso::render {
+namespace {
+
+// A pixel's samples, those nearest to its centre first.
+constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
+  std::array<int, EdgeCoverage::kSamples> order{};
+  const auto squared = [](int i) {  // eighths of a pixel
+    const int x = 2 * (i % EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid,
+              y = 2 * (i / EdgeCoverage::kGrid) + 1 - EdgeCoverage::kGrid;
+    return x * x + y * y;
+  };
+  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
+    int place = i;
+    for (; place > 0 && squared(order[place - 1]) > squared(i); --place)
+      order[place] = order[place - 1];
+    order[place] = i;
+  }
+  return order;
+}();
+
+// Which samples see the sheet that sample `of` sees.
+CALIPSO_WIDE_LOOPS void findSheet(const EdgeCoverage::Pixel& edge, int of,
+                                  std::array<std::uint8_t, EdgeCoverage::kSamples>& sees) {
+  for (int j = 0; j < EdgeCoverage::kSamples; ++j) {
+    const float a = edge.nearness[of], b = edge.nearness[j];
+    const bool one = EdgeCoverage::isOneSheet(a > b ? a : b, a > b ? b : a),
+               same = ((edge.ids[of] ^ edge.ids[j]) >> 24) == 0;
+    sees[j] = static_cast<std::uint8_t>(one & same);
+  }
+}
+
+}  // namespace
+
+// One place for each sheet of each object in a pixel: the sample nearest to the pixel's centre.
+void FrameCompositor::addSheets(int u, int v, std::vector<Sheet>& sheets) const {
+  if (screenAt(u, v) == 1.0f) return;
+  const int column = u - region_.x;
+  const EdgeCoverage::Pixel* edge = edges_->at(u, v);
+  if (edge == nullptr) {
+    const std::uint32_t id = centre_->idAt(u, v);
+    if (isDrawn(id, u, v))
+      sheets.push_back({{id, static_cast<float>(u), static_cast<float>(v)}, column, 1.0f});
+    return;
+  }
+  const auto draws = [&](std::uint32_t id) {
+    return all_drawn_ ? id != VisibilityBuffer::kNothing : isDrawn(id, u, v);
+  };
+  std::array<std::uint8_t, EdgeCoverage::kSamples> done{}, sees;
+  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
+    if (done[i] != 0 || !draws(edge->ids[i])) continue;
+    findSheet(*edge, i, sees);
+    int count = 0;
+    for (int j = 0; j < EdgeCoverage::kSamples; ++j)
+      sees[j] &= static_cast<std::uint8_t>(done[j] == 0), done[j] |= sees[j], count += sees[j];
+    const int middle = *std::find_if(kFromCentre.begin(), kFromCentre.end(),
+                                     [&](int sample) { return sees[sample] != 0; });
+    const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(middle);
+    sheets.push_back({{edge->ids[middle], x.x(), x.y()},
+                      column,
+                      static_cast<float>(count) / EdgeCoverage::kSamples});
+  }
+}
+
+// Sheets of the row's pixels that need more than their centre, or more than its triangle's map.
+void FrameCompositor::findSheets(int v, Row& row) const {
+  constexpr std::uint8_t kPlaces = kSpecial | kPlainEdge;
+  row.sheets.clear();
+  const Kind* kinds = row.kinds.data();
+  for (int i = nextMarked(kinds, 0, region_.width, kPlaces); i < region_.width;
+       i = nextMarked(kinds, i + 1, region_.width, kPlaces)) {
+    row.drawn[i] = {};
+    const float u = static_cast<float>(i + region_.x);
+    if (kinds[i] == kSpecial)
+      addSheets(i + region_.x, v, row.sheets);
+    else
+      row.sheets.push_back({{centre_->ids(v - region_.y)[i], u, static_cast<float>(v)}, i, 1.0f});
+  }
+}
+
+// Row v's sheets, into row.drawn.
+void FrameCompositor::shadeSheets(int v, Row& row) const {
+  SurfacePlace places[SurfaceRun::kMost];
+  const std::size_t all = row.sheets.size();
+  for (std::size_t i = 0; i < all;) {
+    const std::size_t first = i;
+    const int slot = VisibilityBuffer::objectOf(row.sheets[i].place.id);
+    for (; i < all && i - first < SurfaceRun::kMost &&
+           VisibilityBuffer::objectOf(row.sheets[i].place.id) == slot;
+         ++i)
+      places[i - first] = row.sheets[i].place;
+    shadePlaces(places, static_cast<int>(i - first), slot, row.run);
+    for (std::size_t k = 0; k < i - first; ++k) {
+      const Sheet& sheet = row.sheets[first + k];
+      Drawn& drawn = row.drawn[sheet.column];
+      drawn.cover += sheet.part;
+      for (int c = 0; c < 3; ++c) drawn.colour[c] += sheet.part * row.run.colour[c][k];
+    }
+  }
+  for (std::size_t i = 0; i < all; ++i) {
+    const int column = row.sheets[i].column;
+    if (i + 1 < all && row.sheets[i + 1].column == column) continue;
+    Drawn& drawn = row.drawn[column];
+    drawn.colour /= drawn.cover;
+    drawn.cover *= 1.0f - screenAt(column + region_.x, v);
+  }
+}
+
+}  // namespace calipso::render

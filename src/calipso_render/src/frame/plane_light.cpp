@@ -1,0 +1,196 @@
+#include "frame/plane_light.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "draw/light_batch.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kLargest = 64, kSquare = SquareMask::kSide,
+              kStep = 2;  // px: squares, and the places in the least of them
+// of visibility: places that differ by no more speak for those between them
+constexpr float kEven = 0.05f;
+// of visibility: between places that differ by no more it is interpolated
+constexpr float kSlow = 0.3f;
+
+class Squares {
+ public:
+  Squares(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
+          const SquareMask& skip, cv::Mat& out, SquareMask* shaded)
+      : view_(view), light_(light), rect_(rect), skip_(skip), out_(out), shaded_(shaded) {}
+
+  // Squares hang on the picture, not on the rectangle: pixels are the same whatever else is asked
+  // for.
+  void run() const {
+    const int first_row = rect_.y / kLargest, rows = (rect_.br().y - 1) / kLargest - first_row + 1;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (int j = 0; j < rows; ++j) {
+      for (int u = rect_.x / kLargest * kLargest; u < rect_.br().x; u += kLargest)
+        fill({u, (first_row + j) * kLargest, kLargest, kLargest});
+    }
+  }
+
+ private:
+  void fill(const cv::Rect& square) const {
+    const cv::Rect here = (square & rect_) - rect_.tl();
+    if (here.empty() || skip_.all(square & rect_)) return;
+    Receiver middle, corner;
+    bool even = !view_.relief().touches(square.x, square.y, square.width) &&
+                view_.at(square.x + 0.5f * square.width, square.y + 0.5f * square.height, middle);
+    float radius = 0.0f;
+    for (int k = 0; k < 4 && even; ++k) {
+      even = view_.at(square.x + (k & 1) * square.width, square.y + (k >> 1) * square.height,
+                      corner) &&
+             corner.normal == middle.normal;
+      radius = std::max(radius, (corner.position - middle.position).norm());
+    }
+    const std::optional<float> uniform =
+        even ? light_.uniform(middle.position, middle.normal, radius) : std::nullopt;
+    const bool split = !uniform && square.width > kSquare;
+    if (shaded_ != nullptr && !split && uniform != 1.0f) shaded_->set(here + rect_.tl());
+    if (uniform) {
+      for (int y = here.y; y < here.br().y; ++y)
+        std::memset(out_.ptr<std::uint8_t>(y) + here.x, lightLevel(*uniform), here.width);
+    } else if (split) {
+      const int half = square.width / 2;
+      for (int k = 0; k < 4; ++k)
+        fill({square.x + (k & 1) * half, square.y + (k >> 1) * half, half, half});
+    } else if (even) {
+      refine(square, here);
+    } else {
+      fillExactly(square, here);
+    }
+  }
+
+  // Places looked up at once; those that see neither plane nor relief keep 1.
+  class Lookup {
+   public:
+    explicit Lookup(const Squares& squares) : squares_(squares) {}
+    void add(int u, int v, float* visible) {
+      Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+      *visible = 1.0f;
+      if (!squares_.view_.at(u, v, r)) return;
+      out_[batch_.add(r.position, r.normal)] = visible;
+      if (batch_.count() == LightBatch::kMost) look();
+    }
+    void look() {
+      float visible[LightBatch::kMost];
+      batch_.look(squares_.light_, visible);
+      for (int k = 0; k < batch_.count(); ++k) *out_[k] = visible[k];
+      batch_.clear();
+    }
+
+   private:
+    const Squares& squares_;
+    LightBatch batch_;
+    float* out_[LightBatch::kMost];
+  };
+
+  static constexpr int kPlaces = kSquare / kStep + 1;
+
+  // Places two steps apart are looked at first; those between where they, or the one in their
+  // middle, differ.
+  void fillGrid(const cv::Rect& square, float (&grid)[kPlaces][kPlaces]) const {
+    Lookup lookup(*this);
+    const auto set = [&](int i, int j) {
+      lookup.add(square.x + i * kStep, square.y + j * kStep, &grid[j][i]);
+    };
+    for (int j = 0; j < kPlaces; ++j) {
+      for (int i = j % 2; i < kPlaces; i += 2) set(i, j);
+    }
+    lookup.look();
+    bool uneven[kPlaces / 2][kPlaces / 2] = {};
+    for (int j = 1; j < kPlaces; j += 2) {
+      for (int i = 1; i < kPlaces; i += 2) {
+        const auto [low, high] = std::minmax({grid[j][i], grid[j - 1][i - 1], grid[j - 1][i + 1],
+                                              grid[j + 1][i - 1], grid[j + 1][i + 1]});
+        uneven[j / 2][i / 2] = high - low > kEven;
+      }
+    }
+    const auto isUneven = [&](int i, int j) {
+      return i >= 0 && j >= 0 && i < kPlaces / 2 && j < kPlaces / 2 && uneven[j][i];
+    };
+    for (int j = 0; j < kPlaces; ++j) {
+      for (int i = 1 - j % 2; i < kPlaces; i += 2) {
+        const bool level = j % 2 == 0;  // it lies between a left and a right one
+        if (isUneven(i / 2, j / 2) ||
+            (level ? isUneven(i / 2, j / 2 - 1) : isUneven(i / 2 - 1, j / 2)))
+          set(i, j);
+        else
+          grid[j][i] = level ? 0.5f * (grid[j][i - 1] + grid[j][i + 1])
+                             : 0.5f * (grid[j - 1][i] + grid[j + 1][i]);
+      }
+    }
+    lookup.look();
+  }
+
+  // The pixels of a square by its grid; exactly where its places differ by much.
+  void refine(const cv::Rect& square, const cv::Rect& here) const {
+    float grid[kPlaces][kPlaces], visible[kSquare][kSquare];
+    fillGrid(square, grid);
+    Lookup lookup(*this);
+    for (int v = 0; v < kSquare; v += kStep) {
+      for (int u = 0; u < kSquare; u += kStep) {
+        const float *above = &grid[v / kStep][u / kStep], *below = &grid[v / kStep + 1][u / kStep];
+        const auto [low, high] = std::minmax({above[0], above[1], below[0], below[1]});
+        for (int y = v; y < v + kStep; ++y) {
+          for (int x = u; x < u + kStep; ++x) {
+            const float s = static_cast<float>(x - u) / kStep,
+                        t = static_cast<float>(y - v) / kStep;
+            if (high - low <= kSlow)
+              visible[y][x] = (above[0] + (above[1] - above[0]) * s) * (1.0f - t) +
+                              (below[0] + (below[1] - below[0]) * s) * t;
+            else if (here.contains(cv::Point(square.x + x, square.y + y) - rect_.tl()))
+              lookup.add(square.x + x, square.y + y, &visible[y][x]);
+          }
+        }
+      }
+    }
+    lookup.look();
+    write(square, here, visible);
+  }
+
+  void write(const cv::Rect& square, const cv::Rect& here,
+             const float (&visible)[kSquare][kSquare]) const {
+    for (int y = here.y; y < here.br().y; ++y) {
+      std::uint8_t* row = out_.ptr<std::uint8_t>(y);
+      for (int x = here.x; x < here.br().x; ++x)
+        row[x] = lightLevel(visible[y + rect_.y - square.y][x + rect_.x - square.x]);
+    }
+  }
+
+  // Every pixel on its own: the relief, or several planes. What sees neither keeps its value.
+  void fillExactly(const cv::Rect& square, const cv::Rect& here) const {
+    float visible[kSquare][kSquare];
+    Lookup lookup(*this);
+    Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+    for (int y = here.y; y < here.br().y; ++y) {
+      for (int x = here.x; x < here.br().x; ++x) {
+        float& at = visible[y + rect_.y - square.y][x + rect_.x - square.x];
+        lookup.add(x + rect_.x, y + rect_.y, &at);
+        if (!view_.at(x + rect_.x, y + rect_.y, r)) at = out_.at<std::uint8_t>(y, x) / 255.0f;
+      }
+    }
+    lookup.look();
+    write(square, here, visible);
+  }
+
+  const PlaceView& view_;
+  const Visibility& light_;
+  const cv::Rect rect_;
+  const SquareMask& skip_;
+  cv::Mat& out_;
+  SquareMask* shaded_;
+};
+
+}  // namespace
+
+void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
+                   const SquareMask& skip, cv::Mat& out, SquareMask* shaded) {
+  if (!rect.empty()) Squares(view, light, rect, skip, out, shaded).run();
+}
+
+}  // namespace calipso::render

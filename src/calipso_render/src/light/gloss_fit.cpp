@@ -1,0 +1,367 @@
+#include "light/gloss_fit.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kRim = 1;               // px of the mask's rim that are left out
+constexpr float kSaturated = 0.95f;   // linear; the surface may be brighter than that
+constexpr float kNearMirror = 0.85f;  // cosine between normal and half vector
+constexpr std::size_t kMost = 2500;
+constexpr std::size_t kFewest = 30;
+constexpr double kSmoothest = 0.03, kRoughest = 0.7;  // m
+constexpr int kRoughnesses = 24;
+constexpr int kReweightings = 3;
+constexpr double kOutlier = 0.15;  // of the cluster's brightness
+// of the worst roughness' error: less must remain, or the roughness is not told
+constexpr double kSharp = 0.98;
+constexpr double kBroad = 0.35;      // m from which a lobe looks like diffuse shading
+constexpr double kNarrowPart = 0.5;  // of its roughness, that a narrow one beside it has at most
+// rows' mean errors by which the narrow one has to make the fit better
+constexpr double kSeenBeside = 15.0;
+// rows' mean errors within which another roughness explains the highlights as well
+constexpr double kAlike = 6.0;
+// Strength of mirrored surroundings at most: a dielectric's, of refraction 1.6, where lit white has
+// half of the light's unit.
+constexpr double kMostAround = 0.025;
+// Directions beside the light's, and how far (rad), that highlights have to speak against; by so
+// many samples, and every so manieth roughness.
+constexpr int kBesides = 8, kTriedStep = 3;
+constexpr float kBeside = 0.1f;
+constexpr std::size_t kTriedWith = 900;
+// of the error without gloss: less must remain, or no highlight was seen
+constexpr double kExplained = 0.97;
+
+struct NormalMap {
+  cv::Rect region;
+  cv::Mat normals;    // CV_32FC3; 0 where the object is not seen
+  cv::Mat triangles;  // CV_32SC1
+};
+
+NormalMap normalMap(const View& view, const Actor& actor, const Eigen::Vector3f& eye) {
+  NormalMap map;
+  map.region = boundsOf(actor.screen, 1, view.picture.size());
+  map.normals = cv::Mat::zeros(map.region.size(), CV_32FC3);
+  map.triangles = cv::Mat(map.region.size(), CV_32S, cv::Scalar(-1));
+  VisibilityBuffer buffer(map.region);
+  buffer.draw(actor.screen, 0);
+  for (int v = 0; v < map.region.height; ++v) {
+    for (int u = 0; u < map.region.width; ++u) {
+      const std::uint32_t id = buffer.ids(v)[u];
+      if (id == VisibilityBuffer::kNothing) continue;
+      map.triangles.at<int>(v, u) = VisibilityBuffer::triangleOf(id);
+      const Eigen::Vector3f n = surfacePoint(actor, VisibilityBuffer::triangleOf(id),
+                                             u + map.region.x, v + map.region.y, eye)
+                                    .normal;
+      map.normals.at<cv::Vec3f>(v, u) = {n.x(), n.y(), n.z()};
+    }
+  }
+  return map;
+}
+
+// Turn of the normal across a pixel, as the deviation of a uniform spread over it.
+float spreadAt(const cv::Mat& normals, int u, int v) {
+  double sum = 0.0;
+  int count = 0;
+  const cv::Vec3f& here = normals.at<cv::Vec3f>(v, u);
+  for (const cv::Point d : {cv::Point(1, 0), cv::Point(-1, 0), cv::Point(0, 1), cv::Point(0, -1)}) {
+    const int x = u + d.x, y = v + d.y;
+    if (x < 0 || y < 0 || x >= normals.cols || y >= normals.rows) continue;
+    const cv::Vec3f& there = normals.at<cv::Vec3f>(y, x);
+    if (there.dot(there) == 0.0f) continue;
+    const cv::Vec3f turn = there - here;
+    sum += turn.dot(turn), ++count;
+  }
+  return count > 0 ? static_cast<float>(std::sqrt(sum / count / 12.0)) : 0.0f;
+}
+
+int nearestCluster(const std::vector<LightSample>& samples, int picture, const Eigen::Vector3f& p) {
+  float best = 1e30f;
+  int cluster = -1;
+  for (const LightSample& s : samples) {
+    const float squared = s.picture == picture ? (s.position - p).squaredNorm() : 1e30f;
+    if (squared < best) best = squared, cluster = s.cluster;
+  }
+  return cluster;
+}
+
+void collect(const View& view, int picture, const Actor& actor, const Eigen::Vector3f& light,
+             std::vector<HighlightSample>& highlights) {
+  const Eigen::Vector3f eye = view.camera.world_from_camera.translation().cast<float>();
+  const NormalMap map = normalMap(view, actor, eye);
+  cv::Mat inside;
+  cv::erode(view.labels == actor.surface->index, inside,
+            cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
+  for (int v = 0; v < map.region.height; ++v) {
+    for (int u = 0; u < map.region.width; ++u) {
+      const int triangle = map.triangles.at<int>(v, u);
+      if (triangle < 0 || inside.at<std::uint8_t>(v + map.region.y, u + map.region.x) == 0)
+        continue;
+      const SurfacePoint s = surfacePoint(actor, triangle, u + map.region.x, v + map.region.y, eye);
+      const Eigen::Vector3f towards = (eye - s.position).normalized();
+      if (s.normal.dot((light + towards).normalized()) < kNearMirror || s.normal.dot(light) <= 0.0f)
+        continue;
+      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v + map.region.y, u + map.region.x);
+      HighlightSample h{{s.position, s.normal, towards, {}, -1, s.seen, picture},
+                        spreadAt(map.normals, u, v)};
+      for (int c = 0; c < 3; ++c) h.at.radiance[c] = linearFromRealCode(code[c]);
+      highlights.push_back(h);
+    }
+  }
+}
+
+// I_c = x_k a_kc E_c + ks G_c + kb B_c, linear in the clusters' brightness x, in ks and in kb.
+struct Row {
+  int cluster;
+  cv::Vec3f diffuse, radiance, sun, mirrored;  // a E; I; L V; F A S
+  double scale;
+};
+
+struct Solution {
+  double strength = 0.0, beside = 0.0;  // of Lobes' own, and of what goes with the broad one
+  double cost = 1e30;
+};
+
+// Lobes of the rows whose strengths are unknown: the one in question, and a broad one beside it.
+// nullptr: there is none.
+struct Lobes {
+  const std::vector<double>* own = nullptr;
+  const std::vector<double>* broad = nullptr;
+};
+
+// Normal equations of the lobes' strengths, the clusters' brightness eliminated: each cluster meets
+// only itself and them.
+struct Reduced {
+  std::vector<double> dd, di;
+  std::vector<Eigen::Vector2d> dg;
+  Eigen::Matrix2d gg = 1e-12 * Eigen::Matrix2d::Identity();
+  Eigen::Vector2d gi = Eigen::Vector2d::Zero();
+  explicit Reduced(int clusters)
+      : dd(clusters, 1e-9), di(clusters, 0.0), dg(clusters, Eigen::Vector2d::Zero()) {}
+  void add(int k, double w, double d, const Eigen::Vector2d& g, double x) {
+    dd[k] += w * d * d, dg[k] += w * d * g, di[k] += w * d * x, gg += w * g * g.transpose(),
+        gi += w * g * x;
+  }
+  Eigen::Vector2d strengths() const {
+    Eigen::Matrix2d left = gg;
+    Eigen::Vector2d right = gi;
+    for (std::size_t k = 0; k < dd.size(); ++k)
+      left -= dg[k] * dg[k].transpose() / dd[k], right -= dg[k] * di[k] / dd[k];
+    const auto alone = [&](int i) {
+      return left(i, i) > 1e-12 ? std::max(0.0, right[i] / left(i, i)) : 0.0;
+    };
+    const double determinant = left.determinant();
+    if (determinant > 1e-9 * left(0, 0) * left(1, 1)) {
+      const Eigen::Vector2d both = left.inverse() * right;
+      if (both.minCoeff() >= 0.0) return both;
+    }
+    // No strength is negative: then one of them is 0, the one that explains less alone.
+    const Eigen::Vector2d own(alone(0), 0.0), broad(0.0, alone(1));
+    return right.dot(own) >= right.dot(broad) ? own : broad;
+  }
+};
+
+Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
+  std::vector<double> weights(rows.size(), 1.0);
+  Solution solution;
+  const auto glossOf = [&](std::size_t i, int c) {
+    const double mirrored = rows[i].mirrored[c];  // goes with the broader one
+    const double own = lobes.own == nullptr ? 0.0
+                                            : rows[i].sun[c] * (*lobes.own)[i] +
+                                                  (lobes.broad == nullptr ? mirrored : 0.0);
+    return Eigen::Vector2d(
+        own, lobes.broad == nullptr ? 0.0 : rows[i].sun[c] * (*lobes.broad)[i] + mirrored);
+  };
+  for (int round = 0; round < kReweightings; ++round) {
+    Reduced sums(clusters);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double w = weights[i] / (rows[i].scale * rows[i].scale);
+      for (int c = 0; c < 3; ++c)
+        sums.add(rows[i].cluster, w, rows[i].diffuse[c], glossOf(i, c), rows[i].radiance[c]);
+    }
+    const Eigen::Vector2d strengths = sums.strengths();
+    solution.strength = strengths[0], solution.beside = strengths[1], solution.cost = 0.0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const int k = rows[i].cluster;
+      const double brightness = (sums.di[k] - strengths.dot(sums.dg[k])) / sums.dd[k];
+      double squared = 0.0;
+      for (int c = 0; c < 3; ++c) {
+        const double r =
+            (brightness * rows[i].diffuse[c] + strengths.dot(glossOf(i, c)) - rows[i].radiance[c]) /
+            rows[i].scale;
+        if (r < 0.0 || rows[i].radiance[c] < kSaturated) squared += r * r;
+      }
+      // Cauchy's loss: a highlight that is not explained goes on counting.
+      const double bound = 3.0 * kOutlier * kOutlier;
+      solution.cost += bound * std::log1p(squared / bound);
+      weights[i] = bound / (squared + bound);
+    }
+  }
+  return solution;
+}
+
+Row rowOf(const LightSample& s, const LightFit& fit, const SunVisible& visible) {
+  const Light& light = fit.light;
+  const float sun = visible ? visible(s, light.direction) : 1.0f;
+  const Eigen::Vector3f mirrored = mirroredIn(s.normal, s.view);
+  Row row;
+  row.cluster = s.cluster;
+  row.diffuse = fit.albedos[s.cluster].mul(
+      diffuseShading(light, s.normal, sun, s.seen, cv::Vec3f::all(kThrownBack)));
+  row.radiance = s.radiance, row.sun = light.sun * sun;
+  row.mirrored =
+      ambientAt(light, mirrored) * (skyMirrored(s.seen, mirrored) * grazing(s.normal.dot(s.view)));
+  row.scale = (row.diffuse[0] + row.diffuse[1] + row.diffuse[2]) / 3.0 + 1e-3;
+  return row;
+}
+
+double roughnessAt(int i) {
+  return kSmoothest * std::pow(kRoughest / kSmoothest, static_cast<double>(i) / kRoughnesses);
+}
+
+// The pixel averages the lobe: its width and the normals' spread add up (Beckmann's variance per
+// axis is m^2 / 2).
+std::vector<double> lobesOf(const std::vector<HighlightSample>& highlights,
+                            const Eigen::Vector3f& light, double m) {
+  std::vector<double> lobes;
+  for (const HighlightSample& h : highlights) {
+    const double wide = std::sqrt(m * m + 2.0 * h.spread * h.spread);
+    lobes.push_back(torranceSparrow(h.at.normal, light, h.at.view, static_cast<float>(wide)));
+  }
+  return lobes;
+}
+
+struct Found : SeenGloss {
+  double cost = 0.0;
+};
+
+// The best of the roughnesses below `limit`, and which others explain the rows as well. @param most
+// error that it may leave
+// @param worst out: the worst error that any leaves
+std::optional<Found> bestRoughness(const std::vector<Row>& rows,
+                                   const std::vector<HighlightSample>& highlights,
+                                   const Eigen::Vector3f& light, int clusters,
+                                   const std::vector<double>* broad, double limit, double most,
+                                   double& worst) {
+  std::vector<double> costs, strengths;
+  for (int i = 0; i <= kRoughnesses && roughnessAt(i) < limit; ++i) {
+    const std::vector<double> own = lobesOf(highlights, light, roughnessAt(i));
+    const Solution s = solve(rows, {&own, broad}, clusters);
+    costs.push_back(s.strength > 0.0 ? s.cost : 1e30), strengths.push_back(s.strength);
+    worst = std::max(worst, s.cost);
+  }
+  const std::size_t best = std::min_element(costs.begin(), costs.end()) - costs.begin();
+  if (costs.empty() || costs[best] >= most) return std::nullopt;
+  const double alike = costs[best] * (1.0 + kAlike / static_cast<double>(rows.size()));
+  std::size_t first = best, last = best;
+  while (first > 0 && costs[first - 1] <= alike) --first;
+  while (last + 1 < costs.size() && costs[last + 1] <= alike) ++last;
+  const auto roughness = [](std::size_t i) {
+    return static_cast<float>(roughnessAt(static_cast<int>(i)));
+  };
+  Found found;
+  const float ks = static_cast<float>(strengths[best]);
+  found.gloss = {ks, roughness(best), ks};
+  found.smoothest = roughness(first), found.roughest = roughness(last), found.cost = costs[best];
+  return found;
+}
+
+// The least error that any roughness leaves under the same light from direction l.
+double leastError(const std::vector<HighlightSample>& highlights, LightFit fit,
+                  const SunVisible& visible, const Eigen::Vector3f& l) {
+  fit.light.direction = l;
+  std::vector<Row> rows;
+  for (const HighlightSample& h : highlights) rows.push_back(rowOf(h.at, fit, visible));
+  double least = 1e30;
+  for (int i = 0; i <= kRoughnesses; i += kTriedStep) {
+    const std::vector<double> lobes = lobesOf(highlights, l, roughnessAt(i));
+    const int clusters = static_cast<int>(fit.albedos.size());
+    least = std::min(least, solve(rows, {&lobes, nullptr}, clusters).cost);
+  }
+  return least;
+}
+
+}  // namespace
+
+std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
+                                              const std::vector<bool>& moves,
+                                              const std::vector<LightSample>& samples,
+                                              const Eigen::Vector3f& light) {
+  std::vector<HighlightSample> all, thinned;
+  for (std::size_t object = 0; object < moves.size(); ++object) {
+    for (std::size_t i = 0; i < (moves[object] ? views.size() : 1); ++i)
+      collect(views[i], static_cast<int>(i), views[i].actors[object], light, all);
+  }
+  const std::size_t step = std::max<std::size_t>(1, all.size() / kMost);
+  for (std::size_t i = 0; i < all.size(); i += step) {
+    thinned.push_back(all[i]);
+    thinned.back().at.cluster = nearestCluster(samples, all[i].at.picture, all[i].at.position);
+    if (thinned.back().at.cluster < 0) thinned.pop_back();
+  }
+  return thinned;
+}
+
+std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights,
+                                  const LightFit& fit, const SunVisible& visible) {
+  if (highlights.size() < kFewest) return std::nullopt;
+  const Light& light = fit.light;
+  std::vector<Row> rows;
+  for (const HighlightSample& h : highlights) rows.push_back(rowOf(h.at, fit, visible));
+  const int clusters = static_cast<int>(fit.albedos.size());
+  const double without = solve(rows, {}, clusters).cost;
+  double worst = 0.0;
+  const std::optional<Found> best =
+      bestRoughness(rows, highlights, light.direction, clusters, nullptr, 2.0 * kRoughest,
+                    kExplained * without, worst);
+  if (!best || best->cost >= kSharp * worst) return std::nullopt;
+  if (best->gloss.roughness < kBroad) return *best;
+  // A lobe nearly as broad as diffuse shading explains that one's errors too. Where beside it a
+  // narrow one is seen, that is the gloss.
+  const std::vector<double> beside = lobesOf(highlights, light.direction, best->gloss.roughness);
+  const double with_broad = solve(rows, {nullptr, &beside}, clusters).cost *
+                            (1.0 - kSeenBeside / static_cast<double>(rows.size()));
+  const std::optional<Found> narrow =
+      bestRoughness(rows, highlights, light.direction, clusters, &beside,
+                    kNarrowPart * best->gloss.roughness, with_broad, worst);
+  return *(narrow ? narrow : best);
+}
+
+bool tellDirection(const std::vector<HighlightSample>& highlights, const LightFit& fit,
+                   const SunVisible& visible) {
+  std::vector<HighlightSample> some;
+  const std::size_t step = std::max<std::size_t>(1, highlights.size() / kTriedWith);
+  for (std::size_t i = 0; i < highlights.size(); i += step) some.push_back(highlights[i]);
+  const Eigen::Vector3f l = fit.light.direction, s = l.unitOrthogonal(), t = l.cross(s);
+  const double here = leastError(some, fit, visible, l);
+  for (int i = 0; i < kBesides; ++i) {
+    const float a = 2.0f * static_cast<float>(M_PI) * i / kBesides;
+    const Eigen::Vector3f off = std::cos(a) * s + std::sin(a) * t;
+    const Eigen::Vector3f beside = std::cos(kBeside) * l + std::sin(kBeside) * off;
+    if (leastError(some, fit, visible, beside) < here) return false;
+  }
+  return true;
+}
+
+float surroundingsStrength(const LightEvidence& evidence, const LightFit& fit) {
+  std::vector<Row> rows;
+  std::vector<double> lobes;
+  for (const LightSample& s : evidence.samples) {
+    rows.push_back(rowOf(s, fit, evidence.visible));
+    lobes.push_back(torranceSparrow(s.normal, fit.light.direction, s.view, fit.gloss.roughness));
+  }
+  // The slot of the broad lobe without a lobe: the surroundings alone.
+  const std::vector<double> no_lobe(rows.size(), 0.0);
+  const int clusters = static_cast<int>(fit.albedos.size());
+  const Solution together = solve(rows, {&lobes, nullptr}, clusters),
+                 apart = solve(rows, {&lobes, &no_lobe}, clusters);
+  const double found = apart.cost < together.cost ? apart.beside : together.strength;
+  return static_cast<float>(std::min(found, kMostAround));
+}
+
+}  // namespace calipso::render

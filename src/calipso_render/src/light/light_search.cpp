@@ -1,0 +1,201 @@
+#include "light/light_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace calipso::render {
+namespace {
+
+// tried over the upper hemisphere, without the objects' own shadows
+constexpr int kDirections = 400;
+constexpr std::size_t kKept = 10;  // of those, tried with them
+constexpr float kApart = 0.94f;    // cosine of the angle between two of them
+// the same between two that cast shadows speak for: 4 degrees
+constexpr float kShadowApart = 0.9976f;
+constexpr float kLowestSun = 0.08f;                     // sine of its elevation
+constexpr double kLeastRatio = 0.1, kMostRatio = 10.0;  // of sun to ambient light
+constexpr int kRatios = 20;
+constexpr double kShadingWeight = 50.0;  // pixels that err independently of each other
+constexpr std::size_t kSearchSamples = 1200;
+constexpr float kFirstStep = 0.08f, kLastStep = 0.006f;  // rad, of the refinement
+
+using Visible = std::function<float(const LightSample&, const Eigen::Vector3f&)>;
+
+// Evenly spread over the sphere (Fibonacci), those above the horizon.
+std::vector<Eigen::Vector3f> candidateDirections(const Eigen::Vector3f& up) {
+  std::vector<Eigen::Vector3f> directions;
+  for (int i = 0; i < kDirections * 2; ++i) {
+    const float z = 1.0f - (2 * i + 1.0f) / (2 * kDirections), r = std::sqrt(1.0f - z * z),
+                a = i * 2.39996323f;
+    const Eigen::Vector3f d(r * std::cos(a), r * std::sin(a), z);
+    if (d.dot(up) > kLowestSun) directions.push_back(d);
+  }
+  return directions;
+}
+
+// Sums of one cluster's channel for I = a (p + q s): p the ambient light's profile, s = V max(0,
+// n.l).
+struct LineSums {
+  double n = 0, i = 0, pp = 0, ps = 0, ss = 0, ip = 0, is = 0, ii = 0;
+
+  double albedo(double q) const {
+    return std::max(0.0, ip + q * is) / std::max(pp + q * (2.0 * ps + q * ss), 1e-12);
+  }
+  // Sum of squares at the best a, relative to the mean brightness.
+  double error(double q) const {
+    const double a = albedo(q), mean = i / n + 1e-4;
+    return std::max(0.0, ii - 2.0 * a * (ip + q * is) + a * a * (pp + q * (2.0 * ps + q * ss))) /
+           (mean * mean);
+  }
+};
+
+using ClusterSums = std::vector<std::array<LineSums, 3>>;
+
+double errorOf(const ClusterSums& sums, int channel, double q) {
+  double error = 0.0;
+  for (const auto& cluster : sums) {
+    if (cluster[channel].n >= 8) error += cluster[channel].error(q);
+  }
+  return error;
+}
+
+// The ratio of sun to ambient light that all clusters share.
+double bestRatio(const ClusterSums& sums, int channel) {
+  double best = 0.0, best_error = errorOf(sums, channel, 0.0);
+  for (int i = 0; i <= kRatios; ++i) {
+    const double q =
+        kLeastRatio * std::pow(kMostRatio / kLeastRatio, static_cast<double>(i) / kRatios);
+    const double error = errorOf(sums, channel, q);
+    if (error < best_error) best = q, best_error = error;
+  }
+  return best;
+}
+
+class Search {
+ public:
+  Search(const LightEvidence& evidence, const Eigen::Vector3f& up) : evidence_(evidence), up_(up) {
+    const std::size_t step = std::max<std::size_t>(1, evidence.samples.size() / kSearchSamples);
+    for (std::size_t i = 0; i < evidence.samples.size(); i += step)
+      samples_.push_back(evidence.samples[i]);
+  }
+
+  // One albedo per cluster and channel; the errors count relative to the cluster's brightness.
+  LightCandidate byShading(const Eigen::Vector3f& l, const Visible& visible) const {
+    ClusterSums sums(evidence_.clusters);
+    for (const LightSample& x : samples_) {
+      const float cosine = x.normal.dot(l);
+      const GreyLight around = greyLight(x.seen, up_, l);
+      const double s =
+          (cosine > 0.0f ? cosine * (visible ? visible(x, l) : 1.0f) : 0.0f) + around.sun;
+      for (int c = 0; c < 3; ++c) {
+        const double p =
+            around.even + (1.0 - (1.0 - kSkyGradient) * evidence_.below[c]) * around.lean;
+        LineSums& m = sums[x.cluster][c];
+        const double i = x.radiance[c];
+        m.n += 1, m.i += i, m.pp += p * p, m.ps += p * s, m.ss += s * s, m.ip += i * p,
+            m.is += i * s, m.ii += i * i;
+      }
+    }
+    LightCandidate total;
+    total.direction = l;
+    double error = 0.0;
+    for (int c = 0; c < 3; ++c) {
+      const double q = bestRatio(sums, c);
+      error += errorOf(sums, c, q);
+      total.ambient[c] = static_cast<float>(std::max(0.1, 1.0 / (1.0 + q)));
+      total.sun[c] = static_cast<float>(std::max(0.05, q / (1.0 + q)));
+    }
+    // The errors' size is not known: its likelihood is profiled out.
+    total.misfit = kShadingWeight * std::log(error / samples_.size() + 1e-6);
+    return total;
+  }
+
+  LightCandidate byAll(const Eigen::Vector3f& l) const {
+    LightCandidate candidate = byShading(l, evidence_.visible);
+    if (evidence_.shadow_misfit) candidate.misfit += evidence_.shadow_misfit(l);
+    return candidate;
+  }
+
+  // Steps along two tangents, halved when none leads on.
+  LightCandidate refined(LightCandidate best) const {
+    for (float step = kFirstStep; step > kLastStep; step *= 0.5f) {
+      for (bool better = true; better;) {
+        better = false;
+        const Eigen::Vector3f centre = best.direction, s = centre.unitOrthogonal(),
+                              t = centre.cross(s);
+        for (const Eigen::Vector3f& d : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)}) {
+          const Eigen::Vector3f l = (centre + step * d).normalized();
+          if (l.dot(up_) < kLowestSun) continue;
+          const LightCandidate next = byAll(l);
+          if (next.misfit < best.misfit - 1e-6) best = next, better = true;
+        }
+      }
+    }
+    return best;
+  }
+
+ private:
+  const LightEvidence& evidence_;
+  Eigen::Vector3f up_;
+  std::vector<LightSample> samples_;
+};
+
+bool better(const LightCandidate& a, const LightCandidate& b) { return a.misfit < b.misfit; }
+
+// The first `count` of them that are apart from each other.
+std::vector<LightCandidate> spread(const std::vector<LightCandidate>& sorted, float apart,
+                                   std::size_t count) {
+  std::vector<LightCandidate> chosen;
+  for (const LightCandidate& candidate : sorted) {
+    if (chosen.size() == count) break;
+    const bool far = std::all_of(chosen.begin(), chosen.end(), [&](const LightCandidate& b) {
+      return b.direction.dot(candidate.direction) < apart;
+    });
+    if (far) chosen.push_back(candidate);
+  }
+  return chosen;
+}
+
+template <typename Judge>
+std::vector<LightCandidate> judged(const std::vector<Eigen::Vector3f>& directions, Judge judge) {
+  std::vector<LightCandidate> candidates(directions.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 0; i < directions.size(); ++i) candidates[i] = judge(directions[i]);
+  return candidates;
+}
+
+std::vector<Eigen::Vector3f> directionsOf(const std::vector<LightCandidate>& candidates) {
+  std::vector<Eigen::Vector3f> directions;
+  for (const LightCandidate& c : candidates) directions.push_back(c.direction);
+  return directions;
+}
+
+}  // namespace
+
+std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
+                                        std::size_t count) {
+  const Search search(evidence, up);
+  const auto by_all = [&](const Eigen::Vector3f& l) { return search.byAll(l); };
+  std::vector<LightCandidate> all = judged(
+      candidateDirections(up), [&](const Eigen::Vector3f& l) { return search.byShading(l, {}); });
+  std::stable_sort(all.begin(), all.end(), better);
+  std::vector<LightCandidate> kept = judged(directionsOf(spread(all, kApart, kKept)), by_all);
+  std::vector<Eigen::Vector3f> cast;
+  for (const Eigen::Vector3f& l : evidence.shadow_candidates) {
+    if (l.dot(up) > kLowestSun) cast.push_back(l);
+  }
+  std::vector<LightCandidate> from_shadows = judged(cast, by_all);
+  std::stable_sort(from_shadows.begin(), from_shadows.end(), better);
+  for (const LightCandidate& c : spread(from_shadows, kShadowApart, count)) kept.push_back(c);
+  std::stable_sort(kept.begin(), kept.end(), better);
+  kept.resize(std::min(kept.size(), count));
+  const double contrast = all[all.size() / 2].misfit - all.front().misfit;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    kept[i] = search.refined(kept[i]), kept[i].contrast = contrast;
+  std::stable_sort(kept.begin(), kept.end(), better);
+  return kept;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,113 @@
+#include "place/key_cover.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+namespace calipso::render {
+namespace {
+
+// px; narrower gaps between mask and model are misfit, unless they reach
+constexpr int kFrontOpening = 7;
+constexpr int kNarrowFront = 3;         // ... so much of them
+constexpr float kDeepFront = 6.0f;      // ... that far inside the model's outline: a peg on a towel
+constexpr float kNearerBeside = 1.02f;  // times as near: before an object
+
+// Where an object's surface should be seen at the key frame but no mask is, something stands before
+// it. The rim is left out: there the fit is not exact.
+cv::Mat frontOf(const cv::Mat& outline, const cv::Mat& labels) {
+  const cv::Mat gaps = outline & (labels == 0);
+  cv::Mat front, narrow, inside, parts;
+  cv::morphologyEx(gaps, front, cv::MORPH_OPEN, cv::Mat::ones(kFrontOpening, kFrontOpening, CV_8U));
+  cv::morphologyEx(gaps, narrow, cv::MORPH_OPEN, cv::Mat::ones(kNarrowFront, kNarrowFront, CV_8U));
+  cv::distanceTransform(outline, inside, cv::DIST_L2, cv::DIST_MASK_3);
+  std::vector<bool> deep(cv::connectedComponents(narrow, parts, 8, CV_32S), false);
+  for (int v = 0; v < parts.rows; ++v) {
+    for (int u = 0; u < parts.cols; ++u) {
+      if (inside.at<float>(v, u) >= kDeepFront) deep[parts.at<int>(v, u)] = true;
+    }
+  }
+  for (int v = 0; v < parts.rows; ++v) {
+    for (int u = 0; u < parts.cols; ++u) {
+      if (parts.at<int>(v, u) > 0 && deep[parts.at<int>(v, u)]) front.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return cv::countNonZero(front) > 0 ? front : cv::Mat();
+}
+
+// What the depth image shows just beside an object, off the planes and nearer: it stands before it.
+// @param ground nearness of the support planes
+cv::Mat nearerBeside(const cv::Mat& mask, const cv::Mat& labels, const cv::Mat& depth,
+                     const cv::Mat& ground, int margin) {
+  cv::Mat nearness = cv::Mat::zeros(depth.size(), CV_32F), own = nearness.clone();
+  cv::Mat(1.0 / depth).copyTo(nearness, depth > 0.0f);
+  nearness.copyTo(own, mask);
+  cv::dilate(own, own,
+             cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
+  cv::Mat nearer = (labels == 0) & (own > 0.0f) & (nearness > kNearerBeside * own);
+  if (!ground.empty()) nearer &= cv::abs(nearness - ground) > (kNearerBeside - 1.0f) * nearness;
+  return nearer;
+}
+
+}  // namespace
+
+cv::Mat outlineOf(const Actor& actor, const cv::Size& size) {
+  cv::Mat outline = cv::Mat::zeros(size, CV_8U);
+  VisibilityBuffer buffer({0, 0, size.width, size.height});
+  buffer.draw(actor.screen, 0);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      if (buffer.ids(v)[u] != VisibilityBuffer::kNothing) outline.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return outline;
+}
+
+cv::Mat grown(const cv::Mat& mask, int radius) {
+  cv::Mat out;
+  cv::dilate(mask, out,
+             cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+  return out;
+}
+
+std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p,
+                              const RenderParams& params) {
+  std::vector<cv::Mat> fronts;
+  const cv::Mat ground =
+      params.depth.empty() ? cv::Mat() : groundNearness(params.planes, p.camera, cv::Mat());
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    cv::Mat front = frontOf(outlineOf(actors[i], p.key_labels.size()), p.key_labels);
+    if (!params.depth.empty() && !p.moves[i]) {
+      const cv::Mat beside =
+          nearerBeside(p.key_labels == p.surfaces[i].index, p.key_labels, params.depth, ground,
+                       params.background.mask_margin_px + params.background.shadow_margin_px + 1);
+      if (cv::countNonZero(beside) > 0) front = front.empty() ? beside : cv::Mat(front | beside);
+    }
+    fronts.push_back(front);
+  }
+  return fronts;
+}
+
+std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepared& p) {
+  std::vector<cv::Mat> footprints;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    cv::Mat footprint =
+        (p.key_labels == p.surfaces[i].index) | outlineOf(actors[i], p.key_labels.size());
+    if (!p.fronts[i].empty()) footprint.setTo(0, p.fronts[i]);
+    footprints.push_back(p.moves[i] ? cv::Mat() : footprint);
+  }
+  return footprints;
+}
+
+cv::Mat sceneryOf(const cv::Mat& depth, const Prepared& p, int margin) {
+  if (depth.empty()) return {};
+  cv::Mat objects = p.key_labels != 0, nearness = cv::Mat::zeros(depth.size(), CV_32F);
+  for (const cv::Mat& f : p.footprints) {
+    if (!f.empty()) objects |= f;
+  }
+  cv::dilate(objects, objects,
+             cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
+  cv::Mat(1.0 / depth).copyTo(nearness, (depth > 0.0f) & (objects == 0));
+  cv::erode(nearness, nearness, cv::Mat::ones(3, 3, CV_8U));
+  return nearness;
+}
+
+}  // namespace calipso::render

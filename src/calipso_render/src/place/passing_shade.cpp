@@ -1,0 +1,183 @@
+#include "place/passing_shade.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
+#include "light/shadow_check.hpp"
+#include "place/key_cover.hpp"
+#include "place/place_samples.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kStride = 2;  // px between the places for which shade is predicted
+
+// What a frame is predicted to show, one value per kStride px.
+struct Lighting {
+  cv::Mat sun, sky;  // CV_32FC1, visible part
+};
+
+// The places that take shade, one per kStride px.
+struct Places {
+  cv::Size size;
+  std::vector<std::optional<Receiver>> receivers;
+};
+
+Places placesOf(const ReceiverOf& receiver, const cv::Size& picture) {
+  Places places{{(picture.width + kStride - 1) / kStride, (picture.height + kStride - 1) / kStride},
+                {}};
+  for (int j = 0; j < places.size.height; ++j) {
+    for (int i = 0; i < places.size.width; ++i)
+      places.receivers.push_back(receiver(kStride * i, kStride * j));
+  }
+  return places;
+}
+
+// The objects that move where a frame has them. Empty unless all their poses are known.
+std::vector<Points> movingShapes(const ClipFrame& frame, const PassingCast& cast, bool is_key) {
+  std::vector<Points> shapes;
+  for (std::size_t k = 0; k < cast.surfaces.size(); ++k) {
+    const Surface& s = cast.surfaces[k];
+    if (!cast.moves[k]) continue;
+    const auto pose = std::find_if(frame.poses.begin(), frame.poses.end(),
+                                   [&](const ObjectPose& o) { return o.index == s.index; });
+    if (pose != frame.poses.end())
+      shapes.push_back(transformed(s.object_vertices, pose->world_from_object));
+    else if (is_key)
+      shapes.push_back(s.key_vertices);
+    else
+      return {};
+  }
+  return shapes;
+}
+
+Lighting lightingOf(const std::vector<Points>& shapes, const PassingCast& cast,
+                    const Places& places) {
+  std::vector<Occluder> occluders;
+  for (std::size_t k = 0, i = 0; k < cast.surfaces.size(); ++k) {
+    if (cast.moves[k])
+      occluders.push_back({&shapes[i++], &cast.surfaces[k].triangles, cast.surfaces[k].winding});
+  }
+  const ShadowMap sun(occluders, cast.to_sun, {512, cast.sun_radius, 16});
+  const SkyMap sky(occluders, cast.up, {});
+  Lighting out{cv::Mat(places.size, CV_32F, cv::Scalar(1.0f)),
+               cv::Mat(places.size, CV_32F, cv::Scalar(1.0f))};
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int k = 0; k < static_cast<int>(places.receivers.size()); ++k) {
+    const std::optional<Receiver>& r = places.receivers[k];
+    if (!r) continue;
+    out.sun.at<float>(k) = sun.visibility(r->position, r->normal);
+    out.sky.at<float>(k) = sky.visibility(r->position, r->normal);
+  }
+  return out;
+}
+
+// A frame's predicted shade, of the picture's size.
+struct Shade {
+  cv::Mat core, near;  // CV_8UC1; near: within the prediction's error of it
+};
+
+Shade shadeOf(const Lighting& lighting, const cv::Size& size, int margin) {
+  Shade shade;
+  cv::resize(isShaded(lighting.sun, lighting.sky), shade.core, size, 0, 0, cv::INTER_NEAREST);
+  shade.near = grown(shade.core, margin);
+  return shade;
+}
+
+// A pixel's values over time: in shade by the prediction, within its error, and neither.
+struct Sorted {
+  Samples core, near, lit;
+};
+
+class Sorter {
+ public:
+  Sorter(const std::vector<ClipFrame>& frames, int margin)
+      : frames_(frames), samples_(frames, margin), shades_(frames.size()) {}
+
+  void set(std::size_t frame, const Shade& shade) { shades_[frame] = shade; }
+
+  // Of the frames whose shade is known.
+  Sorted at(int u, int v) const {
+    Sorted s;
+    for (std::size_t i = 0; i < frames_.size(); ++i) {
+      if (!shades_[i] || !samples_.shows(i, u, v)) continue;
+      Samples& of = shades_[i]->core.at<std::uint8_t>(v, u) != 0   ? s.core
+                    : shades_[i]->near.at<std::uint8_t>(v, u) != 0 ? s.near
+                                                                   : s.lit;
+      of.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
+    }
+    return s;
+  }
+
+  bool shows(std::size_t frame, int u, int v) const { return samples_.shows(frame, u, v); }
+
+ private:
+  const std::vector<ClipFrame>& frames_;
+  PlaceSamples samples_;
+  std::vector<std::optional<Shade>> shades_;
+};
+
+// The brightest that is shown of every place.
+void brighten(const Lighting& now, const Sorter& sorter, std::size_t frame, Lighting& most) {
+  for (int j = 0; j < most.sun.rows; ++j) {
+    for (int i = 0; i < most.sun.cols; ++i) {
+      if (!sorter.shows(frame, kStride * i, kStride * j)) continue;
+      most.sun.at<float>(j, i) = std::max(most.sun.at<float>(j, i), now.sun.at<float>(j, i));
+      most.sky.at<float>(j, i) = std::max(most.sky.at<float>(j, i), now.sky.at<float>(j, i));
+    }
+  }
+}
+
+// Takes the shaded frames out of a plate's median. @return CV_8UC1: 255 where no frame is lit
+cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& background) {
+  const cv::Size size = background.plate.size();
+  cv::Mat never_lit = cv::Mat::zeros(size, CV_8U);
+  background.shaded_at_times = cv::Mat::zeros(size, CV_8U);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      Sorted s = sorter.at(u, v);
+      if (s.core.empty() && s.near.empty()) continue;
+      background.shaded_at_times.at<std::uint8_t>(v, u) = 255;
+      if (s.lit.empty()) {
+        never_lit.at<std::uint8_t>(v, u) = 255;
+        continue;
+      }
+      if (!shadedAgainst(s.lit, s.core.empty() ? s.near : s.core, step)) continue;
+      dropShaded(step, s.lit);
+      background.plate.at<cv::Vec3f>(v, u) = robustMean(s.lit, background.spread.at<float>(v, u));
+    }
+  }
+  return never_lit;
+}
+
+}  // namespace
+
+ShadeThatStays leaveOutPassingShade(const std::vector<ClipFrame>& frames, const PassingCast& cast,
+                                    const ReceiverOf& receiver, const BackgroundParams& params,
+                                    Background& background) {
+  const cv::Size size = frames.front().bgr.size();
+  const Places places = placesOf(receiver, size);
+  Sorter sorter(frames, params.mask_margin_px);
+  Lighting most{cv::Mat::zeros(places.size, CV_32F), cv::Mat::zeros(places.size, CV_32F)};
+  bool any = false;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const std::vector<Points> shapes = movingShapes(frames[i], cast, i == 0);
+    if (shapes.empty()) continue;
+    const Lighting now = lightingOf(shapes, cast, places);
+    sorter.set(i, shadeOf(now, size, params.shadow_margin_px));
+    brighten(now, sorter, i, most);
+    any = any || i > 0;
+  }
+  ShadeThatStays stays;
+  if (!any) return stays;
+  stays.never_lit = dropShadedFrames(sorter, params.shadow_step, background);
+  cv::resize(most.sun, stays.sun, size, 0, 0, cv::INTER_LINEAR);
+  cv::resize(most.sky, stays.sky, size, 0, 0, cv::INTER_LINEAR);
+  for (cv::Mat* visible : {&stays.sun, &stays.sky}) visible->setTo(1.0f, stays.never_lit == 0);
+  return stays;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,232 @@
+#include "place/place_depth.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "calipso_render/inpaint.hpp"
+#include "calipso_render/stage.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kDepths = 24;      // tried behind an object
+constexpr int kFewestViews = 3;  // that must look behind it
+constexpr int kAround = 15;      // px of the square whose spread is compared
+constexpr float kNoSpread = 1e9f;
+constexpr float kBefore = 1.1f;        // times that what hides a place is nearer than it,
+constexpr float kLeastBefore = 1e-4f;  // 1/m
+
+cv::Mat grown(const cv::Mat& mask, int radius) {
+  cv::Mat out;
+  cv::dilate(mask, out,
+             cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+  return out;
+}
+
+float planeNearness(const std::vector<SupportPlane>& planes, const Camera& camera,
+                    const Eigen::Isometry3d& from_world, int u, int v) {
+  const auto receiver = receiverAt(planes, camera, static_cast<float>(u), static_cast<float>(v));
+  return receiver ? static_cast<float>(1.0 / (from_world * receiver->position.cast<double>()).z())
+                  : 0.0f;
+}
+
+// One frame, with the way from the key frame's pixels into it.
+struct Sight {
+  cv::Mat grey, covered;
+  Eigen::Matrix3f turn;
+  Eigen::Vector3f shift;
+  float fx, fy, cx, cy;
+
+  Sight(const ClipFrame& f, const Camera& key, int margin) : covered(grown(f.labels != 0, margin)) {
+    cv::cvtColor(f.bgr, grey, cv::COLOR_BGR2GRAY);
+    const Eigen::Isometry3f way =
+        (f.camera.world_from_camera.inverse() * key.world_from_camera).cast<float>();
+    turn = way.linear(), shift = way.translation();
+    fx = static_cast<float>(f.camera.fx), fy = static_cast<float>(f.camera.fy),
+    cx = static_cast<float>(f.camera.cx), cy = static_cast<float>(f.camera.cy);
+  }
+
+  // @return -1 where the frame does not show it
+  int at(const Eigen::Vector3f& ray, float nearness) const {
+    const Eigen::Vector3f p = turn * ray + nearness * shift;
+    if (p.z() < 1e-6f) return -1;
+    const int u = cvRound(fx * p.x() / p.z() + cx), v = cvRound(fy * p.y() / p.z() + cy);
+    if (u < 0 || v < 0 || u >= grey.cols || v >= grey.rows || covered.at<std::uint8_t>(v, u) != 0)
+      return -1;
+    return grey.at<std::uint8_t>(v, u);
+  }
+};
+
+// Mean deviation from the median of what the frames show there.
+float spreadAt(const std::vector<Sight>& sights, const Eigen::Vector3f& ray, float nearness,
+               std::vector<int>& values) {
+  values.clear();
+  for (const Sight& s : sights) {
+    const int value = s.at(ray, nearness);
+    if (value >= 0) values.push_back(value);
+  }
+  if (values.size() < kFewestViews) return kNoSpread;
+  const std::size_t middle = values.size() / 2;
+  std::nth_element(values.begin(), values.begin() + middle, values.end());
+  const int median = values[middle];
+  float sum = 0.0f;
+  for (const int value : values) sum += static_cast<float>(std::abs(value - median));
+  return sum / static_cast<float>(values.size());
+}
+
+// Depths of what is seen around, evenly spaced among its pixels, and infinity.
+std::vector<float> depthsAround(const cv::Mat& nearness, const cv::Mat& hidden) {
+  const cv::Rect box = cv::boundingRect(hidden),
+                 around = cv::Rect(box.x - box.width / 2, box.y - box.height / 2, 2 * box.width,
+                                   2 * box.height) &
+                          cv::Rect({0, 0}, hidden.size());
+  std::vector<float> seen, depths = {0.0f};
+  for (int v = around.y; v < around.br().y; ++v) {
+    for (int u = around.x; u < around.br().x; ++u) {
+      const float near = nearness.at<float>(v, u);
+      if (hidden.at<std::uint8_t>(v, u) == 0 && near > 0.0f) seen.push_back(near);
+    }
+  }
+  std::sort(seen.begin(), seen.end());
+  for (int i = 0; i < kDepths && !seen.empty(); ++i)
+    depths.push_back(seen[(2 * i + 1) * seen.size() / (2 * kDepths)]);
+  return depths;
+}
+
+void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int margin,
+           cv::Mat& nearness) {
+  const cv::Rect box = cv::boundingRect(hidden);
+  const Camera& key = frames.front().camera;
+  std::vector<Sight> sights;
+  for (const ClipFrame& f : frames) sights.emplace_back(f, key, margin);
+  cv::Mat least(box.size(), CV_32F, cv::Scalar(kNoSpread)), known = hidden == 0;
+  for (const float depth : depthsAround(nearness, hidden)) {
+    cv::Mat spread(box.size(), CV_32F, cv::Scalar(0.0f)), counted = spread.clone(), total;
+#pragma omp parallel for schedule(dynamic, 4)
+    for (int v = 0; v < box.height; ++v) {
+      std::vector<int> values;
+      for (int u = 0; u < box.width; ++u) {
+        if (hidden.at<std::uint8_t>(v + box.y, u + box.x) == 0) continue;
+        const float s =
+            spreadAt(sights, key.ray(u + box.x, v + box.y).cast<float>(), depth, values);
+        if (s < kNoSpread) spread.at<float>(v, u) = s, counted.at<float>(v, u) = 1.0f;
+      }
+    }
+    cv::blur(spread, spread, {kAround, kAround});
+    cv::blur(counted, total, {kAround, kAround});
+    for (int v = 0; v < box.height; ++v) {
+      for (int u = 0; u < box.width; ++u) {
+        if (counted.at<float>(v, u) == 0.0f) continue;
+        const float s = spread.at<float>(v, u) / total.at<float>(v, u);
+        if (s >= least.at<float>(v, u)) continue;
+        least.at<float>(v, u) = s, nearness.at<float>(v + box.y, u + box.x) = depth,
+                           known.at<std::uint8_t>(v + box.y, u + box.x) = 255;
+      }
+    }
+  }
+  cv::Mat weight, three;
+  known.convertTo(weight, CV_32F, 1.0 / 255.0);
+  cv::merge(std::vector<cv::Mat>(3, nearness), three);
+  cv::extractChannel(pushPull(three, weight), three, 0);
+  three.copyTo(nearness, known == 0);
+}
+
+// The key frame's pixels as another camera sees them.
+class OtherView {
+ public:
+  OtherView(const Camera& key, const Camera& to)
+      : key_(key),
+        to_(to),
+        way_((to.world_from_camera.inverse() * key.world_from_camera).cast<float>()) {}
+
+  // Where pixel (u, v) of the key frame is seen, px, and its depth over that in the key frame;
+  // nothing behind the camera.
+  // @param near 1/m
+  std::optional<Eigen::Vector3f> placeOf(int u, int v, float near) const {
+    const Eigen::Vector3f p =
+        way_.linear() * key_.ray(u, v).cast<float>() + near * way_.translation();
+    if (p.z() < 1e-6f) return std::nullopt;
+    return Eigen::Vector3f(to_.fx * p.x() / p.z() + to_.cx, to_.fy * p.y() / p.z() + to_.cy, p.z());
+  }
+
+ private:
+  const Camera &key_, &to_;
+  Eigen::Isometry3f way_;
+};
+
+// What is nearest at every pixel of another camera, of the key frame's pixels drawn as squares of
+// two, so that a place that grows has no gaps; -1 where none falls.
+cv::Mat nearestFrom(const cv::Mat& nearness, const Camera& key, const Camera& to) {
+  const OtherView view(key, to);
+  cv::Mat out(to.height, to.width, CV_32F, cv::Scalar(-1.0f));
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) {
+      const float near = nearness.at<float>(v, u);
+      const auto place = view.placeOf(u, v, near);
+      if (!place) continue;
+      const int x = cvFloor(place->x()), y = cvFloor(place->y());
+      for (int j = std::max(0, y); j <= std::min(to.height - 1, y + 1); ++j) {
+        for (int i = std::max(0, x); i <= std::min(to.width - 1, x + 1); ++i)
+          out.at<float>(j, i) = std::max(out.at<float>(j, i), near / place->z());
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<SupportPlane>& planes,
+                      const cv::Mat& depth, int margin) {
+  const ClipFrame& key = frames.front();
+  const Eigen::Isometry3d from_world = key.camera.world_from_camera.inverse();
+  cv::Mat nearness(key.bgr.size(), CV_32F);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) {
+      const float d = depth.empty() ? 0.0f : depth.at<float>(v, u);
+      nearness.at<float>(v, u) =
+          d > 0.0f ? 1.0f / d : planeNearness(planes, key.camera, from_world, u, v);
+    }
+  }
+  const cv::Mat hidden = grown(key.labels != 0, margin);
+  if (!depth.empty() && cv::countNonZero(hidden) > 0) sweep(frames, hidden, margin, nearness);
+  return nearness;
+}
+
+cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& to) {
+  cv::Mat out = nearestFrom(nearness, key, to), farthest;
+  for (cv::Mat unseen = out<0.0f; cv::countNonZero(unseen)> 0; unseen = out < 0.0f) {
+    cv::Mat near = out.clone();
+    near.setTo(1e9f, unseen);
+    cv::erode(near, farthest, cv::Mat::ones(3, 3, CV_8U));
+    farthest.copyTo(out, unseen & (farthest < 1e9f));
+    if (cv::countNonZero(out >= 0.0f) == 0) out.setTo(0.0f);
+  }
+  return out;
+}
+
+cv::Mat hiddenFrom(const cv::Mat& nearness, const cv::Mat& guessed, const Camera& key,
+                   const Camera& to) {
+  const OtherView view(key, to);
+  cv::Mat surely = nearness.clone();
+  surely.setTo(0.0f, guessed);
+  const cv::Mat nearest = nearestFrom(surely, key, to);
+  cv::Mat hidden = cv::Mat::zeros(nearness.size(), CV_8U);
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) {
+      const float near = nearness.at<float>(v, u);
+      const auto place = view.placeOf(u, v, near);
+      if (!place) continue;
+      const int x = cvRound(place->x()), y = cvRound(place->y());
+      if (x < 0 || y < 0 || x >= to.width || y >= to.height) continue;
+      if (nearest.at<float>(y, x) > kBefore * near / place->z() + kLeastBefore)
+        hidden.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return hidden;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,141 @@
+#include "place/place_samples.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calipso_render/colour.hpp"
+#include "place/key_cover.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kNearMedian = 6.0f;    // code values; farther ones do not enter the mean
+constexpr float kLit = 0.75f;          // quantile of brightness that stands for the unshaded value
+constexpr std::size_t kFewestLit = 3;  // samples that a lit or shaded group must have
+constexpr double kGroupGap = 4.0;      // gap between two groups, in spreads of either
+// a shadow's largest ratio of shaded to lit in a channel over its smallest
+constexpr float kShadowTint = 1.8f;
+
+int brightness(const cv::Vec3b& c) { return c[0] + 2 * c[1] + c[2]; }
+
+// Where values in order of brightness fall apart best: the least sum of squares within two groups
+// (Otsu).
+std::size_t bestSplit(const Samples& sorted) {
+  double total = 0.0, below = 0.0, best = -1.0;
+  for (const cv::Vec3b& c : sorted) total += brightness(c);
+  std::size_t split = 0;
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    below += brightness(sorted[i - 1]);
+    const double gap = (total - below) / (sorted.size() - i) - below / i;
+    const double between = gap * gap * i * (sorted.size() - i);
+    if (between > best) best = between, split = i;
+  }
+  return split;
+}
+
+// Half the range that the middle half of a group covers, at least the camera's noise.
+double groupSpread(const Samples& sorted, std::size_t from, std::size_t to) {
+  const std::size_t quarter = (to - from) / 4;
+  return std::max(0.5 * (brightness(sorted[to - 1 - quarter]) - brightness(sorted[from + quarter])),
+                  1.0 * kNearMedian);
+}
+
+// A shadow darkens all channels, and to about the same part of their linear values.
+bool darkenedAlike(const cv::Vec3b& shaded, const cv::Vec3b& lit) {
+  float least = 1.0f, most = 0.0f;
+  for (int c = 0; c < 3; ++c) {
+    const float ratio = linearFromCode(shaded[c]) / std::max(linearFromCode(lit[c]), 1e-3f);
+    least = std::min(least, ratio), most = std::max(most, ratio);
+  }
+  return most < 1.0f && most < kShadowTint * least;
+}
+
+// Brightness without shade. A shadow that stays can hold most of the samples; two clear groups
+// that differ as shade does tell it, however few the bright ones are.
+double litBrightness(double step, Samples values) {
+  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) {
+    return brightness(a) < brightness(b);
+  };
+  std::stable_sort(values.begin(), values.end(), darker);
+  const std::size_t n = values.size(), split = bestSplit(values);
+  const double usual = brightness(values[static_cast<std::size_t>(kLit * (n - 1))]);
+  if (split < kFewestLit || n - split < kFewestLit) return usual;
+  const cv::Vec3b &shaded = values[split / 2], &lit = values[(split + n) / 2];
+  const double gap = brightness(lit) - brightness(shaded);
+  const double spread = std::max(groupSpread(values, 0, split), groupSpread(values, split, n));
+  const bool apart = gap > std::max(step * brightness(lit), kGroupGap * spread);
+  return apart && darkenedAlike(shaded, lit) ? brightness(lit) : usual;
+}
+
+cv::Vec3b medianOf(const Samples& values) {
+  cv::Vec3b median;
+  std::vector<std::uint8_t> sorted(values.size());
+  for (int c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < values.size(); ++i) sorted[i] = values[i][c];
+    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
+    median[c] = sorted[sorted.size() / 2];
+  }
+  return median;
+}
+
+}  // namespace
+
+PlaceSamples::PlaceSamples(const std::vector<ClipFrame>& frames, int margin) : frames_(frames) {
+  for (const ClipFrame& f : frames) covered_.push_back(grown(f.labels != 0, margin));
+}
+
+Samples PlaceSamples::at(int u, int v) const {
+  Samples values;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (shows(i, u, v)) values.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
+  }
+  return values;
+}
+
+bool shadedAgainst(const Samples& lit, const Samples& values, double step) {
+  const cv::Vec3b bright = medianOf(lit), dark = medianOf(values);
+  const double least = std::max(step * brightness(bright), 4.0 * kNearMedian);
+  return brightness(dark) < brightness(bright) - least && darkenedAlike(dark, bright);
+}
+
+bool dropShaded(double step, Samples& values) {
+  const std::size_t before = values.size();
+  const double lit = litBrightness(step, values);
+  const double limit = lit - std::max(step * lit, 4.0 * kNearMedian);
+  values.erase(std::remove_if(values.begin(), values.end(),
+                              [&](const cv::Vec3b& c) { return brightness(c) < limit; }),
+               values.end());
+  return 2 * values.size() < before;
+}
+
+void keepBrighter(Samples& values) {
+  const auto darker = [](const cv::Vec3b& a, const cv::Vec3b& b) {
+    return brightness(a) < brightness(b);
+  };
+  std::stable_sort(values.begin(), values.end(), darker);
+  values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(bestSplit(values)));
+}
+
+cv::Vec3f robustMean(const Samples& values, float& spread) {
+  cv::Vec3f result;
+  spread = 0.0f;
+  std::vector<int> sorted(values.size()), deviation(values.size());
+  const std::size_t middle = values.size() / 2;
+  for (int c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < values.size(); ++i) sorted[i] = values[i][c];
+    std::nth_element(sorted.begin(), sorted.begin() + middle, sorted.end());
+    const int median = sorted[middle];
+    float sum = 0.0f;
+    int used = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      deviation[i] = std::abs(values[i][c] - median);
+      if (deviation[i] <= kNearMedian) sum += values[i][c], ++used;
+    }
+    std::nth_element(deviation.begin(), deviation.begin() + middle, deviation.end());
+    spread = std::max(spread, static_cast<float>(deviation[middle]));
+    result[c] = sum / used;
+  }
+  return result;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,397 @@
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "place/place_relief.hpp"
+#include "place/plane_edges.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kStride = 4;  // px between pixels that planes are sought among
+// px: places where planes are begun, and the square they are begun from
+constexpr int kSeedStep = 16, kSeedReach = 7;
+constexpr int kMostPlanes = 10;
+constexpr double kLeastPart = 0.01;  // of the picture, for a plane: walls, not the sides of things
+constexpr float kOnPlane = 0.01f;    // of the nearness
+constexpr double kSeedSpread = 0.005;  // likewise
+// of the nearness: what is farther from the support planes is relief
+constexpr float kOffSupport = 0.02f;
+constexpr float kBehind = 1.02f;      // of an object's nearness: what it hides is no nearer
+constexpr double kLeastPiece = 0.05;  // of a plane's pixels, for a connected piece of it to count
+// of the side of a square as large as what is seen of a plane: so far it may go on beyond that
+constexpr double kBeyond = 0.25;
+constexpr float kFarther = 0.97f;  // of a plane's nearness: where that is seen the plane is not
+constexpr int kCurvedReach = 4;    // px of the square that tells the normal of what is not plane
+constexpr float kSameSurface = 0.05f;  // of the nearness within it
+
+constexpr int kCopied = 6;  // px around a place that are plane, for it to be copied from
+
+constexpr int kNoPlane = -1;
+
+struct Pixel {
+  int u, v;
+  double nearness;
+};
+
+std::optional<Eigen::Vector3d> affineThrough(const std::vector<Pixel>& pixels) {
+  if (pixels.size() < 3) return std::nullopt;
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  const double u0 = pixels.front().u, v0 = pixels.front().v;  // well conditioned about one of them
+  for (const Pixel& p : pixels) {
+    const Eigen::Vector3d x(p.u - u0, p.v - v0, 1.0);
+    A += x * x.transpose(), b += p.nearness * x;
+  }
+  if (A.determinant() < 1e-6 * A.trace()) return std::nullopt;
+  Eigen::Vector3d abc = A.ldlt().solve(b);
+  abc[2] -= abc[0] * u0 + abc[1] * v0;
+  return abc;
+}
+
+double errorAt(const Eigen::Vector3d& abc, const Pixel& p) {
+  return std::abs(abc[0] * p.u + abc[1] * p.v + abc[2] - p.nearness) / p.nearness;
+}
+
+std::vector<Pixel> pixelsIn(const cv::Mat& nearness, const cv::Mat& wanted, const cv::Rect& rect,
+                            int step) {
+  std::vector<Pixel> pixels;
+  const cv::Rect here = rect & cv::Rect({0, 0}, wanted.size());
+  for (int v = here.y; v < here.br().y; v += step) {
+    for (int u = here.x; u < here.br().x; u += step) {
+      if (wanted.at<std::uint8_t>(v, u) != 0) pixels.push_back({u, v, nearness.at<float>(v, u)});
+    }
+  }
+  return pixels;
+}
+
+// Planes through small squares that are plane.
+std::vector<Eigen::Vector3d> seeds(const cv::Mat& nearness, const cv::Mat& wanted) {
+  std::vector<Eigen::Vector3d> found;
+  const int side = 2 * kSeedReach + 1;
+  for (int v = kSeedReach; v < wanted.rows; v += kSeedStep) {
+    for (int u = kSeedReach; u < wanted.cols; u += kSeedStep) {
+      const std::vector<Pixel> pixels =
+          pixelsIn(nearness, wanted, {u - kSeedReach, v - kSeedReach, side, side}, 2);
+      if (10 * pixels.size() < 6 * static_cast<std::size_t>((side + 1) * (side + 1) / 4)) continue;
+      const auto abc = affineThrough(pixels);
+      if (!abc) continue;
+      double squares = 0.0;
+      for (const Pixel& p : pixels) squares += errorAt(*abc, p) * errorAt(*abc, p);
+      if (squares < kSeedSpread * kSeedSpread * static_cast<double>(pixels.size()))
+        found.push_back(*abc);
+    }
+  }
+  return found;
+}
+
+std::vector<Pixel> onPlane(const Eigen::Vector3d& abc, const std::vector<Pixel>& pixels) {
+  std::vector<Pixel> on;
+  std::copy_if(pixels.begin(), pixels.end(), std::back_inserter(on),
+               [&](const Pixel& p) { return errorAt(abc, p) < kOnPlane; });
+  return on;
+}
+
+// Where a plane may be at most: in the hull of its larger pieces, and beyond by a part of its size.
+cv::Mat reachOf(const cv::Mat& on) {
+  cv::Mat pieces, stats, centres, reach = cv::Mat::zeros(on.size(), CV_8U), beyond;
+  cv::connectedComponentsWithStats(on, pieces, stats, centres, 8, CV_32S);
+  const int all = cv::countNonZero(on);
+  std::vector<cv::Point> points, hull;
+  for (int v = 0; v < on.rows; ++v) {
+    for (int u = 0; u < on.cols; ++u) {
+      const int piece = pieces.at<int>(v, u);
+      if (piece > 0 && stats.at<int>(piece, cv::CC_STAT_AREA) >= kLeastPiece * all)
+        points.push_back({u, v});
+    }
+  }
+  if (points.empty()) return reach;
+  cv::convexHull(points, hull);
+  cv::fillConvexPoly(reach, hull, 255);
+  cv::distanceTransform(reach == 0, beyond, cv::DIST_L2, cv::DIST_MASK_5);
+  return beyond <= kBeyond * std::sqrt(static_cast<double>(all));
+}
+
+// A plane all over the picture.
+struct Extent {
+  cv::Mat nearness;  // CV_32FC1, 0: not there
+  cv::Mat farthest;  // CV_32FC1: of it and the pixels around, which the depth image may show
+  cv::Mat goes_on;   // CV_8UC1: 255 where it may be behind objects
+
+  // Part by which what is seen misses it: none within a pixel. Towards the horizon that is much.
+  float miss(float seen, int u, int v) const {
+    return std::max({0.0f, seen - nearness.at<float>(v, u), farthest.at<float>(v, u) - seen}) /
+           seen;
+  }
+};
+
+Extent supportExtent(const cv::Mat& nearness) {
+  Extent e{nearness, {}, {}};
+  cv::erode(nearness, e.farthest, cv::Mat::ones(3, 3, CV_8U));
+  return e;
+}
+
+// Where a plane goes on that is hidden: in its reach, and nearer to where it is seen than to where
+// something farther is seen in its place.
+// @param taken CV_8UC1, != 0: another plane is seen, which it may well pass through
+// @param beyond CV_8UC1, != 0: a plane is seen with which it ends at an edge: that says where
+// @param nothing CV_8UC1, != 0: so far away that the depth image says nothing
+cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& scenery, const cv::Mat& taken,
+               const cv::Mat& beyond, const cv::Mat& nothing) {
+  const cv::Mat known = (scenery > 0.0f) & (plane > 0.0f),
+                on = known & (cv::abs(plane - scenery) < kOnPlane * plane) & (taken == 0);
+  cv::Mat absent = (known & (scenery < kFarther * plane) & (beyond == 0)) | nothing, to_on,
+          to_absent;
+  cv::morphologyEx(absent, absent, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  if (cv::countNonZero(on) == 0) return cv::Mat::zeros(plane.size(), CV_8U);
+  const cv::Mat reach = reachOf(on);
+  if (cv::countNonZero(absent) == 0) return reach & (plane > 0.0f);
+  cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
+  cv::distanceTransform(absent == 0, to_absent, cv::DIST_L2, cv::DIST_MASK_5);
+  return (to_on < to_absent) & reach & (plane > 0.0f);
+}
+
+cv::Mat supportNearness(const SupportPlane& plane, const Camera& camera) {
+  cv::Mat nearness = cv::Mat::zeros(camera.height, camera.width, CV_32F);
+  const Eigen::Isometry3d from_world = camera.world_from_camera.inverse();
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u) {
+      const auto r = receiverAt({plane}, camera, static_cast<float>(u), static_cast<float>(v));
+      if (r)
+        nearness.at<float>(v, u) =
+            static_cast<float>(1.0 / (from_world * r->position.cast<double>()).z());
+    }
+  }
+  return nearness;
+}
+
+cv::Mat nearnessOf(const PicturePlane& plane, const cv::Size& size) {
+  cv::Mat nearness(size, CV_32F);
+  for (int v = 0; v < nearness.rows; ++v) {
+    for (int u = 0; u < nearness.cols; ++u)
+      nearness.at<float>(v, u) = static_cast<float>(std::max(0.0, plane.nearnessAt(u, v)));
+  }
+  return nearness;
+}
+
+// The normal of a surface that is not plane, from its pixels around.
+// @param known CV_8UC1, != 0: the depth image says how near it is
+std::optional<PicturePlane> curvedAt(const cv::Mat& nearness, const cv::Mat& known, int u, int v) {
+  const float own = nearness.at<float>(v, u);
+  const cv::Rect around(u - kCurvedReach, v - kCurvedReach, 2 * kCurvedReach + 1,
+                        2 * kCurvedReach + 1);
+  std::vector<Pixel> same;
+  for (const Pixel& p : pixelsIn(nearness, known, around, 1)) {
+    if (std::abs(p.nearness - own) < kSameSurface * own) same.push_back(p);
+  }
+  const auto abc = affineThrough(same);
+  return abc ? std::optional<PicturePlane>({*abc}) : std::nullopt;
+}
+
+void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const Camera& camera,
+           PlaceSurfaces& surfaces) {
+  const Eigen::Vector3f p =
+      (camera.world_from_camera * Eigen::Vector3d(camera.ray(u, v) / nearness)).cast<float>();
+  surfaces.position.at<cv::Vec3f>(v, u) = {p.x(), p.y(), p.z()};
+  surfaces.normal.at<cv::Vec3f>(v, u) = {normal.x(), normal.y(), normal.z()};
+}
+
+// Of planes first ... last - 1 the one that misses what is seen least, by less than `most`.
+int closest(const std::vector<Extent>& planes, int first, int last, float most, float seen, int u,
+            int v) {
+  int best = kNoPlane;
+  for (int k = first; k < last; ++k) {
+    const float miss = planes[k].miss(seen, u, v);
+    if (miss < most) most = miss, best = k;
+  }
+  return best;
+}
+
+// The plane that the depth image shows at a pixel, or kNoPlane: support planes above all, which
+// others pass through, and which are met less exactly.
+int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u, int v) {
+  int best = closest(planes, 0, supports, kOnPlane, seen, u, v);
+  if (best == kNoPlane)
+    best = closest(planes, supports, static_cast<int>(planes.size()), kOnPlane, seen, u, v);
+  return best != kNoPlane ? best : closest(planes, 0, supports, kOffSupport, seen, u, v);
+}
+
+// The plane seen if the object were not there: the nearest behind it, but for one that has ended at its edge with
+// another. @param object nearness of the object, 0 unknown
+int planeBehind(const std::vector<Extent>& planes, const Edges& edges, float object, int u, int v) {
+  const float limit = object > 0.0f ? kBehind * object : 1e9f;
+  const auto isThere = [&](int k) {
+    const float near = planes[k].nearness.at<float>(v, u);
+    return near > 0.0f && near < limit && planes[k].goes_on.at<std::uint8_t>(v, u) != 0;
+  };
+  const auto hasEnded = [&](int k) {
+    for (int j = 0; j < static_cast<int>(planes.size()); ++j) {
+      if (edges[k][j] == kStandsOut && isThere(j) &&
+          planes[j].nearness.at<float>(v, u) < planes[k].nearness.at<float>(v, u))
+        return true;
+    }
+    return false;
+  };
+  int best = kNoPlane;
+  float nearest = 0.0f;
+  for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
+    const float near = planes[k].nearness.at<float>(v, u);
+    if (near > nearest && isThere(k) && !hasEnded(k)) nearest = near, best = k;
+  }
+  return best;
+}
+
+// Of a mask the pieces that are as large as planes.
+cv::Mat largePieces(const cv::Mat& mask) {
+  cv::Mat pieces, stats, centres, large = cv::Mat::zeros(mask.size(), CV_8U);
+  cv::connectedComponentsWithStats(mask, pieces, stats, centres, 8, CV_32S);
+  for (int v = 0; v < mask.rows; ++v) {
+    for (int u = 0; u < mask.cols; ++u) {
+      const int piece = pieces.at<int>(v, u);
+      if (piece > 0 && stats.at<int>(piece, cv::CC_STAT_AREA) >= kLeastPart * mask.total())
+        large.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return large;
+}
+
+// CV_8SC1: the plane that every pixel shows, or kNoPlane.
+cv::Mat planesSeen(const cv::Mat& scenery, int supports, const std::vector<Extent>& planes) {
+  cv::Mat seen(scenery.size(), CV_8S, cv::Scalar(kNoPlane));
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = 0; v < scenery.rows; ++v) {
+    for (int u = 0; u < scenery.cols; ++u) {
+      const float near = scenery.at<float>(v, u);
+      if (near > 0.0f)
+        seen.at<std::int8_t>(v, u) =
+            static_cast<std::int8_t>(planeSeen(planes, supports, near, u, v));
+    }
+  }
+  return seen;
+}
+
+// @param seen planesSeen()
+void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, const cv::Mat& seen,
+                 const Edges& edges, std::vector<Extent>& planes) {
+  cv::Mat on_support = cv::Mat::zeros(scenery.size(), CV_8U);
+  for (int v = 0; v < scenery.rows && supports > 0; ++v) {
+    for (int u = 0; u < scenery.cols; ++u) {
+      const float near = scenery.at<float>(v, u);
+      if (near > 0.0f && closest(planes, 0, supports, kOnPlane, near, u, v) != kNoPlane)
+        on_support.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  const cv::Mat none = cv::Mat::zeros(scenery.size(), CV_8U);
+  for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
+    cv::Mat beyond = none.clone();
+    for (int j = 0; j < static_cast<int>(planes.size()); ++j) {
+      if (edges[k][j] == kStandsOut) beyond |= seen == j;
+    }
+    planes[k].goes_on =
+        goesOn(planes[k].nearness, scenery, k < supports ? none : on_support, beyond, nothing);
+  }
+}
+
+// Where a plane is seen, or hidden and nearer to where it is than to anything else that does not meet it.
+cv::Mat sureOf(const cv::Mat& label, const cv::Mat& hidden, const cv::Mat& seen,
+               const cv::Mat& nothing, const Edges& edges) {
+  const cv::Mat large = cv::Mat::ones(2 * kCopied + 1, 2 * kCopied + 1, CV_8U),
+                small = cv::Mat::ones(5, 5, CV_8U);
+  cv::Mat sure = hidden == 0;
+  for (int k = 0; k < static_cast<int>(edges.size()); ++k) {
+    const cv::Mat wanted = hidden & (label == k + 1);
+    if (cv::countNonZero(wanted) == 0) continue;
+    cv::Mat on, other, to_on, to_other;  // of both what is large enough to be copied from
+    cv::morphologyEx(seen == k, on, cv::MORPH_OPEN, large, {-1, -1}, 1, cv::BORDER_REPLICATE);
+    cv::morphologyEx(nothing | ((hidden == 0) & (seen != k)), other, cv::MORPH_OPEN, small,
+                     {-1, -1}, 1, cv::BORDER_REPLICATE);
+    for (int j = 0; j < static_cast<int>(edges.size()); ++j) {
+      if (edges[k][j] != kApart) other.setTo(0, seen == j);
+    }
+    if (cv::countNonZero(on) == 0) continue;
+    cv::distanceTransform(~on, to_on, cv::DIST_L2, cv::DIST_MASK_5);
+    if (cv::countNonZero(other) > 0)
+      cv::distanceTransform(~other, to_other, cv::DIST_L2, cv::DIST_MASK_5);
+    else
+      to_other = cv::Mat(label.size(), CV_32F, cv::Scalar(1e9f));
+    sure |= wanted & (to_on < to_other);
+  }
+  return sure;
+}
+
+}  // namespace
+
+std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& wanted) {
+  const cv::Rect whole({0, 0}, wanted.size());
+  const std::vector<Eigen::Vector3d> starts = seeds(nearness, wanted);
+  std::vector<Pixel> left = pixelsIn(nearness, wanted, whole, kStride);
+  const double fewest = kLeastPart * wanted.total() / (kStride * kStride);
+  std::vector<PicturePlane> found;
+  while (found.size() < kMostPlanes) {
+    std::vector<Pixel> most;
+    for (const Eigen::Vector3d& abc : starts) {
+      std::vector<Pixel> on = onPlane(abc, left);
+      if (on.size() > most.size()) most = std::move(on);
+    }
+    if (most.size() < fewest) break;
+    const Eigen::Vector3d first = *affineThrough(most), abc = *affineThrough(onPlane(first, left));
+    found.push_back({abc});
+    left.erase(std::remove_if(left.begin(), left.end(),
+                              [&](const Pixel& p) { return errorAt(abc, p) < kOnPlane; }),
+               left.end());
+  }
+  return found;
+}
+
+PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels,
+                           const std::vector<SupportPlane>& planes, const Camera& camera) {
+  if (scenery.empty()) return {};
+  const int supports = static_cast<int>(planes.size());
+  std::vector<Extent> extents;
+  std::vector<PicturePlane> all;
+  cv::Mat off = scenery > 0.0f;
+  for (const SupportPlane& plane : planes) {
+    extents.push_back(supportExtent(supportNearness(plane, camera)));
+    all.push_back(inPicture(plane, camera));
+    off &= (scenery - extents.back().nearness > kOffSupport * scenery) |
+           (extents.back().farthest - scenery > kOffSupport * scenery);
+  }
+  std::vector<Eigen::Vector3f> normals(planes.size());
+  for (const PicturePlane& plane : picturePlanes(scenery, off)) {
+    const cv::Mat nearness = nearnessOf(plane, scenery.size());
+    all.push_back(plane), extents.push_back({nearness, nearness, {}}),
+        normals.push_back(plane.normal(camera));
+  }
+  const cv::Mat seen_planes = planesSeen(scenery, supports, extents);
+  const Edges edges = findEdges(all, seen_planes);
+  const cv::Mat nothing = largePieces((depth == 0.0f) & (labels == 0));
+  findReaches(scenery, nothing, supports, seen_planes, edges, extents);
+  const cv::Mat known = scenery > 0.0f;
+  PlaceSurfaces surfaces{
+      cv::Mat::zeros(scenery.size(), CV_8U), {},       cv::Mat(scenery.size(), CV_32FC3),
+      cv::Mat(scenery.size(), CV_32FC3),     supports, all};
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = 0; v < scenery.rows; ++v) {
+    for (int u = 0; u < scenery.cols; ++u) {
+      const float seen = scenery.at<float>(v, u), d = depth.at<float>(v, u);
+      if (seen == 0.0f && d == 0.0f && labels.at<std::uint8_t>(v, u) == 0)
+        continue;  // nothing is known
+      const int plane = seen > 0.0f ? seen_planes.at<std::int8_t>(v, u)
+                                    : planeBehind(extents, edges, d > 0.0f ? 1.0f / d : 0.0f, u, v);
+      std::uint8_t& label = surfaces.label.at<std::uint8_t>(v, u);
+      if (plane != kNoPlane) label = static_cast<std::uint8_t>(plane + 1);
+      if (plane >= supports)
+        setAt(u, v, extents[plane].nearness.at<float>(v, u), normals[plane], camera, surfaces);
+      if (plane != kNoPlane || seen == 0.0f) continue;
+      if (const auto curved = curvedAt(scenery, known, u, v))
+        label = PlaceSurfaces::kCurved, setAt(u, v, seen, curved->normal(camera), camera, surfaces);
+    }
+  }
+  surfaces.sure =
+      sureOf(surfaces.label, (scenery == 0.0f) & (nothing == 0), seen_planes, nothing, edges);
+  return surfaces;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,233 @@
+#include "calipso_render/appearance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "calipso_render/colour.hpp"
+#include "calipso_render/inpaint.hpp"
+#include "calipso_render/shadow_map.hpp"
+#include "draw/bicubic.hpp"
+#include "texture/texture_fill.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kMatt = 0.25f;  // part of a pixel's light that is never taken for a highlight
+constexpr int kMargin = 12;     // px around the object that albedo is extended by
+constexpr int kShadowMapSide = 768;
+// of the mean light: what has less of it shows its reflectance with less certainty
+constexpr float kLit = 0.7f;
+constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
+
+// Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the
+// first pixels mix with the background and with what compression spreads.
+float rimTrust(float depth) {
+  if (depth <= 1.0f) return 0.02f;
+  return std::clamp((depth - 1.0f) / 1.5f, 0.05f, 1.0f);
+}
+
+cv::Mat trustOf(const cv::Mat& labels, int index) {
+  cv::Mat padded, depth;
+  cv::copyMakeBorder(labels == index, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
+  cv::distanceTransform(padded, depth, cv::DIST_L2, 5);
+  depth = depth(cv::Rect(1, 1, labels.cols, labels.rows));
+  cv::Mat trust = cv::Mat::zeros(labels.size(), CV_32F);
+  for (int v = 0; v < labels.rows; ++v) {
+    for (int u = 0; u < labels.cols; ++u) {
+      const float d = depth.at<float>(v, u);
+      if (d > 0.0f) trust.at<float>(v, u) = rimTrust(d);
+    }
+  }
+  return trust;
+}
+
+// Light on one actor's visible surface, pixel by pixel.
+struct Shaded {
+  cv::Mat highlight;  // CV_32FC3: specular radiance
+  cv::Mat light;      // CV_32FC3: shading of a white surface; 0 where the object is not seen
+  cv::Mat nearness;   // CV_32FC1
+  cv::Mat normal;     // CV_32FC3
+  cv::Vec3f mean;
+};
+
+Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
+             const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& thrown_back) {
+  Shaded s{cv::Mat::zeros(region.size(), CV_32FC3),
+           cv::Mat::zeros(region.size(), CV_32FC3),
+           cv::Mat::zeros(region.size(), CV_32F),
+           cv::Mat::zeros(region.size(), CV_32FC3),
+           {}};
+  VisibilityBuffer buffer(region);
+  buffer.draw(actor.screen, 0);
+  const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
+  std::vector<cv::Vec3d> sums(region.height);
+  std::vector<int> counts(region.height, 0);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < region.height; ++v) {
+    for (int u = 0; u < region.width; ++u) {
+      const std::uint32_t id = buffer.ids(v)[u];
+      if (id == VisibilityBuffer::kNothing) continue;
+      const SurfacePoint p =
+          surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
+      const float visible = sun.visibility(p.position, p.normal);
+      const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.seen, thrown_back);
+      s.light.at<cv::Vec3f>(v, u) = l;
+      const Eigen::Vector3f towards = (eye - p.position).normalized();
+      s.highlight.at<cv::Vec3f>(v, u) =
+          specularShading(light, gloss, p.normal, towards, visible,
+                          skyMirrored(p.seen, mirroredIn(p.normal, towards)));
+      s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
+      s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
+      sums[v] += cv::Vec3d(l), ++counts[v];
+    }
+  }
+  cv::Vec3d sum;
+  int count = 0;
+  for (int v = 0; v < region.height; ++v) sum += sums[v], count += counts[v];
+  s.mean = count > 0 ? cv::Vec3f(sum / count) : cv::Vec3f(1, 1, 1);
+  return s;
+}
+
+// @param mean_light that of the key frame, where there is one
+Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light,
+                          const Gloss& gloss, const ShadowMap& sun,
+                          const std::optional<cv::Vec3f>& mean_light,
+                          const cv::Vec3f& thrown_back) {
+  Reflectance r;
+  const cv::Rect all(0, 0, view.picture.cols, view.picture.rows);
+  cv::Rect mask_box = cv::boundingRect(view.labels == actor.surface->index);
+  mask_box =
+      mask_box.empty()
+          ? mask_box
+          : (mask_box + cv::Size(2 * kMargin, 2 * kMargin) - cv::Point(kMargin, kMargin)) & all;
+  r.region = boundsOf(actor.screen, kMargin, view.picture.size()) | mask_box;
+  if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
+  const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun, thrown_back);
+  r.nearness = shaded.nearness, r.normal = shaded.normal;
+  r.mean_light = mean_light.value_or(shaded.mean);
+  const cv::Vec3f floor = lightFloor(r.mean_light);
+  r.trust = trustOf(view.labels, actor.surface->index)(r.region).clone();
+  r.albedo = cv::Mat(r.region.size(), CV_32FC3, cv::Scalar::all(0));
+  for (int v = 0; v < r.region.height; ++v) {
+    for (int u = 0; u < r.region.width; ++u) {
+      if (r.nearness.at<float>(v, u) == 0.0f) {
+        r.trust.at<float>(v, u) = 0.0f;
+        continue;
+      }
+      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v + r.region.y, u + r.region.x);
+      const cv::Vec3f& l = shaded.light.at<cv::Vec3f>(v, u);
+      const cv::Vec3f& highlight = shaded.highlight.at<cv::Vec3f>(v, u);
+      for (int c = 0; c < 3; ++c) {
+        const float i = linearFromRealCode(code[c]);
+        r.albedo.at<cv::Vec3f>(v, u)[c] = std::max(i - highlight[c], kMatt * i) / (l[c] + floor[c]);
+      }
+      r.trust.at<float>(v, u) *= std::min(1.0f, luminance(l) / (kLit * luminance(r.mean_light)));
+    }
+  }
+  return r;
+}
+
+cv::Vec3f meanReflectance(const Reflectance& r) {
+  const cv::Scalar mean =
+      cv::countNonZero(r.trust) > 0 ? cv::mean(r.albedo, r.trust > 0.0f) : cv::Scalar();
+  return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
+}
+
+cv::Mat widened(const cv::Mat& colour) {
+  cv::Mat wide;
+  cv::cvtColor(colour, wide, cv::COLOR_BGR2BGRA);
+  return wide;
+}
+
+Appearance::Source sourceOf(const SurfaceTexture& texture, int triangle) {
+  bool picture = true, filled = true;
+  for (std::size_t i = texture.firstOf(triangle); i < texture.firstOf(triangle + 1); ++i) {
+    picture = picture && texture.texels[i][3] > kOnlyPicture,
+    filled = filled && texture.texels[i][3] < kOnlyTexture;
+  }
+  return picture  ? Appearance::Source::kPicture
+         : filled ? Appearance::Source::kTexture
+                  : Appearance::Source::kBoth;
+}
+
+Appearance makeAppearance(const std::vector<View>& views, const std::vector<ShadowMap>& suns,
+                          std::size_t object, bool moves, const Light& light, const Gloss& gloss) {
+  Appearance a;
+  a.gloss = gloss;
+  a.key_camera = views[0].camera;
+  std::vector<const View*> used;
+  std::vector<const Actor*> actors;
+  std::vector<Reflectance> pictures;
+  for (std::size_t i = 0; i < (moves ? views.size() : 1); ++i) {
+    used.push_back(&views[i]);
+    actors.push_back(&views[i].actors[object]);
+    const std::optional<cv::Vec3f> mean = i == 0 ? std::nullopt : std::make_optional(a.mean_light);
+    if (i == 0)
+      a.thrown_back = thrownBack(meanReflectance(
+          reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, thrownBack({}))));
+    pictures.push_back(
+        reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, a.thrown_back));
+    if (i == 0) a.mean_light = pictures[0].mean_light;
+  }
+  a.region = pictures[0].region;
+  a.albedo = widened(pushPull(pictures[0].albedo, pictures[0].trust));
+  for (Reflectance& r : pictures) r.albedo = widened(r.albedo);
+  fillTexture({used, actors, pictures}, a);
+  a.findSources();
+  return a;
+}
+
+}  // namespace
+
+std::vector<Appearance> makeAppearances(const std::vector<View>& views,
+                                        const std::vector<bool>& moves, const Light& light,
+                                        const Gloss& gloss) {
+  std::vector<ShadowMap> suns;
+  for (const View& view : views) {
+    std::vector<Occluder> occluders;
+    for (const Actor& a : view.actors)
+      occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+    suns.emplace_back(occluders, light.direction.cast<double>(),
+                      ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
+  }
+  std::vector<Appearance> appearances;
+  for (std::size_t i = 0; i < moves.size(); ++i)
+    appearances.push_back(makeAppearance(views, suns, i, moves[i], light, gloss));
+  return appearances;
+}
+
+void Appearance::findSources() {
+  sources.clear();
+  for (int t = 0; t < texture.triangleCount(); ++t) sources.push_back(sourceOf(texture, t));
+}
+
+cv::Vec3f Appearance::pictureAt(const Eigen::Vector3f& key_position) const {
+  const Eigen::Vector2d q = key_camera.projectWorld(key_position.cast<double>());
+  const cv::Vec4f c = sampleBicubic(albedo, static_cast<float>(q.x()) - region.x,
+                                    static_cast<float>(q.y()) - region.y);
+  return {c[0], c[1], c[2]};
+}
+
+cv::Vec3f Appearance::albedoAt(const SurfacePoint& point) const {
+  const cv::Vec4f texel = texture.at(point.triangle, point.weights);
+  if (texel[3] > kOnlyPicture) return pictureAt(point.key_position);
+  const cv::Vec3f filled(texel[0], texel[1], texel[2]);
+  return texel[3] < kOnlyTexture
+             ? filled
+             : filled * (1.0f - texel[3]) + pictureAt(point.key_position) * texel[3];
+}
+
+cv::Vec3f Appearance::radiance(const cv::Vec3f& albedo_at, const cv::Vec3f& now,
+                               const cv::Vec3f& highlight) const {
+  return albedo_at.mul(now + lightFloor(mean_light)) + highlight;
+}
+
+cv::Vec4f sampleBicubic(const cv::Mat& image, float u, float v) {
+  cv::Vec4f value;
+  cv::v_store(value.val, bicubic(image, u, v));
+  return value;
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,69 @@
+#include "texture/mesh_topology.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "calipso_scene/disjoint_sets.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kSamePlace = 1e-5f;  // of the surface's extent
+
+using DirectedEdge = std::pair<int, int>;
+
+// Every edge is walked once in each direction.
+bool isClosed(std::vector<DirectedEdge> edges) {
+  std::sort(edges.begin(), edges.end());
+  if (std::adjacent_find(edges.begin(), edges.end()) != edges.end()) return false;
+  return std::all_of(edges.begin(), edges.end(), [&](const DirectedEdge& e) {
+    return std::binary_search(edges.begin(), edges.end(), DirectedEdge(e.second, e.first));
+  });
+}
+
+}  // namespace
+
+std::vector<int> weld(const Points& vertices) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : vertices) box.extend(p);
+  const float cell = std::max(kSamePlace * box.diagonal().norm(), 1e-12f);
+  std::map<std::array<long, 3>, int> first;
+  std::vector<int> welded(vertices.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    std::array<long, 3> key;
+    for (int k = 0; k < 3; ++k) key[k] = std::lround(vertices[i][k] / cell);
+    welded[i] = first.try_emplace(key, static_cast<int>(i)).first->second;
+  }
+  return welded;
+}
+
+int outsideWinding(const Points& vertices, const Triangles& triangles) {
+  const std::vector<int> place = weld(vertices);
+  DisjointSets parts(static_cast<int>(vertices.size()));
+  std::vector<DirectedEdge> edges;
+  for (const Eigen::Vector3i& t : triangles) {
+    const int a = place[t[0]], b = place[t[1]], c = place[t[2]];
+    if (a == b || b == c || c == a) continue;  // without area
+    edges.insert(edges.end(), {{a, b}, {b, c}, {c, a}});
+    parts.join(a, b);
+    parts.join(b, c);
+  }
+  if (edges.empty() || !isClosed(edges)) return 0;
+  std::map<int, double> volumes;  // of the connected parts, six times
+  for (const Eigen::Vector3i& t : triangles) {
+    const Eigen::Vector3d a = vertices[t[0]].cast<double>(), b = vertices[t[1]].cast<double>(),
+                          c = vertices[t[2]].cast<double>();
+    volumes[parts.find(place[t[0]])] += a.dot(b.cross(c));
+  }
+  const bool outward =
+      std::all_of(volumes.begin(), volumes.end(), [](const auto& v) { return v.second >= 0.0; });
+  const bool inward =
+      std::all_of(volumes.begin(), volumes.end(), [](const auto& v) { return v.second <= 0.0; });
+  return outward == inward ? 0 : outward ? 1 : -1;
+}
+
+}  // namespace calipso::render

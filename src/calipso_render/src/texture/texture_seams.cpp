@@ -1,0 +1,103 @@
+#include "texture/texture_seams.hpp"
+
+#include <algorithm>
+
+#include "calipso_render/colour.hpp"
+#include "texture/mesh_topology.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kFewest = 0.5f;    // texels at a vertex that tell the colour of a part there
+constexpr float kLargest = 0.35f;  // step, of the brighter side, that differing light explains
+
+// Mean colours of a part at the vertices that it reaches.
+struct Part {
+  std::vector<cv::Vec3f> colour;
+  std::vector<float> texels;
+
+  explicit Part(std::size_t vertices) : colour(vertices), texels(vertices, 0.0f) {}
+  bool reaches(std::size_t vertex) const { return texels[vertex] >= kFewest; }
+};
+
+std::vector<Part> partsAtVertices(const std::vector<int>& welded, const Triangles& triangles,
+                                  const std::vector<signed char>& part,
+                                  const SurfaceTexture& texture) {
+  const int count = 1 + std::max<int>(0, *std::max_element(part.begin(), part.end()));
+  std::vector<Part> parts(count, Part(welded.size()));
+  for (int t = 0; t < texture.triangleCount(); ++t) {
+    for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
+      if (part[i] < 0) continue;
+      const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
+      const cv::Vec4f& c = texture.texels[i];
+      for (int k = 0; k < 3; ++k) {
+        const int vertex = welded[triangles[t][k]];
+        parts[part[i]].colour[vertex] += w[k] * cv::Vec3f(c[0], c[1], c[2]),
+            parts[part[i]].texels[vertex] += w[k];
+      }
+    }
+  }
+  for (Part& p : parts) {
+    for (std::size_t v = 0; v < p.colour.size(); ++v) {
+      if (p.texels[v] > 0.0f) p.colour[v] *= 1.0f / p.texels[v];
+    }
+  }
+  return parts;
+}
+
+// What part `own` lacks at a vertex where others meet it that differ from it by their light. The
+// seen part keeps its colour, others meet in the middle.
+// @return whether there is a step to be evened out
+bool lacking(const std::vector<Part>& parts, int own, std::size_t vertex, cv::Vec3f& lacks) {
+  if (!parts[own].reaches(vertex)) return false;
+  const cv::Vec3f& colour = parts[own].colour[vertex];
+  const auto continues = [&](const Part& other) {
+    const cv::Vec3f& c = other.colour[vertex];
+    return other.reaches(vertex) &&
+           cv::norm(c - colour) <= kLargest * std::max(cv::norm(c), cv::norm(colour));
+  };
+  if (continues(parts[0])) {
+    lacks = parts[0].colour[vertex] - colour;
+    return true;
+  }
+  cv::Vec3f sum;
+  float total = 0.0f;
+  for (const Part& other : parts) {
+    if (!continues(other)) continue;
+    sum += other.texels[vertex] * other.colour[vertex], total += other.texels[vertex];
+  }
+  lacks = sum / total - colour;
+  return total > parts[own].texels[vertex];
+}
+
+}  // namespace
+
+void levelSeams(const Points& vertices, const Triangles& triangles,
+                const std::vector<signed char>& part, SurfaceTexture& texture) {
+  if (part.empty()) return;
+  const std::vector<int> welded = weld(vertices);
+  const std::vector<Part> parts = partsAtVertices(welded, triangles, part, texture);
+  std::vector<std::vector<cv::Vec3f>> shifts(parts.size());
+  for (std::size_t own = 1; own < parts.size(); ++own) {
+    std::vector<cv::Vec3f> shift(vertices.size());
+    std::vector<bool> known(vertices.size(), false);
+    for (std::size_t v = 0; v < vertices.size(); ++v)
+      known[v] = lacking(parts, static_cast<int>(own), welded[v], shift[v]);
+    if (std::find(known.begin(), known.end(), true) == known.end()) continue;
+    diffuseOverMesh(vertices, triangles, known, shift);
+    shifts[own] = std::move(shift);
+  }
+  for (int t = 0; t < texture.triangleCount(); ++t) {
+    for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
+      if (part[i] <= 0 || shifts[part[i]].empty()) continue;
+      const std::vector<cv::Vec3f>& shift = shifts[part[i]];
+      const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
+      const cv::Vec3f by = w[0] * shift[triangles[t][0]] + w[1] * shift[triangles[t][1]] +
+                           w[2] * shift[triangles[t][2]];
+      for (int c = 0; c < 3; ++c)
+        texture.texels[i][c] = std::max(0.0f, texture.texels[i][c] + by[c]);
+    }
+  }
+}
+
+}  // namespace calipso::render
