@@ -78,7 +78,7 @@ bool ObjectTracker::hasStayed(const Frame& frame, const Reference& nearest) {
   if (!frame.camera.world_from_camera.isApprox(last_frame_.camera.world_from_camera, 0.0))
     return false;
   const ReferenceView::Warped& look =
-      lookAt(frame, nearest.view, last_->world_from_object, Care::kForward).warped;
+      lookAt(frame, nearest.view, last_->world_from_object, Care::kRough).warped;
   if (look.coverage == 0.0) return false;
   cv::Mat with_outline;
   cv::dilate(look.covered, with_outline, cv::Mat());

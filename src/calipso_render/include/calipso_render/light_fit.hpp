@@ -35,7 +35,7 @@ struct SeenGloss {
   bool tells_direction = false;  // they are where the light found puts them, and not beside it
 };
 
-// All that the pictures show of the light.
+// All that the pictures show of the light. The functions are called from several threads at once.
 struct LightEvidence {
   std::vector<LightSample> samples;
   int clusters = 0;

@@ -66,9 +66,9 @@ std::optional<cv::Vec3f> unshaded(const EmptyPlace& place,
     return std::nullopt;
   const cv::Point nearest(static_cast<int>(std::lround(uv.x())),
                           static_cast<int>(std::lround(uv.y())));
-  if (place.plate.count.at<std::uint8_t>(nearest) < kFewestFrames ||
-      place.plate.spread.at<float>(nearest) >= kQuiet)
-    return std::nullopt;
+  if (place.plate.spread.at<float>(nearest) >= kQuiet) return std::nullopt;
+  const cv::Rect mixed(static_cast<int>(uv.x()), static_cast<int>(uv.y()), 2, 2);
+  if (cv::countNonZero(place.plate.count(mixed) < kFewestFrames) > 0) return std::nullopt;
   const float depth = place.depth.empty() ? 0.0f : place.depth.at<float>(nearest);
   if (depth > 0.0f && std::abs(depth - p.z()) > kOffPlane * p.z()) return std::nullopt;
   return between(place.plate.plate, uv);
