@@ -122,10 +122,8 @@ TEST(Settle, ASlenderObjectOfDefaultStiffnessBearsItsWeight) {
   EXPECT_EQ(compact.reason.find("slender"), std::string::npos) << compact.reason;
 }
 
-constexpr double kFarTooSoft = 0.02;  // to be bent into the shape of a bar by gravity
-
-struct Bar {  // held at one end
-  explicit Bar(double stiffness) : soft(surface(), material(stiffness), options()) {
+struct Bar {  // held at one end, its material far too soft to be bent into this shape by gravity
+  Bar() : soft(surface(), material(), options()) {
     DeformableBody& body = soft.body();
     for (int i = 0; i < body.nodeCount(); ++i)
       if (body.positions()[3 * i] < -0.45) body.fixNode(i);
@@ -134,10 +132,9 @@ struct Bar {  // held at one end
     report = soft.settle({0, 0, -kG}, hold, 1e-4);
   }
   static TriangleMesh surface() { return boxSurface({1.0, 0.1, 0.1}, 4); }
-  // stiffness: as a share of the default one
-  static Material material(double stiffness) {
+  static Material material() {
     Material m = defaultMaterial(1.0, kG);
-    m.youngs_modulus *= stiffness;
+    m.youngs_modulus *= 0.02;
     return m;
   }
   static FemOptions options() {
@@ -150,23 +147,13 @@ struct Bar {  // held at one end
   SettleReport report;
 };
 
-// Both kinds of search are long if nothing stops them: 8 iterations, and 7.
-TEST(Settle, AVainSearchIsGivenUpEarlyASlowOneIsNot) {
-  const SettleReport vain = Bar(1.0).report, slow = Bar(2.0).report;
-  EXPECT_FALSE(vain.converged);
-  EXPECT_FALSE(vain.message.empty());
-  EXPECT_LE(vain.iterations, 3);
-  EXPECT_TRUE(slow.converged) << slow.message;
-  EXPECT_GE(slow.iterations, 6);
-}
-
 // Set free to sag, it swings into its new equilibrium: no later swing is larger than the first.
 TEST(Settle, APrestressedBodyGainsNoEnergy) {
   constexpr double kH = 1.0 / 60.0;
   constexpr int kSteps = 480;
-  Bar bar(kFarTooSoft);
+  Bar bar;
   ASSERT_FALSE(bar.report.converged);
-  Material material = Bar::material(kFarTooSoft);
+  Material material = Bar::material();
   material.youngs_modulus *= 0.99;
   bar.soft.setMaterial(material);
   DeformableBody& body = bar.soft.body();
@@ -188,7 +175,7 @@ TEST(Settle, APrestressedBodyGainsNoEnergy) {
 
 // The prestress has no resultant: let go, the body falls like any other.
 TEST(Settle, APrestressCarriesNothingThatIsLetGo) {
-  Bar bar(kFarTooSoft);
+  Bar bar;
   DeformableBody& body = bar.soft.body();
   body.releaseAll();
   constexpr double kH = 1.0 / 60.0;

@@ -2,7 +2,6 @@
 
 #include <Eigen/SVD>
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include "calipso_fem/world/mass_properties.hpp"
@@ -28,25 +27,6 @@ int largestWeight(const Embedding& embedding, int vertex) {
     }
   return node;
 }
-
-// The sag falls by about the same ratio in every iteration. A single bad one can still be made good
-// (near the tolerance sags are no more exact than their equilibria), two in a row have not been.
-class VainSearch {
- public:
-  // sag, tolerance: m; left: how many more sags can follow. True: this one and the one before it
-  // foretold, by their ratio to their predecessor, a last one above the tolerance.
-  bool isVain(double sag, double tolerance, int left) {
-    const bool bad = previous_ > 0.0 && sag * std::pow(sag / previous_, left) > tolerance;
-    const bool vain = bad && was_bad_;
-    previous_ = sag;
-    was_bad_ = bad;
-    return vain;
-  }
-
- private:
-  double previous_ = 0.0;  // m; 0: none yet
-  bool was_bad_ = false;
-};
 
 }  // namespace
 
@@ -178,7 +158,6 @@ SettleReport SoftObject::findRestShape(const Vec& goal, double stiffness,
                                        std::vector<HoldPoint>& hold, double tolerance) {
   constexpr int kMaxIterations = 8;
   SettleReport report;
-  VainSearch search;
   Vec rest = restPositions(body_.model().mesh());
   std::vector<SoftConstraint> constraints;
   for (const HoldPoint& h : hold) {
@@ -199,8 +178,7 @@ SettleReport SoftObject::findRestShape(const Vec& goal, double stiffness,
         Eigen::Map<const NodeMatrix>(error.data(), error.size() / 3, 3).rowwise().norm().maxCoeff();
     if (report.iterations == 0) report.sag = sag;
     report.converged = sag <= tolerance;
-    const int left = kMaxIterations - 1 - report.iterations;
-    if (report.converged || search.isVain(sag, tolerance, left)) break;
+    if (report.converged) break;
     rest -= error;
     body_.setRestNodes(Eigen::Map<const NodeMatrix>(rest.data(), rest.size() / 3, 3));
     ++report.iterations;
