@@ -12,7 +12,7 @@ constexpr int kWide = 4;        // px; rows of wider triangles are worth clippin
 
 struct ProjectedVertex {
   double u, v;       // px
-  double inverse_z;  // 1/m; 0 = behind the camera
+  double inverse_z;  // 1/m; 0 = behind the camera, or nowhere
   // of u and v, not farther out than matters to any window
   int u_floor, u_ceiling, v_floor, v_ceiling;
 };
@@ -40,7 +40,7 @@ std::vector<ProjectedVertex> projectVertices(const Vertices& vertices, const Cam
   std::vector<ProjectedVertex> projected(vertices.rows());
   for (int i = 0; i < vertices.rows(); ++i) {
     const Eigen::Vector3d p = vertices.row(i).transpose();
-    if (p.z() < kNear) {
+    if (!p.allFinite() || p.z() < kNear) {
       projected[i] = {};
       continue;
     }

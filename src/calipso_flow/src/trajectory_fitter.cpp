@@ -186,8 +186,8 @@ void TrajectoryFitter::settleStillPieces() {
 }
 
 // Nothing keeps from turning what falls. That no spin stands out is no reason to know it for none:
-// the velocity, which hangs together with it in the poses' errors, would be off and its interval too
-// narrow. The pieces are told apart before, while every travel is free not to turn.
+// the velocity, which hangs together with it in the poses' errors, would be off and its interval
+// too narrow. The pieces are told apart before, while every travel is free not to turn.
 void TrajectoryFitter::letFallingPiecesTurn() {
   for (MotionPiece& piece : pieces_) {
     if (piece.travel == Travel::kFreeFall && piece.turning == Turning::kNone)

@@ -1,6 +1,7 @@
 #include "calipso_render/light.hpp"
 
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include <cmath>
 #include <random>
@@ -121,6 +122,24 @@ TEST(FitLight, FindsTheSunOfABall) {
             std::cos(2.0 * M_PI / 180.0));  // 2 degrees: the gloss prior's pull
   EXPECT_NEAR(fit.light.sun[1] / fit.light.ambient[0][1], 2.0f, 0.2f);
   EXPECT_FALSE(fit.confirmed());  // by nothing but shading
+}
+
+TEST(FitLight, DoesNotDependOnTheNumberOfThreads) {
+  LightEvidence evidence;
+  evidence.samples = ballSamples(Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized());
+  evidence.clusters = 1;
+  const int threads = omp_get_max_threads();
+  std::vector<LightFit> fits;
+  for (const int count : {1, 2, 5}) {
+    omp_set_num_threads(count);
+    fits.push_back(fitLight(evidence, kUp.cast<float>(), {0, -1, 0}));
+  }
+  omp_set_num_threads(threads);
+  for (const LightFit& fit : fits) {
+    EXPECT_EQ(fit.light.direction, fits.front().light.direction);
+    EXPECT_EQ(fit.light.sun, fits.front().light.sun);
+    EXPECT_EQ(fit.cost, fits.front().cost);
+  }
 }
 
 // A shadow of known direction outweighs shading that says otherwise.

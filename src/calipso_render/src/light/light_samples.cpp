@@ -124,29 +124,33 @@ RayScene sceneOf(const View& view, const std::vector<bool>& which) {
 
 using Scenes = std::shared_ptr<std::vector<RayScene>>;
 
-// Shadows of what leaves its place, against the place without them; those that stay, by their
-// outlines in the key frame.
+// Shadows of what leaves its place, against the place without them where that is known; others by
+// their outlines in the key frame.
 void addShadows(const std::vector<View>& views, const std::vector<bool>& leave,
-                const std::vector<SupportPlane>& planes, const EmptyPlace& place,
-                const Scenes& scenes, LightEvidence& evidence) {
+                const std::vector<SupportPlane>& planes, const Background& plate,
+                const cv::Mat& depth, const Scenes& scenes, LightEvidence& evidence) {
+  const View& key = views.front();
   evidence.shadow_candidates =
-      ShadowContrast(views.front(), planes, place.depth, ShadowContrast::kCoarse)
-          .candidates(scenes->front());
-  const auto contrast =
-      std::make_shared<ShadowContrast>(views.front(), planes, place.depth, ShadowContrast::kFine);
+      ShadowContrast(key, planes, depth, ShadowContrast::kCoarse).candidates(scenes->front());
+  const auto contrast = std::make_shared<ShadowContrast>(key, planes, depth, ShadowContrast::kFine);
   evidence.shadow_misfit = [scenes, contrast](const Eigen::Vector3f& l) {
     return contrast->misfit(scenes->front(), l);
   };
   if (std::find(leave.begin(), leave.end(), true) == leave.end()) return;
-  const auto passing = std::make_shared<ShadowClue>(views, leave, planes, place);
+  cv::Mat behind = depth.clone();
+  if (!behind.empty()) behind.setTo(0.0f, key.labels != 0);
+  const auto passing =
+      std::make_shared<ShadowClue>(views, leave, planes, EmptyPlace{key.camera, plate, behind});
   if (!passing->plateKnown()) return;
   const auto leaving = std::make_shared<std::vector<RayScene>>();
   for (const View& view : views) leaving->push_back(sceneOf(view, leave));
+  std::vector<bool> stay = leave;
+  stay.flip();
+  const auto staying = std::make_shared<RayScene>(sceneOf(key, stay));
   const std::vector<Eigen::Vector3f> more = passing->candidates();
   evidence.shadow_candidates.insert(evidence.shadow_candidates.end(), more.begin(), more.end());
-  evidence.shadow_misfit = [outlines = evidence.shadow_misfit, leaving,
-                            passing](const Eigen::Vector3f& l) {
-    return outlines(l) + passing->misfit(*leaving, l);
+  evidence.shadow_misfit = [contrast, staying, leaving, passing](const Eigen::Vector3f& l) {
+    return contrast->misfit(*staying, l) + passing->misfit(*leaving, l);
   };
 }
 
@@ -179,8 +183,7 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
   evidence.visible = [scenes](const LightSample& s, const Eigen::Vector3f& l) {
     return (*scenes)[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
   };
-  addShadows(views, leavers(views.front(), moves, plate), planes,
-             {views.front().camera, plate, depth}, scenes, evidence);
+  addShadows(views, leavers(views.front(), moves, plate), planes, plate, depth, scenes, evidence);
   evidence.gloss = [&views, moves, samples = evidence.samples,
                     visible = evidence.visible](const LightFit& fit) {
     const std::vector<HighlightSample> highlights =

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -105,7 +106,7 @@ std::uint32_t shownBy(const std::vector<View>& views, const std::vector<cv::Mat>
   return shown;
 }
 
-// Some `count` of them, evenly spaced.
+// `count` of them or up to twice as many, evenly spaced.
 template <typename T>
 std::vector<T> thinned(const std::vector<T>& all, std::size_t count) {
   const std::size_t step = std::max<std::size_t>(1, all.size() / count);
@@ -139,6 +140,7 @@ std::vector<bool> leavers(const View& view, const std::vector<bool>& moves,
 
 ShadowClue::ShadowClue(const std::vector<View>& views, const std::vector<bool>& casts,
                        const std::vector<SupportPlane>& planes, const EmptyPlace& place) {
+  assert(views.size() <= 32);
   const std::vector<cv::Mat> covered = coveredOf(views);
   const Eigen::Isometry3d camera_from_world = place.camera.world_from_camera.inverse();
   for (std::size_t i = 0; i < views.size(); ++i) {

@@ -31,7 +31,8 @@ std::vector<bool> leavers(const View& view, const std::vector<bool>& moves,
 //   h    hidden part of a sun in direction l     h_0  the least of all views that show the place
 class ShadowClue {
  public:
-  // @param casts per object of the views: it leaves its place. Up to 32 views.
+  // @param casts per object of the views: it leaves its place
+  // @pre at most 32 views
   ShadowClue(const std::vector<View>& views, const std::vector<bool>& casts,
              const std::vector<SupportPlane>& planes, const EmptyPlace& place);
 

@@ -16,7 +16,8 @@ constexpr int kMaskMargin = 5;        // px around the masks that are left out: 
 constexpr float kReach = 6.0f;        // radii of the objects in which their shadow is looked for
 constexpr int kFlatReach = 4;   // px on either side of a pixel between which its surface is flat,
 constexpr float kFlat = 0.02f;  // but for this part of its distance
-constexpr int kGroups = 4, kFewest = 50;                  // groups; cells
+constexpr int kGroups = 4;
+constexpr double kFewest = 0.78;                          // of the reach's square receive shadows
 constexpr float kDarkest = 0.02f;                         // linear; added before the logarithm
 constexpr double kLeastDeviation = 0.015, kCapped = 3.0;  // of y', and of those the most that count
 constexpr double kAlike = 0.1;                            // of the reach's square err alike
@@ -68,7 +69,7 @@ ShadowContrast::ShadowContrast(const View& view, const std::vector<SupportPlane>
   if (box.isEmpty()) return;
   centre_ = box.center(), radius_ = 0.5f * box.diagonal().norm();
   findReceivers(view, planes, depth);
-  if (cv::countNonZero(receives_) < kFewest) {
+  if (cv::countNonZero(receives_) < kFewest * reach_ * reach_) {
     receives_.setTo(0);
     return;
   }
