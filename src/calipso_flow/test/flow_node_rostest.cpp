@@ -8,6 +8,7 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <tf2_ros/static_transform_broadcaster.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <algorithm>
 
@@ -42,7 +43,9 @@ class FlowNodeTest : public testing::Test {
         nh_.subscribe<calipso_msgs::Dynamics>(
             topics::kDynamics, 100, [this](const auto& msg) { dynamics_.push_back(*msg); }),
         nh_.subscribe<sensor_msgs::Image>(topics::kFlow, 100,
-                                          [this](const auto& msg) { flows_.push_back(*msg); })};
+                                          [this](const auto& msg) { flows_.push_back(*msg); }),
+        nh_.subscribe<visualization_msgs::MarkerArray>(
+            "flow/markers", 100, [this](const auto& msg) { markers_ = *msg; })};
   }
 
   // What the node publishes for nobody, it does not compute.
@@ -114,6 +117,20 @@ class FlowNodeTest : public testing::Test {
     EXPECT_TRUE(clip_.cuts.empty());
   }
 
+  // What rviz draws, and takes away: no impact is told.
+  void checkMarkers() const {
+    ASSERT_FALSE(markers_.markers.empty());
+    bool taken_away = false;
+    for (const visualization_msgs::Marker& m : markers_.markers) {
+      const bool is_list = m.type == visualization_msgs::Marker::SPHERE_LIST ||
+                           m.type == visualization_msgs::Marker::LINE_STRIP;
+      if (is_list && m.action == visualization_msgs::Marker::ADD)
+        EXPECT_FALSE(m.points.empty()) << m.ns;
+      taken_away |= m.ns == "box/collisions" && m.action == visualization_msgs::Marker::DELETE;
+    }
+    EXPECT_TRUE(taken_away);
+  }
+
   ros::NodeHandle nh_;
   tf2_ros::StaticTransformBroadcaster broadcaster_;
   std::vector<ros::Subscriber> subscribers_;
@@ -123,6 +140,7 @@ class FlowNodeTest : public testing::Test {
   calipso_msgs::ClipDynamics clip_;
   std::vector<calipso_msgs::Dynamics> dynamics_;
   std::vector<sensor_msgs::Image> flows_;
+  visualization_msgs::MarkerArray markers_;  // the last
 };
 
 TEST_F(FlowNodeTest, analysesTheClipAndRepeatsItPerFrame) {
@@ -162,6 +180,8 @@ TEST_F(FlowNodeTest, analysesTheClipAndRepeatsItPerFrame) {
     EXPECT_EQ(dynamics_[k].objects[0].twist.twist.linear.x,
               clip_.frames[k].objects[0].twist.twist.linear.x);
   }
+  ASSERT_TRUE(waitFor([&] { return !markers_.markers.empty(); }));
+  checkMarkers();
 }
 
 }  // namespace

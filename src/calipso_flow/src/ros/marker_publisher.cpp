@@ -24,6 +24,11 @@ visualization_msgs::Marker makeMarker(const std_msgs::Header& header, const std:
   return marker;
 }
 
+// rviz takes a list without points for an error: what was drawn before is taken away instead.
+void deleteIfEmpty(visualization_msgs::Marker& list) {
+  if (list.points.empty()) list.action = visualization_msgs::Marker::DELETE;
+}
+
 visualization_msgs::Marker trackMarker(const ObjectDynamics& object, size_t index,
                                        const std_msgs::Header& header, double size) {
   auto marker =
@@ -36,6 +41,7 @@ visualization_msgs::Marker trackMarker(const ObjectDynamics& object, size_t inde
     rgba.a = static_cast<float>(0.3 + 0.7 * track.confidence);
     marker.colors.push_back(rgba);
   }
+  deleteIfEmpty(marker);
   return marker;
 }
 
@@ -67,6 +73,7 @@ visualization_msgs::Marker collisionMarker(const ObjectDynamics& object,
   for (const Collision& collision : object.trajectory.collisions) {
     marker.points.push_back(toPointMsg(collision.before.position));
   }
+  deleteIfEmpty(marker);
   return marker;
 }
 
