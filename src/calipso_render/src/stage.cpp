@@ -10,18 +10,34 @@
 
 namespace calipso::render {
 
-Points vertexNormals(const Points& vertices, const Triangles& triangles) {
-  Points normals(vertices.size(), Eigen::Vector3f::Zero());
-  for (const Eigen::Vector3i& t : triangles) {
+namespace {
+
+// Area-weighted sums of the triangles' normals over their corners, unit length.
+// @param corners per triangle: which of the `count` sums its corners add to
+Points normalsOver(const Points& vertices, const Triangles& triangles, const Triangles& corners,
+                   std::size_t count) {
+  Points normals(count, Eigen::Vector3f::Zero());
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    const Eigen::Vector3i& t = triangles[k];
     const Eigen::Vector3f n =
         (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
-    for (int i = 0; i < 3; ++i) normals[t[i]] += n;
+    for (int i = 0; i < 3; ++i) normals[corners[k][i]] += n;
   }
   for (Eigen::Vector3f& n : normals) {
     const float length = n.norm();
     if (length > 0.0f) n /= length;
   }
   return normals;
+}
+
+}  // namespace
+
+Points vertexNormals(const Points& vertices, const Triangles& triangles) {
+  return normalsOver(vertices, triangles, triangles, vertices.size());
+}
+
+Points surfaceNormals(const Surface& surface, const Points& vertices) {
+  return normalsOver(vertices, surface.triangles, surface.corners, surface.vertex_of_normal.size());
 }
 
 Points transformed(const Points& points, const Eigen::Isometry3d& transform) {
@@ -57,9 +73,14 @@ Surface makeSurface(const ObjectModel& model) {
   surface.edges = meshEdges(surface.triangles);
   surface.winding = outsideWinding(surface.object_vertices, surface.triangles);
   surface.key_vertices = transformed(surface.object_vertices, model.world_from_object);
-  surface.key_normals = vertexNormals(surface.key_vertices, surface.triangles);
-  findSkySeen(surface.key_vertices, surface.key_normals, surface.triangles, surface.winding != 1,
-              surface.seen, surface.seen_behind);
+  MeshNormals normals = meshNormals(surface.key_vertices, surface.triangles, surface.edges);
+  surface.corners = std::move(normals.corners);
+  surface.vertex_of_normal = std::move(normals.vertex_of);
+  surface.key_normals = surfaceNormals(surface, surface.key_vertices);
+  Points places;  // of the normals
+  for (const int vertex : surface.vertex_of_normal) places.push_back(surface.key_vertices[vertex]);
+  findSkySeen(places, surface.key_normals, surface.corners, surface.winding != 1, surface.seen,
+              surface.seen_behind);
   return surface;
 }
 
@@ -81,7 +102,7 @@ Eigen::Matrix3f turnBetween(const Points& from, const Points& to) {
   return (U * Eigen::Vector3d(1.0, 1.0, side).asDiagonal() * V.transpose()).cast<float>();
 }
 
-// What the vertices see, turned with their object and then as their normals are beside it.
+// What the surface sees, turned with their object and then as their normals are beside it.
 void turnSeen(const Surface& surface, Actor& actor) {
   const Eigen::Matrix3f turn = turnBetween(surface.key_vertices, actor.vertices);
   actor.seen = surface.seen, actor.seen_behind = surface.seen_behind;
@@ -103,8 +124,10 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
   Actor actor;
   actor.surface = &surface;
   actor.vertices = std::move(vertices);
-  actor.normals = vertexNormals(actor.vertices, surface.triangles);
-  if (actor.vertices.size() == surface.seen.size()) turnSeen(surface, actor);
+  if (actor.vertices.size() == surface.key_vertices.size()) {
+    actor.normals = surfaceNormals(surface, actor.vertices);
+    turnSeen(surface, actor);
+  }
   actor.screen = projectMesh(actor.vertices, surface.triangles, camera);
   const auto behind = [](const Eigen::Vector3f& p) { return std::isnan(p.z()); };
   const bool around_us =
@@ -142,17 +165,18 @@ SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v,
 
 SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3f& w,
                           const Eigen::Vector3f& eye) {
-  const Eigen::Vector3i& t = actor.surface->triangles[triangle];
+  const Eigen::Vector3i &t = actor.surface->triangles[triangle],
+                        &c = actor.surface->corners[triangle];
   const Eigen::Vector3f position = mix(actor.vertices, t, w),
-                        normal = unit(mix(actor.normals, t, w));
+                        normal = unit(mix(actor.normals, c, w));
   const float side = seenFromBehind(actor, t, position, normal, eye) ? -1.0f : 1.0f;
   const std::vector<SkySeen>& seen =
       side < 0.0f && !actor.seen_behind.empty() ? actor.seen_behind : actor.seen;
   return {position,
           side * normal,
           mix(actor.surface->key_vertices, t, w),
-          side * unit(mix(actor.surface->key_normals, t, w)),
-          seen[t[0]] * w[0] + seen[t[1]] * w[1] + seen[t[2]] * w[2],
+          side * unit(mix(actor.surface->key_normals, c, w)),
+          seen[c[0]] * w[0] + seen[c[1]] * w[1] + seen[c[2]] * w[2],
           triangle,
           w};
 }

@@ -314,16 +314,19 @@ TEST(AmbientOn, ComesFromWhereASurfaceSees) {
   EXPECT_GT(red_box[2], floor[2]);
 }
 
-TEST(Actor, SeesTheSkyAsItIsTurned) {
+Surface surfaceOf(const Points& points, const Triangles& faces) {
   ObjectModel model{"box", 1, {}, Eigen::Isometry3d::Identity()};
+  model.mesh.vertices.resize(points.size(), 3);
+  model.mesh.triangles.resize(faces.size(), 3);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    model.mesh.vertices.row(i) = points[i].cast<double>().transpose();
+  for (std::size_t t = 0; t < faces.size(); ++t) model.mesh.triangles.row(t) = faces[t].transpose();
+  return makeSurface(model);
+}
+
+TEST(Actor, SeesTheSkyAsItIsTurned) {
   const OpenBox box;
-  model.mesh.vertices.resize(box.points.size(), 3);
-  model.mesh.triangles.resize(box.faces.size(), 3);
-  for (std::size_t i = 0; i < box.points.size(); ++i)
-    model.mesh.vertices.row(i) = box.points[i].cast<double>().transpose();
-  for (std::size_t t = 0; t < box.faces.size(); ++t)
-    model.mesh.triangles.row(t) = box.faces[t].transpose();
-  const Surface surface = makeSurface(model);
+  const Surface surface = surfaceOf(box.points, box.faces);
   Eigen::Isometry3d pose(Eigen::AngleAxisd(1.1, direction(0.3, -0.2, 0.8)));
   pose.pretranslate(Eigen::Vector3d(3, 2, 1));
   const Actor actor =
@@ -335,6 +338,30 @@ TEST(Actor, SeesTheSkyAsItIsTurned) {
         (actor.seen[i].towards - pose.linear().cast<float>() * surface.seen[i].towards).norm(),
         1e-4f);
   }
+}
+
+// Each side of a box is flat up to its edges, also where three sides share a vertex, and however the
+// box is sheared; a bend of 40 degrees is a smooth surface's.
+TEST(SurfaceNormals, EndAtCreases) {
+  const OpenBox box;
+  const Surface surface = surfaceOf(box.points, box.faces);
+  Points sheared = surface.key_vertices;
+  for (Eigen::Vector3f& p : sheared) p.x() += 0.3f * p.z();
+  const Actor actor = makeActor(surface, sheared, {8, 8, 8, 8, 4, 4, {}});
+  for (std::size_t t = 0; t < box.faces.size(); ++t) {
+    const Eigen::Vector3f &a = sheared[box.faces[t][0]], &b = sheared[box.faces[t][1]],
+                          &c = sheared[box.faces[t][2]];
+    const Eigen::Vector3f flat = (b - a).cross(c - a).normalized();
+    for (int k = 0; k < 3; ++k)
+      EXPECT_LT((actor.normals[surface.corners[t][k]] - flat).norm(), 1e-6f) << t << ", " << k;
+  }
+  const float x = std::cos(0.7f), z = std::sin(0.7f);
+  const Surface roof =
+      surfaceOf({{-1, -1, 0}, {0, -1, 0}, {0, 1, 0}, {-1, 1, 0}, {x, -1, z}, {x, 1, z}},
+                {{0, 1, 2}, {0, 2, 3}, {1, 4, 5}, {1, 5, 2}});
+  EXPECT_EQ(roof.corners, roof.triangles);
+  EXPECT_LT(roof.key_normals[1].x(), -0.1f);  // between its sides' 0 and -0.64
+  EXPECT_GT(roof.key_normals[1].x(), -0.6f);
 }
 
 TEST(FitLight, SaysWhenThereIsTooLittleToSee) {

@@ -31,10 +31,14 @@ struct Surface {
   std::vector<MeshEdge> edges;
   Points object_vertices;  // object frame, m
   Points key_vertices;     // world, key frame, m
-  Points key_normals;      // world, unit
+  // Normals, several for a vertex at a crease: per triangle the numbers of its corners' ones, and
+  // per number the vertex
+  Triangles corners;
+  std::vector<int> vertex_of_normal;
+  Points key_normals;  // world, unit
   // of its triangles seen from outside: 1 counterclockwise, -1 clockwise, 0 it is open
   int winding = 0;
-  // per vertex, world, key frame: of the side that its normal is on, and of the other one unless the
+  // per normal, world, key frame: of the side that its normal is on, and of the other one unless the
   // mesh hides that
   std::vector<SkySeen> seen, seen_behind;
 };
@@ -45,13 +49,16 @@ Surface makeSurface(const ObjectModel& model);
 // Area-weighted vertex normals, unit length (zero where a vertex has no face).
 Points vertexNormals(const Points& vertices, const Triangles& triangles);
 
+// The same of a surface, one for each piece of it that meets others at a crease.
+Points surfaceNormals(const Surface& surface, const Points& vertices);
+
 Points transformed(const Points& points, const Eigen::Isometry3d& transform);
 
 // A surface at one instant, seen by one camera.
 struct Actor {
   const Surface* surface = nullptr;
   Points vertices;                         // world, m
-  Points normals;                          // world, unit
+  Points normals;                          // as Surface::key_normals; world, unit
   std::vector<SkySeen> seen, seen_behind;  // the surface's, turned as it is now
   ScreenMesh screen;
 };

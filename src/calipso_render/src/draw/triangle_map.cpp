@@ -74,7 +74,7 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const
                          const Eigen::Vector3f& eye)
     : actor_(&actor),
       corner_(appearance.region.tl()),
-      vertices_(actor.vertices.size()),
+      vertices_(actor.normals.size()),
       triangles_(new TriangleMap[actor.surface->triangles.size()]) {
   findAround(appearance, light, eye);
   const Triangles& triangles = actor.surface->triangles;
@@ -84,8 +84,9 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const
   {
 #pragma omp for schedule(static)
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
-      const Eigen::Vector3f q = camera_from_world * actor.surface->key_vertices[i],
-                            sight = actor.vertices[i] - eye, &n = actor.normals[i];
+      const int vertex = actor.surface->vertex_of_normal[i];
+      const Eigen::Vector3f q = camera_from_world * actor.surface->key_vertices[vertex],
+                            sight = actor.vertices[vertex] - eye, &n = actor.normals[i];
       vertices_[i] = {
           {sight.x(), sight.y(), sight.z(), 0.0f},
           {n.x(), n.y(), n.z(), 0.0f},
@@ -103,8 +104,9 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const
       if (isTurned(actor, corners, eye)) triangles_[t].traits |= TriangleMap::kTurned;
       const std::vector<Around>& around = aroundOf(static_cast<int>(t));
       const auto corner = [&](int i) -> Corner {
-        const Vertex& x = vertices_[corners[i]];
-        return {x.key, x.normal, around[corners[i]].sky, around[corners[i]].light};
+        const int number = actor.surface->corners[t][i];
+        const Vertex& x = vertices_[number];
+        return {x.key, x.normal, around[number].sky, around[number].light};
       };
       if (!fill(p, {corner(0), corner(1), corner(2)}, triangles_[t]))
         triangles_[t].traits |= TriangleMap::kThin;
@@ -119,8 +121,9 @@ void SurfaceMaps::findAround(const Appearance& appearance, const Light& light,
 #pragma omp parallel for schedule(static)
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const cv::Vec3f ambient = ambientOn(light, seen[i], appearance.thrown_back);
-      const float sky = skyMirrored(
-          seen[i], mirroredIn(side * actor_->normals[i], (eye - actor_->vertices[i]).normalized()));
+      const Eigen::Vector3f& at = actor_->vertices[actor_->surface->vertex_of_normal[i]];
+      const float sky =
+          skyMirrored(seen[i], mirroredIn(side * actor_->normals[i], (eye - at).normalized()));
       around[i] = {{ambient[0], ambient[1], ambient[2], 0.0f}, {0.0f, 0.0f, 0.0f, sky}};
     }
   };
@@ -131,7 +134,7 @@ void SurfaceMaps::locate(const SurfacePlace* places, int count, SurfaceRun& run,
                          Eigen::Vector3f* weights) const {
   for (int k = 0; k < count; ++k) {
     const int triangle = VisibilityBuffer::triangleOf(places[k].id);
-    const Eigen::Vector3i& t = actor_->surface->triangles[triangle];
+    const Eigen::Vector3i& t = actor_->surface->corners[triangle];
     const Eigen::Vector3f w = barycentric(actor_->screen, triangle, places[k].u, places[k].v);
     weights[k] = w;
     const Vertex &a = vertices_[t[0]], &b = vertices_[t[1]], &c = vertices_[t[2]];

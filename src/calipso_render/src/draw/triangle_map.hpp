@@ -71,7 +71,7 @@ class SurfaceMaps {
 
   const Actor* actor_ = nullptr;
   cv::Point corner_;  // Appearance::region's
-  std::vector<Vertex> vertices_;
+  std::vector<Vertex> vertices_;  // per normal of the surface
   std::vector<Around> around_, around_behind_;  // the latter as Actor::seen_behind
   std::unique_ptr<TriangleMap[]> triangles_;
 };

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "calipso_scene/disjoint_sets.hpp"
@@ -13,6 +14,9 @@ namespace calipso::render {
 namespace {
 
 constexpr float kSamePlace = 1e-5f;  // of the surface's extent
+
+// cosine between the normals of two triangles: an edge that bends more is no smooth surface's
+constexpr float kCrease = 0.5f;
 
 using DirectedEdge = std::pair<int, int>;
 
@@ -39,6 +43,42 @@ std::vector<int> weld(const Points& vertices) {
     welded[i] = first.try_emplace(key, static_cast<int>(i)).first->second;
   }
   return welded;
+}
+
+MeshNormals meshNormals(const Points& vertices, const Triangles& triangles,
+                        const std::vector<MeshEdge>& edges) {
+  Points flat;
+  for (const Eigen::Vector3i& t : triangles)
+    flat.push_back((vertices[t[1]] - vertices[t[0]])
+                       .cross(vertices[t[2]] - vertices[t[0]])
+                       .stableNormalized());
+  // Corners that no crease parts are one.
+  const auto cornerAt = [&](int t, int vertex) {
+    const Eigen::Vector3i& corners = triangles[t];
+    return 3 * t + (corners[0] == vertex ? 0 : corners[1] == vertex ? 1 : 2);
+  };
+  DisjointSets pieces(3 * static_cast<int>(triangles.size()));
+  for (const MeshEdge& e : edges) {
+    if (e.b < 0 || flat[e.a].dot(flat[e.b]) < kCrease) continue;
+    for (const int vertex : {e.from, e.to})
+      pieces.join(cornerAt(e.a, vertex), cornerAt(e.b, vertex));
+  }
+  MeshNormals normals{triangles, std::vector<int>(vertices.size())};
+  std::iota(normals.vertex_of.begin(), normals.vertex_of.end(), 0);
+  std::vector<bool> taken(vertices.size(), false);
+  std::vector<int> number(3 * triangles.size(), -1);  // per piece
+  for (int c = 0; c < 3 * static_cast<int>(triangles.size()); ++c) {
+    const int vertex = triangles[c / 3][c % 3];
+    int& piece = number[pieces.find(c)];
+    if (piece < 0 && taken[vertex]) {
+      piece = static_cast<int>(normals.vertex_of.size());
+      normals.vertex_of.push_back(vertex);
+    } else if (piece < 0) {
+      piece = vertex, taken[vertex] = true;
+    }
+    normals.corners[c / 3][c % 3] = piece;
+  }
+  return normals;
 }
 
 int outsideWinding(const Points& vertices, const Triangles& triangles) {

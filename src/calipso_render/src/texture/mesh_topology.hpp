@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "calipso_render/rasterizer.hpp"
+#include "calipso_render/edge_coverage.hpp"
 
 namespace calipso::render {
 
@@ -14,5 +14,17 @@ std::vector<int> weld(const Points& vertices);
 // clockwise. 0: the mesh is open somewhere, or its parts do not agree, so that either side of a
 // triangle can be seen.
 int outsideWinding(const Points& vertices, const Triangles& triangles);
+
+// Where a mesh's normals differ: a vertex has one for every piece of surface around it that no crease
+// parts from the others. The first has the vertex' own number, further ones follow behind all
+// vertices.
+struct MeshNormals {
+  Triangles corners;           // per triangle: the numbers of its corners' normals
+  std::vector<int> vertex_of;  // per number
+};
+
+// @param edges meshEdges(triangles)
+MeshNormals meshNormals(const Points& vertices, const Triangles& triangles,
+                        const std::vector<MeshEdge>& edges);
 
 }  // namespace calipso::render

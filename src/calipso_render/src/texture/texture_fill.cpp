@@ -231,15 +231,17 @@ class TextureFill {
   // comes from, 0 = the place itself, -1 = nowhere
   From texelAt(int triangle, const Eigen::Vector3f& w, const cv::Mat& key_albedo, cv::Vec4f& texel,
                float& certain, signed char& layer) const {
-    const Eigen::Vector3i& t = surface_.triangles[triangle];
-    const auto mix = [&](const Points& x) -> Eigen::Vector3f {
+    const auto mix = [&w](const Points& x, const Eigen::Vector3i& t) -> Eigen::Vector3f {
       return w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]];
+    };
+    const auto placeOf = [&](const Points& vertices, const Points& normals) -> Place {
+      return {mix(vertices, surface_.triangles[triangle]),
+              mix(normals, surface_.corners[triangle]).normalized()};
     };
     cv::Vec3f sum;
     float total = 0.0f, shares = 0.0f, key = 0.0f, key_share = 0.0f;
     for (std::size_t i = 0; i < views_.size(); ++i) {
-      const Look l =
-          lookAt(i, {mix(actors_[i]->vertices), mix(actors_[i]->normals).normalized()}, 1.0f);
+      const Look l = lookAt(i, placeOf(actors_[i]->vertices, actors_[i]->normals), 1.0f);
       if (l.weight <= 0.0f) continue;
       const float weight = l.weight * l.weight * l.weight, share = weight * l.detail * l.detail;
       sum += colourOf(sampleBicubic(i == 0 ? key_albedo : pictures_[i].albedo, l.u, l.v)) * share;
@@ -250,8 +252,8 @@ class TextureFill {
     Layers layers;
     layers.add(sum, std::min(1.0f, total / kSure));
     if (layers.open > 0.0f)
-      addLikePlaces({mix(surface_.key_vertices), mix(surface_.key_normals).normalized()},
-                    key_albedo, sum, total, layers);
+      addLikePlaces(placeOf(surface_.key_vertices, surface_.key_normals), key_albedo, sum, total,
+                    layers);
     certain = 1.0f - layers.open;
     layer = static_cast<signed char>(layers.strongest);
     const cv::Vec3f c = certain > 0.0f ? layers.sum / certain : cv::Vec3f();
