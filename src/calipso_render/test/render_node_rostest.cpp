@@ -101,11 +101,19 @@ class RenderNodeTest : public ::testing::Test {
     for (int k = 0; k < kClipFrames; ++k) {
       clip_.publish(picture(k));
       clip_camera_.publish(cameraInfo(k));
-      calipso_msgs::Segmentation s;
-      s.header = header(k);
-      s.labels = imageMsg(header(k), frame(k).labels);
-      segmentation_.publish(s);
+      sendLabels(k);
     }
+    sendModels();
+  }
+
+  void sendLabels(int k) {
+    calipso_msgs::Segmentation s;
+    s.header = header(k);
+    s.labels = imageMsg(header(k), frame(k).labels);
+    segmentation_.publish(s);
+  }
+
+  void sendModels() {
     calipso_msgs::AlignedModels models;
     models.header = header(0);
     models.models.resize(1);
@@ -194,6 +202,54 @@ TEST_F(RenderNodeWithMotionTest, LearnsFromFramesWhosePosesFit) {
       << status_.message;
   EXPECT_NE(status_.message.find("from 2 frames"), std::string::npos) << status_.message;
   EXPECT_NE(status_.message.find("2 of 3 poses"), std::string::npos) << status_.message;
+}
+
+// Of a live video nothing is lost while the simulator gets ready, however long that takes.
+class LiveRenderNodeTest : public RenderNodeTest {
+ protected:
+  LiveRenderNodeTest() : RenderNodeTest("live") {
+    simulator_status_ = nh_.advertise<calipso_msgs::NodeStatus>(topics::kStatus, 10);
+  }
+
+  void sendSimulatorStatus(int state) {
+    calipso_msgs::NodeStatus status;
+    status.node = "simulator", status.state = static_cast<std::uint8_t>(state);
+    simulator_status_.publish(status);
+  }
+
+  // Whether `count` frames have come back in a while.
+  bool haveCome(std::size_t count) {
+    return waitFor([&] { return edited_.size() >= count; }, 20.0);
+  }
+
+  ros::Publisher simulator_status_;
+};
+
+TEST_F(LiveRenderNodeTest, FramesPassUntilTheSimulatorIsReady) {
+  ASSERT_TRUE(waitFor([&] {
+    return image_.getNumSubscribers() > 0 && camera_.getNumSubscribers() > 0 &&
+           segmentation_.getNumSubscribers() > 0 && state_.getNumSubscribers() > 0 &&
+           simulator_status_.getNumSubscribers() > 1 && edited_sub_.getNumPublishers() > 0;
+  }));
+  sendSimulatorStatus(calipso_msgs::NodeStatus::STARTING);
+  sendFrame(picture(0), 0);
+  ASSERT_TRUE(haveCome(1));
+  sendLabels(0);
+  sendModels();
+  ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; }))
+      << status_.message;
+  constexpr int kFrames = 6;
+  for (int k = 1; k < kFrames; ++k) {
+    sendFrame(picture(k), k);
+    ASSERT_TRUE(haveCome(k + 1)) << k;
+    EXPECT_EQ(edited_[k].data, picture(k).data);
+  }
+
+  sendSimulatorStatus(calipso_msgs::NodeStatus::READY);
+  sendFrame(picture(kFrames), kFrames);
+  state_.publish(state(kFrames, true));
+  ASSERT_TRUE(haveCome(kFrames + 1));
+  EXPECT_NE(edited_[kFrames].data, picture(kFrames).data);
 }
 
 TEST_F(RenderNodeTest, PreparesAndEditsInOrder) {

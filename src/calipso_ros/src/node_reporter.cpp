@@ -3,6 +3,8 @@
 #include <calipso_msgs/Timing.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 
+#include <iomanip>
+
 #include "calipso_ros/topics.hpp"
 
 namespace calipso {
@@ -52,9 +54,15 @@ void NodeReporter::timing(const ros::Time& stamp, double ms) {
 
 void NodeReporter::warn(const ros::Time& stamp, const std::string& message) {
   constexpr double kLogPeriodSec = 1.0;
-  ROS_WARN_STREAM_THROTTLE(kLogPeriodSec,
-                           status_.node << ", frame " << stamp.toSec() << " s: " << message);
+  ROS_WARN_STREAM_THROTTLE(kLogPeriodSec, status_.node << ", frame " << std::fixed
+                                                       << std::setprecision(3) << stamp.toSec()
+                                                       << " s: " << message);
   publishDiagnostic(stamp, DiagnosticStatus::WARN, message);
+}
+
+void NodeReporter::remark(const std::string& message) {
+  ROS_WARN_STREAM(status_.node << ": " << message);
+  publishDiagnostic(ros::Time::now(), DiagnosticStatus::WARN, message);
 }
 
 void NodeReporter::publish(std::uint8_t state, const std::string& message) {

@@ -11,6 +11,16 @@
 namespace calipso {
 namespace {
 
+// A vertex that no face names is no part of the surface, and may lie anywhere. It stays, for the
+// order of the vertices, at the place of one that is.
+void gatherStrays(TriangleMesh* mesh) {
+  std::vector<bool> used(mesh->vertexCount(), false);
+  for (int f = 0; f < mesh->triangleCount(); ++f)
+    for (int k = 0; k < 3; ++k) used[mesh->triangles(f, k)] = true;
+  for (int i = 0; i < mesh->vertexCount(); ++i)
+    if (!used[i]) mesh->vertices.row(i) = mesh->vertices.row(mesh->triangles(0, 0)).eval();
+}
+
 void dropUselessFaces(TriangleMesh* mesh) {
   std::set<std::array<int, 3>> seen;
   int kept = 0;
@@ -107,7 +117,8 @@ bool isClosed(const TriangleMesh& mesh) {
 
 }  // namespace
 
-void repairFaces(TriangleMesh* mesh) {
+void repairMesh(TriangleMesh* mesh) {
+  gatherStrays(mesh);
   dropUselessFaces(mesh);
   const Surface surface = surfaceOf(*mesh);
   std::vector<int> done(mesh->triangleCount(), kUnseen);

@@ -40,7 +40,7 @@ TriangleMesh toMesh(const std::string& path, const Points& points, const Faces& 
   for (std::size_t i = 0; i < faces.size(); ++i) {
     mesh.triangles.row(static_cast<Eigen::Index>(i)) = faces[i].transpose();
   }
-  repairFaces(&mesh);
+  repairMesh(&mesh);
   if (mesh.triangleCount() == 0)
     fail(path, "has no face with three different corners; export the surface as triangles");
   return mesh;
@@ -75,6 +75,18 @@ std::vector<int> parseFace(const std::string& path, std::istream& line, int face
   return corners;
 }
 
+// The next line; a backslash at the end of one continues it. False at the end of the file.
+bool readLine(std::istream& file, std::string* text, int* line_number) {
+  if (!std::getline(file, *text)) return false;
+  ++*line_number;
+  for (std::string more; true; *text += ' ' + more, ++*line_number) {
+    while (!text->empty() && text->back() == '\r') text->pop_back();
+    if (text->empty() || text->back() != '\\') return true;
+    text->pop_back();
+    if (!std::getline(file, more)) return true;
+  }
+}
+
 // NOTE: not through assimp, which reorders vertices and names no face in its errors.
 TriangleMesh loadObj(const std::string& path) {
   std::ifstream file(path);
@@ -83,7 +95,7 @@ TriangleMesh loadObj(const std::string& path) {
   Faces faces;
   std::string text;
   int face = 0;
-  for (int line_number = 1; std::getline(file, text); ++line_number) {
+  for (int line_number = 0; readLine(file, &text, &line_number);) {
     std::istringstream line(text);
     std::string key;
     line >> key;
@@ -110,6 +122,9 @@ TriangleMesh loadWithAssimp(const std::string& path) {
     std::vector<int> merged(part.mNumVertices);
     for (unsigned i = 0; i < part.mNumVertices; ++i) {
       const aiVector3D& p = part.mVertices[i];
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+        fail(path,
+             "vertex " + std::to_string(i) + " is not finite; repair the model or export it again");
       const auto [entry, is_new] =
           index_of.try_emplace({p.x, p.y, p.z}, static_cast<int>(points.size()));
       if (is_new) points.emplace_back(p.x, p.y, p.z);

@@ -79,6 +79,24 @@ TEST(TriangleMesh, insideOfAHollowStaysFacingInwards) {
   EXPECT_NEAR(signedVolume(cubeWith(hollow)), 1.0 - 0.6 * 0.6 * 0.6 / 6.0, 1e-14);
 }
 
+TEST(TriangleMesh, verticesOfNoFaceDoNotCount) {
+  const std::string cube = kUnitCube;
+  const TriangleMesh mesh =
+      cubeWith("v 50 0 0\n" + cube.substr(cube.find('f')));  // left over from something deleted
+  EXPECT_EQ(mesh.vertexCount(), 9);
+  EXPECT_NEAR(boundingDiagonal(mesh), std::sqrt(3.0), 1e-14);
+}
+
+TEST(TriangleMesh, objLinesGoOnAfterABackslash) {
+  const std::string cube = kUnitCube;
+  for (const char* end : {"\\\n", "\\\r\n"}) {
+    std::string faces = cube.substr(cube.find('f'));
+    for (size_t at = 0; (at = faces.find(" 2 ", at)) != std::string::npos; at += 3)
+      faces.replace(at, 3, std::string(" 2 ") + end);
+    EXPECT_NEAR(signedVolume(cubeWith(faces)), 1.0, 1e-14);
+  }
+}
+
 TEST(TriangleMesh, objRoundTripIsExact) {
   TriangleMesh mesh = loadMesh(writeFile("cube.obj", kUnitCube));
   mesh.vertices *= 1.0 / 3.0;
@@ -111,6 +129,9 @@ TEST(TriangleMesh, missingEmptyAndBrokenFilesAreRefused) {
   EXPECT_NE(errorOf(writeFile("empty.obj", "")).find("no vertices"), std::string::npos);
   EXPECT_NE(errorOf(writeFile("points.obj", "v 0 0 0\n")).find("no faces"), std::string::npos);
   EXPECT_NE(errorOf(writeFile("nan.obj", "v 0 nan 0\n")).find("line 1"), std::string::npos);
+  EXPECT_NE(errorOf(writeFile("nan.off", "OFF\n3 1 0\nnan 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"))
+                .find("not finite"),
+            std::string::npos);
   EXPECT_NE(errorOf(writeFile("junk.ply", "junk")).find("cannot be read"), std::string::npos);
 }
 

@@ -74,7 +74,7 @@ void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
 
 // The frame at hand is to become the key frame.
 void SegmentationRos::startOver() {
-  reporter_.warn(last_stamp_, kStartsOver);
+  reporter_.remark(kStartsOver);
   key_image_.release();
   key_message_.reset();
   segmenter_.reset();
@@ -111,7 +111,7 @@ void SegmentationRos::segment() {
         toMsg(key_header_, key.labels, key.contours, 1.0f));
     segmentation_publisher_.publish(key_message_);
     publishOverlay(key);
-    for (const std::string& remark : key.remarks) reporter_.warn(key_header_.stamp, remark);
+    for (const std::string& remark : key.remarks) reporter_.remark(remark);
     reporter_.ready("key frame segmented");
   } catch (const std::exception& error) {
     reporter_.failed(error.what());

@@ -39,7 +39,8 @@ void checkImage(const sensor_msgs::Image& image, const std::string& where) {
                                                     enc::MONO8};
   if (std::find(kKnown.begin(), kKnown.end(), image.encoding) == kKnown.end()) {
     fail(where, "encoding '" + image.encoding +
-                    "' is not known; convert to one of rgb8, bgr8, rgba8, bgra8, mono8");
+                    "' is not known; convert to one of rgb8, bgr8, rgba8, bgra8, mono8 (image_proc "
+                    "debayers raw images; 16 bits a channel take a scaling to 8)");
   }
   const std::size_t row = std::size_t{image.width} * enc::numChannels(image.encoding);
   if (image.width == 0 || image.height == 0 || image.step < row ||

@@ -72,8 +72,7 @@ void SimulatorRos::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip
 void SimulatorRos::onStatus(const calipso_msgs::NodeStatusConstPtr& status) {
   if (status->node != "flow" || status->state != calipso_msgs::NodeStatus::FAILED || clip_dynamics_)
     return;
-  reporter_.warn(ros::Time(0),
-                 "how things move in the video is not known, flow failed: " + status->message);
+  reporter_.remark("how things move in the video is not known, flow failed: " + status->message);
   clip_dynamics_ = boost::make_shared<const calipso_msgs::ClipDynamics>();
   prepare();
 }
@@ -173,12 +172,12 @@ void SimulatorRos::refuse(const calipso_msgs::Edit& edit, const std::string& mes
   report.accepted = false;
   report.message = message;
   applied_.publish(report);
-  reporter_.warn(edit.header.stamp, "edit refused: " + message);
+  reporter_.remark("edit refused: " + message);
 }
 
 // Models of a key frame that is not later stay: they are sent once only, perhaps before this.
 void SimulatorRos::startOver(const ros::Time& stamp) {
-  reporter_.warn(stamp, kStartsOver);
+  reporter_.remark(kStartsOver);
   world_.reset();
   first_stamp_.reset();
   early_edits_.clear();
@@ -214,7 +213,7 @@ void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
 void SimulatorRos::publish(const std::vector<EditOutcome>& outcomes, const ros::Time& stamp) {
   for (const EditOutcome& outcome : outcomes) {
     applied_.publish(toMsg(outcome, stamp, *first_stamp_));
-    if (!outcome.accepted) reporter_.warn(stamp, "edit refused: " + outcome.message);
+    if (!outcome.accepted) reporter_.remark("edit refused: " + outcome.message);
   }
   const WorldState state = world_->state();
   state_.publish(toMsg(state, stamp));

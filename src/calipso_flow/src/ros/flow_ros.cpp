@@ -160,7 +160,7 @@ void FlowNode::finishWhenComplete() {
 
 // What is known of a key frame that is not later stays: it is sent once only, perhaps before this.
 void FlowNode::startOver(const ros::Time& stamp) {
-  reporter_.warn(stamp, kStartsOver);
+  reporter_.remark(kStartsOver);
   describing_ = {};  // waits for its end
   live_analyser_.reset();
   waiting_.clear();

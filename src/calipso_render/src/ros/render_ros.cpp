@@ -141,6 +141,7 @@ void RenderNode::onStatus(const calipso_msgs::NodeStatusConstPtr& msg) {
     flow_works_ = msg->state != calipso_msgs::NodeStatus::FAILED;
     prepareIfComplete();
   }
+  if (msg->node == "simulator") simulator_ready_ = msg->state == calipso_msgs::NodeStatus::READY;
   const bool needed =
       msg->node == "segmentation" || msg->node == "align" || msg->node == "simulator";
   if (!needed) return;
@@ -183,7 +184,7 @@ void RenderNode::prepareNow() {
     std_msgs::Header header;
     header.frame_id = topics::kWorldFrame;
     plate_.publish(imageMsg(header, plate));
-    for (const std::string& remark : prepared->remarks) reporter_.warn(ros::Time(0), remark);
+    for (const std::string& remark : prepared->remarks) reporter_.remark(remark);
     reporter_.ready("prepared from " + std::to_string(clip_.frames().size()) + " frames in " +
                     std::to_string(static_cast<int>(milliseconds(start))) +
                     " ms; light and texture from " + std::to_string(prepared->views) +
@@ -198,7 +199,7 @@ void RenderNode::prepareNow() {
 
 // What is known of frames that are not later stays: it is sent once only, perhaps before this.
 void RenderNode::startOver(const ros::Time& stamp) {
-  reporter_.warn(stamp, kStartsOver);
+  reporter_.remark(kStartsOver);
   renderer_.reset();
   clip_ = ClipSample(params_.clip_samples);
   labels_.forgetAfter(stamp);
@@ -257,6 +258,8 @@ std::string RenderNode::whyUnedited() const {
     return "the renderer could not be prepared";
   if (params_.mode == Mode::kLive && !renderer_)
     return "not ready yet: waiting for segmentation and models";
+  if (params_.mode == Mode::kLive && !simulator_ready_)
+    return "not ready yet: waiting for the simulator";
   return "";
 }
 

@@ -81,6 +81,7 @@ class RenderNode {
   // of the clip; empty: not there yet, or nobody estimates it
   calipso_msgs::ClipDynamicsConstPtr dynamics_;
   bool flow_works_ = false;                    // somebody estimates it, and has not failed
+  bool simulator_ready_ = false;               // live: a state comes for every frame
   std::map<std::string, std::string> failed_;  // node -> why
   std::unique_ptr<Renderer> renderer_;
 

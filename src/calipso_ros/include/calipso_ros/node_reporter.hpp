@@ -30,8 +30,12 @@ class NodeReporter {
 
   void timing(const ros::Time& stamp, double ms);
 
-  // Something went wrong with the frame of this stamp: logged, and published as a diagnostic.
+  // Something went wrong with the frame of this stamp: published as a diagnostic, and logged, but
+  // no more than once a second.
   void warn(const ros::Time& stamp, const std::string& message);
+
+  // Something to know that concerns no frame, or is said once: a diagnostic, and always logged.
+  void remark(const std::string& message);
 
   std::uint8_t state() const { return status_.state; }
 
