@@ -51,6 +51,7 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
                       const InpaintParams& params = {});
 
 // Smooth fill (push-pull): weighted averages at ever coarser scales.
+// @param image CV_32FC3 or CV_32FC1
 // @param weight CV_32FC1 in [0, 1]: how far each pixel is to be trusted
 cv::Mat pushPull(const cv::Mat& image, const cv::Mat& weight);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <vector>
 
 #include "draw/side_by_side.hpp"
 #include "fill/lattice.hpp"
@@ -119,6 +120,7 @@ cv::Mat nearnessOf(const cv::Matx33d& to_plane, const cv::Size& size) {
 // A plane's part of the picture, in its chart.
 struct PlanePart {
   PlaneChart chart;
+  std::optional<Lattice> lattice;
   cv::Mat plain;  // CV_32FC3, the picture; where the plane is not seen it goes on smoothly
   cv::Mat look;   // CV_32FC3, so, too
   cv::Mat hole, known, source;
@@ -127,7 +129,8 @@ struct PlanePart {
 PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen) {
   cv::Mat copied_from;  // around which a sample sees nothing else
   cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
-  PlanePart part{chart, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from)};
+  PlanePart part{
+      chart, {}, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from)};
   part.known &= part.hole == 0, part.source &= part.hole == 0;
   return part;
 }
@@ -142,10 +145,12 @@ void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
 // Every pixel of a plane's hole as the chart's nearest one was filled: a sample of the picture, as
 // far off along the plane as that was copied from, and what was evened out there.
 // @param wanted CV_8UC1, of the chart
-void copyBack(const PlanePart& part, const Filling& filled, const std::optional<Lattice>& lattice,
-              const cv::Mat& wanted, const cv::Mat& hole, Canvas& canvas) {
+void copyBack(const PlanePart& part, const Filling& filled, const cv::Mat& wanted,
+              const cv::Mat& hole, Canvas& canvas) {
+  const std::optional<Lattice>& lattice = part.lattice;
   const cv::Mat spline = splineOf(part.plain);
   const cv::Rect all({0, 0}, part.look.size());
+#pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < hole.rows; ++v) {
     for (int u = 0; u < hole.cols; ++u) {
       if (hole.at<std::uint8_t>(v, u) == 0) continue;
@@ -166,47 +171,64 @@ void copyBack(const PlanePart& part, const Filling& filled, const std::optional<
   }
 }
 
-// Fills a plane's part of the hole with copies shifted along the plane.
-// @param supports something stands on it
-// @param hole, seen CV_8UC1: where the plane is hidden; where it may be copied from
-void fillPlane(const cv::Matx33d& to_plane, bool supports, const cv::Mat& hole, const cv::Mat& seen,
-               const InpaintParams& params, Canvas& canvas) {
-  const std::optional<PlaneChart> chart = planeChart(to_plane, hole, seen);
-  if (!chart) return;
-  PlanePart part = partOf(*chart, hole, seen);
-  if (cv::countNonZero(part.hole) == 0 || cv::countNonZero(part.source) == 0) return;
+// A plane that the hole hides.
+struct HiddenPlane {
+  const cv::Matx33d& to_plane;
+  bool supports;  // something stands on it
+  cv::Mat hole, seen;  // CV_8UC1: where it is hidden; where it may be copied from
+};
+
+// Nothing if it cannot be filled along itself. What else is filled makes no difference.
+std::optional<PlanePart> chartedPart(const HiddenPlane& plane, const cv::Mat& look) {
+  const std::optional<PlaneChart> chart = planeChart(plane.to_plane, plane.hole, plane.seen);
+  if (!chart) return std::nullopt;
+  PlanePart part = partOf(*chart, plane.hole, plane.seen);
+  if (cv::countNonZero(part.hole) == 0 || cv::countNonZero(part.source) == 0) return std::nullopt;
   const cv::Rect near = windowAround(part.hole, kLatticeMargin, kLatticeMargin);
   std::optional<Lattice> lattice;
-  const auto seek = [&] {
-    lattice = findLattice(chart->carried(canvas.look, near), part.source(near));
-  };
-  const auto see = [&] { addLook(canvas.look, seen, part); };
-  if (supports && chart->tilted) {
+  const auto seek = [&] { lattice = findLattice(chart->carried(look, near), part.source(near)); };
+  const auto see = [&] { addLook(look, plane.seen, part); };
+  if (plane.supports && chart->tilted) {
     sideBySide(true, seek, see);
   } else {
     seek();
-    if (!lattice) return;
+    if (!lattice) return std::nullopt;
     see();
   }
+  part.lattice = lattice;
+  return part;
+}
+
+// Fills a plane's part of the hole with copies shifted along the plane.
+void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintParams& params,
+               Canvas& canvas) {
   InpaintParams inner = params;
   inner.surface = cv::Mat();
-  inner.nearness = chart->carried(nearnessOf(to_plane, hole.size())), inner.away_farther = kFarther;
+  inner.nearness = part.chart.carried(nearnessOf(plane.to_plane, plane.hole.size())),
+  inner.away_farther = kFarther;
+  const Lattice* lattice = part.lattice ? &*part.lattice : nullptr;
   const cv::Mat wanted =
       lattice ? goesOnByLattice(*lattice, part.look, part.known, part.hole) : part.hole;
   copyBack(part,
            fill(part.look.clone(), part.hole.clone(), part.source.clone(), part.known.clone(),
-                lattice ? &*lattice : nullptr, inner),
-           lattice, wanted, hole, canvas);
+                lattice, inner),
+           wanted, plane.hole, canvas);
 }
 
 void fillPlanes(const InpaintParams& params, Canvas& canvas) {
-  const cv::Mat hole = canvas.hole.clone();
+  std::vector<HiddenPlane> planes;
   for (std::size_t k = 0; k < params.planes.size(); ++k) {
     const cv::Mat here = params.surface == static_cast<double>(k + 1),
-                  hidden = hole & here & params.sure;
+                  hidden = canvas.hole & here & params.sure;
     if (cv::countNonZero(hidden) >= kFewestOnPlane)
-      fillPlane(params.planes[k], static_cast<int>(k) < params.supports, hidden,
-                canvas.source & here, params, canvas);
+      planes.push_back({params.planes[k], static_cast<int>(k) < params.supports, hidden,
+                        canvas.source & here});
+  }
+  std::vector<std::optional<PlanePart>> parts(planes.size());
+#pragma omp parallel for schedule(dynamic, 1) if (planes.size() > 1)
+  for (std::size_t i = 0; i < planes.size(); ++i) parts[i] = chartedPart(planes[i], canvas.look);
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    if (parts[i]) fillPlane(planes[i], *parts[i], params, canvas);
   }
 }
 

@@ -40,10 +40,8 @@ class LineEndFinder {
   std::vector<LineEnd> run() {
     cv::Mat weight(hole_.size(), CV_32F, cv::Scalar(0.0f)), grey;
     weight.setTo(1.0f, source_);
-    cv::Mat smooth = image_.clone();
-    pushPull(image_, weight).copyTo(smooth, source_ == 0);
-    cv::cvtColor(smooth, grey, cv::COLOR_BGR2GRAY);
-    grey.convertTo(grey, CV_8U);
+    cv::cvtColor(image_, grey, cv::COLOR_BGR2GRAY);
+    pushPull(grey, weight).convertTo(grey, CV_8U);
     std::vector<cv::Vec4f> segments;
     cv::createLineSegmentDetector(cv::LSD_REFINE_STD)->detect(grey, segments);
     for (const cv::Vec4f& s : segments) {

@@ -233,6 +233,7 @@ class Filling {
     std::vector<cv::Point> seen;  // what is known of it, from its middle
     cv::Point best;
     float least;
+    std::vector<cv::Point> tried;  // its neighbours mostly lead to the same few places
   };
 
   void attempt(const cv::Point& p, cv::Point q, Guess& guess) const {
@@ -244,7 +245,7 @@ class Filling {
 
   // Among places all over the picture.
   Guess firstGuess(const cv::Point& p, const cv::Mat& known) const {
-    Guess guess{knownAround(p, known), anySource(p, 0), 0.0f};
+    Guess guess{knownAround(p, known), anySource(p, 0), 0.0f, {}};
     guess.least = rules_.partialDistance(image_, p, guess.best, guess.seen, 1e30f);
     for (int i = 1; i < kFirstGuesses; ++i) attempt(p, anySource(p, i), guess);
     return guess;
@@ -255,7 +256,11 @@ class Filling {
     for (int dv = -2; dv <= 2; ++dv) {
       for (int du = -2; du <= 2; ++du) {
         const cv::Point d(du, dv);
-        if (inside(p + d) && hasMatch(p + d)) attempt(p, match(p + d) - d, guess);
+        if (!inside(p + d) || !hasMatch(p + d)) continue;
+        const cv::Point q = match(p + d) - d;
+        if (std::find(guess.tried.begin(), guess.tried.end(), q) != guess.tried.end()) continue;
+        guess.tried.push_back(q);
+        attempt(p, q, guess);
       }
     }
     for (int reach = 8; reach >= 1; reach /= 2) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/inpaint.hpp"
@@ -5,33 +6,59 @@
 namespace calipso::render {
 namespace {
 
-// image and weight of half the size: averages weighted by trust.
-void pull(const cv::Mat& weighted, const cv::Mat& weight, cv::Mat& weighted_half,
-          cv::Mat& weight_half) {
-  const cv::Size half((weight.cols + 1) / 2, (weight.rows + 1) / 2);
-  cv::pyrDown(weighted, weighted_half, half, cv::BORDER_REPLICATE);
-  cv::pyrDown(weight, weight_half, half, cv::BORDER_REPLICATE);
-}
-
-cv::Mat normalised(const cv::Mat& weighted, const cv::Mat& weight) {
-  cv::Mat out(weighted.size(), CV_32FC3);
+// A picture times its weight, which is the last channel.
+template <int kChannels>
+cv::Mat weighted(const cv::Mat& image, const cv::Mat& weight) {
+  cv::Mat out(image.size(), CV_32FC(kChannels + 1));
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < out.rows; ++v) {
-    for (int u = 0; u < out.cols; ++u) {
-      const float w = weight.at<float>(v, u);
-      out.at<cv::Vec3f>(v, u) =
-          w > 1e-6f ? cv::Vec3f(weighted.at<cv::Vec3f>(v, u) / w) : cv::Vec3f();
+    const float *colour = image.ptr<float>(v), *w = weight.ptr<float>(v);
+    float* to = out.ptr<float>(v);
+    for (int u = 0; u < out.cols; ++u, colour += kChannels, to += kChannels + 1) {
+      for (int c = 0; c < kChannels; ++c) to[c] = w[u] * colour[c];
+      to[kChannels] = w[u];
     }
   }
   return out;
 }
 
-cv::Mat multiplied(const cv::Mat& image, const cv::Mat& weight) {
-  cv::Mat out(image.size(), CV_32FC3);
+// What was weighted, and how far it is to be trusted: a pixel with any support more than its weight
+// says.
+template <int kChannels>
+void unweight(const cv::Mat& weighted, cv::Mat& image, cv::Mat& trust) {
+  image.create(weighted.size(), CV_32FC(kChannels));
+  trust.create(weighted.size(), CV_32F);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < image.rows; ++v) {
+    const float* from = weighted.ptr<float>(v);
+    float *colour = image.ptr<float>(v), *w = trust.ptr<float>(v);
+    for (int u = 0; u < image.cols; ++u, colour += kChannels, from += kChannels + 1) {
+      const float sum = from[kChannels];
+      const float scale = sum > 1e-6f ? 1.0f / sum : 0.0f;
+      for (int c = 0; c < kChannels; ++c) colour[c] = scale * from[c];
+      w[u] = std::min(4.0f * sum, 1.0f);
+    }
+  }
+}
+
+template <int kChannels>
+cv::Mat filled(const cv::Mat& image, const cv::Mat& weight) {
+  if (image.cols <= 2 && image.rows <= 2) return image.clone();
+  cv::Mat half, half_image, half_trust, coarse;
+  cv::pyrDown(weighted<kChannels>(image, weight), half,
+              {(image.cols + 1) / 2, (image.rows + 1) / 2}, cv::BORDER_REPLICATE);
+  unweight<kChannels>(half, half_image, half_trust);
+  cv::pyrUp(filled<kChannels>(half_image, half_trust), coarse, {half.cols * 2, half.rows * 2});
+  cv::Mat out(image.size(), CV_32FC(kChannels));
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < out.rows; ++v) {
-    for (int u = 0; u < out.cols; ++u)
-      out.at<cv::Vec3f>(v, u) = weight.at<float>(v, u) * image.at<cv::Vec3f>(v, u);
+    const float *fine = image.ptr<float>(v), *smooth = coarse.ptr<float>(v),
+                *weights = weight.ptr<float>(v);
+    float* to = out.ptr<float>(v);
+    for (int u = 0; u < out.cols; ++u, fine += kChannels, smooth += kChannels, to += kChannels) {
+      const float w = std::min(1.0f, weights[u]);
+      for (int c = 0; c < kChannels; ++c) to[c] = fine[c] * w + smooth[c] * (1.0f - w);
+    }
   }
   return out;
 }
@@ -39,27 +66,9 @@ cv::Mat multiplied(const cv::Mat& image, const cv::Mat& weight) {
 }  // namespace
 
 cv::Mat pushPull(const cv::Mat& image, const cv::Mat& weight) {
-  CV_Assert(image.type() == CV_32FC3 && weight.type() == CV_32FC1 && image.size() == weight.size());
-  if (image.cols <= 2 && image.rows <= 2) return image.clone();
-  cv::Mat weighted_half, weight_half;
-  pull(multiplied(image, weight), weight, weighted_half, weight_half);
-  const cv::Mat half_image = normalised(weighted_half, weight_half);
-  cv::Mat half_trust;  // a pixel with any support is trusted more than its weight says
-  cv::min(weight_half * 4.0, 1.0, half_trust);
-  const cv::Mat half = pushPull(half_image, half_trust);
-  cv::Mat coarse;
-  cv::pyrUp(half, coarse, {half.cols * 2, half.rows * 2});
-  coarse = coarse(cv::Rect(0, 0, image.cols, image.rows));
-  cv::Mat out(image.size(), CV_32FC3);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < out.rows; ++v) {
-    for (int u = 0; u < out.cols; ++u) {
-      const float w = std::min(1.0f, weight.at<float>(v, u));
-      out.at<cv::Vec3f>(v, u) =
-          image.at<cv::Vec3f>(v, u) * w + coarse.at<cv::Vec3f>(v, u) * (1.0f - w);
-    }
-  }
-  return out;
+  CV_Assert((image.type() == CV_32FC3 || image.type() == CV_32FC1) && weight.type() == CV_32FC1 &&
+            image.size() == weight.size());
+  return image.channels() == 1 ? filled<1>(image, weight) : filled<3>(image, weight);
 }
 
 }  // namespace calipso::render

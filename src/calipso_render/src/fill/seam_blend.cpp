@@ -12,7 +12,8 @@ constexpr float kScreen = 0.003f;
 // code values; what misses by much more is an edge of things, not a seam to be spread
 constexpr float kEdge = 25.0f;
 constexpr float kScreenEdge = 0.3f;  // kScreen of what an edge misses
-// of Gauss-Seidel: seams go on changing slowly far away, what an edge misses is settled soon
+// of successive overrelaxation: seams go on changing slowly far away, what an edge misses is
+// settled soon
 constexpr float kRelax = 1.8f, kRelaxEdge = 1.46f;
 constexpr int kIterations = 30, kIterationsEdge = 12;
 const cv::Point kAround[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
@@ -31,16 +32,20 @@ class Seams {
   Seams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, const cv::Mat& image)
       : hole_(hole), source_(source), origin_(origin), image_(image) {}
 
+  // First one colour of a chessboard, then the other: a field's neighbours have the other one, so
+  // that none waits for the one before it.
   std::vector<Node> nodes() const {
     cv::Mat index(hole_.size(), CV_32S, cv::Scalar(-1));
     std::vector<Node> nodes;
-    for (int v = 0; v < hole_.rows; ++v) {
-      for (int u = 0; u < hole_.cols; ++u) {
-        if (hole_.at<std::uint8_t>(v, u) == 0) continue;
-        index.at<int>(v, u) = static_cast<int>(nodes.size());
-        Node node;
-        node.at = {u, v};
-        nodes.push_back(node);
+    for (int colour = 0; colour < 2; ++colour) {
+      for (int v = 0; v < hole_.rows; ++v) {
+        for (int u = (v + colour) % 2; u < hole_.cols; u += 2) {
+          if (hole_.at<std::uint8_t>(v, u) == 0) continue;
+          index.at<int>(v, u) = static_cast<int>(nodes.size());
+          Node node;
+          node.at = {u, v};
+          nodes.push_back(node);
+        }
       }
     }
 #pragma omp parallel for schedule(static)

@@ -12,6 +12,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kReach = 6;          // px by which a copy may grow
+constexpr int kTile = 16;          // px of the squares in which copies wait for each other
 constexpr int kFewest = 40;        // px of a copy that may grow
 constexpr float kUnknown = 60.0f;  // code values by which what is not seen differs from all colours
 constexpr int kNoCopy = -1;
@@ -83,37 +84,22 @@ class Seams {
                               ? last
                               : labels.try_emplace({way.y, way.x}, next).first->second;
         last = label;
-        if (label == next)
-          ways_.push_back(way), boxes_.emplace_back(u, v, 1, 1), sizes_.push_back(0);
-        boxes_[label] |= cv::Rect(u, v, 1, 1);
-        label_.at<int>(v, u) = label, ++sizes_[label];
+        if (label == next) ways_.push_back(way), pixels_.emplace_back();
+        pixels_[label].emplace_back(u, v);
+        label_.at<int>(v, u) = label;
         picture.at<cv::Vec3f>(v, u) = image.at<cv::Vec3f>(from[1], from[0]);
       }
     }
     right_ = stepWeight(picture, {1, 0}), down_ = stepWeight(picture, {0, 1});
   }
 
-  int labels() const { return static_cast<int>(ways_.size()); }
-
-  // Lets one copy grow over its neighbours to where the cost of all seams is least.
-  void expand(int label) {
-    if (sizes_[label] < kFewest) return;
-    const std::vector<cv::Point> pixels = mayTake(label);
-    if (pixels.empty()) return;
-    cv::detail::GCGraph<float> graph(static_cast<int>(pixels.size()) + 1,
-                                     4 * static_cast<int>(pixels.size()));
-    for (const cv::Point& p : pixels) node_.at<int>(p) = graph.addVtx();
-    for (const cv::Point& p : pixels) {
-      for (const cv::Point& d : kAround) addSeam(p, p + d, label, graph);
+  // Every copy once, in order: only such as are out of each other's reach at the same time, with the
+  // same result.
+  void expandAll() {
+    for (const std::vector<int>& wave : waves()) {
+#pragma omp parallel for schedule(dynamic, 1)
+      for (std::size_t i = 0; i < wave.size(); ++i) expand(wave[i]);
     }
-    graph.addEdges(0, graph.addVtx(), 0.0f, 0.0f);  // it wants one
-    graph.maxFlow();
-    for (const cv::Point& p : pixels) {
-      if (graph.inSourceSegment(node_.at<int>(p))) continue;
-      label_.at<int>(p) = label;
-      boxes_[label] |= cv::Rect(p, cv::Size(1, 1));
-    }
-    for (const cv::Point& p : pixels) node_.at<int>(p) = kNoCopy;
   }
 
   void write(cv::Mat& origin) const {
@@ -128,6 +114,49 @@ class Seams {
   }
 
  private:
+  // The copies that may grow. Each is in the first wave after those of all before it that reach
+  // where it does: others only take pixels from a copy until its own turn.
+  std::vector<std::vector<int>> waves() const {
+    std::vector<std::vector<int>> waves;
+    const int reach = kReach + 1, columns = (hole_.cols + 2 * reach) / kTile + 1,
+              rows = (hole_.rows + 2 * reach) / kTile + 1;
+    std::vector<std::size_t> next(columns * rows, 0);  // free wave of every tile
+    for (std::size_t label = 0; label < pixels_.size(); ++label) {
+      if (pixels_[label].size() < kFewest) continue;
+      std::vector<int> tiles;
+      for (const cv::Point& p : pixels_[label]) {
+        for (int v = p.y / kTile; v <= (p.y + 2 * reach) / kTile; ++v) {
+          for (int u = p.x / kTile; u <= (p.x + 2 * reach) / kTile; ++u)
+            tiles.push_back(v * columns + u);
+        }
+      }
+      std::size_t wave = 0;
+      for (const int tile : tiles) wave = std::max(wave, next[tile]);
+      for (const int tile : tiles) next[tile] = wave + 1;
+      if (wave == waves.size()) waves.emplace_back();
+      waves[wave].push_back(static_cast<int>(label));
+    }
+    return waves;
+  }
+
+  // Lets one copy grow over its neighbours to where the cost of all seams is least.
+  void expand(int label) {
+    const std::vector<cv::Point> pixels = mayTake(label);
+    if (pixels.empty()) return;
+    cv::detail::GCGraph<float> graph(static_cast<int>(pixels.size()) + 1,
+                                     4 * static_cast<int>(pixels.size()));
+    for (const cv::Point& p : pixels) node_.at<int>(p) = graph.addVtx();
+    for (const cv::Point& p : pixels) {
+      for (const cv::Point& d : kAround) addSeam(p, p + d, label, graph);
+    }
+    graph.addEdges(0, graph.addVtx(), 0.0f, 0.0f);  // it wants one
+    graph.maxFlow();
+    for (const cv::Point& p : pixels) {
+      if (!graph.inSourceSegment(node_.at<int>(p))) label_.at<int>(p) = label;
+    }
+    for (const cv::Point& p : pixels) node_.at<int>(p) = kNoCopy;
+  }
+
   bool inside(const cv::Point& p) const {
     return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
   }
@@ -143,19 +172,21 @@ class Seams {
 
   // Pixels of other copies around one that it has something to put on.
   std::vector<cv::Point> mayTake(int label) const {
-    const cv::Rect box =
-        cv::Rect(boxes_[label].x - kReach, boxes_[label].y - kReach,
-                 boxes_[label].width + 2 * kReach, boxes_[label].height + 2 * kReach) &
-        cv::Rect({0, 0}, hole_.size());
-    const cv::Mat own = label_(box) == label;
-    cv::Mat around;
-    cv::dilate(own, around, cv::Mat::ones(2 * kReach + 1, 2 * kReach + 1, CV_8U));
-    around &= (own == 0) & (label_(box) != kNoCopy);
+    const cv::Rect own = cv::boundingRect(pixels_[label]),
+                   box = cv::Rect(own.x - kReach, own.y - kReach, own.width + 2 * kReach,
+                                  own.height + 2 * kReach) &
+                         cv::Rect({0, 0}, hole_.size());
+    cv::Mat around = cv::Mat::zeros(box.size(), CV_8U);
+    for (const cv::Point& p : pixels_[label]) {
+      if (label_.at<int>(p) == label) around.at<std::uint8_t>(p - box.tl()) = 255;
+    }
+    cv::dilate(around, around, cv::Mat::ones(2 * kReach + 1, 2 * kReach + 1, CV_8U));
     std::vector<cv::Point> near, pixels;
     cv::findNonZero(around, near);
     for (const cv::Point& p : near) {
       const cv::Point at = p + box.tl();
-      if (suits(at, at + ways_[label])) pixels.push_back(at);
+      const int other = label_.at<int>(at);
+      if (other != label && other != kNoCopy && suits(at, at + ways_[label])) pixels.push_back(at);
     }
     return pixels;
   }
@@ -218,8 +249,7 @@ class Seams {
   cv::Mat label_, node_;  // CV_32SC1: of the copy, and in the graph of the move at hand
   cv::Mat right_, down_;  // CV_32FC1: weights of steps
   std::vector<cv::Point> ways_;
-  std::vector<cv::Rect> boxes_;  // around every copy's pixels, and
-  std::vector<int> sizes_;       // how many they were
+  std::vector<std::vector<cv::Point>> pixels_;  // of every copy, at first
 };
 
 }  // namespace
@@ -227,7 +257,7 @@ class Seams {
 void cutSeams(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
               const cv::Mat& known, const cv::Mat& surface, cv::Mat& origin) {
   Seams seams(image, hole, source, known, surface, origin);
-  for (int label = 0; label < seams.labels(); ++label) seams.expand(label);
+  seams.expandAll();
   seams.write(origin);
 }
 

@@ -126,11 +126,9 @@ void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int marg
       }
     }
   }
-  cv::Mat weight, three;
+  cv::Mat weight;
   known.convertTo(weight, CV_32F, 1.0 / 255.0);
-  cv::merge(std::vector<cv::Mat>(3, nearness), three);
-  cv::extractChannel(pushPull(three, weight), three, 0);
-  three.copyTo(nearness, known == 0);
+  pushPull(nearness, weight).copyTo(nearness, known == 0);
 }
 
 // The key frame's pixels as another camera sees them.
