@@ -62,6 +62,7 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
   params_.patch.radius_px = std::max(params_.patch.radius_px, std::min(scaled, kLargestRadius));
   wide_ = params_;
   wide_.patch.radius_px = std::max(params_.patch.radius_px, kLargestRadius);
+  for (TrackerParams* of : {&params_, &wide_}) of->pose.patch_px = 2 * of->patch.radius_px + 1;
   references_.push_back(
       {ReferenceView(key_frame, model_, model.world_from_object, mask, params.seed_count),
        Matrix6d::Zero()});

@@ -5,20 +5,14 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "calipso_flow/rotation.hpp"
 #include "calipso_scene/median.hpp"
+#include "shared_error.hpp"
 
 namespace calipso::flow {
 namespace {
 
-constexpr double kShapeLength = 2.5;  // see ShapeError
-// deviations by which it must stand out of what chance makes
-constexpr double kShapeSurprise = 1.0;
-constexpr double kShapeReach = 4.0;  // of 2 l^2: farther apart tracks do not err together
-// 12 / (12 - 6): a pose takes up six of the errors of six such patches
-constexpr double kShapeAbsorbed = 2.0;
 constexpr int kLeastPoints = 2;
 constexpr double kRobust = 3.0;  // deviations: residuals beyond count less and less
 
@@ -108,16 +102,10 @@ Vector6d solveStep(const NormalEquations& normal) {
   return damped.ldlt().solve(normal.right);
 }
 
-// A fit's inliers that are not of the outline, as least squares has them: residuals and Jacobians
-// in units of their deviations.
-struct Whitened {
-  std::vector<Eigen::Vector2d> pixel, residual;
-  std::vector<Eigen::Matrix<double, 2, 6>> jacobian;
-};
-
-Whitened whitened(const std::vector<Correspondence>& correspondences, const Linearisation& lin,
-                  const std::vector<bool>& inlier) {
-  Whitened result;
+// A fit's inliers that are not of the outline, as least squares has them.
+WhitenedTracks whitened(const std::vector<Correspondence>& correspondences,
+                        const Linearisation& lin, const std::vector<bool>& inlier) {
+  WhitenedTracks result;
   for (size_t i = 0; i < inlier.size(); ++i) {
     if (!inlier[i] || lin.outline[i]) continue;
     const Eigen::Matrix2d root =
@@ -127,48 +115,6 @@ Whitened whitened(const std::vector<Correspondence>& correspondences, const Line
     result.jacobian.push_back(root * lin.jacobian[i]);
   }
   return result;
-}
-
-// A model whose shape is not the true one puts neighbouring tracks off together, and such errors do
-// not average out. Covariance between tracks  c exp(-d^2 / 2 l^2), l the kShapeLength-th part of
-// their spread; c from nearest neighbours.
-struct ShapeError {
-  double variance = 0.0;                 // c, per component, of the whitened residuals
-  Matrix6d gradient = Matrix6d::Zero();  // sum_ij c k_ij A_i^T A_j: covariance of sum_i A_i^T r_i
-};
-
-// @param deviation  of the residuals, whitened
-ShapeError shapeError(const Whitened& tracks, double deviation) {
-  const size_t count = tracks.pixel.size();
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& pixel : tracks.pixel) mean += pixel / count;
-  double spread = 0.0;
-  for (const Eigen::Vector2d& pixel : tracks.pixel) spread += (pixel - mean).squaredNorm() / count;
-  const double twice_length = 2.0 * spread / (kShapeLength * kShapeLength);
-  double product = 0.0, chance = 0.0;  // of independent residuals: its variance
-  Matrix6d sum = Matrix6d::Zero();
-  for (size_t i = 0; i < count; ++i) {
-    double nearest = std::numeric_limits<double>::infinity();
-    size_t neighbour = i;
-    Eigen::Matrix<double, 2, 6> around = Eigen::Matrix<double, 2, 6>::Zero();
-    for (size_t j = 0; j < count; ++j) {
-      const double squared = (tracks.pixel[i] - tracks.pixel[j]).squaredNorm();
-      if (j != i && squared < nearest) nearest = squared, neighbour = j;
-      if (squared < kShapeReach * twice_length)
-        around += std::exp(-squared / twice_length) * tracks.jacobian[j];
-    }
-    sum += tracks.jacobian[i].transpose() * around;
-    const double correlation = std::exp(-nearest / twice_length);
-    if (neighbour == i) continue;
-    product += 0.5 * correlation * tracks.residual[i].dot(tracks.residual[neighbour]) / count;
-    // 0.5 in two dimensions; two that are nearest to each other come twice.
-    chance += std::pow(correlation * deviation * deviation / count, 2);
-  }
-  ShapeError error;
-  if (product < kShapeSurprise * std::sqrt(chance)) return error;
-  error.variance = kShapeAbsorbed * product;
-  error.gradient = error.variance * sum;
-  return error;
 }
 
 // Sums of A^T A over the inliers, A = Jacobian in units of its own deviation.
@@ -216,13 +162,11 @@ void judge(const std::vector<Correspondence>& correspondences, const Linearisati
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0.0)) return;
   fit.common = (fit.inliers + 0.5 * sum.outline_inliers) * params.common_px * params.common_px *
                sum.geometry.inverse();
-  // Points err apart by what their shared error leaves of their deviation, and together by that.
-  const ShapeError shape = shapeError(whitened(correspondences, lin, fit.inlier), found.points);
-  const double apart = std::max(1.0, of_points - shape.variance);
-  const Matrix6d alone =
-      apart * sum.points / (of_points * of_points) + sum.outline_apart / of_outline;
+  const SharedError shared =
+      sharedError(whitened(correspondences, lin, fit.inlier), found.points, params.patch_px);
+  const Matrix6d alone = shared.alone / (of_points * of_points) + sum.outline_apart / of_outline;
   const Matrix6d together =
-      shape.gradient / (of_points * of_points) + (sum.outline - sum.outline_apart) / of_outline;
+      shared.together / (of_points * of_points) + (sum.outline - sum.outline_apart) / of_outline;
   const Matrix6d inverse = factor.solve(Matrix6d::Identity());
   const Eigen::Matrix<double, 6, kShapeTerms> bias = inverse * sum.shape / of_points;
   fit.persistent = inverse * together * inverse + bias * bias.transpose();

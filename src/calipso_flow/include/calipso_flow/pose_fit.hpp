@@ -33,6 +33,7 @@ struct PoseFitParams {
   // error that all tracks of a frame may share, and that changes slowly: of how looks are resampled
   // and lit
   double common_px = 0.004;
+  double patch_px = 0.0;  // side of the squares by which points were found: neighbours share noise
   int max_iterations = 30;
   int least_inliers = 6;  // a point of the outline counts half
 };
