@@ -3,6 +3,7 @@
 #include <exception>
 #include <opencv2/core/utils/logger.hpp>
 
+#include "calipso_render/memory.hpp"
 #include "evaluation.hpp"
 
 // Usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] [--appearance-only]
@@ -10,6 +11,7 @@
 int main(int argc, char** argv) {
   cv::utils::logging::setLogLevel(
       cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
+  calipso::render::keepFreedMemory();
   calipso::render::EvaluationOptions options;
   int first = 1;
   for (; first < argc && std::strncmp(argv[first], "--", 2) == 0; ++first) {

@@ -129,8 +129,7 @@ struct PlanePart {
 PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen) {
   cv::Mat copied_from;  // around which a sample sees nothing else
   cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
-  PlanePart part{
-      chart, {}, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from)};
+  PlanePart part{chart, {}, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from)};
   part.known &= part.hole == 0, part.source &= part.hole == 0;
   return part;
 }
@@ -174,7 +173,7 @@ void copyBack(const PlanePart& part, const Filling& filled, const cv::Mat& wante
 // A plane that the hole hides.
 struct HiddenPlane {
   const cv::Matx33d& to_plane;
-  bool supports;  // something stands on it
+  bool supports;       // something stands on it
   cv::Mat hole, seen;  // CV_8UC1: where it is hidden; where it may be copied from
 };
 
@@ -221,8 +220,8 @@ void fillPlanes(const InpaintParams& params, Canvas& canvas) {
     const cv::Mat here = params.surface == static_cast<double>(k + 1),
                   hidden = canvas.hole & here & params.sure;
     if (cv::countNonZero(hidden) >= kFewestOnPlane)
-      planes.push_back({params.planes[k], static_cast<int>(k) < params.supports, hidden,
-                        canvas.source & here});
+      planes.push_back(
+          {params.planes[k], static_cast<int>(k) < params.supports, hidden, canvas.source & here});
   }
   std::vector<std::optional<PlanePart>> parts(planes.size());
 #pragma omp parallel for schedule(dynamic, 1) if (planes.size() > 1)

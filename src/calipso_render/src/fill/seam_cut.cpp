@@ -93,8 +93,8 @@ class Seams {
     right_ = stepWeight(picture, {1, 0}), down_ = stepWeight(picture, {0, 1});
   }
 
-  // Every copy once, in order: only such as are out of each other's reach at the same time, with the
-  // same result.
+  // Every copy once, in order: only such as are out of each other's reach at the same time, with
+  // the same result.
   void expandAll() {
     for (const std::vector<int>& wave : waves()) {
 #pragma omp parallel for schedule(dynamic, 1)

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "calipso_render/memory.hpp"
 #include "drawing_case.hpp"
 #include "filling_case.hpp"
 #ifdef CALIPSO_HAVE_EGL
@@ -121,6 +122,7 @@ int main(int argc, char** argv) {
   using namespace calipso::render;
   cv::utils::logging::setLogLevel(
       cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
+  keepFreedMemory();
   Options options;
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;
