@@ -213,6 +213,10 @@ ObjectDynamics ClipAnalyser::finishObject(const FollowedObject& object, bool wit
     dynamics.motions.push_back(motionFrom(dynamics.trajectory.states[k], tracker.centroid(), moving,
                                           dynamics.observations[k].inliers()));
   }
+  for (Collision& impact : dynamics.trajectory.collisions) {
+    for (MotionState* state : {&impact.before, &impact.after})
+      state->addTwistCovariance(offCentre(tracker.model(), *state));
+  }
   dynamics.motions.front().world_from_object = tracker.model().world_from_object;
   return dynamics;
 }

@@ -1,5 +1,6 @@
 #include "calipso_flow/trajectory.hpp"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -27,6 +28,21 @@ void checkTimes(const std::vector<PoseMeasurement>& measurements) {
 double Collision::restitution() const {
   const Eigen::Vector3d normal = (after.velocity - before.velocity).normalized();
   return -after.velocity.dot(normal) / before.velocity.dot(normal);
+}
+
+// e = -(a . d) / (b . d) of the velocities b before and a after, d = a - b:
+//   de/da = -(d + a + e b) / (b . d),  de/db = (a - e (d - b)) / (b . d);
+// what the instant is off by, both fall longer or shorter.
+double Collision::restitutionDeviation() const {
+  const Eigen::Vector3d &a = after.velocity, &b = before.velocity, d = a - b;
+  const double e = restitution(), over = b.dot(d);
+  const Eigen::Vector3d by_after = -(d + a + e * b) / over, by_before = (a - e * (d - b)) / over;
+  const double by_time = by_after.dot(after.acceleration) + by_before.dot(before.acceleration);
+  const auto variance = [](const Eigen::Vector3d& slope, const MotionState& state) {
+    return slope.dot(state.twistCovariance().topLeftCorner<3, 3>() * slope);
+  };
+  return std::sqrt(variance(by_after, after) + variance(by_before, before) +
+                   std::pow(by_time * time_deviation, 2));
 }
 
 const MotionPiece& Trajectory::pieceAt(double time) const {

@@ -250,8 +250,7 @@ double TrajectoryFitter::pieceSpan(size_t piece) const {
 
 // Errors of deviation s at a piece's beginning and end make a velocity of sqrt(2) s / T. The mean
 // over its poses, since the piece's velocity is that of all of them.
-Matrix6d TrajectoryFitter::driftCovariance(double time) const {
-  const size_t piece = indexOfPieceAt(time);
+Matrix6d TrajectoryFitter::driftCovariance(size_t piece) const {
   const Measurements inside = measurementsOf(piece, piece);
   Matrix6d sum = Matrix6d::Zero();
   for (const PoseMeasurement& m : inside) sum += m.common / inside.size();
@@ -290,6 +289,24 @@ bool TrajectoryFitter::isImpact(const Jump& jump) const {
          prior_.gravity.norm() * frameSpacing();
 }
 
+// The states' errors persist by `factor`, and drift.
+void TrajectoryFitter::widen(MotionState& state, size_t piece, double factor) const {
+  state.covariance *= factor;
+  state.addTwistCovariance(driftCovariance(piece));
+}
+
+void TrajectoryFitter::widen(Trajectory::Gravity& gravity,
+                             const std::vector<MotionState>& states) const {
+  // A parabola's two numbers; where it starts is given.
+  const double share = std::min(0.5, 2.0 / static_cast<double>(gravity.frames));
+  // A bend of the poses by s over the time T of the fall is an acceleration of 8 s / T^2.
+  const double span = pieceSpan(gravity.piece);
+  const Eigen::Vector3d along = gravity.acceleration.normalized();
+  const double drift = along.dot(driftCovariance(gravity.piece).topLeftCorner<3, 3>() * along);
+  gravity.deviation = std::sqrt(std::pow(gravity.deviation, 2) * persistence(states, share) +
+                                32.0 * drift / (span * span));
+}
+
 Trajectory TrajectoryFitter::result() {
   Trajectory trajectory;
   const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
@@ -297,34 +314,18 @@ Trajectory TrajectoryFitter::result() {
   const double share =
       std::min(0.5, 2.0 * pieces_.size() / static_cast<double>(measurements_.size()));
   const double factor = persistence(motion.states, share);
-  for (MotionState& state : trajectory.states) {
-    state.covariance *= factor;
-    state.addTwistCovariance(driftCovariance(state.time));
-  }
+  for (MotionState& state : trajectory.states) widen(state, indexOfPieceAt(state.time), factor);
   trajectory.pieces = pieces_;
   trajectory.noise_scale = noise_scale_;
   trajectory.gravity = fittedGravity();
-  if (trajectory.gravity) {
-    const size_t frames = trajectory.gravity->frames;
-    const double share =
-        std::min(0.5, 2.0 / static_cast<double>(frames));  // a parabola's; where it starts is given
-    // A bend of the poses by s over the time T of the fall is an acceleration of 8 s / T^2.
-    const double span = pieceSpan(trajectory.gravity->piece);
-    const Eigen::Vector3d along = trajectory.gravity->acceleration.normalized();
-    const double drift = along.dot(
-        driftCovariance(
-            measurementsOf(trajectory.gravity->piece, trajectory.gravity->piece).front().time)
-            .topLeftCorner<3, 3>() *
-        along);
-    trajectory.gravity->deviation =
-        std::sqrt(std::pow(trajectory.gravity->deviation, 2) * persistence(motion.states, share) +
-                  32.0 * drift / (span * span));
-  }
+  if (trajectory.gravity) widen(*trajectory.gravity, motion.states);
   for (const Jump& jump : motion.jumps) {
     if (!isImpact(jump)) continue;
-    const double time = jump.after.time;
-    trajectory.collisions.push_back(
-        {time, timeDeviation(indexOfPieceAt(time)), jump.before, jump.after});
+    const size_t after = indexOfPieceAt(jump.after.time);
+    Collision impact{jump.after.time, timeDeviation(after), jump.before, jump.after};
+    widen(impact.before, after - 1, factor);
+    widen(impact.after, after, factor);
+    trajectory.collisions.push_back(impact);
   }
   return trajectory;
 }

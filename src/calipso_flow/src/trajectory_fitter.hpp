@@ -50,8 +50,10 @@ class TrajectoryFitter {
   void letFallingPiecesTurn();
   bool isImpact(const Jump& jump) const;
   std::vector<MotionState> statesWithHonestRest(const SmoothedMotion& motion) const;
-  // Of velocity and spin, by errors of the poses that change slowly over the piece at `time`.
-  Matrix6d driftCovariance(double time) const;
+  // Of velocity and spin, by errors of the poses that change slowly over the piece.
+  Matrix6d driftCovariance(size_t piece) const;
+  void widen(MotionState& state, size_t piece, double factor) const;
+  void widen(Trajectory::Gravity& gravity, const std::vector<MotionState>& states) const;
   double pieceSpan(size_t piece) const;  // s, from its first measurement to its last
   double persistence(const std::vector<MotionState>& states, double fitted_share) const;
   std::optional<Trajectory::Gravity> fittedGravity() const;

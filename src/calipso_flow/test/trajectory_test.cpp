@@ -267,6 +267,7 @@ TEST(Trajectory, findsGravityInFreeFall) {
 // The method's published scatter for this motion: 0.3 px at 760 px and 1.1 m are 0.43 mm.
 TEST(Trajectory, findsTheInstantOfCollisionWithinAFrame) {
   std::vector<double> errors;
+  double surprise = 0.0;
   std::mt19937 random(11);
   std::uniform_real_distribution<double> phase(0.0, 1.0);
   for (int i = 0; i < 20; ++i) {
@@ -277,10 +278,18 @@ TEST(Trajectory, findsTheInstantOfCollisionWithinAFrame) {
     ASSERT_EQ(fit.collisions.size(), 1u) << "repeat " << i;
     errors.push_back(kFps * std::abs(fit.collisions[0].time - tc));
     EXPECT_NEAR(fit.collisions[0].restitution(), 0.35, 0.05);
+    surprise += std::pow((fit.collisions[0].restitution() - 0.35) /
+                             fit.collisions[0].restitutionDeviation(),
+                         2) /
+                20.0;
   }
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[10], 0.03);
   EXPECT_LT(errors[18], 0.1);
+  // Chi-squared with 20 degrees of freedom over 20, from 1 % to 99 %: 0.41 to 1.88. Deviations are
+  // stated rather too large.
+  EXPECT_GT(surprise, 0.1);
+  EXPECT_LT(surprise, 1.88);
 }
 
 // Where any gain would do for a collision, only as many are told as are allowed.

@@ -130,6 +130,21 @@ double restitutionError(const Scene& scene, const TrueObject& truth, const Traje
   return 100.0 * std::abs(found / real - 1.0);
 }
 
+// Of the first impact, along the change of velocity, in units of its stated deviation.
+double restitutionSurprise(const Scene& scene, const TrueObject& truth,
+                           const Trajectory& trajectory) {
+  if (truth.collisions.empty() || trajectory.collisions.empty()) return kNone;
+  const TrueCollision& t = truth.collisions.front();
+  const Collision& e = trajectory.collisions.front();
+  if (std::abs(e.time - t.time) > 1.0 / scene.fps) return kNone;
+  Collision real;
+  real.before.velocity = t.velocity_before;
+  for (const TrueCollision& next : truth.collisions) {
+    if (next.time - t.time < 1.0 / scene.fps) real.after.velocity = next.velocity_after;
+  }
+  return (e.restitution() - real.restitution()) / e.restitutionDeviation();
+}
+
 // The paper's cue: the first frame at which the flow along gravity changes its sign, half a frame
 // earlier. Error in frames against the first true collision.
 double signChangeError(const Scene& scene, const TrueObject& truth,
@@ -175,6 +190,7 @@ void addMotionErrors(const Scene& scene, const TrueObject& truth, const ObjectDy
   entry.number("impacts_found", told(impacts.found)).number("impacts_false", told(impacts.wrong));
   entry.number("sign_change_error_frames", signChangeError(scene, truth, dynamics));
   entry.number("restitution_error_percent", restitutionError(scene, truth, trajectory));
+  entry.number("restitution_error_deviations", restitutionSurprise(scene, truth, trajectory));
   entry.number("covered_95", errors.covered);
   if (truth.still()) entry.flag("below_uncertainty", errors.below_uncertainty);
 }

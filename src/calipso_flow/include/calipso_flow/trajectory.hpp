@@ -16,6 +16,9 @@ struct Collision {
   // Speed of separation over speed of approach along the change of velocity; negative when the
   // object goes on in the direction it came.
   double restitution() const;
+  // Standard. The velocities' errors are taken for independent, which makes it rather too large:
+  // where it was at the impact puts both off in opposite directions.
+  double restitutionDeviation() const;
 };
 
 struct TrajectoryParams {

@@ -36,6 +36,7 @@ calipso_msgs::Collision toMsg(const Collision& collision) {
   msg.before = twistOf(collision.before);
   msg.after = twistOf(collision.after);
   msg.restitution = collision.restitution();
+  msg.restitution_deviation = collision.restitutionDeviation();
   return msg;
 }
 
