@@ -192,9 +192,10 @@ std::vector<Appearance> makeAppearances(const std::vector<View>& views,
     suns.emplace_back(occluders, light.direction.cast<double>(),
                       ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
   }
-  std::vector<Appearance> appearances;
+  std::vector<Appearance> appearances(moves.size());
+#pragma omp parallel for schedule(dynamic, 1) if (moves.size() > 1)
   for (std::size_t i = 0; i < moves.size(); ++i)
-    appearances.push_back(makeAppearance(views, suns, i, moves[i], light, gloss));
+    appearances[i] = makeAppearance(views, suns, i, moves[i], light, gloss);
   return appearances;
 }
 
