@@ -20,8 +20,9 @@ constexpr double kSeen = 3.0;
 constexpr double kSeenShare = 0.03;  // of the best direction's
 constexpr double kHardlyShown = 0.5;
 constexpr double kMostPersistent = 0.95;
-constexpr double kGuesses[] = {1.0, 2.0, 4.0,
-                               8.0};  // m/s: still air has no derivative, drag being quadratic
+// m/s: still air has no derivative, drag being quadratic
+constexpr double kGuesses[] = {1.0, 2.0, 4.0, 8.0};
+constexpr double kWeak = 2.0, kStrong = 4.0;  // m/s: of these the first guesses are simulated
 
 // After Levenberg and Marquardt: from how far a step gained what the slopes promised.
 class Damping {
@@ -167,18 +168,24 @@ std::optional<WindFit::Fitted> WindFit::steady(const Eigen::Vector3d& direction)
   return best;
 }
 
+// Drag is quadratic: what two winds do,  a(v) = a_0 + b v^2,  tells what others would.
 std::optional<WindFit::Fitted> WindFit::firstGuess(const Eigen::Vector3d& direction,
                                                    double log_stiffness) const {
+  const auto wind = [&](double strength) -> Eigen::VectorXd {
+    return (Eigen::Vector4d() << strength * direction, log_stiffness).finished();
+  };
+  const std::optional<SheetMotion> weak = simulated({times_.front()}, wind(kWeak), false),
+                                   strong = simulated({times_.front()}, wind(kStrong), false);
+  if (!weak || !strong) return std::nullopt;
   std::optional<Fitted> best;
   for (const double strength : kGuesses) {
+    const double share =
+        (strength * strength - kWeak * kWeak) / (kStrong * kStrong - kWeak * kWeak);
     Fitted guess;
-    guess.w = (Eigen::Vector4d() << strength * direction, log_stiffness).finished();
-    const std::optional<SheetMotion> motion = simulated({times_.front()}, guess.w, false);
-    if (!motion) return std::nullopt;
-    guess.amplitudes = motion->amplitudes;
-    guess.left = flat(motion->amplitudes - modes_.amplitudes).squaredNorm();
-    if (best && guess.left >= best->left) break;
-    best = guess;
+    guess.w = wind(strength);
+    guess.amplitudes = weak->amplitudes + share * (strong->amplitudes - weak->amplitudes);
+    guess.left = flat(guess.amplitudes - modes_.amplitudes).squaredNorm();
+    if (!best || guess.left < best->left) best = guess;
   }
   return best;
 }
