@@ -364,6 +364,46 @@ TEST(SurfaceNormals, EndAtCreases) {
   EXPECT_GT(roof.key_normals[1].x(), -0.6f);
 }
 
+// A box with faces outwards, from corner to corner.
+void addBox(const Eigen::Vector3f& low, const Eigen::Vector3f& high, Points& points,
+            Triangles& faces) {
+  const int first = static_cast<int>(points.size());
+  for (int i = 0; i < 8; ++i)
+    points.emplace_back((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(),
+                        (i & 4) != 0 ? high.z() : low.z());
+  for (const Eigen::Vector4i& f :
+       {Eigen::Vector4i(0, 2, 3, 1), Eigen::Vector4i(4, 5, 7, 6), Eigen::Vector4i(0, 1, 5, 4),
+        Eigen::Vector4i(2, 6, 7, 3), Eigen::Vector4i(0, 4, 6, 2), Eigen::Vector4i(1, 3, 7, 5)}) {
+    faces.emplace_back(first + f[0], first + f[1], first + f[2]);
+    faces.emplace_back(first + f[0], first + f[2], first + f[3]);
+  }
+}
+
+// A post runs up into a slab. Its upper corners lie within it and see nothing; its sides below it
+// see half of the sky beside them, or a little less.
+TEST(SkySeen, IsThatOutsideWhereShellsRunIntoEachOther) {
+  Points points;
+  Triangles faces;
+  addBox({-0.1f, -0.1f, 0.0f}, {0.1f, 0.1f, 1.2f}, points, faces);
+  addBox({-0.5f, -0.5f, 1.0f}, {0.5f, 0.5f, 1.4f}, points, faces);
+  const Surface surface = surfaceOf(points, faces);
+  ASSERT_EQ(surface.winding, 1);
+  int sides = 0;
+  for (int t = 0; t < 12; ++t) {  // of the post
+    for (int k = 0; k < 3; ++k) {
+      const int number = surface.corners[t][k];
+      const bool upper = points[faces[t][k]].z() > 1.0f,
+                 side = std::abs(surface.key_normals[number].z()) < 0.1f;
+      if (!upper || !side) continue;
+      ++sides;
+      EXPECT_GT(surface.seen[number].open, 0.5f);
+      EXPECT_LT(surface.seen[number].open, 0.99f);
+      EXPECT_GT(surface.seen[number].thrown, 0.01f);  // from the slab
+    }
+  }
+  EXPECT_EQ(sides, 12);
+}
+
 TEST(FitLight, SaysWhenThereIsTooLittleToSee) {
   const LightFit fit = fitLight({}, kUp.cast<float>(), {0, -1, 0});
   EXPECT_FALSE(fit.determined);

@@ -54,6 +54,11 @@ struct SkySeen {
     seen.towards = n;
     return seen;
   }
+  static SkySeen none() {
+    SkySeen seen;
+    seen.open = seen.level = 0.0f;
+    return seen;
+  }
   SkySeen turned(const Eigen::Matrix3f& by) const {
     if (open == 1.0f) return all(by * towards);
     return {open,

@@ -14,6 +14,7 @@ namespace {
 constexpr float kGoldenAngle = 2.39996323f;
 constexpr int kRayBudget = 120000;  // for a whole mesh
 constexpr int kFewestRays = 12, kMostRays = 48;
+constexpr int kSteps = 2;  // along the sides of a triangle with a buried corner, between samples
 constexpr float kEven = 0.02f;  // of the fit of V: weight of no slope, as a part of all rays
 
 // Place of ray k in the unit disc below the hemisphere.
@@ -46,7 +47,7 @@ class Side {
                          kMostRays)),
         hits_(vertices.size() * rays_),
         fit_(polynomialFit(rays_)) {
-    seen.resize(vertices.size());
+    seen.resize(vertices.size()), buried.resize(vertices.size(), 0);
 #pragma omp parallel for schedule(dynamic, 64)
     for (std::size_t i = 0; i < vertices.size(); ++i) {
       const Eigen::Vector3f n = side * normals[i];
@@ -78,11 +79,13 @@ class Side {
   }
 
   std::vector<SkySeen> seen;
+  std::vector<char> buried;  // it looks at the backs of triangles: another shell is around it
 
  private:
   void follow(const RayScene& scene, const Eigen::Vector3f& p, const Eigen::Vector3f& n, int i) {
     const Eigen::Vector3f s = n.unitOrthogonal(), t = n.cross(s);
     Eigen::Matrix<float, 6, 1> hidden = Eigen::Matrix<float, 6, 1>::Zero();
+    int backs = 0;
     for (int k = 0; k < rays_; ++k) {
       const Eigen::Vector2f q = discPlace(k, rays_);
       const Eigen::Vector3f d =
@@ -90,11 +93,13 @@ class Side {
       std::optional<RayScene::Hit>& hit = hits_[static_cast<std::size_t>(i) * rays_ + k];
       hit = scene.hit(p, n, d);
       if (!hit) continue;
+      backs += hit->behind ? 1 : 0;
       // Taken off what the whole hemisphere gives, which is exact where nothing is in the way.
       seen[i].open -= 1.0f / static_cast<float>(rays_);
       seen[i].towards -= 1.5f / static_cast<float>(rays_) * d;
       hidden += fit_.col(k);
     }
+    buried[i] = 2 * backs > rays_ ? 1 : 0;
     seen[i].level -= hidden[0];
     seen[i].slope -= hidden[1] * s + hidden[2] * t;
     const Eigen::Matrix3f ss = s * s.transpose(), tt = t * t.transpose(), st = s * t.transpose();
@@ -105,6 +110,55 @@ class Side {
   int rays_;
   std::vector<std::optional<RayScene::Hit>> hits_;
   Fit fit_;
+};
+
+// Where shells of one mesh run into each other (a beam in a pier), vertices within another shell see
+// nothing, but the triangles they belong to come out of it: there is what they stand for.
+class Emergence {
+ public:
+  Emergence(const Points& vertices, const Points& normals, const Triangles& triangles,
+            const std::vector<char>& buried) {
+    for (const Eigen::Vector3i& t : triangles) {
+      if (buried[t[0]] + buried[t[1]] + buried[t[2]] == 0) continue;
+      for (int i = 0; i <= kSteps; ++i) {
+        for (int j = 0; i + j <= kSteps; ++j) {
+          const Eigen::Vector3f w = Eigen::Vector3f(i, j, kSteps - i - j) / kSteps;
+          if (w.maxCoeff() == 1.0f) continue;
+          samples_.push_back({t, w});
+          places.push_back(w[0] * vertices[t[0]] + w[1] * vertices[t[1]] + w[2] * vertices[t[2]]);
+          this->normals.push_back(
+              (w[0] * normals[t[0]] + w[1] * normals[t[1]] + w[2] * normals[t[2]]).normalized());
+        }
+      }
+    }
+  }
+
+  // Gives the buried vertices what the samples outside see, near ones most.
+  void spread(const Side& samples, const std::vector<char>& buried,
+              std::vector<SkySeen>& seen) const {
+    std::vector<SkySeen> sums(seen.size(), SkySeen::none());
+    std::vector<float> weights(seen.size(), 0.0f);
+    for (std::size_t k = 0; k < samples_.size(); ++k) {
+      if (samples.buried[k] != 0) continue;
+      for (int i = 0; i < 3; ++i) {
+        const int vertex = samples_[k].corners[i];
+        const float weight = samples_[k].weights[i] * samples_[k].weights[i];
+        sums[vertex] = sums[vertex] + samples.seen[k] * weight, weights[vertex] += weight;
+      }
+    }
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (buried[i] != 0 && weights[i] > 0.0f) seen[i] = sums[i] * (1.0f / weights[i]);
+    }
+  }
+
+  Points places, normals;
+
+ private:
+  struct Sample {
+    Eigen::Vector3i corners;
+    Eigen::Vector3f weights;
+  };
+  std::vector<Sample> samples_;
 };
 
 }  // namespace
@@ -121,8 +175,12 @@ void findSkySeen(const Points& vertices, const Points& normals, const Triangles&
     back.gather(triangles, straight, &straight_behind);
     behind = std::move(back.seen);
   } else {
+    const Emergence emergence(vertices, normals, triangles, front.buried);
+    Side outside(scene, emergence.places, emergence.normals, 1.0f);
+    emergence.spread(outside, front.buried, front.seen);
     const std::vector<SkySeen> straight = front.seen;
-    front.gather(triangles, straight, nullptr);
+    front.gather(triangles, straight, nullptr), outside.gather(triangles, straight, nullptr);
+    emergence.spread(outside, front.buried, front.seen);
   }
   seen = std::move(front.seen);
 }
