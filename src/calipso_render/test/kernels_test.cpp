@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <numeric>
 #include <opencv2/core.hpp>
 
@@ -179,6 +180,40 @@ TEST_F(Avx2, SeesTheSameLight) {
   EXPECT_EQ(plain, fast);
   EXPECT_GT(std::count_if(plain.begin(), plain.end(), [](float x) { return x > 0.0f && x < 1.0f; }),
             100);
+}
+
+TEST_F(Avx2, MakesTheSameSpans) {
+  constexpr int kTriangles = 301;
+  const cv::Rect region(3, 2, 90, 70);
+  Triangles triangles;
+  ScreenMesh mesh;
+  mesh.triangles = &triangles;
+  for (int t = 0; t < kTriangles; ++t) {
+    const float u = random_.uniform(-10.0f, 110.0f), v = random_.uniform(-10.0f, 90.0f);
+    triangles.emplace_back(3 * t, 3 * t + 1, 3 * t + 2);
+    for (int i = 0; i < 3; ++i)
+      mesh.points.emplace_back(u + random_.uniform(-9.0f, 9.0f), v + random_.uniform(-9.0f, 9.0f),
+                               random_.uniform(0.1f, 2.0f));
+  }
+  mesh.points[30].setConstant(std::numeric_limits<float>::quiet_NaN());  // behind the camera
+  mesh.points[61] = mesh.points[60];                                     // without area
+  int most = kTriangles;
+  for (const int hidden_side : {0, 1}) {
+    mesh.hidden_side = hidden_side;
+    std::vector<TriangleSpan> plain(kTriangles), fast(kTriangles);
+    const int count = plainKernels().makeSpans(mesh, 5, kTriangles, 2u << 24, region, plain.data());
+    ASSERT_EQ(avx2Kernels()->makeSpans(mesh, 5, kTriangles, 2u << 24, region, fast.data()), count);
+    EXPECT_GT(count, 60);
+    EXPECT_LT(count, most);
+    most = count;
+    EXPECT_EQ(std::memcmp(plain.data(), fast.data(), count * sizeof(TriangleSpan)), 0);
+    for (int k = 0; k < count; ++k) {
+      EXPECT_TRUE(plain[k].id != (2u << 24 | 10u) && plain[k].id != (2u << 24 | 20u));
+      EXPECT_TRUE(k == 0 || plain[k].id > plain[k - 1].id);
+      EXPECT_TRUE(plain[k].row_min >= 0 && plain[k].row_max < region.height);
+      EXPECT_TRUE(plain[k].column_min >= 0 && plain[k].column_max < region.width);
+    }
+  }
 }
 
 TEST_F(Avx2, FillsTheSameTriangles) {

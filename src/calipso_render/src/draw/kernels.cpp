@@ -9,6 +9,7 @@
 #include "draw/bicubic.hpp"
 #include "draw/raster_bodies.hpp"
 #include "draw/shadow_bodies.hpp"
+#include "draw/span_bodies.hpp"
 #include "draw/surface_bodies.hpp"
 
 namespace calipso::render {
@@ -166,36 +167,40 @@ CALIPSO_INLINE void fillBody(const TriangleSpan* spans, const int* which, int co
     fillSpansBody<false>(spans, which, count, target);
 }
 
-#define CALIPSO_KERNELS(name, attribute)                                                         \
-  attribute void name##Visible(const ShadowTexels& map, const ShadowTaps& taps,                  \
-                               const LightPoints& points, int count, float* visible) {           \
-    visibleBody(map, taps, points, count, visible);                                              \
-  }                                                                                              \
-  attribute unsigned name##Locate(const TriangleMap* maps, const std::uint32_t* ids,             \
-                                  const PixelStretch& stretch, const SightLines& sight,          \
-                                  SurfaceRun& run) {                                             \
-    return locateBody(maps, ids, stretch, sight, run);                                           \
-  }                                                                                              \
-  attribute void name##Sample(const cv::Mat& image, int first, int last, SurfaceRun& run) {      \
-    sampleBody(image, first, last, run);                                                         \
-  }                                                                                              \
-  attribute void name##Shade(const SurfaceShade& shade, int first, int last, SurfaceRun& run) {  \
-    shadeBody(shade, first, last, run);                                                          \
-  }                                                                                              \
-  attribute void name##Encode(const NoiseCurves& curves, const float* const(&colour)[4],         \
-                              const NoiseRows& noise, int column, int count, cv::Vec3b* codes) { \
-    encodeBody(curves, colour, noise, column, count, codes);                                     \
-  }                                                                                              \
-  attribute void name##Fill(const TriangleSpan* spans, const int* which, int count,              \
-                            const SpanTarget& target) {                                          \
-    fillBody(spans, which, count, target);                                                       \
-  }                                                                                              \
-  attribute void name##DrawSamples(const TriangleSamples& t, const SampledTile& tile,            \
-                                   std::uint32_t id, EdgeCoverage::Pixel* pixels) {              \
-    drawSamplesBody(t, tile, id, pixels);                                                        \
-  }                                                                                              \
-  const Kernels name##Table{name##Visible, name##Locate, name##Sample,     name##Shade,          \
-                            name##Encode,  name##Fill,   name##DrawSamples};
+#define CALIPSO_KERNELS(name, attribute)                                                          \
+  attribute void name##Visible(const ShadowTexels& map, const ShadowTaps& taps,                   \
+                               const LightPoints& points, int count, float* visible) {            \
+    visibleBody(map, taps, points, count, visible);                                               \
+  }                                                                                               \
+  attribute unsigned name##Locate(const TriangleMap* maps, const std::uint32_t* ids,              \
+                                  const PixelStretch& stretch, const SightLines& sight,           \
+                                  SurfaceRun& run) {                                              \
+    return locateBody(maps, ids, stretch, sight, run);                                            \
+  }                                                                                               \
+  attribute void name##Sample(const cv::Mat& image, int first, int last, SurfaceRun& run) {       \
+    sampleBody(image, first, last, run);                                                          \
+  }                                                                                               \
+  attribute void name##Shade(const SurfaceShade& shade, int first, int last, SurfaceRun& run) {   \
+    shadeBody(shade, first, last, run);                                                           \
+  }                                                                                               \
+  attribute void name##Encode(const NoiseCurves& curves, const float* const(&colour)[4],          \
+                              const NoiseRows& noise, int column, int count, cv::Vec3b* codes) {  \
+    encodeBody(curves, colour, noise, column, count, codes);                                      \
+  }                                                                                               \
+  attribute int name##MakeSpans(const ScreenMesh& mesh, int begin, int end, std::uint32_t object, \
+                                const cv::Rect& region, TriangleSpan* out) {                      \
+    return makeSpansBody(mesh, begin, end, object, region, out);                                  \
+  }                                                                                               \
+  attribute void name##Fill(const TriangleSpan* spans, const int* which, int count,               \
+                            const SpanTarget& target) {                                           \
+    fillBody(spans, which, count, target);                                                        \
+  }                                                                                               \
+  attribute void name##DrawSamples(const TriangleSamples& t, const SampledTile& tile,             \
+                                   std::uint32_t id, EdgeCoverage::Pixel* pixels) {               \
+    drawSamplesBody(t, tile, id, pixels);                                                         \
+  }                                                                                               \
+  const Kernels name##Table{name##Visible, name##Locate,    name##Sample, name##Shade,            \
+                            name##Encode,  name##MakeSpans, name##Fill,   name##DrawSamples};
 
 CALIPSO_KERNELS(plain, )
 #if defined(__x86_64__) && defined(__GNUC__)

@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "calipso_render/edge_coverage.hpp"
+#include "calipso_render/rasterizer.hpp"
 #include "draw/shadow_texels.hpp"
 #include "draw/surface_run.hpp"
 #include "draw/triangle_map.hpp"
@@ -51,6 +52,11 @@ struct Kernels {
   // @param column of the first in the rows of noise, which are read around their end
   void (*encode)(const NoiseCurves& curves, const float* const (&colour)[4], const NoiseRows& noise,
                  int column, int count, cv::Vec3b* codes);
+
+  // Makes the triangles [begin, end) of a mesh ready to be filled that a buffer over `region` can
+  // see. @param object bits of the triangles' ids. @param out room for all. @return how many
+  int (*makeSpans)(const ScreenMesh& mesh, int begin, int end, std::uint32_t object,
+                   const cv::Rect& region, TriangleSpan* out);
 
   // Draws the `count` triangles of `spans` that `which` numbers, in that order.
   void (*fill)(const TriangleSpan* spans, const int* which, int count, const SpanTarget& target);

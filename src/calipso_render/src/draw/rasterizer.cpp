@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
-#include "draw/eight_lanes.hpp"
 #include "draw/kernels.hpp"
 #include "draw/triangle_span.hpp"
 
@@ -12,89 +12,28 @@ namespace calipso::render {
 namespace {
 
 constexpr double kNearPlane = 1e-6;       // m in front of the camera
-constexpr float kEdgeTolerance = 1e-3f;   // px; shared edges belong to both sides, so no cracks
-constexpr float kSmallestArea = 1e-9f;    // px^2
 constexpr std::size_t kFewPoints = 4096;  // not worth sharing out
-
-// Without SSE 4.1 std::floor and std::ceil are calls; |x| must fit an int.
-int floorInt(float x) {
-  const int i = static_cast<int>(x);
-  return i - (static_cast<float>(i) > x);
-}
-int ceilInt(float x) {
-  const int i = static_cast<int>(x);
-  return i + (static_cast<float>(i) < x);
-}
-
-// Rows and columns that a triangle can reach. @return false if there are none
-bool setLimits(const Eigen::Vector3f (&p)[3], const cv::Rect& region, TriangleSpan& span) {
-  const float left = std::min({p[0].x(), p[1].x(), p[2].x()}),
-              right = std::max({p[0].x(), p[1].x(), p[2].x()});
-  const float top = std::min({p[0].y(), p[1].y(), p[2].y()}),
-              bottom = std::max({p[0].y(), p[1].y(), p[2].y()});
-  // Written so that NaN fails every comparison.
-  if (!(right >= 0 && bottom >= 0 && left <= region.width - 1 && top <= region.height - 1))
-    return false;
-  span.row_min = ceilInt(std::max(0.0f, top - kEdgeTolerance));
-  span.row_max = floorInt(std::min(region.height - 1.0f, bottom + kEdgeTolerance));
-  span.column_min = ceilInt(std::max(0.0f, left - kEdgeTolerance));
-  span.column_max = floorInt(std::min(region.width - 1.0f, right + kEdgeTolerance));
-  return span.row_min <= span.row_max && span.column_min <= span.column_max;
-}
-
-// Edge functions, moved out by kEdgeTolerance. @pre the limits are set
-void setEdges(const Eigen::Vector3f (&p)[3], float area, TriangleSpan& span) {
-  const FourInts next = {1, 2, 0, 3};
-  const Four x = {p[0].x(), p[1].x(), p[2].x(), 0.0f}, y = {p[0].y(), p[1].y(), p[2].y(), 0.0f},
-             dx = __builtin_shuffle(x, next) - x, dy = __builtin_shuffle(y, next) - y,
-             squared = dx * dx + dy * dy;
-  const float inwards = area > 0.0f ? 1.0f : -1.0f;
-  const Four across = dx * (static_cast<float>(span.row_min) - y),
-             along = dy * (static_cast<float>(span.column_min) - x);
-  for (int i = 0; i < 4; ++i) {
-    span.edge_u[i] = -inwards * dy[i], span.edge_v[i] = inwards * dx[i];
-    span.edge_0[i] = inwards * (across[i] - along[i]) + kEdgeTolerance * std::sqrt(squared[i]);
-  }
-}
-
-bool makeSpan(const ScreenMesh& mesh, int triangle, const cv::Rect& region, TriangleSpan& span) {
-  const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
-  const Eigen::Vector3f offset(region.x, region.y, 0.0f);
-  const Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset,
-                                mesh.points[t[2]] - offset};
-  const float area =
-      (p[1].x() - p[0].x()) * (p[2].y() - p[0].y()) - (p[2].x() - p[0].x()) * (p[1].y() - p[0].y());
-  if (mesh.hides(area) || !(std::abs(area) > kSmallestArea) ||
-      std::isnan(p[0].z() + p[1].z() + p[2].z()))
-    return false;
-  if (!setLimits(p, region, span)) return false;
-  setEdges(p, area, span);
-  const float dz1 = p[1].z() - p[0].z(), dz2 = p[2].z() - p[0].z(), per_area = 1.0f / area;
-  span.near_u = (dz1 * (p[2].y() - p[0].y()) - dz2 * (p[1].y() - p[0].y())) * per_area;
-  span.near_v = (dz2 * (p[1].x() - p[0].x()) - dz1 * (p[2].x() - p[0].x())) * per_area;
-  span.near_0 = p[0].z() - span.near_u * p[0].x() - span.near_v * p[0].y();
-  return true;
-}
 
 constexpr int kBandRows = 32;
 
 // Spans by the bands of rows that they reach.
 struct Part {
-  std::vector<TriangleSpan> spans;
+  std::unique_ptr<TriangleSpan[]> spans;
+  int count = 0;
   std::vector<int> sorted;  // numbers of spans, ascending in each band
   std::vector<int> first;   // per band: its first in `sorted`, and one more
 
   void sort(int bands) {
     first.assign(bands + 2, 0);
-    for (const TriangleSpan& s : spans) {
-      for (int band = s.row_min / kBandRows; band <= s.row_max / kBandRows; ++band)
+    for (int i = 0; i < count; ++i) {
+      for (int band = spans[i].row_min / kBandRows; band <= spans[i].row_max / kBandRows; ++band)
         ++first[band + 2];
     }
     for (int band = 2; band <= bands; ++band) first[band + 1] += first[band];
     sorted.resize(first.back());
-    for (std::size_t i = 0; i < spans.size(); ++i) {
+    for (int i = 0; i < count; ++i) {
       for (int band = spans[i].row_min / kBandRows; band <= spans[i].row_max / kBandRows; ++band)
-        sorted[first[band + 1]++] = static_cast<int>(i);
+        sorted[first[band + 1]++] = i;
     }
   }
 };
@@ -168,13 +107,10 @@ void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
     for (int k = 0; k < kParts; ++k) {
       const int begin = static_cast<int>(static_cast<long>(count) * k / kParts),
                 end = static_cast<int>(static_cast<long>(count) * (k + 1) / kParts);
-      std::vector<TriangleSpan>& spans = parts[k].spans;
-      spans.reserve(end - begin);
-      TriangleSpan span;
-      for (int t = begin; t < end; ++t) {
-        span.id = (static_cast<std::uint32_t>(object) << 24) | static_cast<std::uint32_t>(t);
-        if (makeSpan(mesh, t, region_, span)) spans.push_back(span);
-      }
+      parts[k].spans.reset(new TriangleSpan[end - begin]);
+      parts[k].count =
+          kernels().makeSpans(mesh, begin, end, static_cast<std::uint32_t>(object) << 24, region_,
+                              parts[k].spans.get());
       parts[k].sort(bands);
     }
 #pragma omp for schedule(dynamic, 1)
@@ -182,7 +118,7 @@ void VisibilityBuffer::draw(const ScreenMesh& mesh, int object) {
       const SpanTarget target{ids_.get(), near_.get(), stride_, band * kBandRows,
                               std::min((band + 1) * kBandRows, region_.height) - 1};
       for (const Part& part : parts) {
-        kernels().fill(part.spans.data(), &part.sorted[part.first[band]],
+        kernels().fill(part.spans.get(), &part.sorted[part.first[band]],
                        part.first[band + 1] - part.first[band], target);
       }
     }
