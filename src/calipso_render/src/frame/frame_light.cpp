@@ -162,9 +162,14 @@ void FrameCompositor::findSkyChanges(const SkyGrid& now, SquareMask& changes) {
   const int first = region_.y / kSide, last = (region_.br().y - 1) / kSide;
 #pragma omp parallel for schedule(static)
   for (int j = first; j <= last; ++j) {
+    const cv::Rect row = cv::Rect(region_.x, j * kSide, region_.width, kSide) & region_;
+    const std::vector<float> differences = now.differences(shadows_.originals_sky, row);
+    const auto at = [&](int u) {
+      return differences.begin() + (u / now.step() - row.x / now.step());
+    };
     for (int u = region_.x / kSide * kSide; u < region_.br().x; u += kSide) {
-      const cv::Rect square = cv::Rect(u, j * kSide, kSide, kSide) & region_;
-      const float difference = now.greatestDifference(shadows_.originals_sky, square);
+      const cv::Rect square = cv::Rect(u, row.y, kSide, row.height) & region_;
+      const float difference = *std::max_element(at(square.x), at(square.br().x - 1) + 1);
       if (difference > kSameSky) changes.set(square);
       if (difference > kLittleSky) sun_changes_.set(square);
     }

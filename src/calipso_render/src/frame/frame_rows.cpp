@@ -275,7 +275,7 @@ void FrameCompositor::composeRow(int v, Row& row, FrameOutput& out) const {
   for (int i = nextMarked(source, 0, region_.width); i < region_.width;
        i = nextMarked(source, i, region_.width)) {
     const int first = i;
-    while (i < region_.width && source[i] != kOriginal) ++i;
+    i = nextUnmarked(source, i, region_.width, 0xff);
     codec_.encode({&row.colour[0][first], &row.colour[1][first], &row.colour[2][first],
                    &row.colour[3][first]},
                   region_.x + first, v, i - first, codes + first);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "draw/eight_lanes.hpp"
 #include "draw/light_batch.hpp"
 
 namespace calipso::render {
@@ -131,19 +132,16 @@ class Squares {
   void refine(const cv::Rect& square, const cv::Rect& here) const {
     float grid[kPlaces][kPlaces], visible[kSquare][kSquare];
     fillGrid(square, grid);
+    interpolate(grid, visible);
     Lookup lookup(*this);
     for (int v = 0; v < kSquare; v += kStep) {
       for (int u = 0; u < kSquare; u += kStep) {
         const float *above = &grid[v / kStep][u / kStep], *below = &grid[v / kStep + 1][u / kStep];
         const auto [low, high] = std::minmax({above[0], above[1], below[0], below[1]});
+        if (high - low <= kSlow) continue;
         for (int y = v; y < v + kStep; ++y) {
           for (int x = u; x < u + kStep; ++x) {
-            const float s = static_cast<float>(x - u) / kStep,
-                        t = static_cast<float>(y - v) / kStep;
-            if (high - low <= kSlow)
-              visible[y][x] = (above[0] + (above[1] - above[0]) * s) * (1.0f - t) +
-                              (below[0] + (below[1] - below[0]) * s) * t;
-            else if (here.contains(cv::Point(square.x + x, square.y + y) - rect_.tl()))
+            if (here.contains(cv::Point(square.x + x, square.y + y) - rect_.tl()))
               lookup.add(square.x + x, square.y + y, &visible[y][x]);
           }
         }
@@ -153,18 +151,38 @@ class Squares {
     write(square, here, visible);
   }
 
+  static void interpolate(const float (&grid)[kPlaces][kPlaces],
+                          float (&visible)[kSquare][kSquare]) {
+    static_assert(kSquare == 8 && kStep == 2);
+    Eight lines[kPlaces];
+    for (int j = 0; j < kPlaces; ++j) {
+      const float* g = grid[j];
+      const Eight left = {g[0], g[0], g[1], g[1], g[2], g[2], g[3], g[3]},
+                  right = {g[1], g[1], g[2], g[2], g[3], g[3], g[4], g[4]},
+                  parts = {0.0f, 0.5f, 0.0f, 0.5f, 0.0f, 0.5f, 0.0f, 0.5f};
+      lines[j] = left + (right - left) * parts;
+    }
+    for (int j = 0; j + 1 < kPlaces; ++j) {
+      eightAt(visible[2 * j]) = lines[j];
+      eightAt(visible[2 * j + 1]) = lines[j] * 0.5f + lines[j + 1] * 0.5f;
+    }
+  }
+
   void write(const cv::Rect& square, const cv::Rect& here,
              const float (&visible)[kSquare][kSquare]) const {
+    typedef std::uint8_t Bytes __attribute__((vector_size(8)));
+    const int left = here.x + rect_.x - square.x;
     for (int y = here.y; y < here.br().y; ++y) {
-      std::uint8_t* row = out_.ptr<std::uint8_t>(y);
-      for (int x = here.x; x < here.br().x; ++x)
-        row[x] = lightLevel(visible[y + rect_.y - square.y][x + rect_.x - square.x]);
+      const Eight level = eightAt(visible[y + rect_.y - square.y]) * 255.0f + 0.5f;
+      const Bytes bytes = __builtin_convertvector(__builtin_convertvector(level, EightInts), Bytes);
+      std::memcpy(out_.ptr<std::uint8_t>(y) + here.x,
+                  reinterpret_cast<const std::uint8_t*>(&bytes) + left, here.width);
     }
   }
 
   // Every pixel on its own: the relief, or several planes. What sees neither keeps its value.
   void fillExactly(const cv::Rect& square, const cv::Rect& here) const {
-    float visible[kSquare][kSquare];
+    float visible[kSquare][kSquare] = {};
     Lookup lookup(*this);
     Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
     for (int y = here.y; y < here.br().y; ++y) {

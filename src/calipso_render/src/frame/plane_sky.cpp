@@ -121,21 +121,21 @@ cv::Rect SkyGrid::cellsOf(const cv::Rect& rect) const {
   return cv::Rect(low, high + cv::Point(1, 1)) - first_;
 }
 
-float SkyGrid::greatestDifference(const SkyGrid& other, const cv::Rect& rect) const {
+std::vector<float> SkyGrid::differences(const SkyGrid& other, const cv::Rect& rect) const {
   const cv::Rect cells = cellsOf(rect), others = cells + first_ - other.first_;
-  float greatest = 0.0f;
+  std::vector<float> at_places(cells.width + 1, 0.0f), greatest(cells.width);
   for (int j = 0; j <= cells.height; ++j) {
     const float *here = light_.ptr<float>(cells.y + j) + cells.x,
                 *there = other.light_.ptr<float>(others.y + j) + others.x;
     for (int i = 0; i <= cells.width; ++i)
-      greatest = std::max(greatest, std::abs(here[i] - there[i]));
+      at_places[i] = std::max(at_places[i], std::abs(here[i] - there[i]));
   }
+  for (int i = 0; i < cells.width; ++i) greatest[i] = std::max(at_places[i], at_places[i + 1]);
   for (int j = 0; j < cells.height; ++j) {
     const std::uint8_t *here = uneven_.ptr<std::uint8_t>(cells.y + j) + cells.x,
                        *there = other.uneven_.ptr<std::uint8_t>(others.y + j) + others.x;
-    for (int i = 0; i < cells.width; ++i) {
-      if ((here[i] | there[i]) != 0) return 1.0f;
-    }
+    for (int i = 0; i < cells.width; ++i)
+      greatest[i] = (here[i] | there[i]) != 0 ? 1.0f : greatest[i];
   }
   return greatest;
 }

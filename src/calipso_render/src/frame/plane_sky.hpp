@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "calipso_render/visibility.hpp"
 #include "frame/square_mask.hpp"
@@ -27,8 +28,10 @@ class SkyGrid {
               std::uint8_t* out) const;
 
   // How much the light at pixels of `rect` can differ from that of another grid of the same
-  // picture; 1 where it is not known.
-  float greatestDifference(const SkyGrid& other, const cv::Rect& rect) const;
+  // picture, per column of cells that it meets: of step() px, the first of which has its first
+  // column; 1 where it is not known.
+  std::vector<float> differences(const SkyGrid& other, const cv::Rect& rect) const;
+  int step() const { return step_; }
 
  private:
   void measureRow(const PlaneView& planes, const Visibility& sky, const SquareMask& skip, int j);
