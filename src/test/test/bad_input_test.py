@@ -88,6 +88,10 @@ class BadInput(unittest.TestCase):
     def test_strokes_of_another_size(self):
         self.expect_complaint("strokes.png", "1280x720", "640x360", scene=self.spoilt_scene("strokes.png", (1280, 720), False))
 
+    def test_strokes_of_an_object_that_is_not_listed(self):
+        scene = clips.make_scene(tempfile.mkdtemp(dir=self.folder.name), 4, objects=1)
+        self.expect_complaint("strokes.png", "value 2", "(1)", scene=scene)
+
     def test_depth_of_another_size_or_kind(self):
         self.expect_complaint("depth/000000.png", "320x180", "640x360",
                               scene=self.spoilt_scene("depth/000000.png", (320, 180), True))

@@ -7,6 +7,7 @@ import tempfile
 import time
 import unittest
 
+import cv2
 import numpy
 import rosgraph
 import rospy
@@ -53,8 +54,10 @@ class Graph(unittest.TestCase):
 
     def test_a_segmentation_that_fails_lets_the_frames_pass(self):
         with tempfile.TemporaryDirectory() as folder:
-            # The strokes name objects that this scene does not have.
-            scene = clips.make_scene(folder, FRAMES, objects=1)
+            scene = clips.make_scene(folder, FRAMES)
+            strokes = os.path.join(scene, "strokes.png")
+            # All is background, the objects too.
+            cv2.imwrite(strokes, numpy.full_like(cv2.imread(strokes, cv2.IMREAD_GRAYSCALE), 255))
             arguments = dict(self.arguments("failed.bag", None), scene=scene)
             status, output = launching.run("calipso_launch", "edit.launch", **arguments)
         self.assertEqual(status, 0, output)

@@ -34,6 +34,19 @@ void checkPicture(const std::string& path, int bits, int width, int height) {
                  ", as the video has: replace or remove it");
 }
 
+void checkStrokes(const std::string& path, const std::set<int>& indices) {
+  if (path.empty()) return;
+  constexpr int kNone = 0, kBackground = 255;
+  const cv::Mat1b strokes = cv::imread(path, cv::IMREAD_GRAYSCALE);
+  for (const int value : std::set<int>(strokes.begin(), strokes.end())) {
+    if (value == kNone || value == kBackground || indices.count(value) > 0) continue;
+    std::string known;
+    for (const int index : indices) known += (known.empty() ? "" : ", ") + std::to_string(index);
+    fail(path, "value " + std::to_string(value) + " is the index of no object in scene.yaml (" +
+                   known + "); list the object there, or erase its strokes (0)");
+  }
+}
+
 void checkImage(const sensor_msgs::Image& image, const std::string& where) {
   static const std::array<std::string, 5> kKnown = {enc::RGB8, enc::BGR8, enc::RGBA8, enc::BGRA8,
                                                     enc::MONO8};

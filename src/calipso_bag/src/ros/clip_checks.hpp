@@ -3,6 +3,7 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 
+#include <set>
 #include <string>
 
 namespace calipso::bag {
@@ -13,6 +14,10 @@ namespace calipso::bag {
 // A picture that belongs to the video: of its size, and deep enough. bits: 8 or 16 per channel.
 // path: "" for none
 void checkPicture(const std::string& path, int bits, int width, int height);
+
+// Strokes mark nothing but background and these objects.
+// path: of a readable picture (checkPicture), "" for none; indices: of the scene's objects
+void checkStrokes(const std::string& path, const std::set<int>& indices);
 
 // Encoding known, 8 bit, data complete.
 void checkImage(const sensor_msgs::Image& image, const std::string& where);

@@ -7,6 +7,7 @@
 #include <boost/make_shared.hpp>
 #include <filesystem>
 #include <iomanip>
+#include <set>
 #include <stdexcept>
 
 #include "calipso_ros/topics.hpp"
@@ -100,7 +101,12 @@ void Player::checkScene() const {
   checkPicture(scene_.depth_path, kDepthBits, scene_.camera.width, scene_.camera.height);
   for (const std::string& mask : {scene_.strokes_path, scene_.matte_path})
     checkPicture(mask, kMaskBits, scene_.camera.width, scene_.camera.height);
-  for (const SceneObject& object : scene_.objects) loadMesh(object.cad_path);
+  std::set<int> indices;
+  for (const SceneObject& object : scene_.objects) {
+    loadMesh(object.cad_path);
+    indices.insert(object.index);
+  }
+  checkStrokes(scene_.strokes_path, indices);
 }
 
 void Player::warnOfCuts() const {
