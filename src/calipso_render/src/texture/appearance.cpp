@@ -9,6 +9,7 @@
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "draw/bicubic.hpp"
+#include "smooth_step.hpp"
 #include "texture/texture_fill.hpp"
 
 namespace calipso::render {
@@ -19,6 +20,11 @@ constexpr int kMargin = 12;     // px around the object that albedo is extended 
 constexpr int kShadowMapSide = 768;
 // of the mean light: what has less of it shows its reflectance with less certainty
 constexpr float kLit = 0.7f;
+// part of a pixel's light, at which the sun's highlight begins to hide its reflectance, and hides it
+constexpr float kGlossy = 0.2f, kAllGloss = 0.6f;
+constexpr float kLeastClear = 0.02f;
+constexpr float kDarkest = 1e-4f;  // linear brightness that is told from none
+constexpr float kBroad = 0.35f;    // m from which a lobe looks like diffuse shading
 constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
 
 // Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the
@@ -47,6 +53,7 @@ cv::Mat trustOf(const cv::Mat& labels, int index) {
 struct Shaded {
   cv::Mat highlight;  // CV_32FC3: specular radiance
   cv::Mat light;      // CV_32FC3: shading of a white surface; 0 where the object is not seen
+  cv::Mat glint;      // CV_32FC1: brightness of the sun's part of it, of a lobe that stands out
   cv::Mat nearness;   // CV_32FC1
   cv::Mat normal;     // CV_32FC3
   cv::Vec3f mean;
@@ -54,11 +61,9 @@ struct Shaded {
 
 Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
              const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& thrown_back) {
-  Shaded s{cv::Mat::zeros(region.size(), CV_32FC3),
-           cv::Mat::zeros(region.size(), CV_32FC3),
-           cv::Mat::zeros(region.size(), CV_32F),
-           cv::Mat::zeros(region.size(), CV_32FC3),
-           {}};
+  Shaded s{cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3),
+           cv::Mat::zeros(region.size(), CV_32F),   cv::Mat::zeros(region.size(), CV_32F),
+           cv::Mat::zeros(region.size(), CV_32FC3), {}};
   VisibilityBuffer buffer(region);
   buffer.draw(actor.screen, 0);
   const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
@@ -78,6 +83,11 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       s.highlight.at<cv::Vec3f>(v, u) =
           specularShading(light, gloss, p.normal, towards, visible,
                           skyMirrored(p.seen, mirroredIn(p.normal, towards)));
+      if (gloss.roughness < kBroad) {
+        s.glint.at<float>(v, u) =
+            luminance(light.sun) * gloss.specular * visible *
+            torranceSparrow(p.normal, light.direction, towards, gloss.roughness);
+      }
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];
@@ -88,6 +98,24 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
   for (int v = 0; v < region.height; ++v) sum += sums[v], count += counts[v];
   s.mean = count > 0 ? cv::Vec3f(sum / count) : cv::Vec3f(1, 1, 1);
   return s;
+}
+
+// Reflectance::clear, of the least clear pixel around.
+// @param picture code values
+cv::Mat clearOf(const cv::Mat& picture, const cv::Mat& glint) {
+  cv::Mat clear(glint.size(), CV_32F);
+  for (int v = 0; v < clear.rows; ++v) {
+    for (int u = 0; u < clear.cols; ++u) {
+      const cv::Vec3f& code = picture.at<cv::Vec3f>(v, u);
+      const cv::Vec3f seen = {linearFromRealCode(code[0]), linearFromRealCode(code[1]),
+                              linearFromRealCode(code[2])};
+      const float all = std::max(luminance(seen), kDarkest);
+      const float hidden = smoothStep(kGlossy * all, kAllGloss * all, glint.at<float>(v, u));
+      clear.at<float>(v, u) = std::max(kLeastClear, 1.0f - hidden);
+    }
+  }
+  cv::erode(clear, clear, cv::Mat::ones(3, 3, CV_8U));
+  return clear;
 }
 
 // @param mean_light that of the key frame, where there is one
@@ -106,6 +134,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
   const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun, thrown_back);
   r.nearness = shaded.nearness, r.normal = shaded.normal;
+  r.clear = clearOf(view.picture(r.region), shaded.glint);
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);
   r.trust = trustOf(view.labels, actor.surface->index)(r.region).clone();

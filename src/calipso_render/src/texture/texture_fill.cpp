@@ -226,7 +226,15 @@ class TextureFill {
     return *look;
   }
 
-  // Of the pictures that show a place, those count most that show it in most detail.
+  float clearAt(std::size_t view, const Look& look) const {
+    const cv::Mat& clear = pictures_[view].clear;
+    const int u = std::clamp(static_cast<int>(std::lround(look.u)), 0, clear.cols - 1),
+              v = std::clamp(static_cast<int>(std::lround(look.v)), 0, clear.rows - 1);
+    return clear.at<float>(v, u);
+  }
+
+  // Of the pictures that show a place, those count most that show it in most detail, and not in a
+  // highlight: the light tells that too badly to be taken off without a trace.
   // @param certain out: 1 = the texel is known, 0 = nothing of it; layer out: where most of it
   // comes from, 0 = the place itself, -1 = nowhere
   From texelAt(int triangle, const Eigen::Vector3f& w, const cv::Mat& key_albedo, cv::Vec4f& texel,
@@ -243,7 +251,8 @@ class TextureFill {
     for (std::size_t i = 0; i < views_.size(); ++i) {
       const Look l = lookAt(i, placeOf(actors_[i]->vertices, actors_[i]->normals), 1.0f);
       if (l.weight <= 0.0f) continue;
-      const float weight = l.weight * l.weight * l.weight, share = weight * l.detail * l.detail;
+      const float weight = l.weight * l.weight * l.weight, telling = l.detail * clearAt(i, l),
+                  share = weight * telling * telling;
       sum += colourOf(sampleBicubic(i == 0 ? key_albedo : pictures_[i].albedo, l.u, l.v)) * share;
       total += weight * (i == 0 ? 1.0f : kFurther), shares += share;
       if (i == 0) key = l.weight, key_share = share;

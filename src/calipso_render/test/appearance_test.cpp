@@ -1,0 +1,78 @@
+#include "calipso_render/appearance.hpp"
+
+#include <gtest/gtest.h>
+
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3d kPlace(0.0, 0.1, 0.12);
+const cv::Vec3f kAlbedo(0.15f, 0.3f, 0.6f);  // of frameWithBall()
+constexpr Gloss kTold{0.1f, 0.1f, 0.0f};
+constexpr float kTurn = 0.6f;  // rad about z: takes a place out of the highlight
+
+float lobeAt(const Eigen::Vector3f& normal) {
+  const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>(),
+                        place = kPlace.cast<float>() + static_cast<float>(kBallRadius) * normal;
+  return torranceSparrow(normal, sunlight().direction, (eye - place).normalized(), kTold.roughness);
+}
+
+// The ball turned by `angle`, with a highlight twice as strong as told, and clipped.
+View viewOf(const Surface& surface, float angle) {
+  const ClipFrame frame = frameWithBall(ballAt(kPlace));
+  View view{{}, frame.labels, frame.camera, {}};
+  frame.bgr.convertTo(view.picture, CV_32F);
+  const Actor unturned = makeActor(surface, surface.key_vertices, frame.camera);
+  VisibilityBuffer buffer({0, 0, kWidth, kHeight});
+  buffer.draw(unturned.screen, 0);
+  const Eigen::Vector3f eye = frame.camera.world_from_camera.translation().cast<float>();
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const std::uint32_t id = buffer.ids(v)[u];
+      if (id == VisibilityBuffer::kNothing) continue;
+      const SurfacePoint p = surfacePoint(unturned, VisibilityBuffer::triangleOf(id), u, v, eye);
+      cv::Vec3f& code = view.picture.at<cv::Vec3f>(v, u);
+      for (int c = 0; c < 3; ++c) {
+        const float highlight = 2.0f * kTold.specular * sunlight().sun[c] * lobeAt(p.normal);
+        code[c] = std::min(255.0f, codeFromLinear(linearFromRealCode(code[c]) + highlight));
+      }
+    }
+  }
+  Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
+  turn.translate(kPlace).rotate(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()));
+  view.actors.push_back(
+      makeActor(surface, transformed(surface.object_vertices, turn), frame.camera));
+  return view;
+}
+
+// A highlight that is told wrongly stays out of the texture where another view shows the place.
+TEST(Appearance, TakesFromAnotherViewWhatAHighlightHides) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  const std::vector<View> views = {viewOf(surface, 0.0f), viewOf(surface, kTurn)};
+  const Appearance a = makeAppearances(views, {true}, sunlight(), kTold).front();
+  const auto normalOf = [&](int triangle, const Eigen::Vector3f& w) -> Eigen::Vector3f {
+    const Eigen::Vector3i& t = surface.triangles[triangle];
+    const Points& x = surface.key_vertices;
+    return (w[0] * x[t[0]] + w[1] * x[t[1]] + w[2] * x[t[2]] - kPlace.cast<float>()).normalized();
+  };
+  const float strong = 0.5f / (kTold.roughness * kTold.roughness * 4.0f);
+  const Eigen::AngleAxisf turn(kTurn, Eigen::Vector3f::UnitZ());
+  int hidden = 0;
+  for (int t = 0; t < a.texture.triangleCount(); ++t) {
+    for (std::size_t i = a.texture.firstOf(t); i < a.texture.firstOf(t + 1); ++i) {
+      const Eigen::Vector3f n = normalOf(t, a.texture.weightsOf(t, i - a.texture.firstOf(t)));
+      if (lobeAt(n) < strong || lobeAt(turn * n) > 0.005f * strong) continue;
+      ++hidden;
+      // 0.06: what keeps the light from 0 takes 5 % off, the rest is for the codes and the other
+      // view's own highlight. What a clipped highlight leaves is grey, 0.3 off.
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.texture.texels[i][c], kAlbedo[c], 0.06f);
+    }
+  }
+  EXPECT_GT(hidden, 20);
+}
+
+}  // namespace
+}  // namespace calipso::render
