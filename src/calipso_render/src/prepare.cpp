@@ -163,8 +163,9 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const SkyMap sky = skyOver(actors, params);
   p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   p.appearance_ms = watch.lap();
-  p.fronts = frontsOf(actors, p, params);
-  p.footprints = footprintsOf(actors, p);
+  for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
+  p.fronts = frontsOf(p, params);
+  p.footprints = footprintsOf(p);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
   prepareBackground({frames, views, actors, seen, picture, sun, sky, cameraMoves(clip)}, params, p);
   p.background_ms += watch.lap();

@@ -67,6 +67,7 @@ void Renderer::addNewcomers(const FrameInput& frame) {
                                        : plainAppearance(surface, more->camera));
     more->surfaces.push_back(std::move(surface));
     more->moves.push_back(true);
+    more->outlines.emplace_back();
     more->fronts.emplace_back();
     more->footprints.emplace_back();
     prepared_ = std::move(more);

@@ -124,6 +124,30 @@ TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
   EXPECT_EQ(cv::countNonZero(left_over), 0);
 }
 
+// The mask has a rail above the ball that the model lacks. The ball's right side moves off: the rail
+// above that side goes, too, also close to the side that rests, whose own part of it stays.
+TEST(Renderer, WhatNoModelHasGoesWithThePartBesideIt) {
+  ClipFrame key = frameWithBall(ballAt(kCentre));
+  const cv::Rect box = cv::boundingRect(key.labels);
+  const int middle = box.x + box.width / 2;
+  const cv::Rect rail(middle - 8, box.y - 5, 16, 2);
+  key.labels(rail).setTo(kBallLabel), key.bgr(rail).setTo(cv::Scalar(40, 40, 200));
+  ClipSample clip;
+  clip.add(key);
+  const auto prepared =
+      std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
+  ObjectInFrame ball;
+  ball.name = "ball", ball.edited = true, ball.vertices = prepared->surfaces[0].key_vertices;
+  for (Eigen::Vector3f& x : ball.vertices) {
+    if (x.x() > static_cast<float>(kCentre.x()) + 0.01f) x.x() += 0.3f;
+  }
+  const FrameOutput out =
+      Renderer(prepared, params()).composite({key.bgr, key.labels, key.camera, 7, {ball}, {}});
+  const cv::Rect right(middle + 4, rail.y, 4, 2), left(middle - 8, rail.y, 4, 2);
+  EXPECT_EQ(cv::countNonZero(out.provenance(right) == kOriginal), 0);
+  EXPECT_EQ(cv::countNonZero(out.provenance(left) == kOriginal), left.area());
+}
+
 TEST(Renderer, SameInputGivesSameBytes) {
   RenderParams p = params();
   p.add_noise = true;

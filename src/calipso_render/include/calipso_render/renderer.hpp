@@ -89,6 +89,7 @@ struct Prepared {
   std::vector<bool> sways;
   std::vector<Appearance> appearances;
   LightFit light;
+  std::vector<cv::Mat> outlines;  // per surface, CV_8UC1: what its model covers at the key frame
   // per surface, CV_8UC1: places where something unmodelled stands before it
   std::vector<cv::Mat> fronts;
   // per surface, CV_8UC1: what it covers at the key frame; empty if it moves

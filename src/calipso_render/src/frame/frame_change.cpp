@@ -10,6 +10,7 @@
 #include "frame/frame_compositor.hpp"
 #include "frame/mask_morphology.hpp"
 #include "frame/tiled_filter.hpp"
+#include "place/view_warp.hpp"
 
 namespace calipso::render {
 namespace {
@@ -73,6 +74,21 @@ void FrameCompositor::findChange(int v, int from, int to, std::uint8_t* out) con
   });
 }
 
+// Pixels that lie nearer to what a surface has left than to where it rests: what no model has of the
+// object there, such as a railing, went along. May be empty.
+// @param owner as keepRims()
+cv::Mat FrameCompositor::nearerToLeft(int surface, const cv::Mat& owner) const {
+  if (prepared_.outlines[surface].empty() || !sameView(frame_.camera, prepared_.camera)) return {};
+  const cv::Mat rests = (owner == surface) & (still_ > 0.0f);
+  cv::Mat left = prepared_.outlines[surface](region_) & ~rests & ((owner < 0) | (owner == surface));
+  cv::morphologyEx(left, left, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));  // no mere silhouette
+  if (cv::countNonZero(left) == 0) return {};
+  cv::Mat to_left, to_rest;
+  cv::distanceTransform(left == 0, to_left, cv::DIST_L2, cv::DIST_MASK_3);
+  cv::distanceTransform(rests == 0, to_rest, cv::DIST_L2, cv::DIST_MASK_3);
+  return to_left < to_rest;
+}
+
 // The rim of an original's pixels belongs to the surface beside it, not to another edited object's.
 void FrameCompositor::keepRims(const cv::Mat& owner) {
   cv::Mat rims = cv::Mat::zeros(region_.size(), CV_32F);
@@ -92,8 +108,10 @@ void FrameCompositor::keepRims(const cv::Mat& owner) {
     cv::dilate(original, own, disc(margin));
     cv::erode(original, inner, disc(margin));
     foreign.setTo(0, own);
-    rim.setTo(0.0f,
-              foreign | inner);  // what the object has left shows it in the video, and is no rim
+    // What the object has left shows it in the video, and is no rim.
+    rim.setTo(0.0f, foreign | inner);
+    const cv::Mat gone = nearerToLeft(static_cast<int>(i), owner);
+    if (!gone.empty()) rim.setTo(0.0f, gone);
     rims = cv::max(rims, rim);
   }
   rims.copyTo(still_, owner < 0);

@@ -68,13 +68,12 @@ cv::Mat grown(const cv::Mat& mask, int radius) {
   return out;
 }
 
-std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p,
-                              const RenderParams& params) {
+std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params) {
   std::vector<cv::Mat> fronts;
   const cv::Mat ground =
       params.depth.empty() ? cv::Mat() : groundNearness(params.planes, p.camera, cv::Mat());
-  for (std::size_t i = 0; i < actors.size(); ++i) {
-    cv::Mat front = frontOf(outlineOf(actors[i], p.key_labels.size()), p.key_labels);
+  for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
+    cv::Mat front = frontOf(p.outlines[i], p.key_labels);
     if (!params.depth.empty() && !p.moves[i]) {
       const cv::Mat beside =
           nearerBeside(p.key_labels == p.surfaces[i].index, p.key_labels, params.depth, ground,
@@ -86,11 +85,10 @@ std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& 
   return fronts;
 }
 
-std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepared& p) {
+std::vector<cv::Mat> footprintsOf(const Prepared& p) {
   std::vector<cv::Mat> footprints;
-  for (std::size_t i = 0; i < actors.size(); ++i) {
-    cv::Mat footprint =
-        (p.key_labels == p.surfaces[i].index) | outlineOf(actors[i], p.key_labels.size());
+  for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
+    cv::Mat footprint = (p.key_labels == p.surfaces[i].index) | p.outlines[i];
     if (!p.fronts[i].empty()) footprint.setTo(0, p.fronts[i]);
     footprints.push_back(p.moves[i] ? cv::Mat() : footprint);
   }

@@ -14,13 +14,12 @@ cv::Mat outlineOf(const Actor& actor, const cv::Size& size);
 // Grown by a disc, px.
 cv::Mat grown(const cv::Mat& mask, int radius);
 
-// Per actor, CV_8UC1: where something that has no model stands before it; empty if nothing does.
-std::vector<cv::Mat> frontsOf(const std::vector<Actor>& actors, const Prepared& p,
-                              const RenderParams& params);
+// Per surface, CV_8UC1: where something that has no model stands before it; empty if nothing does.
+std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params);
 
 // All that a resting object covers at the key frame: its mask, which can miss thin or dark ends,
 // and its model. Empty for those that move.
-std::vector<cv::Mat> footprintsOf(const std::vector<Actor>& actors, const Prepared& p);
+std::vector<cv::Mat> footprintsOf(const Prepared& p);
 
 // CV_32FC1, 1/m: what the depth image shows beside the objects, as near as all of its surroundings:
 // its edges are not exact.
