@@ -195,23 +195,26 @@ void TrajectoryFitter::letFallingPiecesTurn() {
   }
 }
 
-// The states, with the uncertainty of the twist that a resting object would show if it moved.
-std::vector<MotionState> TrajectoryFitter::statesWithHonestRest(
-    const SmoothedMotion& motion) const {
+// With the uncertainty of the twist that a resting object would show if it moved.
+SmoothedMotion TrajectoryFitter::withHonestRest(SmoothedMotion motion) const {
   std::vector<MotionPiece> drifting = pieces_;
   for (MotionPiece& piece : drifting) {
     if (piece.travel == Travel::kRest) piece.travel = Travel::kUniform;
     if (piece.turning == Turning::kNone) piece.turning = Turning::kSteady;
   }
   const SmoothedMotion free = smooth(measurements_, drifting, prior_, noise_scale_);
-  std::vector<MotionState> states = motion.states;
-  for (size_t k = 0; k < states.size(); ++k) {
-    const MotionPiece& piece = pieces_[indexOfPieceAt(states[k].time)];
-    const StateMatrix& drift = free.states[k].covariance;
-    if (piece.travel == Travel::kRest) states[k].setVelocityCovariance(drift);
-    if (piece.turning == Turning::kNone) states[k].setSpinCovariance(drift);
+  const auto take = [&](const MotionState& drift, size_t piece, MotionState& state) {
+    if (pieces_[piece].travel == Travel::kRest) state.setVelocityCovariance(drift.covariance);
+    if (pieces_[piece].turning == Turning::kNone) state.setSpinCovariance(drift.covariance);
+  };
+  for (size_t k = 0; k < motion.states.size(); ++k)
+    take(free.states[k], indexOfPieceAt(motion.states[k].time), motion.states[k]);
+  for (size_t k = 0; k < motion.jumps.size(); ++k) {
+    const size_t after = indexOfPieceAt(motion.jumps[k].after.time);
+    take(free.jumps[k].before, after - 1, motion.jumps[k].before);
+    take(free.jumps[k].after, after, motion.jumps[k].after);
   }
-  return states;
+  return motion;
 }
 
 // Variance by which errors that persist from frame to frame exceed independent ones: for a lag-one
@@ -309,8 +312,9 @@ void TrajectoryFitter::widen(Trajectory::Gravity& gravity,
 
 Trajectory TrajectoryFitter::result() {
   Trajectory trajectory;
-  const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
-  trajectory.states = statesWithHonestRest(motion);
+  const SmoothedMotion motion =
+      withHonestRest(smooth(measurements_, pieces_, prior_, noise_scale_));
+  trajectory.states = motion.states;
   const double share =
       std::min(0.5, 2.0 * pieces_.size() / static_cast<double>(measurements_.size()));
   const double factor = persistence(motion.states, share);

@@ -49,7 +49,7 @@ class TrajectoryFitter {
   void settleStillPieces();
   void letFallingPiecesTurn();
   bool isImpact(const Jump& jump) const;
-  std::vector<MotionState> statesWithHonestRest(const SmoothedMotion& motion) const;
+  SmoothedMotion withHonestRest(SmoothedMotion motion) const;
   // Of velocity and spin, by errors of the poses that change slowly over the piece.
   Matrix6d driftCovariance(size_t piece) const;
   void widen(MotionState& state, size_t piece, double factor) const;

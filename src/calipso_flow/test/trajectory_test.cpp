@@ -292,6 +292,22 @@ TEST(Trajectory, findsTheInstantOfCollisionWithinAFrame) {
   EXPECT_LT(surprise, 1.88);
 }
 
+// What lies where it fell has the restitution zero, and that as surely as a slow rebound would be
+// seen: 0.43 mm over ten frames are 1.6 mm/s, of 2.9 m/s.
+TEST(Trajectory, statesHowSurelyWhatFellDoesNotRebound) {
+  const double tc = 9.3 / kFps;
+  const Eigen::Vector3d floor = bouncing(tc, 10.0, 0.0);
+  const auto data = measure(
+      20, 0.00043, 0.005, 7, [&](double t) { return t < tc ? bouncing(t, 10.0, 0.0) : floor; },
+      still);
+  const Trajectory fit = fitTrajectory(data, {}, testPrior());
+  ASSERT_EQ(fit.collisions.size(), 1u);
+  const Collision& impact = fit.collisions.front();
+  EXPECT_GT(impact.restitutionDeviation(), 1e-4);
+  EXPECT_LT(impact.restitutionDeviation(), 0.01);
+  EXPECT_NEAR(impact.restitution(), 0.0, 4.0 * impact.restitutionDeviation());
+}
+
 // Where any gain would do for a collision, only as many are told as are allowed.
 TEST(Trajectory, tellsNoMoreCollisionsThanAllowed) {
   const auto zigzag = [](double t) {
