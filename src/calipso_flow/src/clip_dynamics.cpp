@@ -204,11 +204,16 @@ ObjectDynamics ClipAnalyser::finishObject(const FollowedObject& object, bool wit
   dynamics.trajectory =
       fitTrajectory(measurements, cut_times_, priorFor(camera, depth, gravity_), trajectory);
   const double scale = scaleDeviation(tracker.model(), measurements.front().position, camera);
+  Matrix6d assumed = Matrix6d::Zero();
+  if (dynamics.deformation) {
+    assumed = assumedTwist(*object.deformable(), object.deformations(), dynamics.deformation->modes,
+                           tracker.centroid());
+  }
   for (size_t k = 0; k < measurements.size(); ++k) {
     dynamics.trajectory.states[k].addScaleUncertainty(scale);
     dynamics.trajectory.states[k].addTwistCovariance(
         offCentre(tracker.model(), dynamics.trajectory.states[k]) +
-        unseen(measurements, measurements[k].time, gravity_));
+        unseen(measurements, measurements[k].time, gravity_) + assumed);
     const bool moving = dynamics.deformation || dynamics.trajectory.movingAt(measurements[k].time);
     dynamics.motions.push_back(motionFrom(dynamics.trajectory.states[k], tracker.centroid(), moving,
                                           dynamics.observations[k].inliers()));

@@ -187,6 +187,7 @@ DeformationObservation DeformableTracker::track(const Frame& whole, bool cut) {
     if (!observation.found) break;
     observation.controls = fit.controls;
     observation.covariance = fit.covariance;
+    observation.assumed = fit.assumed;
     observation.deviation = fit.deviation;
     observation.tracks.clear();
     for (size_t i = 0; i < matches.size(); ++i)

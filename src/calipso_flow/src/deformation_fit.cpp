@@ -1,6 +1,7 @@
 #include "calipso_flow/deformation_fit.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -219,6 +220,34 @@ std::vector<Eigen::Matrix3d> DeformationFitter::inPlaneWeights(
   return weights;
 }
 
+Eigen::MatrixXd DeformationFitter::sharedErrors(const Eigen::VectorXd& controls,
+                                                const Eigen::VectorXd& predicted) const {
+  Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(controls.size(), 9);
+  for (const Spring& spring : springs_) {
+    Eigen::Vector3d d = spring.rest;
+    for (Eigen::SparseVector<double>::InnerIterator w(spring.weights); w; ++w) {
+      d += w.value() * controls.segment<3>(3 * w.index());
+    }
+    const Eigen::Vector3d e = spring.rest.normalized();
+    // e . E e for an isotropic random strain E: diagonal entries with the strain's deviation, the
+    // others with 1 / sqrt(2) of it.
+    Eigen::Matrix<double, 1, 6> stretch;
+    stretch << e.cwiseAbs2().transpose(),
+        M_SQRT2 * Eigen::RowVector3d(e.y() * e.z(), e.x() * e.z(), e.x() * e.y());
+    const Eigen::Vector3d g = d.normalized() / (strain_ * spring.rest.norm());
+    for (Eigen::SparseVector<double>::InnerIterator w(spring.weights); w; ++w) {
+      shared.block<3, 6>(3 * w.index(), 0) += w.value() * g * stretch;
+    }
+  }
+  const std::vector<Eigen::Matrix3d> in_plane = inPlaneWeights(predicted);
+  for (size_t i = 0; i < in_plane.size(); ++i) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(in_plane[i]);
+    shared.block<3, 3>(3 * i, 6) =
+        axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  }
+  return shared;
+}
+
 void DeformationFitter::addPriors(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted,
                                   Normal& normal) const {
   normal.blocks += quadratic_blocks_;
@@ -350,6 +379,7 @@ DeformationFit DeformationFitter::fit(const std::vector<SurfaceMatch>& matches,
   if (factor.info() != Eigen::Success) return fit;
   fit.covariance =
       factor.solve(Eigen::MatrixXd::Identity(fit.controls.size(), fit.controls.size()));
+  fit.assumed = factor.solve(sharedErrors(fit.controls, predicted));
   fit.converged = fit.covariance.allFinite();
   return fit;
 }

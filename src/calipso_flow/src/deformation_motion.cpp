@@ -242,6 +242,61 @@ bool movesRigidly(const std::vector<Observation>& observations, const Eigen::Iso
   return median(left_over) < kRigidShare * farthest;
 }
 
+namespace {
+
+// 3 x 3 size(): mean way of the vertices, world axes, by the controls.
+Eigen::MatrixXd meanWayOf(const DeformableTracker& tracker) {
+  const DeformationField::Weights& weights = tracker.vertexWeights();
+  const Eigen::VectorXd mean =
+      Eigen::VectorXd(weights.transpose() * Eigen::VectorXd::Ones(weights.rows())) /
+      static_cast<double>(weights.rows());
+  Eigen::MatrixXd B(3, 3 * mean.size());
+  for (int m = 0; m < mean.size(); ++m) {
+    B.block<3, 3>(0, 3 * m) = mean[m] * tracker.model().world_from_object.linear();
+  }
+  return B;
+}
+
+// Of a place or its velocity, and from it over the object's radius of the rotation or spin.
+Matrix6d withTurn(const Eigen::Matrix3d& position, const TriangleMesh& mesh,
+                  const Eigen::Vector3d& centroid) {
+  const double squared_radius =
+      (mesh.vertices.rowwise() - centroid.transpose()).rowwise().squaredNorm().mean();
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.topLeftCorner<3, 3>() = position;
+  covariance.bottomRightCorner<3, 3>() =
+      position.trace() / squared_radius * Eigen::Matrix3d::Identity();
+  return covariance;
+}
+
+// 1/s, velocity of the whole by its way if the body is strained. Lengths along the surface go by the
+// square of a bend: what they are wrong by, at twice its pace. No body is strained more than it
+// moves over its size.
+double paceOfStrain(const DeformationModes& modes, double strain, double diagonal) {
+  const Eigen::MatrixXd about = modes.amplitudes.rowwise() - modes.amplitudes.colwise().mean();
+  const double way = about.norm() / std::sqrt(static_cast<double>(about.rows()));  // m, rms
+  const double speed = modes.velocities.norm() / std::sqrt(static_cast<double>(about.rows()));
+  return way > 0.0 ? 2.0 * speed / std::max(way, strain * diagonal) : 0.0;
+}
+
+}  // namespace
+
+Matrix6d assumedTwist(const DeformableTracker& tracker,
+                      const std::vector<DeformationObservation>& observations,
+                      const DeformationModes& modes, const Eigen::Vector3d& centroid) {
+  const Eigen::MatrixXd B = meanWayOf(tracker);
+  Eigen::Matrix3d position = Eigen::Matrix3d::Zero();
+  int seen = 0;
+  for (const DeformationObservation& o : observations) {
+    if (!o.found || o.assumed.size() == 0) continue;
+    const Eigen::MatrixXd way = B * o.assumed;
+    position += way * way.transpose(), ++seen;
+  }
+  const TriangleMesh& mesh = tracker.model().mesh;
+  const double pace = paceOfStrain(modes, tracker.fitter().strain(), boundingDiagonal(mesh));
+  return withTurn(pace * pace / std::max(1, seen) * position, mesh, centroid);
+}
+
 Observation rigidPart(const DeformableTracker& tracker, const DeformationObservation& observation,
                       const Eigen::Vector3d& centroid) {
   Observation rigid;
@@ -265,23 +320,12 @@ Observation rigidPart(const DeformableTracker& tracker, const DeformationObserva
   moved.translation() = mean_to.transpose() - moved.linear() * mean_from.transpose();
   rigid.world_from_object = tracker.model().world_from_object * moved;
 
-  // The mean displacement's covariance, and from it over the object's radius the rotation's.
-  const Eigen::VectorXd mean =
-      Eigen::VectorXd(tracker.vertexWeights().transpose() * Eigen::VectorXd::Ones(from.rows())) /
-      static_cast<double>(from.rows());
-  Eigen::MatrixXd B = Eigen::MatrixXd::Zero(3, observation.controls.size());
-  for (int m = 0; m < mean.size(); ++m) {
-    B.block<3, 3>(0, 3 * m) = mean[m] * tracker.model().world_from_object.linear();
-  }
+  const Eigen::MatrixXd B = meanWayOf(tracker);
   const Eigen::Matrix3d position =
       observation.covariance.size() == 0
           ? Eigen::Matrix3d(1e-12 * Eigen::Matrix3d::Identity())
           : Eigen::Matrix3d(B * observation.covariance * B.transpose());
-  const double radius =
-      std::sqrt((from.rowwise() - centroid.transpose()).rowwise().squaredNorm().mean());
-  rigid.covariance.topLeftCorner<3, 3>() = position;
-  rigid.covariance.bottomRightCorner<3, 3>() =
-      position.trace() / (radius * radius) * Eigen::Matrix3d::Identity();
+  rigid.covariance = withTurn(position, tracker.model().mesh, centroid);
   return rigid;
 }
 

@@ -147,6 +147,35 @@ TEST(DeformationFit, followsASheetThatSwingsFar) {
   }
 }
 
+// What is 3 % larger than its model, one deviation of every strain alike, is taken for nearer.
+TEST(DeformationFit, statesThatAStretchedBodyMayBeNearer) {
+  ObjectModel model;
+  model.name = "block";
+  model.mesh = fineBox({0.6, 0.3, 0.8}, {6, 3, 8});
+  model.world_from_object.translation() << -0.3, 0.0, -0.4;
+  const Camera camera = test::testCamera();
+  const DeformationFitter fitter(model, {});
+  const Eigen::Vector3d centre(0.3, 0.15, 0.4);
+  std::vector<SurfaceMatch> matches;
+  for (int i = 0; i < model.mesh.vertexCount(); ++i) {
+    const Eigen::Vector3d X = model.mesh.vertex(i);
+    if (X.y() > 1e-6) continue;
+    const Eigen::Vector3d p = model.world_from_object * (centre + 1.03 * (X - centre));
+    matches.push_back({X, camera.projectWorld(p), 0.01 * Eigen::Matrix2d::Identity()});
+  }
+  const DeformationFit fit = fitter.fit(matches, camera, fitter.zero(), fitter.zero(), 40.0);
+  ASSERT_TRUE(fit.converged);
+  const auto weights = fitter.field().weightsAt(model.mesh.vertices);
+  const Eigen::RowVectorXd mean = Eigen::RowVectorXd::Ones(weights.rows()) * weights;
+  Eigen::RowVectorXd along = Eigen::RowVectorXd::Zero(fit.controls.size());  // mean way along y
+  for (int m = 0; m < mean.size(); ++m) along[3 * m + 1] = mean[m] / weights.rows();
+  const double error = along * fit.controls;
+  // Points that err each for itself do not explain it; one strain of the whole does.
+  EXPECT_GT(std::abs(error), 3.0 * std::sqrt(along * fit.covariance * along.transpose()));
+  // Three deviations at once, sqrt(3) in length, and what is not linear.
+  EXPECT_LT(std::abs(error), 2.0 * (along * fit.assumed).norm());
+}
+
 TEST(DeformationModes, nothingMovesNothingFound) {
   const ObjectModel model = sheet();
   const DeformationFitter fitter(model, {});

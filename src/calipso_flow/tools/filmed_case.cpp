@@ -9,7 +9,8 @@
 namespace calipso::flow {
 namespace {
 
-constexpr double kMuchNoise = 8.0;  // grey levels
+constexpr double kMuchNoise = 8.0;       // grey levels
+constexpr double kChiSquared95 = 7.815;  // with three degrees of freedom
 
 // Root mean square error of the tracked surface over that of its true motion, percent.
 double shapeError(const ObjectModel& model, const Shapes& shapes, const ObjectDynamics& found) {
@@ -24,6 +25,28 @@ double shapeError(const ObjectModel& model, const Shapes& shapes, const ObjectDy
     motion += (shapes[k] - shapes[0]).squaredNorm();
   }
   return 100.0 * std::sqrt(error / motion);
+}
+
+// Adds how far the velocity of a surface as a whole, that of its vertices' mean, is from the truth,
+// what the analysis states of that, and how often its 95 % ellipsoid holds the truth.
+void addVelocity(const Shapes& shapes, const std::vector<double>& times,
+                 const ObjectDynamics& found, JsonEntry& entry) {
+  double error = 0.0, variance = 0.0, speed = 0.0, inside = 0.0;
+  const size_t last = shapes.size() - 1;
+  for (size_t k = 1; k < last; ++k) {
+    const Eigen::Vector3d way = (shapes[k + 1] - shapes[k - 1]).colwise().mean().transpose();
+    const Eigen::Vector3d v = way / (times[k + 1] - times[k - 1]);
+    const Eigen::Vector3d off = found.motions[k].state.velocity - v;
+    const Eigen::Matrix3d covariance =
+        found.motions[k].state.twistCovariance().topLeftCorner<3, 3>();
+    error += off.squaredNorm(), variance += covariance.trace(), speed += v.squaredNorm();
+    inside += off.dot(covariance.ldlt().solve(off)) < kChiSquared95;
+  }
+  const double frames = static_cast<double>(last - 1);
+  entry.number("velocity_error_percent", 100.0 * std::sqrt(error / speed));
+  entry.number("velocity_error_m_s", std::sqrt(error / frames));
+  entry.number("velocity_deviation_m_s", std::sqrt(variance / frames));
+  entry.number("covered_95", inside / frames);
 }
 
 std::string windEntry(const std::string& name, const Eigen::Vector3d& full_wind,
@@ -43,13 +66,14 @@ std::string windEntry(const std::string& name, const Eigen::Vector3d& full_wind,
     strength = 100.0 * std::abs(w.mean.norm() / wind.norm() - 1.0);
     explained = w.explained;
     const Eigen::Vector3d error = w.mean - wind;
-    covered = error.dot(w.mean_covariance.ldlt().solve(error)) < 7.815;
+    covered = error.dot(w.mean_covariance.ldlt().solve(error)) < kChiSquared95;
     entry.numbers("wind_m_s", {w.mean.x(), w.mean.y(), w.mean.z()});
     const Eigen::Vector3d deviation = w.mean_covariance.diagonal().cwiseSqrt();
     entry.numbers("wind_deviation_m_s", {deviation.x(), deviation.y(), deviation.z()});
     entry.number("sheet_stiffness_m2_s2", w.stiffness_over_density);
   }
   entry.number("shape_error_percent", shapeError(sheet.model, sheet.shapes, found));
+  addVelocity(sheet.shapes, sheet.times, found, entry);
   entry.numbers("wind_true_m_s", {wind.x(), wind.y(), wind.z()});
   entry.number("wind_direction_error_deg", direction);
   entry.number("wind_strength_error_percent", strength);
@@ -82,6 +106,7 @@ std::string beamEntry(const std::string& name, const BeamTruth& truth, double no
     }
   }
   entry.number("shape_error_percent", shapeError(beam.model, beam.shapes, found));
+  addVelocity(beam.shapes, beam.times, found, entry);
   entry.number("frequency_error_percent", frequency);
   entry.number("second_frequency_error_percent", second);
   entry.number("stiffness_ratio_error_percent", stiffness);

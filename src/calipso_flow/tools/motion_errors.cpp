@@ -21,7 +21,8 @@ size_t smoothFrames(const TrueObject& truth, const ObjectDynamics& dynamics) {
 }
 
 struct MotionErrors {
-  double velocity_m = kNone, velocity_percent = kNone, velocity_px = kNone;
+  double velocity_m = kNone, velocity_deviation_m = kNone, velocity_percent = kNone,
+         velocity_px = kNone;
   double spin_percent = kNone, acceleration_percent = kNone;
   double covered = kNone;  // share of frames whose velocity lies inside its 95 % ellipsoid
   bool below_uncertainty = true;
@@ -35,7 +36,7 @@ MotionErrors motionErrors(const Scene& scene, const TrueObject& truth,
   MotionErrors errors;
   if (!truth.hasVelocity()) return errors;
   const size_t frames = smoothFrames(truth, dynamics);
-  double error = 0.0, speed = 0.0, spin_error = 0.0, spin = 0.0, pixels = 0.0;
+  double error = 0.0, variance = 0.0, speed = 0.0, spin_error = 0.0, spin = 0.0, pixels = 0.0;
   int inside = 0;
   for (size_t k = 0; k < frames; ++k) {
     const ObjectMotion& motion = dynamics.motions[k];
@@ -50,11 +51,13 @@ MotionErrors motionErrors(const Scene& scene, const TrueObject& truth,
     spin_error += (motion.state.spin - w).squaredNorm();
     spin += w.squaredNorm();
     const Eigen::Matrix3d covariance = motion.state.twistCovariance().topLeftCorner<3, 3>();
+    variance += covariance.trace();
     const bool covers = difference.dot(covariance.ldlt().solve(difference)) < kChiSquared95;
     inside += covers;
     if (truth.still() && !covers) errors.below_uncertainty = false;
   }
   errors.velocity_m = std::sqrt(error / frames);
+  errors.velocity_deviation_m = std::sqrt(variance / frames);
   errors.velocity_px = pixels / frames;
   errors.covered = static_cast<double>(inside) / frames;
   if (speed > 0.0) errors.velocity_percent = 100.0 * std::sqrt(error / speed);
@@ -180,6 +183,7 @@ void addMotionErrors(const Scene& scene, const TrueObject& truth, const ObjectDy
   entry.number("velocity_error_percent", errors.velocity_percent);
   entry.number("velocity_error_px", errors.velocity_px);
   entry.number("velocity_error_m_s", errors.velocity_m);
+  entry.number("velocity_deviation_m_s", errors.velocity_deviation_m);
   entry.number("angular_velocity_error_percent", errors.spin_percent);
   entry.number("g_error_percent", gravityError(scene, trajectory));
   entry.numbers("collision_errors_frames", collisionErrors(scene, truth, trajectory));

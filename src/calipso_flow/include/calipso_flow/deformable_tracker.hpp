@@ -15,6 +15,7 @@ struct DeformationObservation {
   bool found = false;
   Eigen::VectorXd controls;    // of the field, from the shape in the key frame
   Eigen::MatrixXd covariance;  // of controls, m^2
+  Eigen::MatrixXd assumed;     // see DeformationFit; empty in the key frame
   double deviation = 0.0;      // see DeformationFit
   std::vector<Track> tracks;
   // Logarithm of the brightness over that in the key frame at DeformableTracker::points; NaN where

@@ -35,8 +35,11 @@ struct SurfaceMatch {
 
 struct DeformationFit {
   Eigen::VectorXd controls;    // 3 size(): the field's coefficients, object frame, m
-  Eigen::MatrixXd covariance;  // of controls, m^2
-  std::vector<bool> inlier;    // per match
+  Eigen::MatrixXd covariance;  // of controls, m^2, as if what is assumed erred everywhere anew
+  // Of controls, m, 3 size() x 9: their way, each column a deviation, if what is assumed errs alike
+  // over the whole body. However many points are found, this does not average out.
+  Eigen::MatrixXd assumed;
+  std::vector<bool> inlier;  // per match
   int inliers = 0;
   double deviation = 0.0;  // robust deviation of the residuals over their own, 1 = as expected
   bool converged = false;
@@ -55,6 +58,7 @@ class DeformationFitter {
                      double scale) const;
 
   const DeformationField& field() const { return field_; }
+  double strain() const { return strain_; }  // deviation that is assumed of the body
   // What is known of the controls before any picture, about the shape in the key frame, 1/m^2.
   Eigen::MatrixXd priorInformation() const;
   Eigen::VectorXd zero() const { return Eigen::VectorXd::Zero(3 * field_.size()); }
@@ -89,6 +93,10 @@ class DeformationFitter {
   // Adds what is quadratic in the controls.
   void addPriors(const Eigen::VectorXd& controls, const Eigen::VectorXd& predicted,
                  Normal& normal) const;
+  // Change of the normal equations' right side by one deviation of what is assumed: six strains of
+  // the whole body and three shifts of a sheet within its plane. Columns of 3 size().
+  Eigen::MatrixXd sharedErrors(const Eigen::VectorXd& controls,
+                               const Eigen::VectorXd& predicted) const;
   // Of a sheet's controls within its plane, one each, 1/m^2; nothing of a solid's.
   // @param controls  that the sheet is about as bent as
   std::vector<Eigen::Matrix3d> inPlaneWeights(const Eigen::VectorXd& controls) const;

@@ -50,6 +50,13 @@ bool hasLeft(const Observation& observation, const Eigen::Isometry3d& still_pose
 bool movesRigidly(const std::vector<Observation>& observations, const Eigen::Isometry3d& still_pose,
                   const Camera& camera);
 
+// Covariance of the velocity and spin of a deforming object as a whole that comes from what is
+// assumed of it where the picture is silent, foremost that it hardly stretches. Such an error is
+// shared by neighbouring frames and goes as the motion goes: it does not average out.
+Matrix6d assumedTwist(const DeformableTracker& tracker,
+                      const std::vector<DeformationObservation>& observations,
+                      const DeformationModes& modes, const Eigen::Vector3d& centroid);
+
 // The rigid motion closest to the deformation, as an observation of the object's pose.
 Observation rigidPart(const DeformableTracker& tracker, const DeformationObservation& observation,
                       const Eigen::Vector3d& centroid);
