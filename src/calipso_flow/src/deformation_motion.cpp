@@ -269,9 +269,9 @@ Matrix6d withTurn(const Eigen::Matrix3d& position, const TriangleMesh& mesh,
   return covariance;
 }
 
-// 1/s, what takes the way that an assumed strain stands for to a velocity. Lengths along the surface
-// go by the square of a bend, and so what they are wrong by at twice its pace; and no body is
-// strained more than it moves over its size.
+// 1/s, what takes the way that an assumed strain stands for to a velocity. Lengths along the
+// surface go by the square of a bend, and so what they are wrong by at twice its pace; and no body
+// is strained more than it moves over its size.
 double paceOfStrain(const DeformationModes& modes, double strain, double diagonal) {
   const Eigen::MatrixXd about = modes.amplitudes.rowwise() - modes.amplitudes.colwise().mean();
   const double way = about.norm() / std::sqrt(static_cast<double>(about.rows()));  // m, rms
