@@ -124,6 +124,31 @@ TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
   EXPECT_EQ(cv::countNonZero(left_over), 0);
 }
 
+// A ball that rolls; two places are dark in its key frame: one is grey there instead of pale, as in
+// a shadow, the other blue, as where a cloud has not yet come.
+TEST(Renderer, AMovingObjectsShadowDarkensAllColoursAlike) {
+  const cv::Rect shadow(12, 84, 20, 20), sky(128, 84, 20, 20);
+  const auto frame = [&](int k) {
+    ClipFrame f = frameWithBall(ballAt(kCentre + 0.01 * k * Eigen::Vector3d::UnitX()));
+    f.bgr(shadow).setTo(k == 0 ? cv::Scalar(120, 120, 120) : cv::Scalar(200, 200, 200));
+    f.bgr(sky).setTo(k == 0 ? cv::Scalar(190, 128, 80) : cv::Scalar(200, 200, 200));
+    return f;
+  };
+  ClipSample clip;
+  for (int k = 0; k < 9; ++k) clip.add(frame(k));
+  const auto prepared =
+      std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
+  ASSERT_TRUE(prepared->moves[0]);
+  const FrameInput in = ballMovedLeft(frame(0), *prepared);
+  const FrameOutput out = Renderer(prepared, params()).composite(in);
+  const auto kept = [&](const cv::Rect& place) {
+    const cv::Rect inner(place.x + 4, place.y + 4, 12, 12);
+    return cv::countNonZero(out.provenance(inner) == kOriginal);
+  };
+  EXPECT_EQ(kept(shadow), 0);
+  EXPECT_EQ(kept(sky), 144);
+}
+
 // The mask has a rail above the ball that the model lacks. The ball's right side moves off: the rail
 // above that side goes, too, also close to the side that rests, whose own part of it stays.
 TEST(Renderer, WhatNoModelHasGoesWithThePartBesideIt) {

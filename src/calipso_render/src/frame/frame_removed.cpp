@@ -17,12 +17,41 @@ namespace {
 constexpr float kDarker = 0.97f;  // of the plate's brightness: a passing shadow,
 // likewise in another view, to which the plate is carried with small errors
 constexpr float kDarkerElsewhere = 0.9f;
-constexpr int kLeastPassing = 5;    // px across, and in another view
-constexpr int kLeastElsewhere = 9;  // that somewhere within
-constexpr int kPassingReach = 12;   // px: an edge that the plate misses looks like a narrow shadow
+// part taken off the channel that darkens most, against the one that darkens least: sun and sky have
+// other colours, but white and blue differ by more
+constexpr float kShadowTint = 2.5f;
+constexpr float kTintNoise = 0.05f;  // and added to it
+constexpr int kLeastPassing = 5;     // px across, and in another view
+constexpr int kLeastElsewhere = 9;   // that somewhere within
+constexpr int kPassingReach = 12;    // px: an edge that the plate misses looks like a narrow shadow
 constexpr int kRimShare = 50;   // of the picture's width: how far a mask may miss a moving object
 constexpr int kInFront = 127;   // of a matte
 constexpr float kQuiet = 5.0f;  // code values of spread over time: the background rests
+
+// Keeps where all channels darken alike: a cloud that drifts off the sky is no shadow on it.
+// @param now, plate CV_8UC3
+// @param dark CV_8UC1, in and out
+void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) {
+  const cv::Rect box = cv::boundingRect(dark);
+  if (box.empty()) return;
+  cv::Mat shaded, lit;
+  cv::blur(now(box), shaded, {5, 5});
+  cv::blur(plate(box), lit, {5, 5});
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < box.height; ++v) {
+    std::uint8_t* row = dark.ptr<std::uint8_t>(box.y + v) + box.x;
+    for (int u = 0; u < box.width; ++u) {
+      if (row[u] == 0) continue;
+      const cv::Vec3b &a = shaded.at<cv::Vec3b>(v, u), &b = lit.at<cv::Vec3b>(v, u);
+      float least = 1.0f, most = 0.0f;
+      for (int c = 0; c < 3; ++c) {
+        const float off = 1.0f - linearFromCode(a[c]) / std::max(linearFromCode(b[c]), 1e-3f);
+        least = std::min(least, off), most = std::max(most, off);
+      }
+      if (most > kShadowTint * std::max(0.0f, least) + kTintNoise) row[u] = 0;
+    }
+  }
+}
 
 }  // namespace
 
@@ -49,12 +78,14 @@ void FrameCompositor::findPassingShadows() {
     prepared_.background.plate.convertTo(plate, CV_8U);
   else
     plate = codeFromLinear(plate_);
-  cv::cvtColor(plate, plate, cv::COLOR_BGR2GRAY);
+  cv::Mat grey_plate;
+  cv::cvtColor(plate, grey_plate, cv::COLOR_BGR2GRAY);
   cv::blur(now, ratio_now, {5, 5});
-  cv::blur(plate, ratio_plate, {5, 5});
+  cv::blur(grey_plate, ratio_plate, {5, 5});
   ratio_plate.convertTo(ratio_plate, CV_8U, same_view ? kDarker : kDarkerElsewhere);
   passing_ = ratio_now < ratio_plate;
   passing_ &= quietPlaces() & (labels_ == 0);
+  keepDarkenedAlike(unmirrored_, plate, passing_);
   cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN,
                    cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));
   if (!same_view) {
