@@ -126,27 +126,40 @@ TEST(Renderer, WhatTheMaskMissesOfAMovedObjectGoesToo) {
 
 // A ball that rolls; two places are dark in its key frame: one is grey there instead of pale, as in
 // a shadow, the other blue, as where a cloud has not yet come.
-TEST(Renderer, AMovingObjectsShadowDarkensAllColoursAlike) {
-  const cv::Rect shadow(12, 84, 20, 20), sky(128, 84, 20, 20);
-  const auto frame = [&](int k) {
+struct TwoDarkPlaces {
+  const cv::Rect shadow{12, 84, 20, 20}, sky{128, 84, 20, 20};
+
+  ClipFrame frame(int k) const {
     ClipFrame f = frameWithBall(ballAt(kCentre + 0.01 * k * Eigen::Vector3d::UnitX()));
     f.bgr(shadow).setTo(k == 0 ? cv::Scalar(120, 120, 120) : cv::Scalar(200, 200, 200));
     f.bgr(sky).setTo(k == 0 ? cv::Scalar(190, 128, 80) : cv::Scalar(200, 200, 200));
     return f;
-  };
-  ClipSample clip;
-  for (int k = 0; k < 9; ++k) clip.add(frame(k));
-  const auto prepared =
-      std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, params()));
-  ASSERT_TRUE(prepared->moves[0]);
-  const FrameInput in = ballMovedLeft(frame(0), *prepared);
-  const FrameOutput out = Renderer(prepared, params()).composite(in);
-  const auto kept = [&](const cv::Rect& place) {
-    const cv::Rect inner(place.x + 4, place.y + 4, 12, 12);
-    return cv::countNonZero(out.provenance(inner) == kOriginal);
-  };
-  EXPECT_EQ(kept(shadow), 0);
-  EXPECT_EQ(kept(sky), 144);
+  }
+  // Pixels of the inner part of a place, of 144, that stay when the ball is moved.
+  int kept(const cv::Rect& place, const RenderParams& p) const {
+    ClipSample clip;
+    for (int k = 0; k < 9; ++k) clip.add(frame(k));
+    const auto prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre)}, p));
+    const FrameOutput out = Renderer(prepared, p).composite(ballMovedLeft(frame(0), *prepared));
+    return cv::countNonZero(out.provenance(cv::Rect(place.x + 4, place.y + 4, 12, 12)) ==
+                            kOriginal);
+  }
+};
+
+TEST(Renderer, AMovingObjectsShadowDarkensAllColoursAlike) {
+  const TwoDarkPlaces s;
+  EXPECT_EQ(s.kept(s.shadow, params()), 0);
+  EXPECT_EQ(s.kept(s.sky, params()), 144);
+}
+
+TEST(Renderer, AMovingObjectsShadowDoesNotFallOnTheSky) {
+  const TwoDarkPlaces s;
+  RenderParams p = params();
+  p.planes.clear();
+  p.depth = cv::Mat(kHeight, kWidth, CV_32F, cv::Scalar(1.0f));
+  EXPECT_EQ(s.kept(s.shadow, p), 0);
+  p.depth(s.shadow).setTo(0.0f);
+  EXPECT_EQ(s.kept(s.shadow, p), 144);
 }
 
 // The mask has a rail above the ball that the model lacks. The ball's right side moves off: the rail

@@ -55,9 +55,11 @@ void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) 
 
 }  // namespace
 
-// CV_8UC1: seen in other frames, always alike.
+// CV_8UC1: seen in other frames, always alike, and not the sky as far as a depth image tells.
 cv::Mat FrameCompositor::quietPlaces() const {
-  const cv::Mat at_key = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
+  cv::Mat at_key = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
+  if (!prepared_.scenery.empty() && !prepared_.nearness.empty())
+    at_key.setTo(0, prepared_.nearness == 0.0f);
   if (view_from_key_.empty()) return at_key;
   cv::Mat here;
   cv::remap(at_key, here, view_from_key_, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
