@@ -10,7 +10,9 @@ namespace {
 constexpr double kShapeLength = 2.5;  // of the tracks' spread over l
 // deviations by which the shape's error must stand out of what chance makes
 constexpr double kShapeSurprise = 1.0;
-constexpr double kShapeReach = 4.0;  // of 2 l^2: farther apart a shape's errors are not alike
+// of 2 l^2: tracks farther apart have neither in common; patches that are larger than that (of small
+// objects) are taken for as small
+constexpr double kShapeReach = 4.0;
 // 12 / (12 - 6): a pose takes up six of the errors of six such patches
 constexpr double kShapeAbsorbed = 2.0;
 // pairs of wholly overlapping patches: as surely is noise taken for unshared beforehand

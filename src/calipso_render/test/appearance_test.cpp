@@ -25,22 +25,15 @@ View viewOf(const Surface& surface, float angle) {
   const ClipFrame frame = frameWithBall(ballAt(kPlace));
   View view{{}, frame.labels, frame.camera, {}};
   frame.bgr.convertTo(view.picture, CV_32F);
-  const Actor unturned = makeActor(surface, surface.key_vertices, frame.camera);
-  VisibilityBuffer buffer({0, 0, kWidth, kHeight});
-  buffer.draw(unturned.screen, 0);
-  const Eigen::Vector3f eye = frame.camera.world_from_camera.translation().cast<float>();
-  for (int v = 0; v < kHeight; ++v) {
-    for (int u = 0; u < kWidth; ++u) {
-      const std::uint32_t id = buffer.ids(v)[u];
-      if (id == VisibilityBuffer::kNothing) continue;
-      const SurfacePoint p = surfacePoint(unturned, VisibilityBuffer::triangleOf(id), u, v, eye);
-      cv::Vec3f& code = view.picture.at<cv::Vec3f>(v, u);
-      for (int c = 0; c < 3; ++c) {
-        const float highlight = 2.0f * kTold.specular * sunlight().sun[c] * lobeAt(p.normal);
-        code[c] = std::min(255.0f, codeFromLinear(linearFromRealCode(code[c]) + highlight));
-      }
-    }
-  }
+  forEachPixelOf(
+      makeActor(surface, surface.key_vertices, frame.camera),
+      [&](int u, int v, const SurfacePoint& p) {
+        cv::Vec3f& code = view.picture.at<cv::Vec3f>(v, u);
+        for (int c = 0; c < 3; ++c) {
+          const float highlight = 2.0f * kTold.specular * sunlight().sun[c] * lobeAt(p.normal);
+          code[c] = std::min(255.0f, codeFromLinear(linearFromRealCode(code[c]) + highlight));
+        }
+      });
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
   turn.translate(kPlace).rotate(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()));
   view.actors.push_back(

@@ -85,26 +85,34 @@ inline cv::Mat emptyTable() {
   return picture;
 }
 
-// The ball drawn over the table, with the labels of the pixels whose centre it covers.
-inline ClipFrame frameWithBall(const ObjectModel& model) {
-  ClipFrame frame{emptyTable(), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera()};
-  const Surface surface = makeSurface(model);
-  const Actor actor = makeActor(surface, surface.key_vertices, frame.camera);
+// Calls `act(u, v, point)` for every pixel whose centre an actor covers.
+template <typename Act>
+void forEachPixelOf(const Actor& actor, const Act& act) {
   VisibilityBuffer buffer({0, 0, kWidth, kHeight});
   buffer.draw(actor.screen, 0);
-  const Eigen::Vector3f eye = frame.camera.world_from_camera.translation().cast<float>();
+  const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       const std::uint32_t id = buffer.ids(v)[u];
       if (id == VisibilityBuffer::kNothing) continue;
-      const SurfacePoint p = surfacePoint(actor, VisibilityBuffer::triangleOf(id), u, v, eye);
-      const cv::Vec3f shade = diffuseShading(sunlight(), p.normal, 1.0f);
-      const cv::Vec3f albedo(0.15f, 0.3f, 0.6f);
-      for (int c = 0; c < 3; ++c)
-        frame.bgr.at<cv::Vec3b>(v, u)[c] = quantise(codeFromLinear(albedo[c] * shade[c]));
-      frame.labels.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(model.index);
+      act(u, v, surfacePoint(actor, VisibilityBuffer::triangleOf(id), u, v, eye));
     }
   }
+}
+
+// The ball drawn over the table, with the labels of the pixels whose centre it covers.
+inline ClipFrame frameWithBall(const ObjectModel& model) {
+  ClipFrame frame{emptyTable(), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera()};
+  const Surface surface = makeSurface(model);
+  forEachPixelOf(makeActor(surface, surface.key_vertices, frame.camera),
+                 [&](int u, int v, const SurfacePoint& p) {
+                   const cv::Vec3f shade = diffuseShading(sunlight(), p.normal, 1.0f);
+                   const cv::Vec3f albedo(0.15f, 0.3f, 0.6f);
+                   for (int c = 0; c < 3; ++c)
+                     frame.bgr.at<cv::Vec3b>(v, u)[c] =
+                         quantise(codeFromLinear(albedo[c] * shade[c]));
+                   frame.labels.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(model.index);
+                 });
   return frame;
 }
 

@@ -9,6 +9,7 @@
 #include "frame/frame_compositor.hpp"
 #include "frame/mask_morphology.hpp"
 #include "frame/tiled_filter.hpp"
+#include "place/place_samples.hpp"
 #include "place/view_warp.hpp"
 
 namespace calipso::render {
@@ -17,18 +18,14 @@ namespace {
 constexpr float kDarker = 0.97f;  // of the plate's brightness: a passing shadow,
 // likewise in another view, to which the plate is carried with small errors
 constexpr float kDarkerElsewhere = 0.9f;
-// part taken off the channel that darkens most, against the one that darkens least: sun and sky have
-// other colours, but white and blue differ by more
-constexpr float kShadowTint = 2.5f;
-constexpr float kTintNoise = 0.05f;  // and added to it
-constexpr int kLeastPassing = 5;     // px across, and in another view
-constexpr int kLeastElsewhere = 9;   // that somewhere within
-constexpr int kPassingReach = 12;    // px: an edge that the plate misses looks like a narrow shadow
+constexpr int kLeastPassing = 5;    // px across, and in another view
+constexpr int kLeastElsewhere = 9;  // that somewhere within
+constexpr int kPassingReach = 12;   // px: an edge that the plate misses looks like a narrow shadow
 constexpr int kRimShare = 50;   // of the picture's width: how far a mask may miss a moving object
 constexpr int kInFront = 127;   // of a matte
 constexpr float kQuiet = 5.0f;  // code values of spread over time: the background rests
 
-// Keeps where all channels darken alike: a cloud that drifts off the sky is no shadow on it.
+// Keeps where all channels are darkened alike.
 // @param now, plate CV_8UC3
 // @param dark CV_8UC1, in and out
 void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) {
@@ -42,13 +39,7 @@ void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) 
     std::uint8_t* row = dark.ptr<std::uint8_t>(box.y + v) + box.x;
     for (int u = 0; u < box.width; ++u) {
       if (row[u] == 0) continue;
-      const cv::Vec3b &a = shaded.at<cv::Vec3b>(v, u), &b = lit.at<cv::Vec3b>(v, u);
-      float least = 1.0f, most = 0.0f;
-      for (int c = 0; c < 3; ++c) {
-        const float off = 1.0f - linearFromCode(a[c]) / std::max(linearFromCode(b[c]), 1e-3f);
-        least = std::min(least, off), most = std::max(most, off);
-      }
-      if (most > kShadowTint * std::max(0.0f, least) + kTintNoise) row[u] = 0;
+      if (!darkenedAlike(shaded.at<cv::Vec3b>(v, u), lit.at<cv::Vec3b>(v, u))) row[u] = 0;
     }
   }
 }

@@ -13,8 +13,10 @@ constexpr float kNearMedian = 6.0f;    // code values; farther ones do not enter
 constexpr float kLit = 0.75f;          // quantile of brightness that stands for the unshaded value
 constexpr std::size_t kFewestLit = 3;  // samples that a lit or shaded group must have
 constexpr double kGroupGap = 4.0;      // gap between two groups, in spreads of either
-// a shadow's largest ratio of shaded to lit in a channel over its smallest
-constexpr float kShadowTint = 1.8f;
+// part that a shadow takes off the channel that darkens most, against the one that darkens least:
+// sun and sky have other colours, but white and blue differ by more
+constexpr float kShadowTint = 2.5f;
+constexpr float kTintNoise = 0.05f;  // and added to it
 
 int brightness(const cv::Vec3b& c) { return c[0] + 2 * c[1] + c[2]; }
 
@@ -38,16 +40,6 @@ double groupSpread(const Samples& sorted, std::size_t from, std::size_t to) {
   const std::size_t quarter = (to - from) / 4;
   return std::max(0.5 * (brightness(sorted[to - 1 - quarter]) - brightness(sorted[from + quarter])),
                   1.0 * kNearMedian);
-}
-
-// A shadow darkens all channels, and to about the same part of their linear values.
-bool darkenedAlike(const cv::Vec3b& shaded, const cv::Vec3b& lit) {
-  float least = 1.0f, most = 0.0f;
-  for (int c = 0; c < 3; ++c) {
-    const float ratio = linearFromCode(shaded[c]) / std::max(linearFromCode(lit[c]), 1e-3f);
-    least = std::min(least, ratio), most = std::max(most, ratio);
-  }
-  return most < 1.0f && most < kShadowTint * least;
 }
 
 // Brightness without shade. A shadow that stays can hold most of the samples; two clear groups
@@ -90,6 +82,15 @@ Samples PlaceSamples::at(int u, int v) const {
     if (shows(i, u, v)) values.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
   }
   return values;
+}
+
+bool darkenedAlike(const cv::Vec3b& shaded, const cv::Vec3b& lit) {
+  float least = 1.0f, most = 0.0f;
+  for (int c = 0; c < 3; ++c) {
+    const float off = 1.0f - linearFromCode(shaded[c]) / std::max(linearFromCode(lit[c]), 1e-3f);
+    least = std::min(least, off), most = std::max(most, off);
+  }
+  return most > 0.0f && most <= kShadowTint * std::max(0.0f, least) + kTintNoise;
 }
 
 bool shadedAgainst(const Samples& lit, const Samples& values, double step) {

@@ -26,6 +26,10 @@ class PlaceSamples {
   std::vector<cv::Mat> covered_;  // CV_8UC1
 };
 
+// A shadow darkens all channels, and by about the same part of their linear values: a cloud that
+// drifts off the sky is none.
+bool darkenedAlike(const cv::Vec3b& shaded, const cv::Vec3b& lit);
+
 // Are `values` darker than `lit`, by more than `step` of the brightness of `lit`, as a shadow makes
 // them? @pre neither is empty
 bool shadedAgainst(const Samples& lit, const Samples& values, double step);
