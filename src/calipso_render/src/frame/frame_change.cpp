@@ -74,47 +74,63 @@ void FrameCompositor::findChange(int v, int from, int to, std::uint8_t* out) con
   });
 }
 
-// Pixels that lie nearer to what a surface has left than to where it rests: what no model has of the
-// object there, such as a railing, went along. May be empty.
-// @param owner as keepRims()
-cv::Mat FrameCompositor::nearerToLeft(int surface, const cv::Mat& owner) const {
+// Pixels of a box that lie nearer to what a surface has left than to where it rests: what no model
+// has of the object there, such as a railing, went along. May be empty.
+// @param own 255 = the surface is seen there
+cv::Mat FrameCompositor::nearerToLeft(int surface, const cv::Mat& own, const cv::Mat& owner,
+                                      const cv::Rect& box) const {
   if (prepared_.outlines[surface].empty() || !sameView(frame_.camera, prepared_.camera)) return {};
-  const cv::Mat rests = (owner == surface) & (still_ > 0.0f);
-  cv::Mat left = prepared_.outlines[surface](region_) & ~rests & ((owner < 0) | (owner == surface));
+  const cv::Mat rests = own(box) & (still_(box) > 0.0f);
+  cv::Mat left = prepared_.outlines[surface](box + region_.tl()) & ~rests &
+                 ((owner(box) < 0) | own(box));
   cv::morphologyEx(left, left, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));  // no mere silhouette
   if (cv::countNonZero(left) == 0) return {};
   cv::Mat to_left, to_rest;
-  cv::distanceTransform(left == 0, to_left, cv::DIST_L2, cv::DIST_MASK_3);
-  cv::distanceTransform(rests == 0, to_rest, cv::DIST_L2, cv::DIST_MASK_3);
+  cv::distanceTransform(left == 0, to_left, cv::DIST_L1, cv::DIST_MASK_3, CV_8U);
+  cv::distanceTransform(rests == 0, to_rest, cv::DIST_L1, cv::DIST_MASK_3, CV_8U);
   return to_left < to_rest;
 }
 
 // The rim of an original's pixels belongs to the surface beside it, not to another edited object's.
+// @param owner CV_16SC1 over region_: edited surface that is seen there, -1 = none
 void FrameCompositor::keepRims(const cv::Mat& owner) {
   cv::Mat rims = cv::Mat::zeros(region_.size(), CV_32F);
-  const int margin = params_.background.mask_margin_px, side = 2 * kRimReach * margin + 1;
   for (std::size_t i = 0; i < edited_.size(); ++i) {
-    if (!edited_[i]) continue;
-    cv::Mat rim = cv::Mat::zeros(region_.size(), CV_32F),
-            foreign = cv::Mat::zeros(region_.size(), CV_8U);
-    still_.copyTo(rim, owner == static_cast<int>(i));
-    cv::dilate(rim, rim, cv::Mat::ones(side, side, CV_8U));
-    for (std::size_t j = 0; j < edited_.size(); ++j) {
-      if (edited_[j] && j != i) foreign |= originalOf(static_cast<int>(j));
-    }
-    cv::dilate(foreign, foreign, disc(margin));
-    const cv::Mat original = originalOf(static_cast<int>(i));
-    cv::Mat own, inner;
-    cv::dilate(original, own, disc(margin));
-    cv::erode(original, inner, disc(margin));
-    foreign.setTo(0, own);
-    // What the object has left shows it in the video, and is no rim.
-    rim.setTo(0.0f, foreign | inner);
-    const cv::Mat gone = nearerToLeft(static_cast<int>(i), owner);
-    if (!gone.empty()) rim.setTo(0.0f, gone);
-    rims = cv::max(rims, rim);
+    if (edited_[i]) addRim(static_cast<int>(i), owner, rims);
   }
   rims.copyTo(still_, owner < 0);
+}
+
+void FrameCompositor::addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const {
+  const int margin = params_.background.mask_margin_px, reach = kRimReach * margin;
+  const cv::Rect whole({0, 0}, region_.size());
+  const cv::Mat own = owner == surface;
+  const cv::Rect seen = cv::boundingRect(own);
+  if (seen.empty()) return;
+  const auto around = [&](int px) {
+    return cv::Rect(seen.x - px, seen.y - px, seen.width + 2 * px, seen.height + 2 * px) & whole;
+  };
+  const cv::Rect box = around(reach);
+  cv::Mat rim = cv::Mat::zeros(box.size(), CV_32F), foreign = cv::Mat::zeros(whole.size(), CV_8U);
+  still_(box).copyTo(rim, own(box));
+  cv::dilate(rim, rim, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
+  for (std::size_t j = 0; j < edited_.size(); ++j) {
+    if (edited_[j] && static_cast<int>(j) != surface) foreign |= originalOf(static_cast<int>(j));
+  }
+  const cv::Mat original = originalOf(surface);
+  cv::Mat beside, near, inner;
+  cv::dilate(foreign(box), beside, disc(margin));
+  cv::dilate(original(box), near, disc(margin));
+  cv::erode(original(box), inner, disc(margin));
+  beside.setTo(0, near);
+  // What the object has left shows it in the video, and is no rim.
+  rim.setTo(0.0f, beside | inner);
+  // Rims lie within 2 * reach px, along rows and columns, of what rests.
+  const cv::Rect search = around(3 * reach);
+  const cv::Mat gone = nearerToLeft(surface, own, owner, search);
+  if (!gone.empty()) rim.setTo(0.0f, gone(box - search.tl()));
+  cv::Mat here = rims(box);
+  cv::max(here, rim, here);
 }
 
 // The triangles with a point that may be at rest.

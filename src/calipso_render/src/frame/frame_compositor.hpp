@@ -223,7 +223,9 @@ class FrameCompositor {
   void findStill();
   bool findResting(int slot, std::vector<char>& can_rest) const;
   void keepRims(const cv::Mat& owner);
-  cv::Mat nearerToLeft(int surface, const cv::Mat& owner) const;
+  void addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const;
+  cv::Mat nearerToLeft(int surface, const cv::Mat& own, const cv::Mat& owner,
+                       const cv::Rect& box) const;
   void findCovered();
   void findSurfaceSun();
   void lightCorners(int j, int first, const std::vector<std::uint8_t>& large);

@@ -87,8 +87,7 @@ void FrameCompositor::shadeOther(int u, int v, Behind& behind) const {
   behind.source = kRendered;
 }
 
-// Where the depth image or the user's matte puts something before what is drawn, with a soft edge;
-// and no shadow falls on the support plane that the scenery hides.
+// Where the depth image or the user's matte puts something before what is drawn, with a soft edge.
 void FrameCompositor::findScreened() {
   if ((prepared_.scenery.empty() && params_.matte.empty()) ||
       !sameView(frame_.camera, prepared_.camera))
@@ -96,21 +95,14 @@ void FrameCompositor::findScreened() {
   screened_ = params_.matte.empty() ? cv::Mat::zeros(region_.size(), CV_8U)
                                     : params_.matte(region_).clone();
   if (prepared_.scenery.empty()) return;
-  takes_light_ = takes_light_.clone();  // it is the cache's
   const cv::Mat scenery = prepared_.scenery(region_);
   cv::Mat drawn = cv::Mat::zeros(region_.size(), CV_32F), hidden;
-  const Eigen::Vector3f axis = frame_.camera.world_from_camera.linear().col(2).cast<float>();
   for (int v = 0; v < region_.height; ++v) {
     const std::uint32_t* ids = centre_->ids(v);
-    Receiver r;
     for (int u = 0; u < region_.width; ++u) {
       const bool edited = ids[u] != VisibilityBuffer::kNothing &&
                           edited_[surface_of_slot_[VisibilityBuffer::objectOf(ids[u])]];
       if (edited) drawn.at<float>(v, u) = centre_->nearness(v)[u];
-      const float near = scenery.at<float>(v, u);
-      const bool hides_plane = near > 0.0f && place_view_.at(u + region_.x, v + region_.y, r) &&
-                               near * axis.dot(r.position - eye_) > kNearer;
-      if (hides_plane) takes_light_.at<std::uint8_t>(v, u) = 0;
     }
   }
   cv::dilate(drawn, drawn, cv::Mat::ones(3, 3, CV_8U));

@@ -99,9 +99,9 @@ void FrameCompositor::prepareFrame() {
         sampleEdges();
         findMaps();
         findSurfaceSun();
+        findStill();
       },
       [this] {
-        findStill();
         findCovered();
         measureLight();
         findScreened();

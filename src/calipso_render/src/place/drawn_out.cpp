@@ -10,6 +10,7 @@ namespace {
 
 constexpr int kBlurs = 7;           // levels of blur, each twice the one before,
 constexpr float kLeastBlur = 0.5f;  // px, from this one on
+static_assert(kLeastBlur * (1 << (kBlurs - 1)) / 2.0f <= DrawnOut::kCoarsest);
 
 }  // namespace
 
@@ -54,9 +55,10 @@ DrawnOut::DrawnOut(const cv::Mat& spread, float across, float slope)
 }
 
 cv::Mat DrawnOut::operator()(const cv::Mat& values) const {
-  std::vector<Blurred> levels;
-  for (int k = 0; k <= *std::max_element(highest_.begin(), highest_.end()) + 1; ++k)
-    levels.push_back(blurred(values, k));
+  std::vector<Blurred> levels(*std::max_element(highest_.begin(), highest_.end()) + 2);
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t k = 0; k < levels.size(); ++k)
+    levels[k] = blurred(values, static_cast<int>(k));
   cv::Mat out(values.size(), CV_32FC4);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < out.rows; ++v) {

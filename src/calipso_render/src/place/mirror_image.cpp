@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -55,7 +56,9 @@ void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance,
     image = {cv::Mat::zeros(camera.height, camera.width, CV_32FC3),
              cv::Mat::zeros(camera.height, camera.width, CV_32F),
              {},
-             1.0f};
+             1.0f,
+             {}};
+  image.box |= box;
 #pragma omp parallel for schedule(dynamic, 4)
   for (int v = box.y; v < box.br().y; ++v) {
     for (int u = box.x; u < box.br().x; ++u) {
@@ -84,7 +87,7 @@ void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance,
 void bringDown(const cv::Mat& near, cv::Mat& mean, cv::Mat& weight) {
   const cv::Size size((near.cols + kSpreadStep - 1) / kSpreadStep,
                       (near.rows + kSpreadStep - 1) / kSpreadStep);
-  mean = cv::Mat::zeros(size, CV_32FC3), weight = cv::Mat::zeros(size, CV_32F);
+  mean = cv::Mat::zeros(size, CV_32F), weight = cv::Mat::zeros(size, CV_32F);
 #pragma omp parallel for schedule(static)
   for (int j = 0; j < size.height; ++j) {
     for (int i = 0; i < size.width; ++i) {
@@ -96,8 +99,7 @@ void bringDown(const cv::Mat& near, cv::Mat& mean, cv::Mat& weight) {
         }
       }
       if (count > 0)
-        mean.at<cv::Vec3f>(j, i) = cv::Vec3f::all(sum / static_cast<float>(count)),
-                              weight.at<float>(j, i) = 1.0f;
+        mean.at<float>(j, i) = sum / static_cast<float>(count), weight.at<float>(j, i) = 1.0f;
     }
   }
 }
@@ -113,8 +115,8 @@ void findSpread(const PlaneView& view, const Camera& camera, const cv::Mat& near
   cv::Mat spread = cv::Mat::zeros(weight.size(), CV_32F), whole;
   const Eigen::Isometry3f from_world = camera.world_from_camera.inverse().cast<float>();
   const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
-  double cosines = 0.0;
-  int count = 0;
+  std::vector<cv::Vec2d> cosines(spread.rows);  // per row: their sum, and of how many
+#pragma omp parallel for schedule(static)
   for (int j = 0; j < spread.rows; ++j) {
     for (int i = 0; i < spread.cols; ++i) {
       constexpr float kMiddle = 0.5f * (kSpreadStep - 1);
@@ -123,15 +125,16 @@ void findSpread(const PlaneView& view, const Camera& camera, const cv::Mat& near
                    static_cast<float>(j * kSpreadStep) + kMiddle, receiver))
         continue;
       const float depth = (from_world * receiver.position).z(),
-                  behind = 1.0f - depth * filled.at<cv::Vec3f>(j, i)[0];
+                  behind = 1.0f - depth * filled.at<float>(j, i);
       spread.at<float>(j, i) = 2.0f * static_cast<float>(camera.fy) * std::max(0.0f, behind);
       if (weight.at<float>(j, i) > 0.0f)
-        cosines += receiver.normal.dot((eye - receiver.position).normalized()), ++count;
+        cosines[j] += cv::Vec2d(receiver.normal.dot((eye - receiver.position).normalized()), 1.0);
     }
   }
   cv::resize(spread, whole, spread.size() * kSpreadStep, 0, 0, cv::INTER_LINEAR);
   image.spread = whole(cv::Rect({0, 0}, near.size())).clone();
-  if (count > 0) image.across = static_cast<float>(cosines / count);
+  const cv::Vec2d sum = std::accumulate(cosines.begin(), cosines.end(), cv::Vec2d());
+  if (sum[1] > 0.0) image.across = static_cast<float>(sum[0] / sum[1]);
 }
 
 }  // namespace

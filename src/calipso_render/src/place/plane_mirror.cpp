@@ -8,6 +8,24 @@
 
 namespace calipso::render {
 
+namespace {
+
+constexpr float kReach = 3.0f;  // standard deviations
+
+// Where an image can come to that is drawn out, to whole squares of DrawnOut::kCoarsest px.
+cv::Rect reachedBy(const MirrorImage& image, float slope) {
+  double spread = 0.0;
+  cv::minMaxLoc(image.spread, nullptr, &spread);
+  const int reach = static_cast<int>(kReach * slope * spread) + 1;
+  constexpr int kSquare = DrawnOut::kCoarsest;
+  const auto down = [](int x) { return std::max(0, x) / kSquare * kSquare; };
+  const cv::Point low(down(image.box.x - reach), down(image.box.y - reach)),
+      high(down(image.box.br().x + reach) + kSquare, down(image.box.br().y + reach) + kSquare);
+  return cv::Rect(low, high) & cv::Rect({0, 0}, image.spread.size());
+}
+
+}  // namespace
+
 cv::Mat withCover(const MirrorImage& image) {
   cv::Mat out;
   cv::merge(std::vector<cv::Mat>{image.colour, image.cover}, out);
@@ -15,15 +33,17 @@ cv::Mat withCover(const MirrorImage& image) {
 }
 
 cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image) {
-  const cv::Mat drawn = DrawnOut(image.spread, image.across, mirror.slope)(withCover(image));
-  cv::Mat added(drawn.size(), CV_32FC3);
+  cv::Mat added = cv::Mat::zeros(image.colour.size(), CV_32FC3);
+  const cv::Rect box = reachedBy(image, mirror.slope);
+  const cv::Mat drawn =
+      DrawnOut(image.spread(box), image.across, mirror.slope)(withCover(image)(box));
 #pragma omp parallel for schedule(static)
-  for (int v = 0; v < added.rows; ++v) {
-    for (int u = 0; u < added.cols; ++u) {
-      const cv::Vec4f& c = drawn.at<cv::Vec4f>(v, u);
-      added.at<cv::Vec3f>(v, u) =
-          mirror.strength * (cv::Vec3f(c[0], c[1], c[2]) - c[3] * mirror.surroundings);
-    }
+  for (int v = 0; v < box.height; ++v) {
+    const cv::Vec4f* c = drawn.ptr<cv::Vec4f>(v);
+    cv::Vec3f* to = added.ptr<cv::Vec3f>(box.y + v) + box.x;
+    for (int u = 0; u < box.width; ++u)
+      to[u] = mirror.strength *
+              (cv::Vec3f(c[u][0], c[u][1], c[u][2]) - c[u][3] * mirror.surroundings);
   }
   return added;
 }

@@ -26,6 +26,7 @@ struct MirrorImage {
   // CV_32FC1: px along a column by which it is drawn out for each unit of the planes' slopes
   cv::Mat spread;
   float across = 1.0f;  // how much less it is along a row
+  cv::Rect box;         // beyond it no object is seen
   bool empty() const { return colour.empty(); }
 };
 
