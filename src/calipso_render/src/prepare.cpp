@@ -93,7 +93,7 @@ void checkInput(const ClipSample& clip, const RenderParams& params) {
 
 void findSurfacesInClip(const ClipSample& clip, const std::vector<ClipFrame>& frames,
                         const std::vector<ObjectModel>& models, Prepared& p) {
-  p.camera = frames.front().camera;
+  p.camera = frames.front().camera, p.key_stamp_ns = frames.front().stamp_ns;
   p.key_picture = frames.front().bgr;
   p.key_labels = frames.front().labels;
   for (const ObjectModel& m : models) {

@@ -201,6 +201,26 @@ void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& s
             p.relief);
 }
 
+// What drifts before the camera takes no shadows; the plate has it where the key frame does.
+// @param ground as of DriftingBackground
+void findDrifting(const std::vector<ClipFrame>& frames, const cv::Mat& ground,
+                  const BackgroundParams& params, Prepared& p) {
+  Background& background = p.background;
+  background.drifting = DriftingBackground(frames, params.mask_margin_px, ground);
+  if (!background.drifting.established()) return;
+  const cv::Mat& where = background.drifting.where();
+  p.shadowless |= where;
+  background.drifting.draw({0.0f, 0.0f}, p.plate_linear, background.invented);
+  for (int v = 0; v < where.rows; ++v) {
+    for (int u = 0; u < where.cols; ++u) {
+      if (where.at<std::uint8_t>(v, u) == 0) continue;
+      for (int c = 0; c < 3; ++c)
+        background.plate.at<cv::Vec3f>(v, u)[c] =
+            codeFromLinear(p.plate_linear.at<cv::Vec3f>(v, u)[c]);
+    }
+  }
+}
+
 }  // namespace
 
 void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepared& p) {
@@ -229,6 +249,10 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
   inventBackground(traces, key, known_of_place, params.background, p.background);
   p.plate_linear = linearOf(p.background.plate);
+  const cv::Mat& ground = known_of_place.nearness;
+  findDrifting(e.frames,
+               ground.empty() ? ground : cv::Mat((ground > 0.0f) & (place.off_planes == 0)),
+               params.background, p);
   findPlaceUmbra(e, sun, sky, place.off_planes, params, p);
 }
 

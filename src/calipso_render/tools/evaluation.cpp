@@ -72,13 +72,16 @@ class Evaluation {
   void prepareClip() {
     ClipSample clip;
     for (int k = 0; k < scene_.frame_count; ++k)
-      clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.cameraAt(k), posesAt(k)});
+      clip.add({loadFrame(scene_, k), loadLabels(scene_, k), scene_.cameraAt(k), posesAt(k),
+                stampOf(k)});
     std::vector<ObjectModel> models;
     for (const Truth::Object& o : truth_.objects) models.push_back(o.model);
     const auto start = std::chrono::steady_clock::now();
     prepared_ = std::make_shared<Prepared>(prepare(clip, models, params_));
     ms_prepare_ = elapsedMs(start);
   }
+
+  std::int64_t stampOf(int k) const { return static_cast<std::int64_t>(1e9 * k / scene_.fps); }
 
   std::vector<ObjectPose> posesAt(int k) const {
     std::vector<ObjectPose> poses;
@@ -91,12 +94,8 @@ class Evaluation {
   // Frame k with every object in the state that `change` gives it.
   template <typename Change>
   FrameInput frame(int k, Change change) const {
-    FrameInput in{loadFrame(scene_, k),
-                  loadLabels(scene_, k),
-                  scene_.cameraAt(k),
-                  static_cast<std::int64_t>(1e9 * k / scene_.fps),
-                  {},
-                  {}};
+    FrameInput in{
+        loadFrame(scene_, k), loadLabels(scene_, k), scene_.cameraAt(k), stampOf(k), {}, {}};
     for (std::size_t i = 0; i < prepared_->surfaces.size(); ++i) {
       ObjectInFrame o;
       o.name = prepared_->surfaces[i].name;

@@ -81,6 +81,7 @@ struct RenderParams {
 // Everything learnt from the clip. Coordinates: the key frame's camera, the world.
 struct Prepared {
   Camera camera;        // key frame
+  std::int64_t key_stamp_ns = 0;
   cv::Mat key_picture;  // CV_8UC3
   cv::Mat key_labels;
   std::vector<Surface> surfaces;

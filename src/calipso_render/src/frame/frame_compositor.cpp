@@ -109,7 +109,8 @@ FrameCompositor::Behind FrameCompositor::shadowedAt(int u, int v, bool removed) 
 FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
   const bool invented = invented_.at<std::uint8_t>(v, u) != 0;
   cv::Vec3f now;
-  if (invented && live_ != nullptr &&
+  const bool drifts = !drifts_.empty() && drifts_.at<std::uint8_t>(v, u) != 0;
+  if (invented && !drifts && live_ != nullptr &&
       live_->at(unmirrored_, labels_, live_corrections_, prepared_.noise.deviation(1, 128.0f), u, v,
                 now)) {
     for (int c = 0; c < 3; ++c) now[c] = linearFromRealCode(now[c]);

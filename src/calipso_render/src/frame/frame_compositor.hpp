@@ -310,6 +310,7 @@ class FrameCompositor {
   std::vector<cv::Mat> fronts_;  // Prepared::fronts, where the camera stands as at the key frame
   cv::Mat labels_, plate_;       // of this frame's view
   cv::Mat invented_;             // CV_8UC1
+  cv::Mat drifts_;               // CV_8UC1, key frame's view: plate_ drifts along; may be empty
   cv::Mat view_from_key_;        // viewWarp(); empty: the key frame's view
   cv::Mat shadowless_;  // Prepared::shadowless, where the camera stands as at the key frame
   const LiveFill* live_ = nullptr;  // Background::live, where the camera stands as at the key frame

@@ -46,9 +46,12 @@ void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) 
 
 }  // namespace
 
-// CV_8UC1: seen in other frames, always alike, and not the sky as far as a depth image tells.
+// CV_8UC1: seen in other frames, always alike, and neither what drifts nor, as far as a depth image
+// tells, the sky.
 cv::Mat FrameCompositor::quietPlaces() const {
   cv::Mat at_key = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
+  if (prepared_.background.drifting.established())
+    at_key.setTo(0, prepared_.background.drifting.where());
   if (!prepared_.scenery.empty() && !prepared_.nearness.empty())
     at_key.setTo(0, prepared_.nearness == 0.0f);
   if (view_from_key_.empty()) return at_key;

@@ -54,7 +54,7 @@ FrameInput frameAtRest(const Prepared& prepared, const std::vector<bool>& edited
   FrameInput input;
   prepared.background.plate.convertTo(input.bgr, CV_8U);
   input.labels = prepared.key_labels;
-  input.camera = prepared.camera;
+  input.camera = prepared.camera, input.stamp_ns = prepared.key_stamp_ns;
   for (std::size_t i = 0; i < edited.size(); ++i) {
     if (!edited[i]) continue;
     ObjectInFrame o;

@@ -172,6 +172,12 @@ void FrameCompositor::stagePlace() {
   footprints_.assign(count, cv::Mat());
   plate_ = prepared_.plate_linear;
   invented_ = prepared_.background.invented;
+  const DriftingBackground& drifting = prepared_.background.drifting;
+  if (const auto shift = drifting.shiftAt(frame_.stamp_ns)) {
+    plate_ = plate_.clone(), invented_ = invented_.clone();
+    drifting.draw(*shift, plate_, invented_);
+    drifts_ = drifting.where();
+  }
   if (sameView(frame_.camera, prepared_.camera)) {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
     shadowless_ = prepared_.shadowless;

@@ -1,0 +1,135 @@
+// A background that drifts as a whole: found, followed, and drawn where objects hide it.
+
+#include "calipso_render/drifting_background.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kWide = 320, kHigh = 200, kFrames = 13, kTrim = 12;
+constexpr int kAround = 40;  // px of clouds beyond the picture
+const cv::Rect kObject(140, 70, 40, 60);
+const cv::Point2f kPace(-2.3f, 0.4f);  // px per frame
+
+// Clouds: noise of two scales that does not repeat itself, (0, 0) in its middle.
+const cv::Mat& clouds() {
+  static const cv::Mat picture = [] {
+    cv::Mat fine(kHigh + 2 * kAround, kWide + 2 * kAround, CV_32FC3),
+        coarse(fine.size() / 8, CV_32FC3);
+    cv::RNG random(7);
+    random.fill(fine, cv::RNG::NORMAL, 0.0, 60.0), random.fill(coarse, cv::RNG::NORMAL, 0.0, 40.0);
+    cv::GaussianBlur(fine, fine, {}, 1.5);
+    cv::resize(coarse, coarse, fine.size(), 0, 0, cv::INTER_CUBIC);
+    return cv::Mat(fine + coarse + cv::Scalar(170, 150, 130));
+  }();
+  return picture;
+}
+
+cv::Vec3b cloudAt(float x, float y) {
+  cv::Mat pixel;
+  cv::getRectSubPix(clouds(), {1, 1}, {x + kAround, y + kAround}, pixel);
+  return cv::Vec3b(pixel.at<cv::Vec3f>(0));
+}
+
+enum class Motion { kDrifts, kRests, kRipples };
+
+// A window with a trim that rests; behind it what moves; before it an object.
+ClipFrame frameAt(int k, Motion motion, const cv::Rect& object) {
+  ClipFrame f{cv::Mat(kHigh, kWide, CV_8UC3), cv::Mat::zeros(kHigh, kWide, CV_8U), Camera()};
+  f.camera.width = kWide, f.camera.height = kHigh;
+  f.stamp_ns = 33'000'000LL * k;
+  cv::RNG noise(100 + k);
+  for (int v = 0; v < kHigh; ++v) {
+    for (int u = 0; u < kWide; ++u) {
+      cv::Point2f shift;
+      if (motion == Motion::kDrifts) shift = kPace * static_cast<float>(k);
+      if (motion == Motion::kRipples)
+        shift = {4.0f * std::sin(1.7f * k + 0.2f * v), 3.0f * std::sin(2.3f * k + 0.3f * u)};
+      cv::Vec3b c = cloudAt(u - shift.x, v - shift.y);
+      const bool trim = u < kTrim || v < kTrim || u >= kWide - kTrim || v >= kHigh - kTrim;
+      if (trim) c = cv::Vec3b::all(static_cast<uchar>(60 + 8 * ((u / 3 + v / 5) % 3)));
+      if (object.contains({u, v})) c = {20, 30, 200}, f.labels.at<uchar>(v, u) = 1;
+      for (int i = 0; i < 3; ++i) c[i] = cv::saturate_cast<uchar>(c[i] + noise.gaussian(1.5));
+      f.bgr.at<cv::Vec3b>(v, u) = c;
+    }
+  }
+  return f;
+}
+
+std::vector<ClipFrame> clipOf(Motion motion, const cv::Rect& object = kObject) {
+  std::vector<ClipFrame> frames;
+  for (int k = 0; k < kFrames; ++k) frames.push_back(frameAt(k, motion, object));
+  return frames;
+}
+
+TEST(DriftingBackground, IsFollowedBesideWhatRests) {
+  const DriftingBackground drifting(clipOf(Motion::kDrifts), 2, cv::Mat());
+  ASSERT_TRUE(drifting.established());
+  for (const int k : {1, 6, 12}) {
+    const auto shift = drifting.shiftAt(33'000'000LL * k);
+    ASSERT_TRUE(shift);
+    EXPECT_NEAR(shift->x, kPace.x * k, 0.05) << k;
+    EXPECT_NEAR(shift->y, kPace.y * k, 0.05) << k;
+  }
+  const auto between = drifting.shiftAt(33'000'000LL * 7 / 2);
+  ASSERT_TRUE(between);
+  EXPECT_NEAR(between->x, kPace.x * 3.5f, 0.05);
+  EXPECT_FALSE(drifting.shiftAt(33'000'000LL * 30)) << "the clip does not cover it";
+  const cv::Rect inside(2 * kTrim, 2 * kTrim, kWide - 4 * kTrim, kHigh - 4 * kTrim);
+  EXPECT_LT(cv::countNonZero(drifting.where()(inside) == 0), 0.01 * inside.area())
+      << "also behind the object";
+  EXPECT_LT(cv::countNonZero(drifting.where().colRange(0, kTrim - 3)), 10) << "the trim rests";
+}
+
+TEST(DriftingBackground, WhatOtherFramesShowBesideTheObjectIsSeenWhereItIsNow) {
+  const cv::Rect narrow(140, 70, 14, 60);  // the clouds come by it within the clip
+  const DriftingBackground drifting(clipOf(Motion::kDrifts, narrow), 2, cv::Mat());
+  ASSERT_TRUE(drifting.established());
+  for (const int k : {0, 5, 12}) {
+    cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar()),
+        invented = cv::Mat::zeros(kHigh, kWide, CV_8U);
+    drifting.draw(*drifting.shiftAt(33'000'000LL * k), plate, invented);
+    EXPECT_EQ(cv::countNonZero(invented(narrow)), 0) << k;
+    double squares = 0.0;
+    for (int v = narrow.y; v < narrow.br().y; ++v) {
+      for (int u = narrow.x; u < narrow.br().x; ++u) {
+        const cv::Vec3b truth = cloudAt(u - kPace.x * k, v - kPace.y * k);
+        const double d = codeFromLinear(plate.at<cv::Vec3f>(v, u)[1]) - truth[1];
+        squares += d * d / narrow.area();
+      }
+    }
+    EXPECT_LT(std::sqrt(squares), 1.5) << "code values, frame " << k;
+  }
+}
+
+TEST(DriftingBackground, WhatNoFrameShowsIsInventedOnceAndDriftsAlong) {
+  const cv::Rect wide(100, 60, 100, 80);
+  const DriftingBackground drifting(clipOf(Motion::kDrifts, wide), 2, cv::Mat());
+  ASSERT_TRUE(drifting.established());
+  cv::Mat plates[2], invented[2];
+  for (int i = 0; i < 2; ++i) {
+    plates[i] = cv::Mat::zeros(kHigh, kWide, CV_32FC3),
+    invented[i] = cv::Mat::zeros(kHigh, kWide, CV_8U);
+    drifting.draw(cv::Point2f(-4.0f * i, 0.0f), plates[i], invented[i]);
+  }
+  const cv::Rect middle(140, 90, 20, 20), later = middle - cv::Point(4, 0);
+  EXPECT_EQ(cv::countNonZero(invented[0](middle)), middle.area());
+  EXPECT_LT(cv::norm(plates[0](middle), plates[1](later), cv::NORM_INF), 1e-5);
+  EXPECT_GT(cv::mean(plates[0](middle))[2], 0.1) << "clouds, not the object";
+}
+
+TEST(DriftingBackground, NothingDriftsWhereThePlaceRestsOrRipples) {
+  EXPECT_FALSE(DriftingBackground(clipOf(Motion::kRests), 2, cv::Mat()).established());
+  EXPECT_FALSE(DriftingBackground(clipOf(Motion::kRipples), 2, cv::Mat()).established());
+  EXPECT_FALSE(
+      DriftingBackground({frameAt(0, Motion::kDrifts, kObject)}, 2, cv::Mat()).established());
+}
+
+}  // namespace
+}  // namespace calipso::render
