@@ -1,6 +1,5 @@
 #include "calipso_flow/object_model.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -9,9 +8,6 @@ namespace {
 
 // A closed body encloses more than this share of its bounding cube's volume.
 constexpr double kLeastVolumeShare = 1e-5;
-
-// Of the diagonal: how far from an attachment box its vertices are looked for, and in which steps.
-constexpr double kMostReach = 0.15, kReachStep = 0.01;
 
 Eigen::Vector3d surfaceCentre(const TriangleMesh& mesh) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -28,23 +24,6 @@ Eigen::Vector3d surfaceCentre(const TriangleMesh& mesh) {
 }
 
 }  // namespace
-
-std::vector<int> verticesIn(const std::vector<AttachmentBox>& boxes, const ObjectModel& model) {
-  std::vector<int> inside;
-  const double diagonal = boundingDiagonal(model.mesh);
-  // A placement whose depth is some per cent off misses the boxes: they grow until they are met.
-  for (double reach = 0.0; inside.empty() && reach < kMostReach; reach += kReachStep) {
-    for (int i = 0; i < model.mesh.vertexCount(); ++i) {
-      const Eigen::Array3d p = (model.world_from_object * model.mesh.vertex(i)).array();
-      const bool held = std::any_of(boxes.begin(), boxes.end(), [&](const AttachmentBox& box) {
-        const double grown = reach * diagonal;
-        return (p >= box.min.array() - grown).all() && (p <= box.max.array() + grown).all();
-      });
-      if (held) inside.push_back(i);
-    }
-  }
-  return inside;
-}
 
 Eigen::Vector3d centroid(const TriangleMesh& mesh) {
   if (mesh.triangleCount() == 0) {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "aligned_models.hpp"
+#include "calipso_scene/attachment.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -106,7 +107,8 @@ ClipCase loadClipCase(const std::string& directory, const std::string& models, i
     const std::optional<TrueObject> truth = readTruth(directory, object.name);
     if (!truth) continue;
     clip.models.push_back(modelOf(scene, object, *truth, models, aligned[i]));
-    clip.models.back().attached = verticesIn(object.attachments, clip.models.back());
+    ObjectModel& model = clip.models.back();
+    model.attached = attachedVertices(model.mesh, model.world_from_object, object.attachments);
     clip.masks.push_back(maskOf(*truth, aligned[i], scale));
     clip.truths.push_back(*truth);
   }

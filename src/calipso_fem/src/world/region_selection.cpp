@@ -20,6 +20,13 @@ std::optional<double> intersect(const Eigen::Vector3d& o, const Eigen::Vector3d&
   return t;
 }
 
+std::vector<int> verticesIn(const WorldObject& object, const Eigen::AlignedBox3d& box) {
+  std::vector<int> chosen;
+  for (int i = 0; i < object.mesh.vertexCount(); ++i)
+    if (box.contains(object.world_from_object * object.mesh.vertex(i))) chosen.push_back(i);
+  return chosen;
+}
+
 std::vector<int> verticesNear(const WorldObject& object, const Eigen::Vector3d& point,
                               double radius) {
   std::vector<int> chosen;
@@ -85,8 +92,7 @@ std::vector<int> selectVertices(const WorldScene& scene, int index, const Region
       chosen = verticesNear(object, region.point, radius);
       break;
     case RegionKind::kBox:
-      chosen = verticesInBoxes(object.mesh, object.world_from_object,
-                               {{"region", region.box_min, region.box_max}});
+      chosen = verticesIn(object, {region.box_min, region.box_max});
       break;
   }
   if (chosen.empty()) {
@@ -94,20 +100,6 @@ std::vector<int> selectVertices(const WorldScene& scene, int index, const Region
     message << "region '" << toString(region.kind) << "' (radius " << radius
             << " m) holds no surface vertex of " << object.name << "; move or enlarge it";
     throw std::invalid_argument(message.str());
-  }
-  return chosen;
-}
-
-std::vector<int> verticesInBoxes(const TriangleMesh& mesh, const Eigen::Isometry3d& pose,
-                                 const std::vector<AttachmentBox>& boxes) {
-  std::vector<int> chosen;
-  for (int i = 0; i < mesh.vertexCount(); ++i) {
-    const Eigen::Vector3d p = pose * mesh.vertex(i);
-    for (const AttachmentBox& box : boxes)
-      if (Eigen::AlignedBox3d(box.min, box.max).contains(p)) {
-        chosen.push_back(i);
-        break;
-      }
   }
   return chosen;
 }

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "calipso_fem/world/convex_decomposition.hpp"
-#include "calipso_fem/world/region_selection.hpp"
+#include "calipso_scene/attachment.hpp"
 #include "describe.hpp"
 #include "obstacle_query.hpp"
 #include "world_impl.hpp"
@@ -210,7 +210,7 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   meetOwnSupports(actor, false);
   noteOverlaps(actor, surface);
   const auto attached =
-      verticesInBoxes(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
+      attachedVertices(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
   if (!attached.empty() && actor.holder == Holder::kAttachment) {
     body.fixSurfaceVertices(attached);
     if (actor.fixed.empty()) actor.fixed.push_back(attached);

@@ -4,7 +4,7 @@
 #include <map>
 #include <sstream>
 
-#include "calipso_fem/world/region_selection.hpp"
+#include "calipso_scene/attachment.hpp"
 #include "obstacle_query.hpp"
 #include "world_impl.hpp"
 
@@ -115,8 +115,8 @@ std::vector<HoldPoint> pointsOf(const Touching& touching) {
 void World::Impl::findHolder(Actor& actor) {
   if (actor.holder != Holder::kUnknown) return;
   actor.buoyancy.setZero();
-  const auto boxes = actor.object.attachments;
-  if (!verticesInBoxes(actor.object.mesh, actor.object.world_from_object, boxes).empty()) {
+  const WorldObject& object = actor.object;
+  if (!attachedVertices(object.mesh, object.world_from_object, object.attachments).empty()) {
     actor.holder = Holder::kAttachment;
     return;
   }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <calipso_scene/scene.hpp>
 #include <calipso_scene/triangle_mesh.hpp>
 #include <string>
 #include <vector>
@@ -17,9 +16,6 @@ struct ObjectModel {
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();  // of the placement, world, m^2
   std::vector<int> attached;  // vertices that are held by something that does not move
 };
-
-// Vertices of the placed model that lie in one of the boxes, ascending.
-std::vector<int> verticesIn(const std::vector<AttachmentBox>& boxes, const ObjectModel& model);
 
 // Centre of mass of the body of uniform density that `mesh` encloses. Where the mesh encloses
 // nothing (a sheet, or faces that cancel) it is the centre of the surface.

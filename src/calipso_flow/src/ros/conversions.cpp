@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "calipso_ros/conversions.hpp"
+#include "calipso_scene/attachment.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -124,7 +125,8 @@ ObjectModel modelFromMsg(const calipso_msgs::AlignedModel& model, const Scene& s
     }
   }
   for (const SceneObject& object : scene.objects) {
-    if (object.name == model.object) result.attached = verticesIn(object.attachments, result);
+    if (object.name == model.object)
+      result.attached = attachedVertices(result.mesh, result.world_from_object, object.attachments);
   }
   return result;
 }

@@ -24,8 +24,4 @@ std::optional<RayHit> castRay(const WorldScene& scene, const Eigen::Vector3d& or
 // @throw std::invalid_argument when the region meets no vertex of the object, naming the remedy
 std::vector<int> selectVertices(const WorldScene& scene, int object, const Region& region);
 
-// Vertices of a mesh at `pose` that lie in one of the boxes (world frame), ascending.
-std::vector<int> verticesInBoxes(const TriangleMesh& mesh, const Eigen::Isometry3d& pose,
-                                 const std::vector<AttachmentBox>& boxes);
-
 }  // namespace calipso::fem
