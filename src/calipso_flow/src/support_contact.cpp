@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+
+#include "calipso_flow/rotation.hpp"
 
 namespace calipso::flow {
 namespace {
@@ -57,6 +60,65 @@ bool reaches(const PoseMeasurement& before, const Clearance& height_before,
   return height.lowest + speed * ahead - 0.5 * fall * ahead * ahead < height.tolerance;
 }
 
+// Where a body falls on to from two poses: its pose `ahead` seconds after the second.
+struct Fall {
+  Eigen::Vector3d position, velocity, gravity, spin;  // of the centroid; at the second pose
+  Eigen::Matrix3d rotation;
+
+  Fall(const PoseMeasurement& before, const PoseMeasurement& from, const Eigen::Vector3d& g)
+      : position(from.position), gravity(g), rotation(from.rotation) {
+    const double past = from.time - before.time;
+    velocity = (from.position - before.position) / past + 0.5 * past * gravity;
+    spin = vectorFromRotation(from.rotation * before.rotation.transpose()) / past;
+  }
+  // From the centroid to the body's lowest point above a plane, world axes.
+  Eigen::Vector3d lowestArm(const TriangleMesh& mesh, const Eigen::Vector3d& centroid,
+                            const Eigen::Vector3d& up, double ahead) const {
+    const Eigen::Matrix3d turned = rotationFromVector(spin * ahead) * rotation;
+    const Eigen::VectorXd heights = mesh.vertices * (turned.transpose() * up);
+    Eigen::Index lowest = 0;
+    heights.minCoeff(&lowest);
+    return turned * (mesh.vertex(static_cast<int>(lowest)) - centroid);
+  }
+  Eigen::Vector3d positionAt(double ahead) const {
+    return position + ahead * velocity + 0.5 * ahead * ahead * gravity;
+  }
+};
+
+// When the lowest point of a body that falls on from two poses reaches a plane, until a time; as
+// surely as its height is known: by the poses, which an error of theirs carries on, and its shape.
+std::optional<PoseMeasurement::Instant> contactInstant(
+    const SupportPlane& plane, const ObjectModel& model, const PoseMeasurement& before,
+    const PoseMeasurement& from, double until, const Eigen::Vector3d& gravity, double shape_error) {
+  constexpr int kSteps = 16;
+  const Fall fall(before, from, gravity);
+  const Eigen::Vector3d middle = centroid(model.mesh);
+  const auto heightOf = [&](double ahead) {
+    const Eigen::Vector3d arm = fall.lowestArm(model.mesh, middle, plane.normal, ahead);
+    return plane.normal.dot(fall.positionAt(ahead) + arm) - plane.offset;
+  };
+  const double step = (until - from.time) / kSteps;
+  double height = heightOf(0.0);
+  for (int i = 1; i <= kSteps && height > 0.0; ++i) {
+    const double next = heightOf(i * step);
+    if (next > 0.0) {
+      height = next;
+      continue;
+    }
+    const double ahead = (i - 1 + height / (height - next)) * step;
+    const Eigen::Vector3d arm = fall.lowestArm(model.mesh, middle, plane.normal, ahead);
+    Vector6d by_pose;
+    by_pose << plane.normal, arm.cross(plane.normal);
+    const double share = ahead / (from.time - before.time);
+    const double variance = std::pow(1.0 + share, 2) * by_pose.dot(from.covariance * by_pose) +
+                            share * share * by_pose.dot(before.covariance * by_pose) +
+                            shape_error * shape_error;
+    return PoseMeasurement::Instant{from.time + ahead,
+                                    std::sqrt(variance) * step / (height - next)};
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 void noteContacts(const std::vector<SupportPlane>& planes, const ObjectModel& model,
@@ -79,6 +141,12 @@ void noteContacts(const std::vector<SupportPlane>& planes, const ObjectModel& mo
     for (size_t k = 0; k < count; ++k) {
       if (touches(k)) clear[k] = false;
       if (k == 0) continue;
+      if (k > 1 && falls(k - 2, k - 1, k) && heights[k].whole) {
+        const auto contact = contactInstant(plane, model, measurements[k - 2], measurements[k - 1],
+                                            measurements[k].time, gravity, shape_error);
+        if (contact && (!measurements[k].contact || contact->time < measurements[k].contact->time))
+          measurements[k].contact = contact;
+      }
       if (touches(k - 1) || touches(k) || (k > 1 && falls(k - 2, k - 1, k)) ||
           (k + 1 < count && falls(k + 1, k, k - 1)))
         strikes[k] = true;

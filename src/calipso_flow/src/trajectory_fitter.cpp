@@ -125,7 +125,8 @@ void TrajectoryFitter::chooseContacts() {
       pieces_[i].contact = share * frameSpacing();
       pieces_[i].start = bestTime(i, kRefineReach * frameSpacing());
       const Neighbourhood local = neighbourhood(i);
-      const double value = logLikelihood(local.measurements, local.pieces, prior_, noise_scale_) -
+      const double value = logLikelihood(local.measurements, local.pieces, prior_, noise_scale_) +
+                           contactOdds(i, pieces_[i].start) -
                            (share > 0.0 ? kContactEvidence : 0.0);
       if (value > most) most = value, best = pieces_[i];
     }
@@ -137,6 +138,26 @@ size_t TrajectoryFitter::leastFramesOf(size_t piece) const {
   const bool first = piece == 0 || pieces_[piece].cut;
   const bool last = piece + 1 == pieces_.size() || pieces_[piece + 1].cut;
   return leastFrames(first, last);
+}
+
+// Log odds, besides those of the poses, of a piece that starts at `time`: what falls on a support
+// most likely strikes it where it reaches it. Where one or two poses are all that is seen of it
+// afterwards they tell no instant: the less before them it is, the faster the body came out of it.
+double TrajectoryFitter::contactOdds(size_t piece, double time) const {
+  constexpr std::ptrdiff_t kFewPoses = 2;
+  constexpr double kTrust = 100.0;  // odds that it strikes there and at no other instant
+  const auto next = std::find_if(measurements_.begin(), measurements_.end(),
+                                 [&](const PoseMeasurement& m) { return m.time >= time; });
+  if (next == measurements_.end() || !next->contact) return 0.0;
+  const Measurements after = measurementsOf(piece, piece);
+  if (std::count_if(after.begin(), after.end(), [](const auto& m) { return m.valid; }) > kFewPoses)
+    return 0.0;
+  const auto began = next - 2;  // the fall from there has no jump in it
+  if (piece > 1 && pieces_[piece - 1].start > began->time) return 0.0;
+  const double off = (time - next->contact->time) / next->contact->deviation;
+  const double density =
+      std::exp(-0.5 * off * off) / (std::sqrt(2.0 * M_PI) * next->contact->deviation);
+  return std::log1p(kTrust * density * (next->time - (next - 1)->time));
 }
 
 // The likeliest start of a piece, within `reach` of the present one.
@@ -152,7 +173,8 @@ double TrajectoryFitter::bestTime(size_t piece, double reach) const {
   return maximise(
              [&](double time) {
                local.pieces[local.index].start = time;
-               return logLikelihood(local.measurements, local.pieces, prior_, noise_scale_);
+               return logLikelihood(local.measurements, local.pieces, prior_, noise_scale_) +
+                      contactOdds(piece, time);
              },
              low, high, step)
       .at;
@@ -164,7 +186,8 @@ double TrajectoryFitter::timeDeviation(size_t piece) const {
   const double step = 0.02 * frameSpacing(), at = pieces_[piece].start;
   const auto score = [&](double time) {
     local.pieces[local.index].start = time;
-    return logLikelihood(local.measurements, local.pieces, prior_, noise_scale_);
+    return logLikelihood(local.measurements, local.pieces, prior_, noise_scale_) +
+           contactOdds(piece, time);
   };
   const double curvature = (2.0 * score(at) - score(at - step) - score(at + step)) / (step * step);
   return curvature > 0.0 ? std::min(frameSpacing(), 1.0 / std::sqrt(curvature)) : frameSpacing();

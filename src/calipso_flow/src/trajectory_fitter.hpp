@@ -44,6 +44,7 @@ class TrajectoryFitter {
   void chooseContacts();
   size_t leastFramesOf(size_t piece) const;
   double bestTime(size_t piece, double reach) const;
+  double contactOdds(size_t piece, double time) const;
   double timeDeviation(size_t piece) const;
 
   void settleStillPieces();

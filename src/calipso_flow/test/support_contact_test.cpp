@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "calipso_flow/rotation.hpp"
 #include "rendered_scene.hpp"
 
 namespace calipso::flow {
@@ -38,6 +39,34 @@ TEST(SupportContact, strikesBetweenTheFramesAroundTheImpact) {
   for (int k = 1; k < 12; ++k) EXPECT_EQ(measurements[k].strikes > 0.0, k >= 8) << k;
   for (int k = 1; k <= 7; ++k) EXPECT_LT(measurements[k].strikes, 0.0) << k;
   for (int k = 0; k < 12; ++k) EXPECT_EQ(measurements[k].falls > 0.0, k <= 7) << k;
+}
+
+// 0.3 m takes 0.2473 s; a box that turns by 3 rad/s as it falls comes down on an edge, sooner.
+TEST(SupportContact, tellsWhenAFallReachesThePlane) {
+  for (const double spin : {0.0, 3.0}) {
+    auto observations = fall(0.3, 8);
+    for (Observation& o : observations)
+      o.world_from_object.linear() = rotationFromVector({spin * o.time, 0.0, 0.0});
+    const auto lowest = [&](double t) {
+      const Eigen::Matrix3d turned = rotationFromVector({spin * t, 0.0, 0.0});
+      return 0.5 - 0.5 * 9.81 * t * t +
+             (test::boxModel().mesh.vertices * turned.transpose()).col(2).minCoeff();
+    };
+    double before = 0.2, after = 0.25;  // s
+    while (after - before > 1e-6)
+      (lowest(0.5 * (before + after)) > 0.0 ? before : after) = 0.5 * (before + after);
+    observations.push_back(observations.back());
+    observations.back().time = 8 / kFps;
+    const auto measurements = noted({SupportPlane()}, observations);
+    const int next = static_cast<int>(std::ceil(before * kFps));
+    ASSERT_TRUE(measurements[next].contact) << spin;
+    // Within a sixteenth of a frame it is taken for uniform: 9.81 m/s^2 (2 ms)^2 / 8 are 5 um.
+    EXPECT_NEAR(measurements[next].contact->time, before, 1e-5) << spin;
+    // A hundredth of the diagonal, at about 2.4 m/s.
+    EXPECT_GT(measurements[next].contact->deviation, 1e-3) << spin;
+    EXPECT_LT(measurements[next].contact->deviation, 1e-2) << spin;
+    for (int k = 0; k < next; ++k) EXPECT_FALSE(measurements[k].contact) << k;
+  }
 }
 
 TEST(SupportContact, nothingIsNotedWithoutAPlane) {

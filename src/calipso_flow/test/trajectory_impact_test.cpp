@@ -161,6 +161,22 @@ TEST(Trajectory, findsTheInstantOfCollisionWithinAFrame) {
 
 // What lies where it fell has the restitution zero, and that as surely as a slow rebound would be
 // seen: 0.43 mm over ten frames are 1.6 mm/s, of 2.9 m/s.
+// Lost in the second frame after the impact: where the floor is says when it struck, and so how
+// fast the one pose shows it come back.
+TEST(Trajectory, onePoseAfterAnImpactTellsTheReboundWhereTheFloorIsKnown) {
+  constexpr double kImpact = 8.2 / kFps, kRestitution = 0.3;
+  auto poses = measure(
+      14, 5e-4, 2e-3, 3, [&](double t) { return bouncing(t, kImpact, kRestitution); }, still);
+  for (size_t k = 10; k < poses.size(); ++k) poses[k].valid = false;
+  poses[9].contact = PoseMeasurement::Instant{kImpact, 1e-3};
+  poses[9].strikes = 4.0;
+  const Trajectory trajectory = fitTrajectory(poses, {}, testPrior());
+  ASSERT_EQ(trajectory.collisions.size(), 1u);
+  EXPECT_NEAR(trajectory.collisions[0].time, kImpact, 2e-3);
+  // 0.8 of a frame after the impact 0.5 mm are 0.02 m/s, a ms of the fall's 2.7 m/s is 0.1 m/s.
+  EXPECT_NEAR(trajectory.collisions[0].restitution(), kRestitution, 0.1);
+}
+
 TEST(Trajectory, statesHowSurelyWhatFellDoesNotRebound) {
   const double tc = 9.3 / kFps;
   const Eigen::Vector3d floor = bouncing(tc, 10.0, 0.0);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <vector>
 
 #include "calipso_flow/pose_fit.hpp"
@@ -53,6 +54,12 @@ struct PoseMeasurement {
   // What is known of the surroundings, as log odds: that it falls freely at this time rather than
   // being held, and that since the measurement before it has struck something, besides the usual.
   double falls = 0.0, strikes = 0.0;
+  // When since the measurement before it reaches the surroundings if it goes on falling as it did
+  // in the two before, s, with its standard deviation.
+  struct Instant {
+    double time, deviation;
+  };
+  std::optional<Instant> contact;
 };
 
 enum class Travel { kRest, kUniform, kFreeFall, kAccelerated, kForced };
