@@ -124,6 +124,20 @@ TEST(DriftingBackground, WhatNoFrameShowsIsInventedOnceAndDriftsAlong) {
   EXPECT_GT(cv::mean(plates[0](middle))[2], 0.1) << "clouds, not the object";
 }
 
+TEST(DriftingBackground, IsBroughtToWhatAFrameShowsAroundTheObject) {
+  const DriftingBackground drifting(clipOf(Motion::kDrifts), 2, cv::Mat());
+  ASSERT_TRUE(drifting.established());
+  ClipFrame brighter = frameAt(5, Motion::kDrifts, kObject);
+  brighter.bgr.convertTo(brighter.bgr, CV_8UC3, 1.03);
+  cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar()),
+      invented = cv::Mat::zeros(kHigh, kWide, CV_8U);
+  drifting.draw(*drifting.shiftAt(brighter.stamp_ns), plate, invented);
+  const cv::Scalar before = cv::mean(plate(kObject));
+  drifting.matchTo(brighter.bgr, brighter.labels != 0, plate);
+  const cv::Scalar after = cv::mean(plate(kObject));
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(after[c] / before[c], std::pow(1.03, 2.2), 0.02) << c;
+}
+
 TEST(DriftingBackground, NothingDriftsWhereThePlaceRestsOrRipples) {
   EXPECT_FALSE(DriftingBackground(clipOf(Motion::kRests), 2, cv::Mat()).established());
   EXPECT_FALSE(DriftingBackground(clipOf(Motion::kRipples), 2, cv::Mat()).established());

@@ -9,6 +9,7 @@
 #include "calipso_render/colour.hpp"
 #include "draw/side_by_side.hpp"
 #include "frame/frame_compositor.hpp"
+#include "place/key_cover.hpp"
 #include "place/place_depth.hpp"
 #include "place/view_warp.hpp"
 
@@ -176,6 +177,8 @@ void FrameCompositor::stagePlace() {
   if (const auto shift = drifting.shiftAt(frame_.stamp_ns)) {
     plate_ = plate_.clone(), invented_ = invented_.clone();
     drifting.draw(*shift, plate_, invented_);
+    if (sameView(frame_.camera, prepared_.camera))
+      drifting.matchTo(frame_.bgr, grown(labels_ != 0, params_.background.mask_margin_px), plate_);
     drifts_ = drifting.where();
   }
   if (sameView(frame_.camera, prepared_.camera)) {

@@ -13,7 +13,10 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kInterpolated = 2;   // px around a place that its value hangs on
+constexpr int kInterpolated = 2;  // px around a place that its value hangs on
+constexpr int kMatched = 16;      // px of the squares in which frame and plate are compared
+constexpr float kMostOff =
+    0.1f;  // of the plate's brightness; what is off by more is something else
 constexpr double kMostArea = 4.0;  // times the picture that a panorama may have
 
 cv::Point rounded(const cv::Point2f& p) {
@@ -68,7 +71,8 @@ void DriftingBackground::layOver(const std::vector<ClipFrame>& frames,
     cv::Mat picture;
     frames[i].bgr.convertTo(picture, CV_32F);
     displaced(picture, by, size).convertTo(pictures[i], CV_8U);
-    shown[i] = displacedMask(grown(~where_ | covered[i], kInterpolated) == 0, rounded(by), size);
+    shown[i] = displacedMask((grown(~where_, kInterpolated) | grown(covered[i], 1)) == 0,
+                             rounded(by), size);
   }
   panorama_ = cv::Mat::zeros(size, CV_32FC3), invented_ = cv::Mat(size, CV_8U, cv::Scalar(255));
 #pragma omp parallel for schedule(dynamic, 8)
@@ -114,6 +118,37 @@ void DriftingBackground::draw(const cv::Point2f& shift, cv::Mat& plate, cv::Mat&
   cv::max(now, 0.0, now);
   now.copyTo(plate, where_);
   displacedMask(invented_, rounded(by), plate.size()).copyTo(invented, where_);
+}
+
+void DriftingBackground::matchTo(const cv::Mat& bgr, const cv::Mat& covered, cv::Mat& plate) const {
+  const cv::Size size(bgr.cols / kMatched + 1, bgr.rows / kMatched + 1);
+  cv::Mat off = cv::Mat::zeros(size, CV_32FC3), weight = cv::Mat::zeros(size, CV_32F);
+#pragma omp parallel for schedule(static)
+  for (int j = 0; j < size.height; ++j) {
+    cv::Vec3f* offs = off.ptr<cv::Vec3f>(j);
+    float* weights = weight.ptr<float>(j);
+    std::vector<float> light(size.width, 0.0f);  // of the plate
+    for (int v = j * kMatched; v < std::min(bgr.rows, (j + 1) * kMatched); ++v) {
+      for (int u = 0; u < bgr.cols; ++u) {
+        if (where_.at<std::uint8_t>(v, u) == 0 || covered.at<std::uint8_t>(v, u) != 0) continue;
+        const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
+        const cv::Vec3f now(linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2])),
+            &drawn = plate.at<cv::Vec3f>(v, u);
+        offs[u / kMatched] += now - drawn, light[u / kMatched] += luminance(drawn);
+        weights[u / kMatched] += 1.0f;
+      }
+    }
+    for (int i = 0; i < size.width; ++i) {
+      if (weights[i] == 0.0f) continue;
+      const bool other = cv::norm(offs[i], cv::NORM_INF) > kMostOff * light[i];
+      offs[i] *= 1.0f / weights[i];
+      weights[i] = other ? 0.0f : weights[i] / (kMatched * kMatched);
+    }
+  }
+  cv::Mat correction;
+  cv::resize(pushPull(off, weight), correction, size * kMatched, 0, 0, cv::INTER_LINEAR);
+  const cv::Mat matched = plate + correction(cv::Rect({0, 0}, plate.size()));
+  cv::Mat(cv::max(matched, 0.0)).copyTo(plate, where_);
 }
 
 }  // namespace calipso::render
