@@ -220,15 +220,6 @@ std::vector<std::vector<float>> residualsPerLoop(const FitProblem& problem,
   return residuals;
 }
 
-AlignmentResult unaligned(const TriangleMesh& cad, const Eigen::Isometry3d& pose,
-                          const std::string& reason) {
-  AlignmentResult result;
-  result.world_from_object = pose;
-  result.mesh = result.rest = cad;
-  result.reason = reason;
-  return result;
-}
-
 // Fills in everything that follows from where the vertices ended.
 void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& x,
               const std::vector<ContourLoop>& contour, const LowOrderStep& last, bool judge_depth,
@@ -265,6 +256,15 @@ void describe(const FitProblem& problem, const TriangleMesh& cad, const Points& 
 }
 
 }  // namespace
+
+AlignmentResult unaligned(const TriangleMesh& cad, const Eigen::Isometry3d& pose,
+                          const std::string& reason) {
+  AlignmentResult result;
+  result.world_from_object = pose;
+  result.mesh = result.rest = cad;
+  result.reason = reason;
+  return result;
+}
 
 double totalMs(const AlignmentResult& result) {
   double sum = 0.0;

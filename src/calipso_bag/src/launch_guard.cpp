@@ -57,7 +57,7 @@ void failLaunch() {
   const std::vector<pid_t> children = childrenOf(parent);
   kill(parent, SIGKILL);
   for (const pid_t child : children) {
-    if (child != getpid()) kill(child, SIGTERM);
+    if (child != getpid()) kill(child, SIGINT);  // roscpp closes down on no other signal
   }
 }
 

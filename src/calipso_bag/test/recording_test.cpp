@@ -61,6 +61,17 @@ TEST(OutputBag, HasItsNameOnlyWhenItIsFinished) {
   EXPECT_FALSE(std::filesystem::exists(path + ".active"));
 }
 
+TEST(OutputBag, LeavesWhatWasWrittenOrNothing) {
+  const TemporaryFolder folder;
+  { OutputBag output(folder / "empty.bag"); }
+  EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
+  {
+    OutputBag output(folder / "begun.bag");
+    output.write("/words", ros::Time(1.0), *text("a"));
+  }
+  EXPECT_EQ(wordsIn(folder / "begun.bag.active", "/words"), "a ") << "closed, with its index";
+}
+
 TEST(OutputBag, SaysWhereItCannotBeWritten) {
   const TemporaryFolder folder;
   std::ofstream(folder / "file") << "not a folder";

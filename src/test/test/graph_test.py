@@ -2,6 +2,7 @@
 """The whole graph on a short clip of the shipped example, launched as a user would."""
 
 import os
+import re
 import subprocess
 import tempfile
 import time
@@ -104,14 +105,37 @@ class Graph(unittest.TestCase):
         self.assertGreater(changed[90:190, 190:445].sum(), 300, "the banana's pixels")
         self.assertEqual(changed[:, :150].sum(), 0, "pixels far from it")
 
-    def test_quality_reaches_the_renderer(self):
-        command = ["roslaunch", "--dump-params", "calipso_launch", "edit.launch", "quality:=final"]
-        command += ["%s:=%s" % pair for pair in self.arguments("final.bag", None).items()]
-        self.assertEqual(yaml.safe_load(subprocess.check_output(command))["/calipso/render/quality"], "final")
+    def parameters(self, file, **arguments):
+        """What a launch file sets on the parameter server."""
+        command = ["roslaunch", "--dump-params", "calipso_launch", file]
+        command += ["%s:=%s" % pair for pair in arguments.items()]
+        return yaml.safe_load(subprocess.check_output(command))
 
-    def test_quality_on_the_server_is_kept_by_live(self):
-        command = ["roslaunch", "--dump-params", "calipso_launch", "live.launch", "scene:=" + self.scene]
-        self.assertNotIn("/calipso/render/quality", yaml.safe_load(subprocess.check_output(command)))
+    def test_quality_reaches_the_renderer(self):
+        edit = self.parameters("edit.launch", quality="final", **self.arguments("final.bag", None))
+        live = self.parameters("live.launch", quality="final", scene=self.scene)
+        self.assertEqual([p["/calipso/render/quality"] for p in (edit, live)], ["final", "final"])
+
+    def test_nothing_of_a_run_is_left_on_the_server_for_another_kind_of_run(self):
+        """A master that runs on keeps what a launch sets: the next one sets it anew, unless the node is its own."""
+        edit = self.parameters("edit.launch", **self.arguments("out.bag", None))
+        live = self.parameters("live.launch", scene=self.scene, out=self.path("out.bag"), edits="edits.yaml")
+        own = {"edit": "player", "live": "camera_pose|send_edits"}
+        for one, other, name in ((edit, live, "edit"), (live, edit, "live")):
+            left = [p for p in set(one) - set(other) if not re.match("/calipso/(%s)/" % own[name], p)]
+            self.assertEqual(left, [], "set by %s.launch alone" % name)
+
+    def test_what_happens_in_the_last_frame_is_recorded(self):
+        out = self.edit("last.bag", [{"t": (FRAMES - 1) / 30.0 - 0.01, "object": "banana1", "kind": "velocity",
+                                      "mode": "add", "vector": [0, 0, 1]}])
+        last = clips.stamps(out, EDITED)[-1]
+        self.assertEqual([r.header.stamp for r in clips.messages(out, "/calipso/edits/applied")], [last])
+        plan = clips.messages(out, "/calipso/plan")[-1]
+        self.assertEqual([o.reason for o in plan.objects if o.object == "banana1"], ["edit 'velocity'"])
+        moved = [t for m in clips.messages(out, "/tf") for t in m.transforms if t.child_frame_id == "object/banana1"]
+        self.assertEqual([t.header.stamp for t in moved], [last])
+        drawn = [m for a in clips.messages(out, "/calipso/markers") for m in a.markers if m.ns == "contacts"]
+        self.assertEqual(max(m.header.stamp for m in drawn), last)
 
     def wait_for_publisher(self, topic, timeout_sec=60):
         """Until the master knows one; the run is over within seconds."""

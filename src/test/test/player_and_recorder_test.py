@@ -2,7 +2,9 @@
 """Player and recorder with an echo between them: what goes in comes out, or the run fails."""
 
 import os
+import subprocess
 import tempfile
+import time
 import unittest
 
 import rosbag
@@ -18,10 +20,12 @@ EDITED = "/calipso/image_edited"
 class PlayerAndRecorder(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
+        self.said = open(self.path("said"), "w")
         self.scene = clips.make_scene(self.folder.name, FRAMES)
         self.bag = clips.make_bag(self.scene, self.path("in.bag"))
 
     def tearDown(self):
+        self.said.close()
         self.folder.cleanup()
 
     def path(self, name):
@@ -70,6 +74,48 @@ class PlayerAndRecorder(unittest.TestCase):
         self.assertIn("a frame was lost", output)
         self.assertFalse(os.path.exists(self.path("out.bag")))
 
+
+    def test_a_node_that_comes_back_in_mid_run_is_refused(self):
+        player = subprocess.Popen(
+            ["rosrun", "calipso_bag", "player_node", "_bag:=" + self.bag, "_scene:=" + self.scene],
+            env=dict(os.environ, ROSCONSOLE_STDOUT_LINE_BUFFERED="1"), stdout=self.said, stderr=subprocess.STDOUT)
+        nodes = [self.stand_in()]
+        try:
+            self.wait_for("flow: here")
+            nodes[0].kill()
+            self.wait_for("flow: its process ended")
+            nodes.append(self.stand_in())
+            self.wait_for("flow: started again in mid-run")
+        finally:
+            for process in nodes + [player]:
+                process.kill()
+                process.wait()
+
+    def stand_in(self):
+        """A node that reports as the flow does, and hears what the player sends."""
+        return subprocess.Popen(["python3", "-c", """
+import rospy
+from calipso_msgs.msg import ClipInfo, NodeStatus
+rospy.init_node("stand_in")
+rospy.Subscriber("clip/info", ClipInfo, print)
+status = rospy.Publisher("status", NodeStatus, latch=True, queue_size=1)
+while not rospy.is_shutdown():
+    status.publish(node="flow", message="here")
+    rospy.sleep(0.1)
+"""])
+
+    def wait_for(self, words, printed=None, timeout_sec=60):
+        """Until they have been said, by default by the player that runs alone."""
+        printed = printed or self.printed
+        end = time.monotonic() + timeout_sec
+        while words not in printed():
+            self.assertLess(time.monotonic(), end, "not said: %s\n%s" % (words, printed()))
+            time.sleep(0.05)
+
+    def printed(self):
+        with open(self.path("said")) as file:
+            return file.read()
+
     def test_an_image_that_gets_lost_on_the_way_to_the_recorder_is_not_waited_for_for_ever(self):
         status, output = self.echo(lose_image=1)
         self.assertNotEqual(status, 0)
@@ -83,10 +129,16 @@ class PlayerAndRecorder(unittest.TestCase):
         self.assertFalse(os.path.exists(self.path("out.bag")))
 
     def test_a_last_frame_that_never_comes_is_not_waited_for_for_ever(self):
-        status, output = self.echo(swallow=FRAMES - 1, frame_timeout_sec=3)
+        out = self.path("out.bag")
+        launch = launching.Launch("calipso_test", "echo.launch", bag=self.bag, scene=self.scene, out=out,
+                                  swallow=FRAMES - 1, frame_timeout_sec=3)
+        status, output = launch.wait()
         self.assertNotEqual(status, 0)
         self.assertIn("no edited frame for 3", output)
-        self.assertFalse(os.path.exists(self.path("out.bag")))
+        self.assertFalse(os.path.exists(out))
+        # The recorder is interrupted, as by the user, and closes what it has.
+        self.wait_for("with %d edited frames, as %s.active" % (FRAMES - 1, out), launch.printed)
+        self.assertEqual(len(clips.messages(out + ".active", EDITED)), FRAMES - 1)
 
     def test_a_dead_node_fails_the_run(self):
         status, output = self.echo(die_at=3)

@@ -84,6 +84,10 @@ AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
                       const Eigen::Isometry3d& initial_world_from_object,
                       const std::vector<ContourLoop>& contour, const AlignOptions& options = {});
 
+// The model where the user put it, with the reason why nothing better is known.
+AlignmentResult unaligned(const TriangleMesh& cad, const Eigen::Isometry3d& pose,
+                          const std::string& reason);
+
 // Milliseconds of all stages.
 double totalMs(const AlignmentResult& result);
 

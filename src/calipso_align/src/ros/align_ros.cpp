@@ -36,16 +36,6 @@ const calipso_msgs::ObjectContour* findContour(const calipso_msgs::Segmentation&
   return nullptr;
 }
 
-// The model where the user put it, with the reason why nothing better is known.
-AlignmentResult unaligned(const TriangleMesh& cad, const Eigen::Isometry3d& pose,
-                          const std::string& reason) {
-  AlignmentResult result;
-  result.world_from_object = pose;
-  result.mesh = result.rest = cad;
-  result.reason = reason;
-  return result;
-}
-
 }  // namespace
 
 AlignNodeParams loadAlignParams(const ros::NodeHandle& pnh) {

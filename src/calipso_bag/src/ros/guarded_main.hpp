@@ -18,7 +18,11 @@ inline int runGuarded(const std::string& name, const std::function<void()>& body
     body();
     return 0;
   } catch (const std::exception& error) {
-    ROS_FATAL_STREAM(name << ": " << error.what());
+    if (ros::ok()) {
+      ROS_FATAL_STREAM(name << ": " << error.what());
+    } else {  // interrupted: ROS prints no more
+      std::cerr << name << ": " << error.what() << std::endl;
+    }
     failLaunch();
     return 1;
   }

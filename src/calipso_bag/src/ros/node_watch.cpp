@@ -19,6 +19,10 @@ void NodeWatch::fail(const std::string& node, const std::string& reason) {
   if (preparation_.standing(node).state == NodeState::kFailed) return;
   ROS_ERROR_STREAM(node << ": " << reason << "; frames pass unedited where they need it");
   preparation_.fail(node, reason);
+  announceFailed(node, reason);
+}
+
+void NodeWatch::announceFailed(const std::string& node, const std::string& reason) {
   NodeStatus status;
   status.header.stamp = ros::Time::now();
   status.node = node;
@@ -45,6 +49,14 @@ void NodeWatch::onStatus(const ros::MessageEvent<NodeStatus const>& event) {
   ++activity_;
   const NodeStatus& status = *event.getMessage();
   node_of_[event.getPublisherName()] = status.node;
+  if (ended(status.node)) {
+    const std::string refusal =
+        "started again in mid-run, it does not know the edits and frames before and stays out; "
+        "stop this run and launch it anew";
+    if (came_back_.insert(status.node).second) ROS_ERROR_STREAM(status.node << ": " << refusal);
+    announceFailed(status.node, refusal);  // whoever has believed what it says now
+    return;
+  }
   NodeStanding standing;
   standing.state = static_cast<NodeState>(status.state);
   standing.message = status.message;

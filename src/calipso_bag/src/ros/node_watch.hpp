@@ -22,7 +22,8 @@ class NodeWatch {
   // How many messages of status have come in; grows while anybody makes progress.
   int activity() const { return activity_; }
 
-  // True when the node's process has ended.
+  // True when the node's process has ended. One that is started in its place stays out: it does not
+  // know what went before.
   bool ended(const std::string& node) const { return ended_.count(node) > 0; }
 
   // ROS names of the nodes that have reported.
@@ -40,10 +41,12 @@ class NodeWatch {
  private:
   void onStatus(const ros::MessageEvent<calipso_msgs::NodeStatus const>& event);
 
+  void announceFailed(const std::string& node, const std::string& reason);
+
   Preparation preparation_;
   std::map<std::string, std::string> node_of_;  // ROS name -> name in NodeStatus
   std::map<std::string, std::string> last_said_;
-  std::set<std::string> ended_;
+  std::set<std::string> ended_, came_back_;
   int activity_ = 0;
   bool over_ = false;
   ros::Publisher publisher_;

@@ -23,7 +23,11 @@ OutputBag::OutputBag(const std::string& path)
   }
 }
 
-OutputBag::~OutputBag() { abandon(); }
+OutputBag::~OutputBag() {
+  abandon();
+  std::error_code none;
+  if (empty_) fs::remove(active_path_, none);
+}
 
 // NOTE: where a bag cannot be closed, its destructor would try again, and throw.
 void OutputBag::abandon() {

@@ -10,7 +10,8 @@
 namespace calipso::bag {
 
 // A bag that appears under its name only when it is complete: it grows as PATH.active and is
-// renamed by finish(). Whatever ends the program earlier leaves PATH untouched.
+// renamed by finish(). Whatever ends the program earlier leaves PATH untouched, and PATH.active
+// closed, or gone when nothing was written.
 class OutputBag {
  public:
   // Makes missing folders. @throw std::runtime_error when the file cannot be written
@@ -25,6 +26,7 @@ class OutputBag {
   void write(Arguments&&... arguments) {
     try {
       bag_->write(std::forward<Arguments>(arguments)...);
+      empty_ = false;
     } catch (const rosbag::BagException& e) {
       failWriting(e, kMakeRoom);
     }
@@ -42,6 +44,7 @@ class OutputBag {
 
   std::string path_, active_path_;
   std::unique_ptr<rosbag::Bag> bag_;
+  bool empty_ = true;
 };
 
 }  // namespace calipso::bag

@@ -8,7 +8,6 @@
 
 #include "calipso_msgs/ClipDynamics.h"
 #include "calipso_msgs/Dynamics.h"
-#include "calipso_msgs/SimulationState.h"
 #include "calipso_ros/topics.hpp"
 #include "run_log.hpp"
 #include "wait.hpp"
@@ -45,7 +44,7 @@ void Recorder::subscribeFrames() {
   subscribers_.push_back(nh_.subscribe(topics::kImageEdited, kQueue, &Recorder::onEdited, this));
   record<sensor_msgs::CameraInfo>(topics::kImageEditedCameraInfo);
   record<sensor_msgs::Image>(topics::kProvenance);
-  record<calipso_msgs::SimulationState>(topics::kState);
+  subscribers_.push_back(nh_.subscribe(topics::kState, kQueue, &Recorder::onState, this));
   subscribers_.push_back(nh_.subscribe("/tf", kQueue, &Recorder::onTf, this));
   subscribers_.push_back(nh_.subscribe("/tf_static", kQueue, &Recorder::onTf, this));
 }
@@ -73,6 +72,7 @@ void Recorder::write(const std::string& topic, const ros::MessageEvent<M const>&
   writer_.add(nh_.resolveName(topic), std::max(stamp, ros::TIME_MIN), rank, event.getConstMessage(),
               event.getConnectionHeaderPtr());
   ++count_[topic];
+  newest_[topic] = std::max(newest_[topic], stamp);
 }
 
 template <typename M>
@@ -117,12 +117,19 @@ void Recorder::onSegmentation(const ros::MessageEvent<calipso_msgs::Segmentation
   if (count_[topics::kSegmentation] == 0) write(topics::kSegmentation, event, "");
 }
 
+void Recorder::onState(const ros::MessageEvent<calipso_msgs::SimulationState const>& event) {
+  write(topics::kState, event, "");
+  state_ = event.getConstMessage();
+  simulator_ = event.getPublisherName();
+}
+
 void Recorder::onMarkers(const ros::MessageEvent<visualization_msgs::MarkerArray const>& event) {
   const auto& markers = event.getMessage()->markers;
   if (markers.empty()) return;
   const ros::Time stamp = std::max(markers.front().header.stamp, ros::TIME_MIN);
   writer_.add(nh_.resolveName(topics::kMarkers), stamp, event.getPublisherName() + nextRank(),
               event.getConstMessage(), event.getConnectionHeaderPtr());
+  newest_[event.getPublisherName()] = stamp;
 }
 
 // One message for each transform, so that each is found at its own stamp.
@@ -133,6 +140,7 @@ void Recorder::onTf(const ros::MessageEvent<tf2_msgs::TFMessage const>& event) {
     single->transforms.push_back(transform);
     writer_.add<tf2_msgs::TFMessage>(topic, std::max(transform.header.stamp, ros::TIME_MIN),
                                      transform.child_frame_id, single);
+    newest_[transform.child_frame_id] = transform.header.stamp;
   }
 }
 
@@ -164,19 +172,46 @@ bool Recorder::allExplained() const {
   const bool simulated = summary_.failed.empty();
   return input_.size() >= clip_.played_frames && complete(topics::kImageEditedCameraInfo) &&
          complete(topics::kProvenance) && (!simulated || complete(topics::kState)) &&
-         (!simulated || complete(topics::kDynamics));
+         (!simulated || (complete(topics::kDynamics) && lastStateExplained()));
+}
+
+// What the simulator sends with a state travels on connections of its own, and may come later.
+bool Recorder::lastStateExplained() const {
+  const auto reached = [this](const std::string& name, const ros::Time& stamp) {
+    const auto found = newest_.find(name);
+    return found != newest_.end() && found->second >= stamp;
+  };
+  const auto reports = count_.find(topics::kEditsApplied);
+  const std::uint32_t reported = reports == count_.end() ? 0 : reports->second;
+  const bool planned = state_->plan_stamp.isZero() || reached(topics::kPlan, state_->plan_stamp);
+  if (!planned || reported < state_->reports) return false;
+  if (state_->objects.empty()) return true;  // there is no simulation
+  const ros::Time stamp = state_->header.stamp;
+  return reached(simulator_, stamp) &&
+         std::all_of(state_->objects.begin(), state_->objects.end(), [&](const auto& object) {
+           const bool placed = object.kind == "rigid" || object.kind == "kinematic";
+           return !placed || reached("object/" + object.object, stamp);
+         });
 }
 
 void Recorder::run() {
-  if (params_.live) {
-    recordLive();
-  } else {
-    recordClip();
+  try {
+    params_.live ? recordLive() : recordClip();
+  } catch (const std::exception& error) {
+    throw std::runtime_error(error.what() + keepIncomplete());
   }
   summary_.frames_in = static_cast<int>(input_.size());
   summary_.frames_out = static_cast<int>(edited_.size());
   writer_.flushAll();
   output_.finish();
+}
+
+// What to do with the beginning of a run. Without any frame of it nothing stays.
+std::string Recorder::keepIncomplete() {
+  if (edited_.empty()) return "";
+  writer_.flushAll();
+  return "; the bag stays incomplete, with " + std::to_string(edited_.size()) +
+         " edited frames, as " + output_.path() + ".active";
 }
 
 void Recorder::recordClip() {
@@ -220,9 +255,7 @@ void Recorder::recordLive() {
 void Recorder::checkFrames() const {
   if (edited_ == input_) return;
   throw std::runtime_error(std::to_string(input_.size()) + " frames went in, " +
-                           std::to_string(edited_.size()) +
-                           " came out, or their stamps differ; the bag stays incomplete as " +
-                           output_.path() + ".active");
+                           std::to_string(edited_.size()) + " came out, or their stamps differ");
 }
 
 }  // namespace calipso::bag

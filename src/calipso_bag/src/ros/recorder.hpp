@@ -3,6 +3,7 @@
 #include <calipso_msgs/ClipInfo.h>
 #include <calipso_msgs/Edit.h>
 #include <calipso_msgs/Segmentation.h>
+#include <calipso_msgs/SimulationState.h>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
@@ -25,7 +26,7 @@ namespace calipso::bag {
 
 // Writes the edited bag: images, camera_info and everything that explains them, each message at its
 // own stamp and in an order that does not depend on timing. The bag gets its name only when every
-// frame that went in has come out. Not thread-safe.
+// frame that went in has come out; until then, and when a run ends early, it is PATH.active. Not thread-safe.
 class Recorder {
  public:
   struct Params {
@@ -64,12 +65,15 @@ class Recorder {
   void onInput(const sensor_msgs::CameraInfoConstPtr& info);
   void onEdited(const ros::MessageEvent<sensor_msgs::Image const>& event);
   void onSegmentation(const ros::MessageEvent<calipso_msgs::Segmentation const>& event);
+  void onState(const ros::MessageEvent<calipso_msgs::SimulationState const>& event);
   void onMarkers(const ros::MessageEvent<visualization_msgs::MarkerArray const>& event);
   void onTf(const ros::MessageEvent<tf2_msgs::TFMessage const>& event);
   bool connected() const;
   bool allEdited() const;
   bool allExplained() const;
+  bool lastStateExplained() const;
   void recordClip();
+  std::string keepIncomplete();
   void recordLive();
   void checkFrames() const;
   std::string nextRank();
@@ -81,9 +85,12 @@ class Recorder {
   NodeReporter reporter_;
   RunSummary summary_;
   std::vector<ros::Subscriber> subscribers_;
-  calipso_msgs::ClipInfo clip_;            // frames == 0 until the player has announced it
-  std::vector<ros::Time> input_, edited_;  // stamps, in the order they came
-  std::map<std::string, int> count_;       // messages recorded, by topic
+  calipso_msgs::ClipInfo clip_;                  // frames == 0 until the player has announced it
+  std::vector<ros::Time> input_, edited_;        // stamps, in the order they came
+  std::map<std::string, int> count_;             // messages recorded, by topic
+  calipso_msgs::SimulationStateConstPtr state_;  // the newest one, and its sender's ROS name
+  std::string simulator_;
+  std::map<std::string, ros::Time> newest_;  // plan by topic, markers by sender, tf by child frame
   int rank_ = 0;
   ros::WallTime first_edited_;
   // Live: a bag holds the video up to where its stamps go back.

@@ -1,8 +1,6 @@
 #include "simulator_ros.hpp"
 
-#include <calipso_msgs/EditReport.h>
 #include <calipso_msgs/Plan.h>
-#include <calipso_msgs/SimulationState.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include <boost/make_shared.hpp>
@@ -110,7 +108,9 @@ void SimulatorRos::prepare() {
     reporter_.failed(error.what());
     return;
   }
-  if (!params_.live) {
+  if (params_.live) {
+    world_->prepareForEdits();
+  } else {
     for (const auto& frame : clip_dynamics_->frames) take(frame);
     for (const auto& object : clip_dynamics_->objects) take(object);
     world_->allCollisionsKnown();
@@ -171,8 +171,7 @@ void SimulatorRos::refuse(const calipso_msgs::Edit& edit, const std::string& mes
   report.edit = edit;
   report.accepted = false;
   report.message = message;
-  applied_.publish(report);
-  reporter_.remark("edit refused: " + message);
+  this->report(report);
 }
 
 // Models of a key frame that is not later stay: they are sent once only, perhaps before this.
@@ -192,7 +191,7 @@ void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
   if (!world_) {
     // A state without objects lets the frame pass unedited.
     if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) {
-      state_.publish(toMsg(WorldState{}, stamp));
+      state_.publish(stateMsg(WorldState{}, stamp));
       reporter_.warn(stamp, "there is no simulation; the frame passes unedited");
     }
     return;
@@ -205,27 +204,39 @@ void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
   try {
     publish(world_->advanceTo((stamp - *first_stamp_).toSec()), stamp);
   } catch (const std::exception& error) {
-    state_.publish(toMsg(WorldState{}, stamp));
+    state_.publish(stateMsg(WorldState{}, stamp));
     reporter_.warn(stamp, std::string(error.what()) + "; the frame passes unedited");
   }
 }
 
 void SimulatorRos::publish(const std::vector<EditOutcome>& outcomes, const ros::Time& stamp) {
-  for (const EditOutcome& outcome : outcomes) {
-    applied_.publish(toMsg(outcome, stamp, *first_stamp_));
-    if (!outcome.accepted) reporter_.remark("edit refused: " + outcome.message);
-  }
-  const WorldState state = world_->state();
-  state_.publish(toMsg(state, stamp));
-  reporter_.timing(stamp, state.step_ms);
+  for (const EditOutcome& outcome : outcomes) report(toMsg(outcome, stamp, *first_stamp_));
   if (world_->planChanged()) publishPlan(stamp);
+  const WorldState state = world_->state();
+  state_.publish(stateMsg(state, stamp));
+  reporter_.timing(stamp, state.step_ms);
   sendRigidTransforms(state, stamp);
   if (markers_.getNumSubscribers() > 0)
     markers_.publish(toMarkers(*world_, {params_.colour_by, params_.force_scale}, stamp));
 }
 
+void SimulatorRos::report(const calipso_msgs::EditReport& report) {
+  applied_.publish(report);
+  ++reports_;
+  if (!report.accepted) reporter_.remark("edit refused: " + report.message);
+}
+
 void SimulatorRos::publishPlan(const ros::Time& stamp) {
   plan_.publish(toMsg(world_->plan(), stamp));
+  plan_stamp_ = stamp;
+}
+
+calipso_msgs::SimulationState SimulatorRos::stateMsg(const WorldState& state,
+                                                     const ros::Time& stamp) const {
+  calipso_msgs::SimulationState message = toMsg(state, stamp);
+  message.plan_stamp = plan_stamp_;
+  message.reports = reports_;
+  return message;
 }
 
 void SimulatorRos::sendRigidTransforms(const WorldState& state, const ros::Time& stamp) {

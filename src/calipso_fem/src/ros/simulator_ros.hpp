@@ -5,7 +5,9 @@
 #include <calipso_msgs/ClipInfo.h>
 #include <calipso_msgs/Dynamics.h>
 #include <calipso_msgs/Edit.h>
+#include <calipso_msgs/EditReport.h>
 #include <calipso_msgs/NodeStatus.h>
+#include <calipso_msgs/SimulationState.h>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <tf2_ros/transform_broadcaster.h>
@@ -45,7 +47,9 @@ class SimulatorRos {
   void submit(const calipso_msgs::Edit& edit);
   void refuse(const calipso_msgs::Edit& edit, const std::string& message);
   void publish(const std::vector<EditOutcome>& outcomes, const ros::Time& stamp);
+  void report(const calipso_msgs::EditReport& report);
   void publishPlan(const ros::Time& stamp);
+  calipso_msgs::SimulationState stateMsg(const WorldState& state, const ros::Time& stamp) const;
   void sendRigidTransforms(const WorldState& state, const ros::Time& stamp);
 
   SimulatorParams params_;
@@ -58,6 +62,8 @@ class SimulatorRos {
   calipso_msgs::AlignedModelsConstPtr models_;
   calipso_msgs::ClipDynamicsConstPtr clip_dynamics_;
   std::optional<ros::Time> first_stamp_;
+  ros::Time plan_stamp_;                         // of the newest one sent
+  std::uint32_t reports_ = 0;                    // sent
   std::vector<calipso_msgs::Edit> early_edits_;  // came before the world was there
   std::unique_ptr<World> world_;
 };

@@ -80,6 +80,12 @@ World::World(WorldScene scene, WorldParams params)
     : impl_(std::make_unique<Impl>(std::move(scene), std::move(params))) {}
 World::~World() = default;
 
+void World::prepareForEdits() {
+  std::vector<TriangleMesh> meshes;
+  for (const WorldObject& object : impl_->scene.objects) meshes.push_back(object.mesh);
+  impl_->hulls.prepare(meshes);
+}
+
 double World::time() const { return impl_->now; }
 const WorldScene& World::scene() const { return impl_->scene; }
 

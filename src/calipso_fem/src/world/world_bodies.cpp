@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calipso_fem/world/convex_decomposition.hpp"
 #include "calipso_scene/attachment.hpp"
 #include "describe.hpp"
 #include "obstacle_query.hpp"
@@ -146,18 +145,8 @@ void World::Impl::rebuild(Actor& actor) {
 }
 
 const std::vector<TriangleMesh>& World::Impl::hullsOf(Actor& actor) {
-  if (!actor.hulls.empty()) return actor.hulls;
-  const TriangleMesh& mesh = actor.object.mesh;
-  const auto same = [](const auto& a, const auto& b) {
-    return a.rows() == b.rows() && (a.array() == b.array()).all();
-  };
-  const auto known =
-      std::find_if(decompositions.begin(), decompositions.end(), [&](const Decomposition& d) {
-        return same(d.mesh.vertices, mesh.vertices) && same(d.mesh.triangles, mesh.triangles);
-      });
-  if (known != decompositions.end()) return actor.hulls = known->hulls;
-  decompositions.push_back({mesh, decomposeConvex(mesh)});
-  return actor.hulls = decompositions.back().hulls;
+  if (actor.hulls.empty()) actor.hulls = hulls.of(actor.object.mesh);
+  return actor.hulls;
 }
 
 // Says which others the object is in where it starts: contacts push these apart slowly.

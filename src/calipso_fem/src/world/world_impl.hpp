@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "actor.hpp"
+#include "calipso_fem/world/convex_decomposition.hpp"
+#include "calipso_fem/world/hull_store.hpp"
 #include "calipso_fem/world/soft_contacts.hpp"
 #include "calipso_fem/world/wind.hpp"
 #include "calipso_fem/world/world.hpp"
@@ -206,11 +208,7 @@ struct World::Impl {
   bool collisions_known = false;
   bool plan_changed = true;
 
-  struct Decomposition {
-    TriangleMesh mesh;
-    std::vector<TriangleMesh> hulls;
-  };
-  std::vector<Decomposition> decompositions;  // of the objects' meshes; copies share one
+  HullStore hulls{[](const TriangleMesh& mesh) { return decomposeConvex(mesh); }};
 };
 
 // Defaults completed by what the user set. (world.cpp)

@@ -24,7 +24,9 @@ ObjectMotion motionFrom(const MotionState& state, const Eigen::Vector3d& centroi
 std::vector<PoseMeasurement> measurementsOf(const std::vector<Observation>& observations,
                                             const Eigen::Vector3d& centroid);
 
-// True when `next` does not continue `previous`: the video was cut between them.
+// True when `next` does not continue `previous`: the video was cut between them. Judged without the
+// frames after, as live video must be; calipso_bag's ShotChanges, which warns of cuts in a whole
+// bag, has them.
 bool isCut(const Frame& previous, const Frame& next, double least_correlation);
 
 // Deviations of the motion prior for an object seen at `depth` metres: fast enough to cross the

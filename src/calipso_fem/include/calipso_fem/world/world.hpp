@@ -66,6 +66,8 @@ class World {
   double time() const;
   WorldState state() const;
   std::vector<PlanEntry> plan() const;
+  // Begins, in a thread of its own, what edits would else wait for: live video goes on meanwhile.
+  void prepareForEdits();
   bool planChanged();  // since it was last asked
 
   const WorldScene& scene() const;
