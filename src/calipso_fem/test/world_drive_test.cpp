@@ -119,6 +119,14 @@ TEST(ObservedDrive, AWindOfTheUsersEndsIt) {
   EXPECT_NEAR(sum / static_cast<double>(still.size()), 0.0, 0.1 * kLift);
 }
 
+// The load was found while one end was held: let go, the plate goes on with what speed it has.
+TEST(ObservedDrive, LettingGoOfTheAttachmentsEndsIt) {
+  const std::vector<double> lifts = liftsAfter(
+      [](World& world) { world.submit(plateEdit(EditKind::kRelease, EditMode::kAbsolute)); });
+  // 0.03 m/s at most for 1.2 s; what presses the plate up to 2 cm would drive it off by metres.
+  for (const double lift : lifts) EXPECT_LT(std::abs(lift), 0.04 + kLift);
+}
+
 // A motion that no step can be solved for is not followed: the plate swings on without it, and the
 // plan says so.
 TEST(ObservedDrive, AMotionThatCannotBeFollowedEndsIt) {

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "calipso_fem/world/region_selection.hpp"
+#include "calipso_scene/attachment.hpp"
 #include "describe.hpp"
 #include "world_impl.hpp"
 
@@ -89,9 +90,14 @@ std::string World::Impl::fix(Actor& actor, const Edit& edit) {
 std::string World::Impl::release(Actor& actor, const Edit& edit) {
   const std::vector<int> vertices = selectVertices(scene, actor.id, edit.region);
   touch(actor, edit);
+  const auto attached =
+      attachedVertices(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
   size_t released = 0;
   const auto meets = [&](const std::vector<int>& region) {
     if (!intersects(region, vertices)) return false;
+    // The load that drives it was found while it was held: what the attachments bore of it would
+    // now throw the object off, or keep it up.
+    if (region == attached) endDrive(actor), actor.holder = Holder::kNothing;
     if (actor.soft) actor.soft->body().releaseSurfaceVertices(region);
     ++released;
     return true;
