@@ -123,8 +123,12 @@ TEST(ObservedDrive, AWindOfTheUsersEndsIt) {
 TEST(ObservedDrive, LettingGoOfTheAttachmentsEndsIt) {
   const std::vector<double> lifts = liftsAfter(
       [](World& world) { world.submit(plateEdit(EditKind::kRelease, EditMode::kAbsolute)); });
-  // 0.03 m/s at most for 1.2 s; what presses the plate up to 2 cm would drive it off by metres.
-  for (const double lift : lifts) EXPECT_LT(std::abs(lift), 0.04 + kLift);
+  const double way = lifts.back() - lifts.front();
+  for (size_t k = 1; k < lifts.size(); ++k) {
+    // 5 %: it unbends a little; under the load the end would be 60 % off this line in between.
+    const double uniform = lifts.front() + way * k / (lifts.size() - 1.0);
+    EXPECT_NEAR(lifts[k], uniform, 0.05 * kLift) << k;
+  }
 }
 
 // A motion that no step can be solved for is not followed: the plate swings on without it, and the
