@@ -1,7 +1,9 @@
 #include "calipso_align/key_frame.hpp"
 
 #include <chrono>
+#include <iomanip>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <stdexcept>
 
 #include "calipso_align/alignment.hpp"
@@ -50,6 +52,14 @@ ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
     if (!rendering.roi.empty()) rendering.depth.copyTo(view.depth(rendering.roi));
     return view;
   };
+}
+
+std::string enlargedRemark(const std::string& path, double factor) {
+  std::ostringstream text;
+  text << path << " is a smaller image, enlarged " << std::setprecision(3) << factor
+       << " times by repeating its pixels: it places the models, but masks are found without it; "
+          "enlarge it by interpolation within surfaces";
+  return text.str();
 }
 
 }  // namespace
@@ -102,7 +112,13 @@ std::vector<ObjectContour> extractContours(const cv::Mat& image, const cv::Mat& 
 Segmenter makeSegmenter(const cv::Mat& image, const Scene& scene, bool use_depth) {
   std::optional<DepthObservation> depth;
   if (use_depth) depth = loadDepth(scene);
-  if (!depth) return Segmenter(image, segmentationTargets(scene, depth));
+  // Where pixels were repeated the steps between them would be taken for edges.
+  const double repeated = depth ? enlargement(depth->depth) : 1.0;
+  if (!depth || repeated > 1.0) {
+    Segmenter segmenter(image, segmentationTargets(scene, depth));
+    if (depth) segmenter.addRemark(enlargedRemark(scene.depth_path, repeated));
+    return segmenter;
+  }
   return Segmenter(image, segmentationTargets(scene, depth), {}, depth->depth,
                    supportDepths(scene.planes, scene.camera));
 }

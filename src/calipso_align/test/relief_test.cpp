@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "calipso_align/depth_image.hpp"
 #include "calipso_align/segmentation.hpp"
@@ -45,6 +46,19 @@ TEST(Relief, RegistrationIsMeasured) {
   EXPECT_FALSE(shifted.registered);
   EXPECT_EQ(shifted.state.at<uchar>(60, 56), Relief::kUnusable);
   EXPECT_EQ(shifted.state.at<uchar>(60, 80), Relief::kSurface);
+}
+
+// As registered depth often is: smaller than the picture, its pixels repeated.
+TEST(Relief, EnlargedDepthIsTold) {
+  const cv::Mat depth = depthOfDisc(0);
+  for (const double factor : {1.5, 2.0, 4.0}) {
+    cv::Mat small, enlarged;
+    cv::resize(depth, small, {}, 1.0 / factor, 1.0 / factor, cv::INTER_NEAREST);
+    cv::resize(small, enlarged, depth.size(), 0, 0, cv::INTER_NEAREST);
+    EXPECT_NEAR(enlargement(enlarged), factor, 0.05 * factor) << factor;
+  }
+  EXPECT_EQ(enlargement(depth), 1.0);
+  EXPECT_EQ(enlargement(cv::Mat1f(kSize, 1.0f)), 1.0) << "a wall that is faced tells nothing";
 }
 
 TEST(Relief, NoDepthIsNoRelief) {

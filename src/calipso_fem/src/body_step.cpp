@@ -98,8 +98,8 @@ double DeformableBody::Impl::searchLine(const Vec& y, const Vec& direction, cons
   const double slope = residual.dot(direction);
   const double noise = 1e-13 * std::abs(energy);
   for (double t = 1.0; t > kSmallestStep; t *= 0.5) {
-    const double trial = potential(y + t * direction, i, loads);
-    if (trial <= energy + kSufficientDecrease * t * slope + noise) return t;
+    const double reached = potential(y + t * direction, i, loads);
+    if (reached <= energy + kSufficientDecrease * t * slope + noise) return t;
   }
   return 0.0;
 }
@@ -212,8 +212,8 @@ void DeformableBody::Impl::keepAngularMomentum(const Momentum& before, const Vec
           Eigen::Vector3d::Unit(axis).cross(Eigen::Vector3d(x.segment<3>(k) - now.center));
     inertia.col(axis) = momentOf(applyMass(spin[axis]));
   }
-  const auto solver = inertia.ldlt();
-  const Eigen::Vector3d half = 0.5 * h * solver.solve(target);
+  const auto factor = inertia.ldlt();
+  const Eigen::Vector3d half = 0.5 * h * factor.solve(target);
   if (!half.allFinite()) return;
   const Eigen::Vector3d drift = now.linear / model->totalMass();
   const Eigen::Matrix3d R =
@@ -221,7 +221,7 @@ void DeformableBody::Impl::keepAngularMomentum(const Momentum& before, const Vec
   for (Eigen::Index k = 0; k < v.size(); k += 3)
     v.segment<3>(k) = drift + R * (Eigen::Vector3d(v.segment<3>(k)) - drift);
   now = momentum();
-  const Eigen::Vector3d turn = solver.solve(target - now.angular);
+  const Eigen::Vector3d turn = factor.solve(target - now.angular);
   for (int axis = 0; axis < 3; ++axis) v += turn[axis] * spin[axis];
 }
 

@@ -176,7 +176,8 @@ std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
     }
     // What touches nothing at all is a product of coarse sampling: it stays welded.
     for (CoveredCell& piece : pieces)
-      if (std::all_of(piece.neighbours, piece.neighbours + 6, [](unsigned n) { return n == 0; }))
+      if (std::all_of(piece.neighbours, piece.neighbours + 6,
+                      [](unsigned neighbour) { return neighbour == 0; }))
         std::fill(piece.neighbours, piece.neighbours + 6, ~0u);
     result.insert(result.end(), pieces.begin(), pieces.end());
   }

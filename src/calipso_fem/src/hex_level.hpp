@@ -89,16 +89,16 @@ void sweepRows(const Crew& crew, const StvkHexes& hexes, int begin, int end, boo
 // Used inside parallel regions.
 class HexLevel {
  public:
-  // Calls work(node, row of A x) for nodes begin .. end of this thread; x is complete.
+  // Calls work(node, row of A u) for nodes begin .. end of this thread; u is complete.
   template <class Work>
-  void product(const Crew& crew, const float* x, int begin, int end, const Work& work) {
-    if (crew.rank() == 0 && !springs_.empty()) springs_.apply(x);
+  void product(const Crew& crew, const float* u, int begin, int end, const Work& work) {
+    if (crew.rank() == 0 && !springs_.empty()) springs_.apply(u);
     const auto multiply = [&](int first, int last) {
-      hexKernel().multiplyFloat(hexes->batches<float>(), first, last, this->x.data(), stress.data(),
-                                factor, x, slots.data());
+      hexKernel().multiplyFloat(hexes->batches<float>(), first, last, x.data(), stress.data(),
+                                factor, u, slots.data());
     };
     sweepRows<float>(crew, *hexes, begin, end, springs_.empty(), multiply,
-                     [&](int node) { work(node, row(node, x)); });
+                     [&](int node) { work(node, row(node, u)); });
   }
 
   void allocate(const StvkHexes& hexes);
@@ -114,11 +114,11 @@ class HexLevel {
 
  private:
   // @pre the cells of the node are done
-  Quad row(int node, const float* x) const {
+  Quad row(int node, const float* u) const {
     alignas(16) float sum[4];
     hexes->sumSlots(slots.data(), node, sum);
     const std::size_t at = 4 * static_cast<std::size_t>(node);
-    Quad y = loadQuad(sum) + splat(mass[node]) * loadQuad(x + at);
+    Quad y = loadQuad(sum) + splat(mass[node]) * loadQuad(u + at);
     if (!springs_.empty()) y += loadQuad(springs_.at(node));
     return y * loadQuad(free.data() + at);
   }

@@ -56,6 +56,8 @@ class Segmenter {
   // What the user should know: objects that colours and depth hardly tell from their surroundings,
   // so that it is the rough placement that says where they are. Empty before the first call.
   std::vector<std::string> remarks() const;
+  // Something else to be said among them.
+  void addRemark(const std::string& remark) { further_remarks_.push_back(remark); }
   // Per label, the models that were fitted to the first contours; none before the first call.
   std::map<int, ModelSurface> models() const;
 
@@ -94,6 +96,7 @@ class Segmenter {
   std::vector<std::optional<PlacedShape>> shapes_;  // per target, in pixels of the view
   std::vector<std::optional<FittedShape>> fitted_;  // per target, of the view
   cv::Mat labels_;
+  std::vector<std::string> further_remarks_;
 };
 
 }  // namespace calipso::align

@@ -33,8 +33,7 @@ double travelOf(const btRigidBody& body, double h) {
 
 }  // namespace
 
-void RigidWorld::Impl::addPlaneTouches(Id id, double reach,
-                                       std::vector<RigidTouch>& touches) const {
+void RigidWorld::Impl::addPlaneTouches(Id id, double reach, std::vector<RigidTouch>& found) const {
   const btRigidBody& body = *at(id).body;
   for (const auto& [other, plane] : bodies) {
     if (!isPlane(plane.body.get()) || filter.excluded.count(std::minmax({id, other}))) continue;
@@ -45,8 +44,8 @@ void RigidWorld::Impl::addPlaneTouches(Id id, double reach,
     for (const btConvexHullShape* hull : hullsOf(body))
       for (const PlaneCorner& c : spanningCorners(*hull, plane_from_body, ground, reach)) {
         const btVector3 place = world_from_plane * c.point - (c.height + hull->getMargin()) * up;
-        touches.push_back({id, std::nullopt, fromBullet(place), fromBullet(up),
-                           std::max(0.0, c.height), world.frictionOf(body, *plane.body)});
+        found.push_back({id, std::nullopt, fromBullet(place), fromBullet(up),
+                         std::max(0.0, c.height), world.frictionOf(body, *plane.body)});
       }
   }
 }

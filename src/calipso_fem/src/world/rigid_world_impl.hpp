@@ -97,7 +97,7 @@ struct RigidWorld::Impl {
   }
 
   // Corners of a dynamic body that are nearer to a plane than `reach` (m).
-  void addPlaneTouches(Id id, double reach, std::vector<RigidTouch>& touches) const;
+  void addPlaneTouches(Id id, double reach, std::vector<RigidTouch>& found) const;
 
   Id enter(Body body) {
     const Id id = next++;

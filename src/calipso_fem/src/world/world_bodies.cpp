@@ -207,9 +207,9 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
   for (const auto& region : actor.fixed) body.fixSurfaceVertices(region);
   actor.soft->setGravity(actor.acceleration());
   const std::vector<Obstacle> around = obstacles(now, now, &actor);
-  const Touching touching = settle ? supportPoints(actor, surface, around) : Touching();
-  limitSag(actor, surface, pointsOf(touching));
-  if (settle) settleAsObserved(actor, surface, around, touching);
+  const Touching support = settle ? supportPoints(actor, surface, around) : Touching();
+  limitSag(actor, surface, pointsOf(support));
+  if (settle) settleAsObserved(actor, surface, around, support);
   actor.soft->setMaterial(actor.material);
   if (!motion.linear.isZero() || !motion.angular.isZero())
     body.setRigidVelocity(motion.linear, motion.angular);

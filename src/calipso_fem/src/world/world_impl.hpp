@@ -98,7 +98,7 @@ struct World::Impl {
                          const std::vector<Obstacle>& around) const;
   void limitSag(Actor& actor, const TriangleMesh& surface, std::vector<HoldPoint> hold);
   void settleAsObserved(Actor& actor, const TriangleMesh& surface,
-                        const std::vector<Obstacle>& around, const Touching& touching);
+                        const std::vector<Obstacle>& around, const Touching& support);
 
   // Objects that rest on others (world_rests.cpp)
   void noteWhatRestsOn(

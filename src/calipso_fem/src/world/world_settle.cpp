@@ -172,9 +172,9 @@ void World::Impl::limitSag(Actor& actor, const TriangleMesh& surface, std::vecto
 // Makes the observed shape the equilibrium under what held the object in the video. Buoyancy and
 // free fall leave nothing to balance.
 void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface,
-                                   const std::vector<Obstacle>& around, const Touching& touching) {
+                                   const std::vector<Obstacle>& around, const Touching& support) {
   const double size = boundingDiagonal(surface);
-  std::vector<HoldPoint> hold = pointsOf(touching);
+  std::vector<HoldPoint> hold = pointsOf(support);
   if (hold.empty() && actor.holder != Holder::kAttachment) return;
   const double px = pixelsPerMeter(scene.camera, surface.vertices.colwise().mean().transpose());
   const double tolerance =
@@ -183,7 +183,7 @@ void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface,
   if (!report.message.empty()) actor.note += report.message + "; ";
   const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
   for (size_t i = 0; i < hold.size(); ++i)
-    contacts.hold(entry, around[touching[i].second], hold[i],
+    contacts.hold(entry, around[support[i].second], hold[i],
                   (kSupportGap + kLargestContactPatch) * size);
 }
 

@@ -265,10 +265,10 @@ HardCaseResult runHardCase(const std::string& name, MaterialModel material, int 
     r.displacement = largestDistance(body.positions(), restPositions(s.mesh)) / size;
   } else {
     const Momentum end = body.momentum();
-    const double seconds = r.steps * s.h;
+    const double duration = r.steps * s.h;
     r.displacement =
-        (end.center - start.center - seconds * start.linear / body.totalMass()).norm() /
-        (seconds * start.linear.norm() / body.totalMass());
+        (end.center - start.center - duration * start.linear / body.totalMass()).norm() /
+        (duration * start.linear.norm() / body.totalMass());
     r.momentum_error = std::max((end.linear - start.linear).norm() / start.linear.norm(),
                                 (end.angular - start.angular).norm() / start.angular.norm());
   }
