@@ -132,6 +132,7 @@ PlaneMirror findMirror(const std::vector<Actor>& actors, const cv::Mat& picture,
   if (!mirror.established()) return mirror;
   mirror.off = off_planes;
   mirror.at_key = addedBy(mirror, image);
+  mirror.key_box = reachedBy(image, mirror.slope);
   return mirror;
 }
 

@@ -11,8 +11,9 @@ struct PlaneMirror {
   cv::Vec3f surroundings;  // linear; what is mirrored where no object is
   // standard deviation of the planes' slope, by waves or roughness: it draws reflections out
   float slope = 0.0f;
-  cv::Mat off;     // CV_8UC1: 255 where something else than a plane is seen
-  cv::Mat at_key;  // CV_32FC3, linear: what the objects at rest add to the key frame
+  cv::Mat off;       // CV_8UC1: 255 where something else than a plane is seen
+  cv::Mat at_key;    // CV_32FC3, linear: what the objects at rest add to the key frame
+  cv::Rect key_box;  // beyond it they add nothing
 
   bool established() const { return strength > 0.0f; }
 };

@@ -19,7 +19,7 @@ struct Relief {
   cv::Mat tiles;             // CV_8UC1, one per square of kTile px: 255 where any of it is seen
   Eigen::AlignedBox3f box;   // of all positions
 
-  bool empty() const { return seen.empty(); }
+  bool empty() const { return seen.data == nullptr; }
   bool at(int u, int v) const {
     return !empty() && u >= 0 && v >= 0 && u < seen.cols && v < seen.rows &&
            seen.at<std::uint8_t>(v, u) != 0;

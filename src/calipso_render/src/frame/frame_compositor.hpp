@@ -19,13 +19,23 @@
 
 namespace calipso::render {
 
+// What a frame is compared with to find shadows that pass in the video, in one camera's view.
+struct PlateInView {
+  cv::Mat codes;   // CV_8UC3
+  cv::Mat darker;  // CV_8UC1: where a grey value, meaned around, is less there is a shadow
+  // CV_8UC1: 255 = seen in other frames, always alike, and neither what drifts nor, as far as a
+  // depth image tells, the sky
+  cv::Mat quiet;
+};
+
 // Light that stays the same while the same objects are edited under the same camera. Pictures are
 // CV_8U of the whole frame: lightLevel() of sun or sky on support plane or relief there.
 struct ShadowCache {
   std::vector<bool> edited;  // per surface: which ones it is for
   Camera camera;
   Eigen::Vector3f sun = Eigen::Vector3f::Zero();  // direction
-  std::unique_ptr<Visibility> others;             // of what is not edited
+  std::vector<Points> others_vertices;            // of what is not edited
+  std::unique_ptr<Visibility> others;             // of the same
   // of the edited objects where the video has them; null: of none
   std::unique_ptr<Visibility> originals;
   cv::Mat others_sun, others_sky;  // of the others; empty: nothing else casts a shadow
@@ -38,6 +48,7 @@ struct ShadowCache {
   cv::Rect footprints;             // of what the edited objects cover at the key frame
   cv::Mat shaded;                  // CV_8UC1, 255 = darkened by them, grown by the shadow's margin
   cv::Rect shaded_box, bounds;     // of `shaded`; of all that the originals' shadows can reach
+  PlateInView plate;               // in the key frame's view; empty until it is wanted
 };
 
 // Edited objects drawn where the video has them, which stays the same while the same ones are
@@ -88,7 +99,8 @@ inline std::uint8_t changeOfLight(float by) {
 
 inline cv::Vec3f linearPixel(const cv::Mat& bgr, int u, int v) {
   const cv::Vec3b& c = bgr.at<cv::Vec3b>(v, u);
-  return {linearFromCode(c[0]), linearFromCode(c[1]), linearFromCode(c[2])};
+  const float* decoded = decodeTable();
+  return {decoded[c[0]], decoded[c[1]], decoded[c[2]]};
 }
 
 // One frame on its way: stages the objects, finds what an edit can change, and composes those
@@ -217,6 +229,8 @@ class FrameCompositor {
   void findOwn(const cv::Rect& box);
   void findRemoved();
   cv::Mat quietPlaces() const;
+  PlateInView plateInView() const;
+  bool movesInVideo() const;
   void findPassingShadows();
   void drawVisibility();
   void sampleEdges();
@@ -331,7 +345,9 @@ class FrameCompositor {
       moved_bounds_;  // what an edit can change; what the edited objects can shade now
   // CV_32FC3, whole picture: what support planes mirror now; empty: as in the video
   cv::Mat mirrored_;
-  cv::Mat unmirrored_;  // CV_8UC3: the frame without what they mirrored of objects at rest
+  // CV_8UC3: the frame without what they mirrored of objects at rest, where what comes to light is
+  // found by it
+  cv::Mat unmirrored_;
   // CV_8UC1, whole picture: 255 = it differs from what the video has, 1 = it does not; 0 = there is
   // nothing
   cv::Mat remirrored_;

@@ -23,7 +23,11 @@ float strongest(const cv::Vec3f& c) {
 
 void FrameCompositor::findMirrored() {
   unmirrored_ = frame_.bgr;
-  if (prepared_.mirror.established() && sameView(frame_.camera, prepared_.camera)) mirrorAnew();
+  if (prepared_.mirror.established() && sameView(frame_.camera, prepared_.camera)) {
+    mirrorAnew();
+    if (live_ != nullptr || movesInVideo())
+      unmirrored_ = unmirroredCodes(prepared_.mirror, frame_.bgr);
+  }
   if (live_ != nullptr) live_corrections_ = live_->corrections(unmirrored_, labels_);
 }
 
@@ -45,10 +49,11 @@ void FrameCompositor::mirrorAnew() {
   mirrored_ =
       image.empty() ? cv::Mat(frame_.bgr.size(), CV_32FC3, cv::Scalar()) : addedBy(mirror, image);
   remirrored_ = cv::Mat::zeros(frame_.bgr.size(), CV_8U);
-  unmirrored_ = unmirroredCodes(mirror, frame_.bgr);
+  const cv::Rect box =
+      image.empty() ? mirror.key_box : mirror.key_box | reachedBy(image, mirror.slope);
 #pragma omp parallel for schedule(static)
-  for (int v = 0; v < remirrored_.rows; ++v) {
-    for (int u = 0; u < remirrored_.cols; ++u) {
+  for (int v = box.y; v < box.br().y; ++v) {
+    for (int u = box.x; u < box.br().x; ++u) {
       const cv::Vec3f &now = mirrored_.at<cv::Vec3f>(v, u),
                       &before = mirror.at_key.at<cv::Vec3f>(v, u);
       if (now == cv::Vec3f() && before == cv::Vec3f()) continue;

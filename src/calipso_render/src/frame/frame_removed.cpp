@@ -46,8 +46,7 @@ void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) 
 
 }  // namespace
 
-// CV_8UC1: seen in other frames, always alike, and neither what drifts nor, as far as a depth image
-// tells, the sky.
+// PlateInView::quiet
 cv::Mat FrameCompositor::quietPlaces() const {
   cv::Mat at_key = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
   if (prepared_.background.drifting.established())
@@ -61,27 +60,40 @@ cv::Mat FrameCompositor::quietPlaces() const {
   return here;
 }
 
+PlateInView FrameCompositor::plateInView() const {
+  const bool same_view = sameView(frame_.camera, prepared_.camera);
+  PlateInView plate;
+  if (same_view)
+    prepared_.background.plate.convertTo(plate.codes, CV_8U);
+  else
+    plate.codes = codeFromLinear(plate_);
+  cv::cvtColor(plate.codes, plate.darker, cv::COLOR_BGR2GRAY);
+  cv::blur(plate.darker, plate.darker, {5, 5});
+  plate.darker.convertTo(plate.darker, CV_8U, same_view ? kDarker : kDarkerElsewhere);
+  plate.quiet = quietPlaces();
+  return plate;
+}
+
+// Does any edited object?
+bool FrameCompositor::movesInVideo() const {
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video) return true;
+  }
+  return false;
+}
+
 // The shadow of an object that moves in the video shows as darkening against the plate.
 void FrameCompositor::findPassingShadows() {
-  bool any = false;
-  for (std::size_t i = 0; i < edited_.size(); ++i)
-    any = any || (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video);
-  if (!any) return;
+  if (!movesInVideo()) return;
   const bool same_view = sameView(frame_.camera, prepared_.camera);
-  cv::Mat now, ratio_now, ratio_plate, plate;
+  if (same_view && shadows_.plate.codes.empty()) shadows_.plate = plateInView();
+  const PlateInView plate = same_view ? shadows_.plate : plateInView();
+  cv::Mat now;
   cv::cvtColor(unmirrored_, now, cv::COLOR_BGR2GRAY);
-  if (same_view)
-    prepared_.background.plate.convertTo(plate, CV_8U);
-  else
-    plate = codeFromLinear(plate_);
-  cv::Mat grey_plate;
-  cv::cvtColor(plate, grey_plate, cv::COLOR_BGR2GRAY);
-  cv::blur(now, ratio_now, {5, 5});
-  cv::blur(grey_plate, ratio_plate, {5, 5});
-  ratio_plate.convertTo(ratio_plate, CV_8U, same_view ? kDarker : kDarkerElsewhere);
-  passing_ = ratio_now < ratio_plate;
-  passing_ &= quietPlaces() & (labels_ == 0);
-  keepDarkenedAlike(unmirrored_, plate, passing_);
+  cv::blur(now, now, {5, 5});
+  passing_ = now < plate.darker;
+  passing_ &= plate.quiet & (labels_ == 0);
+  keepDarkenedAlike(unmirrored_, plate.codes, passing_);
   cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN,
                    cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));
   if (!same_view) {

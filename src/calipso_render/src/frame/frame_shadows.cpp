@@ -66,14 +66,16 @@ void FrameCompositor::prepareShadows() {
         moved_sky_ = skyShadowOf(moved, params_);
         for (const Occluder& o : moved) moved_bounds_ |= shadowBounds(*o.vertices, light_);
       });
+  std::vector<Points> others_now;
+  for (const Occluder& o : others) others_now.push_back(*o.vertices);
   const bool same = shadows_.others && shadows_.edited == edited_ &&
                     shadows_.sun == light_.direction && sameView(shadows_.camera, frame_.camera);
-  const bool others_rest =
-      std::find(prepared_.moves.begin(), prepared_.moves.end(), true) == prepared_.moves.end();
+  const bool others_rest = shadows_.others_vertices == others_now;
   if (!same || !others_rest) cacheOthers(others);
   if (!same) cacheOriginals(originals);
   if (!same || !others_rest) cacheBefore();
   shadows_.edited = edited_, shadows_.camera = frame_.camera, shadows_.sun = light_.direction;
+  shadows_.others_vertices = std::move(others_now);
 }
 
 void FrameCompositor::cacheOthers(const std::vector<Occluder>& others) {

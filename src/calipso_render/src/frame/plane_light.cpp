@@ -66,13 +66,14 @@ class Squares {
     }
   }
 
-  // Places looked up at once; those that see neither plane nor relief keep 1.
+  // Places looked up at once.
   class Lookup {
    public:
     explicit Lookup(const Squares& squares) : squares_(squares) {}
-    void add(int u, int v, float* visible) {
+    // @param otherwise what is kept where neither plane nor relief is seen
+    void add(int u, int v, float* visible, float otherwise = 1.0f) {
       Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
-      *visible = 1.0f;
+      *visible = otherwise;
       if (!squares_.view_.at(u, v, r)) return;
       out_[batch_.add(r.position, r.normal)] = visible;
       if (batch_.count() == LightBatch::kMost) look();
@@ -184,13 +185,11 @@ class Squares {
   void fillExactly(const cv::Rect& square, const cv::Rect& here) const {
     float visible[kSquare][kSquare] = {};
     Lookup lookup(*this);
-    Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
     for (int y = here.y; y < here.br().y; ++y) {
-      for (int x = here.x; x < here.br().x; ++x) {
-        float& at = visible[y + rect_.y - square.y][x + rect_.x - square.x];
-        lookup.add(x + rect_.x, y + rect_.y, &at);
-        if (!view_.at(x + rect_.x, y + rect_.y, r)) at = out_.at<std::uint8_t>(y, x) / 255.0f;
-      }
+      const std::uint8_t* kept = out_.ptr<std::uint8_t>(y);
+      float* at = &visible[y + rect_.y - square.y][rect_.x - square.x + here.x];
+      for (int x = here.x; x < here.br().x; ++x)
+        lookup.add(x + rect_.x, y + rect_.y, at++, kept[x] / 255.0f);
     }
     lookup.look();
     write(square, here, visible);

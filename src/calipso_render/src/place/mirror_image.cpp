@@ -84,13 +84,14 @@ void addPlane(const std::vector<const Actor*>& actors, const Radiance& radiance,
 }
 
 // Means of what is known in squares of kSpreadStep px, for pushPull(), and how far they are known.
-void bringDown(const cv::Mat& near, cv::Mat& mean, cv::Mat& weight) {
+// @param box beyond it nothing is
+void bringDown(const cv::Mat& near, const cv::Rect& box, cv::Mat& mean, cv::Mat& weight) {
   const cv::Size size((near.cols + kSpreadStep - 1) / kSpreadStep,
                       (near.rows + kSpreadStep - 1) / kSpreadStep);
   mean = cv::Mat::zeros(size, CV_32F), weight = cv::Mat::zeros(size, CV_32F);
 #pragma omp parallel for schedule(static)
-  for (int j = 0; j < size.height; ++j) {
-    for (int i = 0; i < size.width; ++i) {
+  for (int j = box.y / kSpreadStep; j <= (box.br().y - 1) / kSpreadStep; ++j) {
+    for (int i = box.x / kSpreadStep; i <= (box.br().x - 1) / kSpreadStep; ++i) {
       float sum = 0.0f;
       int count = 0;
       for (int v = j * kSpreadStep; v < std::min(near.rows, (j + 1) * kSpreadStep); ++v) {
@@ -110,7 +111,7 @@ void bringDown(const cv::Mat& near, cv::Mat& mean, cv::Mat& weight) {
 void findSpread(const PlaneView& view, const Camera& camera, const cv::Mat& near,
                 MirrorImage& image) {
   cv::Mat mean, weight;
-  bringDown(near, mean, weight);
+  bringDown(near, image.box, mean, weight);
   const cv::Mat filled = pushPull(mean, weight);
   cv::Mat spread = cv::Mat::zeros(weight.size(), CV_32F), whole;
   const Eigen::Isometry3f from_world = camera.world_from_camera.inverse().cast<float>();

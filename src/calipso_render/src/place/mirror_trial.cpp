@@ -48,7 +48,7 @@ class Trial {
     cv::split(brought(picture), y);
     if (!hidden.empty()) shade_ = lessAround(brought(hidden).mul(y[0] + y[1] + y[2]));
     for (int c = 0; c < 3; ++c) y_less_[c] = less(y[c]);
-    image_ = brought(withCover(image));
+    image_ = brought(withCover(image, {{0, 0}, image.colour.size()}));
     spread_ = brought(image.spread) / scale_, across_ = image.across;
   }
 

@@ -12,7 +12,9 @@ namespace {
 
 constexpr float kReach = 3.0f;  // standard deviations
 
-// Where an image can come to that is drawn out, to whole squares of DrawnOut::kCoarsest px.
+}  // namespace
+
+// To whole squares of DrawnOut::kCoarsest px.
 cv::Rect reachedBy(const MirrorImage& image, float slope) {
   double spread = 0.0;
   cv::minMaxLoc(image.spread, nullptr, &spread);
@@ -24,11 +26,9 @@ cv::Rect reachedBy(const MirrorImage& image, float slope) {
   return cv::Rect(low, high) & cv::Rect({0, 0}, image.spread.size());
 }
 
-}  // namespace
-
-cv::Mat withCover(const MirrorImage& image) {
+cv::Mat withCover(const MirrorImage& image, const cv::Rect& box) {
   cv::Mat out;
-  cv::merge(std::vector<cv::Mat>{image.colour, image.cover}, out);
+  cv::merge(std::vector<cv::Mat>{image.colour(box), image.cover(box)}, out);
   return out;
 }
 
@@ -36,7 +36,7 @@ cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image) {
   cv::Mat added = cv::Mat::zeros(image.colour.size(), CV_32FC3);
   const cv::Rect box = reachedBy(image, mirror.slope);
   const cv::Mat drawn =
-      DrawnOut(image.spread(box), image.across, mirror.slope)(withCover(image)(box));
+      DrawnOut(image.spread(box), image.across, mirror.slope)(withCover(image, box));
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < box.height; ++v) {
     const cv::Vec4f* c = drawn.ptr<cv::Vec4f>(v);

@@ -36,8 +36,11 @@ MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance&
                         const std::vector<SupportPlane>& planes, const Camera& camera,
                         const cv::Mat& off);
 
-// CV_32FC4: colour and cover.
-cv::Mat withCover(const MirrorImage& image);
+// CV_32FC4: colour and cover of a box's pixels.
+cv::Mat withCover(const MirrorImage& image, const cv::Rect& box);
+
+// Where an image can come to that is drawn out by planes' slopes of such a deviation.
+cv::Rect reachedBy(const MirrorImage& image, float slope);
 
 // What `image` adds to the picture, CV_32FC3, linear.
 cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image);
