@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "calipso_render/shadow_map.hpp"
 #include "render_test_scene.hpp"
 
 namespace calipso::render {
@@ -65,6 +66,33 @@ TEST(Appearance, TakesFromAnotherViewWhatAHighlightHides) {
     }
   }
   EXPECT_GT(hidden, 20);
+}
+
+// A model whose shadow on the ball the picture does not have, as of a part fitted beside its place,
+// makes nothing of the ball brighter than it is.
+TEST(Appearance, ShadeThatThePictureDoesNotHaveIsNotDividedBy) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  const ClipFrame frame = frameWithBall(ballAt(kPlace));
+  View view{{}, frame.labels, frame.camera, {}};
+  frame.bgr.convertTo(view.picture, CV_32F);
+  view.actors.push_back(makeActor(surface, surface.key_vertices, frame.camera));
+  ObjectModel pea =
+      ballAt(kPlace + 1.5 * kBallRadius * sunlight().direction.cast<double>(), "pea", 2);
+  pea.mesh.vertices *= 0.15;
+  const Surface blocker = makeSurface(pea);
+  view.actors.push_back(makeActor(blocker, blocker.key_vertices, view.camera));
+  const ShadowMap sun({{&view.actors[1].vertices, &blocker.triangles, blocker.winding}},
+                      sunlight().direction.cast<double>(), {});
+  const Appearance a = makeAppearances({view}, {false, false}, sunlight(), {}).front();
+  int shaded = 0;
+  forEachPixelOf(view.actors[0], [&](int u, int v, const SurfacePoint& p) {
+    if (sun.visibility(p.position, p.normal) > 0.1f) return;
+    ++shaded;
+    // 0.06 as above; divided by the ambient light alone it would be more than twice as bright.
+    const cv::Vec4f& c = a.albedo.at<cv::Vec4f>(v - a.region.y, u - a.region.x);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(c[i], kAlbedo[i], 0.06f);
+  });
+  EXPECT_GT(shaded, 10);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "calipso_render/shadow_map.hpp"
 #include "draw/bicubic.hpp"
 #include "smooth_step.hpp"
+#include "texture/false_shade.hpp"
 #include "texture/texture_fill.hpp"
 
 namespace calipso::render {
@@ -55,6 +56,8 @@ struct Shaded {
   cv::Mat light;      // CV_32FC3: shading of a white surface; 0 where the object is not seen
   cv::Mat glint;      // CV_32FC1: brightness of the sun's part of it, of a lobe that stands out
   cv::Mat nearness;   // CV_32FC1
+  cv::Mat open;       // CV_32FC3: `light` if nothing were before the surface
+  cv::Mat position;   // CV_32FC3, world, m
   cv::Mat normal;     // CV_32FC3
   cv::Vec3f mean;
 };
@@ -63,6 +66,7 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
              const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& thrown_back) {
   Shaded s{cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3),
            cv::Mat::zeros(region.size(), CV_32F),   cv::Mat::zeros(region.size(), CV_32F),
+           cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3),
            cv::Mat::zeros(region.size(), CV_32FC3), {}};
   VisibilityBuffer buffer(region);
   buffer.draw(actor.screen, 0);
@@ -79,6 +83,7 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       const float visible = sun.visibility(p.position, p.normal);
       const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.seen, thrown_back);
       s.light.at<cv::Vec3f>(v, u) = l;
+      s.open.at<cv::Vec3f>(v, u) = diffuseShading(light, p.normal, 1.0f);
       const Eigen::Vector3f towards = (eye - p.position).normalized();
       s.highlight.at<cv::Vec3f>(v, u) =
           specularShading(light, gloss, p.normal, towards, visible,
@@ -89,6 +94,7 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
             torranceSparrow(p.normal, light.direction, towards, gloss.roughness);
       }
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
+      s.position.at<cv::Vec3f>(v, u) = {p.position.x(), p.position.y(), p.position.z()};
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];
     }
@@ -116,6 +122,12 @@ cv::Mat clearOf(const cv::Mat& picture, const cv::Mat& glint) {
   }
   cv::erode(clear, clear, cv::Mat::ones(3, 3, CV_8U));
   return clear;
+}
+
+// Side of a pixel at the surface's mean nearness, m.
+float pixelSize(const cv::Mat& nearness, const Camera& camera) {
+  const double mean = cv::countNonZero(nearness) > 0 ? cv::mean(nearness, nearness > 0.0f)[0] : 1.0;
+  return static_cast<float>(1.0 / (mean * camera.fx));
 }
 
 // @param mean_light that of the key frame, where there is one
@@ -155,6 +167,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
       r.trust.at<float>(v, u) *= std::min(1.0f, luminance(l) / (kLit * luminance(r.mean_light)));
     }
   }
+  takeOutFalseShade({shaded.position, shaded.normal, shaded.light, shaded.open, r.trust}, floor,
+                    pixelSize(shaded.nearness, view.camera), r.albedo);
   return r;
 }
 
