@@ -5,6 +5,7 @@
 
 #include "place/place_relief.hpp"
 #include "place/plane_edges.hpp"
+#include "place/plane_reach.hpp"
 
 namespace calipso::render {
 namespace {
@@ -14,16 +15,11 @@ constexpr int kStride = 4;  // px between pixels that planes are sought among
 constexpr int kSeedStep = 16, kSeedReach = 7;
 constexpr int kMostPlanes = 10;
 constexpr double kLeastPart = 0.01;  // of the picture, for a plane: walls, not the sides of things
-constexpr float kOnPlane = 0.01f;    // of the nearness
 constexpr double kSeedSpread = 0.005;  // likewise
 // of the nearness: what is farther from the support planes is relief
 constexpr float kOffSupport = 0.02f;
-constexpr float kBehind = 1.02f;      // of an object's nearness: what it hides is no nearer
-constexpr double kLeastPiece = 0.05;  // of a plane's pixels, for a connected piece of it to count
-// of the side of a square as large as what is seen of a plane: so far it may go on beyond that
-constexpr double kBeyond = 0.25;
-constexpr float kFarther = 0.97f;  // of a plane's nearness: where that is seen the plane is not
-constexpr int kCurvedReach = 4;    // px of the square that tells the normal of what is not plane
+constexpr float kBehind = 1.02f;  // of an object's nearness: what it hides is no nearer
+constexpr int kCurvedReach = 4;   // px of the square that tells the normal of what is not plane
 constexpr float kSameSurface = 0.05f;  // of the nearness within it
 
 constexpr int kCopied = 6;  // px around a place that are plane, for it to be copied from
@@ -93,26 +89,6 @@ std::vector<Pixel> onPlane(const Eigen::Vector3d& abc, const std::vector<Pixel>&
   return on;
 }
 
-// Where a plane may be at most: in the hull of its larger pieces, and beyond by a part of its size.
-cv::Mat reachOf(const cv::Mat& on) {
-  cv::Mat pieces, stats, centres, reach = cv::Mat::zeros(on.size(), CV_8U), beyond;
-  cv::connectedComponentsWithStats(on, pieces, stats, centres, 8, CV_32S);
-  const int all = cv::countNonZero(on);
-  std::vector<cv::Point> points, hull;
-  for (int v = 0; v < on.rows; ++v) {
-    for (int u = 0; u < on.cols; ++u) {
-      const int piece = pieces.at<int>(v, u);
-      if (piece > 0 && stats.at<int>(piece, cv::CC_STAT_AREA) >= kLeastPiece * all)
-        points.push_back({u, v});
-    }
-  }
-  if (points.empty()) return reach;
-  cv::convexHull(points, hull);
-  cv::fillConvexPoly(reach, hull, 255);
-  cv::distanceTransform(reach == 0, beyond, cv::DIST_L2, cv::DIST_MASK_5);
-  return beyond <= kBeyond * std::sqrt(static_cast<double>(all));
-}
-
 // A plane all over the picture.
 struct Extent {
   cv::Mat nearness;  // CV_32FC1, 0: not there
@@ -130,26 +106,6 @@ Extent supportExtent(const cv::Mat& nearness) {
   Extent e{nearness, {}, {}};
   cv::erode(nearness, e.farthest, cv::Mat::ones(3, 3, CV_8U));
   return e;
-}
-
-// Where a plane goes on that is hidden: in its reach, and nearer to where it is seen than to where
-// something farther is seen in its place.
-// @param taken CV_8UC1, != 0: another plane is seen, which it may well pass through
-// @param beyond CV_8UC1, != 0: a plane is seen with which it ends at an edge: that says where
-// @param nothing CV_8UC1, != 0: so far away that the depth image says nothing
-cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& scenery, const cv::Mat& taken,
-               const cv::Mat& beyond, const cv::Mat& nothing) {
-  const cv::Mat known = (scenery > 0.0f) & (plane > 0.0f),
-                on = known & (cv::abs(plane - scenery) < kOnPlane * plane) & (taken == 0);
-  cv::Mat absent = (known & (scenery < kFarther * plane) & (beyond == 0)) | nothing, to_on,
-          to_absent;
-  cv::morphologyEx(absent, absent, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
-  if (cv::countNonZero(on) == 0) return cv::Mat::zeros(plane.size(), CV_8U);
-  const cv::Mat reach = reachOf(on);
-  if (cv::countNonZero(absent) == 0) return reach & (plane > 0.0f);
-  cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
-  cv::distanceTransform(absent == 0, to_absent, cv::DIST_L2, cv::DIST_MASK_5);
-  return (to_on < to_absent) & reach & (plane > 0.0f);
 }
 
 cv::Mat supportNearness(const SupportPlane& plane, const Camera& camera) {
@@ -284,13 +240,17 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
     }
   }
   const cv::Mat none = cv::Mat::zeros(scenery.size(), CV_8U);
+  cv::Mat taken = on_support;
   for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
     cv::Mat beyond = none.clone();
     for (int j = 0; j < static_cast<int>(planes.size()); ++j) {
       if (edges[k][j] == kStandsOut) beyond |= seen == j;
     }
-    planes[k].goes_on =
-        goesOn(planes[k].nearness, scenery, k < supports ? none : on_support, beyond, nothing);
+    const cv::Mat& nearness = planes[k].nearness;
+    planes[k].goes_on = goesOn(nearness, scenery, k < supports ? none : taken, beyond, nothing);
+    // What a larger plane explains is no sign of one that passes through it.
+    if (k >= supports)
+      taken |= (scenery > 0.0f) & (cv::abs(nearness - scenery) < kOnPlane * nearness);
   }
 }
 
