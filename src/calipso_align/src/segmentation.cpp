@@ -240,9 +240,7 @@ std::vector<std::string> Segmenter::remarks() const {
   if (models_.empty()) return {};
   SegmentationLevel level = coarse_;
   evaluateCosts(models_, params_.outlier_cost, level);
-  std::vector<std::string> remarks = indistinctTargets(targets_, level.costs, level.labels);
-  remarks.insert(remarks.end(), further_remarks_.begin(), further_remarks_.end());
-  return remarks;
+  return indistinctTargets(targets_, level.costs, level.labels);
 }
 
 std::map<int, ModelSurface> Segmenter::models() const {

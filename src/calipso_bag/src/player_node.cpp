@@ -6,18 +6,21 @@ namespace {
 
 calipso::bag::Player::Params loadParams(const ros::NodeHandle& pnh) {
   calipso::bag::Player::Params params;
+  const auto read = [&](const std::string& name, auto& value) {
+    value = calipso::optionalParam(pnh, name, value);
+  };
   params.clip.path = calipso::requiredParam<std::string>(pnh, "bag");
   params.scene = calipso::requiredParam<std::string>(pnh, "scene");
-  pnh.getParam("image_topic", params.clip.image_topic);
-  pnh.getParam("camera_info_topic", params.clip.camera_info_topic);
-  pnh.getParam("edits", params.edits);
-  pnh.getParam("poses", params.poses);
-  pnh.getParam("nodes", params.nodes);
-  pnh.getParam("estimate_wind", params.estimate_wind);
-  pnh.getParam("in_flight", params.in_flight);
-  pnh.getParam("connect_timeout_sec", params.connect_timeout_sec);
-  pnh.getParam("prepare_timeout_sec", params.prepare_timeout_sec);
-  pnh.getParam("frame_timeout_sec", params.frame_timeout_sec);
+  read("image_topic", params.clip.image_topic);
+  read("camera_info_topic", params.clip.camera_info_topic);
+  read("edits", params.edits);
+  read("poses", params.poses);
+  read("nodes", params.nodes);
+  read("estimate_wind", params.estimate_wind);
+  read("in_flight", params.in_flight);
+  read("connect_timeout_sec", params.connect_timeout_sec);
+  read("prepare_timeout_sec", params.prepare_timeout_sec);
+  read("frame_timeout_sec", params.frame_timeout_sec);
   return params;
 }
 

@@ -9,9 +9,13 @@ namespace {
 calipso::bag::Recorder::Params loadParams(const ros::NodeHandle& pnh) {
   calipso::bag::Recorder::Params params;
   params.output = calipso::requiredParam<std::string>(pnh, "output");
-  params.live = pnh.param<std::string>("mode", "bag") == "live";
-  pnh.getParam("flow", params.flow);
-  pnh.getParam("late_timeout_sec", params.late_timeout_sec);
+  const auto mode = calipso::optionalParam<std::string>(pnh, "mode", "bag");
+  if (mode != "bag" && mode != "live")
+    throw std::invalid_argument("parameter mode is '" + mode + "'; it must be bag or live");
+  params.live = mode == "live";
+  params.flow = calipso::optionalParam(pnh, "flow", params.flow);
+  params.late_timeout_sec =
+      calipso::optionalParam(pnh, "late_timeout_sec", params.late_timeout_sec);
   return params;
 }
 

@@ -9,6 +9,7 @@ import unittest
 
 import cv2
 import numpy
+import rosparam
 import rostest
 import yaml
 
@@ -74,6 +75,12 @@ class BadInput(unittest.TestCase):
         with open(self.bag, "rb") as file, open(bag, "wb") as target:
             target.write(file.read()[:1000000])
         self.expect_complaint("truncated.bag", "rosbag reindex", bag=bag)
+
+    def test_parameter_of_another_type(self):
+        try:
+            self.expect_complaint("/player/in_flight", "another type", in_flight="many")
+        finally:
+            rosparam.delete_param("/player/in_flight")  # the test's master keeps it
 
     def test_missing_bag(self):
         self.expect_complaint("absent.bag", bag=self.path("absent.bag"))

@@ -56,8 +56,9 @@ class Segmenter {
   // What the user should know: objects that colours and depth hardly tell from their surroundings,
   // so that it is the rough placement that says where they are. Empty before the first call.
   std::vector<std::string> remarks() const;
-  // Something else to be said among them.
+  // Something else to be said with them.
   void addRemark(const std::string& remark) { further_remarks_.push_back(remark); }
+  const std::vector<std::string>& furtherRemarks() const { return further_remarks_; }
   // Per label, the models that were fitted to the first contours; none before the first call.
   std::map<int, ModelSurface> models() const;
 

@@ -41,8 +41,8 @@ const calipso_msgs::ObjectContour* findContour(const calipso_msgs::Segmentation&
 AlignNodeParams loadAlignParams(const ros::NodeHandle& pnh) {
   AlignNodeParams params;
   params.scene = requiredParam<std::string>(pnh, "scene");
-  pnh.param("levels", params.levels, AlignOptions().levels);
-  pnh.param("use_depth", params.use_depth, params.use_depth);
+  params.levels = optionalParam(pnh, "levels", AlignOptions().levels);
+  params.use_depth = optionalParam(pnh, "use_depth", params.use_depth);
   for (const int nodes : params.levels) {
     if (nodes < 8) {
       throw std::invalid_argument("parameter " + pnh.resolveName("levels") + " has " +

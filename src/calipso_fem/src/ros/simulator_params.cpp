@@ -67,29 +67,29 @@ void readObjects(const ros::NodeHandle& pnh, WorldParams& world) {
 SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
   SimulatorParams p;
   p.scene_directory = requiredParam<std::string>(pnh, "scene");
-  const std::string mode = pnh.param<std::string>("mode", "bag");
+  const std::string mode = optionalParam<std::string>(pnh, "mode", "bag");
   if (mode != "bag" && mode != "live")
     throw std::invalid_argument("parameter mode = '" + mode + "'; must be bag or live");
   p.live = mode == "live";
-  p.colour_by = pnh.param("colour_by", p.colour_by);
+  p.colour_by = optionalParam(pnh, "colour_by", p.colour_by);
   if (p.colour_by != "von_mises" && p.colour_by != "displacement")
     throw std::invalid_argument("parameter colour_by = '" + p.colour_by +
                                 "'; must be von_mises or displacement");
-  p.force_scale = pnh.param("force_scale", p.force_scale);
+  p.force_scale = optionalParam(pnh, "force_scale", p.force_scale);
   WorldParams& w = p.world;
-  w.pixel_error = pnh.param("pixel_error", w.pixel_error);
-  w.max_nodes = pnh.param("max_nodes", w.max_nodes);
-  w.max_substeps = pnh.param("max_substeps", w.max_substeps);
-  w.proximity = pnh.param("proximity", w.proximity);
-  w.contact_iterations = pnh.param("contact_iterations", w.contact_iterations);
-  w.contact_tolerance = pnh.param("contact_tolerance", w.contact_tolerance);
-  w.fem.element = elementTypeFromString(pnh.param("element", toString(w.fem.element)));
+  w.pixel_error = optionalParam(pnh, "pixel_error", w.pixel_error);
+  w.max_nodes = optionalParam(pnh, "max_nodes", w.max_nodes);
+  w.max_substeps = optionalParam(pnh, "max_substeps", w.max_substeps);
+  w.proximity = optionalParam(pnh, "proximity", w.proximity);
+  w.contact_iterations = optionalParam(pnh, "contact_iterations", w.contact_iterations);
+  w.contact_tolerance = optionalParam(pnh, "contact_tolerance", w.contact_tolerance);
+  w.fem.element = elementTypeFromString(optionalParam(pnh, "element", toString(w.fem.element)));
   w.fem.material_model =
-      materialModelFromString(pnh.param("material_model", toString(w.fem.material_model)));
-  w.fem.solver = solverKindFromString(pnh.param("solver", toString(w.fem.solver)));
-  w.fem.newton_iterations = pnh.param("newton_iterations", 8);
-  w.fem.newton_tolerance = pnh.param("newton_tolerance", 1e-3);
-  w.fem.linear_tolerance = pnh.param("linear_tolerance", w.fem.linear_tolerance);
+      materialModelFromString(optionalParam(pnh, "material_model", toString(w.fem.material_model)));
+  w.fem.solver = solverKindFromString(optionalParam(pnh, "solver", toString(w.fem.solver)));
+  w.fem.newton_iterations = optionalParam(pnh, "newton_iterations", 8);
+  w.fem.newton_tolerance = optionalParam(pnh, "newton_tolerance", 1e-3);
+  w.fem.linear_tolerance = optionalParam(pnh, "linear_tolerance", w.fem.linear_tolerance);
   readObjects(pnh, w);
   validate(w);
   return p;

@@ -11,8 +11,7 @@ namespace {
 template <class T>
 void readNumber(const ros::NodeHandle& pnh, const std::string& name, double low, double high,
                 T& value) {
-  double read = static_cast<double>(value);
-  if (!pnh.getParam(name, read)) return;
+  const double read = optionalParam(pnh, name, static_cast<double>(value));
   if (!(read >= low && read <= high)) {
     throw std::invalid_argument("parameter " + pnh.resolveName(name) + " is " +
                                 std::to_string(read) + "; give " + std::to_string(low) + " to " +
@@ -22,7 +21,7 @@ void readNumber(const ros::NodeHandle& pnh, const std::string& name, double low,
 }
 
 DenseFlow::Preset readPreset(const ros::NodeHandle& pnh) {
-  const std::string name = pnh.param<std::string>("flow_preset", "ultrafast");
+  const std::string name = optionalParam<std::string>(pnh, "flow_preset", "ultrafast");
   if (name == "ultrafast") return DenseFlow::Preset::kUltrafast;
   if (name == "fast") return DenseFlow::Preset::kFast;
   if (name == "medium") return DenseFlow::Preset::kMedium;
@@ -31,7 +30,7 @@ DenseFlow::Preset readPreset(const ros::NodeHandle& pnh) {
 }
 
 bool readLive(const ros::NodeHandle& pnh) {
-  const std::string mode = pnh.param<std::string>("mode", "bag");
+  const std::string mode = optionalParam<std::string>(pnh, "mode", "bag");
   if (mode == "bag" || mode == "live") return mode == "live";
   throw std::invalid_argument("parameter " + pnh.resolveName("mode") + " is '" + mode +
                               "'; give bag or live");

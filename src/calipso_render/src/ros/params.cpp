@@ -23,7 +23,7 @@ Quality qualityFromString(const std::string& name) {
 
 template <typename T>
 T inRange(const ros::NodeHandle& pnh, const std::string& name, T fallback, T low, T high) {
-  const T value = pnh.param(name, fallback);
+  const T value = optionalParam(pnh, name, fallback);
   if (!(value >= low && value <= high)) {
     throw std::invalid_argument("parameter " + name + " is " + std::to_string(value) +
                                 "; it must lie in " + std::to_string(low) + " .. " +
@@ -57,10 +57,10 @@ void loadScenery(const Scene& scene, RenderParams& render) {
 NodeParams loadParams(const ros::NodeHandle& pnh) {
   NodeParams p;
   p.scene = requiredParam<std::string>(pnh, "scene");
-  p.mode = modeFromString(pnh.param<std::string>("mode", "bag"));
-  p.render.quality = qualityFromString(pnh.param<std::string>("quality", "live"));
+  p.mode = modeFromString(optionalParam<std::string>(pnh, "mode", "bag"));
+  p.render.quality = qualityFromString(optionalParam<std::string>(pnh, "quality", "live"));
   p.render.sun_radius = inRange(pnh, "sun_radius", p.render.sun_radius, 0.0, 0.5);
-  p.render.add_noise = pnh.param("add_noise", p.render.add_noise);
+  p.render.add_noise = optionalParam(pnh, "add_noise", p.render.add_noise);
   p.render.background.mask_margin_px =
       inRange(pnh, "mask_margin_px", p.render.background.mask_margin_px, 0, 50);
   p.clip_samples = inRange(pnh, "clip_samples", p.clip_samples, 2, 200);

@@ -19,6 +19,19 @@ T requiredParam(const ros::NodeHandle& pnh, const std::string& name) {
   return value;
 }
 
+// A parameter that may be left out.
+// @throw std::invalid_argument naming one that is there and of another type
+template <typename T>
+T optionalParam(const ros::NodeHandle& pnh, const std::string& name, const T& otherwise) {
+  T value = otherwise;
+  if (!pnh.getParam(name, value) && pnh.hasParam(name)) {
+    throw std::invalid_argument("parameter " + pnh.resolveName(name) +
+                                " is of another type than its default; see the package's README "
+                                "and config for what it takes");
+  }
+  return value;
+}
+
 // The main() of every node: init, construct Node(nh, pnh), spin. Returns 1 if construction throws.
 template <typename Node>
 int runNode(int argc, char** argv, const std::string& name) {
