@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "place/masked_quantile.hpp"
+#include "place/drift_extent.hpp"
 
 namespace calipso::render {
 namespace {
@@ -22,25 +22,15 @@ constexpr float kLeastWay = 3.0f;  // px that it has to come in the clip
 constexpr int kStride = 2;         // px between places by which frames are registered
 constexpr int kRounds = 12;        // of registering
 constexpr float kOutlier = 10.0f;  // code values
-constexpr int kAround = 9;         // px across: differences are judged together
-constexpr float kClearWay = 4.0f;  // px between pictures that tell what drifts from what rests
-constexpr float kClearly = 1.3f;   // times, and
-constexpr float kNoise = 0.5f;     // code values, by which one explains a place better
-constexpr float kExplains = 0.6f;  // part of what changes that has to be explained
-constexpr int kLeastPart = 50;     // one part in so many of the picture has to drift
+constexpr int kOff = 9;            // px from the borders of what rests
 
-struct Picture {
-  cv::Mat grey;     // CV_32FC1, smoothed
-  cv::Mat covered;  // CV_8UC1
-};
-
-bool isFree(const Picture& picture, int u, int v) {
+bool isFree(const DriftPicture& picture, int u, int v) {
   return u >= 0 && v >= 0 && u < picture.grey.cols && v < picture.grey.rows &&
          picture.covered.at<std::uint8_t>(v, u) == 0;
 }
 
-Picture coarse(const Picture& picture) {
-  Picture out;
+DriftPicture coarse(const DriftPicture& picture) {
+  DriftPicture out;
   const cv::Size size(picture.grey.cols / kCoarse, picture.grey.rows / kCoarse);
   cv::resize(picture.grey, out.grey, size, 0, 0, cv::INTER_AREA);
   cv::resize(picture.covered, out.covered, size, 0, 0, cv::INTER_AREA);
@@ -48,7 +38,7 @@ Picture coarse(const Picture& picture) {
 }
 
 // Places that change between two pictures and stand out from what is around.
-std::vector<cv::Point> tellingPoints(const Picture& from, const Picture& to) {
+std::vector<cv::Point> tellingPoints(const DriftPicture& from, const DriftPicture& to) {
   std::vector<cv::Point> points;
   for (int v = 1; v + 1 < from.grey.rows; ++v) {
     for (int u = 1; u + 1 < from.grey.cols; ++u) {
@@ -65,7 +55,7 @@ std::vector<cv::Point> tellingPoints(const Picture& from, const Picture& to) {
 }
 
 // Mean difference at points displaced by `by`; none if few of them stay in the picture.
-std::optional<float> missAt(const Picture& from, const Picture& to,
+std::optional<float> missAt(const DriftPicture& from, const DriftPicture& to,
                             const std::vector<cv::Point>& points, const cv::Point& by) {
   float sum = 0.0f;
   std::size_t count = 0;
@@ -79,7 +69,7 @@ std::optional<float> missAt(const Picture& from, const Picture& to,
 }
 
 // The displacement, in px of the whole picture, that explains best what changes.
-std::optional<cv::Point2f> guess(const Picture& from, const Picture& to) {
+std::optional<cv::Point2f> guess(const DriftPicture& from, const DriftPicture& to) {
   const std::vector<cv::Point> points = tellingPoints(from, to);
   if (points.size() < kFewestPoints) return std::nullopt;
   const int reach = from.grey.cols / 3, side = 2 * reach + 1;
@@ -102,7 +92,8 @@ std::optional<cv::Point2f> guess(const Picture& from, const Picture& to) {
 
 // Displacement of `to` against `from` near a guess (Lucas & Kanade 1981, robust).
 // @param only CV_8UC1, != 0: what counts of `from`; empty: all that is free
-cv::Point2f refine(const Picture& from, const Picture& to, const cv::Mat& only, cv::Point2f by) {
+cv::Point2f refine(const DriftPicture& from, const DriftPicture& to, const cv::Mat& only,
+                   cv::Point2f by) {
   for (int round = 0; round < kRounds; ++round) {
     Eigen::Matrix2d H = Eigen::Matrix2d::Zero();
     Eigen::Vector2d b = Eigen::Vector2d::Zero();
@@ -133,8 +124,8 @@ cv::Point2f refine(const Picture& from, const Picture& to, const cv::Mat& only, 
 
 // How far the picture has come in every frame. A frame is registered to the first one that it
 // still shares two thirds of the picture with.
-std::vector<cv::Point2f> followed(const std::vector<Picture>& pictures, const cv::Point2f& pace,
-                                  const cv::Mat& where) {
+std::vector<cv::Point2f> followed(const std::vector<DriftPicture>& pictures,
+                                  const cv::Point2f& pace, const cv::Mat& where) {
   std::vector<cv::Point2f> shifts(pictures.size());
   std::size_t from = 0;
   for (std::size_t i = 1; i < pictures.size(); ++i) {
@@ -146,57 +137,6 @@ std::vector<cv::Point2f> followed(const std::vector<Picture>& pictures, const cv
     shifts[i] = shifts[from] + refine(pictures[from], pictures[i], only, expected - shifts[from]);
   }
   return shifts;
-}
-
-// Mean differences between frames, per place, as if it rested and as if it drifted; where both are
-// known.
-struct Misses {
-  cv::Mat resting, drifting, known;  // CV_32FC1
-};
-
-Misses missesOf(const std::vector<Picture>& pictures, const std::vector<cv::Point2f>& shifts) {
-  const cv::Size size = pictures[0].grey.size();
-  Misses m{cv::Mat::zeros(size, CV_32F), cv::Mat::zeros(size, CV_32F),
-           cv::Mat::zeros(size, CV_32F)};
-  for (const std::size_t r : {std::size_t{0}, pictures.size() / 2, pictures.size() - 1}) {
-    cv::Mat free;
-    cv::Mat(pictures[r].covered == 0).convertTo(free, CV_32F, 1.0 / 255.0);
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-      const cv::Point2f way = shifts[r] - shifts[i];
-      if (std::hypot(way.x, way.y) < kClearWay) continue;
-      const cv::Mat there = displaced(pictures[r].grey, way, size),
-                    shown = (displaced(free, way, size) > 0.99f) & (pictures[i].covered == 0) &
-                            (pictures[r].covered == 0);
-      cv::Mat moved, stayed;
-      cv::absdiff(pictures[i].grey, there, moved),
-          cv::absdiff(pictures[i].grey, pictures[r].grey, stayed);
-      cv::add(m.drifting, moved, m.drifting, shown), cv::add(m.resting, stayed, m.resting, shown);
-      cv::add(m.known, 1.0, m.known, shown);
-    }
-  }
-  for (cv::Mat* x : {&m.resting, &m.drifting, &m.known})
-    cv::boxFilter(*x, *x, -1, {kAround, kAround}, {-1, -1}, false);
-  m.resting /= cv::max(m.known, 1.0f), m.drifting /= cv::max(m.known, 1.0f);
-  return m;
-}
-
-// Where the picture drifts: by which explains the place better, or the nearest one that tells.
-// Empty unless drifting explains most of what changes.
-cv::Mat whereDrifting(const Misses& m, const cv::Mat& ground) {
-  const cv::Mat known = m.known > 0.0f;
-  const float noise = quantileOf(cv::min(m.resting, m.drifting), known, 0.25);
-  const cv::Mat changes = known & (m.resting > 2.0f * noise + 2.0f * kNoise),
-                drifts = known & (m.resting > kClearly * m.drifting + kNoise);
-  cv::Mat rests = known & (m.drifting > kClearly * m.resting + kNoise);
-  if (cv::countNonZero(changes & drifts) < kExplains * cv::countNonZero(changes) ||
-      kLeastPart * static_cast<std::size_t>(cv::countNonZero(drifts)) < drifts.total())
-    return {};
-  if (!ground.empty()) rests |= ground & ~drifts;
-  cv::Mat to_drifting, to_resting;
-  cv::distanceTransform(drifts == 0, to_drifting, cv::DIST_L2, cv::DIST_MASK_5);
-  if (cv::countNonZero(rests) == 0) return cv::Mat(drifts.size(), CV_8U, cv::Scalar(255));
-  cv::distanceTransform(rests == 0, to_resting, cv::DIST_L2, cv::DIST_MASK_5);
-  return to_drifting <= to_resting;
 }
 
 }  // namespace
@@ -222,26 +162,26 @@ cv::Mat displaced(const cv::Mat& image, const cv::Point2f& by, const cv::Size& o
 
 Drift findDrift(const std::vector<ClipFrame>& frames, const std::vector<cv::Mat>& covered,
                 const cv::Mat& ground) {
-  std::vector<Picture> pictures;
+  std::vector<DriftPicture> pictures;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    Picture picture;  // smoothed, what is covered shows farther
+    DriftPicture picture;  // smoothed, what is covered shows farther
     cv::dilate(covered[i], picture.covered, cv::Mat::ones(7, 7, CV_8U));
     cv::cvtColor(frames[i].bgr, picture.grey, cv::COLOR_BGR2GRAY);
     picture.grey.convertTo(picture.grey, CV_32F);
     cv::GaussianBlur(picture.grey, picture.grey, {}, 1.0);
     pictures.push_back(picture);
   }
-  const Picture first = coarse(pictures.front());
+  const DriftPicture first = coarse(pictures.front());
   // The longest time over which a guess succeeds says best how fast it is.
   for (std::size_t last = pictures.size() - 1; last > 0; last /= 2) {
     const auto way = guess(first, coarse(pictures[last]));
     if (!way) continue;
     const cv::Point2f pace = *way / static_cast<float>(last);
     Drift drift{followed(pictures, pace, cv::Mat()), {}};
-    drift.where = whereDrifting(missesOf(pictures, drift.shifts), ground);
+    drift.where = whereDrifting(pictures, drift.shifts, ground);
     if (drift.where.empty()) return {};
     cv::Mat within;  // off the borders of what rests
-    cv::erode(drift.where, within, cv::Mat::ones(2 * kAround + 1, 2 * kAround + 1, CV_8U));
+    cv::erode(drift.where, within, cv::Mat::ones(2 * kOff + 1, 2 * kOff + 1, CV_8U));
     drift.shifts = followed(pictures, pace, within);
     const cv::Point2f whole = drift.shifts.back();
     return std::hypot(whole.x, whole.y) >= kLeastWay ? drift : Drift();
