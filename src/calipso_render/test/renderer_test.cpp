@@ -197,6 +197,34 @@ TEST(Renderer, SameInputGivesSameBytes) {
   EXPECT_EQ(cv::norm(a.bgr, b.bgr, cv::NORM_INF), 0.0);
 }
 
+// What moves beside the edited ball shades it: what is kept of that is of the place it has now.
+TEST(Renderer, SameBytesWhereverWhatMovesBesideWasBefore) {
+  const ObjectModel beside = ballAt(kCentre, "beside", 2);
+  ClipSample clip;
+  const ClipFrame key = frameWithBall(ballAt(kCentre));
+  clip.add(key);
+  Prepared learnt = prepare(clip, {ballAt(kCentre), beside}, params());
+  learnt.moves[1] = true;
+  const auto prepared = std::make_shared<const Prepared>(std::move(learnt));
+  const Eigen::Vector3f moved(-0.05f, 0.0f, 0.0f);
+  const auto frame = [&](float metres_towards_sun) {
+    ObjectInFrame ball, other;
+    ball.name = "ball", ball.edited = true, ball.vertices = prepared->surfaces[0].key_vertices;
+    for (Eigen::Vector3f& x : ball.vertices) x += moved;
+    other.name = "beside";
+    other.world_from_object.translation() =
+        kCentre + (moved + metres_towards_sun * prepared->light.light.direction).cast<double>();
+    return FrameInput{key.bgr, key.labels, key.camera, 7, {ball, other}, {}};
+  };
+  const auto alone = [&](float metres) {
+    return Renderer(prepared, params()).composite(frame(metres)).bgr;
+  };
+  Renderer one(prepared, params());
+  for (const float metres : {0.25f, 2.0f, 2.0f, 0.25f})
+    EXPECT_EQ(cv::norm(one.composite(frame(metres)).bgr, alone(metres), cv::NORM_INF), 0.0);
+  EXPECT_GT(cv::norm(alone(0.25f), alone(2.0f), cv::NORM_INF), 0.0);
+}
+
 TEST(Renderer, SameBytesForAnyNumberOfThreads) {
   RenderParams p = params();
   p.add_noise = true;

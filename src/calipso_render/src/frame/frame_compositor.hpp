@@ -222,6 +222,7 @@ class FrameCompositor {
   SkyGrid skyOver(const Visibility& shadow, const cv::Rect& region, const SquareMask& skip) const;
   cv::Mat skyLevels(const SkyGrid& grid, const Visibility& shadow) const;
   void leaveHidden(int v, int begin, int end, std::uint8_t* sky) const;
+  void cacheShaded();
   void cacheBefore();
   void joinBefore(int v);
   void chooseRegion();

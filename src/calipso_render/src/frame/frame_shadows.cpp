@@ -73,7 +73,7 @@ void FrameCompositor::prepareShadows() {
   const bool others_rest = shadows_.others_vertices == others_now;
   if (!same || !others_rest) cacheOthers(others);
   if (!same) cacheOriginals(originals);
-  if (!same || !others_rest) cacheBefore();
+  if (!same || !others_rest) cacheShaded(), cacheBefore();
   shadows_.edited = edited_, shadows_.camera = frame_.camera, shadows_.sun = light_.direction;
   shadows_.others_vertices = std::move(others_now);
 }
@@ -103,8 +103,18 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   const auto sky_shadow = skyShadowOf(originals, params_);
   shadows_.originals_sky = skyOver(*sky_shadow, whole, SquareMask());
   shadows_.originals_sky_levels = skyLevels(shadows_.originals_sky, *sky_shadow);
+  shadows_.footprints = {};
+  for (std::size_t i = 0; i < edited_.size(); ++i) {
+    if (edited_[i] && !footprints_[i].empty())
+      shadows_.footprints |= cv::boundingRect(footprints_[i]);
+  }
+}
+
+// Where the originals darken what the others leave of the light.
+void FrameCompositor::cacheShaded() {
+  const cv::Size whole = frame_.bgr.size();
   cv::Mat originals_sky = shadows_.originals_sky_levels.clone();
-  shadows_.shaded = cv::Mat::zeros(whole.size(), CV_8U);
+  shadows_.shaded = cv::Mat::zeros(whole, CV_8U);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < whole.height; ++v) {
     leaveHidden(v, 0, whole.width, originals_sky.ptr<std::uint8_t>(v));
@@ -117,11 +127,6 @@ void FrameCompositor::cacheOriginals(const std::vector<Occluder>& originals) {
   }
   cv::dilate(shadows_.shaded, shadows_.shaded, disc(params_.background.shadow_margin_px));
   shadows_.shaded_box = cv::boundingRect(shadows_.shaded);
-  shadows_.footprints = {};
-  for (std::size_t i = 0; i < edited_.size(); ++i) {
-    if (edited_[i] && !footprints_[i].empty())
-      shadows_.footprints |= cv::boundingRect(footprints_[i]);
-  }
 }
 
 // Part of its brightness that a pixel loses which gets these levels of sun and sky.
