@@ -17,8 +17,10 @@
 namespace calipso::render {
 namespace {
 
-constexpr std::size_t kFurtherViews = 5;  // beside the key frame
-constexpr int kMixed = 2;                 // px around a moving object whose colour is mixed
+// beside the key frame: those that tell the light, and that show the objects' reflectance
+constexpr std::size_t kLightViews = 5;
+constexpr std::size_t kTextureViews = 15;
+constexpr int kMixed = 2;  // px around a moving object whose colour is mixed
 
 std::vector<Actor> keyActors(const Prepared& p) {
   std::vector<Actor> actors;
@@ -28,7 +30,8 @@ std::vector<Actor> keyActors(const Prepared& p) {
 
 // The key frame, and further frames in which the poses of all moving objects are known, evenly
 // spaced.
-std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::Mat& key_picture) {
+std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::Mat& key_picture,
+                          std::size_t most) {
   std::vector<View> views = {{key_picture, p.key_labels, p.camera, keyActors(p)}};
   std::vector<const ClipFrame*> usable;
   for (std::size_t i = 1; i < clip.frames().size(); ++i) {
@@ -42,7 +45,7 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
       all = all && (!p.moves[k] || known(p.surfaces[k]));
     if (all) usable.push_back(&f);
   }
-  const std::size_t count = std::min(usable.size(), kFurtherViews);
+  const std::size_t count = std::min(usable.size(), most);
   for (std::size_t i = 0; i < count; ++i) {
     const ClipFrame& f = *usable[(i + 1) * usable.size() / count - 1];
     View view{{}, f.labels, f.camera, {}};
@@ -153,7 +156,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);
   const std::vector<Actor> actors = keyActors(p);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
-  const std::vector<View> views = viewsOf(clip, p, picture);
+  const std::vector<View> views = viewsOf(clip, p, picture, kLightViews);
   p.views = static_cast<int>(views.size());
   Stopwatch watch;
   const Background seen = seenBackground(frames, any_moves, params.background);
@@ -161,7 +164,8 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.light = lightOf(views, seen, any_moves, params, p);
   const ShadowMap sun = sunOver(actors, p.light.light);
   const SkyMap sky = skyOver(actors, params);
-  p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
+  p.appearances = makeAppearances(viewsOf(clip, p, picture, kTextureViews), p.moves, p.light.light,
+                                  p.light.gloss);
   p.appearance_ms = watch.lap();
   for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
   p.fronts = frontsOf(p, params);

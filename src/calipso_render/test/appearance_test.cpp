@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
 #include "calipso_render/shadow_map.hpp"
 #include "render_test_scene.hpp"
 
@@ -13,6 +16,7 @@ using namespace testing;
 const Eigen::Vector3d kPlace(0.0, 0.1, 0.12);
 const cv::Vec3f kAlbedo(0.15f, 0.3f, 0.6f);  // of frameWithBall()
 constexpr Gloss kTold{0.1f, 0.1f, 0.0f};
+constexpr long kBallTriangles = 2 * 24 * 48;
 constexpr float kTurn = 0.6f;  // rad about z: takes a place out of the highlight
 
 float lobeAt(const Eigen::Vector3f& normal) {
@@ -93,6 +97,75 @@ TEST(Appearance, ShadeThatThePictureDoesNotHaveIsNotDividedBy) {
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(c[i], kAlbedo[i], 0.06f);
   });
   EXPECT_GT(shaded, 10);
+}
+
+// The ball, and a plate fixed before its left half, as one object.
+ObjectModel halfHidden() {
+  ObjectModel model = ballAt(kPlace);
+  TriangleMesh& mesh = model.mesh;
+  const auto first = static_cast<int>(mesh.vertices.rows()), t = static_cast<int>(kBallTriangles);
+  const Eigen::RowVector3d ahead = Eigen::RowVector3d(0.0, -0.8, 0.38).normalized(),
+                           up(0.0, -ahead.z(), ahead.y()), left(-0.12, 0.0, 0.0);
+  mesh.vertices.conservativeResize(first + 4, 3), mesh.triangles.conservativeResize(t + 2, 3);
+  for (int k = 0; k < 4; ++k)
+    mesh.vertices.row(first + k) =
+        0.15 * ahead + (k < 2 ? -0.12 : 0.12) * up + (k % 3 == 0 ? 0.0 : 1.0) * left;
+  mesh.triangles.row(t) = Eigen::RowVector3i(first, first + 1, first + 2);
+  mesh.triangles.row(t + 1) = Eigen::RowVector3i(first, first + 2, first + 3);
+  return model;
+}
+
+// What a lens makes of it: the plate's colour and the ball's mix where the one ends.
+View blurredView(const Surface& surface, float angle, const Light& light) {
+  View view{cv::Mat::zeros(kHeight, kWidth, CV_32FC3),
+            cv::Mat::zeros(kHeight, kWidth, CV_8U),
+            camera(),
+            {}};
+  Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
+  turn.translate(kPlace).rotate(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()));
+  view.actors.push_back(
+      makeActor(surface, transformed(surface.object_vertices, turn), view.camera));
+  forEachPixelOf(view.actors.front(), [&](int u, int v, const SurfacePoint& p) {
+    const cv::Vec3f shade = diffuseShading(light, p.normal, 1.0f, p.seen, {});
+    for (int c = 0; c < 3; ++c)
+      view.picture.at<cv::Vec3f>(v, u)[c] = codeFromLinear(
+          kAlbedo[p.triangle < static_cast<int>(kBallTriangles) ? c : 2 - c] * shade[c]);
+    view.labels.at<std::uint8_t>(v, u) = kBallLabel;
+  });
+  cv::blur(view.picture, view.picture, {3, 3});
+  return view;
+}
+
+// Where one part of an object ends before another their colours mix, as at the mask's rim: of
+// several views those count that show the place elsewhere.
+TEST(Appearance, TakesFromAnotherViewWhatMixesWithAPartBefore) {
+  const Surface surface = makeSurface(halfHidden());
+  Light light;
+  light.ambient[0] = {0.8f, 0.8f, 0.8f};
+  std::vector<View> views;
+  for (const float angle : {0.0f, -kTurn, -1.3f * kTurn})
+    views.push_back(blurredView(surface, angle, light));
+  const Appearance a = makeAppearances(views, {true}, light, Gloss()).front();
+  std::vector<float> ratios;
+  for (int t = 0; t < static_cast<int>(kBallTriangles); ++t) {
+    for (std::size_t i = a.texture.firstOf(t); i < a.texture.firstOf(t + 1); ++i) {
+      const Eigen::Vector3f w = a.texture.weightsOf(t, i - a.texture.firstOf(t));
+      const Eigen::Vector3i& corners = surface.triangles[t];
+      const Points& x = surface.key_vertices;
+      const Eigen::Vector3f
+          place = w[0] * x[corners[0]] + w[1] * x[corners[1]] + w[2] * x[corners[2]],
+          to_eye = (camera().world_from_camera.translation().cast<float>() - place).normalized();
+      if ((place - kPlace.cast<float>()).dot(to_eye) < 0.5f * kBallRadius) continue;
+      const double right_of_edge =
+          camera().projectWorld(place.cast<double>()).x() - camera().projectWorld(kPlace).x();
+      if (right_of_edge < 0.3 || right_of_edge > 1.0) continue;
+      ratios.push_back(a.texture.texels[i][0] / a.texture.texels[i][2]);
+    }
+  }
+  ASSERT_GT(ratios.size(), 20u);
+  std::nth_element(ratios.begin(), ratios.begin() + ratios.size() / 2, ratios.end());
+  // The ball's own ratio is 0.25, the plate's 4, that of the mixed pixels 0.6.
+  EXPECT_LT(ratios[ratios.size() / 2], 0.33f);
 }
 
 }  // namespace

@@ -26,6 +26,7 @@ constexpr float kGlossy = 0.2f, kAllGloss = 0.6f;
 constexpr float kLeastClear = 0.02f;
 constexpr float kDarkest = 1e-4f;  // linear brightness that is told from none
 constexpr float kBroad = 0.35f;    // m from which a lobe looks like diffuse shading
+constexpr float kJump = 0.03f;     // of the object's extent: what hides a part of it is before it
 constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
 
 // Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the
@@ -130,6 +131,52 @@ float pixelSize(const cv::Mat& nearness, const Camera& camera) {
   return static_cast<float>(1.0 / (mean * camera.fx));
 }
 
+// Whether the fronts at two neighbouring pixels belong to parts of which one hides the other: each
+// is off the plane that touches the other.
+// @param tolerance m of depth
+bool jumps(const Shaded& s, const cv::Rect& region, const Camera& camera, const cv::Point& a,
+           const cv::Point& b, float tolerance) {
+  const Eigen::Matrix3f axes = camera.world_from_camera.linear().cast<float>();
+  const auto isOff = [&](const cv::Point& here, const cv::Point& there) {
+    const cv::Vec3f& n = s.normal.at<cv::Vec3f>(here);
+    const Eigen::Vector3f normal = axes.transpose() * Eigen::Vector3f(n[0], n[1], n[2]);
+    const auto facing = [&](const cv::Point& q) {
+      return normal.dot(camera.ray(q.x + region.x, q.y + region.y).cast<float>());
+    };
+    const float near = s.nearness.at<float>(here), plane = near * facing(there) / facing(here);
+    return std::abs(s.nearness.at<float>(there) - plane) > tolerance * near * near;
+  };
+  return s.nearness.at<float>(a) > 0.0f && s.nearness.at<float>(b) > 0.0f && isOff(a, b) &&
+         isOff(b, a);
+}
+
+// Trust beside such places: there, too, two colours mix.
+void lowerBesideJumps(const Shaded& s, const Camera& camera, float tolerance, Reflectance& r) {
+  cv::Mat smooth(r.region.size(), CV_8U, cv::Scalar(255)), distance;
+  for (int v = 0; v + 1 < smooth.rows; ++v) {
+    for (int u = 0; u + 1 < smooth.cols; ++u) {
+      for (const cv::Point q : {cv::Point(u + 1, v), cv::Point(u, v + 1)}) {
+        if (jumps(s, r.region, camera, {u, v}, q, tolerance))
+          smooth.at<std::uint8_t>(v, u) = smooth.at<std::uint8_t>(q) = 0;
+      }
+    }
+  }
+  if (cv::countNonZero(smooth == 0) == 0) return;
+  cv::distanceTransform(smooth, distance, cv::DIST_L2, 5);
+  for (int v = 0; v < smooth.rows; ++v) {
+    for (int u = 0; u < smooth.cols; ++u) {
+      float& trust = r.trust.at<float>(v, u);
+      trust = std::min(trust, rimTrust(distance.at<float>(v, u) + 1.0f));
+    }
+  }
+}
+
+float extentOf(const Surface& surface) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : surface.key_vertices) box.extend(p);
+  return box.diagonal().norm();
+}
+
 // @param mean_light that of the key frame, where there is one
 Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light,
                           const Gloss& gloss, const ShadowMap& sun,
@@ -169,6 +216,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   }
   takeOutFalseShade({shaded.position, shaded.normal, shaded.light, shaded.open, r.trust}, floor,
                     pixelSize(shaded.nearness, view.camera), r.albedo);
+  lowerBesideJumps(shaded, view.camera, kJump * extentOf(*actor.surface), r);
   return r;
 }
 
