@@ -168,5 +168,30 @@ TEST(Appearance, TakesFromAnotherViewWhatMixesWithAPartBefore) {
   EXPECT_LT(ratios[ratios.size() / 2], 0.33f);
 }
 
+// A part of the mesh just under another one, as the root of a wing in the fuselage, does not take
+// the other's look.
+TEST(Appearance, APartUnderAnotherIsNotSeen) {
+  ObjectModel model = ballAt(kPlace);
+  const TriangleMesh skin = model.mesh;
+  const int vertices = skin.vertexCount(), triangles = skin.triangleCount();
+  model.mesh.vertices.resize(2 * vertices, 3);
+  model.mesh.triangles.resize(2 * triangles, 3);
+  model.mesh.vertices << skin.vertices, 0.985 * skin.vertices;
+  model.mesh.triangles << skin.triangles, skin.triangles.array() + vertices;
+  const Surface surface = makeSurface(model);
+  const ClipFrame frame = frameWithBall(ballAt(kPlace));
+  View view{{}, frame.labels, frame.camera, {}};
+  frame.bgr.convertTo(view.picture, CV_32F);
+  view.actors.push_back(makeActor(surface, surface.key_vertices, frame.camera));
+  const Appearance a = makeAppearances({view}, {false}, sunlight(), {}).front();
+  const auto fromPicture = [&](int first, int end) {
+    return std::count_if(a.texture.texels.begin() + a.texture.firstOf(first),
+                         a.texture.texels.begin() + a.texture.firstOf(end),
+                         [](const cv::Vec4f& texel) { return texel[3] > 0.0f; });
+  };
+  EXPECT_GT(fromPicture(0, triangles), 100);
+  EXPECT_EQ(fromPicture(triangles, 2 * triangles), 0);
+}
+
 }  // namespace
 }  // namespace calipso::render

@@ -59,16 +59,18 @@ struct Shaded {
   cv::Mat nearness;   // CV_32FC1
   cv::Mat open;       // CV_32FC3: `light` if nothing were before the surface
   cv::Mat position;   // CV_32FC3, world, m
+  cv::Mat triangle;   // CV_32SC1, -1 = none
   cv::Mat normal;     // CV_32FC3
   cv::Vec3f mean;
 };
 
 Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
              const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& thrown_back) {
-  Shaded s{cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3),
-           cv::Mat::zeros(region.size(), CV_32F),   cv::Mat::zeros(region.size(), CV_32F),
-           cv::Mat::zeros(region.size(), CV_32FC3), cv::Mat::zeros(region.size(), CV_32FC3),
-           cv::Mat::zeros(region.size(), CV_32FC3), {}};
+  Shaded s;
+  for (cv::Mat* colours : {&s.highlight, &s.light, &s.open, &s.position, &s.normal})
+    *colours = cv::Mat::zeros(region.size(), CV_32FC3);
+  for (cv::Mat* values : {&s.glint, &s.nearness}) *values = cv::Mat::zeros(region.size(), CV_32F);
+  s.triangle = cv::Mat(region.size(), CV_32S, cv::Scalar(-1));
   VisibilityBuffer buffer(region);
   buffer.draw(actor.screen, 0);
   const Eigen::Vector3f eye = camera.world_from_camera.translation().cast<float>();
@@ -95,6 +97,7 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
             torranceSparrow(p.normal, light.direction, towards, gloss.roughness);
       }
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
+      s.triangle.at<int>(v, u) = VisibilityBuffer::triangleOf(id);
       s.position.at<cv::Vec3f>(v, u) = {p.position.x(), p.position.y(), p.position.z()};
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];
@@ -192,7 +195,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   r.region = boundsOf(actor.screen, kMargin, view.picture.size()) | mask_box;
   if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
   const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun, thrown_back);
-  r.nearness = shaded.nearness, r.normal = shaded.normal;
+  r.nearness = shaded.nearness, r.normal = shaded.normal, r.triangle = shaded.triangle;
   r.clear = clearOf(view.picture(r.region), shaded.glint);
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);

@@ -45,6 +45,18 @@ std::vector<int> weld(const Points& vertices) {
   return welded;
 }
 
+std::vector<int> connectedParts(const Points& vertices, const Triangles& triangles) {
+  const std::vector<int> place = weld(vertices);
+  DisjointSets sets(static_cast<int>(vertices.size()));
+  for (const Eigen::Vector3i& t : triangles) {
+    sets.join(place[t[0]], place[t[1]]);
+    sets.join(place[t[0]], place[t[2]]);
+  }
+  std::vector<int> parts;
+  for (const Eigen::Vector3i& t : triangles) parts.push_back(sets.find(place[t[0]]));
+  return parts;
+}
+
 MeshNormals meshNormals(const Points& vertices, const Triangles& triangles,
                         const std::vector<MeshEdge>& edges) {
   Points flat;

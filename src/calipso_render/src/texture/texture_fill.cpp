@@ -7,6 +7,7 @@
 
 #include "calipso_render/surface_symmetry.hpp"
 #include "smooth_step.hpp"
+#include "texture/mesh_topology.hpp"
 #include "texture/texture_patches.hpp"
 #include "texture/texture_seams.hpp"
 
@@ -19,9 +20,11 @@ constexpr float kDepthTolerance = 0.012f;
 // ... a like place that far before the front is not on the object
 constexpr float kOffSurface = 0.03f;
 constexpr float kFlattest = 0.05f,
-                kFull = 0.25f;   // cosine of the view from which a surface is seen, and well seen
-constexpr float kEnough = 0.3f;  // weight of a look that needs no other
-constexpr float kSeen = 1e-5f;   // sum of weights, cubed, below which a texel counts as not seen
+                kFull = 0.25f;  // cosine of the view from which a surface is seen, and well seen
+constexpr int kAnyPart = -1;
+constexpr float kSameFace = 0.5f;  // cosine to the front's normal of what may be that front
+constexpr float kEnough = 0.3f;    // weight of a look that needs no other
+constexpr float kSeen = 1e-5f;     // sum of weights, cubed, below which a texel counts as not seen
 // certainty, of the greatest there is, of what others are continued from
 constexpr float kKnown = 0.5f;
 constexpr float kSure = 0.2f;     // ... of which nothing else is needed
@@ -45,6 +48,7 @@ cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
 // A point of the surface, world axes, key frame.
 struct Place {
   Eigen::Vector3f point, normal;
+  int part = kAnyPart;  // of the mesh, that has to be seen there
 };
 
 // Turns places about an axis into the quarter of a turn on either side of `middle`, back and forth,
@@ -66,13 +70,14 @@ struct Fold {
     const float half = 0.5f * (angle + folded);
     const Eigen::Vector3f across = std::cos(half) * aside - std::sin(half) * ahead;
     const MirrorPlane plane{across, across.dot(axis.point)};
-    return {plane.point(place.point), plane.vector(place.normal)};
+    return {plane.point(place.point), plane.vector(place.normal), place.part};
   }
 
  private:
   Place turned(const Place& place, float angle) const {
     const Eigen::AngleAxisf rotation(angle, axis.direction);
-    return {axis.point + rotation * (place.point - axis.point), rotation * place.normal};
+    return {axis.point + rotation * (place.point - axis.point), rotation * place.normal,
+            place.part};
   }
 };
 
@@ -125,6 +130,7 @@ class TextureFill {
     for (const View* v : views_)
       camera_from_world_.push_back(v->camera.world_from_camera.inverse().cast<float>());
     key_depth_ = std::max(1e-6f, (camera_from_world_[0] * surface_.key_vertices.front()).z());
+    parts_ = connectedParts(surface_.key_vertices, surface_.triangles);
     planes_ = mirrorPlanes(surface_.key_vertices, surface_.triangles);
     if (const auto axis = revolutionAxis(surface_.key_vertices, surface_.triangles)) {
       folds_ = foldsOf(*axis, views_[0]->camera.world_from_camera.translation().cast<float>());
@@ -168,7 +174,18 @@ class TextureFill {
                 static_cast<float>(pixel.y()) - region.y};
   }
 
-  // The best trust around a pixel among fronts of the object that `accepts` takes, by depth (m).
+  // A part that lies just under another one, or behind it, is not seen there.
+  bool ofPart(const Reflectance& r, const cv::Point& pixel, const Place& place) const {
+    return place.part == kAnyPart || place.part == parts_[r.triangle.at<int>(pixel)];
+  }
+
+  bool sameFace(const Reflectance& r, const cv::Point& pixel, const Place& place) const {
+    const cv::Vec3f& n = r.normal.at<cv::Vec3f>(pixel);
+    const float alike = place.normal.dot(Eigen::Vector3f(n[0], n[1], n[2]));
+    return ofPart(r, pixel, place) && (two_sided_ ? std::abs(alike) : alike) >= kSameFace;
+  }
+
+  // The best trust around a pixel among those of the object's front that `accepts` takes.
   template <typename Accepts>
   float trustAround(std::size_t view, const Look& look, Accepts accepts) const {
     const Reflectance& r = pictures_[view];
@@ -177,8 +194,9 @@ class TextureFill {
     float trust = 0.0f;
     for (int y = std::max(0, v - 1); y <= std::min(r.region.height - 1, v + 1); ++y) {
       for (int x = std::max(0, u - 1); x <= std::min(r.region.width - 1, u + 1); ++x) {
-        const float near = r.nearness.at<float>(y, x);
-        if (near > 0.0f && accepts(1.0f / near)) trust = std::max(trust, r.trust.at<float>(y, x));
+        const cv::Point pixel(x, y);
+        if (r.nearness.at<float>(pixel) > 0.0f && accepts(pixel))
+          trust = std::max(trust, r.trust.at<float>(pixel));
       }
     }
     return trust;
@@ -195,8 +213,11 @@ class TextureFill {
     const float cosine = two_sided_ ? std::abs(facing) : facing;
     if (cosine < kFlattest) return {};
     Look look = *pixel;
-    const float trust = trustAround(view, look, [&](float depth) {
-      return q.z() <= depth + kDepthTolerance * extent_ && q.z() >= depth - before * extent_;
+    const float trust = trustAround(view, look, [&](const cv::Point& pixel) {
+      const Reflectance& r = pictures_[view];
+      const float depth = 1.0f / r.nearness.at<float>(pixel);
+      return q.z() <= depth + kDepthTolerance * extent_ && q.z() >= depth - before * extent_ &&
+             sameFace(r, pixel, place);
     });
     look.weight = trust * std::min(1.0f, (cosine - kFlattest) / (kFull - kFlattest));
     look.detail = cosine *
@@ -213,7 +234,7 @@ class TextureFill {
     const cv::Point pixel =
         look ? cv::Point(std::lround(look->u), std::lround(look->v)) : cv::Point(-1, -1);
     if (!cv::Rect(cv::Point(), r.region.size()).contains(pixel) ||
-        r.nearness.at<float>(pixel) <= 0.0f)
+        r.nearness.at<float>(pixel) <= 0.0f || !ofPart(r, pixel, place))
       return {};
     const Eigen::Vector3f sight =
         (place.point - views_[0]->camera.world_from_camera.translation().cast<float>())
@@ -244,7 +265,7 @@ class TextureFill {
     };
     const auto placeOf = [&](const Points& vertices, const Points& normals) -> Place {
       return {mix(vertices, surface_.triangles[triangle]),
-              mix(normals, surface_.corners[triangle]).normalized()};
+              mix(normals, surface_.corners[triangle]).normalized(), parts_[triangle]};
     };
     cv::Vec3f sum;
     float total = 0.0f, shares = 0.0f, key = 0.0f, key_share = 0.0f;
@@ -364,6 +385,7 @@ class TextureFill {
   const std::vector<Reflectance>& pictures_;
   const Surface& surface_;
   std::vector<Eigen::Isometry3f> camera_from_world_;
+  std::vector<int> parts_;  // connectedParts()
   std::vector<MirrorPlane> planes_;
   std::vector<Fold> folds_;
   float extent_ = 0.0f, key_depth_ = 1.0f;  // m

@@ -12,6 +12,7 @@ struct Reflectance {
   cv::Mat albedo;    // CV_32FC4, extended beyond the silhouette; the fourth unused
   cv::Mat nearness;  // CV_32FC1: 1 / depth of the object's front, 0 = none
   cv::Mat normal;    // CV_32FC3: of the front, world, towards the camera
+  cv::Mat triangle;  // CV_32SC1: of the front, -1 = none
   cv::Mat trust;     // CV_32FC1
   cv::Mat clear;     // CV_32FC1: 1 where no highlight hides the reflectance
   cv::Vec3f mean_light;
