@@ -58,7 +58,6 @@ struct Shaded {
   cv::Mat glint;      // CV_32FC1: brightness of the sun's part of it, of a lobe that stands out
   cv::Mat nearness;   // CV_32FC1
   cv::Mat open;       // CV_32FC3: `light` if nothing were before the surface
-  cv::Mat position;   // CV_32FC3, world, m
   cv::Mat triangle;   // CV_32SC1, -1 = none
   cv::Mat normal;     // CV_32FC3
   cv::Vec3f mean;
@@ -67,7 +66,7 @@ struct Shaded {
 Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
              const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& thrown_back) {
   Shaded s;
-  for (cv::Mat* colours : {&s.highlight, &s.light, &s.open, &s.position, &s.normal})
+  for (cv::Mat* colours : {&s.highlight, &s.light, &s.open, &s.normal})
     *colours = cv::Mat::zeros(region.size(), CV_32FC3);
   for (cv::Mat* values : {&s.glint, &s.nearness}) *values = cv::Mat::zeros(region.size(), CV_32F);
   s.triangle = cv::Mat(region.size(), CV_32S, cv::Scalar(-1));
@@ -98,7 +97,6 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       }
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
       s.triangle.at<int>(v, u) = VisibilityBuffer::triangleOf(id);
-      s.position.at<cv::Vec3f>(v, u) = {p.position.x(), p.position.y(), p.position.z()};
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];
     }
@@ -126,12 +124,6 @@ cv::Mat clearOf(const cv::Mat& picture, const cv::Mat& glint) {
   }
   cv::erode(clear, clear, cv::Mat::ones(3, 3, CV_8U));
   return clear;
-}
-
-// Side of a pixel at the surface's mean nearness, m.
-float pixelSize(const cv::Mat& nearness, const Camera& camera) {
-  const double mean = cv::countNonZero(nearness) > 0 ? cv::mean(nearness, nearness > 0.0f)[0] : 1.0;
-  return static_cast<float>(1.0 / (mean * camera.fx));
 }
 
 // Whether the fronts at two neighbouring pixels belong to parts of which one hides the other: each
@@ -217,9 +209,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
       r.trust.at<float>(v, u) *= std::min(1.0f, luminance(l) / (kLit * luminance(r.mean_light)));
     }
   }
-  takeOutFalseShade({shaded.position, shaded.normal, shaded.light, shaded.open, r.trust}, floor,
-                    pixelSize(shaded.nearness, view.camera), r.albedo);
   lowerBesideJumps(shaded, view.camera, kJump * extentOf(*actor.surface), r);
+  takeOutFalseShade({shaded.light, shaded.open, r.trust}, floor, r.albedo);
   return r;
 }
 
