@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "calipso_render/colour.hpp"
@@ -112,11 +113,11 @@ constexpr float kDark = 0.1f, kBright = 0.5f;
 
 // A cube whose pattern is known on all sides but the one at x = 1.
 struct Patterned {
-  Mesh mesh = cube(10);
+  Mesh mesh;
   SurfaceTexture texture{mesh.vertices, mesh.triangles, 0.012f, 300000};
   std::vector<float> certain = std::vector<float>(texture.size(), 1.0f);
 
-  explicit Patterned(bool pattern) {
+  explicit Patterned(bool pattern, Mesh m = cube(10)) : mesh(std::move(m)) {
     for (int t = 0; t < texture.triangleCount(); ++t) {
       for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
         const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
@@ -173,6 +174,23 @@ TEST(TexturePatches, ASurfaceWithoutAPatternIsLeftAsItIs) {
   const std::vector<cv::Vec4f> before = cube.texture.texels;
   cube.fill();
   EXPECT_EQ(cube.texture.texels, before);
+}
+
+// A strip beside the cube, of another colour and known at its one end.
+TEST(TexturePatches, AnotherPartOfTheMeshDoesNotTakeThePattern) {
+  Mesh mesh = cube(10);
+  const int first = static_cast<int>(mesh.triangles.size());
+  addSheet(mesh, 8, [](float s, float t) { return Eigen::Vector3f(2.0f + 0.2f * s, 0.0f, t); });
+  Patterned both(true, mesh);
+  const std::size_t start = both.texture.firstOf(first),
+                    middle =
+                        both.texture.firstOf(first + (both.texture.triangleCount() - first) / 2);
+  std::fill(both.certain.begin() + start, both.certain.begin() + middle, 1.0f);
+  std::fill(both.texture.texels.begin() + start, both.texture.texels.begin() + middle,
+            cv::Vec4f(0.3f, 0.2f, 0.1f, 1.0f));
+  both.fill();
+  for (std::size_t i = middle; i < both.texture.size(); ++i) ASSERT_EQ(both.certain[i], 0.0f);
+  EXPECT_EQ(*std::min_element(both.certain.begin(), both.certain.begin() + start), 1.0f);
 }
 
 TEST(TexturePatches, NothingKnownFillsNothing) {

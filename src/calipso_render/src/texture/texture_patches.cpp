@@ -68,6 +68,7 @@ class PatternFill {
     if (best < 0) return;
     sample_ = draw(unfolder_.around(best, down_, kRadius * pixel_));
     if (!hasPattern()) return;
+    leaveOtherParts(best, unknown);
     for (int i = 0; i < kMostCharts; ++i) {
       const int seed = nextSeed(unknown);
       if (seed < 0) return;
@@ -86,6 +87,15 @@ class PatternFill {
         unknown[t] = unknown[t] || known_.texels[i][3] < kKnown;
     }
     return unknown;
+  }
+
+  // What does not hang together with the sample may be another thing: a balloon's ropes.
+  void leaveOtherParts(int sample, std::vector<bool>& unknown) const {
+    std::vector<bool> goal(unknown.size(), false);
+    goal[sample] = true;
+    const std::vector<float> distances = unfolder_.distances(goal);
+    for (std::size_t t = 0; t < unknown.size(); ++t)
+      unknown[t] = unknown[t] && std::isfinite(distances[t]);
   }
 
   // The triangle with the greatest distance that is not above a limit; -1: all are 0 or above it.
