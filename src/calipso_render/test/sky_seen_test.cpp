@@ -163,5 +163,15 @@ TEST(SkySeen, IsThatOutsideWhereShellsRunIntoEachOther) {
   EXPECT_EQ(sides, 12);
 }
 
+// A peg within a block, of which nothing comes out, is not black when it does.
+TEST(SkySeen, IsFullOfWhatIsBuriedAltogether) {
+  Points points;
+  Triangles faces;
+  addBox({-0.1f, -0.1f, 0.4f}, {0.1f, 0.1f, 0.6f}, points, faces);
+  addBox({-0.5f, -0.5f, 0.0f}, {0.5f, 0.5f, 1.0f}, points, faces);
+  const Surface surface = surfaceOf(points, faces);
+  for (const SkySeen& seen : surface.seen) EXPECT_FLOAT_EQ(seen.open, 1.0f);
+}
+
 }  // namespace
 }  // namespace calipso::render

@@ -133,8 +133,10 @@ class Emergence {
     }
   }
 
-  // Gives the buried vertices what the samples outside see, near ones most.
-  void spread(const Side& samples, const std::vector<char>& buried,
+  // Gives the buried vertices what the samples outside see, near ones most; those that have none an
+  // open view: nobody sees them until they come out.
+  // @param normals of the vertices
+  void spread(const Side& samples, const Points& normals, const std::vector<char>& buried,
               std::vector<SkySeen>& seen) const {
     std::vector<SkySeen> sums(seen.size(), SkySeen::none());
     std::vector<float> weights(seen.size(), 0.0f);
@@ -147,7 +149,8 @@ class Emergence {
       }
     }
     for (std::size_t i = 0; i < seen.size(); ++i) {
-      if (buried[i] != 0 && weights[i] > 0.0f) seen[i] = sums[i] * (1.0f / weights[i]);
+      if (buried[i] == 0) continue;
+      seen[i] = weights[i] > 0.0f ? sums[i] * (1.0f / weights[i]) : SkySeen::all(normals[i]);
     }
   }
 
@@ -177,10 +180,10 @@ void findSkySeen(const Points& vertices, const Points& normals, const Triangles&
   } else {
     const Emergence emergence(vertices, normals, triangles, front.buried);
     Side outside(scene, emergence.places, emergence.normals, 1.0f);
-    emergence.spread(outside, front.buried, front.seen);
+    emergence.spread(outside, normals, front.buried, front.seen);
     const std::vector<SkySeen> straight = front.seen;
     front.gather(triangles, straight, nullptr), outside.gather(triangles, straight, nullptr);
-    emergence.spread(outside, front.buried, front.seen);
+    emergence.spread(outside, normals, front.buried, front.seen);
   }
   seen = std::move(front.seen);
 }
