@@ -217,13 +217,13 @@ struct LiveCase {
       for (int u = 75; u < 105; ++u)
         origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 65), short(v));
     }
-    fill = LiveFill(origin, labels);
+    fill = LiveFill(origin, labels, frame, labels);
   }
 };
 
 TEST(LiveFill, CopiesTheFrameAtHandAndMeetsTheRim) {
   const LiveCase c(6);
-  const std::vector<cv::Vec3f> corrections = c.fill.corrections(c.frame, c.labels);
+  const LiveFill::Corrections corrections = c.fill.corrections(c.frame, c.labels);
   cv::Vec3f rim_sum, middle;
   for (int v = 15; v < 45; ++v) {
     cv::Vec3f colour;
@@ -233,6 +233,16 @@ TEST(LiveFill, CopiesTheFrameAtHandAndMeetsTheRim) {
   EXPECT_NEAR(rim_sum[0] / 30, 105.0, 2.0);  // the copy alone has 99
   ASSERT_TRUE(c.fill.at(c.frame, c.labels, corrections, 0.0f, 90, 30, middle));
   EXPECT_NEAR(middle[0], c.frame.at<cv::Vec3b>(30, 25)[0], 3.0);
+}
+
+TEST(LiveFill, StaysAsBrightAsItsSurroundingsWhenItsOriginDarkens) {
+  LiveCase c(6);
+  const int before = c.frame.at<cv::Vec3b>(30, 25)[0];
+  cv::subtract(c.frame.colRange(0, 60), cv::Scalar::all(20), c.frame.colRange(0, 60));
+  cv::Vec3f middle;
+  ASSERT_TRUE(
+      c.fill.at(c.frame, c.labels, c.fill.corrections(c.frame, c.labels), 0.0f, 90, 30, middle));
+  EXPECT_NEAR(middle[0], before, 2.0);
 }
 
 TEST(LiveFill, HasNothingWhereTheFrameHidesTheOrigin) {

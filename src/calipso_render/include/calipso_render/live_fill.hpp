@@ -1,44 +1,63 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 namespace calipso::render {
 
 // Fills holes of a place that moves by itself (clouds, water) from the frame at hand: every hole
-// pixel shows what this frame shows at its origin, so that it moves like its surroundings. Where
-// copies of different places meet, or a copy and the picture, their mean colours are drawn
-// together.
+// pixel shows what this frame shows at its origin, so that it moves like its surroundings. Every
+// copy is brightened or darkened as a whole (gain compensation, Brown & Lowe 2007) so that it goes on
+// meeting the picture and the other copies as it does in the key frame: where it comes from a cloud
+// may pass, or the water mirror another part of the sky. What mean colours still differ by where
+// copies meet is drawn together.
 class LiveFill {
  public:
   LiveFill() = default;
   // @param origin CV_16SC2: what a hole pixel is a copy of; (-1, -1): it is no hole, or nothing
   // that moves
   // @param hole CV_8UC1, all that is not seen
-  LiveFill(const cv::Mat& origin, const cv::Mat& hole);
+  // @param key_bgr, key_labels of the key frame, as of corrections()
+  LiveFill(const cv::Mat& origin, const cv::Mat& hole, const cv::Mat& key_bgr,
+           const cv::Mat& key_labels);
 
   bool empty() const { return origin_.empty(); }
 
-  // A frame's corrections at the seams, in the order of the seams.
+  // What a frame's copies are corrected by, code values.
+  struct Corrections {
+    std::vector<cv::Vec3f> copies;  // each as a whole
+    std::vector<cv::Vec3f> seams;   // besides, at every seam
+  };
+
   // @param bgr CV_8UC3; labels CV_8UC1, 0: the place itself is seen
-  std::vector<cv::Vec3f> corrections(const cv::Mat& bgr, const cv::Mat& labels) const;
+  Corrections corrections(const cv::Mat& bgr, const cv::Mat& labels) const;
 
   // The pixel's colour in code values, with the camera's noise smoothed away. @param noise its
   // deviation, code values
   // @return false where this fill has none, or the frame hides its origin
-  bool at(const cv::Mat& bgr, const cv::Mat& labels, const std::vector<cv::Vec3f>& corrections,
-          float noise, int u, int v, cv::Vec3f& colour) const;
+  bool at(const cv::Mat& bgr, const cv::Mat& labels, const Corrections& corrections, float noise,
+          int u, int v, cv::Vec3f& colour) const;
 
  private:
   struct Seam {
     cv::Point other,
         own;  // places that should look alike: beyond the seam, and what this side's copy has there
-    float share;  // of the difference that this side takes
+    float share;       // of the difference that this side takes
+    int copy, beyond;  // on this side; beyond the seam, kPicture: the picture itself
   };
+  // By how much the two sides of a seam differ; none where the frame hides one of them.
+  using Misses = std::vector<std::optional<cv::Vec3f>>;
+  void findCopies();
   void addSeams(const cv::Mat& hole);
+  Misses missesIn(const cv::Mat& bgr, const cv::Mat& labels) const;
+  std::vector<cv::Vec3f> broughtBack(const Misses& misses) const;
 
   cv::Mat origin_, seam_, weight_;  // CV_16SC2; CV_32SC1, -1: none near; CV_32FC1
+  cv::Mat copy_;                    // CV_32SC1: connected pixels copied by the same offset
+  int copies_ = 0;
   std::vector<Seam> seams_;
+  Misses at_key_;
 };
 
 }  // namespace calipso::render

@@ -329,7 +329,7 @@ class FrameCompositor {
   cv::Mat view_from_key_;        // viewWarp(); empty: the key frame's view
   cv::Mat shadowless_;  // Prepared::shadowless, where the camera stands as at the key frame
   const LiveFill* live_ = nullptr;  // Background::live, where the camera stands as at the key frame
-  std::vector<cv::Vec3f> live_corrections_;
+  LiveFill::Corrections live_corrections_;
   std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
   std::vector<bool> edited_;                  // per surface
   // per surface: the video has it, or a part of it, where the key frame has it

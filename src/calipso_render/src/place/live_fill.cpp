@@ -13,6 +13,9 @@ constexpr float kNoiseReach = 6.0f;  // deviations of noise
 constexpr float kFade = 7.0f;        // px over which a correction fades
 constexpr float kFarthest = 30.0f;   // px
 constexpr float kEdge = 30.0f;       // code values; what differs by much more is an edge of things
+constexpr int kPicture = -1;
+constexpr int kRounds = 40;         // in which copies are brought to agree
+constexpr float kUnchanged = 1.0f;  // seam pixels that speak for leaving a copy as it is
 const cv::Point kNeighbours[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 
 bool inside(const cv::Mat& m, const cv::Point& p) {
@@ -50,11 +53,38 @@ cv::Vec3f denoised(const cv::Mat& bgr, const cv::Mat& labels, const cv::Point& p
 
 }  // namespace
 
-LiveFill::LiveFill(const cv::Mat& origin, const cv::Mat& hole)
+LiveFill::LiveFill(const cv::Mat& origin, const cv::Mat& hole, const cv::Mat& key_bgr,
+                   const cv::Mat& key_labels)
     : origin_(origin),
       seam_(origin.size(), CV_32S, cv::Scalar(-1)),
-      weight_(origin.size(), CV_32F, cv::Scalar(0.0f)) {
+      weight_(origin.size(), CV_32F, cv::Scalar(0.0f)),
+      copy_(origin.size(), CV_32S, cv::Scalar(kPicture)) {
+  findCopies();
   addSeams(hole);
+  at_key_ = missesIn(key_bgr, key_labels);
+}
+
+void LiveFill::findCopies() {
+  std::vector<cv::Point> open;
+  const auto join = [&](const cv::Point& p) { copy_.at<int>(p) = copies_, open.push_back(p); };
+  for (int v = 0; v < origin_.rows; ++v) {
+    for (int u = 0; u < origin_.cols; ++u) {
+      const cv::Point start(u, v);
+      if (origin_.at<cv::Vec2s>(start)[0] < 0 || copy_.at<int>(start) != kPicture) continue;
+      for (join(start); !open.empty();) {
+        const cv::Point p = open.back();
+        open.pop_back();
+        for (const cv::Point& d : kNeighbours) {
+          const cv::Point q = p + d;
+          const cv::Vec2s from = origin_.at<cv::Vec2s>(p) + cv::Vec2s(short(d.x), short(d.y));
+          if (inside(origin_, q) && copy_.at<int>(q) == kPicture &&
+              origin_.at<cv::Vec2s>(q) == from)
+            join(q);
+        }
+      }
+      ++copies_;
+    }
+  }
 }
 
 void LiveFill::addSeams(const cv::Mat& hole) {
@@ -73,7 +103,8 @@ void LiveFill::addSeams(const cv::Mat& hole) {
         if (!inside(origin_, q)) continue;
         const bool rim = hole.at<std::uint8_t>(q) == 0;
         if (!rim && (!filled(q) || offset(q) == offset(p))) continue;
-        const Seam seam{rim ? q : q + offset(q), q + offset(p), rim ? 1.0f : 0.5f};
+        const Seam seam{rim ? q : q + offset(q), q + offset(p), rim ? 1.0f : 0.5f, copy_.at<int>(p),
+                        rim ? kPicture : copy_.at<int>(q)};
         if (!inside(origin_, seam.other) || !inside(origin_, seam.own)) continue;
         index.at<int>(p) = static_cast<int>(seams_.size());
         away.at<std::uint8_t>(p) = 0;
@@ -103,28 +134,62 @@ void LiveFill::addSeams(const cv::Mat& hole) {
   }
 }
 
-std::vector<cv::Vec3f> LiveFill::corrections(const cv::Mat& bgr, const cv::Mat& labels) const {
-  std::vector<cv::Vec3f> all(seams_.size());
+LiveFill::Misses LiveFill::missesIn(const cv::Mat& bgr, const cv::Mat& labels) const {
+  Misses misses(seams_.size());
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < seams_.size(); ++i) {
     cv::Vec3f other, own;
-    if (!meanAround(bgr, labels, seams_[i].other, other) ||
-        !meanAround(bgr, labels, seams_[i].own, own))
-      continue;
-    const cv::Vec3f miss = other - own;
-    all[i] = seams_[i].share * miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
+    if (meanAround(bgr, labels, seams_[i].other, other) &&
+        meanAround(bgr, labels, seams_[i].own, own))
+      misses[i] = other - own;
   }
-  return all;
+  return misses;
 }
 
-bool LiveFill::at(const cv::Mat& bgr, const cv::Mat& labels,
-                  const std::vector<cv::Vec3f>& corrections, float noise, int u, int v,
-                  cv::Vec3f& colour) const {
+// What copies have to be corrected by for the seams to differ as at the key frame: least squares
+// (Jacobi), robust.
+std::vector<cv::Vec3f> LiveFill::broughtBack(const Misses& misses) const {
+  std::vector<cv::Vec3f> change(seams_.size()), copies(copies_);
+  std::vector<float> weight(seams_.size(), 0.0f);
+  for (std::size_t i = 0; i < seams_.size(); ++i) {
+    if (!misses[i] || !at_key_[i]) continue;
+    change[i] = *misses[i] - *at_key_[i];
+    weight[i] = 1.0f / (1.0f + change[i].dot(change[i]) / (kEdge * kEdge));
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<cv::Vec3f> sum(copies_);
+    std::vector<float> count(copies_, kUnchanged);
+    for (std::size_t i = 0; i < seams_.size(); ++i) {
+      const Seam& s = seams_[i];
+      const cv::Vec3f beyond = s.beyond == kPicture ? cv::Vec3f() : copies[s.beyond];
+      sum[s.copy] += weight[i] * (change[i] + beyond), count[s.copy] += weight[i];
+    }
+    for (int k = 0; k < copies_; ++k) copies[k] = sum[k] / count[k];
+  }
+  return copies;
+}
+
+LiveFill::Corrections LiveFill::corrections(const cv::Mat& bgr, const cv::Mat& labels) const {
+  const Misses misses = missesIn(bgr, labels);
+  Corrections c{broughtBack(misses), std::vector<cv::Vec3f>(seams_.size())};
+  for (std::size_t i = 0; i < seams_.size(); ++i) {
+    const Seam& s = seams_[i];
+    if (!misses[i]) continue;
+    cv::Vec3f miss = *misses[i] - c.copies[s.copy];
+    if (s.beyond != kPicture) miss += c.copies[s.beyond];
+    c.seams[i] = s.share * miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
+  }
+  return c;
+}
+
+bool LiveFill::at(const cv::Mat& bgr, const cv::Mat& labels, const Corrections& corrections,
+                  float noise, int u, int v, cv::Vec3f& colour) const {
   const cv::Vec2s from = origin_.at<cv::Vec2s>(v, u);
   if (from[0] < 0 || labels.at<std::uint8_t>(from[1], from[0]) != 0) return false;
-  colour = denoised(bgr, labels, {from[0], from[1]}, noise);
+  colour =
+      denoised(bgr, labels, {from[0], from[1]}, noise) + corrections.copies[copy_.at<int>(v, u)];
   const int seam = seam_.at<int>(v, u);
-  if (seam >= 0) colour += weight_.at<float>(v, u) * corrections[seam];
+  if (seam >= 0) colour += weight_.at<float>(v, u) * corrections.seams[seam];
   return true;
 }
 
