@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "draw/side_by_side.hpp"
+#include "fill/colour_trend.hpp"
 #include "fill/lattice.hpp"
 #include "fill/line_bridge.hpp"
 #include "fill/patch_fill.hpp"
@@ -22,6 +23,7 @@ constexpr int kLeastMargin = 48;    // px around the hole that are looked at, at
 constexpr float kRounded =
     1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
 constexpr float kFarther = 2000.0f;  // InpaintParams::away_farther along a plane
+constexpr int kOutline = 3;          // px by which the outlines of surfaces may be off
 constexpr int kFewestOnPlane = 200;  // px of a plane's part of the hole, to be filled along it
 
 cv::Rect windowAround(const cv::Mat& hole, int least = kLeastMargin, int most = 1 << 20) {
@@ -231,12 +233,29 @@ void fillPlanes(const InpaintParams& params, Canvas& canvas) {
   }
 }
 
+// How the colours of what things stand on change slowly over the picture; 0 elsewhere. The
+// outlines of those are no more copied from: in the picture they lie elsewhere by a pixel or two.
+cv::Mat supportsTrend(const InpaintParams& params, Canvas& canvas) {
+  cv::Mat trend = cv::Mat::zeros(canvas.look.size(), CV_32FC3), inner, outer;
+  const cv::Mat square = cv::Mat::ones(2 * kOutline + 1, 2 * kOutline + 1, CV_8U);
+  for (int k = 0; k < params.supports && !params.surface.empty(); ++k) {
+    const cv::Mat here = params.surface == static_cast<double>(k + 1);
+    if (cv::countNonZero(here & canvas.hole) == 0) continue;
+    const cv::Mat own = colourTrend(canvas.look, here & canvas.known);
+    if (cv::norm(own, cv::NORM_INF) == 0.0) continue;
+    own.copyTo(trend, here);
+    cv::erode(here, inner, square), cv::dilate(here, outer, square);
+    canvas.source.setTo(0, outer & ~inner);
+  }
+  return trend;
+}
+
 void fillRest(const InpaintParams& params, Canvas& canvas) {
   const cv::Rect window = windowAround(canvas.hole);
-  const cv::Mat hole = canvas.hole(window);
-  const Filling rest =
-      fill(canvas.look(window).clone(), hole.clone(), canvas.source(window).clone(),
-           canvas.known(window).clone(), nullptr, within(window, params));
+  const cv::Mat hole = canvas.hole(window), trend = supportsTrend(params, canvas)(window);
+  Filling rest = fill(canvas.look(window) - trend, hole.clone(), canvas.source(window).clone(),
+                      canvas.known(window).clone(), nullptr, within(window, params));
+  rest.image += trend;
   rest.image.copyTo(canvas.look(window), hole);
   cv::Mat(rest.origin + cv::Scalar(window.x, window.y))
       .copyTo(canvas.origin(window), copied(rest.origin));

@@ -22,6 +22,8 @@ constexpr float kShortest = 20.0f;    // px that are seen of one
 constexpr float kEnters = 10.0f;      // px from what is hidden, at most, where it was seen last
 constexpr float kWrongSide = 3.0f;    // px beyond a line at which the plane must not be seen,
 constexpr double kMostWrong = 0.03;   // but for so much of it
+constexpr float kNextTo =
+    15.0f;  // px from what is hidden at which nothing else must be seen within
 constexpr int kMostLines = 4;
 
 // A line, unit normal towards the plane: n . p >= c on its side.
@@ -149,7 +151,7 @@ cv::Mat withinOutlines(const cv::Mat& on, const cv::Mat& absent, const cv::Mat& 
                        const cv::Mat& to_absent, const cv::Mat& hidden) {
   const std::vector<OutlineLine> lines = OutlineFinder(on, absent, to_on, to_absent, hidden).run();
   if (lines.empty()) return {};
-  cv::Mat within(on.size(), CV_8U, cv::Scalar(255));
+  cv::Mat within(on.size(), CV_8U, cv::Scalar(255)), near;
   for (int v = 0; v < on.rows; ++v) {
     for (int u = 0; u < on.cols; ++u) {
       const cv::Point2f p(static_cast<float>(u), static_cast<float>(v));
@@ -158,6 +160,10 @@ cv::Mat withinOutlines(const cv::Mat& on, const cv::Mat& absent, const cv::Mat& 
         within.at<std::uint8_t>(v, u) = 0;
     }
   }
+  // It may have ended within them as well.
+  cv::distanceTransform(hidden == 0, near, cv::DIST_L2, cv::DIST_MASK_5);
+  near = within & (near < kNextTo);
+  if (cv::countNonZero(near & absent) > kMostWrong * cv::countNonZero(near & on)) return {};
   return within;
 }
 
