@@ -157,15 +157,16 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const std::vector<Actor> actors = keyActors(p);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   const std::vector<View> views = viewsOf(clip, p, picture, kLightViews);
-  p.views = static_cast<int>(views.size());
+  p.light_views = static_cast<int>(views.size());
   Stopwatch watch;
   const Background seen = seenBackground(frames, any_moves, params.background);
   p.background_ms = watch.lap();
   p.light = lightOf(views, seen, any_moves, params, p);
   const ShadowMap sun = sunOver(actors, p.light.light);
   const SkyMap sky = skyOver(actors, params);
-  p.appearances = makeAppearances(viewsOf(clip, p, picture, kTextureViews), p.moves, p.light.light,
-                                  p.light.gloss);
+  const std::vector<View> texture_views = viewsOf(clip, p, picture, kTextureViews);
+  p.texture_views = static_cast<int>(texture_views.size());
+  p.appearances = makeAppearances(texture_views, p.moves, p.light.light, p.light.gloss);
   p.appearance_ms = watch.lap();
   for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
   p.fronts = frontsOf(p, params);

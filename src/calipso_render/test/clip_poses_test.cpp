@@ -79,10 +79,14 @@ TEST(Prepare, UsesTheFramesWhosePosesAreKnown) {
   ClipSample clip = rollingBall();
   RenderParams params;
   params.planes = table();
-  EXPECT_EQ(prepare(clip, {ballAt(kStart)}, params).views, 1);
+  const Prepared without = prepare(clip, {ballAt(kStart)}, params);
+  EXPECT_EQ(without.light_views, 1);
+  EXPECT_EQ(without.texture_views, 1);
   takePoses({{1001, {poseAt(0.5 * (kStart + kEnd))}}, {1002, {poseAt(kEnd)}}}, {ballAt(kStart)},
             clip);
-  EXPECT_EQ(prepare(clip, {ballAt(kStart)}, params).views, 3);
+  const Prepared with = prepare(clip, {ballAt(kStart)}, params);
+  EXPECT_EQ(with.light_views, 3);
+  EXPECT_EQ(with.texture_views, 3);
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ struct RenderParams {
 
 // Everything learnt from the clip. Coordinates: the key frame's camera, the world.
 struct Prepared {
-  Camera camera;        // key frame
+  Camera camera;  // key frame
   std::int64_t key_stamp_ns = 0;
   cv::Mat key_picture;  // CV_8UC3
   cv::Mat key_labels;
@@ -109,7 +109,7 @@ struct Prepared {
                      0.4f};  // what the sun's absence leaves of a support plane's brightness
   NoiseModel noise;
   float outline_blur = 0.0f;  // px: how much softer than a pixel the video's outlines are
-  int views = 1;              // frames that light and texture come from
+  int light_views = 1, texture_views = 1;  // frames that light and texture come from
   double background_ms = 0.0,
          appearance_ms = 0.0;        // wall time that plate, and light with appearances, took
   std::vector<std::string> remarks;  // what had to be assumed or invented, for a diagnostic

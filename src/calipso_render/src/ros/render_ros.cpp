@@ -187,10 +187,10 @@ void RenderNode::prepareNow() {
     for (const std::string& remark : prepared->remarks) reporter_.remark(remark);
     reporter_.ready("prepared from " + std::to_string(clip_.frames().size()) + " frames in " +
                     std::to_string(static_cast<int>(milliseconds(start))) +
-                    " ms; light and texture from " + std::to_string(prepared->views) +
-                    (prepared->views == 1 ? " frame" : " frames") + ", " +
-                    std::to_string(taken.accepted) + " of " + std::to_string(taken.offered) +
-                    " poses fit their masks");
+                    " ms; frames used: " + std::to_string(prepared->light_views) +
+                    " for the light, " + std::to_string(prepared->texture_views) +
+                    " for textures, " + std::to_string(taken.accepted) + " of " +
+                    std::to_string(taken.offered) + " poses fit their masks");
   } catch (const std::exception& error) {
     reporter_.failed(error.what());
   }
