@@ -200,7 +200,8 @@ TEST_F(RenderNodeWithMotionTest, LearnsFromFramesWhosePosesFit) {
   dynamics_.publish(dynamics());
   ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; }))
       << status_.message;
-  EXPECT_NE(status_.message.find("from 2 frames"), std::string::npos) << status_.message;
+  EXPECT_NE(status_.message.find("2 for the light, 2 for textures"), std::string::npos)
+      << status_.message;
   EXPECT_NE(status_.message.find("2 of 3 poses"), std::string::npos) << status_.message;
 }
 
