@@ -20,6 +20,7 @@ constexpr int kFewestPoints = 60;  // that change
 constexpr float kGuessed = 0.5f;   // part of the differences that a guess may leave
 constexpr float kLeastWay = 3.0f;  // px that it has to come in the clip
 constexpr int kStride = 2;         // px between places by which frames are registered
+constexpr double kFarStep = 16.0;  // px, of one of them: astray
 constexpr int kRounds = 12;        // of registering
 constexpr float kOutlier = 10.0f;  // code values
 constexpr int kOff = 9;            // px from the borders of what rests
@@ -31,7 +32,8 @@ bool isFree(const DriftPicture& picture, int u, int v) {
 
 DriftPicture coarse(const DriftPicture& picture) {
   DriftPicture out;
-  const cv::Size size(picture.grey.cols / kCoarse, picture.grey.rows / kCoarse);
+  const cv::Size size(std::max(1, picture.grey.cols / kCoarse),
+                      std::max(1, picture.grey.rows / kCoarse));
   cv::resize(picture.grey, out.grey, size, 0, 0, cv::INTER_AREA);
   cv::resize(picture.covered, out.covered, size, 0, 0, cv::INTER_AREA);
   return out;
@@ -94,6 +96,7 @@ std::optional<cv::Point2f> guess(const DriftPicture& from, const DriftPicture& t
 // @param only CV_8UC1, != 0: what counts of `from`; empty: all that is free
 cv::Point2f refine(const DriftPicture& from, const DriftPicture& to, const cv::Mat& only,
                    cv::Point2f by) {
+  const cv::Point2f start = by;
   for (int round = 0; round < kRounds; ++round) {
     Eigen::Matrix2d H = Eigen::Matrix2d::Zero();
     Eigen::Vector2d b = Eigen::Vector2d::Zero();
@@ -116,6 +119,7 @@ cv::Point2f refine(const DriftPicture& from, const DriftPicture& to, const cv::M
       }
     }
     const Eigen::Vector2d step = (H + 1e-6 * Eigen::Matrix2d::Identity()).ldlt().solve(b);
+    if (!(step.norm() < kFarStep)) return start;  // too little is seen of both
     by -= cv::Point2f(static_cast<float>(step.x()), static_cast<float>(step.y()));
     if (step.norm() < 0.002) break;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
@@ -41,8 +42,11 @@ DriftingBackground::DriftingBackground(const std::vector<ClipFrame>& frames, int
     stamps_.push_back(f.stamp_ns);
     covered.push_back(grown(f.labels != 0, margin));
   }
+  const bool in_order =
+      std::adjacent_find(stamps_.begin(), stamps_.end(), std::greater_equal<>()) == stamps_.end();
+  if (!in_order) return;  // when it is where cannot be told
   const Drift drift = findDrift(frames, covered, ground);
-  if (drift.where.empty() || !std::is_sorted(stamps_.begin(), stamps_.end())) return;
+  if (drift.where.empty()) return;
   shifts_ = drift.shifts, where_ = drift.where;
   layOver(frames, covered);
   if (established()) invent();

@@ -47,9 +47,9 @@ OutlineLine fitted(const std::vector<cv::Point2f>& points) {
 
 class OutlineFinder {
  public:
-  OutlineFinder(const cv::Mat& on, const cv::Mat& absent, const cv::Mat& to_on,
-                const cv::Mat& to_absent, const cv::Mat& hidden)
-      : on_(on), absent_(absent), to_on_(to_on), to_absent_(to_absent) {
+  OutlineFinder(const cv::Mat& on, const cv::Mat& to_on, const cv::Mat& to_absent,
+                const cv::Mat& hidden)
+      : on_(on) {
     cv::distanceTransform(hidden == 0, to_hidden_, cv::DIST_L2, cv::DIST_MASK_5);
     for (int v = 0; v < hidden.rows; ++v) {
       for (int u = 0; u < hidden.cols; ++u) {
@@ -140,7 +140,7 @@ class OutlineFinder {
     return sides[0] <= kMostWrong * sides[1] ? std::optional<OutlineLine>(line) : std::nullopt;
   }
 
-  const cv::Mat &on_, &absent_, &to_on_, &to_absent_;
+  const cv::Mat& on_;
   cv::Mat to_hidden_;
   std::vector<cv::Point2f> points_;
 };
@@ -149,7 +149,7 @@ class OutlineFinder {
 
 cv::Mat withinOutlines(const cv::Mat& on, const cv::Mat& absent, const cv::Mat& to_on,
                        const cv::Mat& to_absent, const cv::Mat& hidden) {
-  const std::vector<OutlineLine> lines = OutlineFinder(on, absent, to_on, to_absent, hidden).run();
+  const std::vector<OutlineLine> lines = OutlineFinder(on, to_on, to_absent, hidden).run();
   if (lines.empty()) return {};
   cv::Mat within(on.size(), CV_8U, cv::Scalar(255)), near;
   for (int v = 0; v < on.rows; ++v) {
