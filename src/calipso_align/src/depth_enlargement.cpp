@@ -16,9 +16,9 @@ std::vector<bool> steps(const cv::Mat1f& depth) {
   return changes;
 }
 
-// Pixel x of an enlarged row shows the source's pixel floor((x + phase) / factor).
-bool explains(double factor, double phase, const std::vector<bool>& changes) {
-  const auto source = [&](size_t x) { return std::floor((x + phase) / factor); };
+// Pixel x of an enlarged row shows the source's pixel source(x).
+template <class Source>
+bool explains(const Source& source, const std::vector<bool>& changes) {
   for (size_t x = 0; x < changes.size(); ++x)
     if (changes[x] && source(x) == source(x + 1)) return false;
   return true;
@@ -27,13 +27,18 @@ bool explains(double factor, double phase, const std::vector<bool>& changes) {
 // Of the coarsest row of pixels whose repetition gives these steps, if they are enough to tell.
 double repetition(const std::vector<bool>& changes) {
   constexpr double kLargest = 8.0, kSmallest = 1.25;
-  const int size = static_cast<int>(changes.size()) + 1;
-  const auto count = std::count(changes.begin(), changes.end(), true);
-  for (int w = static_cast<int>(std::ceil(size / kLargest)); w * kSmallest <= size; ++w)
-    for (const double phase : {0.0, 0.5}) {
-      const double factor = static_cast<double>(size) / w;
-      if (4 * count >= w && explains(factor, phase, changes)) return factor;
-    }
+  const size_t size = changes.size() + 1, count = std::count(changes.begin(), changes.end(), true);
+  for (size_t w = static_cast<size_t>(std::ceil(size / kLargest)); w * kSmallest <= size; ++w) {
+    if (4 * count < w) break;
+    // In integers: as fractions, products that should be whole come out a little less.
+    const auto corner = [&](size_t x) { return x * w / size; };
+    const auto centre = [&](size_t x) { return (2 * x + 1) * w / (2 * size); };
+    // OpenCV's INTER_NEAREST, with its rounding.
+    const double inverse = 1.0 / (static_cast<double>(size) / w);
+    const auto opencv = [&](size_t x) { return static_cast<size_t>(x * inverse); };
+    if (explains(corner, changes) || explains(centre, changes) || explains(opencv, changes))
+      return static_cast<double>(size) / w;
+  }
   return 1.0;
 }
 

@@ -57,6 +57,13 @@ TEST(Relief, EnlargedDepthIsTold) {
     cv::resize(small, enlarged, depth.size(), 0, 0, cv::INTER_NEAREST);
     EXPECT_NEAR(enlargement(enlarged), factor, 0.05 * factor) << factor;
   }
+  // 848 columns as 1280: products of such fractions are not whole where they should be.
+  cv::Mat1f ramp(2, 1280);
+  for (int x = 0; x < ramp.cols; ++x) ramp.col(x) = static_cast<float>(x * 848 / 1280);
+  cv::Mat square;
+  cv::repeat(ramp, 640, 1, square);
+  cv::Mat both = square + square.t();
+  EXPECT_NEAR(enlargement(both), 1280.0 / 848.0, 0.01);
   EXPECT_EQ(enlargement(depth), 1.0);
   EXPECT_EQ(enlargement(cv::Mat1f(kSize, 1.0f)), 1.0) << "a wall that is faced tells nothing";
 }

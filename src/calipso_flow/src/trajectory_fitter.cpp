@@ -141,8 +141,8 @@ size_t TrajectoryFitter::leastFramesOf(size_t piece) const {
 }
 
 // Log odds, besides those of the poses, of a piece that starts at `time`: what falls on a support
-// most likely strikes it where it reaches it. Where one or two poses are all that is seen of it
-// afterwards they tell no instant: the less before them it is, the faster the body came out of it.
+// most likely strikes it where it reaches it. One or two poses after it cannot tell the instant: an
+// impact shortly before them with a fast rebound fits as well as an earlier one with a slow one.
 double TrajectoryFitter::contactOdds(size_t piece, double time) const {
   constexpr std::ptrdiff_t kFewPoses = 2;
   constexpr double kTrust = 100.0;  // odds that it strikes there and at no other instant

@@ -159,8 +159,6 @@ TEST(Trajectory, findsTheInstantOfCollisionWithinAFrame) {
   EXPECT_LT(surprise, 1.88);
 }
 
-// What lies where it fell has the restitution zero, and that as surely as a slow rebound would be
-// seen: 0.43 mm over ten frames are 1.6 mm/s, of 2.9 m/s.
 // Lost in the second frame after the impact: where the floor is says when it struck, and so how
 // fast the one pose shows it come back.
 TEST(Trajectory, onePoseAfterAnImpactTellsTheReboundWhereTheFloorIsKnown) {
@@ -177,6 +175,8 @@ TEST(Trajectory, onePoseAfterAnImpactTellsTheReboundWhereTheFloorIsKnown) {
   EXPECT_NEAR(trajectory.collisions[0].restitution(), kRestitution, 0.1);
 }
 
+// What lies where it fell has the restitution zero, and that as surely as a slow rebound would be
+// seen: 0.43 mm over ten frames are 1.6 mm/s, of 2.9 m/s.
 TEST(Trajectory, statesHowSurelyWhatFellDoesNotRebound) {
   const double tc = 9.3 / kFps;
   const Eigen::Vector3d floor = bouncing(tc, 10.0, 0.0);

@@ -169,10 +169,12 @@ bool Recorder::allExplained() const {
     const auto found = count_.find(topic);
     return found != count_.end() && found->second >= static_cast<int>(clip_.played_frames);
   };
-  const bool simulated = summary_.failed.empty();
+  // Without the flow there is still a simulation.
+  const auto& failed = summary_.failed;
+  const bool simulated = failed.empty() || (failed.size() == 1 && failed.count("flow") > 0);
   return input_.size() >= clip_.played_frames && complete(topics::kImageEditedCameraInfo) &&
-         complete(topics::kProvenance) && (!simulated || complete(topics::kState)) &&
-         (!simulated || (complete(topics::kDynamics) && lastStateExplained()));
+         complete(topics::kProvenance) && (!failed.empty() || complete(topics::kDynamics)) &&
+         (!simulated || (complete(topics::kState) && lastStateExplained()));
 }
 
 // What the simulator sends with a state travels on connections of its own, and may come later.
@@ -209,7 +211,10 @@ void Recorder::run() {
 // What to do with the beginning of a run. Without any frame of it nothing stays.
 std::string Recorder::keepIncomplete() {
   if (edited_.empty()) return "";
-  writer_.flushAll();
+  try {
+    writer_.flushAll();
+  } catch (const std::exception&) {  // as on a full disk; what is written stays
+  }
   return "; the bag stays incomplete, with " + std::to_string(edited_.size()) +
          " edited frames, as " + output_.path() + ".active";
 }
@@ -221,7 +226,10 @@ void Recorder::recordClip() {
   reporter_.ready("recording to " + output_.path());
   waitForEdited();
   if (!waitFor([this] { return allExplained(); }, params_.late_timeout_sec)) {
-    ROS_WARN("not every frame has its camera_info, provenance, state and dynamics");
+    ROS_WARN_STREAM("what explains the last frames has not all come within "
+                    << params_.late_timeout_sec
+                    << " s (camera_info, provenance, state, dynamics, plan, edit reports, /tf or "
+                       "markers): the bag lacks it; set late_timeout_sec higher");
   }
   checkFrames();
 }

@@ -26,7 +26,8 @@ namespace calipso::bag {
 
 // Writes the edited bag: images, camera_info and everything that explains them, each message at its
 // own stamp and in an order that does not depend on timing. The bag gets its name only when every
-// frame that went in has come out; until then, and when a run ends early, it is PATH.active. Not thread-safe.
+// frame that went in has come out; until then, and when a run ends early, it is PATH.active.
+// Not thread-safe.
 class Recorder {
  public:
   struct Params {

@@ -3,6 +3,7 @@
 #include <ros/ros.h>
 
 #include <exception>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -24,10 +25,13 @@ T requiredParam(const ros::NodeHandle& pnh, const std::string& name) {
 template <typename T>
 T optionalParam(const ros::NodeHandle& pnh, const std::string& name, const T& otherwise) {
   T value = otherwise;
-  if (!pnh.getParam(name, value) && pnh.hasParam(name)) {
-    throw std::invalid_argument("parameter " + pnh.resolveName(name) +
-                                " is of another type than its default; see the package's README "
-                                "and config for what it takes");
+  XmlRpc::XmlRpcValue given;
+  if (!pnh.getParam(name, value) && pnh.getParam(name, given)) {
+    std::ostringstream text;
+    text << "parameter " << pnh.resolveName(name) << " is " << given
+         << ", of another type than its default; see the package's README and config for what it "
+            "takes";
+    throw std::invalid_argument(text.str());
   }
   return value;
 }
