@@ -74,7 +74,6 @@ class PlayerAndRecorder(unittest.TestCase):
         self.assertIn("a frame was lost", output)
         self.assertFalse(os.path.exists(self.path("out.bag")))
 
-
     def test_a_node_that_comes_back_in_mid_run_is_refused(self):
         player = subprocess.Popen(
             ["rosrun", "calipso_bag", "player_node", "_bag:=" + self.bag, "_scene:=" + self.scene],
@@ -97,7 +96,9 @@ class PlayerAndRecorder(unittest.TestCase):
 import rospy
 from calipso_msgs.msg import ClipInfo, NodeStatus
 rospy.init_node("stand_in")
-rospy.Subscriber("clip/info", ClipInfo, print)
+clip = rospy.Subscriber("clip/info", ClipInfo, print)
+while not clip.get_num_connections() and not rospy.is_shutdown():
+    rospy.sleep(0.05)  # the player notices its end by this connection
 status = rospy.Publisher("status", NodeStatus, latch=True, queue_size=1)
 while not rospy.is_shutdown():
     status.publish(node="flow", message="here")
