@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
+#include "render_test_scene.hpp"
 
 namespace calipso::render {
 namespace {
@@ -136,6 +137,53 @@ TEST(DriftingBackground, IsBroughtToWhatAFrameShowsAroundTheObject) {
   drifting.matchTo(brighter.bgr, brighter.labels != 0, plate);
   const cv::Scalar after = cv::mean(plate(kObject));
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(after[c] / before[c], std::pow(1.03, 2.2), 0.02) << c;
+}
+
+// A ball at rest before clouds, as brightly lit as `gain` says, beside a wall that rests, too.
+ClipFrame ballFrame(int k, double gain) {
+  ClipFrame f = testing::frameWithBall(testing::ballAt({0.0, 0.0, 0.12}));
+  for (int v = 0; v < f.bgr.rows; ++v) {
+    for (int u = 0; u < f.bgr.cols; ++u) {
+      const bool wall = u < 30 || v >= 100;
+      const cv::Vec3b c = wall ? cv::Vec3b::all(static_cast<uchar>(90 + 8 * ((u / 3 + v / 5) % 3)))
+                               : cloudAt(u - kPace.x * k, v - kPace.y * k);
+      if (f.labels.at<uchar>(v, u) == 0)
+        for (int i = 0; i < 3; ++i)
+          f.bgr.at<cv::Vec3b>(v, u)[i] = cv::saturate_cast<uchar>(gain * c[i]);
+    }
+  }
+  f.stamp_ns = 33'000'000LL * k;
+  return f;
+}
+
+TEST(DriftingBackground, FramesBeyondTheClipAreFilledFromThemselves) {
+  ClipSample clip;
+  for (int k = 0; k < kFrames; ++k) clip.add(ballFrame(k, 1.0));
+  RenderParams params;
+  params.add_noise = false;
+  const auto prepared =
+      std::make_shared<const Prepared>(prepare(clip, {testing::ballAt({0.0, 0.0, 0.12})}, params));
+  ASSERT_TRUE(prepared->background.drifting.established());
+  const ClipFrame later = ballFrame(kFrames - 1, 0.6);  // evening
+  FrameInput input;
+  input.bgr = later.bgr, input.labels = later.labels, input.camera = later.camera;
+  input.stamp_ns = 33'000'000LL * 1000;
+  ObjectInFrame ball;
+  ball.name = "ball", ball.removed = true;
+  input.objects.push_back(ball);
+  const FrameOutput out = Renderer(prepared, params).composite(input);
+  const cv::Mat hidden = later.labels != 0;
+  const cv::Rect clouds_seen(30, 0, 130, 100);
+  const double inside = cv::mean(out.bgr, hidden)[1],
+               around = cv::mean(later.bgr(clouds_seen), later.labels(clouds_seen) == 0)[1];
+  EXPECT_NEAR(inside, around, 0.2 * around);
+  EXPECT_EQ(cv::countNonZero((out.provenance != kInvented) & hidden), 0);
+}
+
+TEST(DriftingBackground, IsNoneWithoutTimesInOrder) {
+  std::vector<ClipFrame> frames = clipOf(Motion::kDrifts);
+  for (ClipFrame& f : frames) f.stamp_ns = 0;
+  EXPECT_FALSE(DriftingBackground(frames, 2, cv::Mat()).established());
 }
 
 TEST(DriftingBackground, NothingDriftsWhereThePlaceRestsOrRipples) {

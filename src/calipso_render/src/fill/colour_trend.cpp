@@ -84,7 +84,7 @@ cv::Mat colourTrend(const cv::Mat& image, const cv::Mat& known) {
   const std::vector<Sample> samples = samplesOf(image, known);
   if (samples.size() < kFewest) return trend;
   const Terms x[3] = {fitted(samples, 0), fitted(samples, 1), fitted(samples, 2)};
-  if (explained(samples, x) < kExplains) return trend;
+  if (!(explained(samples, x) >= kExplains)) return trend;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> values;  // of the trend where it is known
     for (const Sample& s : samples) values.push_back(x[c].dot(s.terms));

@@ -180,6 +180,9 @@ void FrameCompositor::stagePlace() {
     if (sameView(frame_.camera, prepared_.camera))
       drifting.matchTo(frame_.bgr, grown(labels_ != 0, params_.background.mask_margin_px), plate_);
     drifts_ = drifting.where();
+  } else if (drifting.established()) {
+    // Where it has drifted to is not known: what comes to light is filled from the frame at hand.
+    invented_ = invented_ | drifting.where();
   }
   if (sameView(frame_.camera, prepared_.camera)) {
     live_ = prepared_.background.live.empty() ? nullptr : &prepared_.background.live;
