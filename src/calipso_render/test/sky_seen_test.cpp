@@ -170,6 +170,7 @@ TEST(SkySeen, IsFullOfWhatIsBuriedAltogether) {
   addBox({-0.1f, -0.1f, 0.4f}, {0.1f, 0.1f, 0.6f}, points, faces);
   addBox({-0.5f, -0.5f, 0.0f}, {0.5f, 0.5f, 1.0f}, points, faces);
   const Surface surface = surfaceOf(points, faces);
+  ASSERT_FALSE(surface.seen.empty());
   for (const SkySeen& seen : surface.seen) EXPECT_FLOAT_EQ(seen.open, 1.0f);
 }
 

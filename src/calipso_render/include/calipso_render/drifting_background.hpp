@@ -38,7 +38,7 @@ class DriftingBackground {
   // @param invented CV_8UC1, likewise: 255 where no frame shows what is drawn
   void draw(const cv::Point2f& shift, cv::Mat& plate, cv::Mat& invented) const;
 
-  // Evens out slow changes of it: the plate is brought to what a frame shows around what is covered.
+  // Evens out slow changes of it: brings the plate to what a frame shows around what is covered.
   // @param bgr CV_8UC3, the frame
   // @param covered CV_8UC1, != 0: objects
   void matchTo(const cv::Mat& bgr, const cv::Mat& covered, cv::Mat& plate) const;

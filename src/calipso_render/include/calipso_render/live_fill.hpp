@@ -7,11 +7,11 @@
 namespace calipso::render {
 
 // Fills holes of a place that moves by itself (clouds, water) from the frame at hand: every hole
-// pixel shows what this frame shows at its origin, so that it moves like its surroundings. Every
-// copy is brightened or darkened as a whole (gain compensation, Brown & Lowe 2007) so that it goes on
-// meeting the picture and the other copies as it does in the key frame: where it comes from a cloud
-// may pass, or the water mirror another part of the sky. What mean colours still differ by where
-// copies meet is drawn together.
+// pixel shows what this frame shows at its origin, so that it moves like its surroundings. To every
+// copy one offset of colour is added (as gains are to pictures of a panorama, Brown & Lowe 2007) so
+// that it meets the picture and the other copies as it does in the key frame: where it comes from a
+// cloud may pass, or the water mirror another part of the sky. What mean colours still differ by
+// where copies meet fades out beside the seams.
 class LiveFill {
  public:
   LiveFill() = default;

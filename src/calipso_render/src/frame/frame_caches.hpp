@@ -29,7 +29,7 @@ struct ShadowCache {
   Camera camera;
   Eigen::Vector3f sun = Eigen::Vector3f::Zero();  // direction
   std::vector<Points> others_vertices;            // of what is not edited
-  std::unique_ptr<Visibility> others;             // of the same
+  std::unique_ptr<Visibility> others;             // what they hide of the sun
   // of the edited objects where the video has them; null: of none
   std::unique_ptr<Visibility> originals;
   cv::Mat others_sun, others_sky;  // of the others; empty: nothing else casts a shadow

@@ -17,13 +17,14 @@ constexpr float kChanged = 6.0f;   // code values, there: beyond noise
 constexpr float kEdge = 2.0f;      // code values from one of its pixels to the next
 constexpr float kMostOff = 20.0f;  // code values: what is off by more counts as that much
 constexpr int kFewestPoints = 60;  // that change
-constexpr float kGuessed = 0.5f;   // part of the differences that a guess may leave
-constexpr float kLeastWay = 3.0f;  // px that it has to come in the clip
-constexpr int kStride = 2;         // px between places by which frames are registered
-constexpr double kFarStep = 16.0;  // px, of one of them: astray
-constexpr int kRounds = 12;        // of registering
-constexpr float kOutlier = 10.0f;  // code values
-constexpr int kOff = 9;            // px from the borders of what rests
+constexpr std::size_t kMostPoints = 5000;  // by which a displacement is judged
+constexpr float kGuessed = 0.5f;           // part of the differences that a guess may leave
+constexpr float kLeastWay = 3.0f;          // px that it has to come in the clip
+constexpr int kStride = 2;                 // px between places by which frames are registered
+constexpr double kFarStep = 16.0;          // px, of one of them: astray
+constexpr int kRounds = 12;                // of registering
+constexpr float kOutlier = 10.0f;          // code values
+constexpr int kOff = 9;                    // px from the borders of what rests
 
 bool isFree(const DriftPicture& picture, int u, int v) {
   return u >= 0 && v >= 0 && u < picture.grey.cols && v < picture.grey.rows &&
@@ -53,7 +54,10 @@ std::vector<cv::Point> tellingPoints(const DriftPicture& from, const DriftPictur
         points.push_back({u, v});
     }
   }
-  return points;
+  const std::size_t step = 1 + points.size() / kMostPoints;
+  std::vector<cv::Point> some;
+  for (std::size_t i = 0; i < points.size(); i += step) some.push_back(points[i]);
+  return some;
 }
 
 // Mean difference at points displaced by `by`; none if few of them stay in the picture.
@@ -126,8 +130,8 @@ cv::Point2f refine(const DriftPicture& from, const DriftPicture& to, const cv::M
   return by;
 }
 
-// How far the picture has come in every frame. A frame is registered to the first one that it
-// still shares two thirds of the picture with.
+// How far the picture has come in every frame. Frames are registered to a reference: the first one,
+// and whenever less than two thirds of the picture are shared with it, the frame before.
 std::vector<cv::Point2f> followed(const std::vector<DriftPicture>& pictures,
                                   const cv::Point2f& pace, const cv::Mat& where) {
   std::vector<cv::Point2f> shifts(pictures.size());
@@ -137,8 +141,7 @@ std::vector<cv::Point2f> followed(const std::vector<DriftPicture>& pictures,
     if (std::abs(expected.x - shifts[from].x) > static_cast<float>(pictures[i].grey.cols) / 3.0f ||
         std::abs(expected.y - shifts[from].y) > static_cast<float>(pictures[i].grey.rows) / 3.0f)
       from = i - 1;
-    const cv::Mat& only = from == 0 ? where : cv::Mat();
-    shifts[i] = shifts[from] + refine(pictures[from], pictures[i], only, expected - shifts[from]);
+    shifts[i] = shifts[from] + refine(pictures[from], pictures[i], where, expected - shifts[from]);
   }
   return shifts;
 }

@@ -77,6 +77,9 @@ class OutlineFinder {
     return lines;
   }
 
+  // CV_32FC1, px.
+  const cv::Mat& toHidden() const { return to_hidden_; }
+
  private:
   static std::vector<cv::Point2f> onLine(const OutlineLine& line,
                                          const std::vector<cv::Point2f>& points) {
@@ -149,7 +152,8 @@ class OutlineFinder {
 
 cv::Mat withinOutlines(const cv::Mat& on, const cv::Mat& absent, const cv::Mat& to_on,
                        const cv::Mat& to_absent, const cv::Mat& hidden) {
-  const std::vector<OutlineLine> lines = OutlineFinder(on, to_on, to_absent, hidden).run();
+  OutlineFinder finder(on, to_on, to_absent, hidden);
+  const std::vector<OutlineLine> lines = finder.run();
   if (lines.empty()) return {};
   cv::Mat within(on.size(), CV_8U, cv::Scalar(255)), near;
   for (int v = 0; v < on.rows; ++v) {
@@ -161,8 +165,7 @@ cv::Mat withinOutlines(const cv::Mat& on, const cv::Mat& absent, const cv::Mat& 
     }
   }
   // It may have ended within them as well.
-  cv::distanceTransform(hidden == 0, near, cv::DIST_L2, cv::DIST_MASK_5);
-  near = within & (near < kNextTo);
+  near = within & (finder.toHidden() < kNextTo);
   if (cv::countNonZero(near & absent) > kMostWrong * cv::countNonZero(near & on)) return {};
   return within;
 }
