@@ -207,7 +207,8 @@ TEST(Inpaint, ContinuesStripes) {
 struct LiveCase {
   cv::Mat frame = cv::Mat(60, 120, CV_8UC3), labels = cv::Mat::zeros(60, 120, CV_8U);
   LiveFill fill;
-  explicit LiveCase(int step) {
+  // @param lift what is added to every copy
+  explicit LiveCase(int step, double lift = 0.0) {
     cv::RNG random(3);
     random.fill(frame, cv::RNG::UNIFORM, 100, 110);
     cv::subtract(frame.colRange(0, 60), cv::Scalar::all(step), frame.colRange(0, 60));
@@ -217,9 +218,22 @@ struct LiveCase {
       for (int u = 75; u < 105; ++u)
         origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 65), short(v));
     }
-    fill = LiveFill(origin, labels, frame, labels);
+    fill =
+        LiveFill(origin, cv::Mat(60, 120, CV_32FC3, cv::Scalar::all(lift)), labels, frame, labels);
   }
 };
+
+TEST(LiveFill, CopiesAreLiftedToWhatTheirPlaceHas) {
+  const LiveCase c(6, 6.0);  // by just what they lack: nothing is left to be drawn together
+  const LiveFill::Corrections corrections = c.fill.corrections(c.frame, c.labels);
+  cv::Vec3f sum;
+  for (int v = 15; v < 45; ++v) {
+    cv::Vec3f colour;
+    ASSERT_TRUE(c.fill.at(c.frame, c.labels, corrections, 0.0f, 90, v, colour));
+    sum += colour;
+  }
+  EXPECT_NEAR(sum[0] / 30, 105.0, 1.5) << "also in the middle, where the copy alone has 99";
+}
 
 TEST(LiveFill, CopiesTheFrameAtHandAndMeetsTheRim) {
   const LiveCase c(6);

@@ -38,6 +38,8 @@ struct InpaintResult {
   cv::Mat image;  // CV_32FC3, as the input outside the hole
   // CV_16SC2: (u, v) in the input that each hole pixel is a copy of; (-1, -1) elsewhere
   cv::Mat origin;
+  // CV_32FC3: what the slow change of a surface's colour adds to a copy's origin at its place
+  cv::Mat lift;
   bool patches_found = true;  // false: nothing to copy from, the hole was filled smoothly
 };
 

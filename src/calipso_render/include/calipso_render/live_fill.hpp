@@ -17,9 +17,10 @@ class LiveFill {
   LiveFill() = default;
   // @param origin CV_16SC2: what a hole pixel is a copy of; (-1, -1): it is no hole, or nothing
   // that moves
+  // @param lift CV_32FC3: what is added to a hole pixel's origin at its place, code values
   // @param hole CV_8UC1, all that is not seen
   // @param key_bgr, key_labels of the key frame, as of corrections()
-  LiveFill(const cv::Mat& origin, const cv::Mat& hole, const cv::Mat& key_bgr,
+  LiveFill(const cv::Mat& origin, const cv::Mat& lift, const cv::Mat& hole, const cv::Mat& key_bgr,
            const cv::Mat& key_labels);
 
   bool empty() const { return origin_.empty(); }
@@ -45,6 +46,7 @@ class LiveFill {
         own;  // places that should look alike: beyond the seam, and what this side's copy has there
     float share;       // of the difference that this side takes
     int copy, beyond;  // on this side; beyond the seam, kPicture: the picture itself
+    cv::Vec3f lift;    // how much more of it the other side has
   };
   // By how much the two sides of a seam differ; none where the frame hides one of them.
   using Misses = std::vector<std::optional<cv::Vec3f>>;
@@ -54,6 +56,7 @@ class LiveFill {
   std::vector<cv::Vec3f> broughtBack(const Misses& misses) const;
 
   cv::Mat origin_, seam_, weight_;  // CV_16SC2; CV_32SC1, -1: none near; CV_32FC1
+  cv::Mat lift_;                    // CV_32FC3
   cv::Mat copy_;                    // CV_32SC1: connected pixels copied by the same offset
   int copies_ = 0;
   std::vector<Seam> seams_;

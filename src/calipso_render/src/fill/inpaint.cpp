@@ -101,6 +101,7 @@ Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const
 struct Canvas {
   cv::Mat look, hole, source, known;
   cv::Mat origin;  // CV_16SC2
+  cv::Mat lift;    // InpaintResult::lift
 
   void set(const cv::Point& p, const cv::Vec3f& colour, const cv::Point& from) {
     for (int c = 0; c < 3; ++c) look.at<cv::Vec3f>(p)[c] = std::clamp(colour[c], 0.0f, 255.0f);
@@ -257,6 +258,15 @@ void fillRest(const InpaintParams& params, Canvas& canvas) {
                       canvas.known(window).clone(), nullptr, within(window, params));
   rest.image += trend;
   rest.image.copyTo(canvas.look(window), hole);
+  cv::Mat lift = canvas.lift(window);
+  for (int v = 0; v < lift.rows; ++v) {
+    for (int u = 0; u < lift.cols; ++u) {
+      const cv::Vec2s from = rest.origin.at<cv::Vec2s>(v, u);
+      if (from[0] >= 0)
+        lift.at<cv::Vec3f>(v, u) =
+            trend.at<cv::Vec3f>(v, u) - trend.at<cv::Vec3f>(from[1], from[0]);
+    }
+  }
   cv::Mat(rest.origin + cv::Scalar(window.x, window.y))
       .copyTo(canvas.origin(window), copied(rest.origin));
 }
@@ -268,14 +278,12 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   CV_Assert(image.type() == CV_32FC3 && hole.type() == CV_8UC1 && image.size() == hole.size());
   CV_Assert(params.nearness.empty() ||
             (params.nearness.type() == CV_32FC1 && params.nearness.size() == hole.size()));
-  InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)), true};
+  InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)),
+                       cv::Mat::zeros(image.size(), CV_32FC3), true};
   if (cv::countNonZero(hole) == 0) return result;
   const cv::Rect window = windowAround(hole);
-  Canvas canvas{image(window).clone(),
-                hole(window) != 0,
-                hole(window) == 0,
-                {},
-                result.origin(window).clone()};
+  Canvas canvas{image(window).clone(),         hole(window) != 0,  hole(window) == 0, {},
+                result.origin(window).clone(), result.lift(window)};
   if (!banned.empty()) canvas.source.setTo(0, banned(window));
   canvas.known = canvas.source.clone();
   const InpaintParams inner = within(window, params);

@@ -167,7 +167,7 @@ void inventBackground(const cv::Mat& shaded, const ClipFrame& key, const Inpaint
         live_origin.at<cv::Vec2s>(v, u) = from;
     }
   }
-  background.live = LiveFill(live_origin, background.invented, key.bgr, key.labels);
+  background.live = LiveFill(live_origin, filled.lift, background.invented, key.bgr, key.labels);
 }
 
 cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& camera,

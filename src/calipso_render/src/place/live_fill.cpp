@@ -53,11 +53,12 @@ cv::Vec3f denoised(const cv::Mat& bgr, const cv::Mat& labels, const cv::Point& p
 
 }  // namespace
 
-LiveFill::LiveFill(const cv::Mat& origin, const cv::Mat& hole, const cv::Mat& key_bgr,
-                   const cv::Mat& key_labels)
+LiveFill::LiveFill(const cv::Mat& origin, const cv::Mat& lift, const cv::Mat& hole,
+                   const cv::Mat& key_bgr, const cv::Mat& key_labels)
     : origin_(origin),
       seam_(origin.size(), CV_32S, cv::Scalar(-1)),
       weight_(origin.size(), CV_32F, cv::Scalar(0.0f)),
+      lift_(lift),
       copy_(origin.size(), CV_32S, cv::Scalar(kPicture)) {
   findCopies();
   addSeams(hole);
@@ -103,8 +104,12 @@ void LiveFill::addSeams(const cv::Mat& hole) {
         if (!inside(origin_, q)) continue;
         const bool rim = hole.at<std::uint8_t>(q) == 0;
         if (!rim && (!filled(q) || offset(q) == offset(p))) continue;
-        const Seam seam{rim ? q : q + offset(q), q + offset(p), rim ? 1.0f : 0.5f, copy_.at<int>(p),
-                        rim ? kPicture : copy_.at<int>(q)};
+        const Seam seam{rim ? q : q + offset(q),
+                        q + offset(p),
+                        rim ? 1.0f : 0.5f,
+                        copy_.at<int>(p),
+                        rim ? kPicture : copy_.at<int>(q),
+                        (rim ? cv::Vec3f() : lift_.at<cv::Vec3f>(q)) - lift_.at<cv::Vec3f>(p)};
         if (!inside(origin_, seam.other) || !inside(origin_, seam.own)) continue;
         index.at<int>(p) = static_cast<int>(seams_.size());
         away.at<std::uint8_t>(p) = 0;
@@ -141,7 +146,7 @@ LiveFill::Misses LiveFill::missesIn(const cv::Mat& bgr, const cv::Mat& labels) c
     cv::Vec3f other, own;
     if (meanAround(bgr, labels, seams_[i].other, other) &&
         meanAround(bgr, labels, seams_[i].own, own))
-      misses[i] = other - own;
+      misses[i] = other - own + seams_[i].lift;
   }
   return misses;
 }
@@ -186,8 +191,8 @@ bool LiveFill::at(const cv::Mat& bgr, const cv::Mat& labels, const Corrections& 
                   float noise, int u, int v, cv::Vec3f& colour) const {
   const cv::Vec2s from = origin_.at<cv::Vec2s>(v, u);
   if (from[0] < 0 || labels.at<std::uint8_t>(from[1], from[0]) != 0) return false;
-  colour =
-      denoised(bgr, labels, {from[0], from[1]}, noise) + corrections.copies[copy_.at<int>(v, u)];
+  colour = denoised(bgr, labels, {from[0], from[1]}, noise) + lift_.at<cv::Vec3f>(v, u) +
+           corrections.copies[copy_.at<int>(v, u)];
   const int seam = seam_.at<int>(v, u);
   if (seam >= 0) colour += weight_.at<float>(v, u) * corrections.seams[seam];
   return true;
