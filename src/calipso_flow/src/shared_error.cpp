@@ -10,8 +10,8 @@ namespace {
 constexpr double kShapeLength = 2.5;  // of the tracks' spread over l
 // deviations by which the shape's error must stand out of what chance makes
 constexpr double kShapeSurprise = 1.0;
-// of 2 l^2: tracks farther apart have neither in common; patches that are larger than that (of small
-// objects) are taken for as small
+// of 2 l^2: tracks farther apart have neither in common; patches that are larger than that (of
+// small objects) are taken for as small
 constexpr double kShapeReach = 4.0;
 // 12 / (12 - 6): a pose takes up six of the errors of six such patches
 constexpr double kShapeAbsorbed = 2.0;

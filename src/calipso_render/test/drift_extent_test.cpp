@@ -27,8 +27,8 @@ struct Clip {
   cv::Mat ground = cv::Mat::zeros(kHigh, kWide, CV_8U);
 };
 
-// Clouds that drift, the less of them, the nearer to the horizon; below it a coast that rests, or water that
-// ripples.
+// Clouds that drift, the less of them, the nearer to the horizon; below it a coast that rests, or
+// water that ripples.
 Clip coast(bool ripples) {
   const cv::Mat clouds = noise({kWide + 60, kHigh}, 15.0, 4.0, 3),
                 land = noise({kWide, kHigh}, 15.0, 2.0, 4);

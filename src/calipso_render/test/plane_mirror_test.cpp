@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
+#include "place/drawn_out.hpp"
 #include "render_test_scene.hpp"
 
 namespace calipso::render {
@@ -183,6 +184,20 @@ TEST(PlaneMirror, GoesWithTheObject) {
   const cv::Mat by = (cv::Mat_<double>(2, 3) << 1, 0, 30, 0, 1, 0);
   cv::warpAffine(inner, there, by, inner.size(), cv::INTER_NEAREST);
   EXPECT_LT(cv::mean(moved, there)[0], cv::mean(bgr, there)[0] - 0.3 * (plain[0] - was[0]));
+}
+
+// What the blur gives must not hang on the box that it is asked for: what rests would be repainted.
+TEST(PlaneMirror, IsDrawnOutAlikeInABoxAndInTheWholePicture) {
+  const cv::Size size(241, 187);  // no multiple of any level's pixels
+  cv::Mat values = cv::Mat::zeros(size, CV_32FC4), spread(size, CV_32F);
+  cv::rectangle(values, {100, 90}, {120, 110}, cv::Scalar(0.8, 0.4, 0.2, 1.0), cv::FILLED);
+  for (int v = 0; v < size.height; ++v) spread.row(v) = 2.0 + 0.03 * v;
+  const cv::Rect box = cv::Rect(32, 32, 192, 155) & cv::Rect({0, 0}, size);
+  for (const float across : {0.2f, 0.45f, 0.8f}) {
+    const cv::Mat whole = DrawnOut(spread, across, 1.0f)(values),
+                  part = DrawnOut(spread(box), across, 1.0f)(values(box));
+    EXPECT_LT(cv::norm(whole(box), part, cv::NORM_INF), 1e-4) << across;
+  }
 }
 
 }  // namespace

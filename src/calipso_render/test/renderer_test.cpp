@@ -162,8 +162,8 @@ TEST(Renderer, AMovingObjectsShadowDoesNotFallOnTheSky) {
   EXPECT_EQ(s.kept(s.shadow, p), 144);
 }
 
-// The mask has a rail above the ball that the model lacks. The ball's right side moves off: the rail
-// above that side goes, too, also close to the side that rests, whose own part of it stays.
+// The mask has a rail above the ball that the model lacks. The ball's right side moves off: the
+// rail above that side goes, too, also close to the side that rests, whose own part of it stays.
 TEST(Renderer, WhatNoModelHasGoesWithThePartBesideIt) {
   ClipFrame key = frameWithBall(ballAt(kCentre));
   const cv::Rect box = cv::boundingRect(key.labels);

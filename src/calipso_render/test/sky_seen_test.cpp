@@ -99,8 +99,8 @@ TEST(Actor, SeesTheSkyAsItIsTurned) {
   }
 }
 
-// Each side of a box is flat up to its edges, also where three sides share a vertex, and however the
-// box is sheared; a bend of 40 degrees is a smooth surface's.
+// Each side of a box is flat up to its edges, also where three sides share a vertex, and however
+// the box is sheared; a bend of 40 degrees is a smooth surface's.
 TEST(SurfaceNormals, EndAtCreases) {
   const OpenBox box;
   const Surface surface = surfaceOf(box.points, box.faces);
@@ -138,14 +138,20 @@ void addBox(const Eigen::Vector3f& low, const Eigen::Vector3f& high, Points& poi
   }
 }
 
+Surface surfaceOfBoxes(const Eigen::AlignedBox3f& a, const Eigen::AlignedBox3f& b, Triangles& faces,
+                       Points& points) {
+  addBox(a.min(), a.max(), points, faces), addBox(b.min(), b.max(), points, faces);
+  return surfaceOf(points, faces);
+}
+
 // A post runs up into a slab. Its upper corners lie within it and see nothing; its sides below it
 // see half of the sky beside them, or a little less.
 TEST(SkySeen, IsThatOutsideWhereShellsRunIntoEachOther) {
   Points points;
   Triangles faces;
-  addBox({-0.1f, -0.1f, 0.0f}, {0.1f, 0.1f, 1.2f}, points, faces);
-  addBox({-0.5f, -0.5f, 1.0f}, {0.5f, 0.5f, 1.4f}, points, faces);
-  const Surface surface = surfaceOf(points, faces);
+  const Surface surface = surfaceOfBoxes(
+      {Eigen::Vector3f(-0.1f, -0.1f, 0.0f), Eigen::Vector3f(0.1f, 0.1f, 1.2f)},
+      {Eigen::Vector3f(-0.5f, -0.5f, 1.0f), Eigen::Vector3f(0.5f, 0.5f, 1.4f)}, faces, points);
   ASSERT_EQ(surface.winding, 1);
   int sides = 0;
   for (int t = 0; t < 12; ++t) {  // of the post
@@ -167,9 +173,9 @@ TEST(SkySeen, IsThatOutsideWhereShellsRunIntoEachOther) {
 TEST(SkySeen, IsFullOfWhatIsBuriedAltogether) {
   Points points;
   Triangles faces;
-  addBox({-0.1f, -0.1f, 0.4f}, {0.1f, 0.1f, 0.6f}, points, faces);
-  addBox({-0.5f, -0.5f, 0.0f}, {0.5f, 0.5f, 1.0f}, points, faces);
-  const Surface surface = surfaceOf(points, faces);
+  const Surface surface = surfaceOfBoxes(
+      {Eigen::Vector3f(-0.1f, -0.1f, 0.4f), Eigen::Vector3f(0.1f, 0.1f, 0.6f)},
+      {Eigen::Vector3f(-0.5f, -0.5f, 0.0f), Eigen::Vector3f(0.5f, 0.5f, 1.0f)}, faces, points);
   ASSERT_FALSE(surface.seen.empty());
   for (const SkySeen& seen : surface.seen) EXPECT_FLOAT_EQ(seen.open, 1.0f);
 }

@@ -29,7 +29,7 @@ class DriftingBackground {
   // CV_8UC1, key frame's view: 255 where it is seen, or hidden by an object.
   const cv::Mat& where() const { return where_; }
 
-  // px by which it has moved since the key frame. None for stamps that the clip does not cover.
+  // px by which it has moved since the key frame. None more than a step between frames off the clip.
   std::optional<cv::Point2f> shiftAt(std::int64_t stamp_ns) const;
 
   // Draws it into a plate, where it is.

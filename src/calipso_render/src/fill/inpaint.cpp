@@ -234,8 +234,9 @@ void fillPlanes(const InpaintParams& params, Canvas& canvas) {
   }
 }
 
-// How the colours of what things stand on change slowly over the picture; 0 elsewhere. The
-// outlines of those are no more copied from: in the picture they lie elsewhere by a pixel or two.
+// How the colours of support planes change slowly over the picture; 0 elsewhere. Takes pixels along
+// the borders of such planes from canvas.source: the labels are off by a pixel or two there, so that
+// a copy would have a trend that is not its own.
 cv::Mat supportsTrend(const InpaintParams& params, Canvas& canvas) {
   cv::Mat trend = cv::Mat::zeros(canvas.look.size(), CV_32FC3), inner, outer;
   const cv::Mat square = cv::Mat::ones(2 * kOutline + 1, 2 * kOutline + 1, CV_8U);

@@ -16,7 +16,7 @@ namespace calipso::render {
 // What a frame is compared with to find shadows that pass in the video, in one camera's view.
 struct PlateInView {
   cv::Mat codes;   // CV_8UC3
-  cv::Mat darker;  // CV_8UC1: where a grey value, meaned around, is less there is a shadow
+  cv::Mat darker;  // CV_8UC1: a frame's grey value, averaged over 5 x 5 px, below it is in shadow
   // CV_8UC1: 255 = seen in other frames, always alike, and neither what drifts nor, as far as a
   // depth image tells, the sky
   cv::Mat quiet;

@@ -74,7 +74,7 @@ PlateInView FrameCompositor::plateInView() const {
   return plate;
 }
 
-// Does any edited object?
+// Whether any edited object moves in the video.
 bool FrameCompositor::movesInVideo() const {
   for (std::size_t i = 0; i < edited_.size(); ++i) {
     if (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video) return true;

@@ -112,8 +112,8 @@ class Side {
   Fit fit_;
 };
 
-// Where shells of one mesh run into each other (a beam in a pier), vertices within another shell see
-// nothing, but the triangles they belong to come out of it: there is what they stand for.
+// Where shells of one mesh run into each other (a beam in a pier), vertices within another shell
+// see nothing, but the triangles they belong to come out of it: there is what they stand for.
 class Emergence {
  public:
   Emergence(const Points& vertices, const Points& normals, const Triangles& triangles,

@@ -57,8 +57,7 @@ DrawnOut::DrawnOut(const cv::Mat& spread, float across, float slope)
 cv::Mat DrawnOut::operator()(const cv::Mat& values) const {
   std::vector<Blurred> levels(*std::max_element(highest_.begin(), highest_.end()) + 2);
 #pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t k = 0; k < levels.size(); ++k)
-    levels[k] = blurred(values, static_cast<int>(k));
+  for (std::size_t k = 0; k < levels.size(); ++k) levels[k] = blurred(values, static_cast<int>(k));
   cv::Mat out(values.size(), CV_32FC4);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < out.rows; ++v) {
@@ -76,16 +75,16 @@ cv::Mat DrawnOut::operator()(const cv::Mat& values) const {
 DrawnOut::Blurred DrawnOut::blurred(const cv::Mat& values, int level) const {
   const float along = kLeastBlur * static_cast<float>(1 << level),
               beside = std::max(kLeastBlur, across_ * along);
-  const int rows = std::max(1, static_cast<int>(along / 2.0f)),
-            columns = std::max(1, static_cast<int>(beside / 2.0f));
+  const int rows = std::max(1, static_cast<int>(along / 2.0f));
+  int columns = 1;  // as rows a power of two: grids of different boxes coincide
+  while (4.0f * static_cast<float>(columns) <= beside) columns *= 2;
   Blurred out{{}, 1.0f, 1.0f, 0};
   cv::Mat from = values;
   if (rows > 1 || columns > 1) {
-    cv::resize(values, from,
-               {(values.cols + columns - 1) / columns, (values.rows + rows - 1) / rows}, 0, 0,
-               cv::INTER_AREA);
-    out.columns = static_cast<float>(from.cols) / values.cols,
-    out.rows = static_cast<float>(from.rows) / values.rows;
+    cv::copyMakeBorder(values, from, 0, (rows - values.rows % rows) % rows, 0,
+                       (columns - values.cols % columns) % columns, cv::BORDER_REPLICATE);
+    cv::resize(from, from, {from.cols / columns, from.rows / rows}, 0, 0, cv::INTER_AREA);
+    out.columns = 1.0f / static_cast<float>(columns), out.rows = 1.0f / static_cast<float>(rows);
   } else {
     const cv::Range used = rowsAt(level);
     if (used.empty()) return out;

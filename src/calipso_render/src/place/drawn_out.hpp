@@ -9,7 +9,7 @@ namespace calipso::render {
 // as wide as the one before.
 class DrawnOut {
  public:
-  static constexpr int kCoarsest = 32;  // px of the picture: pixels of the widest level
+  static constexpr int kCoarsest = 32;  // px of the picture: a multiple of all levels' pixels
 
   // @param spread CV_32FC1: px along a column for each unit of slope; across: how much less it is
   // along a row

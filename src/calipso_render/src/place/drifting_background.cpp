@@ -40,7 +40,7 @@ DriftingBackground::DriftingBackground(const std::vector<ClipFrame>& frames, int
   std::vector<cv::Mat> covered;
   for (const ClipFrame& f : frames) {
     stamps_.push_back(f.stamp_ns);
-    covered.push_back(grown(f.labels != 0, margin));
+    covered.push_back(grown(f.labels != 0, std::max(margin, kInterpolated)));
   }
   const bool in_order =
       std::adjacent_find(stamps_.begin(), stamps_.end(), std::greater_equal<>()) == stamps_.end();
@@ -64,7 +64,7 @@ void DriftingBackground::layOver(const std::vector<ClipFrame>& frames,
   const cv::Point more = high - low;
   const cv::Size size = where_.size() + cv::Size(more.x, more.y);
   origin_ = low;
-  if (size.area() > kMostArea * where_.size().area()) {
+  if (static_cast<double>(size.width) * size.height > kMostArea * where_.size().area()) {
     where_.release();
     return;
   }
@@ -121,7 +121,8 @@ void DriftingBackground::draw(const cv::Point2f& shift, cv::Mat& plate, cv::Mat&
   cv::Mat now = displaced(panorama_, by, plate.size());
   cv::max(now, 0.0, now);
   now.copyTo(plate, where_);
-  displacedMask(invented_, rounded(by), plate.size()).copyTo(invented, where_);
+  const cv::Mat seen = displacedMask(invented_ == 0, rounded(by), plate.size());
+  cv::Mat(seen == 0).copyTo(invented, where_);
 }
 
 void DriftingBackground::matchTo(const cv::Mat& bgr, const cv::Mat& covered, cv::Mat& plate) const {

@@ -174,8 +174,8 @@ int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u
   return best != kNoPlane ? best : closest(planes, 0, supports, kOffSupport, seen, u, v);
 }
 
-// The plane seen if the object were not there: the nearest behind it, but for one that has ended at its edge with
-// another. @param object nearness of the object, 0 unknown
+// The plane seen if the object were not there: the nearest behind it, but for one that has ended at
+// its edge with another. @param object nearness of the object, 0 unknown
 int planeBehind(const std::vector<Extent>& planes, const Edges& edges, float object, int u, int v) {
   const float limit = object > 0.0f ? kBehind * object : 1e9f;
   const auto isThere = [&](int k) {
@@ -254,7 +254,8 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
   }
 }
 
-// Where a plane is seen, or hidden and nearer to where it is than to anything else that does not meet it.
+// Where a plane is seen, or hidden and nearer to where it is than to anything else that does not
+// meet it.
 cv::Mat sureOf(const cv::Mat& label, const cv::Mat& hidden, const cv::Mat& seen,
                const cv::Mat& nothing, const Edges& edges) {
   const cv::Mat large = cv::Mat::ones(2 * kCopied + 1, 2 * kCopied + 1, CV_8U),

@@ -39,7 +39,7 @@ MirrorImage mirrorImage(const std::vector<const Actor*>& actors, const Radiance&
 // CV_32FC4: colour and cover of a box's pixels.
 cv::Mat withCover(const MirrorImage& image, const cv::Rect& box);
 
-// Where an image can come to that is drawn out by planes' slopes of such a deviation.
+// Rectangle within which an image lies once slopes of this standard deviation have drawn it out.
 cv::Rect reachedBy(const MirrorImage& image, float slope);
 
 // What `image` adds to the picture, CV_32FC3, linear.

@@ -22,8 +22,8 @@ constexpr float kShortest = 20.0f;    // px that are seen of one
 constexpr float kEnters = 10.0f;      // px from what is hidden, at most, where it was seen last
 constexpr float kWrongSide = 3.0f;    // px beyond a line at which the plane must not be seen,
 constexpr double kMostWrong = 0.03;   // but for so much of it
-constexpr float kNextTo =
-    15.0f;  // px from what is hidden at which nothing else must be seen within
+// px around what is hidden in which nothing farther may be seen on the plane's side
+constexpr float kNextTo = 15.0f;
 constexpr int kMostLines = 4;
 
 // A line, unit normal towards the plane: n . p >= c on its side.

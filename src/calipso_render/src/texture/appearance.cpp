@@ -11,6 +11,7 @@
 #include "draw/bicubic.hpp"
 #include "smooth_step.hpp"
 #include "texture/false_shade.hpp"
+#include "texture/mesh_topology.hpp"
 #include "texture/texture_fill.hpp"
 
 namespace calipso::render {
@@ -21,7 +22,8 @@ constexpr int kMargin = 12;     // px around the object that albedo is extended 
 constexpr int kShadowMapSide = 768;
 // of the mean light: what has less of it shows its reflectance with less certainty
 constexpr float kLit = 0.7f;
-// part of a pixel's light, at which the sun's highlight begins to hide its reflectance, and hides it
+// part of a pixel's light, at which the sun's highlight begins to hide its reflectance, and hides
+// it
 constexpr float kGlossy = 0.2f, kAllGloss = 0.6f;
 constexpr float kLeastClear = 0.02f;
 constexpr float kDarkest = 1e-4f;  // linear brightness that is told from none
@@ -166,12 +168,6 @@ void lowerBesideJumps(const Shaded& s, const Camera& camera, float tolerance, Re
   }
 }
 
-float extentOf(const Surface& surface) {
-  Eigen::AlignedBox3f box;
-  for (const Eigen::Vector3f& p : surface.key_vertices) box.extend(p);
-  return box.diagonal().norm();
-}
-
 // @param mean_light that of the key frame, where there is one
 Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light,
                           const Gloss& gloss, const ShadowMap& sun,
@@ -209,7 +205,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
       r.trust.at<float>(v, u) *= std::min(1.0f, luminance(l) / (kLit * luminance(r.mean_light)));
     }
   }
-  lowerBesideJumps(shaded, view.camera, kJump * extentOf(*actor.surface), r);
+  lowerBesideJumps(shaded, view.camera,
+                   kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
   takeOutFalseShade({shaded.light, shaded.open, r.trust}, floor, r.albedo);
   return r;
 }

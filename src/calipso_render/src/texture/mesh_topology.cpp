@@ -31,10 +31,14 @@ bool isClosed(std::vector<DirectedEdge> edges) {
 
 }  // namespace
 
-std::vector<int> weld(const Points& vertices) {
+Eigen::AlignedBox3f boxOf(const Points& points) {
   Eigen::AlignedBox3f box;
-  for (const Eigen::Vector3f& p : vertices) box.extend(p);
-  const float cell = std::max(kSamePlace * box.diagonal().norm(), 1e-12f);
+  for (const Eigen::Vector3f& p : points) box.extend(p);
+  return box;
+}
+
+std::vector<int> weld(const Points& vertices) {
+  const float cell = std::max(kSamePlace * boxOf(vertices).diagonal().norm(), 1e-12f);
   std::map<std::array<long, 3>, int> first;
   std::vector<int> welded(vertices.size());
   for (std::size_t i = 0; i < vertices.size(); ++i) {

@@ -10,6 +10,8 @@ namespace calipso::render {
 // are one.
 std::vector<int> weld(const Points& vertices);
 
+Eigen::AlignedBox3f boxOf(const Points& points);
+
 // Per triangle the number of the connected part of the mesh that it belongs to.
 std::vector<int> connectedParts(const Points& vertices, const Triangles& triangles);
 
@@ -18,9 +20,9 @@ std::vector<int> connectedParts(const Points& vertices, const Triangles& triangl
 // triangle can be seen.
 int outsideWinding(const Points& vertices, const Triangles& triangles);
 
-// Where a mesh's normals differ: a vertex has one for every piece of surface around it that no crease
-// parts from the others. The first has the vertex' own number, further ones follow behind all
-// vertices.
+// Where a mesh's normals differ: a vertex has one for every piece of surface around it that no
+// crease parts from the others. The first has the vertex' own number, further ones follow behind
+// all vertices.
 struct MeshNormals {
   Triangles corners;           // per triangle: the numbers of its corners' normals
   std::vector<int> vertex_of;  // per number

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "calipso_render/stage.hpp"
+#include "texture/mesh_topology.hpp"
 
 namespace calipso::render {
 namespace {
@@ -17,12 +18,6 @@ constexpr float kMirrorPart = 0.95f;       // of the vertices that must find the
 // principal axes of nearly the same length: any axis between may be the one
 constexpr float kAlike = 0.9f;
 constexpr int kAnglesBetween = 12;  // tried there, over half a turn
-
-Eigen::AlignedBox3f boxOf(const Points& points) {
-  Eigen::AlignedBox3f box;
-  for (const Eigen::Vector3f& p : points) box.extend(p);
-  return box;
-}
 
 // Part of a spread of vertices whose mirror image lies near some vertex.
 float mirroredPart(const Points& vertices, const MirrorPlane& plane, float tolerance) {

@@ -122,9 +122,7 @@ class TextureFill {
         actors_(object.actors),
         pictures_(object.pictures),
         surface_(*object.actors.front()->surface) {
-    Eigen::AlignedBox3f box;
-    for (const Eigen::Vector3f& p : surface_.key_vertices) box.extend(p);
-    extent_ = box.diagonal().norm();
+    extent_ = boxOf(surface_.key_vertices).diagonal().norm();
     two_sided_ = std::any_of(surface_.edges.begin(), surface_.edges.end(),
                              [](const MeshEdge& e) { return e.b < 0; });
     for (const View* v : views_)

@@ -8,6 +8,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "smooth_step.hpp"
+#include "texture/mesh_topology.hpp"
 #include "texture/surface_chart.hpp"
 
 namespace calipso::render {
@@ -53,9 +54,7 @@ class PatternFill {
         certain_(certain),
         texture_(texture),
         known_(texture) {
-    Eigen::AlignedBox3f box;
-    for (const Eigen::Vector3f& p : vertices) box.extend(p);
-    pixel_ = std::max(texture.spacing(), box.diagonal().norm() / kAcross);
+    pixel_ = std::max(texture.spacing(), boxOf(vertices).diagonal().norm() / kAcross);
     const float most = *std::max_element(certain.begin(), certain.end());
     for (std::size_t i = 0; i < certain.size(); ++i)
       known_.texels[i][3] = most > 0.0f ? certain[i] / most : 0.0f;
