@@ -5,6 +5,7 @@
 #include <chrono>
 #include <future>
 #include <stdexcept>
+#include <utility>
 
 #include "world_fixtures.hpp"
 
@@ -51,10 +52,14 @@ TEST(HullStore, DecomposesAheadInAnotherThread) {
 }
 
 TEST(HullStore, WhatFailsAheadFailsWhereItIsNeeded) {
-  HullStore store([](const TriangleMesh&) -> std::vector<TriangleMesh> {
+  std::promise<void> tried;
+  bool first = true;  // one mesh is never decomposed twice at a time
+  HullStore store([&](const TriangleMesh&) -> std::vector<TriangleMesh> {
+    if (std::exchange(first, false)) tried.set_value();
     throw std::invalid_argument("no volume");
   });
   store.prepare({box(0.1)});
+  ASSERT_EQ(tried.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
   EXPECT_THROW(store.of(box(0.1)), std::invalid_argument);
 }
 

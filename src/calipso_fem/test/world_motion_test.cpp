@@ -169,17 +169,22 @@ TEST(WorldMotion, AfloatObjectFallsWithWhatGravityGains) {
   EXPECT_NEAR(centerOf(world.state()).z(), start - 0.5 * 3.0 * kG, 1e-5);
 }
 
+// How far the first object's vertices go, once an edit is made, in some seconds.
+Eigen::MatrixXd movedBy(const Edit& edit, double seconds, World& world) {
+  world.submit(edit);
+  world.advanceTo(0.0);
+  const auto before = world.state().objects[0].vertices;
+  play(world, seconds);
+  return world.state().objects[0].vertices - before;
+}
+
 TEST(WorldMotion, UnchangedStiffnessChangesNothing) {
   World world(sceneWith(bentRod(0.2, 0.04), {0, 0, 0.018}), {});  // 2 mm inside the table
   Edit edit = editOf(EditKind::kMaterial, EditMode::kFactor);
   edit.youngs_modulus = 1.0;
-  world.submit(edit);
-  world.advanceTo(0.0);
-  const auto before = world.state().objects[0].vertices;
-  play(world, 1.0);
-  const auto after = world.state().objects[0].vertices;
+  const Eigen::MatrixXd moved = movedBy(edit, 1.0, world);
   EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kDeformable);
-  EXPECT_LT((after - before).rowwise().norm().maxCoeff(), 1e-4);
+  EXPECT_LT(moved.rowwise().norm().maxCoeff(), 1e-4);
 }
 
 TEST(WorldMotion, HundredfoldSofterSagsAndStaysOnTheTable) {
@@ -232,12 +237,8 @@ TEST(WorldMotion, WhatIsAttachedSagsWhenItGetsHeavier) {
     World world(scene, params);
     Edit heavier = editOf(EditKind::kMaterial, EditMode::kFactor);
     heavier.density = 10.0;
-    world.submit(heavier);
-    world.advanceTo(0.0);
-    const auto before = world.state().objects[0].vertices;
-    play(world, 1.0);
+    const Eigen::VectorXd sag = movedBy(heavier, 1.0, world).col(2);
     EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kDeformable);
-    const Eigen::VectorXd sag = (world.state().objects[0].vertices - before).col(2);
     EXPECT_LT(sag.minCoeff(), -1e-3);
     EXPECT_NEAR(sag.maxCoeff(), 0.0, 1e-3);  // its held end
   }

@@ -198,7 +198,10 @@ bool Recorder::lastStateExplained() const {
 
 void Recorder::run() {
   try {
-    params_.live ? recordLive() : recordClip();
+    if (params_.live)
+      recordLive();
+    else
+      recordClip();
   } catch (const std::exception& error) {
     throw std::runtime_error(error.what() + keepIncomplete());
   }

@@ -2,6 +2,7 @@
 
 #include <omp.h>
 
+#include <cassert>
 #include <mutex>
 
 namespace calipso::fem {
@@ -24,6 +25,7 @@ HullStore::~HullStore() {
 }
 
 void HullStore::prepare(const std::vector<TriangleMesh>& meshes) {
+  assert(!ahead_.joinable());
   std::vector<std::shared_ptr<Entry>> wanted;
   for (const TriangleMesh& mesh : meshes) wanted.push_back(entryOf(mesh));
   ahead_ = std::thread([this, wanted] {

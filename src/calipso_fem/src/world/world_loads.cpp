@@ -97,7 +97,10 @@ std::string World::Impl::release(Actor& actor, const Edit& edit) {
     if (!intersects(region, vertices)) return false;
     // The load that drives it was found while it was held: what the attachments bore of it would
     // now throw the object off, or keep it up.
-    if (region == attached) endDrive(actor), actor.holder = Holder::kNothing;
+    if (region == attached) {
+      endDrive(actor);
+      actor.holder = Holder::kNothing;
+    }
     if (actor.soft) actor.soft->body().releaseSurfaceVertices(region);
     ++released;
     return true;

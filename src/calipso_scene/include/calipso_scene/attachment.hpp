@@ -10,7 +10,7 @@ namespace calipso {
 
 // Vertices of a placed mesh that the boxes hold, ascending. A box that holds none, as a small one
 // of a peg or a hinge does where the model's shape or depth is some per cent off, grows until it
-// is met; one that is 15 % of the mesh's diagonal away from it holds nothing.
+// is met; one that is more than 15 % of the mesh's diagonal away from it holds nothing.
 std::vector<int> attachedVertices(const TriangleMesh& mesh,
                                   const Eigen::Isometry3d& world_from_mesh,
                                   const std::vector<AttachmentBox>& boxes);
