@@ -20,21 +20,12 @@ constexpr int kRimReach = 4;
 
 }  // namespace
 
-bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px) {
-  Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Array2f moved = (now[triangle[i]] - then[triangle[i]]).head<2>();
-    low = low.min(moved), high = high.max(moved);
-  }
-  return (low < px).all() && (high > -px).all();
-}
-
 // Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by
 // some pixels, so what lies that near to both the shadow and the change is taken from the plate. A
 // change of single pixels is noise of the shadow's border and moves nothing.
 void FrameCompositor::findRelit() {
   relit_ = cv::Mat::zeros(region_.size(), CV_8U);
-  const int reach = params_.background.shadow_margin_px, side = reach + 2;
+  const int reach = frame_.params.background.shadow_margin_px, side = reach + 2;
   const auto around = [side](const cv::Rect& r) {
     return r.empty() ? r
                      : cv::Rect(r.x - side, r.y - side, r.width + 2 * side, r.height + 2 * side);
@@ -62,7 +53,7 @@ void FrameCompositor::findChange(int v, int from, int to, std::uint8_t* out) con
   const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
                      *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_),
                      *takes = rowOf(takes_light_);
-  const float umbra = kPerLevel * luminance(prepared_.umbra), lit = kPerLevel - umbra;
+  const float umbra = kPerLevel * luminance(frame_.prepared.umbra), lit = kPerLevel - umbra;
   sun_changes_.visitRow(v, from, to, [&](int begin, int end) {
     for (int u = begin; u < end; ++u) {
       const int more_sky = sky[u] - sky_before[u], more_sun = sun[u] - sun_before[u];
@@ -79,9 +70,9 @@ void FrameCompositor::findChange(int v, int from, int to, std::uint8_t* out) con
 // @param own 255 = the surface is seen there
 cv::Mat FrameCompositor::nearerToLeft(int surface, const cv::Mat& own, const cv::Mat& owner,
                                       const cv::Rect& box) const {
-  if (prepared_.outlines[surface].empty() || !sameView(frame_.camera, prepared_.camera)) return {};
+  if (frame_.prepared.outlines[surface].empty() || !frame_.at_key_camera) return {};
   const cv::Mat rests = own(box) & (still_(box) > 0.0f);
-  cv::Mat left = prepared_.outlines[surface](box + region_.tl()) & ~rests &
+  cv::Mat left = frame_.prepared.outlines[surface](box + region_.tl()) & ~rests &
                  ((owner(box) < 0) | own(box));
   cv::morphologyEx(left, left, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));  // no mere silhouette
   if (cv::countNonZero(left) == 0) return {};
@@ -95,14 +86,14 @@ cv::Mat FrameCompositor::nearerToLeft(int surface, const cv::Mat& own, const cv:
 // @param owner CV_16SC1 over region_: edited surface that is seen there, -1 = none
 void FrameCompositor::keepRims(const cv::Mat& owner) {
   cv::Mat rims = cv::Mat::zeros(region_.size(), CV_32F);
-  for (std::size_t i = 0; i < edited_.size(); ++i) {
-    if (edited_[i]) addRim(static_cast<int>(i), owner, rims);
+  for (std::size_t i = 0; i < frame_.edited.size(); ++i) {
+    if (frame_.edited[i]) addRim(static_cast<int>(i), owner, rims);
   }
   rims.copyTo(still_, owner < 0);
 }
 
 void FrameCompositor::addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const {
-  const int margin = params_.background.mask_margin_px, reach = kRimReach * margin;
+  const int margin = frame_.params.background.mask_margin_px, reach = kRimReach * margin;
   const cv::Rect whole({0, 0}, region_.size());
   const cv::Mat own = owner == surface;
   const cv::Rect seen = cv::boundingRect(own);
@@ -114,8 +105,9 @@ void FrameCompositor::addRim(int surface, const cv::Mat& owner, cv::Mat& rims) c
   cv::Mat rim = cv::Mat::zeros(box.size(), CV_32F), foreign = cv::Mat::zeros(whole.size(), CV_8U);
   still_(box).copyTo(rim, own(box));
   cv::dilate(rim, rim, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
-  for (std::size_t j = 0; j < edited_.size(); ++j) {
-    if (edited_[j] && static_cast<int>(j) != surface) foreign |= originalOf(static_cast<int>(j));
+  for (std::size_t j = 0; j < frame_.edited.size(); ++j) {
+    if (frame_.edited[j] && static_cast<int>(j) != surface)
+      foreign |= originalOf(static_cast<int>(j));
   }
   const cv::Mat original = originalOf(surface);
   cv::Mat beside, near, inner;
@@ -135,13 +127,13 @@ void FrameCompositor::addRim(int surface, const cv::Mat& owner, cv::Mat& rims) c
 
 // The triangles with a point that may be at rest.
 bool FrameCompositor::findResting(int slot, std::vector<char>& can_rest) const {
-  const Actor& actor = actors_[slot];
+  const Actor& actor = frame_.objects[slot].actor;
   can_rest.assign(actor.surface->triangles.size(), 0);
-  if (observed_[slot].points.empty()) return false;
+  if (!frame_.objects[slot].isAtRestInVideo()) return false;
   bool any = false;
 #pragma omp parallel for schedule(static) reduction(|| : any)
   for (std::size_t t = 0; t < can_rest.size(); ++t) {
-    can_rest[t] = mayMoveLess(actor.screen.points, observed_[slot].points,
+    can_rest[t] = mayMoveLess(actor.screen.points, frame_.objects[slot].observed.points,
                               actor.surface->triangles[t], kMovedPx);
     any = any || can_rest[t] != 0;
   }
@@ -149,10 +141,10 @@ bool FrameCompositor::findResting(int slot, std::vector<char>& can_rest) const {
 }
 
 void FrameCompositor::findStill() {
-  if (!params_.keep_still) return;
-  std::vector<std::vector<char>> can_rest(actors_.size());
+  if (!frame_.params.keep_still) return;
+  std::vector<std::vector<char>> can_rest(frame_.objects.size());
   bool any = false;
-  for (std::size_t slot = 0; slot < actors_.size(); ++slot)
+  for (std::size_t slot = 0; slot < frame_.objects.size(); ++slot)
     any = findResting(static_cast<int>(slot), can_rest[slot]) || any;
   if (!any) return;
   still_ = cv::Mat::zeros(region_.size(), CV_32F);
@@ -162,19 +154,17 @@ void FrameCompositor::findStill() {
   for (int v = 0; v < region_.height; ++v) {
     for (int u = 0; u < region_.width; ++u) {
       const std::uint32_t id = centre_->ids(v)[u];
-      if (id == VisibilityBuffer::kNothing ||
-          !edited_[surface_of_slot_[VisibilityBuffer::objectOf(id)]])
-        continue;
-      owner.at<short>(v, u) = static_cast<short>(surface_of_slot_[VisibilityBuffer::objectOf(id)]);
+      if (id == VisibilityBuffer::kNothing || !frame_.objectOf(id).edited) continue;
+      owner.at<short>(v, u) = static_cast<short>(frame_.objectOf(id).surface);
       if (can_rest[VisibilityBuffer::objectOf(id)][VisibilityBuffer::triangleOf(id)] == 0) continue;
-      if (lookOf(VisibilityBuffer::objectOf(id)).changes()) repainted.at<std::uint8_t>(v, u) = 255;
-      still_.at<float>(v, u) = stillness(id, u + region_.x, v + region_.y);
+      if (frame_.objectOf(id).look.changes()) repainted.at<std::uint8_t>(v, u) = 255;
+      still_.at<float>(v, u) = frame_.stillness(id, u + region_.x, v + region_.y);
     }
   }
   keepRims(owner);
   cv::dilate(repainted, repainted, disc(kRepaintReach));
   still_.setTo(0.0f, repainted);
-  if (!elsewhere_.empty()) still_.setTo(0.0f, elsewhere_(region_));
+  if (!frame_.elsewhere.empty()) still_.setTo(0.0f, frame_.elsewhere(region_));
 }
 
 }  // namespace calipso::render

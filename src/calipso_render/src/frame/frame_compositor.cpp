@@ -7,49 +7,22 @@
 
 namespace calipso::render {
 cv::Vec3f FrameCompositor::shadowRatio(float sun, float sky) const {
-  return prepared_.umbra * sky + (cv::Vec3f(1, 1, 1) - prepared_.umbra) * sun;
-}
-
-// How far a surface point of an edited object stays where the video shows it: 1 at rest, 0 moved.
-float FrameCompositor::stillness(std::uint32_t id, float u, float v) const {
-  if (observed_[VisibilityBuffer::objectOf(id)].points.empty()) return 0.0f;
-  return 1.0f - smoothStep(kStillPx, kMovedPx, movement(id, u, v).norm());
-}
-
-// How far from its place in the video a surface point is seen, px. @pre the video has its object at
-// rest
-Eigen::Vector2f FrameCompositor::movement(std::uint32_t id, float u, float v) const {
-  const int slot = VisibilityBuffer::objectOf(id), triangle = VisibilityBuffer::triangleOf(id);
-  const Actor& actor = actors_[slot];
-  const Eigen::Vector3i& t = actor.surface->triangles[triangle];
-  const Eigen::Vector3f w = barycentric(actor.screen, triangle, u, v);
-  Eigen::Vector2f moved = Eigen::Vector2f::Zero();
-  for (int i = 0; i < 3; ++i) {
-    moved += w[i] * (actor.screen.points[t[i]] - observed_[slot].points[t[i]]).head<2>();
-  }
-  return moved;
-}
-
-// Something without a model stands in front: it hid the object at the key frame, and goes on doing
-// so.
-bool FrameCompositor::hiddenByFront(int surface, int u, int v) const {
-  const cv::Mat& front = fronts_[surface];
-  return !front.empty() && front.at<std::uint8_t>(v, u) != 0;
+  return frame_.prepared.umbra * sky + (cv::Vec3f(1, 1, 1) - frame_.prepared.umbra) * sun;
 }
 
 // An edited object is drawn; another one only where the original picture does not show it.
 bool FrameCompositor::isDrawn(std::uint32_t id, int u, int v) const {
   if (id == VisibilityBuffer::kNothing) return false;
   if (always_drawn_[VisibilityBuffer::objectOf(id)]) return true;
-  const int surface = surface_of_slot_[VisibilityBuffer::objectOf(id)];
-  if (hiddenByFront(surface, u, v)) return false;
-  return edited_[surface] || removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
+  const int surface = frame_.objectOf(id).surface;
+  if (place_.hides(surface, u, v)) return false;
+  return frame_.edited[surface] || removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
 }
 
 // The part of a pixel that objects which stay cover: of one on their outline less than all.
 float FrameCompositor::coverOfOthers(int u, int v) const {
   const EdgeCoverage::Pixel* edge = edges_->at(u, v);
-  if (edge == nullptr) return labels_.at<std::uint8_t>(v, u) != 0 ? 1.0f : 0.0f;
+  if (edge == nullptr) return frame_.labels.at<std::uint8_t>(v, u) != 0 ? 1.0f : 0.0f;
   const auto stays = [&](std::uint32_t id) {
     return id != VisibilityBuffer::kNothing && !isDrawn(id, u, v);
   };
@@ -60,8 +33,8 @@ float FrameCompositor::coverOfOthers(int u, int v) const {
 FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
   const bool removed = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
   const float others = removed ? 0.0f : coverOfOthers(u, v);
-  Behind own{linearPixel(frame_.bgr, u, v), 0.0f, kOriginal};
-  if (others > 0.0f && labels_.at<std::uint8_t>(v, u) != 0) shadeOther(u, v, own);
+  Behind own{linearPixel(frame_.input.bgr, u, v), 0.0f, kOriginal};
+  if (others > 0.0f && frame_.labels.at<std::uint8_t>(v, u) != 0) shadeOther(u, v, own);
   if (others == 1.0f) return own;
   const Behind ground = groundAt(u, v, removed);
   if (others == 0.0f || ground.source == kOriginal) return others == 0.0f ? ground : own;
@@ -107,16 +80,16 @@ FrameCompositor::Behind FrameCompositor::shadowedAt(int u, int v, bool removed) 
 
 // What comes to light where an object or its shadow was.
 FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
-  const bool invented = invented_.at<std::uint8_t>(v, u) != 0;
+  const bool invented = place_.invented.at<std::uint8_t>(v, u) != 0;
   cv::Vec3f now;
-  const bool drifts = !drifts_.empty() && drifts_.at<std::uint8_t>(v, u) != 0;
-  if (invented && !drifts && live_ != nullptr &&
-      live_->at(unmirrored_, labels_, live_corrections_, prepared_.noise.deviation(1, 128.0f), u, v,
-                now)) {
+  const bool drifts = !place_.drifts.empty() && place_.drifts.at<std::uint8_t>(v, u) != 0;
+  if (invented && !drifts && place_.live != nullptr &&
+      place_.live->at(unmirrored_, frame_.labels, live_corrections_,
+                      frame_.prepared.noise.deviation(1, 128.0f), u, v, now)) {
     for (int c = 0; c < 3; ++c) now[c] = linearFromRealCode(now[c]);
     return {now, 1.0f, kInvented};
   }
-  return {plate_.at<cv::Vec3f>(v, u), 1.0f, invented ? kInvented : kSeenElsewhere};
+  return {place_.plate.at<cv::Vec3f>(v, u), 1.0f, invented ? kInvented : kSeenElsewhere};
 }
 
 FrameCompositor::Composed FrameCompositor::composedOf(const Drawn& drawn, int u, int v) const {

@@ -13,8 +13,9 @@
 #include "draw/triangle_map.hpp"
 #include "frame/frame_caches.hpp"
 #include "frame/line_codec.hpp"
+#include "frame/seen_place.hpp"
 #include "frame/square_mask.hpp"
-#include "place/place_view.hpp"
+#include "frame/staged_frame.hpp"
 #include "smooth_step.hpp"
 
 namespace calipso::render {
@@ -33,17 +34,10 @@ constexpr float kDarkest = 0.05f;
 constexpr int kRepaintReach = 2;
 constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
 constexpr std::uint8_t kChanged = 255;  // of FrameCompositor::remirrored_
-constexpr float kStillPx = 0.05f;       // moved less: the frame's own pixels
-constexpr float kNonePx = 5.0f;         // from which none of what drawing misses goes along
-constexpr float kMovedPx = 0.3f;        // an edited surface that moved more is drawn
 
 inline cv::Mat disc(int radius) {
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
 }
-
-// Has the triangle a point that moved less than `px` in the picture? The box around its corners'
-// movements tells.
-bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px);
 
 // How much a change of brightness by `by` calls for the plate: 0 not visible .. 255 only it.
 inline std::uint8_t changeOfLight(float by) {
@@ -133,7 +127,6 @@ class FrameCompositor {
     cv::Point nearest;  // drawn pixel
   };
 
-  Light lightOf(const FrameInput& frame) const;
   // A pixel of the result.
   struct Composed {
     cv::Vec3f colour;    // linear
@@ -142,10 +135,6 @@ class FrameCompositor {
   };
 
   void prepareFrame();
-  void stage();
-  void stageStates();
-  void stageActors();
-  void stagePlace();
   void findResidual();
   cv::Rect carriedBox() const;
   void findMiss(const cv::Rect& carried);
@@ -164,13 +153,6 @@ class FrameCompositor {
   void recordRow(int v, Row& row, RestPicture& picture) const;
   void recordOwners(RestPicture& picture) const;
   Composed composedOf(const Drawn& drawn, int u, int v) const;
-  Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
-  bool findRest(int surface);
-  bool isSeenAt(int surface, const Points& vertices) const;
-  bool takesShadow(int u, int v) const {
-    return place_view_.sees(u, v) &&
-           (shadowless_.empty() || shadowless_.at<std::uint8_t>(v, u) == 0);
-  }
   void prepareShadows();
   void cacheOriginals(const std::vector<Occluder>& originals);
   void cacheOthers(const std::vector<Occluder>& others);
@@ -187,7 +169,6 @@ class FrameCompositor {
   void findRemoved();
   cv::Mat quietPlaces() const;
   PlateInView plateInView() const;
-  bool movesInVideo() const;
   void findPassingShadows();
   void drawVisibility();
   void sampleEdges();
@@ -251,17 +232,9 @@ class FrameCompositor {
   void addMirrored(int u, int v, Behind& behind) const;
   float coverOfOthers(int u, int v) const;
   Behind revealedAt(int u, int v) const;
-  bool hiddenByFront(int surface, int u, int v) const;
   bool isDrawn(std::uint32_t id, int u, int v) const;
-  float stillness(std::uint32_t id, float u, float v) const;
-  bool isElsewhere(float u, float v) const {
-    return !elsewhere_.empty() &&
-           elsewhere_.at<std::uint8_t>(static_cast<int>(v), static_cast<int>(u)) != 0;
-  }
   void sunOn(const LightBatch& points, float* sun) const;
   void sunOnPlaces(const int* places, int count, const float* nearness, SurfaceRun& run) const;
-  const Look& lookOf(int slot) const;
-  cv::Vec3f tintOf(int slot) const { return lookOf(slot).tint.value_or(cv::Vec3f(1, 1, 1)); }
   bool isSmooth(int i, int j, int size) const;
   // Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
   cv::Vec3f shadowRatio(float sun, float sky) const;
@@ -270,32 +243,12 @@ class FrameCompositor {
                       Points& shadow) const;
   cv::Rect shadowBounds(const Points& vertices, const Light& light) const;
 
-  const Prepared& prepared_;
-  const RenderParams& params_;
-  const FrameInput& frame_;
+  const StagedFrame frame_;
+  const SeenPlace place_;
   ShadowCache& shadows_;
-  const Light light_;  // of this frame; what the video shows was lit by Prepared::light
   RestPicture& rest_;
 
-  std::vector<cv::Mat> footprints_;  // Prepared::footprints, likewise
-  std::vector<cv::Mat> fronts_;  // Prepared::fronts, where the camera stands as at the key frame
-  cv::Mat labels_, plate_;       // of this frame's view
-  cv::Mat invented_;             // CV_8UC1
-  cv::Mat drifts_;               // CV_8UC1, key frame's view: plate_ drifts along; may be empty
-  cv::Mat view_from_key_;        // viewWarp(); empty: the key frame's view
-  cv::Mat shadowless_;  // Prepared::shadowless, where the camera stands as at the key frame
-  const LiveFill* live_ = nullptr;  // Background::live, where the camera stands as at the key frame
   LiveFill::Corrections live_corrections_;
-  std::vector<const ObjectInFrame*> states_;  // per surface; nullptr: as in the video, at rest
-  std::vector<bool> edited_;                  // per surface
-  // per surface: the video has it, or a part of it, where the key frame has it
-  std::vector<bool> at_rest_;
-  cv::Mat elsewhere_;          // CV_8UC1, whole picture: where it does not; may be empty
-  std::vector<Actor> actors_;  // visible ones, per slot
-  std::vector<int> surface_of_slot_;
-  std::vector<Gloss> glosses_;  // per slot, as its look has it
-  // per slot: where the video has it (edited objects at rest only)
-  std::vector<ScreenMesh> observed_;
   std::unique_ptr<Visibility> moved_shadow_;  // of the edited objects where they are now
   std::unique_ptr<Visibility> moved_sky_;
   cv::Rect region_,
@@ -350,8 +303,6 @@ class FrameCompositor {
   std::vector<SurfaceMaps> maps_;   // per slot; empty where it is not drawn
   std::optional<VisibilityBuffer> centre_;
   std::optional<EdgeCoverage> edges_;
-  Eigen::Vector3f eye_;
-  PlaceView place_view_;
   LineCodec codec_;
 };
 

@@ -51,23 +51,23 @@ void FrameCompositor::leaveHidden(int v, int begin, int end, std::uint8_t* sky) 
 // @param shaded gets the squares that are not known to be all lit; may be null
 cv::Mat FrameCompositor::sunOver(const Visibility& shadow, const cv::Rect& bounds,
                                  SquareMask* shaded) const {
-  cv::Mat sun(frame_.bgr.size(), CV_8U, cv::Scalar(255)), part = sun(bounds);
-  planesInLight(place_view_, shadow, bounds, SquareMask(), part, shaded);
+  cv::Mat sun(frame_.input.bgr.size(), CV_8U, cv::Scalar(255)), part = sun(bounds);
+  planesInLight(place_.view, shadow, bounds, SquareMask(), part, shaded);
   return sun;
 }
 
 // @param skip where it is not wanted
 SkyGrid FrameCompositor::skyOver(const Visibility& shadow, const cv::Rect& region,
                                  const SquareMask& skip) const {
-  return SkyGrid(place_view_.planes(), shadow, frame_.bgr.size(), region, skip);
+  return SkyGrid(place_.view.planes(), shadow, frame_.input.bgr.size(), region, skip);
 }
 
 // The whole picture's levels.
 cv::Mat FrameCompositor::skyLevels(const SkyGrid& grid, const Visibility& shadow) const {
-  cv::Mat sky(frame_.bgr.size(), CV_8U);
+  cv::Mat sky(frame_.input.bgr.size(), CV_8U);
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < sky.rows; ++v)
-    grid.levels(place_view_.planes(), shadow, v, 0, sky.cols, sky.ptr<std::uint8_t>(v));
+    grid.levels(place_.view.planes(), shadow, v, 0, sky.cols, sky.ptr<std::uint8_t>(v));
   return sky;
 }
 
@@ -90,13 +90,13 @@ void FrameCompositor::findCovered() {
     }
   }
   if (!box.empty())
-    covered_ = SquareMask(drawn_(box), drawn_box_, params_.background.shadow_margin_px + 2);
+    covered_ = SquareMask(drawn_(box), drawn_box_, frame_.params.background.shadow_margin_px + 2);
 }
 
 // Sun and sky before the edit, and where light is taken at all; all of it stays while the same
 // objects are edited.
 void FrameCompositor::cacheBefore() {
-  const cv::Size size = frame_.bgr.size();
+  const cv::Size size = frame_.input.bgr.size();
   shadows_.sun_before.create(size, CV_8U), shadows_.takes.create(size, CV_8U);
   shadows_.sky_before = shadows_.originals_sky_levels.clone();
 #pragma omp parallel for schedule(static)
@@ -116,14 +116,14 @@ CALIPSO_WIDE_LOOPS void FrameCompositor::joinBefore(int v) {
     return picture.empty() ? nullptr : picture.ptr<std::uint8_t>(v);
   };
   const std::uint8_t *others = rowOf(shadows_.others_sun),
-                     *originals = rowOf(shadows_.originals_sun), *none = rowOf(shadowless_);
+                     *originals = rowOf(shadows_.originals_sun), *none = rowOf(place_.shadowless);
   const int width = shadows_.takes.cols;
   if (originals != nullptr)
     std::copy_n(originals, width, before);
   else
     std::fill_n(before, width, 255);
   for (int u = 0; others != nullptr && u < width; ++u) before[u] = both(before[u], others[u]);
-  place_view_.seesRow(0, v, width, takes);
+  place_.view.seesRow(0, v, width, takes);
   for (int u = 0; none != nullptr && u < width; ++u) takes[u] = none[u] == 0 ? takes[u] : 0;
 }
 
@@ -138,14 +138,14 @@ void FrameCompositor::measureLight() {
   const cv::Rect bounds = moved_bounds_ & region_;
   if (!bounds.empty()) {
     cv::Mat part = sun_now_(bounds - region_.tl());
-    planesInLight(place_view_, *moved_shadow_, bounds, covered_, part, &sun_changes_);
+    planesInLight(place_.view, *moved_shadow_, bounds, covered_, part, &sun_changes_);
   }
   sun_changes_.add(shadows_.sunless);
   const SkyGrid sky = skyOver(*moved_sky_, region_, covered_);
   SquareMask sky_changes(region_);
   findSkyChanges(sky, sky_changes);
   sun_changes_.remove(covered_);
-  relightable_ = sun_changes_.grown(params_.background.shadow_margin_px + 2);
+  relightable_ = sun_changes_.grown(frame_.params.background.shadow_margin_px + 2);
   relightable_.add(sky_changes);
   relightable_.set(passing_.empty() ? shown_box_ : region_);
   relightable_.remove(covered_);
@@ -180,7 +180,7 @@ void FrameCompositor::findSkyChanges(const SkyGrid& now, SquareMask& changes) {
 void FrameCompositor::measureRun(const SkyGrid& sky_grid, int v, int begin, int end) {
   std::uint8_t *sun = sun_now_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x),
                *sky = sky_now_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x);
-  sky_grid.levels(place_view_.planes(), *moved_sky_, v, begin, end, sky);
+  sky_grid.levels(place_.view.planes(), *moved_sky_, v, begin, end, sky);
   leaveHidden(v, begin, end, sky);
   if (!shadows_.others_sun.empty()) {
     const std::uint8_t* others = shadows_.others_sun.ptr<std::uint8_t>(v) + begin;
@@ -193,9 +193,9 @@ void FrameCompositor::measureRun(const SkyGrid& sky_grid, int v, int begin, int 
 // @param sun, sky columns [begin, end) of row v
 void FrameCompositor::takeReliefInPlaneTerms(int v, int begin, int end, std::uint8_t* sun,
                                              std::uint8_t* sky) const {
-  const Relief& relief = place_view_.relief();
+  const Relief& relief = place_.view.relief();
   if (relief.empty()) return;
-  const float planes_umbra = luminance(prepared_.umbra);
+  const float planes_umbra = luminance(frame_.prepared.umbra);
   const float* umbra = relief.umbra.ptr<float>(v) + begin;
   const std::uint8_t* seen = relief.seen.ptr<std::uint8_t>(v) + begin;
   const int count = end - begin;

@@ -22,33 +22,34 @@ float strongest(const cv::Vec3f& c) {
 }  // namespace
 
 void FrameCompositor::findMirrored() {
-  unmirrored_ = frame_.bgr;
-  if (prepared_.mirror.established() && sameView(frame_.camera, prepared_.camera)) {
+  unmirrored_ = frame_.input.bgr;
+  if (frame_.prepared.mirror.established() && frame_.at_key_camera) {
     mirrorAnew();
-    if (live_ != nullptr || movesInVideo())
-      unmirrored_ = unmirroredCodes(prepared_.mirror, frame_.bgr);
+    if (place_.live != nullptr || frame_.movesInVideo())
+      unmirrored_ = unmirroredCodes(frame_.prepared.mirror, frame_.input.bgr);
   }
-  if (live_ != nullptr) live_corrections_ = live_->corrections(unmirrored_, labels_);
+  if (place_.live != nullptr)
+    live_corrections_ = place_.live->corrections(unmirrored_, frame_.labels);
 }
 
 void FrameCompositor::mirrorAnew() {
-  const PlaneMirror& mirror = prepared_.mirror;
+  const PlaneMirror& mirror = frame_.prepared.mirror;
   std::vector<const Actor*> actors;
   std::vector<int> slots;
-  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
-    const int surface = surface_of_slot_[slot];
-    if (edited_[surface] || !prepared_.moves[surface])
-      actors.push_back(&actors_[slot]), slots.push_back(static_cast<int>(slot));
+  for (std::size_t slot = 0; slot < frame_.objects.size(); ++slot) {
+    const int surface = frame_.objects[slot].surface;
+    if (frame_.edited[surface] || !frame_.prepared.moves[surface])
+      actors.push_back(&frame_.objects[slot].actor), slots.push_back(static_cast<int>(slot));
   }
   const Radiance radiance = [&](int i, const SurfacePoint& point) {
-    return mirroredRadiance(prepared_.appearances[surface_of_slot_[slots[i]]], light_,
-                            lookOf(slots[i]), point);
+    return mirroredRadiance(frame_.prepared.appearances[frame_.objects[slots[i]].surface],
+                            frame_.light, frame_.objects[slots[i]].look, point);
   };
   const MirrorImage image =
-      mirrorImage(actors, radiance, params_.planes, frame_.camera, mirror.off);
-  mirrored_ =
-      image.empty() ? cv::Mat(frame_.bgr.size(), CV_32FC3, cv::Scalar()) : addedBy(mirror, image);
-  remirrored_ = cv::Mat::zeros(frame_.bgr.size(), CV_8U);
+      mirrorImage(actors, radiance, frame_.params.planes, frame_.input.camera, mirror.off);
+  mirrored_ = image.empty() ? cv::Mat(frame_.input.bgr.size(), CV_32FC3, cv::Scalar())
+                            : addedBy(mirror, image);
+  remirrored_ = cv::Mat::zeros(frame_.input.bgr.size(), CV_8U);
   const cv::Rect box =
       image.empty() ? mirror.key_box : mirror.key_box | reachedBy(image, mirror.slope);
 #pragma omp parallel for schedule(static)
@@ -57,18 +58,18 @@ void FrameCompositor::mirrorAnew() {
       const cv::Vec3f &now = mirrored_.at<cv::Vec3f>(v, u),
                       &before = mirror.at_key.at<cv::Vec3f>(v, u);
       if (now == cv::Vec3f() && before == cv::Vec3f()) continue;
-      const bool changed =
-          strongest(now - before) > kNoChange * (strongest(linearPixel(frame_.bgr, u, v)) + kDark);
+      const bool changed = strongest(now - before) >
+                           kNoChange * (strongest(linearPixel(frame_.input.bgr, u, v)) + kDark);
       remirrored_.at<std::uint8_t>(v, u) = changed ? kChanged : 1;
     }
   }
-  if (!params_.matte.empty()) remirrored_.setTo(0, params_.matte > kInFront);
+  if (!frame_.params.matte.empty()) remirrored_.setTo(0, frame_.params.matte > kInFront);
 }
 
 cv::Vec3f FrameCompositor::unmirroredAt(int u, int v) const {
-  cv::Vec3f colour = linearPixel(frame_.bgr, u, v);
+  cv::Vec3f colour = linearPixel(frame_.input.bgr, u, v);
   if (mirrored_.empty() || remirrored_.at<std::uint8_t>(v, u) == 0) return colour;
-  colour -= prepared_.mirror.at_key.at<cv::Vec3f>(v, u);
+  colour -= frame_.prepared.mirror.at_key.at<cv::Vec3f>(v, u);
   return {std::max(0.0f, colour[0]), std::max(0.0f, colour[1]), std::max(0.0f, colour[2])};
 }
 
@@ -77,7 +78,7 @@ cv::Vec3f FrameCompositor::unmirroredAt(int u, int v) const {
 void FrameCompositor::addMirrored(int u, int v, Behind& behind) const {
   if (mirrored_.empty() || remirrored_.at<std::uint8_t>(v, u) == 0) return;
   if (behind.source == kOriginal && remirrored_.at<std::uint8_t>(v, u) != kChanged) {
-    behind.colour = linearPixel(frame_.bgr, u, v);
+    behind.colour = linearPixel(frame_.input.bgr, u, v);
     return;
   }
   const cv::Vec3f& now = mirrored_.at<cv::Vec3f>(v, u);

@@ -35,16 +35,17 @@ struct LightBox {
 }  // namespace
 
 void FrameCompositor::findShaded() {
-  may_be_shaded_.assign(actors_.size(), false);
+  may_be_shaded_.assign(frame_.objects.size(), false);
   std::vector<LightBox> boxes;
-  for (const Actor& actor : actors_) boxes.emplace_back(actor.vertices, light_.direction);
-  for (std::size_t other = 0; other < actors_.size(); ++other) {
-    const Surface& surface = *actors_[other].surface;
-    if (edited_[surface_of_slot_[other]] || !surface.in_video) continue;
-    for (std::size_t slot = 0; slot < actors_.size() && !may_be_shaded_[other]; ++slot) {
-      if (edited_[surface_of_slot_[slot]])
+  for (const StagedObject& object : frame_.objects)
+    boxes.emplace_back(object.actor.vertices, frame_.light.direction);
+  for (std::size_t other = 0; other < frame_.objects.size(); ++other) {
+    const Surface& surface = *frame_.objects[other].actor.surface;
+    if (frame_.objects[other].edited || !surface.in_video) continue;
+    for (std::size_t slot = 0; slot < frame_.objects.size() && !may_be_shaded_[other]; ++slot) {
+      if (frame_.objects[slot].edited)
         may_be_shaded_[other] =
-            boxes[slot].mayShade(boxes[other], static_cast<float>(params_.sun_radius));
+            boxes[slot].mayShade(boxes[other], static_cast<float>(frame_.params.sun_radius));
     }
     any_shaded_ = any_shaded_ || may_be_shaded_[other];
   }
@@ -53,7 +54,7 @@ void FrameCompositor::findShaded() {
 // The surface of an object that stays, seen at a pixel of its mask; the mask may reach beyond the
 // fitted surface.
 std::optional<SurfacePoint> FrameCompositor::otherAt(int u, int v) const {
-  const int label = labels_.at<std::uint8_t>(v, u);
+  const int label = frame_.labels.at<std::uint8_t>(v, u);
   for (int reach = 0; reach <= kRimReach; ++reach) {
     for (const cv::Point d : {cv::Point(0, 0), {1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
       const cv::Point at = cv::Point(u, v) + reach * d;
@@ -61,9 +62,9 @@ std::optional<SurfacePoint> FrameCompositor::otherAt(int u, int v) const {
       const std::uint32_t id = centre_->idAt(at.x, at.y);
       if (id == VisibilityBuffer::kNothing) continue;
       const int slot = VisibilityBuffer::objectOf(id);
-      if (!may_be_shaded_[slot] || actors_[slot].surface->index != label) continue;
-      return surfacePoint(actors_[slot], VisibilityBuffer::triangleOf(id), static_cast<float>(u),
-                          static_cast<float>(v), eye_);
+      if (!may_be_shaded_[slot] || frame_.objects[slot].actor.surface->index != label) continue;
+      return surfacePoint(frame_.objects[slot].actor, VisibilityBuffer::triangleOf(id),
+                          static_cast<float>(u), static_cast<float>(v), frame_.eye);
     }
   }
   return std::nullopt;
@@ -73,15 +74,15 @@ std::optional<SurfacePoint> FrameCompositor::otherAt(int u, int v) const {
 // video.
 void FrameCompositor::shadeOther(int u, int v, Behind& behind) const {
   const std::optional<SurfacePoint> p = otherAt(u, v);
-  if (!p || p->normal.dot(light_.direction) <= 0.0f) return;
+  if (!p || p->normal.dot(frame_.light.direction) <= 0.0f) return;
   const float now = moved_shadow_->visibility(p->position, p->normal);
   const float before =
       shadows_.originals ? shadows_.originals->visibility(p->position, p->normal) : 1.0f;
   if (before - now < kSameShadow) return;
   const float others = shadows_.others->visibility(p->position, p->normal);
   const cv::Vec3f back = cv::Vec3f::all(kThrownBack);
-  const cv::Vec3f lit = diffuseShading(light_, p->normal, others * before, p->seen, back);
-  const cv::Vec3f shaded = diffuseShading(light_, p->normal, others * now, p->seen, back);
+  const cv::Vec3f lit = diffuseShading(frame_.light, p->normal, others * before, p->seen, back);
+  const cv::Vec3f shaded = diffuseShading(frame_.light, p->normal, others * now, p->seen, back);
   for (int c = 0; c < 3; ++c)
     behind.colour[c] *= std::min(1.0f, shaded[c] / std::max(lit[c], 1e-4f));
   behind.source = kRendered;
@@ -89,19 +90,17 @@ void FrameCompositor::shadeOther(int u, int v, Behind& behind) const {
 
 // Where the depth image or the user's matte puts something before what is drawn, with a soft edge.
 void FrameCompositor::findScreened() {
-  if ((prepared_.scenery.empty() && params_.matte.empty()) ||
-      !sameView(frame_.camera, prepared_.camera))
+  if ((frame_.prepared.scenery.empty() && frame_.params.matte.empty()) || !frame_.at_key_camera)
     return;
-  screened_ = params_.matte.empty() ? cv::Mat::zeros(region_.size(), CV_8U)
-                                    : params_.matte(region_).clone();
-  if (prepared_.scenery.empty()) return;
-  const cv::Mat scenery = prepared_.scenery(region_);
+  screened_ = frame_.params.matte.empty() ? cv::Mat::zeros(region_.size(), CV_8U)
+                                          : frame_.params.matte(region_).clone();
+  if (frame_.prepared.scenery.empty()) return;
+  const cv::Mat scenery = frame_.prepared.scenery(region_);
   cv::Mat drawn = cv::Mat::zeros(region_.size(), CV_32F), hidden;
   for (int v = 0; v < region_.height; ++v) {
     const std::uint32_t* ids = centre_->ids(v);
     for (int u = 0; u < region_.width; ++u) {
-      const bool edited = ids[u] != VisibilityBuffer::kNothing &&
-                          edited_[surface_of_slot_[VisibilityBuffer::objectOf(ids[u])]];
+      const bool edited = ids[u] != VisibilityBuffer::kNothing && frame_.objectOf(ids[u]).edited;
       if (edited) drawn.at<float>(v, u) = centre_->nearness(v)[u];
     }
   }

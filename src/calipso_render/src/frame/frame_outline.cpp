@@ -52,8 +52,8 @@ cv::Vec3f blurredAt(const cv::Mat& bgr, int u, int v, const std::vector<float>& 
 // How much of its softness an outline lacks: none where the surface is where the video has it, as
 // what drawing misses of the video is carried over there.
 float FrameCompositor::lacksSoftness(std::uint32_t id, int u, int v) const {
-  if (observed_[VisibilityBuffer::objectOf(id)].points.empty()) return 1.0f;
-  const float moved = movement(id, static_cast<float>(u), static_cast<float>(v)).norm();
+  if (!frame_.objectOf(id).isAtRestInVideo()) return 1.0f;
+  const float moved = frame_.movement(id, static_cast<float>(u), static_cast<float>(v)).norm();
   return smoothStep(kStillPx, kNonePx, moved);
 }
 
@@ -76,8 +76,8 @@ cv::Mat FrameCompositor::findOutlines(int reach) const {
 }
 
 void FrameCompositor::softenOutlines(FrameOutput& out) const {
-  if (prepared_.outline_blur < kLeast) return;
-  const std::vector<float> parts = partsOf(prepared_.outline_blur);
+  if (frame_.prepared.outline_blur < kLeast) return;
+  const std::vector<float> parts = partsOf(frame_.prepared.outline_blur);
   const cv::Mat lacking = findOutlines(static_cast<int>(parts.size()) - 1);
   std::vector<std::vector<std::pair<int, cv::Vec3b>>> softened(region_.height);
 #pragma omp parallel for schedule(dynamic, 8)

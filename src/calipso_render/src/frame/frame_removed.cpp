@@ -48,25 +48,26 @@ void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) 
 
 // PlateInView::quiet
 cv::Mat FrameCompositor::quietPlaces() const {
-  cv::Mat at_key = (prepared_.background.count > 0) & (prepared_.background.spread < kQuiet);
-  if (prepared_.background.drifting.established())
-    at_key.setTo(0, prepared_.background.drifting.where());
-  if (!prepared_.scenery.empty() && !prepared_.nearness.empty())
-    at_key.setTo(0, prepared_.nearness == 0.0f);
-  if (view_from_key_.empty()) return at_key;
+  cv::Mat at_key =
+      (frame_.prepared.background.count > 0) & (frame_.prepared.background.spread < kQuiet);
+  if (frame_.prepared.background.drifting.established())
+    at_key.setTo(0, frame_.prepared.background.drifting.where());
+  if (!frame_.prepared.scenery.empty() && !frame_.prepared.nearness.empty())
+    at_key.setTo(0, frame_.prepared.nearness == 0.0f);
+  if (place_.from_key.empty()) return at_key;
   cv::Mat here;
-  cv::remap(at_key, here, view_from_key_, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
+  cv::remap(at_key, here, place_.from_key, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
             cv::Scalar(0));
   return here;
 }
 
 PlateInView FrameCompositor::plateInView() const {
-  const bool same_view = sameView(frame_.camera, prepared_.camera);
+  const bool same_view = frame_.at_key_camera;
   PlateInView plate;
   if (same_view)
-    prepared_.background.plate.convertTo(plate.codes, CV_8U);
+    frame_.prepared.background.plate.convertTo(plate.codes, CV_8U);
   else
-    plate.codes = codeFromLinear(plate_);
+    plate.codes = codeFromLinear(place_.plate);
   cv::cvtColor(plate.codes, plate.darker, cv::COLOR_BGR2GRAY);
   cv::blur(plate.darker, plate.darker, {5, 5});
   plate.darker.convertTo(plate.darker, CV_8U, same_view ? kDarker : kDarkerElsewhere);
@@ -74,25 +75,17 @@ PlateInView FrameCompositor::plateInView() const {
   return plate;
 }
 
-// Whether any edited object moves in the video.
-bool FrameCompositor::movesInVideo() const {
-  for (std::size_t i = 0; i < edited_.size(); ++i) {
-    if (edited_[i] && prepared_.moves[i] && prepared_.surfaces[i].in_video) return true;
-  }
-  return false;
-}
-
 // The shadow of an object that moves in the video shows as darkening against the plate.
 void FrameCompositor::findPassingShadows() {
-  if (!movesInVideo()) return;
-  const bool same_view = sameView(frame_.camera, prepared_.camera);
+  if (!frame_.movesInVideo()) return;
+  const bool same_view = frame_.at_key_camera;
   if (same_view && shadows_.plate.codes.empty()) shadows_.plate = plateInView();
   const PlateInView plate = same_view ? shadows_.plate : plateInView();
   cv::Mat now;
   cv::cvtColor(unmirrored_, now, cv::COLOR_BGR2GRAY);
   cv::blur(now, now, {5, 5});
   passing_ = now < plate.darker;
-  passing_ &= plate.quiet & (labels_ == 0);
+  passing_ &= plate.quiet & (frame_.labels == 0);
   keepDarkenedAlike(unmirrored_, plate.codes, passing_);
   cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN,
                    cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));
@@ -105,19 +98,19 @@ void FrameCompositor::findPassingShadows() {
   }
   cv::dilate(passing_, passing_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {13, 13}));
   // The rim that the mask of another moving object has missed is no shadow.
-  for (std::size_t i = 0; i < edited_.size(); ++i) {
-    if (edited_[i] || !prepared_.moves[i]) continue;
+  for (std::size_t i = 0; i < frame_.edited.size(); ++i) {
+    if (frame_.edited[i] || !frame_.prepared.moves[i]) continue;
     cv::Mat near;
-    cv::dilate(labels_ == prepared_.surfaces[i].index, near,
-               disc(std::max(2, labels_.cols / kRimShare)));
+    cv::dilate(frame_.labels == frame_.prepared.surfaces[i].index, near,
+               disc(std::max(2, frame_.labels.cols / kRimShare)));
     passing_.setTo(0, near);
   }
 }
 
 // The pixels of region_ that show an object in the video.
 cv::Mat FrameCompositor::originalOf(int surface) const {
-  cv::Mat original = labels_(region_) == prepared_.surfaces[surface].index;
-  if (!footprints_[surface].empty()) original |= footprints_[surface](region_);
+  cv::Mat original = frame_.labels(region_) == frame_.prepared.surfaces[surface].index;
+  if (!place_.footprints[surface].empty()) original |= place_.footprints[surface](region_);
   return original;
 }
 
@@ -126,15 +119,15 @@ cv::Mat FrameCompositor::originalOf(int surface) const {
 CALIPSO_WIDE_LOOPS void FrameCompositor::findShown(int v, const cv::Rect& box, std::uint8_t* own,
                                                    std::uint8_t* others) const {
   const int width = box.width;
-  const std::uint8_t* labels = labels_.ptr<std::uint8_t>(v) + box.x;
+  const std::uint8_t* labels = frame_.labels.ptr<std::uint8_t>(v) + box.x;
   for (int u = 0; u < width; ++u) own[u] = 0, others[u] = labels[u] != 0 ? 255 : 0;
-  for (std::size_t i = 0; i < edited_.size(); ++i) {
-    if (!edited_[i] || !prepared_.surfaces[i].in_video) continue;
-    const std::uint8_t index = static_cast<std::uint8_t>(prepared_.surfaces[i].index);
+  for (std::size_t i = 0; i < frame_.edited.size(); ++i) {
+    if (!frame_.edited[i] || !frame_.prepared.surfaces[i].in_video) continue;
+    const std::uint8_t index = static_cast<std::uint8_t>(frame_.prepared.surfaces[i].index);
     for (int u = 0; u < width; ++u)
       own[u] |= labels[u] == index ? 255 : 0, others[u] &= labels[u] == index ? 0 : 255;
-    if (footprints_[i].empty()) continue;
-    const std::uint8_t* footprint = footprints_[i].ptr<std::uint8_t>(v) + box.x;
+    if (place_.footprints[i].empty()) continue;
+    const std::uint8_t* footprint = place_.footprints[i].ptr<std::uint8_t>(v) + box.x;
     for (int u = 0; u < width; ++u) own[u] |= footprint[u];
   }
 }
@@ -145,7 +138,7 @@ void FrameCompositor::findOwn(const cv::Rect& box) {
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < box.height; ++v)
     findShown(v + box.y, box, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
-  const int margin = params_.background.mask_margin_px;
+  const int margin = frame_.params.background.mask_margin_px;
   filterTiles(own, margin, here, DiscDilation(margin));
   if (!passing_.empty()) here |= passing_(box);
 #pragma omp parallel for schedule(static)
@@ -160,11 +153,11 @@ void FrameCompositor::findRemoved() {
   removed_ = cv::Mat::zeros(region_.size(), CV_8U);
   const cv::Rect box = passing_.empty() ? shown_box_ : region_;
   if (!box.empty()) findOwn(box);
-  for (const cv::Mat& front : fronts_) {
+  for (const cv::Mat& front : place_.fronts) {
     if (!front.empty()) removed_.setTo(0, front(region_));
   }
-  if (!params_.matte.empty() && sameView(frame_.camera, prepared_.camera))
-    removed_.setTo(0, params_.matte(region_) > kInFront);
+  if (!frame_.params.matte.empty() && frame_.at_key_camera)
+    removed_.setTo(0, frame_.params.matte(region_) > kInFront);
 }
 
 }  // namespace calipso::render

@@ -103,8 +103,7 @@ void FrameCompositor::recordOwners(RestPicture& picture) const {
     for (int u = 0; u < r.width; ++u) {
       const std::uint32_t id = centre_->ids(v)[u];
       if (id != VisibilityBuffer::kNothing)
-        owners.at<short>(v, u) =
-            static_cast<short>(surface_of_slot_[VisibilityBuffer::objectOf(id)]);
+        owners.at<short>(v, u) = static_cast<short>(frame_.objectOf(id).surface);
     }
   }
   const Nearest nearest = nearestWhere(owners >= 0);
@@ -140,12 +139,13 @@ void FrameCompositor::recordRow(int v, Row& row, RestPicture& picture) const {
 }
 
 void FrameCompositor::findResidual() {
-  if (!params_.carry_residual || !sameView(frame_.camera, prepared_.camera)) return;
-  const auto seen = [](const ScreenMesh& m) { return !m.points.empty(); };
-  if (std::none_of(observed_.begin(), observed_.end(), seen)) return;
-  std::vector<bool> resting(edited_.size());
-  for (std::size_t i = 0; i < edited_.size(); ++i) resting[i] = edited_[i] && at_rest_[i];
-  if (rest_.edited != resting) rest_ = restPicture(prepared_, params_, resting);
+  if (!frame_.params.carry_residual || !frame_.at_key_camera) return;
+  const auto rests = [](const StagedObject& o) { return o.isAtRestInVideo(); };
+  if (std::none_of(frame_.objects.begin(), frame_.objects.end(), rests)) return;
+  std::vector<bool> resting(frame_.edited.size());
+  for (std::size_t i = 0; i < frame_.edited.size(); ++i)
+    resting[i] = frame_.edited[i] && frame_.at_rest[i];
+  if (rest_.edited != resting) rest_ = restPicture(frame_.prepared, frame_.params, resting);
   const cv::Rect carried = carriedBox();
   if (carried.empty()) return;
   findMiss(carried);
@@ -156,10 +156,11 @@ void FrameCompositor::findResidual() {
 // surroundings.
 cv::Rect FrameCompositor::carriedBox() const {
   cv::Rect carried;
-  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
-    if (observed_[slot].points.empty()) continue;
-    const Points &now = actors_[slot].screen.points, &then = observed_[slot].points;
-    const Triangles& triangles = actors_[slot].surface->triangles;
+  for (std::size_t slot = 0; slot < frame_.objects.size(); ++slot) {
+    if (!frame_.objects[slot].isAtRestInVideo()) continue;
+    const Points &now = frame_.objects[slot].actor.screen.points,
+                 &then = frame_.objects[slot].observed.points;
+    const Triangles& triangles = frame_.objects[slot].actor.surface->triangles;
     float left = 1e9f, top = 1e9f, right = -1e9f, bottom = -1e9f;
 #pragma omp parallel for schedule(static) reduction(min : left, top) reduction(max : right, bottom)
     for (std::size_t k = 0; k < triangles.size(); ++k) {
@@ -189,12 +190,12 @@ void FrameCompositor::findMiss(const cv::Rect& carried) {
 #pragma omp parallel for schedule(static)
   for (int j = 0; j < box.height; ++j) {
     const int v = box.y + j;
-    const cv::Vec3b* codes = frame_.bgr.ptr<cv::Vec3b>(v) + box.x;
+    const cv::Vec3b* codes = frame_.input.bgr.ptr<cv::Vec3b>(v) + box.x;
     const cv::Vec3f *drawn = rest_.drawn.ptr<cv::Vec3f>(v) + box.x,
                     *passing = rest_.passing.ptr<cv::Vec3f>(v) + box.x;
     cv::Vec4f* miss = miss_.ptr<cv::Vec4f>(j);
     for (int i = 0; i < box.width; ++i) {
-      if (drawn[i][0] < 0.0f || isElsewhere(box.x + i, v)) {
+      if (drawn[i][0] < 0.0f || frame_.isElsewhere(box.x + i, v)) {
         miss[i] = {};
         continue;
       }
@@ -212,8 +213,7 @@ void FrameCompositor::findMiss(const cv::Rect& carried) {
 void FrameCompositor::findRims(const cv::Rect& carried) {
   const cv::Rect box = carried - region_.tl();
   const auto isDrawnAtRest = [&](std::uint32_t id) {
-    return id != VisibilityBuffer::kNothing &&
-           !observed_[VisibilityBuffer::objectOf(id)].points.empty();
+    return id != VisibilityBuffer::kNothing && frame_.objectOf(id).isAtRestInVideo();
   };
   cv::Mat index(region_.size(), CV_32S, cv::Scalar(-1));
   for (int v = 0; v < region_.height; ++v) {
@@ -256,18 +256,18 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
     const std::uint32_t id = centre_->ids(rim.nearest.y)[rim.nearest.x];
     const cv::Point from = rim.nearest + region_.tl();
     const Eigen::Vector2f moved =
-        movement(id, static_cast<float>(from.x), static_cast<float>(from.y));
+        frame_.movement(id, static_cast<float>(from.x), static_cast<float>(from.y));
     // Where a surface that moves has turned away from, its rim has not come to.
     const cv::Point away = rim.nearest - cv::Point(rim.u, rim.v);
-    const float reach = params_.background.mask_margin_px + kNonePx;
+    const float reach = frame_.params.background.mask_margin_px + kNonePx;
     if (away.dot(away) > reach * reach && moved.norm() > kStillPx) continue;
     cv::Vec4f colour = row.at(rim.u);
     const cv::Vec3f plain(colour[0], colour[1], colour[2]);
-    addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved,
-                surface_of_slot_[VisibilityBuffer::objectOf(id)], cv::Vec3f::all(1), colour);
+    addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved, frame_.objectOf(id).surface,
+                cv::Vec3f::all(1), colour);
     // Beside a surface of a new look the video has the old one's hue.
-    const bool repainted = away.dot(away) <= kRepaintReach * kRepaintReach &&
-                           lookOf(VisibilityBuffer::objectOf(id)).changes();
+    const bool repainted =
+        away.dot(away) <= kRepaintReach * kRepaintReach && frame_.objectOf(id).look.changes();
     const float brighter =
         luminance({colour[0], colour[1], colour[2]}) / std::max(luminance(plain), kDark);
     for (int c = 0; repainted && c < 3; ++c) colour[c] = plain[c] * brighter;
@@ -280,7 +280,7 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
 void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved, int owner,
                                   const cv::Vec3f& tint, cv::Vec4f& colour) const {
   const float squared = moved.squaredNorm();
-  const bool sways = prepared_.sways[owner];
+  const bool sways = frame_.prepared.sways[owner];
   const float none = sways ? kNoneSwaying : kNonePx;
   if (squared >= none * none) return;
   const float part = 1.0f - smoothStep(sways ? kWholeSwaying : kWholePx, none, std::sqrt(squared));

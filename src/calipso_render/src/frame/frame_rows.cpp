@@ -94,7 +94,7 @@ CALIPSO_WIDE_LOOPS void FrameCompositor::findBehind(int j, int begin, int end, K
   const auto rowOf = [j](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j); };
   const std::uint8_t *sun = rowOf(sun_now_), *sun_before = rowOf(sun_before_),
                      *sky = rowOf(sky_now_), *sky_before = rowOf(sky_before_);
-  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(j + region_.y) + region_.x,
+  const std::uint8_t *labels = frame_.labels.ptr<std::uint8_t>(j + region_.y) + region_.x,
                      *takes = rowOf(takes_light_), *removed = rowOf(removed_),
                      *relit = rowOf(relit_);
   std::uint8_t* out = reinterpret_cast<std::uint8_t*>(kinds);
@@ -115,7 +115,7 @@ CALIPSO_WIDE_LOOPS void FrameCompositor::findBehind(int j, int begin, int end, K
 // What has to be done for every pixel of row v.
 CALIPSO_WIDE_LOOPS void FrameCompositor::findKinds(int v, Row& row) const {
   const int j = v - region_.y, width = region_.width;
-  const std::uint8_t *labels = labels_.ptr<std::uint8_t>(v) + region_.x,
+  const std::uint8_t *labels = frame_.labels.ptr<std::uint8_t>(v) + region_.x,
                      *drawn = drawn_.ptr<std::uint8_t>(j), *removed = removed_.ptr<std::uint8_t>(j);
   const std::uint32_t* ids = centre_->ids(j);
   Kind* kinds = row.kinds.data();
@@ -163,13 +163,14 @@ void FrameCompositor::composeBehind(int v, int first, int last, Row& row) const 
   const int j = v - region_.y;
   for (int i = first; i < last; i += LightFactors::kMost)
     composeRelit(v, i, std::min(last, i + LightFactors::kMost), row);
-  if (remirrored_.empty() && live_ == nullptr) return;
+  if (remirrored_.empty() && place_.live == nullptr) return;
   const std::uint8_t *mirrored = remirrored_.empty() ? nullptr
                                                      : remirrored_.ptr<std::uint8_t>(v) + region_.x,
-                     *invented = invented_.ptr<std::uint8_t>(v) + region_.x,
+                     *invented = place_.invented.ptr<std::uint8_t>(v) + region_.x,
                      *removed = removed_.ptr<std::uint8_t>(j), *relit = relit_.ptr<std::uint8_t>(j);
   for (int i = first; i < last; ++i) {
-    const bool filled_live = live_ != nullptr && invented[i] != 0 && (removed[i] | relit[i]) != 0;
+    const bool filled_live =
+        place_.live != nullptr && invented[i] != 0 && (removed[i] | relit[i]) != 0;
     if (!filled_live && (mirrored == nullptr || mirrored[i] == 0)) continue;
     const Behind behind = groundAt(i + region_.x, v, removed[i] != 0);
     row.set(i, {behind.colour[0], behind.colour[1], behind.colour[2], behind.fresh});
@@ -185,12 +186,12 @@ void FrameCompositor::composeRelit(int v, int first, int last, Row& row) const {
   LightFactors factors;
   findLightFactors({rowOf(sun_now_), rowOf(sun_before_), rowOf(sky_now_), rowOf(sky_before_),
                     rowOf(takes_light_), rowOf(removed_), rowOf(relit_)},
-                   prepared_.umbra, count, factors);
+                   frame_.prepared.umbra, count, factors);
   const int u = first + region_.x;
-  const std::uint8_t* invented = invented_.ptr<std::uint8_t>(v) + u;
-  const cv::Vec3f* plate = plate_.ptr<cv::Vec3f>(v) + u;
-  const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + u;
-  prefetchRow(plate_, v + 1, u, count);
+  const std::uint8_t* invented = place_.invented.ptr<std::uint8_t>(v) + u;
+  const cv::Vec3f* plate = place_.plate.ptr<cv::Vec3f>(v) + u;
+  const cv::Vec3b* frame = frame_.input.bgr.ptr<cv::Vec3b>(v) + u;
+  prefetchRow(place_.plate, v + 1, u, count);
   relight(factors, plate, frame, count,
           {&row.colour[0][first], &row.colour[1][first], &row.colour[2][first]});
   std::copy_n(factors.from_plate, count, &row.colour[3][first]);
@@ -210,9 +211,12 @@ void FrameCompositor::composeSpecial(int u, int v, Row& row) const {
   const std::uint32_t id = centre_->idAt(u, v);
   if (miss_.empty() || pixel.source == kOriginal || id == VisibilityBuffer::kNothing) return;
   const int slot = VisibilityBuffer::objectOf(id);
-  if (observed_[slot].points.empty() || lookOf(slot).albedo || screenAt(u, v) > 0.0f) return;
-  const Eigen::Vector2f moved = movement(id, static_cast<float>(u), static_cast<float>(v));
-  addResidual(u - moved.x(), v - moved.y(), moved, surface_of_slot_[slot], tintOf(slot), out);
+  if (!frame_.objects[slot].isAtRestInVideo() || frame_.objects[slot].look.albedo ||
+      screenAt(u, v) > 0.0f)
+    return;
+  const Eigen::Vector2f moved = frame_.movement(id, static_cast<float>(u), static_cast<float>(v));
+  addResidual(u - moved.x(), v - moved.y(), moved, frame_.objects[slot].surface,
+              frame_.objects[slot].tint(), out);
   row.set(i, out);
 }
 
@@ -249,7 +253,7 @@ void FrameCompositor::keepStill(int v, Row& row) const {
   const int j = v - region_.y;
   const std::uint8_t* removed = removed_.ptr<std::uint8_t>(j);
   const float* still = still_.ptr<float>(j);
-  const cv::Vec3b* frame = frame_.bgr.ptr<cv::Vec3b>(v) + region_.x;
+  const cv::Vec3b* frame = frame_.input.bgr.ptr<cv::Vec3b>(v) + region_.x;
   for (int i = 0; i < region_.width; ++i) {
     if (still[i] == 0.0f || row.source[i] == kOriginal ||
         (removed[i] == 0 && row.source[i] != kRendered))

@@ -25,28 +25,23 @@ int toMultiple(int pixel, int step) { return pixel / step * step; }
 
 }  // namespace
 
-const Look& FrameCompositor::lookOf(int slot) const {
-  static const Look as_it_is;
-  const ObjectInFrame* state = states_[surface_of_slot_[slot]];
-  return state != nullptr ? state->look : as_it_is;
-}
-
 // Light and look of every slot, laid out for the shading of many points.
 void FrameCompositor::shadeSetup() {
-  for (std::size_t slot = 0; slot < actors_.size(); ++slot) {
-    const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
+  for (std::size_t slot = 0; slot < frame_.objects.size(); ++slot) {
+    const Appearance& appearance = frame_.prepared.appearances[frame_.objects[slot].surface];
     SurfaceShade s;
-    Eigen::Map<Eigen::Vector3f>(s.direction) = light_.direction;
-    copyTo(s.sun, light_.sun), copyTo(s.least, 0.02f * light_.ambient[0]);
+    Eigen::Map<Eigen::Vector3f>(s.direction) = frame_.light.direction;
+    copyTo(s.sun, frame_.light.sun), copyTo(s.least, 0.02f * frame_.light.ambient[0]);
     s.terms = 1;
     for (int i = 0; i < 9; ++i) {
-      copyTo(s.ambient[i], light_.ambient[i]);
-      if (light_.ambient[i] != cv::Vec3f()) s.terms = i == 0 ? 1 : i < 4 ? 4 : 9;
+      copyTo(s.ambient[i], frame_.light.ambient[i]);
+      if (frame_.light.ambient[i] != cv::Vec3f()) s.terms = i == 0 ? 1 : i < 4 ? 4 : 9;
     }
     copyTo(s.floor, lightFloor(appearance.mean_light));
-    copyTo(s.tint, tintOf(static_cast<int>(slot)));
-    s.specular = glosses_[slot].specular, s.roughness = glosses_[slot].roughness;
-    s.around = glosses_[slot].around;
+    copyTo(s.tint, frame_.objects[slot].tint());
+    s.specular = frame_.objects[slot].gloss.specular,
+    s.roughness = frame_.objects[slot].gloss.roughness;
+    s.around = frame_.objects[slot].gloss.around;
     shades_.push_back(s);
   }
 }
@@ -72,8 +67,9 @@ void FrameCompositor::sunOnPlaces(const int* places, int count, const float* nea
     const Eigen::Vector3f n(run.normal[0][i], run.normal[1][i], run.normal[2][i]),
         sight(run.sight[0][i], run.sight[1][i], run.sight[2][i]);
     run.sun[i] = 0.0f;
-    if (n.dot(light_.direction) <= 0.0f) continue;
-    numbers[facing.add(eye_ + sight * (nearness != nullptr ? 1.0f / nearness[i] : 1.0f), n)] = i;
+    if (n.dot(frame_.light.direction) <= 0.0f) continue;
+    numbers[facing.add(frame_.eye + sight * (nearness != nullptr ? 1.0f / nearness[i] : 1.0f), n)] =
+        i;
   }
   float sun[LightBatch::kMost];
   sunOn(facing, sun);
@@ -155,7 +151,7 @@ void FrameCompositor::lookUp(int v, CornerRun& wanted, SunCorner* corners) const
   for (int k = 0; k < wanted.count; ++k)
     places[k] = k, nearness[k] = corners[wanted.corners[k]].nearness;
   kernels().locate(maps_[wanted.slot].triangles(), wanted.ids, {v, wanted.count, 0, cv::Point()},
-                   place_view_.planes().sightLines(v), wanted.run);
+                   place_.view.planes().sightLines(v), wanted.run);
   sunOnPlaces(places, wanted.count, nearness, wanted.run);
   for (int k = 0; k < wanted.count; ++k) corners[wanted.corners[k]].sun = wanted.run.sun[k];
   wanted.count = 0;
@@ -187,7 +183,7 @@ std::optional<float> FrameCompositor::sunBetween(float u, float v, float nearnes
                 below = b->*value + fx * (b[1].*value - b->*value);
     return above + fy * (below - above);
   };
-  const float tolerance = kLightStep / static_cast<float>(frame_.camera.fx);
+  const float tolerance = kLightStep / static_cast<float>(frame_.input.camera.fx);
   if (!(std::abs(nearness - between(&SunCorner::nearness)) <= tolerance * nearness))
     return std::nullopt;
   return between(&SunCorner::sun);
@@ -200,7 +196,7 @@ bool FrameCompositor::isSmooth(int i, int j, int size) const {
   const int down = size * sun_columns_;
   const SunCorner &a = first[0], &b = first[size], &c = first[down], &d = first[down + size];
   if (a.slot < 0 || a.slot != b.slot || a.slot != c.slot || a.slot != d.slot) return false;
-  if (std::abs(a.nearness + d.nearness - b.nearness - c.nearness) * frame_.camera.fx >
+  if (std::abs(a.nearness + d.nearness - b.nearness - c.nearness) * frame_.input.camera.fx >
       kLightStep * a.nearness)
     return false;
   auto [low, high] = std::minmax({a.sun, b.sun, c.sun, d.sun});
@@ -215,13 +211,13 @@ bool FrameCompositor::isSmooth(int i, int j, int size) const {
 void FrameCompositor::reflectStretch(unsigned traits, int v, int first, int last, int slot,
                                      Row& row) const {
   const int offset = (first + region_.x) % kLightStep;
-  const std::optional<cv::Vec3f>& albedo = lookOf(slot).albedo;
+  const std::optional<cv::Vec3f>& albedo = frame_.objects[slot].look.albedo;
   SurfaceRun& run = row.run;
   if (albedo) {
     for (int c = 0; c < 3; ++c) std::fill_n(&run.colour[c][offset], last - first, (*albedo)[c]);
     return;
   }
-  const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
+  const Appearance& appearance = frame_.prepared.appearances[frame_.objects[slot].surface];
   if ((traits & TriangleMap::kPictured) != 0)
     kernels().sample(appearance.albedo, offset, offset + last - first, run);
   if ((traits & TriangleMap::kTextured) != 0) addTexture(v, first, last, slot, row);
@@ -229,15 +225,16 @@ void FrameCompositor::reflectStretch(unsigned traits, int v, int first, int last
 
 // What the texture says of their reflectance.
 void FrameCompositor::addTexture(int v, int first, int last, int slot, Row& row) const {
-  const SurfaceTexture& texture = prepared_.appearances[surface_of_slot_[slot]].texture;
+  const SurfaceTexture& texture = frame_.prepared.appearances[frame_.objects[slot].surface].texture;
   const int offset = (first + region_.x) % kLightStep;
   const std::uint32_t* ids = centre_->ids(v - region_.y);
   for (int i = first; i < last; ++i) {
     const int triangle = VisibilityBuffer::triangleOf(ids[i]);
     const TriangleMap& map = maps_[slot].of(triangle);
     if (!map.is(TriangleMap::kTextured) || map.is(TriangleMap::kThin)) continue;
-    const Eigen::Vector3f weights = barycentric(
-        actors_[slot].screen, triangle, static_cast<float>(i + region_.x), static_cast<float>(v));
+    const Eigen::Vector3f weights =
+        barycentric(frame_.objects[slot].actor.screen, triangle, static_cast<float>(i + region_.x),
+                    static_cast<float>(v));
     row.run.mix(offset + i - first, texture.at(triangle, weights), map.is(TriangleMap::kPictured));
   }
 }
@@ -247,7 +244,7 @@ void FrameCompositor::sunOnStretch(int v, int first, int last, int slot, Row& ro
   const int offset = (first + region_.x) % kLightStep, base = first - offset;
   const int j = (v - sun_origin_.y) / kLightStep;
   const float down = static_cast<float>((v - sun_origin_.y) % kLightStep) / kLightStep,
-              tolerance = kLightStep / static_cast<float>(frame_.camera.fx);
+              tolerance = kLightStep / static_cast<float>(frame_.input.camera.fx);
   const float* nearness = centre_->nearness(v - region_.y);
   SurfaceRun& run = row.run;
   float near[SurfaceRun::kRoom] = {};
@@ -291,8 +288,8 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
             static_cast<float>(first + region_.x));
   const unsigned traits = kernels().locate(
       maps_[slot].triangles(), ids + first,
-      {v, count, offset, prepared_.appearances[surface_of_slot_[slot]].region.tl()},
-      place_view_.planes().sightLines(v), run);
+      {v, count, offset, frame_.prepared.appearances[frame_.objects[slot].surface].region.tl()},
+      place_.view.planes().sightLines(v), run);
   reflectStretch(traits, v, first, last, slot, row);
   sunOnStretch(v, first, last, slot, row);
   kernels().shade(shades_[slot], offset, offset + count, run);
@@ -315,9 +312,10 @@ void FrameCompositor::drawStretch(int v, int first, int last, int slot, Row& row
 
 // What drawing misses of the video goes along with pixels that have moved little.
 void FrameCompositor::carryResidual(int v, int first, int last, int slot, Row& row) const {
-  if (miss_.empty() || observed_[slot].points.empty() || lookOf(slot).albedo) return;
-  const int surface = surface_of_slot_[slot], offset = (first + region_.x) % kLightStep;
-  const cv::Point corner = prepared_.appearances[surface].region.tl();
+  if (miss_.empty() || !frame_.objects[slot].isAtRestInVideo() || frame_.objects[slot].look.albedo)
+    return;
+  const int surface = frame_.objects[slot].surface, offset = (first + region_.x) % kLightStep;
+  const cv::Point corner = frame_.prepared.appearances[surface].region.tl();
   for (int i = first; i < last; ++i) {
     const float u = static_cast<float>(i + region_.x),
                 from_u = row.run.key_u[offset + i - first] + static_cast<float>(corner.x),
@@ -325,7 +323,7 @@ void FrameCompositor::carryResidual(int v, int first, int last, int slot, Row& r
     const Eigen::Vector2f moved(u - from_u, static_cast<float>(v) - from_v);
     if (!(moved.squaredNorm() < kNonePx * kNonePx)) continue;
     cv::Vec4f colour = row.at(i);
-    addResidual(from_u, from_v, moved, surface, tintOf(slot), colour);
+    addResidual(from_u, from_v, moved, surface, frame_.objects[slot].tint(), colour);
     row.set(i, colour);
   }
 }
@@ -334,12 +332,12 @@ void FrameCompositor::carryResidual(int v, int first, int last, int slot, Row& r
 // @param count at most SurfaceRun::kMost
 void FrameCompositor::shadePlaces(const SurfacePlace* places, int count, int slot,
                                   SurfaceRun& run) const {
-  const Appearance& appearance = prepared_.appearances[surface_of_slot_[slot]];
+  const Appearance& appearance = frame_.prepared.appearances[frame_.objects[slot].surface];
   Eigen::Vector3f weights[SurfaceRun::kMost];
   maps_[slot].locate(places, count, run, weights);
-  const std::optional<cv::Vec3f>& albedo = lookOf(slot).albedo;
+  const std::optional<cv::Vec3f>& albedo = frame_.objects[slot].look.albedo;
   if (!albedo) kernels().sample(appearance.albedo, 0, count, run);
-  const Eigen::Vector3f axis = frame_.camera.world_from_camera.linear().col(2).cast<float>();
+  const Eigen::Vector3f axis = frame_.input.camera.world_from_camera.linear().col(2).cast<float>();
   int uneven[SurfaceRun::kMost], found = 0;
   for (int k = 0; k < count; ++k) {
     const int triangle = VisibilityBuffer::triangleOf(places[k].id);

@@ -1,0 +1,65 @@
+#include "frame/seen_place.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include "place/key_cover.hpp"
+#include "place/place_depth.hpp"
+#include "place/view_warp.hpp"
+
+namespace calipso::render {
+
+SeenPlace::SeenPlace(const StagedFrame& frame)
+    : plate(frame.prepared.plate_linear),
+      invented(frame.prepared.background.invented),
+      view(PlaneView(frame.params.planes, frame.input.camera)),
+      fronts(frame.prepared.surfaces.size()),
+      footprints(frame.prepared.surfaces.size()) {
+  driftTo(frame);
+  if (frame.at_key_camera)
+    takeKeyView(frame);
+  else
+    warp(frame);
+}
+
+void SeenPlace::driftTo(const StagedFrame& frame) {
+  const DriftingBackground& drifting = frame.prepared.background.drifting;
+  if (const auto shift = drifting.shiftAt(frame.input.stamp_ns)) {
+    plate = plate.clone(), invented = invented.clone();
+    drifting.draw(*shift, plate, invented);
+    if (frame.at_key_camera) {
+      const int margin = frame.params.background.mask_margin_px;
+      drifting.matchTo(frame.input.bgr, grown(frame.labels != 0, margin), plate);
+    }
+    drifts = drifting.where();
+  } else if (drifting.established()) {
+    // Where it has drifted to is not known: what comes to light is filled from the frame at hand.
+    invented = invented | drifting.where();
+  }
+}
+
+void SeenPlace::takeKeyView(const StagedFrame& frame) {
+  const Prepared& prepared = frame.prepared;
+  live = prepared.background.live.empty() ? nullptr : &prepared.background.live;
+  shadowless = prepared.shadowless;
+  view = PlaceView(view.planes(), prepared.relief);
+  for (std::size_t i = 0; i < fronts.size(); ++i) {
+    if (prepared.fronts[i].empty() || (prepared.moves[i] && !frame.at_rest[i])) continue;
+    fronts[i] = frame.elsewhere.empty() ? prepared.fronts[i]
+                                        : cv::Mat(prepared.fronts[i] & ~frame.elsewhere);
+  }
+  footprints = prepared.footprints;
+}
+
+void SeenPlace::warp(const StagedFrame& frame) {
+  const Prepared& prepared = frame.prepared;
+  const Camera &key = prepared.camera, &here = frame.input.camera;
+  from_key = viewWarp(nearnessFrom(prepared.nearness, key, here), key, here);
+  cv::Mat there = plate, invented_there = invented;
+  plate = invented = cv::Mat();
+  cv::remap(there, plate, from_key, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  cv::remap(invented_there, invented, from_key, cv::noArray(), cv::INTER_NEAREST,
+            cv::BORDER_CONSTANT, cv::Scalar(255));
+  view = PlaceView(view.planes(), warped(prepared.relief, from_key));
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,185 @@
+#include "frame/staged_frame.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+#include "place/view_warp.hpp"
+#include "smooth_step.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr int kRestReach = 2;  // px: what lies that near to a change may take part in it
+constexpr int kSameCodes = 8;  // code values, mean over 3 x 3 pixels, that noise may make
+// part of an object's mask that lies within its outline if that is right
+constexpr float kSeenWithin = 0.8f;
+
+Light lightOf(const Prepared& prepared, const SunChange& sun) {
+  Light light = prepared.light.light;
+  if (sun.direction) light.direction = sun.direction->normalized();
+  light.sun *= sun.factor;
+  return light;
+}
+
+Gloss glossOf(const Gloss& own, const Look& look) {
+  return {look.specular.value_or(own.specular), look.roughness.value_or(own.roughness),
+          look.specular.value_or(own.around)};
+}
+
+// @return per surface; nullptr: as in the video, at rest
+std::vector<const ObjectInFrame*> statesOf(const std::vector<Surface>& surfaces,
+                                           const std::vector<ObjectInFrame>& objects) {
+  std::vector<const ObjectInFrame*> states(surfaces.size(), nullptr);
+  for (const ObjectInFrame& o : objects) {
+    const auto it = std::find_if(surfaces.begin(), surfaces.end(),
+                                 [&](const Surface& s) { return s.name == o.name; });
+    if (it == surfaces.end())
+      throw std::invalid_argument("state names object '" + o.name + "', which has no model");
+    states[it - surfaces.begin()] = &o;
+  }
+  return states;
+}
+
+// Where the frame differs from the key frame around what either shows of an object. CV_8UC1
+cv::Mat differenceFromKey(const StagedFrame& frame, cv::Rect box) {
+  box = cv::Rect(box.x - kRestReach, box.y - kRestReach, box.width + 2 * kRestReach,
+                 box.height + 2 * kRestReach) &
+        frame.whole();
+  cv::Mat picture, key_picture, different;
+  cv::blur(frame.input.bgr(box), picture, {3, 3});
+  cv::blur(frame.prepared.key_picture(box), key_picture, {3, 3});
+  cv::absdiff(picture, key_picture, picture);
+  cv::inRange(picture, cv::Scalar(), cv::Scalar::all(kSameCodes), different);
+  cv::bitwise_not(different, different);
+  cv::morphologyEx(different, different, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  cv::Mat whole = cv::Mat::zeros(frame.labels.size(), CV_8U);
+  const int side = 2 * kRestReach + 1;
+  cv::dilate(different, whole(box), cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+  return whole;
+}
+
+// Whether the video has an object, or a part of one that moves or sways, where the key frame has
+// it. Adds to frame.elsewhere where not.
+bool findRest(int surface, StagedFrame& frame) {
+  const Prepared& prepared = frame.prepared;
+  if (!prepared.surfaces[surface].in_video) return false;
+  const bool moves = prepared.moves[surface];
+  if (!moves && !prepared.sways[surface]) return true;
+  if (!frame.edited[surface] || !frame.at_key_camera) return !moves;
+  const int index = prepared.surfaces[surface].index;
+  const cv::Mat now = frame.labels == index, key = prepared.key_labels == index;
+  const cv::Rect box = cv::boundingRect(now | key);
+  if (box.empty()) return false;
+  const cv::Mat elsewhere = differenceFromKey(frame, box), same = now & ~elsewhere;
+  if (cv::countNonZero(same) == 0) return false;
+  frame.elsewhere = frame.elsewhere.empty() ? elsewhere : cv::Mat(frame.elsewhere | elsewhere);
+  return true;
+}
+
+// Whether the video shows an object where its state has it: most of what is seen of it lies within
+// its outline there.
+bool isSeenAt(const StagedFrame& frame, int surface, const Points& vertices) {
+  const Surface& s = frame.prepared.surfaces[surface];
+  const cv::Mat seen = frame.labels == s.index;
+  const cv::Rect box = cv::boundingRect(seen);
+  if (box.empty()) return true;  // something hides it
+  VisibilityBuffer outline(box);
+  outline.draw(projectMesh(vertices, s.triangles, frame.input.camera), 0);
+  int within = 0, all = 0;
+  for (int v = 0; v < box.height; ++v) {
+    const std::uint8_t* row = seen.ptr<std::uint8_t>(box.y + v) + box.x;
+    for (int u = 0; u < box.width; ++u) {
+      if (row[u] == 0) continue;
+      ++all, within += outline.ids(v)[u] != VisibilityBuffer::kNothing;
+    }
+  }
+  return within >= kSeenWithin * all;
+}
+
+// World, m. @param state nullptr: as in the video, at rest
+Points verticesNow(const Prepared& prepared, int surface, const ObjectInFrame* state) {
+  const Surface& s = prepared.surfaces[surface];
+  if (state != nullptr && state->edited) return state->vertices;
+  if (state != nullptr && prepared.moves[surface])
+    return transformed(s.object_vertices, state->world_from_object);
+  return s.key_vertices;
+}
+
+// Adds the object if the frame's picture can show it.
+void stageObject(int surface, const ObjectInFrame* state, StagedFrame& frame) {
+  const Prepared& prepared = frame.prepared;
+  const Surface& s = prepared.surfaces[surface];
+  if (state != nullptr ? state->removed : !s.in_video) return;
+  Points vertices = verticesNow(prepared, surface, state);
+  const bool edited = frame.edited[surface];
+  if (!edited && prepared.moves[surface] && !isSeenAt(frame, surface, vertices)) return;
+  if (vertices.size() != s.key_vertices.size()) {
+    throw std::invalid_argument("object '" + s.name + "': state has " +
+                                std::to_string(vertices.size()) + " vertices, its model " +
+                                std::to_string(s.key_vertices.size()));
+  }
+  const Look look = state != nullptr ? state->look : Look();
+  const Camera& camera = frame.input.camera;
+  frame.objects.push_back({makeActor(s, std::move(vertices), camera), surface, edited, look,
+                           glossOf(prepared.appearances[surface].gloss, look),
+                           edited && frame.at_rest[surface]
+                               ? projectMesh(s.key_vertices, s.triangles, camera)
+                               : ScreenMesh{}});
+}
+
+}  // namespace
+
+StagedFrame::StagedFrame(const Prepared& prepared, const RenderParams& params,
+                         const FrameInput& input)
+    : prepared(prepared),
+      params(params),
+      input(input),
+      light(lightOf(prepared, input.sun)),
+      labels(input.labels.empty() ? prepared.key_labels : input.labels),
+      at_key_camera(sameView(input.camera, prepared.camera)),
+      eye(input.camera.world_from_camera.translation().cast<float>()) {
+  if (labels.size() != input.bgr.size())
+    throw std::invalid_argument("segmentation and frame differ in size");
+  const auto states = statesOf(prepared.surfaces, input.objects);
+  for (const ObjectInFrame* state : states)
+    edited.push_back(state != nullptr && (state->edited || state->removed));
+  const int count = static_cast<int>(states.size());
+  for (int i = 0; i < count; ++i) at_rest.push_back(findRest(i, *this));
+  for (int i = 0; i < count; ++i) stageObject(i, states[i], *this);
+}
+
+bool StagedFrame::movesInVideo() const {
+  for (std::size_t i = 0; i < edited.size(); ++i) {
+    if (edited[i] && prepared.moves[i] && prepared.surfaces[i].in_video) return true;
+  }
+  return false;
+}
+
+Eigen::Vector2f StagedFrame::movement(std::uint32_t id, float u, float v) const {
+  const StagedObject& object = objectOf(id);
+  const ScreenMesh& now = object.actor.screen;
+  const int triangle = VisibilityBuffer::triangleOf(id);
+  const Eigen::Vector3i& t = object.actor.surface->triangles[triangle];
+  const Eigen::Vector3f w = barycentric(now, triangle, u, v);
+  Eigen::Vector2f moved = Eigen::Vector2f::Zero();
+  for (int i = 0; i < 3; ++i)
+    moved += w[i] * (now.points[t[i]] - object.observed.points[t[i]]).head<2>();
+  return moved;
+}
+
+float StagedFrame::stillness(std::uint32_t id, float u, float v) const {
+  if (!objectOf(id).isAtRestInVideo()) return 0.0f;
+  return 1.0f - smoothStep(kStillPx, kMovedPx, movement(id, u, v).norm());
+}
+
+bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px) {
+  Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Array2f moved = (now[triangle[i]] - then[triangle[i]]).head<2>();
+    low = low.min(moved), high = high.max(moved);
+  }
+  return (low < px).all() && (high > -px).all();
+}
+
+}  // namespace calipso::render
