@@ -74,6 +74,24 @@ TEST_F(ObservedBounce, whatGoesOnAsItWasBouncesAsItDid) {
   EXPECT_LT(missAfter({editOf(EditKind::kVelocity, EditMode::kEstimated)}), 2e-3);
 }
 
+// The renderer takes the object's shadow out where the video has it.
+TEST_F(ObservedBounce, theStateTellsWhereTheVideoHasWhatIsTakenAway) {
+  World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 1), at(0).centroid, true), {});
+  world.advanceTo(0.0);
+  EXPECT_FALSE(world.state().objects[0].observed) << "nothing was followed";
+  for (int k = 0; k < 30; ++k) world.addObservedMotion("thing", at(k));
+  Edit thrown = editOf(EditKind::kVelocity, EditMode::kEstimated);
+  thrown.factor = 1.3;
+  world.submit(thrown);
+  play(world, 8 / 30.0);
+  world.submit(editOf(EditKind::kRemove, EditMode::kAbsolute));
+  play(world, 16 / 30.0);
+  const ObjectSnapshot state = world.state().objects[0];
+  EXPECT_TRUE(state.removed);
+  ASSERT_TRUE(state.observed);
+  EXPECT_TRUE(state.observed->isApprox(at(24).world_from_object, 1e-6));
+}
+
 TEST_F(ObservedBounce, whatIsEditedIsSimulated) {
   const Edit goes_on = editOf(EditKind::kVelocity, EditMode::kEstimated);
   Edit faster = goes_on, lighter = editOf(EditKind::kMaterial, EditMode::kFactor);

@@ -48,6 +48,11 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
                         " % of the key frame: little is left to tell the place and its light by; "
                         "check the strokes");
   }
+  if (p.background.drifting.untimed()) {
+    p.remarks.push_back(
+        "the background drifts, but the frames' stamps do not rise from one to the next: it is "
+        "filled as if it did not; give the frames the times at which they were taken");
+  }
   if (!p.light.determined)
     p.remarks.push_back(
         "too little of the objects is seen to tell the light; it is assumed high and frontal");

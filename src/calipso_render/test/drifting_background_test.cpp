@@ -181,9 +181,29 @@ TEST(DriftingBackground, FramesBeyondTheClipAreFilledFromThemselves) {
 }
 
 TEST(DriftingBackground, IsNoneWithoutTimesInOrder) {
-  std::vector<ClipFrame> frames = clipOf(Motion::kDrifts);
+  std::vector<ClipFrame> frames = clipOf(Motion::kDrifts), resting = clipOf(Motion::kRests);
+  EXPECT_FALSE(DriftingBackground(frames, 2, cv::Mat()).untimed());
   for (ClipFrame& f : frames) f.stamp_ns = 0;
-  EXPECT_FALSE(DriftingBackground(frames, 2, cv::Mat()).established());
+  for (ClipFrame& f : resting) f.stamp_ns = 0;
+  const DriftingBackground drifting(frames, 2, cv::Mat());
+  EXPECT_FALSE(drifting.established());
+  EXPECT_TRUE(drifting.untimed());
+  EXPECT_FALSE(DriftingBackground(resting, 2, cv::Mat()).untimed());
+}
+
+TEST(DriftingBackground, IsFoundInWidePictures) {
+  std::vector<ClipFrame> frames = clipOf(Motion::kDrifts);
+  const double larger = 4.3;  // 1376 px: the first guess is made on a coarser grid
+  for (ClipFrame& f : frames) {
+    cv::resize(f.bgr, f.bgr, {}, larger, larger, cv::INTER_CUBIC);
+    cv::resize(f.labels, f.labels, {}, larger, larger, cv::INTER_NEAREST);
+  }
+  const DriftingBackground drifting(frames, 2, cv::Mat());
+  ASSERT_TRUE(drifting.established());
+  const auto shift = drifting.shiftAt(frames.back().stamp_ns);
+  ASSERT_TRUE(shift);
+  EXPECT_NEAR(shift->x, larger * kPace.x * (kFrames - 1), 0.3);
+  EXPECT_NEAR(shift->y, larger * kPace.y * (kFrames - 1), 0.3);
 }
 
 TEST(DriftingBackground, NothingDriftsWhereThePlaceRestsOrRipples) {

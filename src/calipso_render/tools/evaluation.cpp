@@ -100,6 +100,8 @@ class Evaluation {
       ObjectInFrame o;
       o.name = prepared_->surfaces[i].name;
       o.vertices = prepared_->surfaces[i].key_vertices;
+      const std::vector<Eigen::Isometry3d>& poses = truth_.objects[i].poses;
+      if (poses.size() > 1) o.observed = poses[k];
       change(i, o);
       in.objects.push_back(o);
     }

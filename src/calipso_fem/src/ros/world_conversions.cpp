@@ -34,6 +34,7 @@ calipso_msgs::ObjectState toMsg(const ObjectSnapshot& s) {
   m.removed = s.removed;
   m.sleeping = s.sleeping;
   m.pose = calipso::toMsg(s.world_from_object);
+  if (s.observed) m.observed_pose.push_back(calipso::toMsg(*s.observed));
   m.vertices.assign(s.vertices.data(), s.vertices.data() + s.vertices.size());
   m.triangles.assign(s.triangles.data(), s.triangles.data() + s.triangles.size());
   m.von_mises.assign(s.von_mises.data(), s.von_mises.data() + s.von_mises.size());

@@ -234,6 +234,9 @@ ObjectSnapshot World::Impl::snapshot(const Actor& actor) const {
   s.source = actor.source;
   s.look = actor.look;
   s.world_from_object = poseOf(actor, now);
+  const bool in_video = !actor.inserted && actor.source.empty();
+  if (in_video && !actor.track.empty() && actor.modes.cols() == 0)
+    s.observed = actor.track.at(now).world_from_object;
   if (!actor.edited || actor.removed) return s;
   s.vertices = verticesOf(actor);
   if (actor.inserted && actor.source.empty()) s.triangles = actor.object.mesh.triangles;

@@ -26,6 +26,9 @@ class DriftingBackground {
 
   bool established() const { return !where_.empty(); }
 
+  // Something drifts, but the frames' stamps do not rise: when it is where cannot be told.
+  bool untimed() const { return untimed_; }
+
   // CV_8UC1, key frame's view: 255 where it is seen, or hidden by an object.
   const cv::Mat& where() const { return where_; }
 
@@ -47,6 +50,7 @@ class DriftingBackground {
   void layOver(const std::vector<ClipFrame>& frames, const std::vector<cv::Mat>& covered);
   void invent();
 
+  bool untimed_ = false;
   cv::Mat where_;
   std::vector<std::int64_t> stamps_;  // of the frames
   std::vector<cv::Point2f> shifts_;

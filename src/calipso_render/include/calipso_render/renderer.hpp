@@ -43,6 +43,8 @@ struct ObjectInFrame {
   bool edited = false;  // false: as in the video, its pixels stay the original ones
   bool removed = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();
+  // world_from_object in the video, whatever became of it; none: not followed
+  std::optional<Eigen::Isometry3d> observed;
   Points vertices;      // world, m, one per model vertex; only read where edited
   Triangles triangles;  // of an object that no model describes; empty: its model's
 };

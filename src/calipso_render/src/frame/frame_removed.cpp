@@ -8,6 +8,7 @@
 #include "draw/wide_loops.hpp"
 #include "frame/frame_compositor.hpp"
 #include "frame/mask_morphology.hpp"
+#include "frame/shade_reach.hpp"
 #include "frame/tiled_filter.hpp"
 #include "place/place_samples.hpp"
 #include "place/view_warp.hpp"
@@ -86,6 +87,8 @@ void FrameCompositor::findPassingShadows() {
   cv::blur(now, now, {5, 5});
   passing_ = now < plate.darker;
   passing_ &= plate.quiet & (frame_.labels == 0);
+  const cv::Mat reach = reachOfPassing(frame_, place_.view);
+  if (!reach.empty()) passing_ &= reach;
   keepDarkenedAlike(unmirrored_, plate.codes, passing_);
   cv::morphologyEx(passing_, passing_, cv::MORPH_OPEN,
                    cv::Mat::ones(kLeastPassing, kLeastPassing, CV_8U));

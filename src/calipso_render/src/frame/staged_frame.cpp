@@ -156,6 +156,14 @@ bool StagedFrame::movesInVideo() const {
   return false;
 }
 
+std::optional<Points> StagedFrame::observed(int surface) const {
+  const Surface& s = prepared.surfaces[surface];
+  const ObjectInFrame* state = statesOf(prepared.surfaces, input.objects)[surface];
+  if (state == nullptr || !state->observed) return std::nullopt;
+  const Points vertices = transformed(s.object_vertices, *state->observed);
+  return isSeenAt(*this, surface, vertices) ? std::optional<Points>(vertices) : std::nullopt;
+}
+
 Eigen::Vector2f StagedFrame::movement(std::uint32_t id, float u, float v) const {
   const StagedObject& object = objectOf(id);
   const ScreenMesh& now = object.actor.screen;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "calipso_render/renderer.hpp"
@@ -53,6 +54,10 @@ struct StagedFrame {
   }
   // Whether any edited object moves in the video.
   bool movesInVideo() const;
+
+  // Where the video has a surface that its state says to be followed, world, m; none: it is not, or
+  // not seen there.
+  std::optional<Points> observed(int surface) const;
 
   // How far from its place in the video a surface point is seen, px. @pre the video has its object
   // at rest

@@ -12,7 +12,8 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kCoarse = 4;         // px of the picture: the grid on which a first guess is sought
+constexpr int kCoarse = 4;         // px of the picture: the grid on which a first guess is sought;
+constexpr int kColumns = 160;      // in wide pictures first on one of so many columns
 constexpr float kChanged = 6.0f;   // code values, there: beyond noise
 constexpr float kEdge = 2.0f;      // code values from one of its pixels to the next
 constexpr float kMostOff = 20.0f;  // code values: what is off by more counts as that much
@@ -31,10 +32,10 @@ bool isFree(const DriftPicture& picture, int u, int v) {
          picture.covered.at<std::uint8_t>(v, u) == 0;
 }
 
-DriftPicture coarse(const DriftPicture& picture) {
+DriftPicture coarse(const DriftPicture& picture, int cell) {
   DriftPicture out;
-  const cv::Size size(std::max(1, picture.grey.cols / kCoarse),
-                      std::max(1, picture.grey.rows / kCoarse));
+  const cv::Size size(std::max(1, picture.grey.cols / cell),
+                      std::max(1, picture.grey.rows / cell));
   cv::resize(picture.grey, out.grey, size, 0, 0, cv::INTER_AREA);
   cv::resize(picture.covered, out.covered, size, 0, 0, cv::INTER_AREA);
   return out;
@@ -74,17 +75,20 @@ std::optional<float> missAt(const DriftPicture& from, const DriftPicture& to,
                                     : std::nullopt;
 }
 
-// The displacement, in px of the whole picture, that explains best what changes.
-std::optional<cv::Point2f> guess(const DriftPicture& from, const DriftPicture& to) {
+// The displacement that explains best what changes, of those within `reach` of another along
+// either axis.
+std::optional<cv::Point> guess(const DriftPicture& from, const DriftPicture& to,
+                               const cv::Point& near, int reach) {
   const std::vector<cv::Point> points = tellingPoints(from, to);
   if (points.size() < kFewestPoints) return std::nullopt;
-  const int reach = from.grey.cols / 3, side = 2 * reach + 1;
+  const int side = 2 * reach + 1;
+  const cv::Point first = near - cv::Point(reach, reach);
   std::vector<std::optional<float>> misses(static_cast<std::size_t>(side) * side);
 #pragma omp parallel for schedule(dynamic, 4)
   for (int j = 0; j < side; ++j) {
     for (int i = 0; i < side; ++i)
       misses[static_cast<std::size_t>(j) * side + i] =
-          missAt(from, to, points, {i - reach, j - reach});
+          missAt(from, to, points, first + cv::Point(i, j));
   }
   const auto best = std::min_element(
       misses.begin(), misses.end(),
@@ -92,8 +96,18 @@ std::optional<cv::Point2f> guess(const DriftPicture& from, const DriftPicture& t
   const float at_rest = *missAt(from, to, points, {0, 0});
   if (!*best || **best > kGuessed * at_rest) return std::nullopt;
   const int index = static_cast<int>(best - misses.begin());
-  return cv::Point2f(static_cast<float>(kCoarse * (index % side - reach)),
-                     static_cast<float>(kCoarse * (index / side - reach)));
+  return first + cv::Point(index % side, index / side);
+}
+
+// The same between whole pictures, px, within a third of their width: its cost does not grow with
+// them.
+std::optional<cv::Point2f> guess(const DriftPicture& from, const DriftPicture& to) {
+  const int cell = std::max(kCoarse, from.grey.cols / kColumns);
+  const auto way = guess(coarse(from, cell), coarse(to, cell), {0, 0}, from.grey.cols / cell / 3);
+  if (!way) return std::nullopt;
+  const auto finer = guess(coarse(from, kCoarse), coarse(to, kCoarse), *way * cell / kCoarse,
+                           cell == kCoarse ? 0 : cell / kCoarse + 1);
+  return finer ? std::optional<cv::Point2f>(*finer * kCoarse) : std::nullopt;
 }
 
 // Displacement of `to` against `from` near a guess (Lucas & Kanade 1981, robust).
@@ -178,10 +192,9 @@ Drift findDrift(const std::vector<ClipFrame>& frames, const std::vector<cv::Mat>
     cv::GaussianBlur(picture.grey, picture.grey, {}, 1.0);
     pictures.push_back(picture);
   }
-  const DriftPicture first = coarse(pictures.front());
   // The longest time over which a guess succeeds says best how fast it is.
   for (std::size_t last = pictures.size() - 1; last > 0; last /= 2) {
-    const auto way = guess(first, coarse(pictures[last]));
+    const auto way = guess(pictures.front(), pictures[last]);
     if (!way) continue;
     const cv::Point2f pace = *way / static_cast<float>(last);
     Drift drift{followed(pictures, pace, cv::Mat()), {}};

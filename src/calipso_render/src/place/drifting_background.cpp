@@ -42,11 +42,11 @@ DriftingBackground::DriftingBackground(const std::vector<ClipFrame>& frames, int
     stamps_.push_back(f.stamp_ns);
     covered.push_back(grown(f.labels != 0, std::max(margin, kInterpolated)));
   }
-  const bool in_order =
-      std::adjacent_find(stamps_.begin(), stamps_.end(), std::greater_equal<>()) == stamps_.end();
-  if (!in_order) return;  // when it is where cannot be told
   const Drift drift = findDrift(frames, covered, ground);
   if (drift.where.empty()) return;
+  untimed_ =
+      std::adjacent_find(stamps_.begin(), stamps_.end(), std::greater_equal<>()) != stamps_.end();
+  if (untimed_) return;
   shifts_ = drift.shifts, where_ = drift.where;
   layOver(frames, covered);
   if (established()) invent();

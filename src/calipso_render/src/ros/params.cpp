@@ -62,7 +62,7 @@ NodeParams loadParams(const ros::NodeHandle& pnh) {
   p.render.sun_radius = inRange(pnh, "sun_radius", p.render.sun_radius, 0.0, 0.5);
   p.render.add_noise = optionalParam(pnh, "add_noise", p.render.add_noise);
   p.render.background.mask_margin_px =
-      inRange(pnh, "mask_margin_px", p.render.background.mask_margin_px, 0, 50);
+      inRange(pnh, "mask_margin_px", p.render.background.mask_margin_px, 0, 31);
   p.clip_samples = inRange(pnh, "clip_samples", p.clip_samples, 2, 200);
   p.live_queue = inRange(pnh, "live_queue", p.live_queue, 1, 1000);
   const Scene scene = loadScene(p.scene);

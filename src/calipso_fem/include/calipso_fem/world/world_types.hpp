@@ -129,6 +129,8 @@ struct ObjectSnapshot {
   bool removed = false;
   bool sleeping = false;
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // best rigid motion
+  // in the video, whatever became of it; none: not followed, it deforms, or the video has it not
+  std::optional<Eigen::Isometry3d> observed;
   // #V x 3; empty unless edited
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> vertices;
   // #F x 3, of a model that the video does not have; else empty

@@ -1,0 +1,69 @@
+#include "frame/shade_reach.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace calipso::render {
+namespace {
+
+constexpr int kStride = 4;            // px between the places that are looked at
+constexpr float kNear = 2.0f;         // radii from a ball's centre: it hides a quarter of the sky
+constexpr float kConfirmed = 0.26f;   // rad, 15 degrees: by how much a confirmed sun may be off
+constexpr float kFromZenith = 1.22f;  // rad, 70 degrees: how low an unconfirmed one may stand
+
+bool reaches(const Ball& ball, const SunRange& sun, const Eigen::Vector3f& place) {
+  const Eigen::Vector3f way = ball.centre - place;
+  const float distance = way.norm();
+  if (distance < kNear * ball.radius) return true;
+  const float off = std::acos(std::clamp(way.dot(sun.axis) / distance, -1.0f, 1.0f));
+  return off < sun.angle + std::asin(ball.radius / distance);
+}
+
+}  // namespace
+
+SunRange sunRange(const Eigen::Vector3f& to_sun, bool confirmed, const Eigen::Vector3f& up) {
+  return confirmed ? SunRange{to_sun, kConfirmed} : SunRange{up, kFromZenith};
+}
+
+Ball ballAround(const Points& vertices) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : vertices) box.extend(p);
+  Ball ball{box.center(), 0.0f};
+  for (const Eigen::Vector3f& p : vertices)
+    ball.radius = std::max(ball.radius, (p - ball.centre).norm());
+  return ball;
+}
+
+cv::Mat shadeReach(const std::vector<Ball>& balls, const SunRange& sun, const PlaceView& place,
+                   const cv::Size& size) {
+  cv::Mat reach = cv::Mat::zeros(size, CV_8U);
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int v = 0; v < size.height; v += kStride) {
+    for (int u = 0; u < size.width; u += kStride) {
+      Receiver receiver;
+      if (!place.at(static_cast<float>(u), static_cast<float>(v), receiver)) continue;
+      const bool any = std::any_of(balls.begin(), balls.end(), [&](const Ball& ball) {
+        return reaches(ball, sun, receiver.position);
+      });
+      if (any) reach(cv::Rect(u, v, kStride, kStride) & cv::Rect({0, 0}, size)).setTo(255);
+    }
+  }
+  return reach;
+}
+
+cv::Mat reachOfPassing(const StagedFrame& frame, const PlaceView& place) {
+  const Prepared& prepared = frame.prepared;
+  std::vector<Ball> balls;
+  for (std::size_t i = 0; i < frame.edited.size(); ++i) {
+    if (!frame.edited[i] || !prepared.moves[i] || !prepared.surfaces[i].in_video) continue;
+    const auto vertices = frame.observed(static_cast<int>(i));
+    if (!vertices) return {};
+    balls.push_back(ballAround(*vertices));
+  }
+  const SunRange sun = sunRange(prepared.light.light.direction, prepared.light.confirmed(),
+                                frame.params.up.cast<float>());
+  return shadeReach(balls, sun, place, frame.labels.size());
+}
+
+}  // namespace calipso::render

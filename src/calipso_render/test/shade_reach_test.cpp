@@ -1,0 +1,128 @@
+// Where the shade of an object that moves in the video is sought in a frame.
+
+#include "frame/shade_reach.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "ball_setting.hpp"
+#include "calipso_render/shadow_map.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3f kUp = Eigen::Vector3f::UnitZ();
+const Eigen::Vector3d kHigh(0.0, 0.1, 0.25);
+
+Points verticesAt(const Eigen::Vector3d& centre) {
+  return makeSurface(ballAt(centre)).key_vertices;
+}
+
+cv::Mat reachOf(const Eigen::Vector3d& centre, bool confirmed,
+                const std::vector<SupportPlane>& planes = table()) {
+  return shadeReach({ballAround(verticesAt(centre))},
+                    sunRange(sunlight().direction, confirmed, kUp), {PlaneView(planes, camera())},
+                    {kWidth, kHeight});
+}
+
+// 255 where less than half of the sun is seen past the ball.
+cv::Mat shadowOf(const Eigen::Vector3d& centre) {
+  const Points vertices = verticesAt(centre);
+  const Surface surface = makeSurface(ballAt(centre));
+  const ShadowMap sun({{&vertices, &surface.triangles}}, sunlight().direction.cast<double>(),
+                      {512, 0.025, 16});
+  cv::Mat shaded = cv::Mat::zeros(kHeight, kWidth, CV_8U);
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = receiverAt(table(), camera(), u, v);
+      if (r && sun.visibility(r->position, r->normal) < 0.5f) shaded.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return shaded;
+}
+
+TEST(ShadeReach, HoldsTheShadowAndLeavesTheRest) {
+  const cv::Mat shadow = shadowOf(kHigh), reach = reachOf(kHigh, true);
+  ASSERT_GT(cv::countNonZero(shadow), 50);
+  EXPECT_EQ(cv::countNonZero(shadow & ~reach), 0);
+  EXPECT_LT(cv::countNonZero(reach), kWidth * kHeight / 2);
+}
+
+TEST(ShadeReach, AnUnconfirmedSunMayStandAnywhere) {
+  const cv::Mat confirmed = reachOf(kHigh, true), anywhere = reachOf(kHigh, false);
+  EXPECT_EQ(cv::countNonZero(shadowOf(kHigh) & ~anywhere), 0);
+  EXPECT_GT(cv::countNonZero(anywhere), cv::countNonZero(confirmed));
+}
+
+TEST(ShadeReach, IsNowhereWhereNothingTakesShade) {
+  EXPECT_EQ(cv::countNonZero(reachOf(kHigh, false, {})), 0);
+}
+
+// A ball that flies to the right above the table, and at the last frame the shadow of a cloud at
+// the left, far from the ball's own.
+struct Passing {
+  static constexpr int kFrames = 9;
+  const cv::Rect cloud{4, 80, 30, 30};
+  std::vector<ClipFrame> frames;
+  cv::Mat shadow;  // of the ball at the last frame, beside the ball
+  std::shared_ptr<const Prepared> prepared;
+
+  static Eigen::Vector3d centre(int k) { return {-0.25 + 0.05 * k, 0.1, 0.2}; }
+
+  Passing() {
+    ClipSample clip;
+    for (int k = 0; k < kFrames; ++k) {
+      ClipFrame f = frameWithBall(ballAt(centre(k)));
+      shadow = shadowOf(centre(k)) & (f.labels == 0);
+      if (k + 1 == kFrames) shadow(cloud).setTo(255);
+      const cv::Mat dim = 0.6 * emptyTable();
+      dim.copyTo(f.bgr, shadow);
+      shadow(cloud).setTo(0);
+      f.poses = {{kBallLabel, poseAt(k)}};
+      frames.push_back(f), clip.add(f);
+    }
+    Prepared learnt = prepare(clip, {ballAt(centre(0))}, params());
+    learnt.light.light.direction = sunlight().direction, learnt.light.determined = true;
+    learnt.light.from_shadows = true;
+    prepared = std::make_shared<const Prepared>(std::move(learnt));
+  }
+
+  static Eigen::Isometry3d poseAt(int k) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation() = centre(k);
+    return pose;
+  }
+
+  FrameOutput removed(const std::optional<Eigen::Isometry3d>& observed) const {
+    const ClipFrame& last = frames.back();
+    FrameInput in;
+    in.bgr = last.bgr, in.labels = last.labels, in.camera = last.camera;
+    ObjectInFrame ball;
+    ball.name = "ball", ball.removed = true, ball.observed = observed;
+    in.objects = {ball};
+    return Renderer(prepared, params()).composite(in);
+  }
+};
+
+TEST(Renderer, TakesOutThePassingShadowOfAnObjectAndNoOther) {
+  const Passing p;
+  ASSERT_TRUE(p.prepared->moves[0]);
+  const FrameOutput out = p.removed(Passing::poseAt(Passing::kFrames - 1));
+  ASSERT_GT(cv::countNonZero(p.shadow), 100);
+  EXPECT_GT(psnr(out.bgr, emptyTable(), p.shadow), 35.0);
+  EXPECT_EQ(cv::countNonZero(out.provenance(p.cloud)), 0) << "the cloud's is the video's";
+}
+
+// Where the object is in the video is not known, its shadow may be any that passes.
+TEST(Renderer, TakesOutAllThatPassesOfAnObjectThatIsNotFollowed) {
+  const Passing p;
+  const FrameOutput out = p.removed(std::nullopt);
+  EXPECT_GT(psnr(out.bgr, emptyTable(), p.shadow), 35.0);
+  EXPECT_GT(cv::countNonZero(out.provenance(p.cloud)), p.cloud.area() / 2);
+}
+
+}  // namespace
+}  // namespace calipso::render
