@@ -7,6 +7,8 @@
 #include <limits>
 #include <optional>
 
+#include "calipso_fem/blas_threads.hpp"
+
 namespace calipso::align {
 namespace {
 
@@ -196,6 +198,7 @@ void ElasticFit::Impl::makePattern() {
   }
   A.outerIndexPtr()[free * p.rows()] = count;
   std::fill_n(A.valuePtr(), count, 1.0);
+  fem::useOneBlasThread();
   solver.cholmod().print = 0;  // what it would print, the report says
   solver.analyzePattern(A);
 }

@@ -1,5 +1,6 @@
 #include "calipso_align/fem_stage.hpp"
 
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -75,6 +76,17 @@ TEST(ElasticFit, AMeasurementThatIsNoNumberIsReported) {
       fit.fit([&](const Points& x, int) { return pull(mesh, x, 10, 0.1, std::nan("")); });
   EXPECT_FALSE(report.solvable);
   EXPECT_TRUE(fit.vertices().isApprox(mesh.vertices, 1e-9));  // where it was put
+}
+
+// With as many as there are processors, the same clip gives other models on another machine.
+TEST(ElasticFit, BlasHasOneThread) {
+  const auto set = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
+  const auto get = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_num_threads"));
+  if (!set || !get) GTEST_SKIP() << "CHOLMOD stands on another BLAS than OpenBLAS";
+  set(2);
+  const TriangleMesh mesh = test::pear();
+  ElasticFit fit(mesh, gridOf(mesh, kNodes), kAsItIs, options());
+  EXPECT_EQ(get(), 1);
 }
 
 TEST(ElasticFit, RejectsABodyWithoutVolume) {

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "calipso_fem/blas_threads.hpp"
 #include "preconditioner.hpp"
 
 namespace calipso::fem {
@@ -12,6 +13,7 @@ namespace {
 class Cholesky : public Preconditioner {
  public:
   Cholesky() {
+    useOneBlasThread();
     cholmod_start(&common_);
     common_.print = 0;
     common_.supernodal = CHOLMOD_AUTO;

@@ -8,6 +8,7 @@
 #include <string>
 #include <variant>
 
+#include "calipso_fem/blas_threads.hpp"
 #include "supernodal_factor.hpp"
 
 namespace calipso::fem {
@@ -78,6 +79,7 @@ struct CondensedFactor::Impl {
   Eigen::MatrixXd compliance;  // empty: not yet asked for
 
   Impl() {
+    useOneBlasThread();
     cholmod_start(&common);
     common.print = 0;
     common.supernodal = CHOLMOD_SUPERNODAL;

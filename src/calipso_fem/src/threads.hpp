@@ -2,8 +2,7 @@
 
 namespace calipso::fem {
 
-// Threads of the finite element loops (runParallel). BLAS inside CHOLMOD gets one thread, since
-// CHOLMOD's small supernodes lose more by waking threads than they gain.
+// Threads of the finite element loops (runParallel).
 void setThreads(int threads);
 int threadCount();
 

@@ -1,11 +1,14 @@
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 
 #include <numeric>
 #include <random>
 #include <stdexcept>
 
+#include "calipso_fem/condensed_factor.hpp"
 #include "calipso_fem/deformable_body.hpp"
 #include "hex_solver.hpp"
+#include "preconditioner.hpp"
 #include "thread_team.hpp"
 #include "threads.hpp"
 
@@ -140,6 +143,19 @@ TEST(Solver, SameBytesForAnyNumberOfThreads) {
     }
   }
   setThreads(2);
+}
+
+// Whoever factorises first, with or without a body.
+TEST(Solver, BlasHasOneThread) {
+  const auto set = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
+  const auto get = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_num_threads"));
+  if (!set || !get) GTEST_SKIP() << "CHOLMOD stands on another BLAS than OpenBLAS";
+  set(2);
+  const auto cholesky = makeCholesky();
+  EXPECT_EQ(get(), 1);
+  set(2);
+  const CondensedFactor condensed;
+  EXPECT_EQ(get(), 1);
 }
 
 TEST(Solver, MaterialChangeIsFollowed) {
