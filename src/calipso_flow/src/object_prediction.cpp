@@ -100,4 +100,21 @@ Observation ObjectTracker::inPlace(const Frame& frame, const Reference& nearest)
   return best;
 }
 
+// The picture has not changed, though too few of its points say where the object is: its pose errs
+// as before, and by what may have shifted besides. It is not remembered, so that frames to come are
+// compared with the one in which the object was found, and a creep adds up.
+Observation ObjectTracker::asBefore(const Frame& frame) {
+  frames_lost_ = 0;
+  const double depth =
+      (frame.camera.world_from_camera.inverse() * (last_->world_from_object * centroid_)).z();
+  const double shift = kStayedPx * depth / frame.camera.fx;
+  const double turn = shift / (0.5 * boundingDiagonal(model_.mesh));
+  Observation stayed = *last_;
+  stayed.time = frame.time;
+  stayed.drift = Matrix6d::Zero();
+  stayed.covariance.diagonal().head<3>().array() += shift * shift;
+  stayed.covariance.diagonal().tail<3>().array() += turn * turn;
+  return stayed;
+}
+
 }  // namespace calipso::flow

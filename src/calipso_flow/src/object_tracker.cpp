@@ -237,8 +237,9 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
   if (frames_lost_ == 0 && before_last_)
     best = refine(frame, nearest, predicted, drowned_ ? wide_ : params_);
   if (!isClear(best)) {
-    best = !cut && hasStayed(frame, nearest) ? inPlace(frame, nearest)
-                                             : search(frame, nearest, predicted);
+    const bool stayed = !cut && hasStayed(frame, nearest);
+    best = stayed ? inPlace(frame, nearest) : search(frame, nearest, predicted);
+    if (stayed && !best.found) return asBefore(frame);
   }
   if (best.found && frames_lost_ > 0 && best.inliers() < kWeakInliers && fall_.holds() &&
       !fall_.expects(measured(best)))

@@ -163,6 +163,24 @@ TEST(ClipDynamics, findsInItsPlaceWhatHasFewTracksUntilItStarts) {
   }
 }
 
+// Not one of its points is followed; that it has not moved is seen all the same, and that it does.
+TEST(ClipDynamics, takesWhatCannotBeFollowedToRestWhileItsPictureStays) {
+  DynamicsParams params;
+  params.tracker.trust.least_correlation = 1.0;  // no patch is good enough
+  const Eigen::Isometry3d rest = test::boxModel().world_from_object;
+  ClipAnalyser analyser(frameOf(0.0, rest, 1), {test::boxModel()}, {cv::Mat()}, kGravity, params);
+  for (int k = 1; k < 8; ++k) analyser.add(frameOf(k / kFps, rest, 1 + k));
+  analyser.add(frameOf(8 / kFps, movedPose(0.1, {1.0, 0.0, 0.0}, 0.0), 9));
+  const ObjectDynamics box = analyser.finish().front();
+  for (int k = 1; k < 8; ++k) {
+    EXPECT_TRUE(box.observations[k].found) << k;
+    EXPECT_EQ(box.observations[k].world_from_object.matrix(), rest.matrix()) << k;
+    EXPECT_GT(box.observations[k].covariance(0, 0), box.observations[0].covariance(0, 0));
+  }
+  EXPECT_FALSE(box.observations[8].found);
+  EXPECT_EQ(summary({box}), "box at rest");
+}
+
 TEST(ClipDynamics, cameraMotionIsNotObjectMotion) {
   const ObjectModel model = test::boxModel();
   const auto frameFrom = [&](int k) {

@@ -112,6 +112,7 @@ class ObjectTracker {
   Reference& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose);
   bool hasStayed(const Frame& frame, const Reference& nearest);
   Observation inPlace(const Frame& frame, const Reference& nearest);
+  Observation asBefore(const Frame& frame);
   Observation attempt(const Frame& frame, const Reference& reference,
                       const Eigen::Isometry3d& predicted, const TrackerParams& params);
   std::optional<Observation> fromFrameBefore(const Frame& frame, const Reference& nearest,
