@@ -8,10 +8,7 @@
 namespace calipso::render {
 
 Renderer::Renderer(std::shared_ptr<const Prepared> prepared, const RenderParams& params)
-    : prepared_(std::move(prepared)),
-      params_(params),
-      shadows_(std::make_unique<ShadowCache>()),
-      rest_(std::make_unique<RestPicture>()) {}
+    : prepared_(std::move(prepared)), params_(params), caches_(std::make_unique<FrameCaches>()) {}
 
 Renderer::~Renderer() = default;
 
@@ -86,7 +83,7 @@ FrameOutput Renderer::composite(const FrameInput& frame) {
                                 std::to_string(expected.height) + "; play both at one size");
   }
   addNewcomers(frame);
-  return FrameCompositor(*prepared_, params_, frame, *shadows_, *rest_).run();
+  return FrameCompositor(*prepared_, params_, frame, *caches_).run();
 }
 
 }  // namespace calipso::render

@@ -122,8 +122,7 @@ struct Prepared {
 Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
                  const RenderParams& params);
 
-struct ShadowCache;
-struct RestPicture;
+struct FrameCaches;
 
 // Draws edited frames. Every frame's result depends on that frame alone. Not thread-safe: shadow
 // maps of objects that rest, and the models of copies, are kept from frame to frame.
@@ -140,8 +139,7 @@ class Renderer {
 
   std::shared_ptr<const Prepared> prepared_;
   RenderParams params_;
-  std::unique_ptr<ShadowCache> shadows_;
-  std::unique_ptr<RestPicture> rest_;
+  std::unique_ptr<FrameCaches> caches_;
 };
 
 }  // namespace calipso::render

@@ -1,102 +1,117 @@
 #include "frame/frame_compositor.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <cstring>
 
-#include "calipso_render/colour.hpp"
+#include "draw/side_by_side.hpp"
+#include "frame/marked.hpp"
+#include "frame/removed.hpp"
+#include "frame/rest_recording.hpp"
+#include "frame/soft_outlines.hpp"
 
 namespace calipso::render {
-cv::Vec3f FrameCompositor::shadowRatio(float sun, float sky) const {
-  return frame_.prepared.umbra * sky + (cv::Vec3f(1, 1, 1) - frame_.prepared.umbra) * sun;
-}
 
-// An edited object is drawn; another one only where the original picture does not show it.
-bool FrameCompositor::isDrawn(std::uint32_t id, int u, int v) const {
-  if (id == VisibilityBuffer::kNothing) return false;
-  if (always_drawn_[VisibilityBuffer::objectOf(id)]) return true;
-  const int surface = frame_.objectOf(id).surface;
-  if (place_.hides(surface, u, v)) return false;
-  return frame_.edited[surface] || removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
-}
+FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& params,
+                                 const FrameInput& input, FrameCaches& caches)
+    : caches_(caches),
+      frame_(prepared, params, input),
+      place_(frame_),
+      reflections_(frame_, place_),
+      revealed_(frame_, place_, reflections_),
+      moved_(frame_, place_),
+      resting_(caches.light.update(frame_, place_)),
+      others_(frame_, moved_, resting_),
+      passing_(passingShadows(frame_, place_, reflections_.unmirrored(), caches.plate)),
+      region_(frame_, resting_, moved_, others_, reflections_, passing_),
+      codec_(params.add_noise ? prepared.noise : NoiseModel(), input.stamp_ns) {}
 
-// The part of a pixel that objects which stay cover: of one on their outline less than all.
-float FrameCompositor::coverOfOthers(int u, int v) const {
-  const EdgeCoverage::Pixel* edge = edges_->at(u, v);
-  if (edge == nullptr) return frame_.labels.at<std::uint8_t>(v, u) != 0 ? 1.0f : 0.0f;
-  const auto stays = [&](std::uint32_t id) {
-    return id != VisibilityBuffer::kNothing && !isDrawn(id, u, v);
-  };
-  return static_cast<float>(std::count_if(edge->ids.begin(), edge->ids.end(), stays)) /
-         EdgeCoverage::kSamples;
-}
-
-FrameCompositor::Behind FrameCompositor::behindAt(int u, int v) const {
-  const bool removed = removed_.at<std::uint8_t>(v - region_.y, u - region_.x) != 0;
-  const float others = removed ? 0.0f : coverOfOthers(u, v);
-  Behind own{linearPixel(frame_.input.bgr, u, v), 0.0f, kOriginal};
-  if (others > 0.0f && frame_.labels.at<std::uint8_t>(v, u) != 0) shadeOther(u, v, own);
-  if (others == 1.0f) return own;
-  const Behind ground = groundAt(u, v, removed);
-  if (others == 0.0f || ground.source == kOriginal) return others == 0.0f ? ground : own;
-  return {others * own.colour + (1.0f - others) * ground.colour, (1.0f - others) * ground.fresh,
-          ground.source};
-}
-
-// What a pixel shows where no object is.
-FrameCompositor::Behind FrameCompositor::groundAt(int u, int v, bool removed) const {
-  Behind behind = shadowedAt(u, v, removed);
-  addMirrored(u, v, behind);
-  return behind;
-}
-
-// The same without what the planes mirror now.
-FrameCompositor::Behind FrameCompositor::shadowedAt(int u, int v, bool removed) const {
-  Behind behind{unmirroredAt(u, v), 0.0f, kOriginal};
-  if (removed) behind = revealedAt(u, v);
-  const cv::Point at = cv::Point(u, v) - region_.tl();
-  if (!relightable_.at(u, v) || takes_light_.at<std::uint8_t>(at) == 0) return behind;
-  const int sun = sun_now_.at<std::uint8_t>(at), sun_before = sun_before_.at<std::uint8_t>(at);
-  const int sky = sky_now_.at<std::uint8_t>(at), sky_before = sky_before_.at<std::uint8_t>(at);
-  const cv::Vec3f now = shadowRatio(kPerLevel * sun, kPerLevel * sky),
-                  before = shadowRatio(kPerLevel * sun_before, kPerLevel * sky_before);
-  if (removed) {
-    behind.colour = behind.colour.mul(now);
-    return behind;
+FrameOutput FrameCompositor::run() {
+  const cv::Mat& bgr = frame_.input.bgr;
+  if (region_.all.empty()) return {bgr.clone(), cv::Mat::zeros(bgr.size(), CV_8U)};
+  drawRegion();
+  findResidual();
+  const RowComposer composer = this->composer();
+  FrameOutput out{cv::Mat(bgr.size(), CV_8UC3), cv::Mat(bgr.size(), CV_8U)};
+#pragma omp parallel
+  {
+    Row row;
+#pragma omp for schedule(dynamic, 8)
+    for (int v = 0; v < bgr.rows; ++v) {
+      std::memcpy(out.bgr.ptr(v), bgr.ptr(v), 3 * static_cast<std::size_t>(bgr.cols));
+      std::memset(out.provenance.ptr(v), kOriginal, bgr.cols);
+      if (v >= region_.all.y && v < region_.all.br().y) composeRow(composer, v, row, out);
+    }
   }
-  // Darkened further or seeing a little more sky, a pixel keeps its own grain; what the sun newly
-  // reaches must come from the plate.
-  const float from_plate = relit_.at<std::uint8_t>(at) / 255.0f;
-  if (from_plate == 0.0f && std::abs(sun - sun_before) + std::abs(sky - sky_before) < kSameLevels)
-    return behind;
-  cv::Vec3f darkened = behind.colour;
-  for (int c = 0; c < 3; ++c)
-    darkened[c] *= std::min(kBrightest, now[c] / std::max(before[c], kDarkest));
-  const Behind revealed = revealedAt(u, v);
-  behind.colour = from_plate * revealed.colour.mul(now) + (1.0f - from_plate) * darkened;
-  behind.fresh = from_plate * revealed.fresh;
-  behind.source = from_plate > 0.5f ? revealed.source : kRendered;
-  return behind;
+  softenOutlines(frame_, *surfaces_, out);
+  return out;
 }
 
-// What comes to light where an object or its shadow was.
-FrameCompositor::Behind FrameCompositor::revealedAt(int u, int v) const {
-  const bool invented = place_.invented.at<std::uint8_t>(v, u) != 0;
-  cv::Vec3f now;
-  const bool drifts = !place_.drifts.empty() && place_.drifts.at<std::uint8_t>(v, u) != 0;
-  if (invented && !drifts && place_.live != nullptr &&
-      place_.live->at(unmirrored_, frame_.labels, live_corrections_,
-                      frame_.prepared.noise.deviation(1, 128.0f), u, v, now)) {
-    for (int c = 0; c < 3; ++c) now[c] = linearFromRealCode(now[c]);
-    return {now, 1.0f, kInvented};
+void FrameCompositor::drawRegion() {
+  removed_ = removedPixels(frame_, place_, region_, passing_);
+  surfaces_.emplace(frame_, place_, region_, removed_);
+  sideBySide(
+      frame_.params.quality == Quality::kLive,
+      [this] {
+        edges_.emplace(surfaces_->sampleEdges());
+        shader_.emplace(frame_, place_, *surfaces_, moved_, resting_);
+        still_.emplace(frame_, place_, surfaces_->centre(), removed_);
+      },
+      [this] {
+        light_.emplace(frame_, place_, resting_, moved_, region_, surfaces_->covered());
+        screen_.emplace(frame_, surfaces_->centre());
+      });
+  backdrop_.emplace(frame_, place_, revealed_, reflections_, others_, *surfaces_, *edges_, *light_,
+                    removed_);
+  kinds_.emplace(frame_, reflections_, others_, *surfaces_, *edges_, *light_, *still_, *screen_,
+                 removed_);
+  sheets_.emplace(*surfaces_, *edges_, *shader_, *screen_);
+}
+
+void FrameCompositor::findResidual() {
+  if (!frame_.params.carry_residual || !frame_.at_key_camera) return;
+  const auto rests = [](const StagedObject& o) { return o.isAtRestInVideo(); };
+  if (std::none_of(frame_.objects.begin(), frame_.objects.end(), rests)) return;
+  std::vector<bool> resting(frame_.edited.size());  // per surface: edited, and at rest in the video
+  for (std::size_t i = 0; i < resting.size(); ++i)
+    resting[i] = frame_.edited[i] && frame_.at_rest[i];
+  if (caches_.rest.edited != resting) caches_.rest = pictureAtRest(resting);
+  residual_.emplace(frame_, revealed_, surfaces_->centre(), caches_.rest);
+}
+
+// Such objects drawn where the video has them, from what was prepared alone.
+RestPicture FrameCompositor::pictureAtRest(const std::vector<bool>& edited) const {
+  const FrameInput input = frameAtRest(frame_.prepared, edited);
+  RenderParams plain = frame_.params;
+  plain.add_noise = plain.keep_still = plain.carry_residual = false;
+  FrameCaches none;
+  FrameCompositor rest(frame_.prepared, plain, input, none);
+  if (rest.region_.all.empty()) return RestPicture(edited, input.bgr.size());
+  rest.drawRegion();
+  return recordAtRest(rest.frame_, *rest.surfaces_, rest.revealed_, *rest.backdrop_,
+                      rest.composer(), rest.removed_);
+}
+
+RowComposer FrameCompositor::composer() const {
+  return RowComposer(frame_, *surfaces_, *kinds_, *sheets_, *shader_, *backdrop_, *screen_,
+                     residual_ ? &*residual_ : nullptr);
+}
+
+void FrameCompositor::composeRow(const RowComposer& composer, int v, Row& row,
+                                 FrameOutput& out) const {
+  composer.compose(v, row);
+  if (residual_) residual_->addRims(v, row);
+  still_->keep(v, row);
+  const int left = region_.all.x, width = region_.all.width;
+  cv::Vec3b* codes = out.bgr.ptr<cv::Vec3b>(v) + left;
+  const std::uint8_t* source = row.source.data();
+  for (int i = nextMarked(source, 0, width); i < width; i = nextMarked(source, i, width)) {
+    const int first = i;
+    i = nextUnmarked(source, i, width, 0xff);
+    codec_.encode({&row.colour[0][first], &row.colour[1][first], &row.colour[2][first],
+                   &row.colour[3][first]},
+                  left + first, v, i - first, codes + first);
   }
-  return {place_.plate.at<cv::Vec3f>(v, u), 1.0f, invented ? kInvented : kSeenElsewhere};
-}
-
-FrameCompositor::Composed FrameCompositor::composedOf(const Drawn& drawn, int u, int v) const {
-  const Behind behind = drawn.cover < 1.0f ? behindAt(u, v) : Behind{};
-  return {drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour,
-          drawn.cover + (1.0f - drawn.cover) * behind.fresh,
-          drawn.cover > 0.0f ? kRendered : behind.source};
+  std::memcpy(out.provenance.ptr<std::uint8_t>(v) + left, source, width);
 }
 
 }  // namespace calipso::render

@@ -1,10 +1,14 @@
 #pragma once
 
 #include <cstdint>
-#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 namespace calipso::render {
+
+inline cv::Mat disc(int radius) {
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
+}
 
 // cv::dilate() with disc(radius). A disc's rows are runs, and a longer run is a shorter one with a
 // pixel more at either end.

@@ -6,6 +6,7 @@
 
 #include "draw/eight_lanes.hpp"
 #include "draw/light_batch.hpp"
+#include "frame/marked.hpp"
 
 namespace calipso::render {
 namespace {
@@ -208,6 +209,18 @@ class Squares {
 void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
                    const SquareMask& skip, cv::Mat& out, SquareMask* shaded) {
   if (!rect.empty()) Squares(view, light, rect, skip, out, shaded).run();
+}
+
+void takeReliefInPlaneTerms(const Relief& relief, float planes_umbra, int v, int begin, int end,
+                            std::uint8_t* sun, std::uint8_t* sky) {
+  if (relief.empty()) return;
+  const float* umbra = relief.umbra.ptr<float>(v) + begin;
+  const std::uint8_t* seen = relief.seen.ptr<std::uint8_t>(v) + begin;
+  const int count = end - begin;
+  for (int k = nextMarked(seen, 0, count); k < count; k = nextMarked(seen, k + 1, count)) {
+    const PlaneTerms terms = inPlaneTerms(kPerLevel * sun[k], umbra[k], planes_umbra);
+    sun[k] = lightLevel(terms.sun), sky[k] = lightLevel(terms.sky);
+  }
 }
 
 }  // namespace calipso::render

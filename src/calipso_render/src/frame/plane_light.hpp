@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <opencv2/core.hpp>
 
@@ -9,10 +10,39 @@
 
 namespace calipso::render {
 
+constexpr float kPerLevel = 1.0f / 255.0f;
+
 // A visible part of a light, 0..1, as planes of a picture keep it.
 inline std::uint8_t lightLevel(float visible) {
   return static_cast<std::uint8_t>(visible * 255.0f + 0.5f);
 }
+
+// Product of two levels, 255 = 1.
+inline std::uint8_t bothLevels(std::uint8_t a, std::uint8_t b) {
+  const unsigned product = a * static_cast<unsigned>(b) + 128;
+  return static_cast<std::uint8_t>((product + (product >> 8)) >> 8);
+}
+
+// Part of its brightness that a support plane keeps when it sees these parts of sun and sky.
+// @param umbra what the sun's absence leaves of it
+inline cv::Vec3f shadowRatio(const cv::Vec3f& umbra, float sun, float sky) {
+  return umbra * sky + (cv::Vec3f(1, 1, 1) - umbra) * sun;
+}
+
+// How much a change of brightness by `by` calls for the plate: 0 not visible .. 255 only it.
+inline std::uint8_t changeOfLight(float by) {
+  constexpr float kSameRatio = 0.01f,
+                  kPlateRatio = 0.06f;  // from which the plate is taken, and only it
+  const float t = std::clamp((by - kSameRatio) * (1.0f / (kPlateRatio - kSameRatio)), 0.0f, 1.0f);
+  return static_cast<std::uint8_t>(static_cast<int>(255.0f * (t * t * (3.0f - 2.0f * t)) + 0.5f));
+}
+
+// Levels of the relief in the terms of the support planes: the sun alone shades it; what its levels
+// do to the planes they do not do to it.
+// @param planes_umbra luminance() of the planes' umbra
+// @param sun, sky columns [begin, end) of row v
+void takeReliefInPlaneTerms(const Relief& relief, float planes_umbra, int v, int begin, int end,
+                            std::uint8_t* sun, std::uint8_t* sky);
 
 // What support planes and relief see of a light, pixel by pixel: exactly where it changes quickly,
 // interpolated over two pixels where it changes slowly, and at once for squares that are all lit or

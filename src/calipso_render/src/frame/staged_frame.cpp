@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "frame/mask_morphology.hpp"
 #include "place/view_warp.hpp"
 #include "smooth_step.hpp"
 
@@ -54,8 +55,7 @@ cv::Mat differenceFromKey(const StagedFrame& frame, cv::Rect box) {
   cv::bitwise_not(different, different);
   cv::morphologyEx(different, different, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
   cv::Mat whole = cv::Mat::zeros(frame.labels.size(), CV_8U);
-  const int side = 2 * kRestReach + 1;
-  cv::dilate(different, whole(box), cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+  cv::dilate(different, whole(box), disc(kRestReach));
   return whole;
 }
 
@@ -77,26 +77,6 @@ bool findRest(int surface, StagedFrame& frame) {
   return true;
 }
 
-// Whether the video shows an object where its state has it: most of what is seen of it lies within
-// its outline there.
-bool isSeenAt(const StagedFrame& frame, int surface, const Points& vertices) {
-  const Surface& s = frame.prepared.surfaces[surface];
-  const cv::Mat seen = frame.labels == s.index;
-  const cv::Rect box = cv::boundingRect(seen);
-  if (box.empty()) return true;  // something hides it
-  VisibilityBuffer outline(box);
-  outline.draw(projectMesh(vertices, s.triangles, frame.input.camera), 0);
-  int within = 0, all = 0;
-  for (int v = 0; v < box.height; ++v) {
-    const std::uint8_t* row = seen.ptr<std::uint8_t>(box.y + v) + box.x;
-    for (int u = 0; u < box.width; ++u) {
-      if (row[u] == 0) continue;
-      ++all, within += outline.ids(v)[u] != VisibilityBuffer::kNothing;
-    }
-  }
-  return within >= kSeenWithin * all;
-}
-
 // World, m. @param state nullptr: as in the video, at rest
 Points verticesNow(const Prepared& prepared, int surface, const ObjectInFrame* state) {
   const Surface& s = prepared.surfaces[surface];
@@ -113,7 +93,7 @@ void stageObject(int surface, const ObjectInFrame* state, StagedFrame& frame) {
   if (state != nullptr ? state->removed : !s.in_video) return;
   Points vertices = verticesNow(prepared, surface, state);
   const bool edited = frame.edited[surface];
-  if (!edited && prepared.moves[surface] && !isSeenAt(frame, surface, vertices)) return;
+  if (!edited && prepared.moves[surface] && !frame.isSeenAt(surface, vertices)) return;
   if (vertices.size() != s.key_vertices.size()) {
     throw std::invalid_argument("object '" + s.name + "': state has " +
                                 std::to_string(vertices.size()) + " vertices, its model " +
@@ -141,12 +121,30 @@ StagedFrame::StagedFrame(const Prepared& prepared, const RenderParams& params,
       eye(input.camera.world_from_camera.translation().cast<float>()) {
   if (labels.size() != input.bgr.size())
     throw std::invalid_argument("segmentation and frame differ in size");
-  const auto states = statesOf(prepared.surfaces, input.objects);
+  states = statesOf(prepared.surfaces, input.objects);
   for (const ObjectInFrame* state : states)
     edited.push_back(state != nullptr && (state->edited || state->removed));
   const int count = static_cast<int>(states.size());
   for (int i = 0; i < count; ++i) at_rest.push_back(findRest(i, *this));
   for (int i = 0; i < count; ++i) stageObject(i, states[i], *this);
+}
+
+bool StagedFrame::isSeenAt(int surface, const Points& vertices) const {
+  const Surface& s = prepared.surfaces[surface];
+  const cv::Mat seen = labels == s.index;
+  const cv::Rect box = cv::boundingRect(seen);
+  if (box.empty()) return true;  // something hides it
+  VisibilityBuffer outline(box);
+  outline.draw(projectMesh(vertices, s.triangles, input.camera), 0);
+  int within = 0, all = 0;
+  for (int v = 0; v < box.height; ++v) {
+    const std::uint8_t* row = seen.ptr<std::uint8_t>(box.y + v) + box.x;
+    for (int u = 0; u < box.width; ++u) {
+      if (row[u] == 0) continue;
+      ++all, within += outline.ids(v)[u] != VisibilityBuffer::kNothing;
+    }
+  }
+  return within >= kSeenWithin * all;
 }
 
 bool StagedFrame::movesInVideo() const {
@@ -158,10 +156,10 @@ bool StagedFrame::movesInVideo() const {
 
 std::optional<Points> StagedFrame::observed(int surface) const {
   const Surface& s = prepared.surfaces[surface];
-  const ObjectInFrame* state = statesOf(prepared.surfaces, input.objects)[surface];
+  const ObjectInFrame* state = states[surface];
   if (state == nullptr || !state->observed) return std::nullopt;
   const Points vertices = transformed(s.object_vertices, *state->observed);
-  return isSeenAt(*this, surface, vertices) ? std::optional<Points>(vertices) : std::nullopt;
+  return isSeenAt(surface, vertices) ? std::optional<Points>(vertices) : std::nullopt;
 }
 
 Eigen::Vector2f StagedFrame::movement(std::uint32_t id, float u, float v) const {

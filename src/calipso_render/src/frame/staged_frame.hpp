@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calipso_render/renderer.hpp"
+#include "calipso_render/visibility.hpp"
 
 namespace calipso::render {
 
@@ -24,6 +25,9 @@ struct StagedObject {
 
   bool isAtRestInVideo() const { return !observed.points.empty(); }
   cv::Vec3f tint() const { return look.tint.value_or(cv::Vec3f(1, 1, 1)); }
+  Occluder occluder() const {
+    return {&actor.vertices, &actor.surface->triangles, actor.surface->winding};
+  }
 };
 
 // One frame as its state has it: who is where, and what of it the video shows where the key frame
@@ -35,11 +39,12 @@ struct StagedFrame {
   const Prepared& prepared;
   const RenderParams& params;
   const FrameInput& input;
-  Light light;               // of this frame; what the video shows was lit by Prepared::light
-  cv::Mat labels;            // CV_8UC1, of this frame's view
-  bool at_key_camera;        // it is taken from where the key frame is
-  Eigen::Vector3f eye;       // world
-  std::vector<bool> edited;  // per surface
+  Light light;          // of this frame; what the video shows was lit by Prepared::light
+  cv::Mat labels;       // CV_8UC1, of this frame's view
+  bool at_key_camera;   // it is taken from where the key frame is
+  Eigen::Vector3f eye;  // world
+  std::vector<const ObjectInFrame*> states;  // per surface; nullptr: as in the video, at rest
+  std::vector<bool> edited;                  // per surface
   // per surface: the video has it, or a part of it, where the key frame has it
   std::vector<bool> at_rest;
   cv::Mat elsewhere;  // CV_8UC1, whole picture: where it does not; may be empty
@@ -52,6 +57,9 @@ struct StagedFrame {
   bool isElsewhere(int u, int v) const {
     return !elsewhere.empty() && elsewhere.at<std::uint8_t>(v, u) != 0;
   }
+  // Whether the video shows an object where its vertices, in world coordinates, say: most of what
+  // is seen of it lies within its outline there.
+  bool isSeenAt(int surface, const Points& vertices) const;
   // Whether any edited object moves in the video.
   bool movesInVideo() const;
 

@@ -1,11 +1,11 @@
-// The part of FrameCompositor that softens the outlines of what is drawn as those of the video are.
+#include "frame/soft_outlines.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
-#include "frame/frame_compositor.hpp"
+#include "frame/pixel.hpp"
 #include "smooth_step.hpp"
 
 namespace calipso::render {
@@ -47,27 +47,27 @@ cv::Vec3f blurredAt(const cv::Mat& bgr, int u, int v, const std::vector<float>& 
   return sum;
 }
 
-}  // namespace
-
 // How much of its softness an outline lacks: none where the surface is where the video has it, as
 // what drawing misses of the video is carried over there.
-float FrameCompositor::lacksSoftness(std::uint32_t id, int u, int v) const {
-  if (!frame_.objectOf(id).isAtRestInVideo()) return 1.0f;
-  const float moved = frame_.movement(id, static_cast<float>(u), static_cast<float>(v)).norm();
+float lacksSoftness(const StagedFrame& frame, std::uint32_t id, int u, int v) {
+  if (!frame.objectOf(id).isAtRestInVideo()) return 1.0f;
+  const float moved = frame.movement(id, static_cast<float>(u), static_cast<float>(v)).norm();
   return smoothStep(kStillPx, kNonePx, moved);
 }
 
 // @return CV_8UC1 over the region: how much of the softness lacks within `reach` px of an outline
-cv::Mat FrameCompositor::findOutlines(int reach) const {
-  cv::Mat lacking = cv::Mat::zeros(region_.size(), CV_8U);
+cv::Mat findOutlines(const StagedFrame& frame, const DrawnSurfaces& surfaces, int reach) {
+  const cv::Rect region = surfaces.centre().region();
+  const cv::Mat& drawn = surfaces.mask();
+  cv::Mat lacking = cv::Mat::zeros(region.size(), CV_8U);
 #pragma omp parallel for schedule(static)
-  for (int v = 1; v < region_.height - 1; ++v) {
-    const std::uint8_t *above = drawn_.ptr(v - 1), *here = drawn_.ptr(v),
-                       *below = drawn_.ptr(v + 1);
-    for (int u = 1; u < region_.width - 1; ++u) {
+  for (int v = 1; v < region.height - 1; ++v) {
+    const std::uint8_t *above = drawn.ptr(v - 1), *here = drawn.ptr(v), *below = drawn.ptr(v + 1);
+    for (int u = 1; u < region.width - 1; ++u) {
       const bool inner = (here[u - 1] & here[u + 1] & above[u] & below[u]) != 0;
       if (here[u] == 0 || inner) continue;
-      const float part = lacksSoftness(centre_->ids(v)[u], u + region_.x, v + region_.y);
+      const float part =
+          lacksSoftness(frame, surfaces.centre().ids(v)[u], u + region.x, v + region.y);
       lacking.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(255.0f * part + 0.5f);
     }
   }
@@ -75,17 +75,20 @@ cv::Mat FrameCompositor::findOutlines(int reach) const {
   return lacking;
 }
 
-void FrameCompositor::softenOutlines(FrameOutput& out) const {
-  if (frame_.prepared.outline_blur < kLeast) return;
-  const std::vector<float> parts = partsOf(frame_.prepared.outline_blur);
-  const cv::Mat lacking = findOutlines(static_cast<int>(parts.size()) - 1);
-  std::vector<std::vector<std::pair<int, cv::Vec3b>>> softened(region_.height);
+}  // namespace
+
+void softenOutlines(const StagedFrame& frame, const DrawnSurfaces& surfaces, FrameOutput& out) {
+  if (frame.prepared.outline_blur < kLeast) return;
+  const cv::Rect region = surfaces.centre().region();
+  const std::vector<float> parts = partsOf(frame.prepared.outline_blur);
+  const cv::Mat lacking = findOutlines(frame, surfaces, static_cast<int>(parts.size()) - 1);
+  std::vector<std::vector<std::pair<int, cv::Vec3b>>> softened(region.height);
 #pragma omp parallel for schedule(dynamic, 8)
-  for (int j = 0; j < region_.height; ++j) {
+  for (int j = 0; j < region.height; ++j) {
     const std::uint8_t* lacks = lacking.ptr(j);
-    for (int i = 0; i < region_.width; ++i) {
+    for (int i = 0; i < region.width; ++i) {
       if (lacks[i] == 0) continue;
-      const int u = i + region_.x, v = j + region_.y;
+      const int u = i + region.x, v = j + region.y;
       const float part = lacks[i] / 255.0f;
       const cv::Vec3f now = linearPixel(out.bgr, u, v),
                       soft = now + part * (blurredAt(out.bgr, u, v, parts) - now);
@@ -94,10 +97,10 @@ void FrameCompositor::softenOutlines(FrameOutput& out) const {
       if (code != out.bgr.at<cv::Vec3b>(v, u)) softened[j].push_back({u, code});
     }
   }
-  for (int j = 0; j < region_.height; ++j) {
+  for (int j = 0; j < region.height; ++j) {
     for (const auto& [u, code] : softened[j]) {
-      out.bgr.at<cv::Vec3b>(j + region_.y, u) = code;
-      std::uint8_t& source = out.provenance.at<std::uint8_t>(j + region_.y, u);
+      out.bgr.at<cv::Vec3b>(j + region.y, u) = code;
+      std::uint8_t& source = out.provenance.at<std::uint8_t>(j + region.y, u);
       if (source == kOriginal) source = kRendered;
     }
   }

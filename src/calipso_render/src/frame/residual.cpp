@@ -1,14 +1,12 @@
-// The part of FrameCompositor that carries over what drawing misses: the video's pixels around an
-// object at rest, less the same pixels drawn, move along with it. Unmoved, the drawn object is the
-// video again, grain and all.
+#include "frame/residual.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
-#include "frame/frame_compositor.hpp"
-#include "place/view_warp.hpp"
+#include "frame/still_pixels.hpp"
+#include "frame/surface_sun.hpp"
+#include "smooth_step.hpp"
 
 namespace calipso::render {
 namespace {
@@ -26,126 +24,11 @@ constexpr int kCarried = 16;
 
 constexpr float kDark = 1e-5f;  // linear; a plate darker than that says nothing of its shadow
 
-// For every pixel the nearest one of a set.
-struct Nearest {
-  cv::Mat labels;
-  std::vector<cv::Point> place;  // per label; empty: the set is empty
-  cv::Point at(int v, int u) const { return place[labels.at<int>(v, u)]; }
-};
-
-Nearest nearestWhere(const cv::Mat& set) {
-  Nearest nearest;
-  if (cv::countNonZero(set) == 0) return nearest;
-  cv::Mat distance;
-  cv::distanceTransform(set == 0, distance, nearest.labels, cv::DIST_L2, cv::DIST_MASK_5,
-                        cv::DIST_LABEL_PIXEL);
-  for (int v = 0; v < set.rows; ++v) {
-    for (int u = 0; u < set.cols; ++u) {
-      if (set.at<std::uint8_t>(v, u) == 0) continue;
-      const std::size_t label = static_cast<std::size_t>(nearest.labels.at<int>(v, u));
-      if (nearest.place.size() <= label) nearest.place.resize(label + 1);
-      nearest.place[label] = {u, v};
-    }
-  }
-  return nearest;
-}
-
-FrameInput frameAtRest(const Prepared& prepared, const std::vector<bool>& edited) {
-  FrameInput input;
-  prepared.background.plate.convertTo(input.bgr, CV_8U);
-  input.labels = prepared.key_labels;
-  input.camera = prepared.camera, input.stamp_ns = prepared.key_stamp_ns;
-  for (std::size_t i = 0; i < edited.size(); ++i) {
-    if (!edited[i]) continue;
-    ObjectInFrame o;
-    o.name = prepared.surfaces[i].name, o.edited = true,
-    o.vertices = prepared.surfaces[i].key_vertices;
-    input.objects.push_back(o);
-  }
-  return input;
-}
-
 }  // namespace
 
-// The objects in question drawn where the video has them, from what was prepared alone.
-RestPicture FrameCompositor::restPicture(const Prepared& prepared, const RenderParams& params,
-                                         const std::vector<bool>& edited) {
-  const FrameInput input = frameAtRest(prepared, edited);
-  RenderParams plain = params;
-  plain.add_noise = plain.keep_still = plain.carry_residual = false;
-  ShadowCache shadows;
-  RestPicture none;
-  FrameCompositor rest(prepared, plain, input, shadows, none);
-  rest.prepareFrame();
-  RestPicture picture{edited,
-                      cv::Mat(input.bgr.size(), CV_32FC3, cv::Scalar::all(-1)),
-                      cv::Mat::zeros(input.bgr.size(), CV_32FC3),
-                      cv::Mat(input.bgr.size(), CV_16S, cv::Scalar(-1)),
-                      cv::Mat::zeros(input.bgr.size(), CV_8U),
-                      {}};
-  const cv::Rect& r = rest.region_;
-  if (r.empty()) return picture;
-#pragma omp parallel
-  {
-    Row row;
-#pragma omp for schedule(dynamic, 8)
-    for (int v = r.y; v < r.y + r.height; ++v) rest.recordRow(v, row, picture);
-  }
-  rest.recordOwners(picture);
-  return picture;
-}
-
-// The nearest object of every pixel, and how far what is missed can reach.
-void FrameCompositor::recordOwners(RestPicture& picture) const {
-  const cv::Rect& r = region_;
-  cv::Mat owners(r.size(), CV_16S, cv::Scalar(-1));
-  for (int v = 0; v < r.height; ++v) {
-    for (int u = 0; u < r.width; ++u) {
-      const std::uint32_t id = centre_->ids(v)[u];
-      if (id != VisibilityBuffer::kNothing)
-        owners.at<short>(v, u) = static_cast<short>(frame_.objectOf(id).surface);
-    }
-  }
-  const Nearest nearest = nearestWhere(owners >= 0);
-  if (nearest.place.empty()) return;
-  cv::dilate(removed_, picture.reach(r), disc(static_cast<int>(kNonePx)));
-  picture.box = cv::boundingRect(removed_) + r.tl();
-  cv::Mat out = picture.owners(r);
-  for (int v = 0; v < r.height; ++v) {
-    for (int u = 0; u < r.width; ++u) out.at<short>(v, u) = owners.at<short>(nearest.at(v, u));
-  }
-}
-
-// Row v of what is drawn and of what passes beside it.
-void FrameCompositor::recordRow(int v, Row& row, RestPicture& picture) const {
-  row.resize(region_.width);
-  drawRow(v, row);
-  for (int i = 0; i < region_.width; ++i) {
-    const int u = i + region_.x;
-    if (removed_.at<std::uint8_t>(v - region_.y, i) == 0) continue;
-    const cv::Vec4f plain = row.at(i);
-    Drawn drawn;
-    if (isPlain(row.kinds[i]))
-      drawn = {{plain[0], plain[1], plain[2]}, 1.0f};
-    else if (row.kinds[i] == kSpecial)
-      drawn = row.drawn[i];
-    picture.drawn.at<cv::Vec3f>(v, u) = drawn.cover * drawn.colour;
-    if (drawn.cover == 1.0f) continue;
-    const cv::Vec3f behind = behindAt(u, v).colour, revealed = revealedAt(u, v).colour;
-    for (int c = 0; c < 3; ++c)
-      picture.passing.at<cv::Vec3f>(v, u)[c] =
-          (1.0f - drawn.cover) * (revealed[c] > kDark ? behind[c] / revealed[c] : 1.0f);
-  }
-}
-
-void FrameCompositor::findResidual() {
-  if (!frame_.params.carry_residual || !frame_.at_key_camera) return;
-  const auto rests = [](const StagedObject& o) { return o.isAtRestInVideo(); };
-  if (std::none_of(frame_.objects.begin(), frame_.objects.end(), rests)) return;
-  std::vector<bool> resting(frame_.edited.size());
-  for (std::size_t i = 0; i < frame_.edited.size(); ++i)
-    resting[i] = frame_.edited[i] && frame_.at_rest[i];
-  if (rest_.edited != resting) rest_ = restPicture(frame_.prepared, frame_.params, resting);
+Residual::Residual(const StagedFrame& frame, const RevealedPlace& revealed,
+                   const VisibilityBuffer& centre, const RestPicture& rest)
+    : frame_(frame), revealed_(revealed), centre_(centre), rest_(rest), region_(centre.region()) {
   const cv::Rect carried = carriedBox();
   if (carried.empty()) return;
   findMiss(carried);
@@ -154,7 +37,7 @@ void FrameCompositor::findResidual() {
 
 // Pixels that take something over: those of triangles with a point that moved little, and their
 // surroundings.
-cv::Rect FrameCompositor::carriedBox() const {
+cv::Rect Residual::carriedBox() const {
   cv::Rect carried;
   for (std::size_t slot = 0; slot < frame_.objects.size(); ++slot) {
     if (!frame_.objects[slot].isAtRestInVideo()) continue;
@@ -180,7 +63,7 @@ cv::Rect FrameCompositor::carriedBox() const {
 }
 
 // @param carried pixels that may take over what is missed
-void FrameCompositor::findMiss(const cv::Rect& carried) {
+void Residual::findMiss(const cv::Rect& carried) {
   miss_box_ = cv::Rect(carried.x - kCarried, carried.y - kCarried, carried.width + 2 * kCarried,
                        carried.height + 2 * kCarried) &
               rest_.box;
@@ -200,7 +83,7 @@ void FrameCompositor::findMiss(const cv::Rect& carried) {
         continue;
       }
       cv::Vec3f expected = drawn[i];
-      if (passing[i] != cv::Vec3f()) expected += passing[i].mul(revealedAt(box.x + i, v).colour);
+      if (passing[i] != cv::Vec3f()) expected += passing[i].mul(revealed_.at(box.x + i, v).colour);
       miss[i] = {linearFromCode(codes[i][0]) - expected[0],
                  linearFromCode(codes[i][1]) - expected[1],
                  linearFromCode(codes[i][2]) - expected[2], 1.0f};
@@ -210,7 +93,7 @@ void FrameCompositor::findMiss(const cv::Rect& carried) {
 
 // Pixels that no surface at rest is drawn in, but to which its rim may have come, each with the
 // nearest drawn one: carried from neighbour to neighbour, down and up again (Danielsson 1980).
-void FrameCompositor::findRims(const cv::Rect& carried) {
+void Residual::findRims(const cv::Rect& carried) {
   const cv::Rect box = carried - region_.tl();
   const auto isDrawnAtRest = [&](std::uint32_t id) {
     return id != VisibilityBuffer::kNothing && frame_.objectOf(id).isAtRestInVideo();
@@ -218,7 +101,7 @@ void FrameCompositor::findRims(const cv::Rect& carried) {
   cv::Mat index(region_.size(), CV_32S, cv::Scalar(-1));
   for (int v = 0; v < region_.height; ++v) {
     rim_rows_.push_back(rims_.size());
-    const std::uint32_t* ids = centre_->ids(v);
+    const std::uint32_t* ids = centre_.ids(v);
     const std::uint8_t* reach = rest_.reach.ptr<std::uint8_t>(v + region_.y) + region_.x;
     for (int u = box.x; v >= box.y && v < box.br().y && u < box.br().x; ++u) {
       if (reach[u] == 0 || isDrawnAtRest(ids[u])) continue;
@@ -231,9 +114,9 @@ void FrameCompositor::findRims(const cv::Rect& carried) {
     const cv::Point q(rim.u + du, rim.v + dv);
     if (q.x < 0 || q.y < 0 || q.x >= region_.width || q.y >= region_.height) return;
     const int other = index.at<int>(q);
-    const cv::Point drawn = other >= 0                              ? rims_[other].nearest
-                            : isDrawnAtRest(centre_->ids(q.y)[q.x]) ? q
-                                                                    : cv::Point(-1, -1);
+    const cv::Point drawn = other >= 0                             ? rims_[other].nearest
+                            : isDrawnAtRest(centre_.ids(q.y)[q.x]) ? q
+                                                                   : cv::Point(-1, -1);
     if (drawn.x < 0) return;
     const auto squared = [&](const cv::Point& p) {
       return (p.x - rim.u) * (p.x - rim.u) + (p.y - rim.v) * (p.y - rim.v);
@@ -248,12 +131,36 @@ void FrameCompositor::findRims(const cv::Rect& carried) {
   }
 }
 
-void FrameCompositor::addRimResidual(int v, Row& row) const {
+void Residual::addToStretch(int v, int first, int last, int slot, Row& row) const {
+  if (miss_.empty() || !frame_.objects[slot].isAtRestInVideo() || frame_.objects[slot].look.albedo)
+    return;
+  const int surface = frame_.objects[slot].surface, offset = (first + region_.x) % kLightStep;
+  const cv::Point corner = frame_.prepared.appearances[surface].region.tl();
+  for (int i = first; i < last; ++i) {
+    const float u = static_cast<float>(i + region_.x),
+                from_u = row.run.key_u[offset + i - first] + static_cast<float>(corner.x),
+                from_v = row.run.key_v[offset + i - first] + static_cast<float>(corner.y);
+    const Eigen::Vector2f moved(u - from_u, static_cast<float>(v) - from_v);
+    if (!(moved.squaredNorm() < kNonePx * kNonePx)) continue;
+    cv::Vec4f colour = row.at(i);
+    addAt(from_u, from_v, moved, surface, frame_.objects[slot].tint(), colour);
+    row.set(i, colour);
+  }
+}
+
+void Residual::addToPixel(std::uint32_t id, int u, int v, cv::Vec4f& colour) const {
+  const StagedObject& object = frame_.objectOf(id);
+  if (miss_.empty() || !object.isAtRestInVideo() || object.look.albedo) return;
+  const Eigen::Vector2f moved = frame_.movement(id, static_cast<float>(u), static_cast<float>(v));
+  addAt(u - moved.x(), v - moved.y(), moved, object.surface, object.tint(), colour);
+}
+
+void Residual::addRims(int v, Row& row) const {
   if (rims_.empty()) return;
   for (std::size_t i = rim_rows_[v - region_.y]; i < rim_rows_[v - region_.y + 1]; ++i) {
     const Rim& rim = rims_[i];
     if (rim.nearest.x < 0 || row.source[rim.u] == kOriginal) continue;
-    const std::uint32_t id = centre_->ids(rim.nearest.y)[rim.nearest.x];
+    const std::uint32_t id = centre_.ids(rim.nearest.y)[rim.nearest.x];
     const cv::Point from = rim.nearest + region_.tl();
     const Eigen::Vector2f moved =
         frame_.movement(id, static_cast<float>(from.x), static_cast<float>(from.y));
@@ -263,8 +170,8 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
     if (away.dot(away) > reach * reach && moved.norm() > kStillPx) continue;
     cv::Vec4f colour = row.at(rim.u);
     const cv::Vec3f plain(colour[0], colour[1], colour[2]);
-    addResidual(rim.u + region_.x - moved.x(), v - moved.y(), moved, frame_.objectOf(id).surface,
-                cv::Vec3f::all(1), colour);
+    addAt(rim.u + region_.x - moved.x(), v - moved.y(), moved, frame_.objectOf(id).surface,
+          cv::Vec3f::all(1), colour);
     // Beside a surface of a new look the video has the old one's hue.
     const bool repainted =
         away.dot(away) <= kRepaintReach * kRepaintReach && frame_.objectOf(id).look.changes();
@@ -277,8 +184,8 @@ void FrameCompositor::addRimResidual(int v, Row& row) const {
 
 // What drawing misses of the video at (u, v), on a pixel to which the surface there has moved.
 // @param tint of the surface's new look, which what was missed takes on
-void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved, int owner,
-                                  const cv::Vec3f& tint, cv::Vec4f& colour) const {
+void Residual::addAt(float u, float v, const Eigen::Vector2f& moved, int owner,
+                     const cv::Vec3f& tint, cv::Vec4f& colour) const {
   const float squared = moved.squaredNorm();
   const bool sways = frame_.prepared.sways[owner];
   const float none = sways ? kNoneSwaying : kNonePx;
@@ -297,7 +204,7 @@ void FrameCompositor::addResidual(float u, float v, const Eigen::Vector2f& moved
 }
 
 // @return 0 where nothing is known of this owner
-cv::Vec4f FrameCompositor::missAt(float u, float v, int owner) const {
+cv::Vec4f Residual::missAt(float u, float v, int owner) const {
   const float fu = std::floor(u), fv = std::floor(v), x = u - fu, y = v - fv;
   const int i = static_cast<int>(fu) - miss_box_.x, j = static_cast<int>(fv) - miss_box_.y;
   cv::Vec4f sum;

@@ -1,11 +1,9 @@
-// The part of FrameCompositor that draws pixels which see more than the middle of one triangle:
-// silhouettes by a place for each sheet in them.
+#include "frame/sheets.hpp"
 
 #include <algorithm>
 #include <array>
 
 #include "draw/wide_loops.hpp"
-#include "frame/frame_compositor.hpp"
 #include "frame/marked.hpp"
 
 namespace calipso::render {
@@ -41,19 +39,32 @@ CALIPSO_WIDE_LOOPS void findSheet(const EdgeCoverage::Pixel& edge, int of,
 
 }  // namespace
 
+Sheets::Sheets(const DrawnSurfaces& surfaces, const EdgeCoverage& edges,
+               const SurfaceShader& shader, const Screen& screen)
+    : surfaces_(surfaces),
+      edges_(edges),
+      shader_(shader),
+      screen_(screen),
+      region_(surfaces.centre().region()) {}
+
+void Sheets::draw(int v, Row& row) const {
+  find(v, row);
+  shade(v, row);
+}
+
 // One place for each sheet of each object in a pixel: the sample nearest to the pixel's centre.
-void FrameCompositor::addSheets(int u, int v, std::vector<Sheet>& sheets) const {
-  if (screenAt(u, v) == 1.0f) return;
+void Sheets::add(int u, int v, std::vector<Sheet>& sheets) const {
+  if (screen_.at(u, v) == 1.0f) return;
   const int column = u - region_.x;
-  const EdgeCoverage::Pixel* edge = edges_->at(u, v);
+  const EdgeCoverage::Pixel* edge = edges_.at(u, v);
   if (edge == nullptr) {
-    const std::uint32_t id = centre_->idAt(u, v);
-    if (isDrawn(id, u, v))
+    const std::uint32_t id = surfaces_.centre().idAt(u, v);
+    if (surfaces_.isDrawn(id, u, v))
       sheets.push_back({{id, static_cast<float>(u), static_cast<float>(v)}, column, 1.0f});
     return;
   }
   const auto draws = [&](std::uint32_t id) {
-    return all_drawn_ ? id != VisibilityBuffer::kNothing : isDrawn(id, u, v);
+    return surfaces_.isAllDrawn() ? id != VisibilityBuffer::kNothing : surfaces_.isDrawn(id, u, v);
   };
   std::array<std::uint8_t, EdgeCoverage::kSamples> done{}, sees;
   for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
@@ -72,7 +83,7 @@ void FrameCompositor::addSheets(int u, int v, std::vector<Sheet>& sheets) const 
 }
 
 // Sheets of the row's pixels that need more than their centre, or more than its triangle's map.
-void FrameCompositor::findSheets(int v, Row& row) const {
+void Sheets::find(int v, Row& row) const {
   constexpr std::uint8_t kPlaces = kSpecial | kPlainEdge;
   row.sheets.clear();
   const Kind* kinds = row.kinds.data();
@@ -81,14 +92,15 @@ void FrameCompositor::findSheets(int v, Row& row) const {
     row.drawn[i] = {};
     const float u = static_cast<float>(i + region_.x);
     if (kinds[i] == kSpecial)
-      addSheets(i + region_.x, v, row.sheets);
+      add(i + region_.x, v, row.sheets);
     else
-      row.sheets.push_back({{centre_->ids(v - region_.y)[i], u, static_cast<float>(v)}, i, 1.0f});
+      row.sheets.push_back(
+          {{surfaces_.centre().ids(v - region_.y)[i], u, static_cast<float>(v)}, i, 1.0f});
   }
 }
 
 // Row v's sheets, into row.drawn.
-void FrameCompositor::shadeSheets(int v, Row& row) const {
+void Sheets::shade(int v, Row& row) const {
   SurfacePlace places[SurfaceRun::kMost];
   const std::size_t all = row.sheets.size();
   for (std::size_t i = 0; i < all;) {
@@ -98,7 +110,7 @@ void FrameCompositor::shadeSheets(int v, Row& row) const {
            VisibilityBuffer::objectOf(row.sheets[i].place.id) == slot;
          ++i)
       places[i - first] = row.sheets[i].place;
-    shadePlaces(places, static_cast<int>(i - first), slot, row.run);
+    shader_.shadePlaces(places, static_cast<int>(i - first), slot, row.run);
     for (std::size_t k = 0; k < i - first; ++k) {
       const Sheet& sheet = row.sheets[first + k];
       Drawn& drawn = row.drawn[sheet.column];
@@ -111,7 +123,7 @@ void FrameCompositor::shadeSheets(int v, Row& row) const {
     if (i + 1 < all && row.sheets[i + 1].column == column) continue;
     Drawn& drawn = row.drawn[column];
     drawn.colour /= drawn.cover;
-    drawn.cover *= 1.0f - screenAt(column + region_.x, v);
+    drawn.cover *= 1.0f - screen_.at(column + region_.x, v);
   }
 }
 

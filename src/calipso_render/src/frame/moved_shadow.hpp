@@ -1,0 +1,21 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "calipso_render/visibility.hpp"
+#include "frame/seen_place.hpp"
+#include "frame/staged_frame.hpp"
+
+namespace calipso::render {
+
+// What the edited objects leave of sun and sky where they are now.
+struct MovedShadow {
+  // The frame must outlive this.
+  MovedShadow(const StagedFrame& frame, const SeenPlace& place);
+
+  std::unique_ptr<Visibility> sun, sky;
+  cv::Rect bounds;  // of the picture: what they can shade from the sun
+};
+
+}  // namespace calipso::render

@@ -1,0 +1,116 @@
+#include "frame/passing_shadows.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
+#include "frame/mask_morphology.hpp"
+#include "frame/shade_reach.hpp"
+#include "place/place_samples.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kDarker = 0.97f;  // of the plate's brightness: a passing shadow,
+// likewise in another view, to which the plate is carried with small errors
+constexpr float kDarkerElsewhere = 0.9f;
+constexpr int kLeastPassing = 5;    // px across, and in another view
+constexpr int kLeastElsewhere = 9;  // that somewhere within
+constexpr int kPassingReach = 12;   // px: an edge that the plate misses looks like a narrow shadow
+constexpr int kRimShare = 50;   // of the picture's width: how far a mask may miss a moving object
+constexpr int kMargin = 6;      // px around a shadow
+constexpr float kQuiet = 5.0f;  // code values of spread over time: the background rests
+
+cv::Mat square(int side) { return cv::Mat::ones(side, side, CV_8U); }
+
+// Keeps where all channels are darkened alike.
+// @param now, plate CV_8UC3
+// @param dark CV_8UC1, in and out
+void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) {
+  const cv::Rect box = cv::boundingRect(dark);
+  if (box.empty()) return;
+  cv::Mat shaded, lit;
+  cv::blur(now(box), shaded, {5, 5});
+  cv::blur(plate(box), lit, {5, 5});
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < box.height; ++v) {
+    std::uint8_t* row = dark.ptr<std::uint8_t>(box.y + v) + box.x;
+    for (int u = 0; u < box.width; ++u) {
+      if (row[u] == 0) continue;
+      if (!darkenedAlike(shaded.at<cv::Vec3b>(v, u), lit.at<cv::Vec3b>(v, u))) row[u] = 0;
+    }
+  }
+}
+
+// PlateInView::quiet
+cv::Mat quietPlaces(const StagedFrame& frame, const SeenPlace& place) {
+  cv::Mat at_key =
+      (frame.prepared.background.count > 0) & (frame.prepared.background.spread < kQuiet);
+  if (frame.prepared.background.drifting.established())
+    at_key.setTo(0, frame.prepared.background.drifting.where());
+  if (!frame.prepared.scenery.empty() && !frame.prepared.nearness.empty())
+    at_key.setTo(0, frame.prepared.nearness == 0.0f);
+  if (place.from_key.empty()) return at_key;
+  cv::Mat here;
+  cv::remap(at_key, here, place.from_key, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
+            cv::Scalar(0));
+  return here;
+}
+
+PlateInView plateInView(const StagedFrame& frame, const SeenPlace& place) {
+  const bool same_view = frame.at_key_camera;
+  PlateInView plate;
+  if (same_view)
+    frame.prepared.background.plate.convertTo(plate.codes, CV_8U);
+  else
+    plate.codes = codeFromLinear(place.plate);
+  cv::cvtColor(plate.codes, plate.darker, cv::COLOR_BGR2GRAY);
+  cv::blur(plate.darker, plate.darker, {5, 5});
+  plate.darker.convertTo(plate.darker, CV_8U, same_view ? kDarker : kDarkerElsewhere);
+  plate.quiet = quietPlaces(frame, place);
+  return plate;
+}
+
+// Takes out what is too narrow for a shadow.
+void keepWide(bool same_view, cv::Mat& dark) {
+  cv::morphologyEx(dark, dark, cv::MORPH_OPEN, square(kLeastPassing));
+  if (same_view) return;
+  cv::Mat broad;
+  cv::morphologyEx(dark, broad, cv::MORPH_OPEN, square(kLeastElsewhere));
+  cv::dilate(broad, broad, square(2 * kPassingReach + 1));
+  dark &= broad;
+}
+
+// The rim that the mask of another moving object has missed is no shadow.
+void takeOutRims(const StagedFrame& frame, cv::Mat& dark) {
+  for (std::size_t i = 0; i < frame.edited.size(); ++i) {
+    if (frame.edited[i] || !frame.prepared.moves[i]) continue;
+    cv::Mat near;
+    cv::dilate(frame.labels == frame.prepared.surfaces[i].index, near,
+               disc(std::max(2, frame.labels.cols / kRimShare)));
+    dark.setTo(0, near);
+  }
+}
+
+}  // namespace
+
+cv::Mat passingShadows(const StagedFrame& frame, const SeenPlace& place, const cv::Mat& unmirrored,
+                       PlateInView& at_key) {
+  if (!frame.movesInVideo()) return {};
+  if (frame.at_key_camera && at_key.codes.empty()) at_key = plateInView(frame, place);
+  const PlateInView plate = frame.at_key_camera ? at_key : plateInView(frame, place);
+  cv::Mat now;
+  cv::cvtColor(unmirrored, now, cv::COLOR_BGR2GRAY);
+  cv::blur(now, now, {5, 5});
+  cv::Mat dark = now < plate.darker;
+  dark &= plate.quiet & (frame.labels == 0);
+  const cv::Mat reach = reachOfPassing(frame, place.view);
+  if (!reach.empty()) dark &= reach;
+  keepDarkenedAlike(unmirrored, plate.codes, dark);
+  keepWide(frame.at_key_camera, dark);
+  cv::dilate(dark, dark, disc(kMargin));
+  takeOutRims(frame, dark);
+  return dark;
+}
+
+}  // namespace calipso::render

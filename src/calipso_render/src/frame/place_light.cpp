@@ -1,0 +1,140 @@
+#include "frame/place_light.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "calipso_render/colour.hpp"
+#include "frame/mask_morphology.hpp"
+#include "frame/plane_light.hpp"
+#include "frame/plane_sky.hpp"
+#include "frame/tiled_filter.hpp"
+
+namespace calipso::render {
+namespace {
+
+// levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
+constexpr std::uint8_t kSoftSky = 51;
+// of the sky's light: differences of levels that come of no more are less than kSameLevels, or no
+// more than kSoftSky, also once they are rounded
+constexpr float kSameSky = (kSameLevels - 2.1f) * kPerLevel,
+                kLittleSky = (kSoftSky - 2.1f) * kPerLevel;
+
+}  // namespace
+
+PlaceLight::PlaceLight(const StagedFrame& frame, const SeenPlace& place,
+                       const RestingLight& resting, const MovedShadow& moved,
+                       const EditedRegion& region, const SquareMask& covered)
+    : frame_(frame),
+      place_(place),
+      resting_(resting),
+      moved_(moved),
+      region_(region.all),
+      sun_(region_.size(), CV_8U, cv::Scalar(255)),
+      sky_(region_.size(), CV_8U),
+      sun_before_(resting.sunBefore()(region_)),
+      sky_before_(resting.skyBefore()(region_)),
+      takes_(resting.takes()(region_)),
+      sun_changes_(region_) {
+  measure(region.revealed, covered);
+  findRelit();
+}
+
+void PlaceLight::measure(const cv::Rect& revealed, const SquareMask& covered) {
+  const cv::Rect bounds = moved_.bounds & region_;
+  if (!bounds.empty()) {
+    cv::Mat part = sun_(bounds - region_.tl());
+    planesInLight(place_.view, *moved_.sun, bounds, covered, part, &sun_changes_);
+  }
+  sun_changes_.add(resting_.sunless());
+  const SkyGrid sky(place_.view.planes(), *moved_.sky, frame_.input.bgr.size(), region_, covered);
+  SquareMask sky_changes(region_);
+  findSkyChanges(sky, sky_changes);
+  sun_changes_.remove(covered);
+  relightable_ = sun_changes_.grown(frame_.params.background.shadow_margin_px + 2);
+  relightable_.add(sky_changes);
+  relightable_.set(revealed);
+  relightable_.remove(covered);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = region_.y; v < region_.br().y; ++v) {
+    relightable_.visitRow(v, region_.x, region_.br().x,
+                          [&](int begin, int end) { measureRun(sky, v, begin, end); });
+  }
+}
+
+// Squares of the region in which the sky's light may differ from before.
+void PlaceLight::findSkyChanges(const SkyGrid& now, SquareMask& changes) {
+  constexpr int kSide = SquareMask::kSide;
+  const int first = region_.y / kSide, last = (region_.br().y - 1) / kSide;
+#pragma omp parallel for schedule(static)
+  for (int j = first; j <= last; ++j) {
+    const cv::Rect row = cv::Rect(region_.x, j * kSide, region_.width, kSide) & region_;
+    const std::vector<float> differences = now.differences(resting_.originalsSky(), row);
+    const auto at = [&](int u) {
+      return differences.begin() + (u / now.step() - row.x / now.step());
+    };
+    for (int u = region_.x / kSide * kSide; u < region_.br().x; u += kSide) {
+      const cv::Rect square = cv::Rect(u, row.y, kSide, row.height) & region_;
+      const float difference = *std::max_element(at(square.x), at(square.br().x - 1) + 1);
+      if (difference > kSameSky) changes.set(square);
+      if (difference > kLittleSky) sun_changes_.set(square);
+    }
+  }
+}
+
+// Columns [begin, end) of row v.
+void PlaceLight::measureRun(const SkyGrid& sky_grid, int v, int begin, int end) {
+  std::uint8_t *sun = sun_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x),
+               *sky = sky_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x);
+  sky_grid.levels(place_.view.planes(), *moved_.sky, v, begin, end, sky);
+  resting_.leaveHidden(v, begin, end, sky);
+  resting_.addOthersSun(v, begin, end, sun);
+  takeReliefInPlaneTerms(place_.view.relief(), luminance(frame_.prepared.umbra), v, begin, end, sun,
+                         sky);
+}
+
+// Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by
+// some pixels, so what lies that near to both the shadow and the change is taken from the plate. A
+// change of single pixels is noise of the shadow's border and moves nothing.
+void PlaceLight::findRelit() {
+  relit_ = cv::Mat::zeros(region_.size(), CV_8U);
+  const int reach = frame_.params.background.shadow_margin_px, side = reach + 2;
+  const auto around = [side](const cv::Rect& r) {
+    return r.empty() ? r
+                     : cv::Rect(r.x - side, r.y - side, r.width + 2 * side, r.height + 2 * side);
+  };
+  const cv::Rect box = around(resting_.shadedBox()) & around(sun_changes_.box()) & region_;
+  if (box.empty()) return;
+  cv::Mat change(box.size(), CV_8U);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = box.y; v < box.br().y; ++v)
+    findChange(v, box.x, box.br().x, change.ptr<std::uint8_t>(v - box.y));
+  cv::Mat grown(box.size(), CV_8U);
+  filterTiles(openedByThree(change), reach, grown, DiscDilation(reach));
+  cv::min(grown, resting_.shaded()(box), grown);
+  filterTiles(grown, 1, relit_(box - region_.tl()), [](const cv::Mat& from, cv::Mat& to) {
+    cv::blur(from, to, {3, 3});
+  });
+}
+
+// changeOfLight() at columns [from, to) of row v, where it is more than a pixel can follow.
+void PlaceLight::findChange(int v, int from, int to, std::uint8_t* out) const {
+  std::memset(out, 0, to - from);
+  const auto rowOf = [&](const cv::Mat& picture) {
+    return picture.ptr<std::uint8_t>(v - region_.y) - region_.x;
+  };
+  const std::uint8_t *sun = rowOf(sun_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_),
+                     *sky_before = rowOf(sky_before_), *takes = rowOf(takes_);
+  const float umbra = kPerLevel * luminance(frame_.prepared.umbra), lit = kPerLevel - umbra;
+  sun_changes_.visitRow(v, from, to, [&](int begin, int end) {
+    for (int u = begin; u < end; ++u) {
+      const int more_sky = sky[u] - sky_before[u], more_sun = sun[u] - sun_before[u];
+      const int beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
+      if (takes[u] == 0 || (more_sun == 0 && beyond == 0)) continue;
+      out[u - from] = changeOfLight(
+          std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
+    }
+  });
+}
+
+}  // namespace calipso::render

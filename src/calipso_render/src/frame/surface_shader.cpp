@@ -1,0 +1,164 @@
+#include "frame/surface_shader.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+
+#include "draw/kernels.hpp"
+#include "frame/marked.hpp"
+
+namespace calipso::render {
+namespace {
+
+void copyTo(float (&to)[3], const cv::Vec3f& from) { std::copy_n(from.val, 3, to); }
+
+}  // namespace
+
+SurfaceShader::SurfaceShader(const StagedFrame& frame, const SeenPlace& place,
+                             const DrawnSurfaces& surfaces, const MovedShadow& moved,
+                             const RestingLight& resting)
+    : frame_(frame),
+      planes_(place.view.planes()),
+      centre_(surfaces.centre()),
+      region_(centre_.region()),
+      maps_(findMaps()),
+      sun_(frame, planes_, surfaces, maps_, moved, resting) {
+  for (const StagedObject& object : frame.objects) shades_.push_back(shadeOf(object));
+}
+
+std::vector<SurfaceMaps> SurfaceShader::findMaps() const {
+  std::vector<SurfaceMaps> maps;
+  for (std::size_t slot = 0; slot < frame_.objects.size(); ++slot) {
+    const StagedObject& object = frame_.objects[slot];
+    const bool seen =
+        object.edited ||
+        !(boundsOf(object.actor.screen, 0, frame_.input.bgr.size()) & region_).empty();
+    maps.push_back(seen ? SurfaceMaps(object.actor, appearanceOf(static_cast<int>(slot)),
+                                      frame_.light, frame_.eye)
+                        : SurfaceMaps());
+  }
+  return maps;
+}
+
+// Light and look of an object, laid out for the shading of many points.
+SurfaceShade SurfaceShader::shadeOf(const StagedObject& object) const {
+  const Light& light = frame_.light;
+  SurfaceShade s;
+  Eigen::Map<Eigen::Vector3f>(s.direction) = light.direction;
+  copyTo(s.sun, light.sun), copyTo(s.least, 0.02f * light.ambient[0]);
+  s.terms = 1;
+  for (int i = 0; i < 9; ++i) {
+    copyTo(s.ambient[i], light.ambient[i]);
+    if (light.ambient[i] != cv::Vec3f()) s.terms = i == 0 ? 1 : i < 4 ? 4 : 9;
+  }
+  copyTo(s.floor, lightFloor(frame_.prepared.appearances[object.surface].mean_light));
+  copyTo(s.tint, object.tint());
+  s.specular = object.gloss.specular, s.roughness = object.gloss.roughness;
+  s.around = object.gloss.around;
+  return s;
+}
+
+unsigned SurfaceShader::shadeStretch(int v, int first, int last, int slot, Row& row) const {
+  const std::uint32_t* ids = centre_.ids(v - region_.y);
+  const int offset = (first + region_.x) % kLightStep, count = last - first;
+  SurfaceRun& run = row.run;
+  std::iota(run.column + offset, run.column + offset + count,
+            static_cast<float>(first + region_.x));
+  const unsigned traits = kernels().locate(maps_[slot].triangles(), ids + first,
+                                           {v, count, offset, appearanceOf(slot).region.tl()},
+                                           planes_.sightLines(v), run);
+  reflectStretch(traits, v, first, last, slot, row);
+  sun_.onStretch(v, first, last, slot, row);
+  kernels().shade(shades_[slot], offset, offset + count, run);
+  for (int c = 0; c < 3; ++c) std::copy_n(&run.colour[c][offset], count, &row.colour[c][first]);
+  std::fill_n(&row.colour[3][first], count, 1.0f);
+  for (int i = nextMarked(row.kinds.data(), first, last, kPlainEdge); i < last;
+       i = nextMarked(row.kinds.data(), i + 1, last, kPlainEdge)) {
+    const cv::Vec3f& c = row.drawn[i].colour;
+    row.set(i, {c[0], c[1], c[2], 1.0f});
+  }
+  return traits;
+}
+
+void SurfaceShader::shadeThin(int v, int first, int last, int slot, Row& row) const {
+  const std::uint32_t* ids = centre_.ids(v - region_.y);
+  SurfaceRun& run = row.run;
+  for (int i = first; i < last; ++i) {
+    if (!maps_[slot].of(VisibilityBuffer::triangleOf(ids[i])).is(TriangleMap::kThin)) continue;
+    const SurfacePlace place{ids[i], static_cast<float>(i + region_.x), static_cast<float>(v)};
+    shadePlaces(&place, 1, slot, run);
+    row.set(i, {run.colour[0][0], run.colour[1][0], run.colour[2][0], 1.0f});
+  }
+}
+
+// Reflectance of the pixels [first, last) of row v at their places in row.run.
+// @param traits of their triangles
+void SurfaceShader::reflectStretch(unsigned traits, int v, int first, int last, int slot,
+                                   Row& row) const {
+  const int offset = (first + region_.x) % kLightStep;
+  const std::optional<cv::Vec3f>& albedo = frame_.objects[slot].look.albedo;
+  SurfaceRun& run = row.run;
+  if (albedo) {
+    for (int c = 0; c < 3; ++c) std::fill_n(&run.colour[c][offset], last - first, (*albedo)[c]);
+    return;
+  }
+  const Appearance& appearance = appearanceOf(slot);
+  if ((traits & TriangleMap::kPictured) != 0)
+    kernels().sample(appearance.albedo, offset, offset + last - first, run);
+  if ((traits & TriangleMap::kTextured) != 0) addTexture(v, first, last, slot, row);
+}
+
+// What the texture says of their reflectance.
+void SurfaceShader::addTexture(int v, int first, int last, int slot, Row& row) const {
+  const SurfaceTexture& texture = appearanceOf(slot).texture;
+  const int offset = (first + region_.x) % kLightStep;
+  const std::uint32_t* ids = centre_.ids(v - region_.y);
+  for (int i = first; i < last; ++i) {
+    const int triangle = VisibilityBuffer::triangleOf(ids[i]);
+    const TriangleMap& map = maps_[slot].of(triangle);
+    if (!map.is(TriangleMap::kTextured) || map.is(TriangleMap::kThin)) continue;
+    const Eigen::Vector3f weights =
+        barycentric(frame_.objects[slot].actor.screen, triangle, static_cast<float>(i + region_.x),
+                    static_cast<float>(v));
+    row.run.mix(offset + i - first, texture.at(triangle, weights), map.is(TriangleMap::kPictured));
+  }
+}
+
+void SurfaceShader::shadePlaces(const SurfacePlace* places, int count, int slot,
+                                SurfaceRun& run) const {
+  Eigen::Vector3f weights[SurfaceRun::kMost];
+  maps_[slot].locate(places, count, run, weights);
+  reflectPlaces(places, count, slot, weights, run);
+  const Eigen::Vector3f axis = frame_.input.camera.world_from_camera.linear().col(2).cast<float>();
+  int uneven[SurfaceRun::kMost], found = 0;
+  for (int k = 0; k < count; ++k) {
+    const float depth =
+        axis.x() * run.sight[0][k] + axis.y() * run.sight[1][k] + axis.z() * run.sight[2][k];
+    const auto sun = sun_.between(places[k].u, places[k].v, 1.0f / depth, slot);
+    run.sun[k] = sun.value_or(0.0f);
+    if (!sun) uneven[found++] = k;
+  }
+  sun_.onPlaces(uneven, found, nullptr, run);
+  kernels().shade(shades_[slot], 0, count, run);
+}
+
+// Reflectance of places of one object, run.colour.
+// @param weights barycentric, of each place
+void SurfaceShader::reflectPlaces(const SurfacePlace* places, int count, int slot,
+                                  const Eigen::Vector3f* weights, SurfaceRun& run) const {
+  const Appearance& appearance = appearanceOf(slot);
+  const std::optional<cv::Vec3f>& albedo = frame_.objects[slot].look.albedo;
+  if (albedo) {
+    for (int c = 0; c < 3; ++c) std::fill_n(run.colour[c], count, (*albedo)[c]);
+    return;
+  }
+  kernels().sample(appearance.albedo, 0, count, run);
+  for (int k = 0; k < count; ++k) {
+    const int triangle = VisibilityBuffer::triangleOf(places[k].id);
+    const Appearance::Source source = appearance.sources[triangle];
+    if (source != Appearance::Source::kPicture)
+      run.mix(k, appearance.texture.at(triangle, weights[k]), source == Appearance::Source::kBoth);
+  }
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,95 @@
+#include "frame/staged_frame.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "ball_setting.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+TEST(StagedFrame, TellsHowFarASurfaceHasMoved) {
+  const Setting s(params());
+  const RenderParams p = params();
+  const Eigen::Vector3f move(0.02f, 0.0f, 0.01f);
+  const FrameInput in = s.input(true, move);
+  const StagedFrame frame(*s.prepared, p, in);
+  ASSERT_EQ(frame.objects.size(), 1u);
+  ASSERT_TRUE(frame.objects[0].edited && frame.objects[0].isAtRestInVideo());
+  VisibilityBuffer seen(frame.whole());
+  seen.draw(frame.objects[0].actor.screen, 0);
+  int pixels = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const std::uint32_t id = seen.ids(v)[u];
+      if (id == VisibilityBuffer::kNothing) continue;
+      const Eigen::Vector3f now =
+          surfacePoint(frame.objects[0].actor, VisibilityBuffer::triangleOf(id), u, v, frame.eye)
+              .position;
+      const Eigen::Vector2d expected = in.camera.projectWorld(now.cast<double>()) -
+                                       in.camera.projectWorld((now - move).cast<double>());
+      // within a triangle of some pixels the picture is all but affine
+      ASSERT_LT((frame.movement(id, u, v).cast<double>() - expected).norm(), 0.05);
+      ASSERT_EQ(frame.stillness(id, u, v), 0.0f);
+      ++pixels;
+    }
+  }
+  EXPECT_GT(pixels, 300);
+}
+
+TEST(StagedFrame, WhatIsNotMovedIsStill) {
+  const Setting s(params());
+  const RenderParams p = params();
+  const FrameInput in = s.input(true, Eigen::Vector3f::Zero());
+  const StagedFrame frame(*s.prepared, p, in);
+  VisibilityBuffer seen(frame.whole());
+  seen.draw(frame.objects[0].actor.screen, 0);
+  const Eigen::Vector2d middle = in.camera.projectWorld(kCentre);
+  const int u = static_cast<int>(middle.x()), v = static_cast<int>(middle.y());
+  ASSERT_NE(seen.idAt(u, v), VisibilityBuffer::kNothing);
+  EXPECT_EQ(frame.stillness(seen.idAt(u, v), u, v), 1.0f);
+}
+
+TEST(StagedFrame, WhatIsRemovedCannotBeSeenAndWhatIsNotEditedHasNoPlaceToReturnTo) {
+  const Setting s(params());
+  const RenderParams p = params();
+  FrameInput in = s.input(false, Eigen::Vector3f::Zero());
+  const StagedFrame same(*s.prepared, p, in);
+  ASSERT_EQ(same.objects.size(), 1u);
+  EXPECT_FALSE(same.edited[0] || same.objects[0].edited || same.objects[0].isAtRestInVideo());
+  in.objects[0].removed = true;
+  const StagedFrame gone(*s.prepared, p, in);
+  EXPECT_TRUE(gone.edited[0]);
+  EXPECT_TRUE(gone.objects.empty());
+}
+
+// Of what sways, the part that differs from the key frame is elsewhere, the other one is at rest.
+TEST(StagedFrame, APartOfWhatSwaysMayBeElsewhere) {
+  const Setting s(params());
+  Prepared prepared = *s.prepared;
+  prepared.sways[0] = true;
+  const RenderParams p = params();
+  FrameInput in = s.input(true, Eigen::Vector3f::Zero());
+  in.bgr = in.bgr.clone();
+  const Eigen::Vector2d middle = in.camera.projectWorld(kCentre);
+  const int u = static_cast<int>(middle.x()), v = static_cast<int>(middle.y());
+  in.bgr(cv::Rect(0, 0, u, kHeight)).setTo(cv::Scalar::all(255));
+  const StagedFrame frame(prepared, p, in);
+  ASSERT_TRUE(frame.at_rest[0]);
+  EXPECT_TRUE(frame.isElsewhere(u - 8, v));
+  EXPECT_FALSE(frame.isElsewhere(u + 8, v));
+}
+
+TEST(StagedFrame, RefusesASegmentationOfAnotherSize) {
+  const Setting s(params());
+  const RenderParams p = params();
+  FrameInput in = s.input(true, Eigen::Vector3f::Zero());
+  in.labels = cv::Mat::zeros(10, 10, CV_8U);
+  EXPECT_THROW(StagedFrame(*s.prepared, p, in), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace calipso::render
