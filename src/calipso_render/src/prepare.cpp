@@ -28,10 +28,9 @@ std::vector<Actor> keyActors(const Prepared& p) {
   return actors;
 }
 
-// The key frame, and further frames in which the poses of all moving objects are known, evenly
-// spaced.
-std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::Mat& key_picture,
-                          std::size_t most) {
+// The key frame, and up to kTextureViews further frames in which the poses of all moving objects are
+// known, evenly spaced.
+std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::Mat& key_picture) {
   std::vector<View> views = {{key_picture, p.key_labels, p.camera, keyActors(p)}};
   std::vector<const ClipFrame*> usable;
   for (std::size_t i = 1; i < clip.frames().size(); ++i) {
@@ -45,7 +44,7 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
       all = all && (!p.moves[k] || known(p.surfaces[k]));
     if (all) usable.push_back(&f);
   }
-  const std::size_t count = std::min(usable.size(), most);
+  const std::size_t count = std::min(usable.size(), kTextureViews);
   for (std::size_t i = 0; i < count; ++i) {
     const ClipFrame& f = *usable[(i + 1) * usable.size() / count - 1];
     View view{{}, f.labels, f.camera, {}};
@@ -62,6 +61,14 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
     views.push_back(std::move(view));
   }
   return views;
+}
+
+// The key frame's view and up to kLightViews others, evenly spaced. Pictures are shared.
+std::vector<View> lightViewsOf(const std::vector<View>& views) {
+  std::vector<View> some = {views.front()};
+  const std::size_t further = views.size() - 1, count = std::min(further, kLightViews);
+  for (std::size_t i = 0; i < count; ++i) some.push_back(views[(i + 1) * further / count]);
+  return some;
 }
 
 std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
@@ -156,23 +163,23 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);
   const std::vector<Actor> actors = keyActors(p);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
-  const std::vector<View> views = viewsOf(clip, p, picture, kLightViews);
-  p.light_views = static_cast<int>(views.size());
   Stopwatch watch;
   const Background seen = seenBackground(frames, any_moves, params.background);
   p.background_ms = watch.lap();
-  p.light = lightOf(views, seen, any_moves, params, p);
+  const std::vector<View> views = viewsOf(clip, p, picture), light_views = lightViewsOf(views);
+  p.texture_views = static_cast<int>(views.size());
+  p.light_views = static_cast<int>(light_views.size());
+  p.light = lightOf(light_views, seen, any_moves, params, p);
   const ShadowMap sun = sunOver(actors, p.light.light);
   const SkyMap sky = skyOver(actors, params);
-  const std::vector<View> texture_views = viewsOf(clip, p, picture, kTextureViews);
-  p.texture_views = static_cast<int>(texture_views.size());
-  p.appearances = makeAppearances(texture_views, p.moves, p.light.light, p.light.gloss);
+  p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.gloss);
   p.appearance_ms = watch.lap();
   for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
   p.fronts = frontsOf(p, params);
   p.footprints = footprintsOf(p);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
-  prepareBackground({frames, views, actors, seen, picture, sun, sky, cameraMoves(clip)}, params, p);
+  prepareBackground({frames, light_views, actors, seen, picture, sun, sky, cameraMoves(clip)},
+                    params, p);
   p.background_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness, p);
   p.outline_blur = outlineBlur(picture, p.key_labels);
