@@ -129,7 +129,6 @@ KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::M
   result.labels = segmenter.segment(strokes).clone();
   result.models = segmenter.models();
   result.remarks = segmenter.remarks();
-  for (const std::string& remark : segmenter.furtherRemarks()) result.remarks.push_back(remark);
   result.segmentation_ms = millisecondsSince(start);
   const auto traced = std::chrono::steady_clock::now();
   result.contours = extractContours(image, result.labels, segmenter.targets());

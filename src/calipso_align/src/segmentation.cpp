@@ -237,10 +237,12 @@ std::optional<FittedShape> Segmenter::fitModel(size_t k) const {
 }
 
 std::vector<std::string> Segmenter::remarks() const {
-  if (models_.empty()) return {};
+  if (models_.empty()) return added_remarks_;
   SegmentationLevel level = coarse_;
   evaluateCosts(models_, params_.outlier_cost, level);
-  return indistinctTargets(targets_, level.costs, level.labels);
+  std::vector<std::string> remarks = indistinctTargets(targets_, level.costs, level.labels);
+  remarks.insert(remarks.end(), added_remarks_.begin(), added_remarks_.end());
+  return remarks;
 }
 
 std::map<int, ModelSurface> Segmenter::models() const {

@@ -3,11 +3,15 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace calipso::bag {
@@ -26,27 +30,55 @@ bool isRoslaunch(pid_t process) {
   return false;
 }
 
-// Parent of a process: the second field after the parenthesised command name in /proc/PID/stat.
-pid_t parentOf(const std::string& process) {
-  std::ifstream file("/proc/" + process + "/stat");
+struct ProcessStat {
+  char state = 0;  // 'Z': has ended, nobody has asked for its status
+  pid_t parent = 0;
+};
+
+// From the fields after the parenthesised command name in /proc/PID/stat; nothing once it is gone.
+std::optional<ProcessStat> statOf(pid_t process) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const std::size_t name_end = text.rfind(')');
-  if (name_end == std::string::npos) return 0;
+  if (name_end == std::string::npos) return std::nullopt;
   std::istringstream fields(text.substr(name_end + 1));
-  char state = 0;
-  pid_t parent = 0;
-  fields >> state >> parent;
-  return parent;
+  ProcessStat stat;
+  fields >> stat.state >> stat.parent;
+  return stat;
 }
 
-std::vector<pid_t> childrenOf(pid_t parent) {
+// All but this one.
+std::vector<pid_t> siblings(pid_t parent) {
   std::vector<pid_t> children;
   for (const auto& entry : fs::directory_iterator("/proc")) {
     const std::string name = entry.path().filename();
     if (name.find_first_not_of("0123456789") != std::string::npos) continue;
-    if (parentOf(name) == parent) children.push_back(std::stoi(name));
+    const pid_t process = std::stoi(name);
+    const std::optional<ProcessStat> stat = statOf(process);
+    if (stat && stat->parent == parent && process != getpid()) children.push_back(process);
   }
   return children;
+}
+
+void dropEnded(std::vector<pid_t>& processes) {
+  const auto ended = [](pid_t process) {
+    const std::optional<ProcessStat> stat = statOf(process);
+    return !stat || stat->state == 'Z';
+  };
+  processes.erase(std::remove_if(processes.begin(), processes.end(), ended), processes.end());
+}
+
+// Asks them to end, and ends those that do not.
+void endAll(std::vector<pid_t> processes) {
+  using namespace std::chrono_literals;
+  constexpr auto kGrace = 15s;                                  // as roslaunch has it
+  for (const pid_t process : processes) kill(process, SIGINT);  // roscpp hears no other signal
+  const auto end = std::chrono::steady_clock::now() + kGrace;
+  for (dropEnded(processes); !processes.empty(); dropEnded(processes)) {
+    if (std::chrono::steady_clock::now() > end) break;
+    std::this_thread::sleep_for(50ms);
+  }
+  for (const pid_t process : processes) kill(process, SIGKILL);
 }
 
 }  // namespace
@@ -54,11 +86,9 @@ std::vector<pid_t> childrenOf(pid_t parent) {
 void failLaunch() {
   const pid_t parent = getppid();
   if (!isRoslaunch(parent)) return;
-  const std::vector<pid_t> children = childrenOf(parent);
+  const std::vector<pid_t> others = siblings(parent);
   kill(parent, SIGKILL);
-  for (const pid_t child : children) {
-    if (child != getpid()) kill(child, SIGINT);  // roscpp closes down on no other signal
-  }
+  endAll(others);
 }
 
 }  // namespace calipso::bag

@@ -17,6 +17,11 @@ void Preparation::fail(const std::string& node, const std::string& reason) {
   update(node, failed);
 }
 
+bool Preparation::saidBySuccessor(const std::string& node, std::int64_t said) const {
+  const auto end = ended_.find(node);
+  return end != ended_.end() && said > end->second;
+}
+
 bool Preparation::hopeless() const {
   const auto& nodes = roles_.key_frame;
   return std::any_of(nodes.begin(), nodes.end(), [this](const std::string& node) {

@@ -1,5 +1,6 @@
 #include <iostream>
 
+#include "calipso_ros/mode.hpp"
 #include "calipso_ros/node_main.hpp"
 #include "ros/guarded_main.hpp"
 #include "ros/recorder.hpp"
@@ -9,10 +10,8 @@ namespace {
 calipso::bag::Recorder::Params loadParams(const ros::NodeHandle& pnh) {
   calipso::bag::Recorder::Params params;
   params.output = calipso::requiredParam<std::string>(pnh, "output");
-  const auto mode = calipso::optionalParam<std::string>(pnh, "mode", "bag");
-  if (mode != "bag" && mode != "live")
-    throw std::invalid_argument("parameter mode is '" + mode + "'; it must be bag or live");
-  params.live = mode == "live";
+  params.input = calipso::optionalParam(pnh, "input", params.input);
+  params.mode = calipso::modeParam(pnh);
   params.flow = calipso::optionalParam(pnh, "flow", params.flow);
   params.late_timeout_sec =
       calipso::optionalParam(pnh, "late_timeout_sec", params.late_timeout_sec);

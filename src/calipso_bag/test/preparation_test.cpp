@@ -79,6 +79,21 @@ TEST(Preparation, AFailedNodeStaysFailed) {
   EXPECT_EQ(preparation.standing("flow").message, "its process ended");
 }
 
+// The last words of a process can arrive after the news of its end.
+TEST(Preparation, TellsASuccessorFromLastWords) {
+  constexpr std::int64_t kEnd = 5'000'000'000, kOneMs = 1'000'000;
+  Preparation preparation;
+  EXPECT_FALSE(preparation.ended("flow"));
+  EXPECT_FALSE(preparation.saidBySuccessor("flow", kEnd));
+  preparation.end("flow", kEnd);
+  EXPECT_TRUE(preparation.ended("flow"));
+  EXPECT_FALSE(preparation.saidBySuccessor("flow", kEnd - kOneMs));
+  EXPECT_TRUE(preparation.saidBySuccessor("flow", kEnd + kOneMs));
+  preparation.end("flow", kEnd + 2 * kOneMs);  // its successor's
+  EXPECT_TRUE(preparation.saidBySuccessor("flow", kEnd + kOneMs));
+  EXPECT_FALSE(preparation.saidBySuccessor("align", kEnd + kOneMs));
+}
+
 TEST(Preparation, IgnoresStrangers) {
   Preparation preparation;
   preparation.fail("somebody", "else");

@@ -89,6 +89,18 @@ TEST(OutputBag, RefusesAFolderAtOnce) {
   EXPECT_FALSE(std::filesystem::exists(folder / "new"));
 }
 
+TEST(OutputBag, DoesNotReplaceItsInput) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "in.bag";
+  std::ofstream(path) << "a bag";
+  const std::string text = messageOf([&] { OutputBag output(folder / "./in.bag", path); });
+  EXPECT_NE(text.find("in.bag"), std::string::npos) << text;
+  EXPECT_NE(text.find("give another path"), std::string::npos) << text;
+  EXPECT_FALSE(std::filesystem::exists(path + ".active"));
+  EXPECT_NO_THROW(OutputBag(folder / "out.bag", path));
+  EXPECT_TRUE(std::filesystem::exists(path));
+}
+
 TEST(OutputBag, SaysWhereTheWholeBagIsThatCannotHaveItsName) {
   const TemporaryFolder folder;
   OutputBag output(folder / "out.bag");

@@ -149,9 +149,9 @@ double TrajectoryFitter::contactOdds(size_t piece, double time) const {
   const auto next = std::find_if(measurements_.begin(), measurements_.end(),
                                  [&](const PoseMeasurement& m) { return m.time >= time; });
   if (next == measurements_.end() || !next->contact) return 0.0;
-  const Measurements after = measurementsOf(piece, piece);
-  if (std::count_if(after.begin(), after.end(), [](const auto& m) { return m.valid; }) > kFewPoses)
-    return 0.0;
+  const double end = piece + 1 < pieces_.size() ? pieces_[piece + 1].start : kEver;
+  const auto shows = [end](const PoseMeasurement& m) { return m.valid && m.time < end; };
+  if (std::count_if(next, measurements_.end(), shows) > kFewPoses) return 0.0;
   const auto began = next - 2;  // the fall from there has no jump in it
   if (piece > 1 && pieces_[piece - 1].start > began->time) return 0.0;
   const double off = (time - next->contact->time) / next->contact->deviation;

@@ -175,6 +175,22 @@ TEST(Trajectory, onePoseAfterAnImpactTellsTheReboundWhereTheFloorIsKnown) {
   EXPECT_NEAR(trajectory.collisions[0].restitution(), kRestitution, 0.1);
 }
 
+// Which instants the floor speaks of depends on the poses after each, not on those after the guess
+// that the search sets out from: here before the last pose of the fall.
+TEST(Trajectory, theFloorTellsTheInstantOfAnImpactJustAfterAPose) {
+  constexpr double kImpact = 8.05 / kFps;
+  for (const int seed : {4, 10}) {
+    auto poses = measure(
+        16, 3e-3, 1e-2, seed, [&](double t) { return bouncing(t, kImpact, 0.3); }, still);
+    for (size_t k = 11; k < poses.size(); ++k) poses[k].valid = false;
+    poses[9].contact = PoseMeasurement::Instant{kImpact, 1e-3};
+    poses[9].strikes = 4.0;
+    const Trajectory trajectory = fitTrajectory(poses, {}, testPrior());
+    ASSERT_EQ(trajectory.collisions.size(), 1u) << seed;
+    EXPECT_NEAR(trajectory.collisions[0].time, kImpact, 2e-3) << seed;  // two deviations
+  }
+}
+
 // What lies where it fell has the restitution zero, and that as surely as a slow rebound would be
 // seen: 0.43 mm over ten frames are 1.6 mm/s, of 2.9 m/s.
 TEST(Trajectory, statesHowSurelyWhatFellDoesNotRebound) {

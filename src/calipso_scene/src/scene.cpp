@@ -7,6 +7,7 @@
 #include <optional>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <vector>
 
@@ -111,8 +112,24 @@ std::vector<AttachmentBox> readAttachments(const YAML::Node& boxes, const YamlRe
   return attachments;
 }
 
+Eigen::Vector4i readRectangle(const YAML::Node& node, const YamlReader& reader,
+                              const Camera& camera) {
+  const Eigen::Vector4i rect = reader.vector(node, "rect_xywh", 4).cast<int>();
+  const Eigen::Vector2i first = rect.head<2>(), size = rect.tail<2>();
+  const Eigen::Vector2i picture(camera.width, camera.height);
+  if (size.minCoeff() <= 0)
+    reader.fail("rect_xywh", "has no area; draw a rectangle around the object");
+  if ((first.array() >= picture.array()).any() || (first + size).minCoeff() <= 0) {
+    std::ostringstream text;
+    text << "is [" << rect.transpose() << "], outside of the picture of " << camera.width << "x"
+         << camera.height << "; draw a rectangle around the object in the first frame";
+    reader.fail("rect_xywh", text.str());
+  }
+  return rect;
+}
+
 SceneObject readObject(const YAML::Node& node, const YAML::Node& root, const std::string& file,
-                       const std::string& directory) {
+                       const Scene& scene) {
   SceneObject object;
   object.name = YamlReader(file, "objects").text(node, "name");
   const YamlReader reader(file, "object '" + object.name + "'");
@@ -120,12 +137,9 @@ SceneObject readObject(const YAML::Node& node, const YAML::Node& root, const std
   if (object.index < 1 || object.index > 254) {
     reader.fail("index", "is " + std::to_string(object.index) + "; it must be in 1..254");
   }
-  object.cad_path = directory + "/" + reader.text(node, "cad");
+  object.cad_path = scene.directory + "/" + reader.text(node, "cad");
   object.initial_world_from_object = reader.pose(node, "initial_world_T_object");
-  object.rect = reader.vector(node, "rect_xywh", 4).cast<int>();
-  if (object.rect[2] <= 0 || object.rect[3] <= 0) {
-    reader.fail("rect_xywh", "has no area; draw a rectangle around the object");
-  }
+  object.rect = readRectangle(node, reader, scene.camera);
   const YAML::Node hints = root["attachment_hints"];
   if (hints && hints.IsMap() && hints[object.name]) {
     object.attachments = readAttachments(hints[object.name], reader);
@@ -138,7 +152,7 @@ void readObjects(const YAML::Node& root, const std::string& file, Scene& scene) 
   std::set<std::string> names;
   std::set<int> indices;
   for (const auto& node : root["objects"]) {
-    scene.objects.push_back(readObject(node, root, file, scene.directory));
+    scene.objects.push_back(readObject(node, root, file, scene));
     const SceneObject& object = scene.objects.back();
     if (!names.insert(object.name).second) {
       reader.fail("objects", "has '" + object.name + "' twice; give each object its own name");

@@ -88,6 +88,21 @@ TEST(Scene, aGapAmongTheFramesIsNamed) {
   EXPECT_EQ(errorWith({}, "frames/%06d.jpg"), "");  // the frames can come from a bag
 }
 
+TEST(Scene, aRectangleMeetsThePicture) {
+  const std::string drawn = "[3, 4, 20, 10]";
+  const auto errorWith = [&](const std::string& rect) {
+    std::string yaml = kHead + kPose + kObject;
+    return errorOf(yaml.replace(yaml.find(drawn), drawn.size(), rect));
+  };
+  for (const char* outside : {"[64, 4, 20, 10]", "[3, -10, 20, 10]"}) {
+    const std::string error = errorWith(outside);
+    for (const char* part : {"'ball': rect_xywh", "picture of 64x36", "first frame"})
+      EXPECT_NE(error.find(part), std::string::npos) << outside << ": " << error;
+  }
+  EXPECT_NE(errorWith("[3, 4, 0, 10]").find("no area"), std::string::npos);
+  EXPECT_EQ(errorWith("[-5, -9, 20, 10]"), "");  // cut off by the picture's edge
+}
+
 // What is clear of all planes would else be taken to fall.
 TEST(Scene, planesAreNotTheOnlySupportsBesideAMesh) {
   const std::string yaml = kHead + kPose + kObject + "support:\n- {plane: [0, 0, 1, 0]}\n";

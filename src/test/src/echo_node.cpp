@@ -4,6 +4,7 @@
 #include <calipso_msgs/NodeStatus.h>
 #include <calipso_msgs/SimulationState.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <string>
 
@@ -17,7 +18,7 @@ using calipso_msgs::NodeStatus;
 
 // Stands in for the whole graph between player and recorder: is ready at once and gives every frame
 // back as it came. Indices of frames: ~swallow one to lose, ~lose_image one whose image alone is
-// lost, ~die_at one to end the process at.
+// lost, ~die_at one to end the process at. With ~deaf it hears no request to end.
 class EchoNode {
  public:
   EchoNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
@@ -39,6 +40,7 @@ class EchoNode {
             [](const sensor_msgs::ImageConstPtr&, const std::string& reason) {
               ROS_ERROR_STREAM("echo: " << reason);
             }) {
+    if (pnh.param("deaf", false)) std::signal(SIGINT, SIG_IGN);
     timer_ = nh.createWallTimer(ros::WallDuration(0.1), [this](const auto&) { report(); });
   }
 

@@ -143,10 +143,10 @@ class BadInput(unittest.TestCase):
             path = os.path.join(scene, "scene.yaml")
             with open(path) as file:
                 content = yaml.safe_load(file)
-            content["width"] = 320
+            content["width"] = 600
             with open(path, "w") as file:
                 yaml.safe_dump(content, file)
-            self.expect_complaint("640x360", "320x360", scene=scene)
+            self.expect_complaint("640x360", "600x360", scene=scene)
 
     def test_tf_that_does_not_lead_to_the_camera(self):
         def change(topic, message, _):

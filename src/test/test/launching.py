@@ -1,6 +1,7 @@
 """Runs roslaunch as a user would."""
 
 import os
+import pathlib
 import signal
 import socket
 import subprocess
@@ -20,7 +21,7 @@ class Launch:
     """
 
     def __init__(self, package, file, master=None, **arguments):
-        master = master or "http://127.0.0.1:%d" % free_port()
+        self.master = master = master or "http://127.0.0.1:%d" % free_port()
         words = ["%s:=%s" % (name, value) for name, value in arguments.items()]
         environment = dict(os.environ, ROS_MASTER_URI=master, ROS_IP="127.0.0.1")
         # A file, not a pipe: nodes that outlive roslaunch would keep a pipe open.
@@ -39,9 +40,31 @@ class Launch:
             raise AssertionError("no end within %d s:\n%s" % (timeout_sec, self.printed()))
         return self.process.returncode, self.printed()
 
+    def nodes(self, name):
+        """Processes of the launch's nodes of this name, also after roslaunch itself has ended."""
+        found = []
+        for process in pathlib.Path("/proc").iterdir():
+            try:
+                words = (process / "cmdline").read_bytes().split(b"\0")
+                environment = (process / "environ").read_bytes().split(b"\0")
+            except OSError:  # no process, or one that has just ended
+                continue
+            if b"__name:=" + name.encode() in words and b"ROS_MASTER_URI=" + self.master.encode() in environment:
+                found.append(int(process.name))
+        return found
+
     def printed(self):
         self.output.seek(0)
         return self.output.read()
+
+
+def runs(process):
+    """False as well of one that has ended and whose status nobody has asked for."""
+    try:
+        stat = pathlib.Path("/proc/%d/stat" % process).read_text()
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[0] != "Z"
 
 
 def run(package, file, timeout_sec=240, **arguments):

@@ -95,13 +95,14 @@ class PlayerAndRecorder(unittest.TestCase):
         return subprocess.Popen(["python3", "-c", """
 import rospy
 from calipso_msgs.msg import ClipInfo, NodeStatus
+from std_msgs.msg import Header
 rospy.init_node("stand_in")
 clip = rospy.Subscriber("clip/info", ClipInfo, print)
 while not clip.get_num_connections() and not rospy.is_shutdown():
     rospy.sleep(0.05)  # the player notices its end by this connection
 status = rospy.Publisher("status", NodeStatus, latch=True, queue_size=1)
 while not rospy.is_shutdown():
-    status.publish(node="flow", message="here")
+    status.publish(header=Header(stamp=rospy.Time.now()), node="flow", message="here")
     rospy.sleep(0.1)
 """])
 
@@ -140,6 +141,19 @@ while not rospy.is_shutdown():
         # The recorder is interrupted, as by the user, and closes what it has.
         self.wait_for("with %d edited frames, as %s.active" % (FRAMES - 1, out), launch.printed)
         self.assertEqual(len(clips.messages(out + ".active", EDITED)), FRAMES - 1)
+
+    def test_a_node_that_does_not_hear_is_ended_with_the_run(self):
+        launch = launching.Launch("calipso_test", "echo.launch", bag=self.bag, scene=self.scene,
+                                  out=self.path("out.bag"), swallow=FRAMES - 1, frame_timeout_sec=3, deaf=True)
+        self.wait_for("edited frame for 3", launch.printed)
+        self.wait_for_end_of(launch.nodes("echo"))
+
+    def wait_for_end_of(self, processes, timeout_sec=60):
+        self.assertTrue(processes)
+        end = time.monotonic() + timeout_sec
+        while any(launching.runs(process) for process in processes):
+            self.assertLess(time.monotonic(), end, "still there: %s" % processes)
+            time.sleep(0.05)
 
     def test_a_dead_node_fails_the_run(self):
         status, output = self.echo(die_at=3)

@@ -54,11 +54,9 @@ class Segmenter {
   const cv::Mat& labels() const { return labels_; }
   const std::vector<SegmentationTarget>& targets() const { return targets_; }
   // What the user should know: objects that colours and depth hardly tell from their surroundings,
-  // so that it is the rough placement that says where they are. Empty before the first call.
+  // so that it is the rough placement that says where they are; and what was added.
   std::vector<std::string> remarks() const;
-  // Something else to be said with them.
-  void addRemark(const std::string& remark) { further_remarks_.push_back(remark); }
-  const std::vector<std::string>& furtherRemarks() const { return further_remarks_; }
+  void addRemark(const std::string& remark) { added_remarks_.push_back(remark); }
   // Per label, the models that were fitted to the first contours; none before the first call.
   std::map<int, ModelSurface> models() const;
 
@@ -97,7 +95,7 @@ class Segmenter {
   std::vector<std::optional<PlacedShape>> shapes_;  // per target, in pixels of the view
   std::vector<std::optional<FittedShape>> fitted_;  // per target, of the view
   cv::Mat labels_;
-  std::vector<std::string> further_remarks_;
+  std::vector<std::string> added_remarks_;
 };
 
 }  // namespace calipso::align

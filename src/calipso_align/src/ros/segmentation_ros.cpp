@@ -27,12 +27,7 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 SegmentationNodeParams loadSegmentationParams(const ros::NodeHandle& pnh) {
-  SegmentationNodeParams params{requiredParam<std::string>(pnh, "scene"),
-                                requiredParam<std::string>(pnh, "mode")};
-  if (params.mode != "bag" && params.mode != "live")
-    throw std::invalid_argument("parameter " + pnh.resolveName("mode") + " is '" + params.mode +
-                                "'; use bag or live");
-  return params;
+  return {requiredParam<std::string>(pnh, "scene"), modeParam(pnh)};
 }
 
 SegmentationRos::SegmentationRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
@@ -40,7 +35,7 @@ SegmentationRos::SegmentationRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       scene_(loadScene(params_.scene)),
       reporter_(nh, "segmentation"),
       strokes_(loadStrokes(scene_)) {
-  const bool bag = params_.mode == "bag";
+  const bool bag = params_.mode == Mode::kBag;
   segmentation_publisher_ = nh.advertise<calipso_msgs::Segmentation>(
       topics::kSegmentation, kUnlimited,
       [this](const ros::SingleSubscriberPublisher& subscriber) { onSubscriber(subscriber); });
@@ -60,7 +55,7 @@ void SegmentationRos::onSubscriber(const ros::SingleSubscriberPublisher& subscri
 void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
   if (msg->header.stamp == last_stamp_) return;
   last_stamp_ = msg->header.stamp;
-  if (params_.mode == "live" && clock_.startsOver(last_stamp_)) startOver();
+  if (params_.mode == Mode::kLive && clock_.startsOver(last_stamp_)) startOver();
   try {
     if (key_image_.empty())
       adoptKeyFrame(msg);
@@ -69,7 +64,7 @@ void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
   } catch (const std::exception& error) {
     reporter_.warn(msg->header.stamp, error.what());
   }
-  if (params_.mode == "bag") reporter_.clipFrameDone();
+  if (params_.mode == Mode::kBag) reporter_.clipFrameDone();
 }
 
 // The frame at hand is to become the key frame.
@@ -102,8 +97,8 @@ void SegmentationRos::segment() {
   try {
     if (!segmenter_)
       // A live camera's first frame is not the picture that the scene's depth image was taken with.
-      segmenter_ =
-          std::make_unique<Segmenter>(makeSegmenter(key_image_, scene_, params_.mode == "bag"));
+      segmenter_ = std::make_unique<Segmenter>(
+          makeSegmenter(key_image_, scene_, params_.mode == Mode::kBag));
     const KeyFrame key = segmentKeyFrame(key_image_, *segmenter_, strokes_);
     tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels, key.models);
     labels_ = key.labels;

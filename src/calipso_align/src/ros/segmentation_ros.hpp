@@ -9,6 +9,7 @@
 
 #include "calipso_align/key_frame.hpp"
 #include "calipso_align/mask_tracker.hpp"
+#include "calipso_ros/mode.hpp"
 #include "calipso_ros/node_reporter.hpp"
 #include "calipso_ros/video_clock.hpp"
 #include "calipso_scene/scene.hpp"
@@ -17,7 +18,7 @@ namespace calipso::align {
 
 struct SegmentationNodeParams {
   std::string scene;  // directory with scene.yaml
-  std::string mode;   // bag or live
+  Mode mode = Mode::kBag;
 };
 
 // @throw std::invalid_argument naming parameter, value and what is allowed

@@ -7,7 +7,8 @@ namespace calipso::bag {
 // roslaunch exits with 0 whatever its nodes return, and catches the signals that could tell it
 // otherwise. When the parent process is a roslaunch it is killed first, because it would turn the
 // death of a required node into a clean exit; its other children (nodes, master, rosout), which it
-// can then no longer stop, are asked to end. Without such a parent this does nothing.
+// can then no longer stop, are asked to end; one that has not after as long as roslaunch would wait
+// is ended. Returns when none is left. Without such a parent this does nothing.
 void failLaunch();
 
 }  // namespace calipso::bag

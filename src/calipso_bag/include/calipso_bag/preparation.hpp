@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <utility>
@@ -38,6 +39,14 @@ class Preparation {
   // Marks a node as failed on its behalf, e.g. because its process ended.
   void fail(const std::string& node, const std::string& reason);
 
+  // Notes that a node's process has ended by then (ns, as all stamps).
+  void end(const std::string& node, std::int64_t noticed) { ended_.emplace(node, noticed); }
+  bool ended(const std::string& node) const { return ended_.count(node) > 0; }
+
+  // True of what was said after the node's process had ended: another was started in its place. Its
+  // own last words may arrive later than the news of its end.
+  bool saidBySuccessor(const std::string& node, std::int64_t said) const;
+
   bool keyFrameSettled() const { return hopeless() || unsettled(roles_.key_frame).empty(); }
   bool allSettled() const { return hopeless() || unsettled(roles_.all).empty(); }
 
@@ -59,6 +68,7 @@ class Preparation {
 
   Roles roles_;
   std::map<std::string, NodeStanding> standing_;
+  std::map<std::string, std::int64_t> ended_;  // when it was noticed
 };
 
 }  // namespace calipso::bag

@@ -5,6 +5,13 @@
 #include "calipso_ros/topics.hpp"
 
 namespace calipso::bag {
+namespace {
+
+constexpr char kEnded[] = "its process ended";
+
+std::int64_t nanoseconds(const ros::Time& time) { return static_cast<std::int64_t>(time.toNSec()); }
+
+}  // namespace
 
 using calipso_msgs::NodeStatus;
 
@@ -17,8 +24,8 @@ NodeWatch::NodeWatch(ros::NodeHandle& nh, Preparation::Roles roles)
 
 void NodeWatch::fail(const std::string& node, const std::string& reason) {
   if (preparation_.standing(node).state == NodeState::kFailed) return;
-  ROS_ERROR_STREAM(node << ": " << reason << "; frames pass unedited where they need it");
   preparation_.fail(node, reason);
+  ROS_ERROR_STREAM(node << ": " << reason << "; frames pass unedited where they need it");
   announceFailed(node, reason);
 }
 
@@ -40,8 +47,21 @@ std::set<std::string> NodeWatch::rosNames() const {
 void NodeWatch::connectionLost(const std::string& ros_name) {
   const auto found = node_of_.find(ros_name);
   if (found == node_of_.end() || over_) return;
-  ended_.insert(found->second);
-  fail(found->second, "its process ended");
+  const std::string& node = found->second;
+  fail(node, kEnded);
+  preparation_.end(node, nanoseconds(ros::Time::now()));
+}
+
+// Whoever has believed what the node says now is told that it stays FAILED.
+void NodeWatch::hearOfEnded(const NodeStatus& status) {
+  std::string reason = preparation_.standing(status.node).message;
+  if (preparation_.saidBySuccessor(status.node, nanoseconds(status.header.stamp))) {
+    reason =
+        "started again in mid-run, it does not know the edits and frames before and stays out; "
+        "stop this run and launch it anew";
+    if (came_back_.insert(status.node).second) ROS_ERROR_STREAM(status.node << ": " << reason);
+  }
+  announceFailed(status.node, reason);
 }
 
 void NodeWatch::onStatus(const ros::MessageEvent<NodeStatus const>& event) {
@@ -50,11 +70,7 @@ void NodeWatch::onStatus(const ros::MessageEvent<NodeStatus const>& event) {
   const NodeStatus& status = *event.getMessage();
   node_of_[event.getPublisherName()] = status.node;
   if (ended(status.node)) {
-    const std::string refusal =
-        "started again in mid-run, it does not know the edits and frames before and stays out; "
-        "stop this run and launch it anew";
-    if (came_back_.insert(status.node).second) ROS_ERROR_STREAM(status.node << ": " << refusal);
-    announceFailed(status.node, refusal);  // whoever has believed what it says now
+    hearOfEnded(status);
     return;
   }
   NodeStanding standing;

@@ -24,7 +24,7 @@ class NodeWatch {
 
   // True when the node's process has ended. One that is started in its place stays out: it does not
   // know what went before.
-  bool ended(const std::string& node) const { return ended_.count(node) > 0; }
+  bool ended(const std::string& node) const { return preparation_.ended(node); }
 
   // ROS names of the nodes that have reported.
   std::set<std::string> rosNames() const;
@@ -40,13 +40,14 @@ class NodeWatch {
 
  private:
   void onStatus(const ros::MessageEvent<calipso_msgs::NodeStatus const>& event);
+  void hearOfEnded(const calipso_msgs::NodeStatus& status);
 
   void announceFailed(const std::string& node, const std::string& reason);
 
   Preparation preparation_;
   std::map<std::string, std::string> node_of_;  // ROS name -> name in NodeStatus
   std::map<std::string, std::string> last_said_;
-  std::set<std::string> ended_, came_back_;
+  std::set<std::string> came_back_;
   int activity_ = 0;
   bool over_ = false;
   ros::Publisher publisher_;

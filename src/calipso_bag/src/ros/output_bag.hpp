@@ -14,8 +14,9 @@ namespace calipso::bag {
 // closed, or gone when nothing was written.
 class OutputBag {
  public:
-  // Makes missing folders. @throw std::runtime_error when the file cannot be written
-  explicit OutputBag(const std::string& path);
+  // Makes missing folders. The path may not be that of the input, if there is one.
+  // @throw std::runtime_error when the file cannot be written
+  explicit OutputBag(const std::string& path, const std::string& input = "");
 
   ~OutputBag();
   OutputBag(const OutputBag&) = delete;

@@ -27,7 +27,7 @@ std::string seconds(const ros::Time& stamp) { return std::to_string(stamp.toSec(
 Recorder::Recorder(ros::NodeHandle& nh, const Params& params)
     : params_(params),
       nh_(nh),
-      output_(params.output),
+      output_(params.output, params.input),
       writer_(output_),
       reporter_(nh, "recorder") {
   summary_.output = params.output;
@@ -98,7 +98,7 @@ void Recorder::onInput(const sensor_msgs::CameraInfoConstPtr& info) {
 
 void Recorder::onEdited(const ros::MessageEvent<sensor_msgs::Image const>& event) {
   const ros::Time stamp = event.getMessage()->header.stamp;
-  started_over_ = started_over_ || (params_.live && clock_.startsOver(stamp));
+  started_over_ = started_over_ || (params_.mode == Mode::kLive && clock_.startsOver(stamp));
   if (started_over_) return;
   if (!edited_.empty() && stamp <= edited_.back()) {
     throw std::runtime_error("edited frame " + seconds(stamp) + " came after " +
@@ -198,7 +198,7 @@ bool Recorder::lastStateExplained() const {
 
 void Recorder::run() {
   try {
-    if (params_.live)
+    if (params_.mode == Mode::kLive)
       recordLive();
     else
       recordClip();

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "calipso_bag/run_summary.hpp"
+#include "calipso_ros/mode.hpp"
 #include "calipso_ros/node_reporter.hpp"
 #include "calipso_ros/video_clock.hpp"
 #include "output_bag.hpp"
@@ -32,7 +33,8 @@ class Recorder {
  public:
   struct Params {
     std::string output;             // path of the bag
-    bool live = false;              // record until stopped, instead of one clip
+    std::string input;              // path of the bag that is edited, which must stay; or none
+    Mode mode = Mode::kBag;         // live: record until stopped, instead of one clip
     bool flow = true;               // also record the optical flow (8 bytes per pixel and frame)
     double late_timeout_sec = 5.0;  // for what explains the last frames to arrive
   };

@@ -67,10 +67,7 @@ void readObjects(const ros::NodeHandle& pnh, WorldParams& world) {
 SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
   SimulatorParams p;
   p.scene_directory = requiredParam<std::string>(pnh, "scene");
-  const std::string mode = optionalParam<std::string>(pnh, "mode", "bag");
-  if (mode != "bag" && mode != "live")
-    throw std::invalid_argument("parameter mode = '" + mode + "'; must be bag or live");
-  p.live = mode == "live";
+  p.mode = modeParam(pnh);
   p.colour_by = optionalParam(pnh, "colour_by", p.colour_by);
   if (p.colour_by != "von_mises" && p.colour_by != "displacement")
     throw std::invalid_argument("parameter colour_by = '" + p.colour_by +

@@ -5,13 +5,14 @@
 #include <string>
 
 #include "calipso_fem/world/world_types.hpp"
+#include "calipso_ros/mode.hpp"
 
 namespace calipso::fem {
 
 // Parameters of simulator_node; config/simulator.yaml lists them with units.
 struct SimulatorParams {
   std::string scene_directory;
-  bool live = false;                    // mode: bag | live
+  Mode mode = Mode::kBag;
   std::string colour_by = "von_mises";  // or displacement
   double force_scale = 0.05;            // m of arrow per N
   WorldParams world;

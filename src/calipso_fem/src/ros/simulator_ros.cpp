@@ -27,13 +27,13 @@ SimulatorRos::SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
   plan_ = nh.advertise<calipso_msgs::Plan>(topics::kPlan, 1, kLatched);
   applied_ = nh.advertise<calipso_msgs::EditReport>(topics::kEditsApplied, 1000);
   markers_ = nh.advertise<visualization_msgs::MarkerArray>(topics::kMarkers, 2);
-  const unsigned queue = params_.live ? 2 : kKeepAll;
+  const unsigned queue = params_.mode == Mode::kLive ? 2 : kKeepAll;
   subscribers_ = {
       nh.subscribe(topics::kModels, 1, &SimulatorRos::onModels, this),
       nh.subscribe(topics::kEdits, kKeepAll, &SimulatorRos::onEdit, this),
       nh.subscribe(topics::kCameraInfo, queue, &SimulatorRos::onFrame, this),
   };
-  if (params_.live) {
+  if (params_.mode == Mode::kLive) {
     subscribers_.push_back(nh.subscribe(topics::kDynamics, queue, &SimulatorRos::onDynamics, this));
     subscribers_.push_back(
         nh.subscribe(topics::kClipDynamics, 1, &SimulatorRos::onLiveModes, this));
@@ -98,7 +98,7 @@ void SimulatorRos::onLiveModes(const calipso_msgs::ClipDynamicsConstPtr& dynamic
 
 void SimulatorRos::prepare() {
   if (!models_) return;
-  if (!params_.live && !(first_stamp_ && clip_dynamics_)) {
+  if (params_.mode == Mode::kBag && !(first_stamp_ && clip_dynamics_)) {
     reporter_.preparing("models are there; waiting for the clip's dynamics");
     return;
   }
@@ -108,7 +108,7 @@ void SimulatorRos::prepare() {
     reporter_.failed(error.what());
     return;
   }
-  if (params_.live) {
+  if (params_.mode == Mode::kLive) {
     world_->prepareForEdits();
   } else {
     for (const auto& frame : clip_dynamics_->frames) take(frame);
@@ -187,7 +187,7 @@ void SimulatorRos::startOver(const ros::Time& stamp) {
 
 void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
   const ros::Time stamp = info->header.stamp;
-  if (params_.live && clock_.startsOver(stamp)) startOver(stamp);
+  if (params_.mode == Mode::kLive && clock_.startsOver(stamp)) startOver(stamp);
   if (!world_) {
     // A state without objects lets the frame pass unedited.
     if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) {

@@ -31,15 +31,15 @@ FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       clip_dynamics_publisher_(
           nh.advertise<calipso_msgs::ClipDynamics>(topics::kClipDynamics, 1, true)),
       dynamics_publisher_(nh.advertise<calipso_msgs::Dynamics>(topics::kDynamics, kKeepAll)),
-      flow_publisher_(
-          nh.advertise<sensor_msgs::Image>(topics::kFlow, params_.live ? kLiveQueue : kKeepAll)),
+      flow_publisher_(nh.advertise<sensor_msgs::Image>(
+          topics::kFlow, params_.mode == Mode::kLive ? kLiveQueue : kKeepAll)),
       markers_(nh),
       dense_flow_(params_.flow_preset) {
   params_.dynamics.supports = scene_.onlySupports();
   subscribers_ = {nh.subscribe(topics::kModels, 1, &FlowNode::onModels, this),
                   nh.subscribe(topics::kSegmentation, kKeepAll, &FlowNode::onSegmentation, this),
                   nh.subscribe(topics::kStatus, 100, &FlowNode::onStatus, this)};
-  if (!params_.live) {
+  if (params_.mode == Mode::kBag) {
     subscribers_.push_back(nh.subscribe(topics::kClipInfo, 1, &FlowNode::onClipInfo, this));
     clip_frames_source_ = std::make_unique<FrameSource>(
         nh, topics::kClipImage, topics::kClipCameraInfo, kKeepAll, poses_,
@@ -47,7 +47,7 @@ FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
         [this](const auto& image, const auto& reason) { onBadFrame(image, reason, true); });
   }
   frames_source_ = std::make_unique<FrameSource>(
-      nh, topics::kImage, topics::kCameraInfo, params_.live ? 2 : kKeepAll, poses_,
+      nh, topics::kImage, topics::kCameraInfo, params_.mode == Mode::kLive ? 2 : kKeepAll, poses_,
       [this](const calipso::Frame& frame) { onFrame(frame); },
       [this](const auto& image, const auto& reason) { onBadFrame(image, reason, false); });
   reporter_.starting("waiting for the key frame's models");
@@ -115,7 +115,7 @@ void FlowNode::begin(const KeyKnowledge& knowledge) {
   });
   if (key == waiting_.end()) return;
   const Frame key_frame = frameFromMsg(*key);
-  if (params_.live) {
+  if (params_.mode == Mode::kLive) {
     live_analyser_ = std::make_unique<LiveAnalyser>(key_frame, knowledge.models, knowledge.masks,
                                                     scene_.gravity, params_.dynamics);
     waiting_.clear();
@@ -174,7 +174,7 @@ void FlowNode::startOver(const ros::Time& stamp) {
 }
 
 void FlowNode::onFrame(const calipso::Frame& frame) {
-  if (params_.live && clock_.startsOver(frame.stamp())) startOver(frame.stamp());
+  if (params_.mode == Mode::kLive && clock_.startsOver(frame.stamp())) startOver(frame.stamp());
   const auto start = std::chrono::steady_clock::now();
   try {
     publishDynamics(frame);
@@ -186,7 +186,7 @@ void FlowNode::onFrame(const calipso::Frame& frame) {
 }
 
 void FlowNode::publishDynamics(const calipso::Frame& frame) {
-  if (params_.live) {
+  if (params_.mode == Mode::kLive) {
     if (!live_analyser_) {
       if (waiting_.size() >= kLiveWaiting) waiting_.erase(waiting_.begin() + 1);
       waiting_.push_back(frame);

@@ -29,19 +29,12 @@ DenseFlow::Preset readPreset(const ros::NodeHandle& pnh) {
                               "'; give ultrafast, fast or medium");
 }
 
-bool readLive(const ros::NodeHandle& pnh) {
-  const std::string mode = optionalParam<std::string>(pnh, "mode", "bag");
-  if (mode == "bag" || mode == "live") return mode == "live";
-  throw std::invalid_argument("parameter " + pnh.resolveName("mode") + " is '" + mode +
-                              "'; give bag or live");
-}
-
 }  // namespace
 
 Params loadParams(const ros::NodeHandle& pnh) {
   Params params;
   params.scene = requiredParam<std::string>(pnh, "scene");
-  params.live = readLive(pnh);
+  params.mode = modeParam(pnh);
   params.flow_preset = readPreset(pnh);
   TrackerParams& tracker = params.dynamics.tracker;
   readNumber(pnh, "tracks", 8, 2000, tracker.seed_count);

@@ -6,13 +6,14 @@
 
 #include "calipso_flow/clip_dynamics.hpp"
 #include "calipso_flow/dense_flow.hpp"
+#include "calipso_ros/mode.hpp"
 
 namespace calipso::flow {
 
 // The node's parameters; config/flow.yaml explains each.
 struct Params {
   std::string scene;  // directory
-  bool live = false;
+  Mode mode = Mode::kBag;
   DenseFlow::Preset flow_preset = DenseFlow::Preset::kUltrafast;
   DynamicsParams dynamics;
 };

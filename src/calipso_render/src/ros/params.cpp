@@ -9,12 +9,6 @@
 namespace calipso::render {
 namespace {
 
-Mode modeFromString(const std::string& name) {
-  if (name == "bag") return Mode::kBag;
-  if (name == "live") return Mode::kLive;
-  throw std::invalid_argument("parameter mode is '" + name + "'; it must be bag or live");
-}
-
 Quality qualityFromString(const std::string& name) {
   if (name == "live") return Quality::kLive;
   if (name == "final") return Quality::kFinal;
@@ -57,7 +51,7 @@ void loadScenery(const Scene& scene, RenderParams& render) {
 NodeParams loadParams(const ros::NodeHandle& pnh) {
   NodeParams p;
   p.scene = requiredParam<std::string>(pnh, "scene");
-  p.mode = modeFromString(optionalParam<std::string>(pnh, "mode", "bag"));
+  p.mode = modeParam(pnh);
   p.render.quality = qualityFromString(optionalParam<std::string>(pnh, "quality", "live"));
   p.render.sun_radius = inRange(pnh, "sun_radius", p.render.sun_radius, 0.0, 0.5);
   p.render.add_noise = optionalParam(pnh, "add_noise", p.render.add_noise);

@@ -5,10 +5,9 @@
 #include <string>
 
 #include "calipso_render/renderer.hpp"
+#include "calipso_ros/mode.hpp"
 
 namespace calipso::render {
-
-enum class Mode { kBag, kLive };
 
 struct NodeParams {
   std::string scene;  // folder with scene.yaml: supports, gravity
