@@ -230,25 +230,27 @@ float meanJump(const Relief& relief, const cv::Mat& mask) {
   return count > 0 ? static_cast<float>(sum / count) : 0.0f;
 }
 
-SurfaceModel SurfaceModel::fit(const Relief& relief, const cv::Mat& samples, double share,
-                               int components) {
+SurfaceModel SurfaceModel::fit(const Relief& relief, const cv::Mat& samples, const cv::Mat& strokes,
+                               double share, int components) {
+  constexpr int kTelling = 20;        // strokes of fewer pixels tell nothing
   constexpr double kOutliers = 0.05;  // of the surfaces there are, known to no model
   SurfaceModel model;
+  const cv::Mat surfaces = samples & (relief.state == Relief::kSurface);
   std::vector<cv::Vec3f> all;
-  double none = 0.0;
   for (int y = 0; y < samples.rows; ++y)
-    for (int x = 0; x < samples.cols; ++x) {
-      if (!samples.at<uchar>(y, x)) continue;
-      const uchar state = relief.state.at<uchar>(y, x);
-      none += state == Relief::kNone;
-      if (state == Relief::kSurface) all.push_back(relief.surface.at<cv::Vec3f>(y, x));
-    }
+    for (int x = 0; x < samples.cols; ++x)
+      if (surfaces.at<uchar>(y, x)) all.push_back(relief.surface.at<cv::Vec3f>(y, x));
+  // Samples that look alike may be the sky behind the object.
+  const bool told = !strokes.empty() && cv::countNonZero(strokes) >= kTelling;
+  const cv::Mat& sure = told ? strokes : samples;
+  const double none = cv::countNonZero(sure & (relief.state == Relief::kNone));
+  const double some = cv::countNonZero(sure & (relief.state == Relief::kSurface));
   // Laplace's rule: what was never seen is still possible.
-  const double total = none + all.size() + 2.0;
+  const double total = none + some + 2.0;
   const double floor = 1.0 / (samples.total() + 1.0);
   const auto nats = [](double p) { return static_cast<float>(-std::log(p)); };
   model.none_cost_ = nats(std::max(floor, share) * (none + 1.0) / total);
-  model.some_cost_ = nats(std::max(floor, share) * (all.size() + 1.0) / total);
+  model.some_cost_ = nats(std::max(floor, share) * (some + 1.0) / total);
   model.outlier_cost_ = nats(kOutliers / relief.volume);
   std::vector<cv::Vec3f> few;
   const size_t count = std::min(all.size(), kMaxSamples);

@@ -134,8 +134,10 @@ void Segmenter::refitSurfaces(const std::vector<cv::Mat>& certain) {
     const double share = cv::countNonZero(own & coarse_.region) / area;
     if (!certain.empty()) own &= certain[k];
     own = nearIslands(coarse_, own, k);
-    if (cv::countNonZero(own) >= kMinModelPixels)
-      models_[k].surfaces = SurfaceModel::fit(coarse_.relief, own, share, params_.surfaces);
+    if (cv::countNonZero(own) < kMinModelPixels) continue;
+    // The background's strokes are drawn beside objects, and tell nothing of its shares.
+    const cv::Mat strokes = k > 0 ? cv::Mat(coarse_.seeds == static_cast<int>(k + 1)) : cv::Mat();
+    models_[k].surfaces = SurfaceModel::fit(coarse_.relief, own, strokes, share, params_.surfaces);
   }
 }
 

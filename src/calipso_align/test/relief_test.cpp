@@ -79,10 +79,28 @@ TEST(SurfaceModel, SkyBelongsToTheLabelThatHasIt) {
   depth.setTo(0.0f, maskOf(kSize, kDisc) == 0);
   const Relief relief = makeRelief(paint(kSize, kDisc, kGreen, kGrey, 2.0), depth);
   const cv::Mat own = maskOf(kSize, kDisc);
-  const SurfaceModel object = SurfaceModel::fit(relief, own, 0.15, 4);
-  const SurfaceModel sky = SurfaceModel::fit(relief, own == 0, 0.85, 4);
+  const SurfaceModel object = SurfaceModel::fit(relief, own, {}, 0.15, 4);
+  const SurfaceModel sky = SurfaceModel::fit(relief, own == 0, {}, 0.85, 4);
   EXPECT_LT(sky.cost(relief, 5, 5), object.cost(relief, 5, 5) - 5.0f);
   EXPECT_LT(object.cost(relief, 80, 60), sky.cost(relief, 80, 60) - 5.0f);
+}
+
+// As much sky as disc is taken for the disc, as the sky that a lattice encloses may be.
+TEST(SurfaceModel, StrokesTellThatALabelHasNoSky) {
+  cv::Mat depth = depthOfDisc(0);
+  depth.setTo(0.0f, maskOf(kSize, kDisc) == 0);
+  const Relief relief = makeRelief(paint(kSize, kDisc, kGreen, kGrey, 2.0), depth);
+  cv::Mat own = maskOf(kSize, kDisc);
+  const int area = cv::countNonZero(own);
+  own(cv::Rect(0, 0, kSize.width, 20)).setTo(255);
+  ASSERT_GT(cv::countNonZero(own), 1.8 * area);
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  strokes(cv::Rect(65, 55, 30, 10)).setTo(255);
+  const SurfaceModel believing = SurfaceModel::fit(relief, own, {}, 0.3, 4),
+                     told = SurfaceModel::fit(relief, own, strokes, 0.3, 4);
+  // One pixel of 302 instead of one of two, by Laplace's rule.
+  EXPECT_NEAR(told.cost(relief, 5, 5) - believing.cost(relief, 5, 5), std::log(302.0 / 2.0), 0.2);
+  EXPECT_LT(told.cost(relief, 80, 60), believing.cost(relief, 80, 60));
 }
 
 // A picture in which colours tell nothing of the object's right half, and depth tells everything.

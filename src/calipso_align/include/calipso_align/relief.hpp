@@ -50,9 +50,11 @@ float meanJump(const Relief& relief, const cv::Mat& mask);
 // Places in the picture count, so that it is an intensity: a small object claims little of it.
 class SurfaceModel {
  public:
-  // samples: pixels that are the label's (CV_8U); share: of the picture's part in question that is.
-  static SurfaceModel fit(const Relief& relief, const cv::Mat& samples, double share,
-                          int components);
+  // samples: pixels that are taken for the label's (CV_8U); strokes: those that are, which tell
+  // how often it has no depth (or empty: the samples do); share: of the picture's part in question
+  // that is the label's.
+  static SurfaceModel fit(const Relief& relief, const cv::Mat& samples, const cv::Mat& strokes,
+                          double share, int components);
 
   // Negative log intensity of what is seen at a pixel, nats.
   float cost(const Relief& relief, int x, int y) const;
