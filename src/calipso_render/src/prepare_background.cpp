@@ -244,7 +244,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   }
   InpaintParams known_of_place;
   known_of_place.nearness = groundNearness(params.planes, key.camera, p.scenery);
-  known_of_place.surface = surfaces.label, known_of_place.supports = surfaces.supports;
+  known_of_place.surface = surfaces.alike, known_of_place.supports = surfaces.supports;
   known_of_place.sure = surfaces.sure;
   for (const PicturePlane& plane : surfaces.planes)
     known_of_place.planes.push_back(plane.fromPixels(key.camera));

@@ -73,11 +73,11 @@ struct Lines {
       c += covered.at<std::uint8_t>(at[0], at[1]) / 255.0f * (cv::Vec3f::all(dark) - c);
     });
   }
-  LineBridges bridge() {
+  LineBridges bridge(const cv::Mat& surface = cv::Mat()) {
     hole(cv::Rect(110, 50, 100, 100)).setTo(255);
     truth = image.clone();
     image.setTo(cv::Scalar::all(0), hole);
-    return bridgeLines(hole, hole == 0, image);
+    return bridgeLines(hole, hole == 0, surface, image);
   }
 };
 
@@ -108,6 +108,18 @@ TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
   EXPECT_LT(meanDifference(l.image, l.truth, b.drawn), 8.0);
   EXPECT_NE(b.drawn.at<std::uint8_t>(130, 163), 0);  // on the second line
   EXPECT_EQ(b.drawn.at<std::uint8_t>(70, 174), 0);   // beyond the first
+}
+
+// The gaps of a fence do not go on through the hedge that is seen above it.
+TEST(BridgeLines, LeadNoLineThroughAnotherSurface) {
+  Lines l;
+  l.line({0, 90}, {319, 90});
+  l.line({150, 199}, {170, 90});
+  cv::Mat surface(l.image.size(), CV_8U, cv::Scalar(2));
+  surface.rowRange(0, 120).setTo(1);
+  const LineBridges b = l.bridge(surface);
+  EXPECT_NE(b.drawn.at<std::uint8_t>(90, 140), 0);
+  EXPECT_EQ(b.drawn.at<std::uint8_t>(130, 163), 0);
 }
 
 // A broad line, of which both edges are found, goes on through what is faint to one of its like,

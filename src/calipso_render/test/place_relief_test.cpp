@@ -112,6 +112,46 @@ TEST(PlaceRelief, AFloorUpToTheHorizonIsNoPlaneOfItsOwn) {
   EXPECT_TRUE(findRelief(surfaces, kSun).empty());
 }
 
+// Behind an object that stands on it, too.
+TEST(PlaceRelief, AFloorUpToTheHorizonGoesOnBehindAnObject) {
+  Room room;
+  for (int v = 0; v < kHigh; ++v) {
+    const float down = std::max(0.0f, static_cast<float>(camera().ray(0, v).y()));
+    room.scenery.row(v) = down, room.depth.row(v) = down > 0.0f ? 1.0f / down : 0.0f;
+  }
+  cv::erode(room.scenery, room.scenery, cv::Mat::ones(3, 3, CV_8U));
+  const cv::Rect object(70, 55, 20, 30);
+  room.scenery(object) = 0.0f, room.labels.setTo(0), room.labels(object) = 1;
+  room.depth(object) = 2.0f;
+  const PlaceSurfaces surfaces = room.surfaces();
+  EXPECT_EQ(surfaces.label.at<std::uint8_t>(70, 80), 1);
+  EXPECT_EQ(surfaces.alike.at<std::uint8_t>(83, 80), 1);
+  // Up to 20 rows below the horizon something may stand before it.
+  EXPECT_EQ(surfaces.alike.at<std::uint8_t>(70, 80), PlaceSurfaces::kUnknown);
+}
+
+// A bank that bends up from the water, and a bridge before both.
+TEST(PlaceRelief, APlaneIsLeftToWhatRisesAboveIt) {
+  Room room;
+  for (int v = 0; v < kHigh; ++v) {
+    for (int u = 0; u < kWide; ++u) {
+      const float floor = std::max(0.05f, static_cast<float>(camera().ray(0, v).y()));
+      const float x = static_cast<float>(std::max(0, u - 90)) / 40.0f;
+      const float bumps = 1.0f + 0.3f * std::sin(0.5f * v) * std::sin(0.4f * u);
+      room.scenery.at<float>(v, u) = floor + 0.3f * x * x * bumps;
+    }
+  }
+  room.depth = 1.0f / room.scenery;
+  const cv::Rect bridge(0, 84, kWide, 16);
+  room.scenery(bridge) = 0.0f, room.labels.setTo(0), room.labels(bridge) = 1;
+  room.depth(bridge) = 0.5f;
+  const PlaceSurfaces surfaces = room.surfaces();
+  ASSERT_EQ(surfaces.label.at<std::uint8_t>(110, 140), PlaceSurfaces::kCurved);
+  EXPECT_EQ(surfaces.alike.at<std::uint8_t>(92, 30), 1);
+  EXPECT_EQ(surfaces.alike.at<std::uint8_t>(92, 140), PlaceSurfaces::kCurved);
+  EXPECT_EQ(surfaces.label.at<std::uint8_t>(92, 140), PlaceSurfaces::kUnknown);
+}
+
 TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereTheSunComesFromBehind) {
   EXPECT_TRUE(
       findRelief(findSurfaces(cv::Mat(), cv::Mat(), Room().labels, floorPlane(), camera()), kSun)

@@ -82,7 +82,7 @@ struct Filling {
 Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const Lattice* lattice,
              const InpaintParams& params) {
   const cv::Mat whole_hole = to_fill.clone();
-  const LineBridges bridges = bridgeLines(to_fill, source, look, lattice);
+  const LineBridges bridges = bridgeLines(to_fill, source, params.surface, look, lattice);
   to_fill.setTo(0, bridges.core);
   known |= bridges.core;
   source.setTo(0, bridges.lines);

@@ -32,8 +32,8 @@ struct Bridge {
 
 class Bridger {
  public:
-  Bridger(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image)
-      : hole_(hole), source_(source), image_(image) {
+  Bridger(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& surface, cv::Mat& image)
+      : hole_(hole), source_(source), surface_(surface), image_(image) {
     result_.drawn = cv::Mat::zeros(hole.size(), CV_8U);
     result_.core = cv::Mat::zeros(hole.size(), CV_8U);
     result_.lines = cv::Mat::zeros(hole.size(), CV_8U);
@@ -159,8 +159,28 @@ class Bridger {
                   where = render::cross(start - end.at, end.into) / sine;
       if (t > 2.0f && where >= 0.0f && where <= 1.0f && (!nearest || t < *nearest)) nearest = t;
     }
-    if (nearest && hiddenPart(end.at, end.at + *nearest * end.into) < kInHole) return std::nullopt;
+    if (nearest && (hiddenPart(end.at, end.at + *nearest * end.into) < kInHole ||
+                    !staysOnSurface(end, *nearest)))
+      return std::nullopt;
     return nearest;
+  }
+
+  // Is the same surface beside the way as beside what is seen of the line? Else another one comes
+  // between.
+  bool staysOnSurface(const LineEnd& end, float way) const {
+    if (surface_.empty()) return true;
+    for (const float s : {-1.0f * kLineHalf, 1.0f * kLineHalf}) {
+      const int own = surfaceAt(end.at - kLineHalf * end.into + s * leftOf(end.into));
+      for (float t = 0.0f; own != 0 && t < way - kLineHalf; t += 1.0f) {
+        const int other = surfaceAt(end.at + t * end.into + s * leftOf(end.into));
+        if (other != 0 && other != own) return false;
+      }
+    }
+    return true;
+  }
+
+  int surfaceAt(const cv::Point2f& p) const {
+    return isSet(surface_, p) ? surface_.at<std::uint8_t>(cvRound(p.y), cvRound(p.x)) : 0;
   }
 
   // What is seen `t` px before an end, there and back, `s` px beside it.
@@ -220,7 +240,7 @@ class Bridger {
         cv::Vec2s(cv::saturate_cast<short>(origin.x), cv::saturate_cast<short>(origin.y));
   }
 
-  const cv::Mat &hole_, &source_;
+  const cv::Mat &hole_, &source_, &surface_;
   cv::Mat& image_;
   std::vector<LineEnd> ends_;
   LineBridges result_;
@@ -228,9 +248,9 @@ class Bridger {
 
 }  // namespace
 
-LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, cv::Mat& image,
-                        const Lattice* lattice) {
-  return Bridger(hole, source, image).run(lattice);
+LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& surface,
+                        cv::Mat& image, const Lattice* lattice) {
+  return Bridger(hole, source, surface, image).run(lattice);
 }
 
 }  // namespace calipso::render

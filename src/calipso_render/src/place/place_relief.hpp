@@ -32,6 +32,9 @@ struct PlaceSurfaces {
   // CV_8UC1: kUnknown; the support planes from 1 on, then other planes; kCurved: what is none of
   // them
   cv::Mat label;
+  // CV_8UC1: surface whose like what is hidden is filled from: the label, but kCurved (no plane)
+  // where none of the planes goes on, kUnknown just below the horizon
+  cv::Mat alike;
   cv::Mat
       sure;  // CV_8UC1: 255 where a plane is seen, or hidden and nothing else is seen nearer by that does not meet it
   cv::Mat position, normal;          // CV_32FC3, world, off the support planes

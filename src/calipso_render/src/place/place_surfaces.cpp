@@ -24,6 +24,12 @@ constexpr float kSameSurface = 0.05f;  // of the nearness within it
 
 constexpr int kCopied = 6;  // px around a place that are plane, for it to be copied from
 
+// times that a pixel of a support plane is as near as the farthest beside it, from which on so
+// little of the plane is left up to the horizon that what stands on it may hide it
+constexpr float kAtHorizon = 1.05f;
+constexpr int kRises =
+    13;  // px of the squares of a support plane, and of what rises above it, that tell
+
 constexpr int kNoPlane = -1;
 
 struct Pixel {
@@ -247,7 +253,8 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
       if (edges[k][j] == kStandsOut) beyond |= seen == j;
     }
     const cv::Mat& nearness = planes[k].nearness;
-    planes[k].goes_on = goesOn(nearness, scenery, k < supports ? none : taken, beyond, nothing);
+    planes[k].goes_on =
+        goesOn(nearness, planes[k].farthest, scenery, k < supports ? none : taken, beyond, nothing);
     // What a larger plane explains is no sign of one that passes through it.
     if (k >= supports)
       taken |= (scenery > 0.0f) & (cv::abs(nearness - scenery) < kOnPlane * nearness);
@@ -280,6 +287,38 @@ cv::Mat sureOf(const cv::Mat& label, const cv::Mat& hidden, const cv::Mat& seen,
     sure |= wanted & (to_on < to_other);
   }
   return sure;
+}
+
+// A support plane is not seen behind an object where things that rise above it (a bank, a rock) are
+// seen nearer by than it is: they hide it, or may.
+// @param seen planesSeen()
+void leaveToWhatRises(const cv::Mat& scenery, const std::vector<Extent>& planes,
+                      const cv::Mat& seen, PlaceSurfaces& surfaces) {
+  const cv::Mat hidden = scenery == 0.0f, square = cv::Mat::ones(kRises, kRises, CV_8U);
+  for (int k = 0; k < surfaces.supports; ++k) {
+    cv::Mat on, rises, to_on, to_rises;
+    cv::morphologyEx(seen == k, on, cv::MORPH_OPEN, square, {-1, -1}, 1, cv::BORDER_REPLICATE);
+    rises = (surfaces.label == PlaceSurfaces::kCurved) &
+            (scenery > (1.0f + kOffSupport) * planes[k].nearness);
+    cv::morphologyEx(rises, rises, cv::MORPH_OPEN, square, {-1, -1}, 1, cv::BORDER_REPLICATE);
+    if (cv::countNonZero(on) == 0 || cv::countNonZero(rises) == 0) continue;
+    cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
+    cv::distanceTransform(rises == 0, to_rises, cv::DIST_L2, cv::DIST_MASK_5);
+    surfaces.label.setTo(PlaceSurfaces::kUnknown,
+                         hidden & (surfaces.label == k + 1) & (to_rises < to_on));
+  }
+}
+
+// PlaceSurfaces::alike. @param near CV_8UC1, != 0: is known to be seen at some distance
+cv::Mat alikeOf(const cv::Mat& scenery, const cv::Mat& near, const std::vector<Extent>& planes,
+                const PlaceSurfaces& surfaces) {
+  const cv::Mat hidden = scenery == 0.0f, &label = surfaces.label;
+  cv::Mat alike = label.clone();
+  alike.setTo(PlaceSurfaces::kCurved, hidden & near & (label == PlaceSurfaces::kUnknown));
+  for (int k = 0; k < surfaces.supports; ++k)
+    alike.setTo(PlaceSurfaces::kUnknown,
+                hidden & (label == k + 1) & (planes[k].nearness > kAtHorizon * planes[k].farthest));
+  return alike;
 }
 
 }  // namespace
@@ -331,7 +370,7 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
   findReaches(scenery, nothing, supports, seen_planes, edges, extents);
   const cv::Mat known = scenery > 0.0f;
   PlaceSurfaces surfaces{
-      cv::Mat::zeros(scenery.size(), CV_8U), {},       cv::Mat(scenery.size(), CV_32FC3),
+      cv::Mat::zeros(scenery.size(), CV_8U), {},       {}, cv::Mat(scenery.size(), CV_32FC3),
       cv::Mat(scenery.size(), CV_32FC3),     supports, all};
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < scenery.rows; ++v) {
@@ -350,6 +389,8 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
         label = PlaceSurfaces::kCurved, setAt(u, v, seen, curved->normal(camera), camera, surfaces);
     }
   }
+  leaveToWhatRises(scenery, extents, seen_planes, surfaces);
+  surfaces.alike = alikeOf(scenery, (labels != 0) | (depth > 0.0f), extents, surfaces);
   surfaces.sure =
       sureOf(surfaces.label, (scenery == 0.0f) & (nothing == 0), seen_planes, nothing, edges);
   return surfaces;
