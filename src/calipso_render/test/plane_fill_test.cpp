@@ -69,6 +69,23 @@ TEST(FindLattice, FindsNoneInGrainAndInLines) {
   EXPECT_FALSE(findLattice(lines, known));
 }
 
+// Tiles go on behind all of a hole with a spot beside it, not where half of the picture is no tiles.
+TEST(GoesOnByLattice, SmallSpotsDoNotEndAPattern) {
+  const cv::Mat image = tiles(seenFrom(false));
+  cv::Mat hole = cv::Mat::zeros(kHigh, kWide, CV_8U);
+  hole(cv::Rect(130, 60, 60, 80)).setTo(255);
+  const auto lattice = findLattice(image, hole == 0);
+  ASSERT_TRUE(lattice);
+  const auto goneOn = [&](const cv::Rect& otherwise) {
+    cv::Mat look = image.clone();
+    look(otherwise).setTo(cv::Scalar::all(20));
+    look.setTo(0, hole);
+    return cv::countNonZero(goesOnByLattice(*lattice, look, hole == 0, hole));
+  };
+  EXPECT_EQ(goneOn({120, 95, 2, 2}), 60 * 80);
+  EXPECT_LT(goneOn({200, 0, 120, kHigh}), 0.8 * 60 * 80);
+}
+
 TEST(Spline, GoesThroughThePixelsAndKeepsWaves) {
   cv::Mat wave(60, 60, CV_32FC3);
   const auto at = [](double u, double v) {

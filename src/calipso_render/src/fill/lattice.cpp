@@ -262,7 +262,7 @@ cv::Mat goesOnByLattice(const Lattice& lattice, const cv::Mat& image, const cv::
   // Gaps in what is known belong to it.
   cv::morphologyEx(known, other, cv::MORPH_CLOSE, cv::Mat::ones(kCompared, kCompared, CV_8U));
   other &= (on == 0) & (hole == 0);
-  cv::morphologyEx(other, other, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+  cv::morphologyEx(other, other, cv::MORPH_OPEN, cv::Mat::ones(kCompared, kCompared, CV_8U));
   if (cv::countNonZero(other) == 0) return hole.clone();
   if (cv::countNonZero(on) == 0) return cv::Mat::zeros(hole.size(), CV_8U);
   cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
