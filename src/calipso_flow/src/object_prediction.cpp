@@ -101,10 +101,11 @@ Observation ObjectTracker::inPlace(const Frame& frame, const Reference& nearest)
 }
 
 // The picture has not changed, though too few of its points say where the object is: its pose errs
-// as before, and by what may have shifted besides. It is not remembered, so that frames to come are
-// compared with the one in which the object was found, and a creep adds up.
+// as before, and by what may have shifted besides. It is not remembered: frames to come are
+// compared with the one in which the object was found, so that a creep adds up, and no motion is
+// assumed in them.
 Observation ObjectTracker::asBefore(const Frame& frame) {
-  frames_lost_ = 0;
+  ++frames_lost_;
   const double depth =
       (frame.camera.world_from_camera.inverse() * (last_->world_from_object * centroid_)).z();
   const double shift = kStayedPx * depth / frame.camera.fx;
