@@ -1,0 +1,114 @@
+#include "texture/like_places.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calipso_render/surface_symmetry.hpp"
+#include "smooth_step.hpp"
+
+namespace calipso::render {
+namespace {
+
+constexpr float kQuarter = 0.25f * static_cast<float>(M_PI);
+// rad: middles of the part of a body of revolution that others repeat, the first of them; then in
+// steps, up to which, as the pattern may repeat itself about some of them alone
+constexpr float kTurns[] = {0.0f, 0.5f, -0.5f};
+constexpr float kTurnStep = 0.05f, kFarthestTurn = 0.7f;
+constexpr float kApart = 3.0f;  // spacings of texels: places nearer to each other tell nothing
+constexpr int kFewest = 30;     // places that tell whether others are like them
+// difference of two colours, of the brighter one, that light explains, and that none does
+constexpr float kSameColour = 0.15f, kOtherColour = 0.35f;
+// part of the places that look otherwise, from which the likeness counts less, and for nothing
+constexpr float kSomeDiffer = 0.15f, kTooManyDiffer = 0.5f;
+
+// Turns places about an axis into the quarter of a turn on either side of `middle`, back and forth,
+// so that what is near each other stays so.
+struct Fold {
+  Axis axis;
+  Eigen::Vector3f ahead, aside;  // span the plane across the axis; `ahead` is the middle
+
+  Place operator()(const Place& place) const {
+    const Eigen::Vector3f arm = place.point - axis.point;
+    const float angle = std::atan2(arm.dot(aside), arm.dot(ahead));
+    const float turns =
+        angle / (4.0f * kQuarter) + 0.25f;  // whole numbers where the sense changes back
+    const float phase = turns - std::floor(turns);
+    const bool back = phase > 0.5f;
+    const float folded = 4.0f * kQuarter * ((back ? 1.0f - phase : phase) - 0.25f);
+    if (!back) return turned(place, folded - angle);
+    // The mirror image across the plane through the axis that maps the one angle to the other.
+    const float half = 0.5f * (angle + folded);
+    const Eigen::Vector3f across = std::cos(half) * aside - std::sin(half) * ahead;
+    const MirrorPlane plane{across, across.dot(axis.point)};
+    return {plane.point(place.point), plane.vector(place.normal), place.part};
+  }
+
+ private:
+  Place turned(const Place& place, float angle) const {
+    const Eigen::AngleAxisf rotation(angle, axis.direction);
+    return {axis.point + rotation * (place.point - axis.point), rotation * place.normal,
+            place.part};
+  }
+};
+
+}  // namespace
+
+std::vector<LikePlace> mirroredPlaces(const Surface& surface) {
+  std::vector<LikePlace> like;
+  for (const MirrorPlane& plane : mirrorPlanes(surface.key_vertices, surface.triangles)) {
+    like.push_back({[plane](const Place& place) -> Place {
+      return {plane.point(place.point), plane.vector(place.normal)};
+    }});
+  }
+  return like;
+}
+
+std::vector<LikePlace> turnedPlaces(const Surface& surface, const Eigen::Vector3f& eye) {
+  std::vector<LikePlace> like;
+  const auto axis = revolutionAxis(surface.key_vertices, surface.triangles);
+  if (!axis) return like;
+  const Eigen::Vector3f to_eye = eye - axis->point;
+  const Eigen::Vector3f ahead =
+      (to_eye - axis->direction * axis->direction.dot(to_eye)).normalized();
+  if (!ahead.allFinite() || ahead.isZero()) return like;
+  std::vector<float> turns(std::begin(kTurns), std::end(kTurns));
+  for (float turn = kTurnStep; turn <= kFarthestTurn; turn += kTurnStep)
+    turns.insert(turns.end(), {turn, -turn});
+  for (const float turn : turns) {
+    const Eigen::Vector3f middle = Eigen::AngleAxisf(turn, axis->direction) * ahead;
+    like.push_back({Fold{*axis, middle, axis->direction.cross(middle)}});
+  }
+  return like;
+}
+
+void judgeLikePlaces(const std::vector<KnownPlace>& known, float spacing,
+                     const std::function<std::optional<cv::Vec3f>(const Place&)>& colourAt,
+                     std::vector<LikePlace>& like) {
+  const int count = static_cast<int>(like.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int i = 0; i < count; ++i) {
+    float differ = 0.0f;
+    int told = 0;
+    for (const KnownPlace& k : known) {
+      const Place there = like[i].of(k.place);
+      if ((there.point - k.place.point).norm() < kApart * spacing) continue;
+      const std::optional<cv::Vec3f> colour = colourAt(there);
+      if (!colour) continue;
+      const double more = std::max({cv::norm(k.colour), cv::norm(*colour), 1e-6});
+      differ += smoothStep(kSameColour, kOtherColour,
+                           static_cast<float>(cv::norm(k.colour - *colour) / more));
+      ++told;
+    }
+    if (told >= kFewest)
+      like[i].agrees = 1.0f - smoothStep(kSomeDiffer, kTooManyDiffer, differ / told);
+  }
+}
+
+void keepBest(std::size_t most, std::vector<LikePlace>& like) {
+  const auto order = [](const LikePlace& l) { return l.agreesWell() ? l.agrees : 0.0f; };
+  std::stable_sort(like.begin(), like.end(),
+                   [&](const LikePlace& a, const LikePlace& b) { return order(a) > order(b); });
+  if (like.size() > most) like.resize(most);
+}
+
+}  // namespace calipso::render

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "texture/texture_fill.hpp"
+
+namespace calipso::render {
+
+constexpr int kAnyPart = -1;
+
+// A point of the surface, world axes, key frame.
+struct Place {
+  Eigen::Vector3f point, normal;
+  int part = kAnyPart;  // of the mesh, that has to be seen there
+};
+
+// How well a picture shows a place: 0 not at all, 1 straight on and well inside the mask.
+struct Sighting {
+  float weight = 0.0f;
+  // pixels per area of surface, 1 = straight on from where the key frame's camera is
+  float detail = 0.0f;
+  float u = 0.0f, v = 0.0f;  // in Reflectance::region
+};
+
+// How well the pictures of an object show places of it.
+class Sightings {
+ public:
+  explicit Sightings(const SeenObject& object);
+
+  // @param before how far, in extents, the place may lie before the front that is seen there
+  Sighting lookAt(std::size_t view, const Place& place, float before) const;
+
+  // The front of the object before a place, where that is the front's mirror image across the plane
+  // of the key frame's picture.
+  Sighting frontBefore(const Place& place) const;
+
+  // Reflectance::clear where a look falls.
+  float clearAt(std::size_t view, const Sighting& look) const;
+
+  int partOf(int triangle) const { return parts_[triangle]; }  // connectedParts()
+  float extent() const { return extent_; }                     // of the object, m
+  float keyDepth() const { return key_depth_; }                // of the object in the key frame, m
+
+ private:
+  std::optional<Sighting> pixelOf(std::size_t view, const Eigen::Vector3f& in_camera) const;
+  bool ofPart(const Reflectance& r, const cv::Point& pixel, const Place& place) const;
+  bool sameFace(const Reflectance& r, const cv::Point& pixel, const Place& place) const;
+  template <typename Accepts>
+  float trustAround(std::size_t view, const Sighting& look, Accepts accepts) const;
+
+  const std::vector<const View*>& views_;
+  const std::vector<Reflectance>& pictures_;
+  std::vector<Eigen::Isometry3f> camera_from_world_;
+  std::vector<int> parts_;
+  float extent_ = 0.0f, key_depth_ = 1.0f;
+  bool two_sided_ = false;  // an open sheet is seen from both sides
+};
+
+}  // namespace calipso::render

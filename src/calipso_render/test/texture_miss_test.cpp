@@ -1,0 +1,83 @@
+#include "texture/texture_miss.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render_test_scene.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+const Eigen::Vector3d kPlace(0.0, 0.1, 0.12);
+constexpr int kViews = 9;
+
+Light evenLight() {
+  Light light;
+  light.ambient[0] = {0.8f, 0.8f, 0.8f};
+  return light;
+}
+
+constexpr float kWaves = 200.0f;  // rad/m: seven pixels long
+
+// Waves over the ball, of its own axes.
+cv::Vec3f patternAt(const Eigen::Vector3f& x) {
+  return cv::Vec3f::all(0.35f + 0.2f * std::sin(kWaves * x.x()) * std::sin(kWaves * x.z()));
+}
+
+// The ball turned a little from view to view.
+std::vector<View> patternedViews(const Surface& surface) {
+  std::vector<View> views;
+  for (int i = 0; i < kViews; ++i) {
+    View view{cv::Mat::zeros(kHeight, kWidth, CV_32FC3),
+              cv::Mat::zeros(kHeight, kWidth, CV_8U),
+              camera(),
+              {}};
+    Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
+    turn.translate(kPlace).rotate(
+        Eigen::AngleAxisd(0.07 * i, Eigen::Vector3d(0.2, 0.3, 1.0).normalized()));
+    view.actors.push_back(
+        makeActor(surface, transformed(surface.object_vertices, turn), view.camera));
+    forEachPixelOf(view.actors.front(), [&](int u, int v, const SurfacePoint& p) {
+      const cv::Vec3f shade = diffuseShading(evenLight(), p.normal, 1.0f, p.seen, {});
+      const Eigen::Vector3f own = (turn.inverse() * p.position.cast<double>()).cast<float>();
+      for (int c = 0; c < 3; ++c)
+        view.picture.at<cv::Vec3f>(v, u)[c] = codeFromLinear(patternAt(own)[c] * shade[c]);
+      view.labels.at<std::uint8_t>(v, u) = kBallLabel;
+    });
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+// Drawn where a picture shows it, the texture has the picture's contrast, though it is a mean of
+// pictures that lie between its texels.
+TEST(TextureMiss, TheTextureIsAsSharpAsItsPictures) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  const std::vector<View> views = patternedViews(surface);
+  const Appearance a = makeAppearances(views, {true}, evenLight(), {}).front();
+  double product = 0.0, square = 0.0;
+  for (int i = 2; i < kViews; ++i) {
+    const Actor& actor = views[i].actors.front();
+    const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
+    forEachPixelOf(actor, [&](int, int, const SurfacePoint& p) {
+      if (p.normal.dot((eye - p.position).normalized()) < 0.7f) return;
+      const Eigen::Vector3i& t = surface.triangles[p.triangle];
+      const Points& x = surface.object_vertices;
+      const Eigen::Vector3f own =
+          p.weights[0] * x[t[0]] + p.weights[1] * x[t[1]] + p.weights[2] * x[t[2]];
+      const double truth = patternAt(own)[1] - 0.35,
+                   drawn = a.texture.at(p.triangle, p.weights)[1] - 0.33;
+      product += truth * drawn, square += truth * truth;
+    });
+  }
+  // The light's floor takes 5 % off, the mean alone another 9.
+  EXPECT_GT(product / square, 0.90);
+  EXPECT_LT(product / square, 1.0);
+}
+
+}  // namespace
+}  // namespace calipso::render
