@@ -1,6 +1,7 @@
 #include "calipso_bag/arguments.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace calipso::bag {
@@ -50,6 +51,13 @@ double Arguments::number(const std::string& key, double fallback) const {
     throw std::invalid_argument("--" + key + " " + value + ": not a number");
   }
   return number;
+}
+
+double Arguments::positive(const std::string& key, double fallback) const {
+  const double value = number(key, fallback);
+  if (has(key) && !(value > 0.0 && std::isfinite(value)))
+    throw std::invalid_argument("--" + key + " " + values_.at(key) + ": give a number above 0");
+  return value;
 }
 
 }  // namespace calipso::bag

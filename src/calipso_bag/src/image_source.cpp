@@ -56,7 +56,8 @@ class Sequence : public ImageSource {
 class Video : public ImageSource {
  public:
   explicit Video(const std::string& path) : path_(path), capture_(path, cv::CAP_FFMPEG) {
-    if (!capture_.isOpened()) throw std::runtime_error(path + ": neither a video nor an image");
+    if (!capture_.isOpened())
+      throw std::runtime_error(path + ": neither a video nor an image; check the path");
     fps_ = capture_.get(cv::CAP_PROP_FPS);
     if (!(fps_ > 0.0 && fps_ < 1000.0)) {
       throw std::runtime_error(path + ": frame rate " + std::to_string(fps_) +

@@ -28,6 +28,16 @@ TEST(Arguments, FallsBackWhereNothingIsGiven) {
   EXPECT_DOUBLE_EQ(parse({"a", "b"}).number("seconds", 7.0), 7.0);
 }
 
+TEST(Arguments, RejectsWhatIsNotAboveZero) {
+  EXPECT_DOUBLE_EQ(parse({"a", "b", "--seconds", "0.1"}).positive("seconds", 7.0), 0.1);
+  EXPECT_DOUBLE_EQ(parse({"a", "b"}).positive("seconds", 0.0), 0.0);  // a default may be nothing
+  for (const char* value : {"0", "-1", "nan", "inf"}) {
+    EXPECT_THROW(parse({"a", "b", "--seconds", value}).positive("seconds", 7.0),
+                 std::invalid_argument)
+        << value;
+  }
+}
+
 TEST(Arguments, RejectsWhatItDoesNotKnow) {
   EXPECT_THROW(parse({"a"}), std::invalid_argument);
   EXPECT_THROW(parse({"a", "b", "c"}), std::invalid_argument);

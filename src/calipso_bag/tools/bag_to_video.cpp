@@ -29,7 +29,8 @@ cv::VideoWriter openWriter(const std::string& path, double fps, const cv::Size& 
     if (writer.isOpened()) return writer;
   }
   throw std::runtime_error(path +
-                           ": cannot be written as MP4; check the folder and OpenCV's FFmpeg");
+                           ": cannot be written as MP4; check the folder, the name's ending (.mp4) "
+                           "and OpenCV's FFmpeg");
 }
 
 // Both codecs store colour at half resolution and want even sizes.
@@ -43,7 +44,7 @@ void convert(const Arguments& arguments) {
   std::vector<ros::Time> stamps;
   forEachImage(arguments.word(0), arguments.word(1),
                [&](const cv::Mat&, const ros::Time& stamp) { stamps.push_back(stamp); });
-  const double fps = arguments.number("fps", fpsOf(stamps));
+  const double fps = arguments.positive("fps", fpsOf(stamps));
   cv::VideoWriter writer;
   forEachImage(arguments.word(0), arguments.word(1), [&](const cv::Mat& image, const ros::Time&) {
     const cv::Mat even = evenSized(image);

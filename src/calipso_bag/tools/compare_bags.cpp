@@ -43,24 +43,38 @@ cv::Mat sideBySide(cv::Mat original, cv::Mat edited, double seconds) {
   return row;
 }
 
+std::string sizeOf(const cv::Mat& image) {
+  return std::to_string(image.cols) + "x" + std::to_string(image.rows);
+}
+
+void checkSizes(const cv::Mat& original, const cv::Mat& edited) {
+  if (original.size() == edited.size()) return;
+  throw std::runtime_error("images of " + sizeOf(original) + " and of " + sizeOf(edited) +
+                           "; give an original and what was made of it");
+}
+
 void compare(const Arguments& arguments) {
+  if (!cv::haveImageWriter(arguments.word(4)))
+    throw std::invalid_argument(arguments.word(4) + ": no kind of picture; end its name in .png");
   const auto original = readAll(arguments.word(0), arguments.word(1));
   const auto edited = readAll(arguments.word(2), arguments.word(3));
-  const int rows = std::max(1, static_cast<int>(arguments.number("rows", 3)));
+  const int rows = std::max(1, static_cast<int>(arguments.positive("rows", 3)));
   std::vector<cv::Mat> sheet;
   for (int i = 1; i <= rows; ++i) {
     const std::size_t step =
         (edited.size() - 1) * static_cast<std::size_t>(i) / static_cast<std::size_t>(rows);
     const auto frame = std::next(edited.begin(), static_cast<std::ptrdiff_t>(step));
     const auto before = original.find(frame->first);
-    if (before == original.end()) throw std::runtime_error("the bags' stamps differ");
+    if (before == original.end())
+      throw std::runtime_error("the bags' stamps differ; give an original and what was made of it");
+    checkSizes(before->second, frame->second);
     const double seconds = (frame->first - edited.begin()->first).toSec();
     sheet.push_back(sideBySide(before->second.clone(), frame->second.clone(), seconds));
   }
   cv::Mat picture;
   cv::vconcat(sheet, picture);
   if (!cv::imwrite(arguments.word(4), picture)) {
-    throw std::runtime_error(arguments.word(4) + ": cannot be written");
+    throw std::runtime_error(arguments.word(4) + ": cannot be written; check the folder");
   }
   std::cout << arguments.word(4) << ": " << rows << " times, original | edited\n";
 }

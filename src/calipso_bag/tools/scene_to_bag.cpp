@@ -22,7 +22,8 @@ constexpr double kStillSeconds = 2.0;
 
 void convert(const Arguments& arguments) {
   const Scene scene = loadScene(arguments.word(0));
-  const double seconds = arguments.number("seconds", scene.frame_count == 1 ? kStillSeconds : 0.0);
+  const double seconds =
+      arguments.positive("seconds", scene.frame_count == 1 ? kStillSeconds : 0.0);
   const auto frames =
       holdLast(openSequence(scene.directory, scene.frame_pattern, scene.frame_count, scene.fps),
                static_cast<int>(std::lround(seconds * scene.fps)));

@@ -37,7 +37,7 @@ void convert(const Arguments& arguments) {
   const bool still = !look->next().has_value();
   const Calibration calibration = calibrationFor(arguments, *first);
 
-  const double seconds = arguments.number("seconds", still ? kStillSeconds : 0.0);
+  const double seconds = arguments.positive("seconds", still ? kStillSeconds : 0.0);
   const auto frames =
       holdLast(openVideo(arguments.word(0)), static_cast<int>(std::lround(seconds * look->fps())));
   ClipWriter writer(arguments.word(1), calibration.camera, look->fps(),

@@ -92,6 +92,29 @@ class BadInput(unittest.TestCase):
         cv2.imwrite(os.path.join(scene, picture), numpy.ones(size[::-1], numpy.uint16 if deep else numpy.uint8))
         return scene
 
+    def expect_of_tool(self, tool, *words, says):
+        result = subprocess.run(["rosrun", "calipso_bag", tool, *words], text=True,
+                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60)
+        self.assertEqual(result.returncode, 1, result.stdout)
+        for part in says:
+            self.assertIn(part, result.stdout)
+        self.assertEqual(result.stdout.count("\n"), 1, result.stdout)
+
+    def test_what_the_tools_cannot_read_or_write(self):
+        video, picture = self.path("out.mp4"), self.path("out.png")
+        self.expect_of_tool("bag_to_video", self.path("absent.bag"), IMAGE, video, says=["absent.bag", "check the path"])
+        self.expect_of_tool("bag_to_video", self.bag, INFO, video, says=["in.bag", INFO, "topic of pictures"])
+        self.expect_of_tool("bag_to_video", self.bag, IMAGE, video, "--fps", "0", says=["--fps 0", "above 0"])
+        compared = ("compare_bags", self.bag, IMAGE)
+        self.expect_of_tool(*compared, self.bag, IMAGE, self.path("out.pong"), says=["out.pong", ".png"])
+
+        def upper_half(topic, message, _):
+            if topic == IMAGE:
+                message.height //= 2
+                message.data = message.data[:message.height * message.step]
+            return message
+        self.expect_of_tool(*compared, self.spoilt(upper_half), IMAGE, picture, says=["640x360", "640x180"])
+
     def test_strokes_of_another_size(self):
         self.expect_complaint("strokes.png", "1280x720", "640x360", scene=self.spoilt_scene("strokes.png", (1280, 720), False))
 

@@ -21,6 +21,8 @@ class Arguments {
 
   // @throw std::invalid_argument when the value is not a number
   double number(const std::string& key, double fallback) const;
+  // @throw std::invalid_argument when the value is not a number above 0
+  double positive(const std::string& key, double fallback) const;
 
  private:
   std::vector<std::string> words_;

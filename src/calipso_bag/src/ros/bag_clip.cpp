@@ -10,6 +10,7 @@
 
 #include "calipso_bag/shot_changes.hpp"
 #include "clip_checks.hpp"
+#include "open_bag.hpp"
 
 namespace calipso::bag {
 namespace {
@@ -50,19 +51,6 @@ std::string choose(const std::set<std::string>& topics, const std::string& wante
   throw std::runtime_error(what +
                            (wanted.empty() ? ": not exactly one topic" : ": no topic " + wanted) +
                            "; there: " + listed(topics) + ". Choose with " + argument + ":=");
-}
-
-void openForReading(rosbag::Bag& bag, const std::string& path) {
-  try {
-    bag.open(path, rosbag::bagmode::Read);
-  } catch (const rosbag::BagUnindexedException&) {
-    throw std::runtime_error(path +
-                             ": the bag has no index, so its recording was cut short; "
-                             "'rosbag reindex' recovers what is readable");
-  } catch (const rosbag::BagException& e) {
-    throw std::runtime_error(path + ": cannot be read as a bag (" + e.what() +
-                             "); check the path, or recover it with 'rosbag reindex'");
-  }
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 
 #include <stdexcept>
 
+#include "open_bag.hpp"
+
 namespace calipso::bag {
 namespace {
 
@@ -24,16 +26,19 @@ cv_bridge::CvImagePtr decode(const rosbag::MessageInstance& message) {
 
 void forEachImage(const std::string& bag_path, const std::string& topic,
                   const std::function<void(const cv::Mat&, const ros::Time&)>& use) {
-  try {
-    rosbag::Bag bag(bag_path, rosbag::bagmode::Read);
-    rosbag::View view(bag, rosbag::TopicQuery(topic));
-    if (view.size() == 0) throw std::runtime_error("no message; see 'rosbag info'");
-    for (const rosbag::MessageInstance& message : view) {
-      const cv_bridge::CvImagePtr image = decode(message);
-      use(image->image, image->header.stamp);
+  const std::string who = bag_path + ", topic " + topic + ": ";
+  rosbag::Bag bag;
+  openForReading(bag, bag_path);
+  rosbag::View view(bag, rosbag::TopicQuery(topic));
+  if (view.size() == 0) throw std::runtime_error(who + "no message; see 'rosbag info'");
+  for (const rosbag::MessageInstance& message : view) {
+    cv_bridge::CvImagePtr image;
+    try {
+      image = decode(message);
+    } catch (const std::exception& error) {
+      throw std::runtime_error(who + error.what() + "; give a topic of pictures");
     }
-  } catch (const std::exception& error) {
-    throw std::runtime_error(bag_path + ", topic " + topic + ": " + error.what());
+    use(image->image, image->header.stamp);
   }
 }
 
