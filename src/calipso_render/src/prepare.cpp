@@ -11,6 +11,7 @@
 #include "place/clip_motion.hpp"
 #include "place/key_cover.hpp"
 #include "place/place_depth.hpp"
+#include "place/plate_beside.hpp"
 #include "prepare_background.hpp"
 #include "prepare_remarks.hpp"
 
@@ -157,7 +158,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
       cameraMoves(clip) ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()},
       params.planes, params.depth, params.background.mask_margin_px);
   const std::vector<ClipFrame> frames =
-      inKeyView(clip, p.nearness, params.background.mask_margin_px);
+      inKeyView(clip.frames(), p.nearness, params.background.mask_margin_px);
   findSurfacesInClip(clip, frames, models, p);
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);
@@ -180,6 +181,8 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
   prepareBackground({frames, light_views, actors, seen, picture, sun, sky, cameraMoves(clip)},
                     params, p);
+  if (cameraMoves(clip) && !p.background.drifting.established())
+    p.beside = platesBeside(clip.frames(), p.nearness, any_moves, params.background);
   p.background_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness, p);
   p.outline_blur = outlineBlur(picture, p.key_labels);

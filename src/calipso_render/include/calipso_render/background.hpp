@@ -13,9 +13,9 @@ namespace calipso::render {
 
 // The place without the objects, seen from the key frame's camera.
 struct Background {
-  cv::Mat plate;     // CV_32FC3, code values
-  cv::Mat count;     // CV_8UC1: frames of the sample in which the pixel was seen (at most 255)
-  cv::Mat spread;    // CV_32FC1: median absolute deviation over time, code values
+  cv::Mat plate;   // CV_32FC3, code values
+  cv::Mat count;   // CV_8UC1: frames of the sample in which the pixel was seen (at most 255)
+  cv::Mat spread;  // CV_32FC1: median absolute deviation over time, code values
   // CV_8UC1, may be empty: != 0 where moving objects are predicted to cast shade at times, so that
   // `spread` does not tell whether the place itself moves
   cv::Mat shaded_at_times;
@@ -23,7 +23,15 @@ struct Background {
   cv::Mat origin;    // CV_16SC2: where an invented pixel was copied from; (-1, -1) elsewhere
   LiveFill live;     // where an invented pixel's origin moves by itself; empty if nothing moves
   DriftingBackground drifting;  // the part of it that drifts as a whole
-  double filling_ms = 0.0;  // wall time in which what is invented was filled
+  double filling_ms = 0.0;      // wall time in which what is invented was filled
+};
+
+// The place without the objects from another camera, for what lies beside the key frame's picture.
+struct PlateBeside {
+  Camera camera;
+  cv::Mat nearness;  // CV_32FC1, 1/m
+  cv::Mat plate;     // CV_32FC3, linear
+  cv::Mat spread;    // CV_32FC1, as Background's; infinite where no frame shows it
 };
 
 struct BackgroundParams {

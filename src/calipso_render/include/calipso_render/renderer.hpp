@@ -107,6 +107,7 @@ struct Prepared {
   PlaneMirror mirror;
   Background background;
   cv::Mat plate_linear;  // CV_32FC3
+  std::vector<PlateBeside> beside;
   cv::Vec3f umbra = {0.4f, 0.4f,
                      0.4f};  // what the sun's absence leaves of a support plane's brightness
   NoiseModel noise;

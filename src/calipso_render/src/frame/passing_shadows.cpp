@@ -54,6 +54,7 @@ cv::Mat quietPlaces(const StagedFrame& frame, const SeenPlace& place) {
   cv::Mat here;
   cv::remap(at_key, here, place.from_key, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
             cv::Scalar(0));
+  if (!place.spread_beside.empty()) here |= place.spread_beside < kQuiet;
   return here;
 }
 

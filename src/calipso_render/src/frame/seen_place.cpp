@@ -1,9 +1,11 @@
 #include "frame/seen_place.hpp"
 
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "place/key_cover.hpp"
 #include "place/place_depth.hpp"
+#include "place/plate_beside.hpp"
 #include "place/view_warp.hpp"
 
 namespace calipso::render {
@@ -59,7 +61,29 @@ void SeenPlace::warp(const StagedFrame& frame) {
   cv::remap(there, plate, from_key, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   cv::remap(invented_there, invented, from_key, cv::noArray(), cv::INTER_NEAREST,
             cv::BORDER_CONSTANT, cv::Scalar(255));
+  lookBeside(frame);
+  cv::remap(prepared.shadowless, shadowless, from_key, cv::noArray(), cv::INTER_NEAREST,
+            cv::BORDER_CONSTANT, cv::Scalar(0));
   view = PlaceView(view.planes(), warped(prepared.relief, from_key));
+}
+
+// Takes what lies beside the key frame's picture from the plates of other cameras.
+void SeenPlace::lookBeside(const StagedFrame& frame) {
+  cv::Mat beside = besidePicture(from_key, frame.whole().size());
+  if (frame.prepared.beside.empty() || cv::countNonZero(beside) == 0) return;
+  constexpr float kUnknown = std::numeric_limits<float>::infinity();
+  spread_beside = cv::Mat(beside.size(), CV_32F, cv::Scalar(kUnknown));
+  for (const PlateBeside& other : frame.prepared.beside) {
+    const Camera &there = other.camera, &here = frame.input.camera;
+    const cv::Mat map = viewWarp(nearnessFrom(other.nearness, there, here), there, here);
+    cv::Mat colour, spread;
+    cv::remap(other.plate, colour, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+    cv::remap(other.spread, spread, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
+              cv::Scalar(kUnknown));
+    const cv::Mat shown = beside & (spread < kUnknown);
+    colour.copyTo(plate, shown), spread.copyTo(spread_beside, shown);
+    invented.setTo(0, shown), beside.setTo(0, shown);
+  }
 }
 
 }  // namespace calipso::render

@@ -19,8 +19,11 @@ struct SeenPlace {
   cv::Mat drifts;    // CV_8UC1, key frame's view: the plate drifts along; may be empty
   cv::Mat from_key;  // viewWarp(); empty: the key frame's view
   PlaceView view;    // what takes shadows
+  // CV_32FC1, Background::spread of what lies beside the key frame's picture, infinite elsewhere;
+  // may be empty
+  cv::Mat spread_beside;
+  cv::Mat shadowless;  // Prepared::shadowless
   // From the key frame's camera alone; elsewhere empty
-  cv::Mat shadowless;               // Prepared::shadowless
   std::vector<cv::Mat> fronts;      // Prepared::fronts
   std::vector<cv::Mat> footprints;  // Prepared::footprints
   const LiveFill* live = nullptr;   // Background::live
@@ -38,6 +41,7 @@ struct SeenPlace {
   void driftTo(const StagedFrame& frame);
   void takeKeyView(const StagedFrame& frame);
   void warp(const StagedFrame& frame);
+  void lookBeside(const StagedFrame& frame);
 };
 
 }  // namespace calipso::render

@@ -34,8 +34,8 @@ bool cameraMoves(const ClipSample& clip) {
                      [&](const ClipFrame& f) { return !sameView(f.camera, key); });
 }
 
-std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness, int margin) {
-  std::vector<ClipFrame> frames = clip.frames();
+std::vector<ClipFrame> inKeyView(std::vector<ClipFrame> frames, const cv::Mat& nearness,
+                                 int margin) {
   const Camera key = frames.front().camera;
   const cv::Mat objects = grown(frames.front().labels != 0, margin);
   for (ClipFrame& f : frames) {

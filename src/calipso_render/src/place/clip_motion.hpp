@@ -11,9 +11,11 @@ namespace calipso::render {
 bool cameraMoves(const ClipSample& clip);
 
 // The frames as the key frame's camera would see them; labels 255 where they do not show it.
+// @param frames as they were taken
 // @param nearness of the place, from the key frame's camera
 // @param margin px around masks that belong to the objects, as for placeNearness()
-std::vector<ClipFrame> inKeyView(const ClipSample& clip, const cv::Mat& nearness, int margin);
+std::vector<ClipFrame> inKeyView(std::vector<ClipFrame> frames, const cv::Mat& nearness,
+                                 int margin);
 
 // A moving camera sees an object at rest where its model at rest is, as well as they agree at the
 // key frame.

@@ -34,8 +34,7 @@ bool isFree(const DriftPicture& picture, int u, int v) {
 
 DriftPicture coarse(const DriftPicture& picture, int cell) {
   DriftPicture out;
-  const cv::Size size(std::max(1, picture.grey.cols / cell),
-                      std::max(1, picture.grey.rows / cell));
+  const cv::Size size(std::max(1, picture.grey.cols / cell), std::max(1, picture.grey.rows / cell));
   cv::resize(picture.grey, out.grey, size, 0, 0, cv::INTER_AREA);
   cv::resize(picture.covered, out.covered, size, 0, 0, cv::INTER_AREA);
   return out;

@@ -123,8 +123,7 @@ ObjectInFrame fromMsg(const calipso_msgs::ObjectState& state) {
   object.edited = state.edited;
   object.removed = state.removed;
   object.world_from_object = calipso::fromMsg(state.pose);
-  if (!state.observed_pose.empty())
-    object.observed = calipso::fromMsg(state.observed_pose.front());
+  if (!state.observed_pose.empty()) object.observed = calipso::fromMsg(state.observed_pose.front());
   for (std::size_t i = 0; i + 2 < state.vertices.size(); i += 3) {
     object.vertices.emplace_back(state.vertices[i], state.vertices[i + 1], state.vertices[i + 2]);
   }
