@@ -10,6 +10,11 @@
 namespace calipso::render {
 namespace {
 
+// of a support plane's light before an edit: darker, its own pixels do not tell what it would be in
+// more light
+constexpr float kDarkest = 0.05f;
+constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
+
 // The light on pixels of a row: levels now and before, 255 where a change is taken at all, where
 // the place comes to light, and how far the original's shadow is to be taken from the plate.
 struct LightLevels {

@@ -12,10 +12,6 @@
 namespace calipso::render {
 
 constexpr int kSameLevels = 4;  // of a lightLevel(): no visible change
-// of a support plane's light before an edit: darker, its own pixels do not tell what it would be in
-// more light
-constexpr float kDarkest = 0.05f;
-constexpr float kBrightest = 1.25f;  // times its light before, to which its own pixels still tell
 
 // Sun and sky on the place in what an edit can change, before it and now, where now can matter:
 // where they may differ from before, around where the sun may, and where the place behind an object

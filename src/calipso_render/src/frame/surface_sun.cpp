@@ -68,7 +68,7 @@ void SurfaceSun::lightCorners(int j, int first, const std::vector<std::uint8_t>&
   CornerRun wanted;
   wanted.count = 0;
   for (int i = first; i < columns_; i += 2) {
-    const int slot = slotAt(i, v), column = origin_.x + i * kLightStep - region_.x;
+    const int slot = slotAt(i, v, ids), column = origin_.x + i * kLightStep - region_.x;
     if (slot < 0) continue;
     corners[i] = {0.0f, nearness[column], slot};
     const int to_end = j % 2 == 0 ? 1 : columns_;
@@ -85,11 +85,11 @@ void SurfaceSun::lightCorners(int j, int first, const std::vector<std::uint8_t>&
   lookUp(v, wanted, corners);
 }
 
-// Which object's surface is lit at corner i of picture row v; -1: none.
-int SurfaceSun::slotAt(int i, int v) const {
+// Which object's surface is lit at corner i of picture row v; -1: none. @param ids of the row
+int SurfaceSun::slotAt(int i, int v, const std::uint32_t* ids) const {
   const int u = origin_.x + i * kLightStep;
   if (u < region_.x || u >= region_.br().x) return -1;
-  const std::uint32_t id = surfaces_.centre().ids(v - region_.y)[u - region_.x];
+  const std::uint32_t id = ids[u - region_.x];
   if (!surfaces_.isDrawn(id, u, v)) return -1;
   const int slot = VisibilityBuffer::objectOf(id);
   return maps_[slot].of(VisibilityBuffer::triangleOf(id)).is(TriangleMap::kThin) ? -1 : slot;

@@ -54,7 +54,7 @@ class SurfaceSun {
 
   void find();
   void lightCorners(int j, int first, const std::vector<std::uint8_t>& large);
-  int slotAt(int i, int v) const;
+  int slotAt(int i, int v, const std::uint32_t* ids) const;
   void lookUp(int v, CornerRun& wanted, Corner* corners) const;
   bool isSmooth(int i, int j, int size) const;
   bool isSmoothAround(int i, int j, const std::vector<std::uint8_t>& large) const;
