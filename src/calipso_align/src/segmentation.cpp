@@ -4,7 +4,6 @@
 #include <cmath>
 #include <future>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 #include <utility>
 
 #include "segmentation_checks.hpp"
@@ -81,10 +80,7 @@ void Segmenter::learn() {
 void Segmenter::initialiseModels() {
   const cv::Mat outside = surroundings(coarse_) & (coarse_.region == 0) & (coarse_.seeds <= 1);
   const cv::Mat background = outside | (coarse_.seeds == 1);
-  if (cv::countNonZero(background) == 0)
-    throw std::invalid_argument(
-        "segmentation: rectangles and strokes leave no background to learn from; draw smaller "
-        "rectangles or a background stroke");
+  if (cv::countNonZero(background) == 0) failWithoutBackground();
   models_.assign(targets_.size() + 1, {});
   fitColours(coarse_, background, params_.components, models_[0]);
   for (size_t k = 0; k < targets_.size(); ++k) {

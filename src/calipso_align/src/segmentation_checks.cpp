@@ -98,6 +98,12 @@ std::vector<std::string> indistinctTargets(const std::vector<SegmentationTarget>
   return remarks;
 }
 
+void failWithoutBackground() {
+  throw std::invalid_argument(
+      "segmentation: rectangles and strokes leave no background to learn from; draw smaller "
+      "rectangles or a background stroke");
+}
+
 void failWithoutForeground(const SegmentationTarget& target) {
   throw std::invalid_argument("object '" + target.name +
                               "': the rectangle and strokes leave no foreground; draw a stroke on "

@@ -20,6 +20,7 @@ void checkStrokes(const cv::Mat& strokes, const std::vector<SegmentationTarget>&
 std::vector<std::string> indistinctTargets(const std::vector<SegmentationTarget>& targets,
                                            const std::vector<cv::Mat>& costs,
                                            const cv::Mat& labels);
+[[noreturn]] void failWithoutBackground();
 [[noreturn]] void failWithoutForeground(const SegmentationTarget& target);
 
 }  // namespace calipso::align
