@@ -186,6 +186,15 @@ cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const Rece
   return shadeTraces(shadows, place, params) & stays.never_lit;
 }
 
+// What planes mirror is taken off plate and key frame; where nothing else is left it is a trace.
+// @param planes CV_8UC1, != 0: seen but for objects
+void takeOffMirrored(const cv::Mat& planes, cv::Mat& traces, ClipFrame& key, Prepared& p) {
+  p.background.plate = unmirrored(p.mirror, p.background.plate);
+  key.bgr = unmirroredCodes(p.mirror, key.bgr);
+  p.mirror.lost = lostInMirror(p.mirror, key.bgr, planes & (p.key_labels == 0) & (traces == 0));
+  traces |= p.mirror.lost;
+}
+
 void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,
                     const cv::Mat& off_planes, const RenderParams& params, Prepared& p) {
   const Light& light = p.light.light;
@@ -238,19 +247,17 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   cv::Mat traces =
       any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
   traces |= passingTraces(e, place, in_sun, params, p);
-  if (p.mirror.established()) {
-    p.background.plate = unmirrored(p.mirror, p.background.plate);
-    key.bgr = unmirroredCodes(p.mirror, key.bgr);
-  }
+  const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);
+  if (p.mirror.established())
+    takeOffMirrored((ground > 0.0f) & (place.off_planes == 0), traces, key, p);
   InpaintParams known_of_place;
-  known_of_place.nearness = groundNearness(params.planes, key.camera, p.scenery);
+  known_of_place.nearness = ground;
   known_of_place.surface = surfaces.alike, known_of_place.supports = surfaces.supports;
   known_of_place.sure = surfaces.sure;
   for (const PicturePlane& plane : surfaces.planes)
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
   inventBackground(traces, key, known_of_place, params.background, p.background);
   p.plate_linear = linearOf(p.background.plate);
-  const cv::Mat& ground = known_of_place.nearness;
   findDrifting(e.frames,
                ground.empty() ? ground : cv::Mat((ground > 0.0f) & (place.off_planes == 0)),
                params.background, p);

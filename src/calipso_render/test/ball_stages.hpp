@@ -49,7 +49,7 @@ struct BallStages {
         moved(frame, place),
         others(frame, moved, resting.update(frame, place)),
         region(frame, resting, moved, others, reflections, cv::Mat()),
-        removed(removedPixels(frame, place, region, cv::Mat())),
+        removed(removedPixels(frame, place, region, cv::Mat(), reflections.marks())),
         surfaces(frame, place, region, removed) {}
 };
 

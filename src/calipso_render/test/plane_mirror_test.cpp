@@ -200,5 +200,25 @@ TEST(PlaneMirror, IsDrawnOutAlikeInABoxAndInTheWholePicture) {
   }
 }
 
+// Waves all over a lake, and the dark mirror image of a hull, with waves in it or none.
+TEST(PlaneMirror, WhatIsPlainWithoutItIsLost) {
+  const cv::Rect hull(60, 40, 50, 40);
+  cv::Mat lake(kHeight, kWidth, CV_8UC3);
+  cv::RNG random(5);
+  random.fill(lake, cv::RNG::UNIFORM, 100, 160);
+  PlaneMirror mirror;
+  mirror.strength = 1.0f, mirror.at_key = cv::Mat::zeros(lake.size(), CV_32FC3);
+  mirror.at_key(hull).setTo(cv::Scalar::all(-0.1));
+  const cv::Mat plane(lake.size(), CV_8U, cv::Scalar(255));
+  EXPECT_EQ(cv::countNonZero(lostInMirror(mirror, lake, plane)), 0);
+  lake(hull).setTo(cv::Scalar::all(130));
+  const cv::Mat lost = lostInMirror(mirror, lake, plane);
+  EXPECT_EQ(cv::countNonZero(lost(hull)), hull.area());
+  EXPECT_EQ(cv::countNonZero(lost), hull.area());
+  cv::Mat shadow = plane.clone();
+  shadow(hull).setTo(0);
+  EXPECT_EQ(cv::countNonZero(lostInMirror(mirror, lake, shadow)), 0);
+}
+
 }  // namespace
 }  // namespace calipso::render

@@ -13,6 +13,7 @@ struct PlaneMirror {
   float slope = 0.0f;
   cv::Mat off;       // CV_8UC1: 255 where something else than a plane is seen
   cv::Mat at_key;    // CV_32FC3, linear: what the objects at rest add to the key frame
+  cv::Mat lost;      // CV_8UC1: 255 where nothing of the plane is left in that; may be empty
   cv::Rect key_box;  // beyond it they add nothing
 
   bool established() const { return strength > 0.0f; }

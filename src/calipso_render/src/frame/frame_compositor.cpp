@@ -47,7 +47,7 @@ FrameOutput FrameCompositor::run() {
 }
 
 void FrameCompositor::drawRegion() {
-  removed_ = removedPixels(frame_, place_, region_, passing_);
+  removed_ = removedPixels(frame_, place_, region_, passing_, reflections_.marks());
   surfaces_.emplace(frame_, place_, region_, removed_);
   sideBySide(
       frame_.params.quality == Quality::kLive,

@@ -2,6 +2,7 @@
 
 #include "draw/wide_loops.hpp"
 #include "frame/mask_morphology.hpp"
+#include "frame/reflections.hpp"
 #include "frame/tiled_filter.hpp"
 
 namespace calipso::render {
@@ -50,10 +51,14 @@ void findRemoved(const StagedFrame& frame, const SeenPlace& place, const cv::Mat
 }  // namespace
 
 cv::Mat removedPixels(const StagedFrame& frame, const SeenPlace& place, const EditedRegion& region,
-                      const cv::Mat& passing) {
+                      const cv::Mat& passing, const cv::Mat& mirrored) {
   cv::Mat removed = cv::Mat::zeros(region.all.size(), CV_8U);
   const cv::Rect& box = region.revealed;
   if (!box.empty()) findRemoved(frame, place, passing, box, removed(box - region.all.tl()));
+  const cv::Mat& lost = frame.prepared.mirror.lost;
+  if (!mirrored.empty() && !lost.empty())
+    removed |= lost(region.all) & (mirrored(region.all) == Reflections::kChanged) &
+               (frame.labels(region.all) == 0);
   for (const cv::Mat& front : place.fronts) {
     if (!front.empty()) removed.setTo(0, front(region.all));
   }

@@ -1,6 +1,7 @@
 #include "place/plane_mirror.hpp"
 
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "calipso_render/colour.hpp"
@@ -11,6 +12,39 @@ namespace calipso::render {
 namespace {
 
 constexpr float kReach = 3.0f;  // standard deviations
+// of a place's brightness: where the mirror image adds or takes more, the plane is seen through it
+constexpr double kMirrors = 0.1;
+constexpr int kAround = 15;        // px of the squares in which gradients are averaged, and rows
+constexpr int kFewestBeside = 40;  // pixels of a row beside the mirror image, for it to be compared
+constexpr float kPlain = 0.4f;     // of the gradients beside it
+
+// Mean gradient of the grey picture around every pixel, of what is set in `where`.
+cv::Mat meanGradient(const cv::Mat& bgr, const cv::Mat& where) {
+  cv::Mat grey, across, down, weight, weights;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  cv::Scharr(grey, across, CV_32F, 1, 0), cv::Scharr(grey, down, CV_32F, 0, 1);
+  cv::erode(where, weight, cv::Mat::ones(3, 3, CV_8U));
+  weight.convertTo(weight, CV_32F, 1.0 / 255.0);
+  cv::Mat gradient = (cv::abs(across) + cv::abs(down)).mul(weight);
+  cv::blur(gradient, gradient, {kAround, kAround}), cv::blur(weight, weights, {kAround, kAround});
+  return gradient / cv::max(weights, 1e-3);
+}
+
+// The mean of a picture over every row and those around, of what is set; 0 where too few are.
+std::vector<float> meanOfRows(const cv::Mat& values, const cv::Mat& where) {
+  cv::Mat sum(values.rows, 1, CV_32F), count(values.rows, 1, CV_32F);
+  for (int v = 0; v < values.rows; ++v) {
+    sum.at<float>(v) = static_cast<float>(cv::mean(values.row(v), where.row(v))[0]);
+    count.at<float>(v) = static_cast<float>(cv::countNonZero(where.row(v)));
+  }
+  sum = sum.mul(count);
+  cv::blur(sum, sum, {1, kAround}), cv::blur(count, count, {1, kAround});
+  std::vector<float> means(values.rows, 0.0f);
+  for (int v = 0; v < values.rows; ++v) {
+    if (count.at<float>(v) >= kFewestBeside) means[v] = sum.at<float>(v) / count.at<float>(v);
+  }
+  return means;
+}
 
 }  // namespace
 
@@ -42,8 +76,8 @@ cv::Mat addedBy(const PlaneMirror& mirror, const MirrorImage& image) {
     const cv::Vec4f* c = drawn.ptr<cv::Vec4f>(v);
     cv::Vec3f* to = added.ptr<cv::Vec3f>(box.y + v) + box.x;
     for (int u = 0; u < box.width; ++u)
-      to[u] = mirror.strength *
-              (cv::Vec3f(c[u][0], c[u][1], c[u][2]) - c[u][3] * mirror.surroundings);
+      to[u] =
+          mirror.strength * (cv::Vec3f(c[u][0], c[u][1], c[u][2]) - c[u][3] * mirror.surroundings);
   }
   return added;
 }
@@ -75,6 +109,28 @@ cv::Mat unmirroredCodes(const PlaneMirror& mirror, const cv::Mat& bgr) {
     }
   }
   return out;
+}
+
+cv::Mat lostInMirror(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Mat& plane) {
+  cv::Mat changed(bgr.size(), CV_8U, cv::Scalar(0));
+  for (int v = 0; v < bgr.rows; ++v) {
+    for (int u = 0; u < bgr.cols; ++u) {
+      const cv::Vec3b& code = bgr.at<cv::Vec3b>(v, u);
+      double own = 0.0;
+      for (int c = 0; c < 3; ++c) own += linearFromCode(code[c]);
+      if (cv::norm(mirror.at_key.at<cv::Vec3f>(v, u), cv::NORM_L1) > kMirrors * own)
+        changed.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  const cv::Mat within = plane & changed, gradient = meanGradient(bgr, within),
+                beside = plane & ~changed;
+  const std::vector<float> usual = meanOfRows(meanGradient(bgr, beside), beside);
+  cv::Mat lost = cv::Mat::zeros(bgr.size(), CV_8U);
+  for (int v = 0; v < bgr.rows; ++v) lost.row(v) = gradient.row(v) < kPlain * usual[v];
+  lost &= within;
+  cv::morphologyEx(lost, lost, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
+  cv::dilate(lost, lost, cv::Mat::ones(kAround, kAround, CV_8U));
+  return lost & within;
 }
 
 }  // namespace calipso::render

@@ -62,4 +62,11 @@ cv::Mat unmirroredCodes(const PlaneMirror& mirror, const cv::Mat& bgr);
 PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, const cv::Mat& known,
                             const cv::Mat& hidden);
 
+// Where the mirror image is so plain that nothing of the plane is left in it: taken off, the place
+// has far less gradients than the plane has beside it in the same rows.
+// @param bgr CV_8UC3, the key frame without what is mirrored
+// @param plane CV_8UC1, 255: shows the planes, no object and no shadow
+// @return CV_8UC1
+cv::Mat lostInMirror(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Mat& plane);
+
 }  // namespace calipso::render
