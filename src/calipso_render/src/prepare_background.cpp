@@ -253,7 +253,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   InpaintParams known_of_place;
   known_of_place.nearness = ground;
   known_of_place.surface = surfaces.alike, known_of_place.supports = surfaces.supports;
-  known_of_place.sure = surfaces.sure;
+  known_of_place.sure = mirrorsSharply(p.mirror) ? surfaces.sureOffSupports() : surfaces.sure;
   for (const PicturePlane& plane : surfaces.planes)
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
   inventBackground(traces, key, known_of_place, params.background, p.background);

@@ -130,6 +130,14 @@ TEST(PlaceRelief, AFloorUpToTheHorizonGoesOnBehindAnObject) {
   EXPECT_EQ(surfaces.alike.at<std::uint8_t>(70, 80), PlaceSurfaces::kUnknown);
 }
 
+TEST(PlaceRelief, OffTheSupportsWallsStaySure) {
+  const PlaceSurfaces surfaces = Room().surfaces();
+  const cv::Mat sure = surfaces.sureOffSupports();
+  EXPECT_EQ(cv::countNonZero(sure != (surfaces.sure & (surfaces.label != 1))), 0);
+  EXPECT_GT(cv::countNonZero(sure(kObject)), 0);
+  EXPECT_LT(cv::countNonZero(sure), cv::countNonZero(surfaces.sure));
+}
+
 // A bank that bends up from the water, and a bridge before both.
 TEST(PlaceRelief, APlaneIsLeftToWhatRisesAboveIt) {
   Room room;

@@ -200,6 +200,15 @@ TEST(PlaneMirror, IsDrawnOutAlikeInABoxAndInTheWholePicture) {
   }
 }
 
+TEST(PlaneMirror, IsSharpOnPolishedPlanesAlone) {
+  PlaneMirror mirror;
+  EXPECT_FALSE(mirrorsSharply(mirror));
+  mirror.strength = 1.0f;
+  EXPECT_TRUE(mirrorsSharply(mirror));
+  mirror.slope = 0.04f;
+  EXPECT_FALSE(mirrorsSharply(mirror));
+}
+
 // Waves all over a lake, and the dark mirror image of a hull, with waves in it or none.
 TEST(PlaneMirror, WhatIsPlainWithoutItIsLost) {
   const cv::Rect hull(60, 40, 50, 40);

@@ -42,6 +42,8 @@ struct PlaceSurfaces {
   std::vector<PicturePlane> planes;  // of label k + 1
 
   bool empty() const { return label.empty(); }
+  // `sure` of all but the support planes.
+  cv::Mat sureOffSupports() const;
 };
 
 // By the depth image. Behind objects a plane goes on as long as it is seen nearer by than what

@@ -323,6 +323,12 @@ cv::Mat alikeOf(const cv::Mat& scenery, const cv::Mat& near, const std::vector<E
 
 }  // namespace
 
+cv::Mat PlaceSurfaces::sureOffSupports() const {
+  cv::Mat off = sure.clone();
+  if (!off.empty()) off.setTo(0, (label >= 1) & (label <= supports));
+  return off;
+}
+
 std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& wanted) {
   const cv::Rect whole({0, 0}, wanted.size());
   const std::vector<Eigen::Vector3d> starts = seeds(nearness, wanted);

@@ -12,6 +12,7 @@ namespace calipso::render {
 namespace {
 
 constexpr float kReach = 3.0f;  // standard deviations
+constexpr float kEven = 0.03f;  // slope of planes in which outlines are seen
 // of a place's brightness: where the mirror image adds or takes more, the plane is seen through it
 constexpr double kMirrors = 0.1;
 constexpr int kAround = 15;        // px of the squares in which gradients are averaged, and rows
@@ -131,6 +132,10 @@ cv::Mat lostInMirror(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Ma
   cv::morphologyEx(lost, lost, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
   cv::dilate(lost, lost, cv::Mat::ones(kAround, kAround, CV_8U));
   return lost & within;
+}
+
+bool mirrorsSharply(const PlaneMirror& mirror) {
+  return mirror.established() && mirror.slope < kEven;
 }
 
 }  // namespace calipso::render

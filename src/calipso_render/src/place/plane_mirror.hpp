@@ -69,4 +69,8 @@ PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, co
 // @return CV_8UC1
 cv::Mat lostInMirror(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Mat& plane);
 
+// Polished planes show outlines of what is around them. These do not lie in them: such planes are
+// not filled along themselves.
+bool mirrorsSharply(const PlaneMirror& mirror);
+
 }  // namespace calipso::render
