@@ -27,6 +27,12 @@ float sunShare(const Light& light, const Eigen::Vector3f& normal) {
 
 }  // namespace
 
+cv::Mat PlaceSurfaces::sureOffSupports() const {
+  cv::Mat off = sure.clone();
+  if (!off.empty()) off.setTo(0, (label >= 1) & (label <= supports));
+  return off;
+}
+
 Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun) {
   if (surfaces.empty()) return {};
   Relief relief;

@@ -6,6 +6,7 @@
 #include "place/place_relief.hpp"
 #include "place/plane_edges.hpp"
 #include "place/plane_reach.hpp"
+#include "place/sure_surfaces.hpp"
 
 namespace calipso::render {
 namespace {
@@ -21,8 +22,6 @@ constexpr float kOffSupport = 0.02f;
 constexpr float kBehind = 1.02f;  // of an object's nearness: what it hides is no nearer
 constexpr int kCurvedReach = 4;   // px of the square that tells the normal of what is not plane
 constexpr float kSameSurface = 0.05f;  // of the nearness within it
-
-constexpr int kCopied = 6;  // px around a place that are plane, for it to be copied from
 
 // times that a pixel of a support plane is as near as the farthest beside it, from which on so
 // little of the plane is left up to the horizon that what stands on it may hide it
@@ -261,34 +260,6 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
   }
 }
 
-// Where a plane is seen, or hidden and nearer to where it is than to anything else that does not
-// meet it.
-cv::Mat sureOf(const cv::Mat& label, const cv::Mat& hidden, const cv::Mat& seen,
-               const cv::Mat& nothing, const Edges& edges) {
-  const cv::Mat large = cv::Mat::ones(2 * kCopied + 1, 2 * kCopied + 1, CV_8U),
-                small = cv::Mat::ones(5, 5, CV_8U);
-  cv::Mat sure = hidden == 0;
-  for (int k = 0; k < static_cast<int>(edges.size()); ++k) {
-    const cv::Mat wanted = hidden & (label == k + 1);
-    if (cv::countNonZero(wanted) == 0) continue;
-    cv::Mat on, other, to_on, to_other;  // of both what is large enough to be copied from
-    cv::morphologyEx(seen == k, on, cv::MORPH_OPEN, large, {-1, -1}, 1, cv::BORDER_REPLICATE);
-    cv::morphologyEx(nothing | ((hidden == 0) & (seen != k)), other, cv::MORPH_OPEN, small,
-                     {-1, -1}, 1, cv::BORDER_REPLICATE);
-    for (int j = 0; j < static_cast<int>(edges.size()); ++j) {
-      if (edges[k][j] != kApart) other.setTo(0, seen == j);
-    }
-    if (cv::countNonZero(on) == 0) continue;
-    cv::distanceTransform(~on, to_on, cv::DIST_L2, cv::DIST_MASK_5);
-    if (cv::countNonZero(other) > 0)
-      cv::distanceTransform(~other, to_other, cv::DIST_L2, cv::DIST_MASK_5);
-    else
-      to_other = cv::Mat(label.size(), CV_32F, cv::Scalar(1e9f));
-    sure |= wanted & (to_on < to_other);
-  }
-  return sure;
-}
-
 // A support plane is not seen behind an object where things that rise above it (a bank, a rock) are
 // seen nearer by than it is: they hide it, or may.
 // @param seen planesSeen()
@@ -322,12 +293,6 @@ cv::Mat alikeOf(const cv::Mat& scenery, const cv::Mat& near, const std::vector<E
 }
 
 }  // namespace
-
-cv::Mat PlaceSurfaces::sureOffSupports() const {
-  cv::Mat off = sure.clone();
-  if (!off.empty()) off.setTo(0, (label >= 1) & (label <= supports));
-  return off;
-}
 
 std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& wanted) {
   const cv::Rect whole({0, 0}, wanted.size());
