@@ -12,7 +12,9 @@
 #include "draw/ray_scene.hpp"
 #include "light/ambient_fit.hpp"
 #include "light/gloss_fit.hpp"
+#include "light/light_search.hpp"
 #include "light/reflectance_cost.hpp"
+#include "light/sun_prior.hpp"
 
 namespace calipso::render {
 namespace {
@@ -97,6 +99,38 @@ TEST(ReflectanceCost, DerivativesMatchDifferences) {
   }
 }
 
+TEST(SunPriorCost, DerivativesMatchDifferences) {
+  const SunPriorCost cost(direction(0.1, -0.2, 0.9), 1.7);
+  std::vector<std::vector<double>> x = {{0.4, -0.1, 0.8}, {-1.0, -1.1, -0.9}, {-0.3, -0.4, -0.6}};
+  std::vector<std::vector<double>> J(3, std::vector<double>(12));
+  std::vector<double*> blocks, jacobians;
+  for (int b = 0; b < 3; ++b) blocks.push_back(x[b].data()), jacobians.push_back(J[b].data());
+  double r[4], plus[4], minus[4];
+  ASSERT_TRUE(cost.Evaluate(blocks.data(), r, jacobians.data()));
+  const double h = 1e-6;
+  for (int b = 0; b < 3; ++b) {
+    for (int i = 0; i < 3; ++i) {
+      const double kept = x[b][i];
+      x[b][i] = kept + h, cost.Evaluate(blocks.data(), plus, nullptr);
+      x[b][i] = kept - h, cost.Evaluate(blocks.data(), minus, nullptr);
+      x[b][i] = kept;
+      for (int c = 0; c < 4; ++c)
+        EXPECT_NEAR(J[b][3 * c + i], (plus[c] - minus[c]) / (2 * h), 1e-6) << b << ", " << i;
+    }
+  }
+}
+
+// What the search counts is what the fit does.
+TEST(SunPriorCost, IsHalfItsSquare) {
+  const SunPriorCost cost(kUp, 1.0);
+  const double l[] = {0.0, 0.8, 0.6}, A[] = {-1.0, -1.2, -0.8}, L[] = {0.1, 0.2, 0.3};
+  const double* blocks[] = {l, A, L};
+  double r[4], expected = unusualHeight(0.6);
+  cost.Evaluate(blocks, r, nullptr);
+  for (int c = 0; c < 3; ++c) expected += unusualStrength(L[c] - A[c]);
+  EXPECT_NEAR(0.5 * (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]), expected, 1e-12);
+}
+
 // Half a ball of one colour in known light.
 std::vector<LightSample> ballSamples(const Eigen::Vector3f& sun) {
   std::vector<LightSample> samples;
@@ -121,6 +155,22 @@ TEST(FitLight, FindsTheSunOfABall) {
             std::cos(2.0 * M_PI / 180.0));  // 2 degrees: the gloss prior's pull
   EXPECT_NEAR(fit.light.sun[1] / fit.light.ambient[0][1], 2.0f, 0.2f);
   EXPECT_FALSE(fit.confirmed());  // by nothing but shading
+}
+
+// A board's shading is the same under any sun.
+TEST(SearchLight, TakesAUsualSunWhereNothingTellsOne) {
+  LightEvidence evidence;
+  evidence.clusters = 1;
+  const Eigen::Vector3f n(0.0f, -0.8f, 0.6f);
+  for (int i = 0; i < 200; ++i) {
+    const float grain = 0.3f + 0.003f * static_cast<float>(i % 7 - 3);
+    evidence.samples.push_back({n, n, n, cv::Vec3f::all(grain), 0, SkySeen::all(n)});
+  }
+  const std::vector<LightCandidate> found = searchLight(evidence, kUp.cast<float>(), 1);
+  ASSERT_FALSE(found.empty());
+  EXPECT_NEAR(found[0].direction.z(), kUsualHeight, 0.01);  // the search's last steps
+  // ratios tried are 0.23 apart
+  EXPECT_NEAR(std::log(found[0].sun[1] / found[0].ambient[1]), kUsualStrength, 0.12);
 }
 
 TEST(FitLight, DoesNotDependOnTheNumberOfThreads) {

@@ -12,6 +12,7 @@
 #include "light/gloss_fit.hpp"
 #include "light/light_search.hpp"
 #include "light/reflectance_cost.hpp"
+#include "light/sun_prior.hpp"
 
 namespace calipso::render {
 namespace {
@@ -28,6 +29,8 @@ constexpr float kAside = 0.35f;
 constexpr double kRobust = 0.15;  // relative residual beyond which a pixel counts less
 // of a light's colour: e^4 times brighter or darker than the unit
 constexpr double kLogRange = 4.0;
+// relative, of the shading of a sample, of which so many err independently of each other
+constexpr double kShadingError = 0.1, kIndependentSamples = 50.0;
 constexpr double kPriorWeight = 0.05;  // of one prior, as a part of all pixels
 
 // Every parameter of the model; blocks as in ReflectanceCost.
@@ -136,12 +139,22 @@ class Fit {
     const double weight = std::sqrt(kPriorWeight * evidence_.samples.size());
     problem.AddResidualBlock(new Prior(kSkyGradient, 0.5 * weight), nullptr, &x.gradient);
     problem.AddResidualBlock(new GlossPrior(0.05 * weight), nullptr, x.gloss.data());
+    if (direction_free_) {
+      const double unit = kShadingError * std::sqrt(evidence_.samples.size() / kIndependentSamples);
+      problem.AddResidualBlock(new SunPriorCost(up_, unit), nullptr, x.direction.data(),
+                               x.ambient.data(), x.sun.data());
+    }
     problem.SetManifold(x.direction.data(), new ceres::SphereManifold<3>);
     for (int c = 0; c < 3; ++c) {
       problem.SetParameterLowerBound(x.sun.data(), c, -kLogRange),
           problem.SetParameterUpperBound(x.sun.data(), c, kLogRange);
       problem.SetParameterLowerBound(x.ambient.data(), c, -kLogRange),
           problem.SetParameterUpperBound(x.ambient.data(), c, kLogRange);
+    }
+    // Without light no albedo is too high.
+    for (Eigen::Vector3d& a : x.albedos) {
+      for (int c = 0; problem.HasParameterBlock(a.data()) && c < 3; ++c)
+        problem.SetParameterUpperBound(a.data(), c, 2.0 * kLogRange);
     }
     problem.SetParameterLowerBound(&x.gradient, 0, 0.0);
     problem.SetParameterUpperBound(&x.gradient, 0, 0.9);
@@ -233,11 +246,6 @@ bool shadowsTell(const LightEvidence& evidence, const LightCandidate& c,
   return true;
 }
 
-bool anyShadow(const LightEvidence& evidence, const std::vector<LightCandidate>& starts) {
-  return std::any_of(starts.begin(), starts.end(),
-                     [&](const LightCandidate& c) { return shadowMisfit(evidence, c) != 0.0; });
-}
-
 // Dark places that hardly look like shadows count for nothing.
 LightEvidence withoutShadows(LightEvidence evidence) {
   evidence.shadow_misfit = {}, evidence.shadow_candidates.clear();
@@ -253,8 +261,7 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
   if (static_cast<int>(evidence.samples.size()) < kFewestSamples) return best;
   std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
   best.from_shadows = shadowsTell(evidence, starts.front(), up);
-  if (!best.from_shadows && anyShadow(evidence, starts))
-    starts = searchLight(withoutShadows(evidence), up, kStarts);
+  if (!best.from_shadows) starts = searchLight(withoutShadows(evidence), up, kStarts);
   if (!best.from_shadows) {
     std::vector<std::optional<LightFit>> fits(starts.size());
 #pragma omp parallel for schedule(dynamic, 1)

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "light/sun_prior.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -52,29 +54,53 @@ struct LineSums {
 
 using ClusterSums = std::vector<std::array<LineSums, 3>>;
 
-double errorOf(const ClusterSums& sums, int channel, double q) {
-  double error = 0.0;
-  for (const auto& cluster : sums) {
-    if (cluster[channel].n >= 8) error += cluster[channel].error(q);
-  }
-  return error;
+// Ratios of sun to ambient light that are tried; 0 first.
+struct Ratio {
+  double value, unusual;
+};
+using Ratios = std::array<Ratio, kRatios + 2>;
+
+const Ratios& ratios() {
+  static const Ratios all = [] {
+    Ratios r{};
+    r[0] = {0.0, unusualStrength(std::log(kLeastRatio))};
+    for (int i = 0; i <= kRatios; ++i) {
+      const double q =
+          kLeastRatio * std::pow(kMostRatio / kLeastRatio, static_cast<double>(i) / kRatios);
+      r[i + 1] = {q, unusualStrength(std::log(q))};
+    }
+    return r;
+  }();
+  return all;
 }
 
-// The ratio of sun to ambient light that all clusters share.
-double bestRatio(const ClusterSums& sums, int channel) {
-  double best = 0.0, best_error = errorOf(sums, channel, 0.0);
-  for (int i = 0; i <= kRatios; ++i) {
-    const double q =
-        kLeastRatio * std::pow(kMostRatio / kLeastRatio, static_cast<double>(i) / kRatios);
-    const double error = errorOf(sums, channel, q);
-    if (error < best_error) best = q, best_error = error;
+using RatioErrors = std::array<double, kRatios + 2>;
+
+// By the ratio, which all clusters share.
+RatioErrors errorsOf(const ClusterSums& sums, int channel) {
+  RatioErrors errors{};
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    for (const auto& cluster : sums) {
+      if (cluster[channel].n >= 8) errors[i] += cluster[channel].error(ratios()[i].value);
+    }
+  }
+  return errors;
+}
+
+// @param per_unit error that weighs as much as a unit of log-likelihood
+std::size_t likeliestRatio(const RatioErrors& errors, double per_unit) {
+  const auto cost = [&](std::size_t i) { return errors[i] + per_unit * ratios()[i].unusual; };
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < errors.size(); ++i) {
+    if (cost(i) < cost(best)) best = i;
   }
   return best;
 }
 
 class Search {
  public:
-  Search(const LightEvidence& evidence, const Eigen::Vector3f& up) : evidence_(evidence), up_(up) {
+  Search(const LightEvidence& evidence, const Eigen::Vector3f& up)
+      : evidence_(evidence), up_(up), prior_(evidence.shadow_misfit ? 0.0 : 1.0) {
     const std::size_t step = std::max<std::size_t>(1, evidence.samples.size() / kSearchSamples);
     for (std::size_t i = 0; i < evidence.samples.size(); i += step)
       samples_.push_back(evidence.samples[i]);
@@ -97,18 +123,7 @@ class Search {
             m.is += i * s, m.ii += i * i;
       }
     }
-    LightCandidate total;
-    total.direction = l;
-    double error = 0.0;
-    for (int c = 0; c < 3; ++c) {
-      const double q = bestRatio(sums, c);
-      error += errorOf(sums, c, q);
-      total.ambient[c] = static_cast<float>(std::max(0.1, 1.0 / (1.0 + q)));
-      total.sun[c] = static_cast<float>(std::max(0.05, q / (1.0 + q)));
-    }
-    // The errors' size is not known: its likelihood is profiled out.
-    total.misfit = kShadingWeight * std::log(error / samples_.size() + 1e-6);
-    return total;
+    return likeliest(sums, l);
   }
 
   LightCandidate byAll(const Eigen::Vector3f& l) const {
@@ -136,8 +151,31 @@ class Search {
   }
 
  private:
+  // The errors' size is not known: its likelihood is profiled out.
+  LightCandidate likeliest(const ClusterSums& sums, const Eigen::Vector3f& l) const {
+    std::array<RatioErrors, 3> errors;
+    double least = 0.0;
+    for (int c = 0; c < 3; ++c) {
+      errors[c] = errorsOf(sums, c);
+      least += *std::min_element(errors[c].begin(), errors[c].end());
+    }
+    LightCandidate total;
+    total.direction = l;
+    double error = 0.0, unusual = unusualHeight(l.dot(up_));
+    for (int c = 0; c < 3; ++c) {
+      const std::size_t i = likeliestRatio(errors[c], prior_ * least / kShadingWeight);
+      const double q = ratios()[i].value;
+      error += errors[c][i], unusual += ratios()[i].unusual;
+      total.ambient[c] = static_cast<float>(std::max(0.1, 1.0 / (1.0 + q)));
+      total.sun[c] = static_cast<float>(std::max(0.05, q / (1.0 + q)));
+    }
+    total.misfit = kShadingWeight * std::log(error / samples_.size() + 1e-6) + prior_ * unusual;
+    return total;
+  }
+
   const LightEvidence& evidence_;
   Eigen::Vector3f up_;
+  double prior_;  // weight of what suns usually are: none where cast shadows are to tell
   std::vector<LightSample> samples_;
 };
 

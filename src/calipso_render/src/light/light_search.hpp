@@ -10,14 +10,16 @@ namespace calipso::render {
 // best under it; 1 - g = (1 - kSkyGradient) LightEvidence::below.
 struct LightCandidate {
   Eigen::Vector3f direction;
-  double misfit = 0.0;  // minus a log-likelihood of shading and cast shadows
-  // of shading alone: how much better the best direction is than half of all; 0: nothing tells
+  // minus a log-likelihood, of shading and either cast shadows or what suns usually are
+  double misfit = 0.0;
+  // without cast shadows: how much better the best direction is than half of all; 0: nothing tells
   double contrast = 0.0;
   cv::Vec3f ambient, sun;  // their sum is 1
 };
 
 // Tries directions over the whole upper hemisphere and those that cast shadows speak for, and
-// refines the best ones; at least 20 degrees apart at first, best first.
+// refines the best ones; without evidence of shadows also by what suns usually are (sun_prior.hpp).
+// At least 20 degrees apart at first, best first.
 std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
                                         std::size_t count);
 
