@@ -27,14 +27,15 @@ class Avx2 : public ::testing::Test {
 };
 
 TEST_F(Avx2, EncodesTheSameBytes) {
-  std::vector<float> colours[4];
+  std::vector<float> colours[5];
   for (int i = 0; i < 1007; ++i)
     colours[0].push_back(random_.uniform(-0.1f, 1.2f)),
         colours[1].push_back(random_.uniform(0.0f, 0.02f)),
         colours[2].push_back(random_.uniform(0.0f, 1.0f)),
-        colours[3].push_back(random_.uniform(0.0f, 1.0f));
+        colours[3].push_back(random_.uniform(0.0f, 1.0f)),
+        colours[4].push_back(random_.uniform(0.0f, 3.0f));
   const float* const planes[] = {colours[0].data(), colours[1].data(), colours[2].data(),
-                                 colours[3].data()};
+                                 colours[3].data(), colours[4].data()};
   const NoiseField field(3);
   const NoiseRows noise{{field.row(5, 0), field.row(5, 1), field.row(5, 2)}};
   NoiseCurves curves;

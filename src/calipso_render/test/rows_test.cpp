@@ -78,19 +78,41 @@ TEST(SurfaceMaps, TellWhatThePixelsShow) {
 
 TEST(LineCodec, EncodesAsCodeFromLinear) {
   constexpr int kCount = 2001;
-  std::vector<float> colours[4];
+  std::vector<float> colours[5];
   for (auto& channel : colours) channel.resize(kCount + 7, 1.0f);
+  std::fill(colours[4].begin(), colours[4].end(), 0.0f);
   for (int i = 0; i < kCount; ++i)
     colours[0][i] = i / 1990.0f - 0.001f, colours[1][i] = 0.3f * i / 2000.0f,
     colours[2][i] = std::nanf("");
   std::vector<cv::Vec3b> codes(kCount);
   LineCodec(NoiseModel(), 3)
-      .encode({colours[0].data(), colours[1].data(), colours[2].data(), colours[3].data()}, 5, 7,
-              kCount, codes.data());
+      .encode({colours[0].data(), colours[1].data(), colours[2].data(), colours[3].data(),
+               colours[4].data()},
+              5, 7, kCount, codes.data());
   for (int i = 0; i < kCount; ++i) {
     for (int c = 0; c < 3; ++c)
       ASSERT_EQ(codes[i][c], quantise(codeFromLinear(colours[c][i]))) << i << ", " << c;
   }
+}
+
+// A surface's own grain is there where the camera's noise is less: in all but what is not fresh.
+TEST(LineCodec, AddsAtLeastTheGrainOfASurface) {
+  constexpr int kCount = 2000;
+  std::vector<float> colours[5];
+  for (auto& channel : colours) channel.resize(kCount + 7, 0.2f);
+  std::fill(colours[3].begin(), colours[3].begin() + kCount / 2, 1.0f);
+  std::fill(colours[3].begin() + kCount / 2, colours[3].end(), 0.0f);
+  std::fill(colours[4].begin(), colours[4].end(), 4.0f);
+  std::vector<cv::Vec3b> codes(kCount);
+  LineCodec(NoiseModel(), 3)
+      .encode({colours[0].data(), colours[1].data(), colours[2].data(), colours[3].data(),
+               colours[4].data()},
+              0, 0, kCount, codes.data());
+  const float clean = codeFromLinear(0.2f);
+  double square = 0.0;
+  for (int i = 0; i < kCount / 2; ++i) square += std::pow(codes[i][1] - clean, 2);
+  EXPECT_NEAR(std::sqrt(square / (kCount / 2)), 4.0, 0.6);  // half of it is alike in neighbours
+  for (int i = kCount / 2; i < kCount; ++i) ASSERT_EQ(codes[i][1], quantise(clean));
 }
 
 TEST(OutsideWinding, KnowsClosedMeshesFromOpenOnes) {

@@ -21,16 +21,17 @@ Light evenLight() {
   return light;
 }
 
-constexpr float kWaves = 200.0f;  // rad/m: seven pixels long
+constexpr float kFine = 200.0f, kCoarse = 40.0f;  // rad/m: waves seven pixels long, and 35
 
 // Waves over the ball, of its own axes.
-cv::Vec3f patternAt(const Eigen::Vector3f& x) {
-  return cv::Vec3f::all(0.35f + 0.2f * std::sin(kWaves * x.x()) * std::sin(kWaves * x.z()));
+cv::Vec3f patternAt(const Eigen::Vector3f& x, float waves) {
+  return cv::Vec3f::all(0.35f + 0.2f * std::sin(waves * x.x()) * std::sin(waves * x.z()));
 }
 
 // The ball turned a little from view to view.
-std::vector<View> patternedViews(const Surface& surface) {
+std::vector<View> patternedViews(const Surface& surface, float waves, float noise) {
   std::vector<View> views;
+  cv::RNG random(5);
   for (int i = 0; i < kViews; ++i) {
     View view{cv::Mat::zeros(kHeight, kWidth, CV_32FC3),
               cv::Mat::zeros(kHeight, kWidth, CV_8U),
@@ -45,7 +46,8 @@ std::vector<View> patternedViews(const Surface& surface) {
       const cv::Vec3f shade = diffuseShading(evenLight(), p.normal, 1.0f, p.seen, {});
       const Eigen::Vector3f own = (turn.inverse() * p.position.cast<double>()).cast<float>();
       for (int c = 0; c < 3; ++c)
-        view.picture.at<cv::Vec3f>(v, u)[c] = codeFromLinear(patternAt(own)[c] * shade[c]);
+        view.picture.at<cv::Vec3f>(v, u)[c] = codeFromLinear(patternAt(own, waves)[c] * shade[c]) +
+                                              static_cast<float>(random.gaussian(noise));
       view.labels.at<std::uint8_t>(v, u) = kBallLabel;
     });
     views.push_back(std::move(view));
@@ -57,7 +59,7 @@ std::vector<View> patternedViews(const Surface& surface) {
 // pictures that lie between its texels.
 TEST(TextureMiss, TheTextureIsAsSharpAsItsPictures) {
   const Surface surface = makeSurface(ballAt(kPlace));
-  const std::vector<View> views = patternedViews(surface);
+  const std::vector<View> views = patternedViews(surface, kFine, 0.0f);
   const Appearance a = makeAppearances(views, {true}, evenLight(), {}).front();
   double product = 0.0, square = 0.0;
   for (int i = 2; i < kViews; ++i) {
@@ -69,7 +71,7 @@ TEST(TextureMiss, TheTextureIsAsSharpAsItsPictures) {
       const Points& x = surface.object_vertices;
       const Eigen::Vector3f own =
           p.weights[0] * x[t[0]] + p.weights[1] * x[t[1]] + p.weights[2] * x[t[2]];
-      const double truth = patternAt(own)[1] - 0.35,
+      const double truth = patternAt(own, kFine)[1] - 0.35,
                    drawn = a.texture.at(p.triangle, p.weights)[1] - 0.33;
       product += truth * drawn, square += truth * truth;
     });
@@ -77,6 +79,27 @@ TEST(TextureMiss, TheTextureIsAsSharpAsItsPictures) {
   // The light's floor takes 5 % off, the mean alone another 9.
   EXPECT_GT(product / square, 0.90);
   EXPECT_LT(product / square, 1.0);
+}
+
+TEST(TextureMiss, GrainIsWhatPixelsDeviateByThemselves) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  const auto grain = [&](float noise) {
+    return makeAppearances(patternedViews(surface, kCoarse, noise), {true}, evenLight(), {})
+        .front()
+        .grain;
+  };
+  EXPECT_LT(grain(0.0f), 0.5f);
+  // A mean of nine takes a share of each picture's noise along, and is sharpened.
+  const float found = grain(3.0f);
+  EXPECT_GT(found, 2.2f);
+  EXPECT_LT(found, 3.3f);
+}
+
+// From one picture nothing can be told.
+TEST(TextureMiss, OfOnePictureThereIsNoGrain) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  const std::vector<View> views = patternedViews(surface, kCoarse, 3.0f);
+  EXPECT_EQ(makeAppearances({views[0]}, {true}, evenLight(), {}).front().grain, 0.0f);
 }
 
 }  // namespace

@@ -29,6 +29,8 @@ class Appearance {
   // thrownBack() of its mean reflectance
   cv::Vec3f thrown_back = {kThrownBack, kThrownBack, kThrownBack};
   Gloss gloss;
+  // deviation, code values, that pixels of a place have from picture to picture; 0 unknown
+  float grain = 0.0f;
   float seen_in_key = 0.0f, seen_elsewhere = 0.0f,
         copied = 0.0f;  // parts of the texture's texels; the rest is filled
 

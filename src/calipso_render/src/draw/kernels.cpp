@@ -119,25 +119,26 @@ CALIPSO_INLINE Eight codesOf(const Eight& linear) {
 }
 
 // With noise of unit variance, rounded.
-CALIPSO_INLINE EightInts noisyCodes(const Eight& linear, const Eight& fresh, const float* start,
-                                    const float* rise, const float* noise) {
+CALIPSO_INLINE EightInts noisyCodes(const Eight& linear, const Eight& fresh, const Eight& grain,
+                                    const float* start, const float* rise, const float* noise) {
   const Eight code = codesOf(linear);
   const LaneChoice piece = __builtin_convertvector(code * (1.0f / 32.0f), LaneChoice);
-  const Eight deviation =
+  const Eight camera =
       __builtin_shuffle(eightAt(start), piece) + __builtin_shuffle(eightAt(rise), piece) * code;
+  const Eight deviation = camera > grain ? camera : grain;
   const Eight x = code + fresh * deviation * eightAt(noise), most = all(255.0f);
   const Eight positive = x > 0.0f ? x : Eight{};
   return __builtin_convertvector((positive < most ? positive : most) + 0.5f, EightInts);
 }
 
 // Code values of eight colours.
-CALIPSO_INLINE void encodeEight(const NoiseCurves& curves, const float* const (&colour)[4], int k,
+CALIPSO_INLINE void encodeEight(const NoiseCurves& curves, const float* const (&colour)[5], int k,
                                 const NoiseRows& noise, int column, std::uint8_t* codes) {
   typedef std::uint8_t Bytes __attribute__((vector_size(32)));
-  const Eight fresh = eightAt(colour[3] + k);
+  const Eight fresh = eightAt(colour[3] + k), grain = eightAt(colour[4] + k);
   EightInts code[3];
   for (int c = 0; c < 3; ++c)
-    code[c] = noisyCodes(eightAt(colour[c] + k), fresh, curves.start[c], curves.rise[c],
+    code[c] = noisyCodes(eightAt(colour[c] + k), fresh, grain, curves.start[c], curves.rise[c],
                          noise.channel[c] + column);
   const Bytes bytes = (Bytes)(code[0] | (code[1] << 8) | (code[2] << 16));
   const Bytes packed = __builtin_shuffle(
@@ -147,7 +148,7 @@ CALIPSO_INLINE void encodeEight(const NoiseCurves& curves, const float* const (&
       std::memcpy(codes + 12, reinterpret_cast<const std::uint8_t*>(&packed) + 16, 12);
 }
 
-CALIPSO_INLINE void encodeBody(const NoiseCurves& curves, const float* const (&colour)[4],
+CALIPSO_INLINE void encodeBody(const NoiseCurves& curves, const float* const (&colour)[5],
                                const NoiseRows& noise, int column, int count, cv::Vec3b* codes) {
   constexpr int kSide = NoiseField::kSide;
   int k = 0;
@@ -183,7 +184,7 @@ CALIPSO_INLINE void fillBody(const TriangleSpan* spans, const int* which, int co
   attribute void name##Shade(const SurfaceShade& shade, int first, int last, SurfaceRun& run) {   \
     shadeBody(shade, first, last, run);                                                           \
   }                                                                                               \
-  attribute void name##Encode(const NoiseCurves& curves, const float* const(&colour)[4],          \
+  attribute void name##Encode(const NoiseCurves& curves, const float* const(&colour)[5],          \
                               const NoiseRows& noise, int column, int count, cv::Vec3b* codes) {  \
     encodeBody(curves, colour, noise, column, count, codes);                                      \
   }                                                                                               \

@@ -48,9 +48,10 @@ struct Kernels {
   void (*shade)(const SurfaceShade& shade, int first, int last, SurfaceRun& run);
 
   // Code values of `count` linear colours, with noise. Up to seven more are read.
-  // @param colour linear B, G, R, and the part of the pixel that carries no noise yet
+  // @param colour linear B, G, R, the part of the pixel that carries no noise yet, and the
+  // deviation that its noise has at least, code values
   // @param column of the first in the rows of noise, which are read around their end
-  void (*encode)(const NoiseCurves& curves, const float* const (&colour)[4], const NoiseRows& noise,
+  void (*encode)(const NoiseCurves& curves, const float* const (&colour)[5], const NoiseRows& noise,
                  int column, int count, cv::Vec3b* codes);
 
   // Makes the triangles [begin, end) of a mesh ready to be filled that a buffer over `region` can

@@ -108,7 +108,7 @@ void FrameCompositor::composeRow(const RowComposer& composer, int v, Row& row,
     const int first = i;
     i = nextUnmarked(source, i, width, 0xff);
     codec_.encode({&row.colour[0][first], &row.colour[1][first], &row.colour[2][first],
-                   &row.colour[3][first]},
+                   &row.colour[3][first], &row.colour[4][first]},
                   left + first, v, i - first, codes + first);
   }
   std::memcpy(out.provenance.ptr<std::uint8_t>(v) + left, source, width);

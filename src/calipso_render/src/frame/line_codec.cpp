@@ -16,7 +16,7 @@ LineCodec::LineCodec(const NoiseModel& noise, std::int64_t stamp_ns) : field_(st
   }
 }
 
-void LineCodec::encode(const float* const (&colour)[4], int u, int v, int count,
+void LineCodec::encode(const float* const (&colour)[5], int u, int v, int count,
                        cv::Vec3b* codes) const {
   kernels().encode(curves_, colour, {field_.row(v, 0), field_.row(v, 1), field_.row(v, 2)},
                    field_.column(u), count, codes);

@@ -14,9 +14,10 @@ class LineCodec {
   // @param noise of the camera; a model without deviations adds none
   LineCodec(const NoiseModel& noise, std::int64_t stamp_ns);
 
-  // @param colour linear B, G, R, and the part of the pixel that carries no noise yet; up to seven
-  // more are read. @param u, v the first pixel's place in the picture
-  void encode(const float* const (&colour)[4], int u, int v, int count, cv::Vec3b* codes) const;
+  // @param colour linear B, G, R, the part of the pixel that carries no noise yet, and the
+  // deviation that its noise has at least, code values; up to seven more are read.
+  // @param u, v the first pixel's place in the picture
+  void encode(const float* const (&colour)[5], int u, int v, int count, cv::Vec3b* codes) const;
 
  private:
   NoiseCurves curves_;

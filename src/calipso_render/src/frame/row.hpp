@@ -13,6 +13,7 @@ namespace calipso::render {
 struct Drawn {
   cv::Vec3f colour;  // linear
   float cover = 0.0f;
+  float grain = 0.0f;  // Appearance::grain
 };
 
 // A sheet of a surface in a pixel that sees several, or sees one end.
@@ -29,8 +30,9 @@ inline bool isPlain(Kind kind) { return kind == kPlain || kind == kPlainEdge; }
 
 // A row of the result over the region that an edit can change, on its way.
 struct Row {
-  // Linear B, G, R; the part that carries no camera noise yet. Up to seven more than the row has.
-  std::vector<float> colour[4];
+  // Linear B, G, R; the part that carries no noise yet, and the deviation that its noise has at
+  // least, code values. Up to seven more than the row has.
+  std::vector<float> colour[5];
   std::vector<std::uint8_t> source;  // Provenance
   std::vector<Kind> kinds;
   std::vector<Drawn> drawn;   // of pixels that need more than their centre

@@ -40,6 +40,7 @@ void RowComposer::compose(int v, Row& row) const {
   kinds_.find(v, row.kinds.data());
   sheets_.draw(v, row);
   std::memset(row.source.data(), kOriginal, row.source.size());
+  std::fill(row.colour[4].begin(), row.colour[4].end(), 0.0f);
   for (int i = nextMarked(row.kinds.data(), 0, region_.width); i < region_.width;
        i = nextMarked(row.kinds.data(), i, region_.width)) {
     const int first = i, u = i + region_.x;
@@ -75,6 +76,7 @@ void RowComposer::composeSpecial(int u, int v, Row& row) const {
   const cv::Vec3f colour = drawn.cover * drawn.colour + (1.0f - drawn.cover) * behind.colour;
   cv::Vec4f out(colour[0], colour[1], colour[2], drawn.cover + (1.0f - drawn.cover) * behind.fresh);
   row.source[i] = drawn.cover > 0.0f ? kRendered : behind.source;
+  row.colour[4][i] = drawn.cover * drawn.grain;
   const std::uint32_t id = centre_.idAt(u, v);
   if (residual_ != nullptr && row.source[i] != kOriginal && id != VisibilityBuffer::kNothing &&
       screen_.at(u, v) == 0.0f)

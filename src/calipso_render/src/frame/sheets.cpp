@@ -115,6 +115,7 @@ void Sheets::shade(int v, Row& row) const {
       const Sheet& sheet = row.sheets[first + k];
       Drawn& drawn = row.drawn[sheet.column];
       drawn.cover += sheet.part;
+      drawn.grain = std::max(drawn.grain, shader_.grainOf(slot));
       for (int c = 0; c < 3; ++c) drawn.colour[c] += sheet.part * row.run.colour[c][k];
     }
   }

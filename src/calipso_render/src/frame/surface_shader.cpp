@@ -72,6 +72,7 @@ unsigned SurfaceShader::shadeStretch(int v, int first, int last, int slot, Row& 
   kernels().shade(shades_[slot], offset, offset + count, run);
   for (int c = 0; c < 3; ++c) std::copy_n(&run.colour[c][offset], count, &row.colour[c][first]);
   std::fill_n(&row.colour[3][first], count, 1.0f);
+  std::fill_n(&row.colour[4][first], count, grainOf(slot));
   for (int i = nextMarked(row.kinds.data(), first, last, kPlainEdge); i < last;
        i = nextMarked(row.kinds.data(), i + 1, last, kPlainEdge)) {
     const cv::Vec3f& c = row.drawn[i].colour;

@@ -32,6 +32,11 @@ class SurfaceShader {
   // @param count at most SurfaceRun::kMost
   void shadePlaces(const SurfacePlace* places, int count, int slot, SurfaceRun& run) const;
 
+  // Least deviation of the noise of an object's pixels, code values.
+  float grainOf(int slot) const {
+    return frame_.params.add_noise ? appearanceOf(slot).grain : 0.0f;
+  }
+
   SurfaceShader(const SurfaceShader&) = delete;  // its parts refer to each other
 
  private:

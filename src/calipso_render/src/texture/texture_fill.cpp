@@ -75,6 +75,7 @@ class TextureFill {
         shown_[i] = sharpened(shown_[i], pictures_[i], *actors_[i], a.texture);
     }
     makeTexels(a.texture, origins);
+    if (views_.size() > 1) a.grain = grainOf({views_, actors_, pictures_}, a.texture);
     auto& [from, certain, layer] = origins;
     levelSeams(surface_.key_vertices, surface_.triangles, layer, a.texture);
     continuePattern(surface_.key_vertices, surface_.triangles, down, certain, a.texture);

@@ -1,9 +1,18 @@
 #include "texture/texture_miss.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "calipso_render/colour.hpp"
 
 namespace calipso::render {
 namespace {
+
+constexpr float kCertain = 0.9f;      // trust, and clearness, of pixels that grain is measured at
+constexpr std::size_t kFewest = 500;  // of them
+constexpr float kLeast = 1e-4f;       // reflectance that is told from none
+constexpr float kMedianToSigma = 1.4826f;  // of a normal distribution's median absolute value
 
 // The picture's reflectance as the texture has it. CV_32FC4, the picture's own beside the object.
 cv::Mat drawnInto(const Reflectance& picture, const Actor& actor, const SurfaceTexture& texture) {
@@ -22,6 +31,27 @@ cv::Mat drawnInto(const Reflectance& picture, const Actor& actor, const SurfaceT
   return drawn;
 }
 
+// What the picture has beyond a drawn reflectance, code values. CV_32FC3.
+// @param certain out, CV_8UC1: where it can be told
+cv::Mat missedCodes(const cv::Mat& codes, const Reflectance& picture, const cv::Mat& drawn,
+                    cv::Mat& certain) {
+  certain = (picture.trust >= kCertain) & (picture.clear >= kCertain);
+  cv::Mat missed(drawn.size(), CV_32FC3, cv::Scalar());
+  for (int v = 0; v < drawn.rows; ++v) {
+    for (int u = 0; u < drawn.cols; ++u) {
+      if (certain.at<std::uint8_t>(v, u) == 0) continue;
+      const cv::Vec3f& code = codes.at<cv::Vec3f>(v + picture.region.y, u + picture.region.x);
+      const cv::Vec4f &own = picture.albedo.at<cv::Vec4f>(v, u), &now = drawn.at<cv::Vec4f>(v, u);
+      for (int c = 0; c < 3; ++c) {
+        const float ratio = now[c] / std::max(kLeast, own[c]);
+        missed.at<cv::Vec3f>(v, u)[c] =
+            code[c] - codeFromLinear(ratio * linearFromRealCode(code[c]));
+      }
+    }
+  }
+  return missed;
+}
+
 }  // namespace
 
 cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor& actor,
@@ -37,6 +67,31 @@ cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor&
     }
   }
   return out;
+}
+
+float grainOf(const SeenObject& object, const SurfaceTexture& texture) {
+  // Immerkaer's mask, which cancels everything that is linear in the picture, for unit noise.
+  const cv::Mat kernel = (cv::Mat_<float>(3, 3) << 1, -2, 1, -2, 4, -2, 1, -2, 1) / 6.0f;
+  std::vector<float> details;
+  for (std::size_t i = 0; i < object.views.size(); ++i) {
+    const Reflectance& picture = object.pictures[i];
+    cv::Mat certain, detail;
+    const cv::Mat missed = missedCodes(object.views[i]->picture, picture,
+                                       drawnInto(picture, *object.actors[i], texture), certain);
+    cv::filter2D(missed, detail, CV_32F, kernel);
+    cv::erode(certain, certain, cv::Mat::ones(3, 3, CV_8U));
+    for (int v = 0; v < detail.rows; ++v) {
+      for (int u = 0; u < detail.cols; ++u) {
+        if (certain.at<std::uint8_t>(v, u) == 0) continue;
+        const cv::Vec3f& d = detail.at<cv::Vec3f>(v, u);
+        details.insert(details.end(), {std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
+      }
+    }
+  }
+  if (details.size() < 3 * kFewest) return 0.0f;
+  const auto middle = details.begin() + static_cast<std::ptrdiff_t>(details.size() / 2);
+  std::nth_element(details.begin(), middle, details.end());
+  return kMedianToSigma * *middle;
 }
 
 }  // namespace calipso::render
