@@ -12,7 +12,7 @@ COLUMNS = [
     ("gradient_ratio", "gradient ratio"), ("flicker_ratio", "flicker ratio"),
     ("light_error_deg", "light, deg"), ("albedo_error_percent", "albedo, %"),
     ("roughness_error_percent", "roughness, %"), ("roughness_observed", "a highlight tells the roughness"),
-    ("roughness_range", "roughnesses it leaves, highest / lowest"), ("second_order_ambient", "ambient light of second order"),
+    ("roughness_range", "roughnesses it leaves, highest / lowest"), ("roughness_in_range", "the true one is among them"), ("second_order_ambient", "ambient light of second order"),
     ("undeformed_psnr_db", "unmoved, dB"),
     ("seam_psnr_db", "unmoved seam, dB"), ("undeformed_drawn_psnr_db", "unmoved, all drawn, dB"),
     ("seam_drawn_psnr_db", "seam, all drawn, dB"), ("moved_psnr_db", "moved, dB"),

@@ -60,10 +60,10 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
     p.remarks.push_back(
         "neither a cast shadow nor a highlight confirms the light's direction, which shading alone "
         "tells: it may be tens of degrees off; an edit 'light' sets it");
-  if (p.light.determined && !p.light.seen_gloss)
+  if (p.light.determined && !p.light.tellsRoughness())
     p.remarks.push_back(
         "no highlight is seen that tells the objects' gloss; it is what their shading leaves "
-        "possible");
+        "possible, an edit 'appearance' sets it");
 }
 
 void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std::size_t i,

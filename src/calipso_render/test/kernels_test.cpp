@@ -291,7 +291,7 @@ TEST(Kernels, SampleAsSampleBicubic) {
   }
 }
 
-// Against the formulas point by point; the exponential's error is the largest.
+// Against the formulas point by point.
 TEST(Kernels, ShadeAsSpecularShadingAndWhatIsDiffuse) {
   cv::RNG random(5);
   for (const int terms : {1, 4, 9}) {

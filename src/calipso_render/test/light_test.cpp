@@ -285,6 +285,46 @@ TEST(SurroundingsStrength, IsFoundBesideTheHighlights) {
   EXPECT_LT(surroundingsStrength(ballUnder(fit.light), fit), 0.003f);
 }
 
+// Pixels of a ball around the highlight that a lobe of roughness m makes on it, as a picture has
+// them, which ends at 1.
+std::vector<HighlightSample> clippedHighlight(const Light& light, float m, int& clipped) {
+  const Eigen::Vector3f view(0, -1, 0), h = (light.direction + view).normalized(),
+                                        s = h.unitOrthogonal(), t = h.cross(s);
+  std::vector<HighlightSample> highlights;
+  cv::RNG random(5);
+  for (int i = -30; i <= 30; ++i) {
+    for (int j = -30; j <= 30; ++j) {
+      const Eigen::Vector3f n = (h + 0.015f * (i * s + j * t)).normalized();
+      LightSample at{n, n, view, {}, 0, SkySeen::all(n)};
+      at.radiance = diffuseShading(light, n, 1.0f).mul(cv::Vec3f(0.2f, 0.4f, 0.6f)) *
+                        static_cast<float>(1.0 + random.gaussian(0.01)) +
+                    specularShading(light, {0.05f, m, 0.0f}, n, view, 1.0f);
+      clipped += at.radiance[2] > 1.0f;
+      for (int c = 0; c < 3; ++c) at.radiance[c] = std::min(1.0f, at.radiance[c]);
+      highlights.push_back({at, 0.0f});
+    }
+  }
+  return highlights;
+}
+
+// The middle of a bright highlight says only that it is as bright as the picture; its flanks tell
+// how rough the surface is. What 1.1 degrees of error of the normals blur is allowed for.
+TEST(FitGloss, ReadsAClippedHighlightByItsFlanks) {
+  for (const float m : {0.06f, 0.1f}) {
+    LightFit fit = plainFit(Light());
+    fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
+    int clipped = 0;
+    const std::optional<SeenGloss> found =
+        fitGloss(clippedHighlight(fit.light, std::hypot(m, 0.028f), clipped), fit, {});
+    EXPECT_GT(clipped, 5);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->gloss.roughness, m, 0.05f * m);
+    EXPECT_NEAR(found->gloss.specular, 0.05f, 0.005f);
+    EXPECT_LT(found->smoothest, m);
+    EXPECT_GT(found->roughest, m);
+  }
+}
+
 // The pixels around a glossy ball's highlight speak for its light, and against one beside it.
 TEST(TellDirection, BelievesALightOnlyWhereItsHighlightIs) {
   LightFit fit = plainFit(Light());

@@ -156,27 +156,38 @@ class Evaluation {
 
   void judgeAppearance() {
     const Eigen::Vector3d found = prepared_->light.light.direction.cast<double>();
-    std::optional<double> angle, roughness;
+    std::optional<double> angle;
     if (truth_.to_sun)
       angle =
           std::acos(std::clamp(found.dot(truth_.to_sun->normalized()), -1.0, 1.0)) * 180.0 / M_PI;
     put("light_error_deg", angle);
     put("light_confirmed", prepared_->light.confirmed() ? 1.0 : 0.0);
     put("albedo_error_percent", albedoFigure());
-    // Beckmann's slope m is the square of the roughness that Principled shaders ask for.
-    for (std::size_t i = 0; i < truth_.objects.size() && !roughness; ++i) {
-      const Gloss& gloss = prepared_->appearances[i].gloss;
-      if (truth_.objects[i].roughness && gloss.specular > 0.0f) {
-        roughness =
-            100.0 * std::abs(std::sqrt(gloss.roughness) / *truth_.objects[i].roughness - 1.0);
-      }
-    }
-    put("roughness_error_percent", roughness);
-    put("roughness_observed", prepared_->light.seen_gloss ? 1.0 : 0.0);
-    const auto& seen = prepared_->light.seen_gloss;
-    put("roughness_range",
-        seen ? std::optional<double>(std::sqrt(seen->roughest / seen->smoothest)) : std::nullopt);
+    judgeRoughness();
     put("second_order_ambient", prepared_->light.second_order ? 1.0 : 0.0);
+  }
+
+  // Of the first object with a true one. The slope m is the square of the roughness that Principled
+  // shaders ask for.
+  void judgeRoughness() {
+    std::optional<double> truth, error, range, inside;
+    for (std::size_t i = 0; i < truth_.objects.size() && !truth; ++i) {
+      const Gloss& gloss = prepared_->appearances[i].gloss;
+      if (!truth_.objects[i].roughness || gloss.specular <= 0.0f) continue;
+      truth = truth_.objects[i].roughness;
+      error = 100.0 * std::abs(std::sqrt(gloss.roughness) / *truth - 1.0);
+    }
+    const bool told = prepared_->light.tellsRoughness();
+    if (told) {
+      const double low = std::sqrt(prepared_->light.seen_gloss->smoothest),
+                   high = std::sqrt(prepared_->light.seen_gloss->roughest);
+      range = high / low;
+      if (truth) inside = *truth >= low && *truth <= high ? 1.0 : 0.0;
+    }
+    put("roughness_error_percent", error);
+    put("roughness_observed", told ? 1.0 : 0.0);
+    put("roughness_range", range);
+    put("roughness_in_range", inside);
   }
 
   std::optional<double> albedoFigure() const {

@@ -17,7 +17,8 @@ struct Light {
   float angular_radius = 0.02f;                                      // of the sun, rad
 };
 
-// Torrance-Sparrow lobe with Beckmann's distribution: specular strength ks, roughness m. The smooth
+// Torrance-Sparrow lobe with Trowbridge and Reitz's distribution (GGX; Walter et al. 2007), whose
+// highlights end as slowly as real ones: specular strength ks, roughness m. The smooth
 // surroundings are mirrored with a strength of their own: highlights are clipped, and narrower than
 // pixels.
 struct Gloss {
@@ -120,9 +121,9 @@ cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun
 // The same where nothing hides the sky.
 cv::Vec3f diffuseShading(const Light& light, const Eigen::Vector3f& n, float sun);
 
-// D G / (4 n.v) of Torrance and Sparrow 1967 with unit ks, Beckmann's D times pi (the light's
-// colour is irradiance / pi). Zero where light or viewer are below the horizon. l, v: unit, towards
-// light, viewer.
+// D G / (4 n.v) of Torrance and Sparrow 1967 with unit ks, Trowbridge and Reitz's D times pi (the
+// light's colour is irradiance / pi). Zero where light or viewer are below the horizon. l, v: unit,
+// towards light, viewer.
 float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const Eigen::Vector3f& v,
                       float m);
 

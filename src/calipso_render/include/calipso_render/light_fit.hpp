@@ -28,7 +28,8 @@ std::vector<LightSample> lightSamples(const std::vector<View>& views,
 
 struct LightFit;
 
-// Gloss as highlights show it. They do not tell roughnesses from `smoothest` to `roughest` apart.
+// Gloss as highlights show it. They do not tell roughnesses from `smoothest` to `roughest` apart
+// (model errors included: where the light is confirmed, the truth is between them in most scenes).
 struct SeenGloss {
   Gloss gloss;
   float smoothest = 0.0f, roughest = 0.0f;
@@ -76,6 +77,8 @@ struct LightFit {
   bool confirmed() const {
     return determined && (from_shadows || (seen_gloss && seen_gloss->tells_direction));
   }
+  // What looks like a highlight is none where it may be the light that is somewhere else.
+  bool tellsRoughness() const { return seen_gloss && confirmed(); }
 };
 
 // Sun direction, sun and ambient colour, albedos and gloss from shading and cast shadows: a search

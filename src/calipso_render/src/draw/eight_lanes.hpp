@@ -52,18 +52,4 @@ CALIPSO_INLINE Eight squareRoot(const Eight& x) {
   return root;
 }
 
-// e to the x; relative error below 3e-7. @pre x <= 80; below -87 it is taken for that
-CALIPSO_INLINE Eight exponential(const Eight& x) {
-  const Eight y = larger(x, all(-87.0f)) * 1.44269504f;  // of 2
-  const EightInts whole = __builtin_convertvector(y + 16384.5f, EightInts) - 16384;
-  const Eight f = y - __builtin_convertvector(whole, Eight);  // -0.5 .. 0.5
-  const Eight power =
-      1.0f +
-      f * (0.69314718f +
-           f * (0.24022651f +
-                f * (0.05550411f + f * (0.00961813f + f * (0.00133336f + f * 0.00015469f)))));
-  const EightInts scale = (whole + 127) << 23;
-  return power * (Eight)scale;
-}
-
 }  // namespace calipso::render

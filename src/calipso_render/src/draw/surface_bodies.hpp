@@ -119,9 +119,9 @@ CALIPSO_INLINE Eight lobeBody(const SurfaceShade& s, const Eight (&n)[3], const 
     const Eight sum = s.direction[c] + view[c];
     squared += sum * sum, along += n[c] * sum;
   }
-  const float per_m2 = 1.0f / (s.roughness * s.roughness);
-  const Eight per_c2 = squared / (along * along);  // c = n.h
-  const Eight D = exponential((1.0f - per_c2) * per_m2) * (per_c2 * per_c2 * per_m2);
+  const float m2 = s.roughness * s.roughness;
+  const Eight c2 = along * along / squared;  // of c = n.h
+  const Eight root = 1.0f - c2 * (1.0f - m2), D = m2 / (root * root);
   const Eight G = smaller(all(1.0f), 4.0f * along * smaller(n_v, n_l) / squared);
   return D * G / (4.0f * n_v);
 }

@@ -17,8 +17,10 @@ constexpr std::size_t kMost = 2500;
 constexpr std::size_t kFewest = 30;
 constexpr double kSmoothest = 0.03, kRoughest = 0.7;  // m
 constexpr int kRoughnesses = 24;
-constexpr int kReweightings = 3;
-constexpr double kOutlier = 0.15;  // of the cluster's brightness
+constexpr int kReweightings = 4;
+constexpr double kNormalError = 0.02;  // rad per axis: no model has the object's own
+constexpr double kModelError = 1.5;    // of m, whatever the rows' errors say
+constexpr double kOutlier = 0.15;      // of the cluster's brightness
 // of the worst roughness' error: less must remain, or the roughness is not told
 constexpr double kSharp = 0.98;
 constexpr double kBroad = 0.35;      // m from which a lobe looks like diffuse shading
@@ -121,6 +123,7 @@ struct Row {
   int cluster;
   cv::Vec3f diffuse, radiance, sun, mirrored;  // a E; I; L V; F A S
   double scale;
+  double weight = 1.0;
 };
 
 struct Solution {
@@ -167,9 +170,11 @@ struct Reduced {
   }
 };
 
+// Whether a channel tells no more than that the surface is at least as bright.
+bool clipped(float radiance, double model) { return radiance >= kSaturated && model >= radiance; }
+
 Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
-  std::vector<double> weights(rows.size(), 1.0);
-  Solution solution;
+  constexpr double kBound = 3.0 * kOutlier * kOutlier;
   const auto glossOf = [&](std::size_t i, int c) {
     const double mirrored = rows[i].mirrored[c];  // goes with the broader one
     const double own = lobes.own == nullptr ? 0.0
@@ -178,12 +183,17 @@ Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
     return Eigen::Vector2d(
         own, lobes.broad == nullptr ? 0.0 : rows[i].sun[c] * (*lobes.broad)[i] + mirrored);
   };
+  std::vector<cv::Vec3d> weights(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (int c = 0; c < 3; ++c) weights[i][c] = rows[i].radiance[c] < kSaturated ? 1.0 : 0.0;
+  }
+  Solution solution;
   for (int round = 0; round < kReweightings; ++round) {
     Reduced sums(clusters);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const double w = weights[i] / (rows[i].scale * rows[i].scale);
       for (int c = 0; c < 3; ++c)
-        sums.add(rows[i].cluster, w, rows[i].diffuse[c], glossOf(i, c), rows[i].radiance[c]);
+        sums.add(rows[i].cluster, rows[i].weight * weights[i][c] / (rows[i].scale * rows[i].scale),
+                 rows[i].diffuse[c], glossOf(i, c), rows[i].radiance[c]);
     }
     const Eigen::Vector2d strengths = sums.strengths();
     solution.strength = strengths[0], solution.beside = strengths[1], solution.cost = 0.0;
@@ -191,19 +201,42 @@ Solution solve(const std::vector<Row>& rows, const Lobes& lobes, int clusters) {
       const int k = rows[i].cluster;
       const double brightness = (sums.di[k] - strengths.dot(sums.dg[k])) / sums.dd[k];
       double squared = 0.0;
+      cv::Vec3d tells;
       for (int c = 0; c < 3; ++c) {
-        const double r =
-            (brightness * rows[i].diffuse[c] + strengths.dot(glossOf(i, c)) - rows[i].radiance[c]) /
-            rows[i].scale;
-        if (r < 0.0 || rows[i].radiance[c] < kSaturated) squared += r * r;
+        const double model = brightness * rows[i].diffuse[c] + strengths.dot(glossOf(i, c));
+        const double r = (model - rows[i].radiance[c]) / rows[i].scale;
+        tells[c] = clipped(rows[i].radiance[c], model) ? 0.0 : 1.0;
+        squared += tells[c] * r * r;
       }
       // Cauchy's loss: a highlight that is not explained goes on counting.
-      const double bound = 3.0 * kOutlier * kOutlier;
-      solution.cost += bound * std::log1p(squared / bound);
-      weights[i] = bound / (squared + bound);
+      solution.cost += rows[i].weight * kBound * std::log1p(squared / kBound);
+      weights[i] = tells * (kBound / (squared + kBound));
     }
   }
   return solution;
+}
+
+double weightOf(const std::vector<Row>& rows) {
+  double sum = 0.0;
+  for (const Row& r : rows) sum += r.weight;
+  return sum;
+}
+
+// Lets places at every angle from the mirror direction weigh alike: far from it are most of them,
+// and all that they tell is how the diffuse shading errs.
+void balance(const std::vector<HighlightSample>& highlights, const Eigen::Vector3f& light,
+             std::vector<Row>& rows) {
+  constexpr float kRing = 0.05f;  // rad
+  constexpr double kPerRing = 50.0;
+  std::vector<std::size_t> rings, counts;
+  for (const HighlightSample& h : highlights) {
+    const float c = h.at.normal.dot((light + h.at.view).normalized());
+    rings.push_back(static_cast<std::size_t>(std::acos(std::min(1.0f, c)) / kRing));
+    counts.resize(std::max(counts.size(), rings.back() + 1));
+    ++counts[rings.back()];
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i].weight = std::min(1.0, kPerRing / static_cast<double>(counts[rings[i]]));
 }
 
 Row rowOf(const LightSample& s, const LightFit& fit, const SunVisible& visible) {
@@ -221,17 +254,18 @@ Row rowOf(const LightSample& s, const LightFit& fit, const SunVisible& visible) 
   return row;
 }
 
-double roughnessAt(int i) {
-  return kSmoothest * std::pow(kRoughest / kSmoothest, static_cast<double>(i) / kRoughnesses);
+double roughnessAt(double i) {
+  return kSmoothest * std::pow(kRoughest / kSmoothest, i / kRoughnesses);
 }
 
-// The pixel averages the lobe: its width and the normals' spread add up (Beckmann's variance per
-// axis is m^2 / 2).
+// The pixel averages the lobe: its width and the normals' spread and error add up (facets' slopes
+// have a variance of about m^2 / 2 per axis).
 std::vector<double> lobesOf(const std::vector<HighlightSample>& highlights,
                             const Eigen::Vector3f& light, double m) {
   std::vector<double> lobes;
   for (const HighlightSample& h : highlights) {
-    const double wide = std::sqrt(m * m + 2.0 * h.spread * h.spread);
+    const double wide =
+        std::sqrt(m * m + 2.0 * (h.spread * h.spread + kNormalError * kNormalError));
     lobes.push_back(torranceSparrow(h.at.normal, light, h.at.view, static_cast<float>(wide)));
   }
   return lobes;
@@ -241,6 +275,12 @@ struct Found : SeenGloss {
   double cost = 0.0;
 };
 
+// Where the parabola through three equally spaced values has its least, in steps from the middle.
+double leastOf(double before, double middle, double after) {
+  const double bend = before - 2.0 * middle + after;
+  return bend > 0.0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
+}
+
 // The best of the roughnesses below `limit`, and which others explain the rows as well. @param most
 // error that it may leave
 // @param worst out: the worst error that any leaves
@@ -249,26 +289,31 @@ std::optional<Found> bestRoughness(const std::vector<Row>& rows,
                                    const Eigen::Vector3f& light, int clusters,
                                    const std::vector<double>* broad, double limit, double most,
                                    double& worst) {
-  std::vector<double> costs, strengths;
-  for (int i = 0; i <= kRoughnesses && roughnessAt(i) < limit; ++i) {
+  const auto at = [&](double i) {
     const std::vector<double> own = lobesOf(highlights, light, roughnessAt(i));
-    const Solution s = solve(rows, {&own, broad}, clusters);
-    costs.push_back(s.strength > 0.0 ? s.cost : 1e30), strengths.push_back(s.strength);
+    return solve(rows, {&own, broad}, clusters);
+  };
+  std::vector<double> costs;
+  for (int i = 0; i <= kRoughnesses && roughnessAt(i) < limit; ++i) {
+    const Solution s = at(i);
+    costs.push_back(s.strength > 0.0 ? s.cost : 1e30);
     worst = std::max(worst, s.cost);
   }
   const std::size_t best = std::min_element(costs.begin(), costs.end()) - costs.begin();
   if (costs.empty() || costs[best] >= most) return std::nullopt;
-  const double alike = costs[best] * (1.0 + kAlike / static_cast<double>(rows.size()));
+  const double alike = costs[best] * (1.0 + kAlike / weightOf(rows));
   std::size_t first = best, last = best;
   while (first > 0 && costs[first - 1] <= alike) --first;
   while (last + 1 < costs.size() && costs[last + 1] <= alike) ++last;
-  const auto roughness = [](std::size_t i) {
-    return static_cast<float>(roughnessAt(static_cast<int>(i)));
-  };
+  double exact = static_cast<double>(best);
+  if (best > 0 && best + 1 < costs.size())
+    exact += leastOf(costs[best - 1], costs[best], costs[best + 1]);
+  const float ks = static_cast<float>(at(exact).strength);
   Found found;
-  const float ks = static_cast<float>(strengths[best]);
-  found.gloss = {ks, roughness(best), ks};
-  found.smoothest = roughness(first), found.roughest = roughness(last), found.cost = costs[best];
+  found.gloss = {ks, static_cast<float>(roughnessAt(exact)), ks};
+  found.smoothest = static_cast<float>(roughnessAt(first) / kModelError);
+  found.roughest = static_cast<float>(roughnessAt(last) * kModelError);
+  found.cost = costs[best];
   return found;
 }
 
@@ -313,6 +358,7 @@ std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights
   const Light& light = fit.light;
   std::vector<Row> rows;
   for (const HighlightSample& h : highlights) rows.push_back(rowOf(h.at, fit, visible));
+  balance(highlights, light.direction, rows);
   const int clusters = static_cast<int>(fit.albedos.size());
   const double without = solve(rows, {}, clusters).cost;
   double worst = 0.0;
@@ -324,8 +370,8 @@ std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights
   // A lobe nearly as broad as diffuse shading explains that one's errors too. Where beside it a
   // narrow one is seen, that is the gloss.
   const std::vector<double> beside = lobesOf(highlights, light.direction, best->gloss.roughness);
-  const double with_broad = solve(rows, {nullptr, &beside}, clusters).cost *
-                            (1.0 - kSeenBeside / static_cast<double>(rows.size()));
+  const double with_broad =
+      solve(rows, {nullptr, &beside}, clusters).cost * (1.0 - kSeenBeside / weightOf(rows));
   const std::optional<Found> narrow =
       bestRoughness(rows, highlights, light.direction, clusters, &beside,
                     kNarrowPart * best->gloss.roughness, with_broad, worst);

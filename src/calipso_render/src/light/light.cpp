@@ -65,9 +65,8 @@ float torranceSparrow(const Eigen::Vector3f& n, const Eigen::Vector3f& l, const 
   const float nl = n.dot(l), nv = n.dot(v);
   if (nl <= kHorizon || nv <= kHorizon) return 0.0f;
   const Eigen::Vector3f sum = l + v;
-  const float length = sum.norm(), c = n.dot(sum) / length, vh = 0.5f * length, c2 = c * c,
-              m2 = m * m;
-  const float D = std::exp((c2 - 1.0f) / (c2 * m2)) / (m2 * c2 * c2);
+  const float length = sum.norm(), c = n.dot(sum) / length, vh = 0.5f * length, m2 = m * m;
+  const float root = 1.0f - c * c * (1.0f - m2), D = m2 / (root * root);
   const float G = std::min({1.0f, 2.0f * c * nv / vh, 2.0f * c * nl / vh});
   return D * G / (4.0f * nv);
 }
@@ -80,9 +79,8 @@ Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
   const Eigen::Vector3d sum = l + v;
   const double length = sum.norm(), c = n.dot(sum) / length, vh = 0.5 * length;
   const Eigen::Vector3d h = sum / length, dc = (n - c * h) / length, dvh = 0.5 * h;
-  const double c2 = c * c, m2 = m * m, D = std::exp((c2 - 1.0) / (c2 * m2)) / (m2 * c2 * c2);
-  const double dD_dc = D * (2.0 / (c * c2 * m2) - 4.0 / c),
-               dD_dm = D * (2.0 * (1.0 - c2) / (c2 * m2 * m) - 2.0 / m);
+  const double c2 = c * c, m2 = m * m, root = 1.0 - c2 * (1.0 - m2), D = m2 / (root * root);
+  const double dD_dc = D * 4.0 * c * (1.0 - m2) / root, dD_dm = D * (2.0 / m - 4.0 * c2 * m / root);
   double G = 1.0;
   Eigen::Vector3d dG = Eigen::Vector3d::Zero();
   if (2.0 * c * nv / vh < G) G = 2.0 * c * nv / vh, dG = 2.0 * nv * (dc * vh - c * dvh) / (vh * vh);

@@ -22,7 +22,7 @@ uniform mat4 clip_from_world;
 out vec3 p, n;
 void main() { p = position; n = normal; gl_Position = clip_from_world * vec4(position, 1.0); })";
 
-// Torrance-Sparrow with Beckmann's distribution over a procedural albedo, sun and ambient light.
+// Torrance-Sparrow with Trowbridge and Reitz's distribution over a procedural albedo, sun and ambient light.
 const char* const kFragmentShader = R"(#version 330 core
 in vec3 p, n;
 uniform vec3 eye, to_sun;
@@ -32,7 +32,7 @@ void main() {
   float nl = max(dot(N, to_sun), 0.0), nv = max(dot(N, V), 1e-3);
   vec3 H = normalize(to_sun + V);
   float c = max(dot(N, H), 1e-3), c2 = c * c, m2 = 0.09, vh = max(dot(V, H), 1e-3);
-  float D = exp((c2 - 1.0) / (c2 * m2)) / (m2 * c2 * c2);
+  float root = 1.0 - c2 * (1.0 - m2), D = m2 / (root * root);
   float G = min(1.0, min(2.0 * c * nv / vh, 2.0 * c * nl / vh));
   vec3 albedo = vec3(0.3) + 0.1 * sin(160.0 * p.x) * sin(140.0 * p.y);
   vec3 radiance = albedo * (vec3(0.3) + 0.65 * nl) + vec3(0.04 * 0.65 * D * G / (4.0 * nv));
