@@ -60,10 +60,6 @@ void remarkPlace(const std::vector<ClipFrame>& frames, Prepared& p) {
     p.remarks.push_back(
         "neither a cast shadow nor a highlight confirms the light's direction, which shading alone "
         "tells: it may be tens of degrees off; an edit 'light' sets it");
-  if (p.light.determined && !p.light.tellsRoughness())
-    p.remarks.push_back(
-        "no highlight is seen that tells the objects' gloss; it is what their shading leaves "
-        "possible, an edit 'appearance' sets it");
 }
 
 void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std::size_t i,
@@ -93,6 +89,11 @@ void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std:
     p.remarks.push_back(who + ": its model covers " + std::to_string(percent(modelled)) +
                         " % of its mask; the side that the camera sees is missing or misplaced, "
                         "and is left out when the object is drawn elsewhere");
+  }
+  if (p.light.determined && !p.light.toldGloss(i)) {
+    p.remarks.push_back(who +
+                        ": no highlight of a confirmed light tells its gloss; it is what the "
+                        "shading leaves possible, an edit 'appearance' sets it");
   }
   const Appearance& a = p.appearances[i];
   const double unseen = 1.0 - a.seen_in_key - a.seen_elsewhere;

@@ -50,7 +50,7 @@ View viewOf(const Surface& surface, float angle) {
 TEST(Appearance, TakesFromAnotherViewWhatAHighlightHides) {
   const Surface surface = makeSurface(ballAt(kPlace));
   const std::vector<View> views = {viewOf(surface, 0.0f), viewOf(surface, kTurn)};
-  const Appearance a = makeAppearances(views, {true}, sunlight(), kTold).front();
+  const Appearance a = makeAppearances(views, {true}, sunlight(), {kTold}).front();
   const auto normalOf = [&](int triangle, const Eigen::Vector3f& w) -> Eigen::Vector3f {
     const Eigen::Vector3i& t = surface.triangles[triangle];
     const Points& x = surface.key_vertices;
@@ -87,7 +87,8 @@ TEST(Appearance, ShadeThatThePictureDoesNotHaveIsNotDividedBy) {
   view.actors.push_back(makeActor(blocker, blocker.key_vertices, view.camera));
   const ShadowMap sun({{&view.actors[1].vertices, &blocker.triangles, blocker.winding}},
                       sunlight().direction.cast<double>(), {});
-  const Appearance a = makeAppearances({view}, {false, false}, sunlight(), {}).front();
+  const Appearance a =
+      makeAppearances({view}, {false, false}, sunlight(), {Gloss(), Gloss()}).front();
   int shaded = 0;
   forEachPixelOf(view.actors[0], [&](int u, int v, const SurfacePoint& p) {
     if (sun.visibility(p.position, p.normal) > 0.1f) return;
@@ -145,7 +146,7 @@ TEST(Appearance, TakesFromAnotherViewWhatMixesWithAPartBefore) {
   std::vector<View> views;
   for (const float angle : {0.0f, -kTurn, -1.3f * kTurn})
     views.push_back(blurredView(surface, angle, light));
-  const Appearance a = makeAppearances(views, {true}, light, Gloss()).front();
+  const Appearance a = makeAppearances(views, {true}, light, {Gloss()}).front();
   std::vector<float> ratios;
   for (int t = 0; t < static_cast<int>(kBallTriangles); ++t) {
     for (std::size_t i = a.texture.firstOf(t); i < a.texture.firstOf(t + 1); ++i) {
@@ -183,7 +184,7 @@ TEST(Appearance, APartUnderAnotherIsNotSeen) {
   View view{{}, frame.labels, frame.camera, {}};
   frame.bgr.convertTo(view.picture, CV_32F);
   view.actors.push_back(makeActor(surface, surface.key_vertices, frame.camera));
-  const Appearance a = makeAppearances({view}, {false}, sunlight(), {}).front();
+  const Appearance a = makeAppearances({view}, {false}, sunlight(), {Gloss()}).front();
   const auto fromPicture = [&](int first, int end) {
     return std::count_if(a.texture.texels.begin() + a.texture.firstOf(first),
                          a.texture.texels.begin() + a.texture.firstOf(end),

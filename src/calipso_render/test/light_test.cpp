@@ -325,6 +325,30 @@ TEST(FitGloss, ReadsAClippedHighlightByItsFlanks) {
   }
 }
 
+// Three objects: two of one gloss, and one of another.
+TEST(SeenGlosses, HoldEachObjectsOwnWhereItDiffers) {
+  LightFit fit = plainFit(Light());
+  fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
+  std::vector<HighlightSample> all;
+  int clipped = 0;
+  for (const std::size_t object : {0, 1, 2}) {
+    for (HighlightSample& h : clippedHighlight(fit.light, object == 2 ? 0.25f : 0.08f, clipped)) {
+      h.object = object;
+      all.push_back(h);
+    }
+  }
+  fit.seen_gloss = seenGlosses(all, 4, fit, {});
+  ASSERT_TRUE(fit.confirmed());  // by the highlights
+  fit.gloss = fit.seen_gloss.of_all->gloss;
+  EXPECT_FALSE(fit.seen_gloss.of_one[1]);
+  EXPECT_NEAR(fit.glossOf(0).roughness, fit.glossOf(1).roughness, 1e-6f);
+  EXPECT_NEAR(fit.glossOf(1).roughness, 0.08f, 0.015f);
+  EXPECT_NEAR(fit.glossOf(2).roughness, 0.25f, 0.05f);
+  EXPECT_NEAR(fit.glossOf(3).roughness, 0.08f, 0.015f);  // nothing is seen of it
+  EXPECT_TRUE(fit.toldGloss(2)->leaves(0.25f));
+  EXPECT_FALSE(fit.toldGloss(2)->leaves(0.08f));
+}
+
 // The pixels around a glossy ball's highlight speak for its light, and against one beside it.
 TEST(TellDirection, BelievesALightOnlyWhereItsHighlightIs) {
   LightFit fit = plainFit(Light());

@@ -60,7 +60,7 @@ std::vector<View> patternedViews(const Surface& surface, float waves, float nois
 TEST(TextureMiss, TheTextureIsAsSharpAsItsPictures) {
   const Surface surface = makeSurface(ballAt(kPlace));
   const std::vector<View> views = patternedViews(surface, kFine, 0.0f);
-  const Appearance a = makeAppearances(views, {true}, evenLight(), {}).front();
+  const Appearance a = makeAppearances(views, {true}, evenLight(), {Gloss()}).front();
   double product = 0.0, square = 0.0;
   for (int i = 2; i < kViews; ++i) {
     const Actor& actor = views[i].actors.front();
@@ -84,7 +84,7 @@ TEST(TextureMiss, TheTextureIsAsSharpAsItsPictures) {
 TEST(TextureMiss, GrainIsWhatPixelsDeviateByThemselves) {
   const Surface surface = makeSurface(ballAt(kPlace));
   const auto grain = [&](float noise) {
-    return makeAppearances(patternedViews(surface, kCoarse, noise), {true}, evenLight(), {})
+    return makeAppearances(patternedViews(surface, kCoarse, noise), {true}, evenLight(), {Gloss()})
         .front()
         .grain;
   };
@@ -99,7 +99,7 @@ TEST(TextureMiss, GrainIsWhatPixelsDeviateByThemselves) {
 TEST(TextureMiss, OfOnePictureThereIsNoGrain) {
   const Surface surface = makeSurface(ballAt(kPlace));
   const std::vector<View> views = patternedViews(surface, kCoarse, 3.0f);
-  EXPECT_EQ(makeAppearances({views[0]}, {true}, evenLight(), {}).front().grain, 0.0f);
+  EXPECT_EQ(makeAppearances({views[0]}, {true}, evenLight(), {Gloss()}).front().grain, 0.0f);
 }
 
 }  // namespace

@@ -170,22 +170,23 @@ class Evaluation {
   // Of the first object with a true one. The slope m is the square of the roughness that Principled
   // shaders ask for.
   void judgeRoughness() {
-    std::optional<double> truth, error, range, inside;
-    for (std::size_t i = 0; i < truth_.objects.size() && !truth; ++i) {
-      const Gloss& gloss = prepared_->appearances[i].gloss;
-      if (!truth_.objects[i].roughness || gloss.specular <= 0.0f) continue;
-      truth = truth_.objects[i].roughness;
-      error = 100.0 * std::abs(std::sqrt(gloss.roughness) / *truth - 1.0);
-    }
-    const bool told = prepared_->light.tellsRoughness();
-    if (told) {
-      const double low = std::sqrt(prepared_->light.seen_gloss->smoothest),
-                   high = std::sqrt(prepared_->light.seen_gloss->roughest);
-      range = high / low;
-      if (truth) inside = *truth >= low && *truth <= high ? 1.0 : 0.0;
+    const auto isTold = [](const Gloss& gloss, const Truth::Object& object) {
+      return object.roughness && gloss.specular > 0.0f;
+    };
+    std::size_t i = 0;
+    while (i < truth_.objects.size() && !isTold(prepared_->appearances[i].gloss, truth_.objects[i]))
+      ++i;
+    std::optional<double> error, range, inside;
+    if (i < truth_.objects.size()) {
+      const double truth = *truth_.objects[i].roughness;
+      error = 100.0 * std::abs(std::sqrt(prepared_->appearances[i].gloss.roughness) / truth - 1.0);
+      if (const auto told = prepared_->light.toldGloss(i)) {
+        const double low = std::sqrt(told->smoothest), high = std::sqrt(told->roughest);
+        range = high / low, inside = truth >= low && truth <= high ? 1.0 : 0.0;
+      }
     }
     put("roughness_error_percent", error);
-    put("roughness_observed", told ? 1.0 : 0.0);
+    put("roughness_observed", range ? 1.0 : 0.0);
     put("roughness_range", range);
     put("roughness_in_range", inside);
   }
@@ -249,7 +250,7 @@ class Evaluation {
     views[0].labels = p.key_labels, views[0].camera = scene_.camera;
     for (const Surface& s : p.surfaces)
       views[0].actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
-    return makeAppearances(views, p.moves, p.light.light, p.light.gloss);
+    return makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()));
   }
 
   std::shared_ptr<Prepared> fromKeyFrame() const {
@@ -262,7 +263,7 @@ class Evaluation {
   std::shared_ptr<Prepared> unlit() const {
     auto flat = std::make_shared<Prepared>(*prepared_);
     flat->light.light.sun = {0, 0, 0};
-    flat->light.gloss = {};
+    flat->light.gloss = {}, flat->light.seen_gloss = {};
     flat->light.light.ambient = {};
     flat->light.light.ambient[0] = {1, 1, 1};
     for (Surface& s : flat->surfaces) {

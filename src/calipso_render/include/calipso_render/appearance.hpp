@@ -55,7 +55,7 @@ inline cv::Vec3f lightFloor(const cv::Vec3f& mean_light) { return mean_light * 0
 // other sides
 std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<bool>& moves, const Light& light,
-                                        const Gloss& gloss);
+                                        const std::vector<Gloss>& glosses);
 
 // Bicubic (Catmull-Rom) lookup with borders repeated, not below 0. (u, v) in the image's own
 // pixels.

@@ -34,6 +34,14 @@ struct SeenGloss {
   Gloss gloss;
   float smoothest = 0.0f, roughest = 0.0f;
   bool tells_direction = false;  // they are where the light found puts them, and not beside it
+
+  bool leaves(float roughness) const { return roughness >= smoothest && roughness <= roughest; }
+};
+
+struct SeenGlosses {
+  std::optional<SeenGloss> of_all;  // objects together
+  // by object, where its own highlights tell it, and another one than `of_all`
+  std::vector<std::optional<SeenGloss>> of_one;
 };
 
 // All that the pictures show of the light. The functions are called from several threads at once.
@@ -50,7 +58,7 @@ struct LightEvidence {
   std::vector<Eigen::Vector3f> shadow_candidates;  // directions that cast shadows speak for
   // Gloss from the pixels near the mirror direction, under a light found; may be empty, and find
   // none.
-  std::function<std::optional<SeenGloss>(const LightFit&)> gloss;
+  std::function<SeenGlosses(const LightFit&)> gloss;
 };
 
 // What views, one or several, show. @param plate what was seen of the place without the objects,
@@ -63,9 +71,9 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
 
 struct LightFit {
   Light light;
-  Gloss gloss;  // of all objects together
-  // nullopt: no highlight tells it, `gloss` is what the shading leaves possible
-  std::optional<SeenGloss> seen_gloss;
+  Gloss
+      gloss;  // of all objects together: what highlights tell, or what the shading leaves possible
+  SeenGlosses seen_gloss;
   std::vector<cv::Vec3f> albedos;  // per cluster, up to a common factor
   bool determined = false;  // false: too little was seen; the light is a default, high and frontal
   bool second_order = false;  // ambient light in bands 1 and 2, too: held-out pixels spoke for it
@@ -75,10 +83,14 @@ struct LightFit {
   // Something besides shading speaks for the direction: shading alone is off by tens of degrees
   // where surfaces of one albedo are few.
   bool confirmed() const {
-    return determined && (from_shadows || (seen_gloss && seen_gloss->tells_direction));
+    return determined &&
+           (from_shadows || (seen_gloss.of_all && seen_gloss.of_all->tells_direction));
   }
-  // What looks like a highlight is none where it may be the light that is somewhere else.
-  bool tellsRoughness() const { return seen_gloss && confirmed(); }
+  // What tells an object's gloss, if anything. What looks like a highlight is none where it may be
+  // the light that is somewhere else.
+  std::optional<SeenGloss> toldGloss(std::size_t object) const;
+  Gloss glossOf(std::size_t object) const;
+  std::vector<Gloss> glosses(std::size_t objects) const;
 };
 
 // Sun direction, sun and ambient colour, albedos and gloss from shading and cast shadows: a search

@@ -4,24 +4,12 @@
 #include <vector>
 
 #include "calipso_render/light_fit.hpp"
+#include "light/highlight_samples.hpp"
 
 namespace calipso::render {
 
-// A pixel near the mirror direction of the sun.
-struct HighlightSample {
-  LightSample at;
-  float spread = 0.0f;  // root mean square turn of the normal across the pixel, rad per axis
-};
-
 using SunVisible =
     std::function<float(const LightSample&, const Eigen::Vector3f&)>;  // LightEvidence's
-
-// Every pixel of the views inside the masks whose normal lies near the half vector of light and
-// viewer, each in the cluster of the nearest of `samples` in its picture.
-std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
-                                              const std::vector<bool>& moves,
-                                              const std::vector<LightSample>& samples,
-                                              const Eigen::Vector3f& light);
 
 // Specular strength and roughness from the highlights' shape: for every roughness the best strength
 // and brightness of the clusters (linear least squares, outliers weighed down), and of these the
@@ -35,6 +23,10 @@ std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights
 // bright there.
 bool tellDirection(const std::vector<HighlightSample>& highlights, const LightFit& fit,
                    const SunVisible& visible);
+
+// All of it, of so many objects together and of those that differ.
+SeenGlosses seenGlosses(const std::vector<HighlightSample>& highlights, std::size_t objects,
+                        const LightFit& fit, const SunVisible& visible);
 
 // Strength with which the surroundings are mirrored, by all samples beside the highlights' gloss.
 // @param fit light, albedos and gloss so far

@@ -254,6 +254,24 @@ LightEvidence withoutShadows(LightEvidence evidence) {
 
 }  // namespace
 
+std::optional<SeenGloss> LightFit::toldGloss(std::size_t object) const {
+  if (!confirmed()) return std::nullopt;
+  const auto& own = seen_gloss.of_one;
+  return object < own.size() && own[object] ? own[object] : seen_gloss.of_all;
+}
+
+Gloss LightFit::glossOf(std::size_t object) const {
+  const auto& own = seen_gloss.of_one;
+  if (object >= own.size() || !own[object]) return gloss;
+  return {own[object]->gloss.specular, own[object]->gloss.roughness, gloss.around};
+}
+
+std::vector<Gloss> LightFit::glosses(std::size_t objects) const {
+  std::vector<Gloss> all;
+  for (std::size_t i = 0; i < objects; ++i) all.push_back(glossOf(i));
+  return all;
+}
+
 LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
                   const Eigen::Vector3f& view) {
   LightFit best;
@@ -274,8 +292,8 @@ LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
   if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling))
     keepBetter(fitFrom(starts.front(), evidence, up, false), best);
   if (!best.determined) return best;
-  best.seen_gloss = evidence.gloss ? evidence.gloss(best) : std::nullopt;
-  if (best.seen_gloss) best.gloss = best.seen_gloss->gloss;
+  if (evidence.gloss) best.seen_gloss = evidence.gloss(best);
+  if (best.seen_gloss.of_all) best.gloss = best.seen_gloss.of_all->gloss;
   best.gloss.around = surroundingsStrength(evidence, best);
   best.second_order = refineAmbient(evidence, best);
   return best;

@@ -186,11 +186,8 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
   addShadows(views, leavers(views.front(), moves, plate), planes, plate, depth, scenes, evidence);
   evidence.gloss = [&views, moves, samples = evidence.samples,
                     visible = evidence.visible](const LightFit& fit) {
-    const std::vector<HighlightSample> highlights =
-        highlightSamples(views, moves, samples, fit.light.direction);
-    std::optional<SeenGloss> seen = fitGloss(highlights, fit, visible);
-    if (seen) seen->tells_direction = tellDirection(highlights, fit, visible);
-    return seen;
+    return seenGlosses(highlightSamples(views, moves, samples, fit.light.direction), moves.size(),
+                       fit, visible);
   };
   return evidence;
 }

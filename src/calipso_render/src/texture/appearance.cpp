@@ -265,7 +265,7 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
 
 std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<bool>& moves, const Light& light,
-                                        const Gloss& gloss) {
+                                        const std::vector<Gloss>& glosses) {
   std::vector<ShadowMap> suns;
   for (const View& view : views) {
     std::vector<Occluder> occluders;
@@ -277,7 +277,7 @@ std::vector<Appearance> makeAppearances(const std::vector<View>& views,
   std::vector<Appearance> appearances(moves.size());
 #pragma omp parallel for schedule(dynamic, 1) if (moves.size() > 1)
   for (std::size_t i = 0; i < moves.size(); ++i)
-    appearances[i] = makeAppearance(views, suns, i, moves[i], light, gloss);
+    appearances[i] = makeAppearance(views, suns, i, moves[i], light, glosses[i]);
   return appearances;
 }
 
