@@ -22,7 +22,8 @@ uniform mat4 clip_from_world;
 out vec3 p, n;
 void main() { p = position; n = normal; gl_Position = clip_from_world * vec4(position, 1.0); })";
 
-// Torrance-Sparrow with Trowbridge and Reitz's distribution over a procedural albedo, sun and ambient light.
+// Torrance-Sparrow with the distribution that ours has over a procedural albedo, sun and ambient
+// light.
 const char* const kFragmentShader = R"(#version 330 core
 in vec3 p, n;
 uniform vec3 eye, to_sun;
