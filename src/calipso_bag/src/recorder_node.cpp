@@ -10,7 +10,8 @@ namespace {
 calipso::bag::Recorder::Params loadParams(const ros::NodeHandle& pnh) {
   calipso::bag::Recorder::Params params;
   params.output = calipso::requiredParam<std::string>(pnh, "output");
-  params.input = calipso::optionalParam(pnh, "input", params.input);
+  for (const char* name : {"input", "edits"})
+    params.inputs.push_back(calipso::optionalParam(pnh, name, std::string()));
   params.mode = calipso::modeParam(pnh);
   params.flow = calipso::optionalParam(pnh, "flow", params.flow);
   params.late_timeout_sec =

@@ -93,12 +93,17 @@ TEST(OutputBag, DoesNotReplaceItsInput) {
   const TemporaryFolder folder;
   const std::string path = folder / "in.bag";
   std::ofstream(path) << "a bag";
-  const std::string text = messageOf([&] { OutputBag output(folder / "./in.bag", path); });
+  const std::string text = messageOf([&] { OutputBag output(folder / "./in.bag", {path}); });
   EXPECT_NE(text.find("in.bag"), std::string::npos) << text;
   EXPECT_NE(text.find("give another path"), std::string::npos) << text;
   EXPECT_FALSE(std::filesystem::exists(path + ".active"));
-  EXPECT_NO_THROW(OutputBag(folder / "out.bag", path));
+  EXPECT_NO_THROW(OutputBag(folder / "out.bag", {path}));
   EXPECT_TRUE(std::filesystem::exists(path));
+  // Nor any other file that is read, nor what an interrupted run has left.
+  const std::string kept = folder / "kept.bag.active";
+  std::ofstream(kept) << "a bag";
+  EXPECT_NE(messageOf([&] { OutputBag output(folder / "kept.bag", {path, kept}); }), "");
+  EXPECT_EQ(std::filesystem::file_size(kept), 5u);
 }
 
 TEST(OutputBag, SaysWhereTheWholeBagIsThatCannotHaveItsName) {

@@ -7,15 +7,19 @@ namespace calipso::bag {
 
 namespace fs = std::filesystem;
 
-OutputBag::OutputBag(const std::string& path, const std::string& input)
+OutputBag::OutputBag(const std::string& path, const std::vector<std::string>& inputs)
     : path_(path), active_path_(path + ".active"), bag_(std::make_unique<rosbag::Bag>()) {
   if (path.empty()) throw std::invalid_argument("the output bag's path is empty; give one");
   std::error_code none;
   if (!fs::path(path).has_filename() || fs::is_directory(path, none))
     throw std::invalid_argument(path + ": is a folder; give the path of the bag to be written");
-  if (fs::equivalent(path, input, none))
-    throw std::invalid_argument(path +
-                                ": is the bag that is read; give another path to be written");
+  for (const std::string& input : inputs) {
+    for (const std::string& written : {path_, active_path_}) {
+      if (fs::equivalent(written, input, none))
+        throw std::invalid_argument(written + ": is read; give another path to be written than " +
+                                    path);
+    }
+  }
   try {
     const fs::path folder = fs::path(path).parent_path();
     if (!folder.empty()) fs::create_directories(folder);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace calipso::bag {
 
@@ -14,9 +15,9 @@ namespace calipso::bag {
 // closed, or gone when nothing was written.
 class OutputBag {
  public:
-  // Makes missing folders. The path may not be that of the input, if there is one.
+  // Makes missing folders. Neither PATH nor PATH.active may be one of the files that are read.
   // @throw std::runtime_error when the file cannot be written
-  explicit OutputBag(const std::string& path, const std::string& input = "");
+  explicit OutputBag(const std::string& path, const std::vector<std::string>& inputs = {});
 
   ~OutputBag();
   OutputBag(const OutputBag&) = delete;

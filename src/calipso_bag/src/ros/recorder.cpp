@@ -27,7 +27,7 @@ std::string seconds(const ros::Time& stamp) { return std::to_string(stamp.toSec(
 Recorder::Recorder(ros::NodeHandle& nh, const Params& params)
     : params_(params),
       nh_(nh),
-      output_(params.output, params.input),
+      output_(params.output, params.inputs),
       writer_(output_),
       reporter_(nh, "recorder") {
   summary_.output = params.output;
@@ -214,12 +214,14 @@ void Recorder::run() {
 // What to do with the beginning of a run. Without any frame of it nothing stays.
 std::string Recorder::keepIncomplete() {
   if (edited_.empty()) return "";
+  std::string lacks;
   try {
     writer_.flushAll();
-  } catch (const std::exception&) {  // as on a full disk; what is written stays
+  } catch (const std::exception& error) {  // as on a full disk; what is written stays
+    lacks = std::string(" without the last of them (") + error.what() + ")";
   }
-  return "; the bag stays incomplete, with " + std::to_string(edited_.size()) +
-         " edited frames, as " + output_.path() + ".active";
+  return "; the bag stays incomplete, with " + std::to_string(edited_.size()) + " edited frames" +
+         lacks + ", as " + output_.path() + ".active";
 }
 
 void Recorder::recordClip() {

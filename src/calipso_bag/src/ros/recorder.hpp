@@ -32,11 +32,11 @@ namespace calipso::bag {
 class Recorder {
  public:
   struct Params {
-    std::string output;             // path of the bag
-    std::string input;              // path of the bag that is edited, which must stay; or none
-    Mode mode = Mode::kBag;         // live: record until stopped, instead of one clip
-    bool flow = true;               // also record the optical flow (8 bytes per pixel and frame)
-    double late_timeout_sec = 5.0;  // for what explains the last frames to arrive
+    std::string output;               // path of the bag
+    std::vector<std::string> inputs;  // paths of what is read, which must stay
+    Mode mode = Mode::kBag;           // live: record until stopped, instead of one clip
+    bool flow = true;                 // also record the optical flow (8 bytes per pixel and frame)
+    double late_timeout_sec = 5.0;    // for what explains the last frames to arrive
   };
 
   Recorder(ros::NodeHandle& nh, const Params& params);

@@ -14,6 +14,8 @@ cv::Rect grown(const cv::Rect& r, int margin) {
   return {r.x - margin, r.y - margin, r.width + 2 * margin, r.height + 2 * margin};
 }
 
+cv::Rect boxOf(const cv::Mat& mask) { return mask.empty() ? cv::Rect() : cv::boundingRect(mask); }
+
 // Bounding box of an object's pixels.
 cv::Rect boxOf(const cv::Mat& labels, int index) {
   if (index < 0) return {};  // the video does not have it
@@ -47,12 +49,15 @@ EditedRegion::EditedRegion(const StagedFrame& frame, const RestingLight& resting
     drawn |= box;
   }
   all |= resting.bounds() | resting.shadedBox() | moved.bounds;
-  if (!passing.empty()) all |= cv::boundingRect(passing);
-  if (!reflections.marks().empty())
-    all |= cv::boundingRect(reflections.marks() == Reflections::kChanged);
+  const cv::Mat& lost = frame.prepared.mirror.lost;
+  cv::Mat mirrored;
+  if (!reflections.marks().empty()) mirrored = reflections.marks() == Reflections::kChanged;
+  all |= boxOf(passing) | boxOf(mirrored);
   all &= frame.whole(), drawn &= all;
   const int margin = frame.params.background.mask_margin_px;
-  revealed = passing.empty() ? grown(shown | resting.footprints(), margin) & all : all;
+  revealed = grown(shown | resting.footprints(), margin) | boxOf(passing);
+  if (!mirrored.empty() && !lost.empty()) revealed |= boxOf(mirrored & lost);
+  revealed &= all;
 }
 
 }  // namespace calipso::render

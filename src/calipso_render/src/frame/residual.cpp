@@ -22,7 +22,7 @@ constexpr float kMostChange = 3.0f;
 // px around surfaces at rest in which their rims and what they take over lie
 constexpr int kCarried = 16;
 
-constexpr float kDark = 1e-5f;  // linear; a plate darker than that says nothing of its shadow
+constexpr float kDark = 1e-5f;  // linear: the least luminance that is divided by
 
 }  // namespace
 

@@ -17,7 +17,7 @@ class ShadedOthers {
   ShadedOthers(const StagedFrame& frame, const MovedShadow& moved, const RestingLight& resting);
 
   bool any() const { return any_; }
-  // Is the object in a slot in the way of the sun that falls on edited ones?
+  // May the object in a slot lie where edited ones change its sun?
   bool maybe(std::size_t slot) const { return maybe_[slot]; }
 
   // Darkens another object's own pixel where an edited object takes sun away that it had in the

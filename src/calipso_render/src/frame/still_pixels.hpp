@@ -24,7 +24,7 @@ class StillPixels {
   StillPixels(const StagedFrame& frame, const SeenPlace& place, const VisibilityBuffer& centre,
               const cv::Mat& removed);
 
-  // Everything moved.
+  // Everything moved, or nothing is to be kept.
   bool none() const { return parts_.empty(); }
   // Row of the region: 1 = nothing moved at the pixel. @pre !none()
   const float* row(int j) const { return parts_.ptr<float>(j); }

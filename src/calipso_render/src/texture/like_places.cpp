@@ -18,7 +18,7 @@ constexpr float kApart = 3.0f;  // spacings of texels: places nearer to each oth
 constexpr int kFewest = 30;     // places that tell whether others are like them
 // difference of two colours, of the brighter one, that light explains, and that none does
 constexpr float kSameColour = 0.15f, kOtherColour = 0.35f;
-// part of the places that look otherwise, from which the likeness counts less, and for nothing
+// part of the places that look otherwise, from which the likeness comes later, and last
 constexpr float kSomeDiffer = 0.15f, kTooManyDiffer = 0.5f;
 
 // Turns places about an axis into the quarter of a turn on either side of `middle`, back and forth,

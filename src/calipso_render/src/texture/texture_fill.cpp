@@ -121,7 +121,7 @@ class TextureFill {
     return placeOf(triangle, w, surface_.key_vertices, surface_.key_normals);
   }
 
-  // Places that look alike by the shape, as far as those do that are seen themselves.
+  // Places that look alike by the shape; those first that do where they are seen themselves.
   void findLike(const SurfaceTexture& texture, const Origins& origins) {
     like_ = mirroredPlaces(surface_);
     const std::size_t most = like_.size() + kMostTurned;
