@@ -232,7 +232,7 @@ float meanJump(const Relief& relief, const cv::Mat& mask) {
 
 SurfaceModel SurfaceModel::fit(const Relief& relief, const cv::Mat& samples, const cv::Mat& strokes,
                                double share, int components) {
-  constexpr int kTelling = 20;        // strokes of fewer pixels tell nothing
+  constexpr int kTelling = 20;        // strokes with fewer pixels of usable depth tell nothing
   constexpr double kOutliers = 0.05;  // of the surfaces there are, known to no model
   SurfaceModel model;
   const cv::Mat surfaces = samples & (relief.state == Relief::kSurface);
@@ -241,7 +241,8 @@ SurfaceModel SurfaceModel::fit(const Relief& relief, const cv::Mat& samples, con
     for (int x = 0; x < samples.cols; ++x)
       if (surfaces.at<uchar>(y, x)) all.push_back(relief.surface.at<cv::Vec3f>(y, x));
   // Samples that look alike may be the sky behind the object.
-  const bool told = !strokes.empty() && cv::countNonZero(strokes) >= kTelling;
+  const cv::Mat usable = relief.state != Relief::kUnusable;
+  const bool told = !strokes.empty() && cv::countNonZero(strokes & usable) >= kTelling;
   const cv::Mat& sure = told ? strokes : samples;
   const double none = cv::countNonZero(sure & (relief.state == Relief::kNone));
   const double some = cv::countNonZero(sure & (relief.state == Relief::kSurface));

@@ -103,6 +103,20 @@ TEST(SurfaceModel, StrokesTellThatALabelHasNoSky) {
   EXPECT_LT(told.cost(relief, 80, 60), believing.cost(relief, 80, 60));
 }
 
+TEST(SurfaceModel, StrokesWithoutUsableDepthTellNothing) {
+  cv::Mat depth = depthOfDisc(0);
+  depth.setTo(0.0f, maskOf(kSize, kDisc) == 0);
+  Relief relief = makeRelief(paint(kSize, kDisc, kGreen, kGrey, 2.0), depth);
+  const cv::Mat sky = maskOf(kSize, kDisc) == 0;
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  strokes(cv::Rect(0, 0, 30, 10)).setTo(255);
+  relief.state.setTo(Relief::kUnusable, strokes);
+  const SurfaceModel stroked = SurfaceModel::fit(relief, sky, strokes, 0.3, 4),
+                     sampled = SurfaceModel::fit(relief, sky, {}, 0.3, 4);
+  EXPECT_EQ(stroked.cost(relief, 5, 110), sampled.cost(relief, 5, 110));
+  EXPECT_EQ(stroked.someCost(), sampled.someCost());
+}
+
 // A picture in which colours tell nothing of the object's right half, and depth tells everything.
 TEST(Segmenter, DepthFindsWhatColoursDoNot) {
   const auto left = [](double u, double v) { return std::max(kDisc(u, v), u - 80.0); };

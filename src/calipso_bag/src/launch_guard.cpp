@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -12,7 +11,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
-#include <vector>
+#include <utility>
 
 namespace calipso::bag {
 namespace {
@@ -68,27 +67,35 @@ void dropEnded(std::vector<pid_t>& processes) {
   processes.erase(std::remove_if(processes.begin(), processes.end(), ended), processes.end());
 }
 
-// Asks them to end, and ends those that do not.
-void endAll(std::vector<pid_t> processes) {
-  using namespace std::chrono_literals;
-  constexpr auto kGrace = 15s;                                  // as roslaunch has it
-  for (const pid_t process : processes) kill(process, SIGINT);  // roscpp hears no other signal
-  const auto end = std::chrono::steady_clock::now() + kGrace;
+// Those that have not ended when the time is over.
+std::vector<pid_t> awaitEnd(std::vector<pid_t> processes, std::chrono::milliseconds time) {
+  const auto end = std::chrono::steady_clock::now() + time;
   for (dropEnded(processes); !processes.empty(); dropEnded(processes)) {
     if (std::chrono::steady_clock::now() > end) break;
-    std::this_thread::sleep_for(50ms);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  for (const pid_t process : processes) kill(process, SIGKILL);
+  return processes;
+}
+
+void signalAll(const std::vector<pid_t>& processes, int signal) {
+  for (const pid_t process : processes) kill(process, signal);
 }
 
 }  // namespace
+
+std::vector<pid_t> endAll(std::vector<pid_t> processes, std::chrono::milliseconds grace) {
+  signalAll(processes, SIGINT);  // roscpp hears no other signal
+  processes = awaitEnd(std::move(processes), grace);
+  signalAll(processes, SIGKILL);
+  return awaitEnd(std::move(processes), std::chrono::seconds(5));
+}
 
 void failLaunch() {
   const pid_t parent = getppid();
   if (!isRoslaunch(parent)) return;
   const std::vector<pid_t> others = siblings(parent);
   kill(parent, SIGKILL);
-  endAll(others);
+  endAll(others, std::chrono::seconds(15));  // as roslaunch has it
 }
 
 }  // namespace calipso::bag

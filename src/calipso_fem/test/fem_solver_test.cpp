@@ -1,4 +1,3 @@
-#include <dlfcn.h>
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -11,6 +10,9 @@
 #include "preconditioner.hpp"
 #include "thread_team.hpp"
 #include "threads.hpp"
+
+extern "C" void openblas_set_num_threads(int threads) __attribute__((weak));
+extern "C" int openblas_get_num_threads() __attribute__((weak));
 
 namespace calipso::fem {
 namespace {
@@ -147,15 +149,13 @@ TEST(Solver, SameBytesForAnyNumberOfThreads) {
 
 // Whoever factorises first, with or without a body.
 TEST(Solver, BlasHasOneThread) {
-  const auto set = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
-  const auto get = reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_num_threads"));
-  if (!set || !get) GTEST_SKIP() << "CHOLMOD stands on another BLAS than OpenBLAS";
-  set(2);
+  if (!openblas_set_num_threads) GTEST_SKIP() << "CHOLMOD stands on another BLAS than OpenBLAS";
+  openblas_set_num_threads(2);
   const auto cholesky = makeCholesky();
-  EXPECT_EQ(get(), 1);
-  set(2);
+  EXPECT_EQ(openblas_get_num_threads(), 1);
+  openblas_set_num_threads(2);
   const CondensedFactor condensed;
-  EXPECT_EQ(get(), 1);
+  EXPECT_EQ(openblas_get_num_threads(), 1);
 }
 
 TEST(Solver, MaterialChangeIsFollowed) {

@@ -34,6 +34,10 @@ void setRotation(Quaternion& msg, const Eigen::Matrix3d& rotation) {
 
 }  // namespace
 
+std::int64_t nanoseconds(const ros::Time& stamp) {
+  return static_cast<std::int64_t>(stamp.toNSec());
+}
+
 geometry_msgs::Point toPointMsg(const Eigen::Vector3d& p) {
   geometry_msgs::Point msg;
   msg.x = p.x();

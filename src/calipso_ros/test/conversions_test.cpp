@@ -14,6 +14,10 @@ Eigen::Isometry3d somePose() {
   return pose;
 }
 
+TEST(Conversions, stampsKeepEveryNanosecond) {
+  EXPECT_EQ(nanoseconds(ros::Time(1700000000, 123456789)), 1700000000123456789);
+}
+
 TEST(Conversions, posesRoundTrip) {
   constexpr double kRoundOff = 1e-14;  // matrix -> quaternion -> matrix
   EXPECT_TRUE(fromMsg(toMsg(somePose())).isApprox(somePose(), kRoundOff));

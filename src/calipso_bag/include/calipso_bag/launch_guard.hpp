@@ -1,5 +1,10 @@
 #pragma once
 
+#include <sys/types.h>
+
+#include <chrono>
+#include <vector>
+
 namespace calipso::bag {
 
 // Ends the roslaunch that started this process, so that its exit status is not 0.
@@ -10,5 +15,9 @@ namespace calipso::bag {
 // can then no longer stop, are asked to end; one that has not after as long as roslaunch would wait
 // is ended. Returns when none is left. Without such a parent this does nothing.
 void failLaunch();
+
+// Asks processes to end (SIGINT), and ends those that have not after `grace` (SIGKILL).
+// @return those that the system has not taken away 5 s after that: blocked in a device
+std::vector<pid_t> endAll(std::vector<pid_t> processes, std::chrono::milliseconds grace);
 
 }  // namespace calipso::bag

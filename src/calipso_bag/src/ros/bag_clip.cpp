@@ -62,8 +62,7 @@ BagClip::BagClip(const Params& params) : path_(params.path) {
     readCameraInfos();
     checkFrames();
   } catch (const rosbag::BagException& e) {
-    throw std::runtime_error(path_ + ": damaged (" + e.what() +
-                             "); recover what is readable with 'rosbag reindex'");
+    throw damaged(path_, e);
   }
 }
 

@@ -13,13 +13,18 @@ namespace calipso::bag {
 namespace {
 
 // BGR of an image message of either kind; what carries no colour is shown as grey.
-cv_bridge::CvImagePtr decode(const rosbag::MessageInstance& message) {
-  if (const auto compressed = message.instantiate<sensor_msgs::CompressedImage>()) {
-    return cv_bridge::toCvCopy(*compressed, "bgr8");
-  }
+// @throw std::runtime_error starting with `who` for any other message or encoding
+cv_bridge::CvImagePtr decode(const rosbag::MessageInstance& message, const std::string& who) {
+  const auto compressed = message.instantiate<sensor_msgs::CompressedImage>();
   const auto image = message.instantiate<sensor_msgs::Image>();
-  if (!image) throw std::runtime_error("not an image");
-  return cv_bridge::toCvCopy(*image, "bgr8");
+  if (!compressed && !image)
+    throw std::runtime_error(who + message.getDataType() + "; give a topic of pictures");
+  try {
+    return compressed ? cv_bridge::toCvCopy(*compressed, "bgr8")
+                      : cv_bridge::toCvCopy(*image, "bgr8");
+  } catch (const std::exception& error) {
+    throw std::runtime_error(who + error.what() + "; give a topic of pictures in colour or grey");
+  }
 }
 
 }  // namespace
@@ -29,16 +34,15 @@ void forEachImage(const std::string& bag_path, const std::string& topic,
   const std::string who = bag_path + ", topic " + topic + ": ";
   rosbag::Bag bag;
   openForReading(bag, bag_path);
-  rosbag::View view(bag, rosbag::TopicQuery(topic));
-  if (view.size() == 0) throw std::runtime_error(who + "no message; see 'rosbag info'");
-  for (const rosbag::MessageInstance& message : view) {
-    cv_bridge::CvImagePtr image;
-    try {
-      image = decode(message);
-    } catch (const std::exception& error) {
-      throw std::runtime_error(who + error.what() + "; give a topic of pictures");
+  try {
+    rosbag::View view(bag, rosbag::TopicQuery(topic));
+    if (view.size() == 0) throw std::runtime_error(who + "no message; see 'rosbag info'");
+    for (const rosbag::MessageInstance& message : view) {
+      const cv_bridge::CvImagePtr image = decode(message, who);
+      use(image->image, image->header.stamp);
     }
-    use(image->image, image->header.stamp);
+  } catch (const rosbag::BagException& error) {
+    throw damaged(bag_path, error);
   }
 }
 

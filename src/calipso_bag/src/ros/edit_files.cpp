@@ -8,6 +8,7 @@
 
 #include "calipso_ros/conversions.hpp"
 #include "calipso_scene/edit.hpp"
+#include "open_bag.hpp"
 
 namespace calipso::bag {
 namespace {
@@ -36,7 +37,8 @@ std::vector<calipso_msgs::Edit> readBag(const std::string& path, const Scene& sc
                                         const ros::Time& first_stamp) {
   std::vector<calipso_msgs::Edit> edits;
   std::vector<std::string> names = objectNames(scene);
-  rosbag::Bag bag(path, rosbag::bagmode::Read);
+  rosbag::Bag bag;
+  openForReading(bag, path);
   rosbag::View view(bag, rosbag::TypeQuery("calipso_msgs/EditReport"));
   for (const rosbag::MessageInstance& message : view) {
     const auto report = message.instantiate<calipso_msgs::EditReport>();
@@ -59,8 +61,7 @@ std::vector<calipso_msgs::Edit> readEdits(const std::string& path, const Scene& 
   try {
     return readBag(path, scene, first_stamp);
   } catch (const rosbag::BagException& e) {
-    throw std::runtime_error(path + ": cannot be read as a bag of edits (" + e.what() +
-                             "); give an edited bag or a YAML file");
+    throw damaged(path, e);
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument(path + ": " + e.what());
   }

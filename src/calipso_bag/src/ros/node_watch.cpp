@@ -2,14 +2,13 @@
 
 #include <utility>
 
+#include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
 
 namespace calipso::bag {
 namespace {
 
 constexpr char kEnded[] = "its process ended";
-
-std::int64_t nanoseconds(const ros::Time& time) { return static_cast<std::int64_t>(time.toNSec()); }
 
 }  // namespace
 

@@ -1,7 +1,5 @@
 #include "open_bag.hpp"
 
-#include <stdexcept>
-
 namespace calipso::bag {
 
 void openForReading(rosbag::Bag& bag, const std::string& path) {
@@ -15,6 +13,12 @@ void openForReading(rosbag::Bag& bag, const std::string& path) {
     throw std::runtime_error(path + ": cannot be read as a bag (" + e.what() +
                              "); check the path, or recover it with 'rosbag reindex'");
   }
+}
+
+std::runtime_error damaged(const std::string& path, const rosbag::BagException& error) {
+  return std::runtime_error(path + ": damaged (" + error.what() +
+                            "); copy it anew, or keep what comes before the damage with "
+                            "'rosbag reindex -f'");
 }
 
 }  // namespace calipso::bag

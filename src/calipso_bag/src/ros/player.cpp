@@ -10,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
 #include "clip_checks.hpp"
@@ -40,12 +41,11 @@ std::vector<std::string> common(const std::vector<std::string>& a,
 std::vector<PlayedFrame> scheduleOf(const BagClip& clip,
                                     const std::vector<calipso_msgs::Edit>& edits) {
   std::vector<std::int64_t> frames;
-  for (const ros::Time& stamp : clip.stamps())
-    frames.push_back(static_cast<std::int64_t>(stamp.toNSec()));
+  for (const ros::Time& stamp : clip.stamps()) frames.push_back(nanoseconds(stamp));
   std::vector<TimeScale> scales;
   for (const calipso_msgs::Edit& edit : edits) {
     if (edit.kind != calipso_msgs::Edit::TIME_SCALE) continue;
-    scales.push_back({static_cast<std::int64_t>(edit.header.stamp.toNSec()), edit.factor});
+    scales.push_back({nanoseconds(edit.header.stamp), edit.factor});
   }
   return playSchedule(frames, scales);
 }
@@ -283,7 +283,7 @@ void Player::playFrames() {
 }
 
 void Player::playFrame(const BagFrame& frame, const ros::Time& stamp) {
-  window_.sent(static_cast<std::int64_t>(stamp.toNSec()));
+  window_.sent(nanoseconds(stamp));
   if (stamp == frame.image->header.stamp) {
     camera_info_.publish(frame.info);
     image_.publish(frame.image);
@@ -321,7 +321,7 @@ void Player::waitForEdited(const std::function<bool()>& done) {
 }
 
 void Player::onEdited(const sensor_msgs::CameraInfoConstPtr& info) {
-  window_.cameBack(static_cast<std::int64_t>(info->header.stamp.toNSec()));
+  window_.cameBack(nanoseconds(info->header.stamp));
   showProgress();
 }
 

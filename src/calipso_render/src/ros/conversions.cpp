@@ -95,7 +95,7 @@ PosesByStamp posesFromMsg(const calipso_msgs::ClipDynamics& dynamics,
                           const std::vector<ObjectModel>& models) {
   PosesByStamp poses;
   for (const calipso_msgs::Dynamics& frame : dynamics.frames) {
-    std::vector<ObjectPose>& here = poses[static_cast<std::int64_t>(frame.header.stamp.toNSec())];
+    std::vector<ObjectPose>& here = poses[nanoseconds(frame.header.stamp)];
     for (const calipso_msgs::ObjectDynamics& o : frame.objects) {
       const auto model = std::find_if(models.begin(), models.end(),
                                       [&](const ObjectModel& m) { return m.name == o.object; });

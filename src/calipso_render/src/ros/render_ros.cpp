@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
 #include "conversions.hpp"
 
@@ -102,11 +103,7 @@ void RenderNode::pairClipFrames(const ros::Time& segmented) {
 
 void RenderNode::addClipFrame(const Frame& frame, const cv::Mat& labels) {
   try {
-    clip_.add({bgrFromMsg(*frame.image),
-               labels,
-               frame.camera,
-               {},
-               static_cast<std::int64_t>(frame.stamp().toNSec())});
+    clip_.add({bgrFromMsg(*frame.image), labels, frame.camera, {}, nanoseconds(frame.stamp())});
   } catch (const std::exception& error) {
     reporter_.warn(frame.stamp(),
                    std::string("clip frame left out of the background: ") + error.what());
@@ -304,7 +301,7 @@ void RenderNode::edit(const Waiting& frame, const calipso_msgs::SimulationState&
       input.bgr = bgrFromMsg(*frame.image);
       input.labels = labels_.at(stamp);
       input.camera = *frame.camera;
-      input.stamp_ns = static_cast<std::int64_t>(stamp.toNSec());
+      input.stamp_ns = nanoseconds(stamp);
       const FrameOutput output = renderer_->composite(input);
       publish(frame, editedMsg(*frame.image, output), output.provenance);
     }

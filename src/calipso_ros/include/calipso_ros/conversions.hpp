@@ -10,6 +10,7 @@
 #include <sensor_msgs/CameraInfo.h>
 
 #include <Eigen/Geometry>
+#include <cstdint>
 
 #include "calipso_scene/camera.hpp"
 #include "calipso_scene/edit.hpp"
@@ -18,6 +19,9 @@
 // Pure functions between messages and the plain types of calipso_scene. Each fromMsg undoes its
 // toMsg.
 namespace calipso {
+
+// As the cores hold stamps: counted from ROS time 0.
+std::int64_t nanoseconds(const ros::Time& stamp);
 
 geometry_msgs::Point toPointMsg(const Eigen::Vector3d& p);
 geometry_msgs::Vector3 toVectorMsg(const Eigen::Vector3d& v);

@@ -1,0 +1,59 @@
+#include "calipso_bag/launch_guard.hpp"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace calipso::bag {
+namespace {
+
+using std::chrono_literals::operator""ms;
+using std::chrono_literals::operator""s;
+
+// A process that waits for signals; SIGINT ends it, or is not heard. It exists with that choice
+// made: the mask is set before it is forked off.
+pid_t startWaiting(bool stubborn) {
+  sigset_t interrupt, before;
+  sigemptyset(&interrupt);
+  sigaddset(&interrupt, SIGINT);
+  if (stubborn) sigprocmask(SIG_BLOCK, &interrupt, &before);
+  const pid_t process = fork();
+  if (process == 0) {
+    while (true) pause();
+  }
+  if (stubborn) sigprocmask(SIG_SETMASK, &before, nullptr);
+  return process;
+}
+
+// The signal that has ended a process; 0 while it runs.
+int endedBy(pid_t process) {
+  int status = 0;
+  if (waitpid(process, &status, WNOHANG) != process || !WIFSIGNALED(status)) return 0;
+  return WTERMSIG(status);
+}
+
+TEST(LaunchGuard, ProcessesThatListenAreAsked) {
+  const pid_t process = startWaiting(false);
+  EXPECT_TRUE(endAll({process}, 60s).empty());
+  EXPECT_EQ(endedBy(process), SIGINT);
+}
+
+TEST(LaunchGuard, ReturnsWhenStubbornProcessesHaveEnded) {
+  const std::vector<pid_t> processes = {startWaiting(true), startWaiting(false)};
+  EXPECT_TRUE(endAll(processes, 100ms).empty());
+  EXPECT_EQ(endedBy(processes[0]), SIGKILL);
+  EXPECT_EQ(endedBy(processes[1]), SIGINT);
+}
+
+// Whoever runs this test was not started by roslaunch.
+TEST(LaunchGuard, WithoutRoslaunchNothingIsEnded) {
+  const pid_t sibling = startWaiting(false);
+  failLaunch();
+  EXPECT_EQ(endedBy(sibling), 0);
+  endAll({sibling}, 60s);
+  EXPECT_EQ(endedBy(sibling), SIGINT);
+}
+
+}  // namespace
+}  // namespace calipso::bag
