@@ -5,12 +5,13 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
+#include "noise_mask.hpp"
+
 namespace calipso::render {
 namespace {
 
-constexpr double kMedianToSigma = 1.4826;  // of a normal distribution's median absolute value
-constexpr int kFewestSamples = 64;         // per knot; below that the neighbours decide
-constexpr int kHistogram = 512;            // of absolute differences, in 1/8 code value
+constexpr int kFewestSamples = 64;  // per knot; below that the neighbours decide
+constexpr int kHistogram = 512;     // of absolute differences, in 1/8 code value
 // from a knot to the next, at most: shot noise hardly changes in code values, read noise grows in
 // the dark
 constexpr float kGrowsBrighter = 1.25f, kGrowsDarker = 2.5f;
@@ -93,16 +94,15 @@ void addPairs(const cv::Mat& first, const cv::Mat& second, const cv::Mat& steady
   }
 }
 
-// Immerkaer's mask cancels everything that is linear in the picture; its noise gain is 6.
 void addDetail(const cv::Mat& frame, int channel, Differences& differences) {
   cv::Mat plane, detail;
   cv::extractChannel(frame, plane, channel);
-  const cv::Mat kernel = (cv::Mat_<float>(3, 3) << 1, -2, 1, -2, 4, -2, 1, -2, 1);
-  cv::filter2D(plane, detail, CV_32F, kernel);
+  cv::filter2D(plane, detail, CV_32F, noiseMask());
   for (int v = 1; v + 1 < frame.rows; ++v) {
     for (int u = 1; u + 1 < frame.cols; ++u) {
       const int code = plane.at<std::uint8_t>(v, u);
-      if (!isClipped(code)) differences.add(code, std::abs(detail.at<float>(v, u)) / 6.0);
+      if (!isClipped(code))
+        differences.add(code, std::abs(detail.at<float>(v, u)) / kNoiseMaskGain);
     }
   }
 }

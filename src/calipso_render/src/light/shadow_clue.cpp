@@ -68,8 +68,11 @@ std::optional<cv::Vec3f> unshaded(const EmptyPlace& place,
   const cv::Point nearest(static_cast<int>(std::lround(uv.x())),
                           static_cast<int>(std::lround(uv.y())));
   if (place.plate.spread.at<float>(nearest) >= kQuiet) return std::nullopt;
-  const cv::Rect mixed(static_cast<int>(uv.x()), static_cast<int>(uv.y()), 2, 2);
-  if (cv::countNonZero(place.plate.count(mixed) < kFewestFrames) > 0) return std::nullopt;
+  const std::uint8_t* above = place.plate.count.ptr<std::uint8_t>(static_cast<int>(uv.y()));
+  const std::uint8_t* below = place.plate.count.ptr<std::uint8_t>(static_cast<int>(uv.y()) + 1);
+  const int u = static_cast<int>(uv.x());  // the value is one of four pixels, mixed
+  if (std::min({above[u], above[u + 1], below[u], below[u + 1]}) < kFewestFrames)
+    return std::nullopt;
   const float depth = place.depth.empty() ? 0.0f : place.depth.at<float>(nearest);
   if (depth > 0.0f && std::abs(depth - p.z()) > kOffPlane * p.z()) return std::nullopt;
   return between(place.plate.plate, uv);

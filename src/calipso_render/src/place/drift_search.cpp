@@ -104,8 +104,9 @@ std::optional<cv::Point2f> guess(const DriftPicture& from, const DriftPicture& t
   const int cell = std::max(kCoarse, from.grey.cols / kColumns);
   const auto way = guess(coarse(from, cell), coarse(to, cell), {0, 0}, from.grey.cols / cell / 3);
   if (!way) return std::nullopt;
-  const auto finer = guess(coarse(from, kCoarse), coarse(to, kCoarse), *way * cell / kCoarse,
-                           cell == kCoarse ? 0 : cell / kCoarse + 1);
+  if (cell == kCoarse) return *way * kCoarse;
+  const auto finer =
+      guess(coarse(from, kCoarse), coarse(to, kCoarse), *way * cell / kCoarse, cell / kCoarse + 1);
   return finer ? std::optional<cv::Point2f>(*finer * kCoarse) : std::nullopt;
 }
 

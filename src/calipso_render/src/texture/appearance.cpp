@@ -38,15 +38,15 @@ float rimTrust(float depth) {
   return std::clamp((depth - 1.0f) / 1.5f, 0.05f, 1.0f);
 }
 
-cv::Mat trustOf(const cv::Mat& labels, int index) {
+// @param region holds the object's mask and a pixel around it, as far as they lie in the picture
+cv::Mat trustOf(const cv::Mat& labels, int index, const cv::Rect& region) {
   cv::Mat padded, depth;
-  cv::copyMakeBorder(labels == index, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
+  cv::copyMakeBorder(labels(region) == index, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
   cv::distanceTransform(padded, depth, cv::DIST_L2, 5);
-  depth = depth(cv::Rect(1, 1, labels.cols, labels.rows));
-  cv::Mat trust = cv::Mat::zeros(labels.size(), CV_32F);
-  for (int v = 0; v < labels.rows; ++v) {
-    for (int u = 0; u < labels.cols; ++u) {
-      const float d = depth.at<float>(v, u);
+  cv::Mat trust = cv::Mat::zeros(region.size(), CV_32F);
+  for (int v = 0; v < region.height; ++v) {
+    for (int u = 0; u < region.width; ++u) {
+      const float d = depth.at<float>(v + 1, u + 1);
       if (d > 0.0f) trust.at<float>(v, u) = rimTrust(d);
     }
   }
@@ -187,7 +187,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   r.clear = clearOf(view.picture(r.region), shaded.glint);
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);
-  r.trust = trustOf(view.labels, actor.surface->index)(r.region).clone();
+  r.trust = trustOf(view.labels, actor.surface->index, r.region);
   r.albedo = cv::Mat(r.region.size(), CV_32FC3, cv::Scalar::all(0));
   for (int v = 0; v < r.region.height; ++v) {
     for (int u = 0; u < r.region.width; ++u) {
@@ -209,6 +209,21 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
                    kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
   takeOutFalseShade({shaded.light, shaded.open, r.trust}, floor, r.albedo);
   return r;
+}
+
+std::vector<ShadowMap> sunsOver(const std::vector<View>& views, const Light& light) {
+  std::vector<std::optional<ShadowMap>> maps(views.size());
+#pragma omp parallel for schedule(dynamic, 1) if (views.size() > 1)
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    std::vector<Occluder> occluders;
+    for (const Actor& a : views[i].actors)
+      occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+    maps[i].emplace(occluders, light.direction.cast<double>(),
+                    ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
+  }
+  std::vector<ShadowMap> suns;
+  for (std::optional<ShadowMap>& map : maps) suns.push_back(std::move(*map));
+  return suns;
 }
 
 cv::Vec3f meanReflectance(const Reflectance& r) {
@@ -241,18 +256,20 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
   a.key_camera = views[0].camera;
   std::vector<const View*> used;
   std::vector<const Actor*> actors;
-  std::vector<Reflectance> pictures;
-  for (std::size_t i = 0; i < (moves ? views.size() : 1); ++i) {
-    used.push_back(&views[i]);
-    actors.push_back(&views[i].actors[object]);
-    const std::optional<cv::Vec3f> mean = i == 0 ? std::nullopt : std::make_optional(a.mean_light);
-    if (i == 0)
-      a.thrown_back = thrownBack(meanReflectance(
-          reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, thrownBack({}))));
-    pictures.push_back(
-        reflectanceIn(views[i], *actors.back(), light, gloss, suns[i], mean, a.thrown_back));
-    if (i == 0) a.mean_light = pictures[0].mean_light;
-  }
+  for (std::size_t i = 0; i < (moves ? views.size() : 1); ++i)
+    used.push_back(&views[i]), actors.push_back(&views[i].actors[object]);
+  std::vector<Reflectance> pictures(used.size());
+  const auto see = [&](std::size_t i, const std::optional<cv::Vec3f>& mean_light) {
+    pictures[i] =
+        reflectanceIn(*used[i], *actors[i], light, gloss, suns[i], mean_light, a.thrown_back);
+  };
+  a.thrown_back = thrownBack({});
+  see(0, std::nullopt);
+  a.thrown_back = thrownBack(meanReflectance(pictures[0]));
+  see(0, std::nullopt);
+  a.mean_light = pictures[0].mean_light;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 1; i < used.size(); ++i) see(i, a.mean_light);
   a.region = pictures[0].region;
   a.albedo = widened(pushPull(pictures[0].albedo, pictures[0].trust));
   for (Reflectance& r : pictures) r.albedo = widened(r.albedo);
@@ -266,14 +283,7 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
 std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<bool>& moves, const Light& light,
                                         const std::vector<Gloss>& glosses) {
-  std::vector<ShadowMap> suns;
-  for (const View& view : views) {
-    std::vector<Occluder> occluders;
-    for (const Actor& a : view.actors)
-      occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-    suns.emplace_back(occluders, light.direction.cast<double>(),
-                      ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
-  }
+  const std::vector<ShadowMap> suns = sunsOver(views, light);
   std::vector<Appearance> appearances(moves.size());
 #pragma omp parallel for schedule(dynamic, 1) if (moves.size() > 1)
   for (std::size_t i = 0; i < moves.size(); ++i)

@@ -26,7 +26,8 @@ Sightings::Sightings(const SeenObject& object) : views_(object.views), pictures_
   two_sided_ = std::any_of(surface.edges.begin(), surface.edges.end(),
                            [](const MeshEdge& e) { return e.b < 0; });
   for (const View* v : views_)
-    camera_from_world_.push_back(v->camera.world_from_camera.inverse().cast<float>());
+    camera_from_world_.push_back(v->camera.world_from_camera.inverse().cast<float>()),
+        axes_.push_back(v->camera.world_from_camera.linear().cast<float>());
   key_depth_ = std::max(1e-6f, (camera_from_world_[0] * surface.key_vertices.front()).z());
   parts_ = connectedParts(surface.key_vertices, surface.triangles);
 }
@@ -62,8 +63,8 @@ float Sightings::trustAround(std::size_t view, const Sighting& look, Accepts acc
   for (int y = std::max(0, v - 1); y <= std::min(r.region.height - 1, v + 1); ++y) {
     for (int x = std::max(0, u - 1); x <= std::min(r.region.width - 1, u + 1); ++x) {
       const cv::Point pixel(x, y);
-      if (r.nearness.at<float>(pixel) > 0.0f && accepts(pixel))
-        trust = std::max(trust, r.trust.at<float>(pixel));
+      const float here = r.trust.at<float>(pixel);
+      if (here > trust && r.nearness.at<float>(pixel) > 0.0f && accepts(pixel)) trust = here;
     }
   }
   return trust;
@@ -71,13 +72,11 @@ float Sightings::trustAround(std::size_t view, const Sighting& look, Accepts acc
 
 Sighting Sightings::lookAt(std::size_t view, const Place& place, float before) const {
   const Eigen::Vector3f q = camera_from_world_[view] * place.point;
-  const auto pixel = pixelOf(view, q);
-  if (!pixel) return {};
-  const float facing =
-      -place.normal.dot(views_[view]->camera.world_from_camera.linear().cast<float>() * q) /
-      q.norm();
+  const float facing = -place.normal.dot(axes_[view] * q) / q.norm();
   const float cosine = two_sided_ ? std::abs(facing) : facing;
   if (cosine < kFlattest) return {};
+  const auto pixel = pixelOf(view, q);
+  if (!pixel) return {};
   Sighting look = *pixel;
   const float trust = trustAround(view, look, [&](const cv::Point& pixel) {
     const Reflectance& r = pictures_[view];

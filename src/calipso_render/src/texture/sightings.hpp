@@ -52,6 +52,7 @@ class Sightings {
   const std::vector<const View*>& views_;
   const std::vector<Reflectance>& pictures_;
   std::vector<Eigen::Isometry3f> camera_from_world_;
+  std::vector<Eigen::Matrix3f> axes_;  // of the cameras, in the world
   std::vector<int> parts_;
   float extent_ = 0.0f, key_depth_ = 1.0f;
   bool two_sided_ = false;  // an open sheet is seen from both sides

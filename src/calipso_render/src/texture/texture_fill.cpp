@@ -51,6 +51,14 @@ struct Layers {
   }
 };
 
+// How one of the pictures shows a place.
+struct Look {
+  int view;
+  float u, v;    // in Reflectance::region
+  float weight;  // Sighting::weight
+  float share;   // in the place's colour, against other looks at it
+};
+
 class TextureFill {
  public:
   explicit TextureFill(const SeenObject& object)
@@ -68,6 +76,7 @@ class TextureFill {
     Origins origins(a.texture.size());
     for (const Reflectance& r : pictures_) shown_.push_back(r.albedo);
     shown_[0] = a.albedo;
+    findLooks(a.texture);
     makeTexels(a.texture, origins);
     findLike(a.texture, origins);
     if (views_.size() > 1) {
@@ -100,12 +109,50 @@ class TextureFill {
     explicit Origins(std::size_t texels) : from(texels), certain(texels), layer(texels) {}
   };
 
-  void makeTexels(SurfaceTexture& texture, Origins& origins) const {
-#pragma omp parallel for schedule(static)
+  // How the pictures show a triangle's texels: the looks at texel i, of the triangle's, end at
+  // ends[i].
+  struct Looks {
+    std::vector<Look> all;
+    std::vector<std::size_t> ends;
+  };
+
+  void findLooks(const SurfaceTexture& texture) {
+    looks_.resize(texture.triangleCount());
+#pragma omp parallel for schedule(dynamic, 64)
     for (int t = 0; t < texture.triangleCount(); ++t) {
-      for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i)
-        origins.from[i] = texelAt(t, texture.weightsOf(t, i - texture.firstOf(t)),
-                                  texture.texels[i], origins.certain[i], origins.layer[i]);
+      const std::size_t texels = texture.firstOf(t + 1) - texture.firstOf(t);
+      Looks& looks = looks_[t];
+      looks.ends.reserve(texels);
+      for (std::size_t i = 0; i < texels; ++i) {
+        addLooks(t, texture.weightsOf(t, i), looks.all);
+        looks.ends.push_back(looks.all.size());
+      }
+    }
+  }
+
+  // Of the pictures that show a place, those count most that show it in most detail, and not in a
+  // highlight: the light tells that too badly to be taken off without a trace.
+  void addLooks(int triangle, const Eigen::Vector3f& w, std::vector<Look>& looks) const {
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      const Sighting l = sightings_.lookAt(
+          i, placeOf(triangle, w, actors_[i]->vertices, actors_[i]->normals), 1.0f);
+      if (l.weight <= 0.0f) continue;
+      const float telling = l.detail * sightings_.clearAt(i, l);
+      looks.push_back({static_cast<int>(i), l.u, l.v, l.weight,
+                       l.weight * l.weight * l.weight * telling * telling});
+    }
+  }
+
+  void makeTexels(SurfaceTexture& texture, Origins& origins) const {
+#pragma omp parallel for schedule(dynamic, 64)
+    for (int t = 0; t < texture.triangleCount(); ++t) {
+      const Looks& looks = looks_[t];
+      const std::size_t first = texture.firstOf(t);
+      std::size_t begin = 0;
+      for (std::size_t i = 0; i < looks.ends.size(); begin = looks.ends[i++])
+        origins.from[first + i] = texelAt(
+            t, texture.weightsOf(t, i), looks.all.data() + begin, looks.all.data() + looks.ends[i],
+            texture.texels[first + i], origins.certain[first + i], origins.layer[first + i]);
     }
   }
 
@@ -147,22 +194,16 @@ class TextureFill {
     keepBest(most, like_);
   }
 
-  // Of the pictures that show a place, those count most that show it in most detail, and not in a
-  // highlight: the light tells that too badly to be taken off without a trace.
-  // @param certain, layer out: of Origins
-  From texelAt(int triangle, const Eigen::Vector3f& w, cv::Vec4f& texel, float& certain,
-               signed char& layer) const {
+  // @param look, end the looks at the place. @param certain, layer out: of Origins
+  From texelAt(int triangle, const Eigen::Vector3f& w, const Look* look, const Look* end,
+               cv::Vec4f& texel, float& certain, signed char& layer) const {
     cv::Vec3f sum;
     float total = 0.0f, shares = 0.0f, key = 0.0f, key_share = 0.0f;
-    for (std::size_t i = 0; i < views_.size(); ++i) {
-      const Sighting l = sightings_.lookAt(
-          i, placeOf(triangle, w, actors_[i]->vertices, actors_[i]->normals), 1.0f);
-      if (l.weight <= 0.0f) continue;
-      const float weight = l.weight * l.weight * l.weight,
-                  telling = l.detail * sightings_.clearAt(i, l), share = weight * telling * telling;
-      sum += colourOf(sampleBicubic(shown_[i], l.u, l.v)) * share;
-      total += weight * (i == 0 ? 1.0f : kFurther), shares += share;
-      if (i == 0) key = l.weight, key_share = share;
+    for (; look != end; ++look) {
+      sum += colourOf(sampleBicubic(shown_[look->view], look->u, look->v)) * look->share;
+      total += look->weight * look->weight * look->weight * (look->view == 0 ? 1.0f : kFurther);
+      shares += look->share;
+      if (look->view == 0) key = look->weight, key_share = look->share;
     }
     if (shares > 0.0f) sum *= 1.0f / shares, key_share *= 1.0f / shares;
     Layers layers;
@@ -186,6 +227,7 @@ class TextureFill {
       layers.add(part > 0.0f ? colourOf(sampleBicubic(shown_[0], l.u, l.v)) : cv::Vec3f(), part);
     };
     for (const LikePlace& like : like_) {
+      if (layers.open == 0.0f) return;
       const Sighting l = sightings_.lookAt(0, like.of(place), kOffSurface);
       add(l, smoothStep(kPoor, kGood, l.weight));
     }
@@ -265,6 +307,7 @@ class TextureFill {
   const std::vector<Reflectance>& pictures_;
   const Surface& surface_;
   const Sightings sightings_;
+  std::vector<Looks> looks_;     // per triangle
   std::vector<LikePlace> like_;  // best first; none before findLike()
   std::vector<cv::Mat>
       shown_;  // per picture, CV_32FC4: the reflectance that the texture is made of

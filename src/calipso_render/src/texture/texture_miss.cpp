@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
+#include "noise_mask.hpp"
 
 namespace calipso::render {
 namespace {
@@ -12,7 +13,6 @@ namespace {
 constexpr float kCertain = 0.9f;      // trust, and clearness, of pixels that grain is measured at
 constexpr std::size_t kFewest = 500;  // of them
 constexpr float kLeast = 1e-4f;       // reflectance that is told from none
-constexpr float kMedianToSigma = 1.4826f;  // of a normal distribution's median absolute value
 
 // The picture's reflectance as the texture has it. CV_32FC4, the picture's own beside the object.
 cv::Mat drawnInto(const Reflectance& picture, const Actor& actor, const SurfaceTexture& texture) {
@@ -70,15 +70,13 @@ cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor&
 }
 
 float grainOf(const SeenObject& object, const SurfaceTexture& texture) {
-  // Immerkaer's mask, which cancels everything that is linear in the picture, for unit noise.
-  const cv::Mat kernel = (cv::Mat_<float>(3, 3) << 1, -2, 1, -2, 4, -2, 1, -2, 1) / 6.0f;
   std::vector<float> details;
   for (std::size_t i = 0; i < object.views.size(); ++i) {
     const Reflectance& picture = object.pictures[i];
     cv::Mat certain, detail;
     const cv::Mat missed = missedCodes(object.views[i]->picture, picture,
                                        drawnInto(picture, *object.actors[i], texture), certain);
-    cv::filter2D(missed, detail, CV_32F, kernel);
+    cv::filter2D(missed, detail, CV_32F, noiseMask());
     cv::erode(certain, certain, cv::Mat::ones(3, 3, CV_8U));
     for (int v = 0; v < detail.rows; ++v) {
       for (int u = 0; u < detail.cols; ++u) {
@@ -91,7 +89,7 @@ float grainOf(const SeenObject& object, const SurfaceTexture& texture) {
   if (details.size() < 3 * kFewest) return 0.0f;
   const auto middle = details.begin() + static_cast<std::ptrdiff_t>(details.size() / 2);
   std::nth_element(details.begin(), middle, details.end());
-  return kMedianToSigma * *middle;
+  return kMedianToSigma / kNoiseMaskGain * *middle;
 }
 
 }  // namespace calipso::render
