@@ -259,6 +259,30 @@ TEST(LiveFill, StaysAsBrightAsItsSurroundingsWhenItsOriginDarkens) {
   EXPECT_NEAR(middle[0], before, 2.0);
 }
 
+// What of the deviation of noise and stripes, `amplitude` high, a copy has.
+double contrastLeft(LiveCase c, float noise, int amplitude) {
+  cv::Mat noisy = cv::Mat(c.frame.size(), CV_8UC3);
+  cv::RNG(5).fill(noisy, cv::RNG::NORMAL, cv::Scalar::all(100), cv::Scalar::all(noise));
+  for (int u = 0; u < noisy.cols; u += 4) noisy.colRange(u, u + 2) += cv::Scalar::all(amplitude);
+  const LiveFill::Corrections corrections = c.fill.corrections(noisy, c.labels);
+  cv::Mat filled(30, 30, CV_32F);
+  for (int v = 0; v < 30; ++v) {
+    for (int u = 0; u < 30; ++u) {
+      cv::Vec3f colour;
+      EXPECT_TRUE(c.fill.at(noisy, c.labels, corrections, noise, 75 + u, 15 + v, colour));
+      filled.at<float>(v, u) = colour[1];
+    }
+  }
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(filled.colRange(10, 20), mean, deviation);  // the seams' corrections have faded
+  return deviation[0] / std::hypot(0.5 * amplitude, noise);
+}
+
+TEST(LiveFill, TakesNoiseOffAndLeavesTexture) {
+  EXPECT_LT(contrastLeft(LiveCase(0), 2.0f, 0), 0.5);
+  EXPECT_GT(contrastLeft(LiveCase(0), 2.0f, 8), 0.5);  // 1 - 2 * 4 / (16 + 4)
+}
+
 TEST(LiveFill, HasNothingWhereTheFrameHidesTheOrigin) {
   LiveCase c(0);
   c.labels(cv::Rect(10, 15, 30, 30)).setTo(2);

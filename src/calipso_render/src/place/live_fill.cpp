@@ -10,6 +10,7 @@ namespace {
 constexpr int kMean = 3;             // px around a place whose mean colour is compared
 constexpr int kSmooth = 3;           // px around a copied place over which noise is averaged
 constexpr float kNoiseReach = 6.0f;  // deviations of noise
+constexpr float kNoiseTwice = 2.0f;  // times that its variance is in a copy once noise is put back
 constexpr float kFade = 7.0f;        // px over which a correction fades
 constexpr float kFarthest = 30.0f;   // px
 constexpr float kEdge = 30.0f;       // code values; what differs by much more is an edge of things
@@ -34,21 +35,30 @@ bool meanAround(const cv::Mat& bgr, const cv::Mat& labels, const cv::Point& p, c
   return count > 0;
 }
 
-// Mean of the neighbours that differ by no more than noise does (sigma filter, Lee 1983).
+// Mean of the neighbours that differ by no more than noise does (sigma filter, Lee 1983), and of
+// what the pixel differs from it the part by which they spread more than noise (Lee 1980): texture
+// stays.
 cv::Vec3f denoised(const cv::Mat& bgr, const cv::Mat& labels, const cv::Point& p, float noise) {
   const cv::Vec3b own = bgr.at<cv::Vec3b>(p);
   const int limit = static_cast<int>(kNoiseReach * noise + 0.5f);
   cv::Vec3i sum;
-  int count = 0;
+  int count = 0, squares = 0;
   for (int v = std::max(0, p.y - kSmooth); v <= std::min(bgr.rows - 1, p.y + kSmooth); ++v) {
     for (int u = std::max(0, p.x - kSmooth); u <= std::min(bgr.cols - 1, p.x + kSmooth); ++u) {
-      const cv::Vec3b c = bgr.at<cv::Vec3b>(v, u);
-      const int difference =
-          std::max({std::abs(c[0] - own[0]), std::abs(c[1] - own[1]), std::abs(c[2] - own[2])});
-      if (difference <= limit && labels.at<std::uint8_t>(v, u) == 0) sum += cv::Vec3i(c), ++count;
+      const cv::Vec3i c = bgr.at<cv::Vec3b>(v, u), difference = c - cv::Vec3i(own);
+      if (std::max({std::abs(difference[0]), std::abs(difference[1]), std::abs(difference[2])}) >
+              limit ||
+          labels.at<std::uint8_t>(v, u) != 0)
+        continue;
+      sum += difference, squares += difference.dot(difference), ++count;
     }
   }
-  return count > 0 ? cv::Vec3f(sum) / count : cv::Vec3f(own);
+  if (count == 0) return own;
+  const cv::Vec3f from_own = cv::Vec3f(sum) / count;
+  const float variance = static_cast<float>(squares) / count - from_own.dot(from_own),
+              of_noise = kNoiseTwice * 3.0f * noise * noise,
+              part = of_noise < variance ? of_noise / variance : 1.0f;
+  return cv::Vec3f(own) + part * from_own;
 }
 
 }  // namespace
