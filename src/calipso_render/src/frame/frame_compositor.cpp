@@ -29,7 +29,6 @@ FrameOutput FrameCompositor::run() {
   const cv::Mat& bgr = frame_.input.bgr;
   if (region_.all.empty()) return {bgr.clone(), cv::Mat::zeros(bgr.size(), CV_8U)};
   drawRegion();
-  findResidual();
   const RowComposer composer = this->composer();
   FrameOutput out{cv::Mat(bgr.size(), CV_8UC3), cv::Mat(bgr.size(), CV_8U)};
 #pragma omp parallel
@@ -49,17 +48,16 @@ FrameOutput FrameCompositor::run() {
 void FrameCompositor::drawRegion() {
   removed_ = removedPixels(frame_, place_, region_, passing_, reflections_.marks());
   surfaces_.emplace(frame_, place_, region_, removed_);
+  const bool carries = updateRest();
   sideBySide(
-      frame_.params.quality == Quality::kLive,
-      [this] {
-        edges_.emplace(surfaces_->sampleEdges());
-        shader_.emplace(frame_, place_, *surfaces_, moved_, resting_);
-        still_.emplace(frame_, place_, surfaces_->centre(), removed_);
+      frame_.params.quality == Quality::kLive, [this] { edges_.emplace(surfaces_->sampleEdges()); },
+      [this] { light_.emplace(frame_, place_, resting_, moved_, region_, surfaces_->covered()); },
+      [this] { still_.emplace(frame_, place_, surfaces_->centre(), removed_); },
+      [this, carries] {
+        if (carries) residual_.emplace(frame_, revealed_, surfaces_->centre(), caches_.rest);
       },
-      [this] {
-        light_.emplace(frame_, place_, resting_, moved_, region_, surfaces_->covered());
-        screen_.emplace(frame_, surfaces_->centre());
-      });
+      [this] { shader_.emplace(frame_, place_, *surfaces_, moved_, resting_); },
+      [this] { screen_.emplace(frame_, surfaces_->centre()); });
   backdrop_.emplace(frame_, place_, revealed_, reflections_, others_, *surfaces_, *edges_, *light_,
                     removed_);
   kinds_.emplace(frame_, reflections_, others_, *surfaces_, *edges_, *light_, *still_, *screen_,
@@ -67,15 +65,16 @@ void FrameCompositor::drawRegion() {
   sheets_.emplace(*surfaces_, *edges_, *shader_, *screen_);
 }
 
-void FrameCompositor::findResidual() {
-  if (!frame_.params.carry_residual || !frame_.at_key_camera) return;
+// Brings the picture of what rests in the video up to date, if anything of it is carried over.
+bool FrameCompositor::updateRest() {
+  if (!frame_.params.carry_residual || !frame_.at_key_camera) return false;
   const auto rests = [](const StagedObject& o) { return o.isAtRestInVideo(); };
-  if (std::none_of(frame_.objects.begin(), frame_.objects.end(), rests)) return;
+  if (std::none_of(frame_.objects.begin(), frame_.objects.end(), rests)) return false;
   std::vector<bool> resting(frame_.edited.size());  // per surface: edited, and at rest in the video
   for (std::size_t i = 0; i < resting.size(); ++i)
     resting[i] = frame_.edited[i] && frame_.at_rest[i];
   if (caches_.rest.edited != resting) caches_.rest = pictureAtRest(resting);
-  residual_.emplace(frame_, revealed_, surfaces_->centre(), caches_.rest);
+  return true;
 }
 
 // Such objects drawn where the video has them, from what was prepared alone.

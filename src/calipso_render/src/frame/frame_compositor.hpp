@@ -37,7 +37,7 @@ class FrameCompositor {
 
  private:
   void drawRegion();
-  void findResidual();
+  bool updateRest();
   RestPicture pictureAtRest(const std::vector<bool>& edited) const;
   RowComposer composer() const;
   void composeRow(const RowComposer& composer, int v, Row& row, FrameOutput& out) const;
