@@ -155,7 +155,7 @@ TEST_F(BagClipTest, SaysThatCameraInfoIsUncalibratedOrForAnotherSize) {
       test_clip::write(bag, test_clip::image(1.0));
     });
   };
-  expectSays(with([](sensor_msgs::CameraInfo& info) { info.K[0] = 0.0; }), "focal lengths 0.0");
+  expectSays(with([](sensor_msgs::CameraInfo& info) { info.K[0] = 0.0; }), "fx, fy, cx, cy = 0.0");
   expectSays(with([](sensor_msgs::CameraInfo& info) { info.width = 16; }), "is for 16x6");
   expectSays(with([](sensor_msgs::CameraInfo& info) { info.D = {0.1, 0, 0, 0, 0}; }), "undistort");
 }

@@ -1,5 +1,6 @@
 #include <calipso_msgs/EditReport.h>
 #include <gtest/gtest.h>
+#include <tf2_msgs/TFMessage.h>
 
 #include <filesystem>
 #include <fstream>
@@ -7,6 +8,7 @@
 
 #include "ros/bag_clip.hpp"
 #include "ros/bag_images.hpp"
+#include "ros/camera_path.hpp"
 #include "ros/edit_files.hpp"
 #include "temporary_folder.hpp"
 #include "test_clip.hpp"
@@ -21,6 +23,7 @@ class DamagedBagTest : public ::testing::Test {
   void SetUp() override {
     rosbag::Bag bag(path_, rosbag::bagmode::Write);
     bag.setCompression(rosbag::compression::BZ2);
+    bag.setChunkThreshold(1);  // a message, a chunk
     test_clip::write(bag, test_clip::image(1.0));
     test_clip::write(bag, test_clip::info(1.0));
     calipso_msgs::EditReport report;
@@ -28,17 +31,29 @@ class DamagedBagTest : public ::testing::Test {
     report.accepted = true;
     report.edit.kind = calipso_msgs::Edit::GRAVITY;
     bag.write("/calipso/edits/applied", ros::Time(1.0), report);
+    tf2_msgs::TFMessage tf;
+    tf.transforms.resize(1);
+    tf.transforms[0].header.stamp = ros::Time(1.0);
+    tf.transforms[0].header.frame_id = "map";
+    tf.transforms[0].child_frame_id = "camera_optical_frame";
+    tf.transforms[0].transform.rotation.w = 1.0;
+    bag.write("/tf", ros::Time(1.0), tf);
     bag.close();
   }
 
-  // Its index stays; what the index points to cannot be decompressed.
-  void damage() const {
+  // Its index stays; the messages from `first` on, as written above, cannot be decompressed.
+  void damage(int first) const {
+    const std::string kBzip2 = "BZh91AY";
     std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-    const std::size_t chunk = bytes.find("BZh");  // bzip2's signature
-    ASSERT_NE(chunk, std::string::npos);
-    file.seekp(static_cast<std::streamoff>(chunk) + 20);
-    file << std::string(32, '\xff');
+    int chunks = 0;
+    for (std::size_t at = bytes.find(kBzip2); at != std::string::npos;
+         at = bytes.find(kBzip2, at + 1)) {
+      if (chunks++ < first) continue;
+      file.seekp(static_cast<std::streamoff>(at) + 20);
+      file << std::string(32, '\xff');
+    }
+    ASSERT_EQ(chunks, 4);
   }
 
   // As a copy that was cut short is: its index is at the end.
@@ -68,7 +83,7 @@ TEST_F(DamagedBagTest, IsReadByAllWhileItIsWhole) {
 }
 
 TEST_F(DamagedBagTest, IsNamedWithTheRemedy) {
-  damage();
+  damage(0);
   for (const std::string& text : complaints()) {
     EXPECT_EQ(text.find(path_ + ": damaged ("), 0u) << text;
     EXPECT_NE(text.find("'rosbag reindex -f'"), std::string::npos) << text;
@@ -81,6 +96,17 @@ TEST_F(DamagedBagTest, ThatWasCutShortIsNamedWithTheRemedy) {
     EXPECT_EQ(text.find(path_ + ": cannot be read as a bag ("), 0u) << text;
     EXPECT_NE(text.find("'rosbag reindex'"), std::string::npos) << text;
   }
+}
+
+TEST_F(DamagedBagTest, IsNamedWhenOnlyTfCannotBeRead) {
+  const auto pathOf = [&] {
+    BagClip clip({path_, "", ""});
+    cameraPath(clip, Scene(), PoseSource::kBag);
+  };
+  EXPECT_NO_THROW(pathOf());
+  damage(3);
+  const std::string text = messageOf(pathOf);
+  EXPECT_EQ(text.find(path_ + ": damaged ("), 0u) << text;
 }
 
 TEST_F(DamagedBagTest, ATopicOfOtherMessagesIsNotDamage) {

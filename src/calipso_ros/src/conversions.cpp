@@ -118,17 +118,20 @@ sensor_msgs::CameraInfo toMsg(const Camera& camera) {
 }
 
 Camera fromMsg(const sensor_msgs::CameraInfo& info, const Eigen::Isometry3d& world_from_camera) {
-  const bool distorted =
-      std::any_of(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; });
-  if (distorted) {
-    throw std::invalid_argument(
-        "camera_info.D is not zero; undistort the images first (image_proc)");
+  const auto distorted =
+      std::find_if(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; });
+  if (distorted != info.D.end()) {
+    throw std::invalid_argument("camera_info has distortion (D has " + std::to_string(*distorted) +
+                                "); undistort the images first (image_proc)");
   }
-  if (!(info.K[0] > 0.0) || !(info.K[4] > 0.0) || info.width == 0 || info.height == 0) {
-    throw std::invalid_argument("camera_info has fx = " + std::to_string(info.K[0]) +
-                                ", fy = " + std::to_string(info.K[4]) + ", size " +
-                                std::to_string(info.width) + " x " + std::to_string(info.height) +
-                                "; all must be > 0: calibrate the camera");
+  const auto given = [](double value) { return std::to_string(value) + ", "; };
+  const bool finite =
+      std::all_of(info.K.begin(), info.K.end(), [](double k) { return std::isfinite(k); });
+  if (!finite || info.K[0] <= 0.0 || info.K[4] <= 0.0 || info.width == 0 || info.height == 0) {
+    throw std::invalid_argument("camera_info has fx, fy, cx, cy = " + given(info.K[0]) +
+                                given(info.K[4]) + given(info.K[2]) + given(info.K[5]) + "size " +
+                                std::to_string(info.width) + "x" + std::to_string(info.height) +
+                                "; fx, fy and size must be > 0, all finite: calibrate the camera");
   }
   Camera camera;
   camera.width = static_cast<int>(info.width);

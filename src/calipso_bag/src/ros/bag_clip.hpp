@@ -55,6 +55,7 @@ class BagClip {
   };
   Reader reader() { return Reader(*this); }
 
+  const std::string& path() const { return path_; }
   rosbag::Bag& bag() { return bag_; }
 
  private:

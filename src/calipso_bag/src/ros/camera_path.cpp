@@ -8,6 +8,7 @@
 
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
+#include "open_bag.hpp"
 
 namespace calipso::bag {
 namespace {
@@ -16,16 +17,20 @@ const std::vector<std::string> kTfTopics = {"/tf", "tf", "/tf_static", "tf_stati
 
 // Fills the buffer with all the bag's transforms; returns how many there are.
 int readTf(BagClip& clip, tf2::BufferCore& buffer) {
-  rosbag::View view(clip.bag(), rosbag::TopicQuery(kTfTopics));
   int count = 0;
-  for (const rosbag::MessageInstance& message : view) {
-    const auto tf = message.instantiate<tf2_msgs::TFMessage>();
-    if (!tf) continue;
-    const bool is_static = message.getTopic().find("tf_static") != std::string::npos;
-    for (const auto& transform : tf->transforms) {
-      buffer.setTransform(transform, "bag", is_static);
-      ++count;
+  try {
+    rosbag::View view(clip.bag(), rosbag::TopicQuery(kTfTopics));
+    for (const rosbag::MessageInstance& message : view) {
+      const auto tf = message.instantiate<tf2_msgs::TFMessage>();
+      if (!tf) continue;
+      const bool is_static = message.getTopic().find("tf_static") != std::string::npos;
+      for (const auto& transform : tf->transforms) {
+        buffer.setTransform(transform, "bag", is_static);
+        ++count;
+      }
     }
+  } catch (const rosbag::BagException& e) {
+    throw damaged(clip.path(), e);
   }
   return count;
 }

@@ -7,6 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "calipso_ros/conversions.hpp"
+
 namespace calipso::bag {
 namespace {
 
@@ -96,13 +98,10 @@ void checkCameraInfo(const sensor_msgs::CameraInfo& info, const sensor_msgs::Ima
     fail(where, "camera_info is for " + size(info.width, info.height) + " pixels, the image has " +
                     size(image.width, image.height) + "; calibrate for the recorded size");
   }
-  if (!(info.K[0] > 0.0) || !(info.K[4] > 0.0)) {
-    fail(where, "camera_info has focal lengths " + std::to_string(info.K[0]) + ", " +
-                    std::to_string(info.K[4]) + " px; record a calibrated camera");
-  }
-  if (std::any_of(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; })) {
-    fail(where, "camera_info has distortion, first coefficient " + std::to_string(info.D[0]) +
-                    "; undistort the images first (image_proc)");
+  try {
+    fromMsg(info, Eigen::Isometry3d::Identity());
+  } catch (const std::invalid_argument& e) {
+    fail(where, e.what());
   }
 }
 

@@ -39,7 +39,8 @@ calipso_msgs::Mesh toMsg(const TriangleMesh& mesh);
 TriangleMesh fromMsg(const calipso_msgs::Mesh& mesh);
 
 sensor_msgs::CameraInfo toMsg(const Camera& camera);  // header left empty
-// @throw std::invalid_argument if the focal length or size is not positive, or there is distortion
+// @throw std::invalid_argument if the focal length or size is not positive, a number is not finite,
+// or there is distortion
 Camera fromMsg(const sensor_msgs::CameraInfo& info, const Eigen::Isometry3d& world_from_camera);
 
 // Edit::time counts from `first_stamp`, the stamp of the clip's first frame; a message without a
