@@ -297,15 +297,4 @@ std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& 
   return outline;
 }
 
-Points faceNormals(const Points& x, const Triangles& triangles) {
-  Points normals(triangles.rows(), 3);
-  for (int f = 0; f < triangles.rows(); ++f) {
-    const Eigen::Vector3d a = x.row(triangles(f, 0)), b = x.row(triangles(f, 1)),
-                          c = x.row(triangles(f, 2));
-    const Eigen::Vector3d n = (b - a).cross(c - a);
-    normals.row(f) = n.stableNormalized();
-  }
-  return normals;
-}
-
 }  // namespace calipso::align

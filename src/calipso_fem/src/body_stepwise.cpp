@@ -68,12 +68,6 @@ Vec DeformableBody::trialDirection(const Vec& contact_forces) {
   return Vec::Zero(t.y.size());
 }
 
-Vec DeformableBody::trialResponse(const Vec& forces) {
-  Impl& m = *impl_;
-  const double h = m.runningTrial().h;
-  return h * h * m.velocityChange(forces, h);
-}
-
 double DeformableBody::trialPotential(const Vec& positions, const Vec& contact_forces) const {
   const Impl::Trial& t = impl_->runningTrial();
   return impl_->potential(positions, t.integrator, t.loads + contact_forces);

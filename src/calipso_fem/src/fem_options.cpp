@@ -30,17 +30,6 @@ std::string nameOf(const Table& table, Value value) {
   return "unknown";
 }
 
-template <class Value, std::size_t N>
-Value valueOf(const std::array<std::pair<Value, const char*>, N>& table, const std::string& name,
-              const std::string& what) {
-  std::string allowed;
-  for (const auto& [value, known] : table) {
-    if (name == known) return value;
-    allowed += (allowed.empty() ? "" : ", ") + std::string(known);
-  }
-  throw std::invalid_argument(what + " '" + name + "': known are " + allowed);
-}
-
 void require(bool ok, const std::string& name, double value, const std::string& range) {
   if (!ok)
     throw std::invalid_argument("FEM option " + name + " is " + std::to_string(value) +
@@ -51,12 +40,14 @@ void require(bool ok, const std::string& name, double value, const std::string& 
 
 std::string toString(SolverKind solver) { return nameOf(kSolvers, solver); }
 SolverKind solverKindFromString(const std::string& name) {
-  return valueOf(kSolvers, name, "solver");
+  std::string allowed;
+  for (const auto& [solver, known] : kSolvers) {
+    if (name == known) return solver;
+    allowed += (allowed.empty() ? "" : ", ") + std::string(known);
+  }
+  throw std::invalid_argument("solver '" + name + "': known are " + allowed);
 }
 std::string toString(TimeScheme scheme) { return nameOf(kSchemes, scheme); }
-TimeScheme timeSchemeFromString(const std::string& name) {
-  return valueOf(kSchemes, name, "time scheme");
-}
 
 void validate(const FemOptions& o) {
   require(o.cell_size > 0.0 || o.target_nodes >= 8, "target_nodes", o.target_nodes, ">= 8");

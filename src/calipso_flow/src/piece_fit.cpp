@@ -66,16 +66,6 @@ std::vector<MotionPiece> turningOptions(const MotionPiece& piece, const MotionPr
 
 void chooseKind(const std::vector<PoseMeasurement>& measurements, size_t index,
                 const MotionPrior& prior, double noise_scale, std::vector<MotionPiece>& pieces) {
-  const auto takeBest = [&](const std::vector<MotionPiece>& options) {
-    double best = -std::numeric_limits<double>::infinity();
-    MotionPiece winner = pieces[index];
-    for (const MotionPiece& option : options) {
-      pieces[index] = option;
-      const double value = logLikelihood(measurements, pieces, prior, noise_scale);
-      if (value > best) best = value, winner = option;
-    }
-    pieces[index] = winner;
-  };
   const bool few = framesInPiece(measurements, pieces, index) < kLeastForForced;
   MotionPiece& piece = pieces[index];
   if (piece.travel == Travel::kForced && piece.jerk == 0.0) piece.jerk = 0.3 * prior.acceleration;
@@ -83,12 +73,16 @@ void chooseKind(const std::vector<PoseMeasurement>& measurements, size_t index,
     piece.spin_noise = 0.3 * prior.spin;
   }
   // All pairs: travel and turning hang together where the measurements' errors do.
-  std::vector<MotionPiece> options;
+  double best = -std::numeric_limits<double>::infinity();
+  MotionPiece winner = piece;
   for (const MotionPiece& travels : travelOptions(piece, prior, few)) {
-    const std::vector<MotionPiece> turns = turningOptions(travels, prior, few);
-    options.insert(options.end(), turns.begin(), turns.end());
+    for (const MotionPiece& option : turningOptions(travels, prior, few)) {
+      piece = option;
+      const double value = logLikelihood(measurements, pieces, prior, noise_scale);
+      if (value > best) best = value, winner = option;
+    }
   }
-  takeBest(options);
+  piece = winner;
 }
 
 double chooseNoiseScale(const std::vector<PoseMeasurement>& measurements,

@@ -27,8 +27,6 @@ class GaussianMixture {
   // Negative log density of a sample under its best component; unit: nats.
   float cost(const cv::Vec3f& sample) const;
 
-  int componentCount() const { return static_cast<int>(components_.size()); }
-
  private:
   // |L (x - mean)|^2 is the squared Mahalanobis distance; L = inverse Cholesky factor, row by row.
   struct Component {

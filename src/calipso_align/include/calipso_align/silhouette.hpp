@@ -50,7 +50,4 @@ std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& 
                                            const DepthRendering& rendering, const Camera& camera,
                                            double step_px);
 
-// Unit normals of the faces, zero for degenerate ones.
-Points faceNormals(const Points& x, const Triangles& triangles);
-
 }  // namespace calipso::align

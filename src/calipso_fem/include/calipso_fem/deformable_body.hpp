@@ -123,8 +123,6 @@ class DeformableBody {
   const Vec& trialPositions() const;  // 3n, m
   // Newton direction d of the incremental potential with the forces held: A d = forces - gradient.
   Vec trialDirection(const Vec& contact_forces);
-  // A^-1 times nodal forces, A as of the last trialDirection(): change of the trial positions, m.
-  Vec trialResponse(const Vec& forces);
   double trialPotential(const Vec& positions, const Vec& contact_forces) const;
   double trialResidual(const Vec& contact_forces) const;  // over loads and inner forces
   // How far towards `positions` the potential falls: 1, 1/2, 1/4 ...; 0 when it does not.

@@ -20,7 +20,6 @@ enum class SolverKind {
 std::string toString(SolverKind solver);
 SolverKind solverKindFromString(const std::string& name);  // @throw std::invalid_argument
 std::string toString(TimeScheme scheme);
-TimeScheme timeSchemeFromString(const std::string& name);  // @throw std::invalid_argument
 
 // How a body is discretised and solved.
 struct FemOptions {

@@ -21,6 +21,12 @@ bool changesStiffness(const Edit& edit) {
          !std::isnan(edit.damping);
 }
 
+// The edit's turn about a point and its translation, world.
+Eigen::Isometry3d motionAbout(const Eigen::Vector3d& point, const Edit& edit) {
+  return Eigen::Translation3d(point + edit.translation) * edit.rotation.normalized() *
+         Eigen::Translation3d(-point);
+}
+
 }  // namespace
 
 // The simplest kind that an edit can act on.
@@ -141,9 +147,7 @@ std::string World::Impl::carryOut(const Edit& edit) {
 std::string World::Impl::transform(Actor& actor, const Edit& edit) {
   touch(actor, edit);
   const Eigen::Vector3d centroid = centroidOf(actor);
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  motion.linear() = edit.rotation.normalized().toRotationMatrix();
-  motion.translation() = centroid + edit.translation - motion.linear() * centroid;
+  const Eigen::Isometry3d motion = motionAbout(centroid, edit);
   if (actor.soft) {
     actor.soft->body().applyRigidTransform(motion);
     actor.soft->changed();
@@ -259,9 +263,7 @@ std::string World::Impl::copy(Actor& actor, const Edit& edit) {
   if (actor.removed)
     throw std::invalid_argument(actor.object.name + " has been removed; send a reset for it first");
   const Eigen::Vector3d centroid = centroidOf(actor);
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  motion.linear() = edit.rotation.normalized().toRotationMatrix();
-  motion.translation() = centroid + edit.translation - motion.linear() * centroid;
+  const Eigen::Isometry3d motion = motionAbout(centroid, edit);
   Actor& fresh = duplicate(actor.object.name, edit.new_name, motion);
   fresh.source = actor.source.empty() && !actor.inserted ? actor.object.name : actor.source;
   fresh.look = actor.look;
