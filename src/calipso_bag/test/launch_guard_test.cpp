@@ -26,11 +26,16 @@ pid_t startWaiting(bool stubborn) {
   return process;
 }
 
-// The signal that has ended a process; 0 while it runs.
+bool runs(pid_t process) { return waitpid(process, nullptr, WNOHANG) == 0; }
+
+// The signal that has ended a process; 0, and it is ended, if none has.
 int endedBy(pid_t process) {
   int status = 0;
-  if (waitpid(process, &status, WNOHANG) != process || !WIFSIGNALED(status)) return 0;
-  return WTERMSIG(status);
+  if (waitpid(process, &status, WNOHANG) == process)
+    return WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  kill(process, SIGKILL);
+  waitpid(process, &status, 0);
+  return 0;
 }
 
 TEST(LaunchGuard, ProcessesThatListenAreAsked) {
@@ -50,7 +55,7 @@ TEST(LaunchGuard, ReturnsWhenStubbornProcessesHaveEnded) {
 TEST(LaunchGuard, WithoutRoslaunchNothingIsEnded) {
   const pid_t sibling = startWaiting(false);
   failLaunch();
-  EXPECT_EQ(endedBy(sibling), 0);
+  EXPECT_TRUE(runs(sibling));
   endAll({sibling}, 60s);
   EXPECT_EQ(endedBy(sibling), SIGINT);
 }

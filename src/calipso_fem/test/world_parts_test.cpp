@@ -259,8 +259,9 @@ TEST(RegionSelection, PixelChoosesTheVisibleSide) {
   region.kind = RegionKind::kPixel;
   region.pixel = {319.5, 239.5};  // the middle of the face towards the camera, at y = -0.1
   region.radius = 0.06;
-  for (const int v : selectVertices(scene, 0, region))
-    EXPECT_NEAR(scene.objects[0].mesh.vertex(v).y(), -0.1, 1e-12);
+  const std::vector<int> vertices = selectVertices(scene, 0, region);
+  EXPECT_FALSE(vertices.empty());
+  for (const int v : vertices) EXPECT_NEAR(scene.objects[0].mesh.vertex(v).y(), -0.1, 1e-12);
 }
 
 TEST(RegionSelection, SaysWhatThePixelShows) {

@@ -133,6 +133,7 @@ TEST(ClipDynamics, staticBoxBeforeAMovingBackgroundIsAtRest) {
   ClipAnalyser analyser = analyserOf(frameOf(0.0, pose, 21));
   for (int k = 1; k < 12; ++k) analyser.add(frameOf(k / kFps, pose, 21 + k, 3.0 * k));
   const ObjectDynamics box = analyser.finish().front();
+  EXPECT_EQ(box.motions.size(), 12u);
   for (const ObjectMotion& motion : box.motions) {
     EXPECT_FALSE(motion.moving);
     const double deviation =

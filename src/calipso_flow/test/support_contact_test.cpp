@@ -108,7 +108,9 @@ TEST(SupportContact, whatCrossesTheEndOfAPlaneDoesNotStrikeIt) {
 TEST(SupportContact, whatIsBelowAPlaneDoesNotTouchIt) {
   auto observations = fall(0.0, 6);
   for (Observation& o : observations) o.world_from_object.translation().z() = -0.5;
-  for (const PoseMeasurement& m : noted({SupportPlane()}, observations)) {
+  const auto measurements = noted({SupportPlane()}, observations);
+  EXPECT_EQ(measurements.size(), 6u);
+  for (const PoseMeasurement& m : measurements) {
     EXPECT_LE(m.strikes, 0.0);
     EXPECT_GT(m.falls, 0.0);
   }
@@ -129,6 +131,7 @@ TEST(SupportContact, whatIsHeldDoesNotFall) {
   const auto observations = fall(0.3, 6);
   auto measurements = measurementsOf(observations, Eigen::Vector3d::Zero());
   noteContacts({SupportPlane()}, hung, observations, kGravity, measurements);
+  EXPECT_EQ(measurements.size(), 6u);
   for (const PoseMeasurement& m : measurements) EXPECT_EQ(m.falls, 0.0);
 }
 

@@ -79,6 +79,7 @@ TEST(LikePlaces, OfSpotsDoNotAgree) {
       random.seed(random() + static_cast<unsigned>(std::floor(x[i] / 0.015f)));
     return random() % 2 == 0 ? kRed : kYellow;
   });
+  EXPECT_FALSE(like.empty());
   for (const LikePlace& l : like) EXPECT_FALSE(l.agreesWell());
 }
 

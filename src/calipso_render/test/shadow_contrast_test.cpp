@@ -79,7 +79,9 @@ TEST(ShadowContrast, WithoutAShadowNoDirectionStandsOut) {
   const Setting setting;
   const ShadowContrast contrast(setting.seenUnder({0.0f, 0.0f, -1.0f}), table(), cv::Mat(),
                                 kCoarse);
-  for (const Eigen::Vector3f& l : contrast.candidates(setting.objects))
+  const auto candidates = contrast.candidates(setting.objects);
+  EXPECT_FALSE(candidates.empty());
+  for (const Eigen::Vector3f& l : candidates)
     EXPECT_GT(contrast.misfit(setting.objects, l), -12.0);  // from which on light_fit believes it
 }
 

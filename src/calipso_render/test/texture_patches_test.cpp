@@ -93,7 +93,9 @@ TEST(SurfaceChart, ACubeUnfoldsAcrossItsEdges) {
 TEST(SurfaceChart, DownStaysDown) {
   const Mesh m = quarterOfACylinder();
   const SurfaceUnfolder unfolder(m.vertices, m.triangles);
-  for (const FlatTriangle& t : unfolder.around(100, {0, 0, -1}, 10.0f)) {
+  const auto unfolded = unfolder.around(100, {0, 0, -1}, 10.0f);
+  EXPECT_GT(unfolded.size(), 1u);
+  for (const FlatTriangle& t : unfolded) {
     for (int a = 0; a < 3; ++a) {
       for (int b = 0; b < 3; ++b) {
         const Eigen::Vector3i& v = m.triangles[t.triangle];

@@ -54,6 +54,10 @@ TEST(Conversions, uncalibratedAndDistortedCamerasAreRefused) {
   info = toMsg(camera);
   info.D[0] = 0.1;
   EXPECT_THROW(fromMsg(info, somePose()), std::invalid_argument);
+  info = toMsg(camera);
+  EXPECT_NO_THROW(fromMsg(info, somePose()));
+  info.K[2] = std::nan("");
+  EXPECT_THROW(fromMsg(info, somePose()), std::invalid_argument);
 }
 
 TEST(Conversions, meshesRoundTripAndBadOnesAreRefused) {
@@ -76,9 +80,18 @@ TEST(Conversions, editsRoundTrip) {
   edit.mode = EditMode::kTarget;
   edit.region.kind = RegionKind::kPixel;
   edit.region.pixel = {3, 4};
+  edit.region.point = {1, 2, 3};
+  edit.region.radius = 0.5;
+  edit.region.box_min = {4, 5, 6};
+  edit.region.box_max = {7, 8, 9};
   edit.vector = {1, 2, 3};
-  edit.rotation = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ());
+  edit.angular = {4, 5, 6};
+  edit.translation = {7, 8, 9};
+  edit.rotation = Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized());
+  edit.scale = 1.5;
+  edit.factor = 2.5;
   edit.ramp = 0.25;
+  edit.duration = 0.75;
   const Edit again = fromMsg(toMsg(edit, ros::Time(7)), ros::Time(7));
   EXPECT_NEAR(again.time, 0.5, 1e-9);  // stamps hold nanoseconds
   EXPECT_EQ(again.object, edit.object);
@@ -86,9 +99,18 @@ TEST(Conversions, editsRoundTrip) {
   EXPECT_EQ(again.mode, edit.mode);
   EXPECT_EQ(again.region.kind, edit.region.kind);
   EXPECT_EQ(again.region.pixel, edit.region.pixel);
+  EXPECT_EQ(again.region.point, edit.region.point);
+  EXPECT_EQ(again.region.radius, edit.region.radius);
+  EXPECT_EQ(again.region.box_min, edit.region.box_min);
+  EXPECT_EQ(again.region.box_max, edit.region.box_max);
   EXPECT_EQ(again.vector, edit.vector);
+  EXPECT_EQ(again.angular, edit.angular);
+  EXPECT_EQ(again.translation, edit.translation);
   EXPECT_TRUE(again.rotation.isApprox(edit.rotation, 1e-14));
+  EXPECT_EQ(again.scale, edit.scale);
+  EXPECT_EQ(again.factor, edit.factor);
   EXPECT_EQ(again.ramp, edit.ramp);
+  EXPECT_EQ(again.duration, edit.duration);
   EXPECT_TRUE(std::isnan(again.youngs_modulus));
 }
 
@@ -102,6 +124,8 @@ TEST(Conversions, whatTheKindsNeedRoundTrips) {
   edit.after = "cup";
   edit.collision = 2;
   edit.pressure = -3.0;
+  edit.specular = 0.25;
+  edit.roughness = 0.75;
   Edit again = fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1));
   EXPECT_EQ(again.other, "table");
   EXPECT_FALSE(again.meet);
@@ -111,6 +135,8 @@ TEST(Conversions, whatTheKindsNeedRoundTrips) {
   EXPECT_EQ(again.after, "cup");
   EXPECT_EQ(again.collision, 2);
   EXPECT_EQ(again.pressure, -3.0);
+  EXPECT_EQ(again.specular, 0.25);
+  EXPECT_EQ(again.roughness, 0.75);
   edit.color.setZero();  // black
   EXPECT_NEAR(fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1)).color.norm(), 0.0, 1e-30);
   edit.kind = EditKind::kDuplicate;
@@ -127,7 +153,9 @@ TEST(Conversions, aMeantZeroSurvivesAndAMissingNumberIsUnchanged) {
   Edit edit;
   edit.kind = EditKind::kMaterial;
   edit.damping = 0.0;
+  edit.youngs_modulus = 2e4;
   const Edit again = fromMsg(toMsg(edit, ros::Time(1)), ros::Time(1));
+  EXPECT_EQ(again.youngs_modulus, 2e4);
   EXPECT_NEAR(again.damping, 0.0, 1e-300);
   EXPECT_TRUE(std::isnan(again.poissons_ratio));
   EXPECT_TRUE(std::isnan(again.density));
