@@ -4,15 +4,12 @@
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 
+#include "frame/mask_morphology.hpp"
+
 namespace calipso::render {
 namespace {
 
 constexpr int kMargin = 8;  // px
-
-cv::Rect grown(const cv::Rect& r, int margin) {
-  if (r.empty()) return r;
-  return {r.x - margin, r.y - margin, r.width + 2 * margin, r.height + 2 * margin};
-}
 
 cv::Rect boxOf(const cv::Mat& mask) { return mask.empty() ? cv::Rect() : cv::boundingRect(mask); }
 

@@ -10,6 +10,12 @@ inline cv::Mat disc(int radius) {
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1});
 }
 
+// With a margin on all sides; nothing stays nothing.
+inline cv::Rect grown(const cv::Rect& r, int margin) {
+  if (r.empty()) return r;
+  return {r.x - margin, r.y - margin, r.width + 2 * margin, r.height + 2 * margin};
+}
+
 // cv::dilate() with disc(radius). A disc's rows are runs, and a longer run is a shorter one with a
 // pixel more at either end.
 class DiscDilation {

@@ -99,20 +99,17 @@ void PlaceLight::measureRun(const SkyGrid& sky_grid, int v, int begin, int end) 
 void PlaceLight::findRelit() {
   relit_ = cv::Mat::zeros(region_.size(), CV_8U);
   const int reach = frame_.params.background.shadow_margin_px, side = reach + 2;
-  const auto around = [side](const cv::Rect& r) {
-    return r.empty() ? r
-                     : cv::Rect(r.x - side, r.y - side, r.width + 2 * side, r.height + 2 * side);
-  };
-  const cv::Rect box = around(resting_.shadedBox()) & around(sun_changes_.box()) & region_;
+  const cv::Rect box =
+      grown(resting_.shadedBox(), side) & grown(sun_changes_.box(), side) & region_;
   if (box.empty()) return;
   cv::Mat change(box.size(), CV_8U);
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = box.y; v < box.br().y; ++v)
     findChange(v, box.x, box.br().x, change.ptr<std::uint8_t>(v - box.y));
-  cv::Mat grown(box.size(), CV_8U);
-  filterTiles(openedByThree(change), reach, grown, DiscDilation(reach));
-  cv::min(grown, resting_.shaded()(box), grown);
-  filterTiles(grown, 1, relit_(box - region_.tl()), [](const cv::Mat& from, cv::Mat& to) {
+  cv::Mat wide(box.size(), CV_8U);
+  filterTiles(openedByThree(change), reach, wide, DiscDilation(reach));
+  cv::min(wide, resting_.shaded()(box), wide);
+  filterTiles(wide, 1, relit_(box - region_.tl()), [](const cv::Mat& from, cv::Mat& to) {
     cv::blur(from, to, {3, 3});
   });
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calipso_render/colour.hpp"
+#include "frame/mask_morphology.hpp"
 #include "frame/still_pixels.hpp"
 #include "frame/surface_sun.hpp"
 #include "smooth_step.hpp"
@@ -64,9 +65,7 @@ cv::Rect Residual::carriedBox() const {
 
 // @param carried pixels that may take over what is missed
 void Residual::findMiss(const cv::Rect& carried) {
-  miss_box_ = cv::Rect(carried.x - kCarried, carried.y - kCarried, carried.width + 2 * kCarried,
-                       carried.height + 2 * kCarried) &
-              rest_.box;
+  miss_box_ = grown(carried, kCarried) & rest_.box;
   const cv::Rect box = miss_box_;
   if (box.empty()) return;
   miss_ = cv::Mat(box.size(), CV_32FC4);

@@ -44,9 +44,7 @@ std::vector<const ObjectInFrame*> statesOf(const std::vector<Surface>& surfaces,
 
 // Where the frame differs from the key frame around what either shows of an object. CV_8UC1
 cv::Mat differenceFromKey(const StagedFrame& frame, cv::Rect box) {
-  box = cv::Rect(box.x - kRestReach, box.y - kRestReach, box.width + 2 * kRestReach,
-                 box.height + 2 * kRestReach) &
-        frame.whole();
+  box = grown(box, kRestReach) & frame.whole();
   cv::Mat picture, key_picture, different;
   cv::blur(frame.input.bgr(box), picture, {3, 3});
   cv::blur(frame.prepared.key_picture(box), key_picture, {3, 3});

@@ -68,27 +68,25 @@ void StillPixels::keepRims(const cv::Mat& owner) {
 void StillPixels::addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const {
   const int margin = frame_.params.background.mask_margin_px, reach = kRimReach * margin;
   const cv::Rect whole({0, 0}, region_.size());
-  const cv::Mat own = owner == surface;
-  const cv::Rect seen = cv::boundingRect(own);
+  const cv::Mat rests = (owner == surface) & (parts_ > 0.0f);
+  const cv::Rect seen = cv::boundingRect(rests);
   if (seen.empty()) return;
-  const auto around = [&](int px) {
-    return cv::Rect(seen.x - px, seen.y - px, seen.width + 2 * px, seen.height + 2 * px) & whole;
-  };
-  const cv::Rect box = around(reach);
+  const auto around = [&](int px) { return grown(seen, px) & whole; };
+  const cv::Rect box = around(reach), wide = around(reach + margin);
   cv::Mat rim = cv::Mat::zeros(box.size(), CV_32F);
-  parts_(box).copyTo(rim, own(box));
+  parts_(box).copyTo(rim, rests(box));
   cv::dilate(rim, rim, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
-  const cv::Mat original = shownOf(frame_, place_, surface, region_);
+  const cv::Mat original = shownOf(frame_, place_, surface, wide + region_.tl())(box - wide.tl());
   cv::Mat beside, near, inner;
-  cv::dilate(shownOfOthers(surface)(box), beside, disc(margin));
-  cv::dilate(original(box), near, disc(margin));
-  cv::erode(original(box), inner, disc(margin));
+  cv::dilate(shownOfOthers(surface, wide)(box - wide.tl()), beside, disc(margin));
+  cv::dilate(original, near, disc(margin));
+  cv::erode(original, inner, disc(margin));
   beside.setTo(0, near);
   // What the object has left shows it in the video, and is no rim.
   rim.setTo(0.0f, beside | inner);
   // Rims lie within 2 * reach px, along rows and columns, of what rests.
   const cv::Rect search = around(3 * reach);
-  const cv::Mat gone = nearerToLeft(surface, own, owner, search);
+  const cv::Mat gone = nearerToLeft(surface, rests(search), owner, search);
   if (!gone.empty()) rim.setTo(0.0f, gone(box - search.tl()));
   cv::Mat here = rims(box);
   cv::max(here, rim, here);
@@ -96,13 +94,12 @@ void StillPixels::addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const
 
 // Pixels of a box that lie nearer to what a surface has left than to where it rests: what no model
 // has of the object there, such as a railing, went along. May be empty.
-// @param own 255 = the surface is seen there
-cv::Mat StillPixels::nearerToLeft(int surface, const cv::Mat& own, const cv::Mat& owner,
+// @param rests 255 = the surface is seen there, and rests
+cv::Mat StillPixels::nearerToLeft(int surface, const cv::Mat& rests, const cv::Mat& owner,
                                   const cv::Rect& box) const {
   if (frame_.prepared.outlines[surface].empty() || !frame_.at_key_camera) return {};
-  const cv::Mat rests = own(box) & (parts_(box) > 0.0f);
   cv::Mat left = frame_.prepared.outlines[surface](box + region_.tl()) & ~rests &
-                 ((owner(box) < 0) | own(box));
+                 ((owner(box) < 0) | (owner(box) == surface));
   cv::morphologyEx(left, left, cv::MORPH_OPEN, cv::Mat::ones(2, 2, CV_8U));  // no mere silhouette
   if (cv::countNonZero(left) == 0) return {};
   cv::Mat to_left, to_rest;
@@ -126,12 +123,12 @@ bool StillPixels::findResting(const StagedObject& object, std::vector<char>& can
   return any;
 }
 
-// What the video shows of all other edited objects. CV_8UC1 over the region
-cv::Mat StillPixels::shownOfOthers(int surface) const {
-  cv::Mat shown = cv::Mat::zeros(region_.size(), CV_8U);
+// What the video shows of all other edited objects. CV_8UC1 over a box of the region
+cv::Mat StillPixels::shownOfOthers(int surface, const cv::Rect& box) const {
+  cv::Mat shown = cv::Mat::zeros(box.size(), CV_8U);
   for (std::size_t i = 0; i < frame_.edited.size(); ++i) {
     if (frame_.edited[i] && static_cast<int>(i) != surface)
-      shown |= shownOf(frame_, place_, static_cast<int>(i), region_);
+      shown |= shownOf(frame_, place_, static_cast<int>(i), box + region_.tl());
   }
   return shown;
 }

@@ -41,8 +41,8 @@ class StillPixels {
   Seen findParts(const std::vector<std::vector<char>>& can_rest);
   void keepRims(const cv::Mat& owner);
   void addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const;
-  cv::Mat shownOfOthers(int surface) const;
-  cv::Mat nearerToLeft(int surface, const cv::Mat& own, const cv::Mat& owner,
+  cv::Mat shownOfOthers(int surface, const cv::Rect& box) const;
+  cv::Mat nearerToLeft(int surface, const cv::Mat& rests, const cv::Mat& owner,
                        const cv::Rect& box) const;
 
   const StagedFrame& frame_;

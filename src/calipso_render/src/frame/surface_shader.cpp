@@ -14,6 +14,22 @@ void copyTo(float (&to)[3], const cv::Vec3f& from) { std::copy_n(from.val, 3, to
 
 }  // namespace
 
+SurfaceShade layOut(const Light& light, const Appearance& appearance, const Look& look,
+                    const Gloss& gloss) {
+  SurfaceShade s;
+  Eigen::Map<Eigen::Vector3f>(s.direction) = light.direction;
+  copyTo(s.sun, light.sun), copyTo(s.least, 0.02f * light.ambient[0]);
+  s.terms = 1;
+  for (int i = 0; i < 9; ++i) {
+    copyTo(s.ambient[i], light.ambient[i]);
+    if (light.ambient[i] != cv::Vec3f()) s.terms = i == 0 ? 1 : i < 4 ? 4 : 9;
+  }
+  copyTo(s.floor, lightFloor(appearance.mean_light));
+  copyTo(s.tint, look.tint.value_or(cv::Vec3f(1, 1, 1)));
+  s.specular = gloss.specular, s.roughness = gloss.roughness, s.around = gloss.around;
+  return s;
+}
+
 SurfaceShader::SurfaceShader(const StagedFrame& frame, const SeenPlace& place,
                              const DrawnSurfaces& surfaces, const MovedShadow& moved,
                              const RestingLight& resting)
@@ -23,7 +39,11 @@ SurfaceShader::SurfaceShader(const StagedFrame& frame, const SeenPlace& place,
       region_(centre_.region()),
       maps_(findMaps()),
       sun_(frame, planes_, surfaces, maps_, moved, resting) {
-  for (const StagedObject& object : frame.objects) shades_.push_back(shadeOf(object));
+  for (std::size_t slot = 0; slot < frame.objects.size(); ++slot) {
+    const StagedObject& object = frame.objects[slot];
+    shades_.push_back(
+        layOut(frame.light, appearanceOf(static_cast<int>(slot)), object.look, object.gloss));
+  }
 }
 
 std::vector<SurfaceMaps> SurfaceShader::findMaps() const {
@@ -38,24 +58,6 @@ std::vector<SurfaceMaps> SurfaceShader::findMaps() const {
                         : SurfaceMaps());
   }
   return maps;
-}
-
-// Light and look of an object, laid out for the shading of many points.
-SurfaceShade SurfaceShader::shadeOf(const StagedObject& object) const {
-  const Light& light = frame_.light;
-  SurfaceShade s;
-  Eigen::Map<Eigen::Vector3f>(s.direction) = light.direction;
-  copyTo(s.sun, light.sun), copyTo(s.least, 0.02f * light.ambient[0]);
-  s.terms = 1;
-  for (int i = 0; i < 9; ++i) {
-    copyTo(s.ambient[i], light.ambient[i]);
-    if (light.ambient[i] != cv::Vec3f()) s.terms = i == 0 ? 1 : i < 4 ? 4 : 9;
-  }
-  copyTo(s.floor, lightFloor(frame_.prepared.appearances[object.surface].mean_light));
-  copyTo(s.tint, object.tint());
-  s.specular = object.gloss.specular, s.roughness = object.gloss.roughness;
-  s.around = object.gloss.around;
-  return s;
 }
 
 unsigned SurfaceShader::shadeStretch(int v, int first, int last, int slot, Row& row) const {

@@ -12,6 +12,10 @@
 
 namespace calipso::render {
 
+// Light and look of an object, laid out for the shading of many points.
+SurfaceShade layOut(const Light& light, const Appearance& appearance, const Look& look,
+                    const Gloss& gloss);
+
 // Lights and shades the drawn surfaces: stretches of pixels that see one object by their triangles'
 // maps, other places one by one.
 class SurfaceShader {
@@ -44,7 +48,6 @@ class SurfaceShader {
     return frame_.prepared.appearances[frame_.objects[slot].surface];
   }
   std::vector<SurfaceMaps> findMaps() const;
-  SurfaceShade shadeOf(const StagedObject& object) const;
   void reflectStretch(unsigned traits, int v, int first, int last, int slot, Row& row) const;
   void addTexture(int v, int first, int last, int slot, Row& row) const;
   void reflectPlaces(const SurfacePlace* places, int count, int slot,

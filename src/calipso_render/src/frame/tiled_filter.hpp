@@ -5,6 +5,8 @@
 #include <cstring>
 #include <opencv2/core.hpp>
 
+#include "frame/mask_morphology.hpp"
+
 namespace calipso::render {
 
 // Runs a neighbourhood filter over a mask by tiles, on all threads. A tile whose surroundings have
@@ -23,9 +25,7 @@ void filterTiles(const cv::Mat& source, int reach, cv::Mat target, const Filter&
   for (int k = 0; k < across * down; ++k) {
     const cv::Rect tile =
         cv::Rect(k % across * kWidth, k / across * kHeight, kWidth, kHeight) & all;
-    const cv::Rect around =
-        cv::Rect(tile.x - reach, tile.y - reach, tile.width + 2 * reach, tile.height + 2 * reach) &
-        all;
+    const cv::Rect around = grown(tile, reach) & all;
     std::uint8_t low = 255, high = 0;
     for (int v = around.y; v < around.br().y; ++v) {
       const std::uint8_t* row = source.ptr<std::uint8_t>(v);

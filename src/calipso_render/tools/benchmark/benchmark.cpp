@@ -14,6 +14,7 @@
 #include "calipso_render/memory.hpp"
 #include "drawing_case.hpp"
 #include "filling_case.hpp"
+#include "mesh_drawing.hpp"
 #ifdef CALIPSO_HAVE_EGL
 #include "llvmpipe.hpp"
 #endif
@@ -83,6 +84,11 @@ void timeDrawing(const Options& options) {
     timeFrames(way.name, drawing, options,
                [&](int k) { return renderer.composite(drawing.input(k)).bgr; });
   }
+  if (wanted("drawing_mesh_alone")) {
+    const MeshDrawing mesh(live);
+    timeFrames("drawing_mesh_alone", live, options,
+               [&](int k) { return mesh.draw(live.verticesAt(k)); });
+  }
   if (!wanted("drawing_llvmpipe")) return;
 #ifdef CALIPSO_HAVE_EGL
   try {
@@ -116,7 +122,7 @@ void compareScene(const std::string& scene, const Options& options) {
 }  // namespace calipso::render
 
 // Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only drawing_live|
-// drawing_live_no_cast_shadow|drawing_final|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per
+// drawing_live_no_cast_shadow|drawing_final|drawing_mesh_alone|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per
 // case.
 int main(int argc, char** argv) {
   using namespace calipso::render;
