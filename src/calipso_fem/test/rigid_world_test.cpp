@@ -55,43 +55,6 @@ TEST(RigidWorld, BlockSticksBelowAndSlidesAboveTheFrictionAngle) {
   }
 }
 
-// A sheet with one side carries what comes from its front, and lets through what comes from behind.
-TEST(RigidWorld, ASheetWithOneSideTouchesNothingBehindIt) {
-  for (const bool one_sided : {false, true}) {
-    RigidWorld world;
-    RigidBodySpec sheet;
-    sheet.name = "sheet";
-    sheet.motion = RigidMotion::kStatic;
-    sheet.one_sided = one_sided;
-    TriangleMesh square;
-    square.vertices.resize(4, 3);
-    square.vertices << -1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1;
-    square.triangles.resize(2, 3);
-    square.triangles << 0, 1, 2, 0, 2, 3;
-    sheet.shapes = {square};
-    world.add(sheet);
-    RigidBodySpec block;
-    block.name = "block";
-    block.shapes = {test::boxSurface({0.2, 0.2, 0.1}, 1)};
-    block.mass = massProperties(block.shapes.front(), 1000.0);
-    block.world_from_object.translation() = Eigen::Vector3d(0.1, 0, 0.8);
-    block.linear = {0, 0, 4};  // up to 1.6 m, and back
-    const RigidWorld::Id id = world.add(block);
-    world.setAcceleration(id, {0, 0, -kG});
-    double highest = 0.0;
-    for (int k = 0; k < 90; ++k) {
-      world.step(kStep);
-      highest = std::max(highest, world.center(id).z());
-    }
-    if (one_sided) {
-      EXPECT_NEAR(highest, 0.8 + 8 / kG, 0.05);  // half through, it is pushed out at the front
-      EXPECT_NEAR(world.center(id).z(), 1.05, 2e-3) << "rests on the front";  // margins
-    } else {
-      EXPECT_LT(highest, 0.951);
-    }
-  }
-}
-
 // A ring of points as sixteen parts would give, two of them deeper and one far: the ring's outline
 // stays.
 TEST(ManifoldReduction, KeepsTheDeepestAndTheOutline) {

@@ -57,20 +57,6 @@ TriangleMesh boxSurface(const Eigen::Vector3d& size, const Eigen::Vector3i& n) {
   return meshOf(vertices, triangles);
 }
 
-TriangleMesh joined(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& boxes) {
-  TriangleMesh all;
-  for (const auto& [size, at] : boxes) {
-    TriangleMesh box = boxSurface(size, 1);
-    box.vertices.rowwise() += at.transpose();
-    const int v = all.vertexCount(), f = all.triangleCount();
-    all.vertices.conservativeResize(v + box.vertexCount(), 3);
-    all.vertices.bottomRows(box.vertexCount()) = box.vertices;
-    all.triangles.conservativeResize(f + box.triangleCount(), 3);
-    all.triangles.bottomRows(box.triangleCount()) = box.triangles.array() + v;
-  }
-  return all;
-}
-
 TriangleMesh sphereSurface(double radius, int rings, int segments) {
   std::vector<Eigen::Vector3d> vertices = {{0, 0, radius}};
   std::vector<Eigen::Vector3i> triangles;

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "calipso_fem/world/world.hpp"
 
@@ -19,9 +17,6 @@ TriangleMesh boxSurface(const Eigen::Vector3d& size,
 // towards -z.
 TriangleMesh horseshoe(double length, double radius, double thickness, double width,
                        const Eigen::Vector3i& n);
-
-// Several closed parts as one mesh; where they overlap it is not a manifold's surface.
-TriangleMesh joined(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& boxes);
 
 // A sphere by latitude and longitude.
 TriangleMesh sphereSurface(double radius, int rings, int segments);

@@ -135,6 +135,21 @@ TEST(WorldObjects, FirstTouchIsToldWithItsTimeAndSpeed) {
   EXPECT_NEAR(events[0].approach_speed, kG * fall, 0.02 * kG * fall);
 }
 
+// Several closed parts as one mesh; where they overlap it is not a manifold's surface.
+TriangleMesh joined(const std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>& boxes) {
+  TriangleMesh all;
+  for (const auto& [size, at] : boxes) {
+    TriangleMesh box = boxSurface(size, 1);
+    box.vertices.rowwise() += at.transpose();
+    const int v = all.vertexCount(), f = all.triangleCount();
+    all.vertices.conservativeResize(v + box.vertexCount(), 3);
+    all.vertices.bottomRows(box.vertexCount()) = box.vertices;
+    all.triangles.conservativeResize(f + box.triangleCount(), 3);
+    all.triangles.bottomRows(box.triangleCount()) = box.triangles.array() + v;
+  }
+  return all;
+}
+
 TEST(WorldObjects, ACupHoldsABall) {
   WorldScene scene = sceneWith(beaker(), {0, 0, 0.045});
   WorldObject ball = scene.objects.front();

@@ -78,42 +78,6 @@ TEST(WorldRests, AResetLeavesContactsThatTheUserHasEnded) {
   }
 }
 
-// A cart that is driven up a bridge whose model is tilted against its deck and begins below it, the
-// axles a little under the sheet: nothing pushes it down, only friction and slope brake it.
-TEST(WorldRests, ADeckThatIsASheetDoesNotPushDownWhatHasComeUnderIt) {
-  constexpr double kSlope = 0.03, kSpeed = 2.0, kFriction = 0.2, kSeconds = 0.5;
-  for (const bool upwards : {true, false}) {  // a file may wind it either way
-    TriangleMesh deck;
-    deck.vertices.resize(4, 3);
-    deck.vertices << -4, -1, 1, 4, -1, 1, 4, 1, 1, -4, 1, 1;
-    deck.triangles.resize(2, 3);
-    deck.triangles << 0, 1, 2, 0, 2, 3;
-    if (!upwards) deck.triangles.col(1).swap(deck.triangles.col(2));
-    WorldScene scene = sceneWith(boxSurface({8, 2, 0.4}, 8), {0, 0, 0.74});  // its top at 0.94
-    scene.objects[0].world_from_object.translation().z() += 2 * kSlope;
-    scene.objects[0].world_from_object.rotate(Eigen::AngleAxisd(kSlope, Eigen::Vector3d::UnitY()));
-    scene.support_meshes.push_back({"deck", deck});
-    scene.objects.push_back(scene.objects.front());
-    scene.objects[1].name = "cart", scene.objects[1].index = 2;
-    scene.objects[1].mesh = joined({{{0.6, 0.4, 0.3}, {0, 0, 0.2}},  // a box on a thin axle
-                                    {{0.1, 0.5, 0.05}, {0.2, 0, 0.025}},
-                                    {{0.1, 0.5, 0.05}, {-0.2, 0, 0.025}}});
-    scene.objects[1].world_from_object = Eigen::Translation3d(2, 0, 0.955);
-    WorldParams params;
-    params.defaults.surface.friction = params.support.friction = kFriction;
-    World world(scene, params);
-    Edit push = editOf(EditKind::kVelocity, EditMode::kAbsolute);
-    push.object = "cart";
-    push.vector = {-kSpeed, 0, 0};
-    world.submit(push);
-    world.advanceTo(0.0);
-    play(world, kSeconds);
-    const double way = 2.0 - centerOf(world.state(), 1).x();
-    const double braking = (kFriction + kSlope) * 9.81;
-    EXPECT_NEAR(way, (kSpeed - 0.5 * braking * kSeconds) * kSeconds, 0.1) << upwards;
-  }
-}
-
 // A cup on a box: it stays as the video has it while the box does, and falls when that is taken
 // away or falls itself.
 TEST(WorldRests, WhatRestsOnAnObjectFallsWhenThatMovesAway) {

@@ -6,6 +6,7 @@
 #include "calipso_render/colour.hpp"
 #include "light/shadow_check.hpp"
 #include "place/key_cover.hpp"
+#include "place/lifted_shade.hpp"
 #include "place/passing_shade.hpp"
 #include "place/place_relief.hpp"
 #include "place/plane_mirror.hpp"
@@ -20,6 +21,8 @@ constexpr float kUnshadedSun = 0.985f;
 constexpr float kOffPlane = 0.1f;
 // frames that must show a place past an object, from which on their median is believed
 constexpr int kFewestPast = 3;
+constexpr int kAlike = 5;       // px over which it is told whether a place is lit
+constexpr float kQuiet = 5.0f;  // code values of spread over time: the place rests
 
 // Where the depth image shows something else than a support plane.
 cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes,
@@ -65,6 +68,15 @@ cv::Mat linearOf(const cv::Mat& codes) {
     for (int i = 0; i < 3 * codes.cols; ++i) out[i] = linearFromRealCode(in[i]);
   }
   return linear;
+}
+
+cv::Mat luminanceOf(const cv::Mat& codes) {
+  const cv::Mat linear = linearOf(codes);
+  cv::Mat of(codes.size(), CV_32F);
+  for (int v = 0; v < codes.rows; ++v) {
+    for (int u = 0; u < codes.cols; ++u) of.at<float>(v, u) = luminance(linear.at<cv::Vec3f>(v, u));
+  }
+  return of;
 }
 
 // What other frames show past the objects that hide it at the key frame.
@@ -171,19 +183,53 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   return restingTraces(p, shadows, place, seenPast(e), params);
 }
 
+// What objects shade at the key frame whose poses in others nobody knows, as they deform, and where
+// the plate is as dark.
+cv::Mat unfollowedTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
+                         const cv::Mat& sky, const RenderParams& params, const Prepared& p) {
+  const SeenShadows shadows = seenShadows(sun, sky, e.picture, (p.key_labels != 0) | place.blind);
+  const double umbra = luminance(predictedUmbra(p.light.light, params.planes));
+  cv::Mat then, now, half_lit;  // half: of the steps from shade to light, which are ratios
+  cv::blur(luminanceOf(e.picture), then, {kAlike, kAlike});
+  cv::blur(luminanceOf(p.background.plate), now, {kAlike, kAlike});
+  cv::sqrt(umbra * sky + (1.0 - umbra) * sun, half_lit);
+  // What is narrower than a prediction's error goes with what is around it.
+  const int side = 2 * params.background.shadow_margin_px + 1;
+  cv::Mat lit = now.mul(half_lit) >= then;
+  cv::morphologyEx(lit, lit, cv::MORPH_OPEN,
+                   cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+  return shadeTraces(shadows, place, params) & ~lit;
+}
+
 // What objects that move shade in all frames that show it. Where others show it, their shade is
 // taken off the plate.
 cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const ReceiverOf& receiver,
-                      const RenderParams& params, Prepared& p) {
+                      const cv::Mat& sun, const cv::Mat& sky, const RenderParams& params,
+                      Prepared& p) {
   const PassingCast cast{p.surfaces, p.moves, p.light.light.direction.cast<double>(),
                          p.light.light.angular_radius,
                          params.planes.empty() ? params.up : params.planes.front().normal};
   const ShadeThatStays stays =
       leaveOutPassingShade(e.frames, cast, receiver, params.background, p.background);
-  if (stays.never_lit.empty()) return cv::Mat::zeros(p.key_labels.size(), CV_8U);
+  if (stays.never_lit.empty()) return unfollowedTraces(e, place, sun, sky, params, p);
   const SeenShadows shadows = seenShadows(stays.sun, stays.sky, p.background.plate,
                                           (p.background.count == 0) | place.blind);
   return shadeTraces(shadows, place, params) & stays.never_lit;
+}
+
+// The shade of objects at rest is taken off what the key frame shows, where that can be done.
+void liftTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
+                const cv::Mat& sky, const RenderParams& params, cv::Mat& traces, Prepared& p) {
+  cv::Mat covered = p.key_labels != 0;
+  for (const cv::Mat& f : p.footprints) {
+    if (!f.empty()) covered |= f;
+  }
+  const cv::Mat unclear = grown(covered, params.background.mask_margin_px) |
+                          (e.seen.spread >= kQuiet) | place.off_planes;
+  const cv::Mat lifted =
+      liftShade({e.picture, sun, sky, unclear, params.background.shadow_margin_px}, traces,
+                predictedUmbra(p.light.light, params.planes), p.background.plate);
+  traces.setTo(0, lifted);
 }
 
 // What planes mirror is taken off plate and key frame; where nothing else is left it is a trace.
@@ -243,10 +289,14 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
                    under_sky = receiversOf(params.planes, p.relief, place.off_planes, p.camera);
   const cv::Mat sun = placeVisibility(e.sun, in_sun, key.bgr.size()),
                 sky = placeVisibility(e.sky, under_sky, key.bgr.size());
-  const bool any_rests = std::find(p.moves.begin(), p.moves.end(), false) != p.moves.end();
+  const auto any = [&](bool moves) {
+    return std::find(p.moves.begin(), p.moves.end(), moves) != p.moves.end();
+  };
+  const bool any_rests = any(false), any_moves = any(true);
   cv::Mat traces =
       any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
-  traces |= passingTraces(e, place, in_sun, params, p);
+  if (any_rests && p.light.confirmed()) liftTraces(e, place, sun, sky, params, traces, p);
+  if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);
   if (p.mirror.established())
     takeOffMirrored((ground > 0.0f) & (place.off_planes == 0), traces, key, p);

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "render_test_scene.hpp"
+#include "ball_setting.hpp"
 
 namespace calipso::render {
 namespace {
@@ -125,6 +125,29 @@ TEST(PassingShade, NothingIsToldWithoutPoses) {
   EXPECT_TRUE(leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, {}, b)
                   .never_lit.empty());
   EXPECT_TRUE(b.shaded_at_times.empty());
+}
+
+// What deforms has no poses: the key frame's shadow is known alone. Where the plate is as dark it is
+// taken out, where other frames show it lit it is seen.
+TEST(PassingShade, OfWhatIsNotFollowedIsTakenOutWhereThePlateHasItToo) {
+  Clip clip = ballAlong({kTo, kTo + Eigen::Vector3d(0.02, 0.0, 0.0), kTo});
+  ClipSample sample;
+  for (ClipFrame& f : clip.frames) f.poses.clear(), sample.add(f);
+  const Prepared prepared = prepare(sample, {ballAt(kTo)}, params());
+  ASSERT_TRUE(prepared.moves[0]);
+  int shaded = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = clip.receiver(u, v);
+      if (!r || clip.frames[0].labels.at<std::uint8_t>(v, u) != 0 || !isInShadow(r->position, kTo))
+        continue;
+      ++shaded;
+      // The shadow leaves half of the codes; what is filled differs from the table by its pattern.
+      EXPECT_GT(prepared.background.plate.at<cv::Vec3f>(v, u)[2], 0.7f * tableColour(u, v)[2])
+          << u << " " << v;
+    }
+  }
+  EXPECT_GT(shaded, 100);
 }
 
 }  // namespace

@@ -87,7 +87,6 @@ std::vector<Eigen::Isometry3d> readCameraPath(const YAML::Node& root, const Yaml
 
 void readSupport(const YAML::Node& root, const YamlReader& reader, Scene& scene) {
   for (const auto& entry : root["support"]) {
-    reader.checkSpelling(entry, {"plane", "mesh", "name", "x_range"});
     if (entry["mesh"]) {
       scene.support_meshes.push_back(scene.directory + "/" + reader.text(entry, "mesh"));
       continue;
@@ -164,8 +163,6 @@ void readObjects(const YAML::Node& root, const std::string& file, Scene& scene) 
     }
   }
   if (scene.objects.empty()) reader.fail("objects", "is empty; list at least one object");
-  const YamlReader hints(file, "attachment_hints");
-  hints.checkSpelling(root["attachment_hints"], {names.begin(), names.end()});
 }
 
 }  // namespace
@@ -202,35 +199,10 @@ const SceneObject& Scene::object(const std::string& wanted) const {
                               "'; it has: " + known);
 }
 
-namespace {
-
-// The file may hold much else, such as the truth of a rendered scene.
-const std::vector<std::string> kSceneKeys = {"name",
-                                             "fps",
-                                             "frames",
-                                             "n_frames",
-                                             "width",
-                                             "height",
-                                             "fx",
-                                             "fy",
-                                             "cx",
-                                             "cy",
-                                             "distortion",
-                                             "world_T_camera",
-                                             "world_T_camera_per_frame",
-                                             "gravity",
-                                             "support",
-                                             "attachment_hints",
-                                             "depth_scale_m",
-                                             "objects"};
-
-}  // namespace
-
 Scene loadScene(const std::string& directory) {
   const std::string file = directory + "/scene.yaml";
   const YAML::Node root = YamlReader::load(file);
   const YamlReader reader(file, "");
-  reader.checkSpelling(root, kSceneKeys);
   Scene scene;
   scene.directory = directory;
   scene.name = root["name"] ? reader.text(root, "name")

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -21,25 +20,6 @@ std::string joined(const std::vector<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
-}
-
-// Levenshtein's distance: letters to be put in, left out or changed.
-std::size_t editDistance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({changed, diagonal + 1, row[j] + 1});
-    }
-  }
-  return row.back();
-}
-
-bool looksLike(const std::string& key, const std::string& known) {
-  return editDistance(key, known) <= std::max<std::size_t>(1, known.size() / 4);
 }
 
 }  // namespace
@@ -139,18 +119,6 @@ void YamlReader::checkKeys(const YAML::Node& node, const std::vector<std::string
       fail(key, "is not a known key; known ones are " + joined(known));
     if (!seen.insert(key).second)
       fail(key, "is given twice; only one of them would count: leave one out");
-  }
-}
-
-void YamlReader::checkSpelling(const YAML::Node& node,
-                               const std::vector<std::string>& known) const {
-  if (!node || !node.IsMap()) return;
-  for (const auto& entry : node) {
-    const std::string key = entry.first.as<std::string>();
-    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-    for (const std::string& meant : known)
-      if (!node[meant] && looksLike(key, meant))
-        fail(key, "is not read; is " + meant + " meant? What is read: " + joined(known));
   }
 }
 

@@ -37,9 +37,6 @@ class YamlReader {
 
   // @throw std::invalid_argument for a key of `node` that is not among `known`, or twice there
   void checkKeys(const YAML::Node& node, const std::vector<std::string>& known) const;
-  // For maps with keys that are not ours: @throw std::invalid_argument for one that looks like a
-  // known one that `node` does not have
-  void checkSpelling(const YAML::Node& node, const std::vector<std::string>& known) const;
 
  private:
   YAML::Node require(const YAML::Node& node, const std::string& key) const;

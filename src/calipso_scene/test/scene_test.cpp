@@ -157,24 +157,6 @@ TEST(Scene, badInputNamesKeyAndRemedy) {
   EXPECT_THROW(loadScene("/nowhere"), std::runtime_error);
 }
 
-// A key of the format is named where another looks like it; the truth's keys, too, look alike.
-TEST(Scene, aMisspeltKeyIsNotPassedOver) {
-  const auto expect = [](const std::string& yaml, const std::string& part) {
-    EXPECT_NE(errorOf(kHead + kPose + kObject + yaml).find(part), std::string::npos)
-        << yaml << ": " << errorOf(kHead + kPose + kObject + yaml);
-  };
-  expect("gravty: [0, 0, -1.6]\n", "gravty is not read; is gravity meant? What is read: name, fps");
-  expect("Support: []\n", "is support meant?");
-  expect("atachment_hints: {}\n", "is attachment_hints meant?");
-  expect("support:\n- {plane: [0, 0, 1, 0], xrange: [0, 1]}\n", "is x_range meant?");
-  expect("attachment_hints:\n  bal:\n  - {box_min: [0, 0, 0], box_max: [1, 1, 1]}\n",
-         "attachment_hints: bal is not read; is ball meant?");
-  EXPECT_EQ(errorOf(kHead + kPose + kObject +
-                    "n_plates: 1\nmasks: m\nplates: p\nnotes: n\nwave: {}\nframe: 1\nframes: "
-                    "frames/%d.jpg\ngravity: [0, 0, -1]\nsupports: 2\nsupport: []\n"),
-            "");
-}
-
 TEST(Scene, unknownObjectNamesTheKnownOnes) {
   const Scene scene = loadScene(writeScene(kHead + kPose + kObject));
   try {

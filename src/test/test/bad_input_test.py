@@ -82,13 +82,6 @@ class BadInput(unittest.TestCase):
         finally:
             rosparam.delete_param("/player/in_flight")  # the test's master keeps it
 
-    def test_node_that_could_not_start(self):
-        node = subprocess.run(["rosrun", "calipso_render", "render_node", "_scene:=" + self.scene, "_quality:=best"],
-                              timeout=60)
-        self.assertEqual(node.returncode, 1)
-        self.expect_complaint("render could not start", "'best'", "live or final")
-        rosparam.delete_param("/render/start_error")
-
     def test_missing_bag(self):
         self.expect_complaint("absent.bag", bag=self.path("absent.bag"))
 

@@ -11,7 +11,6 @@
 #include <stdexcept>
 
 #include "calipso_ros/conversions.hpp"
-#include "calipso_ros/node_main.hpp"
 #include "calipso_ros/topics.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
 #include "clip_checks.hpp"
@@ -190,22 +189,9 @@ std::vector<std::string> Player::unconnected() const {
   return names;
 }
 
-// What ended before it could report left its reason.
-void Player::checkStarts() const {
-  for (const std::string& node : silent()) {
-    std::string error;
-    if (nh_.getParam(node + "/" + kStartError, error) && !error.empty())
-      throw std::runtime_error(node + " could not start: " + error);
-  }
-}
-
 // A frame sent before everyone is connected would be lost to some.
 void Player::waitForGraph() {
-  const auto reported = [this] {
-    checkStarts();
-    return silent().empty();
-  };
-  if (!waitFor(reported, params_.connect_timeout_sec)) {
+  if (!waitFor([this] { return silent().empty(); }, params_.connect_timeout_sec)) {
     throw std::runtime_error("after " + std::to_string(params_.connect_timeout_sec) +
                              " s these nodes have not reported: " + listed(silent()) +
                              "; look for their own messages above");

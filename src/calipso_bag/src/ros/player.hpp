@@ -53,7 +53,6 @@ class Player {
   ros::Publisher advertise(const std::string& topic, bool latched);
   void advertiseAll();
   std::vector<std::string> silent() const;
-  void checkStarts() const;
   std::vector<std::string> unconnected() const;
   void waitForGraph();
   void announceClip();

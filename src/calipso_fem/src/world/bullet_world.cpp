@@ -45,29 +45,8 @@ bool BulletWorld::isDynamic(const btCollisionObject* object) {
   return !object->isStaticOrKinematicObject();
 }
 
-// The contact's normal looks from B to A.
-bool BulletWorld::fromBehind(const btManifoldPoint& point,
-                             const btPersistentManifold& manifold) const {
-  const auto against = [&](const btCollisionObject* sheet, int triangle, const btVector3& normal) {
-    const auto front = front_.find(sheet->getUserIndex());
-    return front != front_.end() && normal.dot(front->second[triangle]) < 0.0;
-  };
-  return against(manifold.getBody0(), point.m_index0, -point.m_normalWorldOnB) ||
-         against(manifold.getBody1(), point.m_index1, point.m_normalWorldOnB);
-}
-
-void BulletWorld::dropContactsFromBehind() {
-  if (front_.empty()) return;
-  for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
-    btPersistentManifold& manifold = *getDispatcher()->getManifoldByIndexInternal(i);
-    for (int k = manifold.getNumContacts() - 1; k >= 0; --k)
-      if (fromBehind(manifold.getContactPoint(k), manifold)) manifold.removeContactPoint(k);
-  }
-}
-
 void BulletWorld::forgiveOverlapOf(int id) {
   performDiscreteCollisionDetection();
-  dropContactsFromBehind();
   std::map<Pair, double> depth;
   for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
     const btPersistentManifold& manifold = *getDispatcher()->getManifoldByIndexInternal(i);
@@ -129,7 +108,6 @@ std::vector<btManifoldPoint*> BulletWorld::redundantContacts() {
 void BulletWorld::solveConstraints(btContactSolverInfo& info) {
   std::map<Pair, double> depth;
   closing_.clear();
-  dropContactsFromBehind();
   const std::vector<btManifoldPoint*> redundant = redundantContacts();
   for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i) {
     btPersistentManifold& manifold = *getDispatcher()->getManifoldByIndexInternal(i);

@@ -22,8 +22,6 @@ Eigen::Isometry3d fromBullet(const btTransform& pose);
 //  - a bounce takes place in the sub-step in which the surfaces meet; Bullet starts to brake bodies
 //    that are still apart, which costs most of the height of a bounce;
 //  - of a pair's many contacts, those that others stand for are left out (manifold_reduction.hpp);
-//  - the back of a sheet that has one side touches nothing: Bullet pushes what has come a little
-//    under a support down and out, against whatever else carries it;
 //  - free flight is exact: Bullet's x += h (v + h a) leads the parabola by h^2 a / 2.
 class BulletWorld : public btDiscreteDynamicsWorld {
  public:
@@ -40,8 +38,6 @@ class BulletWorld : public btDiscreteDynamicsWorld {
   // Detects contacts, and forgives `id` the depth it has in others.
   void forgiveOverlapOf(int id);
   void forget(int id);
-  // Only the side that these triangles' unit normals (world) face touches anything.
-  void setFront(int id, std::vector<btVector3> normals) { front_[id] = std::move(normals); }
   void setPairSurface(const Pair& pair, std::optional<double> friction,
                       std::optional<double> restitution);
   double frictionOf(const btCollisionObject& a, const btCollisionObject& b) const;
@@ -57,15 +53,12 @@ class BulletWorld : public btDiscreteDynamicsWorld {
 
  private:
   void solveConstraints(btContactSolverInfo& info) override;
-  void dropContactsFromBehind();
-  bool fromBehind(const btManifoldPoint& point, const btPersistentManifold& manifold) const;
   void adjust(btManifoldPoint& point, const btPersistentManifold& manifold, double h,
               double forgiven);
   std::vector<btManifoldPoint*> redundantContacts();
   void findTouches();
 
-  std::map<int, std::vector<btVector3>> front_;  // by triangle
-  std::map<Pair, double> forgiven_;              // m
+  std::map<Pair, double> forgiven_;  // m
   struct PairSurface {
     std::optional<double> friction, restitution;
   };

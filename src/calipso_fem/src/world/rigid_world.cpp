@@ -31,20 +31,6 @@ void applySurface(btRigidBody& body, const SurfaceSettings& surface) {
   body.setRollingFriction(surface.rolling_friction);
 }
 
-// Unit normals of a static body's triangles, world.
-std::vector<btVector3> frontOf(const RigidBodySpec& spec) {
-  const TriangleMesh& mesh = spec.shapes.front();
-  std::vector<btVector3> normals;
-  for (int t = 0; t < mesh.triangleCount(); ++t) {
-    const Eigen::Vector3d a = mesh.vertex(mesh.triangles(t, 0)),
-                          b = mesh.vertex(mesh.triangles(t, 1)),
-                          c = mesh.vertex(mesh.triangles(t, 2));
-    const Eigen::Vector3d across = (b - a).cross(c - a).normalized();
-    normals.push_back(toBullet(Eigen::Vector3d(spec.world_from_object.linear() * across)));
-  }
-  return normals;
-}
-
 }  // namespace
 
 RigidWorld::RigidWorld() : impl_(std::make_unique<Impl>()) {}
@@ -86,7 +72,6 @@ RigidWorld::Id RigidWorld::add(const RigidBodySpec& spec) {
     body.body->setAngularVelocity(toBullet(spec.angular));
   }
   const Id id = impl_->enter(std::move(body));
-  if (spec.one_sided) impl_->world.setFront(id, frontOf(spec));
   if (dynamic) impl_->world.forgiveOverlapOf(id);
   if (spec.asleep) impl_->at(id).body->forceActivationState(ISLAND_SLEEPING);
   return id;

@@ -27,19 +27,6 @@ ContactParams contactParams(const WorldScene& scene, const WorldParams& params) 
   return c;
 }
 
-// A sheet that carries faces up, whichever way its file winds it.
-void faceUp(TriangleMesh* sheet, const Eigen::Vector3d& gravity) {
-  if (isClosed(*sheet)) return;
-  Eigen::Vector3d across = Eigen::Vector3d::Zero();
-  for (int t = 0; t < sheet->triangleCount(); ++t) {
-    const Eigen::Vector3d a = sheet->vertex(sheet->triangles(t, 0)),
-                          b = sheet->vertex(sheet->triangles(t, 1)),
-                          c = sheet->vertex(sheet->triangles(t, 2));
-    across += (b - a).cross(c - a);
-  }
-  if (across.dot(gravity) > 0.0) sheet->triangles.col(1).swap(sheet->triangles.col(2));
-}
-
 }  // namespace
 
 Material observedMaterial(const WorldObject& object, const ObjectSettings& settings,
@@ -74,10 +61,8 @@ World::Impl::Impl(WorldScene scene_in, WorldParams params_in)
       contacts(contactParams(scene, params)) {
   validate(params);
   validateScene(scene);
-  for (SupportMesh& mesh : scene.support_meshes) {
-    faceUp(&mesh.mesh, scene.gravity);
+  for (const SupportMesh& mesh : scene.support_meshes)
     support_trees.push_back(std::make_unique<SurfaceTree>(mesh.mesh));
-  }
   for (const WorldObject& object : scene.objects) {
     Actor actor(object);
     actor.id = static_cast<int>(actors.size());

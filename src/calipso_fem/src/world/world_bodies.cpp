@@ -301,7 +301,6 @@ void World::Impl::addColliders() {
     spec.shapes = {mesh.mesh};
     spec.motion = RigidMotion::kStatic;
     spec.surface = params.support;
-    spec.one_sided = !isClosed(mesh.mesh);
     supports.push_back(rigid.add(spec));
   }
   for (Actor& actor : actors) addCollider(actor);

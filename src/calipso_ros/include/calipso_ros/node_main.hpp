@@ -9,9 +9,6 @@
 
 namespace calipso {
 
-// A node's own parameter: why it could not start. The player reads it, and ends the run.
-constexpr char kStartError[] = "start_error";
-
 // A parameter without which the node cannot run.
 // @throw std::invalid_argument naming the parameter
 template <typename T>
@@ -45,14 +42,12 @@ int runNode(int argc, char** argv, const std::string& name) {
   ros::init(argc, argv, name);
   ros::NodeHandle nh;
   ros::NodeHandle pnh("~");
-  pnh.setParam(kStartError, "");
   try {
     Node node(nh, pnh);
     ros::spin();
     return 0;
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM(name << ": " << error.what());
-    pnh.setParam(kStartError, error.what());
     return 1;
   }
 }

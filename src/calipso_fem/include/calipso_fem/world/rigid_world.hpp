@@ -26,7 +26,6 @@ struct RigidBodySpec {
   Eigen::Vector3d linear = Eigen::Vector3d::Zero();   // of the centre of mass, m/s
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();  // rad/s
   bool asleep = false;
-  bool one_sided = false;  // static: only the side that its triangles face touches anything
 };
 
 // A point where a dynamic rigid body rests on, or is about to touch, something rigid.
