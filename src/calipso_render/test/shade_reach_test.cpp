@@ -22,10 +22,10 @@ Points verticesAt(const Eigen::Vector3d& centre) {
 }
 
 cv::Mat reachOf(const Eigen::Vector3d& centre, bool confirmed,
-                const std::vector<SupportPlane>& planes = table()) {
-  return shadeReach({ballAround(verticesAt(centre))},
-                    sunRange(sunlight().direction, confirmed, kUp), {PlaneView(planes, camera())},
-                    {kWidth, kHeight});
+                const std::vector<SupportPlane>& planes = table(),
+                const Eigen::Vector3f& to_sun = sunlight().direction) {
+  return shadeReach({ballAround(verticesAt(centre))}, sunRanges(to_sun, confirmed, kUp),
+                    {PlaneView(planes, camera())}, {kWidth, kHeight});
 }
 
 // 255 where less than half of the sun is seen past the ball.
@@ -55,6 +55,13 @@ TEST(ShadeReach, AnUnconfirmedSunMayStandAnywhere) {
   const cv::Mat confirmed = reachOf(kHigh, true), anywhere = reachOf(kHigh, false);
   EXPECT_EQ(cv::countNonZero(shadowOf(kHigh) & ~anywhere), 0);
   EXPECT_GT(cv::countNonZero(anywhere), cv::countNonZero(confirmed));
+}
+
+TEST(ShadeReach, AnUnconfirmedSunMayStandAsLowAsItWasFitted) {
+  const Eigen::Vector3f low = Eigen::Vector3f(1.0f, 0.0f, 0.1f).normalized();
+  EXPECT_EQ(
+      cv::countNonZero(reachOf(kHigh, true, table(), low) & ~reachOf(kHigh, false, table(), low)),
+      0);
 }
 
 TEST(ShadeReach, IsNowhereWhereNothingTakesShade) {

@@ -7,23 +7,28 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kStride = 4;            // px between the places that are looked at
-constexpr float kNear = 2.0f;         // radii from a ball's centre: it hides a quarter of the sky
-constexpr float kConfirmed = 0.26f;   // rad, 15 degrees: by how much a confirmed sun may be off
-constexpr float kFromZenith = 1.22f;  // rad, 70 degrees: how low an unconfirmed one may stand
+constexpr int kStride = 4;             // px between the places that are looked at
+constexpr float kNear = 2.0f;          // radii from a ball's centre: it hides a quarter of the sky
+constexpr float kAboutFitted = 0.26f;  // rad, 15 degrees: by how much a confirmed sun may be off
+constexpr float kFromZenith = 1.22f;   // rad, 70 degrees: how low one may stand that was not seen
 
-bool reaches(const Ball& ball, const SunRange& sun, const Eigen::Vector3f& place) {
+bool reaches(const Ball& ball, const std::vector<SunRange>& sun, const Eigen::Vector3f& place) {
   const Eigen::Vector3f way = ball.centre - place;
   const float distance = way.norm();
   if (distance < kNear * ball.radius) return true;
-  const float off = std::acos(std::clamp(way.dot(sun.axis) / distance, -1.0f, 1.0f));
-  return off < sun.angle + std::asin(ball.radius / distance);
+  const float half = std::asin(ball.radius / distance);
+  return std::any_of(sun.begin(), sun.end(), [&](const SunRange& range) {
+    return std::acos(std::clamp(way.dot(range.axis) / distance, -1.0f, 1.0f)) < range.angle + half;
+  });
 }
 
 }  // namespace
 
-SunRange sunRange(const Eigen::Vector3f& to_sun, bool confirmed, const Eigen::Vector3f& up) {
-  return confirmed ? SunRange{to_sun, kConfirmed} : SunRange{up, kFromZenith};
+std::vector<SunRange> sunRanges(const Eigen::Vector3f& to_sun, bool confirmed,
+                                const Eigen::Vector3f& up) {
+  std::vector<SunRange> ranges = {{to_sun, kAboutFitted}};
+  if (!confirmed) ranges.push_back({up, kFromZenith});
+  return ranges;
 }
 
 Ball ballAround(const Points& vertices) {
@@ -35,8 +40,8 @@ Ball ballAround(const Points& vertices) {
   return ball;
 }
 
-cv::Mat shadeReach(const std::vector<Ball>& balls, const SunRange& sun, const PlaceView& place,
-                   const cv::Size& size) {
+cv::Mat shadeReach(const std::vector<Ball>& balls, const std::vector<SunRange>& sun,
+                   const PlaceView& place, const cv::Size& size) {
   cv::Mat reach = cv::Mat::zeros(size, CV_8U);
 #pragma omp parallel for schedule(dynamic, 4)
   for (int v = 0; v < size.height; v += kStride) {
@@ -61,8 +66,8 @@ cv::Mat reachOfPassing(const StagedFrame& frame, const PlaceView& place) {
     if (!vertices) return {};
     balls.push_back(ballAround(*vertices));
   }
-  const SunRange sun = sunRange(prepared.light.light.direction, prepared.light.confirmed(),
-                                frame.params.up.cast<float>());
+  const auto sun = sunRanges(prepared.light.light.direction, prepared.light.confirmed(),
+                             frame.params.up.cast<float>());
   return shadeReach(balls, sun, place, frame.labels.size());
 }
 

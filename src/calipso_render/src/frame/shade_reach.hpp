@@ -15,9 +15,10 @@ struct SunRange {
   float angle;           // rad, between axis and side
 };
 
-// About the one that was fitted. Where nothing confirms it, it may be anywhere well above the
+// About the one that was fitted. Where nothing confirms it, it may also be anywhere well above the
 // horizon.
-SunRange sunRange(const Eigen::Vector3f& to_sun, bool confirmed, const Eigen::Vector3f& up);
+std::vector<SunRange> sunRanges(const Eigen::Vector3f& to_sun, bool confirmed,
+                                const Eigen::Vector3f& up);
 
 // What encloses an object.
 struct Ball {
@@ -29,8 +30,8 @@ Ball ballAround(const Points& vertices);
 
 // Where an object's shade can lie: the sun is behind its ball, or the ball is so near that it hides
 // much of the sky. CV_8UC1, 255; 0 where nothing that takes shade is seen.
-cv::Mat shadeReach(const std::vector<Ball>& balls, const SunRange& sun, const PlaceView& place,
-                   const cv::Size& size);
+cv::Mat shadeReach(const std::vector<Ball>& balls, const std::vector<SunRange>& sun,
+                   const PlaceView& place, const cv::Size& size);
 
 // The same of all edited objects that move in the video, where it has them in this frame; empty:
 // anywhere, since that is not known of one of them.

@@ -15,6 +15,8 @@ constexpr int kDepths = 24;      // tried behind an object
 constexpr int kFewestViews = 3;  // that must look behind it
 constexpr int kAround = 15;      // px of the square whose spread is compared
 constexpr float kNoSpread = 1e9f;
+// times the spread at another depth, and code values over it, that a support plane's may have
+constexpr float kAsWell = 1.3f, kNoise = 0.5f;
 constexpr float kBefore = 1.1f;        // times that what hides a place is nearer than it,
 constexpr float kLeastBefore = 1e-4f;  // 1/m
 
@@ -95,37 +97,73 @@ std::vector<float> depthsAround(const cv::Mat& nearness, const cv::Mat& hidden) 
   return depths;
 }
 
-void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, int margin,
-           cv::Mat& nearness) {
+// How much frames differ in what they show at the hidden pixels, if these are as near as `nearness`
+// says there: mean over the square around, of pixels that enough frames show; kNoSpread at others.
+cv::Mat spreadOf(const std::vector<Sight>& sights, const Camera& key, const cv::Mat& hidden,
+                 const cv::Rect& box, const cv::Mat& nearness) {
+  cv::Mat spread(box.size(), CV_32F, cv::Scalar(0.0f)), counted = spread.clone(), total;
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int v = 0; v < box.height; ++v) {
+    std::vector<int> values;
+    for (int u = 0; u < box.width; ++u) {
+      if (hidden.at<std::uint8_t>(v + box.y, u + box.x) == 0) continue;
+      const float s = spreadAt(sights, key.ray(u + box.x, v + box.y).cast<float>(),
+                               nearness.at<float>(v, u), values);
+      if (s < kNoSpread) spread.at<float>(v, u) = s, counted.at<float>(v, u) = 1.0f;
+    }
+  }
+  const cv::Mat unseen = counted == 0.0f;
+  cv::blur(spread, spread, {kAround, kAround});
+  cv::blur(counted, total, {kAround, kAround});
+  spread /= total;
+  spread.setTo(kNoSpread, unseen);
+  return spread;
+}
+
+// Where a support plane goes on behind the objects: frames that show it agree about as well as at
+// any other depth. What no frame shows of it is as the nearest pixel of which they tell: there other
+// depths have no rival, however wrong.
+// @param least, plane CV_32FC1: spread at the best other depth, and at the plane's
+cv::Mat planeGoesOn(const cv::Mat& least, const cv::Mat& plane) {
+  const cv::Mat told = plane < kNoSpread;
+  if (cv::countNonZero(told) == 0) return cv::Mat::zeros(plane.size(), CV_8U);
+  const cv::Mat agrees = told & (plane <= kAsWell * least + kNoise);
+  cv::Mat away, nearest, goes_on(plane.size(), CV_8U);
+  cv::distanceTransform(told == 0, away, nearest, cv::DIST_L2, 5, cv::DIST_LABEL_PIXEL);
+  std::vector<std::uint8_t> by_label(told.total() + 1, 0);
+  for (int v = 0; v < told.rows; ++v) {
+    for (int u = 0; u < told.cols; ++u) {
+      if (told.at<std::uint8_t>(v, u) != 0)
+        by_label[nearest.at<int>(v, u)] = agrees.at<std::uint8_t>(v, u);
+    }
+  }
+  for (int v = 0; v < told.rows; ++v) {
+    for (int u = 0; u < told.cols; ++u)
+      goes_on.at<std::uint8_t>(v, u) = by_label[nearest.at<int>(v, u)];
+  }
+  return goes_on;
+}
+
+// @param ground CV_32FC1: nearness of the support planes, 0 where none is
+void sweep(const std::vector<ClipFrame>& frames, const cv::Mat& hidden, const cv::Mat& ground,
+           int margin, cv::Mat& nearness) {
   const cv::Rect box = cv::boundingRect(hidden);
   const Camera& key = frames.front().camera;
   std::vector<Sight> sights;
   for (const ClipFrame& f : frames) sights.emplace_back(f, key, margin);
-  cv::Mat least(box.size(), CV_32F, cv::Scalar(kNoSpread)), known = hidden == 0;
+  cv::Mat least(box.size(), CV_32F, cv::Scalar(kNoSpread)), best = nearness(box).clone();
   for (const float depth : depthsAround(nearness, hidden)) {
-    cv::Mat spread(box.size(), CV_32F, cv::Scalar(0.0f)), counted = spread.clone(), total;
-#pragma omp parallel for schedule(dynamic, 4)
-    for (int v = 0; v < box.height; ++v) {
-      std::vector<int> values;
-      for (int u = 0; u < box.width; ++u) {
-        if (hidden.at<std::uint8_t>(v + box.y, u + box.x) == 0) continue;
-        const float s =
-            spreadAt(sights, key.ray(u + box.x, v + box.y).cast<float>(), depth, values);
-        if (s < kNoSpread) spread.at<float>(v, u) = s, counted.at<float>(v, u) = 1.0f;
-      }
-    }
-    cv::blur(spread, spread, {kAround, kAround});
-    cv::blur(counted, total, {kAround, kAround});
-    for (int v = 0; v < box.height; ++v) {
-      for (int u = 0; u < box.width; ++u) {
-        if (counted.at<float>(v, u) == 0.0f) continue;
-        const float s = spread.at<float>(v, u) / total.at<float>(v, u);
-        if (s >= least.at<float>(v, u)) continue;
-        least.at<float>(v, u) = s, nearness.at<float>(v + box.y, u + box.x) = depth,
-                           known.at<std::uint8_t>(v + box.y, u + box.x) = 255;
-      }
-    }
+    const cv::Mat all(box.size(), CV_32F, cv::Scalar(depth));
+    const cv::Mat spread = spreadOf(sights, key, hidden, box, all), better = spread < least;
+    spread.copyTo(least, better), all.copyTo(best, better);
   }
+  cv::Mat known = hidden == 0;
+  const cv::Mat plane = ground(box),
+                on_plane =
+                    planeGoesOn(least, spreadOf(sights, key, hidden, box, plane)) & (plane > 0.0f);
+  plane.copyTo(best, on_plane);
+  best.copyTo(nearness(box), hidden(box));
+  known(box) |= on_plane | (least < kNoSpread);
   cv::Mat weight;
   known.convertTo(weight, CV_32F, 1.0 / 255.0);
   pushPull(nearness, weight).copyTo(nearness, known == 0);
@@ -180,17 +218,18 @@ cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<Su
                       const cv::Mat& depth, int margin) {
   const ClipFrame& key = frames.front();
   const Eigen::Isometry3d from_world = key.camera.world_from_camera.inverse();
-  cv::Mat nearness(key.bgr.size(), CV_32F);
+  cv::Mat ground(key.bgr.size(), CV_32F), nearness(key.bgr.size(), CV_32F);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u) {
       const float d = depth.empty() ? 0.0f : depth.at<float>(v, u);
-      nearness.at<float>(v, u) =
-          d > 0.0f ? 1.0f / d : planeNearness(planes, key.camera, from_world, u, v);
+      ground.at<float>(v, u) = planeNearness(planes, key.camera, from_world, u, v);
+      nearness.at<float>(v, u) = d > 0.0f ? 1.0f / d : ground.at<float>(v, u);
     }
   }
   const cv::Mat hidden = grown(key.labels != 0, margin);
-  if (!depth.empty() && cv::countNonZero(hidden) > 0) sweep(frames, hidden, margin, nearness);
+  if (!depth.empty() && cv::countNonZero(hidden) > 0)
+    sweep(frames, hidden, ground, margin, nearness);
   return nearness;
 }
 
