@@ -79,8 +79,10 @@ struct Passing {
 
   static Eigen::Vector3d centre(int k) { return {-0.25 + 0.05 * k, 0.1, 0.2}; }
 
-  Passing() {
+  // @param brightness part of the setting's; noise: deviation, code values
+  explicit Passing(double brightness = 1.0, double noise = 0.0) {
     ClipSample clip;
+    cv::RNG rng(7);
     for (int k = 0; k < kFrames; ++k) {
       ClipFrame f = frameWithBall(ballAt(centre(k)));
       shadow = shadowOf(centre(k)) & (f.labels == 0);
@@ -88,6 +90,10 @@ struct Passing {
       const cv::Mat dim = 0.6 * emptyTable();
       dim.copyTo(f.bgr, shadow);
       shadow(cloud).setTo(0);
+      cv::Mat grain(f.bgr.size(), CV_32FC3), grainy;
+      rng.fill(grain, cv::RNG::NORMAL, 0.0, std::max(noise, 1e-6));
+      f.bgr.convertTo(grainy, CV_32F, brightness);
+      cv::Mat(grainy + grain).convertTo(f.bgr, CV_8U);
       f.poses = {{kBallLabel, poseAt(k)}};
       frames.push_back(f), clip.add(f);
     }
@@ -121,6 +127,13 @@ TEST(Renderer, TakesOutThePassingShadowOfAnObjectAndNoOther) {
   ASSERT_GT(cv::countNonZero(p.shadow), 100);
   EXPECT_GT(psnr(out.bgr, emptyTable(), p.shadow), 35.0);
   EXPECT_EQ(cv::countNonZero(out.provenance(p.cloud)), 0) << "the cloud's is the video's";
+}
+
+// There single pixels tell neither that the place rests nor the shadow's colour.
+TEST(Renderer, TakesOutAPassingShadowInGrainyDusk) {
+  const Passing p(0.5, 6.0);
+  const FrameOutput out = p.removed(Passing::poseAt(Passing::kFrames - 1));
+  EXPECT_GT(cv::countNonZero(out.provenance & p.shadow), 0.97 * cv::countNonZero(p.shadow));
 }
 
 // Where the object is in the video is not known, its shadow may be any that passes.

@@ -16,6 +16,8 @@ struct Background {
   cv::Mat plate;   // CV_32FC3, code values
   cv::Mat count;   // CV_8UC1: frames of the sample in which the pixel was seen (at most 255)
   cv::Mat spread;  // CV_32FC1: median absolute deviation over time, code values
+  // code values of spread up to which a place rests: what the camera's noise makes of still ones
+  float resting_spread = 0.0f;
   // CV_8UC1, may be empty: != 0 where moving objects are predicted to cast shade at times, so that
   // `spread` does not tell whether the place itself moves
   cv::Mat shaded_at_times;

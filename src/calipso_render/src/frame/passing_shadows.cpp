@@ -17,13 +17,15 @@ constexpr float kDarkerElsewhere = 0.9f;
 constexpr int kLeastPassing = 5;    // px across, and in another view
 constexpr int kLeastElsewhere = 9;  // that somewhere within
 constexpr int kPassingReach = 12;   // px: an edge that the plate misses looks like a narrow shadow
-constexpr int kRimShare = 50;   // of the picture's width: how far a mask may miss a moving object
-constexpr int kMargin = 6;      // px around a shadow
-constexpr float kQuiet = 5.0f;  // code values of spread over time: the background rests
+constexpr int kRimShare = 50;  // of the picture's width: how far a mask may miss a moving object
+constexpr int kMargin = 6;     // px around a shadow
+constexpr int kHalfLit = 128;  // level of the sun: another object's shadow
+constexpr int kVoters = 9;     // px of the square whose dark pixels vote on their colour
 
 cv::Mat square(int side) { return cv::Mat::ones(side, side, CV_8U); }
 
-// Keeps where all channels are darkened alike.
+// Keeps where all channels are darkened alike, at most of the dark pixels around: in deep shade the
+// noise of one tells little of its colour.
 // @param now, plate CV_8UC3
 // @param dark CV_8UC1, in and out
 void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) {
@@ -32,29 +34,31 @@ void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) 
   cv::Mat shaded, lit;
   cv::blur(now(box), shaded, {5, 5});
   cv::blur(plate(box), lit, {5, 5});
+  cv::Mat votes(box.size(), CV_32F, cv::Scalar(0.0f)), inside = dark(box);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < box.height; ++v) {
-    std::uint8_t* row = dark.ptr<std::uint8_t>(box.y + v) + box.x;
     for (int u = 0; u < box.width; ++u) {
-      if (row[u] == 0) continue;
-      if (!darkenedAlike(shaded.at<cv::Vec3b>(v, u), lit.at<cv::Vec3b>(v, u))) row[u] = 0;
+      if (inside.at<std::uint8_t>(v, u) != 0)
+        votes.at<float>(v, u) =
+            darkenedAlike(shaded.at<cv::Vec3b>(v, u), lit.at<cv::Vec3b>(v, u)) ? 1.0f : -1.0f;
     }
   }
+  cv::blur(votes, votes, {kVoters, kVoters});
+  inside &= votes > 0.0f;
 }
 
 // PlateInView::quiet
 cv::Mat quietPlaces(const StagedFrame& frame, const SeenPlace& place) {
-  cv::Mat at_key =
-      (frame.prepared.background.count > 0) & (frame.prepared.background.spread < kQuiet);
-  if (frame.prepared.background.drifting.established())
-    at_key.setTo(0, frame.prepared.background.drifting.where());
+  const Background& background = frame.prepared.background;
+  cv::Mat at_key = (background.count > 0) & (background.spread < background.resting_spread);
+  if (background.drifting.established()) at_key.setTo(0, background.drifting.where());
   if (!frame.prepared.scenery.empty() && !frame.prepared.nearness.empty())
     at_key.setTo(0, frame.prepared.nearness == 0.0f);
   if (place.from_key.empty()) return at_key;
   cv::Mat here;
   cv::remap(at_key, here, place.from_key, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
             cv::Scalar(0));
-  if (!place.spread_beside.empty()) here |= place.spread_beside < kQuiet;
+  if (!place.spread_beside.empty()) here |= place.spread_beside < background.resting_spread;
   return here;
 }
 
@@ -82,6 +86,14 @@ void keepWide(bool same_view, cv::Mat& dark) {
   dark &= broad;
 }
 
+// What other objects shade stays theirs, where it is known.
+void takeOutOthers(const StagedFrame& frame, const cv::Mat& others_sun, cv::Mat& dark) {
+  if (others_sun.empty() || !frame.prepared.light.confirmed()) return;
+  cv::Mat shaded;
+  cv::dilate(others_sun < kHalfLit, shaded, disc(frame.params.background.shadow_margin_px));
+  dark.setTo(0, shaded);
+}
+
 // The rim that the mask of another moving object has missed is no shadow.
 void takeOutRims(const StagedFrame& frame, cv::Mat& dark) {
   for (std::size_t i = 0; i < frame.edited.size(); ++i) {
@@ -96,7 +108,7 @@ void takeOutRims(const StagedFrame& frame, cv::Mat& dark) {
 }  // namespace
 
 cv::Mat passingShadows(const StagedFrame& frame, const SeenPlace& place, const cv::Mat& unmirrored,
-                       PlateInView& at_key) {
+                       const cv::Mat& others_sun, PlateInView& at_key) {
   if (!frame.movesInVideo()) return {};
   if (frame.at_key_camera && at_key.codes.empty()) at_key = plateInView(frame, place);
   const PlateInView plate = frame.at_key_camera ? at_key : plateInView(frame, place);
@@ -109,6 +121,7 @@ cv::Mat passingShadows(const StagedFrame& frame, const SeenPlace& place, const c
   if (!reach.empty()) dark &= reach;
   keepDarkenedAlike(unmirrored, plate.codes, dark);
   keepWide(frame.at_key_camera, dark);
+  takeOutOthers(frame, others_sun, dark);
   cv::dilate(dark, dark, disc(kMargin));
   takeOutRims(frame, dark);
   return dark;

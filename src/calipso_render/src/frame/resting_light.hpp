@@ -21,8 +21,9 @@ class RestingLight {
   // Brings it up to date: after it this light is that of the frame.
   const RestingLight& update(const StagedFrame& frame, const SeenPlace& place);
 
-  // What objects that are not edited hide of the sun.
+  // What objects that are not edited hide of the sun; its levels, empty: nothing.
   const Visibility& others() const { return *others_; }
+  const cv::Mat& othersSun() const { return others_sun_; }
   // Of the edited objects where the video has them; null: of none.
   const Visibility* originals() const { return originals_.get(); }
   const SkyGrid& originalsSky() const { return originals_sky_; }

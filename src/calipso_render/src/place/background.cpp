@@ -15,6 +15,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kAgree = 7;  // px; a shadow that stays covers most of such a square or nothing of it
+constexpr float kLeastResting = 5.0f;  // code values: of Background::resting_spread
 constexpr float kMovingSpread = 2.2f;  // times what still places have, and
 constexpr float kLeastMoving = 2.0f;   // code values: from there on a place moves by itself
 constexpr int kMovingGap = 12;         // px between moving places that move with them
@@ -61,6 +62,8 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
     }
   }
   b.invented = b.count == 0;
+  b.resting_spread =
+      std::max(kLeastResting, kMovingSpread * quantileOf(b.spread, b.invented == 0, 0.25));
   return b;
 }
 
