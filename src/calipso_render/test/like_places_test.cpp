@@ -6,6 +6,7 @@
 #include <random>
 
 #include "render_test_scene.hpp"
+#include "texture/mesh_topology.hpp"
 
 namespace calipso::render {
 namespace {
@@ -48,10 +49,10 @@ std::vector<LikePlace> judged(const std::function<cv::Vec3f(const Eigen::Vector3
 // What is seen is repeated about places where its pattern repeats itself.
 TEST(LikePlaces, AreTurnedAboutTheMiddlesOfGores) {
   std::vector<LikePlace> like = judged(goreAt);
-  EXPECT_LT(like.front().agrees, 0.2f);
+  EXPECT_LT(like.front().agrees.value(), 0.2f);
   keepBest(3, like);
   ASSERT_EQ(like.size(), 3u);
-  EXPECT_GT(like.front().agrees, 0.8f);
+  EXPECT_GT(like.front().agrees.value(), 0.8f);
   int same = 0, all = 0;
   for (int i = 0; i < 360; ++i, ++all) {
     const float angle = static_cast<float>(i * M_PI / 180.0);
@@ -69,6 +70,44 @@ TEST(LikePlaces, OfOneColourAreThoseNearestToTheMiddle) {
   EXPECT_EQ(like.front().agrees, 1.0f);
   keepBest(3, like);
   EXPECT_EQ(like.front().of(place).point, first);
+}
+
+// Where nothing tells, the shape is believed unless what is seen speaks clearly for others.
+TEST(LikePlaces, ThatNothingTellsOfComeBetweenTheOthers) {
+  const auto same = [](const Place& place) { return place; };
+  std::vector<LikePlace> like = {{same, 0.2f}, {same, 0.8f}, {same, std::nullopt}, {same, 0.95f}};
+  keepBest(3, like);
+  ASSERT_EQ(like.size(), 3u);
+  EXPECT_EQ(like[0].agrees, 0.95f);
+  EXPECT_FALSE(like[1].agrees);
+  EXPECT_EQ(like[2].agrees, 0.8f);
+}
+
+// A ball between two others: the outer ones are each other's images, the middle one its own.
+TEST(LikePlaces, MirroredAreOfTheMirroredPart) {
+  ObjectModel model = ballAt(Eigen::Vector3d::Zero());
+  const TriangleMesh one = ball(8);
+  const Eigen::Index vertices = one.vertices.rows(), triangles = one.triangles.rows();
+  model.mesh.vertices.resize(3 * vertices, 3), model.mesh.triangles.resize(3 * triangles, 3);
+  for (int i = 0; i < 3; ++i) {
+    model.mesh.vertices.middleRows(i * vertices, vertices) =
+        one.vertices.rowwise() + Eigen::RowVector3d(3.0 * kBallRadius * (i - 1), 0.0, 0.0);
+    model.mesh.triangles.middleRows(i * triangles, triangles) =
+        one.triangles.array() + static_cast<int>(i * vertices);
+  }
+  const Surface surface = makeSurface(model);
+  const std::vector<int> parts = connectedParts(surface.key_vertices, surface.triangles);
+  const int left = parts[0], middle = parts[triangles], right = parts[2 * triangles];
+  bool across = false;
+  for (const LikePlace& like : mirroredPlaces(surface, parts)) {
+    const Eigen::Vector3f x(-3.0f * static_cast<float>(kBallRadius), 0.0f, 0.0f);
+    const Place image = like.of({x, Eigen::Vector3f::UnitX(), left});
+    const bool changes = image.point.x() > 0.0f;
+    EXPECT_EQ(image.part, changes ? right : left);
+    EXPECT_EQ(like.of({{0, 0, 0}, Eigen::Vector3f::UnitX(), middle}).part, middle);
+    across = across || changes;
+  }
+  EXPECT_TRUE(across);
 }
 
 // Spots that nothing repeats.

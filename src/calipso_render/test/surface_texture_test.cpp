@@ -147,7 +147,8 @@ TEST(DiffuseOverMesh, GoesOverToAValueFarAway) {
   std::vector<cv::Vec3f> values(vertices.size());
   known[0] = known[1] = true;
   values[0] = values[1] = {1, 1, 1};
-  diffuseOverMesh(vertices, triangles, known, values, FarValue{{0.0f, 1.0f, 0.0f}, kReach});
+  diffuseOverMesh(vertices, triangles, known, values,
+                  FarValues{std::vector<cv::Vec3f>(vertices.size(), {0.0f, 1.0f, 0.0f}), kReach});
   EXPECT_GT(values[2][0], 0.7f);
   // The strip's rims have fewer links than the formula takes for granted: within a factor of two.
   const float at_reach = values[2 * static_cast<int>(kReach / kStep)][0];

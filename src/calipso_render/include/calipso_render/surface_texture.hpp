@@ -44,16 +44,16 @@ class SurfaceTexture {
 };
 
 // What vertices far from all that is known go over to: by 1 - 1/e within `reach`, m.
-struct FarValue {
-  cv::Vec3f value;
+struct FarValues {
+  std::vector<cv::Vec3f> value;  // per vertex
   float reach;
 };
 
 // Fills vertices that have no value smoothly from those that have (harmonic on the mesh, or screened
-// Poisson with a value far away; vertices at one place are one).
+// Poisson with values far away; vertices at one place are one).
 // @param known per vertex; at least one must be
 void diffuseOverMesh(const Points& vertices, const Triangles& triangles,
                      const std::vector<bool>& known, std::vector<cv::Vec3f>& values,
-                     const std::optional<FarValue>& far = {});
+                     const std::optional<FarValues>& far = {});
 
 }  // namespace calipso::render

@@ -271,7 +271,8 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t i = 1; i < used.size(); ++i) see(i, a.mean_light);
   a.region = pictures[0].region;
-  a.albedo = widened(pushPull(pictures[0].albedo, pictures[0].trust));
+  // What a highlight hides is taken from around it.
+  a.albedo = widened(pushPull(pictures[0].albedo, pictures[0].trust.mul(pictures[0].clear)));
   for (Reflectance& r : pictures) r.albedo = widened(r.albedo);
   fillTexture({used, actors, pictures}, a);
   a.findSources();

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "calipso_render/surface_symmetry.hpp"
 #include "smooth_step.hpp"
+#include "texture/mesh_topology.hpp"
 
 namespace calipso::render {
 namespace {
@@ -20,6 +22,9 @@ constexpr int kFewest = 30;     // places that tell whether others are like them
 constexpr float kSameColour = 0.15f, kOtherColour = 0.35f;
 // part of the places that look otherwise, from which the likeness comes later, and last
 constexpr float kSomeDiffer = 0.15f, kTooManyDiffer = 0.5f;
+// where a likeness that nothing tells of ranks among those that agree well
+constexpr float kUnjudged = 0.9f;
+constexpr float kSameBox = 0.05f;  // of the extent: parts are mirror images of each other
 
 // Turns places about an axis into the quarter of a turn on either side of `middle`, back and forth,
 // so that what is near each other stays so.
@@ -40,25 +45,58 @@ struct Fold {
     const float half = 0.5f * (angle + folded);
     const Eigen::Vector3f across = std::cos(half) * aside - std::sin(half) * ahead;
     const MirrorPlane plane{across, across.dot(axis.point)};
-    return {plane.point(place.point), plane.vector(place.normal), place.part};
+    return {plane.point(place.point), plane.vector(place.normal), place.part, place.piece};
   }
 
  private:
   Place turned(const Place& place, float angle) const {
     const Eigen::AngleAxisf rotation(angle, axis.direction);
-    return {axis.point + rotation * (place.point - axis.point), rotation * place.normal,
-            place.part};
+    return {axis.point + rotation * (place.point - axis.point), rotation * place.normal, place.part,
+            place.piece};
   }
 };
 
+using PartBoxes = std::map<int, Eigen::AlignedBox3f>;
+
+template <typename Map>
+PartBoxes boxesOf(const Surface& surface, const std::vector<int>& parts, const Map& map) {
+  PartBoxes boxes;
+  for (std::size_t t = 0; t < parts.size(); ++t) {
+    for (int k = 0; k < 3; ++k)
+      boxes[parts[t]].extend(map(surface.key_vertices[surface.triangles[t][k]]));
+  }
+  return boxes;
+}
+
+// Which part each of them has as its mirror image: the one whose bounding box comes nearest, if it
+// comes near.
+std::map<int, int> mirroredParts(const PartBoxes& boxes, const PartBoxes& mirrored, float apart) {
+  std::map<int, int> images;
+  for (const auto& [part, image] : mirrored) {
+    float least = apart;
+    for (const auto& [other, box] : boxes) {
+      const float off = (box.min() - image.min()).norm() + (box.max() - image.max()).norm();
+      if (off < least) least = off, images[part] = other;
+    }
+  }
+  return images;
+}
+
 }  // namespace
 
-std::vector<LikePlace> mirroredPlaces(const Surface& surface) {
+std::vector<LikePlace> mirroredPlaces(const Surface& surface, const std::vector<int>& parts) {
+  const PartBoxes boxes = boxesOf(surface, parts, [](const Eigen::Vector3f& p) { return p; });
+  const float apart = kSameBox * boxOf(surface.key_vertices).diagonal().norm();
   std::vector<LikePlace> like;
   for (const MirrorPlane& plane : mirrorPlanes(surface.key_vertices, surface.triangles)) {
-    like.push_back({[plane](const Place& place) -> Place {
-      return {plane.point(place.point), plane.vector(place.normal)};
-    }});
+    const PartBoxes mirrored =
+        boxesOf(surface, parts, [&](const Eigen::Vector3f& p) { return plane.point(p); });
+    like.push_back({[plane, images = mirroredParts(boxes, mirrored, apart)](const Place& place) {
+                      const auto image = images.find(place.part);
+                      return Place{plane.point(place.point), plane.vector(place.normal),
+                                   image == images.end() ? kAnyPart : image->second};
+                    },
+                    std::nullopt});
   }
   return like;
 }
@@ -76,7 +114,7 @@ std::vector<LikePlace> turnedPlaces(const Surface& surface, const Eigen::Vector3
     turns.insert(turns.end(), {turn, -turn});
   for (const float turn : turns) {
     const Eigen::Vector3f middle = Eigen::AngleAxisf(turn, axis->direction) * ahead;
-    like.push_back({Fold{*axis, middle, axis->direction.cross(middle)}});
+    like.push_back({Fold{*axis, middle, axis->direction.cross(middle)}, std::nullopt});
   }
   return like;
 }
@@ -105,7 +143,9 @@ void judgeLikePlaces(const std::vector<KnownPlace>& known, float spacing,
 }
 
 void keepBest(std::size_t most, std::vector<LikePlace>& like) {
-  const auto order = [](const LikePlace& l) { return l.agreesWell() ? l.agrees : 0.0f; };
+  const auto order = [](const LikePlace& l) {
+    return !l.agrees ? kUnjudged : l.agreesWell() ? *l.agrees : 0.0f;
+  };
   std::stable_sort(like.begin(), like.end(),
                    [&](const LikePlace& a, const LikePlace& b) { return order(a) > order(b); });
   if (like.size() > most) like.resize(most);

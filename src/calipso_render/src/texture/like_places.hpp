@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "texture/sightings.hpp"
@@ -10,13 +11,14 @@ namespace calipso::render {
 // A place that is expected to look as another one does, from the shape of the surface.
 struct LikePlace {
   std::function<Place(const Place&)> of;
-  float agrees = 1.0f;  // how far what is seen of the surface bears that out: 0..1
+  // how far what is seen of the surface bears that out: 0..1; none: nothing of it tells
+  std::optional<float> agrees;
 
-  bool agreesWell() const { return agrees >= 0.7f; }
+  bool agreesWell() const { return agrees && *agrees >= 0.7f; }
 };
 
-// The mirror images at the planes of symmetry.
-std::vector<LikePlace> mirroredPlaces(const Surface& surface);
+// The mirror images at the planes of symmetry. @param parts connectedParts()
+std::vector<LikePlace> mirroredPlaces(const Surface& surface, const std::vector<int>& parts);
 
 // Of a body of revolution: places turned about its axis, back and forth, into the quarter of a turn
 // on either side of a middle. The middles that are first are as near as can be to the side that is
@@ -36,7 +38,8 @@ void judgeLikePlaces(const std::vector<KnownPlace>& known, float spacing,
                      std::vector<LikePlace>& like);
 
 // Puts those first that agree well, best first, and keeps `most`: what is seen may repeat itself
-// about some planes and middles alone.
+// about some planes and middles alone. Where nothing tells, as of mirror images behind the object,
+// the shape is believed unless what is seen speaks clearly for others.
 void keepBest(std::size_t most, std::vector<LikePlace>& like);
 
 }  // namespace calipso::render

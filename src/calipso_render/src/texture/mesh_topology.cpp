@@ -29,6 +29,15 @@ bool isClosed(std::vector<DirectedEdge> edges) {
   });
 }
 
+Points flatNormals(const Points& vertices, const Triangles& triangles) {
+  Points flat;
+  for (const Eigen::Vector3i& t : triangles)
+    flat.push_back((vertices[t[1]] - vertices[t[0]])
+                       .cross(vertices[t[2]] - vertices[t[0]])
+                       .stableNormalized());
+  return flat;
+}
+
 }  // namespace
 
 Eigen::AlignedBox3f boxOf(const Points& points) {
@@ -61,13 +70,24 @@ std::vector<int> connectedParts(const Points& vertices, const Triangles& triangl
   return parts;
 }
 
+std::vector<int> smoothParts(const Points& vertices, const Triangles& triangles) {
+  const std::vector<int> place = weld(vertices);
+  const Points flat = flatNormals(vertices, triangles);
+  Triangles welded = triangles;
+  for (Eigen::Vector3i& t : welded) t = t.unaryExpr([&](int vertex) { return place[vertex]; });
+  DisjointSets sets(static_cast<int>(triangles.size()));
+  for (const MeshEdge& e : meshEdges(welded)) {
+    if (e.b >= 0 && flat[e.a].dot(flat[e.b]) >= kCrease) sets.join(e.a, e.b);
+  }
+  std::vector<int> parts;
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    parts.push_back(sets.find(static_cast<int>(t)));
+  return parts;
+}
+
 MeshNormals meshNormals(const Points& vertices, const Triangles& triangles,
                         const std::vector<MeshEdge>& edges) {
-  Points flat;
-  for (const Eigen::Vector3i& t : triangles)
-    flat.push_back((vertices[t[1]] - vertices[t[0]])
-                       .cross(vertices[t[2]] - vertices[t[0]])
-                       .stableNormalized());
+  const Points flat = flatNormals(vertices, triangles);
   // Corners that no crease parts are one.
   const auto cornerAt = [&](int t, int vertex) {
     const Eigen::Vector3i& corners = triangles[t];

@@ -15,6 +15,9 @@ Eigen::AlignedBox3f boxOf(const Points& points);
 // Per triangle the number of the connected part of the mesh that it belongs to.
 std::vector<int> connectedParts(const Points& vertices, const Triangles& triangles);
 
+// The same of the part within which no crease is crossed: the outside of a bowl, a side of a box.
+std::vector<int> smoothParts(const Points& vertices, const Triangles& triangles);
+
 // How the triangles of a mesh that encloses space wind, seen from outside: 1 counterclockwise, -1
 // clockwise. 0: the mesh is open somewhere, or its parts do not agree, so that either side of a
 // triangle can be seen.

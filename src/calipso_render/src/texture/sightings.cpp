@@ -12,6 +12,8 @@ namespace {
 
 // of the object's extent: a point that far behind the front is hidden
 constexpr float kDepthTolerance = 0.012f;
+// of the extent: what is that thin is a wall, whose sides need not look alike
+constexpr float kThinnest = 0.1f;
 constexpr float kFlattest = 0.05f,
                 kFull = 0.25f;     // cosine of the view from which a surface is seen, and well seen
 constexpr float kSameFace = 0.5f;  // cosine to the front's normal of what may be that front
@@ -30,6 +32,7 @@ Sightings::Sightings(const SeenObject& object) : views_(object.views), pictures_
         axes_.push_back(v->camera.world_from_camera.linear().cast<float>());
   key_depth_ = std::max(1e-6f, (camera_from_world_[0] * surface.key_vertices.front()).z());
   parts_ = connectedParts(surface.key_vertices, surface.triangles);
+  pieces_ = smoothParts(surface.key_vertices, surface.triangles);
 }
 
 // The pixel of a picture that a point comes to, if it is before the camera.
@@ -44,7 +47,9 @@ std::optional<Sighting> Sightings::pixelOf(std::size_t view,
 
 // A part that lies just under another one, or behind it, is not seen there.
 bool Sightings::ofPart(const Reflectance& r, const cv::Point& pixel, const Place& place) const {
-  return place.part == kAnyPart || place.part == parts_[r.triangle.at<int>(pixel)];
+  const int triangle = r.triangle.at<int>(pixel);
+  return (place.part == kAnyPart || place.part == parts_[triangle]) &&
+         (place.piece == kAnyPart || place.piece == pieces_[triangle]);
 }
 
 bool Sightings::sameFace(const Reflectance& r, const cv::Point& pixel, const Place& place) const {
@@ -92,12 +97,14 @@ Sighting Sightings::lookAt(std::size_t view, const Place& place, float before) c
 }
 
 Sighting Sightings::frontBefore(const Place& place) const {
-  auto look = pixelOf(0, camera_from_world_[0] * place.point);
+  const Eigen::Vector3f q = camera_from_world_[0] * place.point;
+  auto look = pixelOf(0, q);
   const Reflectance& r = pictures_[0];
   const cv::Point pixel =
       look ? cv::Point(std::lround(look->u), std::lround(look->v)) : cv::Point(-1, -1);
   if (!cv::Rect(cv::Point(), r.region.size()).contains(pixel) ||
-      r.nearness.at<float>(pixel) <= 0.0f || !ofPart(r, pixel, place))
+      r.nearness.at<float>(pixel) <= 0.0f || !ofPart(r, pixel, place) ||
+      q.z() - 1.0f / r.nearness.at<float>(pixel) < kThinnest * extent_)
     return {};
   const Eigen::Vector3f sight =
       (place.point - views_[0]->camera.world_from_camera.translation().cast<float>()).normalized();

@@ -12,7 +12,8 @@ constexpr int kAnyPart = -1;
 // A point of the surface, world axes, key frame.
 struct Place {
   Eigen::Vector3f point, normal;
-  int part = kAnyPart;  // of the mesh, that has to be seen there
+  int part = kAnyPart;   // of the mesh, that has to be seen there
+  int piece = kAnyPart;  // the same, of its smooth parts
 };
 
 // How well a picture shows a place: 0 not at all, 1 straight on and well inside the mask.
@@ -32,15 +33,18 @@ class Sightings {
   Sighting lookAt(std::size_t view, const Place& place, float before) const;
 
   // The front of the object before a place, where that is the front's mirror image across the plane
-  // of the key frame's picture.
+  // of the key frame's picture, and not the other side of a wall.
   Sighting frontBefore(const Place& place) const;
 
   // Reflectance::clear where a look falls.
   float clearAt(std::size_t view, const Sighting& look) const;
 
-  int partOf(int triangle) const { return parts_[triangle]; }  // connectedParts()
-  float extent() const { return extent_; }                     // of the object, m
-  float keyDepth() const { return key_depth_; }                // of the object in the key frame, m
+  int partOf(int triangle) const { return parts_[triangle]; }
+  int pieceOf(int triangle) const { return pieces_[triangle]; }  // smoothParts()
+  const std::vector<int>& pieces() const { return pieces_; }
+  const std::vector<int>& parts() const { return parts_; }  // connectedParts()
+  float extent() const { return extent_; }                  // of the object, m
+  float keyDepth() const { return key_depth_; }             // of the object in the key frame, m
 
  private:
   std::optional<Sighting> pixelOf(std::size_t view, const Eigen::Vector3f& in_camera) const;
@@ -53,7 +57,7 @@ class Sightings {
   const std::vector<Reflectance>& pictures_;
   std::vector<Eigen::Isometry3f> camera_from_world_;
   std::vector<Eigen::Matrix3f> axes_;  // of the cameras, in the world
-  std::vector<int> parts_;
+  std::vector<int> parts_, pieces_;
   float extent_ = 0.0f, key_depth_ = 1.0f;
   bool two_sided_ = false;  // an open sheet is seen from both sides
 };

@@ -50,7 +50,7 @@ struct WeldedValues {
 // Graph Laplacian with a weak pull to the mean and one to the value far away. @return one row per
 // unknown
 Eigen::MatrixXd smoothValues(const WeldedValues& welded, const Points& vertices,
-                             const Triangles& triangles, const std::optional<FarValue>& far) {
+                             const Triangles& triangles, const std::optional<FarValues>& far) {
   std::vector<Eigen::Triplet<double>> entries;
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(welded.rows, 3);
   if (welded.rows == 0) return right;
@@ -65,7 +65,7 @@ Eigen::MatrixXd smoothValues(const WeldedValues& welded, const Points& vertices,
     const double e = (vertices[a] - vertices[b]).norm(),
                  pull = far ? 0.25 * e * e / (far->reach * far->reach) : 0.0;
     entries.emplace_back(row, row, 1.0 + pull);
-    for (int c = 0; c < 3 && far; ++c) right(row, c) += pull * far->value[c];
+    for (int c = 0; c < 3 && far; ++c) right(row, c) += pull * far->value[a][c];
     if (other >= 0)
       entries.emplace_back(row, other, -1.0);
     else
@@ -137,7 +137,7 @@ cv::Vec4f SurfaceTexture::at(int triangle, const Eigen::Vector3f& weights) const
 
 void diffuseOverMesh(const Points& vertices, const Triangles& triangles,
                      const std::vector<bool>& known, std::vector<cv::Vec3f>& values,
-                     const std::optional<FarValue>& far) {
+                     const std::optional<FarValues>& far) {
   const WeldedValues welded(vertices, known, values);
   const Eigen::MatrixXd x = smoothValues(welded, vertices, triangles, far);
   for (std::size_t i = 0; i < values.size(); ++i) {

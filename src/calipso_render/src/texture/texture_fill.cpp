@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 #include "smooth_step.hpp"
@@ -11,6 +10,7 @@
 #include "texture/texture_miss.hpp"
 #include "texture/texture_patches.hpp"
 #include "texture/texture_seams.hpp"
+#include "texture/texture_unseen.hpp"
 
 namespace calipso::render {
 namespace {
@@ -18,10 +18,8 @@ namespace {
 constexpr std::size_t kMostTexels = 300000;  // per object
 // of the object's extent: a like place that far before the front is not on the object
 constexpr float kOffSurface = 0.03f;
-constexpr float kEnough = 0.3f;  // weight of a look that needs no other
-constexpr float kSeen = 1e-5f;   // sum of weights, cubed, below which a texel counts as not seen
-// certainty, of the greatest there is, of what others are continued from
-constexpr float kKnown = 0.5f;
+constexpr float kEnough = 0.3f;   // weight of a look that needs no other
+constexpr float kSeen = 1e-5f;    // sum of weights, cubed, below which a texel counts as not seen
 constexpr float kSure = 0.2f;     // ... of which nothing else is needed
 constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exact
 // the key frame's share in a colour with which it counts for nothing, and alone
@@ -30,10 +28,6 @@ constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;
 constexpr float kPoor = 0.15f, kGood = 0.45f;
 constexpr std::size_t kMostTurned = 3;    // turned places that a place takes its look from
 constexpr std::size_t kCompared = 20000;  // texels, about, by which like places are judged
-// of the extent: within it what is not seen goes over from the seen around it to the common colour
-constexpr float kFromSeen = 0.1f;
-constexpr std::size_t kLookedAt = 300;       // texels, for that
-const cv::Vec3f kUnknown(0.3f, 0.3f, 0.3f);  // reflectance of an object that no picture shows
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
 
@@ -88,7 +82,7 @@ class TextureFill {
     auto& [from, certain, layer] = origins;
     levelSeams(surface_.key_vertices, surface_.triangles, layer, a.texture);
     continuePattern(surface_.key_vertices, surface_.triangles, down, certain, a.texture);
-    fillUnseen(certain, a.texture);
+    fillUnseen(surface_, sightings_.pieces(), sightings_.parts(), certain, a.texture);
     const auto part = [&](char kind) {
       return static_cast<float>(std::count(from.begin(), from.end(), kind)) /
              std::max<std::size_t>(1, from.size());
@@ -165,12 +159,14 @@ class TextureFill {
             mix(normals, surface_.corners[triangle]).normalized(), sightings_.partOf(triangle)};
   }
   Place keyPlaceOf(int triangle, const Eigen::Vector3f& w) const {
-    return placeOf(triangle, w, surface_.key_vertices, surface_.key_normals);
+    Place place = placeOf(triangle, w, surface_.key_vertices, surface_.key_normals);
+    place.piece = sightings_.pieceOf(triangle);
+    return place;
   }
 
   // Places that look alike by the shape; those first that do where they are seen themselves.
   void findLike(const SurfaceTexture& texture, const Origins& origins) {
-    like_ = mirroredPlaces(surface_);
+    like_ = mirroredPlaces(surface_, sightings_.parts());
     const std::size_t most = like_.size() + kMostTurned;
     const std::vector<LikePlace> turned =
         turnedPlaces(surface_, views_[0]->camera.world_from_camera.translation().cast<float>());
@@ -233,73 +229,8 @@ class TextureFill {
     }
     const float flat = std::min(1.0f, std::cbrt(total) / kEnough);
     layers.add(own, flat * flat);
-    const Sighting front = sightings_.frontBefore(place);
+    const Sighting front = sightings_.frontBefore({place.point, place.normal, place.part});
     add(front, smoothStep(0.0f, kGood, front.weight));
-  }
-
-  // The reflectance that most of what is known has: that of the texel nearest to all others, with
-  // the quarter of them that is most like it.
-  static cv::Vec3f commonColour(const std::vector<float>& certain, const SurfaceTexture& texture) {
-    std::vector<cv::Vec3f> known, some;
-    for (std::size_t i = 0; i < certain.size(); ++i) {
-      if (certain[i] >= 1.0f) known.push_back(colourOf(texture.texels[i]));
-    }
-    if (known.empty()) return kUnknown;
-    const std::size_t step = (known.size() + kLookedAt - 1) / kLookedAt;
-    for (std::size_t i = 0; i < known.size(); i += step) some.push_back(known[i]);
-    const auto away = [](const cv::Vec3f& a, const cv::Vec3f& b) { return cv::norm(a - b); };
-    cv::Vec3f middle;
-    double least = 1e30;
-    for (const cv::Vec3f& a : some) {
-      double sum = 0.0;
-      for (const cv::Vec3f& b : some) sum += away(a, b);
-      if (sum < least) least = sum, middle = a;
-    }
-    const std::size_t quarter = (some.size() + 3) / 4;
-    std::sort(some.begin(), some.end(), [&](const cv::Vec3f& a, const cv::Vec3f& b) {
-      return away(a, middle) < away(b, middle);
-    });
-    return std::accumulate(some.begin(), some.begin() + quarter, cv::Vec3f()) *
-           (1.0f / static_cast<float>(quarter));
-  }
-
-  // What no picture shows, or none for certain, continues the surface around it, and goes over to
-  // what the object is like on the whole: the rim of what is seen is seen flatly, with the sky and
-  // the background in it.
-  void fillUnseen(const std::vector<float>& certain, SurfaceTexture& texture) const {
-    const Triangles& triangles = surface_.triangles;
-    std::vector<cv::Vec3f> values(surface_.key_vertices.size());
-    std::vector<float> parts(values.size(), 0.0f), best(values.size(), 0.0f);
-    for (int t = 0; t < texture.triangleCount(); ++t) {
-      for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
-        Eigen::Index corner;
-        const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
-        w.maxCoeff(&corner);
-        const int vertex = triangles[t][corner];
-        values[vertex] += colourOf(texture.texels[i]) * certain[i], parts[vertex] += certain[i],
-            best[vertex] = std::max(best[vertex], certain[i]);
-      }
-    }
-    const float most = *std::max_element(best.begin(), best.end());
-    std::vector<bool> known(values.size(), false);
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (parts[i] > 0.0f) values[i] *= 1.0f / parts[i], known[i] = best[i] >= kKnown * most;
-    }
-    if (most == 0.0f)
-      std::fill(values.begin(), values.end(), kUnknown);
-    else
-      diffuseOverMesh(surface_.key_vertices, triangles, known, values,
-                      FarValue{commonColour(certain, texture), kFromSeen * sightings_.extent()});
-    for (int t = 0; t < texture.triangleCount(); ++t) {
-      for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
-        if (certain[i] >= 1.0f) continue;
-        const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
-        const cv::Vec3f around = values[triangles[t][0]] * w[0] + values[triangles[t][1]] * w[1] +
-                                 values[triangles[t][2]] * w[2];
-        const cv::Vec3f c = certain[i] * colourOf(texture.texels[i]) + (1.0f - certain[i]) * around;
-        texture.texels[i] = cv::Vec4f(c[0], c[1], c[2], certain[i] * texture.texels[i][3]);
-      }
-    }
   }
 
   const std::vector<const View*>& views_;

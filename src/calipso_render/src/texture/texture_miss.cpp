@@ -60,7 +60,7 @@ cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor&
   cv::Mat out = shown.clone();
   for (int v = 0; v < out.rows; ++v) {
     for (int u = 0; u < out.cols; ++u) {
-      const float trust = picture.trust.at<float>(v, u);
+      const float trust = picture.trust.at<float>(v, u) * picture.clear.at<float>(v, u);
       const cv::Vec4f &own = picture.albedo.at<cv::Vec4f>(v, u), &now = drawn.at<cv::Vec4f>(v, u);
       cv::Vec4f& colour = out.at<cv::Vec4f>(v, u);
       for (int c = 0; c < 3; ++c) colour[c] = std::max(0.0f, colour[c] + trust * (own[c] - now[c]));
