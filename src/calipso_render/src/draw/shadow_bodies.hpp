@@ -12,6 +12,14 @@ namespace calipso::render {
 constexpr float kUp = 16384.0f;  // makes the truncation to int a floor
 constexpr int kDown = 16384;
 
+// Places beyond all ints, and lanes that nobody asks for, wrap around.
+typedef std::uint32_t EightNaturals __attribute__((vector_size(32), aligned(4), may_alias));
+
+CALIPSO_INLINE EightInts lowered(const Eight& x) {
+  const EightInts up = __builtin_convertvector(x, EightInts);
+  return (EightInts)((EightNaturals)up - kDown);
+}
+
 CALIPSO_INLINE Eight gather(const float* from, const EightInts& at) {
   return Eight{from[at[0]], from[at[1]], from[at[2]], from[at[3]],
                from[at[4]], from[at[5]], from[at[6]], from[at[7]]};
@@ -35,14 +43,14 @@ CALIPSO_INLINE void gatherPairs(const float* from, const EightInts& at, Eight& f
 // Where the texels (i, j) are in the map; the corner for those outside [0, right) x [0, bottom).
 CALIPSO_INLINE EightInts texelsAt(const ShadowTexels& map, const EightInts& i, const EightInts& j,
                                   int right, int bottom) {
-  return (j * map.stride + i) & (i >= 0) & (j >= 0) & (i < right) & (j < bottom);
+  const EightInts at = (EightInts)((EightNaturals)j * map.stride + (EightNaturals)i);
+  return at & (i >= 0) & (j >= 0) & (i < right) & (j < bottom);
 }
 
 // 1 where four texels around (x, y) are higher than h, between them by their parts.
 CALIPSO_INLINE Eight coveredAt(const ShadowTexels& map, const Eight& x, const Eight& y,
                                const Eight& h) {
-  const EightInts i = __builtin_convertvector(x + kUp, EightInts) - kDown,
-                  j = __builtin_convertvector(y + kUp, EightInts) - kDown;
+  const EightInts i = lowered(x + kUp), j = lowered(y + kUp);
   const Eight fx = x - __builtin_convertvector(i, Eight),
               fy = y - __builtin_convertvector(j, Eight);
   const EightInts at = texelsAt(map, i, j, map.width - 1, map.height - 1);
@@ -99,8 +107,7 @@ CALIPSO_INLINE Eight visibleEight(const ShadowTexels& map, const ShadowTaps& tap
   for (int k = 0; k < taps.count; ++k) {
     const Eight x = s + search * taps.x[k] + (kUp + 0.5f),
                 y = t + search * taps.y[k] + (kUp + 0.5f);
-    const EightInts i = __builtin_convertvector(x, EightInts) - kDown,
-                    j = __builtin_convertvector(y, EightInts) - kDown;
+    const EightInts i = lowered(x), j = lowered(y);
     const Eight over = gather(map.heights, texelsAt(map, i, j, map.width, map.height)) - h;
     const EightInts blocks = over > 0.0f;
     above += blocks ? over : none, hits += blocks ? one : none;
