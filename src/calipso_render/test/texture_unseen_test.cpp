@@ -28,8 +28,8 @@ Surface twoBalls() {
   return makeSurface(model);
 }
 
-// Of two shells of one mesh the upper halves are seen. The lower ones go on as their own shell does,
-// not as most of the object.
+// Of two shells of one mesh the upper halves are seen. The lower ones go on as their own shell
+// does, not as most of the object.
 TEST(FillUnseen, PartsGoOverToTheirOwnColour) {
   const Surface surface = twoBalls();
   SurfaceTexture texture(surface.key_vertices, surface.triangles, 0.01f, 100000);

@@ -18,8 +18,8 @@ const cv::Vec3f kUnknown(0.3f, 0.3f, 0.3f);  // reflectance of an object that no
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
 
-// The reflectance that most of them have: that of the one nearest to all others, with the quarter of
-// them that is most like it.
+// The reflectance that most of them have: that of the one nearest to all others, with the quarter
+// of them that is most like it.
 cv::Vec3f commonColour(const std::vector<cv::Vec3f>& known) {
   std::vector<cv::Vec3f> some;
   const std::size_t step = (known.size() + kLookedAt - 1) / kLookedAt;
@@ -59,8 +59,8 @@ std::vector<std::optional<cv::Vec3f>> commonColours(const std::vector<int>& part
   return colours;
 }
 
-// What each vertex goes over to: the common colour of the smooth part of the surface that it belongs
-// to, or else of all that hangs together with it, or else of the object.
+// What each vertex goes over to: the common colour of the smooth part of the surface that it
+// belongs to, or else of all that hangs together with it, or else of the object.
 std::vector<cv::Vec3f> commonAround(const Surface& surface, const std::vector<int>& pieces,
                                     const std::vector<int>& shells,
                                     const std::vector<float>& certain,

@@ -6,9 +6,9 @@
 
 namespace calipso::render {
 
-// What no picture shows, or none for certain, continues the surface around it, and goes over to what
-// its part of the mesh is like on the whole: the rim of what is seen is seen flatly, with the sky and
-// the background in it.
+// What no picture shows, or none for certain, continues the surface around it, and goes over to
+// what its part of the mesh is like on the whole: the rim of what is seen is seen flatly, with the
+// sky and the background in it.
 // @param pieces, shells smoothParts() and connectedParts() of the surface
 // @param certain per texel: 1 = it is known, 0 = nothing of it
 void fillUnseen(const Surface& surface, const std::vector<int>& pieces,
