@@ -139,17 +139,53 @@ void markSpurs(FitProblem& problem) {
   }
 }
 
+// By what part of its depth something has to be nearer than the object to be told from what touches
+// it: a twentieth of the object's size, within what depth images can show.
+double nearerBy(const FitProblem& problem) {
+  constexpr double kOfSize = 0.05, kLeast = 0.01, kMost = 0.05;
+  return std::clamp(kOfSize * problem.model_size / problem.X.col(2).mean(), kLeast, kMost);
+}
+
+// 1 / depth of a support plane at a pixel.
+double inverseDepth(const SupportTarget& support, const Camera& camera, const Eigen::Vector2d& p) {
+  const Eigen::Vector3d ray((p.x() - camera.cx) / camera.fx, (p.y() - camera.cy) / camera.fy, 1.0);
+  return support.normal.dot(ray) / support.offset;
+}
+
+constexpr double kSameDepth = 0.03;  // part of the depth: what is that near a plane lies on it
+
+// What is nearer than most of the object, beside it, and not what it stands on.
+cv::Mat1b hidingPixels(const cv::Mat1f& depth, const FitProblem& problem, double nearer_by) {
+  std::vector<float> depths;
+  for (int v = 0; v < depth.rows; ++v)
+    for (int u = 0; u < depth.cols; ++u)
+      if (problem.inside(v, u) && std::isfinite(depth(v, u)) && depth(v, u) > 0.0f)
+        depths.push_back(depth(v, u));
+  if (depths.empty()) return {};
+  const auto middle = depths.begin() + depths.size() / 2;
+  std::nth_element(depths.begin(), middle, depths.end());
+  const double farthest = *middle / (1.0 + nearer_by);
+  cv::Mat1b hiding = (depth > 0.0f) & (depth < farthest) & ~problem.inside;
+  for (int v = 0; v < depth.rows; ++v)
+    for (int u = 0; u < depth.cols; ++u)
+      for (const SupportTarget& support : problem.supports)
+        if (hiding(v, u) && std::abs(inverseDepth(support, problem.camera, {u, v}) * depth(v, u) -
+                                     1.0) < kSameDepth)
+          hiding(v, u) = 0;
+  return hiding;
+}
+
 // Where the surroundings are nearer than the object, the contour is the edge of what hides it. What
 // the object stands on is nearer too, but reaches the contour at the object's depth: the inverse
 // depth of a plane is linear in the picture.
-void markHidden(const cv::Mat1f& depth, ContourTarget& target) {
+void markHidden(const cv::Mat1f& depth, double nearer_by, ContourTarget& target) {
   constexpr double kReachPx = 4.0;  // beyond the pixels that mix two surfaces
-  constexpr double kNearer = 1.05;
   for (TargetPoint& p : target.points) {
     const double inside = inverseDepth(depth, p.pixel - kReachPx * p.normal);
     const double near = inverseDepth(depth, p.pixel + kReachPx * p.normal);
     const double far = inverseDepth(depth, p.pixel + 2.0 * kReachPx * p.normal);
-    const bool is_hidden = inside > 0.0 && std::min(near, 2.0 * near - far) >= kNearer * inside;
+    const bool is_hidden =
+        inside > 0.0 && std::min(near, 2.0 * near - far) >= (1.0 + nearer_by) * inside;
     if (is_hidden) makeUnknown(p, target);
   }
 }
@@ -158,13 +194,11 @@ void markHidden(const cv::Mat1f& depth, ContourTarget& target) {
 // only that it reaches the plane.
 void markContacts(const cv::Mat1f& depth, const Camera& camera,
                   const std::vector<SupportTarget>& supports, ContourTarget& target) {
-  constexpr double kReachPx = 4.0, kSameDepth = 0.03;
+  constexpr double kReachPx = 4.0;
   for (TargetPoint& p : target.points) {
-    const Eigen::Vector3d ray((p.pixel.x() - camera.cx) / camera.fx,
-                              (p.pixel.y() - camera.cy) / camera.fy, 1.0);
     const double inside = inverseDepth(depth, p.pixel - kReachPx * p.normal);
     for (const SupportTarget& support : supports) {
-      const double of_plane = support.normal.dot(ray) / support.offset;  // 1 / depth
+      const double of_plane = inverseDepth(support, camera, p.pixel);
       if (inside > 0.0 && std::abs(of_plane / inside - 1.0) < kSameDepth) makeUnknown(p, target);
     }
   }
@@ -193,6 +227,7 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
                      {},
                      {},
                      {},
+                     {},
                      makeSupportTargets(options.planes, camera),
                      0.0,
                      boundingDiagonal(cad)};
@@ -202,7 +237,9 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
   markSpurs(problem);
   if (options.depth) {
     checkDepth(options.depth->depth, camera);
-    markHidden(options.depth->depth, problem.target);
+    const double nearer_by = nearerBy(problem);
+    problem.hiding = hidingPixels(options.depth->depth, problem, nearer_by);
+    markHidden(options.depth->depth, nearer_by, problem.target);
     markContacts(options.depth->depth, camera, problem.supports, problem.target);
     problem.depth = makeDepthTarget(options.depth->depth, problem.inside);
   }

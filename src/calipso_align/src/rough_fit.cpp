@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "calipso_align/depth_term.hpp"
+#include "calipso_align/schedule.hpp"
 
 namespace calipso::align {
 namespace {
@@ -40,6 +41,13 @@ Moments momentsOf(const cv::Mat1b& mask) {
   return {m.m00, {m.m10 / m.m00, m.m01 / m.m00}};
 }
 
+LowOrderMap::Parameters shiftOf(const Eigen::Vector2d& px, double z, const Camera& camera) {
+  LowOrderMap::Parameters step = LowOrderMap::Parameters::Zero();
+  step[LowOrderMap::kTranslation] = px.x() * z / camera.fx;
+  step[LowOrderMap::kTranslation + 1] = px.y() * z / camera.fy;
+  return step;
+}
+
 // Shift and scale by which the rendered silhouette's moments become the contour's.
 void matchMoments(const FitProblem& problem, const Moments& goal, LowOrderMap& map) {
   constexpr double kLargestLogScale = 0.25;  // per round
@@ -47,14 +55,38 @@ void matchMoments(const FitProblem& problem, const Moments& goal, LowOrderMap& m
   const Points x = map.apply(problem.X);
   const Moments now = momentsOf(maskOf(renderDepth(x, problem.topology, camera), camera));
   if (now.area <= 0.0) return;
-  const double z = x.col(2).mean();
-  const Eigen::Vector2d shift = goal.centroid - now.centroid;
-  LowOrderMap::Parameters step = LowOrderMap::Parameters::Zero();
-  step[LowOrderMap::kTranslation] = shift.x() * z / camera.fx;
-  step[LowOrderMap::kTranslation + 1] = shift.y() * z / camera.fy;
+  LowOrderMap::Parameters step = shiftOf(goal.centroid - now.centroid, x.col(2).mean(), camera);
   step[LowOrderMap::kLogScale] =
       std::clamp(0.5 * std::log(goal.area / now.area), -kLargestLogScale, kLargestLogScale);
   map.setParameters(map.plus(step));
+}
+
+// Shift by which the silhouette covers most of the contour's inside, and least of what the picture
+// shows behind the object; where something hides it, it may be or not.
+void matchKnown(const FitProblem& problem, LowOrderMap& map) {
+  constexpr double kInside = 2.0, kNearby = 0.05;  // of the area, for the farthest shift
+  const Camera& camera = problem.camera;
+  const Points x = map.apply(problem.X);
+  const DepthRendering rendering = renderDepth(x, problem.topology, camera);
+  if (rendering.roi.empty()) return;
+  const int reach = cvCeil(kPlacementError * std::max(camera.fx, camera.fy));
+  cv::Mat1f worth(problem.inside.size(), -1.0f);
+  worth.setTo(0.0f, problem.hiding);
+  worth.setTo(kInside, problem.inside);
+  cv::copyMakeBorder(worth, worth, reach, reach, reach, reach, cv::BORDER_CONSTANT, 0.0);
+  cv::Mat1f silhouette, gain;
+  cv::Mat(rendering.depth > 0.0f).convertTo(silhouette, CV_32F, 1.0 / 255.0);
+  const cv::Rect around(rendering.roi.tl(), rendering.roi.size() + cv::Size(2 * reach, 2 * reach));
+  cv::matchTemplate(worth(around), silhouette, gain, cv::TM_CCORR);
+  const double farness = kNearby * cv::countNonZero(problem.inside) / (reach * reach);
+  for (int v = 0; v < gain.rows; ++v)
+    for (int u = 0; u < gain.cols; ++u)
+      gain(v, u) -=
+          static_cast<float>(farness * ((u - reach) * (u - reach) + (v - reach) * (v - reach)));
+  cv::Point best;
+  cv::minMaxLoc(gain, nullptr, nullptr, nullptr, &best);
+  const Eigen::Vector2d shift(best.x - reach, best.y - reach);
+  map.setParameters(map.plus(shiftOf(shift, x.col(2).mean(), camera)));
 }
 
 // Shift along the sight line of the centroid to where the depth image has the object.
@@ -103,7 +135,10 @@ void placeRoughly(const FitProblem& problem, LowOrderMap& map) {
   const Moments goal = comparable ? momentsOf(problem.inside) : Moments{};
   for (int round = 0; round < kRounds; ++round) {
     matchDepth(problem, map);
-    if (goal.area > 0.0) matchMoments(problem, goal, map);
+    if (goal.area > 0.0)
+      matchMoments(problem, goal, map);
+    else if (!comparable && !problem.hiding.empty())
+      matchKnown(problem, map);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "calipso_align/rough_fit.hpp"
 #include "calipso_align/trust.hpp"
 #include "synthetic_shape.hpp"
 
@@ -70,21 +71,42 @@ TEST(FitProblem, NoiseDoesNotThinTheTarget) {
 }
 
 TEST(FitProblem, ContourOfAnOccluderIsUnknown) {
-  Seen seen;
-  cv::Mat1f depth = seen.depth();
-  const double middle = seen.camera.cx;
-  seen.options.depth = DepthObservation{depth};
-  const long right = knownPoints(seen.problem(), true, middle);
-  // Everything right of the middle that is not the pear comes nearer than it.
-  for (float& d : cv::Mat1f(depth.colRange(static_cast<int>(middle) + 1, depth.cols))) {
-    if (d == kWallDepth) d = 1.5f;
+  for (const float nearer : {1.5f, 2.8f}) {  // m; the second is a tenth of the pear before it
+    Seen seen;
+    cv::Mat1f depth = seen.depth();
+    const double middle = seen.camera.cx;
+    seen.options.depth = DepthObservation{depth};
+    const long right = knownPoints(seen.problem(), true, middle);
+    // Everything right of the middle that is not the pear comes nearer than it.
+    for (float& d : cv::Mat1f(depth.colRange(static_cast<int>(middle) + 1, depth.cols))) {
+      if (d == kWallDepth) d = nearer;
+    }
+    seen.options.depth = DepthObservation{depth};
+    const FitProblem hidden = seen.problem();
+    EXPECT_GT(right, 50);
+    EXPECT_LT(knownPoints(hidden, true, middle), right / 10) << nearer;
+    EXPECT_GT(knownPoints(hidden, false, middle), right / 2) << nearer;
+    EXPECT_LT(hidden.target.known_length_px, 0.7 * hidden.target.length_px) << nearer;
   }
+}
+
+// The lower half stands behind a wall, and the model was placed a twentieth of the distance off.
+TEST(RoughFit, GoesToWhatIsSeenOfAnObjectThatIsHalfHidden) {
+  Seen seen;
+  const Points truth = test::inCamera(seen.camera, seen.pose, seen.mesh.vertices);
+  cv::Mat1f depth = seen.depth();
+  cv::Mat1b mask = fillContour(seen.contour, depth.size());
+  const int half = depth.rows / 2;
+  depth.rowRange(half, depth.rows) = 2.0f;
+  mask.rowRange(half, mask.rows) = 0;
+  seen.contour = traceLoops(mask / 255, 1, {});
   seen.options.depth = DepthObservation{depth};
-  const FitProblem hidden = seen.problem();
-  EXPECT_GT(right, 50);
-  EXPECT_LT(knownPoints(hidden, true, middle), right / 10);
-  EXPECT_GT(knownPoints(hidden, false, middle), right / 2);
-  EXPECT_LT(hidden.target.known_length_px, 0.7 * hidden.target.length_px);
+  seen.pose.translation() = Eigen::Vector3d(0.12, 0.0, -0.09);
+  const FitProblem problem = seen.problem();
+  LowOrderMap map(problem.X);
+  placeRoughly(problem, map);
+  const Points off = map.apply(problem.X) - truth;
+  EXPECT_LT(off.colwise().mean().norm(), 0.02);  // m: three pixels
 }
 
 // A rail that was taken in: two pixels high, where the pear has nothing as thin.

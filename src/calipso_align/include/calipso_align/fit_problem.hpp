@@ -17,6 +17,7 @@ struct FitProblem {
   ContourTarget target;
   cv::Mat1b inside;   // 255 within the contour, whole picture
   cv::Mat1b foreign;  // 255 in spurs of it that no part of the model can be; or empty
+  cv::Mat1b hiding;   // 255 where the picture shows something nearer than the object; or empty
   DepthTarget depth;  // empty: none
   std::vector<SupportTarget> supports;
   double extent_px = 0.0;                            // diagonal of the contour's bounding box

@@ -15,8 +15,8 @@ struct RoughCheck {
 RoughCheck checkPlacement(const FitProblem& problem);
 
 // Shifts and scales the model so that the centroid and the area of its silhouette are those of the
-// contour, at the depth that the depth image has for it. Areas are left alone where much of the
-// contour is unknown: then they cannot be compared.
+// contour, at the depth that the depth image has for it. Where much of the contour is unknown,
+// areas cannot be compared: then the model is shifted to where the depth image lets it be.
 void placeRoughly(const FitProblem& problem, LowOrderMap& map);
 
 }  // namespace calipso::align
