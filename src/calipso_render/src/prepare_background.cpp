@@ -303,6 +303,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   InpaintParams known_of_place;
   known_of_place.nearness = ground;
   known_of_place.surface = surfaces.alike, known_of_place.supports = surfaces.supports;
+  known_of_place.sky = surfaces.sky;
   known_of_place.sure = mirrorsSharply(p.mirror) ? surfaces.sureOffSupports() : surfaces.sure;
   for (const PicturePlane& plane : surfaces.planes)
     known_of_place.planes.push_back(plane.fromPixels(key.camera));

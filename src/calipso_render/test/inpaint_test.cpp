@@ -264,7 +264,7 @@ TEST(CutSeams, MoveToWhereCopiesAreAlike) {
       origin.at<cv::Vec2s>(v, u) = {static_cast<short>(u < 113 ? u - way : u + way),
                                     static_cast<short>(v)};
   }
-  cutSeams(image, hole, hole == 0, hole == 0, cv::Mat(), origin);
+  cutSeams(image, hole, hole == 0, hole == 0, InpaintParams(), origin);
   for (int v = 0; v < image.rows; ++v) {
     for (int u = first; u <= last; ++u) {
       const bool from_left = origin.at<cv::Vec2s>(v, u)[0] < u;

@@ -7,6 +7,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "place/place_view.hpp"
+#include "place/plane_reach.hpp"
 
 namespace calipso::render {
 namespace {
@@ -158,6 +159,29 @@ TEST(PlaceRelief, APlaneIsLeftToWhatRisesAboveIt) {
   EXPECT_EQ(surfaces.alike.at<std::uint8_t>(92, 30), 1);
   EXPECT_EQ(surfaces.alike.at<std::uint8_t>(92, 140), PlaceSurfaces::kCurved);
   EXPECT_EQ(surfaces.label.at<std::uint8_t>(92, 140), PlaceSurfaces::kUnknown);
+}
+
+TEST(PlaceRelief, ASupportPlaneIsNotSeenBeyondItsEnds) {
+  const Room room;
+  std::vector<SupportPlane> planes = floorPlane();
+  planes.push_back(planes.front());
+  planes.back().offset = 0.4, planes.back().x_range = Eigen::Vector2d(-0.3, 0.3);
+  const PlaceSurfaces surfaces =
+      findSurfaces(room.scenery, room.depth, room.labels, planes, camera());
+  EXPECT_EQ(cv::countNonZero(surfaces.label == 2), 0);
+}
+
+TEST(PlaneReach, WhatMeetsAPlaneThatGoesOnDoesSoAsWell) {
+  cv::Mat plane(kHigh, kWide, CV_32F, cv::Scalar(0.5f)),
+      scenery = plane.clone(), none = cv::Mat::zeros(kHigh, kWide, CV_8U), edge = none.clone();
+  scenery.colRange(120, kWide).setTo(0.2f);  // farther
+  scenery.colRange(20, 120).setTo(0.0f);     // hidden
+  edge(cv::Rect(20, 60, 90, 1)).setTo(255);
+  const auto reaches = [&](const cv::Mat& at) {
+    return goesOn(plane, plane, scenery, none, none, at, none).at<std::uint8_t>(63, 100) != 0;
+  };
+  EXPECT_FALSE(reaches(none));
+  EXPECT_TRUE(reaches(edge));
 }
 
 TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereTheSunComesFromBehind) {

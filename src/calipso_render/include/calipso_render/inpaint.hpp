@@ -23,6 +23,10 @@ struct InpaintParams {
   // CV_8UC1, may be empty: number of the surface that a pixel sees, 0 unknown. What is copied comes
   // from the same one.
   cv::Mat surface;
+  // CV_8UC1, may be empty: kSky where a pixel sees nothing (the depth image has none, over a large
+  // area), kNoSky where it sees something, 0 unknown. Copies of the one do not stand for the other.
+  cv::Mat sky;
+  static constexpr std::uint8_t kSky = 1, kNoSky = 2;
   // CV_8UC1, may be empty: != 0 where a surface that is hidden is known to go on.
   cv::Mat sure;
   // Of surface k + 1, the homography from pixels to its own coordinates, the third of them its

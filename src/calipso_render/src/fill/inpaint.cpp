@@ -7,6 +7,7 @@
 
 #include "draw/side_by_side.hpp"
 #include "fill/colour_trend.hpp"
+#include "fill/hidden_sky.hpp"
 #include "fill/lattice.hpp"
 #include "fill/line_bridge.hpp"
 #include "fill/patch_fill.hpp"
@@ -40,6 +41,7 @@ InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
   for (cv::Matx33d& plane : inner.planes) plane = plane * shift;
   if (!params.nearness.empty()) inner.nearness = params.nearness(window).clone();
   if (!params.surface.empty()) inner.surface = params.surface(window).clone();
+  if (!params.sky.empty()) inner.sky = params.sky(window).clone();
   if (!params.sure.empty()) inner.sure = params.sure(window).clone();
   return inner;
 }
@@ -80,14 +82,15 @@ struct Filling {
 
 // @param known CV_8UC1: what the filling has to go with; source, of it: what may be copied
 Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const Lattice* lattice,
-             const InpaintParams& params) {
+             InpaintParams params) {
   const cv::Mat whole_hole = to_fill.clone();
   const LineBridges bridges = bridgeLines(to_fill, source, params.surface, look, lattice);
   to_fill.setTo(0, bridges.core);
   known |= bridges.core;
   source.setTo(0, bridges.lines);
+  if (!params.sky.empty()) params.sky = hiddenSky(copiedSky(params.sky, bridges.origin));
   Filling f{look.clone(), patchOrigins(look, to_fill, source, lattice, params)};
-  cutSeams(look, to_fill, source, known, params.surface, f.origin);
+  cutSeams(look, to_fill, source, known, params, f.origin);
   const cv::Mat without = to_fill & (copyFrom(f.origin, look, f.image) == 0);
   if (cv::countNonZero(without) > 0) smoothFill(look, to_fill, known).copyTo(f.image, without);
   if (cv::countNonZero(without) < cv::countNonZero(to_fill))
@@ -205,7 +208,7 @@ std::optional<PlanePart> chartedPart(const HiddenPlane& plane, const cv::Mat& lo
 void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintParams& params,
                Canvas& canvas) {
   InpaintParams inner = params;
-  inner.surface = cv::Mat();
+  inner.surface = inner.sky = cv::Mat();
   inner.nearness = part.chart.carried(nearnessOf(plane.to_plane, plane.hole.size())),
   inner.away_farther = kFarther;
   const Lattice* lattice = part.lattice ? &*part.lattice : nullptr;
@@ -255,8 +258,10 @@ cv::Mat supportsTrend(const InpaintParams& params, Canvas& canvas) {
 void fillRest(const InpaintParams& params, Canvas& canvas) {
   const cv::Rect window = windowAround(canvas.hole);
   const cv::Mat hole = canvas.hole(window), trend = supportsTrend(params, canvas)(window);
+  InpaintParams here = params;
+  if (!params.sky.empty()) here.sky = copiedSky(params.sky, canvas.origin);
   Filling rest = fill(canvas.look(window) - trend, hole.clone(), canvas.source(window).clone(),
-                      canvas.known(window).clone(), nullptr, within(window, params));
+                      canvas.known(window).clone(), nullptr, within(window, here));
   rest.image += trend;
   rest.image.copyTo(canvas.look(window), hole);
   cv::Mat lift = canvas.lift(window);

@@ -15,12 +15,19 @@ constexpr float kOffLattice = 0.75f;  // px by which a copy's way may miss the l
 
 }  // namespace
 
+bool differ(const cv::Mat& labels, const cv::Point& p, const cv::Point& q) {
+  const std::uint8_t own = labels.at<std::uint8_t>(p), other = labels.at<std::uint8_t>(q);
+  return own != 0 && other != 0 && own != other;
+}
+
 PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
                      const InpaintParams& params)
     : nearness_(level.nearness),
       surface_(level.surface),
+      sky_(level.sky),
       has_nearness_(!nearness_.empty()),
       has_surface_(!surface_.empty()),
+      has_sky_(!sky_.empty()),
       scale_(scale),
       horizon_(horizon),
       lattice_(lattice),
@@ -71,10 +78,8 @@ float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
     if (away_farther_ > 0.0f && own > kAsNear * other && other > 0.0f)
       cost += away_farther_ * (own / other - kAsNear);
   }
-  if (has_surface_) {
-    const std::uint8_t own = surface_.at<std::uint8_t>(p), other = surface_.at<std::uint8_t>(q);
-    if (own != 0 && other != 0 && own != other) cost += kMisplaced;
-  }
+  if (has_surface_ && differ(surface_, p, q)) cost += kMisplaced;
+  if (has_sky_ && differ(sky_, p, q)) cost += kMisplaced;
   if (lattice_ != nullptr && offLattice(q - p) > kOffLattice) cost += kMisplaced;
   return kPatchSide * kPatchSide * cost;
 }

@@ -12,6 +12,9 @@ namespace calipso::render {
 constexpr int kPatchRadius = 3;  // px; patches are squares of 7
 constexpr int kPatchSide = 2 * kPatchRadius + 1;
 
+// Are both labels known, and not the same? @param labels CV_8UC1, 0 unknown
+bool differ(const cv::Mat& labels, const cv::Point& p, const cv::Point& q);
+
 // What it costs to copy the patch around q to p: how unlike they look, in squared code values
 // summed over the patch, and how little like the places are. Patches must lie within the picture.
 class PatchCost {
@@ -35,8 +38,8 @@ class PatchCost {
   float awayCost(const cv::Point& p, const cv::Point& q) const;
   float offLattice(const cv::Point& shift) const;
 
-  cv::Mat nearness_, surface_;
-  bool has_nearness_, has_surface_;
+  cv::Mat nearness_, surface_, sky_;
+  bool has_nearness_, has_surface_, has_sky_;
   float scale_, horizon_;
   const Lattice* lattice_;
   float away_row_, away_column_, away_farther_;  // as InpaintParams'

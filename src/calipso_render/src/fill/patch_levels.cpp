@@ -45,6 +45,7 @@ FillLevel halved(const FillLevel& fine) {
                  {},
                  cv::Mat(size, CV_8U, cv::Scalar(255)),
                  {},
+                 {},
                  {}};
   cv::Mat weight = cv::Mat::zeros(size, CV_32F), count = weight.clone();
 #pragma omp parallel for schedule(static)
@@ -66,6 +67,7 @@ FillLevel halved(const FillLevel& fine) {
   if (!fine.nearness.empty())
     cv::resize(fine.nearness, half.nearness, size, 0, 0, cv::INTER_NEAREST);
   if (!fine.surface.empty()) cv::resize(fine.surface, half.surface, size, 0, 0, cv::INTER_NEAREST);
+  if (!fine.sky.empty()) cv::resize(fine.sky, half.sky, size, 0, 0, cv::INTER_NEAREST);
   return half;
 }
 
@@ -77,7 +79,7 @@ std::vector<FillLevel> fillLevels(const cv::Mat& image, const cv::Mat& hole, con
   cv::merge(std::vector<cv::Mat>{image, kLively * liveliness(image, hole == 0)}, levels[0].image);
   cv::Mat(hole == 0).convertTo(levels[0].known, CV_32F, 1.0 / 255.0);
   levels[0].hole = hole, levels[0].source = source, levels[0].nearness = params.nearness,
-  levels[0].surface = params.surface;
+  levels[0].surface = params.surface, levels[0].sky = params.sky;
   while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side)
     levels.push_back(halved(levels.back()));
   return levels;

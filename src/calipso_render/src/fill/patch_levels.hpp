@@ -11,7 +11,7 @@ struct FillLevel {
   cv::Mat image;              // CV_32FC4: colour, and how lively it is around
   cv::Mat known;              // CV_32FC1: part of a pixel that is known
   cv::Mat hole, source;       // CV_8UC1
-  cv::Mat nearness, surface;  // CV_32FC1, CV_8UC1; may be empty
+  cv::Mat nearness, surface, sky;  // as InpaintParams'; may be empty
 };
 
 // The picture at half the size, a quarter and so on, the finest first.

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "fill/patch_cost.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -62,12 +64,13 @@ cv::Mat stepWeight(const cv::Mat& picture, const cv::Point& next) {
 class Seams {
  public:
   Seams(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source, const cv::Mat& known,
-        const cv::Mat& surface, const cv::Mat& origin)
+        const InpaintParams& params, const cv::Mat& origin)
       : image_(image),
         hole_(hole),
         source_(source),
         known_(known),
-        surface_(surface),
+        surface_(params.surface),
+        sky_(params.sky),
         lively_(liveliness(image, source)),
         label_(hole.size(), CV_32S, cv::Scalar(kNoCopy)),
         node_(hole.size(), CV_32S, cv::Scalar(kNoCopy)) {
@@ -165,9 +168,8 @@ class Seams {
     if (!inside(from) || source_.at<std::uint8_t>(from) == 0) return false;
     const cv::Point covered = p + ways_[label_.at<int>(p)];
     if (lively_.at<float>(from) < kBland * lively_.at<float>(covered)) return false;
-    if (surface_.empty()) return true;
-    const std::uint8_t own = surface_.at<std::uint8_t>(p), other = surface_.at<std::uint8_t>(from);
-    return own == 0 || other == 0 || own == other;
+    return (surface_.empty() || !differ(surface_, p, from)) &&
+           (sky_.empty() || !differ(sky_, p, from));
   }
 
   // Pixels of other copies around one that it has something to put on.
@@ -244,7 +246,7 @@ class Seams {
     graph.addEdges(node, beside, std::max(0.0f, q_taken + p_taken - both_kept), 0.0f);
   }
 
-  const cv::Mat &image_, &hole_, &source_, &known_, &surface_;
+  const cv::Mat &image_, &hole_, &source_, &known_, &surface_, &sky_;
   cv::Mat lively_;        // CV_32FC1: gradients around what may be copied
   cv::Mat label_, node_;  // CV_32SC1: of the copy, and in the graph of the move at hand
   cv::Mat right_, down_;  // CV_32FC1: weights of steps
@@ -255,8 +257,8 @@ class Seams {
 }  // namespace
 
 void cutSeams(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
-              const cv::Mat& known, const cv::Mat& surface, cv::Mat& origin) {
-  Seams seams(image, hole, source, known, surface, origin);
+              const cv::Mat& known, const InpaintParams& params, cv::Mat& origin) {
+  Seams seams(image, hole, source, known, params, origin);
   seams.expandAll();
   seams.write(origin);
 }

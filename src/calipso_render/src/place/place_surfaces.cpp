@@ -3,6 +3,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "calipso_render/inpaint.hpp"
 #include "place/place_relief.hpp"
 #include "place/plane_edges.hpp"
 #include "place/plane_reach.hpp"
@@ -107,12 +108,6 @@ struct Extent {
   }
 };
 
-Extent supportExtent(const cv::Mat& nearness) {
-  Extent e{nearness, {}, {}};
-  cv::erode(nearness, e.farthest, cv::Mat::ones(3, 3, CV_8U));
-  return e;
-}
-
 cv::Mat supportNearness(const SupportPlane& plane, const Camera& camera) {
   cv::Mat nearness = cv::Mat::zeros(camera.height, camera.width, CV_32F);
   const Eigen::Isometry3d from_world = camera.world_from_camera.inverse();
@@ -128,11 +123,12 @@ cv::Mat supportNearness(const SupportPlane& plane, const Camera& camera) {
   return nearness;
 }
 
-cv::Mat nearnessOf(const PicturePlane& plane, const cv::Size& size) {
+// @param offset added to the plane's nearness
+cv::Mat nearnessOf(const PicturePlane& plane, double offset, const cv::Size& size) {
   cv::Mat nearness(size, CV_32F);
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u)
-      nearness.at<float>(v, u) = static_cast<float>(std::max(0.0, plane.nearnessAt(u, v)));
+      nearness.at<float>(v, u) = static_cast<float>(std::max(0.0, plane.nearnessAt(u, v) + offset));
   }
   return nearness;
 }
@@ -235,7 +231,8 @@ cv::Mat planesSeen(const cv::Mat& scenery, int supports, const std::vector<Exten
 
 // @param seen planesSeen()
 void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, const cv::Mat& seen,
-                 const Edges& edges, std::vector<Extent>& planes) {
+                 const std::vector<PicturePlane>& in_picture, const Edges& edges,
+                 std::vector<Extent>& planes) {
   cv::Mat on_support = cv::Mat::zeros(scenery.size(), CV_8U);
   for (int v = 0; v < scenery.rows && supports > 0; ++v) {
     for (int u = 0; u < scenery.cols; ++u) {
@@ -247,13 +244,17 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
   const cv::Mat none = cv::Mat::zeros(scenery.size(), CV_8U);
   cv::Mat taken = on_support;
   for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
-    cv::Mat beyond = none.clone();
+    cv::Mat beyond = none.clone(), edge = none.clone();
     for (int j = 0; j < static_cast<int>(planes.size()); ++j) {
-      if (edges[k][j] == kStandsOut) beyond |= seen == j;
+      if (edges[k][j] != kStandsOut) continue;
+      beyond |= seen == j;
+      if (j < k)
+        edge |= (scenery == 0.0f) & planes[j].goes_on &
+                alongEdge(in_picture[k], in_picture[j], scenery.size());
     }
     const cv::Mat& nearness = planes[k].nearness;
-    planes[k].goes_on =
-        goesOn(nearness, planes[k].farthest, scenery, k < supports ? none : taken, beyond, nothing);
+    planes[k].goes_on = goesOn(nearness, planes[k].farthest, scenery, k < supports ? none : taken,
+                               beyond, edge, nothing);
     // What a larger plane explains is no sign of one that passes through it.
     if (k >= supports)
       taken |= (scenery > 0.0f) & (cv::abs(nearness - scenery) < kOnPlane * nearness);
@@ -324,24 +325,26 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
   std::vector<PicturePlane> all;
   cv::Mat off = scenery > 0.0f;
   for (const SupportPlane& plane : planes) {
-    extents.push_back(supportExtent(supportNearness(plane, camera)));
     all.push_back(inPicture(plane, camera));
+    const double per_pixel = std::abs(all.back().abc[0]) + std::abs(all.back().abc[1]);
+    extents.push_back(
+        {supportNearness(plane, camera), nearnessOf(all.back(), -per_pixel, scenery.size()), {}});
     off &= (scenery - extents.back().nearness > kOffSupport * scenery) |
            (extents.back().farthest - scenery > kOffSupport * scenery);
   }
   std::vector<Eigen::Vector3f> normals(planes.size());
   for (const PicturePlane& plane : picturePlanes(scenery, off)) {
-    const cv::Mat nearness = nearnessOf(plane, scenery.size());
+    const cv::Mat nearness = nearnessOf(plane, 0.0, scenery.size());
     all.push_back(plane), extents.push_back({nearness, nearness, {}}),
         normals.push_back(plane.normal(camera));
   }
   const cv::Mat seen_planes = planesSeen(scenery, supports, extents);
   const Edges edges = findEdges(all, seen_planes);
   const cv::Mat nothing = largePieces((depth == 0.0f) & (labels == 0));
-  findReaches(scenery, nothing, supports, seen_planes, edges, extents);
+  findReaches(scenery, nothing, supports, seen_planes, all, edges, extents);
   const cv::Mat known = scenery > 0.0f;
   PlaceSurfaces surfaces{
-      cv::Mat::zeros(scenery.size(), CV_8U), {},       {}, cv::Mat(scenery.size(), CV_32FC3),
+      cv::Mat::zeros(scenery.size(), CV_8U), {},       {}, {}, cv::Mat(scenery.size(), CV_32FC3),
       cv::Mat(scenery.size(), CV_32FC3),     supports, all};
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < scenery.rows; ++v) {
@@ -362,6 +365,9 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
   }
   leaveToWhatRises(scenery, extents, seen_planes, surfaces);
   surfaces.alike = alikeOf(scenery, (labels != 0) | (depth > 0.0f), extents, surfaces);
+  surfaces.sky = cv::Mat::zeros(scenery.size(), CV_8U);
+  surfaces.sky.setTo(InpaintParams::kSky, nothing);
+  surfaces.sky.setTo(InpaintParams::kNoSky, known);
   surfaces.sure =
       sureOf(surfaces.label, (scenery == 0.0f) & (nothing == 0), seen_planes, nothing, edges);
   return surfaces;

@@ -7,10 +7,11 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kEdgeReach = 24;     // px around an edge that tell whether it stands out
-constexpr float kOnEdge = 2.0f;    // px: too near to it to tell
-constexpr int kFewestAtEdge = 40;  // places on either side of it
-constexpr int kClearEdge = 6;      // times as many places that say so as others
+constexpr int kEdgeReach = 24;      // px around an edge that tell whether it stands out
+constexpr float kOnEdge = 2.0f;     // px: too near to it to tell
+constexpr float kAlongEdge = 1.0f;  // px
+constexpr int kFewestAtEdge = 40;   // places on either side of it
+constexpr int kClearEdge = 6;       // times as many places that say so as others
 
 // px by which a place is off the line where two planes meet, towards where the first one is nearer.
 float offEdge(const PicturePlane& a, const PicturePlane& b, int u, int v) {
@@ -54,6 +55,16 @@ Edges findEdges(const std::vector<PicturePlane>& planes, const cv::Mat& seen) {
           meetingOf(planes[a], planes[b], around[a] & around[b], seen, a, b);
   }
   return edges;
+}
+
+cv::Mat alongEdge(const PicturePlane& a, const PicturePlane& b, const cv::Size& size) {
+  cv::Mat along = cv::Mat::zeros(size, CV_8U);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      if (std::abs(offEdge(a, b, u, v)) <= kAlongEdge) along.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return along;
 }
 
 }  // namespace calipso::render

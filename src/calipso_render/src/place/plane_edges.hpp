@@ -16,4 +16,7 @@ using Edges = std::vector<std::vector<Meeting>>;
 // @param seen CV_8SC1, of every pixel the plane, or -1
 Edges findEdges(const std::vector<PicturePlane>& planes, const cv::Mat& seen);
 
+// CV_8UC1: 255 on the line where two planes meet.
+cv::Mat alongEdge(const PicturePlane& a, const PicturePlane& b, const cv::Size& size);
+
 }  // namespace calipso::render

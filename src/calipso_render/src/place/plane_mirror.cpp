@@ -19,16 +19,21 @@ constexpr int kAround = 15;        // px of the squares in which gradients are a
 constexpr int kFewestBeside = 40;  // pixels of a row beside the mirror image, for it to be compared
 constexpr float kPlain = 0.4f;     // of the gradients beside it
 
-// Mean gradient of the grey picture around every pixel, of what is set in `where`.
-cv::Mat meanGradient(const cv::Mat& bgr, const cv::Mat& where) {
-  cv::Mat grey, across, down, weight, weights;
+cv::Mat gradientOf(const cv::Mat& bgr) {
+  cv::Mat grey, across, down;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
   cv::Scharr(grey, across, CV_32F, 1, 0), cv::Scharr(grey, down, CV_32F, 0, 1);
+  return cv::abs(across) + cv::abs(down);
+}
+
+// The mean of a gradient around every pixel, of what is set in `where`.
+cv::Mat meanAround(const cv::Mat& gradient, const cv::Mat& where) {
+  cv::Mat weight, weights, mean;
   cv::erode(where, weight, cv::Mat::ones(3, 3, CV_8U));
   weight.convertTo(weight, CV_32F, 1.0 / 255.0);
-  cv::Mat gradient = (cv::abs(across) + cv::abs(down)).mul(weight);
-  cv::blur(gradient, gradient, {kAround, kAround}), cv::blur(weight, weights, {kAround, kAround});
-  return gradient / cv::max(weights, 1e-3);
+  cv::blur(gradient.mul(weight), mean, {kAround, kAround});
+  cv::blur(weight, weights, {kAround, kAround});
+  return mean / cv::max(weights, 1e-3);
 }
 
 // The mean of a picture over every row and those around, of what is set; 0 where too few are.
@@ -123,9 +128,9 @@ cv::Mat lostInMirror(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Ma
         changed.at<std::uint8_t>(v, u) = 255;
     }
   }
-  const cv::Mat within = plane & changed, gradient = meanGradient(bgr, within),
-                beside = plane & ~changed;
-  const std::vector<float> usual = meanOfRows(meanGradient(bgr, beside), beside);
+  const cv::Mat within = plane & changed, beside = plane & ~changed, strength = gradientOf(bgr),
+                gradient = meanAround(strength, within);
+  const std::vector<float> usual = meanOfRows(meanAround(strength, beside), beside);
   cv::Mat lost = cv::Mat::zeros(bgr.size(), CV_8U);
   for (int v = 0; v < bgr.rows; ++v) lost.row(v) = gradient.row(v) < kPlain * usual[v];
   lost &= within;

@@ -39,10 +39,11 @@ cv::Mat reachOf(const cv::Mat& on, double part) {
 }  // namespace
 
 cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& farthest, const cv::Mat& scenery,
-               const cv::Mat& taken, const cv::Mat& beyond, const cv::Mat& nothing) {
+               const cv::Mat& taken, const cv::Mat& beyond, const cv::Mat& edge,
+               const cv::Mat& nothing) {
   const cv::Mat known = (scenery > 0.0f) & (plane > 0.0f),
-                on = known & (scenery < (1.0f + kOnPlane) * plane) &
-                     (scenery > (1.0f - kOnPlane) * farthest) & (taken == 0);
+                on = edge | (known & (scenery < (1.0f + kOnPlane) * plane) &
+                             (scenery > (1.0f - kOnPlane) * farthest) & (taken == 0));
   cv::Mat absent = (known & (scenery < kFarther * farthest) & (beyond == 0)) | nothing, to_on,
           to_absent;
   cv::morphologyEx(absent, absent, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));

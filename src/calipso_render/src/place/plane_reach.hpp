@@ -14,9 +14,11 @@ constexpr float kOnPlane = 0.01f;  // of the nearness: what is seen so near to a
 // @param scenery CV_32FC1, 1/m, of what is no object; 0 unknown
 // @param taken CV_8UC1, != 0: another plane is seen, which it may well pass through
 // @param beyond CV_8UC1, != 0: a plane is seen with which it ends at an edge: that says where
+// @param edge CV_8UC1, != 0: hidden, there it meets such a plane that goes on
 // @param nothing CV_8UC1, != 0: so far away that the depth image says nothing
 // @return CV_8UC1
 cv::Mat goesOn(const cv::Mat& plane, const cv::Mat& farthest, const cv::Mat& scenery,
-               const cv::Mat& taken, const cv::Mat& beyond, const cv::Mat& nothing);
+               const cv::Mat& taken, const cv::Mat& beyond, const cv::Mat& edge,
+               const cv::Mat& nothing);
 
 }  // namespace calipso::render
