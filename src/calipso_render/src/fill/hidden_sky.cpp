@@ -11,8 +11,7 @@ constexpr int kFewest = 30;  // px of a thing
 
 constexpr std::uint8_t kSky = InpaintParams::kSky, kNoSky = InpaintParams::kNoSky;
 
-// CV_8UC1: 255 on what is seen that hangs together with nothing at the
-// picture's border.
+// CV_8UC1: 255 on what is seen that hangs together with nothing at the picture's border.
 cv::Mat unheld(const cv::Mat& sky) {
   cv::Mat pieces, stats, centres, unheld = cv::Mat::zeros(sky.size(), CV_8U);
   cv::connectedComponentsWithStats(sky == kNoSky, pieces, stats, centres, 8, CV_32S);
