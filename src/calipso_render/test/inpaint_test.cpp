@@ -100,6 +100,17 @@ TEST(BridgeLines, ConnectTheTwoEndsOfALine) {
   }
 }
 
+// The hole's rim runs beside the line at one of its ends, so that only farther back both of its
+// sides are seen.
+TEST(BridgeLines, ConnectALineThatIsSeenFromAfar) {
+  Lines l;
+  l.line({0, 80}, {319, 115});
+  cv::fillConvexPoly(l.hole, std::vector<cv::Point>{{205, 107}, {228, 109}, {228, 130}, {205, 130}},
+                     cv::Scalar(255));
+  const LineBridges b = l.bridge();
+  EXPECT_NE(b.core.at<std::uint8_t>(96, 150), 0);
+}
+
 TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
   Lines l;
   l.line({0, 90}, {319, 90});

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "fill/line_ends.hpp"
@@ -92,8 +93,11 @@ class Bridger {
                          static_cast<float>(cv::norm(ends_[j].at - ends_[i].at)), *cost});
       }
     }
-    std::stable_sort(all.begin(), all.end(),
-                     [](const Bridge& a, const Bridge& b) { return a.cost < b.cost; });
+    // What was measured near the hole comes first.
+    const auto from_afar = [](const Bridge& b) { return b.from->from_afar || b.to->from_afar; };
+    std::stable_sort(all.begin(), all.end(), [&](const Bridge& a, const Bridge& b) {
+      return std::make_pair(from_afar(a), a.cost) < std::make_pair(from_afar(b), b.cost);
+    });
     for (const Bridge& b : all) {
       const bool taken = std::any_of(chosen.begin(), chosen.end(), [&](const Bridge& c) {
         return c.from == b.from || c.to == b.from || c.from == b.to || c.to == b.to || cross(c, b);
@@ -147,7 +151,7 @@ class Bridger {
   // The way from a lone end to the nearest connection that it meets, all of it in the hole.
   std::optional<float> wayTo(const LineEnd& end, const std::vector<Bridge>& bridges,
                              std::size_t count) const {
-    if (end.contrast < kAloneContrast || !end.isThin()) return std::nullopt;
+    if (end.contrast < kAloneContrast || !end.isThin() || end.from_afar) return std::nullopt;
     std::optional<float> nearest;
     for (std::size_t i = 0; i < count; ++i) {
       if (std::min(bridges[i].from->contrast, bridges[i].to->contrast) < kAsStrong * end.contrast)

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <utility>
 
 #include "calipso_render/inpaint.hpp"
 
@@ -11,7 +12,9 @@ namespace calipso::render {
 namespace {
 
 constexpr float kShortest = 14.0f;  // px of a line that is seen
-constexpr float kLost = 14.0f;      // px from where a line was lost to the hole, at most
+constexpr float kLost = 14.0f;      // px from where a line was lost to the hole, and at most,
+constexpr float kFarthest = 24.0f;  // where what is near the hole does not tell its colours
+constexpr float kStepBack = 4.0f;   // px
 constexpr float kReach = 8.0f;      // px along a line by which both of its edges may end apart
 // px from the hole at which the line must have been seen: it does not run along the rim
 constexpr float kClear = 4.0f;
@@ -53,15 +56,17 @@ class LineEndFinder {
   }
 
  private:
-  // Both edges of a line were found and are now the same: the longer one stays.
+  // Both edges of a line were found and are now the same: the longer one stays, seen near the hole
+  // if one is.
   void dropDoubles() {
     const auto isSame = [](const LineEnd& a, const LineEnd& b) {
       const cv::Point2f apart = b.at - a.at;
       return a.into.dot(b.into) > kSameLine && std::abs(a.into.dot(apart)) < kReach &&
              std::abs(render::cross(a.into, apart)) < kStray;
     };
-    std::stable_sort(ends_.begin(), ends_.end(),
-                     [](const LineEnd& a, const LineEnd& b) { return a.length > b.length; });
+    std::stable_sort(ends_.begin(), ends_.end(), [](const LineEnd& a, const LineEnd& b) {
+      return std::make_pair(a.from_afar, -a.length) < std::make_pair(b.from_afar, -b.length);
+    });
     std::vector<LineEnd> kept;
     for (const LineEnd& end : ends_) {
       if (std::none_of(kept.begin(), kept.end(), [&](const LineEnd& k) { return isSame(k, end); }))
@@ -81,10 +86,15 @@ class LineEndFinder {
                                                         cvRound(to.y - kLast * into.y))) < kClear)
       return;
     float reach = 1.0f;
-    while (reach <= kLost && !isSet(hole_, to + reach * into)) reach += 1.0f;
-    if (reach > kLost) return;
-    LineEnd end{to, into, length, {}, 0.0f, {}};
-    if (measure(end) && standsOut(end) && centre(end)) ends_.push_back(end);
+    while (reach <= kFarthest && !isSet(hole_, to + reach * into)) reach += 1.0f;
+    // Where the hole runs beside it the line is measured farther back.
+    for (const float nearest = std::min(reach, kLost); reach <= kFarthest && length >= kShortest;
+         reach += kStepBack, length -= kStepBack, to -= kStepBack * into) {
+      LineEnd end{to, into, length, {}, 0.0f, {}, reach > nearest};
+      if (!measure(end) || !standsOut(end) || !centre(end)) continue;
+      ends_.push_back(end);
+      return;
+    }
   }
 
   // An edge of a thin line goes to the line's middle, and along it: through its middles near the

@@ -19,6 +19,7 @@ struct LineEnd {
   LineProfile profile;   // from left to right of `into`
   float contrast;
   std::array<cv::Vec3f, 2> beside;  // mean colours left and right of it
+  bool from_afar;                   // nearer to the hole it was not to be measured
 
   bool isThin() const;  // a line, not an edge between two things
 };
