@@ -12,21 +12,9 @@ namespace {
 // Outlines are sampled every quarter of a pixel.
 constexpr double kSampling = 0.15;
 
-// A square plate with a square hole, 2 m in front of the camera: 200 and 100 px wide.
-struct Plate {
-  Points x{8, 3};
-  Triangles triangles{8, 3};
-
-  Plate() {
-    for (int k = 0; k < 4; ++k) {
-      const double u = k == 0 || k == 3 ? -1 : 1, v = k < 2 ? -1 : 1;
-      x.row(k) << 0.4 * u, 0.4 * v, 2.0;
-      x.row(4 + k) << 0.2 * u, 0.2 * v, 2.0;
-      const int next = (k + 1) % 4;
-      triangles.row(2 * k) << k, 4 + k, next;
-      triangles.row(2 * k + 1) << next, 4 + k, 4 + next;
-    }
-  }
+// Plate 200 px wide, hole 100.
+struct Plate : test::PlateWithHole {
+  Plate() : PlateWithHole(0.4) {}
 };
 
 // A square about the picture's middle, a point every pixel.

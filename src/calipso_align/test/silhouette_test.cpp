@@ -10,20 +10,8 @@
 namespace calipso::align {
 namespace {
 
-// A square plate of side 1 with a square hole of side 0.4, 2 m in front of the camera.
-struct Frame {
-  Points x{8, 3};
-  Triangles triangles{8, 3};
-  Frame() {
-    for (int k = 0; k < 4; ++k) {
-      const double u = k == 0 || k == 3 ? -1 : 1, v = k < 2 ? -1 : 1;
-      x.row(k) << 0.5 * u, 0.5 * v, 2.0;
-      x.row(4 + k) << 0.2 * u, 0.2 * v, 2.0;
-      const int next = (k + 1) % 4;
-      triangles.row(2 * k) << k, 4 + k, next;
-      triangles.row(2 * k + 1) << next, 4 + k, 4 + next;
-    }
-  }
+struct Frame : test::PlateWithHole {
+  Frame() : PlateWithHole(0.5) {}
 };
 
 TEST(Silhouette, DepthOfAPlateIsItsDistance) {

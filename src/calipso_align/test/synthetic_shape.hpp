@@ -41,6 +41,24 @@ inline TriangleMesh pear(int rings = 18, int segments = 24) {
   return mesh;
 }
 
+// A square plate of so many metres to either side of its middle, with a square hole of 0.2, 2 m in
+// front of a camera at its own origin.
+struct PlateWithHole {
+  Points x{8, 3};
+  Triangles triangles{8, 3};
+
+  explicit PlateWithHole(double half) {
+    for (int k = 0; k < 4; ++k) {
+      const double u = k == 0 || k == 3 ? -1 : 1, v = k < 2 ? -1 : 1;
+      x.row(k) << half * u, half * v, 2.0;
+      x.row(4 + k) << 0.2 * u, 0.2 * v, 2.0;
+      const int next = (k + 1) % 4;
+      triangles.row(2 * k) << k, 4 + k, next;
+      triangles.row(2 * k + 1) << next, 4 + k, 4 + next;
+    }
+  }
+};
+
 // Of every kind of deformation a little.
 inline LowOrderMap::Parameters someParameters() {
   LowOrderMap::Parameters p;

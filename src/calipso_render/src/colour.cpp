@@ -29,6 +29,17 @@ float linearFromRealCode(float code) {
   return table[i] + (x - i) * (table[i + 1] - table[i]);
 }
 
+cv::Mat linearFromRealCodes(const cv::Mat& codes) {
+  CV_Assert(codes.type() == CV_32FC3);
+  cv::Mat linear(codes.size(), CV_32FC3);
+  for (int v = 0; v < codes.rows; ++v) {
+    const float* in = codes.ptr<float>(v);
+    float* out = linear.ptr<float>(v);
+    for (int i = 0; i < 3 * codes.cols; ++i) out[i] = linearFromRealCode(in[i]);
+  }
+  return linear;
+}
+
 float codeFromLinear(float linear) {
   if (!(linear > 0.0f)) return 0.0f;  // also NaN
   if (linear >= 1.0f) return 255.0f;

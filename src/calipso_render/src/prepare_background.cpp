@@ -60,18 +60,8 @@ cv::Mat placeVisibility(const Visibility& light, const ReceiverOf& receiver_of,
   return visibility;
 }
 
-cv::Mat linearOf(const cv::Mat& codes) {
-  cv::Mat linear(codes.size(), CV_32FC3);
-  for (int v = 0; v < codes.rows; ++v) {
-    const float* in = codes.ptr<float>(v);
-    float* out = linear.ptr<float>(v);
-    for (int i = 0; i < 3 * codes.cols; ++i) out[i] = linearFromRealCode(in[i]);
-  }
-  return linear;
-}
-
 cv::Mat luminanceOf(const cv::Mat& codes) {
-  const cv::Mat linear = linearOf(codes);
+  const cv::Mat linear = linearFromRealCodes(codes);
   cv::Mat of(codes.size(), CV_32F);
   for (int v = 0; v < codes.rows; ++v) {
     for (int u = 0; u < codes.cols; ++u) of.at<float>(v, u) = luminance(linear.at<cv::Vec3f>(v, u));
@@ -139,8 +129,9 @@ PlaneMirror findMirror(const std::vector<Actor>& actors, const cv::Mat& picture,
   };
   const MirrorImage image = mirrorImage(resting, radiance, params.planes, p.camera, off_planes);
   if (image.empty()) return {};
-  PlaneMirror mirror = establishMirror(
-      image, linearOf(picture), grown(unclear, params.background.mask_margin_px) == 0, 1.0 - sky);
+  PlaneMirror mirror =
+      establishMirror(image, linearFromRealCodes(picture),
+                      grown(unclear, params.background.mask_margin_px) == 0, 1.0 - sky);
   if (!mirror.established()) return mirror;
   mirror.off = off_planes;
   mirror.at_key = addedBy(mirror, image);
@@ -308,7 +299,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   for (const PicturePlane& plane : surfaces.planes)
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
   inventBackground(traces, key, known_of_place, params.background, p.background);
-  p.plate_linear = linearOf(p.background.plate);
+  p.plate_linear = linearFromRealCodes(p.background.plate);
   findDrifting(e.frames,
                ground.empty() ? ground : cv::Mat((ground > 0.0f) & (place.off_planes == 0)),
                params.background, p);

@@ -14,8 +14,9 @@ const float* decodeTable();
 // Linear value of a code value.
 float linearFromCode(std::uint8_t code);
 
-// The same for a code value that is a real number in [0, 255].
+// The same for a code value that is a real number in [0, 255], and for a picture of such.
 float linearFromRealCode(float code);
+cv::Mat linearFromRealCodes(const cv::Mat& codes);  // CV_32FC3 -> CV_32FC3
 
 // Code value as a real number in [0, 255] of a linear value; clamps to [0, 1] first.
 float codeFromLinear(float linear);

@@ -97,11 +97,7 @@ void DriftingBackground::layOver(const std::vector<ClipFrame>& frames,
 
 void DriftingBackground::invent() {
   if (cv::countNonZero(invented_) > 0) panorama_ = inpaint(panorama_, invented_, cv::Mat()).image;
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < panorama_.rows; ++v) {
-    float* row = panorama_.ptr<float>(v);
-    for (int i = 0; i < 3 * panorama_.cols; ++i) row[i] = linearFromRealCode(row[i]);
-  }
+  panorama_ = linearFromRealCodes(panorama_);
 }
 
 std::optional<cv::Point2f> DriftingBackground::shiftAt(std::int64_t stamp_ns) const {

@@ -33,7 +33,7 @@ cv::Mat depthInShade(const cv::Mat& sun) {
   return depth;
 }
 
-cv::Mat hiddenSky(const cv::Mat& sky) {
+cv::Mat hiddenPart(const cv::Mat& sky) {
   cv::Mat smooth;
   cv::GaussianBlur(1.0 - sky, smooth, {}, kSmooth);
   return smooth;
@@ -41,13 +41,8 @@ cv::Mat hiddenSky(const cv::Mat& sky) {
 
 // Mean linear colours of 3 x 3 px.
 cv::Mat smoothLinear(const cv::Mat& picture) {
-  cv::Mat linear(picture.size(), CV_32FC3), smooth;
-  for (int v = 0; v < picture.rows; ++v) {
-    const float* in = picture.ptr<float>(v);
-    float* out = linear.ptr<float>(v);
-    for (int i = 0; i < 3 * picture.cols; ++i) out[i] = linearFromRealCode(in[i]);
-  }
-  cv::blur(linear, smooth, {3, 3});
+  cv::Mat smooth;
+  cv::blur(linearFromRealCodes(picture), smooth, {3, 3});
   return smooth;
 }
 
@@ -98,7 +93,7 @@ std::optional<float> agreedOn(std::vector<float> values) {
 std::optional<cv::Vec3f> umbraAtBorders(const ShadedPlace& place, const cv::Vec3f& predicted) {
   const std::vector<Pair> pairs = pairsAcross(place, place.margin);
   if (pairs.size() < kFewest) return std::nullopt;
-  const cv::Mat linear = smoothLinear(place.picture), hidden = hiddenSky(place.sky);
+  const cv::Mat linear = smoothLinear(place.picture), hidden = hiddenPart(place.sky);
   cv::Vec3f umbra;
   for (int c = 0; c < 3; ++c) {
     std::vector<float> logs;
@@ -121,7 +116,7 @@ cv::Mat liftShade(const ShadedPlace& place, const cv::Mat& traces, const cv::Vec
                   cv::Mat& plate) {
   const std::optional<cv::Vec3f> measured = umbraAtBorders(place, predicted);
   const cv::Vec3f umbra = measured.value_or(predicted);
-  const cv::Mat clear = traces & (place.unclear == 0), hidden = hiddenSky(place.sky),
+  const cv::Mat clear = traces & (place.unclear == 0), hidden = hiddenPart(place.sky),
                 lit = clear & (grown(place.sun < kFullSun, place.margin) == 0);
   cv::Mat dark = cv::Mat::zeros(clear.size(), CV_8U);
   if (measured && std::min({umbra[0], umbra[1], umbra[2]}) >= kLeastUmbra)

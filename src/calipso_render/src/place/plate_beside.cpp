@@ -23,12 +23,8 @@ PlateBeside plateFrom(std::vector<ClipFrame> frames, std::size_t first, const cv
       frames.front().camera, nearnessFrom(nearness, key, frames.front().camera), {}, {}};
   const Background seen = seenBackground(inKeyView(frames, beside.nearness, params.mask_margin_px),
                                          objects_move, params);
-  beside.plate = seen.plate, beside.spread = seen.spread;
+  beside.plate = linearFromRealCodes(seen.plate), beside.spread = seen.spread;
   beside.spread.setTo(std::numeric_limits<float>::infinity(), seen.count == 0);
-  for (int v = 0; v < beside.plate.rows; ++v) {
-    float* row = beside.plate.ptr<float>(v);
-    for (int i = 0; i < 3 * beside.plate.cols; ++i) row[i] = linearFromRealCode(row[i]);
-  }
   return beside;
 }
 
