@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <calipso_scene/disjoint_sets.hpp>
 #include <map>
 #include <numeric>
 #include <unordered_map>
@@ -146,6 +147,20 @@ int neighbourOf(const CellMap& index, Vector3i p, int face) {
   return it == index.end() ? -1 : it->second;
 }
 
+// A few cells that touch no others are a product of coarse sampling, or of a model whose small parts
+// do not reach each other: they are welded to all around them.
+void weldCrumbs(std::vector<CoveredCell>* cells) {
+  constexpr double kCrumb = 0.02;  // of all cells
+  const int n = static_cast<int>(cells->size());
+  DisjointSets parts(n);
+  for (const FaceContact& contact : faceContacts(*cells)) parts.join(contact.low, contact.high);
+  std::vector<int> size(n, 0);
+  for (int c = 0; c < n; ++c) ++size[parts.find(c)];
+  for (int c = 0; c < n; ++c)
+    if (size[parts.find(c)] <= std::max(1.0, kCrumb * n))
+      std::fill((*cells)[c].neighbours, (*cells)[c].neighbours + 6, ~0u);
+}
+
 }  // namespace
 
 std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
@@ -174,13 +189,9 @@ std::vector<CoveredCell> separateBranches(const std::vector<CoveredCell>& cells,
       const auto touched = contacts(parts[c], parts[other], face, s);
       for (int b = 0; b < n; ++b) pieces[b].neighbours[face] = touched[b];
     }
-    // What touches nothing at all is a product of coarse sampling: it stays welded.
-    for (CoveredCell& piece : pieces)
-      if (std::all_of(piece.neighbours, piece.neighbours + 6,
-                      [](unsigned neighbour) { return neighbour == 0; }))
-        std::fill(piece.neighbours, piece.neighbours + 6, ~0u);
     result.insert(result.end(), pieces.begin(), pieces.end());
   }
+  if (separate) weldCrumbs(&result);
   return result;
 }
 

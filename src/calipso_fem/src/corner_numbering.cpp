@@ -16,30 +16,45 @@ Position key(const Vector3i& p) { return {p.z(), p.y(), p.x()}; }
 
 Vector3i cornerOffset(int c) { return {c & 1, (c >> 1) & 1, c >> 2}; }
 
-// Joins the four corners that two touching cells share across face +axis of `a`.
-void joinFace(int a, int b, int axis, DisjointSets* sets) {
+using CellsAt = std::map<Position, std::vector<int>>;
+
+CellsAt cellsAt(const std::vector<CoveredCell>& cells) {
+  CellsAt at;
+  for (std::size_t c = 0; c < cells.size(); ++c)
+    at[key(cells[c].position)].push_back(static_cast<int>(c));
+  return at;
+}
+
+// Joins the four corners that the two cells share.
+void joinFace(const FaceContact& contact, DisjointSets* sets) {
   for (int c = 0; c < 8; ++c)
-    if (cornerOffset(c)[axis] == 1) sets->join(8 * a + c, 8 * b + (c ^ (1 << axis)));
+    if (cornerOffset(c)[contact.axis] == 1)
+      sets->join(8 * contact.low + c, 8 * contact.high + (c ^ (1 << contact.axis)));
 }
 
 }  // namespace
 
-CornerNumbering numberCorners(const std::vector<CoveredCell>& cells) {
-  const int n = static_cast<int>(cells.size());
-  std::map<Position, std::vector<int>> at_position;
-  for (int c = 0; c < n; ++c) at_position[key(cells[c].position)].push_back(c);
-
-  DisjointSets sets(8 * n);
-  for (int a = 0; a < n; ++a)
+std::vector<FaceContact> faceContacts(const std::vector<CoveredCell>& cells) {
+  const CellsAt at_position = cellsAt(cells);
+  std::vector<FaceContact> contacts;
+  for (int a = 0; a < static_cast<int>(cells.size()); ++a)
     for (int axis = 0; axis < 3; ++axis) {
       const auto it = at_position.find(key(cells[a].position + Vector3i::Unit(axis)));
       if (it == at_position.end()) continue;
       for (int b : it->second) {
         const bool touch = (cells[a].neighbours[2 * axis + 1] >> cells[b].branch & 1u) ||
                            (cells[b].neighbours[2 * axis] >> cells[a].branch & 1u);
-        if (touch) joinFace(a, b, axis, &sets);
+        if (touch) contacts.push_back({a, b, axis});
       }
     }
+  return contacts;
+}
+
+CornerNumbering numberCorners(const std::vector<CoveredCell>& cells) {
+  const int n = static_cast<int>(cells.size());
+  const CellsAt at_position = cellsAt(cells);
+  DisjointSets sets(8 * n);
+  for (const FaceContact& contact : faceContacts(cells)) joinFace(contact, &sets);
 
   // Around a node without divided cells everything is one, also across an edge or a corner.
   std::map<Position, std::vector<int>> corners_at;
@@ -47,7 +62,7 @@ CornerNumbering numberCorners(const std::vector<CoveredCell>& cells) {
     corners_at[key(cells[k / 8].position + cornerOffset(k % 8))].push_back(k);
   for (const auto& [position, corners] : corners_at) {
     const bool divided = std::any_of(corners.begin(), corners.end(), [&](int k) {
-      return at_position[key(cells[k / 8].position)].size() > 1;
+      return at_position.at(key(cells[k / 8].position)).size() > 1;
     });
     if (divided) continue;
     for (int k : corners) sets.join(corners.front(), k);

@@ -11,6 +11,8 @@ namespace {
 
 // Renewing the multigrid costs about this many CG iterations.
 constexpr double kRenewalCost = 3.0;
+// A residual that grows so far belongs to loads that nothing holds: the system is singular.
+constexpr double kRunaway = 1e6;
 constexpr int kGrain = Multigrid::kGrain;
 constexpr int kFloatLanes = kHexLanes<float>;
 
@@ -355,8 +357,8 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
          ++iteration) {
       turned = cg.turn(residual, iteration == 0);
       const std::optional<double> next = turned ? cg.advance() : std::nullopt;
-      positive = next.has_value();
       residual = next.value_or(residual);
+      positive = next.has_value() && residual < kRunaway * first;
     }
     cg.finish(solution);
     if (crew.rank() != 0) return;

@@ -33,6 +33,13 @@ std::vector<CoveredCell> coverSurface(const TriangleMesh& surface, const VoxelLa
                                       const VoxelizeOptions& options,
                                       std::vector<std::string>* messages);
 
+// Two cells that touch across face +axis of `low`.
+struct FaceContact {
+  int low = 0, high = 0, axis = 0;
+};
+
+std::vector<FaceContact> faceContacts(const std::vector<CoveredCell>& cells);
+
 struct CornerNumbering {
   Eigen::Matrix<int, Eigen::Dynamic, 8, Eigen::RowMajor> hexes;
   Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor> node_lattice;

@@ -3,26 +3,12 @@
 #include <cmath>
 #include <set>
 
+#include "append_box.hpp"
 #include "calipso_fem/embedding.hpp"
 #include "calipso_fem/voxel_grid.hpp"
 
 namespace calipso::fem {
 namespace {
-
-void appendBox(const Eigen::Vector3d& low, const Eigen::Vector3d& high, TriangleMesh* mesh) {
-  static const int kFaces[12][3] = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5},
-                                    {0, 1, 5}, {0, 5, 4}, {2, 6, 7}, {2, 7, 3},
-                                    {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
-  const int first = mesh->vertexCount(), face = mesh->triangleCount();
-  mesh->vertices.conservativeResize(first + 8, 3);
-  mesh->triangles.conservativeResize(face + 12, 3);
-  for (int c = 0; c < 8; ++c)
-    mesh->vertices.row(first + c) << (c & 1 ? high : low).x(), (c & 2 ? high : low).y(),
-        (c & 4 ? high : low).z();
-  for (int t = 0; t < 12; ++t)
-    mesh->triangles.row(face + t) << first + kFaces[t][0], first + kFaces[t][1],
-        first + kFaces[t][2];
-}
 
 double filledVolume(const VoxelGrid& grid) {
   return grid.fraction.sum() * std::pow(grid.cell_size, 3);
@@ -155,6 +141,21 @@ TEST(Voxelize, BranchesThatShareACellAreNotWelded) {
   EXPECT_EQ(apart.nodeCount(), 24);
   options.separate_branches = false;
   EXPECT_EQ(voxelize(mesh, options).nodeCount(), 12);
+}
+
+// Its vertices would fall off as soon as the object can bend.
+TEST(Voxelize, SmallPartsThatTouchNothingAreWelded) {
+  const auto nodesWithBrick = [](double length) {
+    TriangleMesh mesh;
+    appendBox({0.0, 0.0, 0.0}, {length, 0.40, 0.5}, &mesh);
+    appendBox({3.0, 0.70, 0.0}, {5.0, 1.0, 0.5}, &mesh);
+    VoxelizeOptions options;
+    options.cell_size = 1.0;
+    options.has_anchor = true;
+    return voxelize(mesh, options).nodeCount();
+  };
+  EXPECT_EQ(nodesWithBrick(120.0), 4 * 121);     // 2 of 122 cells
+  EXPECT_EQ(nodesWithBrick(20.0), 4 * 21 + 12);  // 2 of 22: a part of its own
 }
 
 TEST(Embedding, ReproducesPointsAndSumsToOne) {
