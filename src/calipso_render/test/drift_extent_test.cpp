@@ -71,6 +71,27 @@ TEST(DriftExtent, EndsAtWhatMovesOtherwise) {
   EXPECT_LT(wrong(where), where.total() / 100);
 }
 
+TEST(DriftExtent, GoesUpToARoundWindowsTrimBehindAnObjectThatEndsThere) {
+  const cv::Mat clouds = noise({kWide + 60, kHigh}, 15.0, 4.0, 3);
+  cv::Mat window = cv::Mat::zeros(kHigh, kWide, CV_8U), object = window.clone();
+  cv::circle(window, {100, 60}, 90, 255, -1);
+  object(cv::Rect(100, 60, 100, 100)) = 255;
+  object &= window;
+  Clip clip;
+  for (int k = 0; k < kFrames; ++k) {
+    cv::Mat grey(kHigh, kWide, CV_32F, cv::Scalar(90.0f)), covered;
+    cv::Mat(clouds.colRange(3 * k, 3 * k + kWide) + 180.0f).copyTo(grey, window);
+    grey.setTo(30.0f, object);
+    grey += noise(grey.size(), 0.7, 1.0, 100 + k);
+    cv::dilate(object, covered, cv::Mat::ones(7, 7, CV_8U));
+    clip.pictures.push_back({grey, covered});
+    clip.shifts.push_back({-3.0f * static_cast<float>(k), 0.0f});
+  }
+  const cv::Mat where = whereDrifting(clip.pictures, clip.shifts, cv::Mat());
+  ASSERT_FALSE(where.empty());
+  EXPECT_LT(cv::countNonZero((where == 0) & object), cv::countNonZero(object) / 100);
+}
+
 TEST(DriftExtent, IsNowhereIfAnotherDriftWasMeant) {
   Clip clip = coast(false);
   for (cv::Point2f& shift : clip.shifts) shift.x = -shift.x;

@@ -125,6 +125,22 @@ TEST(DriftingBackground, WhatNoFrameShowsIsInventedOnceAndDriftsAlong) {
   EXPECT_GT(cv::mean(plates[0](middle))[2], 0.1) << "clouds, not the object";
 }
 
+TEST(DriftingBackground, IsInventedNowhereBesideWhatIsTakenOutOfAFrame) {
+  const int margin = 3;
+  const cv::Rect wide(100, 60, 100, 80), taken(100 - margin, 60 - margin, 106, 86);
+  const std::vector<ClipFrame> frames = clipOf(Motion::kDrifts, wide);
+  const DriftingBackground drifting(frames, margin, cv::Mat());
+  ASSERT_TRUE(drifting.established());
+  for (const int k : {0, 4, 12}) {
+    cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar()),
+        invented = cv::Mat::zeros(kHigh, kWide, CV_8U);
+    drifting.draw(*drifting.shiftAt(frames[k].stamp_ns), plate, invented);
+    invented(taken) = 0;
+    const cv::Rect around(80, 40, 140, 120);
+    EXPECT_EQ(cv::countNonZero(invented(around)), 0) << k;
+  }
+}
+
 TEST(DriftingBackground, IsBroughtToWhatAFrameShowsAroundTheObject) {
   const DriftingBackground drifting(clipOf(Motion::kDrifts), 2, cv::Mat());
   ASSERT_TRUE(drifting.established());

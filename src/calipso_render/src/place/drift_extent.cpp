@@ -24,6 +24,8 @@ constexpr float kHiddenBorder = 1.0f;  // where no picture shows it
 constexpr float kEdge = 0.7f;          // code values from cell to cell: half that cost
 constexpr float kDoubt = 0.15f;        // what speaks for resting wherever anything is seen, and
 constexpr float kGround = 0.3f;        // besides where a support plane is seen
+// for drifting where nothing is seen: of equal borders the one along what rests
+constexpr float kHidden = 0.02f;
 const cv::Point kNext[] = {{1, 0}, {0, 1}};
 
 // Mean differences between pictures, per place.
@@ -132,7 +134,7 @@ cv::Mat whatSpeaks(const Misses& m, const cv::Mat& ground) {
   const float usual = quantileOf(m.drifting, drifts, 0.75);
   cv::Mat speaks = (m.resting - m.drifting) / (m.resting + m.drifting + usual);
   speaks.setTo(0.0f, ~m.known);
-  cv::subtract(speaks, kDoubt, speaks, m.seen);
+  cv::subtract(speaks, kDoubt, speaks, m.seen), cv::add(speaks, kHidden, speaks, ~m.seen);
   if (!ground.empty()) cv::subtract(speaks, kGround, speaks, ground);
   return speaks;
 }

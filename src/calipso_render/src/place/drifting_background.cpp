@@ -40,7 +40,7 @@ DriftingBackground::DriftingBackground(const std::vector<ClipFrame>& frames, int
   std::vector<cv::Mat> covered;
   for (const ClipFrame& f : frames) {
     stamps_.push_back(f.stamp_ns);
-    covered.push_back(grown(f.labels != 0, std::max(margin, kInterpolated)));
+    covered.push_back(grown(f.labels != 0, std::max(margin, kInterpolated + 1)));
   }
   const Drift drift = findDrift(frames, covered, ground);
   if (drift.where.empty()) return;
@@ -75,7 +75,7 @@ void DriftingBackground::layOver(const std::vector<ClipFrame>& frames,
     cv::Mat picture;
     frames[i].bgr.convertTo(picture, CV_32F);
     displaced(picture, by, size).convertTo(pictures[i], CV_8U);
-    shown[i] = displacedMask((grown(~where_, kInterpolated) | grown(covered[i], 1)) == 0,
+    shown[i] = displacedMask((grown(~where_, kInterpolated) | covered[i]) == 0,
                              rounded(by), size);
   }
   panorama_ = cv::Mat::zeros(size, CV_32FC3), invented_ = cv::Mat(size, CV_8U, cv::Scalar(255));
