@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "fill/line_bridge.hpp"
 #include "fill/patch_fill.hpp"
@@ -254,6 +255,26 @@ TEST(PatchOrigins, DoNotDependOnTheNumberOfThreads) {
   omp_set_num_threads(threads);
 }
 
+// So little of it that coarser levels have no patch of it to begin with.
+TEST(PatchOrigins, ComeFromAPlaneOfWhichLittleIsSeen) {
+  const cv::Rect strip(110, 60, 24, 112), hidden(90, 40, 80, 110);
+  cv::Mat image = spots(256, 172), surface(172, 256, CV_8U, cv::Scalar(1)),
+          hole = cv::Mat::zeros(172, 256, CV_8U);
+  image(strip) = 0.5 * image(strip);
+  surface(strip) = 2, hole(hidden) = 255;
+  InpaintParams params;
+  params.surface = surface, params.planes.resize(2);
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, nullptr, params);
+  int elsewhere = 0;
+  for (int v = 63; v < 147; ++v) {
+    for (int u = 113; u < 131; ++u) {
+      const cv::Vec2s from = origin.at<cv::Vec2s>(v, u);
+      elsewhere += surface.at<std::uint8_t>(from[1], from[0]) != 2;
+    }
+  }
+  EXPECT_LT(elsewhere, 18 * 84 / 10);
+}
+
 TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
   const cv::Mat image = grain(40, 40), hole(40, 40, CV_8U, cv::Scalar(255)),
                 source = cv::Mat::zeros(40, 40, CV_8U);
@@ -285,21 +306,34 @@ TEST(CutSeams, MoveToWhereCopiesAreAlike) {
   }
 }
 
-// A step that is too high for a seam keeps its place, but not its edge.
-TEST(BlendSeams, SoftenAStepBetweenThings) {
+// A row of a picture whose left half is darker by a step, blended.
+std::vector<float> blendedStep(float step, const cv::Mat& planes) {
   cv::Mat image(40, 120, CV_32FC3, cv::Scalar::all(50)), hole = cv::Mat::zeros(40, 120, CV_8U);
-  image.colRange(60, 120).setTo(cv::Scalar::all(200));
+  image.colRange(60, 120).setTo(cv::Scalar::all(50.0 + step));
   hole.colRange(30, 90).setTo(255);
-  cv::Mat origin(40, 120, CV_16SC2, {-1, -1});
+  cv::Mat origin(40, 120, CV_16SC2, {-1, -1}), row;
   for (int v = 0; v < 40; ++v) {
     for (int u = 30; u < 90; ++u)
       origin.at<cv::Vec2s>(v, u) = {static_cast<short>(u < 60 ? 10 : 105), static_cast<short>(v)};
   }
-  blendSeams(hole, hole == 0, origin, image);
-  const auto at = [&](int u) { return image.at<cv::Vec3f>(20, u)[0]; };
-  EXPECT_LT(at(60) - at(59), 75.0f);
-  EXPECT_NEAR(at(50), 50.0f, 12.0f);
-  EXPECT_NEAR(at(70), 200.0f, 12.0f);
+  blendSeams(hole, hole == 0, origin, planes, image);
+  cv::extractChannel(image.row(20), row, 0);
+  return row;
+}
+
+// A step that is too high for a seam keeps its place, but not its edge.
+TEST(BlendSeams, SoftenAStepBetweenThings) {
+  const std::vector<float> at = blendedStep(150.0f, cv::Mat());
+  EXPECT_LT(at[60] - at[59], 75.0f);
+  EXPECT_NEAR(at[50], 50.0f, 12.0f);
+  EXPECT_NEAR(at[70], 200.0f, 12.0f);
+}
+
+TEST(BlendSeams, KeepTheEdgeBetweenPlanes) {
+  cv::Mat planes(40, 120, CV_8U, cv::Scalar(1));
+  planes.colRange(60, 120).setTo(2);
+  for (const float step : {10.0f, 150.0f})
+    EXPECT_NEAR(blendedStep(step, planes)[60] - blendedStep(step, planes)[59], step, 1e-3f);
 }
 
 TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
@@ -312,10 +346,10 @@ TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
     for (int u = 50; u < 70; ++u) origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 40), short(v));
   }
   const cv::Mat exact = image.clone();
-  blendSeams(hole, hole == 0, origin, image);
+  blendSeams(hole, hole == 0, origin, cv::Mat(), image);
   EXPECT_LT(cv::norm(image, exact, cv::NORM_INF), 1e-3);  // what fits stays
   cv::subtract(image, cv::Scalar::all(3.0), image, hole);
-  blendSeams(hole, hole == 0, origin, image);
+  blendSeams(hole, hole == 0, origin, cv::Mat(), image);
   EXPECT_LT(meanDifference(image, truth, hole), 0.5);
 }
 

@@ -80,6 +80,13 @@ struct Filling {
   cv::Mat origin;  // CV_16SC2; (-1, -1) where nothing was copied
 };
 
+// The surfaces that are planes, the others unknown.
+cv::Mat planesOf(const InpaintParams& params) {
+  cv::Mat planes = params.surface.clone();
+  if (!planes.empty()) planes.setTo(0, planes > static_cast<double>(params.planes.size()));
+  return planes;
+}
+
 // @param known CV_8UC1: what the filling has to go with; source, of it: what may be copied
 Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const Lattice* lattice,
              InpaintParams params) {
@@ -94,7 +101,7 @@ Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const
   const cv::Mat without = to_fill & (copyFrom(f.origin, look, f.image) == 0);
   if (cv::countNonZero(without) > 0) smoothFill(look, to_fill, known).copyTo(f.image, without);
   if (cv::countNonZero(without) < cv::countNonZero(to_fill))
-    blendSeams(to_fill, known, f.origin, f.image);
+    blendSeams(to_fill, known, f.origin, planesOf(params), f.image);
   bridges.origin.copyTo(f.origin, bridges.core);
   f.origin.setTo(cv::Scalar(-1, -1), whole_hole == 0);
   return f;

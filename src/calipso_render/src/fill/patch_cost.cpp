@@ -78,7 +78,7 @@ float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
     if (away_farther_ > 0.0f && own > kAsNear * other && other > 0.0f)
       cost += away_farther_ * (own / other - kAsNear);
   }
-  if (has_surface_ && differ(surface_, p, q)) cost += kMisplaced;
+  if (onOther(p, q)) cost += kMisplaced;
   if (has_sky_ && differ(sky_, p, q)) cost += kMisplaced;
   if (lattice_ != nullptr && offLattice(q - p) > kOffLattice) cost += kMisplaced;
   return kPatchSide * kPatchSide * cost;

@@ -34,6 +34,14 @@ class PatchCost {
   // The place nearest to q from which p can be copied by a shift of the lattice; q without one.
   cv::Point onLattice(const cv::Point& p, const cv::Point& q) const;
 
+  // Label of the surface at a place; 0 unknown.
+  int surfaceAt(const cv::Point& p) const {
+    return has_surface_ ? surface_.at<std::uint8_t>(p) : 0;
+  }
+  bool onOther(const cv::Point& p, const cv::Point& q) const {
+    return has_surface_ && differ(surface_, p, q);
+  }
+
  private:
   float awayCost(const cv::Point& p, const cv::Point& q) const;
   float offLattice(const cv::Point& shift) const;

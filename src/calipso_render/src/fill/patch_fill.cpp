@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -47,6 +48,11 @@ class Filling {
     cv::Mat touched;
     cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
     cv::findNonZero(whole_, sources_);
+    for (const cv::Point& q : sources_) {
+      const int surface = rules_.surfaceAt(q);
+      if (0 < surface && surface <= static_cast<int>(params_.planes.size()))
+        on_plane_[surface].push_back(q);
+    }
     cv::dilate(hole_, touched, patch);
     for (int v = kPatchRadius; v + kPatchRadius < hole_.rows; ++v) {
       for (int u = kPatchRadius; u + kPatchRadius < hole_.cols; ++u) {
@@ -62,11 +68,13 @@ class Filling {
 
   // From the rim inwards: a ring's patches are compared by what is known of them, then the ring is
   // filled.
-  void peel() {
-    cv::Mat known = hole_ == 0, ring;
+  void peel() { peel(hole_); }
+
+  void peel(const cv::Mat& part) {
+    cv::Mat known = part == 0, ring;
     for (;;) {
       cv::dilate(known, ring, cv::Mat::ones(3, 3, CV_8U));
-      ring &= hole_ & (known == 0);
+      ring &= part & (known == 0);
       std::vector<cv::Point> pixels;
       cv::findNonZero(ring, pixels);
       if (pixels.empty()) return;
@@ -100,6 +108,21 @@ class Filling {
       vote();
     else
       copy();
+  }
+
+  // Peels anew what was led off its plane for want of it: coarser levels have fewer whole patches,
+  // and finer ones look no farther than around what those found.
+  void peelMisled() {
+    cv::Mat misled = cv::Mat::zeros(hole_.size(), CV_8U);
+    for (int v = 0; v < hole_.rows; ++v) {
+      for (int u = 0; u < hole_.cols; ++u) {
+        if (hole_.at<std::uint8_t>(v, u) != 0 && isMisled(centreFor({u, v})))
+          misled.at<std::uint8_t>(v, u) = 255;
+      }
+    }
+    along_planes_ = true;
+    peel(misled);
+    along_planes_ = false;
   }
 
   // @param reach px around the best place found so far in which others are tried
@@ -181,7 +204,13 @@ class Filling {
   }
   bool isWhole(const cv::Point& p) const { return inside(p) && whole_.at<std::uint8_t>(p) != 0; }
   cv::Point anySource(const cv::Point& p, int salt) const {
-    return sources_[random(p, salt) % sources_.size()];
+    const auto own = on_plane_.find(rules_.surfaceAt(p));
+    const std::vector<cv::Point>& from =
+        along_planes_ && own != on_plane_.end() ? own->second : sources_;
+    return from[random(p, salt) % from.size()];
+  }
+  bool isMisled(const cv::Point& p) const {
+    return hasMatch(p) && on_plane_.count(rules_.surfaceAt(p)) > 0 && rules_.onOther(p, match(p));
   }
 
   // The nearest centre of a patch that lies within the picture.
@@ -317,6 +346,8 @@ class Filling {
   cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   std::vector<cv::Point> sources_;
+  std::map<int, std::vector<cv::Point>> on_plane_;  // of them those on every plane
+  bool along_planes_ = false;                       // a plane's first guesses lie on it
   int sweep_ = 0;
 };
 
@@ -343,6 +374,7 @@ cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& s
   for (int k = coarsest - 1; k >= 0; --k) {
     Filling finer(levels[k], static_cast<float>(1 << k), horizon, lattice, params);
     finer.startFrom(filling);
+    finer.peelMisled();
     if (k > 0)
       settle(finer, params.rounds, kFarthest);
     else

@@ -4,6 +4,8 @@
 #include <opencv2/core/hal/intrin.hpp>
 #include <vector>
 
+#include "fill/patch_cost.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -29,8 +31,9 @@ cv::Vec4f widened(const cv::Vec3f& c) { return {c[0], c[1], c[2], 0.0f}; }
 
 class Seams {
  public:
-  Seams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, const cv::Mat& image)
-      : hole_(hole), source_(source), origin_(origin), image_(image) {}
+  Seams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, const cv::Mat& planes,
+        const cv::Mat& image)
+      : hole_(hole), source_(source), origin_(origin), planes_(planes), image_(image) {}
 
   // First one colour of a chessboard, then the other: a field's neighbours have the other one, so
   // that none waits for the one before it.
@@ -59,6 +62,7 @@ class Seams {
       const cv::Point q = node.at + kAround[i];
       node.neighbours[i] = static_cast<int>(none);
       if (!inside(q) || (index.at<int>(q) < 0 && source_.at<std::uint8_t>(q) == 0)) continue;
+      if (index.at<int>(q) >= 0 && !planes_.empty() && differ(planes_, node.at, q)) continue;
       if (index.at<int>(q) >= 0) node.neighbours[i] = index.at<int>(q);
       node.count += 1.0f;
       const cv::Vec3f miss = colour(q) - colour(node.at) - wanted(node.at, q);
@@ -88,7 +92,7 @@ class Seams {
     return seen > 0 ? cv::Vec3f(sum / seen) : cv::Vec3f(0, 0, 0);
   }
 
-  const cv::Mat &hole_, &source_, &origin_, &image_;
+  const cv::Mat &hole_, &source_, &origin_, &planes_, &image_;
 };
 
 // What is added: mismatches spread by a screened Poisson equation, all channels at once. Known
@@ -113,8 +117,9 @@ std::vector<cv::Vec4f> spread(const std::vector<Node>& nodes, cv::Vec4f Node::*m
 
 }  // namespace
 
-void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, cv::Mat& image) {
-  const std::vector<Node> nodes = Seams(hole, source, origin, image).nodes();
+void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin,
+                const cv::Mat& planes, cv::Mat& image) {
+  const std::vector<Node> nodes = Seams(hole, source, origin, planes, image).nodes();
   std::vector<cv::Vec4f> wide, narrow;
 #pragma omp parallel sections
   {

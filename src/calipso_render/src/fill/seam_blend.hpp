@@ -11,6 +11,9 @@ namespace calipso::render {
 // @param hole CV_8UC1
 // @param source CV_8UC1, known pixels
 // @param origin CV_16SC2, per hole pixel what it is a copy of; (-1, -1): of nothing
-void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, cv::Mat& image);
+// @param planes CV_8UC1, number of the plane that is seen, 0 unknown; may be empty: where one gives
+// way to another there is an edge, and no seam
+void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin,
+                const cv::Mat& planes, cv::Mat& image);
 
 }  // namespace calipso::render
