@@ -79,6 +79,25 @@ TEST_F(LiftedShade, BringsThePlaceBackInShadeAndBesideIt) {
   }
 }
 
+TEST_F(LiftedShade, HasNoMoreGrainThanWhatLiesInTheLight) {
+  cv::RNG random(3);
+  cv::Mat noise(size_, CV_32FC3), plate, grain;
+  random.fill(place_, cv::RNG::UNIFORM, 110.0, 122.0);
+  random.fill(noise, cv::RNG::NORMAL, 0.0, 5.0);
+  const cv::Mat where = lifted(shaded(kUmbra) + noise, plate), dark = where & (sun_ == 0.0f),
+                lit = where & (sun_ == 1.0f);
+  cv::Laplacian(plate, grain, -1);
+  const auto strength = [&](const cv::Mat& mask) {
+    cv::Scalar mean, deviation;
+    cv::Mat inner;
+    cv::erode(mask, inner, cv::Mat::ones(3, 3, CV_8U));
+    cv::meanStdDev(grain, mean, deviation, inner);
+    return cv::norm(deviation);
+  };
+  // Taken off alone, shade leaves 1.5 times as much.
+  EXPECT_NEAR(strength(dark) / strength(lit), 1.0, 0.1);
+}
+
 TEST_F(LiftedShade, LeavesBordersContactsAndWhatIsUnclear) {
   unclear_(cv::Rect(150, 0, 50, 160)).setTo(255);
   traces_(cv::Rect(0, 0, 200, 20)).setTo(0);

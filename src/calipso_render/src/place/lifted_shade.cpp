@@ -7,6 +7,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "place/key_cover.hpp"
+#include "place/masked_quantile.hpp"
 
 namespace calipso::render {
 namespace {
@@ -22,7 +23,11 @@ constexpr float kAlike = 0.1f;       // of the ratio: pairs that agree,
 constexpr float kMostlyAlike = 1.0f / 3;  // and the part of them that must
 // U: with more of the light there is no shadow; less of it has too much noise to be lifted
 constexpr float kMostUmbra = 0.95f, kLeastUmbra = 0.25f;
-constexpr int kNarrow = 7;  // px of what is too small to be lifted by itself
+constexpr int kNarrow = 7;      // px of what is too small to be lifted by itself
+constexpr double kGrain = 1.5;  // px: what differs from the mean of so many is grain, or texture,
+constexpr int kGrainSide = 5;   // ... as strong as in the mean of such a square
+constexpr int kAround = 40;     // px around a piece of shade in which grain is usual
+constexpr int kFewestAround = 200;
 
 // How far inside the shadow's core, in px; negative outside.
 cv::Mat depthInShade(const cv::Mat& sun) {
@@ -88,6 +93,49 @@ std::optional<float> agreedOn(std::vector<float> values) {
   return median;
 }
 
+// Squares of what differs from the mean around, within a mask: CV_32FC1, of all channels.
+cv::Mat grainOf(const cv::Mat& picture, const cv::Mat& mask, cv::Mat& mean) {
+  cv::Mat weight, inside = cv::Mat::zeros(picture.size(), CV_32FC3), energy, of;
+  mask.convertTo(weight, CV_32F, 1.0 / 255.0);
+  picture.copyTo(inside, mask);
+  const auto smooth = [](cv::Mat& m) { cv::GaussianBlur(m, m, {}, kGrain); };
+  cv::Mat total = weight.clone();
+  smooth(inside), smooth(total);
+  cv::merge(std::vector<cv::Mat>(3, cv::max(total, 1e-3)), of);
+  mean = inside / of;
+  const cv::Mat grain = picture - mean;
+  cv::transform(grain.mul(grain), energy, cv::Matx13f(1, 1, 1));
+  energy.setTo(0, mask == 0);
+  cv::blur(energy, energy, {kGrainSide, kGrainSide}),
+      cv::blur(weight, weight, {kGrainSide, kGrainSide});
+  return energy / cv::max(weight, 1e-3);
+}
+
+// Noise grows when shade is taken off: what there is more of it than in the light around is taken
+// off, too (Lee 1980: what spreads more than noise stays).
+// @param dark CV_8UC1: where shade was taken off; open: what is seen in the light
+void evenGrain(const cv::Mat& dark, const cv::Mat& open, cv::Mat& plate) {
+  cv::Mat mean, unused, pieces, stats, centres;
+  const cv::Mat own = grainOf(plate, dark, mean), usual = grainOf(plate, open, unused);
+  const int count = cv::connectedComponentsWithStats(dark, pieces, stats, centres, 8, CV_32S);
+  for (int piece = 1; piece < count; ++piece) {
+    const int* of = stats.ptr<int>(piece);
+    const cv::Rect box =
+        cv::Rect(of[cv::CC_STAT_LEFT] - kAround, of[cv::CC_STAT_TOP] - kAround,
+                 of[cv::CC_STAT_WIDTH] + 2 * kAround, of[cv::CC_STAT_HEIGHT] + 2 * kAround) &
+        cv::Rect({0, 0}, dark.size());
+    const cv::Mat here = pieces(box) == piece, around = grown(here, kAround) & open(box);
+    if (cv::countNonZero(around) < kFewestAround) continue;
+    const float grain = quantileOf(own(box), here, 0.5),
+                excess = grain - quantileOf(usual(box), around, 0.5);
+    if (excess <= 0.0f) continue;
+    cv::Mat kept = cv::max(1.0 - excess / own(box), 1.0 - excess / grain), of_colours;
+    cv::sqrt(kept, kept);
+    cv::merge(std::vector<cv::Mat>(3, kept), of_colours);
+    cv::Mat(mean(box) + of_colours.mul(plate(box) - mean(box))).copyTo(plate(box), here);
+  }
+}
+
 }  // namespace
 
 std::optional<cv::Vec3f> umbraAtBorders(const ShadedPlace& place, const cv::Vec3f& predicted) {
@@ -135,6 +183,8 @@ cv::Mat liftShade(const ShadedPlace& place, const cv::Mat& traces, const cv::Vec
       }
     }
   }
+  const cv::Mat open = (grown(place.sun < kFullSun, place.margin) == 0) & (place.unclear == 0);
+  if (cv::countNonZero(dark) > 0) evenGrain(dark, open, plate);
   return lit | dark;
 }
 
