@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "draw/side_by_side.hpp"
 #include "light/sky_seen.hpp"
 #include "texture/mesh_topology.hpp"
 
@@ -124,11 +125,14 @@ Actor makeActor(const Surface& surface, Points vertices, const Camera& camera) {
   Actor actor;
   actor.surface = &surface;
   actor.vertices = std::move(vertices);
-  if (actor.vertices.size() == surface.key_vertices.size()) {
-    actor.normals = surfaceNormals(surface, actor.vertices);
-    turnSeen(surface, actor);
-  }
-  actor.screen = projectMesh(actor.vertices, surface.triangles, camera);
+  sideBySide(
+      true,
+      [&] {
+        if (actor.vertices.size() != surface.key_vertices.size()) return;
+        actor.normals = surfaceNormals(surface, actor.vertices);
+        turnSeen(surface, actor);
+      },
+      [&] { actor.screen = projectMesh(actor.vertices, surface.triangles, camera); });
   const auto behind = [](const Eigen::Vector3f& p) { return std::isnan(p.z()); };
   const bool around_us =
       std::any_of(actor.screen.points.begin(), actor.screen.points.end(), behind);

@@ -42,7 +42,7 @@ class ShadowMap : public Visibility {
   };
   // Lowest and highest of windows of cells, by their first cell.
   struct Level {
-    std::vector<float> low, high;
+    std::unique_ptr<float[]> low, high;
   };
 
   // A surface point in the map, lifted off so that it does not shade itself.
@@ -53,6 +53,7 @@ class ShadowMap : public Visibility {
 
   ShadowTexels texels() const;
   void buildLevels();
+  Level unset() const;
   Level coarsened() const;
   Extremes around(float s, float t, float reach) const;
   Extremes coneAround(float s, float t, float lowest, float margin) const;

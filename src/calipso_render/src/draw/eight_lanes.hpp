@@ -37,6 +37,12 @@ CALIPSO_INLINE bool any(const EightInts& mask) {
   return ((h[0] | h[1]) | (h[2] | h[3])) != 0;
 }
 
+CALIPSO_INLINE bool any(const FourInts& mask) {
+  typedef std::int64_t Halves __attribute__((vector_size(16)));
+  const Halves h = (Halves)mask;
+  return (h[0] | h[1]) != 0;
+}
+
 // How many of the first lanes are set. @param mask 0 or -1 in each lane
 CALIPSO_INLINE int leadingLanes(const EightInts& mask) {
   typedef std::int8_t EightBytes __attribute__((vector_size(8)));

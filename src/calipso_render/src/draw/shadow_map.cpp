@@ -75,7 +75,7 @@ void ShadowMap::buildLevels() {
   levels_.push_back(coarsened());
   for (int size = 2; size <= std::min(columns_, rows_); size *= 2) {
     const Level& half = levels_.back();
-    Level level{std::vector<float>(half.low.size()), std::vector<float>(half.high.size())};
+    Level level = unset();
     const int columns = columns_ - size + 1, step = size / 2;
 #pragma omp parallel for schedule(static) if (columns_ * rows_ > kFewCells)
     for (int j = 0; j <= rows_ - size; ++j) {
@@ -94,9 +94,13 @@ void ShadowMap::buildLevels() {
   }
 }
 
+ShadowMap::Level ShadowMap::unset() const {
+  const std::size_t count = static_cast<std::size_t>(columns_) * rows_;
+  return {std::unique_ptr<float[]>(new float[count]), std::unique_ptr<float[]>(new float[count])};
+}
+
 ShadowMap::Level ShadowMap::coarsened() const {
-  Level cells{std::vector<float>(static_cast<std::size_t>(columns_) * rows_),
-              std::vector<float>(static_cast<std::size_t>(columns_) * rows_)};
+  Level cells = unset();
 #pragma omp parallel for schedule(static)
   for (int b = 0; b < rows_; ++b) {
     std::vector<float> low(columns_ * kCell, std::numeric_limits<float>::max()),

@@ -172,13 +172,11 @@ class Squares {
 
   void write(const cv::Rect& square, const cv::Rect& here,
              const float (&visible)[kSquare][kSquare]) const {
-    typedef std::uint8_t Bytes __attribute__((vector_size(8)));
     const int left = here.x + rect_.x - square.x;
     for (int y = here.y; y < here.br().y; ++y) {
-      const Eight level = eightAt(visible[y + rect_.y - square.y]) * 255.0f + 0.5f;
-      const Bytes bytes = __builtin_convertvector(__builtin_convertvector(level, EightInts), Bytes);
+      const EightLevels levels = lightLevels(eightAt(visible[y + rect_.y - square.y]));
       std::memcpy(out_.ptr<std::uint8_t>(y) + here.x,
-                  reinterpret_cast<const std::uint8_t*>(&bytes) + left, here.width);
+                  reinterpret_cast<const std::uint8_t*>(&levels) + left, here.width);
     }
   }
 

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "calipso_render/visibility.hpp"
+#include "draw/eight_lanes.hpp"
 #include "frame/square_mask.hpp"
 #include "place/place_view.hpp"
 
@@ -15,6 +16,13 @@ constexpr float kPerLevel = 1.0f / 255.0f;
 // A visible part of a light, 0..1, as planes of a picture keep it.
 inline std::uint8_t lightLevel(float visible) {
   return static_cast<std::uint8_t>(visible * 255.0f + 0.5f);
+}
+
+// The same of eight.
+typedef std::uint8_t EightLevels __attribute__((vector_size(8)));
+CALIPSO_INLINE EightLevels lightLevels(const Eight& visible) {
+  return __builtin_convertvector(__builtin_convertvector(visible * 255.0f + 0.5f, EightInts),
+                                 EightLevels);
 }
 
 // Product of two levels, 255 = 1.

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "calipso_render/sky_map.hpp"
 #include "draw/light_batch.hpp"
+#include "draw/wide_loops.hpp"
 #include "frame/marked.hpp"
 #include "frame/plane_light.hpp"
 
@@ -102,7 +104,7 @@ void SkyGrid::levels(const PlaneView& planes, const Visibility& sky, int v, int 
   lookup.look();
 }
 
-void SkyGrid::interpolate(int v, int begin, int end, std::uint8_t* out) const {
+CALIPSO_WIDE_LOOPS void SkyGrid::interpolate(int v, int begin, int end, std::uint8_t* out) const {
   const int j = v / step_ - first_.y;
   const float y = static_cast<float>(v % step_) / static_cast<float>(step_);
   const float *above = light_.ptr<float>(j), *below = light_.ptr<float>(j + 1);
@@ -111,7 +113,16 @@ void SkyGrid::interpolate(int v, int begin, int end, std::uint8_t* out) const {
     const int i = u / step_ - first_.x, corner = (i + first_.x) * step_,
               stop = std::min(end, corner + step_);
     const float left = at(i), rise = (at(i + 1) - left) / static_cast<float>(step_);
-    for (; u < stop; ++u) *out++ = lightLevel(left + rise * static_cast<float>(u - corner));
+    while (u < stop) {
+      const EightLevels levels =
+          lightLevels(left + rise * (static_cast<float>(u - corner) + lanes()));
+      const int count = std::min(8, stop - u);
+      if (count == 8)
+        std::memcpy(out, &levels, 8);
+      else
+        std::memcpy(out, &levels, count);
+      u += count, out += count;
+    }
   }
 }
 

@@ -214,6 +214,7 @@ void SurfaceSun::onStretch(int v, int first, int last, int slot, Row& row) const
     // Another piece of the surface can look out between the corners.
     const Four here = fourAt(near + k), off = here - (from + parts * rise), most = tolerance * here;
     const FourInts other = (off > most) | (-off > most);
+    if (!any(other)) continue;
     for (int i = begin; i < end; ++i) {
       if (other[i - k] != 0) uneven[count++] = i;
     }
