@@ -147,8 +147,8 @@ int neighbourOf(const CellMap& index, Vector3i p, int face) {
   return it == index.end() ? -1 : it->second;
 }
 
-// A few cells that touch no others are a product of coarse sampling, or of a model whose small parts
-// do not reach each other: they are welded to all around them.
+// A few cells that touch no others are a product of coarse sampling, or of a model whose small
+// parts do not reach each other: they are welded to all around them.
 void weldCrumbs(std::vector<CoveredCell>* cells) {
   constexpr double kCrumb = 0.02;  // of all cells
   const int n = static_cast<int>(cells->size());
