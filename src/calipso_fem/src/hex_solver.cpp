@@ -11,8 +11,6 @@ namespace {
 
 // Renewing the multigrid costs about this many CG iterations.
 constexpr double kRenewalCost = 3.0;
-// A residual that grows so far belongs to loads that nothing holds: the system is singular.
-constexpr double kRunaway = 1e6;
 constexpr int kGrain = Multigrid::kGrain;
 constexpr int kFloatLanes = kHexLanes<float>;
 
@@ -358,7 +356,7 @@ SolveReport HexSolver::iterate(const Vec& b, double tolerance, int most_iteratio
       turned = cg.turn(residual, iteration == 0);
       const std::optional<double> next = turned ? cg.advance() : std::nullopt;
       residual = next.value_or(residual);
-      positive = next.has_value() && residual < kRunaway * first;
+      positive = next.has_value() && residual < kRunaway * std::max(first, scale);
     }
     cg.finish(solution);
     if (crew.rank() != 0) return;

@@ -67,7 +67,8 @@ SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditio
   Vec r, z, p, Ap;
   A.multiply(*x, Ap);
   r = b - Ap;
-  double residual = r.norm();
+  const double first = r.norm();
+  double residual = first;
   double rz = 0.0;
   for (; report.iterations < most_iterations; ++report.iterations) {
     if (residual <= tolerance * scale) break;
@@ -86,6 +87,8 @@ SolveReport conjugateGradients(const BlockMatrix& A, Preconditioner& preconditio
     *x += step * p;
     r -= step * Ap;
     residual = r.norm();
+    report.positive = residual < kRunaway * std::max(first, scale);
+    if (!report.positive) break;
   }
   report.residual = scale > 0.0 ? residual / scale : residual;
   report.converged = report.positive && residual <= tolerance * scale;

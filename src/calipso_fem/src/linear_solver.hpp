@@ -9,8 +9,12 @@
 
 namespace calipso::fem {
 
+// times the first residual or the right side: one that grows so far belongs to loads that nothing
+// holds.
+constexpr double kRunaway = 1e6;
+
 struct SolveReport {
-  bool positive = true;  // false: A has shown a direction of negative curvature
+  bool positive = true;  // false: A has shown to be singular, or to have negative curvature
   bool preconditioner_positive = true;
   bool converged = false;
   int iterations = 0;

@@ -75,8 +75,7 @@ void DriftingBackground::layOver(const std::vector<ClipFrame>& frames,
     cv::Mat picture;
     frames[i].bgr.convertTo(picture, CV_32F);
     displaced(picture, by, size).convertTo(pictures[i], CV_8U);
-    shown[i] = displacedMask((grown(~where_, kInterpolated) | covered[i]) == 0,
-                             rounded(by), size);
+    shown[i] = displacedMask((grown(~where_, kInterpolated) | covered[i]) == 0, rounded(by), size);
   }
   panorama_ = cv::Mat::zeros(size, CV_32FC3), invented_ = cv::Mat(size, CV_8U, cv::Scalar(255));
 #pragma omp parallel for schedule(dynamic, 8)
