@@ -105,6 +105,22 @@ TEST(PlaneMirror, SomethingDarkBesideItsPlaceIsNone) {
   EXPECT_FALSE(establishMirror(m.image, tablePicture(beside), m.known, cv::Mat()).established());
 }
 
+// With two colours the strength is known.
+TEST(PlaneMirror, StrongerThanSteelIsNone) {
+  Mirrored m;
+  const cv::Rect half(0, 0, m.image.box.x + m.image.box.width / 2, kHeight);
+  cv::Mat colour = m.image.colour(half);
+  colour *= 4.0;
+  PlaneMirror truth;
+  truth.surroundings = kSky;
+  for (const float strength : {5.0f, 20.0f}) {
+    truth.strength = strength;
+    const cv::Mat picture = tablePicture(addedBy(truth, m.image));
+    EXPECT_EQ(establishMirror(m.image, picture, m.known, cv::Mat()).established(), strength < 10.0f)
+        << strength;
+  }
+}
+
 TEST(PlaneMirror, UnmirroredTakesAwayWhatWasAdded) {
   const Mirrored m;
   PlaneMirror mirror;

@@ -59,6 +59,8 @@ class Trial {
 
     // What the objects' mirror image takes away was mirrored there.
     bool plausible() const { return std::min({x[1], x[2], x[3]}) >= 0.0; }
+    // Shade under objects, over a pattern that happens to go along with their colours.
+    bool brighterThanAny() const { return x[0] >= kBrightest; }
     double alike(const Fit& other) const {
       return cover.dot(other.cover) /
              std::sqrt(std::max(1e-30, cover.dot(cover) * other.cover.dot(other.cover)));
@@ -169,7 +171,8 @@ PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, co
     if (best.cover.empty() || fit.explained > best.explained)
       best = fit, best_drawn = drawn, mirror.slope = slope;
   }
-  if (best.explained < kExplained * trial.squares() || !best.plausible()) return mirror;
+  if (best.explained < kExplained * trial.squares() || !best.plausible() || best.brighterThanAny())
+    return mirror;
   double others = 0.0, elsewhere = 0.0;
   int count = 0;
   for (int by = -kFarthest; by <= kFarthest; ++by) {

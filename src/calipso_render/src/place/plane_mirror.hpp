@@ -54,7 +54,7 @@ cv::Mat unmirroredCodes(const PlaneMirror& mirror, const cv::Mat& bgr);
 //   y' = strength (colour' - surroundings cover') + e,   ': less its mean around the pixel,
 // strength and surroundings found in one half of the picture's squares and judged in the other, and
 // both the same way for mirror images displaced sideways. Established if the one in place explains
-// far more than any of those.
+// far more than any of those, and no stronger than polished steel.
 // The dark along contacts may be there as well.
 // @param picture CV_32FC3, linear; known CV_8UC1: pixels that may be looked at
 // @param hidden CV_32FC1, part of the sky that objects hide, 0..1; may be empty
