@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "render_test_scene.hpp"
 
@@ -98,6 +99,59 @@ TEST(Appearance, ShadeThatThePictureDoesNotHaveIsNotDividedBy) {
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(c[i], kAlbedo[i], 0.06f);
   });
   EXPECT_GT(shaded, 10);
+}
+
+// A pea in the sun before the ball, moved to the left.
+Surface peaBefore(double left) {
+  ObjectModel pea = ballAt(kPlace + 1.5 * kBallRadius * sunlight().direction.cast<double>() -
+                               left * Eigen::Vector3d::UnitX(),
+                           "pea", 2);
+  pea.mesh.vertices *= 0.3;
+  return makeSurface(pea);
+}
+
+ShadowMap shadowOf(const Actor& actor) {
+  return {{{&actor.vertices, &actor.surface->triangles, actor.surface->winding}},
+          sunlight().direction.cast<double>(),
+          {}};
+}
+
+// A model whose shadow falls a pixel beside the picture's: where the one is lit and the other is not
+// the picture is not divided by a light that it does not have.
+TEST(Appearance, AShadowThatIsOffByAPixelLeavesNoEdge) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  const ClipFrame frame = frameWithBall(ballAt(kPlace));
+  View view{{}, frame.labels, frame.camera, {}};
+  frame.bgr.convertTo(view.picture, CV_32F);
+  view.actors.push_back(makeActor(surface, surface.key_vertices, frame.camera));
+  const double pixel =
+      (kPlace - frame.camera.world_from_camera.translation()).norm() / frame.camera.fx;
+  const Surface told = peaBefore(0.0), true_one = peaBefore(1.3 * pixel);
+  view.actors.push_back(makeActor(told, told.key_vertices, view.camera));
+  const ShadowMap sun = shadowOf(view.actors[1]),
+                  true_sun = shadowOf(makeActor(true_one, true_one.key_vertices, view.camera));
+  const auto dark = [](const SurfacePoint& p, const ShadowMap& map) {
+    return map.visibility(p.position, p.normal) < 0.5f;
+  };
+  forEachPixelOf(view.actors[0], [&](int u, int v, const SurfacePoint& p) {
+    if (!dark(p, true_sun)) return;
+    const cv::Vec3f shade = diffuseShading(sunlight(), p.normal, 0.0f),
+                    open = diffuseShading(sunlight(), p.normal, 1.0f);
+    cv::Vec3f& code = view.picture.at<cv::Vec3f>(v, u);
+    for (int c = 0; c < 3; ++c)
+      code[c] = codeFromLinear(linearFromRealCode(code[c]) * shade[c] / open[c]);
+  });
+  const Appearance a =
+      makeAppearances({view}, {false, false}, sunlight(), {Gloss(), Gloss()}).front();
+  int darker = 0;
+  forEachPixelOf(view.actors[0], [&](int u, int v, const SurfacePoint& p) {
+    if (!dark(p, true_sun) || dark(p, sun)) return;
+    ++darker;
+    // divided by the light in the open it would be less than half as bright
+    const cv::Vec4f& c = a.albedo.at<cv::Vec4f>(v - a.region.y, u - a.region.x);
+    for (int i = 0; i < 3; ++i) EXPECT_GT(c[i], 0.75f * kAlbedo[i]);
+  });
+  EXPECT_GT(darker, 10);
 }
 
 // The ball, and a plate fixed before its left half, as one object.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -29,6 +30,11 @@ constexpr float kLeastClear = 0.02f;
 constexpr float kDarkest = 1e-4f;  // linear brightness that is told from none
 constexpr float kBroad = 0.35f;    // m from which a lobe looks like diffuse shading
 constexpr float kJump = 0.03f;     // of the object's extent: what hides a part of it is before it
+// part by which light falls within two pixels, at which it begins to be a step, and is one
+constexpr float kStep = 0.2f, kWholeStep = 0.4f;
+constexpr float kLeastAtStep = 0.1f;  // of the trust
+constexpr float kCrease =
+    0.87f;  // cosine of the angle by which a surface turns from pixel to pixel
 constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
 
 // Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the
@@ -168,11 +174,53 @@ void lowerBesideJumps(const Shaded& s, const Camera& camera, float tolerance, Re
   }
 }
 
-// @param mean_light that of the key frame, where there is one
+// Part by which values fall within two pixels. @param values CV_32F; where CV_8U, != 0: has some
+cv::Mat fallOf(const cv::Mat& values, const cv::Mat& where) {
+  const cv::Mat around = cv::Mat::ones(3, 3, CV_8U);
+  cv::Mat most, least = values.clone();
+  least.setTo(std::numeric_limits<float>::max(), where == 0);
+  cv::erode(least, least, around);
+  cv::dilate(values, most, around);
+  return 1.0f - least / cv::max(most, kDarkest);
+}
+
+// Trust where light steps, at the edge of a cast shadow or at a crease: a fit that is off by a pixel
+// there divides the picture by the light beside.
+void lowerAtSteps(const Shaded& s, cv::Mat& trust) {
+  const cv::Mat seen = s.triangle >= 0;
+  cv::Mat light = cv::Mat::zeros(seen.size(), CV_32F), openness = light.clone(),
+          creased = cv::Mat::zeros(seen.size(), CV_8U);
+  for (int v = 0; v < light.rows; ++v) {
+    for (int u = 0; u < light.cols; ++u) {
+      if (seen.at<std::uint8_t>(v, u) == 0) continue;
+      light.at<float>(v, u) = luminance(s.light.at<cv::Vec3f>(v, u));
+      openness.at<float>(v, u) =
+          light.at<float>(v, u) / std::max(kDarkest, luminance(s.open.at<cv::Vec3f>(v, u)));
+      for (const cv::Point q : {cv::Point(u + 1, v), cv::Point(u, v + 1)}) {
+        if (q.x < light.cols && q.y < light.rows && seen.at<std::uint8_t>(q) != 0 &&
+            s.normal.at<cv::Vec3f>(v, u).dot(s.normal.at<cv::Vec3f>(q)) < kCrease)
+          creased.at<std::uint8_t>(v, u) = creased.at<std::uint8_t>(q) = 255;
+      }
+    }
+  }
+  const cv::Mat shade = fallOf(openness, seen), turn = fallOf(light, seen);
+  cv::Mat steady(seen.size(), CV_32F);
+  for (int v = 0; v < steady.rows; ++v) {
+    for (int u = 0; u < steady.cols; ++u) {
+      const float fall = std::max(
+          shade.at<float>(v, u), creased.at<std::uint8_t>(v, u) != 0 ? turn.at<float>(v, u) : 0.0f);
+      steady.at<float>(v, u) = 1.0f - (1.0f - kLeastAtStep) * smoothStep(kStep, kWholeStep, fall);
+    }
+  }
+  cv::erode(steady, steady, cv::Mat::ones(3, 3, CV_8U));
+  trust = trust.mul(steady);
+}
+
+// @param mean_light that of the key frame, where there is one; alone no other view shows the object
 Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light,
                           const Gloss& gloss, const ShadowMap& sun,
-                          const std::optional<cv::Vec3f>& mean_light,
-                          const cv::Vec3f& thrown_back) {
+                          const std::optional<cv::Vec3f>& mean_light, const cv::Vec3f& thrown_back,
+                          bool alone) {
   Reflectance r;
   const cv::Rect all(0, 0, view.picture.cols, view.picture.rows);
   cv::Rect mask_box = cv::boundingRect(view.labels == actor.surface->index);
@@ -207,6 +255,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   }
   lowerBesideJumps(shaded, view.camera,
                    kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
+  if (alone) lowerAtSteps(shaded, r.trust);
   takeOutFalseShade({shaded.light, shaded.open, r.trust}, floor, r.albedo);
   return r;
 }
@@ -260,8 +309,8 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
     used.push_back(&views[i]), actors.push_back(&views[i].actors[object]);
   std::vector<Reflectance> pictures(used.size());
   const auto see = [&](std::size_t i, const std::optional<cv::Vec3f>& mean_light) {
-    pictures[i] =
-        reflectanceIn(*used[i], *actors[i], light, gloss, suns[i], mean_light, a.thrown_back);
+    pictures[i] = reflectanceIn(*used[i], *actors[i], light, gloss, suns[i], mean_light,
+                                a.thrown_back, used.size() == 1);
   };
   a.thrown_back = thrownBack({});
   see(0, std::nullopt);
