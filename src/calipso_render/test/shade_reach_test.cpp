@@ -110,7 +110,10 @@ struct Passing {
   }
 
   FrameOutput removed(const std::optional<Eigen::Isometry3d>& observed) const {
-    const ClipFrame& last = frames.back();
+    return removed(observed, frames.back());
+  }
+  FrameOutput removed(const std::optional<Eigen::Isometry3d>& observed,
+                      const ClipFrame& last) const {
     FrameInput in;
     in.bgr = last.bgr, in.labels = last.labels, in.camera = last.camera;
     ObjectInFrame ball;
@@ -127,6 +130,22 @@ TEST(Renderer, TakesOutThePassingShadowOfAnObjectAndNoOther) {
   ASSERT_GT(cv::countNonZero(p.shadow), 100);
   EXPECT_GT(psnr(out.bgr, emptyTable(), p.shadow), 35.0);
   EXPECT_EQ(cv::countNonZero(out.provenance(p.cloud)), 0) << "the cloud's is the video's";
+}
+
+// A quarter of the ball that its mask misses; a hand beside it stays.
+TEST(Renderer, TakesOutWhatAMaskMissesOfAnObjectThatIsFollowed) {
+  const Passing p;
+  ClipFrame last = p.frames.back();
+  const cv::Rect ball = cv::boundingRect(last.labels), hand(ball.br().x + 6, ball.y, 12, 12);
+  const cv::Mat left = cv::Mat::zeros(last.labels.size(), CV_8U);
+  left(cv::Rect(ball.x, ball.y, ball.width / 4, ball.height)).setTo(255);
+  const cv::Mat missed = left & last.labels;
+  last.labels.setTo(0, left);
+  last.bgr(hand).setTo(cv::Scalar(120, 150, 220));
+  const FrameOutput out = p.removed(Passing::poseAt(Passing::kFrames - 1), last);
+  EXPECT_GT(cv::countNonZero(missed), 100);
+  EXPECT_GT(psnr(out.bgr, emptyTable(), missed), 35.0);
+  EXPECT_EQ(cv::norm(out.bgr(hand), last.bgr(hand), cv::NORM_INF), 0.0);
 }
 
 // There single pixels tell neither that the place rests nor the shadow's colour.

@@ -12,7 +12,7 @@ namespace calipso::render {
 
 // What of the picture an edit can change.
 struct EditedRegion {
-  // @param passing CV_8UC1, whole picture: shadows that pass in the video and go; may be empty
+  // @param passing CV_8UC1, whole picture: passingShadows(); may be empty
   EditedRegion(const StagedFrame& frame, const RestingLight& resting, const MovedShadow& moved,
                const ShadedOthers& others, const Reflections& reflections, const cv::Mat& passing);
 

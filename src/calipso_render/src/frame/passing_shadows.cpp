@@ -5,6 +5,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "frame/mask_morphology.hpp"
+#include "frame/missed_parts.hpp"
 #include "frame/shade_reach.hpp"
 #include "place/place_samples.hpp"
 
@@ -122,6 +123,7 @@ cv::Mat passingShadows(const StagedFrame& frame, const SeenPlace& place, const c
   keepDarkenedAlike(unmirrored, plate.codes, dark);
   keepWide(frame.at_key_camera, dark);
   takeOutOthers(frame, others_sun, dark);
+  dark |= missedParts(frame, plate, unmirrored);
   cv::dilate(dark, dark, disc(kMargin));
   takeOutRims(frame, dark);
   return dark;

@@ -10,7 +10,7 @@ namespace calipso::render {
 
 // What the video shows of edited objects and their shadows: pixels behind which the place comes to
 // light. What objects show has a margin, but not what stands beside them.
-// @param passing CV_8UC1, whole picture: shadows that pass in the video and go; may be empty
+// @param passing CV_8UC1, whole picture: passingShadows(); may be empty
 // @param mirrored Reflections::marks(): where that changes and hid all of a plane, it comes to light
 // @return CV_8UC1 over the region
 cv::Mat removedPixels(const StagedFrame& frame, const SeenPlace& place, const EditedRegion& region,

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "frame/passing_shadows.hpp"
+#include "frame/staged_frame.hpp"
+
+namespace calipso::render {
+
+// What masks miss of edited objects that move in the video: where their models are seen, no object
+// is labelled, and the picture is unlike a plate that is known well.
+// @param now CV_8UC3, the frame that the plate is compared with
+// @return CV_8UC1, whole picture
+cv::Mat missedParts(const StagedFrame& frame, const PlateInView& plate, const cv::Mat& now);
+
+}  // namespace calipso::render
