@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "calipso_render/colour.hpp"
+#include "draw/eight_lanes.hpp"
 #include "draw/wide_loops.hpp"
 #include "frame/plane_light.hpp"
 
@@ -18,7 +20,9 @@ constexpr float kBrightest = 1.25f;  // times its light before, to which its own
 // The light on pixels of a row: levels now and before, 255 where a change is taken at all, where
 // the place comes to light, and how far the original's shadow is to be taken from the plate.
 struct LightLevels {
-  const std::uint8_t *sun, *sun_before, *sky, *sky_before, *takes, *removed, *relit;
+  static constexpr int kKinds = 7;
+  enum Kind { kSun, kSunBefore, kSky, kSkyBefore, kTakes, kRemoved, kRelit };
+  const std::uint8_t* of[kKinds];
 };
 
 // What it makes of them.
@@ -30,25 +34,54 @@ struct LightFactors {
   float now[3][kMost], change[3][kMost];
 };
 
-CALIPSO_WIDE_LOOPS void findLightFactors(const LightLevels& at, const cv::Vec3f& full_umbra,
-                                         int count, LightFactors& out) {
-  for (int i = 0; i < count; ++i)
-    out.from_plate[i] = at.removed[i] != 0 ? 1.0f : static_cast<float>(at.relit[i]) * kPerLevel;
+// Of eight pixels from the i-th on.
+CALIPSO_INLINE void findEightFactors(const LightLevels& levels, const cv::Vec3f& full_umbra, int i,
+                                     LightFactors& out) {
+  const auto at = [&](LightLevels::Kind kind) { return eightLevels(levels.of[kind] + i); };
+  const Eight sun = at(LightLevels::kSun), sun_before = at(LightLevels::kSunBefore),
+              sky = at(LightLevels::kSky), sky_before = at(LightLevels::kSkyBefore),
+              takes = at(LightLevels::kTakes), removed = at(LightLevels::kRemoved),
+              one = all(1.0f);
+  eightAt(out.from_plate + i) = removed > 0.0f ? one : at(LightLevels::kRelit) * kPerLevel;
   for (int c = 0; c < 3; ++c) {
     const float umbra = full_umbra[c] * kPerLevel, lit = kPerLevel - umbra;
-    for (int i = 0; i < count; ++i) {
-      const float all = umbra * static_cast<float>(at.sky[i]) + lit * static_cast<float>(at.sun[i]),
-                  now = at.takes[i] == 0 ? 1.0f : all,
-                  before = umbra * static_cast<float>(at.sky_before[i]) +
-                           lit * static_cast<float>(at.sun_before[i]),
-                  ratio = now / (before > kDarkest ? before : kDarkest);
-      out.now[c][i] = now;
-      out.change[c][i] = ratio < kBrightest ? ratio : kBrightest;
-    }
+    const Eight now = takes > 0.0f ? umbra * sky + lit * sun : one,
+                before = umbra * sky_before + lit * sun_before;
+    eightAt(out.now[c] + i) = now;
+    eightAt(out.change[c] + i) = smaller(now / larger(before, all(kDarkest)), all(kBrightest));
   }
 }
 
-// Linear colours of `count` pixels, by channels, from the plate and from the frame's codes.
+// @return whether anything is taken from the plate
+CALIPSO_WIDE_LOOPS bool findLightFactors(const LightLevels& levels, const cv::Vec3f& umbra,
+                                         int count, LightFactors& out) {
+  int i = 0;
+  for (; i + 8 <= count; i += 8) findEightFactors(levels, umbra, i, out);
+  if (i < count) {
+    std::uint8_t rest[LightLevels::kKinds][LightFactors::kMost] = {};
+    LightLevels last;
+    for (int k = 0; k < LightLevels::kKinds; ++k) {
+      std::copy(levels.of[k] + i, levels.of[k] + count, rest[k] + i);
+      last.of[k] = rest[k];
+    }
+    findEightFactors(last, umbra, i, out);
+  }
+  float most = 0.0f;
+  for (int k = 0; k < count; ++k) most = std::max(most, out.from_plate[k]);
+  return most > 0.0f;
+}
+
+// Linear colours of `count` pixels, by channels, from the frame's codes.
+CALIPSO_WIDE_LOOPS void darken(const LightFactors& factors, const cv::Vec3b* frame, int count,
+                               float* const (&out)[3]) {
+  const float* decoded = decodeTable();
+  for (int c = 0; c < 3; ++c) {
+    for (int k = 0; k < count; ++k) out[c][k] = decoded[frame[k][c]];
+    for (int k = 0; k < count; ++k) out[c][k] *= factors.change[c][k];
+  }
+}
+
+// The same from the plate, too.
 CALIPSO_WIDE_LOOPS void relight(const LightFactors& factors, const cv::Vec3f* plate,
                                 const cv::Vec3b* frame, int count, float* const (&out)[3]) {
   const float* decoded = decodeTable();
@@ -177,19 +210,23 @@ void Backdrop::compose(int v, int first, int last, Row& row) const {
 void Backdrop::composeRelit(int v, int first, int last, Row& row) const {
   const int j = v - region_.y, count = last - first;
   const auto rowOf = [&](const cv::Mat& picture) { return picture.ptr<std::uint8_t>(j) + first; };
-  LightFactors factors;
-  findLightFactors(
-      {rowOf(light_.sun()), rowOf(light_.sunBefore()), rowOf(light_.sky()),
-       rowOf(light_.skyBefore()), rowOf(light_.takes()), rowOf(removed_), rowOf(light_.relit())},
-      frame_.prepared.umbra, count, factors);
   const int u = first + region_.x;
-  const std::uint8_t* invented = place_.invented.ptr<std::uint8_t>(v) + u;
-  const cv::Vec3f* plate = place_.plate.ptr<cv::Vec3f>(v) + u;
   const cv::Vec3b* frame = frame_.input.bgr.ptr<cv::Vec3b>(v) + u;
-  prefetchRow(place_.plate, v + 1, u, count);
-  relight(factors, plate, frame, count,
-          {&row.colour[0][first], &row.colour[1][first], &row.colour[2][first]});
+  float* const colour[] = {&row.colour[0][first], &row.colour[1][first], &row.colour[2][first]};
+  LightFactors factors;
+  const bool wants_plate = findLightFactors(
+      {{rowOf(light_.sun()), rowOf(light_.sunBefore()), rowOf(light_.sky()),
+        rowOf(light_.skyBefore()), rowOf(light_.takes()), rowOf(removed_), rowOf(light_.relit())}},
+      frame_.prepared.umbra, count, factors);
   std::copy_n(factors.from_plate, count, &row.colour[3][first]);
+  if (!wants_plate) {  // which is not even read then
+    darken(factors, frame, count, colour);
+    std::memset(&row.source[first], kRendered, count);
+    return;
+  }
+  prefetchRow(place_.plate, v + 1, u, count);
+  relight(factors, place_.plate.ptr<cv::Vec3f>(v) + u, frame, count, colour);
+  const std::uint8_t* invented = place_.invented.ptr<std::uint8_t>(v) + u;
   for (int k = 0; k < count; ++k) {
     const Provenance revealed = invented[k] != 0 ? kInvented : kSeenElsewhere;
     row.source[first + k] = factors.from_plate[k] > 0.5f ? revealed : kRendered;

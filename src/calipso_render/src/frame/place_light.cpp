@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "calipso_render/colour.hpp"
+#include "draw/wide_loops.hpp"
 #include "frame/mask_morphology.hpp"
 #include "frame/plane_light.hpp"
 #include "frame/plane_sky.hpp"
@@ -19,6 +20,25 @@ constexpr std::uint8_t kSoftSky = 51;
 // more than kSoftSky, also once they are rounded
 constexpr float kSameSky = (kSameLevels - 2.1f) * kPerLevel,
                 kLittleSky = (kSoftSky - 2.1f) * kPerLevel;
+
+// The light on pixels of a row, levels, and where it is taken at all.
+struct LightChange {
+  const std::uint8_t *sun, *sun_before, *sky, *sky_before, *takes;
+};
+
+// changeOfLight() where it is more than a pixel can follow.
+// @param umbra per level
+CALIPSO_WIDE_LOOPS void changesOfLight(const LightChange& at, float umbra, int count,
+                                       std::uint8_t* out) {
+  const float lit = kPerLevel - umbra;
+  for (int i = 0; i < count; ++i) {
+    const int more_sky = at.sky[i] - at.sky_before[i], more_sun = at.sun[i] - at.sun_before[i],
+              beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
+    const std::uint8_t change = changeOfLight(
+        std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
+    out[i] = at.takes[i] == 0 ? 0 : change;
+  }
+}
 
 }  // namespace
 
@@ -122,15 +142,10 @@ void PlaceLight::findChange(int v, int from, int to, std::uint8_t* out) const {
   };
   const std::uint8_t *sun = rowOf(sun_), *sun_before = rowOf(sun_before_), *sky = rowOf(sky_),
                      *sky_before = rowOf(sky_before_), *takes = rowOf(takes_);
-  const float umbra = kPerLevel * luminance(frame_.prepared.umbra), lit = kPerLevel - umbra;
+  const float umbra = kPerLevel * luminance(frame_.prepared.umbra);
   sun_changes_.visitRow(v, from, to, [&](int begin, int end) {
-    for (int u = begin; u < end; ++u) {
-      const int more_sky = sky[u] - sky_before[u], more_sun = sun[u] - sun_before[u];
-      const int beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
-      if (takes[u] == 0 || (more_sun == 0 && beyond == 0)) continue;
-      out[u - from] = changeOfLight(
-          std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
-    }
+    changesOfLight({sun + begin, sun_before + begin, sky + begin, sky_before + begin, takes + begin},
+                   umbra, end - begin, out + begin - from);
   });
 }
 

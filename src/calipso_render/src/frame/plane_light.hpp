@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <opencv2/core.hpp>
 
 #include "calipso_render/visibility.hpp"
@@ -23,6 +24,12 @@ typedef std::uint8_t EightLevels __attribute__((vector_size(8)));
 CALIPSO_INLINE EightLevels lightLevels(const Eight& visible) {
   return __builtin_convertvector(__builtin_convertvector(visible * 255.0f + 0.5f, EightInts),
                                  EightLevels);
+}
+
+CALIPSO_INLINE Eight eightLevels(const std::uint8_t* at) {
+  EightLevels levels;
+  std::memcpy(&levels, at, sizeof(levels));
+  return __builtin_convertvector(__builtin_convertvector(levels, EightInts), Eight);
 }
 
 // Product of two levels, 255 = 1.
