@@ -43,14 +43,16 @@ CALIPSO_INLINE bool any(const FourInts& mask) {
   return (h[0] | h[1]) != 0;
 }
 
-// How many of the first lanes are set. @param mask 0 or -1 in each lane
-CALIPSO_INLINE int leadingLanes(const EightInts& mask) {
-  typedef std::int8_t EightBytes __attribute__((vector_size(8)));
-  const EightBytes bytes = __builtin_convertvector(~mask, EightBytes);
-  std::uint64_t others;
-  std::memcpy(&others, &bytes, sizeof(others));
-  return others == 0 ? 8 : __builtin_ctzll(others) / 8;
+// A bit for each lane, the first lowest. @param mask 0 or -1 in each lane
+CALIPSO_INLINE unsigned bitsOf(const EightInts& mask) {
+  typedef std::uint64_t Halves __attribute__((vector_size(32)));
+  const Halves h = (Halves)(mask & EightInts{1, 2, 4, 8, 16, 32, 64, 128});
+  const std::uint64_t both = (h[0] | h[1]) | (h[2] | h[3]);
+  return static_cast<unsigned>(both | both >> 32);
 }
+
+// How many of the first lanes are set. @param mask 0 or -1 in each lane
+CALIPSO_INLINE int leadingLanes(const EightInts& mask) { return __builtin_ctz(bitsOf(~mask) | 256); }
 
 CALIPSO_INLINE Eight squareRoot(const Eight& x) {
   Eight root;

@@ -25,17 +25,13 @@ CALIPSO_INLINE void turnToViewer(const SightLines& sight, const Eight& column, E
   for (Eight& x : n) x = away > 0.0f ? -x : x;
 }
 
-// Weights of a stretch's places, and the sums of their corners' weights.
-struct StretchWeights {
-  alignas(32) float w[SurfaceRun::kRoom], sum[SurfaceRun::kRoom];
-};
-
-// The triangles' linear functions at a stretch's pixels: key places, normals, sky and ambient
-// light up to a factor.
+// The triangles' linear functions at a stretch's pixels: nearness, and up to that as a factor key
+// places, normals, sky and ambient light.
+// @param weights of the key places
 // @return the triangles' traits, of any of them
 CALIPSO_INLINE unsigned evaluateMaps(const TriangleMap* maps, const std::uint32_t* ids,
                                      const PixelStretch& at, const SightLines& sight,
-                                     SurfaceRun& run, StretchWeights& weights) {
+                                     SurfaceRun& run, float (&weights)[SurfaceRun::kRoom]) {
   unsigned traits = 0;
   for (int k = 0; k < at.count;) {
     const std::uint32_t id = ids[k];
@@ -53,8 +49,8 @@ CALIPSO_INLINE unsigned evaluateMaps(const TriangleMap* maps, const std::uint32_
       const Eight column = eightAt(run.column + to), du = column - map.u;
       eightAt(run.key_u + to) = key[0] + key_rise[0] * du;
       eightAt(run.key_v + to) = key[1] + key_rise[1] * du;
-      eightAt(weights.w + to) = key[2] + key_rise[2] * du;
-      eightAt(weights.sum + to) = key[3] + key_rise[3] * du;
+      eightAt(weights + to) = key[2] + key_rise[2] * du;
+      eightAt(run.nearness + to) = key[3] + key_rise[3] * du;
       Eight n[3];
       for (int c = 0; c < 3; ++c) n[c] = normal[c] + normal_rise[c] * du;
       if (map.is(TriangleMap::kTurned)) turnToViewer(sight, column, n);
@@ -73,11 +69,10 @@ CALIPSO_INLINE unsigned locateBody(const TriangleMap* maps, const std::uint32_t*
                                    const PixelStretch& at, const SightLines& sight,
                                    SurfaceRun& run) {
   const float left = static_cast<float>(at.corner.x), top = static_cast<float>(at.corner.y);
-  StretchWeights weights;
+  alignas(32) float weights[SurfaceRun::kRoom];
   const unsigned traits = evaluateMaps(maps, ids, at, sight, run, weights);
   for (int k = at.offset; k < at.offset + at.count; k += 8) {
-    // The corners' weights add up to `sum`.
-    const Eight w = eightAt(weights.w + k), sum = eightAt(weights.sum + k),
+    const Eight w = eightAt(weights + k), sum = eightAt(run.nearness + k),
                 inverse = 1.0f / (w * sum), scale = sum * inverse;
     eightAt(run.key_u + k) = eightAt(run.key_u + k) * scale - left;
     eightAt(run.key_v + k) = eightAt(run.key_v + k) * scale - top;

@@ -10,6 +10,7 @@ struct SurfaceRun {
   static constexpr int kMost = 64, kRoom = kMost + 12;
 
   alignas(32) float column[kRoom];               // of the picture
+  alignas(32) float nearness[kRoom];             // of stretches: 1 / depth, 1/m
   alignas(32) float sight[3][kRoom];             // along the way from the eye to it, world
   alignas(32) float normal[3][kRoom];            // unit, faces the viewer
   alignas(32) float sky[kRoom];                  // skyMirrored()

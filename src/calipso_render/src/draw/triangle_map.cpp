@@ -10,7 +10,7 @@ namespace {
 constexpr float kThinnest = 0.03f;  // px of height
 
 // Coefficients of the sum of the corners' values, each weighted by its edge's function and its
-// nearness.
+// nearness; the weights add up to the nearness.
 void addCorner(float (&map)[3][4], const float (&edge)[3], const cv::v_float32x4& value) {
   for (int k = 0; k < 3; ++k)
     cv::v_store(map[k], cv::v_load(map[k]) + cv::v_setall_f32(edge[k]) * value);
@@ -36,7 +36,7 @@ bool fill(const Eigen::Vector3f (&p)[3], const Corner (&corners)[3], TriangleMap
   std::fill_n(&map.key[0][0], 12, 0.0f), std::fill_n(&map.normal[0][0], 12, 0.0f),
       std::fill_n(&map.ambient[0][0], 12, 0.0f);
   if (!(area * area > kThinnest * kThinnest * longest)) return false;
-  const float scale = 1.0f / (area * p[0].z());
+  const float scale = 1.0f / area;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
     const float factor = p[i].z() * scale;

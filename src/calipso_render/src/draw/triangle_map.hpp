@@ -10,7 +10,7 @@
 
 namespace calipso::render {
 
-// What the pixels of a drawn triangle show, linear in the picture, each up to the same factor: the
+// What the pixels of a drawn triangle show, linear in the picture, each times the nearness: the
 // place in the key frame's picture, homogeneous; the normal with the sky that it mirrors; the
 // ambient light. Counted from the triangle's first corner, where single precision is exact.
 struct alignas(16) TriangleMap {
@@ -21,7 +21,7 @@ struct alignas(16) TriangleMap {
     kTextured = 8   // ... the texture, or both
   };
 
-  float key[3][4];      // at the corner, per column, per row; x, y, w, sum of the weights
+  float key[3][4];      // at the corner, per column, per row; x, y, w, 1
   float normal[3][4];   // likewise; world, sky
   float ambient[3][4];  // likewise; B, G, R, 0
   float u, v;           // the corner, px

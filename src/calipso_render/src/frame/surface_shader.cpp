@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cstring>
-#include <numeric>
 
+#include "draw/eight_lanes.hpp"
 #include "draw/kernels.hpp"
 #include "frame/marked.hpp"
 
@@ -64,8 +64,8 @@ unsigned SurfaceShader::shadeStretch(int v, int first, int last, int slot, Row& 
   const std::uint32_t* ids = centre_.ids(v - region_.y);
   const int offset = (first + region_.x) % kLightStep, count = last - first;
   SurfaceRun& run = row.run;
-  std::iota(run.column + offset, run.column + offset + count,
-            static_cast<float>(first + region_.x));
+  for (int k = 0; k < count; k += 8)
+    eightAt(run.column + offset + k) = static_cast<float>(first + region_.x + k) + lanes();
   const unsigned traits = kernels().locate(maps_[slot].triangles(), ids + first,
                                            {v, count, offset, appearanceOf(slot).region.tl()},
                                            planes_.sightLines(v), run);

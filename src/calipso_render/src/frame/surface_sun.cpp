@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "draw/eight_lanes.hpp"
 #include "draw/kernels.hpp"
@@ -90,22 +91,24 @@ int SurfaceSun::slotAt(int i, int v, const std::uint32_t* ids) const {
   const int u = origin_.x + i * kLightStep;
   if (u < region_.x || u >= region_.br().x) return -1;
   const std::uint32_t id = ids[u - region_.x];
-  if (!surfaces_.isDrawn(id, u, v)) return -1;
-  const int slot = VisibilityBuffer::objectOf(id);
-  return maps_[slot].of(VisibilityBuffer::triangleOf(id)).is(TriangleMap::kThin) ? -1 : slot;
+  return surfaces_.isDrawn(id, u, v) ? VisibilityBuffer::objectOf(id) : -1;
 }
 
 // The sun at corners of row v, all of one object.
 void SurfaceSun::lookUp(int v, CornerRun& wanted, Corner* corners) const {
   if (wanted.count == 0) return;
-  float nearness[SurfaceRun::kRoom];
+  const SurfaceMaps& maps = maps_[wanted.slot];
+  const unsigned traits =
+      kernels().locate(maps.triangles(), wanted.ids, {v, wanted.count, 0, cv::Point()},
+                       planes_.sightLines(v), wanted.run);
   int places[SurfaceRun::kMost];
-  for (int k = 0; k < wanted.count; ++k)
-    places[k] = k, nearness[k] = corners[wanted.corners[k]].nearness;
-  kernels().locate(maps_[wanted.slot].triangles(), wanted.ids, {v, wanted.count, 0, cv::Point()},
-                   planes_.sightLines(v), wanted.run);
-  onPlaces(places, wanted.count, nearness, wanted.run);
+  std::iota(places, places + wanted.count, 0);
+  onPlaces(places, wanted.count, wanted.run.nearness, wanted.run);
   for (int k = 0; k < wanted.count; ++k) corners[wanted.corners[k]].sun = wanted.run.sun[k];
+  for (int k = 0; k < wanted.count && (traits & TriangleMap::kThin) != 0; ++k) {
+    if (maps.of(VisibilityBuffer::triangleOf(wanted.ids[k])).is(TriangleMap::kThin))
+      corners[wanted.corners[k]].slot = -1;
+  }
   wanted.count = 0;
 }
 
@@ -188,10 +191,7 @@ void SurfaceSun::onStretch(int v, int first, int last, int slot, Row& row) const
   const int j = (v - origin_.y) / kLightStep;
   const float down = static_cast<float>((v - origin_.y) % kLightStep) / kLightStep,
               tolerance = kLightStep / static_cast<float>(frame_.input.camera.fx);
-  const float* nearness = surfaces_.centre().nearness(v - region_.y);
   SurfaceRun& run = row.run;
-  float near[SurfaceRun::kRoom] = {};
-  std::copy_n(&nearness[first], last - first, &near[offset]);
   const Four parts = {0.0f, 0.25f, 0.5f, 0.75f};
   static_assert(kLightStep == 4);
   int uneven[SurfaceRun::kRoom], count = 0;
@@ -212,14 +212,14 @@ void SurfaceSun::onStretch(int v, int first, int last, int slot, Row& row) const
                 rise = between(a[1].nearness, b[1].nearness) - from;
     *reinterpret_cast<Four*>(run.sun + k) = sun + parts * sun_rise;
     // Another piece of the surface can look out between the corners.
-    const Four here = fourAt(near + k), off = here - (from + parts * rise), most = tolerance * here;
+    const Four here = fourAt(run.nearness + k), off = here - (from + parts * rise), most = tolerance * here;
     const FourInts other = (off > most) | (-off > most);
     if (!any(other)) continue;
     for (int i = begin; i < end; ++i) {
       if (other[i - k] != 0) uneven[count++] = i;
     }
   }
-  onPlaces(uneven, count, near, run);
+  onPlaces(uneven, count, run.nearness, run);
 }
 
 }  // namespace calipso::render
