@@ -61,8 +61,9 @@ class EdgeCoverage {
     }
   }
 
-  // Do samples of one object, of these nearnesses, see one sheet of it?
-  static bool isOneSheet(float nearest, float farthest) {
+  // Do samples of one object, of these nearnesses, see one sheet of it? Numbers or lanes of them.
+  template <class Nearness>
+  static auto isOneSheet(const Nearness& nearest, const Nearness& farthest) {
     return nearest - farthest <= kSameSheet * farthest;
   }
 

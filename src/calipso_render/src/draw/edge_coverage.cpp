@@ -19,10 +19,16 @@ float signedArea(const ScreenMesh& mesh, const Eigen::Vector3i& t) {
   return (q.x() - p.x()) * (r.y() - p.y()) - (r.x() - p.x()) * (q.y() - p.y());
 }
 
-// @param area positive
-TriangleSamples samplesOf(const Eigen::Vector3f (&p)[3], float area) {
+// @param corners the triangle's, of area `area` as signedArea()
+// @param origin of the samples' coordinates
+TriangleSamples samplesOf(const ScreenMesh& mesh, const Eigen::Vector3i& corners, float area,
+                          const cv::Point& origin) {
+  const Eigen::Vector3f offset(origin.x, origin.y, 0.0f);
+  Eigen::Vector3f p[3];
+  for (int i = 0; i < 3; ++i) p[i] = mesh.points[corners[i]] - offset;
+  if (area < 0.0f) std::swap(p[1], p[2]);
   TriangleSamples t{};
-  const float per_area = 1.0f / area;
+  const float per_area = 1.0f / std::abs(area);
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3f &a = p[(i + 1) % 3], &b = p[(i + 2) % 3];
     t.edge_u[i] = a.y() - b.y(), t.edge_v[i] = b.x() - a.x(),
@@ -92,9 +98,17 @@ bool agree(const EdgeCoverage::Pixel& pixel, std::uint32_t id) {
 
 // Is a place hidden by another sheet? Its own sheet may turn away so fast that the pixel's centre
 // is as much nearer; but beyond its edge, in the pixel beside, that one hides nothing.
+// @param at region coordinates
 bool isHidden(const VisibilityBuffer& centre, const cv::Point& at, float nearness) {
+  const cv::Rect& region = centre.region();
+  if (cv::Rect(1, 1, region.width - 2, region.height - 2).contains(at)) {
+    const float* here = centre.nearness(at.y) + at.x;
+    const float least = std::min({here[0], here[-1], here[1], here[-centre.stride()],
+                                  here[centre.stride()]});
+    return !EdgeCoverage::isOneSheet(least, nearness);
+  }
   for (const cv::Point& to : {cv::Point(0, 0), {-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-    const cv::Point seen = at + to;
+    const cv::Point seen = at + to + region.tl();
     if (EdgeCoverage::isOneSheet(centre.nearnessAt(seen.x, seen.y), nearness)) return false;
   }
   return true;
@@ -204,11 +218,10 @@ void EdgeCoverage::addCrossed(const Eigen::Vector3f& p, const Eigen::Vector3f& q
   const int steps = 1 + static_cast<int>(2.0f * length);
   for (int i = 0; i <= steps; ++i) {
     const Eigen::Vector3f s = p + (q - p) * (static_cast<float>(i) / steps);
-    const cv::Point seen(static_cast<int>(std::floor(s.x() + 0.5f)),
-                         static_cast<int>(std::floor(s.y() + 0.5f))),
-        at = seen - region_.tl();
+    const cv::Point at(static_cast<int>(std::floor(s.x() + 0.5f)) - region_.x,
+                       static_cast<int>(std::floor(s.y() + 0.5f)) - region_.y);
     if (!crossed.empty() && crossed.back() == at) continue;
-    if (!isHidden(centre, seen, s.z())) crossed.push_back(at);
+    if (!isHidden(centre, at, s.z())) crossed.push_back(at);
   }
 }
 
@@ -244,25 +257,21 @@ void EdgeCoverage::draw(const ScreenMesh& mesh, int object) {
 void EdgeCoverage::addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t id,
                              std::vector<Piece>& pieces) const {
   const Eigen::Vector3i& t = (*mesh.triangles)[triangle];
-  float area = signedArea(mesh, t);
+  const float area = signedArea(mesh, t);
   if (mesh.hides(area) || !(std::abs(area) > 1e-9f)) return;
-  const Eigen::Vector3f offset(region_.x, region_.y, 0.0f);
-  Eigen::Vector3f p[3] = {mesh.points[t[0]] - offset, mesh.points[t[1]] - offset,
-                          mesh.points[t[2]] - offset};
-  if (std::isnan(p[0].z() + p[1].z() + p[2].z())) return;
-  if (area < 0.0f) std::swap(p[1], p[2]), area = -area;
   // From the pixel whose square holds the least coordinate to the one that holds the greatest.
-  const auto low = [](float a, float b, float c) {
-    return static_cast<int>(std::clamp(std::min({a, b, c}) + 0.5f, 0.0f, 1e6f));
-  };
-  const auto high = [](float a, float b, float c, int ceiling) {
-    return std::min(ceiling,
-                    static_cast<int>(std::clamp(std::max({a, b, c}) + 1.5f, 0.0f, 1e6f)) - 1);
-  };
-  const int u0 = low(p[0].x(), p[1].x(), p[2].x()),
-            u1 = high(p[0].x(), p[1].x(), p[2].x(), region_.width - 1);
-  const int v0 = low(p[0].y(), p[1].y(), p[2].y()),
-            v1 = high(p[0].y(), p[1].y(), p[2].y(), region_.height - 1);
+  const float left = static_cast<float>(region_.x), top = static_cast<float>(region_.y);
+  const cv::v_float32x4 from_corner(0.5f - left, 0.5f - top, 1.5f - left, 1.5f - top);
+  const auto place = [&](int i) { return cv::v_load_low(mesh.points[t[i]].data()); };
+  const cv::v_float32x4 a = place(0), b = place(1), c = place(2),
+                        corners = cv::v_combine_low(cv::v_min(cv::v_min(a, b), c),
+                                                    cv::v_max(cv::v_max(a, b), c)),
+                        within = cv::v_min(cv::v_max(corners + from_corner, cv::v_setzero_f32()),
+                                           cv::v_setall_f32(1e6f));
+  int limits[4];
+  cv::v_store(limits, cv::v_trunc(within));
+  const int u0 = limits[0], u1 = std::min(limits[2], region_.width) - 1, v0 = limits[1],
+            v1 = std::min(limits[3], region_.height) - 1;
   std::optional<TriangleSamples> samples;
   for (int j = v0 / kTile; j <= v1 / kTile && v0 <= v1; ++j) {
     for (int i = u0 / kTile; i <= u1 / kTile && u0 <= u1; ++i) {
@@ -273,7 +282,7 @@ void EdgeCoverage::addPieces(const ScreenMesh& mesh, int triangle, std::uint32_t
           chosen_[tile] & pixelsWithin(std::max(u0 - u, 0), std::max(v0 - v, 0),
                                        std::min(u1 - u, kTile - 1), std::min(v1 - v, kTile - 1));
       if (wanted == 0) continue;
-      if (!samples) samples = samplesOf(p, area);
+      if (!samples) samples = samplesOf(mesh, t, area, region_.tl());
       pieces.push_back({*samples, wanted, u, v, tile, id});
     }
   }

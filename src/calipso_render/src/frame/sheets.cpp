@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "draw/eight_lanes.hpp"
 #include "draw/wide_loops.hpp"
 #include "frame/marked.hpp"
 
@@ -26,15 +27,20 @@ constexpr std::array<int, EdgeCoverage::kSamples> kFromCentre = [] {
   return order;
 }();
 
-// Which samples see the sheet that sample `of` sees.
-CALIPSO_WIDE_LOOPS void findSheet(const EdgeCoverage::Pixel& edge, int of,
-                                  std::array<std::uint8_t, EdgeCoverage::kSamples>& sees) {
-  for (int j = 0; j < EdgeCoverage::kSamples; ++j) {
-    const float a = edge.nearness[of], b = edge.nearness[j];
-    const bool one = EdgeCoverage::isOneSheet(a > b ? a : b, a > b ? b : a),
-               same = ((edge.ids[of] ^ edge.ids[j]) >> 24) == 0;
-    sees[j] = static_cast<std::uint8_t>(one & same);
+// Which samples see the sheet that sample `of` sees, a bit for each.
+CALIPSO_WIDE_LOOPS unsigned sheetOf(const EdgeCoverage::Pixel& edge, int of) {
+  static_assert(EdgeCoverage::kSamples == 16);
+  const Eight here = all(edge.nearness[of]);
+  const EightInts id = EightInts{} + static_cast<std::int32_t>(edge.ids[of]);
+  unsigned sees = 0;
+  for (int half = 0; half < 2; ++half) {
+    const Eight other = eightAt(&edge.nearness[8 * half]);
+    const EightInts differ = *reinterpret_cast<const EightInts*>(&edge.ids[8 * half]) ^ id;
+    sees |= bitsOf(EdgeCoverage::isOneSheet(larger(here, other), smaller(here, other)) &
+                   ((differ >> 24) == 0))
+            << 8 * half;
   }
+  return sees;
 }
 
 }  // namespace
@@ -66,15 +72,17 @@ void Sheets::add(int u, int v, std::vector<Sheet>& sheets) const {
   const auto draws = [&](std::uint32_t id) {
     return surfaces_.isAllDrawn() ? id != VisibilityBuffer::kNothing : surfaces_.isDrawn(id, u, v);
   };
-  std::array<std::uint8_t, EdgeCoverage::kSamples> done{}, sees;
-  for (int i = 0; i < EdgeCoverage::kSamples; ++i) {
-    if (done[i] != 0 || !draws(edge->ids[i])) continue;
-    findSheet(*edge, i, sees);
-    int count = 0;
-    for (int j = 0; j < EdgeCoverage::kSamples; ++j)
-      sees[j] &= static_cast<std::uint8_t>(done[j] == 0), done[j] |= sees[j], count += sees[j];
-    const int middle = *std::find_if(kFromCentre.begin(), kFromCentre.end(),
-                                     [&](int sample) { return sees[sample] != 0; });
+  for (unsigned rest = (1u << EdgeCoverage::kSamples) - 1; rest != 0;) {
+    const int first = __builtin_ctz(rest);
+    if (!draws(edge->ids[first])) {
+      rest &= rest - 1;
+      continue;
+    }
+    const unsigned sees = sheetOf(*edge, first) & rest;
+    rest &= ~sees;
+    const int count = __builtin_popcount(sees),
+              middle = *std::find_if(kFromCentre.begin(), kFromCentre.end(),
+                                     [&](int sample) { return (sees >> sample & 1) != 0; });
     const Eigen::Vector2f x = Eigen::Vector2f(u, v) + EdgeCoverage::offset(middle);
     sheets.push_back({{edge->ids[middle], x.x(), x.y()},
                       column,

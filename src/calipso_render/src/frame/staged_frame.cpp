@@ -1,6 +1,7 @@
 #include "frame/staged_frame.hpp"
 
 #include <algorithm>
+#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
@@ -178,12 +179,12 @@ float StagedFrame::stillness(std::uint32_t id, float u, float v) const {
 }
 
 bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px) {
-  Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Array2f moved = (now[triangle[i]] - then[triangle[i]]).head<2>();
-    low = low.min(moved), high = high.max(moved);
-  }
-  return (low < px).all() && (high > -px).all();
+  const auto moved = [&](int i) {  // u, v, 0, 0
+    return cv::v_load_low(now[triangle[i]].data()) - cv::v_load_low(then[triangle[i]].data());
+  };
+  const cv::v_float32x4 a = moved(0), b = moved(1), c = moved(2), low = cv::v_min(cv::v_min(a, b), c),
+                        high = cv::v_max(cv::v_max(a, b), c);
+  return cv::v_check_all((low < cv::v_setall_f32(px)) & (high > cv::v_setall_f32(-px)));
 }
 
 }  // namespace calipso::render
