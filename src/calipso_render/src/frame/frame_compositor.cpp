@@ -51,13 +51,14 @@ void FrameCompositor::drawRegion() {
   surfaces_.emplace(frame_, place_, region_, removed_);
   const bool carries = updateRest();
   sideBySide(
-      frame_.params.quality == Quality::kLive, [this] { edges_.emplace(surfaces_->sampleEdges()); },
+      frame_.params.quality == Quality::kLive,
       [this] { light_.emplace(frame_, place_, resting_, moved_, region_, surfaces_->covered()); },
+      [this] { shader_.emplace(frame_, place_, *surfaces_, moved_, resting_); },
+      [this] { edges_.emplace(surfaces_->sampleEdges()); },
       [this] { still_.emplace(frame_, place_, surfaces_->centre(), removed_); },
       [this, carries] {
         if (carries) residual_.emplace(frame_, revealed_, surfaces_->centre(), caches_.rest);
       },
-      [this] { shader_.emplace(frame_, place_, *surfaces_, moved_, resting_); },
       [this] { screen_.emplace(frame_, surfaces_->centre()); });
   backdrop_.emplace(frame_, place_, revealed_, reflections_, others_, *surfaces_, *edges_, *light_,
                     removed_);
