@@ -54,6 +54,28 @@ CALIPSO_INLINE unsigned bitsOf(const EightInts& mask) {
 // How many of the first lanes are set. @param mask 0 or -1 in each lane
 CALIPSO_INLINE int leadingLanes(const EightInts& mask) { return __builtin_ctz(bitsOf(~mask) | 256); }
 
+typedef std::uint8_t EightBytes __attribute__((vector_size(8)));
+
+CALIPSO_INLINE EightInts toInts(const EightBytes& bytes) {
+  typedef std::uint64_t Halves __attribute__((vector_size(32)));
+  typedef std::uint8_t Bytes __attribute__((vector_size(32)));
+  const Bytes all_bytes = (Bytes)(Halves{} + (std::uint64_t)bytes);
+  return (EightInts)__builtin_shuffle(
+             all_bytes, Bytes{0,  0,  0,  0,  1,  1,  1,  1,  2,  2,  2,  2,  3,  3,  3,  3,
+                              20, 20, 20, 20, 21, 21, 21, 21, 22, 22, 22, 22, 23, 23, 23, 23}) &
+         0xff;
+}
+
+// @pre in [0, 255]
+CALIPSO_INLINE EightBytes toBytes(const EightInts& ints) {
+  typedef std::uint8_t Bytes __attribute__((vector_size(32)));
+  const EightInts fours = (EightInts)__builtin_shuffle(
+      (Bytes)ints, Bytes{0,  4,  8,  12, 0,  4,  8,  12, 0,  4,  8,  12, 0,  4,  8,  12,
+                         16, 20, 24, 28, 16, 20, 24, 28, 16, 20, 24, 28, 16, 20, 24, 28});
+  return (EightBytes)(static_cast<std::uint32_t>(fours[0]) |
+                      std::uint64_t{static_cast<std::uint32_t>(fours[4])} << 32);
+}
+
 CALIPSO_INLINE Eight squareRoot(const Eight& x) {
   Eight root;
   for (int k = 0; k < 8; ++k) root[k] = std::sqrt(x[k]);

@@ -15,7 +15,7 @@ namespace calipso::render {
 namespace {
 
 // levels of the sky, a fifth: so much more or less of it only brightens or darkens a pixel
-constexpr std::uint8_t kSoftSky = 51;
+constexpr float kSoftSky = 51.0f;
 // of the sky's light: differences of levels that come of no more are less than kSameLevels, or no
 // more than kSoftSky, also once they are rounded
 constexpr float kSameSky = (kSameLevels - 2.1f) * kPerLevel,
@@ -26,18 +26,30 @@ struct LightChange {
   const std::uint8_t *sun, *sun_before, *sky, *sky_before, *takes;
 };
 
-// changeOfLight() where it is more than a pixel can follow.
+// changesOfLight() of eight pixels from the i-th on, where it is more than a pixel can follow.
 // @param umbra per level
-CALIPSO_WIDE_LOOPS void changesOfLight(const LightChange& at, float umbra, int count,
-                                       std::uint8_t* out) {
-  const float lit = kPerLevel - umbra;
-  for (int i = 0; i < count; ++i) {
-    const int more_sky = at.sky[i] - at.sky_before[i], more_sun = at.sun[i] - at.sun_before[i],
-              beyond = more_sky - std::clamp<int>(more_sky, -kSoftSky, kSoftSky);
-    const std::uint8_t change = changeOfLight(
-        std::abs(umbra * static_cast<float>(beyond) + lit * static_cast<float>(more_sun)));
-    out[i] = at.takes[i] == 0 ? 0 : change;
+CALIPSO_INLINE EightBytes eightChanges(const LightChange& at, float umbra, int i) {
+  const Eight more_sky = eightLevels(at.sky + i) - eightLevels(at.sky_before + i),
+              more_sun = eightLevels(at.sun + i) - eightLevels(at.sun_before + i),
+              soft = smaller(larger(more_sky, all(-kSoftSky)), all(kSoftSky)),
+              by = umbra * (more_sky - soft) + (kPerLevel - umbra) * more_sun;
+  return changesOfLight(eightLevels(at.takes + i) > 0.0f ? larger(by, -by) : Eight{});
+}
+
+CALIPSO_WIDE_LOOPS void findChanges(const LightChange& at, float umbra, int count,
+                                    std::uint8_t* out) {
+  for (int i = 0; i + 8 <= count; i += 8) {
+    const EightBytes changes = eightChanges(at, umbra, i);
+    std::memcpy(out + i, &changes, 8);
   }
+  const int done = count / 8 * 8, more = count - done;
+  if (more == 0) return;
+  std::uint8_t rest[5][8] = {};
+  const std::uint8_t* const from[] = {at.sun, at.sun_before, at.sky, at.sky_before, at.takes};
+  for (int k = 0; k < 5; ++k) std::copy_n(from[k] + done, more, rest[k]);
+  const EightBytes changes =
+      eightChanges({rest[0], rest[1], rest[2], rest[3], rest[4]}, umbra, 0);
+  std::memcpy(out + done, &changes, more);
 }
 
 }  // namespace
@@ -144,7 +156,7 @@ void PlaceLight::findChange(int v, int from, int to, std::uint8_t* out) const {
                      *sky_before = rowOf(sky_before_), *takes = rowOf(takes_);
   const float umbra = kPerLevel * luminance(frame_.prepared.umbra);
   sun_changes_.visitRow(v, from, to, [&](int begin, int end) {
-    changesOfLight({sun + begin, sun_before + begin, sky + begin, sky_before + begin, takes + begin},
+    findChanges({sun + begin, sun_before + begin, sky + begin, sky_before + begin, takes + begin},
                    umbra, end - begin, out + begin - from);
   });
 }

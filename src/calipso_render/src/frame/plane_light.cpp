@@ -174,7 +174,7 @@ class Squares {
              const float (&visible)[kSquare][kSquare]) const {
     const int left = here.x + rect_.x - square.x;
     for (int y = here.y; y < here.br().y; ++y) {
-      const EightLevels levels = lightLevels(eightAt(visible[y + rect_.y - square.y]));
+      const EightBytes levels = lightLevels(eightAt(visible[y + rect_.y - square.y]));
       std::memcpy(out_.ptr<std::uint8_t>(y) + here.x,
                   reinterpret_cast<const std::uint8_t*>(&levels) + left, here.width);
     }

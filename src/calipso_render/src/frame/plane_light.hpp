@@ -20,16 +20,15 @@ inline std::uint8_t lightLevel(float visible) {
 }
 
 // The same of eight.
-typedef std::uint8_t EightLevels __attribute__((vector_size(8)));
-CALIPSO_INLINE EightLevels lightLevels(const Eight& visible) {
-  return __builtin_convertvector(__builtin_convertvector(visible * 255.0f + 0.5f, EightInts),
-                                 EightLevels);
+CALIPSO_INLINE EightBytes lightLevels(const Eight& visible) {
+  return toBytes(__builtin_convertvector(visible * 255.0f + 0.5f, EightInts));
 }
 
+// Eight levels as numbers.
 CALIPSO_INLINE Eight eightLevels(const std::uint8_t* at) {
-  EightLevels levels;
+  EightBytes levels;
   std::memcpy(&levels, at, sizeof(levels));
-  return __builtin_convertvector(__builtin_convertvector(levels, EightInts), Eight);
+  return __builtin_convertvector(toInts(levels), Eight);
 }
 
 // Product of two levels, 255 = 1.
@@ -45,11 +44,18 @@ inline cv::Vec3f shadowRatio(const cv::Vec3f& umbra, float sun, float sky) {
 }
 
 // How much a change of brightness by `by` calls for the plate: 0 not visible .. 255 only it.
+constexpr float kSameRatio = 0.01f,
+                kPlateRatio = 0.06f;  // from which the plate is taken, and only it
 inline std::uint8_t changeOfLight(float by) {
-  constexpr float kSameRatio = 0.01f,
-                  kPlateRatio = 0.06f;  // from which the plate is taken, and only it
   const float t = std::clamp((by - kSameRatio) * (1.0f / (kPlateRatio - kSameRatio)), 0.0f, 1.0f);
   return static_cast<std::uint8_t>(static_cast<int>(255.0f * (t * t * (3.0f - 2.0f * t)) + 0.5f));
+}
+
+// The same of eight.
+CALIPSO_INLINE EightBytes changesOfLight(const Eight& by) {
+  const Eight t = smaller(
+      larger((by - kSameRatio) * (1.0f / (kPlateRatio - kSameRatio)), Eight{}), all(1.0f));
+  return lightLevels(t * t * (3.0f - 2.0f * t));
 }
 
 // Levels of the relief in the terms of the support planes: the sun alone shades it; what its levels

@@ -114,7 +114,7 @@ CALIPSO_WIDE_LOOPS void SkyGrid::interpolate(int v, int begin, int end, std::uin
               stop = std::min(end, corner + step_);
     const float left = at(i), rise = (at(i + 1) - left) / static_cast<float>(step_);
     while (u < stop) {
-      const EightLevels levels =
+      const EightBytes levels =
           lightLevels(left + rise * (static_cast<float>(u - corner) + lanes()));
       const int count = std::min(8, stop - u);
       if (count == 8)
