@@ -38,6 +38,7 @@ struct BallStages {
   RestingLight resting;
   ShadedOthers others;
   EditedRegion region;
+  ShownPixels shown;
   cv::Mat removed;
   DrawnSurfaces surfaces;
 
@@ -49,7 +50,7 @@ struct BallStages {
         moved(frame, place),
         others(frame, moved, resting.update(frame, place)),
         region(frame, resting, moved, others, reflections, cv::Mat()),
-        removed(removedPixels(frame, place, region, cv::Mat(), reflections.marks())),
+        removed(removedPixels(frame, place, region, cv::Mat(), reflections.marks(), shown)),
         surfaces(frame, place, region, removed) {}
 };
 

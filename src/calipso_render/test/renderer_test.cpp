@@ -225,6 +225,22 @@ TEST(Renderer, SameBytesWhereverWhatMovesBesideWasBefore) {
   EXPECT_GT(cv::norm(alone(0.25f), alone(2.0f), cv::NORM_INF), 0.0);
 }
 
+// What a frame shows of the ball is kept only as long as its labels say the same.
+TEST(Renderer, SameBytesWhateverStoodBeforeTheBall) {
+  const Setting s(params());
+  FrameInput free = s.input(true, {0.3f, 0.0f, 0.0f}), hidden = free;
+  hidden.labels = free.labels.clone();
+  const cv::Rect ball = cv::boundingRect(free.labels);
+  hidden.labels(cv::Rect(ball.tl() + cv::Point(ball.size() / 4), ball.size() / 2)).setTo(2);
+  const auto alone = [&](const FrameInput& in) {
+    return Renderer(s.prepared, params()).composite(in).bgr;
+  };
+  Renderer one(s.prepared, params());
+  for (const FrameInput* in : {&free, &hidden, &hidden, &free})
+    EXPECT_EQ(cv::norm(one.composite(*in).bgr, alone(*in), cv::NORM_INF), 0.0);
+  EXPECT_GT(cv::norm(alone(free), alone(hidden), cv::NORM_INF), 0.0);
+}
+
 TEST(Renderer, SameBytesForAnyNumberOfThreads) {
   RenderParams p = params();
   p.add_noise = true;

@@ -47,7 +47,7 @@ FrameOutput FrameCompositor::run() {
 }
 
 void FrameCompositor::drawRegion() {
-  removed_ = removedPixels(frame_, place_, region_, passing_, reflections_.marks());
+  removed_ = removedPixels(frame_, place_, region_, passing_, reflections_.marks(), caches_.shown);
   surfaces_.emplace(frame_, place_, region_, removed_);
   const bool carries = updateRest();
   sideBySide(

@@ -1,5 +1,7 @@
 #include "frame/removed.hpp"
 
+#include <cstring>
+
 #include "draw/wide_loops.hpp"
 #include "frame/mask_morphology.hpp"
 #include "frame/reflections.hpp"
@@ -28,33 +30,61 @@ CALIPSO_WIDE_LOOPS void findShown(const StagedFrame& frame, const SeenPlace& pla
   }
 }
 
+bool areSame(const cv::Mat& a, const cv::Mat& b) {
+  if (a.size() != b.size()) return false;
+  for (int v = 0; v < a.rows; ++v) {
+    if (std::memcmp(a.ptr(v), b.ptr(v), a.cols) != 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void ShownPixels::update(const StagedFrame& frame, const SeenPlace& place, const cv::Rect& box) {
+  if (box_ == box && edited_ == frame.edited && at_key_camera_ == frame.at_key_camera &&
+      areSame(labels_, frame.labels(box)))
+    return;
+  box_ = box, edited_ = frame.edited, at_key_camera_ = frame.at_key_camera;
+  labels_ = frame.labels(box).clone();
+  own_.create(box.size(), CV_8U), others_.create(box.size(), CV_8U);
+  cv::Mat without_margin(box.size(), CV_8U);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < box.height; ++v)
+    findShown(frame, place, v + box.y, box, without_margin.ptr<std::uint8_t>(v),
+              others_.ptr<std::uint8_t>(v));
+  const int margin = frame.params.background.mask_margin_px;
+  filterTiles(without_margin, margin, own_, DiscDilation(margin));
+}
+
+namespace {
+
 // What a box's pixels show of edited objects, with a margin, and of their passing shadows, but not
 // what stands beside them.
 // @param out CV_8UC1 of the box's size
-void findRemoved(const StagedFrame& frame, const SeenPlace& place, const cv::Mat& passing,
-                 const cv::Rect& box, cv::Mat out) {
-  cv::Mat own(box.size(), CV_8U), others(box.size(), CV_8U);
-#pragma omp parallel for schedule(static)
-  for (int v = 0; v < box.height; ++v)
-    findShown(frame, place, v + box.y, box, own.ptr<std::uint8_t>(v), others.ptr<std::uint8_t>(v));
-  const int margin = frame.params.background.mask_margin_px;
-  filterTiles(own, margin, out, DiscDilation(margin));
-  if (!passing.empty()) out |= passing(box);
+void findRemoved(const ShownPixels& shown, const cv::Mat& passing, const cv::Rect& box,
+                 cv::Mat out) {
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < box.height; ++v) {
     std::uint8_t* row = out.ptr<std::uint8_t>(v);
-    const std::uint8_t* stays = others.ptr<std::uint8_t>(v);
-    for (int u = 0; u < box.width; ++u) row[u] &= static_cast<std::uint8_t>(~stays[u]);
+    const std::uint8_t *own = shown.own().ptr<std::uint8_t>(v),
+                       *stays = shown.others().ptr<std::uint8_t>(v),
+                       *passes = passing.empty() ? own
+                                                 : passing.ptr<std::uint8_t>(v + box.y) + box.x;
+    for (int u = 0; u < box.width; ++u)
+      row[u] = (own[u] | passes[u]) & static_cast<std::uint8_t>(~stays[u]);
   }
 }
 
 }  // namespace
 
 cv::Mat removedPixels(const StagedFrame& frame, const SeenPlace& place, const EditedRegion& region,
-                      const cv::Mat& passing, const cv::Mat& mirrored) {
+                      const cv::Mat& passing, const cv::Mat& mirrored, ShownPixels& shown) {
   cv::Mat removed = cv::Mat::zeros(region.all.size(), CV_8U);
   const cv::Rect& box = region.revealed;
-  if (!box.empty()) findRemoved(frame, place, passing, box, removed(box - region.all.tl()));
+  if (!box.empty()) {
+    shown.update(frame, place, box);
+    findRemoved(shown, passing, box, removed(box - region.all.tl()));
+  }
   const cv::Mat& lost = frame.prepared.mirror.lost;
   if (!mirrored.empty() && !lost.empty())
     removed |= lost(region.all) & (mirrored(region.all) == Reflections::kChanged) &
