@@ -240,7 +240,10 @@ void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& s
     p.umbra = umbraInPicture(e.picture, p.background.plate, sun, sky,
                              (p.key_labels != 0) | off_planes, predicted);
   } else {
-    const auto in_views = umbraInViews(e.views, params.planes, p.background, light);
+    cv::Mat behind = params.depth.clone();
+    if (!behind.empty()) behind.setTo(0.0f, p.key_labels != 0);
+    const EmptyPlace place{p.camera, p.background, behind};
+    const auto in_views = umbraInViews(e.views, params.planes, place, light);
     p.umbra =
         in_views ? *in_views : umbraOfPassing(e.frames, params.planes, p.background, predicted);
   }

@@ -5,7 +5,6 @@
 #include <cassert>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 #include "calipso_render/colour.hpp"
 
@@ -53,29 +52,6 @@ cv::Vec3f between(const cv::Mat& picture, const Eigen::Vector2d& at) {
   const auto value = [&](int du, int dv) { return picture.at<cv::Vec3f>(v + dv, u + du); };
   return (value(0, 0) * (1.0f - s) + value(1, 0) * s) * (1.0f - t) +
          (value(0, 1) * (1.0f - s) + value(1, 1) * s) * t;
-}
-
-// A place on a support plane as it is without what moves, code values; nullopt: not known.
-std::optional<cv::Vec3f> unshaded(const EmptyPlace& place,
-                                  const Eigen::Isometry3d& camera_from_world,
-                                  const Eigen::Vector3f& position) {
-  const Eigen::Vector3d p = camera_from_world * position.cast<double>();
-  if (place.plate.count.empty() || p.z() <= 0.0) return std::nullopt;
-  const Eigen::Vector2d uv = place.camera.project(p);
-  const cv::Size size = place.plate.count.size();
-  if (!(uv.x() >= 0.0 && uv.y() >= 0.0 && uv.x() < size.width - 1 && uv.y() < size.height - 1))
-    return std::nullopt;
-  const cv::Point nearest(static_cast<int>(std::lround(uv.x())),
-                          static_cast<int>(std::lround(uv.y())));
-  if (place.plate.spread.at<float>(nearest) >= kQuiet) return std::nullopt;
-  const std::uint8_t* above = place.plate.count.ptr<std::uint8_t>(static_cast<int>(uv.y()));
-  const std::uint8_t* below = place.plate.count.ptr<std::uint8_t>(static_cast<int>(uv.y()) + 1);
-  const int u = static_cast<int>(uv.x());  // the value is one of four pixels, mixed
-  if (std::min({above[u], above[u + 1], below[u], below[u + 1]}) < kFewestFrames)
-    return std::nullopt;
-  const float depth = place.depth.empty() ? 0.0f : place.depth.at<float>(nearest);
-  if (depth > 0.0f && std::abs(depth - p.z()) > kOffPlane * p.z()) return std::nullopt;
-  return between(place.plate.plate, uv);
 }
 
 bool isNear(const Eigen::Vector3f& p, const std::vector<Eigen::AlignedBox3f>& boxes) {
@@ -129,6 +105,28 @@ double unshadedVariance(const Samples& samples) {
 }
 
 }  // namespace
+
+std::optional<cv::Vec3f> unshaded(const EmptyPlace& place,
+                                  const Eigen::Isometry3d& camera_from_world,
+                                  const Eigen::Vector3f& position) {
+  const Eigen::Vector3d p = camera_from_world * position.cast<double>();
+  if (place.plate.count.empty() || p.z() <= 0.0) return std::nullopt;
+  const Eigen::Vector2d uv = place.camera.project(p);
+  const cv::Size size = place.plate.count.size();
+  if (!(uv.x() >= 0.0 && uv.y() >= 0.0 && uv.x() < size.width - 1 && uv.y() < size.height - 1))
+    return std::nullopt;
+  const cv::Point nearest(static_cast<int>(std::lround(uv.x())),
+                          static_cast<int>(std::lround(uv.y())));
+  if (place.plate.spread.at<float>(nearest) >= kQuiet) return std::nullopt;
+  const std::uint8_t* above = place.plate.count.ptr<std::uint8_t>(static_cast<int>(uv.y()));
+  const std::uint8_t* below = place.plate.count.ptr<std::uint8_t>(static_cast<int>(uv.y()) + 1);
+  const int u = static_cast<int>(uv.x());  // the value is one of four pixels, mixed
+  if (std::min({above[u], above[u + 1], below[u], below[u + 1]}) < kFewestFrames)
+    return std::nullopt;
+  const float depth = place.depth.empty() ? 0.0f : place.depth.at<float>(nearest);
+  if (depth > 0.0f && std::abs(depth - p.z()) > kOffPlane * p.z()) return std::nullopt;
+  return between(place.plate.plate, uv);
+}
 
 std::vector<bool> leavers(const View& view, const std::vector<bool>& moves,
                           const Background& plate) {

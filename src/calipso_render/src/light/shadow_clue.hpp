@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "calipso_render/background.hpp"
@@ -16,6 +17,12 @@ struct EmptyPlace {
   const Background& plate;  // may be empty
   const cv::Mat& depth;     // CV_32FC1, m, 0: unknown; may be empty
 };
+
+// A place on a support plane as it is without what moves, code values; nullopt: not known, or it
+// does not rest.
+std::optional<cv::Vec3f> unshaded(const EmptyPlace& place,
+                                  const Eigen::Isometry3d& camera_from_world,
+                                  const Eigen::Vector3f& position);
 
 // Which objects (in the view of the place's camera) leave the place that they stand at, so that
 // other frames show it, and their shadow's, without them. @param moves per object
