@@ -19,6 +19,7 @@ constexpr float kContrast = 0.05f;      // linear: the least that tells
 constexpr float kMisfit = 0.1f;         // of the contrast, r.m.s.: more is no plain step
 constexpr float kFurthest = 1.5f;       // px between the mask's outline and the picture's
 constexpr std::size_t kFewest = 12;     // places
+constexpr float kUsual = 0.3f;  // px: what lenses and pixels that overlap do; for want of places
 constexpr double kQuantile = 0.25;
 constexpr float kPixel = 0.288675f;  // standard deviation of a pixel's own width, px
 constexpr float kFinest = 1.15f;     // factor between the widths that are tried
@@ -105,7 +106,7 @@ class Outlines {
 
 float outlineBlur(const cv::Mat& picture, const cv::Mat& labels) {
   std::vector<float> widths = Outlines(picture, labels).widths();
-  if (widths.size() < kFewest) return 0.0f;
+  if (widths.size() < kFewest) return kUsual;
   const auto quantile = widths.begin() + static_cast<std::ptrdiff_t>(kQuantile * widths.size());
   std::nth_element(widths.begin(), quantile, widths.end());
   return std::sqrt(std::max(*quantile * *quantile - kPixel * kPixel, 0.0f));

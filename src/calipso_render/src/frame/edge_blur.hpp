@@ -10,7 +10,7 @@ namespace calipso::render {
 // softer than it is, never sharper: a lower quantile of all places counts.
 // @param picture CV_32FC3, code values
 // @param labels CV_8UC1, 0: no object
-// @return standard deviation, px; 0 where too few places tell it
+// @return standard deviation, px; the usual one where too few places tell it
 float outlineBlur(const cv::Mat& picture, const cv::Mat& labels);
 
 }  // namespace calipso::render
