@@ -157,6 +157,19 @@ TEST(FitLight, FindsTheSunOfABall) {
   EXPECT_FALSE(fit.confirmed());  // by nothing but shading
 }
 
+// A ball whose top is of a grey ten times as dark as the rest: of one hue, but no shading.
+TEST(FitLight, TellsReflectancesOfOneHueApart) {
+  const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
+  LightEvidence evidence;
+  evidence.samples = ballSamples(sun), evidence.clusters = 1;
+  for (LightSample& s : evidence.samples)
+    if (s.normal.z() > 0.6f) s.radiance *= 0.1f;
+  const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
+  ASSERT_EQ(fit.albedos.size(), 2u);
+  EXPECT_NEAR(fit.albedos[1][1] / fit.albedos[0][1], 10.0f, 1.5f);
+  EXPECT_GT(fit.light.direction.dot(sun), std::cos(3.0 * M_PI / 180.0));
+}
+
 // A board's shading is the same under any sun.
 TEST(SearchLight, TakesAUsualSunWhereNothingTellsOne) {
   LightEvidence evidence;

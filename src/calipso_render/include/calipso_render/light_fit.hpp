@@ -56,9 +56,9 @@ struct LightEvidence {
   // was seen; may be empty.
   std::function<double(const Eigen::Vector3f& l)> shadow_misfit;
   std::vector<Eigen::Vector3f> shadow_candidates;  // directions that cast shadows speak for
-  // Gloss from the pixels near the mirror direction, under a light found; may be empty, and find
-  // none.
-  std::function<SeenGlosses(const LightFit&)> gloss;
+  // Gloss from the pixels near the mirror direction, in the clusters of the samples nearest to them,
+  // under a light found; may be empty, and find none.
+  std::function<SeenGlosses(const LightFit&, const std::vector<LightSample>&)> gloss;
 };
 
 // What views, one or several, show. @param plate what was seen of the place without the objects,

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "light/ambient_fit.hpp"
+#include "light/cluster_split.hpp"
 #include "light/gloss_fit.hpp"
 #include "light/light_search.hpp"
 #include "light/reflectance_cost.hpp"
@@ -31,6 +32,7 @@ constexpr double kRobust = 0.15;  // relative residual beyond which a pixel coun
 constexpr double kLogRange = 4.0;
 // relative, of the shading of a sample, of which so many err independently of each other
 constexpr double kShadingError = 0.1, kIndependentSamples = 50.0;
+constexpr int kSplits = 2;             // rounds of telling reflectances of one hue apart
 constexpr double kPriorWeight = 0.05;  // of one prior, as a part of all pixels
 
 // Every parameter of the model; blocks as in ReflectanceCost.
@@ -252,6 +254,26 @@ LightEvidence withoutShadows(LightEvidence evidence) {
   return evidence;
 }
 
+// Light, albedos and gloss from shading and cast shadows.
+LightFit fitShading(const LightEvidence& evidence, const Eigen::Vector3f& up) {
+  LightFit best;
+  std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
+  best.from_shadows = shadowsTell(evidence, starts.front(), up);
+  if (!best.from_shadows) starts = searchLight(withoutShadows(evidence), up, kStarts);
+  if (!best.from_shadows) {
+    std::vector<std::optional<LightFit>> fits(starts.size());
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = 0; i < starts.size(); ++i)
+      fits[i] = fitFrom(starts[i], evidence, up, true);
+    for (const std::optional<LightFit>& fit : fits) keepBetter(fit, best);
+  }
+  // Shading alone may lead below the horizon: then the search's direction stands, if it stands out,
+  // as it does where shadows tell it.
+  if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling))
+    keepBetter(fitFrom(starts.front(), evidence, up, false), best);
+  return best;
+}
+
 }  // namespace
 
 std::optional<SeenGloss> LightFit::toldGloss(std::size_t object) const {
@@ -272,27 +294,22 @@ std::vector<Gloss> LightFit::glosses(std::size_t objects) const {
   return all;
 }
 
-LightFit fitLight(const LightEvidence& evidence, const Eigen::Vector3f& up,
+LightFit fitLight(const LightEvidence& seen, const Eigen::Vector3f& up,
                   const Eigen::Vector3f& view) {
   LightFit best;
   best.light.direction = (up + 0.4f * view).normalized();
-  if (static_cast<int>(evidence.samples.size()) < kFewestSamples) return best;
-  std::vector<LightCandidate> starts = searchLight(evidence, up, kStarts);
-  best.from_shadows = shadowsTell(evidence, starts.front(), up);
-  if (!best.from_shadows) starts = searchLight(withoutShadows(evidence), up, kStarts);
-  if (!best.from_shadows) {
-    std::vector<std::optional<LightFit>> fits(starts.size());
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t i = 0; i < starts.size(); ++i)
-      fits[i] = fitFrom(starts[i], evidence, up, true);
-    for (const std::optional<LightFit>& fit : fits) keepBetter(fit, best);
-  }
-  // Shading alone may lead below the horizon: then the search's direction stands, if it stands out,
-  // as it does where shadows tell it.
-  if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling))
-    keepBetter(fitFrom(starts.front(), evidence, up, false), best);
+  if (static_cast<int>(seen.samples.size()) < kFewestSamples) return best;
+  LightEvidence evidence = seen;
+  if (const LightFit fit = fitShading(evidence, up); fit.determined) best = fit;
   if (!best.determined) return best;
-  if (evidence.gloss) best.seen_gloss = evidence.gloss(best);
+  for (int i = 0; i < kSplits; ++i) {
+    LightEvidence apart = evidence;
+    if (!splitClusters(best, apart)) break;
+    const LightFit fit = fitShading(apart, up);
+    if (!fit.determined) break;
+    best = fit, evidence = apart;
+  }
+  if (evidence.gloss) best.seen_gloss = evidence.gloss(best, evidence.samples);
   if (best.seen_gloss.of_all) best.gloss = best.seen_gloss.of_all->gloss;
   best.gloss.around = surroundingsStrength(evidence, best);
   best.second_order = refineAmbient(evidence, best);

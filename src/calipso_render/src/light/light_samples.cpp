@@ -184,8 +184,8 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
     return (*scenes)[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
   };
   addShadows(views, leavers(views.front(), moves, plate), planes, plate, depth, scenes, evidence);
-  evidence.gloss = [&views, moves, samples = evidence.samples,
-                    visible = evidence.visible](const LightFit& fit) {
+  evidence.gloss = [&views, moves, visible = evidence.visible](
+                       const LightFit& fit, const std::vector<LightSample>& samples) {
     return seenGlosses(highlightSamples(views, moves, samples, fit.light.direction), moves.size(),
                        fit, visible);
   };
