@@ -173,7 +173,8 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.light = lightOf(light_views, seen, any_moves, params, p);
   const ShadowMap sun = sunOver(actors, p.light.light);
   const SkyMap sky = skyOver(actors, params);
-  p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()));
+  p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()),
+                                  params.planes);
   p.appearance_ms = watch.lap();
   for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
   p.fronts = frontsOf(p, params);

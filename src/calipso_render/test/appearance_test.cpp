@@ -7,6 +7,8 @@
 
 #include "calipso_render/colour.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
+#include "light/shaded_ground.hpp"
 #include "render_test_scene.hpp"
 
 namespace calipso::render {
@@ -246,6 +248,55 @@ TEST(Appearance, APartUnderAnotherIsNotSeen) {
   };
   EXPECT_GT(fromPicture(0, triangles), 100);
   EXPECT_EQ(fromPicture(triangles, 2 * triangles), 0);
+}
+
+// What a glossy ball mirrors of its own shade on the table is dark: that is no highlight.
+TEST(Appearance, TakesOffTheGroundAsShadedAsItIs) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  constexpr Gloss kMirroring{0.0f, 0.4f, 0.1f};
+  View view{cv::Mat::zeros(kHeight, kWidth, CV_32FC3),
+            cv::Mat::zeros(kHeight, kWidth, CV_8U),
+            camera(),
+            {makeActor(surface, surface.key_vertices, camera())}};
+  const Actor& actor = view.actors.front();
+  const std::vector<Occluder> occluders = {{&actor.vertices, &surface.triangles, surface.winding}};
+  const Light light = sunlight();
+  const ShadowMap sun(occluders, light.direction.cast<double>(), ShadowMap::Params());
+  const SkyMap sky(occluders, Eigen::Vector3d::UnitZ(), SkyMap::Params());
+  const ShadedGround ground(table(), light, {&sun}, sky);
+  const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
+  cv::Mat lit = cv::Mat::ones(kHeight, kWidth, CV_32F);
+  forEachPixelOf(actor, [&](int u, int v, const SurfacePoint& p) {
+    const Eigen::Vector3f towards = (eye - p.position).normalized(),
+                          mirrored = mirroredIn(p.normal, towards);
+    const float visible = sun.visibility(p.position, p.normal);
+    lit.at<float>(v, u) = ground.lit(p.position, mirrored);
+    const cv::Vec3f diffuse = diffuseShading(light, p.normal, visible, p.seen, {}),
+                    highlight = specularShading(light, kMirroring, p.normal, towards, visible,
+                                                skyMirrored(p.seen, mirrored, lit.at<float>(v, u)));
+    for (int c = 0; c < 3; ++c)
+      view.picture.at<cv::Vec3f>(v, u)[c] = codeFromLinear(kAlbedo[c] * diffuse[c] + highlight[c]);
+    view.labels.at<std::uint8_t>(v, u) = kBallLabel;
+  });
+  cv::Mat inside;
+  cv::erode(view.labels, inside, cv::Mat::ones(7, 7, CV_8U));
+  // Mean error where the table's shade is mirrored, as a part of the reflectance.
+  const auto error = [&](const std::vector<SupportPlane>& planes) {
+    const Appearance a = makeAppearances({view}, {false}, light, {kMirroring}, planes).front();
+    double sum = 0.0;
+    int count = 0;
+    forEachPixelOf(actor, [&](int u, int v, const SurfacePoint& p) {
+      if (inside.at<std::uint8_t>(v, u) == 0 || lit.at<float>(v, u) > 0.5f) return;
+      const cv::Vec3f diffuse = diffuseShading(light, p.normal, 1.0f, p.seen, {});
+      const float floor = lightFloor(a.mean_light)[0];
+      const cv::Vec4f& found = a.albedo.at<cv::Vec4f>(v - a.region.y, u - a.region.x);
+      sum += std::abs(found[0] * (diffuse[0] + floor) / (kAlbedo[0] * diffuse[0]) - 1.0f), ++count;
+    });
+    EXPECT_GT(count, 30);
+    return sum / count;
+  };
+  EXPECT_LT(error(table()), 0.04);
+  EXPECT_GT(error({}), 0.15);
 }
 
 }  // namespace

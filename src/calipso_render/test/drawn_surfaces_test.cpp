@@ -50,7 +50,7 @@ TEST(SurfaceSun, BetweenCornersFollowsFromThem) {
   const BallStages s({0.0f, -0.45f, 0.15f});
   const Actor& actor = s.frame.objects[0].actor;
   std::vector<SurfaceMaps> maps;
-  maps.emplace_back(actor, s.prepared->appearances[0], s.frame.light, s.frame.eye);
+  maps.emplace_back(actor, s.prepared->appearances[0], s.frame.light, ShadedGround(), s.frame.eye);
   const SurfaceSun sun(s.frame, s.place.view.planes(), s.surfaces, maps, s.moved, s.resting);
   const VisibilityBuffer& centre = s.surfaces.centre();
   int compared = 0;

@@ -250,7 +250,8 @@ class Evaluation {
     views[0].labels = p.key_labels, views[0].camera = scene_.camera;
     for (const Surface& s : p.surfaces)
       views[0].actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
-    return makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()));
+    return makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()),
+                           params_.planes);
   }
 
   std::shared_ptr<Prepared> fromKeyFrame() const {

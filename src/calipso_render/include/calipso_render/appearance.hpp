@@ -52,10 +52,11 @@ class Appearance {
 inline cv::Vec3f lightFloor(const cv::Vec3f& mean_light) { return mean_light * 0.05f; }
 
 // @param views the key frame, then frames in which the objects that `moves` names are seen from
-// other sides
+// other sides; planes: those that they mirror from below
 std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<bool>& moves, const Light& light,
-                                        const std::vector<Gloss>& glosses);
+                                        const std::vector<Gloss>& glosses,
+                                        const std::vector<SupportPlane>& planes = {});
 
 // Bicubic (Catmull-Rom) lookup with borders repeated, not below 0. (u, v) in the image's own
 // pixels.

@@ -97,12 +97,12 @@ inline Eigen::Vector3f mirroredIn(const Eigen::Vector3f& n, const Eigen::Vector3
 }
 
 // Part of the sky that a surface mirrors from unit direction w; where its object hides it, what
-// that throws back for it.
-inline float skyMirrored(const SkySeen& seen, const Eigen::Vector3f& w) {
+// that throws back for it. @param lit part of the light from there that shade leaves
+inline float skyMirrored(const SkySeen& seen, const Eigen::Vector3f& w, float lit = 1.0f) {
   constexpr float kNone = 1e-3f;
   const float open = seen.openTowards(w), hidden = 1.0f - seen.open;
   const float back = hidden > kNone ? seen.thrown / hidden : 0.0f;
-  return open + (1.0f - open) * kThrownBack * std::min(1.0f, back);
+  return open * lit + (1.0f - open) * kThrownBack * std::min(1.0f, back);
 }
 
 // Part of the sun's light that reaches a point by way of its object, per unit of reflectance: by

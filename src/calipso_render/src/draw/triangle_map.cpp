@@ -8,6 +8,7 @@ namespace calipso::render {
 namespace {
 
 constexpr float kThinnest = 0.03f;  // px of height
+constexpr float kAway = -0.2f;      // cosine to the eye
 
 // Coefficients of the sum of the corners' values, each weighted by its edge's function and its
 // nearness; the weights add up to the nearness.
@@ -71,12 +72,12 @@ bool isTurned(const Actor& actor, const Eigen::Vector3i& t, const Eigen::Vector3
 }  // namespace
 
 SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const Light& light,
-                         const Eigen::Vector3f& eye)
+                         const ShadedGround& ground, const Eigen::Vector3f& eye)
     : actor_(&actor),
       corner_(appearance.region.tl()),
       vertices_(actor.normals.size()),
       triangles_(new TriangleMap[actor.surface->triangles.size()]) {
-  findAround(appearance, light, eye);
+  findAround(appearance, light, ground, eye);
   const Triangles& triangles = actor.surface->triangles;
   const Camera& c = appearance.key_camera;
   const Eigen::Isometry3f camera_from_world = c.world_from_camera.inverse().cast<float>();
@@ -115,15 +116,18 @@ SurfaceMaps::SurfaceMaps(const Actor& actor, const Appearance& appearance, const
 }
 
 void SurfaceMaps::findAround(const Appearance& appearance, const Light& light,
-                             const Eigen::Vector3f& eye) {
+                             const ShadedGround& ground, const Eigen::Vector3f& eye) {
   const auto find = [&](const std::vector<SkySeen>& seen, float side, std::vector<Around>& around) {
     around.resize(seen.size());
 #pragma omp parallel for schedule(static)
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const cv::Vec3f ambient = ambientOn(light, seen[i], appearance.thrown_back);
       const Eigen::Vector3f& at = actor_->vertices[actor_->surface->vertex_of_normal[i]];
-      const float sky =
-          skyMirrored(seen[i], mirroredIn(side * actor_->normals[i], (eye - at).normalized()));
+      const Eigen::Vector3f n = side * actor_->normals[i], view = (eye - at).normalized(),
+                            mirrored = mirroredIn(n, view);
+      // A vertex that faces away by little has triangles that are seen.
+      const float lit = n.dot(view) > kAway ? ground.lit(at, mirrored) : 1.0f,
+                  sky = skyMirrored(seen[i], mirrored, lit);
       around[i] = {{ambient[0], ambient[1], ambient[2], 0.0f}, {0.0f, 0.0f, 0.0f, sky}};
     }
   };

@@ -7,6 +7,7 @@
 #include "calipso_render/appearance.hpp"
 #include "calipso_render/stage.hpp"
 #include "draw/surface_run.hpp"
+#include "light/shaded_ground.hpp"
 
 namespace calipso::render {
 
@@ -41,7 +42,7 @@ class SurfaceMaps {
  public:
   SurfaceMaps() = default;
   SurfaceMaps(const Actor& actor, const Appearance& appearance, const Light& light,
-              const Eigen::Vector3f& eye);
+              const ShadedGround& ground, const Eigen::Vector3f& eye);
 
   const TriangleMap* triangles() const { return triangles_.get(); }
   const TriangleMap& of(int triangle) const { return triangles_[triangle]; }
@@ -63,15 +64,16 @@ class SurfaceMaps {
     float sky[4];    // 0, 0, 0, sky
   };
 
-  void findAround(const Appearance& appearance, const Light& light, const Eigen::Vector3f& eye);
+  void findAround(const Appearance& appearance, const Light& light, const ShadedGround& ground,
+                  const Eigen::Vector3f& eye);
   const std::vector<Around>& aroundOf(int triangle) const {
     const bool behind = of(triangle).is(TriangleMap::kTurned) && !around_behind_.empty();
     return behind ? around_behind_ : around_;
   }
 
   const Actor* actor_ = nullptr;
-  cv::Point corner_;  // Appearance::region's
-  std::vector<Vertex> vertices_;  // per normal of the surface
+  cv::Point corner_;                            // Appearance::region's
+  std::vector<Vertex> vertices_;                // per normal of the surface
   std::vector<Around> around_, around_behind_;  // the latter as Actor::seen_behind
   std::unique_ptr<TriangleMap[]> triangles_;
 };

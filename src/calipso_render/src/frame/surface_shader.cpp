@@ -37,7 +37,8 @@ SurfaceShader::SurfaceShader(const StagedFrame& frame, const SeenPlace& place,
       planes_(place.view.planes()),
       centre_(surfaces.centre()),
       region_(centre_.region()),
-      maps_(findMaps()),
+      maps_(findMaps(
+          {frame.params.planes, frame.light, {moved.sun.get(), &resting.others()}, *moved.sky})),
       sun_(frame, planes_, surfaces, maps_, moved, resting) {
   for (std::size_t slot = 0; slot < frame.objects.size(); ++slot) {
     const StagedObject& object = frame.objects[slot];
@@ -46,7 +47,7 @@ SurfaceShader::SurfaceShader(const StagedFrame& frame, const SeenPlace& place,
   }
 }
 
-std::vector<SurfaceMaps> SurfaceShader::findMaps() const {
+std::vector<SurfaceMaps> SurfaceShader::findMaps(const ShadedGround& ground) const {
   std::vector<SurfaceMaps> maps;
   for (std::size_t slot = 0; slot < frame_.objects.size(); ++slot) {
     const StagedObject& object = frame_.objects[slot];
@@ -54,7 +55,7 @@ std::vector<SurfaceMaps> SurfaceShader::findMaps() const {
         object.edited ||
         !(boundsOf(object.actor.screen, 0, frame_.input.bgr.size()) & region_).empty();
     maps.push_back(seen ? SurfaceMaps(object.actor, appearanceOf(static_cast<int>(slot)),
-                                      frame_.light, frame_.eye)
+                                      frame_.light, ground, frame_.eye)
                         : SurfaceMaps());
   }
   return maps;

@@ -47,7 +47,7 @@ class SurfaceShader {
   const Appearance& appearanceOf(int slot) const {
     return frame_.prepared.appearances[frame_.objects[slot].surface];
   }
-  std::vector<SurfaceMaps> findMaps() const;
+  std::vector<SurfaceMaps> findMaps(const ShadedGround& ground) const;
   void reflectStretch(unsigned traits, int v, int first, int last, int slot, Row& row) const;
   void addTexture(int v, int first, int last, int slot, Row& row) const;
   void reflectPlaces(const SurfacePlace* places, int count, int slot,

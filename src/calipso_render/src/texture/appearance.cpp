@@ -9,7 +9,9 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "calipso_render/sky_map.hpp"
 #include "draw/bicubic.hpp"
+#include "light/shaded_ground.hpp"
 #include "smooth_step.hpp"
 #include "texture/false_shade.hpp"
 #include "texture/mesh_topology.hpp"
@@ -59,6 +61,13 @@ cv::Mat trustOf(const cv::Mat& labels, int index, const cv::Rect& region) {
   return trust;
 }
 
+// What the objects of a view leave of sun and sky.
+struct Shade {
+  ShadowMap sun;
+  SkyMap sky;
+  const std::vector<SupportPlane>* planes;
+};
+
 // Light on one actor's visible surface, pixel by pixel.
 struct Shaded {
   cv::Mat highlight;  // CV_32FC3: specular radiance
@@ -71,9 +80,10 @@ struct Shaded {
   cv::Vec3f mean;
 };
 
-Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
-             const Gloss& gloss, const ShadowMap& sun, const cv::Vec3f& thrown_back) {
+Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
+               const Gloss& gloss, const Shade& shade, const cv::Vec3f& thrown_back) {
   Shaded s;
+  const ShadedGround ground(*shade.planes, light, {&shade.sun}, shade.sky);
   for (cv::Mat* colours : {&s.highlight, &s.light, &s.open, &s.normal})
     *colours = cv::Mat::zeros(region.size(), CV_32FC3);
   for (cv::Mat* values : {&s.glint, &s.nearness}) *values = cv::Mat::zeros(region.size(), CV_32F);
@@ -90,14 +100,15 @@ Shaded shade(const Actor& actor, const cv::Rect& region, const Camera& camera, c
       if (id == VisibilityBuffer::kNothing) continue;
       const SurfacePoint p =
           surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
-      const float visible = sun.visibility(p.position, p.normal);
+      const float visible = shade.sun.visibility(p.position, p.normal);
       const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.seen, thrown_back);
       s.light.at<cv::Vec3f>(v, u) = l;
       s.open.at<cv::Vec3f>(v, u) = diffuseShading(light, p.normal, 1.0f);
       const Eigen::Vector3f towards = (eye - p.position).normalized();
+      const Eigen::Vector3f mirrored = mirroredIn(p.normal, towards);
       s.highlight.at<cv::Vec3f>(v, u) =
           specularShading(light, gloss, p.normal, towards, visible,
-                          skyMirrored(p.seen, mirroredIn(p.normal, towards)));
+                          skyMirrored(p.seen, mirrored, ground.lit(p.position, mirrored)));
       if (gloss.roughness < kBroad) {
         s.glint.at<float>(v, u) =
             luminance(light.sun) * gloss.specular * visible *
@@ -218,7 +229,7 @@ void lowerAtSteps(const Shaded& s, cv::Mat& trust) {
 
 // @param mean_light that of the key frame, where there is one; alone no other view shows the object
 Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light,
-                          const Gloss& gloss, const ShadowMap& sun,
+                          const Gloss& gloss, const Shade& shade,
                           const std::optional<cv::Vec3f>& mean_light, const cv::Vec3f& thrown_back,
                           bool alone) {
   Reflectance r;
@@ -230,7 +241,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
           : (mask_box + cv::Size(2 * kMargin, 2 * kMargin) - cv::Point(kMargin, kMargin)) & all;
   r.region = boundsOf(actor.screen, kMargin, view.picture.size()) | mask_box;
   if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
-  const Shaded shaded = shade(actor, r.region, view.camera, light, gloss, sun, thrown_back);
+  const Shaded shaded = lightOn(actor, r.region, view.camera, light, gloss, shade, thrown_back);
   r.nearness = shaded.nearness, r.normal = shaded.normal, r.triangle = shaded.triangle;
   r.clear = clearOf(view.picture(r.region), shaded.glint);
   r.mean_light = mean_light.value_or(shaded.mean);
@@ -260,19 +271,23 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   return r;
 }
 
-std::vector<ShadowMap> sunsOver(const std::vector<View>& views, const Light& light) {
-  std::vector<std::optional<ShadowMap>> maps(views.size());
+std::vector<Shade> shadesIn(const std::vector<View>& views, const Light& light,
+                            const std::vector<SupportPlane>& planes) {
+  std::vector<std::optional<Shade>> found(views.size());
 #pragma omp parallel for schedule(dynamic, 1) if (views.size() > 1)
   for (std::size_t i = 0; i < views.size(); ++i) {
     std::vector<Occluder> occluders;
     for (const Actor& a : views[i].actors)
       occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-    maps[i].emplace(occluders, light.direction.cast<double>(),
-                    ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
+    ShadowMap sun(occluders, light.direction.cast<double>(),
+                  {kShadowMapSide, light.angular_radius, 16});
+    if (planes.empty()) occluders.clear();
+    const Eigen::Vector3d up = planes.empty() ? Eigen::Vector3d::UnitZ() : planes.front().normal;
+    found[i].emplace(Shade{std::move(sun), SkyMap(occluders, up, SkyMap::Params()), &planes});
   }
-  std::vector<ShadowMap> suns;
-  for (std::optional<ShadowMap>& map : maps) suns.push_back(std::move(*map));
-  return suns;
+  std::vector<Shade> shades;
+  for (std::optional<Shade>& shade : found) shades.push_back(std::move(*shade));
+  return shades;
 }
 
 cv::Vec3f meanReflectance(const Reflectance& r) {
@@ -298,7 +313,7 @@ Appearance::Source sourceOf(const SurfaceTexture& texture, int triangle) {
                   : Appearance::Source::kBoth;
 }
 
-Appearance makeAppearance(const std::vector<View>& views, const std::vector<ShadowMap>& suns,
+Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shade>& shades,
                           std::size_t object, bool moves, const Light& light, const Gloss& gloss) {
   Appearance a;
   a.gloss = gloss;
@@ -309,7 +324,7 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
     used.push_back(&views[i]), actors.push_back(&views[i].actors[object]);
   std::vector<Reflectance> pictures(used.size());
   const auto see = [&](std::size_t i, const std::optional<cv::Vec3f>& mean_light) {
-    pictures[i] = reflectanceIn(*used[i], *actors[i], light, gloss, suns[i], mean_light,
+    pictures[i] = reflectanceIn(*used[i], *actors[i], light, gloss, shades[i], mean_light,
                                 a.thrown_back, used.size() == 1);
   };
   a.thrown_back = thrownBack({});
@@ -332,12 +347,13 @@ Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shad
 
 std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<bool>& moves, const Light& light,
-                                        const std::vector<Gloss>& glosses) {
-  const std::vector<ShadowMap> suns = sunsOver(views, light);
+                                        const std::vector<Gloss>& glosses,
+                                        const std::vector<SupportPlane>& planes) {
+  const std::vector<Shade> shades = shadesIn(views, light, planes);
   std::vector<Appearance> appearances(moves.size());
 #pragma omp parallel for schedule(dynamic, 1) if (moves.size() > 1)
   for (std::size_t i = 0; i < moves.size(); ++i)
-    appearances[i] = makeAppearance(views, suns, i, moves[i], light, glosses[i]);
+    appearances[i] = makeAppearance(views, shades, i, moves[i], light, glosses[i]);
   return appearances;
 }
 

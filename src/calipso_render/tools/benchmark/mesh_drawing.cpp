@@ -21,7 +21,8 @@ cv::Mat MeshDrawing::draw(const Points& vertices) const {
   const cv::Rect box = boundsOf(actor.screen, 1, {camera.width, camera.height});
   VisibilityBuffer seen(box);
   seen.draw(actor.screen, 0);
-  const SurfaceMaps maps(actor, prepared_.appearances.front(), prepared_.light.light, sight_.eye());
+  const SurfaceMaps maps(actor, prepared_.appearances.front(), prepared_.light.light, {},
+                         sight_.eye());
   cv::Mat picture = cv::Mat::zeros(camera.height, camera.width, CV_8UC3);
 #pragma omp parallel
   {
