@@ -41,7 +41,8 @@ bool areSame(const cv::Mat& a, const cv::Mat& b) {
 }  // namespace
 
 void ShownPixels::update(const StagedFrame& frame, const SeenPlace& place, const cv::Rect& box) {
-  if (box_ == box && edited_ == frame.edited && at_key_camera_ == frame.at_key_camera &&
+  // From elsewhere the key frame's footprints are seen in other places.
+  if (at_key_camera_ && frame.at_key_camera && box_ == box && edited_ == frame.edited &&
       areSame(labels_, frame.labels(box)))
     return;
   box_ = box, edited_ = frame.edited, at_key_camera_ = frame.at_key_camera;
