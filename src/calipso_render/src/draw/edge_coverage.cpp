@@ -103,8 +103,8 @@ bool isHidden(const VisibilityBuffer& centre, const cv::Point& at, float nearnes
   const cv::Rect& region = centre.region();
   if (cv::Rect(1, 1, region.width - 2, region.height - 2).contains(at)) {
     const float* here = centre.nearness(at.y) + at.x;
-    const float least = std::min({here[0], here[-1], here[1], here[-centre.stride()],
-                                  here[centre.stride()]});
+    const float least =
+        std::min({here[0], here[-1], here[1], here[-centre.stride()], here[centre.stride()]});
     return !EdgeCoverage::isOneSheet(least, nearness);
   }
   for (const cv::Point& to : {cv::Point(0, 0), {-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {

@@ -52,7 +52,9 @@ CALIPSO_INLINE unsigned bitsOf(const EightInts& mask) {
 }
 
 // How many of the first lanes are set. @param mask 0 or -1 in each lane
-CALIPSO_INLINE int leadingLanes(const EightInts& mask) { return __builtin_ctz(bitsOf(~mask) | 256); }
+CALIPSO_INLINE int leadingLanes(const EightInts& mask) {
+  return __builtin_ctz(bitsOf(~mask) | 256);
+}
 
 typedef std::uint8_t EightBytes __attribute__((vector_size(8)));
 

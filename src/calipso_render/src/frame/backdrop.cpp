@@ -40,8 +40,7 @@ CALIPSO_INLINE void findEightFactors(const LightLevels& levels, const cv::Vec3f&
   const auto at = [&](LightLevels::Kind kind) { return eightLevels(levels.of[kind] + i); };
   const Eight sun = at(LightLevels::kSun), sun_before = at(LightLevels::kSunBefore),
               sky = at(LightLevels::kSky), sky_before = at(LightLevels::kSkyBefore),
-              takes = at(LightLevels::kTakes), removed = at(LightLevels::kRemoved),
-              one = all(1.0f);
+              takes = at(LightLevels::kTakes), removed = at(LightLevels::kRemoved), one = all(1.0f);
   eightAt(out.from_plate + i) = removed > 0.0f ? one : at(LightLevels::kRelit) * kPerLevel;
   for (int c = 0; c < 3; ++c) {
     const float umbra = full_umbra[c] * kPerLevel, lit = kPerLevel - umbra;

@@ -36,6 +36,7 @@ CALIPSO_INLINE EightBytes eightChanges(const LightChange& at, float umbra, int i
   return changesOfLight(eightLevels(at.takes + i) > 0.0f ? larger(by, -by) : Eight{});
 }
 
+// The same of `count` pixels.
 CALIPSO_WIDE_LOOPS void findChanges(const LightChange& at, float umbra, int count,
                                     std::uint8_t* out) {
   for (int i = 0; i + 8 <= count; i += 8) {
@@ -47,8 +48,7 @@ CALIPSO_WIDE_LOOPS void findChanges(const LightChange& at, float umbra, int coun
   std::uint8_t rest[5][8] = {};
   const std::uint8_t* const from[] = {at.sun, at.sun_before, at.sky, at.sky_before, at.takes};
   for (int k = 0; k < 5; ++k) std::copy_n(from[k] + done, more, rest[k]);
-  const EightBytes changes =
-      eightChanges({rest[0], rest[1], rest[2], rest[3], rest[4]}, umbra, 0);
+  const EightBytes changes = eightChanges({rest[0], rest[1], rest[2], rest[3], rest[4]}, umbra, 0);
   std::memcpy(out + done, &changes, more);
 }
 
@@ -157,7 +157,7 @@ void PlaceLight::findChange(int v, int from, int to, std::uint8_t* out) const {
   const float umbra = kPerLevel * luminance(frame_.prepared.umbra);
   sun_changes_.visitRow(v, from, to, [&](int begin, int end) {
     findChanges({sun + begin, sun_before + begin, sky + begin, sky_before + begin, takes + begin},
-                   umbra, end - begin, out + begin - from);
+                umbra, end - begin, out + begin - from);
   });
 }
 

@@ -53,8 +53,8 @@ inline std::uint8_t changeOfLight(float by) {
 
 // The same of eight.
 CALIPSO_INLINE EightBytes changesOfLight(const Eight& by) {
-  const Eight t = smaller(
-      larger((by - kSameRatio) * (1.0f / (kPlateRatio - kSameRatio)), Eight{}), all(1.0f));
+  const Eight t =
+      smaller(larger((by - kSameRatio) * (1.0f / (kPlateRatio - kSameRatio)), Eight{}), all(1.0f));
   return lightLevels(t * t * (3.0f - 2.0f * t));
 }
 

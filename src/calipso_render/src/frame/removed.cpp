@@ -69,8 +69,8 @@ void findRemoved(const ShownPixels& shown, const cv::Mat& passing, const cv::Rec
     std::uint8_t* row = out.ptr<std::uint8_t>(v);
     const std::uint8_t *own = shown.own().ptr<std::uint8_t>(v),
                        *stays = shown.others().ptr<std::uint8_t>(v),
-                       *passes = passing.empty() ? own
-                                                 : passing.ptr<std::uint8_t>(v + box.y) + box.x;
+                       *passes =
+                           passing.empty() ? own : passing.ptr<std::uint8_t>(v + box.y) + box.x;
     for (int u = 0; u < box.width; ++u)
       row[u] = (own[u] | passes[u]) & static_cast<std::uint8_t>(~stays[u]);
   }

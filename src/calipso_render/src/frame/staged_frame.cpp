@@ -182,8 +182,8 @@ bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& t
   const auto moved = [&](int i) {  // u, v, 0, 0
     return cv::v_load_low(now[triangle[i]].data()) - cv::v_load_low(then[triangle[i]].data());
   };
-  const cv::v_float32x4 a = moved(0), b = moved(1), c = moved(2), low = cv::v_min(cv::v_min(a, b), c),
-                        high = cv::v_max(cv::v_max(a, b), c);
+  const cv::v_float32x4 a = moved(0), b = moved(1), c = moved(2),
+                        low = cv::v_min(cv::v_min(a, b), c), high = cv::v_max(cv::v_max(a, b), c);
   return cv::v_check_all((low < cv::v_setall_f32(px)) & (high > cv::v_setall_f32(-px)));
 }
 

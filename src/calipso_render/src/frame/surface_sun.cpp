@@ -212,7 +212,8 @@ void SurfaceSun::onStretch(int v, int first, int last, int slot, Row& row) const
                 rise = between(a[1].nearness, b[1].nearness) - from;
     *reinterpret_cast<Four*>(run.sun + k) = sun + parts * sun_rise;
     // Another piece of the surface can look out between the corners.
-    const Four here = fourAt(run.nearness + k), off = here - (from + parts * rise), most = tolerance * here;
+    const Four here = fourAt(run.nearness + k), off = here - (from + parts * rise),
+               most = tolerance * here;
     const FourInts other = (off > most) | (-off > most);
     if (!any(other)) continue;
     for (int i = begin; i < end; ++i) {
