@@ -161,6 +161,40 @@ TEST(PlaceRelief, APlaneIsLeftToWhatRisesAboveIt) {
   EXPECT_EQ(surfaces.label.at<std::uint8_t>(92, 140), PlaceSurfaces::kUnknown);
 }
 
+// A pillar with a rough face, 4 m away, before whose foot an object is.
+TEST(PlaceRelief, WhatStandsOnAPlaneEndsThere) {
+  Room room;
+  for (int v = 40; v < 90; ++v) {
+    for (int u = 60; u < 95; ++u)
+      room.scenery.at<float>(v, u) =
+          0.25f * (1.1f + 0.1f * std::sin(0.5f * v) * std::sin(0.4f * u));
+  }
+  room.depth = 1.0f / room.scenery;
+  const cv::Rect object(40, 76, 75, 44);
+  room.scenery(object) = 0.0f, room.labels.setTo(0), room.labels(object) = 1;
+  room.depth(object) = 1.5f;
+  const PlaceSurfaces surfaces = room.surfaces();
+  ASSERT_EQ(surfaces.label.at<std::uint8_t>(70, 78), PlaceSurfaces::kCurved);
+  EXPECT_EQ(surfaces.label.at<std::uint8_t>(80, 78), PlaceSurfaces::kUnknown);
+  EXPECT_EQ(surfaces.label.at<std::uint8_t>(94, 78), 1);  // nearer than the pillar is its floor
+}
+
+// A rough bowl of which little is seen, but on all sides of what lies in it.
+TEST(PlaceRelief, APlaneIsNotSeenWithinWhatStandsOnIt) {
+  Room room;
+  const cv::Rect bowl(50, 70, 60, 36), object(54, 74, 52, 28);
+  for (int v = bowl.y; v < bowl.br().y; ++v) {
+    for (int u = bowl.x; u < bowl.br().x; ++u)
+      room.scenery.at<float>(v, u) = static_cast<float>(camera().ray(0, v).y()) + 0.12f +
+                                     0.08f * std::sin(0.9f * v) * std::sin(0.8f * u);
+  }
+  room.depth = 1.0f / room.scenery;
+  room.scenery(object) = 0.0f, room.labels.setTo(0), room.labels(object) = 1;
+  room.depth(object) = 1.5f;
+  const PlaceSurfaces surfaces = room.surfaces();
+  EXPECT_EQ(cv::countNonZero(surfaces.label(object) == 1), 0);
+}
+
 TEST(PlaceRelief, ASupportPlaneIsNotSeenBeyondItsEnds) {
   const Room room;
   std::vector<SupportPlane> planes = floorPlane();

@@ -27,8 +27,8 @@ constexpr float kSameSurface = 0.05f;  // of the nearness within it
 // times that a pixel of a support plane is as near as the farthest beside it, from which on so
 // little of the plane is left up to the horizon that what stands on it may hide it
 constexpr float kAtHorizon = 1.05f;
-constexpr int kRises =
-    13;  // px of the squares of a support plane, and of what rises above it, that tell
+// px of the squares of a support plane, and of what rises above it, that tell
+constexpr int kOnSide = 13, kRisesSide = 3;
 
 constexpr int kNoPlane = -1;
 
@@ -261,23 +261,33 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
   }
 }
 
-// A support plane is not seen behind an object where things that rise above it (a bank, a rock) are
-// seen nearer by than it is: they hide it, or may.
+// A support plane is not seen behind an object where things that rise above it (a bank, a rock, a
+// bowl) are seen nearer by than it is: they hide it, or may, unless they would be beneath it if they
+// went on there as near as around.
 // @param seen planesSeen()
 void leaveToWhatRises(const cv::Mat& scenery, const std::vector<Extent>& planes,
                       const cv::Mat& seen, PlaceSurfaces& surfaces) {
-  const cv::Mat hidden = scenery == 0.0f, square = cv::Mat::ones(kRises, kRises, CV_8U);
+  const auto pieces = [](const cv::Mat& mask, int side) {
+    cv::Mat opened;
+    cv::morphologyEx(mask, opened, cv::MORPH_OPEN, cv::Mat::ones(side, side, CV_8U), {-1, -1}, 1,
+                     cv::BORDER_REPLICATE);
+    return opened;
+  };
+  const cv::Mat hidden = scenery == 0.0f;
   for (int k = 0; k < surfaces.supports; ++k) {
-    cv::Mat on, rises, to_on, to_rises;
-    cv::morphologyEx(seen == k, on, cv::MORPH_OPEN, square, {-1, -1}, 1, cv::BORDER_REPLICATE);
-    rises = (surfaces.label == PlaceSurfaces::kCurved) &
-            (scenery > (1.0f + kOffSupport) * planes[k].nearness);
-    cv::morphologyEx(rises, rises, cv::MORPH_OPEN, square, {-1, -1}, 1, cv::BORDER_REPLICATE);
+    const cv::Mat& plane = planes[k].nearness;
+    const cv::Mat on = pieces(seen == k, kOnSide),
+                  rises = pieces((surfaces.label == PlaceSurfaces::kCurved) &
+                                     (scenery > (1.0f + kOffSupport) * plane),
+                                 kRisesSide);
     if (cv::countNonZero(on) == 0 || cv::countNonZero(rises) == 0) continue;
+    cv::Mat to_on, to_rises, weight;
     cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
     cv::distanceTransform(rises == 0, to_rises, cv::DIST_L2, cv::DIST_MASK_5);
-    surfaces.label.setTo(PlaceSurfaces::kUnknown,
-                         hidden & (surfaces.label == k + 1) & (to_rises < to_on));
+    rises.convertTo(weight, CV_32F, 1.0 / 255.0);
+    surfaces.label.setTo(PlaceSurfaces::kUnknown, hidden & (surfaces.label == k + 1) &
+                                                      (to_rises < to_on) &
+                                                      (pushPull(scenery, weight) > plane));
   }
 }
 
