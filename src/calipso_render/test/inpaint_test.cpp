@@ -256,14 +256,14 @@ TEST(PatchOrigins, DoNotDependOnTheNumberOfThreads) {
 }
 
 // So little of it that coarser levels have no patch of it to begin with.
-TEST(PatchOrigins, ComeFromAPlaneOfWhichLittleIsSeen) {
+TEST(PatchOrigins, ComeFromASurfaceOfWhichLittleIsSeen) {
   const cv::Rect strip(110, 60, 24, 112), hidden(90, 40, 80, 110);
   cv::Mat image = spots(256, 172), surface(172, 256, CV_8U, cv::Scalar(1)),
           hole = cv::Mat::zeros(172, 256, CV_8U);
   image(strip) = 0.5 * image(strip);
   surface(strip) = 2, hole(hidden) = 255;
   InpaintParams params;
-  params.surface = surface, params.planes.resize(2);
+  params.surface = surface;
   const cv::Mat origin = patchOrigins(image, hole, hole == 0, nullptr, params);
   int elsewhere = 0;
   for (int v = 63; v < 147; ++v) {

@@ -48,16 +48,15 @@ float PatchCost::distance(const cv::Mat& image, const cv::Point& p, const cv::Po
 }
 
 float PatchCost::partialDistance(const cv::Mat& image, const cv::Point& p, const cv::Point& q,
-                                 const std::vector<cv::Point>& seen, float bound) const {
+                                 const std::vector<int>& seen, float bound) const {
   using Pixel = Eigen::Map<const Eigen::Array4f>;
   const float away = awayCost(p, q), part = static_cast<float>(kPatchSide * kPatchSide) /
                                             std::max<std::size_t>(1, seen.size());
+  const float *a = image.ptr<float>(p.y, p.x), *b = image.ptr<float>(q.y, q.x);
   Eigen::Array4f sums = Eigen::Array4f::Zero();
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (i % kPatchSide == 0 && part * sums.sum() + away >= bound) return bound;
-    const Eigen::Array4f difference =
-        Pixel(image.at<cv::Vec4f>(p + seen[i]).val) - Pixel(image.at<cv::Vec4f>(q + seen[i]).val);
-    sums += difference.square();
+    sums += (Pixel(a + seen[i]) - Pixel(b + seen[i])).square();
   }
   return part * sums.sum() + away;
 }

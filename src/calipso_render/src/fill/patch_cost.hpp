@@ -27,9 +27,9 @@ class PatchCost {
 
   // No less than `bound` if it is not below. @param image CV_32FC4
   float distance(const cv::Mat& image, const cv::Point& p, const cv::Point& q, float bound) const;
-  // By a part of the patch, `seen` from its middle.
+  // By a part of the patch: `seen`, in floats of the image from its middle.
   float partialDistance(const cv::Mat& image, const cv::Point& p, const cv::Point& q,
-                        const std::vector<cv::Point>& seen, float bound) const;
+                        const std::vector<int>& seen, float bound) const;
 
   // The place nearest to q from which p can be copied by a shift of the lattice; q without one.
   cv::Point onLattice(const cv::Point& p, const cv::Point& q) const;

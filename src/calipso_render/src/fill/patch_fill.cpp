@@ -14,8 +14,9 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kBandRows = 16;       // rows that one thread searches in order
-constexpr int kFirstGuesses = 200;  // places tried for a patch of the rim
+constexpr int kBandRows = 16;  // rows that one thread searches in order
+// places tried for a patch of the rim, and where more than the rim has been filled before
+constexpr int kFirstGuesses = 200, kGuessesAnew = 40;
 // px around the best place in which levels, and the finest, look further
 constexpr int kFarthest = 16, kFinest = 2;
 constexpr int kSweeps = 2;  // of a search
@@ -49,9 +50,7 @@ class Filling {
     cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
     cv::findNonZero(whole_, sources_);
     for (const cv::Point& q : sources_) {
-      const int surface = rules_.surfaceAt(q);
-      if (0 < surface && surface <= static_cast<int>(params_.planes.size()))
-        on_plane_[surface].push_back(q);
+      if (rules_.surfaceAt(q) != 0) of_surface_[rules_.surfaceAt(q)].push_back(q);
     }
     cv::dilate(hole_, touched, patch);
     for (int v = kPatchRadius; v + kPatchRadius < hole_.rows; ++v) {
@@ -110,8 +109,8 @@ class Filling {
       copy();
   }
 
-  // Peels anew what was led off its plane for want of it: coarser levels have fewer whole patches,
-  // and finer ones look no farther than around what those found.
+  // Peels anew what was led off its surface for want of it: coarser levels have fewer whole
+  // patches, and finer ones look no farther than around what those found.
   void peelMisled() {
     cv::Mat misled = cv::Mat::zeros(hole_.size(), CV_8U);
     for (int v = 0; v < hole_.rows; ++v) {
@@ -120,9 +119,9 @@ class Filling {
           misled.at<std::uint8_t>(v, u) = 255;
       }
     }
-    along_planes_ = true;
+    along_surfaces_ = true;
     peel(misled);
-    along_planes_ = false;
+    along_surfaces_ = false;
   }
 
   // @param reach px around the best place found so far in which others are tried
@@ -130,7 +129,7 @@ class Filling {
   float search(int reach) {
     std::vector<int> changes(bands_.size(), 0);
     forEachPatch([&](const cv::Point& p) {
-      if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(anySource(p, 0));
+      if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(oneOf(sources_, p, 0));
       cost_.at<float>(p) = rules_.distance(image_, p, match(p), 1e30f);
       plain_.at<std::uint8_t>(p) = 255;
     });
@@ -203,14 +202,16 @@ class Filling {
     return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
   }
   bool isWhole(const cv::Point& p) const { return inside(p) && whole_.at<std::uint8_t>(p) != 0; }
-  cv::Point anySource(const cv::Point& p, int salt) const {
-    const auto own = on_plane_.find(rules_.surfaceAt(p));
-    const std::vector<cv::Point>& from =
-        along_planes_ && own != on_plane_.end() ? own->second : sources_;
+  // Where a place may be copied from.
+  const std::vector<cv::Point>& sourcesOf(const cv::Point& p) const {
+    const auto own = along_surfaces_ ? of_surface_.find(rules_.surfaceAt(p)) : of_surface_.end();
+    return own != of_surface_.end() ? own->second : sources_;
+  }
+  cv::Point oneOf(const std::vector<cv::Point>& from, const cv::Point& p, int salt) const {
     return from[random(p, salt) % from.size()];
   }
   bool isMisled(const cv::Point& p) const {
-    return hasMatch(p) && on_plane_.count(rules_.surfaceAt(p)) > 0 && rules_.onOther(p, match(p));
+    return hasMatch(p) && rules_.onOther(p, match(p)) && of_surface_.count(rules_.surfaceAt(p)) > 0;
   }
 
   // The nearest centre of a patch that lies within the picture.
@@ -259,7 +260,7 @@ class Filling {
 
   // A patch of the rim, the best place found for it and what that costs.
   struct Guess {
-    std::vector<cv::Point> seen;  // what is known of it, from its middle
+    std::vector<int> seen;  // what is known of it, as PatchCost counts it
     cv::Point best;
     float least;
     std::vector<cv::Point> tried;  // its neighbours mostly lead to the same few places
@@ -274,9 +275,11 @@ class Filling {
 
   // Among places all over the picture.
   Guess firstGuess(const cv::Point& p, const cv::Mat& known) const {
-    Guess guess{knownAround(p, known), anySource(p, 0), 0.0f, {}};
+    const std::vector<cv::Point>& from = sourcesOf(p);
+    Guess guess{knownAround(p, known), oneOf(from, p, 0), 0.0f, {}};
     guess.least = rules_.partialDistance(image_, p, guess.best, guess.seen, 1e30f);
-    for (int i = 1; i < kFirstGuesses; ++i) attempt(p, anySource(p, i), guess);
+    const int guesses = along_surfaces_ ? kGuessesAnew : kFirstGuesses;
+    for (int i = 1; i < guesses; ++i) attempt(p, oneOf(from, p, i), guess);
     return guess;
   }
 
@@ -299,12 +302,14 @@ class Filling {
     to_.at<cv::Vec2s>(p) = shorts(guess.best);
   }
 
-  // What is known of the patch around a place, from it.
-  static std::vector<cv::Point> knownAround(const cv::Point& p, const cv::Mat& known) {
-    std::vector<cv::Point> seen;
+  // What is known of the patch around a place.
+  std::vector<int> knownAround(const cv::Point& p, const cv::Mat& known) const {
+    const int row = static_cast<int>(image_.step1());
+    std::vector<int> seen;
     for (int dv = -kPatchRadius; dv <= kPatchRadius; ++dv) {
       for (int du = -kPatchRadius; du <= kPatchRadius; ++du) {
-        if (known.at<std::uint8_t>(p + cv::Point(du, dv)) != 0) seen.push_back({du, dv});
+        if (known.at<std::uint8_t>(p + cv::Point(du, dv)) != 0)
+          seen.push_back(dv * row + du * image_.channels());
       }
     }
     return seen;
@@ -346,8 +351,8 @@ class Filling {
   cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   std::vector<cv::Point> sources_;
-  std::map<int, std::vector<cv::Point>> on_plane_;  // of them those on every plane
-  bool along_planes_ = false;                       // a plane's first guesses lie on it
+  std::map<int, std::vector<cv::Point>> of_surface_;  // of them those on each
+  bool along_surfaces_ = false;                       // a place's first guesses lie on its own
   int sweep_ = 0;
 };
 
