@@ -260,7 +260,8 @@ TEST(Appearance, TakesOffTheGroundAsShadedAsItIs) {
             {makeActor(surface, surface.key_vertices, camera())}};
   const Actor& actor = view.actors.front();
   const std::vector<Occluder> occluders = {{&actor.vertices, &surface.triangles, surface.winding}};
-  const Light light = sunlight();
+  Light light = sunlight();  // from behind: the shadow lies before the ball
+  light.direction = Eigen::Vector3f(0.1f, 0.7f, 0.7f).normalized();
   const ShadowMap sun(occluders, light.direction.cast<double>(), ShadowMap::Params());
   const SkyMap sky(occluders, Eigen::Vector3d::UnitZ(), SkyMap::Params());
   const ShadedGround ground(table(), light, {&sun}, sky);
@@ -286,7 +287,9 @@ TEST(Appearance, TakesOffTheGroundAsShadedAsItIs) {
     double sum = 0.0;
     int count = 0;
     forEachPixelOf(actor, [&](int u, int v, const SurfacePoint& p) {
-      if (inside.at<std::uint8_t>(v, u) == 0 || lit.at<float>(v, u) > 0.5f) return;
+      if (inside.at<std::uint8_t>(v, u) == 0 || lit.at<float>(v, u) > 0.5f ||
+          p.normal.dot(light.direction) > 0.0f)
+        return;
       const cv::Vec3f diffuse = diffuseShading(light, p.normal, 1.0f, p.seen, {});
       const float floor = lightFloor(a.mean_light)[0];
       const cv::Vec4f& found = a.albedo.at<cv::Vec4f>(v - a.region.y, u - a.region.x);
@@ -295,7 +298,7 @@ TEST(Appearance, TakesOffTheGroundAsShadedAsItIs) {
     EXPECT_GT(count, 30);
     return sum / count;
   };
-  EXPECT_LT(error(table()), 0.04);
+  EXPECT_LT(error(table()), 0.08);  // weak light's reflectance is mixed with that around
   EXPECT_GT(error({}), 0.15);
 }
 
