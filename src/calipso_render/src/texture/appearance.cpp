@@ -195,16 +195,17 @@ cv::Mat fallOf(const cv::Mat& values, const cv::Mat& where) {
   return 1.0f - least / cv::max(most, kDarkest);
 }
 
-// Trust where light steps, at the edge of a cast shadow or at a crease: a fit that is off by a pixel
-// there divides the picture by the light beside.
-void lowerAtSteps(const Shaded& s, cv::Mat& trust) {
+// Trust where light steps, at the edge of a cast shadow or at a crease, and the reflectance does, too:
+// a fit that is off by a pixel divides the picture by the light beside.
+void lowerAtSteps(const Shaded& s, Reflectance& r) {
   const cv::Mat seen = s.triangle >= 0;
   cv::Mat light = cv::Mat::zeros(seen.size(), CV_32F), openness = light.clone(),
-          creased = cv::Mat::zeros(seen.size(), CV_8U);
+          albedo = light.clone(), creased = cv::Mat::zeros(seen.size(), CV_8U);
   for (int v = 0; v < light.rows; ++v) {
     for (int u = 0; u < light.cols; ++u) {
       if (seen.at<std::uint8_t>(v, u) == 0) continue;
       light.at<float>(v, u) = luminance(s.light.at<cv::Vec3f>(v, u));
+      albedo.at<float>(v, u) = luminance(r.albedo.at<cv::Vec3f>(v, u));
       openness.at<float>(v, u) =
           light.at<float>(v, u) / std::max(kDarkest, luminance(s.open.at<cv::Vec3f>(v, u)));
       for (const cv::Point q : {cv::Point(u + 1, v), cv::Point(u, v + 1)}) {
@@ -214,17 +215,19 @@ void lowerAtSteps(const Shaded& s, cv::Mat& trust) {
       }
     }
   }
-  const cv::Mat shade = fallOf(openness, seen), turn = fallOf(light, seen);
+  const cv::Mat shade = fallOf(openness, seen), turn = fallOf(light, seen),
+                change = fallOf(albedo, seen);
   cv::Mat steady(seen.size(), CV_32F);
   for (int v = 0; v < steady.rows; ++v) {
     for (int u = 0; u < steady.cols; ++u) {
       const float fall = std::max(
           shade.at<float>(v, u), creased.at<std::uint8_t>(v, u) != 0 ? turn.at<float>(v, u) : 0.0f);
-      steady.at<float>(v, u) = 1.0f - (1.0f - kLeastAtStep) * smoothStep(kStep, kWholeStep, fall);
+      steady.at<float>(v, u) =
+          1.0f - (1.0f - kLeastAtStep) *
+                     smoothStep(kStep, kWholeStep, std::min(fall, change.at<float>(v, u)));
     }
   }
-  cv::erode(steady, steady, cv::Mat::ones(3, 3, CV_8U));
-  trust = trust.mul(steady);
+  r.trust = r.trust.mul(steady);
 }
 
 // @param mean_light that of the key frame, where there is one; alone no other view shows the object
@@ -266,7 +269,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   }
   lowerBesideJumps(shaded, view.camera,
                    kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
-  if (alone) lowerAtSteps(shaded, r.trust);
+  if (alone) lowerAtSteps(shaded, r);
   takeOutFalseShade({shaded.light, shaded.open, r.trust}, floor, r.albedo);
   return r;
 }
