@@ -54,8 +54,9 @@ std::vector<SurfaceMaps> SurfaceShader::findMaps(const ShadedGround& ground) con
     const bool seen =
         object.edited ||
         !(boundsOf(object.actor.screen, 0, frame_.input.bgr.size()) & region_).empty();
+    const bool mirrors = object.gloss.around > 0.0f;
     maps.push_back(seen ? SurfaceMaps(object.actor, appearanceOf(static_cast<int>(slot)),
-                                      frame_.light, ground, frame_.eye)
+                                      frame_.light, mirrors ? ground : ShadedGround(), frame_.eye)
                         : SurfaceMaps());
   }
   return maps;
