@@ -173,8 +173,10 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.light = lightOf(light_views, seen, any_moves, params, p);
   const ShadowMap sun = sunOver(actors, p.light.light);
   const SkyMap sky = skyOver(actors, params);
-  p.appearances = makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()),
-                                  params.planes);
+  // Where no cast shadow tells the light, the objects' shade on the ground may be another.
+  p.appearances =
+      makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()),
+                      p.light.from_shadows ? params.planes : std::vector<SupportPlane>());
   p.appearance_ms = watch.lap();
   for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
   p.fronts = frontsOf(p, params);

@@ -54,7 +54,7 @@ std::vector<SurfaceMaps> SurfaceShader::findMaps(const ShadedGround& ground) con
     const bool seen =
         object.edited ||
         !(boundsOf(object.actor.screen, 0, frame_.input.bgr.size()) & region_).empty();
-    const bool mirrors = object.gloss.around > 0.0f;
+    const bool mirrors = object.gloss.around > 0.0f && frame_.prepared.light.from_shadows;
     maps.push_back(seen ? SurfaceMaps(object.actor, appearanceOf(static_cast<int>(slot)),
                                       frame_.light, mirrors ? ground : ShadedGround(), frame_.eye)
                         : SurfaceMaps());
