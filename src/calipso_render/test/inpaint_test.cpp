@@ -112,6 +112,20 @@ TEST(BridgeLines, ConnectALineThatIsSeenFromAfar) {
   EXPECT_NE(b.core.at<std::uint8_t>(96, 150), 0);
 }
 
+// What is hidden where a line ends at the hole has nothing to say about it.
+TEST(BridgeLines, DrawNothingThatIsHidden) {
+  for (const int v : {70, 80, 90, 100}) {
+    Lines l;
+    l.line({0, v}, {319, v + 35}, 230);
+    const LineBridges b = l.bridge();
+    double darkest;
+    cv::Mat green;
+    cv::extractChannel(l.image, green, 1);
+    cv::minMaxLoc(green, &darkest, nullptr, nullptr, nullptr, b.drawn);
+    EXPECT_GT(darkest, 140.0) << v;  // the grain, 12.8 around 156
+  }
+}
+
 TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
   Lines l;
   l.line({0, 90}, {319, 90});

@@ -224,7 +224,7 @@ class Bridger {
   void drawPixel(const Bridge& b, const cv::Mat& known, const cv::Point& at, float t, float s) {
     const cv::Point2f from = mirrored(*b.from, t, s);
     if (!isSet(source_, from)) return;
-    cv::Vec3f colour = sampleLinear(known, from);
+    cv::Vec3f colour = sampleSeen(known, source_, from);
     cv::Point2f origin = from;
     if (b.to != nullptr) {
       const cv::Point2f other = mirrored(*b.to, b.gap - t, -s);
@@ -234,7 +234,7 @@ class Bridger {
       const float part = t / b.gap,
                   share = std::clamp(0.5f + (t - 0.5f * b.gap) / (2.0f * kCrossFade), 0.0f, 1.0f);
       colour = (1.0f - share) * (colour + part * difference) +
-               share * (sampleLinear(known, other) - (1.0f - part) * difference);
+               share * (sampleSeen(known, source_, other) - (1.0f - part) * difference);
       if (share > 0.5f) origin = other;
     }
     image_.at<cv::Vec3f>(at) = colour;

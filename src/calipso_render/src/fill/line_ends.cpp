@@ -121,8 +121,8 @@ class LineEndFinder {
         const cv::Point2f p =
             end.at - static_cast<float>(t) * end.into + static_cast<float>(s) * leftOf(end.into);
         if (!isSet(source_, p)) continue;
-        const float weight =
-            std::max(0.0f, rms(sampleLinear(image_, p) - around) - kLineItself * end.contrast);
+        const cv::Vec3f c = sampleSeen(image_, source_, p);
+        const float weight = std::max(0.0f, rms(c - around) - kLineItself * end.contrast);
         sum += static_cast<float>(s) * weight, weights += weight;
       }
     }
@@ -139,7 +139,7 @@ class LineEndFinder {
       for (int t = kFirst; t <= kLast; ++t) {
         const cv::Point2f p =
             end.at - static_cast<float>(t) * end.into + static_cast<float>(s) * leftOf(end.into);
-        if (isSet(source_, p)) sum += sampleLinear(image_, p), ++count;
+        if (isSet(source_, p)) sum += sampleSeen(image_, source_, p), ++count;
       }
       if (2 * count < kLast - kFirst) return false;
       const cv::Vec3f mean = sum / count;
@@ -161,7 +161,7 @@ class LineEndFinder {
             end.at - static_cast<float>(t) * end.into + static_cast<float>(s) * leftOf(end.into);
         if (!isSet(source_, p)) return static_cast<float>(t);
         sums[s < 0 ? 0 : 1] +=
-            rms(sampleLinear(image_, p) - end.profile[s + kLineHalf]) / kLineHalf;
+            rms(sampleSeen(image_, source_, p) - end.profile[s + kLineHalf]) / kLineHalf;
       }
       if (std::max(sums[0], sums[1]) > kSame * end.contrast) return static_cast<float>(t);
     }
@@ -179,7 +179,7 @@ class LineEndFinder {
           const cv::Point2f p = end.at - static_cast<float>(t) * end.into +
                                 static_cast<float>(side == 0 ? -s : s) * leftOf(end.into);
           if (!isSet(source_, p)) continue;
-          const cv::Vec3f c = sampleLinear(image_, p);
+          const cv::Vec3f c = sampleSeen(image_, source_, p);
           sum += c, squares += c.dot(c), ++count;
         }
       }
@@ -221,7 +221,7 @@ bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,
           const cv::Point2f p = end.at + shift - static_cast<float>(t) * end.into +
                                 static_cast<float>(s) * leftOf(end.into);
           if (isSet(source, p))
-            sum += rms(sampleLinear(image, p) - end.profile[s + kLineHalf]), ++count;
+            sum += rms(sampleSeen(image, source, p) - end.profile[s + kLineHalf]), ++count;
         }
       }
       if (2 * count < (kLast - kFirst) * (2 * kLineHalf + 1)) continue;
@@ -238,13 +238,20 @@ bool isSet(const cv::Mat& mask, const cv::Point2f& p) {
          mask.at<std::uint8_t>(cvRound(p.y), cvRound(p.x)) != 0;
 }
 
-cv::Vec3f sampleLinear(const cv::Mat& image, const cv::Point2f& p) {
+cv::Vec3f sampleSeen(const cv::Mat& image, const cv::Mat& seen, const cv::Point2f& p) {
   const int x = std::clamp(static_cast<int>(std::floor(p.x)), 0, image.cols - 2),
             y = std::clamp(static_cast<int>(std::floor(p.y)), 0, image.rows - 2);
   const float a = std::clamp(p.x - x, 0.0f, 1.0f), b = std::clamp(p.y - y, 0.0f, 1.0f);
-  const cv::Vec3f *upper = image.ptr<cv::Vec3f>(y) + x, *lower = image.ptr<cv::Vec3f>(y + 1) + x;
-  return (1.0f - b) * ((1.0f - a) * upper[0] + a * upper[1]) +
-         b * ((1.0f - a) * lower[0] + a * lower[1]);
+  cv::Vec3f sum;
+  float total = 0.0f;
+  for (const int i : {0, 1}) {
+    for (const int j : {0, 1}) {
+      if (seen.at<std::uint8_t>(y + i, x + j) == 0) continue;
+      const float weight = (i == 0 ? 1.0f - b : b) * (j == 0 ? 1.0f - a : a);
+      sum += weight * image.at<cv::Vec3f>(y + i, x + j), total += weight;
+    }
+  }
+  return sum / total;
 }
 
 }  // namespace calipso::render

@@ -39,7 +39,7 @@ float rms(const cv::Vec3f& c);
 // Is the pixel nearest to p set in a mask?
 bool isSet(const cv::Mat& mask, const cv::Point2f& p);
 
-// Bilinear. @param image CV_32FC3
-cv::Vec3f sampleLinear(const cv::Mat& image, const cv::Point2f& p);
+// Bilinear, of those around p that are seen. @pre isSet(seen, p) @param image CV_32FC3
+cv::Vec3f sampleSeen(const cv::Mat& image, const cv::Mat& seen, const cv::Point2f& p);
 
 }  // namespace calipso::render
