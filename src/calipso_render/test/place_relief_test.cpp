@@ -195,6 +195,28 @@ TEST(PlaceRelief, APlaneIsNotSeenWithinWhatStandsOnIt) {
   EXPECT_EQ(cv::countNonZero(surfaces.label(object) == 1), 0);
 }
 
+// A bush before an object says nothing of what is behind that.
+TEST(PlaceRelief, APlaneGoesOnBehindAnObjectThatABushStandsBefore) {
+  Room room;
+  const cv::Rect object(60, 62, 40, 32), bush(64, 84, 32, 20);
+  for (int v = 0; v < kHigh; ++v) {
+    for (int u = 0; u < kWide; ++u) {
+      room.scenery.at<float>(v, u) =
+          bush.contains({u, v}) ? 0.4f + 0.04f * std::sin(0.9f * v) * std::sin(0.8f * u)
+                                : std::max(0.02f, static_cast<float>(camera().ray(0, v).y()));
+    }
+  }
+  room.depth = 1.0f / room.scenery, room.labels.setTo(0);
+  for (int v = object.y; v < bush.y; ++v) {
+    for (int u = object.x; u < object.br().x; ++u)
+      room.scenery.at<float>(v, u) = 0.0f, room.depth.at<float>(v, u) = 3.3f,
+      room.labels.at<std::uint8_t>(v, u) = 1;
+  }
+  const PlaceSurfaces surfaces = room.surfaces();
+  ASSERT_EQ(surfaces.label.at<std::uint8_t>(94, 80), PlaceSurfaces::kCurved);
+  EXPECT_EQ(surfaces.label.at<std::uint8_t>(80, 80), 1);
+}
+
 TEST(PlaceRelief, ASupportPlaneIsNotSeenBeyondItsEnds) {
   const Room room;
   std::vector<SupportPlane> planes = floorPlane();

@@ -261,12 +261,38 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
   }
 }
 
+// Where the depth image shows something nearer than the object beside it in the picture: it stands
+// before that and does not go on behind it.
+cv::Mat beforeObjects(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels) {
+  const cv::Mat object = (labels != 0) & (depth > 0.0f);
+  cv::Mat before = cv::Mat::zeros(scenery.size(), CV_8U);
+  if (cv::countNonZero(object) == 0) return before;
+  cv::Mat away, nearest;
+  cv::distanceTransform(object == 0, away, nearest, cv::DIST_L2, cv::DIST_MASK_5,
+                        cv::DIST_LABEL_PIXEL);
+  std::vector<float> nearness(cv::countNonZero(object) + 1, 0.0f);  // of every object's pixel
+  for (int v = 0; v < object.rows; ++v) {
+    for (int u = 0; u < object.cols; ++u) {
+      if (object.at<std::uint8_t>(v, u) != 0)
+        nearness[nearest.at<int>(v, u)] = 1.0f / depth.at<float>(v, u);
+    }
+  }
+  for (int v = 0; v < object.rows; ++v) {
+    for (int u = 0; u < object.cols; ++u) {
+      if (scenery.at<float>(v, u) > kBehind * nearness[nearest.at<int>(v, u)])
+        before.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return before;
+}
+
 // A support plane is not seen behind an object where things that rise above it (a bank, a rock, a
 // bowl) are seen nearer by than it is: they hide it, or may, unless they would be beneath it if they
-// went on there as near as around.
-// @param seen planesSeen()
-void leaveToWhatRises(const cv::Mat& scenery, const std::vector<Extent>& planes,
-                      const cv::Mat& seen, PlaceSurfaces& surfaces) {
+// went on there as near as around, or stand before the object.
+// @param before beforeObjects() @param seen planesSeen()
+void leaveToWhatRises(const cv::Mat& scenery, const cv::Mat& before,
+                      const std::vector<Extent>& planes, const cv::Mat& seen,
+                      PlaceSurfaces& surfaces) {
   const auto pieces = [](const cv::Mat& mask, int side) {
     cv::Mat opened;
     cv::morphologyEx(mask, opened, cv::MORPH_OPEN, cv::Mat::ones(side, side, CV_8U), {-1, -1}, 1,
@@ -277,7 +303,7 @@ void leaveToWhatRises(const cv::Mat& scenery, const std::vector<Extent>& planes,
   for (int k = 0; k < surfaces.supports; ++k) {
     const cv::Mat& plane = planes[k].nearness;
     const cv::Mat on = pieces(seen == k, kOnSide),
-                  rises = pieces((surfaces.label == PlaceSurfaces::kCurved) &
+                  rises = pieces((surfaces.label == PlaceSurfaces::kCurved) & ~before &
                                      (scenery > (1.0f + kOffSupport) * plane),
                                  kRisesSide);
     if (cv::countNonZero(on) == 0 || cv::countNonZero(rises) == 0) continue;
@@ -373,7 +399,7 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
         label = PlaceSurfaces::kCurved, setAt(u, v, seen, curved->normal(camera), camera, surfaces);
     }
   }
-  leaveToWhatRises(scenery, extents, seen_planes, surfaces);
+  leaveToWhatRises(scenery, beforeObjects(scenery, depth, labels), extents, seen_planes, surfaces);
   surfaces.alike = alikeOf(scenery, (labels != 0) | (depth > 0.0f), extents, surfaces);
   surfaces.sky = cv::Mat::zeros(scenery.size(), CV_8U);
   surfaces.sky.setTo(InpaintParams::kSky, nothing);
