@@ -82,6 +82,29 @@ TEST(PassingShade, IsTakenOffWhereItLiesInAllFramesButOne) {
   EXPECT_GT(shaded, 100);
 }
 
+// Up to 7 px beside the predicted shadow a frame may show it or not.
+TEST(PassingShade, IsTakenOffWhereTheOneLitFrameShowsItBesideThePlace) {
+  std::vector<Eigen::Vector3d> places(6, kTo);
+  places[0] = kTo + Eigen::Vector3d(0.03, 0.0, 0.0);
+  const Clip clip = ballAlong(places);
+  const std::vector<bool> moves = {true};
+  Background b = seenBackground(clip.frames, true);
+  leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, {}, b);
+  int came_to_light = 0, dark = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = clip.receiver(u, v);
+      if (!r || b.count.at<std::uint8_t>(v, u) < 6 || !isInShadow(r->position, kTo) ||
+          isInShadow(r->position, places[0]))
+        continue;
+      ++came_to_light;
+      dark += b.plate.at<cv::Vec3f>(v, u)[2] < tableColour(u, v)[2] - 0.5f;
+    }
+  }
+  EXPECT_GT(came_to_light, 50);
+  EXPECT_LT(4 * dark, came_to_light);  // shade is predicted once for 2 x 2 pixels
+}
+
 TEST(PassingShade, StaysWhereNoFrameShowsThePlaceWithoutIt) {
   const Clip clip = ballAlong({kTo, kTo + Eigen::Vector3d(0.01, 0.0, 0.0), kTo});
   const std::vector<bool> moves = {true};

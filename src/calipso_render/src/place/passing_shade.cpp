@@ -130,6 +130,16 @@ void brighten(const Lighting& now, const Sorter& sorter, std::size_t frame, Ligh
   }
 }
 
+// Within the prediction's error the values tell what is lit: what differs from the shaded ones as
+// shade does.
+Samples litAmong(const Samples& near, const Samples& core, double step) {
+  Samples lit;
+  for (const cv::Vec3b& c : near) {
+    if (!core.empty() && shadedAgainst({c}, core, step)) lit.push_back(c);
+  }
+  return lit;
+}
+
 // Takes the shaded frames out of a plate's median. @return CV_8UC1: 255 where no frame is lit
 cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& background) {
   const cv::Size size = background.plate.size();
@@ -141,6 +151,7 @@ cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& backgrou
       Sorted s = sorter.at(u, v);
       if (s.core.empty() && s.near.empty()) continue;
       background.shaded_at_times.at<std::uint8_t>(v, u) = 255;
+      if (s.lit.empty()) s.lit = litAmong(s.near, s.core, step);
       if (s.lit.empty()) {
         never_lit.at<std::uint8_t>(v, u) = 255;
         continue;
