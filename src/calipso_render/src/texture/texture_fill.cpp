@@ -15,7 +15,8 @@
 namespace calipso::render {
 namespace {
 
-constexpr std::size_t kMostTexels = 300000;  // per object
+// per object; where several frames make them, nothing else is drawn of what these show
+constexpr std::size_t kMostTexels = 300000, kMostOfSeveral = 600000;
 // of the object's extent: a like place that far before the front is not on the object
 constexpr float kOffSurface = 0.03f;
 constexpr float kEnough = 0.3f;   // weight of a look that needs no other
@@ -66,7 +67,8 @@ class TextureFill {
     const Camera& camera = views_[0]->camera;
     const Eigen::Vector3f down = camera.world_from_camera.linear().col(1).cast<float>();
     a.texture = SurfaceTexture(surface_.key_vertices, surface_.triangles,
-                               sightings_.keyDepth() / static_cast<float>(camera.fx), kMostTexels);
+                               sightings_.keyDepth() / static_cast<float>(camera.fx),
+                               views_.size() > 1 ? kMostOfSeveral : kMostTexels);
     Origins origins(a.texture.size());
     for (const Reflectance& r : pictures_) shown_.push_back(r.albedo);
     shown_[0] = a.albedo;
