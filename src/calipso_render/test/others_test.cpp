@@ -6,6 +6,7 @@
 
 #include "calipso_render/renderer.hpp"
 #include "calipso_render/shadow_map.hpp"
+#include "place/key_cover.hpp"
 #include "render_test_scene.hpp"
 
 namespace calipso::render {
@@ -120,6 +121,28 @@ TEST(Others, WhatIsNarrowStandsInFrontIfItReachesIn) {
   ASSERT_FALSE(prepared.fronts[0].empty());
   EXPECT_NE(prepared.fronts[0].at<std::uint8_t>(middle.y - 4, middle.x), 0);
   EXPECT_EQ(prepared.fronts[0].at<std::uint8_t>(middle.y, box.x + 1), 0);
+}
+
+// A ball afloat: the water hides what is below it, but what the mask misses just above is the ball's.
+TEST(Others, WhatAPlaneHidesBeginsBesideTheMask) {
+  const ObjectModel afloat = ballAt({0.0, 0.0, 0.0});
+  ClipFrame key = frameWithBall(afloat);
+  RenderParams p = params();
+  p.depth = 1.0f / groundNearness(table(), key.camera, cv::Mat());
+  cv::Mat above = cv::Mat::zeros(key.labels.size(), CV_8U);
+  const Surface surface = makeSurface(afloat);
+  forEachPixelOf(makeActor(surface, surface.key_vertices, key.camera),
+                 [&](int u, int v, const SurfacePoint& point) {
+                   if (point.position.z() > 0.0f) above.at<std::uint8_t>(v, u) = 255;
+                 });
+  cv::Mat mask;  // a pixel short of the waterline
+  cv::erode(above, mask, cv::Mat::ones(3, 3, CV_8U));
+  key.labels.setTo(0, mask == 0);
+  ClipSample clip;
+  clip.add(key);
+  const cv::Mat front = prepare(clip, {afloat}, p).fronts[0];
+  EXPECT_EQ(cv::countNonZero(front & above & grown(mask, 1)), 0);
+  EXPECT_GT(cv::countNonZero(front & ~grown(above, 2)), 100);
 }
 
 // A pose that the tracking has lost is no reason to draw an object where its mask does not have it.

@@ -10,6 +10,7 @@ constexpr int kFrontOpening = 7;
 constexpr int kNarrowFront = 3;         // ... so much of them
 constexpr float kDeepFront = 6.0f;      // ... that far inside the model's outline: a peg on a towel
 constexpr float kNearerBeside = 1.02f;  // times as near: before an object
+constexpr int kWaterline = 2;           // px by which masks end before it, and over which it mixes
 
 // Where an object's surface should be seen at the key frame but no mask is, something stands before
 // it. The rim is left out: there the fit is not exact.
@@ -33,17 +34,27 @@ cv::Mat frontOf(const cv::Mat& outline, const cv::Mat& labels) {
   return cv::countNonZero(front) > 0 ? front : cv::Mat();
 }
 
+cv::Mat nearnessOf(const cv::Mat& depth) {
+  cv::Mat nearness = cv::Mat::zeros(depth.size(), CV_32F);
+  cv::Mat(1.0 / depth).copyTo(nearness, depth > 0.0f);
+  return nearness;
+}
+
+// Where the depth image shows the support planes. @param ground nearness of these
+cv::Mat onGround(const cv::Mat& nearness, const cv::Mat& ground) {
+  return (ground > 0.0f) & (cv::abs(nearness - ground) <= (kNearerBeside - 1.0f) * nearness);
+}
+
 // What the depth image shows just beside an object, off the planes and nearer: it stands before it.
 // @param ground nearness of the support planes
-cv::Mat nearerBeside(const cv::Mat& mask, const cv::Mat& labels, const cv::Mat& depth,
+cv::Mat nearerBeside(const cv::Mat& mask, const cv::Mat& labels, const cv::Mat& nearness,
                      const cv::Mat& ground, int margin) {
-  cv::Mat nearness = cv::Mat::zeros(depth.size(), CV_32F), own = nearness.clone();
-  cv::Mat(1.0 / depth).copyTo(nearness, depth > 0.0f);
+  cv::Mat own = cv::Mat::zeros(nearness.size(), CV_32F);
   nearness.copyTo(own, mask);
   cv::dilate(own, own,
              cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
   cv::Mat nearer = (labels == 0) & (own > 0.0f) & (nearness > kNearerBeside * own);
-  if (!ground.empty()) nearer &= cv::abs(nearness - ground) > (kNearerBeside - 1.0f) * nearness;
+  if (!ground.empty()) nearer &= ~onGround(nearness, ground);
   return nearer;
 }
 
@@ -70,13 +81,20 @@ cv::Mat grown(const cv::Mat& mask, int radius) {
 
 std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params) {
   std::vector<cv::Mat> fronts;
-  const cv::Mat ground =
-      params.depth.empty() ? cv::Mat() : groundNearness(params.planes, p.camera, cv::Mat());
+  cv::Mat ground, nearness;
+  if (!params.depth.empty()) {
+    ground = groundNearness(params.planes, p.camera, cv::Mat());
+    nearness = nearnessOf(params.depth);
+  }
   for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
+    const cv::Mat mask = p.key_labels == p.surfaces[i].index;
     cv::Mat front = frontOf(p.outlines[i], p.key_labels);
-    if (!params.depth.empty() && !p.moves[i]) {
+    // A plane that hides its foot (water, grass): what mixes along there is the object's, too.
+    if (!front.empty() && !ground.empty())
+      front.setTo(0, grown(mask, kWaterline) & grown(onGround(nearness, ground), 1));
+    if (!nearness.empty() && !p.moves[i]) {
       const cv::Mat beside =
-          nearerBeside(p.key_labels == p.surfaces[i].index, p.key_labels, params.depth, ground,
+          nearerBeside(mask, p.key_labels, nearness, ground,
                        params.background.mask_margin_px + params.background.shadow_margin_px + 1);
       if (cv::countNonZero(beside) > 0) front = front.empty() ? beside : cv::Mat(front | beside);
     }
@@ -97,13 +115,14 @@ std::vector<cv::Mat> footprintsOf(const Prepared& p) {
 
 cv::Mat sceneryOf(const cv::Mat& depth, const Prepared& p, int margin) {
   if (depth.empty()) return {};
-  cv::Mat objects = p.key_labels != 0, nearness = cv::Mat::zeros(depth.size(), CV_32F);
+  cv::Mat objects = p.key_labels != 0;
   for (const cv::Mat& f : p.footprints) {
     if (!f.empty()) objects |= f;
   }
   cv::dilate(objects, objects,
              cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
-  cv::Mat(1.0 / depth).copyTo(nearness, (depth > 0.0f) & (objects == 0));
+  cv::Mat nearness = nearnessOf(depth);
+  nearness.setTo(0, objects);
   cv::erode(nearness, nearness, cv::Mat::ones(3, 3, CV_8U));
   return nearness;
 }
