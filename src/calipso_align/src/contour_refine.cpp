@@ -151,7 +151,7 @@ Fall steepestFall(const std::vector<double>& alpha, double first_s, double max_o
 std::optional<EdgeEstimate> locateEdge(const cv::Mat& image, const cv::Mat& labels, int label,
                                        const ContourParams& params, const Vector2d& p,
                                        const Vector2d& normal) {
-  constexpr double kMinShare = 0.5;
+  constexpr double kMinShare = 0.5, kMaxShare = 1.25;  // more falls at a rim of a third colour
   constexpr int kMinSideSamples = 2;
   const Sides sides = sampleSides(image, labels, label, params.window_px, p, normal);
   if (sides.fore_count < kMinSideSamples || sides.back_count < kMinSideSamples) return std::nullopt;
@@ -165,7 +165,7 @@ std::optional<EdgeEstimate> locateEdge(const cv::Mat& image, const cv::Mat& labe
     alpha.push_back((colourAt(image, p + s * normal) - sides.back).dot(difference) /
                     (contrast * contrast));
   const Fall fall = steepestFall(alpha, -reach, params.max_offset_px);
-  if (fall.share < kMinShare) return std::nullopt;
+  if (fall.share < kMinShare || fall.share > kMaxShare) return std::nullopt;
   const double clean = std::min(1.0, fall.share) * (2.0 - std::clamp(fall.share, 1.0, 2.0));
   return EdgeEstimate{fall.position, clean * contrast / (contrast + params.min_contrast)};
 }

@@ -78,6 +78,18 @@ TEST(Contour, WithoutContrastTheMaskCounts) {
   for (const float confidence : contour.loops[0].confidence) EXPECT_LE(confidence, 0.3f);
 }
 
+// The rim's inner side is the only place where colours change from about the disc's to the
+// surroundings'.
+TEST(Contour, ARimOfAThirdColourLeavesTheMask) {
+  const auto shape = disc(60.37, 49.61, 30.42), inside = disc(60.37, 49.61, 29.2);
+  const cv::Vec3b grey(125, 125, 125), darker(100, 100, 100);
+  const cv::Mat rim = paint(kSize, shape, {235, 235, 235}, grey);
+  const auto contour =
+      extractContour(paint(kSize, inside, darker, grey, 2.0, rim), labelsOf(shape), 1, "mug");
+  // What the mask alone tells.
+  EXPECT_LT(deviation(contour.loops[0], shape).mean, 0.25);
+}
+
 TEST(Contour, CornersDoNotShrink) {
   const auto shape = box(30.3, 25.2, 85.6, 74.7);
   const auto contour =
