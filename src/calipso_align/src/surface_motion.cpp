@@ -1,5 +1,6 @@
 #include "surface_motion.hpp"
 
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -82,16 +83,24 @@ BlurredPart blurred(const cv::Mat& grey, const cv::Rect& part, double sigma) {
 // A point of the surface and what it looked like.
 struct Sample {
   Eigen::Vector3d point;                  // key frame, m
+  Eigen::Vector3d normal;                 // camera frame, before
   std::array<float, kBlurs.size()> grey;  // at each blur
 };
 
 std::vector<Sample> samplesOf(const std::vector<BlurredPart>& levels, const Camera& camera,
                               const DepthRendering& before, const BodyPose& pose) {
   const Eigen::Isometry3d key_from_camera = pose.camera_from_key.inverse();
+  const auto positionAt = [&](int u, int v) -> Eigen::Vector3d {
+    return before.at(u, v) * camera.ray(u, v);
+  };
   std::vector<Sample> samples;
   for (const cv::Point& p : thinnedOut(insideOf(before.depth > 0.0f))) {
     const cv::Point at = p + before.roi.tl();
-    Sample sample{key_from_camera * Eigen::Vector3d(before.depth(p) * camera.ray(at.x, at.y)), {}};
+    Sample sample{key_from_camera * positionAt(at.x, at.y),
+                  (positionAt(at.x, at.y + 1) - positionAt(at.x, at.y - 1))
+                      .cross(positionAt(at.x + 1, at.y) - positionAt(at.x - 1, at.y))
+                      .normalized(),
+                  {}};
     for (size_t k = 0; k < levels.size(); ++k)
       sample.grey[k] = levels[k].values.at<cv::Vec3f>(at - levels[k].part.tl())[0];
     samples.push_back(sample);
@@ -99,20 +108,40 @@ std::vector<Sample> samplesOf(const std::vector<BlurredPart>& levels, const Came
   return samples;
 }
 
+// Where a body may be now, and by which part it has become brighter: light . normal. What turns
+// leaves its shading where it was, which else holds the pose back.
+struct Guess {
+  BodyPose pose;
+  Eigen::Vector3d light = Eigen::Vector3d::Zero();
+};
+
 struct Comparison {
-  StepEquations equations;
   double difference = 0.0;
+  StepEquations equations;     // of the step alone: whatever the light does
+  Eigen::Vector3d light_step;  // without a step
+  Eigen::Matrix<double, 3, 6> light_by_step;
+
+  void improve(Guess& guess) const {
+    const Vector6 step = solve(equations);
+    guess.pose.move(step);
+    guess.light += light_step - light_by_step * step;
+  }
 };
 
 Comparison compare(const std::vector<Sample>& samples, size_t level, const BlurredPart& now,
-                   const Camera& camera, const BodyPose& pose) {
+                   const Camera& camera, const Guess& guess) {
   constexpr double kNoise = 6.0;         // grey levels, of light that changes
   constexpr double kSystematicPx = 0.4;  // how far the surface may be off
   constexpr double kIndependent = 10.0;  // so many samples are wrong alike
+  constexpr double kLight = 0.2;         // deviation of what the light changes
   const cv::Rect inner(0, 0, now.part.width - 1, now.part.height - 1);
   Comparison result;
+  Eigen::Matrix<double, 9, 9> matrix = Eigen::Matrix<double, 9, 9>::Zero();  // its lower half
+  Eigen::Matrix<double, 9, 1> right = Eigen::Matrix<double, 9, 1>::Zero(), full;
+  matrix.diagonal().tail<3>().setConstant(1.0 / (kLight * kLight));
+  right.tail<3>() = -guess.light / (kLight * kLight);
   for (const Sample& sample : samples) {
-    const Eigen::Vector3d p = pose.camera_from_key * sample.point;
+    const Eigen::Vector3d p = guess.pose.camera_from_key * sample.point;
     const Eigen::Vector2d pixel = camera.project(p) - Eigen::Vector2d(now.part.x, now.part.y);
     const int u = cvFloor(pixel.x()), v = cvFloor(pixel.y());
     if (p.z() <= 0.0 || !inner.contains({u, v})) {
@@ -125,15 +154,25 @@ Comparison compare(const std::vector<Sample>& samples, size_t level, const Blurr
     const cv::Vec3f seen =
         (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * next[0] + a * next[1]);
     const Eigen::Vector2d gradient(seen[1], seen[2]);
-    const double residual = sample.grey[level] - seen[0];
+    const double grey = sample.grey[level];
+    const double residual = grey * (1.0 + guess.light.dot(sample.normal)) - seen[0];
     const double variance =
         kNoise * kNoise + kSystematicPx * kSystematicPx * gradient.squaredNorm();
     const double squared = residual * residual / (4.0 * variance);
     result.difference += squared / (1.0 + squared);
-    result.equations.add(credible(squared) / (variance * kIndependent), residual,
-                         pose.jacobian(camera, p).transpose() * gradient);
+    const double weight = credible(squared) / (variance * kIndependent);
+    full << guess.pose.jacobian(camera, p).transpose() * gradient, -grey * sample.normal;
+    matrix.selfadjointView<Eigen::Lower>().rankUpdate(full, weight);
+    right += weight * residual * full;
   }
   result.difference /= samples.size();
+  const Eigen::Matrix3d light = matrix.bottomRightCorner<3, 3>().selfadjointView<Eigen::Lower>();
+  const Eigen::Matrix<double, 3, 6> shared = matrix.bottomLeftCorner<3, 6>();
+  result.light_step = light.inverse() * right.tail<3>();
+  result.light_by_step = light.inverse() * shared;
+  result.equations.matrix = matrix.topLeftCorner<6, 6>().selfadjointView<Eigen::Lower>();
+  result.equations.matrix -= shared.transpose() * result.light_by_step;
+  result.equations.right = right.head<6>() - shared.transpose() * result.light_step;
   return result;
 }
 
@@ -175,14 +214,15 @@ SurfaceLook followSurface(const FramePair& frames, const cv::Mat& core, const Ca
   const std::vector<Sample> samples = samplesOf(then, camera, before, pose);
   SurfaceLook best;
   if (samples.size() < kFewest) return best;
-  for (BodyPose end : starts) {
+  for (const BodyPose& start : starts) {
+    Guess end{start};
     for (size_t level = 0; level < now.size(); ++level)
       for (int k = 0; k < kIterations; ++k)
-        end.move(solve(compare(samples, level, now[level], camera, end).equations));
+        compare(samples, level, now[level], camera, end).improve(end);
     const Comparison found = compare(samples, now.size() - 1, now.back(), camera, end);
     if (found.difference >= best.difference) continue;
     best = {found.difference, found.equations.matrix};
-    pose = end;
+    pose = end.pose;
   }
   return best;
 }

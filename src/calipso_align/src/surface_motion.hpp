@@ -22,7 +22,7 @@ struct FramePair {
 };
 
 // Moves a body to where its surface looks as it did,
-//   sum_i rho(I(project(T p_i)) - I_0(x_i)),
+//   sum_i rho(I(project(T p_i)) - (1 + light . n_i) I_0(x_i)),  with the light that fits,
 // from blurred pictures to sharp ones, starting from where the flow under `core` puts it and from
 // where it goes if it moves on as it did; the better end counts.
 // before    the previous frame's depth of the surface

@@ -5,6 +5,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../src/body_pose.hpp"
+#include "../src/surface_motion.hpp"
+#include "calipso_align/mask_edge.hpp"
 #include "calipso_align/mask_tracker.hpp"
 #include "synthetic_picture.hpp"
 #include "synthetic_shape.hpp"
@@ -86,6 +88,40 @@ TEST(BodyPose, JacobianMatchesDifferences) {
     // Central differences: the error is of order h^2 times the third derivative, some 1e-6 px.
     EXPECT_LT((difference - J.col(k)).norm(), 1e-4) << "parameter " << k;
   }
+}
+
+TEST(SurfaceMotion, ShadingThatStaysDoesNotHoldATurningBodyBack) {
+  const PaintedPear pear;
+  const Camera& camera = pear.surface().camera;
+  const auto viewAt = [&](int frame) {
+    return renderDepth(transformed(motionAt(frame), pear.surface().points),
+                       pear.surface().triangles, camera);
+  };
+  // Faint paint, lit from the right.
+  const auto picture = [&](int frame) {
+    cv::Mat grey;
+    cv::cvtColor(pear.picture(motionAt(frame), frame + 1), grey, cv::COLOR_BGR2GRAY);
+    const DepthRendering view = viewAt(frame);
+    const auto positionAt = [&](int u, int v) -> Eigen::Vector3d {
+      return view.at(u, v) * camera.ray(u, v);
+    };
+    for (int v = 1; v < grey.rows - 1; ++v)
+      for (int u = 1; u < grey.cols - 1; ++u) {
+        if (!(view.at(u, v) > 0.0)) continue;
+        const Eigen::Vector3d normal = (positionAt(u, v + 1) - positionAt(u, v - 1))
+                                           .cross(positionAt(u + 1, v) - positionAt(u - 1, v))
+                                           .normalized();
+        const double light = 1.0 + 0.5 * normal.x();
+        grey.at<uchar>(v, u) = cv::saturate_cast<uchar>(light * (60 + 0.4 * grey.at<uchar>(v, u)));
+      }
+    return grey;
+  };
+  BodyPose pose{{0.0, 0.0, 3.0}};
+  const cv::Mat still = cv::Mat::zeros(camera.height, camera.width, CV_32FC2);
+  followSurface({picture(0), picture(2), still}, insideOf(pear.mask(motionAt(0))), camera,
+                viewAt(0), Eigen::Isometry3d::Identity(), pose);
+  const Eigen::Matrix3d off = pose.camera_from_key.linear() * motionAt(2).linear().transpose();
+  EXPECT_LT(Eigen::AngleAxisd(off).angle(), 0.02) << "of 0.1 rad";
 }
 
 TEST(RigidShape, FollowsATurningBodyBeforeItsOwnColours) {
