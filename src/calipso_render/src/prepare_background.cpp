@@ -10,6 +10,7 @@
 #include "place/passing_shade.hpp"
 #include "place/place_relief.hpp"
 #include "place/plane_mirror.hpp"
+#include "place/scenery_shade.hpp"
 #include "place/umbra.hpp"
 
 namespace calipso::render {
@@ -218,8 +219,8 @@ void liftTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& s
   const cv::Mat unclear = grown(covered, params.background.mask_margin_px) |
                           (e.seen.spread >= kQuiet) | place.off_planes;
   const cv::Mat lifted =
-      liftShade({e.picture, sun, sky, unclear, params.background.shadow_margin_px}, traces,
-                predictedUmbra(p.light.light, params.planes), p.background.plate);
+      liftShade({e.picture, sun, sky, p.sunless, unclear, params.background.shadow_margin_px},
+                traces, predictedUmbra(p.light.light, params.planes), p.background.plate);
   traces.setTo(0, lifted);
 }
 
@@ -281,12 +282,16 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   const SeenPlace place = findPlace(surfaces, params, p);
   const ReceiverOf in_sun = receiversOf(params.planes, p.relief, place.blind, p.camera),
                    under_sky = receiversOf(params.planes, p.relief, place.off_planes, p.camera);
-  const cv::Mat sun = placeVisibility(e.sun, in_sun, key.bgr.size()),
-                sky = placeVisibility(e.sky, under_sky, key.bgr.size());
+  cv::Mat sun = placeVisibility(e.sun, in_sun, key.bgr.size());
+  const cv::Mat sky = placeVisibility(e.sky, under_sky, key.bgr.size());
   const auto any = [&](bool moves) {
     return std::find(p.moves.begin(), p.moves.end(), moves) != p.moves.end();
   };
   const bool any_rests = any(false), any_moves = any(true);
+  if (p.light.confirmed()) {
+    p.sunless = shadeOfScenery(p.scenery, surfaces, p.camera, p.light.light.direction, in_sun);
+    if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);
+  }
   cv::Mat traces =
       any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
   if (any_rests && p.light.confirmed()) liftTraces(e, place, sun, sky, params, traces, p);

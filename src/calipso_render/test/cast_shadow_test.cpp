@@ -127,6 +127,30 @@ TEST(Renderer, AMovedShadowTakesItsWholeEdgeAlong) {
   EXPECT_LT(cv::countNonZero(kept), cv::countNonZero(edge) / 50);
 }
 
+TEST(Renderer, TakesNoSunWhereSceneryKeepsItOff) {
+  const Setting s(params());
+  const FrameInput moved = s.input(true, {-0.3f, 0.0f, 0.0f});
+  auto shaded = std::make_shared<Prepared>(*s.prepared);
+  shaded->sunless = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255));
+  const FrameOutput in_sun = Renderer(s.prepared, params()).composite(moved),
+                    in_shade = Renderer(shaded, params()).composite(moved);
+  const Actor now = makeActor(s.prepared->surfaces[0], moved.objects[0].vertices, camera());
+  const ShadowMap cast({{&now.vertices, &now.surface->triangles}},
+                       s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+  int darker = 0, all = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = receiverAt(params().planes, camera(), u, v);
+      if (!r || cast.visibility(r->position, r->normal) > 0.1f) continue;
+      const int sun = in_sun.bgr.at<cv::Vec3b>(v, u)[1],
+                shade = in_shade.bgr.at<cv::Vec3b>(v, u)[1];
+      ++all, darker += sun + 20 < shade;
+    }
+  }
+  ASSERT_GT(all, 50);
+  EXPECT_GT(darker, all / 5);  // the ball hides others, and the sky
+}
+
 // Water, or a light that was told wrongly: where the ball casts none in the video, it casts none
 // when it is moved.
 TEST(Renderer, CastsShadowsOnlyWhereTheVideoShowsThem) {

@@ -50,18 +50,19 @@ class LiftedShade : public ::testing::Test {
 
   cv::Mat lifted(const cv::Mat& picture, cv::Mat& plate) const {
     plate = picture.clone();
-    return liftShade({picture, sun_, sky_, unclear_, kMargin}, traces_, {0.6f, 0.6f, 0.6f}, plate);
+    return liftShade({picture, sun_, sky_, sunless_, unclear_, kMargin}, traces_,
+                     {0.6f, 0.6f, 0.6f}, plate);
   }
 
   const cv::Size size_{200, 160};
   cv::Mat sun_{size_, CV_32F}, sky_{size_, CV_32F}, place_{size_, CV_32FC3};
-  cv::Mat traces_{size_, CV_8U, cv::Scalar(255)}, unclear_ = cv::Mat::zeros(size_, CV_8U);
+  cv::Mat traces_{size_, CV_8U, cv::Scalar(255)}, unclear_ = cv::Mat::zeros(size_, CV_8U), sunless_;
 };
 
 TEST_F(LiftedShade, MeasuresWhatTheSunLeavesAcrossBorders) {
   const cv::Mat picture = shaded(kUmbra);
-  const auto umbra =
-      umbraAtBorders({picture, sun_, sky_, unclear_, kMargin}, cv::Vec3f(0.6f, 0.6f, 0.6f));
+  const auto umbra = umbraAtBorders({picture, sun_, sky_, sunless_, unclear_, kMargin},
+                                    cv::Vec3f(0.6f, 0.6f, 0.6f));
   ASSERT_TRUE(umbra);
   // The checks' borders are crossed by a part of the pairs; the prediction's error counts outside.
   for (int c = 0; c < 3; ++c) EXPECT_NEAR((*umbra)[c], kUmbra[c], 0.04f);
@@ -110,9 +111,30 @@ TEST_F(LiftedShade, LeavesBordersContactsAndWhatIsUnclear) {
   EXPECT_EQ(cv::norm(plate, picture, cv::NORM_INF, where == 0), 0.0);
 }
 
+// In the shade of a wall an object takes no sun from the place.
+TEST_F(LiftedShade, LeavesTheShadeOfOtherThings) {
+  const cv::Rect wall(0, 0, 90, size_.height);
+  sunless_ = cv::Mat::zeros(size_, CV_8U);
+  sunless_(wall).setTo(255), sun_(wall).setTo(1.0f);
+  cv::Mat picture = shaded(kUmbra), without = picture.clone(), plate;
+  for (int v = 0; v < wall.height; ++v) {
+    for (int u = 0; u < wall.width; ++u) {
+      const float under = 1.0f - kHides * (1.0f - sky_.at<float>(v, u));
+      for (int c = 0; c < 3; ++c) {
+        const float left = kUmbra[c] * linearFromRealCode(place_.at<cv::Vec3f>(v, u)[c]);
+        without.at<cv::Vec3f>(v, u)[c] = codeFromLinear(left);
+        picture.at<cv::Vec3f>(v, u)[c] = codeFromLinear(left * under);
+      }
+    }
+  }
+  const cv::Mat off = lifted(picture, plate)(wall) & (sky_(wall) < 0.9f);
+  ASSERT_GT(cv::countNonZero(off), 500);
+  EXPECT_LT(cv::norm(plate(wall), without(wall), cv::NORM_INF, off), 8.0);  // the sky is smoothed
+}
+
 TEST_F(LiftedShade, LeavesTheShadowThatIsNotSeen) {
   const cv::Mat picture = shaded({1.0f, 1.0f, 1.0f});
-  EXPECT_FALSE(umbraAtBorders({picture, sun_, sky_, unclear_, kMargin}, kUmbra));
+  EXPECT_FALSE(umbraAtBorders({picture, sun_, sky_, sunless_, unclear_, kMargin}, kUmbra));
   cv::Mat plate;
   EXPECT_EQ(cv::countNonZero(lifted(picture, plate) & (sun_ < 0.5f)), 0);
 }

@@ -102,6 +102,7 @@ struct Prepared {
   // CV_8UC1: where objects cast no shadow: neither plane nor relief is seen there, or shows none in
   // the video
   cv::Mat shadowless;
+  cv::Mat sunless;   // CV_8UC1: 255 where scenery stands before the sun; may be empty
   Relief relief;     // of the place, takes shadows; may be empty
   cv::Mat nearness;  // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
   PlaneMirror mirror;

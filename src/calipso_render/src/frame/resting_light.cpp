@@ -76,6 +76,8 @@ void RestingLight::measureOthers(const StagedFrame& frame, const SeenPlace& plac
   for (const Occluder& o : others)
     bounds |= shadowBounds(frame, place.view.relief(), *o.vertices, frame.light.direction);
   others_sun_ = bounds.empty() ? cv::Mat() : sunLevels(frame, place, *others_, bounds, nullptr);
+  sunless_place_ =
+      frame.light.direction == frame.prepared.light.light.direction ? place.sunless : cv::Mat();
   others_sky_.release();
   if (others.empty()) return;
   const auto sky = skyVisibility(others, frame.params);
@@ -113,7 +115,8 @@ void RestingLight::findShaded(const StagedFrame& frame, const SeenPlace& place) 
   for (int v = 0; v < size.height; ++v) {
     leaveHidden(v, 0, size.width, sky_levels.ptr<std::uint8_t>(v));
     for (int u = 0; u < size.width; ++u) {
-      const std::uint8_t sun = levelAt(originals_sun_, u, v),
+      const bool sunless = !sunless_place_.empty() && sunless_place_.at<std::uint8_t>(v, u) != 0;
+      const std::uint8_t sun = sunless ? 255 : levelAt(originals_sun_, u, v),
                          sky = sky_levels.at<std::uint8_t>(v, u);
       if ((sun == 255 && sky == 255) || !place.takesShadow(u, v)) continue;
       shaded_.at<std::uint8_t>(v, u) =
@@ -155,9 +158,13 @@ CALIPSO_WIDE_LOOPS void RestingLight::joinSun(const SeenPlace& place, int v) {
 }
 
 void RestingLight::addOthersSun(int v, int begin, int end, std::uint8_t* sun) const {
-  if (others_sun_.empty()) return;
-  const std::uint8_t* others = others_sun_.ptr<std::uint8_t>(v) + begin;
-  for (int k = 0; k < end - begin; ++k) sun[k] = bothLevels(sun[k], others[k]);
+  if (!others_sun_.empty()) {
+    const std::uint8_t* others = others_sun_.ptr<std::uint8_t>(v) + begin;
+    for (int k = 0; k < end - begin; ++k) sun[k] = bothLevels(sun[k], others[k]);
+  }
+  if (sunless_place_.empty()) return;
+  const std::uint8_t* sunless = sunless_place_.ptr<std::uint8_t>(v) + begin;
+  for (int k = 0; k < end - begin; ++k) sun[k] |= sunless[k];
 }
 
 void RestingLight::leaveHidden(int v, int begin, int end, std::uint8_t* sky) const {

@@ -44,7 +44,7 @@ class RestingLight {
 
   // The others' part of the light of edited objects alone, columns [begin, end) of row v. Edited
   // objects hide only that part of the sky which others leave: the picture's pixels lack theirs
-  // already.
+  // already. Where scenery keeps the sun off anyhow it counts as seen: plate and picture lack it.
   void addOthersSun(int v, int begin, int end, std::uint8_t* sun) const;
   void leaveHidden(int v, int begin, int end, std::uint8_t* sky) const;
 
@@ -61,6 +61,7 @@ class RestingLight {
   Eigen::Vector3f sun_ = Eigen::Vector3f::Zero();  // direction
   std::vector<Points> others_vertices_;            // of what is not edited
   std::unique_ptr<Visibility> others_, originals_;
+  cv::Mat sunless_place_;            // SeenPlace::sunless, under the video's sun; else empty
   cv::Mat others_sun_, others_sky_;  // of the others; empty: nothing else casts a shadow
   cv::Mat originals_sun_;            // empty: the originals cast none
   SkyGrid originals_sky_;

@@ -42,7 +42,7 @@ void SeenPlace::driftTo(const StagedFrame& frame) {
 void SeenPlace::takeKeyView(const StagedFrame& frame) {
   const Prepared& prepared = frame.prepared;
   live = prepared.background.live.empty() ? nullptr : &prepared.background.live;
-  shadowless = prepared.shadowless;
+  shadowless = prepared.shadowless, sunless = prepared.sunless;
   view = PlaceView(view.planes(), prepared.relief);
   for (std::size_t i = 0; i < fronts.size(); ++i) {
     if (prepared.fronts[i].empty() || (prepared.moves[i] && !frame.at_rest[i])) continue;
@@ -64,6 +64,9 @@ void SeenPlace::warp(const StagedFrame& frame) {
   lookBeside(frame);
   cv::remap(prepared.shadowless, shadowless, from_key, cv::noArray(), cv::INTER_NEAREST,
             cv::BORDER_CONSTANT, cv::Scalar(0));
+  if (!prepared.sunless.empty())
+    cv::remap(prepared.sunless, sunless, from_key, cv::noArray(), cv::INTER_NEAREST,
+              cv::BORDER_CONSTANT, cv::Scalar(0));
   view = PlaceView(view.planes(), warped(prepared.relief, from_key));
 }
 

@@ -23,6 +23,7 @@ struct SeenPlace {
   // may be empty
   cv::Mat spread_beside;
   cv::Mat shadowless;  // Prepared::shadowless
+  cv::Mat sunless;     // Prepared::sunless
   // From the key frame's camera alone; elsewhere empty
   std::vector<cv::Mat> fronts;      // Prepared::fronts
   std::vector<cv::Mat> footprints;  // Prepared::footprints

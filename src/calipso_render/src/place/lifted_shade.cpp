@@ -58,9 +58,12 @@ struct Pair {
 
 std::vector<Pair> pairsAcross(const ShadedPlace& place, int reach) {
   const cv::Mat depth = depthInShade(place.sun);
+  const cv::Mat unclear = place.sunless.empty()
+                              ? place.unclear
+                              : cv::Mat(place.unclear | grown(place.sunless, place.margin));
   const cv::Rect all(1, 1, depth.cols - 2, depth.rows - 2);
   const auto isClear = [&](const cv::Point& p) {
-    return all.contains(p) && place.unclear.at<std::uint8_t>(p) == 0;
+    return all.contains(p) && unclear.at<std::uint8_t>(p) == 0;
   };
   std::vector<Pair> pairs;
   for (int v = 1; v + 1 < depth.rows; ++v) {
@@ -175,9 +178,11 @@ cv::Mat liftShade(const ShadedPlace& place, const cv::Mat& traces, const cv::Vec
     for (int u = 0; u < clear.cols; ++u) {
       const bool is_dark = dark.at<std::uint8_t>(v, u) != 0;
       if (!is_dark && lit.at<std::uint8_t>(v, u) == 0) continue;
+      const bool sunless = !place.sunless.empty() && place.sunless.at<std::uint8_t>(v, u) != 0;
       const float under = 1.0f - kHides * hidden.at<float>(v, u);
       for (int c = 0; c < 3; ++c) {
-        const float light = umbra[c] * under + (is_dark ? 0.0f : 1.0f - umbra[c]);
+        const float left = sunless ? 1.0f : umbra[c],
+                    light = left * under + (is_dark ? 0.0f : 1.0f - left);
         plate.at<cv::Vec3f>(v, u)[c] =
             codeFromLinear(linearFromRealCode(place.picture.at<cv::Vec3f>(v, u)[c]) / light);
       }

@@ -10,11 +10,13 @@ namespace calipso::render {
 //   I = L (U (1 - B (1 - k)) + (1 - U) s)
 //   I  linear colour seen     s, k  visible part of sun and sky, as predicted
 //   L  in full light          U     what the sun's absence leaves, per channel
+//      where something else keeps the sun off, L is the light without it, and U 1
 //   B  part of the light from above that an object hides, less what it throws back itself
 // Only where s is 0 or 1 for certain: borders of shadows are off by some pixels.
 struct ShadedPlace {
   const cv::Mat& picture;    // CV_32FC3, code values
   const cv::Mat &sun, &sky;  // CV_32FC1, s and k
+  const cv::Mat& sunless;    // CV_8UC1, != 0: has no sun anyhow, s is 1; may be empty
   const cv::Mat& unclear;    // CV_8UC1, != 0: covered, moves by itself or is no support plane
   int margin;                // px by which the sun's shadows may be off
 };
