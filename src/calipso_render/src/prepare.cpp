@@ -114,6 +114,18 @@ void findSurfacesInClip(const ClipSample& clip, const std::vector<ClipFrame>& fr
   }
 }
 
+// What rests is where it was in the key frame, also where a later mask misses it.
+void coverWhatRests(const Prepared& p, std::vector<ClipFrame>& frames) {
+  for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
+    if (p.moves[i] || p.sways[i]) continue;
+    const cv::Mat covered = p.key_labels == p.surfaces[i].index;
+    for (ClipFrame& f : frames) {
+      f.labels = f.labels.clone();  // the clip keeps its own
+      f.labels.setTo(p.surfaces[i].index, covered & (f.labels == 0));
+    }
+  }
+}
+
 LightFit lightOf(const std::vector<View>& views, const Background& seen, bool any_moves,
                  const RenderParams& params, const Prepared& p) {
   const LightEvidence evidence =
@@ -157,9 +169,10 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.nearness = placeNearness(
       cameraMoves(clip) ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()},
       params.planes, params.depth, params.background.mask_margin_px);
-  const std::vector<ClipFrame> frames =
+  std::vector<ClipFrame> frames =
       inKeyView(clip.frames(), p.nearness, params.background.mask_margin_px);
   findSurfacesInClip(clip, frames, models, p);
+  if (!cameraMoves(clip)) coverWhatRests(p, frames);
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);
   const std::vector<Actor> actors = keyActors(p);

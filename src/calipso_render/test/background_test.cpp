@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "calipso_render/clip_sample.hpp"
 #include "calipso_render/inpaint.hpp"
@@ -48,6 +49,25 @@ TEST(SeenBackground, LeavesOutPassingShadows) {
   cv::Mat plate;
   b.plate.convertTo(plate, CV_8U);
   EXPECT_EQ(cv::norm(plate, emptyTable(), cv::NORM_INF), 0.0);
+}
+
+// A mask that misses a piece of what rests does not show the place there.
+TEST(SeenBackground, ShowsNothingOfWhatRestsWhereALaterMaskMissesIt) {
+  const ObjectModel ball = ballAt({0.0, -0.3, 0.28});
+  ClipFrame frame = frameWithBall(ball);
+  const cv::Rect box = cv::boundingRect(frame.labels);
+  const cv::Rect bite(box.x + box.width / 2 - 8, box.y + box.height / 2 - 8, 16, 16);
+  ClipSample clip;
+  clip.add(frame);
+  for (int k = 1; k < 6; ++k) {
+    frame.labels = frame.labels.clone();
+    frame.labels(bite).setTo(0);
+    clip.add(frame);
+  }
+  RenderParams params;
+  params.planes = table();
+  const Prepared prepared = prepare(clip, {ball}, params);
+  EXPECT_EQ(cv::countNonZero(prepared.background.count(bite) & prepared.key_labels(bite)), 0);
 }
 
 // Noise of one code value, the same in every run.
