@@ -8,6 +8,7 @@
 #include "calipso_render/shadow_map.hpp"
 #include "calipso_render/sky_map.hpp"
 #include "frame/edge_blur.hpp"
+#include "light/shadow_borders.hpp"
 #include "place/clip_motion.hpp"
 #include "place/key_cover.hpp"
 #include "place/place_depth.hpp"
@@ -132,6 +133,9 @@ LightFit lightOf(const std::vector<View>& views, const Background& seen, bool an
       lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background(), params.depth);
   const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
   LightFit fit = fitLight(evidence, params.up.cast<float>(), view);
+  if (fit.from_shadows)
+    fit.light.direction = directionByBorders(views, params.planes, params.depth, fit.light)
+                              .value_or(fit.light.direction);
   fit.light.angular_radius = static_cast<float>(params.sun_radius);
   return fit;
 }
