@@ -34,6 +34,26 @@ TEST(DiffuseShading, SunAddsItsCosine) {
   EXPECT_NEAR(diffuseShading(light, -slanted, 1.0f)[2], 0.2f, 1e-6f);  // turned away
 }
 
+// What lies at the rim of a rough surface keeps its own colour.
+TEST(SpecularShading, MirrorsTheSurroundingsLessAtTheRimsOfRoughSurfaces) {
+  Light light;
+  light.sun = {0, 0, 0}, light.ambient[0] = {1, 1, 1};
+  const Eigen::Vector3f n = Eigen::Vector3f::UnitZ(),
+                        at_rim = Eigen::Vector3f(1, 0, 0.1f).normalized();
+  const auto growth = [&](float m, float around) {
+    const Gloss gloss{0.04f, m, around};
+    return specularShading(light, gloss, n, at_rim, 0.0f)[0] /
+           specularShading(light, gloss, n, n, 0.0f)[0];
+  };
+  // 1 + 14 (1 - n.v)^5
+  const float smooth = 1.0f + 14.0f * std::pow(1.0f - at_rim.z(), 5.0f);
+  EXPECT_NEAR(growth(0.03f, 0.02f), smooth, 1e-3f * smooth);
+  EXPECT_LT(growth(0.12f, 0.02f), 0.9f * smooth);
+  EXPECT_LT(growth(0.35f, 0.02f), 0.4f * smooth);
+  // What is stronger than any dielectric's is not this gloss.
+  EXPECT_NEAR(growth(0.35f, kMostAround), smooth, 1e-3f * smooth);
+}
+
 TEST(TorranceSparrow, PeaksAtTheMirrorDirectionOfSmoothSurfaces) {
   const Eigen::Vector3f n = Eigen::Vector3f::UnitZ(), l = Eigen::Vector3f(0.6f, 0, 0.8f);
   EXPECT_GT(torranceSparrow(n, l, {-0.6f, 0, 0.8f}, 0.1f),

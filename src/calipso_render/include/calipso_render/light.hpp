@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <opencv2/core.hpp>
 
 namespace calipso::render {
@@ -27,7 +28,20 @@ struct Gloss {
   float around = 0.0f;     // ks of the surroundings
 };
 
-inline constexpr float kGrazing = 14.0f;  // of grazing()
+// Strength of mirrored surroundings at most: a dielectric's, of refraction 1.6, where lit white has
+// half of the light's unit.
+inline constexpr float kMostAround = 0.025f;
+
+inline constexpr float kGrazing = 14.0f;  // of grazing(), and the roughness up to which it holds
+inline constexpr float kSmooth = 0.08f;
+
+// How much more a surface mirrors at a grazing view than straight on: the rougher the less, as facets
+// hide each other. Where its surroundings seem stronger than any dielectric mirrors them, the fit
+// takes something else for gloss, and its roughness tells nothing of that.
+inline float grazingGrowth(const Gloss& gloss) {
+  if (gloss.around >= kMostAround) return kGrazing;
+  return kGrazing * std::exp(-5.3f * std::max(0.0f, gloss.roughness - kSmooth));
+}
 
 // 1, then the eight of bands 1 and 2, scaled so that band 0 is 1 (Ramamoorthi and Hanrahan 2001).
 std::array<float, 9> shBasis(const Eigen::Vector3f& n);
@@ -136,12 +150,11 @@ struct Lobe {
 Lobe torranceSparrowLobe(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                          const Eigen::Vector3d& v, double m);
 
-// How much more a surface mirrors at a grazing view (Schlick 1994), relative to normal incidence.
-// One minus the roughness that a rough surface keeps of it is taken as constant: the surroundings
-// are smooth.
-inline float grazing(float n_v) {
+// The same at any view (Schlick 1994), relative to normal incidence. Fits, which see no grazing
+// views, take it as constant.
+inline float grazing(float n_v, float growth = kGrazing) {
   const float rest = 1.0f - std::clamp(n_v, 0.0f, 1.0f), squared = rest * rest;
-  return 1.0f + kGrazing * squared * squared * rest;
+  return 1.0f + growth * (squared * squared * rest);
 }
 
 // Radiance of the gloss: ks times the lobe times the visible sun, and the mirrored surroundings.

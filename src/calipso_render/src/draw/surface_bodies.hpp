@@ -122,12 +122,12 @@ CALIPSO_INLINE Eight lobeBody(const SurfaceShade& s, const Eight (&n)[3], const 
 }
 
 // grazing() of what the surroundings send back.
-CALIPSO_INLINE Eight grazingBody(const Eight& n_v) {
+CALIPSO_INLINE Eight grazingBody(float growth, const Eight& n_v) {
   const Eight rest = 1.0f - smaller(larger(n_v, Eight{}), all(1.0f)), squared = rest * rest;
-  return 1.0f + kGrazing * squared * squared * rest;
+  return 1.0f + growth * (squared * squared * rest);
 }
 
-CALIPSO_INLINE void shadeEight(const SurfaceShade& s, int k, SurfaceRun& run) {
+CALIPSO_INLINE void shadeEight(const SurfaceShade& s, float growth, int k, SurfaceRun& run) {
   constexpr float kHorizon = 1e-4f;
   const Eight n[3] = {eightAt(run.normal[0] + k), eightAt(run.normal[1] + k),
                       eightAt(run.normal[2] + k)};
@@ -147,7 +147,7 @@ CALIPSO_INLINE void shadeEight(const SurfaceShade& s, int k, SurfaceRun& run) {
     for (int c = 0; c < 3; ++c) n_v += n[c] * view[c];
     for (int c = 0; c < 3; ++c) mirrored[c] = 2.0f * n_v * n[c] - view[c];
     if (s.terms > 4) secondBand(mirrored, second);
-    const Eight from_around = s.around * sky * grazingBody(n_v);
+    const Eight from_around = s.around * sky * grazingBody(growth, n_v);
     for (int c = 0; c < 3; ++c) out[c] += ambientBody(s, c, mirrored, second) * from_around;
     if (any(sunlit > 0.0f)) {  // places beyond the run may be no numbers
       const EightInts seen = (n_l > kHorizon) & (n_v > kHorizon);
@@ -159,7 +159,8 @@ CALIPSO_INLINE void shadeEight(const SurfaceShade& s, int k, SurfaceRun& run) {
 }
 
 CALIPSO_INLINE void shadeBody(const SurfaceShade& s, int first, int last, SurfaceRun& run) {
-  for (int k = first; k < last; k += 8) shadeEight(s, k, run);
+  const float growth = grazingGrowth({s.specular, s.roughness, s.around});
+  for (int k = first; k < last; k += 8) shadeEight(s, growth, k, run);
 }
 
 }  // namespace calipso::render

@@ -24,9 +24,6 @@ constexpr double kNarrowPart = 0.5;  // of its roughness, that a narrow one besi
 constexpr double kSeenBeside = 15.0;
 // rows' mean errors within which another roughness explains the highlights as well
 constexpr double kAlike = 6.0;
-// Strength of mirrored surroundings at most: a dielectric's, of refraction 1.6, where lit white has
-// half of the light's unit.
-constexpr double kMostAround = 0.025;
 // Directions beside the light's, and how far (rad), that highlights have to speak against; by so
 // many samples, and every so manieth roughness.
 constexpr int kBesides = 8, kTriedStep = 3;
@@ -323,7 +320,7 @@ float surroundingsStrength(const LightEvidence& evidence, const LightFit& fit) {
   const Solution together = solve(rows, {&lobes, nullptr}, clusters),
                  apart = solve(rows, {&lobes, &no_lobe}, clusters);
   const double found = apart.cost < together.cost ? apart.beside : together.strength;
-  return static_cast<float>(std::min(found, kMostAround));
+  return static_cast<float>(std::min<double>(found, kMostAround));
 }
 
 }  // namespace calipso::render
