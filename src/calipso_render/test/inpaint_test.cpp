@@ -126,6 +126,22 @@ TEST(BridgeLines, DrawNothingThatIsHidden) {
   }
 }
 
+// A wire, at one end before what is brighter.
+TEST(BridgeLines, DrawALineAloneThatPassesBeforeOtherThings) {
+  Lines l;
+  for (int u = 110; u < l.image.cols; ++u)
+    l.image.col(u) += cv::Scalar::all(std::min(0.7 * (u - 110), 70.0));
+  l.line({0, 80}, {319, 100});
+  const LineBridges b = l.bridge();
+  for (int u = 112; u < 208; ++u) {
+    const int v = cvRound(80.0 + 20.0 * u / 319.0);
+    ASSERT_NE(b.drawn.at<std::uint8_t>(v, u), 0) << u;
+    EXPECT_LT(l.image.at<cv::Vec3f>(v, u)[1], 80.0f) << u;  // the line has 30, its rim half of it
+    EXPECT_EQ(b.drawn.at<std::uint8_t>(v - 3, u), 0) << u;
+    EXPECT_EQ(b.drawn.at<std::uint8_t>(v + 3, u), 0) << u;
+  }
+}
+
 TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
   Lines l;
   l.line({0, 90}, {319, 90});

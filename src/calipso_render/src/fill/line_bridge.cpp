@@ -24,11 +24,13 @@ constexpr float kInHole = 0.7f;       // part of a connection that the hole hide
 constexpr float kLongest = 40.0f;     // px of a line that are mirrored
 constexpr float kNear = 4.0f;         // px on either side that its colours reach
 constexpr float kCore = 1.5f;         // px on either side that are the line itself
+constexpr float kAlone = 1.0f;        // the same of one that passes before different things
 constexpr float kCrossFade = 4.0f;    // px on either side of the middle
 
 struct Bridge {
   const LineEnd *from, *to;  // to: nothing if it ends at another bridge
   float gap, cost;
+  float half;  // px on either side that are drawn
 };
 
 class Bridger {
@@ -56,7 +58,7 @@ class Bridger {
                       [&](const Bridge& b) { return b.from == &end || b.to == &end; }))
         continue;
       if (const auto gap = wayTo(end, bridges, through))
-        bridges.push_back({&end, nullptr, *gap, 0.0f});
+        bridges.push_back({&end, nullptr, *gap, 0.0f, kLineHalf});
     }
     // What is led to another line comes before it, which goes through its end; what is weaker comes
     // first.
@@ -88,9 +90,12 @@ class Bridger {
     std::vector<Bridge> all, chosen;
     for (std::size_t i = 0; i < ends_.size(); ++i) {
       for (std::size_t j = i + 1; j < ends_.size(); ++j) {
-        if (const auto cost = misfit(ends_[i], ends_[j]))
-          all.push_back({&ends_[i], &ends_[j],
-                         static_cast<float>(cv::norm(ends_[j].at - ends_[i].at)), *cost});
+        const LineEnd &a = ends_[i], &b = ends_[j];
+        const float gap = static_cast<float>(cv::norm(b.at - a.at));
+        if (const auto cost = misfit(a, b, kLineHalf))
+          all.push_back({&a, &b, gap, *cost, kLineHalf});
+        else if (const auto alone = misfit(a, b, kAlone); a.isThin() && b.isThin() && alone)
+          all.push_back({&a, &b, gap, 1.0f + *alone, kAlone});
       }
     }
     // What was measured near the hole comes first.
@@ -115,8 +120,27 @@ class Bridger {
     return side(p, q, r) != side(p, q, s) && side(r, s, p) != side(r, s, q);
   }
 
+  // Of what lines and what is beside them look like, to their contrast.
+  static float differenceAcross(const LineEnd& a, const LineEnd& b) {
+    float sum = 0.0f;
+    for (int s = 0; s <= 2 * kLineHalf; ++s)
+      sum += static_cast<float>(
+                 cv::norm(a.profile[s] - b.profile[2 * kLineHalf - s], cv::NORM_L2SQR)) /
+             3.0f;
+    return std::sqrt(sum / (2 * kLineHalf + 1)) / std::min(a.contrast, b.contrast);
+  }
+
+  // Of the lines themselves, wherever in a pixel they lie.
+  static float differenceAlone(const LineEnd& a, const LineEnd& b) {
+    cv::Vec3f sum;
+    for (int s = -1; s <= 1; ++s) sum += a.profile[kLineHalf + s] - b.profile[kLineHalf - s];
+    return rms(sum / 3.0f) / std::max(a.contrast, b.contrast);
+  }
+
   // How badly b continues a; nothing if it does not.
-  std::optional<float> misfit(const LineEnd& a, const LineEnd& b) const {
+  // @param half px on either side that tell: kLineHalf, or kAlone
+  std::optional<float> misfit(const LineEnd& a, const LineEnd& b, float half) const {
+    const bool alone = half < kLineHalf;
     const cv::Point2f way = b.at - a.at;
     const float gap = static_cast<float>(cv::norm(way)), allowed = kStray + kTurn * gap;
     if (gap < 2.0f || a.into.dot(way) < 0.9f * gap || b.into.dot(way) > -0.9f * gap)
@@ -124,17 +148,11 @@ class Bridger {
     const float stray =
         std::max(std::abs(render::cross(a.into, way)), std::abs(render::cross(b.into, way)));
     if (stray > allowed || hiddenPart(a.at, b.at) < kInHole) return std::nullopt;
-    float sum = 0.0f;
-    for (int s = 0; s <= 2 * kLineHalf; ++s)
-      sum += static_cast<float>(
-                 cv::norm(a.profile[s] - b.profile[2 * kLineHalf - s], cv::NORM_L2SQR)) /
-             3.0f;
-    const float difference =
-        std::sqrt(sum / (2 * kLineHalf + 1)) / std::min(a.contrast, b.contrast);
+    const float difference = alone ? differenceAlone(a, b) : differenceAcross(a, b);
     if (difference > kAlike) return std::nullopt;
     for (const int side : {0, 1}) {
-      if (rms(a.beside[side] - b.beside[1 - side]) >
-          kBesideAlike * std::min(a.contrast, b.contrast))
+      if (!alone && rms(a.beside[side] - b.beside[1 - side]) >
+                        kBesideAlike * std::min(a.contrast, b.contrast))
         return std::nullopt;
     }
     return stray / allowed + difference / kAlike + gap / std::max(hole_.cols, hole_.rows);
@@ -213,7 +231,7 @@ class Bridger {
         const float t = d.dot(along), s = d.dot(leftOf(along));
         if (result_.drawn.at<std::uint8_t>(v, u) != 0 && std::abs(s) > kCore) continue;
         const float beyond = b.to != nullptr ? kLineHalf : 0.0f;
-        if (std::abs(s) <= kLineHalf && t >= -kLineHalf && t <= b.gap + beyond)
+        if (std::abs(s) <= b.half && t >= -kLineHalf && t <= b.gap + beyond)
           drawPixel(b, known, {u, v}, std::clamp(t, 0.0f, b.gap), s);
       }
     }
