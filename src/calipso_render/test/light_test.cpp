@@ -241,6 +241,43 @@ TEST(FitLight, BelievesCastShadows) {
             std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
 }
 
+// What a glossy ball over ground that the picture shows mirrors from straight below it.
+cv::Vec3f mirroredGround(const cv::Vec3f& colour, float brightness, LightFit& fit) {
+  const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
+  LightEvidence evidence;
+  evidence.samples = ballSamples(sun), evidence.clusters = 1;
+  for (LightSample& s : evidence.samples)
+    s.radiance += cv::Vec3f::all(0.3f * 0.02f * grazing(s.normal.dot(s.view)));
+  evidence.shadow_misfit = [sun](const Eigen::Vector3f& l) {
+    return -2000.0 * std::max(0.0f, l.dot(sun) - 0.99f) / 0.01;
+  };
+  evidence.below = colour, evidence.below_brightness = brightness;
+  fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
+  const Eigen::Vector3f view(0.0f, -1.0f, 0.0f), n = (view - kUp.cast<float>()).normalized();
+  return specularShading(fit.light, fit.gloss, n, view, 0.0f) *
+         (1.0f / grazing(n.dot(view), grazingGrowth(fit.gloss)));
+}
+
+TEST(FitLight, LetsSurfacesMirrorTheGroundAsThePictureShowsIt) {
+  const cv::Vec3f colour(0.6f, 1.0f, 1.4f);
+  LightFit fit;
+  const cv::Vec3f mirrored = mirroredGround(colour, 0.1f, fit);
+  ASSERT_TRUE(fit.from_shadows);
+  ASSERT_GT(fit.gloss.around, 0.0f);
+  // A dielectric's part of it, whatever the fit says of the light from below.
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(mirrored[c], 0.04f * 0.1f * colour[c], 1e-5f);
+  EXPECT_LT(cv::norm(fit.light.mirrored[0] - fit.light.mirrored[2] * -1.0f), 1e-6);  // not overhead
+}
+
+TEST(FitLight, LetsNoGroundBeBrighterThanWhite) {
+  const cv::Vec3f colour(0.6f, 1.0f, 1.4f);
+  LightFit fit;
+  const cv::Vec3f mirrored = mirroredGround(colour, 50.0f, fit),
+                  white = diffuseShading(fit.light, kUp.cast<float>(), 1.0f) * fit.gloss.around;
+  EXPECT_NEAR(mirrored[2], 0.9f * white[2], 1e-5f);
+  EXPECT_NEAR(mirrored[0] / mirrored[2], 0.6f / 1.4f, 1e-3f);  // its colour is kept
+}
+
 // A place that is dark wherever the shadow falls, like the dark below an object.
 TEST(FitLight, IsNotToldByWhatAllDirectionsExplain) {
   const Eigen::Vector3f shading = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();

@@ -15,7 +15,9 @@ struct Light {
   Eigen::Vector3f direction = Eigen::Vector3f::UnitZ();  // unit, towards the sun, world
   cv::Vec3f sun = {0.6f, 0.6f, 0.6f};
   std::array<cv::Vec3f, 9> ambient = {cv::Vec3f(0.4f, 0.4f, 0.4f)};  // times the basis of shBasis()
-  float angular_radius = 0.02f;                                      // of the sun, rad
+  // What surfaces mirror beyond the ambient light, bands 0 and 1: the ground as pictures show it.
+  std::array<cv::Vec3f, 4> mirrored = {};
+  float angular_radius = 0.02f;  // of the sun, rad
 };
 
 // Torrance-Sparrow lobe with Trowbridge and Reitz's distribution (GGX; Walter et al. 2007), whose
@@ -47,6 +49,12 @@ inline float grazingGrowth(const Gloss& gloss) {
 std::array<float, 9> shBasis(const Eigen::Vector3f& n);
 
 cv::Vec3f ambientAt(const Light& light, const Eigen::Vector3f& n);
+
+// A light whose ambient light is what surfaces mirror.
+inline Light asMirrored(Light light) {
+  for (int i = 0; i < 4; ++i) light.ambient[i] += light.mirrored[i];
+  return light;
+}
 
 // How ambient light reaches a surface point past its own object: transfer of harmonics of bands 0
 // and 1 (Sloan, Kautz and Snyder 2002), of what comes straight and of what the object throws back

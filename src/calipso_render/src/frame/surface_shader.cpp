@@ -17,12 +17,13 @@ void copyTo(float (&to)[3], const cv::Vec3f& from) { std::copy_n(from.val, 3, to
 SurfaceShade layOut(const Light& light, const Appearance& appearance, const Look& look,
                     const Gloss& gloss) {
   SurfaceShade s;
+  const std::array<cv::Vec3f, 9> around = asMirrored(light).ambient;
   Eigen::Map<Eigen::Vector3f>(s.direction) = light.direction;
-  copyTo(s.sun, light.sun), copyTo(s.least, 0.02f * light.ambient[0]);
+  copyTo(s.sun, light.sun), copyTo(s.least, 0.02f * around[0]);
   s.terms = 1;
   for (int i = 0; i < 9; ++i) {
-    copyTo(s.ambient[i], light.ambient[i]);
-    if (light.ambient[i] != cv::Vec3f()) s.terms = i == 0 ? 1 : i < 4 ? 4 : 9;
+    copyTo(s.ambient[i], around[i]);
+    if (around[i] != cv::Vec3f()) s.terms = i == 0 ? 1 : i < 4 ? 4 : 9;
   }
   copyTo(s.floor, lightFloor(appearance.mean_light));
   copyTo(s.tint, look.tint.value_or(cv::Vec3f(1, 1, 1)));

@@ -94,7 +94,7 @@ cv::Vec3f specularShading(const Light& light, const Gloss& gloss, const Eigen::V
                           const Eigen::Vector3f& view, float sun, float sky) {
   if (gloss.specular <= 0.0f && gloss.around <= 0.0f) return {};
   const float n_v = n.dot(view);
-  cv::Vec3f radiance = ambientAt(light, mirroredIn(n, view)) *
+  cv::Vec3f radiance = ambientAt(asMirrored(light), mirroredIn(n, view)) *
                        (gloss.around * sky * grazing(n_v, grazingGrowth(gloss)));
   if (sun > 0.0f)
     radiance += light.sun *

@@ -32,8 +32,10 @@ constexpr double kRobust = 0.15;  // relative residual beyond which a pixel coun
 constexpr double kLogRange = 4.0;
 // relative, of the shading of a sample, of which so many err independently of each other
 constexpr double kShadingError = 0.1, kIndependentSamples = 50.0;
-constexpr int kSplits = 2;             // rounds of telling reflectances of one hue apart
-constexpr double kPriorWeight = 0.05;  // of one prior, as a part of all pixels
+constexpr int kSplits = 2;                // rounds of telling reflectances of one hue apart
+constexpr float kDielectric = 0.04f;      // reflectance at normal incidence, refraction 1.5
+constexpr float kBrightestGround = 0.9f;  // reflectance
+constexpr double kPriorWeight = 0.05;     // of one prior, as a part of all pixels
 
 // Every parameter of the model; blocks as in ReflectanceCost.
 struct Unknowns {
@@ -274,6 +276,22 @@ LightFit fitShading(const LightEvidence& evidence, const Eigen::Vector3f& up) {
   return best;
 }
 
+// Ambient light from below is told by few pixels, dark ones, and in units that only the surroundings'
+// strength ties to the picture's. What is mirrored there needs neither: the picture shows it, and a
+// dielectric mirrors a known part, F_0, of it.
+//   G = (F_0 / kb) I    G  the ground, in the light's units    I  its radiance in the picture
+// Where that is brighter than almost white under the light found, kb is not a dielectric's.
+void mirrorGround(const LightEvidence& evidence, const Eigen::Vector3f& up, LightFit& fit) {
+  if (!(evidence.below_brightness > 0.0f) || !(fit.gloss.around > 0.0f)) return;
+  cv::Vec3f ground = evidence.below * (evidence.below_brightness * kDielectric / fit.gloss.around);
+  const cv::Vec3f white = kBrightestGround * diffuseShading(fit.light, up, 1.0f);
+  float part = 1.0f;
+  for (int c = 0; c < 3; ++c) part = std::min(part, white[c] / std::max(ground[c], 1e-6f));
+  const cv::Vec3f more = 0.5f * (part * ground - ambientAt(fit.light, -up));
+  fit.light.mirrored[0] = more;  // all of it straight below, none of it overhead
+  for (int i = 0; i < 3; ++i) fit.light.mirrored[1 + i] = more * -up[(i + 1) % 3];
+}
+
 }  // namespace
 
 std::optional<SeenGloss> LightFit::toldGloss(std::size_t object) const {
@@ -313,6 +331,7 @@ LightFit fitLight(const LightEvidence& seen, const Eigen::Vector3f& up,
   if (best.seen_gloss.of_all) best.gloss = best.seen_gloss.of_all->gloss;
   best.gloss.around = surroundingsStrength(evidence, best);
   best.second_order = refineAmbient(evidence, best);
+  if (best.from_shadows) mirrorGround(evidence, up, best);
   return best;
 }
 

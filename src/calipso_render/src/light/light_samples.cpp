@@ -88,8 +88,8 @@ void sampleView(const View& view, int picture, std::size_t object, std::size_t l
   }
 }
 
-// Linear colour of the support planes around the objects, mean 1.
-cv::Vec3f colourBelow(const View& view, const std::vector<SupportPlane>& planes) {
+// LightEvidence's `below`: the support planes around the objects.
+void lookBelow(const View& view, const std::vector<SupportPlane>& planes, LightEvidence& evidence) {
   Eigen::AlignedBox3f box;
   for (const Actor& a : view.actors) {
     for (const Eigen::Vector3f& p : a.vertices) box.extend(p);
@@ -108,8 +108,9 @@ cv::Vec3f colourBelow(const View& view, const std::vector<SupportPlane>& planes)
     }
   }
   const double mean = (sum[0] + sum[1] + sum[2]) / 3.0;
-  if (count < kFewestBelow || !(mean > kDarkest * count)) return {1.0f, 1.0f, 1.0f};
-  return cv::Vec3f(sum / mean);
+  if (count < kFewestBelow || !(mean > kDarkest * count)) return;
+  evidence.below = cv::Vec3f(sum / mean);
+  evidence.below_brightness = static_cast<float>(mean / count);
 }
 
 // @param which of its objects, one for each
@@ -176,7 +177,7 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
                             const cv::Mat& depth) {
   LightEvidence evidence;
   evidence.samples = lightSamples(views, moves, evidence.clusters);
-  evidence.below = colourBelow(views.front(), planes);
+  lookBelow(views.front(), planes, evidence);
   const auto scenes = std::make_shared<std::vector<RayScene>>();
   for (const View& view : views)
     scenes->push_back(sceneOf(view, std::vector<bool>(moves.size(), true)));
