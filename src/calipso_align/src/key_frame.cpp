@@ -26,12 +26,16 @@ cv::Mat readImage(const std::string& path, int flags) {
   return image;
 }
 
-// Fits the low-order deformations only: what is to be told is where the contour is implausible.
-// What is attached somewhere cannot move as a whole.
+// Fits no more than a coarse grid: what is to be told is where the contour is implausible, and how
+// the model goes on as a whole. What is attached somewhere cannot: low-order deformations do.
 ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
                         const std::optional<DepthObservation>& depth) {
   AlignOptions options;
-  options.levels = {};
+  constexpr int kCoarse = 600;  // nodes
+  if (object.attachments.empty())
+    options.levels = {kCoarse};
+  else
+    options.levels = {};
   options.judge_depth = false;
   options.planes = scene.planes;
   options.depth = depth;

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::array<double, 3> kBlurs = {4.0, 2.0, 1.0};  // px
 constexpr int kIterations = 6;                             // per blur
+constexpr double kSettled = 1e-4;                          // rad; smaller steps show nowhere
 constexpr size_t kFewest = 20;                             // samples that tell a pose
 
 // About so many pixels of a mask, evenly spread.
@@ -121,17 +122,20 @@ struct Comparison {
   Eigen::Vector3d light_step;  // without a step
   Eigen::Matrix<double, 3, 6> light_by_step;
 
-  void improve(Guess& guess) const {
+  // Returns by how much, in radians as the camera sees it.
+  double improve(Guess& guess) const {
     const Vector6 step = solve(equations);
+    const double distance = (guess.pose.camera_from_key * guess.pose.centre).norm();
     guess.pose.move(step);
     guess.light += light_step - light_by_step * step;
+    return step.head<3>().norm() / distance + step.tail<3>().norm();
   }
 };
 
 Comparison compare(const std::vector<Sample>& samples, size_t level, const BlurredPart& now,
                    const Camera& camera, const Guess& guess) {
-  constexpr double kNoise = 6.0;         // grey levels, of light that changes
-  constexpr double kSystematicPx = 0.4;  // how far the surface may be off
+  constexpr double kNoise = 4.0;         // grey levels, of light that changes otherwise
+  constexpr double kSystematicPx = 0.2;  // how far the surface may be off
   constexpr double kIndependent = 10.0;  // so many samples are wrong alike
   constexpr double kLight = 0.2;         // deviation of what the light changes
   const cv::Rect inner(0, 0, now.part.width - 1, now.part.height - 1);
@@ -218,7 +222,7 @@ SurfaceLook followSurface(const FramePair& frames, const cv::Mat& core, const Ca
     Guess end{start};
     for (size_t level = 0; level < now.size(); ++level)
       for (int k = 0; k < kIterations; ++k)
-        compare(samples, level, now[level], camera, end).improve(end);
+        if (compare(samples, level, now[level], camera, end).improve(end) < kSettled) break;
     const Comparison found = compare(samples, now.size() - 1, now.back(), camera, end);
     if (found.difference >= best.difference) continue;
     best = {found.difference, found.equations.matrix};
