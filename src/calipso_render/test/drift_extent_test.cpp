@@ -71,25 +71,44 @@ TEST(DriftExtent, EndsAtWhatMovesOtherwise) {
   EXPECT_LT(wrong(where), where.total() / 100);
 }
 
-TEST(DriftExtent, GoesUpToARoundWindowsTrimBehindAnObjectThatEndsThere) {
-  const cv::Mat clouds = noise({kWide + 60, kHigh}, 15.0, 4.0, 3);
-  cv::Mat window = cv::Mat::zeros(kHigh, kWide, CV_8U), object = window.clone();
-  cv::circle(window, {100, 60}, 90, 255, -1);
-  object(cv::Rect(100, 60, 100, 100)) = 255;
-  object &= window;
+// Clouds that drift beyond a round window, and an object that hides them, up to the window's trim.
+struct Window {
+  cv::Mat pane = cv::Mat::zeros(kHigh, kWide, CV_8U), object = pane.clone(), covered;
   Clip clip;
-  for (int k = 0; k < kFrames; ++k) {
-    cv::Mat grey(kHigh, kWide, CV_32F, cv::Scalar(90.0f)), covered;
-    cv::Mat(clouds.colRange(3 * k, 3 * k + kWide) + 180.0f).copyTo(grey, window);
-    grey.setTo(30.0f, object);
-    grey += noise(grey.size(), 0.7, 1.0, 100 + k);
+
+  // @param mottled deviation of the trim's colours
+  explicit Window(double mottled) {
+    const cv::Mat clouds = noise({kWide + 60, kHigh}, 15.0, 4.0, 3),
+                  trim = noise({kWide, kHigh}, mottled, 3.0, 5);
+    cv::circle(pane, {100, 60}, 90, 255, -1);
+    object(cv::Rect(100, 60, 100, 100)) = 255;
+    object &= pane;
     cv::dilate(object, covered, cv::Mat::ones(7, 7, CV_8U));
-    clip.pictures.push_back({grey, covered});
-    clip.shifts.push_back({-3.0f * static_cast<float>(k), 0.0f});
+    for (int k = 0; k < kFrames; ++k) {
+      cv::Mat grey = trim + 90.0f;
+      cv::Mat(clouds.colRange(3 * k, 3 * k + kWide) + 180.0f).copyTo(grey, pane);
+      grey.setTo(30.0f, object);
+      grey += noise(grey.size(), 0.7, 1.0, 100 + k);
+      clip.pictures.push_back({grey, covered});
+      clip.shifts.push_back({-3.0f * static_cast<float>(k), 0.0f});
+    }
   }
-  const cv::Mat where = whereDrifting(clip.pictures, clip.shifts, cv::Mat());
+};
+
+TEST(DriftExtent, GoesUpToARoundWindowsTrimBehindAnObjectThatEndsThere) {
+  const Window w(0.0);
+  const cv::Mat where = whereDrifting(w.clip.pictures, w.clip.shifts, cv::Mat());
   ASSERT_FALSE(where.empty());
-  EXPECT_LT(cv::countNonZero((where == 0) & object), cv::countNonZero(object) / 100);
+  EXPECT_LT(cv::countNonZero((where == 0) & w.object), cv::countNonZero(w.object) / 100);
+}
+
+TEST(DriftExtent, LeavesOutAMottledTrimBesideWhatHidesTheDrift) {
+  const Window w(4.0);
+  const cv::Mat where = whereDrifting(w.clip.pictures, w.clip.shifts, cv::Mat());
+  ASSERT_FALSE(where.empty());
+  cv::Mat trim;
+  cv::erode(~(w.pane | w.covered), trim, cv::Mat::ones(3, 3, CV_8U));  // cells are of 2 px
+  EXPECT_LT(cv::countNonZero(where & trim), 10);
 }
 
 TEST(DriftExtent, IsNowhereIfAnotherDriftWasMeant) {

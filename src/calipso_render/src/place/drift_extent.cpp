@@ -24,6 +24,7 @@ constexpr float kHiddenBorder = 1.0f;  // where no picture shows it
 constexpr float kEdge = 0.7f;          // code values from cell to cell: half that cost
 constexpr float kDoubt = 0.15f;        // what speaks for resting wherever anything is seen, and
 constexpr float kGround = 0.3f;        // besides where a support plane is seen
+constexpr float kStill = 0.5f;         // ... or nothing changes, and no drift can be tried
 // for drifting where nothing is seen: of equal borders the one along what rests
 constexpr float kHidden = 0.02f;
 const cv::Point kNext[] = {{1, 0}, {0, 1}};
@@ -51,13 +52,14 @@ struct Mean {
 struct Misses {
   cv::Mat resting, drifting;  // CV_32FC1, code values
   cv::Mat known, seen;        // CV_8UC1: where both are; where any picture shows the place
+  cv::Mat change;             // CV_32FC1: as `resting`, also where it is not known what drifts there
 };
 
 // @param tells CV_8UC1, != 0: what is seen there may come to drifting places
 Misses missesOf(const std::vector<DriftPicture>& pictures, const std::vector<cv::Point2f>& shifts,
                 const cv::Mat& tells) {
   const cv::Size size = tells.size();
-  Mean resting(size), drifting(size);
+  Mean resting(size), drifting(size), change(size);
   cv::Mat seen = cv::Mat::zeros(size, CV_8U);
   for (const DriftPicture& picture : pictures) seen |= picture.covered == 0;
   for (const std::size_t r : {std::size_t{0}, pictures.size() / 2, pictures.size() - 1}) {
@@ -66,13 +68,16 @@ Misses missesOf(const std::vector<DriftPicture>& pictures, const std::vector<cv:
     for (std::size_t i = 0; i < pictures.size(); ++i) {
       const cv::Point2f way = shifts[r] - shifts[i];
       if (std::hypot(way.x, way.y) < kClearWay) continue;
-      const cv::Mat both = (pictures[i].covered == 0) & (pictures[r].covered == 0) &
-                           (displaced(comes, way, size) > 0.99f);
+      const cv::Mat shown = (pictures[i].covered == 0) & (pictures[r].covered == 0),
+                    both = shown & (displaced(comes, way, size) > 0.99f);
+      change.add(pictures[i].grey, pictures[r].grey, shown);
       resting.add(pictures[i].grey, pictures[r].grey, both);
       drifting.add(pictures[i].grey, displaced(pictures[r].grey, way, size), both);
     }
   }
-  return {resting.around(), drifting.around(), resting.count > 0.0f, seen};
+  cv::Mat changes = change.around();
+  changes.setTo(INFINITY, change.count == 0.0f);
+  return {resting.around(), drifting.around(), resting.count > 0.0f, seen, changes};
 }
 
 // A picture by cells.
@@ -136,6 +141,8 @@ cv::Mat whatSpeaks(const Misses& m, const cv::Mat& ground) {
   speaks.setTo(0.0f, ~m.known);
   cv::subtract(speaks, kDoubt, speaks, m.seen), cv::add(speaks, kHidden, speaks, ~m.seen);
   if (!ground.empty()) cv::subtract(speaks, kGround, speaks, ground);
+  // Beside what hides the drift (a window's trim beside a wing).
+  cv::subtract(speaks, kStill, speaks, ~m.known & (m.change < 2.0f * noise + 2.0f * kNoise));
   return speaks;
 }
 
