@@ -294,7 +294,10 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   }
   cv::Mat traces =
       any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
-  if (any_rests && p.light.confirmed()) liftTraces(e, place, sun, sky, params, traces, p);
+  // What water shows is mirrored, not lit.
+  const bool water = p.mirror.established() && !mirrorsSharply(p.mirror);
+  if (any_rests && p.light.confirmed() && !water)
+    liftTraces(e, place, sun, sky, params, traces, p);
   if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);
   if (p.mirror.established())
