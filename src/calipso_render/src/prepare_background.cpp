@@ -79,12 +79,31 @@ cv::Mat seenPast(const PlaceEvidence& e) {
 // Where the key frame shows support planes, the relief, and neither.
 struct SeenPlace {
   cv::Mat off_planes;  // CV_8UC1: 255 where something else than a support plane is seen
-  // ... what is neither plane nor relief, or curved, which has no like to be filled from: gives up
-  // no shadow
+  // ... what is neither plane nor relief, or, unless the light is confirmed, curved (trees, banks):
+  // gives up no shadow
   cv::Mat blind;
+  cv::Mat curved;   // ... curved and not blind
   cv::Mat surface;  // CV_8UC1: PlaceSurfaces::label; may be empty
   int planes = 0;   // of the surfaces, from 1 on
 };
+
+// Shadows on planes and on what is curved, each told by its own kind of surface: what one shows
+// (a bank) says nothing of another (water).
+// @param unknown as of seenShadows(), but for what is blind
+SeenShadows shadowsOn(const SeenPlace& place, const cv::Mat& sun, const cv::Mat& sky,
+                      const cv::Mat& picture, const cv::Mat& unknown) {
+  const auto beside = [&](const cv::Mat& left_out) {
+    cv::Mat sun_there = sun.clone(), sky_there = sky.clone();
+    sun_there.setTo(1.0f, left_out), sky_there.setTo(1.0f, left_out);
+    return seenShadows(sun_there, sky_there, picture, unknown | place.blind | left_out);
+  };
+  SeenShadows seen = beside(place.curved);
+  if (cv::countNonZero(place.curved) == 0) return seen;
+  const SeenShadows on_curved = beside(~place.curved);
+  seen.sun |= on_curved.sun, seen.sky |= on_curved.sky, seen.refuted |= on_curved.refuted;
+  seen.none = cv::countNonZero(seen.refuted) > 0 && cv::countNonZero(seen.sun | seen.sky) == 0;
+  return seen;
+}
 
 // Where shadows leave a trace, with the predictions' errors: on the surfaces that they fall on, not
 // on what stands before these.
@@ -143,6 +162,7 @@ PlaneMirror findMirror(const std::vector<Actor>& actors, const cv::Mat& picture,
 SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, Prepared& p) {
   SeenPlace place{offPlanes(p.scenery, params.planes, p.camera),
                   {},
+                  cv::Mat::zeros(p.key_labels.size(), CV_8U),
                   surfaces.label,
                   static_cast<int>(surfaces.planes.size())};
   place.blind = place.off_planes.clone();
@@ -151,7 +171,8 @@ SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, P
     place.blind = place.off_planes & ~p.relief.seen, place.off_planes |= p.relief.seen;
   p.shadowless = place.blind.clone();
   if (!surfaces.empty()) {
-    place.blind |= surfaces.label == PlaceSurfaces::kCurved;
+    cv::Mat& where = p.light.confirmed() ? place.curved : place.blind;
+    where |= (surfaces.label == PlaceSurfaces::kCurved) & ~place.blind;
   }
   return place;
 }
@@ -160,11 +181,11 @@ SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, P
 cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
                    const cv::Mat& sky, const RenderParams& params, Prepared& p) {
   const cv::Mat objects = p.key_labels != 0;
-  SeenShadows shadows = seenShadows(sun, sky, e.picture, objects | place.blind);
+  SeenShadows shadows = shadowsOn(place, sun, sky, e.picture, objects);
   const cv::Mat dark = (sun < kUnshadedSun) & (shadows.refuted == 0);
   p.mirror = findMirror(e.actors, e.picture, objects | dark, sky, place.off_planes, params, p);
   if (p.mirror.established())  // what is mirrored can be dark, too
-    shadows = seenShadows(sun, sky, unmirrored(p.mirror, e.picture), objects | place.blind);
+    shadows = shadowsOn(place, sun, sky, unmirrored(p.mirror, e.picture), objects);
   if (cv::countNonZero(shadows.refuted) > 0) {
     p.remarks.push_back(
         "a shadow that the light predicts is not seen in the picture: none is taken out or drawn "
@@ -179,7 +200,7 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
 // the plate is as dark.
 cv::Mat unfollowedTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
                          const cv::Mat& sky, const RenderParams& params, const Prepared& p) {
-  const SeenShadows shadows = seenShadows(sun, sky, e.picture, (p.key_labels != 0) | place.blind);
+  const SeenShadows shadows = shadowsOn(place, sun, sky, e.picture, p.key_labels != 0);
   const double umbra = luminance(predictedUmbra(p.light.light, params.planes));
   cv::Mat then, now, half_lit;  // half: of the steps from shade to light, which are ratios
   cv::blur(luminanceOf(e.picture), then, {kAlike, kAlike});
@@ -204,8 +225,8 @@ cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const Rece
   const ShadeThatStays stays =
       leaveOutPassingShade(e.frames, cast, receiver, params.background, p.background);
   if (stays.never_lit.empty()) return unfollowedTraces(e, place, sun, sky, params, p);
-  const SeenShadows shadows = seenShadows(stays.sun, stays.sky, p.background.plate,
-                                          (p.background.count == 0) | place.blind);
+  const SeenShadows shadows =
+      shadowsOn(place, stays.sun, stays.sky, p.background.plate, p.background.count == 0);
   return shadeTraces(shadows, place, params) & stays.never_lit;
 }
 

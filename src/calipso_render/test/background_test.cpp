@@ -8,6 +8,7 @@
 #include "calipso_render/clip_sample.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/renderer.hpp"
+#include "prepare_background.hpp"
 #include "render_test_scene.hpp"
 
 namespace calipso::render {
@@ -378,6 +379,66 @@ TEST(PrepareBackground, WhatStandsBeforeAShadowKeepsItsPixels) {
   const cv::Rect core(post.x + 4, post.y, post.width - 8, post.height);  // without its rim
   EXPECT_EQ(cv::countNonZero(invented(core)), 0);
   EXPECT_GT(cv::countNonZero(invented), kHeight);  // the ball, on both sides
+}
+
+// The ball over ground that is not plane, as the depth image has it, in sunlight.
+struct BallOverBumps {
+  const ObjectModel model = ballAt({0.0, 0.1, 0.12});
+  const Surface surface = makeSurface(model);
+  ClipFrame frame = frameWithBall(model);
+  RenderParams params;
+  cv::Mat shaded = cv::Mat::zeros(kHeight, kWidth, CV_8U);  // 255: the sun is hidden there
+  ShadowMap sun{{{&surface.key_vertices, &surface.triangles}},
+                sunlight().direction.cast<double>(),
+                {512, 0.025, 16}};
+
+  BallOverBumps() {
+    params.planes = table();
+    params.depth = cv::Mat(kHeight, kWidth, CV_32F);
+    const Eigen::Isometry3d from_world = camera().world_from_camera.inverse();
+    const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        const bool ball = frame.labels.at<std::uint8_t>(v, u) != 0;
+        Receiver seen = *receiverAt(table(), camera(), u, v);
+        seen.position +=
+            (0.05f + 0.03f * std::sin(1.3f * u) * std::sin(1.1f * v)) * (eye - seen.position);
+        if (ball) seen.position = model.world_from_object.translation().cast<float>();
+        params.depth.at<float>(v, u) =
+            static_cast<float>((from_world * seen.position.cast<double>()).z());
+        if (ball || sun.visibility(seen.position, seen.normal) > 0.5f) continue;
+        shaded.at<std::uint8_t>(v, u) = 255;
+        frame.bgr.at<cv::Vec3b>(v, u) *= 0.6;
+      }
+    }
+  }
+
+  // @param confirmed by something besides shading
+  cv::Mat invented(bool confirmed) const {
+    ClipSample clip;
+    clip.add(frame);
+    Prepared p = prepare(clip, {model}, params);
+    p.light = LightFit();
+    p.light.light = sunlight();
+    p.light.determined = true, p.light.from_shadows = confirmed;
+    const std::vector<Actor> actors = {makeActor(surface, surface.key_vertices, frame.camera)};
+    cv::Mat picture;
+    frame.bgr.convertTo(picture, CV_32F);
+    const std::vector<ClipFrame> frames = {frame};
+    const Background seen = seenBackground(frames, false);
+    const ShadowMap sky({}, Eigen::Vector3d::UnitZ(), {});
+    prepareBackground({frames, {}, actors, seen, picture, sun, sky, false}, params, p);
+    return p.background.invented;
+  }
+};
+
+TEST(PrepareBackground, CurvedPlacesGiveUpTheShadowsOfAConfirmedLightAlone) {
+  const BallOverBumps place;
+  const double shaded = cv::countNonZero(place.shaded);
+  ASSERT_GT(shaded, 300);
+  EXPECT_GT(cv::countNonZero(place.invented(true) & place.shaded), 0.95 * shaded);
+  // ... but what the rim of the ball covers
+  EXPECT_LT(cv::countNonZero(place.invented(false) & place.shaded), 0.5 * shaded);
 }
 
 }  // namespace
