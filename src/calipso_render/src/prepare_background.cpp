@@ -90,16 +90,18 @@ struct SeenPlace {
 // Shadows on planes and on what is curved, each told by its own kind of surface: what one shows
 // (a bank) says nothing of another (water).
 // @param unknown as of seenShadows(), but for what is blind
+// @param on_planes darkness of shadows there
 SeenShadows shadowsOn(const SeenPlace& place, const cv::Mat& sun, const cv::Mat& sky,
-                      const cv::Mat& picture, const cv::Mat& unknown) {
-  const auto beside = [&](const cv::Mat& left_out) {
+                      const cv::Mat& picture, const cv::Mat& unknown,
+                      const UsualDarkness& on_planes = kOnGround) {
+  const auto beside = [&](const cv::Mat& left_out, const UsualDarkness& usual) {
     cv::Mat sun_there = sun.clone(), sky_there = sky.clone();
     sun_there.setTo(1.0f, left_out), sky_there.setTo(1.0f, left_out);
-    return seenShadows(sun_there, sky_there, picture, unknown | place.blind | left_out);
+    return seenShadows(sun_there, sky_there, picture, unknown | place.blind | left_out, usual);
   };
-  SeenShadows seen = beside(place.curved);
+  SeenShadows seen = beside(place.curved, on_planes);
   if (cv::countNonZero(place.curved) == 0) return seen;
-  const SeenShadows on_curved = beside(~place.curved);
+  const SeenShadows on_curved = beside(~place.curved, kOnGround);
   seen.sun |= on_curved.sun, seen.sky |= on_curved.sky, seen.refuted |= on_curved.refuted;
   seen.none = cv::countNonZero(seen.refuted) > 0 && cv::countNonZero(seen.sun | seen.sky) == 0;
   return seen;
@@ -185,7 +187,8 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   const cv::Mat dark = (sun < kUnshadedSun) & (shadows.refuted == 0);
   p.mirror = findMirror(e.actors, e.picture, objects | dark, sky, place.off_planes, params, p);
   if (p.mirror.established())  // what is mirrored can be dark, too
-    shadows = shadowsOn(place, sun, sky, unmirrored(p.mirror, e.picture), objects);
+    shadows = shadowsOn(place, sun, sky, unmirrored(p.mirror, e.picture), objects,
+                        isWater(p.mirror) ? kOnWater : kOnGround);
   if (cv::countNonZero(shadows.refuted) > 0) {
     p.remarks.push_back(
         "a shadow that the light predicts is not seen in the picture: none is taken out or drawn "
@@ -315,9 +318,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   }
   cv::Mat traces =
       any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
-  // What water shows is mirrored, not lit.
-  const bool water = p.mirror.established() && !mirrorsSharply(p.mirror);
-  if (any_rests && p.light.confirmed() && !water)
+  if (any_rests && p.light.confirmed() && !isWater(p.mirror))
     liftTraces(e, place, sun, sky, params, traces, p);
   if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);

@@ -218,11 +218,11 @@ TEST(PlaneMirror, IsDrawnOutAlikeInABoxAndInTheWholePicture) {
 
 TEST(PlaneMirror, IsSharpOnPolishedPlanesAlone) {
   PlaneMirror mirror;
-  EXPECT_FALSE(mirrorsSharply(mirror));
+  EXPECT_FALSE(mirrorsSharply(mirror) || isWater(mirror));
   mirror.strength = 1.0f;
-  EXPECT_TRUE(mirrorsSharply(mirror));
+  EXPECT_TRUE(mirrorsSharply(mirror) && !isWater(mirror));
   mirror.slope = 0.04f;
-  EXPECT_FALSE(mirrorsSharply(mirror));
+  EXPECT_TRUE(isWater(mirror) && !mirrorsSharply(mirror));
 }
 
 // Waves all over a lake, and the dark mirror image of a hull, with waves in it or none.

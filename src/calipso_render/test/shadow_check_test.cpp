@@ -64,6 +64,15 @@ TEST(SeenShadows, WhatCannotBeComparedFollowsWhatCan) {
   EXPECT_EQ(cv::countNonZero(g.seen().sun), 2 * g.left.area());
 }
 
+TEST(SeenShadows, OnWaterPaleOnesCount) {
+  Ground g;  // a quarter of the light, as most of what is seen is mirrored; beside it none
+  g.picture(g.left) *= 0.88f;
+  const SeenShadows on_water = seenShadows(g.sun, g.sky, g.picture, g.unknown, kOnWater);
+  EXPECT_EQ(cv::countNonZero(on_water.sun(g.left)), g.left.area());
+  EXPECT_EQ(cv::countNonZero(on_water.refuted), g.right.area());
+  EXPECT_TRUE(g.seen().none);
+}
+
 TEST(SeenShadows, TheHiddenSkyIsAskedLikewise) {
   Ground g;
   g.sun.setTo(1.0f);

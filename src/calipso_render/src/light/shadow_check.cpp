@@ -25,8 +25,6 @@ constexpr int kFewest = 130;             // px of a region that is asked by itse
 constexpr int kLeastOpen = 30;  // px of a region away from what says nothing, for it to be asked
 constexpr double kLeastEvidence = 1.0;  // and sum of h'^2
 constexpr double kByChance = 0.12;  // deviation of b where there is no shadow: what else is dark
-// mean and deviation of b where there is one: it takes 5 to 6 tenths of the light
-constexpr double kDark = 0.8, kDarkVaries = 0.45;
 constexpr double kDecided = 1.5;   // log of the odds from which a region is decided on by itself
 constexpr float kDarkest = 0.01f;  // linear; added before the logarithm
 
@@ -81,15 +79,16 @@ double logNormal(double x, double mean, double variance) {
 }
 
 // Log of how much likelier b is of a shadow than of none.
-double logOdds(const Depth& d) {
+double logOdds(const Depth& d, const UsualDarkness& usual) {
   const double variance = d.deviation * d.deviation;
-  return logNormal(d.b, kDark, kDarkVaries * kDarkVaries + variance) -
+  return logNormal(d.b, usual.mean, usual.deviation * usual.deviation + variance) -
          logNormal(d.b, 0.0, kByChance * kByChance + variance);
 }
 
 class Test {
  public:
-  Test(const cv::Mat& picture, const cv::Mat& unknown) : darkness_(picture.size(), CV_32F) {
+  Test(const cv::Mat& picture, const cv::Mat& unknown, const UsualDarkness& usual)
+      : darkness_(picture.size(), CV_32F), usual_(usual) {
     for (int v = 0; v < picture.rows; ++v) {
       for (int u = 0; u < picture.cols; ++u) {
         const cv::Vec3f& c = picture.at<cv::Vec3f>(v, u);
@@ -120,7 +119,7 @@ class Test {
     weight_(box).copyTo(weight, grown(part, kAround + kFarthest));
     const cv::Mat y = lessSurroundings(darkness_(box), weight);
     const Depth depth = depthOf(bestPlace(own, weight, y), y);
-    return depth.evidence >= kLeastEvidence ? logOdds(depth) : 0.0;
+    return depth.evidence >= kLeastEvidence ? logOdds(depth, usual_) : 0.0;
   }
 
  private:
@@ -139,6 +138,7 @@ class Test {
   }
 
   cv::Mat darkness_, weight_;  // of half the picture's size
+  UsualDarkness usual_;
 };
 
 struct Region {
@@ -170,8 +170,8 @@ cv::Mat isShaded(const cv::Mat& sun, const cv::Mat& sky) {
 }
 
 SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& picture,
-                        const cv::Mat& unknown) {
-  const Test test(picture, unknown);
+                        const cv::Mat& unknown, const UsualDarkness& usual) {
+  const Test test(picture, unknown, usual);
   std::vector<Region> regions;
   addRegions(test, sun, kSunShaded, true, regions);
   addRegions(test, sky, kSkyShaded, false, regions);

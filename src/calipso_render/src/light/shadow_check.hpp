@@ -22,10 +22,17 @@ struct SeenShadows {
 // CV_32FC1, visible part of them, 0..1
 cv::Mat isShaded(const cv::Mat& sun, const cv::Mat& sky);
 
+// b of usual shadows
+struct UsualDarkness {
+  double mean, deviation;
+};
+constexpr UsualDarkness kOnGround{0.8, 0.45};  // a shadow takes 5 to 6 tenths of the light
+constexpr UsualDarkness kOnWater{0.4, 0.25};   // less, as what is mirrored is not shaded
+
 // @param sun, sky CV_32FC1, visible part of them, 0..1, as predicted
 // @param picture CV_32FC3, code values
 // @param unknown CV_8UC1, != 0: says nothing (objects, things off the planes)
 SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& picture,
-                        const cv::Mat& unknown);
+                        const cv::Mat& unknown, const UsualDarkness& usual = kOnGround);
 
 }  // namespace calipso::render

@@ -143,4 +143,8 @@ bool mirrorsSharply(const PlaneMirror& mirror) {
   return mirror.established() && mirror.slope < kEven;
 }
 
+bool isWater(const PlaneMirror& mirror) {
+  return mirror.established() && !mirrorsSharply(mirror);
+}
+
 }  // namespace calipso::render

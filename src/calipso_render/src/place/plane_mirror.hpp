@@ -73,4 +73,7 @@ cv::Mat lostInMirror(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Ma
 // not filled along themselves.
 bool mirrorsSharply(const PlaneMirror& mirror);
 
+// Water, by its waves: most of what it shows is mirrored, not lit.
+bool isWater(const PlaneMirror& mirror);
+
 }  // namespace calipso::render
