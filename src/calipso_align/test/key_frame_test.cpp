@@ -1,6 +1,7 @@
 #include "calipso_align/key_frame.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -19,7 +20,9 @@ class KeyFrameModel : public ::testing::Test {
  protected:
   KeyFrameModel() : mesh_(test::pear()), bent_(mesh_) {
     scene_.camera = test::frontCamera();
-    path_ = (std::filesystem::temp_directory_path() / "key_frame_test_pear.obj").string();
+    path_ = (std::filesystem::temp_directory_path() /
+             ("key_frame_test_" + std::to_string(getpid()) + "_pear.obj"))
+                .string();
     std::ofstream file(path_);
     for (int i = 0; i < mesh_.vertices.rows(); ++i) file << "v " << mesh_.vertices.row(i) << "\n";
     for (int f = 0; f < mesh_.triangles.rows(); ++f)

@@ -4,6 +4,7 @@
 #include <calipso_msgs/NodeStatus.h>
 #include <calipso_msgs/Segmentation.h>
 #include <calipso_msgs/SimulationState.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
@@ -256,6 +257,25 @@ TEST_F(LiveRenderNodeTest, FramesPassUntilTheSimulatorIsReady) {
     edited = edited_[k].data != picture(k).data;
   }
   EXPECT_TRUE(edited);
+}
+
+TEST_F(LiveRenderNodeTest, WhatHasNoStampPasses) {
+  std::string said;
+  const auto diagnostics = nh_.subscribe<diagnostic_msgs::DiagnosticArray>(
+      topics::kDiagnostics, 10,
+      [&](const diagnostic_msgs::DiagnosticArrayConstPtr& m) { said += m->status[0].message; });
+  ASSERT_TRUE(waitFor([&] {
+    return image_.getNumSubscribers() > 0 && edited_sub_.getNumPublishers() > 0 &&
+           diagnostics.getNumPublishers() > 0;
+  }));
+  sensor_msgs::Image image = picture(0);
+  image.header.stamp = ros::Time(0);
+  for (std::size_t k = 1; k < 3; ++k) {
+    image_.publish(image);
+    ASSERT_TRUE(haveCome(k));
+    EXPECT_EQ(edited_.back().data, image.data);
+  }
+  EXPECT_TRUE(waitFor([&] { return said.find("stamp is 0") != std::string::npos; })) << said;
 }
 
 TEST_F(RenderNodeTest, PreparesAndEditsInOrder) {

@@ -47,11 +47,19 @@ FrameSource::FrameSource(ros::NodeHandle& nh, const std::string& image_topic,
       image_(nh, image_topic, queue),
       info_(nh, info_topic, queue),
       pairs_(image_, info_, pairQueue(queue)) {
+  image_.registerCallback(&FrameSource::onImage, this);
   pairs_.registerCallback(&FrameSource::onPair, this);
+}
+
+// What has no stamp belongs to no camera_info.
+void FrameSource::onImage(const sensor_msgs::ImageConstPtr& image) {
+  if (image->header.stamp.isZero())
+    on_bad_frame_(image, "its stamp is 0; the camera's driver must stamp images with their time");
 }
 
 void FrameSource::onPair(const sensor_msgs::ImageConstPtr& image,
                          const sensor_msgs::CameraInfoConstPtr& info) {
+  if (image->header.stamp.isZero()) return;
   Frame frame;
   try {
     frame = {image, info,

@@ -53,7 +53,11 @@ void SegmentationRos::onSubscriber(const ros::SingleSubscriberPublisher& subscri
 
 // A latched image can come twice to a subscriber that connects while it is published.
 void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
-  if (msg->header.stamp == last_stamp_) return;
+  if (msg->header.stamp == last_stamp_) {
+    if (last_stamp_.isZero())
+      reporter_.warn(last_stamp_, "an image's stamp is 0; the camera's driver must stamp them");
+    return;
+  }
   last_stamp_ = msg->header.stamp;
   if (params_.mode == Mode::kLive && clock_.startsOver(last_stamp_)) startOver();
   try {

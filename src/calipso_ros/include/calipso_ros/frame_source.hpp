@@ -45,7 +45,7 @@ struct Frame {
 class FrameSource {
  public:
   using OnFrame = std::function<void(const Frame&)>;
-  // A pair that makes no Frame (no pose, bad camera_info): the image, and what is wrong.
+  // What makes no Frame (no pose, bad camera_info, stamp 0): the image, and what is wrong.
   using OnBadFrame =
       std::function<void(const sensor_msgs::ImageConstPtr&, const std::string& reason)>;
 
@@ -54,6 +54,7 @@ class FrameSource {
               unsigned queue, const CameraPoses& poses, OnFrame on_frame, OnBadFrame on_bad_frame);
 
  private:
+  void onImage(const sensor_msgs::ImageConstPtr& image);
   void onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
 
   const CameraPoses& poses_;
