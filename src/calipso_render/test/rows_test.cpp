@@ -192,6 +192,18 @@ TEST(OutsideWinding, LeavesOutOnlyWhatIsHidden) {
         << x;
 }
 
+// What a pixel's corners see on average; what lies beyond the planes is lit.
+float seenByCorners(const PlaceView& view, const Visibility& light, int u, int v) {
+  float sum = 0.0f;
+  for (int k = 0; k < 4; ++k) {
+    Receiver r;
+    sum += view.at(u - 0.5f + (k & 1), v - 0.5f + (k >> 1), r)
+               ? light.visibility(r.position, r.normal)
+               : 1.0f;
+  }
+  return 0.25f * sum;
+}
+
 TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
   const Surface surface = makeSurface(ballAt(kCentre));
   const ShadowMap sun({{&surface.key_vertices, &surface.triangles}},
@@ -203,9 +215,7 @@ TEST(PlanesInLight, AgreesWithEveryPixelOnItsOwn) {
   int shaded = 0;
   for (int v = 0; v < rect.height; ++v) {
     for (int u = 0; u < rect.width; ++u) {
-      Receiver r;
-      const float exact =
-          view.at(u + rect.x, v + rect.y, r) ? sun.visibility(r.position, r.normal) : 1.0f;
+      const float exact = seenByCorners(view, sun, u + rect.x, v + rect.y);
       ASSERT_NEAR(fast.at<std::uint8_t>(v, u) / 255.0f, exact, 0.16f)
           << u << ", " << v;  // half of what may lie between two places
       shaded += exact < 0.5f;
@@ -273,6 +283,24 @@ class HalfSky : public Visibility {
  private:
   float rise_;
 };
+
+// Pixels that a sharp shadow's border crosses are shaded in part.
+TEST(PlanesInLight, IsAsSoftAsAPixelWhereTheSunIsAPoint) {
+  const PlaceView view(PlaneView(table(), camera()));
+  const HalfSky sun(1e6f);  // from nothing to all within a micrometre
+  const cv::Rect rect(13, 9, 120, 101);
+  cv::Mat levels(rect.size(), CV_8U, cv::Scalar(255));
+  planesInLight(view, sun, rect, SquareMask(), levels);
+  int in_part = 0;
+  for (int v = 0; v < rect.height; ++v) {
+    for (int u = 0; u < rect.width; ++u) {
+      const int level = levels.at<std::uint8_t>(v, u);
+      ASSERT_NEAR(level, 255.0f * seenByCorners(view, sun, u + rect.x, v + rect.y), 1.0f);
+      in_part += level > 0 && level < 255;
+    }
+  }
+  EXPECT_GE(in_part, rect.height);
+}
 
 TEST(SkyGrid, IsWhatThePlanesSeeAndDiffersByNoMoreThanItSays) {
   const PlaneView planes(table(), camera());

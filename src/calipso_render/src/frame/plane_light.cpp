@@ -12,7 +12,8 @@ namespace calipso::render {
 namespace {
 
 constexpr int kLargest = 64, kSquare = SquareMask::kSide,
-              kStep = 2;  // px: squares, and the places in the least of them
+              kStep = 2;          // px: squares, and the places in the least of them
+constexpr float kCorner = -0.5f;  // px from a pixel to its first corner
 // of visibility: places that differ by no more speak for those between them
 constexpr float kEven = 0.05f;
 // of visibility: between places that differ by no more it is interpolated
@@ -41,11 +42,12 @@ class Squares {
     if (here.empty() || skip_.all(square & rect_)) return;
     Receiver middle, corner;
     bool even = !view_.relief().touches(square.x, square.y, square.width) &&
-                view_.at(square.x + 0.5f * square.width, square.y + 0.5f * square.height, middle);
+                view_.at(square.x + kCorner + 0.5f * square.width,
+                         square.y + kCorner + 0.5f * square.height, middle);
     float radius = 0.0f;
     for (int k = 0; k < 4 && even; ++k) {
-      even = view_.at(square.x + (k & 1) * square.width, square.y + (k >> 1) * square.height,
-                      corner) &&
+      even = view_.at(square.x + kCorner + (k & 1) * square.width,
+                      square.y + kCorner + (k >> 1) * square.height, corner) &&
              corner.normal == middle.normal;
       radius = std::max(radius, (corner.position - middle.position).norm());
     }
@@ -72,7 +74,7 @@ class Squares {
    public:
     explicit Lookup(const Squares& squares) : squares_(squares) {}
     // @param otherwise what is kept where neither plane nor relief is seen
-    void add(int u, int v, float* visible, float otherwise = 1.0f) {
+    void add(float u, float v, float* visible, float otherwise = 1.0f) {
       Receiver r{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
       *visible = otherwise;
       if (!squares_.view_.at(u, v, r)) return;
@@ -92,14 +94,16 @@ class Squares {
     float* out_[LightBatch::kMost];
   };
 
-  static constexpr int kPlaces = kSquare / kStep + 1;
+  // Corners of the square's pixels: each pixel has what its four see on average, as soft as
+  // lenses and its width make its picture.
+  static constexpr int kCorners = kSquare + 1, kPlaces = kSquare / kStep + 1;
 
   // Places two steps apart are looked at first; those between where they, or the one in their
   // middle, differ.
   void fillGrid(const cv::Rect& square, float (&grid)[kPlaces][kPlaces]) const {
     Lookup lookup(*this);
     const auto set = [&](int i, int j) {
-      lookup.add(square.x + i * kStep, square.y + j * kStep, &grid[j][i]);
+      lookup.add(square.x + kCorner + i * kStep, square.y + kCorner + j * kStep, &grid[j][i]);
     };
     for (int j = 0; j < kPlaces; ++j) {
       for (int i = j % 2; i < kPlaces; i += 2) set(i, j);
@@ -132,41 +136,48 @@ class Squares {
 
   // The pixels of a square by its grid; exactly where its places differ by much.
   void refine(const cv::Rect& square, const cv::Rect& here) const {
-    float grid[kPlaces][kPlaces], visible[kSquare][kSquare];
+    float grid[kPlaces][kPlaces], corners[kCorners][kCorners], visible[kSquare][kSquare];
     fillGrid(square, grid);
-    interpolate(grid, visible);
-    Lookup lookup(*this);
-    for (int v = 0; v < kSquare; v += kStep) {
-      for (int u = 0; u < kSquare; u += kStep) {
-        const float *above = &grid[v / kStep][u / kStep], *below = &grid[v / kStep + 1][u / kStep];
-        const auto [low, high] = std::minmax({above[0], above[1], below[0], below[1]});
+    interpolate(grid, corners);
+    bool wanted[kCorners][kCorners] = {};
+    for (int j = 0; j + 1 < kPlaces; ++j) {
+      for (int i = 0; i + 1 < kPlaces; ++i) {
+        const auto [low, high] =
+            std::minmax({grid[j][i], grid[j][i + 1], grid[j + 1][i], grid[j + 1][i + 1]});
         if (high - low <= kSlow) continue;
-        for (int y = v; y < v + kStep; ++y) {
-          for (int x = u; x < u + kStep; ++x) {
-            if (here.contains(cv::Point(square.x + x, square.y + y) - rect_.tl()))
-              lookup.add(square.x + x, square.y + y, &visible[y][x]);
-          }
-        }
+        const int x = i * kStep + 1, y = j * kStep + 1;
+        wanted[y][x] = wanted[y - 1][x] = wanted[y + 1][x] = wanted[y][x - 1] = wanted[y][x + 1] =
+            true;
+      }
+    }
+    Lookup lookup(*this);
+    for (int y = 0; y < kCorners; ++y) {
+      for (int x = 0; x < kCorners; ++x) {
+        if (wanted[y][x])
+          lookup.add(square.x + kCorner + x, square.y + kCorner + y, &corners[y][x]);
       }
     }
     lookup.look();
+    for (int y = 0; y < kSquare; ++y)
+      eightAt(visible[y]) = 0.25f * (eightAt(corners[y]) + eightAt(corners[y] + 1) +
+                                     eightAt(corners[y + 1]) + eightAt(corners[y + 1] + 1));
     write(square, here, visible);
   }
 
   static void interpolate(const float (&grid)[kPlaces][kPlaces],
-                          float (&visible)[kSquare][kSquare]) {
+                          float (&corners)[kCorners][kCorners]) {
     static_assert(kSquare == 8 && kStep == 2);
-    Eight lines[kPlaces];
     for (int j = 0; j < kPlaces; ++j) {
       const float* g = grid[j];
       const Eight left = {g[0], g[0], g[1], g[1], g[2], g[2], g[3], g[3]},
                   right = {g[1], g[1], g[2], g[2], g[3], g[3], g[4], g[4]},
                   parts = {0.0f, 0.5f, 0.0f, 0.5f, 0.0f, 0.5f, 0.0f, 0.5f};
-      lines[j] = left + (right - left) * parts;
+      eightAt(corners[2 * j]) = left + (right - left) * parts;
+      corners[2 * j][kSquare] = g[kPlaces - 1];
     }
-    for (int j = 0; j + 1 < kPlaces; ++j) {
-      eightAt(visible[2 * j]) = lines[j];
-      eightAt(visible[2 * j + 1]) = lines[j] * 0.5f + lines[j + 1] * 0.5f;
+    for (int j = 1; j < kCorners; j += 2) {
+      for (int i = 0; i < kCorners; ++i)
+        corners[j][i] = 0.5f * (corners[j - 1][i] + corners[j + 1][i]);
     }
   }
 
@@ -188,7 +199,8 @@ class Squares {
       const std::uint8_t* kept = out_.ptr<std::uint8_t>(y);
       float* at = &visible[y + rect_.y - square.y][rect_.x - square.x + here.x];
       for (int x = here.x; x < here.br().x; ++x)
-        lookup.add(x + rect_.x, y + rect_.y, at++, kept[x] / 255.0f);
+        lookup.add(static_cast<float>(x + rect_.x), static_cast<float>(y + rect_.y), at++,
+                   kept[x] / 255.0f);
     }
     lookup.look();
     write(square, here, visible);
