@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fill/line_bridge.hpp"
+#include "fill/line_ends.hpp"
 #include "fill/patch_fill.hpp"
 #include "fill/seam_blend.hpp"
 #include "fill/seam_cut.hpp"
@@ -78,7 +79,7 @@ struct Lines {
     hole(cv::Rect(110, 50, 100, 100)).setTo(255);
     truth = image.clone();
     image.setTo(cv::Scalar::all(0), hole);
-    return bridgeLines(hole, hole == 0, surface, image);
+    return bridgeLines(straightEdges(hole == 0, image), hole, hole == 0, surface, image);
   }
 };
 

@@ -4,20 +4,17 @@
 
 #include <exception>
 #include <functional>
+#include <vector>
 
 namespace calipso::render {
 
-// Pieces of work that do not need each other's results: on few threads at the same time, each on one
-// of them, so that nobody waits at the end of every short loop in them; else one after the other,
-// their loops on all threads. They are begun in their order: the longest should be the first.
-// @param alike whether the threads get about as much to do
-template <class... Work>
-void sideBySide(bool alike, const Work&... work) {
-  constexpr int kFewThreads = 3, kCount = sizeof...(work);
-  const std::function<void()> works[] = {work...};
-  std::exception_ptr failures[kCount];  // none may leave the region
-#pragma omp parallel for schedule(dynamic, 1) if (alike && omp_get_max_threads() <= kFewThreads)
-  for (int i = 0; i < kCount; ++i) {
+// Pieces of work that do not need each other's results, each on one thread, begun in their order: the
+// longest should be the first.
+// @param at_once else one after the other, their loops on all threads
+inline void doAll(bool at_once, const std::vector<std::function<void()>>& works) {
+  std::vector<std::exception_ptr> failures(works.size());  // none may leave the region
+#pragma omp parallel for schedule(dynamic, 1) if (at_once && works.size() > 1)
+  for (std::size_t i = 0; i < works.size(); ++i) {
     try {
       works[i]();
     } catch (...) {
@@ -27,6 +24,14 @@ void sideBySide(bool alike, const Work&... work) {
   for (const std::exception_ptr& failure : failures) {
     if (failure) std::rethrow_exception(failure);
   }
+}
+
+// The same at once on few threads, so that nobody waits at the end of every short loop in them.
+// @param alike whether the threads get about as much to do
+template <class... Work>
+void sideBySide(bool alike, const Work&... work) {
+  constexpr int kFewThreads = 3;
+  doAll(alike && omp_get_max_threads() <= kFewThreads, {work...});
 }
 
 }  // namespace calipso::render

@@ -1,6 +1,7 @@
 #include "calipso_render/inpaint.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "fill/hidden_sky.hpp"
 #include "fill/lattice.hpp"
 #include "fill/line_bridge.hpp"
+#include "fill/line_ends.hpp"
 #include "fill/patch_fill.hpp"
 #include "fill/plane_chart.hpp"
 #include "fill/seam_blend.hpp"
@@ -87,16 +89,18 @@ cv::Mat planesOf(const InpaintParams& params) {
   return planes;
 }
 
+// @param edges straightEdges() of the picture
+// @param look is filled
 // @param known CV_8UC1: what the filling has to go with; source, of it: what may be copied
-Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const Lattice* lattice,
-             InpaintParams params) {
+Filling fill(const std::vector<cv::Vec4f>& edges, cv::Mat look, cv::Mat to_fill, cv::Mat source,
+             cv::Mat known, const Lattice* lattice, InpaintParams params) {
   const cv::Mat whole_hole = to_fill.clone();
-  const LineBridges bridges = bridgeLines(to_fill, source, params.surface, look, lattice);
+  const LineBridges bridges = bridgeLines(edges, to_fill, source, params.surface, look, lattice);
   to_fill.setTo(0, bridges.core);
   known |= bridges.core;
   source.setTo(0, bridges.lines);
   if (!params.sky.empty()) params.sky = hiddenSky(copiedSky(params.sky, bridges.origin));
-  Filling f{look.clone(), patchOrigins(look, to_fill, source, lattice, params)};
+  Filling f{look, patchOrigins(look, to_fill, source, lattice, params)};
   cutSeams(look, to_fill, source, known, params, f.origin);
   const cv::Mat without = to_fill & (copyFrom(f.origin, look, f.image) == 0);
   if (cv::countNonZero(without) > 0) smoothFill(look, to_fill, known).copyTo(f.image, without);
@@ -110,8 +114,9 @@ Filling fill(cv::Mat look, cv::Mat to_fill, cv::Mat source, cv::Mat known, const
 // A picture on its way to being filled.
 struct Canvas {
   cv::Mat look, hole, source, known;
-  cv::Mat origin;  // CV_16SC2
-  cv::Mat lift;    // InpaintResult::lift
+  cv::Mat origin;                               // CV_16SC2
+  cv::Mat lift;                                 // InpaintResult::lift
+  std::optional<std::vector<cv::Vec4f>> edges;  // straightEdges(), once sought
 
   void set(const cv::Point& p, const cv::Vec3f& colour, const cv::Point& from) {
     for (int c = 0; c < 3; ++c) look.at<cv::Vec3f>(p)[c] = std::clamp(colour[c], 0.0f, 255.0f);
@@ -137,12 +142,14 @@ struct PlanePart {
   cv::Mat plain;  // CV_32FC3, the picture; where the plane is not seen it goes on smoothly
   cv::Mat look;   // CV_32FC3, so, too
   cv::Mat hole, known, source;
+  std::vector<cv::Vec4f> edges;  // straightEdges(), of look
 };
 
 PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen) {
   cv::Mat copied_from;  // around which a sample sees nothing else
   cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
-  PlanePart part{chart, {}, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from)};
+  PlanePart part{chart, {}, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from),
+                 {}};
   part.known &= part.hole == 0, part.source &= part.hole == 0;
   return part;
 }
@@ -152,6 +159,7 @@ void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
   part.plain = smoothFill(look, seen == 0, seen);
   part.look = part.chart.carried(part.plain);
   smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
+  part.edges = straightEdges(part.source, part.look);
 }
 
 // Every pixel of a plane's hole as the chart's nearest one was filled: a sample of the picture, as
@@ -186,29 +194,22 @@ void copyBack(const PlanePart& part, const Filling& filled, const cv::Mat& wante
 // A plane that the hole hides.
 struct HiddenPlane {
   const cv::Matx33d& to_plane;
-  bool supports;       // something stands on it
-  cv::Mat hole, seen;  // CV_8UC1: where it is hidden; where it may be copied from
+  bool supports;                  // something stands on it
+  cv::Mat hole, seen;             // CV_8UC1: where it is hidden; where it may be copied from
+  std::optional<PlanePart> part;  // nothing if it cannot be filled along itself
 };
 
-// Nothing if it cannot be filled along itself. What else is filled makes no difference.
-std::optional<PlanePart> chartedPart(const HiddenPlane& plane, const cv::Mat& look) {
+std::optional<PlanePart> chartedPart(const HiddenPlane& plane) {
   const std::optional<PlaneChart> chart = planeChart(plane.to_plane, plane.hole, plane.seen);
   if (!chart) return std::nullopt;
   PlanePart part = partOf(*chart, plane.hole, plane.seen);
   if (cv::countNonZero(part.hole) == 0 || cv::countNonZero(part.source) == 0) return std::nullopt;
-  const cv::Rect near = windowAround(part.hole, kLatticeMargin, kLatticeMargin);
-  std::optional<Lattice> lattice;
-  const auto seek = [&] { lattice = findLattice(chart->carried(look, near), part.source(near)); };
-  const auto see = [&] { addLook(look, plane.seen, part); };
-  if (plane.supports && chart->tilted) {
-    sideBySide(true, seek, see);
-  } else {
-    seek();
-    if (!lattice) return std::nullopt;
-    see();
-  }
-  part.lattice = lattice;
   return part;
+}
+
+void addLattice(const cv::Mat& look, PlanePart& part) {
+  const cv::Rect near = windowAround(part.hole, kLatticeMargin, kLatticeMargin);
+  part.lattice = findLattice(part.chart.carried(look, near), part.source(near));
 }
 
 // Fills a plane's part of the hole with copies shifted along the plane.
@@ -222,25 +223,56 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
   const cv::Mat wanted =
       lattice ? goesOnByLattice(*lattice, part.look, part.known, part.hole) : part.hole;
   copyBack(part,
-           fill(part.look.clone(), part.hole.clone(), part.source.clone(), part.known.clone(),
+           fill(part.edges, part.look, part.hole.clone(), part.source.clone(), part.known.clone(),
                 lattice, inner),
            wanted, plane.hole, canvas);
 }
 
-void fillPlanes(const InpaintParams& params, Canvas& canvas) {
+std::vector<HiddenPlane> hiddenPlanes(const InpaintParams& params, const Canvas& canvas) {
   std::vector<HiddenPlane> planes;
   for (std::size_t k = 0; k < params.planes.size(); ++k) {
     const cv::Mat here = params.surface == static_cast<double>(k + 1),
                   hidden = canvas.hole & here & params.sure;
     if (cv::countNonZero(hidden) >= kFewestOnPlane)
-      planes.push_back(
-          {params.planes[k], static_cast<int>(k) < params.supports, hidden, canvas.source & here});
+      planes.push_back({params.planes[k],
+                        static_cast<int>(k) < params.supports,
+                        hidden,
+                        canvas.source & here,
+                        {}});
   }
-  std::vector<std::optional<PlanePart>> parts(planes.size());
+  return planes;
+}
+
+// What is sought in the picture before any of it is filled, at the same time.
+void lookAround(std::vector<HiddenPlane>& planes, Canvas& canvas) {
 #pragma omp parallel for schedule(dynamic, 1) if (planes.size() > 1)
-  for (std::size_t i = 0; i < planes.size(); ++i) parts[i] = chartedPart(planes[i], canvas.look);
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    if (parts[i]) fillPlane(planes[i], *parts[i], params, canvas);
+  for (std::size_t i = 0; i < planes.size(); ++i) planes[i].part = chartedPart(planes[i]);
+  cv::Mat rest = canvas.hole.clone();
+  std::vector<std::function<void()>> looks, lattices, later;
+  for (HiddenPlane& plane : planes) {
+    if (!plane.part) continue;
+    const bool anyway = plane.supports && plane.part->chart.tilted;
+    lattices.push_back([&] { addLattice(canvas.look, *plane.part); });
+    (anyway ? looks : later).push_back([&, anyway] {
+      if (anyway || plane.part->lattice)
+        addLook(canvas.look, plane.seen, *plane.part);
+      else
+        plane.part.reset();
+    });
+    if (anyway) rest.setTo(0, plane.hole);
+  }
+  if (cv::countNonZero(rest) > 0)
+    lattices.push_back([&] { canvas.edges = straightEdges(canvas.source, canvas.look); });
+  looks.insert(looks.end(), lattices.begin(), lattices.end());
+  doAll(true, looks);
+  doAll(true, later);
+}
+
+void fillPlanes(const InpaintParams& params, Canvas& canvas) {
+  std::vector<HiddenPlane> planes = hiddenPlanes(params, canvas);
+  lookAround(planes, canvas);
+  for (const HiddenPlane& plane : planes) {
+    if (plane.part) fillPlane(plane, *plane.part, params, canvas);
   }
 }
 
@@ -262,13 +294,22 @@ cv::Mat supportsTrend(const InpaintParams& params, Canvas& canvas) {
   return trend;
 }
 
+std::vector<cv::Vec4f> edgesIn(const cv::Rect& window, const Canvas& canvas) {
+  std::vector<cv::Vec4f> edges =
+      canvas.edges ? *canvas.edges : straightEdges(canvas.source, canvas.look);
+  const cv::Vec4f corner(window.x, window.y, window.x, window.y);
+  for (cv::Vec4f& edge : edges) edge -= corner;
+  return edges;
+}
+
 void fillRest(const InpaintParams& params, Canvas& canvas) {
   const cv::Rect window = windowAround(canvas.hole);
   const cv::Mat hole = canvas.hole(window), trend = supportsTrend(params, canvas)(window);
   InpaintParams here = params;
   if (!params.sky.empty()) here.sky = copiedSky(params.sky, canvas.origin);
-  Filling rest = fill(canvas.look(window) - trend, hole.clone(), canvas.source(window).clone(),
-                      canvas.known(window).clone(), nullptr, within(window, here));
+  Filling rest = fill(edgesIn(window, canvas), canvas.look(window) - trend, hole.clone(),
+                      canvas.source(window).clone(), canvas.known(window).clone(), nullptr,
+                      within(window, here));
   rest.image += trend;
   rest.image.copyTo(canvas.look(window), hole);
   cv::Mat lift = canvas.lift(window);
@@ -295,8 +336,13 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
                        cv::Mat::zeros(image.size(), CV_32FC3), true};
   if (cv::countNonZero(hole) == 0) return result;
   const cv::Rect window = windowAround(hole);
-  Canvas canvas{image(window).clone(),         hole(window) != 0,  hole(window) == 0, {},
-                result.origin(window).clone(), result.lift(window)};
+  Canvas canvas{image(window).clone(),
+                hole(window) != 0,
+                hole(window) == 0,
+                {},
+                result.origin(window).clone(),
+                result.lift(window),
+                {}};
   if (!banned.empty()) canvas.source.setTo(0, banned(window));
   canvas.known = canvas.source.clone();
   const InpaintParams inner = within(window, params);

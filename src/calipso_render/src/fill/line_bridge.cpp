@@ -43,8 +43,8 @@ class Bridger {
     result_.origin = cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   }
 
-  LineBridges run(const Lattice* lattice) {
-    ends_ = findLineEnds(hole_, source_, image_);
+  LineBridges run(const std::vector<cv::Vec4f>& edges, const Lattice* lattice) {
+    ends_ = findLineEnds(edges, hole_, source_, image_);
     if (lattice != nullptr) {
       ends_.erase(std::remove_if(
                       ends_.begin(), ends_.end(),
@@ -270,9 +270,10 @@ class Bridger {
 
 }  // namespace
 
-LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& surface,
-                        cv::Mat& image, const Lattice* lattice) {
-  return Bridger(hole, source, surface, image).run(lattice);
+LineBridges bridgeLines(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
+                        const cv::Mat& source, const cv::Mat& surface, cv::Mat& image,
+                        const Lattice* lattice) {
+  return Bridger(hole, source, surface, image).run(edges, lattice);
 }
 
 }  // namespace calipso::render

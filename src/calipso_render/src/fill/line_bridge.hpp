@@ -1,6 +1,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "fill/lattice.hpp"
 
@@ -21,11 +22,13 @@ struct LineBridges {
 // and with the same colours across, are connected; one that meets such a connection within the hole
 // goes on to it, unless another surface comes between. What lies a few pixels beside the line is drawn with it, mirrored from outside the
 // hole, so that it keeps its grain.
+// @param edges straightEdges() of the picture
 // @param image CV_32FC3, code values; drawn upon
 // @param hole, source CV_8UC1: to be filled; known
 // @param surface InpaintParams::surface, of the hole's picture; may be empty
 // @param lattice by which the picture repeats itself, may be nullptr: its lines are left to it
-LineBridges bridgeLines(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& surface,
-                        cv::Mat& image, const Lattice* lattice = nullptr);
+LineBridges bridgeLines(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
+                        const cv::Mat& source, const cv::Mat& surface, cv::Mat& image,
+                        const Lattice* lattice = nullptr);
 
 }  // namespace calipso::render

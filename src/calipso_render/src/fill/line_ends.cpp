@@ -40,14 +40,8 @@ class LineEndFinder {
     cv::distanceTransform(hole == 0, away_, cv::DIST_L2, 3);
   }
 
-  std::vector<LineEnd> run() {
-    cv::Mat weight(hole_.size(), CV_32F, cv::Scalar(0.0f)), grey;
-    weight.setTo(1.0f, source_);
-    cv::cvtColor(image_, grey, cv::COLOR_BGR2GRAY);
-    pushPull(grey, weight).convertTo(grey, CV_8U);
-    std::vector<cv::Vec4f> segments;
-    cv::createLineSegmentDetector(cv::LSD_REFINE_STD)->detect(grey, segments);
-    for (const cv::Vec4f& s : segments) {
+  std::vector<LineEnd> run(const std::vector<cv::Vec4f>& edges) {
+    for (const cv::Vec4f& s : edges) {
       addEnd({s[0], s[1]}, {s[2], s[3]});
       addEnd({s[2], s[3]}, {s[0], s[1]});
     }
@@ -82,8 +76,9 @@ class LineEndFinder {
     const cv::Point2f into = way / length;
     // The last place that is known, and the hole soon after it.
     while (length >= kShortest && !isSet(source_, to)) to -= into, length -= 1.0f;
-    if (length < kShortest || away_.at<float>(cv::Point(cvRound(to.x - kLast * into.x),
-                                                        cvRound(to.y - kLast * into.y))) < kClear)
+    const cv::Point before(cvRound(to.x - kLast * into.x), cvRound(to.y - kLast * into.y));
+    if (length < kShortest || !cv::Rect({0, 0}, hole_.size()).contains(before) ||
+        away_.at<float>(before) < kClear)
       return;
     float reach = 1.0f;
     while (reach <= kFarthest && !isSet(hole_, to + reach * into)) reach += 1.0f;
@@ -201,9 +196,19 @@ class LineEndFinder {
 
 bool LineEnd::isThin() const { return rms(beside[0] - beside[1]) < kThin * contrast; }
 
-std::vector<LineEnd> findLineEnds(const cv::Mat& hole, const cv::Mat& source,
-                                  const cv::Mat& image) {
-  return LineEndFinder(hole, source, image).run();
+std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image) {
+  cv::Mat weight(image.size(), CV_32F, cv::Scalar(0.0f)), grey;
+  weight.setTo(1.0f, source);
+  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+  pushPull(grey, weight).convertTo(grey, CV_8U);
+  std::vector<cv::Vec4f> edges;
+  cv::createLineSegmentDetector(cv::LSD_REFINE_STD)->detect(grey, edges);
+  return edges;
+}
+
+std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
+                                  const cv::Mat& source, const cv::Mat& image) {
+  return LineEndFinder(hole, source, image).run(edges);
 }
 
 bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,

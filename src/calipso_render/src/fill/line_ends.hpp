@@ -24,9 +24,14 @@ struct LineEnd {
   bool isThin() const;  // a line, not an edge between two things
 };
 
+// Straight edges of a picture, from end to end. @param source CV_8UC1: known; image CV_32FC3
+std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image);
+
 // Lines and edges that stand out from what is beside them and end at the hole, the longest first.
+// @param edges straightEdges() of the picture, of which more may be unknown now
 // @param image CV_32FC3, code values; hole, source CV_8UC1: to be filled; known
-std::vector<LineEnd> findLineEnds(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image);
+std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
+                                  const cv::Mat& source, const cv::Mat& image);
 
 // Is a line seen again at the shifts of a lattice that lead off it?
 bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,

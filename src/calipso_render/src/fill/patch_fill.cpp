@@ -1,8 +1,9 @@
 #include "fill/patch_fill.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <map>
+#include <cstdint>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -33,10 +34,11 @@ cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_c
 // they make.
 class Filling {
  public:
+  // @param level its picture is filled
   // @param horizon difference of nearness that does not count
   Filling(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
           const InpaintParams& params)
-      : image_(level.image.clone()),
+      : image_(level.image),
         hole_(level.hole),
         scale_(scale),
         rules_(level, scale, horizon, lattice, params),
@@ -49,9 +51,7 @@ class Filling {
     cv::Mat touched;
     cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
     cv::findNonZero(whole_, sources_);
-    for (const cv::Point& q : sources_) {
-      if (rules_.surfaceAt(q) != 0) of_surface_[rules_.surfaceAt(q)].push_back(q);
-    }
+    for (const cv::Point& q : sources_) has_source_[rules_.surfaceAt(q)] = true;
     cv::dilate(hole_, touched, patch);
     for (int v = kPatchRadius; v + kPatchRadius < hole_.rows; ++v) {
       for (int u = kPatchRadius; u + kPatchRadius < hole_.cols; ++u) {
@@ -119,6 +119,10 @@ class Filling {
           misled.at<std::uint8_t>(v, u) = 255;
       }
     }
+    if (cv::countNonZero(misled) == 0) return;
+    for (const cv::Point& q : sources_) {
+      if (rules_.surfaceAt(q) != 0) of_surface_[rules_.surfaceAt(q)].push_back(q);
+    }
     along_surfaces_ = true;
     peel(misled);
     along_surfaces_ = false;
@@ -149,6 +153,7 @@ class Filling {
   }
 
   // Every hole pixel becomes the mean of what the patches over it have there, good ones above all.
+  // Patches come from what is no hole.
   void vote() {
     std::vector<float> costs;
     for (const auto& band : bands_) {
@@ -157,30 +162,28 @@ class Filling {
     const std::size_t part = 3 * costs.size() / 4;
     std::nth_element(costs.begin(), costs.begin() + part, costs.end());
     const float scale = -0.5f / std::max(costs[part], 1.0f);
-    cv::Mat weights(hole_.size(), CV_32F, cv::Scalar(0.0f)), next = image_.clone();
+    cv::Mat weights(hole_.size(), CV_32F, cv::Scalar(0.0f));
     forEachPatch([&](const cv::Point& p) {
       weights.at<float>(p) = hasMatch(p) ? std::exp(scale * cost_.at<float>(p)) + 1e-6f : 0.0f;
     });
 #pragma omp parallel for schedule(dynamic, 4)
     for (int v = 0; v < hole_.rows; ++v) {
       for (int u = 0; u < hole_.cols; ++u) {
-        if (hole_.at<std::uint8_t>(v, u) != 0) next.at<cv::Vec4f>(v, u) = meanVote({u, v}, weights);
+        if (hole_.at<std::uint8_t>(v, u) != 0)
+          image_.at<cv::Vec4f>(v, u) = meanVote({u, v}, weights);
       }
     }
-    image_ = next;
   }
 
   // Every hole pixel becomes what the patch around it has there.
   void copy() {
     const cv::Mat from = origins();
-    cv::Mat next = image_.clone();
     for (int v = 0; v < hole_.rows; ++v) {
       for (int u = 0; u < hole_.cols; ++u) {
         const cv::Vec2s q = from.at<cv::Vec2s>(v, u);
-        if (q[0] >= 0) next.at<cv::Vec4f>(v, u) = image_.at<cv::Vec4f>(q[1], q[0]);
+        if (q[0] >= 0) image_.at<cv::Vec4f>(v, u) = image_.at<cv::Vec4f>(q[1], q[0]);
       }
     }
-    image_ = next;
   }
 
   cv::Mat origins() const {
@@ -204,14 +207,14 @@ class Filling {
   bool isWhole(const cv::Point& p) const { return inside(p) && whole_.at<std::uint8_t>(p) != 0; }
   // Where a place may be copied from.
   const std::vector<cv::Point>& sourcesOf(const cv::Point& p) const {
-    const auto own = along_surfaces_ ? of_surface_.find(rules_.surfaceAt(p)) : of_surface_.end();
-    return own != of_surface_.end() ? own->second : sources_;
+    const std::vector<cv::Point>& own = of_surface_[rules_.surfaceAt(p)];
+    return along_surfaces_ && !own.empty() ? own : sources_;
   }
   cv::Point oneOf(const std::vector<cv::Point>& from, const cv::Point& p, int salt) const {
     return from[random(p, salt) % from.size()];
   }
   bool isMisled(const cv::Point& p) const {
-    return hasMatch(p) && rules_.onOther(p, match(p)) && of_surface_.count(rules_.surfaceAt(p)) > 0;
+    return hasMatch(p) && rules_.onOther(p, match(p)) && has_source_[rules_.surfaceAt(p)];
   }
 
   // The nearest centre of a patch that lies within the picture.
@@ -351,8 +354,9 @@ class Filling {
   cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   std::vector<cv::Point> sources_;
-  std::map<int, std::vector<cv::Point>> of_surface_;  // of them those on each
-  bool along_surfaces_ = false;                       // a place's first guesses lie on its own
+  std::array<bool, 256> has_source_{};                  // by surface, and once they matter
+  std::array<std::vector<cv::Point>, 256> of_surface_;  // those on each
+  bool along_surfaces_ = false;                         // a place's first guesses lie on its own
   int sweep_ = 0;
 };
 

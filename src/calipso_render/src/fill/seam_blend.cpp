@@ -40,6 +40,7 @@ class Seams {
   std::vector<Node> nodes() const {
     cv::Mat index(hole_.size(), CV_32S, cv::Scalar(-1));
     std::vector<Node> nodes;
+    nodes.reserve(cv::countNonZero(hole_));
     for (int colour = 0; colour < 2; ++colour) {
       for (int v = 0; v < hole_.rows; ++v) {
         for (int u = (v + colour) % 2; u < hole_.cols; u += 2) {
