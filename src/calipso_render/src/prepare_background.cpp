@@ -194,7 +194,9 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
         "a shadow that the light predicts is not seen in the picture: none is taken out or drawn "
         "there; give the light if it is wrong, a depth image if a wall or a step is in its way");
   }
-  p.shadowless |= grown(shadows.refuted, params.background.shadow_margin_px);
+  cv::Mat without = grown(shadows.refuted, params.background.shadow_margin_px);
+  without.setTo(0, shadeTraces(shadows, place, params));  // the other light is hidden there
+  p.shadowless |= without;
   if (shadows.none) p.shadowless.setTo(255);
   return restingTraces(p, shadows, place, seenPast(e), params);
 }

@@ -381,9 +381,9 @@ TEST(PrepareBackground, WhatStandsBeforeAShadowKeepsItsPixels) {
   EXPECT_GT(cv::countNonZero(invented), kHeight);  // the ball, on both sides
 }
 
-// The ball over ground that is not plane, as the depth image has it, in sunlight.
-struct BallOverBumps {
-  const ObjectModel model = ballAt({0.0, 0.1, 0.12});
+// The ball over the table, or ground that is not plane, as the depth image has it, in sunlight.
+struct BallOverGround {
+  const ObjectModel model = ballAt({0.0, 0.1, 0.2});
   const Surface surface = makeSurface(model);
   ClipFrame frame = frameWithBall(model);
   RenderParams params;
@@ -392,8 +392,9 @@ struct BallOverBumps {
                 sunlight().direction.cast<double>(),
                 {512, 0.025, 16}};
 
-  BallOverBumps() {
+  explicit BallOverGround(float bumps) {
     params.planes = table();
+    frame.bgr.setTo(cv::Scalar::all(150), frame.labels == 0);
     params.depth = cv::Mat(kHeight, kWidth, CV_32F);
     const Eigen::Isometry3d from_world = camera().world_from_camera.inverse();
     const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
@@ -402,7 +403,7 @@ struct BallOverBumps {
         const bool ball = frame.labels.at<std::uint8_t>(v, u) != 0;
         Receiver seen = *receiverAt(table(), camera(), u, v);
         seen.position +=
-            (0.05f + 0.03f * std::sin(1.3f * u) * std::sin(1.1f * v)) * (eye - seen.position);
+            bumps * (5.0f + 3.0f * std::sin(1.3f * u) * std::sin(1.1f * v)) * (eye - seen.position);
         if (ball) seen.position = model.world_from_object.translation().cast<float>();
         params.depth.at<float>(v, u) =
             static_cast<float>((from_world * seen.position.cast<double>()).z());
@@ -414,7 +415,7 @@ struct BallOverBumps {
   }
 
   // @param confirmed by something besides shading
-  cv::Mat invented(bool confirmed) const {
+  Prepared prepared(bool confirmed, const Visibility& sky) const {
     ClipSample clip;
     clip.add(frame);
     Prepared p = prepare(clip, {model}, params);
@@ -426,19 +427,42 @@ struct BallOverBumps {
     frame.bgr.convertTo(picture, CV_32F);
     const std::vector<ClipFrame> frames = {frame};
     const Background seen = seenBackground(frames, false);
-    const ShadowMap sky({}, Eigen::Vector3d::UnitZ(), {});
     prepareBackground({frames, {}, actors, seen, picture, sun, sky, false}, params, p);
-    return p.background.invented;
+    return p;
   }
 };
 
 TEST(PrepareBackground, CurvedPlacesGiveUpTheShadowsOfAConfirmedLightAlone) {
-  const BallOverBumps place;
+  const BallOverGround place(0.01f);
+  const ShadowMap sky({}, Eigen::Vector3d::UnitZ(), {});
+  const auto invented = [&](bool confirmed) {
+    return cv::countNonZero(place.prepared(confirmed, sky).background.invented & place.shaded);
+  };
   const double shaded = cv::countNonZero(place.shaded);
   ASSERT_GT(shaded, 300);
-  EXPECT_GT(cv::countNonZero(place.invented(true) & place.shaded), 0.95 * shaded);
-  // ... but what the rim of the ball covers
-  EXPECT_LT(cv::countNonZero(place.invented(false) & place.shaded), 0.5 * shaded);
+  EXPECT_GT(invented(true), 0.95 * shaded);
+  EXPECT_LT(invented(false), 0.5 * shaded);  // ... but what the rim of the ball covers
+}
+
+// Spots all over the table that no sky reaches, as is predicted; the picture has none.
+class SpotsWithoutSky : public Visibility {
+ public:
+  float visibility(const Eigen::Vector3f& at, const Eigen::Vector3f&) const override {
+    const auto off = [](float x) { return x - 0.15f * std::round(x / 0.15f); };
+    return std::hypot(off(at.x()), off(at.y())) < 0.03f ? 0.0f : 1.0f;
+  }
+  bool empty() const override { return false; }
+  std::optional<float> uniform(const Eigen::Vector3f&, const Eigen::Vector3f&,
+                               float) const override {
+    return std::nullopt;
+  }
+};
+
+TEST(PrepareBackground, WhereTheSunIsHiddenASkyThatIsNotChangesNothing) {
+  const BallOverGround place(0.0f);
+  const Prepared p = place.prepared(true, SpotsWithoutSky());
+  EXPECT_GT(cv::countNonZero(p.shadowless), 100);
+  EXPECT_EQ(cv::countNonZero(p.shadowless & place.shaded), 0);
 }
 
 }  // namespace
