@@ -133,10 +133,14 @@ LightFit lightOf(const std::vector<View>& views, const Background& seen, bool an
       lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background(), params.depth);
   const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
   LightFit fit = fitLight(evidence, params.up.cast<float>(), view);
-  if (fit.from_shadows)
-    fit.light.direction = directionByBorders(views, params.planes, params.depth, fit.light)
-                              .value_or(fit.light.direction);
   fit.light.angular_radius = static_cast<float>(params.sun_radius);
+  const auto sun = fit.from_shadows
+                       ? sunByBorders(views, params.planes, params.depth, fit.light, p.outline_blur)
+                       : std::nullopt;
+  if (sun) {
+    fit.light.direction = sun->direction;
+    fit.light.angular_radius = sun->radius.value_or(fit.light.angular_radius);
+  }
   return fit;
 }
 
@@ -179,6 +183,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   if (!cameraMoves(clip)) coverWhatRests(p, frames);
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, steadiness);
+  p.outline_blur = outlineBlur(picture, p.key_labels);
   const std::vector<Actor> actors = keyActors(p);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   Stopwatch watch;
@@ -205,7 +210,6 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
     p.beside = platesBeside(clip.frames(), p.nearness, any_moves, params.background);
   p.background_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness, p);
-  p.outline_blur = outlineBlur(picture, p.key_labels);
   addRemarks(clip.frames(), actors, p);
   return p;
 }

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "calipso_render/rasterizer.hpp"
-#include "draw/ray_scene.hpp"
+#include "calipso_render/ray_shadow.hpp"
 #include "render_test_scene.hpp"
 
 namespace calipso::render {
@@ -21,17 +21,18 @@ Camera closeCamera() {
   return c;
 }
 
-// A ball above a plain table, and its shadow as dark as `shade` of the light.
+// A ball above a plain table, and its shadow as dark as `shade` of the light, of a sun of `radius`.
 struct Setting {
   Surface surface = makeSurface(ballAt({-0.1, 0.0, 0.2}));
   View view{{}, {}, closeCamera(), {makeActor(surface, surface.key_vertices, closeCamera())}};
 
-  explicit Setting(float shade) {
+  explicit Setting(float shade, double radius = 1e-4) {
     constexpr int kParts = 3;  // of a pixel, each way
     const cv::Size size(view.camera.width, view.camera.height);
     view.picture = cv::Mat(size, CV_32FC3), view.labels = cv::Mat::zeros(size, CV_8U);
     const Actor& ball = view.actors[0];
-    const RayScene objects({{&ball.vertices, &surface.triangles, surface.winding}});
+    const RayShadow sun({{&ball.vertices, &surface.triangles, surface.winding}},
+                        kSun.cast<double>(), {radius, 24});
     VisibilityBuffer seen({{0, 0}, size});
     seen.draw(ball.screen, 0);
     cv::RNG random(5);
@@ -39,14 +40,14 @@ struct Setting {
       for (int u = 0; u < size.width; ++u) {
         if (seen.ids(v)[u] != VisibilityBuffer::kNothing)
           view.labels.at<std::uint8_t>(v, u) = kBallLabel;
-        int shaded = 0;
+        float part = 0.0f;  // in shade
         for (int k = 0; k < kParts * kParts; ++k) {
           const auto table_there = receiverAt(table(), view.camera, u + (k % kParts - 1) / 3.0f,
                                               v + (k / kParts - 1) / 3.0f);
-          shaded +=
-              table_there && objects.blocked(table_there->position, table_there->normal, kSun);
+          if (table_there)
+            part += (1.0f - sun.visibility(table_there->position, table_there->normal)) /
+                    (kParts * kParts);
         }
-        const float part = static_cast<float>(shaded) / (kParts * kParts);
         view.picture.at<cv::Vec3f>(v, u) =
             cv::Vec3f::all(codeFromLinear(0.3f * (1.0f - part * (1.0f - shade))) +
                            static_cast<float>(random.gaussian(1.0)));
@@ -54,11 +55,11 @@ struct Setting {
     }
   }
 
-  std::optional<Eigen::Vector3f> directionFrom(const Eigen::Vector3f& start,
-                                               const std::vector<SupportPlane>& planes) const {
+  std::optional<SunByBorders> sunFrom(const Eigen::Vector3f& start,
+                                      const std::vector<SupportPlane>& planes) const {
     Light light;
     light.direction = start.normalized();
-    return directionByBorders({view}, planes, cv::Mat(), light);
+    return sunByBorders({view}, planes, cv::Mat(), light, 0.0f);
   }
 };
 
@@ -70,18 +71,27 @@ TEST(ShadowBorders, PutTheSunWhereItsShadowsLie) {
   const Setting setting(0.5f);
   const Eigen::Vector3f s = kSun.unitOrthogonal(), t = kSun.cross(s);
   for (const Eigen::Vector3f& off : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)}) {
-    const auto found = setting.directionFrom(kSun + 0.014f * off, table());  // 0.8 degrees
+    const auto found = setting.sunFrom(kSun + 0.014f * off, table());  // 0.8 degrees
     ASSERT_TRUE(found);
     // A pixel is a quarter of a degree, and some forty borders tell a fifth of one.
-    EXPECT_LT(degreesBetween(*found, kSun), 0.15);
+    EXPECT_LT(degreesBetween(found->direction, kSun), 0.15);
+  }
+}
+
+TEST(ShadowBorders, AreAsSoftAsTheSunIsLarge) {
+  for (const double radius : {0.02, 0.04}) {
+    const auto found = Setting(0.5f, radius).sunFrom(kSun, table());
+    ASSERT_TRUE(found && found->radius);
+    // Borders are 3 and 6 px wide, told to a fifth or so, and a lower quantile counts.
+    EXPECT_NEAR(*found->radius, radius, 0.3 * radius);
   }
 }
 
 TEST(ShadowBorders, TellNothingWhereNoneAreSeen) {
-  EXPECT_FALSE(Setting(1.0f).directionFrom(kSun, table()));
-  EXPECT_FALSE(Setting(0.5f).directionFrom(kSun, {}));
+  EXPECT_FALSE(Setting(1.0f).sunFrom(kSun, table()));
+  EXPECT_FALSE(Setting(0.5f).sunFrom(kSun, {}));
   // The shadow is somewhere else.
-  EXPECT_FALSE(Setting(0.5f).directionFrom(kSun + Eigen::Vector3f(-0.6f, 0.0f, 0.0f), table()));
+  EXPECT_FALSE(Setting(0.5f).sunFrom(kSun + Eigen::Vector3f(-0.6f, 0.0f, 0.0f), table()));
 }
 
 }  // namespace

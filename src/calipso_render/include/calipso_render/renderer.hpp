@@ -72,9 +72,10 @@ struct RenderParams {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   BackgroundParams background;
   // What stands before edited objects, seen from the key frame's camera. Either may be empty.
-  cv::Mat depth;               // CV_32FC1, m along the optical axis; 0: unknown
-  cv::Mat matte;               // CV_8UC1, 255: stays in front
-  double sun_radius = 0.025;   // rad; the angular radius of the sun's disc with its glare
+  cv::Mat depth;  // CV_32FC1, m along the optical axis; 0: unknown
+  cv::Mat matte;  // CV_8UC1, 255: stays in front
+  // rad; the angular radius of the sun's disc with its glare, where no shadow's border tells it
+  double sun_radius = 0.025;
   bool add_noise = true;       // on rendered and invented pixels
   bool carry_residual = true;  // what drawing misses goes along with what moves little
   bool keep_still = true;      // what an edit does not move keeps the frame's own pixels

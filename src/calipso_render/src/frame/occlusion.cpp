@@ -41,7 +41,7 @@ void addReliefBounds(const Relief& relief, float sun_radius, const Points& verti
 }
 
 // Adds the feet of the sun's rays through the vertices on a plane, with the disc's spread.
-void addPlaneBounds(const SupportPlane& plane, double sun_radius, const Points& vertices,
+void addPlaneBounds(const SupportPlane& plane, float sun_radius, const Points& vertices,
                     const Eigen::Vector3f& sun, Points& shadow) {
   const Eigen::Vector3f n = plane.normal.cast<float>();
   const float slope = n.dot(sun);
@@ -79,17 +79,17 @@ std::unique_ptr<Visibility> sunVisibility(const std::vector<Occluder>& occluders
   const Eigen::Vector3d direction = light.direction.cast<double>();
   if (params.quality == Quality::kFinal)
     return std::make_unique<RayShadow>(occluders, direction,
-                                       RayShadow::Params{params.sun_radius, 24});
+                                       RayShadow::Params{light.angular_radius, 24});
   return std::make_unique<ShadowMap>(occluders, direction,
-                                     ShadowMap::Params{kShadowMapSide, params.sun_radius, 16});
+                                     ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
 }
 
 cv::Rect shadowBounds(const StagedFrame& frame, const Relief& relief, const Points& vertices,
                       const Eigen::Vector3f& sun) {
   Points shadow;
   for (const SupportPlane& plane : frame.params.planes)
-    addPlaneBounds(plane, frame.params.sun_radius, vertices, sun, shadow);
-  addReliefBounds(relief, static_cast<float>(frame.params.sun_radius), vertices, sun, shadow);
+    addPlaneBounds(plane, frame.light.angular_radius, vertices, sun, shadow);
+  addReliefBounds(relief, frame.light.angular_radius, vertices, sun, shadow);
   return boundsOf(projectMesh(shadow, {}, frame.input.camera), kShadowBoundsMargin,
                   frame.input.bgr.size());
 }

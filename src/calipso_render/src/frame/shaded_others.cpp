@@ -38,8 +38,7 @@ ShadedOthers::ShadedOthers(const StagedFrame& frame, const MovedShadow& moved,
     if (frame.objects[other].edited || !frame.objects[other].actor.surface->in_video) continue;
     for (std::size_t slot = 0; slot < maybe_.size() && !maybe_[other]; ++slot) {
       if (frame.objects[slot].edited)
-        maybe_[other] =
-            boxes[slot].mayShade(boxes[other], static_cast<float>(frame.params.sun_radius));
+        maybe_[other] = boxes[slot].mayShade(boxes[other], frame.light.angular_radius);
     }
     any_ = any_ || maybe_[other];
   }

@@ -32,9 +32,22 @@ constexpr float kLeastShift = 15.0f;  // px per rad: less tells nothing
 constexpr float kKnown = 0.01f;       // rad, to which the sun is known before
 constexpr float kError = 1.0f;        // px, of a border's place
 constexpr int kReweightings = 10;
+// Its softness: of the borders that move most with the sun this part tells it, by this quantile of
+// them, as what lies beside a border makes it look softer, never sharper, ...
+constexpr std::size_t kSoftPart = 3, kSoftQuantile = 4;
+constexpr float kLeastLever = 60.0f;  // ... px per rad, if they move as much
+// px^2: of a pixel's own width, and of places across a border told to a pixel
+constexpr float kPixels = 2.0f / 12.0f;
+constexpr float kSmallest = 0.002f, kLargest = 0.06f;  // rad: suns
+
+// A step of brightness across a border.
+struct Step {
+  float at, width;  // px: from the place outwards; standard deviation
+};
 
 struct Border {
   float offset;           // px outwards, from where it is expected
+  float width;            // px, standard deviation
   Eigen::Vector2f shift;  // px outwards, if the sun moves by 1 rad along either axis
 };
 
@@ -67,9 +80,19 @@ class Steps {
   float rise_[kWidths][kSize];
 };
 
-// Where a profile has a step up that explains it, as v = a + b s(x) + c x: besides shade itself the
+// The width between those that were tried, by a parabola through what they leave.
+float widthBetween(const std::array<double, kWidths>& left, int best) {
+  double by = 0.0;
+  if (best > 0 && best + 1 < kWidths) {
+    const double bend = left[best - 1] - 2.0 * left[best] + left[best + 1];
+    by = bend > 0.0 ? 0.5 * (left[best - 1] - left[best + 1]) / bend : 0.0;
+  }
+  return kNarrowest * std::pow(kWider, static_cast<float>(best + by));
+}
+
+// The step up in a profile that explains it, as v = a + b s(x) + c x: besides shade itself the
 // sky that objects hide makes it slope.
-std::optional<float> stepIn(const Profile& profile, const Steps& steps) {
+std::optional<Step> stepIn(const Profile& profile, const Steps& steps) {
   constexpr int kCount = 2 * kAcross + 1;
   double mean = 0.0, xx = 0.0, xv = 0.0, vv = 0.0;
   for (const float v : profile.values) mean += v / kCount;
@@ -77,8 +100,10 @@ std::optional<float> stepIn(const Profile& profile, const Steps& steps) {
     const double x = i - kAcross, v = profile.values[i] - mean;
     xx += x * x, xv += x * v, vv += v * v;
   }
-  double least = vv;
-  std::optional<float> found;
+  std::array<double, kWidths> least;  // squares left by the best step of each width
+  least.fill(vv);
+  std::optional<float> at;
+  int best = 0;
   constexpr int kEdges = static_cast<int>(kFurthest) * Steps::kParts;
   for (int w = 0; w < kWidths; ++w) {
     for (int edge = -kEdges; edge <= kEdges; ++edge) {
@@ -90,17 +115,20 @@ std::optional<float> stepIn(const Profile& profile, const Steps& steps) {
       }
       const double spread = ss - s * s / kCount - sx * sx / xx,
                    height = spread > 1e-6 ? (sv - sx * xv / xx) / spread : 0.0,
-                   slope = (xv - height * sx) / xx, at = static_cast<double>(edge) / Steps::kParts,
-                   shaded = mean - height * s / kCount + slope * at,
+                   slope = (xv - height * sx) / xx,
+                   here = static_cast<double>(edge) / Steps::kParts,
+                   shaded = mean - height * s / kCount + slope * here,
                    left = vv - xv * xv / xx - height * height * spread;
-      if (height < kContrast || shaded > kDarker * (shaded + height) || left >= least) continue;
-      least = left;
-      found = std::sqrt(std::max(0.0, left) / kCount) < kMisfit * height
-                  ? std::make_optional(static_cast<float>(at))
-                  : std::nullopt;
+      if (height < kContrast || shaded > kDarker * (shaded + height) || left >= least[w]) continue;
+      least[w] = left;
+      if (left > least[best]) continue;
+      best = w;
+      at = std::sqrt(std::max(0.0, left) / kCount) < kMisfit * height
+               ? std::make_optional(static_cast<float>(here))
+               : std::nullopt;
     }
   }
-  return found;
+  return at ? std::make_optional(Step{*at, widthBetween(least, best)}) : std::nullopt;
 }
 
 // Those of one view.
@@ -169,7 +197,7 @@ class Borders {
     const auto profile = profileAt(place, n);
     const auto step = profile ? stepIn(*profile, steps) : std::nullopt;
     if (!step) return std::nullopt;
-    return Border{*step - profile->expected, shift};
+    return Border{step->at - profile->expected, step->width, shift};
   }
 
   // nullopt where something else than the planes is near.
@@ -248,11 +276,28 @@ Eigen::Vector2f turnBy(const std::vector<Border>& borders) {
   return turn;
 }
 
+// Radius of the sun's disc by the softness of the borders: a disc's edge of so many pixels' radius
+// deviates by half of them. @param blur px, of a sharp edge in the picture
+std::optional<float> radiusBy(std::vector<Border> borders, float blur) {
+  std::sort(borders.begin(), borders.end(), [](const Border& a, const Border& b) {
+    return a.shift.squaredNorm() > b.shift.squaredNorm();
+  });
+  borders.resize(borders.size() / kSoftPart);
+  if (borders.back().shift.norm() < kLeastLever) return std::nullopt;
+  std::vector<float> radii;
+  for (const Border& b : borders)
+    radii.push_back(2.0f * std::sqrt(std::max(0.0f, b.width * b.width - blur * blur - kPixels)) /
+                    b.shift.norm());
+  const auto quantile = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / kSoftQuantile);
+  std::nth_element(radii.begin(), quantile, radii.end());
+  return std::clamp(*quantile, kSmallest, kLargest);
+}
+
 }  // namespace
 
-std::optional<Eigen::Vector3f> directionByBorders(const std::vector<View>& views,
-                                                  const std::vector<SupportPlane>& planes,
-                                                  const cv::Mat& depth, const Light& light) {
+std::optional<SunByBorders> sunByBorders(const std::vector<View>& views,
+                                         const std::vector<SupportPlane>& planes,
+                                         const cv::Mat& depth, const Light& light, float blur) {
   if (planes.empty()) return std::nullopt;
   const std::size_t count = std::min(views.size(), kViews);
   std::vector<std::vector<Border>> seen(count);
@@ -266,7 +311,9 @@ std::optional<Eigen::Vector3f> directionByBorders(const std::vector<View>& views
   if (borders.size() < kFewest) return std::nullopt;
   const Eigen::Vector2f turn = turnBy(borders);
   const Eigen::Vector3f e = light.direction.unitOrthogonal();
-  return (light.direction + turn.x() * e + turn.y() * light.direction.cross(e)).normalized();
+  return SunByBorders{
+      (light.direction + turn.x() * e + turn.y() * light.direction.cross(e)).normalized(),
+      radiusBy(std::move(borders), blur)};
 }
 
 }  // namespace calipso::render

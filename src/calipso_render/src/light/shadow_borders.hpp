@@ -9,16 +9,24 @@
 
 namespace calipso::render {
 
-// Direction of a sun that is nearly known, such that the borders of the shadows that it casts on
-// the support planes lie where the pictures show them: each is sought across itself, as a step of
-// brightness, and by linear least squares
+struct SunByBorders {
+  Eigen::Vector3f direction;  // unit, towards it, world
+  std::optional<float>
+      radius;  // rad, of its disc; none: no border is far enough from what casts it
+};
+
+// A sun that is nearly known, such that the borders of the shadows that it casts on the support
+// planes lie where the pictures show them: each is sought across itself, as a step of brightness,
+// and by linear least squares
 //   o_i = g_i . t
 //   o  px from where it is expected, outwards    g  by how much it moves with t
 //   t  rad by which the sun moves, along two axes, near 0 before anything is seen
+// The farther a border moves with the sun, the softer the sun's disc makes it.
 // nullopt: too few plain borders are seen.
 // @param depth CV_32FC1, m, of the first view, 0: unknown; may be empty
-std::optional<Eigen::Vector3f> directionByBorders(const std::vector<View>& views,
-                                                  const std::vector<SupportPlane>& planes,
-                                                  const cv::Mat& depth, const Light& light);
+// @param blur px, of sharp outlines in the pictures: outlineBlur()
+std::optional<SunByBorders> sunByBorders(const std::vector<View>& views,
+                                         const std::vector<SupportPlane>& planes,
+                                         const cv::Mat& depth, const Light& light, float blur);
 
 }  // namespace calipso::render
