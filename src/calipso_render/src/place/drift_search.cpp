@@ -115,10 +115,15 @@ std::optional<cv::Point2f> guess(const DriftPicture& from, const DriftPicture& t
 cv::Point2f refine(const DriftPicture& from, const DriftPicture& to, const cv::Mat& only,
                    cv::Point2f by) {
   const cv::Point2f start = by;
-  for (int round = 0; round < kRounds; ++round) {
+  struct Sums {
     Eigen::Matrix2d H = Eigen::Matrix2d::Zero();
     Eigen::Vector2d b = Eigen::Vector2d::Zero();
-    for (int v = 1; v + 1 < from.grey.rows; v += kStride) {
+  };
+  std::vector<Sums> of_row(from.grey.rows);
+  for (int round = 0; round < kRounds; ++round) {
+#pragma omp parallel for schedule(dynamic, 8)
+    for (int v = 1; v < from.grey.rows - 1; v += kStride) {
+      auto& [H, b] = of_row[v] = Sums();
       for (int u = 1; u + 1 < from.grey.cols; u += kStride) {
         if (!isFree(from, u, v) || (!only.empty() && only.at<std::uint8_t>(v, u) == 0)) continue;
         const float x = static_cast<float>(u) + by.x, y = static_cast<float>(v) + by.y;
@@ -136,7 +141,9 @@ cv::Point2f refine(const DriftPicture& from, const DriftPicture& to, const cv::M
         H += root * root * slope * slope.transpose(), b += root * root * off * slope;
       }
     }
-    const Eigen::Vector2d step = (H + 1e-6 * Eigen::Matrix2d::Identity()).ldlt().solve(b);
+    Sums all;
+    for (const Sums& row : of_row) all.H += row.H, all.b += row.b;
+    const Eigen::Vector2d step = (all.H + 1e-6 * Eigen::Matrix2d::Identity()).ldlt().solve(all.b);
     if (!(step.norm() < kFarStep)) return start;  // too little is seen of both
     by -= cv::Point2f(static_cast<float>(step.x()), static_cast<float>(step.y()));
     if (step.norm() < 0.002) break;
@@ -183,14 +190,14 @@ cv::Mat displaced(const cv::Mat& image, const cv::Point2f& by, const cv::Size& o
 
 Drift findDrift(const std::vector<ClipFrame>& frames, const std::vector<cv::Mat>& covered,
                 const cv::Mat& ground) {
-  std::vector<DriftPicture> pictures;
+  std::vector<DriftPicture> pictures(frames.size());
+#pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    DriftPicture picture;  // smoothed, what is covered shows farther
+    DriftPicture& picture = pictures[i];  // smoothed, what is covered shows farther
     cv::dilate(covered[i], picture.covered, cv::Mat::ones(7, 7, CV_8U));
     cv::cvtColor(frames[i].bgr, picture.grey, cv::COLOR_BGR2GRAY);
     picture.grey.convertTo(picture.grey, CV_32F);
     cv::GaussianBlur(picture.grey, picture.grey, {}, 1.0);
-    pictures.push_back(picture);
   }
   // The longest time over which a guess succeeds says best how fast it is.
   for (std::size_t last = pictures.size() - 1; last > 0; last /= 2) {

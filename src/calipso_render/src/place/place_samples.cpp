@@ -1,7 +1,9 @@
 #include "place/place_samples.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "calipso_render/colour.hpp"
 #include "place/key_cover.hpp"
@@ -59,14 +61,26 @@ double litBrightness(double step, Samples values) {
   return apart && darkenedAlike(shaded, lit) ? brightness(lit) : usual;
 }
 
+// The upper median of `of(v)`, code values, over all values, by counting them: most are about the same.
+template <typename Of>
+int upperMedian(const Samples& values, Of of) {
+  std::array<std::uint16_t, 256> count{};
+  int least = 255;
+  for (const cv::Vec3b& v : values) {
+    const int value = of(v);
+    ++count[value], least = std::min(least, value);
+  }
+  int median = least;
+  for (std::size_t below = count[median]; below <= values.size() / 2; below += count[median])
+    ++median;
+  return median;
+}
+
 cv::Vec3b medianOf(const Samples& values) {
   cv::Vec3b median;
-  std::vector<std::uint8_t> sorted(values.size());
-  for (int c = 0; c < 3; ++c) {
-    for (std::size_t i = 0; i < values.size(); ++i) sorted[i] = values[i][c];
-    std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
-    median[c] = sorted[sorted.size() / 2];
-  }
+  for (int c = 0; c < 3; ++c)
+    median[c] =
+        static_cast<std::uint8_t>(upperMedian(values, [c](const cv::Vec3b& v) { return v[c]; }));
   return median;
 }
 
@@ -120,20 +134,15 @@ void keepBrighter(Samples& values) {
 cv::Vec3f robustMean(const Samples& values, float& spread) {
   cv::Vec3f result;
   spread = 0.0f;
-  std::vector<int> sorted(values.size()), deviation(values.size());
-  const std::size_t middle = values.size() / 2;
   for (int c = 0; c < 3; ++c) {
-    for (std::size_t i = 0; i < values.size(); ++i) sorted[i] = values[i][c];
-    std::nth_element(sorted.begin(), sorted.begin() + middle, sorted.end());
-    const int median = sorted[middle];
+    const int median = upperMedian(values, [c](const cv::Vec3b& v) { return v[c]; });
     float sum = 0.0f;
     int used = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      deviation[i] = std::abs(values[i][c] - median);
-      if (deviation[i] <= kNearMedian) sum += values[i][c], ++used;
+    const auto deviation = [&](const cv::Vec3b& v) { return std::abs(v[c] - median); };
+    for (const cv::Vec3b& v : values) {
+      if (deviation(v) <= kNearMedian) sum += v[c], ++used;
     }
-    std::nth_element(deviation.begin(), deviation.begin() + middle, deviation.end());
-    spread = std::max(spread, static_cast<float>(deviation[middle]));
+    spread = std::max(spread, static_cast<float>(upperMedian(values, deviation)));
     result[c] = sum / used;
   }
   return result;
