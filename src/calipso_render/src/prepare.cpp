@@ -47,9 +47,12 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
     if (all) usable.push_back(&f);
   }
   const std::size_t count = std::min(usable.size(), kTextureViews);
+  views.resize(1 + count);
+#pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t i = 0; i < count; ++i) {
     const ClipFrame& f = *usable[(i + 1) * usable.size() / count - 1];
-    View view{{}, f.labels, f.camera, {}};
+    View& view = views[1 + i];
+    view.labels = f.labels, view.camera = f.camera;
     f.bgr.convertTo(view.picture, CV_32F);
     for (std::size_t k = 0; k < p.surfaces.size(); ++k) {
       const Surface& s = p.surfaces[k];
@@ -60,7 +63,6 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
       }
       view.actors.push_back(makeActor(s, std::move(vertices), f.camera));
     }
-    views.push_back(std::move(view));
   }
   return views;
 }

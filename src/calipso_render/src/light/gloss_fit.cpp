@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 
@@ -207,9 +208,13 @@ std::optional<Found> bestRoughness(const std::vector<Row>& rows,
     const std::vector<double> own = lobesOf(highlights, light, roughnessAt(i));
     return solve(rows, {&own, broad}, clusters);
   };
+  int count = 0;
+  while (count <= kRoughnesses && roughnessAt(count) < limit) ++count;
+  std::vector<Solution> solutions(count);
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int i = 0; i < count; ++i) solutions[i] = at(i);
   std::vector<double> costs;
-  for (int i = 0; i <= kRoughnesses && roughnessAt(i) < limit; ++i) {
-    const Solution s = at(i);
+  for (const Solution& s : solutions) {
     costs.push_back(s.strength > 0.0 ? s.cost : 1e30);
     worst = std::max(worst, s.cost);
   }
@@ -280,14 +285,15 @@ bool tellDirection(const std::vector<HighlightSample>& highlights, const LightFi
   const std::size_t step = std::max<std::size_t>(1, highlights.size() / kTriedWith);
   for (std::size_t i = 0; i < highlights.size(); i += step) some.push_back(highlights[i]);
   const Eigen::Vector3f l = fit.light.direction, s = l.unitOrthogonal(), t = l.cross(s);
-  const double here = leastError(some, fit, visible, l);
-  for (int i = 0; i < kBesides; ++i) {
+  std::array<double, kBesides + 1> errors;  // the last one: of the direction itself
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int i = 0; i <= kBesides; ++i) {
     const float a = 2.0f * static_cast<float>(M_PI) * i / kBesides;
     const Eigen::Vector3f off = std::cos(a) * s + std::sin(a) * t;
     const Eigen::Vector3f beside = std::cos(kBeside) * l + std::sin(kBeside) * off;
-    if (leastError(some, fit, visible, beside) < here) return false;
+    errors[i] = leastError(some, fit, visible, i < kBesides ? beside : l);
   }
-  return true;
+  return *std::min_element(errors.begin(), errors.end()) >= errors.back();
 }
 
 SeenGlosses seenGlosses(const std::vector<HighlightSample>& highlights, std::size_t objects,

@@ -101,8 +101,12 @@ std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
                                               const Eigen::Vector3f& light) {
   std::vector<HighlightSample> all, thinned;
   for (std::size_t object = 0; object < moves.size(); ++object) {
-    for (std::size_t i = 0; i < (moves[object] ? views.size() : 1); ++i)
-      collect(views[i], static_cast<int>(i), object, light, all);
+    std::vector<std::vector<HighlightSample>> of_view(moves[object] ? views.size() : 1);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = 0; i < of_view.size(); ++i)
+      collect(views[i], static_cast<int>(i), object, light, of_view[i]);
+    for (const std::vector<HighlightSample>& own : of_view)
+      all.insert(all.end(), own.begin(), own.end());
   }
   const std::size_t step = std::max<std::size_t>(1, all.size() / kMost);
   for (std::size_t i = 0; i < all.size(); i += step) {

@@ -131,6 +131,7 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
 // @param picture code values
 cv::Mat clearOf(const cv::Mat& picture, const cv::Mat& glint) {
   cv::Mat clear(glint.size(), CV_32F);
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < clear.rows; ++v) {
     for (int u = 0; u < clear.cols; ++u) {
       const cv::Vec3f& code = picture.at<cv::Vec3f>(v, u);
@@ -251,6 +252,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   const cv::Vec3f floor = lightFloor(r.mean_light);
   r.trust = trustOf(view.labels, actor.surface->index, r.region);
   r.albedo = cv::Mat(r.region.size(), CV_32FC3, cv::Scalar::all(0));
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < r.region.height; ++v) {
     for (int u = 0; u < r.region.width; ++u) {
       if (r.nearness.at<float>(v, u) == 0.0f) {

@@ -76,6 +76,7 @@ class TextureFill {
     makeTexels(a.texture, origins);
     findLike(a.texture, origins);
     if (views_.size() > 1) {
+#pragma omp parallel for schedule(dynamic, 1)
       for (std::size_t i = 0; i < views_.size(); ++i)
         shown_[i] = sharpened(shown_[i], pictures_[i], *actors_[i], a.texture);
     }
@@ -114,14 +115,20 @@ class TextureFill {
 
   void findLooks(const SurfaceTexture& texture) {
     looks_.resize(texture.triangleCount());
-#pragma omp parallel for schedule(dynamic, 64)
-    for (int t = 0; t < texture.triangleCount(); ++t) {
-      const std::size_t texels = texture.firstOf(t + 1) - texture.firstOf(t);
-      Looks& looks = looks_[t];
-      looks.ends.reserve(texels);
-      for (std::size_t i = 0; i < texels; ++i) {
-        addLooks(t, texture.weightsOf(t, i), looks.all);
-        looks.ends.push_back(looks.all.size());
+#pragma omp parallel
+    {
+      std::vector<Look> found;
+#pragma omp for schedule(dynamic, 64)
+      for (int t = 0; t < texture.triangleCount(); ++t) {
+        const std::size_t texels = texture.firstOf(t + 1) - texture.firstOf(t);
+        Looks& looks = looks_[t];
+        found.clear();
+        looks.ends.reserve(texels);
+        for (std::size_t i = 0; i < texels; ++i) {
+          addLooks(t, texture.weightsOf(t, i), found);
+          looks.ends.push_back(found.size());
+        }
+        looks.all = found;
       }
     }
   }

@@ -52,6 +52,24 @@ cv::Mat missedCodes(const cv::Mat& codes, const Reflectance& picture, const cv::
   return missed;
 }
 
+// Sizes of what that has of the finest detail.
+std::vector<float> detailsOf(const cv::Mat& codes, const Reflectance& picture,
+                             const cv::Mat& drawn) {
+  cv::Mat certain, detail;
+  const cv::Mat missed = missedCodes(codes, picture, drawn, certain);
+  cv::filter2D(missed, detail, CV_32F, noiseMask());
+  cv::erode(certain, certain, cv::Mat::ones(3, 3, CV_8U));
+  std::vector<float> details;
+  for (int v = 0; v < detail.rows; ++v) {
+    for (int u = 0; u < detail.cols; ++u) {
+      if (certain.at<std::uint8_t>(v, u) == 0) continue;
+      const cv::Vec3f& d = detail.at<cv::Vec3f>(v, u);
+      details.insert(details.end(), {std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
+    }
+  }
+  return details;
+}
+
 }  // namespace
 
 cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor& actor,
@@ -70,22 +88,16 @@ cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor&
 }
 
 float grainOf(const SeenObject& object, const SurfaceTexture& texture) {
-  std::vector<float> details;
+  std::vector<std::vector<float>> of_view(object.views.size());
+#pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t i = 0; i < object.views.size(); ++i) {
     const Reflectance& picture = object.pictures[i];
-    cv::Mat certain, detail;
-    const cv::Mat missed = missedCodes(object.views[i]->picture, picture,
-                                       drawnInto(picture, *object.actors[i], texture), certain);
-    cv::filter2D(missed, detail, CV_32F, noiseMask());
-    cv::erode(certain, certain, cv::Mat::ones(3, 3, CV_8U));
-    for (int v = 0; v < detail.rows; ++v) {
-      for (int u = 0; u < detail.cols; ++u) {
-        if (certain.at<std::uint8_t>(v, u) == 0) continue;
-        const cv::Vec3f& d = detail.at<cv::Vec3f>(v, u);
-        details.insert(details.end(), {std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
-      }
-    }
+    of_view[i] = detailsOf(object.views[i]->picture, picture,
+                           drawnInto(picture, *object.actors[i], texture));
   }
+  std::vector<float> details;
+  for (const std::vector<float>& own : of_view)
+    details.insert(details.end(), own.begin(), own.end());
   if (details.size() < 3 * kFewest) return 0.0f;
   const auto middle = details.begin() + static_cast<std::ptrdiff_t>(details.size() / 2);
   std::nth_element(details.begin(), middle, details.end());
