@@ -27,6 +27,12 @@ std::vector<Eigen::Vector3d> readVectors(const YAML::Node& node) {
   return result;
 }
 
+// Of the centre of mass, which scenes also call just the velocity.
+Eigen::Vector3d readVelocity(const YAML::Node& collision, const std::string& when) {
+  const YAML::Node named = collision["com_velocity_" + when];
+  return readVector(named ? named : collision["velocity_" + when]);
+}
+
 Eigen::Isometry3d readPose(const YAML::Node& node) {
   Eigen::Matrix4d m;
   for (int r = 0; r < 4; ++r) {
@@ -91,8 +97,8 @@ TrueObject readObject(const std::string& directory, const YAML::Node& node, doub
   if (truth.velocity.empty()) truth.velocity = readVectors(node["linear_velocity_per_frame"]);
   truth.spin = readVectors(node["angular_velocity_world"]);
   for (const YAML::Node& c : node["collisions"]) {
-    truth.collisions.push_back({c["time_s"].as<double>(), readVector(c["com_velocity_before"]),
-                                readVector(c["com_velocity_after"])});
+    truth.collisions.push_back(
+        {c["time_s"].as<double>(), readVelocity(c, "before"), readVelocity(c, "after")});
   }
   truth.collisions_known = node["collisions"] || truth.world_from_object.size() == 1;
   if (const YAML::Node wave = node["wave"]) {
