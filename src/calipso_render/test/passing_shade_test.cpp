@@ -125,6 +125,32 @@ TEST(PassingShade, StaysWhereNoFrameShowsThePlaceWithoutIt) {
   EXPECT_EQ(stays.sun.at<float>(5, 5), 1.0f);
 }
 
+// Where all frames are in shade by the prediction, one of them (by its rim, or by the sky's alone)
+// shows more light than the others.
+TEST(PassingShade, LeavesTheLeastOfItWhereItLiesInAllFrames) {
+  std::vector<Eigen::Vector3d> places(6, kTo);
+  places[0] = kFrom;
+  Clip clip = ballAlong(places);
+  clip.frames[0].poses = clip.frames[1].poses;
+  const std::vector<bool> moves = {true};
+  Background b = seenBackground(clip.frames, true);
+  const ShadeThatStays stays =
+      leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, {}, b);
+  int shaded = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = clip.receiver(u, v);
+      if (!r || b.count.at<std::uint8_t>(v, u) < 6 || !isInShadow(r->position, kTo) ||
+          isInShadow(r->position, kFrom))
+        continue;
+      ++shaded;
+      EXPECT_EQ(stays.never_lit.at<std::uint8_t>(v, u), 255);
+      EXPECT_NEAR(b.plate.at<cv::Vec3f>(v, u)[2], tableColour(u, v)[2], 0.5f) << u << " " << v;
+    }
+  }
+  EXPECT_GT(shaded, 100);
+}
+
 TEST(PassingShade, ChangesNothingWhereThePredictedShadowIsNotSeen) {
   std::vector<Eigen::Vector3d> places(6, kTo);
   places[0] = kFrom;

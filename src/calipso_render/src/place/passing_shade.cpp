@@ -140,6 +140,16 @@ Samples litAmong(const Samples& near, const Samples& core, double step) {
   return lit;
 }
 
+// Of values that all lie in shade: those of its rim, or under less of it, if the others differ from
+// them as shade does.
+Samples leastShaded(const Sorted& s, double step) {
+  Samples all = s.core;
+  all.insert(all.end(), s.near.begin(), s.near.end());
+  Samples bright = all;
+  keepBrighter(bright);
+  return shadedAgainst(bright, all, step) ? bright : Samples();
+}
+
 // Takes the shaded frames out of a plate's median. @return CV_8UC1: 255 where no frame is lit
 cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& background) {
   const cv::Size size = background.plate.size();
@@ -154,6 +164,9 @@ cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& backgrou
       if (s.lit.empty()) s.lit = litAmong(s.near, s.core, step);
       if (s.lit.empty()) {
         never_lit.at<std::uint8_t>(v, u) = 255;
+        const Samples least = leastShaded(s, step);
+        if (!least.empty())
+          background.plate.at<cv::Vec3f>(v, u) = robustMean(least, background.spread.at<float>(v, u));
         continue;
       }
       if (!shadedAgainst(s.lit, s.core.empty() ? s.near : s.core, step)) continue;
