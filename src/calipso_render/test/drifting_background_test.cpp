@@ -40,8 +40,9 @@ cv::Vec3b cloudAt(float x, float y) {
 
 enum class Motion { kDrifts, kRests, kRipples };
 
-// A window with a trim that rests; behind it what moves; before it an object.
-ClipFrame frameAt(int k, Motion motion, const cv::Rect& object) {
+// A window with a trim that rests; behind it what moves; before it, within the trim, an object.
+// @param cut px by which its lower right corner is cut off
+ClipFrame frameAt(int k, Motion motion, const cv::Rect& object, int cut = 0) {
   ClipFrame f{cv::Mat(kHigh, kWide, CV_8UC3), cv::Mat::zeros(kHigh, kWide, CV_8U), Camera()};
   f.camera.width = kWide, f.camera.height = kHigh;
   f.stamp_ns = 33'000'000LL * k;
@@ -53,9 +54,12 @@ ClipFrame frameAt(int k, Motion motion, const cv::Rect& object) {
       if (motion == Motion::kRipples)
         shift = {4.0f * std::sin(1.7f * k + 0.2f * v), 3.0f * std::sin(2.3f * k + 0.3f * u)};
       cv::Vec3b c = cloudAt(u - shift.x, v - shift.y);
-      const bool trim = u < kTrim || v < kTrim || u >= kWide - kTrim || v >= kHigh - kTrim;
-      if (trim) c = cv::Vec3b::all(static_cast<uchar>(60 + 8 * ((u / 3 + v / 5) % 3)));
-      if (object.contains({u, v})) c = {20, 30, 200}, f.labels.at<uchar>(v, u) = 1;
+      const bool trim = u < kTrim || v < kTrim || u >= kWide - kTrim || v >= kHigh - kTrim ||
+                        u + v >= kWide + kHigh - 2 * kTrim - cut;
+      if (trim)
+        c = cv::Vec3b::all(static_cast<uchar>(60 + 8 * ((u / 3 + v / 5) % 3)));
+      else if (object.contains({u, v}))
+        c = {20, 30, 200}, f.labels.at<uchar>(v, u) = 1;
       for (int i = 0; i < 3; ++i) c[i] = cv::saturate_cast<uchar>(c[i] + noise.gaussian(1.5));
       f.bgr.at<cv::Vec3b>(v, u) = c;
     }
@@ -139,6 +143,27 @@ TEST(DriftingBackground, IsInventedNowhereBesideWhatIsTakenOutOfAFrame) {
     const cv::Rect around(80, 40, 140, 120);
     EXPECT_EQ(cv::countNonZero(invented(around)), 0) << k;
   }
+}
+
+// An object in a cut corner of the window, up to the trim.
+TEST(DriftingBackground, TakesNothingOfTheTrimAlong) {
+  const cv::Rect corner(180, 80, kWide, kHigh);
+  std::vector<ClipFrame> frames;
+  for (int k = 0; k < kFrames; ++k) frames.push_back(frameAt(k, Motion::kDrifts, corner, 80));
+  const DriftingBackground drifting(frames, 2, cv::Mat());
+  ASSERT_TRUE(drifting.established());
+  cv::Mat plate(kHigh, kWide, CV_32FC3, cv::Scalar(1, 1, 1)),
+      invented = cv::Mat::zeros(kHigh, kWide, CV_8U);
+  drifting.draw(*drifting.shiftAt(frames.back().stamp_ns), plate, invented);
+  int grey = 0;  // the trim is dark and grey, clouds are coloured
+  for (int v = 0; v < kHigh; ++v) {
+    for (int u = 0; u < kWide; ++u) {
+      const cv::Vec3f& c = plate.at<cv::Vec3f>(v, u);
+      grey += frames[0].labels.at<std::uint8_t>(v, u) != 0 && c[0] < linearFromCode(100) &&
+              std::abs(c[0] - c[1]) < 0.02f && std::abs(c[0] - c[2]) < 0.02f;
+    }
+  }
+  EXPECT_LT(grey, 50);
 }
 
 TEST(DriftingBackground, IsBroughtToWhatAFrameShowsAroundTheObject) {

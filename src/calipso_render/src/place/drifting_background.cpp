@@ -15,6 +15,9 @@ namespace calipso::render {
 namespace {
 
 constexpr int kInterpolated = 2;  // px around a place that its value hangs on
+// px beside both what covers and what rests, of which nobody knows whether it drifts: the search
+// looks at cells, and less near to what covers
+constexpr int kUntold = 8;
 constexpr int kMatched = 16;      // px of the squares in which frame and plate are compared
 constexpr float kMostOff =
     0.1f;  // of the plate's brightness; what is off by more is something else
@@ -75,7 +78,9 @@ void DriftingBackground::layOver(const std::vector<ClipFrame>& frames,
     cv::Mat picture;
     frames[i].bgr.convertTo(picture, CV_32F);
     displaced(picture, by, size).convertTo(pictures[i], CV_8U);
-    shown[i] = displacedMask((grown(~where_, kInterpolated) | covered[i]) == 0, rounded(by), size);
+    const cv::Mat untold = grown(~where_, kUntold) & grown(covered[i], kUntold);
+    shown[i] = displacedMask((grown(~where_, kInterpolated) | covered[i] | untold) == 0,
+                             rounded(by), size);
   }
   panorama_ = cv::Mat::zeros(size, CV_32FC3), invented_ = cv::Mat(size, CV_8U, cv::Scalar(255));
 #pragma omp parallel for schedule(dynamic, 8)
