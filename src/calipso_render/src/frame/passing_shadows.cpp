@@ -21,6 +21,8 @@ constexpr int kPassingReach = 12;   // px: an edge that the plate misses looks l
 constexpr int kRimShare = 50;  // of the picture's width: how far a mask may miss a moving object
 constexpr int kMargin = 6;     // px around a shadow
 constexpr int kHalfLit = 128;  // level of the sun: another object's shadow
+// px across: most of them tell whether a place rests, as of few frames some differ by chance
+constexpr int kMost = 5;
 constexpr int kVoters = 9;     // px of the square whose dark pixels vote on their colour
 
 cv::Mat square(int side) { return cv::Mat::ones(side, side, CV_8U); }
@@ -51,7 +53,9 @@ void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) 
 // PlateInView::quiet
 cv::Mat quietPlaces(const StagedFrame& frame, const SeenPlace& place) {
   const Background& background = frame.prepared.background;
-  cv::Mat at_key = (background.count > 0) & (background.spread < background.resting_spread);
+  cv::Mat at_key;
+  cv::medianBlur((background.count > 0) & (background.spread < background.resting_spread), at_key,
+                 kMost);
   if (background.drifting.established()) at_key.setTo(0, background.drifting.where());
   if (!frame.prepared.scenery.empty() && !frame.prepared.nearness.empty())
     at_key.setTo(0, frame.prepared.nearness == 0.0f);
