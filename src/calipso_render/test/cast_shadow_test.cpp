@@ -76,6 +76,21 @@ TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
   EXPECT_FALSE(umbraInViews({unshaded_view}, table(), place, sunlight()));
 }
 
+// All colours tell a shadow, or none: one alone would tint it.
+TEST(Umbra, IsThePredictedOneUnlessAllColoursAreDarker) {
+  const cv::Mat plate(20, 20, CV_32FC3, cv::Scalar::all(150)), dark(20, 20, CV_32F, cv::Scalar(0)),
+      open(20, 20, CV_32F, cv::Scalar(1)), labels = cv::Mat::zeros(20, 20, CV_8U);
+  const auto seen = [&](const cv::Vec3f& ratio) {
+    const float lit = linearFromRealCode(150.0f);
+    cv::Scalar codes;
+    for (int c = 0; c < 3; ++c) codes[c] = codeFromLinear(ratio[c] * lit);
+    return umbraInPicture(cv::Mat(plate.size(), CV_32FC3, codes), plate, dark, open, labels, kUmbra);
+  };
+  const cv::Vec3f darker(0.5f, 0.4f, 0.3f);
+  EXPECT_LT(cv::norm(seen(darker) - darker), 0.01);
+  EXPECT_EQ(seen({1.05f, 0.8f, 0.95f}), kUmbra);
+}
+
 // Near the ball the shadow is darker than the sun's absence makes it: the ball hides sky, too.
 TEST(Renderer, TheDarkOfAShadowIsToldFromTheHiddenSky) {
   const cv::Vec3f umbra(0.45f, 0.4f, 0.35f);

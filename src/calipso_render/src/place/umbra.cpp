@@ -68,7 +68,7 @@ std::optional<cv::Vec3f> umbraInViews(const std::vector<View>& views,
 
 cv::Vec3f umbraInPicture(const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,
                          const cv::Mat& sky, const cv::Mat& labels, const cv::Vec3f& predicted) {
-  cv::Vec3f umbra = predicted;
+  cv::Vec3f umbra;
   for (int c = 0; c < 3; ++c) {
     std::vector<float> ratios;
     for (int v = 0; v < picture.rows; ++v) {
@@ -81,12 +81,12 @@ cv::Vec3f umbraInPicture(const cv::Mat& picture, const cv::Mat& plate, const cv:
         if (lit > 0.01f) ratios.push_back(linearFromRealCode(picture.at<cv::Vec3f>(v, u)[c]) / lit);
       }
     }
-    if (ratios.size() < 50) continue;
+    if (ratios.size() < 50) return predicted;
     std::nth_element(ratios.begin(), ratios.begin() + ratios.size() / 2, ratios.end());
-    // A shadow that is hardly darker than the light's own ratio says was not seen where it was
-    // predicted.
+    // A shadow that is hardly darker in any colour was not seen where it was predicted.
     const float measured = ratios[ratios.size() / 2];
-    if (measured < 0.85f) umbra[c] = std::max(measured, 0.1f);
+    if (measured > kNoShadow) return predicted;
+    umbra[c] = std::max(measured, 0.1f);
   }
   return umbra;
 }
