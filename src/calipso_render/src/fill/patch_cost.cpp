@@ -15,11 +15,6 @@ constexpr float kOffLattice = 0.75f;  // px by which a copy's way may miss the l
 
 }  // namespace
 
-bool differ(const cv::Mat& labels, const cv::Point& p, const cv::Point& q) {
-  const std::uint8_t own = labels.at<std::uint8_t>(p), other = labels.at<std::uint8_t>(q);
-  return own != 0 && other != 0 && own != other;
-}
-
 PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
                      const InpaintParams& params)
     : nearness_(level.nearness),

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -13,7 +14,10 @@ constexpr int kPatchRadius = 3;  // px; patches are squares of 7
 constexpr int kPatchSide = 2 * kPatchRadius + 1;
 
 // Are both labels known, and not the same? @param labels CV_8UC1, 0 unknown
-bool differ(const cv::Mat& labels, const cv::Point& p, const cv::Point& q);
+inline bool differ(const cv::Mat& labels, const cv::Point& p, const cv::Point& q) {
+  const std::uint8_t own = labels.at<std::uint8_t>(p), other = labels.at<std::uint8_t>(q);
+  return own != 0 && other != 0 && own != other;
+}
 
 // What it costs to copy the patch around q to p: how unlike they look, in squared code values
 // summed over the patch, and how little like the places are. Patches must lie within the picture.

@@ -319,14 +319,21 @@ class Filling {
   }
 
   cv::Vec4f meanVote(const cv::Point& pixel, const cv::Mat& weights) const {
+    const cv::Rect centres =
+        cv::Rect(pixel.x - kPatchRadius, pixel.y - kPatchRadius, kPatchSide, kPatchSide) &
+        cv::Rect({0, 0}, hole_.size());
     cv::Vec4f sum;
     float total = 0.0f;
-    for (int dv = -kPatchRadius; dv <= kPatchRadius; ++dv) {
-      for (int du = -kPatchRadius; du <= kPatchRadius; ++du) {
-        const cv::Point centre = pixel + cv::Point(du, dv);
-        const float w = inside(centre) ? weights.at<float>(centre) : 0.0f;
-        if (w > 0.0f)
-          sum += w * image_.at<cv::Vec4f>(match(centre) - cv::Point(du, dv)), total += w;
+    for (int v = centres.y; v < centres.br().y; ++v) {
+      const float* weight = weights.ptr<float>(v);
+      const cv::Vec2s* to = to_.ptr<cv::Vec2s>(v);
+      for (int u = centres.x; u < centres.br().x; ++u) {
+        const float w = weight[u];
+        if (w <= 0.0f) continue;
+        const cv::Vec4f& voted =
+            image_.ptr<cv::Vec4f>(to[u][1] + pixel.y - v)[to[u][0] + pixel.x - u];
+        for (int c = 0; c < 4; ++c) sum[c] += w * voted[c];
+        total += w;
       }
     }
     return total > 0.0f ? cv::Vec4f(sum / total) : image_.at<cv::Vec4f>(pixel);
