@@ -56,8 +56,8 @@ struct BallStages {
 
 // How far a table pixel's way to the sun passes from a ball's centre, in radii; no value: it does
 // not see the table, or the ball is behind it.
-inline std::optional<double> passesBy(int u, int v, const Eigen::Vector3d& centre) {
-  const auto at = receiverAt(table(), camera(), static_cast<float>(u), static_cast<float>(v));
+inline std::optional<double> passesBy(float u, float v, const Eigen::Vector3d& centre) {
+  const auto at = receiverAt(table(), camera(), u, v);
   if (!at) return std::nullopt;
   const Eigen::Vector3d sun = sunlight().direction.cast<double>(),
                         way = centre - at->position.cast<double>();
