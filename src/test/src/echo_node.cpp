@@ -85,6 +85,7 @@ class EchoNode {
     provenance_.publish(provenance);
     calipso_msgs::SimulationState state;
     state.header = frame.image->header;
+    state.reports = edit_count_;
     state_.publish(state);
     calipso_msgs::Dynamics dynamics;
     dynamics.header = frame.image->header;
