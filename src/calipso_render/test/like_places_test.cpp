@@ -46,21 +46,39 @@ std::vector<LikePlace> judged(const std::function<cv::Vec3f(const Eigen::Vector3
   return like;
 }
 
+// Of 360 degrees around the middle, those in which a place and the one it is like have one colour.
+int degreesAlike(const LikePlace& like,
+                 const std::function<cv::Vec3f(const Eigen::Vector3f&)>& colour) {
+  int same = 0;
+  for (int i = 0; i < 360; ++i) {
+    const float angle = static_cast<float>(i * M_PI / 180.0);
+    const Eigen::Vector3f x =
+        static_cast<float>(kBallRadius) * Eigen::Vector3f(std::sin(angle), -std::cos(angle), 0.0f);
+    same += colour(like.of({x, x.normalized()}).point) == colour(x);
+  }
+  return same;
+}
+
 // What is seen is repeated about places where its pattern repeats itself.
 TEST(LikePlaces, AreTurnedAboutTheMiddlesOfGores) {
   std::vector<LikePlace> like = judged(goreAt);
   EXPECT_LT(like.front().agrees.value(), 0.2f);
-  keepBest(3, like);
+  like = bestFirst({}, like, 3);
   ASSERT_EQ(like.size(), 3u);
   EXPECT_GT(like.front().agrees.value(), 0.8f);
-  int same = 0, all = 0;
-  for (int i = 0; i < 360; ++i, ++all) {
-    const float angle = static_cast<float>(i * M_PI / 180.0);
-    const Eigen::Vector3f x =
-        static_cast<float>(kBallRadius) * Eigen::Vector3f(std::sin(angle), -std::cos(angle), 0.0f);
-    same += goreAt(like.front().of({x, x.normalized()}).point) == goreAt(x);
-  }
-  EXPECT_GT(same, 300);
+  EXPECT_GT(degreesAlike(like.front(), goreAt), 300);
+}
+
+// Gores of three colours in turn are no mirror images of each other, but of the fourth next.
+TEST(LikePlaces, AreTurnedByThePartsThatDivideTheTurn) {
+  const auto colour = [](const Eigen::Vector3f& x) {
+    const cv::Vec3f colours[] = {kRed, kYellow, {0.6f, 0.1f, 0.1f}};
+    return colours[static_cast<int>(std::floor(angleOf(x) / (M_PI / 6.0) + 120.2)) % 3];
+  };
+  const std::vector<LikePlace> like = bestFirst({}, judged(colour), 1);
+  ASSERT_EQ(like.size(), 1u);
+  EXPECT_GT(like.front().agrees.value(), 0.8f);
+  EXPECT_GT(degreesAlike(like.front(), colour), 340);
 }
 
 TEST(LikePlaces, OfOneColourAreThoseNearestToTheMiddle) {
@@ -68,19 +86,28 @@ TEST(LikePlaces, OfOneColourAreThoseNearestToTheMiddle) {
   const Place place{{0.0f, static_cast<float>(kBallRadius), 0.0f}, Eigen::Vector3f::UnitY()};
   const Eigen::Vector3f first = like.front().of(place).point;
   EXPECT_EQ(like.front().agrees, 1.0f);
-  keepBest(3, like);
+  like = bestFirst({}, like, 3);
   EXPECT_EQ(like.front().of(place).point, first);
 }
 
-// Where nothing tells, the shape is believed unless what is seen speaks clearly for others.
+// Where nothing tells, the shape is believed, after what is seen and before what that contradicts.
 TEST(LikePlaces, ThatNothingTellsOfComeBetweenTheOthers) {
   const auto same = [](const Place& place) { return place; };
-  std::vector<LikePlace> like = {{same, 0.2f}, {same, 0.8f}, {same, std::nullopt}, {same, 0.95f}};
-  keepBest(3, like);
-  ASSERT_EQ(like.size(), 3u);
+  const std::vector<LikePlace> like = bestFirst({{same, std::nullopt}, {same, 0.2f}},
+                                                {{same, 0.8f}, {same, 0.1f}, {same, 0.95f}}, 3);
+  ASSERT_EQ(like.size(), 5u);
   EXPECT_EQ(like[0].agrees, 0.95f);
-  EXPECT_FALSE(like[1].agrees);
-  EXPECT_EQ(like[2].agrees, 0.8f);
+  EXPECT_EQ(like[1].agrees, 0.8f);
+  EXPECT_FALSE(like[2].agrees);
+}
+
+// However well turned places agree: a handle has its mirror image alone.
+TEST(LikePlaces, MirroredAreAllKept) {
+  const auto same = [](const Place& place) { return place; };
+  const std::vector<LikePlace> like =
+      bestFirst({{same, std::nullopt}}, std::vector<LikePlace>(5, {same, 1.0f}), 3);
+  ASSERT_EQ(like.size(), 4u);
+  EXPECT_FALSE(like.back().agrees);
 }
 
 // A ball between two others: the outer ones are each other's images, the middle one its own.

@@ -16,14 +16,15 @@ constexpr float kQuarter = 0.25f * static_cast<float>(M_PI);
 // steps, up to which, as the pattern may repeat itself about some of them alone
 constexpr float kTurns[] = {0.0f, 0.5f, -0.5f};
 constexpr float kTurnStep = 0.05f, kFarthestTurn = 0.7f;
+constexpr int kMostParts = 24;  // equal ones, into which a pattern may divide a turn
 constexpr float kApart = 3.0f;  // spacings of texels: places nearer to each other tell nothing
 constexpr int kFewest = 30;     // places that tell whether others are like them
 // difference of two colours, of the brighter one, that light explains, and that none does
 constexpr float kSameColour = 0.15f, kOtherColour = 0.35f;
 // part of the places that look otherwise, from which the likeness comes later, and last
 constexpr float kSomeDiffer = 0.15f, kTooManyDiffer = 0.5f;
-// where a likeness that nothing tells of ranks among those that agree well
-constexpr float kUnjudged = 0.9f;
+// where a likeness that nothing tells of ranks: after all that agree well
+constexpr float kUnjudged = 0.5f;
 constexpr float kSameBox = 0.05f;  // of the extent: parts are mirror images of each other
 
 // Turns places about an axis into the quarter of a turn on either side of `middle`, back and forth,
@@ -53,6 +54,21 @@ struct Fold {
     const Eigen::AngleAxisf rotation(angle, axis.direction);
     return {axis.point + rotation * (place.point - axis.point), rotation * place.normal, place.part,
             place.piece};
+  }
+};
+
+// Turns places about an axis by whole parts of a turn, to within half of one from the plane that
+// `ahead` spans with the axis.
+struct Repeat {
+  Axis axis;
+  Eigen::Vector3f ahead, aside;
+  float part;  // rad
+
+  Place operator()(const Place& place) const {
+    const Eigen::Vector3f arm = place.point - axis.point;
+    const float angle = std::atan2(arm.dot(aside), arm.dot(ahead));
+    const Eigen::AngleAxisf back(-part * std::round(angle / part), axis.direction);
+    return {axis.point + back * arm, back * place.normal, place.part, place.piece};
   }
 };
 
@@ -116,6 +132,10 @@ std::vector<LikePlace> turnedPlaces(const Surface& surface, const Eigen::Vector3
     const Eigen::Vector3f middle = Eigen::AngleAxisf(turn, axis->direction) * ahead;
     like.push_back({Fold{*axis, middle, axis->direction.cross(middle)}, std::nullopt});
   }
+  const Eigen::Vector3f aside = axis->direction.cross(ahead);
+  for (int parts = 2; parts <= kMostParts; ++parts)
+    like.push_back(
+        {Repeat{*axis, ahead, aside, 8.0f * kQuarter / static_cast<float>(parts)}, std::nullopt});
   return like;
 }
 
@@ -142,13 +162,20 @@ void judgeLikePlaces(const std::vector<KnownPlace>& known, float spacing,
   }
 }
 
-void keepBest(std::size_t most, std::vector<LikePlace>& like) {
-  const auto order = [](const LikePlace& l) {
-    return !l.agrees ? kUnjudged : l.agreesWell() ? *l.agrees : 0.0f;
+std::vector<LikePlace> bestFirst(std::vector<LikePlace> mirrored, std::vector<LikePlace> turned,
+                                 std::size_t most_turned) {
+  const auto sort = [](std::vector<LikePlace>& like) {
+    const auto order = [](const LikePlace& l) {
+      return !l.agrees ? kUnjudged : l.agreesWell() ? *l.agrees : 0.0f;
+    };
+    std::stable_sort(like.begin(), like.end(),
+                     [&](const LikePlace& a, const LikePlace& b) { return order(a) > order(b); });
   };
-  std::stable_sort(like.begin(), like.end(),
-                   [&](const LikePlace& a, const LikePlace& b) { return order(a) > order(b); });
-  if (like.size() > most) like.resize(most);
+  sort(turned);
+  turned.resize(std::min(turned.size(), most_turned));
+  mirrored.insert(mirrored.end(), turned.begin(), turned.end());
+  sort(mirrored);
+  return mirrored;
 }
 
 }  // namespace calipso::render

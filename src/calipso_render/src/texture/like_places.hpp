@@ -20,9 +20,9 @@ struct LikePlace {
 // The mirror images at the planes of symmetry. @param parts connectedParts()
 std::vector<LikePlace> mirroredPlaces(const Surface& surface, const std::vector<int>& parts);
 
-// Of a body of revolution: places turned about its axis, back and forth, into the quarter of a turn
-// on either side of a middle. The middles that are first are as near as can be to the side that is
-// seen from `eye`.
+// Of a body of revolution: places turned about its axis. First back and forth, into the quarter of a
+// turn on either side of a middle; the middles that are first are as near as can be to the side that
+// is seen from `eye`. Then by whole parts of a turn, a half to a twenty-fourth, to that side.
 std::vector<LikePlace> turnedPlaces(const Surface& surface, const Eigen::Vector3f& eye);
 
 // A place of the surface and the colour that is known of it.
@@ -37,9 +37,10 @@ void judgeLikePlaces(const std::vector<KnownPlace>& known, float spacing,
                      const std::function<std::optional<cv::Vec3f>(const Place&)>& colourAt,
                      std::vector<LikePlace>& like);
 
-// Puts those first that agree well, best first, and keeps `most`: what is seen may repeat itself
-// about some planes and middles alone. Where nothing tells, as of mirror images behind the object,
-// the shape is believed unless what is seen speaks clearly for others.
-void keepBest(std::size_t most, std::vector<LikePlace>& like);
+// All that are mirrored, and as many of those that are turned, best first: what is seen may repeat
+// itself about some planes and middles alone. Where nothing tells, as of mirror images behind the
+// object, the shape is believed, but what is seen first.
+std::vector<LikePlace> bestFirst(std::vector<LikePlace> mirrored, std::vector<LikePlace> turned,
+                                 std::size_t most_turned);
 
 }  // namespace calipso::render

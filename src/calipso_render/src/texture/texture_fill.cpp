@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "smooth_step.hpp"
 #include "texture/like_places.hpp"
@@ -175,11 +176,6 @@ class TextureFill {
 
   // Places that look alike by the shape; those first that do where they are seen themselves.
   void findLike(const SurfaceTexture& texture, const Origins& origins) {
-    like_ = mirroredPlaces(surface_, sightings_.parts());
-    const std::size_t most = like_.size() + kMostTurned;
-    const std::vector<LikePlace> turned =
-        turnedPlaces(surface_, views_[0]->camera.world_from_camera.translation().cast<float>());
-    like_.insert(like_.end(), turned.begin(), turned.end());
     std::vector<KnownPlace> known;
     const std::size_t step = 1 + texture.size() / kCompared;
     std::size_t next = 0;
@@ -195,8 +191,12 @@ class TextureFill {
       if (l.weight < kGood) return std::nullopt;
       return colourOf(sampleBicubic(shown_[0], l.u, l.v));
     };
+    like_ = mirroredPlaces(surface_, sightings_.parts());
+    std::vector<LikePlace> turned =
+        turnedPlaces(surface_, views_[0]->camera.world_from_camera.translation().cast<float>());
     judgeLikePlaces(known, texture.spacing(), colourAt, like_);
-    keepBest(most, like_);
+    judgeLikePlaces(known, texture.spacing(), colourAt, turned);
+    like_ = bestFirst(std::move(like_), std::move(turned), kMostTurned);
   }
 
   // @param look, end the looks at the place. @param certain, layer out: of Origins
