@@ -116,8 +116,10 @@ void validateScale(const Edit& edit) {
                                 edit.after +
                                 "'): the video is laid out before it plays; give its time t");
   }
-  require(edit.factor > 0.0 && (!slower || edit.factor <= 1.0), "factor", edit.factor,
-          slower ? "in (0, 1]" : "> 0");
+  // Each frame is sent 1 / factor times.
+  constexpr double kSlowest = 0.001;
+  require(edit.factor > 0.0 && (!slower || (edit.factor >= kSlowest && edit.factor <= 1.0)),
+          "factor", edit.factor, slower ? "in [0.001, 1]" : "> 0");
 }
 
 void validateNewName(const Edit& edit, const std::vector<std::string>& objects) {
