@@ -11,8 +11,10 @@ namespace calipso {
 namespace {
 
 std::string describe(const YAML::Node& node) {
+  YAML::Node in_one_line = YAML::Clone(node);
+  in_one_line.SetStyle(YAML::EmitterStyle::Flow);
   std::ostringstream text;
-  text << node;
+  text << in_one_line;
   return text.str().substr(0, 80);
 }
 
@@ -35,8 +37,8 @@ YAML::Node YamlReader::load(const std::string& path) {
 }
 
 void YamlReader::fail(const std::string& key, const std::string& what) const {
-  throw std::invalid_argument(path_ + ": " + context_ + (context_.empty() ? "" : ": ") + key + " " +
-                              what);
+  throw std::invalid_argument(path_ + ": " + context_ + (context_.empty() ? "" : ": ") + key +
+                              (key.empty() ? "" : " ") + what);
 }
 
 YAML::Node YamlReader::require(const YAML::Node& node, const std::string& key) const {

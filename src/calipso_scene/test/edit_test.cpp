@@ -112,7 +112,11 @@ TEST(Edit, badInputNamesEntryFieldAndRemedy) {
   expect("- {t: 0, object: banana1, kind: pull, vektor: [0, 0, 1]}", "vektor is not a known key");
   expect("- {t: 0, object: banana1, kind: remove, t: 1}",
          "t is given twice; only one of them would count: leave one out");
-  expect("- {t: 0, object: banana1, kind: pull, vector: [0, 0]}", "list of 3 numbers");
+  expect("- {t: 0, object: banana1, kind: pull, vector: [0, 0]}",
+         "vector is '[0, 0]'; it must be a list of 3 numbers");
+  expect("- t: 0\n  object: banana1\n  kind: pull\n  vector:\n  - 0\n  - 1\n",
+         "vector is '[0, 1]'");
+  expect("- remove banana1", "edit 1: is not a map");
   expect("- {t: 0, object: banana1, kind: pull, mode: factor}", "for kind 'pull'");
   expect("- {t: 0, object: banana1, kind: transform, scale: 0}", "scale = 0");
   expect("- {t: 0, object: banana1, kind: duplicate}", "value is missing");
@@ -126,6 +130,8 @@ TEST(Edit, badInputNamesEntryFieldAndRemedy) {
   expect("- {t: 0, object: banana1, kind: contact, restitution: 1.5}", "restitution = 1.5");
   expect("- {t: 0, object: banana1, kind: contact, value: maybe}", "include, exclude");
   expect("- {t: 0, kind: time_scale, factor: 2}", "factor = 2");
+  expect("- {t: 0, kind: time_scale, factor: 0.0001}",
+         "factor = 0.0001 is not allowed; it must be in [0.001, 1]");
   expect("- {t: 0, kind: speed_scale, factor: 0}", "factor = 0");
   expect("- {t: 0, object: banana1, kind: appearance, roughness: 2}", "roughness = 2");
   expect("- {t: 0, object: banana1, kind: remove, after: apple}", "after is 'apple'");
