@@ -48,6 +48,10 @@ void convert(const Arguments& arguments) {
   writer.finish();
   std::cout << arguments.word(1) << ": " << writer.frameCount() << " frames at " << look->fps()
             << " per second\n";
+  const Camera& camera = calibration.camera;
+  std::cout << "for scene.yaml: width: " << camera.width << ", height: " << camera.height
+            << ", fps: " << look->fps() << ", fx: " << camera.fx << ", fy: " << camera.fy
+            << ", cx: " << camera.cx << ", cy: " << camera.cy << "\n";
 }
 
 }  // namespace

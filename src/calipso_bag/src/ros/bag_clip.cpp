@@ -31,7 +31,7 @@ std::set<std::string> topicsOf(const rosbag::Bag& bag, const std::set<std::strin
 std::string listed(const std::set<std::string>& topics) {
   std::string text;
   for (const std::string& topic : topics) text += (text.empty() ? "" : ", ") + topic;
-  return text.empty() ? "none" : text;
+  return text;
 }
 
 // The camera_info that belongs to an image topic by convention: its sibling.
@@ -43,7 +43,7 @@ std::string siblingInfo(std::string image_topic) {
   return image_topic.substr(0, image_topic.rfind('/') + 1) + "camera_info";
 }
 
-// `wanted` if it is there, the only one if nothing is wanted.
+// `wanted` if it is there, the only one if nothing is wanted. @pre there are topics
 std::string choose(const std::set<std::string>& topics, const std::string& wanted,
                    const std::string& argument, const std::string& what) {
   if (wanted.empty() && topics.size() == 1) return *topics.begin();
@@ -73,8 +73,10 @@ double BagClip::fps() const {
 }
 
 void BagClip::chooseTopics(const Params& params) {
-  image_topic_ =
-      choose(topicsOf(bag_, kImageTypes), params.image_topic, "image_topic", path_ + ": images");
+  const std::set<std::string> images = topicsOf(bag_, kImageTypes);
+  if (images.empty())
+    throw std::runtime_error(path_ + ": no images; record sensor_msgs/Image or CompressedImage");
+  image_topic_ = choose(images, params.image_topic, "image_topic", path_ + ": images");
   const std::set<std::string> infos = topicsOf(bag_, kInfoTypes);
   if (infos.empty()) {
     throw std::runtime_error(path_ + ": no camera_info for " + image_topic_ +

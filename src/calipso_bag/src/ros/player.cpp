@@ -97,6 +97,8 @@ void Player::checkScene() const {
                              std::to_string(scene_.camera.height) +
                              "; use the scene of this video");
   }
+  checkSameCamera(scene_, fromMsg(info, fromMsg(path_.world_from_camera.front().transform)),
+                  params_.clip.path);
   constexpr int kDepthBits = 16, kMaskBits = 8;
   checkPicture(scene_.depth_path, kDepthBits, scene_.camera.width, scene_.camera.height);
   for (const std::string& mask : {scene_.strokes_path, scene_.matte_path})
@@ -317,7 +319,7 @@ void Player::waitForEdited(const std::function<bool()>& done) {
       (in_time ? "the renderer's process ended"
                : "no edited frame for " + std::to_string(params_.frame_timeout_sec) + " s") +
       " after " + std::to_string(window_.returned()) + " of " + std::to_string(schedule_.size()) +
-      " frames; look for the renderer's messages above");
+      " frames; look for the simulator's and the renderer's messages above");
 }
 
 void Player::onEdited(const sensor_msgs::CameraInfoConstPtr& info) {
