@@ -202,6 +202,29 @@ TEST(PlaneMirror, GoesWithTheObject) {
   EXPECT_LT(cv::mean(moved, there)[0], cv::mean(bgr, there)[0] - 0.3 * (plain[0] - was[0]));
 }
 
+// What lies behind its outline may have changed since the key frame (water): what is missed of it
+// there is told by what is there now.
+TEST(PlaneMirror, AtRestTheFrameComesBackWhateverLiesBehind) {
+  cv::Mat bgr;
+  auto p = std::make_shared<Prepared>(*polished(bgr));
+  const cv::Mat& invented = p->background.invented;
+  cv::Mat origin(invented.size(), CV_16SC2, cv::Scalar(-1, -1));
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      if (invented.at<std::uint8_t>(v, u) != 0)
+        origin.at<cv::Vec2s>(v, u) = {static_cast<short>(u % 30), static_cast<short>(v)};
+    }
+  }
+  p->background.live = LiveFill(origin, cv::Mat::zeros(invented.size(), CV_32FC3), invented,
+                                unmirroredCodes(p->mirror, bgr), p->key_labels);
+  cv::Mat later = bgr.clone();
+  later.colRange(0, 31) *= 1.5;
+  RenderParams params;
+  params.planes = table(), params.add_noise = params.keep_still = false;
+  const cv::Mat out = Renderer(p, params).composite(frameOf(later, *p, 0.0, false)).bgr;
+  EXPECT_LE(cv::norm(out, later, cv::NORM_INF), 2.0);
+}
+
 // What the blur gives must not hang on the box that it is asked for: what rests would be repainted.
 TEST(PlaneMirror, IsDrawnOutAlikeInABoxAndInTheWholePicture) {
   const cv::Size size(241, 187);  // no multiple of any level's pixels

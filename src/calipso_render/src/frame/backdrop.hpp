@@ -27,6 +27,8 @@ class Backdrop {
 
   // A pixel of the picture.
   Pixel at(int u, int v) const;
+  // What comes to light at a pixel, without what the planes mirror now.
+  cv::Vec3f unmirroredAt(int u, int v) const { return shadowedAt(u, v, true).colour; }
   // Pixels [first, last) of the region's row of picture row v, where no object is seen.
   void compose(int v, int first, int last, Row& row) const;
 

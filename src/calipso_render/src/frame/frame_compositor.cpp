@@ -88,8 +88,8 @@ RestPicture FrameCompositor::pictureAtRest(const std::vector<bool>& edited) cons
   FrameCompositor rest(frame_.prepared, plain, input, none);
   if (rest.region_.all.empty()) return RestPicture(edited, input.bgr.size());
   rest.drawRegion();
-  return recordAtRest(rest.frame_, *rest.surfaces_, rest.revealed_, *rest.backdrop_,
-                      rest.composer(), rest.removed_);
+  return recordAtRest(rest.frame_, *rest.surfaces_, rest.revealed_, rest.reflections_,
+                      *rest.backdrop_, rest.composer(), rest.removed_);
 }
 
 RowComposer FrameCompositor::composer() const {

@@ -69,13 +69,18 @@ cv::Vec3f Reflections::takenOff(int u, int v) const {
   return {std::max(0.0f, colour[0]), std::max(0.0f, colour[1]), std::max(0.0f, colour[2])};
 }
 
+cv::Vec3f Reflections::added(int u, int v) const {
+  return now_.empty() || marks_.at<std::uint8_t>(v, u) == 0 ? cv::Vec3f()
+                                                            : now_.at<cv::Vec3f>(v, u);
+}
+
 void Reflections::add(int u, int v, Pixel& pixel) const {
   if (now_.empty() || marks_.at<std::uint8_t>(v, u) == 0) return;
   if (pixel.source == kOriginal && marks_.at<std::uint8_t>(v, u) != kChanged) {
     pixel.colour = linearPixel(frame_.input.bgr, u, v);
     return;
   }
-  const cv::Vec3f& now = now_.at<cv::Vec3f>(v, u);
+  const cv::Vec3f now = added(u, v);
   if (pixel.source == kOriginal || now != cv::Vec3f()) pixel.source = kRendered;
   for (int c = 0; c < 3; ++c) pixel.colour[c] = std::max(0.0f, pixel.colour[c] + now[c]);
 }

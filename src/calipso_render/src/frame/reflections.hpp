@@ -30,6 +30,8 @@ class Reflections {
   // Adds what the planes mirror now to what a pixel shows without it. Where nothing changed it is
   // the frame's own.
   void add(int u, int v, Pixel& pixel) const;
+  // What that is where it is added to a place that comes to light.
+  cv::Vec3f added(int u, int v) const;
 
  private:
   void draw();

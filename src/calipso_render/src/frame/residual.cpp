@@ -77,12 +77,13 @@ void Residual::findMiss(const cv::Rect& carried) {
                     *passing = rest_.passing.ptr<cv::Vec3f>(v) + box.x;
     cv::Vec4f* miss = miss_.ptr<cv::Vec4f>(j);
     for (int i = 0; i < box.width; ++i) {
-      if (drawn[i][0] < 0.0f || frame_.isElsewhere(box.x + i, v)) {
+      if (passing[i][0] < 0.0f || frame_.isElsewhere(box.x + i, v)) {
         miss[i] = {};
         continue;
       }
       cv::Vec3f expected = drawn[i];
       if (passing[i] != cv::Vec3f()) expected += passing[i].mul(revealed_.at(box.x + i, v).colour);
+      for (int c = 0; c < 3; ++c) expected[c] = std::max(0.0f, expected[c]);
       miss[i] = {linearFromCode(codes[i][0]) - expected[0],
                  linearFromCode(codes[i][1]) - expected[1],
                  linearFromCode(codes[i][2]) - expected[2], 1.0f};

@@ -51,8 +51,8 @@ FrameInput frameAtRest(const Prepared& prepared, const std::vector<bool>& edited
 
 RestPicture::RestPicture(const std::vector<bool>& edited, const cv::Size& size)
     : edited(edited),
-      drawn(size, CV_32FC3, cv::Scalar::all(-1)),
-      passing(cv::Mat::zeros(size, CV_32FC3)),
+      drawn(cv::Mat::zeros(size, CV_32FC3)),
+      passing(size, CV_32FC3, cv::Scalar::all(-1)),
       owners(size, CV_16S, cv::Scalar(-1)),
       reach(cv::Mat::zeros(size, CV_8U)) {}
 

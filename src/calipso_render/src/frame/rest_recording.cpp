@@ -27,8 +27,9 @@ Drawn drawnAt(const Row& row, int i) {
 }  // namespace
 
 RestPicture recordAtRest(const StagedFrame& frame, const DrawnSurfaces& surfaces,
-                         const RevealedPlace& revealed, const Backdrop& backdrop,
-                         const RowComposer& composer, const cv::Mat& removed) {
+                         const RevealedPlace& revealed, const Reflections& reflections,
+                         const Backdrop& backdrop, const RowComposer& composer,
+                         const cv::Mat& removed) {
   const cv::Rect region = surfaces.centre().region();
   RestPicture picture(frame.edited, frame.input.bgr.size());
 #pragma omp parallel
@@ -42,12 +43,15 @@ RestPicture recordAtRest(const StagedFrame& frame, const DrawnSurfaces& surfaces
         const int u = i + region.x;
         if (removed.at<std::uint8_t>(j, i) == 0) continue;
         const Drawn drawn = drawnAt(row, i);
+        picture.passing.at<cv::Vec3f>(v, u) = {};
         picture.drawn.at<cv::Vec3f>(v, u) = drawn.cover * drawn.colour;
         if (drawn.cover == 1.0f) continue;
-        const cv::Vec3f behind = backdrop.at(u, v).colour, place = revealed.at(u, v).colour;
+        const float beside = 1.0f - drawn.cover;
+        picture.drawn.at<cv::Vec3f>(v, u) += beside * reflections.added(u, v);
+        const cv::Vec3f behind = backdrop.unmirroredAt(u, v), place = revealed.at(u, v).colour;
         for (int c = 0; c < 3; ++c)
           picture.passing.at<cv::Vec3f>(v, u)[c] =
-              (1.0f - drawn.cover) * (place[c] > kDark ? behind[c] / place[c] : 1.0f);
+              beside * (place[c] > kDark ? behind[c] / place[c] : 1.0f);
       }
     }
   }

@@ -17,7 +17,8 @@ namespace calipso::render {
 // @param removed CV_8UC1 over the region: pixels of the objects in it
 // @param composer without a residual
 RestPicture recordAtRest(const StagedFrame& frame, const DrawnSurfaces& surfaces,
-                         const RevealedPlace& revealed, const Backdrop& backdrop,
-                         const RowComposer& composer, const cv::Mat& removed);
+                         const RevealedPlace& revealed, const Reflections& reflections,
+                         const Backdrop& backdrop, const RowComposer& composer,
+                         const cv::Mat& removed);
 
 }  // namespace calipso::render
