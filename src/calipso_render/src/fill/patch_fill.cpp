@@ -30,6 +30,18 @@ constexpr float kHorizon = 6.0f;  // px of height by which a source may miss Pat
 cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
 cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_cast<short>(p.y)}; }
 
+// Remainders of 16-bit numbers as division leaves them, without one (Lemire, Kaser & Kurz 2019).
+class Divisor {
+ public:
+  explicit Divisor(std::uint32_t value) : value_(value), inverse_(0xffffffffu / value + 1) {}
+  std::uint32_t rest(std::uint32_t number) const {
+    return static_cast<std::uint32_t>(std::uint64_t{inverse_ * number} * value_ >> 32);
+  }
+
+ private:
+  std::uint32_t value_, inverse_;
+};
+
 // One level's hole: the nearest source patch of every patch that touches it, and the picture that
 // they make.
 class Filling {
@@ -47,6 +59,8 @@ class Filling {
         cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)),
         plain_(hole_.size(), CV_8U, cv::Scalar(0)),
         bands_((hole_.rows + kBandRows - 1) / kBandRows) {
+    for (int reach = 0; reach <= std::max({hole_.cols, hole_.rows, kFarthest}); ++reach)
+      offsets_.emplace_back(2 * reach + 1);
     const cv::Mat patch = cv::Mat::ones(kPatchSide, kPatchSide, CV_8U);
     cv::Mat touched;
     cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
@@ -211,7 +225,7 @@ class Filling {
     return along_surfaces_ && !own.empty() ? own : sources_;
   }
   cv::Point oneOf(const std::vector<cv::Point>& from, const cv::Point& p, int salt) const {
-    return from[random(p, salt) % from.size()];
+    return from[random(p, salt) % static_cast<std::uint32_t>(from.size())];
   }
   bool isMisled(const cv::Point& p) const {
     return hasMatch(p) && rules_.onOther(p, match(p)) && has_source_[rules_.surfaceAt(p)];
@@ -341,8 +355,8 @@ class Filling {
 
   cv::Point jitter(const cv::Point& p, int salt, int reach) const {
     const std::uint32_t h = random(p, 1024 + salt);
-    return {static_cast<int>((h & 0xffff) % (2 * reach + 1)) - reach,
-            static_cast<int>((h >> 16) % (2 * reach + 1)) - reach};
+    return {static_cast<int>(offsets_[reach].rest(h & 0xffff)) - reach,
+            static_cast<int>(offsets_[reach].rest(h >> 16)) - reach};
   }
 
   std::uint32_t random(const cv::Point& p, int salt) const {
@@ -359,6 +373,7 @@ class Filling {
   InpaintParams params_;
   cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
   cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
+  std::vector<Divisor> offsets_;  // by reach: how many there are along an axis
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   std::vector<cv::Point> sources_;
   std::array<bool, 256> has_source_{};                  // by surface, and once they matter
