@@ -96,6 +96,18 @@ Sighting Sightings::lookAt(std::size_t view, const Place& place, float before) c
   return look;
 }
 
+// Between the corners, too, as normal and way from the camera are weighted means of theirs.
+bool Sightings::mayShow(std::size_t view, const std::array<Place, 3>& corners) const {
+  if (two_sided_) return true;
+  const Eigen::Vector3f eye = views_[view]->camera.world_from_camera.translation().cast<float>();
+  for (const Place& at : corners) {
+    for (const Place& of : corners) {
+      if (of.normal.dot(at.point - eye) < 0.0f) return true;
+    }
+  }
+  return false;
+}
+
 Sighting Sightings::frontBefore(const Place& place) const {
   const Eigen::Vector3f q = camera_from_world_[0] * place.point;
   auto look = pixelOf(0, q);

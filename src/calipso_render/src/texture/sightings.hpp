@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -31,6 +32,10 @@ class Sightings {
 
   // @param before how far, in extents, the place may lie before the front that is seen there
   Sighting lookAt(std::size_t view, const Place& place, float before) const;
+
+  // Whether a picture may show points of a triangle: not if it is turned away from the camera.
+  // @param corners its vertices and their normals
+  bool mayShow(std::size_t view, const std::array<Place, 3>& corners) const;
 
   // The front of the object before a place, where that is the front's mirror image across the plane
   // of the key frame's picture, and not the other side of a wall.

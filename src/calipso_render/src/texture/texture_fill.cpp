@@ -125,8 +125,9 @@ class TextureFill {
         Looks& looks = looks_[t];
         found.clear();
         looks.ends.reserve(texels);
+        const std::vector<std::size_t> showing = viewsShowing(t);
         for (std::size_t i = 0; i < texels; ++i) {
-          addLooks(t, texture.weightsOf(t, i), found);
+          addLooks(t, texture.weightsOf(t, i), showing, found);
           looks.ends.push_back(found.size());
         }
         looks.all = found;
@@ -134,10 +135,25 @@ class TextureFill {
     }
   }
 
+  // The views that may show points of a triangle.
+  std::vector<std::size_t> viewsShowing(int triangle) const {
+    const Eigen::Vector3i &t = surface_.triangles[triangle], &c = surface_.corners[triangle];
+    std::vector<std::size_t> showing;
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      const Actor& a = *actors_[i];
+      if (sightings_.mayShow(i, {Place{a.vertices[t[0]], a.normals[c[0]]},
+                                 {a.vertices[t[1]], a.normals[c[1]]},
+                                 {a.vertices[t[2]], a.normals[c[2]]}}))
+        showing.push_back(i);
+    }
+    return showing;
+  }
+
   // Of the pictures that show a place, those count most that show it in most detail, and not in a
   // highlight: the light tells that too badly to be taken off without a trace.
-  void addLooks(int triangle, const Eigen::Vector3f& w, std::vector<Look>& looks) const {
-    for (std::size_t i = 0; i < views_.size(); ++i) {
+  void addLooks(int triangle, const Eigen::Vector3f& w, const std::vector<std::size_t>& showing,
+                std::vector<Look>& looks) const {
+    for (const std::size_t i : showing) {
       const Sighting l = sightings_.lookAt(
           i, placeOf(triangle, w, actors_[i]->vertices, actors_[i]->normals), 1.0f);
       if (l.weight <= 0.0f) continue;
