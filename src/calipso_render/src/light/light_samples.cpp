@@ -5,6 +5,7 @@
 #include "calipso_render/colour.hpp"
 #include "calipso_render/light_fit.hpp"
 #include "draw/ray_scene.hpp"
+#include "draw/side_by_side.hpp"
 #include "light/gloss_fit.hpp"
 #include "light/shadow_clue.hpp"
 #include "light/shadow_contrast.hpp"
@@ -123,35 +124,34 @@ RayScene sceneOf(const View& view, const std::vector<bool>& which) {
   return RayScene(occluders);
 }
 
-using Scenes = std::shared_ptr<std::vector<RayScene>>;
+std::vector<RayScene> scenesOf(const std::vector<View>& views, const std::vector<bool>& which) {
+  std::vector<RayScene> scenes;
+  for (const View& view : views) scenes.push_back(sceneOf(view, which));
+  return scenes;
+}
 
-// Shadows of what leaves its place, against the place without them where that is known; others by
-// their outlines in the key frame.
-void addShadows(const std::vector<View>& views, const std::vector<bool>& leave,
-                const std::vector<SupportPlane>& planes, const Background& plate,
-                const cv::Mat& depth, const Scenes& scenes, LightEvidence& evidence) {
-  const View& key = views.front();
-  evidence.shadow_candidates =
-      ShadowContrast(key, planes, depth, ShadowContrast::kCoarse).candidates(scenes->front());
-  const auto contrast = std::make_shared<ShadowContrast>(key, planes, depth, ShadowContrast::kFine);
-  evidence.shadow_misfit = [scenes, contrast](const Eigen::Vector3f& l) {
-    return contrast->misfit(scenes->front(), l);
-  };
-  if (std::find(leave.begin(), leave.end(), true) == leave.end()) return;
-  cv::Mat behind = depth.clone();
-  if (!behind.empty()) behind.setTo(0.0f, key.labels != 0);
-  const auto passing =
-      std::make_shared<ShadowClue>(views, leave, planes, EmptyPlace{key.camera, plate, behind});
-  if (!passing->plateKnown()) return;
-  const auto leaving = std::make_shared<std::vector<RayScene>>();
-  for (const View& view : views) leaving->push_back(sceneOf(view, leave));
-  std::vector<bool> stay = leave;
-  stay.flip();
-  const auto staying = std::make_shared<RayScene>(sceneOf(key, stay));
-  const std::vector<Eigen::Vector3f> more = passing->candidates();
+// What tells shadows of what leaves its place, against the place without them where that is known;
+// and of others by their outlines in the key frame.
+struct Shadows {
+  std::unique_ptr<ShadowContrast> coarse, fine;
+  std::unique_ptr<ShadowClue> passing;             // none: nothing leaves
+  std::vector<RayScene> objects, leaving, staying;  // all of each view; those; the key frame's others
+
+  bool anyPass() const { return passing != nullptr && passing->plateKnown(); }
+};
+
+void addShadows(const std::shared_ptr<const Shadows>& seen, LightEvidence& evidence) {
+  evidence.shadow_candidates = seen->coarse->candidates(seen->objects.front());
+  if (!seen->anyPass()) {
+    evidence.shadow_misfit = [seen](const Eigen::Vector3f& l) {
+      return seen->fine->misfit(seen->objects.front(), l);
+    };
+    return;
+  }
+  const std::vector<Eigen::Vector3f> more = seen->passing->candidates();
   evidence.shadow_candidates.insert(evidence.shadow_candidates.end(), more.begin(), more.end());
-  evidence.shadow_misfit = [contrast, staying, leaving, passing](const Eigen::Vector3f& l) {
-    return contrast->misfit(*staying, l) + passing->misfit(*leaving, l);
+  evidence.shadow_misfit = [seen](const Eigen::Vector3f& l) {
+    return seen->fine->misfit(seen->staying.front(), l) + seen->passing->misfit(seen->leaving, l);
   };
 }
 
@@ -176,15 +176,39 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
                             const std::vector<SupportPlane>& planes, const Background& plate,
                             const cv::Mat& depth) {
   LightEvidence evidence;
-  evidence.samples = lightSamples(views, moves, evidence.clusters);
-  lookBelow(views.front(), planes, evidence);
-  const auto scenes = std::make_shared<std::vector<RayScene>>();
-  for (const View& view : views)
-    scenes->push_back(sceneOf(view, std::vector<bool>(moves.size(), true)));
-  evidence.visible = [scenes](const LightSample& s, const Eigen::Vector3f& l) {
-    return (*scenes)[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
+  const auto seen = std::make_shared<Shadows>();
+  const View& key = views.front();
+  const std::vector<bool> leave = leavers(key, moves, plate);
+  const bool any_leaves = std::find(leave.begin(), leave.end(), true) != leave.end();
+  cv::Mat behind = depth.clone();
+  if (!behind.empty()) behind.setTo(0.0f, key.labels != 0);
+  const auto contrastBy = [&](int cells) {
+    return std::make_unique<ShadowContrast>(key, planes, depth, cells);
   };
-  addShadows(views, leavers(views.front(), moves, plate), planes, plate, depth, scenes, evidence);
+  doAll(true,
+        {[&] {
+           if (any_leaves)
+             seen->passing = std::make_unique<ShadowClue>(views, leave, planes,
+                                                          EmptyPlace{key.camera, plate, behind});
+         },
+         [&] {
+           evidence.samples = lightSamples(views, moves, evidence.clusters);
+           lookBelow(key, planes, evidence);
+         },
+         [&] { seen->fine = contrastBy(ShadowContrast::kFine); },
+         [&] {
+           seen->objects = scenesOf(views, std::vector<bool>(moves.size(), true));
+           if (!any_leaves) return;
+           seen->leaving = scenesOf(views, leave);
+           std::vector<bool> stay = leave;
+           stay.flip();
+           seen->staying.push_back(sceneOf(key, stay));
+         },
+         [&] { seen->coarse = contrastBy(ShadowContrast::kCoarse); }});
+  evidence.visible = [seen](const LightSample& s, const Eigen::Vector3f& l) {
+    return seen->objects[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
+  };
+  addShadows(seen, evidence);
   evidence.gloss = [&views, moves, visible = evidence.visible](
                        const LightFit& fit, const std::vector<LightSample>& samples) {
     return seenGlosses(highlightSamples(views, moves, samples, fit.light.direction), moves.size(),
