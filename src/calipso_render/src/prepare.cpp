@@ -52,8 +52,7 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
   for (std::size_t i = 0; i < count; ++i) {
     const ClipFrame& f = *usable[(i + 1) * usable.size() / count - 1];
     View& view = views[1 + i];
-    view.labels = f.labels, view.camera = f.camera;
-    f.bgr.convertTo(view.picture, CV_32F);
+    view.picture = f.bgr, view.labels = f.labels, view.camera = f.camera;
     for (std::size_t k = 0; k < p.surfaces.size(); ++k) {
       const Surface& s = p.surfaces[k];
       Points vertices = s.key_vertices;
@@ -67,11 +66,14 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
   return views;
 }
 
-// The key frame's view and up to kLightViews others, evenly spaced. Pictures are shared.
+// The key frame's view and up to kLightViews others, evenly spaced.
 std::vector<View> lightViewsOf(const std::vector<View>& views) {
   std::vector<View> some = {views.front()};
   const std::size_t further = views.size() - 1, count = std::min(further, kLightViews);
   for (std::size_t i = 0; i < count; ++i) some.push_back(views[(i + 1) * further / count]);
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 1; i < some.size(); ++i)
+    some[i].picture.convertTo(some[i].picture, CV_32F);  // the other view keeps its own
   return some;
 }
 
@@ -195,13 +197,13 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.texture_views = static_cast<int>(views.size());
   p.light_views = static_cast<int>(light_views.size());
   p.light = lightOf(light_views, seen, any_moves, params, p);
-  const ShadowMap sun = sunOver(actors, p.light.light);
-  const SkyMap sky = skyOver(actors, params);
   // Where no cast shadow tells the light, the objects' shade on the ground may be another.
   p.appearances =
       makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()),
                       p.light.from_shadows ? params.planes : std::vector<SupportPlane>());
   p.appearance_ms = watch.lap();
+  const ShadowMap sun = sunOver(actors, p.light.light);
+  const SkyMap sky = skyOver(actors, params);
   for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
   p.fronts = frontsOf(p, params);
   p.footprints = footprintsOf(p);

@@ -11,6 +11,7 @@
 #include "calipso_render/shadow_map.hpp"
 #include "calipso_render/sky_map.hpp"
 #include "draw/bicubic.hpp"
+#include "draw/light_batch.hpp"
 #include "light/shaded_ground.hpp"
 #include "smooth_step.hpp"
 #include "texture/false_shade.hpp"
@@ -80,6 +81,21 @@ struct Shaded {
   cv::Vec3f mean;
 };
 
+// Visible part of the sun at each point.
+std::vector<float> sunAt(const std::vector<SurfacePoint>& points, const ShadowMap& sun) {
+  std::vector<float> visible;
+  LightBatch batch;
+  float some[LightBatch::kMost];
+  for (const SurfacePoint& p : points) {
+    batch.add(p.position, p.normal);
+    if (batch.count() < LightBatch::kMost && &p != &points.back()) continue;
+    batch.look(sun, some);
+    visible.insert(visible.end(), some, some + batch.count());
+    batch.clear();
+  }
+  return visible;
+}
+
 Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera, const Light& light,
                const Gloss& gloss, const Shade& shade, const cv::Vec3f& thrown_back) {
   Shaded s;
@@ -95,12 +111,20 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
   std::vector<int> counts(region.height, 0);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < region.height; ++v) {
+    std::vector<int> columns;
+    std::vector<SurfacePoint> points;
     for (int u = 0; u < region.width; ++u) {
       const std::uint32_t id = buffer.ids(v)[u];
       if (id == VisibilityBuffer::kNothing) continue;
-      const SurfacePoint p =
-          surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye);
-      const float visible = shade.sun.visibility(p.position, p.normal);
+      columns.push_back(u);
+      points.push_back(
+          surfacePoint(actor, VisibilityBuffer::triangleOf(id), u + region.x, v + region.y, eye));
+    }
+    const std::vector<float> sun = sunAt(points, shade.sun);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const int u = columns[i];
+      const SurfacePoint& p = points[i];
+      const float visible = sun[i];
       const cv::Vec3f l = diffuseShading(light, p.normal, visible, p.seen, thrown_back);
       s.light.at<cv::Vec3f>(v, u) = l;
       s.open.at<cv::Vec3f>(v, u) = diffuseShading(light, p.normal, 1.0f);
@@ -115,7 +139,7 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
             torranceSparrow(p.normal, light.direction, towards, gloss.roughness);
       }
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
-      s.triangle.at<int>(v, u) = VisibilityBuffer::triangleOf(id);
+      s.triangle.at<int>(v, u) = p.triangle;
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];
     }
@@ -247,7 +271,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
   const Shaded shaded = lightOn(actor, r.region, view.camera, light, gloss, shade, thrown_back);
   r.nearness = shaded.nearness, r.normal = shaded.normal, r.triangle = shaded.triangle;
-  r.clear = clearOf(view.picture(r.region), shaded.glint);
+  view.picture(r.region).convertTo(r.codes, CV_32F);
+  r.clear = clearOf(r.codes, shaded.glint);
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);
   r.trust = trustOf(view.labels, actor.surface->index, r.region);
@@ -259,7 +284,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
         r.trust.at<float>(v, u) = 0.0f;
         continue;
       }
-      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v + r.region.y, u + r.region.x);
+      const cv::Vec3f& code = r.codes.at<cv::Vec3f>(v, u);
       const cv::Vec3f& l = shaded.light.at<cv::Vec3f>(v, u);
       const cv::Vec3f& highlight = shaded.highlight.at<cv::Vec3f>(v, u);
       for (int c = 0; c < 3; ++c) {

@@ -9,6 +9,7 @@ namespace calipso::render {
 // The reflectance that one picture shows of an object.
 struct Reflectance {
   cv::Rect region;
+  cv::Mat codes;     // CV_32FC3: the picture there, code values
   cv::Mat albedo;    // CV_32FC4, extended beyond the silhouette; the fourth unused
   cv::Mat nearness;  // CV_32FC1: 1 / depth of the object's front, 0 = none
   cv::Mat normal;    // CV_32FC3: of the front, world, towards the camera

@@ -33,14 +33,13 @@ cv::Mat drawnInto(const Reflectance& picture, const Actor& actor, const SurfaceT
 
 // What the picture has beyond a drawn reflectance, code values. CV_32FC3.
 // @param certain out, CV_8UC1: where it can be told
-cv::Mat missedCodes(const cv::Mat& codes, const Reflectance& picture, const cv::Mat& drawn,
-                    cv::Mat& certain) {
+cv::Mat missedCodes(const Reflectance& picture, const cv::Mat& drawn, cv::Mat& certain) {
   certain = (picture.trust >= kCertain) & (picture.clear >= kCertain);
   cv::Mat missed(drawn.size(), CV_32FC3, cv::Scalar());
   for (int v = 0; v < drawn.rows; ++v) {
     for (int u = 0; u < drawn.cols; ++u) {
       if (certain.at<std::uint8_t>(v, u) == 0) continue;
-      const cv::Vec3f& code = codes.at<cv::Vec3f>(v + picture.region.y, u + picture.region.x);
+      const cv::Vec3f& code = picture.codes.at<cv::Vec3f>(v, u);
       const cv::Vec4f &own = picture.albedo.at<cv::Vec4f>(v, u), &now = drawn.at<cv::Vec4f>(v, u);
       for (int c = 0; c < 3; ++c) {
         const float ratio = now[c] / std::max(kLeast, own[c]);
@@ -53,10 +52,9 @@ cv::Mat missedCodes(const cv::Mat& codes, const Reflectance& picture, const cv::
 }
 
 // Sizes of what that has of the finest detail.
-std::vector<float> detailsOf(const cv::Mat& codes, const Reflectance& picture,
-                             const cv::Mat& drawn) {
+std::vector<float> detailsOf(const Reflectance& picture, const cv::Mat& drawn) {
   cv::Mat certain, detail;
-  const cv::Mat missed = missedCodes(codes, picture, drawn, certain);
+  const cv::Mat missed = missedCodes(picture, drawn, certain);
   cv::filter2D(missed, detail, CV_32F, noiseMask());
   cv::erode(certain, certain, cv::Mat::ones(3, 3, CV_8U));
   std::vector<float> details;
@@ -92,8 +90,7 @@ float grainOf(const SeenObject& object, const SurfaceTexture& texture) {
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t i = 0; i < object.views.size(); ++i) {
     const Reflectance& picture = object.pictures[i];
-    of_view[i] = detailsOf(object.views[i]->picture, picture,
-                           drawnInto(picture, *object.actors[i], texture));
+    of_view[i] = detailsOf(picture, drawnInto(picture, *object.actors[i], texture));
   }
   std::vector<float> details;
   for (const std::vector<float>& own : of_view)

@@ -78,6 +78,7 @@ void levelSeams(const Points& vertices, const Triangles& triangles,
   const std::vector<int> welded = weld(vertices);
   const std::vector<Part> parts = partsAtVertices(welded, triangles, part, texture);
   std::vector<std::vector<cv::Vec3f>> shifts(parts.size());
+#pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t own = 1; own < parts.size(); ++own) {
     std::vector<cv::Vec3f> shift(vertices.size());
     std::vector<bool> known(vertices.size(), false);
