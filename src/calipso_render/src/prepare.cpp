@@ -133,17 +133,17 @@ void coverWhatRests(const Prepared& p, std::vector<ClipFrame>& frames) {
 
 LightFit lightOf(const std::vector<View>& views, const Background& seen, bool any_moves,
                  const RenderParams& params, const Prepared& p) {
-  const LightEvidence evidence =
+  LightEvidence evidence =
       lightEvidence(views, p.moves, params.planes, any_moves ? seen : Background(), params.depth);
+  evidence.borders = [&](const Eigen::Vector3f& l) {
+    return sunByBorders(views, params.planes, params.depth, l, p.outline_blur);
+  };
   const Eigen::Vector3f view = -p.camera.world_from_camera.linear().col(2).cast<float>();
   LightFit fit = fitLight(evidence, params.up.cast<float>(), view);
   fit.light.angular_radius = static_cast<float>(params.sun_radius);
-  const auto sun = fit.from_shadows
-                       ? sunByBorders(views, params.planes, params.depth, fit.light, p.outline_blur)
-                       : std::nullopt;
-  if (sun) {
-    fit.light.direction = sun->direction;
-    fit.light.angular_radius = sun->radius.value_or(fit.light.angular_radius);
+  if (fit.by_borders) {
+    fit.light.direction = fit.by_borders->direction;
+    fit.light.angular_radius = fit.by_borders->radius.value_or(fit.light.angular_radius);
   }
   return fit;
 }

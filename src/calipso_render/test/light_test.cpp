@@ -234,8 +234,11 @@ TEST(FitLight, BelievesCastShadows) {
     return -2000.0 * std::max(0.0f, l.dot(shadow) - 0.99f) / 0.01;
   };
   evidence.shadow_candidates = {Eigen::Vector3f(0.25f, -0.5f, 0.8f).normalized()};
+  evidence.borders = [](const Eigen::Vector3f& l) { return SunByBorders{l, 0.01f}; };
   const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
   EXPECT_TRUE(fit.from_shadows);
+  ASSERT_TRUE(fit.by_borders);  // asked where the search put the sun
+  EXPECT_EQ(fit.by_borders->direction, fit.light.direction);
   EXPECT_TRUE(fit.confirmed());
   EXPECT_GT(fit.light.direction.dot(shadow),
             std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
@@ -284,8 +287,10 @@ TEST(FitLight, IsNotToldByWhatAllDirectionsExplain) {
   LightEvidence evidence;
   evidence.samples = ballSamples(shading), evidence.clusters = 1;
   evidence.shadow_misfit = [](const Eigen::Vector3f& l) { return -200.0 - l.x(); };
+  evidence.borders = [](const Eigen::Vector3f& l) { return SunByBorders{l, 0.01f}; };
   const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
   EXPECT_FALSE(fit.from_shadows);
+  EXPECT_FALSE(fit.by_borders);
   EXPECT_FALSE(fit.confirmed());
   EXPECT_GT(fit.light.direction.dot(shading), std::cos(2.0 * M_PI / 180.0));  // as without shadows
 }

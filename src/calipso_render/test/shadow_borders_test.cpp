@@ -57,9 +57,7 @@ struct Setting {
 
   std::optional<SunByBorders> sunFrom(const Eigen::Vector3f& start,
                                       const std::vector<SupportPlane>& planes) const {
-    Light light;
-    light.direction = start.normalized();
-    return sunByBorders({view}, planes, cv::Mat(), light, 0.0f);
+    return sunByBorders({view}, planes, cv::Mat(), start.normalized(), 0.0f);
   }
 };
 

@@ -44,6 +44,13 @@ struct SeenGlosses {
   std::vector<std::optional<SeenGloss>> of_one;
 };
 
+// The sun as the borders of its shadows show it.
+struct SunByBorders {
+  Eigen::Vector3f direction;  // unit, towards it, world
+  // rad, of its disc; none: no border is far enough from what casts it
+  std::optional<float> radius;
+};
+
 // All that the pictures show of the light. The functions are called from several threads at once.
 struct LightEvidence {
   std::vector<LightSample> samples;
@@ -57,6 +64,9 @@ struct LightEvidence {
   // was seen; may be empty.
   std::function<double(const Eigen::Vector3f& l)> shadow_misfit;
   std::vector<Eigen::Vector3f> shadow_candidates;  // directions that cast shadows speak for
+  // Where borders of cast shadows put a sun that is nearly in direction l; may be empty, and tell
+  // nothing.
+  std::function<std::optional<SunByBorders>(const Eigen::Vector3f& l)> borders;
   // Gloss from the pixels near the mirror direction, in the clusters of the samples nearest to them,
   // under a light found; may be empty, and find none.
   std::function<SeenGlosses(const LightFit&, const std::vector<LightSample>&)> gloss;
@@ -79,6 +89,7 @@ struct LightFit {
   bool determined = false;  // false: too little was seen; the light is a default, high and frontal
   bool second_order = false;  // ambient light in bands 1 and 2, too: held-out pixels spoke for it
   bool from_shadows = false;  // cast shadows decided on the direction
+  std::optional<SunByBorders> by_borders;  // only then: what their borders make of it
   double cost = 0.0;          // of the last pass, half the robust sum of squares
 
   // Something besides shading speaks for the direction: shading alone is off by tens of degrees

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "draw/side_by_side.hpp"
 #include "light/ambient_fit.hpp"
 #include "light/cluster_split.hpp"
 #include "light/gloss_fit.hpp"
@@ -271,8 +272,16 @@ LightFit fitShading(const LightEvidence& evidence, const Eigen::Vector3f& up) {
   }
   // Shading alone may lead below the horizon: then the search's direction stands, if it stands out,
   // as it does where shadows tell it.
-  if (!best.determined && (best.from_shadows || starts.front().contrast > kTelling))
-    keepBetter(fitFrom(starts.front(), evidence, up, false), best);
+  if (best.determined || (!best.from_shadows && starts.front().contrast <= kTelling)) return best;
+  std::optional<LightFit> fit;
+  std::optional<SunByBorders> by_borders;
+  std::vector<std::function<void()>> works = {
+      [&] { fit = fitFrom(starts.front(), evidence, up, false); }};
+  if (best.from_shadows && evidence.borders)
+    works.emplace_back([&] { by_borders = evidence.borders(starts.front().direction); });
+  doAll(true, works);
+  keepBetter(fit, best);
+  best.by_borders = by_borders;
   return best;
 }
 

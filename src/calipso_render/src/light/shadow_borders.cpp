@@ -297,23 +297,23 @@ std::optional<float> radiusBy(std::vector<Border> borders, float blur) {
 
 std::optional<SunByBorders> sunByBorders(const std::vector<View>& views,
                                          const std::vector<SupportPlane>& planes,
-                                         const cv::Mat& depth, const Light& light, float blur) {
+                                         const cv::Mat& depth, const Eigen::Vector3f& sun,
+                                         float blur) {
   if (planes.empty()) return std::nullopt;
   const std::size_t count = std::min(views.size(), kViews);
   std::vector<std::vector<Border>> seen(count);
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = k * (views.size() - 1) / std::max<std::size_t>(1, count - 1);
-    seen[k] = Borders(views[i], planes, i == 0 ? depth : cv::Mat(), light.direction).find();
+    seen[k] = Borders(views[i], planes, i == 0 ? depth : cv::Mat(), sun).find();
   }
   std::vector<Border> borders;
   for (const auto& some : seen) borders.insert(borders.end(), some.begin(), some.end());
   if (borders.size() < kFewest) return std::nullopt;
   const Eigen::Vector2f turn = turnBy(borders);
-  const Eigen::Vector3f e = light.direction.unitOrthogonal();
-  return SunByBorders{
-      (light.direction + turn.x() * e + turn.y() * light.direction.cross(e)).normalized(),
-      radiusBy(std::move(borders), blur)};
+  const Eigen::Vector3f e = sun.unitOrthogonal();
+  return SunByBorders{(sun + turn.x() * e + turn.y() * sun.cross(e)).normalized(),
+                      radiusBy(std::move(borders), blur)};
 }
 
 }  // namespace calipso::render

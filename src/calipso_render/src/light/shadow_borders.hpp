@@ -4,16 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "calipso_render/light.hpp"
+#include "calipso_render/light_fit.hpp"
 #include "calipso_render/stage.hpp"
 
 namespace calipso::render {
-
-struct SunByBorders {
-  Eigen::Vector3f direction;  // unit, towards it, world
-  std::optional<float>
-      radius;  // rad, of its disc; none: no border is far enough from what casts it
-};
 
 // A sun that is nearly known, such that the borders of the shadows that it casts on the support
 // planes lie where the pictures show them: each is sought across itself, as a step of brightness,
@@ -27,6 +21,7 @@ struct SunByBorders {
 // @param blur px, of sharp outlines in the pictures: outlineBlur()
 std::optional<SunByBorders> sunByBorders(const std::vector<View>& views,
                                          const std::vector<SupportPlane>& planes,
-                                         const cv::Mat& depth, const Light& light, float blur);
+                                         const cv::Mat& depth, const Eigen::Vector3f& sun,
+                                         float blur);
 
 }  // namespace calipso::render
