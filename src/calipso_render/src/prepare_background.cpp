@@ -10,6 +10,7 @@
 #include "place/passing_shade.hpp"
 #include "place/place_relief.hpp"
 #include "place/plane_mirror.hpp"
+#include "place/relief_sky.hpp"
 #include "place/scenery_shade.hpp"
 #include "place/umbra.hpp"
 
@@ -107,6 +108,41 @@ SeenShadows shadowsOn(const SeenPlace& place, const cv::Mat& sun, const cv::Mat&
   return seen;
 }
 
+// CV_32FC1: visible part of the sky on walls, 1 elsewhere.
+cv::Mat skyOnWalls(const std::vector<Actor>& actors, const Relief& relief, const cv::Size& size) {
+  cv::Mat sky(size, CV_32F, cv::Scalar(1.0f));
+  std::vector<Occluder> occluders;
+  for (const Actor& a : actors)
+    occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+  const ReliefSky on_walls(relief, occluders, 256);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = 0; v < sky.rows; ++v) {
+    for (int u = 0; u < sky.cols; ++u) sky.at<float>(v, u) = on_walls.at(u, v);
+  }
+  return sky;
+}
+
+// The dark that contacts leave on walls, where the picture surely shows it, whatever becomes of the
+// sun's shadows; walls that should show some and do not take none.
+cv::Mat contactTraces(const PlaceEvidence& e, const RenderParams& params, Prepared& p) {
+  const cv::Mat sky = skyOnWalls(e.actors, p.relief, e.picture.size()), objects = p.key_labels != 0,
+                predicted = isShaded(cv::Mat::ones(sky.size(), CV_32F), sky) & ~objects;
+  cv::Mat traces = cv::Mat::zeros(sky.size(), CV_8U);
+  for (int k = 1; k <= static_cast<int>(p.relief.walls.size()); ++k) {
+    const cv::Mat wall = (p.relief.wall == k) & p.relief.seen;
+    if (cv::countNonZero(predicted & wall) == 0) continue;
+    cv::Mat here = sky.clone();
+    here.setTo(1.0f, ~wall);
+    const cv::Mat dark = surelyDarker(here, e.picture, objects | ~wall);
+    if (cv::countNonZero(dark) == 0) p.relief.wall.setTo(0, wall);
+    traces |= grown(dark, params.background.shadow_margin_px) & wall;
+  }
+  p.relief.index();
+  p.shadowless.setTo(
+      0, traces | (turnedAway(p.relief, p.light.light.direction) & (p.relief.wall > 0)));
+  return traces;
+}
+
 // Where shadows leave a trace, with the predictions' errors: on the surfaces that they fall on, not
 // on what stands before these.
 cv::Mat shadeTraces(const SeenShadows& shadows, const SeenPlace& place,
@@ -172,6 +208,8 @@ SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, P
   if (!p.relief.empty())
     place.blind = place.off_planes & ~p.relief.seen, place.off_planes |= p.relief.seen;
   p.shadowless = place.blind.clone();
+  p.sunless = turnedAway(p.relief, p.light.light.direction);
+  if (!p.sunless.empty()) place.blind |= p.sunless;
   if (!surfaces.empty()) {
     cv::Mat& where = p.light.confirmed() ? place.curved : place.blind;
     where |= (surfaces.label == PlaceSurfaces::kCurved) & ~place.blind;
@@ -315,13 +353,16 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   };
   const bool any_rests = any(false), any_moves = any(true);
   if (p.light.confirmed()) {
-    p.sunless = shadeOfScenery(p.scenery, surfaces, p.camera, p.light.light.direction, in_sun);
-    if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);
+    const cv::Mat shaded =
+        shadeOfScenery(p.scenery, surfaces, p.camera, p.light.light.direction, in_sun);
+    if (!shaded.empty()) p.sunless = p.sunless.empty() ? shaded : cv::Mat(p.sunless | shaded);
   }
+  if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);
   cv::Mat traces =
       any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
   if (any_rests && p.light.confirmed() && !isWater(p.mirror))
     liftTraces(e, place, sun, sky, params, traces, p);
+  if (any_rests && !p.relief.empty()) traces |= contactTraces(e, params, p);
   if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);
   if (p.mirror.established())

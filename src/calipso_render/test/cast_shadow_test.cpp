@@ -166,6 +166,100 @@ TEST(Renderer, TakesNoSunWhereSceneryKeepsItOff) {
   EXPECT_GT(darker, all / 5);  // the ball hides others, and the sky
 }
 
+// A ball before a wall that turns away from the sun, nearly touching it; the picture has its dark
+// there, and no shadow of the sun.
+struct BeforeAWall {
+  static constexpr double kAway = 0.18;  // m
+  static constexpr int kCode = 150;      // of wall and floor
+  const Eigen::Vector3d normal = Eigen::Vector3d(-1.0, -1.0, 0.0).normalized();
+  const Eigen::Vector3d centre = (1.02 * kBallRadius - kAway) * normal + Eigen::Vector3d(0, 0, 0.1);
+  ObjectModel ball = ballAt(centre);
+  ClipFrame key{cv::Mat(kHeight, kWidth, CV_8UC3), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera()};
+  RenderParams render = params();
+
+  BeforeAWall() {
+    render.depth = cv::Mat(kHeight, kWidth, CV_32F);
+    Light light = sunlight();
+    light.direction = Eigen::Vector3f(0.4f, 0.3f, 0.87f).normalized();
+    cv::RNG random(7);
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        render.depth.at<float>(v, u) = static_cast<float>(std::min(toWall(u, v), toFloor(u, v)));
+        const float open = 1.0f - 0.85f * hiddenAt(u, v, centre),
+                    code = codeFromLinear(open * linearFromCode(kCode));
+        key.bgr.at<cv::Vec3b>(v, u) =
+            cv::Vec3b::all(quantise(code + static_cast<float>(random.uniform(-3, 4))));
+      }
+    }
+    const Surface surface = makeSurface(ball);
+    forEachPixelOf(makeActor(surface, surface.key_vertices, key.camera),
+                   [&](int u, int v, const SurfacePoint& p) {
+                     const cv::Vec3f shade = diffuseShading(light, p.normal, 1.0f);
+                     for (int c = 0; c < 3; ++c)
+                       key.bgr.at<cv::Vec3b>(v, u)[c] = quantise(codeFromLinear(0.5f * shade[c]));
+                     key.labels.at<std::uint8_t>(v, u) = kBallLabel;
+                     const Eigen::Vector3d at = key.camera.world_from_camera.inverse() *
+                                                p.position.cast<double>();
+                     render.depth.at<float>(v, u) = static_cast<float>(at.z());
+                   });
+  }
+  Eigen::Vector3d eye() const { return key.camera.world_from_camera.translation(); }
+  Eigen::Vector3d ray(int u, int v) const {
+    return key.camera.world_from_camera.linear() * key.camera.ray(u, v);
+  }
+  double toWall(int u, int v) const {
+    const double t = (-kAway - normal.dot(eye())) / normal.dot(ray(u, v));
+    return t > 0.0 ? t : 1e9;
+  }
+  double toFloor(int u, int v) const { return ray(u, v).z() < 0.0 ? -eye().z() / ray(u, v).z() : 1e9; }
+  // Of the wall's sky, by a ball of which it sees all: its form factor.
+  float hiddenAt(int u, int v, const Eigen::Vector3d& by) const {
+    if (toWall(u, v) > toFloor(u, v)) return 0.0f;
+    const Eigen::Vector3d way = by - eye() - toWall(u, v) * ray(u, v);
+    return static_cast<float>(normal.dot(way) * kBallRadius * kBallRadius / std::pow(way.norm(), 3));
+  }
+  bool isBeside(int u, int v, const Eigen::Vector3d& ball_at) const {
+    const Eigen::Vector3d way = ball_at - eye(), along = ray(u, v).normalized();
+    return (way - way.dot(along) * along).norm() > 1.3 * kBallRadius;
+  }
+  // Mean code of what is seen of the wall where a ball hides much of its sky.
+  double darkAt(const cv::Mat& picture, const Eigen::Vector3d& by,
+                const Eigen::Vector3d& other) const {
+    double sum = 0.0;
+    int count = 0;
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kWidth; ++u) {
+        if (!(hiddenAt(u, v, by) > 0.3f) || !isBeside(u, v, by) || !isBeside(u, v, other)) continue;
+        sum += picture.depth() == CV_8U ? picture.at<cv::Vec3b>(v, u)[1]
+                                        : picture.at<cv::Vec3f>(v, u)[1];
+        ++count;
+      }
+    }
+    EXPECT_GT(count, 20);
+    return sum / count;
+  }
+};
+
+TEST(Renderer, TheDarkOfAContactOnAWallGoesAlong) {
+  const BeforeAWall s;
+  ClipSample clip;
+  clip.add(s.key);
+  const auto prepared = std::make_shared<const Prepared>(prepare(clip, {s.ball}, s.render));
+  const Eigen::Vector3d move = 0.25 * Eigen::Vector3d(-1.0, 1.0, 0.0).normalized(),
+                        there = s.centre + move;
+  ASSERT_LT(s.darkAt(s.key.bgr, s.centre, there), s.kCode - 20);
+  EXPECT_NEAR(s.darkAt(prepared->background.plate, s.centre, there), s.kCode, 5);
+  Renderer renderer(prepared, s.render);
+  FrameInput in = ballMovedLeft(s.key, *prepared);
+  in.objects[0].vertices = prepared->surfaces[0].key_vertices;
+  for (Eigen::Vector3f& x : in.objects[0].vertices) x += move.cast<float>();
+  const cv::Mat moved = renderer.composite(in).bgr;
+  EXPECT_NEAR(s.darkAt(moved, s.centre, there), s.kCode, 5);
+  EXPECT_LT(s.darkAt(moved, there, s.centre), s.kCode - 15);
+  in.objects[0].removed = true;
+  EXPECT_NEAR(s.darkAt(renderer.composite(in).bgr, s.centre, there), s.kCode, 5);
+}
+
 // Water, or a light that was told wrongly: where the ball casts none in the video, it casts none
 // when it is moved.
 TEST(Renderer, CastsShadowsOnlyWhereTheVideoShowsThem) {

@@ -8,6 +8,7 @@
 #include "calipso_render/inpaint.hpp"
 #include "place/place_view.hpp"
 #include "place/plane_reach.hpp"
+#include "place/relief_sky.hpp"
 
 namespace calipso::render {
 namespace {
@@ -240,11 +241,14 @@ TEST(PlaneReach, WhatMeetsAPlaneThatGoesOnDoesSoAsWell) {
   EXPECT_TRUE(reaches(edge));
 }
 
-TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereTheSunComesFromBehind) {
+TEST(PlaceRelief, IsNoneWhereNothingStandsAndWhereWhatIsCurvedTurnsAway) {
   EXPECT_TRUE(
       findRelief(findSurfaces(cv::Mat(), cv::Mat(), Room().labels, floorPlane(), camera()), kSun)
           .empty());
-  EXPECT_TRUE(findRelief(Room().surfaces(), Eigen::Vector3f(0.0f, 0.6f, 0.8f)).empty());
+  PlaceSurfaces surfaces = Room().surfaces();
+  surfaces.label.setTo(PlaceSurfaces::kCurved, surfaces.label == 2);
+  EXPECT_FALSE(findRelief(surfaces, kSun).empty());
+  EXPECT_TRUE(findRelief(surfaces, Eigen::Vector3f(0.0f, 0.6f, 0.8f)).empty());
 }
 
 TEST(PlaceRelief, WhatIsBehindAnObjectIsNotBeforeIt) {
@@ -317,12 +321,44 @@ TEST(PlaceRelief, PlaneTermsGiveItsOwnLight) {
   for (const float planes : {0.3f, 0.6f}) {
     for (const float umbra : {0.1f, 0.45f, 0.9f}) {
       for (const float sun : {0.0f, 0.4f, 1.0f}) {
-        const PlaneTerms t = inPlaneTerms(sun, umbra, planes);
-        EXPECT_NEAR(planes * t.sky + (1.0f - planes) * t.sun, umbra + (1.0f - umbra) * sun, 1e-5);
-        EXPECT_TRUE(t.sun >= 0.0f && t.sun <= 1.0f && t.sky >= 0.0f && t.sky <= 1.0f);
+        for (const float sky : {0.3f, 1.0f}) {
+          const PlaneTerms t = inPlaneTerms({sun, sky}, umbra, planes);
+          EXPECT_NEAR(planes * t.sky + (1.0f - planes) * t.sun, umbra * sky + (1.0f - umbra) * sun,
+                      1e-5);
+          EXPECT_TRUE(t.sun >= 0.0f && t.sun <= 1.0f && t.sky >= 0.0f && t.sky <= 1.0f);
+        }
       }
     }
   }
+}
+
+// In the sun's absence nothing but the sky lights them.
+TEST(PlaceRelief, WallsThatTurnAwayTakeTheSkysShadeAlone) {
+  const Eigen::Vector3f behind = Eigen::Vector3f(0.0f, 0.7f, 0.7f).normalized();
+  const Relief relief = findRelief(Room().surfaces(), behind);
+  ASSERT_EQ(relief.walls.size(), 1u);
+  EXPECT_NEAR((relief.walls[0].normal - Eigen::Vector3f(0, -1, 0)).norm(), 0.0, 1e-3);
+  EXPECT_EQ(turnedAway(relief, behind).at<std::uint8_t>(25, 20), 255);
+  EXPECT_EQ(cv::countNonZero(turnedAway(findRelief(Room().surfaces(), kSun), kSun)), 0);
+  const PlaneTerms half = inPlaneTerms({1.0f, 0.5f}, 1.0f, 0.4f);
+  EXPECT_NEAR(half.sun, 0.5f, 1e-5);
+  EXPECT_NEAR(half.sky, 0.5f, 1e-5);
+}
+
+TEST(ReliefSky, IsHiddenFromAWallByWhatIsNearItAlone) {
+  const Relief relief = findRelief(Room().surfaces(), kSun);
+  const auto seenAt = [&](float away, int u) {  // past a board, 30 cm wide and high
+    const Points board = {{-0.15f, away, 0.85f}, {0.15f, away, 0.85f}, {0.15f, away, 1.15f},
+                          {-0.15f, away, 1.15f}};
+    const Triangles triangles = {{0, 1, 2}, {0, 2, 3}};
+    return ReliefSky(relief, {{&board, &triangles}}, 128).at(u, 59);
+  };
+  const int middle = 80;
+  EXPECT_LT(seenAt(kWallAway - 0.03f, middle), 0.1f);
+  EXPECT_NEAR(seenAt(kWallAway - 0.03f, middle + 6), 0.5f, 0.3f);  // below its side
+  EXPECT_EQ(seenAt(kWallAway - 0.03f, middle + 20), 1.0f);
+  EXPECT_EQ(seenAt(kWallAway - 0.3f, middle), 1.0f);
+  EXPECT_TRUE(ReliefSky(relief, {}, 128).empty());
 }
 
 TEST(PlaceView, SeesTheReliefBeforeThePlanesBehindIt) {

@@ -9,15 +9,21 @@
 namespace calipso::render {
 
 // Walls, steps and whatever else of the place lies off its support planes, per pixel of one view.
-// It takes shadows as they do.
+// It takes shadows as they do; walls that turn away from the sun take the sky's shade alone.
 struct Relief {
   static constexpr int kTile = 8;  // px
 
   cv::Mat seen;              // CV_8UC1: 255 where it is seen; the others mean nothing elsewhere
   cv::Mat position, normal;  // CV_32FC3, world
   cv::Mat umbra;             // CV_32FC1: what the sun's absence leaves of its brightness
+  cv::Mat wall;              // CV_8UC1: the wall that it is part of, from 1 on; 0: none, it is curved
   cv::Mat tiles;             // CV_8UC1, one per square of kTile px: 255 where any of it is seen
   Eigen::AlignedBox3f box;   // of all positions
+  struct Wall {
+    Eigen::Vector3f normal;   // unit
+    Eigen::AlignedBox3f box;  // empty: none of it is seen
+  };
+  std::vector<Wall> walls;
 
   bool empty() const { return seen.data == nullptr; }
   bool at(int u, int v) const {
@@ -28,7 +34,7 @@ struct Relief {
   // Is any of it seen in the square that begins at (u, v)? @pre u, v and size are multiples of
   // kTile
   bool touches(int u, int v, int size) const;
-  // Fills tiles and box from what is seen.
+  // Fills tiles, box and walls from what is seen.
   void index();
 };
 
@@ -37,11 +43,10 @@ struct Relief {
 Relief warped(const Relief& relief, const cv::Mat& map);
 
 // A relief's light in the terms of the support planes, so that `planes_umbra` makes of these levels
-// what its own umbra makes of the sun.
-// @param sun its visible part, 0..1
+// what its own umbra makes of its own.
 struct PlaneTerms {
   float sun, sky;
 };
-PlaneTerms inPlaneTerms(float sun, float umbra, float planes_umbra);
+PlaneTerms inPlaneTerms(const PlaneTerms& levels, float umbra, float planes_umbra);
 
 }  // namespace calipso::render

@@ -24,6 +24,7 @@ class SkyMap : public Visibility {
   struct Params {
     int resolution = 128;                // texels along the longer side, >= 16
     double angular_radius = kSkyRadius;  // of the disc of sky, rad, < pi / 2
+    double farthest = 1e9;               // m over a point, from where on nothing hides any of it
   };
 
   // @param up unit normal of the plane, world
@@ -47,6 +48,7 @@ class SkyMap : public Visibility {
   float texel_ = 0.0f;                  // m
   float height_ = 0.0f;                 // of the occluders, texels
   float spread_;                        // tangent of the angular radius
+  float farthest_ = 0.0f;               // texels
   int width_ = 0, depth_ = 0;           // texels
   std::vector<std::uint32_t> columns_;  // lowest (low half) and highest height over each place
   alignas(32) float x_[kDirections], y_[kDirections];  // of the directions, per height

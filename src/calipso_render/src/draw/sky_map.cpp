@@ -28,6 +28,7 @@ struct Look {
   const std::uint32_t* columns;
   int width, depth;
   float height;        // of the highest, texels
+  float farthest;      // over the point, from where on nothing counts, texels
   const float *x, *y;  // of the directions, per height
   float s, t, h;       // the point, texels
   float first;         // height over it below which no direction meets anything, texels
@@ -51,11 +52,11 @@ CALIPSO_INLINE EightInts columnsAt(const Look& look, const Eight& s, const Eight
 CALIPSO_WIDE_LOOPS int openDirections(const Look& look, int directions) {
   EightInts closed[kMostDirections / 8] = {};
   const int groups = directions / 8;
-  for (float from = look.first, to = 2.0f * from + 1.0f; look.h + from < look.height;
-       from = to, to *= 2.0f) {
+  for (float from = look.first, to = 2.0f * from + 1.0f;
+       look.h + from < look.height && from < look.farthest; from = to, to *= 2.0f) {
     const float half_way = 0.5f * (from + to);
     const int lowest = static_cast<int>((look.h + std::max(from, kOwnSurface)) * kPerTexel),
-              highest = static_cast<int>((look.h + to) * kPerTexel);
+              highest = static_cast<int>((look.h + std::min(to, look.farthest)) * kPerTexel);
     for (int g = 0; g < groups; ++g) {
       const EightInts column = columnsAt(look, look.s + half_way * eightAt(look.x + 8 * g),
                                          look.t + half_way * eightAt(look.y + 8 * g));
@@ -99,6 +100,7 @@ SkyMap::SkyMap(const std::vector<Occluder>& occluders, const Eigen::Vector3d& up
   width_ = static_cast<int>(size.x() / texel_) + 2 * kMargin + 1;
   depth_ = static_cast<int>(size.y() / texel_) + 2 * kMargin + 1;
   height_ = size.z() / texel_;
+  farthest_ = static_cast<float>(params.farthest) / texel_;
   keepHeights(occluders);
 }
 
@@ -153,8 +155,8 @@ float SkyMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f&) const
   const Eigen::Vector3f place = placeOf(p);
   if (isClear(place, 0.0f)) return 1.0f;
   const float first = std::max(0.0f, besideBox(place) - 1.0f) / spread_;
-  const Look look{columns_.data(), width_,    depth_,    height_, x_, y_,
-                  place.x(),       place.y(), place.z(), first};
+  const Look look{columns_.data(), width_, depth_,    height_,   farthest_, x_,
+                  y_,              place.x(), place.y(), place.z(), first};
   return static_cast<float>(openDirections(look, kDirections)) / kDirections;
 }
 

@@ -15,6 +15,7 @@ MovedShadow::MovedShadow(const StagedFrame& frame, const SeenPlace& place) {
       [&] { sun = sunVisibility(moved, frame.light, frame.params); },
       [&] {
         sky = skyVisibility(moved, frame.params);
+        on_walls = skyOnWalls(moved, place.view.relief(), frame.params);
         for (const Occluder& o : moved)
           bounds |= shadowBounds(frame, place.view.relief(), *o.vertices, frame.light.direction);
       });

@@ -6,6 +6,7 @@
 #include "calipso_render/visibility.hpp"
 #include "frame/seen_place.hpp"
 #include "frame/staged_frame.hpp"
+#include "place/relief_sky.hpp"
 
 namespace calipso::render {
 
@@ -15,6 +16,7 @@ struct MovedShadow {
   MovedShadow(const StagedFrame& frame, const SeenPlace& place);
 
   std::unique_ptr<Visibility> sun, sky;
+  ReliefSky on_walls;  // of the sky
   cv::Rect bounds;  // of the picture: what they can shade from the sun
 };
 

@@ -5,6 +5,7 @@
 
 #include "calipso_render/visibility.hpp"
 #include "frame/staged_frame.hpp"
+#include "place/relief_sky.hpp"
 
 namespace calipso::render {
 
@@ -16,6 +17,10 @@ std::unique_ptr<Visibility> sunVisibility(const std::vector<Occluder>& occluders
 // The sky over a support plane as one wide light: near contact an object hides much of it.
 std::unique_ptr<Visibility> skyVisibility(const std::vector<Occluder>& occluders,
                                           const RenderParams& params);
+
+// The same over walls.
+ReliefSky skyOnWalls(const std::vector<Occluder>& occluders, const Relief& relief,
+                     const RenderParams& params);
 
 // Pixels onto which the sun can cast the vertices' shadow.
 // @param relief as the frame's camera sees it

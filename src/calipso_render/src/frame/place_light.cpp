@@ -112,6 +112,32 @@ void PlaceLight::findSkyChanges(const SkyGrid& now, SquareMask& changes) {
       if (difference > kLittleSky) sun_changes_.set(square);
     }
   }
+  if (!moved_.on_walls.empty() || resting_.shadesWalls()) findWallChanges(changes);
+}
+
+// The same on walls.
+void PlaceLight::findWallChanges(SquareMask& changes) {
+  constexpr int kSide = SquareMask::kSide;
+  const Relief& relief = place_.view.relief();
+  const int first = region_.y / kSide, last = (region_.br().y - 1) / kSide;
+#pragma omp parallel for schedule(dynamic, 2)
+  for (int j = first; j <= last; ++j) {
+    for (int u = region_.x / kSide * kSide; u < region_.br().x; u += kSide) {
+      if (!relief.touches(u, j * kSide, kSide)) continue;
+      const cv::Rect square = cv::Rect(u, j * kSide, kSide, kSide) & region_;
+      float difference = 0.0f;
+      for (int v = square.y; v < square.br().y; ++v) {
+        const std::uint8_t* before = resting_.originalsSkyLevels().ptr<std::uint8_t>(v);
+        std::uint8_t now[kSide];
+        std::copy_n(before + square.x, square.width, now);
+        takeReliefSky(relief, moved_.on_walls, v, square.x, square.br().x, now);
+        for (int k = 0; k < square.width; ++k)
+          difference = std::max(difference, kPerLevel * std::abs(now[k] - before[square.x + k]));
+      }
+      if (difference > kSameSky) changes.set(square);
+      if (difference > kLittleSky) sun_changes_.set(square);
+    }
+  }
 }
 
 // Columns [begin, end) of row v.
@@ -119,6 +145,7 @@ void PlaceLight::measureRun(const SkyGrid& sky_grid, int v, int begin, int end) 
   std::uint8_t *sun = sun_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x),
                *sky = sky_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x);
   sky_grid.levels(place_.view.planes(), *moved_.sky, v, begin, end, sky);
+  takeReliefSky(place_.view.relief(), moved_.on_walls, v, begin, end, sky);
   resting_.leaveHidden(v, begin, end, sky);
   resting_.addOthersSun(v, begin, end, sun);
   takeReliefInPlaneTerms(place_.view.relief(), luminance(frame_.prepared.umbra), v, begin, end, sun,

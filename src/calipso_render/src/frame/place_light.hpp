@@ -39,6 +39,7 @@ class PlaceLight {
  private:
   void measure(const cv::Rect& revealed, const SquareMask& covered);
   void findSkyChanges(const SkyGrid& now, SquareMask& changes);
+  void findWallChanges(SquareMask& changes);
   void measureRun(const SkyGrid& sky_grid, int v, int begin, int end);
   void findRelit();
   void findChange(int v, int from, int to, std::uint8_t* out) const;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "calipso_render/sky_map.hpp"
 #include "draw/eight_lanes.hpp"
 #include "draw/light_batch.hpp"
 #include "frame/marked.hpp"
@@ -221,6 +222,15 @@ void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rec
   if (!rect.empty()) Squares(view, light, rect, skip, out, shaded).run();
 }
 
+void takeReliefSky(const Relief& relief, const ReliefSky& on_walls, int v, int begin, int end,
+                   std::uint8_t* sky) {
+  if (relief.empty()) return;
+  const std::uint8_t* seen = relief.seen.ptr<std::uint8_t>(v) + begin;
+  const int count = end - begin;
+  for (int k = nextMarked(seen, 0, count); k < count; k = nextMarked(seen, k + 1, count))
+    sky[k] = lightLevel(skyLight(on_walls.at(begin + k, v)));
+}
+
 void takeReliefInPlaneTerms(const Relief& relief, float planes_umbra, int v, int begin, int end,
                             std::uint8_t* sun, std::uint8_t* sky) {
   if (relief.empty()) return;
@@ -228,7 +238,8 @@ void takeReliefInPlaneTerms(const Relief& relief, float planes_umbra, int v, int
   const std::uint8_t* seen = relief.seen.ptr<std::uint8_t>(v) + begin;
   const int count = end - begin;
   for (int k = nextMarked(seen, 0, count); k < count; k = nextMarked(seen, k + 1, count)) {
-    const PlaneTerms terms = inPlaneTerms(kPerLevel * sun[k], umbra[k], planes_umbra);
+    const PlaneTerms terms =
+        inPlaneTerms({kPerLevel * sun[k], kPerLevel * sky[k]}, umbra[k], planes_umbra);
     sun[k] = lightLevel(terms.sun), sky[k] = lightLevel(terms.sky);
   }
 }

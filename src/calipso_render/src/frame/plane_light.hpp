@@ -9,6 +9,7 @@
 #include "draw/eight_lanes.hpp"
 #include "frame/square_mask.hpp"
 #include "place/place_view.hpp"
+#include "place/relief_sky.hpp"
 
 namespace calipso::render {
 
@@ -58,8 +59,13 @@ CALIPSO_INLINE EightBytes changesOfLight(const Eight& by) {
   return lightLevels(t * t * (3.0f - 2.0f * t));
 }
 
-// Levels of the relief in the terms of the support planes: the sun alone shades it; what its levels
-// do to the planes they do not do to it.
+// Levels of the sky's light where relief is seen, instead of those of planes behind it.
+// @param sky columns [begin, end) of row v
+void takeReliefSky(const Relief& relief, const ReliefSky& on_walls, int v, int begin, int end,
+                   std::uint8_t* sky);
+
+// Levels of the relief in the terms of the support planes: what its levels do to the planes they do
+// not do to it.
 // @param planes_umbra luminance() of the planes' umbra
 // @param sun, sky columns [begin, end) of row v
 void takeReliefInPlaneTerms(const Relief& relief, float planes_umbra, int v, int begin, int end,

@@ -32,19 +32,23 @@ SkyGrid skyGrid(const StagedFrame& frame, const SeenPlace& place, const Visibili
 }
 
 cv::Mat skyLevels(const SkyGrid& grid, const SeenPlace& place, const Visibility& sky,
-                  const cv::Size& size) {
+                  const ReliefSky& on_walls, const cv::Size& size) {
   cv::Mat levels(size, CV_8U);
 #pragma omp parallel for schedule(dynamic, 8)
-  for (int v = 0; v < size.height; ++v)
+  for (int v = 0; v < size.height; ++v) {
     grid.levels(place.view.planes(), sky, v, 0, size.width, levels.ptr<std::uint8_t>(v));
+    takeReliefSky(place.view.relief(), on_walls, v, 0, size.width, levels.ptr<std::uint8_t>(v));
+  }
   return levels;
 }
 
 // Part of its brightness that a pixel loses which gets these levels of sun and sky.
 float darkeningAt(const PlaceView& view, const cv::Vec3f& umbra, int u, int v, std::uint8_t sun,
                   std::uint8_t sky) {
-  if (view.relief().at(u, v))
-    return (1.0f - view.relief().umbra.at<float>(v, u)) * (1.0f - kPerLevel * sun);
+  if (view.relief().at(u, v)) {
+    const float own = view.relief().umbra.at<float>(v, u);
+    return own * (1.0f - kPerLevel * sky) + (1.0f - own) * (1.0f - kPerLevel * sun);
+  }
   return 1.0f - luminance(shadowRatio(umbra, kPerLevel * sun, kPerLevel * sky));
 }
 
@@ -81,7 +85,9 @@ void RestingLight::measureOthers(const StagedFrame& frame, const SeenPlace& plac
   others_sky_.release();
   if (others.empty()) return;
   const auto sky = skyVisibility(others, frame.params);
-  others_sky_ = skyLevels(skyGrid(frame, place, *sky), place, *sky, frame.input.bgr.size());
+  others_sky_ = skyLevels(skyGrid(frame, place, *sky), place, *sky,
+                          skyOnWalls(others, place.view.relief(), frame.params),
+                          frame.input.bgr.size());
 }
 
 void RestingLight::measureOriginals(const StagedFrame& frame, const SeenPlace& place) {
@@ -103,7 +109,10 @@ void RestingLight::measureOriginals(const StagedFrame& frame, const SeenPlace& p
       bounds_.empty() ? cv::Mat() : sunLevels(frame, place, *originals_, bounds_, &sunless_);
   const auto sky = skyVisibility(originals, frame.params);
   originals_sky_ = skyGrid(frame, place, *sky);
-  originals_sky_levels_ = skyLevels(originals_sky_, place, *sky, frame.input.bgr.size());
+  const ReliefSky on_walls = skyOnWalls(originals, place.view.relief(), frame.params);
+  shades_walls_ = !on_walls.empty();
+  originals_sky_levels_ =
+      skyLevels(originals_sky_, place, *sky, on_walls, frame.input.bgr.size());
 }
 
 // Where the originals darken what the others leave of the light.

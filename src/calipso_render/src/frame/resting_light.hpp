@@ -27,6 +27,8 @@ class RestingLight {
   // Of the edited objects where the video has them; null: of none.
   const Visibility* originals() const { return originals_.get(); }
   const SkyGrid& originalsSky() const { return originals_sky_; }
+  const cv::Mat& originalsSkyLevels() const { return originals_sky_levels_; }
+  bool shadesWalls() const { return shades_walls_; }  // they hide some of the sky from walls
   // Squares that originals are not known to leave all lit by the sun.
   const SquareMask& sunless() const { return sunless_; }
 
@@ -66,6 +68,7 @@ class RestingLight {
   cv::Mat originals_sun_;            // empty: the originals cast none
   SkyGrid originals_sky_;
   cv::Mat originals_sky_levels_;
+  bool shades_walls_ = false;
   SquareMask sunless_;
   cv::Mat sun_before_, sky_before_, takes_, shaded_;
   cv::Rect footprints_, shaded_box_, bounds_;

@@ -191,4 +191,14 @@ SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& p
   return result;
 }
 
+cv::Mat surelyDarker(const cv::Mat& sky, const cv::Mat& picture, const cv::Mat& unknown) {
+  std::vector<Region> regions;
+  addRegions(Test(picture, unknown, kOnGround), sky, kSkyShaded, false, regions);
+  cv::Mat darker = cv::Mat::zeros(picture.size(), CV_8U);
+  for (const Region& r : regions) {
+    if (r.odds > kDecided) darker |= r.mask;
+  }
+  return darker;
+}
+
 }  // namespace calipso::render

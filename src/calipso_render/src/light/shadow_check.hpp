@@ -35,4 +35,7 @@ constexpr UsualDarkness kOnWater{0.4, 0.25};   // less, as what is mirrored is n
 SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& picture,
                         const cv::Mat& unknown, const UsualDarkness& usual = kOnGround);
 
+// CV_8UC1: of the places that see less of the sky the regions that a picture surely shows darker.
+cv::Mat surelyDarker(const cv::Mat& sky, const cv::Mat& picture, const cv::Mat& unknown);
+
 }  // namespace calipso::render

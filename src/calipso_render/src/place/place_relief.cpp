@@ -38,14 +38,22 @@ Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun) {
   Relief relief;
   relief.seen = surfaces.label > surfaces.supports, relief.position = surfaces.position,
   relief.normal = surfaces.normal;
-  for (int v = 0; v < relief.seen.rows; ++v) {
-    for (int u = 0; u < relief.seen.cols; ++u) {
-      if (relief.at(u, v) && relief.receiver(u, v).normal.dot(sun) < kLeastSlope)
-        relief.seen.at<std::uint8_t>(v, u) = 0;
-    }
-  }
+  relief.wall = surfaces.label - surfaces.supports;  // less than none is none
+  relief.wall.setTo(0, surfaces.label == PlaceSurfaces::kCurved);
+  relief.seen.setTo(0, turnedAway(relief, sun) & (relief.wall == 0));
   relief.index();
   return relief.box.isEmpty() ? Relief() : relief;
+}
+
+cv::Mat turnedAway(const Relief& relief, const Eigen::Vector3f& sun) {
+  cv::Mat away = cv::Mat::zeros(relief.seen.size(), CV_8U);
+  for (int v = 0; v < away.rows; ++v) {
+    for (int u = 0; u < away.cols; ++u) {
+      if (relief.at(u, v) && relief.receiver(u, v).normal.dot(sun) < kLeastSlope)
+        away.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return away;
 }
 
 void findUmbra(const Light& light, const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,

@@ -56,9 +56,12 @@ struct PlaceSurfaces {
 PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels,
                            const std::vector<SupportPlane>& planes, const Camera& camera);
 
-// What of them lies off the support planes. @param sun unit, towards it: what faces away from it
-// takes no shadow
+// What of them lies off the support planes. @param sun unit, towards it: of what faces away from it
+// only planes take shade, that of the sky
 Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun);
+
+// CV_8UC1: 255 where it faces away from the sun.
+cv::Mat turnedAway(const Relief& relief, const Eigen::Vector3f& sun);
 
 // What the sun's absence leaves of the relief: from how bright it is in the objects' full shade
 // where that is seen, else as the light has it for a surface that faces so, on the scale of the

@@ -26,12 +26,17 @@ bool Relief::touches(int u, int v, int size) const {
 
 void Relief::index() {
   tiles = cv::Mat::zeros((seen.rows + kTile - 1) / kTile, (seen.cols + kTile - 1) / kTile, CV_8U);
-  box.setEmpty();
+  box.setEmpty(), walls.clear();
   for (int v = 0; v < seen.rows; ++v) {
     for (int u = 0; u < seen.cols; ++u) {
       if (seen.at<std::uint8_t>(v, u) == 0) continue;
       tiles.at<std::uint8_t>(v / kTile, u / kTile) = 255;
       box.extend(vectorAt(position, u, v));
+      const int number = wall.at<std::uint8_t>(v, u);
+      if (number > static_cast<int>(walls.size())) walls.resize(number);
+      if (number == 0) continue;
+      walls[number - 1].normal = vectorAt(normal, u, v);
+      walls[number - 1].box.extend(vectorAt(position, u, v));
     }
   }
 }
@@ -43,16 +48,23 @@ Relief warped(const Relief& relief, const cv::Mat& map) {
     cv::remap(from, to, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT);
   };
   carry(relief.seen, out.seen), carry(relief.position, out.position),
-      carry(relief.normal, out.normal), carry(relief.umbra, out.umbra);
+      carry(relief.normal, out.normal), carry(relief.umbra, out.umbra),
+      carry(relief.wall, out.wall);
   out.index();
   return out;
 }
 
-PlaneTerms inPlaneTerms(float sun, float umbra, float planes_umbra) {
-  // planes_umbra sky + (1 - planes_umbra) sun' = umbra + (1 - umbra) sun, one of the two levels
+PlaneTerms inPlaneTerms(const PlaneTerms& levels, float umbra, float planes_umbra) {
+  // planes_umbra sky' + (1 - planes_umbra) sun' = umbra + (1 - umbra) sun, one of the two levels
   // being that of the planes
-  if (umbra <= planes_umbra) return {sun, sun + (1.0f - sun) * umbra / planes_umbra};
-  return {(umbra - planes_umbra + (1.0f - umbra) * sun) / (1.0f - planes_umbra), 1.0f};
+  const float open = umbra + (1.0f - umbra) * levels.sun;
+  const PlaneTerms under_open_sky =
+      umbra <= planes_umbra
+          ? PlaneTerms{levels.sun, levels.sun + (1.0f - levels.sun) * umbra / planes_umbra}
+          : PlaneTerms{(open - planes_umbra) / (1.0f - planes_umbra), 1.0f};
+  // What objects hide of the sky goes off both.
+  const float left = (open - umbra * (1.0f - levels.sky)) / open;
+  return {left * under_open_sky.sun, left * under_open_sky.sky};
 }
 
 }  // namespace calipso::render
