@@ -5,6 +5,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "light/shadow_check.hpp"
+#include "place/haze.hpp"
 #include "place/key_cover.hpp"
 #include "place/lifted_shade.hpp"
 #include "place/passing_shade.hpp"
@@ -297,13 +298,16 @@ void takeOffMirrored(const cv::Mat& planes, cv::Mat& traces, ClipFrame& key, Pre
   traces |= p.mirror.lost;
 }
 
-void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,
-                    const cv::Mat& off_planes, const RenderParams& params, Prepared& p) {
+// @param haze none where objects move: what is measured there has it in
+void findPlaceUmbra(const PlaceEvidence& e, const Haze& haze, const cv::Mat& sun,
+                    const cv::Mat& sky, const cv::Mat& off_planes, const RenderParams& params,
+                    Prepared& p) {
   const Light& light = p.light.light;
+  const cv::Mat picture = withoutHaze(haze, e.picture, p.nearness),
+                plate = withoutHaze(haze, p.background.plate, p.nearness);
   const cv::Vec3f predicted = predictedUmbra(light, params.planes);
   if (std::find(p.moves.begin(), p.moves.end(), true) == p.moves.end()) {
-    p.umbra = umbraInPicture(e.picture, p.background.plate, sun, sky,
-                             (p.key_labels != 0) | off_planes, predicted);
+    p.umbra = umbraInPicture(picture, plate, sun, sky, (p.key_labels != 0) | off_planes, predicted);
   } else {
     cv::Mat behind = params.depth.clone();
     if (!behind.empty()) behind.setTo(0.0f, p.key_labels != 0);
@@ -312,8 +316,7 @@ void findPlaceUmbra(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& s
     p.umbra =
         in_views ? *in_views : umbraOfPassing(e.frames, params.planes, p.background, predicted);
   }
-  findUmbra(light, e.picture, p.background.plate, sun, p.key_labels, params.planes, p.umbra,
-            p.relief);
+  findUmbra(light, picture, plate, sun, p.key_labels, params.planes, p.umbra, p.relief);
 }
 
 // What drifts before the camera takes no shadows; the plate has it where the key frame does.
@@ -379,7 +382,11 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   findDrifting(e.frames,
                ground.empty() ? ground : cv::Mat((ground > 0.0f) & (place.off_planes == 0)),
                params.background, p);
-  findPlaceUmbra(e, sun, sky, place.off_planes, params, p);
+  const Haze haze = any_moves || surfaces.empty()
+                        ? Haze()
+                        : Haze(e.picture, p.scenery, surfaces.sky == InpaintParams::kSky);
+  p.veil = veilOf(haze, p.plate_linear, p.nearness);
+  findPlaceUmbra(e, haze, sun, sky, place.off_planes, params, p);
 }
 
 }  // namespace calipso::render

@@ -166,6 +166,35 @@ TEST(Renderer, TakesNoSunWhereSceneryKeepsItOff) {
   EXPECT_GT(darker, all / 5);  // the ball hides others, and the sky
 }
 
+TEST(Renderer, ShadesNothingOfWhatHazeAdds) {
+  const Setting s(params());
+  auto clear = std::make_shared<Prepared>(*s.prepared);
+  clear->shadowless.release();
+  auto hazy = std::make_shared<Prepared>(*clear);
+  hazy->veil = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(128));
+  const FrameInput moved = s.input(true, {-0.3f, 0.0f, 0.0f});
+  const cv::Mat in_clear = Renderer(clear, params()).composite(moved).bgr,
+                in_haze = Renderer(hazy, params()).composite(moved).bgr;
+  const Actor now = makeActor(s.prepared->surfaces[0], moved.objects[0].vertices, camera());
+  const ShadowMap cast({{&now.vertices, &now.surface->triangles}},
+                       s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+  double dark = 0.0, half_dark = 0.0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = receiverAt(params().planes, camera(), u, v);
+      if (!r || cast.visibility(r->position, r->normal) > 0.1f) continue;
+      const float lit = linearFromCode(s.key.bgr.at<cv::Vec3b>(v, u)[1]);
+      dark += lit - linearFromCode(in_clear.at<cv::Vec3b>(v, u)[1]);
+      if (in_clear.at<cv::Vec3b>(v, u) != in_haze.at<cv::Vec3b>(v, u))
+        half_dark += lit - linearFromCode(in_haze.at<cv::Vec3b>(v, u)[1]);
+      else  // the ball itself
+        dark -= lit - linearFromCode(in_clear.at<cv::Vec3b>(v, u)[1]);
+    }
+  }
+  ASSERT_GT(dark, 5.0);
+  EXPECT_NEAR(half_dark / dark, 0.5, 0.05);
+}
+
 // A ball before a wall that turns away from the sun, nearly touching it; the picture has its dark
 // there, and no shadow of the sun.
 struct BeforeAWall {

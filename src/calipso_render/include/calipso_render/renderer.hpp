@@ -105,6 +105,7 @@ struct Prepared {
   cv::Mat shadowless;
   cv::Mat sunless;   // CV_8UC1: 255 where scenery stands before the sun; may be empty
   Relief relief;     // of the place, takes shadows; may be empty
+  cv::Mat veil;      // CV_8UC1: part of what the place shows that haze adds, 255 all; may be empty
   cv::Mat nearness;  // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far
   PlaneMirror mirror;
   Background background;

@@ -150,6 +150,7 @@ void PlaceLight::measureRun(const SkyGrid& sky_grid, int v, int begin, int end) 
   resting_.addOthersSun(v, begin, end, sun);
   takeReliefInPlaneTerms(place_.view.relief(), luminance(frame_.prepared.umbra), v, begin, end, sun,
                          sky);
+  veilLevels(place_.veil, v, begin, end, sun), veilLevels(place_.veil, v, begin, end, sky);
 }
 
 // Where the original's shadow changes, it goes with its whole edge: a predicted shadow is off by

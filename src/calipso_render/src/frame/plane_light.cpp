@@ -7,6 +7,7 @@
 #include "calipso_render/sky_map.hpp"
 #include "draw/eight_lanes.hpp"
 #include "draw/light_batch.hpp"
+#include "draw/wide_loops.hpp"
 #include "frame/marked.hpp"
 
 namespace calipso::render {
@@ -216,6 +217,14 @@ class Squares {
 };
 
 }  // namespace
+
+CALIPSO_WIDE_LOOPS void veilLevels(const cv::Mat& veil, int v, int begin, int end,
+                                   std::uint8_t* levels) {
+  if (veil.empty()) return;
+  const std::uint8_t* over = veil.ptr<std::uint8_t>(v) + begin;
+  for (int k = 0; k < end - begin; ++k)
+    levels[k] = static_cast<std::uint8_t>(255 - bothLevels(255 - levels[k], 255 - over[k]));
+}
 
 void planesInLight(const PlaceView& view, const Visibility& light, const cv::Rect& rect,
                    const SquareMask& skip, cv::Mat& out, SquareMask* shaded) {

@@ -71,6 +71,11 @@ void takeReliefSky(const Relief& relief, const ReliefSky& on_walls, int v, int b
 void takeReliefInPlaneTerms(const Relief& relief, float planes_umbra, int v, int begin, int end,
                             std::uint8_t* sun, std::uint8_t* sky);
 
+// Takes the veil that haze lays over the place, which nothing shades, off what levels darken.
+// @param veil CV_8UC1, whole picture; may be empty
+// @param levels columns [begin, end) of row v
+void veilLevels(const cv::Mat& veil, int v, int begin, int end, std::uint8_t* levels);
+
 // What support planes and relief see of a light, pixel by pixel: exactly where it changes quickly,
 // interpolated over two pixels where it changes slowly, and at once for squares that are all lit or
 // all shaded.

@@ -128,8 +128,10 @@ void RestingLight::findShaded(const StagedFrame& frame, const SeenPlace& place) 
       const std::uint8_t sun = sunless ? 255 : levelAt(originals_sun_, u, v),
                          sky = sky_levels.at<std::uint8_t>(v, u);
       if ((sun == 255 && sky == 255) || !place.takesShadow(u, v)) continue;
+      const float clear =
+          place.veil.empty() ? 1.0f : 1.0f - kPerLevel * place.veil.at<std::uint8_t>(v, u);
       shaded_.at<std::uint8_t>(v, u) =
-          changeOfLight(darkeningAt(place.view, frame.prepared.umbra, u, v, sun, sky));
+          changeOfLight(clear * darkeningAt(place.view, frame.prepared.umbra, u, v, sun, sky));
     }
   }
   cv::dilate(shaded_, shaded_, disc(frame.params.background.shadow_margin_px));
@@ -148,6 +150,7 @@ void RestingLight::join(const StagedFrame& frame, const SeenPlace& place) {
     joinSun(place, v);
     leaveHidden(v, 0, size.width, sky);
     takeReliefInPlaneTerms(place.view.relief(), umbra, v, 0, size.width, sun, sky);
+    veilLevels(place.veil, v, 0, size.width, sun), veilLevels(place.veil, v, 0, size.width, sky);
   }
 }
 

@@ -42,7 +42,7 @@ void SeenPlace::driftTo(const StagedFrame& frame) {
 void SeenPlace::takeKeyView(const StagedFrame& frame) {
   const Prepared& prepared = frame.prepared;
   live = prepared.background.live.empty() ? nullptr : &prepared.background.live;
-  shadowless = prepared.shadowless, sunless = prepared.sunless;
+  shadowless = prepared.shadowless, sunless = prepared.sunless, veil = prepared.veil;
   view = PlaceView(view.planes(), prepared.relief);
   for (std::size_t i = 0; i < fronts.size(); ++i) {
     if (prepared.fronts[i].empty() || (prepared.moves[i] && !frame.at_rest[i])) continue;
@@ -67,6 +67,8 @@ void SeenPlace::warp(const StagedFrame& frame) {
   if (!prepared.sunless.empty())
     cv::remap(prepared.sunless, sunless, from_key, cv::noArray(), cv::INTER_NEAREST,
               cv::BORDER_CONSTANT, cv::Scalar(0));
+  if (!prepared.veil.empty())
+    cv::remap(prepared.veil, veil, from_key, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_REPLICATE);
   view = PlaceView(view.planes(), warped(prepared.relief, from_key));
 }
 
