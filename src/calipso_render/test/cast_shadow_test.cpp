@@ -84,7 +84,8 @@ TEST(Umbra, IsThePredictedOneUnlessAllColoursAreDarker) {
     const float lit = linearFromRealCode(150.0f);
     cv::Scalar codes;
     for (int c = 0; c < 3; ++c) codes[c] = codeFromLinear(ratio[c] * lit);
-    return umbraInPicture(cv::Mat(plate.size(), CV_32FC3, codes), plate, dark, open, labels, kUmbra);
+    return umbraInPicture(cv::Mat(plate.size(), CV_32FC3, codes), plate, dark, open, labels,
+                          kUmbra);
   };
   const cv::Vec3f darker(0.5f, 0.4f, 0.3f);
   EXPECT_LT(cv::norm(seen(darker) - darker), 0.01);
@@ -203,7 +204,8 @@ struct BeforeAWall {
   const Eigen::Vector3d normal = Eigen::Vector3d(-1.0, -1.0, 0.0).normalized();
   const Eigen::Vector3d centre = (1.02 * kBallRadius - kAway) * normal + Eigen::Vector3d(0, 0, 0.1);
   ObjectModel ball = ballAt(centre);
-  ClipFrame key{cv::Mat(kHeight, kWidth, CV_8UC3), cv::Mat::zeros(kHeight, kWidth, CV_8U), camera()};
+  ClipFrame key{cv::Mat(kHeight, kWidth, CV_8UC3), cv::Mat::zeros(kHeight, kWidth, CV_8U),
+                camera()};
   RenderParams render = params();
 
   BeforeAWall() {
@@ -227,8 +229,8 @@ struct BeforeAWall {
                      for (int c = 0; c < 3; ++c)
                        key.bgr.at<cv::Vec3b>(v, u)[c] = quantise(codeFromLinear(0.5f * shade[c]));
                      key.labels.at<std::uint8_t>(v, u) = kBallLabel;
-                     const Eigen::Vector3d at = key.camera.world_from_camera.inverse() *
-                                                p.position.cast<double>();
+                     const Eigen::Vector3d at =
+                         key.camera.world_from_camera.inverse() * p.position.cast<double>();
                      render.depth.at<float>(v, u) = static_cast<float>(at.z());
                    });
   }
@@ -240,12 +242,15 @@ struct BeforeAWall {
     const double t = (-kAway - normal.dot(eye())) / normal.dot(ray(u, v));
     return t > 0.0 ? t : 1e9;
   }
-  double toFloor(int u, int v) const { return ray(u, v).z() < 0.0 ? -eye().z() / ray(u, v).z() : 1e9; }
+  double toFloor(int u, int v) const {
+    return ray(u, v).z() < 0.0 ? -eye().z() / ray(u, v).z() : 1e9;
+  }
   // Of the wall's sky, by a ball of which it sees all: its form factor.
   float hiddenAt(int u, int v, const Eigen::Vector3d& by) const {
     if (toWall(u, v) > toFloor(u, v)) return 0.0f;
     const Eigen::Vector3d way = by - eye() - toWall(u, v) * ray(u, v);
-    return static_cast<float>(normal.dot(way) * kBallRadius * kBallRadius / std::pow(way.norm(), 3));
+    return static_cast<float>(normal.dot(way) * kBallRadius * kBallRadius /
+                              std::pow(way.norm(), 3));
   }
   bool isBeside(int u, int v, const Eigen::Vector3d& ball_at) const {
     const Eigen::Vector3d way = ball_at - eye(), along = ray(u, v).normalized();

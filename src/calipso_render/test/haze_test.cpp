@@ -15,7 +15,8 @@ const cv::Vec3f kAir(0.8f, 0.7f, 0.6f);
 
 // Ground from kNear to kFar below a sky, a tenth of it dark, through air.
 struct Land {
-  cv::Mat picture = cv::Mat(kHigh, kWide, CV_32FC3), nearness = cv::Mat::zeros(kHigh, kWide, CV_32F),
+  cv::Mat picture = cv::Mat(kHigh, kWide, CV_32FC3),
+          nearness = cv::Mat::zeros(kHigh, kWide, CV_32F),
           sky = cv::Mat::zeros(kHigh, kWide, CV_8U);
 
   Land(float extinction, float darkest) {

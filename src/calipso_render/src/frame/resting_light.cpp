@@ -85,9 +85,9 @@ void RestingLight::measureOthers(const StagedFrame& frame, const SeenPlace& plac
   others_sky_.release();
   if (others.empty()) return;
   const auto sky = skyVisibility(others, frame.params);
-  others_sky_ = skyLevels(skyGrid(frame, place, *sky), place, *sky,
-                          skyOnWalls(others, place.view.relief(), frame.params),
-                          frame.input.bgr.size());
+  others_sky_ =
+      skyLevels(skyGrid(frame, place, *sky), place, *sky,
+                skyOnWalls(others, place.view.relief(), frame.params), frame.input.bgr.size());
 }
 
 void RestingLight::measureOriginals(const StagedFrame& frame, const SeenPlace& place) {
@@ -111,8 +111,7 @@ void RestingLight::measureOriginals(const StagedFrame& frame, const SeenPlace& p
   originals_sky_ = skyGrid(frame, place, *sky);
   const ReliefSky on_walls = skyOnWalls(originals, place.view.relief(), frame.params);
   shades_walls_ = !on_walls.empty();
-  originals_sky_levels_ =
-      skyLevels(originals_sky_, place, *sky, on_walls, frame.input.bgr.size());
+  originals_sky_levels_ = skyLevels(originals_sky_, place, *sky, on_walls, frame.input.bgr.size());
 }
 
 // Where the originals darken what the others leave of the light.

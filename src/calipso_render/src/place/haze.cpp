@@ -12,14 +12,14 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kHorizon = 8;            // px of sky above what is seen before it
-constexpr float kRange = 1.25f;        // of distance, that is looked at together
-constexpr std::size_t kFewest = 200;   // px in it
-constexpr float kDarkest = 0.01f;      // part of them that is darkest
-constexpr float kExplained = 2.0f;     // times as dark as the law has it
-constexpr float kMostly = 2.0f / 3.0f; // of the ranges
-constexpr float kLeastSpan = 3.0f;     // from the nearest to the farthest of them
-constexpr float kMostAdded = 0.9f;     // of what is seen: the rest is what the noise leaves
+constexpr int kHorizon = 8;             // px of sky above what is seen before it
+constexpr float kRange = 1.25f;         // of distance, that is looked at together
+constexpr std::size_t kFewest = 200;    // px in it
+constexpr float kDarkest = 0.01f;       // part of them that is darkest
+constexpr float kExplained = 2.0f;      // times as dark as the law has it
+constexpr float kMostly = 2.0f / 3.0f;  // of the ranges
+constexpr float kLeastSpan = 3.0f;      // from the nearest to the farthest of them
+constexpr float kMostAdded = 0.9f;      // of what is seen: the rest is what the noise leaves
 
 struct Range {
   float distance, darkest;

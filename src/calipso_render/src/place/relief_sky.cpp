@@ -38,8 +38,8 @@ ReliefSky::ReliefSky(const Relief& relief, const std::vector<Occluder>& occluder
     }
     over_.push_back(nullptr);
     if (near.empty()) continue;
-    over_.back() = std::make_unique<const SkyMap>(
-        near, wall.normal.cast<double>(), SkyMap::Params{resolution, kSkyRadius, farthest});
+    over_.back() = std::make_unique<const SkyMap>(near, wall.normal.cast<double>(),
+                                                  SkyMap::Params{resolution, kSkyRadius, farthest});
     relief_ = &relief;
   }
 }
