@@ -6,6 +6,7 @@
 #include "calipso_render/colour.hpp"
 #include "light/shadow_check.hpp"
 #include "place/haze.hpp"
+#include "place/hollow.hpp"
 #include "place/key_cover.hpp"
 #include "place/lifted_shade.hpp"
 #include "place/passing_shade.hpp"
@@ -339,6 +340,18 @@ void findDrifting(const std::vector<ClipFrame>& frames, const cv::Mat& ground,
   }
 }
 
+// Invents what is hidden: insides of bowls by what goes round in them, the rest by what is around.
+void inventPlace(const cv::Mat& traces, const ClipFrame& key, const InpaintParams& known,
+                 const PlaceSurfaces& surfaces, const RenderParams& params, Prepared& p) {
+  cv::Mat hollows = cv::Mat::zeros(traces.size(), CV_8U);
+  if (!surfaces.empty() && !params.planes.empty())
+    hollows = fillHollows(p.scenery, surfaces, params.planes.front(), p.camera,
+                          p.background.invented | traces, p.background.plate);
+  p.background.invented.setTo(0, hollows);
+  inventBackground(traces & ~hollows, key, known, params.background, p.background);
+  p.background.invented |= hollows;
+}
+
 }  // namespace
 
 void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepared& p) {
@@ -377,7 +390,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   known_of_place.sure = mirrorsSharply(p.mirror) ? surfaces.sureOffSupports() : surfaces.sure;
   for (const PicturePlane& plane : surfaces.planes)
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
-  inventBackground(traces, key, known_of_place, params.background, p.background);
+  inventPlace(traces, key, known_of_place, surfaces, params, p);
   p.plate_linear = linearFromRealCodes(p.background.plate);
   findDrifting(e.frames,
                ground.empty() ? ground : cv::Mat((ground > 0.0f) & (place.off_planes == 0)),
