@@ -358,7 +358,10 @@ cv::Mat fillHollows(const cv::Mat& scenery, const PlaceSurfaces& surfaces,
   const cv::Mat off = (surfaces.label > surfaces.supports) & (scenery > 0.0f) & (hole == 0);
   const int count = cv::connectedComponentsWithStats(off, pieces, stats, centres, 8, CV_32S);
   for (int k = 1; k < count; ++k) {
-    if (stats.at<int>(k, cv::CC_STAT_AREA) < kFewest) continue;
+    const int* of = stats.ptr<int>(k);
+    const cv::Rect box(of[cv::CC_STAT_LEFT], of[cv::CC_STAT_TOP], of[cv::CC_STAT_WIDTH],
+                       of[cv::CC_STAT_HEIGHT]);
+    if (of[cv::CC_STAT_AREA] < kFewest || cv::countNonZero(hole(box)) < kFewestHidden) continue;
     const auto hollow = Hollow::find(pointsOf(pieces == k, scenery, frame));
     if (hollow) filled |= fillHollow(*hollow, scenery, frame, hole & ~filled, plate);
   }
