@@ -188,8 +188,14 @@ bool Multigrid::widen() {
 }
 
 bool Multigrid::factorizeCoarsest() {
-  const Eigen::MatrixXd A = Eigen::MatrixXd(levels_.back().own.toSparse());
-  const Eigen::LLT<Eigen::MatrixXd> llt(A);
+  Eigen::MatrixXd A(levels_.back().own.toSparse());
+  Eigen::LLT<Eigen::MatrixXd> llt(A);
+  if (llt.info() != Eigen::Success) {
+    // Where most nodes are fixed, coarse ones may move the same few free ones: A is singular.
+    constexpr double kShift = 1e-5;
+    A.diagonal() *= 1.0 + kShift;
+    llt.compute(A);
+  }
   if (llt.info() != Eigen::Success) return false;
   const Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
   const int n = levels_.back().nodes;

@@ -169,6 +169,24 @@ TEST(Solver, SingularSystemsAreGivenUpSoon) {
   EXPECT_TRUE(body.positions() == rest);
 }
 
+// Coarse nodes then move the same few nodes: their system is singular, that of the body is not.
+TEST(Solver, WhereMostNodesAreFixedTheOthersMove) {
+  TriangleMesh bar;
+  appendBox({0.0, 0.0, 0.0}, {0.16, 0.03, 0.03}, &bar);
+  FemOptions options;
+  options.solver = SolverKind::kMultigrid;
+  options.cell_size = 0.01;
+  for (int seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    DeformableBody body(bar, kRubber, options);
+    for (int i = 0; i < body.nodeCount(); ++i)
+      if (random() % 8 > 0) body.fixNode(i);
+    body.setGravity({0.0, 0.0, -9.81});
+    const StepReport report = body.step(kStep);
+    EXPECT_TRUE(report.converged) << seed << ": " << report.message;
+  }
+}
+
 // Whoever factorises first, with or without a body.
 TEST(Solver, BlasHasOneThread) {
   if (!openblas_set_num_threads) GTEST_SKIP() << "CHOLMOD stands on another BLAS than OpenBLAS";
