@@ -104,8 +104,8 @@ std::vector<std::string> evaluateScene(const std::string& directory,
     const std::vector<ObjectDynamics> dynamics = analyse(clip, costs);
     for (size_t i = 0; i < dynamics.size(); ++i) {
       entries.push_back(describe(clip, i, dynamics[i], costs));
-      if (!options.trace.empty() && n == 0)
-        writeTrace(options.trace, clip.scene, clip.models[i], clip.truths[i], dynamics[i]);
+      if (!options.trace.empty())
+        writeTrace(options.trace, clip.scene, clip.models[i], clip.truths[i], dynamics[i], n);
     }
   }
   return entries;

@@ -27,9 +27,10 @@ void writeMeasured(std::ofstream& file, const Observation& observation,
 }  // namespace
 
 void writeTrace(const std::string& folder, const Scene& scene, const ObjectModel& model,
-                const TrueObject& truth, const ObjectDynamics& dynamics) {
+                const TrueObject& truth, const ObjectDynamics& dynamics, int recording) {
   const std::string name = std::filesystem::path(scene.directory).filename().string();
-  std::ofstream file(folder + "/" + name + "_" + dynamics.name + ".csv");
+  const std::string further = recording > 0 ? "_" + std::to_string(recording) : "";
+  std::ofstream file(folder + "/" + name + "_" + dynamics.name + further + ".csv");
   file << "t,tracks,moving,x,y,z,vx,vy,vz,wx,wy,wz,ax,ay,az,sx,sy,sz,tvx,tvy,tvz,twx,twy,twz,"
           "mex,mey,mez,msx,msy,msz,rex,rey,rez,rsx,rsy,rsz,inliers,deviation\n";
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero(), middle = centroid(model.mesh);
