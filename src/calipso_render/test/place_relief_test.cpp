@@ -211,7 +211,7 @@ TEST(PlaceRelief, APlaneGoesOnBehindAnObjectThatABushStandsBefore) {
   for (int v = object.y; v < bush.y; ++v) {
     for (int u = object.x; u < object.br().x; ++u)
       room.scenery.at<float>(v, u) = 0.0f, room.depth.at<float>(v, u) = 3.3f,
-      room.labels.at<std::uint8_t>(v, u) = 1;
+                                room.labels.at<std::uint8_t>(v, u) = 1;
   }
   const PlaceSurfaces surfaces = room.surfaces();
   ASSERT_EQ(surfaces.label.at<std::uint8_t>(94, 80), PlaceSurfaces::kCurved);
@@ -348,8 +348,8 @@ TEST(PlaceRelief, WallsThatTurnAwayTakeTheSkysShadeAlone) {
 TEST(ReliefSky, IsHiddenFromAWallByWhatIsNearItAlone) {
   const Relief relief = findRelief(Room().surfaces(), kSun);
   const auto seenAt = [&](float away, int u) {  // past a board, 30 cm wide and high
-    const Points board = {{-0.15f, away, 0.85f}, {0.15f, away, 0.85f}, {0.15f, away, 1.15f},
-                          {-0.15f, away, 1.15f}};
+    const Points board = {
+        {-0.15f, away, 0.85f}, {0.15f, away, 0.85f}, {0.15f, away, 1.15f}, {-0.15f, away, 1.15f}};
     const Triangles triangles = {{0, 1, 2}, {0, 2, 3}};
     return ReliefSky(relief, {{&board, &triangles}}, 128).at(u, 59);
   };

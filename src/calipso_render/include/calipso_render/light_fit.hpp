@@ -90,7 +90,7 @@ struct LightFit {
   bool second_order = false;  // ambient light in bands 1 and 2, too: held-out pixels spoke for it
   bool from_shadows = false;  // cast shadows decided on the direction
   std::optional<SunByBorders> by_borders;  // only then: what their borders make of it
-  double cost = 0.0;          // of the last pass, half the robust sum of squares
+  double cost = 0.0;                       // of the last pass, half the robust sum of squares
 
   // Something besides shading speaks for the direction: shading alone is off by tens of degrees
   // where surfaces of one albedo are few.

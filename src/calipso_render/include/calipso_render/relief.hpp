@@ -16,9 +16,9 @@ struct Relief {
   cv::Mat seen;              // CV_8UC1: 255 where it is seen; the others mean nothing elsewhere
   cv::Mat position, normal;  // CV_32FC3, world
   cv::Mat umbra;             // CV_32FC1: what the sun's absence leaves of its brightness
-  cv::Mat wall;              // CV_8UC1: the wall that it is part of, from 1 on; 0: none, it is curved
-  cv::Mat tiles;             // CV_8UC1, one per square of kTile px: 255 where any of it is seen
-  Eigen::AlignedBox3f box;   // of all positions
+  cv::Mat wall;   // CV_8UC1: the wall that it is part of, from 1 on; 0: none, it is curved
+  cv::Mat tiles;  // CV_8UC1, one per square of kTile px: 255 where any of it is seen
+  Eigen::AlignedBox3f box;  // of all positions
   struct Wall {
     Eigen::Vector3f normal;   // unit
     Eigen::AlignedBox3f box;  // empty: none of it is seen

@@ -155,8 +155,8 @@ float SkyMap::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f&) const
   const Eigen::Vector3f place = placeOf(p);
   if (isClear(place, 0.0f)) return 1.0f;
   const float first = std::max(0.0f, besideBox(place) - 1.0f) / spread_;
-  const Look look{columns_.data(), width_, depth_,    height_,   farthest_, x_,
-                  y_,              place.x(), place.y(), place.z(), first};
+  const Look look{columns_.data(), width_,    depth_,    height_, farthest_, x_, y_,
+                  place.x(),       place.y(), place.z(), first};
   return static_cast<float>(openDirections(look, kDirections)) / kDirections;
 }
 

@@ -373,7 +373,7 @@ class Filling {
   InpaintParams params_;
   cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
   cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
-  std::vector<Divisor> offsets_;  // by reach: how many there are along an axis
+  std::vector<Divisor> offsets_;               // by reach: how many there are along an axis
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   std::vector<cv::Point> sources_;
   std::array<bool, 256> has_source_{};                  // by surface, and once they matter

@@ -17,7 +17,7 @@ struct MovedShadow {
 
   std::unique_ptr<Visibility> sun, sky;
   ReliefSky on_walls;  // of the sky
-  cv::Rect bounds;  // of the picture: what they can shade from the sun
+  cv::Rect bounds;     // of the picture: what they can shade from the sun
 };
 
 }  // namespace calipso::render

@@ -20,13 +20,13 @@ struct RestPicture {
   void spreadOwners(const cv::Mat& seen, const cv::Mat& removed, const cv::Rect& region);
 
   std::vector<bool> edited;  // per surface; empty: of nothing yet
-  cv::Mat drawn;  // CV_32FC3: what they add to a pixel, linear, also mirrored
+  cv::Mat drawn;             // CV_32FC3: what they add to a pixel, linear, also mirrored
   // CV_32FC3: part of the background's light that passes beside them; negative where the video does
   // not show them
   cv::Mat passing;
-  cv::Mat owners;   // CV_16SC1: surface that is seen there, or nearest; -1 = none
-  cv::Mat reach;    // CV_8UC1: 255 where what drawing misses can be carried to
-  cv::Rect box;     // of what they show
+  cv::Mat owners;  // CV_16SC1: surface that is seen there, or nearest; -1 = none
+  cv::Mat reach;   // CV_8UC1: 255 where what drawing misses can be carried to
+  cv::Rect box;    // of what they show
 };
 
 // The plate as a frame in which these objects are edited but stay where the key frame has them.

@@ -68,7 +68,8 @@ void SeenPlace::warp(const StagedFrame& frame) {
     cv::remap(prepared.sunless, sunless, from_key, cv::noArray(), cv::INTER_NEAREST,
               cv::BORDER_CONSTANT, cv::Scalar(0));
   if (!prepared.veil.empty())
-    cv::remap(prepared.veil, veil, from_key, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_REPLICATE);
+    cv::remap(prepared.veil, veil, from_key, cv::noArray(), cv::INTER_NEAREST,
+              cv::BORDER_REPLICATE);
   view = PlaceView(view.planes(), warped(prepared.relief, from_key));
 }
 

@@ -134,8 +134,9 @@ std::vector<RayScene> scenesOf(const std::vector<View>& views, const std::vector
 // and of others by their outlines in the key frame.
 struct Shadows {
   std::unique_ptr<ShadowContrast> coarse, fine;
-  std::unique_ptr<ShadowClue> passing;             // none: nothing leaves
-  std::vector<RayScene> objects, leaving, staying;  // all of each view; those; the key frame's others
+  std::unique_ptr<ShadowClue> passing;  // none: nothing leaves
+  std::vector<RayScene> objects, leaving,
+      staying;  // all of each view; those; the key frame's others
 
   bool anyPass() const { return passing != nullptr && passing->plateKnown(); }
 };
@@ -185,26 +186,25 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
   const auto contrastBy = [&](int cells) {
     return std::make_unique<ShadowContrast>(key, planes, depth, cells);
   };
-  doAll(true,
-        {[&] {
-           if (any_leaves)
-             seen->passing = std::make_unique<ShadowClue>(views, leave, planes,
-                                                          EmptyPlace{key.camera, plate, behind});
-         },
-         [&] {
-           evidence.samples = lightSamples(views, moves, evidence.clusters);
-           lookBelow(key, planes, evidence);
-         },
-         [&] { seen->fine = contrastBy(ShadowContrast::kFine); },
-         [&] {
-           seen->objects = scenesOf(views, std::vector<bool>(moves.size(), true));
-           if (!any_leaves) return;
-           seen->leaving = scenesOf(views, leave);
-           std::vector<bool> stay = leave;
-           stay.flip();
-           seen->staying.push_back(sceneOf(key, stay));
-         },
-         [&] { seen->coarse = contrastBy(ShadowContrast::kCoarse); }});
+  doAll(true, {[&] {
+                 if (any_leaves)
+                   seen->passing = std::make_unique<ShadowClue>(
+                       views, leave, planes, EmptyPlace{key.camera, plate, behind});
+               },
+               [&] {
+                 evidence.samples = lightSamples(views, moves, evidence.clusters);
+                 lookBelow(key, planes, evidence);
+               },
+               [&] { seen->fine = contrastBy(ShadowContrast::kFine); },
+               [&] {
+                 seen->objects = scenesOf(views, std::vector<bool>(moves.size(), true));
+                 if (!any_leaves) return;
+                 seen->leaving = scenesOf(views, leave);
+                 std::vector<bool> stay = leave;
+                 stay.flip();
+                 seen->staying.push_back(sceneOf(key, stay));
+               },
+               [&] { seen->coarse = contrastBy(ShadowContrast::kCoarse); }});
   evidence.visible = [seen](const LightSample& s, const Eigen::Vector3f& l) {
     return seen->objects[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
   };

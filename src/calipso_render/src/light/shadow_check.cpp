@@ -25,8 +25,8 @@ constexpr int kFewest = 130;             // px of a region that is asked by itse
 constexpr int kLeastOpen = 30;  // px of a region away from what says nothing, for it to be asked
 constexpr double kLeastEvidence = 1.0;  // and sum of h'^2
 constexpr double kByChance = 0.12;  // deviation of b where there is no shadow: what else is dark
-constexpr double kDecided = 1.5;   // log of the odds from which a region is decided on by itself
-constexpr float kDarkest = 0.01f;  // linear; added before the logarithm
+constexpr double kDecided = 1.5;    // log of the odds from which a region is decided on by itself
+constexpr float kDarkest = 0.01f;   // linear; added before the logarithm
 
 struct Depth {
   double b, deviation, evidence;

@@ -37,7 +37,7 @@ struct PlaceSurfaces {
   cv::Mat alike;
   cv::Mat
       sure;  // CV_8UC1: 255 where a plane is seen, or hidden and nothing else is seen nearer by that does not meet it
-  cv::Mat sky;  // InpaintParams::sky, of what is seen
+  cv::Mat sky;                       // InpaintParams::sky, of what is seen
   cv::Mat position, normal;          // CV_32FC3, world, off the support planes
   int supports = 0;                  // support planes
   std::vector<PicturePlane> planes;  // of label k + 1
