@@ -84,8 +84,8 @@ SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3
 
 // One picture of the clip with its objects where they were.
 struct View {
-  cv::Mat
-      picture;     // CV_32FC3, code values; a frame's own, CV_8UC3, where texture alone comes of it
+  // CV_32FC3, code values; a frame's own, CV_8UC3, where texture alone comes of it
+  cv::Mat picture;
   cv::Mat labels;  // CV_8UC1
   Camera camera;
   std::vector<Actor> actors;

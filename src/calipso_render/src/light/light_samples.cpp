@@ -135,8 +135,8 @@ std::vector<RayScene> scenesOf(const std::vector<View>& views, const std::vector
 struct Shadows {
   std::unique_ptr<ShadowContrast> coarse, fine;
   std::unique_ptr<ShadowClue> passing;  // none: nothing leaves
-  std::vector<RayScene> objects, leaving,
-      staying;  // all of each view; those; the key frame's others
+  // all of each view; those that leave; the key frame's others
+  std::vector<RayScene> objects, leaving, staying;
 
   bool anyPass() const { return passing != nullptr && passing->plateKnown(); }
 };

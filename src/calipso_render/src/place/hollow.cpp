@@ -27,8 +27,8 @@ constexpr double kTurned = 0.2;   // cosine between normal and way to the axis, 
 constexpr int kBeside = 2;        // px to what tells a pixel's normal,
 constexpr float kSmooth = 0.05f;  // ... unless it is that much nearer or farther
 constexpr float kDark = 4e-3f;    // linear; added before the logarithm
-constexpr std::size_t kFewestSteps =
-    12;                    // between pixels that tell how a ring differs from the next
+// between pixels that tell how a ring differs from the next
+constexpr std::size_t kFewestSteps = 12;
 constexpr int kMixed = 2;  // px beside the hole, which shows what is before it
 
 // A point by its distance from the axis and its height over the support.
