@@ -77,13 +77,6 @@ std::vector<View> lightViewsOf(const std::vector<View>& views) {
   return some;
 }
 
-std::vector<Occluder> occluders(const std::vector<Actor>& actors) {
-  std::vector<Occluder> all;
-  for (const Actor& a : actors)
-    all.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-  return all;
-}
-
 class Stopwatch {
  public:
   double lap() {
@@ -149,13 +142,13 @@ LightFit lightOf(const std::vector<View>& views, const Background& seen, bool an
 }
 
 ShadowMap sunOver(const std::vector<Actor>& actors, const Light& light) {
-  return {occluders(actors), light.direction.cast<double>(), {768, light.angular_radius, 16}};
+  return {occludersOf(actors), light.direction.cast<double>(), {768, light.angular_radius, 16}};
 }
 
 SkyMap skyOver(const std::vector<Actor>& actors, const RenderParams& params) {
   constexpr SkyMap::Params kFine{256};
   if (params.planes.empty()) return {{}, params.up, kFine};
-  return {occluders(actors), params.planes.front().normal, kFine};
+  return {occludersOf(actors), params.planes.front().normal, kFine};
 }
 
 NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadiness,

@@ -110,24 +110,11 @@ SeenShadows shadowsOn(const SeenPlace& place, const cv::Mat& sun, const cv::Mat&
   return seen;
 }
 
-// CV_32FC1: visible part of the sky on walls, 1 elsewhere.
-cv::Mat skyOnWalls(const std::vector<Actor>& actors, const Relief& relief, const cv::Size& size) {
-  cv::Mat sky(size, CV_32F, cv::Scalar(1.0f));
-  std::vector<Occluder> occluders;
-  for (const Actor& a : actors)
-    occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-  const ReliefSky on_walls(relief, occluders, 256);
-#pragma omp parallel for schedule(dynamic, 8)
-  for (int v = 0; v < sky.rows; ++v) {
-    for (int u = 0; u < sky.cols; ++u) sky.at<float>(v, u) = on_walls.at(u, v);
-  }
-  return sky;
-}
-
 // The dark that contacts leave on walls, where the picture surely shows it, whatever becomes of the
 // sun's shadows; walls that should show some and do not take none.
 cv::Mat contactTraces(const PlaceEvidence& e, const RenderParams& params, Prepared& p) {
-  const cv::Mat sky = skyOnWalls(e.actors, p.relief, e.picture.size()), objects = p.key_labels != 0,
+  const ReliefSky on_walls(p.relief, occludersOf(e.actors), ReliefSky::kFine);
+  const cv::Mat sky = on_walls.visibility(e.picture.size()), objects = p.key_labels != 0,
                 predicted = isShaded(cv::Mat::ones(sky.size(), CV_32F), sky) & ~objects;
   cv::Mat traces = cv::Mat::zeros(sky.size(), CV_8U);
   for (int k = 1; k <= static_cast<int>(p.relief.walls.size()); ++k) {

@@ -162,6 +162,13 @@ bool seenFromBehind(const Actor& actor, const Eigen::Vector3i& t, const Eigen::V
 
 }  // namespace
 
+std::vector<Occluder> occludersOf(const std::vector<Actor>& actors) {
+  std::vector<Occluder> all;
+  for (const Actor& a : actors)
+    all.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+  return all;
+}
+
 SurfacePoint surfacePoint(const Actor& actor, int triangle, float u, float v,
                           const Eigen::Vector3f& eye) {
   return surfacePoint(actor, triangle, barycentric(actor.screen, triangle, u, v), eye);

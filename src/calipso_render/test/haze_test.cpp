@@ -19,7 +19,7 @@ struct Land {
           nearness = cv::Mat::zeros(kHigh, kWide, CV_32F),
           sky = cv::Mat::zeros(kHigh, kWide, CV_8U);
 
-  Land(float extinction, float darkest) {
+  Land(float extinction, float darkest, float bright = 0.3f) {
     for (int v = 0; v < kHigh; ++v) {
       for (int u = 0; u < kWide; ++u) {
         cv::Vec3f linear = kAir;
@@ -28,7 +28,7 @@ struct Land {
         } else {
           const float part = static_cast<float>(kHigh - 1 - v) / (kHigh - 1 - kHorizon),
                       distance = kNear * std::pow(kFar / kNear, part);
-          const float left = std::exp(-extinction * distance), own = u % 10 == 0 ? darkest : 0.3f;
+          const float left = std::exp(-extinction * distance), own = u % 10 == 0 ? darkest : bright;
           nearness.at<float>(v, u) = 1.0f / distance;
           linear = left * cv::Vec3f::all(own) + (1.0f - left) * kAir;
         }
@@ -60,6 +60,8 @@ TEST(Haze, IsToldByWhatIsDarkest) {
 
 TEST(Haze, IsNoneWhereFarThingsAreAsDarkAsNearOnes) {
   EXPECT_FALSE(Land(0.0f, 0.02f).haze().established());
+  // snow below a darker sky: no haze makes anything brighter than itself
+  EXPECT_FALSE(Land(0.0f, 0.85f, 0.95f).haze().established());
   EXPECT_TRUE(veilOf(Haze(), cv::Mat(), cv::Mat()).empty());
 }
 

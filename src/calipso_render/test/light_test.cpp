@@ -6,18 +6,20 @@
 #include <cmath>
 #include <random>
 
+#include "ball_samples.hpp"
 #include "calipso_render/colour.hpp"
 #include "calipso_render/light_fit.hpp"
 #include "calipso_render/ray_shadow.hpp"
 #include "draw/ray_scene.hpp"
 #include "light/ambient_fit.hpp"
-#include "light/gloss_fit.hpp"
 #include "light/light_search.hpp"
 #include "light/reflectance_cost.hpp"
 #include "light/sun_prior.hpp"
 
 namespace calipso::render {
 namespace {
+
+using namespace testing;
 
 const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 
@@ -151,20 +153,6 @@ TEST(SunPriorCost, IsHalfItsSquare) {
   EXPECT_NEAR(0.5 * (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]), expected, 1e-12);
 }
 
-// Half a ball of one colour in known light.
-std::vector<LightSample> ballSamples(const Eigen::Vector3f& sun) {
-  std::vector<LightSample> samples;
-  const Eigen::Vector3f view(0, -1, 0);
-  for (int i = 0; i < 1200; ++i) {
-    const float z = 1.0f - (2 * i + 1) / 1200.0f, r = std::sqrt(1.0f - z * z), a = i * 2.39996f;
-    const Eigen::Vector3f n(r * std::cos(a), r * std::sin(a), z);
-    if (n.dot(view) < 0.2f) continue;
-    const float shade = 0.3f * (1.0f + 0.45f * n.z()) + 0.6f * std::max(0.0f, n.dot(sun));
-    samples.push_back({n, n, view, cv::Vec3f(0.2f, 0.4f, 0.6f) * shade, 0, SkySeen::all(n)});
-  }
-  return samples;
-}
-
 TEST(FitLight, FindsTheSunOfABall) {
   const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
   LightEvidence evidence;
@@ -295,27 +283,6 @@ TEST(FitLight, IsNotToldByWhatAllDirectionsExplain) {
   EXPECT_GT(fit.light.direction.dot(shading), std::cos(2.0 * M_PI / 180.0));  // as without shadows
 }
 
-// The ball's samples under an ambient light with these harmonics, with errors of 1 %.
-LightEvidence ballUnder(const Light& light) {
-  LightEvidence evidence;
-  cv::RNG random(5);
-  evidence.clusters = 1;
-  for (LightSample s : ballSamples(light.direction)) {
-    s.radiance = diffuseShading(light, s.normal, 1.0f).mul(cv::Vec3f(0.2f, 0.4f, 0.6f)) *
-                 static_cast<float>(1.0 + random.gaussian(0.01));
-    evidence.samples.push_back(s);
-  }
-  return evidence;
-}
-
-LightFit plainFit(const Light& light) {
-  LightFit fit;
-  fit.determined = true, fit.light = light, fit.gloss.specular = 0.0f,
-  fit.albedos = {cv::Vec3f(0.2f, 0.4f, 0.6f)};
-  for (int j = 4; j < 9; ++j) fit.light.ambient[j] = {};
-  return fit;
-}
-
 TEST(RefineAmbient, FindsTheLightOfASkyThatIsNotEven) {
   Light light;
   light.direction = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
@@ -345,98 +312,6 @@ TEST(ThrownBack, IsOfTheSurfacesColourAndNoBrighter) {
   EXPECT_LT(blue[2], kThrownBack);
   EXPECT_NEAR(luminance(blue), kThrownBack, 1e-6f);
   EXPECT_LT(cv::norm(thrownBack({0, 0, 0}), cv::Vec3f::all(kThrownBack)), 1e-6);
-}
-
-// A glossy ball's rim mirrors the sky with a strength that its highlight does not have.
-TEST(SurroundingsStrength, IsFoundBesideTheHighlights) {
-  LightFit fit = plainFit(Light());
-  fit.light.direction = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
-  fit.gloss = {0.005f, 0.1f, 0.02f};
-  LightEvidence evidence = ballUnder(fit.light);
-  for (LightSample& s : evidence.samples)
-    s.radiance += specularShading(fit.light, fit.gloss, s.normal, s.view, 1.0f);
-  fit.gloss.around = 0.0f;
-  EXPECT_NEAR(surroundingsStrength(evidence, fit), 0.02f, 0.003f);  // errors of 1 %
-  EXPECT_LT(surroundingsStrength(ballUnder(fit.light), fit), 0.003f);
-}
-
-// Pixels of a ball around the highlight that a lobe of roughness m makes on it, as a picture has
-// them, which ends at 1.
-std::vector<HighlightSample> clippedHighlight(const Light& light, float m, int& clipped) {
-  const Eigen::Vector3f view(0, -1, 0), h = (light.direction + view).normalized(),
-                                        s = h.unitOrthogonal(), t = h.cross(s);
-  std::vector<HighlightSample> highlights;
-  cv::RNG random(5);
-  for (int i = -30; i <= 30; ++i) {
-    for (int j = -30; j <= 30; ++j) {
-      const Eigen::Vector3f n = (h + 0.015f * (i * s + j * t)).normalized();
-      LightSample at{n, n, view, {}, 0, SkySeen::all(n)};
-      at.radiance = diffuseShading(light, n, 1.0f).mul(cv::Vec3f(0.2f, 0.4f, 0.6f)) *
-                        static_cast<float>(1.0 + random.gaussian(0.01)) +
-                    specularShading(light, {0.05f, m, 0.0f}, n, view, 1.0f);
-      clipped += at.radiance[2] > 1.0f;
-      for (int c = 0; c < 3; ++c) at.radiance[c] = std::min(1.0f, at.radiance[c]);
-      highlights.push_back({at, 0.0f});
-    }
-  }
-  return highlights;
-}
-
-// The middle of a bright highlight says only that it is as bright as the picture; its flanks tell
-// how rough the surface is. What 1.1 degrees of error of the normals blur is allowed for.
-TEST(FitGloss, ReadsAClippedHighlightByItsFlanks) {
-  for (const float m : {0.06f, 0.1f}) {
-    LightFit fit = plainFit(Light());
-    fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
-    int clipped = 0;
-    const std::optional<SeenGloss> found =
-        fitGloss(clippedHighlight(fit.light, std::hypot(m, 0.028f), clipped), fit, {});
-    EXPECT_GT(clipped, 5);
-    ASSERT_TRUE(found);
-    EXPECT_NEAR(found->gloss.roughness, m, 0.05f * m);
-    EXPECT_NEAR(found->gloss.specular, 0.05f, 0.005f);
-    EXPECT_LT(found->smoothest, m);
-    EXPECT_GT(found->roughest, m);
-  }
-}
-
-// Three objects: two of one gloss, and one of another.
-TEST(SeenGlosses, HoldEachObjectsOwnWhereItDiffers) {
-  LightFit fit = plainFit(Light());
-  fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
-  std::vector<HighlightSample> all;
-  int clipped = 0;
-  for (const std::size_t object : {0, 1, 2}) {
-    for (HighlightSample& h : clippedHighlight(fit.light, object == 2 ? 0.25f : 0.08f, clipped)) {
-      h.object = object;
-      all.push_back(h);
-    }
-  }
-  fit.seen_gloss = seenGlosses(all, 4, fit, {});
-  ASSERT_TRUE(fit.confirmed());  // by the highlights
-  fit.gloss = fit.seen_gloss.of_all->gloss;
-  EXPECT_FALSE(fit.seen_gloss.of_one[1]);
-  EXPECT_NEAR(fit.glossOf(0).roughness, fit.glossOf(1).roughness, 1e-6f);
-  EXPECT_NEAR(fit.glossOf(1).roughness, 0.08f, 0.015f);
-  EXPECT_NEAR(fit.glossOf(2).roughness, 0.25f, 0.05f);
-  EXPECT_NEAR(fit.glossOf(3).roughness, 0.08f, 0.015f);  // nothing is seen of it
-  EXPECT_TRUE(fit.toldGloss(2)->leaves(0.25f));
-  EXPECT_FALSE(fit.toldGloss(2)->leaves(0.08f));
-}
-
-// The pixels around a glossy ball's highlight speak for its light, and against one beside it.
-TEST(TellDirection, BelievesALightOnlyWhereItsHighlightIs) {
-  LightFit fit = plainFit(Light());
-  fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
-  fit.gloss = {0.02f, 0.2f, 0.0f};
-  std::vector<HighlightSample> highlights;
-  for (LightSample s : ballUnder(fit.light).samples) {
-    s.radiance += specularShading(fit.light, fit.gloss, s.normal, s.view, 1.0f);
-    highlights.push_back({s, 0.0f});
-  }
-  EXPECT_TRUE(tellDirection(highlights, fit, {}));
-  fit.light.direction = Eigen::Vector3f(0.1f, -0.7f, 0.7f).normalized();  // 18 degrees off
-  EXPECT_FALSE(tellDirection(highlights, fit, {}));
 }
 
 TEST(FitLight, SaysWhenThereIsTooLittleToSee) {

@@ -103,7 +103,8 @@ struct Prepared {
   // CV_8UC1: where objects cast no shadow: neither plane nor relief is seen there, or shows none in
   // the video
   cv::Mat shadowless;
-  cv::Mat sunless;   // CV_8UC1: 255 where scenery stands before the sun; may be empty
+  // CV_8UC1: 255 where scenery stands before the sun, or a wall turns away from it; may be empty
+  cv::Mat sunless;
   Relief relief;     // of the place, takes shadows; may be empty
   cv::Mat veil;      // CV_8UC1: part of what the place shows that haze adds, 255 all; may be empty
   cv::Mat nearness;  // CV_32FC1, 1/m: of the place without the objects, 0 infinitely far

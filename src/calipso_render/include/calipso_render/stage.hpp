@@ -9,6 +9,7 @@
 #include "calipso_render/edge_coverage.hpp"
 #include "calipso_render/light.hpp"
 #include "calipso_render/rasterizer.hpp"
+#include "calipso_render/visibility.hpp"
 #include "calipso_scene/scene.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
 
@@ -64,6 +65,9 @@ struct Actor {
 };
 
 Actor makeActor(const Surface& surface, Points vertices, const Camera& camera);
+
+// @pre the actors outlive them
+std::vector<Occluder> occludersOf(const std::vector<Actor>& actors);
 
 // A point of an actor's surface, with the same material point at the key frame.
 struct SurfacePoint {

@@ -11,6 +11,7 @@
 
 #include "fill/patch_cost.hpp"
 #include "fill/patch_levels.hpp"
+#include "fill/place_random.hpp"
 
 namespace calipso::render {
 namespace {
@@ -30,18 +31,6 @@ constexpr float kHorizon = 6.0f;  // px of height by which a source may miss Pat
 cv::Point point(const cv::Vec2s& v) { return {v[0], v[1]}; }
 cv::Vec2s shorts(const cv::Point& p) { return {static_cast<short>(p.x), static_cast<short>(p.y)}; }
 
-// Remainders of 16-bit numbers as division leaves them, without one (Lemire, Kaser & Kurz 2019).
-class Divisor {
- public:
-  explicit Divisor(std::uint32_t value) : value_(value), inverse_(0xffffffffu / value + 1) {}
-  std::uint32_t rest(std::uint32_t number) const {
-    return static_cast<std::uint32_t>(std::uint64_t{inverse_ * number} * value_ >> 32);
-  }
-
- private:
-  std::uint32_t value_, inverse_;
-};
-
 // One level's hole: the nearest source patch of every patch that touches it, and the picture that
 // they make.
 class Filling {
@@ -55,12 +44,11 @@ class Filling {
         scale_(scale),
         rules_(level, scale, horizon, lattice, params),
         params_(params),
+        random_(params.seed, std::max({hole_.cols, hole_.rows, kFarthest})),
         to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
         cost_(hole_.size(), CV_32F, cv::Scalar(0.0f)),
         plain_(hole_.size(), CV_8U, cv::Scalar(0)),
         bands_((hole_.rows + kBandRows - 1) / kBandRows) {
-    for (int reach = 0; reach <= std::max({hole_.cols, hole_.rows, kFarthest}); ++reach)
-      offsets_.emplace_back(2 * reach + 1);
     const cv::Mat patch = cv::Mat::ones(kPatchSide, kPatchSide, CV_8U);
     cv::Mat touched;
     cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
@@ -225,7 +213,7 @@ class Filling {
     return along_surfaces_ && !own.empty() ? own : sources_;
   }
   cv::Point oneOf(const std::vector<cv::Point>& from, const cv::Point& p, int salt) const {
-    return from[random(p, salt) % static_cast<std::uint32_t>(from.size())];
+    return from[random_.number(p, salt, sweep_) % static_cast<std::uint32_t>(from.size())];
   }
   bool isMisled(const cv::Point& p) const {
     return hasMatch(p) && rules_.onOther(p, match(p)) && has_source_[rules_.surfaceAt(p)];
@@ -354,26 +342,16 @@ class Filling {
   }
 
   cv::Point jitter(const cv::Point& p, int salt, int reach) const {
-    const std::uint32_t h = random(p, 1024 + salt);
-    return {static_cast<int>(offsets_[reach].rest(h & 0xffff)) - reach,
-            static_cast<int>(offsets_[reach].rest(h >> 16)) - reach};
-  }
-
-  std::uint32_t random(const cv::Point& p, int salt) const {
-    std::uint32_t h = params_.seed * 0x9e3779b9u ^ static_cast<std::uint32_t>(p.x) * 0x85ebca6bu ^
-                      static_cast<std::uint32_t>(p.y) * 0xc2b2ae35u ^
-                      static_cast<std::uint32_t>(salt + 2048 * sweep_) * 0x27d4eb2fu;
-    h ^= h >> 15, h *= 0x2c1b3c6du, h ^= h >> 12, h *= 0x297a2d39u, h ^= h >> 15;
-    return h;
+    return random_.offset(p, salt, sweep_, reach);
   }
 
   cv::Mat image_, hole_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
   float scale_;                   // size of these pixels in the finest level's
   PatchCost rules_;
   InpaintParams params_;
+  PlaceRandom random_;
   cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
   cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
-  std::vector<Divisor> offsets_;               // by reach: how many there are along an axis
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   std::vector<cv::Point> sources_;
   std::array<bool, 256> has_source_{};                  // by surface, and once they matter

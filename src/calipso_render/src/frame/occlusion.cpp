@@ -12,7 +12,6 @@ namespace calipso::render {
 namespace {
 
 constexpr int kShadowMapSide = 512;     // texels, live
-constexpr int kFineWallMapSide = 256;   // final
 constexpr int kShadowBoundsMargin = 8;  // px
 constexpr float kReliefMargin = 0.01f;  // m: planes have boxes without thickness
 // of the height: a vertex that far below its plane still shades it
@@ -78,7 +77,7 @@ std::unique_ptr<Visibility> skyVisibility(const std::vector<Occluder>& all,
 ReliefSky skyOnWalls(const std::vector<Occluder>& occluders, const Relief& relief,
                      const RenderParams& params) {
   return {relief, occluders,
-          params.quality == Quality::kFinal ? kFineWallMapSide : SkyMap::Params().resolution};
+          params.quality == Quality::kFinal ? ReliefSky::kFine : SkyMap::Params().resolution};
 }
 
 std::unique_ptr<Visibility> sunVisibility(const std::vector<Occluder>& occluders,

@@ -136,7 +136,7 @@ class Borders {
  public:
   Borders(const View& view, const std::vector<SupportPlane>& planes, const cv::Mat& depth,
           const Eigen::Vector3f& sun)
-      : view_(view), planes_(planes, view.camera), sun_(sun), scene_(occludersOf(view)) {
+      : view_(view), planes_(planes, view.camera), sun_(sun), scene_(occludersOf(view.actors)) {
     findShade(depth);
   }
 
@@ -157,15 +157,8 @@ class Borders {
  private:
   enum : std::uint8_t { kNone, kOpen, kShaded };  // no plane is seen; one in the sun; one in shade
 
-  static std::vector<Occluder> occludersOf(const View& view) {
-    std::vector<Occluder> all;
-    for (const Actor& a : view.actors)
-      all.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-    return all;
-  }
-
   void findShade(const cv::Mat& depth) {
-    const ShadowMap shadow(occludersOf(view_), sun_.cast<double>(), {1024, kSharp, 16});
+    const ShadowMap shadow(occludersOf(view_.actors), sun_.cast<double>(), {1024, kSharp, 16});
     const Eigen::Isometry3f camera_from_world =
         view_.camera.world_from_camera.inverse().cast<float>();
     cv::Mat covered;

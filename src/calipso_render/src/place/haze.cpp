@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <vector>
 
@@ -25,14 +26,14 @@ struct Range {
   float distance, darkest;
 };
 
-std::vector<Range> rangesOf(const cv::Mat& luminance_of, const cv::Mat& nearness) {
+std::vector<Range> rangesOf(const cv::Mat& linear, const cv::Mat& nearness) {
   std::map<int, std::vector<float>> values;
   for (int v = 0; v < nearness.rows; ++v) {
     for (int u = 0; u < nearness.cols; ++u) {
       const float near = nearness.at<float>(v, u);
       if (near > 0.0f)
         values[static_cast<int>(std::floor(-std::log(near) / std::log(kRange)))].push_back(
-            luminance_of.at<float>(v, u));
+            luminance(linear.at<cv::Vec3f>(v, u)));
     }
   }
   std::vector<Range> ranges;
@@ -52,19 +53,19 @@ Haze::Haze(const cv::Mat& picture, const cv::Mat& nearness, const cv::Mat& sky) 
   const cv::Mat linear = linearFromRealCodes(picture),
                 horizon = sky & grown(nearness > 0.0f, kHorizon);
   if (cv::countNonZero(horizon) < static_cast<int>(kFewest)) return;
-  cv::Mat brightness, colours[3];
-  cv::transform(linear, brightness, cv::Matx13f(0.0722f, 0.7152f, 0.2126f));
+  cv::Mat colours[3];
   cv::split(linear, colours);
   for (int c = 0; c < 3; ++c) air_[c] = quantileOf(colours[c], horizon, 0.5);
   const float air = luminance(air_);
-  const std::vector<Range> ranges = rangesOf(brightness, nearness);
+  const std::vector<Range> ranges = rangesOf(linear, nearness);
   if (ranges.empty() || ranges.back().distance < kLeastSpan * ranges.front().distance) return;
   // Nothing is darker than the haze before it.
-  float extinction = 1e9f;
+  float extinction = std::numeric_limits<float>::infinity();
   for (const Range& r : ranges) {
     if (r.darkest < air)
       extinction = std::min(extinction, -std::log(1.0f - r.darkest / air) / r.distance);
   }
+  if (!std::isfinite(extinction)) return;
   const auto explained = std::count_if(ranges.begin(), ranges.end(), [&](const Range& r) {
     return r.darkest < kExplained * air * (1.0f - std::exp(-extinction * r.distance));
   });

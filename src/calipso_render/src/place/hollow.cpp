@@ -29,9 +29,10 @@ constexpr float kSmooth = 0.05f;  // ... unless it is that much nearer or farthe
 constexpr float kDark = 4e-3f;    // linear; added before the logarithm
 // between pixels that tell how a ring differs from the next
 constexpr std::size_t kFewestSteps = 12;
-constexpr int kMixed = 2;  // px beside the hole, which shows what is before it
+constexpr float kStep = 0.15f;  // rings by which two neighbours must differ to tell that
+constexpr int kMixed = 2;       // px beside the hole, which shows what is before it
 
-// A point by its distance from the axis and its height over the support.
+// A point of the scenery.
 struct Point {
   double x, y, h;  // along the support, and over it
   double nx, ny;   // of its normal
@@ -236,7 +237,7 @@ std::array<float, kRings + 1> patternOf(const cv::Mat& log, const cv::Mat& radiu
   const auto look = [&](const cv::Point& p, const cv::Point& q) {
     if (known.at<std::uint8_t>(p) == 0 || known.at<std::uint8_t>(q) == 0) return;
     const float a = radius.at<float>(p), b = radius.at<float>(q);
-    if (std::abs(a - b) < 0.15f) return;
+    if (std::abs(a - b) < kStep) return;
     slopes[std::min(kRings - 1, static_cast<int>(0.5f * (a + b)))].push_back(
         {(log.at<float>(q) - log.at<float>(p)) / (b - a), std::abs(b - a)});
   };
@@ -249,7 +250,7 @@ std::array<float, kRings + 1> patternOf(const cv::Mat& log, const cv::Mat& radiu
   return pattern;
 }
 
-float at(const std::array<float, kRings + 1>& pattern, float radius) {
+float valueAt(const std::array<float, kRings + 1>& pattern, float radius) {
   const int k = std::clamp(static_cast<int>(radius), 0, kRings - 1);
   return pattern[k] + (radius - static_cast<float>(k)) * (pattern[k + 1] - pattern[k]);
 }
@@ -267,14 +268,14 @@ void fillAround(const cv::Mat& radius, const cv::Mat& known, const cv::Mat& hidd
     for (int v = 0; v < plate.rows; ++v) {
       for (int u = 0; u < plate.cols; ++u) {
         if (known.at<std::uint8_t>(v, u) != 0)
-          shade.at<float>(v, u) = log.at<float>(v, u) - at(pattern, radius.at<float>(v, u));
+          shade.at<float>(v, u) = log.at<float>(v, u) - valueAt(pattern, radius.at<float>(v, u));
       }
     }
     shade = pushPull(shade, weight);
     for (int v = 0; v < plate.rows; ++v) {
       for (int u = 0; u < plate.cols; ++u) {
         if (hidden.at<std::uint8_t>(v, u) == 0) continue;
-        const float sum = shade.at<float>(v, u) + at(pattern, radius.at<float>(v, u));
+        const float sum = shade.at<float>(v, u) + valueAt(pattern, radius.at<float>(v, u));
         plate.at<cv::Vec3f>(v, u)[c] = codeFromLinear(std::exp(sum) - kDark);
       }
     }

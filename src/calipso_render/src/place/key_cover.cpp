@@ -7,10 +7,9 @@ namespace {
 
 // px; narrower gaps between mask and model are misfit, unless they reach
 constexpr int kFrontOpening = 7;
-constexpr int kNarrowFront = 3;         // ... so much of them
-constexpr float kDeepFront = 6.0f;      // ... that far inside the model's outline: a peg on a towel
-constexpr float kNearerBeside = 1.02f;  // times as near: before an object
-constexpr int kWaterline = 2;           // px by which masks end before it, and over which it mixes
+constexpr int kNarrowFront = 3;     // ... so much of them
+constexpr float kDeepFront = 6.0f;  // ... that far inside the model's outline: a peg on a towel
+constexpr int kWaterline = 2;       // px by which masks end before it, and over which it mixes
 
 // Where an object's surface should be seen at the key frame but no mask is, something stands before
 // it. The rim is left out: there the fit is not exact.
@@ -42,7 +41,7 @@ cv::Mat nearnessOf(const cv::Mat& depth) {
 
 // Where the depth image shows the support planes. @param ground nearness of these
 cv::Mat onGround(const cv::Mat& nearness, const cv::Mat& ground) {
-  return (ground > 0.0f) & (cv::abs(nearness - ground) <= (kNearerBeside - 1.0f) * nearness);
+  return (ground > 0.0f) & (cv::abs(nearness - ground) <= (kBehind - 1.0f) * nearness);
 }
 
 // What the depth image shows just beside an object, off the planes and nearer: it stands before it.
@@ -53,7 +52,7 @@ cv::Mat nearerBeside(const cv::Mat& mask, const cv::Mat& labels, const cv::Mat& 
   nearness.copyTo(own, mask);
   cv::dilate(own, own,
              cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
-  cv::Mat nearer = (labels == 0) & (own > 0.0f) & (nearness > kNearerBeside * own);
+  cv::Mat nearer = (labels == 0) & (own > 0.0f) & (nearness > kBehind * own);
   if (!ground.empty()) nearer &= ~onGround(nearness, ground);
   return nearer;
 }
@@ -125,6 +124,29 @@ cv::Mat sceneryOf(const cv::Mat& depth, const Prepared& p, int margin) {
   nearness.setTo(0, objects);
   cv::erode(nearness, nearness, cv::Mat::ones(3, 3, CV_8U));
   return nearness;
+}
+
+cv::Mat beforeObjects(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels) {
+  const cv::Mat object = (labels != 0) & (depth > 0.0f);
+  cv::Mat before = cv::Mat::zeros(scenery.size(), CV_8U);
+  if (cv::countNonZero(object) == 0) return before;
+  cv::Mat away, nearest;
+  cv::distanceTransform(object == 0, away, nearest, cv::DIST_L2, cv::DIST_MASK_5,
+                        cv::DIST_LABEL_PIXEL);
+  std::vector<float> nearness(cv::countNonZero(object) + 1, 0.0f);  // of every object's pixel
+  for (int v = 0; v < object.rows; ++v) {
+    for (int u = 0; u < object.cols; ++u) {
+      if (object.at<std::uint8_t>(v, u) != 0)
+        nearness[nearest.at<int>(v, u)] = 1.0f / depth.at<float>(v, u);
+    }
+  }
+  for (int v = 0; v < object.rows; ++v) {
+    for (int u = 0; u < object.cols; ++u) {
+      if (scenery.at<float>(v, u) > kBehind * nearness[nearest.at<int>(v, u)])
+        before.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return before;
 }
 
 }  // namespace calipso::render

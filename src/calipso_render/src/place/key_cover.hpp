@@ -8,6 +8,8 @@ namespace calipso::render {
 
 // What covers what at the key frame, by models, masks and the depth image.
 
+inline constexpr float kBehind = 1.02f;  // times something's nearness: what it hides is no nearer
+
 // CV_8UC1: 255 where the model covers the picture.
 cv::Mat outlineOf(const Actor& actor, const cv::Size& size);
 
@@ -20,6 +22,11 @@ std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params);
 // All that a resting object covers at the key frame: its mask, which can miss thin or dark ends,
 // and its model. Empty for those that move.
 std::vector<cv::Mat> footprintsOf(const Prepared& p);
+
+// CV_8UC1: 255 where the depth image shows something nearer than the object beside it in the picture:
+// it stands before that and does not go on behind it.
+// @param scenery sceneryOf() @param depth CV_32FC1, m, 0: unknown
+cv::Mat beforeObjects(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels);
 
 // CV_32FC1, 1/m: what the depth image shows beside the objects, as near as all of its surroundings:
 // its edges are not exact.

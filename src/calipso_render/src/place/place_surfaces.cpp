@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "calipso_render/inpaint.hpp"
+#include "place/key_cover.hpp"
 #include "place/place_relief.hpp"
 #include "place/plane_edges.hpp"
 #include "place/plane_reach.hpp"
@@ -20,8 +21,7 @@ constexpr double kLeastPart = 0.01;  // of the picture, for a plane: walls, not 
 constexpr double kSeedSpread = 0.005;  // likewise
 // of the nearness: what is farther from the support planes is relief
 constexpr float kOffSupport = 0.02f;
-constexpr float kBehind = 1.02f;  // of an object's nearness: what it hides is no nearer
-constexpr int kCurvedReach = 4;   // px of the square that tells the normal of what is not plane
+constexpr int kCurvedReach = 4;  // px of the square that tells the normal of what is not plane
 constexpr float kSameSurface = 0.05f;  // of the nearness within it
 
 // times that a pixel of a support plane is as near as the farthest beside it, from which on so
@@ -259,31 +259,6 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
     if (k >= supports)
       taken |= (scenery > 0.0f) & (cv::abs(nearness - scenery) < kOnPlane * nearness);
   }
-}
-
-// Where the depth image shows something nearer than the object beside it in the picture: it stands
-// before that and does not go on behind it.
-cv::Mat beforeObjects(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels) {
-  const cv::Mat object = (labels != 0) & (depth > 0.0f);
-  cv::Mat before = cv::Mat::zeros(scenery.size(), CV_8U);
-  if (cv::countNonZero(object) == 0) return before;
-  cv::Mat away, nearest;
-  cv::distanceTransform(object == 0, away, nearest, cv::DIST_L2, cv::DIST_MASK_5,
-                        cv::DIST_LABEL_PIXEL);
-  std::vector<float> nearness(cv::countNonZero(object) + 1, 0.0f);  // of every object's pixel
-  for (int v = 0; v < object.rows; ++v) {
-    for (int u = 0; u < object.cols; ++u) {
-      if (object.at<std::uint8_t>(v, u) != 0)
-        nearness[nearest.at<int>(v, u)] = 1.0f / depth.at<float>(v, u);
-    }
-  }
-  for (int v = 0; v < object.rows; ++v) {
-    for (int u = 0; u < object.cols; ++u) {
-      if (scenery.at<float>(v, u) > kBehind * nearness[nearest.at<int>(v, u)])
-        before.at<std::uint8_t>(v, u) = 255;
-    }
-  }
-  return before;
 }
 
 // A support plane is not seen behind an object where things that rise above it (a bank, a rock, a

@@ -63,7 +63,7 @@ PlaneTerms inPlaneTerms(const PlaneTerms& levels, float umbra, float planes_umbr
           ? PlaneTerms{levels.sun, levels.sun + (1.0f - levels.sun) * umbra / planes_umbra}
           : PlaneTerms{(open - planes_umbra) / (1.0f - planes_umbra), 1.0f};
   // What objects hide of the sky goes off both.
-  const float left = (open - umbra * (1.0f - levels.sky)) / open;
+  const float left = open > 0.0f ? (open - umbra * (1.0f - levels.sky)) / open : 0.0f;
   return {left * under_open_sky.sun, left * under_open_sky.sky};
 }
 

@@ -52,4 +52,13 @@ float ReliefSky::at(int u, int v) const {
   return over_[wall - 1]->visibility(r.position, r.normal);
 }
 
+cv::Mat ReliefSky::visibility(const cv::Size& size) const {
+  cv::Mat visible(size, CV_32F, cv::Scalar(1.0f));
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) visible.at<float>(v, u) = at(u, v);
+  }
+  return visible;
+}
+
 }  // namespace calipso::render

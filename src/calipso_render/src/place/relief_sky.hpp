@@ -13,6 +13,8 @@ namespace calipso::render {
 // it.
 class ReliefSky {
  public:
+  static constexpr int kFine = 256;  // SkyMap::Params::resolution for pictures that stay
+
   ReliefSky() = default;
 
   // @param relief must outlive this
@@ -22,6 +24,8 @@ class ReliefSky {
   bool empty() const { return relief_ == nullptr; }  // all see all of it
   // Visible part, 0..1, of a pixel.
   float at(int u, int v) const;
+  // CV_32FC1: of all pixels.
+  cv::Mat visibility(const cv::Size& size) const;
 
  private:
   const Relief* relief_ = nullptr;

@@ -22,9 +22,7 @@ constexpr float kNoShadow = 0.85f;  // hardly darker: the shadow was not where i
 // Picture over plate in the full shade of one view.
 void collect(const View& view, const std::vector<SupportPlane>& planes, const EmptyPlace& place,
              const Light& light, std::vector<float> (&ratios)[3]) {
-  std::vector<Occluder> occluders;
-  for (const Actor& a : view.actors)
-    occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+  const std::vector<Occluder> occluders = occludersOf(view.actors);
   const ShadowMap sun(occluders, light.direction.cast<double>(), {512, light.angular_radius, 16});
   const SkyMap sky(occluders, planes.front().normal, {});
   const PlaneView seen(planes, view.camera);

@@ -16,6 +16,7 @@
 #include "smooth_step.hpp"
 #include "texture/false_shade.hpp"
 #include "texture/mesh_topology.hpp"
+#include "texture/picture_trust.hpp"
 #include "texture/texture_fill.hpp"
 
 namespace calipso::render {
@@ -33,34 +34,7 @@ constexpr float kLeastClear = 0.02f;
 constexpr float kDarkest = 1e-4f;  // linear brightness that is told from none
 constexpr float kBroad = 0.35f;    // m from which a lobe looks like diffuse shading
 constexpr float kJump = 0.03f;     // of the object's extent: what hides a part of it is before it
-// part by which light falls within two pixels, at which it begins to be a step, and is one
-constexpr float kStep = 0.2f, kWholeStep = 0.4f;
-constexpr float kLeastAtStep = 0.1f;  // of the trust
-constexpr float kCrease =
-    0.87f;  // cosine of the angle by which a surface turns from pixel to pixel
 constexpr float kOnlyPicture = 0.999f, kOnlyTexture = 0.001f;  // of the texture's fourth value
-
-// Trust in a pixel as a picture of the object alone, by distance from the mask's rim (px): the
-// first pixels mix with the background and with what compression spreads.
-float rimTrust(float depth) {
-  if (depth <= 1.0f) return 0.02f;
-  return std::clamp((depth - 1.0f) / 1.5f, 0.05f, 1.0f);
-}
-
-// @param region holds the object's mask and a pixel around it, as far as they lie in the picture
-cv::Mat trustOf(const cv::Mat& labels, int index, const cv::Rect& region) {
-  cv::Mat padded, depth;
-  cv::copyMakeBorder(labels(region) == index, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
-  cv::distanceTransform(padded, depth, cv::DIST_L2, 5);
-  cv::Mat trust = cv::Mat::zeros(region.size(), CV_32F);
-  for (int v = 0; v < region.height; ++v) {
-    for (int u = 0; u < region.width; ++u) {
-      const float d = depth.at<float>(v + 1, u + 1);
-      if (d > 0.0f) trust.at<float>(v, u) = rimTrust(d);
-    }
-  }
-  return trust;
-}
 
 // What the objects of a view leave of sun and sky.
 struct Shade {
@@ -170,91 +144,6 @@ cv::Mat clearOf(const cv::Mat& picture, const cv::Mat& glint) {
   return clear;
 }
 
-// Whether the fronts at two neighbouring pixels belong to parts of which one hides the other: each
-// is off the plane that touches the other.
-// @param tolerance m of depth
-bool jumps(const Shaded& s, const cv::Rect& region, const Camera& camera, const cv::Point& a,
-           const cv::Point& b, float tolerance) {
-  const Eigen::Matrix3f axes = camera.world_from_camera.linear().cast<float>();
-  const auto isOff = [&](const cv::Point& here, const cv::Point& there) {
-    const cv::Vec3f& n = s.normal.at<cv::Vec3f>(here);
-    const Eigen::Vector3f normal = axes.transpose() * Eigen::Vector3f(n[0], n[1], n[2]);
-    const auto facing = [&](const cv::Point& q) {
-      return normal.dot(camera.ray(q.x + region.x, q.y + region.y).cast<float>());
-    };
-    const float near = s.nearness.at<float>(here), plane = near * facing(there) / facing(here);
-    return std::abs(s.nearness.at<float>(there) - plane) > tolerance * near * near;
-  };
-  return s.nearness.at<float>(a) > 0.0f && s.nearness.at<float>(b) > 0.0f && isOff(a, b) &&
-         isOff(b, a);
-}
-
-// Trust beside such places: there, too, two colours mix.
-void lowerBesideJumps(const Shaded& s, const Camera& camera, float tolerance, Reflectance& r) {
-  cv::Mat smooth(r.region.size(), CV_8U, cv::Scalar(255)), distance;
-  for (int v = 0; v + 1 < smooth.rows; ++v) {
-    for (int u = 0; u + 1 < smooth.cols; ++u) {
-      for (const cv::Point q : {cv::Point(u + 1, v), cv::Point(u, v + 1)}) {
-        if (jumps(s, r.region, camera, {u, v}, q, tolerance))
-          smooth.at<std::uint8_t>(v, u) = smooth.at<std::uint8_t>(q) = 0;
-      }
-    }
-  }
-  if (cv::countNonZero(smooth == 0) == 0) return;
-  cv::distanceTransform(smooth, distance, cv::DIST_L2, 5);
-  for (int v = 0; v < smooth.rows; ++v) {
-    for (int u = 0; u < smooth.cols; ++u) {
-      float& trust = r.trust.at<float>(v, u);
-      trust = std::min(trust, rimTrust(distance.at<float>(v, u) + 1.0f));
-    }
-  }
-}
-
-// Part by which values fall within two pixels. @param values CV_32F; where CV_8U, != 0: has some
-cv::Mat fallOf(const cv::Mat& values, const cv::Mat& where) {
-  const cv::Mat around = cv::Mat::ones(3, 3, CV_8U);
-  cv::Mat most, least = values.clone();
-  least.setTo(std::numeric_limits<float>::max(), where == 0);
-  cv::erode(least, least, around);
-  cv::dilate(values, most, around);
-  return 1.0f - least / cv::max(most, kDarkest);
-}
-
-// Trust where light steps, at the edge of a cast shadow or at a crease, and the reflectance does, too:
-// a fit that is off by a pixel divides the picture by the light beside.
-void lowerAtSteps(const Shaded& s, Reflectance& r) {
-  const cv::Mat seen = s.triangle >= 0;
-  cv::Mat light = cv::Mat::zeros(seen.size(), CV_32F), openness = light.clone(),
-          albedo = light.clone(), creased = cv::Mat::zeros(seen.size(), CV_8U);
-  for (int v = 0; v < light.rows; ++v) {
-    for (int u = 0; u < light.cols; ++u) {
-      if (seen.at<std::uint8_t>(v, u) == 0) continue;
-      light.at<float>(v, u) = luminance(s.light.at<cv::Vec3f>(v, u));
-      albedo.at<float>(v, u) = luminance(r.albedo.at<cv::Vec3f>(v, u));
-      openness.at<float>(v, u) =
-          light.at<float>(v, u) / std::max(kDarkest, luminance(s.open.at<cv::Vec3f>(v, u)));
-      for (const cv::Point q : {cv::Point(u + 1, v), cv::Point(u, v + 1)}) {
-        if (q.x < light.cols && q.y < light.rows && seen.at<std::uint8_t>(q) != 0 &&
-            s.normal.at<cv::Vec3f>(v, u).dot(s.normal.at<cv::Vec3f>(q)) < kCrease)
-          creased.at<std::uint8_t>(v, u) = creased.at<std::uint8_t>(q) = 255;
-      }
-    }
-  }
-  const cv::Mat shade = fallOf(openness, seen), turn = fallOf(light, seen),
-                change = fallOf(albedo, seen);
-  cv::Mat steady(seen.size(), CV_32F);
-  for (int v = 0; v < steady.rows; ++v) {
-    for (int u = 0; u < steady.cols; ++u) {
-      const float fall = std::max(
-          shade.at<float>(v, u), creased.at<std::uint8_t>(v, u) != 0 ? turn.at<float>(v, u) : 0.0f);
-      steady.at<float>(v, u) =
-          1.0f - (1.0f - kLeastAtStep) *
-                     smoothStep(kStep, kWholeStep, std::min(fall, change.at<float>(v, u)));
-    }
-  }
-  r.trust = r.trust.mul(steady);
-}
-
 // @param mean_light that of the key frame, where there is one; alone no other view shows the object
 Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& light,
                           const Gloss& gloss, const Shade& shade,
@@ -294,9 +183,8 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
       r.trust.at<float>(v, u) *= std::min(1.0f, luminance(l) / (kLit * luminance(r.mean_light)));
     }
   }
-  lowerBesideJumps(shaded, view.camera,
-                   kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
-  if (alone) lowerAtSteps(shaded, r);
+  lowerBesideJumps(view.camera, kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
+  if (alone) lowerAtSteps(shaded.light, shaded.open, r);
   takeOutFalseShade({shaded.light, shaded.open, r.trust}, floor, r.albedo);
   return r;
 }

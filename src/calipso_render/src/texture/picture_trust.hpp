@@ -1,0 +1,22 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "texture/texture_fill.hpp"
+
+namespace calipso::render {
+
+// Trust in pixels as a picture of the object alone: less at the mask's rim. CV_32FC1, 0..1
+// @param region holds the object's mask and a pixel around it, as far as they lie in the picture
+cv::Mat trustOf(const cv::Mat& labels, int index, const cv::Rect& region);
+
+// Trust beside places where one part of the object hides another: there, too, two colours mix.
+// @param tolerance m of depth
+void lowerBesideJumps(const Camera& camera, float tolerance, Reflectance& r);
+
+// Trust where light steps, at the edge of a cast shadow or at a crease, and the reflectance does,
+// too: a fit that is off by a pixel divides the picture by the light beside.
+// @param light, open CV_32FC3: shading of a white surface there, and if nothing were before it
+void lowerAtSteps(const cv::Mat& light, const cv::Mat& open, Reflectance& r);
+
+}  // namespace calipso::render

@@ -1,0 +1,155 @@
+#include "fill/line_bridge.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "fill/line_ends.hpp"
+#include "grain_pictures.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+// Dark lines over fine grain, hidden in a square.
+struct Lines {
+  cv::Mat image = 0.05 * grain(320, 200) + cv::Scalar::all(150.0), truth,
+          hole = cv::Mat::zeros(200, 320, CV_8U);
+
+  void line(const cv::Point& a, const cv::Point& b, int dark = 30, int width = 3) {
+    cv::Mat covered(image.size(), CV_8U, cv::Scalar(0));
+    cv::line(covered, a, b, cv::Scalar(255), width, cv::LINE_AA);
+    image.forEach<cv::Vec3f>([&](cv::Vec3f& c, const int* at) {
+      c += covered.at<std::uint8_t>(at[0], at[1]) / 255.0f * (cv::Vec3f::all(dark) - c);
+    });
+  }
+  LineBridges bridge(const cv::Mat& surface = cv::Mat()) {
+    hole(cv::Rect(110, 50, 100, 100)).setTo(255);
+    truth = image.clone();
+    image.setTo(cv::Scalar::all(0), hole);
+    return bridgeLines(straightEdges(hole == 0, image), hole, hole == 0, surface, image);
+  }
+};
+
+TEST(BridgeLines, ConnectTheTwoEndsOfALine) {
+  Lines l;
+  l.line({0, 80}, {319, 115});
+  const LineBridges b = l.bridge();
+  EXPECT_GT(cv::countNonZero(b.drawn), 700);  // nine rows of 100 px, less what the ends leave
+  EXPECT_EQ(cv::countNonZero(b.drawn & (l.hole == 0)), 0);
+  // Grain differs by 5 code values (12 % of 200) and a line's rim by a tenth of a pixel, which
+  // are 12.
+  EXPECT_LT(meanDifference(l.image, l.truth, b.drawn), 8.0);
+  for (int v = 50; v < 150; ++v) {
+    for (int u = 110; u < 210; ++u) {
+      const cv::Vec2s from = b.origin.at<cv::Vec2s>(v, u);
+      if (b.drawn.at<std::uint8_t>(v, u) != 0) {
+        EXPECT_EQ(l.hole.at<std::uint8_t>(from[1], from[0]), 0);
+      }
+    }
+  }
+}
+
+// The hole's rim runs beside the line at one of its ends, so that only farther back both of its
+// sides are seen.
+TEST(BridgeLines, ConnectALineThatIsSeenFromAfar) {
+  Lines l;
+  l.line({0, 80}, {319, 115});
+  cv::fillConvexPoly(l.hole, std::vector<cv::Point>{{205, 107}, {228, 109}, {228, 130}, {205, 130}},
+                     cv::Scalar(255));
+  const LineBridges b = l.bridge();
+  EXPECT_NE(b.core.at<std::uint8_t>(96, 150), 0);
+}
+
+// What is hidden where a line ends at the hole has nothing to say about it.
+TEST(BridgeLines, DrawNothingThatIsHidden) {
+  for (const int v : {70, 80, 90, 100}) {
+    Lines l;
+    l.line({0, v}, {319, v + 35}, 230);
+    const LineBridges b = l.bridge();
+    double darkest;
+    cv::Mat green;
+    cv::extractChannel(l.image, green, 1);
+    cv::minMaxLoc(green, &darkest, nullptr, nullptr, nullptr, b.drawn);
+    EXPECT_GT(darkest, 140.0) << v;  // the grain, 12.8 around 156
+  }
+}
+
+// A wire, at one end before what is brighter.
+TEST(BridgeLines, DrawALineAloneThatPassesBeforeOtherThings) {
+  Lines l;
+  for (int u = 110; u < l.image.cols; ++u)
+    l.image.col(u) += cv::Scalar::all(std::min(0.7 * (u - 110), 70.0));
+  l.line({0, 80}, {319, 100});
+  const LineBridges b = l.bridge();
+  for (int u = 112; u < 208; ++u) {
+    const int v = cvRound(80.0 + 20.0 * u / 319.0);
+    ASSERT_NE(b.drawn.at<std::uint8_t>(v, u), 0) << u;
+    EXPECT_LT(l.image.at<cv::Vec3f>(v, u)[1], 80.0f) << u;  // the line has 30, its rim half of it
+    EXPECT_EQ(b.drawn.at<std::uint8_t>(v - 3, u), 0) << u;
+    EXPECT_EQ(b.drawn.at<std::uint8_t>(v + 3, u), 0) << u;
+  }
+}
+
+TEST(BridgeLines, LeadALineToTheOneThatItMeets) {
+  Lines l;
+  l.line({0, 90}, {319, 90});
+  l.line({150, 199}, {170, 90});
+  const LineBridges b = l.bridge();
+  EXPECT_LT(meanDifference(l.image, l.truth, b.drawn), 8.0);
+  EXPECT_NE(b.drawn.at<std::uint8_t>(130, 163), 0);  // on the second line
+  EXPECT_EQ(b.drawn.at<std::uint8_t>(70, 174), 0);   // beyond the first
+}
+
+// The gaps of a fence do not go on through the hedge that is seen above it.
+TEST(BridgeLines, LeadNoLineThroughAnotherSurface) {
+  Lines l;
+  l.line({0, 90}, {319, 90});
+  l.line({150, 199}, {170, 90});
+  cv::Mat surface(l.image.size(), CV_8U, cv::Scalar(2));
+  surface.rowRange(0, 120).setTo(1);
+  const LineBridges b = l.bridge(surface);
+  EXPECT_NE(b.drawn.at<std::uint8_t>(90, 140), 0);
+  EXPECT_EQ(b.drawn.at<std::uint8_t>(130, 163), 0);
+}
+
+// A broad line, of which both edges are found, goes on through what is faint to one of its like,
+// whole and no further.
+TEST(BridgeLines, LeadABroadLineThroughAFaintOne) {
+  Lines l;
+  l.line({0, 115}, {319, 115}, 118);
+  l.line({150, 199}, {170, 80}, 30, 4);
+  l.line({0, 80}, {319, 80});
+  const LineBridges b = l.bridge();
+  for (int v = 82; v < 150; ++v) {
+    const int u = cvRound(150.0 + 20.0 * (199 - v) / 119.0);
+    ASSERT_NE(b.drawn.at<std::uint8_t>(v, u), 0) << v;
+    EXPECT_LT(l.image.at<cv::Vec3f>(v, u)[1], 70.0f) << v;
+  }
+  EXPECT_EQ(b.drawn.at<std::uint8_t>(72, 171), 0);
+}
+
+TEST(BridgeLines, LeaveALineThatHasNoOtherEnd) {
+  Lines l;
+  l.line({0, 90}, {160, 100});
+  EXPECT_EQ(cv::countNonZero(l.bridge().drawn), 0);
+}
+
+TEST(BridgeLines, LeaveLinesOfDifferentColour) {
+  Lines l;
+  l.line({0, 100}, {160, 100}, 30);
+  l.line({160, 100}, {319, 100}, 255);
+  EXPECT_EQ(cv::countNonZero(l.bridge().drawn), 0);
+}
+
+TEST(BridgeLines, LeaveTextureOfManyLines) {
+  Lines l;
+  for (int v = 4; v < 200; v += 9) l.line({0, v}, {319, v}, 60);
+  EXPECT_EQ(cv::countNonZero(l.bridge().drawn), 0);
+}
+
+}  // namespace
+}  // namespace calipso::render
