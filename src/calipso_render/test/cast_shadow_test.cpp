@@ -143,6 +143,21 @@ TEST(Renderer, AMovedShadowTakesItsWholeEdgeAlong) {
   EXPECT_LT(cv::countNonZero(kept), cv::countNonZero(edge) / 50);
 }
 
+// Pixels of the table in the full shadow of the ball where it is now.
+std::vector<cv::Point> inShadow(const Setting& s, const FrameInput& moved) {
+  const Actor now = makeActor(s.prepared->surfaces[0], moved.objects[0].vertices, camera());
+  const ShadowMap cast({{&now.vertices, &now.surface->triangles}},
+                       s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
+  std::vector<cv::Point> pixels;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = receiverAt(params().planes, camera(), u, v);
+      if (r && cast.visibility(r->position, r->normal) <= 0.1f) pixels.push_back({u, v});
+    }
+  }
+  return pixels;
+}
+
 TEST(Renderer, TakesNoSunWhereSceneryKeepsItOff) {
   const Setting s(params());
   const FrameInput moved = s.input(true, {-0.3f, 0.0f, 0.0f});
@@ -150,18 +165,10 @@ TEST(Renderer, TakesNoSunWhereSceneryKeepsItOff) {
   shaded->sunless = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255));
   const FrameOutput in_sun = Renderer(s.prepared, params()).composite(moved),
                     in_shade = Renderer(shaded, params()).composite(moved);
-  const Actor now = makeActor(s.prepared->surfaces[0], moved.objects[0].vertices, camera());
-  const ShadowMap cast({{&now.vertices, &now.surface->triangles}},
-                       s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
   int darker = 0, all = 0;
-  for (int v = 0; v < kHeight; ++v) {
-    for (int u = 0; u < kWidth; ++u) {
-      const auto r = receiverAt(params().planes, camera(), u, v);
-      if (!r || cast.visibility(r->position, r->normal) > 0.1f) continue;
-      const int sun = in_sun.bgr.at<cv::Vec3b>(v, u)[1],
-                shade = in_shade.bgr.at<cv::Vec3b>(v, u)[1];
-      ++all, darker += sun + 20 < shade;
-    }
+  for (const cv::Point& p : inShadow(s, moved)) {
+    const int sun = in_sun.bgr.at<cv::Vec3b>(p)[1], shade = in_shade.bgr.at<cv::Vec3b>(p)[1];
+    ++all, darker += sun + 20 < shade;
   }
   ASSERT_GT(all, 50);
   EXPECT_GT(darker, all / 5);  // the ball hides others, and the sky
@@ -176,21 +183,12 @@ TEST(Renderer, ShadesNothingOfWhatHazeAdds) {
   const FrameInput moved = s.input(true, {-0.3f, 0.0f, 0.0f});
   const cv::Mat in_clear = Renderer(clear, params()).composite(moved).bgr,
                 in_haze = Renderer(hazy, params()).composite(moved).bgr;
-  const Actor now = makeActor(s.prepared->surfaces[0], moved.objects[0].vertices, camera());
-  const ShadowMap cast({{&now.vertices, &now.surface->triangles}},
-                       s.prepared->light.light.direction.cast<double>(), {512, 0.025, 16});
   double dark = 0.0, half_dark = 0.0;
-  for (int v = 0; v < kHeight; ++v) {
-    for (int u = 0; u < kWidth; ++u) {
-      const auto r = receiverAt(params().planes, camera(), u, v);
-      if (!r || cast.visibility(r->position, r->normal) > 0.1f) continue;
-      const float lit = linearFromCode(s.key.bgr.at<cv::Vec3b>(v, u)[1]);
-      dark += lit - linearFromCode(in_clear.at<cv::Vec3b>(v, u)[1]);
-      if (in_clear.at<cv::Vec3b>(v, u) != in_haze.at<cv::Vec3b>(v, u))
-        half_dark += lit - linearFromCode(in_haze.at<cv::Vec3b>(v, u)[1]);
-      else  // the ball itself
-        dark -= lit - linearFromCode(in_clear.at<cv::Vec3b>(v, u)[1]);
-    }
+  for (const cv::Point& p : inShadow(s, moved)) {
+    if (in_clear.at<cv::Vec3b>(p) == in_haze.at<cv::Vec3b>(p)) continue;  // the ball itself
+    const float lit = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[1]);
+    dark += lit - linearFromCode(in_clear.at<cv::Vec3b>(p)[1]);
+    half_dark += lit - linearFromCode(in_haze.at<cv::Vec3b>(p)[1]);
   }
   ASSERT_GT(dark, 5.0);
   EXPECT_NEAR(half_dark / dark, 0.5, 0.12);  // the table is told from the frame or from the plate
