@@ -34,6 +34,17 @@ void NodeReporter::failed(const std::string& message) {
   publishDiagnostic(ros::Time::now(), DiagnosticStatus::ERROR, message);
 }
 
+void NodeReporter::lastWords(const std::string& message) {
+  constexpr double kListenersComeSec = 5.0, kPollSec = 0.05, kDeliverySec = 0.5;
+  failed(message);
+  const ros::WallTime give_up = ros::WallTime::now() + ros::WallDuration(kListenersComeSec);
+  while (ros::ok() && status_publisher_.getNumSubscribers() == 0 &&
+         ros::WallTime::now() < give_up) {
+    ros::WallDuration(kPollSec).sleep();
+  }
+  if (ros::ok()) ros::WallDuration(kDeliverySec).sleep();
+}
+
 void NodeReporter::clipFrameDone() {
   ++status_.clip_frames;
   publish(status_.state, status_.message);

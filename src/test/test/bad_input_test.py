@@ -14,6 +14,7 @@ import rostest
 import yaml
 
 import clips
+import launching
 
 IMAGE, INFO = clips.IMAGE_TOPIC, "/camera/camera_info"
 
@@ -81,6 +82,26 @@ class BadInput(unittest.TestCase):
             self.expect_complaint("/player/in_flight", "another type", in_flight="many")
         finally:
             rosparam.delete_param("/player/in_flight")  # the test's master keeps it
+
+    def edit_with(self, parameter, value):
+        """(exit status, everything printed) of a run in which one of the nodes gets this parameter."""
+        rosparam.set_param(parameter, value)
+        try:
+            return launching.Launch("calipso_launch", "edit.launch", os.environ["ROS_MASTER_URI"], bag=self.bag,
+                                    scene=self.scene, out=self.path("out.bag")).wait(45)
+        finally:
+            rosparam.delete_param(parameter)
+
+    def test_renderer_that_cannot_start_ends_the_run_at_once(self):
+        status, printed = self.edit_with("/calipso/render/add_noise", "loud")
+        self.assertNotEqual(status, 0, printed)
+        self.assertIn("nobody draws the frames, render has failed: parameter /calipso/render/add_noise", printed)
+
+    def test_frames_pass_a_simulator_that_cannot_start(self):
+        status, printed = self.edit_with("/calipso/simulator/max_nodes", "few")
+        self.assertEqual(status, 0, printed)
+        self.assertIn("frames: 4 in, 4 out", printed)
+        self.assertIn("simulator failed: parameter /calipso/simulator/max_nodes is few", printed)
 
     def test_missing_bag(self):
         self.expect_complaint("absent.bag", bag=self.path("absent.bag"))

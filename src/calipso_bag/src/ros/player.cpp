@@ -191,18 +191,30 @@ std::vector<std::string> Player::unconnected() const {
   return names;
 }
 
+// True once the renderer has failed before it could offer edited frames.
+bool Player::undrawn() const {
+  return watch_.preparation().standing("render").state == NodeState::kFailed &&
+         edited_.getNumPublishers() == 0;
+}
+
 // A frame sent before everyone is connected would be lost to some.
 void Player::waitForGraph() {
-  if (!waitFor([this] { return silent().empty(); }, params_.connect_timeout_sec)) {
-    throw std::runtime_error("after " + std::to_string(params_.connect_timeout_sec) +
-                             " s these nodes have not reported: " + listed(silent()) +
-                             "; look for their own messages above");
-  }
-  if (!waitFor([this] { return unconnected().empty(); }, params_.connect_timeout_sec)) {
-    throw std::runtime_error("after " + std::to_string(params_.connect_timeout_sec) +
-                             " s not connected: " + listed(unconnected()) +
-                             "; can the machines reach each other (ROS_IP, ROS_HOSTNAME)?");
-  }
+  const auto wait = [this](const auto& missing, const std::string& complaint,
+                           const std::string& remedy) {
+    const auto done = [&] { return undrawn() || missing().empty(); };
+    const bool in_time = waitFor(done, params_.connect_timeout_sec);
+    if (undrawn()) {
+      throw std::runtime_error("nobody draws the frames, render has failed: " +
+                               watch_.preparation().standing("render").message);
+    }
+    if (in_time) return;
+    throw std::runtime_error("after " + std::to_string(params_.connect_timeout_sec) + " s " +
+                             complaint + ": " + listed(missing()) + "; " + remedy);
+  };
+  wait([this] { return silent(); }, "these nodes have not reported",
+       "look for their own messages above");
+  wait([this] { return unconnected(); }, "not connected",
+       "can the machines reach each other (ROS_IP, ROS_HOSTNAME)?");
 }
 
 void Player::announceClip() {

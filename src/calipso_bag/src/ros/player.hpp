@@ -54,6 +54,7 @@ class Player {
   void advertiseAll();
   std::vector<std::string> silent() const;
   std::vector<std::string> unconnected() const;
+  bool undrawn() const;
   void waitForGraph();
   void announceClip();
   void prepare();

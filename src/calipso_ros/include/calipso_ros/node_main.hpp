@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "calipso_ros/node_reporter.hpp"
+
 namespace calipso {
 
 // A parameter without which the node cannot run.
@@ -36,7 +38,8 @@ T optionalParam(const ros::NodeHandle& pnh, const std::string& name, const T& ot
   return value;
 }
 
-// The main() of every node: init, construct Node(nh, pnh), spin. Returns 1 if construction throws.
+// The main() of every node: init, construct Node(nh, pnh), spin. If construction throws, says so on
+// the log and, for the player not to wait for it, as the status FAILED; returns 1.
 template <typename Node>
 int runNode(int argc, char** argv, const std::string& name) {
   ros::init(argc, argv, name);
@@ -47,7 +50,7 @@ int runNode(int argc, char** argv, const std::string& name) {
     ros::spin();
     return 0;
   } catch (const std::exception& error) {
-    ROS_FATAL_STREAM(name << ": " << error.what());
+    NodeReporter(nh, name).lastWords(error.what());
     return 1;
   }
 }

@@ -22,6 +22,10 @@ class NodeReporter {
   void ready(const std::string& message);
   void failed(const std::string& message);
 
+  // As failed(), for a process about to end: returns once a listener has had the time to hear it, or
+  // after some seconds without any.
+  void lastWords(const std::string& message);
+
   // One more frame of the clip has been taken in; lets the player send another.
   void clipFrameDone();
 
