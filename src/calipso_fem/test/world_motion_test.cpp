@@ -325,6 +325,16 @@ TEST(WorldMotion, ResolutionFollowsThePixelErrorAskedFor) {
   EXPECT_LE(nodes(1e-3), 1.25 * WorldParams().max_nodes);  // what NodeCountFollowsTheTarget allows
 }
 
+// In coarser cells a sheet that passes from one layer of them to the next shows it by a dent.
+TEST(WorldMotion, CellsOfASheetHangOnItsThicknessToo) {
+  WorldParams params;
+  params.pixel_error = 2.0;
+  World world(sceneWith(boxSurface({0.5, 0.006, 0.7}, 8), {0, 0, 0.4}), params);
+  world.submit(becomeDeformable());
+  world.advanceTo(0.0);
+  EXPECT_LE(world.plan().at(0).cell_size, 8.01 * 0.006);  // and the last digits of its thickness
+}
+
 TEST(WorldMotion, DeformableObjectSleepsWhenStillAndWakesForAnEdit) {
   World world(sceneWith(boxSurface({0.2, 0.2, 0.2}, 3), {0, 0, 0.1}), {});
   world.submit(becomeDeformable());

@@ -13,6 +13,10 @@ namespace {
 // An object that starts to be simulated must not keep the video waiting.
 constexpr int kSettlingLoadSteps = 4;
 constexpr double kRunUp = 0.2;  // s, over which one that deforms in the video is led there
+// A sheet bears loads where the points of integration of its cells are. Where it passes from one
+// layer of cells to the next they step aside with it; in cells ten times as thick as it is such a
+// step is seen as a dent.
+constexpr double kMostThicknesses = 8.0;
 
 }  // namespace
 
@@ -49,11 +53,10 @@ FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const Wo
       (surface.vertices.colwise().maxCoeff() - surface.vertices.colwise().minCoeff()).transpose();
   // Thin objects need cells no larger than their thickness; what is too many nodes is left to the
   // search for max_nodes.
-  const double thickness =
-      std::max(std::abs(signedVolume(surface)) / (extent.prod() / extent.minCoeff()), 1e-3 * size);
-  const double nodes =
-      std::abs(signedVolume(surface)) / std::pow(cell, 3) * std::pow(1.0 + cell / thickness, 2);
-  if (nodes < params.max_nodes) options.cell_size = cell;
+  const double volume = std::abs(signedVolume(surface)),
+               thickness = std::max(volume / (extent.prod() / extent.minCoeff()), 1e-3 * size),
+               nodes = volume / std::pow(cell, 3) * std::pow(1.0 + cell / thickness, 2);
+  if (nodes < params.max_nodes) options.cell_size = std::min(cell, kMostThicknesses * thickness);
   return options;
 }
 
