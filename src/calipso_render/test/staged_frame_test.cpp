@@ -53,6 +53,29 @@ TEST(StagedFrame, WhatIsNotMovedIsStill) {
   EXPECT_EQ(frame.stillness(seen.idAt(u, v), u, v), 1.0f);
 }
 
+// A cloth that blows away from the camera is lit otherwise before it leaves its pixels.
+TEST(StagedFrame, WhatHasTurnedInItsPlaceIsNotStill) {
+  const Setting s(params());
+  const RenderParams p = params();
+  const auto middleStillness = [&](float lean) {  // along the views' rays, more to the right
+    FrameInput in = s.input(true, Eigen::Vector3f::Zero());
+    const Eigen::Vector3f eye = in.camera.world_from_camera.translation().cast<float>(),
+                          right = in.camera.world_from_camera.linear().col(0).cast<float>();
+    const float distance = (kCentre.cast<float>() - eye).norm();
+    for (Eigen::Vector3f& x : in.objects[0].vertices)
+      x += (x - eye) * (lean / distance * right.dot(x - kCentre.cast<float>()));
+    const StagedFrame frame(*s.prepared, p, in);
+    VisibilityBuffer seen(frame.whole());
+    seen.draw(frame.objects[0].actor.screen, 0);
+    const Eigen::Vector2d middle = in.camera.projectWorld(kCentre);
+    const int u = static_cast<int>(middle.x()), v = static_cast<int>(middle.y());
+    EXPECT_LT(frame.movement(seen.idAt(u, v), u, v).norm(), kStillPx);
+    return frame.stillness(seen.idAt(u, v), u, v);
+  };
+  EXPECT_EQ(middleStillness(0.01f), 1.0f);
+  EXPECT_EQ(middleStillness(0.1f), 0.0f);
+}
+
 TEST(StagedFrame, WhatIsRemovedCannotBeSeenAndWhatIsNotEditedHasNoPlaceToReturnTo) {
   const Setting s(params());
   const RenderParams p = params();

@@ -174,8 +174,18 @@ Eigen::Vector2f StagedFrame::movement(std::uint32_t id, float u, float v) const 
 }
 
 float StagedFrame::stillness(std::uint32_t id, float u, float v) const {
-  if (!objectOf(id).isAtRestInVideo()) return 0.0f;
-  return 1.0f - smoothStep(kStillPx, kMovedPx, movement(id, u, v).norm());
+  const StagedObject& object = objectOf(id);
+  if (!object.isAtRestInVideo()) return 0.0f;
+  const float moved = smoothStep(kStillPx, kMovedPx, movement(id, u, v).norm());
+  if (moved == 1.0f) return 0.0f;
+  const Actor& actor = object.actor;
+  const int triangle = VisibilityBuffer::triangleOf(id);
+  const Eigen::Vector3i& corners = actor.surface->corners[triangle];
+  const Eigen::Vector3f w = barycentric(actor.screen, triangle, u, v);
+  Eigen::Vector3f turned = Eigen::Vector3f::Zero();
+  for (int i = 0; i < 3; ++i)
+    turned += w[i] * (actor.normals[corners[i]] - actor.surface->key_normals[corners[i]]);
+  return (1.0f - moved) * (1.0f - smoothStep(kStillTurn, kTurned, turned.norm()));
 }
 
 bool mayMoveLess(const Points& now, const Points& then, const Eigen::Vector3i& triangle, float px) {

@@ -11,6 +11,8 @@ namespace calipso::render {
 
 inline constexpr float kStillPx = 0.05f;  // moved less: the frame's own pixels
 inline constexpr float kMovedPx = 0.3f;   // an edited surface that moved more is drawn
+// the same of how far its normal has turned, rad: it is lit otherwise
+inline constexpr float kStillTurn = 0.02f, kTurned = 0.08f;
 inline constexpr float kNonePx = 5.0f;    // from which none of what drawing misses goes along
 
 // An object that a frame's picture can show. Its place in StagedFrame::objects is the slot by which
@@ -70,7 +72,8 @@ struct StagedFrame {
   // How far from its place in the video a surface point is seen, px. @pre the video has its object
   // at rest
   Eigen::Vector2f movement(std::uint32_t id, float u, float v) const;
-  // How far a surface point of an edited object stays where the video shows it: 1 at rest, 0 moved.
+  // How far a surface point of an edited object stays where, and turned as, the video shows it: 1 at
+  // rest, 0 moved.
   float stillness(std::uint32_t id, float u, float v) const;
 };
 
