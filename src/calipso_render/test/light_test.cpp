@@ -232,6 +232,23 @@ TEST(FitLight, BelievesCastShadows) {
             std::cos(1.0 * M_PI / 180.0));  // 1 degree: the search's last steps
 }
 
+// A wall says nothing of how strong a sun is whose direction cast shadows tell.
+TEST(FitLight, TakesAUsualStrengthWhereShadowsTellTheDirectionAlone) {
+  const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized(), n(0, -1, 0);
+  LightEvidence evidence;
+  evidence.samples.assign(200, {n, n, n, cv::Vec3f(0.2f, 0.4f, 0.6f), 0, SkySeen::all(n)});
+  evidence.clusters = 1;
+  evidence.shadow_misfit = [sun](const Eigen::Vector3f& l) {
+    return -2000.0 * std::max(0.0f, l.dot(sun) - 0.99f) / 0.01;
+  };
+  evidence.shadow_candidates = {sun};
+  const LightFit fit = fitLight(evidence, kUp.cast<float>(), {0, -1, 0});
+  ASSERT_TRUE(fit.from_shadows);
+  const double usual = std::exp(kUsualStrength);
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(fit.light.sun[c] / fit.light.ambient[0][c], usual, 0.3 * usual);
+}
+
 // What a glossy ball over ground that the picture shows mirrors from straight below it.
 cv::Vec3f mirroredGround(const cv::Vec3f& colour, float brightness, LightFit& fit) {
   const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();

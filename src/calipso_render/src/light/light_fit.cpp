@@ -144,11 +144,9 @@ class Fit {
     const double weight = std::sqrt(kPriorWeight * evidence_.samples.size());
     problem.AddResidualBlock(new Prior(kSkyGradient, 0.5 * weight), nullptr, &x.gradient);
     problem.AddResidualBlock(new GlossPrior(0.05 * weight), nullptr, x.gloss.data());
-    if (direction_free_) {
-      const double unit = kShadingError * std::sqrt(evidence_.samples.size() / kIndependentSamples);
-      problem.AddResidualBlock(new SunPriorCost(up_, unit), nullptr, x.direction.data(),
-                               x.ambient.data(), x.sun.data());
-    }
+    const double unit = kShadingError * std::sqrt(evidence_.samples.size() / kIndependentSamples);
+    problem.AddResidualBlock(new SunPriorCost(up_, unit), nullptr, x.direction.data(),
+                             x.ambient.data(), x.sun.data());
     problem.SetManifold(x.direction.data(), new ceres::SphereManifold<3>);
     for (int c = 0; c < 3; ++c) {
       problem.SetParameterLowerBound(x.sun.data(), c, -kLogRange),
