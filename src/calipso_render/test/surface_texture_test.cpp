@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "calipso_render/colour.hpp"
+#include "calipso_render/colour.hpp"
 #include "calipso_render/surface_symmetry.hpp"
 #include "texture/texture_seams.hpp"
 
@@ -158,9 +160,9 @@ TEST(DiffuseOverMesh, GoesOverToAValueFarAway) {
   EXPECT_NEAR(values[2 * kSteps][1], 1.0f, 1e-3f);
 }
 
-// A strip whose left third is seen, and the others copied: one is darker than what it continues,
-// the other has another pattern.
-TEST(LevelSeams, ShiftsACopyToWhatItContinuesAndLeavesPatterns) {
+// A strip whose left third is seen, with the sky in it, and the others copied: one is darker than
+// what it continues, the other has another pattern.
+TEST(LevelSeams, BrightensACopyToWhatItContinuesAndLeavesHuesAndPatterns) {
   Points vertices;
   Triangles triangles;
   for (int i = 0; i <= 30; ++i) vertices.emplace_back(i, 0, 0), vertices.emplace_back(i, 1, 0);
@@ -168,21 +170,25 @@ TEST(LevelSeams, ShiftsACopyToWhatItContinuesAndLeavesPatterns) {
     triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1}),
         triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
   SurfaceTexture texture(vertices, triangles, 0.25f, 100000);
-  const float colours[] = {0.5f, 0.4f, 0.9f};
+  const cv::Vec3f colours[] = {{0.09f, 0.06f, 0.5f}, {0.02f, 0.05f, 0.4f}, {0.9f, 0.9f, 0.9f}};
   std::vector<signed char> part(texture.size());
   for (int t = 0; t < texture.triangleCount(); ++t) {
     for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {
       part[i] = static_cast<signed char>(t / 20);
-      texture.texels[i] = cv::Vec4f::all(colours[t / 20] + (i % 2 == 0 ? 0.01f : -0.01f));
+      const cv::Vec3f c = colours[t / 20] * (i % 2 == 0 ? 1.02f : 0.98f);  // grain
+      texture.texels[i] = cv::Vec4f(c[0], c[1], c[2], 0.0f);
     }
   }
   const SurfaceTexture before = texture;
   levelSeams(vertices, triangles, part, texture);
+  const float brighter = luminance(colours[0]) / luminance(colours[1]);
   for (std::size_t i = 0; i < texture.size(); ++i) {
-    if (part[i] != 1)
+    if (part[i] != 1) {
       EXPECT_EQ(texture.texels[i], before.texels[i]) << i;
-    else
-      EXPECT_NEAR(texture.texels[i][0] - before.texels[i][0], 0.1f, 0.01f) << i;  // grain stays
+      continue;
+    }
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(texture.texels[i][c] / before.texels[i][c], brighter, 0.02f) << i;
   }
 }
 

@@ -1,6 +1,7 @@
 #include "texture/texture_seams.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "calipso_render/colour.hpp"
 #include "texture/mesh_topology.hpp"
@@ -10,6 +11,7 @@ namespace {
 
 constexpr float kFewest = 0.5f;    // texels at a vertex that tell the colour of a part there
 constexpr float kLargest = 0.35f;  // step, of the brighter side, that differing light explains
+constexpr float kDarkest = 0.01f;  // brightness from which on steps are told
 
 // Mean colours of a part at the vertices that it reaches.
 struct Part {
@@ -45,10 +47,14 @@ std::vector<Part> partsAtVertices(const std::vector<int>& welded, const Triangle
   return parts;
 }
 
-// What part `own` lacks at a vertex where others meet it that differ from it by their light. The
-// seen part keeps its colour, others meet in the middle.
+float logBrightness(const cv::Vec3f& colour) {
+  return std::log(std::max(luminance(colour), kDarkest));
+}
+
+// By how much, in logarithms, part `own` is too dark at a vertex where others meet it that differ
+// from it by their light. The seen part keeps its brightness, others meet in the middle.
 // @return whether there is a step to be evened out
-bool lacking(const std::vector<Part>& parts, int own, std::size_t vertex, cv::Vec3f& lacks) {
+bool isTooDark(const std::vector<Part>& parts, int own, std::size_t vertex, float& by) {
   if (!parts[own].reaches(vertex)) return false;
   const cv::Vec3f& colour = parts[own].colour[vertex];
   const auto continues = [&](const Part& other) {
@@ -57,7 +63,7 @@ bool lacking(const std::vector<Part>& parts, int own, std::size_t vertex, cv::Ve
            cv::norm(c - colour) <= kLargest * std::max(cv::norm(c), cv::norm(colour));
   };
   if (continues(parts[0])) {
-    lacks = parts[0].colour[vertex] - colour;
+    by = logBrightness(parts[0].colour[vertex]) - logBrightness(colour);
     return true;
   }
   cv::Vec3f sum;
@@ -66,7 +72,7 @@ bool lacking(const std::vector<Part>& parts, int own, std::size_t vertex, cv::Ve
     if (!continues(other)) continue;
     sum += other.texels[vertex] * other.colour[vertex], total += other.texels[vertex];
   }
-  lacks = sum / total - colour;
+  by = logBrightness(sum / total) - logBrightness(colour);
   return total > parts[own].texels[vertex];
 }
 
@@ -82,8 +88,11 @@ void levelSeams(const Points& vertices, const Triangles& triangles,
   for (std::size_t own = 1; own < parts.size(); ++own) {
     std::vector<cv::Vec3f> shift(vertices.size());
     std::vector<bool> known(vertices.size(), false);
-    for (std::size_t v = 0; v < vertices.size(); ++v)
-      known[v] = lacking(parts, static_cast<int>(own), welded[v], shift[v]);
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      float by = 0.0f;
+      known[v] = isTooDark(parts, static_cast<int>(own), welded[v], by);
+      shift[v] = cv::Vec3f::all(by);
+    }
     if (std::find(known.begin(), known.end(), true) == known.end()) continue;
     diffuseOverMesh(vertices, triangles, known, shift);
     shifts[own] = std::move(shift);
@@ -93,10 +102,9 @@ void levelSeams(const Points& vertices, const Triangles& triangles,
       if (part[i] <= 0 || shifts[part[i]].empty()) continue;
       const std::vector<cv::Vec3f>& shift = shifts[part[i]];
       const Eigen::Vector3f w = texture.weightsOf(t, i - texture.firstOf(t));
-      const cv::Vec3f by = w[0] * shift[triangles[t][0]] + w[1] * shift[triangles[t][1]] +
-                           w[2] * shift[triangles[t][2]];
-      for (int c = 0; c < 3; ++c)
-        texture.texels[i][c] = std::max(0.0f, texture.texels[i][c] + by[c]);
+      const float by = w[0] * shift[triangles[t][0]][0] + w[1] * shift[triangles[t][1]][0] +
+                       w[2] * shift[triangles[t][2]][0];
+      for (int c = 0; c < 3; ++c) texture.texels[i][c] *= std::exp(by);
     }
   }
 }
