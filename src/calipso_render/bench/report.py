@@ -73,13 +73,19 @@ def evaluation(cases):
 
 
 def pictures(cases, page):
-    """One picture of each case that the evaluator wrote beside the page."""
-    text = ""
-    for case in cases:
-        path = os.path.join("appearance", case["case"] + ".jpg")
-        if os.path.exists(os.path.join(os.path.dirname(os.path.abspath(page)), path)):
-            text += f"![{case['case']}: video, without its objects, objects lifted]({path})\n\n"
-    return text and "\n## Pictures\nThe video; without its objects; its objects lifted (final quality).\n\n" + text
+    """What the evaluator drew of each case beside the page."""
+    folder = os.path.dirname(os.path.abspath(page))
+
+    def shown(suffix, alt):
+        paths = [(case["case"], os.path.join("appearance", case["case"] + suffix + ".jpg")) for case in cases]
+        return "".join(f"![{name}: {alt}]({path})\n\n" for name, path in paths
+                       if os.path.exists(os.path.join(folder, path)))
+
+    lifted = shown("", "video, without its objects, objects lifted")
+    around = shown("_around", "turned in its place")
+    return (lifted and "\n## Pictures\nThe video; without its objects; its objects lifted (final quality).\n\n" + lifted) + (
+        around and "\n## All around\nThe largest object of each scene turned in its place by eighths about the vertical, but "
+        "for those too large: most of it no camera has seen.\n\n" + around)
 
 
 def drawing(cases):

@@ -11,6 +11,7 @@
 #include "calipso_render/inpaint.hpp"
 #include "measures.hpp"
 #include "truth.hpp"
+#include "turntable.hpp"
 
 namespace calipso::render {
 namespace {
@@ -351,8 +352,14 @@ class Evaluation {
     cv::hconcat(summary_, all);
     const double scale = static_cast<double>(kSummaryWidth) / all.cols;
     cv::resize(all, all, {}, scale, scale, cv::INTER_AREA);
-    cv::imwrite(options_.summaries + "/" + scene_.name + ".jpg", all,
-                {cv::IMWRITE_JPEG_QUALITY, 85});
+    const auto write = [this](const std::string& suffix, const cv::Mat& image) {
+      cv::imwrite(options_.summaries + "/" + scene_.name + suffix + ".jpg", image,
+                  {cv::IMWRITE_JPEG_QUALITY, 85});
+    };
+    write("", all);
+    const cv::Mat around =
+        turntable(prepared_, params_, frame(0, [](std::size_t, ObjectInFrame&) {}));
+    if (!around.empty()) write("_around", around);
   }
 
   void timeFrames() {

@@ -15,7 +15,7 @@ struct Figures {
 
 struct EvaluationOptions {
   std::string pictures;  // folder for pictures to look at; empty: none
-  // folder for one picture of each case: video, emptied, objects lifted; empty: none
+  // folder for pictures of each case: video, emptied, objects lifted; turntable(); empty: none
   std::string summaries;
   std::string sheets;            // folder for blind sheets; empty: none
   bool appearance_only = false;  // leaves background and times out
