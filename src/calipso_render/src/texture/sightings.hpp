@@ -64,7 +64,7 @@ class Sightings {
   std::vector<Eigen::Matrix3f> axes_;  // of the cameras, in the world
   std::vector<int> parts_, pieces_;
   float extent_ = 0.0f, key_depth_ = 1.0f;
-  bool two_sided_ = false;  // an open sheet is seen from both sides
+  bool two_sided_ = false;  // a sheet shows one side what the other is like
 };
 
 }  // namespace calipso::render
