@@ -37,6 +37,11 @@ void NodeWatch::announceFailed(const std::string& node, const std::string& reaso
   publisher_.publish(status);
 }
 
+void NodeWatch::repeatFailures() {
+  for (const std::string& node : preparation_.failed())
+    announceFailed(node, preparation_.standing(node).message);
+}
+
 std::set<std::string> NodeWatch::rosNames() const {
   std::set<std::string> names;
   for (const auto& [ros_name, node] : node_of_) names.insert(ros_name);

@@ -32,6 +32,10 @@ class NodeWatch {
   // Declares a node FAILED, to everyone.
   void fail(const std::string& node, const std::string& reason);
 
+  // Says again who has FAILED: a node that failed at its start may have ended before all others
+  // could hear it. To be called once the nodes are connected.
+  void repeatFailures();
+
   // From now on nodes may end: the run is over.
   void runIsOver() { over_ = true; }
 

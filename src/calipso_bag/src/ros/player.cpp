@@ -166,6 +166,7 @@ void Player::advertiseAll() {
 
 void Player::run() {
   waitForGraph();
+  watch_.repeatFailures();
   announceClip();
   prepare();
   sendEdits();
