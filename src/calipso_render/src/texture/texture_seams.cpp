@@ -51,10 +51,10 @@ float logBrightness(const cv::Vec3f& colour) {
   return std::log(std::max(luminance(colour), kDarkest));
 }
 
-// By how much, in logarithms, part `own` is too dark at a vertex where others meet it that differ
-// from it by their light. The seen part keeps its brightness, others meet in the middle.
+// By how much, in logarithms, part `own` is to become brighter at a vertex where others meet it that
+// differ from it by their light. The seen part keeps its brightness, others meet in the middle.
 // @return whether there is a step to be evened out
-bool isTooDark(const std::vector<Part>& parts, int own, std::size_t vertex, float& by) {
+bool stepsAt(const std::vector<Part>& parts, int own, std::size_t vertex, float& by) {
   if (!parts[own].reaches(vertex)) return false;
   const cv::Vec3f& colour = parts[own].colour[vertex];
   const auto continues = [&](const Part& other) {
@@ -90,7 +90,7 @@ void levelSeams(const Points& vertices, const Triangles& triangles,
     std::vector<bool> known(vertices.size(), false);
     for (std::size_t v = 0; v < vertices.size(); ++v) {
       float by = 0.0f;
-      known[v] = isTooDark(parts, static_cast<int>(own), welded[v], by);
+      known[v] = stepsAt(parts, static_cast<int>(own), welded[v], by);
       shift[v] = cv::Vec3f::all(by);
     }
     if (std::find(known.begin(), known.end(), true) == known.end()) continue;
