@@ -151,6 +151,39 @@ TEST(PassingShade, LeavesTheLeastOfItWhereItLiesInAllFrames) {
   EXPECT_GT(shaded, 100);
 }
 
+// What lies beside a place takes some of its sky: less than a pixel's values tell from their noise.
+TEST(PassingShade, IsTakenOffWhereItIsFaint) {
+  const Eigen::Vector3d rests(0.05, 0.1, kBallRadius), flies(-0.4, 0.1, 0.3);
+  std::vector<Eigen::Vector3d> places(10, rests);
+  for (int i = 0; i < 3; ++i) places[i] = flies;
+  Clip clip = ballAlong(places);
+  const auto isDimmed = [&](int u, int v) {
+    const auto r = clip.receiver(u, v);
+    return r &&
+           (r->position.head<2>() - rests.cast<float>().head<2>()).norm() < 1.5 * kBallRadius &&
+           !isInShadow(r->position, rests);
+  };
+  for (std::size_t i = 3; i < places.size(); ++i) {
+    ClipFrame& f = clip.frames[i];
+    for (int v = 0; v < kHeight; ++v)
+      for (int u = 0; u < kWidth; ++u)
+        if (isDimmed(u, v) && f.labels.at<std::uint8_t>(v, u) == 0)
+          f.bgr.at<cv::Vec3b>(v, u) = cv::Vec3f(f.bgr.at<cv::Vec3b>(v, u)) * 0.95f;
+  }
+  const std::vector<bool> moves = {true};
+  Background b = seenBackground(clip.frames, true);
+  leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, {}, b);
+  int dimmed = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      if (!isDimmed(u, v) || b.count.at<std::uint8_t>(v, u) < 10) continue;
+      ++dimmed;
+      EXPECT_NEAR(b.plate.at<cv::Vec3f>(v, u)[2], tableColour(u, v)[2], 1.0f) << u << " " << v;
+    }
+  }
+  EXPECT_GT(dimmed, 100);
+}
+
 TEST(PassingShade, ChangesNothingWhereThePredictedShadowIsNotSeen) {
   std::vector<Eigen::Vector3d> places(6, kTo);
   places[0] = kFrom;

@@ -12,7 +12,10 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kStride = 2;  // px between the places for which shade is predicted
+constexpr int kStride = 2;              // px between the places for which shade is predicted
+constexpr float kSameSky = 0.02f;       // visible part of the sky that tells two frames apart
+constexpr std::size_t kFewestOpen = 3;  // frames under more sky that stand for all
+constexpr float kVisible = 1.0f;        // code values
 
 // What a frame is predicted to show, one value per kStride px.
 struct Lighting {
@@ -89,34 +92,58 @@ Shade shadeOf(const Lighting& lighting, const cv::Size& size, int margin) {
 // A pixel's values over time: in shade by the prediction, within its error, and neither.
 struct Sorted {
   Samples core, near, lit;
+  bool dimmed = false;  // of those in no shade, some were left out: objects hid more of their sky
 };
 
 class Sorter {
  public:
   Sorter(const std::vector<ClipFrame>& frames, int margin)
-      : frames_(frames), samples_(frames, margin), shades_(frames.size()) {}
+      : frames_(frames), samples_(frames, margin), shades_(frames.size()), skies_(frames.size()) {}
 
-  void set(std::size_t frame, const Shade& shade) { shades_[frame] = shade; }
+  void set(std::size_t frame, const Shade& shade, const cv::Mat& sky) {
+    shades_[frame] = shade, skies_[frame] = sky;
+  }
 
   // Of the frames whose shade is known.
   Sorted at(int u, int v) const {
     Sorted s;
+    std::vector<std::size_t> lit;
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       if (!shades_[i] || !samples_.shows(i, u, v)) continue;
-      Samples& of = shades_[i]->core.at<std::uint8_t>(v, u) != 0   ? s.core
-                    : shades_[i]->near.at<std::uint8_t>(v, u) != 0 ? s.near
-                                                                   : s.lit;
-      of.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
+      if (shades_[i]->core.at<std::uint8_t>(v, u) != 0)
+        s.core.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
+      else if (shades_[i]->near.at<std::uint8_t>(v, u) != 0)
+        s.near.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
+      else
+        lit.push_back(i);
     }
+    s.dimmed = keepOpen(u, v, lit);
+    for (const std::size_t i : lit) s.lit.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
     return s;
   }
 
   bool shows(std::size_t frame, int u, int v) const { return samples_.shows(frame, u, v); }
 
  private:
+  float skyOf(std::size_t frame, int u, int v) const {
+    return skies_[frame].at<float>(v / kStride, u / kStride);
+  }
+
+  // Keeps the frames that have the most sky there. @return whether there were others
+  bool keepOpen(int u, int v, std::vector<std::size_t>& frames) const {
+    float most = 0.0f;
+    for (const std::size_t i : frames) most = std::max(most, skyOf(i, u, v));
+    const auto dim = [&](std::size_t i) { return skyOf(i, u, v) < most - kSameSky; };
+    const std::size_t dims = std::count_if(frames.begin(), frames.end(), dim);
+    if (dims == 0 || frames.size() - dims < kFewestOpen) return false;
+    frames.erase(std::remove_if(frames.begin(), frames.end(), dim), frames.end());
+    return true;
+  }
+
   const std::vector<ClipFrame>& frames_;
   PlaceSamples samples_;
   std::vector<std::optional<Shade>> shades_;
+  std::vector<cv::Mat> skies_;  // Lighting::sky
 };
 
 // The brightest that is shown of every place.
@@ -150,7 +177,18 @@ Samples leastShaded(const Sorted& s, double step) {
   return shadedAgainst(bright, all, step) ? bright : Samples();
 }
 
-// Takes the shaded frames out of a plate's median. @return CV_8UC1: 255 where no frame is lit
+// Of faint shade, such as an object beside a place leaves, a pixel's noise hides what is shade's.
+void takeIfBrighter(const Samples& values, Background& background, int u, int v) {
+  float spread = 0.0f;
+  const cv::Vec3f mean = robustMean(values, spread);
+  cv::Vec3f& plate = background.plate.at<cv::Vec3f>(v, u);
+  const cv::Vec3f gain = mean - plate;
+  if (gain[0] + 2.0f * gain[1] + gain[2] < 4.0f * kVisible) return;
+  plate = mean, background.spread.at<float>(v, u) = spread;
+}
+
+// Takes the shaded frames out of a plate's median, and those that objects leave less of the sky.
+// @return CV_8UC1: 255 where no frame is lit
 cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& background) {
   const cv::Size size = background.plate.size();
   cv::Mat never_lit = cv::Mat::zeros(size, CV_8U);
@@ -159,17 +197,24 @@ cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& backgrou
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       Sorted s = sorter.at(u, v);
-      if (s.core.empty() && s.near.empty()) continue;
+      if (s.core.empty() && s.near.empty()) {
+        if (s.dimmed) takeIfBrighter(s.lit, background, u, v);
+        continue;
+      }
       background.shaded_at_times.at<std::uint8_t>(v, u) = 255;
       if (s.lit.empty()) s.lit = litAmong(s.near, s.core, step);
       if (s.lit.empty()) {
         never_lit.at<std::uint8_t>(v, u) = 255;
         const Samples least = leastShaded(s, step);
         if (!least.empty())
-          background.plate.at<cv::Vec3f>(v, u) = robustMean(least, background.spread.at<float>(v, u));
+          background.plate.at<cv::Vec3f>(v, u) =
+              robustMean(least, background.spread.at<float>(v, u));
         continue;
       }
-      if (!shadedAgainst(s.lit, s.core.empty() ? s.near : s.core, step)) continue;
+      if (!shadedAgainst(s.lit, s.core.empty() ? s.near : s.core, step)) {
+        if (s.lit.size() >= kFewestOpen) takeIfBrighter(s.lit, background, u, v);
+        continue;
+      }
       dropShaded(step, s.lit);
       background.plate.at<cv::Vec3f>(v, u) = robustMean(s.lit, background.spread.at<float>(v, u));
     }
@@ -191,7 +236,7 @@ ShadeThatStays leaveOutPassingShade(const std::vector<ClipFrame>& frames, const 
     const std::vector<Points> shapes = movingShapes(frames[i], cast, i == 0);
     if (shapes.empty()) continue;
     const Lighting now = lightingOf(shapes, cast, places);
-    sorter.set(i, shadeOf(now, size, params.shadow_margin_px));
+    sorter.set(i, shadeOf(now, size, params.shadow_margin_px), now.sky);
     brighten(now, sorter, i, most);
     any = any || i > 0;
   }

@@ -29,8 +29,9 @@ struct ShadeThatStays {
   cv::Mat sun, sky, never_lit;
 };
 
-// Takes the frames in which a place is predicted to lie in shade out of its median, if they are
-// darker there than the others. So a shadow is known also where it lies for most of the video.
+// Takes the frames in which a place is predicted to lie in shade, or to get less of the sky than in
+// others, out of its median, if they are darker there than the others. So shade is known also where
+// it lies for most of the video.
 // @param frames as seen from the key frame's camera, with poses
 ShadeThatStays leaveOutPassingShade(const std::vector<ClipFrame>& frames, const PassingCast& cast,
                                     const ReceiverOf& receiver, const BackgroundParams& params,
