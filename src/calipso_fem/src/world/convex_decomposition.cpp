@@ -5,6 +5,7 @@
 #include <array>
 #include <limits>
 #include <set>
+#include <tuple>
 
 #include "calipso_fem/voxel_grid.hpp"
 #include "calipso_fem/world/mass_properties.hpp"
@@ -115,11 +116,42 @@ Box half(const Box& box, int axis, double at, double sign) {
   return b;
 }
 
-// The surface's points sorted between parallel planes.
+// The surface's points sorted between parallel planes, each once.
 struct Slabs {
   std::vector<Points> between;  // one more than planes
   std::vector<Points> on;       // where the surface crosses a plane
 };
+
+void keepOneOfEach(Points& points) {
+  const auto less = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  };
+  std::sort(points.begin(), points.end(), less);
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+}
+
+// Of points on a plane those that their hull needs (Andrew's monotone chain), in any order.
+Points planarHull(const Points& points, int axis) {
+  const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  Points sorted = points, chain;
+  std::sort(sorted.begin(), sorted.end(), [&](const auto& a, const auto& b) {
+    return std::tie(a[u], a[v]) < std::tie(b[u], b[v]);
+  });
+  for (const int pass : {0, 1}) {
+    const size_t start = chain.size();
+    for (const Eigen::Vector3d& p : sorted) {
+      const auto turnsRight = [&] {
+        const Eigen::Vector3d &a = chain.end()[-2], &b = chain.end()[-1];
+        return (b[u] - a[u]) * (p[v] - a[v]) <= (b[v] - a[v]) * (p[u] - a[u]);
+      };
+      while (chain.size() >= start + 2 && turnsRight()) chain.pop_back();
+      chain.push_back(p);
+    }
+    if (!chain.empty()) chain.pop_back();  // begins the other pass
+    if (pass == 0) std::reverse(sorted.begin(), sorted.end());
+  }
+  return chain;
+}
 
 Slabs sortInto(const Triangles& triangles, int axis, const std::vector<double>& planes) {
   Slabs slabs{std::vector<Points>(planes.size() + 1), std::vector<Points>(planes.size())};
@@ -136,6 +168,8 @@ Slabs sortInto(const Triangles& triangles, int axis, const std::vector<double>& 
       for (auto i = std::min(from, to); i < std::max(from, to); ++i)
         slabs.on[i].push_back(a + (planes[i] - a[axis]) / (b[axis] - a[axis]) * (b - a));
     }
+  for (Points& points : slabs.between) keepOneOfEach(points);
+  for (Points& points : slabs.on) points = planarHull(points, axis);
   return slabs;
 }
 
@@ -166,17 +200,16 @@ Cut bestCut(const Part& part, const Solid& solid, int cuts_per_axis) {
   for (const auto& t : part.triangles)
     for (const auto& p : t) extent.extend(p);
   std::vector<double> planes[3], volumes[6];
+  for (int axis = 0; axis < 3; ++axis)
+    for (int i = 1; i <= cuts_per_axis; ++i) {
+      const double s = i / (cuts_per_axis + 1.0);
+      planes[axis].push_back((1.0 - s) * extent.min()[axis] + s * extent.max()[axis]);
+    }
 #pragma omp parallel for schedule(dynamic, 1)
   for (int k = 0; k < 6; ++k) {
     const int axis = k / 2;
-    std::vector<double> at;
-    for (int i = 1; i <= cuts_per_axis; ++i) {
-      const double s = i / (cuts_per_axis + 1.0);
-      at.push_back((1.0 - s) * extent.min()[axis] + s * extent.max()[axis]);
-    }
-    volumes[k] = sweep(sortInto(part.triangles, axis, at), at, part.box, axis,
+    volumes[k] = sweep(sortInto(part.triangles, axis, planes[axis]), planes[axis], part.box, axis,
                        k % 2 == 0 ? 1.0 : -1.0, solid);
-    if (k % 2 == 0) planes[axis] = at;
   }
   Cut best;
   for (int axis = 0; axis < 3; ++axis)
