@@ -11,6 +11,7 @@
 
 #include "calipso_align/metrics.hpp"
 #include "calipso_align/support_term.hpp"
+#include "calipso_scene/help.hpp"
 #include "evaluation_case.hpp"
 #include "run_evaluation.hpp"
 
@@ -53,6 +54,7 @@ std::vector<T> listOf(const std::string& text) {
 }
 
 Arguments parse(int argc, char** argv) {
+  helpIfAsked(argc, argv, kUsage);
   Arguments arguments;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];

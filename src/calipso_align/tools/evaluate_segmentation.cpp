@@ -16,6 +16,7 @@
 #include "calipso_align/key_frame.hpp"
 #include "calipso_align/mask_tracker.hpp"
 #include "calipso_align/metrics.hpp"
+#include "calipso_scene/help.hpp"
 #include "run_evaluation.hpp"
 
 namespace {
@@ -39,6 +40,7 @@ struct Arguments {
 };
 
 Arguments parse(int argc, char** argv) {
+  helpIfAsked(argc, argv, kUsage);
   Arguments arguments;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];

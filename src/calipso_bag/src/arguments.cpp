@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "calipso_scene/help.hpp"
+
 namespace calipso::bag {
 namespace {
 
@@ -15,6 +17,7 @@ bool contains(const std::vector<std::string>& list, const std::string& word) {
 
 Arguments::Arguments(int argc, char** argv, int positional, const std::vector<std::string>& keys,
                      const std::vector<std::string>& flags, const std::string& usage) {
+  helpIfAsked(argc, argv, usage);
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word.rfind("--", 0) != 0) {

@@ -16,6 +16,8 @@ Arguments parse(std::vector<const char*> words) {
 
 }  // namespace
 
+TEST(Arguments, HelpIsNoError) { EXPECT_EXIT(parse({"--help"}), ::testing::ExitedWithCode(0), ""); }
+
 TEST(Arguments, ReadsWordsKeysAndFlagsInAnyOrder) {
   const Arguments arguments = parse({"--seconds", "2.5", "a", "--compressed", "b"});
   EXPECT_EQ(arguments.word(0), "a");

@@ -4,7 +4,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <stdexcept>
 
+#include "calipso_scene/help.hpp"
 #include "dynamics_case.hpp"
 #include "filmed_case.hpp"
 #include "flow_case.hpp"
@@ -38,6 +40,7 @@ struct Arguments {
 };
 
 Arguments parse(int argc, char** argv) {
+  calipso::helpIfAsked(argc, argv, kUsage);
   Arguments arguments;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
@@ -53,6 +56,8 @@ Arguments parse(int argc, char** argv) {
       arguments.filmed = true;
     } else if (argument == "--scale" && i + 1 < argc) {
       arguments.options.scale = std::max(1, std::atoi(argv[++i]));
+    } else if (argument.rfind("--", 0) == 0) {
+      throw std::invalid_argument("unknown option or missing value: " + argument + "\n" + kUsage);
     } else {
       arguments.paths.push_back(argument);
     }
@@ -76,7 +81,7 @@ void print(const std::vector<std::string>& entries) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   const Arguments arguments = parse(argc, argv);
   if (arguments.paths.empty() && !arguments.filmed && arguments.repeats == 0) {
     std::cerr << kUsage;
@@ -99,4 +104,7 @@ int main(int argc, char** argv) {
   }
   print(entries);
   return good ? 0 : 1;
+} catch (const std::exception& error) {
+  std::cerr << error.what() << "\n";
+  return 2;
 }

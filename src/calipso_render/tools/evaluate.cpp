@@ -4,11 +4,16 @@
 #include <opencv2/core/utils/logger.hpp>
 
 #include "calipso_render/memory.hpp"
+#include "calipso_scene/help.hpp"
 #include "evaluation.hpp"
 
-// Usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] [--appearance-only]
-// SCENE_DIR...   One line of JSON per scene folder with ground truth.
+constexpr char kUsage[] =
+    "usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] [--appearance-only] "
+    "SCENE_DIR...\n"
+    "  One line of JSON per scene folder with ground truth.\n";
+
 int main(int argc, char** argv) {
+  calipso::helpIfAsked(argc, argv, kUsage);
   cv::utils::logging::setLogLevel(
       cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
   calipso::render::keepFreedMemory();
@@ -27,9 +32,7 @@ int main(int argc, char** argv) {
       first = argc;
   }
   if (first >= argc) {
-    std::fprintf(stderr,
-                 "usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] "
-                 "[--appearance-only] SCENE_DIR...\n");
+    std::fprintf(stderr, "%s", kUsage);
     return 1;
   }
   int status = 0;

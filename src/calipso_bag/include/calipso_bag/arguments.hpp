@@ -9,7 +9,7 @@ namespace calipso::bag {
 // A command line of positional words, `--key value` pairs and `--flag`s.
 class Arguments {
  public:
-  // `keys` take a value, `flags` do not.
+  // `keys` take a value, `flags` do not. --help prints `usage` and ends the program.
   // @throw std::invalid_argument with `usage` when a key is unknown, lacks its value, or the number
   // of positional words is not `positional`
   Arguments(int argc, char** argv, int positional, const std::vector<std::string>& keys,

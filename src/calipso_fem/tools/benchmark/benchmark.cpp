@@ -9,8 +9,11 @@
 #include <fstream>
 #include <iostream>
 #include <set>
+#include <stdexcept>
+#include <string>
 
 #include "beam.hpp"
+#include "calipso_scene/help.hpp"
 #include "hard_cases.hpp"
 
 namespace calipso::fem {
@@ -109,9 +112,15 @@ void measureHardCases() {
 
 int main(int argc, char** argv) {
   using namespace calipso::fem;
+  const std::string usage =
+      "usage: benchmark [steps|newton|rest|trajectories|hard]...   (default: all)\n";
+  calipso::helpIfAsked(argc, argv, usage);
+  const std::set<std::string> known = {"steps", "newton", "rest", "trajectories", "hard"};
   const std::set<std::string> wanted(argv + 1, argv + argc);
   const auto want = [&wanted](const char* part) { return wanted.empty() || wanted.count(part); };
   try {
+    for (const std::string& part : wanted)
+      if (known.count(part) == 0) throw std::invalid_argument("no part '" + part + "'\n" + usage);
     if (want("steps")) measureSteps();
     if (want("newton")) measureNewton();
     if (want("rest")) measureRest();

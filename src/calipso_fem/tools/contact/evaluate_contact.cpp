@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "../../src/world/obstacle_query.hpp"
+#include "calipso_scene/help.hpp"
 #include "contact_cases.hpp"
 
 namespace calipso::fem {
@@ -93,6 +94,10 @@ void run(const Cases& cases, const std::string& name) {
 
 int main(int argc, char** argv) {
   const calipso::fem::Cases cases = calipso::fem::allCases();
+  std::string known =
+      "usage: evaluate_contact [CASE | SCENE_FOLDER]...   (default: all cases)\ncases:";
+  for (const auto& entry : cases) known += " " + entry.first;
+  calipso::helpIfAsked(argc, argv, known + "\n");
   std::vector<std::string> names(argv + 1, argv + argc);
   if (names.empty())
     for (const auto& entry : cases) names.push_back(entry.first);

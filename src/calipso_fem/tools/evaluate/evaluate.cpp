@@ -6,6 +6,7 @@
 #include <iostream>
 #include <map>
 
+#include "calipso_scene/help.hpp"
 #include "reference_cases.hpp"
 
 namespace calipso::fem {
@@ -69,8 +70,11 @@ void addReport(const StepReport& report, ResultLine* line) {
 
 int main(int argc, char** argv) {
   using namespace calipso::fem;
+  const std::string usage =
+      "usage: evaluate PATH...   (reference cases: JSON files, or folders of them)\n";
+  calipso::helpIfAsked(argc, argv, usage);
   if (argc < 2) {
-    std::cerr << "usage: evaluate PATH...   (reference cases: JSON files, or folders of them)\n";
+    std::cerr << usage;
     return 1;
   }
   bool complete = true;

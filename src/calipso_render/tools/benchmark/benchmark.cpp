@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "calipso_render/memory.hpp"
+#include "calipso_scene/help.hpp"
 #include "drawing_case.hpp"
 #include "filling_case.hpp"
 #include "mesh_drawing.hpp"
@@ -121,11 +122,15 @@ void compareScene(const std::string& scene, const Options& options) {
 }  // namespace
 }  // namespace calipso::render
 
-// Usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only drawing_live|
-// drawing_live_no_cast_shadow|drawing_final|drawing_mesh_alone|drawing_llvmpipe] [SCENE_DIR...]   One line of JSON per
-// case.
+constexpr char kUsage[] =
+    "usage: benchmark [--frames N] [--pictures DIR] [--no-drawing] [--only CASE] [SCENE_DIR...]\n"
+    "  CASE: drawing_live, drawing_live_no_cast_shadow, drawing_final, drawing_mesh_alone or "
+    "drawing_llvmpipe\n"
+    "  One line of JSON per case.\n";
+
 int main(int argc, char** argv) {
   using namespace calipso::render;
+  calipso::helpIfAsked(argc, argv, kUsage);
   cv::utils::logging::setLogLevel(
       cv::utils::logging::LOG_LEVEL_SILENT);  // masks of resting objects exist once only
   keepFreedMemory();
@@ -140,7 +145,10 @@ int main(int argc, char** argv) {
       options.only = argv[++i];
     else if (std::strcmp(argv[i], "--no-drawing") == 0)
       options.drawing = false;
-    else
+    else if (std::strncmp(argv[i], "--", 2) == 0) {
+      std::fprintf(stderr, "unknown option or missing value: %s\n%s", argv[i], kUsage);
+      return 1;
+    } else
       options.scenes.push_back(argv[i]);
   }
   try {
