@@ -116,10 +116,12 @@ void validateScale(const Edit& edit) {
                                 edit.after +
                                 "'): the video is laid out before it plays; give its time t");
   }
-  // Each frame is sent 1 / factor times.
-  constexpr double kSlowest = 0.001;
-  require(edit.factor > 0.0 && (!slower || (edit.factor >= kSlowest && edit.factor <= 1.0)),
-          "factor", edit.factor, slower ? "in [0.001, 1]" : "> 0");
+  // A slowed frame is sent 1 / factor times; one of a hastened scene is simulated factor times as
+  // long, which nobody can follow by then.
+  constexpr double kSlowest = 0.001, kFastest = 100.0;
+  require(edit.factor > 0.0 && edit.factor <= (slower ? 1.0 : kFastest) &&
+              (!slower || edit.factor >= kSlowest),
+          "factor", edit.factor, slower ? "in [0.001, 1]" : "in (0, 100]");
 }
 
 void validateNewName(const Edit& edit, const std::vector<std::string>& objects) {

@@ -133,6 +133,7 @@ TEST(Edit, badInputNamesEntryFieldAndRemedy) {
   expect("- {t: 0, kind: time_scale, factor: 0.0001}",
          "factor = 0.0001 is not allowed; it must be in [0.001, 1]");
   expect("- {t: 0, kind: speed_scale, factor: 0}", "factor = 0");
+  expect("- {t: 0, kind: speed_scale, factor: 1e6}", "(0, 100]");
   expect("- {t: 0, object: banana1, kind: appearance, roughness: 2}", "roughness = 2");
   expect("- {t: 0, object: banana1, kind: remove, after: apple}", "after is 'apple'");
   expect("- {t: 0, kind: wind, mode: factor}", "for kind 'wind'");
