@@ -75,6 +75,23 @@ class Live(unittest.TestCase):
         self.assertEqual([s.header.stamp for s in heard["segmentation"] if s.contours], [FIRST])
         self.assertTrue(os.path.exists(os.path.join(self.folder.name, "out.bag")), "complete: the first lap")
 
+    def test_another_cameras_video_passes_and_is_told(self):
+        self.info.K = [2 * k for k in self.info.K[:8]] + [1.0]
+        statuses, edited = [], []
+        subscribers = [rospy.Subscriber("/calipso/status", NodeStatus, statuses.append),
+                       rospy.Subscriber("/calipso/image_edited", Image, edited.append)]
+
+        def told():
+            return [s.message for s in statuses if s.node == "render" and s.state == NodeStatus.FAILED]
+
+        self.lap(told)
+        count = len(edited)
+        self.lap(lambda: len(edited) > count)
+        for subscriber in subscribers:
+            subscriber.unregister()
+        self.assertIn("scene.yaml has", told()[0])
+        self.assertTrue(all(i.data == self.image.data for i in edited))
+
 
 if __name__ == "__main__":
     rostest.rosrun("calipso_test", "live", Live)

@@ -6,8 +6,6 @@
 #include <set>
 #include <string>
 
-#include "calipso_scene/scene.hpp"
-
 namespace calipso::bag {
 
 // Each throws std::runtime_error naming what is wrong, the value and the remedy.
@@ -31,9 +29,5 @@ void checkFollows(const sensor_msgs::Image& image, const sensor_msgs::Image& fir
 // Calibrated, without distortion, and for images of this size.
 void checkCameraInfo(const sensor_msgs::CameraInfo& info, const sensor_msgs::Image& image,
                      const std::string& where);
-
-// The camera that the objects are placed before is the one that takes the pictures.
-// video: of the first frame, by camera_info and tf; where: "in.bag"
-void checkSameCamera(const Scene& scene, const Camera& video, const std::string& where);
 
 }  // namespace calipso::bag

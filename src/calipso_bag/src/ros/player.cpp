@@ -12,6 +12,7 @@
 
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
+#include "calipso_scene/same_camera.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
 #include "clip_checks.hpp"
 #include "edit_files.hpp"
@@ -89,16 +90,11 @@ Player::Player(ros::NodeHandle& nh, const Params& params)
 
 void Player::checkScene() const {
   const sensor_msgs::CameraInfo& info = clip_.firstInfo();
-  if (static_cast<int>(info.width) != scene_.camera.width ||
-      static_cast<int>(info.height) != scene_.camera.height) {
-    throw std::runtime_error(params_.clip.path + ": images are " + std::to_string(info.width) +
-                             "x" + std::to_string(info.height) + ", but " + params_.scene +
-                             "/scene.yaml is for " + std::to_string(scene_.camera.width) + "x" +
-                             std::to_string(scene_.camera.height) +
-                             "; use the scene of this video");
+  try {
+    checkSameCamera(scene_, fromMsg(info, fromMsg(path_.world_from_camera.front().transform)));
+  } catch (const std::exception& error) {
+    throw std::runtime_error(params_.clip.path + ": " + error.what());
   }
-  checkSameCamera(scene_, fromMsg(info, fromMsg(path_.world_from_camera.front().transform)),
-                  params_.clip.path);
   constexpr int kDepthBits = 16, kMaskBits = 8;
   checkPicture(scene_.depth_path, kDepthBits, scene_.camera.width, scene_.camera.height);
   for (const std::string& mask : {scene_.strokes_path, scene_.matte_path})

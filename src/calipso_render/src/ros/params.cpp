@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "calipso_ros/node_main.hpp"
-#include "calipso_scene/scene.hpp"
 
 namespace calipso::render {
 namespace {
@@ -50,7 +49,7 @@ void loadScenery(const Scene& scene, RenderParams& render) {
 
 NodeParams loadParams(const ros::NodeHandle& pnh) {
   NodeParams p;
-  p.scene = requiredParam<std::string>(pnh, "scene");
+  p.scene = loadScene(requiredParam<std::string>(pnh, "scene"));
   p.mode = modeParam(pnh);
   p.render.quality = qualityFromString(optionalParam<std::string>(pnh, "quality", "live"));
   p.render.sun_radius = inRange(pnh, "sun_radius", p.render.sun_radius, 0.0, 0.5);
@@ -59,10 +58,9 @@ NodeParams loadParams(const ros::NodeHandle& pnh) {
       inRange(pnh, "mask_margin_px", p.render.background.mask_margin_px, 0, 31);
   p.clip_samples = inRange(pnh, "clip_samples", p.clip_samples, 2, 200);
   p.live_queue = inRange(pnh, "live_queue", p.live_queue, 1, 1000);
-  const Scene scene = loadScene(p.scene);
-  p.render.planes = scene.planes;
-  if (p.mode == Mode::kBag) loadScenery(scene, p.render);
-  if (scene.gravity.norm() > 0.0) p.render.up = -scene.gravity.normalized();
+  p.render.planes = p.scene.planes;
+  if (p.mode == Mode::kBag) loadScenery(p.scene, p.render);
+  if (p.scene.gravity.norm() > 0.0) p.render.up = -p.scene.gravity.normalized();
   return p;
 }
 

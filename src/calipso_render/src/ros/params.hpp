@@ -2,15 +2,14 @@
 
 #include <ros/ros.h>
 
-#include <string>
-
 #include "calipso_render/renderer.hpp"
 #include "calipso_ros/mode.hpp"
+#include "calipso_scene/scene.hpp"
 
 namespace calipso::render {
 
 struct NodeParams {
-  std::string scene;  // folder with scene.yaml: supports, gravity
+  Scene scene;
   Mode mode = Mode::kBag;
   RenderParams render;
   int clip_samples = 24;  // frames of the clip that are kept for the background, 2 .. 200

@@ -5,6 +5,7 @@
 
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/topics.hpp"
+#include "calipso_scene/same_camera.hpp"
 #include "conversions.hpp"
 
 namespace calipso::render {
@@ -172,6 +173,8 @@ void RenderNode::prepareNow() {
   try {
     reporter_.preparing("background plate, light and appearance");
     const auto start = std::chrono::steady_clock::now();
+    // Of a bag the player compares them.
+    if (params_.mode == Mode::kLive) checkSameCamera(params_.scene, clip_.frames().front().camera);
     PosesTaken taken;
     if (dynamics_) taken = takePoses(posesFromMsg(*dynamics_, models_), models_, clip_);
     const auto prepared = std::make_shared<const Prepared>(prepare(clip_, models_, params_.render));
@@ -217,7 +220,7 @@ void RenderNode::onFrame(const Frame& frame) {
     unlabelled_.push_back(frame);
     if (unlabelled_.size() > static_cast<std::size_t>(params_.live_queue)) unlabelled_.pop_front();
     pairClipFrames(ros::Time(0));
-    prepareIfComplete();
+    if (reporter_.state() != calipso_msgs::NodeStatus::FAILED) prepareIfComplete();
   }
   frames_.push_back({frame.image, frame.info, frame.camera, ""});
   workOff();
