@@ -17,18 +17,23 @@ constexpr float kOffLattice = 0.75f;  // px by which a copy's way may miss the l
 
 PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
                      const InpaintParams& params)
-    : nearness_(level.nearness),
-      surface_(level.surface),
-      sky_(level.sky),
-      has_nearness_(!nearness_.empty()),
-      has_surface_(!surface_.empty()),
-      has_sky_(!sky_.empty()),
+    : columns_(level.hole.cols),
+      places_(level.hole.total()),
       scale_(scale),
       horizon_(horizon),
       lattice_(lattice),
       away_row_(params.away_row),
       away_column_(params.away_column),
-      away_farther_(params.away_farther) {}
+      away_farther_(params.away_farther) {
+  for (int v = 0; v < level.hole.rows; ++v) {
+    for (int u = 0; u < columns_; ++u) {
+      Known& known = places_[v * columns_ + u];
+      if (!level.nearness.empty()) known.nearness = level.nearness.at<float>(v, u);
+      if (!level.surface.empty()) known.surface = level.surface.at<std::uint8_t>(v, u);
+      if (!level.sky.empty()) known.sky = level.sky.at<std::uint8_t>(v, u);
+    }
+  }
+}
 
 float PatchCost::distance(const cv::Mat& image, const cv::Point& p, const cv::Point& q,
                           float bound) const {
@@ -64,16 +69,16 @@ cv::Point PatchCost::onLattice(const cv::Point& p, const cv::Point& q) const {
 
 // Places are layered: what is at another height is seldom the same, what is of another surface
 // never.
-float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
+inline float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
   float cost = scale_ * (away_row_ * std::abs(p.y - q.y) + away_column_ * std::abs(p.x - q.x));
-  if (has_nearness_) {
-    const float own = nearness_.at<float>(p), other = nearness_.at<float>(q);
-    if (other > kNearer * own + horizon_ || own > kNearer * other + horizon_) cost += kMisplaced;
-    if (away_farther_ > 0.0f && own > kAsNear * other && other > 0.0f)
-      cost += away_farther_ * (own / other - kAsNear);
-  }
-  if (onOther(p, q)) cost += kMisplaced;
-  if (has_sky_ && differ(sky_, p, q)) cost += kMisplaced;
+  const Known &own = at(p), &other = at(q);
+  if (other.nearness > kNearer * own.nearness + horizon_ ||
+      own.nearness > kNearer * other.nearness + horizon_)
+    cost += kMisplaced;
+  if (away_farther_ > 0.0f && own.nearness > kAsNear * other.nearness && other.nearness > 0.0f)
+    cost += away_farther_ * (own.nearness / other.nearness - kAsNear);
+  if (differ(own.surface, other.surface)) cost += kMisplaced;
+  if (differ(own.sky, other.sky)) cost += kMisplaced;
   if (lattice_ != nullptr && offLattice(q - p) > kOffLattice) cost += kMisplaced;
   return kPatchSide * kPatchSide * cost;
 }

@@ -13,10 +13,12 @@ namespace calipso::render {
 constexpr int kPatchRadius = 3;  // px; patches are squares of 7
 constexpr int kPatchSide = 2 * kPatchRadius + 1;
 
-// Are both labels known, and not the same? @param labels CV_8UC1, 0 unknown
-inline bool differ(const cv::Mat& labels, const cv::Point& p, const cv::Point& q) {
-  const std::uint8_t own = labels.at<std::uint8_t>(p), other = labels.at<std::uint8_t>(q);
+// Are both labels known, and not the same? @param labels CV_8UC1; 0 unknown
+inline bool differ(std::uint8_t own, std::uint8_t other) {
   return own != 0 && other != 0 && own != other;
+}
+inline bool differ(const cv::Mat& labels, const cv::Point& p, const cv::Point& q) {
+  return differ(labels.at<std::uint8_t>(p), labels.at<std::uint8_t>(q));
 }
 
 // What it costs to copy the patch around q to p: how unlike they look, in squared code values
@@ -39,19 +41,24 @@ class PatchCost {
   cv::Point onLattice(const cv::Point& p, const cv::Point& q) const;
 
   // Label of the surface at a place; 0 unknown.
-  int surfaceAt(const cv::Point& p) const {
-    return has_surface_ ? surface_.at<std::uint8_t>(p) : 0;
-  }
+  int surfaceAt(const cv::Point& p) const { return at(p).surface; }
   bool onOther(const cv::Point& p, const cv::Point& q) const {
-    return has_surface_ && differ(surface_, p, q);
+    return differ(at(p).surface, at(q).surface);
   }
 
  private:
-  float awayCost(const cv::Point& p, const cv::Point& q) const;
+  // What is known of a place; 0 nothing.
+  struct Known {
+    float nearness;
+    std::uint8_t surface, sky;
+  };
+
+  const Known& at(const cv::Point& p) const { return places_[p.y * columns_ + p.x]; }
+  inline float awayCost(const cv::Point& p, const cv::Point& q) const;
   float offLattice(const cv::Point& shift) const;
 
-  cv::Mat nearness_, surface_, sky_;
-  bool has_nearness_, has_surface_, has_sky_;
+  int columns_;
+  std::vector<Known> places_;
   float scale_, horizon_;
   const Lattice* lattice_;
   float away_row_, away_column_, away_farther_;  // as InpaintParams'

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
@@ -324,7 +325,7 @@ class Filling {
     const cv::Rect centres =
         cv::Rect(pixel.x - kPatchRadius, pixel.y - kPatchRadius, kPatchSide, kPatchSide) &
         cv::Rect({0, 0}, hole_.size());
-    cv::Vec4f sum;
+    cv::v_float32x4 sums = cv::v_setzero_f32();
     float total = 0.0f;
     for (int v = centres.y; v < centres.br().y; ++v) {
       const float* weight = weights.ptr<float>(v);
@@ -334,10 +335,12 @@ class Filling {
         if (w <= 0.0f) continue;
         const cv::Vec4f& voted =
             image_.ptr<cv::Vec4f>(to[u][1] + pixel.y - v)[to[u][0] + pixel.x - u];
-        for (int c = 0; c < 4; ++c) sum[c] += w * voted[c];
+        sums += cv::v_setall_f32(w) * cv::v_load(voted.val);
         total += w;
       }
     }
+    cv::Vec4f sum;
+    cv::v_store(sum.val, sums);
     return total > 0.0f ? cv::Vec4f(sum / total) : image_.at<cv::Vec4f>(pixel);
   }
 
