@@ -97,6 +97,14 @@ std::size_t likeliestRatio(const RatioErrors& errors, double per_unit) {
   return best;
 }
 
+template <typename Judge>
+std::vector<LightCandidate> judged(const std::vector<Eigen::Vector3f>& directions, Judge judge) {
+  std::vector<LightCandidate> candidates(directions.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 0; i < directions.size(); ++i) candidates[i] = judge(directions[i]);
+  return candidates;
+}
+
 class Search {
  public:
   Search(const LightEvidence& evidence, const Eigen::Vector3f& up)
@@ -132,25 +140,45 @@ class Search {
     return candidate;
   }
 
-  // Steps along two tangents, halved when none leads on.
-  LightCandidate refined(LightCandidate best) const {
-    for (float step = kFirstStep; step > kLastStep; step *= 0.5f) {
-      for (bool better = true; better;) {
-        better = false;
-        const Eigen::Vector3f centre = best.direction, s = centre.unitOrthogonal(),
-                              t = centre.cross(s);
-        for (const Eigen::Vector3f& d : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)}) {
-          const Eigen::Vector3f l = (centre + step * d).normalized();
-          if (l.dot(up_) < kLowestSun) continue;
-          const LightCandidate next = byAll(l);
-          if (next.misfit < best.misfit - 1e-6) best = next, better = true;
-        }
+  // Steps along two tangents, halved when none leads on. One of each at a time, so that all of them
+  // can be judged at once.
+  void refine(std::vector<LightCandidate>& candidates) const {
+    std::vector<float> steps(candidates.size(), kFirstStep);
+    for (;;) {
+      std::vector<Eigen::Vector3f> directions;
+      std::vector<std::size_t> of;
+      for (std::size_t i = 0; i < candidates.size(); ++i) {
+        if (!(steps[i] > kLastStep)) continue;
+        const std::vector<Eigen::Vector3f> beside = around(candidates[i].direction, steps[i]);
+        directions.insert(directions.end(), beside.begin(), beside.end());
+        of.insert(of.end(), beside.size(), i);
+      }
+      if (directions.empty()) return;
+      const std::vector<LightCandidate> tried =
+          judged(directions, [this](const Eigen::Vector3f& l) { return byAll(l); });
+      std::vector<bool> better(candidates.size(), false);
+      for (std::size_t k = 0; k < tried.size(); ++k) {
+        LightCandidate& best = candidates[of[k]];
+        if (tried[k].misfit < best.misfit - 1e-6) best = tried[k], better[of[k]] = true;
+      }
+      for (std::size_t i = 0; i < candidates.size(); ++i) {
+        if (!better[i]) steps[i] *= 0.5f;
       }
     }
-    return best;
   }
 
  private:
+  // Those above the horizon of four a step away along two tangents.
+  std::vector<Eigen::Vector3f> around(const Eigen::Vector3f& centre, float step) const {
+    const Eigen::Vector3f s = centre.unitOrthogonal(), t = centre.cross(s);
+    std::vector<Eigen::Vector3f> beside;
+    for (const Eigen::Vector3f& d : {s, Eigen::Vector3f(-s), t, Eigen::Vector3f(-t)}) {
+      const Eigen::Vector3f l = (centre + step * d).normalized();
+      if (!(l.dot(up_) < kLowestSun)) beside.push_back(l);
+    }
+    return beside;
+  }
+
   // The errors' size is not known: its likelihood is profiled out.
   LightCandidate likeliest(const ClusterSums& sums, const Eigen::Vector3f& l) const {
     std::array<RatioErrors, 3> errors;
@@ -195,14 +223,6 @@ std::vector<LightCandidate> spread(const std::vector<LightCandidate>& sorted, fl
   return chosen;
 }
 
-template <typename Judge>
-std::vector<LightCandidate> judged(const std::vector<Eigen::Vector3f>& directions, Judge judge) {
-  std::vector<LightCandidate> candidates(directions.size());
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t i = 0; i < directions.size(); ++i) candidates[i] = judge(directions[i]);
-  return candidates;
-}
-
 std::vector<Eigen::Vector3f> directionsOf(const std::vector<LightCandidate>& candidates) {
   std::vector<Eigen::Vector3f> directions;
   for (const LightCandidate& c : candidates) directions.push_back(c.direction);
@@ -229,9 +249,8 @@ std::vector<LightCandidate> searchLight(const LightEvidence& evidence, const Eig
   std::stable_sort(kept.begin(), kept.end(), better);
   kept.resize(std::min(kept.size(), count));
   const double contrast = all[all.size() / 2].misfit - all.front().misfit;
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t i = 0; i < kept.size(); ++i)
-    kept[i] = search.refined(kept[i]), kept[i].contrast = contrast;
+  search.refine(kept);
+  for (LightCandidate& c : kept) c.contrast = contrast;
   std::stable_sort(kept.begin(), kept.end(), better);
   return kept;
 }
