@@ -48,12 +48,18 @@ Eigen::AlignedBox3f boxOf(const Points& points) {
 
 std::vector<int> weld(const Points& vertices) {
   const float cell = std::max(kSamePlace * boxOf(vertices).diagonal().norm(), 1e-12f);
-  std::map<std::array<long, 3>, int> first;
-  std::vector<int> welded(vertices.size());
+  using Numbered = std::pair<std::array<long, 3>, int>;  // a vertex's cell, and the vertex
+  std::vector<Numbered> sorted(vertices.size());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
-    std::array<long, 3> key;
-    for (int k = 0; k < 3; ++k) key[k] = std::lround(vertices[i][k] / cell);
-    welded[i] = first.try_emplace(key, static_cast<int>(i)).first->second;
+    for (int k = 0; k < 3; ++k) sorted[i].first[k] = std::lround(vertices[i][k] / cell);
+    sorted[i].second = static_cast<int>(i);
+  }
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<int> welded(vertices.size());
+  const Numbered* first = sorted.data();  // of those in its cell
+  for (const Numbered& vertex : sorted) {
+    if (vertex.first != first->first) first = &vertex;
+    welded[vertex.second] = first->second;
   }
   return welded;
 }

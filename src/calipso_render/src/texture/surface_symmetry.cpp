@@ -156,10 +156,16 @@ std::vector<MirrorPlane> mirrorPlanes(const Points& vertices, const Triangles& t
     }
   }
   const float tolerance = kMirrorTolerance * boxOf(vertices).diagonal().norm();
+  std::vector<MirrorPlane> tried;
+  for (const Eigen::Vector3d& n : normals)
+    tried.push_back({n.cast<float>(), static_cast<float>(n.dot(middle))});
+  std::vector<float> mirrored(tried.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t i = 0; i < tried.size(); ++i)
+    mirrored[i] = mirroredPart(vertices, tried[i], tolerance);
   std::vector<MirrorPlane> planes;
-  for (const Eigen::Vector3d& n : normals) {
-    const MirrorPlane plane{n.cast<float>(), static_cast<float>(n.dot(middle))};
-    if (mirroredPart(vertices, plane, tolerance) >= kMirrorPart) planes.push_back(plane);
+  for (std::size_t i = 0; i < tried.size(); ++i) {
+    if (mirrored[i] >= kMirrorPart) planes.push_back(tried[i]);
   }
   return planes;
 }
@@ -171,18 +177,30 @@ std::optional<Axis> revolutionAxis(const Points& vertices, const Triangles& tria
   const std::vector<NormalLine> lines = normalLines(vertices, triangles, box.center(), extent);
   if (lines.size() < 5) return std::nullopt;
   std::mt19937 random(1);
+  std::vector<Eigen::Matrix<double, 5, 6>> rows(kAxisTrials);
+  for (auto& five : rows) {
+    for (int k = 0; k < 5; ++k) five.row(k) = lines[random() % lines.size()].row();
+  }
+  const auto partOf = [&](const std::optional<AxisLine>& axis) {
+    return axis ? agreeingPart(lines, *axis) : 0.0;
+  };
+  std::vector<std::optional<AxisLine>> tried(kAxisTrials);
+  std::vector<double> parts(kAxisTrials);
+#pragma omp parallel for schedule(static)
+  for (int i = 0; i < kAxisTrials; ++i) {
+    tried[i] = axisLine(Eigen::FullPivLU<Eigen::Matrix<double, 5, 6>>(rows[i]).kernel().col(0));
+    parts[i] = partOf(tried[i]);
+  }
   std::optional<AxisLine> best;
   double best_part = 0.0;
-  const auto consider = [&](const std::optional<AxisLine>& axis) {
-    const double part = axis ? agreeingPart(lines, *axis) : 0.0;
+  const auto consider = [&](const std::optional<AxisLine>& axis, double part) {
     if (part > best_part) best = axis, best_part = part;
   };
-  for (int trial = 0; trial < kAxisTrials; ++trial) {
-    Eigen::Matrix<double, 5, 6> rows;
-    for (int k = 0; k < 5; ++k) rows.row(k) = lines[random() % lines.size()].row();
-    consider(axisLine(Eigen::FullPivLU<Eigen::Matrix<double, 5, 6>>(rows).kernel().col(0)));
+  for (int i = 0; i < kAxisTrials; ++i) consider(tried[i], parts[i]);
+  for (int k = 0; k < kRefinements && best; ++k) {
+    const std::optional<AxisLine> next = refined(lines, *best);
+    consider(next, partOf(next));
   }
-  for (int k = 0; k < kRefinements && best; ++k) consider(refined(lines, *best));
   if (best_part < kAxisPart) return std::nullopt;
   const Eigen::Vector3d point = best->direction.cross(best->moment) * extent;
   return Axis{box.center() + point.cast<float>(), best->direction.cast<float>()};
