@@ -189,23 +189,15 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   return r;
 }
 
-std::vector<Shade> shadesIn(const std::vector<View>& views, const Light& light,
-                            const std::vector<SupportPlane>& planes) {
-  std::vector<std::optional<Shade>> found(views.size());
-#pragma omp parallel for schedule(dynamic, 1) if (views.size() > 1)
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    std::vector<Occluder> occluders;
-    for (const Actor& a : views[i].actors)
-      occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
-    ShadowMap sun(occluders, light.direction.cast<double>(),
-                  {kShadowMapSide, light.angular_radius, 16});
-    if (planes.empty()) occluders.clear();
-    const Eigen::Vector3d up = planes.empty() ? Eigen::Vector3d::UnitZ() : planes.front().normal;
-    found[i].emplace(Shade{std::move(sun), SkyMap(occluders, up, SkyMap::Params()), &planes});
-  }
-  std::vector<Shade> shades;
-  for (std::optional<Shade>& shade : found) shades.push_back(std::move(*shade));
-  return shades;
+Shade shadeIn(const View& view, const Light& light, const std::vector<SupportPlane>& planes) {
+  std::vector<Occluder> occluders;
+  for (const Actor& a : view.actors)
+    occluders.push_back({&a.vertices, &a.surface->triangles, a.surface->winding});
+  ShadowMap sun(occluders, light.direction.cast<double>(),
+                {kShadowMapSide, light.angular_radius, 16});
+  if (planes.empty()) occluders.clear();
+  const Eigen::Vector3d up = planes.empty() ? Eigen::Vector3d::UnitZ() : planes.front().normal;
+  return {std::move(sun), SkyMap(occluders, up, SkyMap::Params()), &planes};
 }
 
 cv::Vec3f meanReflectance(const Reflectance& r) {
@@ -231,35 +223,53 @@ Appearance::Source sourceOf(const SurfaceTexture& texture, int triangle) {
                   : Appearance::Source::kBoth;
 }
 
-Appearance makeAppearance(const std::vector<View>& views, const std::vector<Shade>& shades,
-                          std::size_t object, bool moves, const Light& light, const Gloss& gloss) {
-  Appearance a;
-  a.gloss = gloss;
-  a.key_camera = views[0].camera;
-  std::vector<const View*> used;
-  std::vector<const Actor*> actors;
-  for (std::size_t i = 0; i < (moves ? views.size() : 1); ++i)
-    used.push_back(&views[i]), actors.push_back(&views[i].actors[object]);
-  std::vector<Reflectance> pictures(used.size());
-  const auto see = [&](std::size_t i, const std::optional<cv::Vec3f>& mean_light) {
-    pictures[i] = reflectanceIn(*used[i], *actors[i], light, gloss, shades[i], mean_light,
-                                a.thrown_back, used.size() == 1);
-  };
-  a.thrown_back = thrownBack({});
-  see(0, std::nullopt);
-  a.thrown_back = thrownBack(meanReflectance(pictures[0]));
-  see(0, std::nullopt);
-  a.mean_light = pictures[0].mean_light;
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t i = 1; i < used.size(); ++i) see(i, a.mean_light);
-  a.region = pictures[0].region;
-  // What a highlight hides is taken from around it.
-  a.albedo = widened(pushPull(pictures[0].albedo, pictures[0].trust.mul(pictures[0].clear)));
-  for (Reflectance& r : pictures) r.albedo = widened(r.albedo);
-  fillTexture({used, actors, pictures}, a);
-  a.findSources();
-  return a;
-}
+// One object as the views show it, the key frame's first; alone if it rests.
+class Portrait {
+ public:
+  Portrait(const std::vector<View>& views, std::size_t object, bool moves, const Light& light,
+           const Gloss& gloss)
+      : light_(light) {
+    for (std::size_t i = 0; i < (moves ? views.size() : 1); ++i)
+      views_.push_back(&views[i]), actors_.push_back(&views[i].actors[object]);
+    pictures_.resize(views_.size());
+    appearance_.gloss = gloss, appearance_.key_camera = views[0].camera;
+  }
+
+  void seeKey(const Shade& shade) {
+    appearance_.thrown_back = thrownBack({});
+    see(0, shade, std::nullopt);
+    appearance_.thrown_back = thrownBack(meanReflectance(pictures_[0]));
+    see(0, shade, std::nullopt);
+    appearance_.mean_light = pictures_[0].mean_light, appearance_.region = pictures_[0].region;
+  }
+
+  // @param view one after the key frame's
+  void seeFurther(std::size_t view, const Shade& shade) {
+    if (view < views_.size()) see(view, shade, appearance_.mean_light);
+  }
+
+  Appearance finished() {
+    Appearance& a = appearance_;
+    // What a highlight hides is taken from around it.
+    a.albedo = widened(pushPull(pictures_[0].albedo, pictures_[0].trust.mul(pictures_[0].clear)));
+    for (Reflectance& r : pictures_) r.albedo = widened(r.albedo);
+    fillTexture({views_, actors_, pictures_}, a);
+    a.findSources();
+    return std::move(a);
+  }
+
+ private:
+  void see(std::size_t i, const Shade& shade, const std::optional<cv::Vec3f>& mean_light) {
+    pictures_[i] = reflectanceIn(*views_[i], *actors_[i], light_, appearance_.gloss, shade,
+                                 mean_light, appearance_.thrown_back, views_.size() == 1);
+  }
+
+  const Light& light_;
+  std::vector<const View*> views_;
+  std::vector<const Actor*> actors_;
+  std::vector<Reflectance> pictures_;
+  Appearance appearance_;
+};
 
 }  // namespace
 
@@ -267,11 +277,22 @@ std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<bool>& moves, const Light& light,
                                         const std::vector<Gloss>& glosses,
                                         const std::vector<SupportPlane>& planes) {
-  const std::vector<Shade> shades = shadesIn(views, light, planes);
+  std::vector<Portrait> portraits;
+  for (std::size_t i = 0; i < moves.size(); ++i)
+    portraits.emplace_back(views, i, moves[i], light, glosses[i]);
+  const Shade key_shade = shadeIn(views[0], light, planes);
+#pragma omp parallel for schedule(dynamic, 1) if (moves.size() > 1)
+  for (std::size_t i = 0; i < moves.size(); ++i) portraits[i].seeKey(key_shade);
+  if (std::find(moves.begin(), moves.end(), true) != moves.end()) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t k = 1; k < views.size(); ++k) {
+      const Shade shade = shadeIn(views[k], light, planes);
+      for (Portrait& p : portraits) p.seeFurther(k, shade);
+    }
+  }
   std::vector<Appearance> appearances(moves.size());
 #pragma omp parallel for schedule(dynamic, 1) if (moves.size() > 1)
-  for (std::size_t i = 0; i < moves.size(); ++i)
-    appearances[i] = makeAppearance(views, shades, i, moves[i], light, glosses[i]);
+  for (std::size_t i = 0; i < moves.size(); ++i) appearances[i] = portraits[i].finished();
   return appearances;
 }
 
