@@ -151,14 +151,20 @@ SkyMap skyOver(const std::vector<Actor>& actors, const RenderParams& params) {
   return {occludersOf(actors), params.planes.front().normal, kFine};
 }
 
+// CV_8UC1, 255: what moves or sways.
+cv::Mat movingIn(const cv::Mat& labels, const Prepared& p) {
+  cv::Mat moving = cv::Mat::zeros(labels.size(), CV_8U);
+  for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
+    if (p.moves[i] || p.sways[i]) moving |= labels == p.surfaces[i].index;
+  }
+  return moving;
+}
+
 NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadiness,
                    const Prepared& p) {
   std::vector<cv::Mat> pictures, steady;
   for (const ClipFrame& f : frames) {
-    cv::Mat moving = cv::Mat::zeros(f.labels.size(), CV_8U);
-    for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
-      if (p.moves[i] || p.sways[i]) moving |= f.labels == p.surfaces[i].index;
-    }
+    cv::Mat moving = movingIn(f.labels, p);
     cv::dilate(moving, moving, cv::Mat::ones(2 * kMixed + 1, 2 * kMixed + 1, CV_8U));
     pictures.push_back(f.bgr), steady.push_back((steadiness > 1) & (moving == 0));
   }
@@ -179,7 +185,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   findSurfacesInClip(clip, frames, models, p);
   if (!cameraMoves(clip)) coverWhatRests(p, frames);
   cv::Mat steadiness;
-  const cv::Mat picture = steadyKeyFrame(frames, steadiness);
+  const cv::Mat picture = steadyKeyFrame(frames, movingIn(frames.front().labels, p), steadiness);
   p.outline_blur = outlineBlur(picture, p.key_labels);
   const std::vector<Actor> actors = keyActors(p);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();

@@ -37,6 +37,22 @@ TEST(SeenBackground, IsExactWhereAnyFrameShowsIt) {
   EXPECT_EQ(cv::norm(plate, emptyTable(), cv::NORM_INF), 0.0);
 }
 
+// Shade that creeps over a cloth stays within the noise for a while.
+TEST(SteadyKeyFrame, AveragesWhatRestsAlone) {
+  std::vector<ClipFrame> clip;
+  for (int k = 0; k < 12; ++k) {
+    clip.push_back({cv::Mat(20, 40, CV_8UC3, cv::Scalar::all(100 + k)),
+                    cv::Mat(20, 40, CV_8U, cv::Scalar(kBallLabel)), camera()});
+  }
+  cv::Mat moving = cv::Mat::zeros(20, 40, CV_8U), steadiness;
+  moving.colRange(20, 40).setTo(255);
+  const cv::Mat steady = steadyKeyFrame(clip, moving, steadiness);
+  EXPECT_EQ(steady.at<cv::Vec3f>(10, 10), cv::Vec3f(105.5f, 105.5f, 105.5f));
+  EXPECT_EQ(steadiness.at<std::uint8_t>(10, 10), 12);
+  EXPECT_EQ(steady.at<cv::Vec3f>(10, 30), cv::Vec3f(100.0f, 100.0f, 100.0f));
+  EXPECT_EQ(steadiness.at<std::uint8_t>(10, 30), 1);
+}
+
 TEST(SeenBackground, CountsTheFramesThatShowAPixel) {
   const Background b = seenBackground(wanderingSquare(8), false);
   EXPECT_EQ(b.count.at<std::uint8_t>(5, 5), 8);

@@ -68,7 +68,10 @@ cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& ca
 
 // The key frame with its noise averaged away where the sample shows the same thing all the time
 // (same label, value within the noise); elsewhere the key frame itself. CV_32FC3, code values.
+// @param moving  CV_8UC1, 255: what moves or sways is seen in the key frame; its shade creeps by
+//                less than the noise from frame to frame, and averages to another
 // @param steadiness CV_8UC1 out: number of frames averaged, 1..255
-cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness);
+cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, const cv::Mat& moving,
+                       cv::Mat& steadiness);
 
 }  // namespace calipso::render

@@ -192,7 +192,8 @@ cv::Mat groundNearness(const std::vector<SupportPlane>& planes, const Camera& ca
   return cv::countNonZero(nearness) > 0 ? nearness : cv::Mat();
 }
 
-cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness) {
+cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, const cv::Mat& moving,
+                       cv::Mat& steadiness) {
   CV_Assert(!frames.empty());
   const ClipFrame& key = frames.front();
   cv::Mat steady(key.bgr.size(), CV_32FC3);
@@ -214,7 +215,8 @@ cv::Mat steadyKeyFrame(const std::vector<ClipFrame>& frames, cv::Mat& steadiness
       }
       // Something that moves agrees with the key frame by chance only: then the key frame alone
       // counts.
-      const bool still = 4 * same >= 3 * static_cast<int>(frames.size());
+      const bool still =
+          moving.at<std::uint8_t>(v, u) == 0 && 4 * same >= 3 * static_cast<int>(frames.size());
       steady.at<cv::Vec3f>(v, u) = still ? cv::Vec3f(sum / same) : cv::Vec3f(k[0], k[1], k[2]);
       steadiness.at<std::uint8_t>(v, u) =
           static_cast<std::uint8_t>(still ? std::min(same, 255) : 1);
