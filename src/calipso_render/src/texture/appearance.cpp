@@ -17,6 +17,7 @@
 #include "texture/false_shade.hpp"
 #include "texture/mesh_topology.hpp"
 #include "texture/picture_trust.hpp"
+#include "texture/rim_hue.hpp"
 #include "texture/texture_fill.hpp"
 
 namespace calipso::render {
@@ -161,6 +162,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   const Shaded shaded = lightOn(actor, r.region, view.camera, light, gloss, shade, thrown_back);
   r.nearness = shaded.nearness, r.normal = shaded.normal, r.triangle = shaded.triangle;
   view.picture(r.region).convertTo(r.codes, CV_32F);
+  unmixHue(view.labels(r.region) == actor.surface->index, r.codes);
   r.clear = clearOf(r.codes, shaded.glint);
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);
