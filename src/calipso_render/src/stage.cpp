@@ -48,6 +48,41 @@ Points transformed(const Points& points, const Eigen::Isometry3d& transform) {
   return out;
 }
 
+namespace {
+
+Eigen::Vector3d meanOf(const Points& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3f& p : points) sum += p.cast<double>();
+  return sum / static_cast<double>(points.size());
+}
+
+// The turn that takes one set of points best to another (Kabsch 1976).
+Eigen::Matrix3f turnBetween(const Points& from, const Points& to) {
+  if (from == to) return Eigen::Matrix3f::Identity();
+  const Eigen::Vector3d from_mean = meanOf(from), to_mean = meanOf(to);
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < from.size(); ++i)
+    products += (to[i].cast<double>() - to_mean) * (from[i].cast<double>() - from_mean).transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d U = svd.matrixU(), V = svd.matrixV();
+  const double side = (U * V.transpose()).determinant() < 0.0 ? -1.0 : 1.0;
+  return (U * Eigen::Vector3d(1.0, 1.0, side).asDiagonal() * V.transpose()).cast<float>();
+}
+
+// Surface::stock_vertices.
+Points stockAt(const ObjectModel& model, const Points& key_vertices) {
+  if (model.stock.vertexCount() != static_cast<int>(key_vertices.size())) return key_vertices;
+  Points stock;
+  for (int i = 0; i < model.stock.vertexCount(); ++i)
+    stock.push_back(model.stock.vertex(i).cast<float>());
+  const Eigen::Matrix3f turn = turnBetween(stock, key_vertices);
+  const Eigen::Vector3f from = meanOf(stock).cast<float>(), to = meanOf(key_vertices).cast<float>();
+  for (Eigen::Vector3f& p : stock) p = to + turn * (p - from);
+  return stock;
+}
+
+}  // namespace
+
 Surface makeSurface(const ObjectModel& model) {
   if (model.mesh.triangleCount() == 0) {
     throw std::invalid_argument("object '" + model.name +
@@ -74,6 +109,7 @@ Surface makeSurface(const ObjectModel& model) {
   surface.edges = meshEdges(surface.triangles);
   surface.winding = outsideWinding(surface.object_vertices, surface.triangles);
   surface.key_vertices = transformed(surface.object_vertices, model.world_from_object);
+  surface.stock_vertices = stockAt(model, surface.key_vertices);
   MeshNormals normals = meshNormals(surface.key_vertices, surface.triangles, surface.edges);
   surface.corners = std::move(normals.corners);
   surface.vertex_of_normal = std::move(normals.vertex_of);
@@ -86,22 +122,6 @@ Surface makeSurface(const ObjectModel& model) {
 }
 
 namespace {
-
-// The turn that takes one set of points best to another (Kabsch 1976).
-Eigen::Matrix3f turnBetween(const Points& from, const Points& to) {
-  if (from == to) return Eigen::Matrix3f::Identity();
-  Eigen::Vector3d from_mean = Eigen::Vector3d::Zero(), to_mean = from_mean;
-  for (std::size_t i = 0; i < from.size(); ++i)
-    from_mean += from[i].cast<double>(), to_mean += to[i].cast<double>();
-  from_mean /= static_cast<double>(from.size()), to_mean /= static_cast<double>(from.size());
-  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < from.size(); ++i)
-    products += (to[i].cast<double>() - to_mean) * (from[i].cast<double>() - from_mean).transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(products, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d U = svd.matrixU(), V = svd.matrixV();
-  const double side = (U * V.transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-  return (U * Eigen::Vector3d(1.0, 1.0, side).asDiagonal() * V.transpose()).cast<float>();
-}
 
 // What the surface sees, turned with their object and then as their normals are beside it.
 void turnSeen(const Surface& surface, Actor& actor) {

@@ -36,7 +36,7 @@ std::vector<LikePlace> judged(const std::function<cv::Vec3f(const Eigen::Vector3
   for (const Eigen::Vector3f& x : surface.key_vertices) {
     if (isKnown(x)) known.push_back({{x, x.normalized()}, colour(x)});
   }
-  std::vector<LikePlace> like = turnedPlaces(surface, kEye);
+  std::vector<LikePlace> like = turnedPlaces(surface.key_vertices, surface.triangles, kEye);
   judgeLikePlaces(
       known, 0.002f,
       [&](const Place& place) {
@@ -126,7 +126,7 @@ TEST(LikePlaces, MirroredAreOfTheMirroredPart) {
   const std::vector<int> parts = connectedParts(surface.key_vertices, surface.triangles);
   const int left = parts[0], middle = parts[triangles], right = parts[2 * triangles];
   bool across = false;
-  for (const LikePlace& like : mirroredPlaces(surface, parts)) {
+  for (const LikePlace& like : mirroredPlaces(surface.key_vertices, surface.triangles, parts)) {
     const Eigen::Vector3f x(-3.0f * static_cast<float>(kBallRadius), 0.0f, 0.0f);
     const Place image = like.of({x, Eigen::Vector3f::UnitX(), left});
     const bool changes = image.point.x() > 0.0f;

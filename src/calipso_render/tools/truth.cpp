@@ -55,6 +55,7 @@ Truth::Object toObject(const Scene& scene, const YAML::Node& node) {
   object.model.name = node["name"].as<std::string>();
   object.model.index = node["index"].as<int>();
   object.model.mesh = loadMesh(scene.directory + "/" + node["true_mesh"].as<std::string>());
+  object.model.stock = loadMesh(scene.directory + "/" + node["cad"].as<std::string>());
   for (const YAML::Node& pose : node["world_T_object"]) object.poses.push_back(toIsometry(pose));
   object.model.world_from_object = object.poses.front();
   if (const YAML::Node file = node["true_vertices_per_frame"]) {

@@ -21,6 +21,8 @@ struct ObjectModel {
   int index = 0;                                                        // label in the masks
   TriangleMesh mesh;                                                    // object frame, m
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // at the key frame
+  // the stock model that the mesh was bent from, of the same vertices; empty: it was not
+  TriangleMesh stock = {};
 };
 
 // What never changes about an object's surface.
@@ -32,6 +34,7 @@ struct Surface {
   std::vector<MeshEdge> edges;
   Points object_vertices;  // object frame, m
   Points key_vertices;     // world, key frame, m
+  Points stock_vertices;   // the stock model's, laid over those as one piece
   // Normals, several for a vertex at a crease: per triangle the numbers of its corners' ones, and
   // per number the vertex
   Triangles corners;

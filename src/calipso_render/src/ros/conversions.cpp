@@ -65,8 +65,8 @@ sensor_msgs::Image imageMsg(const std_msgs::Header& header, const cv::Mat& image
 std::vector<ObjectModel> fromMsg(const calipso_msgs::AlignedModels& models) {
   std::vector<ObjectModel> out;
   for (const calipso_msgs::AlignedModel& m : models.models) {
-    out.push_back(
-        {m.object, m.index, calipso::fromMsg(m.mesh), calipso::fromMsg(m.world_from_object.pose)});
+    out.push_back({m.object, m.index, calipso::fromMsg(m.mesh),
+                   calipso::fromMsg(m.world_from_object.pose), calipso::fromMsg(m.cad)});
   }
   return out;
 }

@@ -52,6 +52,7 @@ struct Shaded {
   cv::Mat nearness;   // CV_32FC1
   cv::Mat open;       // CV_32FC3: `light` if nothing were before the surface
   cv::Mat triangle;   // CV_32SC1, -1 = none
+  cv::Mat sky;        // CV_32FC1: SkySeen::open
   cv::Mat normal;     // CV_32FC3
   cv::Vec3f mean;
 };
@@ -77,7 +78,8 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
   const ShadedGround ground(*shade.planes, light, {&shade.sun}, shade.sky);
   for (cv::Mat* colours : {&s.highlight, &s.light, &s.open, &s.normal})
     *colours = cv::Mat::zeros(region.size(), CV_32FC3);
-  for (cv::Mat* values : {&s.glint, &s.nearness}) *values = cv::Mat::zeros(region.size(), CV_32F);
+  for (cv::Mat* values : {&s.glint, &s.nearness, &s.sky})
+    *values = cv::Mat::zeros(region.size(), CV_32F);
   s.triangle = cv::Mat(region.size(), CV_32S, cv::Scalar(-1));
   VisibilityBuffer buffer(region);
   buffer.draw(actor.screen, 0);
@@ -115,6 +117,7 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
       }
       s.nearness.at<float>(v, u) = buffer.nearness(v)[u];
       s.triangle.at<int>(v, u) = p.triangle;
+      s.sky.at<float>(v, u) = p.seen.open;
       s.normal.at<cv::Vec3f>(v, u) = {p.normal.x(), p.normal.y(), p.normal.z()};
       sums[v] += cv::Vec3d(l), ++counts[v];
     }
@@ -161,6 +164,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   if (r.region.empty()) r.region = cv::Rect(0, 0, 1, 1);
   const Shaded shaded = lightOn(actor, r.region, view.camera, light, gloss, shade, thrown_back);
   r.nearness = shaded.nearness, r.normal = shaded.normal, r.triangle = shaded.triangle;
+  r.open = shaded.sky;
   view.picture(r.region).convertTo(r.codes, CV_32F);
   unmixHue(view.labels(r.region) == actor.surface->index, r.codes);
   r.clear = clearOf(r.codes, shaded.glint);

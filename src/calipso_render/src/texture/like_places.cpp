@@ -46,14 +46,15 @@ struct Fold {
     const float half = 0.5f * (angle + folded);
     const Eigen::Vector3f across = std::cos(half) * aside - std::sin(half) * ahead;
     const MirrorPlane plane{across, across.dot(axis.point)};
-    return {plane.point(place.point), plane.vector(place.normal), place.part, place.piece};
+    return {plane.point(place.point), plane.vector(place.normal), place.part, place.piece,
+            place.open};
   }
 
  private:
   Place turned(const Place& place, float angle) const {
     const Eigen::AngleAxisf rotation(angle, axis.direction);
     return {axis.point + rotation * (place.point - axis.point), rotation * place.normal, place.part,
-            place.piece};
+            place.piece, place.open};
   }
 };
 
@@ -68,18 +69,18 @@ struct Repeat {
     const Eigen::Vector3f arm = place.point - axis.point;
     const float angle = std::atan2(arm.dot(aside), arm.dot(ahead));
     const Eigen::AngleAxisf back(-part * std::round(angle / part), axis.direction);
-    return {axis.point + back * arm, back * place.normal, place.part, place.piece};
+    return {axis.point + back * arm, back * place.normal, place.part, place.piece, place.open};
   }
 };
 
 using PartBoxes = std::map<int, Eigen::AlignedBox3f>;
 
 template <typename Map>
-PartBoxes boxesOf(const Surface& surface, const std::vector<int>& parts, const Map& map) {
+PartBoxes boxesOf(const Points& vertices, const Triangles& triangles, const std::vector<int>& parts,
+                  const Map& map) {
   PartBoxes boxes;
   for (std::size_t t = 0; t < parts.size(); ++t) {
-    for (int k = 0; k < 3; ++k)
-      boxes[parts[t]].extend(map(surface.key_vertices[surface.triangles[t][k]]));
+    for (int k = 0; k < 3; ++k) boxes[parts[t]].extend(map(vertices[triangles[t][k]]));
   }
   return boxes;
 }
@@ -100,26 +101,30 @@ std::map<int, int> mirroredParts(const PartBoxes& boxes, const PartBoxes& mirror
 
 }  // namespace
 
-std::vector<LikePlace> mirroredPlaces(const Surface& surface, const std::vector<int>& parts) {
-  const PartBoxes boxes = boxesOf(surface, parts, [](const Eigen::Vector3f& p) { return p; });
-  const float apart = kSameBox * boxOf(surface.key_vertices).diagonal().norm();
+std::vector<LikePlace> mirroredPlaces(const Points& vertices, const Triangles& triangles,
+                                      const std::vector<int>& parts) {
+  const PartBoxes boxes =
+      boxesOf(vertices, triangles, parts, [](const Eigen::Vector3f& p) { return p; });
+  const float apart = kSameBox * boxOf(vertices).diagonal().norm();
   std::vector<LikePlace> like;
-  for (const MirrorPlane& plane : mirrorPlanes(surface.key_vertices, surface.triangles)) {
-    const PartBoxes mirrored =
-        boxesOf(surface, parts, [&](const Eigen::Vector3f& p) { return plane.point(p); });
+  for (const MirrorPlane& plane : mirrorPlanes(vertices, triangles)) {
+    const PartBoxes mirrored = boxesOf(vertices, triangles, parts,
+                                       [&](const Eigen::Vector3f& p) { return plane.point(p); });
     like.push_back({[plane, images = mirroredParts(boxes, mirrored, apart)](const Place& place) {
                       const auto image = images.find(place.part);
                       return Place{plane.point(place.point), plane.vector(place.normal),
-                                   image == images.end() ? kAnyPart : image->second};
+                                   image == images.end() ? kAnyPart : image->second, kAnyPart,
+                                   place.open};
                     },
                     std::nullopt});
   }
   return like;
 }
 
-std::vector<LikePlace> turnedPlaces(const Surface& surface, const Eigen::Vector3f& eye) {
+std::vector<LikePlace> turnedPlaces(const Points& vertices, const Triangles& triangles,
+                                    const Eigen::Vector3f& eye) {
   std::vector<LikePlace> like;
-  const auto axis = revolutionAxis(surface.key_vertices, surface.triangles);
+  const auto axis = revolutionAxis(vertices, triangles);
   if (!axis) return like;
   const Eigen::Vector3f to_eye = eye - axis->point;
   const Eigen::Vector3f ahead =

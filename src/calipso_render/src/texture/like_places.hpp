@@ -18,12 +18,14 @@ struct LikePlace {
 };
 
 // The mirror images at the planes of symmetry. @param parts connectedParts()
-std::vector<LikePlace> mirroredPlaces(const Surface& surface, const std::vector<int>& parts);
+std::vector<LikePlace> mirroredPlaces(const Points& vertices, const Triangles& triangles,
+                                      const std::vector<int>& parts);
 
 // Of a body of revolution: places turned about its axis. First back and forth, into the quarter of a
 // turn on either side of a middle; the middles that are first are as near as can be to the side that
 // is seen from `eye`. Then by whole parts of a turn, a half to a twenty-fourth, to that side.
-std::vector<LikePlace> turnedPlaces(const Surface& surface, const Eigen::Vector3f& eye);
+std::vector<LikePlace> turnedPlaces(const Points& vertices, const Triangles& triangles,
+                                    const Eigen::Vector3f& eye);
 
 // A place of the surface and the colour that is known of it.
 struct KnownPlace {

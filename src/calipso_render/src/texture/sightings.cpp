@@ -17,6 +17,8 @@ constexpr float kThinnest = 0.1f;
 constexpr float kFlattest = 0.05f,
                 kFull = 0.25f;     // cosine of the view from which a surface is seen, and well seen
 constexpr float kSameFace = 0.5f;  // cosine to the front's normal of what may be that front
+// sky that a place has less of than another, from which it is not like it, and is not at all
+constexpr float kLittleLess = 0.03f, kMuchLess = 0.1f;
 constexpr float kAskew = 0.6f,
                 kAlike = 0.9f;  // cosine between normals that are not, and are, mirror images
 
@@ -37,9 +39,9 @@ float thicknessOf(const Surface& surface) {
 Sightings::Sightings(const SeenObject& object) : views_(object.views), pictures_(object.pictures) {
   const Surface& surface = *object.actors.front()->surface;
   extent_ = boxOf(surface.key_vertices).diagonal().norm();
-  two_sided_ = std::any_of(surface.edges.begin(), surface.edges.end(),
-                           [](const MeshEdge& e) { return e.b < 0; }) ||
-               thicknessOf(surface) < kDepthTolerance * extent_;
+  is_sheet_ = thicknessOf(surface) < kDepthTolerance * extent_;
+  two_sided_ = is_sheet_ || std::any_of(surface.edges.begin(), surface.edges.end(),
+                                        [](const MeshEdge& e) { return e.b < 0; });
   for (const View* v : views_)
     camera_from_world_.push_back(v->camera.world_from_camera.inverse().cast<float>()),
         axes_.push_back(v->camera.world_from_camera.linear().cast<float>());
@@ -137,6 +139,13 @@ Sighting Sightings::frontBefore(const Place& place) const {
   const Eigen::Vector3f mirrored = MirrorPlane{sight, 0.0f}.vector({front[0], front[1], front[2]});
   look->weight = r.trust.at<float>(pixel) * smoothStep(kAskew, kAlike, mirrored.dot(place.normal));
   return *look;
+}
+
+float Sightings::asOpen(std::size_t view, const Sighting& look, const Place& place) const {
+  const cv::Mat& open = pictures_[view].open;
+  const int u = std::clamp(static_cast<int>(std::lround(look.u)), 0, open.cols - 1),
+            v = std::clamp(static_cast<int>(std::lround(look.v)), 0, open.rows - 1);
+  return 1.0f - smoothStep(kLittleLess, kMuchLess, place.open - open.at<float>(v, u));
 }
 
 float Sightings::clearAt(std::size_t view, const Sighting& look) const {

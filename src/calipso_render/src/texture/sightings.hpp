@@ -15,6 +15,7 @@ struct Place {
   Eigen::Vector3f point, normal;
   int part = kAnyPart;   // of the mesh, that has to be seen there
   int piece = kAnyPart;  // the same, of its smooth parts
+  float open = 0.0f;     // SkySeen::open
 };
 
 // How well a picture shows a place: 0 not at all, 1 straight on and well inside the mask.
@@ -44,12 +45,17 @@ class Sightings {
   // Reflectance::clear where a look falls.
   float clearAt(std::size_t view, const Sighting& look) const;
 
+  // How far the front that a look falls on is as open to the sky as a place: what other parts of the
+  // object hide more of is darker than light tells, for their contact.
+  float asOpen(std::size_t view, const Sighting& look, const Place& place) const;
+
   int partOf(int triangle) const { return parts_[triangle]; }
   int pieceOf(int triangle) const { return pieces_[triangle]; }  // smoothParts()
   const std::vector<int>& pieces() const { return pieces_; }
   const std::vector<int>& parts() const { return parts_; }  // connectedParts()
-  float extent() const { return extent_; }                  // of the object, m
-  float keyDepth() const { return key_depth_; }             // of the object in the key frame, m
+  bool isSheet() const { return is_sheet_; }
+  float extent() const { return extent_; }       // of the object, m
+  float keyDepth() const { return key_depth_; }  // of the object in the key frame, m
 
  private:
   std::optional<Sighting> pixelOf(std::size_t view, const Eigen::Vector3f& in_camera) const;
@@ -64,6 +70,7 @@ class Sightings {
   std::vector<Eigen::Matrix3f> axes_;  // of the cameras, in the world
   std::vector<int> parts_, pieces_;
   float extent_ = 0.0f, key_depth_ = 1.0f;
+  bool is_sheet_ = false;   // closed or not
   bool two_sided_ = false;  // a sheet shows one side what the other is like
 };
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "smooth_step.hpp"
+#include "texture/bent_shape.hpp"
 #include "texture/like_places.hpp"
 #include "texture/sightings.hpp"
 #include "texture/texture_miss.hpp"
@@ -28,8 +29,9 @@ constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exa
 constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;
 // weight of a look at a like place that counts for nothing, and in full
 constexpr float kPoor = 0.15f, kGood = 0.45f;
-constexpr std::size_t kMostTurned = 3;    // turned places that a place takes its look from
-constexpr std::size_t kCompared = 20000;  // texels, about, by which like places are judged
+constexpr std::size_t kMostTurned = 3;  // turned places that a place takes its look from
+// texels, about, by which like places are judged; of the stock model, where that takes longer
+constexpr std::size_t kCompared = 20000, kComparedOfStock = 5000;
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
 
@@ -185,34 +187,70 @@ class TextureFill {
             mix(normals, surface_.corners[triangle]).normalized(), sightings_.partOf(triangle)};
   }
   Place keyPlaceOf(int triangle, const Eigen::Vector3f& w) const {
-    Place place = placeOf(triangle, w, surface_.key_vertices, surface_.key_normals);
+    return placeOf(triangle, w, surface_.key_vertices, surface_.key_normals);
+  }
+  // In the shape in which likenesses are sought.
+  Place shapePlaceOf(int triangle, const Eigen::Vector3f& w) const {
+    Place place = bent_ ? placeOf(triangle, w, surface_.stock_vertices, stock_normals_)
+                        : keyPlaceOf(triangle, w);
     place.piece = sightings_.pieceOf(triangle);
+    const Eigen::Vector3i& c = surface_.corners[triangle];
+    place.open = w[0] * surface_.seen[c[0]].open + w[1] * surface_.seen[c[1]].open +
+                 w[2] * surface_.seen[c[2]].open;
     return place;
+  }
+
+  // How the key frame shows a place of that shape.
+  Sighting lookAtShape(const Place& place) const {
+    const std::optional<Place> there = bent_ ? (*bent_)(place) : place;
+    return there ? sightings_.lookAt(0, *there, kOffSurface) : Sighting();
+  }
+
+  struct Likenesses {
+    std::vector<LikePlace> mirrored, turned;
+    std::size_t size() const { return mirrored.size() + turned.size(); }
+  };
+
+  Likenesses likenessesOf(const Points& vertices) const {
+    const Eigen::Vector3f eye = views_[0]->camera.world_from_camera.translation().cast<float>();
+    return {mirroredPlaces(vertices, surface_.triangles, sightings_.parts()),
+            turnedPlaces(vertices, surface_.triangles, eye)};
+  }
+
+  // Of the object's shape, or of its stock model's where that has more of them: bent things are as
+  // they were made. But how a cloth is cut tells nothing of its print.
+  Likenesses likenesses() {
+    Likenesses own = likenessesOf(surface_.key_vertices);
+    if (sightings_.isSheet() || surface_.stock_vertices == surface_.key_vertices) return own;
+    Likenesses stock = likenessesOf(surface_.stock_vertices);
+    if (stock.size() <= own.size()) return own;
+    stock_normals_ = surfaceNormals(surface_, surface_.stock_vertices);
+    bent_.emplace(surface_.stock_vertices, surface_.key_vertices, surface_.triangles,
+                  sightings_.parts());
+    return stock;
   }
 
   // Places that look alike by the shape; those first that do where they are seen themselves.
   void findLike(const SurfaceTexture& texture, const Origins& origins) {
+    Likenesses like = likenesses();
     std::vector<KnownPlace> known;
-    const std::size_t step = 1 + texture.size() / kCompared;
+    const std::size_t step = 1 + texture.size() / (bent_ ? kComparedOfStock : kCompared);
     std::size_t next = 0;
     for (int t = 0; t < texture.triangleCount(); ++t) {
       for (; next < texture.firstOf(t + 1); next += step) {
         if (origins.layer[next] == 0 && origins.certain[next] >= 1.0f)
-          known.push_back({keyPlaceOf(t, texture.weightsOf(t, next - texture.firstOf(t))),
+          known.push_back({shapePlaceOf(t, texture.weightsOf(t, next - texture.firstOf(t))),
                            colourOf(texture.texels[next])});
       }
     }
     const auto colourAt = [&](const Place& place) -> std::optional<cv::Vec3f> {
-      const Sighting l = sightings_.lookAt(0, place, kOffSurface);
+      const Sighting l = lookAtShape(place);
       if (l.weight < kGood) return std::nullopt;
       return colourOf(sampleBicubic(shown_[0], l.u, l.v));
     };
-    like_ = mirroredPlaces(surface_, sightings_.parts());
-    std::vector<LikePlace> turned =
-        turnedPlaces(surface_, views_[0]->camera.world_from_camera.translation().cast<float>());
-    judgeLikePlaces(known, texture.spacing(), colourAt, like_);
-    judgeLikePlaces(known, texture.spacing(), colourAt, turned);
-    like_ = bestFirst(std::move(like_), std::move(turned), kMostTurned);
+    judgeLikePlaces(known, texture.spacing(), colourAt, like.mirrored);
+    judgeLikePlaces(known, texture.spacing(), colourAt, like.turned);
+    like_ = bestFirst(std::move(like.mirrored), std::move(like.turned), kMostTurned);
   }
 
   // @param look, end the looks at the place. @param certain, layer out: of Origins
@@ -229,7 +267,7 @@ class TextureFill {
     if (shares > 0.0f) sum *= 1.0f / shares, key_share *= 1.0f / shares;
     Layers layers;
     layers.add(sum, std::min(1.0f, total / kSure));
-    if (layers.open > 0.0f) addLikePlaces(keyPlaceOf(triangle, w), sum, total, layers);
+    if (layers.open > 0.0f) addLikePlaces(triangle, w, sum, total, layers);
     certain = 1.0f - layers.open;
     layer = static_cast<signed char>(layers.strongest);
     const cv::Vec3f c = certain > 0.0f ? layers.sum / certain : cv::Vec3f();
@@ -243,18 +281,21 @@ class TextureFill {
   // What is seen at a flat angle, at the mask's rim (where the background's colour is in it) or not
   // at all.
   // @param own, total the place's own colour as far as it is seen, and the weight of that
-  void addLikePlaces(const Place& place, const cv::Vec3f& own, float total, Layers& layers) const {
+  void addLikePlaces(int triangle, const Eigen::Vector3f& w, const cv::Vec3f& own, float total,
+                     Layers& layers) const {
+    const Place place = shapePlaceOf(triangle, w);
     const auto add = [&](const Sighting& l, float part) {
       layers.add(part > 0.0f ? colourOf(sampleBicubic(shown_[0], l.u, l.v)) : cv::Vec3f(), part);
     };
     for (const LikePlace& like : like_) {
       if (layers.open == 0.0f) return;
-      const Sighting l = sightings_.lookAt(0, like.of(place), kOffSurface);
-      add(l, smoothStep(kPoor, kGood, l.weight));
+      const Sighting l = lookAtShape(like.of(place));
+      const float good = smoothStep(kPoor, kGood, l.weight);
+      add(l, good > 0.0f ? good * sightings_.asOpen(0, l, place) : 0.0f);
     }
     const float flat = std::min(1.0f, std::cbrt(total) / kEnough);
     layers.add(own, flat * flat);
-    const Sighting front = sightings_.frontBefore({place.point, place.normal, place.part});
+    const Sighting front = sightings_.frontBefore(keyPlaceOf(triangle, w));
     add(front, smoothStep(0.0f, kGood, front.weight));
   }
 
@@ -263,6 +304,9 @@ class TextureFill {
   const std::vector<Reflectance>& pictures_;
   const Surface& surface_;
   const Sightings sightings_;
+  // Where likenesses are the stock model's: its normals, and from it to the key frame's shape.
+  Points stock_normals_;
+  std::optional<BentShape> bent_;
   std::vector<Looks> looks_;     // per triangle
   std::vector<LikePlace> like_;  // best first; none before findLike()
   std::vector<cv::Mat>

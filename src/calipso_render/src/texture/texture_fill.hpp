@@ -14,6 +14,7 @@ struct Reflectance {
   cv::Mat nearness;  // CV_32FC1: 1 / depth of the object's front, 0 = none
   cv::Mat normal;    // CV_32FC3: of the front, world, towards the camera
   cv::Mat triangle;  // CV_32SC1: of the front, -1 = none
+  cv::Mat open;      // CV_32FC1: SkySeen::open of the front
   cv::Mat trust;     // CV_32FC1
   cv::Mat clear;     // CV_32FC1: 1 where no highlight hides the reflectance
   cv::Vec3f mean_light;
