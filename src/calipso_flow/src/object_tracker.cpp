@@ -127,12 +127,7 @@ Observation ObjectTracker::refine(const Frame& frame, const Reference& reference
   if (!near) {
     approach(frame, reference.view, params, observation);
   }
-  for (int round = 0; round < kRefinements; ++round) {
-    observation.world_from_object =
-        refineOnce(frame, reference.view, Care::kChecked, params, observation);
-    // The same look again would give the same pose.
-    if (!observation.found || isLookOf(frame, reference.view, observation.world_from_object)) break;
-  }
+  refineFinely(frame, reference.view, params, observation);
   // The reference's own error is all of its frames': too far away there, the object is taken for
   // too far away here.
   observation.covariance += reference.covariance;
@@ -140,6 +135,17 @@ Observation ObjectTracker::refine(const Frame& frame, const Reference& reference
   observation.reference_time = reference.view.frame().time;
   observation.reference_error = reference.alone;
   return observation;
+}
+
+void ObjectTracker::refineFinely(const Frame& frame, const ReferenceView& reference,
+                                 const TrackerParams& params, Observation& observation,
+                                 const Matrix6d& reference_error) {
+  for (int round = 0; round < kRefinements; ++round) {
+    observation.world_from_object =
+        refineOnce(frame, reference, Care::kChecked, params, observation, reference_error);
+    // The same look again would give the same pose.
+    if (!observation.found || isLookOf(frame, reference, observation.world_from_object)) break;
+  }
 }
 
 // From a start that may be some pixels off. Large patches reach farther.
@@ -159,7 +165,8 @@ void ObjectTracker::approach(const Frame& frame, const ReferenceView& reference,
 
 Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceView& reference,
                                             Care care, const TrackerParams& params,
-                                            Observation& observation) {
+                                            Observation& observation,
+                                            const Matrix6d& reference_error) {
   const Look& seen = lookAt(frame, reference, observation.world_from_object, care);
   // The same place, but for what is too little to be told, gives the same numbers.
   const Eigen::Isometry3d pose = care == Care::kForward ? observation.world_from_object : seen.pose;
@@ -173,7 +180,7 @@ Eigen::Isometry3d ObjectTracker::refineOnce(const Frame& frame, const ReferenceV
                   pose, params, boundingDiagonal(model_.mesh), found);
   const size_t tracks = found.size();
   if (care != Care::kRough) addOutline(frame, seen, found);
-  const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params.pose);
+  const PoseFit fit = fitPose(found, frame.camera, pose, centroid_, params.pose, reference_error);
   // Few agreeing matches where many are due are the background, not the object.
   const int due = seedsInPicture(reference, frame.camera, fit.world_from_object);
   observation.found = fit.converged && fit.inliers >= kLeastInlierShare * tracks &&
@@ -315,6 +322,19 @@ ObjectTracker::Reference ObjectTracker::lastAsReference() const {
       last_->covariance, last_->covariance - last_->persistent};
 }
 
+// A reference passes its error on to all that is compared with it, other references among them: for
+// its pose the outline may say what the pose of the one before errs by. In between, poses follow
+// the points alone, which are smoother from frame to frame.
+ObjectTracker::Reference ObjectTracker::newReference(const Frame& frame, const Reference& nearest,
+                                                     const Observation& observation) {
+  Observation anchored = observation;
+  refineFinely(frame, nearest.view, drowned_ ? wide_ : params_, anchored, nearest.covariance);
+  const bool surely = anchored.inliers() >= kLeastInlierShare * observation.inliers();
+  const Observation& best = surely ? anchored : observation;
+  return {ReferenceView(frame, model_, best.world_from_object, cv::Mat(), params_.seed_count),
+          best.covariance, best.covariance - best.persistent};
+}
+
 // Looked at again with a reference whose errors are smaller, unless that shows too little of it.
 Observation ObjectTracker::withReference(const Frame& frame, const Reference& reference,
                                          Observation found) {
@@ -386,12 +406,11 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   if (change < kOtherView) return;
   const bool worn = observation.inliers() < params_.least_inliers * nearest.most_inliers;
   if (!worn && observation.coverage >= params_.least_coverage && change < kFarView) return;
+  Reference taken = newReference(frame, nearest, observation);
   if (static_cast<int>(references_.size()) >= params_.max_references) {
     references_.erase(references_.begin() + 1);  // the key frame stays
   }
-  references_.push_back(
-      {ReferenceView(frame, model_, observation.world_from_object, cv::Mat(), params_.seed_count),
-       observation.covariance, observation.covariance - observation.persistent});
+  references_.push_back(std::move(taken));
   due_inliers_ = static_cast<int>(references_.back().view.seeds().size());
   look_ = {};  // the references may have moved
 }

@@ -25,11 +25,15 @@ struct Linearisation {
   std::vector<double> alike;
 };
 
+// @param off  what the pose that the points show is off by, see fitPose
 Linearisation linearise(const std::vector<Correspondence>& correspondences, const Camera& camera,
-                        const Eigen::Isometry3d& pose, const Eigen::Vector3d& pivot, double floor) {
+                        const Eigen::Isometry3d& object, const Vector6d& off,
+                        const Eigen::Vector3d& pivot, double floor) {
   Linearisation lin;
   const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
+  const Eigen::Isometry3d shown = off.isZero(0.0) ? object : movePose(object, pivot, off);
   for (const Correspondence& c : correspondences) {
+    const Eigen::Isometry3d& pose = c.outline ? object : shown;
     const Eigen::Vector3d p_camera = camera_from_world * (pose * c.point);
     if (p_camera.z() <= 0.0) {
       lin.residual.emplace_back(1e6, 1e6);
@@ -79,12 +83,14 @@ struct NormalEquations {
   Vector6d right = Vector6d::Zero();
 };
 
-// Geman-McClure: weight (s^2 / (s^2 + r^2))^2 with r in the deviations found.
-NormalEquations weightedNormal(const Linearisation& lin, const std::vector<double>& lengths,
-                               const Deviations& found, double scale) {
-  NormalEquations normal;
+// Adds what the points say, or the outline. Geman-McClure: weight (s^2 / (s^2 + r^2))^2 with r in
+// the deviations found.
+void addWeighted(const Linearisation& lin, const std::vector<double>& lengths,
+                 const Deviations& found, double scale, bool outline, NormalEquations& normal) {
+  const double deviation = found.of(outline);
   for (size_t i = 0; i < lin.residual.size(); ++i) {
-    const double deviation = found.of(lin.outline[i]), length = lengths[i] / deviation;
+    if (lin.outline[i] != outline) continue;
+    const double length = lengths[i] / deviation;
     const double ratio = scale * scale / (scale * scale + length * length);
     const double weight = ratio * ratio / (deviation * deviation);
     const Eigen::Matrix<double, 6, 2> weighted =
@@ -92,7 +98,6 @@ NormalEquations weightedNormal(const Linearisation& lin, const std::vector<doubl
     normal.matrix += weighted * lin.jacobian[i];
     normal.right -= weighted * lin.residual[i];
   }
-  return normal;
 }
 
 // Directions that the tracks do not determine keep their start: a weak prior of one part in 1e-9.
@@ -102,9 +107,32 @@ Vector6d solveStep(const NormalEquations& normal) {
   return damped.ldlt().solve(normal.right);
 }
 
+// S of (A^-1 + C)^-1 = S A: what is left of the information A if its source errs by C.
+Matrix6d shareLeft(const Matrix6d& information, const Matrix6d& covariance) {
+  if (covariance.isZero(0.0)) return Matrix6d::Identity();
+  return (Matrix6d::Identity() + information * covariance).inverse();
+}
+
+// The pose's step; that of the points' common error is eliminated.
+// @param off  that error; out: after the step
+Vector6d solveStep(const Linearisation& lin, const std::vector<double>& lengths,
+                   const Deviations& found, double scale, const Matrix6d& reference,
+                   Vector6d& off) {
+  NormalEquations points;
+  addWeighted(lin, lengths, found, scale, false, points);
+  const Matrix6d share = shareLeft(points.matrix, reference);
+  NormalEquations normal{share * points.matrix, share * (points.right + points.matrix * off)};
+  addWeighted(lin, lengths, found, scale, true, normal);
+  const Vector6d step = solveStep(normal);
+  off = reference * share * (points.right + points.matrix * (off - step));
+  return step;
+}
+
 // A fit's inliers that are not of the outline, as least squares has them.
+// @param share  of what they tell, see shareLeft
 WhitenedTracks whitened(const std::vector<Correspondence>& correspondences,
-                        const Linearisation& lin, const std::vector<bool>& inlier) {
+                        const Linearisation& lin, const std::vector<bool>& inlier,
+                        const Matrix6d& share) {
   WhitenedTracks result;
   for (size_t i = 0; i < inlier.size(); ++i) {
     if (!inlier[i] || lin.outline[i]) continue;
@@ -112,7 +140,7 @@ WhitenedTracks whitened(const std::vector<Correspondence>& correspondences,
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(lin.information[i]).operatorSqrt();
     result.pixel.push_back(correspondences[i].pixel);
     result.residual.push_back(root * lin.residual[i]);
-    result.jacobian.push_back(root * lin.jacobian[i]);
+    result.jacobian.push_back(root * lin.jacobian[i] * share.transpose());
   }
   return result;
 }
@@ -147,7 +175,7 @@ Information chooseInliers(const std::vector<Correspondence>& correspondences,
 }
 
 void judge(const std::vector<Correspondence>& correspondences, const Linearisation& lin,
-           const PoseFitParams& params, PoseFit& fit) {
+           const PoseFitParams& params, const Matrix6d& reference, PoseFit& fit) {
   const std::vector<double> all = lengths(lin);
   const Deviations found = robustDeviations(lin, all);
   fit.deviation = found.points;
@@ -158,18 +186,21 @@ void judge(const std::vector<Correspondence>& correspondences, const Linearisati
     return;
   const double of_points = found.of(false) * found.of(false),
                of_outline = found.of(true) * found.of(true);
-  const Eigen::LDLT<Matrix6d> factor(sum.points / of_points + sum.outline / of_outline);
+  const Matrix6d told = sum.points / of_points, share = shareLeft(told, reference);
+  const Eigen::LDLT<Matrix6d> factor(share * told + sum.outline / of_outline);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0.0)) return;
   fit.common = (fit.inliers + 0.5 * sum.outline_inliers) * params.common_px * params.common_px *
                sum.geometry.inverse();
   const SharedError shared =
-      sharedError(whitened(correspondences, lin, fit.inlier), found.points, params.patch_px);
+      sharedError(whitened(correspondences, lin, fit.inlier, share), found.points, params.patch_px);
   const Matrix6d alone = shared.alone / (of_points * of_points) + sum.outline_apart / of_outline;
   const Matrix6d together =
       shared.together / (of_points * of_points) + (sum.outline - sum.outline_apart) / of_outline;
   const Matrix6d inverse = factor.solve(Matrix6d::Identity());
-  const Eigen::Matrix<double, 6, kShapeTerms> bias = inverse * sum.shape / of_points;
-  fit.persistent = inverse * together * inverse + bias * bias.transpose();
+  const Eigen::Matrix<double, 6, kShapeTerms> bias = inverse * share * sum.shape / of_points;
+  const Matrix6d passed_on = inverse * share * told;  // of the reference's error
+  fit.persistent = inverse * together * inverse + bias * bias.transpose() +
+                   passed_on * reference * passed_on.transpose();
   fit.covariance = inverse * alone * inverse + fit.persistent;
   fit.converged = fit.covariance.allFinite();
 }
@@ -196,25 +227,26 @@ Eigen::Isometry3d movePose(const Eigen::Isometry3d& world_from_object, const Eig
 
 PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera& camera,
                 const Eigen::Isometry3d& start, const Eigen::Vector3d& pivot,
-                const PoseFitParams& params) {
+                const PoseFitParams& params, const Matrix6d& reference) {
   PoseFit fit;
   fit.world_from_object = start;
   if (static_cast<int>(correspondences.size()) < params.least_inliers) return fit;
-  Linearisation lin = linearise(correspondences, camera, start, pivot, params.floor_px);
+  Vector6d off = Vector6d::Zero();
+  Linearisation lin = linearise(correspondences, camera, start, off, pivot, params.floor_px);
   double scale = std::max(4.0, params.start_scale_px / params.floor_px);
   for (int iteration = 0; iteration < params.max_iterations; ++iteration) {
     const std::vector<double> residuals = lengths(lin);
     const Vector6d step =
-        solveStep(weightedNormal(lin, residuals, robustDeviations(lin, residuals), scale));
+        solveStep(lin, residuals, robustDeviations(lin, residuals), scale, reference, off);
     if (!step.allFinite()) return fit;
     fit.world_from_object = movePose(fit.world_from_object, pivot, step);
-    lin = linearise(correspondences, camera, fit.world_from_object, pivot, params.floor_px);
+    lin = linearise(correspondences, camera, fit.world_from_object, off, pivot, params.floor_px);
     const bool annealed = scale <= kRobust;
     const double change = (lin.jacobian[0] * step).norm();
     if (annealed && change < 1e-4) break;
     scale = std::max(kRobust, 0.5 * scale);
   }
-  judge(correspondences, lin, params, fit);
+  judge(correspondences, lin, params, reference, fit);
   return fit;
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <random>
 
 #include "calipso_flow/rotation.hpp"
@@ -158,6 +159,52 @@ TEST(PoseFit, theOutlineIsWeighedByHowWellItFits) {
   ASSERT_TRUE(fit.converged);
   // 60 points of 0.02 px at 200 px/m: the weakest direction scatters by about 0.2 mm.
   EXPECT_LT((fit.world_from_object.translation() - somePose().translation()).norm(), 0.001);
+}
+
+// Points whose reference errs show another pose than the outline: together they are nearer to the
+// truth than either alone, and as near as is stated.
+TEST(PoseFit, theOutlineTellsWhatThePointsReferenceErrsBy) {
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  const Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
+  Vector6d deviation;
+  deviation << 0.004, 0.004, 0.004, 0.02, 0.02, 0.02;
+  const Matrix6d reference = deviation.cwiseAbs2().asDiagonal();
+  double taken_as_exact = 0.0, told = 0.0, by_outline = 0.0;
+  int inside = 0;
+  constexpr int kRepeats = 200;
+  for (int i = 0; i < kRepeats; ++i) {
+    Vector6d off;
+    for (int k = 0; k < 6; ++k) off[k] = deviation[k] * normal(random);
+    auto points = correspondences(movePose(somePose(), pivot, off), 0.05, 1000 + 2 * i);
+    const size_t count = points.size();
+    for (Correspondence& c : correspondences(somePose(), 0.8, 1001 + 2 * i)) {
+      const Eigen::Vector2d across = Eigen::Vector2d(c.point.x(), c.point.z()).normalized(),
+                            along(-across.y(), across.x());
+      c.covariance += 1e6 * along * along.transpose();
+      c.outline = true;
+      points.push_back(c);
+    }
+    const auto fitted = [&](const Matrix6d& error) {
+      return fitPose(points, test::testCamera(), somePose(), pivot, {}, error);
+    };
+    const auto error = [&](const PoseFit& fit) {
+      Vector6d by;
+      by << fit.world_from_object * pivot - somePose() * pivot,
+          vectorFromRotation(fit.world_from_object.linear() * somePose().linear().transpose());
+      return by;
+    };
+    const PoseFit fit = fitted(reference);
+    ASSERT_TRUE(fit.converged);
+    EXPECT_EQ(std::count(fit.inlier.begin(), fit.inlier.begin() + count, true), fit.inliers);
+    told += error(fit).squaredNorm();
+    taken_as_exact += error(fitted(Matrix6d::Zero())).squaredNorm();
+    by_outline += error(fitted(1e6 * reference)).squaredNorm();
+    inside += error(fit).dot(fit.covariance.ldlt().solve(error(fit))) < 12.59;
+  }
+  EXPECT_LT(told, 0.7 * taken_as_exact);
+  EXPECT_LT(told, 0.7 * by_outline);
+  EXPECT_GE(inside, 0.90 * kRepeats);  // 95 % of a chi-squared of 6 degrees of freedom
 }
 
 TEST(PoseFit, saysSoWhenThereAreTooFewPoints) {

@@ -108,7 +108,11 @@ class ObjectTracker {
   void approach(const Frame& frame, const ReferenceView& reference, const TrackerParams& params,
                 Observation& observation);
   Eigen::Isometry3d refineOnce(const Frame& frame, const ReferenceView& reference, Care care,
-                               const TrackerParams& params, Observation& observation);
+                               const TrackerParams& params, Observation& observation,
+                               const Matrix6d& reference_error = Matrix6d::Zero());
+  // @param reference_error  covariance of what the outline may say of the reference's own pose
+  void refineFinely(const Frame& frame, const ReferenceView& reference, const TrackerParams& params,
+                    Observation& observation, const Matrix6d& reference_error = Matrix6d::Zero());
   Reference& nearestReference(const Frame& frame, const Eigen::Isometry3d& pose);
   bool hasStayed(const Frame& frame, const Reference& nearest);
   Observation inPlace(const Frame& frame, const Reference& nearest);
@@ -120,6 +124,8 @@ class ObjectTracker {
   Observation findTurned(const Frame& frame, const Reference& nearest,
                          const Eigen::Isometry3d& predicted);
   Reference lastAsReference() const;
+  Reference newReference(const Frame& frame, const Reference& nearest,
+                         const Observation& observation);
   Observation withReference(const Frame& frame, const Reference& reference, Observation found);
   Observation search(const Frame& frame, const Reference& nearest,
                      const Eigen::Isometry3d& predicted);

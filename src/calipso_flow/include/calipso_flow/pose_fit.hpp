@@ -55,9 +55,12 @@ struct PoseFit {
 // error, the scale of the Geman-McClure weight shrinking from start_scale_px to the noise found.
 // @param start  first guess of world_from_object
 // @param pivot  object frame, m; the point whose position the covariance speaks of
+// @param reference  covariance (m of the pivot, rad), world axes, of an error that all points but
+//                   the outline's have in common: that of the pose they were taken from. The
+//                   outline tells it in part; the pose's covariance holds what is left.
 PoseFit fitPose(const std::vector<Correspondence>& correspondences, const Camera& camera,
                 const Eigen::Isometry3d& start, const Eigen::Vector3d& pivot,
-                const PoseFitParams& params = {});
+                const PoseFitParams& params = {}, const Matrix6d& reference = Matrix6d::Zero());
 
 // Moves a pose parallel to the picture plane, so that its pivot (object frame, m) moves by
 // `pixels`.
