@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace calipso::render {
 namespace {
@@ -26,12 +27,15 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const L
       away_column_(params.away_column),
       away_farther_(params.away_farther) {
   for (int v = 0; v < level.hole.rows; ++v) {
-    for (int u = 0; u < columns_; ++u) {
-      Known& known = places_[v * columns_ + u];
-      if (!level.nearness.empty()) known.nearness = level.nearness.at<float>(v, u);
-      if (!level.surface.empty()) known.surface = level.surface.at<std::uint8_t>(v, u);
-      if (!level.sky.empty()) known.sky = level.sky.at<std::uint8_t>(v, u);
-    }
+    Known* known = &places_[v * columns_];
+    const auto take = [&](const cv::Mat& values, auto Known::*to) {
+      using Value = std::remove_reference_t<decltype(known->*to)>;
+      const Value* row = values.empty() ? nullptr : values.ptr<Value>(v);
+      for (int u = 0; u < columns_ && row != nullptr; ++u) known[u].*to = row[u];
+    };
+    take(level.nearness, &Known::nearness);
+    take(level.surface, &Known::surface);
+    take(level.sky, &Known::sky);
   }
 }
 

@@ -33,7 +33,12 @@ class Seams {
  public:
   Seams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, const cv::Mat& planes,
         const cv::Mat& image)
-      : hole_(hole), source_(source), origin_(origin), planes_(planes), image_(image) {}
+      : hole_(hole),
+        source_(source),
+        origin_(origin),
+        planes_(planes),
+        image_(image),
+        has_planes_(!planes.empty()) {}
 
   // First one colour of a chessboard, then the other: a field's neighbours have the other one, so
   // that none waits for the one before it.
@@ -63,7 +68,7 @@ class Seams {
       const cv::Point q = node.at + kAround[i];
       node.neighbours[i] = static_cast<int>(none);
       if (!inside(q) || (index.at<int>(q) < 0 && source_.at<std::uint8_t>(q) == 0)) continue;
-      if (index.at<int>(q) >= 0 && !planes_.empty() && differ(planes_, node.at, q)) continue;
+      if (index.at<int>(q) >= 0 && has_planes_ && differ(planes_, node.at, q)) continue;
       if (index.at<int>(q) >= 0) node.neighbours[i] = index.at<int>(q);
       node.count += 1.0f;
       const cv::Vec3f miss = colour(q) - colour(node.at) - wanted(node.at, q);
@@ -94,6 +99,7 @@ class Seams {
   }
 
   const cv::Mat &hole_, &source_, &origin_, &planes_, &image_;
+  bool has_planes_;
 };
 
 // What is added: mismatches spread by a screened Poisson equation, all channels at once. Known

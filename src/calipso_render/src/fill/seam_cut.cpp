@@ -71,6 +71,8 @@ class Seams {
         known_(known),
         surface_(params.surface),
         sky_(params.sky),
+        has_surface_(!surface_.empty()),
+        has_sky_(!sky_.empty()),
         lively_(liveliness(image, source)),
         label_(hole.size(), CV_32S, cv::Scalar(kNoCopy)),
         node_(hole.size(), CV_32S, cv::Scalar(kNoCopy)) {
@@ -168,8 +170,7 @@ class Seams {
     if (!inside(from) || source_.at<std::uint8_t>(from) == 0) return false;
     const cv::Point covered = p + ways_[label_.at<int>(p)];
     if (lively_.at<float>(from) < kBland * lively_.at<float>(covered)) return false;
-    return (surface_.empty() || !differ(surface_, p, from)) &&
-           (sky_.empty() || !differ(sky_, p, from));
+    return !(has_surface_ && differ(surface_, p, from)) && !(has_sky_ && differ(sky_, p, from));
   }
 
   // Pixels of other copies around one that it has something to put on.
@@ -247,6 +248,7 @@ class Seams {
   }
 
   const cv::Mat &image_, &hole_, &source_, &known_, &surface_, &sky_;
+  bool has_surface_, has_sky_;
   cv::Mat lively_;        // CV_32FC1: gradients around what may be copied
   cv::Mat label_, node_;  // CV_32SC1: of the copy, and in the graph of the move at hand
   cv::Mat right_, down_;  // CV_32FC1: weights of steps
