@@ -81,10 +81,9 @@ float Sightings::trustAround(std::size_t view, const Sighting& look, Accepts acc
   const int v = static_cast<int>(std::lround(std::clamp(look.v, -9.0f, r.region.height + 9.0f)));
   float trust = 0.0f;
   for (int y = std::max(0, v - 1); y <= std::min(r.region.height - 1, v + 1); ++y) {
+    const float *here = r.trust.ptr<float>(y), *nearness = r.nearness.ptr<float>(y);
     for (int x = std::max(0, u - 1); x <= std::min(r.region.width - 1, u + 1); ++x) {
-      const cv::Point pixel(x, y);
-      const float here = r.trust.at<float>(pixel);
-      if (here > trust && r.nearness.at<float>(pixel) > 0.0f && accepts(pixel)) trust = here;
+      if (here[x] > trust && nearness[x] > 0.0f && accepts(cv::Point(x, y))) trust = here[x];
     }
   }
   return trust;

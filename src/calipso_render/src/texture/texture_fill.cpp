@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -52,9 +53,15 @@ struct Layers {
 // How one of the pictures shows a place.
 struct Look {
   int view;
-  float u, v;    // in Reflectance::region
-  float weight;  // Sighting::weight
-  float share;   // in the place's colour, against other looks at it
+  float u, v;   // in Reflectance::region
+  float share;  // in the place's colour, against other looks at it
+};
+
+// How the pictures show a texel.
+struct Seen {
+  float total = 0.0f;     // how well, sum of weights, cubed
+  float key = 0.0f;       // Sighting::weight in the key frame
+  std::uint32_t end = 0;  // of its looks, among those at its triangle
 };
 
 class TextureFill {
@@ -109,11 +116,10 @@ class TextureFill {
     explicit Origins(std::size_t texels) : from(texels), certain(texels), layer(texels) {}
   };
 
-  // How the pictures show a triangle's texels: the looks at texel i, of the triangle's, end at
-  // ends[i].
+  // How the pictures show a triangle's texels.
   struct Looks {
     std::vector<Look> all;
-    std::vector<std::size_t> ends;
+    std::vector<Seen> texels;
   };
 
   void findLooks(const SurfaceTexture& texture) {
@@ -126,12 +132,10 @@ class TextureFill {
         const std::size_t texels = texture.firstOf(t + 1) - texture.firstOf(t);
         Looks& looks = looks_[t];
         found.clear();
-        looks.ends.reserve(texels);
+        looks.texels.reserve(texels);
         const std::vector<std::size_t> showing = viewsShowing(t);
-        for (std::size_t i = 0; i < texels; ++i) {
-          addLooks(t, texture.weightsOf(t, i), showing, found);
-          looks.ends.push_back(found.size());
-        }
+        for (std::size_t i = 0; i < texels; ++i)
+          looks.texels.push_back(addLooks(t, texture.weightsOf(t, i), showing, found));
         looks.all = found;
       }
     }
@@ -153,16 +157,21 @@ class TextureFill {
 
   // Of the pictures that show a place, those count most that show it in most detail, and not in a
   // highlight: the light tells that too badly to be taken off without a trace.
-  void addLooks(int triangle, const Eigen::Vector3f& w, const std::vector<std::size_t>& showing,
+  Seen addLooks(int triangle, const Eigen::Vector3f& w, const std::vector<std::size_t>& showing,
                 std::vector<Look>& looks) const {
+    Seen seen;
     for (const std::size_t i : showing) {
       const Sighting l = sightings_.lookAt(
           i, placeOf(triangle, w, actors_[i]->vertices, actors_[i]->normals), 1.0f);
       if (l.weight <= 0.0f) continue;
-      const float telling = l.detail * sightings_.clearAt(i, l);
-      looks.push_back({static_cast<int>(i), l.u, l.v, l.weight,
-                       l.weight * l.weight * l.weight * telling * telling});
+      const float telling = l.detail * sightings_.clearAt(i, l),
+                  cubed = l.weight * l.weight * l.weight;
+      looks.push_back({static_cast<int>(i), l.u, l.v, cubed * telling * telling});
+      seen.total += cubed * (i == 0 ? 1.0f : kFurther);
+      if (i == 0) seen.key = l.weight;
     }
+    seen.end = static_cast<std::uint32_t>(looks.size());
+    return seen;
   }
 
   void makeTexels(SurfaceTexture& texture, Origins& origins) const {
@@ -170,11 +179,15 @@ class TextureFill {
     for (int t = 0; t < texture.triangleCount(); ++t) {
       const Looks& looks = looks_[t];
       const std::size_t first = texture.firstOf(t);
-      std::size_t begin = 0;
-      for (std::size_t i = 0; i < looks.ends.size(); begin = looks.ends[i++])
-        origins.from[first + i] = texelAt(
-            t, texture.weightsOf(t, i), looks.all.data() + begin, looks.all.data() + looks.ends[i],
-            texture.texels[first + i], origins.certain[first + i], origins.layer[first + i]);
+      const Look* look = looks.all.data();
+      for (std::size_t i = 0; i < looks.texels.size(); ++i) {
+        const Seen& seen = looks.texels[i];
+        const Look* end = looks.all.data() + seen.end;
+        origins.from[first + i] =
+            texelAt(t, texture.weightsOf(t, i), seen, look, end, texture.texels[first + i],
+                    origins.certain[first + i], origins.layer[first + i]);
+        look = end;
+      }
     }
   }
 
@@ -254,15 +267,15 @@ class TextureFill {
   }
 
   // @param look, end the looks at the place. @param certain, layer out: of Origins
-  From texelAt(int triangle, const Eigen::Vector3f& w, const Look* look, const Look* end,
-               cv::Vec4f& texel, float& certain, signed char& layer) const {
+  From texelAt(int triangle, const Eigen::Vector3f& w, const Seen& seen, const Look* look,
+               const Look* end, cv::Vec4f& texel, float& certain, signed char& layer) const {
+    const float total = seen.total, key = seen.key;
     cv::Vec3f sum;
-    float total = 0.0f, shares = 0.0f, key = 0.0f, key_share = 0.0f;
+    float shares = 0.0f, key_share = 0.0f;
     for (; look != end; ++look) {
       sum += colourOf(sampleBicubic(shown_[look->view], look->u, look->v)) * look->share;
-      total += look->weight * look->weight * look->weight * (look->view == 0 ? 1.0f : kFurther);
       shares += look->share;
-      if (look->view == 0) key = look->weight, key_share = look->share;
+      if (look->view == 0) key_share = look->share;
     }
     if (shares > 0.0f) sum *= 1.0f / shares, key_share *= 1.0f / shares;
     Layers layers;
