@@ -71,9 +71,6 @@ std::vector<View> lightViewsOf(const std::vector<View>& views) {
   std::vector<View> some = {views.front()};
   const std::size_t further = views.size() - 1, count = std::min(further, kLightViews);
   for (std::size_t i = 0; i < count; ++i) some.push_back(views[(i + 1) * further / count]);
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t i = 1; i < some.size(); ++i)
-    some[i].picture.convertTo(some[i].picture, CV_32F);  // the other view keeps its own
   return some;
 }
 

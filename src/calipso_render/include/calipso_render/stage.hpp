@@ -91,11 +91,15 @@ SurfacePoint surfacePoint(const Actor& actor, int triangle, const Eigen::Vector3
 
 // One picture of the clip with its objects where they were.
 struct View {
-  // CV_32FC3, code values; a frame's own, CV_8UC3, where texture alone comes of it
-  cv::Mat picture;
-  cv::Mat labels;  // CV_8UC1
+  cv::Mat picture;  // code values: CV_32FC3, the key frame's; CV_8UC3, another frame's own
+  cv::Mat labels;   // CV_8UC1
   Camera camera;
   std::vector<Actor> actors;
+
+  cv::Vec3f codeAt(int v, int u) const {
+    return picture.depth() == CV_8U ? cv::Vec3f(picture.at<cv::Vec3b>(v, u))
+                                    : picture.at<cv::Vec3f>(v, u);
+  }
 };
 
 // The support plane that pixel (u, v) of the camera looks at.

@@ -83,7 +83,7 @@ void collect(const View& view, int picture, std::size_t object, const Eigen::Vec
       const Eigen::Vector3f towards = (eye - s.position).normalized();
       if (s.normal.dot((light + towards).normalized()) < kNearMirror || s.normal.dot(light) <= 0.0f)
         continue;
-      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v + map.region.y, u + map.region.x);
+      const cv::Vec3f code = view.codeAt(v + map.region.y, u + map.region.x);
       HighlightSample h{{s.position, s.normal, towards, {}, -1, s.seen, picture},
                         spreadAt(map.normals, u, v),
                         object};

@@ -28,7 +28,7 @@ struct Pixel {
 };
 
 // Pixels well inside the object's mask that its surface covers, thinned evenly.
-std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const cv::Mat& picture,
+std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const View& view,
                                 const cv::Mat& inside, std::size_t limit) {
   std::vector<Pixel> pixels;
   const cv::Rect& r = buffer.region();
@@ -37,7 +37,7 @@ std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const cv::Mat& p
       if (buffer.ids(v)[u] == VisibilityBuffer::kNothing ||
           inside.at<std::uint8_t>(v + r.y, u + r.x) == 0)
         continue;
-      const cv::Vec3f& x = picture.at<cv::Vec3f>(v + r.y, u + r.x);
+      const cv::Vec3f x = view.codeAt(v + r.y, u + r.x);
       if (std::max({x[0], x[1], x[2]}) < kSaturated) pixels.push_back({u + r.x, v + r.y});
     }
   }
@@ -77,13 +77,13 @@ void sampleView(const View& view, int picture, std::size_t object, std::size_t l
   cv::Mat inside;
   cv::erode(view.labels == actor.surface->index, inside,
             cv::Mat::ones(2 * kRim + 1, 2 * kRim + 1, CV_8U));
-  for (const Pixel& p : usablePixels(buffer, view.picture, inside, limit)) {
+  for (const Pixel& p : usablePixels(buffer, view, inside, limit)) {
     const int triangle = VisibilityBuffer::triangleOf(buffer.idAt(p.u, p.v));
     const SurfacePoint s = surfacePoint(actor, triangle, p.u, p.v, eye);
     const Eigen::Vector3f towards = (eye - s.position).normalized();
     if (s.normal.dot(towards) < kGrazingView) continue;
     LightSample sample{s.position, s.normal, towards, {}, 0, s.seen, picture};
-    const cv::Vec3f& code = view.picture.at<cv::Vec3f>(p.v, p.u);
+    const cv::Vec3f code = view.codeAt(p.v, p.u);
     for (int c = 0; c < 3; ++c) sample.radiance[c] = linearFromRealCode(code[c]);
     samples.push_back(sample);
   }
@@ -103,7 +103,7 @@ void lookBelow(const View& view, const std::vector<SupportPlane>& planes, LightE
       const auto receiver = receiverAt(planes, view.camera, u, v);
       if (!receiver || (receiver->position - box.center()).norm() > kAround * box.diagonal().norm())
         continue;
-      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v, u);
+      const cv::Vec3f code = view.codeAt(v, u);
       for (int c = 0; c < 3; ++c) sum[c] += linearFromRealCode(code[c]);
       ++count;
     }

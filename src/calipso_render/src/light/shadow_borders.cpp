@@ -208,7 +208,7 @@ class Borders {
         if (std::abs(across) > kAcross || std::abs(n.x() * off.y() - n.y() * off.x()) > kAlong)
           continue;
         if (shade_.at<std::uint8_t>(v, u) == kNone) return std::nullopt;
-        const cv::Vec3f& code = view_.picture.at<cv::Vec3f>(v, u);
+        const cv::Vec3f code = view_.codeAt(v, u);
         profile.values[across + kAcross] +=
             luminance({linearFromRealCode(code[0]), linearFromRealCode(code[1]),
                        linearFromRealCode(code[2])});

@@ -158,8 +158,7 @@ ShadowClue::ShadowClue(const std::vector<View>& views, const std::vector<bool>& 
           ++unknown;
           continue;
         }
-        const float darkness =
-            logBrightness(*without) - logBrightness(views[i].picture.at<cv::Vec3f>(v, u));
+        const float darkness = logBrightness(*without) - logBrightness(views[i].codeAt(v, u));
         samples.push_back(
             {receiver->position, receiver->normal, std::clamp(darkness, kBrighter, kDarker), 0});
       }

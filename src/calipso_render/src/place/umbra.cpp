@@ -37,7 +37,7 @@ void collect(const View& view, const std::vector<SupportPlane>& planes, const Em
         continue;
       const auto lit_code = unshaded(place, camera_from_world, r.position);
       const float open = sky.visibility(r.position, r.normal);
-      const cv::Vec3f& code = view.picture.at<cv::Vec3f>(v, u);
+      const cv::Vec3f code = view.codeAt(v, u);
       for (int c = 0; c < 3 && lit_code && open >= kOpenSky; ++c) {
         const float lit = linearFromRealCode((*lit_code)[c]) * open;
         if (lit > kDark) ratios[c].push_back(linearFromRealCode(code[c]) / lit);
