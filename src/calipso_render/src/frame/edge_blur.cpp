@@ -66,10 +66,15 @@ class Outlines {
   std::vector<float> widths() const {
     std::vector<std::vector<cv::Point>> outlines;
     cv::findContours(labels_ != 0, outlines, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
-    std::vector<float> found;
+    std::vector<cv::Point> places;
     for (const auto& outline : outlines)
-      for (std::size_t i = 0; i < outline.size(); i += kStride)
-        if (const auto width = widthOf(samplesAt(outline[i]))) found.push_back(*width);
+      for (std::size_t i = 0; i < outline.size(); i += kStride) places.push_back(outline[i]);
+    std::vector<std::optional<float>> widths(places.size());
+#pragma omp parallel for schedule(dynamic, 8)
+    for (std::size_t i = 0; i < places.size(); ++i) widths[i] = widthOf(samplesAt(places[i]));
+    std::vector<float> found;
+    for (const std::optional<float>& width : widths)
+      if (width) found.push_back(*width);
     return found;
   }
 

@@ -109,11 +109,15 @@ std::vector<HighlightSample> highlightSamples(const std::vector<View>& views,
       all.insert(all.end(), own.begin(), own.end());
   }
   const std::size_t step = std::max<std::size_t>(1, all.size() / kMost);
-  for (std::size_t i = 0; i < all.size(); i += step) {
-    thinned.push_back(all[i]);
-    thinned.back().at.cluster = nearestCluster(samples, all[i].at.picture, all[i].at.position);
-    if (thinned.back().at.cluster < 0) thinned.pop_back();
+  for (std::size_t i = 0; i < all.size(); i += step) thinned.push_back(all[i]);
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < thinned.size(); ++i) {
+    LightSample& at = thinned[i].at;
+    at.cluster = nearestCluster(samples, at.picture, at.position);
   }
+  thinned.erase(std::remove_if(thinned.begin(), thinned.end(),
+                               [](const HighlightSample& h) { return h.at.cluster < 0; }),
+                thinned.end());
   return thinned;
 }
 

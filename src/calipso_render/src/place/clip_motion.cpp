@@ -67,11 +67,14 @@ bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface) 
 }
 
 bool swaysInVideo(const std::vector<ClipFrame>& frames, int index) {
+  const cv::Mat key = frames.front().labels == index;
+  const cv::Rect box = cv::boundingRect(key);
+  if (box.empty()) return false;
   cv::Mat key_picture, picture, same;
-  cv::blur(frames.front().bgr, key_picture, {3, 3});
+  cv::blur(frames.front().bgr(box), key_picture, {3, 3});
   for (const ClipFrame& f : frames) {
-    const cv::Mat both = (f.labels == index) & (frames.front().labels == index);
-    cv::blur(f.bgr, picture, {3, 3});
+    const cv::Mat both = (f.labels(box) == index) & key(box);
+    cv::blur(f.bgr(box), picture, {3, 3});
     cv::absdiff(picture, key_picture, picture);
     cv::inRange(picture, cv::Scalar(), cv::Scalar::all(kSameCodes), same);
     if (cv::countNonZero(both & ~same) > kSwayed * cv::countNonZero(both)) return true;
