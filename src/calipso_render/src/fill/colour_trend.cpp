@@ -83,7 +83,9 @@ cv::Mat colourTrend(const cv::Mat& image, const cv::Mat& known) {
   cv::Mat trend = cv::Mat::zeros(image.size(), CV_32FC3);
   const std::vector<Sample> samples = samplesOf(image, known);
   if (samples.size() < kFewest) return trend;
-  const Terms x[3] = {fitted(samples, 0), fitted(samples, 1), fitted(samples, 2)};
+  Terms x[3];
+#pragma omp parallel for schedule(static, 1)
+  for (int c = 0; c < 3; ++c) x[c] = fitted(samples, c);
   if (!(explained(samples, x) >= kExplains)) return trend;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> values;  // of the trend where it is known
@@ -93,6 +95,7 @@ cv::Mat colourTrend(const cv::Mat& image, const cv::Mat& known) {
         static_cast<std::size_t>(kExtremes * static_cast<double>(values.size()));
     const double low = values[few], middle = values[values.size() / 2],
                  high = values[values.size() - 1 - few];
+#pragma omp parallel for schedule(static)
     for (int v = 0; v < trend.rows; ++v) {
       for (int u = 0; u < trend.cols; ++u)
         trend.at<cv::Vec3f>(v, u)[c] = static_cast<float>(

@@ -60,6 +60,13 @@ cv::Mat stepWeight(const cv::Mat& picture, const cv::Point& next) {
   return 1.0f / (grain + kLeastGrain);
 }
 
+cv::Rect aroundHole(const cv::Mat& hole, int margin) {
+  const cv::Rect box = cv::boundingRect(hole);
+  return cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin,
+                  box.height + 2 * margin) &
+         cv::Rect({0, 0}, hole.size());
+}
+
 // A labelling of the hole's pixels by the way to what they are copies of.
 class Seams {
  public:
@@ -73,10 +80,11 @@ class Seams {
         sky_(params.sky),
         has_surface_(!surface_.empty()),
         has_sky_(!sky_.empty()),
+        near_(aroundHole(hole, 1 + kGrainSide / 2)),
         lively_(liveliness(image, source)),
         label_(hole.size(), CV_32S, cv::Scalar(kNoCopy)),
         node_(hole.size(), CV_32S, cv::Scalar(kNoCopy)) {
-    cv::Mat picture = image.clone();
+    cv::Mat picture = image(near_).clone();
     std::map<std::pair<int, int>, int> labels;
     for (int v = 0; v < hole.rows; ++v) {
       int last = kNoCopy;  // most copies go on along a row
@@ -92,7 +100,8 @@ class Seams {
         if (label == next) ways_.push_back(way), pixels_.emplace_back();
         pixels_[label].emplace_back(u, v);
         label_.at<int>(v, u) = label;
-        picture.at<cv::Vec3f>(v, u) = image.at<cv::Vec3f>(from[1], from[0]);
+        picture.at<cv::Vec3f>(cv::Point(u, v) - near_.tl()) =
+            image.at<cv::Vec3f>(from[1], from[0]);
       }
     }
     right_ = stepWeight(picture, {1, 0}), down_ = stepWeight(picture, {0, 1});
@@ -207,7 +216,8 @@ class Seams {
   }
 
   float weight(const cv::Point& p, const cv::Point& q) const {
-    return (p.y == q.y ? right_ : down_).at<float>(std::min(p.y, q.y), std::min(p.x, q.x));
+    const cv::Point first(std::min(p.x, q.x), std::min(p.y, q.y));
+    return (p.y == q.y ? right_ : down_).at<float>(first - near_.tl());
   }
 
   // What shows of the border between two pixels.
@@ -249,9 +259,10 @@ class Seams {
 
   const cv::Mat &image_, &hole_, &source_, &known_, &surface_, &sky_;
   bool has_surface_, has_sky_;
+  cv::Rect near_;         // what the steps' weights are told from
   cv::Mat lively_;        // CV_32FC1: gradients around what may be copied
   cv::Mat label_, node_;  // CV_32SC1: of the copy, and in the graph of the move at hand
-  cv::Mat right_, down_;  // CV_32FC1: weights of steps
+  cv::Mat right_, down_;  // CV_32FC1: weights of steps, of what is near
   std::vector<cv::Point> ways_;
   std::vector<std::vector<cv::Point>> pixels_;  // of every copy, at first
 };
