@@ -22,8 +22,6 @@ constexpr double kSameLookShare = 0.025;
 constexpr double kClearShare = 0.7;
 // looks that differ by this, but for where they are, serve for one another
 constexpr double kSameShapePx = 1.0;
-constexpr double kOtherView = 0.1;  // rad, or relative distance: looks from nearer show the same
-constexpr double kLeastInlierShare = 0.35;   // of the matches
 constexpr double kLeastVisibleShare = 0.25;  // of the seeds inside the picture
 constexpr int kWeakInliers = 12;             // fewer tracks than this are worth another attempt
 constexpr double kStaysShare = 0.01;         // of the diagonal: what moves less has not moved
@@ -34,8 +32,6 @@ constexpr double kDrownedShare = 0.35;
 constexpr double kTurnedShare = 0.35;  // of the tracks due: with fewer the object may have turned
 constexpr size_t kTurnsTried = 6;
 constexpr double kTurnedView = 0.4;  // rad, or relative distance: half of what is searched
-// rad, or relative distance: seen from farther a look is drawn out
-constexpr double kFarView = 0.5;
 // of the object's extent, of its outline seen from another side
 constexpr double kShapeError = 0.01;
 constexpr double kIndependent = 1.5;  // errors along an outline: they are off nearly as one
@@ -316,32 +312,6 @@ Observation ObjectTracker::findTurned(const Frame& frame, const Reference& neare
   return best;
 }
 
-ObjectTracker::Reference ObjectTracker::lastAsReference() const {
-  return {
-      ReferenceView(last_frame_, model_, last_->world_from_object, cv::Mat(), params_.seed_count),
-      last_->covariance, last_->covariance - last_->persistent};
-}
-
-// A reference passes its error on to all that is compared with it, other references among them: for
-// its pose the outline may say what the pose of the one before errs by. In between, poses follow
-// the points alone, which are smoother from frame to frame.
-ObjectTracker::Reference ObjectTracker::newReference(const Frame& frame, const Reference& nearest,
-                                                     const Observation& observation) {
-  Observation anchored = observation;
-  refineFinely(frame, nearest.view, drowned_ ? wide_ : params_, anchored, nearest.covariance);
-  const bool surely = anchored.inliers() >= kLeastInlierShare * observation.inliers();
-  const Observation& best = surely ? anchored : observation;
-  return {ReferenceView(frame, model_, best.world_from_object, cv::Mat(), params_.seed_count),
-          best.covariance, best.covariance - best.persistent};
-}
-
-// Looked at again with a reference whose errors are smaller, unless that shows too little of it.
-Observation ObjectTracker::withReference(const Frame& frame, const Reference& reference,
-                                         Observation found) {
-  Observation again = refine(frame, reference, found.world_from_object, drowned_ ? wide_ : params_);
-  return again.inliers() >= kLeastInlierShare * found.inliers() ? again : found;
-}
-
 // What has turned since its reference still looks as it did a frame ago. Found so, it is looked at
 // again with the reference, whose errors are smaller.
 std::optional<Observation> ObjectTracker::fromFrameBefore(const Frame& frame,
@@ -386,33 +356,6 @@ Matrix6d ObjectTracker::driftSinceLast(const Observation& observation, double ch
       (1.0 - std::exp(-change / kViewLength)) * (last_->persistent + observation.persistent);
   if (observation.reference_time == last_->reference_time) return forgotten;
   return forgotten + last_->reference_error + observation.reference_error;
-}
-
-void ObjectTracker::remember(const Frame& frame, const Observation& observation, bool cut) {
-  before_last_ = cut ? std::nullopt : last_;
-  last_ = observation;
-  last_frame_ = frame;
-  const double depth =
-      (frame.camera.world_from_camera.inverse() * (observation.world_from_object * centroid_))
-          .norm();
-  if (cut) fall_ = {};
-  fall_.take(measured(observation), priorFor(frame.camera, depth, params_.gravity));
-  due_inliers_ = std::max(due_inliers_, observation.inliers());
-  Reference& nearest = nearestReference(frame, observation.world_from_object);
-  nearest.most_inliers = std::max(nearest.most_inliers, observation.inliers());
-  // A reference that shows the object from the same side would have the same tracks, and this
-  // pose's errors.
-  const double change = viewChange(nearest.view, frame, observation.world_from_object, centroid_);
-  if (change < kOtherView) return;
-  const bool worn = observation.inliers() < params_.least_inliers * nearest.most_inliers;
-  if (!worn && observation.coverage >= params_.least_coverage && change < kFarView) return;
-  Reference taken = newReference(frame, nearest, observation);
-  if (static_cast<int>(references_.size()) >= params_.max_references) {
-    references_.erase(references_.begin() + 1);  // the key frame stays
-  }
-  references_.push_back(std::move(taken));
-  due_inliers_ = static_cast<int>(references_.back().view.seeds().size());
-  look_ = {};  // the references may have moved
 }
 
 }  // namespace calipso::flow

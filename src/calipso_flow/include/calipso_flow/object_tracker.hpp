@@ -74,6 +74,8 @@ class ObjectTracker {
   const Eigen::Vector3d& centroid() const { return centroid_; }  // object frame, m
 
  private:
+  static constexpr double kLeastInlierShare = 0.35;  // of the matches
+
   static constexpr double kNearPx = 1.5;  // a prediction this close needs no half-size match
   static constexpr int kForgetAfter =
       3;  // frames without the object before its motion is forgotten
@@ -123,6 +125,7 @@ class ObjectTracker {
                                              const Eigen::Isometry3d& predicted);
   Observation findTurned(const Frame& frame, const Reference& nearest,
                          const Eigen::Isometry3d& predicted);
+  Reference asReference(const Frame& frame, const Observation& observation) const;
   Reference lastAsReference() const;
   Reference newReference(const Frame& frame, const Reference& nearest,
                          const Observation& observation);
