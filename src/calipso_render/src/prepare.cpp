@@ -11,6 +11,7 @@
 #include "light/shadow_borders.hpp"
 #include "place/clip_motion.hpp"
 #include "place/key_cover.hpp"
+#include "place/mended_depth.hpp"
 #include "place/place_depth.hpp"
 #include "place/plate_beside.hpp"
 #include "prepare_background.hpp"
@@ -171,8 +172,11 @@ NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadine
 }  // namespace
 
 Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
-                 const RenderParams& params) {
-  checkInput(clip, params);
+                 const RenderParams& given) {
+  checkInput(clip, given);
+  RenderParams params = given;
+  const ClipFrame& key = clip.frames().front();
+  params.depth = mendedDepth(given.depth, key.labels, given.planes, key.camera);
   Prepared p;
   p.nearness = placeNearness(
       cameraMoves(clip) ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()},

@@ -95,18 +95,20 @@ struct SeenPlace {
 // @param unknown as of seenShadows(), but for what is blind
 // @param on_planes darkness of shadows there
 SeenShadows shadowsOn(const SeenPlace& place, const cv::Mat& sun, const cv::Mat& sky,
-                      const cv::Mat& picture, const cv::Mat& unknown,
+                      const cv::Mat& picture, const cv::Mat& unknown, bool sun_is_sure,
                       const UsualDarkness& on_planes = kOnGround) {
   const auto beside = [&](const cv::Mat& left_out, const UsualDarkness& usual) {
     cv::Mat sun_there = sun.clone(), sky_there = sky.clone();
     sun_there.setTo(1.0f, left_out), sky_there.setTo(1.0f, left_out);
-    return seenShadows(sun_there, sky_there, picture, unknown | place.blind | left_out, usual);
+    return seenShadows(sun_there, sky_there, picture, unknown | place.blind | left_out, usual,
+                       sun_is_sure);
   };
   SeenShadows seen = beside(place.curved, on_planes);
   if (cv::countNonZero(place.curved) == 0) return seen;
   const SeenShadows on_curved = beside(~place.curved, kOnGround);
   seen.sun |= on_curved.sun, seen.sky |= on_curved.sky, seen.refuted |= on_curved.refuted;
   seen.none = cv::countNonZero(seen.refuted) > 0 && cv::countNonZero(seen.sun | seen.sky) == 0;
+  seen.no_sun = (seen.no_sun || on_curved.no_sun) && cv::countNonZero(seen.sun) == 0;
   return seen;
 }
 
@@ -210,12 +212,12 @@ SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, P
 cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
                    const cv::Mat& sky, const RenderParams& params, Prepared& p) {
   const cv::Mat objects = p.key_labels != 0;
-  SeenShadows shadows = shadowsOn(place, sun, sky, e.picture, objects);
+  SeenShadows shadows = shadowsOn(place, sun, sky, e.picture, objects, p.light.confirmed());
   const cv::Mat dark = (sun < kUnshadedSun) & (shadows.refuted == 0);
   p.mirror = findMirror(e.actors, e.picture, objects | dark, sky, place.off_planes, params, p);
   if (p.mirror.established())  // what is mirrored can be dark, too
     shadows = shadowsOn(place, sun, sky, unmirrored(p.mirror, e.picture), objects,
-                        isWater(p.mirror) ? kOnWater : kOnGround);
+                        p.light.confirmed(), isWater(p.mirror) ? kOnWater : kOnGround);
   if (cv::countNonZero(shadows.refuted) > 0) {
     p.remarks.push_back(
         "a shadow that the light predicts is not seen in the picture: none is taken out or drawn "
@@ -225,6 +227,8 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   without.setTo(0, shadeTraces(shadows, place, params));  // the other light is hidden there
   p.shadowless |= without;
   if (shadows.none) p.shadowless.setTo(255);
+  if (shadows.no_sun && !p.light.confirmed())
+    p.sunless = cv::Mat(p.shadowless.size(), CV_8U, cv::Scalar(255));
   return restingTraces(p, shadows, place, seenPast(e), params);
 }
 
@@ -232,7 +236,8 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
 // the plate is as dark.
 cv::Mat unfollowedTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
                          const cv::Mat& sky, const RenderParams& params, const Prepared& p) {
-  const SeenShadows shadows = shadowsOn(place, sun, sky, e.picture, p.key_labels != 0);
+  const SeenShadows shadows =
+      shadowsOn(place, sun, sky, e.picture, p.key_labels != 0, p.light.confirmed());
   const double umbra = luminance(predictedUmbra(p.light.light, params.planes));
   cv::Mat then, now, half_lit;  // half: of the steps from shade to light, which are ratios
   cv::blur(luminanceOf(e.picture), then, {kAlike, kAlike});
@@ -257,8 +262,8 @@ cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const Rece
   const ShadeThatStays stays =
       leaveOutPassingShade(e.frames, cast, receiver, params.background, p.background);
   if (stays.never_lit.empty()) return unfollowedTraces(e, place, sun, sky, params, p);
-  const SeenShadows shadows =
-      shadowsOn(place, stays.sun, stays.sky, p.background.plate, p.background.count == 0);
+  const SeenShadows shadows = shadowsOn(place, stays.sun, stays.sky, p.background.plate,
+                                        p.background.count == 0, p.light.confirmed());
   return shadeTraces(shadows, place, params) & stays.never_lit;
 }
 

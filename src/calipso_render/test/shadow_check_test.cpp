@@ -64,6 +64,24 @@ TEST(SeenShadows, WhatCannotBeComparedFollowsWhatCan) {
   EXPECT_EQ(cv::countNonZero(g.seen().sun), 2 * g.left.area());
 }
 
+TEST(SeenShadows, OfAnUnsureSunThoseThatShowAreBelieved) {
+  Ground g;
+  g.picture(g.left) *= 0.88f;  // may be a pale shadow, or another thing: undecided
+  g.unknown.colRange(100, 200).setTo(255);
+  g.sky(g.left).setTo(0.4f);  // whose dark speaks for a shadow no more
+  const auto seen = [&](bool sun_is_sure) {
+    return seenShadows(g.sun, g.sky, g.picture, g.unknown, kOnGround, sun_is_sure);
+  };
+  EXPECT_EQ(cv::countNonZero(seen(true).sun), 2 * g.left.area());
+  EXPECT_EQ(cv::countNonZero(seen(false).sun), 0);
+  EXPECT_TRUE(seen(false).no_sun);
+  g.picture(g.left) *= 0.8f;
+  EXPECT_EQ(cv::countNonZero(seen(false).sun(g.left)), g.left.area());
+  // Where nothing at all can be compared, predictions are believed.
+  g.unknown.setTo(255);
+  EXPECT_EQ(cv::countNonZero(seen(false).sun), 2 * g.left.area());
+}
+
 TEST(SeenShadows, OnWaterPaleOnesCount) {
   Ground g;  // a quarter of the light, as most of what is seen is mirrored; beside it none
   g.picture(g.left) *= 0.88f;

@@ -12,8 +12,10 @@
 #include "fill/lattice.hpp"
 #include "fill/line_bridge.hpp"
 #include "fill/line_ends.hpp"
+#include "fill/patch_cost.hpp"
 #include "fill/patch_fill.hpp"
 #include "fill/plane_chart.hpp"
+#include "fill/plane_pattern.hpp"
 #include "fill/seam_blend.hpp"
 #include "fill/seam_cut.hpp"
 #include "fill/spline.hpp"
@@ -21,7 +23,8 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kLatticeMargin = 72;  // px around it in which a pattern is sought
+constexpr int kLatticeMargin = 72;  // px around it in which a pattern is sought,
+constexpr int kFarMargin = 216;     // ... that alone can tell a plane
 constexpr int kLeastMargin = 48;    // px around the hole that are looked at, at least
 constexpr float kRounded =
     1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
@@ -193,9 +196,11 @@ void copyBack(const PlanePart& part, const Filling& filled, const cv::Mat& wante
 
 // A plane that the hole hides.
 struct HiddenPlane {
+  int label;  // InpaintParams::surface
   const cv::Matx33d& to_plane;
-  bool supports;                  // something stands on it
-  cv::Mat hole, seen;             // CV_8UC1: where it is hidden; where it may be copied from
+  bool supports;       // something stands on it
+  bool known;          // false: where it is hidden its pattern alone can tell
+  cv::Mat hole, seen;  // CV_8UC1: where it is, or may be, hidden; where it may be copied from
   std::optional<PlanePart> part;  // nothing if it cannot be filled along itself
 };
 
@@ -207,8 +212,8 @@ std::optional<PlanePart> chartedPart(const HiddenPlane& plane) {
   return part;
 }
 
-void addLattice(const cv::Mat& look, PlanePart& part) {
-  const cv::Rect near = windowAround(part.hole, kLatticeMargin, kLatticeMargin);
+void addLattice(const cv::Mat& look, int margin, PlanePart& part) {
+  const cv::Rect near = windowAround(part.hole, margin, margin);
   part.lattice = findLattice(part.chart.carried(look, near), part.source(near));
 }
 
@@ -220,8 +225,18 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
   inner.nearness = part.chart.carried(nearnessOf(plane.to_plane, plane.hole.size())),
   inner.away_farther = kFarther;
   const Lattice* lattice = part.lattice ? &*part.lattice : nullptr;
+  if (lattice) {
+    // A pattern is alike all over; its light is that of the next places.
+    inner.away_column = inner.away_row;
+    // Where patches span more than two of its shifts it is grey.
+    const int side = std::min(part.look.cols, part.look.rows);
+    inner.coarsest_side =
+        std::max(inner.coarsest_side, cvRound(kPatchSide * side / (2.0f * lattice->shortest())));
+  }
   const cv::Mat wanted =
-      lattice ? goesOnByLattice(*lattice, part.look, part.known, part.hole) : part.hole;
+      lattice ? goesOnByPattern(repeatsBy(*lattice, part.look, part.known, part.known), part.known,
+                                part.hole)
+              : part.hole;
   copyBack(part,
            fill(part.edges, part.look, part.hole.clone(), part.source.clone(), part.known.clone(),
                 lattice, inner),
@@ -229,16 +244,24 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
 }
 
 std::vector<HiddenPlane> hiddenPlanes(const InpaintParams& params, const Canvas& canvas) {
+  const cv::Mat told = (params.surface > 0) & (params.surface <= params.supports) & params.sure;
   std::vector<HiddenPlane> planes;
   for (std::size_t k = 0; k < params.planes.size(); ++k) {
-    const cv::Mat here = params.surface == static_cast<double>(k + 1),
-                  hidden = canvas.hole & here & params.sure;
-    if (cv::countNonZero(hidden) >= kFewestOnPlane)
-      planes.push_back({params.planes[k],
-                        static_cast<int>(k) < params.supports,
+    const bool supports = static_cast<int>(k) < params.supports;
+    const cv::Mat here = params.surface == static_cast<double>(k + 1);
+    cv::Mat hidden = canvas.hole & here & params.sure;
+    const bool known = cv::countNonZero(hidden) >= kFewestOnPlane;
+    if (!known && supports)
+      hidden = canvas.hole & ~told & (nearnessOf(params.planes[k], hidden.size()) > 0.0f);
+    if (known || (supports && cv::countNonZero(hidden) >= kFewestOnPlane)) {
+      planes.push_back({static_cast<int>(k) + 1,
+                        params.planes[k],
+                        supports,
+                        known,
                         hidden,
                         canvas.source & here,
                         {}});
+    }
   }
   return planes;
 }
@@ -252,7 +275,9 @@ void lookAround(std::vector<HiddenPlane>& planes, Canvas& canvas) {
   for (HiddenPlane& plane : planes) {
     if (!plane.part) continue;
     const bool anyway = plane.supports && plane.part->chart.tilted;
-    lattices.push_back([&] { addLattice(canvas.look, *plane.part); });
+    lattices.push_back(
+        [&] { addLattice(canvas.look, plane.known ? kLatticeMargin : kFarMargin, *plane.part); });
+    if (!plane.known) continue;
     (anyway ? looks : later).push_back([&, anyway] {
       if (anyway || plane.part->lattice)
         addLook(canvas.look, plane.seen, *plane.part);
@@ -268,11 +293,28 @@ void lookAround(std::vector<HiddenPlane>& planes, Canvas& canvas) {
   doAll(true, later);
 }
 
-void fillPlanes(const InpaintParams& params, Canvas& canvas) {
+// @return false: patterns tell nothing that was not known
+bool goOnByPatterns(const std::vector<HiddenPlane>& planes, const Canvas& canvas,
+                    InpaintParams& params) {
+  bool more = false;
+  for (const HiddenPlane& plane : planes) {
+    if (!plane.supports || !plane.part || !plane.part->lattice) continue;
+    more |=
+        goOnByPattern({plane.label, plane.to_plane, *plane.part->lattice, plane.hole, plane.seen},
+                      {canvas.look, canvas.hole, canvas.source}, kFewestOnPlane, params);
+  }
+  return more;
+}
+
+void fillPlanes(InpaintParams& params, Canvas& canvas) {
   std::vector<HiddenPlane> planes = hiddenPlanes(params, canvas);
   lookAround(planes, canvas);
+  if (goOnByPatterns(planes, canvas, params)) {
+    planes = hiddenPlanes(params, canvas);
+    lookAround(planes, canvas);
+  }
   for (const HiddenPlane& plane : planes) {
-    if (plane.part) fillPlane(plane, *plane.part, params, canvas);
+    if (plane.known && plane.part) fillPlane(plane, *plane.part, params, canvas);
   }
 }
 
@@ -345,7 +387,7 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
                 {}};
   if (!banned.empty()) canvas.source.setTo(0, banned(window));
   canvas.known = canvas.source.clone();
-  const InpaintParams inner = within(window, params);
+  InpaintParams inner = within(window, params);
   if (!inner.surface.empty() && !inner.sure.empty()) fillPlanes(inner, canvas);
   if (cv::countNonZero(canvas.hole) > 0) fillRest(inner, canvas);
   const cv::Mat has_origin = copied(canvas.origin);

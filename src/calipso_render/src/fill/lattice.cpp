@@ -14,6 +14,7 @@ constexpr int kFarthest = 96;      // px of the shifts that are looked at
 constexpr float kShortest = 5.0f;  // px of a shift
 constexpr int kLevel = 6;  // px (deviation) of the mean that is taken off: light is no pattern
 constexpr float kOverlap = 0.15f;       // of what is known, for a shift to be judged
+constexpr float kUnjudged = -1.0f;      // stands for the correlation of the others
 constexpr float kPeak = 0.3f;           // correlation of a shift that repeats the picture, and
 constexpr float kContrast = 0.1f;       // by how much that of half the shift is lower
 constexpr float kStrong = 0.7f;         // of the highest peak's correlation
@@ -27,6 +28,7 @@ constexpr int kCompared =
     7;  // px of the square in which a picture is compared with itself one shift off
 constexpr float kUnlike = 2.5f;       // times the median difference, and
 constexpr float kLeastUnlike = 4.0f;  // code values more, from which it is something else
+constexpr float kAsLively = 0.4f;     // of the median deviation from the mean around
 constexpr float kMostOf = 0.8f;       // of the shifts of a lattice that must be peaks
 
 struct Peak {
@@ -57,7 +59,7 @@ class Correlation {
     const cv::Mat product = correlated(f, f), squares = correlated(m, f2),
                   shifted = correlated(f2, m), count = correlated(m, m);
     const float least = kOverlap * static_cast<float>(cv::countNonZero(known));
-    ncc_ = cv::Mat(kFarthest + 1, 2 * kFarthest + 1, CV_32F, cv::Scalar(-1.0f));
+    ncc_ = cv::Mat(kFarthest + 1, 2 * kFarthest + 1, CV_32F, cv::Scalar(kUnjudged));
     for (int v = 0; v <= kFarthest; ++v) {
       for (int u = -kFarthest; u <= kFarthest; ++u) {
         const int j = v, i = (u + padded.width) % padded.width;
@@ -72,7 +74,7 @@ class Correlation {
   float at(cv::Point2f x) const {
     if (x.y < 0.0f) x = -x;
     const int u = cvRound(x.x) + kFarthest, v = cvRound(x.y);
-    return u >= 0 && v >= 0 && u < ncc_.cols && v < ncc_.rows ? ncc_.at<float>(v, u) : -1.0f;
+    return u >= 0 && v >= 0 && u < ncc_.cols && v < ncc_.rows ? ncc_.at<float>(v, u) : kUnjudged;
   }
   bool covers(const cv::Point2f& x) const {
     return std::abs(x.x) < kFarthest - 2 && std::abs(x.y) < kFarthest - 2;
@@ -82,7 +84,7 @@ class Correlation {
   std::optional<Peak> peakNear(const cv::Point2f& x) const {
     if (!covers(x)) return std::nullopt;
     cv::Point2f best = x;
-    float most = -1.0f;
+    float most = kUnjudged;
     const int reach = cvCeil(kNear);
     for (int dv = -reach; dv <= reach; ++dv) {
       for (int du = -reach; du <= reach; ++du) {
@@ -132,7 +134,7 @@ class Correlation {
     };
     return {x + cv::Point2f(vertex({1, 0}), vertex({0, 1})), c};
   }
-  cv::Mat ncc_;  // CV_32FC1; row: v, column: u + kFarthest; -1: not known
+  cv::Mat ncc_;  // CV_32FC1; row: v, column: u + kFarthest
 };
 
 // How well a pair of shifts and what they add up to repeats the picture: the worst of them. Below
@@ -167,7 +169,8 @@ float meanOf(const Correlation& c, const Lattice& lattice) {
       if (i == 0 && j == 0) continue;
       const cv::Vec2f shift = lattice.basis * cv::Vec2f(i, j);
       const auto peak = c.peakNear({shift[0], shift[1]});
-      if (peak) ++all, peaks += peak->correlation >= kPeak, sum += peak->correlation;
+      if (peak && peak->correlation > kUnjudged)
+        ++all, peaks += peak->correlation >= kPeak, sum += peak->correlation;
     }
   }
   return static_cast<float>(peaks) >= kMostOf * static_cast<float>(all)
@@ -251,23 +254,35 @@ std::optional<Lattice> findLattice(const cv::Mat& image, const cv::Mat& known) {
   return found;
 }
 
-cv::Mat goesOnByLattice(const Lattice& lattice, const cv::Mat& image, const cv::Mat& known,
-                        const cv::Mat& hole) {
-  cv::Mat weight, on, other, to_on, to_other;
+cv::Mat repeatsBy(const Lattice& lattice, const cv::Mat& image, const cv::Mat& known,
+                  const cv::Mat& sample) {
+  cv::Mat weight, on;
   known.convertTo(weight, CV_32F, 1.0 / 255.0);
   const cv::Mat difference = differenceFromShifted(lattice, image, weight);
-  on = known & (difference < kUnlike * quantileOf(difference, known, 0.5) + kLeastUnlike);
+  on = known & (difference < kUnlike * quantileOf(difference, sample, 0.5) + kLeastUnlike);
   cv::morphologyEx(on, on, cv::MORPH_OPEN, cv::Mat::ones(kCompared, kCompared, CV_8U), {-1, -1}, 1,
                    cv::BORDER_REPLICATE);
+  return on;
+}
+
+cv::Mat asLively(const cv::Mat& image, const cv::Mat& known, const cv::Mat& sample) {
+  cv::Mat weight, spread;
+  known.convertTo(weight, CV_32F, 1.0 / 255.0);
+  cv::GaussianBlur(cv::abs(levelled(image, weight)), spread, {0, 0}, kLevel);
+  return spread > kAsLively * quantileOf(spread, sample, 0.5);
+}
+
+cv::Mat goesOnByPattern(const cv::Mat& repeats, const cv::Mat& known, const cv::Mat& hole) {
+  cv::Mat other, to_repeats, to_other;
   // Gaps in what is known belong to it.
   cv::morphologyEx(known, other, cv::MORPH_CLOSE, cv::Mat::ones(kCompared, kCompared, CV_8U));
-  other &= (on == 0) & (hole == 0);
+  other &= (repeats == 0) & (hole == 0);
   cv::morphologyEx(other, other, cv::MORPH_OPEN, cv::Mat::ones(kCompared, kCompared, CV_8U));
   if (cv::countNonZero(other) == 0) return hole.clone();
-  if (cv::countNonZero(on) == 0) return cv::Mat::zeros(hole.size(), CV_8U);
-  cv::distanceTransform(on == 0, to_on, cv::DIST_L2, cv::DIST_MASK_5);
+  if (cv::countNonZero(repeats) == 0) return cv::Mat::zeros(hole.size(), CV_8U);
+  cv::distanceTransform(repeats == 0, to_repeats, cv::DIST_L2, cv::DIST_MASK_5);
   cv::distanceTransform(other == 0, to_other, cv::DIST_L2, cv::DIST_MASK_5);
-  return hole & (to_on < to_other);
+  return hole & (to_repeats < to_other);
 }
 
 }  // namespace calipso::render

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -16,6 +18,10 @@ struct Lattice {
     const cv::Vec2f x = basis * whole;
     return {x[0], x[1]};
   }
+  // Length of the shorter one.
+  float shortest() const {
+    return std::min(std::hypot(basis(0, 0), basis(1, 0)), std::hypot(basis(0, 1), basis(1, 1)));
+  }
   cv::Matx22f inverse;
 };
 
@@ -25,9 +31,17 @@ struct Lattice {
 // @param image CV_32FC3, code values; known CV_8UC1
 std::optional<Lattice> findLattice(const cv::Mat& image, const cv::Mat& known);
 
-// Where a hole is nearer to what repeats itself by the lattice than to what is known and does not, like a coping.
-// @param image CV_32FC3; known, hole CV_8UC1. @return CV_8UC1
-cv::Mat goesOnByLattice(const Lattice& lattice, const cv::Mat& image, const cv::Mat& known,
-                        const cv::Mat& hole);
+// What of a picture repeats itself by a lattice. CV_8UC1
+// @param image CV_32FC3; known CV_8UC1; sample CV_8UC1, of it what the lattice was found in
+cv::Mat repeatsBy(const Lattice& lattice, const cv::Mat& image, const cv::Mat& known,
+                  const cv::Mat& sample);
+
+// Where a picture differs from the mean around about as much as in a sample: what is bland repeats
+// itself by any lattice. CV_8UC1
+cv::Mat asLively(const cv::Mat& image, const cv::Mat& known, const cv::Mat& sample);
+
+// Where a hole is nearer to what repeats itself than to what is known and does not, like a coping.
+// @param repeats, known, hole CV_8UC1. @return CV_8UC1
+cv::Mat goesOnByPattern(const cv::Mat& repeats, const cv::Mat& known, const cv::Mat& hole);
 
 }  // namespace calipso::render

@@ -170,24 +170,29 @@ cv::Mat isShaded(const cv::Mat& sun, const cv::Mat& sky) {
 }
 
 SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& picture,
-                        const cv::Mat& unknown, const UsualDarkness& usual) {
+                        const cv::Mat& unknown, const UsualDarkness& usual, bool sun_is_sure) {
   const Test test(picture, unknown, usual);
   std::vector<Region> regions;
   addRegions(test, sun, kSunShaded, true, regions);
   addRegions(test, sky, kSkyShaded, false, regions);
-  double all = 0.0;
-  bool any_seen = false;
-  for (const Region& r : regions) all += r.odds;
-  const cv::Mat nothing = cv::Mat::zeros(picture.size(), CV_8U);
-  SeenShadows result{nothing.clone(), nothing.clone(), nothing.clone(), false};
+  double all = 0.0, of_sun = 0.0;
+  for (const Region& r : regions) all += r.odds, of_sun += r.of_sun ? r.odds : 0.0;
   // What cannot be decided by itself goes with all the others.
+  const auto believed = [&](const Region& r) {
+    if (std::abs(r.odds) > kDecided) return r.odds > 0.0;
+    if (r.of_sun && !sun_is_sure && of_sun != 0.0) return of_sun > kDecided;
+    return all >= 0.0;
+  };
+  const cv::Mat nothing = cv::Mat::zeros(picture.size(), CV_8U);
+  SeenShadows result{nothing.clone(), nothing.clone(), nothing.clone()};
+  bool any_of_sun = false;
   for (const Region& r : regions) {
-    const bool believed = (std::abs(r.odds) > kDecided ? r.odds : all) >= 0.0;
-    cv::Mat& of = !believed ? result.refuted : r.of_sun ? result.sun : result.sky;
+    cv::Mat& of = !believed(r) ? result.refuted : r.of_sun ? result.sun : result.sky;
     of |= r.mask;
-    any_seen = any_seen || believed;
+    any_of_sun = any_of_sun || r.of_sun;
   }
-  result.none = !regions.empty() && !any_seen;
+  result.none = !regions.empty() && cv::countNonZero(result.sun | result.sky) == 0;
+  result.no_sun = any_of_sun && cv::countNonZero(result.sun) == 0;
   return result;
 }
 

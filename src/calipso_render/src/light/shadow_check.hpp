@@ -13,9 +13,10 @@ namespace calipso::render {
 // a small b. The odds are those of b under a shadow and under none. A prediction may lie some
 // pixels beside its shadow.
 struct SeenShadows {
-  cv::Mat sun, sky;   // CV_8UC1: the regions that are seen, or that nothing speaks against
-  cv::Mat refuted;    // CV_8UC1: the others
-  bool none = false;  // there are predictions, and all of them were refuted
+  cv::Mat sun, sky;     // CV_8UC1: the regions that are seen, or that nothing speaks against
+  cv::Mat refuted;      // CV_8UC1: the others
+  bool none = false;    // there are predictions, and all of them were refuted
+  bool no_sun = false;  // the same of the sun's
 };
 
 // CV_8UC1: 255 where so little of sun or sky is seen that a picture tells. @param sun, sky
@@ -32,8 +33,11 @@ constexpr UsualDarkness kOnWater{0.4, 0.25};   // less, as what is mirrored is n
 // @param sun, sky CV_32FC1, visible part of them, 0..1, as predicted
 // @param picture CV_32FC3, code values
 // @param unknown CV_8UC1, != 0: says nothing (objects, things off the planes)
+// @param sun_is_sure false: of the sun's shadows those are believed that the picture shows, if it
+//   tells anything of them
 SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& picture,
-                        const cv::Mat& unknown, const UsualDarkness& usual = kOnGround);
+                        const cv::Mat& unknown, const UsualDarkness& usual = kOnGround,
+                        bool sun_is_sure = true);
 
 // CV_8UC1: of the places that see less of the sky the regions that a picture surely shows darker.
 cv::Mat surelyDarker(const cv::Mat& sky, const cv::Mat& picture, const cv::Mat& unknown);

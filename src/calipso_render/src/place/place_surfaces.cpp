@@ -214,6 +214,17 @@ cv::Mat largePieces(const cv::Mat& mask) {
   return large;
 }
 
+// Where the picture shows nothing, as far as it has any depth: large areas in which nothing was
+// measured, but for those in which a support plane would be seen (not just below its horizon).
+cv::Mat showsNothing(const cv::Mat& depth, const cv::Mat& labels, int supports,
+                     const std::vector<Extent>& planes) {
+  cv::Mat unmeasured = (depth == 0.0f) & (labels == 0);
+  for (int k = 0; k < supports; ++k)
+    unmeasured &=
+        (planes[k].nearness == 0.0f) | (planes[k].nearness > kAtHorizon * planes[k].farthest);
+  return largePieces(unmeasured);
+}
+
 // CV_8SC1: the plane that every pixel shows, or kNoPlane.
 cv::Mat planesSeen(const cv::Mat& scenery, int supports, const std::vector<Extent>& planes) {
   cv::Mat seen(scenery.size(), CV_8S, cv::Scalar(kNoPlane));
@@ -351,7 +362,7 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
   }
   const cv::Mat seen_planes = planesSeen(scenery, supports, extents);
   const Edges edges = findEdges(all, seen_planes);
-  const cv::Mat nothing = largePieces((depth == 0.0f) & (labels == 0));
+  const cv::Mat nothing = showsNothing(depth, labels, supports, extents);
   findReaches(scenery, nothing, supports, seen_planes, all, edges, extents);
   const cv::Mat known = scenery > 0.0f;
   PlaceSurfaces surfaces{
