@@ -16,6 +16,8 @@ using namespace testing;
 
 const Eigen::Vector3d kCentre(-0.15, 0.1, 0.12), kOther(0.15, 0.25, 0.12);
 
+const cv::Scalar kMixedHue(60, 60, 200);
+
 RenderParams params() {
   RenderParams p;
   p.planes = table();
@@ -25,18 +27,27 @@ RenderParams params() {
 
 // A ball that is edited, and one that is not.
 struct TwoBalls {
-  ClipFrame key = frameWithBall(ballAt(kCentre));
+  Eigen::Vector3d centre;  // of the first
+  ClipFrame key = frameWithBall(ballAt(centre));
   RenderParams render = params();
   std::shared_ptr<const Prepared> prepared;
 
-  explicit TwoBalls(const RenderParams& p) : render(p) {
+  // @param mixed px around the first one at which the other's pixels have another hue
+  explicit TwoBalls(const RenderParams& p, const Eigen::Vector3d& centre = kCentre, int mixed = 0)
+      : centre(centre), render(p) {
     const ObjectModel other = ballAt(kOther, "other", 2);
     const ClipFrame behind = frameWithBall(other);
     behind.bgr.copyTo(key.bgr, (behind.labels == 2) & (key.labels == 0));
     behind.labels.copyTo(key.labels, (behind.labels == 2) & (key.labels == 0));
+    key.bgr.setTo(kMixedHue, mixedAround(mixed));
     ClipSample clip;
     clip.add(key);
-    prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(kCentre), other}, render));
+    prepared = std::make_shared<const Prepared>(prepare(clip, {ballAt(centre), other}, render));
+  }
+  cv::Mat mixedAround(int px) const {
+    cv::Mat near;
+    cv::dilate(key.labels == 1, near, cv::Mat::ones(2 * px + 1, 2 * px + 1, CV_8U));
+    return near & (key.labels == 2);
   }
   FrameOutput drawn(const Eigen::Vector3d& move) const {
     FrameInput in;
@@ -74,6 +85,22 @@ TEST(Others, AnEditedObjectCastsItsShadowOnOneThatStays) {
                 0.06f)
         << c;  // codes are rounded
   }
+}
+
+// Where an object that is taken away has mixed into what stands behind it, that is drawn anew.
+TEST(Others, WhatIsTakenAwayLeavesNoHueOnThem) {
+  const Eigen::Vector3d before = kOther + Eigen::Vector3d(-0.06, -0.3, 0.0);
+  const TwoBalls s(params(), before, 1);
+  const cv::Mat mixed = s.mixedAround(1);
+  ASSERT_GT(cv::countNonZero(mixed), 20);
+  const FrameOutput out = s.drawn(kCentre - before);
+  const auto redness = [](const cv::Mat& picture, const cv::Mat& where) {
+    const cv::Scalar mean = cv::mean(picture, where);
+    return mean[2] - mean[1];
+  };
+  const double own = redness(s.key.bgr, (s.key.labels == 2) & ~s.mixedAround(6));
+  EXPECT_GT(redness(s.key.bgr, mixed), own + 50.0);
+  EXPECT_LT(redness(out.bgr, mixed), own + 15.0);
 }
 
 // Of an object that moves in the video, the part that the frame shows as the key frame does is

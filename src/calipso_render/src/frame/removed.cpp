@@ -1,6 +1,7 @@
 #include "frame/removed.hpp"
 
 #include <cstring>
+#include <opencv2/imgproc.hpp>
 
 #include "draw/wide_loops.hpp"
 #include "frame/mask_morphology.hpp"
@@ -11,6 +12,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kInFront = 127;  // of a matte
+constexpr int kMixed = 2;      // px around an object in which its hue mixes into others'
 
 // Row v of the pixels of a box that show an edited object in the video, and of those that show
 // another one.
@@ -55,12 +57,13 @@ void ShownPixels::update(const StagedFrame& frame, const SeenPlace& place, const
               others_.ptr<std::uint8_t>(v));
   const int margin = frame.params.background.mask_margin_px;
   filterTiles(without_margin, margin, own_, DiscDilation(margin));
+  cv::erode(others_, others_, disc(kMixed));
 }
 
 namespace {
 
 // What a box's pixels show of edited objects, with a margin, and of their passing shadows, but not
-// what stands beside them.
+// what stands clear of them.
 // @param out CV_8UC1 of the box's size
 void findRemoved(const ShownPixels& shown, const cv::Mat& passing, const cv::Rect& box,
                  cv::Mat out) {

@@ -29,7 +29,7 @@ class ShownPixels {
 };
 
 // What the video shows of edited objects and their shadows: pixels behind which the place comes to
-// light. What objects show has a margin, but not what stands beside them.
+// light. What objects show has a margin; of what stands beside them only where their hue mixes.
 // @param passing CV_8UC1, whole picture: passingShadows(); may be empty
 // @param mirrored Reflections::marks(): where that changes and hid all of a plane, it comes to light
 // @return CV_8UC1 over the region
