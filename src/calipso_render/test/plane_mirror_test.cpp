@@ -268,5 +268,27 @@ TEST(PlaneMirror, WhatIsPlainWithoutItIsLost) {
   EXPECT_EQ(cv::countNonZero(lostInMirror(mirror, lake, shadow)), 0);
 }
 
+// The mirror image of a hull that is taken off two pixels beside its place leaves a dark and a pale
+// line.
+TEST(PlaneMirror, OutlinesBesideTheirPlaceAreLost) {
+  const cv::Rect hull(60, 40, 50, 40);
+  cv::Mat lake(kHeight, kWidth, CV_8UC3);
+  cv::RNG random(5);
+  random.fill(lake, cv::RNG::UNIFORM, 125, 135);
+  PlaneMirror mirror;
+  mirror.strength = 1.0f, mirror.at_key = cv::Mat::zeros(lake.size(), CV_32FC3);
+  mirror.at_key(hull).setTo(cv::Scalar::all(-0.1));
+  const cv::Mat plane(lake.size(), CV_8U, cv::Scalar(255));
+  EXPECT_EQ(cv::countNonZero(lostInMirror(mirror, lake, plane)), 0);
+  const cv::Rect dark(hull.x - 2, hull.y, 2, hull.height),
+      pale(hull.br().x - 2, hull.y, 2, hull.height);
+  lake(dark) -= cv::Scalar::all(40), lake(pale) += cv::Scalar::all(40);
+  const cv::Mat lost = lostInMirror(mirror, lake, plane);
+  EXPECT_EQ(cv::countNonZero(lost(dark)), dark.area());
+  EXPECT_EQ(cv::countNonZero(lost(pale)), pale.area());
+  const cv::Rect inside(hull.x + 6, hull.y + 6, hull.width - 12, hull.height - 12);
+  EXPECT_EQ(cv::countNonZero(lost(inside)), 0);
+}
+
 }  // namespace
 }  // namespace calipso::render

@@ -18,6 +18,9 @@ constexpr double kMirrors = 0.1;
 constexpr int kAround = 15;        // px of the squares in which gradients are averaged, and rows
 constexpr int kFewestBeside = 40;  // pixels of a row beside the mirror image, for it to be compared
 constexpr float kPlain = 0.4f;     // of the gradients beside it
+constexpr float kOutline = 0.1f;   // of the brightness, from pixel to pixel: an outline is mirrored
+constexpr int kBesideOutline = 2;  // px by which it may be off
+constexpr float kRough = 1.8f;     // times the gradients beside the mirror image: it is
 
 cv::Mat gradientOf(const cv::Mat& bgr) {
   cv::Mat grey, across, down;
@@ -117,6 +120,40 @@ cv::Mat unmirroredCodes(const PlaneMirror& mirror, const cv::Mat& bgr) {
   return out;
 }
 
+namespace {
+
+// Where a mirrored outline lies beside its place, so that taken off it leaves two steps.
+// @param strength gradientOf(bgr); usual its mean beside the mirror image, per row
+cv::Mat roughOutlines(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Mat& strength,
+                      const std::vector<float>& usual, const cv::Mat& plane) {
+  cv::Mat outline = cv::Mat::zeros(bgr.size(), CV_8U);
+  for (int v = 0; v + 1 < bgr.rows; ++v) {
+    for (int u = 0; u + 1 < bgr.cols; ++u) {
+      const cv::Vec3f& here = mirror.at_key.at<cv::Vec3f>(v, u);
+      const float step =
+          std::max(std::abs(luminance(mirror.at_key.at<cv::Vec3f>(v, u + 1) - here)),
+                   std::abs(luminance(mirror.at_key.at<cv::Vec3f>(v + 1, u) - here)));
+      const cv::Vec3b& code = bgr.at<cv::Vec3b>(v, u);
+      const float own =
+          luminance({linearFromCode(code[0]), linearFromCode(code[1]), linearFromCode(code[2])});
+      if (step > kOutline * own) outline.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  constexpr int kSide = 2 * kBesideOutline + 1;
+  cv::dilate(outline, outline, cv::Mat::ones(kSide, kSide, CV_8U));
+  outline &= plane;
+  const cv::Mat gradient = meanAround(strength, outline);
+  for (int v = 0; v < bgr.rows; ++v) {
+    if (usual[v] > 0.0f)
+      outline.row(v) &= gradient.row(v) > kRough * usual[v];
+    else
+      outline.row(v).setTo(0);
+  }
+  return outline;
+}
+
+}  // namespace
+
 cv::Mat lostInMirror(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Mat& plane) {
   cv::Mat changed(bgr.size(), CV_8U, cv::Scalar(0));
   for (int v = 0; v < bgr.rows; ++v) {
@@ -136,15 +173,13 @@ cv::Mat lostInMirror(const PlaneMirror& mirror, const cv::Mat& bgr, const cv::Ma
   lost &= within;
   cv::morphologyEx(lost, lost, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
   cv::dilate(lost, lost, cv::Mat::ones(kAround, kAround, CV_8U));
-  return lost & within;
+  return (lost & within) | roughOutlines(mirror, bgr, strength, usual, plane);
 }
 
 bool mirrorsSharply(const PlaneMirror& mirror) {
   return mirror.established() && mirror.slope < kEven;
 }
 
-bool isWater(const PlaneMirror& mirror) {
-  return mirror.established() && !mirrorsSharply(mirror);
-}
+bool isWater(const PlaneMirror& mirror) { return mirror.established() && !mirrorsSharply(mirror); }
 
 }  // namespace calipso::render

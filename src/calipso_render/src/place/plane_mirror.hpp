@@ -63,7 +63,8 @@ PlaneMirror establishMirror(const MirrorImage& image, const cv::Mat& picture, co
                             const cv::Mat& hidden);
 
 // Where the mirror image is so plain that nothing of the plane is left in it: taken off, the place
-// has far less gradients than the plane has beside it in the same rows.
+// has far less gradients than the plane has beside it in the same rows. And where a mirrored outline
+// lies beside its place: there it has far more.
 // @param bgr CV_8UC3, the key frame without what is mirrored
 // @param plane CV_8UC1, 255: shows the planes, no object and no shadow
 // @return CV_8UC1
