@@ -294,13 +294,13 @@ void lookAround(std::vector<HiddenPlane>& planes, Canvas& canvas) {
 }
 
 // @return false: patterns tell nothing that was not known
-bool goOnByPatterns(const std::vector<HiddenPlane>& planes, const Canvas& canvas,
+bool followPatterns(const std::vector<HiddenPlane>& planes, const Canvas& canvas,
                     InpaintParams& params) {
   bool more = false;
   for (const HiddenPlane& plane : planes) {
     if (!plane.supports || !plane.part || !plane.part->lattice) continue;
     more |=
-        goOnByPattern({plane.label, plane.to_plane, *plane.part->lattice, plane.hole, plane.seen},
+        followPattern({plane.label, plane.to_plane, *plane.part->lattice, plane.hole, plane.seen},
                       {canvas.look, canvas.hole, canvas.source}, kFewestOnPlane, params);
   }
   return more;
@@ -309,7 +309,7 @@ bool goOnByPatterns(const std::vector<HiddenPlane>& planes, const Canvas& canvas
 void fillPlanes(InpaintParams& params, Canvas& canvas) {
   std::vector<HiddenPlane> planes = hiddenPlanes(params, canvas);
   lookAround(planes, canvas);
-  if (goOnByPatterns(planes, canvas, params)) {
+  if (followPatterns(planes, canvas, params)) {
     planes = hiddenPlanes(params, canvas);
     lookAround(planes, canvas);
   }

@@ -22,7 +22,7 @@ cv::Mat mistakenPlanes(const cv::Mat& repeats, const cv::Mat& source, const Inpa
 
 }  // namespace
 
-bool goOnByPattern(const PatternedPlane& plane, const PictureToFill& picture, int fewest,
+bool followPattern(const PatternedPlane& plane, const PictureToFill& picture, int fewest,
                    InpaintParams& params) {
   const cv::Size size = picture.hole.size();
   // As the lattice's, but of all that is around.

@@ -27,7 +27,7 @@ struct PictureToFill {
 // @param fewest px of the hole that have to be told so
 // @param params surface and sure are set where the plane is
 // @return false: there are fewer, nothing is changed
-bool goOnByPattern(const PatternedPlane& plane, const PictureToFill& picture, int fewest,
+bool followPattern(const PatternedPlane& plane, const PictureToFill& picture, int fewest,
                    InpaintParams& params);
 
 }  // namespace calipso::render
