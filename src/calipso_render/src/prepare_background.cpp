@@ -380,8 +380,11 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   known_of_place.surface = surfaces.alike, known_of_place.supports = surfaces.supports;
   known_of_place.sky = surfaces.sky;
   known_of_place.sure = mirrorsSharply(p.mirror) ? surfaces.sureOffSupports() : surfaces.sure;
-  for (const PicturePlane& plane : surfaces.planes)
+  const std::vector<PicturePlane> planes =
+      surfaces.empty() ? inPicture(params.planes, key.camera) : surfaces.planes;
+  for (const PicturePlane& plane : planes)
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
+  if (surfaces.empty()) known_of_place.supports = static_cast<int>(planes.size());
   inventPlace(traces, key, known_of_place, surfaces, params, p);
   p.plate_linear = linearFromRealCodes(p.background.plate);
   findDrifting(e.frames,

@@ -125,8 +125,8 @@ TEST(PlaneChart, LeavesTheMiddleOfTheHoleAsItIs) {
   EXPECT_FALSE(planeChart(seenFrom(false), hole, hole == 0)->tilted);
 }
 
-// What is known of the tiles' plane: nothing, all, or its lower half.
-enum class Plane { kUnknown, kKnown, kHalf };
+// What is known of the tiles' plane: nothing, all, its lower half, or that it is a support plane.
+enum class Plane { kUnknown, kKnown, kHalf, kSupposed };
 
 // Mean difference from the true tiles of what a hole is filled with.
 double missOfTiles(bool tilted, Plane plane) {
@@ -136,12 +136,12 @@ double missOfTiles(bool tilted, Plane plane) {
   cv::ellipse(hole, {160, 100}, {60, 45}, 0, 0, 360, cv::Scalar(255), cv::FILLED);
   image.setTo(cv::Scalar::all(0), hole);
   InpaintParams params;
-  if (plane != Plane::kUnknown) {
+  if (plane != Plane::kUnknown) params.planes = {to_plane}, params.supports = 1;
+  if (plane == Plane::kKnown || plane == Plane::kHalf) {
     params.surface = cv::Mat(hole.size(), CV_8U, cv::Scalar(1)),
     params.sure = cv::Mat(hole.size(), CV_8U, cv::Scalar(255));
     if (plane == Plane::kHalf)
       params.surface.rowRange(0, kHigh / 2).setTo(0), params.sure.rowRange(0, kHigh / 2).setTo(0);
-    params.planes = {to_plane}, params.supports = 1;
   }
   const InpaintResult r = inpaint(image, hole, cv::Mat(), params);
   EXPECT_TRUE(r.patches_found);
@@ -161,6 +161,7 @@ TEST(Inpaint, GoesOnWithTilesAsTheyAreSeen) {
 
 TEST(Inpaint, FollowsTilesToWhereNothingElseTellsTheirPlane) {
   EXPECT_LT(missOfTiles(true, Plane::kHalf), 6.0);
+  EXPECT_LT(missOfTiles(true, Plane::kSupposed), 6.0);
 }
 
 // Nothing of what was in the hole shines through along its rim, dark as it was.

@@ -31,7 +31,7 @@ struct InpaintParams {
   cv::Mat sure;
   // Of surface k + 1, the homography from pixels to its own coordinates, the third of them its
   // nearness (1/m): copies within it are shifted along it. May be empty; of surfaces without one
-  // none.
+  // none. Without `surface` those that repeat themselves are followed.
   std::vector<cv::Matx33d> planes;
   // The first so many of them are what things stand on; along others only what repeats itself is
   // shifted.

@@ -246,22 +246,16 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
 std::vector<HiddenPlane> hiddenPlanes(const InpaintParams& params, const Canvas& canvas) {
   const cv::Mat told = (params.surface > 0) & (params.surface <= params.supports) & params.sure;
   std::vector<HiddenPlane> planes;
-  for (std::size_t k = 0; k < params.planes.size(); ++k) {
-    const bool supports = static_cast<int>(k) < params.supports;
-    const cv::Mat here = params.surface == static_cast<double>(k + 1);
+  for (int k = 0; k < static_cast<int>(params.planes.size()); ++k) {
+    const bool supports = k < params.supports;
+    const cv::Mat here = params.surface == k + 1;
     cv::Mat hidden = canvas.hole & here & params.sure;
     const bool known = cv::countNonZero(hidden) >= kFewestOnPlane;
     if (!known && supports)
       hidden = canvas.hole & ~told & (nearnessOf(params.planes[k], hidden.size()) > 0.0f);
-    if (known || (supports && cv::countNonZero(hidden) >= kFewestOnPlane)) {
-      planes.push_back({static_cast<int>(k) + 1,
-                        params.planes[k],
-                        supports,
-                        known,
-                        hidden,
-                        canvas.source & here,
-                        {}});
-    }
+    if (known || (supports && cv::countNonZero(hidden) >= kFewestOnPlane))
+      planes.push_back(
+          {k + 1, params.planes[k], supports, known, hidden, canvas.source & here, {}});
   }
   return planes;
 }
@@ -389,6 +383,8 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   canvas.known = canvas.source.clone();
   InpaintParams inner = within(window, params);
   if (!inner.surface.empty() && !inner.sure.empty()) fillPlanes(inner, canvas);
+  InpaintParams supposed = supposedSupports(inner, window.size());
+  if (inner.surface.empty()) fillPlanes(supposed, canvas);
   if (cv::countNonZero(canvas.hole) > 0) fillRest(inner, canvas);
   const cv::Mat has_origin = copied(canvas.origin);
   result.patches_found = cv::countNonZero(has_origin) > 0;

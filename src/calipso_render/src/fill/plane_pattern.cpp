@@ -22,6 +22,22 @@ cv::Mat mistakenPlanes(const cv::Mat& repeats, const cv::Mat& source, const Inpa
 
 }  // namespace
 
+InpaintParams supposedSupports(const InpaintParams& params, const cv::Size& size) {
+  InpaintParams supposed = params;
+  supposed.surface = cv::Mat::zeros(size, CV_8U), supposed.sure = cv::Mat::zeros(size, CV_8U);
+  for (int k = 0; k < params.supports; ++k) {
+    const cv::Matx33d& plane = params.planes[k];
+    for (int v = 0; v < size.height; ++v) {
+      for (int u = 0; u < size.width; ++u) {
+        std::uint8_t& label = supposed.surface.at<std::uint8_t>(v, u);
+        if (label == 0 && plane(2, 0) * u + plane(2, 1) * v + plane(2, 2) > 0.0)
+          label = static_cast<std::uint8_t>(k + 1);
+      }
+    }
+  }
+  return supposed;
+}
+
 bool followPattern(const PatternedPlane& plane, const PictureToFill& picture, int fewest,
                    InpaintParams& params) {
   const cv::Size size = picture.hole.size();
@@ -44,6 +60,7 @@ bool followPattern(const PatternedPlane& plane, const PictureToFill& picture, in
   if (cv::countNonZero(found & picture.hole) < fewest) return false;
   params.surface.setTo(0, mistaken & picture.hole);
   params.surface.setTo(plane.label, found), params.sure.setTo(255, found);
+  params.surface.setTo(0, (params.surface == plane.label) & ~params.sure & picture.source);
   return true;
 }
 

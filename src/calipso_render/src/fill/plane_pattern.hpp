@@ -21,11 +21,15 @@ struct PictureToFill {
   const cv::Mat& source;  // CV_8UC1: what may be copied
 };
 
+// Without a depth image: support planes are supposed all below their horizons, and sure nowhere.
+InpaintParams supposedSupports(const InpaintParams& params, const cv::Size& size);
+
 // Such a plane is seen wherever the picture repeats itself so, too, and goes on behind the hole from
 // there, whatever the depth image says: it is told least of what is dark or polished. Planes found
 // in the depth image most of which do so are none.
 // @param fewest px of the hole that have to be told so
-// @param params surface and sure are set where the plane is
+// @param params surface and sure are set where the plane is; where it was supposed and does not
+//   repeat itself surface is unknown
 // @return false: there are fewer, nothing is changed
 bool followPattern(const PatternedPlane& plane, const PictureToFill& picture, int fewest,
                    InpaintParams& params);

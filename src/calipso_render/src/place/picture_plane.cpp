@@ -30,4 +30,12 @@ cv::Matx33d PicturePlane::fromPixels(const Camera& camera) const {
   return H;
 }
 
+std::vector<PicturePlane> inPicture(const std::vector<SupportPlane>& planes, const Camera& camera) {
+  std::vector<PicturePlane> endless;
+  for (const SupportPlane& plane : planes) {
+    if (!plane.x_range) endless.push_back(inPicture(plane, camera));
+  }
+  return endless;
+}
+
 }  // namespace calipso::render

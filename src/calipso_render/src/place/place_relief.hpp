@@ -21,6 +21,8 @@ struct PicturePlane {
 };
 
 PicturePlane inPicture(const SupportPlane& plane, const Camera& camera);
+// Of those that do not end.
+std::vector<PicturePlane> inPicture(const std::vector<SupportPlane>& planes, const Camera& camera);
 
 // The largest planes among the pixels of `wanted`.
 std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& wanted);
