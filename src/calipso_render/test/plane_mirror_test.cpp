@@ -248,16 +248,25 @@ TEST(PlaneMirror, IsSharpOnPolishedPlanesAlone) {
   EXPECT_TRUE(isWater(mirror) && !mirrorsSharply(mirror));
 }
 
-// Waves all over a lake, and the dark mirror image of a hull, with waves in it or none.
-TEST(PlaneMirror, WhatIsPlainWithoutItIsLost) {
-  const cv::Rect hull(60, 40, 50, 40);
-  cv::Mat lake(kHeight, kWidth, CV_8UC3);
-  cv::RNG random(5);
-  random.fill(lake, cv::RNG::UNIFORM, 100, 160);
+// Waves all over a lake, and the dark mirror image of a hull.
+struct Lake {
+  const cv::Rect hull{60, 40, 50, 40};
+  cv::Mat lake = cv::Mat(kHeight, kWidth, CV_8UC3),
+          plane = cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(255));
   PlaneMirror mirror;
-  mirror.strength = 1.0f, mirror.at_key = cv::Mat::zeros(lake.size(), CV_32FC3);
-  mirror.at_key(hull).setTo(cv::Scalar::all(-0.1));
-  const cv::Mat plane(lake.size(), CV_8U, cv::Scalar(255));
+
+  Lake(int darkest, int brightest) {
+    cv::RNG random(5);
+    random.fill(lake, cv::RNG::UNIFORM, darkest, brightest);
+    mirror.strength = 1.0f, mirror.at_key = cv::Mat::zeros(lake.size(), CV_32FC3);
+    mirror.at_key(hull).setTo(cv::Scalar::all(-0.1));
+  }
+};
+
+// There are waves in it, or none.
+TEST(PlaneMirror, WhatIsPlainWithoutItIsLost) {
+  Lake l(100, 160);
+  auto& [hull, lake, plane, mirror] = l;
   EXPECT_EQ(cv::countNonZero(lostInMirror(mirror, lake, plane)), 0);
   lake(hull).setTo(cv::Scalar::all(130));
   const cv::Mat lost = lostInMirror(mirror, lake, plane);
@@ -271,14 +280,8 @@ TEST(PlaneMirror, WhatIsPlainWithoutItIsLost) {
 // The mirror image of a hull that is taken off two pixels beside its place leaves a dark and a pale
 // line.
 TEST(PlaneMirror, OutlinesBesideTheirPlaceAreLost) {
-  const cv::Rect hull(60, 40, 50, 40);
-  cv::Mat lake(kHeight, kWidth, CV_8UC3);
-  cv::RNG random(5);
-  random.fill(lake, cv::RNG::UNIFORM, 125, 135);
-  PlaneMirror mirror;
-  mirror.strength = 1.0f, mirror.at_key = cv::Mat::zeros(lake.size(), CV_32FC3);
-  mirror.at_key(hull).setTo(cv::Scalar::all(-0.1));
-  const cv::Mat plane(lake.size(), CV_8U, cv::Scalar(255));
+  Lake l(125, 135);
+  auto& [hull, lake, plane, mirror] = l;
   EXPECT_EQ(cv::countNonZero(lostInMirror(mirror, lake, plane)), 0);
   const cv::Rect dark(hull.x - 2, hull.y, 2, hull.height),
       pale(hull.br().x - 2, hull.y, 2, hull.height);
