@@ -382,9 +382,12 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   if (!banned.empty()) canvas.source.setTo(0, banned(window));
   canvas.known = canvas.source.clone();
   InpaintParams inner = within(window, params);
-  if (!inner.surface.empty() && !inner.sure.empty()) fillPlanes(inner, canvas);
-  InpaintParams supposed = supposedSupports(inner, window.size());
-  if (inner.surface.empty()) fillPlanes(supposed, canvas);
+  if (inner.surface.empty()) {
+    InpaintParams supposed = supposedSupports(inner, window.size());
+    fillPlanes(supposed, canvas);
+  } else if (!inner.sure.empty()) {
+    fillPlanes(inner, canvas);
+  }
   if (cv::countNonZero(canvas.hole) > 0) fillRest(inner, canvas);
   const cv::Mat has_origin = copied(canvas.origin);
   result.patches_found = cv::countNonZero(has_origin) > 0;

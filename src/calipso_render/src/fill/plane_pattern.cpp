@@ -24,7 +24,9 @@ cv::Mat mistakenPlanes(const cv::Mat& repeats, const cv::Mat& source, const Inpa
 
 InpaintParams supposedSupports(const InpaintParams& params, const cv::Size& size) {
   InpaintParams supposed = params;
-  supposed.surface = cv::Mat::zeros(size, CV_8U), supposed.sure = cv::Mat::zeros(size, CV_8U);
+  // No cv::Mat::zeros: that would write into what the copy shares with its original.
+  supposed.surface = cv::Mat(size, CV_8U, cv::Scalar(0)),
+  supposed.sure = cv::Mat(size, CV_8U, cv::Scalar(0));
   for (int k = 0; k < params.supports; ++k) {
     const cv::Matx33d& plane = params.planes[k];
     for (int v = 0; v < size.height; ++v) {
