@@ -206,7 +206,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const SkyMap sky = skyOver(actors, params);
   for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
   p.fronts = frontsOf(p, params);
-  p.footprints = footprintsOf(p);
+  p.footprints = footprintsOf(p, picture, params.background.mask_margin_px);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
   prepareBackground({frames, light_views, actors, seen, picture, sun, sky, cameraMoves(clip)},
                     params, p);

@@ -151,5 +151,53 @@ TEST(BridgeLines, LeaveTextureOfManyLines) {
   EXPECT_EQ(cv::countNonZero(l.bridge().drawn), 0);
 }
 
+// A floor, of other tiles on the right, ends at a wall in a dark gap; the labels have the border four
+// pixels too high.
+struct FloorAndWall {
+  Lines l;
+  cv::Mat surface{200, 320, CV_8U, cv::Scalar(1)};
+
+  FloorAndWall() {
+    l.image.rowRange(100, 200) -= cv::Scalar::all(90.0);
+    l.image(cv::Rect(170, 100, 150, 100)) += cv::Scalar::all(70.0);
+    l.line({0, 99}, {319, 99}, 20);
+    surface.rowRange(0, 95) = 2;
+    l.hole(cv::Rect(110, 50, 100, 100)).setTo(255);
+    l.image.setTo(cv::Scalar::all(0), l.hole);
+  }
+  LineBridges bridge() {
+    return bridgeBorders(straightEdges(l.hole == 0, l.image), l.hole, l.hole == 0, surface,
+                         l.image);
+  }
+};
+
+TEST(BridgeBorders, LeadAnEdgeBetweenSurfacesThroughOfWhichOneSideChanges) {
+  FloorAndWall place;
+  EXPECT_EQ(cv::countNonZero(place.l.bridge(place.surface).drawn), 0);  // as lines alone are told
+  FloorAndWall again;
+  const LineBridges b = again.bridge();
+  for (int u = 112; u < 208; ++u) {
+    ASSERT_NE(b.core.at<std::uint8_t>(99, u), 0) << u;
+    EXPECT_LT(again.l.image.at<cv::Vec3f>(99, u)[1], 60.0f) << u;
+    EXPECT_GT(again.l.image.at<cv::Vec3f>(96, u)[1], 110.0f) << u;
+  }
+}
+
+TEST(BridgeBorders, TellWhereTheSurfacesMeet) {
+  FloorAndWall place;
+  place.bridge();
+  for (int u = 112; u < 208; ++u) {
+    EXPECT_EQ(place.surface.at<std::uint8_t>(97, u), 2) << u;
+    EXPECT_EQ(place.surface.at<std::uint8_t>(102, u), 1) << u;
+  }
+  EXPECT_EQ(place.surface.at<std::uint8_t>(97, 100), 2);  // beside the hole, too
+}
+
+TEST(BridgeBorders, LeaveEdgesWithinASurface) {
+  FloorAndWall place;
+  place.surface = 1;
+  EXPECT_EQ(cv::countNonZero(place.bridge().drawn), 0);
+}
+
 }  // namespace
 }  // namespace calipso::render

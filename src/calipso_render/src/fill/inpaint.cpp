@@ -7,14 +7,15 @@
 #include <vector>
 
 #include "draw/side_by_side.hpp"
+#include "fill/around_hole.hpp"
 #include "fill/colour_trend.hpp"
+#include "fill/hidden_plane.hpp"
 #include "fill/hidden_sky.hpp"
 #include "fill/lattice.hpp"
 #include "fill/line_bridge.hpp"
 #include "fill/line_ends.hpp"
 #include "fill/patch_cost.hpp"
 #include "fill/patch_fill.hpp"
-#include "fill/plane_chart.hpp"
 #include "fill/plane_pattern.hpp"
 #include "fill/seam_blend.hpp"
 #include "fill/seam_cut.hpp"
@@ -25,20 +26,10 @@ namespace {
 
 constexpr int kLatticeMargin = 72;  // px around it in which a pattern is sought,
 constexpr int kFarMargin = 216;     // ... that alone can tell a plane
-constexpr int kLeastMargin = 48;    // px around the hole that are looked at, at least
 constexpr float kRounded =
     1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
 constexpr float kFarther = 2000.0f;  // InpaintParams::away_farther along a plane
-constexpr int kOutline = 3;          // px by which the outlines of surfaces may be off
 constexpr int kFewestOnPlane = 200;  // px of a plane's part of the hole, to be filled along it
-
-cv::Rect windowAround(const cv::Mat& hole, int least = kLeastMargin, int most = 1 << 20) {
-  const cv::Rect box = cv::boundingRect(hole);
-  const int margin = std::clamp(std::max(box.width, box.height) / 2, least, most);
-  const cv::Rect grown(box.x - margin, box.y - margin, box.width + 2 * margin,
-                       box.height + 2 * margin);
-  return grown & cv::Rect(0, 0, hole.cols, hole.rows);
-}
 
 InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
   InpaintParams inner = params;
@@ -49,13 +40,6 @@ InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
   if (!params.sky.empty()) inner.sky = params.sky(window).clone();
   if (!params.sure.empty()) inner.sure = params.sure(window).clone();
   return inner;
-}
-
-cv::Mat smoothFill(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& known) {
-  cv::Mat weight(hole.size(), CV_32F, cv::Scalar(0.0f)), filled = image.clone();
-  weight.setTo(1.0f, known);
-  pushPull(image, weight).copyTo(filled, hole);
-  return filled;
 }
 
 // Copies every pixel from its origin. @return CV_8UC1: 255 where it has one
@@ -128,43 +112,6 @@ struct Canvas {
   }
 };
 
-cv::Mat nearnessOf(const cv::Matx33d& to_plane, const cv::Size& size) {
-  cv::Mat nearness(size, CV_32F);
-  for (int v = 0; v < size.height; ++v) {
-    for (int u = 0; u < size.width; ++u)
-      nearness.at<float>(v, u) =
-          static_cast<float>(to_plane(2, 0) * u + to_plane(2, 1) * v + to_plane(2, 2));
-  }
-  return nearness;
-}
-
-// A plane's part of the picture, in its chart.
-struct PlanePart {
-  PlaneChart chart;
-  std::optional<Lattice> lattice;
-  cv::Mat plain;  // CV_32FC3, the picture; where the plane is not seen it goes on smoothly
-  cv::Mat look;   // CV_32FC3, so, too
-  cv::Mat hole, known, source;
-  std::vector<cv::Vec4f> edges;  // straightEdges(), of look
-};
-
-PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen) {
-  cv::Mat copied_from;  // around which a sample sees nothing else
-  cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
-  PlanePart part{chart, {}, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from),
-                 {}};
-  part.known &= part.hole == 0, part.source &= part.hole == 0;
-  return part;
-}
-
-void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
-  // What is not seen of the plane would shine through to what is.
-  part.plain = smoothFill(look, seen == 0, seen);
-  part.look = part.chart.carried(part.plain);
-  smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
-  part.edges = straightEdges(part.source, part.look);
-}
-
 // Every pixel of a plane's hole as the chart's nearest one was filled: a sample of the picture, as
 // far off along the plane as that was copied from, and what was evened out there.
 // @param wanted CV_8UC1, of the chart
@@ -192,29 +139,6 @@ void copyBack(const PlanePart& part, const Filling& filled, const cv::Mat& wante
                  {cvRound(from.x), cvRound(from.y)});
     }
   }
-}
-
-// A plane that the hole hides.
-struct HiddenPlane {
-  int label;  // InpaintParams::surface
-  const cv::Matx33d& to_plane;
-  bool supports;       // something stands on it
-  bool known;          // false: where it is hidden its pattern alone can tell
-  cv::Mat hole, seen;  // CV_8UC1: where it is, or may be, hidden; where it may be copied from
-  std::optional<PlanePart> part;  // nothing if it cannot be filled along itself
-};
-
-std::optional<PlanePart> chartedPart(const HiddenPlane& plane) {
-  const std::optional<PlaneChart> chart = planeChart(plane.to_plane, plane.hole, plane.seen);
-  if (!chart) return std::nullopt;
-  PlanePart part = partOf(*chart, plane.hole, plane.seen);
-  if (cv::countNonZero(part.hole) == 0 || cv::countNonZero(part.source) == 0) return std::nullopt;
-  return part;
-}
-
-void addLattice(const cv::Mat& look, int margin, PlanePart& part) {
-  const cv::Rect near = windowAround(part.hole, margin, margin);
-  part.lattice = findLattice(part.chart.carried(look, near), part.source(near));
 }
 
 // Fills a plane's part of the hole with copies shifted along the plane.
@@ -254,8 +178,14 @@ std::vector<HiddenPlane> hiddenPlanes(const InpaintParams& params, const Canvas&
     if (!known && supports)
       hidden = canvas.hole & ~told & (nearnessOf(params.planes[k], hidden.size()) > 0.0f);
     if (known || (supports && cv::countNonZero(hidden) >= kFewestOnPlane))
-      planes.push_back(
-          {k + 1, params.planes[k], supports, known, hidden, canvas.source & here, {}});
+      planes.push_back({k + 1,
+                        params.planes[k],
+                        supports,
+                        known,
+                        hidden,
+                        canvas.source & here,
+                        canvas.source & ~here,
+                        {}});
   }
   return planes;
 }
@@ -280,7 +210,7 @@ void lookAround(std::vector<HiddenPlane>& planes, Canvas& canvas) {
     });
     if (anyway) rest.setTo(0, plane.hole);
   }
-  if (cv::countNonZero(rest) > 0)
+  if (cv::countNonZero(rest) > 0 && !canvas.edges)
     lattices.push_back([&] { canvas.edges = straightEdges(canvas.source, canvas.look); });
   looks.insert(looks.end(), lattices.begin(), lattices.end());
   doAll(true, looks);
@@ -300,6 +230,18 @@ bool followPatterns(const std::vector<HiddenPlane>& planes, const Canvas& canvas
   return more;
 }
 
+// Edges between two surfaces go on before these do.
+void fillBorders(InpaintParams& params, Canvas& canvas) {
+  double first, last;
+  cv::minMaxLoc(params.surface, &first, &last, nullptr, nullptr, canvas.hole);
+  if (first == last) return;
+  canvas.edges = straightEdges(canvas.source, canvas.look);
+  const LineBridges borders =
+      bridgeBorders(*canvas.edges, canvas.hole, canvas.source, params.surface, canvas.look);
+  canvas.hole.setTo(0, borders.core), canvas.known |= borders.core;
+  borders.origin.copyTo(canvas.origin, borders.core);
+}
+
 void fillPlanes(InpaintParams& params, Canvas& canvas) {
   std::vector<HiddenPlane> planes = hiddenPlanes(params, canvas);
   lookAround(planes, canvas);
@@ -317,7 +259,7 @@ void fillPlanes(InpaintParams& params, Canvas& canvas) {
 // a copy would have a trend that is not its own.
 cv::Mat supportsTrend(const InpaintParams& params, Canvas& canvas) {
   cv::Mat trend = cv::Mat::zeros(canvas.look.size(), CV_32FC3), inner, outer;
-  const cv::Mat square = cv::Mat::ones(2 * kOutline + 1, 2 * kOutline + 1, CV_8U);
+  const cv::Mat square = cv::Mat::ones(2 * kOutlineError + 1, 2 * kOutlineError + 1, CV_8U);
   for (int k = 0; k < params.supports && !params.surface.empty(); ++k) {
     const cv::Mat here = params.surface == static_cast<double>(k + 1);
     if (cv::countNonZero(here & canvas.hole) == 0) continue;
@@ -386,6 +328,7 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
     InpaintParams supposed = supposedSupports(inner, window.size());
     fillPlanes(supposed, canvas);
   } else if (!inner.sure.empty()) {
+    fillBorders(inner, canvas);
     fillPlanes(inner, canvas);
   }
   if (cv::countNonZero(canvas.hole) > 0) fillRest(inner, canvas);

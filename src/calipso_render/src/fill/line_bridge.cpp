@@ -26,6 +26,10 @@ constexpr float kNear = 4.0f;         // px on either side that its colours reac
 constexpr float kCore = 1.5f;         // px on either side that are the line itself
 constexpr float kAlone = 1.0f;        // the same of one that passes before different things
 constexpr float kCrossFade = 4.0f;    // px on either side of the middle
+// px on either side of an edge between two surfaces by which their labels may be off
+constexpr int kOffBorder = 6;
+constexpr int kBesideEnd = 3;    // px by which one of its ends may have been found beside it
+constexpr float kParted = 0.7f;  // part of the way on which such an edge parts them
 
 struct Bridge {
   const LineEnd *from, *to;  // to: nothing if it ends at another bridge
@@ -51,7 +55,7 @@ class Bridger {
                       [&](const LineEnd& end) { return repeats(end, *lattice, source_, image_); }),
                   ends_.end());
     }
-    std::vector<Bridge> bridges = connections();
+    std::vector<Bridge> bridges = connections(&Bridger::connection);
     const std::size_t through = bridges.size();
     for (const LineEnd& end : ends_) {
       if (std::any_of(bridges.begin(), bridges.begin() + through,
@@ -68,16 +72,34 @@ class Bridger {
     };
     std::stable_sort(bridges.begin(), bridges.end(),
                      [&](const Bridge& a, const Bridge& b) { return strength(a) < strength(b); });
+    drawAll(bridges);
+    return result_;
+  }
+
+  // @param surface as bridgeBorders()'s
+  LineBridges runBorders(const std::vector<cv::Vec4f>& edges, cv::Mat& surface) {
+    ends_ =
+        withBeside(findLineEnds(edges, hole_, source_, image_), kBesideEnd, hole_, source_, image_);
+    std::vector<Bridge> borders = connections(&Bridger::border);
+    std::stable_sort(borders.begin(), borders.end(), [&](const Bridge& a, const Bridge& b) {
+      return std::min(a.from->contrast, a.to->contrast) <
+             std::min(b.from->contrast, b.to->contrast);
+    });
+    drawAll(borders);
+    for (const Bridge& b : borders) setSides(b, surface);
+    return result_;
+  }
+
+ private:
+  void drawAll(const std::vector<Bridge>& bridges) {
     const cv::Mat known = image_.clone();
     for (const Bridge& b : bridges) {
       draw(b, known);
       markSeen(*b.from);
       if (b.to != nullptr) markSeen(*b.to);
     }
-    return result_;
   }
 
- private:
   // A thin one; an edge between two things may well have others like it.
   void markSeen(const LineEnd& end) {
     if (!end.isThin()) return;
@@ -85,17 +107,35 @@ class Bridger {
              2 * cvRound(kCore) + 1);
   }
 
+  // @return nothing if b does not continue a
+  std::optional<Bridge> connection(const LineEnd& a, const LineEnd& b, float gap) const {
+    if (besideAlike(a, b)) {
+      if (const auto cost = misfit(a, b, gap, differenceAcross(a, b)))
+        return Bridge{&a, &b, gap, *cost, kLineHalf};
+    }
+    if (!a.isThin() || !b.isThin()) return std::nullopt;
+    const auto alone = misfit(a, b, gap, differenceAlone(a, b));
+    return alone ? std::optional<Bridge>({&a, &b, gap, 1.0f + *alone, kAlone}) : std::nullopt;
+  }
+
+  // Of two surfaces: one side of them is alike.
+  std::optional<Bridge> border(const LineEnd& a, const LineEnd& b, float gap) const {
+    const auto cost = misfit(a, b, gap, differenceOfSides(a, b));
+    if (!cost) return std::nullopt;
+    const Bridge bridge{&a, &b, gap, *cost, kLineHalf};
+    return partsSurfaces(bridge) ? std::optional<Bridge>(bridge) : std::nullopt;
+  }
+
   // Ends that continue each other, the best first, each once, none across another.
-  std::vector<Bridge> connections() const {
+  // @param connect connection() or border()
+  std::vector<Bridge> connections(std::optional<Bridge> (Bridger::*connect)(const LineEnd&,
+                                                                            const LineEnd&, float)
+                                      const) const {
     std::vector<Bridge> all, chosen;
     for (std::size_t i = 0; i < ends_.size(); ++i) {
       for (std::size_t j = i + 1; j < ends_.size(); ++j) {
-        const LineEnd &a = ends_[i], &b = ends_[j];
-        const float gap = static_cast<float>(cv::norm(b.at - a.at));
-        if (const auto cost = misfit(a, b, kLineHalf))
-          all.push_back({&a, &b, gap, *cost, kLineHalf});
-        else if (const auto alone = misfit(a, b, kAlone); a.isThin() && b.isThin() && alone)
-          all.push_back({&a, &b, gap, 1.0f + *alone, kAlone});
+        const float gap = static_cast<float>(cv::norm(ends_[j].at - ends_[i].at));
+        if (const auto bridge = (this->*connect)(ends_[i], ends_[j], gap)) all.push_back(*bridge);
       }
     }
     // What was measured near the hole comes first.
@@ -104,8 +144,11 @@ class Bridger {
       return std::make_pair(from_afar(a), a.cost) < std::make_pair(from_afar(b), b.cost);
     });
     for (const Bridge& b : all) {
+      const auto uses = [](const Bridge& c, const LineEnd* end) {
+        return c.from->line == end->line || c.to->line == end->line;
+      };
       const bool taken = std::any_of(chosen.begin(), chosen.end(), [&](const Bridge& c) {
-        return c.from == b.from || c.to == b.from || c.from == b.to || c.to == b.to || cross(c, b);
+        return uses(c, b.from) || uses(c, b.to) || cross(c, b);
       });
       if (!taken) chosen.push_back(b);
     }
@@ -137,24 +180,37 @@ class Bridger {
     return rms(sum / 3.0f) / std::max(a.contrast, b.contrast);
   }
 
+  // That of the line and what is on one side of it, the side that differs less.
+  static float differenceOfSides(const LineEnd& a, const LineEnd& b) {
+    float least = 1e9f;
+    for (const int first : {0, kLineHalf}) {
+      float sum = 0.0f;
+      for (int s = first; s <= first + kLineHalf; ++s)
+        sum += static_cast<float>(
+                   cv::norm(a.profile[s] - b.profile[2 * kLineHalf - s], cv::NORM_L2SQR)) /
+               3.0f;
+      least = std::min(least, std::sqrt(sum / (kLineHalf + 1)));
+    }
+    return least / std::min(a.contrast, b.contrast);
+  }
+
+  static bool besideAlike(const LineEnd& a, const LineEnd& b) {
+    const float most = kBesideAlike * std::min(a.contrast, b.contrast);
+    return rms(a.beside[0] - b.beside[1]) <= most && rms(a.beside[1] - b.beside[0]) <= most;
+  }
+
   // How badly b continues a; nothing if it does not.
-  // @param half px on either side that tell: kLineHalf, or kAlone
-  std::optional<float> misfit(const LineEnd& a, const LineEnd& b, float half) const {
-    const bool alone = half < kLineHalf;
+  // @param difference of their colours, to their contrast
+  std::optional<float> misfit(const LineEnd& a, const LineEnd& b, float gap,
+                              float difference) const {
     const cv::Point2f way = b.at - a.at;
-    const float gap = static_cast<float>(cv::norm(way)), allowed = kStray + kTurn * gap;
+    const float allowed = kStray + kTurn * gap;
     if (gap < 2.0f || a.into.dot(way) < 0.9f * gap || b.into.dot(way) > -0.9f * gap)
       return std::nullopt;
     const float stray =
         std::max(std::abs(render::cross(a.into, way)), std::abs(render::cross(b.into, way)));
-    if (stray > allowed || hiddenPart(a.at, b.at) < kInHole) return std::nullopt;
-    const float difference = alone ? differenceAlone(a, b) : differenceAcross(a, b);
-    if (difference > kAlike) return std::nullopt;
-    for (const int side : {0, 1}) {
-      if (!alone && rms(a.beside[side] - b.beside[1 - side]) >
-                        kBesideAlike * std::min(a.contrast, b.contrast))
-        return std::nullopt;
-    }
+    if (stray > allowed || difference > kAlike || hiddenPart(a.at, b.at) < kInHole)
+      return std::nullopt;
     return stray / allowed + difference / kAlike + gap / std::max(hole_.cols, hole_.rows);
   }
 
@@ -199,6 +255,45 @@ class Bridger {
       }
     }
     return true;
+  }
+
+  // Labels on the left and on the right of a connection where it begins.
+  std::pair<int, int> sidesOf(const Bridge& b) const {
+    const cv::Point2f before = b.from->at - kLineHalf * b.from->into,
+                      left = (kOffBorder + 1.0f) * leftOf(b.from->into);
+    return {surfaceAt(before + left), surfaceAt(before - left)};
+  }
+
+  // Are two surfaces, one on each side, parted by most of a connection?
+  bool partsSurfaces(const Bridge& b) const {
+    const auto [left, right] = sidesOf(b);
+    if (left == 0 || right == 0 || left == right) return false;
+    const cv::Point2f along = (b.to->at - b.from->at) / b.gap,
+                      aside = (kOffBorder + 1.0f) * leftOf(along);
+    const int steps = std::max(2, cvRound(b.gap));
+    int parted = 0;
+    for (int i = 0; i <= steps; ++i) {
+      const cv::Point2f p = b.from->at + (b.gap * i / steps) * along;
+      parted += surfaceAt(p + aside) == left && surfaceAt(p - aside) == right;
+    }
+    return parted > kParted * steps;
+  }
+
+  void setSides(const Bridge& b, cv::Mat& surface) const {
+    const auto [left, right] = sidesOf(b);
+    const cv::Point2f along = (b.to->at - b.from->at) / b.gap;
+    const cv::Point2f start = b.from->at - b.from->length * along;
+    const float length = b.from->length + b.gap + b.to->length;
+    for (int v = 0; v < surface.rows; ++v) {
+      for (int u = 0; u < surface.cols; ++u) {
+        std::uint8_t& label = surface.at<std::uint8_t>(v, u);
+        if (label != left && label != right) continue;
+        const cv::Point2f d = cv::Point2f(static_cast<float>(u), static_cast<float>(v)) - start;
+        const float t = d.dot(along), s = d.dot(leftOf(along));
+        if (t >= 0.0f && t <= length && std::abs(s) <= kOffBorder)
+          label = static_cast<std::uint8_t>(s > 0.0f ? left : right);
+      }
+    }
   }
 
   int surfaceAt(const cv::Point2f& p) const {
@@ -274,6 +369,12 @@ LineBridges bridgeLines(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole
                         const cv::Mat& source, const cv::Mat& surface, cv::Mat& image,
                         const Lattice* lattice) {
   return Bridger(hole, source, surface, image).run(edges, lattice);
+}
+
+LineBridges bridgeBorders(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
+                          const cv::Mat& source, cv::Mat& surface, cv::Mat& image) {
+  const cv::Mat before = surface.clone();
+  return Bridger(hole, source, before, image).runBorders(edges, surface);
 }
 
 }  // namespace calipso::render

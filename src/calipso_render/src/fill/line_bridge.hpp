@@ -31,4 +31,11 @@ LineBridges bridgeLines(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole
                         const cv::Mat& source, const cv::Mat& surface, cv::Mat& image,
                         const Lattice* lattice = nullptr);
 
+// The same of those edges alone that part two surfaces all the way, to be continued before anything
+// is filled. Where the picture shows such an edge it tells more exactly than a depth image where the
+// surfaces meet.
+// @param surface of two sides of such an edge set by it, in the hole and beside what is seen of it
+LineBridges bridgeBorders(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
+                          const cv::Mat& source, cv::Mat& surface, cv::Mat& image);
+
 }  // namespace calipso::render

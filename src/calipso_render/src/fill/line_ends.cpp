@@ -46,7 +46,13 @@ class LineEndFinder {
       addEnd({s[2], s[3]}, {s[0], s[1]});
     }
     dropDoubles();
+    for (std::size_t i = 0; i < ends_.size(); ++i) ends_[i].line = static_cast<int>(i);
     return ends_;
+  }
+
+  std::optional<LineEnd> moved(LineEnd end, float aside) const {
+    end.at += aside * leftOf(end.into);
+    return isSet(source_, end.at) && measure(end) ? std::optional<LineEnd>(end) : std::nullopt;
   }
 
  private:
@@ -209,6 +215,19 @@ std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image
 std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
                                   const cv::Mat& source, const cv::Mat& image) {
   return LineEndFinder(hole, source, image).run(edges);
+}
+
+std::vector<LineEnd> withBeside(const std::vector<LineEnd>& ends, int reach, const cv::Mat& hole,
+                                const cv::Mat& source, const cv::Mat& image) {
+  const LineEndFinder finder(hole, source, image);
+  std::vector<LineEnd> all = ends;
+  for (const LineEnd& end : ends) {
+    for (int aside = -reach; aside <= reach; ++aside) {
+      const auto moved = aside != 0 ? finder.moved(end, static_cast<float>(aside)) : std::nullopt;
+      if (moved) all.push_back(*moved);
+    }
+  }
+  return all;
 }
 
 bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,

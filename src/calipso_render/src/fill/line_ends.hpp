@@ -20,6 +20,7 @@ struct LineEnd {
   float contrast;
   std::array<cv::Vec3f, 2> beside;  // mean colours left and right of it
   bool from_afar;                   // nearer to the hole it was not to be measured
+  int line = 0;                     // number of the edge that it is an end of
 
   bool isThin() const;  // a line, not an edge between two things
 };
@@ -32,6 +33,11 @@ std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image
 // @param image CV_32FC3, code values; hole, source CV_8UC1: to be filled; known
 std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
                                   const cv::Mat& source, const cv::Mat& image);
+
+// The same ends, and each up to so many pixels to either side: of two edges that lie close together
+// one may have been found here and the other one there.
+std::vector<LineEnd> withBeside(const std::vector<LineEnd>& ends, int reach, const cv::Mat& hole,
+                                const cv::Mat& source, const cv::Mat& image);
 
 // Is a line seen again at the shifts of a lattice that lead off it?
 bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,

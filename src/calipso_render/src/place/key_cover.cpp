@@ -2,6 +2,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "place/rim_remains.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -102,12 +104,16 @@ std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params) {
   return fronts;
 }
 
-std::vector<cv::Mat> footprintsOf(const Prepared& p) {
-  std::vector<cv::Mat> footprints;
+std::vector<cv::Mat> footprintsOf(const Prepared& p, const cv::Mat& picture, int margin) {
+  std::vector<cv::Mat> footprints(p.surfaces.size());
   for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
-    cv::Mat footprint = (p.key_labels == p.surfaces[i].index) | p.outlines[i];
+    if (p.moves[i]) continue;
+    const cv::Mat own = p.key_labels == p.surfaces[i].index;
+    cv::Mat footprint = own | p.outlines[i];
     if (!p.fronts[i].empty()) footprint.setTo(0, p.fronts[i]);
-    footprints.push_back(p.moves[i] ? cv::Mat() : footprint);
+    footprint |= rimRemains(picture, footprint, (p.key_labels != 0) & ~own, margin);
+    if (!p.fronts[i].empty()) footprint.setTo(0, p.fronts[i]);
+    footprints[i] = footprint;
   }
   return footprints;
 }

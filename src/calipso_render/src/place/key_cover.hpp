@@ -20,8 +20,9 @@ cv::Mat grown(const cv::Mat& mask, int radius);
 std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params);
 
 // All that a resting object covers at the key frame: its mask, which can miss thin or dark ends,
-// and its model. Empty for those that move.
-std::vector<cv::Mat> footprintsOf(const Prepared& p);
+// its model, and what remains along the rim of both. Empty for those that move.
+// @param picture CV_32FC3, code values: the key frame; margin px around footprints that go with them
+std::vector<cv::Mat> footprintsOf(const Prepared& p, const cv::Mat& picture, int margin);
 
 // CV_8UC1: 255 where the depth image shows something nearer than the object beside it in the picture:
 // it stands before that and does not go on behind it.

@@ -1,0 +1,57 @@
+#include "fill/hidden_plane.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include "fill/around_hole.hpp"
+#include "fill/line_ends.hpp"
+
+namespace calipso::render {
+namespace {
+
+// @param beside CV_8UC1, != 0: where another surface is seen
+PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen,
+                 const cv::Mat& beside) {
+  cv::Mat copied_from, off;  // around which a sample sees nothing else
+  cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
+  cv::dilate(beside, off, cv::Mat::ones(2 * kOutlineError + 5, 2 * kOutlineError + 5, CV_8U));
+  copied_from.setTo(0, off);
+  PlanePart part{chart, {}, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from),
+                 {}};
+  part.known &= part.hole == 0, part.source &= part.hole == 0;
+  return part;
+}
+
+}  // namespace
+
+cv::Mat nearnessOf(const cv::Matx33d& to_plane, const cv::Size& size) {
+  cv::Mat nearness(size, CV_32F);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u)
+      nearness.at<float>(v, u) =
+          static_cast<float>(to_plane(2, 0) * u + to_plane(2, 1) * v + to_plane(2, 2));
+  }
+  return nearness;
+}
+
+std::optional<PlanePart> chartedPart(const HiddenPlane& plane) {
+  const std::optional<PlaneChart> chart = planeChart(plane.to_plane, plane.hole, plane.seen);
+  if (!chart) return std::nullopt;
+  PlanePart part = partOf(*chart, plane.hole, plane.seen, plane.beside);
+  if (cv::countNonZero(part.hole) == 0 || cv::countNonZero(part.source) == 0) return std::nullopt;
+  return part;
+}
+
+void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
+  // What is not seen of the plane would shine through to what is.
+  part.plain = smoothFill(look, seen == 0, seen);
+  part.look = part.chart.carried(part.plain);
+  smoothFill(part.look, part.known == 0, part.known).copyTo(part.look);
+  part.edges = straightEdges(part.source, part.look);
+}
+
+void addLattice(const cv::Mat& look, int margin, PlanePart& part) {
+  const cv::Rect near = windowAround(part.hole, margin, margin);
+  part.lattice = findLattice(part.chart.carried(look, near), part.source(near));
+}
+
+}  // namespace calipso::render
