@@ -43,7 +43,8 @@ TEST(FillUnseen, PartsGoOverToTheirOwnColour) {
       texture.texels[i] = isSmall(t) ? kRed : kBlue, certain[i] = 1.0f;
   }
   fillUnseen(surface, smoothParts(surface.key_vertices, surface.triangles),
-             connectedParts(surface.key_vertices, surface.triangles), certain, texture);
+             connectedParts(surface.key_vertices, surface.triangles),
+             FaintColours(surface.triangles.size()), certain, texture);
   int lowest = 0;
   for (int t = 0; t < texture.triangleCount(); ++t) {
     if (heightOf(t) > -0.4f * kBallRadius) continue;
@@ -54,13 +55,38 @@ TEST(FillUnseen, PartsGoOverToTheirOwnColour) {
   EXPECT_GT(lowest, 100);
 }
 
+// Of the small shell its rim alone is seen: what that shows is more like it than the large one is.
+TEST(FillUnseen, PartsGoOverToWhatIsFaintlySeenOfThem) {
+  const Surface surface = twoBalls();
+  SurfaceTexture texture(surface.key_vertices, surface.triangles, 0.01f, 100000);
+  const std::vector<int> shells = connectedParts(surface.key_vertices, surface.triangles);
+  std::vector<float> certain(texture.size(), 0.0f);
+  FaintColours faint(surface.triangles.size());
+  const auto isSmall = [&](int t) {
+    return surface.key_vertices[surface.triangles[t][0]].x() < 0.6f * kBallRadius;
+  };
+  for (int t = 0; t < texture.triangleCount(); ++t) {
+    faint[shells[t]] = isSmall(t) ? cv::Vec3f(0.1f, 0.3f, 0.2f) : cv::Vec3f(1, 1, 1);
+    for (std::size_t i = texture.firstOf(t); !isSmall(t) && i < texture.firstOf(t + 1); ++i)
+      texture.texels[i] = kBlue, certain[i] = 1.0f;
+  }
+  fillUnseen(surface, smoothParts(surface.key_vertices, surface.triangles), shells, faint, certain,
+             texture);
+  for (int t = 0; t < texture.triangleCount(); ++t) {
+    const cv::Vec4f &expected = isSmall(t) ? cv::Vec4f(0.1f, 0.3f, 0.2f, 0.0f) : kBlue,
+                    &c = texture.texels[texture.firstOf(t)];
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(c[k], expected[k], 0.02f) << t;
+  }
+}
+
 // Nothing is seen at all: a middle grey.
 TEST(FillUnseen, OfNothingIsGrey) {
   const Surface surface = makeSurface(ballAt(Eigen::Vector3d::Zero()));
   SurfaceTexture texture(surface.key_vertices, surface.triangles, 0.02f, 100000);
   fillUnseen(surface, smoothParts(surface.key_vertices, surface.triangles),
              connectedParts(surface.key_vertices, surface.triangles),
-             std::vector<float>(texture.size(), 0.0f), texture);
+             FaintColours(surface.triangles.size()), std::vector<float>(texture.size(), 0.0f),
+             texture);
   for (const cv::Vec4f& c : texture.texels) EXPECT_NEAR(c[1], 0.3f, 1e-4f);
 }
 

@@ -95,7 +95,8 @@ class TextureFill {
     auto& [from, certain, layer] = origins;
     levelSeams(surface_.key_vertices, surface_.triangles, layer, a.texture);
     continuePattern(surface_.key_vertices, surface_.triangles, down, certain, a.texture);
-    fillUnseen(surface_, sightings_.pieces(), sightings_.parts(), certain, a.texture);
+    fillUnseen(surface_, sightings_.pieces(), sightings_.parts(), faintColours(), certain,
+               a.texture);
     const auto part = [&](char kind) {
       return static_cast<float>(std::count(from.begin(), from.end(), kind)) /
              std::max<std::size_t>(1, from.size());
@@ -189,6 +190,23 @@ class TextureFill {
         look = end;
       }
     }
+  }
+
+  FaintColours faintColours() const {
+    const std::vector<int>& shells = sightings_.parts();
+    std::vector<cv::Vec3f> sums(1 + *std::max_element(shells.begin(), shells.end()));
+    std::vector<float> weights(sums.size(), 0.0f);
+    for (std::size_t t = 0; t < looks_.size(); ++t) {
+      for (const Look& look : looks_[t].all) {
+        sums[shells[t]] += look.share * colourOf(sampleBicubic(shown_[look.view], look.u, look.v));
+        weights[shells[t]] += look.share;
+      }
+    }
+    FaintColours colours(sums.size());
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      if (weights[k] > 0.0f) colours[k] = sums[k] * (1.0f / weights[k]);
+    }
+    return colours;
   }
 
   Place placeOf(int triangle, const Eigen::Vector3f& w, const Points& vertices,

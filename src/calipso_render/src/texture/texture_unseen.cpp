@@ -60,9 +60,10 @@ std::vector<std::optional<cv::Vec3f>> commonColours(const std::vector<int>& part
 }
 
 // What each vertex goes over to: the common colour of the smooth part of the surface that it
-// belongs to, or else of all that hangs together with it, or else of the object.
+// belongs to, or else of all that hangs together with it, or else what is faintly seen of that, or
+// else of the object.
 std::vector<cv::Vec3f> commonAround(const Surface& surface, const std::vector<int>& pieces,
-                                    const std::vector<int>& shells,
+                                    const std::vector<int>& shells, const FaintColours& faint,
                                     const std::vector<float>& certain,
                                     const SurfaceTexture& texture) {
   const Triangles& triangles = surface.triangles;
@@ -72,9 +73,12 @@ std::vector<cv::Vec3f> commonAround(const Surface& surface, const std::vector<in
   std::vector<cv::Vec3f> sums(surface.key_vertices.size());
   std::vector<float> counts(sums.size(), 0.0f);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
-    const auto& own = of_piece[pieces[t]] ? of_piece[pieces[t]] : of_shell[shells[t]];
-    const cv::Vec3f colour = own ? *own : of_all[0].value_or(kUnknown);
-    for (int k = 0; k < 3; ++k) sums[triangles[t][k]] += colour, ++counts[triangles[t][k]];
+    std::optional<cv::Vec3f> colour;
+    for (const auto& of : {of_piece[pieces[t]], of_shell[shells[t]], faint[shells[t]], of_all[0]}) {
+      if (!colour) colour = of;
+    }
+    for (int k = 0; k < 3; ++k)
+      sums[triangles[t][k]] += colour.value_or(kUnknown), ++counts[triangles[t][k]];
   }
   for (std::size_t i = 0; i < sums.size(); ++i) {
     if (counts[i] > 0.0f) sums[i] *= 1.0f / counts[i];
@@ -85,8 +89,8 @@ std::vector<cv::Vec3f> commonAround(const Surface& surface, const std::vector<in
 }  // namespace
 
 void fillUnseen(const Surface& surface, const std::vector<int>& pieces,
-                const std::vector<int>& shells, const std::vector<float>& certain,
-                SurfaceTexture& texture) {
+                const std::vector<int>& shells, const FaintColours& faint,
+                const std::vector<float>& certain, SurfaceTexture& texture) {
   const Triangles& triangles = surface.triangles;
   std::vector<cv::Vec3f> values(surface.key_vertices.size());
   std::vector<float> parts(values.size(), 0.0f), best(values.size(), 0.0f);
@@ -109,7 +113,7 @@ void fillUnseen(const Surface& surface, const std::vector<int>& pieces,
     std::fill(values.begin(), values.end(), kUnknown);
   else
     diffuseOverMesh(surface.key_vertices, triangles, known, values,
-                    FarValues{commonAround(surface, pieces, shells, certain, texture),
+                    FarValues{commonAround(surface, pieces, shells, faint, certain, texture),
                               kFromSeen * boxOf(surface.key_vertices).diagonal().norm()});
   for (int t = 0; t < texture.triangleCount(); ++t) {
     for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i) {

@@ -1,10 +1,15 @@
 #pragma once
 
+#include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "calipso_render/surface_texture.hpp"
 
 namespace calipso::render {
+
+// Per shell: mean colour of what is seen of it at all, be it at rims alone (a rope).
+using FaintColours = std::vector<std::optional<cv::Vec3f>>;
 
 // What no picture shows, or none for certain, continues the surface around it, and goes over to
 // what its part of the mesh is like on the whole: the rim of what is seen is seen flatly, with the
@@ -12,7 +17,7 @@ namespace calipso::render {
 // @param pieces, shells smoothParts() and connectedParts() of the surface
 // @param certain per texel: 1 = it is known, 0 = nothing of it
 void fillUnseen(const Surface& surface, const std::vector<int>& pieces,
-                const std::vector<int>& shells, const std::vector<float>& certain,
-                SurfaceTexture& texture);
+                const std::vector<int>& shells, const FaintColours& faint,
+                const std::vector<float>& certain, SurfaceTexture& texture);
 
 }  // namespace calipso::render
