@@ -156,8 +156,9 @@ cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const SeenP
   cv::Mat traces = shadeTraces(shadows, place, params);
   for (std::size_t i = 0; i < p.footprints.size(); ++i) {
     if (p.footprints[i].empty()) continue;
-    traces |= grown(p.footprints[i], params.background.mask_margin_px) & (seen_past == 0);
-    if (!p.fronts[i].empty()) traces.setTo(0, p.fronts[i]);
+    cv::Mat covered = grown(p.footprints[i], params.background.mask_margin_px) & (seen_past == 0);
+    if (!p.fronts[i].empty()) covered.setTo(0, p.fronts[i]);
+    traces |= covered;
   }
   return traces;
 }

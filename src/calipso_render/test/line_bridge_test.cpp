@@ -199,5 +199,28 @@ TEST(BridgeBorders, LeaveEdgesWithinASurface) {
   EXPECT_EQ(cv::countNonZero(place.bridge().drawn), 0);
 }
 
+cv::Mat loneLinesOf(const Lines& l) {
+  const cv::Mat all(l.image.size(), CV_8U, cv::Scalar(255));
+  return loneLines(straightEdges(all, l.image), all, l.image);
+}
+
+TEST(LoneLines, AreLongAndThinAlsoWhereTheyAreFaint) {
+  Lines l;
+  l.line({0, 80}, {200, 80}, 250);
+  l.line({201, 80}, {319, 80}, 175);
+  const cv::Mat lone = loneLinesOf(l);
+  EXPECT_NE(lone.at<std::uint8_t>(80, 100), 0);
+  EXPECT_NE(lone.at<std::uint8_t>(80, 280), 0);
+  EXPECT_EQ(cv::countNonZero(lone.rowRange(90, 200)), 0);
+}
+
+TEST(LoneLines, AreNeitherTextureNorEdgesNorFaintAlone) {
+  Lines texture, edge, faint;
+  for (int v = 4; v < 200; v += 9) texture.line({0, v}, {319, v}, 60);
+  edge.image.rowRange(100, 200) += cv::Scalar::all(60.0);
+  faint.line({0, 80}, {319, 80}, 175);
+  for (const Lines* l : {&texture, &edge, &faint}) EXPECT_EQ(cv::countNonZero(loneLinesOf(*l)), 0);
+}
+
 }  // namespace
 }  // namespace calipso::render

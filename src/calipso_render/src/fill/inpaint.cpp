@@ -28,8 +28,9 @@ constexpr int kLatticeMargin = 72;  // px around it in which a pattern is sought
 constexpr int kFarMargin = 216;     // ... that alone can tell a plane
 constexpr float kRounded =
     1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
-constexpr float kFarther = 2000.0f;  // InpaintParams::away_farther along a plane
-constexpr int kFewestOnPlane = 200;  // px of a plane's part of the hole, to be filled along it
+constexpr float kFarther = 2000.0f;   // InpaintParams::away_farther along a plane
+constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
+constexpr int kFewestOnPlane = 200;   // px of a plane's part of the hole, to be filled along it
 
 InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
   InpaintParams inner = params;
@@ -76,16 +77,31 @@ cv::Mat planesOf(const InpaintParams& params) {
   return planes;
 }
 
+int patchesIn(const cv::Mat& source) {
+  cv::Mat whole;
+  cv::erode(source, whole, cv::Mat::ones(kPatchSide, kPatchSide, CV_8U));
+  return cv::countNonZero(whole);
+}
+
+// If most of what may be copied remains.
+void leaveOut(const cv::Mat& lines, cv::Mat& source) {
+  cv::Mat without = source.clone();
+  without.setTo(0, lines);
+  if (patchesIn(without) > kPatchesLeft * patchesIn(source)) source = without;
+}
+
 // @param edges straightEdges() of the picture
 // @param look is filled
 // @param known CV_8UC1: what the filling has to go with; source, of it: what may be copied
 Filling fill(const std::vector<cv::Vec4f>& edges, cv::Mat look, cv::Mat to_fill, cv::Mat source,
              cv::Mat known, const Lattice* lattice, InpaintParams params) {
   const cv::Mat whole_hole = to_fill.clone();
+  const cv::Mat lone = lattice == nullptr ? loneLines(edges, source, look) : cv::Mat();
   const LineBridges bridges = bridgeLines(edges, to_fill, source, params.surface, look, lattice);
   to_fill.setTo(0, bridges.core);
   known |= bridges.core;
   source.setTo(0, bridges.lines);
+  if (!lone.empty()) leaveOut(lone, source);
   if (!params.sky.empty()) params.sky = hiddenSky(copiedSky(params.sky, bridges.origin));
   Filling f{look, patchOrigins(look, to_fill, source, lattice, params)};
   cutSeams(look, to_fill, source, known, params, f.origin);

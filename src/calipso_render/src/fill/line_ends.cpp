@@ -12,6 +12,8 @@ namespace calipso::render {
 namespace {
 
 constexpr float kShortest = 14.0f;  // px of a line that is seen
+// px of one that is the only one of its kind, its contrast at least, and px that it goes on unseen
+constexpr float kLong = 40.0f, kLoneContrast = 30.0f, kGoesOn = 20.0f;
 constexpr float kLost = 14.0f;      // px from where a line was lost to the hole, and at most,
 constexpr float kFarthest = 24.0f;  // where what is near the hole does not tell its colours
 constexpr float kStepBack = 4.0f;   // px
@@ -20,6 +22,7 @@ constexpr float kReach = 8.0f;      // px along a line by which both of its edge
 constexpr float kClear = 4.0f;
 constexpr int kFirst = 2, kLast = 14;  // px before the end over which its colours are averaged
 constexpr int kCentrings = 3;
+constexpr int kLineWidth = 3;  // px on either side of an edge of a thin line that are its own
 // of the contrast: what differs more from its surroundings is the line
 constexpr float kLineItself = 0.3f;
 constexpr float kSameLine = 0.995f;  // cosine between the two edges of a line
@@ -48,6 +51,23 @@ class LineEndFinder {
     dropDoubles();
     for (std::size_t i = 0; i < ends_.size(); ++i) ends_[i].line = static_cast<int>(i);
     return ends_;
+  }
+
+  // Mean contrast of a thin line that stands out on most of its way; 0 if it is none.
+  float contrastOfThin(const cv::Point2f& from, const cv::Point2f& way) const {
+    const float length = static_cast<float>(cv::norm(way));
+    if (length < kShortest) return 0.0f;
+    const cv::Point2f into = way / length;
+    const int pieces = static_cast<int>(length) / kLast;
+    int found = 0;
+    float sum = 0.0f;
+    for (int i = 1; i <= pieces; ++i) {
+      LineEnd end{
+          from + static_cast<float>(i * kLast) * into, into, 1.0f * kLast, {}, 0.0f, {}, false};
+      if (isSet(source_, end.at) && measure(end) && standsOut(end) && end.isThin())
+        ++found, sum += end.contrast;
+    }
+    return 2 * found > pieces ? sum / static_cast<float>(found) : 0.0f;
   }
 
   std::optional<LineEnd> moved(LineEnd end, float aside) const {
@@ -228,6 +248,37 @@ std::vector<LineEnd> withBeside(const std::vector<LineEnd>& ends, int reach, con
     }
   }
   return all;
+}
+
+cv::Mat loneLines(const std::vector<cv::Vec4f>& edges, const cv::Mat& source,
+                  const cv::Mat& image) {
+  cv::Mat lines = cv::Mat::zeros(source.size(), CV_8U);
+  const LineEndFinder finder(lines, source, image);
+  const auto along = [](const cv::Vec4f& s) { return cv::Point2f(s[2] - s[0], s[3] - s[1]); };
+  std::vector<cv::Vec4f> found, faint;
+  for (const cv::Vec4f& s : edges) {
+    const float contrast = finder.contrastOfThin({s[0], s[1]}, along(s));
+    if (contrast == 0.0f) continue;
+    const bool lone = contrast > kLoneContrast && cv::norm(along(s)) > kLong;
+    (lone ? found : faint).push_back(s);
+  }
+  const auto continues = [&](const cv::Vec4f& s, const cv::Vec4f& of) {
+    const cv::Point2f way = along(of) / cv::norm(along(of)), start(of[0], of[1]);
+    return std::abs(render::cross(way, cv::Point2f(s[0], s[1]) - start)) < kReach &&
+           std::abs(render::cross(way, cv::Point2f(s[2], s[3]) - start)) < kReach;
+  };
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto rest = std::stable_partition(
+        faint.begin(), faint.end(), [&](const cv::Vec4f& s) { return !continues(s, found[i]); });
+    found.insert(found.end(), rest, faint.end());
+    faint.erase(rest, faint.end());
+  }
+  for (const cv::Vec4f& s : found) {
+    const cv::Point2f from(s[0], s[1]), way = along(s),
+                                        more = kGoesOn / static_cast<float>(cv::norm(way)) * way;
+    cv::line(lines, from - more, from + way + more, cv::Scalar(255), 2 * kLineWidth + 1);
+  }
+  return lines;
 }
 
 bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,

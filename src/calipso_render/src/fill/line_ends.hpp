@@ -39,6 +39,10 @@ std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv:
 std::vector<LineEnd> withBeside(const std::vector<LineEnd>& ends, int reach, const cv::Mat& hole,
                                 const cv::Mat& source, const cv::Mat& image);
 
+// CV_8UC1: 255 on long thin lines that stand out from what is beside them: there is but one of such,
+// and nothing else should look like it. @param edges straightEdges() of the picture
+cv::Mat loneLines(const std::vector<cv::Vec4f>& edges, const cv::Mat& source, const cv::Mat& image);
+
 // Is a line seen again at the shifts of a lattice that lead off it?
 bool repeats(const LineEnd& end, const Lattice& lattice, const cv::Mat& source,
              const cv::Mat& image);
