@@ -53,6 +53,16 @@ TEST(OutlineBlur, IsThatOfThePicture) {
   }
 }
 
+// Most of an outline has something soft along it (a shade, a wave).
+TEST(OutlineBlur, IsThatOfTheSharpPart) {
+  cv::Mat labels;
+  const cv::Mat sharp = disc(0.3f, labels), soft = disc(1.5f, labels);
+  cv::Mat picture = soft.clone();
+  sharp.rowRange(0, 60).copyTo(picture.rowRange(0, 60));
+  EXPECT_GT(outlineBlur(soft, labels), 1.2f);
+  EXPECT_LT(outlineBlur(picture, labels), 0.6f);
+}
+
 TEST(OutlineBlur, IsTheUsualOneWithoutContrast) {
   cv::Mat labels;
   disc(0.0f, labels);

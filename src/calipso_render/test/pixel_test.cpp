@@ -96,6 +96,18 @@ TEST(Noise, IsNotWhatMoves) {
   EXPECT_LT(NoiseModel::estimate(frames, everywhere).deviation(1, 250.0f), 10.0f);
 }
 
+// Water that ripples by a few code values over two thirds of the picture.
+TEST(Noise, IsNotWhatRipples) {
+  cv::RNG random(4);
+  const std::vector<cv::Mat> frames = noisyFrames([&](int, cv::Mat& picture) {
+    cv::Mat ripples(80, 120, CV_32FC3);
+    random.fill(ripples, cv::RNG::NORMAL, 0.0, 8.0);
+    picture.rowRange(0, 80) += ripples;
+  });
+  const std::vector<cv::Mat> everywhere(4, cv::Mat(120, 120, CV_8U, cv::Scalar(255)));
+  EXPECT_LT(NoiseModel::estimate(frames, everywhere).deviation(1, 100.0f), 4.0f);
+}
+
 // Black bars above and below a picture, or a burnt-out sky, hold most of the samples.
 TEST(Noise, IsNotBoundByWhatIsClipped) {
   for (const double clipped : {0.0, 255.0}) {

@@ -28,6 +28,7 @@ constexpr int kLatticeMargin = 72;  // px around it in which a pattern is sought
 constexpr int kFarMargin = 216;     // ... that alone can tell a plane
 constexpr float kRounded =
     1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
+constexpr float kAwayOnPlane = 0.5f;  // InpaintParams::away_row there: its rows are no layers
 constexpr float kFarther = 2000.0f;   // InpaintParams::away_farther along a plane
 constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
 constexpr int kFewestOnPlane = 200;   // px of a plane's part of the hole, to be filled along it
@@ -165,9 +166,10 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
   inner.nearness = part.chart.carried(nearnessOf(plane.to_plane, plane.hole.size())),
   inner.away_farther = kFarther;
   const Lattice* lattice = part.lattice ? &*part.lattice : nullptr;
+  inner.away_row = kAwayOnPlane;
   if (lattice) {
     // A pattern is alike all over; its light is that of the next places.
-    inner.away_column = inner.away_row;
+    inner.away_column = inner.away_row = params.away_row;
     // Where patches span more than two of its shifts it is grey.
     const int side = std::min(part.look.cols, part.look.rows);
     inner.coarsest_side =

@@ -20,7 +20,9 @@ constexpr float kMisfit = 0.1f;         // of the contrast, r.m.s.: more is no p
 constexpr float kFurthest = 1.5f;       // px between the mask's outline and the picture's
 constexpr std::size_t kFewest = 12;     // places
 constexpr float kUsual = 0.3f;  // px: what lenses and pixels that overlap do; for want of places
-constexpr double kQuantile = 0.25;
+// quantiles of the places' widths, and how much softer the one may be than the other
+constexpr double kQuantile = 0.25, kSharp = 0.1;
+constexpr float kSofter = 1.5f;
 constexpr float kPixel = 0.288675f;  // standard deviation of a pixel's own width, px
 constexpr float kFinest = 1.15f;     // factor between the widths that are tried
 constexpr float kWidest = 3.0f;      // px
@@ -112,9 +114,13 @@ class Outlines {
 float outlineBlur(const cv::Mat& picture, const cv::Mat& labels) {
   std::vector<float> widths = Outlines(picture, labels).widths();
   if (widths.size() < kFewest) return kUsual;
-  const auto quantile = widths.begin() + static_cast<std::ptrdiff_t>(kQuantile * widths.size());
-  std::nth_element(widths.begin(), quantile, widths.end());
-  return std::sqrt(std::max(*quantile * *quantile - kPixel * kPixel, 0.0f));
+  std::sort(widths.begin(), widths.end());
+  const auto blurAt = [&](double part) {
+    const float width = widths[static_cast<std::size_t>(part * widths.size())];
+    return std::sqrt(std::max(width * width - kPixel * kPixel, 0.0f));
+  };
+  // What lies along an outline makes it look softer, never sharper.
+  return std::min(blurAt(kQuantile), std::max(kUsual, kSofter * blurAt(kSharp)));
 }
 
 }  // namespace calipso::render

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
@@ -12,6 +13,9 @@ namespace {
 
 constexpr int kFewestSamples = 64;  // per knot; below that the neighbours decide
 constexpr int kHistogram = 512;     // of absolute differences, in 1/8 code value
+constexpr int kSquare = 40;         // px
+constexpr std::size_t kFewestSquares = 4;
+constexpr double kLouder = 1.2;  // times the quieter squares' deviation
 // from a knot to the next, at most: shot noise hardly changes in code values, read noise grows in
 // the dark
 constexpr float kGrowsBrighter = 1.25f, kGrowsDarker = 2.5f;
@@ -23,30 +27,65 @@ std::uint64_t splitMix(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-// Absolute differences by code value, whose median gives the deviation.
-struct Differences {
-  std::vector<std::array<int, kHistogram>> counts;
-  explicit Differences(int knots) : counts(knots) {
-    for (auto& c : counts) c.fill(0);
+using Histogram = std::array<int, kHistogram>;
+
+long samplesOf(const Histogram& counts) {
+  return std::accumulate(counts.begin(), counts.end(), 0L);
+}
+
+// < 0: too few samples.
+double medianOf(const Histogram& counts) {
+  const long total = samplesOf(counts);
+  if (total < kFewestSamples) return -1.0;
+  long below = 0;
+  for (int i = 0; i < kHistogram; ++i) {
+    const int here = counts[i];
+    if (2 * (below + here) >= total) return (i + (0.5 * total - below) / here) / 8.0;
+    below += here;
   }
-  void add(int code, double difference) {
-    ++counts[(code + 16) / 32][std::min(kHistogram - 1, static_cast<int>(8.0 * difference))];
+  return kHistogram / 8.0;
+}
+
+// Absolute differences by code value and square of the picture.
+class Differences {
+ public:
+  Differences(int knots, const cv::Size& size)
+      : knots_(knots),
+        columns_((size.width + kSquare - 1) / kSquare),
+        counts_(knots * columns_ * ((size.height + kSquare - 1) / kSquare)) {
+    for (Histogram& c : counts_) c.fill(0);
   }
-  long samples(int knot) const {
-    return std::accumulate(counts[knot].begin(), counts[knot].end(), 0L);
+  void add(int u, int v, int code, double difference) {
+    const int square = u / kSquare + v / kSquare * columns_, knot = (code + 16) / 32;
+    ++counts_[square * knots_ + knot][std::min(kHistogram - 1, static_cast<int>(8.0 * difference))];
   }
+  long samples(int knot) const { return samplesOf(all(knot)); }
+
+  // That of all squares, but not much more than the quieter ones': what moves is no noise.
   // < 0: too few samples.
   double median(int knot) const {
-    const long total = samples(knot);
-    if (total < kFewestSamples) return -1.0;
-    long below = 0;
-    for (int i = 0; i < kHistogram; ++i) {
-      const int here = counts[knot][i];
-      if (2 * (below + here) >= total) return (i + (0.5 * total - below) / here) / 8.0;
-      below += here;
+    std::vector<double> medians;
+    for (std::size_t i = knot; i < counts_.size(); i += knots_) {
+      const double own = medianOf(counts_[i]);
+      if (own >= 0.0) medians.push_back(own);
     }
-    return kHistogram / 8.0;
+    const double whole = medianOf(all(knot));
+    if (medians.size() < kFewestSquares) return whole;
+    const auto quiet = medians.begin() + static_cast<std::ptrdiff_t>(medians.size() / 4);
+    std::nth_element(medians.begin(), quiet, medians.end());
+    return std::min(whole, kLouder * *quiet);
   }
+
+ private:
+  Histogram all(int knot) const {
+    Histogram sum{};
+    for (std::size_t i = knot; i < counts_.size(); i += knots_)
+      std::transform(sum.begin(), sum.end(), counts_[i].begin(), sum.begin(), std::plus<>());
+    return sum;
+  }
+
+  int knots_, columns_;
+  std::vector<Histogram> counts_;  // per square the knots'
 };
 
 // Knots without samples take the nearest one's value.
@@ -89,7 +128,7 @@ void addPairs(const cv::Mat& first, const cv::Mat& second, const cv::Mat& steady
       if (isClipped(x) || isClipped(y)) continue;
       // Spread within the cell of rounding, so that small deviations are not lost in steps of one.
       const double dither = ((u * 7 + v * 13) % 16 + 0.5) / 16.0 - 0.5;
-      differences.add((x + y) / 2, std::abs(x - y + dither) / std::sqrt(2.0));
+      differences.add(u, v, (x + y) / 2, std::abs(x - y + dither) / std::sqrt(2.0));
     }
   }
 }
@@ -102,7 +141,7 @@ void addDetail(const cv::Mat& frame, int channel, Differences& differences) {
     for (int u = 1; u + 1 < frame.cols; ++u) {
       const int code = plane.at<std::uint8_t>(v, u);
       if (!isClipped(code))
-        differences.add(code, std::abs(detail.at<float>(v, u)) / kNoiseMaskGain);
+        differences.add(u, v, code, std::abs(detail.at<float>(v, u)) / kNoiseMaskGain);
     }
   }
 }
@@ -118,7 +157,7 @@ NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames,
   CV_Assert(!frames.empty() && frames.size() == steady.size());
   NoiseModel model;
   for (int channel = 0; channel < 3; ++channel) {
-    Differences differences(kKnots);
+    Differences differences(kKnots, frames[0].size());
     for (std::size_t i = 0; i + 1 < frames.size() && i < 6; ++i) {
       addPairs(frames[i], frames[i + 1], steady[i] & steady[i + 1], channel, differences);
     }

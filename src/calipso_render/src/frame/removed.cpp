@@ -89,13 +89,13 @@ cv::Mat removedPixels(const StagedFrame& frame, const SeenPlace& place, const Ed
     shown.update(frame, place, box);
     findRemoved(shown, passing, box, removed(box - region.all.tl()));
   }
+  for (const cv::Mat& front : place.fronts) {
+    if (!front.empty()) removed.setTo(0, front(region.all));
+  }
   const cv::Mat& lost = frame.prepared.mirror.lost;
   if (!mirrored.empty() && !lost.empty())
     removed |= lost(region.all) & (mirrored(region.all) == Reflections::kChanged) &
                (frame.labels(region.all) == 0);
-  for (const cv::Mat& front : place.fronts) {
-    if (!front.empty()) removed.setTo(0, front(region.all));
-  }
   if (!frame.params.matte.empty() && frame.at_key_camera)
     removed.setTo(0, frame.params.matte(region.all) > kInFront);
   return removed;
