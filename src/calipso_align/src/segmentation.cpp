@@ -270,16 +270,14 @@ void Segmenter::expectSurfaces(SegmentationLevel& level) const {
     cv::resize(fitted_[k]->view.depth, depth, level.image.size(), 0, 0, cv::INTER_NEAREST);
     cv::Mat& expected = level.expected[k + 1];
     expected = cv::Mat::zeros(depth.size(), CV_32F);
-    for (int y = 0; y < depth.rows; ++y)
-      for (int x = 0; x < depth.cols; ++x)
-        if (depth.at<float>(y, x) > 0.0f)
-          expected.at<float>(y, x) = static_cast<float>(level.relief.units) / depth.at<float>(y, x);
+    cv::Mat(level.relief.units / depth).copyTo(expected, depth > 0.0f);
   }
 }
 
 // How far the relief is off the models' surfaces where the labels have the objects.
 void Segmenter::measureSurfaces() {
-  constexpr float kLeastSigma = 2.0f;  // the relief's own noise
+  constexpr float kLeastSigma = 2.0f;                     // the relief's own noise
+  constexpr float kBefore = 1.03f, kBeforeSigmas = 6.0f;  // times as near as its nearest place
   for (size_t k = 1; k < models_.size(); ++k) {
     models_[k].expected.reset();
     const cv::Mat& expected = coarse_.expected[k];
@@ -295,10 +293,13 @@ void Segmenter::measureSurfaces() {
     const auto middle = errors.begin() + errors.size() / 2;
     std::nth_element(errors.begin(), middle, errors.end());
     const float sigma = std::max(kLeastSigma, 1.4826f * *middle);
-    const double area = static_cast<double>(cv::countNonZero(fitted_[k - 1]->view.silhouette));
-    models_[k].expected = ExpectedSurface{
-        sigma, models_[k].surfaces->someCost() +
-                   static_cast<float>(std::log(area * sigma * std::sqrt(2.0 * CV_PI)))};
+    const double area = cv::countNonZero(fitted_[k - 1]->view.silhouette);
+    const double usual = std::log(area * sigma * std::sqrt(2.0 * CV_PI));
+    double nearest = 0.0;
+    cv::minMaxLoc(expected, nullptr, &nearest);
+    models_[k].expected =
+        ExpectedSurface{sigma, models_[k].surfaces->someCost() + static_cast<float>(usual),
+                        kBefore * static_cast<float>(nearest) + kBeforeSigmas * sigma};
   }
 }
 

@@ -61,6 +61,25 @@ TEST(Segmenter, AFittedModelBringsInColoursWithoutStroke) {
   EXPECT_GE(intersectionOverUnion(guided.segment(strokes) == 1, maskOf(kSize, whole)), 0.97);
 }
 
+// A post of the object's own colour, which the depth image shows nearer than any of the object.
+TEST(Segmenter, WhatStandsBeforeAnObjectIsNotItsPart) {
+  const auto whole = box(49.5, 29.5, 109.5, 89.5), post = box(69.5, 39.5, 79.5, 69.5);
+  const cv::Mat image = paint(kSize, whole, kGreen, kGrey, 3.0);
+  cv::Mat depth(kSize, CV_32F, cv::Scalar(8.0f));
+  depth.setTo(4.0f, maskOf(kSize, whole)), depth.setTo(3.0f, maskOf(kSize, post));
+  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
+  cv::line(strokes, {90, 40}, {105, 80}, 1, 3);
+  SegmentationTarget target{"box", 1, cv::Rect(40, 20, 80, 80), {}};
+  target.fit_model = [&](const std::vector<ContourLoop>&) -> std::optional<ModelView> {
+    cv::Mat1f surface = cv::Mat1f::zeros(kSize);
+    surface.setTo(4.0f, maskOf(kSize, whole));
+    return ModelView{maskOf(kSize, whole), surface, 1.5};
+  };
+  Segmenter segmenter(image, {target}, {}, depth);
+  const cv::Mat own = maskOf(kSize, whole) & ~maskOf(kSize, post);
+  EXPECT_GE(intersectionOverUnion(segmenter.segment(strokes) == 1, own), 0.97);
+}
+
 // Where the object is said to be there is nothing but more of the background; its model alone says
 // where it ends.
 TEST(Segmenter, SaysThatAnObjectMayNotBeInThePicture) {

@@ -67,6 +67,7 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
 struct ExpectedSurface {
   float sigma = 1.0f;         // of the relief's inverse depth about it
   float nearest_cost = 0.0f;  // nats, of a pixel that lies on it
+  float before = 0.0f;        // inverse depth from which on something else stands before all of it
 };
 
 // What a label looks like, and where its surfaces lie once that is known.
