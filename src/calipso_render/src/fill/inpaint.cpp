@@ -31,7 +31,8 @@ constexpr float kRounded =
 constexpr float kAwayOnPlane = 0.5f;  // InpaintParams::away_row there: its rows are no layers
 constexpr float kFarther = 2000.0f;   // InpaintParams::away_farther along a plane
 constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
-constexpr int kFewestOnPlane = 200;   // px of a plane's part of the hole, to be filled along it
+constexpr int kNearEdges = 64;  // px around the hole in which edges between surfaces are sought
+constexpr int kFewestOnPlane = 200;  // px of a plane's part of the hole, to be filled along it
 
 InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
   InpaintParams inner = params;
@@ -228,7 +229,7 @@ void lookAround(std::vector<HiddenPlane>& planes, Canvas& canvas) {
     });
     if (anyway) rest.setTo(0, plane.hole);
   }
-  if (cv::countNonZero(rest) > 0 && !canvas.edges)
+  if (cv::countNonZero(rest) > 0)
     lattices.push_back([&] { canvas.edges = straightEdges(canvas.source, canvas.look); });
   looks.insert(looks.end(), lattices.begin(), lattices.end());
   doAll(true, looks);
@@ -253,9 +254,11 @@ void fillBorders(InpaintParams& params, Canvas& canvas) {
   double first, last;
   cv::minMaxLoc(params.surface, &first, &last, nullptr, nullptr, canvas.hole);
   if (first == last) return;
-  canvas.edges = straightEdges(canvas.source, canvas.look);
+  const cv::Rect near = windowAround(canvas.hole, kNearEdges, kNearEdges);
+  std::vector<cv::Vec4f> edges = straightEdges(canvas.source(near), canvas.look(near));
+  for (cv::Vec4f& edge : edges) edge += cv::Vec4f(near.x, near.y, near.x, near.y);
   const LineBridges borders =
-      bridgeBorders(*canvas.edges, canvas.hole, canvas.source, params.surface, canvas.look);
+      bridgeBorders(edges, canvas.hole, canvas.source, params.surface, canvas.look);
   canvas.hole.setTo(0, borders.core), canvas.known |= borders.core;
   borders.origin.copyTo(canvas.origin, borders.core);
 }

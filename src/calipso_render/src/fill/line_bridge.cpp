@@ -109,6 +109,7 @@ class Bridger {
 
   // @return nothing if b does not continue a
   std::optional<Bridge> connection(const LineEnd& a, const LineEnd& b, float gap) const {
+    if (!areInLine(a, b, gap)) return std::nullopt;
     if (besideAlike(a, b)) {
       if (const auto cost = misfit(a, b, gap, differenceAcross(a, b)))
         return Bridge{&a, &b, gap, *cost, kLineHalf};
@@ -120,6 +121,7 @@ class Bridger {
 
   // Of two surfaces: one side of them is alike.
   std::optional<Bridge> border(const LineEnd& a, const LineEnd& b, float gap) const {
+    if (!areInLine(a, b, gap)) return std::nullopt;
     const auto cost = misfit(a, b, gap, differenceOfSides(a, b));
     if (!cost) return std::nullopt;
     const Bridge bridge{&a, &b, gap, *cost, kLineHalf};
@@ -199,19 +201,25 @@ class Bridger {
     return rms(a.beside[0] - b.beside[1]) <= most && rms(a.beside[1] - b.beside[0]) <= most;
   }
 
-  // How badly b continues a; nothing if it does not.
+  static float strayOf(const LineEnd& a, const LineEnd& b) {
+    const cv::Point2f way = b.at - a.at;
+    return std::max(std::abs(render::cross(a.into, way)), std::abs(render::cross(b.into, way)));
+  }
+  static float allowedStray(float gap) { return kStray + kTurn * gap; }
+
+  static bool areInLine(const LineEnd& a, const LineEnd& b, float gap) {
+    const cv::Point2f way = b.at - a.at;
+    return gap >= 2.0f && a.into.dot(way) >= 0.9f * gap && b.into.dot(way) <= -0.9f * gap &&
+           strayOf(a, b) <= allowedStray(gap);
+  }
+
+  // How badly b, in line with a, continues it; nothing if it does not.
   // @param difference of their colours, to their contrast
   std::optional<float> misfit(const LineEnd& a, const LineEnd& b, float gap,
                               float difference) const {
-    const cv::Point2f way = b.at - a.at;
-    const float allowed = kStray + kTurn * gap;
-    if (gap < 2.0f || a.into.dot(way) < 0.9f * gap || b.into.dot(way) > -0.9f * gap)
-      return std::nullopt;
-    const float stray =
-        std::max(std::abs(render::cross(a.into, way)), std::abs(render::cross(b.into, way)));
-    if (stray > allowed || difference > kAlike || hiddenPart(a.at, b.at) < kInHole)
-      return std::nullopt;
-    return stray / allowed + difference / kAlike + gap / std::max(hole_.cols, hole_.rows);
+    if (difference > kAlike || hiddenPart(a.at, b.at) < kInHole) return std::nullopt;
+    return strayOf(a, b) / allowedStray(gap) + difference / kAlike +
+           gap / std::max(hole_.cols, hole_.rows);
   }
 
   float hiddenPart(const cv::Point2f& a, const cv::Point2f& b) const {

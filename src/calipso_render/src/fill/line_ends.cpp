@@ -255,12 +255,15 @@ cv::Mat loneLines(const std::vector<cv::Vec4f>& edges, const cv::Mat& source,
   cv::Mat lines = cv::Mat::zeros(source.size(), CV_8U);
   const LineEndFinder finder(lines, source, image);
   const auto along = [](const cv::Vec4f& s) { return cv::Point2f(s[2] - s[0], s[3] - s[1]); };
+  std::vector<float> contrast(edges.size());
+#pragma omp parallel for schedule(dynamic, 8)
+  for (std::size_t i = 0; i < edges.size(); ++i)
+    contrast[i] = finder.contrastOfThin({edges[i][0], edges[i][1]}, along(edges[i]));
   std::vector<cv::Vec4f> found, faint;
-  for (const cv::Vec4f& s : edges) {
-    const float contrast = finder.contrastOfThin({s[0], s[1]}, along(s));
-    if (contrast == 0.0f) continue;
-    const bool lone = contrast > kLoneContrast && cv::norm(along(s)) > kLong;
-    (lone ? found : faint).push_back(s);
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (contrast[i] == 0.0f) continue;
+    const bool lone = contrast[i] > kLoneContrast && cv::norm(along(edges[i])) > kLong;
+    (lone ? found : faint).push_back(edges[i]);
   }
   const auto continues = [&](const cv::Vec4f& s, const cv::Vec4f& of) {
     const cv::Point2f way = along(of) / cv::norm(along(of)), start(of[0], of[1]);
