@@ -196,15 +196,12 @@ std::vector<HiddenPlane> hiddenPlanes(const InpaintParams& params, const Canvas&
     const bool known = cv::countNonZero(hidden) >= kFewestOnPlane;
     if (!known && supports)
       hidden = canvas.hole & ~told & (nearnessOf(params.planes[k], hidden.size()) > 0.0f);
+    // Where its pattern has to tell, the depth image may have taken parts of it for something else.
+    const cv::Mat beside = known ? cv::Mat(canvas.source & ~here & (params.surface != 0))
+                                 : cv::Mat(here.size(), CV_8U, cv::Scalar(0));
     if (known || (supports && cv::countNonZero(hidden) >= kFewestOnPlane))
-      planes.push_back({k + 1,
-                        params.planes[k],
-                        supports,
-                        known,
-                        hidden,
-                        canvas.source & here,
-                        canvas.source & ~here,
-                        {}});
+      planes.push_back(
+          {k + 1, params.planes[k], supports, known, hidden, canvas.source & here, beside, {}});
   }
   return planes;
 }

@@ -272,19 +272,23 @@ class Bridger {
     return {surfaceAt(before + left), surfaceAt(before - left)};
   }
 
-  // Are two surfaces, one on each side, parted by most of a connection?
+  // Are two surfaces, one on each side, parted by most of a connection, and by most of what is seen
+  // of its lines?
   bool partsSurfaces(const Bridge& b) const {
     const auto [left, right] = sidesOf(b);
     if (left == 0 || right == 0 || left == right) return false;
     const cv::Point2f along = (b.to->at - b.from->at) / b.gap,
                       aside = (kOffBorder + 1.0f) * leftOf(along);
-    const int steps = std::max(2, cvRound(b.gap));
-    int parted = 0;
-    for (int i = 0; i <= steps; ++i) {
-      const cv::Point2f p = b.from->at + (b.gap * i / steps) * along;
-      parted += surfaceAt(p + aside) == left && surfaceAt(p - aside) == right;
-    }
-    return parted > kParted * steps;
+    const auto parts = [&, left = left, right = right](float first, float last) {
+      const int steps = std::max(2, cvRound(last - first));
+      int parted = 0;
+      for (int i = 0; i <= steps; ++i) {
+        const cv::Point2f p = b.from->at + (first + (last - first) * i / steps) * along;
+        parted += surfaceAt(p + aside) == left && surfaceAt(p - aside) == right;
+      }
+      return parted > kParted * steps;
+    };
+    return parts(0.0f, b.gap) && parts(-b.from->length, 0.0f) && parts(b.gap, b.gap + b.to->length);
   }
 
   void setSides(const Bridge& b, cv::Mat& surface) const {
