@@ -28,7 +28,7 @@ constexpr int kLatticeMargin = 72;  // px around it in which a pattern is sought
 constexpr int kFarMargin = 216;     // ... that alone can tell a plane
 constexpr float kRounded =
     1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
-constexpr float kAwayOnPlane = 0.5f;  // InpaintParams::away_row there: its rows are no layers
+constexpr float kAwayOnPlane = 3.0f;  // InpaintParams::away_row there: its rows are no layers
 constexpr float kFarther = 2000.0f;   // InpaintParams::away_farther along a plane
 constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
 constexpr int kNearEdges = 64;  // px around the hole in which edges between surfaces are sought
