@@ -277,7 +277,7 @@ void Segmenter::expectSurfaces(SegmentationLevel& level) const {
 // How far the relief is off the models' surfaces where the labels have the objects.
 void Segmenter::measureSurfaces() {
   constexpr float kLeastSigma = 2.0f;                     // the relief's own noise
-  constexpr float kBefore = 1.03f, kBeforeSigmas = 6.0f;  // times as near as its nearest place
+  constexpr float kBefore = 1.03f, kBeforeSigmas = 6.0f;  // times as near, and deviations more
   for (size_t k = 1; k < models_.size(); ++k) {
     models_[k].expected.reset();
     const cv::Mat& expected = coarse_.expected[k];

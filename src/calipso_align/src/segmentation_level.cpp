@@ -36,13 +36,13 @@ cv::Mat resized(const cv::Mat& mask, const cv::Size& size) {
 // Cost of a label's surface at a pixel: a fitted model's, which may lack details, or any of the
 // label's.
 float surfaceCost(const LabelModel& model, const SegmentationLevel& level, size_t k, int x, int y) {
-  constexpr float kDetails = 0.2f;  // part of a label's pixels that its model does not know
-  constexpr float kBefore = 20.0f;  // nats: more than any colour says
+  constexpr float kDetails = 0.2f;   // part of a label's pixels that its model does not know
+  constexpr float kInFront = 20.0f;  // nats: more than any colour says
   const float any = model.surfaces->cost(level.relief, x, y);
   if (!model.expected || level.relief.state.at<uchar>(y, x) != Relief::kSurface) return any;
   const float expected = level.expected[k].at<float>(y, x);
   const float seen = level.relief.surface.at<cv::Vec3f>(y, x)[2];
-  if (seen > model.expected->before) return any + kBefore;
+  if (seen > model.expected->before) return any + kInFront;
   float on_model = 0.0f;
   if (expected > 0.0f) {
     const float r = (seen - expected) / model.expected->sigma;

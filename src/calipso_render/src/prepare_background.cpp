@@ -157,8 +157,7 @@ cv::Mat restingTraces(const Prepared& p, const SeenShadows& shadows, const SeenP
   for (std::size_t i = 0; i < p.footprints.size(); ++i) {
     if (p.footprints[i].empty()) continue;
     cv::Mat covered = grown(p.footprints[i], params.background.mask_margin_px) & (seen_past == 0);
-    if (!p.fronts[i].empty()) covered.setTo(0, p.fronts[i]);
-    traces |= covered;
+    traces |= p.fronts[i].empty() ? covered : cv::Mat(covered & ~p.fronts[i]);
   }
   return traces;
 }

@@ -244,8 +244,33 @@ TEST(Inpaint, ContinuesWhatRepeatsItself) {
   EXPECT_EQ(cv::norm(r.image, image, cv::NORM_INF, hole == 0), 0.0);
 }
 
-// Behind the hole the one on the right goes farther than what is seen of it tells.
 TEST(Inpaint, CopiesComeFromTheSameSurface) {
+  cv::Mat picture(96, 96, CV_32FC3), surface(96, 96, CV_8U, cv::Scalar(1)),
+      hole = cv::Mat::zeros(96, 96, CV_8U);
+  cv::RNG random(1);
+  random.fill(picture, cv::RNG::NORMAL, 100.0, 4.0);
+  picture(cv::Rect(0, 40, 96, 56)) += cv::Scalar::all(80.0);
+  surface(cv::Rect(0, 56, 96, 40)) = 2;  // the paint changes elsewhere than the surface
+  hole(cv::Rect(30, 20, 36, 60)) = 255;
+  InpaintParams params;
+  params.surface = surface;
+  const InpaintResult filled = inpaint(picture, hole, cv::Mat(), params);
+  int foreign = 0, copied = 0;
+  for (int v = 0; v < 96; ++v) {
+    for (int u = 0; u < 96; ++u) {
+      const cv::Vec2s from = filled.origin.at<cv::Vec2s>(v, u);
+      if (from[0] < 0) continue;
+      ++copied,
+          foreign += surface.at<std::uint8_t>(from[1], from[0]) != surface.at<std::uint8_t>(v, u) &&
+                     std::abs(v - 56) > 3;
+    }
+  }
+  EXPECT_GT(copied, 1000);
+  EXPECT_LT(foreign, copied / 50);  // patches that lie across the border
+}
+
+// Behind the hole the one on the right goes farther than what is seen of it tells.
+TEST(Inpaint, CopiesComeFromTheSurfaceThatIsHiddenThere) {
   const cv::Rect right(48, 0, 48, 96), hidden_part(34, 24, 14, 48);
   cv::Mat picture(96, 96, CV_32FC3), surface(96, 96, CV_8U, cv::Scalar(1)),
       hole = cv::Mat::zeros(96, 96, CV_8U);

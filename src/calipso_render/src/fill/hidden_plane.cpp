@@ -8,12 +8,17 @@
 namespace calipso::render {
 namespace {
 
+constexpr int kClear = 2;  // px around a sample that see nothing else
+
 // @param beside CV_8UC1, != 0: where another surface is seen
 PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen,
                  const cv::Mat& beside) {
-  cv::Mat copied_from, off;  // around which a sample sees nothing else
-  cv::erode(seen, copied_from, cv::Mat::ones(5, 5, CV_8U));
-  cv::dilate(beside, off, cv::Mat::ones(2 * kOutlineError + 5, 2 * kOutlineError + 5, CV_8U));
+  const auto square = [](int radius) {
+    return cv::Mat(cv::Mat::ones(2 * radius + 1, 2 * radius + 1, CV_8U));
+  };
+  cv::Mat copied_from, off;
+  cv::erode(seen, copied_from, square(kClear));
+  cv::dilate(beside, off, square(kClear + kOutlineError));
   copied_from.setTo(0, off);
   PlanePart part{chart, {}, {}, {}, chart.any(hole), chart.whole(seen), chart.whole(copied_from),
                  {}};

@@ -109,11 +109,9 @@ std::vector<cv::Mat> footprintsOf(const Prepared& p, const cv::Mat& picture, int
   for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
     if (p.moves[i]) continue;
     const cv::Mat own = p.key_labels == p.surfaces[i].index;
-    cv::Mat footprint = own | p.outlines[i];
-    if (!p.fronts[i].empty()) footprint.setTo(0, p.fronts[i]);
-    footprint |= rimRemains(picture, footprint, (p.key_labels != 0) & ~own, margin);
-    if (!p.fronts[i].empty()) footprint.setTo(0, p.fronts[i]);
-    footprints[i] = footprint;
+    const cv::Mat before = p.fronts[i].empty() ? cv::Mat::zeros(own.size(), CV_8U) : p.fronts[i],
+                  footprint = (own | p.outlines[i]) & ~before, others = (p.key_labels != 0) & ~own;
+    footprints[i] = footprint | (rimRemains(picture, footprint, others, margin) & ~before);
   }
   return footprints;
 }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kRim = 3;           // px beyond the margin in which something may remain
 constexpr int kBeside = 10;       // px beyond that, of what is around
-constexpr int kLooked = 7;       // px around a remain in which nothing may look like it
+constexpr int kLooked = 7;        // px around a remain in which nothing may look like it
 constexpr float kUnlike = 18.0f;  // code values, in one channel
 
 float unlikeness(const cv::Vec3f& a, const cv::Vec3f& b) {
@@ -35,25 +35,6 @@ bool isForeign(const cv::Mat& picture, const cv::Mat& around, const cv::Point& p
   return any;
 }
 
-// The pieces of a mask that touch another one.
-cv::Mat touching(const cv::Mat& mask, const cv::Mat& other) {
-  cv::Mat pieces;
-  std::vector<bool> touches(cv::connectedComponents(mask, pieces, 8, CV_32S), false);
-  const cv::Mat beside = grown(other, 1);
-  cv::Mat out = cv::Mat::zeros(mask.size(), CV_8U);
-  for (const bool marking : {true, false}) {
-    for (int v = 0; v < mask.rows; ++v) {
-      for (int u = 0; u < mask.cols; ++u) {
-        const int piece = pieces.at<int>(v, u);
-        if (piece == 0) continue;
-        if (marking && beside.at<std::uint8_t>(v, u) != 0) touches[piece] = true;
-        if (!marking && touches[piece]) out.at<std::uint8_t>(v, u) = 255;
-      }
-    }
-  }
-  return out;
-}
-
 }  // namespace
 
 cv::Mat rimRemains(const cv::Mat& picture, const cv::Mat& footprint, const cv::Mat& others,
@@ -68,7 +49,12 @@ cv::Mat rimRemains(const cv::Mat& picture, const cv::Mat& footprint, const cv::M
   for (std::size_t i = 0; i < rim.size(); ++i) {
     if (isForeign(picture, around, rim[i])) remains.at<std::uint8_t>(rim[i]) = 255;
   }
-  return touching(remains, own);
+  cv::Mat reached = own.clone();  // what hangs together with the footprint
+  for (int i = 0; i < kRim; ++i) {
+    cv::dilate(reached, reached, cv::Mat::ones(3, 3, CV_8U));
+    reached &= own | remains;
+  }
+  return remains & reached;
 }
 
 }  // namespace calipso::render

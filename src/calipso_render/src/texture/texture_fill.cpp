@@ -95,8 +95,8 @@ class TextureFill {
     auto& [from, certain, layer] = origins;
     levelSeams(surface_.key_vertices, surface_.triangles, layer, a.texture);
     continuePattern(surface_.key_vertices, surface_.triangles, down, certain, a.texture);
-    fillUnseen(surface_, sightings_.pieces(), sightings_.parts(), faintColours(), certain,
-               a.texture);
+    fillUnseen(surface_, sightings_.pieces(), sightings_.parts(), faintColours(a.texture, certain),
+               certain, a.texture);
     const auto part = [&](char kind) {
       return static_cast<float>(std::count(from.begin(), from.end(), kind)) /
              std::max<std::size_t>(1, from.size());
@@ -192,11 +192,18 @@ class TextureFill {
     }
   }
 
-  FaintColours faintColours() const {
+  FaintColours faintColours(const SurfaceTexture& texture,
+                            const std::vector<float>& certain) const {
     const std::vector<int>& shells = sightings_.parts();
     std::vector<cv::Vec3f> sums(1 + *std::max_element(shells.begin(), shells.end()));
     std::vector<float> weights(sums.size(), 0.0f);
+    std::vector<std::size_t> known(sums.size(), 0);
+    for (int t = 0; t < texture.triangleCount(); ++t) {
+      for (std::size_t i = texture.firstOf(t); i < texture.firstOf(t + 1); ++i)
+        known[shells[t]] += certain[i] >= 1.0f;
+    }
     for (std::size_t t = 0; t < looks_.size(); ++t) {
+      if (known[shells[t]] >= kFewestKnown) continue;
       for (const Look& look : looks_[t].all) {
         sums[shells[t]] += look.share * colourOf(sampleBicubic(shown_[look.view], look.u, look.v));
         weights[shells[t]] += look.share;

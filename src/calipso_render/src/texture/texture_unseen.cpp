@@ -13,7 +13,6 @@ constexpr float kKnown = 0.5f;
 // of the extent: within it what is not seen goes over from the seen around it to the common colour
 constexpr float kFromSeen = 0.1f;
 constexpr std::size_t kLookedAt = 300;       // texels, for that
-constexpr std::size_t kFewest = 20;          // of them: fewer are not like the whole part
 const cv::Vec3f kUnknown(0.3f, 0.3f, 0.3f);  // reflectance of an object that no picture shows
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
@@ -54,7 +53,7 @@ std::vector<std::optional<cv::Vec3f>> commonColours(const std::vector<int>& part
   }
   std::vector<std::optional<cv::Vec3f>> colours(count);
   for (int p = 0; p < count; ++p) {
-    if (known[p].size() >= kFewest) colours[p] = commonColour(known[p]);
+    if (known[p].size() >= kFewestKnown) colours[p] = commonColour(known[p]);
   }
   return colours;
 }

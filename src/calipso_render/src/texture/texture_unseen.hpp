@@ -8,7 +8,11 @@
 
 namespace calipso::render {
 
-// Per shell: mean colour of what is seen of it at all, be it at rims alone (a rope).
+// texels of a part that are certain, at least: fewer are not like the whole of it
+constexpr std::size_t kFewestKnown = 20;
+
+// Per shell of which fewer are certain: mean colour of what is seen of it at all, be it at rims alone
+// (a rope).
 using FaintColours = std::vector<std::optional<cv::Vec3f>>;
 
 // What no picture shows, or none for certain, continues the surface around it, and goes over to
