@@ -30,8 +30,7 @@ constexpr int kLargestRadius = 9;            // px
 // of the seeds in the picture: with fewer tracks noise or blur drowns small patches
 constexpr double kDrownedShare = 0.35;
 constexpr double kTurnedShare = 0.35;  // of the tracks due: with fewer the object may have turned
-constexpr size_t kTurnsTried = 6;
-constexpr double kTurnedView = 0.4;  // rad, or relative distance: half of what is searched
+constexpr size_t kTurnsTried = 12;
 // of the object's extent, of its outline seen from another side
 constexpr double kShapeError = 0.01;
 constexpr double kIndependent = 1.5;  // errors along an outline: they are off nearly as one
@@ -284,30 +283,33 @@ Observation ObjectTracker::search(const Frame& frame, const Reference& nearest,
     }
   }
   if (best.inliers() < kTurnedShare * due_inliers_ && frames_lost_ < kForgetAfter && !stays(best)) {
-    Observation other = findTurned(frame, nearest, predicted);
+    Observation other = findTurned(frame, predicted);
     if (other.inliers() > best.inliers()) best = std::move(other);
   }
   due_inliers_ = best.inliers();
   return best;
 }
 
-// What was struck turns otherwise than expected. Where its reference shows it from afar, it is
-// searched with the frame before, which shows about the same side.
-Observation ObjectTracker::findTurned(const Frame& frame, const Reference& nearest,
-                                      const Eigen::Isometry3d& predicted) {
-  const bool near = viewChange(nearest.view, frame, predicted, centroid_) < kTurnedView;
-  const std::optional<Reference> before = near ? std::nullopt : std::optional(lastAsReference());
-  const Reference& reference = near ? nearest : *before;
+// What was struck turns otherwise than expected: any reference may show the side that is seen now,
+// or the frame before.
+Observation ObjectTracker::findTurned(const Frame& frame, const Eigen::Isometry3d& predicted) {
+  const Reference before = lastAsReference();
+  std::vector<const Reference*> references{&before};
+  std::vector<const ReferenceView*> views{&before.view};
+  for (const Reference& reference : references_) {
+    references.push_back(&reference);
+    views.push_back(&reference.view);
+  }
   Observation best;
   best.time = frame.time;
-  for (const Eigen::Isometry3d& turned :
-       searchTurned(reference.view, frame, {predicted, centroid_, reachFrom(frame, predicted)},
-                    kTurnsTried)) {
-    Observation found = refine(frame, reference, turned, drowned_ ? wide_ : params_);
+  for (const TurnedPose& turned : searchTurned(
+           views, frame, {predicted, centroid_, reachFrom(frame, predicted)}, kTurnsTried)) {
+    Observation found =
+        refine(frame, *references[turned.reference], turned.pose, drowned_ ? wide_ : params_);
     if (found.inliers() > best.inliers()) best = std::move(found);
   }
-  if (near) return best;
-  if (best.found) best = withReference(frame, nearest, std::move(best));
+  if (best.found)
+    best = withReference(frame, nearestReference(frame, best.world_from_object), std::move(best));
   look_ = {};  // `before` goes
   return best;
 }

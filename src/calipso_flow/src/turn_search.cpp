@@ -19,22 +19,43 @@ constexpr double kAgainReach = 2.0;    // px of the first look
 constexpr double kTurnPenalty = 0.02;
 
 struct Hypothesis {
-  Eigen::Isometry3d pose;
+  TurnedPose turned;
   double turn = 0.0;  // rad, from the prediction
   double score = -1.0;
 };
 
-// Reference and frame at a smaller size.
+// References and frame at a smaller size.
 struct Pictures {
-  ReferenceView reference;
+  std::vector<ReferenceView> references;
   Frame frame;
   int factor;
-  Pictures(const ReferenceView& full, const Frame& seen, int by)
-      : reference(full.reduced(by)), frame(reduced(seen, by)), factor(by) {}
+  Pictures(const std::vector<const ReferenceView*>& full, const Frame& seen, int by)
+      : frame(reduced(seen, by)), factor(by) {
+    for (const ReferenceView* reference : full) references.push_back(reference->reduced(by));
+  }
 };
 
+// From where the camera looks at the object, object frame.
+Eigen::Vector3d viewedFrom(const Frame& frame, const Eigen::Isometry3d& pose,
+                           const Eigen::Vector3d& pivot) {
+  const Eigen::Vector3d camera = frame.camera.world_from_camera.translation();
+  return (pose.inverse() * camera - pivot).normalized();
+}
+
+size_t nearestOf(const std::vector<const ReferenceView*>& references, const Frame& frame,
+                 const Eigen::Isometry3d& pose, const Eigen::Vector3d& pivot) {
+  const Eigen::Vector3d from = viewedFrom(frame, pose, pivot);
+  const auto alike = [&](const ReferenceView* reference) {
+    return viewedFrom(reference->frame(), reference->worldFromObject(), pivot).dot(from);
+  };
+  return std::max_element(references.begin(), references.end(),
+                          [&](const auto* a, const auto* b) { return alike(a) < alike(b); }) -
+         references.begin();
+}
+
 // Poses turned by the rotation vectors on a cubic grid within a ball.
-std::vector<Hypothesis> turnedPoses(const TurnSearch& search) {
+std::vector<Hypothesis> turnedPoses(const std::vector<const ReferenceView*>& references,
+                                    const Frame& frame, const TurnSearch& search) {
   const int n = static_cast<int>(std::floor(search.largest_turn / kStep));
   std::vector<Hypothesis> hypotheses;
   for (int i = -n; i <= n; ++i) {
@@ -43,7 +64,9 @@ std::vector<Hypothesis> turnedPoses(const TurnSearch& search) {
         Vector6d motion = Vector6d::Zero();
         motion.tail<3>() = kStep * Eigen::Vector3d(i, j, k);
         if (motion.norm() > search.largest_turn) continue;
-        hypotheses.push_back({movePose(search.predicted, search.pivot, motion), motion.norm()});
+        const Eigen::Isometry3d pose = movePose(search.predicted, search.pivot, motion);
+        hypotheses.push_back(
+            {{pose, nearestOf(references, frame, pose, search.pivot)}, motion.norm()});
       }
     }
   }
@@ -53,15 +76,15 @@ std::vector<Hypothesis> turnedPoses(const TurnSearch& search) {
 // @param reach  px of the full size
 void place(const Pictures& pictures, const Eigen::AlignedBox2d& reach, const Eigen::Vector3d& pivot,
            Hypothesis& hypothesis) {
+  TurnedPose& turned = hypothesis.turned;
   const ReferenceView::Warped look =
-      pictures.reference.warp(pictures.frame.camera, hypothesis.pose);
+      pictures.references[turned.reference].warp(pictures.frame.camera, turned.pose);
   hypothesis.score = -1.0;
   if (look.coverage == 0.0) return;
   const double factor = pictures.factor;
   const CoarseMatch match =
       matchCoarsely(look, pictures.frame.gray, {reach.min() / factor, reach.max() / factor}, 1);
-  hypothesis.pose =
-      shiftInPicture(pictures.frame.camera, hypothesis.pose, pivot, match.displacement);
+  turned.pose = shiftInPicture(pictures.frame.camera, turned.pose, pivot, match.displacement);
   hypothesis.score = match.correlation - kTurnPenalty * hypothesis.turn;
 }
 
@@ -81,25 +104,25 @@ bool areNeighbours(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
 
 }  // namespace
 
-std::vector<Eigen::Isometry3d> searchTurned(const ReferenceView& reference, const Frame& frame,
-                                            const TurnSearch& search, size_t count) {
-  const double side = std::sqrt(static_cast<double>(reference.seenPixels()));
+std::vector<TurnedPose> searchTurned(const std::vector<const ReferenceView*>& references,
+                                     const Frame& frame, const TurnSearch& search, size_t count) {
+  const double side = std::sqrt(static_cast<double>(references.front()->seenPixels()));
   int factor = 1;
   while (factor < kMostReduced && side >= 2.0 * factor * kFirstSide) factor *= 2;
-  std::vector<Hypothesis> hypotheses = turnedPoses(search);
-  placeAll(Pictures(reference, frame, factor), search.reach, search.pivot, hypotheses);
+  std::vector<Hypothesis> hypotheses = turnedPoses(references, frame, search);
+  placeAll(Pictures(references, frame, factor), search.reach, search.pivot, hypotheses);
   if (factor > 1) {
     hypotheses.resize(std::min(kLookedAtAgain, hypotheses.size()));
     const Eigen::Vector2d near = Eigen::Vector2d::Constant(kAgainReach * factor);
-    placeAll(Pictures(reference, frame, factor / 2), {-near, near}, search.pivot, hypotheses);
+    placeAll(Pictures(references, frame, factor / 2), {-near, near}, search.pivot, hypotheses);
   }
-  std::vector<Eigen::Isometry3d> best;
+  std::vector<TurnedPose> best;
   for (const Hypothesis& hypothesis : hypotheses) {
     if (best.size() == count || hypothesis.score <= 0.0) break;
-    const bool new_one = std::none_of(best.begin(), best.end(), [&](const Eigen::Isometry3d& pose) {
-      return areNeighbours(pose, hypothesis.pose);
+    const bool new_one = std::none_of(best.begin(), best.end(), [&](const TurnedPose& other) {
+      return areNeighbours(other.pose, hypothesis.turned.pose);
     });
-    if (new_one) best.push_back(hypothesis.pose);
+    if (new_one) best.push_back(hypothesis.turned);
   }
   return best;
 }

@@ -64,6 +64,24 @@ TEST(ClipDynamics, findsAFastSpinningBox) {
   EXPECT_NEAR(box.motions[5].state.velocity.z(), 0.3, 0.07);
 }
 
+// Struck, it turns back by a radian a frame: what it shows then it showed in earlier frames only.
+TEST(ClipDynamics, findsABoxThatABlowTurnsBack) {
+  constexpr int kBlow = 8;  // after this frame
+  const auto poseAt = [=](int k) {
+    const double turn = -4.0 * std::min(k, kBlow) / kFps + 26.0 * std::max(0, k - kBlow) / kFps;
+    return movedPose(1.0, 0.3 * k / kFps * Eigen::Vector3d::UnitX(), turn);
+  };
+  ObjectTracker tracker(test::boxModel(), frameOf(0.0, poseAt(0), 1), {});
+  for (int k = 1; k < kBlow + 3; ++k) {
+    const Observation observed = tracker.track(frameOf(k / kFps, poseAt(k), 1 + k), false);
+    ASSERT_TRUE(observed.found) << "frame " << k;
+    EXPECT_LT(observed.world_from_object.linear().col(0).cross(poseAt(k).linear().col(0)).norm(),
+              0.05)
+        << "frame " << k;
+    EXPECT_GT(observed.world_from_object.linear().col(0).dot(poseAt(k).linear().col(0)), 0.0);
+  }
+}
+
 // Noise hides tracks from a reference; a new one from the same side would only add its pose's
 // error.
 TEST(ClipDynamics, noiseWearsNoReferenceOut) {

@@ -123,8 +123,7 @@ class ObjectTracker {
                       const Eigen::Isometry3d& predicted, const TrackerParams& params);
   std::optional<Observation> fromFrameBefore(const Frame& frame, const Reference& nearest,
                                              const Eigen::Isometry3d& predicted);
-  Observation findTurned(const Frame& frame, const Reference& nearest,
-                         const Eigen::Isometry3d& predicted);
+  Observation findTurned(const Frame& frame, const Eigen::Isometry3d& predicted);
   Reference asReference(const Frame& frame, const Observation& observation) const;
   Reference lastAsReference() const;
   Reference newReference(const Frame& frame, const Reference& nearest,

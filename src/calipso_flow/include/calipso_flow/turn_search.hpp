@@ -13,13 +13,19 @@ struct TurnSearch {
   Eigen::Isometry3d predicted;  // world_from_object
   Eigen::Vector3d pivot;        // object frame, m; what it turns about
   Eigen::AlignedBox2d reach;    // px by which the pivot may lie off in the picture
-  double largest_turn = 0.8;    // rad, against the prediction
+  double largest_turn = 1.6;    // rad, against the prediction
+};
+
+struct TurnedPose {
+  Eigen::Isometry3d pose;  // world_from_object
+  size_t reference;        // that shows most of the side seen then
 };
 
 // The likeliest poses, best first, over a grid of turns and all places within reach: by masked,
-// normalised correlation of the reference's look with the frame, both at reduced size. They are
+// normalised correlation of the references' looks with the frame, all at reduced size. They are
 // good to half a step of the grid, for a finer match to start from.
-std::vector<Eigen::Isometry3d> searchTurned(const ReferenceView& reference, const Frame& frame,
-                                            const TurnSearch& search, size_t count);
+// @param references  not empty
+std::vector<TurnedPose> searchTurned(const std::vector<const ReferenceView*>& references,
+                                     const Frame& frame, const TurnSearch& search, size_t count);
 
 }  // namespace calipso::flow
