@@ -1,5 +1,6 @@
 #include "calipso_align/alignment.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <functional>
@@ -59,12 +60,12 @@ LowOrderFit fitLowOrderStages(const FitProblem& problem, const AlignOptions& opt
 }
 
 // The grids only depend on the stock model: they are laid while the first stages run.
-using Grids = std::vector<std::future<fem::VoxelGrid>>;
+using Grids = std::vector<std::shared_future<fem::VoxelGrid>>;
 
 Grids layGrids(const TriangleMesh& cad, const std::vector<ElasticStep>& steps) {
   Grids grids;
   for (const ElasticStep& step : steps) {
-    grids.push_back(std::async(std::launch::async, gridOf, std::cref(cad), step.fit.nodes));
+    grids.push_back(std::async(std::launch::async, gridOf, std::cref(cad), step.fit.nodes).share());
   }
   return grids;
 }
@@ -119,10 +120,10 @@ Placement comeCloser(const TriangleMesh& cad, const FitProblem& problem, const f
 // Stage C: the elastic body on finer and finer grids.
 ElasticOutcome fitElasticStages(const TriangleMesh& cad, const FitProblem& problem,
                                 const Placement& placed, const std::vector<ElasticStep>& steps,
-                                Grids& grids, StageClock& clock) {
+                                const Grids& grids, StageClock& clock) {
   ElasticOutcome outcome{placed, ""};
   for (size_t k = 0; k < steps.size() && outcome.trouble.empty(); ++k) {
-    const fem::VoxelGrid grid = grids[k].get();
+    const fem::VoxelGrid& grid = grids[k].get();
     clock.stop("grid of " + std::to_string(steps[k].fit.nodes));
     outcome = fitOnGrid(cad, problem, grid, outcome.placed, steps[k]);
     clock.stop("elastic " + std::to_string(steps[k].fit.nodes));
@@ -131,6 +132,57 @@ ElasticOutcome fitElasticStages(const TriangleMesh& cad, const FitProblem& probl
     clock.stop("coming closer");
   }
   return outcome;
+}
+
+// Where all stages left the model.
+struct StagedFit {
+  LowOrderFit low;
+  Points x;  // its vertices, camera frame
+  std::string trouble;
+};
+
+StagedFit fitAllStages(const TriangleMesh& cad, const FitProblem& problem,
+                       const Eigen::Isometry3d& camera_from_object, const AlignOptions& options,
+                       const std::vector<ElasticStep>& steps, const Grids& grids,
+                       StageClock& clock) {
+  const LowOrderFit low = fitLowOrderStages(problem, options, clock);
+  const Placement placed = [&](const Points& points) {
+    return low.map.apply(transformed(camera_from_object, points));
+  };
+  const ElasticOutcome end = fitElasticStages(cad, problem, placed, steps, grids, clock);
+  return {low, end.placed(cad.vertices), end.trouble};
+}
+
+// Without the planes that the model reaches through, though they push it out. The same where there
+// are none.
+FitProblem withoutReached(const FitProblem& problem, const Points& x) {
+  FitProblem without = problem;
+  const double through = reachesThrough(MeasureSettings().support_sigma * problem.model_size);
+  auto& supports = without.supports;
+  supports.erase(std::remove_if(supports.begin(), supports.end(),
+                                [&](const SupportTarget& support) {
+                                  const auto height = clearance(support, x, problem.camera);
+                                  return !support.stands && height && *height < -through;
+                                }),
+                 supports.end());
+  return without;
+}
+
+// A hull is taken for one that floats on the water, not in it, and pressed to the water line. What
+// fits clearly better without the plane goes through it; what stands on it fits as well with it.
+void tryThroughPlanes(const TriangleMesh& cad, const Eigen::Isometry3d& camera_from_object,
+                      const AlignOptions& options, const std::vector<ElasticStep>& steps,
+                      const Grids& grids, StageClock& clock, FitProblem& problem, StagedFit& fit) {
+  constexpr double kPoorPx = 0.3, kClearlyBetter = 0.6;
+  const double mean_px = assess(problem, fit.x).mean_px;
+  if (mean_px < kPoorPx || options.method == Method::kLiteral) return;
+  FitProblem without = withoutReached(problem, fit.x);
+  if (without.supports.size() == problem.supports.size()) return;
+  StagedFit through = fitAllStages(cad, without, camera_from_object, options, steps, grids, clock);
+  if (!through.trouble.empty() || assess(without, through.x).mean_px > kClearlyBetter * mean_px)
+    return;
+  problem = std::move(without);
+  fit = std::move(through);
 }
 
 // Ratio of the root mean square distances from the centroid.
@@ -277,25 +329,21 @@ AlignmentResult align(const TriangleMesh& cad, const Camera& camera,
                       const std::vector<ContourLoop>& contour, const AlignOptions& options) {
   AlignmentResult result;
   StageClock clock(result.times);
-  const FitProblem problem =
-      makeFitProblem(cad, camera, initial_world_from_object, contour, options);
+  FitProblem problem = makeFitProblem(cad, camera, initial_world_from_object, contour, options);
   clock.stop("contour");
   const RoughCheck check = checkPlacement(problem);
   if (!check.usable) return unaligned(cad, initial_world_from_object, check.reason);
 
   const std::vector<ElasticStep> steps = elasticSteps(problem, options);
-  Grids grids = layGrids(cad, steps);
-  const LowOrderFit low = fitLowOrderStages(problem, options, clock);
+  const Grids grids = layGrids(cad, steps);
   const Eigen::Isometry3d camera_from_object =
       camera.world_from_camera.inverse() * initial_world_from_object;
-  const Placement placed = [&](const Points& points) {
-    return low.map.apply(transformed(camera_from_object, points));
-  };
-  const ElasticOutcome end = fitElasticStages(cad, problem, placed, steps, grids, clock);
-  describe(problem, cad, end.placed(cad.vertices), contour, low.last, options.judge_depth, result);
-  if (!end.trouble.empty()) {
+  StagedFit fit = fitAllStages(cad, problem, camera_from_object, options, steps, grids, clock);
+  tryThroughPlanes(cad, camera_from_object, options, steps, grids, clock, problem, fit);
+  describe(problem, cad, fit.x, contour, fit.low.last, options.judge_depth, result);
+  if (!fit.trouble.empty()) {
     result.trusted = false;
-    result.reason = end.trouble + (result.reason.empty() ? "" : "; " + result.reason);
+    result.reason = fit.trouble + (result.reason.empty() ? "" : "; " + result.reason);
   }
   clock.stop("result");
   return result;

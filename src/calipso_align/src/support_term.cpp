@@ -5,8 +5,6 @@
 namespace calipso::align {
 namespace {
 
-constexpr double kReachesThrough = 5.0;  // deviations
-
 // Whether the plane reaches under the point.
 bool reachesUnder(const SupportPlane& plane, const Camera& camera, const Eigen::Vector3d& p) {
   if (!plane.x_range) return true;
@@ -47,6 +45,11 @@ std::optional<double> clearance(const SupportTarget& target, const Points& x,
   return target.normal.dot(x.row(lowest)) - target.offset;
 }
 
+double reachesThrough(double sigma) {
+  constexpr double kDeviations = 5.0;
+  return kDeviations * sigma;
+}
+
 Rows supportRows(const std::vector<SupportTarget>& targets, const Points& x, const Camera& camera,
                  double sigma) {
   Rows rows;
@@ -62,7 +65,7 @@ Rows supportRows(const std::vector<SupportTarget>& targets, const Points& x, con
     const double weight = 1.0 / (sigma * sigma * std::max<size_t>(1, rows.size() - first));
     for (size_t k = first; k < rows.size(); ++k) {
       // What other measurements hold far below a plane reaches through it, as a pier through water.
-      const double trust = target.stands ? 1.0 : gemanMcClure(rows[k].r, kReachesThrough * sigma);
+      const double trust = target.stands ? 1.0 : gemanMcClure(rows[k].r, reachesThrough(sigma));
       rows[k].weight = weight * trust;
     }
   }

@@ -142,6 +142,50 @@ TEST(Alignment, DoesNotGoThroughTheTable) {
   EXPECT_GT(world.col(2).minCoeff(), -0.5 - 0.01);
 }
 
+// What is seen of a mesh in water of this height, by a level camera.
+struct Afloat {
+  DepthObservation depth;
+  std::vector<ContourLoop> contour;
+  Afloat(const TriangleMesh& mesh, double water, const Camera& camera)
+      : depth(depthOf(mesh, camera)) {
+    cv::Mat1b mask = cv::Mat1b::zeros(depth.depth.size());
+    for (int v = 0; v < mask.rows; ++v) {
+      const double below = (v - camera.cy) / camera.fy;  // of a ray of depth 1
+      const float surface = below > 0.0 ? static_cast<float>(-water / below) : 0.0f;
+      for (int u = 0; u < mask.cols; ++u) {
+        float& d = depth.depth(v, u);
+        if (d > 0.0f && !(surface > 0.0f && surface < d)) {
+          mask(v, u) = 1;
+        } else {
+          d = surface;
+        }
+      }
+    }
+    contour = traceLoops(mask, 1, {});
+  }
+};
+
+// Pressed to the water line the mesh meets the contour less well. (A soft one would meet it as well:
+// then it is taken to stand.)
+TEST(Alignment, LeavesInTheWaterWhatGoesOnBelowIt) {
+  constexpr double kWater = -0.35, kStiff = 100.0;
+  const Camera camera = test::frontCamera();
+  TriangleMesh mesh = test::pear(40, 24);
+  for (int i = 0; i < mesh.vertexCount(); ++i)
+    mesh.vertices.row(i).head<2>() *= 1.0 + 0.2 * std::sin(25.0 * mesh.vertices(i, 2));
+  const Afloat seen(mesh, kWater, camera);
+  AlignOptions options = coarse();
+  options.elastic_weight = kStiff;
+  options.depth = seen.depth;
+  options.planes.push_back({"water", Eigen::Vector3d::UnitZ(), kWater, std::nullopt});
+  Eigen::Isometry3d rough = test::roughPose();
+  rough.translation().z() += 0.1;
+  const AlignmentResult result = align(mesh, camera, rough, seen.contour, options);
+  const Points world = transformed(result.world_from_object, result.mesh.vertices);
+  EXPECT_NEAR(world.col(2).minCoeff(), mesh.vertices.col(2).minCoeff(), 0.01);
+  EXPECT_LT(result.contour_mean_px, 0.3);
+}
+
 TEST(Alignment, SameInputGivesTheSameBytes) {
   const Camera camera = test::frontCamera();
   const std::vector<ContourLoop> contour =

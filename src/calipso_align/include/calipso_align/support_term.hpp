@@ -24,6 +24,10 @@ std::vector<SupportTarget> makeSupportTargets(const std::vector<SupportPlane>& p
 // Height of the lowest vertex above the plane, m; nothing when the plane ends beside the object.
 std::optional<double> clearance(const SupportTarget& target, const Points& x, const Camera& camera);
 
+// How far below a plane, m, something reaches through it rather than being off.
+// @param sigma  what a vertex may be off, m
+double reachesThrough(double sigma);
+
 // Vertices under a plane are pushed out of it; the lowest one of an object that stands is held on
 // it. Residuals in m.
 // @param sigma  what a vertex may be off, m
