@@ -53,8 +53,10 @@ void appendPair(const TargetPoint& data, const OutlinePoint& model, const Camera
   const double w = weight * gemanMcClure(r, options.robust_px);
   rows.push_back({model.v0, model.v1, model.a0, model.a1, d.transpose() * data.normal, r, w});
   if (options.tangential > 0.0) {
-    rows.push_back({model.v0, model.v1, model.a0, model.a1, d.transpose() * tangent,
-                    tangent.dot(gap), options.tangential * w});
+    // What is hidden finds the ends of what is seen: it must not be drawn together there.
+    const double along = tangent.dot(gap);
+    rows.push_back({model.v0, model.v1, model.a0, model.a1, d.transpose() * tangent, along,
+                    options.tangential * w * gemanMcClure(along, options.robust_px)});
   }
 }
 
