@@ -267,15 +267,17 @@ cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const Rece
   return shadeTraces(shadows, place, params) & stays.never_lit;
 }
 
-// The shade of objects at rest is taken off what the key frame shows, where that can be done.
+// The shade of objects at rest is taken off what the key frame shows, where that can be done: if the
+// light is confirmed, or hardly anything else is left.
 void liftTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
                 const cv::Mat& sky, const RenderParams& params, cv::Mat& traces, Prepared& p) {
   cv::Mat covered = p.key_labels != 0;
   for (const cv::Mat& f : p.footprints) {
     if (!f.empty()) covered |= f;
   }
-  const cv::Mat unclear = grown(covered, params.background.mask_margin_px) |
-                          (e.seen.spread >= kQuiet) | place.off_planes;
+  cv::Mat unclear = grown(covered, params.background.mask_margin_px) | (e.seen.spread >= kQuiet) |
+                    place.off_planes;
+  if (!p.light.confirmed()) unclear |= ~mostlyShaded(place.surface, place.planes, traces, covered);
   const cv::Mat lifted =
       liftShade({e.picture, sun, sky, p.sunless, unclear, params.background.shadow_margin_px},
                 traces, predictedUmbra(p.light.light, params.planes), p.background.plate);
@@ -368,8 +370,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);
   cv::Mat traces =
       any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
-  if (any_rests && p.light.confirmed() && !isWater(p.mirror))
-    liftTraces(e, place, sun, sky, params, traces, p);
+  if (any_rests && !isWater(p.mirror)) liftTraces(e, place, sun, sky, params, traces, p);
   if (any_rests && !p.relief.empty()) traces |= contactTraces(e, params, p);
   if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);

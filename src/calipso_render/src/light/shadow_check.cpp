@@ -177,10 +177,12 @@ SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& p
   addRegions(test, sky, kSkyShaded, false, regions);
   double all = 0.0, of_sun = 0.0;
   for (const Region& r : regions) all += r.odds, of_sun += r.of_sun ? r.odds : 0.0;
-  // What cannot be decided by itself goes with all the others.
+  // What cannot be decided by itself goes with all the others; the sun's, of which nothing is told,
+  // unless these surely speak against it.
   const auto believed = [&](const Region& r) {
     if (std::abs(r.odds) > kDecided) return r.odds > 0.0;
-    if (r.of_sun && !sun_is_sure && of_sun != 0.0) return of_sun > kDecided;
+    if (r.of_sun && of_sun == 0.0) return all > -kDecided;
+    if (r.of_sun && !sun_is_sure) return of_sun > kDecided;
     return all >= 0.0;
   };
   const cv::Mat nothing = cv::Mat::zeros(picture.size(), CV_8U);

@@ -18,6 +18,7 @@ constexpr float kHides = 0.7f;       // B
 constexpr float kOpenSky = 0.5f;     // less of it is seen along contacts, where B is uncertain
 constexpr double kSmooth = 2.0;      // px over which the sky's coarse directions are evened out
 constexpr float kDark = 2e-3f;       // linear; added before the logarithm
+constexpr float kLittle = 1.0f / 3;  // of what is seen of a plane: so much of it must be unshaded
 constexpr std::size_t kFewest = 60;  // pairs
 constexpr float kAlike = 0.1f;       // of the ratio: pairs that agree,
 constexpr float kMostlyAlike = 1.0f / 3;  // and the part of them that must
@@ -161,6 +162,17 @@ std::optional<cv::Vec3f> umbraAtBorders(const ShadedPlace& place, const cv::Vec3
     if (umbra[c] > kMostUmbra) return std::nullopt;
   }
   return umbra;
+}
+
+cv::Mat mostlyShaded(const cv::Mat& surface, int planes, const cv::Mat& traces,
+                     const cv::Mat& covered) {
+  cv::Mat where = cv::Mat::zeros(traces.size(), CV_8U);
+  for (int k = 1; k <= planes && !surface.empty(); ++k) {
+    const cv::Mat plane = surface == k, seen = plane & (covered == 0);
+    if (cv::countNonZero(seen & (traces == 0)) < kLittle * cv::countNonZero(seen))
+      where.setTo(255, plane);
+  }
+  return where;
 }
 
 cv::Mat liftShade(const ShadedPlace& place, const cv::Mat& traces, const cv::Vec3f& predicted,

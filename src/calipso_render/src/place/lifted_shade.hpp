@@ -26,6 +26,12 @@ struct ShadedPlace {
 // @param predicted U as the light has it
 std::optional<cv::Vec3f> umbraAtBorders(const ShadedPlace& place, const cv::Vec3f& predicted);
 
+// Planes of which shade leaves less than a third of what is seen: there is little to copy from.
+// @param surface CV_8UC1, PlaceSurfaces::label, may be empty; planes: its labels from 1 on
+// @param covered CV_8UC1, != 0: not seen @return CV_8UC1: 255 all over such planes
+cv::Mat mostlyShaded(const cv::Mat& surface, int planes, const cv::Mat& traces,
+                     const cv::Mat& covered);
+
 // Takes the shade off the plate where that can be done.
 // @param traces CV_8UC1: what is shaded at all @return CV_8UC1: 255 where it was taken off
 cv::Mat liftShade(const ShadedPlace& place, const cv::Mat& traces, const cv::Vec3f& predicted,

@@ -127,7 +127,9 @@ class OutlineFinder {
     if (last - first < kShortest || nearest > kEnters) return std::nullopt;
     int on = 0, beside = 0;  // near to where it enters
     for (const cv::Point2f& p : points_) {
-      if (std::abs(line.at(p)) > kBesideLine || std::abs(along.dot(p) - enters) > kLooked) continue;
+      const float at = along.dot(p);
+      if (std::abs(line.at(p)) > kBesideLine || std::abs(at - enters) > kLooked) continue;
+      if (at < first || at > last) continue;  // past a corner
       ++beside, on += std::abs(line.at(p)) <= kOnLine;
     }
     if (on < kStraight * beside) return std::nullopt;
