@@ -191,7 +191,8 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   const std::vector<Actor> actors = keyActors(p);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   Stopwatch watch;
-  const Background seen = seenBackground(frames, any_moves, params.background);
+  Background seen = seenBackground(frames, any_moves, params.background);
+  if (cameraMoves(clip)) sharpenSeen(frames, params.background, seen);
   p.background_ms = watch.lap();
   const std::vector<View> views = viewsOf(clip, p, picture), light_views = lightViewsOf(views);
   p.texture_views = static_cast<int>(views.size());

@@ -59,6 +59,19 @@ class LiftedShade : public ::testing::Test {
   cv::Mat traces_{size_, CV_8U, cv::Scalar(255)}, unclear_ = cv::Mat::zeros(size_, CV_8U), sunless_;
 };
 
+TEST_F(LiftedShade, MostlyShadedIsWhatLeavesTooLittleToCopyFrom) {
+  cv::Mat surface(size_, CV_8U, cv::Scalar(1)), traces = cv::Mat::zeros(size_, CV_8U),
+                                                covered = traces.clone();
+  surface.colRange(100, 200).setTo(2);
+  traces.colRange(0, 50).setTo(255);     // half of one,
+  traces.colRange(130, 200).setTo(255);  // most of the other,
+  const auto where = [&] { return mostlyShaded(surface, 2, traces, covered); };
+  EXPECT_EQ(cv::countNonZero(where() != (surface == 2)), 0);
+  covered.colRange(60, 100).setTo(255);  // and of what is seen of the first, too
+  EXPECT_EQ(cv::countNonZero(where() == 0), 0);
+  EXPECT_EQ(cv::countNonZero(mostlyShaded(cv::Mat(), 2, traces, covered)), 0);
+}
+
 TEST_F(LiftedShade, MeasuresWhatTheSunLeavesAcrossBorders) {
   const cv::Mat picture = shaded(kUmbra);
   const auto umbra = umbraAtBorders({picture, sun_, sky_, sunless_, unclear_, kMargin},

@@ -54,6 +54,15 @@ TEST(PlaneOutline, TwoEdgesMeetAtACornerThatNobodySees) {
   EXPECT_LT(wrong(s, within), 0.04);
 }
 
+// A corner that is seen near the object is no sign that the edge before it bends.
+TEST(PlaneOutline, AnEdgeEndsAtACornerThatIsSeen) {
+  const Setting s =
+      behindDisc({{20, 62}, {172, 60}, {230, 85}, {230, 130}, {20, 130}}, {120, 65}, 35);
+  const cv::Mat within = s.within();
+  ASSERT_FALSE(within.empty());
+  EXPECT_LT(wrong(s, within), 0.04);
+}
+
 TEST(PlaneOutline, WhatIsRoundHasNone) {
   Setting s;
   cv::circle(s.plane, {120, 90}, 60, 255, cv::FILLED);

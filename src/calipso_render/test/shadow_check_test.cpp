@@ -82,6 +82,22 @@ TEST(SeenShadows, OfAnUnsureSunThoseThatShowAreBelieved) {
   EXPECT_EQ(cv::countNonZero(seen(false).sun), 2 * g.left.area());
 }
 
+// Of a sun's shadow too little is seen to tell; the sky's, a little too pale, is undecided.
+TEST(SeenShadows, OfWhichNothingIsToldAreBelievedUnlessOthersSurelySpeakAgainst) {
+  Ground g;
+  g.sun(g.right).setTo(1.0f);
+  g.unknown.colRange(0, 100).setTo(255);
+  g.sky(g.right).setTo(0.4f);
+  g.picture(g.right) *= 0.95f;
+  const auto seen = [&] {
+    return seenShadows(g.sun, g.sky, g.picture, g.unknown, kOnGround, false);
+  };
+  EXPECT_EQ(cv::countNonZero(seen().sun), g.left.area());
+  EXPECT_EQ(cv::countNonZero(seen().sky), 0);
+  g.picture(g.right) *= 1.0f / 0.95f;  // nothing of it is seen
+  EXPECT_EQ(cv::countNonZero(seen().sun), 0);
+}
+
 TEST(SeenShadows, OnWaterPaleOnesCount) {
   Ground g;  // a quarter of the light, as most of what is seen is mirrored; beside it none
   g.picture(g.left) *= 0.88f;

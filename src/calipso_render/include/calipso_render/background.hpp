@@ -53,6 +53,12 @@ struct BackgroundParams {
 Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_move,
                           const BackgroundParams& params = {});
 
+// Frames of a camera that moves lie over each other but for the errors of what is known of depths:
+// where their values differ, a mean is blurred. There the plate takes the value of the earliest
+// frame that agrees with the others, which shows the place most as the key frame does.
+void sharpenSeen(const std::vector<ClipFrame>& frames, const BackgroundParams& params,
+                 Background& background);
+
 // Fills what was never seen, and `shaded` (CV_8UC1, may be empty: pixels that the objects cover or
 // darken in every frame), from the surroundings. Where the place moves by itself, the median is no
 // picture of it: there the key frame is what the surroundings look like.

@@ -22,6 +22,8 @@ constexpr int kMovingGap = 12;         // px between moving places that move wit
 constexpr int kFewestMoving = 50;  // one part in so many of the picture; fewer are passing things
 constexpr int kRowsAround = 2;     // on either side of a row, for what moves in it,
 constexpr float kResting = 0.15f;  // and the part of it, or of a plane, up to which it rests
+constexpr float kBlurred = 3.0f;       // code values of spread, from which a mean is blurred
+constexpr float kAgreeing = 2.0f;      // spreads from it
 constexpr int kSteadyDifference = 14;  // code values; about five deviations of the difference
 
 }  // namespace
@@ -65,6 +67,25 @@ Background seenBackground(const std::vector<ClipFrame>& frames, bool objects_mov
   b.resting_spread =
       std::max(kLeastResting, kMovingSpread * quantileOf(b.spread, b.invented == 0, 0.25));
   return b;
+}
+
+void sharpenSeen(const std::vector<ClipFrame>& frames, const BackgroundParams& params,
+                 Background& background) {
+  const PlaceSamples samples(frames, params.mask_margin_px);
+#pragma omp parallel for schedule(static)
+  for (int v = 0; v < background.plate.rows; ++v) {
+    for (int u = 0; u < background.plate.cols; ++u) {
+      const float spread = background.spread.at<float>(v, u);
+      if (spread < kBlurred) continue;
+      cv::Vec3f& plate = background.plate.at<cv::Vec3f>(v, u);
+      for (const cv::Vec3b& value : samples.at(u, v)) {
+        const cv::Vec3f colour(value[0], value[1], value[2]);
+        if (cv::norm(colour - plate, cv::NORM_INF) > kAgreeing * spread) continue;
+        plate = colour;
+        break;
+      }
+    }
+  }
 }
 
 // Where the place moves by itself: it spreads over time, or the key frame shows something else than

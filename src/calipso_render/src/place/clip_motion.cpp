@@ -42,7 +42,7 @@ std::vector<ClipFrame> inKeyView(std::vector<ClipFrame> frames, const cv::Mat& n
     if (sameView(f.camera, key)) continue;
     const cv::Mat map = viewWarp(nearness, f.camera, key);
     cv::Mat bgr, labels;
-    cv::remap(f.bgr, bgr, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+    cv::remap(f.bgr, bgr, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_CONSTANT);
     cv::remap(f.labels, labels, map, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
               cv::Scalar(255));
     labels.setTo(255, hiddenFrom(nearness, objects, key, f.camera));

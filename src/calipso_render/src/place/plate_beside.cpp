@@ -21,8 +21,9 @@ PlateBeside plateFrom(std::vector<ClipFrame> frames, std::size_t first, const cv
   std::rotate(frames.begin(), frames.begin() + first, frames.end());
   PlateBeside beside{
       frames.front().camera, nearnessFrom(nearness, key, frames.front().camera), {}, {}};
-  const Background seen = seenBackground(inKeyView(frames, beside.nearness, params.mask_margin_px),
-                                         objects_move, params);
+  frames = inKeyView(frames, beside.nearness, params.mask_margin_px);
+  Background seen = seenBackground(frames, objects_move, params);
+  sharpenSeen(frames, params, seen);
   beside.plate = linearFromRealCodes(seen.plate), beside.spread = seen.spread;
   beside.spread.setTo(std::numeric_limits<float>::infinity(), seen.count == 0);
   return beside;
