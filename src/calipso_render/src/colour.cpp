@@ -62,6 +62,15 @@ cv::Mat linearFromCode(const cv::Mat& bgr) {
   return linear;
 }
 
+cv::Mat luminanceOf(const cv::Mat& codes) {
+  const cv::Mat linear = linearFromRealCodes(codes);
+  cv::Mat of(codes.size(), CV_32F);
+  for (int v = 0; v < codes.rows; ++v) {
+    for (int u = 0; u < codes.cols; ++u) of.at<float>(v, u) = luminance(linear.at<cv::Vec3f>(v, u));
+  }
+  return of;
+}
+
 cv::Mat codeFromLinear(const cv::Mat& linear) {
   CV_Assert(linear.type() == CV_32FC3);
   cv::Mat bgr(linear.size(), CV_8UC3);

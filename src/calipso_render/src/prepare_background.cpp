@@ -64,15 +64,6 @@ cv::Mat placeVisibility(const Visibility& light, const ReceiverOf& receiver_of,
   return visibility;
 }
 
-cv::Mat luminanceOf(const cv::Mat& codes) {
-  const cv::Mat linear = linearFromRealCodes(codes);
-  cv::Mat of(codes.size(), CV_32F);
-  for (int v = 0; v < codes.rows; ++v) {
-    for (int u = 0; u < codes.cols; ++u) of.at<float>(v, u) = luminance(linear.at<cv::Vec3f>(v, u));
-  }
-  return of;
-}
-
 // What other frames show past the objects that hide it at the key frame.
 cv::Mat seenPast(const PlaceEvidence& e) {
   if (!e.camera_moves) return cv::Mat::zeros(e.seen.count.size(), CV_8U);
@@ -354,6 +345,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   const PlaceSurfaces surfaces =
       findSurfaces(p.scenery, params.depth, p.key_labels, params.planes, p.camera);
   const SeenPlace place = findPlace(surfaces, params, p);
+  if (e.camera_moves) followPlanes(surfaces, (p.scenery == 0.0f) & (e.seen.count == 0), p.nearness);
   const ReceiverOf in_sun = receiversOf(params.planes, p.relief, place.blind, p.camera),
                    under_sky = receiversOf(params.planes, p.relief, place.off_planes, p.camera);
   cv::Mat sun = placeVisibility(e.sun, in_sun, key.bgr.size());
@@ -387,6 +379,8 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
     known_of_place.planes.push_back(plane.fromPixels(key.camera));
   if (surfaces.empty()) known_of_place.supports = static_cast<int>(planes.size());
   inventPlace(traces, key, known_of_place, surfaces, params, p);
+  if (e.camera_moves)
+    followPlanes(surfaces, p.background.invented & (p.scenery == 0.0f), p.nearness);
   p.plate_linear = linearFromRealCodes(p.background.plate);
   findDrifting(e.frames,
                ground.empty() ? ground : cv::Mat((ground > 0.0f) & (place.off_planes == 0)),

@@ -40,5 +40,7 @@ inline std::uint8_t quantise(float code) {
 inline float luminance(const cv::Vec3f& c) {
   return 0.0722f * c[0] + 0.7152f * c[1] + 0.2126f * c[2];
 }
+// The same of a picture of code values. @param codes CV_32FC3 @return CV_32FC1
+cv::Mat luminanceOf(const cv::Mat& codes);
 
 }  // namespace calipso::render

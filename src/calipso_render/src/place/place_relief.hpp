@@ -58,6 +58,10 @@ struct PlaceSurfaces {
 PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const cv::Mat& labels,
                            const std::vector<SupportPlane>& planes, const Camera& camera);
 
+// Makes what is invented as near as the plane that goes on there, if one does.
+// @param invented CV_8UC1, != 0: hidden, and shown by no frame @param nearness CV_32FC1, 1/m
+void followPlanes(const PlaceSurfaces& surfaces, const cv::Mat& invented, cv::Mat& nearness);
+
 // What of them lies off the support planes. @param sun unit, towards it: of what faces away from it
 // only planes take shade, that of the sky
 Relief findRelief(const PlaceSurfaces& surfaces, const Eigen::Vector3f& sun);

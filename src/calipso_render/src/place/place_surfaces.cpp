@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "calipso_render/inpaint.hpp"
+#include "place/crossing_planes.hpp"
 #include "place/key_cover.hpp"
 #include "place/place_relief.hpp"
 #include "place/plane_edges.hpp"
@@ -29,8 +30,6 @@ constexpr float kSameSurface = 0.05f;  // of the nearness within it
 constexpr float kAtHorizon = 1.05f;
 // px of the squares of a support plane, and of what rises above it, that tell
 constexpr int kOnSide = 13, kRisesSide = 3;
-
-constexpr int kNoPlane = -1;
 
 struct Pixel {
   int u, v;
@@ -95,19 +94,6 @@ std::vector<Pixel> onPlane(const Eigen::Vector3d& abc, const std::vector<Pixel>&
   return on;
 }
 
-// A plane all over the picture.
-struct Extent {
-  cv::Mat nearness;  // CV_32FC1, 0: not there
-  cv::Mat farthest;  // CV_32FC1: of it and the pixels around, which the depth image may show
-  cv::Mat goes_on;   // CV_8UC1: 255 where it may be behind objects
-
-  // Part by which what is seen misses it: none within a pixel. Towards the horizon that is much.
-  float miss(float seen, int u, int v) const {
-    return std::max({0.0f, seen - nearness.at<float>(v, u), farthest.at<float>(v, u) - seen}) /
-           seen;
-  }
-};
-
 cv::Mat supportNearness(const SupportPlane& plane, const Camera& camera) {
   cv::Mat nearness = cv::Mat::zeros(camera.height, camera.width, CV_32F);
   const Eigen::Isometry3d from_world = camera.world_from_camera.inverse();
@@ -156,8 +142,8 @@ void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const C
 }
 
 // Of planes first ... last - 1 the one that misses what is seen least, by less than `most`.
-int closest(const std::vector<Extent>& planes, int first, int last, float most, float seen, int u,
-            int v) {
+int closest(const std::vector<PlaneExtent>& planes, int first, int last, float most, float seen,
+            int u, int v) {
   int best = kNoPlane;
   for (int k = first; k < last; ++k) {
     const float miss = planes[k].miss(seen, u, v);
@@ -168,7 +154,7 @@ int closest(const std::vector<Extent>& planes, int first, int last, float most, 
 
 // The plane that the depth image shows at a pixel, or kNoPlane: support planes above all, which
 // others pass through, and which are met less exactly.
-int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u, int v) {
+int planeSeen(const std::vector<PlaneExtent>& planes, int supports, float seen, int u, int v) {
   int best = closest(planes, 0, supports, kOnPlane, seen, u, v);
   if (best == kNoPlane)
     best = closest(planes, supports, static_cast<int>(planes.size()), kOnPlane, seen, u, v);
@@ -177,7 +163,8 @@ int planeSeen(const std::vector<Extent>& planes, int supports, float seen, int u
 
 // The plane seen if the object were not there: the nearest behind it, but for one that has ended at
 // its edge with another. @param object nearness of the object, 0 unknown
-int planeBehind(const std::vector<Extent>& planes, const Edges& edges, float object, int u, int v) {
+int planeBehind(const std::vector<PlaneExtent>& planes, const Edges& edges, float object, int u,
+                int v) {
   const float limit = object > 0.0f ? kBehind * object : 1e9f;
   const auto isThere = [&](int k) {
     const float near = planes[k].nearness.at<float>(v, u);
@@ -217,7 +204,7 @@ cv::Mat largePieces(const cv::Mat& mask) {
 // Where the picture shows nothing, as far as it has any depth: large areas in which nothing was
 // measured, but for those in which a support plane would be seen (not just below its horizon).
 cv::Mat showsNothing(const cv::Mat& depth, const cv::Mat& labels, int supports,
-                     const std::vector<Extent>& planes) {
+                     const std::vector<PlaneExtent>& planes) {
   cv::Mat unmeasured = (depth == 0.0f) & (labels == 0);
   for (int k = 0; k < supports; ++k)
     unmeasured &=
@@ -226,7 +213,7 @@ cv::Mat showsNothing(const cv::Mat& depth, const cv::Mat& labels, int supports,
 }
 
 // CV_8SC1: the plane that every pixel shows, or kNoPlane.
-cv::Mat planesSeen(const cv::Mat& scenery, int supports, const std::vector<Extent>& planes) {
+cv::Mat planesSeen(const cv::Mat& scenery, int supports, const std::vector<PlaneExtent>& planes) {
   cv::Mat seen(scenery.size(), CV_8S, cv::Scalar(kNoPlane));
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < scenery.rows; ++v) {
@@ -237,13 +224,14 @@ cv::Mat planesSeen(const cv::Mat& scenery, int supports, const std::vector<Exten
             static_cast<std::int8_t>(planeSeen(planes, supports, near, u, v));
     }
   }
+  leaveStrips(scenery, supports, planes, seen);
   return seen;
 }
 
 // @param seen planesSeen()
 void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, const cv::Mat& seen,
                  const std::vector<PicturePlane>& in_picture, const Edges& edges,
-                 std::vector<Extent>& planes) {
+                 std::vector<PlaneExtent>& planes) {
   cv::Mat on_support = cv::Mat::zeros(scenery.size(), CV_8U);
   for (int v = 0; v < scenery.rows && supports > 0; ++v) {
     for (int u = 0; u < scenery.cols; ++u) {
@@ -252,8 +240,8 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
         on_support.at<std::uint8_t>(v, u) = 255;
     }
   }
-  const cv::Mat none = cv::Mat::zeros(scenery.size(), CV_8U);
-  cv::Mat taken = on_support;
+  const cv::Mat none = cv::Mat::zeros(scenery.size(), CV_8U), on_others = seen >= supports;
+  cv::Mat taken = on_support & ~on_others;
   for (int k = 0; k < static_cast<int>(planes.size()); ++k) {
     cv::Mat beyond = none.clone(), edge = none.clone();
     for (int j = 0; j < static_cast<int>(planes.size()); ++j) {
@@ -264,8 +252,8 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
                 alongEdge(in_picture[k], in_picture[j], scenery.size());
     }
     const cv::Mat& nearness = planes[k].nearness;
-    planes[k].goes_on = goesOn(nearness, planes[k].farthest, scenery, k < supports ? none : taken,
-                               beyond, edge, nothing);
+    planes[k].goes_on = goesOn(nearness, planes[k].farthest, scenery,
+                               k < supports ? on_others : taken, beyond, edge, nothing);
     // What a larger plane explains is no sign of one that passes through it.
     if (k >= supports)
       taken |= (scenery > 0.0f) & (cv::abs(nearness - scenery) < kOnPlane * nearness);
@@ -277,7 +265,7 @@ void findReaches(const cv::Mat& scenery, const cv::Mat& nothing, int supports, c
 // went on there as near as around, or stand before the object.
 // @param before beforeObjects() @param seen planesSeen()
 void leaveToWhatRises(const cv::Mat& scenery, const cv::Mat& before,
-                      const std::vector<Extent>& planes, const cv::Mat& seen,
+                      const std::vector<PlaneExtent>& planes, const cv::Mat& seen,
                       PlaceSurfaces& surfaces) {
   const auto pieces = [](const cv::Mat& mask, int side) {
     cv::Mat opened;
@@ -304,7 +292,7 @@ void leaveToWhatRises(const cv::Mat& scenery, const cv::Mat& before,
 }
 
 // PlaceSurfaces::alike. @param near CV_8UC1, != 0: is known to be seen at some distance
-cv::Mat alikeOf(const cv::Mat& scenery, const cv::Mat& near, const std::vector<Extent>& planes,
+cv::Mat alikeOf(const cv::Mat& scenery, const cv::Mat& near, const std::vector<PlaneExtent>& planes,
                 const PlaceSurfaces& surfaces) {
   const cv::Mat hidden = scenery == 0.0f, &label = surfaces.label;
   cv::Mat alike = label.clone();
@@ -343,7 +331,7 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
                            const std::vector<SupportPlane>& planes, const Camera& camera) {
   if (scenery.empty()) return {};
   const int supports = static_cast<int>(planes.size());
-  std::vector<Extent> extents;
+  std::vector<PlaneExtent> extents;
   std::vector<PicturePlane> all;
   cv::Mat off = scenery > 0.0f;
   for (const SupportPlane& plane : planes) {
@@ -393,6 +381,18 @@ PlaceSurfaces findSurfaces(const cv::Mat& scenery, const cv::Mat& depth, const c
   surfaces.sure =
       sureOf(surfaces.label, (scenery == 0.0f) & (nothing == 0), seen_planes, nothing, edges);
   return surfaces;
+}
+
+void followPlanes(const PlaceSurfaces& surfaces, const cv::Mat& invented, cv::Mat& nearness) {
+  for (int v = 0; v < surfaces.label.rows; ++v) {
+    for (int u = 0; u < surfaces.label.cols; ++u) {
+      const std::size_t label = surfaces.label.at<std::uint8_t>(v, u);
+      if (invented.at<std::uint8_t>(v, u) == 0 || label == 0 || label > surfaces.planes.size())
+        continue;
+      const double near = surfaces.planes[label - 1].nearnessAt(u, v);
+      nearness.at<float>(v, u) = static_cast<float>(std::max(0.0, near));
+    }
+  }
 }
 
 }  // namespace calipso::render
