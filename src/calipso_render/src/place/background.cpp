@@ -22,8 +22,8 @@ constexpr int kMovingGap = 12;         // px between moving places that move wit
 constexpr int kFewestMoving = 50;  // one part in so many of the picture; fewer are passing things
 constexpr int kRowsAround = 2;     // on either side of a row, for what moves in it,
 constexpr float kResting = 0.15f;  // and the part of it, or of a plane, up to which it rests
-constexpr float kBlurred = 3.0f;       // code values of spread, from which a mean is blurred
-constexpr float kAgreeing = 2.0f;      // spreads from it
+constexpr float kBlurred = 3.0f;   // code values of spread, from which a mean is blurred
+constexpr float kAgreeing = 2.0f;  // spreads from it
 constexpr int kSteadyDifference = 14;  // code values; about five deviations of the difference
 
 }  // namespace
