@@ -64,7 +64,7 @@ TEST(ClipDynamics, findsAFastSpinningBox) {
   EXPECT_NEAR(box.motions[5].state.velocity.z(), 0.3, 0.07);
 }
 
-// Struck, it turns back by a radian a frame: what it shows then it showed in earlier frames only.
+// Struck, it turns a radian away from what is expected: what it shows then it showed in earlier frames only.
 TEST(ClipDynamics, findsABoxThatABlowTurnsBack) {
   constexpr int kBlow = 8;  // after this frame
   const auto poseAt = [=](int k) {

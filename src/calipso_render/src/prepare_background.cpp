@@ -345,7 +345,6 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   const PlaceSurfaces surfaces =
       findSurfaces(p.scenery, params.depth, p.key_labels, params.planes, p.camera);
   const SeenPlace place = findPlace(surfaces, params, p);
-  if (e.camera_moves) followPlanes(surfaces, (p.scenery == 0.0f) & (e.seen.count == 0), p.nearness);
   const ReceiverOf in_sun = receiversOf(params.planes, p.relief, place.blind, p.camera),
                    under_sky = receiversOf(params.planes, p.relief, place.off_planes, p.camera);
   cv::Mat sun = placeVisibility(e.sun, in_sun, key.bgr.size());
