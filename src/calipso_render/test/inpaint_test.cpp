@@ -35,7 +35,7 @@ TEST(PatchOrigins, AreWhereThePictureRepeatsItself) {
   const cv::Mat image = repeated(spots(160, 120), 52);
   cv::Mat hole = cv::Mat::zeros(120, 160, CV_8U);
   hole(cv::Rect(60, 40, 30, 30)).setTo(255);
-  const cv::Mat origin = patchOrigins(image, hole, hole == 0, nullptr, {});
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, {}, {});
   int elsewhere = 0;
   for (int v = 0; v < 120; ++v) {
     for (int u = 0; u < 160; ++u) {
@@ -75,7 +75,7 @@ TEST(PatchOrigins, StayInTheirLayer) {
   cv::add(image(cv::Rect(0, 80, 240, 80)), cv::Scalar(-60, 20, 20),
           image(cv::Rect(0, 80, 240, 80)));
   hole(cv::Rect(80, 30, 60, 100)).setTo(255);
-  const cv::Mat origin = patchOrigins(image, hole, hole == 0, nullptr, {});
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, {}, {});
   for (int v = 30; v < 130; ++v) {
     if (std::abs(v - 80) < 6) continue;  // the border may waver by a patch
     for (int u = 80; u < 140; ++u)
@@ -90,7 +90,7 @@ TEST(PatchOrigins, ComeFromWhereTheGroundIsAboutAsNear) {
   InpaintParams params;
   params.nearness = cv::Mat(120, 240, CV_32F, cv::Scalar(1.0f));
   params.nearness(cv::Rect(128, 0, 112, 120)).setTo(0.2f);  // five times as far
-  const cv::Mat origin = patchOrigins(image, hole, hole == 0, nullptr, params);
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, {}, params);
   for (int v = 40; v < 70; ++v) {
     for (int u = 80; u < 110; ++u)
       EXPECT_LT(origin.at<cv::Vec2s>(v, u)[0], 131)
@@ -109,7 +109,7 @@ TEST(PatchOrigins, AgreeWithWhatShowsThroughNarrowGaps) {
   image(tower).setTo(cv::Scalar::all(60.0));
   for (int u = around.x; u < around.br().x; u += 12)
     hole(cv::Rect(u, around.y, 8, around.height)).setTo(255);  // slits of 4 px
-  const cv::Mat origin = patchOrigins(image, hole, hole == 0, nullptr, {});
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, {}, {});
   int wrong = 0, all = 0;
   for (int v = tower.y + 10; v < tower.br().y - 10; ++v) {
     for (int u = tower.x + 10; u < tower.br().x - 10; ++u) {
@@ -128,7 +128,7 @@ TEST(PatchOrigins, DoNotDependOnTheNumberOfThreads) {
   const int threads = omp_get_max_threads();
   for (const int count : {1, 2, 5}) {
     omp_set_num_threads(count);
-    const cv::Mat origin = patchOrigins(image, hole, hole == 0, nullptr, {});
+    const cv::Mat origin = patchOrigins(image, hole, hole == 0, {}, {});
     if (first.empty()) first = origin;
     EXPECT_EQ(cv::norm(origin, first, cv::NORM_INF), 0.0) << count;
   }
@@ -144,7 +144,7 @@ TEST(PatchOrigins, ComeFromASurfaceOfWhichLittleIsSeen) {
   surface(strip) = 2, hole(hidden) = 255;
   InpaintParams params;
   params.surface = surface;
-  const cv::Mat origin = patchOrigins(image, hole, hole == 0, nullptr, params);
+  const cv::Mat origin = patchOrigins(image, hole, hole == 0, {}, params);
   int elsewhere = 0;
   for (int v = 63; v < 147; ++v) {
     for (int u = 113; u < 131; ++u) {
@@ -158,7 +158,7 @@ TEST(PatchOrigins, ComeFromASurfaceOfWhichLittleIsSeen) {
 TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
   const cv::Mat image = grain(40, 40), hole(40, 40, CV_8U, cv::Scalar(255)),
                 source = cv::Mat::zeros(40, 40, CV_8U);
-  const cv::Mat origin = patchOrigins(image, hole, source, nullptr, {});
+  const cv::Mat origin = patchOrigins(image, hole, source, {}, {});
   EXPECT_EQ(cv::countNonZero(origin.reshape(1) != -1), 0);
 }
 

@@ -1,13 +1,19 @@
 #include "fill/hidden_plane.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "fill/around_hole.hpp"
 #include "fill/line_ends.hpp"
+#include "fill/row_periods.hpp"
+#include "fill/stripes.hpp"
 
 namespace calipso::render {
 namespace {
 
+constexpr float kAlongRow =
+    0.05f;                 // slope of edges that go on in stripes: others are their pattern
 constexpr int kClear = 2;  // px around a sample that see nothing else
 
 // @param beside CV_8UC1, != 0: where another surface is seen
@@ -56,7 +62,24 @@ void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
 
 void addLattice(const cv::Mat& look, int margin, PlanePart& part) {
   const cv::Rect near = windowAround(part.hole, margin, margin);
-  part.lattice = findLattice(part.chart.carried(look, near), part.source(near));
+  part.pattern.lattice = findLattice(part.chart.carried(look, near), part.source(near));
+}
+
+bool turnAlongStripes(const cv::Mat& look, HiddenPlane& plane) {
+  const auto direction =
+      stripesAcross(plane.part->chart.carried(look), plane.part->hole, plane.part->source);
+  if (!direction) return false;
+  PlanePart& part = *plane.part;
+  part = partOf(*planeChart(plane.to_plane, plane.hole, plane.seen, *direction), plane.hole,
+                plane.seen, plane.beside);
+  addLook(look, plane.seen, part);
+  const auto leads_off = [](const cv::Vec4f& e) {
+    return std::abs(e[3] - e[1]) > kAlongRow * std::abs(e[2] - e[0]);
+  };
+  part.edges.erase(std::remove_if(part.edges.begin(), part.edges.end(), leads_off),
+                   part.edges.end());
+  part.pattern.striped = true, part.pattern.periods = rowPeriods(part.look, part.source);
+  return true;
 }
 
 }  // namespace calipso::render

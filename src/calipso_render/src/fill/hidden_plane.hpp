@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "fill/lattice.hpp"
+#include "fill/pattern.hpp"
 #include "fill/plane_chart.hpp"
 
 namespace calipso::render {
@@ -14,7 +14,7 @@ constexpr int kOutlineError = 3;  // px by which the outlines of surfaces may be
 // A plane's part of the picture, in its chart.
 struct PlanePart {
   PlaneChart chart;
-  std::optional<Lattice> lattice;
+  Pattern pattern;
   cv::Mat plain;  // CV_32FC3, the picture; where the plane is not seen it goes on smoothly
   cv::Mat look;   // CV_32FC3, so, too
   cv::Mat hole, known, source;
@@ -36,7 +36,7 @@ struct HiddenPlane {
 // CV_32FC1, 1/m, of a picture's pixels.
 cv::Mat nearnessOf(const cv::Matx33d& to_plane, const cv::Size& size);
 
-// All but its look and its lattice; nothing if it cannot be filled along itself.
+// All but its look and its pattern; nothing if it cannot be filled along itself.
 std::optional<PlanePart> chartedPart(const HiddenPlane& plane);
 
 // @param look CV_32FC3, the picture; seen HiddenPlane::seen
@@ -44,5 +44,9 @@ void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part);
 
 // @param margin px around what is hidden in which a pattern is sought
 void addLattice(const cv::Mat& look, int margin, PlanePart& part);
+
+// Charts a plane's part anew, with its look, so that its stripes lie along the rows: what goes on
+// in them is copied along them. @return false: it has none, nothing is changed
+bool turnAlongStripes(const cv::Mat& look, HiddenPlane& plane);
 
 }  // namespace calipso::render

@@ -16,6 +16,7 @@
 #include "fill/line_ends.hpp"
 #include "fill/patch_cost.hpp"
 #include "fill/patch_fill.hpp"
+#include "fill/pattern.hpp"
 #include "fill/plane_pattern.hpp"
 #include "fill/seam_blend.hpp"
 #include "fill/seam_cut.hpp"
@@ -29,6 +30,7 @@ constexpr int kFarMargin = 216;     // ... that alone can tell a plane
 constexpr float kRounded =
     1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
 constexpr float kAwayOnPlane = 3.0f;  // InpaintParams::away_row there: its rows are no layers
+constexpr float kAwayFromStripe = 300.0f, kAwayAlongStripe = 4.0f;  // ... where they are stripes
 constexpr float kFarther = 2000.0f;   // InpaintParams::away_farther along a plane
 constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
 constexpr int kNearEdges = 64;  // px around the hole in which edges between surfaces are sought
@@ -96,16 +98,17 @@ void leaveOut(const cv::Mat& lines, cv::Mat& source) {
 // @param look is filled
 // @param known CV_8UC1: what the filling has to go with; source, of it: what may be copied
 Filling fill(const std::vector<cv::Vec4f>& edges, cv::Mat look, cv::Mat to_fill, cv::Mat source,
-             cv::Mat known, const Lattice* lattice, InpaintParams params) {
+             cv::Mat known, const Pattern& pattern, InpaintParams params) {
   const cv::Mat whole_hole = to_fill.clone();
-  const cv::Mat lone = lattice == nullptr ? loneLines(edges, source, look) : cv::Mat();
-  const LineBridges bridges = bridgeLines(edges, to_fill, source, params.surface, look, lattice);
+  const cv::Mat lone = !pattern.lattice ? loneLines(edges, source, look) : cv::Mat();
+  const LineBridges bridges = bridgeLines(edges, to_fill, source, params.surface, look,
+                                          pattern.lattice ? &*pattern.lattice : nullptr);
   to_fill.setTo(0, bridges.core);
   known |= bridges.core;
   source.setTo(0, bridges.lines);
   if (!lone.empty()) leaveOut(lone, source);
   if (!params.sky.empty()) params.sky = hiddenSky(copiedSky(params.sky, bridges.origin));
-  Filling f{look, patchOrigins(look, to_fill, source, lattice, params)};
+  Filling f{look, patchOrigins(look, to_fill, source, pattern, params)};
   cutSeams(look, to_fill, source, known, params, f.origin);
   const cv::Mat without = to_fill & (copyFrom(f.origin, look, f.image) == 0);
   if (cv::countNonZero(without) > 0) smoothFill(look, to_fill, known).copyTo(f.image, without);
@@ -135,7 +138,6 @@ struct Canvas {
 // @param wanted CV_8UC1, of the chart
 void copyBack(const PlanePart& part, const Filling& filled, const cv::Mat& wanted,
               const cv::Mat& hole, Canvas& canvas) {
-  const std::optional<Lattice>& lattice = part.lattice;
   const cv::Mat spline = splineOf(part.plain);
   const cv::Rect all({0, 0}, part.look.size());
 #pragma omp parallel for schedule(dynamic, 8)
@@ -148,8 +150,8 @@ void copyBack(const PlanePart& part, const Filling& filled, const cv::Mat& wante
       if (filled.origin.at<cv::Vec2s>(nearest)[0] < 0) continue;
       const cv::Vec2s& o = filled.origin.at<cv::Vec2s>(nearest);
       cv::Point2f shift(cv::Point(o[0], o[1]) - nearest);
-      if (lattice && cv::norm(lattice->nearest(shift) - shift) < kRounded)
-        shift = lattice->nearest(shift);
+      const auto whole = part.pattern.nearest(nearest.y, shift);
+      if (whole && cv::norm(*whole - shift) < kRounded) shift = *whole;
       const cv::Point2d from = taken(part.chart.to_picture, at.x + shift.x, at.y + shift.y);
       const cv::Vec3f evened =
           filled.image.at<cv::Vec3f>(nearest) - part.look.at<cv::Vec3f>(o[1], o[0]);
@@ -166,8 +168,9 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
   inner.surface = inner.sky = cv::Mat();
   inner.nearness = part.chart.carried(nearnessOf(plane.to_plane, plane.hole.size())),
   inner.away_farther = kFarther;
-  const Lattice* lattice = part.lattice ? &*part.lattice : nullptr;
+  const std::optional<Lattice>& lattice = part.pattern.lattice;
   inner.away_row = kAwayOnPlane;
+  if (part.pattern.striped) inner.away_row = kAwayFromStripe, inner.away_column = kAwayAlongStripe;
   if (lattice) {
     // A pattern is alike all over; its light is that of the next places.
     inner.away_column = inner.away_row = params.away_row;
@@ -182,7 +185,7 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
               : part.hole;
   copyBack(part,
            fill(part.edges, part.look, part.hole.clone(), part.source.clone(), part.known.clone(),
-                lattice, inner),
+                part.pattern, inner),
            wanted, plane.hole, canvas);
 }
 
@@ -218,11 +221,12 @@ void lookAround(std::vector<HiddenPlane>& planes, Canvas& canvas) {
     lattices.push_back(
         [&] { addLattice(canvas.look, plane.known ? kLatticeMargin : kFarMargin, *plane.part); });
     if (!plane.known) continue;
-    (anyway ? looks : later).push_back([&, anyway] {
-      if (anyway || plane.part->lattice)
-        addLook(canvas.look, plane.seen, *plane.part);
-      else
-        plane.part.reset();
+    if (anyway) looks.push_back([&] { addLook(canvas.look, plane.seen, *plane.part); });
+    later.push_back([&, anyway] {
+      const bool repeats = plane.part->pattern.lattice.has_value();
+      if (!repeats && turnAlongStripes(canvas.look, plane)) return;
+      if (!anyway && repeats) addLook(canvas.look, plane.seen, *plane.part);
+      if (!anyway && !repeats) plane.part.reset();
     });
     if (anyway) rest.setTo(0, plane.hole);
   }
@@ -238,10 +242,10 @@ bool followPatterns(const std::vector<HiddenPlane>& planes, const Canvas& canvas
                     InpaintParams& params) {
   bool more = false;
   for (const HiddenPlane& plane : planes) {
-    if (!plane.supports || !plane.part || !plane.part->lattice) continue;
-    more |=
-        followPattern({plane.label, plane.to_plane, *plane.part->lattice, plane.hole, plane.seen},
-                      {canvas.look, canvas.hole, canvas.source}, kFewestOnPlane, params);
+    if (!plane.supports || !plane.part || !plane.part->pattern.lattice) continue;
+    more |= followPattern(
+        {plane.label, plane.to_plane, *plane.part->pattern.lattice, plane.hole, plane.seen},
+        {canvas.look, canvas.hole, canvas.source}, kFewestOnPlane, params);
   }
   return more;
 }
@@ -303,9 +307,9 @@ void fillRest(const InpaintParams& params, Canvas& canvas) {
   const cv::Mat hole = canvas.hole(window), trend = supportsTrend(params, canvas)(window);
   InpaintParams here = params;
   if (!params.sky.empty()) here.sky = copiedSky(params.sky, canvas.origin);
-  Filling rest = fill(edgesIn(window, canvas), canvas.look(window) - trend, hole.clone(),
-                      canvas.source(window).clone(), canvas.known(window).clone(), nullptr,
-                      within(window, here));
+  Filling rest =
+      fill(edgesIn(window, canvas), canvas.look(window) - trend, hole.clone(),
+           canvas.source(window).clone(), canvas.known(window).clone(), {}, within(window, here));
   rest.image += trend;
   rest.image.copyTo(canvas.look(window), hole);
   cv::Mat lift = canvas.lift(window);

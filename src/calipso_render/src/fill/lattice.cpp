@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "fill/levelled.hpp"
 #include "place/masked_quantile.hpp"
 
 namespace calipso::render {
@@ -36,12 +37,10 @@ struct Peak {
   float correlation;
 };
 
-cv::Mat levelled(const cv::Mat& image, const cv::Mat& weight) {
-  cv::Mat grey, sum, weights;
+cv::Mat patternOf(const cv::Mat& image, const cv::Mat& known) {
+  cv::Mat grey;
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  cv::GaussianBlur(grey.mul(weight), sum, {0, 0}, kLevel);
-  cv::GaussianBlur(weight, weights, {0, 0}, kLevel);
-  return (grey - sum / cv::max(weights, 1e-3)).mul(weight);
+  return levelled(grey, known, kLevel);
 }
 
 // Normalised correlation of a picture and itself shifted by up to kFarthest px, right or left and
@@ -51,7 +50,7 @@ class Correlation {
   Correlation(const cv::Mat& image, const cv::Mat& known) {
     cv::Mat weight;
     cv::Mat(known != 0).convertTo(weight, CV_32F, 1.0 / 255.0);
-    const cv::Mat flat = levelled(image, weight);
+    const cv::Mat flat = patternOf(image, known);
     const cv::Size padded(cv::getOptimalDFTSize(image.cols + kFarthest),
                           cv::getOptimalDFTSize(image.rows + kFarthest));
     const cv::Mat f = transformed(flat, padded), f2 = transformed(flat.mul(flat), padded),
@@ -266,9 +265,8 @@ cv::Mat repeatsBy(const Lattice& lattice, const cv::Mat& image, const cv::Mat& k
 }
 
 cv::Mat asLively(const cv::Mat& image, const cv::Mat& known, const cv::Mat& sample) {
-  cv::Mat weight, spread;
-  known.convertTo(weight, CV_32F, 1.0 / 255.0);
-  cv::GaussianBlur(cv::abs(levelled(image, weight)), spread, {0, 0}, kLevel);
+  cv::Mat spread;
+  cv::GaussianBlur(cv::abs(patternOf(image, known)), spread, {0, 0}, kLevel);
   return spread > kAsLively * quantileOf(spread, sample, 0.5);
 }
 

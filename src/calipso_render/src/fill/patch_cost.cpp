@@ -12,17 +12,18 @@ constexpr float kNearer = 2.5f;  // times that a source may be nearer or farther
 // cost of one that does not, squared code values: such are taken for want of others only
 constexpr float kMisplaced = 2000.0f;
 constexpr float kAsNear = 1.02f;  // times that a place may be nearer than a source as near as it
-constexpr float kOffLattice = 0.75f;  // px by which a copy's way may miss the lattice
+constexpr float kOffPattern = 0.75f;  // px by which a copy's way may miss the pattern
 
 }  // namespace
 
-PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
+PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const Pattern& pattern,
                      const InpaintParams& params)
     : columns_(level.hole.cols),
       places_(level.hole.total()),
       scale_(scale),
       horizon_(horizon),
-      lattice_(lattice),
+      pattern_(&pattern),
+      repeats_(pattern.lattice || !pattern.periods.empty()),
       away_row_(params.away_row),
       away_column_(params.away_column),
       away_farther_(params.away_farther) {
@@ -65,10 +66,10 @@ float PatchCost::partialDistance(const cv::Mat& image, const cv::Point& p, const
   return part * sums.sum() + away;
 }
 
-cv::Point PatchCost::onLattice(const cv::Point& p, const cv::Point& q) const {
-  if (lattice_ == nullptr) return q;
-  const cv::Point2f whole = lattice_->nearest(scale_ * cv::Point2f(q - p));
-  return p + cv::Point(cvRound(whole.x / scale_), cvRound(whole.y / scale_));
+cv::Point PatchCost::onPattern(const cv::Point& p, const cv::Point& q) const {
+  if (!repeats_) return q;
+  const auto whole = pattern_->nearest(rowOf(p), scale_ * cv::Point2f(q - p));
+  return whole ? p + cv::Point(cvRound(whole->x / scale_), cvRound(whole->y / scale_)) : q;
 }
 
 // Places are layered: what is at another height is seldom the same, what is of another surface
@@ -83,14 +84,15 @@ inline float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
     cost += away_farther_ * (own.nearness / other.nearness - kAsNear);
   if (differ(own.surface, other.surface)) cost += kMisplaced;
   if (differ(own.sky, other.sky)) cost += kMisplaced;
-  if (lattice_ != nullptr && offLattice(q - p) > kOffLattice) cost += kMisplaced;
+  if (repeats_ && offPattern(p, q) > kOffPattern) cost += kMisplaced;
   return kPatchSide * kPatchSide * cost;
 }
 
-// px of this level by which a shift misses the lattice
-float PatchCost::offLattice(const cv::Point& shift) const {
-  const cv::Point2f fine = scale_ * cv::Point2f(shift);
-  return static_cast<float>(cv::norm(fine - lattice_->nearest(fine))) / scale_;
+// px of this level by which a shift misses the pattern
+float PatchCost::offPattern(const cv::Point& p, const cv::Point& q) const {
+  const cv::Point2f fine = scale_ * cv::Point2f(q - p);
+  const auto whole = pattern_->nearest(rowOf(p), fine);
+  return whole ? static_cast<float>(cv::norm(fine - *whole)) / scale_ : 0.0f;
 }
 
 }  // namespace calipso::render

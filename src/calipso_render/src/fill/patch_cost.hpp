@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "calipso_render/inpaint.hpp"
-#include "fill/lattice.hpp"
 #include "fill/patch_levels.hpp"
+#include "fill/pattern.hpp"
 
 namespace calipso::render {
 
@@ -27,8 +27,8 @@ class PatchCost {
  public:
   // @param scale   size of the level's pixels in those of the finest
   // @param horizon difference of nearness that does not count
-  // @param lattice by which the picture repeats itself, px of the finest level; may be nullptr
-  PatchCost(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
+  // @param pattern px of the finest level; must outlive this
+  PatchCost(const FillLevel& level, float scale, float horizon, const Pattern& pattern,
             const InpaintParams& params);
 
   // No less than `bound` if it is not below. @param image CV_32FC4
@@ -37,8 +37,8 @@ class PatchCost {
   float partialDistance(const cv::Mat& image, const cv::Point& p, const cv::Point& q,
                         const std::vector<int>& seen, float bound) const;
 
-  // The place nearest to q from which p can be copied by a shift of the lattice; q without one.
-  cv::Point onLattice(const cv::Point& p, const cv::Point& q) const;
+  // The place nearest to q from which p can be copied by a shift of the pattern; q without one.
+  cv::Point onPattern(const cv::Point& p, const cv::Point& q) const;
 
   // Label of the surface at a place; 0 unknown.
   int surfaceAt(const cv::Point& p) const { return at(p).surface; }
@@ -54,13 +54,16 @@ class PatchCost {
   };
 
   const Known& at(const cv::Point& p) const { return places_[p.y * columns_ + p.x]; }
+  // Of the finest level.
+  int rowOf(const cv::Point& p) const { return cvRound(scale_ * (p.y + 0.5f) - 0.5f); }
   inline float awayCost(const cv::Point& p, const cv::Point& q) const;
-  float offLattice(const cv::Point& shift) const;
+  float offPattern(const cv::Point& p, const cv::Point& q) const;
 
   int columns_;
   std::vector<Known> places_;
   float scale_, horizon_;
-  const Lattice* lattice_;
+  const Pattern* pattern_;
+  bool repeats_;                                 // the pattern knows any shifts
   float away_row_, away_column_, away_farther_;  // as InpaintParams'
 };
 

@@ -1,7 +1,6 @@
 #include "fill/patch_fill.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
@@ -12,6 +11,7 @@
 
 #include "fill/patch_cost.hpp"
 #include "fill/patch_levels.hpp"
+#include "fill/patch_sources.hpp"
 #include "fill/place_random.hpp"
 
 namespace calipso::render {
@@ -38,12 +38,14 @@ class Filling {
  public:
   // @param level its picture is filled
   // @param horizon difference of nearness that does not count
-  Filling(const FillLevel& level, float scale, float horizon, const Lattice* lattice,
+  Filling(const FillLevel& level, float scale, float horizon, const Pattern& pattern,
           const InpaintParams& params)
       : image_(level.image),
         hole_(level.hole),
+        sources_(level.source, level.surface),
         scale_(scale),
-        rules_(level, scale, horizon, lattice, params),
+        rules_(level, scale, horizon, pattern, params),
+        striped_(pattern.striped),
         params_(params),
         random_(params.seed, std::max({hole_.cols, hole_.rows, kFarthest})),
         to_(hole_.size(), CV_16SC2, cv::Scalar(-1, -1)),
@@ -52,9 +54,6 @@ class Filling {
         bands_((hole_.rows + kBandRows - 1) / kBandRows) {
     const cv::Mat patch = cv::Mat::ones(kPatchSide, kPatchSide, CV_8U);
     cv::Mat touched;
-    cv::erode(level.source, whole_, patch, {-1, -1}, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
-    cv::findNonZero(whole_, sources_);
-    for (const cv::Point& q : sources_) has_source_[rules_.surfaceAt(q)] = true;
     cv::dilate(hole_, touched, patch);
     for (int v = kPatchRadius; v + kPatchRadius < hole_.rows; ++v) {
       for (int u = kPatchRadius; u + kPatchRadius < hole_.cols; ++u) {
@@ -103,7 +102,7 @@ class Filling {
       const cv::Point q = p + 2 * (point(from) - c);
       for (int i = 0; i < 9 && !hasMatch(p); ++i) {
         const cv::Point near = i == 0 ? q : q + jitter(p, i, kFinest);
-        if (isWhole(near)) to_.at<cv::Vec2s>(p) = shorts(near);
+        if (sources_.contains(near)) to_.at<cv::Vec2s>(p) = shorts(near);
       }
     });
     if (scale_ > 1.0f)
@@ -123,9 +122,6 @@ class Filling {
       }
     }
     if (cv::countNonZero(misled) == 0) return;
-    for (const cv::Point& q : sources_) {
-      if (rules_.surfaceAt(q) != 0) of_surface_[rules_.surfaceAt(q)].push_back(q);
-    }
     along_surfaces_ = true;
     peel(misled);
     along_surfaces_ = false;
@@ -136,7 +132,7 @@ class Filling {
   float search(int reach) {
     std::vector<int> changes(bands_.size(), 0);
     forEachPatch([&](const cv::Point& p) {
-      if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(oneOf(sources_, p, 0));
+      if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(sources_.one(number(p, 0)));
       cost_.at<float>(p) = rules_.distance(image_, p, match(p), 1e30f);
       plain_.at<std::uint8_t>(p) = 255;
     });
@@ -207,17 +203,11 @@ class Filling {
   bool inside(const cv::Point& p) const {
     return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
   }
-  bool isWhole(const cv::Point& p) const { return inside(p) && whole_.at<std::uint8_t>(p) != 0; }
-  // Where a place may be copied from.
-  const std::vector<cv::Point>& sourcesOf(const cv::Point& p) const {
-    const std::vector<cv::Point>& own = of_surface_[rules_.surfaceAt(p)];
-    return along_surfaces_ && !own.empty() ? own : sources_;
-  }
-  cv::Point oneOf(const std::vector<cv::Point>& from, const cv::Point& p, int salt) const {
-    return from[random_.number(p, salt, sweep_) % static_cast<std::uint32_t>(from.size())];
+  std::uint32_t number(const cv::Point& p, int salt) const {
+    return random_.number(p, salt, sweep_);
   }
   bool isMisled(const cv::Point& p) const {
-    return hasMatch(p) && rules_.onOther(p, match(p)) && has_source_[rules_.surfaceAt(p)];
+    return hasMatch(p) && rules_.onOther(p, match(p)) && sources_.anyOn(rules_.surfaceAt(p));
   }
 
   // The nearest centre of a patch that lies within the picture.
@@ -244,7 +234,7 @@ class Filling {
       }
       for (int r = reach; r >= 1; r /= 2) {
         const cv::Point q = match(p) + jitter(p, r, r);
-        attempt(p, rules_.onLattice(p, q), kJump);
+        attempt(p, rules_.onPattern(p, q), kJump);
       }
       changed += match(p) != before;
     }
@@ -253,7 +243,7 @@ class Filling {
 
   // @param better how many times the cost must be lower
   void attempt(const cv::Point& p, const cv::Point& q, float better) {
-    if (!isWhole(q)) return;
+    if (!sources_.contains(q)) return;
     std::uint8_t& plain = plain_.at<std::uint8_t>(p);
     // Most neighbours lead to where a patch has been led already.
     if (q == match(p) && (plain != 0 || better > 1.0f)) return;
@@ -273,19 +263,26 @@ class Filling {
   };
 
   void attempt(const cv::Point& p, cv::Point q, Guess& guess) const {
-    q = rules_.onLattice(p, q);
-    const float cost =
-        isWhole(q) ? rules_.partialDistance(image_, p, q, guess.seen, guess.least) : guess.least;
+    q = rules_.onPattern(p, q);
+    const float cost = sources_.contains(q)
+                           ? rules_.partialDistance(image_, p, q, guess.seen, guess.least)
+                           : guess.least;
     if (cost < guess.least) guess.least = cost, guess.best = q;
+  }
+
+  // A place to copy from. What goes on in stripes is sought along them every other time.
+  cv::Point somewhere(const cv::Point& p, int salt) const {
+    const std::uint32_t any = number(p, salt);
+    if (along_surfaces_) return sources_.oneOn(rules_.surfaceAt(p), any);
+    return striped_ && salt % 2 == 1 ? sources_.oneInRow(p.y, any) : sources_.one(any);
   }
 
   // Among places all over the picture.
   Guess firstGuess(const cv::Point& p, const cv::Mat& known) const {
-    const std::vector<cv::Point>& from = sourcesOf(p);
-    Guess guess{knownAround(p, known), oneOf(from, p, 0), 0.0f, {}};
+    Guess guess{knownAround(p, known), somewhere(p, 0), 0.0f, {}};
     guess.least = rules_.partialDistance(image_, p, guess.best, guess.seen, 1e30f);
     const int guesses = along_surfaces_ ? kGuessesAnew : kFirstGuesses;
-    for (int i = 1; i < guesses; ++i) attempt(p, oneOf(from, p, i), guess);
+    for (int i = 1; i < guesses; ++i) attempt(p, somewhere(p, i), guess);
     return guess;
   }
 
@@ -348,18 +345,17 @@ class Filling {
     return random_.offset(p, salt, sweep_, reach);
   }
 
-  cv::Mat image_, hole_, whole_;  // whole_ CV_8UC1: all of the patch around it may be copied
-  float scale_;                   // size of these pixels in the finest level's
+  cv::Mat image_, hole_;
+  PatchSources sources_;
+  float scale_;  // size of these pixels in the finest level's
   PatchCost rules_;
+  bool striped_;
   InpaintParams params_;
   PlaceRandom random_;
   cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
   cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
-  std::vector<cv::Point> sources_;
-  std::array<bool, 256> has_source_{};                  // by surface, and once they matter
-  std::array<std::vector<cv::Point>, 256> of_surface_;  // those on each
-  bool along_surfaces_ = false;                         // a place's first guesses lie on its own
+  bool along_surfaces_ = false;                // a place's first guesses lie on its own surface
   int sweep_ = 0;
 };
 
@@ -375,16 +371,16 @@ void settle(Filling& filling, int rounds, int reach) {
 }  // namespace
 
 cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
-                     const Lattice* lattice, const InpaintParams& params) {
+                     const Pattern& pattern, const InpaintParams& params) {
   const std::vector<FillLevel> levels = fillLevels(image, hole, source, params);
   const float horizon = params.nearness.empty() ? 0.0f : kHorizon * nearnessPerRow(params.nearness);
   const int coarsest = static_cast<int>(levels.size()) - 1;
-  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, lattice, params);
+  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, pattern, params);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   filling.peel();
   settle(filling, params.coarsest_rounds, std::max(hole.cols, hole.rows) >> coarsest);
   for (int k = coarsest - 1; k >= 0; --k) {
-    Filling finer(levels[k], static_cast<float>(1 << k), horizon, lattice, params);
+    Filling finer(levels[k], static_cast<float>(1 << k), horizon, pattern, params);
     finer.startFrom(filling);
     finer.peelMisled();
     if (k > 0)

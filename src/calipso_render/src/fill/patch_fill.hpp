@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 
 #include "calipso_render/inpaint.hpp"
-#include "fill/lattice.hpp"
+#include "fill/pattern.hpp"
 
 namespace calipso::render {
 
@@ -14,10 +14,10 @@ namespace calipso::render {
 // there is no vote: what is copied keeps its grain. Does not depend on the number of threads.
 // @param image CV_32FC3, code values
 // @param hole, source CV_8UC1: to be filled; may be copied from
-// @param lattice by which the picture repeats itself: copies are shifted by it; may be nullptr
+// @param pattern copies are shifted by it
 // @return CV_16SC2: (u, v); (-1, -1) outside the hole, and everywhere if no patch lies in the
 //   source
 cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
-                     const Lattice* lattice, const InpaintParams& params);
+                     const Pattern& pattern, const InpaintParams& params);
 
 }  // namespace calipso::render

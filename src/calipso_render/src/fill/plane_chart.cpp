@@ -28,6 +28,12 @@ cv::Matx33d keeping(const cv::Matx33d& to_plane, const cv::Point2d& c) {
   return {A(0, 0), A(0, 1), b[0], A(1, 0), A(1, 1), b[1], 0.0, 0.0, 1.0};
 }
 
+// About a place.
+cv::Matx33d turn(double angle, const cv::Point2d& c) {
+  const double a = std::cos(angle), b = std::sin(angle);
+  return {a, -b, c.x - a * c.x + b * c.y, b, a, c.y - b * c.x - a * c.y, 0.0, 0.0, 1.0};
+}
+
 double nearnessAt(const cv::Matx33d& to_plane, const cv::Point& p) {
   return to_plane(2, 0) * p.x + to_plane(2, 1) * p.y + to_plane(2, 2);
 }
@@ -35,7 +41,7 @@ double nearnessAt(const cv::Matx33d& to_plane, const cv::Point& p) {
 }  // namespace
 
 std::optional<PlaneChart> planeChart(const cv::Matx33d& to_plane, const cv::Mat& hole,
-                                     const cv::Mat& seen) {
+                                     const cv::Mat& seen, double direction) {
   std::vector<cv::Point> inside, around;
   cv::findNonZero(hole, inside);
   cv::findNonZero(hole | seen, around);
@@ -52,7 +58,8 @@ std::optional<PlaneChart> planeChart(const cv::Matx33d& to_plane, const cv::Mat&
   PlaneChart chart;
   chart.tilted = nearest > kTilted * farthest;
   const cv::Matx33d whole =
-      chart.tilted ? keeping(to_plane, middle) * to_plane : cv::Matx33d::eye();
+      turn(-direction, middle) *
+      (chart.tilted ? keeping(to_plane, middle) * to_plane : cv::Matx33d::eye());
   cv::Point2d least(1e9, 1e9), most(-1e9, -1e9);
   for (const cv::Point& p : around) {
     const double near = nearnessAt(to_plane, p);

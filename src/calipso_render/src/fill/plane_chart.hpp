@@ -26,8 +26,9 @@ struct PlaneChart {
 // The chart of the plane around a hole in it. Nothing if the plane is seen from behind.
 // @param to_plane the homography from pixels to the plane's coordinates, the third one its nearness
 // @param hole, seen CV_8UC1: where the plane is to be filled; where it is seen
+// @param direction radians from the chart's rows: what leads so shall lie along them
 std::optional<PlaneChart> planeChart(const cv::Matx33d& to_plane, const cv::Mat& hole,
-                                     const cv::Mat& seen);
+                                     const cv::Mat& seen, double direction = 0.0);
 
 // Where a homography takes a pixel.
 inline cv::Point2d taken(const cv::Matx33d& H, double u, double v) {
