@@ -12,10 +12,11 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kShrink = 2;  // times by which the picture in which they are sought is smaller
+constexpr int kShrink = 3;   // times by which the picture in which they are sought is smaller
+constexpr int kSampled = 3;  // every so many px, for the light
 constexpr int kDirections = 72;
 constexpr double kFinest = 0.1 * CV_PI / 180.0;  // between directions, at last
-constexpr int kShortest = 40;       // px, halved, of a line on either side to be compared
+constexpr int kShortest = 27;       // px, shrunk, of a line on either side to be compared
 constexpr double kCompared = 0.25;  // of what is known that must lie on such lines
 constexpr double kExplained = 0.3;  // of how colours vary, by the line that they lie on
 constexpr double kAlike = 0.85;     // correlation of both sides' lines
@@ -77,6 +78,15 @@ class Sides {
   double variance_ = 0.0;
 };
 
+// How colours change slowly, told by a sample of the pixels.
+cv::Mat lightOf(const cv::Mat& image, const cv::Mat& known) {
+  cv::Mat sample, known_sample, light;
+  cv::resize(image, sample, {}, 1.0 / kSampled, 1.0 / kSampled, cv::INTER_NEAREST);
+  cv::resize(known, known_sample, sample.size(), 0, 0, cv::INTER_NEAREST);
+  cv::resize(colourTrend(sample, known_sample), light, image.size(), 0, 0, cv::INTER_LINEAR);
+  return light;
+}
+
 }  // namespace
 
 std::optional<double> stripesAcross(const cv::Mat& image, const cv::Mat& hole,
@@ -90,7 +100,7 @@ std::optional<double> stripesAcross(const cv::Mat& image, const cv::Mat& hole,
   cv::resize(known, small_known, half, 0, 0, cv::INTER_NEAREST);
   const cv::Point2f middle(static_cast<float>(m.m10 / m.m00 / kShrink),
                            static_cast<float>(m.m01 / m.m00 / kShrink));
-  small -= colourTrend(small, small_known);  // light makes no stripes
+  small -= lightOf(small, small_known);  // it makes no stripes
   const Sides sides(levelled(small, small_known, kStripesLevel / kShrink), middle, small_known);
   double best = 0.0;
   Likeness most;
