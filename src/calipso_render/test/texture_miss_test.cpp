@@ -29,7 +29,10 @@ cv::Vec3f patternAt(const Eigen::Vector3f& x, float waves) {
 }
 
 // The ball turned a little from view to view.
-std::vector<View> patternedViews(const Surface& surface, float waves, float noise) {
+// @param off m by which the pictures' patterns are beside their poses, to either side in turn; then
+//   half of the ball is plain
+std::vector<View> patternedViews(const Surface& surface, float waves, float noise,
+                                 float off = 0.0f) {
   std::vector<View> views;
   cv::RNG random(5);
   for (int i = 0; i < kViews; ++i) {
@@ -44,10 +47,13 @@ std::vector<View> patternedViews(const Surface& surface, float waves, float nois
         makeActor(surface, transformed(surface.object_vertices, turn), view.camera));
     forEachPixelOf(view.actors.front(), [&](int u, int v, const SurfacePoint& p) {
       const cv::Vec3f shade = diffuseShading(evenLight(), p.normal, 1.0f, p.seen, {});
-      const Eigen::Vector3f own = (turn.inverse() * p.position.cast<double>()).cast<float>();
+      Eigen::Vector3f own = (turn.inverse() * p.position.cast<double>()).cast<float>();
+      own.x() += i % 2 == 0 ? off : -off;
+      const bool plain = off > 0.0f && own.z() < 0.0f;
+      const cv::Vec3f albedo = plain ? cv::Vec3f::all(0.35f) : patternAt(own, waves);
       for (int c = 0; c < 3; ++c)
-        view.picture.at<cv::Vec3f>(v, u)[c] = codeFromLinear(patternAt(own, waves)[c] * shade[c]) +
-                                              static_cast<float>(random.gaussian(noise));
+        view.picture.at<cv::Vec3f>(v, u)[c] =
+            codeFromLinear(albedo[c] * shade[c]) + static_cast<float>(random.gaussian(noise));
       view.labels.at<std::uint8_t>(v, u) = kBallLabel;
     });
     views.push_back(std::move(view));
@@ -93,6 +99,13 @@ TEST(TextureMiss, GrainIsWhatPixelsDeviateByThemselves) {
   const float found = grain(3.0f);
   EXPECT_GT(found, 2.2f);
   EXPECT_LT(found, 3.3f);
+}
+
+TEST(TextureMiss, MarksBesideTheirPlaceAreNoGrain) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  // Waves seven pixels long, a pixel beside their place.
+  const std::vector<View> views = patternedViews(surface, kFine, 0.0f, 0.0045f);
+  EXPECT_LT(makeAppearances(views, {true}, evenLight(), {Gloss()}).front().grain, 0.5f);
 }
 
 // From one picture nothing can be told.

@@ -12,7 +12,10 @@ namespace {
 
 constexpr float kCertain = 0.9f;      // trust, and clearness, of pixels that grain is measured at
 constexpr std::size_t kFewest = 500;  // of them
-constexpr float kLeast = 1e-4f;       // reflectance that is told from none
+constexpr int kAround = 5;            // px of the square in which the texture's own change counts
+// of them, where it changes least: beside its marks a pose that is a little off makes a difference
+constexpr double kPlainest = 0.05;
+constexpr float kLeast = 1e-4f;  // reflectance that is told from none
 
 // The picture's reflectance as the texture has it. CV_32FC4, the picture's own beside the object.
 cv::Mat drawnInto(const Reflectance& picture, const Actor& actor, const SurfaceTexture& texture) {
@@ -51,18 +54,27 @@ cv::Mat missedCodes(const Reflectance& picture, const cv::Mat& drawn, cv::Mat& c
   return missed;
 }
 
-// Sizes of what that has of the finest detail.
-std::vector<float> detailsOf(const Reflectance& picture, const cv::Mat& drawn) {
-  cv::Mat certain, detail;
+// What a picture has of the finest detail beyond a drawn reflectance, and how far that itself changes
+// around, code values.
+struct Detail {
+  cv::Vec3f missed;
+  float around;
+};
+
+std::vector<Detail> detailsOf(const Reflectance& picture, const cv::Mat& drawn) {
+  cv::Mat certain, detail, change, channels[3];
   const cv::Mat missed = missedCodes(picture, drawn, certain);
   cv::filter2D(missed, detail, CV_32F, noiseMask());
-  cv::erode(certain, certain, cv::Mat::ones(3, 3, CV_8U));
-  std::vector<float> details;
+  cv::morphologyEx(picture.codes - missed, change, cv::MORPH_GRADIENT,
+                   cv::Mat::ones(kAround, kAround, CV_8U));
+  cv::split(change, channels);
+  change = cv::max(cv::max(channels[0], channels[1]), channels[2]);
+  cv::erode(certain, certain, cv::Mat::ones(kAround, kAround, CV_8U));
+  std::vector<Detail> details;
   for (int v = 0; v < detail.rows; ++v) {
     for (int u = 0; u < detail.cols; ++u) {
-      if (certain.at<std::uint8_t>(v, u) == 0) continue;
-      const cv::Vec3f& d = detail.at<cv::Vec3f>(v, u);
-      details.insert(details.end(), {std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
+      if (certain.at<std::uint8_t>(v, u) != 0)
+        details.push_back({detail.at<cv::Vec3f>(v, u), change.at<float>(v, u)});
     }
   }
   return details;
@@ -86,18 +98,28 @@ cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor&
 }
 
 float grainOf(const SeenObject& object, const SurfaceTexture& texture) {
-  std::vector<std::vector<float>> of_view(object.views.size());
+  std::vector<std::vector<Detail>> of_view(object.views.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t i = 0; i < object.views.size(); ++i) {
     const Reflectance& picture = object.pictures[i];
     of_view[i] = detailsOf(picture, drawnInto(picture, *object.actors[i], texture));
   }
-  std::vector<float> details;
-  for (const std::vector<float>& own : of_view)
+  std::vector<Detail> details;
+  for (const std::vector<Detail>& own : of_view)
     details.insert(details.end(), own.begin(), own.end());
-  if (details.size() < 3 * kFewest) return 0.0f;
-  const auto middle = details.begin() + static_cast<std::ptrdiff_t>(details.size() / 2);
-  std::nth_element(details.begin(), middle, details.end());
+  if (details.size() < kFewest) return 0.0f;
+  const std::size_t plain =
+      std::max(kFewest, static_cast<std::size_t>(kPlainest * static_cast<double>(details.size())));
+  const auto last = details.begin() + static_cast<std::ptrdiff_t>(plain - 1);
+  std::nth_element(details.begin(), last, details.end(),
+                   [](const Detail& a, const Detail& b) { return a.around < b.around; });
+  details.resize(plain);
+  std::vector<float> sizes;
+  for (const Detail& d : details) {
+    for (int c = 0; c < 3; ++c) sizes.push_back(std::abs(d.missed[c]));
+  }
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
   return kMedianToSigma / kNoiseMaskGain * *middle;
 }
 

@@ -17,7 +17,7 @@ cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor&
 
 // Deviation of pixels from the texture by themselves, code values, mean of the channels: the
 // camera's noise and what the surface has of its own, which goes lost in a mean of pictures. By the
-// median, which edges do not move; 0 when too little is seen.
+// median of where the texture is plainest; 0 when too little is seen.
 float grainOf(const SeenObject& object, const SurfaceTexture& texture);
 
 }  // namespace calipso::render
