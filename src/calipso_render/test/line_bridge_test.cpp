@@ -64,6 +64,27 @@ TEST(BridgeLines, ConnectALineThatIsSeenFromAfar) {
   EXPECT_NE(b.core.at<std::uint8_t>(96, 150), 0);
 }
 
+// A ledge, its dark groove and the board below: the ledge's upper edge, near the groove, is no line
+// of its own.
+TEST(BridgeLines, TakeAlongWhatRunsBesideALine) {
+  Lines l;
+  const auto band = [&](float top, float bottom, float colour) {
+    l.image.forEach<cv::Vec3f>([&](cv::Vec3f& c, const int* at) {
+      const float v = static_cast<float>(at[0]) - 0.02f * static_cast<float>(at[1]);
+      const float covered = std::clamp(v - top, 0.0f, 1.0f) * std::clamp(bottom - v, 0.0f, 1.0f);
+      c += covered * (cv::Vec3f::all(colour) - c);
+    });
+  };
+  band(80.0f, 91.0f, 195.0f), band(90.0f, 93.0f, 80.0f), band(92.0f, 120.0f, 180.0f);
+  const LineBridges b = l.bridge();
+  for (int u = 115; u < 205; u += 10) {
+    const int top = cvRound(80.0f + 0.02f * static_cast<float>(u));
+    EXPECT_NE(b.core.at<std::uint8_t>(top, u), 0) << u;
+  }
+  // Grain and a tenth of a pixel at edges of 60.
+  EXPECT_LT(meanDifference(l.image, l.truth, b.core), 6.0);
+}
+
 // What is hidden where a line ends at the hole has nothing to say about it.
 TEST(BridgeLines, DrawNothingThatIsHidden) {
   for (const int v : {70, 80, 90, 100}) {

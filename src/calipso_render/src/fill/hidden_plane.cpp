@@ -66,19 +66,21 @@ void addLattice(const cv::Mat& look, int margin, PlanePart& part) {
 }
 
 bool turnAlongStripes(const cv::Mat& look, HiddenPlane& plane) {
-  const auto direction =
-      stripesAcross(plane.part->chart.carried(look), plane.part->hole, plane.part->source);
-  if (!direction) return false;
   PlanePart& part = *plane.part;
+  const auto direction = stripesAcross(part.look.empty() ? part.chart.carried(look) : part.look,
+                                       part.hole, part.source);
+  if (!direction) return false;
   part = partOf(*planeChart(plane.to_plane, plane.hole, plane.seen, *direction), plane.hole,
                 plane.seen, plane.beside);
   addLook(look, plane.seen, part);
-  const auto leads_off = [](const cv::Vec4f& e) {
-    return std::abs(e[3] - e[1]) > kAlongRow * std::abs(e[2] - e[0]);
-  };
-  part.edges.erase(std::remove_if(part.edges.begin(), part.edges.end(), leads_off),
-                   part.edges.end());
   part.pattern.striped = true, part.pattern.periods = rowPeriods(part.look, part.source);
+  // The edges of what repeats itself end where it does, and what leads across stripes is a mark too.
+  const auto is_mark = [&](const cv::Vec4f& e) {
+    const int row = std::clamp(cvRound(0.5f * (e[1] + e[3])), 0, part.look.rows - 1);
+    return part.pattern.periods[row] > 0.0f ||
+           std::abs(e[3] - e[1]) > kAlongRow * std::abs(e[2] - e[0]);
+  };
+  part.edges.erase(std::remove_if(part.edges.begin(), part.edges.end(), is_mark), part.edges.end());
   return true;
 }
 

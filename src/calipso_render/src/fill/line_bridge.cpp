@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "fill/line_band.hpp"
 #include "fill/line_ends.hpp"
 
 namespace calipso::render {
@@ -22,10 +23,10 @@ constexpr float kAlike = 0.4f;        // difference of colours across, to their 
 constexpr float kBesideAlike = 0.5f;  // the same of what is beside it
 constexpr float kInHole = 0.7f;       // part of a connection that the hole hides
 constexpr float kLongest = 40.0f;     // px of a line that are mirrored
-constexpr float kNear = 4.0f;         // px on either side that its colours reach
 constexpr float kCore = 1.5f;         // px on either side that are the line itself
 constexpr float kAlone = 1.0f;        // the same of one that passes before different things
-constexpr float kCrossFade = 4.0f;    // px on either side of the middle
+constexpr LineBand kOwn{kLineHalf, kLineHalf};  // of a line by itself
+constexpr float kCrossFade = 4.0f;              // px on either side of the middle
 // px on either side of an edge between two surfaces by which their labels may be off
 constexpr int kOffBorder = 6;
 constexpr int kBesideEnd = 3;    // px by which one of its ends may have been found beside it
@@ -34,7 +35,7 @@ constexpr float kParted = 0.7f;  // part of the way on which such an edge parts 
 struct Bridge {
   const LineEnd *from, *to;  // to: nothing if it ends at another bridge
   float gap, cost;
-  float half;  // px on either side that are drawn
+  LineBand band;
 };
 
 class Bridger {
@@ -56,13 +57,16 @@ class Bridger {
                   ends_.end());
     }
     std::vector<Bridge> bridges = connections(&Bridger::connection);
+    for (Bridge& b : bridges) {
+      if (b.band.left > kAlone) b.band = bandAlong(*b.from, *b.to, source_, image_);
+    }
     const std::size_t through = bridges.size();
     for (const LineEnd& end : ends_) {
       if (std::any_of(bridges.begin(), bridges.begin() + through,
                       [&](const Bridge& b) { return b.from == &end || b.to == &end; }))
         continue;
       if (const auto gap = wayTo(end, bridges, through))
-        bridges.push_back({&end, nullptr, *gap, 0.0f, kLineHalf});
+        bridges.push_back({&end, nullptr, *gap, 0.0f, kOwn});
     }
     // What is led to another line comes before it, which goes through its end; what is weaker comes
     // first.
@@ -112,11 +116,12 @@ class Bridger {
     if (!areInLine(a, b, gap)) return std::nullopt;
     if (besideAlike(a, b)) {
       if (const auto cost = misfit(a, b, gap, differenceAcross(a, b)))
-        return Bridge{&a, &b, gap, *cost, kLineHalf};
+        return Bridge{&a, &b, gap, *cost, kOwn};
     }
     if (!a.isThin() || !b.isThin()) return std::nullopt;
     const auto alone = misfit(a, b, gap, differenceAlone(a, b));
-    return alone ? std::optional<Bridge>({&a, &b, gap, 1.0f + *alone, kAlone}) : std::nullopt;
+    return alone ? std::optional<Bridge>({&a, &b, gap, 1.0f + *alone, {kAlone, kAlone}})
+                 : std::nullopt;
   }
 
   // Of two surfaces: one side of them is alike.
@@ -124,7 +129,7 @@ class Bridger {
     if (!areInLine(a, b, gap)) return std::nullopt;
     const auto cost = misfit(a, b, gap, differenceOfSides(a, b));
     if (!cost) return std::nullopt;
-    const Bridge bridge{&a, &b, gap, *cost, kLineHalf};
+    const Bridge bridge{&a, &b, gap, *cost, kOwn};
     return partsSurfaces(bridge) ? std::optional<Bridge>(bridge) : std::nullopt;
   }
 
@@ -326,10 +331,11 @@ class Bridger {
                           b.to != nullptr ? cv::Point2f((b.to->at - start) / b.gap) : b.from->into,
                       stop = start + b.gap * along;
     const cv::Rect all(0, 0, hole_.cols, hole_.rows);
-    const cv::Rect box = cv::Rect(cv::Point(cvFloor(std::min(start.x, stop.x)) - kLineHalf,
-                                            cvFloor(std::min(start.y, stop.y)) - kLineHalf),
-                                  cv::Point(cvCeil(std::max(start.x, stop.x)) + kLineHalf + 1,
-                                            cvCeil(std::max(start.y, stop.y)) + kLineHalf + 1)) &
+    const int wide = cvCeil(std::max({b.band.left, b.band.right, 1.0f * kLineHalf}));
+    const cv::Rect box = cv::Rect(cv::Point(cvFloor(std::min(start.x, stop.x)) - wide,
+                                            cvFloor(std::min(start.y, stop.y)) - wide),
+                                  cv::Point(cvCeil(std::max(start.x, stop.x)) + wide + 1,
+                                            cvCeil(std::max(start.y, stop.y)) + wide + 1)) &
                          all;
     for (int v = box.y; v < box.br().y; ++v) {
       for (int u = box.x; u < box.br().x; ++u) {
@@ -338,7 +344,7 @@ class Bridger {
         const float t = d.dot(along), s = d.dot(leftOf(along));
         if (result_.drawn.at<std::uint8_t>(v, u) != 0 && std::abs(s) > kCore) continue;
         const float beyond = b.to != nullptr ? kLineHalf : 0.0f;
-        if (std::abs(s) <= b.half && t >= -kLineHalf && t <= b.gap + beyond)
+        if (s <= b.band.left && s >= -b.band.right && t >= -kLineHalf && t <= b.gap + beyond)
           drawPixel(b, known, {u, v}, std::clamp(t, 0.0f, b.gap), s);
       }
     }
@@ -364,7 +370,7 @@ class Bridger {
     }
     image_.at<cv::Vec3f>(at) = colour;
     result_.drawn.at<std::uint8_t>(at) = 255;
-    if (std::abs(s) <= kNear) result_.core.at<std::uint8_t>(at) = 255;
+    result_.core.at<std::uint8_t>(at) = 255;
     result_.origin.at<cv::Vec2s>(at) =
         cv::Vec2s(cv::saturate_cast<short>(origin.x), cv::saturate_cast<short>(origin.y));
   }
