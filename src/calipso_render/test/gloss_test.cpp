@@ -89,6 +89,29 @@ TEST(SeenGlosses, HoldEachObjectsOwnWhereItDiffers) {
 }
 
 // The pixels around a glossy ball's highlight speak for its light, and against one beside it.
+// In later pictures, whose poses are off, the highlight is not where the model has it.
+TEST(SeenGlosses, AreReadFromTheFirstPictureWhereTheOthersSayNothing) {
+  LightFit fit = plainFit(Light());
+  fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();
+  int clipped = 0;
+  std::vector<HighlightSample> all = clippedHighlight(fit.light, 0.08f, clipped);
+  for (int picture = 1; picture < 9; ++picture) {
+    const float turn = 0.8f * static_cast<float>(picture);
+    Light beside = fit.light;
+    beside.direction += 0.5f * Eigen::Vector3f(std::cos(turn), 0.0f, std::sin(turn));
+    beside.direction.normalize();
+    for (HighlightSample& h : clippedHighlight(beside, 0.08f, clipped)) {
+      h.at.picture = picture;
+      all.push_back(h);
+    }
+  }
+  ASSERT_FALSE(fitGloss(all, fit, {}));
+  const SeenGlosses seen = seenGlosses(all, 1, fit, {});
+  ASSERT_TRUE(seen.of_all);
+  EXPECT_NEAR(seen.of_all->gloss.roughness, 0.08f, 0.015f);
+  EXPECT_TRUE(seen.of_all->tells_direction);
+}
+
 TEST(TellDirection, BelievesALightOnlyWhereItsHighlightIs) {
   LightFit fit = plainFit(Light());
   fit.light.direction = Eigen::Vector3f(0.4f, -0.6f, 0.7f).normalized();

@@ -251,6 +251,14 @@ double leastError(const std::vector<HighlightSample>& highlights, LightFit fit,
   return least;
 }
 
+// Empty if all are.
+std::vector<HighlightSample> inFirstPicture(const std::vector<HighlightSample>& highlights) {
+  std::vector<HighlightSample> first;
+  std::copy_if(highlights.begin(), highlights.end(), std::back_inserter(first),
+               [](const HighlightSample& h) { return h.at.picture == 0; });
+  return first.size() < highlights.size() ? first : std::vector<HighlightSample>();
+}
+
 }  // namespace
 
 std::optional<SeenGloss> fitGloss(const std::vector<HighlightSample>& highlights,
@@ -298,9 +306,14 @@ bool tellDirection(const std::vector<HighlightSample>& highlights, const LightFi
 
 SeenGlosses seenGlosses(const std::vector<HighlightSample>& highlights, std::size_t objects,
                         const LightFit& fit, const SunVisible& visible) {
-  SeenGlosses seen{fitGloss(highlights, fit, visible),
-                   std::vector<std::optional<SeenGloss>>(objects)};
-  if (seen.of_all) seen.of_all->tells_direction = tellDirection(highlights, fit, visible);
+  SeenGlosses seen{std::nullopt, std::vector<std::optional<SeenGloss>>(objects)};
+  // The models are fitted to the first picture; elsewhere a pose that is a little off leads
+  // highlights astray.
+  for (const std::vector<HighlightSample>& some : {highlights, inFirstPicture(highlights)}) {
+    if (seen.of_all || some.empty()) break;
+    seen.of_all = fitGloss(some, fit, visible);
+    if (seen.of_all) seen.of_all->tells_direction = tellDirection(some, fit, visible);
+  }
   if (objects < 2) return seen;
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t i = 0; i < objects; ++i) {
