@@ -76,6 +76,24 @@ TEST(MendedDepth, ThingsAndWideGapsStay) {
             0.0);
 }
 
+// A wall some way behind the table's far edge, seen down below the table: where the table would go
+// on is neither a gap nor, where the wall is as near as that, the table.
+TEST(MendedDepth, AWallSeenBeyondATablesEdgeStays) {
+  const Table table;
+  cv::Mat depth = table.truth.clone();
+  const float edge = 0.9f, wall = 1.05f;  // m
+  const Eigen::Isometry3d& camera = table.camera.world_from_camera;
+  for (int v = 0; v < kHigh; ++v) {
+    for (int u = 0; u < kWide; ++u) {
+      const Eigen::Vector3d ray = camera.linear() * table.camera.ray(u, v);
+      float& d = depth.at<float>(v, u);
+      if (d == 0.0f || (camera * Eigen::Vector3d(table.camera.ray(u, v) * d)).y() > edge)
+        d = static_cast<float>(wall / ray.y());
+    }
+  }
+  EXPECT_EQ(cv::norm(table.mended(depth), depth, cv::NORM_INF), 0.0);
+}
+
 TEST(MendedDepth, WithoutPlanesOrDepthImageNothingChanges) {
   Table table;
   EXPECT_TRUE(table.mended(cv::Mat()).empty());

@@ -1,5 +1,8 @@
 #include "place/mended_depth.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/background.hpp"
@@ -9,6 +12,34 @@ namespace {
 
 constexpr double kGap = 0.03;      // of the picture's width: radius of discs that fit into no gap
 constexpr double kOnPlane = 0.03;  // of the nearness: measured ones spread
+constexpr int kMeanSide = 5;       // px of a row whose mean tells how the depth runs,
+constexpr int kReach = 5;          // and rows above and below over which it does
+// parts of the depth by which it leaves the plane over them where it only passes through it
+constexpr float kLeastChange = 0.012f, kChangePerRow = 0.0015f;
+
+// Where what is as near as a plane only passes through it, as a wall does that goes on below a
+// table's far edge. CV_8UC1
+// @param off part of the depth by which it is off the plane @param on CV_8UC1: by how little
+cv::Mat passesThrough(const cv::Mat& off, const cv::Mat& on) {
+  cv::Mat weight, mean, through = cv::Mat::zeros(on.size(), CV_8U);
+  on.convertTo(weight, CV_32F, 1.0 / 255.0);
+  cv::blur(off.mul(weight), mean, {kMeanSide, 1});
+  cv::blur(weight, weight, {kMeanSide, 1});
+  mean /= cv::max(weight, 1e-6);
+  for (int v = 0; v < on.rows; ++v) {
+    for (int u = 0; u < on.cols; ++u) {
+      if (on.at<std::uint8_t>(v, u) == 0) continue;
+      int first = v, last = v;
+      while (first > std::max(0, v - kReach) && on.at<std::uint8_t>(first - 1, u) != 0) --first;
+      while (last < std::min(on.rows - 1, v + kReach) && on.at<std::uint8_t>(last + 1, u) != 0)
+        ++last;
+      const float change = std::abs(mean.at<float>(last, u) - mean.at<float>(first, u));
+      if (change > std::max(kLeastChange, kChangePerRow * static_cast<float>(last - first)))
+        through.at<std::uint8_t>(v, u) = 255;
+    }
+  }
+  return through;
+}
 
 }  // namespace
 
@@ -22,9 +53,10 @@ cv::Mat mendedDepth(const cv::Mat& depth, const cv::Mat& labels,
                 gap = (plane_depth > 0.0f) & (labels == 0) & ~on &
                       ((depth == 0.0f) | (depth > plane_depth));
   if (cv::countNonZero(gap) == 0) return depth;
+  const cv::Mat through = passesThrough((depth - plane_depth) / depth, on);
   const int radius = cvRound(kGap * depth.cols);
   cv::Mat closed;
-  cv::copyMakeBorder(on | (labels != 0), closed, radius, radius, radius, radius,
+  cv::copyMakeBorder((on & ~through) | (labels != 0), closed, radius, radius, radius, radius,
                      cv::BORDER_CONSTANT);
   cv::morphologyEx(closed, closed, cv::MORPH_CLOSE,
                    cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));

@@ -141,13 +141,17 @@ void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const C
   surfaces.normal.at<cv::Vec3f>(v, u) = {normal.x(), normal.y(), normal.z()};
 }
 
-// Of planes first ... last - 1 the one that misses what is seen least, by less than `most`.
+// Of planes first ... last - 1 the one that misses what is seen least, by less than `most`; of those
+// that are met within a pixel the nearest one to it.
 int closest(const std::vector<PlaneExtent>& planes, int first, int last, float most, float seen,
             int u, int v) {
   int best = kNoPlane;
+  float least_off = 0.0f;
   for (int k = first; k < last; ++k) {
-    const float miss = planes[k].miss(seen, u, v);
-    if (miss < most) most = miss, best = k;
+    const float miss = planes[k].miss(seen, u, v),
+                off = std::abs(seen - planes[k].nearness.at<float>(v, u));
+    if (miss < most || (miss == most && best != kNoPlane && off < least_off))
+      most = miss, least_off = off, best = k;
   }
   return best;
 }
