@@ -35,14 +35,10 @@ void NodeReporter::failed(const std::string& message) {
 }
 
 void NodeReporter::lastWords(const std::string& message) {
-  constexpr double kListenersComeSec = 5.0, kPollSec = 0.05, kDeliverySec = 0.5;
+  constexpr double kStaySec = 10.0, kPollSec = 0.05;
   failed(message);
-  const ros::WallTime give_up = ros::WallTime::now() + ros::WallDuration(kListenersComeSec);
-  while (ros::ok() && status_publisher_.getNumSubscribers() == 0 &&
-         ros::WallTime::now() < give_up) {
-    ros::WallDuration(kPollSec).sleep();
-  }
-  if (ros::ok()) ros::WallDuration(kDeliverySec).sleep();
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(kStaySec);
+  while (ros::ok() && ros::WallTime::now() < end) ros::WallDuration(kPollSec).sleep();
 }
 
 void NodeReporter::clipFrameDone() {

@@ -12,8 +12,8 @@
 namespace calipso::render {
 namespace {
 
-constexpr float kAlongRow =
-    0.05f;                 // slope of edges that go on in stripes: others are their pattern
+// slope of edges that go on in stripes: others are their pattern
+constexpr float kAlongRow = 0.05f;
 constexpr int kClear = 2;  // px around a sample that see nothing else
 
 // @param beside CV_8UC1, != 0: where another surface is seen

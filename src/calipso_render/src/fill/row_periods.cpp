@@ -17,8 +17,8 @@ constexpr float kOverlap = 0.25f;  // of what is known, for a shift to be judged
 constexpr int kFewest = 100;       // px that are known, likewise
 constexpr float kRepeats = 0.4f;   // correlation of a shift that repeats a row, and
 constexpr float kDip = 0.3f;       // by how much that of a shorter one is lower
-constexpr float kAsHigh =
-    0.85f;                // of the highest peak's correlation: the shortest such is the period
+// of the highest peak's correlation: the shortest such is the period
+constexpr float kAsHigh = 0.85f;
 constexpr int kNear = 2;  // px between a multiple of the period and a peak
 
 // Sums over the places of a row, by shift.

@@ -22,8 +22,8 @@ class NodeReporter {
   void ready(const std::string& message);
   void failed(const std::string& message);
 
-  // As failed(), for a process about to end: returns once a listener has had the time to hear it, or
-  // after some seconds without any.
+  // As failed(), for a process about to end: stays for some seconds, as the player may start later
+  // than the node fails, and would wait in vain for one that it never heard.
   void lastWords(const std::string& message);
 
   // One more frame of the clip has been taken in; lets the player send another.
