@@ -2,6 +2,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <utility>
 
 #include "calipso_render/inpaint.hpp"
 #include "place/crossing_planes.hpp"
@@ -24,12 +25,10 @@ constexpr double kSeedSpread = 0.005;  // likewise
 constexpr float kOffSupport = 0.02f;
 constexpr int kCurvedReach = 4;  // px of the square that tells the normal of what is not plane
 constexpr float kSameSurface = 0.05f;  // of the nearness within it
-
 // times that a pixel of a support plane is as near as the farthest beside it, from which on so
 // little of the plane is left up to the horizon that what stands on it may hide it
 constexpr float kAtHorizon = 1.05f;
-// px of the squares of a support plane, and of what rises above it, that tell
-constexpr int kOnSide = 13, kRisesSide = 3;
+constexpr int kOnSide = 13, kRisesSide = 3;  // px: squares of a support, of what rises, that tell
 
 struct Pixel {
   int u, v;
@@ -146,12 +145,11 @@ void setAt(int u, int v, double nearness, const Eigen::Vector3f& normal, const C
 int closest(const std::vector<PlaneExtent>& planes, int first, int last, float most, float seen,
             int u, int v) {
   int best = kNoPlane;
-  float least_off = 0.0f;
+  std::pair least(most, 0.0f);
   for (int k = first; k < last; ++k) {
-    const float miss = planes[k].miss(seen, u, v),
-                off = std::abs(seen - planes[k].nearness.at<float>(v, u));
-    if (miss < most || (miss == most && best != kNoPlane && off < least_off))
-      most = miss, least_off = off, best = k;
+    const float off = std::abs(seen - planes[k].nearness.at<float>(v, u));
+    const std::pair miss(planes[k].miss(seen, u, v), off);
+    if (miss < least) least = miss, best = k;
   }
   return best;
 }
