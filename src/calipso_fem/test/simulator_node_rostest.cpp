@@ -68,6 +68,10 @@ class SimulatorNodeTest : public ::testing::Test {
     info.fps = 30.0;
     info.last_stamp = stamp(kFrames - 1);
     info_.publish(info);
+    sendModels(kStart);
+  }
+
+  void sendModels(const Eigen::Vector3d& start) {
     calipso_msgs::AlignedModels models;
     models.header.stamp = stamp(0);
     models.models.resize(1);
@@ -75,7 +79,7 @@ class SimulatorNodeTest : public ::testing::Test {
     models.models[0].index = 1;
     models.models[0].mesh = calipso::toMsg(test::boxSurface({0.1, 0.1, 0.1}, 2));
     models.models[0].world_from_object.pose =
-        calipso::toMsg(Eigen::Isometry3d(Eigen::Translation3d(kStart)));
+        calipso::toMsg(Eigen::Isometry3d(Eigen::Translation3d(start)));
     models_.publish(models);
   }
 
@@ -153,6 +157,19 @@ TEST_F(SimulatorNodeTest, OneStatePerFrameAndEditsAreReported) {
   for (const auto& marker : markers_.back().markers) namespaces.insert(marker.ns);
   EXPECT_TRUE(namespaces.count("surface"));
   EXPECT_TRUE(namespaces.count("support"));
+
+  // Models that come anew, as the user has corrected a pose, make a world that begins there and then
+  // and in which the edits hold.
+  const Eigen::Vector3d corrected = kStart + Eigen::Vector3d(0.5, 0.0, 0.0);
+  sendModels(corrected);
+  ASSERT_TRUE(waitFor([&] {
+    sendFrame(kFrames - 1);
+    return states_.back().objects.at(0).pose.position.x > kStart.x() + 0.25;
+  }));
+  EXPECT_TRUE(states_.back().objects.at(0).edited);
+  sendFrame(2 * (kFrames - 1));
+  ASSERT_TRUE(waitFor([&] { return states_.back().header.stamp == stamp(2 * (kFrames - 1)); }));
+  EXPECT_NEAR(states_.back().objects.at(0).pose.position.z, corrected.z() - 9.81 * t * t, 1e-6);
 }
 
 }  // namespace

@@ -115,9 +115,7 @@ void SimulatorRos::prepare() {
     for (const auto& object : clip_dynamics_->objects) take(object);
     world_->allCollisionsKnown();
   }
-  if (first_stamp_)
-    for (const auto& edit : early_edits_) submit(edit);
-  if (first_stamp_) early_edits_.clear();
+  if (first_stamp_) submitAll();
   publishPlan(models_->header.stamp);
   reporter_.ready(std::to_string(models_->models.size()) + " objects");
 }
@@ -149,11 +147,14 @@ void SimulatorRos::take(const calipso_msgs::ObjectClipDynamics& object) {
 }
 
 void SimulatorRos::onEdit(const calipso_msgs::EditConstPtr& edit) {
-  if (world_ && first_stamp_)
-    submit(*edit);
-  else
-    early_edits_.push_back(*edit);
+  edits_.push_back(*edit);
+  if (world_ && first_stamp_) submit(*edit);
   reporter_.editReceived();
+}
+
+// A world knows nothing of what one before it was told.
+void SimulatorRos::submitAll() {
+  for (const auto& edit : edits_) submit(edit);
 }
 
 void SimulatorRos::submit(const calipso_msgs::Edit& edit) {
@@ -179,7 +180,7 @@ void SimulatorRos::startOver(const ros::Time& stamp) {
   reporter_.remark(kStartsOver);
   world_.reset();
   first_stamp_.reset();
-  early_edits_.clear();
+  edits_.clear();
   if (models_ && models_->header.stamp > stamp) models_.reset();
   reporter_.starting("waiting for models");
   prepare();
@@ -198,8 +199,7 @@ void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
   }
   if (!first_stamp_) {
     first_stamp_ = stamp;
-    for (const auto& edit : early_edits_) submit(edit);
-    early_edits_.clear();
+    submitAll();
   }
   try {
     publish(world_->advanceTo((stamp - *first_stamp_).toSec()), stamp);

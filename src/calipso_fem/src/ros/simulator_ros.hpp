@@ -44,6 +44,7 @@ class SimulatorRos {
   void prepare();  // once everything it takes has arrived
   void take(const calipso_msgs::Dynamics& dynamics);
   void take(const calipso_msgs::ObjectClipDynamics& object);
+  void submitAll();
   void submit(const calipso_msgs::Edit& edit);
   void refuse(const calipso_msgs::Edit& edit, const std::string& message);
   void publish(const std::vector<EditOutcome>& outcomes, const ros::Time& stamp);
@@ -62,9 +63,9 @@ class SimulatorRos {
   calipso_msgs::AlignedModelsConstPtr models_;
   calipso_msgs::ClipDynamicsConstPtr clip_dynamics_;
   std::optional<ros::Time> first_stamp_;
-  ros::Time plan_stamp_;                         // of the newest one sent
-  std::uint32_t reports_ = 0;                    // sent
-  std::vector<calipso_msgs::Edit> early_edits_;  // came before the world was there
+  ros::Time plan_stamp_;                   // of the newest one sent
+  std::uint32_t reports_ = 0;              // sent
+  std::vector<calipso_msgs::Edit> edits_;  // of this video
   std::unique_ptr<World> world_;
 };
 
