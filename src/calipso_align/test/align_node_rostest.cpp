@@ -63,7 +63,7 @@ class AlignNode : public ::testing::Test {
  protected:
   explicit AlignNode(const std::string& name_space = "")
       : nh_(name_space),
-        segmentations_(nh_.advertise<calipso_msgs::Segmentation>(topics::kSegmentation, 1)),
+        segmentations_(nh_.advertise<calipso_msgs::Segmentation>(topics::kSegmentation, 10)),
         poses_(nh_.advertise<geometry_msgs::PoseStamped>("align/initial_pose/disc", 1)),
         models_(nh_.subscribe(topics::kModels, 0, &AlignNode::onModels, this)) {}
 
@@ -166,6 +166,17 @@ TEST_F(AlignNode, SaysThatTheImageBorderCutsTheObject) {
   const calipso_msgs::AlignedModel model =
       answerTo(keyFrame(ros::Time(7.0), {tippedSquare(79.5, 100.0, 33.0)}));
   EXPECT_NE(model.reason.find("cut by the image border"), std::string::npos) << model.reason;
+}
+
+TEST_F(AlignNode, AlignsAKeyFrameThatComesTwiceOnce) {
+  waitForNode();
+  const ros::Time stamp(8.0);
+  for (int sent = 0; sent < 2; ++sent)
+    segmentations_.publish(keyFrame(stamp, {tippedSquare(82.0, 58.0, 33.0)}));
+  answerTo(keyFrame(ros::Time(9.0), {tippedSquare(82.0, 58.0, 33.0)}));
+  EXPECT_EQ(std::count_if(received_.begin(), received_.end(),
+                          [&](const auto& msg) { return msg->header.stamp == stamp; }),
+            1);
 }
 
 class AlignNodeInMillimetres : public AlignNode {

@@ -9,6 +9,7 @@
 #include "calipso_align/depth_image.hpp"
 #include "calipso_ros/conversions.hpp"
 #include "calipso_ros/node_main.hpp"
+#include "calipso_ros/same_message.hpp"
 #include "calipso_ros/topics.hpp"
 #include "ros/align_conversions.hpp"
 #include "ros/segmentation_conversions.hpp"
@@ -89,7 +90,7 @@ void AlignRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& msg) {
 // Only key frames carry contours. The same one can come twice to a subscriber that connects while
 // it is published.
 void AlignRos::onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) {
-  if (msg->contours.empty() || (key_ && *key_ == *msg)) return;
+  if (msg->contours.empty() || (key_ && sameMessage(*key_, *msg))) return;
   key_ = msg;
   fitAll();
 }

@@ -6,6 +6,7 @@
 #include <boost/make_shared.hpp>
 
 #include "calipso_ros/conversions.hpp"
+#include "calipso_ros/same_message.hpp"
 #include "calipso_ros/topics.hpp"
 #include "world_conversions.hpp"
 #include "world_markers.hpp"
@@ -48,7 +49,7 @@ SimulatorRos::SimulatorRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
 
 // Latched messages can come twice; the world must not start anew for that.
 void SimulatorRos::onModels(const calipso_msgs::AlignedModelsConstPtr& models) {
-  if (models_ && *models_ == *models) return;
+  if (models_ && sameMessage(*models_, *models)) return;
   models_ = models;
   prepare();
 }
@@ -61,7 +62,7 @@ void SimulatorRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
 }
 
 void SimulatorRos::onClipDynamics(const calipso_msgs::ClipDynamicsConstPtr& clip) {
-  if (clip_dynamics_ && *clip_dynamics_ == *clip) return;
+  if (clip_dynamics_ && sameMessage(*clip_dynamics_, *clip)) return;
   clip_dynamics_ = clip;
   prepare();
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "calipso_ros/conversions.hpp"
+#include "calipso_ros/same_message.hpp"
 #include "calipso_ros/topics.hpp"
 #include "calipso_scene/same_camera.hpp"
 #include "conversions.hpp"
@@ -113,7 +114,7 @@ void RenderNode::addClipFrame(const Frame& frame, const cv::Mat& labels) {
 
 // A latched message can come twice to a subscriber that connects while it is published.
 void RenderNode::onModels(const calipso_msgs::AlignedModelsConstPtr& msg) {
-  if (models_msg_ && *models_msg_ == *msg) return;
+  if (models_msg_ && sameMessage(*models_msg_, *msg)) return;
   models_msg_ = msg;
   try {
     models_ = fromMsg(*msg);
