@@ -170,6 +170,21 @@ TEST(Renderer, TakesOutAPassingShadowWherePixelsSeemToChange) {
   EXPECT_GT(psnr(out.bgr, emptyTable(), p.shadow), 35.0);
 }
 
+// Frames that were taken for lit there were not, quite: what is around tells that the place rests.
+TEST(Renderer, TakesOutAPassingShadowWhereOthersMakeAPlaceSeemToChange) {
+  Passing p;
+  Prepared unsettled = *p.prepared;
+  const cv::Rect shadow = cv::boundingRect(p.shadow);
+  const cv::Rect block((shadow.tl() + shadow.br()) / 2 - cv::Point(10, 10), cv::Size(21, 21));
+  ASSERT_GT(cv::countNonZero(p.shadow(block)), block.area() / 2);
+  ASSERT_EQ(cv::countNonZero(unsettled.background.shaded_at_times(block)), block.area());
+  unsettled.background.spread = unsettled.background.spread.clone();
+  unsettled.background.spread(block).setTo(20.0f);
+  p.prepared = std::make_shared<const Prepared>(std::move(unsettled));
+  const FrameOutput out = p.removed(Passing::poseAt(Passing::kFrames - 1));
+  EXPECT_GT(psnr(out.bgr, emptyTable(), p.shadow), 35.0);
+}
+
 // Where the object is in the video is not known, its shadow may be any that passes.
 TEST(Renderer, TakesOutAllThatPassesOfAnObjectThatIsNotFollowed) {
   const Passing p;

@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
+#include "calipso_render/inpaint.hpp"
 #include "frame/mask_morphology.hpp"
 #include "frame/missed_parts.hpp"
 #include "frame/shade_reach.hpp"
@@ -23,7 +24,7 @@ constexpr int kMargin = 6;     // px around a shadow
 constexpr int kHalfLit = 128;  // level of the sun: another object's shadow
 // px across: most of them tell whether a place rests, as of few frames some differ by chance
 constexpr int kMost = 5;
-constexpr int kVoters = 9;     // px of the square whose dark pixels vote on their colour
+constexpr int kVoters = 9;  // px of the square whose dark pixels vote on their colour
 
 cv::Mat square(int side) { return cv::Mat::ones(side, side, CV_8U); }
 
@@ -50,12 +51,25 @@ void keepDarkenedAlike(const cv::Mat& now, const cv::Mat& plate, cv::Mat& dark) 
   inside &= votes > 0.0f;
 }
 
+// Where the place rests, of the key frame's view. Where shade passes at times, it spreads anyhow,
+// and what is around tells.
+cv::Mat restingPlaces(const Background& background) {
+  cv::Mat rests;
+  cv::medianBlur((background.count > 0) & (background.spread < background.resting_spread), rests,
+                 kMost);
+  if (background.shaded_at_times.empty()) return rests;
+  const cv::Mat shaded = background.shaded_at_times & (background.count > 0);
+  cv::Mat part, told;
+  rests.convertTo(part, CV_32F, 1.0 / 255.0);
+  cv::Mat(background.shaded_at_times == 0).convertTo(told, CV_32F, 1.0 / 255.0);
+  cv::Mat(pushPull(part, told) > 0.5f).copyTo(rests, shaded);
+  return rests;
+}
+
 // PlateInView::quiet
 cv::Mat quietPlaces(const StagedFrame& frame, const SeenPlace& place) {
   const Background& background = frame.prepared.background;
-  cv::Mat at_key;
-  cv::medianBlur((background.count > 0) & (background.spread < background.resting_spread), at_key,
-                 kMost);
+  cv::Mat at_key = restingPlaces(background);
   if (background.drifting.established()) at_key.setTo(0, background.drifting.where());
   if (!frame.prepared.scenery.empty() && !frame.prepared.nearness.empty())
     at_key.setTo(0, frame.prepared.nearness == 0.0f);
