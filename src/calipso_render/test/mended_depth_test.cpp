@@ -94,6 +94,20 @@ TEST(MendedDepth, AWallSeenBeyondATablesEdgeStays) {
   EXPECT_EQ(cv::norm(table.mended(depth), depth, cv::NORM_INF), 0.0);
 }
 
+// Beside an object that stands at a board's far edge the table beyond is no gap of the board.
+TEST(MendedDepth, ATableSeenBeyondABoardsEdgeStays) {
+  Table table;
+  SupportPlane board;
+  board.offset = 0.1;
+  table.planes.push_back(board);
+  const cv::Mat on_board = 1.0 / groundNearness({board}, table.camera, cv::Mat());
+  cv::Mat depth = table.truth.clone();
+  const cv::Rect top(0, 80, kWide, kHigh - 80), object(140, 50, 30, 60);
+  on_board(top).copyTo(depth(top));
+  table.labels(object).setTo(1), depth(object).setTo(0.4f);
+  EXPECT_EQ(cv::norm(table.mended(depth), depth, cv::NORM_INF), 0.0);
+}
+
 TEST(MendedDepth, WithoutPlanesOrDepthImageNothingChanges) {
   Table table;
   EXPECT_TRUE(table.mended(cv::Mat()).empty());

@@ -17,6 +17,11 @@ constexpr int kReach = 5;          // and rows above and below over which it doe
 // parts of the depth by which it leaves the plane over them where it only passes through it
 constexpr float kLeastChange = 0.012f, kChangePerRow = 0.0015f;
 
+// CV_8UC1. @param nearness of a plane, 0: not there
+cv::Mat isOn(const cv::Mat& nearness, const cv::Mat& depth) {
+  return (nearness > 0.0f) & (cv::abs(1.0 / nearness - depth) < kOnPlane * depth);
+}
+
 // Where what is as near as a plane only passes through it, as a wall does that goes on below a
 // table's far edge. CV_8UC1
 // @param off part of the depth by which it is off the plane @param on CV_8UC1: by how little
@@ -49,9 +54,13 @@ cv::Mat mendedDepth(const cv::Mat& depth, const cv::Mat& labels,
   if (ground.empty()) return depth;
   cv::Mat plane_depth = 1.0 / ground;
   plane_depth.setTo(0.0f, ground == 0.0f);
-  const cv::Mat on = (plane_depth > 0.0f) & (cv::abs(depth - plane_depth) < kOnPlane * depth),
-                gap = (plane_depth > 0.0f) & (labels == 0) & ~on &
-                      ((depth == 0.0f) | (depth > plane_depth));
+  const cv::Mat on = isOn(ground, depth);
+  cv::Mat gap =
+      (plane_depth > 0.0f) & (labels == 0) & ~on & ((depth == 0.0f) | (depth > plane_depth));
+  for (std::size_t k = 0; k < planes.size() && planes.size() > 1; ++k) {  // past another's edge
+    const cv::Mat own = groundNearness({planes[k]}, camera, cv::Mat());
+    if (!own.empty()) gap.setTo(0, isOn(own, depth));
+  }
   if (cv::countNonZero(gap) == 0) return depth;
   const cv::Mat through = passesThrough((depth - plane_depth) / depth, on);
   const int radius = cvRound(kGap * depth.cols);
