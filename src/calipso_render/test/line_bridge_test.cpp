@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calipso_render/inpaint.hpp"
 #include "fill/line_ends.hpp"
 #include "grain_pictures.hpp"
 
@@ -218,6 +219,37 @@ TEST(BridgeBorders, LeaveEdgesWithinASurface) {
   FloorAndWall place;
   place.surface = 1;
   EXPECT_EQ(cv::countNonZero(place.bridge().drawn), 0);
+}
+
+// A strip of water (2) between the sky (7) and a rough rock of many surfaces, behind a tower of which
+// only guesses are known.
+TEST(BridgeBorders, LeadAHorizonOverAStripBeforeARoughRock) {
+  Lines l;
+  constexpr int kHorizon = 80, kRock = 88;
+  cv::Mat surface(l.image.size(), CV_8U, cv::Scalar(InpaintParams::kNoPlane));
+  cv::RNG rng(3);
+  for (int v = 0; v < l.image.rows; ++v) {
+    for (int u = 0; u < l.image.cols; ++u) {
+      const bool rock = v >= kRock, water = v >= kHorizon && !rock;
+      const double grey = rock ? 90.0 + rng.gaussian(20.0) : water ? 170.0 : 210.0;
+      l.image.at<cv::Vec3f>(v, u) = cv::Vec3f::all(static_cast<float>(grey));
+      surface.at<std::uint8_t>(v, u) = rock ? 3 + u / 40 % 2 : water ? 2 : 7;
+    }
+  }
+  l.hole(cv::Rect(110, 50, 100, 100)).setTo(255);
+  surface.setTo(InpaintParams::kNoPlane, l.hole);
+  l.image.setTo(cv::Scalar::all(0), l.hole);
+  const LineBridges b =
+      bridgeBorders(straightEdges(l.hole == 0, l.image), l.hole, l.hole == 0, surface, l.image);
+  const cv::Rect hole = cv::boundingRect(l.hole);
+  ASSERT_TRUE(hole.y < kHorizon - 4 && hole.br().y > kRock + 4);
+  for (int u = hole.x; u < hole.br().x; ++u) {
+    ASSERT_NE(b.core.at<std::uint8_t>(kHorizon, u), 0) << u;
+    EXPECT_GT(l.image.at<cv::Vec3f>(kHorizon - 3, u)[0], 200.0f) << u;
+    EXPECT_NEAR(l.image.at<cv::Vec3f>(kHorizon + 3, u)[0], 170.0f, 8.0f) << u;
+    EXPECT_EQ(surface.at<std::uint8_t>(kHorizon - 5, u), 7) << u;
+    EXPECT_EQ(surface.at<std::uint8_t>(kHorizon + 5, u), 2) << u;
+  }
 }
 
 cv::Mat loneLinesOf(const Lines& l) {

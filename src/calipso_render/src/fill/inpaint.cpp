@@ -34,6 +34,7 @@ constexpr float kAwayFromStripe = 300.0f, kAwayAlongStripe = 4.0f;  // ... where
 constexpr float kFarther = 2000.0f;   // InpaintParams::away_farther along a plane
 constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
 constexpr int kNearEdges = 64;  // px around the hole in which edges between surfaces are sought
+constexpr int kSkyLabel = 254;  // of the sky among surfaces
 constexpr int kFewestOnPlane = 200;  // px of a plane's part of the hole, to be filled along it
 
 InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
@@ -250,16 +251,22 @@ bool followPatterns(const std::vector<HiddenPlane>& planes, const Canvas& canvas
   return more;
 }
 
-// Edges between two surfaces go on before these do.
+// Edges between two surfaces, or one and the sky, go on before these do.
 void fillBorders(InpaintParams& params, Canvas& canvas) {
   double first, last;
   cv::minMaxLoc(params.surface, &first, &last, nullptr, nullptr, canvas.hole);
   if (first == last) return;
+  const bool any_sky = !params.sky.empty();
+  if (any_sky) params.surface.setTo(kSkyLabel, params.sky == InpaintParams::kSky);
   const cv::Rect near = windowAround(canvas.hole, kNearEdges, kNearEdges);
   std::vector<cv::Vec4f> edges = straightEdges(canvas.source(near), canvas.look(near));
   for (cv::Vec4f& edge : edges) edge += cv::Vec4f(near.x, near.y, near.x, near.y);
   const LineBridges borders =
       bridgeBorders(edges, canvas.hole, canvas.source, params.surface, canvas.look);
+  if (any_sky) {
+    const cv::Mat sky = params.surface == kSkyLabel;
+    params.sky.setTo(InpaintParams::kSky, sky), params.surface.setTo(0, sky);
+  }
   canvas.hole.setTo(0, borders.core), canvas.known |= borders.core;
   borders.origin.copyTo(canvas.origin, borders.core);
 }

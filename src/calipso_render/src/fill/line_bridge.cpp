@@ -10,6 +10,7 @@
 
 #include "fill/line_band.hpp"
 #include "fill/line_ends.hpp"
+#include "fill/surface_border.hpp"
 
 namespace calipso::render {
 namespace {
@@ -27,10 +28,8 @@ constexpr float kCore = 1.5f;         // px on either side that are the line its
 constexpr float kAlone = 1.0f;        // the same of one that passes before different things
 constexpr LineBand kOwn{kLineHalf, kLineHalf};  // of a line by itself
 constexpr float kCrossFade = 4.0f;              // px on either side of the middle
-// px on either side of an edge between two surfaces by which their labels may be off
-constexpr int kOffBorder = 6;
-constexpr int kBesideEnd = 3;    // px by which one of its ends may have been found beside it
-constexpr float kParted = 0.7f;  // part of the way on which such an edge parts them
+constexpr int kBesideEnd =
+    3;  // px by which an end of an edge between two surfaces may have been found beside it
 
 struct Bridge {
   const LineEnd *from, *to;  // to: nothing if it ends at another bridge
@@ -82,15 +81,18 @@ class Bridger {
 
   // @param surface as bridgeBorders()'s
   LineBridges runBorders(const std::vector<cv::Vec4f>& edges, cv::Mat& surface) {
-    ends_ =
-        withBeside(findLineEnds(edges, hole_, source_, image_), kBesideEnd, hole_, source_, image_);
+    ends_ = withBeside(findLineEnds(edges, hole_, source_, image_, false), kBesideEnd, hole_,
+                       source_, image_);
     std::vector<Bridge> borders = connections(&Bridger::border);
     std::stable_sort(borders.begin(), borders.end(), [&](const Bridge& a, const Bridge& b) {
       return std::min(a.from->contrast, a.to->contrast) <
              std::min(b.from->contrast, b.to->contrast);
     });
     drawAll(borders);
-    for (const Bridge& b : borders) setSides(b, surface);
+    for (const Bridge& b : borders) {
+      if (const auto border = borderAlong(*b.from, *b.to, surface_))
+        setSides(*border, *b.from, *b.to, hole_, surface);
+    }
     return result_;
   }
 
@@ -129,8 +131,8 @@ class Bridger {
     if (!areInLine(a, b, gap)) return std::nullopt;
     const auto cost = misfit(a, b, gap, differenceOfSides(a, b));
     if (!cost) return std::nullopt;
-    const Bridge bridge{&a, &b, gap, *cost, kOwn};
-    return partsSurfaces(bridge) ? std::optional<Bridge>(bridge) : std::nullopt;
+    return borderAlong(a, b, surface_) ? std::optional<Bridge>({&a, &b, gap, *cost, kOwn})
+                                       : std::nullopt;
   }
 
   // Ends that continue each other, the best first, each once, none across another.
@@ -261,60 +263,13 @@ class Bridger {
   bool staysOnSurface(const LineEnd& end, float way) const {
     if (surface_.empty()) return true;
     for (const float s : {-1.0f * kLineHalf, 1.0f * kLineHalf}) {
-      const int own = surfaceAt(end.at - kLineHalf * end.into + s * leftOf(end.into));
+      const int own = surfaceAt(surface_, end.at - kLineHalf * end.into + s * leftOf(end.into));
       for (float t = 0.0f; own != 0 && t < way - kLineHalf; t += 1.0f) {
-        const int other = surfaceAt(end.at + t * end.into + s * leftOf(end.into));
+        const int other = surfaceAt(surface_, end.at + t * end.into + s * leftOf(end.into));
         if (other != 0 && other != own) return false;
       }
     }
     return true;
-  }
-
-  // Labels on the left and on the right of a connection where it begins.
-  std::pair<int, int> sidesOf(const Bridge& b) const {
-    const cv::Point2f before = b.from->at - kLineHalf * b.from->into,
-                      left = (kOffBorder + 1.0f) * leftOf(b.from->into);
-    return {surfaceAt(before + left), surfaceAt(before - left)};
-  }
-
-  // Are two surfaces, one on each side, parted by most of a connection, and by most of what is seen
-  // of its lines?
-  bool partsSurfaces(const Bridge& b) const {
-    const auto [left, right] = sidesOf(b);
-    if (left == 0 || right == 0 || left == right) return false;
-    const cv::Point2f along = (b.to->at - b.from->at) / b.gap,
-                      aside = (kOffBorder + 1.0f) * leftOf(along);
-    const auto parts = [&, left = left, right = right](float first, float last) {
-      const int steps = std::max(2, cvRound(last - first));
-      int parted = 0;
-      for (int i = 0; i <= steps; ++i) {
-        const cv::Point2f p = b.from->at + (first + (last - first) * i / steps) * along;
-        parted += surfaceAt(p + aside) == left && surfaceAt(p - aside) == right;
-      }
-      return parted > kParted * steps;
-    };
-    return parts(0.0f, b.gap) && parts(-b.from->length, 0.0f) && parts(b.gap, b.gap + b.to->length);
-  }
-
-  void setSides(const Bridge& b, cv::Mat& surface) const {
-    const auto [left, right] = sidesOf(b);
-    const cv::Point2f along = (b.to->at - b.from->at) / b.gap;
-    const cv::Point2f start = b.from->at - b.from->length * along;
-    const float length = b.from->length + b.gap + b.to->length;
-    for (int v = 0; v < surface.rows; ++v) {
-      for (int u = 0; u < surface.cols; ++u) {
-        std::uint8_t& label = surface.at<std::uint8_t>(v, u);
-        if (label != left && label != right) continue;
-        const cv::Point2f d = cv::Point2f(static_cast<float>(u), static_cast<float>(v)) - start;
-        const float t = d.dot(along), s = d.dot(leftOf(along));
-        if (t >= 0.0f && t <= length && std::abs(s) <= kOffBorder)
-          label = static_cast<std::uint8_t>(s > 0.0f ? left : right);
-      }
-    }
-  }
-
-  int surfaceAt(const cv::Point2f& p) const {
-    return isSet(surface_, p) ? surface_.at<std::uint8_t>(cvRound(p.y), cvRound(p.x)) : 0;
   }
 
   // What is seen `t` px before an end, there and back, `s` px beside it.

@@ -38,8 +38,9 @@ constexpr float kThin = 0.35f;   // both sides differ by no more than this part 
 
 class LineEndFinder {
  public:
-  LineEndFinder(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image)
-      : hole_(hole), source_(source), image_(image) {
+  LineEndFinder(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image,
+                bool only_clear = true)
+      : hole_(hole), source_(source), image_(image), only_clear_(only_clear) {
     cv::distanceTransform(hole == 0, away_, cv::DIST_L2, 3);
   }
 
@@ -204,16 +205,21 @@ class LineEndFinder {
           sum += c, squares += c.dot(c), ++count;
         }
       }
-      if (4 * count < (kBesideLast - kBesideFirst) * (kLast - kFirst)) return false;
+      if (4 * count < (kBesideLast - kBesideFirst) * (kLast - kFirst)) {
+        if (only_clear_) return false;
+        end.beside[side] = end.profile[side == 0 ? 0 : 2 * kLineHalf];
+        continue;
+      }
       end.beside[side] = sum / count;
       const float deviation = std::sqrt(
           std::max(0.0f, squares / count - end.beside[side].dot(end.beside[side])) / 3.0f);
-      if (end.contrast < kStandsOut * deviation) return false;
+      if (only_clear_ && end.contrast < kStandsOut * deviation) return false;
     }
     return true;
   }
 
   const cv::Mat &hole_, &source_, &image_;
+  bool only_clear_;
   cv::Mat away_;  // CV_32FC1, px from the hole
   std::vector<LineEnd> ends_;
 };
@@ -233,8 +239,8 @@ std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image
 }
 
 std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
-                                  const cv::Mat& source, const cv::Mat& image) {
-  return LineEndFinder(hole, source, image).run(edges);
+                                  const cv::Mat& source, const cv::Mat& image, bool only_clear) {
+  return LineEndFinder(hole, source, image, only_clear).run(edges);
 }
 
 std::vector<LineEnd> withBeside(const std::vector<LineEnd>& ends, int reach, const cv::Mat& hole,

@@ -28,11 +28,13 @@ struct LineEnd {
 // Straight edges of a picture, from end to end. @param source CV_8UC1: known; image CV_32FC3
 std::vector<cv::Vec4f> straightEdges(const cv::Mat& source, const cv::Mat& image);
 
-// Lines and edges that stand out from what is beside them and end at the hole, the longest first.
+// Lines and edges that end at the hole, the longest first.
 // @param edges straightEdges() of the picture, of which more may be unknown now
+// @param only_clear those that stand out from what is beside them: others may be texture
 // @param image CV_32FC3, code values; hole, source CV_8UC1: to be filled; known
 std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv::Mat& hole,
-                                  const cv::Mat& source, const cv::Mat& image);
+                                  const cv::Mat& source, const cv::Mat& image,
+                                  bool only_clear = true);
 
 // The same ends, and each up to so many pixels to either side: of two edges that lie close together
 // one may have been found here and the other one there.

@@ -8,9 +8,9 @@ namespace calipso::render {
 
 // A picture with a hole, to be filled at one of several sizes.
 struct FillLevel {
-  cv::Mat image;              // CV_32FC4: colour, and how lively it is around
-  cv::Mat known;              // CV_32FC1: part of a pixel that is known
-  cv::Mat hole, source;       // CV_8UC1
+  cv::Mat image;                   // CV_32FC4: colour, and how lively it is around
+  cv::Mat known;                   // CV_32FC1: part of a pixel that is known
+  cv::Mat hole, source;            // CV_8UC1
   cv::Mat nearness, surface, sky;  // as InpaintParams'; may be empty
 };
 

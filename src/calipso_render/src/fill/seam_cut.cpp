@@ -62,8 +62,7 @@ cv::Mat stepWeight(const cv::Mat& picture, const cv::Point& next) {
 
 cv::Rect aroundHole(const cv::Mat& hole, int margin) {
   const cv::Rect box = cv::boundingRect(hole);
-  return cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin,
-                  box.height + 2 * margin) &
+  return cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) &
          cv::Rect({0, 0}, hole.size());
 }
 
@@ -100,8 +99,7 @@ class Seams {
         if (label == next) ways_.push_back(way), pixels_.emplace_back();
         pixels_[label].emplace_back(u, v);
         label_.at<int>(v, u) = label;
-        picture.at<cv::Vec3f>(cv::Point(u, v) - near_.tl()) =
-            image.at<cv::Vec3f>(from[1], from[0]);
+        picture.at<cv::Vec3f>(cv::Point(u, v) - near_.tl()) = image.at<cv::Vec3f>(from[1], from[0]);
       }
     }
     right_ = stepWeight(picture, {1, 0}), down_ = stepWeight(picture, {0, 1});

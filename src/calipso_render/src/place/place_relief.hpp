@@ -3,6 +3,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "calipso_render/inpaint.hpp"
 #include "calipso_render/light.hpp"
 #include "calipso_render/relief.hpp"
 
@@ -29,7 +30,7 @@ std::vector<PicturePlane> picturePlanes(const cv::Mat& nearness, const cv::Mat& 
 
 // Which surface of the place every pixel sees, or would see without the objects.
 struct PlaceSurfaces {
-  static constexpr int kUnknown = 0, kCurved = 255;
+  static constexpr int kUnknown = 0, kCurved = InpaintParams::kNoPlane;
 
   // CV_8UC1: kUnknown; the support planes from 1 on, then other planes; kCurved: what is none of
   // them
