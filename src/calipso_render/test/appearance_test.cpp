@@ -75,6 +75,37 @@ TEST(Appearance, TakesFromAnotherViewWhatAHighlightHides) {
   EXPECT_GT(hidden, 20);
 }
 
+// Dark letters on a white ball under a broad highlight, which outshines them but not the white.
+TEST(Appearance, KeepsWhatIsDarkUnderABroadHighlight) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  constexpr Gloss kBroad{0.06f, 0.3f, 0.0f};
+  constexpr float kWhite = 0.7f, kDark = 0.03f;
+  View view{cv::Mat::zeros(kHeight, kWidth, CV_32FC3),
+            cv::Mat::zeros(kHeight, kWidth, CV_8U),
+            camera(),
+            {makeActor(surface, surface.key_vertices, camera())}};
+  const Eigen::Vector3f eye = camera().world_from_camera.translation().cast<float>();
+  cv::Mat letters = cv::Mat::zeros(kHeight, kWidth, CV_8U);
+  forEachPixelOf(view.actors.front(), [&](int u, int v, const SurfacePoint& p) {
+    const bool dark = u / 6 % 2 == 0;
+    const cv::Vec3f diffuse = diffuseShading(sunlight(), p.normal, 1.0f, p.seen, {}),
+                    highlight = specularShading(sunlight(), kBroad, p.normal,
+                                                (eye - p.position).normalized(), 1.0f, 1.0f);
+    for (int c = 0; c < 3; ++c)
+      view.picture.at<cv::Vec3f>(v, u)[c] =
+          codeFromLinear((dark ? kDark : kWhite) * diffuse[c] + highlight[c]);
+    view.labels.at<std::uint8_t>(v, u) = kBallLabel;
+    if (dark && highlight[1] > 2.0f * kDark * diffuse[1]) letters.at<std::uint8_t>(v, u) = 255;
+  });
+  cv::Mat inside;
+  cv::erode(view.labels, inside, cv::Mat::ones(9, 9, CV_8U));
+  letters.setTo(0, inside == 0);
+  ASSERT_GT(cv::countNonZero(letters), 40);
+  const Appearance a = makeAppearances({view}, {false}, sunlight(), {kBroad}).front();
+  const cv::Scalar found = cv::mean(a.albedo, letters(a.region));
+  EXPECT_LT(found[1], 0.1);
+}
+
 // A model whose shadow on the ball the picture does not have, as of a part fitted beside its place,
 // makes nothing of the ball brighter than it is.
 TEST(Appearance, ShadeThatThePictureDoesNotHaveIsNotDividedBy) {

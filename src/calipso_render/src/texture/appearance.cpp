@@ -13,6 +13,7 @@
 #include "draw/bicubic.hpp"
 #include "draw/light_batch.hpp"
 #include "light/shaded_ground.hpp"
+#include "place/masked_quantile.hpp"
 #include "smooth_step.hpp"
 #include "texture/false_shade.hpp"
 #include "texture/mesh_topology.hpp"
@@ -28,9 +29,10 @@ constexpr int kMargin = 12;     // px around the object that albedo is extended 
 constexpr int kShadowMapSide = 768;
 // of the mean light: what has less of it shows its reflectance with less certainty
 constexpr float kLit = 0.7f;
-// part of a pixel's light, at which the sun's highlight begins to hide its reflectance, and hides
-// it
+// part of a pixel's light, or of that of the object's bright ones, at which the sun's highlight begins
+// to hide its reflectance, and hides it
 constexpr float kGlossy = 0.2f, kAllGloss = 0.6f;
+constexpr double kBright = 0.9;  // quantile of the object's brightness
 constexpr float kLeastClear = 0.02f;
 constexpr float kDarkest = 1e-4f;  // linear brightness that is told from none
 constexpr float kBroad = 0.35f;    // m from which a lobe looks like diffuse shading
@@ -129,17 +131,17 @@ Shaded lightOn(const Actor& actor, const cv::Rect& region, const Camera& camera,
   return s;
 }
 
-// Reflectance::clear, of the least clear pixel around.
-// @param picture code values
-cv::Mat clearOf(const cv::Mat& picture, const cv::Mat& glint) {
+// Reflectance::clear, of the least clear pixel around. A highlight hides what it outshines: of dark
+// things on a bright object more is told than is lost as long as it is little against that.
+// @param codes CV_32FC3 @param object CV_8UC1, 255 on it
+cv::Mat clearOf(const cv::Mat& codes, const cv::Mat& object, const cv::Mat& glint) {
   cv::Mat clear(glint.size(), CV_32F);
+  const cv::Mat brightness = luminanceOf(codes);
+  const float bright = quantileOf(brightness, object, kBright);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < clear.rows; ++v) {
     for (int u = 0; u < clear.cols; ++u) {
-      const cv::Vec3f& code = picture.at<cv::Vec3f>(v, u);
-      const cv::Vec3f seen = {linearFromRealCode(code[0]), linearFromRealCode(code[1]),
-                              linearFromRealCode(code[2])};
-      const float all = std::max(luminance(seen), kDarkest);
+      const float all = std::max({brightness.at<float>(v, u), bright, kDarkest});
       const float hidden = smoothStep(kGlossy * all, kAllGloss * all, glint.at<float>(v, u));
       clear.at<float>(v, u) = std::max(kLeastClear, 1.0f - hidden);
     }
@@ -167,7 +169,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   r.open = shaded.sky;
   view.picture(r.region).convertTo(r.codes, CV_32F);
   unmixHue(view.labels(r.region) == actor.surface->index, r.codes);
-  r.clear = clearOf(r.codes, shaded.glint);
+  r.clear = clearOf(r.codes, view.labels(r.region) == actor.surface->index, shaded.glint);
   r.mean_light = mean_light.value_or(shaded.mean);
   const cv::Vec3f floor = lightFloor(r.mean_light);
   r.trust = trustOf(view.labels, actor.surface->index, r.region);
