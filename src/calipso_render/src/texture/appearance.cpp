@@ -27,12 +27,14 @@ namespace {
 constexpr float kMatt = 0.25f;  // part of a pixel's light that is never taken for a highlight
 constexpr int kMargin = 12;     // px around the object that albedo is extended by
 constexpr int kShadowMapSide = 768;
-// of the mean light: what has less of it shows its reflectance with less certainty
-constexpr float kLit = 0.7f;
+// of the mean light: what has less of it shows its reflectance with less certainty. By the second one
+// at the mask's rim, where brighter surroundings mix in, and of what tells that others are too bright.
+constexpr float kLit = 0.38f, kWellLit = 0.7f;
 // part of a pixel's light, or of that of the object's bright ones, at which the sun's highlight begins
 // to hide its reflectance, and hides it
 constexpr float kGlossy = 0.2f, kAllGloss = 0.6f;
 constexpr double kBright = 0.9;  // quantile of the object's brightness
+constexpr float kTold = 0.9f;    // trust from which a reflectance is told
 constexpr float kLeastClear = 0.02f;
 constexpr float kDarkest = 1e-4f;  // linear brightness that is told from none
 constexpr float kBroad = 0.35f;    // m from which a lobe looks like diffuse shading
@@ -174,6 +176,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   const cv::Vec3f floor = lightFloor(r.mean_light);
   r.trust = trustOf(view.labels, actor.surface->index, r.region);
   r.albedo = cv::Mat(r.region.size(), CV_32FC3, cv::Scalar::all(0));
+  cv::Mat well_lit = cv::Mat::zeros(r.region.size(), CV_8U);
 #pragma omp parallel for schedule(static)
   for (int v = 0; v < r.region.height; ++v) {
     for (int u = 0; u < r.region.width; ++u) {
@@ -188,12 +191,15 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
         const float i = linearFromRealCode(code[c]);
         r.albedo.at<cv::Vec3f>(v, u)[c] = std::max(i - highlight[c], kMatt * i) / (l[c] + floor[c]);
       }
-      r.trust.at<float>(v, u) *= std::min(1.0f, luminance(l) / (kLit * luminance(r.mean_light)));
+      const float part = luminance(l) / luminance(r.mean_light);
+      float& trust = r.trust.at<float>(v, u);
+      trust *= std::min(1.0f, part / (trust < 1.0f ? kWellLit : kLit));
+      if (part > kWellLit) well_lit.at<std::uint8_t>(v, u) = 255;
     }
   }
   lowerBesideJumps(view.camera, kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
   if (alone) lowerAtSteps(shaded.light, shaded.open, r);
-  takeOutFalseShade({shaded.light, shaded.open, r.trust}, floor, r.albedo);
+  takeOutFalseShade({shaded.light, shaded.open, (r.trust > kTold) & well_lit}, floor, r.albedo);
   return r;
 }
 

@@ -8,8 +8,7 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kAround = 31;       // px: side of the square in which pixels are compared
-constexpr float kCertain = 0.9f;  // trust of what others are compared with
+constexpr int kAround = 31;  // px: side of the square in which pixels are compared
 constexpr float kBrighter = 1.1f;
 constexpr float kShaded = 0.7f;  // of the light in the open: what has less lies in cast shade
 
@@ -27,7 +26,7 @@ cv::Mat brightnessOf(const cv::Mat& colour) {
 void takeOutFalseShade(const SurfaceLight& seen, const cv::Vec3f& floor, cv::Mat& albedo) {
   const cv::Mat brightness = brightnessOf(albedo);
   cv::Mat most = cv::Mat::zeros(albedo.size(), CV_32F);
-  brightness.copyTo(most, seen.trust >= kCertain);
+  brightness.copyTo(most, seen.certain);
   cv::dilate(most, most, cv::Mat::ones(kAround, kAround, CV_8U));
   for (int v = 0; v < albedo.rows; ++v) {
     for (int u = 0; u < albedo.cols; ++u) {

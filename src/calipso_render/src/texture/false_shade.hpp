@@ -7,7 +7,7 @@ namespace calipso::render {
 // Of one object in a picture, pixel by pixel.
 struct SurfaceLight {
   cv::Mat now, open;  // CV_32FC3: shading of a white surface; if nothing were before it
-  cv::Mat trust;      // CV_32FC1: Reflectance::trust
+  cv::Mat certain;    // CV_8UC1: 255 where the picture tells the reflectance
 };
 
 // Takes out shade that the model predicts and the picture does not have: where parts of the model
