@@ -77,6 +77,20 @@ TEST(SkyMap, IsWhatABoxLeavesOfTheSky) {
   }
 }
 
+// Two thousand texels over the plane, of a box a direction or none is hidden.
+TEST(SkyMap, WhatIsHighUpHidesNoMoreThanItCovers) {
+  const Eigen::AlignedBox3f high(Eigen::Vector3f(-0.5f, -0.5f, 16.0f),
+                                 Eigen::Vector3f(0.5f, 0.5f, 17.0f));
+  const Box b = box(high.min(), high.max());
+  const SkyMap map({{&b.vertices, &b.triangles}}, Eigen::Vector3d::UnitZ(), {});
+  const Eigen::AngleAxisf level(0.0f, Eigen::Vector3f::UnitX());
+  for (float x = -12.0f; x <= 12.0f; x += 0.37f) {
+    for (float y = -12.0f; y <= 12.0f; y += 0.41f)
+      EXPECT_NEAR(map.visibility({x, y, 0.0f}, kUp), seenPast(high, level, {x, y, 0.0f}), 0.06f)
+          << x << ", " << y;
+  }
+}
+
 TEST(SkyMap, ASheetThatLiesOnThePlaneHidesNothing) {
   const Points sheet = {{-1, -1, 0.001f}, {1, -1, 0}, {1, 1, 0.001f}, {-1, 1, 0}};
   const Triangles faces = {{0, 1, 2}, {0, 2, 3}};

@@ -13,14 +13,16 @@ namespace {
 
 constexpr float kGoldenAngle = 2.39996323f;
 constexpr int kMostDirections = 64;
-constexpr int kMargin = 2;           // texels around the occluders, where nothing is
-constexpr float kPerTexel = 64.0f;   // units of a kept height
+constexpr int kMargin = 2;          // texels around the occluders, where nothing is
+constexpr float kPerTexel = 64.0f;  // units of a kept height,
+constexpr float kHighest =
+    65534.0f;                        // and as many as it has at most: below an open column's lowest
 constexpr float kOwnSurface = 2.0f;  // texels: what reaches no higher over a point is its own plane
 // A column with nothing in it: its lowest is over its highest.
 constexpr std::uint32_t kOpen = 0xffffu;
 
 std::uint32_t unitsOf(float texels) {
-  return static_cast<std::uint32_t>(std::clamp(texels * kPerTexel, 0.0f, 65534.0f));
+  return static_cast<std::uint32_t>(std::clamp(texels * kPerTexel, 0.0f, kHighest));
 }
 
 // What a look up through the columns needs.
@@ -56,7 +58,8 @@ CALIPSO_WIDE_LOOPS int openDirections(const Look& look, int directions) {
        look.h + from < look.height && from < look.farthest; from = to, to *= 2.0f) {
     const float half_way = 0.5f * (from + to);
     const int lowest = static_cast<int>((look.h + std::max(from, kOwnSurface)) * kPerTexel),
-              highest = static_cast<int>((look.h + std::min(to, look.farthest)) * kPerTexel);
+              highest = static_cast<int>(
+                  std::min((look.h + std::min(to, look.farthest)) * kPerTexel, kHighest));
     for (int g = 0; g < groups; ++g) {
       const EightInts column = columnsAt(look, look.s + half_way * eightAt(look.x + 8 * g),
                                          look.t + half_way * eightAt(look.y + 8 * g));
@@ -95,7 +98,7 @@ SkyMap::SkyMap(const std::vector<Occluder>& occluders, const Eigen::Vector3d& up
   const Eigen::Vector3f size = high - low;
   texel_ =
       std::max({size.x(), size.y(), 1e-6f}) / static_cast<float>(params.resolution - 2 * kMargin);
-  texel_ = std::max(texel_, size.z() * kPerTexel / 65534.0f);
+  texel_ = std::max(texel_, size.z() * kPerTexel / kHighest);
   origin_ = low - kMargin * texel_ * Eigen::Vector3f(1.0f, 1.0f, 0.0f);
   width_ = static_cast<int>(size.x() / texel_) + 2 * kMargin + 1;
   depth_ = static_cast<int>(size.y() / texel_) + 2 * kMargin + 1;
