@@ -187,6 +187,19 @@ TEST(WorldMotion, AfloatObjectFallsWithWhatGravityGains) {
   EXPECT_NEAR(centerOf(world.state()).z(), start - 0.5 * 3.0 * kG, 1e-5);
 }
 
+// A fit can leave what rests on a table as high over it.
+TEST(WorldMotion, WhatRestsJustOverATableIsNotAfloat) {
+  const double radius = 0.5, gap = 0.04 * 2.0 * std::sqrt(3.0) * radius;
+  World world(sceneWith(sphereSurface(radius, 8, 12), {0, 0, radius + gap}), {});
+  Edit thrown = editOf(EditKind::kVelocity, EditMode::kAbsolute);
+  thrown.vector = {0.0, 0.0, 3.0};
+  world.submit(thrown);
+  world.advanceTo(0.0);
+  const double start = centerOf(world.state()).z(), t = 0.4;
+  play(world, t);
+  EXPECT_NEAR(centerOf(world.state()).z(), start + 3.0 * t - 0.5 * kG * t * t, 1e-3);
+}
+
 // How far the first object's vertices go, once an edit is made, in some seconds.
 Eigen::MatrixXd movedBy(const Edit& edit, double seconds, World& world) {
   world.submit(edit);

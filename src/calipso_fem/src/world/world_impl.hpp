@@ -217,10 +217,12 @@ Material observedMaterial(const WorldObject& object, const ObjectSettings& setti
 // @throw std::invalid_argument naming the object and what is wrong with it (world.cpp)
 void validateScene(const WorldScene& scene);
 TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose);  // world_bodies.cpp
+// Whether it moves by a part of its size that counts to the next frame. (world_rests.cpp)
+bool isOnTheMove(const ObservedMotion& seen, double size, double frame_period);
 
 // Alignment leaves supported objects a little above or inside their support: gaps up to this share
-// of the object's diagonal count as contact.
-constexpr double kSupportGap = 0.02;
+// of the object's diagonal count as contact, and wider ones of what rests in the video.
+constexpr double kSupportGap = 0.02, kRestingGap = 0.06;
 
 // Lasting id of the k-th support, planes first; objects have ids from 0 up.
 constexpr int supportId(size_t k) { return -1 - static_cast<int>(k); }

@@ -10,13 +10,12 @@ namespace {
 
 constexpr double kFollows = 0.01;  // of the size: by so much the place has to move
 
-// Whether it moves by more than that to the next frame of the video.
+}  // namespace
+
 bool isOnTheMove(const ObservedMotion& seen, double size, double frame_period) {
   return seen.moving &&
          (seen.linear.norm() + 0.5 * size * seen.angular.norm()) * frame_period > kFollows * size;
 }
-
-}  // namespace
 
 void World::Impl::noteWhatRestsOn(const Actor& carrier) {
   if (carrier.edited || carrier.removed) return;

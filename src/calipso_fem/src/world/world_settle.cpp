@@ -121,12 +121,14 @@ void World::Impl::findHolder(Actor& actor) {
     return;
   }
   const TriangleMesh surface = placed(actor.object.mesh, poseOf(actor, now));
-  const double reach = kSupportGap * boundingDiagonal(surface);
+  const ObservedMotion seen = actor.track.at(now);
+  const double size = boundingDiagonal(surface);
+  const bool rests = !isOnTheMove(seen, size, params.frame_period);
+  const double reach = (rests ? kRestingGap : kSupportGap) * size;
   if (supportGap(surface, obstacles(now, now, &actor), scene.gravity, reach) < reach) {
     actor.holder = Holder::kSupport;
     return;
   }
-  const ObservedMotion seen = actor.track.at(now);
   const bool falls =
       seen.moving && seen.acceleration.dot(scene.gravity) > 0.5 * scene.gravity.squaredNorm();
   actor.holder = falls ? Holder::kNothing : Holder::kBuoyancy;
@@ -140,7 +142,7 @@ Touching World::Impl::supportPoints(const Actor& actor, const TriangleMesh& surf
   if (actor.holder != Holder::kSupport) return {};
   const double size = boundingDiagonal(surface);
   const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
-  const double gap = supportGap(surface, around, scene.gravity, kSupportGap * size);
+  const double gap = supportGap(surface, around, scene.gravity, kRestingGap * size);
   return standingPoints(
       *actor.soft, scene.gravity,
       [&](double patch) {
@@ -184,7 +186,7 @@ void World::Impl::settleAsObserved(Actor& actor, const TriangleMesh& surface,
   const SoftEntry entry{actor.id, actor.object.name, actor.settings.surface, actor.soft.get()};
   for (size_t i = 0; i < hold.size(); ++i)
     contacts.hold(entry, around[support[i].second], hold[i],
-                  (kSupportGap + kLargestContactPatch) * size);
+                  (kRestingGap + kLargestContactPatch) * size);
 }
 
 }  // namespace calipso::fem
