@@ -148,6 +148,23 @@ TEST(Renderer, TakesOutWhatAMaskMissesOfAnObjectThatIsFollowed) {
   EXPECT_EQ(cv::norm(out.bgr(hand), last.bgr(hand), cv::NORM_INF), 0.0);
 }
 
+// A string that neither mask nor model have.
+TEST(Renderer, TakesOutWhatHangsOnAnObjectThatIsFollowed) {
+  const Passing p;
+  ClipFrame last = p.frames.back();
+  const cv::Rect ball = cv::boundingRect(last.labels), all({0, 0}, last.labels.size()),
+                 string = cv::Rect(ball.x + ball.width / 2, ball.y - 20, 2, 22) & all,
+                 other = cv::Rect(ball.x - 20, ball.y - 10, 2, 22) & all;
+  cv::Mat hangs = cv::Mat::zeros(last.labels.size(), CV_8U);
+  hangs(string).setTo(255, last.labels(string) == 0);
+  last.bgr.setTo(cv::Scalar(20, 20, 20), hangs);
+  last.bgr(other).setTo(cv::Scalar(20, 20, 20));
+  const FrameOutput out = p.removed(Passing::poseAt(Passing::kFrames - 1), last);
+  ASSERT_GT(cv::countNonZero(hangs), 20);
+  EXPECT_GT(psnr(out.bgr, emptyTable(), hangs), 35.0);
+  EXPECT_EQ(cv::norm(out.bgr(other), last.bgr(other), cv::NORM_INF), 0.0) << "it hangs on nothing";
+}
+
 // There single pixels tell neither that the place rests nor the shadow's colour.
 TEST(Renderer, TakesOutAPassingShadowInGrainyDusk) {
   const Passing p(0.5, 6.0);

@@ -13,10 +13,30 @@ namespace {
 constexpr int kOff = 4;          // px by which a model may be beside its place
 constexpr double kUnlike = 2.0;  // times what a place that rests may vary by, in one channel
 constexpr int kLeastAcross = 3;  // px
+// px up to which something is thin, gaps that it may have, and the part of an object's size by which
+// it may stand out from it
+constexpr int kThin = 5, kGaps = 2, kReach = 2;
+
+// Is an object that the video has here drawn elsewhere, or not at all?
+bool isGone(const StagedFrame& frame, std::size_t surface, const Actor& here) {
+  for (const StagedObject& object : frame.objects) {
+    if (static_cast<std::size_t>(object.surface) != surface) continue;
+    const auto &now = object.actor.screen.points, &then = here.screen.points;
+    return !std::equal(now.begin(), now.end(), then.begin(), then.end(),
+                       [](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
+                         return (p - q).head<2>().norm() < kNonePx;
+                       });
+  }
+  return true;
+}
 
 // Where edited objects that move are seen in this frame, by their models.
-cv::Mat outlines(const StagedFrame& frame) {
-  cv::Mat within = cv::Mat::zeros(frame.labels.size(), CV_8U);
+struct Outlines {
+  cv::Mat all, gone;  // CV_8UC1, whole picture; of those that are gone from there
+};
+
+Outlines outlines(const StagedFrame& frame) {
+  cv::Mat within = cv::Mat::zeros(frame.labels.size(), CV_8U), gone = within.clone();
   for (std::size_t i = 0; i < frame.edited.size(); ++i) {
     const Surface& surface = frame.prepared.surfaces[i];
     if (!frame.edited[i] || !frame.prepared.moves[i] || !surface.in_video) continue;
@@ -35,26 +55,58 @@ cv::Mat outlines(const StagedFrame& frame) {
     }
     cv::dilate(outline, outline, disc(kOff));
     within(box) |= outline;
+    if (isGone(frame, i, actor)) gone(box) |= outline;
   }
-  return within;
+  return {within, gone};
+}
+
+// Of what is unlike, what is thin and goes on from within an outline, as ropes do.
+// @param unlike, within CV_8UC1
+cv::Mat hanging(const cv::Mat& unlike, const cv::Mat& within) {
+  cv::Mat broad, joined, pieces, found = cv::Mat::zeros(unlike.size(), CV_8U);
+  cv::morphologyEx(unlike, broad, cv::MORPH_OPEN, cv::Mat::ones(kThin + 1, kThin + 1, CV_8U));
+  const cv::Mat thin = unlike & ~broad;
+  cv::dilate(thin, joined, disc(kGaps));
+  const int count = cv::connectedComponents(joined, pieces, 8, CV_32S);
+  std::vector<char> goes_on(count, 0);
+  const auto visit = [&](const auto& see) {
+    for (int v = 0; v < thin.rows; ++v) {
+      for (int u = 0; u < thin.cols; ++u) {
+        const int piece = pieces.at<int>(v, u);
+        if (piece > 0) see(v, u, piece);
+      }
+    }
+  };
+  visit([&](int v, int u, int piece) {
+    if (within.at<std::uint8_t>(v, u) != 0) goes_on[piece] = 1;
+  });
+  visit([&](int v, int u, int piece) {
+    if (goes_on[piece] != 0 && thin.at<std::uint8_t>(v, u) != 0) found.at<std::uint8_t>(v, u) = 255;
+  });
+  return found;
 }
 
 }  // namespace
 
 cv::Mat missedParts(const StagedFrame& frame, const PlateInView& plate, const cv::Mat& now) {
-  const cv::Mat within = outlines(frame);
+  const auto [within, gone] = outlines(frame);
   cv::Mat missed = cv::Mat::zeros(within.size(), CV_8U);
-  const cv::Rect box = cv::boundingRect(within);
-  if (box.empty()) return missed;
+  const cv::Rect outline = cv::boundingRect(within);
+  if (outline.empty()) return missed;
+  const int reach = std::max(outline.width, outline.height) / kReach;
+  const cv::Rect box = (outline + cv::Size(2 * reach, 2 * reach) - cv::Point(reach, reach)) &
+                       cv::Rect({0, 0}, within.size());
   cv::Mat here, behind, differs;
   cv::blur(now(box), here, {3, 3}), cv::blur(plate.codes(box), behind, {3, 3});
   cv::absdiff(here, behind, differs);
   std::vector<cv::Mat> c;
   cv::split(differs, c);
   const cv::Mat unlike =
-      cv::max(c[0], cv::max(c[1], c[2])) > kUnlike * frame.prepared.background.resting_spread;
-  cv::morphologyEx(unlike & within(box) & plate.quiet(box) & (frame.labels(box) == 0), missed(box),
-                   cv::MORPH_OPEN, cv::Mat::ones(kLeastAcross, kLeastAcross, CV_8U));
+      (frame.labels(box) == 0) &
+      (cv::max(c[0], cv::max(c[1], c[2])) > kUnlike * frame.prepared.background.resting_spread);
+  cv::morphologyEx(unlike & within(box) & plate.quiet(box), missed(box), cv::MORPH_OPEN,
+                   cv::Mat::ones(kLeastAcross, kLeastAcross, CV_8U));
+  missed(box) |= hanging(unlike & plate.rests(box), gone(box));
   return missed;
 }
 

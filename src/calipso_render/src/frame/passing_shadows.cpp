@@ -66,19 +66,26 @@ cv::Mat restingPlaces(const Background& background) {
   return rests;
 }
 
-// PlateInView::quiet
-cv::Mat quietPlaces(const StagedFrame& frame, const SeenPlace& place) {
-  const Background& background = frame.prepared.background;
-  cv::Mat at_key = restingPlaces(background);
-  if (background.drifting.established()) at_key.setTo(0, background.drifting.where());
-  if (!frame.prepared.scenery.empty() && !frame.prepared.nearness.empty())
-    at_key.setTo(0, frame.prepared.nearness == 0.0f);
+// A mask of the key frame's view in the frame's.
+cv::Mat inView(const cv::Mat& at_key, const SeenPlace& place) {
   if (place.from_key.empty()) return at_key;
   cv::Mat here;
   cv::remap(at_key, here, place.from_key, cv::noArray(), cv::INTER_NEAREST, cv::BORDER_CONSTANT,
             cv::Scalar(0));
-  if (!place.spread_beside.empty()) here |= place.spread_beside < background.resting_spread;
   return here;
+}
+
+// PlateInView::rests and quiet
+void findQuiet(const StagedFrame& frame, const SeenPlace& place, PlateInView& plate) {
+  const Prepared& p = frame.prepared;
+  cv::Mat at_key = restingPlaces(p.background);
+  if (p.background.drifting.established()) at_key.setTo(0, p.background.drifting.where());
+  plate.rests = inView(at_key, place);
+  plate.quiet = plate.rests.clone();
+  if (!p.scenery.empty() && !p.nearness.empty()) plate.quiet &= inView(p.nearness > 0.0f, place);
+  if (place.from_key.empty() || place.spread_beside.empty()) return;
+  const cv::Mat beside = place.spread_beside < p.background.resting_spread;
+  plate.rests |= beside, plate.quiet |= beside;
 }
 
 PlateInView plateInView(const StagedFrame& frame, const SeenPlace& place) {
@@ -91,7 +98,7 @@ PlateInView plateInView(const StagedFrame& frame, const SeenPlace& place) {
   cv::cvtColor(plate.codes, plate.darker, cv::COLOR_BGR2GRAY);
   cv::blur(plate.darker, plate.darker, {5, 5});
   plate.darker.convertTo(plate.darker, CV_8U, same_view ? kDarker : kDarkerElsewhere);
-  plate.quiet = quietPlaces(frame, place);
+  findQuiet(frame, place, plate);
   return plate;
 }
 

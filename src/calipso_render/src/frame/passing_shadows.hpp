@@ -11,9 +11,8 @@ namespace calipso::render {
 struct PlateInView {
   cv::Mat codes;   // CV_8UC3
   cv::Mat darker;  // CV_8UC1: a frame's grey value, averaged over 5 x 5 px, below it is in shadow
-  // CV_8UC1: 255 = seen in other frames, always alike, and neither what drifts nor, as far as a
-  // depth image tells, the sky
-  cv::Mat quiet;
+  cv::Mat rests;   // CV_8UC1: 255 = seen in other frames, always alike, and not what drifts
+  cv::Mat quiet;   // ... nor, as far as a depth image tells, the sky
 };
 
 // The shadows of edited objects that move in the video show as darkening against the plate. With
