@@ -23,7 +23,7 @@ struct InpaintParams {
   // CV_8UC1, may be empty: number of the surface that a pixel sees, 0 unknown. What is copied comes
   // from the same one.
   cv::Mat surface;
-  static constexpr int kNoPlane = 255;  // all surfaces that are none
+  static constexpr int kNoPlane = 255;  // number of all surfaces that are no planes
   // CV_8UC1, may be empty: kSky where a pixel sees nothing (the depth image has none, over a large
   // area), kNoSky where it sees something, 0 unknown. Copies of the one do not stand for the other.
   cv::Mat sky;

@@ -13,10 +13,9 @@ namespace {
 
 constexpr float kGoldenAngle = 2.39996323f;
 constexpr int kMostDirections = 64;
-constexpr int kMargin = 2;          // texels around the occluders, where nothing is
-constexpr float kPerTexel = 64.0f;  // units of a kept height,
-constexpr float kHighest =
-    65534.0f;                        // and as many as it has at most: below an open column's lowest
+constexpr int kMargin = 2;  // texels around the occluders, where nothing is
+// units of a kept height, and as many as it has at most: fewer than an open column's lowest
+constexpr float kPerTexel = 64.0f, kHighest = 65534.0f;
 constexpr float kOwnSurface = 2.0f;  // texels: what reaches no higher over a point is its own plane
 // A column with nothing in it: its lowest is over its highest.
 constexpr std::uint32_t kOpen = 0xffffu;

@@ -28,8 +28,8 @@ constexpr float kCore = 1.5f;         // px on either side that are the line its
 constexpr float kAlone = 1.0f;        // the same of one that passes before different things
 constexpr LineBand kOwn{kLineHalf, kLineHalf};  // of a line by itself
 constexpr float kCrossFade = 4.0f;              // px on either side of the middle
-constexpr int kBesideEnd =
-    3;  // px by which an end of an edge between two surfaces may have been found beside it
+// px by which an end of an edge between two surfaces may have been found beside it
+constexpr int kBesideEnd = 3;
 
 struct Bridge {
   const LineEnd *from, *to;  // to: nothing if it ends at another bridge
