@@ -6,6 +6,7 @@
 
 #include "calipso_render/visibility.hpp"
 #include "frame/mask_morphology.hpp"
+#include "place/touching_pieces.hpp"
 
 namespace calipso::render {
 namespace {
@@ -63,27 +64,12 @@ Outlines outlines(const StagedFrame& frame) {
 // Of what is unlike, what is thin and goes on from within an outline, as ropes do.
 // @param unlike, within CV_8UC1
 cv::Mat hanging(const cv::Mat& unlike, const cv::Mat& within) {
-  cv::Mat broad, joined, pieces, found = cv::Mat::zeros(unlike.size(), CV_8U);
+  if (cv::countNonZero(within) == 0) return cv::Mat::zeros(unlike.size(), CV_8U);
+  cv::Mat broad, joined;
   cv::morphologyEx(unlike, broad, cv::MORPH_OPEN, cv::Mat::ones(kThin + 1, kThin + 1, CV_8U));
   const cv::Mat thin = unlike & ~broad;
   cv::dilate(thin, joined, disc(kGaps));
-  const int count = cv::connectedComponents(joined, pieces, 8, CV_32S);
-  std::vector<char> goes_on(count, 0);
-  const auto visit = [&](const auto& see) {
-    for (int v = 0; v < thin.rows; ++v) {
-      for (int u = 0; u < thin.cols; ++u) {
-        const int piece = pieces.at<int>(v, u);
-        if (piece > 0) see(v, u, piece);
-      }
-    }
-  };
-  visit([&](int v, int u, int piece) {
-    if (within.at<std::uint8_t>(v, u) != 0) goes_on[piece] = 1;
-  });
-  visit([&](int v, int u, int piece) {
-    if (goes_on[piece] != 0 && thin.at<std::uint8_t>(v, u) != 0) found.at<std::uint8_t>(v, u) = 255;
-  });
-  return found;
+  return thin & touchingPieces(joined, within);
 }
 
 }  // namespace

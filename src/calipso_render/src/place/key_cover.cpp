@@ -3,6 +3,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "place/rim_remains.hpp"
+#include "place/touching_pieces.hpp"
 
 namespace calipso::render {
 namespace {
@@ -17,21 +18,11 @@ constexpr int kWaterline = 2;       // px by which masks end before it, and over
 // it. The rim is left out: there the fit is not exact.
 cv::Mat frontOf(const cv::Mat& outline, const cv::Mat& labels) {
   const cv::Mat gaps = outline & (labels == 0);
-  cv::Mat front, narrow, inside, parts;
+  cv::Mat front, narrow, inside;
   cv::morphologyEx(gaps, front, cv::MORPH_OPEN, cv::Mat::ones(kFrontOpening, kFrontOpening, CV_8U));
   cv::morphologyEx(gaps, narrow, cv::MORPH_OPEN, cv::Mat::ones(kNarrowFront, kNarrowFront, CV_8U));
   cv::distanceTransform(outline, inside, cv::DIST_L2, cv::DIST_MASK_3);
-  std::vector<bool> deep(cv::connectedComponents(narrow, parts, 8, CV_32S), false);
-  for (int v = 0; v < parts.rows; ++v) {
-    for (int u = 0; u < parts.cols; ++u) {
-      if (inside.at<float>(v, u) >= kDeepFront) deep[parts.at<int>(v, u)] = true;
-    }
-  }
-  for (int v = 0; v < parts.rows; ++v) {
-    for (int u = 0; u < parts.cols; ++u) {
-      if (parts.at<int>(v, u) > 0 && deep[parts.at<int>(v, u)]) front.at<std::uint8_t>(v, u) = 255;
-    }
-  }
+  front |= touchingPieces(narrow, inside >= kDeepFront);
   return cv::countNonZero(front) > 0 ? front : cv::Mat();
 }
 

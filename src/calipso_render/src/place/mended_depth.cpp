@@ -57,8 +57,8 @@ cv::Mat mendedDepth(const cv::Mat& depth, const cv::Mat& labels,
   const cv::Mat on = isOn(ground, depth);
   cv::Mat gap =
       (plane_depth > 0.0f) & (labels == 0) & ~on & ((depth == 0.0f) | (depth > plane_depth));
-  for (std::size_t k = 0; k < planes.size() && planes.size() > 1; ++k) {  // past another's edge
-    const cv::Mat own = groundNearness({planes[k]}, camera, cv::Mat());
+  for (const SupportPlane& plane : planes) {  // is seen past another's edge
+    const cv::Mat own = groundNearness({plane}, camera, cv::Mat());
     if (!own.empty()) gap.setTo(0, isOn(own, depth));
   }
   if (cv::countNonZero(gap) == 0) return depth;
