@@ -98,6 +98,27 @@ TEST(PatchOrigins, ComeFromWhereTheGroundIsAboutAsNear) {
   }
 }
 
+// A board on a darker floor, and a dark spot at the hole's rim: what is around the hole is the
+// board, so nothing comes from the floor.
+TEST(PatchOrigins, ComeFromWhatHasTheColourAroundTheHole) {
+  constexpr int kFloor = 112;  // its first row
+  cv::Mat image = 0.3 * spots(240, 200) + cv::Scalar::all(120.0),
+          hole = cv::Mat::zeros(200, 240, CV_8U);
+  for (const cv::Rect& dark : {cv::Rect(0, kFloor, 240, 200 - kFloor), cv::Rect(90, 34, 40, 6)})
+    cv::subtract(image(dark), cv::Scalar::all(110.0), image(dark));
+  hole(cv::Rect(80, 40, 70, 60)).setTo(255);
+  pushPull(image, cv::Mat_<float>(1.0f / 255.0f * cv::Mat_<float>(hole == 0))).copyTo(image, hole);
+  const auto fromFloor = [&](float off_colour) {
+    InpaintParams params;
+    params.off_colour = off_colour, params.away_row = 3.0f;
+    cv::Mat rows;
+    cv::extractChannel(patchOrigins(image, hole, hole == 0, {}, params), rows, 1);
+    return cv::countNonZero(rows >= kFloor);
+  };
+  EXPECT_GT(fromFloor(0.0f), 100);
+  EXPECT_EQ(fromFloor(1.0f), 0);
+}
+
 // A dark tower stands at the left and shows again through slits of a hole at the right, too narrow
 // for any patch.
 TEST(PatchOrigins, AgreeWithWhatShowsThroughNarrowGaps) {

@@ -16,6 +16,9 @@ struct InpaintParams {
   // squared code values per unit by which a place is nearer than the source, over that: what is
   // farther has less detail
   float away_farther = 0.0f;
+  // what a squared code value counts by which a source's mean colour is off that of the smooth fill
+  // that the hole is given with
+  float off_colour = 0.0f;
   std::uint32_t seed = 1;
   // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the horizon. What is
   // copied comes from where the ground is about as near: there things have the same size.

@@ -31,7 +31,8 @@ constexpr float kRounded =
     1.5f;  // px by which copies are off a lattice whose shifts are no whole pixels
 constexpr float kAwayOnPlane = 3.0f;  // InpaintParams::away_row there: its rows are no layers
 constexpr float kAwayFromStripe = 300.0f, kAwayAlongStripe = 4.0f;  // ... where they are stripes
-constexpr float kFarther = 2000.0f;   // InpaintParams::away_farther along a plane
+constexpr float kFarther = 2000.0f;  // InpaintParams::away_farther along a plane
+constexpr float kOffColour = 1.0f;   // InpaintParams::off_colour there: two things lie in one plane
 constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
 constexpr int kNearEdges = 64;  // px around the hole in which edges between surfaces are sought
 constexpr int kSkyLabel = 254;  // of the sky among surfaces
@@ -180,6 +181,7 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
     inner.coarsest_side =
         std::max(inner.coarsest_side, cvRound(kPatchSide * side / (2.0f * lattice->shortest())));
   }
+  if (!lattice && !part.pattern.striped) inner.off_colour = kOffColour;
   const cv::Mat wanted =
       lattice ? goesOnByPattern(repeatsBy(*lattice, part.look, part.known, part.known), part.known,
                                 part.hole)

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <type_traits>
 
 namespace calipso::render {
@@ -12,7 +13,9 @@ constexpr float kNearer = 2.5f;  // times that a source may be nearer or farther
 // cost of one that does not, squared code values: such are taken for want of others only
 constexpr float kMisplaced = 2000.0f;
 constexpr float kAsNear = 1.02f;  // times that a place may be nearer than a source as near as it
-constexpr float kOffPattern = 0.75f;  // px by which a copy's way may miss the pattern
+constexpr float kOffPattern = 0.75f;      // px by which a copy's way may miss the pattern
+constexpr float kColourVaries = 1000.0f;  // squared code values that are not off a colour
+constexpr float kColourAround = 61.0f;    // px of the square that tells a place's colour
 
 }  // namespace
 
@@ -26,7 +29,14 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const P
       repeats_(pattern.lattice || !pattern.periods.empty()),
       away_row_(params.away_row),
       away_column_(params.away_column),
-      away_farther_(params.away_farther) {
+      away_farther_(params.away_farther),
+      off_colour_(params.off_colour) {
+  if (off_colour_ > 0.0f) {
+    // Wider in the hole: a spot at its rim does not tell what is there.
+    const int around = std::max(kPatchSide, cvRound(kColourAround / scale));
+    cv::blur(level.image, colours_, {kPatchSide, kPatchSide});
+    cv::blur(level.image, expected_, {around, around});
+  }
   for (int v = 0; v < level.hole.rows; ++v) {
     Known* known = &places_[v * columns_];
     const auto take = [&](const cv::Mat& values, auto Known::*to) {
@@ -85,6 +95,7 @@ inline float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
   if (differ(own.surface, other.surface)) cost += kMisplaced;
   if (differ(own.sky, other.sky)) cost += kMisplaced;
   if (repeats_ && offPattern(p, q) > kOffPattern) cost += kMisplaced;
+  if (!colours_.empty()) cost += off_colour_ * offColour(p, q);
   return kPatchSide * kPatchSide * cost;
 }
 
@@ -93,6 +104,12 @@ float PatchCost::offPattern(const cv::Point& p, const cv::Point& q) const {
   const cv::Point2f fine = scale_ * cv::Point2f(q - p);
   const auto whole = pattern_->nearest(rowOf(p), fine);
   return whole ? static_cast<float>(cv::norm(fine - *whole)) / scale_ : 0.0f;
+}
+
+// Squared code values by which a copy would be off its place's colour.
+float PatchCost::offColour(const cv::Point& p, const cv::Point& q) const {
+  const cv::Vec4f off = expected_.at<cv::Vec4f>(p) - colours_.at<cv::Vec4f>(q);
+  return std::max(0.0f, off[0] * off[0] + off[1] * off[1] + off[2] * off[2] - kColourVaries);
 }
 
 }  // namespace calipso::render

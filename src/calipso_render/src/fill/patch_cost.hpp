@@ -58,13 +58,17 @@ class PatchCost {
   int rowOf(const cv::Point& p) const { return cvRound(scale_ * (p.y + 0.5f) - 0.5f); }
   inline float awayCost(const cv::Point& p, const cv::Point& q) const;
   float offPattern(const cv::Point& p, const cv::Point& q) const;
+  float offColour(const cv::Point& p, const cv::Point& q) const;
 
   int columns_;
   std::vector<Known> places_;
+  // CV_32FC4, before the hole is filled: means over a patch, and far around it; empty if no colour
+  // counts
+  cv::Mat colours_, expected_;
   float scale_, horizon_;
   const Pattern* pattern_;
-  bool repeats_;                                 // the pattern knows any shifts
-  float away_row_, away_column_, away_farther_;  // as InpaintParams'
+  bool repeats_;                                              // the pattern knows any shifts
+  float away_row_, away_column_, away_farther_, off_colour_;  // as InpaintParams'
 };
 
 }  // namespace calipso::render
