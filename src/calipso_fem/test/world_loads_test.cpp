@@ -267,10 +267,6 @@ TEST(WorldLoads, ACopyLivesOnItsOwn) {
   twin.new_name = "twin";
   twin.translation = {0.3, 0, 0.2};
   world.submit(twin);
-  Edit drop = editOf(EditKind::kObjectKind);
-  drop.object = "twin";
-  drop.object_kind = ObjectKind::kRigid;
-  world.submit(drop);
   for (const EditOutcome& outcome : world.advanceTo(0.0))
     EXPECT_TRUE(outcome.accepted) << outcome.message;
   WorldState state = world.state();

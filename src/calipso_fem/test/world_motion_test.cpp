@@ -31,6 +31,30 @@ TEST(WorldMotion, FallingRigidBodyFollowsTheParabola) {
               0.0, 1e-6);
 }
 
+TEST(WorldMotion, ACopyOfWhatTheVideoMovesStartsWithItsVelocityAndFalls) {
+  World world(sceneWith(boxSurface({0.1, 0.2, 0.3}, 1), {0, 0, 10}, false), {});
+  world.addObservedMotion("thing", {0.0,
+                                    true,
+                                    Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
+                                    {0, 0, 10},
+                                    {1, 0, 2},
+                                    {0, 0, 0},
+                                    {0, 0, -kG}});
+  Edit twin = editOf(EditKind::kDuplicate);
+  twin.new_name = "twin";
+  twin.translation = {0.5, 0, 1};
+  world.submit(twin);
+  world.advanceTo(0.0);
+  play(world, 1.0);
+  const WorldState state = world.state();
+  EXPECT_FALSE(state.objects[0].edited);
+  EXPECT_EQ(state.objects[1].kind, ObjectKind::kRigid);
+  EXPECT_NEAR(
+      (state.objects[1].world_from_object.translation() - Eigen::Vector3d(1.5, 0, 13 - 0.5 * kG))
+          .norm(),
+      0.0, 1e-6);
+}
+
 // A box that the video shows falling onto the ground and springing off aside, by 30 frames: where
 // no simulation would send it. Thrown on as it was, it does the same; changed in any way, it is
 // simulated.

@@ -49,6 +49,7 @@ ObjectKind World::Impl::kindFor(const Actor& actor, const Edit& edit) const {
     case EditKind::kObjectKind:
       return edit.object_kind;
     case EditKind::kInsert:
+    case EditKind::kDuplicate:  // nothing moves the copy but physics
       return ObjectKind::kRigid;
     case EditKind::kTransform:
       return ObjectKind::kKinematic;
@@ -239,13 +240,17 @@ std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
                   edit.factor * nodalModes(actor, actor.track.at(now).mode_velocities));
     return actor.object.name + " moves with " + std::to_string(edit.factor) +
            " of the velocity it deforms with";
-  } else if (actor.soft) {
-    actor.soft->body().setRigidVelocity(linear, angular);
   } else {
-    rigid.setVelocity(*actor.body, linear, angular);
+    setVelocity(actor, linear, angular);
   }
   return actor.object.name + " moves with " + describe(linear) + " m/s, " + describe(angular) +
          " rad/s";
+}
+
+void World::Impl::setVelocity(Actor& actor, const Eigen::Vector3d& linear,
+                              const Eigen::Vector3d& angular) {
+  if (actor.soft) actor.soft->body().setRigidVelocity(linear, angular);
+  if (actor.kind == ObjectKind::kRigid) rigid.setVelocity(*actor.body, linear, angular);
 }
 
 std::string World::Impl::remove(Actor& actor) {
@@ -258,17 +263,25 @@ std::string World::Impl::remove(Actor& actor) {
   return actor.object.name + " is removed";
 }
 
-// Moved like edit 'transform' moves, from where the original is now.
+// Moved like edit 'transform' moves, from where the original is now and with its velocity.
 std::string World::Impl::copy(Actor& actor, const Edit& edit) {
   if (actor.removed)
     throw std::invalid_argument(actor.object.name + " has been removed; send a reset for it first");
   const Eigen::Vector3d centroid = centroidOf(actor);
   const Eigen::Isometry3d motion = motionAbout(centroid, edit);
+  const BodyMotion moves = motionOf(actor);
+  const Holder known = actor.holder;
+  findHolder(actor);  // what floats has a copy that floats
   Actor& fresh = duplicate(actor.object.name, edit.new_name, motion);
+  actor.holder = known;
   fresh.source = actor.source.empty() && !actor.inserted ? actor.object.name : actor.source;
   fresh.look = actor.look;
   fresh.edited = true;
   if (edit.scale != 1.0) scale(fresh, edit.scale);
+  if (!fresh.simulated()) {
+    touch(fresh, edit);
+    setVelocity(fresh, motion.linear() * moves.linear, motion.linear() * moves.angular);
+  }
   return edit.new_name + " is a copy of " + actor.object.name + ", moved by " +
          describe(edit.translation) + " m";
 }

@@ -162,6 +162,7 @@ struct World::Impl {
   std::string changeMaterial(Actor& actor, const Edit& edit);
   std::string makeImmovable(Actor& actor, const Edit& edit, const Material& material);
   std::string changeGravity(const Edit& edit);
+  void setVelocity(Actor& actor, const Eigen::Vector3d& linear, const Eigen::Vector3d& angular);
   std::string changeVelocity(Actor& actor, const Edit& edit);
   void touch(Actor& actor, const Edit& edit);
   ObjectKind kindFor(const Actor& actor, const Edit& edit) const;
