@@ -49,14 +49,16 @@ struct TwoBalls {
     cv::dilate(key.labels == 1, near, cv::Mat::ones(2 * px + 1, 2 * px + 1, CV_8U));
     return near & (key.labels == 2);
   }
-  FrameOutput drawn(const Eigen::Vector3d& move) const {
+  // @param touched the other one is edited, too, and stays where it is
+  FrameOutput drawn(const Eigen::Vector3d& move, bool touched = false) const {
     FrameInput in;
     in.bgr = key.bgr, in.labels = key.labels, in.camera = key.camera, in.stamp_ns = 7;
     ObjectInFrame ball, other;
     ball.name = "ball", ball.edited = true;
     for (const Eigen::Vector3f& x : prepared->surfaces[0].key_vertices)
       ball.vertices.push_back(x + move.cast<float>());
-    other.name = "other";
+    other.name = "other", other.edited = touched;
+    if (touched) other.vertices = prepared->surfaces[1].key_vertices;
     in.objects = {ball, other};
     return Renderer(prepared, render).composite(in);
   }
@@ -85,6 +87,25 @@ TEST(Others, AnEditedObjectCastsItsShadowOnOneThatStays) {
                 0.06f)
         << c;  // codes are rounded
   }
+}
+
+// An edited object at rest comes into another's shadow like one that is not edited, and so does
+// the table around it.
+TEST(Others, AShadowFallsOnAnEditedObjectAtRestAndAroundIt) {
+  const TwoBalls s(params());
+  const Eigen::Vector3d sun = s.prepared->light.light.direction.cast<double>(),
+                        above = kOther + 2.6 * kBallRadius * sun - kCentre;
+  const cv::Mat expected = s.drawn(above).bgr, touched = s.drawn(above, true).bgr;
+  cv::Mat near, difference, other;
+  cv::dilate(s.key.labels == 2, near, cv::Mat::ones(25, 25, CV_8U));
+  cv::absdiff(expected, touched, difference);
+  cv::inRange(difference, cv::Scalar(), cv::Scalar::all(24), other);
+  other = (other == 0) & near & (s.key.labels != 1);
+  EXPECT_LT(cv::countNonZero(other), cv::countNonZero(near) / 100);
+  cv::Mat shaded;
+  cv::absdiff(expected, s.key.bgr, difference);
+  cv::inRange(difference, cv::Scalar(), cv::Scalar::all(24), shaded);
+  EXPECT_GT(cv::countNonZero((shaded == 0) & near), cv::countNonZero(near) / 5);
 }
 
 // Where an object that is taken away has mixed into what stands behind it, that is drawn anew.

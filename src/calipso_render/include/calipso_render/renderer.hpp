@@ -33,6 +33,7 @@ struct Look {
 struct SunChange {
   std::optional<Eigen::Vector3f> direction;  // towards it, world
   float factor = 1.0f;                       // of its brightness
+  bool changes() const { return direction || factor != 1.0f; }
 };
 
 // One object in one frame, as the simulator has it.

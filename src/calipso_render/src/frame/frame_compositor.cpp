@@ -60,6 +60,7 @@ void FrameCompositor::drawRegion() {
         if (carries) residual_.emplace(frame_, revealed_, surfaces_->centre(), caches_.rest);
       },
       [this] { screen_.emplace(frame_, surfaces_->centre()); });
+  still_->leaveRelit(*light_, moved_, resting_, removed_);
   backdrop_.emplace(frame_, place_, revealed_, reflections_, others_, *surfaces_, *edges_, *light_,
                     removed_);
   kinds_.emplace(frame_, reflections_, others_, *surfaces_, *edges_, *light_, *still_, *screen_,
@@ -100,7 +101,7 @@ RowComposer FrameCompositor::composer() const {
 void FrameCompositor::composeRow(const RowComposer& composer, int v, Row& row,
                                  FrameOutput& out) const {
   composer.compose(v, row);
-  if (residual_) residual_->addRims(v, row);
+  if (residual_) residual_->addRims(v, *still_, row);
   still_->keep(v, row);
   const int left = region_.all.x, width = region_.all.width;
   cv::Vec3b* codes = out.bgr.ptr<cv::Vec3b>(v) + left;

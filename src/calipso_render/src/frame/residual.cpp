@@ -155,11 +155,12 @@ void Residual::addToPixel(std::uint32_t id, int u, int v, cv::Vec4f& colour) con
   addAt(u - moved.x(), v - moved.y(), moved, object.surface, object.tint(), colour);
 }
 
-void Residual::addRims(int v, Row& row) const {
+void Residual::addRims(int v, const StillPixels& still, Row& row) const {
   if (rims_.empty()) return;
   for (std::size_t i = rim_rows_[v - region_.y]; i < rim_rows_[v - region_.y + 1]; ++i) {
     const Rim& rim = rims_[i];
-    if (rim.nearest.x < 0 || row.source[rim.u] == kOriginal) continue;
+    if (rim.nearest.x < 0 || row.source[rim.u] == kOriginal || still.isRelit(rim.u, v - region_.y))
+      continue;
     const std::uint32_t id = centre_.ids(rim.nearest.y)[rim.nearest.x];
     const cv::Point from = rim.nearest + region_.tl();
     const Eigen::Vector2f moved =

@@ -7,6 +7,7 @@
 #include "frame/revealed_place.hpp"
 #include "frame/row.hpp"
 #include "frame/staged_frame.hpp"
+#include "frame/still_pixels.hpp"
 
 namespace calipso::render {
 
@@ -25,8 +26,8 @@ class Residual {
   void addToStretch(int v, int first, int last, int slot, Row& row) const;
   // To pixel (u, v), which sees a triangle `id`. @param colour linear, and what carries no noise
   void addToPixel(std::uint32_t id, int u, int v, cv::Vec4f& colour) const;
-  // To the pixels of picture row v that a rim has come to.
-  void addRims(int v, Row& row) const;
+  // To the pixels of picture row v that a rim has come to, and that are not the video's own.
+  void addRims(int v, const StillPixels& still, Row& row) const;
 
  private:
   // What drawing misses beyond the silhouette, where a surface's rim has come to.

@@ -82,6 +82,8 @@ CALIPSO_WIDE_LOOPS void RowKinds::takeStill(int j, Kind* kinds) const {
   for (int i = 0; i < region_.width; ++i) {
     if (still[i] >= StillPixels::kKept && kinds[i] != kNone)
       kinds[i] = removed[i] != 0 ? kNone : isPlain(kinds[i]) ? kSpecial : kinds[i];
+    else if (kinds[i] == kNone && still_.isRelit(i, j))
+      kinds[i] = kBehind;
   }
 }
 

@@ -1,18 +1,52 @@
 #include "frame/still_pixels.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
 #include "frame/mask_morphology.hpp"
 #include "frame/removed.hpp"
+#include "smooth_step.hpp"
 
 namespace calipso::render {
 namespace {
 
 // mask margins around a surface at rest in which the frame's pixels stay
 constexpr int kRimReach = 4;
+// of the visible sun: changes on a surface at rest that are not seen, and from which it is drawn
+constexpr float kSameSun = 0.05f, kOtherSun = 0.2f;
+
+// Is the light on the place another one at (i, j) of the region?
+bool isRelitAt(const PlaceLight& light, const cv::Rect& region, int i, int j) {
+  if (light.takes().at<std::uint8_t>(j, i) == 0 ||
+      !light.relightable().at(i + region.x, j + region.y))
+    return false;
+  const auto change = [&](const cv::Mat& now, const cv::Mat& before) {
+    return std::abs(now.at<std::uint8_t>(j, i) - before.at<std::uint8_t>(j, i));
+  };
+  return change(light.sun(), light.sunBefore()) + change(light.sky(), light.skyBefore()) >=
+         kSameLevels;
+}
+
+struct SunOnSurfaces {
+  const StagedFrame& frame;
+  const MovedShadow& moved;
+  const RestingLight& resting;
+
+  // How far a pixel's surface has the sun that it has in the video: 0 where edited objects keep it
+  // off, or let it in.
+  float sameAt(std::uint32_t id, int u, int v) const {
+    const SurfacePoint p = surfacePoint(frame.objectOf(id).actor, VisibilityBuffer::triangleOf(id),
+                                        static_cast<float>(u), static_cast<float>(v), frame.eye);
+    if (p.normal.dot(frame.light.direction) <= 0.0f) return 1.0f;
+    const Visibility* originals = resting.originals();
+    const float now = moved.sun->visibility(p.position, p.normal),
+                before = originals != nullptr ? originals->visibility(p.position, p.normal) : 1.0f;
+    return 1.0f - smoothStep(kSameSun, kOtherSun, std::abs(now - before));
+  }
+};
 
 cv::v_float32x4 linearOf(const float* decoded, const cv::Vec3b& c) {
   return {decoded[c[0]], decoded[c[1]], decoded[c[2]], 0.0f};
@@ -106,6 +140,47 @@ cv::Mat StillPixels::nearerToLeft(int surface, const cv::Mat& rests, const cv::M
   cv::distanceTransform(left == 0, to_left, cv::DIST_L1, cv::DIST_MASK_3, CV_8U);
   cv::distanceTransform(rests == 0, to_rest, cv::DIST_L1, cv::DIST_MASK_3, CV_8U);
   return to_left < to_rest;
+}
+
+// Per surface: edited, and not where the video has it.
+std::vector<bool> StillPixels::findMoved() const {
+  std::vector<bool> moved = frame_.edited;
+  for (const StagedObject& object : frame_.objects) {
+    const auto &now = object.actor.screen.points, &then = object.observed.points;
+    const auto isNear = [](const auto& a, const auto& b) {
+      return (a - b).template head<2>().norm() < kMovedPx;
+    };
+    if (object.isAtRestInVideo() && std::equal(now.begin(), now.end(), then.begin(), isNear))
+      moved[object.surface] = false;
+  }
+  return moved;
+}
+
+void StillPixels::leaveRelit(const PlaceLight& light, const MovedShadow& moved,
+                             const RestingLight& resting, cv::Mat& removed) {
+  const bool other_sun = frame_.input.sun.changes();
+  const std::vector<bool> has_moved = findMoved();
+  const auto count = std::count(has_moved.begin(), has_moved.end(), true);
+  if (none() || (count == 0 && !other_sun)) return;
+  const SunOnSurfaces sun{frame_, moved, resting};
+  relit_ = cv::Mat::zeros(region_.size(), CV_8U);
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int j = 0; j < region_.height; ++j) {
+    const std::uint32_t* ids = centre_.ids(j);
+    float* parts = parts_.ptr<float>(j);
+    for (int i = 0; i < region_.width; ++i) {
+      if (parts[i] == 0.0f) continue;
+      if (ids[i] == VisibilityBuffer::kNothing || !frame_.objectOf(ids[i]).edited) {
+        if (!isRelitAt(light, region_, i, j)) continue;
+        relit_.at<std::uint8_t>(j, i) = 255;
+        parts[i] = 0.0f, removed.at<std::uint8_t>(j, i) = 0;
+      } else if (other_sun) {
+        parts[i] = 0.0f;
+      } else if (count > (has_moved[frame_.objectOf(ids[i]).surface] ? 1 : 0)) {
+        parts[i] *= sun.sameAt(ids[i], i + region_.x, j + region_.y);
+      }
+    }
+  }
 }
 
 // The triangles with a point that may be at rest.

@@ -3,6 +3,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "frame/moved_shadow.hpp"
+#include "frame/place_light.hpp"
+#include "frame/resting_light.hpp"
 #include "frame/row.hpp"
 #include "frame/seen_place.hpp"
 #include "frame/staged_frame.hpp"
@@ -12,8 +15,8 @@ namespace calipso::render {
 // px around a surface of a new look in which the frame has its old colour, too
 constexpr int kRepaintReach = 2;
 
-// Pixels of edited objects at which nothing has moved: the frame's own are the best picture of
-// them.
+// Pixels of edited objects at which nothing has moved, nor their light: the frame's own are the
+// best picture of them.
 class StillPixels {
  public:
   static constexpr float kKept = 0.999f;  // of a pixel at rest: it keeps its bytes
@@ -24,10 +27,18 @@ class StillPixels {
   StillPixels(const StagedFrame& frame, const SeenPlace& place, const VisibilityBuffer& centre,
               const cv::Mat& removed);
 
+  // Leaves out what others that have moved, or another sun, light otherwise than the video: the
+  // surfaces, and what of their rims lies on the place. That keeps its pixels in their new light,
+  // and is not removed.
+  void leaveRelit(const PlaceLight& light, const MovedShadow& moved, const RestingLight& resting,
+                  cv::Mat& removed);
+
   // Everything moved, or nothing is to be kept.
   bool none() const { return parts_.empty(); }
   // Row of the region: 1 = nothing moved at the pixel. @pre !none()
   const float* row(int j) const { return parts_.ptr<float>(j); }
+  // Does the rim of a surface at rest lie at (i, j) of the region, in another light?
+  bool isRelit(int i, int j) const { return !relit_.empty() && relit_.at<std::uint8_t>(j, i) != 0; }
   // Gives the pixels of picture row v their part of the frame's own.
   void keep(int v, Row& row) const;
 
@@ -37,6 +48,7 @@ class StillPixels {
     cv::Mat owner;      // CV_16SC1: surface, -1 = none
     cv::Mat repainted;  // CV_8UC1: in a new look
   };
+  std::vector<bool> findMoved() const;
   bool findResting(const StagedObject& object, std::vector<char>& can_rest) const;
   Seen findParts(const std::vector<std::vector<char>>& can_rest);
   void keepRims(const cv::Mat& owner);
@@ -51,6 +63,7 @@ class StillPixels {
   const cv::Mat removed_;
   const cv::Rect region_;
   cv::Mat parts_;  // CV_32FC1 over the region
+  cv::Mat relit_;  // CV_8UC1 likewise; may be empty
 };
 
 }  // namespace calipso::render
