@@ -283,6 +283,15 @@ TEST(WorldLoads, ACopyLivesOnItsOwn) {
   EXPECT_FALSE(world.advanceTo(world.time()).at(0).accepted) << "the name is taken";
 }
 
+TEST(WorldLoads, ACopyOfClothIsCloth) {
+  World world(sceneWith(boxSurface({0.4, 0.002, 0.3}, 8), {0, 0, 1}, false), coarse());
+  Edit twin = editOf(EditKind::kDuplicate);
+  twin.new_name = "twin";
+  world.submit(twin);
+  world.advanceTo(0.0);
+  EXPECT_EQ(world.state().objects.at(1).kind, ObjectKind::kDeformable);
+}
+
 TEST(WorldLoads, AnInsertedModelFallsOntoTheTable) {
   WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 2), {0, 0, 0.05});
   scene.directory = ::testing::TempDir();

@@ -96,7 +96,18 @@ BodyMotion World::Impl::motionOf(const Actor& actor) const {
 
 decltype(TriangleMesh::vertices) World::Impl::verticesOf(const Actor& actor) const {
   if (actor.soft) return actor.soft->vertices();
-  return placed(actor.object.mesh, poseOf(actor, now)).vertices;
+  if (actor.kind == ObjectKind::kRigid || actor.modes.cols() == 0)
+    return placed(actor.object.mesh, poseOf(actor, now)).vertices;
+  // What the video deforms goes on doing so until it is simulated: from its shape and place in the
+  // key frame.
+  TriangleMesh shape = actor.object.mesh;
+  const Eigen::VectorXd amplitudes = actor.track.at(now).mode_amplitudes;
+  if (amplitudes.size() == actor.modes.cols()) {
+    const Eigen::VectorXd field = actor.modes * amplitudes;
+    shape.vertices +=
+        Eigen::Map<const Eigen::Matrix3Xd>(field.data(), 3, field.size() / 3).transpose();
+  }
+  return placed(shape, actor.placement * actor.object.world_from_object).vertices;
 }
 
 Eigen::Vector3d World::Impl::centroidOf(const Actor& actor) const {

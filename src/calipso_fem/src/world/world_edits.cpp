@@ -49,8 +49,10 @@ ObjectKind World::Impl::kindFor(const Actor& actor, const Edit& edit) const {
     case EditKind::kObjectKind:
       return edit.object_kind;
     case EditKind::kInsert:
-    case EditKind::kDuplicate:  // nothing moves the copy but physics
-      return ObjectKind::kRigid;
+    case EditKind::kDuplicate:  // nothing but physics moves what is new
+      return isCloth(actor.object.mesh, massProperties(actor.object.mesh, 1.0).mass)
+                 ? ObjectKind::kDeformable
+                 : ObjectKind::kRigid;
     case EditKind::kTransform:
       return ObjectKind::kKinematic;
     default:

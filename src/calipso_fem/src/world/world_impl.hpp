@@ -218,6 +218,8 @@ Material observedMaterial(const WorldObject& object, const ObjectSettings& setti
 // @throw std::invalid_argument naming the object and what is wrong with it (world.cpp)
 void validateScene(const WorldScene& scene);
 TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose);  // world_bodies.cpp
+// A sheet that is meant to bend: thin, and large for its volume (m^3). world_settle.cpp
+bool isCloth(const TriangleMesh& surface, double volume);
 // Whether it moves by a part of its size that counts to the next frame. (world_rests.cpp)
 bool isOnTheMove(const ObservedMotion& seen, double size, double frame_period);
 

@@ -70,7 +70,8 @@ std::string World::Impl::blowEverywhere(const Edit& edit) {
   return message.empty() ? "there is nothing that wind could move" : message;
 }
 
-// A CAD model that the video does not have. It is rigid unless an edit to come needs more.
+// A CAD model that the video does not have. It is rigid unless it is cloth, or an edit to
+// come needs more.
 std::string World::Impl::insert(const Edit& edit) {
   WorldObject object;
   object.name = edit.new_name;

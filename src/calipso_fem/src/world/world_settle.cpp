@@ -94,16 +94,14 @@ std::vector<HoldPoint> lowestPoints(const SoftObject& soft, const Eigen::Vector3
   return points;
 }
 
-// A sheet that is meant to bend: thin, and large for its volume.
-bool isCloth(const TriangleMesh& surface, const DeformableBody& body) {
+}  // namespace
+
+bool isCloth(const TriangleMesh& surface, double volume) {
   constexpr double kThin = 0.01, kLarge = 0.1;  // of the size, and of its square
   const double size = boundingDiagonal(surface),
                area = (isClosed(surface) ? 0.5 : 1.0) * surfaceArea(surface);
-  const double volume = body.totalMass() / body.model().cellMaterials().front().density;
   return volume < kThin * size * area && area > kLarge * size * size;
 }
-
-}  // namespace
 
 std::vector<HoldPoint> pointsOf(const Touching& touching) {
   std::vector<HoldPoint> points;
@@ -155,7 +153,9 @@ Touching World::Impl::supportPoints(const Actor& actor, const TriangleMesh& surf
 // with it: they get what keeps their sag at a few per cent, where they stand, hang or, put down,
 // would stand.
 void World::Impl::limitSag(Actor& actor, const TriangleMesh& surface, std::vector<HoldPoint> hold) {
-  if (actor.settings.youngs_modulus || isCloth(surface, actor.soft->body())) return;
+  const DeformableBody& body = actor.soft->body();
+  const double volume = body.totalMass() / body.model().cellMaterials().front().density;
+  if (actor.settings.youngs_modulus || isCloth(surface, volume)) return;
   if (hold.empty() && !actor.soft->hasFixedNodes()) hold = lowestPoints(*actor.soft, scene.gravity);
   const auto sag = actor.soft->linearSag(scene.gravity, hold);
   const double factor = sag ? *sag / (kLargestSag * boundingDiagonal(surface)) : 1.0;

@@ -189,6 +189,8 @@ void Residual::addAt(float u, float v, const Eigen::Vector2f& moved, int owner,
                      const cv::Vec3f& tint, cv::Vec4f& colour) const {
   const float squared = moved.squaredNorm();
   const bool sways = frame_.prepared.sways[owner];
+  // What sways past its place in the key frame in another colour would flash there.
+  if (sways && tint != cv::Vec3f::all(1)) return;
   const float none = sways ? kNoneSwaying : kNonePx;
   if (squared >= none * none) return;
   const float part = 1.0f - smoothStep(sways ? kWholeSwaying : kWholePx, none, std::sqrt(squared));

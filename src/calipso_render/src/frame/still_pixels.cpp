@@ -158,7 +158,7 @@ std::vector<bool> StillPixels::findMoved() const {
 
 void StillPixels::leaveRelit(const PlaceLight& light, const MovedShadow& moved,
                              const RestingLight& resting, cv::Mat& removed) {
-  const bool other_sun = frame_.input.sun.changes();
+  const bool other_sun = frame_.input.sun.changes(), own_shadows = frame_.movesInVideo();
   const std::vector<bool> has_moved = findMoved();
   const auto count = std::count(has_moved.begin(), has_moved.end(), true);
   if (none() || (count == 0 && !other_sun)) return;
@@ -172,8 +172,8 @@ void StillPixels::leaveRelit(const PlaceLight& light, const MovedShadow& moved,
       if (parts[i] == 0.0f) continue;
       if (ids[i] == VisibilityBuffer::kNothing || !frame_.objectOf(ids[i]).edited) {
         if (!isRelitAt(light, region_, i, j)) continue;
-        relit_.at<std::uint8_t>(j, i) = 255;
-        parts[i] = 0.0f, removed.at<std::uint8_t>(j, i) = 0;
+        parts[i] = 0.0f, relit_.at<std::uint8_t>(j, i) = 255;
+        if (!own_shadows) removed.at<std::uint8_t>(j, i) = 0;
       } else if (other_sun) {
         parts[i] = 0.0f;
       } else if (count > (has_moved[frame_.objectOf(ids[i]).surface] ? 1 : 0)) {

@@ -29,7 +29,7 @@ class StillPixels {
 
   // Leaves out what others that have moved, or another sun, light otherwise than the video: the
   // surfaces, and what of their rims lies on the place. That keeps its pixels in their new light,
-  // and is not removed.
+  // and is not removed; but where edited objects move in the video these have their shadows.
   void leaveRelit(const PlaceLight& light, const MovedShadow& moved, const RestingLight& resting,
                   cv::Mat& removed);
 
