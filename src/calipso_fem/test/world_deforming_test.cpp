@@ -85,5 +85,35 @@ TEST(WorldDeforming, ADeformingObjectStartsWithItsShapeAndVelocity) {
   }
 }
 
+// A sheet that hangs by its upper edge, one half of which is let go: that half falls, the other
+// stays where it is.
+TEST(WorldDeforming, APartOfTheAttachmentsIsLetGo) {
+  WorldParams params;
+  params.max_nodes = 300;
+  params.defaults.youngs_modulus = 3e4;
+  WorldScene scene = sceneWith(boxSurface({0.6, 0.01, 0.4}, 10), {0, 0, 2}, false);
+  scene.objects[0].attachments.push_back({"edge", {-1, -1, 2.19}, {1, 1, 2.21}});
+  World world(scene, params);
+  Edit half = editOf(EditKind::kRelease);
+  half.region.kind = RegionKind::kBox;
+  half.region.box_min = {0.1, -1, 1}, half.region.box_max = {1, 1, 3};
+  world.submit(half);
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
+  play(world, 0.5);
+  const ObjectSnapshot state = world.state().objects.at(0);
+  const TriangleMesh& mesh = scene.objects[0].mesh;
+  for (int v = 0; v < mesh.vertexCount(); ++v) {
+    const Eigen::Vector3d at = mesh.vertex(v);
+    const double fell = at.z() + 2.0 - state.vertices(v, 2);
+    if (at.z() < 0.19) continue;
+    if (at.x() < 0.0) {
+      EXPECT_LT(std::abs(fell), 1e-3) << v;
+    } else if (at.x() > 0.29) {
+      EXPECT_GT(fell, 0.05) << v;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace calipso::fem

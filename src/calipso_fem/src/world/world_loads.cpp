@@ -12,7 +12,14 @@
 namespace calipso::fem {
 namespace {
 
-bool intersects(const std::vector<int>& a, const std::vector<int>& b) {  // both ascending
+// Sets of vertices, ascending.
+std::vector<int> without(const std::vector<int>& all, const std::vector<int>& some) {
+  std::vector<int> rest;
+  std::set_difference(all.begin(), all.end(), some.begin(), some.end(), std::back_inserter(rest));
+  return rest;
+}
+
+bool intersects(const std::vector<int>& a, const std::vector<int>& b) {
   std::vector<int> common;
   std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(common));
   return !common.empty();
@@ -93,20 +100,21 @@ std::string World::Impl::release(Actor& actor, const Edit& edit) {
   const auto attached =
       attachedVertices(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
   size_t released = 0;
-  const auto meets = [&](const std::vector<int>& region) {
+  const auto is_over = [&](std::vector<int>& region) {
     if (!intersects(region, vertices)) return false;
-    // The load that drives it was found while it was held: what the attachments bore of it would
-    // now throw the object off, or keep it up.
-    if (region == attached) {
-      endDrive(actor);
-      actor.holder = Holder::kNothing;
-    }
     if (actor.soft) actor.soft->body().releaseSurfaceVertices(region);
     ++released;
-    return true;
+    if (!without(region, attached).empty()) return true;
+    // Attachments hold what of them the region leaves: a towel's other pegs. The load that drives
+    // it was found while all of it was held: what the attachments bore of it would now throw the
+    // object off, or keep it up.
+    endDrive(actor);
+    region = without(region, vertices);
+    if (region.empty()) actor.holder = Holder::kNothing;
+    return region.empty();
   };
-  actor.fixed.erase(std::remove_if(actor.fixed.begin(), actor.fixed.end(), meets),
-                    actor.fixed.end());
+  for (auto region = actor.fixed.begin(); region != actor.fixed.end();)
+    region = is_over(*region) ? actor.fixed.erase(region) : region + 1;
   const auto lets_go = [&](const Pull& pull) {
     if (!intersects(pull.vertices, vertices)) return false;
     if (actor.soft)
