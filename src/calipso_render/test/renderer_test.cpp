@@ -162,6 +162,37 @@ TEST(Renderer, AMovingObjectsShadowDoesNotFallOnTheSky) {
   EXPECT_EQ(s.kept(s.shadow, p), 144);
 }
 
+// Where the video has it, a moving object hides the sky already: in another look it darkens the
+// table beside it no further.
+TEST(Renderer, AMovingObjectHidesTheSkyOnce) {
+  const Eigen::Vector3d low(kCentre.x(), kCentre.y(), kBallRadius),
+      there = low + Eigen::Vector3d(0.1, 0, 0);
+  const ObjectModel model = ballAt(low), moved = ballAt(there);
+  const ClipFrame now = frameWithBall(moved);
+  ClipSample clip;
+  clip.add(frameWithBall(model));
+  auto prepared = std::make_shared<Prepared>(prepare(clip, {model}, params()));
+  prepared->moves[0] = true, prepared->light.light = sunlight();
+  prepared->umbra = cv::Vec3f::all(0.5f), prepared->shadowless.release();
+  ObjectInFrame ball;
+  ball.name = "ball", ball.edited = true, ball.world_from_object = moved.world_from_object;
+  for (const Eigen::Vector3f& x : prepared->surfaces[0].key_vertices)
+    ball.vertices.push_back(x + Eigen::Vector3f(0.1f, 0, 0));
+  const auto beside = [&] {  // on the side that the sun shines on
+    const Eigen::Vector3d sun = sunlight().direction.cast<double>(),
+                          side = Eigen::Vector3d(sun.x(), sun.y(), 0).normalized();
+    const Eigen::Vector3d at = there + 1.5 * kBallRadius * side;
+    const Eigen::Vector2d p = now.camera.projectWorld({at.x(), at.y(), 0.0});
+    const cv::Rect patch(int(p.x()) - 1, int(p.y()) - 1, 3, 3);
+    const FrameInput in{now.bgr, now.labels, now.camera, 7, {ball}, {}};
+    const FrameOutput out = Renderer(prepared, params()).composite(in);
+    return cv::mean(out.bgr(patch))[1] - cv::mean(now.bgr(patch))[1];
+  };
+  EXPECT_LT(beside(), -3.0);
+  ball.observed = moved.world_from_object;
+  EXPECT_NEAR(beside(), 0.0, 0.5);
+}
+
 // The mask has a rail above the ball that the model lacks. The ball's right side moves off: the
 // rail above that side goes, too, also close to the side that rests, whose own part of it stays.
 TEST(Renderer, WhatNoModelHasGoesWithThePartBesideIt) {

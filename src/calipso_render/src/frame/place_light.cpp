@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <optional>
+#include <vector>
 
 #include "calipso_render/colour.hpp"
 #include "draw/wide_loops.hpp"
@@ -80,8 +82,13 @@ void PlaceLight::measure(const cv::Rect& revealed, const SquareMask& covered) {
   }
   sun_changes_.add(resting_.sunless());
   const SkyGrid sky(place_.view.planes(), *moved_.sky, frame_.input.bgr.size(), region_, covered);
+  std::optional<SkyGrid> observed;
+  if (moved_.sky_before)
+    observed.emplace(place_.view.planes(), *moved_.sky_before, frame_.input.bgr.size(), region_,
+                     covered);
+  const SkyGrid& before = observed ? *observed : resting_.originalsSky();
   SquareMask sky_changes(region_);
-  findSkyChanges(sky, sky_changes);
+  findSkyChanges(sky, before, sky_changes);
   sun_changes_.remove(covered);
   relightable_ = sun_changes_.grown(frame_.params.background.shadow_margin_px + 2);
   relightable_.add(sky_changes);
@@ -92,16 +99,37 @@ void PlaceLight::measure(const cv::Rect& revealed, const SquareMask& covered) {
     relightable_.visitRow(v, region_.x, region_.br().x,
                           [&](int begin, int end) { measureRun(sky, v, begin, end); });
   }
+  if (observed) takeObservedSky(*observed);
+}
+
+// On support planes the sky before the edit is what this grid says, no less than it is now: where
+// an object that moves is always near, the plate has been in its shade, too.
+void PlaceLight::takeObservedSky(const SkyGrid& observed) {
+  sky_before_ = sky_before_.clone();
+  const Relief& relief = place_.view.relief();
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int v = region_.y; v < region_.br().y; ++v) {
+    relightable_.visitRow(v, region_.x, region_.br().x, [&](int begin, int end) {
+      std::vector<std::uint8_t> levels(end - begin);
+      observed.levels(place_.view.planes(), *moved_.sky_before, v, begin, end, levels.data());
+      resting_.leaveHidden(v, begin, end, levels.data());
+      veilLevels(place_.veil, v, begin, end, levels.data());
+      std::uint8_t* sky = sky_before_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x);
+      const std::uint8_t* now = sky_.ptr<std::uint8_t>(v - region_.y) + (begin - region_.x);
+      for (int k = 0; k < end - begin; ++k)
+        sky[k] = relief.at(begin + k, v) ? sky[k] : std::max(levels[k], now[k]);
+    });
+  }
 }
 
 // Squares of the region in which the sky's light may differ from before.
-void PlaceLight::findSkyChanges(const SkyGrid& now, SquareMask& changes) {
+void PlaceLight::findSkyChanges(const SkyGrid& now, const SkyGrid& before, SquareMask& changes) {
   constexpr int kSide = SquareMask::kSide;
   const int first = region_.y / kSide, last = (region_.br().y - 1) / kSide;
 #pragma omp parallel for schedule(static)
   for (int j = first; j <= last; ++j) {
     const cv::Rect row = cv::Rect(region_.x, j * kSide, region_.width, kSide) & region_;
-    const std::vector<float> differences = now.differences(resting_.originalsSky(), row);
+    const std::vector<float> differences = now.differences(before, row);
     const auto at = [&](int u) {
       return differences.begin() + (u / now.step() - row.x / now.step());
     };

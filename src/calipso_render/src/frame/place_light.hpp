@@ -38,7 +38,8 @@ class PlaceLight {
 
  private:
   void measure(const cv::Rect& revealed, const SquareMask& covered);
-  void findSkyChanges(const SkyGrid& now, SquareMask& changes);
+  void findSkyChanges(const SkyGrid& now, const SkyGrid& before, SquareMask& changes);
+  void takeObservedSky(const SkyGrid& observed);
   void findWallChanges(SquareMask& changes);
   void measureRun(const SkyGrid& sky_grid, int v, int begin, int end);
   void findRelit();
