@@ -108,6 +108,14 @@ TEST(Others, AShadowFallsOnAnEditedObjectAtRestAndAroundIt) {
   EXPECT_GT(cv::countNonZero((shaded == 0) & near), cv::countNonZero(near) / 5);
 }
 
+// What hid a part of an edited object at rest does not stay there once it has left.
+TEST(Others, WhatHasLeftIsNotKeptOnAnEditedObjectAtRest) {
+  const TwoBalls s(params(), kOther + Eigen::Vector3d(-0.06, -0.3, 0.0));
+  const FrameOutput out = s.drawn({-0.4, 0.0, 0.0}, true);
+  ASSERT_GT(cv::countNonZero(s.key.labels == 1), 100);
+  EXPECT_EQ(cv::countNonZero((s.key.labels == 1) & (out.provenance == kOriginal)), 0);
+}
+
 // Where an object that is taken away has mixed into what stands behind it, that is drawn anew.
 TEST(Others, WhatIsTakenAwayLeavesNoHueOnThem) {
   const Eigen::Vector3d before = kOther + Eigen::Vector3d(-0.06, -0.3, 0.0);

@@ -39,4 +39,9 @@ cv::Mat removedPixels(const StagedFrame& frame, const SeenPlace& place, const Ed
 // The pixels of `box` that show an object in the video. CV_8UC1
 cv::Mat shownOf(const StagedFrame& frame, const SeenPlace& place, int surface, const cv::Rect& box);
 
+// What a box's pixels show of edited objects that are not where the video has them, with the margin
+// in which their hue mixes into others', but for pixels that such an object owns itself.
+// @param owners CV_16SC1 over the box: surfaces; -1 = none
+cv::Mat shownOfMoved(const StagedFrame& frame, const cv::Mat& owners, const cv::Rect& box);
+
 }  // namespace calipso::render

@@ -5,6 +5,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "frame/mask_morphology.hpp"
+#include "frame/removed.hpp"
 #include "frame/still_pixels.hpp"
 #include "frame/surface_sun.hpp"
 #include "smooth_step.hpp"
@@ -69,6 +70,7 @@ void Residual::findMiss(const cv::Rect& carried) {
   const cv::Rect box = miss_box_;
   if (box.empty()) return;
   miss_ = cv::Mat(box.size(), CV_32FC4);
+  const cv::Mat foreign = shownOfMoved(frame_, rest_.owners(box), box);
 #pragma omp parallel for schedule(static)
   for (int j = 0; j < box.height; ++j) {
     const int v = box.y + j;
@@ -77,7 +79,8 @@ void Residual::findMiss(const cv::Rect& carried) {
                     *passing = rest_.passing.ptr<cv::Vec3f>(v) + box.x;
     cv::Vec4f* miss = miss_.ptr<cv::Vec4f>(j);
     for (int i = 0; i < box.width; ++i) {
-      if (passing[i][0] < 0.0f || frame_.isElsewhere(box.x + i, v)) {
+      if (passing[i][0] < 0.0f || frame_.isElsewhere(box.x + i, v) ||
+          foreign.at<std::uint8_t>(j, i) != 0) {
         miss[i] = {};
         continue;
       }

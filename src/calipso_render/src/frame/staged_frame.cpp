@@ -146,6 +146,19 @@ bool StagedFrame::isSeenAt(int surface, const Points& vertices) const {
   return within >= kSeenWithin * all;
 }
 
+std::vector<bool> StagedFrame::moved() const {
+  std::vector<bool> moved = edited;
+  for (const StagedObject& object : objects) {
+    const Points &now = object.actor.screen.points, &then = object.observed.points;
+    const auto isNear = [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+      return (a - b).head<2>().norm() < kMovedPx;
+    };
+    if (object.isAtRestInVideo() && std::equal(now.begin(), now.end(), then.begin(), isNear))
+      moved[object.surface] = false;
+  }
+  return moved;
+}
+
 bool StagedFrame::movesInVideo() const {
   for (std::size_t i = 0; i < edited.size(); ++i) {
     if (edited[i] && prepared.moves[i] && prepared.surfaces[i].in_video) return true;

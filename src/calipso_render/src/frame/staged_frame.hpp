@@ -13,7 +13,7 @@ inline constexpr float kStillPx = 0.05f;  // moved less: the frame's own pixels
 inline constexpr float kMovedPx = 0.3f;   // an edited surface that moved more is drawn
 // the same of how far its normal has turned, rad: it is lit otherwise
 inline constexpr float kStillTurn = 0.02f, kTurned = 0.08f;
-inline constexpr float kNonePx = 5.0f;    // from which none of what drawing misses goes along
+inline constexpr float kNonePx = 5.0f;  // from which none of what drawing misses goes along
 
 // An object that a frame's picture can show. Its place in StagedFrame::objects is the slot by which
 // VisibilityBuffer::objectOf() names it.
@@ -62,6 +62,8 @@ struct StagedFrame {
   // Whether the video shows an object where its vertices, in world coordinates, say: most of what
   // is seen of it lies within its outline there.
   bool isSeenAt(int surface, const Points& vertices) const;
+  // Per surface: edited, and not where the video has it.
+  std::vector<bool> moved() const;
   // Whether any edited object moves in the video.
   bool movesInVideo() const;
 

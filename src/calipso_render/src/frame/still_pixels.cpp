@@ -66,6 +66,8 @@ StillPixels::StillPixels(const StagedFrame& frame, const SeenPlace& place,
   }
   if (!any) return;
   Seen seen = findParts(can_rest);
+  // What the video shows of objects that have left is no picture of what they hid.
+  parts_.setTo(0.0f, shownOfMoved(frame, seen.owner, region_) & (seen.owner >= 0));
   keepRims(seen.owner);
   cv::dilate(seen.repainted, seen.repainted, disc(kRepaintReach));
   parts_.setTo(0.0f, seen.repainted);
@@ -118,6 +120,8 @@ void StillPixels::addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const
   beside.setTo(0, near);
   // What the object has left shows it in the video, and is no rim.
   rim.setTo(0.0f, beside | inner);
+  const cv::Mat own(box.size(), CV_16S, cv::Scalar(surface));
+  rim.setTo(0.0f, shownOfMoved(frame_, own, box + region_.tl()));
   // Rims lie within 2 * reach px, along rows and columns, of what rests.
   const cv::Rect search = around(3 * reach);
   const cv::Mat gone = nearerToLeft(surface, rests(search), owner, search);
@@ -142,24 +146,10 @@ cv::Mat StillPixels::nearerToLeft(int surface, const cv::Mat& rests, const cv::M
   return to_left < to_rest;
 }
 
-// Per surface: edited, and not where the video has it.
-std::vector<bool> StillPixels::findMoved() const {
-  std::vector<bool> moved = frame_.edited;
-  for (const StagedObject& object : frame_.objects) {
-    const auto &now = object.actor.screen.points, &then = object.observed.points;
-    const auto isNear = [](const auto& a, const auto& b) {
-      return (a - b).template head<2>().norm() < kMovedPx;
-    };
-    if (object.isAtRestInVideo() && std::equal(now.begin(), now.end(), then.begin(), isNear))
-      moved[object.surface] = false;
-  }
-  return moved;
-}
-
 void StillPixels::leaveRelit(const PlaceLight& light, const MovedShadow& moved,
                              const RestingLight& resting, cv::Mat& removed) {
   const bool other_sun = frame_.input.sun.changes(), own_shadows = frame_.movesInVideo();
-  const std::vector<bool> has_moved = findMoved();
+  const std::vector<bool> has_moved = frame_.moved();
   const auto count = std::count(has_moved.begin(), has_moved.end(), true);
   if (none() || (count == 0 && !other_sun)) return;
   const SunOnSurfaces sun{frame_, moved, resting};

@@ -48,7 +48,6 @@ class StillPixels {
     cv::Mat owner;      // CV_16SC1: surface, -1 = none
     cv::Mat repainted;  // CV_8UC1: in a new look
   };
-  std::vector<bool> findMoved() const;
   bool findResting(const StagedObject& object, std::vector<char>& can_rest) const;
   Seen findParts(const std::vector<std::vector<char>>& can_rest);
   void keepRims(const cv::Mat& owner);
