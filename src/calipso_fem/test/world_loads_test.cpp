@@ -283,6 +283,20 @@ TEST(WorldLoads, ACopyLivesOnItsOwn) {
   EXPECT_FALSE(world.advanceTo(world.time()).at(0).accepted) << "the name is taken";
 }
 
+TEST(WorldLoads, AnEditToComeNamesACopyAndHoldsIt) {
+  World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 2), {0, 0, 0.05}), coarse());
+  Edit twin = editOf(EditKind::kDuplicate), hold = editOf(EditKind::kObjectKind);
+  twin.new_name = hold.object = "twin";
+  twin.translation = {0.3, 0, 0.2};
+  hold.object_kind = ObjectKind::kStatic;
+  world.submit(twin);
+  world.submit(hold);
+  for (const EditOutcome& outcome : world.advanceTo(0.0))
+    EXPECT_TRUE(outcome.accepted) << outcome.message;
+  play(world, 0.5);
+  EXPECT_NEAR((centerOf(world.state(), 1) - Eigen::Vector3d(0.3, 0, 0.25)).norm(), 0.0, 1e-9);
+}
+
 TEST(WorldLoads, ACopyOfClothIsCloth) {
   World world(sceneWith(boxSurface({0.4, 0.002, 0.3}, 8), {0, 0, 1}, false), coarse());
   Edit twin = editOf(EditKind::kDuplicate);

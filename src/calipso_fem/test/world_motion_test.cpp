@@ -12,15 +12,17 @@ using namespace test;
 
 constexpr double kG = 9.81;
 
+// What the video shows at 0 s of a thing that flies at a height of 10 m.
+ObservedMotion thrown(const Eigen::Vector3d& linear,
+                      const Eigen::Vector3d& angular = Eigen::Vector3d::Zero()) {
+  const Eigen::Vector3d place(0, 0, 10);
+  return {0.0,     true,       Eigen::Isometry3d(Eigen::Translation3d(place)), place, linear,
+          angular, {0, 0, -kG}};
+}
+
 TEST(WorldMotion, FallingRigidBodyFollowsTheParabola) {
   World world(sceneWith(boxSurface({0.1, 0.2, 0.3}, 1), {0, 0, 10}, false), {});
-  world.addObservedMotion("thing", {0.0,
-                                    true,
-                                    Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
-                                    {0, 0, 10},
-                                    {1, 0, 2},
-                                    {0, 0, 3},
-                                    {0, 0, -kG}});
+  world.addObservedMotion("thing", thrown({1, 0, 2}, {0, 0, 3}));
   world.submit(editOf(EditKind::kVelocity, EditMode::kEstimated));
   world.advanceTo(0.0);
   play(world, 1.0);
@@ -33,13 +35,7 @@ TEST(WorldMotion, FallingRigidBodyFollowsTheParabola) {
 
 TEST(WorldMotion, ACopyOfWhatTheVideoMovesStartsWithItsVelocityAndFalls) {
   World world(sceneWith(boxSurface({0.1, 0.2, 0.3}, 1), {0, 0, 10}, false), {});
-  world.addObservedMotion("thing", {0.0,
-                                    true,
-                                    Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
-                                    {0, 0, 10},
-                                    {1, 0, 2},
-                                    {0, 0, 0},
-                                    {0, 0, -kG}});
+  world.addObservedMotion("thing", thrown({1, 0, 2}));
   Edit twin = editOf(EditKind::kDuplicate);
   twin.new_name = "twin";
   twin.translation = {0.5, 0, 1};
@@ -137,13 +133,7 @@ TEST(WorldMotion, DeformableFlightIsExactToo) {
   params.defaults.kind = ObjectKind::kDeformable;
   params.max_nodes = 200;
   World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 10}, false), params);
-  world.addObservedMotion("thing", {0.0,
-                                    true,
-                                    Eigen::Isometry3d(Eigen::Translation3d(0, 0, 10)),
-                                    {0, 0, 10},
-                                    {1, 0, 0},
-                                    {0, 0, 0},
-                                    {0, 0, -kG}});
+  world.addObservedMotion("thing", thrown({1, 0, 0}));
   Edit edit = editOf(EditKind::kVelocity);
   edit.vector = {1, 0, 2};
   edit.angular = {0, 3, 0};

@@ -41,7 +41,7 @@ Outlines outlines(const StagedFrame& frame) {
   for (std::size_t i = 0; i < frame.edited.size(); ++i) {
     const Surface& surface = frame.prepared.surfaces[i];
     if (!frame.edited[i] || !frame.prepared.moves[i] || !surface.in_video) continue;
-    const auto vertices = frame.observed(static_cast<int>(i));
+    const auto& vertices = frame.observed[i];
     if (!vertices) continue;
     const Actor actor = makeActor(surface, *vertices, frame.input.camera);
     const cv::Rect box = boundsOf(actor.screen, kOff + 1, within.size());

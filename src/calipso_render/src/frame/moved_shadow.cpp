@@ -1,7 +1,5 @@
 #include "frame/moved_shadow.hpp"
 
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include "draw/side_by_side.hpp"
@@ -10,27 +8,19 @@
 namespace calipso::render {
 namespace {
 
-// The edited objects' sky as the video has them now; null where none is known to move.
+// The sky that edited objects leave where the video has them now; null: it shows none that moves.
 std::unique_ptr<Visibility> skyOfObserved(const StagedFrame& frame) {
-  std::vector<Points> points;
-  std::vector<int> surfaces;
-  bool moves = false;
-  for (int i = 0; i < static_cast<int>(frame.edited.size()); ++i) {
-    const Surface& s = frame.prepared.surfaces[i];
-    if (!frame.edited[i] || !s.in_video) continue;
-    std::optional<Points> now = frame.observed(i);
-    if (frame.prepared.moves[i] && !now) continue;
-    moves = moves || frame.prepared.moves[i];
-    points.push_back(frame.prepared.moves[i] ? *std::move(now) : s.key_vertices);
-    surfaces.push_back(i);
-  }
-  if (!moves) return nullptr;
   std::vector<Occluder> occluders;
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const Surface& s = frame.prepared.surfaces[surfaces[k]];
-    occluders.push_back({&points[k], &s.triangles, s.winding});
+  bool moves = false;
+  for (std::size_t i = 0; i < frame.edited.size(); ++i) {
+    const Surface& s = frame.prepared.surfaces[i];
+    const bool shown = frame.observed[i] || !frame.prepared.moves[i];
+    if (!frame.edited[i] || !s.in_video || !shown) continue;
+    moves |= frame.observed[i].has_value();
+    occluders.push_back(
+        {frame.observed[i] ? &*frame.observed[i] : &s.key_vertices, &s.triangles, s.winding});
   }
-  return skyVisibility(occluders, frame.params);
+  return moves ? skyVisibility(occluders, frame.params) : nullptr;
 }
 
 }  // namespace

@@ -16,8 +16,8 @@ struct MovedShadow {
   MovedShadow(const StagedFrame& frame, const SeenPlace& place);
 
   std::unique_ptr<Visibility> sun, sky;
-  // What they leave of the sky where the video has them in this frame, if it shows one that moves
-  // in another place than the key frame does; may be null.
+  // What they leave of the sky where the video has them in this frame; null: it shows none of them
+  // that moves, and RestingLight has it.
   std::unique_ptr<Visibility> sky_before;
   ReliefSky on_walls;  // of the sky
   cv::Rect bounds;     // of the picture: what they can shade from the sun

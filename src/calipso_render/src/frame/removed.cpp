@@ -110,9 +110,8 @@ cv::Mat shownOf(const StagedFrame& frame, const SeenPlace& place, int surface,
 
 cv::Mat shownOfMoved(const StagedFrame& frame, const cv::Mat& owners, const cv::Rect& box) {
   cv::Mat shown = cv::Mat::zeros(box.size(), CV_8U), of_one;
-  const std::vector<bool> moved = frame.moved();
-  for (std::size_t i = 0; i < moved.size(); ++i) {
-    if (!moved[i] || !frame.prepared.surfaces[i].in_video) continue;
+  for (std::size_t i = 0; i < frame.moved.size(); ++i) {
+    if (!frame.moved[i] || !frame.prepared.surfaces[i].in_video) continue;
     cv::dilate(frame.labels(box) == frame.prepared.surfaces[i].index, of_one, disc(kMixed));
     shown |= of_one & (owners != static_cast<double>(i));
   }

@@ -62,7 +62,7 @@ cv::Mat reachOfPassing(const StagedFrame& frame, const PlaceView& place) {
   std::vector<Ball> balls;
   for (std::size_t i = 0; i < frame.edited.size(); ++i) {
     if (!frame.edited[i] || !prepared.moves[i] || !prepared.surfaces[i].in_video) continue;
-    const auto vertices = frame.observed(static_cast<int>(i));
+    const auto& vertices = frame.observed[i];
     if (!vertices) return {};
     balls.push_back(ballAround(*vertices));
   }

@@ -107,6 +107,29 @@ void stageObject(int surface, const ObjectInFrame* state, StagedFrame& frame) {
                                : ScreenMesh{}});
 }
 
+std::vector<bool> movedSurfaces(const StagedFrame& frame) {
+  std::vector<bool> moved = frame.edited;
+  const auto isNear = [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+    return (a - b).head<2>().norm() < kMovedPx;
+  };
+  for (const StagedObject& object : frame.objects) {
+    const Points &now = object.actor.screen.points, &then = object.observed.points;
+    if (object.isAtRestInVideo() && std::equal(now.begin(), now.end(), then.begin(), isNear))
+      moved[object.surface] = false;
+  }
+  return moved;
+}
+
+std::optional<Points> observedPlace(const StagedFrame& frame, int surface) {
+  const Surface& s = frame.prepared.surfaces[surface];
+  const ObjectInFrame* state = frame.states[surface];
+  if (!frame.edited[surface] || !frame.prepared.moves[surface] || !s.in_video || state == nullptr ||
+      !state->observed)
+    return std::nullopt;
+  const Points vertices = transformed(s.object_vertices, *state->observed);
+  return frame.isSeenAt(surface, vertices) ? std::optional<Points>(vertices) : std::nullopt;
+}
+
 }  // namespace
 
 StagedFrame::StagedFrame(const Prepared& prepared, const RenderParams& params,
@@ -126,6 +149,8 @@ StagedFrame::StagedFrame(const Prepared& prepared, const RenderParams& params,
   const int count = static_cast<int>(states.size());
   for (int i = 0; i < count; ++i) at_rest.push_back(findRest(i, *this));
   for (int i = 0; i < count; ++i) stageObject(i, states[i], *this);
+  moved = movedSurfaces(*this);
+  for (int i = 0; i < count; ++i) observed.push_back(observedPlace(*this, i));
 }
 
 bool StagedFrame::isSeenAt(int surface, const Points& vertices) const {
@@ -146,32 +171,11 @@ bool StagedFrame::isSeenAt(int surface, const Points& vertices) const {
   return within >= kSeenWithin * all;
 }
 
-std::vector<bool> StagedFrame::moved() const {
-  std::vector<bool> moved = edited;
-  for (const StagedObject& object : objects) {
-    const Points &now = object.actor.screen.points, &then = object.observed.points;
-    const auto isNear = [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-      return (a - b).head<2>().norm() < kMovedPx;
-    };
-    if (object.isAtRestInVideo() && std::equal(now.begin(), now.end(), then.begin(), isNear))
-      moved[object.surface] = false;
-  }
-  return moved;
-}
-
 bool StagedFrame::movesInVideo() const {
   for (std::size_t i = 0; i < edited.size(); ++i) {
     if (edited[i] && prepared.moves[i] && prepared.surfaces[i].in_video) return true;
   }
   return false;
-}
-
-std::optional<Points> StagedFrame::observed(int surface) const {
-  const Surface& s = prepared.surfaces[surface];
-  const ObjectInFrame* state = states[surface];
-  if (state == nullptr || !state->observed) return std::nullopt;
-  const Points vertices = transformed(s.object_vertices, *state->observed);
-  return isSeenAt(surface, vertices) ? std::optional<Points>(vertices) : std::nullopt;
 }
 
 Eigen::Vector2f StagedFrame::movement(std::uint32_t id, float u, float v) const {

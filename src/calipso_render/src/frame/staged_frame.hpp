@@ -51,6 +51,10 @@ struct StagedFrame {
   std::vector<bool> at_rest;
   cv::Mat elsewhere;  // CV_8UC1, whole picture: where it does not; may be empty
   std::vector<StagedObject> objects;
+  std::vector<bool> moved;  // per surface: edited, and not where the video has it
+  // per surface: where the video has one that is edited and moves in it, if its state says so and
+  // it is seen there; world, m
+  std::vector<std::optional<Points>> observed;
 
   cv::Rect whole() const { return {{0, 0}, input.bgr.size()}; }
   const StagedObject& objectOf(std::uint32_t id) const {
@@ -62,14 +66,8 @@ struct StagedFrame {
   // Whether the video shows an object where its vertices, in world coordinates, say: most of what
   // is seen of it lies within its outline there.
   bool isSeenAt(int surface, const Points& vertices) const;
-  // Per surface: edited, and not where the video has it.
-  std::vector<bool> moved() const;
   // Whether any edited object moves in the video.
   bool movesInVideo() const;
-
-  // Where the video has a surface that its state says to be followed, world, m; none: it is not, or
-  // not seen there.
-  std::optional<Points> observed(int surface) const;
 
   // How far from its place in the video a surface point is seen, px. @pre the video has its object
   // at rest

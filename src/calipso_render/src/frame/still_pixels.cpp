@@ -149,8 +149,7 @@ cv::Mat StillPixels::nearerToLeft(int surface, const cv::Mat& rests, const cv::M
 void StillPixels::leaveRelit(const PlaceLight& light, const MovedShadow& moved,
                              const RestingLight& resting, cv::Mat& removed) {
   const bool other_sun = frame_.input.sun.changes(), own_shadows = frame_.movesInVideo();
-  const std::vector<bool> has_moved = frame_.moved();
-  const auto count = std::count(has_moved.begin(), has_moved.end(), true);
+  const auto count = std::count(frame_.moved.begin(), frame_.moved.end(), true);
   if (none() || (count == 0 && !other_sun)) return;
   const SunOnSurfaces sun{frame_, moved, resting};
   relit_ = cv::Mat::zeros(region_.size(), CV_8U);
@@ -166,7 +165,7 @@ void StillPixels::leaveRelit(const PlaceLight& light, const MovedShadow& moved,
         if (!own_shadows) removed.at<std::uint8_t>(j, i) = 0;
       } else if (other_sun) {
         parts[i] = 0.0f;
-      } else if (count > (has_moved[frame_.objectOf(ids[i]).surface] ? 1 : 0)) {
+      } else if (count > (frame_.moved[frame_.objectOf(ids[i]).surface] ? 1 : 0)) {
         parts[i] *= sun.sameAt(ids[i], i + region_.x, j + region_.y);
       }
     }

@@ -37,7 +37,7 @@ class StillPixels {
   bool none() const { return parts_.empty(); }
   // Row of the region: 1 = nothing moved at the pixel. @pre !none()
   const float* row(int j) const { return parts_.ptr<float>(j); }
-  // Does the rim of a surface at rest lie at (i, j) of the region, in another light?
+  // Does the rim of a surface at rest lie at (i, j) of the region, in another light than before?
   bool isRelit(int i, int j) const { return !relit_.empty() && relit_.at<std::uint8_t>(j, i) != 0; }
   // Gives the pixels of picture row v their part of the frame's own.
   void keep(int v, Row& row) const;
