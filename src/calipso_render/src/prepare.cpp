@@ -9,6 +9,7 @@
 #include "calipso_render/sky_map.hpp"
 #include "frame/edge_blur.hpp"
 #include "light/shadow_borders.hpp"
+#include "model_details.hpp"
 #include "place/clip_motion.hpp"
 #include "place/key_cover.hpp"
 #include "place/mended_depth.hpp"
@@ -188,16 +189,19 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, movingIn(frames.front().labels, p), steadiness);
   p.outline_blur = outlineBlur(picture, p.key_labels);
-  const std::vector<Actor> actors = keyActors(p);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   Stopwatch watch;
   Background seen = seenBackground(frames, any_moves, params.background);
   if (cameraMoves(clip)) sharpenSeen(frames, params.background, seen);
   p.background_ms = watch.lap();
-  const std::vector<View> views = viewsOf(clip, p, picture), light_views = lightViewsOf(views);
+  std::vector<View> views = viewsOf(clip, p, picture);
+  p.light = lightOf(lightViewsOf(views), seen, any_moves, params, p);
+  if (addDetails(views.front(), params.depth, p.nearness, models, p.surfaces))
+    views = viewsOf(clip, p, picture);
+  const std::vector<View> light_views = lightViewsOf(views);
+  const std::vector<Actor>& actors = views.front().actors;
   p.texture_views = static_cast<int>(views.size());
   p.light_views = static_cast<int>(light_views.size());
-  p.light = lightOf(light_views, seen, any_moves, params, p);
   // Where no cast shadow tells the light, the objects' shade on the ground may be another.
   p.appearances =
       makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()),

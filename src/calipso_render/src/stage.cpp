@@ -83,6 +83,18 @@ Points stockAt(const ObjectModel& model, const Points& key_vertices) {
 
 }  // namespace
 
+void findNormals(Surface& surface) {
+  surface.edges = meshEdges(surface.triangles);
+  MeshNormals normals = meshNormals(surface.key_vertices, surface.triangles, surface.edges);
+  surface.corners = std::move(normals.corners);
+  surface.vertex_of_normal = std::move(normals.vertex_of);
+  surface.key_normals = surfaceNormals(surface, surface.key_vertices);
+  Points places;  // of the normals
+  for (const int vertex : surface.vertex_of_normal) places.push_back(surface.key_vertices[vertex]);
+  findSkySeen(places, surface.key_normals, surface.corners, surface.winding != 1, surface.seen,
+              surface.seen_behind);
+}
+
 Surface makeSurface(const ObjectModel& model) {
   if (model.mesh.triangleCount() == 0) {
     throw std::invalid_argument("object '" + model.name +
@@ -106,18 +118,10 @@ Surface makeSurface(const ObjectModel& model) {
     }
     surface.triangles.push_back(triangle);
   }
-  surface.edges = meshEdges(surface.triangles);
   surface.winding = outsideWinding(surface.object_vertices, surface.triangles);
   surface.key_vertices = transformed(surface.object_vertices, model.world_from_object);
   surface.stock_vertices = stockAt(model, surface.key_vertices);
-  MeshNormals normals = meshNormals(surface.key_vertices, surface.triangles, surface.edges);
-  surface.corners = std::move(normals.corners);
-  surface.vertex_of_normal = std::move(normals.vertex_of);
-  surface.key_normals = surfaceNormals(surface, surface.key_vertices);
-  Points places;  // of the normals
-  for (const int vertex : surface.vertex_of_normal) places.push_back(surface.key_vertices[vertex]);
-  findSkySeen(places, surface.key_normals, surface.corners, surface.winding != 1, surface.seen,
-              surface.seen_behind);
+  findNormals(surface);
   return surface;
 }
 

@@ -25,8 +25,17 @@ struct ObjectModel {
   TriangleMesh stock = {};
 };
 
+// What a vertex of a detail hangs on: a triangle of the model, and where the vertex is in its frame.
+struct Hold {
+  int triangle;
+  float part;          // in the vertex' place; all of a vertex add up to 1
+  Eigen::Vector3f at;  // m
+};
+
 // What never changes about an object's surface.
 struct Surface {
+  static constexpr std::size_t kHolds = 6;  // per vertex of a detail
+
   std::string name;
   int index = 0;         // of its label in the video; -1: the video does not have it
   bool in_video = true;  // false: a copy, drawn only where a state has it
@@ -45,10 +54,16 @@ struct Surface {
   // per normal, world, key frame: of the side that its normal is on, and of the other one unless the
   // mesh hides that
   std::vector<SkySeen> seen, seen_behind;
+  // kHolds for each of the last vertices: details that the model lacks (addDetails())
+  std::vector<Hold> holds;
+  std::size_t detailVertices() const { return holds.size() / kHolds; }
 };
 
 // @throw std::invalid_argument naming the object and what is wrong with its mesh
 Surface makeSurface(const ObjectModel& model);
+
+// Edges, normals and what is seen of the sky, for the vertices and triangles that it has.
+void findNormals(Surface& surface);
 
 // Area-weighted vertex normals, unit length (zero where a vertex has no face).
 Points vertexNormals(const Points& vertices, const Triangles& triangles);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "frame/mask_morphology.hpp"
+#include "model_details.hpp"
 #include "place/view_warp.hpp"
 #include "smooth_step.hpp"
 
@@ -79,7 +80,7 @@ bool findRest(int surface, StagedFrame& frame) {
 // World, m. @param state nullptr: as in the video, at rest
 Points verticesNow(const Prepared& prepared, int surface, const ObjectInFrame* state) {
   const Surface& s = prepared.surfaces[surface];
-  if (state != nullptr && state->edited) return state->vertices;
+  if (state != nullptr && state->edited) return withDetails(s, state->vertices);
   if (state != nullptr && prepared.moves[surface])
     return transformed(s.object_vertices, state->world_from_object);
   return s.key_vertices;
@@ -96,7 +97,7 @@ void stageObject(int surface, const ObjectInFrame* state, StagedFrame& frame) {
   if (vertices.size() != s.key_vertices.size()) {
     throw std::invalid_argument("object '" + s.name + "': state has " +
                                 std::to_string(vertices.size()) + " vertices, its model " +
-                                std::to_string(s.key_vertices.size()));
+                                std::to_string(s.key_vertices.size() - s.detailVertices()));
   }
   const Look look = state != nullptr ? state->look : Look();
   const Camera& camera = frame.input.camera;

@@ -199,6 +199,7 @@ Reflectance reflectanceIn(const View& view, const Actor& actor, const Light& lig
   }
   lowerBesideJumps(view.camera, kJump * boxOf(actor.surface->key_vertices).diagonal().norm(), r);
   if (alone) lowerAtSteps(shaded.light, shaded.open, r);
+  trustDetails(view.labels, *actor.surface, r);
   takeOutFalseShade({shaded.light, shaded.open, (r.trust > kTold) & well_lit}, floor, r.albedo);
   return r;
 }

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/colour.hpp"
+#include "model_details.hpp"
 #include "smooth_step.hpp"
 
 namespace calipso::render {
@@ -15,6 +16,8 @@ constexpr float kDarkest = 1e-4f;  // linear brightness that is told from none
 // part by which light falls within two pixels, at which it begins to be a step, and is one
 constexpr float kStep = 0.2f, kWholeStep = 0.4f;
 constexpr float kLeastAtStep = 0.1f;  // of the trust
+constexpr float kDeep = 2.5f;         // px from the rim, from which a pixel has the object's colour
+constexpr int kThin = 2;              // px around within which a thin part has its middle
 // cosine of the angle by which a surface turns from pixel to pixel
 constexpr float kCrease = 0.87f;
 
@@ -22,7 +25,15 @@ constexpr float kCrease = 0.87f;
 // compression spreads.
 float rimTrust(float depth) {
   if (depth <= 1.0f) return 0.02f;
-  return std::clamp((depth - 1.0f) / 1.5f, 0.05f, 1.0f);
+  return std::clamp((depth - 1.0f) / (kDeep - 1.0f), 0.05f, 1.0f);
+}
+
+// Distance of an object's pixels from its mask's rim, px.
+cv::Mat depthIn(const cv::Mat& labels, int index, const cv::Rect& region) {
+  cv::Mat padded, depth;
+  cv::copyMakeBorder(labels(region) == index, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
+  cv::distanceTransform(padded, depth, cv::DIST_L2, 5);
+  return depth({{1, 1}, region.size()});
 }
 
 // Whether the fronts at two neighbouring pixels belong to parts of which one hides the other: each
@@ -57,17 +68,31 @@ cv::Mat fallOf(const cv::Mat& values, const cv::Mat& where) {
 }  // namespace
 
 cv::Mat trustOf(const cv::Mat& labels, int index, const cv::Rect& region) {
-  cv::Mat padded, depth;
-  cv::copyMakeBorder(labels(region) == index, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
-  cv::distanceTransform(padded, depth, cv::DIST_L2, 5);
+  const cv::Mat depth = depthIn(labels, index, region);
   cv::Mat trust = cv::Mat::zeros(region.size(), CV_32F);
   for (int v = 0; v < region.height; ++v) {
     for (int u = 0; u < region.width; ++u) {
-      const float d = depth.at<float>(v + 1, u + 1);
+      const float d = depth.at<float>(v, u);
       if (d > 0.0f) trust.at<float>(v, u) = rimTrust(d);
     }
   }
   return trust;
+}
+
+void trustDetails(const cv::Mat& labels, const Surface& surface, Reflectance& r) {
+  if (surface.detailVertices() == 0) return;
+  const cv::Mat depth = depthIn(labels, surface.index, r.region);
+  cv::Mat deepest;
+  cv::dilate(depth, deepest, cv::Mat::ones(2 * kThin + 1, 2 * kThin + 1, CV_8U));
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 0; u < depth.cols; ++u) {
+      const int triangle = r.triangle.at<int>(v, u);
+      const float d = depth.at<float>(v, u);
+      const float lacks = kDeep - deepest.at<float>(v, u);
+      if (triangle < 0 || d <= 0.0f || lacks <= 0.0f || !isDetail(surface, triangle)) continue;
+      r.trust.at<float>(v, u) = rimTrust(d + lacks);
+    }
+  }
 }
 
 void lowerBesideJumps(const Camera& camera, float tolerance, Reflectance& r) {

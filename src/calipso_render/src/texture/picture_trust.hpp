@@ -19,4 +19,7 @@ void lowerBesideJumps(const Camera& camera, float tolerance, Reflectance& r);
 // @param light, open CV_32FC3: shading of a white surface there, and if nothing were before it
 void lowerAtSteps(const cv::Mat& light, const cv::Mat& open, Reflectance& r);
 
+// Trust in what the surface's thin details show, such as rails: the mask's rim is all there is.
+void trustDetails(const cv::Mat& labels, const Surface& surface, Reflectance& r);
+
 }  // namespace calipso::render
