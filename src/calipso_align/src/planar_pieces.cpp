@@ -41,9 +41,15 @@ struct PlaneFit {
     b += q * x;
     qq += q * q;
   }
+  void add(const PlaneFit& other) { A += other.A, b += other.b, qq += other.qq; }
   double count() const { return A(0, 0); }
+  double mean() const { return b(0) / A(0, 0); }
+  Eigen::Vector3d plane() const { return A.ldlt().solve(b); }
   double deviation() const {  // r.m.s.
-    return std::sqrt(std::max(0.0, qq - b.dot(A.ldlt().solve(b))) / count());
+    return std::sqrt(std::max(0.0, qq - b.dot(plane())) / count());
+  }
+  double deviationFrom(const Eigen::Vector3d& x) const {
+    return std::sqrt(std::max(0.0, qq - 2.0 * x.dot(b) + x.dot(A * x)) / count());
   }
 };
 
@@ -125,6 +131,50 @@ cv::Mat planarPieces(const Relief& relief, float crease) {
   cv::Mat pieces = cv::Mat::zeros(relief.state.size(), CV_32S);
   each([&](int x, int y, int piece) { pieces.at<int>(y, x) = number[piece]; });
   return withRims(relief, pieces, crease);
+}
+
+cv::Mat sharedPlanes(const Relief& relief, const cv::Mat& pieces) {
+  constexpr double kLeastPixels = 400.0;  // smaller ones lie near many planes
+  // from a common plane they deviate hardly more than from their own; in the relief's units
+  constexpr double kNoMore = 1.5, kNoise = 2.0;
+  constexpr double kApart = 0.005;  // ... nor by that part of their inverse depth
+  double most = 0.0;
+  cv::minMaxLoc(pieces, nullptr, &most);
+  std::vector<PlaneFit> fits(static_cast<size_t>(most) + 1);
+  const cv::Point middle(pieces.cols / 2, pieces.rows / 2);  // numbers about it keep their digits
+  for (int y = 0; y < pieces.rows; ++y)
+    for (int x = 0; x < pieces.cols; ++x) {
+      if (pieces.at<int>(y, x) == 0) continue;
+      fits[pieces.at<int>(y, x)].add(x - middle.x, y - middle.y, inverseDepth(relief, {x, y}));
+    }
+  std::vector<size_t> order;  // the largest first
+  for (size_t k = 1; k < fits.size(); ++k)
+    if (fits[k].count() >= kLeastPixels) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return fits[a].count() > fits[b].count(); });
+  std::vector<PlaneFit> planes;
+  std::vector<int> plane_of(fits.size(), 0);
+  for (const size_t k : order) {
+    for (size_t j = 0; j < planes.size() && plane_of[k] == 0; ++j) {
+      PlaneFit both = planes[j];
+      both.add(fits[k]);
+      const Eigen::Vector3d plane = both.plane();
+      const auto strays = [&](const PlaneFit& fit) {
+        const double most = std::min(kNoMore * fit.deviation() + kNoise, kApart * fit.mean());
+        return fit.deviationFrom(plane) > most;
+      };
+      if (strays(fits[k]) || strays(planes[j])) continue;
+      planes[j] = both;
+      plane_of[k] = static_cast<int>(j) + 1;
+    }
+    if (plane_of[k] != 0) continue;
+    planes.push_back(fits[k]);
+    plane_of[k] = static_cast<int>(planes.size());
+  }
+  cv::Mat result = cv::Mat::zeros(pieces.size(), CV_32S);
+  for (int y = 0; y < pieces.rows; ++y)
+    for (int x = 0; x < pieces.cols; ++x) result.at<int>(y, x) = plane_of[pieces.at<int>(y, x)];
+  return result;
 }
 
 cv::Mat strokesOfPieces(const cv::Mat& pieces, const cv::Mat& strokes) {

@@ -170,6 +170,7 @@ Relief makeRelief(const cv::Mat& image, const cv::Mat& depth,
   if (relief.registered) {
     const float crease = creaseThreshold(relief);
     relief.pieces = planarPieces(relief, crease);
+    relief.planes = sharedPlanes(relief, relief.pieces);
     relief.islands = surfaceIslands(relief, crease);
   }
   if (!supports.empty())
@@ -187,6 +188,8 @@ Relief resized(const Relief& relief, const cv::Rect& view, const cv::Size& size)
   cv::resize(relief.state(view), result.state, size, 0, 0, cv::INTER_NEAREST);
   if (!relief.pieces.empty())
     cv::resize(relief.pieces(view), result.pieces, size, 0, 0, cv::INTER_NEAREST);
+  if (!relief.planes.empty())
+    cv::resize(relief.planes(view), result.planes, size, 0, 0, cv::INTER_NEAREST);
   if (!relief.islands.empty())
     cv::resize(relief.islands(view), result.islands, size, 0, 0, cv::INTER_NEAREST);
   if (!relief.raised.empty())

@@ -156,6 +156,9 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
   }
   if (!level.relief.registered) return;
   level.stroked = strokesOfPieces(level.relief.pieces, level.seeds);
+  // A wall goes on behind an object, also where that encloses a piece of it.
+  const cv::Mat of_planes = strokesOfPieces(level.relief.planes, level.seeds);
+  level.stroked.setTo(1, (level.stroked == 0) & (of_planes == 1));
   level.floating = seedsOfIslands(level.relief.islands, level.seeds, level.allowed);
   if (!level.relief.raised.empty()) {
     // A vessel's inside and outside are parted by a jump, but stand on the table as one.

@@ -58,6 +58,23 @@ TEST(PlanarPieces, WhatIsCurvedIsNone) {
   EXPECT_EQ(cv::countNonZero(piecesOf(relief)), 0);
 }
 
+// Tiles between joints, one of which stands out of the wall.
+TEST(SharedPlanes, TilesOfAWallShareOne) {
+  std::mt19937 generator(1);
+  std::normal_distribution<float> noise(0.0f, 0.5f);
+  const Relief relief = reliefOf([&](int x, int y) {
+    const float wall = 500.0f + 2.0f * x - y, joint = x % 20 == 19 ? 30.0f : 0.0f;
+    return noise(generator) + wall - joint + (x > 40 ? 50.0f : 0.0f);
+  });
+  const cv::Mat pieces = piecesOf(relief);
+  ASSERT_NE(pieces.at<int>(30, 10), pieces.at<int>(30, 30));
+  const cv::Mat planes = sharedPlanes(relief, pieces);
+  EXPECT_GT(planes.at<int>(30, 10), 0);
+  EXPECT_EQ(planes.at<int>(30, 10), planes.at<int>(30, 30));
+  EXPECT_GT(planes.at<int>(30, 50), 0);
+  EXPECT_NE(planes.at<int>(30, 10), planes.at<int>(30, 50));
+}
+
 TEST(PlanarPieces, WithoutDepthThereAreNone) {
   Relief relief = corner();
   relief.state.setTo(Relief::kNone);

@@ -12,6 +12,10 @@ struct Relief;
 // crease: creaseThreshold()
 cv::Mat planarPieces(const Relief& relief, float crease);
 
+// The pieces that lie in one plane with others, such as the tiles of a wall between their joints:
+// CV_32S, per pixel the number of its plane from 1, 0 where a pixel is in no piece or in a small one.
+cv::Mat sharedPlanes(const Relief& relief, const cv::Mat& pieces);
+
 // How far the inverse depth of a relief may bend at a pixel without a crease, in its units.
 float creaseThreshold(const Relief& relief);
 

@@ -16,6 +16,7 @@ struct Relief {
   cv::Mat surface;
   cv::Mat state;    // CV_8U: kUnusable near edges when `registered` is false, kNone without depth
   cv::Mat pieces;   // CV_32S: planar_pieces.hpp; empty unless `registered`
+  cv::Mat planes;   // CV_32S: likewise, sharedPlanes()
   cv::Mat islands;  // CV_32S: surface_islands.hpp; empty unless `registered`
   cv::Mat on_support;  // CV_8U: the surface is that of a support plane, within its noise; or empty
   // CV_32S: number from 1 of what hangs together in the picture and is no support; empty unless
