@@ -17,6 +17,7 @@
 #include "place/plate_beside.hpp"
 #include "prepare_background.hpp"
 #include "prepare_remarks.hpp"
+#include "texture/mesh_topology.hpp"
 
 namespace calipso::render {
 namespace {
@@ -123,6 +124,15 @@ void coverWhatRests(const Prepared& p, std::vector<ClipFrame>& frames) {
   }
 }
 
+// Which of them are cloth: sheets that lie about in a plane, as no boat's thin hull does.
+std::vector<bool> clothAmong(const std::vector<Surface>& surfaces) {
+  constexpr float kFlat = 0.15f;  // least to greatest extent
+  std::vector<bool> cloth;
+  for (const Surface& s : surfaces)
+    cloth.push_back(isSheet(s.key_vertices, s.triangles) && flatness(s.key_vertices) < kFlat);
+  return cloth;
+}
+
 LightFit lightOf(const std::vector<View>& views, const Background& seen, bool any_moves,
                  const RenderParams& params, const Prepared& p) {
   LightEvidence evidence =
@@ -204,7 +214,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.light_views = static_cast<int>(light_views.size());
   // Where no cast shadow tells the light, the objects' shade on the ground may be another.
   p.appearances =
-      makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()),
+      makeAppearances(views, p.moves, p.light.light, p.light.glosses(clothAmong(p.surfaces)),
                       p.light.from_shadows ? params.planes : std::vector<SupportPlane>());
   p.appearance_ms = watch.lap();
   const ShadowMap sun = sunOver(actors, p.light.light);

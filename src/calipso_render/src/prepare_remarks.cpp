@@ -90,12 +90,13 @@ void remarkObject(const std::vector<ClipFrame>& frames, const Actor& actor, std:
                         " % of its mask; the side that the camera sees is missing or misplaced, "
                         "and is left out when the object is drawn elsewhere");
   }
-  if (p.light.determined && !p.light.toldGloss(i)) {
-    p.remarks.push_back(who +
-                        ": no highlight of a confirmed light tells its gloss; it is what the "
-                        "shading leaves possible, an edit 'appearance' sets it");
-  }
   const Appearance& a = p.appearances[i];
+  if (p.light.determined && !p.light.toldGloss(i)) {
+    p.remarks.push_back(
+        who + ": no highlight of a confirmed light tells its gloss; it is " +
+        (a.gloss.specular > 0.0f ? "what the shading leaves possible" : "taken to be matt") +
+        ", an edit 'appearance' sets it");
+  }
   const double unseen = 1.0 - a.seen_in_key - a.seen_elsewhere;
   if (unseen > kMuchUnseen) {
     p.remarks.push_back(who + ": " + std::to_string(percent(unseen)) +

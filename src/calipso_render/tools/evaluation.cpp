@@ -251,8 +251,9 @@ class Evaluation {
     views[0].labels = p.key_labels, views[0].camera = scene_.camera;
     for (const Surface& s : p.surfaces)
       views[0].actors.push_back(makeActor(s, s.key_vertices, scene_.camera));
-    return makeAppearances(views, p.moves, p.light.light, p.light.glosses(p.moves.size()),
-                           params_.planes);
+    std::vector<Gloss> glosses;
+    for (const Appearance& a : p.appearances) glosses.push_back(a.gloss);
+    return makeAppearances(views, p.moves, p.light.light, glosses, params_.planes);
   }
 
   std::shared_ptr<Prepared> fromKeyFrame() const {
@@ -265,7 +266,7 @@ class Evaluation {
   std::shared_ptr<Prepared> unlit() const {
     auto flat = std::make_shared<Prepared>(*prepared_);
     flat->light.light.sun = {0, 0, 0};
-    flat->light.gloss = {}, flat->light.seen_gloss = {};
+    for (Appearance& a : flat->appearances) a.gloss = {};
     flat->light.light.ambient = {};
     flat->light.light.ambient[0] = {1, 1, 1};
     for (Surface& s : flat->surfaces) {

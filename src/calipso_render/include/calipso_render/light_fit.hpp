@@ -102,7 +102,9 @@ struct LightFit {
   // the light that is somewhere else.
   std::optional<SeenGloss> toldGloss(std::size_t object) const;
   Gloss glossOf(std::size_t object) const;
-  std::vector<Gloss> glosses(std::size_t objects) const;
+  // @param cloth per object; it is matt unless its own highlights, or such of nothing but cloth,
+  // tell otherwise
+  std::vector<Gloss> glosses(const std::vector<bool>& cloth) const;
 };
 
 // Sun direction, sun and ambient colour, albedos and gloss from shading and cast shadows: a search

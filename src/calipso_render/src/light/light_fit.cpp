@@ -313,9 +313,14 @@ Gloss LightFit::glossOf(std::size_t object) const {
   return {own[object]->gloss.specular, own[object]->gloss.roughness, gloss.around};
 }
 
-std::vector<Gloss> LightFit::glosses(std::size_t objects) const {
+std::vector<Gloss> LightFit::glosses(const std::vector<bool>& cloth) const {
+  const bool all_cloth = std::find(cloth.begin(), cloth.end(), false) == cloth.end();
   std::vector<Gloss> all;
-  for (std::size_t i = 0; i < objects; ++i) all.push_back(glossOf(i));
+  for (std::size_t i = 0; i < cloth.size(); ++i) {
+    const bool own = i < seen_gloss.of_one.size() && seen_gloss.of_one[i];
+    const bool told = confirmed() && (own || (all_cloth && seen_gloss.of_all));
+    all.push_back(cloth[i] && !told ? Gloss() : glossOf(i));
+  }
   return all;
 }
 

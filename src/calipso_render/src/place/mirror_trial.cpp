@@ -18,7 +18,7 @@ constexpr int kFarthest = 64;      // px by which the image is displaced for com
 constexpr double kAlike = 0.3;
 constexpr int kFewestOthers = 12;    // such displaced images, at least
 constexpr double kClear = 1.8;       // times what the best of them explains
-constexpr double kExplained = 0.04;  // of the squares around the image, at least
+constexpr double kExplained = 0.1;   // of the squares around the image, at least
 // strengths, times what water and varnish mirror: dull ones, and polished steel
 constexpr double kFaintest = 0.3, kBrightest = 10.0;
 constexpr int kMisplaced = 2;  // px by which the image may be displaced against its place

@@ -1,5 +1,6 @@
 #include "texture/mesh_topology.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -14,6 +15,8 @@ namespace calipso::render {
 namespace {
 
 constexpr float kSamePlace = 1e-5f;  // of the surface's extent
+
+constexpr float kSheet = 0.012f;  // of the extent: mean thickness of a sheet
 
 // cosine between the normals of two triangles: an edge that bends more is no smooth surface's
 constexpr float kCrease = 0.5f;
@@ -89,6 +92,33 @@ std::vector<int> smoothParts(const Points& vertices, const Triangles& triangles)
   for (std::size_t t = 0; t < triangles.size(); ++t)
     parts.push_back(sets.find(static_cast<int>(t)));
   return parts;
+}
+
+float flatness(const Points& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3f& p : points) sum += p.cast<double>();
+  const Eigen::Vector3d mean = sum / static_cast<double>(points.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3f& p : points) {
+    const Eigen::Vector3d d = p.cast<double>() - mean;
+    spread += d * d.transpose();
+  }
+  const Eigen::Vector3d squares =  // ascending
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread, Eigen::EigenvaluesOnly).eigenvalues();
+  return static_cast<float>(std::sqrt(std::max(0.0, squares[0]) / std::max(1e-30, squares[2])));
+}
+
+bool isSheet(const Points& vertices, const Triangles& triangles) {
+  const Eigen::AlignedBox3f box = boxOf(vertices);
+  const Eigen::Vector3f origin = box.center();
+  float volume = 0.0f, area = 0.0f;
+  for (const Eigen::Vector3i& t : triangles) {
+    const Eigen::Vector3f& a = vertices[t[0]];
+    const Eigen::Vector3f normal = 0.5f * (vertices[t[1]] - a).cross(vertices[t[2]] - a);
+    volume += (a - origin).dot(normal) / 3.0f, area += normal.norm();
+  }
+  const float thickness = area > 0.0f ? 2.0f * std::abs(volume) / area : 0.0f;  // mean
+  return thickness < kSheet * box.diagonal().norm();
 }
 
 MeshNormals meshNormals(const Points& vertices, const Triangles& triangles,

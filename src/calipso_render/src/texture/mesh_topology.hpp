@@ -23,6 +23,12 @@ std::vector<int> smoothParts(const Points& vertices, const Triangles& triangles)
 // triangle can be seen.
 int outsideWinding(const Points& vertices, const Triangles& triangles);
 
+// How far points spread where they spread least, to where they spread most (standard deviations).
+float flatness(const Points& points);
+
+// Is a mesh as thin as cloth, closed or not?
+bool isSheet(const Points& vertices, const Triangles& triangles);
+
 // Where a mesh's normals differ: a vertex has one for every piece of surface around it that no
 // crease parts from the others. The first has the vertex' own number, further ones follow behind
 // all vertices.

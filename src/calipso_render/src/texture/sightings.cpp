@@ -10,7 +10,7 @@
 namespace calipso::render {
 namespace {
 
-// of the object's extent: a point that far behind the front is hidden; what is thinner is a sheet
+// of the object's extent: a point that far behind the front is hidden
 constexpr float kDepthTolerance = 0.012f;
 // of the extent: what is that thin is a wall, whose sides need not look alike
 constexpr float kThinnest = 0.1f;
@@ -22,24 +22,12 @@ constexpr float kLittleLess = 0.03f, kMuchLess = 0.1f;
 constexpr float kAskew = 0.6f,
                 kAlike = 0.9f;  // cosine between normals that are not, and are, mirror images
 
-// Mean thickness of a closed surface: volume over half of the area.
-float thicknessOf(const Surface& surface) {
-  const Points& p = surface.key_vertices;
-  const Eigen::Vector3f origin = boxOf(p).center();
-  float volume = 0.0f, area = 0.0f;
-  for (const Eigen::Vector3i& t : surface.triangles) {
-    const Eigen::Vector3f normal = 0.5f * (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
-    volume += (p[t[0]] - origin).dot(normal) / 3.0f, area += normal.norm();
-  }
-  return area > 0.0f ? 2.0f * std::abs(volume) / area : 0.0f;
-}
-
 }  // namespace
 
 Sightings::Sightings(const SeenObject& object) : views_(object.views), pictures_(object.pictures) {
   const Surface& surface = *object.actors.front()->surface;
   extent_ = boxOf(surface.key_vertices).diagonal().norm();
-  is_sheet_ = thicknessOf(surface) < kDepthTolerance * extent_;
+  is_sheet_ = render::isSheet(surface.key_vertices, surface.triangles);
   two_sided_ = is_sheet_ || std::any_of(surface.edges.begin(), surface.edges.end(),
                                         [](const MeshEdge& e) { return e.b < 0; });
   for (const View* v : views_)
