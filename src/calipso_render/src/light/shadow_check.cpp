@@ -144,7 +144,8 @@ class Test {
 struct Region {
   cv::Mat mask;  // CV_8UC1
   bool of_sun;
-  double odds;  // log
+  bool scattered;  // all small regions together
+  double odds;     // log
 };
 
 void addRegions(const Test& test, const cv::Mat& visible, float limit, bool of_sun,
@@ -158,9 +159,9 @@ void addRegions(const Test& test, const cv::Mat& visible, float limit, bool of_s
     if (cv::countNonZero(mask) < kFewest)
       small |= mask;
     else
-      regions.push_back({mask, of_sun, test.of(mask, hidden)});
+      regions.push_back({mask, of_sun, false, test.of(mask, hidden)});
   }
-  if (cv::countNonZero(small) > 0) regions.push_back({small, of_sun, test.of(small, hidden)});
+  if (cv::countNonZero(small) > 0) regions.push_back({small, of_sun, true, test.of(small, hidden)});
 }
 
 }  // namespace
@@ -189,9 +190,11 @@ SeenShadows seenShadows(const cv::Mat& sun, const cv::Mat& sky, const cv::Mat& p
   SeenShadows result{nothing.clone(), nothing.clone(), nothing.clone()};
   bool any_of_sun = false;
   for (const Region& r : regions) {
-    cv::Mat& of = !believed(r) ? result.refuted : r.of_sun ? result.sun : result.sky;
-    of |= r.mask;
     any_of_sun = any_of_sun || r.of_sun;
+    if (believed(r))
+      (r.of_sun ? result.sun : result.sky) |= r.mask;
+    else if (r.of_sun || !r.scattered)  // specks of a little less sky tell nothing
+      result.refuted |= r.mask;
   }
   result.none = !regions.empty() && cv::countNonZero(result.sun | result.sky) == 0;
   result.no_sun = any_of_sun && cv::countNonZero(result.sun) == 0;

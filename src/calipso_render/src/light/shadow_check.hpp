@@ -14,7 +14,7 @@ namespace calipso::render {
 // pixels beside its shadow.
 struct SeenShadows {
   cv::Mat sun, sky;     // CV_8UC1: the regions that are seen, or that nothing speaks against
-  cv::Mat refuted;      // CV_8UC1: the others
+  cv::Mat refuted;      // CV_8UC1: the others, without what small regions of the sky's leave
   bool none = false;    // there are predictions, and all of them were refuted
   bool no_sun = false;  // the same of the sun's
 };
