@@ -150,6 +150,15 @@ LightFit lightOf(const std::vector<View>& views, const Background& seen, bool an
   return fit;
 }
 
+// Those that rest, if others move; none if none does, as then all are the same.
+std::vector<Actor> restingAmong(const std::vector<Actor>& actors, const std::vector<bool>& moves) {
+  std::vector<Actor> resting;
+  for (std::size_t i = 0; i < actors.size(); ++i) {
+    if (!moves[i]) resting.push_back(actors[i]);
+  }
+  return resting.size() < actors.size() ? resting : std::vector<Actor>();
+}
+
 ShadowMap sunOver(const std::vector<Actor>& actors, const Light& light) {
   return {occludersOf(actors), light.direction.cast<double>(), {768, light.angular_radius, 16}};
 }
@@ -219,11 +228,15 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
   p.appearance_ms = watch.lap();
   const ShadowMap sun = sunOver(actors, p.light.light);
   const SkyMap sky = skyOver(actors, params);
+  const std::vector<Actor> resting = restingAmong(actors, p.moves);
+  const ShadowMap sun_past_resting = sunOver(resting, p.light.light);
+  const SkyMap sky_past_resting = skyOver(resting, params);
   for (const Actor& a : actors) p.outlines.push_back(outlineOf(a, p.key_labels.size()));
   p.fronts = frontsOf(p, params);
   p.footprints = footprintsOf(p, picture, params.background.mask_margin_px);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
-  prepareBackground({frames, light_views, actors, seen, picture, sun, sky, cameraMoves(clip)},
+  prepareBackground({frames, light_views, actors, seen, picture, sun, sky, sun_past_resting,
+                     sky_past_resting, cameraMoves(clip)},
                     params, p);
   if (cameraMoves(clip) && !p.background.drifting.established())
     p.beside = platesBeside(clip.frames(), p.nearness, any_moves, params.background);

@@ -25,8 +25,9 @@ constexpr float kUnshadedSun = 0.985f;
 constexpr float kOffPlane = 0.1f;
 // frames that must show a place past an object, from which on their median is believed
 constexpr int kFewestPast = 3;
-constexpr int kAlike = 5;       // px over which it is told whether a place is lit
-constexpr float kQuiet = 5.0f;  // code values of spread over time: the place rests
+constexpr float kHardlyShaded = 0.9f;  // of the brightness
+constexpr int kAlike = 5;              // px over which it is told whether a place is lit
+constexpr float kQuiet = 5.0f;         // code values of spread over time: the place rests
 
 // Where the depth image shows something else than a support plane.
 cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes,
@@ -223,12 +224,10 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   return restingTraces(p, shadows, place, seenPast(e), params);
 }
 
-// What objects shade at the key frame whose poses in others nobody knows, as they deform, and where
-// the plate is as dark.
-cv::Mat unfollowedTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
-                         const cv::Mat& sky, const RenderParams& params, const Prepared& p) {
-  const SeenShadows shadows =
-      shadowsOn(place, sun, sky, e.picture, p.key_labels != 0, p.light.confirmed());
+// Where the key frame is shaded, as predicted, and the plate is lit.
+// @param sun, sky CV_32FC1, visible part of them at the key frame
+cv::Mat litSince(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,
+                 const RenderParams& params, const Prepared& p) {
   const double umbra = luminance(predictedUmbra(p.light.light, params.planes));
   cv::Mat then, now, half_lit;  // half: of the steps from shade to light, which are ratios
   cv::blur(luminanceOf(e.picture), then, {kAlike, kAlike});
@@ -236,10 +235,24 @@ cv::Mat unfollowedTraces(const PlaceEvidence& e, const SeenPlace& place, const c
   cv::sqrt(umbra * sky + (1.0 - umbra) * sun, half_lit);
   // What is narrower than a prediction's error goes with what is around it.
   const int side = 2 * params.background.shadow_margin_px + 1;
-  cv::Mat lit = now.mul(half_lit) >= then;
-  cv::morphologyEx(lit, lit, cv::MORPH_OPEN,
-                   cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
-  return shadeTraces(shadows, place, params) & ~lit;
+  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side});
+  cv::Mat lit = (now.mul(half_lit) >= then) & (half_lit < kHardlyShaded);
+  cv::morphologyEx(lit, lit, cv::MORPH_OPEN, disc);
+  // Beside it, where the key frame may be lit, too, the plate is if it is about as bright.
+  cv::Mat part, sum, count, beside;
+  lit.convertTo(part, CV_32F, 1.0 / 255.0);
+  cv::blur(now.mul(part), sum, {3 * side, 3 * side}), cv::blur(part, count, {3 * side, 3 * side});
+  cv::dilate(lit, beside, disc), cv::dilate(beside, beside, disc);
+  return lit | (beside & (now.mul(count) > std::sqrt(umbra) * sum));
+}
+
+// What objects shade at the key frame whose poses in others nobody knows, as they deform, and where
+// the plate is as dark.
+cv::Mat unfollowedTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
+                         const cv::Mat& sky, const RenderParams& params, const Prepared& p) {
+  const SeenShadows shadows =
+      shadowsOn(place, sun, sky, e.picture, p.key_labels != 0, p.light.confirmed());
+  return shadeTraces(shadows, place, params) & ~litSince(e, sun, sky, params, p);
 }
 
 // What objects that move shade in all frames that show it. Where others show it, their shade is
@@ -361,6 +374,12 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);
   cv::Mat traces =
       any_rests ? findTraces(e, place, sun, sky, params, p) : cv::Mat::zeros(key.bgr.size(), CV_8U);
+  if (any_rests && any_moves) {  // what has left some place shades it no more
+    const cv::Mat shaded = isShaded(placeVisibility(e.sun_past_resting, in_sun, key.bgr.size()),
+                                    placeVisibility(e.sky_past_resting, under_sky, key.bgr.size()));
+    traces.setTo(
+        0, litSince(e, sun, sky, params, p) & ~grown(shaded, params.background.shadow_margin_px));
+  }
   if (any_rests && !isWater(p.mirror)) liftTraces(e, place, sun, sky, params, traces, p);
   if (any_rests && !p.relief.empty()) traces |= contactTraces(e, params, p);
   if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);

@@ -15,6 +15,7 @@ struct PlaceEvidence {
   const Background& seen;
   const cv::Mat& picture;  // CV_32FC3, code values: the key frame, steadied
   const Visibility &sun, &sky;
+  const Visibility &sun_past_resting, &sky_past_resting;  // what moves in the video left out
   bool camera_moves;
 };
 

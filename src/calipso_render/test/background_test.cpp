@@ -352,7 +352,7 @@ struct BallOverGround {
     frame.bgr.convertTo(picture, CV_32F);
     const std::vector<ClipFrame> frames = {frame};
     const Background seen = seenBackground(frames, false);
-    prepareBackground({frames, {}, actors, seen, picture, sun, sky, false}, params, p);
+    prepareBackground({frames, {}, actors, seen, picture, sun, sky, sun, sky, false}, params, p);
     return p;
   }
 };
@@ -372,22 +372,31 @@ TEST(PrepareBackground, CurvedPlacesGiveUpTheShadowsOfAConfirmedLightAlone) {
 // Spots all over the table that no sky reaches, as is predicted; the picture has none.
 class SpotsWithoutSky : public Visibility {
  public:
+  explicit SpotsWithoutSky(float radius) : radius_(radius) {}
   float visibility(const Eigen::Vector3f& at, const Eigen::Vector3f&) const override {
-    const auto off = [](float x) { return x - 0.15f * std::round(x / 0.15f); };
-    return std::hypot(off(at.x()), off(at.y())) < 0.03f ? 0.0f : 1.0f;
+    const auto off = [&](float x) { return x - 5.0f * radius_ * std::round(x / (5.0f * radius_)); };
+    return std::hypot(off(at.x()), off(at.y())) < radius_ ? 0.0f : 1.0f;
   }
   bool empty() const override { return false; }
   std::optional<float> uniform(const Eigen::Vector3f&, const Eigen::Vector3f&,
                                float) const override {
     return std::nullopt;
   }
+
+ private:
+  float radius_;  // m
 };
 
 TEST(PrepareBackground, WhereTheSunIsHiddenASkyThatIsNotChangesNothing) {
   const BallOverGround place(0.0f);
-  const Prepared p = place.prepared(true, SpotsWithoutSky());
+  const Prepared p = place.prepared(true, SpotsWithoutSky(0.06f));
   EXPECT_GT(cv::countNonZero(p.shadowless), 100);
   EXPECT_EQ(cv::countNonZero(p.shadowless & place.shaded), 0);
+}
+
+TEST(PrepareBackground, SpecksWithoutSkyKeepNoShadowOff) {
+  const BallOverGround place(0.0f);
+  EXPECT_EQ(cv::countNonZero(place.prepared(true, SpotsWithoutSky(0.02f)).shadowless), 0);
 }
 
 }  // namespace

@@ -232,5 +232,33 @@ TEST(PassingShade, OfWhatIsNotFollowedIsTakenOutWhereThePlateHasItToo) {
   EXPECT_GT(shaded, 100);
 }
 
+// Beside something that rests, too: later frames show the place that what is not followed has left.
+TEST(PassingShade, OfWhatIsNotFollowedLeavesThePlaceThatLaterFramesShowLit) {
+  const Eigen::Vector3d resting(0.25, 0.1, 0.1);
+  const ObjectModel other = ballAt(resting, "other", 2);
+  Clip clip = ballAlong({kTo, kFrom, kFrom, kFrom});
+  const ClipFrame rests = frameWithBall(other);
+  ClipSample sample;
+  for (ClipFrame& f : clip.frames) {
+    rests.bgr.copyTo(f.bgr, rests.labels == 2), rests.labels.copyTo(f.labels, rests.labels == 2);
+    f.poses.clear(), sample.add(f);
+  }
+  const Prepared prepared = prepare(sample, {ballAt(kTo), other}, params());
+  ASSERT_TRUE(prepared.moves[0] && !prepared.moves[1]);
+  int shaded = 0, invented = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const auto r = clip.receiver(u, v);
+      if (!r || clip.frames[0].labels.at<std::uint8_t>(v, u) != 0 ||
+          clip.frames[1].labels.at<std::uint8_t>(v, u) != 0 || !isInShadow(r->position, kTo) ||
+          isInShadow(r->position, resting) || isInShadow(r->position, kFrom))
+        continue;
+      ++shaded, invented += prepared.background.invented.at<std::uint8_t>(v, u) != 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(shaded, 100);
+  EXPECT_LT(invented, shaded / 4);  // what is left lies at its edges
+}
+
 }  // namespace
 }  // namespace calipso::render
