@@ -134,7 +134,7 @@ cv::Mat planarPieces(const Relief& relief, float crease) {
 }
 
 cv::Mat sharedPlanes(const Relief& relief, const cv::Mat& pieces) {
-  constexpr double kLeastPixels = 400.0;  // smaller ones lie near many planes
+  constexpr double kLeast = 0.0017;  // of the picture: smaller ones lie near many planes
   // from a common plane they deviate hardly more than from their own; in the relief's units
   constexpr double kNoMore = 1.5, kNoise = 2.0;
   constexpr double kApart = 0.005;  // ... nor by that part of their inverse depth
@@ -149,7 +149,7 @@ cv::Mat sharedPlanes(const Relief& relief, const cv::Mat& pieces) {
     }
   std::vector<size_t> order;  // the largest first
   for (size_t k = 1; k < fits.size(); ++k)
-    if (fits[k].count() >= kLeastPixels) order.push_back(k);
+    if (fits[k].count() >= kLeast * static_cast<double>(pieces.total())) order.push_back(k);
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return fits[a].count() > fits[b].count(); });
   std::vector<PlaneFit> planes;
@@ -160,8 +160,8 @@ cv::Mat sharedPlanes(const Relief& relief, const cv::Mat& pieces) {
       both.add(fits[k]);
       const Eigen::Vector3d plane = both.plane();
       const auto strays = [&](const PlaneFit& fit) {
-        const double most = std::min(kNoMore * fit.deviation() + kNoise, kApart * fit.mean());
-        return fit.deviationFrom(plane) > most;
+        return fit.deviationFrom(plane) >
+               std::min(kNoMore * fit.deviation() + kNoise, kApart * fit.mean());
       };
       if (strays(fits[k]) || strays(planes[j])) continue;
       planes[j] = both;
