@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+
 #include "../src/world/obstacle_query.hpp"
 #include "calipso_fem/condensed_factor.hpp"
 #include "calipso_fem/deformable_body.hpp"
@@ -41,6 +43,24 @@ TEST(MassProperties, OpenMeshUsesItsHullAndSaysSo) {
   const MassProperties m = massProperties(box, 1000.0);
   EXPECT_NEAR(m.mass, 1000.0, 1e-6);
   EXPECT_NE(m.note.find("hull"), std::string::npos);
+}
+
+// A fit can turn a thin hull inside out in places: its integrals are no solid's, and a body with
+// such an inertia flies apart.
+TEST(MassProperties, PartsInsideOutLeaveItToTheHull) {
+  const TriangleMesh box = boxSurface({1, 1, 1}, 1);
+  const Eigen::Index vertices = box.vertices.rows(), triangles = box.triangles.rows();
+  TriangleMesh both = box;
+  both.vertices.conservativeResize(2 * vertices, 3);
+  both.triangles.conservativeResize(2 * triangles, 3);
+  both.vertices.bottomRows(vertices) =
+      (0.9 * box.vertices).rowwise() + Eigen::RowVector3d(3.0, 0.0, 0.0);
+  both.triangles.bottomRows(triangles) = box.triangles.array() + static_cast<int>(vertices);
+  both.triangles.bottomRows(triangles).col(1).swap(both.triangles.bottomRows(triangles).col(2));
+  const MassProperties m = massProperties(both, 1000.0);
+  EXPECT_GT(m.mass, 1000.0);
+  EXPECT_GT(m.inertia.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), 0.0);
+  EXPECT_NE(m.note.find("inside out"), std::string::npos);
 }
 
 TEST(MassProperties, RefusesFlatMeshAndBadDensity) {

@@ -2,6 +2,7 @@
 
 #include <LinearMath/btConvexHullComputer.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <map>
 #include <stdexcept>
@@ -31,6 +32,16 @@ Moments moments(const TriangleMesh& mesh, const Eigen::Vector3d& origin) {
         v / 20.0 * (s * s.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
   }
   return m;
+}
+
+// Is it that of a solid: does its mass spread in every direction? Not where parts are inside out.
+bool isSpread(const Moments& m) {
+  const Eigen::Vector3d r = m.first / m.volume;
+  const Eigen::Vector3d spread =  // ascending
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m.second - m.volume * r * r.transpose(),
+                                                     Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  return spread[0] > 1e-9 * spread[2];
 }
 
 MassProperties fromMoments(const Moments& m, const Eigen::Vector3d& origin, double density) {
@@ -104,14 +115,15 @@ MassProperties massProperties(const TriangleMesh& mesh, double density) {
   const bool inside_out = m.volume < 0.0;
   if (inside_out) m = {-m.volume, -m.first, -m.second};
   const double diagonal = boundingDiagonal(mesh);
-  const bool encloses = m.volume > 1e-6 * diagonal * diagonal * diagonal;
-  if (encloses && isClosed(mesh)) {
+  const bool encloses = m.volume > 1e-6 * diagonal * diagonal * diagonal && isClosed(mesh);
+  if (encloses && isSpread(m)) {
     MassProperties p = fromMoments(m, origin, density);
     if (inside_out) p.note = "the faces pointed inwards and were turned";
     return p;
   }
   MassProperties p = fromMoments(moments(convexHull(mesh.vertices), origin), origin, density);
-  p.note = "the mesh is not closed; its convex hull stands in for mass and inertia";
+  p.note = std::string(encloses ? "parts of the mesh are inside out" : "the mesh is not closed") +
+           "; its convex hull stands in for mass and inertia";
   return p;
 }
 

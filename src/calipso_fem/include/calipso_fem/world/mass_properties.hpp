@@ -17,7 +17,8 @@ struct MassProperties {
 };
 
 // Exact integrals over the enclosed solid. Inside-out meshes are turned; where the mesh encloses no
-// volume (open, or flat), the convex hull of its vertices stands in, and `note` says so.
+// volume (open, or flat), or parts of it are inside out, so that the integrals are no solid's, the
+// convex hull of its vertices stands in, and `note` says so.
 // @throw std::invalid_argument if density is not positive or even the hull is flat
 MassProperties massProperties(const TriangleMesh& mesh, double density);
 
