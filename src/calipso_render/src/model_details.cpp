@@ -8,6 +8,7 @@
 
 #include "calipso_render/visibility.hpp"
 #include "frame/mask_morphology.hpp"
+#include "place/masked_quantile.hpp"
 
 namespace calipso::render {
 namespace {
@@ -28,12 +29,12 @@ constexpr double kKnown = 0.5;  // part of its pixels whose depth the image has 
 
 // The object's model as the key frame shows it.
 struct SeenModel {
-  cv::Mat nearness;  // CV_32FC1, 1/m; 0: not there
-  cv::Mat seen;      // CV_8UC1
-  cv::Mat beside;    // CV_32FC1, px: how far beside it
-  cv::Mat nearest;   // CV_32SC1: number of the model's pixel that is nearest to each
-  std::vector<float> nearness_of;
-  std::vector<int> triangle_of;
+  cv::Mat nearness;              // CV_32FC1, 1/m; 0: not there
+  cv::Mat seen;                  // CV_8UC1
+  cv::Mat beside;                // CV_32FC1, px: how far beside it
+  cv::Mat nearest;               // CV_32SC1: number of the model's pixel that is nearest to each
+  cv::Mat next;                  // CV_32FC1, 1/m: nearness of that
+  std::vector<int> triangle_of;  // by number
 };
 
 SeenModel seenModel(const Actor& actor, const cv::Size& size) {
@@ -52,23 +53,22 @@ SeenModel seenModel(const Actor& actor, const cv::Size& size) {
                         cv::DIST_LABEL_PIXEL);
   double most;
   cv::minMaxLoc(model.nearest, nullptr, &most);
-  model.nearness_of.resize(static_cast<std::size_t>(most) + 1, 0.0f);
-  model.triangle_of.resize(model.nearness_of.size(), 0);
+  std::vector<float> nearness_of(static_cast<std::size_t>(most) + 1, 0.0f);
+  model.triangle_of.resize(nearness_of.size(), 0);
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       if (model.seen.at<std::uint8_t>(v, u) == 0) continue;
       const int number = model.nearest.at<int>(v, u);
-      model.nearness_of[number] = model.nearness.at<float>(v, u);
+      nearness_of[number] = model.nearness.at<float>(v, u);
       model.triangle_of[number] = VisibilityBuffer::triangleOf(buffer.ids(v)[u]);
     }
   }
+  model.next.create(size, CV_32F);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u)
+      model.next.at<float>(v, u) = nearness_of[model.nearest.at<int>(v, u)];
+  }
   return model;
-}
-
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Is what a piece of the mask shows beside its model as near as that, or as the place behind it?
@@ -78,24 +78,15 @@ bool isOfObject(const cv::Mat& piece, const SeenModel& model, const cv::Mat& dep
                 const cv::Mat& place) {
   cv::Mat around;
   cv::dilate(piece, around, disc(kAround));
-  std::vector<float> scale, measured, place_there, model_there;
-  int count = 0;
-  for (int v = 0; v < piece.rows; ++v) {
-    for (int u = 0; u < piece.cols; ++u) {
-      const float z = depth.at<float>(v, u);
-      if (piece.at<std::uint8_t>(v, u)) {
-        ++count;
-        if (z <= 0.0f) continue;
-        measured.push_back(1.0f / z), place_there.push_back(place.at<float>(v, u));
-        model_there.push_back(model.nearness_of[model.nearest.at<int>(v, u)]);
-      } else if (around.at<std::uint8_t>(v, u) && model.seen.at<std::uint8_t>(v, u) && z > 0.0f) {
-        scale.push_back(1.0f / (z * model.nearness.at<float>(v, u)));
-      }
-    }
-  }
-  if (scale.empty() || static_cast<double>(measured.size()) < kKnown * count) return false;
-  const float by = median(scale), here = median(measured);
-  return std::abs(here - by * median(model_there)) < std::abs(here - median(place_there));
+  const cv::Mat measured = depth > 0.0f, there = piece & measured,
+                of_model = around & ~piece & model.seen & measured;
+  if (cv::countNonZero(of_model) == 0 || cv::countNonZero(there) < kKnown * cv::countNonZero(piece))
+    return false;
+  const cv::Mat here = 1.0f / depth;
+  const float by = quantileOf(1.0f / depth.mul(model.nearness), of_model, 0.5),
+              seen = quantileOf(here, there, 0.5);
+  return std::abs(seen - by * quantileOf(model.next, there, 0.5)) <
+         std::abs(seen - quantileOf(place, there, 0.5));
 }
 
 // What the mask shows of an object beyond its model.
@@ -137,7 +128,7 @@ cv::Mat flatNearness(const cv::Mat& shape, const SeenModel& model, double fx) {
       places.at<double>(k, 0) = 1.0;
       places.at<double>(k, 1) = pixels[k].x - pixels[0].x;
       places.at<double>(k, 2) = pixels[k].y - pixels[0].y;
-      near.at<double>(k) = model.nearness_of[model.nearest.at<int>(pixels[k])];
+      near.at<double>(k) = model.next.at<float>(pixels[k]);
     }
     cv::solve(places, near, plane, cv::DECOMP_SVD | cv::DECOMP_NORMAL);
     const cv::Mat fitted = places * plane;

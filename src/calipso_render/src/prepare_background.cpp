@@ -9,6 +9,7 @@
 #include "place/hollow.hpp"
 #include "place/key_cover.hpp"
 #include "place/lifted_shade.hpp"
+#include "place/lit_since.hpp"
 #include "place/passing_shade.hpp"
 #include "place/place_relief.hpp"
 #include "place/plane_mirror.hpp"
@@ -25,9 +26,7 @@ constexpr float kUnshadedSun = 0.985f;
 constexpr float kOffPlane = 0.1f;
 // frames that must show a place past an object, from which on their median is believed
 constexpr int kFewestPast = 3;
-constexpr float kHardlyShaded = 0.9f;  // of the brightness
-constexpr int kAlike = 5;              // px over which it is told whether a place is lit
-constexpr float kQuiet = 5.0f;         // code values of spread over time: the place rests
+constexpr float kQuiet = 5.0f;  // code values of spread over time: the place rests
 
 // Where the depth image shows something else than a support plane.
 cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes,
@@ -224,26 +223,12 @@ cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat
   return restingTraces(p, shadows, place, seenPast(e), params);
 }
 
-// Where the key frame is shaded, as predicted, and the plate is lit.
-// @param sun, sky CV_32FC1, visible part of them at the key frame
-cv::Mat litSince(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,
+// litSince() of the light found.
+cv::Mat litPlate(const PlaceEvidence& e, const cv::Mat& sun, const cv::Mat& sky,
                  const RenderParams& params, const Prepared& p) {
   const double umbra = luminance(predictedUmbra(p.light.light, params.planes));
-  cv::Mat then, now, half_lit;  // half: of the steps from shade to light, which are ratios
-  cv::blur(luminanceOf(e.picture), then, {kAlike, kAlike});
-  cv::blur(luminanceOf(p.background.plate), now, {kAlike, kAlike});
-  cv::sqrt(umbra * sky + (1.0 - umbra) * sun, half_lit);
-  // What is narrower than a prediction's error goes with what is around it.
-  const int side = 2 * params.background.shadow_margin_px + 1;
-  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side});
-  cv::Mat lit = (now.mul(half_lit) >= then) & (half_lit < kHardlyShaded);
-  cv::morphologyEx(lit, lit, cv::MORPH_OPEN, disc);
-  // Beside it, where the key frame may be lit, too, the plate is if it is about as bright.
-  cv::Mat part, sum, count, beside;
-  lit.convertTo(part, CV_32F, 1.0 / 255.0);
-  cv::blur(now.mul(part), sum, {3 * side, 3 * side}), cv::blur(part, count, {3 * side, 3 * side});
-  cv::dilate(lit, beside, disc), cv::dilate(beside, beside, disc);
-  return lit | (beside & (now.mul(count) > std::sqrt(umbra) * sum));
+  return litSince(e.picture, p.background.plate, umbra * sky + (1.0 - umbra) * sun, umbra,
+                  params.background.shadow_margin_px);
 }
 
 // What objects shade at the key frame whose poses in others nobody knows, as they deform, and where
@@ -252,7 +237,7 @@ cv::Mat unfollowedTraces(const PlaceEvidence& e, const SeenPlace& place, const c
                          const cv::Mat& sky, const RenderParams& params, const Prepared& p) {
   const SeenShadows shadows =
       shadowsOn(place, sun, sky, e.picture, p.key_labels != 0, p.light.confirmed());
-  return shadeTraces(shadows, place, params) & ~litSince(e, sun, sky, params, p);
+  return shadeTraces(shadows, place, params) & ~litPlate(e, sun, sky, params, p);
 }
 
 // What objects that move shade in all frames that show it. Where others show it, their shade is
@@ -378,7 +363,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
     const cv::Mat shaded = isShaded(placeVisibility(e.sun_past_resting, in_sun, key.bgr.size()),
                                     placeVisibility(e.sky_past_resting, under_sky, key.bgr.size()));
     traces.setTo(
-        0, litSince(e, sun, sky, params, p) & ~grown(shaded, params.background.shadow_margin_px));
+        0, litPlate(e, sun, sky, params, p) & ~grown(shaded, params.background.shadow_margin_px));
   }
   if (any_rests && !isWater(p.mirror)) liftTraces(e, place, sun, sky, params, traces, p);
   if (any_rests && !p.relief.empty()) traces |= contactTraces(e, params, p);

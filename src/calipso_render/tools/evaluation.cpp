@@ -267,8 +267,7 @@ class Evaluation {
     auto flat = std::make_shared<Prepared>(*prepared_);
     flat->light.light.sun = {0, 0, 0};
     for (Appearance& a : flat->appearances) a.gloss = {};
-    flat->light.light.ambient = {};
-    flat->light.light.ambient[0] = {1, 1, 1};
+    flat->light.light.ambient = {cv::Vec3f(1, 1, 1)};
     for (Surface& s : flat->surfaces) {
       std::fill(s.seen.begin(), s.seen.end(), SkySeen());
       std::fill(s.seen_behind.begin(), s.seen_behind.end(), SkySeen());
