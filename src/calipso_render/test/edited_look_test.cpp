@@ -105,6 +105,37 @@ TEST(EditedLook, AnInsertedObjectIsHiddenByWhatStandsBeforeIt) {
   EXPECT_EQ(with.bgr.at<cv::Vec3b>(s.at(kCentre)), s.draw(in).bgr.at<cv::Vec3b>(s.at(kCentre)));
 }
 
+// What the video shows beside the object's drawing goes along with the object, not with what is
+// before it.
+TEST(EditedLook, NothingOfAnObjectBehindShowsThroughAnInsertedOne) {
+  const BallToEdit s;
+  FrameInput in = s.input(true);
+  in.objects.push_back(card(kCentre + Eigen::Vector3d(0.0, -0.2, 0.0)));
+  const FrameOutput plain = s.draw(in);
+  const cv::Point middle = s.at(kCentre + Eigen::Vector3d(0.0, -0.2, 0.0));
+  const cv::Rect square(middle - cv::Point(4, 4), cv::Size(9, 9));
+  const BallToEdit marked = [&] {  // with marks on the ball that its texture does not have
+    BallToEdit other;
+    for (int k = 0; k < 9; k += 3) other.key.bgr(square).row(k).setTo(cv::Scalar(255, 255, 255));
+    return other;
+  }();
+  in.bgr = marked.key.bgr;
+  const FrameOutput with_marks = marked.draw(in);
+  EXPECT_EQ(cv::norm(plain.bgr(square), with_marks.bgr(square), cv::NORM_INF), 0.0);
+}
+
+// Removed in the frame in which it came: it was never drawn.
+TEST(EditedLook, WhatIsGoneBeforeItIsDrawnIsPassedOver) {
+  const BallToEdit s;
+  FrameInput in = s.input(true);
+  in.objects[0].look.tint = cv::Vec3f(0.2f, 0.5f, 1.0f);
+  const FrameOutput alone = s.draw(in);
+  ObjectInFrame gone;
+  gone.name = "card", gone.removed = true;
+  in.objects.push_back(gone);
+  EXPECT_EQ(cv::norm(s.draw(in).bgr, alone.bgr, cv::NORM_INF), 0.0);
+}
+
 TEST(EditedLook, ATintMultipliesTheReflectance) {
   const BallToEdit s;
   FrameInput in = s.input(true);
@@ -143,6 +174,34 @@ TEST(EditedLook, AnAlbedoReplacesTheReflectance) {
     EXPECT_NEAR(linearFromCode(dark[c]) / linearFromCode(bright[c]), 0.5f, 0.06f)
         << c;  // codes are rounded
   }
+}
+
+// A bright mark that no light explains is as much fainter as the light is.
+TEST(EditedLook, WhatDrawingMissesFadesWithTheSun) {
+  BallToEdit s;
+  const cv::Point p = s.at(kCentre + Eigen::Vector3d(0.0, -0.09, 0.03));
+  const cv::Rect mark(p - cv::Point(1, 1), cv::Size(3, 3));
+  FrameInput in = s.input(true);
+  in.bgr = s.key.bgr.clone();  // the clip that was learnt from does not have it
+  in.bgr(mark).setTo(cv::Scalar(250, 250, 250));
+  in.sun.factor = 0.05f;
+  const cv::Vec3b dim = s.draw(in).bgr.at<cv::Vec3b>(p);
+  in.bgr = s.key.bgr;
+  const cv::Vec3b around = s.draw(in).bgr.at<cv::Vec3b>(p);
+  const float lit = linearFromCode(s.key.bgr.at<cv::Vec3b>(p)[1]);
+  const float factor = linearFromCode(around[1]) / lit;
+  ASSERT_LT(factor, 0.7f);
+  for (int c = 0; c < 3; ++c) EXPECT_LT(linearFromCode(dim[c]), 1.1f * factor) << c;
+}
+
+// It shows the sun in one direction alone.
+TEST(EditedLook, NoRoughnessAtAllIsDrawnAsLittle) {
+  const BallToEdit s;
+  FrameInput in = s.input(true);
+  in.objects[0].look.specular = 0.5f, in.objects[0].look.roughness = 0.0f;
+  const FrameOutput none = s.draw(in);
+  in.objects[0].look.roughness = 0.01f;
+  EXPECT_EQ(cv::norm(none.bgr, s.draw(in).bgr, cv::NORM_INF), 0.0);
 }
 
 TEST(EditedLook, AnotherSunLightsTheOtherSide) {

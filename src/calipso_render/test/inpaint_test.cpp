@@ -176,6 +176,28 @@ TEST(PatchOrigins, ComeFromASurfaceOfWhichLittleIsSeen) {
   EXPECT_LT(elsewhere, 18 * 84 / 10);
 }
 
+// Of a thin hole coarse levels show nothing.
+TEST(PatchOrigins, AreFoundForWhatIsThin) {
+  const cv::Mat image = repeated(spots(320, 240), 52);
+  const auto missed = [&](const cv::Mat& hole) {
+    const cv::Mat origin = patchOrigins(image, hole, hole == 0, {}, {});
+    int far = 0;
+    for (int u = 110; u < 300; ++u) {
+      const cv::Vec2s from = origin.at<cv::Vec2s>(30, u);
+      if (from[0] < 0) return 1000;
+      const cv::Vec3f difference =
+          image.at<cv::Vec3f>(30, u) - image.at<cv::Vec3f>(from[1], from[0]);
+      far += cv::norm(difference) > 30.0;
+    }
+    return far;
+  };
+  cv::Mat hole = cv::Mat::zeros(240, 320, CV_8U);
+  hole(cv::Rect(100, 30, 210, 2)).setTo(255);
+  EXPECT_LT(missed(hole), 20);
+  hole(cv::Rect(60, 120, 50, 60)).setTo(255);  // beside one that they do show
+  EXPECT_LT(missed(hole), 20);
+}
+
 TEST(PatchOrigins, HaveNoneWhereNoPatchIsWhole) {
   const cv::Mat image = grain(40, 40), hole(40, 40, CV_8U, cv::Scalar(255)),
                 source = cv::Mat::zeros(40, 40, CV_8U);

@@ -111,13 +111,14 @@ class Filling {
       copy();
   }
 
-  // Peels anew what was led off its surface for want of it: coarser levels have fewer whole
-  // patches, and finer ones look no farther than around what those found.
+  // Peels anew what was led off its surface, or nowhere: coarser levels have fewer whole patches and
+  // nothing thin, and finer ones look no farther than around what those found.
   void peelMisled() {
     cv::Mat misled = cv::Mat::zeros(hole_.size(), CV_8U);
     for (int v = 0; v < hole_.rows; ++v) {
       for (int u = 0; u < hole_.cols; ++u) {
-        if (hole_.at<std::uint8_t>(v, u) != 0 && isMisled(centreFor({u, v})))
+        const cv::Point p = centreFor({u, v});
+        if (hole_.at<std::uint8_t>(v, u) != 0 && (!hasMatch(p) || isMisled(p)))
           misled.at<std::uint8_t>(v, u) = 255;
       }
     }
@@ -207,7 +208,7 @@ class Filling {
     return random_.number(p, salt, sweep_);
   }
   bool isMisled(const cv::Point& p) const {
-    return hasMatch(p) && rules_.onOther(p, match(p)) && sources_.anyOn(rules_.surfaceAt(p));
+    return rules_.onOther(p, match(p)) && sources_.anyOn(rules_.surfaceAt(p));
   }
 
   // The nearest centre of a patch that lies within the picture.
@@ -374,13 +375,17 @@ cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& s
                      const Pattern& pattern, const InpaintParams& params) {
   const std::vector<FillLevel> levels = fillLevels(image, hole, source, params);
   const float horizon = params.nearness.empty() ? 0.0f : kHorizon * nearnessPerRow(params.nearness);
-  const int coarsest = static_cast<int>(levels.size()) - 1;
-  Filling filling(levels[coarsest], static_cast<float>(1 << coarsest), horizon, pattern, params);
+  const auto fillingOf = [&](int k) {
+    return Filling(levels[k], static_cast<float>(1 << k), horizon, pattern, params);
+  };
+  int coarsest = static_cast<int>(levels.size()) - 1;
+  while (coarsest > 0 && cv::countNonZero(levels[coarsest].hole) == 0) --coarsest;  // it is thin
+  Filling filling = fillingOf(coarsest);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   filling.peel();
   settle(filling, params.coarsest_rounds, std::max(hole.cols, hole.rows) >> coarsest);
   for (int k = coarsest - 1; k >= 0; --k) {
-    Filling finer(levels[k], static_cast<float>(1 << k), horizon, pattern, params);
+    Filling finer = fillingOf(k);
     finer.startFrom(filling);
     finer.peelMisled();
     if (k > 0)

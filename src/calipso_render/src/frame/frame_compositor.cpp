@@ -21,8 +21,8 @@ FrameCompositor::FrameCompositor(const Prepared& prepared, const RenderParams& p
       moved_(frame_, place_),
       resting_(caches.light.update(frame_, place_)),
       others_(frame_, moved_, resting_),
-      passing_(passingShadows(frame_, place_, reflections_.unmirrored(), resting_.othersSun(),
-                              caches.plate)),
+      passing_(passingShadows(frame_, place_, reflections_.unmirrored(),
+                              resting_.othersSunInVideo(), caches.plate)),
       region_(frame_, resting_, moved_, others_, reflections_, passing_),
       codec_(params.add_noise ? prepared.noise : NoiseModel(), input.stamp_ns) {}
 

@@ -96,8 +96,12 @@ cv::Rect shadowBounds(const StagedFrame& frame, const Relief& relief, const Poin
   for (const SupportPlane& plane : frame.params.planes)
     addPlaneBounds(plane, frame.light.angular_radius, vertices, sun, shadow);
   addReliefBounds(relief, frame.light.angular_radius, vertices, sun, shadow);
-  return boundsOf(projectMesh(shadow, {}, frame.input.camera), kShadowBoundsMargin,
-                  frame.input.bgr.size());
+  const ScreenMesh seen = projectMesh(shadow, {}, frame.input.camera);
+  // A shadow that goes on behind the camera can leave the picture anywhere.
+  for (std::size_t i = 0; i < shadow.size(); ++i) {
+    if (shadow[i].allFinite() && std::isnan(seen.points[i].z())) return frame.whole();
+  }
+  return boundsOf(seen, kShadowBoundsMargin, frame.input.bgr.size());
 }
 
 }  // namespace calipso::render

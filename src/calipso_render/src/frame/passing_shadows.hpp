@@ -18,7 +18,7 @@ struct PlateInView {
 // The shadows of edited objects that move in the video show as darkening against the plate. With
 // them goes what masks miss of these objects (missedParts()).
 // @param unmirrored CV_8UC3, the frame without what planes mirror of objects at rest
-// @param others_sun RestingLight::othersSun(): what others shade is not taken for theirs
+// @param others_sun RestingLight::othersSunInVideo(): what others shade is not taken for theirs
 // @param at_key of the key frame's view; made if it is empty
 // @return CV_8UC1, whole picture, with a margin; empty: none moves
 cv::Mat passingShadows(const StagedFrame& frame, const SeenPlace& place, const cv::Mat& unmirrored,

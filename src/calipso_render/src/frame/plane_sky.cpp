@@ -14,6 +14,9 @@ namespace calipso::render {
 namespace {
 
 constexpr int kSteps = 160;  // places along the picture's width
+// px between places, at least and at most: what lies within so many of a place that is left out (a
+// square and its margin) is left out, too
+constexpr int kNearest = 4, kFarthest = 16;
 // of the sky's light: between places that differ by no more it is interpolated
 constexpr float kSlow = 0.12f;
 
@@ -48,7 +51,7 @@ class SkyLookup {
 
 SkyGrid::SkyGrid(const PlaneView& planes, const Visibility& sky, const cv::Size& picture,
                  const cv::Rect& region, const SquareMask& skip)
-    : step_(std::max(4, picture.width / kSteps)),
+    : step_(std::clamp(picture.width / kSteps, kNearest, kFarthest)),
       first_(region.x / step_, region.y / step_),
       light_((region.br().y - 1) / step_ - first_.y + 2, (region.br().x - 1) / step_ - first_.x + 2,
              CV_32F, cv::Scalar(1.0f)),

@@ -35,8 +35,10 @@ void Reflections::draw() {
       actors.push_back(&object.actor), objects.push_back(&object);
   }
   const Radiance radiance = [&](int i, const SurfacePoint& point) {
-    return mirroredRadiance(frame_.prepared.appearances[objects[i]->surface], frame_.light,
-                            objects[i]->look, point);
+    const StagedObject& object = *objects[i];
+    return mirroredRadiance(frame_.prepared.appearances[object.surface],
+                            object.edited ? frame_.light : frame_.prepared.light.light, object.look,
+                            point);
   };
   const MirrorImage image =
       mirrorImage(actors, radiance, frame_.params.planes, frame_.input.camera, mirror.off);

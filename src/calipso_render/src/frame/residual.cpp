@@ -101,13 +101,16 @@ void Residual::findRims(const cv::Rect& carried) {
   const auto isDrawnAtRest = [&](std::uint32_t id) {
     return id != VisibilityBuffer::kNothing && frame_.objectOf(id).isAtRestInVideo();
   };
+  const auto isDrawn = [&](std::uint32_t id) {
+    return id != VisibilityBuffer::kNothing && frame_.objectOf(id).edited;
+  };
   cv::Mat index(region_.size(), CV_32S, cv::Scalar(-1));
   for (int v = 0; v < region_.height; ++v) {
     rim_rows_.push_back(rims_.size());
     const std::uint32_t* ids = centre_.ids(v);
     const std::uint8_t* reach = rest_.reach.ptr<std::uint8_t>(v + region_.y) + region_.x;
     for (int u = box.x; v >= box.y && v < box.br().y && u < box.br().x; ++u) {
-      if (reach[u] == 0 || isDrawnAtRest(ids[u])) continue;
+      if (reach[u] == 0 || isDrawn(ids[u])) continue;
       index.at<int>(v, u) = static_cast<int>(rims_.size());
       rims_.push_back({u, v, {-1, -1}});
     }
@@ -134,9 +137,14 @@ void Residual::findRims(const cv::Rect& carried) {
   }
 }
 
+// What sways past its place in the key frame in another colour would flash there.
+bool Residual::carries(const StagedObject& object) const {
+  return !miss_.empty() && object.isAtRestInVideo() && !object.look.albedo &&
+         !(object.look.tint && frame_.prepared.sways[object.surface]);
+}
+
 void Residual::addToStretch(int v, int first, int last, int slot, Row& row) const {
-  if (miss_.empty() || !frame_.objects[slot].isAtRestInVideo() || frame_.objects[slot].look.albedo)
-    return;
+  if (!carries(frame_.objects[slot])) return;
   const int surface = frame_.objects[slot].surface, offset = (first + region_.x) % kLightStep;
   const cv::Point corner = frame_.prepared.appearances[surface].region.tl();
   for (int i = first; i < last; ++i) {
@@ -146,16 +154,20 @@ void Residual::addToStretch(int v, int first, int last, int slot, Row& row) cons
     const Eigen::Vector2f moved(u - from_u, static_cast<float>(v) - from_v);
     if (!(moved.squaredNorm() < kNonePx * kNonePx)) continue;
     cv::Vec4f colour = row.at(i);
-    addAt(from_u, from_v, moved, surface, frame_.objects[slot].tint(), colour);
+    const cv::Vec3f tint = frame_.objects[slot].tint();
+    addAt(from_u, from_v, moved, surface, tint.mul(dimmed(from_u, from_v, tint, colour)), colour);
     row.set(i, colour);
   }
 }
 
 void Residual::addToPixel(std::uint32_t id, int u, int v, cv::Vec4f& colour) const {
   const StagedObject& object = frame_.objectOf(id);
-  if (miss_.empty() || !object.isAtRestInVideo() || object.look.albedo) return;
+  if (!carries(object)) return;
   const Eigen::Vector2f moved = frame_.movement(id, static_cast<float>(u), static_cast<float>(v));
-  addAt(u - moved.x(), v - moved.y(), moved, object.surface, object.tint(), colour);
+  const cv::Point2f from(u - moved.x(), v - moved.y());
+  cv::Vec3f tint = object.tint();
+  if (frame_.input.sun.changes()) tint = tint.mul(dimmed(from.x, from.y, tint, colour));
+  addAt(from.x, from.y, moved, object.surface, tint, colour);
 }
 
 void Residual::addRims(int v, const StillPixels& still, Row& row) const {
@@ -186,14 +198,27 @@ void Residual::addRims(int v, const StillPixels& still, Row& row) const {
   }
 }
 
+// Part of the video's light that is left on a pixel to which the surface at (u, v) has moved: of
+// what drawing misses there is as much less.
+cv::Vec3f Residual::dimmed(float u, float v, const cv::Vec3f& tint, const cv::Vec4f& colour) const {
+  const cv::Point at(cvRound(u), cvRound(v));
+  if (!miss_box_.contains(at)) return cv::Vec3f::all(1);
+  const cv::Vec4f& miss = miss_.at<cv::Vec4f>(at - miss_box_.tl());
+  const cv::Vec3f video = linearPixel(frame_.input.bgr, at.x, at.y);
+  cv::Vec3f left;
+  for (int c = 0; c < 3; ++c) {
+    const float drawn = std::max(0.0f, tint[c] * (video[c] - miss[c]));
+    left[c] = std::min(1.0f, (std::max(0.0f, colour[c]) + kDark) / (drawn + kDark));
+  }
+  return left;
+}
+
 // What drawing misses of the video at (u, v), on a pixel to which the surface there has moved.
-// @param tint of the surface's new look, which what was missed takes on
+// @param tint of the surface's new look and light, which what was missed takes on
 void Residual::addAt(float u, float v, const Eigen::Vector2f& moved, int owner,
                      const cv::Vec3f& tint, cv::Vec4f& colour) const {
   const float squared = moved.squaredNorm();
   const bool sways = frame_.prepared.sways[owner];
-  // What sways past its place in the key frame in another colour would flash there.
-  if (sways && tint != cv::Vec3f::all(1)) return;
   const float none = sways ? kNoneSwaying : kNonePx;
   if (squared >= none * none) return;
   const float part = 1.0f - smoothStep(sways ? kWholeSwaying : kWholePx, none, std::sqrt(squared));

@@ -76,12 +76,18 @@ const RestingLight& RestingLight::update(const StagedFrame& frame, const SeenPla
 void RestingLight::measureOthers(const StagedFrame& frame, const SeenPlace& place,
                                  const std::vector<Occluder>& others) {
   others_ = sunVisibility(others, frame.light, frame.params);
-  cv::Rect bounds;
-  for (const Occluder& o : others)
-    bounds |= shadowBounds(frame, place.view.relief(), *o.vertices, frame.light.direction);
-  others_sun_ = bounds.empty() ? cv::Mat() : sunLevels(frame, place, *others_, bounds, nullptr);
-  sunless_place_ =
-      frame.light.direction == frame.prepared.light.light.direction ? place.sunless : cv::Mat();
+  const auto levels = [&](const Visibility& sun, const Light& light) {
+    cv::Rect bounds;
+    for (const Occluder& o : others)
+      bounds |= shadowBounds(frame, place.view.relief(), *o.vertices, light.direction);
+    return bounds.empty() ? cv::Mat() : sunLevels(frame, place, sun, bounds, nullptr);
+  };
+  const Light& of_video = frame.prepared.light.light;
+  const bool as_in_video = frame.light.direction == of_video.direction;
+  others_sun_ = levels(*others_, frame.light);
+  others_sun_in_video_ =
+      as_in_video ? others_sun_ : levels(*sunVisibility(others, of_video, frame.params), of_video);
+  sunless_place_ = as_in_video ? place.sunless : cv::Mat();
   others_sky_.release();
   if (others.empty()) return;
   const auto sky = skyVisibility(others, frame.params);

@@ -24,6 +24,8 @@ class RestingLight {
   // What objects that are not edited hide of the sun; its levels, empty: nothing.
   const Visibility& others() const { return *others_; }
   const cv::Mat& othersSun() const { return others_sun_; }
+  // ... under the sun of the video, which an edit may have moved.
+  const cv::Mat& othersSunInVideo() const { return others_sun_in_video_; }
   // Of the edited objects where the video has them; null: of none.
   const Visibility* originals() const { return originals_.get(); }
   const SkyGrid& originalsSky() const { return originals_sky_; }
@@ -63,9 +65,10 @@ class RestingLight {
   Eigen::Vector3f sun_ = Eigen::Vector3f::Zero();  // direction
   std::vector<Points> others_vertices_;            // of what is not edited
   std::unique_ptr<Visibility> others_, originals_;
-  cv::Mat sunless_place_;            // SeenPlace::sunless, under the video's sun; else empty
-  cv::Mat others_sun_, others_sky_;  // of the others; empty: nothing else casts a shadow
-  cv::Mat originals_sun_;            // empty: the originals cast none
+  cv::Mat sunless_place_;  // SeenPlace::sunless, under the video's sun; else empty
+  // of the others; empty: nothing else casts a shadow
+  cv::Mat others_sun_, others_sun_in_video_, others_sky_;
+  cv::Mat originals_sun_;  // empty: the originals cast none
   SkyGrid originals_sky_;
   cv::Mat originals_sky_levels_;
   bool shades_walls_ = false;

@@ -25,8 +25,12 @@ Light lightOf(const Prepared& prepared, const SunChange& sun) {
   return light;
 }
 
+// A perfect mirror would show the sun nowhere but in one direction: that far it is no mirror.
+constexpr float kSmoothest = 0.02f;
+
 Gloss glossOf(const Gloss& own, const Look& look) {
-  return {look.specular.value_or(own.specular), look.roughness.value_or(own.roughness),
+  return {look.specular.value_or(own.specular),
+          std::max(kSmoothest, look.roughness.value_or(own.roughness)),
           look.specular.value_or(own.around)};
 }
 
@@ -37,6 +41,7 @@ std::vector<const ObjectInFrame*> statesOf(const std::vector<Surface>& surfaces,
   for (const ObjectInFrame& o : objects) {
     const auto it = std::find_if(surfaces.begin(), surfaces.end(),
                                  [&](const Surface& s) { return s.name == o.name; });
+    if (it == surfaces.end() && o.removed) continue;  // gone before it was ever drawn
     if (it == surfaces.end())
       throw std::invalid_argument("state names object '" + o.name + "', which has no model");
     states[it - surfaces.begin()] = &o;

@@ -25,7 +25,10 @@ PlateBeside plateFrom(std::vector<ClipFrame> frames, std::size_t first, const cv
   Background seen = seenBackground(frames, objects_move, params);
   sharpenSeen(frames, params, seen);
   beside.plate = linearFromRealCodes(seen.plate), beside.spread = seen.spread;
-  beside.spread.setTo(std::numeric_limits<float>::infinity(), seen.count == 0);
+  // Beside what no frame shows, colours are mixed with nothing when they are carried over.
+  cv::Mat unseen;
+  cv::dilate(seen.count == 0, unseen, cv::Mat());
+  beside.spread.setTo(std::numeric_limits<float>::infinity(), unseen);
   return beside;
 }
 

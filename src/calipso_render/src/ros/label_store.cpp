@@ -1,5 +1,6 @@
 #include "label_store.hpp"
 
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 
 namespace calipso::render {
@@ -15,6 +16,11 @@ cv::Mat LabelStore::at(const ros::Time& stamp) const {
   auto it = packed_.upper_bound(stamp);
   if (it == packed_.begin()) return {};
   return cv::imdecode((--it)->second, cv::IMREAD_GRAYSCALE);
+}
+
+ros::Time LabelStore::stampAt(const ros::Time& stamp) const {
+  const auto it = packed_.upper_bound(stamp);
+  return it == packed_.begin() ? stamp : std::prev(it)->first;
 }
 
 }  // namespace calipso::render

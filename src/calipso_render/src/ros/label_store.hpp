@@ -25,6 +25,8 @@ class LabelStore {
 
   // Labels at `stamp`, else the nearest before it, else an empty matrix.
   cv::Mat at(const ros::Time& stamp) const;
+  // Their stamp: in slow motion that of the frame whose picture is shown again. Else `stamp`.
+  ros::Time stampAt(const ros::Time& stamp) const;
 
  private:
   std::size_t limit_;

@@ -305,7 +305,7 @@ void RenderNode::edit(const Waiting& frame, const calipso_msgs::SimulationState&
       input.bgr = bgrFromMsg(*frame.image);
       input.labels = labels_.at(stamp);
       input.camera = *frame.camera;
-      input.stamp_ns = nanoseconds(stamp);
+      input.stamp_ns = nanoseconds(params_.mode == Mode::kLive ? stamp : labels_.stampAt(stamp));
       const FrameOutput output = renderer_->composite(input);
       publish(frame, editedMsg(*frame.image, output), output.provenance);
     }
