@@ -26,6 +26,19 @@ cv::Mat readImage(const std::string& path, int flags) {
   return image;
 }
 
+// Nothing where the model cannot be fitted to anything; what is wrong with it the alignment says.
+std::optional<AlignmentResult> fitted(const TriangleMesh& mesh, const Camera& camera,
+                                      const Eigen::Isometry3d& rough,
+                                      const std::vector<ContourLoop>& contour,
+                                      const AlignOptions& options) {
+  try {
+    AlignmentResult fit = align(mesh, camera, rough, contour, options);
+    if (fit.placed) return fit;
+  } catch (const std::invalid_argument&) {
+  }
+  return std::nullopt;
+}
+
 // Fits no more than a coarse grid: what is to be told is where the contour is implausible, and how
 // the model goes on as a whole. What is attached somewhere cannot: low-order deformations do.
 ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
@@ -43,14 +56,14 @@ ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
           moves_whole = object.attachments.empty(), rough = object.initial_world_from_object](
              const std::vector<ContourLoop>& contour) -> std::optional<ModelView> {
     constexpr double kLeastTolerancePx = 1.5;
-    const AlignmentResult fit = align(mesh, camera, rough, contour, options);
-    if (!fit.placed) return std::nullopt;
-    const Points x =
-        transformed(camera.world_from_camera.inverse() * fit.world_from_object, fit.mesh.vertices);
+    const auto fit = fitted(mesh, camera, rough, contour, options);
+    if (!fit) return std::nullopt;
+    const Points x = transformed(camera.world_from_camera.inverse() * fit->world_from_object,
+                                 fit->mesh.vertices);
     const DepthRendering rendering = renderDepth(x, mesh.triangles, camera);
     ModelView view{maskOf(rendering, camera),
                    cv::Mat1f::zeros(camera.height, camera.width),
-                   std::max(kLeastTolerancePx, 2.0 * fit.met_mean_px),
+                   std::max(kLeastTolerancePx, 2.0 * fit->met_mean_px),
                    {}};
     if (moves_whole) view.surface = {x, mesh.triangles, camera};
     if (!rendering.roi.empty()) rendering.depth.copyTo(view.depth(rendering.roi));

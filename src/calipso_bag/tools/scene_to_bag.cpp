@@ -22,6 +22,13 @@ constexpr double kStillSeconds = 2.0;
 
 void convert(const Arguments& arguments) {
   const Scene scene = loadScene(arguments.word(0));
+  const auto poses = static_cast<int>(scene.world_from_camera_per_frame.size());
+  if (scene.camera_moves && poses < scene.frame_count) {
+    throw std::runtime_error(scene.directory + "/scene.yaml: the camera moves, but " +
+                             "world_T_camera_per_frame has " + std::to_string(poses) +
+                             " poses for " + std::to_string(scene.frame_count) +
+                             " frames; list one for each");
+  }
   const double seconds =
       arguments.positive("seconds", scene.frame_count == 1 ? kStillSeconds : 0.0);
   const auto frames =

@@ -127,6 +127,73 @@ TEST(WorldEdits, LaterPullMakesTheObjectDeformableFromTheStart) {
   EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kDeformable);
 }
 
+// The copy falls; the original stays where it was put.
+TEST(WorldEdits, ALaterCopyLeavesTheOriginalAlone) {
+  World world = boxWorld();
+  Edit lift = editOf(EditKind::kTransform), copy = editOf(EditKind::kDuplicate);
+  lift.translation = {0, 0, 0.3};
+  copy.time = 1.0, copy.new_name = "twin", copy.translation = {0.3, 0, 0};
+  world.submit(lift), world.submit(copy);
+  world.advanceTo(0.0);
+  play(world, 0.5);
+  EXPECT_EQ(world.state().objects[0].kind, ObjectKind::kKinematic);
+  EXPECT_NEAR(centerOf(world.state()).z(), 0.35, 1e-6);
+}
+
+TEST(WorldEdits, AFlatModelIsRefusedAndLeavesNothing) {
+  World world = boxWorld();
+  TriangleMesh card;
+  card.vertices.resize(4, 3);
+  card.vertices << 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.1, 0, 0, 0.1;
+  card.triangles.resize(2, 3);
+  card.triangles << 0, 1, 2, 0, 2, 3;
+  WorldObject object;
+  object.name = "card", object.index = 2, object.mesh = card;
+  try {
+    world.addObject(object, {});
+    FAIL() << "no error";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("card: "), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("thickness"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(world.state().objects.size(), 1u);
+  world.advanceTo(0.0);
+  EXPECT_NO_THROW(play(world, 0.2));
+}
+
+TEST(WorldEdits, APixelShowsWhatTheVideoHasThere) {
+  World world = boxWorld();
+  WorldObject before;
+  before.name = "before", before.index = 2, before.mesh = boxSurface({0.1, 0.1, 0.1}, 1);
+  before.world_from_object.translation() = Eigen::Vector3d(0, -0.4, 0.05);
+  world.addObject(before, {});
+  Edit fix = editOf(EditKind::kFix);
+  fix.region.kind = RegionKind::kPixel;
+  const Camera& camera = world.scene().camera;
+  fix.region.pixel = camera.projectWorld({0, -0.05, 0.05});
+  world.submit(fix);
+  const auto outcomes = world.advanceTo(0.0);
+  ASSERT_EQ(outcomes.size(), 1u);
+  EXPECT_TRUE(outcomes[0].accepted) << outcomes[0].message;
+}
+
+TEST(WorldEdits, WindEverywherePassesOverWhatIsHeld) {
+  WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.05});
+  scene.objects.push_back(scene.objects[0]);
+  scene.objects[1].name = "other", scene.objects[1].index = 2;
+  scene.objects[1].world_from_object.translation().x() = 0.5;
+  World world(scene, coarse());
+  Edit hold = editOf(EditKind::kObjectKind), wind = editOf(EditKind::kWind);
+  hold.object = scene.objects[0].name, hold.object_kind = ObjectKind::kStatic;
+  wind.object.clear(), wind.vector = {40, 0, 0};
+  world.submit(hold), world.submit(wind);
+  const auto outcomes = world.advanceTo(0.0);
+  ASSERT_EQ(outcomes.size(), 2u);
+  EXPECT_TRUE(outcomes[1].accepted) << outcomes[1].message;
+  EXPECT_NE(outcomes[1].message.find("static and stays"), std::string::npos) << outcomes[1].message;
+  EXPECT_EQ(world.state().objects[1].kind, ObjectKind::kRigid);
+}
+
 TEST(WorldEdits, SceneGravityLeavesWhatLiesOnTheTable) {
   World world = boxWorld();
   Edit edit = editOf(EditKind::kGravity, EditMode::kFactor);

@@ -21,13 +21,17 @@ unsigned pairQueue(unsigned queue) { return queue == 0 ? kUnboundedPairs : queue
 
 }  // namespace
 
+std::string tfName(const std::string& frame_id) {
+  return frame_id.compare(0, 1, "/") == 0 ? frame_id.substr(1) : frame_id;
+}
+
 CameraPoses::CameraPoses() : buffer_(ros::Duration(kKeepSec)), listener_(buffer_) {}
 
 Eigen::Isometry3d CameraPoses::worldFromCamera(const std::string& camera_frame,
                                                const ros::Time& stamp) const {
   try {
     return fromMsg(buffer_
-                       .lookupTransform(topics::kWorldFrame, camera_frame, stamp,
+                       .lookupTransform(topics::kWorldFrame, tfName(camera_frame), stamp,
                                         ros::Duration(kPoseTimeoutSec))
                        .transform);
   } catch (const tf2::TransformException& error) {

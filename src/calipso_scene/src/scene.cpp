@@ -77,16 +77,20 @@ Camera readCamera(const YAML::Node& root, const YamlReader& reader) {
 
 std::vector<Eigen::Isometry3d> readCameraPath(const YAML::Node& root, const YamlReader& reader) {
   std::vector<Eigen::Isometry3d> poses;
-  for (const auto& entry : root["world_T_camera_per_frame"]) {
+  for (const YAML::Node& entry : reader.list(root, "world_T_camera_per_frame")) {
     YAML::Node wrapped;
-    wrapped["world_T_camera_per_frame"] = YAML::Node(entry);
+    wrapped["world_T_camera_per_frame"] = entry;
     poses.push_back(reader.pose(wrapped, "world_T_camera_per_frame"));
   }
   return poses;
 }
 
 void readSupport(const YAML::Node& root, const YamlReader& reader, Scene& scene) {
-  for (const auto& entry : root["support"]) {
+  for (const YAML::Node& entry : reader.list(root, "support")) {
+    if (!entry.IsMap())
+      reader.fail("support",
+                  "has an entry that names neither; give \"plane: [nx, ny, nz, d]\" or "
+                  "\"mesh: FILE\"");
     if (entry["mesh"]) {
       scene.support_meshes.push_back(scene.directory + "/" + reader.text(entry, "mesh"));
       continue;
@@ -103,9 +107,10 @@ void readSupport(const YAML::Node& root, const YamlReader& reader, Scene& scene)
   }
 }
 
-std::vector<AttachmentBox> readAttachments(const YAML::Node& boxes, const YamlReader& reader) {
+std::vector<AttachmentBox> readAttachments(const YAML::Node& hints, const std::string& object,
+                                           const YamlReader& reader) {
   std::vector<AttachmentBox> attachments;
-  for (const auto& box : boxes) {
+  for (const YAML::Node& box : reader.list(hints, object)) {
     attachments.push_back({reader.text(box, "name", "attachment"), reader.vector(box, "box_min", 3),
                            reader.vector(box, "box_max", 3)});
   }
@@ -141,9 +146,8 @@ SceneObject readObject(const YAML::Node& node, const YAML::Node& root, const std
   object.initial_world_from_object = reader.pose(node, "initial_world_T_object");
   object.rect = readRectangle(node, reader, scene.camera);
   const YAML::Node hints = root["attachment_hints"];
-  if (hints && hints.IsMap() && hints[object.name]) {
-    object.attachments = readAttachments(hints[object.name], reader);
-  }
+  if (hints && hints.IsMap())
+    object.attachments = readAttachments(hints, object.name, YamlReader(file, "attachment_hints"));
   return object;
 }
 
@@ -151,7 +155,7 @@ void readObjects(const YAML::Node& root, const std::string& file, Scene& scene) 
   const YamlReader reader(file, "");
   std::set<std::string> names;
   std::set<int> indices;
-  for (const auto& node : root["objects"]) {
+  for (const YAML::Node& node : reader.list(root, "objects")) {
     scene.objects.push_back(readObject(node, root, file, scene));
     const SceneObject& object = scene.objects.back();
     if (!names.insert(object.name).second) {
@@ -163,6 +167,24 @@ void readObjects(const YAML::Node& root, const std::string& file, Scene& scene) 
     }
   }
   if (scene.objects.empty()) reader.fail("objects", "is empty; list at least one object");
+  const YAML::Node hints = root["attachment_hints"];
+  if (!hints || hints.IsNull()) return;
+  if (!hints.IsMap())
+    reader.fail("attachment_hints", "has no objects' names; give each a list of boxes");
+  YamlReader(file, "attachment_hints").checkKeys(hints, {names.begin(), names.end()});
+}
+
+// Strokes have a name of their own at most.
+std::string strokesPath(const YAML::Node& root, const YamlReader& reader,
+                        const std::string& directory) {
+  const std::string usual = "strokes.png";
+  const YAML::Node strokes = root["strokes"];
+  const std::string file =
+      strokes && strokes.IsMap() ? reader.text(strokes, "file", usual.c_str()) : usual;
+  const std::string path = existing(directory + "/" + file);
+  if (path.empty() && file != usual)
+    reader.fail("strokes", "names " + file + ", which is not there; correct it or leave it out");
+  return path;
 }
 
 }  // namespace
@@ -215,10 +237,11 @@ Scene loadScene(const std::string& directory) {
   scene.frame_count =
       root["n_frames"] ? reader.integer(root, "n_frames") : frameFiles(scene, reader);
   scene.camera = readCamera(root, reader);
+  scene.camera_moves = root["camera_moving"] && root["camera_moving"].as<bool>(false);
   scene.world_from_camera_per_frame = readCameraPath(root, reader);
   if (root["gravity"]) scene.gravity = reader.vector(root, "gravity", 3);
   readSupport(root, reader, scene);
-  scene.strokes_path = existing(directory + "/strokes.png");
+  scene.strokes_path = strokesPath(root, reader, directory);
   scene.matte_path = existing(directory + "/matte.png");
   scene.depth_path = existing(directory + "/depth/000000.png");
   if (!scene.depth_path.empty()) scene.depth_scale = reader.number(root, "depth_scale_m");

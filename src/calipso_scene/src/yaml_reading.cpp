@@ -42,8 +42,16 @@ void YamlReader::fail(const std::string& key, const std::string& what) const {
 }
 
 YAML::Node YamlReader::require(const YAML::Node& node, const std::string& key) const {
-  if (!node.IsMap() || !node[key]) fail(key, "is missing; add it");
+  if (!node.IsDefined() || !node.IsMap() || !node[key]) fail(key, "is missing; add it");
   return node[key];
+}
+
+std::vector<YAML::Node> YamlReader::list(const YAML::Node& node, const std::string& key) const {
+  const YAML::Node value = node[key];
+  if (!value || value.IsNull()) return {};
+  if (!value.IsSequence())
+    fail(key, "is '" + describe(value) + "'; it must be a list: put \"- \" before each entry");
+  return {value.begin(), value.end()};
 }
 
 double YamlReader::number(const YAML::Node& node, const std::string& key) const {

@@ -18,6 +18,10 @@ class YamlReader {
 
   [[noreturn]] void fail(const std::string& key, const std::string& what) const;
 
+  // The entries of the list under key, none where there is none or it is empty.
+  // @throw std::invalid_argument if it is no list
+  std::vector<YAML::Node> list(const YAML::Node& node, const std::string& key) const;
+
   // All of these: @throw std::invalid_argument if absent, of another type or not finite.
   double number(const YAML::Node& node, const std::string& key) const;
   int integer(const YAML::Node& node, const std::string& key) const;

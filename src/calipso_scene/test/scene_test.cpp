@@ -154,6 +154,15 @@ TEST(Scene, badInputNamesKeyAndRemedy) {
   expect(kHead + kPose + kObject + "distortion: [0.1, 0, 0, 0, 0]\n", "undistort");
   expect(kHead + "world_T_camera: [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n",
          "not a rigid transform");
+  expect(kHead + kPose + "objects: {ball: {index: 1}}\n", "scene.yaml: objects is '{ball");
+  expect(kHead + kPose + kObject + "support: {plane: [0, 0, 1, 0]}\n", "it must be a list");
+  expect(kHead + kPose + kObject + "support: floor.obj\n", "support is 'floor.obj'");
+  expect(kHead + kPose + kObject + "support: [floor.obj]\n", "mesh: FILE");
+  expect(kHead + kPose + kObject + "attachment_hints: {ball: {box_min: [0, 0, 0]}}\n",
+         "attachment_hints: ball is");
+  expect(kHead + kPose + kObject + "attachment_hints: {bal: []}\n", "known ones are ball");
+  expect(kHead + kPose + kObject + "attachment_hints: [ball]\n", "objects' names");
+  expect(kHead + kPose + kObject + "strokes: {file: scribble.png}\n", "scribble.png");
   EXPECT_THROW(loadScene("/nowhere"), std::runtime_error);
 }
 

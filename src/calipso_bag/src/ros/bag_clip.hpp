@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "calipso_ros/frame_source.hpp"
+
 namespace calipso::bag {
 
 struct BagFrame {
@@ -36,7 +38,7 @@ class BagClip {
   const std::vector<ros::Time>& stamps() const { return stamps_; }
   const std::string& imageTopic() const { return image_topic_; }
   const sensor_msgs::CameraInfo& firstInfo() const { return *first_info_; }
-  const std::string& frameId() const { return first_info_->header.frame_id; }
+  std::string frameId() const { return tfName(first_info_->header.frame_id); }  // in tf
   // Frames with which another shot begins.
   const std::vector<int>& shotChanges() const { return shot_changes_; }
   double fps() const;  // mean over the clip; 30 for a single frame

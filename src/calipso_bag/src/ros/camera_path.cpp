@@ -55,6 +55,11 @@ std::vector<geometry_msgs::TransformStamped> posesFromTf(const BagClip& clip,
 std::vector<geometry_msgs::TransformStamped> posesFromScene(const BagClip& clip,
                                                             const Scene& scene) {
   const auto& moving = scene.world_from_camera_per_frame;
+  if (scene.camera_moves && moving.empty()) {
+    throw std::runtime_error(
+        "the camera moves (camera_moving in scene.yaml), but nothing says where it is in each "
+        "frame; record tf in the bag, or list world_T_camera_per_frame");
+  }
   if (!moving.empty() && static_cast<int>(moving.size()) < clip.frameCount()) {
     throw std::runtime_error("the camera moves, but scene.yaml has poses for " +
                              std::to_string(moving.size()) + " of the bag's " +

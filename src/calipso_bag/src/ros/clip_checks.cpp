@@ -28,8 +28,8 @@ void checkPicture(const std::string& path, int bits, int width, int height) {
   if (path.empty()) return;
   const cv::Mat picture = cv::imread(path, cv::IMREAD_UNCHANGED);
   if (picture.empty()) fail(path, "no readable picture; replace or remove it");
-  const bool deep_enough = bits == 8 || picture.elemSize1() == 2;
-  if (deep_enough && picture.cols == width && picture.rows == height) return;
+  const bool is_deep = 8 * picture.elemSize1() == static_cast<std::size_t>(bits);
+  if (is_deep && picture.cols == width && picture.rows == height) return;
   fail(path, "has " + size(picture.cols, picture.rows) + " pixels of " +
                  std::to_string(8 * picture.elemSize1()) + " bits; it takes " +
                  size(width, height) + " of " + std::to_string(bits) +

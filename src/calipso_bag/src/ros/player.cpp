@@ -99,6 +99,7 @@ void Player::checkScene() const {
   checkPicture(scene_.depth_path, kDepthBits, scene_.camera.width, scene_.camera.height);
   for (const std::string& mask : {scene_.strokes_path, scene_.matte_path})
     checkPicture(mask, kMaskBits, scene_.camera.width, scene_.camera.height);
+  for (const std::string& support : scene_.support_meshes) loadMesh(support);
   std::set<int> indices;
   for (const SceneObject& object : scene_.objects) {
     loadMesh(object.cad_path);
@@ -118,8 +119,15 @@ void Player::warnOfCuts() const {
 }
 
 void Player::checkEdits() const {
-  const ros::Time last = clip_.stamps().back();
+  const ros::Time first = clip_.stamps().front(), last = clip_.stamps().back();
   for (const calipso_msgs::Edit& edit : edits_) {
+    if (edit.header.stamp < first) {
+      throw std::runtime_error(
+          params_.edits + ": edit '" + edit.kind + "' of '" + edit.object + "' is for " +
+          std::to_string(edit.header.stamp.toSec()) + " s, before the first frame at " +
+          std::to_string(first.toSec()) +
+          " s; edits of a bag go with its own recording: write them as edits.yaml for another");
+    }
     if (edit.kind == calipso_msgs::Edit::INSERT)
       loadMesh((std::filesystem::path(scene_.directory) / edit.model).string());
     if (edit.header.stamp <= last) continue;
@@ -216,7 +224,10 @@ void Player::waitForGraph() {
 
 void Player::announceClip() {
   tf2_msgs::TFMessage tf;
-  tf.transforms = path_.world_from_camera;
+  for (const PlayedFrame& played : schedule_) {  // in slow motion a picture's camera rests, too
+    tf.transforms.push_back(path_.world_from_camera[played.source]);
+    tf.transforms.back().header.stamp.fromNSec(static_cast<std::uint64_t>(played.time_ns));
+  }
   tf_.publish(tf);
   calipso_msgs::ClipInfo info;
   info.header.stamp = clip_.stamps().front();

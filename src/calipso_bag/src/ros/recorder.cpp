@@ -100,7 +100,14 @@ void Recorder::onEdited(const ros::MessageEvent<sensor_msgs::Image const>& event
   const ros::Time stamp = event.getMessage()->header.stamp;
   started_over_ = started_over_ || (params_.mode == Mode::kLive && clock_.startsOver(stamp));
   if (started_over_) return;
-  if (!edited_.empty() && stamp <= edited_.back()) {
+  const bool repeated = !edited_.empty() && stamp <= edited_.back();
+  if (repeated && params_.mode == Mode::kLive) {
+    ROS_WARN_STREAM_THROTTLE(10.0, "not recorded: the camera's stamp " << seconds(stamp)
+                                                                       << " does not come after "
+                                                                       << seconds(edited_.back()));
+    return;
+  }
+  if (repeated) {
     throw std::runtime_error("edited frame " + seconds(stamp) + " came after " +
                              seconds(edited_.back()) + "; is a second renderer running?");
   }

@@ -148,8 +148,14 @@ void SimulatorRos::take(const calipso_msgs::ObjectClipDynamics& object) {
 }
 
 void SimulatorRos::onEdit(const calipso_msgs::EditConstPtr& edit) {
-  edits_.push_back(*edit);
-  if (world_ && first_stamp_) submit(*edit);
+  if (edit->kind == calipso_msgs::Edit::TIME_SCALE && (params_.mode == Mode::kLive || plays_)) {
+    refuse(*edit,
+           "pictures are laid out in time before the video plays, and those of a camera come "
+           "as they are; give time_scale in the file of edits");
+  } else {
+    edits_.push_back(*edit);
+    if (world_ && first_stamp_) submit(*edit);
+  }
   reporter_.editReceived();
 }
 
@@ -189,6 +195,7 @@ void SimulatorRos::startOver(const ros::Time& stamp) {
 
 void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
   const ros::Time stamp = info->header.stamp;
+  plays_ = true;
   if (params_.mode == Mode::kLive && clock_.startsOver(stamp)) startOver(stamp);
   if (!world_) {
     // A state without objects lets the frame pass unedited.

@@ -63,6 +63,7 @@ class SimulatorRos {
   calipso_msgs::AlignedModelsConstPtr models_;
   calipso_msgs::ClipDynamicsConstPtr clip_dynamics_;
   std::optional<ros::Time> first_stamp_;
+  bool plays_ = false;                     // a frame to edit has come
   ros::Time plan_stamp_;                   // of the newest one sent
   std::uint32_t reports_ = 0;              // sent
   std::vector<calipso_msgs::Edit> edits_;  // of this video

@@ -41,7 +41,8 @@ std::vector<int> verticesUnderPixel(const WorldScene& scene, int index, const Re
   const WorldObject& object = scene.objects[index];
   const auto hit = castRay(scene, scene.camera.world_from_camera.translation(),
                            scene.camera.world_from_camera.linear() *
-                               scene.camera.ray(region.pixel.x(), region.pixel.y()));
+                               scene.camera.ray(region.pixel.x(), region.pixel.y()),
+                           index);
   std::ostringstream where;
   where << "pixel (" << region.pixel.x() << ", " << region.pixel.y() << ")";
   if (!hit)
@@ -58,9 +59,10 @@ std::vector<int> verticesUnderPixel(const WorldScene& scene, int index, const Re
 }  // namespace
 
 std::optional<RayHit> castRay(const WorldScene& scene, const Eigen::Vector3d& origin,
-                              const Eigen::Vector3d& direction) {
+                              const Eigen::Vector3d& direction, int besides) {
   std::optional<RayHit> nearest;
   for (size_t k = 0; k < scene.objects.size(); ++k) {
+    if (!scene.objects[k].in_video && static_cast<int>(k) != besides) continue;
     const TriangleMesh& mesh = scene.objects[k].mesh;
     const Eigen::Isometry3d object_from_world = scene.objects[k].world_from_object.inverse();
     const Eigen::Vector3d o = object_from_world * origin,

@@ -70,6 +70,7 @@ void World::Impl::touch(Actor& actor, const Edit& edit) {
   for (const Edit& later : pending) {
     if (&later == &pending.front() || later.object != actor.object.name) continue;
     if (later.kind == EditKind::kReset || later.kind == EditKind::kObjectKind) break;
+    if (later.kind == EditKind::kDuplicate) continue;  // acts on the copy alone
     const ObjectKind needed = kindFor(actor, later);
     if (needed > kind) {
       kind = needed;

@@ -166,9 +166,12 @@ std::string World::Impl::blow(Actor& actor, const Edit& edit) {
   else
     air.add({now, edit.vector, Eigen::Matrix3d::Zero()});
   touch(actor, edit);
-  if (!actor.simulated())
-    throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
+  if (!actor.simulated()) {
+    const std::string held = actor.object.name + " is " + toString(actor.kind);
+    if (edit.object.empty()) return held + " and stays";  // the others are blown at all the same
+    throw std::invalid_argument(held +
                                 " and no wind moves it; make it rigid or deformable (edit 'kind')");
+  }
   actor.air = air;
   endDrive(actor);  // another wind drives it now
   return "wind of " + describe(air.at(now)) + " m/s moves " + actor.object.name +

@@ -181,8 +181,15 @@ int World::Impl::freeIndex() const {
   return index;
 }
 
+// What is new is not held by a video, and has to have a mass.
 Actor& World::Impl::addObject(const WorldObject& object, const ObjectSettings& settings) {
+  try {
+    massProperties(object.mesh, 1.0);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(object.name + ": " + error.what() + "; give it a thickness");
+  }
   scene.objects.push_back(object);
+  scene.objects.back().in_video = false;
   try {
     validateScene(scene);
   } catch (...) {

@@ -17,6 +17,9 @@
 
 namespace calipso {
 
+// A frame's name as tf2 has it: old drivers write "/camera".
+std::string tfName(const std::string& frame_id);
+
 // The camera's pose in the world over time, from tf. Keeps the whole clip, so that a second pass
 // over the same stamps finds it again. Listens in its own thread; lookups may come from any thread.
 class CameraPoses {

@@ -42,7 +42,8 @@ struct Scene {
   int frame_count = 0;        // the files there are where scene.yaml has no n_frames
   std::string frame_pattern;  // printf style, relative to directory
   Camera camera;              // pose: frame 0
-  std::vector<Eigen::Isometry3d> world_from_camera_per_frame;  // empty when the camera stands still
+  bool camera_moves = false;  // as scene.yaml says, also where it has no poses per frame
+  std::vector<Eigen::Isometry3d> world_from_camera_per_frame;  // may be empty
   Eigen::Vector3d gravity = {0.0, 0.0, -9.81};                 // m/s^2, world
   std::vector<SupportPlane> planes;
   std::vector<std::string> support_meshes;  // absolute paths, world frame

@@ -17,8 +17,9 @@ struct RayHit {
 };
 
 // Nearest intersection of the ray with the objects as they stand at the key frame.
+// @param besides index of an object that counts though the video does not have it; -1: none
 std::optional<RayHit> castRay(const WorldScene& scene, const Eigen::Vector3d& origin,
-                              const Eigen::Vector3d& direction);
+                              const Eigen::Vector3d& direction, int besides = -1);
 
 // Vertices of the scene's object `object` that a region chooses at the key frame, ascending.
 // @throw std::invalid_argument when the region meets no vertex of the object, naming the remedy

@@ -25,6 +25,7 @@ struct WorldObject {
   TriangleMesh mesh;                                                    // object frame
   Eigen::Isometry3d world_from_object = Eigen::Isometry3d::Identity();  // at the key frame
   std::vector<AttachmentBox> attachments;
+  bool in_video = true;  // no copy, and not inserted
 };
 
 struct SupportMesh {
