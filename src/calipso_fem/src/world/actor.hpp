@@ -38,6 +38,17 @@ struct Pull {
     if (angle == 0.0) return Eigen::Vector3d::Zero();
     return Eigen::AngleAxisd(share * angle, vector / angle) * arm - arm;
   }
+  // Where a point at `at` was from the region's middle, before it went `share` of the way.
+  Eigen::Vector3d armOf(const Eigen::Vector3d& at, double share) const {
+    const double angle = vector.norm();
+    if (!twists || angle == 0.0) return at - start;
+    return Eigen::AngleAxisd(-share * angle, vector / angle) * (at - start);
+  }
+  // The object was put elsewhere; the way to go stays as the edit has it.
+  void moveBy(const Eigen::Isometry3d& motion) {
+    start = motion * start;
+    start_rotation = motion.linear() * start_rotation;
+  }
   bool over(double time) const { return duration > 0.0 && time >= begin + duration - 1e-9; }
 };
 
@@ -99,12 +110,18 @@ struct Actor {
   std::vector<double> collisions;  // instants in the video, s, ascending
   Look look;
   std::vector<std::vector<int>> fixed;  // vertices per fixed region
+  double pressure = 0.0;                // Pa, by an edit
   bool asleep = false;
   int calm_frames = 0;
   double soft_ms = 0.0;  // of the last frame
   std::string note;      // what the user should know about the model
 
   Eigen::Vector3d acceleration() const { return gravity + buoyancy; }
+  // Where the video has it; an edit may have given it another look.
+  bool followsVideo() const {
+    return !removed && kind == ObjectKind::kStatic &&
+           placement.isApprox(Eigen::Isometry3d::Identity(), 1e-9);
+  }
   bool simulated() const {
     return !removed && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
   }

@@ -25,7 +25,18 @@ double turn(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 
 // @param fresh  the objects that nothing had moved before the edit
 void World::Impl::noteWhatContinues(const Edit& edit, const std::vector<bool>& fresh) {
-  if (edit.kind == EditKind::kAppearance || edit.kind == EditKind::kLight) return;
+  switch (edit.kind) {  // of which none is felt by what was there before
+    case EditKind::kAppearance:
+    case EditKind::kLight:
+    case EditKind::kInsert:
+    case EditKind::kDuplicate:
+    case EditKind::kTimeScale:
+    case EditKind::kSpeedScale:
+    case EditKind::kReset:
+      return;
+    default:
+      break;
+  }
   const bool continues =
       edit.kind == EditKind::kVelocity && edit.mode == EditMode::kEstimated && edit.factor == 1.0;
   for (size_t i = 0; i < fresh.size(); ++i) {
@@ -72,7 +83,7 @@ bool World::Impl::touchesInStep(Actor& actor) const {
     touches = true;
     const std::string& other = a == actor.object.name ? b : a;
     for (const Actor& partner : actors) {
-      if (partner.object.name == other && partner.edited) actor.continues = false;
+      if (partner.object.name == other && !partner.followsVideo()) actor.continues = false;
     }
   };
   for (const ContactPoint& contact : rigid.contacts()) note(contact.a, contact.b);

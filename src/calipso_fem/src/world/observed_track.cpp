@@ -19,6 +19,7 @@ ObservedTrack::ObservedTrack(const Eigen::Isometry3d& world_from_object_at_key_f
     : key_pose_(world_from_object_at_key_frame) {}
 
 void ObservedTrack::add(const ObservedMotion& sample) {
+  moves_ = moves_ || sample.moving || sample.mode_amplitudes.size() > 0;
   const auto at = std::lower_bound(
       samples_.begin(), samples_.end(), sample,
       [](const ObservedMotion& a, const ObservedMotion& b) { return a.time < b.time; });
@@ -29,13 +30,10 @@ void ObservedTrack::add(const ObservedMotion& sample) {
 }
 
 ObservedMotion ObservedTrack::at(double time) const {
-  const bool moves = std::any_of(samples_.begin(), samples_.end(), [](const ObservedMotion& s) {
-    return s.moving || s.mode_amplitudes.size() > 0;
-  });
   ObservedMotion m;
   m.world_from_object = key_pose_;
   m.time = time;
-  if (!moves) return m;  // a clip in which the object rests: the alignment is the best pose known
+  if (!moves_) return m;  // a clip in which the object rests: the alignment is the best pose known
   const auto after = std::lower_bound(samples_.begin(), samples_.end(), time,
                                       [](const ObservedMotion& s, double t) { return s.time < t; });
   if (after == samples_.begin()) return samples_.front();

@@ -61,6 +61,7 @@ World::Impl::Impl(WorldScene scene_in, WorldParams params_in)
       contacts(contactParams(scene, params)) {
   validate(params);
   validateScene(scene);
+  gravity_now = scene.gravity;
   for (const SupportMesh& mesh : scene.support_meshes)
     support_trees.push_back(std::make_unique<SurfaceTree>(mesh.mesh));
   for (const WorldObject& object : scene.objects) {

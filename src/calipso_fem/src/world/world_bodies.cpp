@@ -115,7 +115,7 @@ Eigen::Vector3d World::Impl::centroidOf(const Actor& actor) const {
 }
 
 void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reason) {
-  if (kind != ObjectKind::kStatic && !actor.edited) findHolder(actor);
+  if (kind != ObjectKind::kStatic && actor.followsVideo()) findHolder(actor);
   // What is attached does not move as a whole.
   const bool attached = kind == ObjectKind::kRigid && actor.holder == Holder::kAttachment;
   const bool immovable =
@@ -218,7 +218,8 @@ void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) 
     body.fixSurfaceVertices(attached);
     if (actor.fixed.empty()) actor.fixed.push_back(attached);
   }
-  for (const auto& region : actor.fixed) body.fixSurfaceVertices(region);
+  holdAnew(actor);
+  body.setPressure(actor.pressure);
   actor.soft->setGravity(actor.acceleration());
   const std::vector<Obstacle> around = obstacles(now, now, &actor);
   const Touching support = settle ? supportPoints(actor, surface, around) : Touching();
@@ -271,7 +272,9 @@ void World::Impl::deformAsObserved(Actor& actor) {
 }
 
 void World::Impl::removeBodies(Actor& actor) {
+  wakeAround(actor);
   if (actor.body) rigid.remove(*actor.body);
+  for (Pull& pull : actor.pulls) pull.nodes.clear();
   actor.body.reset();
   actor.soft.reset();
   actor.drive.reset();
@@ -293,6 +296,7 @@ void World::Impl::reset(Actor& actor) {
   fresh.track = actor.track;
   fresh.own_supports = actor.own_supports;
   fresh.wind = actor.wind;
+  fresh.collisions = actor.collisions;
   fresh.modes = actor.modes;
   fresh.settings = actor.settings;
   fresh.immovable = actor.settings.immovable();

@@ -60,11 +60,17 @@ ObjectKind World::Impl::kindFor(const Actor& actor, const Edit& edit) const {
   }
 }
 
+void World::Impl::checkThere(const Actor& actor) const {
+  if (!actor.removed) return;
+  throw std::invalid_argument(
+      actor.object.name + " has been removed; " +
+      (actor.inserted ? "insert it again under another name" : "send a reset for it first"));
+}
+
 // Makes the object a body that this edit, and those known to come, can act on.
 void World::Impl::touch(Actor& actor, const Edit& edit) {
-  if (actor.removed)
-    throw std::invalid_argument(actor.object.name + " has been removed; send a reset for it first");
-  if (!actor.edited) findHolder(actor);
+  checkThere(actor);
+  if (actor.followsVideo()) findHolder(actor);
   ObjectKind kind = std::max(actor.kind, kindFor(actor, edit));
   std::string reason = "edit '" + toString(edit.kind) + "'";
   for (const Edit& later : pending) {
@@ -141,7 +147,8 @@ std::string World::Impl::carryOut(const Edit& edit) {
       return remove(actor);
     case EditKind::kReset:
       reset(actor);
-      return actor.object.name + " is as in the video again";
+      return actor.object.name + (actor.inserted ? " is gone: the video does not have it"
+                                                 : " is as in the video again");
     default:
       throw std::invalid_argument("an edit '" + toString(edit.kind) +
                                   "' is for the whole scene; leave object out");
@@ -150,14 +157,18 @@ std::string World::Impl::carryOut(const Edit& edit) {
 
 std::string World::Impl::transform(Actor& actor, const Edit& edit) {
   touch(actor, edit);
+  wakeAround(actor);
   const Eigen::Vector3d centroid = centroidOf(actor);
   const Eigen::Isometry3d motion = motionAbout(centroid, edit);
   if (actor.soft) {
     actor.soft->body().applyRigidTransform(motion);
+    for (Pull& pull : actor.pulls) pull.moveBy(motion);
+    holdAnew(actor);
     actor.soft->changed();
     contacts.forget(actor.id);
   } else if (actor.kind == ObjectKind::kRigid) {
     rigid.setPose(*actor.body, motion * rigid.pose(*actor.body));
+    for (Pull& pull : actor.pulls) pull.moveBy(motion);
   } else {
     actor.placement = motion * actor.placement;
     if (actor.body) rigid.setPose(*actor.body, poseOf(actor, now));
@@ -172,9 +183,15 @@ std::string World::Impl::transform(Actor& actor, const Edit& edit) {
 
 void World::Impl::scale(Actor& actor, double factor) {
   const Eigen::RowVector3d middle = actor.object.mesh.vertices.colwise().mean();
+  const Eigen::Vector3d own = middle.transpose(), placed = poseOf(actor, now) * own;
+  for (Pull& pull : actor.pulls) {
+    pull.anchor = own + factor * (pull.anchor - own);
+    pull.start = placed + factor * (pull.start - placed);
+  }
   actor.object.mesh.vertices =
       (factor * (actor.object.mesh.vertices.rowwise() - middle)).rowwise() + middle;
   rebuild(actor);
+  wake(actor);
 }
 
 std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
@@ -268,8 +285,7 @@ std::string World::Impl::remove(Actor& actor) {
 
 // Moved like edit 'transform' moves, from where the original is now and with its velocity.
 std::string World::Impl::copy(Actor& actor, const Edit& edit) {
-  if (actor.removed)
-    throw std::invalid_argument(actor.object.name + " has been removed; send a reset for it first");
+  checkThere(actor);
   const Eigen::Vector3d centroid = centroidOf(actor);
   const Eigen::Isometry3d motion = motionAbout(centroid, edit);
   const BodyMotion moves = motionOf(actor);
@@ -289,9 +305,10 @@ std::string World::Impl::copy(Actor& actor, const Edit& edit) {
          describe(edit.translation) + " m";
 }
 
-// Only the picture changes, but an object that is drawn is one that an edit has touched.
+// Only the picture changes: edits to come find the object as the video has it.
 std::string World::Impl::changeLook(Actor& actor, const Edit& edit) {
-  touch(actor, edit);
+  checkThere(actor);
+  if (actor.followsVideo()) actor.reason = "edit 'appearance'", plan_changed = true;
   actor.edited = true;
   Look& look = actor.look;
   if (edit.color.allFinite()) {

@@ -10,6 +10,14 @@ namespace {
 
 // rad/s, a quarter of a second to follow a target
 constexpr double kPullFrequency = 2.0 * M_PI * 4.0;
+
+// A critically damped spring over a step h that ends where the force is asked for (implicit Euler):
+// stable however long that is. Acceleration for a distance to go and a velocity.
+Eigen::Vector3d springTo(const Eigen::Vector3d& to_go, const Eigen::Vector3d& velocity, double h) {
+  const double w = kPullFrequency;
+  return (w * w * to_go - (2.0 * w + w * w * h) * velocity) / (1.0 + 2.0 * w * h + w * w * h * h);
+}
+
 constexpr double kFramesAhead = 2.5;  // for which a deforming object's motion is foreseen
 
 }  // namespace
@@ -92,26 +100,27 @@ void World::Impl::twistSoft(Actor& actor, const Pull& pull, double at) {
                          torque / inertia * axis.cross(vertices.row(v).transpose() - middle));
 }
 
-// Torque on a rigid body; towards a target angle by a critically damped spring.
-Eigen::Vector3d World::Impl::twistOf(const Actor& actor, const Pull& pull, double at) const {
+// Torque on a rigid body; towards a target angle by a spring.
+Eigen::Vector3d World::Impl::twistOf(const Actor& actor, const Pull& pull, double at,
+                                     double h) const {
   const Eigen::Vector3d wanted = pull.share(at) * pull.vector;
   if (!pull.to_target) return wanted;
   const Eigen::AngleAxisd turned(rigid.pose(*actor.body).linear() *
                                  pull.start_rotation.transpose());
-  const Eigen::Vector3d error = wanted - turned.angle() * turned.axis();
-  const Eigen::Matrix3d inertia = rigid.inertia(*actor.body);
-  return inertia * (kPullFrequency * kPullFrequency * error -
-                    2.0 * kPullFrequency * rigid.angularVelocity(*actor.body));
+  // Of all angles that look alike the one nearest to what is wanted.
+  const double turns = std::round((wanted.dot(turned.axis()) - turned.angle()) / (2.0 * M_PI));
+  const Eigen::Vector3d error = wanted - (turned.angle() + 2.0 * M_PI * turns) * turned.axis();
+  return rigid.inertia(*actor.body) * springTo(error, rigid.angularVelocity(*actor.body), h);
 }
 
-// On a rigid body a pull acts at its region's centre; a target draws it by a critically damped
-// spring.
+// On a rigid body a pull acts at its region's centre; a target draws it by a spring, and bears its
+// weight.
 void World::Impl::loadRigid(Actor& actor, double at, double h) {
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
   const Eigen::Vector3d center = rigid.center(*actor.body);
   for (const Pull& pull : actor.pulls) {
     if (pull.twists) {
-      torque += twistOf(actor, pull, at);
+      torque += twistOf(actor, pull, at, h);
       continue;
     }
     const Eigen::Vector3d arm = rigid.pose(*actor.body) * pull.anchor - center;
@@ -121,8 +130,7 @@ void World::Impl::loadRigid(Actor& actor, double at, double h) {
           rigid.linearVelocity(*actor.body) + rigid.angularVelocity(*actor.body).cross(arm);
       const Eigen::Matrix3d mass =
           rigid.compliance(*actor.body, center + arm, center + arm).inverse();
-      f = mass * (kPullFrequency * kPullFrequency * (pull.start + f - center - arm) -
-                  2.0 * kPullFrequency * velocity);
+      f = mass * (springTo(pull.start + f - center - arm, velocity, h) - actor.acceleration());
     }
     force += f;
     torque += arm.cross(f);

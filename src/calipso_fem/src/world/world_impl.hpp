@@ -127,13 +127,16 @@ struct World::Impl {
   void endDrive(Actor& actor);
   void noteNoDrive(Actor& actor);
   void applyLoads(double at, double h);  // world_forces.cpp
-  Eigen::Vector3d twistOf(const Actor& actor, const Pull& pull, double at) const;
+  Eigen::Vector3d twistOf(const Actor& actor, const Pull& pull, double at, double h) const;
   void twistSoft(Actor& actor, const Pull& pull, double at);
   Vertices airOn(Actor& actor, const Vertices& x, const Vertices& u, double at, double h);
   void blowSoft(Actor& actor, double at, double h);
   void pullSoft(Actor& actor, const Pull& pull, double at);
   void loadRigid(Actor& actor, double at, double h);
   void endPulls(double at);
+  bool isDisturbed(const Actor& actor) const;
+  void wakeAround(const Actor& actor);
+  Eigen::AlignedBox3d boxNear(const Actor& actor) const;
   void updateSleep();
   int substepsPerFrame() const;
 
@@ -153,7 +156,8 @@ struct World::Impl {
   const WindTrack& windFor(
       const Actor& actor) const;  // @throw std::invalid_argument when the video shows none
   std::string insert(const Edit& edit);
-  void lead(Actor& actor, Pull& pull);
+  void lead(Actor& actor, Pull& pull, double gone);
+  void holdAnew(Actor& actor);  // of a deformable one
   void scale(Actor& actor, double factor);
   std::string remove(Actor& actor);
   std::string copy(Actor& actor, const Edit& edit);
@@ -164,6 +168,7 @@ struct World::Impl {
   std::string changeGravity(const Edit& edit);
   void setVelocity(Actor& actor, const Eigen::Vector3d& linear, const Eigen::Vector3d& angular);
   std::string changeVelocity(Actor& actor, const Edit& edit);
+  void checkThere(const Actor& actor) const;  // @throw std::invalid_argument: it was removed
   void touch(Actor& actor, const Edit& edit);
   ObjectKind kindFor(const Actor& actor, const Edit& edit) const;
   int idOf(const std::string& name) const;  // of an object or a support
@@ -192,7 +197,10 @@ struct World::Impl {
 
   double now = 0.0;  // video time, s
   std::optional<ObservedGravity> observed_gravity;
+  Eigen::Vector3d gravity_now = Eigen::Vector3d::Zero();  // the scene's, as edits have it, m/s^2
+  std::optional<Edit> wind_now;                           // around everything, by an edit
   double speed_scale = 1.0;  // simulated seconds per second of the video
+  double part_begin = 0.0;   // video time, s, at which the part of a step under way begins
   Sun sun;
   bool started = false;
   double step_ms = 0.0;

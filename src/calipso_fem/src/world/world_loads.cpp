@@ -50,7 +50,12 @@ std::string World::Impl::pull(Actor& actor, const Edit& edit) {
   pull.anchor = meanOf(actor.object.mesh.vertices, pull.vertices);
   pull.start = meanOf(verticesOf(actor), pull.vertices);
   pull.start_rotation = poseOf(actor, now).linear();
-  if (actor.soft && pull.to_target) lead(actor, pull);
+  if (actor.soft && pull.to_target) {
+    lead(actor, pull, 0.0);
+    if (pull.nodes.empty())
+      throw std::invalid_argument("the region to pull on " + actor.object.name +
+                                  " is held fixed; release it first or choose another");
+  }
   actor.pulls.push_back(pull);
   const char* unit =
       pull.twists ? (pull.to_target ? " rad" : " N m") : (pull.to_target ? " m" : " N");
@@ -59,25 +64,38 @@ std::string World::Impl::pull(Actor& actor, const Edit& edit) {
          std::to_string(pull.vertices.size()) + " vertices";
 }
 
-// Nodes that carry the region follow a given path; they are let go when the pull is over.
-void World::Impl::lead(Actor& actor, Pull& pull) {
+// Nodes that carry the region, and are not fixed, follow a given path; they are let go when the pull
+// is over.
+// @param gone the share of the way that lies behind them
+void World::Impl::lead(Actor& actor, Pull& pull, double gone) {
   DeformableBody& body = actor.soft->body();
+  pull.nodes.clear();
   for (const int node : body.nodesOfSurfaceVertices(pull.vertices))
     if (!body.isFixed(node)) pull.nodes.push_back(node);
-  if (pull.nodes.empty())
-    throw std::invalid_argument("the region to pull on " + actor.object.name +
-                                " is held fixed; release it first or choose another");
   // The body's clock counts simulated seconds, the pull's those of the video.
-  const auto share = [pull, start = body.time(), begin = now, pace = speed_scale](double t) {
-    return pull.share(begin + (t - start) / pace);
+  const auto share = [this, pull, body = &body](double t) {
+    return pull.share(part_begin + (t - body->time()) / speed_scale);
   };
   for (const int node : pull.nodes) {
-    const Eigen::Vector3d now_at = body.positions().segment<3>(3 * node);
-    const Eigen::Vector3d from = now_at - body.model().mesh().node(node), arm = now_at - pull.start;
+    const Eigen::Vector3d at = body.positions().segment<3>(3 * node);
+    const Eigen::Vector3d arm = pull.armOf(at, gone);
+    const Eigen::Vector3d from = at - pull.way(gone, arm) - body.model().mesh().node(node);
     for (int axis = 0; axis < 3; ++axis)
       body.prescribe(node, axis, [share, pull, from, arm, axis](double t) {
         return from[axis] + pull.way(share(t), arm)[axis];
       });
+  }
+  actor.soft->forgetSystem();
+}
+
+// What is held goes on being held where it is now.
+void World::Impl::holdAnew(Actor& actor) {
+  for (const auto& region : actor.fixed) actor.soft->body().fixSurfaceVertices(region);
+  for (Pull& pull : actor.pulls) {
+    if (!pull.to_target) continue;
+    for (const int node : pull.nodes) actor.soft->body().releaseNode(node);
+    for (const auto& region : actor.fixed) actor.soft->body().fixSurfaceVertices(region);
+    lead(actor, pull, pull.share(now));
   }
   actor.soft->forgetSystem();
 }
@@ -139,7 +157,8 @@ std::string World::Impl::press(Actor& actor, const Edit& edit) {
   if (!actor.soft)
     throw std::invalid_argument(actor.object.name + " is " + toString(actor.kind) +
                                 "; only a deformable object gives way to pressure (edit 'kind')");
-  actor.soft->body().setPressure(edit.pressure);
+  actor.pressure = edit.pressure;
+  actor.soft->body().setPressure(actor.pressure);
   return actor.object.name + " is under " + std::to_string(edit.pressure) + " Pa";
 }
 

@@ -202,7 +202,7 @@ Actor& World::Impl::addObject(const WorldObject& object, const ObjectSettings& s
   actor.settings = settings;
   actor.observed_material = actor.material = observedMaterial(object, settings, scene.gravity);
   actor.immovable = settings.immovable();
-  actor.gravity = scene.gravity;
+  actor.gravity = gravity_now;
   actor.holder = Holder::kNothing;
   actor.edited = true;
   actor.kind = ObjectKind::kKinematic;
@@ -230,6 +230,8 @@ Actor& World::Impl::duplicate(const std::string& source_name, const std::string&
   copy.material = source.material;
   copy.immovable = source.immovable;
   copy.gravity = source.gravity;
+  copy.air = source.air;
+  copy.pressure = source.pressure;
   if (source.holder == Holder::kBuoyancy) {
     copy.holder = source.holder;
     copy.buoyancy = source.buoyancy;
@@ -268,6 +270,7 @@ void World::Impl::copySoft(Actor& copy, const Actor& source, const Eigen::Isomet
   copy.soft->setMaterial(copy.material);
   copy.soft->body().applyRigidTransform(motion);
   copy.soft->setGravity(copy.acceleration());
+  copy.soft->body().setPressure(copy.pressure);
   copy.soft->changed();
   watchItself(copy);
 }

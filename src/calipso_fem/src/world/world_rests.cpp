@@ -18,7 +18,7 @@ bool isOnTheMove(const ObservedMotion& seen, double size, double frame_period) {
 }
 
 void World::Impl::noteWhatRestsOn(const Actor& carrier) {
-  if (carrier.edited || carrier.removed) return;
+  if (!carrier.followsVideo()) return;
   const auto isOwn = [&](int id) {
     return std::find(carrier.own_supports.begin(), carrier.own_supports.end(), id) !=
            carrier.own_supports.end();
@@ -29,9 +29,7 @@ void World::Impl::noteWhatRestsOn(const Actor& carrier) {
     });
   };
   for (Actor& actor : actors) {
-    if (&actor == &carrier || actor.edited || actor.removed || actor.kind != ObjectKind::kStatic ||
-        isKnown(actor.id))
-      continue;
+    if (&actor == &carrier || !actor.followsVideo() || isKnown(actor.id)) continue;
     if (!actor.object.attachments.empty()) continue;
     const double size = boundingDiagonal(actor.object.mesh);
     if (isOnTheMove(actor.track.at(now), size, params.frame_period)) continue;
@@ -78,7 +76,7 @@ void World::Impl::letGoWhatLostItsRest() {
   };
   for (size_t k = 0; k < rests.size();) {
     Actor& actor = actors[rests[k].actor];
-    const bool over = actor.edited || actor.removed, falls = !over && lost(rests[k]);
+    const bool over = !actor.followsVideo(), falls = !over && lost(rests[k]);
     if (!over && !falls) {
       ++k;
       continue;

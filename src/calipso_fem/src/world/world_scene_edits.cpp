@@ -8,6 +8,14 @@
 
 // Edits of the whole scene, and of what two objects are to each other.
 namespace calipso::fem {
+namespace {
+
+bool pointsAlong(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  constexpr double kSlant = 1e-3;  // rad
+  return a.dot(b) > 0.0 && a.cross(b).norm() <= kSlant * a.norm() * b.norm();
+}
+
+}  // namespace
 
 std::string World::Impl::applyToScene(const Edit& edit) {
   switch (edit.kind) {
@@ -29,6 +37,8 @@ std::string World::Impl::applyToScene(const Edit& edit) {
       for (Actor& actor : actors) reset(actor);
       sun = Sun();
       speed_scale = 1.0;
+      gravity_now = scene.gravity;
+      wind_now.reset();
       return "every object is as in the video again";
   }
 }
@@ -39,15 +49,18 @@ std::string World::Impl::changeGravity(const Edit& edit) {
         "nothing was seen to fall in the video; give gravity by mode absolute or factor");
   const Eigen::Vector3d replaced =
       edit.mode == EditMode::kEstimated ? observed_gravity->vector : edit.vector;
+  if (edit.object.empty())
+    gravity_now = edit.mode == EditMode::kFactor ? edit.factor * gravity_now : replaced;
   std::string changed_objects;
   for (Actor& actor : actors) {
     if (actor.removed || (!edit.object.empty() && actor.object.name != edit.object)) continue;
     const Eigen::Vector3d gravity =
         edit.mode == EditMode::kFactor ? edit.factor * actor.gravity : replaced;
-    // A change for the whole scene leaves alone what goes on lying on its support.
-    if (edit.object.empty() && !actor.edited) {
+    // A change for the whole scene leaves alone what goes on lying on its support: under gravity
+    // that slants it may slide.
+    if (edit.object.empty() && actor.followsVideo()) {
       findHolder(actor);
-      if (actor.holder == Holder::kSupport && gravity.dot(scene.gravity) > 0.0) {
+      if (actor.holder == Holder::kSupport && pointsAlong(gravity, scene.gravity)) {
         actor.gravity = gravity;
         continue;
       }
@@ -67,6 +80,7 @@ std::string World::Impl::blowEverywhere(const Edit& edit) {
   for (Actor& actor : actors) {
     if (!actor.removed) message += (message.empty() ? "" : "; ") + blow(actor, edit);
   }
+  wind_now = edit;
   return message.empty() ? "there is nothing that wind could move" : message;
 }
 
@@ -100,6 +114,7 @@ std::string World::Impl::insert(const Edit& edit) {
   const Eigen::Vector3d grey = Eigen::Vector3d::Constant(0.5);
   fresh.look = {edit.color.allFinite() ? edit.color : grey, true, edit.specular, edit.roughness};
   touch(fresh, edit);
+  if (wind_now) blow(fresh, *wind_now);
   return object.name + " is a new object at " + describe(edit.translation) + " m";
 }
 

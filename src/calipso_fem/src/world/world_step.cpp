@@ -12,7 +12,8 @@ namespace {
 // Rest: slower than this share of the own size per second, for so many frames.
 constexpr double kRestSpeed = 1e-3;
 constexpr int kCalmFrames = 15;
-constexpr int kGoodParts = 2;  // of a step; after so many in a row they are tried twice as long
+constexpr double kNear = 0.05;  // of its size: what moves there may touch it
+constexpr int kGoodParts = 2;   // of a step; after so many in a row they are tried twice as long
 constexpr double kSameInstant = 1e-9;  // s
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
@@ -20,9 +21,8 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
       .count();
 }
 
-Eigen::AlignedBox3d boxOf(const SoftObject& soft) {
-  return {soft.vertices().colwise().minCoeff().transpose(),
-          soft.vertices().colwise().maxCoeff().transpose()};
+Eigen::AlignedBox3d boxOf(const Vertices& vertices) {
+  return {vertices.colwise().minCoeff().transpose(), vertices.colwise().maxCoeff().transpose()};
 }
 
 }  // namespace
@@ -126,6 +126,7 @@ void World::Impl::substep(double from, double span) {
     // A part that does not converge is taken in halves; forces are given anew for each.
     for (double at = from; at < to - kSameInstant;) {
       const double rest = to - at, part = soft_part < 0.75 * rest ? soft_part : rest;
+      part_begin = at;
       if (at > from || part < span) applyLoads(at + part, speed_scale * part);
       report = contacts.step(softs, obstacles(at, at + part), rigid, speed_scale * part);
       if (report.bodies.empty()) {
@@ -167,29 +168,47 @@ void World::Impl::endPulls(double at) {
   }
 }
 
+// Whether anything moves where it may touch a deformable object.
+bool World::Impl::isDisturbed(const Actor& actor) const {
+  const auto moves = [&](const Actor& other) {
+    if (other.soft) return !other.asleep && other.calm_frames == 0;
+    if (other.kind == ObjectKind::kRigid) return !rigid.sleeping(*other.body);
+    return isOnTheMove(other.track.at(now), boundingDiagonal(other.object.mesh),
+                       params.frame_period);
+  };
+  const Eigen::AlignedBox3d near = boxNear(actor);
+  return std::any_of(actors.begin(), actors.end(), [&](const Actor& other) {
+    return &other != &actor && !other.removed && moves(other) &&
+           near.intersects(boxOf(verticesOf(other)));
+  });
+}
+
+// What sleeps beside an object that is about to be elsewhere may have rested on it.
+void World::Impl::wakeAround(const Actor& actor) {
+  if (actor.removed) return;
+  const Eigen::AlignedBox3d box = boxOf(verticesOf(actor));
+  for (Actor& other : actors)
+    if (&other != &actor && other.soft && other.asleep && boxNear(other).intersects(box))
+      wake(other);
+}
+
+Eigen::AlignedBox3d World::Impl::boxNear(const Actor& actor) const {
+  const double reach = kNear * boundingDiagonal(actor.object.mesh);
+  const Eigen::AlignedBox3d box = boxOf(actor.soft->vertices());
+  return {box.min().array() - reach, box.max().array() + reach};
+}
+
 // A deformable object sleeps once it has been still, and wakes when something moving comes near.
 void World::Impl::updateSleep() {
   for (Actor& actor : actors) {
     if (!actor.soft || actor.removed) continue;
-    const double size = boundingDiagonal(actor.object.mesh);
     if (actor.asleep) {
-      Eigen::AlignedBox3d box = boxOf(*actor.soft);
-      box = {box.min().array() - 0.05 * size, box.max().array() + 0.05 * size};
-      for (const Actor& other : actors) {
-        if (&other == &actor || other.removed) continue;
-        const bool moves = other.soft
-                               ? !other.asleep && other.calm_frames == 0
-                               : other.kind == ObjectKind::kRigid && !rigid.sleeping(*other.body);
-        if (!moves) continue;
-        const auto vertices = verticesOf(other);
-        if (box.intersects({vertices.colwise().minCoeff().transpose(),
-                            vertices.colwise().maxCoeff().transpose()}))
-          wake(actor);
-      }
+      if (isDisturbed(actor)) wake(actor);
       continue;
     }
+    const double slow = kRestSpeed * boundingDiagonal(actor.object.mesh);
     const bool calm = actor.pulls.empty() && actor.air.empty() && !actor.drive &&
-                      actor.soft->body().isAtRest(kRestSpeed * size);
+                      actor.soft->body().isAtRest(slow) && !isDisturbed(actor);
     actor.calm_frames = calm ? actor.calm_frames + 1 : 0;
     actor.asleep = actor.calm_frames >= kCalmFrames;
   }

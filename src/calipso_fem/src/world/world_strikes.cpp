@@ -69,19 +69,20 @@ ObjectKind World::Impl::kindWhenFree(const Actor& actor) const {
 
 bool World::Impl::canBeStruck(const Actor& actor) const {
   const ObjectKind kind = kindWhenFree(actor);
-  return !actor.edited && !actor.removed && !actor.immovable && actor.kind == ObjectKind::kStatic &&
-         actor.object.attachments.empty() && actor.modes.cols() == 0 &&
-         (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
+  return actor.followsVideo() && !actor.immovable && actor.object.attachments.empty() &&
+         actor.modes.cols() == 0 && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
 }
 
-// m/s, within the next h; 0: they do not meet.
+// m/s, within the next h of the video; 0: they do not meet.
 double World::Impl::closingSpeedOf(const Actor& striker, const Actor& struck, double h) {
   if (!meet(striker.id, struck.id)) return 0.0;
   const auto fieldOf = [&](const Actor& actor) {
     const BodyMotion m = motionOf(actor);
+    const double pace = actor.simulated() ? 1.0 : 1.0 / speed_scale;  // in simulated seconds
     return VelocityField{m.world_from_object * massProperties(actor.object.mesh, 1.0).center,
-                         m.linear, m.angular};
+                         pace * m.linear, pace * m.angular};
   };
+  h *= speed_scale;
   const VelocityField a = fieldOf(striker), b = fieldOf(struck);
   const double size =
       std::max(boundingDiagonal(striker.object.mesh), boundingDiagonal(struck.object.mesh));
@@ -143,8 +144,7 @@ void World::Impl::releaseWhatIsStruck(double h) {
   for (Actor& actor : actors) {
     if (!canBeStruck(actor)) continue;
     for (const Actor& striker : actors) {
-      const bool follows_video = striker.continues || !(striker.edited || striker.removed);
-      if (&striker == &actor || follows_video) continue;
+      if (&striker == &actor || striker.continues || striker.followsVideo()) continue;
       if (strikesInVideo(striker, actor, h)) {
         letGo(actor, "what strikes it in the video, " + striker.object.name + ", is edited");
         break;

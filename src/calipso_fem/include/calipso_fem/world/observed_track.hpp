@@ -27,6 +27,7 @@ class ObservedTrack {
  private:
   Eigen::Isometry3d key_pose_;
   std::vector<ObservedMotion> samples_;
+  bool moves_ = false;  // any of them tells a motion
 };
 
 }  // namespace calipso::fem
