@@ -70,12 +70,28 @@ void checkDepth(const cv::Mat1f& depth, const Camera& camera) {
                               ": register the depth with the picture");
 }
 
-// Whether the rough placement, which may be off by a twentieth of the distance, has the object on
-// the plane.
+// The model moved across the view until its middle is seen where the contour's is.
+Points beforeContour(const FitProblem& problem) {
+  Eigen::AlignedBox2d seen, wanted;
+  for (Eigen::Index i = 0; i < problem.X.rows(); ++i)
+    if (problem.X(i, 2) > 0.0) seen.extend(problem.camera.project(problem.X.row(i).transpose()));
+  for (const TargetPoint& p : problem.target.points) wanted.extend(p.pixel);
+  if (seen.isEmpty() || wanted.isEmpty()) return problem.X;
+  const Eigen::Vector2d pixels = wanted.center() - seen.center();
+  const double z = problem.X.col(2).mean();
+  return problem.X.rowwise() + Eigen::RowVector3d(pixels.x() * z / problem.camera.fx,
+                                                  pixels.y() * z / problem.camera.fy, 0.0);
+}
+
+// Whether the rough placement may have the object on the plane: along the view it may be off by a
+// twentieth of the distance, and it may be turned by some degrees.
 bool standsOn(const SupportTarget& support, const FitProblem& problem) {
-  constexpr double kPlacementError = 0.06;
-  const std::optional<double> height = clearance(support, problem.X, problem.camera);
-  return height && std::abs(*height) < kPlacementError * problem.X.col(2).mean();
+  constexpr double kPlacementError = 0.06, kTurned = 0.06;  // of the distance, of the size
+  const Points x = beforeContour(problem);
+  const std::optional<double> height = clearance(support, x, problem.camera);
+  const Eigen::Vector3d middle = x.colwise().mean().transpose();
+  const double along = std::abs(support.normal.dot(middle.normalized())) * middle.z();
+  return height && std::abs(*height) < kPlacementError * along + kTurned * problem.model_size;
 }
 
 // 1 / depth at a pixel; 0 where it is unknown or far away.

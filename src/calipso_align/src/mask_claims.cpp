@@ -42,15 +42,17 @@ void MaskTracker::takeUpAgain(const cv::Mat& image, const cv::Mat& means) {
   constexpr float kConfidence = 0.5f;   // of a mask that no motion led to
   cv::Mat taken = cv::Mat::zeros(size_, CV_8U);
   for (const Object& object : objects_) taken |= object.mask;
+  suspects_ = cv::Mat::zeros(size_, CV_8U);
   for (Object& object : objects_) {
     const int least = std::max(1, static_cast<int>(kLeastShare * object.key_area));
     if (cv::countNonZero(object.mask) >= least) continue;
-    const cv::Mat found =
+    const Reappearance back =
         findAgain(image, background_, taken & ~object.mask, object.colours, least);
-    if (found.empty()) continue;
+    if (!back.suspects.empty()) suspects_ |= back.suspects;
+    if (back.mask.empty()) continue;
     object.shape.reset();  // it was left behind
     object.confidence = kConfidence;
-    accept(object, image, background_, kLeastNoise, found, cv::Rect(cv::Point(), size_));
+    accept(object, image, background_, kLeastNoise, back.mask, cv::Rect(cv::Point(), size_));
     object.reference_mean = means;
     taken |= object.mask;
   }

@@ -163,6 +163,7 @@ void MaskTracker::rememberBackground(const cv::Mat& image) {
   }
   cv::Mat now = cv::Mat::zeros(size_, CV_8U);
   for (const Object& object : objects_) now |= object.mask;
+  if (!suspects_.empty()) now |= suspects_;
   const cv::Mat seen = ~grown(now, kClearance);
   image.copyTo(background_.image, seen);
   background_.known.setTo(255, seen);

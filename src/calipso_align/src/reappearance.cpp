@@ -1,6 +1,7 @@
 #include "reappearance.hpp"
 
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "background_evidence.hpp"
 #include "layer_appearance.hpp"
@@ -33,27 +34,31 @@ cv::Mat lookingLike(const cv::Mat& image, const cv::Mat& mask, const GaussianMix
 
 }  // namespace
 
-cv::Mat findAgain(const cv::Mat& image, const KnownBackground& background, const cv::Mat& taken,
-                  const GaussianMixture& colours, int least_px) {
+Reappearance findAgain(const cv::Mat& image, const KnownBackground& background,
+                       const cv::Mat& taken, const GaussianMixture& colours, int least_px) {
   const double noise = noiseOf(image, background.image, background.known & (taken == 0));
   if (noise > kStillNoise) return {};
   const cv::Mat strange = strangeParts(image, background, taken, noise, colours);
   const cv::Mat own = lookingLike(image, strange, colours);
-  if (cv::countNonZero(own) < least_px) return {};
+  if (cv::countNonZero(own) < least_px) return {{}, own};
   cv::Mat joined, pieces;  // gaps are passed over where object and background look alike
   cv::morphologyEx(strange, joined, cv::MORPH_CLOSE,
                    cv::Mat::ones(kLookAlikeGap + 1, kLookAlikeGap + 1, CV_8U));
   const int count = cv::connectedComponents(joined & (taken == 0), pieces, 8);
-  cv::Mat found;
-  int most = least_px - 1;
-  for (int piece = 1; piece < count; ++piece) {
-    const cv::Mat here = pieces == piece;
-    const int explained = cv::countNonZero(own & here);
-    if (explained <= most || explained < kOwnShare * cv::countNonZero(strange & here)) continue;
-    most = explained;
-    found = here;
+  std::vector<int> strange_in(count, 0), own_in(count, 0);
+  for (int y = 0; y < pieces.rows; ++y) {
+    for (int x = 0; x < pieces.cols; ++x) {
+      const int piece = pieces.at<int>(y, x);
+      strange_in[piece] += strange.at<uchar>(y, x) != 0;
+      own_in[piece] += own.at<uchar>(y, x) != 0;
+    }
   }
-  return found;
+  int found = 0, most = least_px - 1;
+  for (int piece = 1; piece < count; ++piece) {
+    if (own_in[piece] <= most || own_in[piece] < kOwnShare * strange_in[piece]) continue;
+    most = own_in[piece], found = piece;
+  }
+  return {found > 0 ? cv::Mat(pieces == found) : cv::Mat(), own};
 }
 
 }  // namespace calipso::align

@@ -79,6 +79,20 @@ TEST(MaskTracker, TakesUpAnObjectThatComesBack) {
   EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(140, height(20))), 0.95);
 }
 
+// Strip by strip, each of which is too little to tell it by.
+TEST(MaskTracker, TakesUpAnObjectThatComesBackSlowly) {
+  const auto height = [](int k) { return k < 6 ? 60.0 - 20.0 * k : -40.0 + 1.5 * (k - 5); };
+  MaskTracker tracker(picture(60, height(0), 1), truth(60, height(0)) / 255);
+  TrackedMask tracked;
+  bool was_gone = false;
+  for (int k = 1; k <= 60; ++k) {
+    tracked = tracker.track(picture(60, height(k), k + 1));
+    was_gone = was_gone || cv::countNonZero(tracked.labels) == 0;
+  }
+  EXPECT_TRUE(was_gone);
+  EXPECT_GE(intersectionOverUnion(tracked.labels == 1, truth(60, height(60))), 0.95);
+}
+
 // A moving object of the wall's own colour: only where it was seen before tells it from the wall.
 TEST(MaskTracker, ARememberedBackgroundIsNotTakenIn) {
   const auto withTwin = [](double u0, int seed) {

@@ -39,7 +39,7 @@ GaussianMixture red() {
 TEST(Reappearance, FindsTheObjectWhereverItIs) {
   for (const double u : {30.0, 120.0, 158.0}) {  // the last one comes in at the border
     const cv::Mat image = paint(kSize, disc(u, 50, 15), kRed, kWall, kNoise);
-    const cv::Mat found = findAgain(image, wall(), kNothing, red(), kLeast);
+    const cv::Mat found = findAgain(image, wall(), kNothing, red(), kLeast).mask;
     ASSERT_FALSE(found.empty()) << u;
     EXPECT_GE(intersectionOverUnion(found, maskOf(kSize, disc(u, 50, 15))), 0.9) << u;
   }
@@ -47,14 +47,14 @@ TEST(Reappearance, FindsTheObjectWhereverItIs) {
 
 TEST(Reappearance, NothingIsFoundWhereNothingHasCome) {
   const cv::Mat image = paint(kSize, kNowhere, kRed, kWall, kNoise);
-  EXPECT_TRUE(findAgain(image, wall(), kNothing, red(), kLeast).empty());
+  EXPECT_TRUE(findAgain(image, wall(), kNothing, red(), kLeast).mask.empty());
 }
 
 TEST(Reappearance, SomethingElseIsNotTakenForTheObject) {
   const cv::Mat image = paint(kSize, disc(60, 50, 20), kBlue, kWall, kNoise);
-  EXPECT_TRUE(findAgain(image, wall(), kNothing, red(), kLeast).empty());
+  EXPECT_TRUE(findAgain(image, wall(), kNothing, red(), kLeast).mask.empty());
   const cv::Mat both = paint(kSize, disc(120, 50, 12), kRed, kWall, kNoise, image);
-  EXPECT_GE(intersectionOverUnion(findAgain(both, wall(), kNothing, red(), kLeast),
+  EXPECT_GE(intersectionOverUnion(findAgain(both, wall(), kNothing, red(), kLeast).mask,
                                   maskOf(kSize, disc(120, 50, 12))),
             0.9);
 }
@@ -62,7 +62,7 @@ TEST(Reappearance, SomethingElseIsNotTakenForTheObject) {
 TEST(Reappearance, AnotherObjectKeepsWhatIsIts) {
   const cv::Mat image = paint(kSize, disc(60, 50, 15), kRed, kWall, kNoise);
   const cv::Mat taken = maskOf(kSize, disc(60, 50, 17));
-  EXPECT_TRUE(findAgain(image, wall(), taken, red(), kLeast).empty());
+  EXPECT_TRUE(findAgain(image, wall(), taken, red(), kLeast).mask.empty());
 }
 
 TEST(Reappearance, ABackgroundThatMovesTellsNothing) {
@@ -76,7 +76,7 @@ TEST(Reappearance, ABackgroundThatMovesTellsNothing) {
   };
   const KnownBackground before{stripes(0), cv::Mat(kSize, CV_8U, cv::Scalar(255))};
   const cv::Mat image = paint(kSize, disc(60, 50, 15), kRed, kWall, kNoise, stripes(4));
-  EXPECT_TRUE(findAgain(image, before, kNothing, red(), kLeast).empty());
+  EXPECT_TRUE(findAgain(image, before, kNothing, red(), kLeast).mask.empty());
 }
 
 }  // namespace

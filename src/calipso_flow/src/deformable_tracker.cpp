@@ -198,7 +198,7 @@ DeformationObservation DeformableTracker::track(const Frame& whole, bool cut) {
     return observation;
   }
   last_miss_px_ = missOf(predicted, observation, frame);
-  before_last_ = last_;
+  if (!cut) before_last_ = last_;  // across a cut nothing moved on
   last_ = observation;
   return observation;
 }

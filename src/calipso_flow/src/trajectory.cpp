@@ -1,6 +1,7 @@
 #include "calipso_flow/trajectory.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -26,8 +27,12 @@ void checkTimes(const std::vector<PoseMeasurement>& measurements) {
 }  // namespace
 
 double Collision::restitution() const {
-  const Eigen::Vector3d normal = (after.velocity - before.velocity).normalized();
-  return -after.velocity.dot(normal) / before.velocity.dot(normal);
+  constexpr double kLeastApproach = 0.01;  // of the change of velocity
+  const Eigen::Vector3d change = after.velocity - before.velocity, normal = change.normalized();
+  const double approach = -before.velocity.dot(normal);
+  if (std::abs(approach) < kLeastApproach * change.norm())
+    return std::numeric_limits<double>::quiet_NaN();
+  return after.velocity.dot(normal) / approach;
 }
 
 // e = -(a . d) / (b . d) of the velocities b before and a after, d = a - b:

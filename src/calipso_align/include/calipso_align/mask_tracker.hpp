@@ -121,6 +121,7 @@ class MaskTracker {
   std::vector<Object> objects_;
   cv::Mat previous_image_, previous_grey_, previous_means_;
   cv::Mat occupied_;            // CV_8U: any object of the previous frame
+  cv::Mat suspects_;            // CV_8U, or empty: may be an object that was lost, and comes back
   KnownBackground background_;  // the whole picture
 };
 

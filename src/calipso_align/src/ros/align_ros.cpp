@@ -44,6 +44,7 @@ AlignNodeParams loadAlignParams(const ros::NodeHandle& pnh) {
   params.scene = requiredParam<std::string>(pnh, "scene");
   params.levels = optionalParam(pnh, "levels", AlignOptions().levels);
   params.use_depth = optionalParam(pnh, "use_depth", params.use_depth);
+  params.mode = modeParam(pnh);
   for (const int nodes : params.levels) {
     if (nodes < 8) {
       throw std::invalid_argument("parameter " + pnh.resolveName("levels") + " has " +
@@ -56,7 +57,9 @@ AlignNodeParams loadAlignParams(const ros::NodeHandle& pnh) {
 AlignRos::AlignRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
     : params_(loadAlignParams(pnh)), scene_(loadScene(params_.scene)), reporter_(nh, "align") {
   options_.levels = params_.levels;
-  if (params_.use_depth && !scene_.depth_path.empty()) options_.depth = loadDepth(scene_);
+  // A live camera's first frame is not the picture that the depth image was taken with.
+  if (params_.mode == Mode::kBag && params_.use_depth && !scene_.depth_path.empty())
+    options_.depth = loadDepth(scene_);
   options_.planes = scene_.planes;
   models_publisher_ = nh.advertise<calipso_msgs::AlignedModels>(topics::kModels, 1, kLatched);
   markers_publisher_ = nh.advertise<visualization_msgs::MarkerArray>(

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "calipso_align/alignment.hpp"
+#include "calipso_ros/mode.hpp"
 #include "calipso_ros/node_reporter.hpp"
 #include "calipso_scene/scene.hpp"
 #include "ros/pose_markers.hpp"
@@ -22,7 +23,8 @@ namespace calipso::align {
 struct AlignNodeParams {
   std::string scene;        // directory with scene.yaml
   std::vector<int> levels;  // about how many nodes the grids have, coarse to fine
-  bool use_depth = true;    // the scene's depth image, where it has one
+  Mode mode = Mode::kBag;
+  bool use_depth = true;  // the scene's depth image, where it has one; of a bag only
 };
 
 // @throw std::invalid_argument naming parameter, value and what is allowed

@@ -14,7 +14,7 @@ struct Collision {
   double time_deviation = 0.0;  // s, standard
   MotionState before, after;    // at `time`
   // Speed of separation over speed of approach along the change of velocity; negative when the
-  // object goes on in the direction it came.
+  // object goes on in the direction it came; NaN when it rested and was struck.
   double restitution() const;
   // Standard. The velocities' errors are taken for independent, which makes it rather too large:
   // where it was at the impact puts both off in opposite directions.

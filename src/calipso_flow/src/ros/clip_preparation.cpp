@@ -16,6 +16,11 @@ void KeyCollector::forgetAfter(const ros::Time& stamp) {
   if (segmentation_ && segmentation_->header.stamp > stamp) segmentation_.reset();
 }
 
+std::optional<ros::Time> KeyCollector::segmentedStamp() const {
+  if (!segmentation_) return std::nullopt;
+  return segmentation_->header.stamp;
+}
+
 std::optional<ros::Time> KeyCollector::keyStamp() const {
   if (!models_) return std::nullopt;
   return models_->header.stamp;
@@ -24,10 +29,15 @@ std::optional<ros::Time> KeyCollector::keyStamp() const {
 std::optional<KeyKnowledge> KeyCollector::knowledge(const Scene& scene) const {
   if (!models_ || !segmentation_ || segmentation_->header.stamp != models_->header.stamp)
     return std::nullopt;
+  return knowledgeAt(*segmentation_, scene);
+}
+
+KeyKnowledge KeyCollector::knowledgeAt(const calipso_msgs::Segmentation& frame,
+                                       const Scene& scene) const {
   KeyKnowledge knowledge;
   for (const calipso_msgs::AlignedModel& model : models_->models) {
     knowledge.models.push_back(modelFromMsg(model, scene));
-    knowledge.masks.push_back(maskFromMsg(segmentation_->labels, model.index));
+    knowledge.masks.push_back(maskFromMsg(frame.labels, model.index));
   }
   return knowledge;
 }

@@ -30,11 +30,15 @@ class KeyCollector {
   void take(const calipso_msgs::SegmentationConstPtr& segmentation);  // the key frame's counts
   // Forgets what belongs to a key frame later than this.
   void forgetAfter(const ros::Time& stamp);
+  // Stamp of the key frame, once it has been segmented.
+  std::optional<ros::Time> segmentedStamp() const;
   // Stamp of the key frame, once models have come.
   std::optional<ros::Time> keyStamp() const;
   // Both messages' content, once both have come. @throw std::invalid_argument for a bad message
   // @param scene  says where objects are attached
   std::optional<KeyKnowledge> knowledge(const Scene& scene) const;
+  // The same with the masks of another frame. @pre knowledge() is there
+  KeyKnowledge knowledgeAt(const calipso_msgs::Segmentation& frame, const Scene& scene) const;
 
  private:
   calipso_msgs::AlignedModelsConstPtr models_;

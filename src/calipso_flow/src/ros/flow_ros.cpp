@@ -15,7 +15,7 @@ constexpr unsigned kLiveQueue = 10;
 constexpr double kDescribeEvery = 1.0;  // s, at least: how deforming objects have moved of late
 // of one core: what may be spent on that, whose search for the wind costs most
 constexpr double kDescribeShare = 0.2;
-constexpr size_t kLiveWaiting = 300;  // frames kept while a live key frame is being aligned
+constexpr size_t kLiveWaiting = 60;  // frames kept until it is known which one is the key frame
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
@@ -66,6 +66,7 @@ void FlowNode::onModels(const calipso_msgs::AlignedModelsConstPtr& models) {
 void FlowNode::onSegmentation(const calipso_msgs::SegmentationConstPtr& segmentation) {
   key_.take(segmentation);
   beginWhenPossible();
+  beginLate(*segmentation);
 }
 
 void FlowNode::onStatus(const calipso_msgs::NodeStatusConstPtr& status) {
@@ -115,13 +116,7 @@ void FlowNode::begin(const KeyKnowledge& knowledge) {
   });
   if (key == waiting_.end()) return;
   const Frame key_frame = frameFromMsg(*key);
-  if (params_.mode == Mode::kLive) {
-    live_analyser_ = std::make_unique<LiveAnalyser>(key_frame, knowledge.models, knowledge.masks,
-                                                    scene_.gravity, params_.dynamics);
-    waiting_.clear();
-    reporter_.ready("following " + std::to_string(knowledge.models.size()) + " objects");
-    return;
-  }
+  if (params_.mode == Mode::kLive) return follow(key_frame, knowledge);
   clip_analyser_ = std::make_unique<ClipAnalyser>(key_frame, knowledge.models, knowledge.masks,
                                                   scene_.gravity, params_.dynamics);
   headers_ = {key->image->header};
@@ -129,6 +124,50 @@ void FlowNode::begin(const KeyKnowledge& knowledge) {
   waiting_.clear();
   for (const calipso::Frame& frame : later) analyse(frame);
   finishWhenComplete();
+}
+
+void FlowNode::follow(const Frame& first, const KeyKnowledge& knowledge) {
+  live_analyser_ = std::make_unique<LiveAnalyser>(first, knowledge.models, knowledge.masks,
+                                                  scene_.gravity, params_.dynamics);
+  waiting_.clear();
+  reporter_.ready("following " + std::to_string(knowledge.models.size()) + " objects");
+}
+
+// A camera that ran before this node did: the key frame has been missed. What has not moved since is
+// where its model is in later frames, too.
+void FlowNode::beginLate(const calipso_msgs::Segmentation& segmentation) {
+  if (params_.mode != Mode::kLive || live_analyser_ || !key_.keyStamp()) return;
+  const auto of = [](const ros::Time& stamp) {
+    return [stamp](const calipso::Frame& f) { return f.stamp() == stamp; };
+  };
+  const auto frame = std::find_if(waiting_.begin(), waiting_.end(), of(segmentation.header.stamp));
+  const bool missed = std::none_of(waiting_.begin(), waiting_.end(), of(*key_.keyStamp())) &&
+                      segmentation.header.stamp > *key_.keyStamp();
+  if (!missed || frame == waiting_.end()) return;
+  try {
+    if (!key_.knowledge(scene_)) return;
+    const KeyKnowledge knowledge = key_.knowledgeAt(segmentation, scene_);
+    reporter_.remark("the key frame was missed: motion is followed from " +
+                     std::to_string((frame->stamp() - *key_.keyStamp()).toSec()) + " s after it");
+    follow(frameFromMsg(*frame), knowledge);
+  } catch (const std::exception& error) {
+    reporter_.failed(error.what());
+  }
+}
+
+// Of live frames the key frame is needed, whichever that will be; of those that missed it the newest.
+void FlowNode::keepWaiting(const calipso::Frame& frame) {
+  if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) return waiting_.clear();
+  const std::optional<ros::Time> key = key_.segmentedStamp();
+  const auto is_key = [&](const calipso::Frame& f) { return key && f.stamp() == *key; };
+  if (std::any_of(waiting_.begin(), waiting_.end(), is_key)) {
+    waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(),
+                                  [&](const calipso::Frame& f) { return !is_key(f); }),
+                   waiting_.end());
+    return;
+  }
+  if (waiting_.size() >= kLiveWaiting) waiting_.erase(waiting_.begin());
+  waiting_.push_back(frame);
 }
 
 void FlowNode::analyse(const calipso::Frame& frame) {
@@ -188,8 +227,7 @@ void FlowNode::onFrame(const calipso::Frame& frame) {
 void FlowNode::publishDynamics(const calipso::Frame& frame) {
   if (params_.mode == Mode::kLive) {
     if (!live_analyser_) {
-      if (waiting_.size() >= kLiveWaiting) waiting_.erase(waiting_.begin() + 1);
-      waiting_.push_back(frame);
+      keepWaiting(frame);
       beginWhenPossible();
       return;
     }

@@ -37,6 +37,9 @@ class FlowNode {
   void startOver(const ros::Time& stamp);
   void beginWhenPossible();
   void begin(const KeyKnowledge& knowledge);
+  void beginLate(const calipso_msgs::Segmentation& segmentation);
+  void follow(const Frame& first, const KeyKnowledge& knowledge);
+  void keepWaiting(const calipso::Frame& frame);
   void analyse(const calipso::Frame& frame);
   void finishWhenComplete();
   void publishDynamics(const calipso::Frame& frame);
