@@ -95,15 +95,14 @@ bool isOfObject(const cv::Mat& piece, const SeenModel& model, const cv::Mat& dep
 cv::Mat detailsOf(const View& key, int index, const SeenModel& model, const cv::Mat& objects,
                   const cv::Mat& depth, const cv::Mat& place) {
   const cv::Mat own = key.labels == index, beyond = own & ~objects;
-  cv::Mat pieces, details = cv::Mat::zeros(own.size(), CV_8U);
-  const int count = cv::connectedComponents(beyond, pieces);
+  cv::Mat pieces, extents, middles, details = cv::Mat::zeros(own.size(), CV_8U);
+  const int count = cv::connectedComponentsWithStats(beyond, pieces, extents, middles);
   for (int i = 1; i < count; ++i) {
+    if (extents.at<int>(i, cv::CC_STAT_AREA) < kLeast) continue;
     const cv::Mat piece = pieces == i;
     double farthest;
     cv::minMaxLoc(model.beside, nullptr, &farthest, nullptr, nullptr, piece);
-    if (farthest < kBeside || cv::countNonZero(piece) < kLeast ||
-        !isOfObject(piece, model, depth, place))
-      continue;
+    if (farthest < kBeside || !isOfObject(piece, model, depth, place)) continue;
     cv::Mat reach;
     cv::dilate(piece & (model.beside >= kBeside), reach, disc(static_cast<int>(2 * kBeside)));
     details |= piece & reach;
@@ -122,20 +121,22 @@ cv::Mat flatNearness(const cv::Mat& shape, const SeenModel& model, double fx) {
   for (int i = 1; i < count; ++i) {
     std::vector<cv::Point> pixels;
     cv::findNonZero(pieces == i, pixels);
-    cv::Mat places(static_cast<int>(pixels.size()), 3, CV_64F),
-        near(static_cast<int>(pixels.size()), 1, CV_64F), plane;
-    for (int k = 0; k < places.rows; ++k) {
+    const int pixel_count = static_cast<int>(pixels.size());
+    cv::Mat places = cv::Mat::zeros(std::max(3, pixel_count), 3, CV_64F),  // 3: or it is no plane
+        near = cv::Mat::zeros(places.rows, 1, CV_64F), plane;
+    for (int k = 0; k < pixel_count; ++k) {
       places.at<double>(k, 0) = 1.0;
       places.at<double>(k, 1) = pixels[k].x - pixels[0].x;
       places.at<double>(k, 2) = pixels[k].y - pixels[0].y;
       near.at<double>(k) = model.next.at<float>(pixels[k]);
     }
     cv::solve(places, near, plane, cv::DECOMP_SVD | cv::DECOMP_NORMAL);
-    const cv::Mat fitted = places * plane;
-    double farthest;  // behind the model
-    cv::minMaxLoc(near - fitted, nullptr, &farthest);
-    const double mean = cv::mean(near)[0], nearer = std::min(farthest, kBefore * mean / fx);
-    for (int k = 0; k < places.rows; ++k) {
+    const cv::Mat fitted = places * plane, behind = near - fitted;
+    double farthest;
+    cv::minMaxLoc(behind.rowRange(0, pixel_count), nullptr, &farthest);
+    const double mean = cv::sum(near)[0] / pixel_count,
+                 nearer = std::min(farthest, kBefore * mean / fx);
+    for (int k = 0; k < pixel_count; ++k) {
       nearness.at<float>(pixels[k]) = static_cast<float>(
           std::clamp(fitted.at<double>(k) + nearer, mean / kDeepest, mean * kDeepest));
     }

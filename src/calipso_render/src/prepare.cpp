@@ -11,6 +11,7 @@
 #include "light/shadow_borders.hpp"
 #include "model_details.hpp"
 #include "place/clip_motion.hpp"
+#include "place/exposure.hpp"
 #include "place/key_cover.hpp"
 #include "place/mended_depth.hpp"
 #include "place/place_depth.hpp"
@@ -191,9 +192,11 @@ NoiseModel noiseOf(const std::vector<ClipFrame>& frames, const cv::Mat& steadine
 
 }  // namespace
 
-Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
+Prepared prepare(const ClipSample& as_taken, const std::vector<ObjectModel>& models,
                  const RenderParams& given) {
-  checkInput(clip, given);
+  checkInput(as_taken, given);
+  const std::optional<ClipSample> even = evenlyExposed(as_taken);
+  const ClipSample& clip = even ? *even : as_taken;
   RenderParams params = given;
   const ClipFrame& key = clip.frames().front();
   params.depth = mendedDepth(given.depth, key.labels, given.planes, key.camera);

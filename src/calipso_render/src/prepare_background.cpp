@@ -295,10 +295,12 @@ void findPlaceUmbra(const PlaceEvidence& e, const Haze& haze, const cv::Mat& sun
   } else {
     cv::Mat behind = params.depth.clone();
     if (!behind.empty()) behind.setTo(0.0f, p.key_labels != 0);
-    const EmptyPlace place{p.camera, p.background, behind};
-    const auto in_views = umbraInViews(e.views, params.planes, place, light);
-    p.umbra =
-        in_views ? *in_views : umbraOfPassing(e.frames, params.planes, p.background, predicted);
+    const auto in_views =
+        umbraInViews(e.views, params.planes, {p.camera, p.background, behind}, light);
+    p.umbra = in_views.umbra ? *in_views.umbra
+                             : umbraOfPassing(e.frames, params.planes, p.background, predicted);
+    if (in_views.refuted && !p.light.confirmed())  // what moves casts none under this sun
+      p.sunless = cv::Mat(p.shadowless.size(), CV_8U, cv::Scalar(255));
   }
   findUmbra(light, picture, plate, sun, p.key_labels, params.planes, p.umbra, p.relief);
 }

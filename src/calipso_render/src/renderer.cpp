@@ -4,11 +4,16 @@
 #include <stdexcept>
 
 #include "frame/frame_compositor.hpp"
+#include "place/exposure.hpp"
+#include "place/view_warp.hpp"
 
 namespace calipso::render {
 
 Renderer::Renderer(std::shared_ptr<const Prepared> prepared, const RenderParams& params)
-    : prepared_(std::move(prepared)), params_(params), caches_(std::make_unique<FrameCaches>()) {}
+    : prepared_(std::move(prepared)),
+      params_(params),
+      caches_(std::make_unique<FrameCaches>()),
+      meter_(std::make_unique<ExposureMeter>(prepared_->key_picture, prepared_->key_labels)) {}
 
 Renderer::~Renderer() = default;
 
@@ -83,7 +88,20 @@ FrameOutput Renderer::composite(const FrameInput& frame) {
                                 std::to_string(expected.height) + "; play both at one size");
   }
   addNewcomers(frame);
+  if (sameView(prepared_->camera, frame.camera)) {
+    const cv::Mat& labels = frame.labels.empty() ? prepared_->key_labels : frame.labels;
+    if (const auto gain = meter_->gainOf(frame.bgr, labels)) return compositeAt(*gain, frame);
+  }
   return FrameCompositor(*prepared_, params_, frame, *caches_).run();
+}
+
+FrameOutput Renderer::compositeAt(const cv::Vec3f& gain, const FrameInput& frame) {
+  FrameInput even = frame;
+  even.bgr = exposedBy(frame.bgr, {1.0f / gain[0], 1.0f / gain[1], 1.0f / gain[2]});
+  FrameOutput output = FrameCompositor(*prepared_, params_, even, *caches_).run();
+  output.bgr = exposedBy(output.bgr, gain);
+  frame.bgr.copyTo(output.bgr, output.provenance == kOriginal);
+  return output;
 }
 
 }  // namespace calipso::render

@@ -65,7 +65,7 @@ TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
     std::vector<View> views = {viewOfShade(surface, -0.1f, camera(), plate.plate),
                                viewOfShade(surface, 0.15f, further, plate.plate)};
     views[0].labels.setTo(kBallLabel);
-    const auto found = umbraInViews(views, table(), place, sunlight());
+    const auto found = umbraInViews(views, table(), place, sunlight()).umbra;
     ASSERT_TRUE(found);
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR((*found)[c], kUmbra[c], 0.03f) << c;  // the maps have other resolutions
@@ -73,7 +73,9 @@ TEST(Umbra, IsToldFromWhatTheViewsObjectsShade) {
   const View unshaded_view{plate.plate, cv::Mat::zeros(kHeight, kWidth, CV_8U), camera(),
                            viewOfShade(surface, -0.1f, camera(), plate.plate).actors};
   // No shadow where one is predicted.
-  EXPECT_FALSE(umbraInViews({unshaded_view}, table(), place, sunlight()));
+  const SeenUmbra none = umbraInViews({unshaded_view, unshaded_view}, table(), place, sunlight());
+  EXPECT_FALSE(none.umbra);
+  EXPECT_TRUE(none.refuted);
 }
 
 // All colours tell a shadow, or none: one alone would tint it.

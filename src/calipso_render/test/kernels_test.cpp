@@ -36,7 +36,7 @@ TEST_F(Avx2, EncodesTheSameBytes) {
         colours[4].push_back(random_.uniform(0.0f, 3.0f));
   const float* const planes[] = {colours[0].data(), colours[1].data(), colours[2].data(),
                                  colours[3].data(), colours[4].data()};
-  const NoiseField field(3);
+  const NoiseField field(NoiseModel(), 3);
   const NoiseRows noise{{field.row(5, 0), field.row(5, 1), field.row(5, 2)}};
   NoiseCurves curves;
   for (int i = 0; i < 24; ++i)

@@ -66,6 +66,25 @@ TEST(ModelDetails, WhatTheModelLacksGoesAlong) {
   EXPECT_GT(greenPixels(out.bgr(now)), s.rail.width);  // its rim is mixed with the table
 }
 
+// Guy lines, twigs: parts of them can be single pixels.
+TEST(ModelDetails, HairsOfAnyShapeAreTaken) {
+  cv::RNG random(3);
+  for (int seed = 0; seed < 40; ++seed) {
+    RailSetting s;
+    const cv::Rect box = cv::boundingRect(s.key.labels);
+    const float z = s.depthOf(kCentre.cast<float>());
+    for (int hair = 0; hair < 4; ++hair) {
+      cv::Point p(box.x + box.width / 2, box.y - 1);
+      for (int k = 0; k < 60; ++k) {
+        p += cv::Point(random.uniform(-1, 2), random.uniform(-1, 2));
+        p.x = std::clamp(p.x, 1, kWidth - 2), p.y = std::clamp(p.y, 1, kHeight - 2);
+        s.key.labels.at<std::uint8_t>(p) = kBallLabel, s.depth.at<float>(p) = z;
+      }
+    }
+    ASSERT_NO_THROW(s.prepared(s.depth)) << seed;
+  }
+}
+
 // Specks of a mask are no details, nor do single pixels that are left of one do harm.
 TEST(ModelDetails, SpecksAreLeftOut) {
   RailSetting s;

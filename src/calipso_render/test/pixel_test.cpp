@@ -139,7 +139,8 @@ TEST(Noise, StillPicturesHaveNone) {
 }
 
 TEST(NoiseField, HangsOnStampAndPixelAlone) {
-  const NoiseField a(5), b(5), c(6);
+  const NoiseModel model;
+  const NoiseField a(model, 5), b(model, 5), c(model, 6);
   int different = 0;
   double sum = 0.0, squares = 0.0;
   for (int v = 0; v < 256; ++v) {

@@ -2,12 +2,14 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <vector>
 
 namespace calipso::render {
 
-// The camera's noise: standard deviation in code values against code value, per channel.
+// The camera's noise: standard deviation in code values against code value, per channel, and how
+// much of it the channels have in common.
 class NoiseModel {
  public:
   NoiseModel();  // a camera without noise
@@ -22,19 +24,24 @@ class NoiseModel {
   // Code values, >= 0.
   float deviation(int channel, float code) const;
 
+  // Between two channels, 0..1: codecs keep of colours' noise little but its mean over some pixels.
+  // Grey pictures have 1.
+  float correlation() const { return correlation_; }
+
   static constexpr int kKnots = 9;  // at code values 0, 32, .. 256; linear between them
   static constexpr float kKnotStep = 32.0f;
 
  private:
   std::array<std::array<float, kKnots>, 3> deviation_;
+  float correlation_;
 };
 
-// Noise of unit variance per channel, half of it correlated between neighbours as demosaicing and
-// compression leave it. The same stamp and pixel always get the same value, whatever is drawn
-// first.
+// Noise of unit variance per channel: what the channels have in common, hardly correlated between
+// neighbouring pixels, and each channel's own, which spreads over two pixels as compression leaves
+// it. The same model, stamp and pixel always get the same value, whatever is drawn first.
 class NoiseField {
  public:
-  explicit NoiseField(std::int64_t stamp_ns);
+  NoiseField(const NoiseModel& model, std::int64_t stamp_ns);
   float at(int u, int v, int channel) const { return row(v, channel)[column(u)]; }
 
   static constexpr int kSide = 256,
@@ -42,13 +49,13 @@ class NoiseField {
                            8;  // columns, and how many of the first stand once more after the last
   // A channel's row v of the picture, as columns say.
   const float* row(int v, int channel) const {
-    return &tile()[static_cast<std::size_t>(channel * kSide + ((v + shift_v_) & (kSide - 1))) *
-                   (kSide + kWrapped)];
+    return &(*tile_)[static_cast<std::size_t>(channel * kSide + ((v + shift_v_) & (kSide - 1))) *
+                     (kSide + kWrapped)];
   }
   int column(int u) const { return (u + shift_u_) & (kSide - 1); }
 
  private:
-  static const std::vector<float>& tile();
+  std::shared_ptr<const std::vector<float>> tile_;
   int shift_u_, shift_v_;
 };
 

@@ -129,6 +129,7 @@ Prepared prepare(const ClipSample& clip, const std::vector<ObjectModel>& models,
                  const RenderParams& params);
 
 struct FrameCaches;
+class ExposureMeter;
 
 // Draws edited frames. Every frame's result depends on that frame alone. Not thread-safe: shadow
 // maps of objects that rest, and the models of copies, are kept from frame to frame.
@@ -142,10 +143,13 @@ class Renderer {
 
  private:
   void addNewcomers(const FrameInput& frame);
+  // Composes it in the key frame's exposure.
+  FrameOutput compositeAt(const cv::Vec3f& gain, const FrameInput& frame);
 
   std::shared_ptr<const Prepared> prepared_;
   RenderParams params_;
   std::unique_ptr<FrameCaches> caches_;
+  std::unique_ptr<const ExposureMeter> meter_;
 };
 
 }  // namespace calipso::render

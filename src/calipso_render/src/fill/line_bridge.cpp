@@ -23,6 +23,10 @@ constexpr float kTurn = 0.04f;        // and part of the way between them
 constexpr float kAlike = 0.4f;        // difference of colours across, to their contrast
 constexpr float kBesideAlike = 0.5f;  // the same of what is beside it
 constexpr float kInHole = 0.7f;       // part of a connection that the hole hides
+constexpr float kSeenPart = 0.1f;     // of it, that is seen of either line at least,
+constexpr float kSeenAmid = 0.15f;    // and amid others, as blades of grass are
+constexpr float kAmid = 25.0f;        // px around a line's end,
+constexpr int kOthers = 3;            // and how many others end there
 constexpr float kLongest = 40.0f;     // px of a line that are mirrored
 constexpr float kCore = 1.5f;         // px on either side that are the line itself
 constexpr float kAlone = 1.0f;        // the same of one that passes before different things
@@ -115,7 +119,7 @@ class Bridger {
 
   // @return nothing if b does not continue a
   std::optional<Bridge> connection(const LineEnd& a, const LineEnd& b, float gap) const {
-    if (!areInLine(a, b, gap)) return std::nullopt;
+    if (!areInLine(a, b, gap) || isByChance(a, b, gap)) return std::nullopt;
     if (besideAlike(a, b)) {
       if (const auto cost = misfit(a, b, gap, differenceAcross(a, b)))
         return Bridge{&a, &b, gap, *cost, kOwn};
@@ -218,6 +222,19 @@ class Bridger {
     const cv::Point2f way = b.at - a.at;
     return gap >= 2.0f && a.into.dot(way) >= 0.9f * gap && b.into.dot(way) <= -0.9f * gap &&
            strayOf(a, b) <= allowedStray(gap);
+  }
+
+  // Among many short lines some are in line with others far away.
+  bool isByChance(const LineEnd& a, const LineEnd& b, float gap) const {
+    const auto amid = [&](const LineEnd& end) {
+      return std::count_if(ends_.begin(), ends_.end(), [&](const LineEnd& other) {
+               return &other != &end && cv::norm(other.at - end.at) < kAmid;
+             }) >= kOthers;
+    };
+    const auto is_short = [&](const LineEnd& end) {
+      return end.length < kSeenPart * gap || (end.length < kSeenAmid * gap && amid(end));
+    };
+    return is_short(a) || is_short(b);
   }
 
   // How badly b, in line with a, continues it; nothing if it does not.

@@ -4,7 +4,7 @@
 
 namespace calipso::render {
 
-LineCodec::LineCodec(const NoiseModel& noise, std::int64_t stamp_ns) : field_(stamp_ns) {
+LineCodec::LineCodec(const NoiseModel& noise, std::int64_t stamp_ns) : field_(noise, stamp_ns) {
   constexpr float step = NoiseModel::kKnotStep;
   for (int c = 0; c < 3; ++c) {
     for (int k = 0; k + 1 < NoiseModel::kKnots; ++k) {

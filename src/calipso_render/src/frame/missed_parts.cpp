@@ -17,6 +17,10 @@ constexpr int kLeastAcross = 3;  // px
 // px up to which something is thin, gaps that it may have, and the part of an object's size by which
 // it may stand out from it
 constexpr int kThin = 5, kGaps = 2, kReach = 2;
+// of its area in the picture: a spout, a button; and the gaps up to which it hangs together, as a
+// stem may look like what is behind it
+constexpr double kSmall = 0.06;
+constexpr int kStem = 5;
 
 // Is an object that the video has here drawn elsewhere, or not at all?
 bool isGone(const StagedFrame& frame, std::size_t surface, const Actor& here) {
@@ -61,15 +65,37 @@ Outlines outlines(const StagedFrame& frame) {
   return {within, gone};
 }
 
-// Of what is unlike, what is thin and goes on from within an outline, as ropes do.
+// Pieces of a mask that are small, gaps passed over.
+cv::Mat smallPieces(const cv::Mat& mask, double most) {
+  cv::Mat joined, pieces, small = cv::Mat::zeros(mask.size(), CV_8U);
+  cv::dilate(mask, joined, disc(kGaps));
+  std::vector<int> area(cv::connectedComponents(joined, pieces), 0);
+  const auto forEachPixel = [&](const auto& act) {
+    for (int v = 0; v < mask.rows; ++v) {
+      for (int u = 0; u < mask.cols; ++u) {
+        if (mask.at<std::uint8_t>(v, u) != 0) act(v, u, pieces.at<int>(v, u));
+      }
+    }
+  };
+  forEachPixel([&](int, int, int piece) { ++area[piece]; });
+  forEachPixel([&](int v, int u, int piece) {
+    if (area[piece] <= most) small.at<std::uint8_t>(v, u) = 255;
+  });
+  return small;
+}
+
+// Of what is unlike, what is thin, or small, and goes on from within an outline, as ropes do.
 // @param unlike, within CV_8UC1
 cv::Mat hanging(const cv::Mat& unlike, const cv::Mat& within) {
-  if (cv::countNonZero(within) == 0) return cv::Mat::zeros(unlike.size(), CV_8U);
+  const int area = cv::countNonZero(within);
+  if (area == 0) return cv::Mat::zeros(unlike.size(), CV_8U);
   cv::Mat broad, joined;
   cv::morphologyEx(unlike, broad, cv::MORPH_OPEN, cv::Mat::ones(kThin + 1, kThin + 1, CV_8U));
-  const cv::Mat thin = unlike & ~broad;
+  const cv::Mat thin = unlike & ~broad, small = smallPieces(unlike & ~within, kSmall * area);
   cv::dilate(thin, joined, disc(kGaps));
-  return thin & touchingPieces(joined, within);
+  const cv::Mat hangs = thin & touchingPieces(joined, within);
+  cv::dilate(small, joined, disc(kStem));
+  return hangs | (small & touchingPieces(joined, within));
 }
 
 }  // namespace

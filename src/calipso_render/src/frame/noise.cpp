@@ -5,6 +5,7 @@
 #include <functional>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "noise_mask.hpp"
 
@@ -15,17 +16,12 @@ constexpr int kFewestSamples = 64;  // per knot; below that the neighbours decid
 constexpr int kHistogram = 512;     // of absolute differences, in 1/8 code value
 constexpr int kSquare = 40;         // px
 constexpr std::size_t kFewestSquares = 4;
-constexpr double kLouder = 1.2;  // times the quieter squares' deviation
+constexpr std::size_t kMostPairs = 6;
+constexpr float kUsualCorrelation = 0.55f;  // of a JPEG whose hue is coded at half the size
+constexpr double kLouder = 1.2;             // times the quieter squares' deviation
 // from a knot to the next, at most: shot noise hardly changes in code values, read noise grows in
 // the dark
 constexpr float kGrowsBrighter = 1.25f, kGrowsDarker = 2.5f;
-
-std::uint64_t splitMix(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ull;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
 
 using Histogram = std::array<int, kHistogram>;
 
@@ -146,9 +142,57 @@ void addDetail(const cv::Mat& frame, int channel, Differences& differences) {
   }
 }
 
+bool isGrey(const cv::Mat& picture) {
+  std::vector<cv::Mat> channels;
+  cv::split(picture, channels);
+  return cv::norm(channels[0], channels[1], cv::NORM_INF) == 0.0 &&
+         cv::norm(channels[1], channels[2], cv::NORM_INF) == 0.0;
+}
+
+// How alike the channels' noise is in pairs of pictures.
+class CommonNoise {
+ public:
+  explicit CommonNoise(const NoiseModel& model) : model_(model) {}
+
+  void add(const cv::Mat& first, const cv::Mat& second, const cv::Mat& steady) {
+    for (int v = 0; v < first.rows; v += 2) {
+      const cv::Vec3b *a = first.ptr<cv::Vec3b>(v), *b = second.ptr<cv::Vec3b>(v);
+      const std::uint8_t* use = steady.ptr<std::uint8_t>(v);
+      for (int u = 0; u < first.cols; ++u) {
+        if (use[u] != 0) add(a[u], b[u]);
+      }
+    }
+  }
+
+  // nullopt: too little is known of it.
+  std::optional<float> correlation() const {
+    if (count_ < kFewestSamples || !(own_ > 0.0)) return std::nullopt;
+    return static_cast<float>(std::clamp(shared_ / own_, 0.0, 1.0));
+  }
+
+ private:
+  void add(const cv::Vec3b& a, const cv::Vec3b& b) {
+    constexpr double kLeast = 0.3, kFarthest = 3.0;  // code values; deviations, of no outlier
+    double x[3];
+    for (int c = 0; c < 3; ++c) {
+      if (isClipped(a[c]) || isClipped(b[c])) return;
+      const double deviation = model_.deviation(c, 0.5f * static_cast<float>(a[c] + b[c]));
+      x[c] = (a[c] - b[c]) / (std::sqrt(2.0) * std::max(kLeast, deviation));
+      if (std::abs(x[c]) > kFarthest) return;
+    }
+    shared_ += x[0] * x[1] + x[1] * x[2] + x[2] * x[0];
+    own_ += x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
+    ++count_;
+  }
+
+  const NoiseModel& model_;
+  double shared_ = 0.0, own_ = 0.0;
+  long count_ = 0;
+};
+
 }  // namespace
 
-NoiseModel::NoiseModel() {
+NoiseModel::NoiseModel() : correlation_(kUsualCorrelation) {
   for (auto& channel : deviation_) channel.fill(0.0f);
 }
 
@@ -158,7 +202,7 @@ NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames,
   NoiseModel model;
   for (int channel = 0; channel < 3; ++channel) {
     Differences differences(kKnots, frames[0].size());
-    for (std::size_t i = 0; i + 1 < frames.size() && i < 6; ++i) {
+    for (std::size_t i = 0; i + 1 < frames.size() && i < kMostPairs; ++i) {
       addPairs(frames[i], frames[i + 1], steady[i] & steady[i + 1], channel, differences);
     }
     if (frames.size() == 1) addDetail(frames[0], channel, differences);
@@ -171,6 +215,11 @@ NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames,
     fillGaps(model.deviation_[channel]);
     limitGrowth(best, model.deviation_[channel]);
   }
+  CommonNoise common(model);
+  for (std::size_t i = 0; i + 1 < frames.size() && i < kMostPairs; ++i)
+    common.add(frames[i], frames[i + 1], steady[i] & steady[i + 1]);
+  if (const auto correlation = common.correlation()) model.correlation_ = *correlation;
+  if (isGrey(frames[0])) model.correlation_ = 1.0f;
   return model;
 }
 
@@ -179,36 +228,6 @@ float NoiseModel::deviation(int channel, float code) const {
   const int i = static_cast<int>(x);
   const auto& d = deviation_[channel];
   return d[i] + (x - i) * (d[i + 1] - d[i]);
-}
-
-NoiseField::NoiseField(std::int64_t stamp_ns) {
-  const std::uint64_t h = splitMix(static_cast<std::uint64_t>(stamp_ns));
-  shift_u_ = static_cast<int>(h & (kSide - 1));
-  shift_v_ = static_cast<int>((h >> 20) & (kSide - 1));
-}
-
-const std::vector<float>& NoiseField::tile() {
-  static const std::vector<float> field = [] {
-    cv::Mat white(kSide, kSide, CV_32FC3), other(kSide, kSide, CV_32FC3), smooth;
-    cv::RNG random(0x5eed);
-    random.fill(white, cv::RNG::NORMAL, 0.0, 1.0);
-    random.fill(other, cv::RNG::NORMAL, 0.0, 1.0);
-    cv::GaussianBlur(other, smooth, {5, 5}, 0.6, 0.6, cv::BORDER_REFLECT);
-    cv::Mat mix = white * std::sqrt(0.5) + smooth;  // smooth keeps about half of its variance
-    cv::Scalar mean, deviation;
-    cv::meanStdDev(mix, mean, deviation);
-    std::vector<float> values;
-    values.reserve(3 * kSide * (kSide + kWrapped));
-    for (int c = 0; c < 3; ++c) {
-      for (int v = 0; v < kSide; ++v) {
-        for (int u = 0; u < kSide + kWrapped; ++u)
-          values.push_back(
-              static_cast<float>((mix.at<cv::Vec3f>(v, u % kSide)[c] - mean[c]) / deviation[c]));
-      }
-    }
-    return values;
-  }();
-  return field;
 }
 
 }  // namespace calipso::render

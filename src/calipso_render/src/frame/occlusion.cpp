@@ -7,6 +7,7 @@
 #include "calipso_render/ray_shadow.hpp"
 #include "calipso_render/shadow_map.hpp"
 #include "calipso_render/sky_map.hpp"
+#include "draw/joint_visibility.hpp"
 
 namespace calipso::render {
 namespace {
@@ -49,11 +50,20 @@ void addPlaneBounds(const SupportPlane& plane, float sun_radius, const Points& v
   const Eigen::Vector3f side = n.unitOrthogonal(), other = n.cross(side);
   const Eigen::Vector3f nowhere =
       Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  const auto height_of = [&](const Eigen::Vector3f& p) {
+    return n.dot(p) - static_cast<float>(plane.offset);
+  };
+  const auto sunk = [&](const Eigen::Vector3f& p) { return height_of(p) < -kHeightTolerance; };
+  const auto count = std::count_if(vertices.begin(), vertices.end(), sunk);
+  if (count == static_cast<std::ptrdiff_t>(vertices.size())) return;
+  // Where edges pass through the plane lies between the feet of their ends' perpendiculars.
+  for (std::size_t i = 0; count > 0 && i < vertices.size(); ++i)
+    shadow.push_back(vertices[i] - n * height_of(vertices[i]));
   const std::size_t first = shadow.size();
   shadow.resize(first + 4 * vertices.size(), nowhere);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const float height = n.dot(vertices[i]) - static_cast<float>(plane.offset);
+    const float height = height_of(vertices[i]);
     if (height < -kHeightTolerance) continue;
     const float spread = sun_radius * height / (slope * slope);
     const Eigen::Vector3f foot = vertices[i] - sun * (height / slope);
@@ -61,6 +71,17 @@ void addPlaneBounds(const SupportPlane& plane, float sun_radius, const Points& v
     to[0] = foot + spread * side, to[1] = foot - spread * side, to[2] = foot + spread * other,
     to[3] = foot - spread * other;
   }
+}
+
+// One map, or one for each group of occluders.
+template <class MapOf>
+std::unique_ptr<Visibility> mapsOf(const std::vector<Occluder>& occluders,
+                                   const Eigen::Vector3d& direction, const MapOf& map_of) {
+  const std::vector<std::vector<Occluder>> groups = nearGroups(occluders, direction);
+  if (groups.size() <= 1) return map_of(occluders);
+  std::vector<std::unique_ptr<Visibility>> maps;
+  for (const std::vector<Occluder>& group : groups) maps.push_back(map_of(group));
+  return std::make_unique<JointVisibility>(std::move(maps));
 }
 
 }  // namespace
@@ -71,7 +92,9 @@ std::unique_ptr<Visibility> skyVisibility(const std::vector<Occluder>& all,
   const Eigen::Vector3d up = params.planes.empty() ? params.up : params.planes.front().normal;
   if (params.quality == Quality::kFinal)
     return std::make_unique<RayShadow>(occluders, up, RayShadow::Params{kSkyRadius, 48});
-  return std::make_unique<SkyMap>(occluders, up, SkyMap::Params());
+  return mapsOf(occluders, up, [&](const std::vector<Occluder>& group) {
+    return std::make_unique<SkyMap>(group, up, SkyMap::Params());
+  });
 }
 
 ReliefSky skyOnWalls(const std::vector<Occluder>& occluders, const Relief& relief,
@@ -86,8 +109,10 @@ std::unique_ptr<Visibility> sunVisibility(const std::vector<Occluder>& occluders
   if (params.quality == Quality::kFinal)
     return std::make_unique<RayShadow>(occluders, direction,
                                        RayShadow::Params{light.angular_radius, 24});
-  return std::make_unique<ShadowMap>(occluders, direction,
-                                     ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
+  return mapsOf(occluders, direction, [&](const std::vector<Occluder>& group) {
+    return std::make_unique<ShadowMap>(group, direction,
+                                       ShadowMap::Params{kShadowMapSide, light.angular_radius, 16});
+  });
 }
 
 cv::Rect shadowBounds(const StagedFrame& frame, const Relief& relief, const Points& vertices,

@@ -124,10 +124,10 @@ void takeOutOthers(const StagedFrame& frame, const cv::Mat& others_sun, cv::Mat&
 void takeOutRims(const StagedFrame& frame, cv::Mat& dark) {
   for (std::size_t i = 0; i < frame.edited.size(); ++i) {
     if (frame.edited[i] || !frame.prepared.moves[i]) continue;
-    cv::Mat near;
-    cv::dilate(frame.labels == frame.prepared.surfaces[i].index, near,
-               disc(std::max(2, frame.labels.cols / kRimShare)));
-    dark.setTo(0, near);
+    cv::Mat away;
+    cv::distanceTransform(frame.labels != frame.prepared.surfaces[i].index, away, cv::DIST_L2,
+                          cv::DIST_MASK_PRECISE);
+    dark.setTo(0, away <= std::max(2, frame.labels.cols / kRimShare));
   }
 }
 

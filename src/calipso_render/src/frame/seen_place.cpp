@@ -80,6 +80,7 @@ void SeenPlace::lookBeside(const StagedFrame& frame) {
   constexpr float kUnknown = std::numeric_limits<float>::infinity();
   spread_beside = cv::Mat(beside.size(), CV_32F, cv::Scalar(kUnknown));
   for (const PlateBeside& other : frame.prepared.beside) {
+    if (cv::countNonZero(beside) == 0) break;
     const Camera &there = other.camera, &here = frame.input.camera;
     const cv::Mat map = viewWarp(nearnessFrom(other.nearness, there, here), there, here);
     cv::Mat colour, spread;

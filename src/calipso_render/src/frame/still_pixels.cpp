@@ -122,12 +122,25 @@ void StillPixels::addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const
   rim.setTo(0.0f, beside | inner);
   const cv::Mat own(box.size(), CV_16S, cv::Scalar(surface));
   rim.setTo(0.0f, shownOfMoved(frame_, own, box + region_.tl()));
+  keepLines(surface, owner, rims);
   // Rims lie within 2 * reach px, along rows and columns, of what rests.
   const cv::Rect search = around(3 * reach);
   const cv::Mat gone = nearerToLeft(surface, rests(search), owner, search);
   if (!gone.empty()) rim.setTo(0.0f, gone(box - search.tl()));
   cv::Mat here = rims(box);
   cv::max(here, rim, here);
+}
+
+// What the object's mask shows and no model has, however far from that, such as the ends of guy
+// lines, as long as nothing of it has left.
+void StillPixels::keepLines(int surface, const cv::Mat& owner, cv::Mat& rims) const {
+  if (frame_.moved[surface]) return;
+  cv::Mat lines =
+      (frame_.labels(region_) == frame_.prepared.surfaces[surface].index) & (owner != surface);
+  if (cv::countNonZero(lines) == 0) return;
+  cv::dilate(lines, lines, disc(2 * frame_.params.background.mask_margin_px));
+  lines.setTo(0, shownOfOthers(surface, {{0, 0}, region_.size()}));
+  rims.setTo(1.0f, lines & (owner < 0));
 }
 
 // Pixels of a box that lie nearer to what a surface has left than to where it rests: what no model

@@ -51,6 +51,7 @@ class StillPixels {
   bool findResting(const StagedObject& object, std::vector<char>& can_rest) const;
   Seen findParts(const std::vector<std::vector<char>>& can_rest);
   void keepRims(const cv::Mat& owner);
+  void keepLines(int surface, const cv::Mat& owner, cv::Mat& rims) const;
   void addRim(int surface, const cv::Mat& owner, cv::Mat& rims) const;
   cv::Mat shownOfOthers(int surface, const cv::Rect& box) const;
   cv::Mat nearerToLeft(int surface, const cv::Mat& rests, const cv::Mat& owner,

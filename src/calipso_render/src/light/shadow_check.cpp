@@ -150,16 +150,22 @@ struct Region {
 
 void addRegions(const Test& test, const cv::Mat& visible, float limit, bool of_sun,
                 std::vector<Region>& regions) {
-  cv::Mat parts;
-  const int count = cv::connectedComponents(visible < limit, parts, 8, CV_32S);
+  cv::Mat parts, extents, middles;
+  const int count =
+      cv::connectedComponentsWithStats(visible < limit, parts, extents, middles, 8, CV_32S);
   const cv::Mat hidden = 1.0 - visible;
   cv::Mat small = cv::Mat::zeros(visible.size(), CV_8U);
+  const auto isSmall = [&](int part) { return extents.at<int>(part, cv::CC_STAT_AREA) < kFewest; };
+  for (int v = 0; v < parts.rows; ++v) {
+    for (int u = 0; u < parts.cols; ++u) {
+      const int part = parts.at<int>(v, u);
+      if (part > 0 && isSmall(part)) small.at<std::uint8_t>(v, u) = 255;
+    }
+  }
   for (int part = 1; part < count; ++part) {
+    if (isSmall(part)) continue;
     const cv::Mat mask = parts == part;
-    if (cv::countNonZero(mask) < kFewest)
-      small |= mask;
-    else
-      regions.push_back({mask, of_sun, false, test.of(mask, hidden)});
+    regions.push_back({mask, of_sun, false, test.of(mask, hidden)});
   }
   if (cv::countNonZero(small) > 0) regions.push_back({small, of_sun, true, test.of(small, hidden)});
 }

@@ -38,6 +38,7 @@ cv::Mat onGround(const cv::Mat& nearness, const cv::Mat& ground) {
 }
 
 // What the depth image shows just beside an object, off the planes and nearer: it stands before it.
+// Blades of grass are narrower: beside them pixels are mixed with the object, and go with it.
 // @param ground nearness of the support planes
 cv::Mat nearerBeside(const cv::Mat& mask, const cv::Mat& labels, const cv::Mat& nearness,
                      const cv::Mat& ground, int margin) {
@@ -47,6 +48,8 @@ cv::Mat nearerBeside(const cv::Mat& mask, const cv::Mat& labels, const cv::Mat& 
              cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
   cv::Mat nearer = (labels == 0) & (own > 0.0f) & (nearness > kBehind * own);
   if (!ground.empty()) nearer &= ~onGround(nearness, ground);
+  cv::morphologyEx(nearer, nearer, cv::MORPH_OPEN,
+                   cv::Mat::ones(kNarrowFront, kNarrowFront, CV_8U));
   return nearer;
 }
 

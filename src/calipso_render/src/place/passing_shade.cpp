@@ -15,7 +15,9 @@ namespace {
 constexpr int kStride = 2;              // px between the places for which shade is predicted
 constexpr float kSameSky = 0.02f;       // visible part of the sky that tells two frames apart
 constexpr std::size_t kFewestOpen = 3;  // frames under more sky that stand for all
-constexpr float kVisible = 1.0f;        // code values
+// code values: of faint shade, such as an object beside a place leaves, a pixel's noise hides what is
+// shade's
+constexpr float kVisible = 1.0f;
 
 // What a frame is predicted to show, one value per kStride px.
 struct Lighting {
@@ -177,13 +179,13 @@ Samples leastShaded(const Sorted& s, double step) {
   return shadedAgainst(bright, all, step) ? bright : Samples();
 }
 
-// Of faint shade, such as an object beside a place leaves, a pixel's noise hides what is shade's.
-void takeIfBrighter(const Samples& values, Background& background, int u, int v) {
+// Takes the mean of values for the plate if it is brighter by that much, code values.
+void takeIfBrighter(const Samples& values, float by, Background& background, int u, int v) {
   float spread = 0.0f;
   const cv::Vec3f mean = robustMean(values, spread);
   cv::Vec3f& plate = background.plate.at<cv::Vec3f>(v, u);
   const cv::Vec3f gain = mean - plate;
-  if (gain[0] + 2.0f * gain[1] + gain[2] < 4.0f * kVisible) return;
+  if (gain[0] + 2.0f * gain[1] + gain[2] < 4.0f * by) return;
   plate = mean, background.spread.at<float>(v, u) = spread;
 }
 
@@ -198,7 +200,7 @@ cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& backgrou
     for (int u = 0; u < size.width; ++u) {
       Sorted s = sorter.at(u, v);
       if (s.core.empty() && s.near.empty()) {
-        if (s.dimmed) takeIfBrighter(s.lit, background, u, v);
+        if (s.dimmed) takeIfBrighter(s.lit, kVisible, background, u, v);
         continue;
       }
       background.shaded_at_times.at<std::uint8_t>(v, u) = 255;
@@ -206,17 +208,16 @@ cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& backgrou
       if (s.lit.empty()) {
         never_lit.at<std::uint8_t>(v, u) = 255;
         const Samples least = leastShaded(s, step);
-        if (!least.empty())
-          background.plate.at<cv::Vec3f>(v, u) =
-              robustMean(least, background.spread.at<float>(v, u));
+        if (!least.empty()) takeIfBrighter(least, -kVisible, background, u, v);
         continue;
       }
       if (!shadedAgainst(s.lit, s.core.empty() ? s.near : s.core, step)) {
-        if (s.lit.size() >= kFewestOpen) takeIfBrighter(s.lit, background, u, v);
+        if (s.lit.size() >= kFewestOpen) takeIfBrighter(s.lit, kVisible, background, u, v);
         continue;
       }
       dropShaded(step, s.lit);
-      background.plate.at<cv::Vec3f>(v, u) = robustMean(s.lit, background.spread.at<float>(v, u));
+      // Where it is darker, frames without a known pose show more of the light.
+      takeIfBrighter(s.lit, -kVisible, background, u, v);
     }
   }
   return never_lit;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <vector>
 
 #include "calipso_render/inpaint.hpp"
 #include "calipso_render/stage.hpp"
@@ -233,14 +235,63 @@ cv::Mat placeNearness(const std::vector<ClipFrame>& frames, const std::vector<Su
   return nearness;
 }
 
+namespace {
+
+// The pixels around one that lie within the picture.
+template <typename Act>
+void forEachBeside(const cv::Mat& picture, const cv::Point& p, const Act& act) {
+  for (int v = std::max(0, p.y - 1); v <= std::min(picture.rows - 1, p.y + 1); ++v) {
+    for (int u = std::max(0, p.x - 1); u <= std::min(picture.cols - 1, p.x + 1); ++u)
+      act(cv::Point(u, v));
+  }
+}
+
+// Of the pixels around one those that are known: the least nearness.
+float farthestBeside(const cv::Mat& nearness, const cv::Point& p) {
+  float least = std::numeric_limits<float>::max();
+  forEachBeside(nearness, p, [&](const cv::Point& q) {
+    const float near = nearness.at<float>(q);
+    if (near >= 0.0f) least = std::min(least, near);
+  });
+  return least;
+}
+
+// Unknown pixels (< 0) beside known ones.
+std::vector<cv::Point> besideKnown(const cv::Mat& nearness) {
+  cv::Mat beside;
+  cv::dilate(nearness >= 0.0f, beside, cv::Mat::ones(3, 3, CV_8U));
+  std::vector<cv::Point> pixels;
+  cv::findNonZero(beside & (nearness < 0.0f), pixels);
+  return pixels;
+}
+
+// Unknown pixels beside those of a ring, each once.
+std::vector<cv::Point> unknownBeside(const cv::Mat& nearness, const std::vector<cv::Point>& ring) {
+  std::vector<cv::Point> pixels;
+  for (const cv::Point& p : ring) {
+    forEachBeside(nearness, p, [&](const cv::Point& q) {
+      if (nearness.at<float>(q) < 0.0f) pixels.push_back(q);
+    });
+  }
+  const auto before = [](const cv::Point& a, const cv::Point& b) {
+    return a.y != b.y ? a.y < b.y : a.x < b.x;
+  };
+  std::sort(pixels.begin(), pixels.end(), before);
+  pixels.erase(std::unique(pixels.begin(), pixels.end()), pixels.end());
+  return pixels;
+}
+
+}  // namespace
+
 cv::Mat nearnessFrom(const cv::Mat& nearness, const Camera& key, const Camera& to) {
-  cv::Mat out = nearestFrom(nearness, key, to), farthest;
-  for (cv::Mat unseen = out<0.0f; cv::countNonZero(unseen)> 0; unseen = out < 0.0f) {
-    cv::Mat near = out.clone();
-    near.setTo(1e9f, unseen);
-    cv::erode(near, farthest, cv::Mat::ones(3, 3, CV_8U));
-    farthest.copyTo(out, unseen & (farthest < 1e9f));
-    if (cv::countNonZero(out >= 0.0f) == 0) out.setTo(0.0f);
+  cv::Mat out = nearestFrom(nearness, key, to);
+  std::vector<cv::Point> ring = besideKnown(out);
+  if (ring.empty() && out.at<float>(0, 0) < 0.0f) out.setTo(0.0f);  // nothing is known
+  while (!ring.empty()) {
+    std::vector<float> farthest;
+    for (const cv::Point& p : ring) farthest.push_back(farthestBeside(out, p));
+    for (std::size_t i = 0; i < ring.size(); ++i) out.at<float>(ring[i]) = farthest[i];
+    ring = unknownBeside(out, ring);
   }
   return out;
 }

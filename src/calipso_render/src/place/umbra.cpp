@@ -48,20 +48,19 @@ void collect(const View& view, const std::vector<SupportPlane>& planes, const Em
 
 }  // namespace
 
-std::optional<cv::Vec3f> umbraInViews(const std::vector<View>& views,
-                                      const std::vector<SupportPlane>& planes,
-                                      const EmptyPlace& place, const Light& light) {
-  if (planes.empty()) return std::nullopt;
+SeenUmbra umbraInViews(const std::vector<View>& views, const std::vector<SupportPlane>& planes,
+                       const EmptyPlace& place, const Light& light) {
+  if (planes.empty()) return {};
   std::vector<float> ratios[3];
   for (const View& view : views) collect(view, planes, place, light, ratios);
   cv::Vec3f umbra;
   for (int c = 0; c < 3; ++c) {
-    if (ratios[c].size() < kFewest) return std::nullopt;
+    if (ratios[c].size() < kFewest) return {};
     std::nth_element(ratios[c].begin(), ratios[c].begin() + ratios[c].size() / 2, ratios[c].end());
     umbra[c] = std::max(ratios[c][ratios[c].size() / 2], 0.1f);
-    if (umbra[c] > kNoShadow) return std::nullopt;
+    if (umbra[c] > kNoShadow) return {std::nullopt, true};
   }
-  return umbra;
+  return {umbra, false};
 }
 
 cv::Vec3f umbraInPicture(const cv::Mat& picture, const cv::Mat& plate, const cv::Mat& sun,

@@ -10,13 +10,16 @@
 
 namespace calipso::render {
 
+struct SeenUmbra {
+  std::optional<cv::Vec3f> umbra;  // per channel; nullopt where too little of shadows is seen
+  bool refuted = false;            // it is no darker where they should be
+};
+
 // What the sun's absence leaves of a support plane's brightness, from the places that the views'
-// objects are known to shade: the median of picture over plate, per channel, what the objects hide
-// of the sky taken off.
-// @return nullopt where too little of such shadows is seen
-std::optional<cv::Vec3f> umbraInViews(const std::vector<View>& views,
-                                      const std::vector<SupportPlane>& planes,
-                                      const EmptyPlace& place, const Light& light);
+// objects are known to shade: the median of picture over plate, what the objects hide of the sky
+// taken off.
+SeenUmbra umbraInViews(const std::vector<View>& views, const std::vector<SupportPlane>& planes,
+                       const EmptyPlace& place, const Light& light);
 
 // What the light itself says of that, on the first plane.
 cv::Vec3f predictedUmbra(const Light& light, const std::vector<SupportPlane>& planes);

@@ -10,7 +10,7 @@
 namespace calipso::render {
 namespace {
 
-constexpr int kMostSteps = 256;   // texels along an edge
+constexpr int kMostSteps = 512;   // texels along an edge
 constexpr double kAnchor = 1e-4;  // pull towards the mean where nothing known is connected
 
 std::size_t texelCount(int steps) { return static_cast<std::size_t>(steps + 1) * (steps + 2) / 2; }

@@ -18,8 +18,10 @@
 namespace calipso::render {
 namespace {
 
-// per object; where several frames make them, nothing else is drawn of what these show
+// per object; where several frames make them, nothing else is drawn of what these show. Of pictures
+// of so many pixels, and of larger ones as many more, but no more than some times as many.
 constexpr std::size_t kMostTexels = 300000, kMostOfSeveral = 600000;
+constexpr double kUsualPixels = 640.0 * 360.0, kMostTimes = 4.0;
 // of the object's extent: a like place that far before the front is not on the object
 constexpr float kOffSurface = 0.03f;
 constexpr float kEnough = 0.3f;   // weight of a look that needs no other
@@ -30,6 +32,13 @@ constexpr float kFurther = 0.3f;  // of further frames, whose poses are less exa
 constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;
 // weight of a look at a like place that counts for nothing, and in full
 constexpr float kPoor = 0.15f, kGood = 0.45f;
+
+std::size_t mostTexels(const Camera& camera, std::size_t views) {
+  const double pictures = static_cast<double>(camera.width) * camera.height / kUsualPixels;
+  return static_cast<std::size_t>(std::clamp(pictures, 1.0, kMostTimes) *
+                                  static_cast<double>(views > 1 ? kMostOfSeveral : kMostTexels));
+}
+
 constexpr std::size_t kMostTurned = 3;  // turned places that a place takes its look from
 // texels, about, by which like places are judged; of the stock model, where that takes longer
 constexpr std::size_t kCompared = 20000, kComparedOfStock = 5000;
@@ -78,7 +87,7 @@ class TextureFill {
     const Eigen::Vector3f down = camera.world_from_camera.linear().col(1).cast<float>();
     a.texture = SurfaceTexture(surface_.key_vertices, surface_.triangles,
                                sightings_.keyDepth() / static_cast<float>(camera.fx),
-                               views_.size() > 1 ? kMostOfSeveral : kMostTexels);
+                               mostTexels(camera, views_.size()));
     Origins origins(a.texture.size());
     for (const Reflectance& r : pictures_) shown_.push_back(r.albedo);
     shown_[0] = a.albedo;
