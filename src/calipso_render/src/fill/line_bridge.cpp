@@ -25,6 +25,7 @@ constexpr float kBesideAlike = 0.5f;  // the same of what is beside it
 constexpr float kInHole = 0.7f;       // part of a connection that the hole hides
 constexpr float kSeenPart = 0.1f;     // of it, that is seen of either line at least,
 constexpr float kSeenAmid = 0.15f;    // and amid others, as blades of grass are
+constexpr float kBesideLine = 3.0f;   // px by which its pieces may miss it
 constexpr float kAmid = 25.0f;        // px around a line's end,
 constexpr int kOthers = 3;            // and how many others end there
 constexpr float kLongest = 40.0f;     // px of a line that are mirrored
@@ -52,6 +53,7 @@ class Bridger {
   }
 
   LineBridges run(const std::vector<cv::Vec4f>& edges, const Lattice* lattice) {
+    edges_ = edges;
     ends_ = findLineEnds(edges, hole_, source_, image_);
     if (lattice != nullptr) {
       ends_.erase(std::remove_if(
@@ -232,9 +234,25 @@ class Bridger {
              }) >= kOthers;
     };
     const auto is_short = [&](const LineEnd& end) {
-      return end.length < kSeenPart * gap || (end.length < kSeenAmid * gap && amid(end));
+      const float seen = seenLength(end);
+      return seen < kSeenPart * gap || (seen < kSeenAmid * gap && amid(end));
     };
     return is_short(a) || is_short(b);
+  }
+
+  // px of the end's line, which may be seen in pieces, as a rope is.
+  float seenLength(const LineEnd& end) const {
+    float sum = 0.0f;
+    for (const cv::Vec4f& s : edges_) {
+      const cv::Point2f a(s[0], s[1]), b(s[2], s[3]);
+      const auto aside = [&](const cv::Point2f& p) {
+        return std::abs(render::cross(end.into, p - end.at));
+      };
+      const auto behind = [&](const cv::Point2f& p) { return end.into.dot(p - end.at) < kStray; };
+      if (aside(a) <= kBesideLine && aside(b) <= kBesideLine && behind(a) && behind(b))
+        sum += 0.5f * std::abs(end.into.dot(b - a));  // each has two sides
+    }
+    return std::max(end.length, sum);
   }
 
   // How badly b, in line with a, continues it; nothing if it does not.
@@ -349,6 +367,7 @@ class Bridger {
 
   const cv::Mat &hole_, &source_, &surface_;
   cv::Mat& image_;
+  std::vector<cv::Vec4f> edges_;
   std::vector<LineEnd> ends_;
   LineBridges result_;
 };
