@@ -201,6 +201,7 @@ Prepared prepare(const ClipSample& as_taken, const std::vector<ObjectModel>& mod
   const ClipFrame& key = clip.frames().front();
   params.depth = mendedDepth(given.depth, key.labels, given.planes, key.camera);
   Prepared p;
+  p.camera_moves = cameraMoves(clip);
   p.nearness = placeNearness(
       cameraMoves(clip) ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()},
       params.planes, params.depth, params.background.mask_margin_px);

@@ -88,7 +88,7 @@ FrameOutput Renderer::composite(const FrameInput& frame) {
                                 std::to_string(expected.height) + "; play both at one size");
   }
   addNewcomers(frame);
-  if (sameView(prepared_->camera, frame.camera)) {
+  if (!prepared_->camera_moves && sameView(prepared_->camera, frame.camera)) {
     const cv::Mat& labels = frame.labels.empty() ? prepared_->key_labels : frame.labels;
     if (const auto gain = meter_->gainOf(frame.bgr, labels)) return compositeAt(*gain, frame);
   }
@@ -97,7 +97,7 @@ FrameOutput Renderer::composite(const FrameInput& frame) {
 
 FrameOutput Renderer::compositeAt(const cv::Vec3f& gain, const FrameInput& frame) {
   FrameInput even = frame;
-  even.bgr = exposedBy(frame.bgr, {1.0f / gain[0], 1.0f / gain[1], 1.0f / gain[2]});
+  even.bgr = exposedAsKey(frame.bgr, gain);
   FrameOutput output = FrameCompositor(*prepared_, params_, even, *caches_).run();
   output.bgr = exposedBy(output.bgr, gain);
   frame.bgr.copyTo(output.bgr, output.provenance == kOriginal);

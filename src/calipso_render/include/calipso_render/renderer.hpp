@@ -86,7 +86,8 @@ struct RenderParams {
 struct Prepared {
   Camera camera;  // key frame
   std::int64_t key_stamp_ns = 0;
-  cv::Mat key_picture;  // CV_8UC3
+  bool camera_moves = false;  // in the clip
+  cv::Mat key_picture;        // CV_8UC3
   cv::Mat key_labels;
   std::vector<Surface> surfaces;
   std::vector<bool> moves;  // per surface: it moves in the video

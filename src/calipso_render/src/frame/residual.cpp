@@ -137,6 +137,18 @@ void Residual::findRims(const cv::Rect& carried) {
   }
 }
 
+// The pixels around (u, v) that an owner has, with their bilinear weights.
+template <class Act>
+void Residual::forEachOwned(float u, float v, int owner, const Act& act) const {
+  const float fu = std::floor(u), fv = std::floor(v), x = u - fu, y = v - fv;
+  for (int k = 0; k < 4; ++k) {
+    const float weight = ((k & 1) != 0 ? x : 1.0f - x) * ((k & 2) != 0 ? y : 1.0f - y);
+    const cv::Point at(static_cast<int>(fu) + (k & 1), static_cast<int>(fv) + (k >> 1));
+    if (weight > 0.0f && miss_box_.contains(at) && rest_.owners.at<short>(at) == owner)
+      act(at, weight);
+  }
+}
+
 // What sways past its place in the key frame in another colour would flash there.
 bool Residual::carries(const StagedObject& object) const {
   return !miss_.empty() && object.isAtRestInVideo() && !object.look.albedo &&
@@ -154,8 +166,9 @@ void Residual::addToStretch(int v, int first, int last, int slot, Row& row) cons
     const Eigen::Vector2f moved(u - from_u, static_cast<float>(v) - from_v);
     if (!(moved.squaredNorm() < kNonePx * kNonePx)) continue;
     cv::Vec4f colour = row.at(i);
-    const cv::Vec3f tint = frame_.objects[slot].tint();
-    addAt(from_u, from_v, moved, surface, tint.mul(dimmed(from_u, from_v, tint, colour)), colour);
+    cv::Vec3f tint = frame_.objects[slot].tint();
+    if (mayBeDimmed(surface)) tint = tint.mul(dimmed(from_u, from_v, surface, tint, colour));
+    addAt(from_u, from_v, moved, surface, tint, colour);
     row.set(i, colour);
   }
 }
@@ -166,7 +179,8 @@ void Residual::addToPixel(std::uint32_t id, int u, int v, cv::Vec4f& colour) con
   const Eigen::Vector2f moved = frame_.movement(id, static_cast<float>(u), static_cast<float>(v));
   const cv::Point2f from(u - moved.x(), v - moved.y());
   cv::Vec3f tint = object.tint();
-  if (frame_.input.sun.changes()) tint = tint.mul(dimmed(from.x, from.y, tint, colour));
+  if (mayBeDimmed(object.surface))
+    tint = tint.mul(dimmed(from.x, from.y, object.surface, tint, colour));
   addAt(from.x, from.y, moved, object.surface, tint, colour);
 }
 
@@ -198,18 +212,30 @@ void Residual::addRims(int v, const StillPixels& still, Row& row) const {
   }
 }
 
+// Another sun, or another object that has come before it.
+bool Residual::mayBeDimmed(int surface) const {
+  const auto others =
+      std::count(frame_.moved.begin(), frame_.moved.end(), true) - (frame_.moved[surface] ? 1 : 0);
+  return frame_.input.sun.changes() || others > 0;
+}
+
 // Part of the video's light that is left on a pixel to which the surface at (u, v) has moved: of
 // what drawing misses there is as much less.
-cv::Vec3f Residual::dimmed(float u, float v, const cv::Vec3f& tint, const cv::Vec4f& colour) const {
-  const cv::Point at(cvRound(u), cvRound(v));
-  if (!miss_box_.contains(at)) return cv::Vec3f::all(1);
-  const cv::Vec4f& miss = miss_.at<cv::Vec4f>(at - miss_box_.tl());
-  const cv::Vec3f video = linearPixel(frame_.input.bgr, at.x, at.y);
+cv::Vec3f Residual::dimmed(float u, float v, int owner, const cv::Vec3f& tint,
+                           const cv::Vec4f& colour) const {
+  cv::Vec3f drawn;
+  float known = 0.0f;
+  forEachOwned(u, v, owner, [&](const cv::Point& at, float weight) {
+    const cv::Vec4f& miss = miss_.at<cv::Vec4f>(at - miss_box_.tl());
+    const cv::Vec3f video = linearPixel(frame_.input.bgr, at.x, at.y);
+    for (int c = 0; c < 3; ++c) drawn[c] += weight * std::max(0.0f, video[c] - miss[c]);
+    known += weight;
+  });
+  if (known == 0.0f) return cv::Vec3f::all(1);
   cv::Vec3f left;
-  for (int c = 0; c < 3; ++c) {
-    const float drawn = std::max(0.0f, tint[c] * (video[c] - miss[c]));
-    left[c] = std::min(1.0f, (std::max(0.0f, colour[c]) + kDark) / (drawn + kDark));
-  }
+  for (int c = 0; c < 3; ++c)
+    left[c] =
+        std::min(1.0f, (std::max(0.0f, colour[c]) + kDark) / (tint[c] * drawn[c] / known + kDark));
   return left;
 }
 
@@ -236,17 +262,10 @@ void Residual::addAt(float u, float v, const Eigen::Vector2f& moved, int owner,
 
 // @return 0 where nothing is known of this owner
 cv::Vec4f Residual::missAt(float u, float v, int owner) const {
-  const float fu = std::floor(u), fv = std::floor(v), x = u - fu, y = v - fv;
-  const int i = static_cast<int>(fu) - miss_box_.x, j = static_cast<int>(fv) - miss_box_.y;
   cv::Vec4f sum;
-  for (int k = 0; k < 4; ++k) {
-    const float weight = ((k & 1) != 0 ? x : 1.0f - x) * ((k & 2) != 0 ? y : 1.0f - y);
-    const int column = i + (k & 1), row = j + (k >> 1);
-    if (weight == 0.0f || column < 0 || row < 0 || column >= miss_.cols || row >= miss_.rows)
-      continue;
-    if (rest_.owners.at<short>(row + miss_box_.y, column + miss_box_.x) == owner)
-      sum += weight * miss_.at<cv::Vec4f>(row, column);
-  }
+  forEachOwned(u, v, owner, [&](const cv::Point& at, float weight) {
+    sum += weight * miss_.at<cv::Vec4f>(at - miss_box_.tl());
+  });
   return sum;
 }
 

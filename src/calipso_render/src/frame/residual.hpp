@@ -40,7 +40,11 @@ class Residual {
   void findMiss(const cv::Rect& carried);
   bool carries(const StagedObject& object) const;
   void findRims(const cv::Rect& carried);
-  cv::Vec3f dimmed(float u, float v, const cv::Vec3f& tint, const cv::Vec4f& colour) const;
+  template <class Act>
+  void forEachOwned(float u, float v, int owner, const Act& act) const;
+  bool mayBeDimmed(int surface) const;
+  cv::Vec3f dimmed(float u, float v, int owner, const cv::Vec3f& tint,
+                   const cv::Vec4f& colour) const;
   void addAt(float u, float v, const Eigen::Vector2f& moved, int owner, const cv::Vec3f& tint,
              cv::Vec4f& colour) const;
   cv::Vec4f missAt(float u, float v, int owner) const;

@@ -140,6 +140,8 @@ void StillPixels::keepLines(int surface, const cv::Mat& owner, cv::Mat& rims) co
   if (cv::countNonZero(lines) == 0) return;
   cv::dilate(lines, lines, disc(2 * frame_.params.background.mask_margin_px));
   lines.setTo(0, shownOfOthers(surface, {{0, 0}, region_.size()}));
+  const cv::Mat own(region_.size(), CV_16S, cv::Scalar(surface));
+  lines.setTo(0, shownOfMoved(frame_, own, region_));
   rims.setTo(1.0f, lines & (owner < 0));
 }
 

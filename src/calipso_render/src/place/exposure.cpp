@@ -12,10 +12,11 @@ namespace {
 constexpr int kSide = 8;           // px of the squares whose means are compared
 constexpr double kSquares = 1000;  // about so many
 constexpr std::size_t kFewest = 60;
-constexpr float kDark = 0.01f;                      // linear; darker squares tell little
+constexpr float kDark = 0.02f;                      // linear; darker squares tell little
 constexpr float kSame = 0.01f;                      // of the gain: what noise and grain may make
-constexpr float kAgree = 0.02f, kMostAgree = 0.6f;  // to so much, so many of the squares
+constexpr float kAgree = 0.04f, kMostAgree = 0.6f;  // to so much, so many of the squares
 constexpr std::uint8_t kClipped = 250;
+constexpr float kNearlyClipped = 235.0f;  // code values, from which less is known of the light
 
 // Mean of a square in linear light; nullopt where an object is, or it is clipped or dark.
 std::optional<cv::Vec3f> meanOf(const cv::Mat& bgr, const cv::Mat& labels, const cv::Rect& where) {
@@ -89,10 +90,22 @@ cv::Mat exposedBy(const cv::Mat& bgr, const cv::Vec3f& gain) {
   cv::Mat table(1, 256, CV_8UC3), out;
   for (int code = 0; code < 256; ++code) {
     for (int c = 0; c < 3; ++c)
-      table.at<cv::Vec3b>(0, code)[c] =
-          code >= kClipped && gain[c] <= 1.0f
-              ? static_cast<std::uint8_t>(code)  // how bright it was is not known
-              : quantise(codeFromLinear(gain[c] * decodeTable()[code]));
+      table.at<cv::Vec3b>(0, code)[c] = quantise(codeFromLinear(gain[c] * decodeTable()[code]));
+  }
+  cv::LUT(bgr, table, out);
+  return out;
+}
+
+cv::Mat exposedAsKey(const cv::Mat& bgr, const cv::Vec3f& gain) {
+  cv::Mat table(1, 256, CV_8UC3), out;
+  for (int code = 0; code < 256; ++code) {
+    const float clipped = std::clamp(
+        (static_cast<float>(code) - kNearlyClipped) / (255.0f - kNearlyClipped), 0.0f, 1.0f);
+    for (int c = 0; c < 3; ++c) {
+      const float known = gain[c] > 1.0f ? 1.0f - clipped : 1.0f;
+      const float back = 1.0f + known * (1.0f / gain[c] - 1.0f);
+      table.at<cv::Vec3b>(0, code)[c] = quantise(codeFromLinear(back * decodeTable()[code]));
+    }
   }
   cv::LUT(bgr, table, out);
   return out;
@@ -107,8 +120,7 @@ std::optional<ClipSample> evenlyExposed(const ClipSample& clip) {
     const auto gain = meter.gainOf(frames[i].bgr, frames[i].labels);
     if (!gain) continue;
     if (!even) even = clip;
-    const cv::Vec3f back(1.0f / (*gain)[0], 1.0f / (*gain)[1], 1.0f / (*gain)[2]);
-    even->setPicture(i, exposedBy(frames[i].bgr, back));
+    even->setPicture(i, exposedAsKey(frames[i].bgr, *gain));
   }
   return even;
 }

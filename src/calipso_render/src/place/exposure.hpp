@@ -29,6 +29,8 @@ class ExposureMeter {
 
 // A picture of another exposure. CV_8UC3
 cv::Mat exposedBy(const cv::Mat& bgr, const cv::Vec3f& gain);
+// One that has been exposed by a gain as the key frame is; what is clipped in it stays bright.
+cv::Mat exposedAsKey(const cv::Mat& bgr, const cv::Vec3f& gain);
 
 // The clip with every frame exposed as the first one; nullopt: they are.
 std::optional<ClipSample> evenlyExposed(const ClipSample& clip);

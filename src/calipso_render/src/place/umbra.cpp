@@ -54,12 +54,14 @@ SeenUmbra umbraInViews(const std::vector<View>& views, const std::vector<Support
   std::vector<float> ratios[3];
   for (const View& view : views) collect(view, planes, place, light, ratios);
   cv::Vec3f umbra;
+  int undarkened = 0;
   for (int c = 0; c < 3; ++c) {
     if (ratios[c].size() < kFewest) return {};
     std::nth_element(ratios[c].begin(), ratios[c].begin() + ratios[c].size() / 2, ratios[c].end());
     umbra[c] = std::max(ratios[c][ratios[c].size() / 2], 0.1f);
-    if (umbra[c] > kNoShadow) return {std::nullopt, true};
+    undarkened += umbra[c] > kNoShadow;
   }
+  if (undarkened > 0) return {std::nullopt, undarkened == 3};
   return {umbra, false};
 }
 

@@ -27,6 +27,7 @@ double milliseconds(std::chrono::steady_clock::time_point since) {
 RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
     : params_(loadParams(pnh)),
       reporter_(nh, "render"),
+      poses_(params_.mode),
       clip_(params_.clip_samples),
       labels_(params_.mode == Mode::kLive ? kLiveLabels : 0) {
   const std::uint32_t queue = params_.mode == Mode::kLive ? kLiveQueue : kKeepAll;
@@ -34,12 +35,13 @@ RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
   edited_info_ = nh.advertise<sensor_msgs::CameraInfo>(topics::kImageEditedCameraInfo, queue);
   provenance_ = nh.advertise<sensor_msgs::Image>(topics::kProvenance, queue);
   plate_ = nh.advertise<sensor_msgs::Image>(topics::kPlate, 1, true);
+  state_ = nh.subscribe(topics::kState, kLatchedQueue, &RenderNode::onState, this);
   subscribers_ = {
       nh.subscribe(topics::kClipInfo, 1, &RenderNode::onClipInfo, this),
       nh.subscribe(topics::kSegmentation, kLatchedQueue, &RenderNode::onSegmentation, this),
       nh.subscribe(topics::kModels, 1, &RenderNode::onModels, this),
       nh.subscribe(topics::kClipDynamics, 1, &RenderNode::onClipDynamics, this),
-      nh.subscribe(topics::kState, kLatchedQueue, &RenderNode::onState, this),
+      state_,
       nh.subscribe(topics::kStatus, 100, &RenderNode::onStatus, this),
   };
   clip_source_ = std::make_unique<FrameSource>(
@@ -261,6 +263,8 @@ std::string RenderNode::whyUnedited() const {
     return "not ready yet: waiting for segmentation and models";
   if (params_.mode == Mode::kLive && !simulator_ready_)
     return "not ready yet: waiting for the simulator";
+  if (params_.mode == Mode::kLive && state_.getNumPublishers() == 0)
+    return "the simulator has ended: start the launch again";
   return "";
 }
 

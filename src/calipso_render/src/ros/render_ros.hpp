@@ -90,6 +90,7 @@ class RenderNode {
   std::uint64_t skipped_ = 0;  // live mode: frames that a newer one overtook
 
   std::unique_ptr<FrameSource> clip_source_, source_;
+  ros::Subscriber state_;
   std::vector<ros::Subscriber> subscribers_;
 };
 
