@@ -86,7 +86,7 @@ Points beforeContour(const FitProblem& problem) {
 // Whether the rough placement may have the object on the plane: along the view it may be off by a
 // twentieth of the distance, and it may be turned by some degrees.
 bool standsOn(const SupportTarget& support, const FitProblem& problem) {
-  constexpr double kPlacementError = 0.06, kTurned = 0.06;  // of the distance, of the size
+  constexpr double kPlacementError = 0.06, kTurned = 0.09;  // of the distance, of the size
   const Points x = beforeContour(problem);
   const std::optional<double> height = clearance(support, x, problem.camera);
   const Eigen::Vector3d middle = x.colwise().mean().transpose();

@@ -1,14 +1,15 @@
+#include <calipso_msgs/NodeStatus.h>
 #include <sensor_msgs/CameraInfo.h>
+
+#include <map>
+#include <string>
 
 #include "calipso_ros/node_main.hpp"
 #include "calipso_ros/topics.hpp"
 #include "calipso_scene/scene.hpp"
 #include "ros/edit_files.hpp"
-#include "ros/node_watch.hpp"
 
 namespace {
-
-using calipso::bag::NodeState;
 
 // Sends a file of edits into a running graph. Live video has no first frame to count from: the
 // times of the edits count from the first frame after the simulator and the renderer are ready.
@@ -19,14 +20,15 @@ void sendEdits(ros::NodeHandle& nh, const ros::NodeHandle& pnh) {
   const std::string path = calipso::requiredParam<std::string>(pnh, "edits");
   calipso::bag::readEdits(path, scene, ros::Time(1.0));  // complain early
 
-  calipso::bag::NodeWatch watch(nh, calipso::bag::Preparation::Roles());
+  std::map<std::string, std::uint8_t> state_of;  // a node that failed may be ready again
   ros::Publisher edits = nh.advertise<calipso_msgs::Edit>(calipso::topics::kEdits, 1000);
   const auto ready = [&](const std::string& node) {
-    return watch.preparation().standing(node).state == NodeState::kReady;
+    return state_of[node] == calipso_msgs::NodeStatus::READY;
   };
   bool due = true;
   const boost::function<void(const calipso_msgs::NodeStatusConstPtr&)> on_status =
       [&](const calipso_msgs::NodeStatusConstPtr& status) {
+        state_of[status->node] = status->state;
         due = due || (status->node == "simulator" && status->state == status->STARTING);
       };
   const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> on_frame =

@@ -40,6 +40,15 @@ cv::Mat evenSized(const cv::Mat& image) {
   return even;
 }
 
+// A writer does not say that its disk is full.
+void checkComplete(const std::string& path, std::size_t frames) {
+  const cv::VideoCapture written(path, cv::CAP_FFMPEG);
+  const double count = written.isOpened() ? written.get(cv::CAP_PROP_FRAME_COUNT) : 0.0;
+  if (count + 0.5 < static_cast<double>(frames))
+    throw std::runtime_error(path + ": holds " + std::to_string(static_cast<long>(count)) + " of " +
+                             std::to_string(frames) + " frames; is the disk full?");
+}
+
 void convert(const Arguments& arguments) {
   std::vector<ros::Time> stamps;
   forEachImage(arguments.word(0), arguments.word(1),
@@ -51,6 +60,8 @@ void convert(const Arguments& arguments) {
     if (!writer.isOpened()) writer = openWriter(arguments.word(2), fps, even.size());
     writer.write(even);
   });
+  writer.release();
+  checkComplete(arguments.word(2), stamps.size());
   std::cout << arguments.word(2) << ": " << stamps.size() << " frames at " << fps
             << " per second\n";
 }

@@ -19,11 +19,28 @@ constexpr char kUsage[] =
     "usage: compare_bags ORIGINAL.bag TOPIC EDITED.bag TOPIC OUT.png [--rows N]\n"
     "  original and edited frames side by side, at N times spread over the clip (default 3)";
 
-std::map<ros::Time, cv::Mat> readAll(const std::string& bag, const std::string& topic) {
+std::vector<ros::Time> stampsOf(const std::string& bag, const std::string& topic) {
+  std::vector<ros::Time> stamps;
+  forEachImage(bag, topic,
+               [&](const cv::Mat&, const ros::Time& stamp) { stamps.push_back(stamp); });
+  return stamps;
+}
+
+// Per stamp the image that is shown then: the last one up to it.
+std::map<ros::Time, cv::Mat> imagesAt(const std::string& bag, const std::string& topic,
+                                      const std::vector<ros::Time>& stamps) {
   std::map<ros::Time, cv::Mat> images;
+  cv::Mat shown;
+  std::size_t next = 0;
+  const auto takeBefore = [&](const ros::Time& end) {
+    for (; next < stamps.size() && stamps[next] < end; ++next)
+      if (!shown.empty()) images[stamps[next]] = shown.clone();
+  };
   forEachImage(bag, topic, [&](const cv::Mat& image, const ros::Time& stamp) {
-    images[stamp] = image.clone();
+    takeBefore(stamp);
+    image.copyTo(shown);
   });
+  takeBefore(ros::TIME_MAX);
   return images;
 }
 
@@ -56,20 +73,22 @@ void checkSizes(const cv::Mat& original, const cv::Mat& edited) {
 void compare(const Arguments& arguments) {
   if (!cv::haveImageWriter(arguments.word(4)))
     throw std::invalid_argument(arguments.word(4) + ": no kind of picture; end its name in .png");
-  const auto original = readAll(arguments.word(0), arguments.word(1));
-  const auto edited = readAll(arguments.word(2), arguments.word(3));
   const int rows = std::max(1, static_cast<int>(arguments.positive("rows", 3)));
+  const std::vector<ros::Time> stamps = stampsOf(arguments.word(2), arguments.word(3));
+  std::vector<ros::Time> chosen;
+  for (int i = 1; i <= rows; ++i)
+    chosen.push_back(
+        stamps[(stamps.size() - 1) * static_cast<std::size_t>(i) / static_cast<std::size_t>(rows)]);
+  const auto original = imagesAt(arguments.word(0), arguments.word(1), chosen),
+             edited = imagesAt(arguments.word(2), arguments.word(3), chosen);
   std::vector<cv::Mat> sheet;
-  for (int i = 1; i <= rows; ++i) {
-    const std::size_t step =
-        (edited.size() - 1) * static_cast<std::size_t>(i) / static_cast<std::size_t>(rows);
-    const auto frame = std::next(edited.begin(), static_cast<std::ptrdiff_t>(step));
-    const auto before = original.find(frame->first);
+  for (const ros::Time& stamp : chosen) {
+    const auto before = original.find(stamp);
     if (before == original.end())
       throw std::runtime_error("the bags' stamps differ; give an original and what was made of it");
-    checkSizes(before->second, frame->second);
-    const double seconds = (frame->first - edited.begin()->first).toSec();
-    sheet.push_back(sideBySide(before->second.clone(), frame->second.clone(), seconds));
+    checkSizes(before->second, edited.at(stamp));
+    sheet.push_back(sideBySide(before->second.clone(), edited.at(stamp).clone(),
+                               (stamp - stamps.front()).toSec()));
   }
   cv::Mat picture;
   cv::vconcat(sheet, picture);

@@ -10,12 +10,14 @@ namespace calipso {
 
 namespace {
 
-constexpr double kKeepSec = 1e6;         // longer than any clip
+constexpr double kKeepSec = 1e6;  // longer than any clip
+constexpr double kKeepLiveSec = 30.0;
 constexpr double kPoseTimeoutSec = 1.0;  // tf and image travel on different connections
 constexpr unsigned kUnboundedPairs = 100000;
 // Halves of pairs wait at the cost of a pointer. Those left over when live stamps go back are the
 // newest, and must not fill the queue.
 constexpr unsigned kStrayHalves = 30;
+constexpr unsigned kMostUnpaired = 60;  // images in a row, until it is said that they have no pair
 
 unsigned pairQueue(unsigned queue) { return queue == 0 ? kUnboundedPairs : queue + kStrayHalves; }
 
@@ -25,7 +27,8 @@ std::string tfName(const std::string& frame_id) {
   return frame_id.compare(0, 1, "/") == 0 ? frame_id.substr(1) : frame_id;
 }
 
-CameraPoses::CameraPoses() : buffer_(ros::Duration(kKeepSec)), listener_(buffer_) {}
+CameraPoses::CameraPoses(Mode mode)
+    : buffer_(ros::Duration(mode == Mode::kLive ? kKeepLiveSec : kKeepSec)), listener_(buffer_) {}
 
 Eigen::Isometry3d CameraPoses::worldFromCamera(const std::string& camera_frame,
                                                const ros::Time& stamp) const {
@@ -50,7 +53,9 @@ FrameSource::FrameSource(ros::NodeHandle& nh, const std::string& image_topic,
       on_bad_frame_(std::move(on_bad_frame)),
       image_(nh, image_topic, queue),
       info_(nh, info_topic, queue),
-      pairs_(image_, info_, pairQueue(queue)) {
+      pairs_(image_, info_, pairQueue(queue)),
+      live_(queue > 0),
+      info_topic_(nh.resolveName(info_topic)) {
   image_.registerCallback(&FrameSource::onImage, this);
   pairs_.registerCallback(&FrameSource::onPair, this);
 }
@@ -59,11 +64,16 @@ FrameSource::FrameSource(ros::NodeHandle& nh, const std::string& image_topic,
 void FrameSource::onImage(const sensor_msgs::ImageConstPtr& image) {
   if (image->header.stamp.isZero())
     on_bad_frame_(image, "its stamp is 0; the camera's driver must stamp images with their time");
+  else if (live_ && ++unpaired_ > kMostUnpaired)
+    on_bad_frame_(image, info_topic_ +
+                             " has nothing with the images' stamps; name the camera's own, and see "
+                             "that its driver stamps both alike");
 }
 
 void FrameSource::onPair(const sensor_msgs::ImageConstPtr& image,
                          const sensor_msgs::CameraInfoConstPtr& info) {
   if (image->header.stamp.isZero()) return;
+  unpaired_ = 0;
   Frame frame;
   try {
     frame = {image, info,

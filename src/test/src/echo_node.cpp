@@ -97,7 +97,7 @@ class EchoNode {
   unsigned clip_frames_ = 0, edit_count_ = 0;
   ros::Publisher edited_, info_, provenance_, state_, dynamics_, report_, status_;
   ros::Subscriber clip_, edits_;
-  calipso::CameraPoses poses_;
+  calipso::CameraPoses poses_{calipso::Mode::kBag};
   calipso::FrameSource frames_;
   ros::WallTimer timer_;
 };

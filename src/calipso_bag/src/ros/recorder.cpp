@@ -19,6 +19,7 @@ namespace {
 constexpr unsigned kQueue = 10000;
 // messages of a frame may come this much later than its image
 constexpr std::size_t kLagFrames = 8;
+const ros::Duration kLatest(10.0);  // by which a message of live video may come late
 
 std::string seconds(const ros::Time& stamp) { return std::to_string(stamp.toSec()) + " s"; }
 
@@ -73,6 +74,9 @@ void Recorder::write(const std::string& topic, const ros::MessageEvent<M const>&
               event.getConnectionHeaderPtr());
   ++count_[topic];
   newest_[topic] = std::max(newest_[topic], stamp);
+  // Live video may have no edited frames for long; nothing comes so much later.
+  if (params_.mode == Mode::kLive && stamp > ros::TIME_MIN + kLatest)
+    writer_.flush(stamp - kLatest);
 }
 
 template <typename M>
@@ -270,6 +274,8 @@ void Recorder::recordLive() {
   if (started_over_)
     ROS_WARN_STREAM("the stamps went back after " << seconds(edited_.back())
                                                   << ": the recording ends there");
+  if (edited_.empty())
+    throw std::runtime_error("no edited frame came: nothing is recorded; does the camera publish?");
 }
 
 void Recorder::checkFrames() const {

@@ -62,6 +62,8 @@ void readObjects(const ros::NodeHandle& pnh, WorldParams& world) {
     world.objects[name] = readSettings(settings, world.defaults, "objects/" + name);
 }
 
+constexpr int kMostLiveFrames = 3;
+
 }  // namespace
 
 SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
@@ -77,6 +79,8 @@ SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
   w.pixel_error = optionalParam(pnh, "pixel_error", w.pixel_error);
   w.max_nodes = optionalParam(pnh, "max_nodes", w.max_nodes);
   w.max_substeps = optionalParam(pnh, "max_substeps", w.max_substeps);
+  // What made one step last would make it fall ever farther behind the camera.
+  if (p.mode == Mode::kLive) w.most_frames = kMostLiveFrames;
   w.proximity = optionalParam(pnh, "proximity", w.proximity);
   w.contact_iterations = optionalParam(pnh, "contact_iterations", w.contact_iterations);
   w.contact_tolerance = optionalParam(pnh, "contact_tolerance", w.contact_tolerance);

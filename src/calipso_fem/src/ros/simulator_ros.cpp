@@ -152,6 +152,8 @@ void SimulatorRos::onEdit(const calipso_msgs::EditConstPtr& edit) {
     refuse(*edit,
            "pictures are laid out in time before the video plays, and those of a camera come "
            "as they are; give time_scale in the file of edits");
+  } else if (params_.mode == Mode::kLive && !edit->after.empty()) {
+    refuse(*edit, "collisions of live video are not known when they happen; give the edit a time");
   } else {
     edits_.push_back(*edit);
     if (world_ && first_stamp_) submit(*edit);

@@ -44,10 +44,19 @@ struct Pull {
     if (!twists || angle == 0.0) return at - start;
     return Eigen::AngleAxisd(-share * angle, vector / angle) * (at - start);
   }
-  // The object was put elsewhere; the way to go stays as the edit has it.
-  void moveBy(const Eigen::Isometry3d& motion) {
-    start = motion * start;
-    start_rotation = motion.linear() * start_rotation;
+  // The object was put elsewhere, or scaled about a point, after `share` of the way: the way to go
+  // stays as the edit has it.
+  void moveBy(const Eigen::Isometry3d& motion, double share) {
+    const Eigen::Vector3d gone = (twists ? 0.0 : share) * vector;
+    start = motion * (start + gone) - gone;
+    const double angle = vector.norm();
+    if (!twists || angle == 0.0) return;
+    const Eigen::Matrix3d turned = Eigen::AngleAxisd(share * angle, vector / angle).matrix();
+    start_rotation = turned.transpose() * motion.linear() * turned * start_rotation;
+  }
+  void scaleBy(double factor, const Eigen::Vector3d& about, double share) {
+    const Eigen::Vector3d gone = (twists ? 0.0 : share) * vector;
+    start = about + factor * (start + gone - about) - gone;
   }
   bool over(double time) const { return duration > 0.0 && time >= begin + duration - 1e-9; }
 };

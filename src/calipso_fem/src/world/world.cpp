@@ -175,7 +175,8 @@ std::vector<EditOutcome> World::advanceTo(double time) {
     const double frames = (time - w.now) / period;
     const int whole = std::max(1, static_cast<int>(std::lround(frames)));
     const bool regular = std::abs(frames - whole) < 1e-3;
-    for (int k = 0; k < whole; ++k) w.stepFrame(regular ? period : (time - w.now) / (whole - k));
+    const int steps = w.params.most_frames > 0 ? std::min(whole, w.params.most_frames) : whole;
+    for (int k = 0; k < steps; ++k) w.stepFrame(regular ? period : (time - w.now) / (whole - k));
   }
   if (!w.started || time > w.now - 1e-3 * w.params.frame_period) w.now = time;
   w.started = true;

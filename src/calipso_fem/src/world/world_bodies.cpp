@@ -301,7 +301,7 @@ void World::Impl::reset(Actor& actor) {
   fresh.settings = actor.settings;
   fresh.immovable = actor.settings.immovable();
   fresh.observed_material = fresh.material = actor.observed_material;
-  fresh.gravity = scene.gravity;
+  fresh.gravity = gravity_now;
   actor = std::move(fresh);
   addCollider(actor);
   plan_changed = true;

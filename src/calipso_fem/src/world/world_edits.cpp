@@ -162,13 +162,13 @@ std::string World::Impl::transform(Actor& actor, const Edit& edit) {
   const Eigen::Isometry3d motion = motionAbout(centroid, edit);
   if (actor.soft) {
     actor.soft->body().applyRigidTransform(motion);
-    for (Pull& pull : actor.pulls) pull.moveBy(motion);
+    for (Pull& pull : actor.pulls) pull.moveBy(motion, pull.share(now));
     holdAnew(actor);
     actor.soft->changed();
     contacts.forget(actor.id);
   } else if (actor.kind == ObjectKind::kRigid) {
     rigid.setPose(*actor.body, motion * rigid.pose(*actor.body));
-    for (Pull& pull : actor.pulls) pull.moveBy(motion);
+    for (Pull& pull : actor.pulls) pull.moveBy(motion, pull.share(now));
   } else {
     actor.placement = motion * actor.placement;
     if (actor.body) rigid.setPose(*actor.body, poseOf(actor, now));
@@ -186,7 +186,7 @@ void World::Impl::scale(Actor& actor, double factor) {
   const Eigen::Vector3d own = middle.transpose(), placed = poseOf(actor, now) * own;
   for (Pull& pull : actor.pulls) {
     pull.anchor = own + factor * (pull.anchor - own);
-    pull.start = placed + factor * (pull.start - placed);
+    pull.scaleBy(factor, placed, pull.share(now));
   }
   actor.object.mesh.vertices =
       (factor * (actor.object.mesh.vertices.rowwise() - middle)).rowwise() + middle;
@@ -301,6 +301,7 @@ std::string World::Impl::copy(Actor& actor, const Edit& edit) {
     touch(fresh, edit);
     setVelocity(fresh, motion.linear() * moves.linear, motion.linear() * moves.angular);
   }
+  if (wind_now && fresh.air.empty()) blow(fresh, *wind_now);
   return edit.new_name + " is a copy of " + actor.object.name + ", moved by " +
          describe(edit.translation) + " m";
 }

@@ -11,7 +11,7 @@ namespace calipso::fem {
 namespace {
 
 bool pointsAlong(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  constexpr double kSlant = 1e-3;  // rad
+  constexpr double kSlant = 0.05;  // rad: what is seen of a fall errs by some hundredths
   return a.dot(b) > 0.0 && a.cross(b).norm() <= kSlant * a.norm() * b.norm();
 }
 
@@ -34,11 +34,11 @@ std::string World::Impl::applyToScene(const Edit& edit) {
       sun = {edit.vector, edit.factor};
       return "the sun stands towards " + describe(edit.vector);
     default:
+      gravity_now = scene.gravity;
+      wind_now.reset();
       for (Actor& actor : actors) reset(actor);
       sun = Sun();
       speed_scale = 1.0;
-      gravity_now = scene.gravity;
-      wind_now.reset();
       return "every object is as in the video again";
   }
 }

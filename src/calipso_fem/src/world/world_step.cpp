@@ -170,7 +170,11 @@ void World::Impl::endPulls(double at) {
 
 // Whether anything moves where it may touch a deformable object.
 bool World::Impl::isDisturbed(const Actor& actor) const {
+  const auto slow = [](const Actor& a) { return kRestSpeed * boundingDiagonal(a.object.mesh); };
   const auto moves = [&](const Actor& other) {
+    // Two that come to rest beside each other do not keep each other awake.
+    if (other.soft && !actor.asleep)
+      return !other.asleep && !other.soft->body().isAtRest(slow(other));
     if (other.soft) return !other.asleep && other.calm_frames == 0;
     if (other.kind == ObjectKind::kRigid) return !rigid.sleeping(*other.body);
     return isOnTheMove(other.track.at(now), boundingDiagonal(other.object.mesh),

@@ -27,6 +27,7 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
 FlowNode::FlowNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
     : params_(loadParams(pnh)),
       scene_(loadScene(params_.scene)),
+      poses_(params_.mode),
       reporter_(nh, "flow"),
       clip_dynamics_publisher_(
           nh.advertise<calipso_msgs::ClipDynamics>(topics::kClipDynamics, 1, true)),
@@ -157,7 +158,6 @@ void FlowNode::beginLate(const calipso_msgs::Segmentation& segmentation) {
 
 // Of live frames the key frame is needed, whichever that will be; of those that missed it the newest.
 void FlowNode::keepWaiting(const calipso::Frame& frame) {
-  if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) return waiting_.clear();
   const std::optional<ros::Time> key = key_.segmentedStamp();
   const auto is_key = [&](const calipso::Frame& f) { return key && f.stamp() == *key; };
   if (std::any_of(waiting_.begin(), waiting_.end(), is_key)) {
@@ -166,7 +166,8 @@ void FlowNode::keepWaiting(const calipso::Frame& frame) {
                    waiting_.end());
     return;
   }
-  if (waiting_.size() >= kLiveWaiting) waiting_.erase(waiting_.begin());
+  // The first one most likely is the key frame, which is not known before it has been segmented.
+  if (waiting_.size() >= kLiveWaiting) waiting_.erase(waiting_.begin() + (key ? 0 : 1));
   waiting_.push_back(frame);
 }
 

@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 
+#include "calipso_ros/mode.hpp"
 #include "calipso_scene/camera.hpp"
 
 namespace calipso {
@@ -21,10 +22,11 @@ namespace calipso {
 std::string tfName(const std::string& frame_id);
 
 // The camera's pose in the world over time, from tf. Keeps the whole clip, so that a second pass
-// over the same stamps finds it again. Listens in its own thread; lookups may come from any thread.
+// over the same stamps finds it again, of live video the last half minute. Listens in its own
+// thread; lookups may come from any thread.
 class CameraPoses {
  public:
-  CameraPoses();
+  explicit CameraPoses(Mode mode);
 
   // @throw std::runtime_error naming frames, stamp and remedy when tf does not know the pose in
   // time
@@ -66,6 +68,9 @@ class FrameSource {
   message_filters::Subscriber<sensor_msgs::Image> image_;
   message_filters::Subscriber<sensor_msgs::CameraInfo> info_;
   message_filters::TimeSynchronizer<sensor_msgs::Image, sensor_msgs::CameraInfo> pairs_;
+  const bool live_;  // the queue has an end
+  const std::string info_topic_;
+  unsigned unpaired_ = 0;  // images since the last pair
 };
 
 }  // namespace calipso

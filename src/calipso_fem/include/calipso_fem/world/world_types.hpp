@@ -104,6 +104,7 @@ struct WorldParams {
   double pixel_error = 0.5;          // px, discretisation error the resolution is chosen for
   int max_nodes = 1200;              // per deformable object
   int max_substeps = 2;              // of deformable objects, per frame
+  int most_frames = 0;               // stepped at once at most, a longer gap is passed over; 0: all
   FemOptions fem;                    // cell_size and target_nodes are chosen per object
   double proximity = 0.0;  // m, minimal distance of surfaces; 0: a fiftieth of the smallest object
   int contact_iterations = 60;  // block Gauss-Seidel sweeps per solve
