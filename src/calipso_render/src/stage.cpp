@@ -2,7 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 
 #include "draw/side_by_side.hpp"
@@ -81,6 +83,23 @@ Points stockAt(const ObjectModel& model, const Points& key_vertices) {
   return stock;
 }
 
+// Triangles with vertices of their own, as some files have them, are neighbours where these are at
+// one place. A sheet that has every face twice, once for each side, stays as it is.
+void joinCorners(const Points& vertices, Triangles& triangles) {
+  const std::vector<int> welded = weld(vertices);
+  Triangles joined = triangles;
+  std::set<std::array<int, 3>> faces;
+  for (Eigen::Vector3i& t : joined) {
+    std::array<int, 3> face = {welded[t[0]], welded[t[1]], welded[t[2]]};
+    const Eigen::Vector3i corners(face[0], face[1], face[2]);
+    std::sort(face.begin(), face.end());
+    if (face[0] == face[1] || face[1] == face[2]) continue;  // it has no area
+    if (!faces.insert(face).second) return;
+    t = corners;
+  }
+  triangles = std::move(joined);
+}
+
 }  // namespace
 
 void findNormals(Surface& surface) {
@@ -118,6 +137,7 @@ Surface makeSurface(const ObjectModel& model) {
     }
     surface.triangles.push_back(triangle);
   }
+  joinCorners(surface.object_vertices, surface.triangles);
   surface.winding = outsideWinding(surface.object_vertices, surface.triangles);
   surface.key_vertices = transformed(surface.object_vertices, model.world_from_object);
   surface.stock_vertices = stockAt(model, surface.key_vertices);

@@ -281,6 +281,33 @@ TEST(Appearance, APartUnderAnotherIsNotSeen) {
   EXPECT_EQ(fromPicture(triangles, 2 * triangles), 0);
 }
 
+// A part that winds otherwise than the others, as a mirrored wheel does, is seen as they are.
+TEST(Appearance, APartThatIsInsideOutIsSeen) {
+  ObjectModel model = ballAt(kPlace);
+  const TriangleMesh skin = model.mesh;
+  const int vertices = skin.vertexCount(), triangles = skin.triangleCount();
+  model.mesh.vertices.resize(2 * vertices, 3);
+  model.mesh.triangles.resize(2 * triangles, 3);
+  model.mesh.vertices << skin.vertices, 0.5 * skin.vertices;
+  model.mesh.vertices.bottomRows(vertices).col(0).array() -= 0.18;
+  const auto turned = skin.triangles.rowwise().reverse().array() + vertices;
+  model.mesh.triangles << skin.triangles, turned.matrix();
+  const Surface surface = makeSurface(model);
+  const Actor actor = makeActor(surface, surface.key_vertices, camera());
+  View view{cv::Mat(kHeight, kWidth, CV_32FC3, cv::Scalar(90, 120, 150)),
+            cv::Mat::zeros(kHeight, kWidth, CV_8U),
+            camera(),
+            {actor}};
+  forEachPixelOf(actor, [&](int u, int v, const SurfacePoint&) {
+    view.labels.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(model.index);
+  });
+  const Appearance a = makeAppearances({view}, {false}, sunlight(), {Gloss()}).front();
+  const auto seen = std::count_if(a.texture.texels.begin() + a.texture.firstOf(triangles),
+                                  a.texture.texels.begin() + a.texture.firstOf(2 * triangles),
+                                  [](const cv::Vec4f& texel) { return texel[3] > 0.0f; });
+  EXPECT_GT(seen, 100);
+}
+
 // What a glossy ball mirrors of its own shade on the table is dark: that is no highlight.
 TEST(Appearance, TakesOffTheGroundAsShadedAsItIs) {
   const Surface surface = makeSurface(ballAt(kPlace));

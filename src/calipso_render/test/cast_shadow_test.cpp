@@ -39,7 +39,7 @@ View viewOfShade(const Surface& surface, float x, const Camera& from, const cv::
       const float part = sun.visibility(r->position, r->normal),
                   open = sky.visibility(r->position, r->normal);
       for (int c = 0; c < 3; ++c)
-        shade.at<cv::Vec3f>(v, u)[c] = kUmbra[c] * open + (1.0f - kUmbra[c]) * part;
+        shade.at<cv::Vec3f>(v, u)[c] = kUmbra[c] * skyLight(open) + (1.0f - kUmbra[c]) * part;
     }
   }
   cv::remap(linearFromRealCodes(plate), view.picture, places, {}, cv::INTER_LINEAR);

@@ -170,6 +170,35 @@ TEST(SkySeen, IsThatOutsideWhereShellsRunIntoEachOther) {
 }
 
 // A peg within a block, of which nothing comes out, is not black when it does.
+// One open edge anywhere does not hide what another shell runs into.
+TEST(SkySeen, IsThatOutsideInAnOpenMeshToo) {
+  Points points;
+  Triangles faces;
+  const Surface closed = surfaceOfBoxes(
+      {Eigen::Vector3f(-0.1f, -0.1f, 0.0f), Eigen::Vector3f(0.1f, 0.1f, 1.2f)},
+      {Eigen::Vector3f(-0.5f, -0.5f, 1.0f), Eigen::Vector3f(0.5f, 0.5f, 1.4f)}, faces, points);
+  ObjectModel model{"post", 1, {}, Eigen::Isometry3d::Identity()};
+  const auto count = static_cast<Eigen::Index>(points.size());
+  model.mesh.vertices.resize(count + 3, 3);
+  model.mesh.triangles.resize(static_cast<Eigen::Index>(faces.size()) + 1, 3);
+  for (Eigen::Index v = 0; v < count; ++v)
+    model.mesh.vertices.row(v) = points[v].cast<double>().transpose();
+  model.mesh.vertices.bottomRows(3) << 3, 0, 0, 3.1, 0, 0, 3, 0.1, 0;
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    model.mesh.triangles.row(static_cast<Eigen::Index>(f)) = faces[f].transpose();
+  model.mesh.triangles.bottomRows(1) << static_cast<int>(count), static_cast<int>(count) + 1,
+      static_cast<int>(count) + 2;
+  const Surface open = makeSurface(model);
+  ASSERT_EQ(open.winding, 0);
+  for (int t = 0; t < 12; ++t) {  // of the post
+    for (int k = 0; k < 3; ++k) {
+      const SkySeen &seen = open.seen[open.corners[t][k]],
+                    &alone = closed.seen[closed.corners[t][k]];
+      EXPECT_NEAR(seen.open, alone.open, 0.1f) << t << ", " << k;
+    }
+  }
+}
+
 TEST(SkySeen, IsFullOfWhatIsBuriedAltogether) {
   Points points;
   Triangles faces;

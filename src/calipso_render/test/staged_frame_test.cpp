@@ -11,6 +11,32 @@ namespace {
 
 using namespace testing;
 
+// As files have it whose triangles have vertices of their own.
+TEST(MakeSurface, JoinsTrianglesThatMeet) {
+  const ObjectModel whole = ballAt(kCentre);
+  ObjectModel apart = whole;
+  const int count = whole.mesh.triangleCount();
+  apart.mesh.vertices.resize(3 * count, 3), apart.mesh.triangles.resize(count, 3);
+  for (int t = 0; t < count; ++t) {
+    for (int k = 0; k < 3; ++k) {
+      apart.mesh.vertices.row(3 * t + k) =
+          whole.mesh.vertex(whole.mesh.triangles(t, k)).transpose();
+      apart.mesh.triangles(t, k) = 3 * t + k;
+    }
+  }
+  const Surface joined = makeSurface(apart), expected = makeSurface(whole);
+  EXPECT_EQ(joined.winding, expected.winding);
+  EXPECT_EQ(joined.key_vertices.size(), static_cast<std::size_t>(3 * count));
+  for (std::size_t t = 0; t < joined.corners.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3f normal = joined.key_normals[joined.corners[t][k]],
+                            place = joined.key_vertices[joined.triangles[t][k]];
+      if (normal.isZero()) continue;  // a triangle at a pole has no area
+      ASSERT_GT(normal.dot((place - kCentre.cast<float>()).normalized()), 0.99f) << t;
+    }
+  }
+}
+
 TEST(StagedFrame, TellsHowFarASurfaceHasMoved) {
   const Setting s(params());
   const RenderParams p = params();

@@ -164,6 +164,19 @@ class Emergence {
   std::vector<Sample> samples_;
 };
 
+// Of an open mesh a place that looks at backs is within another shell only if nothing is seen from
+// its other side either.
+void leaveOpen(const Side& back, Side& front) {
+  constexpr float kHidden = 0.1f;  // of the light
+  for (std::size_t i = 0; i < front.buried.size(); ++i)
+    front.buried[i] = front.buried[i] != 0 && back.seen[i].open < kHidden ? 1 : 0;
+}
+
+Points negated(Points normals) {
+  for (Eigen::Vector3f& n : normals) n = -n;
+  return normals;
+}
+
 }  // namespace
 
 void findSkySeen(const Points& vertices, const Points& normals, const Triangles& triangles,
@@ -172,10 +185,22 @@ void findSkySeen(const Points& vertices, const Points& normals, const Triangles&
   Side front(scene, vertices, normals, 1.0f);
   behind.clear();
   if (open) {
+    const Points turned = negated(normals);
     Side back(scene, vertices, normals, -1.0f);
+    leaveOpen(back, front);
+    const Emergence emergence(vertices, normals, triangles, front.buried);
+    Side outside(scene, emergence.places, emergence.normals, 1.0f),
+        inside(scene, emergence.places, emergence.normals, -1.0f);
+    leaveOpen(inside, outside), inside.buried = outside.buried;
+    const auto spread = [&] {
+      emergence.spread(outside, normals, front.buried, front.seen);
+      emergence.spread(inside, turned, front.buried, back.seen);
+    };
+    spread();
     const std::vector<SkySeen> straight = front.seen, straight_behind = back.seen;
-    front.gather(triangles, straight, &straight_behind);
-    back.gather(triangles, straight, &straight_behind);
+    for (Side* side : {&front, &back, &outside, &inside})
+      side->gather(triangles, straight, &straight_behind);
+    spread();
     behind = std::move(back.seen);
   } else {
     const Emergence emergence(vertices, normals, triangles, front.buried);

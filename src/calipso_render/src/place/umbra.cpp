@@ -39,7 +39,7 @@ void collect(const View& view, const std::vector<SupportPlane>& planes, const Em
       const float open = sky.visibility(r.position, r.normal);
       const cv::Vec3f code = view.codeAt(v, u);
       for (int c = 0; c < 3 && lit_code && open >= kOpenSky; ++c) {
-        const float lit = linearFromRealCode((*lit_code)[c]) * open;
+        const float lit = linearFromRealCode((*lit_code)[c]) * skyLight(open);
         if (lit > kDark) ratios[c].push_back(linearFromRealCode(code[c]) / lit);
       }
     }

@@ -263,11 +263,21 @@ class Portrait {
     if (view < views_.size()) see(view, shade, appearance_.mean_light);
   }
 
+  // What is sampled at the rim has some of the pixels beside it in it.
+  static cv::Mat beyondRim(const Reflectance& r) {
+    cv::Mat filled = pushPull(r.albedo, r.trust.mul(r.clear));
+    r.albedo.copyTo(filled, r.nearness > 0.0f);
+    return widened(filled);
+  }
+
   Appearance finished() {
     Appearance& a = appearance_;
     // What a highlight hides is taken from around it.
     a.albedo = widened(pushPull(pictures_[0].albedo, pictures_[0].trust.mul(pictures_[0].clear)));
-    for (Reflectance& r : pictures_) r.albedo = widened(r.albedo);
+    pictures_[0].albedo = widened(pictures_[0].albedo);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = 1; i < pictures_.size(); ++i)
+      pictures_[i].albedo = beyondRim(pictures_[i]);
     fillTexture({views_, actors_, pictures_}, a);
     a.findSources();
     return std::move(a);

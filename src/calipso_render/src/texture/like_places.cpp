@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
+#include <vector>
 
 #include "calipso_render/surface_symmetry.hpp"
 #include "smooth_step.hpp"
@@ -86,12 +88,16 @@ PartBoxes boxesOf(const Points& vertices, const Triangles& triangles, const std:
 }
 
 // Which part each of them has as its mirror image: the one whose bounding box comes nearest, if it
-// comes near.
+// comes near. Parts smaller than that are not told apart.
 std::map<int, int> mirroredParts(const PartBoxes& boxes, const PartBoxes& mirrored, float apart) {
   std::map<int, int> images;
+  std::vector<std::pair<int, Eigen::AlignedBox3f>> large;
+  for (const auto& entry : boxes)
+    if (entry.second.diagonal().norm() >= apart) large.push_back(entry);
   for (const auto& [part, image] : mirrored) {
     float least = apart;
-    for (const auto& [other, box] : boxes) {
+    if (image.diagonal().norm() < apart) continue;
+    for (const auto& [other, box] : large) {
       const float off = (box.min() - image.min()).norm() + (box.max() - image.max()).norm();
       if (off < least) least = off, images[part] = other;
     }

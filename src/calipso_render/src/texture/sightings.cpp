@@ -28,8 +28,10 @@ Sightings::Sightings(const SeenObject& object) : views_(object.views), pictures_
   const Surface& surface = *object.actors.front()->surface;
   extent_ = boxOf(surface.key_vertices).diagonal().norm();
   is_sheet_ = render::isSheet(surface.key_vertices, surface.triangles);
-  two_sided_ = is_sheet_ || std::any_of(surface.edges.begin(), surface.edges.end(),
-                                        [](const MeshEdge& e) { return e.b < 0; });
+  // Open, or with shells that wind otherwise than the others.
+  two_sided_ = is_sheet_ || surface.winding != 1 ||
+               std::any_of(surface.edges.begin(), surface.edges.end(),
+                           [](const MeshEdge& e) { return e.b < 0; });
   for (const View* v : views_)
     camera_from_world_.push_back(v->camera.world_from_camera.inverse().cast<float>()),
         axes_.push_back(v->camera.world_from_camera.linear().cast<float>());

@@ -95,7 +95,7 @@ SurfaceTexture::SurfaceTexture(const Points& vertices, const Triangles& triangle
           std::clamp(static_cast<int>(std::ceil(longestEdge(vertices, t) / texel)), 1, kMostSteps));
       count += texelCount(steps_.back());
     }
-    if (count <= std::max(most, 3 * triangles.size())) break;
+    if (count <= most + 3 * triangles.size()) break;  // no triangle has fewer than three
   }
   spacing_ = texel;
   texels.assign(count, cv::Vec4f());

@@ -76,6 +76,18 @@ bool stepsAt(const std::vector<Part>& parts, int own, std::size_t vertex, float&
   return total > parts[own].texels[vertex];
 }
 
+// The triangles that have texels of a part: nothing else reads its shift.
+Triangles trianglesWith(int own, const Triangles& triangles, const std::vector<signed char>& part,
+                        const SurfaceTexture& texture) {
+  Triangles with;
+  for (int t = 0; t < texture.triangleCount(); ++t) {
+    const auto first = part.begin() + static_cast<std::ptrdiff_t>(texture.firstOf(t)),
+               last = part.begin() + static_cast<std::ptrdiff_t>(texture.firstOf(t + 1));
+    if (std::find(first, last, own) != last) with.push_back(triangles[t]);
+  }
+  return with;
+}
+
 }  // namespace
 
 void levelSeams(const Points& vertices, const Triangles& triangles,
@@ -94,7 +106,8 @@ void levelSeams(const Points& vertices, const Triangles& triangles,
       shift[v] = cv::Vec3f::all(by);
     }
     if (std::find(known.begin(), known.end(), true) == known.end()) continue;
-    diffuseOverMesh(vertices, triangles, known, shift);
+    diffuseOverMesh(vertices, trianglesWith(static_cast<int>(own), triangles, part, texture), known,
+                    shift);
     shifts[own] = std::move(shift);
   }
   for (int t = 0; t < texture.triangleCount(); ++t) {
