@@ -11,12 +11,6 @@ namespace {
 
 using namespace test;
 
-WorldParams coarse() {
-  WorldParams params;
-  params.max_nodes = 150;
-  return params;
-}
-
 WorldScene box(double height = 0.05) {
   return sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, height});
 }

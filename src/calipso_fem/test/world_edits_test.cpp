@@ -7,12 +7,6 @@ namespace {
 
 using namespace test;
 
-WorldParams coarse() {
-  WorldParams params;
-  params.max_nodes = 150;
-  return params;
-}
-
 World boxWorld() {
   return World(sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.05}), coarse());
 }

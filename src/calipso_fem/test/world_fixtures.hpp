@@ -31,6 +31,13 @@ TriangleMesh bentRod(double size, double thickness);
 // looks along +y from 1 m away.
 WorldScene sceneWith(const TriangleMesh& mesh, const Eigen::Vector3d& position, bool table = true);
 
+// Simulated on few nodes: quick.
+inline WorldParams coarse() {
+  WorldParams params;
+  params.max_nodes = 150;
+  return params;
+}
+
 Edit editOf(EditKind kind, EditMode mode = EditMode::kAbsolute, double time = 0.0);
 
 // Lets `seconds` of video pass at 30 frames per second.

@@ -11,12 +11,6 @@ namespace {
 
 using namespace test;
 
-WorldParams coarse() {
-  WorldParams params;
-  params.max_nodes = 150;
-  return params;
-}
-
 World boxInTheAir() {
   WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.5}, false);
   scene.gravity.setZero();

@@ -256,16 +256,23 @@ TEST(Appearance, TakesFromAnotherViewWhatMixesWithAPartBefore) {
   EXPECT_LT(ratios[ratios.size() / 2], 0.33f);
 }
 
-// A part of the mesh just under another one, as the root of a wing in the fuselage, does not take
-// the other's look.
-TEST(Appearance, APartUnderAnotherIsNotSeen) {
+// A ball of two shells: the second half of its triangles is the first, shrunk to `scale`.
+ObjectModel ballWithSmaller(double scale) {
   ObjectModel model = ballAt(kPlace);
   const TriangleMesh skin = model.mesh;
   const int vertices = skin.vertexCount(), triangles = skin.triangleCount();
   model.mesh.vertices.resize(2 * vertices, 3);
   model.mesh.triangles.resize(2 * triangles, 3);
-  model.mesh.vertices << skin.vertices, 0.985 * skin.vertices;
+  model.mesh.vertices << skin.vertices, scale * skin.vertices;
   model.mesh.triangles << skin.triangles, skin.triangles.array() + vertices;
+  return model;
+}
+
+// A part of the mesh just under another one, as the root of a wing in the fuselage, does not take
+// the other's look.
+TEST(Appearance, APartUnderAnotherIsNotSeen) {
+  const ObjectModel model = ballWithSmaller(0.985);
+  const int triangles = model.mesh.triangleCount() / 2;
   const Surface surface = makeSurface(model);
   const ClipFrame frame = frameWithBall(ballAt(kPlace));
   View view{{}, frame.labels, frame.camera, {}};
@@ -283,15 +290,11 @@ TEST(Appearance, APartUnderAnotherIsNotSeen) {
 
 // A part that winds otherwise than the others, as a mirrored wheel does, is seen as they are.
 TEST(Appearance, APartThatIsInsideOutIsSeen) {
-  ObjectModel model = ballAt(kPlace);
-  const TriangleMesh skin = model.mesh;
-  const int vertices = skin.vertexCount(), triangles = skin.triangleCount();
-  model.mesh.vertices.resize(2 * vertices, 3);
-  model.mesh.triangles.resize(2 * triangles, 3);
-  model.mesh.vertices << skin.vertices, 0.5 * skin.vertices;
+  ObjectModel model = ballWithSmaller(0.5);
+  const int vertices = model.mesh.vertexCount() / 2, triangles = model.mesh.triangleCount() / 2;
   model.mesh.vertices.bottomRows(vertices).col(0).array() -= 0.18;
-  const auto turned = skin.triangles.rowwise().reverse().array() + vertices;
-  model.mesh.triangles << skin.triangles, turned.matrix();
+  auto smaller = model.mesh.triangles.bottomRows(triangles);
+  smaller = smaller.rowwise().reverse().eval();
   const Surface surface = makeSurface(model);
   const Actor actor = makeActor(surface, surface.key_vertices, camera());
   View view{cv::Mat(kHeight, kWidth, CV_32FC3, cv::Scalar(90, 120, 150)),

@@ -144,14 +144,19 @@ Surface surfaceOfBoxes(const Eigen::AlignedBox3f& a, const Eigen::AlignedBox3f& 
   return surfaceOf(points, faces);
 }
 
+// The first twelve faces are the post's.
+Surface postUnderSlab(Triangles& faces, Points& points) {
+  return surfaceOfBoxes({Eigen::Vector3f(-0.1f, -0.1f, 0.0f), Eigen::Vector3f(0.1f, 0.1f, 1.2f)},
+                        {Eigen::Vector3f(-0.5f, -0.5f, 1.0f), Eigen::Vector3f(0.5f, 0.5f, 1.4f)},
+                        faces, points);
+}
+
 // A post runs up into a slab. Its upper corners lie within it and see nothing; its sides below it
 // see half of the sky beside them, or a little less.
 TEST(SkySeen, IsThatOutsideWhereShellsRunIntoEachOther) {
   Points points;
   Triangles faces;
-  const Surface surface = surfaceOfBoxes(
-      {Eigen::Vector3f(-0.1f, -0.1f, 0.0f), Eigen::Vector3f(0.1f, 0.1f, 1.2f)},
-      {Eigen::Vector3f(-0.5f, -0.5f, 1.0f), Eigen::Vector3f(0.5f, 0.5f, 1.4f)}, faces, points);
+  const Surface surface = postUnderSlab(faces, points);
   ASSERT_EQ(surface.winding, 1);
   int sides = 0;
   for (int t = 0; t < 12; ++t) {  // of the post
@@ -169,14 +174,11 @@ TEST(SkySeen, IsThatOutsideWhereShellsRunIntoEachOther) {
   EXPECT_EQ(sides, 12);
 }
 
-// A peg within a block, of which nothing comes out, is not black when it does.
 // One open edge anywhere does not hide what another shell runs into.
 TEST(SkySeen, IsThatOutsideInAnOpenMeshToo) {
   Points points;
   Triangles faces;
-  const Surface closed = surfaceOfBoxes(
-      {Eigen::Vector3f(-0.1f, -0.1f, 0.0f), Eigen::Vector3f(0.1f, 0.1f, 1.2f)},
-      {Eigen::Vector3f(-0.5f, -0.5f, 1.0f), Eigen::Vector3f(0.5f, 0.5f, 1.4f)}, faces, points);
+  const Surface closed = postUnderSlab(faces, points);
   ObjectModel model{"post", 1, {}, Eigen::Isometry3d::Identity()};
   const auto count = static_cast<Eigen::Index>(points.size());
   model.mesh.vertices.resize(count + 3, 3);
@@ -199,6 +201,7 @@ TEST(SkySeen, IsThatOutsideInAnOpenMeshToo) {
   }
 }
 
+// A peg within a block, of which nothing comes out, is not black when it does.
 TEST(SkySeen, IsFullOfWhatIsBuriedAltogether) {
   Points points;
   Triangles faces;

@@ -62,7 +62,7 @@ void readObjects(const ros::NodeHandle& pnh, WorldParams& world) {
     world.objects[name] = readSettings(settings, world.defaults, "objects/" + name);
 }
 
-constexpr int kMostLiveFrames = 3;
+constexpr int kMostLiveFrames = 3;  // stepped at once: so many late frames are caught up with
 
 }  // namespace
 
@@ -79,7 +79,7 @@ SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
   w.pixel_error = optionalParam(pnh, "pixel_error", w.pixel_error);
   w.max_nodes = optionalParam(pnh, "max_nodes", w.max_nodes);
   w.max_substeps = optionalParam(pnh, "max_substeps", w.max_substeps);
-  // What made one step last would make it fall ever farther behind the camera.
+  // A step over all frames since the last would take longer still, and the next one longer again.
   if (p.mode == Mode::kLive) w.most_frames = kMostLiveFrames;
   w.proximity = optionalParam(pnh, "proximity", w.proximity);
   w.contact_iterations = optionalParam(pnh, "contact_iterations", w.contact_iterations);

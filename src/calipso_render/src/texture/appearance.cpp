@@ -227,6 +227,13 @@ cv::Mat widened(const cv::Mat& colour) {
   return wide;
 }
 
+// What is sampled at the rim has some of the pixels beside it in it.
+cv::Mat beyondRim(const Reflectance& r) {
+  cv::Mat filled = pushPull(r.albedo, r.trust.mul(r.clear));
+  r.albedo.copyTo(filled, r.nearness > 0.0f);
+  return widened(filled);
+}
+
 Appearance::Source sourceOf(const SurfaceTexture& texture, int triangle) {
   bool picture = true, filled = true;
   for (std::size_t i = texture.firstOf(triangle); i < texture.firstOf(triangle + 1); ++i) {
@@ -261,13 +268,6 @@ class Portrait {
   // @param view one after the key frame's
   void seeFurther(std::size_t view, const Shade& shade) {
     if (view < views_.size()) see(view, shade, appearance_.mean_light);
-  }
-
-  // What is sampled at the rim has some of the pixels beside it in it.
-  static cv::Mat beyondRim(const Reflectance& r) {
-    cv::Mat filled = pushPull(r.albedo, r.trust.mul(r.clear));
-    r.albedo.copyTo(filled, r.nearness > 0.0f);
-    return widened(filled);
   }
 
   Appearance finished() {

@@ -33,15 +33,15 @@ constexpr float kOwnLow = 0.2f, kOwnHigh = 0.6f;
 // weight of a look at a like place that counts for nothing, and in full
 constexpr float kPoor = 0.15f, kGood = 0.45f;
 
+constexpr std::size_t kMostTurned = 3;  // turned places that a place takes its look from
+// texels, about, by which like places are judged; of the stock model, where that takes longer
+constexpr std::size_t kCompared = 20000, kComparedOfStock = 5000;
+
 std::size_t mostTexels(const Camera& camera, std::size_t views) {
   const double pictures = static_cast<double>(camera.width) * camera.height / kUsualPixels;
   return static_cast<std::size_t>(std::clamp(pictures, 1.0, kMostTimes) *
                                   static_cast<double>(views > 1 ? kMostOfSeveral : kMostTexels));
 }
-
-constexpr std::size_t kMostTurned = 3;  // turned places that a place takes its look from
-// texels, about, by which like places are judged; of the stock model, where that takes longer
-constexpr std::size_t kCompared = 20000, kComparedOfStock = 5000;
 
 cv::Vec3f colourOf(const cv::Vec4f& c) { return {c[0], c[1], c[2]}; }
 
