@@ -237,7 +237,7 @@ Scene loadScene(const std::string& directory) {
   scene.frame_count =
       root["n_frames"] ? reader.integer(root, "n_frames") : frameFiles(scene, reader);
   scene.camera = readCamera(root, reader);
-  scene.camera_moves = root["camera_moving"] && root["camera_moving"].as<bool>(false);
+  scene.camera_moves = root["camera_moving"] && reader.yes(root, "camera_moving");
   scene.world_from_camera_per_frame = readCameraPath(root, reader);
   if (root["gravity"]) scene.gravity = reader.vector(root, "gravity", 3);
   readSupport(root, reader, scene);

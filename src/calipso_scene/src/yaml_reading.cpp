@@ -79,6 +79,15 @@ int YamlReader::integer(const YAML::Node& node, const std::string& key) const {
   return static_cast<int>(value);
 }
 
+bool YamlReader::yes(const YAML::Node& node, const std::string& key) const {
+  const YAML::Node value = require(node, key);
+  bool result = false;
+  if (!value.IsScalar() || !YAML::convert<bool>::decode(value, result)) {
+    fail(key, "is '" + describe(value) + "'; it must be true or false");
+  }
+  return result;
+}
+
 std::string YamlReader::text(const YAML::Node& node, const std::string& key) const {
   const YAML::Node value = require(node, key);
   if (!value.IsScalar()) fail(key, "is '" + describe(value) + "'; it must be a text");

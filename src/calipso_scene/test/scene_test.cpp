@@ -155,6 +155,7 @@ TEST(Scene, badInputNamesKeyAndRemedy) {
   expect(kHead + "world_T_camera: [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n",
          "not a rigid transform");
   expect(kHead + kPose + "objects: {ball: {index: 1}}\n", "scene.yaml: objects is '{ball");
+  expect(kHead + kPose + kObject + "camera_moving: maybe\n", "it must be true or false");
   expect(kHead + kPose + kObject + "support: {plane: [0, 0, 1, 0]}\n", "it must be a list");
   expect(kHead + kPose + kObject + "support: floor.obj\n", "support is 'floor.obj'");
   expect(kHead + kPose + kObject + "support: [floor.obj]\n", "mesh: FILE");
