@@ -34,9 +34,8 @@ constexpr float kAwayFromStripe = 300.0f, kAwayAlongStripe = 4.0f;  // ... where
 constexpr float kFarther = 2000.0f;  // InpaintParams::away_farther along a plane
 constexpr float kOffColour = 1.0f;   // InpaintParams::off_colour there: two things lie in one plane
 constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
-constexpr int kNearEdges = 64;  // px around the hole in which edges between surfaces are sought
-constexpr int kSkyLabel = 254;  // of the sky among surfaces
-constexpr int kFewestOnPlane = 200;  // px of a plane's part of the hole, to be filled along it
+constexpr int kSkyLabel = 254;        // of the sky among surfaces
+constexpr int kFewestOnPlane = 200;   // px of a plane's part of the hole, to be filled along it
 
 InpaintParams within(const cv::Rect& window, const InpaintParams& params) {
   InpaintParams inner = params;
@@ -233,7 +232,7 @@ void lookAround(std::vector<HiddenPlane>& planes, Canvas& canvas) {
     });
     if (anyway) rest.setTo(0, plane.hole);
   }
-  if (cv::countNonZero(rest) > 0)
+  if (cv::countNonZero(rest) > 0 && !canvas.edges)
     lattices.push_back([&] { canvas.edges = straightEdges(canvas.source, canvas.look); });
   looks.insert(looks.end(), lattices.begin(), lattices.end());
   doAll(true, looks);
@@ -260,11 +259,9 @@ void fillBorders(InpaintParams& params, Canvas& canvas) {
   if (first == last) return;
   const bool any_sky = !params.sky.empty();
   if (any_sky) params.surface.setTo(kSkyLabel, params.sky == InpaintParams::kSky);
-  const cv::Rect near = windowAround(canvas.hole, kNearEdges, kNearEdges);
-  std::vector<cv::Vec4f> edges = straightEdges(canvas.source(near), canvas.look(near));
-  for (cv::Vec4f& edge : edges) edge += cv::Vec4f(near.x, near.y, near.x, near.y);
+  canvas.edges = straightEdges(canvas.source, canvas.look);
   const LineBridges borders =
-      bridgeBorders(edges, canvas.hole, canvas.source, params.surface, canvas.look);
+      bridgeBorders(*canvas.edges, canvas.hole, canvas.source, params.surface, canvas.look);
   if (any_sky) {
     const cv::Mat sky = params.surface == kSkyLabel;
     params.sky.setTo(InpaintParams::kSky, sky), params.surface.setTo(0, sky);

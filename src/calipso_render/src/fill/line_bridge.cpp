@@ -146,13 +146,17 @@ class Bridger {
   std::vector<Bridge> connections(std::optional<Bridge> (Bridger::*connect)(const LineEnd&,
                                                                             const LineEnd&, float)
                                       const) const {
-    std::vector<Bridge> all, chosen;
+    std::vector<std::vector<Bridge>> from(ends_.size());
+#pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t i = 0; i < ends_.size(); ++i) {
       for (std::size_t j = i + 1; j < ends_.size(); ++j) {
         const float gap = static_cast<float>(cv::norm(ends_[j].at - ends_[i].at));
-        if (const auto bridge = (this->*connect)(ends_[i], ends_[j], gap)) all.push_back(*bridge);
+        if (const auto bridge = (this->*connect)(ends_[i], ends_[j], gap))
+          from[i].push_back(*bridge);
       }
     }
+    std::vector<Bridge> all, chosen;
+    for (const std::vector<Bridge>& f : from) all.insert(all.end(), f.begin(), f.end());
     // What was measured near the hole comes first.
     const auto from_afar = [](const Bridge& b) { return b.from->from_afar || b.to->from_afar; };
     std::stable_sort(all.begin(), all.end(), [&](const Bridge& a, const Bridge& b) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "calipso_render/inpaint.hpp"
+#include "fill/around_hole.hpp"
 
 namespace calipso::render {
 namespace {
@@ -40,14 +41,21 @@ class LineEndFinder {
  public:
   LineEndFinder(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& image,
                 bool only_clear = true)
-      : hole_(hole), source_(source), image_(image), only_clear_(only_clear) {
-    cv::distanceTransform(hole == 0, away_, cv::DIST_L2, 3);
-  }
+      : hole_(hole), source_(source), image_(image), only_clear_(only_clear) {}
 
   std::vector<LineEnd> run(const std::vector<cv::Vec4f>& edges) {
-    for (const cv::Vec4f& s : edges) {
-      addEnd({s[0], s[1]}, {s[2], s[3]});
-      addEnd({s[2], s[3]}, {s[0], s[1]});
+    const cv::Rect near = windowAround(hole_, cvCeil(kClear), cvCeil(kClear));
+    cv::Mat away(hole_.size(), CV_32F, cv::Scalar(kClear)), away_near = away(near);
+    if (!near.empty()) cv::distanceTransform(hole_(near) == 0, away_near, cv::DIST_L2, 3);
+    std::vector<std::optional<LineEnd>> found(2 * edges.size());  // of either end of every edge
+#pragma omp parallel for schedule(dynamic, 8)
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const cv::Vec4f& s = edges[i / 2];
+      const cv::Point2f first(s[0], s[1]), last(s[2], s[3]);
+      found[i] = i % 2 == 0 ? endOf(first, last, away) : endOf(last, first, away);
+    }
+    for (const std::optional<LineEnd>& end : found) {
+      if (end) ends_.push_back(*end);
     }
     dropDoubles();
     for (std::size_t i = 0; i < ends_.size(); ++i) ends_[i].line = static_cast<int>(i);
@@ -96,27 +104,28 @@ class LineEndFinder {
     ends_ = std::move(kept);
   }
 
-  void addEnd(cv::Point2f from, cv::Point2f to) {
+  // Where an edge meets the hole; nothing if it does not, or does not stand out there.
+  // @param away CV_32FC1: px from the hole
+  std::optional<LineEnd> endOf(const cv::Point2f& from, cv::Point2f to, const cv::Mat& away) const {
     const cv::Point2f way = to - from;
     float length = static_cast<float>(cv::norm(way));
-    if (length < kShortest) return;
+    if (length < kShortest) return std::nullopt;
     const cv::Point2f into = way / length;
     // The last place that is known, and the hole soon after it.
     while (length >= kShortest && !isSet(source_, to)) to -= into, length -= 1.0f;
     const cv::Point before(cvRound(to.x - kLast * into.x), cvRound(to.y - kLast * into.y));
     if (length < kShortest || !cv::Rect({0, 0}, hole_.size()).contains(before) ||
-        away_.at<float>(before) < kClear)
-      return;
+        away.at<float>(before) < kClear)
+      return std::nullopt;
     float reach = 1.0f;
     while (reach <= kFarthest && !isSet(hole_, to + reach * into)) reach += 1.0f;
     // Where the hole runs beside it the line is measured farther back.
     for (const float nearest = std::min(reach, kLost); reach <= kFarthest && length >= kShortest;
          reach += kStepBack, length -= kStepBack, to -= kStepBack * into) {
       LineEnd end{to, into, length, {}, 0.0f, {}, reach > nearest};
-      if (!measure(end) || !standsOut(end) || !centre(end)) continue;
-      ends_.push_back(end);
-      return;
+      if (measure(end) && standsOut(end) && centre(end)) return end;
     }
+    return std::nullopt;
   }
 
   // An edge of a thin line goes to the line's middle, and along it: through its middles near the
@@ -220,7 +229,6 @@ class LineEndFinder {
 
   const cv::Mat &hole_, &source_, &image_;
   bool only_clear_;
-  cv::Mat away_;  // CV_32FC1, px from the hole
   std::vector<LineEnd> ends_;
 };
 
@@ -246,13 +254,17 @@ std::vector<LineEnd> findLineEnds(const std::vector<cv::Vec4f>& edges, const cv:
 std::vector<LineEnd> withBeside(const std::vector<LineEnd>& ends, int reach, const cv::Mat& hole,
                                 const cv::Mat& source, const cv::Mat& image) {
   const LineEndFinder finder(hole, source, image);
-  std::vector<LineEnd> all = ends;
-  for (const LineEnd& end : ends) {
+  std::vector<std::vector<LineEnd>> moved(ends.size());
+#pragma omp parallel for schedule(dynamic, 8)
+  for (std::size_t i = 0; i < ends.size(); ++i) {
     for (int aside = -reach; aside <= reach; ++aside) {
-      const auto moved = aside != 0 ? finder.moved(end, static_cast<float>(aside)) : std::nullopt;
-      if (moved) all.push_back(*moved);
+      const auto beside =
+          aside != 0 ? finder.moved(ends[i], static_cast<float>(aside)) : std::nullopt;
+      if (beside) moved[i].push_back(*beside);
     }
   }
+  std::vector<LineEnd> all = ends;
+  for (const std::vector<LineEnd>& m : moved) all.insert(all.end(), m.begin(), m.end());
   return all;
 }
 

@@ -6,6 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <type_traits>
 
+#include "draw/side_by_side.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -34,9 +36,14 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const P
   if (off_colour_ > 0.0f) {
     // Wider in the hole: a spot at its rim does not tell what is there.
     const int around = std::max(kPatchSide, cvRound(kColourAround / scale));
-    cv::blur(level.image, colours_, {kPatchSide, kPatchSide});
-    cv::blur(level.image, expected_, {around, around});
+    doAll(true, {[&] {
+                   cv::blur(level.image, expected_, {around, around});
+                 },
+                 [&] {
+                   cv::blur(level.image, colours_, {kPatchSide, kPatchSide});
+                 }});
   }
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < level.hole.rows; ++v) {
     Known* known = &places_[v * columns_];
     const auto take = [&](const cv::Mat& values, auto Known::*to) {

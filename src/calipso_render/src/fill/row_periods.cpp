@@ -105,6 +105,7 @@ std::vector<float> rowPeriods(const cv::Mat& image, const cv::Mat& known) {
   cv::Mat grey, weight;
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   grey = levelled(grey, known, kStripesLevel);
+#pragma omp parallel for schedule(static)
   for (int v = 0; v < grey.rows; ++v) grey.row(v) -= cv::mean(grey.row(v), known.row(v))[0];
   grey.setTo(0.0, known == 0);
   cv::Mat(known != 0).convertTo(weight, CV_32F, 1.0 / 255.0);
@@ -114,6 +115,7 @@ std::vector<float> rowPeriods(const cv::Mat& image, const cv::Mat& known) {
   for (int v = 0; v < image.rows; ++v)
     rows[v] = sumsOf(grey.ptr<float>(v), weight.ptr<float>(v), image.cols, shifts);
   std::vector<float> periods(image.rows);
+#pragma omp parallel for schedule(dynamic, 4)
   for (int v = 0; v < image.rows; ++v) periods[v] = periodOf(correlations(rows, v));
   return periods;
 }

@@ -1,5 +1,6 @@
 #include "fill/seam_blend.hpp"
 
+#include <array>
 #include <cmath>
 #include <opencv2/core/hal/intrin.hpp>
 #include <vector>
@@ -27,6 +28,12 @@ struct Node {
   cv::Point at;
 };
 
+// All of one colour, then all of the other: where either and their end begin.
+struct Nodes {
+  std::vector<Node> all;
+  std::array<std::size_t, 3> first_of;
+};
+
 cv::Vec4f widened(const cv::Vec3f& c) { return {c[0], c[1], c[2], 0.0f}; }
 
 class Seams {
@@ -41,12 +48,14 @@ class Seams {
         has_planes_(!planes.empty()) {}
 
   // First one colour of a chessboard, then the other: a field's neighbours have the other one, so
-  // that none waits for the one before it.
-  std::vector<Node> nodes() const {
+  // that none waits for another of its colour.
+  Nodes nodes() const {
     cv::Mat index(hole_.size(), CV_32S, cv::Scalar(-1));
-    std::vector<Node> nodes;
+    Nodes result;
+    std::vector<Node>& nodes = result.all;
     nodes.reserve(cv::countNonZero(hole_));
     for (int colour = 0; colour < 2; ++colour) {
+      result.first_of[colour] = nodes.size();
       for (int v = 0; v < hole_.rows; ++v) {
         for (int u = (v + colour) % 2; u < hole_.cols; u += 2) {
           if (hole_.at<std::uint8_t>(v, u) == 0) continue;
@@ -59,7 +68,8 @@ class Seams {
     }
 #pragma omp parallel for schedule(static)
     for (std::size_t k = 0; k < nodes.size(); ++k) link(index, nodes[k], nodes.size());
-    return nodes;
+    result.first_of[2] = nodes.size();
+    return result;
   }
 
  private:
@@ -104,13 +114,15 @@ class Seams {
 
 // What is added: mismatches spread by a screened Poisson equation, all channels at once. Known
 // pixels, for which the last node stands, get nothing.
-std::vector<cv::Vec4f> spread(const std::vector<Node>& nodes, cv::Vec4f Node::*mismatch,
-                              float screen, float relax, int iterations) {
-  std::vector<cv::Vec4f> change(nodes.size() + 1, cv::Vec4f::all(0.0f));
+std::vector<cv::Vec4f> spread(const Nodes& nodes, cv::Vec4f Node::*mismatch, float screen,
+                              float relax, int iterations) {
+  std::vector<cv::Vec4f> change(nodes.all.size() + 1, cv::Vec4f::all(0.0f));
   const auto at = [&](int i) { return cv::v_load(change[i].val); };
-  for (int k = 0; k < iterations; ++k) {
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      const Node& n = nodes[i];
+#pragma omp parallel
+  for (int k = 0; k < 2 * iterations; ++k) {
+#pragma omp for schedule(static)
+    for (std::size_t i = nodes.first_of[k % 2]; i < nodes.first_of[k % 2 + 1]; ++i) {
+      const Node& n = nodes.all[i];
       const int* j = n.neighbours;
       const cv::v_float32x4 own = at(static_cast<int>(i)), sum = cv::v_load((n.*mismatch).val) +
                                                                  at(j[0]) + at(j[1]) + at(j[2]) +
@@ -126,17 +138,12 @@ std::vector<cv::Vec4f> spread(const std::vector<Node>& nodes, cv::Vec4f Node::*m
 
 void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin,
                 const cv::Mat& planes, cv::Mat& image) {
-  const std::vector<Node> nodes = Seams(hole, source, origin, planes, image).nodes();
-  std::vector<cv::Vec4f> wide, narrow;
-#pragma omp parallel sections
-  {
-#pragma omp section
-    wide = spread(nodes, &Node::seam, kScreen, kRelax, kIterations);
-#pragma omp section
-    narrow = spread(nodes, &Node::edge, kScreenEdge, kRelaxEdge, kIterationsEdge);
-  }
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    cv::Vec3f& colour = image.at<cv::Vec3f>(nodes[i].at);
+  const Nodes nodes = Seams(hole, source, origin, planes, image).nodes();
+  const std::vector<cv::Vec4f> wide = spread(nodes, &Node::seam, kScreen, kRelax, kIterations),
+                               narrow = spread(nodes, &Node::edge, kScreenEdge, kRelaxEdge,
+                                               kIterationsEdge);
+  for (std::size_t i = 0; i < nodes.all.size(); ++i) {
+    cv::Vec3f& colour = image.at<cv::Vec3f>(nodes.all[i].at);
     for (int c = 0; c < 3; ++c)
       colour[c] = std::min(255.0f, std::max(0.0f, colour[c] + wide[i][c] + narrow[i][c]));
   }

@@ -132,14 +132,18 @@ class Seams {
     std::vector<std::vector<int>> waves;
     const int reach = kReach + 1, columns = (hole_.cols + 2 * reach) / kTile + 1,
               rows = (hole_.rows + 2 * reach) / kTile + 1;
-    std::vector<std::size_t> next(columns * rows, 0);  // free wave of every tile
+    std::vector<std::size_t> next(columns * rows, 0);   // free wave of every tile
+    std::vector<int> last_of(columns * rows, kNoCopy);  // copy in it
     for (std::size_t label = 0; label < pixels_.size(); ++label) {
       if (pixels_[label].size() < kFewest) continue;
       std::vector<int> tiles;
       for (const cv::Point& p : pixels_[label]) {
         for (int v = p.y / kTile; v <= (p.y + 2 * reach) / kTile; ++v) {
-          for (int u = p.x / kTile; u <= (p.x + 2 * reach) / kTile; ++u)
-            tiles.push_back(v * columns + u);
+          for (int u = p.x / kTile; u <= (p.x + 2 * reach) / kTile; ++u) {
+            int& last = last_of[v * columns + u];
+            if (last != static_cast<int>(label)) tiles.push_back(v * columns + u);
+            last = static_cast<int>(label);
+          }
         }
       }
       std::size_t wave = 0;

@@ -104,16 +104,20 @@ std::optional<double> stripesAcross(const cv::Mat& image, const cv::Mat& hole,
   const Sides sides(levelled(small, small_known, kStripesLevel / kShrink), middle, small_known);
   double best = 0.0;
   Likeness most;
-  const auto attempt = [&](double direction) {
-    const Likeness l = sides.along(direction);
-    if (l.explained > most.explained) most = l, best = direction;
+  const auto attempt = [&](const std::vector<double>& directions) {
+    std::vector<Likeness> likeness(directions.size());
+#pragma omp parallel for schedule(static, 1)
+    for (std::size_t i = 0; i < directions.size(); ++i) likeness[i] = sides.along(directions[i]);
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      if (likeness[i].explained > most.explained) most = likeness[i], best = directions[i];
+    }
   };
+  std::vector<double> all;
   for (int i = 0; i < kDirections; ++i)
-    attempt(CV_PI * (static_cast<double>(i) / kDirections - 0.5));
-  for (double step = 0.5 * CV_PI / kDirections; step > kFinest; step /= 2.0) {
-    const double middle_of = best;
-    attempt(middle_of - step), attempt(middle_of + step);
-  }
+    all.push_back(CV_PI * (static_cast<double>(i) / kDirections - 0.5));
+  attempt(all);
+  for (double step = 0.5 * CV_PI / kDirections; step > kFinest; step /= 2.0)
+    attempt({best - step, best + step});
   if (most.explained < kExplained || most.correlation < kAlike) return std::nullopt;
   return best;
 }
