@@ -81,6 +81,8 @@ FrameOutput Renderer::composite(const FrameInput& frame) {
                                    [](const ObjectInFrame& o) { return o.edited || o.removed; });
   if (!touched) return {frame.bgr.clone(), cv::Mat::zeros(frame.bgr.size(), CV_8U)};
   const cv::Size expected(prepared_->camera.width, prepared_->camera.height);
+  if (!frame.labels.empty() && frame.labels.size() != frame.bgr.size())
+    throw std::invalid_argument("segmentation and frame differ in size");
   if (frame.bgr.size() != expected) {
     throw std::invalid_argument("frame is " + std::to_string(frame.bgr.cols) + " x " +
                                 std::to_string(frame.bgr.rows) + ", but the clip was " +

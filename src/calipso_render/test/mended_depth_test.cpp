@@ -92,6 +92,11 @@ TEST(MendedDepth, AWallSeenBeyondATablesEdgeStays) {
     }
   }
   EXPECT_EQ(cv::norm(table.mended(depth), depth, cv::NORM_INF), 0.0);
+  // What has no depth says nothing about what is beside it.
+  for (int v = 3; v < kHigh; v += 7) {
+    for (int u = 0; u < kWide; u += 6) depth.at<float>(v, u) = 0.0f;
+  }
+  EXPECT_EQ(cv::countNonZero((table.mended(depth) != depth) & (depth > 0.0f)), 0);
 }
 
 // Beside an object that stands at a board's far edge the table beyond is no gap of the board.

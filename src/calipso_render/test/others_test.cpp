@@ -108,6 +108,93 @@ TEST(Others, AShadowFallsOnAnEditedObjectAtRestAndAroundIt) {
   EXPECT_GT(cv::countNonZero((shaded == 0) & near), cv::countNonZero(near) / 5);
 }
 
+// Its shadow leaves an object that stays with the one that cast it.
+TEST(Others, AShadowOnOneThatStaysLeavesWithTheEditedObject) {
+  const Eigen::Vector3d sun = sunlight().direction.cast<double>();
+  TwoBalls s(params(), kOther + 2.6 * kBallRadius * sun);
+  const auto sure = std::make_shared<Prepared>(*s.prepared);
+  sure->light.light = sunlight(), sure->light.determined = sure->light.from_shadows = true;
+  s.prepared = sure;
+  const Eigen::Vector3d eye = s.key.camera.world_from_camera.translation();
+  const Eigen::Vector3d facing = (sun + (eye - kOther).normalized()).normalized();
+  const cv::Point p = s.at(kOther + kBallRadius * facing);
+  ASSERT_EQ(s.key.labels.at<std::uint8_t>(p), 2);
+  const cv::Vec3b lit = s.key.bgr.at<cv::Vec3b>(p);
+  const Eigen::Vector3f n = facing.cast<float>();
+  cv::Vec3b& shaded = s.key.bgr.at<cv::Vec3b>(p);
+  for (int c = 0; c < 3; ++c)
+    shaded[c] =
+        quantise(codeFromLinear(linearFromCode(lit[c]) * diffuseShading(sunlight(), n, 0.0f)[c] /
+                                diffuseShading(sunlight(), n, 1.0f)[c]));
+  ASSERT_LT(shaded[1] + 20, lit[1]);
+  const cv::Vec3b now = s.drawn({-3.0, 0.0, 0.0}).bgr.at<cv::Vec3b>(p);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(now[c], lit[c], 6) << c;  // codes are rounded
+  sure->light.determined = false;  // then it may be the shadow of something else
+  EXPECT_EQ(s.drawn({-3.0, 0.0, 0.0}).bgr.at<cv::Vec3b>(p), shaded);
+}
+
+// The other ball moves in the video, and passes before a place of the first one.
+struct PassingBall : TwoBalls {
+  ClipFrame passing;
+
+  // @param over where it is seen as it passes
+  // @param front where something stands before the first ball
+  PassingBall(const cv::Rect& over, const cv::Rect& front) : TwoBalls(params()) {
+    key.labels(front).setTo(0);
+    passing = {key.bgr.clone(), key.labels.clone(), key.camera};
+    passing.labels.setTo(0, passing.labels == 2);
+    passing.labels(over).setTo(2), passing.bgr(over).setTo(kMixedHue);
+    ClipSample clip;
+    clip.add(key), clip.add(passing);
+    prepared = std::make_shared<const Prepared>(
+        prepare(clip, {ballAt(kCentre), ballAt(kOther, "other", 2)}, render));
+  }
+  // @param states of the objects in the frame in which it passes
+  FrameOutput drawnPassing(const std::vector<ObjectInFrame>& states) const {
+    FrameInput in;
+    in.bgr = passing.bgr, in.labels = passing.labels, in.camera = passing.camera;
+    in.objects = states;
+    return Renderer(prepared, render).composite(in);
+  }
+};
+
+cv::Point middleOfBall() {
+  const Eigen::Vector2d p = camera().projectWorld(kCentre);
+  return {cvRound(p.x()), cvRound(p.y())};
+}
+
+// None of it stays on a peg that stands before the first one if it is taken away.
+TEST(Others, WhatPassesBeforeAFrontLeavesWithItsObject) {
+  const cv::Point middle = middleOfBall();
+  const cv::Rect peg(middle - cv::Point(8, 18), cv::Size(17, 18)),
+      over(middle - cv::Point(2, 10), cv::Size(5, 5));
+  const PassingBall s(over, peg);
+  ASSERT_TRUE(s.prepared->moves[1]);
+  ASSERT_EQ(cv::countNonZero(s.prepared->fronts[0](over)), over.area());
+  ObjectInFrame other;
+  other.name = "other", other.removed = true;
+  const FrameOutput out = s.drawnPassing({other});
+  EXPECT_EQ(cv::countNonZero(out.provenance(over) == kOriginal), 0);
+  cv::Mat within = cv::Mat::zeros(out.bgr.size(), CV_8U);
+  within(over).setTo(255);
+  EXPECT_GT(psnr(out.bgr, s.key.bgr, within), 25.0);  // the plate shows the peg
+}
+
+// What it hides of the first one, which an edit moves by a little, is not what drawing that misses.
+TEST(Others, WhatPassesLeavesNoHueOnAnObjectThatMovedALittle) {
+  const cv::Rect over(middleOfBall() - cv::Point(3, 3), cv::Size(7, 7));
+  const PassingBall s(over, cv::Rect());
+  ObjectInFrame ball;
+  ball.name = "ball", ball.edited = true;
+  for (const Eigen::Vector3f& x : s.prepared->surfaces[0].key_vertices)
+    ball.vertices.push_back(x + Eigen::Vector3f(0.01f, 0.0f, 0.0f));
+  const cv::Mat out = s.drawnPassing({ball}).bgr;
+  for (int u = over.br().x + 1; u < over.br().x + 5; ++u) {
+    const cv::Vec3b beside = out.at<cv::Vec3b>(over.y + 3, u);
+    EXPECT_LT(beside[2] - beside[0], 110) << u << " " << beside;  // of the hue: 140
+  }
+}
+
 // What hid a part of an edited object at rest does not stay there once it has left.
 TEST(Others, WhatHasLeftIsNotKeptOnAnEditedObjectAtRest) {
   const TwoBalls s(params(), kOther + Eigen::Vector3d(-0.06, -0.3, 0.0));

@@ -132,12 +132,11 @@ TEST(StagedFrame, APartOfWhatSwaysMayBeElsewhere) {
   EXPECT_FALSE(frame.isElsewhere(u + 8, v));
 }
 
-TEST(StagedFrame, RefusesASegmentationOfAnotherSize) {
+TEST(StagedFrame, ASegmentationOfAnotherSizeIsRefused) {
   const Setting s(params());
-  const RenderParams p = params();
   FrameInput in = s.input(true, Eigen::Vector3f::Zero());
   in.labels = cv::Mat::zeros(10, 10, CV_8U);
-  EXPECT_THROW(StagedFrame(*s.prepared, p, in), std::invalid_argument);
+  EXPECT_THROW(Renderer(s.prepared, params()).composite(in), std::invalid_argument);
 }
 
 }  // namespace

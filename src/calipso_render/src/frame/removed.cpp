@@ -12,7 +12,6 @@ namespace calipso::render {
 namespace {
 
 constexpr int kInFront = 127;  // of a matte
-constexpr int kMixed = 2;      // px around an object in which its hue mixes into others'
 
 // Row v of the pixels of a box that show an edited object in the video, and of those that show
 // another one.
@@ -89,8 +88,10 @@ cv::Mat removedPixels(const StagedFrame& frame, const SeenPlace& place, const Ed
     shown.update(frame, place, box);
     findRemoved(shown, passing, box, removed(box - region.all.tl()));
   }
+  const cv::Mat passing_before =
+      shownInPassing(frame, region.all, frame.params.background.mask_margin_px);
   for (const cv::Mat& front : place.fronts) {
-    if (!front.empty()) removed.setTo(0, front(region.all));
+    if (!front.empty()) removed.setTo(0, front(region.all) & ~passing_before);
   }
   const cv::Mat& lost = frame.prepared.mirror.lost;
   if (!mirrored.empty() && !lost.empty())
@@ -105,6 +106,15 @@ cv::Mat shownOf(const StagedFrame& frame, const SeenPlace& place, int surface,
                 const cv::Rect& box) {
   cv::Mat shown = frame.labels(box) == frame.prepared.surfaces[surface].index;
   if (!place.footprints[surface].empty()) shown |= place.footprints[surface](box);
+  return shown;
+}
+
+cv::Mat shownInPassing(const StagedFrame& frame, const cv::Rect& box, int margin) {
+  cv::Mat shown = cv::Mat::zeros(box.size(), CV_8U);
+  for (std::size_t i = 0; i < frame.at_rest.size(); ++i) {
+    if (!frame.at_rest[i]) shown |= frame.labels(box) == frame.prepared.surfaces[i].index;
+  }
+  if (cv::countNonZero(shown) > 0) cv::dilate(shown, shown, disc(margin));
   return shown;
 }
 

@@ -9,6 +9,8 @@
 
 namespace calipso::render {
 
+constexpr int kMixed = 2;  // px around an object in which its hue mixes into others'
+
 // What the video shows of edited objects in a box, with a margin, and of others: kept from frame to
 // frame as long as it shows the same.
 class ShownPixels {
@@ -38,6 +40,9 @@ cv::Mat removedPixels(const StagedFrame& frame, const SeenPlace& place, const Ed
 
 // The pixels of `box` that show an object in the video. CV_8UC1
 cv::Mat shownOf(const StagedFrame& frame, const SeenPlace& place, int surface, const cv::Rect& box);
+
+// What a box's pixels show, with a margin, of objects that pass in the video, edited or not.
+cv::Mat shownInPassing(const StagedFrame& frame, const cv::Rect& box, int margin);
 
 // What a box's pixels show of edited objects that are not where the video has them, with the margin
 // in which their hue mixes into others', but for pixels that such an object owns itself.

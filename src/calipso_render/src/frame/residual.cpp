@@ -70,7 +70,8 @@ void Residual::findMiss(const cv::Rect& carried) {
   const cv::Rect box = miss_box_;
   if (box.empty()) return;
   miss_ = cv::Mat(box.size(), CV_32FC4);
-  const cv::Mat foreign = shownOfMoved(frame_, rest_.owners(box), box);
+  const cv::Mat foreign =
+      shownOfMoved(frame_, rest_.owners(box), box) | shownInPassing(frame_, box, kMixed);
 #pragma omp parallel for schedule(static)
   for (int j = 0; j < box.height; ++j) {
     const int v = box.y + j;

@@ -26,20 +26,33 @@ struct LightBox {
   }
 };
 
+// Edited objects where they are now, and where the video has at rest those that have left.
+std::vector<LightBox> shadingBoxes(const StagedFrame& frame) {
+  std::vector<LightBox> boxes;
+  for (const StagedObject& object : frame.objects) {
+    if (object.edited) boxes.emplace_back(object.actor.vertices, frame.light.direction);
+  }
+  for (std::size_t i = 0; i < frame.moved.size(); ++i) {
+    const Surface& s = frame.prepared.surfaces[i];
+    if (frame.moved[i] && s.in_video && !frame.prepared.moves[i])
+      boxes.emplace_back(s.key_vertices, frame.light.direction);
+  }
+  return boxes;
+}
+
 }  // namespace
 
 ShadedOthers::ShadedOthers(const StagedFrame& frame, const MovedShadow& moved,
                            const RestingLight& resting)
     : frame_(frame), moved_(moved), resting_(resting), maybe_(frame.objects.size(), false) {
-  std::vector<LightBox> boxes;
-  for (const StagedObject& object : frame.objects)
-    boxes.emplace_back(object.actor.vertices, frame.light.direction);
+  const std::vector<LightBox> shading = shadingBoxes(frame);
   for (std::size_t other = 0; other < maybe_.size(); ++other) {
-    if (frame.objects[other].edited || !frame.objects[other].actor.surface->in_video) continue;
-    for (std::size_t slot = 0; slot < maybe_.size() && !maybe_[other]; ++slot) {
-      if (frame.objects[slot].edited)
-        maybe_[other] = boxes[slot].mayShade(boxes[other], frame.light.angular_radius);
-    }
+    const Actor& actor = frame.objects[other].actor;
+    if (frame.objects[other].edited || !actor.surface->in_video) continue;
+    const LightBox box(actor.vertices, frame.light.direction);
+    maybe_[other] = std::any_of(shading.begin(), shading.end(), [&](const LightBox& s) {
+      return s.mayShade(box, frame.light.angular_radius);
+    });
     any_ = any_ || maybe_[other];
   }
 }
@@ -71,13 +84,15 @@ void ShadedOthers::shade(const VisibilityBuffer& seen, int u, int v, Pixel& pixe
   const float before = resting_.originals() != nullptr
                            ? resting_.originals()->visibility(p->position, p->normal)
                            : 1.0f;
-  if (before - now < kSameShadow) return;
+  // Light is given back only if the shadow was there: where the sun is not sure it may be elsewhere.
+  if (before - now < kSameShadow &&
+      (now - before < kSameShadow || !frame_.prepared.light.confirmed()))
+    return;
   const float others = resting_.others().visibility(p->position, p->normal);
   const cv::Vec3f back = cv::Vec3f::all(kThrownBack);
-  const cv::Vec3f lit = diffuseShading(frame_.light, p->normal, others * before, p->seen, back);
-  const cv::Vec3f shaded = diffuseShading(frame_.light, p->normal, others * now, p->seen, back);
-  for (int c = 0; c < 3; ++c)
-    pixel.colour[c] *= std::min(1.0f, shaded[c] / std::max(lit[c], 1e-4f));
+  const cv::Vec3f was = diffuseShading(frame_.light, p->normal, others * before, p->seen, back),
+                  is = diffuseShading(frame_.light, p->normal, others * now, p->seen, back);
+  for (int c = 0; c < 3; ++c) pixel.colour[c] *= is[c] / std::max(was[c], 1e-4f);
   pixel.source = kRendered;
 }
 

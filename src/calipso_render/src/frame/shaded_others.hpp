@@ -10,7 +10,7 @@
 
 namespace calipso::render {
 
-// Objects that are not edited and come into the shadow of edited ones.
+// Objects that are not edited and come into the shadow of edited ones, or out of it.
 class ShadedOthers {
  public:
   // All of them must outlive this.
@@ -21,7 +21,7 @@ class ShadedOthers {
   bool maybe(std::size_t slot) const { return maybe_[slot]; }
 
   // Darkens another object's own pixel where an edited object takes sun away that it had in the
-  // video.
+  // video, and brightens it where that has gone which took it in the video.
   // @param seen what the picture's pixels see now
   void shade(const VisibilityBuffer& seen, int u, int v, Pixel& pixel) const;
 

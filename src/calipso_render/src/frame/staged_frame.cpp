@@ -147,8 +147,6 @@ StagedFrame::StagedFrame(const Prepared& prepared, const RenderParams& params,
       labels(input.labels.empty() ? prepared.key_labels : input.labels),
       at_key_camera(sameView(input.camera, prepared.camera)),
       eye(input.camera.world_from_camera.translation().cast<float>()) {
-  if (labels.size() != input.bgr.size())
-    throw std::invalid_argument("segmentation and frame differ in size");
   states = statesOf(prepared.surfaces, input.objects);
   for (const ObjectInFrame* state : states)
     edited.push_back(state != nullptr && (state->edited || state->removed));

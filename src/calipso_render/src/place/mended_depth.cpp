@@ -28,7 +28,9 @@ cv::Mat isOn(const cv::Mat& nearness, const cv::Mat& depth) {
 cv::Mat passesThrough(const cv::Mat& off, const cv::Mat& on) {
   cv::Mat weight, mean, through = cv::Mat::zeros(on.size(), CV_8U);
   on.convertTo(weight, CV_32F, 1.0 / 255.0);
-  cv::blur(off.mul(weight), mean, {kMeanSide, 1});
+  cv::Mat counted = off.mul(weight);
+  counted.setTo(0, on == 0);  // where the depth is unknown it is off by no number
+  cv::blur(counted, mean, {kMeanSide, 1});
   cv::blur(weight, weight, {kMeanSide, 1});
   mean /= cv::max(weight, 1e-6);
   for (int v = 0; v < on.rows; ++v) {
