@@ -114,9 +114,10 @@ class RenderNodeTest : public ::testing::Test {
     segmentation_.publish(s);
   }
 
-  void sendModels() {
+  // @param key the frame that they are fitted to
+  void sendModels(int key = 0) {
     calipso_msgs::AlignedModels models;
-    models.header = header(0);
+    models.header = header(key);
     models.models.resize(1);
     models.models[0].object = "ball";
     models.models[0].index = kBallLabel;
@@ -219,6 +220,19 @@ class LiveRenderNodeTest : public RenderNodeTest {
     simulator_status_.publish(status);
   }
 
+  bool isConnected() {
+    return waitFor([&] {
+      return image_.getNumSubscribers() > 0 && camera_.getNumSubscribers() > 0 &&
+             segmentation_.getNumSubscribers() > 0 && models_.getNumSubscribers() > 0 &&
+             state_.getNumSubscribers() > 0 && simulator_status_.getNumSubscribers() > 1 &&
+             edited_sub_.getNumPublishers() > 0;
+    });
+  }
+
+  bool isReady() {
+    return waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; });
+  }
+
   // Whether `count` frames have come back in a while.
   bool haveCome(std::size_t count) {
     return waitFor([&] { return edited_.size() >= count; }, 20.0);
@@ -228,18 +242,13 @@ class LiveRenderNodeTest : public RenderNodeTest {
 };
 
 TEST_F(LiveRenderNodeTest, FramesPassUntilTheSimulatorIsReady) {
-  ASSERT_TRUE(waitFor([&] {
-    return image_.getNumSubscribers() > 0 && camera_.getNumSubscribers() > 0 &&
-           segmentation_.getNumSubscribers() > 0 && state_.getNumSubscribers() > 0 &&
-           simulator_status_.getNumSubscribers() > 1 && edited_sub_.getNumPublishers() > 0;
-  }));
+  ASSERT_TRUE(isConnected());
   sendSimulatorStatus(calipso_msgs::NodeStatus::STARTING);
   sendFrame(picture(0), 0);
   ASSERT_TRUE(haveCome(1));
   sendLabels(0);
   sendModels();
-  ASSERT_TRUE(waitFor([&] { return status_.state == calipso_msgs::NodeStatus::READY; }))
-      << status_.message;
+  ASSERT_TRUE(isReady()) << status_.message;
   constexpr int kFrames = 6;
   for (int k = 1; k < kFrames; ++k) {
     sendFrame(picture(k), k);
@@ -253,6 +262,7 @@ TEST_F(LiveRenderNodeTest, FramesPassUntilTheSimulatorIsReady) {
   for (int k = kFrames; !edited && k < kFrames + 60; ++k) {
     sendFrame(picture(k), k);
     state_.publish(state(k, true));
+    sendLabels(k);
     ASSERT_TRUE(haveCome(k + 1)) << k;
     edited = edited_[k].data != picture(k).data;
   }
@@ -276,6 +286,37 @@ TEST_F(LiveRenderNodeTest, WhatHasNoStampPasses) {
     EXPECT_EQ(edited_.back().data, image.data);
   }
   EXPECT_TRUE(waitFor([&] { return said.find("stamp is 0") != std::string::npos; })) << said;
+}
+
+// Many frames come while the first one is segmented and its models are fitted: it stays the key
+// frame. Then every frame waits for its own mask.
+TEST_F(LiveRenderNodeTest, TheKeyFrameIsKeptAndFramesWaitForTheirMasks) {
+  ASSERT_TRUE(isConnected());
+  sendSimulatorStatus(calipso_msgs::NodeStatus::READY);
+  // Before all that other tests send: the video starts over.
+  constexpr int kFirst = -600, kMeanwhile = kFirst + 15;  // more than may wait
+  for (int k = kFirst; k < kMeanwhile; ++k) {
+    sendFrame(picture(k), k);
+    ASSERT_TRUE(haveCome(k - kFirst + 1)) << k;
+  }
+  sendLabels(kFirst);
+  sendModels(kFirst);
+  ASSERT_TRUE(isReady()) << status_.message;
+
+  const std::size_t before = edited_.size();
+  sendFrame(picture(kMeanwhile), kMeanwhile);
+  state_.publish(state(kMeanwhile, true));
+  EXPECT_FALSE(waitFor([&] { return edited_.size() > before; }, 1.0));
+  sendLabels(kMeanwhile);
+  ASSERT_TRUE(haveCome(before + 1));
+  EXPECT_NE(edited_.back().data, picture(kMeanwhile).data);
+  // A mask that does not come holds up the video no longer than the queue is long.
+  for (int k = kMeanwhile + 1; k <= kMeanwhile + 10; ++k) {
+    sendFrame(picture(k), k);
+    state_.publish(state(k, true));
+    waitFor([] { return false; }, 0.05);
+  }
+  EXPECT_TRUE(haveCome(before + 2));
 }
 
 TEST_F(RenderNodeTest, PreparesAndEditsInOrder) {

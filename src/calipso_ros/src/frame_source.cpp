@@ -19,6 +19,17 @@ constexpr unsigned kUnboundedPairs = 100000;
 constexpr unsigned kStrayHalves = 30;
 constexpr unsigned kMostUnpaired = 60;  // images in a row, until it is said that they have no pair
 
+void checkSameSize(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info) {
+  const auto size = [](auto width, auto height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+  };
+  if (image.width == info.width && image.height == info.height) return;
+  throw std::invalid_argument(
+      "camera_info is for " + size(info.width, info.height) + " pixels, the image has " +
+      size(image.width, image.height) +
+      "; calibrate for this size, or name the camera_info that goes with it");
+}
+
 unsigned pairQueue(unsigned queue) { return queue == 0 ? kUnboundedPairs : queue + kStrayHalves; }
 
 }  // namespace
@@ -76,6 +87,7 @@ void FrameSource::onPair(const sensor_msgs::ImageConstPtr& image,
   unpaired_ = 0;
   Frame frame;
   try {
+    checkSameSize(*image, *info);
     frame = {image, info,
              fromMsg(*info, poses_.worldFromCamera(image->header.frame_id, image->header.stamp))};
   } catch (const std::exception& error) {

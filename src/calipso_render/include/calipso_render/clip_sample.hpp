@@ -36,6 +36,8 @@ class ClipSample {
   // Keeps or drops the frame. Pictures are copied. @throw std::invalid_argument if sizes differ
   void add(const ClipFrame& frame);
 
+  // @return false: it does not have this frame
+  bool setLabels(std::int64_t stamp_ns, const cv::Mat& labels);
   void setPicture(std::size_t frame, const cv::Mat& bgr) { frames_.at(frame).bgr = bgr; }
   void setPoses(std::size_t frame, std::vector<ObjectPose> poses) {
     frames_.at(frame).poses = std::move(poses);

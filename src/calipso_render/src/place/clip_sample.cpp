@@ -1,5 +1,6 @@
 #include "calipso_render/clip_sample.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 
@@ -31,6 +32,18 @@ void ClipSample::add(const ClipFrame& frame) {
   }
   frames_.push_back(
       {frame.bgr.clone(), frame.labels.clone(), frame.camera, frame.poses, frame.stamp_ns});
+}
+
+bool ClipSample::setLabels(std::int64_t stamp_ns, const cv::Mat& labels) {
+  const auto frame = std::find_if(frames_.begin(), frames_.end(),
+                                  [&](const ClipFrame& f) { return f.stamp_ns == stamp_ns; });
+  if (frame == frames_.end()) return false;
+  if (labels.size() != frame->bgr.size()) {
+    throw std::invalid_argument("clip frame: new labels are " + sizeText(labels.size()) +
+                                ", the picture is " + sizeText(frame->bgr.size()));
+  }
+  frame->labels = labels.clone();
+  return true;
 }
 
 }  // namespace calipso::render

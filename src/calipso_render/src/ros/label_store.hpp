@@ -23,6 +23,8 @@ class LabelStore {
 
   bool has(const ros::Time& stamp) const { return packed_.count(stamp) > 0; }
 
+  ros::Time newest() const { return packed_.empty() ? ros::Time() : packed_.rbegin()->first; }
+
   // Labels at `stamp`, else the nearest before it, else an empty matrix.
   cv::Mat at(const ros::Time& stamp) const;
   // Their stamp: in slow motion that of the frame whose picture is shown again. Else `stamp`.

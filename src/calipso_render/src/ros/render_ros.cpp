@@ -16,6 +16,8 @@ constexpr std::size_t kLiveLabels = 300;  // label images kept in live mode
 constexpr std::uint32_t kLatchedQueue = 10000;
 // messages kept for a slow subscriber: in a clip nothing may be lost
 constexpr std::uint32_t kKeepAll = 0, kLiveQueue = 10;
+// Live images that wait while one is composed: the newest count.
+constexpr std::uint32_t kLiveImages = 2;
 
 double milliseconds(std::chrono::steady_clock::time_point since) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - since)
@@ -49,7 +51,7 @@ RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       [this](const Frame& f) { onClipFrame(f); },
       [this](const sensor_msgs::ImageConstPtr& i, const std::string& r) { onBadClipFrame(i, r); });
   source_ = std::make_unique<FrameSource>(
-      nh, topics::kImage, topics::kCameraInfo, params_.mode == Mode::kLive ? params_.live_queue : 0,
+      nh, topics::kImage, topics::kCameraInfo, params_.mode == Mode::kLive ? kLiveImages : kKeepAll,
       poses_, [this](const Frame& f) { onFrame(f); },
       [this](const sensor_msgs::ImageConstPtr& i, const std::string& r) { onBadFrame(i, r); });
   reporter_.starting("waiting for clip, segmentation and models");
@@ -81,13 +83,17 @@ void RenderNode::onBadClipFrame(const sensor_msgs::ImageConstPtr& image,
 void RenderNode::onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) {
   if (params_.mode == Mode::kLive && !clock_.covers(msg->header.stamp)) return;
   try {
-    labels_.put(msg->header.stamp, labelsFromMsg(msg->labels));
+    const cv::Mat labels = labelsFromMsg(msg->labels);
+    labels_.put(msg->header.stamp, labels);
+    // Of a frame that was segmented anew; its models follow.
+    if (clip_.setLabels(nanoseconds(msg->header.stamp), labels)) moves_.reset();
   } catch (const std::exception& error) {
     reporter_.warn(msg->header.stamp, error.what());
     return;
   }
   pairClipFrames(msg->header.stamp);
   prepareIfComplete();
+  if (params_.mode == Mode::kLive) workOff();
 }
 
 // Frames up to the newest segmentation either have theirs or will not get one.
@@ -126,6 +132,8 @@ void RenderNode::onModels(const calipso_msgs::AlignedModelsConstPtr& msg) {
     return;
   }
   renderer_.reset();
+  unpreparable_ = false;
+  moves_.reset();
   prepareIfComplete();
 }
 
@@ -160,14 +168,15 @@ bool RenderNode::clipComplete() const {
 }
 
 void RenderNode::prepareIfComplete() {
-  if (!renderer_ && clipComplete() && !mustWaitForPoses()) prepareNow();
+  if (!renderer_ && !unpreparable_ && clipComplete() && !mustWaitForPoses()) prepareNow();
 }
 
 // Where objects move, further frames show more of them; the poses that this takes come from the
 // flow.
 bool RenderNode::mustWaitForPoses() {
-  if (params_.mode == Mode::kLive || dynamics_ || !flow_works_ || !anyMoves(clip_, models_))
-    return false;
+  if (params_.mode == Mode::kLive || dynamics_ || !flow_works_) return false;
+  if (!moves_) moves_ = anyMoves(clip_, models_);
+  if (!*moves_) return false;
   reporter_.preparing("waiting for the objects' motion in the clip");
   return true;
 }
@@ -177,7 +186,7 @@ void RenderNode::prepareNow() {
     reporter_.preparing("background plate, light and appearance");
     const auto start = std::chrono::steady_clock::now();
     // Of a bag the player compares them.
-    if (params_.mode == Mode::kLive) checkSameCamera(params_.scene, clip_.frames().front().camera);
+    if (params_.mode == Mode::kLive) checkKeyFrame(clip_.frames().front());
     PosesTaken taken;
     if (dynamics_) taken = takePoses(posesFromMsg(*dynamics_, models_), models_, clip_);
     const auto prepared = std::make_shared<const Prepared>(prepare(clip_, models_, params_.render));
@@ -195,9 +204,19 @@ void RenderNode::prepareNow() {
                     " for textures, " + std::to_string(taken.accepted) + " of " +
                     std::to_string(taken.offered) + " poses fit their masks");
   } catch (const std::exception& error) {
+    unpreparable_ = true;  // by these models: it is not tried again with every message
     reporter_.failed(error.what());
   }
   workOff();
+}
+
+void RenderNode::checkKeyFrame(const ClipFrame& first) {
+  checkSameCamera(params_.scene, first.camera);
+  const double late =
+      1e-9 * static_cast<double>(first.stamp_ns) - models_msg_->header.stamp.toSec();
+  if (late > 0.0)
+    reporter_.remark("the key frame was missed: what is seen " + std::to_string(late) +
+                     " s after it stands for it, which is wrong of what has moved since");
 }
 
 // What is known of frames that are not later stays: it is sent once only, perhaps before this.
@@ -212,8 +231,11 @@ void RenderNode::startOver(const ros::Time& stamp) {
     models_.clear();
   }
   dynamics_.reset();
+  moves_.reset();
+  unpreparable_ = false;
   frames_.clear();
   states_.clear();
+  left_ = ros::Time();
   reporter_.starting("waiting for segmentation and models");
 }
 
@@ -221,9 +243,11 @@ void RenderNode::onFrame(const Frame& frame) {
   if (params_.mode == Mode::kLive && clock_.startsOver(frame.stamp())) startOver(frame.stamp());
   if (params_.mode == Mode::kLive && !renderer_) {
     unlabelled_.push_back(frame);
-    if (unlabelled_.size() > static_cast<std::size_t>(params_.live_queue)) unlabelled_.pop_front();
+    // The first one most likely is the key frame, whose segmentation takes longest.
+    if (unlabelled_.size() > static_cast<std::size_t>(params_.live_queue))
+      unlabelled_.erase(unlabelled_.begin() + (clip_.frames().empty() ? 1 : 0));
     pairClipFrames(ros::Time(0));
-    if (reporter_.state() != calipso_msgs::NodeStatus::FAILED) prepareIfComplete();
+    prepareIfComplete();
   }
   frames_.push_back({frame.image, frame.info, frame.camera, ""});
   workOff();
@@ -235,22 +259,26 @@ void RenderNode::onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::
 }
 
 void RenderNode::onState(const calipso_msgs::SimulationStateConstPtr& msg) {
-  if (params_.mode == Mode::kLive && !clock_.covers(msg->header.stamp)) return;
+  const bool gone = msg->header.stamp <= left_;  // the frame went without it
+  if (params_.mode == Mode::kLive && (gone || !clock_.covers(msg->header.stamp))) return;
   states_[msg->header.stamp] = msg;
   if (params_.mode == Mode::kLive && renderer_) skipOlderThan(msg->header.stamp);
   workOff();
 }
 
-// Live: the newest frame that has a state goes out; those before it are too late.
+// Live: states come in order, so that what has none before this one gets none.
 void RenderNode::skipOlderThan(const ros::Time& stamp) {
-  const bool here = std::any_of(frames_.begin(), frames_.end(),
-                                [&](const Waiting& w) { return w.image->header.stamp == stamp; });
-  if (!here) return;
-  while (!frames_.empty() && frames_.front().image->header.stamp < stamp) {
-    reporter_.warn(frames_.front().image->header.stamp, "frame skipped, the machine is too slow; " +
-                                                            std::to_string(++skipped_) + " so far");
+  const auto first_stamp = [&] { return frames_.front().image->header.stamp; };
+  while (!frames_.empty() && first_stamp() < stamp && states_.count(first_stamp()) == 0) {
+    countSkipped(first_stamp(), 1, "the simulator is too slow");
+    left_ = first_stamp();
     frames_.pop_front();
   }
+}
+
+void RenderNode::countSkipped(const ros::Time& stamp, std::size_t frames, const std::string& why) {
+  skipped_ += frames;
+  reporter_.warn(stamp, "frame skipped, " + why + "; " + std::to_string(skipped_) + " so far");
 }
 
 // Empty: frames can be edited. Otherwise the reason why they pass unedited, "" while they must
@@ -273,8 +301,8 @@ void RenderNode::workOff() {
   }
   if (params_.mode != Mode::kLive) return;
   while (frames_.size() > static_cast<std::size_t>(params_.live_queue)) {
-    reporter_.warn(frames_.front().image->header.stamp,
-                   "frame skipped, no state came; " + std::to_string(++skipped_) + " so far");
+    left_ = frames_.front().image->header.stamp;
+    countSkipped(left_, 1, "no state came");
     frames_.pop_front();
   }
 }
@@ -282,16 +310,28 @@ void RenderNode::workOff() {
 // false: the first frame has to wait.
 bool RenderNode::workOffFront() {
   const Waiting frame = frames_.front();
+  const ros::Time stamp = frame.image->header.stamp;
   const std::string reason = frame.camera ? whyUnedited() : frame.trouble;
-  const auto state = states_.find(frame.image->header.stamp);
-  if (reason.empty() && (!renderer_ || state == states_.end())) return false;
+  const auto state = states_.find(stamp);
+  if (reason.empty() && (!renderer_ || state == states_.end() || mustWaitForMask(stamp)))
+    return false;
   frames_.pop_front();
   if (reason.empty())
     edit(frame, *state->second);
   else
     passUnedited(frame, reason);
-  states_.erase(states_.begin(), states_.upper_bound(frame.image->header.stamp));
+  const auto missed = std::distance(states_.begin(), states_.lower_bound(stamp));
+  if (missed > 0) countSkipped(stamp, missed, "the machine is too slow");
+  states_.erase(states_.begin(), states_.upper_bound(stamp));
+  left_ = std::max(left_, stamp);
   return true;
+}
+
+// Live: its mask comes soon, or never if a later frame's has come; a segmentation that lags must not
+// hold up the video.
+bool RenderNode::mustWaitForMask(const ros::Time& stamp) const {
+  return params_.mode == Mode::kLive && labels_.newest() < stamp &&
+         frames_.size() < static_cast<std::size_t>(params_.live_queue);
 }
 
 void RenderNode::edit(const Waiting& frame, const calipso_msgs::SimulationState& state) {

@@ -57,9 +57,13 @@ class RenderNode {
   bool mustWaitForPoses();
   void prepareIfComplete();
   void prepareNow();
+  // @throw std::invalid_argument if another camera took it
+  void checkKeyFrame(const ClipFrame& first);
   void workOff();
   bool workOffFront();
+  bool mustWaitForMask(const ros::Time& stamp) const;
   void skipOlderThan(const ros::Time& stamp);
+  void countSkipped(const ros::Time& stamp, std::size_t frames, const std::string& why);
   void edit(const Waiting& frame, const calipso_msgs::SimulationState& state);
   void passUnedited(const Waiting& frame, const std::string& reason);
   void publish(const Waiting& frame, const sensor_msgs::Image& edited, const cv::Mat& provenance);
@@ -83,11 +87,14 @@ class RenderNode {
   bool flow_works_ = false;                    // somebody estimates it, and has not failed
   bool simulator_ready_ = false;               // live: a state comes for every frame
   std::map<std::string, std::string> failed_;  // node -> why
+  std::optional<bool> moves_;                  // anything in the clip; empty: not looked at yet
+  bool unpreparable_ = false;
   std::unique_ptr<Renderer> renderer_;
 
   std::deque<Waiting> frames_;
   std::map<ros::Time, calipso_msgs::SimulationStateConstPtr> states_;
-  std::uint64_t skipped_ = 0;  // live mode: frames that a newer one overtook
+  ros::Time left_;             // of the newest frame that has left, however
+  std::uint64_t skipped_ = 0;  // live mode: frames that were left out
 
   std::unique_ptr<FrameSource> clip_source_, source_;
   ros::Subscriber state_;
