@@ -79,9 +79,14 @@ Calibration loadCalibration(const std::string& path) {
   camera.cx = k[2];
   camera.fy = k[4];
   camera.cy = k[5];
-  if (root["distortion_coefficients"]) {
+  if (root["distortion_coefficients"])
     calibration.distortion = readData(root, "distortion_coefficients", path);
-  }
+  if (!root["distortion_model"]) return calibration;
+  const std::string model = root["distortion_model"].as<std::string>();
+  calibration.fisheye = model == "equidistant" || model == "fisheye";
+  if (!calibration.fisheye && model != "plumb_bob" && model != "rational_polynomial")
+    fail(path, "distortion_model is '" + model +
+                   "'; it must be plumb_bob, rational_polynomial or equidistant");
   return calibration;
 }
 
@@ -89,7 +94,10 @@ cv::Mat undistort(const cv::Mat& image, const Calibration& calibration) {
   const Camera& c = calibration.camera;
   const cv::Matx33d k(c.fx, 0.0, c.cx, 0.0, c.fy, c.cy, 0.0, 0.0, 1.0);
   cv::Mat straight;
-  cv::undistort(image, straight, k, calibration.distortion);
+  if (calibration.fisheye)
+    cv::fisheye::undistortImage(image, straight, k, calibration.distortion, k);
+  else
+    cv::undistort(image, straight, k, calibration.distortion);
   return straight;
 }
 

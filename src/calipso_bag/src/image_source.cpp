@@ -1,6 +1,7 @@
 #include "calipso_bag/image_source.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <stdexcept>
@@ -13,6 +14,7 @@ namespace calipso::bag {
 namespace {
 
 constexpr double kStillFps = 30.0;
+constexpr double kMostOf = 0.9;  // of the frames that a video says it has
 
 cv::Mat readImage(const std::string& path) {
   cv::Mat image = cv::imread(path, cv::IMREAD_COLOR);
@@ -67,7 +69,11 @@ class Video : public ImageSource {
 
   std::optional<cv::Mat> next() override {
     cv::Mat image;
-    if (!capture_.read(image) || image.empty()) return std::nullopt;
+    if (!capture_.read(image) || image.empty()) {
+      checkComplete();
+      return std::nullopt;
+    }
+    ++frames_;
     if (size_.empty()) size_ = image.size();
     requireSize(image, size_, path_ + ": a frame");
     return image;
@@ -75,8 +81,19 @@ class Video : public ImageSource {
   double fps() const override { return fps_; }
 
  private:
+  // How many there are is an estimate in some formats.
+  void checkComplete() const {
+    const double all = capture_.get(cv::CAP_PROP_FRAME_COUNT);
+    if (frames_ >= kMostOf * all) return;
+    throw std::runtime_error(path_ + ": holds " + std::to_string(frames_) + " of " +
+                             std::to_string(std::lround(all)) +
+                             " frames, it is damaged or incomplete; copy it anew, or re-encode "
+                             "what there is");
+  }
+
   std::string path_;
   cv::VideoCapture capture_;
+  int frames_ = 0;  // read
   double fps_ = 0.0;
   cv::Size size_;
 };

@@ -77,6 +77,18 @@ TEST_F(BagClipTest, ASingleCameraInfoServesEveryFrame) {
   EXPECT_EQ(second.info->header.stamp, second.image->header.stamp);
 }
 
+TEST_F(BagClipTest, RectifiedImagesHaveTheirOwnFocalLength) {
+  write([](rosbag::Bag& bag) {
+    sensor_msgs::CameraInfo info = test_clip::info(1.0);
+    info.D = {-0.3, 0.1, 0.0, 0.0, 0.0};
+    info.P = {9.0, 0.0, 3.5, 0.0, 0.0, 9.0, 2.5, 0.0, 0.0, 0.0, 1.0, 0.0};
+    test_clip::write(bag, info);
+    bag.write("/camera/image_rect", ros::Time(1.0), test_clip::image(1.0));
+  });
+  BagClip clip({path_, "", ""});
+  EXPECT_DOUBLE_EQ(clip.reader().next().info->K[0], 9.0);
+}
+
 TEST_F(BagClipTest, CompressedImagesAreReadAsBgr) {
   Camera camera;
   camera.width = 16;

@@ -71,3 +71,23 @@ TEST(Undistort, LeavesThePrincipalPointAlone) {
   const cv::Mat straight = undistort(image, c);
   EXPECT_EQ(straight.at<cv::Vec3b>(50, 50), cv::Vec3b(255, 255, 255));
 }
+
+// A fisheye's four numbers mean something else. Its picture of a point 45 degrees off the axis lies
+// at a distance of f pi / 4, where a pinhole's lies at f.
+TEST(Undistort, AFisheyeIsUndistortedByItsOwnModel) {
+  const TemporaryFolder folder;
+  const std::string text =
+      "image_width: 201\nimage_height: 201\ncamera_matrix: {rows: 3, cols: 3, data: "
+      "[80, 0, 100, 0, 80, 100, 0, 0, 1]}\ndistortion_model: MODEL\n"
+      "distortion_coefficients: {rows: 1, cols: 4, data: [0, 0, 0, 0]}\n";
+  const auto of_model = [&](const std::string& model) {
+    std::string named = text;
+    return loadCalibration(written(folder, named.replace(named.find("MODEL"), 5, model)));
+  };
+  cv::Mat image(201, 201, CV_8UC3, cv::Scalar(0, 0, 0));
+  image.at<cv::Vec3b>(100, 100 + cvRound(80 * CV_PI / 4)) = {255, 255, 255};
+  const cv::Mat straight = undistort(image, of_model("equidistant"));
+  EXPECT_GT(straight.at<cv::Vec3b>(100, 180)[0], 50);
+  EXPECT_NE(messageOf([&] { of_model("cylinder"); }).find("distortion_model is 'cylinder'"),
+            std::string::npos);
+}

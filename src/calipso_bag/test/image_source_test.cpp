@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 #include <stdexcept>
 
 #include "temporary_folder.hpp"
@@ -68,6 +70,34 @@ TEST(HoldLast, LeavesALongClipAlone) {
   int count = 0;
   while (source->next()) ++count;
   EXPECT_EQ(count, 3);
+}
+
+// A download that was cut short still opens.
+TEST(OpenVideo, SaysThatAVideoIsIncomplete) {
+  const TemporaryFolder folder;
+  const cv::Size size(64, 48);
+  const int all = 40;
+  cv::VideoWriter writer(folder / "whole.avi", cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25.0,
+                         size);
+  cv::Mat noise(size, CV_8UC3);
+  cv::RNG random(1);
+  for (int k = 0; k < all; ++k) {
+    random.fill(noise, cv::RNG::UNIFORM, 0, 255);
+    writer.write(noise);
+  }
+  writer.release();
+  const auto count = [](const std::string& path) {
+    const auto source = openVideo(path);
+    int frames = 0;
+    while (source->next()) ++frames;
+    return frames;
+  };
+  EXPECT_EQ(count(folder / "whole.avi"), all);
+  std::filesystem::copy(folder / "whole.avi", folder / "part.avi");
+  std::filesystem::resize_file(folder / "part.avi",
+                               std::filesystem::file_size(folder / "whole.avi") / 2);
+  const std::string said = messageOf([&] { count(folder / "part.avi"); });
+  EXPECT_NE(said.find("of 40 frames"), std::string::npos) << said;
 }
 
 TEST(OpenVideo, NamesAFileThatIsNeitherVideoNorImage) {

@@ -117,6 +117,14 @@ sensor_msgs::CameraInfo toMsg(const Camera& camera) {
   return info;
 }
 
+sensor_msgs::CameraInfo infoOfTopic(const std::string& image_topic, sensor_msgs::CameraInfo info) {
+  if (image_topic.find("image_rect") == std::string::npos) return info;
+  for (std::size_t i = 0; i < 9; ++i) info.K[i] = info.P[i + i / 3];
+  info.D.assign(info.D.size(), 0.0);
+  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  return info;
+}
+
 Camera fromMsg(const sensor_msgs::CameraInfo& info, const Eigen::Isometry3d& world_from_camera) {
   const auto distorted =
       std::find_if(info.D.begin(), info.D.end(), [](double d) { return d != 0.0; });

@@ -41,6 +41,8 @@ std::string tfName(const std::string& frame_id) {
 CameraPoses::CameraPoses(Mode mode)
     : buffer_(ros::Duration(mode == Mode::kLive ? kKeepLiveSec : kKeepSec)), listener_(buffer_) {}
 
+void CameraPoses::forget() { buffer_.clear(); }
+
 Eigen::Isometry3d CameraPoses::worldFromCamera(const std::string& camera_frame,
                                                const ros::Time& stamp) const {
   try {
@@ -57,7 +59,7 @@ Eigen::Isometry3d CameraPoses::worldFromCamera(const std::string& camera_frame,
 }
 
 FrameSource::FrameSource(ros::NodeHandle& nh, const std::string& image_topic,
-                         const std::string& info_topic, unsigned queue, const CameraPoses& poses,
+                         const std::string& info_topic, unsigned queue, CameraPoses& poses,
                          OnFrame on_frame, OnBadFrame on_bad_frame)
     : poses_(poses),
       on_frame_(std::move(on_frame)),
@@ -66,6 +68,7 @@ FrameSource::FrameSource(ros::NodeHandle& nh, const std::string& image_topic,
       info_(nh, info_topic, queue),
       pairs_(image_, info_, pairQueue(queue)),
       live_(queue > 0),
+      image_topic_(nh.resolveName(image_topic)),
       info_topic_(nh.resolveName(info_topic)) {
   image_.registerCallback(&FrameSource::onImage, this);
   pairs_.registerCallback(&FrameSource::onPair, this);
@@ -82,14 +85,17 @@ void FrameSource::onImage(const sensor_msgs::ImageConstPtr& image) {
 }
 
 void FrameSource::onPair(const sensor_msgs::ImageConstPtr& image,
-                         const sensor_msgs::CameraInfoConstPtr& info) {
-  if (image->header.stamp.isZero()) return;
+                         const sensor_msgs::CameraInfoConstPtr& given) {
+  const ros::Time& stamp = image->header.stamp;
+  if (stamp.isZero()) return;
   unpaired_ = 0;
+  if (live_ && clock_.startsOver(stamp)) poses_.forget();
+  const auto info =
+      boost::make_shared<const sensor_msgs::CameraInfo>(infoOfTopic(image_topic_, *given));
   Frame frame;
   try {
     checkSameSize(*image, *info);
-    frame = {image, info,
-             fromMsg(*info, poses_.worldFromCamera(image->header.frame_id, image->header.stamp))};
+    frame = {image, info, fromMsg(*info, poses_.worldFromCamera(image->header.frame_id, stamp))};
   } catch (const std::exception& error) {
     on_bad_frame_(image, error.what());
     return;

@@ -45,6 +45,22 @@ TEST(Conversions, camerasRoundTrip) {
   EXPECT_EQ(again.cy, 179.5);
 }
 
+// image_proc publishes no camera_info of its own: D and K are the raw images', P is the others'.
+TEST(Conversions, aCameraInfoTellsOfRectifiedImagesToo) {
+  Camera straight;
+  straight.width = straight.height = 10;
+  straight.fx = 8, straight.fy = 9, straight.cx = 4.5, straight.cy = 5.5;
+  sensor_msgs::CameraInfo info = toMsg(straight);
+  info.K[0] = info.K[4] = 12.0, info.K[2] = 3.0;
+  info.D[0] = -0.3;
+  EXPECT_THROW(fromMsg(infoOfTopic("/camera/image_raw", info), somePose()), std::invalid_argument);
+  const Camera seen = fromMsg(infoOfTopic("/camera/image_rect_color", info), somePose());
+  EXPECT_EQ(seen.fx, 8);
+  EXPECT_EQ(seen.fy, 9);
+  EXPECT_EQ(seen.cx, 4.5);
+  EXPECT_EQ(seen.cy, 5.5);
+}
+
 TEST(Conversions, uncalibratedAndDistortedCamerasAreRefused) {
   sensor_msgs::CameraInfo info;
   EXPECT_THROW(fromMsg(info, somePose()), std::invalid_argument);

@@ -69,7 +69,7 @@ Edit readEdit(const YAML::Node& node, const YamlReader& reader) {
   edit.duration = reader.number(node, "duration", edit.duration);
   edit.youngs_modulus = reader.number(node, "youngs_modulus", kUnchanged);
   edit.poissons_ratio = reader.number(node, "poissons_ratio", kUnchanged);
-  edit.density = reader.number(node, "density", kUnchanged);
+  if (node["density"]) edit.density = reader.numberOrInfinity(node, "density");  // nothing moves it
   edit.damping = reader.number(node, "damping", kUnchanged);
   edit.pressure = reader.number(node, "pressure", edit.pressure);
   edit.specular = reader.number(node, "specular", kUnchanged);

@@ -54,13 +54,18 @@ std::vector<YAML::Node> YamlReader::list(const YAML::Node& node, const std::stri
   return {value.begin(), value.end()};
 }
 
-double YamlReader::number(const YAML::Node& node, const std::string& key) const {
+double YamlReader::numberOrInfinity(const YAML::Node& node, const std::string& key) const {
   const YAML::Node value = require(node, key);
   double result = 0.0;
-  if (!value.IsScalar() || !YAML::convert<double>::decode(value, result)) {
+  if (!value.IsScalar() || !YAML::convert<double>::decode(value, result) || std::isnan(result)) {
     fail(key, "is '" + describe(value) + "'; it must be a number");
   }
-  if (!std::isfinite(result)) fail(key, "is '" + describe(value) + "'; it must be finite");
+  return result;
+}
+
+double YamlReader::number(const YAML::Node& node, const std::string& key) const {
+  const double result = numberOrInfinity(node, key);
+  if (std::isinf(result)) fail(key, "is '" + describe(node[key]) + "'; it must be finite");
   return result;
 }
 

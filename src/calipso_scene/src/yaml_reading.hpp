@@ -24,6 +24,7 @@ class YamlReader {
 
   // All of these: @throw std::invalid_argument if absent, of another type or not finite.
   double number(const YAML::Node& node, const std::string& key) const;
+  double numberOrInfinity(const YAML::Node& node, const std::string& key) const;  // .inf, too
   int integer(const YAML::Node& node, const std::string& key) const;
   bool yes(const YAML::Node& node, const std::string& key) const;
   // ... or not above zero; `unit` for the message.

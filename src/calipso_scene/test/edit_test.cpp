@@ -47,6 +47,12 @@ TEST(Edit, readsEveryFieldAndSortsByTime) {
   EXPECT_TRUE(std::isnan(edits[1].density));
 }
 
+TEST(Edit, anInfiniteDensityLetsNothingMoveAnObject) {
+  const auto edits =
+      loadEdits(writeFile("- {t: 0, object: banana1, kind: material, density: .inf}"), kObjects);
+  EXPECT_TRUE(std::isinf(edits.at(0).density));
+}
+
 TEST(Edit, readsWhatTheKindsNeed) {
   const auto edits = loadEdits(
       writeFile(

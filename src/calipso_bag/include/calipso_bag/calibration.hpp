@@ -11,8 +11,10 @@ namespace calipso::bag {
 // What a camera's calibration file says.
 struct Calibration {
   Camera camera;  // pose: identity
-  // k1 k2 p1 p2 [k3 ...] (plumb_bob, rational_polynomial); may be empty
+  // k1 k2 p1 p2 [k3 ...] (plumb_bob, rational_polynomial), of a fisheye k1 k2 k3 k4 (equidistant);
+  // may be empty
   std::vector<double> distortion;
+  bool fisheye = false;
 
   bool distorted() const;
 };

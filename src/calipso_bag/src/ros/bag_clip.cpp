@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "calipso_bag/shot_changes.hpp"
+#include "calipso_ros/conversions.hpp"
 #include "clip_checks.hpp"
 #include "open_bag.hpp"
 
@@ -92,7 +93,7 @@ void BagClip::readCameraInfos() {
   rosbag::View view(bag_, rosbag::TopicQuery(camera_info_topic_));
   for (const rosbag::MessageInstance& message : view) {
     const auto info = message.instantiate<sensor_msgs::CameraInfo>();
-    infos_[info->header.stamp] = *info;
+    infos_[info->header.stamp] = infoOfTopic(image_topic_, *info);
   }
   if (infos_.empty()) {
     throw std::runtime_error(path_ + ": topic " + camera_info_topic_ + " holds no message");

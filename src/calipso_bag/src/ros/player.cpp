@@ -301,7 +301,8 @@ void Player::playFrames() {
     waitForEdited([this] { return window_.hasRoom() && recorded(window_.returned()); });
     playFrame(frame, ros::Time().fromNSec(static_cast<std::uint64_t>(schedule_[i].time_ns)));
   }
-  waitForEdited([this] { return window_.empty(); });
+  while (!window_.empty())
+    waitForEdited([this, before = window_.returned()] { return window_.returned() > before; });
 }
 
 void Player::playFrame(const BagFrame& frame, const ros::Time& stamp) {

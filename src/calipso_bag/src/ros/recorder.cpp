@@ -143,8 +143,12 @@ void Recorder::onMarkers(const ros::MessageEvent<visualization_msgs::MarkerArray
   newest_[event.getPublisherName()] = stamp;
 }
 
-// One message for each transform, so that each is found at its own stamp.
+// One message for each transform, so that each is found at its own stamp. Of a clip the graph's own
+// alone: what runs beside it has other times.
 void Recorder::onTf(const ros::MessageEvent<tf2_msgs::TFMessage const>& event) {
+  const std::string own = nh_.getNamespace() + "/";
+  if (params_.mode == Mode::kBag && event.getPublisherName().compare(0, own.size(), own) != 0)
+    return;
   const std::string topic = event.getConnectionHeader().at("topic");
   for (const geometry_msgs::TransformStamped& transform : event.getMessage()->transforms) {
     const auto single = boost::make_shared<tf2_msgs::TFMessage>();

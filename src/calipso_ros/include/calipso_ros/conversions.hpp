@@ -39,6 +39,9 @@ calipso_msgs::Mesh toMsg(const TriangleMesh& mesh);
 TriangleMesh fromMsg(const calipso_msgs::Mesh& mesh);
 
 sensor_msgs::CameraInfo toMsg(const Camera& camera);  // header left empty
+// What a camera_info says of the images of a topic. One and the same tells of a camera's raw images
+// (D, K) and of its rectified ones, "image_rect...", as image_proc makes them (P).
+sensor_msgs::CameraInfo infoOfTopic(const std::string& image_topic, sensor_msgs::CameraInfo info);
 // @throw std::invalid_argument if the focal length or size is not positive, a number is not finite,
 // or there is distortion
 Camera fromMsg(const sensor_msgs::CameraInfo& info, const Eigen::Isometry3d& world_from_camera);

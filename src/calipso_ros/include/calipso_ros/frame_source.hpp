@@ -14,6 +14,7 @@
 #include <string>
 
 #include "calipso_ros/mode.hpp"
+#include "calipso_ros/video_clock.hpp"
 #include "calipso_scene/camera.hpp"
 
 namespace calipso {
@@ -31,6 +32,9 @@ class CameraPoses {
   // @throw std::runtime_error naming frames, stamp and remedy when tf does not know the pose in
   // time
   Eigen::Isometry3d worldFromCamera(const std::string& camera_frame, const ros::Time& stamp) const;
+
+  // What moves, as the video starts over: tf takes nothing that is much older than what it has.
+  void forget();
 
  private:
   tf2_ros::Buffer buffer_;
@@ -56,20 +60,21 @@ class FrameSource {
 
   // queue: pairs kept while waiting; 0 keeps all. Both callbacks run in the node's callback thread.
   FrameSource(ros::NodeHandle& nh, const std::string& image_topic, const std::string& info_topic,
-              unsigned queue, const CameraPoses& poses, OnFrame on_frame, OnBadFrame on_bad_frame);
+              unsigned queue, CameraPoses& poses, OnFrame on_frame, OnBadFrame on_bad_frame);
 
  private:
   void onImage(const sensor_msgs::ImageConstPtr& image);
   void onPair(const sensor_msgs::ImageConstPtr& image, const sensor_msgs::CameraInfoConstPtr& info);
 
-  const CameraPoses& poses_;
+  CameraPoses& poses_;
   OnFrame on_frame_;
   OnBadFrame on_bad_frame_;
   message_filters::Subscriber<sensor_msgs::Image> image_;
   message_filters::Subscriber<sensor_msgs::CameraInfo> info_;
   message_filters::TimeSynchronizer<sensor_msgs::Image, sensor_msgs::CameraInfo> pairs_;
   const bool live_;  // the queue has an end
-  const std::string info_topic_;
+  const std::string image_topic_, info_topic_;
+  VideoClock clock_;       // live
   unsigned unpaired_ = 0;  // images since the last pair
 };
 
