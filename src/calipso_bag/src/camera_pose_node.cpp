@@ -13,7 +13,7 @@ namespace {
 class CameraPoseNode {
  public:
   CameraPoseNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
-      : scene_(calipso::loadScene(calipso::requiredParam<std::string>(pnh, "scene"))) {
+      : scene_(calipso::loadScene(calipso::pathParam(pnh, "scene"))) {
     if (scene_.camera_moves || !scene_.world_from_camera_per_frame.empty()) {
       throw std::invalid_argument("the camera of scene '" + scene_.name +
                                   "' moves; its pose has to come from tf");

@@ -9,11 +9,11 @@ calipso::bag::Player::Params loadParams(const ros::NodeHandle& pnh) {
   const auto read = [&](const std::string& name, auto& value) {
     value = calipso::optionalParam(pnh, name, value);
   };
-  params.clip.path = calipso::requiredParam<std::string>(pnh, "bag");
-  params.scene = calipso::requiredParam<std::string>(pnh, "scene");
+  params.clip.path = calipso::pathParam(pnh, "bag");
+  params.scene = calipso::pathParam(pnh, "scene");
   read("image_topic", params.clip.image_topic);
   read("camera_info_topic", params.clip.camera_info_topic);
-  read("edits", params.edits);
+  params.edits = calipso::optionalPathParam(pnh, "edits");
   read("poses", params.poses);
   read("nodes", params.nodes);
   read("estimate_wind", params.estimate_wind);

@@ -9,9 +9,9 @@ namespace {
 
 calipso::bag::Recorder::Params loadParams(const ros::NodeHandle& pnh) {
   calipso::bag::Recorder::Params params;
-  params.output = calipso::requiredParam<std::string>(pnh, "output");
+  params.output = calipso::pathParam(pnh, "output");
   for (const char* name : {"input", "edits"})
-    params.inputs.push_back(calipso::optionalParam(pnh, name, std::string()));
+    params.inputs.push_back(calipso::optionalPathParam(pnh, name));
   params.mode = calipso::modeParam(pnh);
   params.flow = calipso::optionalParam(pnh, "flow", params.flow);
   params.late_timeout_sec =

@@ -15,9 +15,8 @@ namespace {
 // times of the edits count from the first frame after the simulator and the renderer are ready.
 // They are sent again when the simulator has started over, because the video has.
 void sendEdits(ros::NodeHandle& nh, const ros::NodeHandle& pnh) {
-  const calipso::Scene scene =
-      calipso::loadScene(calipso::requiredParam<std::string>(pnh, "scene"));
-  const std::string path = calipso::requiredParam<std::string>(pnh, "edits");
+  const calipso::Scene scene = calipso::loadScene(calipso::pathParam(pnh, "scene"));
+  const std::string path = calipso::pathParam(pnh, "edits");
   calipso::bag::readEdits(path, scene, ros::Time(1.0));  // complain early
 
   std::map<std::string, std::uint8_t> state_of;  // a node that failed may be ready again

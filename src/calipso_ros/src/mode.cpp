@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "calipso_ros/node_main.hpp"
+#include "calipso_ros/params.hpp"
 
 namespace calipso {
 

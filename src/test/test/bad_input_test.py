@@ -83,25 +83,30 @@ class BadInput(unittest.TestCase):
         finally:
             rosparam.delete_param("/player/in_flight")  # the test's master keeps it
 
-    def edit_with(self, parameter, value, timeout_sec):
-        """(exit status, everything printed) of a run in which one of the nodes gets this parameter."""
-        rosparam.set_param(parameter, value)
-        try:
-            return launching.Launch("calipso_launch", "edit.launch", os.environ["ROS_MASTER_URI"], bag=self.bag,
-                                    scene=self.scene, out=self.path("out.bag")).wait(timeout_sec)
-        finally:
-            rosparam.delete_param(parameter)
+    def edit_with(self, parameters, timeout_sec):
+        """(exit status, everything printed) of a run with these parameters, as YAML."""
+        params = self.path("params.yaml")
+        with open(params, "w") as file:
+            file.write(parameters)
+        return launching.Launch("calipso_launch", "edit.launch", os.environ["ROS_MASTER_URI"], bag=self.bag,
+                                scene=self.scene, out=self.path("out.bag"), params=params).wait(timeout_sec)
 
     def test_renderer_that_cannot_start_ends_the_run_at_once(self):
-        status, printed = self.edit_with("/calipso/render/add_noise", "loud", 45)
+        status, printed = self.edit_with("render: {add_noise: loud}", 45)
         self.assertNotEqual(status, 0, printed)
         self.assertIn("nobody draws the frames, render has failed: parameter /calipso/render/add_noise", printed)
 
     def test_frames_pass_a_simulator_that_cannot_start(self):
-        status, printed = self.edit_with("/calipso/simulator/max_nodes", "few", 120)
+        status, printed = self.edit_with("simulator: {max_nodes: few}", 120)
         self.assertEqual(status, 0, printed)
         self.assertIn("frames: 4 in, 4 out", printed)
         self.assertIn("simulator failed: parameter /calipso/simulator/max_nodes is few", printed)
+
+    def test_a_master_that_runs_on_keeps_nothing_of_another_run(self):
+        rosparam.set_param("/calipso/simulator/max_nodes", "few")
+        status, printed = self.edit_with("{}", 120)
+        self.assertEqual(status, 0, printed)
+        self.assertNotIn("simulator failed", printed)
 
     def test_missing_bag(self):
         self.expect_complaint("absent.bag", bag=self.path("absent.bag"))

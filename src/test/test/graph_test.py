@@ -2,7 +2,6 @@
 """The whole graph on a short clip of the shipped example, launched as a user would."""
 
 import os
-import re
 import subprocess
 import tempfile
 import time
@@ -115,15 +114,6 @@ class Graph(unittest.TestCase):
         edit = self.parameters("edit.launch", quality="final", **self.arguments("final.bag", None))
         live = self.parameters("live.launch", quality="final", scene=self.scene)
         self.assertEqual([p["/calipso/render/quality"] for p in (edit, live)], ["final", "final"])
-
-    def test_nothing_of_a_run_is_left_on_the_server_for_another_kind_of_run(self):
-        """A master that runs on keeps what a launch sets: the next one sets it anew, unless the node is its own."""
-        edit = self.parameters("edit.launch", **self.arguments("out.bag", None))
-        live = self.parameters("live.launch", scene=self.scene, out=self.path("out.bag"), edits="edits.yaml")
-        own = {"edit": "player", "live": "camera_pose|send_edits"}
-        for one, other, name in ((edit, live, "edit"), (live, edit, "live")):
-            left = [p for p in set(one) - set(other) if not re.match("/calipso/(%s)/" % own[name], p)]
-            self.assertEqual(left, [], "set by %s.launch alone" % name)
 
     def test_what_happens_in_the_last_frame_is_recorded(self):
         out = self.edit("last.bag", [{"t": (FRAMES - 1) / 30.0 - 0.01, "object": "banana1", "kind": "velocity",

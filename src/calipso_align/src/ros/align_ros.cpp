@@ -41,7 +41,7 @@ const calipso_msgs::ObjectContour* findContour(const calipso_msgs::Segmentation&
 
 AlignNodeParams loadAlignParams(const ros::NodeHandle& pnh) {
   AlignNodeParams params;
-  params.scene = requiredParam<std::string>(pnh, "scene");
+  params.scene = pathParam(pnh, "scene");
   params.levels = optionalParam(pnh, "levels", AlignOptions().levels);
   params.use_depth = optionalParam(pnh, "use_depth", params.use_depth);
   params.mode = modeParam(pnh);

@@ -27,7 +27,7 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 SegmentationNodeParams loadSegmentationParams(const ros::NodeHandle& pnh) {
-  return {requiredParam<std::string>(pnh, "scene"), modeParam(pnh)};
+  return {pathParam(pnh, "scene"), modeParam(pnh)};
 }
 
 SegmentationRos::SegmentationRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)

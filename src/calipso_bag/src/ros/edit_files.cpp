@@ -56,7 +56,7 @@ std::vector<calipso_msgs::Edit> readBag(const std::string& path, const Scene& sc
 
 std::vector<calipso_msgs::Edit> readEdits(const std::string& path, const Scene& scene,
                                           const ros::Time& first_stamp) {
-  if (path.empty() || path == "none") return {};
+  if (path.empty()) return {};
   if (!endsWith(path, ".bag")) return readYaml(path, scene, first_stamp);
   try {
     return readBag(path, scene, first_stamp);

@@ -10,7 +10,7 @@
 
 namespace calipso::bag {
 
-// The edits of a YAML file, or those that an edited bag says were applied; none for "" and "none".
+// The edits of a YAML file, or those that an edited bag says were applied; none for "".
 // Sorted by stamp. `first_stamp`: of the clip.
 // @throw std::runtime_error / std::invalid_argument naming file, entry, value and remedy
 std::vector<calipso_msgs::Edit> readEdits(const std::string& path, const Scene& scene,

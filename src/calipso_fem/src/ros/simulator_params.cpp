@@ -68,7 +68,7 @@ constexpr int kMostLiveFrames = 3;  // stepped at once: so many late frames are 
 
 SimulatorParams loadSimulatorParams(const ros::NodeHandle& pnh) {
   SimulatorParams p;
-  p.scene_directory = requiredParam<std::string>(pnh, "scene");
+  p.scene_directory = pathParam(pnh, "scene");
   p.mode = modeParam(pnh);
   p.colour_by = optionalParam(pnh, "colour_by", p.colour_by);
   if (p.colour_by != "von_mises" && p.colour_by != "displacement")

@@ -33,7 +33,7 @@ DenseFlow::Preset readPreset(const ros::NodeHandle& pnh) {
 
 Params loadParams(const ros::NodeHandle& pnh) {
   Params params;
-  params.scene = requiredParam<std::string>(pnh, "scene");
+  params.scene = pathParam(pnh, "scene");
   params.mode = modeParam(pnh);
   params.flow_preset = readPreset(pnh);
   TrackerParams& tracker = params.dynamics.tracker;

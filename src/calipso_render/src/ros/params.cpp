@@ -49,7 +49,7 @@ void loadScenery(const Scene& scene, RenderParams& render) {
 
 NodeParams loadParams(const ros::NodeHandle& pnh) {
   NodeParams p;
-  p.scene = loadScene(requiredParam<std::string>(pnh, "scene"));
+  p.scene = loadScene(pathParam(pnh, "scene"));
   p.mode = modeParam(pnh);
   p.render.quality = qualityFromString(optionalParam<std::string>(pnh, "quality", "live"));
   p.render.sun_radius = inRange(pnh, "sun_radius", p.render.sun_radius, 0.0, 0.5);
