@@ -8,6 +8,10 @@
 
 namespace calipso::render {
 
+// What NoiseField repeats over the picture: its channels' values, row by row.
+using NoiseTile = std::vector<float>;
+NoiseTile noiseTile(float correlation);
+
 // The camera's noise: standard deviation in code values against code value, per channel, and how
 // much of it the channels have in common.
 class NoiseModel {
@@ -28,12 +32,15 @@ class NoiseModel {
   // Grey pictures have 1.
   float correlation() const { return correlation_; }
 
+  const std::shared_ptr<const NoiseTile>& tile() const { return tile_; }
+
   static constexpr int kKnots = 9;  // at code values 0, 32, .. 256; linear between them
   static constexpr float kKnotStep = 32.0f;
 
  private:
   std::array<std::array<float, kKnots>, 3> deviation_;
   float correlation_;
+  std::shared_ptr<const NoiseTile> tile_;
 };
 
 // Noise of unit variance per channel: what the channels have in common, hardly correlated between
@@ -55,7 +62,7 @@ class NoiseField {
   int column(int u) const { return (u + shift_u_) & (kSide - 1); }
 
  private:
-  std::shared_ptr<const std::vector<float>> tile_;
+  std::shared_ptr<const NoiseTile> tile_;
   int shift_u_, shift_v_;
 };
 

@@ -193,6 +193,8 @@ class CommonNoise {
 }  // namespace
 
 NoiseModel::NoiseModel() : correlation_(kUsualCorrelation) {
+  static const auto usual = std::make_shared<const NoiseTile>(noiseTile(kUsualCorrelation));
+  tile_ = usual;
   for (auto& channel : deviation_) channel.fill(0.0f);
 }
 
@@ -220,6 +222,7 @@ NoiseModel NoiseModel::estimate(const std::vector<cv::Mat>& frames,
     common.add(frames[i], frames[i + 1], steady[i] & steady[i + 1]);
   if (const auto correlation = common.correlation()) model.correlation_ = *correlation;
   if (isGrey(frames[0])) model.correlation_ = 1.0f;
+  model.tile_ = std::make_shared<const NoiseTile>(noiseTile(model.correlation_));
   return model;
 }
 

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <mutex>
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_render/noise.hpp"
@@ -49,7 +48,9 @@ const Fields& fields() {
   return made;
 }
 
-std::vector<float> mixed(float correlation) {
+}  // namespace
+
+NoiseTile noiseTile(float correlation) {
   constexpr int kColumns = kSide + NoiseField::kWrapped;
   std::vector<float> values;
   values.reserve(3 * kSide * kColumns);
@@ -63,22 +64,7 @@ std::vector<float> mixed(float correlation) {
   return values;
 }
 
-// Videos have one each: the last one made is kept.
-std::shared_ptr<const std::vector<float>> tileOf(float correlation) {
-  static std::mutex guard;
-  static float kept_correlation = -1.0f;
-  static std::shared_ptr<const std::vector<float>> kept;
-  const std::lock_guard<std::mutex> lock(guard);
-  if (kept_correlation != correlation)
-    kept = std::make_shared<const std::vector<float>>(mixed(correlation)),
-    kept_correlation = correlation;
-  return kept;
-}
-
-}  // namespace
-
-NoiseField::NoiseField(const NoiseModel& model, std::int64_t stamp_ns)
-    : tile_(tileOf(model.correlation())) {
+NoiseField::NoiseField(const NoiseModel& model, std::int64_t stamp_ns) : tile_(model.tile()) {
   const std::uint64_t h = splitMix(static_cast<std::uint64_t>(stamp_ns));
   shift_u_ = static_cast<int>(h & (kSide - 1));
   shift_v_ = static_cast<int>((h >> 20) & (kSide - 1));

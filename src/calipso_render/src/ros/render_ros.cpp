@@ -43,7 +43,6 @@ RenderNode::RenderNode(ros::NodeHandle& nh, ros::NodeHandle& pnh)
       nh.subscribe(topics::kSegmentation, kLatchedQueue, &RenderNode::onSegmentation, this),
       nh.subscribe(topics::kModels, 1, &RenderNode::onModels, this),
       nh.subscribe(topics::kClipDynamics, 1, &RenderNode::onClipDynamics, this),
-      state_,
       nh.subscribe(topics::kStatus, 100, &RenderNode::onStatus, this),
   };
   clip_source_ = std::make_unique<FrameSource>(
