@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <algorithm>
 #include <functional>
@@ -108,6 +109,12 @@ class AlignNode : public ::testing::Test {
     return answerTo(segmentations_, message, message.header.stamp);
   }
 
+  // How many models of this key frame have come.
+  long countOf(const ros::Time& stamp) const {
+    return std::count_if(received_.begin(), received_.end(),
+                         [&](const auto& msg) { return msg->header.stamp == stamp; });
+  }
+
   ros::NodeHandle nh_;
   ros::Publisher segmentations_, poses_;
   ros::Subscriber models_;
@@ -174,9 +181,19 @@ TEST_F(AlignNode, AlignsAKeyFrameThatComesTwiceOnce) {
   for (int sent = 0; sent < 2; ++sent)
     segmentations_.publish(keyFrame(stamp, {tippedSquare(82.0, 58.0, 33.0)}));
   answerTo(keyFrame(ros::Time(9.0), {tippedSquare(82.0, 58.0, 33.0)}));
-  EXPECT_EQ(std::count_if(received_.begin(), received_.end(),
-                          [&](const auto& msg) { return msg->header.stamp == stamp; }),
-            1);
+  EXPECT_EQ(countOf(stamp), 1);
+}
+
+// As rviz does, at any time of a run; who has models would prepare anew.
+TEST_F(AlignNode, SendsWhoListensToMarkersThoseAlone) {
+  const ros::Time stamp(10.0);
+  answerTo(keyFrame(stamp, {tippedSquare(82.0, 58.0, 33.0)}));
+  visualization_msgs::MarkerArrayConstPtr markers;
+  const ros::Subscriber listener = nh_.subscribe<visualization_msgs::MarkerArray>(
+      topics::kMarkers, 1, [&](const auto& msg) { markers = msg; });
+  waitFor([&] { return markers && markers->markers[0].header.stamp == stamp; }, "the markers");
+  answerTo(keyFrame(ros::Time(11.0), {tippedSquare(82.0, 58.0, 33.0)}));
+  EXPECT_EQ(countOf(stamp), 1);
 }
 
 class AlignNodeInMillimetres : public AlignNode {

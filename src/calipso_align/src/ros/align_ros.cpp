@@ -1,7 +1,5 @@
 #include "ros/align_ros.hpp"
 
-#include <visualization_msgs/MarkerArray.h>
-
 #include <cctype>
 #include <numeric>
 #include <stdexcept>
@@ -63,7 +61,9 @@ AlignRos::AlignRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
   options_.planes = scene_.planes;
   models_publisher_ = nh.advertise<calipso_msgs::AlignedModels>(topics::kModels, 1, kLatched);
   markers_publisher_ = nh.advertise<visualization_msgs::MarkerArray>(
-      topics::kMarkers, 1, [this](const ros::SingleSubscriberPublisher&) { publish(); });
+      topics::kMarkers, 1, [this](const ros::SingleSubscriberPublisher& subscriber) {
+        if (key_) subscriber.publish(markers());
+      });
   rerun_service_ = nh.advertiseService("align/rerun", &AlignRos::onRerun, this);
   pose_markers_ = std::make_unique<PoseMarkers>(
       nh.resolveName("align/rough_pose"),
@@ -165,19 +165,24 @@ calipso_msgs::AlignedModel AlignRos::fitObject(int object) {
 }
 
 void AlignRos::publish() {
-  if (!key_) return;
   calipso_msgs::AlignedModels models;
-  models.header.stamp = key_->header.stamp;
-  models.header.frame_id = topics::kWorldFrame;
-  visualization_msgs::MarkerArray markers;
-  for (const auto& [object, model] : aligned_) {
-    models.models.push_back(model);
-    if (markers_publisher_.getNumSubscribers() > 0) {
-      markers.markers.push_back(toMarker(models.header, model));
-    }
-  }
+  models.header = header();
+  for (const auto& [object, model] : aligned_) models.models.push_back(model);
   models_publisher_.publish(models);
-  if (!markers.markers.empty()) markers_publisher_.publish(markers);
+  if (markers_publisher_.getNumSubscribers() > 0) markers_publisher_.publish(markers());
+}
+
+std_msgs::Header AlignRos::header() const {
+  std_msgs::Header header;
+  header.stamp = key_->header.stamp;
+  header.frame_id = topics::kWorldFrame;
+  return header;
+}
+
+visualization_msgs::MarkerArray AlignRos::markers() const {
+  visualization_msgs::MarkerArray markers;
+  for (const auto& [object, model] : aligned_) markers.markers.push_back(toMarker(header(), model));
+  return markers;
 }
 
 }  // namespace calipso::align

@@ -6,6 +6,7 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <ros/ros.h>
 #include <std_srvs/Trigger.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <map>
 #include <memory>
@@ -47,6 +48,8 @@ class AlignRos {
   void fit(const std::vector<int>& objects);  // indices into scene_.objects
   calipso_msgs::AlignedModel fitObject(int object);
   void publish();
+  std_msgs::Header header() const;  // of what is known of the key frame
+  visualization_msgs::MarkerArray markers() const;
 
   AlignNodeParams params_;
   Scene scene_;
