@@ -30,6 +30,13 @@ sensor_msgs::ImagePtr frame(double u0, double stamp) {
   return cv_bridge::CvImage(header, "bgr8", picture).toImageMsg();
 }
 
+// Of `value` inside a square about the disc's middle.
+sensor_msgs::ImagePtr strokes(int value) {
+  cv::Mat marks = cv::Mat::zeros(kSize, CV_8U);
+  marks(cv::Rect(70, 50, 20, 20)).setTo(value);
+  return cv_bridge::CvImage(std_msgs::Header(), "mono8", marks).toImageMsg();
+}
+
 class SegmentationNode : public ::testing::Test {
  protected:
   SegmentationNode()
@@ -102,9 +109,12 @@ TEST_F(SegmentationNode, SegmentsTheKeyFrameTracksTheRestAndServesLateSubscriber
   EXPECT_GT(cv::countNonZero(labelsFromMsg(received_[1]->labels)), 0)
       << "the labels of the frame before";
 
-  cv::Mat strokes = cv::Mat::zeros(kSize, CV_8U);
-  strokes(cv::Rect(70, 50, 20, 20)).setTo(1);
-  strokes_.publish(cv_bridge::CvImage(std_msgs::Header(), "mono8", strokes).toImageMsg());
+  constexpr int kNobody = 7;
+  strokes_.publish(strokes(kNobody));
+  waitFor([&] { return status_.message.find("stands") != std::string::npos; }, "the refusal");
+  EXPECT_EQ(status_.state, calipso_msgs::NodeStatus::READY);
+
+  strokes_.publish(strokes(1));
   waitFor([&] { return received_.size() >= 3; }, "the key frame after a stroke");
   EXPECT_EQ(received_.back()->header.stamp, ros::Time(1.0));
   EXPECT_EQ(received_.back()->contours.size(), 1u);

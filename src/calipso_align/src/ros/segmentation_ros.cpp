@@ -66,7 +66,7 @@ void SegmentationRos::onImage(const sensor_msgs::ImageConstPtr& msg) {
     else if (tracker_)
       trackFrame(msg);
   } catch (const std::exception& error) {
-    reporter_.warn(msg->header.stamp, error.what());
+    reporter_.failed(error.what());
   }
   if (params_.mode == Mode::kBag) reporter_.clipFrameDone();
 }
@@ -82,40 +82,45 @@ void SegmentationRos::startOver() {
 
 void SegmentationRos::onStrokes(const sensor_msgs::ImageConstPtr& msg) {
   try {
-    strokes_ = labelsFromMsg(*msg);
-    if (!key_image_.empty()) segment();
+    const cv::Mat strokes = labelsFromMsg(*msg);
+    if (!key_image_.empty()) segment(strokes);
+    strokes_ = strokes;
   } catch (const std::exception& error) {
     reporter_.warn(msg->header.stamp, error.what());
+    if (key_message_)
+      reporter_.ready("the segmentation before these strokes stands");
+    else if (!key_image_.empty())
+      reporter_.failed(error.what());
   }
 }
 
 void SegmentationRos::adoptKeyFrame(const sensor_msgs::ImageConstPtr& msg) {
   key_image_ = colourImageFromMsg(msg).clone();
   key_header_ = msg->header;
-  segment();
+  segment(strokes_);
 }
 
-void SegmentationRos::segment() {
+// Where this throws nothing has changed, but that colours are learnt anew the next time: a segmenter
+// that gives up is left half way.
+void SegmentationRos::segment(const cv::Mat& strokes) {
   reporter_.preparing("segmenting the key frame");
   const auto start = std::chrono::steady_clock::now();
-  try {
-    if (!segmenter_)
-      // A live camera's first frame is not the picture that the scene's depth image was taken with.
-      segmenter_ = std::make_unique<Segmenter>(
-          makeSegmenter(key_image_, scene_, params_.mode == Mode::kBag));
-    const KeyFrame key = segmentKeyFrame(key_image_, *segmenter_, strokes_);
-    tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels, key.models);
-    labels_ = key.labels;
-    key_message_ = boost::make_shared<calipso_msgs::Segmentation>(
-        toMsg(key_header_, key.labels, key.contours, 1.0f));
-    segmentation_publisher_.publish(key_message_);
-    publishOverlay(key);
-    for (const std::string& remark : key.remarks) reporter_.remark(remark);
-    reporter_.ready("key frame segmented");
-  } catch (const std::exception& error) {
-    reporter_.failed(error.what());
-  }
+  std::unique_ptr<Segmenter> segmenter = std::move(segmenter_);
+  if (!segmenter)
+    // A live camera's first frame is not the picture that the scene's depth image was taken with.
+    segmenter =
+        std::make_unique<Segmenter>(makeSegmenter(key_image_, scene_, params_.mode == Mode::kBag));
+  const KeyFrame key = segmentKeyFrame(key_image_, *segmenter, strokes);
+  tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels, key.models);
+  segmenter_ = std::move(segmenter);
+  labels_ = key.labels;
+  key_message_ = boost::make_shared<calipso_msgs::Segmentation>(
+      toMsg(key_header_, key.labels, key.contours, 1.0f));
+  segmentation_publisher_.publish(key_message_);
+  publishOverlay(key);
+  for (const std::string& remark : key.remarks) reporter_.remark(remark);
   reporter_.timing(key_header_.stamp, millisecondsSince(start));
+  reporter_.ready("key frame segmented");
 }
 
 // Who waits for the labels of a frame gets some, even if the frame cannot be read: those of the

@@ -37,7 +37,7 @@ class SegmentationRos {
 
   void startOver();
   void adoptKeyFrame(const sensor_msgs::ImageConstPtr& msg);
-  void segment();
+  void segment(const cv::Mat& strokes);  // the key frame. @throw std::exception saying why not
   void trackFrame(const sensor_msgs::ImageConstPtr& msg);
   void publishOverlay(const KeyFrame& key);
 
