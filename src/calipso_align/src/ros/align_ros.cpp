@@ -90,10 +90,11 @@ void AlignRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& msg) {
   }
 }
 
-// Only key frames carry contours. The same one can come twice to a subscriber that connects while
-// it is published.
+// Only key frames carry contours. The same one comes again when a bag is played in a loop: who has
+// forgotten its models then needs them again, and to all others they are nothing new.
 void AlignRos::onSegmentation(const calipso_msgs::SegmentationConstPtr& msg) {
-  if (msg->contours.empty() || (key_ && sameMessage(*key_, *msg))) return;
+  if (msg->contours.empty()) return;
+  if (key_ && sameMessage(*key_, *msg)) return publish();
   key_ = msg;
   fitAll();
 }
