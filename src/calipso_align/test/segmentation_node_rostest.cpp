@@ -8,6 +8,7 @@
 
 #include <boost/make_shared.hpp>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "calipso_ros/topics.hpp"
@@ -21,8 +22,8 @@ const cv::Size kSize(160, 120);
 constexpr double kRadius = 30.0;
 constexpr double kTimeoutSec = 20.0;
 
-sensor_msgs::ImagePtr frame(double u0, double stamp) {
-  const cv::Mat picture = testing::paint(kSize, testing::disc(u0, 60, kRadius),
+sensor_msgs::ImagePtr frame(double u0, double stamp, const cv::Size& size = kSize) {
+  const cv::Mat picture = testing::paint(size, testing::disc(u0, 60, kRadius),
                                          cv::Vec3b(40, 160, 60), cv::Vec3b(150, 150, 150), 2.0);
   std_msgs::Header header;
   header.stamp = ros::Time(stamp);
@@ -39,8 +40,10 @@ sensor_msgs::ImagePtr strokes(int value) {
 
 class SegmentationNode : public ::testing::Test {
  protected:
-  SegmentationNode()
-      : images_(nh_.advertise<sensor_msgs::Image>(topics::kClipImage, 100)),
+  explicit SegmentationNode(const std::string& name_space = "",
+                            const std::string& images = topics::kClipImage)
+      : nh_(name_space),
+        images_(nh_.advertise<sensor_msgs::Image>(images, 100)),
         strokes_(nh_.advertise<sensor_msgs::Image>(topics::kStrokes, 1)),
         statuses_(nh_.subscribe(topics::kStatus, 0, &SegmentationNode::onStatus, this)) {
     listen();
@@ -63,6 +66,15 @@ class SegmentationNode : public ::testing::Test {
     }
   }
 
+  void waitForNode() {
+    waitFor(
+        [&] {
+          return images_.getNumSubscribers() > 0 && strokes_.getNumSubscribers() > 0 &&
+                 segmentations_.getNumPublishers() > 0 && !status_.node.empty();
+        },
+        "the node");
+  }
+
   ros::NodeHandle nh_;
   ros::Publisher images_, strokes_;
   ros::Subscriber segmentations_, statuses_;
@@ -71,8 +83,7 @@ class SegmentationNode : public ::testing::Test {
 };
 
 TEST_F(SegmentationNode, SegmentsTheKeyFrameTracksTheRestAndServesLateSubscribers) {
-  waitFor([&] { return images_.getNumSubscribers() > 0 && segmentations_.getNumPublishers() > 0; },
-          "the node");
+  waitForNode();
   for (int k = 0; k < 3; ++k) images_.publish(frame(80.0 + 2.0 * k, 1.0 + 0.1 * k));
   waitFor([&] { return received_.size() >= 3 && status_.clip_frames == 3; }, "three frames");
 
@@ -118,6 +129,22 @@ TEST_F(SegmentationNode, SegmentsTheKeyFrameTracksTheRestAndServesLateSubscriber
   waitFor([&] { return received_.size() >= 3; }, "the key frame after a stroke");
   EXPECT_EQ(received_.back()->header.stamp, ros::Time(1.0));
   EXPECT_EQ(received_.back()->contours.size(), 1u);
+}
+
+class LiveSegmentationNode : public SegmentationNode {
+ protected:
+  LiveSegmentationNode() : SegmentationNode("live", topics::kImage) {}
+};
+
+TEST_F(LiveSegmentationNode, WaitsForAPictureOfTheScenesSize) {
+  waitForNode();
+  images_.publish(frame(40.0, 1.0, kSize / 2));
+  waitFor([&] { return status_.state == calipso_msgs::NodeStatus::FAILED; }, "the refusal");
+  EXPECT_EQ(status_.message,
+            "images are 80x60, but scene.yaml is for 160x120; use the scene of this video");
+  images_.publish(frame(80.0, 1.1));
+  waitFor([&] { return !received_.empty(); }, "the key frame");
+  EXPECT_EQ(received_[0]->header.stamp, ros::Time(1.1));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "calipso_align/overlay.hpp"
 #include "calipso_ros/node_main.hpp"
 #include "calipso_ros/topics.hpp"
+#include "calipso_scene/same_camera.hpp"
 #include "ros/segmentation_conversions.hpp"
 
 namespace calipso::align {
@@ -94,8 +95,14 @@ void SegmentationRos::onStrokes(const sensor_msgs::ImageConstPtr& msg) {
   }
 }
 
+// A picture of another size is not kept: one of the right size may follow.
 void SegmentationRos::adoptKeyFrame(const sensor_msgs::ImageConstPtr& msg) {
-  key_image_ = colourImageFromMsg(msg).clone();
+  const cv::Mat image = colourImageFromMsg(msg);
+  Camera camera = scene_.camera;
+  camera.width = image.cols;
+  camera.height = image.rows;
+  checkSameCamera(scene_, camera);
+  key_image_ = image.clone();
   key_header_ = msg->header;
   segment(strokes_);
 }
