@@ -84,8 +84,17 @@ void SegmentationRos::startOver() {
 void SegmentationRos::onStrokes(const sensor_msgs::ImageConstPtr& msg) {
   try {
     const cv::Mat strokes = labelsFromMsg(*msg);
+    const bool tracked = tracker_ && last_stamp_ != key_header_.stamp;
+    if (tracked && params_.mode == Mode::kBag)
+      throw std::runtime_error(
+          "strokes come after frames have got their masks; save them as the scene's strokes.png "
+          "and start again");
     if (!key_image_.empty()) segment(strokes);
     strokes_ = strokes;
+    if (tracked)
+      reporter_.remark(
+          "with new strokes masks start over from the key frame: what has moved far since may be "
+          "lost");
   } catch (const std::exception& error) {
     reporter_.warn(msg->header.stamp, error.what());
     if (key_message_)
