@@ -51,11 +51,13 @@ void appendPair(const TargetPoint& data, const OutlinePoint& model, const Camera
   const Eigen::Vector2d tangent(-data.normal.y(), data.normal.x());
   const double r = shrink(data.normal.dot(gap), options.dead_band_px);
   const double w = weight * gemanMcClure(r, options.robust_px);
-  rows.push_back({model.v0, model.v1, model.a0, model.a1, d.transpose() * data.normal, r, w});
+  const std::array<int, 3> v = {model.v0, model.v1, model.v1};
+  const std::array<double, 3> a = {model.a0, model.a1, 0.0};
+  rows.push_back({v, a, d.transpose() * data.normal, r, w});
   if (options.tangential > 0.0) {
     // What is hidden finds the ends of what is seen: it must not be drawn together there.
     const double along = tangent.dot(gap);
-    rows.push_back({model.v0, model.v1, model.a0, model.a1, d.transpose() * tangent, along,
+    rows.push_back({v, a, d.transpose() * tangent, along,
                     options.tangential * w * gemanMcClure(along, options.robust_px)});
   }
 }

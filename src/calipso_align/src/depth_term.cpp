@@ -3,53 +3,63 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "calipso_scene/median.hpp"
 
 namespace calipso::align {
 namespace {
 
-constexpr double kLeastFacing = 0.25;  // cosine to the sight line; grazing surfaces tell little
-
-// Vertices to measure at, no more than the depth image can tell apart by far: spread over the mesh
-// whatever pattern its order follows, as multiples of the golden ratio are over the unit interval.
-std::vector<int> spreadVertices(int count) {
-  constexpr int kMost = 3000;
-  const double golden = 0.5 * (std::sqrt(5.0) - 1.0), share = static_cast<double>(kMost) / count;
-  std::vector<int> chosen;
-  for (int i = 0; i < count; ++i) {
-    const double at = i * golden;
-    if (at - std::floor(at) < share) chosen.push_back(i);
-  }
-  return chosen;
+double areaOf(const Points& x, const Triangles& triangles, int face) {
+  const Eigen::Vector3d a = x.row(triangles(face, 0)), b = x.row(triangles(face, 1)),
+                        c = x.row(triangles(face, 2));
+  return 0.5 * (b - a).cross(c - a).norm();
 }
 
-// As long as the faces around are large.
-Points vertexNormals(const Points& x, const Triangles& triangles) {
-  Points normals = Points::Zero(x.rows(), 3);
-  for (int f = 0; f < triangles.rows(); ++f) {
-    const Eigen::Vector3d a = x.row(triangles(f, 0)), b = x.row(triangles(f, 1)),
-                          c = x.row(triangles(f, 2));
-    const Eigen::RowVector3d n = (b - a).cross(c - a).transpose();
-    for (int k = 0; k < 3; ++k) normals.row(triangles(f, k)) += n;
-  }
-  return normals;
-}
-
-// Observed depth under a vertex that the camera sees from its front; 0 for all others.
-float observedDepth(const DepthTarget& target, const DepthRendering& rendering,
-                    const Camera& camera, const Eigen::Vector3d& p, const Eigen::Vector3d& normal,
-                    double tolerance) {
-  if (p.z() <= 0.0 || -normal.dot(p.normalized()) < kLeastFacing) return 0.0f;
+// Depth observed where a point of the model is seen, against the plane of its face; nothing where
+// it is hidden or nothing is known there.
+std::optional<PointRow> depthRow(const DepthTarget& target, const DepthRendering& rendering,
+                                 const Camera& camera, const Points& x, const Triangles& triangles,
+                                 const SurfacePoint& point) {
+  constexpr double kLeastFacing = 0.25;  // cosine to the sight line; grazing surfaces tell little
+  constexpr double kHiddenPx = 0.5;      // what lies so far behind what is drawn is not seen
+  const std::array<int, 3> v = {triangles(point.face, 0), triangles(point.face, 1),
+                                triangles(point.face, 2)};
+  const Eigen::Vector3d a = x.row(v[0]), b = x.row(v[1]), c = x.row(v[2]);
+  const Eigen::Vector3d normal = (b - a).cross(c - a).stableNormalized();
+  const Eigen::Vector3d p = point.weights[0] * a + point.weights[1] * b + point.weights[2] * c;
+  if (p.z() <= 0.0 || std::abs(normal.dot(p.normalized())) < kLeastFacing) return std::nullopt;
   const Eigen::Vector2d pixel = camera.project(p);
   const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
-  if (!rendering.roi.contains(at)) return 0.0f;
-  const float rendered = rendering.at(at.x, at.y);
-  if (rendered <= 0.0f || p.z() > rendered + tolerance) return 0.0f;
-  return target.depth(at);
+  const float drawn = rendering.at(at.x, at.y);
+  if (drawn <= 0.0f || target.depth(at) <= 0.0f) return std::nullopt;
+  // The pixel's own sight line, which passes the point by.
+  const Eigen::Vector3d ray = camera.ray(at.x, at.y);
+  const double z = normal.dot(p) / normal.dot(ray);
+  if (z > drawn + kHiddenPx * p.z() / camera.fx) return std::nullopt;
+  return PointRow{v, point.weights, normal, normal.dot(p - target.depth(at) * ray), 1.0};
 }
 
 }  // namespace
+
+std::vector<SurfacePoint> spreadOver(const Points& x, const Triangles& triangles) {
+  constexpr int kCount = 3000;  // no more than a depth image can tell apart by far
+  constexpr double kPlastic = 1.32471795724474602596;
+  double total = 0.0, passed = 0.0;
+  for (int f = 0; f < triangles.rows(); ++f) total += areaOf(x, triangles, f);
+  std::vector<SurfacePoint> points;
+  for (int f = 0; f < triangles.rows(); ++f) {
+    passed += areaOf(x, triangles, f);
+    while ((points.size() + 0.5) * total < passed * kCount) {
+      // Multiples of the powers of 1 / kPlastic are spread over the unit square (Roberts 2018).
+      const double k = static_cast<double>(points.size());
+      double s = std::fmod(k / kPlastic, 1.0), t = std::fmod(k / (kPlastic * kPlastic), 1.0);
+      if (s + t > 1.0) s = 1.0 - s, t = 1.0 - t;
+      points.push_back({f, {1.0 - s - t, s, t}});
+    }
+  }
+  return points;
+}
 
 DepthTarget makeDepthTarget(const cv::Mat1f& depth, const cv::Mat1b& silhouette) {
   cv::Mat1b inner;
@@ -71,18 +81,13 @@ DepthTarget makeDepthTarget(const cv::Mat1f& depth, const cv::Mat1b& silhouette)
 }
 
 Rows depthRows(const DepthTarget& target, const Points& x, const Triangles& triangles,
-               const DepthRendering& rendering, const Camera& camera,
-               const DepthTermOptions& options) {
+               const std::vector<SurfacePoint>& points, const DepthRendering& rendering,
+               const Camera& camera, const DepthTermOptions& options) {
   Rows rows;
   if (target.empty() || rendering.roi.empty()) return rows;
-  const Points normals = vertexNormals(x, triangles);
-  for (const int i : spreadVertices(static_cast<int>(x.rows()))) {
-    const Eigen::Vector3d p = x.row(i), n = normals.row(i).stableNormalized();
-    const float observed = observedDepth(target, rendering, camera, p, n, options.robust);
-    if (observed <= 0.0f) continue;
-    // The observed point on the vertex' own sight line.
-    const Eigen::Vector3d q = p * (observed / p.z());
-    rows.push_back({i, i, 1.0, 0.0, n, n.dot(p - q), 1.0});
+  for (const SurfacePoint& point : points) {
+    const auto row = depthRow(target, rendering, camera, x, triangles, point);
+    if (row) rows.push_back(*row);
   }
   if (rows.empty()) return rows;
 

@@ -142,7 +142,7 @@ struct ElasticFit::Impl {
   }
 
   // Adds the measurements' gradient J^T W r, and a bound of J^T W J that stays inside K's pattern:
-  // (a0 x0 + a1 x1)^2 <= a0 x0^2 + a1 x1^2, each vertex in one cell. Of H's blocks only those on
+  // (sum of a_k x_k)^2 <= sum of a_k x_k^2, each vertex in one cell. Of H's blocks only those on
   // and above the diagonal, which solve() reads.
   void addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) const;
   void addVertex(int vertex, double share, const PointRow& row, BlockMatrix& H) const;
@@ -169,12 +169,12 @@ void ElasticFit::Impl::addVertex(int vertex, double share, const PointRow& row,
 void ElasticFit::Impl::addRows(const Rows& rows, Vec& gradient, BlockMatrix& H) const {
   for (const PointRow& row : rows) {
     if (row.weight == 0.0) continue;
-    for (const auto& [vertex, share] : {std::pair(row.v0, row.a0), std::pair(row.v1, row.a1)}) {
-      if (share == 0.0) continue;
-      const Carrier& c = carriers[vertex];
-      const Eigen::Vector3d f = share * row.weight * row.r * row.g;
+    for (int k = 0; k < 3; ++k) {
+      if (row.a[k] == 0.0) continue;
+      const Carrier& c = carriers[row.v[k]];
+      const Eigen::Vector3d f = row.a[k] * row.weight * row.r * row.g;
       for (int i = 0; i < c.count; ++i) gradient.segment<3>(3 * c.nodes[i]) += c.weights[i] * f;
-      addVertex(vertex, share, row, H);
+      addVertex(row.v[k], row.a[k], row, H);
     }
   }
 }
@@ -255,8 +255,9 @@ double ElasticFit::Impl::energy(const Vec& at, const Vec& from, const Rows& rows
   double sum = weight * model.energy(at);
   const Vec moved = embedding.apply(at - from);
   for (const PointRow& row : rows) {
-    const double r = row.r + row.g.dot(row.a0 * moved.segment<3>(3 * row.v0) +
-                                       row.a1 * moved.segment<3>(3 * row.v1));
+    double r = row.r;
+    for (int k = 0; k < 3; ++k)
+      if (row.a[k] != 0.0) r += row.a[k] * row.g.dot(moved.segment<3>(3 * row.v[k]));
     sum += 0.5 * row.weight * r * r;
   }
   return sum + 0.5 * driftInformation() * (at - x0).squaredNorm();

@@ -70,17 +70,25 @@ void checkDepth(const cv::Mat1f& depth, const Camera& camera) {
                               ": register the depth with the picture");
 }
 
-// The model moved across the view until its middle is seen where the contour's is.
+// The model moved across the view until the middle of what the picture shows of it is where the
+// contour's is.
 Points beforeContour(const FitProblem& problem) {
-  Eigen::AlignedBox2d seen, wanted;
-  for (Eigen::Index i = 0; i < problem.X.rows(); ++i)
-    if (problem.X(i, 2) > 0.0) seen.extend(problem.camera.project(problem.X.row(i).transpose()));
-  for (const TargetPoint& p : problem.target.points) wanted.extend(p.pixel);
-  if (seen.isEmpty() || wanted.isEmpty()) return problem.X;
-  const Eigen::Vector2d pixels = wanted.center() - seen.center();
+  const cv::Rect wanted = cv::boundingRect(problem.inside),
+                 seen = boundsOf(renderDepth(problem.X, problem.topology, problem.camera));
+  if (seen.empty() || wanted.empty()) return problem.X;
+  const cv::Point2d pixels = 0.5 * cv::Point2d(wanted.tl() + wanted.br() - seen.tl() - seen.br());
   const double z = problem.X.col(2).mean();
-  return problem.X.rowwise() + Eigen::RowVector3d(pixels.x() * z / problem.camera.fx,
-                                                  pixels.y() * z / problem.camera.fy, 0.0);
+  return problem.X.rowwise() + Eigen::RowVector3d(pixels.x * z / problem.camera.fx,
+                                                  pixels.y * z / problem.camera.fy, 0.0);
+}
+
+// Whether the depth image can be compared with what is seen of the model at all.
+bool measuresDepth(const FitProblem& problem) {
+  const Points x = beforeContour(problem);
+  return !depthRows(problem.depth, x, problem.topology.triangles(), problem.surface,
+                    renderDepth(x, problem.topology, problem.camera), problem.camera,
+                    {problem.model_size})
+              .empty();
 }
 
 // Whether the rough placement may have the object on the plane: along the view it may be off by a
@@ -244,6 +252,7 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
                      {},
                      {},
                      {},
+                     {},
                      makeSupportTargets(options.planes, camera),
                      0.0,
                      boundingDiagonal(cad)};
@@ -258,6 +267,8 @@ FitProblem makeFitProblem(const TriangleMesh& cad, const Camera& camera,
     markHidden(options.depth->depth, nearer_by, problem.target);
     markContacts(options.depth->depth, camera, problem.supports, problem.target);
     problem.depth = makeDepthTarget(options.depth->depth, problem.inside);
+    problem.surface = spreadOver(problem.X, problem.topology.triangles());
+    if (!measuresDepth(problem)) problem.depth = {};
   }
   for (SupportTarget& support : problem.supports) {
     support.stands = problem.depth.empty() && standsOn(support, problem);
@@ -276,10 +287,10 @@ Rows measure(const FitProblem& problem, const Points& x, const MeasureSettings& 
                                     settings.contour_correlation_px);
   for (PointRow& row : rows) row.weight *= information;
 
-  const Rows depth =
-      depthRows(problem.depth, x, problem.topology.triangles(), rendering, problem.camera,
-                {settings.depth_robust * problem.model_size,
-                 settings.depth_sigma * problem.model_size, settings.depth_samples});
+  const Rows depth = depthRows(problem.depth, x, problem.topology.triangles(), problem.surface,
+                               rendering, problem.camera,
+                               {settings.depth_robust * problem.model_size,
+                                settings.depth_sigma * problem.model_size, settings.depth_samples});
   const Rows support =
       supportRows(problem.supports, x, problem.camera, settings.support_sigma * problem.model_size);
   rows.insert(rows.end(), depth.begin(), depth.end());

@@ -44,8 +44,9 @@ NormalEquations assemble(const Points& X, const Rows& rows, const Map& map, int 
   };
   for (const PointRow& row : rows) {
     if (row.weight == 0.0) continue;
-    const Map::Parameters j =
-        map.gradient(X.row(row.v0), row.a0 * row.g) + map.gradient(X.row(row.v1), row.a1 * row.g);
+    Map::Parameters j = Map::Parameters::Zero();
+    for (int k = 0; k < 3; ++k)
+      if (row.a[k] != 0.0) j += map.gradient(X.row(row.v[k]), row.a[k] * row.g);
     panel.col(filled++) = std::sqrt(row.weight) * j.head(count);
     normal.gradient += row.weight * row.r * j;
     if (filled == kPanel) flush();

@@ -273,6 +273,12 @@ cv::Mat1b maskOf(const DepthRendering& rendering, const Camera& camera) {
   return mask;
 }
 
+cv::Rect boundsOf(const DepthRendering& rendering) {
+  if (rendering.roi.empty()) return {};
+  const cv::Rect bounds = cv::boundingRect(cv::Mat1b(rendering.depth > 0.0f));
+  return bounds.empty() ? bounds : bounds + rendering.roi.tl();
+}
+
 std::vector<OutlinePoint> occludingContour(const Points& x, const MeshTopology& topology,
                                            const DepthRendering& rendering, const Camera& camera,
                                            double step_px) {

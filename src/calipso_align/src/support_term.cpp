@@ -59,7 +59,7 @@ Rows supportRows(const std::vector<SupportTarget>& targets, const Points& x, con
     for (int i = 0; i < x.rows(); ++i) {
       const double h = target.normal.dot(x.row(i)) - target.offset;
       if (i != lowest && (h >= 0.0 || !reachesUnder(target.plane, camera, x.row(i)))) continue;
-      rows.push_back({i, i, 1.0, 0.0, target.normal, h, 1.0});
+      rows.push_back(vertexRow(i, target.normal, h, 1.0));
     }
     // One contact, however many vertices the mesh spends on it.
     const double weight = 1.0 / (sigma * sigma * std::max<size_t>(1, rows.size() - first));

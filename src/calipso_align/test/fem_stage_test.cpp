@@ -41,7 +41,7 @@ Rows pull(const TriangleMesh& mesh, const Points& x, int count, double by, doubl
   Rows rows;
   for (int i = 0; i < count; ++i) {
     rows.push_back(
-        {i, i, 1.0, 0.0, Eigen::Vector3d::UnitX(), x(i, 0) - mesh.vertices(i, 0) - by, weight});
+        vertexRow(i, Eigen::Vector3d::UnitX(), x(i, 0) - mesh.vertices(i, 0) - by, weight));
   }
   return rows;
 }

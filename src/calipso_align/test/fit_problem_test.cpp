@@ -153,6 +153,23 @@ TEST(FitProblem, ContourOnASupportPlaneIsUnknown) {
   EXPECT_LT(known_at_line(seen.problem()), 3);
 }
 
+// Its top is seen at 8 degrees, which tells nothing, its front is less than a pixel high.
+TEST(FitProblem, WhatTheDepthImageDoesNotShowStandsOnItsPlane) {
+  Seen seen;
+  seen.mesh = test::box({0.4, 0.4, 0.001});
+  seen.pose.linear() = Eigen::AngleAxisd(0.14, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  seen.contour = test::contourOf(seen.mesh, seen.pose, seen.camera);
+  seen.options.depth = DepthObservation{seen.depth()};
+  const double lowest = transformed(seen.pose, seen.mesh.vertices).col(2).minCoeff();
+  seen.options.planes.push_back({"table", Eigen::Vector3d::UnitZ(), lowest, std::nullopt});
+  EXPECT_TRUE(seen.problem().depth.empty());
+  EXPECT_TRUE(seen.problem().supports[0].stands);
+  seen.mesh = test::box({0.2, 0.2, 0.2});
+  seen.contour = test::contourOf(seen.mesh, seen.pose, seen.camera);
+  seen.options.depth = DepthObservation{seen.depth()};
+  EXPECT_FALSE(seen.problem().depth.empty());
+}
+
 TEST(ContourTerm, AnUnknownEdgeOnlyPullsOutwards) {
   Seen seen;
   for (ContourLoop& loop : seen.contour) loop.known.assign(loop.known.size(), false);

@@ -68,7 +68,7 @@ double deformationOf(const Points& X, const LowOrderMap& truth) {
     Rows rows;
     for (int i = 0; i < x.rows(); ++i) {
       for (int k = 0; k < 3; ++k) {
-        rows.push_back({i, i, 1.0, 0.0, Eigen::Vector3d::Unit(k), x(i, k) - goal(i, k), 1e6});
+        rows.push_back(vertexRow(i, Eigen::Vector3d::Unit(k), x(i, k) - goal(i, k), 1e6));
       }
     }
     return rows;
@@ -112,7 +112,7 @@ TEST(LowOrderStage, RecoversAnAffineMapFromPoints) {
     Rows rows;
     for (int i = 0; i < x.rows(); ++i) {
       for (int k = 0; k < 3; ++k) {
-        rows.push_back({i, i, 1.0, 0.0, Eigen::Vector3d::Unit(k), x(i, k) - goal(i, k), 1e8});
+        rows.push_back(vertexRow(i, Eigen::Vector3d::Unit(k), x(i, k) - goal(i, k), 1e8));
       }
     }
     return rows;
@@ -130,7 +130,7 @@ TEST(LowOrderStage, RecoversAnAffineMapFromPoints) {
 TEST(LowOrderStage, HeldParametersStayWhereTheyAre) {
   const Points X = test::pear().vertices;
   const Observe observe = [](const Points& x, int, double) {
-    return Rows{{0, 0, 1.0, 0.0, Eigen::Vector3d::UnitZ(), x(0, 2) - 5.0, 1.0}};
+    return Rows{vertexRow(0, Eigen::Vector3d::UnitZ(), x(0, 2) - 5.0, 1.0)};
   };
   LowOrderStageOptions options;
   options.prior.log_scale = 0.5;

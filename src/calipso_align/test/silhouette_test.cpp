@@ -116,7 +116,7 @@ TEST(ContourTerm, ResidualDerivativesMatchDifferences) {
   const Eigen::Vector3d d = 1e-6 * Eigen::Vector3d(0.3, -0.5, 0.8);
   for (size_t k = 0; k < rows.size(); k += 7) {
     const PointRow& row = rows[k];
-    const Eigen::Vector3d p = row.a0 * x.row(row.v0) + row.a1 * x.row(row.v1);
+    const Eigen::Vector3d p = row.a[0] * x.row(row.v[0]) + row.a[1] * x.row(row.v[1]);
     const Eigen::Vector2d change = camera.project(p + d) - camera.project(p);
     const Eigen::Vector2d normal =
         (camera.projectJacobian(p) * camera.projectJacobian(p).transpose()).inverse() *

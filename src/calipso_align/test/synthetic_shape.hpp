@@ -41,6 +41,31 @@ inline TriangleMesh pear(int rings = 18, int segments = 24) {
   return mesh;
 }
 
+// A box about the origin.
+inline TriangleMesh box(const Eigen::Vector3d& half) {
+  TriangleMesh mesh;
+  mesh.vertices.resize(8, 3);
+  for (int i = 0; i < 8; ++i)
+    for (int k = 0; k < 3; ++k) mesh.vertices(i, k) = (i >> k) % 2 ? half[k] : -half[k];
+  mesh.triangles.resize(12, 3);
+  mesh.triangles << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,  //
+      2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5;
+  return mesh;
+}
+
+// What the camera below sees of a mesh, wound the other way round.
+inline TriangleMesh frontInsideOut(const TriangleMesh& mesh) {
+  TriangleMesh front = mesh;
+  int faces = 0;
+  for (int f = 0; f < mesh.triangleCount(); ++f) {
+    const Eigen::RowVector3i t = mesh.triangles.row(f);
+    const Eigen::Vector3d a = mesh.vertex(t[0]), b = mesh.vertex(t[1]), c = mesh.vertex(t[2]);
+    if ((b - a).cross(c - a).y() < 0.0) front.triangles.row(faces++) << t[0], t[2], t[1];
+  }
+  front.triangles.conservativeResize(faces, 3);
+  return front;
+}
+
 // A square plate of so many metres to either side of its middle, with a square hole of 0.2, 2 m in
 // front of a camera at its own origin.
 struct PlateWithHole {

@@ -19,6 +19,7 @@ struct FitProblem {
   cv::Mat1b foreign;  // 255 in spurs of it that no part of the model can be; or empty
   cv::Mat1b hiding;   // 255 where the picture shows something nearer than the object; or empty
   DepthTarget depth;  // empty: none
+  std::vector<SurfacePoint> surface;  // of the model, to be compared with it
   std::vector<SupportTarget> supports;
   double extent_px = 0.0;                            // diagonal of the contour's bounding box
   double model_size = 0.0;                           // diagonal of the model, m

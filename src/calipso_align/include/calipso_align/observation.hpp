@@ -1,20 +1,26 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 namespace calipso::align {
 
 // One linearised measurement of the model: residual r, and its derivative g with respect to a point
-// in the camera frame that lies a0 : a1 between vertices v0 and v1.
-//   energy = 1/2 sum of weight r^2 ;  dr = g . (a0 dx_v0 + a1 dx_v1)
+// in the camera frame whose barycentric weights on a face are a; on an edge or a vertex some are 0.
+//   energy = 1/2 sum of weight r^2 ;  dr = g . sum of a_k dx_vk
 struct PointRow {
-  int v0, v1;
-  double a0, a1;
+  std::array<int, 3> v;
+  std::array<double, 3> a;
   Eigen::Vector3d g;  // unit of r per m
   double r;
   double weight;  // 1 / (unit of r)^2
 };
+
+// Of vertex i.
+inline PointRow vertexRow(int i, const Eigen::Vector3d& g, double r, double weight) {
+  return {{i, i, i}, {1.0, 0.0, 0.0}, g, r, weight};
+}
 
 using Rows = std::vector<PointRow>;
 

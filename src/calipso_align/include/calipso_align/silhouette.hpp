@@ -33,6 +33,9 @@ DepthRendering renderDepth(const Points& x, const MeshTopology& topology, const 
 // 255 where the rendering covers the pixel; the whole picture.
 cv::Mat1b maskOf(const DepthRendering& rendering, const Camera& camera);
 
+// Bounding box of what is rendered, px; empty when that is nothing.
+cv::Rect boundsOf(const DepthRendering& rendering);
+
 // A point of the visible outline: on the edge v0-v1, where it projects to, and which way is out.
 struct OutlinePoint {
   int v0, v1;
