@@ -5,11 +5,13 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "calipso_align/alignment.hpp"
 #include "calipso_align/depth_image.hpp"
 #include "calipso_align/silhouette.hpp"
 #include "calipso_scene/triangle_mesh.hpp"
+#include "segmentation_checks.hpp"
 
 namespace calipso::align {
 namespace {
@@ -146,6 +148,8 @@ KeyFrame segmentKeyFrame(const cv::Mat& image, Segmenter& segmenter, const cv::M
   result.labels = segmenter.segment(strokes).clone();
   result.models = segmenter.models();
   result.remarks = segmenter.remarks();
+  for (std::string& remark : strayStrokes(strokes, segmenter.targets()))
+    result.remarks.push_back(std::move(remark));
   result.segmentation_ms = millisecondsSince(start);
   const auto traced = std::chrono::steady_clock::now();
   result.contours = extractContours(image, result.labels, segmenter.targets());

@@ -80,6 +80,22 @@ void checkStrokes(const cv::Mat& strokes, const std::vector<SegmentationTarget>&
   }
 }
 
+std::vector<std::string> strayStrokes(const cv::Mat& strokes,
+                                      const std::vector<SegmentationTarget>& targets) {
+  std::vector<std::string> remarks;
+  for (const SegmentationTarget& target : targets) {
+    if (strokes.empty() || target.rect.empty()) continue;
+    cv::Mat stray = strokes == target.label;
+    stray(target.rect & cv::Rect(cv::Point(), strokes.size())).setTo(0);
+    const int count = cv::countNonZero(stray);
+    if (count == 0) continue;
+    remarks.push_back("object '" + target.name + "': " + std::to_string(count) +
+                      " px of its strokes lie outside of its rectangle and count for nothing; "
+                      "enlarge its rect_xywh");
+  }
+  return remarks;
+}
+
 std::vector<std::string> indistinctTargets(const std::vector<SegmentationTarget>& targets,
                                            const std::vector<cv::Mat>& costs,
                                            const cv::Mat& labels) {

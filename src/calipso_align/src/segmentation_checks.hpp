@@ -15,6 +15,10 @@ void checkTargets(const std::vector<SegmentationTarget>& targets, const cv::Size
 void checkStrokes(const cv::Mat& strokes, const std::vector<SegmentationTarget>& targets,
                   const cv::Size& size);
 
+// What the user should know of each target whose strokes lie in part where it may not.
+std::vector<std::string> strayStrokes(const cv::Mat& strokes,
+                                      const std::vector<SegmentationTarget>& targets);
+
 // What the user should know of each target that colours and depth hardly tell from the background.
 // costs: of these alone; labels: where the targets were found.
 std::vector<std::string> indistinctTargets(const std::vector<SegmentationTarget>& targets,

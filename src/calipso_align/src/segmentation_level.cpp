@@ -145,7 +145,7 @@ void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& str
   level.seeds.setTo(1, marks == kBackgroundStroke);
   level.labels.setTo(0, marks == kBackgroundStroke);
   for (size_t k = 0; k < targets.size(); ++k) {
-    const cv::Mat own = marks == targets[k].label;
+    const cv::Mat own = (marks == targets[k].label) & level.allowed[k];
     level.seeds.setTo(static_cast<double>(k + 2), own);
     level.labels.setTo(static_cast<double>(k + 1), own);
   }

@@ -58,5 +58,20 @@ TEST_F(KeyFrameModel, OfWhatMovesAsAWholeMeetsItsOutline) {
   EXPECT_GT(overlap(), 0.97);
 }
 
+TEST(KeyFrame, StrokesOutsideOfAnObjectsRectangleAreNoneOfItAndRemarked) {
+  const cv::Size size(160, 120);
+  const cv::Mat image = testing::paint(size, testing::disc(80.3, 60.7, 30.2),
+                                       cv::Vec3b(40, 160, 60), cv::Vec3b(150, 150, 150), 3.0);
+  Segmenter segmenter(image, {{"disc", 7, cv::Rect(45, 25, 72, 72), {}}});
+  const KeyFrame without = segmentKeyFrame(image, segmenter, {});
+  cv::Mat strokes = cv::Mat::zeros(size, CV_8U);
+  strokes(cv::Rect(130, 50, 5, 4)).setTo(7);
+  const KeyFrame with = segmentKeyFrame(image, segmenter, strokes);
+  EXPECT_EQ(cv::countNonZero(with.labels != without.labels), 0);
+  EXPECT_TRUE(without.remarks.empty());
+  ASSERT_EQ(with.remarks.size(), 1u);
+  EXPECT_NE(with.remarks[0].find("'disc': 20 px"), std::string::npos) << with.remarks[0];
+}
+
 }  // namespace
 }  // namespace calipso::align

@@ -59,7 +59,8 @@ cv::Rect viewOf(const std::vector<SegmentationTarget>& targets, const cv::Size& 
 SegmentationLevel makeLevel(const cv::Mat& image, const std::vector<SegmentationTarget>& targets,
                             const Relief& relief, const cv::Rect& view, double scale);
 
-// Takes the strokes (CV_8U of the view, or empty) over into seeds and labels.
+// Takes the strokes (CV_8U of the view, or empty) over into seeds and labels; an object's count
+// where it may lie.
 void setSeeds(const std::vector<SegmentationTarget>& targets, const cv::Mat& strokes,
               SegmentationLevel& level);
 
