@@ -11,22 +11,38 @@
 namespace calipso::align {
 namespace {
 
-constexpr double kLeastKnown = 0.9;  // part of the contour that must be known to compare areas
+// Whether enough of the contour is known to compare it with the whole model.
+bool isComparable(const FitProblem& problem) {
+  constexpr double kLeastKnown = 0.9;  // part of its length
+  return problem.target.known_length_px >= kLeastKnown * problem.target.length_px;
+}
 
-// Size that the model seems to have in the picture against the contour's.
+double focalLength(const Camera& camera) { return std::sqrt(camera.fx * camera.fy); }
+
+// Size of the model that shows in the picture, m: of what is seen along its length that is little.
+// What reaches behind the camera may look as large as it is.
+double sizeInView(const FitProblem& problem) {
+  if (problem.X.col(2).minCoeff() <= 0.0) return problem.model_size;
+  Eigen::AlignedBox2d seen;
+  for (Eigen::Index i = 0; i < problem.X.rows(); ++i)
+    seen.extend(problem.camera.project(problem.X.row(i).transpose()));
+  const double z = problem.X.col(2).mean();
+  return std::min(problem.model_size, seen.diagonal().norm() * z / focalLength(problem.camera));
+}
+
+// The contour's size against that which the model has in the picture.
 double apparentScale(const FitProblem& problem) {
   const double z = problem.X.col(2).mean();
-  const double f = std::sqrt(problem.camera.fx * problem.camera.fy);
-  return problem.extent_px * z / (f * problem.model_size);
+  return problem.extent_px * z / (focalLength(problem.camera) * sizeInView(problem));
 }
 
 // By what the model's coordinates would have to be multiplied to fill the contour: it then shrinks
 // towards its frame's origin, which stays where it was placed.
 //   s size f / (z0 + s (z - z0)) = extent
 double unitScale(const FitProblem& problem) {
-  const double f = std::sqrt(problem.camera.fx * problem.camera.fy), z0 = problem.origin.z();
-  const double arm = problem.X.col(2).mean() - z0;
-  const double scale = problem.extent_px * z0 / (f * problem.model_size - problem.extent_px * arm);
+  const double z0 = problem.origin.z(), arm = problem.X.col(2).mean() - z0;
+  const double full = focalLength(problem.camera) * sizeInView(problem);
+  const double scale = problem.extent_px * z0 / (full - problem.extent_px * arm);
   return scale > 0.0 && std::isfinite(scale) ? scale : apparentScale(problem);
 }
 
@@ -104,8 +120,9 @@ void matchDepth(const FitProblem& problem, LowOrderMap& map) {
 }  // namespace
 
 RoughCheck checkPlacement(const FitProblem& problem) {
-  // A model far larger or smaller than the contour was drawn in another unit.
-  constexpr double kImplausible = 5.0;
+  // A model far larger or smaller than the contour was drawn in another unit; of one that is mostly
+  // hidden or cut, the contour may be that much smaller, too.
+  constexpr double kImplausible = 5.0, kMostHidden = 10.0;
   const double z = problem.X.col(2).mean();
   if (z <= 0.0) {
     std::ostringstream text;
@@ -115,7 +132,8 @@ RoughCheck checkPlacement(const FitProblem& problem) {
     return {false, text.str()};
   }
   const double scale = apparentScale(problem);
-  if (scale > kImplausible || scale < 1.0 / kImplausible) {
+  const double smallest = 1.0 / (isComparable(problem) ? kImplausible : kImplausible * kMostHidden);
+  if (scale > kImplausible || scale < smallest) {
     std::ostringstream text;
     text.precision(3);
     text << "size implausible: the model (" << problem.model_size << " m) at its rough distance ("
@@ -131,7 +149,7 @@ RoughCheck checkPlacement(const FitProblem& problem) {
 
 void placeRoughly(const FitProblem& problem, LowOrderMap& map) {
   constexpr int kRounds = 3;
-  const bool comparable = problem.target.known_length_px >= kLeastKnown * problem.target.length_px;
+  const bool comparable = isComparable(problem);
   const Moments goal = comparable ? momentsOf(problem.inside) : Moments{};
   for (int round = 0; round < kRounds; ++round) {
     matchDepth(problem, map);

@@ -109,6 +109,23 @@ TEST(RoughFit, GoesToWhatIsSeenOfAnObjectThatIsHalfHidden) {
   EXPECT_LT(off.colwise().mean().norm(), 0.02);  // m: three pixels
 }
 
+// A pole of 0.8 m whose end alone is seen, and a pear through a round window.
+TEST(RoughFit, WhatShowsLittleOfItselfIsNotOfAnotherUnit) {
+  Seen pole;
+  pole.mesh = test::box({0.02, 0.4, 0.02});
+  pole.contour = test::contourOf(pole.mesh, pole.pose, pole.camera);
+  EXPECT_TRUE(checkPlacement(pole.problem()).usable);
+  Seen pear;
+  cv::Mat1b window = cv::Mat1b::zeros(pear.camera.height, pear.camera.width);
+  cv::circle(window, {160, 120}, 12, 1, cv::FILLED);
+  pear.contour = traceLoops(window, 1, {});
+  EXPECT_FALSE(checkPlacement(pear.problem()).usable);
+  pear.contour[0].known.assign(pear.contour[0].points.size(), false);
+  EXPECT_TRUE(checkPlacement(pear.problem()).usable);
+  pear.mesh.vertices *= 100.0;  // in centimetres
+  EXPECT_FALSE(checkPlacement(pear.problem()).usable);
+}
+
 // A rail that was taken in: two pixels high, where the pear has nothing as thin.
 TEST(FitProblem, ASpurNarrowerThanTheModelIsNotItsOwn) {
   const Seen seen;
