@@ -97,7 +97,7 @@ double openPart(const FitProblem& problem, const cv::Mat1b& silhouette, double t
 // What the user should know of a fit that can be trusted.
 std::string remarks(const FitProblem& problem, double known, double distance_sigma) {
   std::vector<std::string> all;
-  if (spinAxis(problem.X)) {
+  if (spinAxis(problem.X, problem.topology.triangles())) {
     all.push_back(
         "spin about its axis undetermined: the shape is axisymmetric, so that the contour "
         "leaves it as it was placed");

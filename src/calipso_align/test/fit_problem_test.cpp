@@ -220,19 +220,21 @@ TEST(Trust, NoiseOpensNothing) {
   EXPECT_TRUE(judge(problem, seen.contour, quality, 1.0, 0.0, {}).trusted);
 }
 
-TEST(Trust, AVaseSpinsAndAPearDoesNot) {
-  TriangleMesh vase = test::pear(18, 48);
+TEST(Trust, AVaseSpinsAndAPearAndABoxDoNot) {
+  constexpr int kSegments = 16;
+  TriangleMesh vase = test::pear(18, kSegments);
   for (int i = 0; i < vase.vertexCount(); ++i) {
-    const double turn = 2.0 * M_PI * (i - 2) / 48, z = vase.vertices(i, 2);
+    const double turn = 2.0 * M_PI * (i - 2) / kSegments, z = vase.vertices(i, 2);
     const double radius =
         i < 2 ? 0.0 : (0.2 - 0.1 * z) * std::sqrt(std::max(0.0, 1.0 - 4.0 * z * z));
     vase.vertices.row(i) << radius * std::cos(turn), radius * std::sin(turn), z;
   }
-  const std::optional<Eigen::Vector3d> axis = spinAxis(vase.vertices);
+  const std::optional<Eigen::Vector3d> axis = spinAxis(vase.vertices, vase.triangles);
   ASSERT_TRUE(axis.has_value());
   EXPECT_GT(std::abs(axis->z()), 0.99);
-  // Dense enough that the bump is more than what points are apart.
-  EXPECT_FALSE(spinAxis(test::pear(60, 120).vertices).has_value());
+  for (const TriangleMesh& mesh :
+       {test::pear(), test::box({0.25, 0.2, 0.3}), test::box({0.2, 0.2, 0.4})})
+    EXPECT_FALSE(spinAxis(mesh.vertices, mesh.triangles).has_value());
 }
 
 TEST(Trust, AnUncertainDistanceIsRemarked) {

@@ -42,6 +42,6 @@ Verdict judge(const FitProblem& problem, const std::vector<ContourLoop>& contour
 
 // Whether turning the model about one of its principal axes leaves it where it was: then no contour
 // shows that turn. Returns the axis in the frame of X.
-std::optional<Eigen::Vector3d> spinAxis(const Points& X);
+std::optional<Eigen::Vector3d> spinAxis(const Points& X, const Triangles& triangles);
 
 }  // namespace calipso::align
