@@ -184,6 +184,19 @@ TEST_F(LiveSegmentationNode, WaitsForAPictureOfTheScenesSizeAndSaysWhatLateStrok
   EXPECT_EQ(labelAtMiddle(3), 0);
 }
 
+class SegmentationNodeWithoutDepth : public SegmentationNode {
+ protected:
+  SegmentationNodeWithoutDepth() : SegmentationNode("without_depth") {}
+};
+
+// Of its scene it cannot be read.
+TEST_F(SegmentationNodeWithoutDepth, DoesWithoutTheDepthImage) {
+  waitForNode();
+  images_.publish(frame(80.0, 1.0));
+  waitFor([&] { return status_.clip_frames == 1; }, "the key frame");
+  EXPECT_EQ(status_.state, calipso_msgs::NodeStatus::READY) << status_.message;
+}
+
 }  // namespace
 }  // namespace calipso::align
 

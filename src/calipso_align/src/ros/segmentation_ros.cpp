@@ -28,7 +28,11 @@ double millisecondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 SegmentationNodeParams loadSegmentationParams(const ros::NodeHandle& pnh) {
-  return {pathParam(pnh, "scene"), modeParam(pnh)};
+  SegmentationNodeParams params;
+  params.scene = pathParam(pnh, "scene");
+  params.mode = modeParam(pnh);
+  params.use_depth = optionalParam(pnh, "use_depth", params.use_depth);
+  return params;
 }
 
 SegmentationRos::SegmentationRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
@@ -124,8 +128,8 @@ void SegmentationRos::segment(const cv::Mat& strokes) {
   std::unique_ptr<Segmenter> segmenter = std::move(segmenter_);
   if (!segmenter)
     // A live camera's first frame is not the picture that the scene's depth image was taken with.
-    segmenter =
-        std::make_unique<Segmenter>(makeSegmenter(key_image_, scene_, params_.mode == Mode::kBag));
+    segmenter = std::make_unique<Segmenter>(
+        makeSegmenter(key_image_, scene_, params_.use_depth && params_.mode == Mode::kBag));
   const KeyFrame key = segmentKeyFrame(key_image_, *segmenter, strokes);
   tracker_ = std::make_unique<MaskTracker>(key_image_, key.labels, key.models);
   segmenter_ = std::move(segmenter);

@@ -19,6 +19,7 @@ namespace calipso::align {
 struct SegmentationNodeParams {
   std::string scene;  // directory with scene.yaml
   Mode mode = Mode::kBag;
+  bool use_depth = true;  // the scene's depth image, where it has one; of a bag only
 };
 
 // @throw std::invalid_argument naming parameter, value and what is allowed
