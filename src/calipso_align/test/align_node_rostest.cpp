@@ -9,11 +9,13 @@
 
 #include <algorithm>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "calipso_ros/same_message.hpp"
 #include "calipso_ros/topics.hpp"
+#include "ros/align_ros.hpp"
 
 namespace calipso::align {
 namespace {
@@ -208,6 +210,17 @@ TEST_F(AlignNodeInMillimetres, FlagsTheMeshAndOffersTheScale) {
   const size_t at = model.reason.find("scaled by ");
   ASSERT_NE(at, std::string::npos) << model.reason;
   EXPECT_NEAR(std::stod(model.reason.substr(at + 10)), 1e-3, 3e-4);
+}
+
+TEST(AlignRos, NamesObjectsThatWouldShareAPoseTopic) {
+  ros::NodeHandle nh, pnh("~like_names");
+  try {
+    AlignRos node(nh, pnh);
+    FAIL() << "nothing was thrown";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("'disc 1' and 'disc-1'"), std::string::npos)
+        << error.what();
+  }
 }
 
 }  // namespace

@@ -27,6 +27,18 @@ std::string graphName(const std::string& object) {
   return name;
 }
 
+// @throw std::invalid_argument naming two objects that would share a pose topic
+void checkGraphNames(const std::vector<SceneObject>& objects) {
+  std::map<std::string, std::string> owners;
+  for (const SceneObject& object : objects) {
+    const auto [owner, is_new] = owners.emplace(graphName(object.name), object.name);
+    if (is_new) continue;
+    throw std::invalid_argument("objects '" + owner->second + "' and '" + object.name +
+                                "' would both have the topic align/initial_pose/" + owner->first +
+                                "; name them otherwise");
+  }
+}
+
 const calipso_msgs::ObjectContour* findContour(const calipso_msgs::Segmentation& segmentation,
                                                const std::string& object) {
   for (const calipso_msgs::ObjectContour& contour : segmentation.contours) {
@@ -54,6 +66,7 @@ AlignNodeParams loadAlignParams(const ros::NodeHandle& pnh) {
 
 AlignRos::AlignRos(ros::NodeHandle& nh, ros::NodeHandle& pnh)
     : params_(loadAlignParams(pnh)), scene_(loadScene(params_.scene)), reporter_(nh, "align") {
+  checkGraphNames(scene_.objects);
   options_.levels = params_.levels;
   // A live camera's first frame is not the picture that the depth image was taken with.
   if (params_.mode == Mode::kBag && params_.use_depth && !scene_.depth_path.empty())
