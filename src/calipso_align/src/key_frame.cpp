@@ -43,7 +43,7 @@ std::optional<AlignmentResult> fitted(const TriangleMesh& mesh, const Camera& ca
 
 // Fits no more than a coarse grid: what is to be told is where the contour is implausible, and how
 // the model goes on as a whole. What is attached somewhere cannot: low-order deformations do.
-ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
+ModelFitter modelFitter(const Scene& scene, const SceneObject& object, const TriangleMesh& mesh,
                         const std::optional<DepthObservation>& depth) {
   AlignOptions options;
   constexpr int kCoarse = 600;  // nodes
@@ -54,8 +54,8 @@ ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
   options.judge_depth = false;
   options.planes = scene.planes;
   options.depth = depth;
-  return [mesh = loadMesh(object.cad_path), camera = scene.camera, options,
-          moves_whole = object.attachments.empty(), rough = object.initial_world_from_object](
+  return [mesh, camera = scene.camera, options, moves_whole = object.attachments.empty(),
+          rough = object.initial_world_from_object](
              const std::vector<ContourLoop>& contour) -> std::optional<ModelView> {
     constexpr double kLeastTolerancePx = 1.5;
     const auto fit = fitted(mesh, camera, rough, contour, options);
@@ -73,6 +73,19 @@ ModelFitter modelFitter(const Scene& scene, const SceneObject& object,
   };
 }
 
+// Where the user's rough placement puts an object's model in the key frame: CV_8U, 255 inside; with
+// a margin of a quarter of the picture on every side; all zero behind the camera.
+cv::Mat placedSilhouette(Camera camera, const SceneObject& object, const TriangleMesh& mesh) {
+  const int margin_u = camera.width / 4, margin_v = camera.height / 4;
+  camera.width += 2 * margin_u;
+  camera.height += 2 * margin_v;
+  camera.cx += margin_u;
+  camera.cy += margin_v;
+  const Points x = transformed(
+      camera.world_from_camera.inverse() * object.initial_world_from_object, mesh.vertices);
+  return maskOf(renderDepth(x, mesh.triangles, camera), camera);
+}
+
 std::string enlargedRemark(const std::string& path, double factor) {
   std::ostringstream text;
   text << path << " is a smaller image, enlarged " << std::setprecision(3) << factor
@@ -83,32 +96,15 @@ std::string enlargedRemark(const std::string& path, double factor) {
 
 }  // namespace
 
-cv::Mat placedSilhouette(const Scene& scene, const SceneObject& object) {
-  Camera camera = scene.camera;
-  const int margin_u = camera.width / 4, margin_v = camera.height / 4;
-  camera.width += 2 * margin_u;
-  camera.height += 2 * margin_v;
-  camera.cx += margin_u;
-  camera.cy += margin_v;
-  const TriangleMesh mesh = loadMesh(object.cad_path);
-  const Eigen::Isometry3d camera_from_object =
-      camera.world_from_camera.inverse() * object.initial_world_from_object;
-  const Points x = (mesh.vertices * camera_from_object.linear().transpose()).rowwise() +
-                   camera_from_object.translation().transpose();
-  return maskOf(renderDepth(x, mesh.triangles, camera), camera);
-}
-
 std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
                                                     const std::optional<DepthObservation>& depth) {
   std::vector<SegmentationTarget> targets;
   for (const SceneObject& object : scene.objects) {
     const cv::Rect rect(object.rect[0], object.rect[1], object.rect[2], object.rect[3]);
-    targets.push_back({object.name,
-                       object.index,
-                       rect,
-                       {},
-                       placedSilhouette(scene, object),
-                       modelFitter(scene, object, depth)});
+    const TriangleMesh mesh = loadMesh(object.cad_path);
+    targets.push_back({object.name, object.index, rect,
+                       placedSilhouette(scene.camera, object, mesh),
+                       modelFitter(scene, object, mesh, depth)});
   }
   return targets;
 }

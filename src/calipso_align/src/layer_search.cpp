@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_align/layer_motion.hpp"
+#include "calipso_align/mask_edge.hpp"
 #include "layer_appearance.hpp"
 
 namespace calipso::align {

@@ -44,6 +44,14 @@ std::optional<float> coverage(const cv::Vec3f& colour, const cv::Vec3f& fore, co
 
 }  // namespace
 
+cv::Mat grown(const cv::Mat& mask, int px) {
+  const cv::Mat square =
+      cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1));
+  cv::Mat result;
+  cv::dilate(mask, result, square);
+  return result;
+}
+
 cv::Mat insideOf(const cv::Mat& mask, int rim_px) {
   for (int rim = rim_px; rim > 0; rim /= 2) {
     cv::Mat core;
@@ -61,19 +69,17 @@ cv::Mat signedDistance(const cv::Mat& mask) {
   return outside - inside;
 }
 
-cv::Mat settleEdge(const cv::Mat& image, const cv::Mat& other, const KnownBackground& background,
-                   double noise, cv::Mat& mask) {
+cv::Mat settleEdge(const cv::Mat& image, const KnownBackground& background, double noise,
+                   cv::Mat& mask) {
   const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3));
   cv::Mat inner, outer;
   cv::erode(mask, inner, square);
   cv::dilate(mask, outer, square);
-  const cv::Mat edge = outer & ~inner;
-  cv::Mat back_pure = ~outer;
-  if (!other.empty()) back_pure &= ~other;
+  const cv::Mat edge = outer & ~inner, back_pure = ~outer;
   cv::Mat alpha = mask.clone(), settled = mask.clone();
   for (int y = 0; y < mask.rows; ++y)
     for (int x = 0; x < mask.cols; ++x) {
-      if (!edge.at<uchar>(y, x) || (!other.empty() && other.at<uchar>(y, x))) continue;
+      if (!edge.at<uchar>(y, x)) continue;
       const std::optional<cv::Vec3f> fore = meanNear(image, inner, {x, y});
       std::optional<cv::Vec3f> back;
       if (!background.image.empty() && background.known.at<uchar>(y, x))

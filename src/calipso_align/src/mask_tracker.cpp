@@ -134,11 +134,11 @@ TrackedMask MaskTracker::track(const cv::Mat& image) {
   image.copyTo(previous_image_);
   previous_grey_ = grey;
   previous_means_ = means;
-  return combine(static_cast<int>(moving.size()));
+  return combine();
 }
 
-TrackedMask MaskTracker::combine(int moved) const {
-  TrackedMask result{cv::Mat::zeros(size_, CV_8U), 1.0f, moved};
+TrackedMask MaskTracker::combine() const {
+  TrackedMask result{cv::Mat::zeros(size_, CV_8U), 1.0f};
   for (const Object& object : objects_) {
     result.labels.setTo(object.label, object.mask);
     result.confidence = std::min(result.confidence, object.confidence);
@@ -350,7 +350,7 @@ void MaskTracker::settle(Object& object, const cv::Mat& image, const cv::Mat& fl
 void MaskTracker::accept(Object& object, const cv::Mat& view, const KnownBackground& background,
                          double noise, cv::Mat mask, const cv::Rect& roi) const {
   object.coverage = cv::Mat::zeros(size_, CV_8U);
-  settleEdge(view, cv::Mat(), background, noise, mask).copyTo(object.coverage(roi));
+  settleEdge(view, background, noise, mask).copyTo(object.coverage(roi));
   object.mask = cv::Mat::zeros(size_, CV_8U);
   mask.copyTo(object.mask(roi));
   if (object.confidence > kSureEnough && cv::countNonZero(mask) > 0)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calipso_align/mask_edge.hpp"
 #include "calipso_align/planar_pieces.hpp"
 #include "calipso_align/surface_islands.hpp"
 
@@ -86,13 +87,6 @@ double registrationError(const cv::Mat& image, const cv::Mat& across, const cv::
   while (within < kMost * total && ++r <= kReach)
     for (const int o : {-r, r}) within += std::max(0.0, profile[kReach + o] - ground);
   return r;
-}
-
-cv::Mat grown(const cv::Mat& mask, int px) {
-  cv::Mat result;
-  cv::dilate(mask, result,
-             cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1)));
-  return result;
 }
 
 // The step in which depth is stored, m: the least by which neighbours differ that do. What is not

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "calipso_align/mask_edge.hpp"
 #include "segmentation_checks.hpp"
 
 namespace calipso::align {
@@ -162,9 +163,8 @@ cv::Mat Segmenter::evidence(size_t k) const {
   cv::Mat result = cost[0] - cost[k + 1];
   for (size_t j = 0; j < targets_.size(); ++j)
     if (j != k) result = cv::min(result, cv::max(cost[j + 1] - cost[k + 1], 0));
-  const cv::Mat own = coarse_.seeds == static_cast<int>(k + 2);
   result.setTo(-kMaxEvidence, (coarse_.allowed[k] == 0) | (coarse_.seeds != 0));
-  result.setTo(kMaxEvidence, own);
+  result.setTo(kMaxEvidence, coarse_.seeds == static_cast<int>(k + 2));
   return cv::min(cv::max(result, -kMaxEvidence), kMaxEvidence);
 }
 

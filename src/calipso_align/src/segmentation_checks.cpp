@@ -59,9 +59,9 @@ void checkStrokes(const cv::Mat& strokes, const std::vector<SegmentationTarget>&
                   const cv::Size& size) {
   if (strokes.empty()) {
     for (const SegmentationTarget& target : targets)
-      if (target.rect.empty() && target.lasso.empty())
+      if (target.rect.empty())
         throw std::invalid_argument("object '" + target.name +
-                                    "' has neither rectangle nor lasso nor stroke; give one");
+                                    "' has neither rectangle nor stroke; give one");
     return;
   }
   if (strokes.type() != CV_8U || strokes.size() != size)

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calipso_align/label_cut.hpp"
+#include "calipso_align/mask_edge.hpp"
 #include "calipso_align/planar_pieces.hpp"
 #include "calipso_align/surface_islands.hpp"
 
@@ -19,11 +20,6 @@ int nearReach(int picture_width) { return std::max(3, picture_width / 10); }
 cv::Mat allowedRegion(const SegmentationTarget& target, const cv::Size& size) {
   cv::Mat allowed(size, CV_8U, cv::Scalar(target.rect.empty() ? 255 : 0));
   if (!target.rect.empty()) allowed(target.rect & cv::Rect(cv::Point(), size)).setTo(255);
-  if (!target.lasso.empty()) {
-    cv::Mat inside = cv::Mat::zeros(size, CV_8U);
-    cv::fillPoly(inside, std::vector<std::vector<cv::Point>>{target.lasso}, 255);
-    allowed &= inside;
-  }
   return allowed;
 }
 
@@ -81,22 +77,11 @@ cv::Mat thinnedOut(const cv::Mat& strokes, const cv::Size& size) {
 
 }  // namespace
 
-cv::Mat grown(const cv::Mat& mask, int px) {
-  const cv::Mat square =
-      cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * px + 1, 2 * px + 1));
-  cv::Mat result;
-  cv::dilate(mask, result, square);
-  return result;
-}
-
 cv::Rect viewOf(const std::vector<SegmentationTarget>& targets, const cv::Size& size) {
   const cv::Rect whole(cv::Point(), size);
   cv::Rect view;
-  for (const SegmentationTarget& target : targets) {
-    cv::Rect place = target.rect.empty() ? whole : target.rect & whole;
-    if (!target.lasso.empty()) place &= cv::boundingRect(target.lasso);
-    view |= place;
-  }
+  for (const SegmentationTarget& target : targets)
+    view |= target.rect.empty() ? whole : target.rect & whole;
   const int margin = nearReach(size.width);
   return cv::Rect(view.x - margin, view.y - margin, view.width + 2 * margin,
                   view.height + 2 * margin) &

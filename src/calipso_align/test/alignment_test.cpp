@@ -130,7 +130,9 @@ TEST(Alignment, SaysHowUncertainTheDistanceIs) {
       EXPECT_LT(std::abs(error), 3.0 * result.distance_sigma) << off << " " << with_depth;
       // A placement that is at most a twentieth off is the least that is known.
       EXPECT_LT(result.distance_sigma, with_depth ? 0.01 : 0.05);
-      if (!with_depth) EXPECT_GT(result.distance_sigma, 0.02);
+      if (!with_depth) {
+        EXPECT_GT(result.distance_sigma, 0.02);
+      }
     }
   }
 }

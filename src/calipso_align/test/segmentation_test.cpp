@@ -176,19 +176,6 @@ TEST(Segmenter, ALaterStrokeTakesAPartAway) {
             0.95 * cv::countNonZero(maskOf(kSize, object)));
 }
 
-TEST(Segmenter, KeepsInsideALasso) {
-  const auto shape = disc(80, 60, 30);
-  const cv::Mat image = paint(kSize, shape, kGreen, kGrey, 3.0);
-  const std::vector<cv::Point> diamond = {{80, 10}, {130, 60}, {80, 110}, {30, 60}};
-  Segmenter segmenter(image, {{"disc", 1, cv::Rect(), diamond}});
-  const cv::Mat labels = segmenter.segment({});
-  cv::Mat inside = cv::Mat::zeros(kSize, CV_8U);
-  cv::fillPoly(inside, std::vector<std::vector<cv::Point>>{diamond}, 255);
-  EXPECT_EQ(cv::countNonZero((labels > 0) & (inside == 0)), 0);
-  // Half a pixel all along the edge costs 3 %.
-  EXPECT_GE(intersectionOverUnion(labels == 1, maskOf(kSize, shape)), 0.97);
-}
-
 TEST(Segmenter, TwoRunsAreByteIdentical) {
   const cv::Mat image = paint(kSize, disc(80, 60, 30), kGreen, kGrey, 8.0);
   const std::vector<SegmentationTarget> targets = {{"disc", 1, cv::Rect(40, 20, 80, 80), {}}};

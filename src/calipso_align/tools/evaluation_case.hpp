@@ -28,7 +28,7 @@ struct EvaluationCase {
   Eigen::Isometry3d rough = Eigen::Isometry3d::Identity();
   std::vector<ContourLoop> contour;
   cv::Mat image;         // the key frame; empty: none
-  AlignOptions options;  // planes, attachments and depth of the scene
+  AlignOptions options;  // planes and depth of the scene
   std::optional<double> ms_segment;
   std::optional<double> segmentation_iou;
   std::optional<Truth> truth;

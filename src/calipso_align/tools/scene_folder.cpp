@@ -81,7 +81,6 @@ std::vector<EvaluationCase> loadSceneFolder(const std::string& directory,
     one.contour = key.contours[k].loops;
     one.image = image;
     one.options.planes = scene.planes;
-    one.options.attachments = object.attachments;
     if (options.use_depth) one.options.depth = loadDepth(scene);
     one.ms_segment = key.segmentation_ms + key.contour_ms;
     one.truth = readTruth(scene, object, entryOf(root, object.name), labels, one.cad.vertexCount());

@@ -22,12 +22,8 @@ struct KeyFrame {
   double contour_ms = 0.0;
 };
 
-// Where the user's rough placement puts an object's CAD model in the key frame: CV_8U, 255 inside;
-// with a margin of a quarter of the picture on every side; all zero behind the camera. @throw
-// std::runtime_error (mesh file)
-cv::Mat placedSilhouette(const Scene& scene, const SceneObject& object);
-
 // The scene's objects as the segmenter wants them; depth: of the key frame, where there is one.
+// @throw std::runtime_error (mesh file)
 std::vector<SegmentationTarget> segmentationTargets(const Scene& scene,
                                                     const std::optional<DepthObservation>& depth);
 

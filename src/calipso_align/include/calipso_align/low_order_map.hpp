@@ -41,9 +41,6 @@ class LowOrderMap {
   Parameters plus(const Parameters& step) const;
   // The same map with its scale counted as strain: s (1 + E) = 1 + E'.
   void absorbScale();
-  // The rigid and scaling part alone.
-  Eigen::Matrix3d rotation() const { return R_; }
-  double scale() const { return s_; }
 
  private:
   Eigen::Vector3d deformed(const Eigen::Vector3d& d) const;  // d + l E (d/l) + l Q(d/l)

@@ -7,6 +7,9 @@ namespace calipso::align {
 // Signed distance from the outline of a mask (CV_8U), px: CV_32F, negative inside.
 cv::Mat signedDistance(const cv::Mat& mask);
 
+// A mask made larger by so many pixels on every side.
+cv::Mat grown(const cv::Mat& mask, int px);
+
 // A mask without its rim, where flow mixes both sides; the mask itself where nothing else is left.
 cv::Mat insideOf(const cv::Mat& mask, int rim_px = 4);
 
@@ -23,11 +26,10 @@ struct KnownBackground {
 // for the noise, or a pixel is no mixture of them, it stays as it is.
 // image  CV_8UC3
 // noise  its standard deviation, grey levels
-// other  CV_8U, pixels of other objects, which are left alone; or empty
 // mask   CV_8U 0 or 255, in and out
 // Returns CV_8U 255 alpha, 0 or 255 away from the outline.
-cv::Mat settleEdge(const cv::Mat& image, const cv::Mat& other, const KnownBackground& background,
-                   double noise, cv::Mat& mask);
+cv::Mat settleEdge(const cv::Mat& image, const KnownBackground& background, double noise,
+                   cv::Mat& mask);
 
 // The mask without the pieces that lie wholly outside of where it was expected, as long as these
 // are the smaller part of it: shadows, and other things of its colours.

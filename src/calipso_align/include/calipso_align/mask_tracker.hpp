@@ -35,7 +35,6 @@ struct TrackerParams {
 struct TrackedMask {
   cv::Mat labels;           // CV_8U: 0 none, else the object's label
   float confidence = 1.0f;  // 0..1, of the least certain object
-  int moved = 0;            // objects that were looked for anew; the others kept their mask
 };
 
 // Carries a label image through a video. Each object is a layer that moves by itself in front of a
@@ -93,7 +92,7 @@ class MaskTracker {
   // What two objects claim is left to one of them.
   void settleClaims();
   static void leave(Object& object, const cv::Mat& pixels);  // takes these from its mask
-  TrackedMask combine(int moved) const;
+  TrackedMask combine() const;
   void settle(Object& object, const cv::Mat& image, const cv::Mat& flow, const cv::Mat& rough,
               const cv::Rect& roi);
   // Takes a mask as where the object is, with its edge settled.

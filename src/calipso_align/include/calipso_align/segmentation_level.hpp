@@ -18,9 +18,8 @@ constexpr int kBackgroundStroke = 255;
 // An object to be found in the picture, and where the user says that it lies.
 struct SegmentationTarget {
   std::string name;
-  int label = 0;                 // 1..254, distinct
-  cv::Rect rect;                 // px; empty: anywhere
-  std::vector<cv::Point> lasso;  // px, polygon; empty: none. The object lies inside both.
+  int label = 0;  // 1..254, distinct
+  cv::Rect rect;  // px; empty: anywhere
   // CV_8U: roughly its shape and place, or empty. May be larger than the picture, with an equal
   // margin on opposite sides.
   cv::Mat silhouette = {};
@@ -107,9 +106,6 @@ cv::Mat uncertainPixels(const SegmentationLevel& level, int band_px);
 
 // The colours under a mask, evenly thinned out to what a model needs.
 std::vector<cv::Vec3f> sampleColours(const cv::Mat& image, const cv::Mat& mask);
-
-// A mask made larger by so many pixels on every side.
-cv::Mat grown(const cv::Mat& mask, int px);
 
 // Whatever lies near the region, objects and background.
 cv::Mat surroundings(const SegmentationLevel& level);

@@ -47,22 +47,6 @@ calipso_msgs::AlignedModel toMsg(const SceneObject& object, const AlignmentResul
   return msg;
 }
 
-AlignmentResult fromMsg(const calipso_msgs::AlignedModel& msg) {
-  AlignmentResult result;
-  result.world_from_object = calipso::fromMsg(msg.world_from_object.pose);
-  for (int i = 0; i < 36; ++i)
-    result.covariance(i / 6, i % 6) = msg.world_from_object.covariance[i];
-  result.mesh = calipso::fromMsg(msg.mesh);
-  result.rest = calipso::fromMsg(msg.cad);
-  result.contour_mean_px = msg.contour_mean_px;
-  result.contour_p95_px = msg.contour_p95_px;
-  result.residual_px = {msg.residual_px};
-  result.trusted = msg.trusted;
-  result.reason = msg.reason;
-  result.times = {{"all", 1e3 * msg.seconds}};
-  return result;
-}
-
 visualization_msgs::Marker toMarker(const std_msgs::Header& header,
                                     const calipso_msgs::AlignedModel& model) {
   visualization_msgs::Marker marker;

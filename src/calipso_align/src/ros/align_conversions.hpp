@@ -10,10 +10,6 @@ namespace calipso::align {
 
 calipso_msgs::AlignedModel toMsg(const SceneObject& object, const AlignmentResult& result);
 
-// Takes back what the message holds of a result. @throw std::invalid_argument as fromMsg(Mesh),
-// Pose
-AlignmentResult fromMsg(const calipso_msgs::AlignedModel& msg);
-
 // The deformed mesh as triangles in the world, coloured by the object's index; red when not
 // trusted.
 visualization_msgs::Marker toMarker(const std_msgs::Header& header,

@@ -167,7 +167,6 @@ void AlignRos::fit(const std::vector<int>& objects) {
 calipso_msgs::AlignedModel AlignRos::fitObject(int object) {
   const SceneObject& description = scene_.objects[object];
   const Eigen::Isometry3d& rough = description.initial_world_from_object;
-  options_.attachments = description.attachments;
   try {
     const calipso_msgs::ObjectContour* contour = findContour(*key_, description.name);
     if (!contour) throw std::invalid_argument("the segmentation has no contour of it: add strokes");
