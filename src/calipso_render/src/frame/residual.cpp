@@ -138,6 +138,12 @@ void Residual::findRims(const cv::Rect& carried) {
   }
 }
 
+// A pixel on the rims of two that have not moved is either's.
+bool Residual::owns(int surface, const cv::Point& at) const {
+  const int owner = rest_.owners.at<short>(at);
+  return owner == surface || (owner >= 0 && !frame_.moved[owner] && !frame_.moved[surface]);
+}
+
 // The pixels around (u, v) that an owner has, with their bilinear weights.
 template <class Act>
 void Residual::forEachOwned(float u, float v, int owner, const Act& act) const {
@@ -145,8 +151,7 @@ void Residual::forEachOwned(float u, float v, int owner, const Act& act) const {
   for (int k = 0; k < 4; ++k) {
     const float weight = ((k & 1) != 0 ? x : 1.0f - x) * ((k & 2) != 0 ? y : 1.0f - y);
     const cv::Point at(static_cast<int>(fu) + (k & 1), static_cast<int>(fv) + (k >> 1));
-    if (weight > 0.0f && miss_box_.contains(at) && rest_.owners.at<short>(at) == owner)
-      act(at, weight);
+    if (weight > 0.0f && miss_box_.contains(at) && owns(owner, at)) act(at, weight);
   }
 }
 

@@ -40,6 +40,7 @@ class Residual {
   void findMiss(const cv::Rect& carried);
   bool carries(const StagedObject& object) const;
   void findRims(const cv::Rect& carried);
+  bool owns(int surface, const cv::Point& at) const;
   template <class Act>
   void forEachOwned(float u, float v, int owner, const Act& act) const;
   bool mayBeDimmed(int surface) const;

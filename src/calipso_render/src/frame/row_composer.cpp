@@ -65,7 +65,20 @@ void RowComposer::drawStretch(int v, int first, int last, Row& row) const {
   const unsigned traits = shader_.shadeStretch(v, first, last, slot, row);
   std::memset(&row.source[first], kRendered, last - first);
   if (residual_ != nullptr) residual_->addToStretch(v, first, last, slot, row);
-  if ((traits & TriangleMap::kThin) != 0) shader_.shadeThin(v, first, last, slot, row);
+  if ((traits & TriangleMap::kThin) != 0) drawThin(v, first, last, row);
+}
+
+// The same of those that see thin triangles, which need places of their own.
+void RowComposer::drawThin(int v, int first, int last, Row& row) const {
+  const std::uint32_t* ids = centre_.ids(v - region_.y);
+  for (int i = first; i < last; ++i) {
+    if (!shader_.isThin(ids[i])) continue;
+    const int u = i + region_.x;
+    const cv::Vec3f shaded = shader_.shadedThin(ids[i], u, v, row.run);
+    cv::Vec4f colour(shaded[0], shaded[1], shaded[2], 1.0f);
+    if (residual_ != nullptr) residual_->addToPixel(ids[i], u, v, colour);
+    row.set(i, colour);
+  }
 }
 
 // A pixel that needs more than one surface.

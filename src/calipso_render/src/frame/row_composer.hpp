@@ -29,6 +29,7 @@ class RowComposer {
 
  private:
   void drawStretch(int v, int first, int last, Row& row) const;
+  void drawThin(int v, int first, int last, Row& row) const;
   void composeSpecial(int u, int v, Row& row) const;
 
   const StagedFrame& frame_;

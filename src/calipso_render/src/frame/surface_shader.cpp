@@ -86,15 +86,16 @@ unsigned SurfaceShader::shadeStretch(int v, int first, int last, int slot, Row& 
   return traits;
 }
 
-void SurfaceShader::shadeThin(int v, int first, int last, int slot, Row& row) const {
-  const std::uint32_t* ids = centre_.ids(v - region_.y);
-  SurfaceRun& run = row.run;
-  for (int i = first; i < last; ++i) {
-    if (!maps_[slot].of(VisibilityBuffer::triangleOf(ids[i])).is(TriangleMap::kThin)) continue;
-    const SurfacePlace place{ids[i], static_cast<float>(i + region_.x), static_cast<float>(v)};
-    shadePlaces(&place, 1, slot, run);
-    row.set(i, {run.colour[0][0], run.colour[1][0], run.colour[2][0], 1.0f});
-  }
+bool SurfaceShader::isThin(std::uint32_t id) const {
+  return maps_[VisibilityBuffer::objectOf(id)]
+      .of(VisibilityBuffer::triangleOf(id))
+      .is(TriangleMap::kThin);
+}
+
+cv::Vec3f SurfaceShader::shadedThin(std::uint32_t id, int u, int v, SurfaceRun& run) const {
+  const SurfacePlace place{id, static_cast<float>(u), static_cast<float>(v)};
+  shadePlaces(&place, 1, VisibilityBuffer::objectOf(id), run);
+  return {run.colour[0][0], run.colour[1][0], run.colour[2][0]};
 }
 
 // Reflectance of the pixels [first, last) of row v at their places in row.run.

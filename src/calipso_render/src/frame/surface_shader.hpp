@@ -30,8 +30,10 @@ class SurfaceShader {
   // @return TriangleMap::traits that any of their triangles has: what is told of kThin ones is of
   // no use
   unsigned shadeStretch(int v, int first, int last, int slot, Row& row) const;
-  // Colours of those of them that see thin triangles.
-  void shadeThin(int v, int first, int last, int slot, Row& row) const;
+  // Whether a triangle is kThin, and the colour of one that pixel (u, v) sees.
+  // @param run for its places
+  bool isThin(std::uint32_t id) const;
+  cv::Vec3f shadedThin(std::uint32_t id, int u, int v, SurfaceRun& run) const;
   // Radiance of places of one object, run.colour.
   // @param count at most SurfaceRun::kMost
   void shadePlaces(const SurfacePlace* places, int count, int slot, SurfaceRun& run) const;

@@ -12,6 +12,7 @@ namespace {
 constexpr int kFrontOpening = 7;
 constexpr int kNarrowFront = 3;     // ... so much of them
 constexpr float kDeepFront = 6.0f;  // ... that far inside the model's outline: a peg on a towel
+constexpr int kRim = 2;             // px beyond a model's outline in which its rim may be drawn
 constexpr int kWaterline = 2;       // px by which masks end before it, and over which it mixes
 
 // Where an object's surface should be seen at the key frame but no mask is, something stands before
@@ -93,6 +94,9 @@ std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params) {
                        params.background.mask_margin_px + params.background.shadow_margin_px + 1);
       if (cv::countNonZero(beside) > 0) front = front.empty() ? beside : cv::Mat(front | beside);
     }
+    // The outline of what is hidden is hidden, too, with the pixels that it only touches.
+    if (!front.empty())
+      front |= grown(front, kRim) & ~grown(mask, kRim) & ~p.outlines[i] & (p.key_labels == 0);
     fronts.push_back(front);
   }
   return fronts;
