@@ -220,6 +220,11 @@ void SoftObject::addForce(const SurfacePoint& point, const Eigen::Vector3d& forc
   forced_ = true;
 }
 
+void SoftObject::clearForces() {
+  forces_.setZero();
+  forced_ = false;
+}
+
 StepReport SoftObject::step(double h) {
   applyNodalForces();
   const StepReport report = body_.step(h);
@@ -248,8 +253,6 @@ StepReport SoftObject::endStep(const Vec& contact_forces, double h,
     target.center = before_.center + h / mass * target.linear - 0.5 * h * h * gravity_;
     setMomentum(target);
   }
-  forces_.setZero();
-  forced_ = false;
   changed();
   return report;
 }

@@ -61,10 +61,12 @@ void World::Impl::noteNoDrive(Actor& actor) {
   plan_changed = true;
 }
 
+// In place of those of the step before, or of a longer one that was given up.
 void World::Impl::applyLoads(double at, double h) {
   for (Actor& actor : actors) {
     if (actor.removed) continue;
     if (actor.soft) {
+      actor.soft->clearForces();
       for (const Pull& pull : actor.pulls) pullSoft(actor, pull, at);
       if (!actor.air.empty()) blowSoft(actor, at, h);
     }

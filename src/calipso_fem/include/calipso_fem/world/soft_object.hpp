@@ -57,8 +57,8 @@ class SoftObject {
   void copyPrestress(const SoftObject& other);
 
   StepReport step(double h);  // under gravity and what drives it alone, without contacts
-  // One step under gravity, all forces given since the last one, and contacts: whoever solves for
-  // these drives the body's trial in between. `gained`: impulse and, about the centre of mass
+  // One step under gravity, all forces given and contacts: whoever solves for these drives the
+  // body's trial in between. `gained`: impulse and, about the centre of mass
   // before the step, its moment, of a body that nothing else holds; then momentum is exact, and
   // flight follows its parabola.
   void beginStep(double h);
@@ -66,7 +66,8 @@ class SoftObject {
   const Momentum& momentumBefore() const { return before_; }
 
   void setGravity(const Eigen::Vector3d& gravity);
-  void addForce(const SurfacePoint& point, const Eigen::Vector3d& force);  // N, for the next step
+  void addForce(const SurfacePoint& point, const Eigen::Vector3d& force);  // N, until cleared
+  void clearForces();
   void setDrive(const Vec& forces) { drive_ = forces; }  // 3n, N, until others are given
 
   // The system that contact iterates with; forgotten when the body's own has changed for good.
@@ -108,7 +109,7 @@ class SoftObject {
 
   DeformableBody body_;
   Eigen::Vector3d gravity_ = Eigen::Vector3d::Zero();
-  Vec forces_;  // 3 #V, for the next step
+  Vec forces_;  // 3 #V, N
   bool forced_ = false;
   Vec observed_;                    // 3 #N, nodes at construction
   Vec prestress_;                   // 3 #N, N, at the observed shape; empty: none
