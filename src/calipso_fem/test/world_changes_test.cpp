@@ -36,11 +36,8 @@ Edit kindEdit(ObjectKind kind) {
 }
 
 void apply(World& world, const Edit& edit) {
-  Edit now = edit;
-  now.time = world.time();
-  world.submit(now);
-  for (const EditOutcome& outcome : world.advanceTo(world.time()))
-    EXPECT_TRUE(outcome.accepted) << outcome.message;
+  const EditOutcome outcome = outcomeOf(world, edit);
+  EXPECT_TRUE(outcome.accepted) << outcome.message;
 }
 
 double lowest(const WorldState& state, int object = 0) {

@@ -134,27 +134,6 @@ TEST(WorldEdits, ALaterCopyLeavesTheOriginalAlone) {
   EXPECT_NEAR(centerOf(world.state()).z(), 0.35, 1e-6);
 }
 
-TEST(WorldEdits, AFlatModelIsRefusedAndLeavesNothing) {
-  World world = boxWorld();
-  TriangleMesh card;
-  card.vertices.resize(4, 3);
-  card.vertices << 0, 0, 0, 0.1, 0, 0, 0.1, 0, 0.1, 0, 0, 0.1;
-  card.triangles.resize(2, 3);
-  card.triangles << 0, 1, 2, 0, 2, 3;
-  WorldObject object;
-  object.name = "card", object.index = 2, object.mesh = card;
-  try {
-    world.addObject(object, {});
-    FAIL() << "no error";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("card: "), std::string::npos) << error.what();
-    EXPECT_NE(std::string(error.what()).find("thickness"), std::string::npos) << error.what();
-  }
-  EXPECT_EQ(world.state().objects.size(), 1u);
-  world.advanceTo(0.0);
-  EXPECT_NO_THROW(play(world, 0.2));
-}
-
 TEST(WorldEdits, APixelShowsWhatTheVideoHasThere) {
   World world = boxWorld();
   WorldObject before;

@@ -164,6 +164,12 @@ Edit editOf(EditKind kind, EditMode mode, double time) {
   return edit;
 }
 
+EditOutcome outcomeOf(World& world, Edit edit) {
+  edit.time = world.time();
+  world.submit(edit);
+  return world.advanceTo(world.time()).at(0);
+}
+
 void play(World& world, double seconds) {
   const double start = world.time();
   const int frames = static_cast<int>(std::lround(seconds * 30.0));

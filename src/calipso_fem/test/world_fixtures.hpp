@@ -40,6 +40,9 @@ inline WorldParams coarse() {
 
 Edit editOf(EditKind kind, EditMode mode = EditMode::kAbsolute, double time = 0.0);
 
+// What becomes of an edit that is made now.
+EditOutcome outcomeOf(World& world, Edit edit);
+
 // Lets `seconds` of video pass at 30 frames per second.
 void play(World& world, double seconds);
 

@@ -73,7 +73,8 @@ enum class Holder { kUnknown, kAttachment, kSupport, kBuoyancy, kNothing };
 
 // One object of the simulated world.
 struct Actor {
-  explicit Actor(const WorldObject& object) : object(object), track(object.world_from_object) {}
+  explicit Actor(const WorldObject& object)
+      : object(object), track(object.world_from_object), flat(isFlat(object.mesh)) {}
 
   WorldObject object;  // its mesh is rescaled by edits
   ObservedTrack track;
@@ -93,6 +94,7 @@ struct Actor {
   bool continues = false;
   bool inserted = false;          // not in the video
   bool immovable = false;         // of infinite mass
+  bool flat = false;              // without a mass: no rigid body can be made of it
   std::vector<int> own_supports;  // ids of the support meshes that are its own surface
   // Contacts of own supports that it has put an end to; others' wishes stay.
   std::vector<std::pair<std::string, std::string>> ended_contacts;
@@ -102,7 +104,6 @@ struct Actor {
   Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();           // m/s^2
   Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  // by edits, of a kinematic object
   std::optional<RigidWorld::Id> body;                           // also as a collider while static
-  std::vector<TriangleMesh> hulls;                              // cached convex parts, object frame
   std::unique_ptr<SoftObject> soft;
   Vec key_nodes;  // 3n, m: of one that deforms in the video, in the key frame
   std::unique_ptr<ObservedDrive>

@@ -55,6 +55,34 @@ MassProperties fromMoments(const Moments& m, const Eigen::Vector3d& origin, doub
   return p;
 }
 
+// Without volume where the points lie in one plane.
+TriangleMesh hullOf(const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>& points) {
+  btConvexHullComputer hull;
+  hull.compute(points.data(), 3 * sizeof(double), static_cast<int>(points.rows()), 0.0, 0.0);
+  TriangleMesh mesh;
+  mesh.vertices.resize(hull.vertices.size(), 3);
+  for (int i = 0; i < hull.vertices.size(); ++i)
+    mesh.vertices.row(i) << hull.vertices[i].x(), hull.vertices[i].y(), hull.vertices[i].z();
+  std::vector<Eigen::Vector3i> triangles;
+  for (int f = 0; f < hull.faces.size(); ++f) {
+    const auto* first = &hull.edges[hull.faces[f]];
+    // Fan around the face's first vertex.
+    for (const auto* e = first->getNextEdgeOfFace();
+         e->getTargetVertex() != first->getSourceVertex(); e = e->getNextEdgeOfFace())
+      triangles.emplace_back(first->getSourceVertex(), e->getSourceVertex(), e->getTargetVertex());
+  }
+  mesh.triangles.resize(static_cast<Eigen::Index>(triangles.size()), 3);
+  for (size_t f = 0; f < triangles.size(); ++f)
+    mesh.triangles.row(static_cast<Eigen::Index>(f)) = triangles[f].transpose();
+  if (signedVolume(mesh) < 0.0) mesh.triangles.col(1).swap(mesh.triangles.col(2));
+  return mesh;
+}
+
+bool hasNoVolume(const TriangleMesh& hull) {
+  const double d = hull.vertexCount() ? boundingDiagonal(hull) : 0.0;
+  return !(signedVolume(hull) > 1e-12 * d * d * d);
+}
+
 }  // namespace
 
 double surfaceArea(const TriangleMesh& mesh) {
@@ -80,30 +108,14 @@ bool isClosed(const TriangleMesh& mesh) {
 }
 
 TriangleMesh convexHull(const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>& points) {
-  btConvexHullComputer hull;
-  hull.compute(points.data(), 3 * sizeof(double), static_cast<int>(points.rows()), 0.0, 0.0);
-  TriangleMesh mesh;
-  mesh.vertices.resize(hull.vertices.size(), 3);
-  for (int i = 0; i < hull.vertices.size(); ++i)
-    mesh.vertices.row(i) << hull.vertices[i].x(), hull.vertices[i].y(), hull.vertices[i].z();
-  std::vector<Eigen::Vector3i> triangles;
-  for (int f = 0; f < hull.faces.size(); ++f) {
-    const auto* first = &hull.edges[hull.faces[f]];
-    // Fan around the face's first vertex.
-    for (const auto* e = first->getNextEdgeOfFace();
-         e->getTargetVertex() != first->getSourceVertex(); e = e->getNextEdgeOfFace())
-      triangles.emplace_back(first->getSourceVertex(), e->getSourceVertex(), e->getTargetVertex());
-  }
-  mesh.triangles.resize(static_cast<Eigen::Index>(triangles.size()), 3);
-  for (size_t f = 0; f < triangles.size(); ++f)
-    mesh.triangles.row(static_cast<Eigen::Index>(f)) = triangles[f].transpose();
-  if (signedVolume(mesh) < 0.0) mesh.triangles.col(1).swap(mesh.triangles.col(2));
-  const double d = mesh.vertexCount() ? boundingDiagonal(mesh) : 0.0;
-  if (!(signedVolume(mesh) > 1e-12 * d * d * d))
+  TriangleMesh mesh = hullOf(points);
+  if (hasNoVolume(mesh))
     throw std::invalid_argument("convex hull of " + std::to_string(points.rows()) +
                                 " points is flat; a solid needs four points off one plane");
   return mesh;
 }
+
+bool isFlat(const TriangleMesh& mesh) { return hasNoVolume(hullOf(mesh.vertices)); }
 
 MassProperties massProperties(const TriangleMesh& mesh, double density) {
   if (!(density > 0.0 && std::isfinite(density)))

@@ -32,6 +32,17 @@ TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose) {
   return m;
 }
 
+Eigen::Vector3d centerOfMass(const Actor& actor) {
+  const TriangleMesh& mesh = actor.object.mesh;
+  if (actor.flat) return mesh.vertices.colwise().mean().transpose();
+  return massProperties(mesh, 1.0).center;
+}
+
+double massOf(const Actor& actor) {
+  return actor.soft ? actor.soft->body().totalMass()
+                    : massProperties(actor.object.mesh, actor.material.density).mass;
+}
+
 FemOptions chooseFem(const TriangleMesh& surface, const Camera& camera, const WorldParams& params,
                      const ObjectSettings& settings) {
   FemOptions options = params.fem;
@@ -85,8 +96,7 @@ BodyMotion World::Impl::motionOf(const Actor& actor) const {
   } else {
     const ObservedMotion seen = actor.track.at(now);
     if (!seen.moving) return m;
-    const Eigen::Vector3d center =
-        seen.world_from_object * massProperties(actor.object.mesh, 1.0).center;
+    const Eigen::Vector3d center = seen.world_from_object * centerOfMass(actor);
     m.angular = actor.placement.linear() * seen.angular;
     m.linear =
         actor.placement.linear() * (seen.linear + seen.angular.cross(center - seen.centroid));
@@ -121,12 +131,10 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
   const bool immovable =
       actor.immovable && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
   if (attached || immovable) kind = ObjectKind::kKinematic;
-  actor.edited = actor.edited || kind != ObjectKind::kStatic;
   if (kind == ObjectKind::kStatic && !actor.edited) actor.reason = reason, plan_changed = true;
   if (actor.kind == kind) return;
   BodyMotion motion = motionOf(actor);
   const bool as_observed = actor.kind == ObjectKind::kStatic;
-  removeBodies(actor);
   Eigen::Isometry3d seen = actor.track.at(now).world_from_object;
   const bool deforms = as_observed && kind == ObjectKind::kDeformable && actor.modes.cols() > 0 &&
                        !actor.track.empty();
@@ -134,33 +142,48 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
     motion = BodyMotion();
     motion.world_from_object = seen = actor.object.world_from_object;
   }
-  actor.kind = kind;
+  Body body = bodyOf(actor, actor.object.mesh, kind, motion);
+  actor.edited = actor.edited || kind != ObjectKind::kStatic;
   actor.reason = reason + (immovable  ? "; its mass is infinite"
                            : attached ? "; its attachments hold it in place"
                                       : "");
   actor.placement = motion.world_from_object * seen.inverse();
-  if (kind == ObjectKind::kRigid) makeRigid(actor, motion);
-  if (kind == ObjectKind::kDeformable) makeSoft(actor, motion, as_observed);
+  enter(actor, std::move(body), as_observed);
   if (deforms) deformAsObserved(actor);
-  if (kind == ObjectKind::kKinematic || kind == ObjectKind::kStatic) addCollider(actor);
-  plan_changed = true;
 }
 
-// The same kind again, from a changed mesh.
-void World::Impl::rebuild(Actor& actor) {
-  const BodyMotion motion = motionOf(actor);
+World::Impl::Body World::Impl::bodyOf(const Actor& actor, const TriangleMesh& mesh, ObjectKind kind,
+                                      const BodyMotion& motion) {
+  Body body{kind, motion, {}, nullptr};
+  if (kind == ObjectKind::kRigid) {
+    RigidBodySpec& spec = body.rigid;
+    spec.name = actor.object.name;
+    spec.shapes = hulls.of(mesh);
+    spec.mass = massProperties(mesh, actor.material.density);
+    spec.surface = actor.settings.surface;
+    spec.world_from_object = motion.world_from_object;
+    spec.linear = motion.linear;
+    spec.angular = motion.angular;
+    spec.asleep =
+        actor.holder == Holder::kSupport && motion.linear.isZero() && motion.angular.isZero();
+  } else if (kind == ObjectKind::kDeformable) {
+    const TriangleMesh surface = placed(mesh, motion.world_from_object);
+    body.soft = std::make_unique<SoftObject>(
+        surface, actor.observed_material, chooseFem(surface, scene.camera, params, actor.settings));
+  }
+  return body;
+}
+
+void World::Impl::enter(Actor& actor, Body body, bool settle) {
   removeBodies(actor);
-  actor.hulls.clear();
-  actor.tree.reset();
-  if (actor.kind == ObjectKind::kRigid) makeRigid(actor, motion);
-  if (actor.kind == ObjectKind::kDeformable) makeSoft(actor, motion, false);
-  if (!actor.simulated()) addCollider(actor);
+  actor.kind = body.kind;
+  if (body.kind == ObjectKind::kRigid)
+    makeRigid(actor, body.rigid);
+  else if (body.kind == ObjectKind::kDeformable)
+    makeSoft(actor, std::move(body), settle);
+  else
+    addCollider(actor);
   plan_changed = true;
-}
-
-const std::vector<TriangleMesh>& World::Impl::hullsOf(Actor& actor) {
-  if (actor.hulls.empty()) actor.hulls = hulls.of(actor.object.mesh);
-  return actor.hulls;
 }
 
 // Says which others the object is in where it starts: contacts push these apart slowly.
@@ -183,30 +206,20 @@ void World::Impl::noteOverlaps(Actor& actor, const TriangleMesh& surface) {
   }
 }
 
-void World::Impl::makeRigid(Actor& actor, const BodyMotion& motion) {
+void World::Impl::makeRigid(Actor& actor, const RigidBodySpec& spec) {
   addColliders();
-  RigidBodySpec spec;
-  spec.name = actor.object.name;
-  spec.shapes = hullsOf(actor);
-  spec.mass = massProperties(actor.object.mesh, actor.material.density);
-  spec.surface = actor.settings.surface;
-  spec.world_from_object = motion.world_from_object;
-  spec.linear = motion.linear;
-  spec.angular = motion.angular;
-  spec.asleep =
-      actor.holder == Holder::kSupport && motion.linear.isZero() && motion.angular.isZero();
   actor.note = spec.mass.note.empty() ? "" : spec.mass.note + "; ";
   meetOwnSupports(actor, false);
-  noteOverlaps(actor, placed(actor.object.mesh, motion.world_from_object));
+  noteOverlaps(actor, placed(actor.object.mesh, spec.world_from_object));
   actor.body = rigid.add(spec);
   rigid.setAcceleration(*actor.body, actor.acceleration());
   applyRules(actor);
 }
 
-void World::Impl::makeSoft(Actor& actor, const BodyMotion& motion, bool settle) {
+void World::Impl::makeSoft(Actor& actor, Body made, bool settle) {
+  const BodyMotion& motion = made.motion;
   const TriangleMesh surface = placed(actor.object.mesh, motion.world_from_object);
-  const FemOptions options = chooseFem(surface, scene.camera, params, actor.settings);
-  actor.soft = std::make_unique<SoftObject>(surface, actor.observed_material, options);
+  actor.soft = std::move(made.soft);
   actor.soft_from_object = motion.world_from_object;
   DeformableBody& body = actor.soft->body();
   for (const std::string& message : body.grid().messages) actor.note += message + "; ";
@@ -307,7 +320,8 @@ void World::Impl::reset(Actor& actor) {
   plan_changed = true;
 }
 
-// Bullet gets the supports and the objects at rest with the first rigid body, not before.
+// Bullet gets the supports and the objects at rest with the first rigid body, not before. What
+// moves is made of convex parts; what is flat is its own.
 void World::Impl::addColliders() {
   if (has_colliders) return;
   has_colliders = true;
@@ -332,7 +346,10 @@ void World::Impl::addCollider(Actor& actor) {
   spec.world_from_object = poseOf(actor, now);
   const bool moves = !actor.track.empty() || actor.kind == ObjectKind::kKinematic;
   spec.motion = moves ? RigidMotion::kKinematic : RigidMotion::kStatic;
-  spec.shapes = moves ? hullsOf(actor) : std::vector<TriangleMesh>{actor.object.mesh};
+  if (moves && !actor.flat)
+    spec.shapes = hulls.of(actor.object.mesh);
+  else
+    spec.shapes = {actor.object.mesh};
   actor.body = rigid.add(spec);
   applyRules(actor);
 }

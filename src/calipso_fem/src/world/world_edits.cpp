@@ -95,6 +95,16 @@ void World::Impl::touch(Actor& actor, const Edit& edit) {
   wake(actor);
 }
 
+std::string World::Impl::touchIfPossible(Actor& actor, const Edit& edit) {
+  try {
+    touch(actor, edit);
+  } catch (const std::invalid_argument& error) {
+    if (!edit.object.empty()) throw;
+    return error.what();
+  }
+  return {};
+}
+
 std::string World::Impl::apply(const Edit& edit) {
   std::vector<bool> fresh;
   for (const Actor& actor : actors) fresh.push_back(actor.kind == ObjectKind::kStatic);
@@ -140,9 +150,7 @@ std::string World::Impl::carryOut(const Edit& edit) {
     case EditKind::kAppearance:
       return changeLook(actor, edit);
     case EditKind::kObjectKind:
-      actor.forced_kind = edit.object_kind;
-      touch(actor, edit);
-      return actor.object.name + " is " + toString(actor.kind) + " now";
+      return changeKind(actor, edit);
     case EditKind::kRemove:
       return remove(actor);
     case EditKind::kReset:
@@ -157,6 +165,8 @@ std::string World::Impl::carryOut(const Edit& edit) {
 
 std::string World::Impl::transform(Actor& actor, const Edit& edit) {
   touch(actor, edit);
+  const bool deformed = actor.soft != nullptr;
+  if (edit.scale != 1.0) scale(actor, edit.scale);
   wakeAround(actor);
   const Eigen::Vector3d centroid = centroidOf(actor);
   const Eigen::Isometry3d motion = motionAbout(centroid, edit);
@@ -175,22 +185,23 @@ std::string World::Impl::transform(Actor& actor, const Edit& edit) {
   }
   std::string message = actor.object.name + " is moved by " + describe(edit.translation) + " m";
   if (edit.scale == 1.0) return message;
-  const bool deformed = actor.soft != nullptr;
-  scale(actor, edit.scale);
   message += " and scaled by " + std::to_string(edit.scale);
   return deformed ? message + "; it starts anew from its undeformed shape" : message;
 }
 
 void World::Impl::scale(Actor& actor, double factor) {
   const Eigen::RowVector3d middle = actor.object.mesh.vertices.colwise().mean();
+  TriangleMesh mesh = actor.object.mesh;
+  mesh.vertices = (factor * (mesh.vertices.rowwise() - middle)).rowwise() + middle;
+  Body body = bodyOf(actor, mesh, actor.kind, motionOf(actor));
   const Eigen::Vector3d own = middle.transpose(), placed = poseOf(actor, now) * own;
   for (Pull& pull : actor.pulls) {
     pull.anchor = own + factor * (pull.anchor - own);
     pull.scaleBy(factor, placed, pull.share(now));
   }
-  actor.object.mesh.vertices =
-      (factor * (actor.object.mesh.vertices.rowwise() - middle)).rowwise() + middle;
-  rebuild(actor);
+  actor.object.mesh = mesh;
+  actor.tree.reset();
+  enter(actor, std::move(body), false);
   wake(actor);
 }
 
@@ -304,6 +315,17 @@ std::string World::Impl::copy(Actor& actor, const Edit& edit) {
   if (wind_now && fresh.air.empty()) blow(fresh, *wind_now);
   return edit.new_name + " is a copy of " + actor.object.name + ", moved by " +
          describe(edit.translation) + " m";
+}
+
+std::string World::Impl::changeKind(Actor& actor, const Edit& edit) {
+  const auto before = std::exchange(actor.forced_kind, edit.object_kind);
+  try {
+    touch(actor, edit);
+  } catch (...) {
+    actor.forced_kind = before;
+    throw;
+  }
+  return actor.object.name + " is " + toString(actor.kind) + " now";
 }
 
 // Only the picture changes: edits to come find the object as the video has it.

@@ -161,9 +161,7 @@ Vertices World::Impl::airOn(Actor& actor, const Vertices& x, const Vertices& u, 
     Actor::Sheet sheet;
     sheet.closed = isClosed(mesh);
     const double area = (sheet.closed ? 0.5 : 1.0) * surfaceArea(mesh);
-    const double mass = actor.soft ? actor.soft->body().totalMass()
-                                   : massProperties(mesh, actor.material.density).mass;
-    sheet.areal_density = mass / std::max(area, 1e-12);
+    sheet.areal_density = massOf(actor) / std::max(area, 1e-12);
     actor.sheet = sheet;
   }
   const Air air{actor.air.at(at), (actor.sheet->closed ? 0.5 : 1.0) * kAirDrag};

@@ -54,10 +54,21 @@ struct World::Impl {
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> verticesOf(const Actor& actor) const;
   Eigen::Vector3d centroidOf(const Actor& actor) const;
   void become(Actor& actor, ObjectKind kind, const std::string& reason);
-  void rebuild(Actor& actor);
+  // A body to come. It is made before anything changes: an object of which none can be made stays
+  // as it is.
+  struct Body {
+    ObjectKind kind;
+    BodyMotion motion;
+    RigidBodySpec rigid;               // of a rigid one
+    std::unique_ptr<SoftObject> soft;  // of a deformable one
+  };
+  // @throw std::invalid_argument: none can be made
+  Body bodyOf(const Actor& actor, const TriangleMesh& mesh, ObjectKind kind,
+              const BodyMotion& motion);
+  void enter(Actor& actor, Body body, bool settle);  // in place of the body it has
   void noteOverlaps(Actor& actor, const TriangleMesh& surface);
-  void makeRigid(Actor& actor, const BodyMotion& motion);
-  void makeSoft(Actor& actor, const BodyMotion& motion, bool settle);
+  void makeRigid(Actor& actor, const RigidBodySpec& spec);
+  void makeSoft(Actor& actor, Body body, bool settle);
   void deformAsObserved(Actor& actor);  // shape and velocity as in the video at this instant
   Vec nodalModes(const Actor& actor, const Vec& amplitudes) const;
   // The same body in the same state, with the material it was observed with and not held.
@@ -89,7 +100,6 @@ struct World::Impl {
   void copySoft(Actor& copy, const Actor& source, const Eigen::Isometry3d& motion);
   void addColliders();
   void addCollider(Actor& actor);
-  const std::vector<TriangleMesh>& hullsOf(Actor& actor);  // computed once per mesh
   void wake(Actor& actor);
 
   // What held an object in the video (world_settle.cpp)
@@ -163,6 +173,7 @@ struct World::Impl {
   std::string copy(Actor& actor, const Edit& edit);
   std::string changeContact(Actor& actor, const Edit& edit);
   std::string changeLook(Actor& actor, const Edit& edit);
+  std::string changeKind(Actor& actor, const Edit& edit);
   std::string changeMaterial(Actor& actor, const Edit& edit);
   std::string makeImmovable(Actor& actor, const Edit& edit, const Material& material);
   std::string changeGravity(const Edit& edit);
@@ -170,6 +181,9 @@ struct World::Impl {
   std::string changeVelocity(Actor& actor, const Edit& edit);
   void checkThere(const Actor& actor) const;  // @throw std::invalid_argument: it was removed
   void touch(Actor& actor, const Edit& edit);
+  // An edit of the whole scene passes over what it cannot touch. @return why that stays; empty: it
+  // was touched
+  std::string touchIfPossible(Actor& actor, const Edit& edit);
   ObjectKind kindFor(const Actor& actor, const Edit& edit) const;
   int idOf(const std::string& name) const;  // of an object or a support
   std::optional<RigidWorld::Id> rigidIdOf(int id) const;
@@ -226,6 +240,9 @@ Material observedMaterial(const WorldObject& object, const ObjectSettings& setti
 // @throw std::invalid_argument naming the object and what is wrong with it (world.cpp)
 void validateScene(const WorldScene& scene);
 TriangleMesh placed(const TriangleMesh& mesh, const Eigen::Isometry3d& pose);  // world_bodies.cpp
+// Object frame, m; of what is flat, the mean of its vertices. (world_bodies.cpp)
+Eigen::Vector3d centerOfMass(const Actor& actor);
+double massOf(const Actor& actor);  // kg. @pre not flat, or deformable (world_bodies.cpp)
 // A sheet that is meant to bend: thin, and large for its volume (m^3). world_settle.cpp
 bool isCloth(const TriangleMesh& surface, double volume);
 // Whether it moves by a part of its size that counts to the next frame. (world_rests.cpp)

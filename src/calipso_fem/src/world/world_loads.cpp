@@ -184,7 +184,8 @@ std::string World::Impl::blow(Actor& actor, const Edit& edit) {
     air = windFor(actor).times(edit.factor);
   else
     air.add({now, edit.vector, Eigen::Matrix3d::Zero()});
-  touch(actor, edit);
+  const std::string stays = touchIfPossible(actor, edit);
+  if (!stays.empty()) return actor.object.name + " stays: " + stays;
   if (!actor.simulated()) {
     const std::string held = actor.object.name + " is " + toString(actor.kind);
     if (edit.object.empty()) return held + " and stays";  // the others are blown at all the same

@@ -236,15 +236,12 @@ Actor& World::Impl::duplicate(const std::string& source_name, const std::string&
     copy.holder = source.holder;
     copy.buoyancy = source.buoyancy;
   }
-  copy.hulls = source.hulls;
   copy.reason = "it is a copy of " + source_name;
   if (!source.simulated()) return copy;
-  removeBodies(copy);
-  copy.kind = source.kind;
-  BodyMotion start{object.world_from_object, motion.linear() * moves.linear,
-                   motion.linear() * moves.angular};
+  const BodyMotion start{object.world_from_object, motion.linear() * moves.linear,
+                         motion.linear() * moves.angular};
   if (source.kind == ObjectKind::kRigid)
-    makeRigid(copy, start);
+    enter(copy, bodyOf(copy, object.mesh, ObjectKind::kRigid, start), false);
   else
     copySoft(copy, source, motion);
   return copy;
@@ -265,6 +262,8 @@ std::unique_ptr<SoftObject> World::Impl::twinOf(const Actor& actor, const Triang
 
 // The same grid in the same place, with the original's rest shape; then the state, moved.
 void World::Impl::copySoft(Actor& copy, const Actor& source, const Eigen::Isometry3d& motion) {
+  removeBodies(copy);
+  copy.kind = ObjectKind::kDeformable;
   copy.soft = twinOf(source, copy.object.mesh, source.soft->body().options());
   copy.soft_from_object = source.soft_from_object;
   copy.soft->setMaterial(copy.material);

@@ -25,10 +25,9 @@ PlanEntry entryOf(const Actor& actor, double time_step) {
     e.mass = body.totalMass();
     e.ms_per_frame = actor.soft_ms;
   } else if (actor.kind == ObjectKind::kRigid) {
-    e.elements = static_cast<int>(actor.hulls.size());
     e.element = "convex hull";
     e.solver = "Bullet";
-    e.mass = massProperties(actor.object.mesh, actor.material.density).mass;
+    e.mass = massOf(actor);
   }
   return e;
 }
@@ -60,8 +59,11 @@ void drawGrid(const DeformableBody& body, World::Drawing& drawing) {
 std::vector<PlanEntry> World::plan() const {
   std::vector<PlanEntry> entries;
   const double period = impl_->params.frame_period;
-  for (const Actor& actor : impl_->actors)
+  for (const Actor& actor : impl_->actors) {
     entries.push_back(entryOf(actor, actor.soft ? period / impl_->substepsPerFrame() : period));
+    if (actor.kind == ObjectKind::kRigid)
+      entries.back().elements = static_cast<int>(impl_->hulls.of(actor.object.mesh).size());
+  }
   return entries;
 }
 

@@ -65,8 +65,12 @@ std::string World::Impl::changeGravity(const Edit& edit) {
         continue;
       }
     }
-    touch(actor, edit);
+    const std::string stays = touchIfPossible(actor, edit);
     actor.gravity = gravity;
+    if (!stays.empty()) {
+      changed_objects += " " + actor.object.name + " stays: " + stays + ";";
+      continue;
+    }
     if (actor.soft) actor.soft->setGravity(actor.acceleration());
     if (actor.kind == ObjectKind::kRigid) rigid.setAcceleration(*actor.body, actor.acceleration());
     changed_objects += " " + actor.object.name + " " + describe(gravity) + " m/s^2;";

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <limits>
 
-#include "calipso_fem/world/mass_properties.hpp"
 #include "obstacle_query.hpp"
 #include "world_impl.hpp"
 
@@ -69,8 +68,9 @@ ObjectKind World::Impl::kindWhenFree(const Actor& actor) const {
 
 bool World::Impl::canBeStruck(const Actor& actor) const {
   const ObjectKind kind = kindWhenFree(actor);
-  return actor.followsVideo() && !actor.immovable && actor.object.attachments.empty() &&
-         actor.modes.cols() == 0 && (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
+  return actor.followsVideo() && !actor.immovable && !actor.flat &&
+         actor.object.attachments.empty() && actor.modes.cols() == 0 &&
+         (kind == ObjectKind::kRigid || kind == ObjectKind::kDeformable);
 }
 
 // m/s, within the next h of the video; 0: they do not meet.
@@ -79,8 +79,8 @@ double World::Impl::closingSpeedOf(const Actor& striker, const Actor& struck, do
   const auto fieldOf = [&](const Actor& actor) {
     const BodyMotion m = motionOf(actor);
     const double pace = actor.simulated() ? 1.0 : 1.0 / speed_scale;  // in simulated seconds
-    return VelocityField{m.world_from_object * massProperties(actor.object.mesh, 1.0).center,
-                         pace * m.linear, pace * m.angular};
+    return VelocityField{m.world_from_object * centerOfMass(actor), pace * m.linear,
+                         pace * m.angular};
   };
   h *= speed_scale;
   const VelocityField a = fieldOf(striker), b = fieldOf(struck);
@@ -122,16 +122,19 @@ bool World::Impl::strikesInVideo(const Actor& striker, const Actor& struck, doub
   return false;
 }
 
+// What no body can be made of stays where the video has it.
 void World::Impl::letGo(Actor& actor, const std::string& why) {
   noteWhatRestsOn(actor);
-  become(actor, kindWhenFree(actor), why);
-  wake(actor);
+  try {
+    become(actor, kindWhenFree(actor), why);
+    wake(actor);
+  } catch (const std::invalid_argument& error) {
+    actor.reason = why + ", but it stays: " + error.what();
+    plan_changed = true;
+  }
 }
 
 bool World::Impl::isStruckHard(const Actor& actor, const Actor& striker, double h) {
-  const auto massOf = [](const Actor& a) {
-    return massProperties(a.object.mesh, a.material.density).mass;
-  };
   const double way = kOverlooked * boundingDiagonal(actor.object.mesh);
   const double least =
       std::sqrt(2.0 * actor.settings.surface.friction * scene.gravity.norm() * way);

@@ -28,5 +28,7 @@ double surfaceArea(const TriangleMesh& mesh);  // m^2
 
 // Convex hull, triangulated. @throw std::invalid_argument if the vertices lie in one plane
 TriangleMesh convexHull(const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>& points);
+// All vertices lie in one plane: such a mesh has no mass, not even that of its hull.
+bool isFlat(const TriangleMesh& mesh);
 
 }  // namespace calipso::fem
