@@ -156,6 +156,25 @@ TEST(WorldMotion, AfloatObjectFallsWithWhatGravityGains) {
   EXPECT_NEAR(centerOf(world.state()).z(), start - 0.5 * 3.0 * kG, 1e-5);
 }
 
+// Buoyancy bears what the object weighed before.
+TEST(WorldMotion, AfloatObjectFallsOrRisesWithWhatItsMassGainsOrLoses) {
+  for (const ObjectKind kind : {ObjectKind::kRigid, ObjectKind::kDeformable})
+    for (const double density : {3.0, 0.8}) {
+      WorldParams params = coarse();
+      params.defaults.kind = kind;
+      World world(sceneWith(sphereSurface(0.5, 8, 12), {0, 0, 20}, false), params);
+      Edit edit = editOf(EditKind::kMaterial, EditMode::kFactor);
+      edit.density = density;
+      world.submit(edit);
+      world.advanceTo(0.0);
+      const double start = centerOf(world.state()).z(), t = 0.5;
+      play(world, t);
+      const double way = -0.5 * kG * (1.0 - 1.0 / density) * t * t;
+      EXPECT_NEAR(centerOf(world.state()).z() - start, way, 1e-3 * std::abs(way))
+          << toString(kind) << ", density x " << density;
+    }
+}
+
 // A fit can leave what rests on a table as high over it.
 TEST(WorldMotion, WhatRestsJustOverATableIsNotAfloat) {
   const double radius = 0.5, gap = 0.04 * 2.0 * std::sqrt(3.0) * radius;

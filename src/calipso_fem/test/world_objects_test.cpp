@@ -283,8 +283,8 @@ TEST(WorldObjects, AnImmovableObjectKeepsTheRestOfItsMaterial) {
   EXPECT_EQ(said[0], said[1]);
 }
 
-// A falling box stops on a floating one that an edit has made immovable; given a mass again, that
-// falls.
+// A falling box stops on a floating one that an edit has made immovable; given a larger mass than
+// it had, that falls.
 TEST(WorldObjects, AnEditMakesMassInfinite) {
   WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 3), {0, 0, 0.5});
   scene.objects.push_back(scene.objects.front());
@@ -298,13 +298,10 @@ TEST(WorldObjects, AnEditMakesMassInfinite) {
   heavy.density = std::numeric_limits<double>::infinity();
   thrown.object = "above";
   thrown.vector = {0, 0, -1};
-  Edit light = editOf(EditKind::kMaterial, EditMode::kAbsolute),
-       falls = editOf(EditKind::kGravity, EditMode::kFactor);
-  light.density = 500.0;
-  light.time = 1.0;
-  falls.factor = 2.0;  // afloat before
+  Edit falls = editOf(EditKind::kMaterial, EditMode::kAbsolute);
+  falls.density = 2000.0;
   falls.time = 1.0;
-  for (const Edit& edit : {heavy, thrown, light, falls}) world.submit(edit);
+  for (const Edit& edit : {heavy, thrown, falls}) world.submit(edit);
   for (const EditOutcome& outcome : world.advanceTo(0.0))
     EXPECT_TRUE(outcome.accepted) << outcome.message;
   play(world, 0.9);

@@ -101,7 +101,7 @@ struct Actor {
   std::string source;  // of a copy: the object of the video whose model it is drawn by
   Holder holder = Holder::kUnknown;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();            // m/s^2
-  Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();           // m/s^2
+  Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();           // m/s^2, as observed
   Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  // by edits, of a kinematic object
   std::optional<RigidWorld::Id> body;                           // also as a collider while static
   std::unique_ptr<SoftObject> soft;
@@ -126,7 +126,10 @@ struct Actor {
   double soft_ms = 0.0;  // of the last frame
   std::string note;      // what the user should know about the model
 
-  Eigen::Vector3d acceleration() const { return gravity + buoyancy; }
+  // Buoyancy is a force: it stays the same when an edit changes the mass.
+  Eigen::Vector3d acceleration() const {
+    return gravity + observed_material.density / material.density * buoyancy;
+  }
   // Where the video has it; an edit may have given it another look.
   bool followsVideo() const {
     return !removed && kind == ObjectKind::kStatic &&

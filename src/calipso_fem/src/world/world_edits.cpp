@@ -222,6 +222,7 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   if (actor.soft) actor.soft->setMaterial(material);
   if (actor.kind == ObjectKind::kRigid)
     rigid.setMass(*actor.body, massProperties(actor.object.mesh, material.density));
+  applyGravity(actor);
   plan_changed = true;
   std::ostringstream text;
   text << actor.object.name << ": E = " << material.youngs_modulus

@@ -177,6 +177,7 @@ struct World::Impl {
   std::string changeMaterial(Actor& actor, const Edit& edit);
   std::string makeImmovable(Actor& actor, const Edit& edit, const Material& material);
   std::string changeGravity(const Edit& edit);
+  void applyGravity(Actor& actor);  // and buoyancy, as they are from now on
   void setVelocity(Actor& actor, const Eigen::Vector3d& linear, const Eigen::Vector3d& angular);
   std::string changeVelocity(Actor& actor, const Edit& edit);
   void checkThere(const Actor& actor) const;  // @throw std::invalid_argument: it was removed

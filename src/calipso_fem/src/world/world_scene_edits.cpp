@@ -71,12 +71,16 @@ std::string World::Impl::changeGravity(const Edit& edit) {
       changed_objects += " " + actor.object.name + " stays: " + stays + ";";
       continue;
     }
-    if (actor.soft) actor.soft->setGravity(actor.acceleration());
-    if (actor.kind == ObjectKind::kRigid) rigid.setAcceleration(*actor.body, actor.acceleration());
+    applyGravity(actor);
     changed_objects += " " + actor.object.name + " " + describe(gravity) + " m/s^2;";
   }
   return changed_objects.empty() ? "gravity changed; every object goes on resting"
                                  : "gravity:" + changed_objects;
+}
+
+void World::Impl::applyGravity(Actor& actor) {
+  if (actor.soft) actor.soft->setGravity(actor.acceleration());
+  if (actor.kind == ObjectKind::kRigid) rigid.setAcceleration(*actor.body, actor.acceleration());
 }
 
 std::string World::Impl::blowEverywhere(const Edit& edit) {
