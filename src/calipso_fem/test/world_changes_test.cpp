@@ -99,6 +99,59 @@ TEST(WorldChanges, PressureOutlastsAnotherScale) {
   EXPECT_GT(std::abs(widthAfter(1e5) - widthAfter(0.0)), 1e-4);  // it rings
 }
 
+// A towel that two pegs hold by its upper corners.
+WorldScene towel() {
+  WorldScene scene = sceneWith(boxSurface({0.6, 0.01, 0.4}, 10), {0, 0, 2}, false);
+  scene.objects[0].attachments = {{"left", {-1, -1, 2.19}, {-0.29, 1, 2.21}},
+                                  {"right", {0.29, -1, 2.19}, {1, 1, 2.21}}};
+  return scene;
+}
+
+Edit softer() {
+  Edit edit = editOf(EditKind::kMaterial, EditMode::kFactor);
+  edit.youngs_modulus = 0.8;
+  return edit;
+}
+
+// How far an upper corner has come down since the object was scaled, m; side: -1 or 1.
+double fallOfCorner(const World& world, double scale, int side) {
+  const TriangleMesh mesh = towel().objects[0].mesh;
+  double most = 0.0;
+  for (int v = 0; v < mesh.vertexCount(); ++v)
+    if (side * mesh.vertices(v, 0) > 0.299 && mesh.vertices(v, 2) > 0.199)
+      most = std::max(most, 2.0 + scale * 0.2 - world.state().objects[0].vertices(v, 2));
+  return most;
+}
+
+TEST(WorldChanges, WhatIsAttachedIsHeldByTheSamePointsWhenItIsScaled) {
+  for (const double factor : {0.5, 1.2}) {
+    World world(towel(), coarse());
+    world.advanceTo(0.0);
+    Edit scale = editOf(EditKind::kTransform);
+    scale.scale = factor;
+    apply(world, scale);
+    play(world, 0.1);
+    apply(world, softer());
+    play(world, 0.4);
+    for (const int side : {-1, 1})
+      EXPECT_LT(std::abs(fallOfCorner(world, factor, side)), 1e-6) << factor;
+  }
+}
+
+TEST(WorldChanges, WhatWasReleasedIsNotHeldAgainWhenItIsScaled) {
+  World world(towel(), coarse());
+  world.advanceTo(0.0);
+  Edit release = editOf(EditKind::kRelease), scale = editOf(EditKind::kTransform);
+  release.region.kind = RegionKind::kBox;
+  release.region.box_min = {0.2, -1, 1}, release.region.box_max = {1, 1, 3};
+  scale.scale = 1.1;
+  apply(world, release);
+  apply(world, scale);
+  play(world, 0.3);
+  EXPECT_LT(std::abs(fallOfCorner(world, 1.1, -1)), 1e-6);
+  EXPECT_GT(fallOfCorner(world, 1.1, 1), 0.01);
+}
+
 TEST(WorldChanges, AScaledBodyComesToRestOnItsSupport) {
   World world(box(), coarse());
   world.advanceTo(0.0);

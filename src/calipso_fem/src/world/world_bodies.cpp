@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calipso_scene/attachment.hpp"
 #include "describe.hpp"
 #include "obstacle_query.hpp"
 #include "world_impl.hpp"
@@ -225,12 +224,8 @@ void World::Impl::makeSoft(Actor& actor, Body made, bool settle) {
   for (const std::string& message : body.grid().messages) actor.note += message + "; ";
   meetOwnSupports(actor, false);
   noteOverlaps(actor, surface);
-  const auto attached =
-      attachedVertices(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
-  if (!attached.empty() && actor.holder == Holder::kAttachment) {
-    body.fixSurfaceVertices(attached);
-    if (actor.fixed.empty()) actor.fixed.push_back(attached);
-  }
+  if (actor.holder == Holder::kAttachment && actor.fixed.empty())
+    actor.fixed.push_back(attachedOf(actor));
   holdAnew(actor);
   body.setPressure(actor.pressure);
   actor.soft->setGravity(actor.acceleration());

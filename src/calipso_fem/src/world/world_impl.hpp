@@ -104,6 +104,7 @@ struct World::Impl {
 
   // What held an object in the video (world_settle.cpp)
   void findHolder(Actor& actor);
+  std::vector<int> attachedOf(const Actor& actor) const;  // vertices that the video shows held
   Touching supportPoints(const Actor& actor, const TriangleMesh& surface,
                          const std::vector<Obstacle>& around) const;
   void limitSag(Actor& actor, const TriangleMesh& surface, std::vector<HoldPoint> hold);

@@ -3,7 +3,6 @@
 #include <string>
 
 #include "calipso_fem/world/region_selection.hpp"
-#include "calipso_scene/attachment.hpp"
 #include "describe.hpp"
 #include "world_impl.hpp"
 
@@ -115,8 +114,7 @@ std::string World::Impl::fix(Actor& actor, const Edit& edit) {
 std::string World::Impl::release(Actor& actor, const Edit& edit) {
   const std::vector<int> vertices = selectVertices(scene, actor.id, edit.region);
   touch(actor, edit);
-  const auto attached =
-      attachedVertices(actor.object.mesh, actor.object.world_from_object, actor.object.attachments);
+  const std::vector<int> attached = attachedOf(actor);
   size_t released = 0;
   const auto is_over = [&](std::vector<int>& region) {
     if (!intersects(region, vertices)) return false;

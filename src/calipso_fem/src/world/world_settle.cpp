@@ -109,12 +109,17 @@ std::vector<HoldPoint> pointsOf(const Touching& touching) {
   return points;
 }
 
+// Of the model as the video has it: attachments do not grow with it.
+std::vector<int> World::Impl::attachedOf(const Actor& actor) const {
+  const WorldObject& observed = scene.objects[actor.id];
+  return attachedVertices(observed.mesh, observed.world_from_object, observed.attachments);
+}
+
 // What holds the object in the video, and with what buoyancy.
 void World::Impl::findHolder(Actor& actor) {
   if (actor.holder != Holder::kUnknown) return;
   actor.buoyancy.setZero();
-  const WorldObject& object = actor.object;
-  if (!attachedVertices(object.mesh, object.world_from_object, object.attachments).empty()) {
+  if (!attachedOf(actor).empty()) {
     actor.holder = Holder::kAttachment;
     return;
   }
