@@ -26,5 +26,37 @@ TEST(WorldStep, APullCountsOnceInEveryPartOfAStep) {
   EXPECT_NEAR(centerOf(world.state()).z() - 0.4, way, 0.1 * way);
 }
 
+// Whether it comes in a fall, or is thrown just before the frame in which it arrives.
+TEST(WorldStep, WhatSleepsWakesBeforeAnythingFastReachesIt) {
+  constexpr double kRadius = 0.03;
+  WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 3), {0, 0, 0.1});
+  scene.objects.push_back(scene.objects.front());
+  scene.objects[1].name = "ball", scene.objects[1].index = 2;
+  scene.objects[1].mesh = sphereSurface(kRadius, 8, 12);
+  for (const bool thrown : {false, true}) {
+    scene.objects[1].world_from_object.translation() =
+        thrown ? Eigen::Vector3d(-0.8, 0, 0.1) : Eigen::Vector3d(0, 0, 1.2);
+    World world(scene, coarse());
+    Edit soft = editOf(EditKind::kObjectKind), fast = editOf(EditKind::kVelocity);
+    soft.object_kind = ObjectKind::kDeformable;
+    fast.object = "ball", fast.vector = {30, 0, 0};
+    outcomeOf(world, soft);
+    play(world, 2.0);
+    ASSERT_TRUE(world.state().objects[0].sleeping);
+    outcomeOf(world, thrown ? fast : letGo("ball"));
+    for (int frame = 0; frame < 20; ++frame) {
+      play(world, 1.0 / 30.0);
+      const WorldState state = world.state();
+      const auto box = state.objects[0].vertices;
+      const Eigen::Vector3d ball = centerOf(state, 1);
+      // 5 mm, by which a blow may dent the box
+      const double gap =
+          thrown ? box.col(0).minCoeff() - ball.x() : ball.z() - box.col(2).maxCoeff();
+      EXPECT_GT(gap, kRadius - 0.005) << "thrown: " << thrown << ", frame " << frame;
+    }
+    EXPECT_FALSE(world.state().objects[0].sleeping);
+  }
+}
+
 }  // namespace
 }  // namespace calipso::fem

@@ -145,10 +145,12 @@ struct World::Impl {
   void pullSoft(Actor& actor, const Pull& pull, double at);
   void loadRigid(Actor& actor, double at, double h);
   void endPulls(double at);
-  bool isDisturbed(const Actor& actor) const;
+  double wayOf(const Actor& actor, double h) const;
+  bool isDisturbed(const Actor& actor, double h) const;
   void wakeAround(const Actor& actor);
   Eigen::AlignedBox3d boxNear(const Actor& actor) const;
-  void updateSleep();
+  void wakeDisturbed(double h);
+  void updateSleep(double h);
   int substepsPerFrame() const;
 
   // Edits (world_edits.cpp, world_loads.cpp, world_scene_edits.cpp)

@@ -25,6 +25,10 @@ Eigen::AlignedBox3d boxOf(const Vertices& vertices) {
   return {vertices.colwise().minCoeff().transpose(), vertices.colwise().maxCoeff().transpose()};
 }
 
+Eigen::AlignedBox3d grown(const Eigen::AlignedBox3d& box, double by) {
+  return {box.min().array() - by, box.max().array() + by};
+}
+
 }  // namespace
 
 void World::Impl::addSupports(std::vector<Obstacle>& list) const {
@@ -99,6 +103,7 @@ int World::Impl::substepsPerFrame() const {
 void World::Impl::stepFrame(double h) {
   for (Actor& actor : actors) actor.soft_ms = 0.0;
   releaseWhatIsStruck(h);
+  wakeDisturbed(h);
   const bool soft = std::any_of(actors.begin(), actors.end(),
                                 [](const Actor& a) { return a.soft && !a.removed && !a.asleep; });
   const int parts = soft ? substepsPerFrame() : 1;
@@ -110,7 +115,7 @@ void World::Impl::stepFrame(double h) {
   }
   actAsObserved(continuing, from);
   letGoWhatLostItsRest();
-  updateSleep();
+  updateSleep(h);
 }
 
 // From video time `from` on for `span` seconds; the bodies live through speed_scale times as many.
@@ -168,8 +173,22 @@ void World::Impl::endPulls(double at) {
   }
 }
 
-// Whether anything moves where it may touch a deformable object.
-bool World::Impl::isDisturbed(const Actor& actor) const {
+// m, which no point of the object exceeds in the next h of the video.
+double World::Impl::wayOf(const Actor& actor, double h) const {
+  const double size = boundingDiagonal(actor.object.mesh);
+  if (!actor.simulated()) {
+    const ObservedMotion seen = actor.track.at(now);
+    return h * (seen.linear.norm() + size * seen.angular.norm());
+  }
+  h *= speed_scale;
+  const double gained = h * actor.acceleration().norm();
+  if (actor.soft) return h * (actor.soft->fastest() + gained);
+  return h * (rigid.linearVelocity(*actor.body).norm() + gained +
+              size * rigid.angularVelocity(*actor.body).norm());
+}
+
+// Whether anything moves where it may touch a deformable object within the next h of the video.
+bool World::Impl::isDisturbed(const Actor& actor, double h) const {
   const auto slow = [](const Actor& a) { return kRestSpeed * boundingDiagonal(a.object.mesh); };
   const auto moves = [&](const Actor& other) {
     // Two that come to rest beside each other do not keep each other awake.
@@ -183,7 +202,7 @@ bool World::Impl::isDisturbed(const Actor& actor) const {
   const Eigen::AlignedBox3d near = boxNear(actor);
   return std::any_of(actors.begin(), actors.end(), [&](const Actor& other) {
     return &other != &actor && !other.removed && moves(other) &&
-           near.intersects(boxOf(verticesOf(other)));
+           near.intersects(grown(boxOf(verticesOf(other)), wayOf(other, h)));
   });
 }
 
@@ -197,22 +216,22 @@ void World::Impl::wakeAround(const Actor& actor) {
 }
 
 Eigen::AlignedBox3d World::Impl::boxNear(const Actor& actor) const {
-  const double reach = kNear * boundingDiagonal(actor.object.mesh);
-  const Eigen::AlignedBox3d box = boxOf(actor.soft->vertices());
-  return {box.min().array() - reach, box.max().array() + reach};
+  return grown(boxOf(actor.soft->vertices()), kNear * boundingDiagonal(actor.object.mesh));
 }
 
-// A deformable object sleeps once it has been still, and wakes when something moving comes near.
-void World::Impl::updateSleep() {
+// A deformable object wakes before something that moves reaches it, or it would be passed through,
+void World::Impl::wakeDisturbed(double h) {
+  for (Actor& actor : actors)
+    if (actor.asleep && isDisturbed(actor, h)) wake(actor);
+}
+
+// and sleeps once it has been still.
+void World::Impl::updateSleep(double h) {
   for (Actor& actor : actors) {
-    if (!actor.soft || actor.removed) continue;
-    if (actor.asleep) {
-      if (isDisturbed(actor)) wake(actor);
-      continue;
-    }
+    if (!actor.soft || actor.removed || actor.asleep) continue;
     const double slow = kRestSpeed * boundingDiagonal(actor.object.mesh);
     const bool calm = actor.pulls.empty() && actor.air.empty() && !actor.drive &&
-                      actor.soft->body().isAtRest(slow) && !isDisturbed(actor);
+                      actor.soft->body().isAtRest(slow) && !isDisturbed(actor, h);
     actor.calm_frames = calm ? actor.calm_frames + 1 : 0;
     actor.asleep = actor.calm_frames >= kCalmFrames;
   }
