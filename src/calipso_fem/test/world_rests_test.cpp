@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "world_fixtures.hpp"
 
 // What rests on an object, and supports that are its own surface.
@@ -78,14 +80,20 @@ TEST(WorldRests, AResetLeavesContactsThatTheUserHasEnded) {
   }
 }
 
-// A cup on a box: it stays as the video has it while the box does, and falls when that is taken
-// away or falls itself.
-TEST(WorldRests, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
-  WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, 0.5}, false);
+// A cup on a box.
+WorldScene boxWithLoad(double height, bool table) {
+  WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, height}, table);
   scene.objects.push_back(scene.objects.front());
   scene.objects[1].name = "load", scene.objects[1].index = 2;
   scene.objects[1].mesh = boxSurface({0.05, 0.05, 0.05}, 1);
-  scene.objects[1].world_from_object.translation().z() = 0.6255;
+  scene.objects[1].world_from_object.translation().z() = height + 0.1255;
+  return scene;
+}
+
+// It stays as the video has it while the box does, and falls when that is taken away or falls
+// itself.
+TEST(WorldRests, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
+  const WorldScene scene = boxWithLoad(0.5, false);
   for (const EditKind kind : {EditKind::kRemove, EditKind::kGravity, EditKind::kAppearance}) {
     World world(scene, {});
     Edit edit = letGo("thing");
@@ -104,6 +112,36 @@ TEST(WorldRests, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
     EXPECT_EQ(world.plan()[1].reason.find("thing, on which it rests") == std::string::npos, stays)
         << world.plan()[1].reason;
   }
+}
+
+// Both are moved in the video after a second, and an edit of something else changes nothing there;
+// taken away before, the box lets the load fall.
+TEST(WorldRests, WhatTheVideoMovesWithItsCarrierStaysOnIt) {
+  for (const EditKind kind : {EditKind::kSpeedScale, EditKind::kGravity})
+    for (const bool removed : {false, true}) {
+      const WorldScene scene = boxWithLoad(0.1, true);
+      World world(scene, {});
+      for (const WorldObject& object : scene.objects)
+        for (int k = 0; k <= 60; ++k) {
+          ObservedMotion seen;
+          seen.time = k / 30.0;
+          seen.moving = seen.time > 1.0;
+          seen.linear.x() = seen.moving ? 0.1 : 0.0;
+          seen.world_from_object = object.world_from_object;
+          seen.world_from_object.translation().x() = 0.1 * std::max(0.0, seen.time - 1.0);
+          world.addObservedMotion(object.name, seen);
+        }
+      Edit edit = editOf(kind, EditMode::kFactor);
+      edit.object.clear(), edit.factor = 1.0;
+      world.advanceTo(0.0);
+      play(world, 0.2);
+      ASSERT_TRUE(outcomeOf(world, edit).accepted);
+      play(world, 0.2);
+      if (removed) outcomeOf(world, editOf(EditKind::kRemove));
+      play(world, 1.6);
+      EXPECT_EQ(world.state().objects[1].kind, removed ? ObjectKind::kRigid : ObjectKind::kStatic)
+          << world.plan()[1].reason;
+    }
 }
 
 }  // namespace

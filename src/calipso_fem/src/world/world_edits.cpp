@@ -71,6 +71,7 @@ void World::Impl::checkThere(const Actor& actor) const {
 void World::Impl::touch(Actor& actor, const Edit& edit) {
   checkThere(actor);
   if (actor.followsVideo()) findHolder(actor);
+  noteWhatRestsOn(actor);
   ObjectKind kind = std::max(actor.kind, kindFor(actor, edit));
   std::string reason = "edit '" + toString(edit.kind) + "'";
   for (const Edit& later : pending) {
@@ -108,9 +109,6 @@ std::string World::Impl::touchIfPossible(Actor& actor, const Edit& edit) {
 std::string World::Impl::apply(const Edit& edit) {
   std::vector<bool> fresh;
   for (const Actor& actor : actors) fresh.push_back(actor.kind == ObjectKind::kStatic);
-  const bool look = edit.kind == EditKind::kAppearance || edit.kind == EditKind::kLight;
-  for (const Actor& actor : actors)
-    if (!look && (edit.object.empty() || edit.object == actor.object.name)) noteWhatRestsOn(actor);
   const std::string done = carryOut(edit);
   noteWhatContinues(edit, fresh);
   return done;
@@ -286,6 +284,7 @@ void World::Impl::setVelocity(Actor& actor, const Eigen::Vector3d& linear,
 }
 
 std::string World::Impl::remove(Actor& actor) {
+  noteWhatRestsOn(actor);
   removeBodies(actor);
   meetOwnSupports(actor, false);
   actor.removed = actor.edited = true;

@@ -112,8 +112,8 @@ struct World::Impl {
                         const std::vector<Obstacle>& around, const Touching& support);
 
   // Objects that rest on others (world_rests.cpp)
-  void noteWhatRestsOn(
-      const Actor& carrier);  // as the video has it, before an edit touches the carrier
+  // As the video has it, before the carrier leaves its place there.
+  void noteWhatRestsOn(const Actor& carrier);
   void letGoWhatLostItsRest();
   struct Rest;
   void setPressing(const Rest& rest, bool presses);

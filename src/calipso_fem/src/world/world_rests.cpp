@@ -76,7 +76,9 @@ void World::Impl::letGoWhatLostItsRest() {
   };
   for (size_t k = 0; k < rests.size();) {
     Actor& actor = actors[rests[k].actor];
-    const bool over = !actor.followsVideo(), falls = !over && lost(rests[k]);
+    // A carrier that no edit has moved takes along what rests on it, as the video has it.
+    const bool over = !actor.followsVideo() || actors[rests[k].carrier].followsVideo();
+    const bool falls = !over && lost(rests[k]);
     if (!over && !falls) {
       ++k;
       continue;
