@@ -241,14 +241,47 @@ TEST(WorldChanges, ARigidBodyTurnsByMoreThanHalfATurnAndStops) {
 }
 
 TEST(WorldChanges, ASleeperWakesWhenItsSupportGoes) {
-  World world(twoBoxes({0, 0, 0.15}), coarse());
+  for (const ObjectKind kind : {ObjectKind::kDeformable, ObjectKind::kRigid})
+    for (const EditKind goes : {EditKind::kRemove, EditKind::kTransform}) {
+      World world(twoBoxes({0, 0, 0.15}), coarse());
+      world.advanceTo(0.0);
+      if (kind == ObjectKind::kRigid) apply(world, kindEdit(kind));
+      apply(world, of("other", kindEdit(kind)));
+      play(world, 3.0);
+      ASSERT_TRUE(world.state().objects[1].sleeping);
+      Edit edit = editOf(goes);
+      edit.translation = {1, 0, 0};
+      apply(world, edit);
+      play(world, 0.5);
+      EXPECT_LT(centerOf(world.state(), 1).z(), 0.08) << toString(kind) << ", " << toString(goes);
+    }
+}
+
+TEST(WorldChanges, ASleeperWakesWhenSomethingIsPutIntoIt) {
+  World world(twoBoxes({1, 0, 0.05}), coarse());
   world.advanceTo(0.0);
   apply(world, of("other", kindEdit(ObjectKind::kDeformable)));
-  play(world, 3.0);
+  play(world, 2.0);
   ASSERT_TRUE(world.state().objects[1].sleeping);
-  apply(world, editOf(EditKind::kRemove));
+  Edit move = editOf(EditKind::kTransform);
+  move.translation = {0.92, 0.02, 0.01};
+  apply(world, move);
+  EXPECT_FALSE(world.state().objects[1].sleeping);
   play(world, 0.5);
-  EXPECT_LT(centerOf(world.state(), 1).z(), 0.08);
+  EXPECT_GT(centerOf(world.state(), 1).x(), 1.005);
+}
+
+TEST(WorldChanges, ASleeperSleepsOnWhenSomethingElseGoes) {
+  World world(twoBoxes({1, 0, 0.05}), coarse());
+  world.advanceTo(0.0);
+  apply(world, of("other", kindEdit(ObjectKind::kRigid)));
+  play(world, 3.0);
+  for (const EditKind kind : {EditKind::kTransform, EditKind::kRemove}) {
+    ASSERT_TRUE(world.state().objects[1].sleeping);
+    apply(world, editOf(kind));
+    play(world, 0.1);
+    EXPECT_TRUE(world.state().objects[1].sleeping) << toString(kind);
+  }
 }
 
 TEST(WorldChanges, AResetKeepsWhatTheVideoShowsOfCollisions) {

@@ -96,7 +96,6 @@ RigidWorld::Id RigidWorld::addPlane(const SupportPlane& plane, const SurfaceSett
 void RigidWorld::remove(Id id) {
   BulletBody& b = impl_->at(id);
   impl_->world.forget(id);
-  for (auto& [other, body] : impl_->bodies) body.body->activate();  // what lay on it may fall
   impl_->world.removeRigidBody(b.body.get());
   impl_->bodies.erase(id);
 }

@@ -355,4 +355,9 @@ void World::Impl::wake(Actor& actor) {
   if (actor.kind == ObjectKind::kRigid && actor.body) rigid.wake(*actor.body);
 }
 
+bool World::Impl::sleeps(const Actor& actor) const {
+  if (actor.soft) return actor.asleep;
+  return actor.kind == ObjectKind::kRigid && actor.body && rigid.sleeping(*actor.body);
+}
+
 }  // namespace calipso::fem

@@ -165,9 +165,16 @@ std::string World::Impl::transform(Actor& actor, const Edit& edit) {
   touch(actor, edit);
   const bool deformed = actor.soft != nullptr;
   if (edit.scale != 1.0) scale(actor, edit.scale);
+  moveBy(actor, motionAbout(centroidOf(actor), edit));
+  const std::string message =
+      actor.object.name + " is moved by " + describe(edit.translation) + " m";
+  if (edit.scale == 1.0) return message;
+  return message + " and scaled by " + std::to_string(edit.scale) +
+         (deformed ? "; it starts anew from its undeformed shape" : "");
+}
+
+void World::Impl::moveBy(Actor& actor, const Eigen::Isometry3d& motion) {
   wakeAround(actor);
-  const Eigen::Vector3d centroid = centroidOf(actor);
-  const Eigen::Isometry3d motion = motionAbout(centroid, edit);
   if (actor.soft) {
     actor.soft->body().applyRigidTransform(motion);
     for (Pull& pull : actor.pulls) pull.moveBy(motion, pull.share(now));
@@ -181,10 +188,7 @@ std::string World::Impl::transform(Actor& actor, const Edit& edit) {
     actor.placement = motion * actor.placement;
     if (actor.body) rigid.setPose(*actor.body, poseOf(actor, now));
   }
-  std::string message = actor.object.name + " is moved by " + describe(edit.translation) + " m";
-  if (edit.scale == 1.0) return message;
-  message += " and scaled by " + std::to_string(edit.scale);
-  return deformed ? message + "; it starts anew from its undeformed shape" : message;
+  wakeAround(actor);
 }
 
 void World::Impl::scale(Actor& actor, double factor) {

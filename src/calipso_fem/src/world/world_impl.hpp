@@ -101,6 +101,7 @@ struct World::Impl {
   void addColliders();
   void addCollider(Actor& actor);
   void wake(Actor& actor);
+  bool sleeps(const Actor& actor) const;
 
   // What held an object in the video (world_settle.cpp)
   void findHolder(Actor& actor);
@@ -171,6 +172,7 @@ struct World::Impl {
   std::string insert(const Edit& edit);
   void lead(Actor& actor, Pull& pull, double gone);
   void holdAnew(Actor& actor);  // of a deformable one
+  void moveBy(Actor& actor, const Eigen::Isometry3d& motion);
   void scale(Actor& actor, double factor);
   std::string remove(Actor& actor);
   std::string copy(Actor& actor, const Edit& edit);

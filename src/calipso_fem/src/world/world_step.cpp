@@ -12,8 +12,7 @@ namespace {
 // Rest: slower than this share of the own size per second, for so many frames.
 constexpr double kRestSpeed = 1e-3;
 constexpr int kCalmFrames = 15;
-constexpr double kNear = 0.05;  // of its size: what moves there may touch it
-constexpr int kGoodParts = 2;   // of a step; after so many in a row they are tried twice as long
+constexpr int kGoodParts = 2;  // of a step; after so many in a row they are tried twice as long
 constexpr double kSameInstant = 1e-9;  // s
 
 double millisecondsSince(std::chrono::steady_clock::time_point start) {
@@ -206,17 +205,21 @@ bool World::Impl::isDisturbed(const Actor& actor, double h) const {
   });
 }
 
-// What sleeps beside an object that is about to be elsewhere may have rested on it.
+// What sleeps beside an object that is about to be elsewhere may have rested on it, and others on
+// that; what sleeps where it has been put is in its way.
 void World::Impl::wakeAround(const Actor& actor) {
   if (actor.removed) return;
   const Eigen::AlignedBox3d box = boxOf(verticesOf(actor));
-  for (Actor& other : actors)
-    if (&other != &actor && other.soft && other.asleep && boxNear(other).intersects(box))
-      wake(other);
+  for (Actor& other : actors) {
+    if (&other == &actor || !sleeps(other) || !boxNear(other).intersects(box)) continue;
+    wake(other);
+    wakeAround(other);
+  }
 }
 
+// Where it may touch others, or rest on them.
 Eigen::AlignedBox3d World::Impl::boxNear(const Actor& actor) const {
-  return grown(boxOf(actor.soft->vertices()), kNear * boundingDiagonal(actor.object.mesh));
+  return grown(boxOf(verticesOf(actor)), kRestingGap * boundingDiagonal(actor.object.mesh));
 }
 
 // A deformable object wakes before something that moves reaches it, or it would be passed through,
