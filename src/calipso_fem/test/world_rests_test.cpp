@@ -66,6 +66,30 @@ TEST(WorldRests, ARemovedObjectTakesItsOwnTopWithItUntilItIsReset) {
   }
 }
 
+// Placed elsewhere without physics, it takes it along, too.
+TEST(WorldRests, AnObjectThatIsMovedTakesItsOwnTopWithIt) {
+  World world(thingWithDeck(), {});
+  Edit lower = editOf(EditKind::kTransform);
+  lower.translation = {0, 0, -0.5};
+  for (const Edit& edit : {letGo("load"), lower}) ASSERT_TRUE(outcomeOf(world, edit).accepted);
+  play(world, 1.0);
+  EXPECT_NEAR(centerOf(world.state(), 1).z(), 0.575, 5e-3);
+}
+
+TEST(WorldRests, NothingNewRestsOnTheTopOfWhatHasGone) {
+  World world(thingWithDeck(), {});
+  outcomeOf(world, editOf(EditKind::kRemove));
+  play(world, 1.0);
+  Edit copy = editOf(EditKind::kDuplicate);
+  copy.object = "load", copy.new_name = "late";
+  copy.translation = {0, 0, 1.2};
+  ASSERT_TRUE(outcomeOf(world, copy).accepted);
+  play(world, 1.0);
+  EXPECT_LT(centerOf(world.state(), 2).z(), 0.2);
+  outcomeOf(world, editOf(EditKind::kReset));
+  EXPECT_TRUE(world.pairRule("late", "deck").contact);
+}
+
 TEST(WorldRests, AResetLeavesContactsThatTheUserHasEnded) {
   World world(thingWithDeck(), {});
   world.setPairContact("load", "deck", false);

@@ -188,6 +188,7 @@ void World::Impl::moveBy(Actor& actor, const Eigen::Isometry3d& motion) {
     actor.placement = motion * actor.placement;
     if (actor.body) rigid.setPose(*actor.body, poseOf(actor, now));
   }
+  meetOwnSupports(actor, false);
   wakeAround(actor);
 }
 

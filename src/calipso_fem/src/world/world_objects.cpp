@@ -90,7 +90,8 @@ void World::Impl::meetOwnSupports(Actor& actor, bool contact) {
       setPairContact(mesh.name, other, false);
       actor.ended_contacts.emplace_back(mesh.name, other);
     }
-    actor.note += mesh.name + " is its own surface and is left out; ";
+    const std::string left_out = mesh.name + " is its own surface and is left out; ";
+    if (actor.note.find(left_out) == std::string::npos) actor.note += left_out;
   }
 }
 
@@ -209,6 +210,8 @@ Actor& World::Impl::addObject(const WorldObject& object, const ObjectSettings& s
   actor.reason = "it was added";
   actors.push_back(std::move(actor));
   addCollider(actors.back());
+  for (Actor& other : actors)  // supports that have gone carry nothing new either
+    if (!other.ended_contacts.empty()) meetOwnSupports(other, false);
   plan_changed = true;
   return actors.back();
 }
