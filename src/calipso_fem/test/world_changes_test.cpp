@@ -138,6 +138,19 @@ TEST(WorldChanges, WhatIsAttachedIsHeldByTheSamePointsWhenItIsScaled) {
   }
 }
 
+// A pole that sticks out from a wall: slender, so that a default stiffness would be raised.
+TEST(WorldChanges, AGivenStiffnessOutlastsAScale) {
+  WorldScene scene = sceneWith(boxSurface({1.0, 0.04, 0.04}, 4), {0, 0, 1}, false);
+  scene.objects[0].attachments.push_back({"wall", {-0.6, -1, -1}, {-0.45, 1, 3}});
+  World world(scene, coarse());
+  world.advanceTo(0.0);
+  Edit given = editOf(EditKind::kMaterial), scale = editOf(EditKind::kTransform);
+  given.youngs_modulus = 1e6, scale.scale = 2.0;
+  apply(world, given);
+  apply(world, scale);
+  EXPECT_EQ(world.plan()[0].material.youngs_modulus, 1e6);
+}
+
 TEST(WorldChanges, WhatWasReleasedIsNotHeldAgainWhenItIsScaled) {
   World world(towel(), coarse());
   world.advanceTo(0.0);

@@ -58,12 +58,17 @@ TEST(WorldDeforming, WhatIsNotSimulatedDeformsAsInTheVideo) {
   }
 }
 
-// Touched in the midst of it, it goes on from there.
-TEST(WorldDeforming, ADeformingObjectStartsWithItsShapeAndVelocity) {
+// Touched in the midst of it, it goes on from there, also where an edit has placed it.
+class StartOfDeforming : public ::testing::TestWithParam<double> {};
+
+TEST_P(StartOfDeforming, HasItsShapeAndVelocity) {
   const BendingPlate plate;
   const TriangleMesh& mesh = plate.mesh;
   const Eigen::MatrixXd& bending = plate.bending;
   World& world = *plate.world;
+  Edit aside = editOf(EditKind::kTransform, EditMode::kAbsolute, 0.05);
+  aside.translation.z() = GetParam();
+  if (GetParam() != 0.0) world.submit(aside);
   Edit soft = editOf(EditKind::kObjectKind, EditMode::kAbsolute, 0.1);
   soft.object_kind = ObjectKind::kDeformable;
   world.submit(soft);
@@ -75,7 +80,7 @@ TEST(WorldDeforming, ADeformingObjectStartsWithItsShapeAndVelocity) {
   world.advanceTo(0.1 + h);
   const auto later = world.state().objects.at(0).vertices;
   for (int i = 0; i < mesh.vertexCount(); ++i) {
-    const double way = at_once(i, 2) - (mesh.vertex(i).z() + 2.0),
+    const double way = at_once(i, 2) - (mesh.vertex(i).z() + 2.0 + GetParam()),
                  speed = (later(i, 2) - at_once(i, 2)) / h;
     // A node goes as its surroundings do on average, over cells of 0.1 m.
     EXPECT_NEAR(way, 0.02 * bending(3 * i + 2, 0), 2e-3) << i;
@@ -84,6 +89,8 @@ TEST(WorldDeforming, ADeformingObjectStartsWithItsShapeAndVelocity) {
     }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Placed, StartOfDeforming, ::testing::Values(0.0, 0.5));
 
 // A sheet that hangs by its upper edge, one half of which is let go: that half falls, the other
 // stays where it is.

@@ -119,6 +119,20 @@ TEST(ObservedDrive, AWindOfTheUsersEndsIt) {
   EXPECT_NEAR(sum / static_cast<double>(still.size()), 0.0, 0.1 * kLift);
 }
 
+TEST(ObservedDrive, AScaleDoesNotEndIt) {
+  constexpr double kScale = 1.02;
+  const std::vector<double> lifts = liftsAfter([](World& world) {
+    Edit edit = plateEdit(EditKind::kTransform, EditMode::kAbsolute);
+    edit.time = 0.5;
+    edit.scale = kScale;
+    world.submit(edit);
+  });
+  for (size_t k = 12; k < lifts.size(); ++k) {
+    const double time = kTouched + k * kFramePeriod;
+    EXPECT_NEAR(lifts[k], kScale * liftAt(time), 0.08 * kLift) << time;
+  }
+}
+
 // The load was found while one end was held: let go, the plate goes on with what speed it has.
 TEST(ObservedDrive, LettingGoOfTheAttachmentsEndsIt) {
   const std::vector<double> lifts = liftsAfter(

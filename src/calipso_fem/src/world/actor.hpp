@@ -76,7 +76,8 @@ struct Actor {
   explicit Actor(const WorldObject& object)
       : object(object), track(object.world_from_object), flat(isFlat(object.mesh)) {}
 
-  WorldObject object;  // its mesh is rescaled by edits
+  WorldObject object;  // its mesh is rescaled by edits,
+  double scale = 1.0;  // by so much in all
   ObservedTrack track;
   // 3 #V x K, object frame: in which it deforms in the video; empty: as a rigid body
   Eigen::MatrixXd modes;
@@ -85,6 +86,7 @@ struct Actor {
   ObjectSettings settings;
   Material observed_material;  // with which the observed shape is at rest
   Material material;
+  bool stiffness_given = false;  // by an edit, in Pa
   ObjectKind kind = ObjectKind::kStatic;
   std::optional<ObjectKind> forced_kind;
   std::string reason = "no edit touches it";
@@ -100,10 +102,11 @@ struct Actor {
   std::vector<std::pair<std::string, std::string>> ended_contacts;
   std::string source;  // of a copy: the object of the video whose model it is drawn by
   Holder holder = Holder::kUnknown;
-  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();            // m/s^2
-  Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();           // m/s^2, as observed
-  Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();  // by edits, of a kinematic object
-  std::optional<RigidWorld::Id> body;                           // also as a collider while static
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   // m/s^2
+  Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();  // m/s^2, as observed
+  // By edits; of a rigid one only until it is let go.
+  Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();
+  std::optional<RigidWorld::Id> body;  // also as a collider while static
   std::unique_ptr<SoftObject> soft;
   Vec key_nodes;  // 3n, m: of one that deforms in the video, in the key frame
   std::unique_ptr<ObservedDrive>

@@ -112,7 +112,7 @@ decltype(TriangleMesh::vertices) World::Impl::verticesOf(const Actor& actor) con
   TriangleMesh shape = actor.object.mesh;
   const Eigen::VectorXd amplitudes = actor.track.at(now).mode_amplitudes;
   if (amplitudes.size() == actor.modes.cols()) {
-    const Eigen::VectorXd field = actor.modes * amplitudes;
+    const Eigen::VectorXd field = actor.scale * (actor.modes * amplitudes);
     shape.vertices +=
         Eigen::Map<const Eigen::Matrix3Xd>(field.data(), 3, field.size() / 3).transpose();
   }
@@ -135,12 +135,9 @@ void World::Impl::become(Actor& actor, ObjectKind kind, const std::string& reaso
   BodyMotion motion = motionOf(actor);
   const bool as_observed = actor.kind == ObjectKind::kStatic;
   Eigen::Isometry3d seen = actor.track.at(now).world_from_object;
-  const bool deforms = as_observed && kind == ObjectKind::kDeformable && actor.modes.cols() > 0 &&
-                       !actor.track.empty();
-  if (deforms) {  // its modes start from the key frame's shape and place
-    motion = BodyMotion();
-    motion.world_from_object = seen = actor.object.world_from_object;
-  }
+  const bool deforms = !actor.simulated() && kind == ObjectKind::kDeformable &&
+                       actor.modes.cols() > 0 && !actor.track.empty();
+  if (deforms) motion = keyPlaceOf(actor), seen = actor.object.world_from_object;
   Body body = bodyOf(actor, actor.object.mesh, kind, motion);
   actor.edited = actor.edited || kind != ObjectKind::kStatic;
   actor.reason = reason + (immovable  ? "; its mass is infinite"
@@ -242,9 +239,15 @@ void World::Impl::makeSoft(Actor& actor, Body made, bool settle) {
   actor.calm_frames = 0;
 }
 
+BodyMotion World::Impl::keyPlaceOf(const Actor& actor) const {
+  BodyMotion motion;
+  motion.world_from_object = actor.placement * actor.object.world_from_object;
+  return motion;
+}
+
 // The field sum_m a_m phi_m of the video's deformation as the nodes move, world axes.
 Vec World::Impl::nodalModes(const Actor& actor, const Vec& amplitudes) const {
-  Vec field = actor.modes * amplitudes;
+  Vec field = actor.scale * (actor.modes * amplitudes);
   Eigen::Map<Eigen::Matrix3Xd> columns(field.data(), 3, field.size() / 3);
   columns = (actor.soft_from_object.linear() * columns).eval();
   return actor.soft->nodalField(field);
@@ -286,6 +289,7 @@ void World::Impl::removeBodies(Actor& actor) {
   actor.body.reset();
   actor.soft.reset();
   actor.drive.reset();
+  actor.sheet.reset();
   contacts.forget(actor.id);
 }
 

@@ -170,11 +170,12 @@ std::string World::Impl::transform(Actor& actor, const Edit& edit) {
       actor.object.name + " is moved by " + describe(edit.translation) + " m";
   if (edit.scale == 1.0) return message;
   return message + " and scaled by " + std::to_string(edit.scale) +
-         (deformed ? "; it starts anew from its undeformed shape" : "");
+         (deformed && !actor.drive ? "; it starts anew from its undeformed shape" : "");
 }
 
 void World::Impl::moveBy(Actor& actor, const Eigen::Isometry3d& motion) {
   wakeAround(actor);
+  actor.placement = motion * actor.placement;
   if (actor.soft) {
     actor.soft->body().applyRigidTransform(motion);
     for (Pull& pull : actor.pulls) pull.moveBy(motion, pull.share(now));
@@ -185,7 +186,6 @@ void World::Impl::moveBy(Actor& actor, const Eigen::Isometry3d& motion) {
     rigid.setPose(*actor.body, motion * rigid.pose(*actor.body));
     for (Pull& pull : actor.pulls) pull.moveBy(motion, pull.share(now));
   } else {
-    actor.placement = motion * actor.placement;
     if (actor.body) rigid.setPose(*actor.body, poseOf(actor, now));
   }
   meetOwnSupports(actor, false);
@@ -196,15 +196,18 @@ void World::Impl::scale(Actor& actor, double factor) {
   const Eigen::RowVector3d middle = actor.object.mesh.vertices.colwise().mean();
   TriangleMesh mesh = actor.object.mesh;
   mesh.vertices = (factor * (mesh.vertices.rowwise() - middle)).rowwise() + middle;
-  Body body = bodyOf(actor, mesh, actor.kind, motionOf(actor));
+  const bool driven = actor.drive != nullptr;
+  Body body = bodyOf(actor, mesh, actor.kind, driven ? keyPlaceOf(actor) : motionOf(actor));
   const Eigen::Vector3d own = middle.transpose(), placed = poseOf(actor, now) * own;
   for (Pull& pull : actor.pulls) {
     pull.anchor = own + factor * (pull.anchor - own);
     pull.scaleBy(factor, placed, pull.share(now));
   }
   actor.object.mesh = mesh;
+  actor.scale *= factor;
   actor.tree.reset();
   enter(actor, std::move(body), false);
+  if (driven) deformAsObserved(actor);  // the video drives it on
   wake(actor);
 }
 
@@ -221,7 +224,7 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   if (edit.mode == EditMode::kAbsolute && !std::isnan(edit.density)) actor.immovable = false;
   touch(actor, edit);  // may find a default stiffness that carries it
   material.youngs_modulus = changed(actor.material.youngs_modulus, edit.youngs_modulus, edit.mode);
-  actor.material = material;
+  setMaterial(actor, edit, material);
   if (actor.soft) actor.soft->setMaterial(material);
   if (actor.kind == ObjectKind::kRigid)
     rigid.setMass(*actor.body, massProperties(actor.object.mesh, material.density));
@@ -234,11 +237,17 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   return text.str();
 }
 
+void World::Impl::setMaterial(Actor& actor, const Edit& edit, const Material& material) {
+  actor.material = material;
+  actor.stiffness_given |= edit.mode == EditMode::kAbsolute && !std::isnan(edit.youngs_modulus);
+  actor.sheet.reset();
+}
+
 // Goes on as the video shows, or stays where an edit has put it, whatever pushes.
 std::string World::Impl::makeImmovable(Actor& actor, const Edit& edit, const Material& material) {
   actor.immovable = true;
   touch(actor, edit);
-  actor.material = material;  // for when it is given a mass again
+  setMaterial(actor, edit, material);  // for when it is given a mass again
   become(actor, ObjectKind::kKinematic, "its mass is infinite");
   return actor.object.name + " has infinite mass: nothing moves it";
 }

@@ -69,7 +69,9 @@ struct World::Impl {
   void noteOverlaps(Actor& actor, const TriangleMesh& surface);
   void makeRigid(Actor& actor, const RigidBodySpec& spec);
   void makeSoft(Actor& actor, Body body, bool settle);
-  void deformAsObserved(Actor& actor);  // shape and velocity as in the video at this instant
+  // Where edits have placed the key frame's shape, at rest: what deforms in the video starts there,
+  BodyMotion keyPlaceOf(const Actor& actor) const;
+  void deformAsObserved(Actor& actor);  // with shape and velocity as in the video at this instant
   Vec nodalModes(const Actor& actor, const Vec& amplitudes) const;
   // The same body in the same state, with the material it was observed with and not held.
   std::unique_ptr<SoftObject> twinOf(const Actor& actor, const TriangleMesh& mesh,
@@ -180,6 +182,7 @@ struct World::Impl {
   std::string changeLook(Actor& actor, const Edit& edit);
   std::string changeKind(Actor& actor, const Edit& edit);
   std::string changeMaterial(Actor& actor, const Edit& edit);
+  void setMaterial(Actor& actor, const Edit& edit, const Material& material);
   std::string makeImmovable(Actor& actor, const Edit& edit, const Material& material);
   std::string changeGravity(const Edit& edit);
   void applyGravity(Actor& actor);  // and buoyancy, as they are from now on

@@ -231,6 +231,7 @@ Actor& World::Impl::duplicate(const std::string& source_name, const std::string&
   Actor& copy = addObject(object, source.settings);
   copy.observed_material = source.observed_material;
   copy.material = source.material;
+  copy.stiffness_given = source.stiffness_given;
   copy.immovable = source.immovable;
   copy.gravity = source.gravity;
   copy.air = source.air;

@@ -166,7 +166,7 @@ void World::Impl::limitSag(Actor& actor, const TriangleMesh& surface, std::vecto
   const double factor = sag ? *sag / (kLargestSag * boundingDiagonal(surface)) : 1.0;
   if (!(factor > 1.0) || !std::isfinite(factor)) return;
   actor.observed_material.youngs_modulus *= factor;
-  actor.material.youngs_modulus *= factor;
+  if (!actor.stiffness_given) actor.material.youngs_modulus *= factor;
   actor.soft->setMaterial(actor.observed_material);
   std::ostringstream text;
   text.precision(2);
