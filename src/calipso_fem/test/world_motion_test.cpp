@@ -33,6 +33,29 @@ TEST(WorldMotion, FallingRigidBodyFollowsTheParabola) {
               0.0, 1e-6);
 }
 
+// What it tells of is the mean of the surface, where the model is open another point.
+TEST(WorldMotion, TheVideosVelocityIsThatOfTheCentroidItTells) {
+  for (const double factor : {1.0, 2.0}) {
+    World world(sceneWith(boxSurface({0.1, 0.2, 0.3}, 1), {0, 0, 10}, false), {});
+    ObservedMotion seen = thrown({1, 0, 2}, {0, 0, 3});
+    seen.centroid.x() += 0.05;
+    world.addObservedMotion("thing", seen);
+    Edit edit = editOf(EditKind::kVelocity, EditMode::kEstimated);
+    edit.factor = factor;
+    world.submit(edit);
+    world.advanceTo(0.0);
+    const double t = 0.5;
+    play(world, t);
+    const Eigen::Vector3d way =
+        factor * t * Eigen::Vector3d(1, -3 * 0.05, 2) - Eigen::Vector3d(0, 0, 0.5 * kG * t * t);
+    EXPECT_NEAR(
+        (world.state().objects[0].world_from_object.translation() - Eigen::Vector3d(0, 0, 10) - way)
+            .norm(),
+        0.0, 1e-6)
+        << factor;
+  }
+}
+
 TEST(WorldMotion, ACopyOfWhatTheVideoMovesStartsWithItsVelocityAndFalls) {
   World world(sceneWith(boxSurface({0.1, 0.2, 0.3}, 1), {0, 0, 10}, false), {});
   world.addObservedMotion("thing", thrown({1, 0, 2}));

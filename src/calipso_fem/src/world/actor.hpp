@@ -104,7 +104,7 @@ struct Actor {
   Holder holder = Holder::kUnknown;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   // m/s^2
   Eigen::Vector3d buoyancy = Eigen::Vector3d::Zero();  // m/s^2, as observed
-  // By edits; of a rigid one only until it is let go.
+  // By edits, from where the video has it; known anew with every change of its kind.
   Eigen::Isometry3d placement = Eigen::Isometry3d::Identity();
   std::optional<RigidWorld::Id> body;  // also as a collider while static
   std::unique_ptr<SoftObject> soft;

@@ -92,15 +92,20 @@ BodyMotion World::Impl::motionOf(const Actor& actor) const {
   } else if (actor.kind == ObjectKind::kRigid && actor.body) {
     m.linear = rigid.linearVelocity(*actor.body);
     m.angular = rigid.angularVelocity(*actor.body);
-  } else {
-    const ObservedMotion seen = actor.track.at(now);
-    if (!seen.moving) return m;
-    const Eigen::Vector3d center = seen.world_from_object * centerOfMass(actor);
+  } else if (actor.track.at(now).moving) {
+    const BodyMotion seen = seenMotionOf(actor);
+    m.linear = actor.placement.linear() * seen.linear;
     m.angular = actor.placement.linear() * seen.angular;
-    m.linear =
-        actor.placement.linear() * (seen.linear + seen.angular.cross(center - seen.centroid));
   }
   return m;
+}
+
+// The video tells the velocity of another point than the centre of mass.
+BodyMotion World::Impl::seenMotionOf(const Actor& actor) const {
+  const ObservedMotion seen = actor.track.at(now);
+  const Eigen::Vector3d center = seen.world_from_object * centerOfMass(actor);
+  return {seen.world_from_object, seen.linear + seen.angular.cross(center - seen.centroid),
+          seen.angular};
 }
 
 decltype(TriangleMesh::vertices) World::Impl::verticesOf(const Actor& actor) const {

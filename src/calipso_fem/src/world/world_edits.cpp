@@ -266,7 +266,7 @@ std::string World::Impl::changeVelocity(Actor& actor, const Edit& edit) {
     linear += motion.linear;
     angular += motion.angular;
   } else if (edit.mode == EditMode::kEstimated) {
-    const ObservedMotion seen = actor.track.at(now);
+    const BodyMotion seen = seenMotionOf(actor);
     linear = edit.factor * seen.linear;
     angular = edit.factor * seen.angular;
   }

@@ -51,6 +51,7 @@ struct World::Impl {
   // Bodies (world_bodies.cpp)
   Eigen::Isometry3d poseOf(const Actor& actor, double at) const;
   BodyMotion motionOf(const Actor& actor) const;
+  BodyMotion seenMotionOf(const Actor& actor) const;  // in the video
   Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor> verticesOf(const Actor& actor) const;
   Eigen::Vector3d centroidOf(const Actor& actor) const;
   void become(Actor& actor, ObjectKind kind, const std::string& reason);
