@@ -104,6 +104,30 @@ TEST(WorldRests, AResetLeavesContactsThatTheUserHasEnded) {
   }
 }
 
+// What edits have changed is as before.
+TEST(WorldRests, AResetUndoesWhatEditsHaveChangedOfContacts) {
+  const auto wayAfter = [](bool edited) {
+    World world(sceneWith(boxSurface({0.1, 0.1, 0.1}, 1), {0, 0, 0.05}), {});
+    world.advanceTo(0.0);
+    Edit smooth = editOf(EditKind::kContact), dead = smooth, apart = smooth;
+    smooth.friction = 1e-3;
+    dead.other = "table", dead.friction = 1e-3, dead.restitution = 1e-3;
+    apart.meet = false;
+    for (const Edit& edit : {smooth, dead, apart})
+      EXPECT_TRUE(!edited || outcomeOf(world, edit).accepted);
+    EXPECT_EQ(world.pairRule("thing", "table").contact, !edited);
+    outcomeOf(world, editOf(EditKind::kReset));
+    EXPECT_TRUE(world.pairRule("thing", "table").contact);
+    EXPECT_FALSE(world.pairRule("thing", "table").friction);
+    Edit thrown = editOf(EditKind::kVelocity);
+    thrown.vector = {2, 0, 1};
+    outcomeOf(world, thrown);
+    play(world, 1.0);
+    return centerOf(world.state());
+  };
+  EXPECT_EQ(wayAfter(true), wayAfter(false));
+}
+
 // A cup on a box.
 WorldScene boxWithLoad(double height, bool table) {
   WorldScene scene = sceneWith(boxSurface({0.2, 0.2, 0.2}, 2), {0, 0, height}, table);

@@ -302,6 +302,8 @@ void World::Impl::reset(Actor& actor) {
   const int id = actor.id;
   removeBodies(actor);
   meetOwnSupports(actor, true);
+  restoreRules(actor.object.name);
+  keepOwnSupportsOut();
   if (actor.inserted) {  // the video does not have it
     actor.removed = actor.edited = true;
     actor.kind = ObjectKind::kStatic;
@@ -315,9 +317,10 @@ void World::Impl::reset(Actor& actor) {
   fresh.wind = actor.wind;
   fresh.collisions = actor.collisions;
   fresh.modes = actor.modes;
-  fresh.settings = actor.settings;
-  fresh.immovable = actor.settings.immovable();
-  fresh.observed_material = fresh.material = actor.observed_material;
+  fresh.settings = params.settingsOf(fresh.object.name);
+  fresh.immovable = fresh.settings.immovable();
+  fresh.observed_material = fresh.material =
+      observedMaterial(fresh.object, fresh.settings, scene.gravity);
   fresh.gravity = gravity_now;
   actor = std::move(fresh);
   addCollider(actor);

@@ -93,6 +93,10 @@ struct World::Impl {
   std::vector<int> ownSupports(const WorldObject& object) const;  // ids
   void meetOwnSupports(Actor& actor,
                        bool contact);  // nothing is to meet them once it moves or is gone
+  void keepOwnSupportsOut();           // of what has moved, also for what is new
+  // What pairs were before edits changed them; for a reset.
+  void rememberRules(const std::string& object, const std::string& other);
+  void restoreRules(const std::string& object);
   // A new object takes part from now on, at its world_from_object; static until an edit touches it.
   Actor& addObject(const WorldObject& object, const ObjectSettings& settings);
   // A copy in the present state (shape, velocity, material, gravity), moved by `motion` (world).
@@ -235,8 +239,9 @@ struct World::Impl {
   std::vector<ContactPoint> shown_contacts;
   std::set<std::pair<std::string, std::string>> touching;
   std::vector<TouchEvent> first_touches;
-  std::map<std::pair<int, int>, PairRule> rules;  // by ids, smaller first
-  std::deque<Edit> pending;                       // by time
+  std::map<std::pair<int, int>, PairRule> rules;                         // by ids, smaller first
+  std::map<std::pair<std::string, std::string>, PairRule> rules_before;  // edits, by names
+  std::deque<Edit> pending;                                              // by time
   std::vector<Edit> waiting;  // for a collision in the video that is not known yet
   bool collisions_known = false;
   bool plan_changed = true;

@@ -95,6 +95,25 @@ void World::Impl::meetOwnSupports(Actor& actor, bool contact) {
   }
 }
 
+void World::Impl::keepOwnSupportsOut() {
+  for (Actor& actor : actors)
+    if (!actor.ended_contacts.empty()) meetOwnSupports(actor, false);
+}
+
+void World::Impl::rememberRules(const std::string& object, const std::string& other) {
+  for (const std::string& partner : other.empty() ? allBut(object) : std::vector{other})
+    rules_before.emplace(std::minmax(object, partner), pairRule(object, partner));
+}
+
+void World::Impl::restoreRules(const std::string& object) {
+  for (auto it = rules_before.begin(); it != rules_before.end();) {
+    const auto& [pair, rule] = *it;
+    const bool its_own = pair.first == object || pair.second == object;
+    if (its_own) setPairRule(pair.first, pair.second, rule);
+    it = its_own ? rules_before.erase(it) : std::next(it);
+  }
+}
+
 PairRule World::Impl::pairRule(const std::string& a, const std::string& b) const {
   const int ia = idOf(a), ib = idOf(b);
   const auto found = rules.find(std::minmax({ia, ib}));
@@ -210,8 +229,7 @@ Actor& World::Impl::addObject(const WorldObject& object, const ObjectSettings& s
   actor.reason = "it was added";
   actors.push_back(std::move(actor));
   addCollider(actors.back());
-  for (Actor& other : actors)  // supports that have gone carry nothing new either
-    if (!other.ended_contacts.empty()) meetOwnSupports(other, false);
+  keepOwnSupportsOut();
   plan_changed = true;
   return actors.back();
 }

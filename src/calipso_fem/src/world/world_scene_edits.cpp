@@ -127,7 +127,9 @@ std::string World::Impl::insert(const Edit& edit) {
 }
 
 std::string World::Impl::changeContact(Actor& actor, const Edit& edit) {
-  std::string message;
+  const bool of_pairs =
+      !edit.other.empty() || (std::isnan(edit.friction) && std::isnan(edit.restitution));
+  if (of_pairs) rememberRules(actor.object.name, edit.other);
   if (std::isnan(edit.friction) && std::isnan(edit.restitution)) {
     setPairContact(actor.object.name, edit.other, edit.meet);
     const std::string other = edit.other == actor.object.name ? "itself" : edit.other;

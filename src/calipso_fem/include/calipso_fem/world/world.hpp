@@ -46,7 +46,8 @@ class World {
   // is wrong with it is said in its outcome.
   void submit(const Edit& edit);
 
-  // Contact between two objects or supports, by name; an empty b stands for everything.
+  // Contact between two objects or supports, by name; an empty b stands for everything. An edit
+  // 'reset' leaves rules, and gives an object back the surface of its parameters.
   // @throw std::invalid_argument naming what is not known, or the value and its range
   void setPairContact(const std::string& a, const std::string& b, bool on);
   void setPairRule(const std::string& a, const std::string& b, const PairRule& rule);
