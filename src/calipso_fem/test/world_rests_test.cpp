@@ -162,6 +162,20 @@ TEST(WorldRests, WhatRestsOnAnObjectFallsWhenThatMovesAway) {
   }
 }
 
+// Edited itself, it presses on what carries it from the first step on.
+TEST(WorldRests, WhatRestsOnADeformableObjectDoesNotFallIntoItWhenItIsEdited) {
+  WorldParams params = coarse();
+  params.objects["thing"].kind = ObjectKind::kDeformable;
+  World world(boxWithLoad(0.1, true), params);
+  Edit edit = editOf(EditKind::kObjectKind);
+  edit.object_kind = ObjectKind::kDeformable;
+  outcomeOf(world, edit);
+  edit.object = "load", edit.object_kind = ObjectKind::kRigid;
+  outcomeOf(world, edit);
+  play(world, 1.0 / 30.0);
+  EXPECT_NEAR(centerOf(world.state(), 1).z(), 0.2255, 1e-3);
+}
+
 // Both are moved in the video after a second, and an edit of something else changes nothing there;
 // taken away before, the box lets the load fall.
 TEST(WorldRests, WhatTheVideoMovesWithItsCarrierStaysOnIt) {

@@ -101,6 +101,7 @@ int World::Impl::substepsPerFrame() const {
 
 void World::Impl::stepFrame(double h) {
   for (Actor& actor : actors) actor.soft_ms = 0.0;
+  letGoWhatLostItsRest();
   releaseWhatIsStruck(h);
   wakeDisturbed(h);
   const bool soft = std::any_of(actors.begin(), actors.end(),
@@ -113,7 +114,6 @@ void World::Impl::stepFrame(double h) {
     now += h / parts;
   }
   actAsObserved(continuing, from);
-  letGoWhatLostItsRest();
   updateSleep(h);
 }
 
