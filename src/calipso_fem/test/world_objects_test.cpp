@@ -123,16 +123,21 @@ TEST(WorldObjects, BadNamesAndValuesAreRefused) {
 }
 
 TEST(WorldObjects, FirstTouchIsToldWithItsTimeAndSpeed) {
-  const auto world = dropped(0.5);
-  std::vector<TouchEvent> events;
-  for (int k = 1; k <= 12; ++k) {
-    world->advanceTo(k / 30.0);
-    for (const TouchEvent& e : world->state().first_touches) events.push_back(e);
+  for (const double pace : {1.0, 0.7}) {
+    const auto world = dropped(0.5);
+    Edit slow = editOf(EditKind::kSpeedScale);
+    slow.object.clear(), slow.factor = pace;
+    outcomeOf(*world, slow);
+    std::vector<TouchEvent> events;
+    for (int k = 1; k <= 20; ++k) {
+      world->advanceTo(k / 30.0);
+      for (const TouchEvent& e : world->state().first_touches) events.push_back(e);
+    }
+    ASSERT_FALSE(events.empty());  // and perhaps those of its bounces
+    const double fall = std::sqrt(2.0 * 0.5 / kG);
+    EXPECT_NEAR(events[0].time, fall / pace, 2e-3);  // the margin of a collision shape: 0.1 mm
+    EXPECT_NEAR(events[0].approach_speed, kG * fall, 0.02 * kG * fall);
   }
-  ASSERT_FALSE(events.empty());  // and perhaps those of its bounces
-  const double fall = std::sqrt(2.0 * 0.5 / kG);
-  EXPECT_NEAR(events[0].time, fall, 2e-3);  // the margin of a collision shape takes 0.1 mm
-  EXPECT_NEAR(events[0].approach_speed, kG * fall, 0.02 * kG * fall);
 }
 
 // Several closed parts as one mesh; where they overlap it is not a manifold's surface.

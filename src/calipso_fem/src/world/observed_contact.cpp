@@ -76,7 +76,7 @@ std::vector<World::Impl::Continued> World::Impl::continued() const {
 
 // Sees to it that what touches something edited is left to itself from now on. @return it touches
 // anything
-bool World::Impl::touchesInStep(Actor& actor) const {
+bool World::Impl::touchesInStep(Actor& actor, double from) const {
   bool touches = false;
   const auto note = [&](const std::string& a, const std::string& b) {
     if (a != actor.object.name && b != actor.object.name) return;
@@ -88,13 +88,15 @@ bool World::Impl::touchesInStep(Actor& actor) const {
   };
   for (const ContactPoint& contact : rigid.contacts()) note(contact.a, contact.b);
   for (const TouchEvent& touch : rigid.touches()) note(touch.a, touch.b);
+  for (const TouchEvent& touch : first_touches)  // in parts of the step before its last
+    if (touch.time >= from) note(touch.a, touch.b);
   return touches;
 }
 
 void World::Impl::actAsObserved(const std::vector<Continued>& list, double from) {
   for (const Continued& before : list) {
     Actor& actor = actors[before.id];
-    const bool touches = touchesInStep(actor);
+    const bool touches = touchesInStep(actor, from);
     if (!actor.continues || !actor.track.reaches(now)) continue;
     const ObservedMotion y0 = actor.track.at(from), y1 = actor.track.at(now);
     const double h = now - from;

@@ -41,9 +41,11 @@ struct World::Impl {
   void noteWhatContinues(const Edit& edit, const std::vector<bool>& fresh);
   bool agreesWithVideo(const Actor& actor) const;
   std::vector<Continued> continued() const;
-  bool touchesInStep(Actor& actor) const;
+  bool touchesInStep(Actor& actor, double from) const;
   void actAsObserved(const std::vector<Continued>& list, double from);
   void substep(double from, double span);
+  bool stepSofts(const std::vector<SoftEntry>& softs, double at, double part);
+  int stepRigids(double at, double part);
   void rememberFirstTouches();
   void noteTouch(const TouchEvent& touch);  // unless the pair has been noted in this frame
   ObjectSnapshot snapshot(const Actor& actor) const;
@@ -240,7 +242,7 @@ struct World::Impl {
   std::set<std::pair<std::string, std::string>> touching;
   std::vector<TouchEvent> first_touches;
   std::map<std::pair<int, int>, PairRule> rules;                         // by ids, smaller first
-  std::map<std::pair<std::string, std::string>, PairRule> rules_before;  // edits, by names
+  std::map<std::pair<std::string, std::string>, PairRule> rules_before;  // any edit, by names
   std::deque<Edit> pending;                                              // by time
   std::vector<Edit> waiting;  // for a collision in the video that is not known yet
   bool collisions_known = false;

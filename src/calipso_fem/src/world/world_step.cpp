@@ -118,44 +118,53 @@ void World::Impl::stepFrame(double h) {
 }
 
 // From video time `from` on for `span` seconds; the bodies live through speed_scale times as many.
+// Where deformable objects do not converge in so long a step, everything takes it in parts.
 void World::Impl::substep(double from, double span) {
-  const double to = from + span, h = speed_scale * span;
+  const double to = from + span;
   endPulls(from);
-  driveAsObserved(to, h);
-  applyLoads(to, h);
+  driveAsObserved(to, speed_scale * span);
   const std::vector<SoftEntry> softs = softEntries();
-  if (!softs.empty()) {
-    const auto start = std::chrono::steady_clock::now();
-    ContactReport report;
-    // A part that does not converge is taken in halves; forces are given anew for each.
-    for (double at = from; at < to - kSameInstant;) {
-      const double rest = to - at, part = soft_part < 0.75 * rest ? soft_part : rest;
-      part_begin = at;
-      if (at > from || part < span) applyLoads(at + part, speed_scale * part);
-      report = contacts.step(softs, obstacles(at, at + part), rigid, speed_scale * part);
-      if (report.bodies.empty()) {
-        soft_part = 0.5 * part, good_parts = 0;
-        continue;
-      }
-      at += part;
-      if (++good_parts >= kGoodParts) soft_part *= 2.0, good_parts = 0;
-    }
-    double nodes = 0.0;
-    for (const SoftEntry& entry : softs) nodes += entry.soft->body().nodeCount();
-    for (size_t i = 0; i < softs.size(); ++i) {
-      Actor& actor = actors[softs[i].id];
-      if (!report.bodies[i].message.empty()) actor.note = report.bodies[i].message;
-      // They are solved together; each has its nodes' share of the time.
-      actor.soft_ms += millisecondsSince(start) * actor.soft->body().nodeCount() / nodes;
-    }
+  for (double at = from; at < to - kSameInstant;) {
+    const double rest = to - at;
+    const double part = !softs.empty() && soft_part < 0.75 * rest ? soft_part : rest;
+    applyLoads(at + part, speed_scale * part);
+    if (!softs.empty() && !stepSofts(softs, at, part)) continue;
+    substeps += std::max(stepRigids(at, part), softs.empty() ? 0 : 1);
+    at += part;
   }
+}
+
+// @return whether they converge; otherwise nothing has changed, and the next part is half as long
+bool World::Impl::stepSofts(const std::vector<SoftEntry>& softs, double at, double part) {
+  const auto start = std::chrono::steady_clock::now();
+  part_begin = at;
+  const ContactReport report =
+      contacts.step(softs, obstacles(at, at + part), rigid, speed_scale * part);
+  double nodes = 0.0;
+  for (const SoftEntry& entry : softs) nodes += entry.soft->body().nodeCount();
+  for (const SoftEntry& entry : softs)  // solved together: each has its nodes' share of the time
+    actors[entry.id].soft_ms += millisecondsSince(start) * entry.soft->body().nodeCount() / nodes;
+  if (report.bodies.empty()) {
+    soft_part = 0.5 * part, good_parts = 0;
+    return false;
+  }
+  for (size_t i = 0; i < softs.size(); ++i)
+    if (!report.bodies[i].message.empty()) actors[softs[i].id].note = report.bodies[i].message;
+  if (++good_parts >= kGoodParts) soft_part *= 2.0, good_parts = 0;
+  return true;
+}
+
+// @return Bullet's sub-steps
+int World::Impl::stepRigids(double at, double part) {
   for (Actor& actor : actors)
-    if (actor.body && !actor.simulated()) rigid.moveKinematic(*actor.body, poseOf(actor, to));
-  substeps += std::max(rigid.step(h), softs.empty() ? 0 : 1);
+    if (actor.body && !actor.simulated())
+      rigid.moveKinematic(*actor.body, poseOf(actor, at + part));
+  const int steps = rigid.step(speed_scale * part);
   for (TouchEvent touch : rigid.touches()) {
-    touch.time += from;
+    touch.time = at + touch.time / speed_scale;
     noteTouch(touch);
   }
+  return steps;
 }
 
 void World::Impl::endPulls(double at) {

@@ -49,7 +49,7 @@ class RigidWorld {
   // @throw std::invalid_argument naming the body and what is wrong (shapes, mass, friction)
   Id add(const RigidBodySpec& spec);
   Id addPlane(const SupportPlane& plane, const SurfaceSettings& surface);
-  void remove(Id id);  // what sleeps on it is not woken; neither by a jump of it
+  void remove(Id id);  // wakes nothing that sleeps on it; no more does setPose()
 
   // Contact between the two, whatever they are: none, or with a friction or restitution of its own.
   void setRule(Id a, Id b, const PairRule& rule);

@@ -58,9 +58,9 @@ class SoftObject {
 
   StepReport step(double h);  // under gravity and what drives it alone, without contacts
   // One step under gravity, all forces given and contacts: whoever solves for these drives the
-  // body's trial in between. `gained`: impulse and, about the centre of mass
-  // before the step, its moment, of a body that nothing else holds; then momentum is exact, and
-  // flight follows its parabola.
+  // body's trial in between. `gained`: impulse and, about the centre of mass before the step, its
+  // moment, of a body that nothing else holds; then momentum is exact, and flight follows its
+  // parabola.
   void beginStep(double h);
   StepReport endStep(const Vec& contact_forces, double h, const std::optional<Momentum>& gained);
   const Momentum& momentumBefore() const { return before_; }
