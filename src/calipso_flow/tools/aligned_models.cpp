@@ -15,7 +15,6 @@ std::vector<AlignedModel> alignedModels(const Scene& scene, const Perturbation& 
     const SceneObject& object = scene.objects[k];
     align::AlignOptions options;
     options.planes = scene.planes;
-    options.attachments = object.attachments;
     options.depth = align::loadDepth(scene);
     const align::AlignmentResult fit = align::align(
         loadMesh(object.cad_path), scene.camera,

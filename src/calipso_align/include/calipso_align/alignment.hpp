@@ -39,7 +39,6 @@ struct AlignOptions {
   bool judge_depth = true;                 // whether the result says how far it may be off in 3D
   double elastic_weight = 1.0;             // final stiffness of the model against the contour
   std::vector<SupportPlane> planes;        // world; the object does not go through them
-  std::vector<AttachmentBox> attachments;  // world; without effect
   std::optional<DepthObservation> depth;
 };
 

@@ -3,6 +3,7 @@
 #include <calipso_msgs/Plan.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <algorithm>
 #include <boost/make_shared.hpp>
 
 #include "calipso_ros/conversions.hpp"
@@ -14,7 +15,8 @@
 namespace calipso::fem {
 namespace {
 
-constexpr unsigned kKeepAll = 0;  // in bag mode nothing may be lost
+constexpr unsigned kKeepAll = 0;     // in bag mode nothing may be lost
+constexpr double kFarAhead = 600.0;  // s past live video, at which no edit is meant
 
 }  // namespace
 
@@ -57,6 +59,7 @@ void SimulatorRos::onModels(const calipso_msgs::AlignedModelsConstPtr& models) {
 void SimulatorRos::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
   if (first_stamp_) return;
   first_stamp_ = info->header.stamp;
+  clip_ = info;
   if (info->fps > 0.0) params_.world.frame_period = 1.0 / info->fps;
   prepare();
 }
@@ -105,6 +108,7 @@ void SimulatorRos::prepare() {
   }
   try {
     world_ = std::make_unique<World>(toWorldScene(scene_, *models_), params_.world);
+    said_before_ = said_;
   } catch (const std::exception& error) {
     reporter_.failed(error.what());
     return;
@@ -148,17 +152,33 @@ void SimulatorRos::take(const calipso_msgs::ObjectClipDynamics& object) {
 }
 
 void SimulatorRos::onEdit(const calipso_msgs::EditConstPtr& edit) {
-  if (edit->kind == calipso_msgs::Edit::TIME_SCALE && (params_.mode == Mode::kLive || plays_)) {
-    refuse(*edit,
-           "pictures are laid out in time before the video plays, and those of a camera come "
-           "as they are; give time_scale in the file of edits");
-  } else if (params_.mode == Mode::kLive && !edit->after.empty()) {
-    refuse(*edit, "collisions of live video are not known when they happen; give the edit a time");
-  } else {
+  const std::string wrong = whyImpossible(*edit);
+  if (wrong.empty()) {
     edits_.push_back(*edit);
     if (world_ && first_stamp_) submit(*edit);
+  } else {
+    send(refusal(*edit, wrong));
   }
   reporter_.editReceived();
+}
+
+// What no world can know; empty: nothing is wrong.
+std::string SimulatorRos::whyImpossible(const calipso_msgs::Edit& edit) const {
+  const bool live = params_.mode == Mode::kLive;
+  const bool laid_out = plays_ || (clip_ && clip_->played_frames == clip_->frames);
+  if (edit.kind == calipso_msgs::Edit::TIME_SCALE && (live || laid_out))
+    return "pictures are laid out in time before the video plays, and those of a camera come "
+           "as they are; give time_scale in the file of edits";
+  if (live && !edit.after.empty())
+    return "collisions of live video are not known when they happen; give the edit a time";
+  const ros::Time last = clip_ ? clip_->last_stamp : newest_ + ros::Duration(kFarAhead);
+  const bool known = clip_ || !newest_.isZero();
+  if (known && edit.after.empty() && edit.header.stamp > last)
+    return "its stamp is " + std::to_string(edit.header.stamp.toSec()) + " s, the video " +
+           (clip_ ? "ends at " : "is at ") +
+           std::to_string((clip_ ? clip_->last_stamp : newest_).toSec()) +
+           " s; give a stamp of the video, or 0 for the next frame";
+  return "";
 }
 
 // A world knows nothing of what one before it was told.
@@ -170,18 +190,19 @@ void SimulatorRos::submit(const calipso_msgs::Edit& edit) {
   try {
     world_->submit(calipso::fromMsg(edit, *first_stamp_));
   } catch (const std::invalid_argument& error) {
-    refuse(edit, error.what());
+    report(refusal(edit, error.what()));
   }
 }
 
-void SimulatorRos::refuse(const calipso_msgs::Edit& edit, const std::string& message) {
+calipso_msgs::EditReport SimulatorRos::refusal(const calipso_msgs::Edit& edit,
+                                               const std::string& message) const {
   calipso_msgs::EditReport report;
-  report.header.stamp = edit.header.stamp;
+  report.header.stamp = newest_.isZero() ? first_stamp_.value_or(edit.header.stamp) : newest_;
   report.header.frame_id = topics::kWorldFrame;
   report.edit = edit;
   report.accepted = false;
   report.message = message;
-  this->report(report);
+  return report;
 }
 
 // Models of a key frame that is not later stay: they are sent once only, perhaps before this.
@@ -189,7 +210,8 @@ void SimulatorRos::startOver(const ros::Time& stamp) {
   reporter_.remark(kStartsOver);
   world_.reset();
   first_stamp_.reset();
-  edits_.clear();
+  newest_ = ros::Time();
+  edits_.clear(), said_.clear(), said_before_.clear();
   if (models_ && models_->header.stamp > stamp) models_.reset();
   reporter_.starting("waiting for models");
   prepare();
@@ -199,6 +221,7 @@ void SimulatorRos::onFrame(const sensor_msgs::CameraInfoConstPtr& info) {
   const ros::Time stamp = info->header.stamp;
   plays_ = true;
   if (params_.mode == Mode::kLive && clock_.startsOver(stamp)) startOver(stamp);
+  newest_ = stamp;
   if (!world_) {
     // A state without objects lets the frame pass unedited.
     if (reporter_.state() == calipso_msgs::NodeStatus::FAILED) {
@@ -230,7 +253,21 @@ void SimulatorRos::publish(const std::vector<EditOutcome>& outcomes, const ros::
     markers_.publish(toMarkers(*world_, {params_.colour_by, params_.force_scale}, stamp));
 }
 
+// A world that is made anew says once more what the one before it has said.
 void SimulatorRos::report(const calipso_msgs::EditReport& report) {
+  const auto said = std::find_if(
+      said_before_.begin(), said_before_.end(), [&](const calipso_msgs::EditReport& r) {
+        return r.accepted == report.accepted && sameMessage(r.edit, report.edit);
+      });
+  if (said != said_before_.end()) {
+    said_before_.erase(said);
+    return;
+  }
+  said_.push_back(report);
+  send(report);
+}
+
+void SimulatorRos::send(const calipso_msgs::EditReport& report) {
   applied_.publish(report);
   ++reports_;
   if (!report.accepted) reporter_.remark("edit refused: " + report.message);

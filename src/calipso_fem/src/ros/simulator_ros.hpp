@@ -46,9 +46,12 @@ class SimulatorRos {
   void take(const calipso_msgs::ObjectClipDynamics& object);
   void submitAll();
   void submit(const calipso_msgs::Edit& edit);
-  void refuse(const calipso_msgs::Edit& edit, const std::string& message);
+  std::string whyImpossible(const calipso_msgs::Edit& edit) const;
+  calipso_msgs::EditReport refusal(const calipso_msgs::Edit& edit,
+                                   const std::string& message) const;
   void publish(const std::vector<EditOutcome>& outcomes, const ros::Time& stamp);
-  void report(const calipso_msgs::EditReport& report);
+  void report(const calipso_msgs::EditReport& report);  // what a world says
+  void send(const calipso_msgs::EditReport& report);
   void publishPlan(const ros::Time& stamp);
   calipso_msgs::SimulationState stateMsg(const WorldState& state, const ros::Time& stamp) const;
   void sendRigidTransforms(const WorldState& state, const ros::Time& stamp);
@@ -62,11 +65,15 @@ class SimulatorRos {
   VideoClock clock_;  // live
   calipso_msgs::AlignedModelsConstPtr models_;
   calipso_msgs::ClipDynamicsConstPtr clip_dynamics_;
+  calipso_msgs::ClipInfoConstPtr clip_;
   std::optional<ros::Time> first_stamp_;
+  ros::Time newest_;                       // frame's; zero: none to edit has come
   bool plays_ = false;                     // a frame to edit has come
   ros::Time plan_stamp_;                   // of the newest one sent
   std::uint32_t reports_ = 0;              // sent
   std::vector<calipso_msgs::Edit> edits_;  // of this video
+  // what its worlds have said of them, and of that what the newest has yet to say again
+  std::vector<calipso_msgs::EditReport> said_, said_before_;
   std::unique_ptr<World> world_;
 };
 
