@@ -15,7 +15,8 @@ COLUMNS = [
     ("roughness_range", "roughnesses it leaves, highest / lowest"), ("roughness_in_range", "the true one is among them"), ("second_order_ambient", "ambient light of second order"),
     ("undeformed_psnr_db", "unmoved, dB"),
     ("seam_psnr_db", "unmoved seam, dB"), ("undeformed_drawn_psnr_db", "unmoved, all drawn, dB"),
-    ("seam_drawn_psnr_db", "seam, all drawn, dB"), ("moved_psnr_db", "moved, dB"),
+    ("seam_drawn_psnr_db", "seam, all drawn, dB"), ("undeformed_plain_psnr_db", "unmoved, drawn plainly, dB"),
+    ("moved_psnr_db", "moved, dB"),
     ("moved_from_clip_psnr_db", "moved, texture from the clip, dB"),
     ("shadow_psnr_db", "around moved, dB"), ("moved_copied_psnr_db", "moved, not relit, dB"),
     ("relighting_gain_db", "gain over copying, dB"), ("relighting_gain_turned_db", "the same where turned by 10 degrees or more, dB"),
@@ -29,8 +30,9 @@ HEADER = """# Appearance
 Written by `src/calipso_render/bench/run.sh`. The true shape, pose and masks stand in for alignment and
 segmentation. "moved": later frames drawn again from the key frame's appearance with the true motion; the worst
 frame counts; "texture from the clip": further frames add what the key frame does not show, and frames between those are
-judged. 1: yes, 0: no. "all drawn": no pixel of the frame is kept, what drawing misses goes along as a residual. "live" and "final": every object lifted, so that all of
-it is drawn, shaded and replaced. Times of this table are wall times of the machine while it ran, best of five.
+judged. 1: yes, 0: no. "all drawn": no pixel of the frame is kept, what drawing misses goes along as a residual; "drawn
+plainly": without that, by texture and light alone. "live" and "final": every object lifted, so that all of it is drawn,
+shaded and replaced. Times are wall times of the machine while it ran, of frames the best of five, of preparation one.
 
 """
 

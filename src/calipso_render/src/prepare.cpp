@@ -35,7 +35,7 @@ std::vector<Actor> keyActors(const Prepared& p) {
 }
 
 // The key frame, and up to kTextureViews further frames in which the poses of all moving objects are
-// known, evenly spaced.
+// known, evenly spaced: where something moves, or the camera.
 std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::Mat& key_picture) {
   std::vector<View> views = {{key_picture, p.key_labels, p.camera, keyActors(p)}};
   std::vector<const ClipFrame*> usable;
@@ -45,7 +45,7 @@ std::vector<View> viewsOf(const ClipSample& clip, const Prepared& p, const cv::M
       return std::any_of(f.poses.begin(), f.poses.end(),
                          [&](const ObjectPose& o) { return o.index == s.index; });
     };
-    bool all = !f.poses.empty();
+    bool all = p.camera_moves || !f.poses.empty();
     for (std::size_t k = 0; k < p.surfaces.size(); ++k)
       all = all && (!p.moves[k] || known(p.surfaces[k]));
     if (all) usable.push_back(&f);

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
+#include <map>
 #include <stdexcept>
 
 #include "draw/side_by_side.hpp"
 #include "light/sky_seen.hpp"
+#include "place/view_warp.hpp"
 #include "texture/mesh_topology.hpp"
 
 namespace calipso::render {
@@ -84,20 +85,21 @@ Points stockAt(const ObjectModel& model, const Points& key_vertices) {
 }
 
 // Triangles with vertices of their own, as some files have them, are neighbours where these are at
-// one place. A sheet that has every face twice, once for each side, stays as it is.
+// one place. Faces that a sheet has twice, once for each side, stay as they are.
 void joinCorners(const Points& vertices, Triangles& triangles) {
   const std::vector<int> welded = weld(vertices);
-  Triangles joined = triangles;
-  std::set<std::array<int, 3>> faces;
-  for (Eigen::Vector3i& t : joined) {
+  const auto cornersOf = [&](const Eigen::Vector3i& t) {
     std::array<int, 3> face = {welded[t[0]], welded[t[1]], welded[t[2]]};
-    const Eigen::Vector3i corners(face[0], face[1], face[2]);
     std::sort(face.begin(), face.end());
-    if (face[0] == face[1] || face[1] == face[2]) continue;  // it has no area
-    if (!faces.insert(face).second) return;
-    t = corners;
+    return face;
+  };
+  std::map<std::array<int, 3>, int> times;
+  for (const Eigen::Vector3i& t : triangles) ++times[cornersOf(t)];
+  for (Eigen::Vector3i& t : triangles) {
+    const std::array<int, 3> face = cornersOf(t);
+    const bool no_area = face[0] == face[1] || face[1] == face[2];
+    if (!no_area && times[face] == 1) t = {welded[t[0]], welded[t[1]], welded[t[2]]};
   }
-  triangles = std::move(joined);
 }
 
 }  // namespace
@@ -112,6 +114,13 @@ void findNormals(Surface& surface) {
   for (const int vertex : surface.vertex_of_normal) places.push_back(surface.key_vertices[vertex]);
   findSkySeen(places, surface.key_normals, surface.corners, surface.winding != 1, surface.seen,
               surface.seen_behind);
+}
+
+std::vector<bool> shownAnew(const std::vector<View>& views, const std::vector<bool>& moves) {
+  const bool camera_moves = std::any_of(views.begin(), views.end(), [&](const View& v) {
+    return !sameView(v.camera, views.front().camera);
+  });
+  return camera_moves ? std::vector<bool>(moves.size(), true) : moves;
 }
 
 Surface makeSurface(const ObjectModel& model) {

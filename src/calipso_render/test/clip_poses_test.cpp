@@ -51,6 +51,15 @@ TEST(TakePoses, WhatStandsBeforeTheObjectDoesNotCount) {
   EXPECT_EQ(takePoses({{1002, {poseAt(kEnd)}}}, {ballAt(kStart)}, hidden).accepted, 1);
 }
 
+// It is then known to be nowhere, and others' frames count.
+TEST(TakePoses, AcceptsThatAnObjectHasLeftThePicture) {
+  ClipSample clip = rollingBall();
+  clip.setLabels(1002, cv::Mat::zeros(kHeight, kWidth, CV_8U));
+  const Eigen::Vector3d beside(5.0, 0.1, 0.12);
+  EXPECT_EQ(takePoses({{1002, {poseAt(beside)}}}, {ballAt(kStart)}, clip).accepted, 1);
+  EXPECT_EQ(takePoses({{1002, {poseAt(kEnd)}}}, {ballAt(kStart)}, clip).accepted, 0);
+}
+
 TEST(AnyMoves, TellsRestFromMotion) {
   ClipSample resting;
   for (int k = 0; k < 3; ++k) resting.add(frameWithBall(ballAt(kStart)));
@@ -87,6 +96,25 @@ TEST(Prepare, UsesTheFramesWhosePosesAreKnown) {
   const Prepared with = prepare(clip, {ballAt(kStart)}, params);
   EXPECT_EQ(with.light_views, 3);
   EXPECT_EQ(with.texture_views, 3);
+}
+
+// A camera that moves shows other sides of what rests.
+TEST(Prepare, UsesTheFramesOfAMovingCamera) {
+  RenderParams params;
+  params.planes = table();
+  ClipSample clip;
+  for (const double right : {0.0, 0.06, -0.06}) {
+    ClipFrame frame = seenFrom(right, kStart);
+    frame.stamp_ns = 1000 + static_cast<int>(100 * right);
+    clip.add(frame);
+  }
+  const Prepared prepared = prepare(clip, {ballAt(kStart)}, params);
+  ASSERT_FALSE(prepared.moves[0]);
+  EXPECT_EQ(prepared.texture_views, 3);
+  View key{prepared.key_picture, prepared.key_labels, prepared.camera, {}}, other = key;
+  other.camera = clip.frames()[1].camera;
+  EXPECT_EQ(shownAnew({key, key}, {false}), std::vector<bool>{false});
+  EXPECT_EQ(shownAnew({key, other}, {false}), std::vector<bool>{true});
 }
 
 }  // namespace

@@ -352,6 +352,25 @@ TEST(Inpaint, CopiesFromNoBannedPlace) {
   }
 }
 
+// All that is known is a border too narrow for whole patches at the coarsest level.
+TEST(Inpaint, CopiesFromANarrowBorder) {
+  const cv::Mat image = grain(320, 240);
+  cv::Mat hole = cv::Mat::zeros(240, 320, CV_8U);
+  hole(cv::Rect(25, 25, 270, 190)).setTo(255);
+  EXPECT_TRUE(inpaint(image, hole, cv::Mat()).patches_found);
+}
+
+// What may be copied lies farther from the hole than that is large.
+TEST(Inpaint, CopiesFromAnywhereIfItMay) {
+  const cv::Mat image = grain(200, 80);
+  cv::Mat hole = cv::Mat::zeros(80, 200, CV_8U), banned(80, 200, CV_8U, cv::Scalar(255));
+  hole(cv::Rect(20, 30, 20, 20)).setTo(255), banned(cv::Rect(120, 0, 80, 80)).setTo(0);
+  InpaintParams params;
+  EXPECT_FALSE(inpaint(image, hole, banned, params).patches_found);
+  params.from_anywhere = true;
+  EXPECT_TRUE(inpaint(image, hole, banned, params).patches_found);
+}
+
 TEST(Inpaint, SaysWhenThereIsNothingToCopy) {
   const cv::Mat image(20, 20, CV_32FC3, cv::Scalar::all(50)), hole(20, 20, CV_8U, cv::Scalar(255));
   EXPECT_FALSE(inpaint(image, hole, cv::Mat()).patches_found);

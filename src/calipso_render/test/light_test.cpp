@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "ball_samples.hpp"
@@ -15,6 +18,7 @@
 #include "light/light_search.hpp"
 #include "light/reflectance_cost.hpp"
 #include "light/sun_prior.hpp"
+#include "render_test_scene.hpp"
 
 namespace calipso::render {
 namespace {
@@ -166,6 +170,26 @@ TEST(FitLight, FindsTheSunOfABall) {
 }
 
 // A ball whose top is of a grey ten times as dark as the rest: of one hue, but no shading.
+// Of a grey picture all is one cluster: what differs is shading.
+TEST(LightSamples, BrightnessIsNoColour) {
+  const ObjectModel ball = ballAt({0.0, 0.1, 0.12});
+  const ClipFrame frame = frameWithBall(ball);
+  cv::Mat grey;
+  cv::cvtColor(frame.bgr, grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(grey, grey, cv::COLOR_GRAY2BGR);
+  const Surface surface = makeSurface(ball);
+  View view{grey, frame.labels, frame.camera, {}};
+  view.actors.push_back(makeActor(surface, surface.key_vertices, frame.camera));
+  int clusters = 0;
+  const std::vector<LightSample> samples = lightSamples({view}, {false}, clusters);
+  ASSERT_GT(samples.size(), 100u);
+  std::map<int, int> count;  // of no colour there may be more than a stray sample
+  for (const LightSample& s : samples) ++count[s.cluster];
+  int most = 0;
+  for (const auto& [cluster, samples_of_it] : count) most = std::max(most, samples_of_it);
+  EXPECT_GT(most + 4, static_cast<int>(samples.size()));
+}
+
 TEST(FitLight, TellsReflectancesOfOneHueApart) {
   const Eigen::Vector3f sun = Eigen::Vector3f(0.5f, -0.5f, 0.7f).normalized();
   LightEvidence evidence;

@@ -108,7 +108,7 @@ TEST(Renderer, ThinTrianglesComeBackToo) {
 
 TEST(Renderer, UnmovedSurfaceDrawsBackToItsPixels) {
   RenderParams p = params();
-  p.keep_still = false;  // so that every pixel is really drawn
+  p.keep_still = p.carry_residual = false;  // so that every pixel is really drawn
   const Setting s(p);
   const FrameOutput out = Renderer(s.prepared, p).composite(s.input(true, Eigen::Vector3f::Zero()));
   cv::Mat inside;

@@ -113,6 +113,15 @@ class Evaluation {
     return frame(k, [](std::size_t, ObjectInFrame& o) { o.removed = true; });
   }
 
+  // Of what is edited.
+  static cv::Mat maskOf(const FrameInput& in, const std::vector<Surface>& surfaces) {
+    cv::Mat mask = cv::Mat::zeros(in.labels.size(), CV_8U);
+    for (std::size_t i = 0; i < in.objects.size(); ++i) {
+      if (in.objects[i].edited) mask |= in.labels == surfaces[i].index;
+    }
+    return mask;
+  }
+
   RenderParams without(bool noise, bool still) const {
     RenderParams p = params_;
     p.add_noise = noise, p.keep_still = still;
@@ -216,11 +225,15 @@ class Evaluation {
                   seam = grow(mask, kSeam) & ~shrink(mask, kSeam);
     const cv::Mat kept = Renderer(prepared_, params_).composite(in).bgr;
     const cv::Mat drawn = Renderer(prepared_, without(false, false)).composite(in).bgr;
+    RenderParams plain = without(false, false);
+    plain.carry_residual = false;
     picture("undeformed", drawn);
     put("undeformed_psnr_db", psnr(kept, in.bgr, inside));
     put("seam_psnr_db", psnr(kept, in.bgr, seam));
     put("undeformed_drawn_psnr_db", psnr(drawn, in.bgr, inside));
     put("seam_drawn_psnr_db", psnr(drawn, in.bgr, seam));
+    put("undeformed_plain_psnr_db",
+        psnr(Renderer(prepared_, plain).composite(in).bgr, in.bgr, inside));
   }
 
   // Crops of the video and of the same frames with everything edited but moving and deforming as it
@@ -302,7 +315,7 @@ class Evaluation {
       if (std::none_of(in.objects.begin(), in.objects.end(),
                        [](const ObjectInFrame& o) { return o.edited; }))
         break;
-      const cv::Mat drawn = renderer.composite(in).bgr, mask = in.labels != 0,
+      const cv::Mat drawn = renderer.composite(in).bgr, mask = maskOf(in, prepared_->surfaces),
                     inside = shrink(mask, 2);
       const auto relit = psnr(drawn, in.bgr, inside),
                  copy = psnr(copier.composite(in).bgr, in.bgr, inside);

@@ -117,6 +117,10 @@ struct View {
   }
 };
 
+// Which objects further views show from elsewhere than the key frame's, the first: those that move,
+// and all of them if the camera does.
+std::vector<bool> shownAnew(const std::vector<View>& views, const std::vector<bool>& moves);
+
 // The support plane that pixel (u, v) of the camera looks at.
 struct Receiver {
   Eigen::Vector3f position, normal;  // world

@@ -127,10 +127,12 @@ struct Canvas {
   cv::Mat lift;                                 // InpaintResult::lift
   std::optional<std::vector<cv::Vec4f>> edges;  // straightEdges(), once sought
 
+  // @param from what lies just beyond the picture's border stands for it
   void set(const cv::Point& p, const cv::Vec3f& colour, const cv::Point& from) {
     for (int c = 0; c < 3; ++c) look.at<cv::Vec3f>(p)[c] = std::clamp(colour[c], 0.0f, 255.0f);
     hole.at<std::uint8_t>(p) = 0, known.at<std::uint8_t>(p) = 255;
-    origin.at<cv::Vec2s>(p) = {static_cast<short>(from.x), static_cast<short>(from.y)};
+    origin.at<cv::Vec2s>(p) = {static_cast<short>(std::clamp(from.x, 0, look.cols - 1)),
+                               static_cast<short>(std::clamp(from.y, 0, look.rows - 1))};
   }
 };
 
@@ -309,7 +311,8 @@ std::vector<cv::Vec4f> edgesIn(const cv::Rect& window, const Canvas& canvas) {
 }
 
 void fillRest(const InpaintParams& params, Canvas& canvas) {
-  const cv::Rect window = windowAround(canvas.hole);
+  const cv::Rect window =
+      params.from_anywhere ? cv::Rect({0, 0}, canvas.hole.size()) : windowAround(canvas.hole);
   const cv::Mat hole = canvas.hole(window), trend = supportsTrend(params, canvas)(window);
   InpaintParams here = params;
   if (!params.sky.empty()) here.sky = copiedSky(params.sky, canvas.origin);
@@ -341,7 +344,7 @@ InpaintResult inpaint(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& 
   InpaintResult result{image.clone(), cv::Mat(image.size(), CV_16SC2, cv::Scalar(-1, -1)),
                        cv::Mat::zeros(image.size(), CV_32FC3), true};
   if (cv::countNonZero(hole) == 0) return result;
-  const cv::Rect window = windowAround(hole);
+  const cv::Rect window = params.from_anywhere ? cv::Rect({0, 0}, hole.size()) : windowAround(hole);
   Canvas canvas{image(window).clone(),
                 hole(window) != 0,
                 hole(window) == 0,

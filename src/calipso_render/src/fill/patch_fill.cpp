@@ -379,7 +379,11 @@ cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& s
     return Filling(levels[k], static_cast<float>(1 << k), horizon, pattern, params);
   };
   int coarsest = static_cast<int>(levels.size()) - 1;
-  while (coarsest > 0 && cv::countNonZero(levels[coarsest].hole) == 0) --coarsest;  // it is thin
+  // A thin hole is none there, and a coarse pixel is source only if all of its own are.
+  const auto useless = [](const FillLevel& level) {
+    return cv::countNonZero(level.hole) == 0 || PatchSources(level.source, cv::Mat()).empty();
+  };
+  while (coarsest > 0 && useless(levels[coarsest])) --coarsest;
   Filling filling = fillingOf(coarsest);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   filling.peel();

@@ -47,10 +47,15 @@ std::vector<Pixel> usablePixels(const VisibilityBuffer& buffer, const View& view
   return thinned;
 }
 
-// Colour without brightness, which shading changes.
+// Colour without brightness, which shading changes: the darker, the more like grey. All greys are
+// one, whatever rounding makes of them.
 cv::Vec2f chromaticity(const cv::Vec3f& radiance) {
-  const float sum = radiance[0] + radiance[1] + radiance[2] + 0.01f;
-  return {radiance[0] / sum, radiance[2] / sum};
+  constexpr float kDark = 0.01f, kStep = 1e-4f;
+  const float sum = radiance[0] + radiance[1] + radiance[2] + kDark;
+  const auto part = [&](int c) {
+    return kStep * std::round((radiance[c] + kDark / 3.0f) / (kStep * sum));
+  };
+  return {part(0), part(2)};
 }
 
 // Cluster of each sample, 0-based; returns how many there are.
@@ -161,10 +166,11 @@ void addShadows(const std::shared_ptr<const Shadows>& seen, LightEvidence& evide
 std::vector<LightSample> lightSamples(const std::vector<View>& views,
                                       const std::vector<bool>& moves, int& clusters) {
   std::vector<LightSample> samples;
+  const std::vector<bool> anew = shownAnew(views, moves);
   clusters = 0;
   for (std::size_t object = 0; object < moves.size(); ++object) {
     const std::size_t first = samples.size();
-    const std::size_t pictures = moves[object] ? views.size() : 1;
+    const std::size_t pictures = anew[object] ? views.size() : 1;
     for (std::size_t i = 0; i < pictures; ++i)
       sampleView(views[i], static_cast<int>(i), object, kPerObject / pictures, samples);
     for (std::size_t i = first; i < samples.size(); ++i) samples[i].cluster = clusters;
@@ -209,9 +215,9 @@ LightEvidence lightEvidence(const std::vector<View>& views, const std::vector<bo
     return seen->objects[s.picture].blocked(s.position, s.normal, l) ? 0.0f : 1.0f;
   };
   addShadows(seen, evidence);
-  evidence.gloss = [&views, moves, visible = evidence.visible](
+  evidence.gloss = [&views, anew = shownAnew(views, moves), visible = evidence.visible](
                        const LightFit& fit, const std::vector<LightSample>& samples) {
-    return seenGlosses(highlightSamples(views, moves, samples, fit.light.direction), moves.size(),
+    return seenGlosses(highlightSamples(views, anew, samples, fit.light.direction), anew.size(),
                        fit, visible);
   };
   return evidence;

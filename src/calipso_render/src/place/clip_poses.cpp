@@ -28,7 +28,8 @@ double overlap(const ObjectModel& model, const ObjectPose& pose, const ClipFrame
       both += drawn && seen, either += drawn || seen;
     }
   }
-  return either > 0 ? static_cast<double>(both) / either : 0.0;
+  // Where neither has it, it has left the picture or is hidden.
+  return either > 0 ? static_cast<double>(both) / static_cast<double>(either) : 1.0;
 }
 
 }  // namespace

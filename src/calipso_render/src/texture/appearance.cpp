@@ -245,13 +245,13 @@ Appearance::Source sourceOf(const SurfaceTexture& texture, int triangle) {
                   : Appearance::Source::kBoth;
 }
 
-// One object as the views show it, the key frame's first; alone if it rests.
+// One object as the views show it, the key frame's first; alone if they show it as that does.
 class Portrait {
  public:
-  Portrait(const std::vector<View>& views, std::size_t object, bool moves, const Light& light,
+  Portrait(const std::vector<View>& views, std::size_t object, bool anew, const Light& light,
            const Gloss& gloss)
       : light_(light) {
-    for (std::size_t i = 0; i < (moves ? views.size() : 1); ++i)
+    for (std::size_t i = 0; i < (anew ? views.size() : 1); ++i)
       views_.push_back(&views[i]), actors_.push_back(&views[i].actors[object]);
     pictures_.resize(views_.size());
     appearance_.gloss = gloss, appearance_.key_camera = views[0].camera;
@@ -303,12 +303,13 @@ std::vector<Appearance> makeAppearances(const std::vector<View>& views,
                                         const std::vector<Gloss>& glosses,
                                         const std::vector<SupportPlane>& planes) {
   std::vector<Portrait> portraits;
+  const std::vector<bool> anew = shownAnew(views, moves);
   for (std::size_t i = 0; i < moves.size(); ++i)
-    portraits.emplace_back(views, i, moves[i], light, glosses[i]);
+    portraits.emplace_back(views, i, anew[i], light, glosses[i]);
   const Shade key_shade = shadeIn(views[0], light, planes);
 #pragma omp parallel for schedule(dynamic, 1) if (moves.size() > 1)
   for (std::size_t i = 0; i < moves.size(); ++i) portraits[i].seeKey(key_shade);
-  if (std::find(moves.begin(), moves.end(), true) != moves.end()) {
+  if (std::find(anew.begin(), anew.end(), true) != anew.end()) {
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t k = 1; k < views.size(); ++k) {
       const Shade shade = shadeIn(views[k], light, planes);

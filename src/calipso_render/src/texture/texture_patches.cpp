@@ -194,6 +194,7 @@ class PatternFill {
     banned(left).setTo(0, chart.known), banned(right).setTo(0, sample_.known);
     InpaintParams params;
     params.away_row = params.away_column = 0.0f;
+    params.from_anywhere = true;  // the sample lies beside the chart
     return inpaint(image, hole, banned, params).image(left).clone();
   }
 
