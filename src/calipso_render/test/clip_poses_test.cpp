@@ -67,6 +67,16 @@ TEST(AnyMoves, TellsRestFromMotion) {
   EXPECT_TRUE(anyMoves(rollingBall(), {ballAt(kStart)}));
 }
 
+TEST(AnyMoves, WhatPassesBeforeAnObjectDoesNotMoveIt) {
+  ClipSample passed;
+  passed.add(frameWithBall(ballAt(kStart)));
+  ClipFrame frame = frameWithBall(ballAt(kStart));
+  const cv::Rect box = cv::boundingRect(frame.labels);
+  frame.labels(cv::Rect(box.x, box.y, box.width / 2, box.height)).setTo(kBallLabel + 1);
+  passed.add(frame);
+  EXPECT_FALSE(anyMoves(passed, {ballAt(kStart)}));
+}
+
 // The ball as a camera `right` m beside the key frame's sees it.
 ClipFrame seenFrom(double right, const Eigen::Vector3d& centre) {
   ClipFrame frame = frameWithBall(ballAt(centre - Eigen::Vector3d(right, 0, 0)));

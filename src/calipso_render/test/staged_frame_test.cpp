@@ -11,28 +11,36 @@ namespace {
 
 using namespace testing;
 
-// As files have it whose triangles have vertices of their own.
-TEST(MakeSurface, JoinsTrianglesThatMeet) {
-  const ObjectModel whole = ballAt(kCentre);
+// As files have it whose triangles have vertices of their own. @param doubled triangle that it has
+// twice; < 0: none
+ObjectModel inPieces(const ObjectModel& whole, int doubled) {
   ObjectModel apart = whole;
-  const int count = whole.mesh.triangleCount();
+  const int own = whole.mesh.triangleCount(), count = doubled < 0 ? own : own + 1;
   apart.mesh.vertices.resize(3 * count, 3), apart.mesh.triangles.resize(count, 3);
   for (int t = 0; t < count; ++t) {
     for (int k = 0; k < 3; ++k) {
-      apart.mesh.vertices.row(3 * t + k) =
-          whole.mesh.vertex(whole.mesh.triangles(t, k)).transpose();
+      const int vertex = whole.mesh.triangles(t < own ? t : doubled, k);
+      apart.mesh.vertices.row(3 * t + k) = whole.mesh.vertex(vertex).transpose();
       apart.mesh.triangles(t, k) = 3 * t + k;
     }
   }
-  const Surface joined = makeSurface(apart), expected = makeSurface(whole);
-  EXPECT_EQ(joined.winding, expected.winding);
-  EXPECT_EQ(joined.key_vertices.size(), static_cast<std::size_t>(3 * count));
-  for (std::size_t t = 0; t < joined.corners.size(); ++t) {
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::Vector3f normal = joined.key_normals[joined.corners[t][k]],
-                            place = joined.key_vertices[joined.triangles[t][k]];
-      if (normal.isZero()) continue;  // a triangle at a pole has no area
-      ASSERT_GT(normal.dot((place - kCentre.cast<float>()).normalized()), 0.99f) << t;
+  return apart;
+}
+
+TEST(MakeSurface, JoinsTrianglesThatMeet) {
+  const ObjectModel whole = ballAt(kCentre);
+  const int count = whole.mesh.triangleCount();
+  EXPECT_EQ(makeSurface(inPieces(whole, -1)).winding, makeSurface(whole).winding);
+  for (const int doubled : {-1, count / 2}) {
+    const Surface joined = makeSurface(inPieces(whole, doubled));
+    EXPECT_EQ(joined.key_vertices.size(), 3 * joined.triangles.size());
+    for (int t = 0; t < count; ++t) {
+      for (int k = 0; k < 3 && t != doubled; ++k) {
+        const Eigen::Vector3f normal = joined.key_normals[joined.corners[t][k]],
+                              place = joined.key_vertices[joined.triangles[t][k]];
+        if (normal.isZero()) continue;  // a triangle at a pole has no area
+        ASSERT_GT(normal.dot((place - kCentre.cast<float>()).normalized()), 0.99f) << t;
+      }
     }
   }
 }

@@ -56,11 +56,12 @@ bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface) 
   const cv::Mat key = frames.front().labels == surface.index;
   std::optional<double> fit;
   for (const ClipFrame& f : frames) {
-    const cv::Mat now = f.labels == surface.index;
+    const cv::Mat now = f.labels == surface.index, open = now | (f.labels == 0);
     if (!sameView(f.camera, camera) && !fit) fit = overlap(key, outlineAtRest(surface, camera));
-    const bool rests = sameView(f.camera, camera)
-                           ? overlap(now, key) >= kStillOverlap
-                           : overlap(now, outlineAtRest(surface, f.camera)) >= kStillOverlap * *fit;
+    const bool rests =
+        sameView(f.camera, camera)
+            ? overlap(now, key & open) >= kStillOverlap
+            : overlap(now, outlineAtRest(surface, f.camera) & open) >= kStillOverlap * *fit;
     if (!rests) return true;
   }
   return false;

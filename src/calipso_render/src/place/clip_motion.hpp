@@ -17,7 +17,7 @@ bool cameraMoves(const ClipSample& clip);
 std::vector<ClipFrame> inKeyView(std::vector<ClipFrame> frames, const cv::Mat& nearness,
                                  int margin);
 
-// A moving camera sees an object at rest where its model at rest is, as well as they agree at the
+// What others hide of it in a frame says nothing. A moving camera sees an object at rest where its model at rest is, as well as they agree at the
 // key frame.
 // @param frames as they were taken
 bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface);
