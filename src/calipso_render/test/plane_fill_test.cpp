@@ -58,6 +58,19 @@ TEST(FindLattice, TellsTheShiftsOfTiles) {
               0.3);  // px: peaks are told to a part of a pixel
 }
 
+// As a camera of four times as many pixels sees them.
+TEST(FindLattice, TellsTheShiftsOfLargeTilesInHalfTheSize) {
+  cv::Mat large;
+  cv::resize(tiles(seenFrom(false)), large, {}, 4.0, 4.0, cv::INTER_CUBIC);
+  const cv::Mat known(large.size(), CV_8U, cv::Scalar(255));
+  EXPECT_FALSE(findLattice(large, known));
+  const auto lattice = findLattice(large, known, 2);
+  ASSERT_TRUE(lattice);
+  for (const cv::Point2f& shift : {cv::Point2f(120 * std::cos(0.3), 120 * std::sin(0.3)),
+                                   cv::Point2f(-96 * std::sin(0.3), 96 * std::cos(0.3))})
+    EXPECT_LT(cv::norm(lattice->nearest(shift) - shift), 1.0);  // px
+}
+
 TEST(FindLattice, FindsNoneInGrainAndInLines) {
   cv::Mat grain(kHigh, kWide, CV_32FC3), lines(kHigh, kWide, CV_32FC3);
   cv::RNG random(3);

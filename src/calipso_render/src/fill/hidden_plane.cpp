@@ -14,7 +14,8 @@ namespace {
 
 // slope of edges that go on in stripes: others are their pattern
 constexpr float kAlongRow = 0.05f;
-constexpr int kClear = 2;  // px around a sample that see nothing else
+constexpr double kUsualWidth = 640.0;  // px of a picture; in wider ones tiles are larger, too
+constexpr int kClear = 2;              // px around a sample that see nothing else
 
 // @param beside CV_8UC1, != 0: where another surface is seen
 PlanePart partOf(const PlaneChart& chart, const cv::Mat& hole, const cv::Mat& seen,
@@ -61,8 +62,11 @@ void addLook(const cv::Mat& look, const cv::Mat& seen, PlanePart& part) {
 }
 
 void addLattice(const cv::Mat& look, int margin, PlanePart& part) {
-  const cv::Rect near = windowAround(part.hole, margin, margin);
-  part.pattern.lattice = findLattice(part.chart.carried(look, near), part.source(near));
+  const double size = std::max(1.0, look.cols / kUsualWidth);
+  const int around = cvRound(size * margin);
+  const cv::Rect near = windowAround(part.hole, around, around);
+  part.pattern.lattice =
+      findLattice(part.chart.carried(look, near), part.source(near), cvRound(std::log2(size)));
 }
 
 bool turnAlongStripes(const cv::Mat& look, HiddenPlane& plane) {

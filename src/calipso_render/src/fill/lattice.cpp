@@ -230,9 +230,8 @@ cv::Mat differenceFromShifted(const Lattice& lattice, const cv::Mat& image, cons
   return sum / cv::max(weights, 1e-3);
 }
 
-}  // namespace
-
-std::optional<Lattice> findLattice(const cv::Mat& image, const cv::Mat& known) {
+// Whose shifts are below kFarthest.
+std::optional<Lattice> shortLattice(const cv::Mat& image, const cv::Mat& known) {
   if (cv::countNonZero(known) < 4 * kFarthest * kFarthest / 9) return std::nullopt;
   const Correlation c(image, known);
   const std::vector<Peak> all = c.peaks(), peaks = candidates(all);
@@ -251,6 +250,19 @@ std::optional<Lattice> findLattice(const cv::Mat& image, const cv::Mat& known) {
     }
   }
   return found;
+}
+
+}  // namespace
+
+std::optional<Lattice> findLattice(const cv::Mat& image, const cv::Mat& known, int halvings) {
+  const auto found = shortLattice(image, known);
+  if (found || halvings == 0) return found;
+  cv::Mat half, half_known;
+  cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  cv::resize(known, half_known, half.size(), 0, 0, cv::INTER_AREA);
+  const auto coarse = findLattice(half, half_known == 255, halvings - 1);
+  if (!coarse) return std::nullopt;
+  return Lattice{2.0f * coarse->basis, 0.5f * coarse->inverse};
 }
 
 cv::Mat repeatsBy(const Lattice& lattice, const cv::Mat& image, const cv::Mat& known,

@@ -29,7 +29,8 @@ struct Lattice {
 // normalised cross-correlation, Padfield 2010), all of which the lattice explains; nothing where the picture does not
 // repeat itself.
 // @param image CV_32FC3, code values; known CV_8UC1
-std::optional<Lattice> findLattice(const cv::Mat& image, const cv::Mat& known);
+// @param halvings shifts of up to 93 px are looked for, then in half the size, and so on
+std::optional<Lattice> findLattice(const cv::Mat& image, const cv::Mat& known, int halvings = 0);
 
 // What of a picture repeats itself by a lattice. CV_8UC1
 // @param image CV_32FC3; known CV_8UC1; sample CV_8UC1, of it what the lattice was found in
