@@ -6,6 +6,8 @@ namespace {
 constexpr double kSpinShare = 0.03;  // of the prior's: how fast a free body's spin changes
 constexpr double kNoiseScale = 2.0;  // poses err by more than they state
 constexpr double kSurprise = 22.46;  // chi-squared with 6 degrees of freedom, 99.9 %
+constexpr int kSure = 4;             // poses in a row
+constexpr double kUnseen = 0.4;      // s: so long it may go on falling
 
 MotionPiece fallOf(const MotionPrior& prior) {
   MotionPiece piece;
@@ -31,6 +33,10 @@ void FallFilter::take(const PoseMeasurement& measurement, const MotionPrior& pri
   }
   correct(next, measurement, kNoiseScale);
   state_ = next;
+}
+
+bool FallFilter::holds(double time) const {
+  return agreed_ >= kSure && time - state_->time < kUnseen;
 }
 
 bool FallFilter::expects(const PoseMeasurement& measurement) const {

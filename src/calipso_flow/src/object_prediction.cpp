@@ -39,10 +39,11 @@ PoseMeasurement ObjectTracker::measured(const Observation& observation) const {
 Eigen::Isometry3d ObjectTracker::likeliestPrediction(const Frame& frame) {
   const Eigen::Isometry3d on = predict(frame.time, Eigen::Vector3d::Zero());
   const Eigen::Isometry3d falling =
-      fall_.holds() ? motionFrom(fall_.at(frame.time), centroid_, true, 0).world_from_object
-                    : predict(frame.time, params_.gravity);
+      fall_.holds(frame.time)
+          ? motionFrom(fall_.at(frame.time), centroid_, true, 0).world_from_object
+          : predict(frame.time, params_.gravity);
   if (imageMotion(frame.camera, on, falling, {centroid_}).largest < kNearPx) return on;
-  if (fall_.holds() && frames_lost_ > 0) return falling;
+  if (fall_.holds(frame.time) && frames_lost_ > 0) return falling;
   const Reference& nearest = nearestReference(frame, on);
   const auto likeness = [&](const Eigen::Isometry3d& pose) {
     return correlationInPlace(lookAt(frame, nearest.view, pose, Care::kRough).warped, frame.gray);
@@ -51,7 +52,8 @@ Eigen::Isometry3d ObjectTracker::likeliestPrediction(const Frame& frame) {
 }
 
 bool ObjectTracker::isOutOfPicture(const Frame& frame, const Eigen::Isometry3d& predicted) const {
-  return fall_.holds() && seedsInPicture(references_.front().view, frame.camera, predicted) == 0;
+  return fall_.holds(frame.time) &&
+         seedsInPicture(references_.front().view, frame.camera, predicted) == 0;
 }
 
 // The object may have stopped, or turned round: look as far as twice back to where it was.
@@ -60,7 +62,7 @@ Eigen::AlignedBox2d ObjectTracker::reachFrom(const Frame& frame,
   const Eigen::Vector2d home = frame.camera.projectWorld(predicted * centroid_);
   const Eigen::Vector2d before = frame.camera.projectWorld(last_->world_from_object * centroid_);
   // Without a motion to go by, it may be anywhere near.
-  const bool falls = fall_.holds() && frames_lost_ > 0;
+  const bool falls = fall_.holds(frame.time) && frames_lost_ > 0;
   const bool known = falls || (before_last_ && frames_lost_ < kForgetAfter);
   const double search =
       known ? params_.search_px : std::max(params_.search_px, kFirstSearch * frame.camera.width);

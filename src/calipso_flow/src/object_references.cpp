@@ -51,7 +51,6 @@ void ObjectTracker::remember(const Frame& frame, const Observation& observation,
   const double depth =
       (frame.camera.world_from_camera.inverse() * (observation.world_from_object * centroid_))
           .norm();
-  if (cut) fall_ = {};
   fall_.take(measured(observation), priorFor(frame.camera, depth, params_.gravity));
   due_inliers_ = std::max(due_inliers_, observation.inliers());
   Reference& nearest = nearestReference(frame, observation.world_from_object);

@@ -78,7 +78,9 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
   last_ = key_;
   last_frame_ = key_frame;
   last_seen_time_ = key_.time;
-  fall_.take(measured(key_), MotionPrior());
+  MotionPrior prior;
+  prior.gravity = params_.gravity;
+  fall_.take(measured(key_), prior);
   due_inliers_ = static_cast<int>(key_.tracks.size());
 }
 
@@ -225,7 +227,10 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
                                 " s); give frames in order of time");
   }
   last_seen_time_ = frame.time;
-  frames_lost_ = cut ? kForgetAfter : frames_lost_;
+  if (cut) {
+    frames_lost_ = kForgetAfter;
+    fall_ = {};
+  }
   const Eigen::Isometry3d predicted = likeliestPrediction(frame);
   if (isOutOfPicture(frame, predicted)) {
     ++frames_lost_;
@@ -243,7 +248,7 @@ Observation ObjectTracker::track(const Frame& frame, bool cut) {
     best = stayed ? inPlace(frame, nearest) : search(frame, nearest, predicted);
     if (stayed && !best.found) return asBefore(frame);
   }
-  if (best.found && frames_lost_ > 0 && best.inliers() < kWeakInliers && fall_.holds() &&
+  if (best.found && frames_lost_ > 0 && best.inliers() < kWeakInliers && fall_.holds(frame.time) &&
       !fall_.expects(measured(best)))
     best.found = false;  // few tracks that are not where it falls to are something else's
   frames_lost_ = best.found ? 0 : frames_lost_ + 1;

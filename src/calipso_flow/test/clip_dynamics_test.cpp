@@ -82,6 +82,28 @@ TEST(ClipDynamics, findsABoxThatABlowTurnsBack) {
   }
 }
 
+// Thrown up, it falls, is not seen while it would fall out of the picture, and then is where it was
+// at first.
+Observation seenAgainAfterAFall(int unseen, bool cut) {
+  constexpr int kFalls = 7;
+  const Eigen::Vector3d up(0.0, 0.0, 0.8), away(100.0, 0.0, 0.0);
+  TrackerParams params;
+  params.gravity = kGravity;
+  ObjectTracker tracker(test::boxModel(), frameOf(0.0, movedPose(0.0, away, 0.0), 1), {}, params);
+  for (int k = 1; k < kFalls + unseen; ++k) {
+    const double t = k / kFps;
+    const Eigen::Vector3d way = k < kFalls ? up * t + 0.5 * t * t * kGravity : away;
+    EXPECT_EQ(tracker.track(frameOf(t, movedPose(1.0, way, 0.0), 1 + k), false).found, k < kFalls);
+  }
+  return tracker.track(frameOf((kFalls + unseen) / kFps, movedPose(0.0, away, 0.0), 90), cut);
+}
+
+TEST(ClipDynamics, looksAgainForWhatMayHaveLanded) {
+  EXPECT_TRUE(seenAgainAfterAFall(15, false).found);
+}
+
+TEST(ClipDynamics, noFallGoesOnOverACut) { EXPECT_TRUE(seenAgainAfterAFall(9, true).found); }
+
 // Noise hides tracks from a reference; a new one from the same side would only add its pose's
 // error.
 TEST(ClipDynamics, noiseWearsNoReferenceOut) {

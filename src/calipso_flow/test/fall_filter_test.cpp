@@ -34,8 +34,9 @@ TEST(FallFilter, saysWhereAnUnseenFallHasCome) {
   std::mt19937 random(1);
   FallFilter fall;
   for (int k = 0; k < 10; ++k) fall.take(measured(k / kFps, fallen(k / kFps), random), kPrior);
-  EXPECT_TRUE(fall.holds());
   const double later = 19 / kFps;
+  EXPECT_TRUE(fall.holds(later));
+  EXPECT_FALSE(fall.holds(later + 0.1));  // it may long have landed
   const MotionState state = fall.at(later);
   // A velocity from ten poses of 1 mm errs by 4 mm/s, over a third of a second; g by 5 % at most.
   EXPECT_LT((state.position - fallen(later)).norm(), 0.02);
@@ -59,9 +60,9 @@ TEST(FallFilter, endsWithABounceAndBeginsAgain) {
   EXPECT_FALSE(fall.expects(after));
   EXPECT_TRUE(fall.expects(measured(9 / kFps, fallen(9 / kFps), random)));
   fall.take(after, kPrior);
-  EXPECT_FALSE(fall.holds());
+  EXPECT_FALSE(fall.holds(9 / kFps));
   for (int k = 10; k < 16; ++k) take(k);
-  EXPECT_TRUE(fall.holds());
+  EXPECT_TRUE(fall.holds(15 / kFps));
 }
 
 TEST(FallFilter, doesNotHoldAtRest) {
@@ -70,7 +71,7 @@ TEST(FallFilter, doesNotHoldAtRest) {
   bool held = false;
   for (int k = 0; k < 20; ++k) {
     fall.take(measured(k / kFps, Eigen::Vector3d::Zero(), random), kPrior);
-    held = held || fall.holds();
+    held = held || fall.holds(k / kFps);
   }
   EXPECT_FALSE(held);
 }

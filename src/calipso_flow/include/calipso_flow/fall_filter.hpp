@@ -13,16 +13,15 @@ class FallFilter {
  public:
   // @pre measurements come in order of time
   void take(const PoseMeasurement& measurement, const MotionPrior& prior);
-  // Some poses in a row were where the fall had them.
-  bool holds() const { return agreed_ >= kSure; }
+  // Some poses in a row were where the fall had them, and it is not long unseen: what was not seen
+  // may have landed.
+  bool holds(double time) const;
   // The pose is where the fall has it. @pre as at()
   bool expects(const PoseMeasurement& measurement) const;
   // @pre take() was called, and `time` is not before the last measurement
   MotionState at(double time) const;
 
  private:
-  static constexpr int kSure = 4;
-
   MotionPiece piece_;
   std::optional<MotionState> state_;
   int agreed_ = 0;
