@@ -4,6 +4,7 @@
 #include <calipso_msgs/NodeStatus.h>
 #include <calipso_msgs/Segmentation.h>
 #include <cv_bridge/cv_bridge.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
@@ -45,7 +46,9 @@ class FlowNodeTest : public testing::Test {
         nh_.subscribe<sensor_msgs::Image>(topics::kFlow, 100,
                                           [this](const auto& msg) { flows_.push_back(*msg); }),
         nh_.subscribe<visualization_msgs::MarkerArray>(
-            "flow/markers", 100, [this](const auto& msg) { markers_ = *msg; })};
+            "flow/markers", 100, [this](const auto& msg) { markers_ = *msg; }),
+        nh_.subscribe<diagnostic_msgs::DiagnosticArray>(
+            "/diagnostics", 100, [this](const auto& msg) { diagnostics_.push_back(*msg); })};
   }
 
   // What the node publishes for nobody, it does not compute.
@@ -141,6 +144,7 @@ class FlowNodeTest : public testing::Test {
   std::vector<calipso_msgs::Dynamics> dynamics_;
   std::vector<sensor_msgs::Image> flows_;
   visualization_msgs::MarkerArray markers_;  // the last
+  std::vector<diagnostic_msgs::DiagnosticArray> diagnostics_;
 };
 
 TEST_F(FlowNodeTest, analysesTheClipAndRepeatsItPerFrame) {
@@ -182,6 +186,15 @@ TEST_F(FlowNodeTest, analysesTheClipAndRepeatsItPerFrame) {
   }
   ASSERT_TRUE(waitFor([&] { return !markers_.markers.empty(); }));
   checkMarkers();
+
+  diagnostics_.clear();
+  model_.world_from_object.translation().x() += 0.01;
+  aligned.publish(models());
+  EXPECT_TRUE(waitFor([&] {
+    return std::any_of(diagnostics_.begin(), diagnostics_.end(), [](const auto& d) {
+      return d.status.at(0).message.find("corrected") != std::string::npos;
+    });
+  })) << "nothing was said of the corrected models";
 }
 
 }  // namespace

@@ -68,19 +68,21 @@ class LiveSheetTest : public testing::Test {
     image_.publish(cv_bridge::CvImage(headerOf(k), "mono8", picture).toImageMsg());
   }
 
-  void sendKey() {
-    send(0);
+  void sendSegmentation(int k) {
     calipso_msgs::Segmentation segmentation;
-    segmentation.contours.resize(1);  // as the key frame has them
-    segmentation.header = headerOf(0);
+    segmentation.header = headerOf(k);
     cv::Mat labels(sheet_.camera.height, sheet_.camera.width, CV_8U, cv::Scalar(0));
     const SurfaceView view =
         viewSurface(sheet_.model.mesh, sheet_.camera,
                     sheet_.camera.world_from_camera.inverse() * sheet_.model.world_from_object);
     labels(view.window).setTo(1, view.depth > 0.0f);
-    cv_bridge::CvImage(headerOf(0), "mono8", labels).toImageMsg(segmentation.labels);
-    segmentation.contours.emplace_back();  // by which the key frame's is told from later ones
+    cv_bridge::CvImage(headerOf(k), "mono8", labels).toImageMsg(segmentation.labels);
+    // By which the key frame's is told from later ones.
+    segmentation.contours.resize(k == 0 ? 2 : 0);
     labels_.publish(segmentation);
+  }
+
+  void sendModels() {
     calipso_msgs::AlignedModels models;
     models.header = headerOf(0);
     models.header.frame_id = topics::kWorldFrame;
@@ -92,6 +94,12 @@ class LiveSheetTest : public testing::Test {
     model.trusted = true;
     models.models.push_back(model);
     aligned_.publish(models);
+  }
+
+  void sendKey() {
+    send(0);
+    sendSegmentation(0);
+    sendModels();
   }
 
   void sendEdit(int k) const {
@@ -180,6 +188,16 @@ TEST_F(LiveSheetTest, goesOnAsItWasSeenTo) {
   // It sets out with what was seen; no wind blows on it, gravity brakes it: the more the later.
   const Eigen::VectorXd first = kFps * (simulated(kEdited + 1) - simulated(kEdited));
   EXPECT_GT(first.dot(seen), 0.7 * seen.squaredNorm());
+
+  // Corrected models: motion is followed anew, from a frame in which they are segmented.
+  sheet_.model.world_from_object.translation().x() += 0.001;
+  sendModels();
+  ASSERT_TRUE(waitFor([&] { return !ready("flow"); }));
+  send(kFrames);
+  EXPECT_TRUE(waitFor([&] {
+    sendSegmentation(kFrames);  // perhaps before the frame
+    return ready("flow");
+  })) << status_["flow"].message;
 }
 
 }  // namespace

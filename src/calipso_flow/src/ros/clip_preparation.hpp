@@ -28,6 +28,7 @@ class KeyCollector {
  public:
   void take(const calipso_msgs::AlignedModelsConstPtr& models) { models_ = models; }
   void take(const calipso_msgs::SegmentationConstPtr& segmentation);  // the key frame's counts
+  const calipso_msgs::AlignedModelsConstPtr& models() const { return models_; }  // or null
   // Forgets what belongs to a key frame later than this.
   void forgetAfter(const ros::Time& stamp);
   // Stamp of the key frame, once it has been segmented.

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <limits>
 
+#include "calipso_ros/same_message.hpp"
 #include "calipso_ros/topics.hpp"
 #include "conversions.hpp"
 
@@ -60,7 +61,16 @@ void FlowNode::onClipInfo(const calipso_msgs::ClipInfoConstPtr& info) {
 }
 
 void FlowNode::onModels(const calipso_msgs::AlignedModelsConstPtr& models) {
+  const bool corrected = key_.models() && !sameMessage(*key_.models(), *models);
   key_.take(models);
+  if (corrected && live_analyser_) {
+    reporter_.remark("the models have been corrected: motion is followed anew");
+    stopFollowing();
+  } else if (corrected && clip_analyser_) {
+    reporter_.remark(
+        "the models have been corrected: the clip's motion is still that of the models before; "
+        "start anew for another");
+  }
   beginWhenPossible();
 }
 
@@ -134,8 +144,8 @@ void FlowNode::follow(const Frame& first, const KeyKnowledge& knowledge) {
   reporter_.ready("following " + std::to_string(knowledge.models.size()) + " objects");
 }
 
-// A camera that ran before this node did: the key frame has been missed. What has not moved since is
-// where its model is in later frames, too.
+// A camera that ran before this node did, or models corrected since: the key frame is gone. What has
+// not moved since is where its model is in later frames, too.
 void FlowNode::beginLate(const calipso_msgs::Segmentation& segmentation) {
   if (params_.mode != Mode::kLive || live_analyser_ || !key_.keyStamp()) return;
   const auto of = [](const ros::Time& stamp) {
@@ -148,7 +158,7 @@ void FlowNode::beginLate(const calipso_msgs::Segmentation& segmentation) {
   try {
     if (!key_.knowledge(scene_)) return;
     const KeyKnowledge knowledge = key_.knowledgeAt(segmentation, scene_);
-    reporter_.remark("the key frame was missed: motion is followed from " +
+    reporter_.remark("the key frame is gone: motion is followed from " +
                      std::to_string((frame->stamp() - *key_.keyStamp()).toSec()) + " s after it");
     follow(frameFromMsg(*frame), knowledge);
   } catch (const std::exception& error) {
@@ -201,15 +211,19 @@ void FlowNode::finishWhenComplete() {
 // What is known of a key frame that is not later stays: it is sent once only, perhaps before this.
 void FlowNode::startOver(const ros::Time& stamp) {
   reporter_.remark(kStartsOver);
+  stopFollowing();
+  key_.forgetAfter(stamp);
+  previous_image_.reset();
+}
+
+void FlowNode::stopFollowing() {
   describing_ = {};  // waits for its end
   live_analyser_.reset();
   waiting_.clear();
-  key_.forgetAfter(stamp);
   of_late_.clear();
   modes_told_ = 0;
   described_ = ros::Time();
   describe_every_ = 0.0;
-  previous_image_.reset();
   reporter_.starting("waiting for the key frame's models");
 }
 

@@ -35,6 +35,7 @@ class FlowNode {
   void onBadFrame(const sensor_msgs::ImageConstPtr& image, const std::string& reason, bool of_clip);
 
   void startOver(const ros::Time& stamp);
+  void stopFollowing();
   void beginWhenPossible();
   void begin(const KeyKnowledge& knowledge);
   void beginLate(const calipso_msgs::Segmentation& segmentation);
