@@ -76,7 +76,8 @@ Eigen::VectorXd deviationsOf(const std::vector<DeformationObservation>& observat
   return deviations;
 }
 
-// Slope of the parabola through a frame and its neighbours in time.
+// Slope of the cubic through a frame and its neighbours in time: in their midst a parabola's is that
+// of a straight line, a third too low for what swings in 8 frames.
 Eigen::MatrixXd slopes(const std::vector<DeformationObservation>& observations,
                        const Eigen::MatrixXd& values) {
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(values.rows(), values.cols());
@@ -84,7 +85,7 @@ Eigen::MatrixXd slopes(const std::vector<DeformationObservation>& observations,
   if (count < 2) return result;
   for (int k = 0; k < count; ++k) {
     const int first = std::max(0, k - kHalfWindow), last = std::min(count - 1, k + kHalfWindow);
-    const int terms = std::min(3, last - first + 1);
+    const int terms = std::min(4, last - first + 1);
     Eigen::MatrixXd A(last - first + 1, terms);
     for (int i = first; i <= last; ++i) {
       const double t = observations[i].time - observations[k].time;
