@@ -27,6 +27,7 @@ constexpr int kWeakInliers = 12;             // fewer tracks than this are worth
 constexpr double kStaysShare = 0.01;         // of the diagonal: what moves less has not moved
 constexpr double kPatchShare = 1.0 / 160.0;  // of the picture's width: a patch's radius
 constexpr int kLargestRadius = 9;            // px
+constexpr double kSearchWidth = 640.0;       // px: wider pictures are searched as much farther
 // of the seeds in the picture: with fewer tracks noise or blur drowns small patches
 constexpr double kDrownedShare = 0.35;
 constexpr double kTurnedShare = 0.35;  // of the tracks due: with fewer the object may have turned
@@ -55,6 +56,7 @@ ObjectTracker::ObjectTracker(const ObjectModel& model, const Frame& key_frame, c
   // What a larger picture shows larger is not seen sharper by as much.
   const int scaled = static_cast<int>(std::lround(kPatchShare * key_frame.camera.width));
   params_.patch.radius_px = std::max(params_.patch.radius_px, std::min(scaled, kLargestRadius));
+  params_.search_px *= std::max(1.0, key_frame.camera.width / kSearchWidth);
   wide_ = params_;
   wide_.patch.radius_px = std::max(params_.patch.radius_px, kLargestRadius);
   for (TrackerParams* of : {&params_, &wide_}) of->pose.patch_px = 2 * of->patch.radius_px + 1;

@@ -82,6 +82,22 @@ TEST(ClipDynamics, findsABoxThatABlowTurnsBack) {
   }
 }
 
+// In a picture four times as wide 45 px are what 11 are.
+TEST(ClipDynamics, looksAsManyTimesFartherInAWiderPicture) {
+  Camera camera = test::testCamera();
+  camera.width *= 4, camera.height *= 4, camera.fx *= 4, camera.fy *= 4;
+  camera.cx = 639.5, camera.cy = 479.5;
+  const auto frameAt = [&](int k, double x) {
+    const Eigen::Isometry3d pose = movedPose(1.0, {x, 0.0, 0.0}, 0.0);
+    return makeFrame(k / kFps, test::render(test::boxModel(), pose, camera, kNoise, 1 + k), camera);
+  };
+  ObjectTracker tracker(test::boxModel(), frameAt(0, 0.0), {});
+  for (int k = 1; k < 3; ++k) ASSERT_TRUE(tracker.track(frameAt(k, 0.0), false).found);
+  const Observation struck = tracker.track(frameAt(3, 45.0 * 2.0 / camera.fx), false);
+  ASSERT_TRUE(struck.found);
+  EXPECT_NEAR(struck.world_from_object.translation().x(), 45.0 * 2.0 / camera.fx, 0.002);
+}
+
 // Thrown up, it falls, is not seen while it would fall out of the picture, and then is where it was
 // at first.
 Observation seenAgainAfterAFall(int unseen, bool cut) {
