@@ -77,8 +77,8 @@ void TrajectoryFitter::dropJumpsOfSpinAlone() {
 }
 
 // What rests, is elsewhere for a few poses and rests again where it was has not moved: these poses
-// are wrong. Nor has what rests again a pose or two later, wherever: no force starts and stops
-// things so fast, but what is mostly hidden is easily found again in another place.
+// are wrong. Nor has what rests again a pose or two, and 0.13 s, later, wherever: no force starts and
+// stops things so fast, but what is mostly hidden is easily found again in another place.
 void TrajectoryFitter::dropExcursions() {
   const auto rests = [&](size_t i) { return pieces_[i].travel == Travel::kRest; };
   for (size_t first = 1; first < pieces_.size(); ++first) {
@@ -94,14 +94,17 @@ void TrajectoryFitter::dropExcursions() {
 // @param first, back  pieces: the first that moves, and the one that rests again
 bool TrajectoryFitter::isExcursion(size_t first, size_t back) const {
   constexpr size_t kMostPoses = 4, kNoMotion = 2;
+  constexpr double kMostTime = 0.21, kNoMotionTime = 0.13;  // s: as many poses at 24 frames/s
   constexpr double kBack = 0.5;  // of the way out: so near it is where it was
   const auto is_cut = [](const MotionPiece& piece) { return piece.cut; };
   const Measurements before = measurementsOf(first - 1, first - 1),
                      away = measurementsOf(first, back - 1), after = measurementsOf(back, back);
-  if (before.empty() || after.empty() || away.size() > kMostPoses ||
+  if (before.empty() || after.empty()) return false;
+  const double between = after.front().time - before.back().time;
+  if (away.size() > kMostPoses || between > kMostTime ||
       std::any_of(pieces_.begin() + first, pieces_.begin() + back + 1, is_cut))
     return false;
-  if (away.size() <= kNoMotion) return true;
+  if (away.size() <= kNoMotion && between < kNoMotionTime) return true;
   const SmoothedMotion motion = smooth(measurements_, pieces_, prior_, noise_scale_);
   const auto positionAt = [&](double time) {
     const auto state = std::find_if(motion.states.begin(), motion.states.end(),

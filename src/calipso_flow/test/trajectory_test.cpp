@@ -81,6 +81,17 @@ TEST(Trajectory, isNotAtRestWhereItDoesNotComeBack) {
   EXPECT_NEAR(fit.states.back().position.x(), 0.4, 0.01);
 }
 
+// Ten frames a second show two poses of a motion of a quarter of a second.
+TEST(Trajectory, isNotAtRestInTwoPosesOfASlowCamera) {
+  const auto pushed = [](double t) -> Eigen::Vector3d {
+    return {0.1 * std::clamp((t - 6.3 / kFps) * kFps / 2.4, 0.0, 1.0), 0.0, 0.0};
+  };
+  auto data = measure(30, 0.002, 0.01, 3, pushed, still);
+  for (PoseMeasurement& m : data) m.time *= 3.0;
+  const Trajectory fit = fitTrajectory(data, {}, testPrior());
+  EXPECT_TRUE(fit.movingAt(7.5 * 3.0 / kFps));
+}
+
 TEST(Trajectory, findsUniformMotionAndSpin) {
   const Eigen::Vector3d v(0.4, -0.2, 0.1), w(0.0, 0.3, 1.2);
   const auto data = measure(
