@@ -15,11 +15,12 @@ namespace calipso::flow {
 
 namespace {
 
-// Image motion between the first state and the farthest other one, px, were the camera at rest: the
-// mean over the object's followed points, since errors of the pose are largest at single points far
-// out.
-double largestImageMotion(const std::vector<MotionState>& states, const Camera& camera,
-                          const ObjectTracker& tracker) {
+// Image motion between the first state and the farthest other one, px, for the camera of the other,
+// were that at rest: the mean over the object's followed points, as far as they are before it, since
+// errors of the pose are largest at single points far out.
+// @param times, cameras  per frame
+double largestImageMotion(const std::vector<MotionState>& states, const std::vector<double>& times,
+                          const std::vector<Camera>& cameras, const ObjectTracker& tracker) {
   const std::vector<Track>& tracks = tracker.keyObservation().tracks;
   const Eigen::Isometry3d first =
       motionFrom(states.front(), tracker.centroid(), false, 0).world_from_object;
@@ -27,12 +28,19 @@ double largestImageMotion(const std::vector<MotionState>& states, const Camera& 
   for (const MotionState& state : states) {
     const Eigen::Isometry3d pose =
         motionFrom(state, tracker.centroid(), false, 0).world_from_object;
+    const auto frame = std::lower_bound(times.begin(), times.end(), state.time);
+    const Camera& camera = cameras.at(frame - times.begin());
+    const Eigen::Isometry3d camera_from_world = camera.world_from_camera.inverse();
     double sum = 0.0;
+    int seen = 0;
     for (const Track& track : tracks) {
-      sum += (camera.projectWorld(pose * track.point) - camera.projectWorld(first * track.point))
-                 .norm();
+      const Eigen::Vector3d now = camera_from_world * (pose * track.point),
+                            then = camera_from_world * (first * track.point);
+      if (now.z() <= 0.0 || then.z() <= 0.0) continue;
+      sum += (camera.project(now) - camera.project(then)).norm();
+      ++seen;
     }
-    largest = std::max(largest, sum / std::max<size_t>(1, tracks.size()));
+    largest = std::max(largest, sum / std::max(1, seen));
   }
   return largest;
 }
@@ -135,7 +143,11 @@ std::string summary(const std::vector<ObjectDynamics>& objects) {
 ClipAnalyser::ClipAnalyser(const Frame& key_frame, const std::vector<ObjectModel>& models,
                            const std::vector<cv::Mat>& masks, const Eigen::Vector3d& gravity,
                            const DynamicsParams& params)
-    : params_(params), gravity_(gravity), last_(key_frame), times_{key_frame.time} {
+    : params_(params),
+      gravity_(gravity),
+      last_(key_frame),
+      times_{key_frame.time},
+      cameras_{key_frame.camera} {
   if (models.size() != masks.size()) {
     throw std::invalid_argument("clip analyser: " + std::to_string(models.size()) + " models but " +
                                 std::to_string(masks.size()) +
@@ -160,6 +172,7 @@ void ClipAnalyser::add(const Frame& frame) {
   if (recent_.size() > FollowedObject::kLookBack) recent_.pop_front();
   forEachObject([&](size_t i) { objects_[i].follow(recent_, cut, cut_times_); });
   times_.push_back(frame.time);
+  cameras_.push_back(frame.camera);
   last_ = frame;
 }
 
@@ -194,12 +207,12 @@ ObjectDynamics ClipAnalyser::finishObject(const FollowedObject& object, bool wit
   const auto first = std::find_if(measurements.begin() + 1, measurements.end(),
                                   [](const PoseMeasurement& m) { return m.valid; });
   if (first != measurements.end()) measurements.front().covariance = first->covariance;
-  const Camera& camera = last_.camera;
+  const Camera& camera = cameras_.front();  // the alignment's
   const double depth = (camera.world_from_camera.inverse() * measurements.front().position).norm();
   TrajectoryParams trajectory = params_.trajectory;
   if (object.deformable()) trajectory.max_collisions = 0;  // a swing is no collision
   trajectory.still = [&](const std::vector<MotionState>& states) {
-    return largestImageMotion(states, camera, tracker) < params_.rest_px;
+    return largestImageMotion(states, times_, cameras_, tracker) < params_.rest_px;
   };
   dynamics.trajectory =
       fitTrajectory(measurements, cut_times_, priorFor(camera, depth, gravity_), trajectory);

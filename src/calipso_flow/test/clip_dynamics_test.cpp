@@ -262,6 +262,25 @@ TEST(ClipDynamics, takesAThingBeforeAPlainWallForNoCut) {
   EXPECT_FALSE(isCut(frame(0.0, 40), frame(1 / kFps, 110), DynamicsParams().cut_correlation));
 }
 
+// The key frame's line of sight, whatever the camera looks at later.
+TEST(ClipDynamics, distanceErrsAlongTheKeyFramesSight) {
+  const Eigen::Vector3d velocity(0.5, 0.0, 0.3);
+  ObjectModel model = test::boxModel();
+  model.position_covariance(1, 1) = 0.1 * 0.1;  // m^2, of 2 m
+  ClipAnalyser analyser(frameOf(0.0, movedPose(0.0, velocity, 0.0), 1), {model}, {cv::Mat()},
+                        kGravity);
+  for (int k = 1; k < 8; ++k)
+    analyser.add(frameOf(k / kFps, movedPose(k / kFps, velocity, 0.0), 1 + k));
+  Camera aside = test::testCamera();
+  aside.world_from_camera =
+      Eigen::AngleAxisd(-M_PI_2, Eigen::Vector3d::UnitZ()) * aside.world_from_camera;
+  const Eigen::Isometry3d last = movedPose(8 / kFps, velocity, 0.0);
+  analyser.add(makeFrame(8 / kFps, test::render(model, last, aside, kNoise, 9), aside));
+  const MotionState state = analyser.finish().front().trajectory.states[4];
+  // A distance that errs by 5 % is a velocity that does.
+  EXPECT_GT(std::sqrt(state.twistCovariance()(0, 0)), 0.05 * 0.45);
+}
+
 TEST(ClipDynamics, seesACutAndTakesItForNoMotion) {
   const Eigen::Isometry3d pose = test::boxModel().world_from_object;
   ClipAnalyser analyser = analyserOf(frameOf(0.0, pose, 61));

@@ -64,6 +64,7 @@ class ClipAnalyser {
   Frame last_;
   std::deque<Frame> recent_;  // the frames just seen, oldest first
   std::vector<double> times_;
+  std::vector<Camera> cameras_;  // per frame
   std::vector<double> cut_times_;
   std::vector<FollowedObject> objects_;
 };
