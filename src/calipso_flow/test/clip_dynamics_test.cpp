@@ -262,6 +262,28 @@ TEST(ClipDynamics, takesAThingBeforeAPlainWallForNoCut) {
   EXPECT_FALSE(isCut(frame(0.0, 40), frame(1 / kFps, 110), DynamicsParams().cut_correlation));
 }
 
+// A pan of a third of the picture between two frames, of a camera whose pose is known.
+TEST(ClipDynamics, takesAPanForNoCut) {
+  const auto frameAt = [](int k, double phase) {
+    Camera camera = test::testCamera();
+    camera.world_from_camera.rotate(Eigen::AngleAxisd(0.25 * k, Eigen::Vector3d::UnitY()));
+    cv::Mat picture(camera.height, camera.width, CV_8U);
+    for (int v = 0; v < picture.rows; ++v) {
+      for (int u = 0; u < picture.cols; ++u) {
+        const Eigen::Vector3d far =
+            (camera.world_from_camera.linear() * camera.ray(u, v)).normalized();
+        picture.at<uchar>(v, u) =
+            static_cast<uchar>(test::textureAt(0.25 * far) / 2 +
+                               60 * (1 + std::sin(phase + 17.0 * far.x() + 23.0 * far.z())));
+      }
+    }
+    return makeFrame(k / kFps, picture, camera);
+  };
+  const double least = DynamicsParams().cut_correlation;
+  EXPECT_FALSE(isCut(frameAt(0, 0.0), frameAt(1, 0.0), least));
+  EXPECT_TRUE(isCut(frameAt(0, 0.0), frameAt(1, M_PI), least));
+}
+
 // The key frame's line of sight, whatever the camera looks at later.
 TEST(ClipDynamics, distanceErrsAlongTheKeyFramesSight) {
   const Eigen::Vector3d velocity(0.5, 0.0, 0.3);
