@@ -19,6 +19,8 @@ struct InpaintParams {
   // what a squared code value counts by which a source's mean colour is off that of the smooth fill
   // that the hole is given with
   float off_colour = 0.0f;
+  // Also where no whole patch is left at the coarsest level; else nothing is copied there.
+  bool from_few = true;
   bool from_anywhere = false;  // in the picture; else from around the hole, half its size wide
   std::uint32_t seed = 1;
   // CV_32FC1, 1/m, may be empty: of the ground that a pixel sees, 0 above the horizon. What is

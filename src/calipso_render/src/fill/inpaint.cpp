@@ -169,6 +169,7 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
                Canvas& canvas) {
   InpaintParams inner = params;
   inner.surface = inner.sky = cv::Mat();
+  inner.from_few = false;  // what is hardly seen is filled with the rest
   inner.nearness = part.chart.carried(nearnessOf(plane.to_plane, plane.hole.size())),
   inner.away_farther = kFarther;
   const std::optional<Lattice>& lattice = part.pattern.lattice;

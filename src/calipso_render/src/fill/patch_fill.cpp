@@ -380,8 +380,9 @@ cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& s
   };
   int coarsest = static_cast<int>(levels.size()) - 1;
   // A thin hole is none there, and a coarse pixel is source only if all of its own are.
-  const auto useless = [](const FillLevel& level) {
-    return cv::countNonZero(level.hole) == 0 || PatchSources(level.source, cv::Mat()).empty();
+  const auto useless = [&](const FillLevel& level) {
+    return cv::countNonZero(level.hole) == 0 ||
+           (params.from_few && PatchSources(level.source, cv::Mat()).empty());
   };
   while (coarsest > 0 && useless(levels[coarsest])) --coarsest;
   Filling filling = fillingOf(coarsest);
