@@ -202,20 +202,20 @@ Prepared prepare(const ClipSample& as_taken, const std::vector<ObjectModel>& mod
   params.depth = mendedDepth(given.depth, key.labels, given.planes, key.camera);
   Prepared p;
   p.camera_moves = cameraMoves(clip);
-  p.nearness = placeNearness(
-      cameraMoves(clip) ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()},
-      params.planes, params.depth, params.background.mask_margin_px);
+  p.nearness =
+      placeNearness(p.camera_moves ? clip.frames() : std::vector<ClipFrame>{clip.frames().front()},
+                    params.planes, params.depth, params.background.mask_margin_px);
   std::vector<ClipFrame> frames =
       inKeyView(clip.frames(), p.nearness, params.background.mask_margin_px);
   findSurfacesInClip(clip, frames, models, p);
-  if (!cameraMoves(clip)) coverWhatRests(p, frames);
+  if (!p.camera_moves) coverWhatRests(p, frames);
   cv::Mat steadiness;
   const cv::Mat picture = steadyKeyFrame(frames, movingIn(frames.front().labels, p), steadiness);
   p.outline_blur = outlineBlur(picture, p.key_labels);
   const bool any_moves = std::find(p.moves.begin(), p.moves.end(), true) != p.moves.end();
   Stopwatch watch;
   Background seen = seenBackground(frames, any_moves, params.background);
-  if (cameraMoves(clip)) sharpenSeen(frames, params.background, seen);
+  if (p.camera_moves) sharpenSeen(frames, params.background, seen);
   p.background_ms = watch.lap();
   std::vector<View> views = viewsOf(clip, p, picture);
   p.light = lightOf(lightViewsOf(views), seen, any_moves, params, p);
@@ -240,9 +240,9 @@ Prepared prepare(const ClipSample& as_taken, const std::vector<ObjectModel>& mod
   p.footprints = footprintsOf(p, picture, params.background.mask_margin_px);
   p.scenery = sceneryOf(params.depth, p, params.background.mask_margin_px);
   prepareBackground({frames, light_views, actors, seen, picture, sun, sky, sun_past_resting,
-                     sky_past_resting, cameraMoves(clip)},
+                     sky_past_resting, p.camera_moves},
                     params, p);
-  if (cameraMoves(clip) && !p.background.drifting.established())
+  if (p.camera_moves && !p.background.drifting.established())
     p.beside = platesBeside(clip.frames(), p.nearness, any_moves, params.background);
   p.background_ms += watch.lap();
   p.noise = noiseOf(frames, steadiness, p);

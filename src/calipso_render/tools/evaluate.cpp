@@ -2,6 +2,7 @@
 #include <cstring>
 #include <exception>
 #include <opencv2/core/utils/logger.hpp>
+#include <string>
 
 #include "calipso_render/memory.hpp"
 #include "calipso_scene/help.hpp"
@@ -11,6 +12,21 @@ constexpr char kUsage[] =
     "usage: evaluate [--pictures DIR] [--summaries DIR] [--sheets DIR] [--appearance-only] "
     "SCENE_DIR...\n"
     "  One line of JSON per scene folder with ground truth.\n";
+
+namespace {
+
+// One line of JSON.
+std::string toJson(const calipso::render::Figures& figures) {
+  std::string json = "{\"case\": \"" + figures.name + "\"";
+  for (const auto& [key, value] : figures.values) {
+    char text[64] = "null";
+    if (value) std::snprintf(text, sizeof(text), "%.4g", *value);
+    json += ", \"" + key + "\": " + text;
+  }
+  return json + "}";
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   calipso::helpIfAsked(argc, argv, kUsage);
@@ -38,9 +54,7 @@ int main(int argc, char** argv) {
   int status = 0;
   for (int i = first; i < argc; ++i) {
     try {
-      std::printf(
-          "%s\n",
-          calipso::render::toJson(calipso::render::evaluateScene(argv[i], options)).c_str());
+      std::printf("%s\n", toJson(calipso::render::evaluateScene(argv[i], options)).c_str());
       std::fflush(stdout);
     } catch (const std::exception& error) {
       std::fprintf(stderr, "%s: %s\n", argv[i], error.what());

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -36,6 +35,15 @@ double elapsedMs(std::chrono::steady_clock::time_point since) {
 
 void keepLowest(std::optional<double>& lowest, std::optional<double> value) {
   if (value && (!lowest || *value < *lowest)) lowest = value;
+}
+
+// Of what is edited.
+cv::Mat maskOf(const FrameInput& in, const std::vector<Surface>& surfaces) {
+  cv::Mat mask = cv::Mat::zeros(in.labels.size(), CV_8U);
+  for (std::size_t i = 0; i < in.objects.size(); ++i) {
+    if (in.objects[i].edited) mask |= in.labels == surfaces[i].index;
+  }
+  return mask;
 }
 
 class Evaluation {
@@ -111,15 +119,6 @@ class Evaluation {
 
   FrameInput removedFrame(int k) const {
     return frame(k, [](std::size_t, ObjectInFrame& o) { o.removed = true; });
-  }
-
-  // Of what is edited.
-  static cv::Mat maskOf(const FrameInput& in, const std::vector<Surface>& surfaces) {
-    cv::Mat mask = cv::Mat::zeros(in.labels.size(), CV_8U);
-    for (std::size_t i = 0; i < in.objects.size(); ++i) {
-      if (in.objects[i].edited) mask |= in.labels == surfaces[i].index;
-    }
-    return mask;
   }
 
   RenderParams without(bool noise, bool still) const {
@@ -225,13 +224,13 @@ class Evaluation {
                   seam = grow(mask, kSeam) & ~shrink(mask, kSeam);
     const cv::Mat kept = Renderer(prepared_, params_).composite(in).bgr;
     const cv::Mat drawn = Renderer(prepared_, without(false, false)).composite(in).bgr;
-    RenderParams plain = without(false, false);
-    plain.carry_residual = false;
     picture("undeformed", drawn);
     put("undeformed_psnr_db", psnr(kept, in.bgr, inside));
     put("seam_psnr_db", psnr(kept, in.bgr, seam));
     put("undeformed_drawn_psnr_db", psnr(drawn, in.bgr, inside));
     put("seam_drawn_psnr_db", psnr(drawn, in.bgr, seam));
+    RenderParams plain = without(false, false);
+    plain.carry_residual = false;
     put("undeformed_plain_psnr_db",
         psnr(Renderer(prepared_, plain).composite(in).bgr, in.bgr, inside));
   }
@@ -370,8 +369,7 @@ class Evaluation {
                   {cv::IMWRITE_JPEG_QUALITY, 85});
     };
     write("", all);
-    const cv::Mat around =
-        turntable(prepared_, params_, frame(0, [](std::size_t, ObjectInFrame&) {}));
+    const cv::Mat around = turntable(prepared_, params_, frame(0, [](auto, auto&) {}));
     if (!around.empty()) write("_around", around);
   }
 
@@ -398,16 +396,6 @@ class Evaluation {
 
 Figures evaluateScene(const std::string& directory, const EvaluationOptions& options) {
   return Evaluation(directory, options).run();
-}
-
-std::string toJson(const Figures& figures) {
-  std::string json = "{\"case\": \"" + figures.name + "\"";
-  for (const auto& [key, value] : figures.values) {
-    char text[64] = "null";
-    if (value) std::snprintf(text, sizeof(text), "%.4g", *value);
-    json += ", \"" + key + "\": " + text;
-  }
-  return json + "}";
 }
 
 }  // namespace calipso::render

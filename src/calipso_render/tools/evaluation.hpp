@@ -25,7 +25,4 @@ struct EvaluationOptions {
 // segmentation. @throw std::runtime_error / std::invalid_argument if the folder cannot be read
 Figures evaluateScene(const std::string& directory, const EvaluationOptions& options);
 
-// One line of JSON.
-std::string toJson(const Figures& figures);
-
 }  // namespace calipso::render

@@ -378,13 +378,7 @@ cv::Mat patchOrigins(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& s
   const auto fillingOf = [&](int k) {
     return Filling(levels[k], static_cast<float>(1 << k), horizon, pattern, params);
   };
-  int coarsest = static_cast<int>(levels.size()) - 1;
-  // A thin hole is none there, and a coarse pixel is source only if all of its own are.
-  const auto useless = [&](const FillLevel& level) {
-    return cv::countNonZero(level.hole) == 0 ||
-           (params.from_few && PatchSources(level.source, cv::Mat()).empty());
-  };
-  while (coarsest > 0 && useless(levels[coarsest])) --coarsest;
+  const int coarsest = coarsestUseful(levels, params.from_few);
   Filling filling = fillingOf(coarsest);
   if (!filling.possible()) return cv::Mat(hole.size(), CV_16SC2, cv::Scalar(-1, -1));
   filling.peel();

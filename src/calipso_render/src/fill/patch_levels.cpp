@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "fill/patch_sources.hpp"
+
 namespace calipso::render {
 namespace {
 
@@ -83,6 +85,16 @@ std::vector<FillLevel> fillLevels(const cv::Mat& image, const cv::Mat& hole, con
   while (std::min(levels.back().hole.cols, levels.back().hole.rows) / 2 >= params.coarsest_side)
     levels.push_back(halved(levels.back()));
   return levels;
+}
+
+int coarsestUseful(const std::vector<FillLevel>& levels, bool with_sources) {
+  int k = static_cast<int>(levels.size()) - 1;
+  const auto is_useful = [&] {
+    return cv::countNonZero(levels[k].hole) > 0 &&
+           !(with_sources && PatchSources(levels[k].source, cv::Mat()).empty());
+  };
+  while (k > 0 && !is_useful()) --k;
+  return k;
 }
 
 float nearnessPerRow(const cv::Mat& nearness) {

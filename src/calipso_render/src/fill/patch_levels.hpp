@@ -18,6 +18,10 @@ struct FillLevel {
 std::vector<FillLevel> fillLevels(const cv::Mat& image, const cv::Mat& hole, const cv::Mat& source,
                                   const InpaintParams& params);
 
+// The coarsest level that has a hole, as a thin one has none there, and, if wanted, whole patches to
+// copy: a coarse pixel is source only if all of its own are.
+int coarsestUseful(const std::vector<FillLevel>& levels, bool with_sources);
+
 // How much nearer the ground is a row farther down, in the median.
 float nearnessPerRow(const cv::Mat& nearness);
 

@@ -88,10 +88,12 @@ cv::Mat removedPixels(const StagedFrame& frame, const SeenPlace& place, const Ed
     shown.update(frame, place, box);
     findRemoved(shown, passing, box, removed(box - region.all.tl()));
   }
-  const cv::Mat passing_before =
-      shownInPassing(frame, region.all, frame.params.background.mask_margin_px);
+  cv::Mat passing_before;
   for (const cv::Mat& front : place.fronts) {
-    if (!front.empty()) removed.setTo(0, front(region.all) & ~passing_before);
+    if (front.empty()) continue;
+    if (passing_before.empty())
+      passing_before = shownInPassing(frame, region.all, frame.params.background.mask_margin_px);
+    removed.setTo(0, front(region.all) & ~passing_before);
   }
   const cv::Mat& lost = frame.prepared.mirror.lost;
   if (!mirrored.empty() && !lost.empty())

@@ -17,8 +17,8 @@ bool cameraMoves(const ClipSample& clip);
 std::vector<ClipFrame> inKeyView(std::vector<ClipFrame> frames, const cv::Mat& nearness,
                                  int margin);
 
-// What others hide of it in a frame says nothing. A moving camera sees an object at rest where its model at rest is, as well as they agree at the
-// key frame.
+// What others hide of an object in a frame says nothing. A moving camera sees one at rest where its
+// model at rest is, as well as they agree at the key frame.
 // @param frames as they were taken
 bool movesInVideo(const std::vector<ClipFrame>& frames, const Surface& surface);
 

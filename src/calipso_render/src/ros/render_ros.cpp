@@ -320,7 +320,8 @@ bool RenderNode::workOffFront() {
   else
     passUnedited(frame, reason);
   const auto missed = std::distance(states_.begin(), states_.lower_bound(stamp));
-  if (missed > 0) countSkipped(stamp, missed, "the machine is too slow");
+  if (params_.mode == Mode::kLive && missed > 0)
+    countSkipped(stamp, missed, "the machine is too slow");
   states_.erase(states_.begin(), states_.upper_bound(stamp));
   left_ = std::max(left_, stamp);
   return true;
