@@ -104,6 +104,23 @@ class SimulatorNodeTest : public ::testing::Test {
     camera_.publish(info);
   }
 
+  // Edits that no frame will come for do not wait without a word.
+  void expectRefused(calipso_msgs::Edit late) {
+    late.header.stamp = stamp(1000);
+    edits_.publish(late);
+    calipso_msgs::Edit slow;
+    slow.kind = calipso_msgs::Edit::TIME_SCALE;
+    slow.factor = 0.5;
+    edits_.publish(slow);
+    ASSERT_TRUE(waitFor([&] { return reports_.size() == 4; }));
+    EXPECT_NE(reports_[2].message.find("the video ends at"), std::string::npos);
+    EXPECT_NE(reports_[3].message.find("laid out"), std::string::npos);
+    for (int k : {2, 3}) {
+      EXPECT_FALSE(reports_[k].accepted);
+      EXPECT_EQ(reports_[k].header.stamp, stamp(2 * (kFrames - 1)));
+    }
+  }
+
   ros::NodeHandle nh_;
   ros::Publisher info_, models_, status_, camera_, edits_;
   std::vector<ros::Subscriber> subscribers_;
@@ -171,22 +188,7 @@ TEST_F(SimulatorNodeTest, OneStatePerFrameAndEditsAreReported) {
   ASSERT_TRUE(waitFor([&] { return states_.back().header.stamp == stamp(2 * (kFrames - 1)); }));
   EXPECT_NEAR(states_.back().objects.at(0).pose.position.z, corrected.z() - 9.81 * t * t, 1e-6);
   EXPECT_EQ(reports_.size(), 2u) << "what was reported is reported again";
-
-  // Edits that no frame will come for do not wait without a word.
-  calipso_msgs::Edit late = heavier;
-  late.header.stamp = stamp(1000);
-  edits_.publish(late);
-  calipso_msgs::Edit slow;
-  slow.kind = calipso_msgs::Edit::TIME_SCALE;
-  slow.factor = 0.5;
-  edits_.publish(slow);
-  ASSERT_TRUE(waitFor([&] { return reports_.size() == 4; }));
-  EXPECT_NE(reports_[2].message.find("the video ends at"), std::string::npos);
-  EXPECT_NE(reports_[3].message.find("laid out"), std::string::npos);
-  for (int k : {2, 3}) {
-    EXPECT_FALSE(reports_[k].accepted);
-    EXPECT_EQ(reports_[k].header.stamp, stamp(2 * (kFrames - 1)));
-  }
+  expectRefused(heavier);
 }
 
 }  // namespace
