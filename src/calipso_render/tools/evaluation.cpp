@@ -21,8 +21,7 @@ constexpr int kAround = 40;  // px around a moved object in which its shadow is 
 // frames of a moving object that are drawn again: odd ones, which a clip sample of more than 24
 // frames leaves out
 constexpr int kMovedFirst = 3, kMovedStep = 4;
-// rad against the key frame, from which copying texture is wrong
-constexpr double kTurned = 10.0 * M_PI / 180.0;
+constexpr double kTurned = 10.0 * M_PI / 180.0;  // rad from the key frame: copying is wrong
 constexpr int kFlickerFrames = 8;
 constexpr int kSummaryWidth = 1440;  // px
 constexpr int kSheetFrames = 4;      // of a clip on a blind sheet
