@@ -19,6 +19,9 @@ struct InpaintParams {
   // what a squared code value counts by which a source's mean colour is off that of the smooth fill
   // that the hole is given with
   float off_colour = 0.0f;
+  // In [0, 1]: what is bland differs least from anything, so that a source with fewer gradients costs
+  // that part of the difference more, and one with some more of them that part less.
+  float off_bland = 1.0f;
   // Also where no whole patch is left at the coarsest level; else nothing is copied there.
   bool from_few = true;
   bool from_anywhere = false;  // in the picture; else from around the hole, half its size wide

@@ -32,7 +32,9 @@ constexpr float kRounded =
 constexpr float kAwayOnPlane = 3.0f;  // InpaintParams::away_row there: its rows are no layers
 constexpr float kAwayFromStripe = 300.0f, kAwayAlongStripe = 4.0f;  // ... where they are stripes
 constexpr float kFarther = 2000.0f;  // InpaintParams::away_farther along a plane
-constexpr float kOffColour = 1.0f;   // InpaintParams::off_colour there: two things lie in one plane
+// InpaintParams::off_colour where it does not repeat itself: two things lie in one plane, and what is
+// livelier in it is a mark
+constexpr float kOffColour = 1.0f;
 constexpr float kPatchesLeft = 0.5f;  // of all, that must remain beside lines that are not copied
 constexpr int kSkyLabel = 254;        // of the sky among surfaces
 constexpr int kFewestOnPlane = 200;   // px of a plane's part of the hole, to be filled along it
@@ -183,7 +185,7 @@ void fillPlane(const HiddenPlane& plane, const PlanePart& part, const InpaintPar
     inner.coarsest_side =
         std::max(inner.coarsest_side, cvRound(kPatchSide * side / (2.0f * lattice->shortest())));
   }
-  if (!lattice && !part.pattern.striped) inner.off_colour = kOffColour;
+  if (!lattice && !part.pattern.striped) inner.off_colour = kOffColour, inner.off_bland = 0.0f;
   const cv::Mat wanted =
       lattice ? goesOnByPattern(repeatsBy(*lattice, part.look, part.known, part.known), part.known,
                                 part.hole)

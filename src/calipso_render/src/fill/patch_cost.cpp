@@ -18,6 +18,7 @@ constexpr float kAsNear = 1.02f;  // times that a place may be nearer than a sou
 constexpr float kOffPattern = 0.75f;      // px by which a copy's way may miss the pattern
 constexpr float kColourVaries = 1000.0f;  // squared code values that are not off a colour
 constexpr float kColourAround = 61.0f;    // px of the square that tells a place's colour
+constexpr float kLivelier = 0.6f;  // part of its own gradients by which a source may have more
 
 }  // namespace
 
@@ -32,7 +33,8 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const P
       away_row_(params.away_row),
       away_column_(params.away_column),
       away_farther_(params.away_farther),
-      off_colour_(params.off_colour) {
+      off_colour_(params.off_colour),
+      off_bland_(params.off_bland) {
   if (off_colour_ > 0.0f) {
     // Wider in the hole: a spot at its rim does not tell what is there.
     const int around = std::max(kPatchSide, cvRound(kColourAround / scale));
@@ -57,10 +59,13 @@ PatchCost::PatchCost(const FillLevel& level, float scale, float horizon, const P
   }
 }
 
-float PatchCost::distance(const cv::Mat& image, const cv::Point& p, const cv::Point& q,
-                          float bound) const {
+float PatchCost::distance(const cv::Mat& image, const cv::Mat& lively, const cv::Point& p,
+                          const cv::Point& q, float bound) const {
   using Row = Eigen::Map<const Eigen::Array<float, 4 * kPatchSide, 1>>;
   float sum = awayCost(p, q);
+  // Gradients do not make up for the wrong place.
+  const float bland = blandCost(lively.at<float>(p), lively.at<float>(q));
+  if (bland > 0.0f || sum < kPatchSide * kPatchSide * kMisplaced) sum += bland;
   for (int dv = -kPatchRadius; dv <= kPatchRadius && sum < bound; ++dv) {
     const Row a(image.ptr<float>(p.y + dv) + 4 * (p.x - kPatchRadius)),
         b(image.ptr<float>(q.y + dv) + 4 * (q.x - kPatchRadius));
@@ -104,6 +109,13 @@ inline float PatchCost::awayCost(const cv::Point& p, const cv::Point& q) const {
   if (repeats_ && offPattern(p, q) > kOffPattern) cost += kMisplaced;
   if (!colours_.empty()) cost += off_colour_ * offColour(p, q);
   return kPatchSide * kPatchSide * cost;
+}
+
+// No lower than minus what the gradients' difference costs anyway, as its mean square is no less than
+// the square of its mean.
+inline float PatchCost::blandCost(float own, float other) const {
+  const float lack = own - other, most = kLivelier * own;
+  return kPatchSide * kPatchSide * off_bland_ * std::max(lack * std::abs(lack), -most * most);
 }
 
 // px of this level by which a shift misses the pattern

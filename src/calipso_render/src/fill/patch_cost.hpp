@@ -32,7 +32,9 @@ class PatchCost {
             const InpaintParams& params);
 
   // No less than `bound` if it is not below. @param image CV_32FC4
-  float distance(const cv::Mat& image, const cv::Point& p, const cv::Point& q, float bound) const;
+  // @param lively CV_32FC1: mean of its last channel over the patch around every pixel
+  float distance(const cv::Mat& image, const cv::Mat& lively, const cv::Point& p,
+                 const cv::Point& q, float bound) const;
   // By a part of the patch: `seen`, in floats of the image from its middle.
   float partialDistance(const cv::Mat& image, const cv::Point& p, const cv::Point& q,
                         const std::vector<int>& seen, float bound) const;
@@ -57,6 +59,7 @@ class PatchCost {
   // Of the finest level.
   int rowOf(const cv::Point& p) const { return cvRound(scale_ * (p.y + 0.5f) - 0.5f); }
   inline float awayCost(const cv::Point& p, const cv::Point& q) const;
+  inline float blandCost(float own, float other) const;
   float offPattern(const cv::Point& p, const cv::Point& q) const;
   float offColour(const cv::Point& p, const cv::Point& q) const;
 
@@ -67,8 +70,9 @@ class PatchCost {
   cv::Mat colours_, expected_;
   float scale_, horizon_;
   const Pattern* pattern_;
-  bool repeats_;                                              // the pattern knows any shifts
-  float away_row_, away_column_, away_farther_, off_colour_;  // as InpaintParams'
+  bool repeats_;  // the pattern knows any shifts
+  // as InpaintParams'
+  float away_row_, away_column_, away_farther_, off_colour_, off_bland_;
 };
 
 }  // namespace calipso::render

@@ -132,9 +132,11 @@ class Filling {
   // @return part of the patches that were led elsewhere
   float search(int reach) {
     std::vector<int> changes(bands_.size(), 0);
+    cv::extractChannel(image_, lively_, 3);
+    cv::blur(lively_, lively_, {kPatchSide, kPatchSide});
     forEachPatch([&](const cv::Point& p) {
       if (!hasMatch(p)) to_.at<cv::Vec2s>(p) = shorts(sources_.one(number(p, 0)));
-      cost_.at<float>(p) = rules_.distance(image_, p, match(p), 1e30f);
+      cost_.at<float>(p) = rules_.distance(image_, lively_, p, match(p), 1e30f);
       plain_.at<std::uint8_t>(p) = 255;
     });
     for (int s = 0; s < kSweeps; ++s) {
@@ -249,7 +251,7 @@ class Filling {
     // Most neighbours lead to where a patch has been led already.
     if (q == match(p) && (plain != 0 || better > 1.0f)) return;
     float& least = cost_.at<float>(p);
-    const float cost = better * rules_.distance(image_, p, q, least / better);
+    const float cost = better * rules_.distance(image_, lively_, p, q, least / better);
     if (cost >= least) return;
     least = cost, to_.at<cv::Vec2s>(p) = shorts(q);
     plain = better > 1.0f ? 0 : 255;
@@ -354,6 +356,7 @@ class Filling {
   InpaintParams params_;
   PlaceRandom random_;
   cv::Mat to_, cost_;  // CV_16SC2, CV_32FC1, of the patch around every pixel
+  cv::Mat lively_;     // PatchCost::distance()'s
   cv::Mat plain_;      // CV_8UC1: != 0 where cost_ is no multiple of what the match costs
   std::vector<std::vector<cv::Point>> bands_;  // the patches, by rows
   bool along_surfaces_ = false;                // a place's first guesses lie on its own surface
