@@ -203,9 +203,7 @@ class Filling {
  private:
   cv::Point match(const cv::Point& p) const { return point(to_.at<cv::Vec2s>(p)); }
   bool hasMatch(const cv::Point& p) const { return to_.at<cv::Vec2s>(p)[0] >= 0; }
-  bool inside(const cv::Point& p) const {
-    return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
-  }
+  bool inside(const cv::Point& p) const { return cv::Rect({0, 0}, hole_.size()).contains(p); }
   std::uint32_t number(const cv::Point& p, int salt) const {
     return random_.number(p, salt, sweep_);
   }
