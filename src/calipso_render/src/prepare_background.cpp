@@ -5,6 +5,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "light/shadow_check.hpp"
+#include "place/contact_traces.hpp"
 #include "place/haze.hpp"
 #include "place/hollow.hpp"
 #include "place/key_cover.hpp"
@@ -13,9 +14,9 @@
 #include "place/passing_shade.hpp"
 #include "place/place_relief.hpp"
 #include "place/plane_mirror.hpp"
-#include "place/relief_sky.hpp"
 #include "place/scenery_shade.hpp"
 #include "place/umbra.hpp"
+#include "place/unseen_casters.hpp"
 
 namespace calipso::render {
 namespace {
@@ -103,28 +104,6 @@ SeenShadows shadowsOn(const SeenPlace& place, const cv::Mat& sun, const cv::Mat&
   return seen;
 }
 
-// The dark that contacts leave on walls, where the picture surely shows it, whatever becomes of the
-// sun's shadows; walls that should show some and do not take none.
-cv::Mat contactTraces(const PlaceEvidence& e, const RenderParams& params, Prepared& p) {
-  const ReliefSky on_walls(p.relief, occludersOf(e.actors), ReliefSky::kFine);
-  const cv::Mat sky = on_walls.visibility(e.picture.size()), objects = p.key_labels != 0,
-                predicted = isShaded(cv::Mat::ones(sky.size(), CV_32F), sky) & ~objects;
-  cv::Mat traces = cv::Mat::zeros(sky.size(), CV_8U);
-  for (int k = 1; k <= static_cast<int>(p.relief.walls.size()); ++k) {
-    const cv::Mat wall = (p.relief.wall == k) & p.relief.seen;
-    if (cv::countNonZero(predicted & wall) == 0) continue;
-    cv::Mat here = sky.clone();
-    here.setTo(1.0f, ~wall);
-    const cv::Mat dark = surelyDarker(here, e.picture, objects | ~wall);
-    if (cv::countNonZero(dark) == 0) p.relief.wall.setTo(0, wall);
-    traces |= grown(dark, params.background.shadow_margin_px) & wall;
-  }
-  p.relief.index();
-  p.shadowless.setTo(
-      0, traces | (turnedAway(p.relief, p.light.light.direction) & (p.relief.wall > 0)));
-  return traces;
-}
-
 // Where shadows leave a trace, with the predictions' errors: on the surfaces that they fall on, not
 // on what stands before these.
 cv::Mat shadeTraces(const SeenShadows& shadows, const SeenPlace& place,
@@ -199,6 +178,11 @@ SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, P
   return place;
 }
 
+// @param hidden CV_8UC1: part of the sun, 255 all; may be empty
+void addSunless(const cv::Mat& hidden, Prepared& p) {
+  if (!hidden.empty()) p.sunless = p.sunless.empty() ? hidden : cv::Mat(cv::max(p.sunless, hidden));
+}
+
 // What the objects at rest leave on the place, to be taken out; what of it is mirrored goes to `p`.
 cv::Mat findTraces(const PlaceEvidence& e, const SeenPlace& place, const cv::Mat& sun,
                    const cv::Mat& sky, const RenderParams& params, Prepared& p) {
@@ -251,6 +235,8 @@ cv::Mat passingTraces(const PlaceEvidence& e, const SeenPlace& place, const Rece
   const ShadeThatStays stays =
       leaveOutPassingShade(e.frames, cast, receiver, params.background, p.background);
   if (stays.never_lit.empty()) return unfollowedTraces(e, place, sun, sky, params, p);
+  if (p.light.confirmed())
+    addSunless(unseenCastersShade(stays.told, p.background.plate, place.surface), p);
   const SeenShadows shadows = shadowsOn(place, stays.sun, stays.sky, p.background.plate,
                                         p.background.count == 0, p.light.confirmed());
   return shadeTraces(shadows, place, params) & stays.never_lit;
@@ -356,7 +342,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
   if (p.light.confirmed()) {
     const cv::Mat shaded =
         shadeOfScenery(p.scenery, surfaces, p.camera, p.light.light.direction, in_sun);
-    if (!shaded.empty()) p.sunless = p.sunless.empty() ? shaded : cv::Mat(p.sunless | shaded);
+    addSunless(shaded, p);
   }
   if (!p.sunless.empty()) sun.setTo(1.0f, p.sunless);
   cv::Mat traces =
@@ -368,7 +354,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
         0, litPlate(e, sun, sky, params, p) & ~grown(shaded, params.background.shadow_margin_px));
   }
   if (any_rests && !isWater(p.mirror)) liftTraces(e, place, sun, sky, params, traces, p);
-  if (any_rests && !p.relief.empty()) traces |= contactTraces(e, params, p);
+  if (any_rests && !p.relief.empty()) traces |= contactTraces(e.actors, e.picture, params, p);
   if (any_moves) traces |= passingTraces(e, place, in_sun, sun, sky, params, p);
   const cv::Mat ground = groundNearness(params.planes, key.camera, p.scenery);
   if (p.mirror.established())
@@ -395,6 +381,7 @@ void prepareBackground(const PlaceEvidence& e, const RenderParams& params, Prepa
                         : Haze(e.picture, p.scenery, surfaces.sky == InpaintParams::kSky);
   p.veil = veilOf(haze, p.plate_linear, p.nearness);
   findPlaceUmbra(e, haze, sun, sky, place.off_planes, params, p);
+  if (!p.sunless.empty()) p.sunless = lowestSun(p.sunless, luminance(p.umbra));
 }
 
 }  // namespace calipso::render

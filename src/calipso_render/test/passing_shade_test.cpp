@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "ball_setting.hpp"
+#include "place/unseen_casters.hpp"
 
 namespace calipso::render {
 namespace {
@@ -103,6 +104,35 @@ TEST(PassingShade, IsTakenOffWhereTheOneLitFrameShowsItBesideThePlace) {
   }
   EXPECT_GT(came_to_light, 50);
   EXPECT_LT(4 * dark, came_to_light);  // shade is predicted once for 2 x 2 pixels
+}
+
+// A band of the table lies in the shade of something else, where the ball's darkens nothing.
+TEST(PassingShade, TellsWhereThePlaceHasNoSunAnyhow) {
+  std::vector<Eigen::Vector3d> places;
+  for (int i = 0; i < 12; ++i) places.push_back(kFrom + i / 11.0 * (kTo - kFrom));
+  Clip clip = ballAlong(places);
+  const int middle = kWidth / 4;
+  for (ClipFrame& f : clip.frames) {
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < middle; ++u) {
+        if (f.labels.at<std::uint8_t>(v, u) == 0)
+          f.bgr.at<cv::Vec3b>(v, u) = cv::Vec3b(kUmbra * tableColour(u, v));
+      }
+    }
+  }
+  BackgroundParams params;
+  params.shadow_margin_px = 2;  // the ball is small
+  Background b = seenBackground(clip.frames, true);
+  const std::vector<bool> moves = {true};
+  const ShadeThatStays stays =
+      leaveOutPassingShade(clip.frames, castOf(clip, moves), clip.receiver, params, b);
+  const auto count = [&](const cv::Range& columns, std::uint8_t what) {
+    return cv::countNonZero(stays.told.colRange(columns) == what);
+  };
+  EXPECT_GT(count({0, middle}, kNoSun), 20);
+  EXPECT_EQ(count({0, middle}, kSun), 0);
+  EXPECT_GT(count({middle, kWidth}, kSun), 20);
+  EXPECT_EQ(count({middle, kWidth}, kNoSun), 0);
 }
 
 TEST(PassingShade, StaysWhereNoFrameShowsThePlaceWithoutIt) {

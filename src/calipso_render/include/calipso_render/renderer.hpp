@@ -105,7 +105,8 @@ struct Prepared {
   // CV_8UC1: where objects cast no shadow: neither plane nor relief is seen there, or shows none in
   // the video
   cv::Mat shadowless;
-  // CV_8UC1: 255 where scenery stands before the sun, or a wall turns away from it; may be empty
+  // CV_8UC1: lightLevel() of the sun below which no shade brings a place, as scenery stands before it
+  // anyhow, or something that is not seen, or a wall turns away from it; may be empty
   cv::Mat sunless;
   Relief relief;     // of the place, takes shadows; may be empty
   cv::Mat veil;      // CV_8UC1: part of what the place shows that haze adds, 255 all; may be empty

@@ -129,8 +129,8 @@ void RestingLight::findShaded(const StagedFrame& frame, const SeenPlace& place) 
   for (int v = 0; v < size.height; ++v) {
     leaveHidden(v, 0, size.width, sky_levels.ptr<std::uint8_t>(v));
     for (int u = 0; u < size.width; ++u) {
-      const bool sunless = !sunless_place_.empty() && sunless_place_.at<std::uint8_t>(v, u) != 0;
-      const std::uint8_t sun = sunless ? 255 : levelAt(originals_sun_, u, v),
+      const std::uint8_t none = sunless_place_.empty() ? 0 : sunless_place_.at<std::uint8_t>(v, u),
+                         sun = std::max(none, levelAt(originals_sun_, u, v)),
                          sky = sky_levels.at<std::uint8_t>(v, u);
       if ((sun == 255 && sky == 255) || !place.takesShadow(u, v)) continue;
       const float clear =
@@ -181,7 +181,7 @@ void RestingLight::addOthersSun(int v, int begin, int end, std::uint8_t* sun) co
   }
   if (sunless_place_.empty()) return;
   const std::uint8_t* sunless = sunless_place_.ptr<std::uint8_t>(v) + begin;
-  for (int k = 0; k < end - begin; ++k) sun[k] |= sunless[k];
+  for (int k = 0; k < end - begin; ++k) sun[k] = std::max(sun[k], sunless[k]);
 }
 
 void RestingLight::leaveHidden(int v, int begin, int end, std::uint8_t* sky) const {

@@ -8,6 +8,7 @@
 #include "light/shadow_check.hpp"
 #include "place/key_cover.hpp"
 #include "place/place_samples.hpp"
+#include "place/unseen_casters.hpp"
 
 namespace calipso::render {
 namespace {
@@ -18,6 +19,7 @@ constexpr std::size_t kFewestOpen = 3;  // frames under more sky that stand for 
 // code values: of faint shade, such as an object beside a place leaves, a pixel's noise hides what is
 // shade's
 constexpr float kVisible = 1.0f;
+constexpr float kHidden = 0.05f;  // visible part of the sun up to which it is hidden
 
 // What a frame is predicted to show, one value per kStride px.
 struct Lighting {
@@ -79,21 +81,26 @@ Lighting lightingOf(const std::vector<Points>& shapes, const PassingCast& cast,
   return out;
 }
 
-// A frame's predicted shade, of the picture's size.
+// A frame's predicted shade, of the picture's size, CV_8UC1.
 struct Shade {
-  cv::Mat core, near;  // CV_8UC1; near: within the prediction's error of it
+  cv::Mat core, near;  // near: within the prediction's error of it
+  cv::Mat umbra;       // the sun is hidden, whatever the error
 };
 
 Shade shadeOf(const Lighting& lighting, const cv::Size& size, int margin) {
   Shade shade;
   cv::resize(isShaded(lighting.sun, lighting.sky), shade.core, size, 0, 0, cv::INTER_NEAREST);
   shade.near = grown(shade.core, margin);
+  cv::Mat sun;
+  cv::resize(lighting.sun > kHidden, sun, size, 0, 0, cv::INTER_NEAREST);
+  shade.umbra = ~grown(sun, margin);
   return shade;
 }
 
 // A pixel's values over time: in shade by the prediction, within its error, and neither.
 struct Sorted {
   Samples core, near, lit;
+  Samples umbra;        // of the core, those that the sun does not reach
   bool dimmed = false;  // of those in no shade, some were left out: objects hid more of their sky
 };
 
@@ -112,6 +119,8 @@ class Sorter {
     std::vector<std::size_t> lit;
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       if (!shades_[i] || !samples_.shows(i, u, v)) continue;
+      if (shades_[i]->umbra.at<std::uint8_t>(v, u) != 0)
+        s.umbra.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
       if (shades_[i]->core.at<std::uint8_t>(v, u) != 0)
         s.core.push_back(frames_[i].bgr.at<cv::Vec3b>(v, u));
       else if (shades_[i]->near.at<std::uint8_t>(v, u) != 0)
@@ -189,11 +198,18 @@ void takeIfBrighter(const Samples& values, float by, Background& background, int
   plate = mean, background.spread.at<float>(v, u) = spread;
 }
 
+// Does the sun reach a place? Half a step darker is neither yes nor no.
+std::uint8_t sunAt(const Sorted& s, double step) {
+  if (s.umbra.empty() || s.lit.size() < kFewestOpen) return kSunUntold;
+  if (shadedAgainst(s.lit, s.umbra, step)) return kSun;
+  return shadedAgainst(s.lit, s.umbra, 0.5 * step) ? kSunUntold : kNoSun;
+}
+
 // Takes the shaded frames out of a plate's median, and those that objects leave less of the sky.
-// @return CV_8UC1: 255 where no frame is lit
-cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& background) {
+// @return ShadeThatStays::never_lit and told
+ShadeThatStays dropShadedFrames(const Sorter& sorter, double step, Background& background) {
   const cv::Size size = background.plate.size();
-  cv::Mat never_lit = cv::Mat::zeros(size, CV_8U);
+  cv::Mat never_lit = cv::Mat::zeros(size, CV_8U), told = never_lit.clone();
   background.shaded_at_times = cv::Mat::zeros(size, CV_8U);
 #pragma omp parallel for schedule(dynamic, 8)
   for (int v = 0; v < size.height; ++v) {
@@ -204,6 +220,7 @@ cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& backgrou
         continue;
       }
       background.shaded_at_times.at<std::uint8_t>(v, u) = 255;
+      told.at<std::uint8_t>(v, u) = sunAt(s, step);
       if (s.lit.empty()) s.lit = litAmong(s.near, s.core, step);
       if (s.lit.empty()) {
         never_lit.at<std::uint8_t>(v, u) = 255;
@@ -220,7 +237,7 @@ cv::Mat dropShadedFrames(const Sorter& sorter, double step, Background& backgrou
       takeIfBrighter(s.lit, -kVisible, background, u, v);
     }
   }
-  return never_lit;
+  return {{}, {}, never_lit, told};
 }
 
 }  // namespace
@@ -241,9 +258,8 @@ ShadeThatStays leaveOutPassingShade(const std::vector<ClipFrame>& frames, const 
     brighten(now, sorter, i, most);
     any = any || i > 0;
   }
-  ShadeThatStays stays;
-  if (!any) return stays;
-  stays.never_lit = dropShadedFrames(sorter, params.shadow_step, background);
+  if (!any) return {};
+  ShadeThatStays stays = dropShadedFrames(sorter, params.shadow_step, background);
   cv::resize(most.sun, stays.sun, size, 0, 0, cv::INTER_LINEAR);
   cv::resize(most.sky, stays.sky, size, 0, 0, cv::INTER_LINEAR);
   for (cv::Mat* visible : {&stays.sun, &stays.sky}) visible->setTo(1.0f, stays.never_lit == 0);

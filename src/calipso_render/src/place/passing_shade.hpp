@@ -24,9 +24,10 @@ using ReceiverOf = std::function<std::optional<Receiver>(int u, int v)>;
 
 // Of the brightest that the frames show of every pixel, the visible part of sun and sky, 0..1,
 // CV_32FC1: 1 where one shows it past all of the objects' shade; and CV_8UC1: 255 where none does,
-// within the prediction's error. All empty if nothing is known to move.
+// within the prediction's error. All empty if nothing is known to move. `told`: what the shade tells of
+// the sun (place/unseen_casters.hpp).
 struct ShadeThatStays {
-  cv::Mat sun, sky, never_lit;
+  cv::Mat sun, sky, never_lit, told;
 };
 
 // Takes the frames in which a place is predicted to lie in shade, or to get less of the sky than in

@@ -1,0 +1,66 @@
+#include "place/unseen_casters.hpp"
+
+#include <gtest/gtest.h>
+
+#include "grain_pictures.hpp"
+
+namespace calipso::render {
+namespace {
+
+using namespace testing;
+
+// A wall and a floor below it, the left third of both in the shade of something that is not seen. A
+// shadow that passed over the wall's upper half told where it has the sun, but for noise.
+class UnseenCasters : public ::testing::Test {
+ protected:
+  static constexpr int kEdge = 80, kFloor = 120;
+
+  UnseenCasters()
+      : plate(0.2 * grain(240, 180) + cv::Scalar::all(150.0)),
+        surface(180, 240, CV_8U, cv::Scalar(1)),
+        told(180, 240, CV_8U, cv::Scalar(kSunUntold)) {
+    plate.colRange(0, kEdge) *= 0.5;
+    surface.rowRange(kFloor, 180) = 2;
+    told(cv::Rect(0, 0, 240, kFloor / 2)) = kSun, told(cv::Rect(0, 0, kEdge, kFloor / 2)) = kNoSun;
+    cv::Mat wrong = grain(240, 180);
+    cv::extractChannel(wrong, wrong, 0);
+    told.setTo(kSun, (told == kNoSun) & (wrong > 180.0));
+  }
+
+  int hiddenAt(int u, int v) const {
+    return unseenCastersShade(told, plate, surface).at<std::uint8_t>(v, u);
+  }
+
+  cv::Mat plate, surface, told;
+};
+
+TEST_F(UnseenCasters, ShadeWhereAPassingShadowDarkensNothingAndWhatIsAsDark) {
+  EXPECT_EQ(hiddenAt(40, 30), 255);
+  EXPECT_EQ(hiddenAt(40, 100), 255);  // no shadow passed there
+  EXPECT_EQ(hiddenAt(160, 30), 0);
+  EXPECT_EQ(hiddenAt(160, 100), 0);
+  EXPECT_EQ(hiddenAt(40, 160), 0);  // of the floor nothing is known
+}
+
+TEST_F(UnseenCasters, AreNotSoughtByBrightnessThatDoesNotTell) {
+  plate.colRange(0, kEdge) *= 2.0;
+  EXPECT_EQ(hiddenAt(40, 30), 255);
+  EXPECT_EQ(hiddenAt(40, 100), 0);
+}
+
+TEST_F(UnseenCasters, AreNoneWhereAllShadowsDarken) {
+  told.setTo(kSun, told == kNoSun);
+  EXPECT_TRUE(unseenCastersShade(told, plate, surface).empty());
+}
+
+// With a quarter left in the shade and half the sun hidden, 0.625 are seen: 0.4 of it are 0.25.
+TEST(LowestSun, LeavesWhatTheFullShadeWould) {
+  const cv::Mat hidden = (cv::Mat_<std::uint8_t>(1, 3) << 0, 128, 255);
+  const cv::Mat sun = lowestSun(hidden, 0.25f);
+  EXPECT_EQ(sun.at<std::uint8_t>(0), 0);
+  EXPECT_NEAR(0.25 + 0.75 * sun.at<std::uint8_t>(1) / 255.0, 0.4, 0.005);
+  EXPECT_EQ(sun.at<std::uint8_t>(2), 255);
+}
+
+}  // namespace
+}  // namespace calipso::render
