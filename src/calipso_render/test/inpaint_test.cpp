@@ -230,7 +230,7 @@ TEST(CutSeams, MoveToWhereCopiesAreAlike) {
 }
 
 // A row of a picture whose left half is darker by a step, blended.
-std::vector<float> blendedStep(float step, const cv::Mat& planes) {
+std::vector<float> blendedStep(float step, const cv::Mat& planes, const cv::Mat& sky = {}) {
   cv::Mat image(40, 120, CV_32FC3, cv::Scalar::all(50)), hole = cv::Mat::zeros(40, 120, CV_8U);
   image.colRange(60, 120).setTo(cv::Scalar::all(50.0 + step));
   hole.colRange(30, 90).setTo(255);
@@ -239,7 +239,7 @@ std::vector<float> blendedStep(float step, const cv::Mat& planes) {
     for (int u = 30; u < 90; ++u)
       origin.at<cv::Vec2s>(v, u) = {static_cast<short>(u < 60 ? 10 : 105), static_cast<short>(v)};
   }
-  blendSeams(hole, hole == 0, origin, planes, image);
+  blendSeams(hole, hole == 0, origin, planes, sky, image);
   cv::extractChannel(image.row(20), row, 0);
   return row;
 }
@@ -250,6 +250,12 @@ TEST(BlendSeams, SoftenAStepBetweenThings) {
   EXPECT_LT(at[60] - at[59], 75.0f);
   EXPECT_NEAR(at[50], 50.0f, 12.0f);
   EXPECT_NEAR(at[70], 200.0f, 12.0f);
+}
+
+TEST(BlendSeams, SpreadAnyStepInTheSky) {
+  const cv::Mat sky(40, 120, CV_8U, cv::Scalar(InpaintParams::kSky));
+  const std::vector<float> at = blendedStep(60.0f, cv::Mat(), sky);
+  for (int u = 1; u < 120; ++u) EXPECT_LT(at[u] - at[u - 1], 6.0f) << u;
 }
 
 TEST(BlendSeams, KeepTheEdgeBetweenPlanes) {
@@ -269,10 +275,10 @@ TEST(BlendSeams, SpreadsAStepAndKeepsTheGrain) {
     for (int u = 50; u < 70; ++u) origin.at<cv::Vec2s>(v, u) = cv::Vec2s(short(u - 40), short(v));
   }
   const cv::Mat exact = image.clone();
-  blendSeams(hole, hole == 0, origin, cv::Mat(), image);
+  blendSeams(hole, hole == 0, origin, cv::Mat(), cv::Mat(), image);
   EXPECT_LT(cv::norm(image, exact, cv::NORM_INF), 1e-3);  // what fits stays
   cv::subtract(image, cv::Scalar::all(3.0), image, hole);
-  blendSeams(hole, hole == 0, origin, cv::Mat(), image);
+  blendSeams(hole, hole == 0, origin, cv::Mat(), cv::Mat(), image);
   EXPECT_LT(meanDifference(image, truth, hole), 0.5);
 }
 

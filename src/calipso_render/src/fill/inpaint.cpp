@@ -116,7 +116,7 @@ Filling fill(const std::vector<cv::Vec4f>& edges, cv::Mat look, cv::Mat to_fill,
   const cv::Mat without = to_fill & (copyFrom(f.origin, look, f.image) == 0);
   if (cv::countNonZero(without) > 0) smoothFill(look, to_fill, known).copyTo(f.image, without);
   if (cv::countNonZero(without) < cv::countNonZero(to_fill))
-    blendSeams(to_fill, known, f.origin, planesOf(params), f.image);
+    blendSeams(to_fill, known, f.origin, planesOf(params), params.sky, f.image);
   bridges.origin.copyTo(f.origin, bridges.core);
   f.origin.setTo(cv::Scalar(-1, -1), whole_hole == 0);
   return f;

@@ -5,6 +5,7 @@
 #include <opencv2/core/hal/intrin.hpp>
 #include <vector>
 
+#include "calipso_render/inpaint.hpp"
 #include "fill/patch_cost.hpp"
 
 namespace calipso::render {
@@ -39,11 +40,12 @@ cv::Vec4f widened(const cv::Vec3f& c) { return {c[0], c[1], c[2], 0.0f}; }
 class Seams {
  public:
   Seams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin, const cv::Mat& planes,
-        const cv::Mat& image)
+        const cv::Mat& sky, const cv::Mat& image)
       : hole_(hole),
         source_(source),
         origin_(origin),
         planes_(planes),
+        sky_(sky),
         image_(image),
         has_planes_(!planes.empty()) {}
 
@@ -82,7 +84,8 @@ class Seams {
       if (index.at<int>(q) >= 0) node.neighbours[i] = index.at<int>(q);
       node.count += 1.0f;
       const cv::Vec3f miss = colour(q) - colour(node.at) - wanted(node.at, q);
-      const cv::Vec3f seam = miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
+      const cv::Vec3f seam =
+          isInSky(node.at, q) ? miss : miss / (1.0f + miss.dot(miss) / (kEdge * kEdge));
       node.seam += widened(seam), node.edge += widened(miss - seam);
     }
   }
@@ -91,6 +94,17 @@ class Seams {
     return p.x >= 0 && p.y >= 0 && p.x < hole_.cols && p.y < hole_.rows;
   }
   bool isSource(const cv::Point& p) const { return inside(p) && source_.at<std::uint8_t>(p) != 0; }
+  int skyAt(const cv::Point& p) const {
+    const cv::Vec2s from = origin_.at<cv::Vec2s>(p);
+    return sky_.at<std::uint8_t>(from[0] < 0 ? p : cv::Point(from[0], from[1]));
+  }
+  // Things have edges, the sky has none.
+  bool isInSky(const cv::Point& p, const cv::Point& q) const {
+    if (sky_.empty()) return false;
+    const int own = skyAt(p), other = skyAt(q);
+    return own != InpaintParams::kNoSky && other != InpaintParams::kNoSky &&
+           (own == InpaintParams::kSky || other == InpaintParams::kSky);
+  }
   const cv::Vec3f& colour(const cv::Point& p) const { return image_.at<cv::Vec3f>(p); }
 
   // The difference from p to its neighbour q in the places that they are copies of, as far as it
@@ -108,7 +122,7 @@ class Seams {
     return seen > 0 ? cv::Vec3f(sum / seen) : cv::Vec3f(0, 0, 0);
   }
 
-  const cv::Mat &hole_, &source_, &origin_, &planes_, &image_;
+  const cv::Mat &hole_, &source_, &origin_, &planes_, &sky_, &image_;
   bool has_planes_;
 };
 
@@ -137,8 +151,8 @@ std::vector<cv::Vec4f> spread(const Nodes& nodes, cv::Vec4f Node::*mismatch, flo
 }  // namespace
 
 void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin,
-                const cv::Mat& planes, cv::Mat& image) {
-  const Nodes nodes = Seams(hole, source, origin, planes, image).nodes();
+                const cv::Mat& planes, const cv::Mat& sky, cv::Mat& image) {
+  const Nodes nodes = Seams(hole, source, origin, planes, sky, image).nodes();
   const std::vector<cv::Vec4f> wide = spread(nodes, &Node::seam, kScreen, kRelax, kIterations),
                                narrow = spread(nodes, &Node::edge, kScreenEdge, kRelaxEdge,
                                                kIterationsEdge);

@@ -13,7 +13,9 @@ namespace calipso::render {
 // @param origin CV_16SC2, per hole pixel what it is a copy of; (-1, -1): of nothing
 // @param planes CV_8UC1, number of the plane that is seen, 0 unknown; may be empty: where one gives
 // way to another there is an edge, and no seam
+// @param sky InpaintParams::sky; may be empty: within it, and beside it unless something is
+// known to be seen, every step is a seam
 void blendSeams(const cv::Mat& hole, const cv::Mat& source, const cv::Mat& origin,
-                const cv::Mat& planes, cv::Mat& image);
+                const cv::Mat& planes, const cv::Mat& sky, cv::Mat& image);
 
 }  // namespace calipso::render
