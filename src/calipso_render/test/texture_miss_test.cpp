@@ -87,6 +87,20 @@ TEST(TextureMiss, TheTextureIsAsSharpAsItsPictures) {
   EXPECT_LT(product / square, 1.0);
 }
 
+// At the key frame the ball lies in the shade of something beside the picture, later it does not:
+// nothing turns black, neither where it is seen nor where the key frame's colours are copied to.
+TEST(TextureMiss, ShadeOfTheKeyFrameAloneIsNotProjectedBack) {
+  const Surface surface = makeSurface(ballAt(kPlace));
+  std::vector<View> views = patternedViews(surface, kCoarse, 0.0f);
+  views[0].picture.forEach<cv::Vec3f>([](cv::Vec3f& code, const int*) {
+    for (int c = 0; c < 3; ++c) code[c] = codeFromLinear(0.25f * linearFromRealCode(code[c]));
+  });
+  const Appearance a = makeAppearances(views, {true}, evenLight(), {Gloss()}).front();
+  std::size_t dark = 0;
+  for (const cv::Vec4f& texel : a.texture.texels) dark += texel[1] < 0.05f;
+  EXPECT_LT(dark, a.texture.texels.size() / 1000);
+}
+
 TEST(TextureMiss, GrainIsWhatPixelsDeviateByThemselves) {
   const Surface surface = makeSurface(ballAt(kPlace));
   const auto grain = [&](float noise) {

@@ -6,6 +6,7 @@
 
 #include "calipso_render/colour.hpp"
 #include "noise_mask.hpp"
+#include "smooth_step.hpp"
 
 namespace calipso::render {
 namespace {
@@ -15,6 +16,9 @@ constexpr std::size_t kFewest = 500;  // of them
 constexpr int kAround = 5;            // px of the square in which the texture's own change counts
 // of them, where it changes least: beside its marks a pose that is a little off makes a difference
 constexpr double kPlainest = 0.05;
+constexpr int kEvened = 11;  // px of the square whose mean tells a picture's shade
+// parts by which such means differ that are put down to blur, and to shade alone
+constexpr float kBlur = 0.05f, kShade = 0.2f;
 constexpr float kLeast = 1e-4f;  // reflectance that is told from none
 
 // The picture's reflectance as the texture has it. CV_32FC4, the picture's own beside the object.
@@ -32,6 +36,22 @@ cv::Mat drawnInto(const Reflectance& picture, const Actor& actor, const SurfaceT
     }
   }
   return drawn;
+}
+
+// Weighted means of squares, times the mean of the weights.
+cv::Mat meanAround(const cv::Mat& picture, const cv::Mat& weight) {
+  cv::Mat weights, mean;
+  cv::merge(std::vector<cv::Mat>(4, weight), weights);
+  cv::blur(picture.mul(weights), mean, {kEvened, kEvened}, {-1, -1}, cv::BORDER_CONSTANT);
+  return mean;
+}
+
+// Times by which a picture is brought to the texture's brightness, by their means around: 1 where
+// blur explains the difference.
+float gainTo(float now, float own) {
+  own += kLeast, now += kLeast;
+  const float part = smoothStep(kBlur, kShade, 1.0f - std::min(own, now) / std::max(own, now));
+  return 1.0f + part * (now / own - 1.0f);
 }
 
 // What the picture has beyond a drawn reflectance, code values. CV_32FC3.
@@ -85,13 +105,21 @@ std::vector<Detail> detailsOf(const Reflectance& picture, const cv::Mat& drawn) 
 cv::Mat sharpened(const cv::Mat& shown, const Reflectance& picture, const Actor& actor,
                   const SurfaceTexture& texture) {
   const cv::Mat drawn = drawnInto(picture, actor, texture);
+  cv::Mat trust = picture.trust.mul(picture.clear);
+  trust.setTo(0.0f, picture.triangle < 0);
+  const cv::Mat own_around = meanAround(picture.albedo, trust),
+                now_around = meanAround(drawn, trust);
   cv::Mat out = shown.clone();
   for (int v = 0; v < out.rows; ++v) {
     for (int u = 0; u < out.cols; ++u) {
-      const float trust = picture.trust.at<float>(v, u) * picture.clear.at<float>(v, u);
       const cv::Vec4f &own = picture.albedo.at<cv::Vec4f>(v, u), &now = drawn.at<cv::Vec4f>(v, u);
       cv::Vec4f& colour = out.at<cv::Vec4f>(v, u);
-      for (int c = 0; c < 3; ++c) colour[c] = std::max(0.0f, colour[c] + trust * (own[c] - now[c]));
+      for (int c = 0; c < 3; ++c) {
+        const float gain =
+            gainTo(now_around.at<cv::Vec4f>(v, u)[c], own_around.at<cv::Vec4f>(v, u)[c]);
+        colour[c] =
+            std::max(0.0f, gain * colour[c] + trust.at<float>(v, u) * (gain * own[c] - now[c]));
+      }
     }
   }
   return out;
