@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "picture_file.hpp"
 
 namespace calipso::render {
 namespace {
@@ -44,7 +45,7 @@ void BlindSheet::write(const std::string& folder) const {
   if (pairs_.empty()) return;
   cv::Mat sheet;
   cv::vconcat(pairs_, sheet);
-  cv::imwrite(folder + "/" + name_ + "_blind.png", sheet);
+  writePicture(folder + "/" + name_ + "_blind.png", sheet);
   std::ofstream key(folder + "/" + name_ + "_blind_key.txt");
   for (const std::string& line : key_) key << line << "\n";
 }

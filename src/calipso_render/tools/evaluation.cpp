@@ -9,6 +9,7 @@
 #include "blind_sheet.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "measures.hpp"
+#include "picture_file.hpp"
 #include "truth.hpp"
 #include "turntable.hpp"
 
@@ -73,8 +74,8 @@ class Evaluation {
   }
 
   void picture(const std::string& what, const cv::Mat& image) const {
-    if (!options_.pictures.empty())
-      cv::imwrite(options_.pictures + "/" + scene_.name + "_" + what + ".png", image);
+    if (options_.pictures.empty()) return;
+    writePicture(options_.pictures + "/" + scene_.name + "_" + what + ".png", image);
   }
 
   void prepareClip() {
@@ -164,11 +165,10 @@ class Evaluation {
 
   void judgeAppearance() {
     const Eigen::Vector3d found = prepared_->light.light.direction.cast<double>();
-    std::optional<double> angle;
-    if (truth_.to_sun)
-      angle =
-          std::acos(std::clamp(found.dot(truth_.to_sun->normalized()), -1.0, 1.0)) * 180.0 / M_PI;
-    put("light_error_deg", angle);
+    const auto angleTo = [&](const Eigen::Vector3d& sun) {
+      return std::acos(std::clamp(found.dot(sun.normalized()), -1.0, 1.0)) * 180.0 / M_PI;
+    };
+    put("light_error_deg", truth_.to_sun ? std::optional(angleTo(*truth_.to_sun)) : std::nullopt);
     put("light_confirmed", prepared_->light.confirmed() ? 1.0 : 0.0);
     put("albedo_error_percent", albedoFigure());
     judgeRoughness();
@@ -363,13 +363,11 @@ class Evaluation {
     cv::hconcat(summary_, all);
     const double scale = static_cast<double>(kSummaryWidth) / all.cols;
     cv::resize(all, all, {}, scale, scale, cv::INTER_AREA);
-    const auto write = [this](const std::string& suffix, const cv::Mat& image) {
-      cv::imwrite(options_.summaries + "/" + scene_.name + suffix + ".jpg", image,
-                  {cv::IMWRITE_JPEG_QUALITY, 85});
-    };
-    write("", all);
+    const std::vector<int> quality = {cv::IMWRITE_JPEG_QUALITY, 85};
+    writePicture(options_.summaries + "/" + scene_.name + ".jpg", all, quality);
     const cv::Mat around = turntable(prepared_, params_, frame(0, [](auto, auto&) {}));
-    if (!around.empty()) write("_around", around);
+    if (!around.empty())
+      writePicture(options_.summaries + "/" + scene_.name + "_around.jpg", around, quality);
   }
 
   void timeFrames() {
@@ -394,6 +392,8 @@ class Evaluation {
 }  // namespace
 
 Figures evaluateScene(const std::string& directory, const EvaluationOptions& options) {
+  for (const std::string& folder : {options.pictures, options.summaries, options.sheets})
+    makePictureFolder(folder);
   return Evaluation(directory, options).run();
 }
 

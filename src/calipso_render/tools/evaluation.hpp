@@ -22,7 +22,9 @@ struct EvaluationOptions {
 };
 
 // Runs the whole renderer on a scene folder, the true shape and masks standing in for alignment and
-// segmentation. @throw std::runtime_error / std::invalid_argument if the folder cannot be read
+// segmentation. Makes the options' folders where they are missing.
+// @throw std::runtime_error / std::invalid_argument if the folder cannot be read, or pictures not
+// written
 Figures evaluateScene(const std::string& directory, const EvaluationOptions& options);
 
 }  // namespace calipso::render

@@ -7,10 +7,10 @@
 #include <exception>
 #include <functional>
 #include <opencv2/core/utils/logger.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
+#include "../picture_file.hpp"
 #include "calipso_render/memory.hpp"
 #include "calipso_scene/help.hpp"
 #include "drawing_case.hpp"
@@ -55,7 +55,7 @@ void timeFrames(const std::string& name, const DrawingCase& drawing, const Optio
     if (k >= 2) wall.push_back(wallMs() - w), cpu.push_back(cpuMs() - p);
   }
   std::sort(wall.begin(), wall.end()), std::sort(cpu.begin(), cpu.end());
-  if (!options.pictures.empty()) cv::imwrite(options.pictures + "/" + name + ".png", last);
+  if (!options.pictures.empty()) writePicture(options.pictures + "/" + name + ".png", last);
   std::printf(
       "{\"case\": \"%s\", \"triangles\": %d, \"coverage\": %.3f, \"wall_ms\": %.2f, \"cpu_ms\": "
       "%.2f, \"cpu_median_ms\": %.2f}\n",
@@ -152,6 +152,7 @@ int main(int argc, char** argv) {
       options.scenes.push_back(argv[i]);
   }
   try {
+    makePictureFolder(options.pictures);
     if (options.drawing) timeDrawing(options);
     for (const std::string& scene : options.scenes) compareScene(scene, options);
   } catch (const std::exception& error) {

@@ -1,11 +1,11 @@
 #include "filling_case.hpp"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/photo.hpp>
 #include <opencv2/xphoto/inpainting.hpp>
 
 #include "../measures.hpp"
+#include "../picture_file.hpp"
 #include "../truth.hpp"
 #include "calipso_render/inpaint.hpp"
 #include "calipso_scene/scene.hpp"
@@ -61,7 +61,7 @@ std::vector<FillingResult> compareFilling(const std::string& scene_directory,
       r.psnr_db = psnr(filled, *truth, objects),
       r.gradient_ratio = gradientRatio(filled, *truth, objects);
     if (!pictures.empty())
-      cv::imwrite(pictures + "/" + scene.name + "_filled_" + name + ".png", filled);
+      writePicture(pictures + "/" + scene.name + "_filled_" + name + ".png", filled);
     results.push_back(r);
   }
   return results;
