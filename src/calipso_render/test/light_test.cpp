@@ -60,6 +60,22 @@ TEST(SpecularShading, MirrorsTheSurroundingsLessAtTheRimsOfRoughSurfaces) {
   EXPECT_NEAR(growth(0.35f, kMostAround), smooth, 1e-3f * smooth);
 }
 
+// A polished object has no outline brighter than what it mirrors; half of the light's unit is all.
+TEST(SpecularShading, MirrorsNoMoreThanAllThatReachesIt) {
+  Light light;
+  light.sun = {0, 0, 0}, light.ambient[0] = {1, 1, 1};
+  const Eigen::Vector3f n = Eigen::Vector3f::UnitZ(),
+                        at_rim = Eigen::Vector3f(1, 0, 1e-3f).normalized();
+  for (const float around : {0.03f, 0.04f, 0.2f, 0.5f}) {
+    const Gloss gloss{around, 0.15f, around};
+    const float mirrored = specularShading(light, gloss, n, at_rim, 0.0f)[0];
+    EXPECT_LE(mirrored, kAllAround * (1.0f + 1e-5f)) << around;
+    EXPECT_GT(mirrored, 0.85f * kAllAround) << around;
+    EXPECT_NEAR(specularShading(light, gloss, n, n, 0.0f)[0], around, 1e-6f);
+  }
+  EXPECT_FLOAT_EQ(grazingGrowth({0.0f, kSmooth, 0.0f}), kGrazing);
+}
+
 TEST(TorranceSparrow, PeaksAtTheMirrorDirectionOfSmoothSurfaces) {
   const Eigen::Vector3f n = Eigen::Vector3f::UnitZ(), l = Eigen::Vector3f(0.6f, 0, 0.8f);
   EXPECT_GT(torranceSparrow(n, l, {-0.6f, 0, 0.8f}, 0.1f),

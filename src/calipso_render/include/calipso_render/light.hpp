@@ -30,8 +30,9 @@ struct Gloss {
   float around = 0.0f;     // ks of the surroundings
 };
 
-// Strength of mirrored surroundings at most: a dielectric's, of refraction 1.6, where lit white has
-// half of the light's unit.
+// Strength of mirrored surroundings where lit white has half of the light's unit: of what mirrors
+// all that reaches it, and what is found at most: a dielectric's, of refraction 1.6.
+inline constexpr float kAllAround = 0.5f;
 inline constexpr float kMostAround = 0.025f;
 
 inline constexpr float kGrazing = 14.0f;  // of grazing(), and the roughness up to which it holds
@@ -39,10 +40,14 @@ inline constexpr float kSmooth = 0.08f;
 
 // How much more a surface mirrors at a grazing view than straight on: the rougher the less, as facets
 // hide each other. Where its surroundings seem stronger than any dielectric mirrors them, the fit
-// takes something else for gloss, and its roughness tells nothing of that.
+// takes something else for gloss, and its roughness tells nothing of that. Nothing mirrors more than
+// all that reaches it.
 inline float grazingGrowth(const Gloss& gloss) {
-  if (gloss.around >= kMostAround) return kGrazing;
-  return kGrazing * std::exp(-5.3f * std::max(0.0f, gloss.roughness - kSmooth));
+  float growth = kGrazing;
+  if (gloss.around < kMostAround)
+    growth *= std::exp(-5.3f * std::max(0.0f, gloss.roughness - kSmooth));
+  if ((1.0f + growth) * gloss.around <= kAllAround) return growth;
+  return std::max(0.0f, kAllAround / gloss.around - 1.0f);
 }
 
 // 1, then the eight of bands 1 and 2, scaled so that band 0 is 1 (Ramamoorthi and Hanrahan 2001).

@@ -31,7 +31,7 @@ constexpr float kSmoothest = 0.02f;
 Gloss glossOf(const Gloss& own, const Look& look) {
   return {look.specular.value_or(own.specular),
           std::max(kSmoothest, look.roughness.value_or(own.roughness)),
-          look.specular.value_or(own.around)};
+          look.specular ? std::min(*look.specular, kAllAround) : own.around};
 }
 
 // @return per surface; nullptr: as in the video, at rest
