@@ -166,5 +166,81 @@ TEST(RigidWorld, BodiesRestOnAPlaneThatEnds) {
   }
 }
 
+// A floor of triangles, `cells` squares on a side, whose middle is the origin.
+TriangleMesh triangulatedFloor(double size, int cells) {
+  TriangleMesh floor;
+  const int n = cells + 1;
+  floor.vertices.resize(n * n, 3);
+  for (int i = 0; i < n * n; ++i)
+    floor.vertices.row(i) << size * (double(i % n) / cells - 0.5),
+        size * (double(i / n) / cells - 0.5), 0.0;
+  floor.triangles.resize(2 * cells * cells, 3);
+  for (int y = 0, f = 0; y < cells; ++y)
+    for (int x = 0; x < cells; ++x, f += 2) {
+      const int a = y * n + x;
+      floor.triangles.row(f) << a, a + 1, a + n + 1;
+      floor.triangles.row(f + 1) << a, a + n + 1, a + n;
+    }
+  return floor;
+}
+
+// What slides over the edges between a floor's triangles goes straight on, at any scale and however
+// its own axes lie: it neither rises nor turns.
+TEST(RigidWorld, InnerEdgesOfAFloorStopNothing) {
+  for (const double scale : {0.05, 10.0}) {
+    for (const double turned : {0.0, 0.7}) {
+      const double friction = 0.2, v = std::sqrt(scale * kG);
+      RigidWorld world;
+      RigidBodySpec floor, block;
+      floor.name = "floor";
+      floor.motion = RigidMotion::kStatic;
+      floor.shapes = {triangulatedFloor(8.0 * scale, 40)};
+      block.name = "block";
+      block.shapes = {test::boxSurface(scale * Eigen::Vector3d(0.3, 0.9, 0.2), 1)};
+      block.mass = massProperties(block.shapes.front(), 1000.0);
+      floor.surface.friction = block.surface.friction = friction;
+      block.world_from_object.linear() =
+          Eigen::AngleAxisd(turned, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      block.world_from_object.translation() = scale * Eigen::Vector3d(-3.0, 0.03, 0.1);
+      block.linear = {v, 0, 0};
+      world.add(floor);
+      const RigidWorld::Id id = world.add(block);
+      world.setAcceleration(id, {0, 0, -kG});
+      const Eigen::Vector3d start = world.center(id);
+      double highest = start.z();
+      for (int k = 0; k < std::lround(v / (friction * kG) / kStep) + 30; ++k) {
+        world.step(kStep);
+        highest = std::max(highest, world.center(id).z());
+      }
+      const Eigen::Vector3d way = world.center(id) - start;
+      EXPECT_NEAR(way.x(), v * v / (2.0 * friction * kG), 0.02 * scale) << scale << " " << turned;
+      EXPECT_NEAR(way.y(), 0.0, 0.02 * scale) << scale << " " << turned;
+      EXPECT_LT(highest - start.z(), 2e-3 * scale) << scale << " " << turned;
+    }
+  }
+}
+
+// Edges at which a surface does bend stop what comes against them as a wall does.
+TEST(RigidWorld, BlockOfTrianglesStopsWhatSlidesAgainstIt) {
+  RigidWorld world;
+  world.addPlane({"plane", Eigen::Vector3d::UnitZ(), 0.0, std::nullopt}, {});
+  RigidBodySpec step, block;
+  step.name = "step";
+  step.motion = RigidMotion::kStatic;
+  step.shapes = {test::boxSurface({0.4, 2.0, 0.1}, 4)};
+  step.world_from_object.translation() = Eigen::Vector3d(0.7, 0, 0.05);
+  block.name = "block";
+  block.shapes = {test::boxSurface({0.2, 0.2, 0.3}, 1)};
+  block.mass = massProperties(block.shapes.front(), 1000.0);
+  block.world_from_object.translation().z() = 0.15;
+  block.linear = {2, 0, 0};
+  world.add(step);
+  const RigidWorld::Id id = world.add(block);
+  world.setAcceleration(id, {0, 0, -kG});
+  for (int k = 0; k < 120; ++k) world.step(kStep);
+  EXPECT_LT(world.center(id).x(), 0.41);  // its front at the step's
+  EXPECT_NEAR(world.center(id).z(), 0.15, 1e-3);
+}
+
 }  // namespace
 }  // namespace calipso::fem

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "bullet_world.hpp"
+#include "mesh_shape.hpp"
 
 namespace calipso::fem {
 namespace {
@@ -53,8 +54,8 @@ void buildShape(BulletBody& body, const RigidBodySpec& spec) {
   const double margin = kMargin * span(spec.shapes);
   if (spec.motion == RigidMotion::kStatic) {
     body.triangles = triangleShape(spec.shapes.front());
-    body.shapes.push_back(std::make_unique<btBvhTriangleMeshShape>(body.triangles.get(), true));
-    body.shapes.back()->setMargin(margin);
+    body.shapes.push_back(
+        std::make_unique<MeshShape>(*body.triangles, spec.shapes.front(), margin));
     return;
   }
   const Eigen::Isometry3d body_from_object = body.object_from_body.inverse();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "mesh_shape.hpp"
 #include "rigid_world_impl.hpp"
 
 namespace calipso::fem {
@@ -56,6 +57,7 @@ RigidWorld::Id RigidWorld::add(const RigidBodySpec& spec) {
   info.m_startWorldTransform = toBullet(spec.world_from_object * body.object_from_body);
   body.body = std::make_unique<btRigidBody>(info);
   applySurface(*body.body, spec.surface);
+  if (body.triangles) MeshShape::adjustContactsOf(*body.body);
   if (spec.motion == RigidMotion::kKinematic) {
     body.body->setCollisionFlags(body.body->getCollisionFlags() |
                                  btCollisionObject::CF_KINEMATIC_OBJECT);
