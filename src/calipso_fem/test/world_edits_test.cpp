@@ -194,5 +194,32 @@ TEST(WorldEdits, NegativeFrictionIsRefused) {
   }
 }
 
+// A balloon of 1.2 kg/m^3, whose default density is water's, does not shoot up: that is what it has
+// in the video. The next density is an edit of its weight, as is one above water's, or where the
+// video's is given.
+TEST(WorldEdits, FirstDensityOfWhatFloatsLeavesItAfloat) {
+  struct Case {
+    std::optional<double> given;
+    std::vector<double> densities;  // kg/m^3
+    double fall;                    // g
+  };
+  for (const Case& c : {Case{{}, {1.2}, 0.0}, Case{{}, {1.2, 2.4}, 0.5}, Case{{}, {4000.0}, 0.75},
+                        Case{2.0, {4.0}, 0.5}}) {
+    WorldParams params = coarse();
+    params.defaults.density = c.given;
+    World world(sceneWith(sphereSurface(0.5, 8, 12), {0, 0, 20}, false), params);
+    for (const double density : c.densities) {
+      Edit edit = editOf(EditKind::kMaterial, EditMode::kAbsolute);
+      edit.density = density;
+      world.submit(edit);
+    }
+    world.advanceTo(0.0);
+    const double start = centerOf(world.state()).z(), t = 0.5;
+    play(world, t);
+    EXPECT_NEAR(centerOf(world.state()).z() - start, -0.5 * c.fall * 9.81 * t * t, 2e-3)
+        << c.densities.back();
+  }
+}
+
 }  // namespace
 }  // namespace calipso::fem

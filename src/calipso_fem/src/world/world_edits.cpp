@@ -223,6 +223,7 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   if (immovable) return makeImmovable(actor, edit, material);
   if (edit.mode == EditMode::kAbsolute && !std::isnan(edit.density)) actor.immovable = false;
   touch(actor, edit);  // may find a default stiffness that carries it
+  const bool told = tellsDensity(actor, edit);
   material.youngs_modulus = changed(actor.material.youngs_modulus, edit.youngs_modulus, edit.mode);
   setMaterial(actor, edit, material);
   if (actor.soft) actor.soft->setMaterial(material);
@@ -234,7 +235,18 @@ std::string World::Impl::changeMaterial(Actor& actor, const Edit& edit) {
   text << actor.object.name << ": E = " << material.youngs_modulus
        << " Pa, nu = " << material.poissons_ratio << ", density = " << material.density
        << " kg/m^3, damping = " << material.damping << " s";
+  if (told) text << "; it floats with this density, as in the video";
   return text.str();
+}
+
+// The default density is water's, and what floats is no denser: the first one in kg/m^3 up to that
+// is what it has in the video. One that is given changes its weight, as a factor does.
+bool World::Impl::tellsDensity(Actor& actor, const Edit& edit) {
+  const bool first = edit.mode == EditMode::kAbsolute && !std::isnan(edit.density) &&
+                     !actor.settings.density && actor.holder == Holder::kBuoyancy;
+  if (!first || edit.density > actor.observed_material.density) return false;
+  actor.settings.density = actor.observed_material.density = edit.density;
+  return true;
 }
 
 void World::Impl::setMaterial(Actor& actor, const Edit& edit, const Material& material) {

@@ -189,6 +189,7 @@ struct World::Impl {
   std::string changeLook(Actor& actor, const Edit& edit);
   std::string changeKind(Actor& actor, const Edit& edit);
   std::string changeMaterial(Actor& actor, const Edit& edit);
+  bool tellsDensity(Actor& actor, const Edit& edit);
   void setMaterial(Actor& actor, const Edit& edit, const Material& material);
   std::string makeImmovable(Actor& actor, const Edit& edit, const Material& material);
   std::string changeGravity(const Edit& edit);
