@@ -148,6 +148,22 @@ TEST(Renderer, TakesOutWhatAMaskMissesOfAnObjectThatIsFollowed) {
   EXPECT_EQ(cv::norm(out.bgr(hand), last.bgr(hand), cv::NORM_INF), 0.0);
 }
 
+// Where no pose is known of it in a frame, its mask tells where it is.
+TEST(Renderer, TakesOutWhatAMaskMissesOfAnObjectThatIsNotFollowed) {
+  const Passing p;
+  ClipFrame last = p.frames.back();
+  const cv::Rect ball = cv::boundingRect(last.labels), far(ball.x - 20, ball.y, 6, 12);
+  const cv::Mat left = cv::Mat::zeros(last.labels.size(), CV_8U);
+  left(cv::Rect(ball.x, ball.y, ball.width / 4, ball.height)).setTo(255);
+  const cv::Mat missed = left & last.labels;
+  last.labels.setTo(0, left);
+  last.bgr(far).setTo(cv::Scalar(120, 150, 220));
+  const FrameOutput out = p.removed(std::nullopt, last);
+  EXPECT_GT(cv::countNonZero(missed), 100);
+  EXPECT_GT(psnr(out.bgr, emptyTable(), missed), 35.0);
+  EXPECT_EQ(cv::norm(out.bgr(far), last.bgr(far), cv::NORM_INF), 0.0);
+}
+
 // A string that neither mask nor model have.
 TEST(Renderer, TakesOutWhatHangsOnAnObjectThatIsFollowed) {
   const Passing p;

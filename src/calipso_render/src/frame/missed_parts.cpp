@@ -12,6 +12,7 @@ namespace calipso::render {
 namespace {
 
 constexpr int kOff = 4;          // px by which a model may be beside its place
+constexpr int kAbout = 12;       // px around its mask in which it may be, where no pose is known
 constexpr double kUnlike = 2.0;  // times what a place that rests may vary by, in one channel
 constexpr int kLeastAcross = 3;  // px
 // px up to which something is thin, gaps that it may have, and the part of an object's size by which
@@ -35,7 +36,19 @@ bool isGone(const StagedFrame& frame, std::size_t surface, const Actor& here) {
   return true;
 }
 
-// Where edited objects that move are seen in this frame, by their models.
+// Adds what lies about a mask.
+void addAbout(const cv::Mat& mask, cv::Mat& to) {
+  const cv::Rect seen = cv::boundingRect(mask);
+  if (seen.empty()) return;
+  const cv::Rect box = (seen + cv::Size(2 * kAbout, 2 * kAbout) - cv::Point(kAbout, kAbout)) &
+                       cv::Rect({0, 0}, mask.size());
+  cv::Mat about;
+  cv::dilate(mask(box), about, disc(kAbout));
+  to(box) |= about;
+}
+
+// Where edited objects that move are seen in this frame: by their models, or about their masks where
+// no pose is known.
 struct Outlines {
   cv::Mat all, gone;  // CV_8UC1, whole picture; of those that are gone from there
 };
@@ -46,7 +59,10 @@ Outlines outlines(const StagedFrame& frame) {
     const Surface& surface = frame.prepared.surfaces[i];
     if (!frame.edited[i] || !frame.prepared.moves[i] || !surface.in_video) continue;
     const auto& vertices = frame.observed[i];
-    if (!vertices) continue;
+    if (!vertices) {
+      addAbout(frame.labels == surface.index, within);
+      continue;
+    }
     const Actor actor = makeActor(surface, *vertices, frame.input.camera);
     const cv::Rect box = boundsOf(actor.screen, kOff + 1, within.size());
     if (box.empty()) continue;
