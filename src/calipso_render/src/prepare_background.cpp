@@ -23,23 +23,9 @@ namespace {
 
 // visible part of the sun from which a place says how the planes mirror
 constexpr float kUnshadedSun = 0.985f;
-// part by which scenery is nearer or farther than the plane behind or before it
-constexpr float kOffPlane = 0.1f;
 // frames that must show a place past an object, from which on their median is believed
 constexpr int kFewestPast = 3;
 constexpr float kQuiet = 5.0f;  // code values of spread over time: the place rests
-
-// Where the depth image shows something else than a support plane.
-cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes,
-                  const Camera& camera) {
-  cv::Mat off = cv::Mat::zeros(camera.height, camera.width, CV_8U);
-  const cv::Mat ground = scenery.empty() ? cv::Mat() : groundNearness(planes, camera, cv::Mat());
-  if (ground.empty()) return off;
-  cv::Mat farthest;  // of a pixel and those around: towards the horizon one row makes much
-  cv::erode(ground, farthest, cv::Mat::ones(3, 3, CV_8U));
-  return (scenery > 0.0f) &
-         ((scenery > (1.0f + kOffPlane) * ground) | ((1.0f + kOffPlane) * scenery < farthest));
-}
 
 // What of the place takes shade. @param blind CV_8UC1, != 0: nothing there does
 ReceiverOf receiversOf(const std::vector<SupportPlane>& planes, const Relief& relief,
@@ -169,6 +155,8 @@ SeenPlace findPlace(const PlaceSurfaces& surfaces, const RenderParams& params, P
   if (!p.relief.empty())
     place.blind = place.off_planes & ~p.relief.seen, place.off_planes |= p.relief.seen;
   p.shadowless = place.blind.clone();
+  if (!params.depth.empty())
+    p.shadowless |= rimsOff(place.off_planes, p, params) | bladesBefore(p, params);
   p.sunless = turnedAway(p.relief, p.light.light.direction);
   if (!p.sunless.empty()) place.blind |= p.sunless;
   if (!surfaces.empty()) {

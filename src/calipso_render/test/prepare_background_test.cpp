@@ -76,6 +76,13 @@ struct BallOverGround {
     }
   }
 
+  // Something without a model, nearer than all else.
+  void stand(const cv::Rect& where) {
+    frame.bgr(where).setTo(cv::Scalar(20, 160, 60));
+    frame.labels(where).setTo(0);
+    params.depth(where).setTo(0.3f);
+  }
+
   // @param confirmed by something besides shading
   Prepared prepared(bool confirmed, const Visibility& sky) const {
     ClipSample clip;
@@ -134,6 +141,32 @@ TEST(PrepareBackground, WhereTheSunIsHiddenASkyThatIsNotChangesNothing) {
 TEST(PrepareBackground, SpecksWithoutSkyKeepNoShadowOff) {
   const BallOverGround place(0.0f);
   EXPECT_EQ(cv::countNonZero(place.prepared(true, SpotsWithoutSky(0.02f)).shadowless), 0);
+}
+
+const ShadowMap kOpenSky({}, Eigen::Vector3d::UnitZ(), {});
+
+// They would become a dark line around it; what is within them takes shade as its own surface does.
+TEST(PrepareBackground, OutermostPixelsOfWhatStandsOnAPlaneTakeNoShadowOfThePlane) {
+  BallOverGround place(0.0f);
+  const cv::Rect post(10, 20, 12, 60),
+      within(post.tl() + cv::Point(1, 1), post.size() - cv::Size(2, 2));
+  place.stand(post);
+  cv::Mat shadowless = place.prepared(true, kOpenSky).shadowless;
+  shadowless(within).setTo(0);
+  const int rim = post.area() - within.area();
+  EXPECT_EQ(cv::countNonZero(shadowless(post)), rim);
+  EXPECT_EQ(cv::countNonZero(shadowless), rim);
+}
+
+// Blades of grass before an object's foot: the ground between them is not seen there.
+TEST(PrepareBackground, BetweenBladesBeforeAFootNoShadowLies) {
+  BallOverGround place(0.0f);
+  const cv::Rect ball = cv::boundingRect(place.frame.labels);
+  const cv::Rect before(ball.x + 10, ball.br().y, ball.width - 20, 12);
+  for (int u = before.x; u < before.br().x; u += 5) place.stand({u, before.y - 4, 2, 16});
+  const cv::Mat shadowless = place.prepared(true, kOpenSky).shadowless;
+  EXPECT_EQ(cv::countNonZero(shadowless(before)), before.area());
+  EXPECT_LT(cv::countNonZero(shadowless), kWidth * kHeight / 4);
 }
 
 }  // namespace

@@ -13,7 +13,12 @@ constexpr int kFrontOpening = 7;
 constexpr int kNarrowFront = 3;     // ... so much of them
 constexpr float kDeepFront = 6.0f;  // ... that far inside the model's outline: a peg on a towel
 constexpr int kRim = 2;             // px beyond a model's outline in which its rim may be drawn
-constexpr int kWaterline = 2;       // px by which masks end before it, and over which it mixes
+constexpr int kBroad = 7;           // px: what is narrower is a blade
+constexpr int kAmong = 10;          // px around a place in which blades are counted
+constexpr float kDense = 0.04f;     // part of these pixels from which it is among blades
+// part by which scenery is nearer or farther than the plane behind or before it
+constexpr float kOffPlane = 0.1f;
+constexpr int kWaterline = 2;  // px by which masks end before it, and over which it mixes
 
 // Where an object's surface should be seen at the key frame but no mask is, something stands before
 // it. The rim is left out: there the fit is not exact.
@@ -38,20 +43,22 @@ cv::Mat onGround(const cv::Mat& nearness, const cv::Mat& ground) {
   return (ground > 0.0f) & (cv::abs(nearness - ground) <= (kBehind - 1.0f) * nearness);
 }
 
-// What the depth image shows just beside an object, off the planes and nearer: it stands before it.
-// Blades of grass are narrower: beside them pixels are mixed with the object, and go with it.
+// What the depth image shows just beside an object, off the planes and nearer.
 // @param ground nearness of the support planes
 cv::Mat nearerBeside(const cv::Mat& mask, const cv::Mat& labels, const cv::Mat& nearness,
-                     const cv::Mat& ground, int margin) {
+                     const cv::Mat& ground, const BackgroundParams& params) {
   cv::Mat own = cv::Mat::zeros(nearness.size(), CV_32F);
   nearness.copyTo(own, mask);
-  cv::dilate(own, own,
-             cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1}));
+  own = grown(own, params.mask_margin_px + params.shadow_margin_px + 1);
   cv::Mat nearer = (labels == 0) & (own > 0.0f) & (nearness > kBehind * own);
   if (!ground.empty()) nearer &= ~onGround(nearness, ground);
-  cv::morphologyEx(nearer, nearer, cv::MORPH_OPEN,
-                   cv::Mat::ones(kNarrowFront, kNarrowFront, CV_8U));
   return nearer;
+}
+
+cv::Mat opened(const cv::Mat& mask, int width) {
+  cv::Mat out;
+  cv::morphologyEx(mask, out, cv::MORPH_OPEN, cv::Mat::ones(width, width, CV_8U));
+  return out;
 }
 
 }  // namespace
@@ -89,9 +96,9 @@ std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params) {
     if (!front.empty() && !ground.empty())
       front.setTo(0, grown(mask, kWaterline) & grown(onGround(nearness, ground), 1));
     if (!nearness.empty() && !p.moves[i]) {
-      const cv::Mat beside =
-          nearerBeside(mask, p.key_labels, nearness, ground,
-                       params.background.mask_margin_px + params.background.shadow_margin_px + 1);
+      // Blades of grass are narrower: beside them pixels are mixed with the object, and go with it.
+      const cv::Mat beside = opened(
+          nearerBeside(mask, p.key_labels, nearness, ground, params.background), kNarrowFront);
       if (cv::countNonZero(beside) > 0) front = front.empty() ? beside : cv::Mat(front | beside);
     }
     // The outline of what is hidden is hidden, too, with the pixels that it only touches.
@@ -100,6 +107,41 @@ std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params) {
     fronts.push_back(front);
   }
   return fronts;
+}
+
+cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes,
+                  const Camera& camera) {
+  cv::Mat off = cv::Mat::zeros(camera.height, camera.width, CV_8U);
+  const cv::Mat ground = scenery.empty() ? cv::Mat() : groundNearness(planes, camera, cv::Mat());
+  if (ground.empty()) return off;
+  cv::Mat farthest;  // of a pixel and those around: towards the horizon one row makes much
+  cv::erode(ground, farthest, cv::Mat::ones(3, 3, CV_8U));
+  return (scenery > 0.0f) &
+         ((scenery > (1.0f + kOffPlane) * ground) | ((1.0f + kOffPlane) * scenery < farthest));
+}
+
+cv::Mat rimsOff(const cv::Mat& off_planes, const Prepared& p, const RenderParams& params) {
+  cv::Mat nearness = nearnessOf(params.depth);
+  nearness.setTo(0, p.key_labels != 0);
+  cv::Mat around;
+  cv::dilate(off_planes, around, cv::Mat::ones(3, 3, CV_8U));
+  return offPlanes(nearness, params.planes, p.camera) & around & ~off_planes;
+}
+
+cv::Mat bladesBefore(const Prepared& p, const RenderParams& params) {
+  const cv::Mat ground = groundNearness(params.planes, p.camera, cv::Mat());
+  cv::Mat blades = cv::Mat::zeros(p.key_labels.size(), CV_8U), outlines = blades.clone(), part;
+  if (ground.empty()) return blades;
+  const cv::Mat nearness = nearnessOf(params.depth);
+  for (std::size_t i = 0; i < p.surfaces.size(); ++i) {
+    outlines |= p.outlines[i];
+    if (p.moves[i]) continue;
+    const cv::Mat nearer = nearerBeside(p.key_labels == p.surfaces[i].index, p.key_labels, nearness,
+                                        ground, params.background);
+    blades |= nearer & ~grown(opened(nearer, kBroad), 1);
+  }
+  cv::boxFilter(blades, part, CV_32F, {2 * kAmong + 1, 2 * kAmong + 1});
+  return (part > 255.0f * kDense) & ~outlines;
 }
 
 std::vector<cv::Mat> footprintsOf(const Prepared& p, const cv::Mat& picture, int margin) {

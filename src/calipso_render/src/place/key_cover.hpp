@@ -19,6 +19,22 @@ cv::Mat grown(const cv::Mat& mask, int radius);
 // Per surface, CV_8UC1: where something that has no model stands before it; empty if nothing does.
 std::vector<cv::Mat> frontsOf(const Prepared& p, const RenderParams& params);
 
+// Where the depth image shows something else than a support plane.
+// @param scenery CV_32FC1, 1/m, 0 unknown; may be empty
+cv::Mat offPlanes(const cv::Mat& scenery, const std::vector<SupportPlane>& planes,
+                  const Camera& camera);
+
+// CV_8UC1: the outermost pixels of what stands on the planes, which sceneryOf() leaves to what is
+// behind it. No shade falls on them as on the plane.
+// @param off_planes offPlanes() of the scenery
+// @pre there is a depth image
+cv::Mat rimsOff(const cv::Mat& off_planes, const Prepared& p, const RenderParams& params);
+
+// CV_8UC1: among narrow things, such as blades of grass, that stand before the foot of an object at
+// rest, beside its model. What would be seen of the ground between them lies under the object.
+// @pre there is a depth image
+cv::Mat bladesBefore(const Prepared& p, const RenderParams& params);
+
 // All that a resting object covers at the key frame: its mask, which can miss thin or dark ends,
 // its model, and what remains along the rim of both. Empty for those that move.
 // @param picture CV_32FC3, code values: the key frame; margin px around footprints that go with them
