@@ -77,6 +77,21 @@ TEST(WorldEdits, TransformMovesWithoutPhysics) {
   EXPECT_NEAR((centerOf(state) - Eigen::Vector3d(0, 0, 0.55)).norm(), 0.0, 1e-12);
 }
 
+// What is placed pushes nothing away: the edit's report says what it is in.
+TEST(WorldEdits, TransformIntoAnotherObjectIsSaid) {
+  for (const bool into : {false, true}) {
+    WorldScene scene = sceneWith(boxSurface({0.1, 0.1, 0.1}, 4), {0, 0, 0.05}, true);
+    scene.objects.push_back(scene.objects.front());
+    scene.objects.back().name = "other";
+    scene.objects.back().world_from_object.translation() = Eigen::Vector3d(0.5, 0.01, 0.06);
+    World world(scene, {});
+    Edit edit = editOf(EditKind::kTransform);
+    edit.translation = {into ? 0.405 : 0.39, 0, 0};
+    const std::string said = outcomeOf(world, edit).message;
+    EXPECT_EQ(said.find("mm inside other") != std::string::npos, into) << said;
+  }
+}
+
 TEST(WorldEdits, ScaleKeepsTheCentroid) {
   World world = boxWorld();
   Edit edit = editOf(EditKind::kTransform);

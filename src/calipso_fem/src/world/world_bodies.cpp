@@ -187,10 +187,11 @@ void World::Impl::enter(Actor& actor, Body body, bool settle) {
   plan_changed = true;
 }
 
-// Says which others the object is in where it starts: contacts push these apart slowly.
-void World::Impl::noteOverlaps(Actor& actor, const TriangleMesh& surface) {
+// Which others a surface of the object is in, and how deep: "2 mm inside table".
+std::vector<std::string> World::Impl::overlapsOf(const Actor& actor, const TriangleMesh& surface) {
   constexpr double kNoted = 2e-3;  // of its size: alignment leaves as much
   const double size = boundingDiagonal(surface);
+  std::vector<std::string> found;
   for (const Obstacle& obstacle : obstacles(now, now, &actor)) {
     if (!meet(actor.id, obstacle.id)) continue;
     if (!obstacle.plane &&
@@ -202,9 +203,15 @@ void World::Impl::noteOverlaps(Actor& actor, const TriangleMesh& surface) {
       if (const auto hit = queryObstacle(obstacle, surface.vertex(v), 0.0, size))
         deepest = std::max(deepest, -hit->gap);
     if (deepest > kNoted * size)
-      actor.note += "starts " + describeLength(deepest) + " inside " + obstacle.name +
-                    ", is pushed out slowly; ";
+      found.push_back(describeLength(deepest) + " inside " + obstacle.name);
   }
+  return found;
+}
+
+// Contacts push these apart slowly.
+void World::Impl::noteOverlaps(Actor& actor, const TriangleMesh& surface) {
+  for (const std::string& overlap : overlapsOf(actor, surface))
+    actor.note += "starts " + overlap + ", is pushed out slowly; ";
 }
 
 void World::Impl::makeRigid(Actor& actor, const RigidBodySpec& spec) {

@@ -166,11 +166,14 @@ std::string World::Impl::transform(Actor& actor, const Edit& edit) {
   const bool deformed = actor.soft != nullptr;
   if (edit.scale != 1.0) scale(actor, edit.scale);
   moveBy(actor, motionAbout(centroidOf(actor), edit));
-  const std::string message =
-      actor.object.name + " is moved by " + describe(edit.translation) + " m";
-  if (edit.scale == 1.0) return message;
-  return message + " and scaled by " + std::to_string(edit.scale) +
-         (deformed && !actor.drive ? "; it starts anew from its undeformed shape" : "");
+  std::string message = actor.object.name + " is moved by " + describe(edit.translation) + " m";
+  if (edit.scale != 1.0) message += " and scaled by " + std::to_string(edit.scale);
+  if (edit.scale != 1.0 && deformed && !actor.drive)
+    message += "; it starts anew from its undeformed shape";
+  for (const std::string& overlap :
+       overlapsOf(actor, {verticesOf(actor), actor.object.mesh.triangles}))
+    message += "; it is " + overlap;
+  return message;
 }
 
 void World::Impl::moveBy(Actor& actor, const Eigen::Isometry3d& motion) {

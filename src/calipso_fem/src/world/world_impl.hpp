@@ -69,6 +69,7 @@ struct World::Impl {
   Body bodyOf(const Actor& actor, const TriangleMesh& mesh, ObjectKind kind,
               const BodyMotion& motion);
   void enter(Actor& actor, Body body, bool settle);  // in place of the body it has
+  std::vector<std::string> overlapsOf(const Actor& actor, const TriangleMesh& surface);
   void noteOverlaps(Actor& actor, const TriangleMesh& surface);
   void makeRigid(Actor& actor, const RigidBodySpec& spec);
   void makeSoft(Actor& actor, Body body, bool settle);
